@@ -1,4 +1,5 @@
-"""The Debian package in a fresh Debian 12 without systemd: install, run a job, upgrade, remove, purge (`make test-deb`).
+"""The Debian package in a fresh Debian 12, first without systemd: install, run a job, upgrade, remove, purge; then under
+a systemd of its own, which runs the unit with all that hardens it: a secret handed over, and a job (`make test-deb`).
 
 Needs root, a network and mmdebstrap; says why and ends with 0 where one of them is missing. The chroot stays in
 build/deb/chroot, so that a second run needs no network but for packages; --fresh makes it anew."""
@@ -96,12 +97,15 @@ def results(url, job):
     return hashlib.sha256(get(url, f"/v1/jobs/{job}/results/result.json")).hexdigest()
 
 
-def run_a_job(chroot, url):
-    sample = chroot.path / "tmp" / "sample"
+def write_sample(sample):
     sample.mkdir(exist_ok=True)
     (sample / "job.json").write_text(json.dumps(DOCUMENT))
     (sample / "cloth.hair").write_bytes(small_cloth.hair())
     (sample / "rows.csv").write_text(small_cloth.TABLE)
+
+
+def run_a_job(chroot, url):
+    write_sample(chroot.path / "tmp" / "sample")
     job = chroot.run("selvedge", "submit", "--server", url, "/tmp/sample/job.json", timeout=60).stdout.split()[-1]
     end = time.monotonic() + 300
     while time.monotonic() < end:
@@ -172,6 +176,95 @@ def lifecycle(chroot, package):
     assert chroot.run("id", "-u", "selvedge").stdout.strip() != "0", "the owner of the data stays"
 
 
+# systemd as first process of a container: it needs mounts that are shared, a hierarchy of control groups and these devices
+BOOT = """
+set -e
+mount --make-rprivate /
+mount --bind {0} {0} && cd {0}
+mount -t proc proc proc
+mount -t sysfs -o ro sysfs sys
+mount -t tmpfs -o mode=755 cgroup sys/fs/cgroup
+mkdir sys/fs/cgroup/unified sys/fs/cgroup/systemd
+mount -t cgroup2 cgroup2 sys/fs/cgroup/unified
+mount -t cgroup -o none,name=systemd,xattr cgroup sys/fs/cgroup/systemd || true
+mount -t tmpfs -o mode=755 run run
+mount -t tmpfs tmp tmp
+mount -t tmpfs -o mode=755,nosuid dev dev
+for d in null zero full random urandom tty; do touch dev/$d; mount --bind /dev/$d dev/$d; done
+mkdir dev/mqueue dev/hugepages dev/pts dev/shm
+ln -s pts/ptmx dev/ptmx
+mount -t tmpfs shm dev/shm
+mkdir -p old && pivot_root . old && umount -l old
+mount --make-rshared /
+exec env -i container=selvedge PATH=/usr/sbin:/usr/bin:/sbin:/bin /lib/systemd/systemd
+"""
+
+
+# only the chroot has this file; before systemd has entered it, its process still sees the machine's own files
+MARK = "etc/selvedge-test-chroot"
+
+
+class Booted:
+    """The chroot with systemd as its first process."""
+
+    def __init__(self, path):
+        script = BOOT.format(shlex.quote(str(path)))
+        (path / MARK).touch()
+        self.process = subprocess.Popen(["unshare", "--mount", "--pid", "--fork", "--kill-child", "--cgroup", "--uts", "--ipc", "bash", "-c", script],
+                                        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+
+    def __enter__(self):
+        end = time.monotonic() + 60
+        while time.monotonic() < end and self.process.poll() is None:
+            if self.run("systemctl is-system-running --wait", check=False).stdout.strip() in ("running", "degraded"):
+                return self
+            time.sleep(0.5)
+        self.process.kill()
+        return None
+
+    def __exit__(self, *unused):
+        self.process.kill()
+        self.process.wait()
+
+    def run(self, script, check=True):
+        children = pathlib.Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
+        first = children.read_text().split() if children.exists() else []
+        enter = ["nsenter", "--target", first[0] if first else "0", "--mount", "--pid", "--uts", "--ipc", "--cgroup", "sh", "-c",
+                 f"[ -e /{MARK} ] || exit 97\n{script}"]
+        p = subprocess.run(enter, env={"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "DEBIAN_FRONTEND": "noninteractive"},
+                           capture_output=True, text=True, timeout=300)
+        assert p.returncode == 0 or not check, f"{script}:\n{p.stdout[-2000:]}{p.stderr[-2000:]}"
+        return p
+
+
+def under_systemd(chroot, package):
+    say("boots systemd")
+    shutil.copy(package, chroot.path / "root" / "selvedge.deb")
+    deny = chroot.path / "usr/sbin/policy-rc.d"
+    deny.rename(deny.with_suffix(".off"))
+    try:
+        with Booted(chroot.path) as booted:
+            if booted is None:
+                print("skipped: systemd cannot run here as the first process of a container")
+                return
+            say("installs, which starts the unit")
+            booted.run("apt-get install --yes --no-install-recommends /root/selvedge.deb")
+            booted.run("systemctl is-active selvedge")
+            say("hands a secret over, and runs a job in the worker's sandbox")
+            booted.run(f"sed -i 's/^port = 7878/port = {PORT}/' /{CONF}; echo 'a secret of the laboratory' > /etc/selvedge/secrets/webhook")
+            booted.run(f"printf '[webhook]\\nurl = http://127.0.0.1:1/\\nsecret_file = /run/credentials/selvedge.service/secret_webhook\\n' >> /{CONF}")
+            booted.run("systemctl restart selvedge; sleep 2; systemctl is-active selvedge")
+            write_sample(chroot.path / "root" / "sample")
+            booted.run(f"selvedge submit --watch --server http://127.0.0.1:{PORT} /root/sample/job.json")
+            assert "the worker runs in a sandbox" in booted.run(f"cat /{DATA}/jobs/*/log.txt").stdout
+            say("purges, which stops it")
+            booted.run("apt-get purge --yes selvedge")
+            assert booted.run("systemctl is-active selvedge", check=False).returncode != 0
+    finally:
+        deny.with_suffix(".off").rename(deny)
+        shutil.rmtree(chroot.path / DATA, ignore_errors=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--fresh", action="store_true", help="make the chroot anew")
@@ -193,6 +286,8 @@ def main():
     finally:
         for _, at in mounted:
             subprocess.run(["umount", chroot.path / at], check=False)
+    shutil.rmtree(chroot.path / DATA, ignore_errors=True)
+    under_systemd(chroot, newest_package(folder))
     say("passed")
 
 
