@@ -29,5 +29,7 @@ void input_check_path(const struct input_check *c, const char *name, char path[I
 void input_check_cloth(struct input_check *c);
 /* Every photograph, or every line of the table; then all rows together. */
 void input_check_rows(struct input_check *c);
+/* The meshes that pictures of the fitted cloth lie on. */
+void input_check_pictures(struct input_check *c);
 
 #endif

@@ -53,6 +53,7 @@ status job_check(const char *path, const char *folder, json_t **report, struct e
         job_document_visit_files(c.doc, look_for, &c);
         input_check_cloth(&c);
         input_check_rows(&c);
+        input_check_pictures(&c);
     }
     *report = report_of(&c);
 out:

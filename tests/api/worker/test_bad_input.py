@@ -108,6 +108,15 @@ def radians(document, files):
                 p[key] = round(math.radians(p[key]), 4)
 
 
+SHEET = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n"
+VIEW = {"light_theta_deg": 20, "light_phi_deg": 0, "camera_theta_deg": 0, "camera_phi_deg": 0}
+
+
+def on_mesh(obj):
+    """Two pictures of the fitted cloth, of which the second lies on a mesh."""
+    return both(put("pictures", [{"on": "flat", **VIEW}, {"on": "mesh", "mesh_file": "sheet.obj", **VIEW}]), file("sheet.obj", obj))
+
+
 TAB, PHO, WEAVE = table_job, photo_job, weave_job
 # (case, document, change, "fault" or "warning", part of the message)
 CASES = [
@@ -181,6 +190,10 @@ CASES = [
     ("all rows above white", TAB, rows(lambda v: v[:5] + [x * 40 for x in v[5:]]), "warning", "all rows are above white"),
     ("values of a BRDF", TAB, many_rows(lambda cos: 0.2), "warning", "look like those of a BRDF"),
     ("one dark row", TAB, line(3, "fit,45,0,45,180,0,0.0001,0.0001,0.0001"), "warning", "is dark"),
+    ("a mesh without texture", TAB, on_mesh(SHEET + b"f 1 2 3\n"), "fault", "pictures[1].mesh_file: "),
+    ("a mesh that turns over", TAB, on_mesh(SHEET + b"f 1/1 2/3 3/2\n"), "fault", "pictures[1].mesh_file: "),
+    ("a mesh of text", TAB, on_mesh(b"v zero 0 0\n"), "fault", "'sheet.obj', line 1"),
+    ("a missing mesh", TAB, both(on_mesh(b""), file("sheet.obj", None)), "fault", "'sheet.obj' (mesh) does not exist"),
     ("rows that contradict each other", TAB, line(3, "fit,20,0,20,180,0,0.5,0.4,0.2"), "warning", "same angles"),
 ]
 
