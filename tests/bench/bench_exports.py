@@ -1,5 +1,6 @@
 """How near a scene that a job exports comes to the job's own renderings, when another program renders it: two described cloths with two models,
-every row rendered by Mitsuba 3 (mitsuba_row.py says what it makes of the other formats). Figures are relative RMS errors over the rows, in the same
+every row rendered by Mitsuba 3 (mitsuba_row.py says what it makes of the other formats), and by Blender, where it is installed, the scene for it.
+Figures are relative RMS errors over the rows, in the same
 measure as those of fits."""
 import argparse
 import csv
@@ -14,7 +15,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 ROWS = [(30, 0, 0, 0, 0), (30, 180, 30, 0, 0), (45, 180, 45, 0, 0), (60, 180, 45, 0, 0), (45, 90, 45, 0, 0), (60, 90, 30, 0, 0), (20, 0, 60, 0, 0),
         (60, 0, 60, 180, 90), (45, 0, 45, 180, 90)]
 FIT = {"path_budget": 100000, "render_px": 16, "render_samples": 4, "seed": 5}
-FORMATS = ["mitsuba", "pbrt", "usd", "textures"]
+FORMATS = ["mitsuba", "pbrt", "usd", "textures", "blender"]
 # Narrow bounds: the fit ends at these parameters, whatever the rows are.
 TWO_LOBE = {"C_R": [0.045, 0.055], "C_TT": [0.55, 0.65], "beta_R": [7.5, 8.5], "beta_TT": [19, 21], "gamma_TT": [29, 31]}
 TEXTILE = dict(TWO_LOBE, w=[0.28, 0.32], s=[0.48, 0.52], f=[0.93, 0.95], h=[0.48, 0.52])
@@ -47,18 +48,30 @@ def rendered_by_mitsuba(python, form, folder, row, px, spp):
     return json.loads(done.stdout) if done.returncode == 0 else None
 
 
+def rendered_by_blender(folder, row, px, spp):
+    """The same, by the exported script in Blender."""
+    picture = os.path.join(folder, f"row-{row}.exr")
+    reader = os.path.join(ROOT, "tests", "support", "python", "blender_scene.py")
+    command = ["blender", "-b", "--factory-startup", "--python-exit-code", "1", "--python", os.path.join(folder, "cloth.py"), "--python", reader,
+               "--", picture, str(spp), str(px), str(row)]
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=sys.stderr, text=True, check=False)
+    found = [line for line in done.stdout.split("\n") if line.startswith("found ")]
+    return json.loads(found[0][6:])["mean"] if done.returncode == 0 and found else None
+
+
 def compare(python, form, folder, px=16, spp=64):
-    """Relative RMS error over the rows, as in fits: squares over the square of a row's brightest channel. And rows that Mitsuba rendered."""
+    """Relative RMS error over the rows, as in fits: squares over the square of a row's brightest channel. And rows that were rendered."""
     with open(os.path.join(os.path.dirname(folder), "mitsuba", "rows.csv"), encoding="utf-8") as f:
         rows = list(csv.DictReader(f))
     square, n = 0.0, 0
     for i, row in enumerate(rows):
         ours = [float(row["rendered_" + c]) for c in "rgb"]
-        theirs = rendered_by_mitsuba(python, form, folder, i, px, spp)
+        blender = form == "blender"
+        theirs = rendered_by_blender(folder, i, px, spp) if blender else rendered_by_mitsuba(python, form, folder, i, px, spp)
         if theirs is None:
-            print(f"row {i}: Mitsuba failed", file=sys.stderr)
+            print(f"{form}, row {i}: the renderer failed", file=sys.stderr)
             continue
-        print(f"{form}, row {i}: rendered {ours}, by Mitsuba {theirs}", file=sys.stderr)
+        print(f"{form}, row {i}: rendered {ours}, by the other program {theirs}", file=sys.stderr)
         square += sum((a - b) ** 2 for a, b in zip(ours, theirs)) / max(ours) ** 2 / 3
         n += 1
     return (square / n) ** 0.5 if n > 0 else float("nan"), n, len(rows)
@@ -76,6 +89,9 @@ def main():
         for export in result["exports"]:
             form = export["format"]
             if form not in arguments.formats.split(","):
+                continue
+            if form == "blender" and shutil.which("blender") is None:
+                print("no figures of blender, because there is none (Debian package blender)", file=sys.stderr)
                 continue
             error, n, n_row = compare(arguments.python, form, os.path.join(folder, form))
             whole = whole and n == n_row

@@ -230,6 +230,16 @@ def test_volumes_of_a_scan(tmp_path):
     assert 0.1 < flakes["radiance"] < 1
 
 
+def in_blender(folder, tmp_path, *row):
+    """What Blender has and renders when it runs the exported script."""
+    done = subprocess.run(
+        ["blender", "-b", "--factory-startup", "--python-exit-code", "1", "--python", folder / "cloth.py", "--python",
+         os.path.join(ROOT, "tests", "support", "python", "blender_scene.py"), "--", tmp_path / "picture.exr", "64", "16", *map(str, row)],
+        capture_output=True, text=True, check=False, env={**os.environ, "HOME": str(tmp_path)})
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr
+    return json.loads(next(line for line in done.stdout.split("\n") if line.startswith("found "))[6:])
+
+
 def test_a_scene_for_blender(results, tmp_path):
     export, folder = conversion_of(results, "blender"), results / "export" / "blender"
     assert sorted(p.name for p in folder.iterdir()) == ["cloth.py", "conversion.json", "fibers-0.txt", "rows.csv", "scene.json"]
@@ -237,20 +247,19 @@ def test_a_scene_for_blender(results, tmp_path):
     compile((folder / "cloth.py").read_text(), "cloth.py", "exec")
     if shutil.which("blender") is None:
         pytest.skip("the files are right so far; there is no Blender to open them with (Debian package blender)")
-    done = subprocess.run(
-        ["blender", "-b", "--factory-startup", "--python-exit-code", "1", "--python", folder / "cloth.py", "--python",
-         os.path.join(ROOT, "tests", "support", "python", "blender_scene.py"), "--", tmp_path / "picture.exr", "64", "16"],
-        capture_output=True, text=True, check=False, env={**os.environ, "HOME": str(tmp_path)})
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr
-    found = json.loads(next(line for line in done.stdout.split("\n") if line.startswith("found "))[6:])
+    found = in_blender(folder, tmp_path)
     assert (found["n_object"], found["shared"], found["n_curve"]) == (len(scene["repeats"]), 1, n_fiber)
     assert found["n_point"] == len([x for x in (folder / "fibers-0.txt").read_text().split("\n") if x])
     (material,) = export["materials"]
     assert found["radius"] == pytest.approx(0.008, rel=1e-3) and found["engine"] == "CYCLES"
     for key, name in (("absorption", "absorption"), ("roughness", "longitudinal_roughness"), ("radial", "azimuthal_roughness"), ("index", "index")):
         assert found[key] == pytest.approx(material[name], rel=1e-5)
-    row = next(csv.DictReader((folder / "rows.csv").open()))
-    assert found["mean"] == pytest.approx([float(row[f"rendered_{c}"]) for c in "rgb"], rel=0.4)
+    rows = list(csv.DictReader((folder / "rows.csv").open()))
+    other = in_blender(folder, tmp_path, 2)
+    for look, row in ((found, rows[0]), (other, rows[2])):
+        assert look["camera"] == pytest.approx([float(row[f"camera_{x}_mm"]) for x in "xyz"], rel=1e-5)
+        assert look["mean"] == pytest.approx([float(row[f"rendered_{c}"]) for c in "rgb"], rel=0.4)
+    assert found["camera"] != pytest.approx(other["camera"], rel=0.01)
 
 
 def check_image(image, folder):

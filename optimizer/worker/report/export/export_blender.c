@@ -1,7 +1,7 @@
 /* results/export/blender/: the fitted cloth for Blender 3.4 and later, as a script, because Blender reads hair curves
  * with radii from no file that all its builds know (Debian's has neither USD nor Alembic):
  *
- *     blender --python cloth.py          or: blender -b --python cloth.py -- picture.exr SAMPLES
+ *     blender --python cloth.py          or: blender -b --python cloth.py -- picture.exr SAMPLES PX ROW
  *
  * fibers-<group>.txt has the vertices of each fiber with its radius, scene.json what the script makes of them: Hair
  * curves with the Principled Hair BSDF (hair_fit.h; Cycles), instances, black sheet, camera, lamp. Millimetres. */
@@ -17,8 +17,9 @@ static const double mm = 1e3;
 
 static const char script_head[] =
     "\"\"\"Made by Selvedge: builds the cloth of scene.json in Blender 3.4 or later.\n\n"
-    "blender --python cloth.py, or blender -b --python cloth.py -- picture.exr SAMPLES\"\"\"\n"
-    "import json\nimport os\nimport sys\n\nimport bpy\nfrom mathutils import Matrix, Vector\n\n"
+    "blender --python cloth.py, or blender -b --python cloth.py -- picture.exr SAMPLES PX ROW\n"
+    "ROW: of rows.csv, from 0; the first one where it is left out.\"\"\"\n"
+    "import csv\nimport json\nimport os\nimport sys\n\nimport bpy\nfrom mathutils import Matrix, Vector\n\n"
     "HERE = os.path.dirname(os.path.abspath(__file__))\n\n\n"
     "def nodes_of(name, kind, **inputs):\n"
     "    material = bpy.data.materials.new(name)\n    material.use_nodes = True\n"
@@ -98,8 +99,15 @@ static const char script_scene[] =
     "    scene.render.image_settings.file_format = 'OPEN_EXR'\n"
     "    scene.render.image_settings.color_depth = '32'\n\n\n"
     "def main():\n    with open(os.path.join(HERE, 'scene.json'), encoding='utf-8') as f:\n"
-    "        build(json.load(f))\n"
-    "    more = sys.argv[sys.argv.index('--') + 1:] if '--' in sys.argv else []\n    if more:\n"
+    "        scene = json.load(f)\n"
+    "    more = sys.argv[sys.argv.index('--') + 1:] if '--' in sys.argv else []\n"
+    "    if len(more) > 3:\n"
+    "        with open(os.path.join(HERE, 'rows.csv'), encoding='utf-8') as f:\n"
+    "            row = list(csv.DictReader(f))[int(more[3])]\n"
+    "        for key in ('lamp', 'camera'):\n"
+    "            scene[key]['at'] = [float(row[f'{key}_{x}_mm']) for x in 'xyz']\n"
+    "        scene['camera']['up'] = [float(row[f'up_{x}']) for x in 'xyz']\n"
+    "    build(scene)\n    if more:\n"
     "        render = bpy.context.scene.render\n        render.filepath = os.path.abspath(more[0])\n"
     "        bpy.context.scene.cycles.samples = int(more[1]) if len(more) > 1 else 64\n"
     "        if len(more) > 2:\n            render.resolution_x = render.resolution_y = int(more[2])\n"
