@@ -28,8 +28,8 @@ struct fiber_diameter {
     bool noise_measured; /* in void; else there is none, and the noise is taken as white */
 };
 
-/* Measures in up to 12 bricks of 64^3 voxels with the most material. v: densities in [0, 1]. STATUS_CANCELLED,
- * STATUS_NO_MEMORY. */
+/* Measures in up to 12 bricks of 64^3 voxels with the most material. v: densities, clamped to [0, 1] or not.
+ * STATUS_CANCELLED, STATUS_NO_MEMORY. */
 status fiber_diameter_measure(const struct volume *v, struct thread_pool *pool, const struct progress *progress,
                               struct fiber_diameter *diameter, struct error *err);
 

@@ -1,5 +1,6 @@
 #include "geometry/orientation/diameter/scale_noise.h"
 
+#include <math.h>
 #include <string.h>
 
 /* Number of scales measured (up to 2.3 voxels); coarser ones follow by their law, for little void is far enough from
@@ -49,7 +50,7 @@ void scale_find_void(const float *density, float *a, float *b, uint8_t *far, con
     size_t n_voxel = n[0] * n[1] * n[2];
     memcpy(a, density, n_voxel * sizeof *a);
     scale_blur(a, b, n, MATERIAL_SIGMA);
-    for (size_t i = 0; i < n_voxel; i++) far[i] = a[i] > MATERIAL || !(a[i] > 1e-6f) ? 0 : UINT8_MAX;
+    for (size_t i = 0; i < n_voxel; i++) far[i] = a[i] > MATERIAL || !(fabsf(a[i]) > 1e-6f) ? 0 : UINT8_MAX;
     distances(far, n);
 }
 
@@ -77,7 +78,7 @@ static void count_clamped(struct scale_noise *s, const float *density, const uin
     for (size_t i = 0; i < n[0] * n[1] * n[2]; i++) {
         bool is_void = far[i] > REACH_SIGMA * scale_sigma(0) + REACH_VOXEL;
         s->n_void += is_void;
-        s->n_clamped += is_void && !(density[i] > 0.0f);
+        s->n_clamped += is_void && !(fabsf(density[i]) > 0.0f);
     }
 }
 

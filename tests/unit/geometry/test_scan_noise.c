@@ -1,6 +1,7 @@
 /* The correlation of a scan's noise, measured in void that is clamped at 0, on phantoms whose noise is known. */
 #include "geometry/grade/scan_noise.h"
 #include "geometry/phantom/phantom.h"
+#include "geometry/scan_densities.h"
 #include "geometry/volume/density_map.h"
 
 #include <math.h>
@@ -11,8 +12,8 @@
 
 #include <cmocka.h>
 
-/* A scan of a single fiber along x. */
-static void make_scan(double snr, double noise_sd_voxel, struct volume *v)
+/* A scan of a single fiber along x, with noise that is not clamped. */
+static void make_raw_scan(double snr, double noise_sd_voxel, struct volume *v)
 {
     static const size_t n[3] = {48, 48, 48};
     struct phantom_scan_option o;
@@ -31,8 +32,13 @@ static void make_scan(double snr, double noise_sd_voxel, struct volume *v)
     f.axis_class[0] = 0;
     f.tile_size_m[0] = f.tile_size_m[1] = 48.0 * o.voxel_size_m;
     assert_int_equal(phantom_scan(&f, n, &o, NULL, NULL, v, NULL), STATUS_OK);
-    assert_int_equal(density_map_apply(v, 0.0, 1.0, NULL, NULL), STATUS_OK);
     fiber_set_release(&f);
+}
+
+static void make_scan(double snr, double noise_sd_voxel, struct volume *v)
+{
+    make_raw_scan(snr, noise_sd_voxel, v);
+    assert_int_equal(density_map_apply(v, 0.0, 1.0, NULL, NULL), STATUS_OK);
 }
 
 static void test_correlation_of_known_noise(void **state)
@@ -82,9 +88,24 @@ static void test_nothing_to_measure(void **state)
     volume_release(&v);
 }
 
+/* How far a scan is smoothed follows from the diameter of its fibers. That is measured before the noise is clamped, and
+ * correlated noise must not pass for fibers of three voxels, which are left alone. */
+static void test_diameter_of_a_scan_that_is_not_clamped(void **state)
+{
+    (void)state;
+    struct volume v;
+    struct scan_noise noise;
+    make_raw_scan(2.0, 0.5, &v);
+    assert_int_equal(scan_densities_map(&v, 0.0, 1.0, NAN, NULL, &noise, NULL), STATUS_OK);
+    print_message("noise %.3f, smoothed by %.3f voxels to %.3f\n", noise.scan_sd, noise.smooth_voxel, noise.mapped_sd);
+    assert_true(noise.smooth_voxel > 0.4 && noise.mapped_sd < 0.6 * noise.scan_sd);
+    volume_release(&v);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_known_standard_deviation),
+                                       cmocka_unit_test(test_diameter_of_a_scan_that_is_not_clamped),
                                        cmocka_unit_test(test_correlation_of_known_noise),
                                        cmocka_unit_test(test_nothing_to_measure)};
     return cmocka_run_group_tests(tests, NULL, NULL);
