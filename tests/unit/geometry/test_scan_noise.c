@@ -104,9 +104,8 @@ static void test_diameter_of_a_scan_that_is_not_clamped(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_known_standard_deviation),
-                                       cmocka_unit_test(test_diameter_of_a_scan_that_is_not_clamped),
-                                       cmocka_unit_test(test_correlation_of_known_noise),
-                                       cmocka_unit_test(test_nothing_to_measure)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_known_standard_deviation), cmocka_unit_test(test_diameter_of_a_scan_that_is_not_clamped),
+        cmocka_unit_test(test_correlation_of_known_noise), cmocka_unit_test(test_nothing_to_measure)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
