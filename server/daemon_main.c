@@ -8,6 +8,9 @@
 #include "server/http/static_files.h"
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_paths.h"
+#include "server/rescue/backup_keeper.h"
+#include "server/rescue/rebuild.h"
+#include "server/rescue/rescue_commands.h"
 #include "server/retention/retention_watch.h"
 #include "server/workers/supervisor.h"
 
@@ -36,7 +39,13 @@ static const char usage[] =
     "  --make-token NAME make an access token, print it and end; every request needs one from then on\n"
     "  --scope SCOPE     what that token may do: read, submit or admin (default admin)\n"
     "  --print-config    print every setting with its default and an explanation\n"
-    "  --version, --help\n";
+    "  --version, --help\n"
+    "instead of serving (docs/operating.md):\n"
+    "  --backup FILE     copy the database, also while a daemon runs\n"
+    "  --rebuild         make the database anew from backup and job folders; with --resume,\n"
+    "                    jobs that were running are queued\n"
+    "  --quarantine list, --quarantine restore ID\n"
+    "                    folders that no job in the database had\n";
 
 enum { LOCK_TRIES = 41, LOCK_PAUSE_US = 50000 };
 
@@ -66,14 +75,26 @@ struct token_wish {
 
 /* Returns -1 to go on, or the exit code. The configuration file is read first, so that the other options override it
  * wherever they stand. */
-static int read_options(int argc, char **argv, struct settings *s, struct token_wish *wish, struct error *err)
+static int read_options(int argc, char **argv, struct settings *s, struct token_wish *wish,
+                        struct rescue_request *rescue, struct error *err)
 {
-    static const struct option option[] = {
-        {"config", 1, NULL, 'c'}, {"data", 1, NULL, 0},           {"port", 1, NULL, 1},
-        {"listen", 1, NULL, 2},   {"worker", 1, NULL, 3},         {"web", 1, NULL, 4},
-        {"set", 1, NULL, 's'},    {"print-config", 0, NULL, 'p'}, {"make-token", 1, NULL, 't'},
-        {"scope", 1, NULL, 'o'},  {"version", 0, NULL, 'v'},      {"help", 0, NULL, 'h'},
-        {NULL, 0, NULL, 0}};
+    static const struct option option[] = {{"config", 1, NULL, 'c'},
+                                           {"data", 1, NULL, 0},
+                                           {"port", 1, NULL, 1},
+                                           {"listen", 1, NULL, 2},
+                                           {"worker", 1, NULL, 3},
+                                           {"web", 1, NULL, 4},
+                                           {"set", 1, NULL, 's'},
+                                           {"print-config", 0, NULL, 'p'},
+                                           {"make-token", 1, NULL, 't'},
+                                           {"scope", 1, NULL, 'o'},
+                                           {"version", 0, NULL, 'v'},
+                                           {"help", 0, NULL, 'h'},
+                                           {"backup", 1, NULL, 'b'},
+                                           {"rebuild", 0, NULL, 'r'},
+                                           {"resume", 0, NULL, 'm'},
+                                           {"quarantine", 1, NULL, 'q'},
+                                           {NULL, 0, NULL, 0}};
     for (int pass = 0; pass < 2; pass++) {
         optind = 1;
         for (int c; (c = getopt_long(argc, argv, "", option, NULL)) != -1;) {
@@ -84,18 +105,23 @@ static int read_options(int argc, char **argv, struct settings *s, struct token_
             if (c == 'p') return settings_print(stdout), 0;
             if (c == 'c' && pass == 0) r = settings_read_file(s, optarg, err);
             if (c == 's' && pass == 1) r = set_pair(s, optarg, err);
+            if (c == 'm') rescue->resume = true;
+            if (c == 'b' || c == 'q') rescue->word = optarg;
+            if (c == 'b' || c == 'q' || c == 'r')
+                rescue->command = c == 'b' ? RESCUE_BACKUP : c == 'q' ? RESCUE_QUARANTINE : RESCUE_REBUILD;
             if (c < 5 && pass == 1) r = settings_set(s, option_key[c].key, optarg, err);
             if (c == 't') wish->name = optarg;
             if (c == 'o' && !access_scope_parse(optarg, &wish->scope))
                 r = error_set(err, STATUS_INVALID, "--scope is read, submit or admin, not '%.40s'", optarg);
             if (r != STATUS_OK) return 2;
         }
+        if (optind < argc) rescue->operand = argv[optind++];
         if (optind < argc) {
             error_set(err, STATUS_INVALID, "unexpected argument '%s'", argv[optind]);
             return 2;
         }
     }
-    return -1;
+    return rescue_check(rescue, err) == STATUS_OK ? -1 : 2;
 }
 
 /* Path of the worker program: from the settings, or beside this program. */
@@ -190,7 +216,8 @@ static void announce(const struct settings *s, const char *url, struct log *log)
  * once more, so that users can delete jobs. */
 static status open_service(const struct settings *s, struct log *log, struct job_service **service, struct error *err)
 {
-    status r = job_service_open(s, log, service, err);
+    status r = rebuild_is_needed(s, err);
+    if (r == STATUS_OK) r = job_service_open(s, log, service, err);
     if ((r != STATUS_DISK_FULL && r != STATUS_IO) || !ballast_release(s->data)) return r;
     log_warning(log, "%s; the ballast file has been released to try once more", err->text);
     return job_service_open(s, log, service, err);
@@ -214,6 +241,7 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     struct supervisor *supervisor = NULL;
     struct webhook *webhook = NULL;
     struct retention_watch *retention = NULL;
+    struct backup_keeper *backup = NULL;
     struct static_files *files = NULL;
     struct http_server *server = NULL;
     char worker[PATH_BYTES];
@@ -223,6 +251,7 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     if (r == STATUS_OK) r = open_service(s, log, &service, err);
     if (r != STATUS_OK) goto out;
     r = webhook_start(service, &webhook, err);
+    if (r == STATUS_OK) r = backup_keeper_start(service, &backup, err);
     if (r == STATUS_OK) r = supervisor_start(service, worker, &supervisor, err);
     if (r == STATUS_OK) r = retention_watch_start(service, &retention, err);
     if (r == STATUS_OK) r = http_server_start(service, http_route_find, files, &server, url, err);
@@ -236,6 +265,7 @@ out:
     retention_watch_stop(retention); /* before the supervisor, because it wakes it */
     supervisor_stop(supervisor);
     webhook_stop(webhook);
+    backup_keeper_stop(backup);
     job_service_close(service);
     static_files_free(files);
     return r;
@@ -251,8 +281,10 @@ static int make_token(struct settings *s, const struct token_wish *wish)
     status r = sodium_init() < 0 ? error_set(&err, STATUS_INTERNAL, "cannot start libsodium") : STATUS_OK;
     if (r == STATUS_OK) r = make_absolute(s->data, &err);
     if (r == STATUS_OK) r = lock_data(s, 1, &lock_fd, &err);
-    if (r == STATUS_OK || r == STATUS_CONFLICT)
-        r = first_token_make(s->data, r == STATUS_CONFLICT, wish->name, wish->scope, text, &err);
+    bool used = r == STATUS_CONFLICT;
+    /* a new database in place of a lost one would hide that it is lost */
+    if (r == STATUS_OK) r = rebuild_is_needed(s, &err);
+    if (r == STATUS_OK || used) r = first_token_make(s->data, used, wish->name, wish->scope, text, &err);
     if (lock_fd >= 0) close(lock_fd);
     if (r == STATUS_OK) {
         fprintf(stderr, "token '%s' with scope %s; it is shown only now:\n", wish->name,
@@ -270,11 +302,12 @@ int main(int argc, char **argv)
     struct settings settings;
     struct error err = {0};
     struct log *log = NULL;
+    struct rescue_request rescue = {0};
     int lock_fd = -1;
     sigset_t signals;
     struct token_wish wish = {.scope = ACCESS_ADMIN};
     settings_init(&settings);
-    int code = read_options(argc, argv, &settings, &wish, &err);
+    int code = read_options(argc, argv, &settings, &wish, &rescue, &err);
     if (code >= 0) {
         if (code != 0) fprintf(stderr, "error: %s\n%s", err.text[0] ? err.text : "wrong options", usage);
         return code;
@@ -291,9 +324,14 @@ int main(int argc, char **argv)
     status r = sodium_init() < 0 ? error_set(&err, STATUS_INTERNAL, "cannot start libsodium") : STATUS_OK;
     if (r == STATUS_OK) r = make_absolute(settings.data, &err);
     if (r == STATUS_OK) r = make_absolute(settings.worker, &err);
-    if (r == STATUS_OK) r = lock_data(&settings, LOCK_TRIES, &lock_fd, &err);
+    if (r == STATUS_OK && (rescue.command == RESCUE_NONE || rescue_needs_lock(&rescue)))
+        r = lock_data(&settings, LOCK_TRIES, &lock_fd, &err);
     if (r == STATUS_OK) r = log_open(NULL, stderr, LOG_LEVEL_INFO, &log, &err);
-    if (r == STATUS_OK) r = serve(&settings, log, &signals, &err);
+    if (r == STATUS_OK && rescue.command != RESCUE_NONE) {
+        pthread_sigmask(SIG_UNBLOCK, &signals, NULL);
+        r = rescue_run(&settings, &rescue, stdout, &err);
+    } else if (r == STATUS_OK)
+        r = serve(&settings, log, &signals, &err);
     if (r != STATUS_OK) fprintf(stderr, "error: %s\n", err.text);
     log_close(log);
     if (lock_fd >= 0) close(lock_fd);

@@ -32,6 +32,9 @@ struct settings {
     int64_t requests_per_minute, stored_bytes, jobs_of_owner, session_s;
     /* [retention] */
     int64_t retention_max_age_days, retention_max_bytes, retention_check_s;
+    /* [backup] */
+    int64_t backup_every_s, backup_keep, backup_keep_days;
+    char backup_folder[SETTING_TEXT_BYTES];
     /* [disk] */
     int64_t floor_bytes, ballast_bytes;
 };

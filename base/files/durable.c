@@ -177,7 +177,7 @@ status record_append(const char *path, const char *json, bool sync, struct error
     unsigned long sum = crc32(0, (const unsigned char *)json, (unsigned)n_json);
     int n = snprintf(line, n_json + 16, "%08lx %s\n", sum, json);
     status s = STATUS_OK;
-    int fd = open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
+    int fd = open(path, O_WRONLY | O_CREAT | O_APPEND | O_NOFOLLOW | O_CLOEXEC, 0600);
     off_t before = -1;
     if (fd < 0) {
         s = error_set_errno(err, "cannot append to '%s'", path);

@@ -37,7 +37,8 @@ const char *path_file_name(const char *path);
 
 /* Appends a record "crc32hex json\n" to a file; the checksum is zlib's crc32 of json. json must be a single line of
  * at least one character (STATUS_INVALID). With `sync` the record survives power loss, and so does the file if this
- * is its first record. On failure the file is unchanged or ends in an incomplete record, which readers ignore.
+ * is its first record. On failure the file is unchanged or ends in an incomplete record, which readers ignore. A link
+ * at path is not followed.
  * STATUS_IO, STATUS_DISK_FULL, STATUS_NO_MEMORY. */
 status record_append(const char *path, const char *json, bool sync, struct error *err);
 

@@ -1,7 +1,9 @@
 /* The layout of a job folder. It is the whole interface between the daemon and the worker; a user can also make such a
  * folder and run the worker by hand.
  *
- *   JOB/job.json            the job document (job_document.h), written by the daemon (or the user) before the start
+ *   JOB/job.json            the job document (job_document.h), written by the user or by the daemon: when the job is
+ *                           created, and when its document is replaced
+ *   JOB/journal.rec         the daemon's journal of the job (server/store/job_journal.h); absent when run by hand
  *   JOB/input/<name>        input files under the names that job.json uses. The daemon verifies them, the worker reads
  *                           them.
  *   JOB/attempt.json        {"attempt":3,"token":"..."}: the attempt that may write. Absent when run by hand.
@@ -33,6 +35,7 @@
 #define SELVEDGE_OPTIMIZER_JOB_FOLDER_H
 
 #define JOB_FILE_DOCUMENT "job.json"
+#define JOB_FILE_JOURNAL "journal.rec"
 #define JOB_FILE_ATTEMPT "attempt.json"
 #define JOB_FILE_LOCK "lock"
 #define JOB_FILE_STATUS "status.json"

@@ -7,6 +7,7 @@
 #include "server/http/static_files.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/job_view.h"
+#include "server/rescue/backup_keeper.h"
 
 #include <fcntl.h>
 #include <stdio.h>
@@ -88,6 +89,19 @@ static void print_one(FILE *out, const char *name, const char *kind, const char 
     fprintf(out, "# HELP %s %s\n# TYPE %s %s\n%s %.17g\n", name, help, name, kind, name, value);
 }
 
+static void print_backup(FILE *out, const struct job_service *v)
+{
+    struct backup_state b;
+    backup_keeper_state(v->backup, &b);
+    print_one(out, "selvedge_backup_last_success_timestamp_seconds", "gauge",
+              "Time of the newest backup of the database; 0: there is none, or backups are off.",
+              (double)b.last_good_unix_s);
+    print_one(out, "selvedge_backup_size_bytes", "gauge", "Size of that backup.", (double)b.last_good_bytes);
+    print_one(out, "selvedge_backups_total", "counter", "Backups since the daemon started.", (double)b.n_good);
+    print_one(out, "selvedge_backup_failures_total", "counter", "Backups that failed since the daemon started.",
+              (double)b.n_failed);
+}
+
 static double resident_bytes(void)
 {
     long total = 0, resident = 0;
@@ -119,6 +133,7 @@ void handle_metrics(struct http_request *r)
     print_one(out, "selvedge_disk_free_bytes", "gauge", "Free space under the data folder.", (double)free_bytes);
     print_one(out, "selvedge_disk_floor_bytes", "gauge", "Free space below which work stops.",
               (double)v->settings->floor_bytes);
+    print_backup(out, v);
     print_one(out, "selvedge_http_connections", "gauge", "Open connections.",
               (double)http_server_n_connection(r->server));
     print_one(out, "process_resident_memory_bytes", "gauge", "Memory of the daemon itself.", resident_bytes());

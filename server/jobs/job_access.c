@@ -50,10 +50,28 @@ status job_check_quota(struct job_service *v, const struct access_grant *grant, 
                            owner, (long long)use.bytes, (long long)q->stored_bytes, (long long)more->bytes);
 }
 
-status job_update_surely(struct job_service *v, struct job_row *row, struct error *err)
+void job_note(struct job_service *v, const char *job_id, const struct journal_entry *entry)
+{
+    char folder[PATH_BYTES];
+    struct error err = {0};
+    /* what the daemon does by itself follows from the files of the worker, too, so no one waits for its sync */
+    bool sync = entry->job == NULL || (entry->job->state != JOB_RUNNING && entry->job->state != JOB_PAUSED);
+    path_join(folder, v->settings->data, "jobs", job_id, NULL);
+    status s = job_journal_append(folder, entry, sync, &err);
+    if (s != STATUS_OK && s != STATUS_NOT_FOUND) log_warning(v->log, "job %s: %s", job_id, err.text);
+}
+
+status job_update(struct job_service *v, struct job_row *row, struct error *err)
 {
     status s = store_job_update(v->store, row, err);
-    return s == STATUS_DISK_FULL && ballast_release(v->settings->data) ? store_job_update(v->store, row, err) : s;
+    if (s == STATUS_OK) job_note(v, row->id, &(struct journal_entry){.job = row});
+    return s;
+}
+
+status job_update_surely(struct job_service *v, struct job_row *row, struct error *err)
+{
+    status s = job_update(v, row, err);
+    return s == STATUS_DISK_FULL && ballast_release(v->settings->data) ? job_update(v, row, err) : s;
 }
 
 static status find(struct job_service *v, const char *id, bool document, struct job_row *row, struct error *err)

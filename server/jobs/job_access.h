@@ -4,6 +4,7 @@
 #define SELVEDGE_SERVER_JOB_ACCESS_H
 
 #include "server/jobs/job_service.h"
+#include "server/store/job_journal.h"
 
 /* A random id for a job or an upload. */
 void job_new_id(char out[STORE_ID_BYTES]);
@@ -21,7 +22,11 @@ status job_check_adopted(struct job_service *v, const struct job_row *row, struc
  * so with the numbers. */
 status job_check_quota(struct job_service *v, const struct access_grant *grant, const char *owner,
                        const struct owner_use *more, struct job_refusal *refusal, struct error *err);
-/* store_job_update for changes that free space or end work: if the disk is full, the ballast file is released for
+/* Repeats in the job's journal what the database holds already. A failure is logged: the database is the owner. */
+void job_note(struct job_service *v, const char *job_id, const struct journal_entry *entry);
+/* store_job_update, and the journal. */
+status job_update(struct job_service *v, struct job_row *row, struct error *err);
+/* The same for changes that free space or end work: if the disk is full, the ballast file is released for
  * them. */
 status job_update_surely(struct job_service *v, struct job_row *row, struct error *err);
 

@@ -22,6 +22,14 @@ static status check_document(const char *document, size_t n_bytes, char sample[2
     return STATUS_OK;
 }
 
+/* Writes the document to the job's folder, from which the database could be rebuilt. */
+static status write_document(struct job_service *v, const struct job_row *row, struct error *err)
+{
+    char path[PATH_BYTES];
+    path_join(path, v->settings->data, "jobs", row->id, JOB_FILE_DOCUMENT, NULL);
+    return durable_replace(path, row->document, strlen(row->document), err);
+}
+
 static status make_folders(struct job_service *v, const char *id, struct error *err)
 {
     static const char *const part[] = {JOB_FOLDER_INPUT, "upload"};
@@ -80,10 +88,13 @@ static status create_locked(struct job_service *v, struct job_row *row, const st
     row->created_unix_s = clock_wall_s();
     s = store_job_insert(v->store, row, key, body_hash, err);
     if (s != STATUS_OK) return s;
+    char path[PATH_BYTES];
+    path_join(path, v->settings->data, "jobs", row->id, NULL);
+    const struct journal_entry all = {.job = row, .document = true, .idempotency_key = key, .body_hash = body_hash};
     s = make_folders(v, row->id, err);
+    if (s == STATUS_OK) s = write_document(v, row, err);
+    if (s == STATUS_OK) s = job_journal_append(path, &all, true, err);
     if (s != STATUS_OK) {
-        char path[PATH_BYTES];
-        path_join(path, v->settings->data, "jobs", row->id, NULL);
         path_remove_tree(path, NULL);
         store_job_erase(v->store, row->id, NULL);
     }
@@ -113,6 +124,16 @@ status job_create(struct job_service *v, const struct job_request *request, char
     return s;
 }
 
+/* The folder first: what is acknowledged is in both, and a rebuild makes a job a draft whose document differs from the
+ * journal's checksum. */
+static status replace_document(struct job_service *v, struct job_row *row, struct error *err)
+{
+    status s = write_document(v, row, err);
+    if (s == STATUS_OK) s = store_job_replace(v->store, row, err);
+    if (s == STATUS_OK) job_note(v, row->id, &(struct journal_entry){.job = row, .document = true});
+    return s;
+}
+
 status job_replace_document(struct job_service *v, const char *id, const char *document, size_t n_bytes,
                             status (*may_edit)(void *context, const struct job_row *row, struct error *err),
                             void *context, struct error *err)
@@ -132,8 +153,8 @@ status job_replace_document(struct job_service *v, const char *id, const char *d
     free(row.document);
     row.document = text;
     job_mark_edited(&row);
-    s = store_job_replace(v->store, &row, err);
-    if (s == STATUS_DISK_FULL && ballast_release(v->settings->data)) s = store_job_replace(v->store, &row, err);
+    s = replace_document(v, &row, err);
+    if (s == STATUS_DISK_FULL && ballast_release(v->settings->data)) s = replace_document(v, &row, err);
 out:
     pthread_mutex_unlock(&v->change);
     job_row_release(&row);

@@ -111,8 +111,11 @@ static status find_declared(struct job_service *v, struct job_declaration *d, st
     if (!same)
         return error_set_field(err, STATUS_EXISTS, "name", "file '%s' was declared differently; delete it first",
                                row->name);
-    if (before.sha256[0] == '\0' && row->sha256[0] != '\0')
-        return upload_set_checksum(v->upload, before.id, row->sha256, row, err);
+    if (before.sha256[0] == '\0' && row->sha256[0] != '\0') {
+        s = upload_set_checksum(v->upload, before.id, row->sha256, row, err);
+        if (s == STATUS_OK) job_note(v, row->job_id, &(struct journal_entry){.file = row, .n_file = 1});
+        return s;
+    }
     *row = before;
     return STATUS_OK;
 }
@@ -134,6 +137,7 @@ static status insert_new(struct job_service *v, struct job_row *job, struct job_
         job_mark_edited(job);
         s = store_file_insert(v->store, row, n_new, job, err);
         for (k = 0; s != STATUS_OK && k < n_new; k++) upload_discard(v->upload, &row[k]);
+        if (s == STATUS_OK) job_note(v, job->id, &(struct journal_entry){.job = job, .file = row, .n_file = n_new});
     }
     for (size_t i = 0, j = 0; s == STATUS_OK && i < n; i++)
         if (!file[i].existed) file[i].row = row[j++];
@@ -231,6 +235,7 @@ status job_delete_file(struct job_service *v, const char *id, const char *name, 
     /* the row first: bytes without a row are removed at the next start, but a row must not refer to missing bytes */
     s = store_file_erase(v->store, file.id, &job, err);
     if (s == STATUS_DISK_FULL && ballast_release(v->settings->data)) s = store_file_erase(v->store, file.id, &job, err);
+    if (s == STATUS_OK) job_note(v, id, &(struct journal_entry){.job = &job, .removed = name});
     if (s == STATUS_OK) upload_discard(v->upload, &file);
 out:
     pthread_mutex_unlock(&v->change);

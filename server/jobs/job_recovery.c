@@ -5,15 +5,17 @@
 #include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
 #include "server/events/change_feed.h"
+#include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
-#include "server/jobs/job_service.h"
 
 #include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 /* Moves an entry of jobs/ that the database does not know to the quarantine folder. */
 static status quarantine(struct job_service *v, const char *name, struct error *err)
@@ -77,7 +79,7 @@ static status requeue(struct job_service *v, struct error *err)
         row[i].state = row[i].cancel_requested ? JOB_CANCELLED : JOB_QUEUED;
         if (row[i].cancel_requested) row[i].finished_unix_s = clock_wall_s();
         row[i].cancel_requested = false;
-        s = store_job_update(v->store, &row[i], err);
+        s = job_update(v, &row[i], err);
         if (s == STATUS_OK)
             log_info(v->log, "job %s was running when the daemon stopped; it is now %s", row[i].id,
                      job_state_name(row[i].state));
@@ -102,7 +104,47 @@ static void remove_unknown_parts(struct job_service *v, const char *job_id)
     closedir(d);
 }
 
-/* Makes the missing folders of every job. A job whose folder was lost keeps its row, with an error. */
+/* Writes the document and the journal of a job from before there were journals, without syncs. */
+static status begin_journal(struct job_service *v, const char *job_id, const char *folder, struct error *err)
+{
+    struct job_row row;
+    struct file_row *file = NULL;
+    char path[PATH_BYTES];
+    struct journal_entry all = {.job = &row, .document = true};
+    status s = store_job_get(v->store, job_id, &row, err);
+    if (s == STATUS_OK) s = store_file_list(v->store, job_id, &file, &all.n_file, err);
+    all.file = file;
+    path_join(path, folder, JOB_FILE_DOCUMENT, NULL);
+    if (s == STATUS_OK) s = durable_replace_volatile(path, row.document, strlen(row.document), err);
+    if (s == STATUS_OK) s = job_journal_append(folder, &all, false, err);
+    free(file);
+    job_row_release(&row);
+    return s;
+}
+
+/* Begins the journals that are missing, and syncs them all at once. */
+static void begin_journals(struct job_service *v, const struct job_row *row, size_t n)
+{
+    char folder[PATH_BYTES], path[PATH_BYTES];
+    struct stat st;
+    size_t n_begun = 0;
+    for (size_t i = 0; i < n; i++) {
+        struct error why = {0};
+        path_join(folder, v->settings->data, "jobs", row[i].id, NULL);
+        path_join(path, folder, JOB_FILE_JOURNAL, NULL);
+        if (lstat(path, &st) == 0 || errno != ENOENT) continue;
+        if (begin_journal(v, row[i].id, folder, &why) == STATUS_OK)
+            n_begun++;
+        else
+            log_warning(v->log, "job %s: %s", row[i].id, why.text);
+    }
+    int fd = n_begun > 0 ? open(v->settings->data, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
+    if (fd >= 0) syncfs(fd);
+    if (fd >= 0) close(fd);
+    if (n_begun > 0) log_info(v->log, "%zu jobs had no journal and have got one", n_begun);
+}
+
+/* Makes the missing folders and journals of every job. A job whose folder was lost keeps its row, with an error. */
 static status restore_folders(struct job_service *v, struct error *err)
 {
     struct job_row *row = NULL;
@@ -119,6 +161,7 @@ static status restore_folders(struct job_service *v, struct error *err)
         }
         remove_unknown_parts(v, row[i].id);
     }
+    if (s == STATUS_OK) begin_journals(v, row, n);
     job_rows_free(row, n);
     return s;
 }

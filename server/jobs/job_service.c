@@ -34,7 +34,7 @@ static status queue(struct job_service *v, struct job_row *row, struct job_refus
     row->error_code[0] = row->error_field[0] = row->error_text[0] = '\0';
     row->queued_unix_s = clock_wall_s();
     row->started_unix_s = row->finished_unix_s = 0;
-    return store_job_update(v->store, row, err);
+    return job_update(v, row, err);
 }
 
 static status begin(struct job_service *v, const char *id, bool retry, const int64_t *priority, bool *changed,
@@ -52,7 +52,7 @@ static status begin(struct job_service *v, const char *id, bool retry, const int
             s = error_set(err, STATUS_CONFLICT,
                           "cannot start the job while it is being cancelled; wait until it has stopped");
         else if (other)
-            s = store_job_update(v->store, &row, err);
+            s = job_update(v, &row, err);
         goto out;
     }
     if (retry && row.state != JOB_FAILED && row.state != JOB_CANCELLED) {

@@ -15,6 +15,7 @@
 
 struct supervisor;
 struct change_feed;
+struct backup_keeper;
 
 struct job_service {
     const struct settings *settings;
@@ -23,6 +24,7 @@ struct job_service {
     struct change_feed *feed; /* of what long polls wait for */
     struct log *log;
     struct supervisor *supervisor; /* notified of changes; NULL in tests */
+    struct backup_keeper *backup;  /* NULL when the settings say that there are no backups */
     pthread_mutex_t change;        /* held from reading a row to writing it back */
     atomic_bool stopping;
     atomic_uint_least64_t n_attempt_total, n_lost_total, n_finished_total[JOB_N_STATE];

@@ -120,6 +120,12 @@ status store_file_count(struct store *store, const char *job_id, int64_t *n, str
 /* Lists files in the order of declaration; the caller frees *row. job_id NULL: the incomplete files of all jobs. */
 status store_file_list(struct store *store, const char *job_id, struct file_row **row, size_t *n, struct error *err);
 
+/* Writes all that is known of a job in one transaction, over what the database has of it: the row as it is,
+ * updated_unix_s too, document, files and idempotency key (NULL: none is added). row->serial is that of the job, or 0
+ * if it is new, and is set. A job that ends by this makes a delivery (store_webhook_enable) like any other. */
+status store_import(struct store *store, struct job_row *row, const struct file_row *file, size_t n_file,
+                    const char *idempotency_key, const char *body_hash, struct error *err);
+
 /* Writes one row, as a readiness check. */
 status store_probe(struct store *store, struct error *err);
 

@@ -204,6 +204,23 @@ status store_session_insert(struct store *store, const unsigned char *hash, cons
     return s;
 }
 
+status store_access_rebuilt(struct store *store, bool require, double now_unix_s, struct error *err)
+{
+    pthread_mutex_lock(&store->write.lock);
+    status s = store_run(&store->write, NULL, err, "DELETE FROM session", "");
+    /* a token that is revoked, and whose hash is that of no text, says that tokens were once made */
+    if (s == STATUS_OK && require)
+        s = store_run(
+            &store->write, NULL, err,
+            "INSERT INTO access_token (id, name, owner, scope, hash, created, used, revoked, requests, bytes, "
+            "jobs) VALUES (lower(hex(randomblob(4)) || '-' || hex(randomblob(2)) || '-' || "
+            "hex(randomblob(2)) || '-' || hex(randomblob(2)) || '-' || hex(randomblob(6))), 'lost', 'lost', "
+            "?, zeroblob(1), ?, 0, ?, -1, -1, -1)",
+            "idd", (int64_t)ACCESS_READ, now_unix_s, now_unix_s);
+    pthread_mutex_unlock(&store->write.lock);
+    return s;
+}
+
 status store_session_erase(struct store *store, const unsigned char *hash, struct error *err)
 {
     pthread_mutex_lock(&store->write.lock);

@@ -51,6 +51,9 @@ status store_token_list(struct store *store, int64_t before_serial, size_t limit
 /* Adds a session of a token, and removes those that have expired. */
 status store_session_insert(struct store *store, const unsigned char *hash, const char *token_id, double now_unix_s,
                             double expires_unix_s, struct error *err);
+/* For a database that was rebuilt: ends all sessions, and with `require` makes every request need a token, even if none
+ * is known any more. */
+status store_access_rebuilt(struct store *store, bool require, double now_unix_s, struct error *err);
 /* Ends a session. STATUS_OK also when there is none. */
 status store_session_erase(struct store *store, const unsigned char *hash, struct error *err);
 

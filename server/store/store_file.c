@@ -21,16 +21,23 @@ static void read_row(sqlite3_stmt *q, struct file_row *row)
     if (blob != NULL && n == STORE_HASH_STATE_BYTES) memcpy(row->hash_state, blob, STORE_HASH_STATE_BYTES);
 }
 
-static status insert(struct store *store, const struct file_row *row, size_t n, struct job_row *job, struct error *err)
+status store_file_add(struct store *store, const struct file_row *row, size_t n, struct error *err)
 {
-    status s = store_begin(&store->write, err);
-    if (s != STATUS_OK) return s;
+    status s = STATUS_OK;
     for (size_t i = 0; s == STATUS_OK && i < n; i++) {
         const struct file_row *r = &row[i];
         s = store_run(&store->write, NULL, err, "INSERT INTO file (" COLUMNS ") VALUES (?,?,?,?,?,?,?,?,?)",
                       "ssssiisib", r->id, r->job_id, r->name, r->role, r->size_bytes, r->offset_bytes, r->sha256,
                       (int64_t)r->state, r->hash_state, (int)STORE_HASH_STATE_BYTES);
     }
+    return s;
+}
+
+static status insert(struct store *store, const struct file_row *row, size_t n, struct job_row *job, struct error *err)
+{
+    status s = store_begin(&store->write, err);
+    if (s != STATUS_OK) return s;
+    s = store_file_add(store, row, n, err);
     if (s == STATUS_OK && job != NULL) s = store_job_write(store, job, err);
     return store_end(&store->write, s, err);
 }

@@ -57,11 +57,10 @@ static status read_row(sqlite3_stmt *q, struct job_row *row, struct error *err)
     return STATUS_OK;
 }
 
-static status insert(struct store *store, struct job_row *r, const char *key, const char *body_hash, struct error *err)
+status store_job_add(struct store *store, struct job_row *r, const char *key, const char *body_hash, struct error *err)
 {
-    status s = store_begin(&store->write, err);
-    if (s != STATUS_OK) return s;
-    s = store_run(&store->write, NULL, err,
+    status s =
+        store_run(&store->write, NULL, err,
                   "INSERT INTO job (id, sample, state, cancel_requested, dirty, deleted, attempt, "
                   "lost_attempts, generation, token, created, "
                   "updated, queued, started, finished, error_code, error_field, error_text, peak_rss, owner) VALUES "
@@ -75,7 +74,14 @@ static status insert(struct store *store, struct job_row *r, const char *key, co
         s = store_run(&store->write, NULL, err,
                       "INSERT OR REPLACE INTO idempotency (owner, key, job_id, body_hash, created) VALUES (?,?,?,?,?)",
                       "ssssd", r->owner, key, r->id, body_hash, r->created_unix_s);
-    return store_end(&store->write, s, err);
+    return s;
+}
+
+static status insert(struct store *store, struct job_row *r, const char *key, const char *body_hash, struct error *err)
+{
+    status s = store_begin(&store->write, err);
+    if (s != STATUS_OK) return s;
+    return store_end(&store->write, store_job_add(store, r, key, body_hash, err), err);
 }
 
 status store_job_insert(struct store *store, struct job_row *row, const char *idempotency_key, const char *body_hash,

@@ -29,6 +29,11 @@ status store_run(struct store_link *link, int *n_changed, struct error *err, con
  * commit fails. */
 status store_begin(struct store_link *link, struct error *err);
 status store_end(struct store_link *link, status so_far, struct error *err);
+/* For callers that hold store->write.lock, in their transaction: inserts a draft (as store_job_insert does), and
+ * files. */
+status store_job_add(struct store *store, struct job_row *row, const char *key, const char *body_hash,
+                     struct error *err);
+status store_file_add(struct store *store, const struct file_row *row, size_t n, struct error *err);
 /* store_job_update for callers that hold store->write.lock. */
 status store_job_write(struct store *store, struct job_row *row, struct error *err);
 /* Reports a change of a job, unless s is an error. Returns s. To be called without locks. */

@@ -69,7 +69,7 @@ static status prepare_locked(struct job_service *v, struct job_row *row, struct 
     if (s != STATUS_OK) return s;
     row->state = JOB_RUNNING;
     if (row->started_unix_s <= 0) row->started_unix_s = clock_wall_s();
-    return store_job_update(v->store, row, err);
+    return job_update(v, row, err);
 }
 
 status attempt_prepare(struct job_service *v, const char *job_id, struct error *err)
@@ -258,7 +258,7 @@ status attempt_fail(struct job_service *v, const char *job_id, const char *why, 
         row.state = JOB_FAILED;
         row.finished_unix_s = clock_wall_s();
         set_error(&row, "conflict", "", why);
-        s = store_job_update(v->store, &row, err);
+        s = job_update(v, &row, err);
     }
     pthread_mutex_unlock(&v->change);
     job_row_release(&row);
@@ -274,7 +274,7 @@ void attempt_resume_paused(struct job_service *v)
     if (store_job_list(v->store, &q, &row, &n, NULL) == STATUS_OK)
         for (size_t i = 0; i < n; i++) {
             row[i].state = JOB_QUEUED;
-            store_job_update(v->store, &row[i], NULL);
+            job_update(v, &row[i], NULL);
         }
     pthread_mutex_unlock(&v->change);
     job_rows_free(row, n);

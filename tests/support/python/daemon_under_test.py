@@ -39,6 +39,13 @@ def sha256(data):
     return hashlib.sha256(data).hexdigest()
 
 
+def selvedged(data, *arguments, expect=0):
+    """Runs a command of an operator; what it prints."""
+    done = subprocess.run([program("selvedged"), "--data", str(data), *arguments], capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == expect, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
 def wait_until(condition, timeout_s=20, what="the condition"):
     end = time.monotonic() + timeout_s * TIMEOUT_S
     while time.monotonic() < end:

@@ -1,0 +1,57 @@
+/* Writes jobs that were read from their folders. */
+#include "server/store/store_sql.h"
+
+#include <string.h>
+
+/* Makes the row of a job that the database does not have, with its document and its key. */
+static status add(struct store *store, struct job_row *row, const char *key, const char *body_hash, struct error *err)
+{
+    enum job_state state = row->state;
+    row->state = JOB_DRAFT;
+    status s = store_job_add(store, row, key, body_hash, err);
+    row->state = state;
+    return s;
+}
+
+/* Replaces document and key of a job that the database has. */
+static status replace(struct store *store, const struct job_row *row, const char *key, const char *body_hash,
+                      struct error *err)
+{
+    status s = store_run(&store->write, NULL, err, "INSERT OR REPLACE INTO document (job_id, text) VALUES (?,?)", "ss",
+                         row->id, row->document);
+    if (s == STATUS_OK && key != NULL)
+        s = store_run(&store->write, NULL, err,
+                      "INSERT OR REPLACE INTO idempotency (owner, key, job_id, body_hash, created) VALUES (?,?,?,?,?)",
+                      "ssssd", row->owner, key, row->id, body_hash, row->created_unix_s);
+    if (s == STATUS_OK) s = store_run(&store->write, NULL, err, "DELETE FROM file WHERE job_id = ?", "s", row->id);
+    return s;
+}
+
+static status import(struct store *store, struct job_row *row, const struct file_row *file, size_t n_file,
+                     const char *key, const char *body_hash, struct error *err)
+{
+    double updated_unix_s = row->updated_unix_s;
+    status s = store_begin(&store->write, err);
+    if (s != STATUS_OK) return s;
+    if (s == STATUS_OK)
+        s = row->serial > 0 ? replace(store, row, key, body_hash, err) : add(store, row, key, body_hash, err);
+    if (s == STATUS_OK) s = store_file_add(store, file, n_file, err);
+    if (s == STATUS_OK) s = store_job_write(store, row, err);
+    row->updated_unix_s = updated_unix_s;
+    if (s == STATUS_OK)
+        /* tags and ids of deliveries are made of the revision, so it must rise over all that clients may have seen */
+        s = store_run(&store->write, NULL, err,
+                      "UPDATE job SET updated = ?, revision = max(revision, CAST(strftime('%s', 'now') AS INTEGER)) "
+                      "WHERE id = ?",
+                      "ds", updated_unix_s, row->id);
+    return store_end(&store->write, s, err);
+}
+
+status store_import(struct store *store, struct job_row *row, const struct file_row *file, size_t n_file,
+                    const char *idempotency_key, const char *body_hash, struct error *err)
+{
+    pthread_mutex_lock(&store->write.lock);
+    status s = import(store, row, file, n_file, idempotency_key, body_hash, err);
+    pthread_mutex_unlock(&store->write.lock);
+    return store_report(store, s, row->id);
+}
