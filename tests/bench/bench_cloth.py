@@ -1,6 +1,6 @@
 """How well are measured fabrics reproduced by described cloths? Prints figures cloth.*, one JSON object on a line.
 
-    bench_cloth.py [--build DIR] [--keep DIR] [--tables DIR] [--models IDS] [--plain-prior X] [WHAT ...]
+    bench_cloth.py [--build DIR] [--keep DIR] [--tables DIR] [--models IDS] [--plain-prior X] [--starts N] [WHAT ...]
 
 WHAT: names of tables or of recoveries; default: everything. All tables go through the same procedure: one job for each
 of the descriptions in DESCRIPTIONS, whose cloth numbers are fitted together with the scattering parameters. The job
@@ -90,7 +90,8 @@ def bench_table(arguments, table):
     """Figures of one table; returns (held-out error of the twin, of the plain BRDF)."""
     sample = os.path.splitext(os.path.basename(table))[0]
     fit = {"models": arguments.models.split(","), "render_px": 16, "render_samples": 4,
-           "path_budget": arguments.path_budget, "plain_prior": arguments.plain_prior}
+           "path_budget": arguments.starts * arguments.path_budget, "starts": arguments.starts,
+           "plain_prior": arguments.plain_prior}
     best, wall_s = None, 0.0
     for name, cloth in DESCRIPTIONS.items():
         document = {"sample": f"{sample} as {name}", "cloth": cloth, "measurements": {"file": os.path.basename(table)}, "fit": fit}
@@ -307,7 +308,8 @@ def main():
     parser.add_argument("--keep", help="folder of the jobs (default: bench-cloth in the build folder)")
     parser.add_argument("--tables", default=os.path.join(DATA, "measured-reflectance-dense"))
     parser.add_argument("--models", default="textile.v3", help="scattering models, separated by commas; several: the worker chooses by cross-validation")
-    parser.add_argument("--path-budget", type=int, default=6000000)
+    parser.add_argument("--path-budget", type=int, default=6000000, help="paths of each start")
+    parser.add_argument("--starts", type=int, default=1, help="searches of each job of a table, of which cross-validation keeps one")
     parser.add_argument("--plain-prior", type=float, default=1, help="fit.plain_prior of the tables' jobs")
     parser.add_argument("--recovery-budget", type=int, default=18000000, help="paths of a recovery")
     parser.add_argument("--recovery-model", default="textile.v3", help="model of the recoveries")

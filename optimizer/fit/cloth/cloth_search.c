@@ -1,4 +1,5 @@
 #include "optimizer/fit/cloth/cloth_search.h"
+#include "base/option_id.h"
 #include "optimizer/fit/cloth/carried_error.h"
 
 #include <math.h>
@@ -14,10 +15,12 @@ enum { JOINT_STEPS = 14 };
 
 struct search {
     const struct cloth_search *search;
+    size_t i_start;                                /* of option->n_start searches */
     struct fit_layout layout;                      /* of the numbers alone, for the spread of the cloths */
     struct fit_parameter parameter[FIT_MAX_PARAM]; /* of all unknowns, with the start of the next fit */
     struct cloth_search_result *result;
-    char kind[KIND_BYTES]; /* of the present fit: "cloth 3 of 8" */
+    const struct cloth_search_result *before; /* what the searches before this one took */
+    char kind[KIND_BYTES];                    /* of the present fit: "cloth 3 of 8" */
 };
 
 static size_t n_scattering(const struct cloth_search *q) { return q->cloth->n_scattering; }
@@ -36,21 +39,37 @@ static status spread_layout(const struct cloth_search *q, struct fit_layout *l, 
                            &option, err);
 }
 
+/* Cloths that this search screens: later ones begin at one cloth each. */
+static size_t n_screened(const struct search *s)
+{
+    return s->i_start > 0 && s->search->n_screen > 1 ? 1 : s->search->n_screen;
+}
+
 /* The extra start to which cloth i of the screening belongs; NULL when it belongs to none. */
 static const double *extra_start(const struct cloth_search *q, size_t i)
 {
     return i > 0 && i <= q->option->n_extra_start ? q->option->extra_start[i - 1] : NULL;
 }
 
+/* The place of cloth i in the sequence that is spread over the bounds; 0: the start values. Later searches go on where
+ * the screening of the first one ends. */
+static size_t place_of(const struct search *s, size_t i)
+{
+    const size_t n_extra = s->search->option->n_extra_start, n_screen = s->search->n_screen;
+    if (s->i_start > 0) return s->i_start + (n_screen > 1 + n_extra ? n_screen - 1 - n_extra : 0);
+    return i > n_extra ? i - n_extra : 0;
+}
+
 static void choose_cloth(struct search *s, size_t i, double *number)
 {
-    const double *extra = extra_start(s->search, i);
+    const double *extra = s->i_start == 0 ? extra_start(s->search, i) : NULL;
+    const size_t place = place_of(s, i);
     for (size_t k = 0; k < s->layout.n_unknown; k++) {
         const struct fit_parameter *p = &s->layout.parameter[k];
         number[k] = p->start;
         if (extra != NULL && !p->fixed) number[k] = fmin(fmax(extra[n_scattering(s->search) + k], p->lower), p->upper);
     }
-    if (i > s->search->option->n_extra_start) fit_run_start(&s->layout, i - s->search->option->n_extra_start, number);
+    if (place > 0) fit_run_start(&s->layout, place, number);
 }
 
 static status report_step(void *context, const struct fit_step *step, struct error *err)
@@ -58,12 +77,14 @@ static status report_step(void *context, const struct fit_step *step, struct err
     const struct search *s = context;
     const struct fit_problem *problem = s->search->problem;
     struct fit_step outer = *step;
-    char phase[80];
-    snprintf(phase, sizeof phase, "%s: %.30s", s->kind, step->phase);
+    char phase[100], start[30] = "";
+    if (s->search->option->n_start > 1)
+        snprintf(start, sizeof start, "start %zu of %zu: ", s->i_start + 1, s->search->option->n_start);
+    snprintf(phase, sizeof phase, "%s%s: %.30s", start, s->kind, step->phase);
     outer.phase = phase;
-    outer.step += s->result->n_step;
-    outer.wall_s += s->result->wall_s;
-    outer.n_path_total += s->result->n_path;
+    outer.step += s->before->n_step + s->result->n_step;
+    outer.wall_s += s->before->wall_s + s->result->wall_s;
+    outer.n_path_total += s->before->n_path + s->result->n_path;
     return problem->report(problem->report_context, &outer, err);
 }
 
@@ -121,15 +142,16 @@ static status screen_cloth(struct search *s, size_t i, double *best_param, struc
     const struct cloth_search *q = s->search;
     struct cloth_screened *to = &s->result->screened[i];
     struct progress_part part;
-    const double share = q->screen_share / (double)q->n_screen;
+    const size_t n_screen = n_screened(s);
+    const double share = q->screen_share / (double)n_screen;
     struct progress progress = progress_begin_part(&part, q->problem->progress, share * (double)i, share);
     struct fit_problem problem = *q->problem;
-    snprintf(s->kind, sizeof s->kind, "cloth %zu of %zu", i + 1, q->n_screen);
+    snprintf(s->kind, sizeof s->kind, "cloth %zu of %zu", i + 1, n_screen);
     choose_cloth(s, i, to->number);
     problem.path_budget = q->screen_budget;
     problem.max_iteration = SCREEN_STEPS;
     problem.progress = &progress;
-    status st = fit_on_cloth(s, to->number, extra_start(q, i), &problem, fit, err);
+    status st = fit_on_cloth(s, to->number, s->i_start == 0 ? extra_start(q, i) : NULL, &problem, fit, err);
     if (st != STATUS_OK) return st;
     to->objective = fit->objective.value + fit->prior_penalty;
     to->objective_se = fit->objective.se;
@@ -146,8 +168,12 @@ static status run_screening(struct search *s, struct error *err)
     struct cloth_search_result *r = s->result;
     double best[FIT_MAX_PARAM];
     status st = STATUS_OK;
-    if (q->n_screen == 0) return STATUS_OK;
-    for (; st == STATUS_OK && r->n_screen < q->n_screen; r->n_screen++)
+    if (q->n_screen == 0) {
+        choose_cloth(s, 0, r->screened[0].number);
+        for (size_t k = 0; k < n_number(q); k++) s->parameter[n_scattering(q) + k].start = r->screened[0].number[k];
+        return STATUS_OK;
+    }
+    for (; st == STATUS_OK && r->n_screen < n_screened(s); r->n_screen++)
         st = screen_cloth(s, r->n_screen, best, &r->joint, err); /* its memory is free until the joint fit */
     if (st != STATUS_OK) return st;
     for (size_t p = 0; p < n_scattering(q); p++)
@@ -156,7 +182,6 @@ static status run_screening(struct search *s, struct error *err)
     return STATUS_OK;
 }
 
-/* The fit of all unknowns, from the best cloth. */
 /* Paths of the joint fit's own cloths: differences take paths, too. */
 static uint64_t joint_budget(const struct search *s)
 {
@@ -168,6 +193,7 @@ static uint64_t joint_budget(const struct search *s)
     return (uint64_t)fmax((double)q->problem->path_budget + spared, (double)q->least_joint_budget);
 }
 
+/* The fit of all unknowns, from the best cloth. */
 static status run_joint(struct search *s, struct error *err)
 {
     const struct cloth_search *q = s->search;
@@ -176,6 +202,7 @@ static status run_joint(struct search *s, struct error *err)
     struct progress progress = progress_begin_part(&part, q->problem->progress, done, 1.0 - done - q->final_share);
     struct fit_problem problem = *q->problem;
     struct fit_option option = *q->option;
+    option.n_start = 1;
     option.n_extra_start = 0;
     snprintf(s->kind, sizeof s->kind, "numbers of the cloth");
     if (q->n_screen > 0) problem.path_budget = joint_budget(s);
@@ -218,27 +245,109 @@ static status choose_final(struct search *s, struct fit_result *other, struct er
     return STATUS_OK;
 }
 
-status cloth_search_run(const struct cloth_search *q, struct cloth_search_result *r, struct error *err)
+/* ---- several searches ---- */
+
+/* Makes search i_start, whose progress is a part of the whole. `other` is working memory. */
+static status run_search(const struct cloth_search *q, size_t i_start, const struct cloth_search_result *before,
+                         struct cloth_search_result *r, struct fit_result *other, struct error *err)
 {
+    const double n_start = (double)q->option->n_start;
+    struct progress_part part;
+    struct progress progress =
+        progress_begin_part(&part, q->problem->progress, (double)i_start / n_start, 1.0 / n_start);
+    struct fit_problem problem = *q->problem;
+    struct cloth_search own = *q;
     struct search *s = calloc(1, sizeof *s);
-    struct fit_result *other = malloc(sizeof *other);
+    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit a cloth: out of memory");
+    problem.progress = &progress;
+    own.problem = &problem;
+    *s = (struct search){.search = &own, .i_start = i_start, .result = r, .before = before};
     memset(r, 0, sizeof *r);
-    status st =
-        s != NULL && other != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot fit a cloth: out of memory");
-    if (st == STATUS_OK && q->n_screen > CLOTH_MAX_SCREEN)
-        st = error_set(err, STATUS_INVALID, "cannot screen %zu cloths: at most %d are allowed", q->n_screen,
-                       CLOTH_MAX_SCREEN);
-    if (st != STATUS_OK) goto out;
-    s->search = q;
-    s->result = r;
-    memcpy(s->parameter, q->problem->parameter, q->problem->n_param * sizeof *s->parameter);
-    st = spread_layout(q, &s->layout, err);
+    memcpy(s->parameter, problem.parameter, problem.n_param * sizeof *s->parameter);
+    status st = spread_layout(q, &s->layout, err);
     if (st == STATUS_OK) st = run_screening(s, err);
     if (st == STATUS_OK) st = run_joint(s, err);
     if (st == STATUS_OK) st = choose_final(s, other, err);
-out:
-    free(other);
     free(s);
+    return st;
+}
+
+/* Whether `new` predicts rows that were left out better than `kept`; without cross-validation, whether its objective is
+ * lower beyond doubt. */
+static bool predicts_better(const struct fit_result *new, const struct fit_result *kept)
+{
+    const struct cross_validation *a = &kept->cross_validation, *b = &new->cross_validation;
+    if (a->n_fold > 0 && b->n_fold > 0) return b->rel_square < a->rel_square;
+    double doubt = 2.0 * hypot(new->objective.se, kept->objective.se);
+    return new->objective.value + new->prior_penalty < kept->objective.value + kept->prior_penalty - doubt;
+}
+
+static void describe_start(const struct cloth_search *q, const struct cloth_search_result *r, struct fit_start *to)
+{
+    const struct cross_validation *v = &r->final.cross_validation;
+    for (size_t p = 0; p < q->problem->n_param; p++) to->from[p] = q->problem->parameter[p].start;
+    memcpy(to->from + n_scattering(q), r->screened[0].number, n_number(q) * sizeof *to->from);
+    memcpy(to->param, r->final.param, sizeof to->param);
+    to->objective = r->final.objective.value;
+    to->objective_se = r->final.objective.se;
+    to->prior_penalty = r->final.prior_penalty;
+    to->cross_validation = v->n_fold > 0 ? v->rel_rms : NAN;
+    to->converged = r->final.converged;
+    to->n_path = r->n_path;
+}
+
+static void add_taken(struct cloth_search_result *sum, const struct cloth_search_result *r)
+{
+    sum->n_step += r->n_step;
+    sum->n_path += r->n_path;
+    sum->wall_s += r->wall_s;
+}
+
+/* All searches; the one that predicts best is left in r. next, taken, other: working memory; taken is 0. */
+static status run_searches(const struct cloth_search *q, struct cloth_search_result *r,
+                           struct cloth_search_result *next, struct cloth_search_result *taken,
+                           struct fit_result *other, struct error *err)
+{
+    struct fit_start start[FIT_MAX_START];
+    size_t kept = 0;
+    memset(start, 0, sizeof start);
+    for (size_t k = 0; k < q->option->n_start; k++) {
+        status st = run_search(q, k, taken, k == 0 ? r : next, other, err);
+        if (st != STATUS_OK) return st;
+        const struct cloth_search_result *now = k == 0 ? r : next;
+        describe_start(q, now, &start[k]);
+        add_taken(taken, now);
+        if (k == 0 || !predicts_better(&next->final, &r->final)) continue;
+        kept = k;
+        memcpy(r, next, sizeof *r);
+    }
+    r->n_step = taken->n_step;
+    r->n_path = taken->n_path;
+    r->wall_s = taken->wall_s;
+    if (q->option->n_start == 1) return STATUS_OK;
+    start[kept].kept = true;
+    memcpy(r->final.start, start, sizeof start);
+    r->final.n_start = q->option->n_start;
+    return STATUS_OK;
+}
+
+status cloth_search_run(const struct cloth_search *q, struct cloth_search_result *r, struct error *err)
+{
+    struct cloth_search_result *next = calloc(2, sizeof *next);
+    struct fit_result *other = malloc(sizeof *other);
+    status st = STATUS_OK;
+    if (next == NULL || other == NULL)
+        st = error_set(err, STATUS_NO_MEMORY, "cannot fit a cloth: out of memory");
+    else if (q->n_screen > CLOTH_MAX_SCREEN)
+        st = error_set(err, STATUS_INVALID, "cannot screen %zu cloths: at most %d are allowed", q->n_screen,
+                       CLOTH_MAX_SCREEN);
+    else if (q->option->n_start < 1 || q->option->n_start > FIT_MAX_START)
+        st = error_set_field(err, STATUS_INVALID, OPTION_STARTS, "cannot fit from %zu starts: allowed are 1 to %d",
+                             q->option->n_start, FIT_MAX_START);
+    else
+        st = run_searches(q, r, next, next + 1, other, err);
+    free(other);
+    free(next);
     return st;
 }
 

@@ -12,6 +12,12 @@
  * 3. Final fit: the scattering parameters alone on the cloth of the joint fit. Where its objective is higher than that
  *    of the best cloth of the screening beyond doubt, that cloth is fitted as well and the lower one is taken.
  *
+ * With several starts (fit_option.n_start) all of this is done as often. Each later search screens one cloth of its
+ * own, the next one of the evenly spread sequence, and the search whose final fit predicts left-out rows best
+ * (cross_validation.h) is the result. An objective would not do: where the model misses the rows, many cloths reach
+ * about the same one, and differ in what they say between the rows. Without cross-validation a later search is taken
+ * when its objective is lower by more than two standard errors.
+ *
  * The covariance of the scattering parameters is that of the final fit plus what the numbers add to it by the joint
  * fit: cov(p) = cov(p | x) + C_px C_xx^-1 C_xp with C the joint covariance (law of total covariance). Their errors thus
  * contain the uncertainty of the cloth. All steps are deterministic functions of the estimates: with a journal below
@@ -27,14 +33,14 @@ enum { CLOTH_MAX_SCREEN = 32 };
 
 struct cloth_search {
     const struct descent_method *method;
-    /* of all unknowns; its estimator is cloth_estimator(cloth) or a journal of it, its budget that of the joint fit
-     * without the differences */
+    /* of all unknowns; its estimator is cloth_estimator(cloth) or a journal of it, its budget that of the joint fit of
+     * one search without the differences */
     const struct fit_problem *problem;
     const struct fit_option *option; /* of all unknowns, extra starts too; numbers are not tied */
     struct cloth_estimator *cloth;
     /* Cloths of the screening, more than extra starts. 1: that of the start values alone, so that the joint fit begins
      * with parameters that are fitted to it; 0: the joint fit begins at the start values. */
-    size_t n_screen;
+    size_t n_screen;        /* of the first search */
     uint64_t screen_budget; /* most paths of each of them */
     /* Paths that the budget of `problem` leaves for the whole screening. What the screening takes more or less is the
      * joint fit's, which has least_joint_budget all the same. */
@@ -51,7 +57,7 @@ struct cloth_screened {
 };
 
 struct cloth_search_result {
-    size_t n_screen, i_best; /* 0 cloths: no screening was made */
+    size_t n_screen, i_best; /* 0 cloths: no screening was made, and screened[0].number is where the joint fit began */
     struct cloth_screened screened[CLOTH_MAX_SCREEN];
     bool took_screened;              /* the joint fit ended worse than the best cloth of the screening */
     double number[CLOTH_MAX_FITTED]; /* of the final fit */
@@ -62,7 +68,8 @@ struct cloth_search_result {
     double wall_s;
 };
 
-/* Errors are those of fit_run; STATUS_INVALID for more than CLOTH_MAX_SCREEN cloths. */
+/* Errors are those of fit_run; STATUS_INVALID for more than CLOTH_MAX_SCREEN cloths. With several starts r->final lists
+ * them, and r is the best one's but for n_step, n_path and wall_s. */
 status cloth_search_run(const struct cloth_search *q, struct cloth_search_result *r, struct error *err);
 
 /* The result for the scattering parameters alone: the final fit with the covariance stated above. */

@@ -23,6 +23,7 @@ enum { FIT_MAX_START = 16 };
 struct fit_start {
     double from[FIT_MAX_PARAM], param[FIT_MAX_PARAM]; /* internal unit */
     double objective, objective_se, prior_penalty;
+    double cross_validation; /* relative RMS error, where it chooses among the starts (cloth_search.h); NaN otherwise */
     bool converged;
     bool kept;
     bool elsewhere; /* its objective equals that of the kept one within the noise, but its parameters differ */

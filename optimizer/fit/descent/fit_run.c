@@ -210,6 +210,7 @@ static status run_start(struct fit *f, const struct descent_method *method, size
     start->objective = result->objective.value;
     start->objective_se = result->objective.se;
     start->prior_penalty = result->prior_penalty;
+    start->cross_validation = NAN;
     start->converged = result->converged;
     start->n_path = result->n_path;
     f->n_step += result->n_step;

@@ -195,8 +195,10 @@ const struct job_option option_rows_fit[] = {
      INTO(model[0].option.n_start),
      RANGE(1, JOB_MAX_START),
      .standard = "1",
-     .meaning = "The fit is made from so many starts, spread over the bounds. The best is kept, all are listed. They "
-                "share a `path_budget`; `max_iterations` may be 500 at most."},
+     .meaning =
+         "The fit is made from so many starts, spread over the bounds. The best is kept, all are listed. They "
+         "share a `path_budget`; `max_iterations` may be 500 at most. With fitted numbers of the cloth each start is "
+         "a search from a cloth of its own, and the best is the one that predicts left-out rows best."},
     {.path = "fit.nuisance",
      .kind = OPTION_SECTION,
      .id = OPTION_NUISANCE,

@@ -76,12 +76,13 @@ static json_t *starts_json(const struct pipeline_model *m)
     json_t *list = json_array();
     for (size_t k = 0; k < m->fit.n_start; k++) {
         const struct fit_start *s = &m->fit.start[k];
-        json_array_append_new(list, json_pack("{s:o, s:o, s:o, s:o, s:o, s:b, s:b, s:b, s:I}", "start",
-                                              values_json(m, s->from), "value", values_json(m, s->param), "objective",
-                                              json_number(s->objective), "objective_se", json_number(s->objective_se),
-                                              "prior_penalty", json_number(s->prior_penalty), "converged",
-                                              (int)s->converged, "kept", (int)s->kept, "elsewhere", (int)s->elsewhere,
-                                              "n_path", (json_int_t)s->n_path));
+        json_array_append_new(list,
+                              json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:b, s:b, s:b, s:I}", "start",
+                                        values_json(m, s->from), "value", values_json(m, s->param), "objective",
+                                        json_number(s->objective), "objective_se", json_number(s->objective_se),
+                                        "prior_penalty", json_number(s->prior_penalty), "cross_validation_rel_rms",
+                                        json_number(s->cross_validation), "converged", (int)s->converged, "kept",
+                                        (int)s->kept, "elsewhere", (int)s->elsewhere, "n_path", (json_int_t)s->n_path));
     }
     return list;
 }
@@ -192,7 +193,10 @@ void result_summary_options(const struct pipeline_context *c, const struct pipel
                 100.0 * v->held_out_with_gains.rel_rms);
     for (size_t k = 0; k < m->fit.n_start; k++) {
         const struct fit_start *s = &m->fit.start[k];
-        fprintf(out, "start %-2zu objective %.5g +- %.2g%s%s%s\n", k + 1, s->objective, s->objective_se,
+        char left_out[60] = "";
+        if (isfinite(s->cross_validation))
+            snprintf(left_out, sizeof left_out, ", cross-validation %.2f %%", 100.0 * s->cross_validation);
+        fprintf(out, "start %-2zu objective %.5g +- %.2g%s%s%s%s\n", k + 1, s->objective, s->objective_se, left_out,
                 s->converged ? "" : ", not converged", s->kept ? ", kept" : "",
                 s->elsewhere ? ", as good but at other parameters" : "");
     }

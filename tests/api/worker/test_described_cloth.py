@@ -9,8 +9,8 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selved
 FIT = {"max_iterations": 2, "path_budget": 20000, "render_px": 8, "render_samples": 1}
 
 
-def start(d, cloth):
-    job = d.create({"sample": "described", "cloth": cloth, "measurements": {"file": "rows.csv"}, "fit": FIT})
+def start(d, cloth, **fit):
+    job = d.create({"sample": "described", "cloth": cloth, "measurements": {"file": "rows.csv"}, "fit": FIT | fit})
     d.upload(job, "rows.csv", TABLE.encode(), "measurements")
     assert d.post(f"/v1/jobs/{job}/start").status_code == 202
     return job
@@ -49,11 +49,14 @@ def test_more_fiber_than_fits(real):
 
 
 def test_a_result_describes_its_cloth_to_another_job(real):
-    """With kinds of yarn that have names, and with a number that is searched in the first job."""
+    """With kinds of yarn that have names, and with a number that is searched twice in the first job."""
     first = start(real, {"draft": ["10", "01"], "tile_warps": 2, "tile_wefts": 4, "weft": [1], "warp_per_cm": 50,
                          "crimp": {"lower": 0.45, "upper": 0.55},
-                         "yarns": [{"name": "red", "fibers": 9}, {"name": "blue", "fibers": 8, "plies": 2, "hairs_per_mm": 5}]})
+                         "yarns": [{"name": "red", "fibers": 9}, {"name": "blue", "fibers": 8, "plies": 2, "hairs_per_mm": 5}]}, starts=2)
     result = real.wait_state(first, "succeeded", timeout_s=120)["result"]
+    searches = result["starts"]
+    assert len(searches) == 2 and sum(search["kept"] for search in searches) == 1
+    assert all("cross_validation_rel_rms" in search and search["n_path"] > 0 for search in searches)
     described = result["geometry"]["cloth"]["description"]
     assert [yarn["name"] for yarn in described["yarns"]] == ["red", "blue"]
     made = result["geometry"]["cloth"]["made"]

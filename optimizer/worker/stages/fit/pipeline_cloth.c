@@ -238,19 +238,20 @@ uint64_t pipeline_cloth_least_budget(const struct pipeline_context *c, uint64_t 
     size_t n_free = n_free_number(c);
     /* a moved cloth takes a block of paths at least, a quarter of those of the cloth itself */
     double moved = 0.25 * (double)cloth_estimator_n_moved(CLOTH_MOVES_BALANCED, n_free);
-    double joint =
-        fmax(LEAST_FITS, (double)n_start) * fmax(1.0 + moved, cloth_estimator_cost(CLOTH_MOVES_BALANCED, n_free));
-    return (uint64_t)((2.0 * SCREEN_ITERATIONS * n_screen + joint + LEAST_FITS * n_final) * (double)least);
+    double joint = LEAST_FITS * fmax(1.0 + moved, cloth_estimator_cost(CLOTH_MOVES_BALANCED, n_free));
+    double later = n_extra > 0 ? 1.0 : 0.0; /* cloths that a search after the first one screens */
+    double fits = (double)n_start * (joint + LEAST_FITS * n_final);
+    return (uint64_t)((2.0 * SCREEN_ITERATIONS * (n_screen + later * ((double)n_start - 1.0)) + fits) * (double)least);
 }
 
-/* Divides the paths between screening, joint fit and final fit. Extra starts are screened however small the budget is.
- */
+/* Divides the paths of one search between screening, joint fit and final fit. Several starts share a budget that the
+ * job states. Extra starts are screened however small the budget is. */
 static void plan_budget(const struct pipeline_context *c, const struct descent_method *method,
                         struct fit_problem *problem, struct cloth_search *q)
 {
     double least = (double)method->least_budget(problem), n_row = (double)problem->observation->n;
-    double whole =
-        (double)(c->doc->path_budget > 0 ? c->doc->path_budget : BUDGET_FACTOR * method->info->default_path_budget);
+    double whole = (double)(c->doc->path_budget > 0 ? c->doc->path_budget / q->option->n_start
+                                                    : BUDGET_FACTOR * method->info->default_path_budget);
     double n_extra = (double)q->option->n_extra_start, least_screen = n_extra > 0.0 ? 1.0 + n_extra : 0.0;
     double per_cloth = SCREEN_ITERATIONS * least, most = fmin(MOST_CLOTHS + n_extra, CLOTH_MAX_SCREEN);
     double n_screen = fmax(least_screen, floor(fmin(most, screen_share * whole / per_cloth)));

@@ -40,8 +40,8 @@ void pipeline_cloth_close(struct pipeline_cloth_trace *t);
 status pipeline_cloth_fit(struct pipeline_cloth_trace *trace, const struct pipeline_joint *j,
                           const struct fit_problem *problem, struct error *err);
 
-/* Least number of paths that this search takes however small the budget is: the screening of n_extra starts, the joint
- * fit from n_start starts with its differences, and the final fit. least: that of one fit by the method alone. */
+/* Least number of paths that n_start searches take however small the budget is: the screening of n_extra starts, the
+ * joint fits with their differences, and the final fits. least: that of one fit by the method alone. */
 uint64_t pipeline_cloth_least_budget(const struct pipeline_context *c, uint64_t least, size_t n_start, size_t n_extra);
 
 /* Makes c->fiber and the scene those of the model's fitted numbers, if they are not. Does nothing without numbers. */

@@ -259,7 +259,7 @@ static status store_fits(struct pipeline_context *c, struct error *err)
     size_t n = result_sections(c, section);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
-    return s == STATUS_OK ? work_file_write(path, "fit.10", section, n, err) : s;
+    return s == STATUS_OK ? work_file_write(path, "fit.11", section, n, err) : s;
 }
 
 status stage_fit_load(struct pipeline_context *c, struct error *err)
@@ -269,7 +269,7 @@ status stage_fit_load(struct pipeline_context *c, struct error *err)
     size_t n = result_sections(c, section);
     pipeline_correction_priors(c);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
-    if (s == STATUS_OK) s = work_file_read(path, "fit.10", section, n, err);
+    if (s == STATUS_OK) s = work_file_read(path, "fit.11", section, n, err);
     if (s == STATUS_OK && c->doc->fit_radius) s = pipeline_radius_apply(c, err);
     for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) conclude_fit(c, &c->model[i]);
     return s;
