@@ -45,4 +45,8 @@ status mesh_normals(const struct mesh *m, double (*normal)[3], struct error *err
  * face without texture coordinates; STATUS_TOO_LARGE; STATUS_INVALID as mesh_check; STATUS_IO, STATUS_NOT_FOUND. */
 status mesh_read_obj(const char *path, double scale_mm, struct mesh *m, struct error *err);
 
+/* Writes such a file, in millimetres with six significant digits, pairs of triangles with a common first corner as one
+ * polygon where they lie one after the other. *text belongs to the caller. STATUS_NO_MEMORY. */
+status mesh_obj_text(const struct mesh *m, char **text, size_t *n_bytes, struct error *err);
+
 #endif

@@ -3,6 +3,7 @@
 #include "geometry/mesh/mesh.h"
 
 #include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -159,4 +160,34 @@ status mesh_read_obj(const char *path, double scale_mm, struct mesh *m, struct e
     if (s != STATUS_OK) mesh_release(m);
     free(text);
     return s;
+}
+
+/* Two triangles of a cut rectangle: a b d, a d c. */
+static bool is_rectangle(const struct mesh_triangle *t)
+{
+    return t[0].position[0] == t[1].position[0] && t[0].position[2] == t[1].position[1] &&
+           t[0].texture[0] == t[1].texture[0] && t[0].texture[2] == t[1].texture[1];
+}
+
+status mesh_obj_text(const struct mesh *m, char **text, size_t *n_bytes, struct error *err)
+{
+    FILE *f = open_memstream(text, n_bytes);
+    if (f == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write a mesh: no memory");
+    fputs("# Selvedge: positions in millimetres, texture coordinates in millimetres of cloth\n", f);
+    for (size_t i = 0; i < m->n_position; i++)
+        fprintf(f, "v %.6g %.6g %.6g\n", m->position_mm[i][0], m->position_mm[i][1], m->position_mm[i][2]);
+    for (size_t i = 0; i < m->n_texture; i++) fprintf(f, "vt %.6g %.6g\n", m->texture_mm[i][0], m->texture_mm[i][1]);
+    for (size_t i = 0; i < m->n_triangle; i++) {
+        bool two = i + 1 < m->n_triangle && is_rectangle(&m->triangle[i]);
+        fputc('f', f);
+        for (int k = 0; k < 3; k++) fprintf(f, " %u/%u", m->triangle[i].position[k] + 1, m->triangle[i].texture[k] + 1);
+        if (two) fprintf(f, " %u/%u", m->triangle[i + 1].position[2] + 1, m->triangle[i + 1].texture[2] + 1);
+        fputc('\n', f);
+        i += two;
+    }
+    bool failed = ferror(f) != 0;
+    if (fclose(f) == 0 && !failed) return STATUS_OK;
+    free(*text);
+    *text = NULL;
+    return error_set(err, STATUS_NO_MEMORY, "cannot write a mesh: no memory");
 }

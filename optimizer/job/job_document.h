@@ -72,14 +72,16 @@ struct job_candidate {
     double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
 };
 
-enum job_surface { JOB_ON_FLAT, JOB_ON_CYLINDER, JOB_ON_MESH };
+enum job_surface { JOB_ON_FLAT, JOB_ON_CYLINDER, JOB_ON_DRAPE, JOB_ON_MESH };
 
 /* A picture of the fitted cloth laid on a surface. */
 struct job_surface_picture {
     enum job_surface on;
     char mesh_file[JOB_MAX_NAME_BYTES]; /* of JOB_ON_MESH; "" otherwise */
     double mesh_unit_mm;                /* a unit of the file in millimetres */
-    double radius_mm, size_mm;          /* of the cylinder; of a flat piece, or along the cylinder */
+    double radius_mm, size_mm; /* of the cylinder or the ball; of a flat or draped piece, or along the cylinder */
+    double wrap_deg;           /* of the cylinder */
+    int black_sheet;           /* 0, 1, or -1: as in the document */
     double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
     double width_mm; /* what the picture shows */
     size_t px, sample;

@@ -25,10 +25,11 @@ struct scene_option {
 status scene_new(const struct fiber_set *f, const struct scene_option *o, struct scene **scene, struct error *err);
 /* The cloth of a flat scene laid on a mesh, its upper side on the mesh's and the texture coordinates of the mesh being
  * places in the cloth (a shell map: bent/shell.h). Nothing of the cloth is copied: `flat` must outlive it. The mesh's
- * origin is the orbit centre. The black sheet, if `flat` has one, lies under all of the bent cloth. STATUS_INVALID,
- * naming a triangle, where the mesh bends more tightly than the cloth is thick; for a scene that is bent already;
- * STATUS_NO_MEMORY. The mesh must have passed mesh_check and may be released afterwards. */
-status scene_bend(const struct scene *flat, const struct mesh *mesh, struct scene **bent, struct error *err);
+ * origin is the orbit centre. black_sheet: one lies under all of the bent cloth, whatever lies under `flat`.
+ * STATUS_INVALID, naming a triangle, where the mesh bends more tightly than the cloth is thick; for a scene that is
+ * bent already; STATUS_NO_MEMORY. The mesh must have passed mesh_check and may be released afterwards. */
+status scene_bend(const struct scene *flat, const struct mesh *mesh, bool black_sheet, struct scene **bent,
+                  struct error *err);
 void scene_free(struct scene *scene);
 size_t scene_memory_bytes(const struct scene *scene);
 size_t scene_n_segment(const struct scene *scene);

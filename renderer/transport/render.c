@@ -55,7 +55,8 @@ static void render_pixel(struct run *r, size_t i_pixel)
     double x[N_VALUE] = {0}, x2[3] = {0}, n = (double)n_sample;
     for (size_t i = 0; i < n_sample; i += CHUNK_SAMPLES) {
         if (progress_cancelled(r->progress)) return;
-        add_samples(r, i_pixel, i, n_sample - i < CHUNK_SAMPLES ? n_sample - i : CHUNK_SAMPLES, x, x2);
+        add_samples(r, i_pixel, r->q->first_sample + i, n_sample - i < CHUNK_SAMPLES ? n_sample - i : CHUNK_SAMPLES, x,
+                    x2);
     }
     float *out = r->im->pixel + i_pixel * r->im->n_channel;
     for (size_t k = 0; k < 3; k++) {
@@ -113,8 +114,8 @@ static status check_finite(const struct image *im, const char *id, struct error 
 
 static status check_request(const struct render_request *q, struct error *err)
 {
-    if (q->n_sample == 0 || q->n_sample > UINT32_MAX || q->width == 0 || q->height == 0 || q->width > 65536 ||
-        q->height > 65536 || q->stream > 4095)
+    if (q->n_sample == 0 || q->n_sample > UINT32_MAX || q->first_sample > UINT32_MAX - q->n_sample || q->width == 0 ||
+        q->height == 0 || q->width > 65536 || q->height > 65536 || q->stream > 4095)
         return error_set(err, STATUS_INVALID, "cannot render %zu x %zu pixels with %zu samples in stream %u", q->width,
                          q->height, q->n_sample, q->stream);
     return configuration_check(q->configuration, 1, err);

@@ -17,6 +17,7 @@ struct render_request {
     struct radiance_input input;
     const struct configuration *configuration;
     size_t width, height, n_sample; /* samples a pixel */
+    size_t first_sample;            /* their first number: pictures of other numbers have other random numbers */
     uint64_t seed;
     uint32_t stream; /* takes the place of the configuration number in the random key; at most 4095 */
 };

@@ -44,11 +44,11 @@ static status read_number(const char *option, const char *text, const char *key,
 static status read_picture(const struct cli_args *a, json_t *picture, const char **mesh, struct error *err)
 {
     const char *on = a->on != NULL ? a->on : "cylinder";
-    bool shape = strcmp(on, "flat") == 0 || strcmp(on, "cylinder") == 0;
+    bool shape = strcmp(on, "flat") == 0 || strcmp(on, "cylinder") == 0 || strcmp(on, "drape") == 0;
     size_t n = strlen(on);
     *mesh = shape ? NULL : on;
     if (!shape && (n < 5 || strcmp(on + n - 4, ".obj") != 0))
-        return error_set(err, STATUS_INVALID, "option '--on' takes flat, cylinder or a mesh NAME.obj: '%s'", on);
+        return error_set(err, STATUS_INVALID, "option '--on' takes flat, cylinder, drape or a mesh NAME.obj: '%s'", on);
     json_object_set_new(picture, "on", json_string(shape ? on : "mesh"));
     status s = read_angles("lamp", a->lamp, 45.0, 0.0, picture, "light", err);
     if (s == STATUS_OK) s = read_angles("camera", a->camera, 30.0, 180.0, picture, "camera", err);
@@ -57,7 +57,13 @@ static status read_picture(const struct cli_args *a, json_t *picture, const char
     if (s == STATUS_OK) s = read_number("width-mm", a->width_mm, "width_mm", false, picture, err);
     if (s == STATUS_OK) s = read_number("size-mm", a->size_mm, "size_mm", false, picture, err);
     if (s == STATUS_OK) s = read_number("radius-mm", a->radius_mm, "radius_mm", false, picture, err);
-    return s == STATUS_OK ? read_number("mesh-unit-mm", a->mesh_unit_mm, "mesh_unit_mm", false, picture, err) : s;
+    if (s == STATUS_OK) s = read_number("wrap-deg", a->wrap_deg, "wrap_deg", false, picture, err);
+    if (s == STATUS_OK) s = read_number("mesh-unit-mm", a->mesh_unit_mm, "mesh_unit_mm", false, picture, err);
+    bool yes = a->black_sheet != NULL && strcmp(a->black_sheet, "yes") == 0;
+    if (s == STATUS_OK && a->black_sheet != NULL && !yes && strcmp(a->black_sheet, "no") != 0)
+        return error_set(err, STATUS_INVALID, "option '--black-sheet' takes yes or no: '%s'", a->black_sheet);
+    if (s == STATUS_OK && a->black_sheet != NULL) json_object_set_new(picture, "black_sheet", json_boolean(yes));
+    return s;
 }
 
 /* The section "fit" of the new document: the model of a result, with its parameters. groups: names of their sets. */

@@ -108,25 +108,38 @@ status job_check_export(const struct option_value *v, struct error *err)
                            "'%s' needs a fitted model: give 'photographs' or 'measurements'", v->path);
 }
 
+static status check_picture(const struct job_document *doc, size_t i, struct error *err)
+{
+    const struct job_surface_picture *p = &doc->surface_picture[i];
+    bool sheet = p->black_sheet < 0 ? doc->black_sheet : p->black_sheet != 0;
+    char field[64];
+    snprintf(field, sizeof field, "pictures[%zu].mesh_file", i);
+    if (p->on == JOB_ON_MESH && p->mesh_file[0] == '\0')
+        return error_set_field(err, STATUS_INVALID, field, "'%s' is missing: the picture is to lie on a mesh", field);
+    if (p->on != JOB_ON_MESH && p->mesh_file[0] != '\0')
+        return error_set_field(err, STATUS_INVALID, field, "'%s' is given, but 'on' is not \"mesh\"", field);
+    snprintf(field, sizeof field, "pictures[%zu].width_mm", i);
+    if (!doc->camera_far_field && p->width_mm > 10.0 * doc->camera_distance_cm)
+        return error_set_field(err, STATUS_INVALID, field, "'%s' is %g: allowed is at most camera.distance_cm (%g cm)",
+                               field, p->width_mm, doc->camera_distance_cm);
+    snprintf(field, sizeof field, "pictures[%zu].light_theta_deg", i);
+    if (p->light_theta_deg == 90.0 || (p->on == JOB_ON_FLAT && sheet && p->light_theta_deg > 90.0))
+        return error_set_field(err, STATUS_INVALID, field, "'%s' is %g: %s", field, p->light_theta_deg,
+                               p->light_theta_deg == 90.0 ? "the lamp may not lie in the plane of the orbit center"
+                                                          : "a lamp behind a flat piece needs 'black_sheet' false");
+    snprintf(field, sizeof field, "pictures[%zu].radius_mm", i);
+    if (p->on == JOB_ON_DRAPE && !(p->radius_mm >= 0.02 * p->size_mm && p->radius_mm <= 10.0 * p->size_mm))
+        return error_set_field(err, STATUS_INVALID, field,
+                               "'%s' is %g: the ball under a draped piece of %g mm may have a radius of %g to %g mm",
+                               field, p->radius_mm, p->size_mm, 0.02 * p->size_mm, 10.0 * p->size_mm);
+    return STATUS_OK;
+}
+
 status job_check_pictures(const struct option_value *v, struct error *err)
 {
-    const struct job_document *doc = v->doc;
-    for (size_t i = 0; i < doc->n_surface_picture; i++) {
-        const struct job_surface_picture *p = &doc->surface_picture[i];
-        char field[64];
-        snprintf(field, sizeof field, "pictures[%zu].mesh_file", i);
-        if (p->on == JOB_ON_MESH && p->mesh_file[0] == '\0')
-            return error_set_field(err, STATUS_INVALID, field, "'%s' is missing: the picture is to lie on a mesh",
-                                   field);
-        if (p->on != JOB_ON_MESH && p->mesh_file[0] != '\0')
-            return error_set_field(err, STATUS_INVALID, field, "'%s' is given, but 'on' is not \"mesh\"", field);
-        snprintf(field, sizeof field, "pictures[%zu].width_mm", i);
-        if (!doc->camera_far_field && p->width_mm > 10.0 * doc->camera_distance_cm)
-            return error_set_field(err, STATUS_INVALID, field,
-                                   "'%s' is %g: allowed is at most camera.distance_cm (%g cm)", field, p->width_mm,
-                                   doc->camera_distance_cm);
-    }
-    return STATUS_OK;
+    status s = STATUS_OK;
+    for (size_t i = 0; i < v->doc->n_surface_picture && s == STATUS_OK; i++) s = check_picture(v->doc, i, err);
+    return s;
 }
 
 status job_check_candidates(const struct option_value *v, struct error *err)

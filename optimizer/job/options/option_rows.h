@@ -71,7 +71,9 @@ extern const char *const job_transfer_names[];
     ANGLE(list, type, light_theta_deg, 0, 180, missing, .check = job_check_light_theta,                                \
           .allowed = "0 to below 90; above 90 to 180 without the black sheet",                                         \
           .meaning = "Angle of the lamp from the normal of the cloth. Above 90 the lamp is behind the cloth."),        \
-        ANGLE(list, type, light_phi_deg, -360, 360, missing, .meaning = "Azimuth of the lamp, from +x towards +y."),   \
+        OTHER_ANGLES(list, type, missing)
+#define OTHER_ANGLES(list, type, missing)                                                                              \
+    ANGLE(list, type, light_phi_deg, -360, 360, missing, .meaning = "Azimuth of the lamp, from +x towards +y."),       \
         ANGLE(list, type, camera_theta_deg, 0, 89.999, missing, .allowed = "0 to below 90",                            \
               .meaning = "Angle of the camera from the normal of the cloth."),                                         \
         ANGLE(list, type, camera_phi_deg, -360, 360, missing,                                                          \

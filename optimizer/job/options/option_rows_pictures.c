@@ -3,7 +3,7 @@
 
 #define OF_PICTURE(member) INTO_OF(struct job_surface_picture, member)
 
-static const char *const surface_names[] = {"flat", "cylinder", "mesh", NULL};
+static const char *const surface_names[] = {"flat", "cylinder", "drape", "mesh", NULL};
 
 const struct job_option option_rows_pictures[] = {
     {.path = "pictures",
@@ -23,7 +23,9 @@ const struct job_option option_rows_pictures[] = {
      OF_PICTURE(on),
      .choice = surface_names,
      .required = true,
-     .meaning = "A flat piece, the upper half of a cylinder with the weft around it, or a mesh of your own."},
+     .meaning =
+         "A flat piece, a cylinder with the weft around it, a square piece that has fallen over a ball, or a mesh of "
+         "your own."},
     {.path = "pictures[].mesh_file",
      .kind = OPTION_FILE_NAME,
      TEXT_INTO_OF(struct job_surface_picture, mesh_file),
@@ -45,15 +47,31 @@ const struct job_option option_rows_pictures[] = {
      RANGE(0.1, 10000),
      .unit = "mm",
      .standard = "15",
-     .meaning = "Radius of the cylinder, whose highest line goes through the orbit center."},
+     .meaning = "Radius of the cylinder, whose highest line goes through the orbit center, or of the ball under the "
+                "draped piece (0.02 to 10 times its size)."},
+    {.path = "pictures[].wrap_deg",
+     .kind = OPTION_NUMBER,
+     OF_PICTURE(wrap_deg),
+     RANGE(1, 360),
+     .unit = "degrees",
+     .standard = "180",
+     .meaning = "How far around the cylinder the cloth goes, one half of it to each side of the highest line."},
     {.path = "pictures[].size_mm",
      .kind = OPTION_NUMBER,
      OF_PICTURE(size_mm),
      RANGE(0.1, 10000),
      .unit = "mm",
      .standard = "40",
-     .meaning = "Edge of the flat piece, or length of the cylinder."},
-    ANGLES("pictures[]", struct job_surface_picture, .required = true),
+     .meaning = "Edge of the flat or draped piece, or length of the cylinder."},
+    {.path = "pictures[].black_sheet",
+     .kind = OPTION_BOOL_OR_LEFT_OUT,
+     OF_PICTURE(black_sheet),
+     .left_out = "`black_sheet` of the job",
+     .meaning = "Whether a black sheet lies under all of the cloth, bent as it is: without it light comes through."},
+    ANGLE("pictures[]", struct job_surface_picture, light_theta_deg, 0, 180, .required = true,
+          .allowed = "0 to 180 but 90; above 90 not for a flat piece with the black sheet",
+          .meaning = "Angle of the lamp from the vertical. Above 90 the lamp is below."),
+    OTHER_ANGLES("pictures[]", struct job_surface_picture, .required = true),
     {.path = "pictures[].width_mm",
      .kind = OPTION_NUMBER,
      OF_PICTURE(width_mm),

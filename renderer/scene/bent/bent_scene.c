@@ -30,7 +30,8 @@ static status build_outer(struct bent_cloth *b, struct error *err)
     return STATUS_OK;
 }
 
-status scene_bend(const struct scene *flat, const struct mesh *m, struct scene **bent, struct error *err)
+status scene_bend(const struct scene *flat, const struct mesh *m, bool black_sheet, struct scene **bent,
+                  struct error *err)
 {
     if (flat->bent != NULL) return error_set(err, STATUS_INVALID, "cannot bend a cloth that is bent already");
     struct bent_cloth *b = calloc(1, sizeof *b);
@@ -41,6 +42,7 @@ status scene_bend(const struct scene *flat, const struct mesh *m, struct scene *
         memcpy(s, flat, sizeof *s);
         memcpy(&b->flat, flat, sizeof b->flat);
         s->bent = b;
+        s->black_sheet = black_sheet;
         st = shell_new(m, -(double)flat->bottom_mm, (double)SCENE_MARGIN_MM, &b->shell, err);
     }
     if (st == STATUS_OK) st = build_outer(b, err);

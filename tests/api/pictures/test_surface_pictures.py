@@ -2,7 +2,9 @@
 import json
 import math
 import os
+import signal
 import subprocess
+import time
 
 import pytest
 from daemon_under_test import problem, program
@@ -73,6 +75,63 @@ def test_a_finished_picture_is_not_rendered_again(tmp_path):
     assert json.loads((pictures / "on-1.json").read_text()) == entry, "the same seed makes the same picture"
 
 
+def test_a_picture_grows_in_passes_and_goes_on_where_it_was(tmp_path):
+    """A run that is ended between two passes and one that is not make the same bits; what there was could be looked at."""
+    given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "pictures": [{"on": "flat", **VIEW, "samples": 4096}],
+             "fit": {"model": "two_lobe.v1", "fixed": {"C_R": [0.1] * 3, "C_TT": [0.6] * 3, "beta_R": 6, "beta_TT": 12, "gamma_TT": 30}}}
+    made = {}
+    for name in ("whole", "ended"):
+        folder = tmp_path / name
+        (folder / "input").mkdir(parents=True)
+        (folder / "job.json").write_text(json.dumps(given))
+        (folder / "input/cloth.hair").write_bytes(hair(layers=3))
+        entry = folder / "results/pictures/on-1.json"
+        if name == "ended":
+            worker = subprocess.Popen([program("selvedge-worker"), "--quiet", str(folder)])
+            until = time.monotonic() + 60
+            while not (entry.exists() and 16 <= json.loads(entry.read_text())["samples"]) and time.monotonic() < until:
+                time.sleep(0.01)
+            worker.send_signal(signal.SIGTERM)
+            assert worker.wait(timeout=60) == 3, "it was cancelled"
+            so_far = json.loads(entry.read_text())
+            assert 16 <= so_far["samples"] < 4096 and so_far["noise"] > 0
+            assert (folder / "results/pictures/on-1.png").read_bytes().startswith(b"\x89PNG")
+            assert not (folder / "results/pictures/on-1.exr").exists(), "the picture with its variances is that of all samples"
+        run_worker(folder)
+        made[name] = [(folder / f"results/pictures/on-1{e}").read_bytes() for e in (".exr", ".json", "-columns.csv")]
+        if name == "ended":
+            assert json.loads(made[name][1])["noise"] < 0.5 * so_far["noise"] or so_far["samples"] >= 1024
+    assert made["whole"] == made["ended"]
+    entry, rows = json.loads(made["whole"][1]), made["whole"][2].decode().splitlines()
+    assert entry["samples"] == 4096 and rows[0] == "x_mm,r,g,b,r_se,g_se,b_se" and len(rows) == 17
+    columns = [[float(x) for x in row.split(",")] for row in rows[1:]]
+    assert [c[0] for c in columns] == pytest.approx([40 * ((i + 0.5) / 16 - 0.5) for i in range(16)], rel=1e-5)
+    assert [sum(c[k] for c in columns) / 16 for k in (1, 2, 3)] == pytest.approx(entry["mean"], rel=1e-4)
+
+
+def test_a_drape_with_and_without_the_black_sheet(real):
+    """Lit from below, light comes through a drape without the sheet and none, but at its edges, with it."""
+    below = {"on": "drape", "size_mm": 4, "radius_mm": 1, "width_mm": 4, **VIEW, "light_theta_deg": 150}
+    job, done = run(real, document({**below, "black_sheet": False}, {**below, "black_sheet": True}, {**below, "light_theta_deg": 30}))
+    assert done["state"] == "succeeded", done["error"]
+    through, none, above = [sum(p["mean"]) for p in done["result"]["pictures"]]
+    assert through > 5 * none, done["result"]["pictures"]
+    assert above > 0
+    files = {f["path"] for f in real.get(f"/v1/jobs/{job}/results").json()["files"]}
+    assert "pictures/on-1.obj" in files and "pictures/on-2.obj" not in files, "one mesh for the same drape"
+    mesh = real.get(f"/v1/jobs/{job}/results/pictures/on-1.obj").content
+    assert mesh.count(b"\nv ") == mesh.count(b"\nvt ") == 257**2 and mesh.count(b"\nf ") == 256**2
+
+
+def test_a_cylinder_may_be_wrapped_all_around(real):
+    """The lamp below: only a cloth that goes on around the cylinder shows light at its sides, the black sheet inside."""
+    view = {"on": "cylinder", "radius_mm": 1, "width_mm": 3, **VIEW, "light_theta_deg": 100, "camera_theta_deg": 0, "samples": 64}
+    _, done = run(real, document(view, {**view, "wrap_deg": 300}))
+    assert done["state"] == "succeeded", done["error"]
+    half, around = [sum(p["mean"]) for p in done["result"]["pictures"]]
+    assert half > 0 and around > 0 and abs(half - around) < 0.5 * max(half, around)
+
+
 @pytest.mark.parametrize("obj, words", [
     ("v 0 0 0\nf 1 1 1\n", ["picture 2", "sheet.obj", "line 2", "texture coordinates"]),
     (SHEET + "f 1/1 2/4 3/3\n", ["picture 2", "triangle 1", "mirrored"])])
@@ -96,6 +155,8 @@ def test_a_cylinder_thinner_than_the_cloth_is_refused(real):
     ({"on": "sphere", **VIEW}, "pictures[0].on", "cylinder"),
     ({"on": "flat", **VIEW, "width_mm": 5000}, "pictures[0].width_mm", "camera.distance_cm"),
     ({"on": "flat", **VIEW, "light_theta_deg": 120}, "pictures[0].light_theta_deg", "black_sheet"),
+    ({"on": "drape", **VIEW, "light_theta_deg": 90}, "pictures[0].light_theta_deg", "plane"),
+    ({"on": "drape", **VIEW, "size_mm": 40, "radius_mm": 0.5}, "pictures[0].radius_mm", "0.8 to 400 mm"),
     ({"on": "mesh", "mesh_file": "a.png", **VIEW}, "pictures", "a mesh: .obj")])
 def test_bad_pictures_are_refused_at_submission(real, picture, field, word):
     assert word in problem(real.post("/v1/jobs", json=document(picture)), 422, "invalid", field)["detail"]
@@ -147,7 +208,7 @@ def test_the_command_renders_a_finished_job(real, tmp_path):
 def test_what_the_command_refuses(real, tmp_path):
     draft = real.create(document({"on": "flat", **VIEW}))
     for words, said in ([draft], "no fitted model"), ([draft, "--on", "sphere"], "NAME.obj"), ([draft, "--lamp", "45"], "such as 45,180"), \
-            ([draft, "--px", "1.5"], "whole number"), ([draft, "--json"], "has no option '--json'"), (["nonsense"], "nonsense"):
+            ([draft, "--px", "1.5"], "whole number"), ([draft, "--black-sheet", "maybe"], "yes or no"), ([draft, "--json"], "has no option '--json'"), (["nonsense"], "nonsense"):
         refused = render(real, *words)
         assert refused.returncode != 0 and said in refused.stderr, refused.stderr
 

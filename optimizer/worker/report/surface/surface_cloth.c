@@ -1,23 +1,65 @@
 #include "optimizer/worker/report/surface/surface_cloth.h"
+#include "base/files/durable.h"
 #include "base/option_id.h"
+#include "geometry/mesh/mesh_drape.h"
 #include "geometry/mesh/mesh_shapes.h"
 #include "optimizer/job/job_folder.h"
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
 
-/* Cells of a cylinder's mesh around half of it: chords are 1e-5 of the radius from the circle. */
-enum { CYLINDER_CELLS = 360 };
+/* Cells of a cylinder's mesh around all of it: chords are 1e-5 of the radius from the circle. */
+enum { CYLINDER_CELLS = 720 };
 
-static status make_mesh(const struct pipeline_context *c, const struct job_surface_picture *p, struct mesh *m,
-                        struct error *err)
+/* The number of the first picture that shows the same drape. */
+static size_t first_of_drape(const struct job_document *doc, size_t i)
 {
+    const struct job_surface_picture *p = doc->surface_picture;
+    for (size_t k = 0; k < i; k++)
+        if (p[k].on == JOB_ON_DRAPE && p[k].size_mm == p[i].size_mm && p[k].radius_mm == p[i].radius_mm) return k;
+    return i;
+}
+
+/* A drape is computed once and kept as a mesh file among the results, from which it is read, so that every attempt and
+ * whoever uses the file elsewhere have the same one. */
+static status make_drape(const struct pipeline_context *c, size_t i, struct mesh *m, struct error *err)
+{
+    const struct job_surface_picture *p = &c->doc->surface_picture[i];
+    char path[WORKER_PATH_BYTES], name[64], *text = NULL;
+    size_t n_bytes;
+    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "pictures", path);
+    status s = durable_make_folder(path, err);
+    snprintf(name, sizeof name, "pictures/on-%zu.obj", first_of_drape(c->doc, i) + 1);
+    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, name, path);
+    if (s == STATUS_OK && access(path, F_OK) != 0) {
+        struct progress silent = progress_silent(&c->progress);
+        s = mesh_drape(p->size_mm, p->radius_mm, &silent, m, err);
+        if (s == STATUS_OK) s = mesh_obj_text(m, &text, &n_bytes, err);
+        if (s == STATUS_OK) s = worker_folder_replace(c->folder, path, text, n_bytes, err);
+        free(text);
+        mesh_release(m);
+    }
+    return s == STATUS_OK ? mesh_read_obj(path, 1.0, m, err) : s;
+}
+
+static status make_mesh(const struct pipeline_context *c, size_t i, struct mesh *m, struct error *err)
+{
+    const struct job_surface_picture *p = &c->doc->surface_picture[i];
     char path[WORKER_PATH_BYTES];
-    if (p->on == JOB_ON_CYLINDER) return mesh_cylinder(p->radius_mm, p->size_mm, 0.5 * M_PI, CYLINDER_CELLS, m, err);
-    if (p->on == JOB_ON_FLAT)
+    switch (p->on) {
+    case JOB_ON_CYLINDER:
+        return mesh_cylinder(p->radius_mm, p->size_mm, p->wrap_deg * M_PI / 360.0,
+                             (size_t)ceil(CYLINDER_CELLS * p->wrap_deg / 360.0), m, err);
+    case JOB_ON_FLAT:
         return mesh_flat((const double[2]){p->size_mm, p->size_mm}, (const size_t[2]){1, 1}, m, err);
-    worker_folder_path(c->folder, JOB_FOLDER_INPUT, p->mesh_file, path);
-    return mesh_read_obj(path, p->mesh_unit_mm, m, err);
+    case JOB_ON_DRAPE:
+        return make_drape(c, i, m, err);
+    default:
+        worker_folder_path(c->folder, JOB_FOLDER_INPUT, p->mesh_file, path);
+        return mesh_read_obj(path, p->mesh_unit_mm, m, err);
+    }
 }
 
 /* The picture's name before the error, and the option of its mesh, if it has one, as the field. */
@@ -31,11 +73,13 @@ static status name_picture(size_t i, enum job_surface on, status s, struct error
 
 status surface_cloth_new(const struct pipeline_context *c, size_t i, struct scene **bent, struct error *err)
 {
+    const struct job_surface_picture *p = &c->doc->surface_picture[i];
     struct mesh m = {0};
-    status s = make_mesh(c, &c->doc->surface_picture[i], &m, err);
-    if (s == STATUS_OK) s = scene_bend(c->scene, &m, bent, err);
+    status s = make_mesh(c, i, &m, err);
+    if (s == STATUS_OK)
+        s = scene_bend(c->scene, &m, p->black_sheet < 0 ? c->doc->black_sheet : p->black_sheet != 0, bent, err);
     mesh_release(&m);
-    return name_picture(i, c->doc->surface_picture[i].on, s, err);
+    return name_picture(i, p->on, s, err);
 }
 
 status surface_cloth_check(const struct pipeline_context *c, struct error *err)

@@ -5,8 +5,8 @@
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_pictures.h"
 #include "optimizer/worker/report/surface/surface_cloth.h"
+#include "optimizer/worker/report/surface/surface_passes.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
-#include "renderer/transport/render.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -16,7 +16,7 @@
 enum { STREAM = 4000 };
 static const double mm = 1e-3;
 
-static const char *const surface_name[] = {"flat", "cylinder", "mesh"};
+static const char *const surface_name[] = {"flat", "cylinder", "drape", "mesh"};
 
 double surface_pictures_paths(const struct pipeline_context *c)
 {
@@ -43,11 +43,10 @@ static double exposure_of(const struct image *im)
     return sum > 0.0 ? medium * (double)n_lit / sum : 1.0;
 }
 
-/* Mean radiance of each channel, and the root mean square of the pixels' standard errors over the mean brightness of
- * what is not black. */
-static json_t *picture_json(const struct job_surface_picture *p, const char *name, const struct image *im,
-                            double exposure)
+/* Mean radiance of each channel, and the root mean square of the pixels' standard errors over the mean brightness. */
+static json_t *picture_json(const struct job_surface_picture *p, const struct surface_passes *so_far, double exposure)
 {
+    const struct image *im = &so_far->image;
     double mean[3] = {0.0, 0.0, 0.0}, variance = 0.0;
     size_t n = im->width * im->height;
     for (size_t i = 0; i < n; i++)
@@ -57,15 +56,70 @@ static json_t *picture_json(const struct job_surface_picture *p, const char *nam
         }
     double brightness = (mean[0] + mean[1] + mean[2]) / 3.0;
     char file[80];
-    snprintf(file, sizeof file, "pictures/%s.exr", name);
-    return json_pack("{s:s, s:s, s:[o, o, o], s:o, s:o}", "file", file, "on", surface_name[p->on], "mean",
-                     json_number(mean[0]), json_number(mean[1]), json_number(mean[2]), "noise",
+    snprintf(file, sizeof file, "pictures/%s.exr", so_far->name);
+    return json_pack("{s:s, s:s, s:I, s:[o, o, o], s:o, s:o}", "file", file, "on", surface_name[p->on], "samples",
+                     (json_int_t)so_far->n_sample, "mean", json_number(mean[0]), json_number(mean[1]),
+                     json_number(mean[2]), "noise",
                      json_number(brightness > 0.0 && p->sample > 1 ? sqrt(variance) / brightness : NAN), "png_exposure",
                      json_number(exposure));
 }
 
-static status render(struct pipeline_context *c, size_t i, const struct progress *progress, struct image *im,
-                     struct error *err)
+/* Means over the columns of the picture, as profiles across a cylinder are compared. */
+static status write_columns(const struct pipeline_context *c, const struct job_surface_picture *p,
+                            const struct surface_passes *done, struct error *err)
+{
+    const struct image *im = &done->image;
+    char *text = NULL, path[WORKER_PATH_BYTES], relative[64];
+    size_t n_byte;
+    FILE *f = open_memstream(&text, &n_byte);
+    if (f == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write a table: no memory");
+    fputs("x_mm,r,g,b,r_se,g_se,b_se\n", f);
+    for (size_t x = 0; x < im->width; x++) {
+        double sum[6] = {0.0};
+        for (size_t y = 0; y < im->height; y++)
+            for (int k = 0; k < 6; k++) sum[k] += (double)im->pixel[(y * im->width + x) * im->n_channel + (size_t)k];
+        fprintf(f, "%.6g", p->width_mm * (((double)x + 0.5) / (double)im->width - 0.5));
+        for (int k = 0; k < 6; k++) fprintf(f, ",%.6g", (k < 3 ? sum[k] : sqrt(sum[k])) / (double)im->height);
+        fputc('\n', f);
+    }
+    status s = fclose(f) == 0 ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot write a table: no memory");
+    snprintf(relative, sizeof relative, "pictures/%s-columns.csv", done->name);
+    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, relative, path);
+    if (s == STATUS_OK) s = worker_folder_replace(c->folder, path, text, n_byte, err);
+    free(text);
+    return s;
+}
+
+/* The picture so far as PNG; in the end also as EXR, and its columns. */
+static status write_picture(struct pipeline_context *c, const struct job_surface_picture *p,
+                            const struct surface_passes *so_far, double exposure, struct error *err)
+{
+    bool whole = so_far->n_sample == p->sample;
+    status s = result_image_write(c, &so_far->image, "pictures", so_far->name, exposure, whole, err);
+    return s == STATUS_OK && whole ? write_columns(c, p, so_far, err) : s;
+}
+
+/* The entry of result.json lies beside the picture and is written last: a picture is finished when its entry has all
+ * samples. *out: the entry, of which the caller has a reference. */
+static status write_entry(struct pipeline_context *c, const char *path, const struct job_surface_picture *p,
+                          const struct surface_passes *so_far, json_t **out, struct error *err)
+{
+    double exposure = exposure_of(&so_far->image);
+    status s = write_picture(c, p, so_far, exposure, err);
+    if (s != STATUS_OK) return s;
+    json_t *entry = picture_json(p, so_far, exposure);
+    char *text = entry != NULL ? json_dumps(entry, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
+    s = text != NULL ? worker_folder_replace(c->folder, path, text, strlen(text), err)
+                     : error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
+    free(text);
+    json_decref(*out);
+    *out = entry;
+    return s;
+}
+
+/* Renders pass by pass until all samples are there. */
+static status render(struct pipeline_context *c, size_t i, const char *entry_path, const struct progress *progress,
+                     struct surface_passes *so_far, json_t **entry, struct error *err)
 {
     const struct job_surface_picture *p = &c->doc->surface_picture[i];
     const struct pipeline_model *model = &c->model[pipeline_best_model(c)];
@@ -87,40 +141,35 @@ static status render(struct pipeline_context *c, size_t i, const struct progress
                                      .n_sample = p->sample,
                                      .seed = c->doc->seed ^ 0x73757266616365u,
                                      .stream = (uint32_t)(STREAM + i)};
-    s = render_run(&q, c->pool, progress, im, err);
+    while (s == STATUS_OK && so_far->n_sample < p->sample) {
+        s = surface_passes_add(c, &q, progress, so_far, err);
+        if (s == STATUS_OK) s = write_entry(c, entry_path, p, so_far, entry, err);
+    }
+    if (s == STATUS_OK && *entry == NULL) s = write_entry(c, entry_path, p, so_far, entry, err);
     scene_free(bent);
     return s == STATUS_OK || s == STATUS_CANCELLED ? s : error_prefix(err, s, "picture %zu", i + 1);
 }
 
-/* The entry of result.json lies beside the picture and is written last, so that it marks a finished one. */
-static status write_entry(struct pipeline_context *c, const char *path, json_t *entry, struct error *err)
-{
-    char *text = entry != NULL ? json_dumps(entry, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
-    status s = text != NULL ? worker_folder_replace(c->folder, path, text, strlen(text), err)
-                            : error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
-    free(text);
-    if (s == STATUS_OK)
-        json_array_append_new(c->surface_pictures, entry);
-    else
-        json_decref(entry);
-    return s;
-}
-
 static status write_one(struct pipeline_context *c, size_t i, const struct progress *progress, struct error *err)
 {
+    const struct job_surface_picture *p = &c->doc->surface_picture[i];
     char name[32], relative[64], path[WORKER_PATH_BYTES];
-    struct image im = {0};
+    struct surface_passes so_far;
     snprintf(name, sizeof name, "on-%zu", i + 1);
     snprintf(relative, sizeof relative, "pictures/%s.json", name);
     worker_folder_path(c->folder, JOB_FOLDER_RESULTS, relative, path);
     json_t *entry = json_load_file(path, 0, NULL);
-    if (entry != NULL) return json_array_append_new(c->surface_pictures, entry) == 0 ? STATUS_OK : STATUS_NO_MEMORY;
-    status s = render(c, i, progress, &im, err);
-    if (s != STATUS_OK) return s;
-    double exposure = exposure_of(&im);
-    s = result_image_write(c, &im, "pictures", name, exposure, true, err);
-    if (s == STATUS_OK) s = write_entry(c, path, picture_json(&c->doc->surface_picture[i], name, &im, exposure), err);
-    image_release(&im);
+    if (entry != NULL && json_integer_value(json_object_get(entry, "samples")) == (json_int_t)p->sample)
+        return json_array_append_new(c->surface_pictures, entry) == 0 ? STATUS_OK : STATUS_NO_MEMORY;
+    json_decref(entry);
+    entry = NULL;
+    status s = surface_passes_start(c, name, p->px, p->px, &so_far, err);
+    if (s == STATUS_OK) s = render(c, i, path, progress, &so_far, &entry, err);
+    if (s == STATUS_OK)
+        json_array_append_new(c->surface_pictures, entry);
+    else
+        json_decref(entry);
+    surface_passes_release(&so_far);
     return s;
 }
 

@@ -109,11 +109,33 @@ static void shapes_are_sound(void **state)
     assert_int_equal(mesh_cylinder(15.0, 20.0, 4.0, 100, &m, NULL), STATUS_INVALID);
 }
 
+/* What is written is read again as the same mesh, to the digits written. */
+static void a_written_mesh_is_read_again(void **state)
+{
+    struct mesh m, read;
+    struct error err = {0};
+    char *text;
+    size_t n;
+    const char *path = scratch_path(state, "b.obj");
+    assert_int_equal(mesh_cylinder(15.0, 20.0, 1.0, 7, &m, &err), STATUS_OK);
+    assert_int_equal(mesh_obj_text(&m, &text, &n, &err), STATUS_OK);
+    scratch_write(path, text, n);
+    free(text);
+    if (mesh_read_obj(path, 1.0, &read, &err) != STATUS_OK) fail_msg("%s", err.text);
+    assert_int_equal(read.n_triangle, m.n_triangle);
+    assert_memory_equal(read.triangle, m.triangle, m.n_triangle * sizeof *m.triangle);
+    for (size_t i = 0; i < m.n_position; i++)
+        for (int k = 0; k < 3; k++) assert_true(fabs(read.position_mm[i][k] - m.position_mm[i][k]) <= 5e-6 * 20.0);
+    mesh_release(&read);
+    mesh_release(&m);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(polygons_become_triangles, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(equal_positions_become_one, scratch_folder_setup, scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(a_written_mesh_is_read_again, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(faults_are_named, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test(shapes_are_sound),
     };

@@ -32,7 +32,8 @@ static struct scene *bend(const struct scene *flat, struct mesh *m)
 {
     struct scene *s = NULL;
     struct error err = {0};
-    if (mesh_check(m, &err) != STATUS_OK || scene_bend(flat, m, &s, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (mesh_check(m, &err) != STATUS_OK || scene_bend(flat, m, scene_has_black_sheet(flat), &s, &err) != STATUS_OK)
+        fail_msg("%s", err.text);
     mesh_release(m);
     return s;
 }
@@ -249,7 +250,7 @@ static void a_surface_that_bends_too_tightly_is_refused(void **state)
     hand_weave_small(&f);
     struct scene *flat = flat_scene(&f, false);
     assert_int_equal(mesh_cylinder(0.5 * scene_thickness_mm(flat), 1, 1.5, 100, &m, NULL), STATUS_OK);
-    assert_int_equal(scene_bend(flat, &m, &bent, &err), STATUS_INVALID);
+    assert_int_equal(scene_bend(flat, &m, false, &bent, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "folds over itself"));
     assert_non_null(strstr(err.text, "triangle"));
     mesh_release(&m);
