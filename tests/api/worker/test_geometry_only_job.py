@@ -3,9 +3,10 @@ when the first job is deleted meanwhile."""
 import json
 import os
 import subprocess
+import time
 
 import pytest
-from daemon_under_test import program
+from daemon_under_test import problem, program
 from small_cloth import TABLE
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
@@ -57,9 +58,12 @@ def test_geometry_alone_and_a_job_that_goes_on_from_it(real, scan):
     assert real.delete(f"/v1/jobs/{first}").status_code in (202, 204)
     third = start(real, {"geometry": {"job": second}, **ROWS}, [("rows.csv", "measurements", TABLE.encode())])
     assert real.wait_state(third, "succeeded", timeout_s=120)["result"]["geometry"]["n_fiber"] == made["geometry"]["n_fiber"]
-    lost = start(real, {"geometry": {"job": first}, **ROWS}, [("rows.csv", "measurements", TABLE.encode())])
-    error = real.wait_state(lost, "failed", timeout_s=60)["error"]
-    assert error["field"] == "geometry.job" and "there is no such job" in error["text"]
+    until = time.monotonic() + 30
+    while real.get(f"/v1/jobs/{first}").status_code != 404 and time.monotonic() < until:
+        time.sleep(0.05)
+    lost = real.create({"sample": "cloth", "geometry": {"job": first}, **ROWS})
+    real.upload(lost, "rows.csv", TABLE.encode(), "measurements")
+    assert "does not exist" in problem(real.post(f"/v1/jobs/{lost}/start"), 422, "invalid", "geometry.job")["detail"]
 
 
 def reconstruct(d, *words):
