@@ -207,8 +207,10 @@ def test_the_command_renders_a_finished_job(real, tmp_path):
 
 def test_what_the_command_refuses(real, tmp_path):
     draft = real.create(document({"on": "flat", **VIEW}))
-    for words, said in ([draft], "no fitted model"), ([draft, "--on", "sphere"], "NAME.obj"), ([draft, "--lamp", "45"], "such as 45,180"), \
-            ([draft, "--px", "1.5"], "whole number"), ([draft, "--black-sheet", "maybe"], "yes or no"), ([draft, "--json"], "has no option '--json'"), (["nonsense"], "nonsense"):
+    cases = [([draft], "no fitted model"), ([draft, "--on", "sphere"], "NAME.obj"), ([draft, "--lamp", "45"], "such as 45,180"),
+             ([draft, "--px", "1.5"], "whole number"), ([draft, "--black-sheet", "maybe"], "yes or no"),
+             ([draft, "--json"], "has no option '--json'"), (["nonsense"], "nonsense")]
+    for words, said in cases:
         refused = render(real, *words)
         assert refused.returncode != 0 and said in refused.stderr, refused.stderr
 
