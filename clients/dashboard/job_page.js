@@ -8,6 +8,7 @@ import { duration, el, isNumber, percent, percentWithError, refill, size, stateT
 import { qualityCard } from "./quality_card.js";
 import { channelErrors, choiceOf, configurations, fiberFile, fitted, models, radiusSearch, residuals, sliceFiles } from "./result_view.js";
 import { getJson, poll, sendJson } from "./server_link.js";
+import { SurfacePictures } from "./surface_card.js";
 
 const SHOWN_WARNINGS = 2;
 const LIVE = new Set(["queued", "running", "paused"]);
@@ -106,11 +107,11 @@ function downloads(job, list) {
 
 export function jobPage(page, id) {
   const head = el("div", { class: "head" }), stages = el("div", { class: "stages" }), facts = el("div", { class: "facts" }), verdict = el("div"), notes = el("div");
-  const fitCard = el("div"), curveCard = el("div"), results = el("div", { id: "results" }), logNode = el("pre", { class: "log" });
-  const charts = new JobCharts(fitCard, curveCard), log = new LogTail(logNode);
+  const fitCard = el("div"), curveCard = el("div"), surfaces = el("div"), results = el("div", { id: "results" }), logNode = el("pre", { class: "log" });
+  const charts = new JobCharts(fitCard, curveCard), log = new LogTail(logNode), pictures = new SurfacePictures(surfaces, id);
   const logLink = el("a", { href: `/v1/jobs/${id}/log`, target: "_blank" }, "whole log");
   page.append(el("section", { class: "card", id: "state" }, head, stages, verdict, facts, notes),
-    el("div", { class: "columns" }, card("Fit", fitCard), card("Parameters over the steps", curveCard)), results,
+    el("div", { class: "columns" }, card("Fit", fitCard), card("Parameters over the steps", curveCard)), surfaces, results,
     el("section", { class: "card" }, el("h2", {}, "Log ", el("small", {}, "its last lines; ", logLink)), logNode));
   let about = null, generation = null, closeFibers = null, gone = false;
 
@@ -163,7 +164,7 @@ export function jobPage(page, id) {
     job.parameters = job.result?.parameters ?? null;
     if (gone) return 5;
     document.title = `${job.state === "running" ? `${Math.round(100 * job.fraction)} % ` : ""}${job.sample} – Selvedge`;
-    if (job.generation !== generation) { generation = job.generation; log.reset(); results.replaceChildren(); closeFibers?.(); closeFibers = null; }
+    if (job.generation !== generation) { generation = job.generation; log.reset(); pictures.reset(); results.replaceChildren(); closeFibers?.(); closeFibers = null; }
     refill(head, [job.sample, job.state, job.cancel_requested, job.missing_files], () => [el("h1", {}, job.sample), stateTag(job.state), el("span", { class: "space" }), ...buttons(job)]);
     refill(stages, [job.state, job.i_stage, job.stage_fraction], () => stagesOf(job, about.stages));
     refill(facts, [job.state, job.message, job.fraction, job.eta_s, job.step, job.objective, job.attempt, job.peak_rss_bytes, job.finished_unix_s], () => factsOf(job));
@@ -171,8 +172,9 @@ export function jobPage(page, id) {
     refill(notes, [job.warnings, job.error, job.state, job.missing_files], () => notesOf(job));
     await charts.update(job);
     await log.update(id);
+    await pictures.update(job);
     await showResults(job);
     return job.state === "running" ? 1 : LIVE.has(job.state) ? 2 : 10;
   });
-  return () => { gone = true; poller.stop(); charts.destroy(); closeFibers?.(); };
+  return () => { gone = true; poller.stop(); charts.destroy(); pictures.reset(); closeFibers?.(); };
 }

@@ -151,6 +151,30 @@ def test_corrections(real, browser, tmp_path):
     assert complaints(browser) == []
 
 
+def test_pictures_grow_on_the_page(real, browser, tmp_path):
+    """A picture is shown while it is rendered, with its samples and its noise, which falls; in the end it is whole."""
+    url, _ = real
+    (tmp_path / "cloth.hair").write_bytes(small_cloth.hair(layers=3))
+    view = {"light_theta_deg": 45, "light_phi_deg": 0, "camera_theta_deg": 45, "camera_phi_deg": 180, "width_mm": 3}
+    (tmp_path / "job.json").write_text(json.dumps({
+        "sample": "on surfaces", "fibers": {"file": "cloth.hair"},
+        "pictures": [{"on": "cylinder", "radius_mm": 1, **view, "px": 32, "samples": 16}, {"on": "flat", **view, "px": 32, "samples": 2048}],
+        "fit": {"fixed": {"C_R": [0.1] * 3, "C_TT": [0.6, 0.4, 0.3], "beta_R": 6, "beta_TT": 12, "gamma_TT": 30}, "model": "two_lobe.v1"}}))
+    job = selvedge.Client(url).submit(str(tmp_path / "job.json"))
+    browser.get(f"{url}/#{job.id}")
+    wait_for(browser, "document.querySelector('#surfaces .tag') && / of 2048 samples/.test(document.querySelector('#surfaces').textContent)", 60)
+    keep(browser, "pictures-growing")
+    job.wait()
+    wait_for(browser, "document.querySelectorAll('#surfaces figure').length === 2 && !document.querySelector('#surfaces .tag')", 60)
+    noise = [p["noise"] for p in job.result().raw["pictures"]]
+    shown = [e.text for e in browser.find_elements(By.CSS_SELECTOR, "#surfaces figcaption")]
+    assert [t.split()[0] for t in shown] == ["cylinder", "flat"] and all("θ 45°" in t for t in shown)
+    assert all(abs(float(t.split("noise")[1].split()[0]) - 100 * n) < 0.06 * 100 * n + 0.06 for t, n in zip(shown, noise)), (shown, noise)
+    assert browser.execute_script("return [...document.querySelectorAll('#surfaces img')].every(i => i.complete && i.naturalWidth === 32)")
+    keep(browser, "pictures")
+    assert complaints(browser) == []
+
+
 def test_failed_job_and_hostile_name(stub, browser):
     url, folder = stub
     job, _ = submit(url, folder, "failing <img src=x onerror=alert(1)>")

@@ -123,10 +123,12 @@ static status check_picture(const struct job_document *doc, size_t i, struct err
         return error_set_field(err, STATUS_INVALID, field, "'%s' is %g: allowed is at most camera.distance_cm (%g cm)",
                                field, p->width_mm, doc->camera_distance_cm);
     snprintf(field, sizeof field, "pictures[%zu].light_theta_deg", i);
-    if (p->light_theta_deg == 90.0 || (p->on == JOB_ON_FLAT && sheet && p->light_theta_deg > 90.0))
-        return error_set_field(err, STATUS_INVALID, field, "'%s' is %g: %s", field, p->light_theta_deg,
-                               p->light_theta_deg == 90.0 ? "the lamp may not lie in the plane of the orbit center"
-                                                          : "a lamp behind a flat piece needs 'black_sheet' false");
+    if (p->on == JOB_ON_FLAT && (p->light_theta_deg == 90.0 || (sheet && p->light_theta_deg > 90.0)))
+        return error_set_field(
+            err, STATUS_INVALID, field,
+            "'%s' is %g: a flat piece is lit from above, below 90 degrees, or from behind, above 90, "
+            "with 'black_sheet' false",
+            field, p->light_theta_deg);
     snprintf(field, sizeof field, "pictures[%zu].radius_mm", i);
     if (p->on == JOB_ON_DRAPE && !(p->radius_mm >= 0.02 * p->size_mm && p->radius_mm <= 10.0 * p->size_mm))
         return error_set_field(err, STATUS_INVALID, field,
