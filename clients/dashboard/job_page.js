@@ -110,8 +110,9 @@ export function jobPage(page, id) {
   const fitCard = el("div"), curveCard = el("div"), surfaces = el("div"), results = el("div", { id: "results" }), logNode = el("pre", { class: "log" });
   const charts = new JobCharts(fitCard, curveCard), log = new LogTail(logNode), pictures = new SurfacePictures(surfaces, id);
   const logLink = el("a", { href: `/v1/jobs/${id}/log`, target: "_blank" }, "whole log");
+  const curves = el("div", { class: "columns" }, card("Fit", fitCard), card("Parameters over the steps", curveCard));
   page.append(el("section", { class: "card", id: "state" }, head, stages, verdict, facts, notes),
-    el("div", { class: "columns" }, card("Fit", fitCard), card("Parameters over the steps", curveCard)), surfaces, results,
+    curves, surfaces, results,
     el("section", { class: "card" }, el("h2", {}, "Log ", el("small", {}, "its last lines; ", logLink)), logNode));
   let about = null, generation = null, closeFibers = null, gone = false;
 
@@ -170,6 +171,7 @@ export function jobPage(page, id) {
     refill(facts, [job.state, job.message, job.fraction, job.eta_s, job.step, job.objective, job.attempt, job.peak_rss_bytes, job.finished_unix_s], () => factsOf(job));
     refill(verdict, job.verdict, () => [verdictOf(job.verdict)]);
     refill(notes, [job.warnings, job.error, job.state, job.missing_files], () => notesOf(job));
+    curves.hidden = !job.document?.photographs && !job.document?.measurements; // nothing is fitted
     await charts.update(job);
     await log.update(id);
     await pictures.update(job);
