@@ -122,8 +122,8 @@ def main():
                                     dict(environment, CMOCKA_MESSAGE_OUTPUT="xml", CMOCKA_XML_FILE=junit))
         totals.add(name, junit, code, output, seconds)
 
-    def python_tests():
-        for kind in ["api"] if arguments.quick else ["api", "crash", "browser", "real"]:
+    def python_tests(kinds):
+        for kind in kinds:
             for source in sorted(pathlib.Path(ROOT, "tests", kind).rglob("test_*.py")):
                 name = str(source.relative_to(os.path.join(ROOT, "tests")))[:-3]  # "api/worker/test_skill"
                 if wanted(name):
@@ -143,14 +143,17 @@ def main():
     def lanes(n):
         return concurrent.futures.ThreadPoolExecutor(max_workers=n)
 
-    # quick: two lanes compute, two wait for daemons most of the time; otherwise everything comes one after the other
-    with tempfile.TemporaryDirectory() as folder, lanes(2 if arguments.quick else 1) as computing, lanes(2) as waiting:
+    # quick: two lanes compute, two wait for daemons most of the time; otherwise one of each, and then one after the other
+    # the tests that kill daemons, drive a browser, or take all cores
+    n_lane = 2 if arguments.quick else 1
+    with tempfile.TemporaryDirectory() as folder, lanes(n_lane) as computing, lanes(n_lane) as waiting:
         runs = [computing.submit(run_check, name) for name in checks()]
         runs += [computing.submit(run_c, folder, name) for name in c_tests()]
-        python = waiting if arguments.quick else computing
-        runs += [python.submit(run_python, folder, name) for name in python_tests()]
+        runs += [waiting.submit(run_python, folder, name) for name in python_tests(["api"])]
         for done in runs:
             done.result()
+        for name in python_tests([] if arguments.quick else ["crash", "browser", "real"]):
+            run_python(folder, name)
 
     tail = f", {totals.skipped} skipped" if totals.skipped else ""
     print(f"{totals.passed} passed, {totals.failed} failed{tail}", flush=True)
