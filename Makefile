@@ -50,7 +50,7 @@ folder_server := server
 LIBS := $(foreach p,$(PARTS),$(BUILD)/lib/lib$(p).a)
 
 PROGRAMS := $(BUILD)/bin/selvedge $(BUILD)/bin/selvedged $(BUILD)/bin/selvedge-worker $(BUILD)/bin/selvedge-phantom $(BUILD)/bin/selvedge-camera
-LINK_BASE := -lz -lm -pthread
+LINK_BASE := -lz -lm -pthread -Wl,--undefined=processor_required
 LINK_GEOMETRY := $(shell pkg-config --libs libtiff-4 libzstd 2>/dev/null) -Wl,--as-needed -lopencv_mcc -lopencv_aruco -Wl,--no-as-needed -lopencv_imgproc -lopencv_core -lstdc++ $(LINK_BASE)
 LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lseccomp -lraw_r -ljpeg -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
@@ -98,6 +98,11 @@ $(BUILD)/obj/%.cpp.o: %.cpp
 	@mkdir -p $(@D)
 	@echo "  C++  $<"
 	@$(CXX) $(CXXFLAGS_ALL) -MMD -MP -c $< -o $@
+
+# a program says what its processor lacks; the compiler may use that everywhere but here
+ifeq ($(ARCH),x86_64)
+$(BUILD)/obj/base/machine/processor.c.o: CFLAGS_ALL += -march=x86-64
+endif
 
 L = $(BUILD)/lib/lib
 $(BUILD)/bin/selvedge-worker: $(BUILD)/obj/optimizer/worker/worker_main.c.o $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a

@@ -45,7 +45,8 @@ static const char usage[] =
     "  --rebuild         make the database anew from backup and job folders; with --resume,\n"
     "                    jobs that were running are queued\n"
     "  --quarantine list, --quarantine restore ID\n"
-    "                    folders that no job in the database had\n";
+    "                    folders that no job in the database had\n"
+    "  --doctor [JOB]    examine this machine and the data folder, or a job: its id or its folder\n";
 
 enum { LOCK_TRIES = 41, LOCK_PAUSE_US = 50000 };
 
@@ -78,23 +79,13 @@ struct token_wish {
 static int read_options(int argc, char **argv, struct settings *s, struct token_wish *wish,
                         struct rescue_request *rescue, struct error *err)
 {
-    static const struct option option[] = {{"config", 1, NULL, 'c'},
-                                           {"data", 1, NULL, 0},
-                                           {"port", 1, NULL, 1},
-                                           {"listen", 1, NULL, 2},
-                                           {"worker", 1, NULL, 3},
-                                           {"web", 1, NULL, 4},
-                                           {"set", 1, NULL, 's'},
-                                           {"print-config", 0, NULL, 'p'},
-                                           {"make-token", 1, NULL, 't'},
-                                           {"scope", 1, NULL, 'o'},
-                                           {"version", 0, NULL, 'v'},
-                                           {"help", 0, NULL, 'h'},
-                                           {"backup", 1, NULL, 'b'},
-                                           {"rebuild", 0, NULL, 'r'},
-                                           {"resume", 0, NULL, 'm'},
-                                           {"quarantine", 1, NULL, 'q'},
-                                           {NULL, 0, NULL, 0}};
+    static const struct option option[] = {
+        {"config", 1, NULL, 'c'},     {"data", 1, NULL, 0},           {"port", 1, NULL, 1},
+        {"listen", 1, NULL, 2},       {"worker", 1, NULL, 3},         {"web", 1, NULL, 4},
+        {"set", 1, NULL, 's'},        {"print-config", 0, NULL, 'p'}, {"make-token", 1, NULL, 't'},
+        {"scope", 1, NULL, 'o'},      {"version", 0, NULL, 'v'},      {"help", 0, NULL, 'h'},
+        {"backup", 1, NULL, 'b'},     {"rebuild", 0, NULL, 'r'},      {"resume", 0, NULL, 'm'},
+        {"quarantine", 1, NULL, 'q'}, {"doctor", 0, NULL, 'd'},       {NULL, 0, NULL, 0}};
     for (int pass = 0; pass < 2; pass++) {
         optind = 1;
         for (int c; (c = getopt_long(argc, argv, "", option, NULL)) != -1;) {
@@ -107,8 +98,10 @@ static int read_options(int argc, char **argv, struct settings *s, struct token_
             if (c == 's' && pass == 1) r = set_pair(s, optarg, err);
             if (c == 'm') rescue->resume = true;
             if (c == 'b' || c == 'q') rescue->word = optarg;
-            if (c == 'b' || c == 'q' || c == 'r')
-                rescue->command = c == 'b' ? RESCUE_BACKUP : c == 'q' ? RESCUE_QUARANTINE : RESCUE_REBUILD;
+            if (c == 'b') rescue->command = RESCUE_BACKUP;
+            if (c == 'q') rescue->command = RESCUE_QUARANTINE;
+            if (c == 'r') rescue->command = RESCUE_REBUILD;
+            if (c == 'd') rescue->command = RESCUE_DOCTOR;
             if (c < 5 && pass == 1) r = settings_set(s, option_key[c].key, optarg, err);
             if (c == 't') wish->name = optarg;
             if (c == 'o' && !access_scope_parse(optarg, &wish->scope))
@@ -328,6 +321,9 @@ int main(int argc, char **argv)
         r = lock_data(&settings, LOCK_TRIES, &lock_fd, &err);
     if (r == STATUS_OK) r = log_open(NULL, stderr, LOG_LEVEL_INFO, &log, &err);
     if (r == STATUS_OK && rescue.command != RESCUE_NONE) {
+        char worker[PATH_BYTES];
+        worker_path(&settings, worker);
+        rescue.worker = worker;
         pthread_sigmask(SIG_UNBLOCK, &signals, NULL);
         r = rescue_run(&settings, &rescue, stdout, &err);
     } else if (r == STATUS_OK)

@@ -54,7 +54,8 @@ status cli_submit_document(struct cli *cli, const json_t *document, const char *
                            struct error *err);
 /* The same, but a sample that was sent before gives the job that it gave then, by a key of the document and the content
  * of its files. Only a draft is uploaded and started, and it is started only if unchanged(context) returns true after
- * the upload; otherwise the draft is deleted and STATUS_STALE returned. */
+ * the upload; otherwise the draft is deleted and STATUS_STALE returned. Links are not followed, neither `folder` nor
+ * files in it. */
 status cli_submit_once(struct cli *cli, const json_t *document, const char *folder, bool (*unchanged)(void *context),
                        void *context, char id[CLI_ID_BYTES], struct error *err);
 /* Downloads the results of job `id` to a folder. */

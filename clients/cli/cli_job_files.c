@@ -119,6 +119,33 @@ status cli_job_files_list(const json_t *document, const char *folder, struct cli
     return s;
 }
 
+status cli_job_files_list_strict(const json_t *document, const char *folder, struct cli_file_list *list,
+                                 struct error *err)
+{
+    status s = cli_job_files_list(document, folder, list, err);
+    for (size_t i = 0; i < list->n_file; i++) list->file[i].no_links = true;
+    return s;
+}
+
+int cli_file_open(const struct cli_file *file)
+{
+    if (!file->no_links) return open(file->path, O_RDONLY | O_CLOEXEC);
+    char *folder = strdup(file->path);
+    char *slash = folder == NULL ? NULL : strrchr(folder, '/');
+    if (slash == NULL) {
+        free(folder);
+        errno = ENOMEM;
+        return -1;
+    }
+    *slash = '\0';
+    int at = open(folder, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    int fd = at < 0 ? -1 : openat(at, slash + 1, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC), failed = errno;
+    if (at >= 0) close(at);
+    free(folder);
+    errno = failed;
+    return fd;
+}
+
 void cli_job_files_release(struct cli_file_list *list)
 {
     for (size_t i = 0; i < list->n_file; i++) {
@@ -139,7 +166,7 @@ status cli_file_hash(struct cli_file *file, bool (*changed)(void *context, uint6
     crypto_hash_sha256_state hash;
     crypto_hash_sha256_init(&hash);
     file->n_bytes = 0;
-    int fd = open(file->path, O_RDONLY | O_CLOEXEC);
+    int fd = cli_file_open(file);
     if (fd < 0) {
         s = errno == ENOENT ? error_set(err, STATUS_NOT_FOUND,
                                         "input file '%s' does not exist (the job document names it)", file->path)

@@ -9,6 +9,7 @@
 #include <sodium.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 enum { DECLARE_AT_ONCE = 2000 /* files in a request: 300 bytes each leave them below its limit of 1 MiB */ };
 
@@ -117,9 +118,8 @@ static status hash_files(struct submit *u, struct error *err)
     u->n_before = u->n_now = u->n_total = 0;
     /* all sizes first, for the total of the progress bar */
     for (size_t i = 0; i < u->list.n_file && s == STATUS_OK; i++) {
-        FILE *f = fopen(u->list.file[i].path, "rb");
-        if (f != NULL && fseeko(f, 0, SEEK_END) == 0) u->n_total += (uint64_t)ftello(f);
-        if (f != NULL) fclose(f);
+        struct stat st;
+        if (stat(u->list.file[i].path, &st) == 0) u->n_total += (uint64_t)st.st_size;
     }
     for (size_t i = 0; i < u->list.n_file && s == STATUS_OK; i++) {
         u->name = u->list.file[i].name;
@@ -316,7 +316,7 @@ status cli_submit_once(struct cli *cli, const json_t *document, const char *fold
                        void *context, char id[CLI_ID_BYTES], struct error *err)
 {
     struct submit u = {.cli = cli, .document = json_deep_copy(document)};
-    status s = u.document != NULL ? cli_job_files_list(u.document, folder, &u.list, err)
+    status s = u.document != NULL ? cli_job_files_list_strict(u.document, folder, &u.list, err)
                                   : error_set(err, STATUS_NO_MEMORY, "cannot make the job document: out of memory");
     if (s == STATUS_OK) s = hash_files(&u, err);
     if (s == STATUS_OK) s = content_key(&u, err);

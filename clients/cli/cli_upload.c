@@ -104,7 +104,7 @@ status cli_upload_file(struct cli *cli, const struct cli_file *file, const char 
     bool known = false;
     int n_fruitless = 0;
     status s = STATUS_OK;
-    u.fd = open(file->path, O_RDONLY | O_CLOEXEC);
+    u.fd = cli_file_open(file);
     if (u.fd < 0) return error_set_errno(err, "cannot open input file '%s'", file->path);
     while (!known || u.offset < file->n_bytes) {
         bool again;

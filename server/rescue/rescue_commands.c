@@ -1,4 +1,5 @@
 #include "server/rescue/rescue_commands.h"
+#include "server/doctor/doctor.h"
 #include "server/jobs/job_paths.h"
 #include "server/rescue/quarantine.h"
 #include "server/rescue/rebuild.h"
@@ -13,7 +14,7 @@ status rescue_check(const struct rescue_request *q, struct error *err)
         return error_set(err, STATUS_INVALID, "--quarantine needs 'list' or 'restore', not '%.100s'", q->word);
     if (restore && q->operand == NULL)
         return error_set(err, STATUS_INVALID, "--quarantine restore needs the id of a job");
-    if (!restore && q->operand != NULL)
+    if (!restore && q->command != RESCUE_DOCTOR && q->operand != NULL)
         return error_set(err, STATUS_INVALID, "unexpected argument '%.200s'", q->operand);
     if (q->resume && q->command != RESCUE_REBUILD)
         return error_set(err, STATUS_INVALID, "--resume belongs to --rebuild");
@@ -47,6 +48,8 @@ status rescue_run(const struct settings *settings, const struct rescue_request *
     case RESCUE_QUARANTINE:
         return q->operand == NULL ? quarantine_list(settings, out, err)
                                   : quarantine_restore(settings, q->operand, out, err);
+    case RESCUE_DOCTOR:
+        return doctor_run(settings, q->worker, q->operand, out, err);
     case RESCUE_NONE:
         break;
     }

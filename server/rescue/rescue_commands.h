@@ -7,12 +7,13 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-enum rescue_command { RESCUE_NONE, RESCUE_BACKUP, RESCUE_REBUILD, RESCUE_QUARANTINE };
+enum rescue_command { RESCUE_NONE, RESCUE_BACKUP, RESCUE_REBUILD, RESCUE_QUARANTINE, RESCUE_DOCTOR };
 
 struct rescue_request {
     enum rescue_command command;
     const char *word;    /* value of the option: a file, or "list" or "restore" */
     const char *operand; /* NULL: none */
+    const char *worker;  /* path of the worker program, for the doctor */
     bool resume;
 };
 

@@ -110,7 +110,7 @@ void store_text(sqlite3_stmt *statement, int column, char *out, size_t n_out)
     snprintf(out, n_out, "%s", text == NULL ? "" : (const char *)text);
 }
 
-static status refuse_network(const char *path, struct error *err)
+status store_check_place(const char *path, struct error *err)
 {
     char folder[4096];
     snprintf(folder, sizeof folder, "%s", path);
@@ -196,7 +196,7 @@ static status open_store(const char *path, int create,
                          status (*prepare_schema)(struct store_link *, const char *, struct error *),
                          struct store **out, struct error *err)
 {
-    status s = refuse_network(path, err);
+    status s = store_check_place(path, err);
     if (s != STATUS_OK) return s;
     struct store *store = calloc(1, sizeof *store);
     if (store == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot open the database: out of memory");

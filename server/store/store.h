@@ -62,6 +62,10 @@ struct file_row {
 
 struct store;
 
+/* Whether a database may lie at this path: STATUS_UNSUPPORTED on a network file system, whose locks are not reliable;
+ * STATUS_IO. */
+status store_check_place(const char *path, struct error *err);
+
 /* STATUS_UNSUPPORTED on a network file system or for a newer schema. */
 status store_open(const char *path, struct store **store, struct error *err);
 /* Opens the database of a daemon that runs. It is not migrated: STATUS_CONFLICT when its version is not that of this

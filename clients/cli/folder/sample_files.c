@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 enum { PATH_ROOM = 4096 };
 
@@ -162,7 +163,12 @@ static status own_document(const char *folder, json_t **out, struct error *err)
     char path[PATH_ROOM];
     json_error_t where;
     snprintf(path, sizeof path, "%s/" SAMPLE_DOCUMENT, folder);
-    *out = json_load_file(path, JSON_REJECT_DUPLICATES, &where);
+    char name[] = SAMPLE_DOCUMENT;
+    const struct cli_file file = {.name = name, .path = path, .no_links = true};
+    int fd = cli_file_open(&file);
+    if (fd < 0) return error_set_errno(err, "cannot read " SAMPLE_DOCUMENT);
+    *out = json_loadfd(fd, JSON_REJECT_DUPLICATES, &where);
+    close(fd);
     if (json_is_object(*out)) return STATUS_OK;
     json_decref(*out);
     *out = NULL;

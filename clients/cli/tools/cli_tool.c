@@ -2,31 +2,63 @@
 
 #include "clients/cli/tools/cli_sibling.h"
 
+#include <stdint.h>
 #include <string.h>
 #include <unistd.h>
 
-static const char program[] = "selvedge-camera";
-static const char *const command[] = {"photo", "calibrate-camera"};
+/* option: what takes the place of the command's word; NULL: the word stays */
+static const struct {
+    const char *word, *program, *option;
+} command[] = {{"photo", "selvedge-camera", NULL},
+               {"calibrate-camera", "selvedge-camera", NULL},
+               {"doctor", "selvedged", "--doctor"}};
+enum { N_COMMAND = sizeof command / sizeof *command, MOST_ARGUMENTS = 60 };
+
+/* Where an installed service has them (config/selvedge.service). */
+static const char installed_settings[] = "/etc/selvedge/selvedge.conf", installed_data[] = "/var/lib/selvedge";
 
 bool cli_tool_knows(const char *word)
 {
-    for (size_t i = 0; i < sizeof command / sizeof *command; i++)
-        if (strcmp(command[i], word) == 0) return true;
+    for (size_t i = 0; i < N_COMMAND; i++)
+        if (strcmp(command[i].word, word) == 0) return true;
     return false;
 }
 
 const char *cli_tool_help(void)
 {
-    return "  photo FILE...      show what becomes of a photograph (needs no daemon)\n"
+    return "  doctor [JOB]       examine this machine and the service's data, or a job (needs no daemon)\n"
+           "  photo FILE...      show what becomes of a photograph (needs no daemon)\n"
            "  calibrate-camera   make the record of a camera's noise from dark and flat frames (needs no daemon)\n";
+}
+
+static bool names_a_service(char *const *argv)
+{
+    for (; *argv != NULL; argv++)
+        if (strncmp(*argv, "--config", 8) == 0 || strncmp(*argv, "--data", 6) == 0) return true;
+    return false;
 }
 
 status cli_tool_run(char **argv, struct error *err)
 {
     char path[CLI_SIBLING_BYTES];
-    cli_sibling(program, path);
-    execvp(path, argv);
+    const char *run[MOST_ARGUMENTS + 6];
+    size_t n = 0, i_command = 0;
+    while (strcmp(command[i_command].word, argv[1]) != 0) i_command++;
+    const char *option = command[i_command].option;
+    cli_sibling(command[i_command].program, path);
+    run[n++] = option == NULL ? argv[0] : path;
+    run[n++] = option == NULL ? argv[1] : option;
+    if (option != NULL && !names_a_service(argv) && access(installed_settings, R_OK) == 0) {
+        const char *const installed[] = {"--config", installed_settings, "--data", installed_data};
+        for (size_t i = 0; i < sizeof installed / sizeof *installed; i++) run[n++] = installed[i];
+    }
+    for (size_t i = 2; argv[i] != NULL; i++) {
+        if (n >= MOST_ARGUMENTS + 5) return error_set(err, STATUS_INVALID, "too many arguments");
+        run[n++] = argv[i];
+    }
+    run[n] = NULL;
+    execvp(path, (char *const *)(uintptr_t)run);
     return error_set(err, STATUS_NOT_FOUND,
                      "cannot run `selvedge %s`: the program '%s' is neither beside this one nor in PATH", argv[1],
-                     program);
+                     command[i_command].program);
 }

@@ -1,4 +1,4 @@
-/* Commands of `selvedge` that need no daemon and read pictures: another program of the product runs them, because the
+/* Commands of `selvedge` that need no daemon: another program of the product runs them, because the
  * client itself knows HTTP only. */
 #ifndef SELVEDGE_CLIENTS_CLI_TOOL_H
 #define SELVEDGE_CLIENTS_CLI_TOOL_H

@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <linux/capability.h>
 #include <linux/landlock.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -81,4 +82,11 @@ status sandbox_files_restrict(const struct sandbox_path *path, size_t n, int *ve
         s = error_set_errno(err, "cannot enter the sandbox");
     close(fd);
     return s;
+}
+
+void sandbox_files_drop_capabilities(void)
+{
+    struct __user_cap_header_struct header = {.version = _LINUX_CAPABILITY_VERSION_3};
+    struct __user_cap_data_struct none[_LINUX_CAPABILITY_U32S_3] = {{0}};
+    if (syscall(SYS_capset, &header, none) != 0) return; /* a process may always have less than it has */
 }

@@ -26,4 +26,8 @@ struct sandbox_path {
  * no_new_privs. *version: Landlock's version, or 0 where the kernel has none, which is no error. STATUS_IO. */
 status sandbox_files_restrict(const struct sandbox_path *path, size_t n, int *version, struct error *err);
 
+/* Gives up the capabilities of root for the program that this thread executes next, such as that to write to files
+ * whose mode forbids it. Needs no_new_privs; of other users it changes nothing. */
+void sandbox_files_drop_capabilities(void);
+
 #endif

@@ -149,6 +149,16 @@ static void list_files(const struct confine_files *files, const char *program, s
     job_document_free(doc);
 }
 
+/* A daemon that runs as root owns its jobs' folders, so its workers need no right to pass over modes of files. By hand
+ * root may run the job of another user. */
+static bool owns_everything(const struct confine_files *files)
+{
+    struct worker_folder folder = {.lock_fd = -1};
+    struct stat st;
+    snprintf(folder.path, sizeof folder.path, "%s", files->folder);
+    return files->document == NULL && !by_hand(&folder) && stat(files->folder, &st) == 0 && st.st_uid == geteuid();
+}
+
 static status execute_again(const char *program, char **argv, const struct confinement *c, struct error *err)
 {
     size_t n = 0;
@@ -179,6 +189,7 @@ status worker_confine(const struct confine_files *files, char **argv, struct err
     if (list.failed) s = error_set(err, STATUS_NO_MEMORY, "cannot make a sandbox: out of memory");
     if (s == STATUS_OK && HAS_SANDBOX) s = sandbox_files_restrict(list.item, list.n, &c.files_version, err);
     path_list_free(&list);
+    if (s == STATUS_OK && HAS_SANDBOX && owns_everything(files)) sandbox_files_drop_capabilities();
     return s == STATUS_OK ? execute_again(program, argv, &c, err) : s;
 }
 

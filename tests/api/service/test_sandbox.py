@@ -80,6 +80,19 @@ def test_nothing_outside_of_the_folder_is_written(hostile, tmp_path, act):
     assert "hostile: write: done" in inside.stderr
 
 
+def test_a_shared_checkpoint_cannot_be_changed(hostile, tmp_path):
+    """Files that two jobs have are for reading only (test_geometry_only_job.py), for a worker of root, too."""
+    folder = job_folder(tmp_path / "job")
+    (folder / "attempt.json").write_text('{"attempt":1,"token":"x"}')
+    (folder / "adopted").mkdir()
+    for name, mode, outcome in (("shared.bin", 0o400, "Permission denied"), ("own.bin", 0o600, "done")):
+        path = folder / "adopted" / name
+        path.write_text("kept")
+        path.chmod(mode)
+        done = run(hostile, folder, f"overwrite {path}", HOSTILE_TO="")
+        assert f"hostile: overwrite: {outcome}" in done.stderr, done.stderr
+
+
 @pytest.mark.parametrize("act", ["socket", "execve", "fork", "kill {pid}", "chmod {file}", "truncate {file}"])
 def test_a_forbidden_call_ends_the_worker(hostile, tmp_path, act):
     done = run(hostile, job_folder(tmp_path / "job"), act.format(pid=os.getpid(), file=tmp_path / "job" / "job.json"))

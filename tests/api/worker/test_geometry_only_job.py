@@ -54,6 +54,9 @@ def test_geometry_alone_and_a_job_that_goes_on_from_it(real, scan):
     hair = [real.get(f"/v1/jobs/{job}/results/fibers.hair").content for job in (first, second)]
     assert hair[0] == hair[1]
 
+    shared = [os.stat(os.path.join(real.data, "jobs", job, "work", "fibers", "fibers.bin")) for job in (first, second)]
+    assert shared[0].st_ino == shared[1].st_ino and shared[0].st_mode & 0o777 == 0o400, "no worker may write to what two jobs have"
+
     # Its own checkpoints: the first job may go, and the second can be retried or gone on from.
     assert real.delete(f"/v1/jobs/{first}").status_code in (202, 204)
     third = start(real, {"geometry": {"job": second}, **ROWS}, [("rows.csv", "measurements", TABLE.encode())])

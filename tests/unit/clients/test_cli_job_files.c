@@ -82,6 +82,43 @@ static void test_hash(void **state)
     assert_int_equal(cli_file_hash(&f, NULL, NULL, &err), STATUS_INVALID);
 }
 
+/* A strict file is opened only where neither it nor its folder is a link, also if it was a file when it was
+ * listed. */
+static void test_strict_files_are_no_links(void **state)
+{
+    (void)state;
+    char folder[] = "/tmp/selvedge_links_XXXXXX", file[64], link[64], linked_folder[64], through[96];
+    assert_non_null(mkdtemp(folder));
+    snprintf(file, sizeof file, "%s/file", folder);
+    snprintf(link, sizeof link, "%s/link", folder);
+    snprintf(linked_folder, sizeof linked_folder, "%s.link", folder);
+    snprintf(through, sizeof through, "%s/file", linked_folder);
+    FILE *f = fopen(file, "w");
+    assert_non_null(f);
+    fclose(f);
+    assert_int_equal(symlink(file, link), 0);
+    assert_int_equal(symlink(folder, linked_folder), 0);
+    char *const path[] = {file, link, through};
+    for (size_t i = 0; i < 3; i++) {
+        struct error err = {0};
+        struct cli_file at = {.path = path[i]};
+        assert_int_equal(cli_file_hash(&at, NULL, NULL, &err), STATUS_OK);
+        at.no_links = true;
+        assert_int_equal(cli_file_hash(&at, NULL, NULL, &err), i == 0 ? STATUS_OK : STATUS_IO);
+        assert_true(i == 0 || err.errno_value == (i == 1 ? ELOOP : ENOTDIR));
+    }
+    unlink(link);
+    unlink(file);
+    rmdir(folder);
+    unlink(linked_folder);
+    struct cli_file_list list;
+    json_t *document = json_loads("{\"measurements\":{\"file\":\"m.csv\"}}", 0, NULL);
+    assert_int_equal(cli_job_files_list_strict(document, "in", &list, NULL), STATUS_OK);
+    assert_true(list.n_file == 1 && list.file[0].no_links);
+    cli_job_files_release(&list);
+    json_decref(document);
+}
+
 int main(void)
 {
     if (sodium_init() < 0) return 1;
@@ -89,6 +126,7 @@ int main(void)
         cmocka_unit_test(test_every_file_once),
         cmocka_unit_test(test_bad_names),
         cmocka_unit_test(test_hash),
+        cmocka_unit_test(test_strict_files_are_no_links),
     };
     return cmocka_run_group_tests(test, NULL, NULL);
 }

@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 static const struct {
@@ -35,14 +36,16 @@ static bool stages_done(const struct worker_folder *f)
     return true;
 }
 
-/* Makes JOB/adopted/<name> a link to the other job's file, or removes it when there is none. */
+/* Makes JOB/adopted/<name> a link to the other job's file, or removes it when there is none. Files of two jobs are for
+ * reading only: checkpoints are replaced, never changed, and in its sandbox no worker can change a mode or write
+ * against one, so a worker that its input has taken over cannot change the geometry of the other job. */
 static void link_file(const struct worker_folder *other, const struct worker_folder *own, const char *name)
 {
     char from[WORKER_PATH_BYTES], to[WORKER_PATH_BYTES];
     worker_folder_path(other, name, NULL, from);
     worker_folder_path(own, JOB_FOLDER_ADOPTED, name, to);
     unlink(to);
-    if (link(from, to) != 0) return; /* pipeline_adopt_geometry finds that it is missing */
+    if (link(from, to) != 0 || chmod(to, S_IRUSR) != 0) return; /* pipeline_adopt_geometry finds that it is missing */
 }
 
 /* What of another job is linked: its document, its fingerprint, and for each stage the mark and the checkpoint. */
