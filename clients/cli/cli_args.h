@@ -51,7 +51,7 @@ struct cli_args {
     const char *quiet_s;   /* --quiet */
     /* of a picture; on: --on, and so forth */
     const char *on, *lamp, *camera, *px, *samples, *width_mm, *size_mm, *radius_mm, *mesh_unit_mm, *wrap_deg,
-        *black_sheet;
+        *black_sheet, *twin;
     const char *scope, *owner, *requests, *bytes, *jobs; /* of a token to be made */
     const char *max_age, *max_bytes;                     /* of retention */
     bool watch, json, follow, draft, align, once, yes;

@@ -9,6 +9,7 @@ import { qualityCard } from "./quality_card.js";
 import { channelErrors, choiceOf, configurations, fiberFile, fitted, models, radiusSearch, residuals, sliceFiles } from "./result_view.js";
 import { getJson, poll, sendJson } from "./server_link.js";
 import { SurfacePictures } from "./surface_card.js";
+import { twinCard } from "./twin/twin_card.js";
 
 const SHOWN_WARNINGS = 2;
 const LIVE = new Set(["queued", "running", "paused"]);
@@ -114,7 +115,7 @@ export function jobPage(page, id) {
   page.append(el("section", { class: "card", id: "state" }, head, stages, verdict, facts, notes),
     curves, surfaces, results,
     el("section", { class: "card" }, el("h2", {}, "Log ", el("small", {}, "its last lines; ", logLink)), logNode));
-  let about = null, generation = null, closeFibers = null, gone = false;
+  let about = null, generation = null, closeFibers = null, closeTwin = null, gone = false;
 
   const act = (verb) => async (event) => {
     event.target.disabled = true;
@@ -144,8 +145,11 @@ export function jobPage(page, id) {
     const fibers = hair ? fiberView(hair) : null;
     const quality = qualityCard(job, list.files);
     closeFibers = fibers?.close ?? null;
+    const twin = twinCard(job, list.files, compared);
+    closeTwin = twin?.close ?? null;
     const compete = models(job), radius = radiusSearch(job);
     results.append(
+      twin ? card("The twin under the mouse", twin.box) : "",
       compete.length > 1 ? card("Models compared", modelTable(compete, choiceOf(job))) : "",
       job.result?.models?.length === 0 ? "" : // a job of geometry only has none
         el("div", { class: "columns" }, card("Fitted parameters", parameterTable(fitted(job), "parameters")), card("Measured and rendered means", scatterPlot(compared))),
@@ -165,7 +169,7 @@ export function jobPage(page, id) {
     job.parameters = job.result?.parameters ?? null;
     if (gone) return 5;
     document.title = `${job.state === "running" ? `${Math.round(100 * job.fraction)} % ` : ""}${job.sample} – Selvedge`;
-    if (job.generation !== generation) { generation = job.generation; log.reset(); pictures.reset(); results.replaceChildren(); closeFibers?.(); closeFibers = null; }
+    if (job.generation !== generation) { generation = job.generation; log.reset(); pictures.reset(); results.replaceChildren(); closeFibers?.(); closeTwin?.(); closeFibers = closeTwin = null; }
     refill(head, [job.sample, job.state, job.cancel_requested, job.missing_files], () => [el("h1", {}, job.sample), stateTag(job.state), el("span", { class: "space" }), ...buttons(job)]);
     refill(stages, [job.state, job.i_stage, job.stage_fraction], () => stagesOf(job, about.stages));
     refill(facts, [job.state, job.message, job.fraction, job.eta_s, job.step, job.objective, job.attempt, job.peak_rss_bytes, job.finished_unix_s], () => factsOf(job));
@@ -178,5 +182,5 @@ export function jobPage(page, id) {
     await showResults(job);
     return job.state === "running" ? 1 : LIVE.has(job.state) ? 2 : 10;
   });
-  return () => { gone = true; poller.stop(); charts.destroy(); pictures.reset(); closeFibers?.(); };
+  return () => { gone = true; poller.stop(); charts.destroy(); pictures.reset(); closeFibers?.(); closeTwin?.(); };
 }

@@ -194,6 +194,8 @@ struct job_document {
     size_t render_px, render_sample; /* render_sample 0: chosen from the paths of the fit */
     size_t n_surface_picture;
     struct job_surface_picture *surface_picture;
+    bool twin; /* tables for the page in the browser */
+    size_t twin_paths, twin_texels;
     bool export_mitsuba, export_pbrt, export_usd, export_blender, export_textures, export_pdf;
 };
 

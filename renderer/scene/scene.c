@@ -300,5 +300,9 @@ uint32_t scene_group_of(const struct scene *s, uint32_t i_segment)
     return s->segment_group == NULL ? 0 : s->segment_group[i_segment];
 }
 size_t scene_n_group(const struct scene *s) { return s->n_group; }
+void scene_tile_mm(const struct scene *s, double tile_mm[2])
+{
+    for (int a = 0; a < 2; a++) tile_mm[a] = s->tile_mm[a];
+}
 bool scene_has_black_sheet(const struct scene *s) { return s->black_sheet; }
 double scene_thickness_mm(const struct scene *s) { return -(double)s->bottom_mm; }

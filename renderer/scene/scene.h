@@ -30,9 +30,15 @@ status scene_new(const struct fiber_set *f, const struct scene_option *o, struct
  * bent already; STATUS_NO_MEMORY. The mesh must have passed mesh_check and may be released afterwards. */
 status scene_bend(const struct scene *flat, const struct mesh *mesh, bool black_sheet, struct scene **bent,
                   struct error *err);
+/* Whether a point (orbit center at the origin) lies in the cloth, between its upper and its lower side. */
+bool scene_encloses(const struct scene *scene, const double p_mm[3]);
+/* Whether distant parts of a bent cloth run through each other; at_mm: one of the places. False for a flat one. */
+bool scene_crosses_itself(const struct scene *scene, double at_mm[3]);
 void scene_free(struct scene *scene);
 size_t scene_memory_bytes(const struct scene *scene);
 size_t scene_n_segment(const struct scene *scene);
+/* Edges of the tile that repeats, along x and y. */
+void scene_tile_mm(const struct scene *scene, double tile_mm[2]);
 /* fiber_set_n_group of its fibers. */
 size_t scene_n_group(const struct scene *scene);
 

@@ -11,6 +11,14 @@
 
 static const char fiber_file[] = "fibers.hair";
 
+/* *is: whether the text is "yes"; false when the option is left out. */
+static status read_yes(const char *option, const char *text, bool *is, struct error *err)
+{
+    *is = text != NULL && strcmp(text, "yes") == 0;
+    if (text == NULL || *is || strcmp(text, "no") == 0) return STATUS_OK;
+    return error_set(err, STATUS_INVALID, "option '--%s' takes yes or no: '%s'", option, text);
+}
+
 /* "30,180": two angles in degrees. */
 static status read_angles(const char *option, const char *text, double fallback_theta, double fallback_phi,
                           json_t *picture, const char *prefix, struct error *err)
@@ -59,9 +67,8 @@ static status read_picture(const struct cli_args *a, json_t *picture, const char
     if (s == STATUS_OK) s = read_number("radius-mm", a->radius_mm, "radius_mm", false, picture, err);
     if (s == STATUS_OK) s = read_number("wrap-deg", a->wrap_deg, "wrap_deg", false, picture, err);
     if (s == STATUS_OK) s = read_number("mesh-unit-mm", a->mesh_unit_mm, "mesh_unit_mm", false, picture, err);
-    bool yes = a->black_sheet != NULL && strcmp(a->black_sheet, "yes") == 0;
-    if (s == STATUS_OK && a->black_sheet != NULL && !yes && strcmp(a->black_sheet, "no") != 0)
-        return error_set(err, STATUS_INVALID, "option '--black-sheet' takes yes or no: '%s'", a->black_sheet);
+    bool yes;
+    if (s == STATUS_OK) s = read_yes("black-sheet", a->black_sheet, &yes, err);
     if (s == STATUS_OK && a->black_sheet != NULL) json_object_set_new(picture, "black_sheet", json_boolean(yes));
     return s;
 }
@@ -161,7 +168,9 @@ status cli_render(struct cli *cli, int *exit_code, struct error *err)
     const char *mesh = NULL, *temporary = getenv("TMPDIR");
     char path[256], folder[4000];
     json_t *picture = json_object(), *job = NULL, *document = NULL;
+    bool twin = false;
     status s = read_picture(cli->args, picture, &mesh, err);
+    if (s == STATUS_OK) s = read_yes("twin", cli->args->twin, &twin, err);
     if (s == STATUS_OK) s = cli_job_path(cli->args->operand, "", path, sizeof path, err);
     if (s == STATUS_OK) s = http_json(cli->http, "GET", path, NULL, NULL, &job, err);
     if (s == STATUS_OK) s = cli_add_result(cli, job, err);
@@ -170,6 +179,7 @@ status cli_render(struct cli *cli, int *exit_code, struct error *err)
         s = error_set_errno(err, "cannot make a folder in '%s'", temporary != NULL ? temporary : "/tmp");
     else if (s == STATUS_OK) {
         s = make_document(job, picture, &document, err);
+        if (s == STATUS_OK && twin) json_object_set_new(document, "twin", json_pack("{s:b}", "make", true));
         if (s == STATUS_OK) s = gather_files(cli, cli->args->operand, mesh, folder, picture, err);
         if (s == STATUS_OK) s = render(cli, document, folder, exit_code, err);
         nftw(folder, remove_entry, 8, FTW_DEPTH | FTW_PHYS);

@@ -144,6 +144,15 @@ status job_check_pictures(const struct option_value *v, struct error *err)
     return s;
 }
 
+status job_check_twin(const struct option_value *v, struct error *err)
+{
+    const bool *wanted = v->target;
+    if (!*wanted || !job_document_geometry_only(v->doc)) return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, v->path,
+                           "'%s' needs a model with its parameters: give 'photographs', 'measurements' or 'pictures'",
+                           v->path);
+}
+
 status job_check_candidates(const struct option_value *v, struct error *err)
 {
     return v->doc->candidate_grid ? make_grid(v->doc, err) : STATUS_OK;

@@ -93,5 +93,31 @@ const struct job_option option_rows_pictures[] = {
      .unit = "per pixel",
      .standard = "16",
      .meaning = "Samples of a pixel. The result states the noise that they leave."},
+    {.path = "twin",
+     .kind = OPTION_SECTION,
+     .left_out = "none",
+     .meaning =
+         "Tables of the best model's appearance, a surface model's, from which the browser shows the cloth while "
+         "it is turned, bent and lit with the mouse (docs/bent-cloth.md)."},
+    {.path = "twin.make",
+     .kind = OPTION_BOOL,
+     INTO(twin),
+     .check = job_check_twin,
+     .standard = "false",
+     .meaning = "Whether to make them. Needs `photographs`, `measurements` or `pictures`."},
+    {.path = "twin.paths",
+     .kind = OPTION_COUNT,
+     INTO(twin_paths),
+     RANGE(1000, 1e9),
+     .standard = "1200000",
+     .meaning =
+         "Camera paths of the tables, each with sixteen lamps. As many as by default take one to three minutes of "
+         "one processor, and four times as many halve the noise."},
+    {.path = "twin.texels",
+     .kind = OPTION_COUNT,
+     INTO(twin_texels),
+     RANGE(16, 65536),
+     .standard = "4096",
+     .meaning = "About so many places of the tile are told apart."},
     {.path = NULL},
 };

@@ -3,6 +3,7 @@
 #include "optimizer/job/stage_table.h"
 #include "optimizer/worker/report/result_pictures.h"
 #include "optimizer/worker/report/surface/surface_pictures.h"
+#include "optimizer/worker/report/twin/twin_result.h"
 #include "optimizer/worker/stages/fit/pipeline_correction.h"
 #include "optimizer/worker/stages/fit/pipeline_scan_error.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
@@ -124,7 +125,7 @@ static void plan_after_fit(struct pipeline_context *c, size_t i, size_t i_fit, d
 static void plan_pictures(struct pipeline_context *c, size_t i)
 {
     const struct job_clock_work work = {.key = "report.pictures",
-                                        .units = surface_pictures_paths(c) / n_thread(c),
+                                        .units = (surface_pictures_paths(c) + twin_result_paths(c)) / n_thread(c),
                                         .usual_s = render_s_per_path,
                                         .log_sd = sd_of_fit};
     worker_status_plan(c->status, i, &work);
@@ -161,7 +162,8 @@ void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
     else if (strcmp(name, "report") == 0 && job_document_geometry_only(c->doc))
         plan_voxels(c, i, "report.geometry", n_voxel(c), report_s_per_voxel);
     else if (strcmp(name, "report") == 0)
-        plan_after_fit(c, i, i - 2, result_renderings_paths(c, fit_paths(c)) + surface_pictures_paths(c));
+        plan_after_fit(c, i, i - 2,
+                       result_renderings_paths(c, fit_paths(c)) + surface_pictures_paths(c) + twin_result_paths(c));
     else
         worker_status_plan(c->status, i, &rest);
 }

@@ -142,6 +142,29 @@ def test_a_mesh_that_cannot_be_used_is_found_before_the_fit(real, obj, words):
     assert all(w in done["error"]["text"] for w in words), done["error"]
 
 
+def sheet_at(z):
+    return SHEET.replace(" 0\n", f" {z}\n") + "f 1/1 2/2 3/3 4/4\n"
+
+
+def test_a_camera_inside_of_the_cloth_is_refused(real):
+    """The mesh is the upper side of the cloth, which is 0.1 mm thick: the camera stands 0.03 mm below it, then 2 mm."""
+    above = {"on": "mesh", "mesh_file": "sheet.obj", **VIEW, "camera_theta_deg": 0, "width_mm": 3}
+    for z, word in ((1000.03, "camera"), (610.03, "lamp"), (1002, None)):
+        _, done = run(real, document({**above, "light_theta_deg": 0}), sheet_at(z))
+        if word is None:
+            assert done["state"] == "succeeded", done["error"]
+            continue
+        assert done["state"] == "failed" and done["stage"] == "scene" and done["error"]["field"] == "pictures[0].mesh_file"
+        assert f"the {word}, " in done["error"]["text"] and "inside the cloth" in done["error"]["text"], done["error"]
+
+
+def test_a_mesh_that_runs_through_itself_gives_a_warning(real):
+    upright = "v 0.5 -5 -5\nv 0.5 5 -5\nv 0.5 5 5\nv 0.5 -5 5\n"
+    both = SHEET + upright + "f 1/1 2/2 3/3 4/4\nf 5/1 6/2 7/3 8/4\n"
+    _, done = run(real, document({"on": "mesh", "mesh_file": "sheet.obj", **VIEW}), both)
+    assert done["state"] == "succeeded" and any("picture 1: parts of the mesh run through each other" in w for w in done["warnings"]), done
+
+
 def test_a_cylinder_thinner_than_the_cloth_is_refused(real):
     _, done = run(real, document({"on": "cylinder", "radius_mm": 0.1, **VIEW}))  # the cloth is that thick, nearly
     assert done["state"] == "succeeded", done["error"]
@@ -209,6 +232,7 @@ def test_what_the_command_refuses(real, tmp_path):
     draft = real.create(document({"on": "flat", **VIEW}))
     cases = [([draft], "no fitted model"), ([draft, "--on", "sphere"], "NAME.obj"), ([draft, "--lamp", "45"], "such as 45,180"),
              ([draft, "--px", "1.5"], "whole number"), ([draft, "--black-sheet", "maybe"], "yes or no"),
+             ([draft, "--twin", "perhaps"], "yes or no"),
              ([draft, "--json"], "has no option '--json'"), (["nonsense"], "nonsense")]
     for words, said in cases:
         refused = render(real, *words)

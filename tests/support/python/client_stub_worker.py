@@ -3,7 +3,7 @@
 but computes nothing.
 
 The sample's name selects its behaviour: "slow ..." takes seconds for each stage, "failing ..." fails in the first
-stage with a field, anything else succeeds within a second or two."""
+stage with a field, "twin ..." has tables of a twin among its results, anything else succeeds within a second or two."""
 import json
 import math
 import os
@@ -11,6 +11,9 @@ import signal
 import sys
 import time
 import zlib
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import synthetic_twin  # noqa: E402
 
 FOLDER = sys.argv[-1]
 STAGES = ["volume", "orientation", "fibers", "directions", "scene", "fit", "validation", "report"]
@@ -81,6 +84,8 @@ def main():
             # The fit must last so long that a client that polls once a second sees it.
             time.sleep(15 * pause if stage == "fit" and pause < 0.1 else pause)
     results()
+    if sample.startswith("twin"):
+        synthetic_twin.write(path("results"), sample)
     status(state="succeeded", stage="report", i_stage=len(STAGES) - 1, stage_fraction=1.0, fraction=1.0, eta_s=0.0)
     return 0
 

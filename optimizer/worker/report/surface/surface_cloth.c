@@ -82,12 +82,50 @@ status surface_cloth_new(const struct pipeline_context *c, size_t i, struct scen
     return name_picture(i, p->on, s, err);
 }
 
+static double *point_from(double theta_deg, double phi_deg, double distance_mm, double p[3])
+{
+    double theta = theta_deg * M_PI / 180.0, phi = phi_deg * M_PI / 180.0;
+    p[0] = distance_mm * sin(theta) * cos(phi);
+    p[1] = distance_mm * sin(theta) * sin(phi);
+    p[2] = distance_mm * cos(theta);
+    return p;
+}
+
+/* What would be seen is the inside of the cloth: an error. Parts that run through each other are a warning. */
+static status check_surface(const struct pipeline_context *c, size_t i, const struct scene *bent, struct error *err)
+{
+    const struct job_document *d = c->doc;
+    const struct job_surface_picture *p = &d->surface_picture[i];
+    const double mm_per_cm = 10.0;
+    double at[3];
+    point_from(p->camera_theta_deg, p->camera_phi_deg - p->cloth_rotation_deg, mm_per_cm * d->camera_distance_cm, at);
+    if (!d->camera_far_field && scene_encloses(bent, at))
+        return error_set(err, STATUS_INVALID,
+                         "the camera, %g cm from the orbit center, stands inside the cloth: move the mesh, or the "
+                         "camera",
+                         d->camera_distance_cm);
+    point_from(p->light_theta_deg, p->light_phi_deg - p->cloth_rotation_deg, mm_per_cm * d->lamp_distance_cm, at);
+    if (!d->lamp_directional && scene_encloses(bent, at))
+        return error_set(err, STATUS_INVALID,
+                         "the lamp, %g cm from the orbit center, stands inside the cloth: move the mesh, or the "
+                         "lamp",
+                         d->lamp_distance_cm);
+    if (p->on == JOB_ON_MESH && scene_crosses_itself(bent, at))
+        worker_status_warn(
+            c->status,
+            "picture %zu: parts of the mesh run through each other over the thickness of the cloth, as at "
+            "(%.3g, %.3g, %.3g) mm; what is shown there is no cloth",
+            i + 1, at[0], at[1], at[2]);
+    return STATUS_OK;
+}
+
 status surface_cloth_check(const struct pipeline_context *c, struct error *err)
 {
     status s = STATUS_OK;
     for (size_t i = 0; i < c->doc->n_surface_picture && c->scene != NULL && s == STATUS_OK; i++) {
         struct scene *bent = NULL;
         s = surface_cloth_new(c, i, &bent, err);
+        if (s == STATUS_OK) s = name_picture(i, c->doc->surface_picture[i].on, check_surface(c, i, bent, err), err);
         scene_free(bent);
     }
     return s;

@@ -173,7 +173,7 @@ static status write_one(struct pipeline_context *c, size_t i, const struct progr
     return s;
 }
 
-status surface_pictures_write(struct pipeline_context *c, double from, struct error *err)
+status surface_pictures_write(struct pipeline_context *c, double from, double to, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
     double done = 0.0, all = surface_pictures_paths(c);
@@ -187,7 +187,7 @@ status surface_pictures_write(struct pipeline_context *c, double from, struct er
     status s = durable_make_folder(path, err);
     for (size_t i = 0; i < c->doc->n_surface_picture && s == STATUS_OK; i++) {
         const struct job_surface_picture *p = &c->doc->surface_picture[i];
-        double share = (1.0 - from) * (double)p->px * (double)p->px * (double)p->sample / all;
+        double share = (to - from) * (double)p->px * (double)p->px * (double)p->sample / all;
         struct progress_part part;
         struct progress progress = progress_begin_part(&part, &c->progress, from + done, share);
         s = write_one(c, i, &progress, err);

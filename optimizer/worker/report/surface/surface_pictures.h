@@ -8,8 +8,8 @@
 double surface_pictures_paths(const struct pipeline_context *c);
 
 /* Renders what the job document asks for and fills c->surface_pictures, the entries of result.json. A picture that an
- * earlier attempt has finished is not rendered again. from: share of the stage that was done before. Errors of
+ * earlier attempt has finished is not rendered again. from, to: shares of the stage before and after. Errors of
  * surface_cloth_new and of render_run. */
-status surface_pictures_write(struct pipeline_context *c, double from, struct error *err);
+status surface_pictures_write(struct pipeline_context *c, double from, double to, struct error *err);
 
 #endif

@@ -10,6 +10,7 @@
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_pictures.h"
 #include "optimizer/worker/report/surface/surface_pictures.h"
+#include "optimizer/worker/report/twin/twin_result.h"
 #include "optimizer/worker/stages/fit/pipeline_cloth.h"
 #include "optimizer/worker/stages/result/pipeline_advice.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
@@ -52,7 +53,9 @@ static status report_pictures(struct pipeline_context *c, struct error *err)
     report_pdf_warn(c);
     status s = result_geometry_write(c, err);
     if (s == STATUS_OK) s = quality_write(c, err);
-    if (s == STATUS_OK) s = surface_pictures_write(c, 0.0, err);
+    double on_surfaces = surface_pictures_paths(c), until = on_surfaces / (on_surfaces + twin_result_paths(c));
+    if (s == STATUS_OK) s = surface_pictures_write(c, 0.0, until, err);
+    if (s == STATUS_OK) s = twin_result_write(c, until, 1.0, err);
     if (s == STATUS_OK) pipeline_reach_verdict(c);
     if (s == STATUS_OK) s = result_pictures_json_write(c, err);
     if (s == STATUS_OK) s = result_summary_write(c, err);
@@ -77,10 +80,11 @@ status stage_report(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = result_geometry_write(c, err);
     if (s == STATUS_OK) s = quality_write(c, err);
     double n_fit_path = (double)c->model[pipeline_best_model(c)].fit.n_path;
-    double renderings = result_renderings_paths(c, n_fit_path), all = renderings + surface_pictures_paths(c);
-    double until = all > 0.0 ? 0.1 + 0.9 * renderings / all : 1.0;
-    if (s == STATUS_OK) s = result_renderings_write(c, 0.1, until, err);
-    if (s == STATUS_OK) s = surface_pictures_write(c, until, err);
+    double done = result_renderings_paths(c, n_fit_path), on_surfaces = done + surface_pictures_paths(c),
+           all = on_surfaces + twin_result_paths(c), first = 0.1, rest = all > 0.0 ? (1.0 - first) / all : 0.0;
+    if (s == STATUS_OK) s = result_renderings_write(c, first, first + rest * done, err);
+    if (s == STATUS_OK) s = surface_pictures_write(c, first + rest * done, first + rest * on_surfaces, err);
+    if (s == STATUS_OK) s = twin_result_write(c, first + rest * on_surfaces, 1.0, err);
     if (s == STATUS_OK) s = exports_write(c, err);
     if (s == STATUS_OK) s = result_json_write(c, err);
     if (s == STATUS_OK) s = report_write(c, err);

@@ -257,6 +257,60 @@ static void a_surface_that_bends_too_tightly_is_refused(void **state)
     scene_free(flat);
 }
 
+static void points_inside_of_the_cloth(void **state)
+{
+    (void)state;
+    struct fiber_set f;
+    hand_weave_small(&f);
+    struct scene *flat = flat_scene(&f, false), *bent = on_cylinder(flat, 200);
+    double deep = 0.5 * scene_thickness_mm(flat), at[3];
+    for (int i = -10; i <= 10; i++) {
+        double angle = 0.14 * i;
+        static const double beside[] = {0.1, -30, 3};
+        for (int k = 0; k < 4; k++) {
+            double from = radius_mm + (k == 0 ? -deep : beside[k - 1]);
+            const double p[3] = {from * sin(angle), 0.3 * i, from * cos(angle) - radius_mm};
+            assert_true(scene_encloses(bent, p) == (k == 0));
+        }
+    }
+    assert_false(scene_crosses_itself(bent, at));
+    assert_true(scene_encloses(flat, (const double[3]){7, 8, -deep}));
+    assert_false(scene_encloses(flat, (const double[3]){7, 8, deep}) || scene_crosses_itself(flat, at));
+    scene_free(bent);
+    scene_free(flat);
+}
+
+/* Two square pieces, one upright: apart, and through each other. */
+static void pieces_that_cross(void **state)
+{
+    (void)state;
+    struct fiber_set f;
+    hand_weave_small(&f);
+    struct scene *flat = flat_scene(&f, false);
+    for (int k = 0; k < 2; k++) {
+        struct mesh m;
+        double at[3] = {0}, shift = k == 0 ? 20 : 0.5;
+        assert_int_equal(mesh_new(&m, 8, 8, 4, NULL), STATUS_OK);
+        for (uint32_t i = 0; i < 8; i++) {
+            double u = i % 2 ? 4 : -4, v = i / 2 % 2 ? 4 : -4;
+            const double level[3] = {u, v, 0}, upright[3] = {shift, u, v + 0.7};
+            memcpy(m.position_mm[i], i < 4 ? level : upright, sizeof level);
+            m.texture_mm[i][0] = u;
+            m.texture_mm[i][1] = v;
+        }
+        for (uint32_t i = 0; i < 4; i++) {
+            const uint32_t low[3] = {0, 1, 3}, high[3] = {0, 3, 2};
+            for (int c = 0; c < 3; c++)
+                m.triangle[i].position[c] = m.triangle[i].texture[c] = 4 * (i / 2) + (i % 2 ? high[c] : low[c]);
+        }
+        struct scene *bent = bend(flat, &m);
+        assert_true(scene_crosses_itself(bent, at) == (k == 1));
+        if (k == 1) assert_true(fabs(at[0] - shift) < 0.5 && fabs(at[2]) < 0.5);
+        scene_free(bent);
+    }
+    scene_free(flat);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -266,6 +320,8 @@ int main(void)
         cmocka_unit_test(no_light_is_lost_on_the_cylinder),
         cmocka_unit_test(the_sheet_lies_under_the_bent_cloth),
         cmocka_unit_test(a_surface_that_bends_too_tightly_is_refused),
+        cmocka_unit_test(points_inside_of_the_cloth),
+        cmocka_unit_test(pieces_that_cross),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,142 @@
+// The twin under the mouse: the drawing, its controls, and a photograph beside it. Stands alone: the page that is
+// downloaded has no other part of the dashboard.
+import { environmentNames } from "./twin_lights.js";
+import { TwinScene } from "./twin_scene.js";
+import { shapeNames } from "./twin_shapes.js";
+
+const START = { shape: "drape", theta: 50, phi: 250, width: 42, center: [0, 0, 0], lampTheta: 50, lampPhi: 200, lampPower: 1, environment: "lamp only", exposure: 1 };
+
+function node(name, attributes = {}, ...children) {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) {
+    if (key.startsWith("on")) made.addEventListener(key.slice(2), value);
+    else made.setAttribute(key, value);
+  }
+  made.append(...children.filter((child) => child !== null));
+  return made;
+}
+
+const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
+
+export class TwinPanel {
+  #canvas = node("canvas", { class: "twin-view", width: 640, height: 640, tabindex: 0, "aria-label": "the cloth; drag turns it, shift and drag moves the lamp, the wheel zooms" });
+  #scene = null;
+  #state = { ...START };
+  #controls = new Map();
+  #photo = node("figure", { class: "twin-photo", hidden: "" });
+  #waiting = 0;
+  #observer = null;
+
+  // data: {description, buffer, exposure, photographs: [{name, address, theta, phi, lampTheta, lampPhi, width}], pictures: [{name, address}]}
+  constructor(box, data) {
+    this.#state.exposure = data.exposure ?? 1;
+    try {
+      this.#scene = new TwinScene(this.#canvas, data.description, data.buffer);
+    } catch (error) {
+      box.append(node("p", { class: "hint" }, `The cloth cannot be turned here: ${error.message}. These are pictures of it.`),
+        node("div", { class: "twin-pictures" }, ...data.pictures.map((p) => node("img", { src: p.address, alt: p.name }))));
+      return;
+    }
+    box.append(node("div", { class: "twin-side" }, this.#canvas, this.#photo), this.#makeControls(data));
+    this.#listen();
+    this.#observer = new ResizeObserver(() => this.draw());
+    this.#observer.observe(this.#canvas);
+    Object.assign(this.#canvas, { twin: this }); // for programs that look at the page
+  }
+
+  get works() { return this.#scene !== null; }
+
+  // Changes a part of the state and draws.
+  show(change) {
+    Object.assign(this.#state, change);
+    for (const [key, control] of this.#controls) control.value = String(key === "exposure" ? Math.log2(this.#state.exposure) : this.#state[key]);
+    this.draw();
+  }
+
+  pixels(change, edge) { return this.#scene.pixels({ ...this.#state, ...change }, edge); }
+
+  draw() {
+    if (this.#waiting || !this.#scene) return;
+    this.#waiting = requestAnimationFrame(() => {
+      this.#waiting = 0;
+      const ratio = Math.min(2, devicePixelRatio), width = Math.round(ratio * this.#canvas.clientWidth), height = Math.round(ratio * this.#canvas.clientHeight);
+      if (width > 0 && (this.#canvas.width !== width || this.#canvas.height !== height)) { this.#canvas.width = width; this.#canvas.height = height; }
+      this.#scene.draw(this.#state);
+    });
+  }
+
+  #slider(key, text, low, high) {
+    const input = node("input", { type: "range", min: low, max: high, step: "any", oninput: () => {
+      this.#state[key] = key === "exposure" ? 2 ** Number(input.value) : Number(input.value);
+      this.draw();
+    } });
+    this.#controls.set(key, input);
+    return node("label", {}, text, input);
+  }
+
+  #choice(key, text, names) {
+    const select = node("select", { onchange: () => { this.#state[key] = select.value; this.draw(); } }, ...names.map((n) => node("option", { value: n }, n)));
+    this.#controls.set(key, select);
+    return node("label", {}, text, select);
+  }
+
+  #makeControls(data) {
+    const made = node("div", { class: "twin-controls" },
+      this.#choice("shape", "Shape", shapeNames), this.#choice("environment", "Surroundings", environmentNames),
+      this.#slider("lampTheta", "Lamp from the vertical", 0, 180), this.#slider("lampPhi", "Lamp around", -180, 360),
+      this.#slider("lampPower", "Lamp strength", 0, 2), this.#slider("exposure", "Exposure", -4, 6),
+      data.photographs.length ? this.#photographs(data.photographs) : null,
+      node("button", { type: "button", onclick: () => this.show({ ...START, exposure: data.exposure ?? 1 }) }, "Start view"));
+    this.show({});
+    return made;
+  }
+
+  // Choosing a photograph shows it, and the flat cloth with its lamp and camera.
+  #photographs(list) {
+    const select = node("select", { onchange: () => {
+      const chosen = list.find((p) => p.name === select.value);
+      this.#photo.hidden = !chosen;
+      if (!chosen) return;
+      this.#photo.replaceChildren(node("img", { src: chosen.address, alt: chosen.name }), node("figcaption", {}, `photograph ${chosen.name}; left the twin with the same lamp and camera`));
+      const { theta, phi, lampTheta, lampPhi, width } = chosen;
+      this.show({ shape: "flat", environment: "lamp only", lampPower: 1, center: [0, 0, 0], theta, phi, lampTheta, lampPhi, width, exposure: chosen.exposure });
+    } }, node("option", { value: "" }, "none"), ...list.map((p) => node("option", { value: p.name }, p.name)));
+    return node("label", {}, "Beside a photograph", select);
+  }
+
+  #listen() {
+    let last = null;
+    const c = this.#canvas, touches = new Map();
+    c.addEventListener("contextmenu", (e) => e.preventDefault());
+    c.addEventListener("pointerdown", (e) => { last = [e.clientX, e.clientY]; touches.set(e.pointerId, last); c.setPointerCapture(e.pointerId); });
+    for (const end of ["pointerup", "pointercancel"]) c.addEventListener(end, (e) => { touches.delete(e.pointerId); last = null; });
+    c.addEventListener("pointermove", (e) => {
+      const was = touches.get(e.pointerId);
+      if (!was || !last) return;
+      const dx = e.clientX - was[0], dy = e.clientY - was[1], s = this.#state;
+      if (touches.size === 2) {
+        const other = [...touches].find(([id]) => id !== e.pointerId)[1], before = Math.hypot(was[0] - other[0], was[1] - other[1]);
+        s.width = clamp(s.width * before / Math.max(1, Math.hypot(e.clientX - other[0], e.clientY - other[1])), 0.5, 120);
+      } else if (e.shiftKey || e.buttons & 2) {
+        s.lampPhi = (s.lampPhi + 0.4 * dx + 540) % 360 - 180;
+        s.lampTheta = clamp(s.lampTheta + 0.4 * dy, 0, 180);
+      } else {
+        s.phi = (s.phi - 0.4 * dx + 360) % 360;
+        s.theta = clamp(s.theta - 0.4 * dy, 0, 89);
+      }
+      touches.set(e.pointerId, [e.clientX, e.clientY]);
+      this.show({});
+    });
+    c.addEventListener("wheel", (e) => {
+      e.preventDefault();
+      this.show({ width: clamp(this.#state.width * Math.exp(0.001 * e.deltaY), 0.5, 120) });
+    }, { passive: false });
+  }
+
+  close() {
+    this.#observer?.disconnect();
+    cancelAnimationFrame(this.#waiting);
+    this.#scene?.close();
+    this.#scene = null;
+  }
+}

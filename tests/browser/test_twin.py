@@ -1,0 +1,94 @@
+"""The twin under the mouse, from tables whose drawing is known in closed form: on the page of a job, in the file that is
+saved from there, and where the browser has no WebGL 2."""
+import base64
+
+import pytest
+
+pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
+import synthetic_twin  # noqa: E402
+from browser_page import complaints, keep, submit, wait_for  # noqa: E402
+from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
+from selenium.webdriver.common.by import By  # noqa: E402
+from selenium.webdriver.common.keys import Keys  # noqa: E402
+
+VIEW = {"shape": "flat", "theta": 0, "phi": 0, "lampTheta": 40, "lampPhi": 30, "width": 32, "exposure": 1.5, "environment": "lamp only"}
+EDGE = 64
+
+
+def pixels(browser, **change):
+    """Rows of [r, g, b] of a drawing of 64 x 64."""
+    script = "return Array.from(document.querySelector('canvas.twin-view').twin.pixels(arguments[0], arguments[1]))"
+    flat = browser.execute_script(script, {**VIEW, **change}, EDGE)
+    return [[flat[4 * (EDGE * y + x):4 * (EDGE * y + x) + 3] for x in range(EDGE)] for y in range(EDGE)]
+
+
+def check_drawing(browser):
+    """From above, phi 0: to the right is +y, upwards is -x; stripes run along y."""
+    seen = pixels(browser)
+    for x, y in ((5, 5), (-5, 5), (5, -9), (-15, 3)):
+        column, row = int(EDGE * (0.5 + y / 32)), int(EDGE * (0.5 + x / 32))
+        want = synthetic_twin.expected(32 * ((row + 0.5) / EDGE - 0.5), 32 * ((column + 0.5) / EDGE - 0.5), 0, 0, 40, 30, 1.5)
+        assert all(abs(a - b) <= 3 for a, b in zip(seen[row][column], want)), (x, y, seen[row][column], want)
+
+
+@pytest.fixture
+def opened(stub, browser):
+    url, folder = stub
+    job = submit(url, folder, f"twin {len(list(folder.iterdir()))}")[0]
+    browser.get(f"{url}/#{job.id}")
+    wait_for(browser, "document.querySelector('#twin-open')", 60)
+    return browser
+
+
+def press(browser, name):
+    browser.execute_script(f"document.getElementById('{name}').click()")
+
+
+def test_the_twin_is_drawn_as_its_tables_say(opened):
+    press(opened, "twin-open")
+    wait_for(opened, "document.querySelector('canvas.twin-view')?.twin && document.querySelector('#twin-save')")
+    check_drawing(opened)
+    middle = pixels(opened, shape="cylinder")
+    assert sum(middle[32][32]) > 0 and sum(middle[0][32]) == 0, "the cylinder ends inside of the picture"
+    assert sum(pixels(opened, lampTheta=130)[32][32]) == 0, "a cloth over a black sheet lets no light through"
+    dark, sky = pixels(opened, lampPower=0)[32][32], pixels(opened, lampPower=0, environment="overcast sky")[32][32]
+    assert sum(dark) == 0 and sum(sky) > 100
+    # the mouse: drag turns, shift and drag moves the lamp
+    canvas = opened.find_element(By.CSS_SELECTOR, "canvas.twin-view")
+    value = "return document.querySelector('.twin-controls input').value"  # the lamp's angle from the vertical
+    lamp = opened.execute_script(value)
+    ActionChains(opened).key_down(Keys.SHIFT).move_to_element(canvas).click_and_hold().move_by_offset(0, 60).release().key_up(Keys.SHIFT).perform()
+    assert float(opened.execute_script(value)) > float(lamp) + 10
+    keep(opened, "twin")
+    assert complaints(opened) == []
+
+
+def test_the_saved_file_shows_the_same_alone(opened, tmp_path):
+    press(opened, "twin-open")
+    wait_for(opened, "document.querySelector('#twin-save')")
+    opened.set_script_timeout(30)
+    page = opened.execute_async_script("""const done = arguments[0], make = URL.createObjectURL;
+      URL.createObjectURL = (blob) => {
+        const r = new FileReader();
+        r.onload = () => done(r.result.split(",")[1]);
+        r.readAsDataURL(blob);
+        URL.createObjectURL = make;
+        return "#";
+      };
+      document.getElementById("twin-save").click();""")
+    saved = tmp_path / "twin.html"
+    saved.write_bytes(base64.b64decode(page))
+    assert saved.stat().st_size < 100000 and b"http://" not in saved.read_bytes() and b"https://" not in saved.read_bytes()
+    opened.get(f"file://{saved}")
+    wait_for(opened, "document.querySelector('canvas.twin-view')?.twin")
+    check_drawing(opened)
+    keep(opened, "twin-alone")
+    assert complaints(opened) == []
+
+
+def test_without_webgl_the_page_says_so(opened):
+    opened.execute_script("HTMLCanvasElement.prototype.getContext = () => null")
+    press(opened, "twin-open")
+    wait_for(opened, "document.querySelector('#twin .hint')")
+    assert "no WebGL 2" in opened.find_element(By.ID, "twin").text
+    assert complaints(opened) == []
