@@ -12,7 +12,7 @@ import sys
 import time
 import zlib
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "made"))
 import synthetic_twin  # noqa: E402
 
 FOLDER = sys.argv[-1]
