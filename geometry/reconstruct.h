@@ -38,10 +38,12 @@ struct reconstruct_option {
      * or estimated, or voxels are not cubes: 2^30 by default. */
     size_t trim_above_voxel;
     double density_low, density_high; /* scanner values mapped to 0 and 1 */
-    bool hollow_fibers;               /* lumens are filled when the volume is read (lumen_fill.h) */
-    double fiber_diameter_voxel;      /* typical diameter, from which scales and reaches follow */
-    double s, t;                      /* filter widths, per square voxel (thesis Table 5.2) */
-    size_t h;                         /* edge of the filter's cube, voxels */
+    /* Whether lumens are filled when the volume is read (lumen_fill.h): 0, 1, or -1 (default) where the evidence is
+     * clear; the decision is written back. */
+    int hollow_fibers;
+    double fiber_diameter_voxel; /* typical diameter, from which scales and reaches follow */
+    double s, t;                 /* filter widths, per square voxel (thesis Table 5.2) */
+    size_t h;                    /* edge of the filter's cube, voxels */
     double eps_d, eps_j;
     double link_sigma_voxel;      /* 5 in the thesis */
     size_t min_vertex;            /* 10 in the thesis */
@@ -68,6 +70,7 @@ struct reconstruct_report {
     double separability;              /* of void and material in the histogram, 0..1 (density_map.h) */
     struct scan_noise noise;          /* of the scan, and after smoothing */
     double lumen_share;               /* filled lumens over material; 0 if the fibers are solid */
+    bool lumens_found;                /* they were filled because the fibers look hollow */
     struct lumen_evidence lumen;      /* whether the fibers look hollow */
     double fiber_diameter_voxel;      /* given, or measured from the volume before the filter */
     /* The peak that the measured diameter was preferred to (fiber_diameter.h), and the shares of noise in both; NaN if
@@ -110,6 +113,11 @@ enum { SCAN_BYTES_PER_VOXEL = 22 };
 status reconstruct_read(const char *const *path, size_t n_path, struct reconstruct_option *o,
                         struct scratch_space *space, struct thread_pool *pool, const struct progress *progress,
                         struct volume *v, struct reconstruct_report *report, struct error *err);
+
+/* The part of the step "volume" that looks for lumens and fills them. v: densities in [0, 1]; report->noise is known.
+ * STATUS_NO_MEMORY; with a scratch space also STATUS_DISK_FULL. */
+status reconstruct_lumens(struct volume *v, struct reconstruct_option *o, struct reconstruct_report *report,
+                          struct error *err);
 
 /* Step "orientation": computes directions d from v by the line filter (orientation/line_filter.h), which starts from
  * the structure tensor and refines J locally. STATUS_INVALID when no voxel is kept: field OPTION_FILTER_DENSITY if

@@ -24,6 +24,7 @@ void reconstruct_option_default(struct reconstruct_option *o)
         .matrix = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
         .density_low = NAN,
         .density_high = NAN,
+        .hollow_fibers = -1,
         .fiber_diameter_voxel = NAN,
         .s = NAN,
         .t = NAN,
@@ -254,6 +255,17 @@ static void state_trim(const struct plan *p, struct reconstruct_option *o, struc
     }
 }
 
+status reconstruct_lumens(struct volume *v, struct reconstruct_option *o, struct reconstruct_report *report,
+                          struct error *err)
+{
+    report->lumen_share = 0.0;
+    status s = lumen_evidence_measure(v, report->noise.mapped_sd, &report->lumen, err);
+    report->lumens_found = o->hollow_fibers < 0 && lumen_evidence_judge(&report->lumen) == LUMENS_CLEAR;
+    if (o->hollow_fibers < 0) o->hollow_fibers = report->lumens_found;
+    if (s == STATUS_OK && o->hollow_fibers > 0) s = lumens_fill(v, report->noise.mapped_sd, &report->lumen_share, err);
+    return s;
+}
+
 static status map_densities(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
                             struct reconstruct_report *report, struct error *err)
 {
@@ -280,9 +292,7 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
     report->density_low = o->density_low;
     report->density_high = o->density_high;
     report->separability = m.separability;
-    report->lumen_share = 0.0;
-    s = lumen_evidence_measure(v, report->noise.mapped_sd, &report->lumen, err);
-    if (s == STATUS_OK && o->hollow_fibers) s = lumens_fill(v, report->noise.mapped_sd, &report->lumen_share, err);
+    s = reconstruct_lumens(v, o, report, err);
     if (s != STATUS_OK) return s;
     seam_density_measure(v, &report->seam_density);
     return STATUS_OK;

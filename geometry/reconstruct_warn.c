@@ -55,6 +55,26 @@ static void warn_alignment(const struct warning_sink *warn, const struct reconst
                          "xy"[a], r -> tile.mismatch[a]);
 }
 
+/* Says that lumens were filled without being asked for, or that they may be there. */
+static void warn_lumens(const struct warning_sink *warn, const struct reconstruct_option *o,
+                        const struct reconstruct_report *r)
+{
+    const double percent = 100.0 * r->lumen.middle_share;
+    const enum lumen_verdict verdict = lumen_evidence_judge(&r->lumen);
+    if (r->lumens_found)
+        warning_send(
+            warn, OPTION_HOLLOW_FIBERS,
+            "the fibers are hollow: voids in the middle of fibers are %.2f %% of the material (solid fibers have "
+            "less than 0.1 %%), so void that is enclosed was filled before tracing; give false if they are solid",
+            percent);
+    else if (o->hollow_fibers <= 0 && verdict != LUMENS_NOT_SEEN)
+        warning_send(
+            warn, OPTION_HOLLOW_FIBERS,
+            "the fibers %s hollow: voids in the middle of fibers are %.2f %% of the material, and the walls of "
+            "hollow fibers are traced as fibers; give true if they are hollow, as cotton",
+            verdict == LUMENS_CLEAR ? "look" : "may be", percent);
+}
+
 void reconstruct_warn_volume(const struct reconstruct_option *o, const struct reconstruct_report *r,
                              const struct warning_sink *warn)
 {
@@ -70,11 +90,7 @@ void reconstruct_warn_volume(const struct reconstruct_option *o, const struct re
         warning_send(warn, OPTION_SCAN_FILES,
                      "the scan is very noisy: its standard deviation is %.2f of the step from void to material",
                      r->noise.scan_sd);
-    if (!o->hollow_fibers && r->lumen.middle_share > LUMEN_MIDDLE_SHARE)
-        warning_send(warn, OPTION_HOLLOW_FIBERS,
-                     "the fibers look hollow: voids in the middle of fibers are %.2f %% of the material (solid fibers "
-                     "have less than 0.01 %%), and their walls are traced as fibers; give true if they are, as cotton",
-                     100.0 * r->lumen.middle_share);
+    warn_lumens(warn, o, r);
 }
 
 /* Says which of two diameters was taken. The tracing follows from it, so a wrong one makes wrong fibers. */

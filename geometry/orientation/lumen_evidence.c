@@ -12,6 +12,8 @@ enum { MOST_EDGE = 160, BRICK = SCALE_EDGE, MARGIN = 8, STEP = BRICK - 2 * MARGI
 static const double SCALE_PER_WIDTH[3] = {0.85, 1.05, 1.3};
 static const float MIDDLE = 0.3f;          /* response in the middle of a fiber */
 static const double LEAST_ENCLOSED = 1e-3; /* share below which there are too few places to look at */
+/* middle_share, and its share of what is enclosed, from which on lumens are possible, and clear. */
+static const double POSSIBLE[2] = {0.0003, 0.015}, CLEAR[2] = {0.002, 0.035};
 
 /* A box in the middle of the scan: as it is, and filled. */
 struct evidence_box {
@@ -107,6 +109,13 @@ static double middle_share(const struct evidence_box *b, double width)
                 count_brick(b, from, n, &enclosed, &middle);
             }
     return enclosed > 0 ? (double)middle / (double)enclosed : 0.0;
+}
+
+enum lumen_verdict lumen_evidence_judge(const struct lumen_evidence *e)
+{
+    const double middle = e->middle_share, of_enclosed = middle / fmax(e->enclosed_share, 1e-12);
+    if (middle >= CLEAR[0] && of_enclosed >= CLEAR[1]) return LUMENS_CLEAR;
+    return middle >= POSSIBLE[0] && of_enclosed >= POSSIBLE[1] ? LUMENS_POSSIBLE : LUMENS_NOT_SEEN;
 }
 
 status lumen_evidence_measure(const struct volume *v, double noise_sd, struct lumen_evidence *e, struct error *err)

@@ -118,8 +118,9 @@ struct job_document {
     size_t crop_voxel[6];
     bool align, crop; /* true for "auto"; false where matrix or crop_voxel is given */
     double crop_keep; /* NaN: not given */
-    bool join_seams, unresolved_fibers, hollow_fibers, trial;
-    double fiber_diameter_voxel;                                                      /* NaN: measured */
+    bool join_seams, unresolved_fibers, trial;
+    int hollow_fibers;           /* 0, 1, or -1: decided from the scan */
+    double fiber_diameter_voxel; /* NaN: measured */
     double density_low, density_high, filter_s, filter_t, filter_eps_d, filter_eps_j; /* NaN: not given */
     size_t filter_h;                                                                  /* 0: not given */
     double link_sigma_voxel, radius_um;                                               /* NaN: not given */

@@ -172,7 +172,6 @@ static status bench_phantom(const struct selection *s, const char *name, enum ph
     if (s->seed != NULL && o.section.seed != 0) o.section.seed = o.seed;
     if (s->yarns != NULL) o.n_yarn[0] = o.n_yarn[1] = strtoul(s->yarns, NULL, 10);
     reconstruct_option_default(&r.option);
-    r.option.hollow_fibers = k->section.lumen > 0.0;
     status st = phantom_reconstruct_scan(&o, &scan, &r, err);
     if (st == STATUS_OK && s->pictures != NULL) st = write_pictures(s->pictures, name, &r.v, &r.found, err);
     const struct compare_report *c = &r.compare;

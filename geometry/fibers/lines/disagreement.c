@@ -28,45 +28,72 @@ static float sine2(const struct polyline_set *p, size_t line, size_t i, const st
     return fmaxf(0.0f, 1.0f - cosine * cosine / norm);
 }
 
-static bool disagrees(const float *value, size_t n, size_t i, float limit)
+/* What the cuts of one set of lines have in common. */
+struct disagreement {
+    const struct polyline_set *lines;
+    const struct direction_volume *d;
+    struct vertex_grid grid;
+    float limit, most; /* squared sine; largest radius */
+    float *value;      /* of the vertices of one line */
+};
+
+static status disagreement_init(struct disagreement *w, const struct polyline_set *lines,
+                                const struct direction_volume *d, double max_angle_rad, struct error *err)
 {
-    float sum = 0.0f, weight = 0.0f;
-    for (size_t k = i >= REACH ? i - REACH : 0; k <= i + REACH && k < n; k++)
-        if (value[k] >= 0.0f) {
-            sum += value[k];
-            weight += 1.0f;
-        }
-    return weight > 0.0f && sum > limit * weight;
+    *w = (struct disagreement){.lines = lines, .d = d, .limit = (float)(sin(max_angle_rad) * sin(max_angle_rad))};
+    w->value = malloc((lines->n_vertex + 1) * sizeof *w->value);
+    if (w->value == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot check fibers: out of memory");
+    for (size_t l = 0; l < lines->n_line; l++) w->most = fmaxf(w->most, lines->radius[l]);
+    return vertex_grid_init(&w->grid, lines, d->n, fmaxf(3.0f, 2.0f * w->most), err);
 }
 
-static void measure_line(const struct polyline_set *lines, size_t line, const struct direction_volume *d, float *value)
+static void disagreement_release(struct disagreement *w)
 {
-    scratch_keep_within(d->space);
-    for (size_t i = 0, n = polyline_length(lines, line); i < n; i++)
-        value[i] = sine2(lines, line, lines->first[line] + i, d);
+    vertex_grid_release(&w->grid);
+    free(w->value);
+}
+
+/* Prepares w->value for a line. */
+static void measure_line(const struct disagreement *w, size_t line)
+{
+    scratch_keep_within(w->d->space);
+    for (size_t i = 0, n = polyline_length(w->lines, line); i < n; i++)
+        w->value[i] = sine2(w->lines, line, w->lines->first[line] + i, w->d);
+}
+
+/* Whether vertex i of a measured line, counted from its first one, disagrees and lies in another fiber. */
+static bool is_wrong(const struct disagreement *w, size_t line, size_t i)
+{
+    const size_t n = polyline_length(w->lines, line);
+    float sum = 0.0f, weight = 0.0f;
+    for (size_t k = i >= REACH ? i - REACH : 0; k <= i + REACH && k < n; k++)
+        if (w->value[k] >= 0.0f) {
+            sum += w->value[k];
+            weight += 1.0f;
+        }
+    return weight > 0.0f && sum > w->limit * weight &&
+           polyline_is_overlapped(w->lines, &w->grid, line, w->lines->first[line] + i, OVERLAP, w->most);
 }
 
 status polylines_cut_disagreeing(const struct polyline_set *lines, const struct direction_volume *d,
                                  double max_angle_rad, size_t min_vertex, struct polyline_set *result, size_t *n_cut,
                                  struct error *err)
 {
-    float limit = (float)(sin(max_angle_rad) * sin(max_angle_rad)),
-          *value = malloc((lines->n_vertex + 1) * sizeof *value);
-    if (value == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot check fibers: out of memory");
-    status s = STATUS_OK;
+    struct disagreement w;
+    status s = disagreement_init(&w, lines, d, max_angle_rad, err);
     *n_cut = 0;
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
         size_t n = polyline_length(lines, l), run = 0;
-        measure_line(lines, l, d, value);
+        measure_line(&w, l);
         for (size_t i = 0; i <= n && s == STATUS_OK; i++) {
-            if (i < n && !disagrees(value, n, i, limit)) continue;
+            if (i < n && !is_wrong(&w, l, i)) continue;
             if (i - run >= min_vertex)
                 s = polyline_add_part(result, lines, l, lines->first[l] + run, lines->first[l] + i, err);
             *n_cut += i < n;
             run = i + 1;
         }
     }
-    free(value);
+    disagreement_release(&w);
     return s;
 }
 
@@ -74,24 +101,18 @@ status polylines_trim_disagreeing(const struct polyline_set *lines, const struct
                                   double max_angle_rad, size_t reach, size_t min_vertex, struct polyline_set *result,
                                   struct error *err)
 {
-    float limit = (float)(sin(max_angle_rad) * sin(max_angle_rad)), most = 0.0f,
-          *value = malloc((lines->n_vertex + 1) * sizeof *value);
-    struct vertex_grid g = {0};
-    if (value == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot check fibers: out of memory");
-    for (size_t l = 0; l < lines->n_line; l++) most = fmaxf(most, lines->radius[l]);
-    status s = vertex_grid_init(&g, lines, d->n, fmaxf(3.0f, 2.0f * most), err);
+    struct disagreement w;
+    status s = disagreement_init(&w, lines, d, max_angle_rad, err);
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
         size_t n = polyline_length(lines, l), begin = lines->first[l], from = 0, to = n;
-        measure_line(lines, l, d, value);
+        measure_line(&w, l);
         for (size_t i = 0; i < n && i < reach; i++) {
             size_t k = n - 1 - i;
-            if (disagrees(value, n, i, limit) && polyline_is_overlapped(lines, &g, l, begin + i, OVERLAP, most))
-                from = i + 1;
-            if (disagrees(value, n, k, limit) && polyline_is_overlapped(lines, &g, l, begin + k, OVERLAP, most)) to = k;
+            if (is_wrong(&w, l, i)) from = i + 1;
+            if (is_wrong(&w, l, k)) to = k;
         }
         if (to >= from + min_vertex) s = polyline_add_part(result, lines, l, begin + from, begin + to, err);
     }
-    vertex_grid_release(&g);
-    free(value);
+    disagreement_release(&w);
     return s;
 }

@@ -7,14 +7,15 @@
 #include "geometry/volume/volume.h"
 
 /* Removes the vertices where the angle between line and direction volume, averaged over nine vertices (mean squared
- * sine), exceeds max_angle_rad. The remaining pieces of at least min_vertex vertices go to result (initialised,
- * empty). *n_cut: number of vertices removed. STATUS_NO_MEMORY. */
+ * sine), exceeds max_angle_rad, and that another line passes within 0.9 of the sum of the radii. (The direction volume
+ * alone is not sure enough: where fibers are crowded or thin its own errors reach max_angle_rad.) The remaining pieces
+ * of at least min_vertex vertices go to result (initialised, empty). *n_cut: number of vertices removed.
+ * STATUS_NO_MEMORY. */
 status polylines_cut_disagreeing(const struct polyline_set *lines, const struct direction_volume *d,
                                  double max_angle_rad, size_t min_vertex, struct polyline_set *result, size_t *n_cut,
                                  struct error *err);
-/* The same only at the ends: removes from each end of a line up to the last such vertex within `reach` vertices of it
- * that another line passes within 0.9 of the sum of the radii, where the end has left its fiber. (The direction volume
- * alone is not sure enough: where fibers are crowded its own errors reach max_angle_rad.) STATUS_NO_MEMORY. */
+/* The same only at the ends: removes from each end of a line up to the last such vertex within `reach` vertices of it.
+ * STATUS_NO_MEMORY. */
 status polylines_trim_disagreeing(const struct polyline_set *lines, const struct direction_volume *d,
                                   double max_angle_rad, size_t reach, size_t min_vertex, struct polyline_set *result,
                                   struct error *err);

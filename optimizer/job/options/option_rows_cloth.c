@@ -163,14 +163,14 @@ const struct job_option option_rows_cloth[] = {
          "are always kept when a surface model is fitted, which needs fibers."},
     {.path = "volume.hollow_fibers",
      .id = OPTION_HOLLOW_FIBERS,
-     .kind = OPTION_BOOL,
+     .kind = OPTION_BOOL_OR_LEFT_OUT,
      INTO(hollow_fibers),
-     .standard = "false",
+     .left_out = "decided from the scan",
      .meaning =
          "`true` for hollow fibers, as of cotton: void that is enclosed in material is filled before tracing, and "
-         "radii are those of the fibers' outlines. Not for solid fibers, whose enclosed gaps would be filled. A "
-         "warning "
-         "recommends it where the fibers look hollow."},
+         "radii are those of the fibers' outlines. `false` for solid fibers, whose enclosed gaps would be filled. Left "
+         "out: `true` where the scan shows lumens clearly, which a warning states; where it shows them faintly, a "
+         "warning asks for the answer."},
     {.path = "volume.trial",
      .kind = OPTION_BOOL,
      INTO(trial),

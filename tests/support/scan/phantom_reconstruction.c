@@ -2,7 +2,6 @@
 
 #include "base/clock.h"
 #include "base/rng.h"
-#include "geometry/orientation/lumen_fill.h"
 #include "geometry/volume/density_map.h"
 #include "geometry/volume/volume_align.h"
 
@@ -45,8 +44,7 @@ static status reconstruct(struct phantom_reconstruction *r, struct thread_pool *
     status s = density_modes_find(&r->v, &m, err);
     if (s == STATUS_OK)
         s = scan_densities_map(&r->v, m.low, m.high, r->option.fiber_diameter_voxel, pool, &r->report.noise, err);
-    if (s == STATUS_OK && r->option.hollow_fibers)
-        s = lumens_fill(&r->v, r->report.noise.mapped_sd, &r->report.lumen_share, err);
+    if (s == STATUS_OK) s = reconstruct_lumens(&r->v, &r->option, &r->report, err);
     if (s == STATUS_OK) s = reconstruct_orientation(&r->v, &r->option, pool, NULL, &d, &r->report, err);
     if (s == STATUS_OK) s = compare(r, &d, pool, &r->filtered, err);
     if (s == STATUS_OK) s = reconstruct_fibers(&r->v, &d, &r->option, pool, NULL, &r->found, &r->report, err);

@@ -115,7 +115,7 @@ static void test_hollow_fibers_are_noticed(void **state)
         print_message("hollow %d: enclosed %.3f, width %.2f, in the middle %.5f\n", hollow, e.enclosed_share,
                       e.width_voxel, e.middle_share);
         assert_true(e.enclosed_share > 0.005);
-        assert_true(hollow == 1 ? e.middle_share > 10.0 * LUMEN_MIDDLE_SHARE : e.middle_share < LUMEN_MIDDLE_SHARE);
+        assert_int_equal(lumen_evidence_judge(&e), hollow == 1 ? LUMENS_CLEAR : LUMENS_NOT_SEEN);
         volume_release(&v);
     }
 }
