@@ -48,6 +48,7 @@ static const char usage[] =
     "                    folders that no job in the database had\n"
     "  --doctor [JOB]    examine this machine and the data folder, or a job: its id or its folder\n";
 
+enum { DESCRIPTORS_OF_DAEMON = 128 };
 enum { LOCK_TRIES = 41, LOCK_PAUSE_US = 50000 };
 
 static const struct {
@@ -179,13 +180,19 @@ static status make_absolute(char path[SETTING_TEXT_BYTES], struct error *err)
     return STATUS_OK;
 }
 
-static void raise_descriptor_limit(const struct settings *s)
+/* A connection has a descriptor of its own and at most one more, of a file. Where the limit cannot be raised there are
+ * fewer connections, so that database and workers never lack a descriptor. */
+static void fit_descriptors(struct settings *s, struct log *log)
 {
     struct rlimit now;
-    rlim_t want = (rlim_t)s->max_connections * 2 + 256;
+    rlim_t want = (rlim_t)s->max_connections * 2 + DESCRIPTORS_OF_DAEMON;
     if (getrlimit(RLIMIT_NOFILE, &now) != 0 || now.rlim_cur >= want) return;
     now.rlim_cur = now.rlim_max < want ? now.rlim_max : want;
-    setrlimit(RLIMIT_NOFILE, &now);
+    if (setrlimit(RLIMIT_NOFILE, &now) == 0 && now.rlim_cur >= want) return;
+    int64_t least = 8, n = ((int64_t)now.rlim_cur - DESCRIPTORS_OF_DAEMON) / 2;
+    log_warning(log, "%lld descriptors are allowed (LimitNOFILE=, ulimit -n), so %lld connections instead of %lld",
+                (long long)now.rlim_cur, (long long)(n > least ? n : least), (long long)s->max_connections);
+    s->max_connections = n > least ? n : least;
 }
 
 /* Writes daemon.json, {"url", "pid"}, for clients on this machine. A failure is only logged: clients can be given
@@ -205,15 +212,20 @@ static void announce(const struct settings *s, const char *url, struct log *log)
     fflush(stdout);
 }
 
-/* Opens the service. On a full disk the database may fail to open; then the ballast file is released and it is tried
- * once more, so that users can delete jobs. */
+/* Whether a step of the start that has failed is to be tried once more: on a full disk the ballast file is released, so
+ * that users can delete jobs. */
+static bool make_room(const struct settings *s, struct log *log, status failed, const struct error *err)
+{
+    if ((failed != STATUS_DISK_FULL && failed != STATUS_IO) || !ballast_release(s->data)) return false;
+    log_warning(log, "%s; the ballast file has been released to try once more", err->text);
+    return true;
+}
+
 static status open_service(const struct settings *s, struct log *log, struct job_service **service, struct error *err)
 {
     status r = rebuild_is_needed(s, err);
     if (r == STATUS_OK) r = job_service_open(s, log, service, err);
-    if ((r != STATUS_DISK_FULL && r != STATUS_IO) || !ballast_release(s->data)) return r;
-    log_warning(log, "%s; the ballast file has been released to try once more", err->text);
-    return job_service_open(s, log, service, err);
+    return make_room(s, log, r, err) ? job_service_open(s, log, service, err) : r;
 }
 
 static void wait_for_signal(const sigset_t *signals, struct http_server *server, struct log *log)
@@ -223,6 +235,11 @@ static void wait_for_signal(const sigset_t *signals, struct http_server *server,
         int got = sigtimedwait(signals, NULL, &second);
         http_server_reap(server);
         if (got <= 0) continue;
+        /* sent by programs that rotate logs, or to have settings read; a terminal that is closed means it otherwise */
+        if (got == SIGHUP && isatty(STDIN_FILENO) != 1) {
+            log_info(log, "SIGHUP changes nothing: there is no log file, and settings are read at the start");
+            continue;
+        }
         log_info(log, "stopping: %s", strsignal(got));
         return;
     }
@@ -244,6 +261,7 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     if (r == STATUS_OK) r = open_service(s, log, &service, err);
     if (r != STATUS_OK) goto out;
     r = webhook_start(service, &webhook, err);
+    if (make_room(s, log, r, err)) r = webhook_start(service, &webhook, err);
     if (r == STATUS_OK) r = backup_keeper_start(service, &backup, err);
     if (r == STATUS_OK) r = supervisor_start(service, worker, &supervisor, err);
     if (r == STATUS_OK) r = retention_watch_start(service, &retention, err);
@@ -313,13 +331,13 @@ int main(int argc, char **argv)
     sigaddset(&signals, SIGINT);
     sigaddset(&signals, SIGHUP);
     pthread_sigmask(SIG_BLOCK, &signals, NULL); /* before any thread starts, so that all threads inherit the mask */
-    raise_descriptor_limit(&settings);
     status r = sodium_init() < 0 ? error_set(&err, STATUS_INTERNAL, "cannot start libsodium") : STATUS_OK;
     if (r == STATUS_OK) r = make_absolute(settings.data, &err);
     if (r == STATUS_OK) r = make_absolute(settings.worker, &err);
     if (r == STATUS_OK && (rescue.command == RESCUE_NONE || rescue_needs_lock(&rescue)))
         r = lock_data(&settings, LOCK_TRIES, &lock_fd, &err);
     if (r == STATUS_OK) r = log_open(NULL, stderr, LOG_LEVEL_INFO, &log, &err);
+    if (r == STATUS_OK) fit_descriptors(&settings, log);
     if (r == STATUS_OK && rescue.command != RESCUE_NONE) {
         char worker[PATH_BYTES];
         worker_path(&settings, worker);

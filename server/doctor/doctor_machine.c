@@ -85,7 +85,7 @@ static void examine_memory(struct doctor *d)
 static void examine_descriptors(struct doctor *d)
 {
     struct rlimit limit;
-    long long wanted = d->settings->max_connections * 2 + 256;
+    long long wanted = d->settings->max_connections * 2 + 128;
     if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
     if (limit.rlim_max != RLIM_INFINITY && (long long)limit.rlim_max < wanted)
         doctor_say(

@@ -1,12 +1,16 @@
 """A full disk, write errors and short writes: error messages are clear, offsets stay valid, nothing is lost, and work
 continues when there is space again."""
+import concurrent.futures
 import ctypes
 import errno
+import itertools
 import os
 import shutil
 
 import pytest
 from daemon_under_test import FILES, TUS, Daemon, document, problem, wait_until
+
+AT_ONCE = 6  # runs of the same test
 
 
 @pytest.fixture
@@ -84,6 +88,18 @@ def test_a_daemon_that_starts_on_a_full_disk_can_delete(small_disk):
             assert d.delete(f"/v1/jobs/{j}").status_code == 204
         wait_until(lambda: os.listdir(os.path.join(d.data, "jobs")) == [])
         assert d.post("/v1/jobs", json=document("succeed")).status_code == 201
+
+
+def test_a_daemon_with_drafts_only_starts_on_a_full_disk(small_disk):
+    """It changes no job at its start, so another step is the first that needs room."""
+    d = Daemon(small_disk / "data", options={"disk.ballast_bytes": 1 << 20}).start()
+    job = d.ready_job()
+    wait_until(lambda: os.path.exists(os.path.join(d.data, "ballast")))
+    d.kill()
+    fill(small_disk)
+    with d:
+        assert d.delete(f"/v1/jobs/{job}").status_code == 204
+        wait_until(lambda: os.listdir(os.path.join(d.data, "jobs")) == [])
 
 
 def test_running_jobs_pause_under_the_floor_and_go_on(small_disk):
@@ -165,9 +181,9 @@ def scenario(d):
     ("write", 0, "selvedge.db", 17), ("sync", errno.EIO, "selvedge.db", 7), ("write", errno.ENOSPC, "/jobs/", 9), ("sync", errno.EIO, "/jobs/", 9)])
 def test_one_fault_at_every_call(shim, tmp_path, call, code, path, step):
     """One call fails, at first the first one and then later ones, until a run ends without a fault. SELVEDGE_EVERY=1
-    (make test-crash): every call."""
-    fired = repeated = 0
-    for n in range(1, 2000, 1 if os.environ.get("SELVEDGE_EVERY") == "1" else step):
+    (make test-crash): every call. Runs wait for timers and disk most of the time, so that several go on at once."""
+
+    def run(n):
         mark = tmp_path / f"mark{n}"
         d = Daemon(tmp_path / f"data{n}", environment={"LD_PRELOAD": shim, "FAULT_CALL": call, "FAULT_AT": str(n), "FAULT_ERRNO": str(code),
                                                        "FAULT_PATH": path, "FAULT_MARK": str(mark)})
@@ -178,17 +194,22 @@ def test_one_fault_at_every_call(shim, tmp_path, call, code, path, step):
             assert mark.exists() and "error: " in d.log_text()
             d.environment = {}
             d.start()
-        repeated += scenario(d)
+        repeats = scenario(d)
         d.environment = {}
         d.stop()
         d.start()
         assert d.get("/v1/jobs").json()["jobs"][0]["state"] == "succeeded"
         d.stop()
         shutil.rmtree(d.data)
-        if not mark.exists():
-            break
-        fired += 1
-    else:
-        raise AssertionError("no end")
+        return mark.exists(), repeats
+
+    outcomes = []
+    places = iter(range(1, 2000, 1 if os.environ.get("SELVEDGE_EVERY") == "1" else step))
+    with concurrent.futures.ThreadPoolExecutor(AT_ONCE) as pool:
+        while all(fault for fault, _ in outcomes):
+            some = list(itertools.islice(places, AT_ONCE))
+            assert some, "no end"
+            outcomes += pool.map(run, some)
+    fired = sum(fault for fault, _ in outcomes)
     assert fired > 0, "no fault was injected"
-    print(f"{call} {errno.errorcode.get(code, 'short')} {path}: {fired} faults, {repeated} repeats by the client")
+    print(f"{call} {errno.errorcode.get(code, 'short')} {path}: {fired} faults, {sum(n for _, n in outcomes)} repeats by the client")
