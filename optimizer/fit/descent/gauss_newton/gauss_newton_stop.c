@@ -165,8 +165,8 @@ void gauss_newton_explain_misfit(const struct gauss_newton *g, double f, double 
 {
     result->stop = STOP_MISFIT;
     snprintf(result->reason, sizeof result->reason,
-             "what is left is a difference between model and measurements of about %.2g %%, more paths will not lower "
-             "it: the objective is %.3g with a noise of %.1g",
+             "what is left is a difference between model and measurements of about %.2g %%, more paths from this start "
+             "will not lower it: the objective is %.3g with a noise of %.1g",
              100.0 * sqrt(linear_model_misfit(&g->model, g->n_free)), f, se);
 }
 

@@ -155,7 +155,7 @@ static void test_ends_at_misfit(void **state)
         double truth[FAKE_N_PARAM];
         fit_unstated(cloth[CLOTH], seed, 6000000, 1.0, truth, &f, &r);
         assert_int_equal(r.stop, STOP_MISFIT);
-        assert_true(r.converged && strstr(r.reason, "more paths will not lower it") != NULL);
+        assert_true(r.converged && strstr(r.reason, "more paths from this start will not lower it") != NULL);
         ended += unstated_rel_rms(cloth[CLOTH], seed, r.param) / SEEDS;
         paths += (double)r.n_path / SEEDS;
         fit_unstated(cloth[CLOTH], seed, 6000000, 0.0, truth, &f, &r);
