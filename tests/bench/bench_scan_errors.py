@@ -97,6 +97,7 @@ def bench_phantoms(arguments):
         photographs = make_sample(arguments, folder, weave, 100 + k, parameters, 65536)
         every += fit(arguments, folder, "scan", 1 + k, photographs, {"path_budget": 2000000})
     if every:
+        figure("cloth.scan.worst_error_over_se", round(max(abs(z) for _, z, _ in every), 3), "1")
         figure("cloth.scan.covered", round(covered(every), 4), "1", "higher")
         figure("cloth.scan.parameters", len(every), "parameters", "higher")
 
