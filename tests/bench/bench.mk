@@ -41,8 +41,8 @@ bench-progress: | deps-test ## predicted against actual remaining time of four j
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/bench_progress.py --build $(BUILD) $(PROGRESS)
 
-# SERVICE: some of the figures only: list uploads slow_disk declare readers watchers
-bench-service: | deps-test ## what the daemon costs: the list of jobs, answers beside uploads and a slow disk, declarations, slow readers, long polls (a minute)
+# SERVICE: some of the figures only: list answers uploads slow_disk declare readers watchers
+bench-service: | deps-test ## what the daemon costs: the list of jobs, other answers, those beside uploads and a slow disk, declarations, slow readers, long polls (two minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/bin/selvedged >&2
 	@/usr/bin/python3 tests/bench/service/bench_service.py --build $(BUILD) $(SERVICE)
 

@@ -3,6 +3,7 @@ match their hashes.
 
 SELVEDGE_KILLS says how often all tests together kill (200; `make test-crash`: 2,000). They print
 the kills and the facts that were confirmed, as lines of JSON."""
+import concurrent.futures
 import json
 import os
 import random
@@ -14,6 +15,7 @@ import requests
 from daemon_under_test import FILES, TUS, Daemon, document, sha256, wait_until
 
 
+AT_ONCE = 4
 KILLS_IN_UPLOADS = 12
 KILLS = int(os.environ.get("SELVEDGE_KILLS", "200"))
 LOOPS = max(2, KILLS // 100)
@@ -82,8 +84,22 @@ def test_a_delete_that_was_acknowledged_holds(daemon_maker):
     assert os.listdir(os.path.join(d.data, "quarantine")) == []
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_kill_in_mid_upload(figures, tmp_path, seed):
+def at_once(act, folder, n):
+    """Runs act(folder, seed) for n seeds, each with a daemon of its own. They wait for disk and timers most of the time."""
+    with concurrent.futures.ThreadPoolExecutor(AT_ONCE) as pool:
+        for done in [pool.submit(act, folder / str(seed), seed) for seed in range(n)]:
+            done.result()
+
+
+def test_kill_in_mid_upload(figures, tmp_path):
+    at_once(lambda folder, seed: kills_in_mid_upload(figures, folder, seed), tmp_path, 3)
+
+
+def test_kill_loop_over_everything(figures, tmp_path):
+    at_once(lambda folder, seed: kills_at_everything(figures, folder, seed), tmp_path, LOOPS)
+
+
+def kills_in_mid_upload(figures, tmp_path, seed):
     """Uploads continue through many kills: every acknowledged offset is kept, and the files are complete at the end."""
     rng = random.Random(seed)
     d = Daemon(tmp_path / "data", options={"upload.commit_bytes": 1 << 18}).start()
@@ -133,8 +149,7 @@ def test_kill_in_mid_upload(figures, tmp_path, seed):
     d.stop()
 
 
-@pytest.mark.parametrize("seed", range(LOOPS))
-def test_kill_loop_over_everything(figures, tmp_path, seed):
+def kills_at_everything(figures, tmp_path, seed):
     """Random requests and kills: what was acknowledged is checked after each restart, and at the end every job reaches
     a final state."""
     rng = random.Random(100 + seed)

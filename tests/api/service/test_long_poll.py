@@ -71,11 +71,12 @@ def test_a_change_ends_the_wait(daemon, watched):
 def test_another_job_does_not_end_the_wait(daemon):
     job, other = daemon.create(), daemon.create()
     before = n_waiting(daemon)
-    w = Waiting(daemon, f"/v1/jobs/{job}", tag_of(daemon, f"/v1/jobs/{job}"), wait=2)
+    """Whether it was looked at for nothing is a matter of cost, which test_change_feed looks at."""
+    w = Waiting(daemon, f"/v1/jobs/{job}", tag_of(daemon, f"/v1/jobs/{job}"), wait=1)
     wait_until(lambda: n_waiting(daemon) == before + 1)
     daemon.post(f"/v1/jobs/{other}/cancel")
     w.join(20)
-    assert w.status == 304 and w.took_s > 1.99
+    assert w.status == 304 and w.took_s > 0.99
 
 
 def test_what_does_not_wait(daemon):

@@ -1,8 +1,10 @@
 """What does the daemon cost, and does it answer while it stores uploads? Prints figures service.*.
 
-    bench_service.py [--build DIR] [NAME...]    NAME: list uploads slow_disk declare readers watchers
+    bench_service.py [--build DIR] [NAME...]    NAME: list answers uploads slow_disk declare readers watchers
 
-list: CPU time of the daemon for one page of the list of jobs, at 100 and at 10,000 jobs. uploads: 99th percentile of the
+list: CPU time of the daemon for one page of the list of jobs, at 100 and at 10,000 jobs. answers: answers a second and 99th
+percentile of their time, of a page of the list, a job, its series of 500 steps and the metrics, at 100 and 10,000 jobs, with
+no upload and with 8 that go on; without uploads the CPU time of the daemon for an answer, too. uploads: 99th percentile of the
 time of GET on a job while 8 clients upload. slow_disk: longest time of GET /livez while one client uploads and each sync
 takes 0.5 s. declare: time in which 4,000 slices of a scan are declared. readers: memory of the daemon while 60 clients
 read a job and its result of 12 MB at 100 bytes a second. watchers: CPU time of the daemon and 99th percentile of the time of
@@ -27,7 +29,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.a
 sys.path.insert(0, os.path.join(ROOT, "tests", "support", "python"))
 N_LIST, N_SLICE, N_READER, N_WATCHER, RESULT_BYTES = 200, 4000, 60, 200, 12 << 20
 PIECE_BYTES = 16 << 20
-UPLOAD_S = 5.0
+UPLOAD_S, ANSWERS_S, N_ASKING = 5.0, 2.0, 2
 
 
 def figure(name, value, unit):
@@ -125,6 +127,58 @@ def bench_uploads(folder, daemon_type):
         figure("get_p99_ms_8_uploads", 1e3 * times[int(0.99 * len(times))], "ms")
 
 
+def ask_without_pause(port, path, until, answers):
+    """Sends its own times of GET through the pipe `answers`."""
+    client, times = http.client.HTTPConnection("127.0.0.1", port), []
+    while time.monotonic() < until:
+        start = time.monotonic()
+        client.request("GET", path)
+        assert client.getresponse().read()
+        times.append(time.monotonic() - start)
+    answers.send(times)
+
+
+def bench_answers_of(daemon, path, name, n_upload):
+    """Two clients that ask one after the other, beside n_upload uploads."""
+    senders = []
+    until = time.monotonic() + ANSWERS_S
+    if n_upload:
+        job = daemon.create()
+        urls = [daemon.post(f"/v1/jobs/{job}/files", json={"name": f"s{i}.tif", "role": "volume", "size": 1 << 28, "sha256": None}).json()["upload_url"]
+                for i in range(n_upload)]
+        until = time.monotonic() + ANSWERS_S
+        senders = [multiprocessing.Process(target=send_forever, args=(daemon.port, url, 1 << 28, until)) for url in urls]
+    pipes = [multiprocessing.Pipe(duplex=False) for _ in range(N_ASKING)]
+    asking = [multiprocessing.Process(target=ask_without_pause, args=(daemon.port, path, until, end)) for _, end in pipes]
+    before = cpu_s(daemon.process.pid)
+    for process in senders + asking:
+        process.start()
+    times = sorted(t for end, _ in pipes for t in end.recv())
+    used_s = cpu_s(daemon.process.pid) - before
+    for process in senders + asking:
+        process.join()
+    print(json.dumps({"name": f"service.answers.{name}_per_s", "value": round(len(times) / ANSWERS_S, 1), "unit": "1/s", "better": "higher"}),
+          flush=True)
+    figure(f"answers.{name}_p99_ms", 1e3 * times[int(0.99 * len(times))], "ms")
+    if not n_upload:
+        figure(f"answers.{name}_cpu_ms", 1e3 * used_s / len(times), "ms")
+
+
+def bench_answers(folder, daemon_type):
+    for n, jobs in ((100, "100"), (10000, "10k")):
+        daemon = daemon_type(os.path.join(folder, f"answers-{jobs}"), options={"jobs.max_jobs": 20000})
+        with daemon:
+            daemon.create()
+        copy_jobs(daemon.data, n - 2)
+        with daemon:
+            job = daemon.start_job("series 500")
+            daemon.wait_state(job, "succeeded")
+            paths = {"list": "/v1/jobs", "job": f"/v1/jobs/{job}", "series": f"/v1/jobs/{job}/series", "metrics": "/metrics"}
+            for what, path in paths.items():
+                for n_upload in (0, 8):
+                    bench_answers_of(daemon, path, f"{what}_{jobs}_{n_upload}_uploads", n_upload)
+
+
 def bench_slow_disk(folder, daemon_type):
     shim = os.path.join(folder, "slow.so")
     subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", shim, os.path.join(ROOT, "tests", "crash", "fault_shim.c"), "-ldl"], check=True)
@@ -196,7 +250,7 @@ def bench_watchers(folder, daemon_type):
         figure("watchers_last_s", time.monotonic() - start, "s")
 
 
-BENCH = {"list": bench_list, "uploads": bench_uploads, "slow_disk": bench_slow_disk, "declare": bench_declare, "readers": bench_readers,
+BENCH = {"list": bench_list, "answers": bench_answers, "uploads": bench_uploads, "slow_disk": bench_slow_disk, "declare": bench_declare, "readers": bench_readers,
          "watchers": bench_watchers}
 
 
