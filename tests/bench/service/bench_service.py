@@ -250,8 +250,8 @@ def bench_watchers(folder, daemon_type):
         figure("watchers_last_s", time.monotonic() - start, "s")
 
 
-BENCH = {"list": bench_list, "answers": bench_answers, "uploads": bench_uploads, "slow_disk": bench_slow_disk, "declare": bench_declare, "readers": bench_readers,
-         "watchers": bench_watchers}
+BENCH = {"list": bench_list, "answers": bench_answers, "uploads": bench_uploads, "slow_disk": bench_slow_disk, "declare": bench_declare,
+         "readers": bench_readers, "watchers": bench_watchers}
 
 
 def main():
