@@ -77,17 +77,22 @@ static status read_picture(const struct cli_args *a, json_t *picture, const char
 static json_t *fixed_fit(const json_t *result, json_t *groups)
 {
     const json_t *list = json_object_get(result, "parameters"), *p;
-    json_t *fixed = json_object();
+    json_t *fixed = json_object(),
+           *fit = json_pack("{s:O, s:o}", "model", json_object_get(result, "model"), "fixed", fixed);
     const char *last = NULL;
     size_t i;
     json_array_foreach(list, i, p)
     {
+        if (strcmp(json_string_value(json_object_get(p, "name")), "density_multiplier") == 0) {
+            json_object_set(fit, "density_multiplier_per_cm", json_object_get(p, "value"));
+            continue;
+        }
         const char *set = json_string_value(json_object_get(p, "set"));
         json_object_set(fixed, json_string_value(json_object_get(p, "name")), json_object_get(p, "value"));
         if (set != NULL && (last == NULL || strcmp(last, set) != 0)) json_array_append_new(groups, json_string(set));
         last = set;
     }
-    return json_pack("{s:O, s:o}", "model", json_object_get(result, "model"), "fixed", fixed);
+    return fit;
 }
 
 /* Sections that a picture shares with the photographs. */

@@ -215,10 +215,6 @@ static status check_values_shown(const struct option_value *v, struct error *err
     const struct model_info *info = model_catalogue_find(m->id);
     status s = model_sets_init(&sets, info, doc->group, doc->n_group, err);
     if (s != STATUS_OK) return s;
-    if (info->kind != MODEL_SURFACE)
-        return error_set_field(err, STATUS_INVALID, "fit.model",
-                               "'fit.model' is '%s', a volume model: pictures show the fibers of surface models",
-                               m->id);
     if (m->first_free >= 0)
         return error_set_field(err, STATUS_INVALID, "fit.fixed",
                                "'fit.fixed' lacks '%s': pictures without photographs show the values that it has for "

@@ -16,7 +16,7 @@ const struct job_option option_rows_pictures[] = {
      .items = "pictures",
      .meaning =
          "Pictures of the fitted cloth laid on a surface (docs/bent-cloth.md), in the folder `pictures` of the "
-         "results. They show the best model, which must be a surface model. Without `photographs` and `measurements` "
+         "results. They show the best model. Without `photographs` and `measurements` "
          "nothing is fitted: they show `fit.model` with `fit.fixed`, which then names every parameter."},
     {.path = "pictures[].on",
      .kind = OPTION_CHOICE,

@@ -23,7 +23,7 @@ static bool nearest_face(const struct bent_cloth *b, const double origin[3], con
                              .tfar = (float)tfar,
                              .mask = ~0u};
     q->hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(b->outer, &context, q);
+    rtcIntersect1(b->space.outer, &context, q);
     return q->hit.geomID != RTC_INVALID_GEOMETRY_ID;
 }
 
@@ -51,8 +51,8 @@ static bool touch(const uint32_t a[3], const uint32_t b[3])
  * have an edge that goes through the other one. */
 static bool edge_crosses(const struct bent_cloth *b, size_t f, int k, double at_mm[3])
 {
-    const uint32_t *face = b->shell.outer[f];
-    const float *from = b->shell.node_mm[face[k]], *to = b->shell.node_mm[face[(k + 1) % 3]];
+    const uint32_t *face = b->space.shell.outer[f];
+    const float *from = b->space.shell.node_mm[face[k]], *to = b->space.shell.node_mm[face[(k + 1) % 3]];
     double origin[3], edge[3], t = 0.0;
     for (int a = 0; a < 3; a++) {
         origin[a] = (double)from[a];
@@ -62,7 +62,7 @@ static bool edge_crosses(const struct bent_cloth *b, size_t f, int k, double at_
         struct RTCRayHit q;
         if (!nearest_face(b, origin, edge, t, 1.0, &q)) return false;
         t = (double)q.ray.tfar;
-        if (!touch(face, b->shell.outer[q.hit.primID])) {
+        if (!touch(face, b->space.shell.outer[q.hit.primID])) {
             for (int a = 0; a < 3; a++) at_mm[a] = origin[a] + t * edge[a];
             return true;
         }
@@ -74,9 +74,9 @@ static bool edge_crosses(const struct bent_cloth *b, size_t f, int k, double at_
 bool scene_crosses_itself(const struct scene *s, double at_mm[3])
 {
     if (s->bent == NULL) return false;
-    for (size_t f = 0; f < s->bent->shell.n_outer; f++)
+    for (size_t f = 0; f < s->bent->space.shell.n_outer; f++)
         for (int k = 0; k < 3; k++) {
-            const uint32_t *face = s->bent->shell.outer[f];
+            const uint32_t *face = s->bent->space.shell.outer[f];
             if (face[k] > face[(k + 1) % 3]) continue; /* the neighbour has the same edge the other way */
             if (edge_crosses(s->bent, f, k, at_mm)) return true;
         }

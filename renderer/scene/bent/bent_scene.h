@@ -1,22 +1,17 @@
 /* A bent cloth inside of struct scene, for the files of renderer/scene: it is a copy of the flat scene's struct, with
  * the shell. Its rays are in the space of the mesh: their offsets stay 0, and i_cell is the cell that the origin
- * lies in or near, BENT_OUTSIDE for a ray that has not reached the shell yet, and BENT_ON_SHEET for one that has ended
+ * lies in or near, SHELL_OUTSIDE for a ray that has not reached the shell yet, and SHELL_ON_SHEET for one that has ended
  * on the black sheet.
  */
 #ifndef SELVEDGE_RENDERER_BENT_SCENE_H
 #define SELVEDGE_RENDERER_BENT_SCENE_H
 
-#include "renderer/scene/bent/shell.h"
+#include "renderer/scene/bent/shell_walk.h"
 #include "renderer/scene/scene_data.h"
-
-#define BENT_OUTSIDE UINT32_MAX
-#define BENT_ON_SHEET (UINT32_MAX - 1)
 
 struct bent_cloth {
     struct scene flat; /* a copy: the flat scene itself belongs to the caller */
-    struct shell shell;
-    RTCDevice device;
-    RTCScene outer; /* the outer faces of the shell, as triangles */
+    struct shell_space space;
 };
 
 bool bent_trace(const struct scene *s, struct scene_ray *ray, struct scene_hit *hit);

@@ -9,7 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BASIS_VIEWS = 48, BASIS_ITERATIONS = 6, PURPOSE_BASIS = 1, PURPOSE_START = 2 };
+#define MOST_RELATIVE 3.0f
+enum { BASIS_VIEWS = 64, BASIS_ITERATIONS = 6, PURPOSE_BASIS = 1, PURPOSE_START = 2 };
 enum { COLUMNS_OF_VIEW = 3 * TABLE_LIGHTS, N_COLUMN = BASIS_VIEWS * COLUMNS_OF_VIEW };
 
 struct basis {
@@ -18,6 +19,7 @@ struct basis {
     size_t n_texel;
     float *picture; /* N_COLUMN x n_texel */
     float *next;    /* n_basis x n_texel */
+    float *spare;   /* n_texel for each thread */
 };
 
 static void random_direction(struct rng *rng, size_t n_side, double d[3])
@@ -27,18 +29,45 @@ static void random_direction(struct rng *rng, size_t n_side, double d[3])
     direction_grid_direction(square, n_side == 2 && rng_float(rng) < 0.5f ? 1 : 0, d);
 }
 
-/* Leaves what differs from the mean, so scaled that a picture ten times as bright counts about three times. */
-static void centre(float *picture, size_t n)
+static float mean_of(const float *picture, size_t n)
 {
     double sum = 0.0;
     for (size_t i = 0; i < n; i++) sum += (double)picture[i];
-    float mean = (float)(sum / (double)n), scale = mean > 0.0f ? 1.0f / sqrtf(mean) : 0.0f;
+    return (float)(sum / (double)n);
+}
+
+/* Means over 3 x 3 texels, with the weights (1, 2, 1) / 4 along both axes; the picture repeats. */
+static void smooth(const struct appearance_table *t, const float *from, float *to)
+{
+    for (size_t y = 0; y < t->height; y++) {
+        const float *row[3] = {from + (y + t->height - 1) % t->height * t->width, from + y * t->width,
+                               from + (y + 1) % t->height * t->width};
+        for (size_t x = 0; x < t->width; x++) {
+            size_t left = (x + t->width - 1) % t->width, right = (x + 1) % t->width;
+            float sum = 0.0f;
+            for (int k = 0; k < 3; k++)
+                sum += (k == 1 ? 2.0f : 1.0f) * (row[k][left] + 2.0f * row[k][x] + row[k][right]);
+            to[y * t->width + x] = sum / 16.0f;
+        }
+    }
+}
+
+/* Makes a noisy picture fit for finding textures. A fiber that happens to throw the lamp's light into the camera is many
+ * times as bright as its neighbours: what is above MOST_RELATIVE means is cut off, and the rest smoothed. That changes
+ * the choice of textures only, not the weights that they get. What is left differs from the mean; it is so scaled that a
+ * picture ten times as bright counts about three times. */
+static void prepare_picture(const struct appearance_table *t, float *picture, float *spare)
+{
+    size_t n = t->width * t->height;
+    float most = MOST_RELATIVE * mean_of(picture, n);
+    for (size_t i = 0; i < n; i++) spare[i] = picture[i] < most ? picture[i] : most;
+    smooth(t, spare, picture);
+    float mean = mean_of(picture, n), scale = mean > 0.0f ? 1.0f / sqrtf(mean) : 0.0f;
     for (size_t i = 0; i < n; i++) picture[i] = scale * (picture[i] - mean);
 }
 
 static void trace_view(void *context, size_t i_view, size_t i_thread)
 {
-    (void)i_thread;
     const struct basis *b = context;
     const struct table_walks *w = b->walks;
     struct rng rng;
@@ -55,7 +84,8 @@ static void trace_view(void *context, size_t i_view, size_t i_thread)
         for (size_t k = 0; k < COLUMNS_OF_VIEW; k++)
             column[k * b->n_texel + i] = rgb[k / 3][k % 3] / (float)fabs(wi[k / 3][2]);
     }
-    for (size_t k = 0; k < COLUMNS_OF_VIEW; k++) centre(column + k * b->n_texel, b->n_texel);
+    float *spare = b->spare + i_thread * b->n_texel;
+    for (size_t k = 0; k < COLUMNS_OF_VIEW; k++) prepare_picture(b->t, column + k * b->n_texel, spare);
 }
 
 static float dot(const float *a, const float *b, size_t n)
@@ -131,13 +161,16 @@ status appearance_basis_make(const struct table_walks *w, struct thread_pool *po
     struct basis b = {.walks = w, .t = t, .n_texel = t->width * t->height};
     b.picture = calloc(N_COLUMN * b.n_texel, sizeof *b.picture);
     b.next = malloc(t->n_basis * b.n_texel * sizeof *b.next);
-    status s = b.picture != NULL && b.next != NULL ? STATUS_OK
-                                                   : error_set(err, STATUS_NO_MEMORY, "cannot make tables: no memory");
+    b.spare = malloc(thread_pool_n_thread(pool) * b.n_texel * sizeof *b.spare);
+    status s = b.picture != NULL && b.next != NULL && b.spare != NULL
+                   ? STATUS_OK
+                   : error_set(err, STATUS_NO_MEMORY, "cannot make tables: no memory");
     if (s == STATUS_OK &&
         (thread_pool_run(pool, BASIS_VIEWS, trace_view, &b, progress) != STATUS_OK || progress_cancelled(progress)))
         s = error_set(err, STATUS_CANCELLED, "making tables was cancelled");
     if (s == STATUS_OK) s = iterate(&b, pool, err);
     free(b.picture);
     free(b.next);
+    free(b.spare);
     return s;
 }

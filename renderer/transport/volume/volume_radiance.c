@@ -1,6 +1,7 @@
 #include "renderer/transport/volume/volume_radiance.h"
 
 #include "renderer/transport/camera.h"
+#include "renderer/transport/volume/volume_bent.h"
 #include "renderer/transport/volume/volume_tracer.h"
 
 #include <stdlib.h>
@@ -31,6 +32,8 @@ static status check_input(const struct radiance_input *in, struct error *err)
         return error_set_field(err, STATUS_INVALID, "n_set",
                                "cannot use %zu parameter sets of model '%s': volumes have no material groups",
                                in->n_set, m->id);
+    if (in->want_derivative && in->scene.volume->bent != NULL)
+        return error_set(err, STATUS_INVALID, "a bent volume is traced without derivatives");
     if (d > 0 && d <= 1e9) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, m->param[m->n_param - 1].name,
                            "cannot trace with density multiplier %g per metre", d);
@@ -74,9 +77,28 @@ static bool enter(const struct volume_state *s, const struct camera *camera, con
     return volume_ray_enter(s->scene, origin_mm, direction, ray);
 }
 
+/* The same of a bent cloth, path by path. */
+static uint64_t trace_bent(const struct volume_state *s, const struct radiance_block *b, float *value)
+{
+    const struct camera *camera = &s->camera[b->member[0]];
+    uint64_t n_bounce = 0;
+    for (size_t i = 0; i < b->n_path && !progress_cancelled(b->progress); i++) {
+        struct volume_result path;
+        double at[2], origin_mm[3], direction[3];
+        camera_blur(camera, b->xy[i], &b->rng[i], at);
+        camera_origin(camera, at, origin_mm);
+        camera_direction(camera, at, direction);
+        volume_bent_trace(&s->setting[b->member[0]], origin_mm, direction, &b->rng[i], &path);
+        memcpy(value + i * (3 + s->n_jac), path.radiance, sizeof path.radiance);
+        n_bounce += path.n_bounce;
+    }
+    return n_bounce;
+}
+
 static uint64_t trace(const void *state, const struct radiance_block *b, float *value)
 {
     const struct volume_state *s = state;
+    if (s->scene->bent != NULL) return trace_bent(s, b, value);
     struct volume_ray ray[RADIANCE_BLOCK_PATHS];
     struct volume_result path[RADIANCE_BLOCK_PATHS];
     size_t n_ray = 0, place[RADIANCE_BLOCK_PATHS];

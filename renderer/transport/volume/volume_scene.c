@@ -1,4 +1,4 @@
-#include "renderer/transport/volume/volume_scene.h"
+#include "renderer/transport/volume/volume_bent.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -162,6 +162,10 @@ status volume_scene_init(struct volume_scene *s, const struct direction_volume *
 
 void volume_scene_release(struct volume_scene *s)
 {
+    if (s->bent != NULL) {
+        volume_bent_release(s);
+        return;
+    }
     free(s->brick);
     free(s->voxel);
     s->brick = NULL;

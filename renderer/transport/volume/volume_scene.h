@@ -24,6 +24,8 @@ enum {
     VOLUME_EMPTY_MAX = 32
 };
 
+struct volume_bent;
+
 struct volume_scene {
     size_t n[3];
     double voxel_size_m[3];
@@ -37,6 +39,7 @@ struct volume_scene {
     uint32_t *voxel; /* owned; VOLUME_BRICK_VOXELS a stored brick, x fastest: density << 24 | q << 12 | p */
     size_t n_stored; /* bricks */
     bool black_sheet;
+    struct volume_bent *bent; /* owned; NULL: the cloth is flat. Otherwise brick and voxel are those of the flat one */
 };
 
 struct volume_scene_option {

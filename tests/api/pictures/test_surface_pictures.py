@@ -209,6 +209,23 @@ def test_pictures_of_given_parameters(real):
     assert "with given parameters" in real.get(f"/v1/jobs/{second}/results/summary.txt").text
 
 
+def test_a_volume_model_on_a_cylinder(real):
+    """Fixed parameters of microflakes; the flat piece has the mean of a flat mesh."""
+    mesh = {"on": "mesh", "mesh_file": "sheet.obj", "width_mm": 3, **VIEW}
+    doc = {"sample": "volume", "fibers": {"file": "cloth.hair"}, "pictures": [{k: v for k, v in {**mesh, "on": "flat"}.items() if k != "mesh_file"}, mesh, {"on": "cylinder", "radius_mm": 1, "width_mm": 3, **VIEW}],
+           "fit": {"model": "microflake.v1", "density_multiplier_per_cm": 3000, "fixed": {"alpha": [0.9, 0.8, 0.7], "gamma": 0.3}}}
+    job = real.create(doc)
+    real.upload(job, "cloth.hair", hair(layers=3), "fibers")
+    real.upload(job, "sheet.obj", (SHEET + "f 1/1 2/2 3/3 4/4\n").encode(), "mesh")
+    assert real.post(f"/v1/jobs/{job}/start").status_code == 202
+    done = real.wait_state(job, "succeeded", "failed", timeout_s=60)
+    assert done["state"] == "succeeded", done["error"]
+    flat, mesh, cylinder = done["result"]["pictures"]
+    se = math.hypot(flat["noise"] * sum(flat["mean"]), mesh["noise"] * sum(mesh["mean"])) / 3 / 16
+    assert flat["mean"][0] > flat["mean"][2] > 0 and sum(cylinder["mean"]) < 0.9 * sum(flat["mean"])
+    assert all(abs(a - b) < 5 * se for a, b in zip(flat["mean"], mesh["mean"])), done["result"]["pictures"]
+
+
 def render(real, *words):
     return subprocess.run([program("selvedge"), "render", *map(str, words)], env=dict(os.environ, SELVEDGE_SERVER=real.url),
                           capture_output=True, text=True, timeout=120)
@@ -242,7 +259,7 @@ def test_what_the_command_refuses(real, tmp_path):
 @pytest.mark.parametrize("change, field, word", [
     ({"fit": None}, "pictures", "fit.fixed"), ({"fit": {"fixed": {"C_R": 0.2}}}, "fit.fixed", "lacks"),
     ({"fit": {"models": ["two_lobe.v1", "textile.v3"]}}, "fit.models", "show one"),
-    ({"fit": {"model": "microflake.v1"}}, "fit.model", "volume model"), ({"correction": {"radius": {"fit": True}}}, "photographs", "missing"),
+    ({"fit": {"model": "microflake.v1"}}, "fit.fixed", "lacks"), ({"correction": {"radius": {"fit": True}}}, "photographs", "missing"),
     ({"export": {"mitsuba": True}}, "export.mitsuba", "fitted model")])
 def test_what_pictures_without_photographs_need(real, change, field, word):
     doc = {"sample": "s", "fibers": {"file": "a.hair"}, "pictures": [{"on": "flat", **VIEW}], "fit": {"model": "two_lobe.v1"}, **change}

@@ -29,7 +29,7 @@ FABRIC = {
                   [0.185, 0.047, 0.069], [0.999, 0.330, 0.354], 2.141, 10.0, 23.548),
     "silk": ({"weave": "satin", "yarns": [yarn(40, 4.7, flatness=3, hairs_per_mm=0)]},
              [0.745, 0.008, 0.070], [0.620, 0.553, 0.562], 1.0, 10.0, 19.823),
-    "velvet": ({"weave": "velvet", "pile_tilt_deg": 25, "yarns": [yarn(20, 7), yarn(24, 5)]},
+    "velvet": ({"weave": "velvet", "pile_tilt_deg": 60, "pile_spread_deg": 12, "yarns": [yarn(20, 7), yarn(24, 5)]},
                [0.044, 0.040, 0.040], [0.076, 0.058, 0.057], 1.577, 24.933, 44.881),
     "twill": ({"weave": "twill31", "tile_warps": 8, "tile_wefts": 8, "yarns": [yarn(36, 8, twist_per_m=700)]},
               [0.001, 0.001, 0.024], [0.987, 0.975, 0.825], 1.367, 23.509, 26.419),
@@ -39,7 +39,7 @@ FABRIC = {
 }
 LIGHT = {"light_theta_deg": 50, "light_phi_deg": 0, "camera_theta_deg": 0, "camera_phi_deg": 0}
 VIEW = [{"on": "cylinder", "radius_mm": 15, "size_mm": 40, "width_mm": 32, "wrap_deg": 200, **LIGHT},
-        {"on": "drape", "radius_mm": 10, "size_mm": 40, "width_mm": 40, **LIGHT, "light_phi_deg": 200, "camera_theta_deg": 55, "camera_phi_deg": 250}]
+        {"on": "drape", "radius_mm": 10, "size_mm": 40, "width_mm": 36, **LIGHT, "light_phi_deg": 200, "camera_theta_deg": 55, "camera_phi_deg": 250}]
 
 
 def document(name, px, samples):
@@ -67,8 +67,8 @@ def main():
     p = argparse.ArgumentParser()
     p.add_argument("--build", required=True)
     p.add_argument("--out")
-    p.add_argument("--px", type=int, default=192)
-    p.add_argument("--samples", type=int, default=64)
+    p.add_argument("--px", type=int, default=144)
+    p.add_argument("--samples", type=int, default=40)
     p.add_argument("names", nargs="*")
     a = p.parse_args()
     shown = [render(a.build, name, a.px, a.samples) for name in a.names or FABRIC]

@@ -4,10 +4,12 @@
 #include "geometry/mesh/mesh_drape.h"
 #include "geometry/mesh/mesh_shapes.h"
 #include "optimizer/job/job_folder.h"
+#include "renderer/transport/volume/volume_bent.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 /* Cells of a cylinder's mesh around all of it: chords are 1e-5 of the radius from the circle. */
@@ -71,15 +73,26 @@ static status name_picture(size_t i, enum job_surface on, status s, struct error
     return error_prefix(err, s, "picture %zu", i + 1);
 }
 
-status surface_cloth_new(const struct pipeline_context *c, size_t i, struct scene **bent, struct error *err)
+status surface_cloth_init(const struct pipeline_context *c, size_t i, enum model_kind kind, struct surface_cloth *cloth,
+                          struct error *err)
 {
     const struct job_surface_picture *p = &c->doc->surface_picture[i];
+    const bool black_sheet = p->black_sheet < 0 ? c->doc->black_sheet : p->black_sheet != 0;
     struct mesh m = {0};
+    memset(cloth, 0, sizeof *cloth);
     status s = make_mesh(c, i, &m, err);
-    if (s == STATUS_OK)
-        s = scene_bend(c->scene, &m, p->black_sheet < 0 ? c->doc->black_sheet : p->black_sheet != 0, bent, err);
+    if (s == STATUS_OK && kind == MODEL_SURFACE) s = scene_bend(c->scene, &m, black_sheet, &cloth->fibers, err);
+    if (s == STATUS_OK && kind != MODEL_SURFACE)
+        s = volume_scene_bend(&c->volume_scene, &m, black_sheet, &cloth->volume, err);
     mesh_release(&m);
     return name_picture(i, p->on, s, err);
+}
+
+void surface_cloth_release(struct surface_cloth *cloth)
+{
+    scene_free(cloth->fibers);
+    if (cloth->volume.bent != NULL) volume_scene_release(&cloth->volume);
+    memset(cloth, 0, sizeof *cloth);
 }
 
 static double *point_from(double theta_deg, double phi_deg, double distance_mm, double p[3])
@@ -123,10 +136,11 @@ status surface_cloth_check(const struct pipeline_context *c, struct error *err)
 {
     status s = STATUS_OK;
     for (size_t i = 0; i < c->doc->n_surface_picture && c->scene != NULL && s == STATUS_OK; i++) {
-        struct scene *bent = NULL;
-        s = surface_cloth_new(c, i, &bent, err);
-        if (s == STATUS_OK) s = name_picture(i, c->doc->surface_picture[i].on, check_surface(c, i, bent, err), err);
-        scene_free(bent);
+        struct surface_cloth cloth;
+        s = surface_cloth_init(c, i, MODEL_SURFACE, &cloth, err);
+        if (s == STATUS_OK)
+            s = name_picture(i, c->doc->surface_picture[i].on, check_surface(c, i, cloth.fibers, err), err);
+        surface_cloth_release(&cloth);
     }
     return s;
 }

@@ -123,30 +123,34 @@ static status render(struct pipeline_context *c, size_t i, const char *entry_pat
 {
     const struct job_surface_picture *p = &c->doc->surface_picture[i];
     const struct pipeline_model *model = &c->model[pipeline_best_model(c)];
-    struct scene *bent = NULL;
+    struct surface_cloth cloth;
     struct configuration view = observation_configuration(
         c->doc, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg, p->camera_phi_deg, p->cloth_rotation_deg);
     view.crop_m = mm * p->width_mm;
     view.crop_aspect = 1.0;
     view.environment = c->environment;
-    status s = surface_cloth_new(c, i, &bent, err);
-    if (s != STATUS_OK) return s;
-    const struct render_request q = {.input = {.scene = {.fibers = bent},
-                                               .model = &model->appearance,
-                                               .param = model->fit.param,
-                                               .n_set = model->sets.n_set},
-                                     .configuration = &view,
-                                     .width = p->px,
-                                     .height = p->px,
-                                     .n_sample = p->sample,
-                                     .seed = c->doc->seed ^ 0x73757266616365u,
-                                     .stream = (uint32_t)(STREAM + i)};
+    status s = surface_cloth_init(c, i, model->appearance.kind, &cloth, err);
+    if (s != STATUS_OK) {
+        surface_cloth_release(&cloth);
+        return s;
+    }
+    const struct render_request q = {
+        .input = {.scene = {.fibers = cloth.fibers, .volume = cloth.volume.bent != NULL ? &cloth.volume : NULL},
+                  .model = &model->appearance,
+                  .param = model->fit.param,
+                  .n_set = model->sets.n_set},
+        .configuration = &view,
+        .width = p->px,
+        .height = p->px,
+        .n_sample = p->sample,
+        .seed = c->doc->seed ^ 0x73757266616365u,
+        .stream = (uint32_t)(STREAM + i)};
     while (s == STATUS_OK && so_far->n_sample < p->sample) {
         s = surface_passes_add(c, &q, progress, so_far, err);
         if (s == STATUS_OK) s = write_entry(c, entry_path, p, so_far, entry, err);
     }
     if (s == STATUS_OK && *entry == NULL) s = write_entry(c, entry_path, p, so_far, entry, err);
-    scene_free(bent);
+    surface_cloth_release(&cloth);
     return s == STATUS_OK || s == STATUS_CANCELLED ? s : error_prefix(err, s, "picture %zu", i + 1);
 }
 
@@ -178,11 +182,6 @@ status surface_pictures_write(struct pipeline_context *c, double from, double to
     char path[WORKER_PATH_BYTES];
     double done = 0.0, all = surface_pictures_paths(c);
     if (c->doc->n_surface_picture == 0) return STATUS_OK;
-    if (c->model[pipeline_best_model(c)].appearance.kind != MODEL_SURFACE) {
-        worker_status_warn(c->status, "no picture of the cloth on a surface: the model '%s' sees no fibers",
-                           c->model[pipeline_best_model(c)].appearance.id);
-        return STATUS_OK;
-    }
     worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "pictures", path);
     status s = durable_make_folder(path, err);
     for (size_t i = 0; i < c->doc->n_surface_picture && s == STATUS_OK; i++) {
