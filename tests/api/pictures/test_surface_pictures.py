@@ -211,8 +211,9 @@ def test_pictures_of_given_parameters(real):
 
 def test_a_volume_model_on_a_cylinder(real):
     """Fixed parameters of microflakes; the flat piece has the mean of a flat mesh."""
-    mesh = {"on": "mesh", "mesh_file": "sheet.obj", "width_mm": 3, **VIEW}
-    doc = {"sample": "volume", "fibers": {"file": "cloth.hair"}, "pictures": [{k: v for k, v in {**mesh, "on": "flat"}.items() if k != "mesh_file"}, mesh, {"on": "cylinder", "radius_mm": 1, "width_mm": 3, **VIEW}],
+    view = {"width_mm": 3, **VIEW}
+    pictures = [{"on": "flat", **view}, {"on": "mesh", "mesh_file": "sheet.obj", **view}, {"on": "cylinder", "radius_mm": 1, **view}]
+    doc = {"sample": "volume", "fibers": {"file": "cloth.hair"}, "pictures": pictures,
            "fit": {"model": "microflake.v1", "density_multiplier_per_cm": 3000, "fixed": {"alpha": [0.9, 0.8, 0.7], "gamma": 0.3}}}
     job = real.create(doc)
     real.upload(job, "cloth.hair", hair(layers=3), "fibers")

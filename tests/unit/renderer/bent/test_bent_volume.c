@@ -1,4 +1,4 @@
-/* Volumes on meshes: a flat mesh changes nothing but the noise, no light is lost on a cylinder, the sheet lies under it. */
+/* Volumes on meshes: a flat mesh changes nothing but the noise, no light is lost on a cylinder. */
 #include "base/angle.h"
 #include "geometry/mesh/mesh_shapes.h"
 #include "renderer/transport/render.h"
