@@ -1,7 +1,7 @@
 /* A bent cloth inside of struct scene, for the files of renderer/scene: it is a copy of the flat scene's struct, with
  * the shell. Its rays are in the space of the mesh: their offsets stay 0, and i_cell is the cell that the origin
- * lies in or near, SHELL_OUTSIDE for a ray that has not reached the shell yet, and SHELL_ON_SHEET for one that has ended
- * on the black sheet.
+ * lies in or near, SHELL_OUTSIDE for a ray that has not reached the shell yet, and SHELL_ON_SHEET for one that has
+ * ended on the black sheet.
  */
 #ifndef SELVEDGE_RENDERER_BENT_SCENE_H
 #define SELVEDGE_RENDERER_BENT_SCENE_H

@@ -52,10 +52,10 @@ static void smooth(const struct appearance_table *t, const float *from, float *t
     }
 }
 
-/* Makes a noisy picture fit for finding textures. A fiber that happens to throw the lamp's light into the camera is many
- * times as bright as its neighbours: what is above MOST_RELATIVE means is cut off, and the rest smoothed. That changes
- * the choice of textures only, not the weights that they get. What is left differs from the mean; it is so scaled that
- * a picture ten times as bright counts about three times. */
+/* Makes a noisy picture fit for finding textures. A fiber that happens to throw the lamp's light into the camera is
+ * many times as bright as its neighbours: what is above MOST_RELATIVE means is cut off, and the rest smoothed. That
+ * changes the choice of textures only, not the weights that they get. What is left differs from the mean; it is so
+ * scaled that a picture ten times as bright counts about three times. */
 static void prepare_picture(const struct appearance_table *t, float *picture, float *spare)
 {
     size_t n = t->width * t->height;

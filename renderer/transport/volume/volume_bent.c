@@ -1,39 +1,12 @@
 #include "renderer/transport/volume/volume_bent.h"
 
-#include "renderer/scene/bent/shell_walk.h"
 #include "renderer/transport/path_value.h"
 #include "renderer/transport/volume/volume_flight.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-#define MARGIN_MM 1e-3
 enum { MOST_LOOKUP = 200000 };
-
-struct volume_bent {
-    struct shell_space space;
-};
-
-status volume_scene_bend(const struct volume_scene *flat, const struct mesh *mesh, bool black_sheet,
-                         struct volume_scene *bent, struct error *err)
-{
-    *bent = *flat;
-    bent->black_sheet = black_sheet;
-    bent->bent = calloc(1, sizeof *bent->bent);
-    if (bent->bent == NULL) {
-        memset(bent, 0, sizeof *bent);
-        return error_set(err, STATUS_NO_MEMORY, "cannot bend the cloth: out of memory");
-    }
-    return shell_space_init(&bent->bent->space, mesh, volume_scene_thickness_mm(flat), MARGIN_MM, err);
-}
-
-void volume_bent_release(struct volume_scene *bent)
-{
-    shell_space_release(&bent->bent->space);
-    free(bent->bent);
-    memset(bent, 0, sizeof *bent);
-}
 
 struct bent_path {
     const struct volume_setting *s;

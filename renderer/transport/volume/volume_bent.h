@@ -5,7 +5,12 @@
 #define SELVEDGE_RENDERER_VOLUME_BENT_H
 
 #include "geometry/mesh/mesh.h"
+#include "renderer/scene/bent/shell_walk.h"
 #include "renderer/transport/volume/volume_tracer.h"
+
+struct volume_bent {
+    struct shell_space space;
+};
 
 /* bent: like flat, which must outlive it, on the mesh; its origin is the orbit centre. black_sheet: one lies under all
  * of it. Errors as scene_bend (renderer/scene/scene.h). volume_scene_release in any case. */

@@ -11,8 +11,8 @@ struct surface_cloth {
 };
 
 /* The cloth of c->scene, or for a volume model of c->volume_scene, as picture i shows it; c must outlive it.
- * STATUS_FORMAT and STATUS_INVALID (field: option id), naming the picture: a mesh that cannot be used or that bends too tightly.
- * STATUS_NO_MEMORY. Release in any case. */
+ * STATUS_FORMAT and STATUS_INVALID (field: option id), naming the picture: a mesh that cannot be used or that bends too
+ * tightly. STATUS_NO_MEMORY. Release in any case. */
 status surface_cloth_init(const struct pipeline_context *c, size_t i, enum model_kind kind, struct surface_cloth *cloth,
                           struct error *err);
 void surface_cloth_release(struct surface_cloth *cloth);
