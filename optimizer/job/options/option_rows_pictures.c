@@ -14,10 +14,9 @@ const struct job_option option_rows_pictures[] = {
      .left_out = "none",
      .allowed = "1..32",
      .items = "pictures",
-     .meaning =
-         "Pictures of the fitted cloth laid on a surface (docs/bent-cloth.md), in the folder `pictures` of the "
-         "results. They show the best model. Without `photographs` and `measurements` "
-         "nothing is fitted: they show `fit.model` with `fit.fixed`, which then names every parameter."},
+     .meaning = "Pictures of the fitted cloth laid on a surface (docs/bent-cloth.md), in the folder `pictures` of the "
+                "results. They show the best model. Without `photographs` and `measurements` "
+                "nothing is fitted: they show `fit.model` with `fit.fixed`, which then names every parameter."},
     {.path = "pictures[].on",
      .kind = OPTION_CHOICE,
      OF_PICTURE(on),
