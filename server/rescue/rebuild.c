@@ -33,7 +33,7 @@ static int oldest_first(const void *a, const void *b)
 
 static double created_of(const char *folder)
 {
-    struct job_journal journal;
+    struct job_journal journal = {0};
     struct stat st;
     double t = stat(folder, &st) == 0 ? (double)st.st_mtim.tv_sec : 0;
     if (job_journal_read(folder, &journal, NULL) == STATUS_OK && journal.has_job) t = journal.job.created_unix_s;

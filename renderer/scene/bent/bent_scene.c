@@ -7,27 +7,22 @@ status scene_bend(const struct scene *flat, const struct mesh *m, bool black_she
                   struct error *err)
 {
     if (flat->bent != NULL) return error_set(err, STATUS_INVALID, "cannot bend a cloth that is bent already");
-    struct bent_cloth *b = calloc(1, sizeof *b);
     struct scene *s = calloc(1, sizeof *s);
-    status st =
-        b != NULL && s != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot bend the cloth: out of memory");
-    if (st == STATUS_OK) {
-        memcpy(s, flat, sizeof *s);
-        memcpy(&b->flat, flat, sizeof b->flat);
-        s->bent = b;
-        s->black_sheet = black_sheet;
-        st = shell_space_init(&b->space, m, -(double)flat->bottom_mm, (double)SCENE_MARGIN_MM, err);
-    }
-    if (st == STATUS_OK) {
-        *bent = s;
-        return STATUS_OK;
-    }
-    if (s != NULL && s->bent != NULL)
-        bent_free(s);
-    else {
-        free(b);
+    if (s != NULL) s->bent = calloc(1, sizeof *s->bent);
+    if (s == NULL || s->bent == NULL) {
         free(s);
+        return error_set(err, STATUS_NO_MEMORY, "cannot bend the cloth: out of memory");
     }
+    struct bent_cloth *b = s->bent;
+    memcpy(s, flat, sizeof *s);
+    memcpy(&b->flat, flat, sizeof b->flat);
+    s->bent = b;
+    s->black_sheet = black_sheet;
+    status st = shell_space_init(&b->space, m, -(double)flat->bottom_mm, (double)SCENE_MARGIN_MM, err);
+    if (st == STATUS_OK)
+        *bent = s;
+    else
+        bent_free(s);
     return st;
 }
 
