@@ -45,6 +45,7 @@
 #define JOB_FOLDER_WORK "work"
 #define JOB_FOLDER_ADOPTED "adopted"
 #define JOB_FOLDER_RESULTS "results"
+#define JOB_THUMBNAIL "thumbnail.png" /* among the results: a small picture for lists */
 
 /* Exit codes of the worker. */
 enum worker_exit {

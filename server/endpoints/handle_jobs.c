@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LIST_MOST = 500, LIST_USUAL = 50, PRIORITY_MOST = 10 };
+enum { PRIORITY_MOST = 10 };
 
 /* Decides a 304 when the client has the present job. The document is not even read for it. */
 static bool job_not_modified(struct http_request *r)
@@ -178,62 +178,4 @@ void handle_cancel_job(struct http_request *r)
         reply_problem(r, NULL, &err, NULL);
     else
         reply_job(r, r->param[0], running ? MHD_HTTP_ACCEPTED : MHD_HTTP_OK, false, false);
-}
-
-static bool read_query(struct http_request *r, struct job_query *q)
-{
-    long long limit, cursor;
-    enum job_state state;
-    const char *text = MHD_lookup_connection_value(r->connection, MHD_GET_ARGUMENT_KIND, "state");
-    *q = (struct job_query){.state = -1};
-    if (text != NULL && !job_state_parse(text, &state)) {
-        struct error err = {0};
-        error_set_field(&err, STATUS_INVALID, "state", "there is no state '%.40s'", text);
-        reply_problem(r, NULL, &err, NULL);
-        return false;
-    }
-    if (text != NULL) q->state = (int)state;
-    if (!query_integer(r, "limit", 1, LIST_MOST, LIST_USUAL, &limit) ||
-        !query_integer(r, "cursor", 1, INT64_MAX, 0, &cursor))
-        return false;
-    q->limit = (size_t)limit + 1; /* one more than asked for, to know whether there is another page */
-    q->before_serial = cursor;
-    q->owner = r->grant.all ? NULL : r->grant.owner;
-    return true;
-}
-
-static void list_jobs(struct http_request *r)
-{
-    struct job_query q;
-    struct job_row *row = NULL;
-    size_t n = 0;
-    struct error err = {0};
-    char cursor[32] = "";
-    if (!read_query(r, &q)) return;
-    json_t *list = json_array();
-    status s = store_job_list(r->service->store, &q, &row, &n, &err);
-    for (size_t i = 0; s == STATUS_OK && i < n && i + 1 < q.limit; i++) {
-        json_t *view = NULL;
-        s = job_view(r->service, &row[i], false, &view, &err);
-        if (s != STATUS_OK) break;
-        json_array_append_new(list, view);
-        if (i + 2 == q.limit && n == q.limit) snprintf(cursor, sizeof cursor, "%lld", (long long)row[i].serial);
-    }
-    job_rows_free(row, n);
-    if (s != STATUS_OK) {
-        json_decref(list);
-        reply_problem(r, NULL, &err, NULL);
-        return;
-    }
-    reply_json_tagged(
-        r, json_pack("{s:o,s:o}", "jobs", list, "next_cursor", cursor[0] ? json_string(cursor) : json_null()));
-}
-
-void handle_list_jobs(struct http_request *r)
-{
-    struct long_poll poll;
-    if (!long_poll_begin(r, NULL, &poll)) return;
-    do {
-        list_jobs(r);
-    } while (long_poll_again(r, &poll));
 }

@@ -5,7 +5,6 @@
 #include "server/http/http_server.h"
 
 /* handle_jobs.c */
-void handle_list_jobs(struct http_request *r);
 void handle_create_job(struct http_request *r);
 void handle_get_job(struct http_request *r);
 void handle_delete_job(struct http_request *r);
@@ -13,6 +12,12 @@ void handle_put_document(struct http_request *r);
 void handle_start_job(struct http_request *r);
 void handle_cancel_job(struct http_request *r);
 void handle_retry_job(struct http_request *r);
+/* handle_list.c */
+void handle_list_jobs(struct http_request *r);
+/* handle_tags.c */
+void handle_list_tags(struct http_request *r);
+void handle_put_tags(struct http_request *r);
+void handle_act_on_jobs(struct http_request *r);
 /* handle_files.c */
 void handle_list_files(struct http_request *r);
 void handle_declare_files(struct http_request *r);

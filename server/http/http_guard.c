@@ -131,3 +131,53 @@ bool guard_body(struct http_request *r)
         too_large(r, most);
     return r->reply == NULL;
 }
+
+struct query_seen {
+    const char *known;
+    char name[64]; /* of the parameter at fault; "": none */
+    bool twice;
+    const char *seen[32];
+    size_t n;
+};
+
+/* Whether a name is one of those between spaces. */
+static bool listed(const char *names, const char *name)
+{
+    size_t n = strlen(name);
+    for (const char *at = names; n > 0 && (at = strstr(at, name)) != NULL; at += n)
+        if ((at == names || at[-1] == ' ') && (at[n] == ' ' || at[n] == '\0')) return true;
+    return false;
+}
+
+static enum MHD_Result examine_parameter(void *context, enum MHD_ValueKind kind, const char *name, const char *value)
+{
+    struct query_seen *q = context;
+    (void)kind, (void)value;
+    for (size_t i = 0; i < q->n; i++) q->twice = q->twice || strcmp(q->seen[i], name) == 0;
+    if (listed(q->known, name) && !q->twice && q->n < sizeof q->seen / sizeof q->seen[0]) {
+        q->seen[q->n++] = name;
+        return MHD_YES;
+    }
+    snprintf(q->name, sizeof q->name, "%s", name[0] == '\0' ? "?" : name);
+    for (char *c = q->name; *c != '\0'; c++)
+        if (*c < ' ' || *c > '~') *c = '?'; /* also what is no UTF-8 */
+    return MHD_NO;
+}
+
+bool guard_query(struct http_request *r)
+{
+    struct query_seen q = {.known = r->route->query};
+    struct error err = {0};
+    if (q.known == NULL) return true;
+    MHD_get_connection_values(r->connection, MHD_GET_ARGUMENT_KIND, examine_parameter, &q);
+    if (q.name[0] == '\0') return true;
+    if (q.twice)
+        error_set_field(&err, STATUS_INVALID, q.name, "query parameter '%s' is given twice", q.name);
+    else if (q.known[0] == '\0')
+        error_set_field(&err, STATUS_INVALID, q.name, "there is no query parameter '%s' here", q.name);
+    else
+        error_set_field(&err, STATUS_INVALID, q.name, "there is no query parameter '%s' here; known are: %s", q.name,
+                        q.known);
+    reply_problem(r, NULL, &err, NULL);
+    return false;
+}

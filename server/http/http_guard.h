@@ -12,5 +12,7 @@ bool guard_framing(struct http_request *request);
 bool guard_site(struct http_request *request, const char *method);
 /* Requires the body length and content type that the route accepts. */
 bool guard_body(struct http_request *request);
+/* Requires that the route knows each query parameter, and that none is given twice. */
+bool guard_query(struct http_request *request);
 
 #endif

@@ -72,7 +72,7 @@ static bool examine(struct http_request *r, const char *method)
     else if (r->route == NULL) {
         reply_code(r, "method", "", "this address accepts other methods; see Allow");
         reply_header(r, "Allow", allow);
-    } else if (guard_access(r) && guard_body(r) && r->route->begin != NULL)
+    } else if (guard_access(r) && guard_query(r) && guard_body(r) && r->route->begin != NULL)
         r->route->begin(r);
     /* without a length nobody knows where the next request begins */
     return r->reply != NULL && (skip_body || r->reply_status == MHD_HTTP_LENGTH_REQUIRED);

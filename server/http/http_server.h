@@ -51,6 +51,7 @@ struct http_route {
     void (*handle)(struct http_request *request);
     /* called before the body (HTTP_BODY_UPLOAD): decides a reply or sets request->upload */
     void (*begin)(struct http_request *request);
+    const char *query; /* names of the query parameters that it takes, between spaces; NULL: any */
 };
 
 /* Finds the route of a request and the values of its path's parameters. NULL and *allow "": there is no such path;

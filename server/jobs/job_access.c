@@ -109,5 +109,6 @@ status job_check_editable(const struct job_row *row, struct error *err)
 void job_mark_edited(struct job_row *row)
 {
     row->state = JOB_DRAFT;
+    row->verdict[0] = '\0';
     row->dirty = row->dirty || row->attempt > 0;
 }

@@ -7,6 +7,8 @@
 #include "server/events/change_feed.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
+#include "server/jobs/queue_forecast.h"
+#include "server/workers/attempt.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -53,7 +55,7 @@ static status remove_deleted(struct job_service *v, struct error *err)
 {
     struct job_row *row = NULL;
     size_t n = 0;
-    struct job_query q = {.state = -1, .deleted = true, .limit = SIZE_MAX >> 1};
+    struct job_query q = {.deleted = true, .limit = SIZE_MAX >> 1};
     status s = store_job_list(v->store, &q, &row, &n, err);
     for (size_t i = 0; s == STATUS_OK && i < n; i++) {
         char path[PATH_BYTES];
@@ -73,7 +75,7 @@ static status requeue(struct job_service *v, struct error *err)
 {
     struct job_row *row = NULL;
     size_t n = 0;
-    struct job_query q = {.state = JOB_RUNNING, .limit = SIZE_MAX >> 1};
+    struct job_query q = {.states = 1U << JOB_RUNNING, .limit = SIZE_MAX >> 1};
     status s = store_job_list(v->store, &q, &row, &n, err);
     for (size_t i = 0; s == STATUS_OK && i < n; i++) {
         row[i].state = row[i].cancel_requested ? JOB_CANCELLED : JOB_QUEUED;
@@ -149,7 +151,7 @@ static status restore_folders(struct job_service *v, struct error *err)
 {
     struct job_row *row = NULL;
     size_t n = 0;
-    struct job_query q = {.state = -1, .limit = SIZE_MAX >> 1};
+    struct job_query q = {.limit = SIZE_MAX >> 1};
     status s = store_job_list(v->store, &q, &row, &n, err);
     for (size_t i = 0; s == STATUS_OK && i < n; i++) {
         static const char *const part[] = {JOB_FOLDER_INPUT, "upload"};
@@ -179,6 +181,15 @@ static status make_data_folders(const char *data, struct error *err)
     return s;
 }
 
+/* The code of the verdict that a job's result has. */
+static void read_verdict(void *context, const char *job_id, char code[40])
+{
+    json_t *st = attempt_read_status(context, job_id);
+    const char *text = json_string_value(json_object_get(json_object_get(st, "verdict"), "code"));
+    snprintf(code, 40, "%s", text == NULL ? "" : text);
+    json_decref(st);
+}
+
 static void publish(void *context, const char *job_id) { change_feed_publish(context, job_id); }
 
 status job_service_open(const struct settings *settings, struct log *log, struct job_service **out, struct error *err)
@@ -193,11 +204,14 @@ status job_service_open(const struct settings *settings, struct log *log, struct
     path_join(path, settings->data, "selvedge.db", NULL);
     if (s == STATUS_OK) s = store_open(path, &v->store, err);
     if (s == STATUS_OK) s = change_feed_new(&v->feed, err);
+    v->forecast = queue_forecast_new();
+    if (s == STATUS_OK && v->forecast == NULL) s = error_set(err, STATUS_NO_MEMORY, "cannot start: out of memory");
     if (s == STATUS_OK) store_on_change(v->store, publish, v->feed);
     if (s == STATUS_OK) s = upload_set_new(v->store, settings->data, settings->commit_bytes, log, &v->upload, err);
     if (s == STATUS_OK) s = remove_deleted(v, err);
     if (s == STATUS_OK) s = quarantine_unknown(v, err);
     if (s == STATUS_OK) s = requeue(v, err);
+    if (s == STATUS_OK) s = store_fill_verdicts(v->store, read_verdict, v, err);
     if (s == STATUS_OK) s = restore_folders(v, err);
     if (s == STATUS_OK) s = upload_recover(v->upload, err);
     if (s != STATUS_OK) {
@@ -213,6 +227,7 @@ void job_service_close(struct job_service *v)
     if (v == NULL) return;
     upload_set_free(v->upload);
     store_close(v->store);
+    queue_forecast_free(v->forecast);
     change_feed_free(v->feed);
     pthread_mutex_destroy(&v->change);
     free(v);

@@ -16,12 +16,14 @@
 struct supervisor;
 struct change_feed;
 struct backup_keeper;
+struct queue_forecast;
 
 struct job_service {
     const struct settings *settings;
     struct store *store;
     struct upload_set *upload;
-    struct change_feed *feed; /* of what long polls wait for */
+    struct change_feed *feed;        /* of what long polls wait for */
+    struct queue_forecast *forecast; /* of when queued jobs start */
     struct log *log;
     struct supervisor *supervisor; /* notified of changes; NULL in tests */
     struct backup_keeper *backup;  /* NULL when the settings say that there are no backups */

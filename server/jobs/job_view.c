@@ -4,6 +4,8 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/stage_table.h"
 #include "server/jobs/job_paths.h"
+#include "server/jobs/job_tags.h"
+#include "server/jobs/queue_forecast.h"
 #include "server/retention/job_keep.h"
 #include "server/workers/attempt.h"
 
@@ -60,6 +62,15 @@ static void put_progress(json_t *out, const struct job_row *row, const json_t *s
     put(out, "verdict", row->state == JOB_SUCCEEDED ? st : NULL, "verdict", JSON_OBJECT, json_null());
     json_int_t peak = json_integer_value(json_object_get(st, "peak_rss_bytes"));
     json_object_set_new(out, "peak_rss_bytes", json_integer(peak > row->peak_rss_bytes ? peak : row->peak_rss_bytes));
+}
+
+static void put_place(struct job_service *v, json_t *out, const struct job_row *row)
+{
+    struct queue_place place = {0};
+    if (row->state == JOB_QUEUED) place = queue_forecast_of(v, row->id);
+    json_object_set_new(out, "queue_position",
+                        place.position > 0 ? json_integer((json_int_t)place.position) : json_null());
+    json_object_set_new(out, "expected_start_unix_s", time_or_null(place.start_unix_s));
 }
 
 json_t *job_view_heartbeat_age(struct job_service *v, const struct job_row *row)
@@ -152,6 +163,8 @@ status job_view(struct job_service *v, const struct job_row *row, bool full, jso
                             (json_int_t)row->lost_attempts, "generation", (json_int_t)row->generation);
     json_object_set_new(out, "priority", json_integer((json_int_t)row->priority));
     json_object_set_new(out, "owner", row->owner[0] != '\0' ? json_string(row->owner) : json_null());
+    json_object_set_new(out, "tags", job_tags_json(row));
+    put_place(v, out, row);
     put_progress(out, row, st);
     put_error(out, row);
     json_decref(st);

@@ -193,7 +193,7 @@ static status drop_deleted(struct store *store, const struct settings *settings,
 {
     struct job_row *row = NULL;
     size_t n = 0;
-    struct job_query all = {.state = -1, .limit = SIZE_MAX >> 1};
+    struct job_query all = {.limit = SIZE_MAX >> 1};
     status s = store_job_list(store, &all, &row, &n, err);
     for (size_t i = 0; s == STATUS_OK && i < n; i++) {
         char path[PATH_BYTES];

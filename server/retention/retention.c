@@ -80,7 +80,7 @@ static status find_sources(struct job_service *v, struct id_set *set, struct err
     for (size_t k = 0; s == STATUS_OK && k < sizeof open / sizeof *open; k++) {
         struct job_row *row = NULL;
         size_t n = 0;
-        const struct job_query q = {.state = (int)open[k], .limit = SIZE_MAX >> 1};
+        const struct job_query q = {.states = 1U << open[k], .limit = SIZE_MAX >> 1};
         s = store_job_list(v->store, &q, &row, &n, err);
         for (size_t i = 0; s == STATUS_OK && i < n; i++) {
             struct job_row full = {0};
@@ -133,7 +133,7 @@ status retention_plan_make(struct job_service *v, const struct retention_limits 
     struct job_row *row = NULL;
     size_t n = 0;
     struct id_set source = {0};
-    const struct job_query q = {.state = -1, .limit = SIZE_MAX >> 1};
+    const struct job_query q = {.limit = SIZE_MAX >> 1};
     *p = (struct retention_plan){0};
     status s = store_job_list(v->store, &q, &row, &n, err);
     if (s == STATUS_OK) s = find_sources(v, &source, err);

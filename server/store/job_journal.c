@@ -24,8 +24,8 @@ struct text_column {
     {                                                                                                                  \
 #name, offsetof(struct job_row, name), sizeof((struct job_row *)0)->name                                       \
     }
-static const struct text_column text_column[] = {TEXT(sample), TEXT(owner), TEXT(error_code), TEXT(error_field),
-                                                 TEXT(error_text)};
+static const struct text_column text_column[] = {TEXT(sample),     TEXT(owner), TEXT(error_code), TEXT(error_field),
+                                                 TEXT(error_text), TEXT(tags),  TEXT(verdict)};
 #undef TEXT
 
 struct column {

@@ -11,7 +11,14 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { STORE_ID_BYTES = 40, STORE_OWNER_BYTES = 65, STORE_HASH_TEXT_BYTES = 65, STORE_HASH_STATE_BYTES = 256 };
+enum {
+    STORE_ID_BYTES = 40,
+    STORE_OWNER_BYTES = 65,
+    STORE_HASH_TEXT_BYTES = 65,
+    STORE_HASH_STATE_BYTES = 256,
+    STORE_TAGS_BYTES = 704,
+    STORE_KEY_BYTES = 256
+};
 
 enum job_state {
     JOB_DRAFT,
@@ -44,6 +51,8 @@ struct job_row {
     int64_t peak_rss_bytes;
     char owner[STORE_OWNER_BYTES]; /* whose token made the job; "": made without a token. Never changes */
     int64_t priority;              /* -10..10, higher first among the queued jobs of an owner */
+    char tags[STORE_TAGS_BYTES];   /* "", or tags between spaces: " a b " */
+    char verdict[40];              /* its code, once the job has succeeded; "": none */
 };
 void job_row_release(struct job_row *row);
 
@@ -93,12 +102,23 @@ status store_job_replace(struct store *store, struct job_row *row, struct error 
 /* Removes the row, its files and its idempotency keys. */
 status store_job_erase(struct store *store, const char *id, struct error *err);
 
+enum job_order { JOB_BY_CREATION, JOB_BY_END, JOB_BY_SAMPLE };
+
+/* Which jobs, and from which place of the list on. What is 0 or NULL selects nothing. */
 struct job_query {
-    int state;             /* -1: all */
-    int64_t before_serial; /* 0: from the newest */
-    bool deleted;          /* tombstones instead of jobs */
-    const char *owner;     /* NULL: of all owners */
+    unsigned states; /* bits 1 << enum job_state */
+    bool deleted;    /* tombstones instead of jobs */
+    const char *owner;
+    const char *sample; /* a part of the sample's name, whatever the case of A-Z */
+    const char *id;     /* the beginning of the id */
+    const char *tag;
+    const char *verdict; /* one of these codes between commas, such as ",good,usable,"; ",," has the jobs without one */
+    double created_after_unix_s, created_before_unix_s;
+    enum job_order order;
+    bool ascending; /* the oldest first, or by the alphabet */
     size_t limit;
+    int64_t after_serial;  /* the jobs that follow this one in the list; 0: from the beginning */
+    const char *after_key; /* its sample, or its finished_unix_s in decimal */
 };
 /* *row is an array of *n rows without their documents; the caller calls job_rows_free. */
 status store_job_list(struct store *store, const struct job_query *q, struct job_row **row, size_t *n,
@@ -106,6 +126,22 @@ status store_job_list(struct store *store, const struct job_query *q, struct job
 void job_rows_free(struct job_row *row, size_t n);
 /* Lists the first n_each queued jobs of each owner, by priority and then by queued_unix_s, owner by owner. As above. */
 status store_job_heads(struct store *store, size_t n_each, struct job_row **row, size_t *n, struct error *err);
+/* A queued job, as far as its turn depends on it. */
+struct queued_job {
+    char id[STORE_ID_BYTES], owner[STORE_OWNER_BYTES];
+    double queued_unix_s;
+};
+/* Lists all queued jobs, owner by owner, each owner's in the order of their turn. The caller frees *job. */
+status store_job_queue(struct store *store, struct queued_job **job, size_t *n, struct error *err);
+/* Sets verdicts that are not known yet: read gives the code of a job that has succeeded, or "". */
+status store_fill_verdicts(struct store *store, void (*read)(void *context, const char *id, char code[40]),
+                           void *context, struct error *err);
+/* Counts the jobs of an owner (NULL: of all) by tag. *tag is an array that the caller frees. */
+struct tag_count {
+    char tag[48];
+    int64_t n;
+};
+status store_tag_count(struct store *store, const char *owner, struct tag_count **tag, size_t *n, struct error *err);
 /* Counts the jobs in each state, without tombstones. */
 status store_job_count(struct store *store, int64_t n[JOB_N_STATE], struct error *err);
 

@@ -4,14 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* document: DOCUMENT, or "NULL" to leave it out where it is not needed, because it may have a megabyte. */
-#define DOCUMENT "(SELECT text FROM document WHERE job_id = job.id)"
-#define COLUMNS(document)                                                                                              \
-    "serial, id, sample, " document                                                                                    \
-    ", revision, state, cancel_requested, dirty, deleted, attempt, lost_attempts, generation, "                        \
-    "token, created, updated, queued, started, finished, error_code, error_field, error_text, peak_rss, owner, "       \
-    "priority"
-
 void job_row_release(struct job_row *row)
 {
     free(row->document);
@@ -24,7 +16,7 @@ void job_rows_free(struct job_row *row, size_t n)
     free(row);
 }
 
-static status read_row(sqlite3_stmt *q, struct job_row *row, struct error *err)
+status store_job_read(sqlite3_stmt *q, struct job_row *row, struct error *err)
 {
     memset(row, 0, sizeof *row);
     row->serial = sqlite3_column_int64(q, 0);
@@ -54,6 +46,8 @@ static status read_row(sqlite3_stmt *q, struct job_row *row, struct error *err)
     row->peak_rss_bytes = sqlite3_column_int64(q, 21);
     store_text(q, 22, row->owner, sizeof row->owner);
     row->priority = sqlite3_column_int64(q, 23);
+    store_text(q, 24, row->tags, sizeof row->tags);
+    store_text(q, 25, row->verdict, sizeof row->verdict);
     return STATUS_OK;
 }
 
@@ -125,7 +119,7 @@ static status get(struct store *store, const char *sql, const char *id, struct j
     if (s != STATUS_OK) goto out;
     int rc = sqlite3_step(q);
     if (rc == SQLITE_ROW)
-        s = read_row(q, row, err);
+        s = store_job_read(q, row, err);
     else
         s = rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", id)
                               : store_error(&store->read, "cannot read job", err);
@@ -137,27 +131,27 @@ out:
 
 status store_job_get(struct store *store, const char *id, struct job_row *row, struct error *err)
 {
-    return get(store, "SELECT " COLUMNS(DOCUMENT) " FROM job WHERE id = ?", id, row, err);
+    return get(store, "SELECT " JOB_COLUMNS(JOB_DOCUMENT) " FROM job WHERE id = ?", id, row, err);
 }
 
 status store_job_look(struct store *store, const char *id, struct job_row *row, struct error *err)
 {
-    return get(store, "SELECT " COLUMNS("NULL") " FROM job WHERE id = ?", id, row, err);
+    return get(store, "SELECT " JOB_COLUMNS("NULL") " FROM job WHERE id = ?", id, row, err);
 }
 
 status store_job_write(struct store *store, struct job_row *r, struct error *err)
 {
     int n = 0;
     r->updated_unix_s = clock_wall_s();
-    status s =
-        store_run(&store->write, &n, err,
-                  "UPDATE job SET revision=revision+1, sample=?, state=?, cancel_requested=?, dirty=?, "
-                  "deleted=?, attempt=?, lost_attempts=?, generation=?, token=?, updated=?, queued=?, started=?, "
-                  "finished=?, error_code=?, error_field=?, error_text=?, peak_rss=?, priority=? WHERE id=?",
-                  "siiiiiiisddddsssiis", r->sample, (int64_t)r->state, (int64_t)r->cancel_requested, (int64_t)r->dirty,
-                  (int64_t)r->deleted, r->attempt, r->lost_attempts, r->generation, r->token, r->updated_unix_s,
-                  r->queued_unix_s, r->started_unix_s, r->finished_unix_s, r->error_code, r->error_field, r->error_text,
-                  r->peak_rss_bytes, r->priority, r->id);
+    status s = store_run(
+        &store->write, &n, err,
+        "UPDATE job SET revision=revision+1, sample=?, state=?, cancel_requested=?, dirty=?, "
+        "deleted=?, attempt=?, lost_attempts=?, generation=?, token=?, updated=?, queued=?, started=?, "
+        "finished=?, error_code=?, error_field=?, error_text=?, peak_rss=?, priority=?, tags=?, verdict=? WHERE id=?",
+        "siiiiiiisddddsssiisss", r->sample, (int64_t)r->state, (int64_t)r->cancel_requested, (int64_t)r->dirty,
+        (int64_t)r->deleted, r->attempt, r->lost_attempts, r->generation, r->token, r->updated_unix_s, r->queued_unix_s,
+        r->started_unix_s, r->finished_unix_s, r->error_code, r->error_field, r->error_text, r->peak_rss_bytes,
+        r->priority, r->tags, r->verdict, r->id);
     if (s == STATUS_OK && n == 0) s = error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", r->id);
     return s;
 }
@@ -206,94 +200,4 @@ status store_job_erase(struct store *store, const char *id, struct error *err)
     status s = erase(store, id, err);
     pthread_mutex_unlock(&store->write.lock);
     return store_report(store, s, id);
-}
-
-static status grow(struct job_row **row, size_t n, size_t *capacity, struct error *err)
-{
-    if (n < *capacity) return STATUS_OK;
-    size_t more = *capacity == 0 ? 16 : *capacity * 2;
-    struct job_row *p = realloc(*row, more * sizeof *p);
-    if (p == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot list jobs: out of memory");
-    *row = p;
-    *capacity = more;
-    return STATUS_OK;
-}
-
-/* Runs a prepared query for rows and finalizes it. */
-static status read_rows(struct store *store, status s, sqlite3_stmt *q, struct job_row **out, size_t *n_out,
-                        struct error *err)
-{
-    struct job_row *row = NULL;
-    size_t n = 0, capacity = 0;
-    int rc = SQLITE_DONE;
-    while (s == STATUS_OK && (rc = sqlite3_step(q)) == SQLITE_ROW) {
-        s = grow(&row, n, &capacity, err);
-        if (s == STATUS_OK) s = read_row(q, &row[n], err);
-        if (s == STATUS_OK) n++;
-    }
-    if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(&store->read, "cannot list jobs", err);
-    sqlite3_finalize(q);
-    if (s != STATUS_OK) {
-        job_rows_free(row, n);
-        return s;
-    }
-    *out = row;
-    *n_out = n;
-    return STATUS_OK;
-}
-
-status store_job_list(struct store *store, const struct job_query *query, struct job_row **out, size_t *n_out,
-                      struct error *err)
-{
-#define WANTED "SELECT " COLUMNS("NULL") " FROM job WHERE deleted = ?1 AND serial < ?3 "
-#define NEWEST " ORDER BY serial DESC LIMIT ?4"
-    /* one statement for each index: with "?2 < 0 OR state = ?2" no index would find the rows */
-    static const char *const sql[2][2] = {
-        {WANTED "AND ?2 < 0 AND ?5 = ''" NEWEST, WANTED "AND ?2 < 0 AND owner = ?5" NEWEST},
-        {WANTED "AND state = ?2 AND ?5 = ''" NEWEST, WANTED "AND state = ?2 AND owner = ?5" NEWEST}};
-#undef WANTED
-#undef NEWEST
-    sqlite3_stmt *q = NULL;
-    pthread_mutex_lock(&store->read.lock);
-    status s = store_prepare(&store->read, &q, err, sql[query->state >= 0][query->owner != NULL], "iiiis",
-                             (int64_t)query->deleted, (int64_t)query->state,
-                             query->before_serial > 0 ? query->before_serial : INT64_MAX, (int64_t)query->limit,
-                             query->owner == NULL ? "" : query->owner);
-    s = read_rows(store, s, q, out, n_out, err);
-    pthread_mutex_unlock(&store->read.lock);
-    return s;
-}
-
-status store_job_heads(struct store *store, size_t n_each, struct job_row **out, size_t *n_out, struct error *err)
-{
-    sqlite3_stmt *q = NULL;
-    pthread_mutex_lock(&store->read.lock);
-    status s = store_prepare(
-        &store->read, &q, err,
-        "SELECT " COLUMNS(
-            "NULL") " FROM job WHERE serial IN (SELECT i.serial FROM owner_use u "
-                    "CROSS JOIN job i ON i.serial IN (SELECT h.serial FROM job h WHERE h.deleted = 0 AND "
-                    "h.state = 1 AND h.owner = u.owner ORDER BY h.priority DESC, h.queued, h.serial LIMIT ?) "
-                    "WHERE u.queued > 0) ORDER BY owner, priority DESC, queued, serial",
-        "i", (int64_t)n_each);
-    s = read_rows(store, s, q, out, n_out, err);
-    pthread_mutex_unlock(&store->read.lock);
-    return s;
-}
-
-status store_job_count(struct store *store, int64_t n[JOB_N_STATE], struct error *err)
-{
-    sqlite3_stmt *q = NULL;
-    for (int i = 0; i < JOB_N_STATE; i++) n[i] = 0;
-    pthread_mutex_lock(&store->read.lock);
-    status s = store_prepare(&store->read, &q, err, "SELECT state, n FROM job_count", "");
-    int rc = SQLITE_DONE;
-    while (s == STATUS_OK && (rc = sqlite3_step(q)) == SQLITE_ROW) {
-        int state = sqlite3_column_int(q, 0);
-        if (state >= 0 && state < JOB_N_STATE) n[state] = sqlite3_column_int64(q, 1);
-    }
-    if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(&store->read, "cannot count jobs", err);
-    sqlite3_finalize(q);
-    pthread_mutex_unlock(&store->read.lock);
-    return s;
 }

@@ -110,6 +110,14 @@ static const char *const migration[] = {
     " tries, next, status, error, delivered, owner) VALUES (NEW.id || '.' || NEW.revision, NEW.id, NEW.state,"
     " NEW.sample, NEW.attempt, NEW.error_code, NEW.error_field, NEW.error_text, NEW.updated, 0, 0, NEW.updated, 0, '',"
     " 0, NEW.owner); END;",
+    /* tags ("" or " a b "), and the code of the verdict, "?" until it has been read from the result; indexes for the
+     * orders of the list and for finding an input by its content */
+    "ALTER TABLE job ADD COLUMN tags TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE job ADD COLUMN verdict TEXT NOT NULL DEFAULT '';"
+    "UPDATE job SET verdict = '?' WHERE state = 4;"
+    "CREATE INDEX job_finished ON job (deleted, finished, serial);"
+    "CREATE INDEX job_sample ON job (deleted, sample COLLATE NOCASE, serial);"
+    "CREATE INDEX file_content ON file (sha256, size) WHERE state = 2 AND sha256 <> '';",
 };
 
 const char *const *store_migrations(int *n)

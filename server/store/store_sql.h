@@ -18,6 +18,14 @@ struct store {
     void *changed_context;
 };
 
+/* What is read of a job. document: JOB_DOCUMENT, or "NULL" where it is not needed, because it may have a megabyte. */
+#define JOB_DOCUMENT "(SELECT text FROM document WHERE job_id = job.id)"
+#define JOB_COLUMNS(document)                                                                                          \
+    "serial, id, sample, " document                                                                                    \
+    ", revision, state, cancel_requested, dirty, deleted, attempt, lost_attempts, generation, "                        \
+    "token, created, updated, queued, started, finished, error_code, error_field, error_text, peak_rss, owner, "       \
+    "priority, tags, verdict"
+
 /* Sets err from SQLite's last result; what is for example "cannot write job". */
 status store_error(struct store_link *link, const char *what, struct error *err);
 /* Prepares a statement and binds the values by format: s text, i int64_t, d double, b blob (pointer and int size). */
@@ -25,6 +33,8 @@ status store_prepare(struct store_link *link, sqlite3_stmt **statement, struct e
                      const char *format, ...);
 /* Prepares a statement, binds its values and runs it to the end. *n_changed may be NULL. */
 status store_run(struct store_link *link, int *n_changed, struct error *err, const char *sql, const char *format, ...);
+/* Copies the columns of JOB_COLUMNS to a row. STATUS_NO_MEMORY. */
+status store_job_read(sqlite3_stmt *statement, struct job_row *row, struct error *err);
 /* A transaction, while link->lock is held. store_end commits it, or rolls it back when so_far is an error or the
  * commit fails. */
 status store_begin(struct store_link *link, struct error *err);

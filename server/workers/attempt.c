@@ -115,6 +115,15 @@ static void last_words(struct job_service *v, const char *job_id, char *out, siz
     console_tail(path, out, n_out);
 }
 
+static void succeeded(struct job_service *v, struct job_row *row)
+{
+    json_t *j = attempt_read_status(v, row->id);
+    const char *code = json_string_value(json_object_get(json_object_get(j, "verdict"), "code"));
+    row->state = JOB_SUCCEEDED;
+    snprintf(row->verdict, sizeof row->verdict, "%s", code == NULL ? "" : code);
+    json_decref(j);
+}
+
 static void failed(struct job_service *v, struct job_row *row)
 {
     json_t *j = attempt_read_status(v, row->id);
@@ -205,7 +214,7 @@ static void apply_end(struct job_service *v, struct job_row *row, const struct w
 {
     bool asked = stop == STOP_CANCEL || stop == STOP_SHUTDOWN || stop == STOP_PAUSE;
     if (!end->by_signal && end->code == WORKER_SUCCEEDED)
-        row->state = JOB_SUCCEEDED;
+        succeeded(v, row);
     else if (!end->by_signal && end->code == WORKER_FAILED)
         failed(v, row);
     else if (stop == STOP_TIME && !row->cancel_requested)
@@ -269,7 +278,7 @@ void attempt_resume_paused(struct job_service *v)
 {
     struct job_row *row = NULL;
     size_t n = 0;
-    struct job_query q = {.state = JOB_PAUSED, .limit = 1000};
+    struct job_query q = {.states = 1U << JOB_PAUSED, .limit = 1000};
     pthread_mutex_lock(&v->change);
     if (store_job_list(v->store, &q, &row, &n, NULL) == STATUS_OK)
         for (size_t i = 0; i < n; i++) {

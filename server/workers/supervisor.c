@@ -261,7 +261,7 @@ static void remove_deleted(struct supervisor *u)
 {
     struct job_row *row = NULL;
     size_t n = 0;
-    struct job_query q = {.state = -1, .deleted = true, .limit = 64};
+    struct job_query q = {.deleted = true, .limit = 64};
     if (store_job_list(u->v->store, &q, &row, &n, NULL) != STATUS_OK) return;
     for (size_t i = 0; i < n; i++) {
         const struct waiting *w = waiting_of(u, row[i].id, false);

@@ -4,6 +4,7 @@
 #include "optimizer/fit/photographs/photograph.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/result_json.h"
+#include "optimizer/worker/report/result_thumbnail.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
 #include "renderer/transport/render.h"
 
@@ -88,6 +89,7 @@ static status write_slice(const struct pipeline_context *c, int axis, struct err
         reconstruct_slice_picture(&c->volume, &c->fiber, axis, c->volume.n[axis] / 2, &rgb, &width, &height, err);
     if (s != STATUS_OK) return s;
     s = result_picture_write(c, name[axis], rgb, width, height, err);
+    if (s == STATUS_OK && axis == 2) s = result_thumbnail_of_bytes(c, rgb, width, height, err);
     free(rgb);
     return s;
 }
@@ -125,7 +127,7 @@ static status write_photograph(const struct pipeline_context *c, size_t i, const
     worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, path);
     status s = photograph_develop(&c->process, path, &c->doc->photograph[i], &im, NULL, err);
     if (s != STATUS_OK) return s;
-    s = result_image_write(c, &im, "photographs", name, exposure, false, err);
+    s = result_image_write(c, &im, "photographs", name, exposure, true, err);
     image_release(&im);
     return s;
 }
@@ -167,6 +169,7 @@ static status write_rendering(struct pipeline_context *c, size_t i, const char *
     status s = render_run(&q, c->pool, progress, &im, err);
     if (s != STATUS_OK) return s;
     s = result_image_write(c, &im, "renderings", name, exposure, true, err);
+    if (s == STATUS_OK && i == 0) s = result_thumbnail_of_image(c, &im, err);
     image_release(&im);
     return s;
 }

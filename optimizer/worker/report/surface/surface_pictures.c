@@ -4,6 +4,7 @@
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_pictures.h"
+#include "optimizer/worker/report/result_thumbnail.h"
 #include "optimizer/worker/report/surface/surface_cloth.h"
 #include "optimizer/worker/report/surface/surface_passes.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
@@ -96,6 +97,7 @@ static status write_picture(struct pipeline_context *c, const struct job_surface
 {
     bool whole = so_far->n_sample == p->sample;
     status s = result_image_write(c, &so_far->image, "pictures", so_far->name, exposure, whole, err);
+    if (s == STATUS_OK && whole) s = result_thumbnail_of_image(c, &so_far->image, err);
     return s == STATUS_OK && whole ? write_columns(c, p, so_far, err) : s;
 }
 

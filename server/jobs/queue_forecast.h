@@ -1,0 +1,21 @@
+/* When queued jobs will probably start. It repeats the supervisor's choice (supervisor.c, next_turn) in advance: running
+ * jobs end after their eta_s, and a job of which nothing is known takes the median time of the jobs that succeeded
+ * last. It is computed anew after a second at the earliest, so it costs little however many ask. Thread-safe. */
+#ifndef SELVEDGE_SERVER_QUEUE_FORECAST_H
+#define SELVEDGE_SERVER_QUEUE_FORECAST_H
+
+#include "server/jobs/job_service.h"
+
+struct queue_forecast;
+
+/* NULL: out of memory. */
+struct queue_forecast *queue_forecast_new(void);
+void queue_forecast_free(struct queue_forecast *forecast);
+
+struct queue_place {
+    int64_t position;    /* 1: the next one to start; 0: not queued, or too far behind to say */
+    double start_unix_s; /* rounded to half a minute; 0: unknown */
+};
+struct queue_place queue_forecast_of(struct job_service *v, const char *job_id);
+
+#endif
