@@ -1,27 +1,37 @@
-// Entry point of the dashboard: "#" shows the list of jobs, "#ID" shows one job.
+// Entry point of the dashboard: "#" shows the list of jobs, "#?state=failed" a part of it, "#ID" one job, "#new" the
+// form for a new job.
 import { el } from "./page_parts.js";
+import { droppedFiles } from "./dropped_files.js";
 import { listPage } from "./list_page.js";
 import { jobPage } from "./job_page.js";
 import { showUser, signInPage } from "./sign_in.js";
+import { submitPanel } from "./submit_panel.js";
 
 const page = document.getElementById("page");
 const crumb = document.getElementById("crumb");
 const user = document.getElementById("user");
 let leave = null, signingIn = false;
+let handed = []; // files that were dropped on another page
 
 function route() {
   if (leave) leave();
   signingIn = false;
-  const id = decodeURIComponent(location.hash.slice(1));
+  const [id, query] = location.hash.slice(1).split("?");
   page.replaceChildren();
   crumb.replaceChildren();
   window.scrollTo(0, 0);
-  if (/^[A-Za-z0-9_-]{1,80}$/.test(id)) {
+  if (id === "new") {
+    document.title = "New job – Selvedge";
+    crumb.append(el("a", { href: "#" }, "Jobs"), " › New job");
+    page.append(submitPanel(handed));
+    handed = [];
+    leave = null;
+  } else if (/^[A-Za-z0-9_-]{1,80}$/.test(id)) {
     crumb.append(el("a", { href: "#" }, "Jobs"), " › ", el("span", { class: "mono" }, id));
     leave = jobPage(page, id);
   } else {
     document.title = "Selvedge";
-    leave = listPage(page);
+    leave = listPage(page, new URLSearchParams(query ?? ""));
   }
 }
 
@@ -36,6 +46,14 @@ function askForToken() {
   signInPage(page, () => { showUser(user, askForToken); route(); });
 }
 
+// Files may be dropped anywhere: they open the form for a new job.
+window.addEventListener("dragover", (event) => event.preventDefault());
+window.addEventListener("drop", async (event) => {
+  event.preventDefault();
+  if (signingIn || location.hash.startsWith("#new")) return;
+  handed = await droppedFiles(event.dataTransfer);
+  if (handed.length) location.hash = "new";
+});
 window.addEventListener("hashchange", route);
 window.addEventListener("sign-in", askForToken);
 showUser(user, askForToken);

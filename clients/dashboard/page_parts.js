@@ -58,6 +58,12 @@ export function withError(value, se) {
 export const percent = (x, digits = 1) => (isNumber(x) ? `${(100 * x).toFixed(digits)} %` : "–");
 export const percentWithError = (x, se, digits = 2) => (isNumber(x) && isNumber(se) ? `${(100 * x).toFixed(digits)} ± ${(100 * se).toFixed(digits)} %` : percent(x, digits));
 export const when = (unix) => (isNumber(unix) && unix > 0 ? new Date(1000 * unix).toLocaleString() : "–");
+// A time in the reader's zone, with that of UTC as its title.
+export function timeOf(unix) {
+  if (!isNumber(unix) || unix <= 0) return el("span", {}, "–");
+  const iso = new Date(1000 * unix).toISOString();
+  return el("time", { dateTime: iso, title: `${iso.slice(0, 19).replace("T", " ")} UTC` }, when(unix));
+}
 export const stateTag = (state) => el("span", { class: `state ${state}` }, state);
 
 // The verdict on a result as a coloured tag; null before there is one. The sentence is its title.

@@ -15,8 +15,8 @@ const cached = new Map(); // url -> {etag, value}; a page requests only a few ad
 const KEEP = 40;
 
 // A 401 shows the page that asks for a token; the cookie that it gets is sent by the browser, and no script can read it.
-export async function raw(method, url, { body = null, header = {} } = {}) {
-  const answer = await fetch(url, { method, body, headers: header, cache: "no-store", credentials: "same-origin" });
+export async function raw(method, url, { body = null, header = {}, signal = null } = {}) {
+  const answer = await fetch(url, { method, body, headers: header, signal, cache: "no-store", credentials: "same-origin" });
   if (answer.status === 401 && url !== "/v1/session") window.dispatchEvent(new Event("sign-in"));
   if (!answer.ok && answer.status !== 304) {
     let problem = null;
@@ -55,7 +55,8 @@ function showConnection(error) {
   connection.classList.toggle("lost", Boolean(error));
 }
 
-// Calls `work` repeatedly until stop() is called. `work` returns the seconds to wait. A hidden page waits ten times as
+// Calls `work` repeatedly until stop() is called. `work` returns the seconds to wait, or throws an AbortError to begin
+// anew at once. A hidden page waits ten times as
 // long, and polls at once when it is shown again. After errors the wait grows.
 export function poll(work) {
   let stopped = false, timer = null, failures = 0, busy = false;
@@ -68,10 +69,11 @@ export function poll(work) {
       failures = 0;
       showConnection(null);
     } catch (error) {
-      failures++;
-      wait = Math.min(30, 2 ** failures);
-      if (!stopped) showConnection(error instanceof Problem ? error.message : "The server does not reply; trying again.");
-      if (!(error instanceof Problem) && !(error instanceof TypeError)) console.error(error);
+      const begun = error.name === "AbortError";
+      if (!begun) failures++;
+      wait = begun ? 0 : Math.min(30, 2 ** failures);
+      if (!stopped && !begun) showConnection(error instanceof Problem ? error.message : "The server does not reply; trying again.");
+      if (!begun && !(error instanceof Problem) && !(error instanceof TypeError)) console.error(error);
     }
     busy = false;
     if (!stopped) timer = setTimeout(round, 1000 * wait * (document.hidden ? 10 : 1));

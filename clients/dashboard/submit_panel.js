@@ -1,6 +1,7 @@
 // Drag and drop of a job document (*.json) and the files that it names. Files are uploaded by tus; uploads continue
 // after a broken connection.
 import { documentEditor } from "./document_editor.js";
+import { droppedFiles } from "./dropped_files.js";
 import { el, size } from "./page_parts.js";
 import { getJson, raw, sendJson } from "./server_link.js";
 
@@ -73,7 +74,8 @@ async function declare(job, f, file) {
   return sendJson("POST", url, ask);
 }
 
-export function submitPanel() {
+// handed: files that were dropped on another page.
+export function submitPanel(handed = []) {
   const dropped = new Map();
   let doc = null, source = null, busy = false;
   // kept while the document is the same, so that another try continues an interrupted submit
@@ -109,10 +111,13 @@ export function submitPanel() {
     show();
   };
   const input = el("input", { type: "file", multiple: true, onchange: () => take(input.files) });
-  const drop = el("div", { class: "drop" }, "Drop a job document (.json) and its files here, or ", el("label", {}, "choose them", input), list, message, go);
+  const folder = el("input", { type: "file", webkitdirectory: true, onchange: () => take([...folder.files].filter((f) => !f.name.startsWith("."))) });
+  const drop = el("div", { class: "drop" }, "Drop a job document (.json) and its files here, or a folder; or choose ", el("label", { class: "file" }, "files", input), " or ",
+    el("label", { class: "file" }, "a folder", folder), list, message, go);
+  if (handed.length) take(handed);
   drop.addEventListener("dragover", (e) => { e.preventDefault(); drop.classList.add("over"); });
   drop.addEventListener("dragleave", () => drop.classList.remove("over"));
-  drop.addEventListener("drop", (e) => { e.preventDefault(); drop.classList.remove("over"); take(e.dataTransfer.files); });
+  drop.addEventListener("drop", (e) => { e.preventDefault(); drop.classList.remove("over"); droppedFiles(e.dataTransfer).then(take); });
   go.addEventListener("click", async () => {
     busy = true;
     allow();

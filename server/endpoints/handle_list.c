@@ -2,8 +2,8 @@
 #include "server/endpoints/handlers.h"
 #include "server/events/long_poll.h"
 #include "server/http/http_reply.h"
-#include "server/jobs/job_row_view.h"
 #include "server/jobs/job_view.h"
+#include "server/jobs/listing/job_row_view.h"
 
 #include <errno.h>
 #include <math.h>

@@ -4,8 +4,8 @@
 #include "server/http/http_problem.h"
 #include "server/http/http_reply.h"
 #include "server/jobs/job_paths.h"
-#include "server/jobs/job_tags.h"
 #include "server/jobs/job_view.h"
+#include "server/jobs/listing/job_tags.h"
 
 #include <stdlib.h>
 #include <string.h>

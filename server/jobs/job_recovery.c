@@ -7,7 +7,7 @@
 #include "server/events/change_feed.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
-#include "server/jobs/queue_forecast.h"
+#include "server/jobs/listing/queue_forecast.h"
 #include "server/workers/attempt.h"
 
 #include <dirent.h>

@@ -4,8 +4,8 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/stage_table.h"
 #include "server/jobs/job_paths.h"
-#include "server/jobs/job_tags.h"
-#include "server/jobs/queue_forecast.h"
+#include "server/jobs/listing/job_tags.h"
+#include "server/jobs/listing/queue_forecast.h"
 #include "server/retention/job_keep.h"
 #include "server/workers/attempt.h"
 

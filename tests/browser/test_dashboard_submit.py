@@ -13,8 +13,8 @@ from selenium.webdriver.common.by import By  # noqa: E402
 def test_submit_by_choosing_files(stub, browser):
     url, folder = stub
     _, sample = submit(url, folder, "dropped twill")
-    browser.get(url + "/")
-    chooser = browser.find_element(By.CSS_SELECTOR, ".drop input")
+    browser.get(url + "/#new")
+    chooser = browser.find_element(By.CSS_SELECTOR, ".drop input:not([webkitdirectory])")
     browser.execute_script("arguments[0].style.display = 'block'", chooser)
     chooser.send_keys(str(sample / "job.json"))
     wait_for(browser, "document.querySelector('.drop').textContent.includes('2 of 2 files are still missing')")
@@ -32,7 +32,7 @@ def test_submit_by_choosing_files(stub, browser):
 
 def drop_in(browser, *paths):
     """Drops files into the submit panel, and waits until it is ready."""
-    chooser = browser.find_element(By.CSS_SELECTOR, ".drop input")
+    chooser = browser.find_element(By.CSS_SELECTOR, ".drop input:not([webkitdirectory])")
     browser.execute_script("arguments[0].style.display = 'block'", chooser)
     chooser.send_keys("\n".join(map(str, paths)))
     wait_for(browser, "!document.querySelector('.drop button').disabled")
@@ -71,7 +71,7 @@ def test_form_writes_a_job_document(stub, browser, tmp_path):
     url, _ = stub
     for name, data in (("cloth.hair", b"hair"), ("p0.exr", b"a"), ("p1.exr", b"b")):
         (tmp_path / name).write_bytes(data)
-    browser.get(url + "/")
+    browser.get(url + "/#new")
     click(browser, browser.find_element(By.CSS_SELECTOR, "#editor > summary"))
     wait_for(browser, "document.querySelectorAll('#editor .options > *').length >= 9")
     for path, text in (("sample", "written twill"), ("fibers.file", "cloth.hair"), ("fibers.tile_mm", "0.8, 0.9"), ("lamp.side_cm", "12.5"),
@@ -110,7 +110,7 @@ def test_form_writes_a_job_document(stub, browser, tmp_path):
 def test_form_edits_a_dropped_document(stub, browser):
     url, folder = stub
     _, sample = submit(url, folder, "edited twill")
-    browser.get(url + "/")
+    browser.get(url + "/#new")
     drop_in(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))
     before = json.loads((sample / "job.json").read_text())
     click(browser, browser.find_element(By.CSS_SELECTOR, "#editor > summary"))
@@ -136,7 +136,7 @@ def test_pieces_are_no_larger_than_the_server_takes(browser, tmp_path):
     try:
         _, sample = submit(url, tmp_path, "large twill")
         (sample / "scan.tif").write_bytes(os.urandom(2_500_000))
-        browser.get(url + "/")
+        browser.get(url + "/#new")
         drop_in(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))
         browser.find_element(By.CSS_SELECTOR, ".drop button").click()
         wait_for(browser, "document.querySelector('.state.succeeded')")
@@ -152,7 +152,7 @@ def test_submit_goes_on_with_its_job_after_a_broken_upload(stub, browser, tmp_pa
     def jobs():
         return [j.id for j in selvedge.Client(url).jobs()]
     before = jobs()
-    browser.get(url + "/")
+    browser.get(url + "/#new")
     drop_in(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))
     button = browser.find_element(By.CSS_SELECTOR, ".drop button")
     browser.execute_script("""
@@ -181,7 +181,7 @@ def test_the_document_is_sent_as_it_was_written(stub, browser):
     document = json.loads((sample / "job.json").read_text())
     document["fit"] = {"seed": 9007199254740993}
     (sample / "job.json").write_text(json.dumps(document))
-    browser.get(url + "/")
+    browser.get(url + "/#new")
     drop_in(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))
     browser.find_element(By.CSS_SELECTOR, ".drop button").click()
     wait_for(browser, "location.hash.length > 10")

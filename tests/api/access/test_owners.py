@@ -36,7 +36,7 @@ def call(user, path, method, operation, job, upload):
     if "requestBody" in operation:
         kind = next(iter(operation["requestBody"]["content"]))
         more["headers"]["Content-Type"] = kind
-        more["data"] = {"replaceDocument": json.dumps(DOCUMENT), "uploadBytes": b"01234",
+        more["data"] = {"replaceDocument": json.dumps(DOCUMENT), "uploadBytes": b"01234", "putTags": json.dumps({"tags": ["a"]}),
                         "declareFiles": json.dumps({"name": "more.tif", "role": "volume", "size": 3})}[operation["operationId"]]
     if operation["operationId"] == "uploadBytes":
         more["headers"]["Upload-Offset"] = "0"
@@ -143,8 +143,8 @@ def test_a_page_of_an_owner_is_found_by_an_index(shared):
     import os
     import sqlite3
 
-    with open(os.path.join(os.path.dirname(__file__), "..", "..", "..", "server", "store", "store_job.c"), encoding="utf-8") as f:
-        assert re.search(r"owner = \?5", f.read())
+    with open(os.path.join(os.path.dirname(__file__), "..", "..", "..", "server", "store", "store_list.c"), encoding="utf-8") as f:
+        assert re.search(r"owner = \?4", f.read())
     with sqlite3.connect(os.path.join(shared.data, "selvedge.db"), timeout=10) as db:
         for where, index in (("owner = 'a'", "job_owner"), ("state = 4 AND owner = 'a'", "job_owner_state")):
             plan = " ".join(row[3] for row in db.execute(

@@ -1,4 +1,5 @@
 """A daemon and a page of the dashboard, for the tests in tests/browser. SELVEDGE_SCREENSHOTS=DIR keeps screenshots."""
+import contextlib
 import json
 import os
 import subprocess
@@ -38,15 +39,29 @@ def wait_for(browser, condition, seconds=30):
     raise AssertionError(f"never true: {condition}\n{page[:2000]}")
 
 
-def keep(browser, name):
+@contextlib.contextmanager
+def sized(browser, width, height):
+    """A window whose page has this size, also one narrower than Chromium allows."""
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600})
+    yield
+    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def keep(browser, name, width=0, height=0):
+    """Keeps a screenshot: of the whole page, or of a window of this size."""
     folder = os.environ.get("SELVEDGE_SCREENSHOTS")
-    if folder:
-        os.makedirs(folder, exist_ok=True)
-        height = browser.execute_script("return document.documentElement.scrollHeight")
-        browser.set_window_size(1280, min(height + 150, 6000))
-        time.sleep(0.5)
-        browser.save_screenshot(os.path.join(folder, name + ".png"))
-        browser.set_window_size(1280, 900)
+    if not folder:
+        return
+    os.makedirs(folder, exist_ok=True)
+    path = os.path.join(folder, name + ".png")
+    if width:
+        browser.save_screenshot(path)
+        return
+    whole = browser.execute_script("return document.documentElement.scrollHeight")
+    browser.set_window_size(1280, min(whole + 150, 6000))
+    time.sleep(0.5)
+    browser.save_screenshot(path)
+    browser.set_window_size(1280, 900)
 
 
 def complaints(browser):

@@ -1,8 +1,8 @@
-#include "server/jobs/job_row_view.h"
+#include "server/jobs/listing/job_row_view.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
-#include "server/jobs/job_tags.h"
-#include "server/jobs/queue_forecast.h"
+#include "server/jobs/listing/job_tags.h"
+#include "server/jobs/listing/queue_forecast.h"
 #include "server/workers/attempt.h"
 
 #include <math.h>

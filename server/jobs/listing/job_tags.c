@@ -1,4 +1,4 @@
-#include "server/jobs/job_tags.h"
+#include "server/jobs/listing/job_tags.h"
 #include "server/jobs/job_access.h"
 
 #include <stdio.h>

@@ -1,4 +1,4 @@
-#include "server/jobs/queue_forecast.h"
+#include "server/jobs/listing/queue_forecast.h"
 #include "base/clock.h"
 #include "server/workers/attempt.h"
 
