@@ -2,7 +2,7 @@
 // form for a new job.
 import { el } from "./page_parts.js";
 import { droppedFiles } from "./dropped_files.js";
-import { listPage } from "./list_page.js";
+import { listPage } from "./list/list_page.js";
 import { jobPage } from "./job_page.js";
 import { showUser, signInPage } from "./sign_in.js";
 import { submitPanel } from "./submit_panel.js";

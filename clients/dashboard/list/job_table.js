@@ -1,5 +1,5 @@
 // The table of jobs. It is brought up to date row by row, so that focus, selection and scroll position stay.
-import { duration, el, isNumber, stateTag, timeLeft, timeOf, verdictTag } from "./page_parts.js";
+import { duration, el, isNumber, stateTag, timeLeft, timeOf, verdictTag } from "../page_parts.js";
 
 const BUSY = new Set(["running", "queued", "paused"]);
 const CODES = { good: "good", usable: "usable", does_not_describe_this_cloth: "does not describe this cloth" };
@@ -46,10 +46,15 @@ function redraw(line, job, owners, byTag) {
   if (held && !held.isConnected) [...line.node.querySelectorAll("a, button")].find((x) => x.textContent === held.textContent)?.focus();
 }
 
-// picked: a Map of id -> job, which the boxes fill; changed() is called when they have.
+// picked: a Map of id -> job, which the boxes fill; changed() is called when they have, renewed() when picked jobs are
+// other than before.
 export class JobTable {
-  constructor(body, picked, { changed, byTag }) {
-    Object.assign(this, { body, picked, changed, byTag });
+  constructor(body, picked, { changed, renewed, byTag }) {
+    this.body = body;
+    this.picked = picked;
+    this.changed = changed;
+    this.renewed = renewed;
+    this.byTag = byTag;
     this.lines = new Map(); // id -> {node, box, digest, job}
     this.order = [];
   }
@@ -88,7 +93,7 @@ export class JobTable {
       if (!line) this.lines.set(row.id, line = this.#make(row.id));
       if ("sample" in row && line.digest !== row.digest) {
         Object.assign(line, { job: row, digest: row.digest });
-        if (this.picked.has(row.id)) this.picked.set(row.id, row);
+        if (this.picked.has(row.id)) { this.picked.set(row.id, row); this.renewed(); }
         line.box.setAttribute("aria-label", `select ${row.sample}`);
         redraw(line, row, owners, this.byTag);
         line.node.classList.toggle("picked", this.picked.has(row.id));

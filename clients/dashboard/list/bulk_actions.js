@@ -1,6 +1,6 @@
 // What can be done with the selected jobs of the list.
-import { el } from "./page_parts.js";
-import { sendJson } from "./server_link.js";
+import { el } from "../page_parts.js";
+import { sendJson } from "../server_link.js";
 
 const LIVE = new Set(["queued", "running", "paused"]), ENDED = new Set(["failed", "cancelled"]);
 const WORDS = { cancel: "cancelled", retry: "queued again", delete: "deleted", tag: "tagged" };
@@ -43,5 +43,5 @@ export function bulkActions(picked, { clear, done }) {
     for (const control of [remove, tag]) control.disabled = jobs.length === 0;
     node.classList.toggle("hidden", jobs.length === 0 && said.textContent === "");
   }
-  return { node, changed() { sure = false; if (picked.size) said.textContent = ""; show(); } };
+  return { node, show, changed() { sure = false; if (picked.size) said.textContent = ""; show(); } };
 }

@@ -1,8 +1,8 @@
 // The list of jobs: filters, order and pages, which are in the address; live by long polls that transfer changed rows.
 import { bulkActions } from "./bulk_actions.js";
 import { JobTable } from "./job_table.js";
-import { el } from "./page_parts.js";
-import { getJson, poll, raw } from "./server_link.js";
+import { el } from "../page_parts.js";
+import { getJson, poll, raw } from "../server_link.js";
 
 const PAGE_SIZE = 50, WAIT_S = 25, STATES = ["draft", "queued", "running", "paused", "succeeded", "failed", "cancelled"];
 const VERDICTS = [["good", "good"], ["usable", "usable with reservations"], ["does_not_describe_this_cloth", "does not describe this cloth"], ["none", "none"]];
@@ -16,10 +16,10 @@ function dayStart(text, days = 0) {
 
 // The query of the API that corresponds to the address.
 function queryOf(wanted) {
-  const query = new URLSearchParams({ view: "row", limit: PAGE_SIZE });
+  const query = new URLSearchParams({ view: "row", limit: String(PAGE_SIZE) });
   for (const key of ["sample", "state", "verdict", "tag", "sort", "order"]) if (wanted.get(key)) query.set(key, wanted.get(key));
-  if (wanted.get("from")) query.set("created_after", dayStart(wanted.get("from")));
-  if (wanted.get("to")) query.set("created_before", dayStart(wanted.get("to"), 1));
+  if (wanted.get("from")) query.set("created_after", String(dayStart(wanted.get("from"))));
+  if (wanted.get("to")) query.set("created_before", String(dayStart(wanted.get("to"), 1)));
   return query;
 }
 
@@ -69,7 +69,7 @@ export function listPage(page, asked) {
   const clear = () => { for (const id of [...picked.keys()]) { if (table.lines.has(id)) table.pick(id, false); else picked.delete(id); } bulk.changed(); };
   const bulk = bulkActions(picked, { clear, done: again });
   const all = el("input", { type: "checkbox", "aria-label": "select all jobs of this page", onchange: () => { for (const id of table.order) table.pick(id, all.checked); } });
-  const table = new JobTable(body, picked, { changed: () => { all.checked = table.order.length > 0 && table.order.every((id) => picked.has(id)); bulk.changed(); }, byTag });
+  const table = new JobTable(body, picked, { changed: () => { all.checked = table.order.length > 0 && table.order.every((id) => picked.has(id)); bulk.changed(); }, renewed: bulk.show, byTag });
   const back = el("button", { type: "button", onclick: () => { cursors.pop(); show(); } }, "Newer"), forth = el("button", { type: "button", onclick: () => { cursors.push(next); show(); } }, "Older");
   const place = el("span", { class: "hint" });
   const headings = () => head.replaceChildren(el("th", { class: "pick" }, all), el("td", {}), heading("Sample", "sample", wanted, change), el("th", {}, "State"), el("th", {}, "Verdict"),
@@ -81,7 +81,7 @@ export function listPage(page, asked) {
   const poller = poll(async () => {
     const query = queryOf(wanted), cursor = cursors[cursors.length - 1], have = table.digests(), signal = request.signal;
     if (cursor) query.set("cursor", cursor);
-    if (tag && !document.hidden) query.set("wait", WAIT_S);
+    if (tag && !document.hidden) query.set("wait", String(WAIT_S));
     const answer = await raw("GET", `/v1/jobs?${query}${have ? `&have=${have}` : ""}`, { header: tag ? { "If-None-Match": tag } : {}, signal });
     if (answer.status === 304) return 0.2;
     const { jobs, next_cursor: behind } = await answer.json();
