@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-service bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-fabrics bench-browser bench-pictures bench-weave bench-weave-rendered
+.PHONY: bench bench-service bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics bench-browser bench-pictures bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -87,10 +87,14 @@ docs-pictures: | deps-test ## make docs/images/{twill,derivatives,cloth-weaves,c
 	@$(BUILD)/tests/bench/pictures/documentation_pictures twill docs/images/twill.png
 	@$(BUILD)/tests/bench/pictures/documentation_pictures derivatives docs/images/derivatives.png
 
-bench-pictures: bench-browser
+bench-pictures: bench-browser ## figures of pictures
 bench-browser: | deps-test ## the twin in headless Chromium against the path-traced picture of the same view (2 minutes; part of bench-pictures)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/pictures/bench_twin.py --build $(BUILD)
+
+docs-columns: | deps-test ## draw docs/images/cylinder-columns.svg anew: column means on a cylinder under five lamps (a minute; kept in build)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/pictures/cylinder_columns.py --build $(BUILD) --out docs/images/cylinder-columns.svg
 
 docs-fabrics: | deps-test ## make docs/images/six-fabrics.png anew: the fabrics of Table 5.3 on a cylinder and draped (8 minutes on one core; kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2

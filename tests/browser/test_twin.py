@@ -63,6 +63,31 @@ def test_the_twin_is_drawn_as_its_tables_say(opened):
     assert complaints(opened) == []
 
 
+BESIDE = """const done = arguments[0];
+import("/twin/twin_panel.js").then(async ({ TwinPanel }) => {
+  const old = document.querySelector("canvas.twin-view").twin, box = document.createElement("div");
+  document.body.append(box);
+  const json = async (path) => (await fetch(path)).json(), job = location.hash.slice(1), base = `/v1/jobs/${job}/results/twin/`;
+  const buffer = await (await fetch(base + "twin.bin")).arrayBuffer(), address = "/selvedge.svg";
+  const photographs = [{ name: "one", address, exposure: 2, theta: 20, phi: 180, lampTheta: 33, lampPhi: 44, width: 10 }];
+  const panel = new TwinPanel(box, { description: await json(base + "twin.json"), buffer, photographs, pictures: [], exposure: 1 });
+  const selects = box.querySelectorAll("select"), choose = selects[selects.length - 1];
+  choose.value = "one";
+  choose.dispatchEvent(new Event("change"));
+  done([box.querySelector("figure").hidden, box.querySelector("figure img").getAttribute("src"), selects[0].value, box.querySelectorAll("input")[0].value]);
+  panel.close();
+  old.draw();
+}).catch((error) => done(String(error)));"""
+
+
+def test_a_photograph_brings_its_lamp_and_camera(opened):
+    press(opened, "twin-open")
+    wait_for(opened, "document.querySelector('canvas.twin-view')?.twin")
+    hidden, source, shape, lamp = opened.execute_async_script(BESIDE)
+    assert (hidden, source, shape) == (False, "/selvedge.svg", "flat") and float(lamp) == 33
+    assert complaints(opened) == []
+
+
 def test_the_saved_file_shows_the_same_alone(opened, tmp_path):
     press(opened, "twin-open")
     wait_for(opened, "document.querySelector('#twin-save')")

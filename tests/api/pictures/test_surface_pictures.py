@@ -3,6 +3,7 @@ import json
 import math
 import os
 import signal
+import struct
 import subprocess
 import time
 
@@ -225,6 +226,32 @@ def test_a_volume_model_on_a_cylinder(real):
     se = math.hypot(flat["noise"] * sum(flat["mean"]), mesh["noise"] * sum(mesh["mean"])) / 3 / 16
     assert flat["mean"][0] > flat["mean"][2] > 0 and sum(cylinder["mean"]) < 0.9 * sum(flat["mean"])
     assert all(abs(a - b) < 5 * se for a, b in zip(flat["mean"], mesh["mean"])), done["result"]["pictures"]
+
+
+def test_a_twin_is_written_as_its_description_says(real):
+    """The only test of the worker's tables as a file; their numbers are those of tests/unit/renderer/table."""
+    flat = {"on": "flat", "width_mm": 3, **VIEW, "samples": 2}
+    job, done = run(real, {**document(flat), "twin": {"make": True, "paths": 4000, "texels": 16}})
+    assert done["state"] == "succeeded", done["error"]
+    twin = json.loads(real.get(f"/v1/jobs/{job}/results/twin/twin.json").content)
+    data = real.get(f"/v1/jobs/{job}/results/twin/twin.bin").content
+    textures, table, drape = (twin["parts"][k] for k in ("textures", "table", "drape"))
+    assert twin["format"] == "selvedge-twin.v1" and len(data) == twin["bytes"] == drape["offset"] + 6 * drape["points"]**2
+    n_texel = textures["width"] * textures["height"]
+    weights = struct.unpack_from(f"<{textures['n'] * n_texel}e", data, textures["offset"])
+    assert textures["n"] == 16 and n_texel == 16 and all(weights[4 * i] == 1 for i in range(n_texel)), "W_0 is 1"
+    assert abs(sum(weights[4 * i + 1] for i in range(n_texel))) < 0.1 and abs(sum(weights[4 * i + 1]**2 for i in range(n_texel)) - n_texel) < 0.1
+    n = (table["view_edge"] * table["light_edge"])**2
+    assert table["sides"] == 1 and drape["offset"] - table["offset"] == 2 * 3 * textures["n"] * n
+    means = struct.unpack_from(f"<{4 * n}e", data, table["offset"])[::4]
+    assert min(means) >= 0 and sum(means) > 0, "T_0 of red"
+    row = next(r for r in done["result"]["rows"] if (r["light_theta_deg"], r["camera_theta_deg"]) == (45, 45))
+    assert 0.1 * row["rendered"][0] < 0.5 * sum(means) / n < 10 * row["rendered"][0]
+
+
+def test_a_twin_needs_a_model(real):
+    doc = {"sample": "s", "volume": {"files": ["a.tif"], "voxel_size_um": 2}, "twin": {"make": True}}
+    assert "photographs" in problem(real.post("/v1/jobs", json=doc), 422, "invalid", "twin.make")["detail"]
 
 
 def render(real, *words):
