@@ -5,7 +5,7 @@ import sqlite3
 import time
 
 import pytest
-from daemon_under_test import document, wait_until
+from daemon_under_test import document
 
 
 @pytest.fixture(scope="module")
