@@ -3,7 +3,7 @@
 
 #include "geometry/filter_directions.h"
 #include "geometry/orientation/diameter/fiber_diameter.h"
-#include "geometry/trace_grid.h"
+#include "geometry/trace/trace_grid.h"
 #include "geometry/volume/volume_rescale.h"
 
 #include <math.h>

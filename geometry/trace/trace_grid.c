@@ -1,4 +1,4 @@
-#include "geometry/trace_grid.h"
+#include "geometry/trace/trace_grid.h"
 
 #include <math.h>
 

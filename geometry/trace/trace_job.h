@@ -1,0 +1,51 @@
+/* How lines are traced on one grid: chains of centers, their repair, and the fits between (geometry/fibers). The order
+ * of the steps (trace_steps.c) is in trace_lines.c. All lengths are in voxels of the grid. The steps return
+ * STATUS_CANCELLED, STATUS_NO_MEMORY and, with a scratch space, STATUS_DISK_FULL. */
+#ifndef SELVEDGE_GEOMETRY_TRACE_JOB_H
+#define SELVEDGE_GEOMETRY_TRACE_JOB_H
+
+#include "base/angle.h"
+#include "geometry/fibers/lines/joining.h"
+#include "geometry/fibers/shape/axes/axis_profile.h"
+#include "geometry/reconstruct.h"
+
+enum { TRACE_MIN_PIECE = 4 };   /* least number of centers in a chain before joining */
+#define TRACE_END_DIAMETERS 1.0 /* length at an end, in diameters, that may be wrong */
+/* Angle between a line and the direction of its voxels from which on it may be wrong. */
+#define TRACE_DISAGREEMENT_RAD (30.0 * RAD_PER_DEG)
+
+struct trace_job {
+    const struct volume *v;
+    const struct direction_volume *d;
+    struct reconstruct_option *o;
+    struct thread_pool *pool;
+    struct reconstruct_report *report;
+    struct progress inner;
+    struct progress_part part;   /* progress that inner reports to */
+    double diameter;             /* voxels */
+    double independent;          /* of the voxels of v (axis_profile.h) */
+    struct axis_profile profile; /* of the lines so far */
+};
+
+/* States which part of the progress of the step "fibers" comes next. */
+void trace_enter_part(struct trace_job *job, double from, double to);
+/* A profile to start a fit from. */
+struct axis_profile trace_start_profile(const struct trace_job *job);
+/* Sets the class of each line: the axis along which it extends most. */
+void trace_classify(struct polyline_set *lines);
+/* Finds chains of fiber centers in slices of nine directions. Counts them in the report. */
+status trace_chains(struct trace_job *job, struct polyline_set *chains, struct error *err);
+/* One pass over the pieces: cuts duplicates, lets the ends grow, and joins ends that meet. touching: joining.h. `in` is
+ * emptied. */
+status trace_repair(struct trace_job *job, struct polyline_set *in, bool grow, double touching,
+                    struct polyline_set *out, struct join_counts *counts, struct error *err);
+/* Moves lines that are still in pieces towards their axes, and finds their radii. */
+status trace_center(struct trace_job *job, struct polyline_set *lines, struct error *err);
+/* Adds lines to fibers that have none, in what `lines` leave of the scan (trace_leftover.c), where radii differ. The
+ * report has their spread. */
+status trace_leftover(struct trace_job *job, struct polyline_set *lines, struct error *err);
+/* Finds lines and repairs them, until only the last fit is left, which trace_finish makes: it drops what deviates. */
+status trace_lines(struct trace_job *job, struct polyline_set *lines, struct error *err);
+status trace_finish(struct trace_job *job, struct polyline_set *lines, struct error *err);
+
+#endif

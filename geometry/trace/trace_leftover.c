@@ -1,0 +1,122 @@
+/* A second look at the material that no line explains.
+ *
+ * Thin fibers between thicker ones are missed at first: filters have the scale of the typical fiber, so the directions
+ * inside of thin fibers are those of their neighbours. Once whole lines are fitted, their fibers are subtracted from
+ * the scan (matching pursuit, Mallat and Zhang 1993), and what is left is filtered and traced like a scan of thinner
+ * fibers. The lines found there join the others before ends grow and touching lines are compared. */
+#include "geometry/trace/trace_job.h"
+
+#include "geometry/filter_directions.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Diameter of the fibers looked for, over the typical one; centers are found from 0.55 to 1.5 times this diameter. */
+static const double THINNER = 0.72;
+static const float PAD = 0.3f; /* voxels added to subtracted radii, so that no rims are left */
+/* Spread of the radii, and material that is left over all material, below which there is nothing to look for: fibers
+ * that are alike are all found at first, and only rims of them are left (spread up to 0.04, material up to 0.05). */
+static const double LEAST_SPREAD = 0.1, LEAST_LEFT = 0.03;
+static const double LEAST_DIAMETERS = 1.5; /* length of the lines that are added */
+
+/* Lowers the density around vertex x to what a fiber of this radius leaves. width: of its blurred edge. */
+static void subtract_ball(const struct volume *v, const float x[3], float radius, float width, struct volume *left)
+{
+    const float reach = radius + 0.5f * width;
+    size_t from[3], to[3];
+    for (int a = 0; a < 3; a++) {
+        const float lo = floorf(x[a] - reach), hi = ceilf(x[a] + reach), last = (float)v->n[a];
+        from[a] = (size_t)fminf(fmaxf(lo, 0.0f), last);
+        to[a] = (size_t)fminf(fmaxf(hi, 0.0f), last);
+    }
+    for (size_t k = from[2]; k < to[2]; k++)
+        for (size_t j = from[1]; j < to[1]; j++)
+            for (size_t i = from[0]; i < to[0]; i++) {
+                const float d[3] = {(float)i + 0.5f - x[0], (float)j + 0.5f - x[1], (float)k + 0.5f - x[2]};
+                const float distance = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+                const float share = fminf(1.0f, 0.5f + (radius - distance) / width);
+                const size_t at = volume_index(v->n, i, j, k);
+                if (share > 0.0f) left->density[at] = fmaxf(0.0f, fminf(left->density[at], v->density[at] - share));
+            }
+}
+
+static size_t count_material(const struct volume *v, double eps_d)
+{
+    size_t n = 0, n_slice = v->n[0] * v->n[1];
+    for (size_t k = 0; k < v->n[2]; k++) {
+        for (size_t i = 0; i < n_slice; i++) n += (double)v->density[k * n_slice + i] >= eps_d;
+        scratch_keep_within(v->space);
+    }
+    return n;
+}
+
+/* Makes the volume of what the lines leave. *share: material in it over that of the scan. */
+static status subtract_lines(const struct trace_job *job, const struct polyline_set *lines, struct volume *left,
+                             double *share, struct error *err)
+{
+    const struct volume *v = job->v;
+    const size_t n_slice = v->n[0] * v->n[1];
+    const float width = (float)(sqrt(2.0 * M_PI) * job->profile.blur); /* one over the slope of the edge */
+    status s = volume_init_in(left, v->n, v->voxel_size_m, v->space, err);
+    for (size_t k = 0; k < v->n[2] && s == STATUS_OK; k++) {
+        memcpy(left->density + k * n_slice, v->density + k * n_slice, n_slice * sizeof *v->density);
+        scratch_keep_within(v->space);
+    }
+    if (s != STATUS_OK) return s;
+    const size_t n_material = count_material(v, job->o->eps_d);
+    for (size_t l = 0; l < lines->n_line; l++) {
+        const float radius = lines->radius[l] > 0.0f ? lines->radius[l] : (float)(0.5 * job->diameter);
+        for (size_t i = lines->first[l]; i < lines->first[l + 1]; i++)
+            subtract_ball(v, lines->vertex[i], radius + PAD, width, left);
+        scratch_keep_within(v->space);
+    }
+    *share = n_material > 0 ? (double)count_material(left, job->o->eps_d) / (double)n_material : 0.0;
+    return STATUS_OK;
+}
+
+/* Traces the fibers of the volume that is left, and adds them. */
+static status add_lines(const struct trace_job *job, const struct volume *left, struct polyline_set *lines,
+                        struct error *err)
+{
+    struct trace_job look = *job;
+    struct reconstruct_option option = *job->o;
+    struct reconstruct_report report = *job->report;
+    struct direction_volume d = {0};
+    struct polyline_set part[3];
+    struct join_counts counts = {0};
+    look.inner = progress_silent(&job->inner);
+    option.s = option.t = option.eps_j = NAN;
+    option.h = 0;
+    look.v = left;
+    look.d = &d;
+    look.o = &option;
+    look.report = &report;
+    look.diameter = THINNER * job->diameter;
+    for (int i = 0; i < 3; i++) polyline_set_init(&part[i]);
+    status s = filter_directions(left, look.diameter, &option, job->pool, &look.inner, &d, &report, err);
+    const bool nothing = s == STATUS_INVALID; /* no voxel looks like a part of a fiber */
+    if (nothing) s = STATUS_OK;
+    if (s == STATUS_OK && !nothing) s = trace_chains(&look, &part[0], err);
+    if (s == STATUS_OK && !nothing) s = trace_repair(&look, &part[0], false, 0.0, &part[1], &counts, err);
+    if (s == STATUS_OK && !nothing) s = trace_repair(&look, &part[1], true, 0.0, &part[2], &counts, err);
+    for (size_t l = 0; l < part[2].n_line && s == STATUS_OK; l++)
+        if ((double)polyline_length(&part[2], l) >= LEAST_DIAMETERS * job->diameter)
+            s = polyline_add_part(lines, &part[2], l, part[2].first[l], part[2].first[l + 1], err);
+    for (int i = 0; i < 3; i++) polyline_set_release(&part[i]);
+    direction_volume_release(&d);
+    return s;
+}
+
+status trace_leftover(struct trace_job *job, struct polyline_set *lines, struct error *err)
+{
+    struct volume left = {0};
+    const size_t n_before = lines->n_line;
+    double share = 0.0;
+    if (!(job->report->radius_spread >= LEAST_SPREAD)) return STATUS_OK;
+    status s = subtract_lines(job, lines, &left, &share, err);
+    if (s == STATUS_OK && share >= LEAST_LEFT) s = add_lines(job, &left, lines, err);
+    volume_release(&left);
+    if (s != STATUS_OK || lines->n_line == n_before) return s;
+    trace_classify(lines);
+    return trace_center(job, lines, err);
+}

@@ -1,0 +1,155 @@
+/* Lines on one grid, from chains of centers to the last fit. */
+#include "geometry/trace/trace_job.h"
+
+#include "geometry/fibers/lines/disagreement.h"
+#include "geometry/fibers/lines/kinks.h"
+#include "geometry/fibers/lines/line_ends.h"
+#include "geometry/fibers/shape/axes/axis_fit.h"
+#include "geometry/fibers/shape/axes/flat_fit.h"
+#include "geometry/fibers/shape/smoothing.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum {
+    N_REPAIR = 2, /* rounds of growing, joining and cutting */
+    N_FIT = 4     /* rounds of fitting whole lines */
+};
+
+/* Turn of a kink relative to the usual turn. Less cuts fibers of plain weaves into pieces; more keeps jumps between
+ * fibers. */
+#define OVER_USUAL_TURN 2.1
+/* Distance of the axes of neighbours over the sum of their radii, below which one of two fitted lines is wrong: fibers
+ * do not pass through each other. */
+#define TOUCHING 0.85
+
+/* Smooths every line, and drops those with fewer than min_vertex vertices. */
+static status smooth_and_drop(struct trace_job *job, const struct polyline_set *in, struct polyline_set *out,
+                              struct error *err)
+{
+    size_t longest = 0;
+    for (size_t l = 0; l < in->n_line; l++)
+        if (polyline_length(in, l) > longest) longest = polyline_length(in, l);
+    double *work = malloc(4 * (longest + 1) * sizeof *work);
+    if (work == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot smooth fibers: out of memory");
+    status s = STATUS_OK;
+    for (size_t l = 0; l < in->n_line && s == STATUS_OK; l++) {
+        size_t n = polyline_length(in, l);
+        if (n < job->o->min_vertex || n < 3) {
+            job->report->n_short_dropped[in->axis[l]]++;
+            continue;
+        }
+        polyline_smooth(in->vertex + in->first[l], n, job->o->smooth_alpha, work);
+        s = polyline_add_part(out, in, l, in->first[l], in->first[l + 1], err);
+    }
+    free(work);
+    return s;
+}
+
+/* Moves lines to where they explain the scan best. `last`: as smoothly as fibers are, with errors for the report. */
+static status fit_axes(struct trace_job *job, struct polyline_set *lines, bool last, struct error *err)
+{
+    struct axis_profile profile = trace_start_profile(job);
+    profile.measured_curvature = last;
+    if (last) profile.independent = job->independent;
+    const double voxel_m = job->v->voxel_size_m[0];
+    struct section_ratio ratio;
+    struct polyline_set even, inside;
+    polyline_set_init(&even);
+    polyline_set_init(&inside);
+    status s = polylines_resample(lines, &even, err);
+    const struct flat_fit fit = {job->v, job->diameter, N_FIT, TRACE_MIN_PIECE, job->pool, &job->inner};
+    if (s == STATUS_OK) s = polylines_fit_flat(&even, &fit, &profile, &ratio, err);
+    if (s == STATUS_OK)
+        s = polylines_keep_inside(&even, job->v->n, job->o->min_vertex, &inside, job->report->n_short_dropped, err);
+    if (s == STATUS_OK) {
+        job->report->axis_position_se_m = profile.position_se * voxel_m;
+        job->report->axis_direction_se_rad = profile.direction_se_rad;
+        job->report->profile_radius_m = profile.radius * voxel_m;
+        job->report->profile_blur_m = profile.blur * voxel_m;
+        job->report->radius_spread = profile.radius_spread;
+        job->report->axis_ratio = ratio.mean;
+        job->report->axis_ratio_spread = ratio.sd;
+        job->report->single_radius_se_m = profile.radius_se * profile.radius * voxel_m;
+        polyline_set_release(lines);
+        *lines = inside;
+        polyline_set_init(&inside);
+    }
+    polyline_set_release(&even);
+    polyline_set_release(&inside);
+    return s;
+}
+
+/* Cuts lines at kinks, where they change to another fiber; in the last pass also removes ends that lie in other
+ * fibers. */
+static status straighten(struct trace_job *job, struct polyline_set *lines, bool last, size_t min_vertex,
+                         struct error *err)
+{
+    struct polyline_set out;
+    size_t n_cut;
+    polyline_set_init(&out);
+    status s = polylines_cut_kinks(lines, job->diameter, OVER_USUAL_TURN, min_vertex, last, &out, &n_cut, err);
+    if (s == STATUS_OK) {
+        polyline_set_release(lines);
+        *lines = out;
+        polyline_set_init(&out);
+    }
+    if (s == STATUS_OK && last)
+        s = polylines_trim_disagreeing(lines, job->d, TRACE_DISAGREEMENT_RAD,
+                                       (size_t)(TRACE_END_DIAMETERS * job->diameter + 0.5), min_vertex, &out, err);
+    if (s == STATUS_OK && last) {
+        polyline_set_release(lines);
+        *lines = out;
+        polyline_set_init(&out);
+    }
+    polyline_set_release(&out);
+    return s;
+}
+
+status trace_lines(struct trace_job *job, struct polyline_set *lines, struct error *err)
+{
+    struct polyline_set part[3];
+    struct join_counts counts = {0};
+    for (int i = 0; i < 3; i++) polyline_set_init(&part[i]);
+    status s = trace_chains(job, &part[0], err);
+    trace_enter_part(job, 0.12, 0.14);
+    if (s == STATUS_OK) s = trace_repair(job, &part[0], false, 0.0, &part[1], &counts, err);
+    for (int round = 0; round < N_REPAIR && s == STATUS_OK; round++) { /* grow and join, then cut wrong parts */
+        const double from = 0.14 + 0.2 * round / N_REPAIR;
+        trace_enter_part(job, from, from + 0.14 / N_REPAIR);
+        s = trace_center(job, &part[1], err);
+        if (s == STATUS_OK) s = trace_repair(job, &part[1], true, 0.0, &part[2], &counts, err);
+        trace_enter_part(job, from + 0.14 / N_REPAIR, from + 0.2 / N_REPAIR);
+        if (s == STATUS_OK) s = trace_center(job, &part[2], err);
+        if (s == STATUS_OK) s = trace_repair(job, &part[2], false, 0.0, &part[1], &counts, err);
+    }
+    if (s == STATUS_OK) s = trace_repair(job, &part[1], true, 0.0, &part[0], &counts, err);
+    if (s == STATUS_OK) {
+        trace_classify(&part[0]); /* from classes of subvolumes to axis classes */
+        trace_enter_part(job, 0.34, 0.35);
+        s = smooth_and_drop(job, &part[0], lines, err);
+    }
+    trace_enter_part(job, 0.35, 0.4);
+    if (s == STATUS_OK) s = trace_center(job, lines, err);
+    trace_enter_part(job, 0.4, 0.5);
+    if (s == STATUS_OK) s = fit_axes(job, lines, false, err);
+    if (s == STATUS_OK) s = straighten(job, lines, false, TRACE_MIN_PIECE, err);
+    trace_enter_part(job, 0.5, 0.52);
+    if (s == STATUS_OK) s = trace_leftover(job, lines, err);
+    /* lines on the fibers' axes are easier to distinguish and to join, and their radii are known */
+    if (s == STATUS_OK) s = trace_repair(job, lines, true, TOUCHING, &part[1], &counts, err);
+    trace_enter_part(job, 0.52, 0.54);
+    if (s == STATUS_OK) s = smooth_and_drop(job, &part[1], &part[2], err);
+    if (s == STATUS_OK) s = trace_repair(job, &part[2], true, TOUCHING, lines, &counts, err);
+    job->report->n_gap_bridged = counts.n_gap_bridged;
+    job->report->n_joined = counts.n_joined;
+    for (int i = 0; i < 3; i++) polyline_set_release(&part[i]);
+    return s;
+}
+
+status trace_finish(struct trace_job *job, struct polyline_set *lines, struct error *err)
+{
+    trace_enter_part(job, 0.54, 0.67);
+    status s = fit_axes(job, lines, true, err);
+    return s == STATUS_OK ? straighten(job, lines, true, job->o->min_vertex, err) : s;
+}

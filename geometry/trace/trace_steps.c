@@ -1,0 +1,102 @@
+/* The steps that lines are traced by, on one grid. */
+#include "geometry/trace/trace_job.h"
+
+#include "geometry/fibers/lines/disagreement.h"
+#include "geometry/fibers/lines/growing.h"
+#include "geometry/fibers/lines/linking.h"
+#include "geometry/fibers/shape/axes/axis_fit.h"
+#include "geometry/fibers/slices/centers.h"
+
+#include <math.h>
+#include <string.h>
+
+enum {
+    N_CENTER = 2,   /* rounds of fitting pieces of lines to the scan */
+    MAX_GROWTH = 64 /* voxels by which an end may grow */
+};
+
+/* The shares of the parts are means of those of the time that they take on a phantom, on a scan of cotton and on one of
+ * a weave. */
+void trace_enter_part(struct trace_job *job, double from, double to)
+{
+    job->part.from = from;
+    job->part.share = to - from;
+}
+
+/* Axis class that a frame's centers are counted under. A diagonal between two axes counts under the first. */
+static int frame_axis(const struct slice_frame *f)
+{
+    int axis = 0;
+    for (int a = 1; a < 3; a++)
+        if (fabsf(f->w[a]) > fabsf(f->w[axis]) + 0.01f) axis = a;
+    return axis;
+}
+
+status trace_chains(struct trace_job *job, struct polyline_set *chains, struct error *err)
+{
+    struct subvolumes sub;
+    status s = subvolumes_init(&sub, job->d, job->pool, err);
+    memcpy(job->report->n_class_voxel, sub.n_class_voxel, sizeof sub.n_class_voxel);
+    for (int a = 0; a < 3; a++) job->report->n_center[a] = job->report->n_chain[a] = 0;
+    for (int i = 0; i < N_SLICE_FRAME && s == STATUS_OK; i++) {
+        struct center_list list = {0};
+        struct slice_frame frame;
+        size_t n_chain = 0;
+        slice_frame_init(&frame, i, job->v->n);
+        trace_enter_part(job, 0.12 * i / N_SLICE_FRAME, 0.12 * (i + 1) / N_SLICE_FRAME);
+        const struct center_search search = {job->v, job->d, &sub, &frame, job->diameter};
+        s = centers_detect(&search, job->pool, &job->inner, &list, err);
+        if (s != STATUS_OK) break;
+        s = centers_link(&list, &frame, job->o->link_sigma_voxel, job->diameter, TRACE_MIN_PIECE, chains, &n_chain,
+                         err);
+        job->report->n_center[frame_axis(&frame)] += list.first[list.n_slice];
+        job->report->n_chain[frame_axis(&frame)] += n_chain;
+        center_list_release(&list);
+    }
+    subvolumes_release(&sub);
+    return s;
+}
+
+void trace_classify(struct polyline_set *p)
+{
+    for (size_t l = 0; l < p->n_line; l++) {
+        float moved[3] = {0.0f, 0.0f, 0.0f};
+        for (size_t i = p->first[l]; i + 1 < p->first[l + 1]; i++)
+            for (int a = 0; a < 3; a++) moved[a] += fabsf(p->vertex[i + 1][a] - p->vertex[i][a]);
+        p->axis[l] = moved[0] >= moved[1] && moved[0] >= moved[2] ? 0 : moved[1] >= moved[2] ? 1 : 2;
+    }
+}
+
+status trace_repair(struct trace_job *job, struct polyline_set *in, bool grow, double touching,
+                    struct polyline_set *out, struct join_counts *counts, struct error *err)
+{
+    struct polyline_set agreeing, single, grown;
+    const struct grow_option option = {(float)job->diameter, (float)job->o->eps_d, MAX_GROWTH};
+    size_t n_grown = 0, n_cut = 0;
+    polyline_set_init(&agreeing);
+    polyline_set_init(&single);
+    polyline_set_init(&grown);
+    status s = polylines_cut_disagreeing(in, job->d, TRACE_DISAGREEMENT_RAD, TRACE_MIN_PIECE, &agreeing, &n_cut, err);
+    if (s == STATUS_OK)
+        s = polylines_remove_duplicates(&agreeing, job->v->n, job->diameter, touching, TRACE_MIN_PIECE, &single, counts,
+                                        err);
+    if (s == STATUS_OK && grow) s = polylines_grow(&single, job->v, &option, &grown, &n_grown, err);
+    if (s == STATUS_OK)
+        s = polylines_join(grow ? &grown : &single, job->v, job->diameter, job->o->eps_d, out, counts, err);
+    polyline_set_release(&agreeing);
+    polyline_set_release(&single);
+    polyline_set_release(&grown);
+    polyline_set_release(in);
+    return s;
+}
+
+struct axis_profile trace_start_profile(const struct trace_job *job)
+{
+    return (struct axis_profile){
+        .radius = 0.5 * job->diameter, .radius_spread = 0.3, .blur = 0.8, .high = 1.0, .independent = 1.0};
+}
+
+status trace_center(struct trace_job *job, struct polyline_set *lines, struct error *err)
+{
+    return polylines_fit(lines, job->v, job->diameter, N_CENTER, &job->profile, job->pool, &job->inner, err);
+}
