@@ -14,6 +14,7 @@ int phantom_command_camera(int argc, char **argv);
 int phantom_command_compare(int argc, char **argv);
 int phantom_command_detect(int argc, char **argv);
 int phantom_command_look(int argc, char **argv);
+int phantom_command_mesh(int argc, char **argv);
 
 /* What the option --NAME takes. Each command has one table of its options. */
 enum option_kind {

@@ -20,6 +20,8 @@ static const char usage[] =
     "                                                    find the weave of a real cloth in photographs\n"
     "  selvedge-phantom look --photograph FILE --rendering FILE --period-px P [options]\n"
     "                                                    compare color and texture of a rendering and a photograph\n"
+    "  selvedge-phantom mesh --on SHAPE --out FILE.obj [options]\n"
+    "                                                    write a surface that pictures show the cloth on\n"
     "\n"
     "  selvedge-phantom --version                        print the version\n"
     "\n"
@@ -32,6 +34,7 @@ static const struct {
     {"cloth", phantom_command_cloth},   {"photograph", phantom_command_photograph},
     {"camera", phantom_command_camera}, {"compare", phantom_command_compare},
     {"detect", phantom_command_detect}, {"look", phantom_command_look},
+    {"mesh", phantom_command_mesh},
 };
 
 int main(int argc, char **argv)

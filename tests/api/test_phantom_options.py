@@ -72,3 +72,16 @@ def test_a_wrong_description(tmp_path):
     given.write_text('{"weave": "plain", "crimp": 3}')
     p = subprocess.run([program("selvedge-phantom"), "cloth", "--out", str(tmp_path), "--description", str(given)], capture_output=True, timeout=60)
     assert p.returncode == 2 and b"cloth.crimp" in p.stderr
+
+
+def test_meshes_of_the_shapes_of_pictures(tmp_path):
+    def mesh(*options):
+        return subprocess.run([program("selvedge-phantom"), "mesh", *options, "--out", str(tmp_path / "m.obj")], capture_output=True, text=True, timeout=60)
+    made = mesh("--on", "cylinder", "--radius-mm", "10", "--size-mm", "20", "--wrap-deg", "90")
+    assert made.returncode == 0 and made.stdout == "362 points, 360 triangles\n", made.stderr
+    points = [[float(x) for x in line.split()[1:]] for line in (tmp_path / "m.obj").read_text().splitlines() if line.startswith("v ")]
+    assert all(abs((x * x + (z + 10)**2)**0.5 - 10) < 1e-4 and abs(y) == 10 for x, y, z in points)
+    for options, code, words in ((("--on", "sphere"), 2, "flat, cylinder or drape"), (("--on", "drape", "--radius-mm", "0.1"), 1, "0.1"),
+                                 (("--on", "cylinder", "--wrap-deg", "400"), 2, "--wrap-deg")):
+        refused = mesh(*options)
+        assert refused.returncode == code and words in refused.stderr, refused

@@ -39,10 +39,13 @@ static struct scene *small_cloth(bool black_sheet)
     return scene;
 }
 
-static void make(const struct scene *scene, const struct appearance_table_option *o, size_t n_thread,
+static const double grey[3] = {0.8, 0.6, 0.4}; /* of isotropic.v1 */
+
+static void make(const struct scene *scene, const char *id, const struct appearance_table_option *o, size_t n_thread,
                  struct appearance_table *t)
 {
-    struct radiance_input in = trace_input_surface(scene, scattering_find("two_lobe.v1"), start, &model);
+    const double *param = strcmp(id, "isotropic.v1") == 0 ? grey : start;
+    struct radiance_input in = trace_input_surface(scene, scattering_find(id), param, &model);
     struct thread_pool *pool = NULL;
     struct error err = {0};
     assert_int_equal(thread_pool_new(n_thread, &pool, &err), STATUS_OK);
@@ -84,8 +87,8 @@ static void textures_are_orthonormal(void **state)
         .texels = 64, .view_edge = 2, .light_edge = 3, .n_basis = 4, .n_path = 2000, .seed = 1};
     struct scene *scene = small_cloth(false);
     struct appearance_table t, other;
-    make(scene, &o, 1, &t);
-    make(scene, &o, 2, &other);
+    make(scene, "two_lobe.v1", &o, 1, &t);
+    make(scene, "two_lobe.v1", &o, 2, &other);
     assert_true(t.n_side == 2 && t.width == 8 && t.height == 8);
     size_t n = t.width * t.height, n_value = 2 * 4 * 2 * 9 * 4 * 3;
     assert_memory_equal(t.weight, other.weight, 4 * n * sizeof(float));
@@ -102,16 +105,17 @@ static void textures_are_orthonormal(void **state)
     scene_free(scene);
 }
 
-/* The mean of the tile in nine directions, against estimates with the same lamp and a far camera: what is left is what
- * cells of 18 degrees, 120 paths a cell and smoothing leave; 8,192 paths of a picture leave 3 to 5 %. */
+/* The mean of the tile in nine directions, against pictures with the same lamp and a far camera. Fibers scatter evenly,
+ * so that paths differ by about their mean: 66 of them in a cell, interpolated and smoothed, leave 2 to 3 % of a mean
+ * and 1 % of nine, and the 8,192 of a picture 1.5 %. */
 static void the_mean_is_that_of_the_path_tracer(void **state)
 {
     (void)state;
     const struct appearance_table_option o = {
-        .texels = 16, .view_edge = 10, .light_edge = 12, .n_basis = 4, .n_path = 150000, .seed = 2};
+        .texels = 16, .view_edge = 10, .light_edge = 12, .n_basis = 4, .n_path = 60000, .seed = 2};
     struct scene *scene = small_cloth(true);
     struct appearance_table t;
-    make(scene, &o, 2, &t);
+    make(scene, "isotropic.v1", &o, 2, &t);
     double worst = 0, sum = 0, sum_table = 0;
     for (int i = 0; i < 9; i++) {
         const struct configuration c = {.light = LIGHT_DIRECTIONAL,
@@ -125,7 +129,7 @@ static void the_mean_is_that_of_the_path_tracer(void **state)
                                         .camera_distance_m = 1,
                                         .crop_m = 0.01};
         const struct render_request q = {.input =
-                                             trace_input_surface(scene, scattering_find("two_lobe.v1"), start, &model),
+                                             trace_input_surface(scene, scattering_find("isotropic.v1"), grey, &model),
                                          .configuration = &c,
                                          .width = 16,
                                          .height = 16,
@@ -144,9 +148,9 @@ static void the_mean_is_that_of_the_path_tracer(void **state)
         sum += mean;
         sum_table += rgb[1];
     }
-    if (worst > 0.5) fail_msg("a mean differs by %g", worst);
-    if (fabs(sum_table / sum - 1) > 0.06) fail_msg("the means differ by %g together", sum_table / sum - 1);
-    if (!(t.mean_rel_rms > 0 && t.mean_rel_rms < 0.4 && t.mean_rel_noise > 0 && t.n_smooth > 0))
+    if (worst > 0.12) fail_msg("a mean differs by %g", worst);
+    if (fabs(sum_table / sum - 1) > 0.04) fail_msg("the means differ by %g together", sum_table / sum - 1);
+    if (!(t.mean_rel_rms > 0 && t.mean_rel_rms < 0.12 && t.mean_rel_noise > 0))
         fail_msg("the table states an error of %g, noise %g, after %zu steps of smoothing", t.mean_rel_rms,
                  t.mean_rel_noise, t.n_smooth);
     appearance_table_release(&t);
@@ -162,6 +166,11 @@ static void what_is_refused(void **state)
     struct error err = {0};
     const struct appearance_table_option o = {.texels = 16, .view_edge = 0, .light_edge = 3, .n_basis = 4};
     assert_int_equal(appearance_table_make(&in, &o, NULL, NULL, &t, &err), STATUS_INVALID);
+    const struct appearance_table_option small = {
+        .texels = 16, .view_edge = 2, .light_edge = 2, .n_basis = 4, .n_path = 100};
+    const atomic_bool cancel = true;
+    assert_int_equal(appearance_table_make(&in, &small, NULL, &(struct progress){.cancel = &cancel}, &t, &err),
+                     STATUS_CANCELLED);
     in.scene.fibers = NULL;
     assert_int_equal(appearance_table_make(&in, &o, NULL, NULL, &t, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "sees no fibers"));
