@@ -4,6 +4,7 @@
 #define SELVEDGE_OPTIMIZER_CAMERA_COMMANDS_H
 
 #include "base/status.h"
+#include "renderer/image/image.h"
 
 int camera_command_photo(int argc, char **argv);
 int camera_command_calibrate(int argc, char **argv);
@@ -22,5 +23,9 @@ status camera_options_parse(int argc, char **argv, struct camera_option *option,
 status camera_option_number(const struct camera_option *o, double *out, struct error *err);
 /* undeclared, linear or srgb. */
 status camera_option_transfer(const struct camera_option *o, unsigned *transfer, struct error *err);
+
+/* Draws the outline of the crop (all 0: the whole picture) into the picture, and writes it as PNG whose white is the
+ * 99th percentile of the values. STATUS_IO as image_write_png. */
+status camera_write_picture(struct image *im, const size_t crop_px[4], const char *out, struct error *err);
 
 #endif

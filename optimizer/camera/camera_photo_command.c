@@ -4,12 +4,19 @@
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/report/photograph_json.h"
 
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 enum { FILES, CROP, TRANSFER, EXPOSURE, ISO, APERTURE, BLACK, OUT, JOB, JSON, N_OPTION };
+
+/* Folders of a preview of a job: of its files, and of the pictures to write (NULL: none). */
+struct preview {
+    const char *folder, *pictures;
+};
 
 static void print_stated(const char *name, double value, const char *unit)
 {
@@ -42,42 +49,14 @@ static void print_mean(const char *name, const struct photograph_mean *m)
     if (m->warning[0] != '\0') printf("  %-14s %s\n", "warning", m->warning);
 }
 
-/* Draws the outline of the crop in red, two pixels wide or more in large pictures. */
-static void draw_crop(struct image *im, const size_t crop[4], float bright)
-{
-    size_t wide = 1 + im->width / 400;
-    for (size_t y = 0; y < im->height; y++)
-        for (size_t x = 0; x < im->width; x++) {
-            bool in = x >= crop[0] && x < crop[2] && y >= crop[1] && y < crop[3];
-            bool inner = x >= crop[0] + wide && x + wide < crop[2] && y >= crop[1] + wide && y + wide < crop[3];
-            float *p = im->pixel + 3 * (y * im->width + x);
-            if (in && !inner) p[0] = bright, p[1] = p[2] = 0.0f;
-        }
-}
-
-static int compare_float(const void *a, const void *b)
-{
-    float x, y;
-    memcpy(&x, a, sizeof x);
-    memcpy(&y, b, sizeof y);
-    return x < y ? -1 : x > y;
-}
-
+/* Draws the crop of p in the whole picture of the file at `path`. */
 static status write_picture(const char *path, const struct job_photograph *p, const char *out, struct error *err)
 {
-    enum { N = 4096 };
     struct job_photograph whole = *p;
     struct image im;
-    float value[N];
     memset(whole.crop_px, 0, sizeof whole.crop_px);
     status s = photograph_read(path, &whole, &im, NULL, err);
-    if (s != STATUS_OK) return s;
-    size_t n = im.width * im.height * 3, crop[4] = {0, 0, im.width, im.height};
-    for (size_t i = 0; i < N; i++) value[i] = im.pixel[(size_t)((double)i / N * (double)n)];
-    qsort(value, N, sizeof *value, compare_float);
-    float bright = fmaxf(value[N * 99 / 100], 1e-30f);
-    draw_crop(&im, p->crop_px[2] > 0 ? p->crop_px : crop, bright);
-    s = image_write_png(&im, 1.0 / (double)bright, out, err);
+    if (s == STATUS_OK) s = camera_write_picture(&im, p->crop_px, out, err);
     image_release(&im);
     return s;
 }
@@ -106,7 +85,7 @@ static status photograph_of_options(const struct camera_option *o, struct job_ph
     }
     if (s == STATUS_OK && o[CROP].n > 0 && (p->crop_px[2] <= p->crop_px[0] || p->crop_px[3] <= p->crop_px[1]))
         s = error_set(err, STATUS_INVALID, "--crop-px is empty: the order is x0 y0 x1 y1");
-    if (s == STATUS_OK && o[OUT].n > 0 && o[FILES].n != 1)
+    if (s == STATUS_OK && o[OUT].n > 0 && o[FILES].n > 1)
         s = error_set(err, STATUS_INVALID, "--out goes with one photograph");
     if (s == STATUS_OK && (o[FILES].n > 0) == (o[JOB].n > 0))
         s = error_set(err, STATUS_INVALID, "give photographs, or --job with a job document");
@@ -172,10 +151,40 @@ static json_t *row_json(const struct job_photograph *p, const struct photograph_
                      json_number(p->camera_phi_deg), "photograph", photograph_record_json(&m->record));
 }
 
-/* Prints the photographs of the document and appends them to `rows`. */
-static status preview_photograph(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
-                                 json_t *rows)
+/* Draws the crop of p in the whole picture, as it is developed, into the folder `pictures`. */
+static status write_developed(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
+                              const char *pictures, struct error *err)
 {
+    struct job_photograph whole = *p;
+    struct image im;
+    char path[4096];
+    memset(whole.crop_px, 0, sizeof whole.crop_px);
+    memset(whole.crop_exact_px, 0, sizeof whole.crop_exact_px);
+    status s = photograph_develop(k, folder, &whole, &im, NULL, err);
+    if (s != STATUS_OK) return s;
+    snprintf(path, sizeof path, "%s/%s.png", pictures, p->file);
+    s = camera_write_picture(&im, p->crop_px, path, err);
+    image_release(&im);
+    return s;
+}
+
+/* Makes the folder and writes the picture of the chart into it, if there is one. */
+static status begin_pictures(const struct photograph_process *k, const char *pictures, struct error *err)
+{
+    char path[4096];
+    if (mkdir(pictures, 0777) != 0 && errno != EEXIST)
+        return error_set_errno(err, "cannot make the folder '%s' for pictures", pictures);
+    if (k->chart_picture.pixel == NULL) return STATUS_OK;
+    snprintf(path, sizeof path, "%s/color-chart.png", pictures);
+    return image_write_png(&k->chart_picture, 1.0, path, err);
+}
+
+/* Prints the photographs of the document and appends them to `rows`. A photograph that cannot be used is drawn as well,
+ * because the picture may show why. */
+static status preview_photograph(const struct photograph_process *k, const struct preview *v,
+                                 const struct job_photograph *p, json_t *rows)
+{
+    const char *const folder = v->folder;
     struct photograph_mean mean = {0};
     struct error err = {0};
     struct image im;
@@ -187,12 +196,16 @@ static status preview_photograph(const struct photograph_process *k, const char 
     if (mean.record.info.format != NULL) print_mean(p->file, &mean);
     if (s == STATUS_OK) json_array_append_new(rows, row_json(p, &mean));
     if (s != STATUS_OK) fprintf(stderr, "error: %s\n", err.text);
-    return s;
+    struct error picture_err = {0};
+    if (v->pictures == NULL || write_developed(k, folder, p, v->pictures, &picture_err) == STATUS_OK) return s;
+    if (s == STATUS_OK) fprintf(stderr, "error: %s\n", picture_err.text);
+    return STATUS_INVALID;
 }
 
-static int preview_job(const char *path, const char *json_path)
+static int preview_job(const char *path, const char *json_path, const char *pictures)
 {
     char folder[4096];
+    const struct preview view = {folder, pictures};
     struct job_document *doc = NULL;
     struct photograph_process process;
     struct error err = {0};
@@ -202,8 +215,9 @@ static int preview_job(const char *path, const char *json_path)
     status s = read_document(path, folder, sizeof folder, &doc, &err);
     if (s == STATUS_OK) s = photograph_process_load(&process, doc, folder, &err);
     if (s == STATUS_OK) print_color(&process);
+    if (s == STATUS_OK && pictures != NULL) s = begin_pictures(&process, pictures, &err);
     for (size_t i = 0; s == STATUS_OK && i < doc->n_photograph; i++)
-        whole = preview_photograph(&process, folder, &doc->photograph[i], rows) == STATUS_OK && whole;
+        whole = preview_photograph(&process, &view, &doc->photograph[i], rows) == STATUS_OK && whole;
     if (s == STATUS_OK && json_path != NULL && json_dump_file(rows, json_path, JSON_INDENT(1)) != 0)
         s = error_set(&err, STATUS_IO, "cannot write '%s'", json_path);
     if (s != STATUS_OK) fprintf(stderr, "error: %s\n", err.text);
@@ -230,5 +244,6 @@ int camera_command_photo(int argc, char **argv)
         fprintf(stderr, "error: %s; `selvedge photo --help` lists the options\n", err.text);
         return 2;
     }
-    return o[JOB].n > 0 ? preview_job(o[JOB].word[0], o[JSON].n > 0 ? o[JSON].word[0] : NULL) : preview_files(o, &p);
+    if (o[JOB].n == 0) return preview_files(o, &p);
+    return preview_job(o[JOB].word[0], o[JSON].n > 0 ? o[JSON].word[0] : NULL, o[OUT].n > 0 ? o[OUT].word[0] : NULL);
 }

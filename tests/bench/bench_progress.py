@@ -1,6 +1,6 @@
 """How well do progress and remaining time hold? Prints figures progress.* of real jobs, from their status.json while they run.
 
-    bench_progress.py [--build DIR] [--data DIR] [--threads N] [--keep DIR] [demo] [fiber_ct] [weave_ct] [fleece]
+    bench_progress.py [--build DIR] [--data DIR] [--threads N] [--keep DIR] [--cpu-clock] [demo] [fiber_ct] [weave_ct] [fleece]
 
 Of each job: worst_eta_ratio_after_10pct, the largest factor between the stated and the true remaining time from a tenth of the wall time on, while at
 least a twentieth of it and 3 s remain; and largest_jump of the stated fraction between two looks. On a machine that others use, too, the remaining
@@ -100,18 +100,28 @@ def show_stages(looks):
         print(f"stage {stage}: {end[0] - begin[0]:.1f} s, processor {end[1] - begin[1]:.1f} s", file=sys.stderr)
 
 
+def cpu_clock(arguments):
+    """Environment in which a program's clock is its processor time."""
+    library = os.path.join(ROOT, arguments.build, "cpu_clock.so")
+    source = os.path.join(os.path.dirname(os.path.abspath(__file__)), "cpu_clock.c")
+    subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", library, source], check=True)
+    return dict(os.environ, LD_PRELOAD=library, CPU_CLOCK_THREADS=str(arguments.threads))
+
+
 def record(arguments, job, speeds):
     """Runs the job; [(seconds since the start, processor seconds, status.json)] at every look, and its wall time."""
     looks, start = [], time.monotonic()
     command = [program(arguments, "selvedge-worker"), "--quiet", "--speeds", speeds, "--threads", str(arguments.threads), job]
-    with subprocess.Popen(command) as worker:
+    if arguments.cpu_clock:
+        command[1:1] = ["--sandbox", "off"]  # a worker in its sandbox starts without the library
+    with subprocess.Popen(command, env=cpu_clock(arguments) if arguments.cpu_clock else None) as worker:
         while worker.poll() is None:
             time.sleep(LOOK_S)
             with contextlib.suppress(OSError, ValueError), open(os.path.join(job, "status.json"), encoding="utf-8") as f:
                 look, cpu_s = json.load(f), cpu_of(worker.pid)
                 if cpu_s is not None:
-                    looks.append((time.monotonic() - start, cpu_s, look))
-    wall_s = time.monotonic() - start
+                    looks.append((cpu_s / arguments.threads if arguments.cpu_clock else time.monotonic() - start, cpu_s, look))
+    wall_s = looks[-1][0] if arguments.cpu_clock else time.monotonic() - start
     if worker.returncode != 0:
         sys.exit(f"bench_progress: the worker ended with {worker.returncode} on {job}")
     with open(os.path.join(job, "looks.json"), "w", encoding="utf-8") as f:
@@ -194,6 +204,7 @@ def main():
     parser.add_argument("--data", default=real_jobs.DATA)
     parser.add_argument("--threads", type=int, default=os.cpu_count())
     parser.add_argument("--keep")
+    parser.add_argument("--cpu-clock", action="store_true")
     parser.add_argument("name", nargs="*", choices=NAMES + [[]])
     arguments = parser.parse_args()
     with contextlib.ExitStack() as stack:

@@ -5,11 +5,15 @@ import math
 import os
 import random
 import subprocess
+import sys
 
 import pytest
 from daemon_under_test import program
 from small_cloth import hair
 from small_tiff import tiff16
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "bench"))
+from png_picture import read_png  # noqa: E402
 
 pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
 READ_MEAN, READ_VAR, DARK_PER_S, DARK_VAR, SHOT_VAR, GAIN = 120, 25, 40, 6, 0.8, 200000
@@ -99,6 +103,22 @@ def test_photo_shows_the_photographs_of_a_job(folder):
     for mean, light in zip(means, TRUTH.values(), strict=True):
         assert mean == pytest.approx(light, rel=0.02)
     assert "colors" in done.stdout and "CIEDE2000" in done.stdout
+
+
+def test_photo_draws_the_photographs_of_a_job(folder, tmp_path):
+    """Each as it is developed, as a whole, with its crop; a photograph that cannot be used is drawn, too."""
+    document = json.loads((folder / "job.json").read_text())
+    document["photographs"][0]["crop_px"] = [4, 6, 20, 22]
+    document["photographs"][1]["crop_px"] = [4, 6, 200, 22]
+    (folder / "cropped.json").write_text(json.dumps(document))
+    done = subprocess.run([program("selvedge"), "photo", "--job", str(folder / "cropped.json"), "--out", str(tmp_path / "look")],
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == 1 and "v2-1.tif" in done.stderr  # its crop is larger than the picture
+    assert sorted(os.listdir(tmp_path / "look")) == ["color-chart.png", "v1-1.tif.png", "v2-1.tif.png", "v3-1.tif.png"]
+    rows = read_png(str(tmp_path / "look" / "v1-1.tif.png"))
+    assert len(rows) == 24 and all(len(row) == 3 * 24 for row in rows)
+    red = {(x, y) for y, row in enumerate(rows) for x in range(24) if row[3 * x:3 * x + 3] == b"\xff\0\0"}
+    assert red == {(x, y) for x in range(4, 20) for y in range(6, 22) if x in (4, 19) or y in (6, 21)}
 
 
 def test_a_job_of_raw_exposures(real, folder):
