@@ -168,9 +168,12 @@ status cli_file_hash(struct cli_file *file, bool (*changed)(void *context, uint6
     file->n_bytes = 0;
     int fd = cli_file_open(file);
     if (fd < 0) {
-        s = errno == ENOENT ? error_set(err, STATUS_NOT_FOUND,
-                                        "input file '%s' does not exist (the job document names it)", file->path)
-                            : error_set_errno(err, "cannot open input file '%s'", file->path);
+        s = errno == ENOENT
+                ? error_set(err, STATUS_NOT_FOUND,
+                            "input file '%s' does not exist, which the job document names; `selvedge check` "
+                            "lists all that is wrong",
+                            file->path)
+                : error_set_errno(err, "cannot open input file '%s'", file->path);
         goto out;
     }
     if (fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) {
