@@ -192,7 +192,7 @@ struct job_document {
     size_t n_candidate;                      /* for the next photograph; 0: none are ranked */
     bool candidate_grid;                     /* true: the candidates are the built-in ones */
     struct job_candidate *candidate;
-    size_t render_px, render_sample; /* render_sample 0: chosen from the paths of the fit */
+    size_t render_px, render_sample; /* 0: chosen from the paths of the fit */
     size_t n_surface_picture;
     struct job_surface_picture *surface_picture;
     bool twin; /* tables for the page in the browser */

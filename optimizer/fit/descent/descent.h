@@ -62,6 +62,7 @@ struct fit_problem {
     status (*report)(void *context, const struct fit_step *step, struct error *err); /* NULL: nobody listens */
     void *report_context;
     const struct progress *progress;    /* reports the used fraction of the paths that are expected */
+    double usual_path;                  /* paths that such a fit usually takes, for its progress alone; 0: not known */
     const struct gaussian_prior *prior; /* n_param, in fit coordinates; NULL: none. Methods without priors ignore it */
     /* standard deviation of ln gain of every configuration, which is marginalised; 0: none. Methods without gains
      * ignore it */

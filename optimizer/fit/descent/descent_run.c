@@ -32,6 +32,7 @@ status descent_run_init(struct descent_run *run, const struct fit_problem *probl
     if (s != STATUS_OK) return s;
     size_t n = problem->observation->n;
     run->path_budget = problem->path_budget > 0 ? problem->path_budget : method->info->default_path_budget;
+    run->n_path_expected = fmin(problem->usual_path, (double)run->path_budget);
     run->plain_paths = method->plain_paths;
     run->n_path = calloc(n, sizeof *run->n_path);
     run->replica[0] = calloc(n, sizeof(struct estimate));

@@ -276,7 +276,8 @@ const struct job_option option_rows_fit[] = {
      INTO(render_px),
      RANGE(8, 2048),
      .unit = "pixels",
-     .standard = "96",
+     .left_out = "96; fewer, at least 48, where two samples of each pixel would take more than half of the paths of "
+                 "the fit",
      .meaning = "Edge of the renderings in the result."},
     {.path = "fit.render_samples",
      .kind = OPTION_COUNT,

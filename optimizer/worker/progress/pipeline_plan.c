@@ -16,16 +16,26 @@
 
 /* Seconds that a unit takes on one thread of a common processor of 2023, for a machine that has run no job yet: means
  * of the demo's scan and of two real ones, which need up to 1.5 times more or less. */
-static const double read_s_per_voxel = 1e-7, orientation_s_per_voxel = 5e-7, fibers_s_per_voxel = 1e-5,
-                    transfer_s_per_voxel = 4e-7, fit_s_per_path = 9e-6, render_s_per_path = 6e-6;
+static const double read_s_per_voxel = 1e-7, orientation_s_per_voxel = 9e-7, fibers_s_per_voxel = 6e-6,
+                    transfer_s_per_voxel = 4e-7, render_s_per_path = 6e-6;
+/* The same of a path of a fit to rows whose brightest channel has the mean usual_radiance. In bright cloth paths are
+ * longer: the time goes with this power of the radiance. */
+static const double fit_s_per_path = 9e-6, usual_radiance = 0.13, radiance_power = 0.4;
 /* Share of the voxels that is material, before the volume is known. */
 static const double usual_material = 0.4;
-/* Of a fit with the budget of its method, the share of the paths that it takes; most take far less or nearly all. Of
- * the time of the stage, the share of the fit where a scan's errors are carried on. */
-static const double usual_budget_share = 0.35, usual_budget = 6e6, fit_share = 1.0 - PIPELINE_SCAN_ERROR_SHARE;
+/* Paths of a fitted row that a fit takes: to a table, of which its misfit ends it (tables of five fabrics took 0.7 to 1.3
+ * million for 16 rows), and to photographs, where it ends by their errors, which asks for 120 thousand effective paths
+ * of two replicas. Of a fit that searches the numbers of a cloth, the share of the budget. */
+static const double misfit_row_paths = 62500.0, noise_row_paths = 264000.0, cloth_share = 0.7;
+/* Of the time of the fit, the share of the fit where a scan's errors are carried on. */
+static const double usual_budget = 6e6, fit_share = 1.0 - PIPELINE_SCAN_ERROR_SHARE;
+/* Time of a validated path over that of a fitted one; paths in whose time the rest of a report is made: the gradient
+ * certificate, geometry, pages. */
+static const double validated_path = 0.88, rest_of_report_paths = 1.5e5;
 static const double report_s_per_voxel = 2e-7, least_s = 0.05;
-/* Standard deviations of the logarithm of a time where no job has been run. */
-static const double sd_of_voxels = 0.4, sd_of_fit = 0.8, sd_of_rest = 0.5;
+/* Standard deviations of the logarithm of a time where no job has been run; of filters, because their cost goes with the
+ * size of the fibers in voxels. */
+static const double sd_of_voxels = 0.4, sd_of_filters = 0.8, sd_of_fit = 0.5, sd_of_rest = 0.5;
 
 /* Voxels of the scan: as read, or by the size of its files, which have one or two bytes a voxel. */
 static double n_voxel(const struct pipeline_context *c)
@@ -45,8 +55,9 @@ static double n_thread(const struct pipeline_context *c) { return (double)thread
 /* A stage that goes through n voxels. */
 static void plan_voxels(struct pipeline_context *c, size_t i, const char *key, double n, double s_per_voxel)
 {
+    const bool traced = strcmp(key, "fibers.material") == 0;
     const struct job_clock_work work = {
-        .key = key, .units = n / n_thread(c), .usual_s = s_per_voxel, .log_sd = sd_of_voxels};
+        .key = key, .units = n / n_thread(c), .usual_s = s_per_voxel, .log_sd = traced ? sd_of_voxels : sd_of_filters};
     worker_status_plan(c->status, i, &work);
 }
 
@@ -73,17 +84,39 @@ static double path_budget(const struct pipeline_context *c)
     return method != NULL && method->default_path_budget > 0 ? (double)method->default_path_budget : usual_budget;
 }
 
+double pipeline_plan_usual_paths(const struct pipeline_context *c)
+{
+    const double budget = path_budget(c);
+    if (c->number.n > 0) return cloth_share * budget;
+    if (c->doc->n_photograph > 0 && c->doc->path_budget > 0) return budget; /* it is used up */
+    return fmin((c->doc->n_photograph > 0 ? noise_row_paths : misfit_row_paths) * (double)c->fitted.n, budget);
+}
+
+/* Seconds that a path of the fit takes, by how bright its rows are. */
+static double usual_s_per_path(const struct pipeline_context *c)
+{
+    double sum = 0.0, n = (double)c->fitted.n;
+    for (size_t i = 0; i < c->fitted.n; i++) {
+        const double *rgb = c->fitted.item[i].mean_rgb;
+        sum += fmax(rgb[0], fmax(rgb[1], rgb[2])) / n;
+    }
+    double bright = fmin(fmax(sum / usual_radiance, 0.1), 5.0); /* one, where no row has been read */
+    return fit_s_per_path * (n > 0.0 ? pow(bright, radiance_power) : 1.0);
+}
+
 static void plan_fit(struct pipeline_context *c, size_t i)
 {
     char key[SPEED_BOOK_KEY_BYTES];
-    snprintf(key, sizeof key, "fit.%.40s%s", c->doc->method, kind_of_fit(c));
+    snprintf(key, sizeof key, "fit.%.40s%s.paths", c->doc->method, kind_of_fit(c));
+    const double path_s = usual_s_per_path(c), of_fit = c->doc->has_volume ? fit_share : 1.0;
+    const double n_path = pipeline_plan_usual_paths(c) * (double)c->n_model;
     const struct job_clock_work work = {.key = key,
-                                        .units = path_budget(c) * (double)c->n_model / n_thread(c),
-                                        .usual_s = fit_s_per_path * usual_budget_share,
+                                        .units = n_path * path_s / fit_s_per_path / n_thread(c),
+                                        .usual_s = fit_s_per_path / of_fit,
                                         .log_sd = sd_of_fit,
                                         .predicts_end = true};
     worker_status_plan(c->status, i, &work);
-    c->fit_path = fmax(worker_status_expected_s(c->status, i) * n_thread(c) / fit_s_per_path, 1.0);
+    c->fit_path = fmax(n_path / of_fit, 1.0);
 }
 
 /* Seconds that a path has taken in this job's fits; NaN before their end. */
@@ -107,7 +140,8 @@ static double fit_paths(const struct pipeline_context *c)
 
 static double validation_paths(const struct pipeline_context *c)
 {
-    return (double)c->n_model * pipeline_validation_paths(c, fit_paths(c));
+    const double n_fit = fit_paths(c);
+    return validated_path * (double)c->n_model * (pipeline_validation_paths(c, n_fit) + pipeline_pilot_paths(n_fit));
 }
 
 /* A stage of n_path paths after the fit, which is stage i_fit and counts as a number of paths before it has ended. */
@@ -148,7 +182,7 @@ void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
     if (strcmp(name, "volume") == 0)
         plan_voxels(c, i, "volume", n_voxel(c), read_s_per_voxel);
     else if (strcmp(name, "orientation") == 0)
-        plan_voxels(c, i, "orientation", n_voxel(c), orientation_s_per_voxel);
+        plan_voxels(c, i, "orientation.material", n_material(c), orientation_s_per_voxel);
     else if (strcmp(name, "fibers") == 0 && c->doc->has_volume)
         plan_voxels(c, i, "fibers.material", n_material(c), fibers_s_per_voxel);
     else if (strcmp(name, "directions") == 0)
@@ -163,7 +197,8 @@ void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
         plan_voxels(c, i, "report.geometry", n_voxel(c), report_s_per_voxel);
     else if (strcmp(name, "report") == 0)
         plan_after_fit(c, i, i - 2,
-                       result_renderings_paths(c, fit_paths(c)) + surface_pictures_paths(c) + twin_result_paths(c));
+                       result_renderings_paths(c, fit_paths(c)) + surface_pictures_paths(c) + twin_result_paths(c) +
+                           rest_of_report_paths);
     else
         worker_status_plan(c->status, i, &rest);
 }

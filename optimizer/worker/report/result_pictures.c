@@ -132,21 +132,29 @@ static status write_photograph(const struct pipeline_context *c, size_t i, const
     return s;
 }
 
-/* Without a number in the job document, all renderings together take this share of the paths of the best model's fit,
+/* Without numbers in the job document, all renderings together take this share of the paths of the best model's fit,
  * within these bounds: pictures do not cost more than the fit. */
-static const double picture_share = 0.5, least_sample = 2.0, most_sample = 16.0;
+static const double picture_share = 0.5, least_sample = 2.0, most_sample = 16.0, least_px = 48.0;
+
+size_t result_picture_px(const struct pipeline_context *c, double n_fit_path)
+{
+    const double sample = c->doc->render_sample > 0 ? (double)c->doc->render_sample : least_sample;
+    if (c->doc->render_px > 0) return c->doc->render_px;
+    double px = floor(sqrt(picture_share * n_fit_path / (sample * (double)c->observation.n)));
+    return (size_t)fmin(fmax(px, least_px), (double)RESULT_PICTURE_PX);
+}
 
 size_t result_picture_samples(const struct pipeline_context *c, double n_fit_path)
 {
     if (c->doc->render_sample > 0) return c->doc->render_sample;
-    const double px = (double)c->doc->render_px, n = (double)c->observation.n;
+    const double px = (double)result_picture_px(c, n_fit_path), n = (double)c->observation.n;
     double paths = picture_share * n_fit_path;
     return (size_t)fmin(fmax(floor(paths / (px * px * n)), least_sample), most_sample);
 }
 
 double result_renderings_paths(const struct pipeline_context *c, double n_fit_path)
 {
-    const double px = (double)c->doc->render_px;
+    const double px = (double)result_picture_px(c, n_fit_path);
     return px * px * (double)c->observation.n * (double)result_picture_samples(c, n_fit_path);
 }
 
@@ -158,12 +166,13 @@ static status write_rendering(struct pipeline_context *c, size_t i, const char *
     picture_paths(c, "renderings", name, ".png", path, temporary); /* written last of the two */
     if (exists(path)) return STATUS_OK;
     const struct pipeline_model *m = &c->model[pipeline_best_model(c)];
+    const size_t px = result_picture_px(c, (double)m->fit.n_path);
     const struct render_request q = {
         .input = {.scene = pipeline_scene(c), .model = &m->appearance, .param = m->fit.param, .n_set = m->sets.n_set},
         .configuration = &c->observation.item[i].configuration,
-        .width = c->doc->render_px,
-        .height = c->doc->render_px,
-        .n_sample = result_picture_samples(c, (double)c->model[pipeline_best_model(c)].fit.n_path),
+        .width = px,
+        .height = px,
+        .n_sample = result_picture_samples(c, (double)m->fit.n_path),
         .seed = c->doc->seed ^ 0x70696374757265u,
         .stream = (uint32_t)i};
     status s = render_run(&q, c->pool, progress, &im, err);

@@ -10,6 +10,9 @@
 
 static const double decrease_of_step = 5.0, arrived_share = 0.02;
 static const double steps_with_pull = 3.0, steps_without = 2.0;
+/* The first steps go far, and what they say of the noise at the end and of misfit is of other parameters. The prediction
+ * passes from what such fits usually take to the fit's own over this many steps. */
+static const double own_steps = 12.0;
 
 /* Iterations until a fit that heads for misfit has arrived. */
 static double steps_to_misfit(const struct gauss_newton *g)
@@ -42,5 +45,8 @@ double gauss_newton_expected_paths(const struct gauss_newton *g, double f, doubl
     if (isfinite(growth))
         more = fmin(more, fmax(next * steps_to_misfit(g), (growth - 1.0) * g->model.n_effective * n_row_path));
     more = fmin(more, next * (double)n_left);
-    return fmin(done + fmax(more, next), fmax((double)g->run.path_budget, done + next));
+    const double own = fmin(done + fmax(more, next), fmax((double)g->run.path_budget, done + next));
+    const double usual = fmax(g->run.problem->usual_path, done + next),
+                 trust = fmin((double)g->run.n_step / own_steps, 1.0);
+    return g->run.problem->usual_path > 0.0 ? pow(own, trust) * pow(usual, 1.0 - trust) : own;
 }

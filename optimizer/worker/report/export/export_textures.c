@@ -196,7 +196,7 @@ static json_t *material_json(const struct textures *t)
 static status write_textures(struct export_scene *e, json_t **materials, struct error *err)
 {
     struct textures t = {.e = e};
-    size_t edge = 2 * e->c->doc->render_px;
+    size_t edge = 2 * (e->c->doc->render_px > 0 ? e->c->doc->render_px : RESULT_PICTURE_PX);
     edge = edge < MIN_EDGE ? MIN_EDGE : edge > MAX_EDGE ? MAX_EDGE : edge;
     status s = texture_maps_make(&e->c->fiber, edge, &t.maps, err);
     t.surface.maps = &t.maps;

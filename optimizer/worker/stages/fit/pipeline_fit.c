@@ -67,6 +67,7 @@ static status fit_parameters(struct fit_listener *l, const struct progress *prog
     struct pipeline_context *c = l->pipeline;
     struct pipeline_trace trace;
     struct fit_problem problem = problem_of(l, progress);
+    problem.usual_path = pipeline_plan_usual_paths(c);
     status s = pipeline_trace_open(&trace, c, "fit", "estimates.journal", l->i_model, &c->row, err);
     if (s == STATUS_OK) {
         struct estimator estimator = estimate_journal_estimator(trace.journal);

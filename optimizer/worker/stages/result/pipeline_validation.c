@@ -13,10 +13,12 @@
 
 enum { VALIDATION_PILOT = 8192, VALIDATION_LEAST = 1024, VALIDATION_BLOCK = 256, VALIDATION_MAX = 1 << 20 };
 
-/* Standard error of a validated mean relative to the row's brightness, and the paths that may be spent on all rows for
- * it: a share of the fit's, which together with the pictures (result_pictures.h) stays below the fit, but enough for a
- * fair judgement where the fit needed few. */
-static const double validation_rel_se = 0.005, validation_share = 0.4, validation_least_paths = 1e6;
+/* Standard error of a validated mean relative to the row's brightness: this share of the relative error that the fit has
+ * left, to which it adds less than 1 %, between these bounds. And the paths that may be spent on all rows for that: a
+ * share of the fit's, which together with the pictures (result_pictures.h) stays below the fit, but enough for a fair
+ * judgement where the fit needed few. */
+static const double least_rel_se = 0.005, most_rel_se = 0.01, misfit_share = 0.1, validation_share = 0.4,
+                    validation_least_paths = 3e5;
 
 static double brightness(const struct observation *o)
 {
@@ -31,6 +33,8 @@ static double relative_path_variance(const struct observation *o, const struct e
     return (double)pilot->n_path * largest / (a * a);
 }
 
+double pipeline_pilot_paths(double n_fit_path) { return 0.05 * n_fit_path; }
+
 double pipeline_validation_paths(const struct pipeline_context *c, double n_fit_path)
 {
     double least =
@@ -38,20 +42,19 @@ double pipeline_validation_paths(const struct pipeline_context *c, double n_fit_
     return fmax(validation_share * n_fit_path, least);
 }
 
-/* Plans the paths per replica so that both together reach validation_rel_se. When the budget is short, all rows get
+/* Plans the paths per replica so that both together reach that standard error. When the budget is short, all rows get
  * less in the same proportion. */
 static void plan_validation(const struct pipeline_context *c, const struct pipeline_model *m,
                             const struct estimate *pilot, size_t *n_path)
 {
+    const double rel_se = fmin(fmax(least_rel_se, misfit_share * m->fit.objective.rel_rms), most_rel_se);
     double total = 0.0;
     for (size_t i = 0; i < c->observation.n; i++)
         if (c->observation.item[i].weight > 0.0)
-            total +=
-                relative_path_variance(&c->observation.item[i], &pilot[i]) / (validation_rel_se * validation_rel_se);
+            total += relative_path_variance(&c->observation.item[i], &pilot[i]) / (rel_se * rel_se);
     double shrink = fmin(1.0, pipeline_validation_paths(c, (double)m->fit.n_path) / fmax(total, 1.0));
     for (size_t i = 0; i < c->observation.n; i++) {
-        double n = 0.5 * shrink * relative_path_variance(&c->observation.item[i], &pilot[i]) /
-                   (validation_rel_se * validation_rel_se);
+        double n = 0.5 * shrink * relative_path_variance(&c->observation.item[i], &pilot[i]) / (rel_se * rel_se);
         n = fmin(fmax(n, (double)pilot[i].n_path), VALIDATION_MAX);
         if (!(c->observation.item[i].weight > 0.0)) n = (double)pilot[i].n_path; /* the row is shown, but not scored */
         n_path[i] = (size_t)ceil(n / VALIDATION_BLOCK) * VALIDATION_BLOCK;
@@ -137,7 +140,7 @@ static status estimate_validation(struct pipeline_context *c, struct pipeline_mo
     struct progress progress = progress_begin_part(&part, whole, 0.0, 0.1);
     struct estimator_call call = {m->fit.param, n_path, 0, REPLICA_FINAL_A, false};
     double wall_s;
-    double pilot = 0.05 * (double)m->fit.n_path / (double)c->observation.n;
+    double pilot = pipeline_pilot_paths((double)m->fit.n_path) / (double)c->observation.n;
     for (size_t i = 0; i < c->observation.n; i++)
         n_path[i] = (size_t)fmin(fmax(pilot, VALIDATION_LEAST), VALIDATION_PILOT);
     status s = e->run(e->context, &call, &progress, m->validation.replica[0], &wall_s, err);
