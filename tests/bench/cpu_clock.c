@@ -1,5 +1,5 @@
-/* Preloaded into a program, makes its monotonic clock one of its own processor time, divided by CPU_CLOCK_THREADS (1), so
- * that predictions of remaining time can be judged on a machine that others use at the same time. */
+/* Preloaded into a program, makes its monotonic clock one of its own processor time, divided by CPU_CLOCK_THREADS (1),
+ * so that predictions of remaining time can be judged on a machine that others use at the same time. */
 #define _GNU_SOURCE
 #include <stdlib.h>
 #include <sys/syscall.h>

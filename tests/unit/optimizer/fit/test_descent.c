@@ -145,7 +145,7 @@ static double run_to_an_early_end(bool misfit, double usual_path, struct course 
     return (double)r.n_path;
 }
 
-/* A fit that ends long before its budget knows so after half of its paths; told what such fits take, from a tenth on. */
+/* A fit that ends long before its budget knows so after half of its paths; told what such fits take, after a tenth. */
 static void test_the_fraction_of_an_early_end(void **state)
 {
     (void)state;
