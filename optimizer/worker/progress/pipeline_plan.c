@@ -33,8 +33,8 @@ static const double usual_budget = 6e6, fit_share = 1.0 - PIPELINE_SCAN_ERROR_SH
  * certificate, geometry, pages. */
 static const double validated_path = 0.88, rest_of_report_paths = 1.5e5;
 static const double report_s_per_voxel = 2e-7, least_s = 0.05;
-/* Standard deviations of the logarithm of a time where no job has been run; of filters, because their cost goes with the
- * size of the fibers in voxels. */
+/* Standard deviations of the logarithm of a time where no job has been run; a large one of filters, because their cost
+ * goes with the size of the fibers in voxels. */
 static const double sd_of_voxels = 0.4, sd_of_filters = 0.8, sd_of_fit = 0.5, sd_of_rest = 0.5;
 
 /* Voxels of the scan: as read, or by the size of its files, which have one or two bytes a voxel. */
