@@ -23,9 +23,9 @@ static const double read_s_per_voxel = 1e-7, orientation_s_per_voxel = 9e-7, fib
 static const double fit_s_per_path = 9e-6, usual_radiance = 0.13, radiance_power = 0.4;
 /* Share of the voxels that is material, before the volume is known. */
 static const double usual_material = 0.4;
-/* Paths of a fitted row that a fit takes: to a table, of which its misfit ends it (tables of five fabrics took 0.7 to 1.3
- * million for 16 rows), and to photographs, where it ends by their errors, which asks for 120 thousand effective paths
- * of two replicas. Of a fit that searches the numbers of a cloth, the share of the budget. */
+/* Paths of a fitted row that a fit takes: to a table, of which its misfit ends it (tables of five fabrics took 0.7 to
+ * 1.3 million for 16 rows), and to photographs, where it ends by their errors, which asks for 120 thousand effective
+ * paths of two replicas. Of a fit that searches the numbers of a cloth, the share of the budget. */
 static const double misfit_row_paths = 62500.0, noise_row_paths = 264000.0, cloth_share = 0.7;
 /* Of the time of the fit, the share of the fit where a scan's errors are carried on. */
 static const double usual_budget = 6e6, fit_share = 1.0 - PIPELINE_SCAN_ERROR_SHARE;
