@@ -103,7 +103,7 @@ def show_stages(looks):
 def cpu_clock(arguments):
     """Environment in which a program's clock is its processor time."""
     library = os.path.join(ROOT, arguments.build, "cpu_clock.so")
-    source = os.path.join(os.path.dirname(os.path.abspath(__file__)), "cpu_clock.c")
+    source = os.path.join(os.path.dirname(os.path.abspath(__file__)), "clock", "cpu_clock.c")
     subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", library, source], check=True)
     return dict(os.environ, LD_PRELOAD=library, CPU_CLOCK_THREADS=str(arguments.threads))
 

@@ -16,8 +16,8 @@ status result_image_write(const struct pipeline_context *c, const struct image *
                           const char *name, double exposure, bool exr, struct error *err);
 /* Largest edge of the renderings where the job document states none. */
 enum { RESULT_PICTURE_PX = 96 };
-/* Edge of the renderings in pixels: that of the job document, or fewer than RESULT_PICTURE_PX where the best model's fit
- * has taken only n_fit_path. */
+/* Edge of the renderings in pixels: that of the job document, or fewer than RESULT_PICTURE_PX where the best model's
+ * fit has taken only n_fit_path. */
 size_t result_picture_px(const struct pipeline_context *c, double n_fit_path);
 /* Samples a pixel of the renderings: those of the job document, or as many as the cost of the best model's fit allows,
  * which has taken n_fit_path. */
