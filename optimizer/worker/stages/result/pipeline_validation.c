@@ -13,10 +13,10 @@
 
 enum { VALIDATION_PILOT = 8192, VALIDATION_LEAST = 1024, VALIDATION_BLOCK = 256, VALIDATION_MAX = 1 << 20 };
 
-/* Standard error of a validated mean relative to the row's brightness: this share of the relative error that the fit has
- * left, to which it adds less than 1 %, between these bounds. And the paths that may be spent on all rows for that: a
- * share of the fit's, which together with the pictures (result_pictures.h) stays below the fit, but enough for a fair
- * judgement where the fit needed few. */
+/* Standard error of a validated mean relative to the row's brightness: this share of the relative error that the fit
+ * has left, to which it adds less than 1 %, between these bounds. And the paths that may be spent on all rows for
+ * that: a share of the fit's, which together with the pictures (result_pictures.h) stays below the fit, but enough for
+ * a fair judgement where the fit needed few. */
 static const double least_rel_se = 0.005, most_rel_se = 0.01, misfit_share = 0.1, validation_share = 0.4,
                     validation_least_paths = 3e5;
 
