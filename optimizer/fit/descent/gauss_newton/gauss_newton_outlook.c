@@ -10,8 +10,8 @@
 
 static const double decrease_of_step = 5.0, arrived_share = 0.02;
 static const double steps_with_pull = 3.0, steps_without = 2.0;
-/* The first steps go far, and what they say of the noise at the end and of misfit is of other parameters. The prediction
- * passes from what such fits usually take to the fit's own over this many steps. */
+/* The first steps go far, and what they say of the noise at the end and of misfit is of other parameters. The
+ * prediction passes from what such fits usually take to the fit's own over this many steps. */
 static const double own_steps = 12.0;
 
 /* Iterations until a fit that heads for misfit has arrived. */
