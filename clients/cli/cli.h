@@ -64,6 +64,11 @@ status cli_results_of(struct cli *cli, const char *id, const char *folder, struc
 status cli_results_to_out(struct cli *cli, const char *id, struct error *err);
 /* Follows job `id` until it ends, and prints the fitted parameters. */
 status cli_watch_job(struct cli *cli, const char *id, int *exit_code, struct error *err);
+/* The id of the one job whose id begins with text, which has four characters or more; what cannot be the beginning of
+ * an id is copied. STATUS_NOT_FOUND, STATUS_INVALID (several jobs). */
+status cli_whole_id(struct cli *cli, const char *text, char id[CLI_ID_BYTES], struct error *err);
+/* Prints for programs: the server's numbers to the last digit. */
+void cli_print_json(const json_t *value, FILE *out);
 /* Writes "/v1/jobs/ID" + tail to path. STATUS_INVALID when the id has characters that no id has. */
 /* Adds members "result" and "parameters" to a job as the server gives it: its result by "result_url", or null. */
 status cli_add_result(struct cli *cli, json_t *job, struct error *err);

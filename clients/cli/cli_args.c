@@ -1,4 +1,5 @@
 #include "clients/cli/cli_args.h"
+#include "clients/cli/cli_text.h"
 #include "clients/cli/tools/cli_tool.h"
 
 #include <getopt.h>
@@ -34,7 +35,8 @@ enum {
     OPT_MAX_AGE = 16777216,
     OPT_MAX_BYTES = 33554432,
     OPT_YES = 67108864,
-    OPT_PICTURE = 134217728 /* each of several */
+    OPT_PICTURE = 134217728, /* each of several */
+    OPT_FILTER = 268435456   /* each of several */
 };
 #define OPT_EVERYWHERE (OPT_SERVER | OPT_TOKEN | OPT_HELP)
 
@@ -72,7 +74,7 @@ static const struct cli_command {
          "A live progress line in a terminal, one line per change otherwise. Exit status 0 when the job succeeded,\n"
          "1 when it failed, 3 when it was cancelled.\n",
          0},
-    [CLI_LIST] = {"list", NULL, "list the jobs, newest first", "", OPT_JSON},
+    [CLI_LIST] = {"list", NULL, "list the jobs, newest first", "", OPT_JSON | OPT_FILTER},
     [CLI_CANCEL] = {"cancel", "ID", "stop a job; its results so far are kept", "", 0},
     [CLI_RETRY] = {"retry", "ID", "start a failed or cancelled job again from its last checkpoint", "", 0},
     [CLI_RESULTS] =
@@ -162,6 +164,13 @@ static const struct cli_option {
      offsetof(struct cli_args, quiet_s)},
     {OPT_ONCE, 0, "once", NULL, "end when all samples that are there have ended; status 1 if one failed",
      offsetof(struct cli_args, once)},
+    {OPT_FILTER, 0, "state", "STATES", "only jobs in these states, such as queued,running",
+     offsetof(struct cli_args, state)},
+    {OPT_FILTER, 0, "verdict", "CODES", "only with a verdict: good, usable, does_not_describe_this_cloth, none",
+     offsetof(struct cli_args, verdict)},
+    {OPT_FILTER, 0, "tag", "TAG", "only with this tag", offsetof(struct cli_args, tag)},
+    {OPT_FILTER, 0, "sample", "TEXT", "only samples whose name contains this", offsetof(struct cli_args, sample)},
+    {OPT_FILTER, 0, "days", "N", "only jobs of the last N days", offsetof(struct cli_args, days)},
     {OPT_JSON, 0, "json", NULL, "print JSON", offsetof(struct cli_args, json)},
     {OPT_OUT, 'o', "out", "DIR", "folder for the files (default: selvedge-ID)", offsetof(struct cli_args, out_dir)},
     {OPT_FOLLOW, 'f', "follow", NULL, "keep printing until the job ends", offsetof(struct cli_args, follow)},
@@ -185,36 +194,21 @@ static const struct cli_option {
 };
 enum { N_OPTION = sizeof option_table / sizeof option_table[0], OPTION_CODE = 256 };
 
+bool cli_operand_is_id(enum cli_command_id id)
+{
+    return command_table[id].operand != NULL && command_table[id].needs == NULL;
+}
+
 const char *cli_command_name(enum cli_command_id id)
 {
     return (unsigned)id < CLI_N_COMMAND ? command_table[id].name : "?";
-}
-
-/* Edit distance of two short words, for "did you mean". */
-static size_t distance(const char *a, const char *b)
-{
-    size_t row[32], n_b = strlen(b);
-    if (n_b >= 32 || strlen(a) >= 32) return 99;
-    for (size_t j = 0; j <= n_b; j++) row[j] = j;
-    for (size_t i = 1; a[i - 1] != '\0'; i++) {
-        size_t diagonal = row[0];
-        row[0] = i;
-        for (size_t j = 1; j <= n_b; j++) {
-            size_t best = diagonal + (a[i - 1] != b[j - 1]);
-            diagonal = row[j];
-            if (row[j] + 1 < best) best = row[j] + 1;
-            if (row[j - 1] + 1 < best) best = row[j - 1] + 1;
-            row[j] = best;
-        }
-    }
-    return row[n_b];
 }
 
 static status find_command(const char *word, enum cli_command_id *id, struct error *err)
 {
     size_t best = 99;
     for (int i = 0; i < CLI_N_COMMAND; i++) {
-        size_t d = distance(word, command_table[i].name);
+        size_t d = text_distance(word, command_table[i].name);
         if (d < best) best = d, *id = (enum cli_command_id)i;
     }
     if (best == 0) return STATUS_OK;
@@ -278,6 +272,10 @@ static status take_option(struct cli_args *a, int code, const char *word, int *g
 /* The first word is the command, the second its operand. */
 static status take_word(struct cli_args *a, const char *word, struct error *err)
 {
+    if (!a->has_command && !a->help && strcmp(word, "help") == 0) {
+        a->help = true;
+        return STATUS_OK;
+    }
     if (!a->has_command) {
         status s = find_command(word, &a->command, err);
         a->has_command = s == STATUS_OK;
@@ -395,6 +393,6 @@ void cli_help(const struct cli_args *args, char *text, size_t n_bytes)
     put(text, n_bytes, &at, "%s\noptions of every command:\n", cli_tool_help());
     put_options(OPT_EVERYWHERE | OPT_VERSION, text, n_bytes, &at);
     put(text, n_bytes, &at,
-        "\n`selvedge COMMAND --help` describes a command. docs/sample-preparation.md describes the job document.\n"
+        "\n`selvedge help COMMAND` describes a command. docs/sample-preparation.md describes the job document.\n"
         "Exit status: 0 done, 1 error or failed job, 2 wrong command line, 3 cancelled job, 130 interrupted.\n");
 }

@@ -54,6 +54,7 @@ struct cli_args {
         *black_sheet, *twin;
     const char *scope, *owner, *requests, *bytes, *jobs; /* of a token to be made */
     const char *max_age, *max_bytes;                     /* of retention */
+    const char *state, *verdict, *tag, *sample, *days;   /* of list */
     bool watch, json, follow, draft, align, once, yes;
     bool help; /* --help was given: for one command if has_command is set */
     bool version;
@@ -70,6 +71,8 @@ struct cli_environment {
 status cli_args_parse(int argc, char *const *argv, const struct cli_environment *env, struct cli_args *args,
                       struct error *err);
 
+/* Whether the operand of the command is the id of a job. */
+bool cli_operand_is_id(enum cli_command_id id);
 const char *cli_command_name(enum cli_command_id id);
 /* Writes the help text of one command, or of the program if has_command is false: at most n_bytes, NUL-terminated. */
 void cli_help(const struct cli_args *args, char *text, size_t n_bytes);

@@ -313,7 +313,9 @@ status http_json(struct http *http, const char *method, const char *path, const 
         s = http_call(http, method, path, header, text, text == NULL ? 0 : strlen(text), &reply, err);
         if (s == STATUS_OK && busy(&reply))
             http_sleep(http, reply.retry_after_s < 30.0 ? reply.retry_after_s : 30.0);
-        else if (s != STATUS_OK && reply.cut_off && !reply.refused && repeatable)
+        else if (s != STATUS_OK && reply.refused) /* a daemon may be starting; nothing was sent */
+            http_sleep(http, 0.5);
+        else if (s != STATUS_OK && reply.cut_off && repeatable)
             http_sleep(http, 0.5 * (i_try + 1));
         else
             break;

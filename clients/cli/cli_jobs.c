@@ -25,7 +25,7 @@ static status job_call(struct cli *cli, const char *method, const char *tail, js
     return s != STATUS_OK ? s : http_json(cli->http, method, path, NULL, NULL, job, err);
 }
 
-static void print_json(const json_t *value, FILE *out)
+void cli_print_json(const json_t *value, FILE *out)
 {
     /* for programs: the server's numbers to the last digit */
     json_dumpf(value, out, JSON_INDENT(2) | JSON_REAL_PRECISION(17));
@@ -50,64 +50,52 @@ status cli_status(struct cli *cli, int *exit_code, struct error *err)
     json_t *job = NULL;
     status s = job_call(cli, "GET", "", &job, err);
     if (s == STATUS_OK) s = cli_add_result(cli, job, err);
-    if (s == STATUS_OK && cli->args->json) print_json(job, cli->out);
+    if (s == STATUS_OK && cli->args->json) cli_print_json(job, cli->out);
     if (s == STATUS_OK && !cli->args->json) report_job(job, cli->out);
     json_decref(job);
     return s;
 }
 
-status cli_list(struct cli *cli, int *exit_code, struct error *err)
+/* What a cancel or retry will have done, by the state before it; NULL: nothing. */
+static const char *effect_of(bool cancel, const char *before)
 {
-    (void)exit_code;
-    char path[400] = "/v1/jobs?limit=100";
-    size_t n_job = 0;
-    json_t *all = json_array();
-    status s;
-    for (;;) { /* one page of the list at a time */
-        json_t *page = NULL, *job;
-        size_t i;
-        if ((s = http_json(cli->http, "GET", path, NULL, NULL, &page, err)) != STATUS_OK) break;
-        json_array_foreach(json_object_get(page, "jobs"), i, job)
-        {
-            if (cli->args->json) json_array_append(all, job);
-            if (!cli->args->json && n_job == 0)
-                fprintf(cli->out, "%-36s  %-10s %6s %8s  %s\n", "id", "state", "done", "ETA", "sample");
-            if (!cli->args->json) report_summary(job, cli->out);
-            n_job++;
-        }
-        const char *cursor = json_string_value(json_object_get(page, "next_cursor"));
-        if (cursor != NULL) snprintf(path, sizeof path, "/v1/jobs?limit=100&cursor=%s", cursor);
-        bool more = cursor != NULL && json_array_size(json_object_get(page, "jobs")) > 0;
-        json_decref(page);
-        if (!more) break;
-    }
-    if (s == STATUS_OK && cli->args->json) print_json(all, cli->out);
-    if (s == STATUS_OK && !cli->args->json && n_job == 0)
-        fprintf(cli->note, "no jobs; `selvedge submit JOB.json` makes one\n");
-    json_decref(all);
-    return s;
+    bool running = strcmp(before, "running") == 0;
+    bool waits = strcmp(before, "queued") == 0 || strcmp(before, "paused") == 0;
+    if (!cancel) return running || waits ? NULL : "continues from its last checkpoint";
+    if (running) return "cancellation requested";
+    return waits || strcmp(before, "draft") == 0 ? "cancelled" : NULL;
 }
 
-static status act(struct cli *cli, const char *tail, const char *done, struct error *err)
+static status act(struct cli *cli, bool cancel, struct error *err)
 {
-    json_t *job = NULL;
-    status s = job_call(cli, "POST", tail, &job, err);
-    const char *state = json_string_value(json_object_get(job, "state"));
-    if (s == STATUS_OK) fprintf(cli->out, "%s: %s (now %s)\n", cli->args->operand, done, state == NULL ? "?" : state);
+    json_t *job = NULL, *was = NULL;
+    status s = job_call(cli, "GET", "", &was, err);
+    if (s == STATUS_OK) s = job_call(cli, "POST", cancel ? "/cancel" : "/retry", &job, err);
+    if (s == STATUS_OK) {
+        struct job_view before, now;
+        report_view(was, &before);
+        report_view(job, &now);
+        const char *effect = effect_of(cancel, before.state);
+        if (effect != NULL)
+            fprintf(cli->out, "%s: %s (now %s)\n", cli->args->operand, effect, now.state);
+        else
+            fprintf(cli->out, "%s: nothing to do, it is already %s\n", cli->args->operand, now.state);
+    }
     json_decref(job);
+    json_decref(was);
     return s;
 }
 
 status cli_cancel(struct cli *cli, int *exit_code, struct error *err)
 {
     (void)exit_code;
-    return act(cli, "/cancel", "cancellation requested", err);
+    return act(cli, true, err);
 }
 
 status cli_retry(struct cli *cli, int *exit_code, struct error *err)
 {
     (void)exit_code;
-    return act(cli, "/retry", "continues from its last checkpoint", err);
+    return act(cli, false, err);
 }
 
 status cli_delete(struct cli *cli, int *exit_code, struct error *err)
@@ -221,7 +209,7 @@ status cli_series(struct cli *cli, int *exit_code, struct error *err)
         json_decref(page);
         if (!more) break;
     }
-    if (s == STATUS_OK && cli->args->json) print_json(all, cli->out);
+    if (s == STATUS_OK && cli->args->json) cli_print_json(all, cli->out);
     if (s == STATUS_OK && !cli->args->json && first) fprintf(cli->note, "the fit has not started\n");
     json_decref(all);
     return s;

@@ -6,6 +6,7 @@
 
 #include <curl/curl.h>
 #include <locale.h>
+#include <poll.h>
 #include <signal.h>
 #include <sodium.h>
 #include <stdlib.h>
@@ -53,8 +54,17 @@ static void print_error(const struct error *err)
         fprintf(stderr, "error: %s\n", text);
 }
 
-static int execute(const struct cli_args *args)
+/* Whether the program behind a pipe, such as `head`, has read enough and ended. */
+static bool reader_is_gone(void)
 {
+    struct pollfd out = {.fd = STDOUT_FILENO, .events = POLLOUT};
+    return poll(&out, 1, 0) == 1 && (out.revents & POLLERR) != 0;
+}
+
+static int execute(const struct cli_args *given)
+{
+    struct cli_args whole = *given, *args = &whole;
+    char id[CLI_ID_BYTES];
     struct error err = {0};
     int exit_code = CLI_EXIT_OK;
     struct cli cli = {.args = args, .out = stdout, .note = stderr, .note_is_terminal = isatty(STDERR_FILENO) == 1};
@@ -63,8 +73,13 @@ static int execute(const struct cli_args *args)
     if (s == STATUS_OK) s = http_new(args->server, token != NULL ? token : args->token, &interrupted, &cli.http, &err);
     if (token != NULL) sodium_memzero(token, strlen(token));
     free(token);
+    if (s == STATUS_OK && cli_operand_is_id(args->command) && args->operand != NULL) {
+        s = cli_whole_id(&cli, args->operand, id, &err);
+        args->operand = id;
+    }
     if (s == STATUS_OK) s = run[args->command](&cli, &exit_code, &err);
     http_free(cli.http);
+    if ((fflush(stdout) != 0 || ferror(stdout)) && reader_is_gone()) return s == STATUS_OK ? exit_code : CLI_EXIT_ERROR;
     if (s == STATUS_OK && (fflush(stdout) != 0 || ferror(stdout)))
         s = error_set(&err, STATUS_IO, "cannot write to standard output");
     if (s == STATUS_OK) return exit_code;

@@ -14,6 +14,9 @@ export class CurveChart {
     this.labels = labels;
     this.colours = colours;
     this.options = { log, digits };
+    this.hidden = document.createElement("p");
+    this.hidden.className = "hint not-shown";
+    node.after(this.hidden);
     this.graph = null;
     this.n = 0;
     this.dark = matchMedia("(prefers-color-scheme: dark)");
@@ -31,7 +34,8 @@ export class CurveChart {
   }
 
   set(rows) {
-    const usable = rows.filter((r) => r.slice(1).some((v) => v !== null));
+    const usable = rows.filter((r) => r.slice(1).some((v) => v !== null)), left = rows.length - usable.length;
+    this.hidden.textContent = left === 0 ? "" : `${left} of ${rows.length} steps are not shown: ${this.options.log ? "no number above 0, which a log axis needs" : "no number"}`;
     if (usable.length === 0) return;
     const last = usable[usable.length - 1].slice(1).map((v) => (v === null ? null : v[1]));
     this.last = last;

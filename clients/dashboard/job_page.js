@@ -3,7 +3,7 @@ import { gallery, radiusPlot, scatterPlot } from "./comparison.js";
 import { fiberView } from "./fiber_view.js";
 import { fitDetails } from "./fit_details.js";
 import { JobCharts } from "./job_charts.js";
-import { LogTail } from "./log_tail.js";
+import { LogTail, WholeLog } from "./log_tail.js";
 import { duration, el, isNumber, percent, percentWithError, refill, size, stateTag, timeLeft, verdictTag, when, withError } from "./page_parts.js";
 import { qualityCard } from "./quality_card.js";
 import { channelErrors, choiceOf, configurations, fiberFile, fitted, models, radiusSearch, residuals, sliceFiles } from "./result_view.js";
@@ -110,11 +110,16 @@ export function jobPage(page, id) {
   const head = el("div", { class: "head" }), stages = el("div", { class: "stages" }), facts = el("div", { class: "facts" }), verdict = el("div"), notes = el("div");
   const fitCard = el("div"), curveCard = el("div"), surfaces = el("div"), results = el("div", { id: "results" }), logNode = el("pre", { class: "log" });
   const charts = new JobCharts(fitCard, curveCard), log = new LogTail(logNode), pictures = new SurfacePictures(surfaces, id);
-  const logLink = el("a", { href: `/v1/jobs/${id}/log`, target: "_blank" }, "whole log");
+  const wholeLog = el("details", { id: "whole-log", ontoggle: () => {
+    if (!wholeLog.open || wholeLog.childElementCount > 1) return;
+    const whole = new WholeLog(id);
+    wholeLog.append(whole.node);
+    whole.show(0);
+  } }, el("summary", {}, "Whole log"));
   const curves = el("div", { class: "columns" }, card("Fit", fitCard), card("Parameters over the steps", curveCard));
   page.append(el("section", { class: "card", id: "state" }, head, stages, verdict, facts, notes),
     curves, surfaces, results,
-    el("section", { class: "card" }, el("h2", {}, "Log ", el("small", {}, "its last lines; ", logLink)), logNode));
+    el("section", { class: "card" }, el("h2", {}, "Log ", el("small", {}, "its last lines")), logNode, wholeLog));
   let about = null, generation = null, closeFibers = null, closeTwin = null, gone = false;
 
   const act = (verb) => async (event) => {
@@ -162,9 +167,21 @@ export function jobPage(page, id) {
       card("Downloads", downloads(job, list)));
   };
 
+  // A job that does not exist, or no longer: the page says so instead of staying empty.
+  const missing = (error) => {
+    gone = true;
+    poller.stop();
+    document.title = "No such job – Selvedge";
+    page.replaceChildren(el("section", { class: "card", id: "no-job" }, el("h1", {}, "There is no such job"), el("p", {}, error.message),
+      el("p", {}, "It was deleted, belongs to somebody else, or the address is mistyped. ", el("a", { href: "#" }, "All jobs"))));
+  };
+
   const poller = poll(async () => {
     about ??= await getJson("/v1/about");
-    const job = { ...await getJson(`/v1/jobs/${id}`) };
+    const job = await getJson(`/v1/jobs/${id}`).then((known) => ({ ...known })).catch((error) => {
+      if (error.status === 404) missing(error);
+      throw error;
+    });
     job.result = job.result_url ? await getJson(job.result_url) : null; // answered with 304 while it is the same
     job.parameters = job.result?.parameters ?? null;
     if (gone) return 5;

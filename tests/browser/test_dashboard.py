@@ -192,7 +192,12 @@ def test_failed_job_and_hostile_name(stub, browser):
 
 def test_unknown_job(stub, browser):
     browser.get(f"{stub[0]}/#00000000-0000-0000-0000-000000000000")
-    wait_for(browser, "document.getElementById('connection').textContent.includes('does not exist')")
+    wait_for(browser, "document.querySelector('#no-job')?.textContent.includes('does not exist')")
+    keep(browser, "no-such-job")
+    asked = "return performance.getEntriesByType('resource').filter((e) => e.name.includes('/v1/jobs/')).length"
+    before = browser.execute_script(asked)
+    time.sleep(3)
+    assert browser.execute_script(asked) == before  # nobody asks again
 
 
 def test_long_log_does_not_freeze(stub, browser):
@@ -210,6 +215,20 @@ def test_long_log_does_not_freeze(stub, browser):
         f.write("2026-01-01T00:00:00.000Z INFO the end\n")
     wait_for(browser, "document.querySelector('pre.log').textContent.endsWith('the end')", 30)
     assert browser.execute_script("return document.querySelector('pre.log').textContent.split('\\n').length") <= 1000
+    # the whole log by ranges
+    assert os.path.getsize(log[0]) > 11 << 20
+    browser.execute_script("document.querySelector('#whole-log').open = true")
+    wait_for(browser, "document.querySelector('#whole-log pre')?.textContent.includes('line 10 ')")
+    press = {b.text: b for b in browser.find_elements(By.CSS_SELECTOR, "#whole-log button")}
+    browser.execute_script("arguments[0].click()", press["Later"])
+    wait_for(browser, "document.querySelector('#whole-log .hint').textContent.startsWith('bytes 262144 to 524288')")
+    browser.execute_script("arguments[0].click()", press["Last"])
+    wait_for(browser, "document.querySelector('#whole-log pre').textContent.endsWith('the end\\n')")
+    assert not press["Later"].is_enabled() and press["Earlier"].is_enabled()
+    browser.execute_script("""
+        URL.createObjectURL = (blob) => { window.saved = blob.size; return '#'; };
+        arguments[0].click();""", press["Save the whole log"])
+    wait_for(browser, f"window.saved === {os.path.getsize(log[0])}")
     # the page replies at once
     longest = browser.execute_async_script("""
         const done = arguments[0], start = performance.now(); let last = start, longest = 0;

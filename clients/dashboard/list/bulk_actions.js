@@ -22,9 +22,10 @@ export function bulkActions(picked, { clear, done }) {
     const jobs = [...picked.keys()], results = [];
     try {
       for (let i = 0; i < jobs.length; i += 500) results.push(...(await sendJson("POST", "/v1/actions", { action, jobs: jobs.slice(i, i + 500), ...more })).results);
-      said.textContent = outcomeOf(action, results);
       if (action === "delete") clear();
+      said.textContent = outcomeOf(action, results);
     } catch (error) { said.textContent = error.message; }
+    show();
     done();
   };
   const withTag = (key) => () => { if (tag.value.trim()) send("tag", { [key]: tag.value.trim().split(/[\s,]+/) }); };
