@@ -15,8 +15,9 @@
 static const double THINNER = 0.72;
 static const float PAD = 0.3f; /* voxels added to subtracted radii, so that no rims are left */
 /* Spread of the radii, and material that is left over all material, below which there is nothing to look for: fibers
- * that are alike are all found at first, and only rims of them are left (spread up to 0.04, material up to 0.05). */
-static const double LEAST_SPREAD = 0.1, LEAST_LEFT = 0.03;
+ * that are alike are all found at first, and only rims of them are left (spread up to 0.04, material up to 0.05). Radii
+ * that spread by more than those of yarns do (0.1 to 0.25) are those of lines that the scan does not resolve. */
+static const double LEAST_SPREAD = 0.1, MOST_SPREAD = 0.3, LEAST_LEFT = 0.03;
 static const double LEAST_DIAMETERS = 1.5; /* length of the lines that are added */
 
 /* Lowers the density around vertex x to what a fiber of this radius leaves. width: of its blurred edge. */
@@ -112,7 +113,8 @@ status trace_leftover(struct trace_job *job, struct polyline_set *lines, struct 
     struct volume left = {0};
     const size_t n_before = lines->n_line;
     double share = 0.0;
-    if (!(job->report->radius_spread >= LEAST_SPREAD)) return STATUS_OK;
+    const double spread = job->report->radius_spread;
+    if (!(spread >= LEAST_SPREAD && spread <= MOST_SPREAD)) return STATUS_OK;
     status s = subtract_lines(job, lines, &left, &share, err);
     if (s == STATUS_OK && share >= LEAST_LEFT) s = add_lines(job, &left, lines, err);
     volume_release(&left);
