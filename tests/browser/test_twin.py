@@ -22,19 +22,19 @@ def pixels(browser, **change):
     return [[flat[4 * (EDGE * y + x):4 * (EDGE * y + x) + 3] for x in range(EDGE)] for y in range(EDGE)]
 
 
-def check_drawing(browser):
+def check_drawing(browser, lamp_theta=40):
     """From above, phi 0: to the right is +y, upwards is -x; stripes run along y."""
-    seen = pixels(browser)
+    seen = pixels(browser, lampTheta=lamp_theta)
     for x, y in ((5, 5), (-5, 5), (5, -9), (-15, 3)):
         column, row = int(EDGE * (0.5 + y / 32)), int(EDGE * (0.5 + x / 32))
-        want = synthetic_twin.expected(32 * ((row + 0.5) / EDGE - 0.5), 32 * ((column + 0.5) / EDGE - 0.5), 0, 0, 40, 30, 1.5)
+        want = synthetic_twin.expected(32 * ((row + 0.5) / EDGE - 0.5), 32 * ((column + 0.5) / EDGE - 0.5), 0, 0, lamp_theta, 30, 1.5)
         assert all(abs(a - b) <= 3 for a, b in zip(seen[row][column], want)), (x, y, seen[row][column], want)
 
 
 @pytest.fixture
-def opened(stub, browser):
+def opened(stub, browser, request):
     url, folder = stub
-    job = submit(url, folder, f"twin {len(list(folder.iterdir()))}")[0]
+    job = submit(url, folder, f"twin {getattr(request, 'param', 'above')} {len(list(folder.iterdir()))}")[0]
     browser.get(f"{url}/#{job.id}")
     wait_for(browser, "document.querySelector('#twin-open')", 60)
     return browser
@@ -60,6 +60,15 @@ def test_the_twin_is_drawn_as_its_tables_say(opened):
     ActionChains(opened).key_down(Keys.SHIFT).move_to_element(canvas).click_and_hold().move_by_offset(0, 60).release().key_up(Keys.SHIFT).perform()
     assert float(opened.execute_script(value)) > float(lamp) + 10
     keep(opened, "twin")
+    assert complaints(opened) == []
+
+
+@pytest.mark.parametrize("opened", ["both"], indirect=True)
+def test_light_comes_through_a_cloth_without_sheet(opened):
+    press(opened, "twin-open")
+    wait_for(opened, "document.querySelector('canvas.twin-view')?.twin")
+    check_drawing(opened)
+    check_drawing(opened, 140)
     assert complaints(opened) == []
 
 

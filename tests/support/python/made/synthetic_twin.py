@@ -1,11 +1,12 @@
 """Tables of a twin (optimizer/worker/report/twin/twin_result.h) whose drawing is known in closed form: two stripes along
-x, every 10 mm, one three times as bright as the other, without change by direction but for the factor of a layer."""
+x, every 10 mm, one three times as bright as the other, without change by direction but for the factor of a layer. "both" in the
+sample's name: tables of both sides, where light from the other side is half as bright."""
 import json
 import math
 import os
 import struct
 
-TILE_MM, MEAN, CONTRAST = 20.0, (0.8, 0.5, 0.3), 0.5
+TILE_MM, MEAN, CONTRAST, THROUGH = 20.0, (0.8, 0.5, 0.3), 0.5, 0.5
 LAMP_MM, CAMERA_MM = 610.0, 1000.0
 
 
@@ -16,10 +17,13 @@ def halves(values):
 def write(folder, sample):
     texture = halves([x for i in range(4) for x in (1, 1 if i % 2 == 0 else -1, 0, 0)])  # 2 x 2 texels
     view, light = 2, 3
-    table = halves([x for c in range(3) for _ in range(view * light * view * light) for x in (MEAN[c], CONTRAST * MEAN[c], 0, 0)])
+    sides = 2 if "both" in sample else 1
+    through = [[1 if view_side == light_side else THROUGH for _ in range(view) for light_side in range(sides) for _ in range(light)]
+               for view_side in range(sides) for _ in range(view * light)]
+    table = halves([x for c in range(3) for row in through for t in row for x in (t * MEAN[c], t * CONTRAST * MEAN[c], 0, 0)])
     drape = struct.pack("<27H", *[x for j in range(3) for i in range(3) for x in (32767 * i, 32767 * j, 0)])
     parts = {"textures": {"n": 4, "width": 2, "height": 2, "offset": 0},
-             "table": {"view_edge": view, "light_edge": light, "sides": 1, "offset": len(texture)},
+             "table": {"view_edge": view, "light_edge": light, "sides": sides, "offset": len(texture)},
              "drape": {"points": 3, "size_mm": 40.0, "radius_mm": 10.0, "low": [-20, -20, 0], "high": [20, 20, 1], "offset": len(texture) + len(table)}}
     data = texture + table + drape
     os.makedirs(os.path.join(folder, "twin"), exist_ok=True)
@@ -42,7 +46,8 @@ def expected(x, y, theta, phi, lamp_theta, lamp_phi, exposure):
     to_lamp = [LAMP_MM * d - p for d, p in zip(lamp, (x, y, 0))]
     to_eye = [CAMERA_MM * d - p for d, p in zip(direction(theta, phi), (x, y, 0))]
     far = math.hypot(*to_lamp)
-    cos_i, cos_o = to_lamp[2] / far, to_eye[2] / math.hypot(*to_eye)
+    cos_i, cos_o = abs(to_lamp[2]) / far, to_eye[2] / math.hypot(*to_eye)
     faces = sum(a * b for a, b in zip(lamp, to_lamp)) / far
-    light = exposure * faces * (LAMP_MM / far) ** 2 * cos_i / (cos_i + cos_o) * (1 + (CONTRAST if x % TILE_MM < TILE_MM / 2 else -CONTRAST))
+    stripe = 1 + (CONTRAST if x % TILE_MM < TILE_MM / 2 else -CONTRAST)
+    light = exposure * (1 if to_lamp[2] > 0 else THROUGH) * faces * (LAMP_MM / far) ** 2 * cos_i / (cos_i + cos_o) * stripe
     return [round(255 * min(1.0, 1.055 * v ** (1 / 2.4) - 0.055 if v > 0.0031308 else 12.92 * v)) for v in (light * m for m in MEAN)]
