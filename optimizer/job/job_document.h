@@ -72,6 +72,10 @@ struct job_candidate {
     double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
 };
 
+/* How a picture is rendered: path by path, by the tables of renderer/fast, or by tables with some whole paths, whose
+ * expectation is that of path tracing. */
+enum job_picture_method { JOB_PICTURE_PATH, JOB_PICTURE_FAST, JOB_PICTURE_CORRECTED };
+
 enum job_surface { JOB_ON_FLAT, JOB_ON_CYLINDER, JOB_ON_DRAPE, JOB_ON_MESH };
 
 /* A picture of the fitted cloth laid on a surface. */
@@ -85,6 +89,7 @@ struct job_surface_picture {
     double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
     double width_mm; /* what the picture shows */
     size_t px, sample;
+    enum job_picture_method method;
 };
 
 /* What a kind of yarn in the document counts or names; 0 fibers: not given. */

@@ -1,5 +1,6 @@
 #include "renderer/transport/radiance_source.h"
 
+#include "renderer/fast/fast_radiance.h"
 #include "renderer/transport/surface/surface_radiance.h"
 #include "renderer/transport/volume/volume_radiance.h"
 
@@ -20,7 +21,9 @@ status radiance_source_init(struct radiance_source *s, const struct radiance_inp
     memset(s, 0, sizeof *s);
     status st = check_scene(&in->scene, in->model, err);
     if (st != STATUS_OK) return st;
-    s->tracer = in->model->kind == MODEL_SURFACE ? &surface_radiance : &volume_radiance;
+    s->tracer = in->model->kind != MODEL_SURFACE ? &volume_radiance
+                : in->fast != NULL               ? &fast_radiance
+                                                 : &surface_radiance;
     s->model = in->model;
     s->n_set = in->n_set > 1 ? in->n_set : 1;
     s->n_flat = in->want_derivative ? s->n_set * in->model->n_param : 0;

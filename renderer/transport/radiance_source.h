@@ -1,6 +1,7 @@
 /* One cloth with one model of appearance at given parameter values, ready to be traced: what estimates, pictures and
- * the derivative check are made from. Two implementations stand behind one table of functions: fibers with a scattering
- * model (surface/surface_radiance.c) and a density volume with a phase function (volume/volume_radiance.c).
+ * the derivative check are made from. Three implementations stand behind one table of functions: fibers with a
+ * scattering model (surface/surface_radiance.c), the same by tables (renderer/fast/fast_radiance.c), and a density
+ * volume with a phase function (volume/volume_radiance.c).
  *
  * Derivatives are numbered flat: the parameters of set 0, then of set 1, ...; those of channel c start at c * n_flat.
  * A source is immutable after radiance_source_init: threads share it. It copies nothing of its input.
@@ -17,6 +18,8 @@
 
 enum { RADIANCE_BLOCK_PATHS = 256, RADIANCE_NAME_BYTES = 56 };
 
+struct fast_option; /* renderer/fast/fast_option.h */
+
 /* One cloth in the forms in which it is at hand. */
 struct appearance_scene {
     const struct scene *fibers;        /* NULL: surface models cannot be traced */
@@ -29,6 +32,8 @@ struct radiance_input {
     const double *param; /* max(n_set, 1) * model->n_param, internal units, one set after the other */
     size_t n_set;        /* parameter sets for the material groups of the fibers; 0 and 1: one set for all fibers */
     bool want_derivative;
+    const struct fast_option *fast; /* NULL: path tracing; otherwise fibers are rendered by tables, without
+                                       derivatives */
     bool plain_paths; /* trace no guided shadow paths (path_tracer.h): same means, more variance; volumes have none */
 };
 

@@ -13,6 +13,11 @@ bench-transport: | deps-test ## the renderer's figures (paths a second, time to 
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %transport,$(BENCH_BINS)) >&2
 	@for b in $(filter %transport,$(BENCH_BINS)); do $$b || exit 1; done
 
+# PICTURES: some of the fabrics only, and options of the program, such as PICTURES="silk --px 256"
+bench-pictures: | deps-test ## the fast renderer against path tracing on three fabrics (half an hour on 2 quiet cores)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/pictures/bench_pictures >&2
+	@$(BUILD)/tests/bench/pictures/bench_pictures $(PICTURES)
+
 # WEAVES, CONDITIONS: comma-separated, such as WEAVES=twill CONDITIONS=spread,hollow; then without time and memory
 bench-geometry: | deps-test ## accuracy of reconstructed fibers on phantoms and real scans; time and memory
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %/bench_geometry %/bench_geometry_size,$(BENCH_BINS)) >&2

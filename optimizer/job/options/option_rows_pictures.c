@@ -4,6 +4,7 @@
 #define OF_PICTURE(member) INTO_OF(struct job_surface_picture, member)
 
 static const char *const surface_names[] = {"flat", "cylinder", "drape", "mesh", NULL};
+static const char *const method_names[] = {"path", "fast", "corrected", NULL};
 
 const struct job_option option_rows_pictures[] = {
     {.path = "pictures",
@@ -92,6 +93,14 @@ const struct job_option option_rows_pictures[] = {
      .unit = "per pixel",
      .standard = "16",
      .meaning = "Samples of a pixel. The result states the noise that they leave."},
+    {.path = "pictures[].method",
+     .kind = OPTION_CHOICE,
+     OF_PICTURE(method),
+     .choice = method_names,
+     .standard = "\"path\"",
+     .meaning =
+         "`path`: every path is traced. `fast`: light that is scattered often comes from tables, with less noise "
+         "and a small error (docs/bent-cloth.md). `corrected`: the same, with whole paths that take the error off."},
     {.path = "twin",
      .kind = OPTION_SECTION,
      .left_out = "none",

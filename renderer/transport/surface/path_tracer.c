@@ -1,48 +1,11 @@
-#include "renderer/transport/surface/path_tracer.h"
+#include "renderer/transport/surface/path_walk.h"
 
 #include "renderer/transport/path_value.h"
-#include "renderer/transport/surface/fiber_frame.h"
 
 #include <math.h>
 #include <string.h>
 
 #define GUIDED_PATH_SCALE 1.5f
-
-static inline void unwrapped(const float local_mm[3], const double offset_mm[2], float out[3])
-{
-    out[0] = (float)((double)local_mm[0] + offset_mm[0]);
-    out[1] = (float)((double)local_mm[1] + offset_mm[1]);
-    out[2] = local_mm[2];
-}
-
-/* Where the path meets a fiber. */
-struct bounce {
-    struct scene_hit hit;
-    double offset_mm[2]; /* of the ray that hit, in whole tiles */
-    struct fiber_frame frame;
-    float wo[3]; /* towards where the path comes from, in the fiber frame */
-};
-
-/* The state that a path carries. */
-struct walk {
-    const struct path_setting *s;
-    struct rng *rng;
-    const struct lamp *lamp;
-    size_t n_lamp;
-    struct path_result *out; /* of the lamp whose light is being added */
-    struct path_result *first_out;
-    size_t n_out;                         /* one result per lamp; one without lamps */
-    struct path_step *step;               /* the step that is being recorded, or NULL */
-    const struct scattering_state *state; /* of the fiber that was hit */
-    size_t i_set;                         /* its parameter set */
-    float throughput[3];
-    float towards[PATH_MAX_LAMP][3]; /* directions from the present bounce to the lamps, which guide its guided paths */
-    float p_guided;                  /* probability of a guided path there */
-    float weight[PATH_MAX_LAMP];     /* multiple-importance weight of lamp connections at the present bounce: the guided
-                                        paths of the bounce before have the rest */
-    float score[3 * SCATTERING_MAX_PARAM]; /* of the present step, [c * n_param + p] */
-    float h[PATH_N_DERIVATIVE];            /* running sums of scores, laid out as the derivatives of path_result */
-};
 
 /* Adds value to the radiance and value * (H + score) to the derivatives. score NULL: the scores of the last step are
  * part of H already. */
@@ -66,6 +29,13 @@ static void add_light_to_all(struct walk *w, const float value[3], const float *
     }
 }
 
+/* Whether the lamp is found by direct connections alone: at the first hit of a path that always ends there. */
+static inline bool connects_all(const struct walk *w)
+{
+    const struct path_setting *s = w->s;
+    return w->last && s->n_traced == 1 && s->share_beyond == 0 && !s->lights.has_constant && s->lights.image == NULL;
+}
+
 static void leave(struct walk *w, const struct bounce *b, const float direction[3], struct scene_ray *ray)
 {
     if (w->s->model->across_width)
@@ -87,9 +57,8 @@ static float connect_lamp(struct walk *w, const struct lamp *lamp, float weight,
     if (scene_sheet_hides(s->scene, direction)) return 0;
     fiber_frame_to_local(&b->frame, direction, wi);
     float pdf = s->model->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
-    float light =
-              weight * lamp->radiance * fiber_frame_cos_theta(wi) / pdf_lamp * lights_power_heuristic(pdf_lamp, pdf),
-          value[3];
+    float heuristic = connects_all(w) ? 1 : lights_power_heuristic(pdf_lamp, pdf), value[3],
+          light = weight * lamp->radiance * fiber_frame_cos_theta(wi) / pdf_lamp * heuristic;
     for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * s_rgb[c] * light;
     float most = path_value_largest(value), survival;
     if (!(most > 0)) {
@@ -269,11 +238,19 @@ static float guided_path_probability(const struct walk *w)
     return p < 1 ? p : 1;
 }
 
+static void guide_to_lamp(struct walk *w, size_t i_lamp, const struct bounce *b)
+{
+    float position[3];
+    unwrapped(b->hit.position_mm, b->offset_mm, position);
+    light_guide_towards(&w->lamp[i_lamp], position, w->towards[i_lamp]);
+    bool sees = !scene_sheet_hides(w->s->scene, w->towards[i_lamp]);
+    if (sees && (w->p_guided >= 1 || rng_float(w->rng) < w->p_guided)) trace_guided_path(w, i_lamp, b);
+}
+
 /* Adds the light of all lamps at a bounce, by a direct connection and by a guided path. */
 static void connect_lamps(struct walk *w, const struct bounce *b)
 {
-    float wi[3], position[3];
-    unwrapped(b->hit.position_mm, b->offset_mm, position);
+    float wi[3];
     if (w->s->guided_paths) w->p_guided = guided_path_probability(w);
     for (size_t k = 0; k < w->n_lamp; k++) {
         w->out = w->first_out + k;
@@ -282,10 +259,7 @@ static void connect_lamps(struct walk *w, const struct bounce *b)
             memcpy(w->step->light_wi, wi, sizeof wi);
             w->step->light = light;
         }
-        if (!w->s->guided_paths) continue;
-        light_guide_towards(&w->lamp[k], position, w->towards[k]);
-        bool sees = !scene_sheet_hides(w->s->scene, w->towards[k]);
-        if (sees && (w->p_guided >= 1 || rng_float(w->rng) < w->p_guided)) trace_guided_path(w, k, b);
+        if (w->s->guided_paths && !w->last) guide_to_lamp(w, k, b);
     }
 }
 
@@ -337,6 +311,7 @@ static void walk_start(struct walk *w, const struct path_setting *s, struct rng 
     w->first_out = w->out = out;
     w->n_out = w->n_lamp > 0 ? w->n_lamp : 1;
     w->step = NULL;
+    w->last = false;
     w->state = s->state[0];
     w->i_set = 0;
     for (int c = 0; c < 3; c++) w->throughput[c] = 1;
@@ -347,6 +322,28 @@ static void walk_start(struct walk *w, const struct path_setting *s, struct rng 
         memset(out[i].jac, 0, n_flat * sizeof *out[i].jac);
         out[i].n_bounce = 0;
     }
+}
+
+/* The last bounce of a setting with n_traced. False: the path ends here. The direct connection has taken all of the
+ * lamp's light only if nothing else could find it; otherwise a ray looks for the rest. */
+static bool go_on_beyond_last(struct walk *w, const struct bounce *b, struct scene_ray *ray)
+{
+    const struct path_setting *s = w->s;
+    float rgb[3] = {0, 0, 0}, value[3], share = s->share_beyond, pdf;
+    s->finish(s->finish_context, &b->hit, ray, w->rng, rgb);
+    bool goes_on = share > 0 && (share >= 1 || rng_float(w->rng) < share);
+    for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * (goes_on ? rgb[c] * (1 - 1 / share) : rgb[c]);
+    add_light_to_all(w, value, NULL);
+    if (goes_on) {
+        for (int c = 0; c < 3; c++) w->throughput[c] /= share;
+        for (size_t k = 0; k < w->n_lamp && s->guided_paths; k++) guide_to_lamp(w, k, b);
+        w->last = false;
+        return true;
+    }
+    struct scene_hit unused;
+    bool rest = share == 0 && !connects_all(w);
+    if (rest && scatter(w, b, ray, &pdf) && !scene_trace(s->scene, ray, &unused)) add_beyond(w, ray, pdf);
+    return false;
 }
 
 /* Traces the walk from bounce to bounce until it leaves the cloth or ends. */
@@ -361,6 +358,7 @@ static void walk_on(struct walk *w, struct scene_ray *ray, struct path_record *r
             add_beyond(w, ray, pdf);
             return;
         }
+        w->last = i + 1 == s->n_traced;
         w->first_out->n_bounce++;
         w->step = next_step(record);
         bounce_at(w, &hit, ray, &b);
@@ -370,6 +368,7 @@ static void walk_on(struct walk *w, struct scene_ray *ray, struct path_record *r
         }
         connect_lamps(w, &b);
         if (s->lights.image != NULL) connect_image(w, &b);
+        if (w->last && !go_on_beyond_last(w, &b, ray)) return;
         if (!scatter(w, &b, ray, &pdf)) return;
     }
 }

@@ -25,6 +25,15 @@ struct path_setting {
     bool guided_paths;                                    /* trace guided shadow paths: less variance, same mean */
     struct light_guide_energy energy[SCATTERING_MAX_SET]; /* by material group: sets how many guided paths there are */
     float roulette_below; /* throughput under which paths are ended at random; 0: never */
+    /* Ends paths at their n_traced-th hit (0: nowhere): what that scatters of light that nothing scattered before is
+     * added as ever, and of the other light what finish knows: rgb, radiance along the ray reversed. A share of the
+     * paths goes on all the same, chosen at random, and adds over the share what it finds instead; with a share above
+     * 0 the expectation is that of whole paths, whatever finish knows. Values only: no derivatives, one lamp. */
+    uint32_t n_traced;
+    float share_beyond;
+    void (*finish)(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,
+                   float rgb[3]);
+    const void *finish_context;
     bool want_jacobian;
 };
 

@@ -293,3 +293,37 @@ def test_what_pictures_without_photographs_need(real, change, field, word):
     doc = {"sample": "s", "fibers": {"file": "a.hair"}, "pictures": [{"on": "flat", **VIEW}], "fit": {"model": "two_lobe.v1"}, **change}
     doc = {k: v for k, v in doc.items() if v is not None}
     assert word in problem(real.post("/v1/jobs", json=doc), 422, "invalid", field)["detail"]
+
+
+def test_methods_show_the_same_cloth(tmp_path):
+    """By tables and corrected the means are those of path tracing, the latter within noise; the tables are kept."""
+    folder = tmp_path / "job"
+    (folder / "input").mkdir(parents=True)
+    view = {"on": "flat", "width_mm": 3, **VIEW, "samples": 64}
+    given = {"sample": "s", "fibers": {"file": "cloth.hair"},
+             "pictures": [{**view, "method": m} for m in ("path", "fast", "corrected")],
+             "fit": {"model": "isotropic.v1", "fixed": {"C": [0.8, 0.5, 0.3]}}}
+    (folder / "job.json").write_text(json.dumps(given))
+    (folder / "input/cloth.hair").write_bytes(hair(layers=3))
+    run_worker(folder)
+    path, fast, corrected = (json.loads((folder / f"results/pictures/on-{i}.json").read_text()) for i in (1, 2, 3))
+    assert [p["method"] for p in (path, fast, corrected)] == ["path", "fast", "corrected"]
+    assert (folder / "work/report/fast.tables").read_bytes().startswith(b"SELVFAST")
+    mean = sum(path["mean"]) / 3
+    assert abs(sum(fast["mean"]) / 3 - mean) < 0.1 * mean
+    se = math.hypot(path["noise"], corrected["noise"]) * mean / 16
+    assert abs(sum(corrected["mean"]) / 3 - mean) < 5 * se
+    assert fast["noise"] < path["noise"]
+
+
+def test_a_sheet_of_its_own_has_no_tables(tmp_path):
+    folder = tmp_path / "job"
+    (folder / "input").mkdir(parents=True)
+    given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "black_sheet": True,
+             "pictures": [{"on": "flat", **VIEW, "method": "fast", "black_sheet": False}],
+             "fit": {"model": "isotropic.v1", "fixed": {"C": [0.8, 0.5, 0.3]}}}
+    (folder / "job.json").write_text(json.dumps(given))
+    (folder / "input/cloth.hair").write_bytes(hair(layers=3))
+    p = subprocess.run([program("selvedge-worker"), "--quiet", str(folder)], capture_output=True, timeout=120)
+    assert p.returncode == 1
+    assert "black sheet of the job" in json.loads((folder / "status.json").read_text())["error"]["text"]

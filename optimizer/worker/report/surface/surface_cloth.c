@@ -111,6 +111,11 @@ static status check_surface(const struct pipeline_context *c, size_t i, const st
     const struct job_surface_picture *p = &d->surface_picture[i];
     const double mm_per_cm = 10.0;
     double at[3];
+    if (p->method != JOB_PICTURE_PATH && p->black_sheet >= 0 && (p->black_sheet != 0) != d->black_sheet)
+        return error_set(
+            err, STATUS_INVALID,
+            "a picture by tables has the black sheet of the job, or none like it: leave out black_sheet of "
+            "the picture, or take the method path");
     point_from(p->camera_theta_deg, p->camera_phi_deg - p->cloth_rotation_deg, mm_per_cm * d->camera_distance_cm, at);
     if (!d->camera_far_field && scene_encloses(bent, at))
         return error_set(err, STATUS_INVALID,

@@ -7,6 +7,7 @@
 #include "optimizer/worker/report/result_thumbnail.h"
 #include "optimizer/worker/report/surface/surface_cloth.h"
 #include "optimizer/worker/report/surface/surface_passes.h"
+#include "optimizer/worker/report/surface/surface_tables.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
 
 #include <math.h>
@@ -17,6 +18,7 @@
 enum { STREAM = 4000 };
 static const double mm = 1e-3;
 
+static const char *const method_name[] = {"path", "fast", "corrected"};
 static const char *const surface_name[] = {"flat", "cylinder", "drape", "mesh"};
 
 double surface_pictures_paths(const struct pipeline_context *c)
@@ -58,9 +60,9 @@ static json_t *picture_json(const struct job_surface_picture *p, const struct su
     double brightness = (mean[0] + mean[1] + mean[2]) / 3.0;
     char file[80];
     snprintf(file, sizeof file, "pictures/%s.exr", so_far->name);
-    return json_pack("{s:s, s:s, s:I, s:[o, o, o], s:o, s:o}", "file", file, "on", surface_name[p->on], "samples",
-                     (json_int_t)so_far->n_sample, "mean", json_number(mean[0]), json_number(mean[1]),
-                     json_number(mean[2]), "noise",
+    return json_pack("{s:s, s:s, s:s, s:I, s:[o, o, o], s:o, s:o}", "file", file, "on", surface_name[p->on], "method",
+                     method_name[p->method], "samples", (json_int_t)so_far->n_sample, "mean", json_number(mean[0]),
+                     json_number(mean[1]), json_number(mean[2]), "noise",
                      json_number(brightness > 0.0 && p->sample > 1 ? sqrt(variance) / brightness : NAN), "png_exposure",
                      json_number(exposure));
 }
@@ -119,11 +121,21 @@ static status write_entry(struct pipeline_context *c, const char *path, const st
     return s;
 }
 
+/* One picture of the document. */
+struct one_picture {
+    size_t i;
+    const struct surface_tables *tables;
+    const char *entry_path;
+};
+
 /* Renders pass by pass until all samples are there. */
-static status render(struct pipeline_context *c, size_t i, const char *entry_path, const struct progress *progress,
+static status render(struct pipeline_context *c, const struct one_picture *one, const struct progress *progress,
                      struct surface_passes *so_far, json_t **entry, struct error *err)
 {
+    size_t i = one->i;
     const struct job_surface_picture *p = &c->doc->surface_picture[i];
+    struct fast_option fast;
+    bool by_tables = surface_tables_option(one->tables, p, &fast);
     const struct pipeline_model *model = &c->model[pipeline_best_model(c)];
     struct surface_cloth cloth;
     struct configuration view = observation_configuration(
@@ -140,7 +152,8 @@ static status render(struct pipeline_context *c, size_t i, const char *entry_pat
         .input = {.scene = {.fibers = cloth.fibers, .volume = cloth.volume.bent != NULL ? &cloth.volume : NULL},
                   .model = &model->appearance,
                   .param = model->fit.param,
-                  .n_set = model->sets.n_set},
+                  .n_set = model->sets.n_set,
+                  .fast = by_tables ? &fast : NULL},
         .configuration = &view,
         .width = p->px,
         .height = p->px,
@@ -149,14 +162,15 @@ static status render(struct pipeline_context *c, size_t i, const char *entry_pat
         .stream = (uint32_t)(STREAM + i)};
     while (s == STATUS_OK && so_far->n_sample < p->sample) {
         s = surface_passes_add(c, &q, progress, so_far, err);
-        if (s == STATUS_OK) s = write_entry(c, entry_path, p, so_far, entry, err);
+        if (s == STATUS_OK) s = write_entry(c, one->entry_path, p, so_far, entry, err);
     }
-    if (s == STATUS_OK && *entry == NULL) s = write_entry(c, entry_path, p, so_far, entry, err);
+    if (s == STATUS_OK && *entry == NULL) s = write_entry(c, one->entry_path, p, so_far, entry, err);
     surface_cloth_release(&cloth);
     return s == STATUS_OK || s == STATUS_CANCELLED ? s : error_prefix(err, s, "picture %zu", i + 1);
 }
 
-static status write_one(struct pipeline_context *c, size_t i, const struct progress *progress, struct error *err)
+static status write_one(struct pipeline_context *c, size_t i, const struct surface_tables *tables,
+                        const struct progress *progress, struct error *err)
 {
     const struct job_surface_picture *p = &c->doc->surface_picture[i];
     char name[32], relative[64], path[WORKER_PATH_BYTES];
@@ -170,7 +184,7 @@ static status write_one(struct pipeline_context *c, size_t i, const struct progr
     json_decref(entry);
     entry = NULL;
     status s = surface_passes_start(c, name, p->px, p->px, &so_far, err);
-    if (s == STATUS_OK) s = render(c, i, path, progress, &so_far, &entry, err);
+    if (s == STATUS_OK) s = render(c, &(struct one_picture){i, tables, path}, progress, &so_far, &entry, err);
     if (s == STATUS_OK)
         json_array_append_new(c->surface_pictures, entry);
     else
@@ -186,13 +200,20 @@ status surface_pictures_write(struct pipeline_context *c, double from, double to
     if (c->doc->n_surface_picture == 0) return STATUS_OK;
     worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "pictures", path);
     status s = durable_make_folder(path, err);
+    struct surface_tables tables = {0};
+    double for_tables = (to - from) * surface_tables_share(c);
+    struct progress_part making;
+    struct progress make = progress_begin_part(&making, &c->progress, from, for_tables);
+    if (s == STATUS_OK) s = surface_tables_get(c, &make, &tables, err);
+    from += for_tables;
     for (size_t i = 0; i < c->doc->n_surface_picture && s == STATUS_OK; i++) {
         const struct job_surface_picture *p = &c->doc->surface_picture[i];
         double share = (to - from) * (double)p->px * (double)p->px * (double)p->sample / all;
         struct progress_part part;
         struct progress progress = progress_begin_part(&part, &c->progress, from + done, share);
-        s = write_one(c, i, &progress, err);
+        s = write_one(c, i, &tables, &progress, err);
         done += share;
     }
+    surface_tables_release(&tables);
     return s;
 }

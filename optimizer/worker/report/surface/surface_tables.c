@@ -1,0 +1,62 @@
+#include "optimizer/worker/report/surface/surface_tables.h"
+#include "base/files/durable.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/worker/stages/result/pipeline_choice.h"
+#include "renderer/fast/precompute/fast_precompute.h"
+
+/* Three traced hits leave a third of the error of one (renderer/fast/NOTES.md); the transfer to a cell has an error of
+ * 1 to 2 % by so many paths. */
+enum { N_TRACED = 3, CELL_PATHS = 8000 };
+static const double share_of_time = 0.3, corrected_share = 0.25;
+
+static bool wanted(const struct pipeline_context *c)
+{
+    for (size_t i = 0; i < c->doc->n_surface_picture; i++)
+        if (c->doc->surface_picture[i].method != JOB_PICTURE_PATH) return true;
+    return false;
+}
+
+double surface_tables_share(const struct pipeline_context *c) { return wanted(c) ? share_of_time : 0.0; }
+
+status surface_tables_get(struct pipeline_context *c, const struct progress *progress, struct surface_tables *t,
+                          struct error *err)
+{
+    const struct pipeline_model *model = &c->model[pipeline_best_model(c)];
+    char path[WORKER_PATH_BYTES];
+    *t = (struct surface_tables){0};
+    if (!wanted(c)) return STATUS_OK;
+    if (model->appearance.kind != MODEL_SURFACE || model->appearance.surface->flat_section) {
+        worker_status_warn(c->status, "all pictures are rendered path by path: there are no tables for the model '%s'",
+                           model->appearance.id);
+        return STATUS_OK;
+    }
+    const struct fast_precompute_request q = {.scene = c->scene,
+                                              .model = model->appearance.surface,
+                                              .param = model->fit.param,
+                                              .n_set = model->sets.n_set,
+                                              .n_path = CELL_PATHS,
+                                              .no_visibility = true};
+    worker_folder_path(c->folder, JOB_FOLDER_WORK, "report", path);
+    status s = durable_make_folder(path, err);
+    if (s != STATUS_OK) return s;
+    worker_folder_path(c->folder, JOB_FOLDER_WORK, "report/fast.tables", path);
+    struct error unread;
+    t->present = fast_tables_read(&t->tables, path, &unread) == STATUS_OK;
+    if (t->present && t->tables.checksum == fast_tables_checksum(&q)) return STATUS_OK;
+    fast_tables_release(&t->tables);
+    s = fast_precompute(&q, c->pool, progress, &t->tables, err);
+    t->present = s == STATUS_OK;
+    if (s == STATUS_OK) s = fast_tables_write(&t->tables, path, err);
+    return s;
+}
+
+void surface_tables_release(struct surface_tables *t) { fast_tables_release(&t->tables); }
+
+bool surface_tables_option(const struct surface_tables *t, const struct job_surface_picture *p,
+                           struct fast_option *option)
+{
+    *option = (struct fast_option){.tables = &t->tables,
+                                   .n_traced = N_TRACED,
+                                   .corrected_share = p->method == JOB_PICTURE_CORRECTED ? corrected_share : 0.0};
+    return t->present && p->method != JOB_PICTURE_PATH;
+}

@@ -1,0 +1,307 @@
+#include "renderer/fast/fast_shade.h"
+#include "renderer/fast/sphere_harmonics.h"
+#include "renderer/scene/scene_place.h"
+#include "renderer/transport/surface/fiber_frame.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* The hit of an eye's ray. */
+struct seen_hit {
+    struct scene_hit hit;
+    struct scene_place place;
+    double offset_mm[2];
+    float position_mm[3]; /* true place in the scene */
+    struct fiber_frame frame;
+    float wo[3], wo_scene[3];
+    const struct scattering_state *state;
+    size_t i_set;
+};
+
+static float dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+/* A direction of the scene in the flat cloth. */
+static void to_cloth(const struct scene_place *p, const float d[3], float out[3])
+{
+    for (int a = 0; a < 3; a++) out[a] = dot(p->to_cloth[a], d);
+    float inv = 1 / sqrtf(dot(out, out));
+    for (int a = 0; a < 3; a++) out[a] *= inv;
+}
+
+static void describe(const struct fast_setting *s, const struct scene_ray *ray, struct seen_hit *h)
+{
+    memcpy(h->offset_mm, ray->offset_mm, sizeof h->offset_mm);
+    for (int a = 0; a < 3; a++) {
+        h->position_mm[a] = (float)((double)h->hit.position_mm[a] + (a < 2 ? h->offset_mm[a] : 0.0));
+        h->wo_scene[a] = -ray->direction[a];
+    }
+    scene_place_of(s->path.scene, &h->hit, h->offset_mm, &h->place);
+    fiber_frame_from(&h->frame, h->hit.tangent);
+    fiber_frame_to_local(&h->frame, h->wo_scene, h->wo);
+    h->i_set = s->path.n_set > 1 ? scene_group_of(s->path.scene, h->hit.i_segment) : 0;
+    h->state = s->path.state[h->i_set];
+}
+
+/* ---- light that is scattered once, by tables alone ---- */
+
+/* Whether light from a direction reaches the hit, as the tables have it. */
+static bool reaches(const struct fast_setting *s, const struct seen_hit *h, const float direction[3])
+{
+    const struct scene *scene = s->path.scene;
+    if (scene_sheet_hides(scene, direction)) return false;
+    static const float no_shift[2] = {0, 0};
+    const struct fast_tables *t = s->option->tables;
+    uint32_t row = t->segment_row[h->hit.i_segment];
+    float d[3];
+    if (row == FAST_NO_ROW) return false;
+    to_cloth(&h->place, direction, d);
+    return fast_tables_distance(t, row, d) > 0 && !scene_shell_shades(scene, &h->hit, &h->place, no_shift, direction);
+}
+
+static void add_lamp(const struct fast_setting *s, const struct seen_hit *h, struct rng *rng, float radiance[3])
+{
+    const struct lamp *lamp = &s->path.lights.lamp;
+    float u[2], direction[3], pdf, wi[3], rgb[3];
+    u[0] = rng_float(rng);
+    u[1] = rng_float(rng);
+    if (!lamp_sample(lamp, h->position_mm, u, direction, &pdf)) return;
+    fiber_frame_to_local(&h->frame, direction, wi);
+    s->path.model->eval(h->state, wi, h->wo, rgb, NULL);
+    float light = lamp->radiance * fiber_frame_cos_theta(wi) / pdf;
+    if (!((rgb[0] + rgb[1] + rgb[2]) * light > 0)) return;
+    if (!reaches(s, h, direction)) return;
+    for (int c = 0; c < 3; c++) radiance[c] += rgb[c] * light;
+}
+
+/* One direction of the image, and one that the fiber scatters from, combined by the power heuristic. */
+static void add_environment(const struct fast_setting *s, const struct seen_hit *h, struct rng *rng, float radiance[3])
+{
+    static const float equal[3] = {1, 1, 1};
+    const struct scattering_model *m = s->path.model;
+    float u[3], direction[3], wi[3], rgb[3], light[3] = {0}, pdf_image;
+    for (int a = 0; a < 3; a++) u[a] = rng_float(rng);
+    m->sample(h->state, h->wo, equal, u, wi);
+    float pdf = m->eval_pdf(h->state, wi, h->wo, equal, rgb, NULL);
+    fiber_frame_to_world(&h->frame, wi, direction);
+    if (pdf > 0 && reaches(s, h, direction)) {
+        lights_add_environment(&s->path.lights, direction, pdf, light);
+        for (int c = 0; c < 3; c++) radiance[c] += rgb[c] * light[c] * fiber_frame_cos_theta(wi) / pdf;
+    }
+    if (s->path.lights.image == NULL) return;
+    u[0] = rng_float(rng);
+    u[1] = rng_float(rng);
+    if (!lights_sample_image(&s->path.lights, u, direction, light, &pdf_image)) return;
+    fiber_frame_to_local(&h->frame, direction, wi);
+    pdf = m->eval_pdf(h->state, wi, h->wo, equal, rgb, NULL);
+    float weight = fiber_frame_cos_theta(wi) / pdf_image * lights_power_heuristic(pdf_image, pdf);
+    if (!((rgb[0] + rgb[1] + rgb[2]) * weight > 0) || !reaches(s, h, direction)) return;
+    for (int c = 0; c < 3; c++) radiance[c] += rgb[c] * light[c] * weight;
+}
+
+/* ---- light that is scattered more often ---- */
+
+/* Irradiance of a surface that faces the lamp, and the direction to it. */
+static float lamp_irradiance(const struct lamp *lamp, const float position_mm[3], float direction[3])
+{
+    if (lamp->directional) {
+        for (int a = 0; a < 3; a++) direction[a] = -lamp->normal[a];
+        return (float)M_PI;
+    }
+    float to[3];
+    for (int a = 0; a < 3; a++) to[a] = lamp->centre_mm[a] - position_mm[a];
+    float r2 = dot(to, to), r = sqrtf(r2), cosine = -dot(to, lamp->normal) / r;
+    for (int a = 0; a < 3; a++) direction[a] = to[a] / r;
+    return cosine > 0 ? lamp->radiance * 4 * lamp->half_side_mm * lamp->half_side_mm * cosine / r2 : 0;
+}
+
+/* Adds rgb times the harmonics of a direction in the flat cloth; zonal NULL: of a point. */
+static void add_direction(const struct fast_tables *t, const float d[3], const float rgb[3], const float *zonal,
+                          float *coefficient)
+{
+    size_t n = fast_n_harmonic(t), k = 0;
+    float y[SPHERE_MAX_COUNT];
+    if (t->mirrored != 0 && d[2] <= 0) return;
+    sphere_harmonics(t->order, d, y);
+    for (size_t l = 0; l <= t->order && zonal != NULL; l++)
+        for (size_t m = 0; m < 2 * l + 1; m++) y[k++] *= zonal[l];
+    for (size_t c = 0; c < 3; c++)
+        for (k = 0; k < n; k++) coefficient[c * n + k] += rgb[c] * y[k];
+}
+
+/* Coefficients of all light from outside in the flat cloth at a place; 3 x n_harmonic. */
+static void light_coefficients(const struct fast_setting *s, const struct scene_place *place,
+                               const float position_mm[3], float *coefficient)
+{
+    const struct fast_tables *t = s->option->tables;
+    float direction[3], d[3];
+    memset(coefficient, 0, 3 * fast_n_harmonic(t) * sizeof *coefficient);
+    if (s->path.lights.has_lamp) {
+        float e = lamp_irradiance(&s->path.lights.lamp, position_mm, direction);
+        const float rgb[3] = {e, e, e};
+        to_cloth(place, direction, d);
+        add_direction(t, d, rgb, NULL, coefficient);
+    }
+    for (size_t i = 0; i < s->mixture.n; i++) {
+        to_cloth(place, s->mixture.direction[i], d);
+        add_direction(t, d, s->mixture.rgb[i], s->mixture.zonal, coefficient);
+    }
+}
+
+static void apply_transfer(const struct fast_tables *t, uint32_t row, const float *light, float *arriving)
+{
+    size_t n = fast_n_harmonic(t);
+    const float *a = t->transfer + (size_t)row * 3 * n * n;
+    for (size_t c = 0; c < 3; c++)
+        for (size_t i = 0; i < n; i++) {
+            float sum = 0;
+            for (size_t k = 0; k < n; k++) sum += a[(c * n + i) * n + k] * light[c * n + k];
+            arriving[c * n + i] = sum;
+        }
+}
+
+/* The frame in which the fiber's table is: z along the fiber, w_o in the x-z plane. Rows in the flat cloth. */
+static float table_frame(const struct seen_hit *h, float row[3][3])
+{
+    float wo[3];
+    to_cloth(&h->place, h->hit.tangent, row[2]);
+    to_cloth(&h->place, h->wo_scene, wo);
+    float along = dot(wo, row[2]);
+    for (int a = 0; a < 3; a++) row[0][a] = wo[a] - along * row[2][a];
+    float length2 = dot(row[0], row[0]);
+    if (length2 > 1e-10f) {
+        float inv = 1 / sqrtf(length2);
+        for (int a = 0; a < 3; a++) row[0][a] *= inv;
+    } else {
+        struct fiber_frame f;
+        fiber_frame_from(&f, row[2]);
+        memcpy(row[0], f.v, sizeof f.v);
+    }
+    for (int a = 0; a < 3; a++)
+        row[1][a] = row[2][(a + 1) % 3] * row[0][(a + 2) % 3] - row[2][(a + 2) % 3] * row[0][(a + 1) % 3];
+    return asinf(fminf(fmaxf(along, -1), 1));
+}
+
+/* Share of the light from outside that the shell of a bent cloth lets through, at a place beside the hit where light
+ * may have entered. */
+static bool shell_lets_through(const struct fast_setting *s, const struct seen_hit *h, struct rng *rng)
+{
+    if (s->arriving != NULL) return true;
+    float direction[3], shift[2];
+    double normal[2];
+    float lamp = s->path.lights.has_lamp ? lamp_irradiance(&s->path.lights.lamp, h->position_mm, direction) : 0;
+    if (s->mixture.n > 0) {
+        size_t k = light_mixture_pick(&s->mixture, rng_float(rng));
+        float sky = 0;
+        for (size_t i = 0; i < s->mixture.n; i++) sky += s->mixture.rgb[i][1];
+        if (rng_float(rng) * (lamp + sky) >= lamp) memcpy(direction, s->mixture.direction[k], sizeof direction);
+    }
+    rng_normal_pair(rng, normal);
+    for (int a = 0; a < 2; a++) shift[a] = (float)(normal[a] * s->option->tables->spread_mm);
+    return !scene_shell_shades(s->path.scene, &h->hit, &h->place, shift, direction);
+}
+
+static void add_transfer(const struct fast_setting *s, const struct seen_hit *h, struct rng *rng, float radiance[3])
+{
+    const struct fast_tables *t = s->option->tables;
+    size_t n = fast_n_harmonic(t);
+    uint32_t cell = fast_tables_cell_at(t, h->place.position_mm);
+    float scale = 1, computed[3 * SPHERE_MAX_COUNT], turned[3 * SPHERE_MAX_COUNT], rotation[SPHERE_MAX_ROTATION];
+    const float *arriving = computed;
+    if (cell == FAST_NO_ROW || !shell_lets_through(s, h, rng)) return;
+    if (s->arriving != NULL) {
+        float unused[3], centre[3] = {0, 0, 0};
+        const struct lamp *lamp = &s->path.lights.lamp;
+        arriving = s->arriving + (size_t)cell * 3 * n;
+        if (s->path.lights.has_lamp && s->mixture.n == 0)
+            scale = lamp_irradiance(lamp, h->position_mm, unused) / lamp_irradiance(lamp, centre, unused);
+    } else {
+        float light[3 * SPHERE_MAX_COUNT];
+        light_coefficients(s, &h->place, h->position_mm, light);
+        apply_transfer(t, cell, light, computed);
+    }
+    float row[3][3], theta = table_frame(h, row);
+    sphere_rotation(t->order, (const float(*)[3])row, rotation);
+    sphere_rotate(t->order, rotation, arriving, 3, turned);
+    size_t i = (size_t)lrintf((theta * (float)M_1_PI + 0.5f) * (FAST_N_THETA - 1));
+    const float *scatter = t->scatter + (h->i_set * FAST_N_THETA + i) * 3 * n;
+    for (size_t c = 0; c < 3; c++) {
+        float sum = 0;
+        for (size_t k = 0; k < n; k++) sum += scatter[c * n + k] * turned[c * n + k];
+        radiance[c] += scale * sum; /* not cut at 0: the mean over fibers would be too bright */
+    }
+}
+
+static void add_beyond(const struct fast_setting *s, const struct scene_ray *ray, float radiance[3])
+{
+    float position[3], beyond[3] = {0, 0, 0};
+    if (scene_sheet_met(s->path.scene, ray)) return;
+    for (int a = 0; a < 3; a++) position[a] = (float)((double)ray->origin_mm[a] + (a < 2 ? ray->offset_mm[a] : 0.0));
+    lights_add_environment(&s->path.lights, ray->direction, 0, beyond);
+    float lamp = s->path.lights.has_lamp ? lights_lamp_beyond(&s->path.lights.lamp, position, ray->direction, 0) : 0;
+    for (int c = 0; c < 3; c++) radiance[c] += lamp + beyond[c];
+}
+
+/* Light that is scattered once as the tables have it. */
+static uint32_t shade_by_tables(const struct fast_setting *s, struct scene_ray *ray, struct rng *rng, float radiance[3])
+{
+    struct seen_hit h;
+    if (!scene_trace(s->path.scene, ray, &h.hit)) {
+        add_beyond(s, ray, radiance);
+        return 0;
+    }
+    describe(s, ray, &h);
+    if (s->path.lights.has_lamp) add_lamp(s, &h, rng, radiance);
+    if (s->mixture.n > 0) add_environment(s, &h, rng, radiance);
+    add_transfer(s, &h, rng, radiance);
+    return 1;
+}
+
+/* path_setting.finish */
+static void finish(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,
+                   float rgb[3])
+{
+    const struct fast_setting *s = context;
+    struct seen_hit h = {.hit = *hit};
+    describe(s, ray, &h);
+    add_transfer(s, &h, rng, rgb);
+}
+
+uint32_t fast_shade(const struct fast_setting *s, struct scene_ray *ray, struct rng *rng, float radiance[3])
+{
+    if (s->option->visibility == FAST_TABLES) return shade_by_tables(s, ray, rng, radiance);
+    struct path_result path;
+    path_trace(&s->path, ray, rng, &path, NULL);
+    for (int c = 0; c < 3; c++) radiance[c] += path.radiance[c];
+    return path.n_bounce;
+}
+
+/* ---- what is the same for all rays ---- */
+
+static status fill_arriving(struct fast_setting *s, struct error *err)
+{
+    const struct fast_tables *t = s->option->tables;
+    const struct scene_place flat = {.to_cloth = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+    static const float centre[3] = {0, 0, 0};
+    float light[3 * SPHERE_MAX_COUNT];
+    size_t n = 3 * fast_n_harmonic(t);
+    s->arriving = malloc((t->n_transfer * n + 1) * sizeof *s->arriving);
+    if (s->arriving == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot use tables: out of memory");
+    light_coefficients(s, &flat, centre, light);
+    for (uint32_t i = 0; i < t->n_transfer; i++) apply_transfer(t, i, light, s->arriving + i * n);
+    return STATUS_OK;
+}
+
+status fast_setting_init(struct fast_setting *s, const struct fast_option *option, struct error *err)
+{
+    s->option = option;
+    s->arriving = NULL;
+    s->path.n_traced = option->n_traced > 0 ? option->n_traced : 1;
+    s->path.share_beyond = (float)option->corrected_share;
+    s->path.finish = finish;
+    s->path.finish_context = s;
+    if (s->path.n_traced == 1 && !(s->path.share_beyond > 0)) s->path.guided_paths = false;
+    light_mixture_init(&s->mixture, &s->path.lights);
+    return scene_is_bent(s->path.scene) ? STATUS_OK : fill_arriving(s, err);
+}
+
+void fast_setting_release(struct fast_setting *s) { free(s->arriving); }

@@ -1,0 +1,91 @@
+#include "renderer/fast/precompute/fast_precompute.h"
+#include "renderer/fast/precompute/precompute_parts.h"
+#include "renderer/fast/sphere_harmonics.h"
+#include "renderer/scene/scene_place.h"
+#include "renderer/scene/scene_ray.h"
+
+#include <string.h>
+
+enum { DEFAULT_ORDER = 4, DEFAULT_PATHS = 50000, METHOD_VERSION = 1 };
+
+static uint64_t add_bytes(uint64_t h, const void *data, size_t n)
+{
+    const unsigned char *p = data;
+    for (size_t i = 0; i < n; i++) h = (h ^ p[i]) * 0x100000001b3u;
+    return h;
+}
+
+/* The request with its defaults filled in. */
+static struct fast_precompute_request resolved(const struct fast_precompute_request *q)
+{
+    struct fast_precompute_request r = *q;
+    if (r.n_set == 0) r.n_set = 1;
+    if (r.order == 0) r.order = DEFAULT_ORDER;
+    if (r.n_path == 0) r.n_path = DEFAULT_PATHS;
+    if (!(r.cell_paths > 0.0)) r.cell_paths = 2.0;
+    return r;
+}
+
+uint64_t fast_tables_checksum(const struct fast_precompute_request *q)
+{
+    struct fast_precompute_request r = resolved(q);
+    const uint32_t number[] = {METHOD_VERSION, (uint32_t)r.n_set, r.order,
+                               r.n_path,       r.no_visibility,   scene_has_black_sheet(r.scene)};
+    uint64_t h = scene_checksum(r.scene, 0xcbf29ce484222325u);
+    h = add_bytes(h, r.model->id, strlen(r.model->id));
+    h = add_bytes(h, r.param, r.n_set * r.model->n_param * sizeof *r.param);
+    h = add_bytes(h, number, sizeof number);
+    return add_bytes(h, &r.cell_paths, sizeof r.cell_paths);
+}
+
+static status check(const struct fast_precompute_request *q, struct error *err)
+{
+    if (q->model->flat_section)
+        return error_set_field(err, STATUS_INVALID, "model",
+                               "cannot render model '%s' by tables: its fibers are flat, and tables are of fibers that "
+                               "look alike from all sides around",
+                               q->model->id);
+    if (scene_is_bent(q->scene)) return error_set(err, STATUS_INVALID, "cannot make tables of a bent cloth");
+    if (q->order > SPHERE_MAX_ORDER)
+        return error_set(err, STATUS_INVALID, "cannot make tables of order %u: at most %d", q->order, SPHERE_MAX_ORDER);
+    return STATUS_OK;
+}
+
+static status run_parts(struct precompute_job *j, const struct progress *progress, struct error *err)
+{
+    /* shares of the time, measured on a twill of 120,000 segments */
+    static const struct {
+        status (*run)(struct precompute_job *j, struct error *err);
+        double from, share;
+    } part[] = {{precompute_scatter, 0.0, 0.02}, {precompute_transfer, 0.02, 0.6}, {precompute_visibility, 0.62, 0.38}};
+    status s = STATUS_OK;
+    for (size_t i = 0; i < sizeof part / sizeof part[0] && s == STATUS_OK; i++) {
+        struct progress_part of = {progress, part[i].from, part[i].share};
+        struct progress inner = progress_of_part(&of);
+        j->progress = &inner;
+        s = part[i].run(j, err);
+        if (s == STATUS_OK && progress_cancelled(progress)) s = error_set(err, STATUS_CANCELLED, "cancelled");
+    }
+    return s;
+}
+
+status fast_precompute(const struct fast_precompute_request *q, struct thread_pool *pool,
+                       const struct progress *progress, struct fast_tables *t, struct error *err)
+{
+    *t = (struct fast_tables){0};
+    status s = check(q, err);
+    if (s != STATUS_OK) return s;
+    struct fast_precompute_request r = resolved(q);
+    struct precompute_job j = {.q = &r, .pool = pool, .t = t};
+    t->checksum = fast_tables_checksum(&r);
+    t->order = r.order;
+    t->n_set = (uint32_t)r.n_set;
+    t->mirrored = scene_has_black_sheet(r.scene);
+    t->bottom_mm = -scene_thickness_mm(r.scene);
+    scene_tile_mm(r.scene, t->tile_mm);
+    s = parameter_sets_init(&j.sets, r.scene, r.model, r.param, r.n_set, err);
+    if (s == STATUS_OK) s = run_parts(&j, progress, err);
+    parameter_sets_release(&j.sets);
+    if (s != STATUS_OK) fast_tables_release(t);
+    return s;
+}

@@ -1,0 +1,23 @@
+/* The parts of fast_precompute, each of which fills in a part of the tables. */
+#ifndef SELVEDGE_RENDERER_PRECOMPUTE_PARTS_H
+#define SELVEDGE_RENDERER_PRECOMPUTE_PARTS_H
+
+#include "renderer/fast/precompute/fast_precompute.h"
+#include "renderer/transport/surface/parameter_sets.h"
+
+struct precompute_job {
+    const struct fast_precompute_request *q;
+    struct parameter_sets sets;
+    struct thread_pool *pool;
+    const struct progress *progress; /* of the part that runs */
+    struct fast_tables *t;
+};
+
+/* scatter_table.c: t->scatter. */
+status precompute_scatter(struct precompute_job *j, struct error *err);
+/* transfer_cells.c: cells and transfer, mean free path, spread. */
+status precompute_transfer(struct precompute_job *j, struct error *err);
+/* segment_visibility.c: what the segments see. */
+status precompute_visibility(struct precompute_job *j, struct error *err);
+
+#endif

@@ -1,0 +1,88 @@
+#include "renderer/scene/scene_place.h"
+#include "renderer/scene/bent/bent_scene.h"
+
+#include <math.h>
+#include <string.h>
+
+/* A ray that begins on the shell begins so far above it, so that the surface it leaves does not shade it. */
+static const float lift_mm = 0.02f;
+
+bool scene_is_bent(const struct scene *s) { return s->bent != NULL; }
+
+void scene_segment_at(const struct scene *s, uint32_t i_segment, struct scene_segment *out)
+{
+    const struct scene_vertex *v = &s->vertex[s->segment_vertex[i_segment]];
+    const float d[3] = {v[1].x - v[0].x, v[1].y - v[0].y, v[1].z - v[0].z};
+    float inv = 1 / sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    out->middle_mm[0] = 0.5f * (v[0].x + v[1].x);
+    out->middle_mm[1] = 0.5f * (v[0].y + v[1].y);
+    out->middle_mm[2] = 0.5f * (v[0].z + v[1].z);
+    for (int a = 0; a < 3; a++) out->tangent[a] = d[a] * inv;
+    out->radius_mm = v[0].radius;
+}
+
+static float within(double x, double period) { return (float)(x - floor(x / period) * period); }
+
+void scene_place_of(const struct scene *s, const struct scene_hit *hit, const double offset_mm[2],
+                    struct scene_place *p)
+{
+    memset(p, 0, sizeof *p);
+    if (s->bent == NULL) {
+        for (int a = 0; a < 3; a++) {
+            p->position_mm[a] = a < 2 ? within((double)hit->position_mm[a], s->tile_mm[a]) : hit->position_mm[a];
+            p->to_cloth[a][a] = 1;
+        }
+        return;
+    }
+    const struct shell_cell *c = &s->bent->space.shell.cell[hit->i_cell];
+    for (int a = 0; a < 3; a++) {
+        double x = c->to_cloth[a][3];
+        for (int k = 0; k < 3; k++) {
+            x += c->to_cloth[a][k] * ((double)hit->position_mm[k] + (k < 2 ? offset_mm[k] : 0.0));
+            p->to_cloth[a][k] = (float)c->to_cloth[a][k];
+        }
+        p->position_mm[a] = a < 2 ? within(x, s->tile_mm[a]) : (float)x;
+    }
+}
+
+bool scene_shell_shades(const struct scene *s, const struct scene_hit *hit, const struct scene_place *place,
+                        const float shift_mm[2], const float direction[3])
+{
+    if (s->bent == NULL) return false;
+    const struct shell_cell *c = &s->bent->space.shell.cell[hit->i_cell];
+    float out = 0, start[3];
+    for (int a = 0; a < 3; a++) out += place->to_cloth[2][a] * direction[a];
+    float to_surface = out > 0 ? lift_mm - place->position_mm[2] : s->bottom_mm - lift_mm - place->position_mm[2];
+    const float move[3] = {shift_mm[0], shift_mm[1], to_surface};
+    for (int a = 0; a < 3; a++) {
+        start[a] = hit->position_mm[a];
+        for (int k = 0; k < 3; k++) start[a] += c->to_world[a][k] * move[k];
+    }
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    struct RTCRay q = {.org_x = start[0],
+                       .org_y = start[1],
+                       .org_z = start[2],
+                       .dir_x = direction[0],
+                       .dir_y = direction[1],
+                       .dir_z = direction[2],
+                       .tfar = INFINITY,
+                       .mask = ~0u};
+    rtcOccluded1(s->bent->space.outer, &context, &q);
+    return q.tfar < 0;
+}
+
+static uint64_t add_bytes(uint64_t h, const void *data, size_t n)
+{
+    const unsigned char *p = data;
+    for (size_t i = 0; i < n; i++) h = (h ^ p[i]) * 0x100000001b3u;
+    return h;
+}
+
+uint64_t scene_checksum(const struct scene *s, uint64_t from)
+{
+    uint64_t h = add_bytes(from, s->vertex, s->n_vertex * sizeof *s->vertex);
+    h = add_bytes(h, s->segment_vertex, s->n_segment * sizeof *s->segment_vertex);
+    if (s->segment_group != NULL) h = add_bytes(h, s->segment_group, s->n_segment);
+    return add_bytes(h, s->tile_mm, sizeof s->tile_mm);
+}

@@ -1,0 +1,33 @@
+/* Where in the flat cloth a hit lies, and what else the fast renderer must know of a scene: its segments, and whether
+ * the shell of a bent cloth stands before a light. Millimetres, in the frame of scene_ray.h.
+ */
+#ifndef SELVEDGE_RENDERER_SCENE_PLACE_H
+#define SELVEDGE_RENDERER_SCENE_PLACE_H
+
+#include "renderer/scene/scene_ray.h"
+
+/* A hit in the flat cloth. */
+struct scene_place {
+    float position_mm[3]; /* x and y within the tile */
+    float to_cloth[3][3]; /* rows: takes a direction here to one in the flat cloth, nearly without stretching it */
+};
+
+/* A segment of the scene, whose fibers may be cut into more segments than those of the fiber set. */
+struct scene_segment {
+    float middle_mm[3], tangent[3], radius_mm;
+};
+
+bool scene_is_bent(const struct scene *scene);
+void scene_segment_at(const struct scene *scene, uint32_t i_segment, struct scene_segment *segment);
+/* offset_mm: that of the ray that hit. */
+void scene_place_of(const struct scene *scene, const struct scene_hit *hit, const double offset_mm[2],
+                    struct scene_place *place);
+/* Whether the shell of a bent cloth lies in a direction from a point of its surface: of the upper side if the direction
+ * points out of it, of the lower one otherwise. The point lies over the hit, moved by shift_mm in the plane of the
+ * cloth there. Flat cloth never shades itself so. */
+bool scene_shell_shades(const struct scene *scene, const struct scene_hit *hit, const struct scene_place *place,
+                        const float shift_mm[2], const float direction[3]);
+/* FNV-1a over vertices, radii, groups and tile of the flat cloth, going on from `from`. */
+uint64_t scene_checksum(const struct scene *scene, uint64_t from);
+
+#endif

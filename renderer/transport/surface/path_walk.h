@@ -1,0 +1,45 @@
+/* What a path carries from bounce to bounce: inside of path_tracer.c. */
+#ifndef SELVEDGE_RENDERER_PATH_WALK_H
+#define SELVEDGE_RENDERER_PATH_WALK_H
+
+#include "renderer/transport/surface/fiber_frame.h"
+#include "renderer/transport/surface/path_tracer.h"
+
+static inline void unwrapped(const float local_mm[3], const double offset_mm[2], float out[3])
+{
+    out[0] = (float)((double)local_mm[0] + offset_mm[0]);
+    out[1] = (float)((double)local_mm[1] + offset_mm[1]);
+    out[2] = local_mm[2];
+}
+
+/* Where the path meets a fiber. */
+struct bounce {
+    struct scene_hit hit;
+    double offset_mm[2]; /* of the ray that hit, in whole tiles */
+    struct fiber_frame frame;
+    float wo[3]; /* towards where the path comes from, in the fiber frame */
+};
+
+/* The state that a path carries. */
+struct walk {
+    const struct path_setting *s;
+    struct rng *rng;
+    const struct lamp *lamp;
+    size_t n_lamp;
+    struct path_result *out; /* of the lamp whose light is being added */
+    struct path_result *first_out;
+    size_t n_out;                         /* one result per lamp; one without lamps */
+    struct path_step *step;               /* the step that is being recorded, or NULL */
+    const struct scattering_state *state; /* of the fiber that was hit */
+    size_t i_set;                         /* its parameter set */
+    bool last;                            /* the present bounce is the n_traced-th */
+    float throughput[3];
+    float towards[PATH_MAX_LAMP][3]; /* directions from the present bounce to the lamps, which guide its guided paths */
+    float p_guided;                  /* probability of a guided path there */
+    float weight[PATH_MAX_LAMP];     /* multiple-importance weight of lamp connections at the present bounce: the guided
+                                        paths of the bounce before have the rest */
+    float score[3 * SCATTERING_MAX_PARAM]; /* of the present step, [c * n_param + p] */
+    float h[PATH_N_DERIVATIVE];            /* running sums of scores, laid out as the derivatives of path_result */
+};
+
+#endif

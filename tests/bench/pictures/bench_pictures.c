@@ -1,0 +1,386 @@
+/* The fast renderer against the path tracer. Prints one JSON object on each line.
+ *
+ *   pictures.<fabric>.precompute_s, precompute_bytes
+ *       Processor seconds to make the tables, and the length of their file.
+ *   pictures.<fabric>.flat492_rel_rms
+ *       Root mean square of the differences between the mean radiances of 492 flat configurations and 3 channels, over
+ *       the mean of path tracing. What the noise of both adds is taken off.
+ *   pictures.<fabric>.speedup_at_3pct
+ *       A draped piece of 40 mm in 512 x 512 pixels. The error is the root mean square over fields of 4 x 4 pixels that
+ *       show cloth and 3 channels, over the mean radiance of cloth. Of path tracing it is noise alone, whose square
+ *       falls with the time; of the fast renderer it is noise and a part that stays, for which the noise of both
+ *       pictures is taken off. Figure: processor seconds of path tracing to an error of 3 % over those of the fast
+ *       renderer, both from one run; 0 where the part that stays is above 3 %. Details go to standard error.
+ *
+ * bench_pictures [FABRIC...] [--px N] [--path-samples N] [--fast-samples N] [--flat-paths N] [--paths N] [--order N]
+ *                [--cell-paths N] [--traced N] [--corrected SHARE] [--by-tables] [--yarns N] [--png FOLDER]
+ *                [--no-flat] [--no-drape] [--no-visibility]
+ *   FABRIC   gabardine, fleece, silk (tests/support/cloth/fit_fabrics.h); default: all three
+ */
+#include "base/angle.h"
+#include "geometry/mesh/mesh_drape.h"
+#include "renderer/fast/fast_option.h"
+#include "renderer/fast/precompute/fast_precompute.h"
+#include "renderer/transport/estimate/estimate.h"
+#include "renderer/transport/render.h"
+#include "tests/support/cloth/fit_fabrics.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { N_FLAT = 492, FIELD = 4 };
+
+static struct {
+    size_t px, n_path_sample, n_fast_sample, n_flat_path, n_yarn;
+    uint32_t n_path, order, n_traced; /* 0: the defaults of the precomputation and of the renderer */
+    double cell_paths, corrected;
+    const char *png;
+    enum fast_visibility visibility;
+    bool flat, drape, no_visibility;
+} option = {.px = 512, .n_path_sample = 16, .n_fast_sample = 16, .n_flat_path = 3072, .flat = true, .drape = true};
+
+static struct thread_pool *pool;
+
+static void check(status s, const struct error *err)
+{
+    if (s == STATUS_OK) return;
+    fprintf(stderr, "%s\n", err->text);
+    exit(1);
+}
+
+static double processor_s(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void print(const char *fabric, const char *what, double value, const char *unit, const char *better)
+{
+    printf("{\"name\":\"pictures.%s.%s\",\"value\":%.6g,\"unit\":\"%s\",\"better\":\"%s\"}\n", fabric, what, value,
+           unit, better);
+    fflush(stdout);
+}
+
+struct bench {
+    const struct fit_fabric *fabric;
+    struct fiber_set fiber;
+    struct scene *flat, *drape;
+    struct appearance model;
+    double param[SCATTERING_MAX_PARAM];
+    struct fast_tables tables;
+    struct fast_option fast;
+};
+
+static void make_cloth(struct bench *b)
+{
+    struct phantom_option o;
+    struct phantom_report report;
+    struct error err = {0};
+    phantom_option_default(&o, b->fabric->weave);
+    bool felt = b->fabric->weave == PHANTOM_FELT, satin = b->fabric->weave == PHANTOM_SATIN_5;
+    o.n_fiber_per_yarn = felt ? 3600 : 37;
+    o.felt_tile_m = 18e-4;
+    o.felt_thickness_m = 2.5e-4;
+    o.vertex_spacing_m = 8e-6;
+    if (!felt) o.n_yarn[0] = o.n_yarn[1] = option.n_yarn > 0 ? option.n_yarn : satin ? 10 : 12;
+    if (felt && option.n_yarn > 0) {
+        o.felt_tile_m = 1.5e-4 * (double)option.n_yarn;
+        o.n_fiber_per_yarn = 25 * option.n_yarn * option.n_yarn;
+    }
+    fiber_set_init(&b->fiber);
+    check(phantom_generate(&o, pool, NULL, &b->fiber, &report, &err), &err);
+    check(scene_new(&b->fiber, &(struct scene_option){.black_sheet = true}, &b->flat, &err), &err);
+    fprintf(stderr, "%s: %zu fibers, %zu segments, tile %.2f x %.2f mm, covers %.3f, volume %.2f\n", b->fabric->name,
+            b->fiber.n_fiber, scene_n_segment(b->flat), 1e3 * b->fiber.tile_size_m[0], 1e3 * b->fiber.tile_size_m[1],
+            report.cover, report.volume_fraction);
+}
+
+static void make_tables(struct bench *b)
+{
+    struct error err = {0};
+    char path[] = "/tmp/selvedge-tables-XXXXXX";
+    struct stat info;
+    int fd = mkstemp(path);
+    double start = processor_s();
+    const struct fast_precompute_request q = {.scene = b->flat,
+                                              .model = b->model.surface,
+                                              .param = b->param,
+                                              .n_path = option.n_path,
+                                              .order = option.order,
+                                              .cell_paths = option.cell_paths,
+                                              .no_visibility = option.no_visibility};
+    check(fast_precompute(&q, pool, NULL, &b->tables, &err), &err);
+    double seconds = processor_s() - start;
+    const struct fast_tables *t = &b->tables;
+    check(fast_tables_write(t, path, &err), &err);
+    fprintf(
+        stderr,
+        "%s: free path %.4f mm, spread %.4f mm, cells %u x %u x %u, %u seen, transfer error %.4f, %u of %u segments "
+        "see\n",
+        b->fabric->name, t->mean_free_path_mm, t->spread_mm, t->n_cell[0], t->n_cell[1], t->n_cell[2], t->n_transfer,
+        (double)t->transfer_error, t->n_row, t->n_segment);
+    if (fd < 0 || fstat(fd, &info) != 0 || stat(path, &info) != 0) abort();
+    print(b->fabric->name, "precompute_s", seconds, "s", "lower");
+    print(b->fabric->name, "precompute_bytes", (double)info.st_size, "bytes", "lower");
+    unlink(path);
+}
+
+static struct radiance_input input_of(struct bench *b, const struct scene *scene, bool fast)
+{
+    return (struct radiance_input){
+        .scene = {.fibers = scene}, .model = &b->model, .param = b->param, .fast = fast ? &b->fast : NULL};
+}
+
+/* Quasi-random points of the unit cube of four dimensions (Roberts' sequence). */
+static void flat_configuration(size_t i, struct configuration *c)
+{
+    double g = 1.1673039782614187, u[4], a = 1.0;
+    for (int k = 0; k < 4; k++) {
+        a /= g;
+        u[k] = fmod(0.5 + a * (double)(i + 1), 1.0);
+    }
+    *c = (struct configuration){.light_theta_rad = acos(1.0 - 0.85 * u[0]),
+                                .light_phi_rad = 2.0 * M_PI * u[1],
+                                .camera_theta_rad = acos(1.0 - 0.85 * u[2]),
+                                .camera_phi_rad = 0.0,
+                                .cloth_rotation_rad = 2.0 * M_PI * u[3],
+                                .light_distance_m = 0.61,
+                                .lamp_side_m = 0.1,
+                                .camera_distance_m = 1.0,
+                                .crop_m = 0.01};
+}
+
+/* Mean radiances of all flat configurations, and the processor seconds. */
+static double flat_means(struct bench *b, bool fast, size_t n_path, struct estimate *e)
+{
+    struct error err = {0};
+    double start = processor_s();
+    for (size_t i = 0; i < N_FLAT; i++) {
+        struct configuration c;
+        flat_configuration(i, &c);
+        const struct estimate_request q = {.input = input_of(b, b->flat, fast),
+                                           .configuration = &c,
+                                           .n_configuration = 1,
+                                           .n_path = &n_path,
+                                           .seed = 77 + i,
+                                           .replica = fast};
+        check(estimate_run(&q, pool, NULL, e + i, &err), &err);
+    }
+    return processor_s() - start;
+}
+
+static void bench_flat(struct bench *b)
+{
+    static struct estimate path[N_FLAT], fast[N_FLAT];
+    double path_s = flat_means(b, false, option.n_flat_path, path),
+           fast_s = flat_means(b, true, option.n_flat_path, fast);
+    double error2 = 0.0, noise2 = 0.0, mean = 0.0, difference = 0.0, n = 3.0 * N_FLAT;
+    for (size_t i = 0; i < N_FLAT; i++)
+        for (int c = 0; c < 3; c++) {
+            double d = fast[i].mean[c] - path[i].mean[c];
+            error2 += d * d / n;
+            noise2 += (path[i].var[c] + fast[i].var[c]) / n;
+            mean += path[i].mean[c] / n;
+            difference += d / n;
+        }
+    fprintf(stderr, "%s flat: path %.1f s, fast %.1f s; mean %.4f, fast above it by %.2f %%; noise of both %.2f %%\n",
+            b->fabric->name, path_s, fast_s, mean, 100.0 * difference / mean, 100.0 * sqrt(noise2) / mean);
+    print(b->fabric->name, "flat492_rel_rms", sqrt(fmax(0.0, error2 - noise2)) / mean, "", "lower");
+}
+
+/* ---- draped ---- */
+
+static double render(struct bench *b, bool fast, struct image *im)
+{
+    struct error err = {0};
+    const struct configuration c = {.light_theta_rad = 50 * RAD_PER_DEG,
+                                    .light_phi_rad = 0,
+                                    .camera_theta_rad = 35 * RAD_PER_DEG,
+                                    .camera_phi_rad = 200 * RAD_PER_DEG,
+                                    .light_distance_m = 0.61,
+                                    .lamp_side_m = 0.1,
+                                    .camera_distance_m = 1.0,
+                                    .crop_m = 0.036};
+    const struct render_request q = {.input = input_of(b, b->drape, fast),
+                                     .configuration = &c,
+                                     .width = option.px,
+                                     .height = option.px,
+                                     .n_sample = fast ? option.n_fast_sample : option.n_path_sample,
+                                     .seed = 5,
+                                     .stream = fast};
+    double start = processor_s();
+    check(render_run(&q, pool, NULL, im, &err), &err);
+    return processor_s() - start;
+}
+
+/* Sums over a field of FIELD x FIELD pixels: mean and variance of the mean of each channel. */
+static void field_of(const struct image *im, size_t x, size_t y, double mean[3], double var[3])
+{
+    double n = FIELD * FIELD;
+    for (int c = 0; c < 3; c++) mean[c] = var[c] = 0.0;
+    for (size_t k = 0; k < FIELD * FIELD; k++) {
+        const float *p = im->pixel + ((y * FIELD + k / FIELD) * im->width + x * FIELD + k % FIELD) * im->n_channel;
+        for (int c = 0; c < 3; c++) {
+            mean[c] += (double)p[c] / n;
+            var[c] += (double)p[3 + c] / (n * n);
+        }
+    }
+}
+
+struct comparison {
+    double mean, difference, error2, path_noise2, fast_noise2, n;
+};
+
+static struct comparison compare(const struct image *path, const struct image *fast)
+{
+    struct comparison r = {0};
+    for (size_t y = 0; y < path->height / FIELD; y++)
+        for (size_t x = 0; x < path->width / FIELD; x++) {
+            double a[3], va[3], f[3], vf[3];
+            field_of(path, x, y, a, va);
+            field_of(fast, x, y, f, vf);
+            if (!(a[0] + a[1] + a[2] > 0.0) && !(f[0] + f[1] + f[2] > 0.0)) continue;
+            for (int c = 0; c < 3; c++, r.n += 1.0) {
+                r.mean += a[c];
+                r.difference += f[c] - a[c];
+                r.error2 += (f[c] - a[c]) * (f[c] - a[c]);
+                r.path_noise2 += va[c];
+                r.fast_noise2 += vf[c];
+            }
+        }
+    return r;
+}
+
+static void write_png(const struct bench *b, const struct image *im, const char *how)
+{
+    char file[512];
+    struct error err = {0};
+    if (option.png == NULL) return;
+    snprintf(file, sizeof file, "%s/%s-%s.png", option.png, b->fabric->name, how);
+    check(image_write_png(im, 2.0, file, &err), &err);
+}
+
+static void bench_drape(struct bench *b)
+{
+    struct image path = {0}, fast = {0};
+    struct mesh m = {0};
+    struct error err = {0};
+    check(mesh_drape(40, 10, NULL, &m, &err), &err);
+    check(scene_bend(b->flat, &m, true, &b->drape, &err), &err);
+    mesh_release(&m);
+    double path_s = render(b, false, &path), fast_s = render(b, true, &fast);
+    struct comparison r = compare(&path, &fast);
+    double mean = r.mean / r.n, goal2 = 0.03 * 0.03, scale = r.n * mean * mean;
+    double stays2 = fmax(0.0, (r.error2 - r.path_noise2 - r.fast_noise2) / scale);
+    double path_to = path_s * r.path_noise2 / scale / goal2;
+    double fast_to = stays2 < goal2 ? fast_s * r.fast_noise2 / scale / (goal2 - stays2) : INFINITY;
+    fprintf(
+        stderr,
+        "%s drape: mean %.4f, fast above it by %.2f %%; path %.1f s with noise %.2f %%, fast %.1f s with noise %.2f "
+        "%%; stays %.2f %%; to 3 %%: %.1f s and %.1f s\n",
+        b->fabric->name, mean, 100.0 * r.difference / r.mean, path_s, 100.0 * sqrt(r.path_noise2 / scale), fast_s,
+        100.0 * sqrt(r.fast_noise2 / scale), 100.0 * sqrt(stays2), path_to, fast_to);
+    print(b->fabric->name, "speedup_at_3pct", path_to / fast_to, "", "higher");
+    write_png(b, &path, "path");
+    write_png(b, &fast, "fast");
+    image_release(&path);
+    image_release(&fast);
+    scene_free(b->drape);
+}
+
+static void bench_fabric(const char *name)
+{
+    struct bench b = {.fabric = fit_fabric_find(name)};
+    if (b.fabric == NULL || !appearance_find(b.fabric->model_id, &b.model) || b.model.kind != MODEL_SURFACE) {
+        fprintf(stderr, "no such fabric: %s\n", name);
+        exit(2);
+    }
+    for (size_t p = 0; p < b.model.n_param; p++)
+        b.param[p] = param_from_file_unit(&b.model.param[p], b.fabric->truth[p]);
+    b.fast = (struct fast_option){.tables = &b.tables,
+                                  .visibility = option.visibility,
+                                  .n_traced = option.n_traced,
+                                  .corrected_share = option.corrected};
+    make_cloth(&b);
+    make_tables(&b);
+    if (option.flat) bench_flat(&b);
+    if (option.drape) bench_drape(&b);
+    fast_tables_release(&b.tables);
+    scene_free(b.flat);
+    fiber_set_release(&b.fiber);
+}
+
+/* An option with a number; false: there is none of that name. */
+static bool take_number(const char *name, double number)
+{
+    if (strcmp(name, "--px") == 0)
+        option.px = (size_t)number;
+    else if (strcmp(name, "--path-samples") == 0)
+        option.n_path_sample = (size_t)number;
+    else if (strcmp(name, "--fast-samples") == 0)
+        option.n_fast_sample = (size_t)number;
+    else if (strcmp(name, "--paths") == 0)
+        option.n_path = (uint32_t)number;
+    else if (strcmp(name, "--order") == 0)
+        option.order = (uint32_t)number;
+    else if (strcmp(name, "--traced") == 0)
+        option.n_traced = (uint32_t)number;
+    else if (strcmp(name, "--cell-paths") == 0)
+        option.cell_paths = number;
+    else if (strcmp(name, "--yarns") == 0)
+        option.n_yarn = (size_t)number;
+    else if (strcmp(name, "--corrected") == 0)
+        option.corrected = number;
+    else if (strcmp(name, "--flat-paths") == 0)
+        option.n_flat_path = (size_t)number;
+    else
+        return false;
+    return true;
+}
+
+static bool take_flag(const char *name)
+{
+    if (strcmp(name, "--no-flat") == 0)
+        option.flat = false;
+    else if (strcmp(name, "--no-drape") == 0)
+        option.drape = false;
+    else if (strcmp(name, "--no-visibility") == 0)
+        option.no_visibility = true;
+    else if (strcmp(name, "--by-tables") == 0)
+        option.visibility = FAST_TABLES;
+    else
+        return false;
+    return true;
+}
+
+int main(int argc, char **argv)
+{
+    static const char *const all[] = {"gabardine", "fleece", "silk"};
+    const char *fabric[8];
+    size_t n = 0;
+    struct error err = {0};
+    for (int i = 1; i < argc; i++) {
+        if (strncmp(argv[i], "--", 2) != 0 && n < 8)
+            fabric[n++] = argv[i];
+        else if (take_flag(argv[i]))
+            continue;
+        else if (i + 1 < argc && strcmp(argv[i], "--png") == 0)
+            option.png = argv[++i];
+        else if (i + 1 < argc && take_number(argv[i], strtod(argv[i + 1], NULL)))
+            i++;
+        else {
+            fprintf(stderr, "bench_pictures: unknown argument '%s'\n", argv[i]);
+            return 2;
+        }
+    }
+    check(thread_pool_new(0, &pool, &err), &err);
+    for (size_t i = 0; i < (n > 0 ? n : 3); i++) bench_fabric(n > 0 ? fabric[i] : all[i]);
+    thread_pool_free(pool);
+    return 0;
+}
