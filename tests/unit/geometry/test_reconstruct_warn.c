@@ -207,11 +207,32 @@ static void test_grade(void **state)
     expect_fibers(&r, 8, 7e-6, NULL);
 }
 
+/* Lumens that are clear were filled, unless the job says that there are none; faint ones are a question. */
+static void test_lumens(void **state)
+{
+    struct reconstruct_option o = clean_option();
+    struct reconstruct_report r = clean_report();
+    (void)state;
+    r.lumen = (struct lumen_evidence){.enclosed_share = 0.05, .middle_share = 0.012};
+    expect_volume(&o, &r, OPTION_HOLLOW_FIBERS, "the fibers look hollow: voids in the middle of fibers are 1.20 %");
+    o.hollow_fibers = 1;
+    expect_volume(&o, &r, NULL, NULL);
+    r.lumens_found = true;
+    expect_volume(&o, &r, OPTION_HOLLOW_FIBERS, "was filled before tracing; give false if they are solid");
+    r.lumens_found = false;
+    o.hollow_fibers = 0;
+    r.lumen.middle_share = 0.001;
+    expect_volume(&o, &r, OPTION_HOLLOW_FIBERS, "the fibers may be hollow: voids in the middle of fibers are 0.10 %");
+    r.lumen.enclosed_share = 0.08; /* as in solid fibers of 4 voxels */
+    expect_volume(&o, &r, NULL, NULL);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_spacing),   cmocka_unit_test(test_alignment), cmocka_unit_test(test_crop),
-        cmocka_unit_test(test_densities), cmocka_unit_test(test_fibers),    cmocka_unit_test(test_grade),
+        cmocka_unit_test(test_lumens), cmocka_unit_test(test_spacing),   cmocka_unit_test(test_alignment),
+        cmocka_unit_test(test_crop),   cmocka_unit_test(test_densities), cmocka_unit_test(test_fibers),
+        cmocka_unit_test(test_grade),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
