@@ -6,7 +6,7 @@ import { describedParameters, finite, parameterGroups } from "./result_view.js";
 import { getJson } from "./server_link.js";
 
 const BAND = 2; // standard errors
-const MAX_POINT = 1200;
+const MAX_POINT = 200; // a chart has some 250 to 600 pixels; drawing takes time with each point
 const RGB = ["--red", "--green", "--blue"];
 
 function band(value, se, { positive = false, lower = 0, upper = Infinity } = {}) {

@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-service bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics bench-browser bench-pictures bench-weave bench-weave-rendered
+.PHONY: bench bench-service bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-transport bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics bench-browser bench-pictures bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -45,6 +45,10 @@ bench-scan-errors: | deps-test ## scanned cloths: whether the stated errors cont
 bench-progress: | deps-test ## predicted against actual remaining time of four jobs, and the largest jump of their progress (half an hour on 2 quiet cores)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/bench_progress.py --build $(BUILD) $(PROGRESS)
+
+bench-dashboard: | deps-test ## what the dashboard costs in a browser: opening a list of 10,000 jobs, bytes of a poll, scripts of a page with a long fit and log (a minute)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/bin/selvedged >&2
+	@/usr/bin/python3 tests/bench/service/bench_dashboard.py --build $(BUILD)
 
 # SERVICE: some of the figures only: list answers uploads slow_disk declare readers watchers
 bench-service: | deps-test ## what the daemon costs: the list of jobs, other answers, those beside uploads and a slow disk, declarations, slow readers, long polls (two minutes)
