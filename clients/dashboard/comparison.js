@@ -4,7 +4,7 @@ import { colour, el, percentWithError, svg } from "./page_parts.js";
 const RGB = ["var(--red)", "var(--green)", "var(--blue)"];
 const degrees = (x) => (typeof x === "number" ? `${Number(x.toFixed(1))}°` : "–");
 
-function picture(url, rgb, exposure, what) {
+export function picture(url, rgb, exposure, what) {
   if (url) return el("img", { src: url, alt: what, loading: "lazy", title: what });
   const swatch = el("div", { title: `${what}: mean ${rgb ? rgb.map((v) => v.toFixed(4)).join(", ") : "unknown"}` });
   if (rgb) swatch.style.background = colour(rgb, exposure);

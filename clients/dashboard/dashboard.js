@@ -1,5 +1,6 @@
 // Entry point of the dashboard: "#" shows the list of jobs, "#?state=failed" a part of it, "#ID" one job, "#new" the
-// form for a new job.
+// form for a new job, "#compare/ID,ID" several jobs side by side.
+import { comparePage } from "./compare/compare_page.js";
 import { el } from "./page_parts.js";
 import { droppedFiles } from "./dropped_files.js";
 import { listPage } from "./list/list_page.js";
@@ -26,6 +27,9 @@ function route() {
     page.append(submitPanel(handed));
     handed = [];
     leave = null;
+  } else if (id.startsWith("compare/")) {
+    crumb.append(el("a", { href: "#" }, "Jobs"), " › Comparison");
+    leave = comparePage(page, id.slice("compare/".length));
   } else if (/^[A-Za-z0-9_-]{1,80}$/.test(id)) {
     crumb.append(el("a", { href: "#" }, "Jobs"), " › ", el("span", { class: "mono" }, id));
     leave = jobPage(page, id);

@@ -86,6 +86,8 @@ export const residuals = (job) => ({
   fit: job.result?.fit_rel_rms, fitSe: job.result?.fit_rel_rms_se, held: job.result?.heldout_rel_rms, heldSe: job.result?.heldout_rel_rms_se,
   leftOut: job.result?.cross_validation?.rel_rms, leftOutSe: job.result?.cross_validation?.rel_rms_se, converged: job.result?.converged,
 });
+// The errors of a plain BRDF that was fitted to the same rows; undefined without one.
+export const plainErrors = (job) => ({ fit: job.result?.skill?.plain_brdf?.fit_rel_rms, held: job.result?.skill?.plain_brdf?.heldout_rel_rms });
 // Relative RMS errors of the channels apart: [{set, rgb: [{value, se}]}], without sets that have no rows.
 export function channelErrors(job) {
   const of = (set, key) => ({ set, rgb: (job.result?.[key] ?? []).map((value, c) => ({ value, se: job.result[`${key}_se`]?.[c] })) });

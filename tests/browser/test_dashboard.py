@@ -11,19 +11,27 @@ import pytest
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
 import small_cloth  # noqa: E402
-from browser_page import BIN, complaints, keep, start_daemon, stop_daemon, submit, wait_for  # noqa: E402
+from browser_page import BIN, complaints, keep, sized, start_daemon, stop_daemon, submit, wait_for  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 
 
+LEFT_OUT = 2  # the brightest photograph
+
+
 @pytest.fixture(scope="module")
-def real(tmp_path_factory):
-    """A daemon with the real worker, and a small real job in it: volume, 9 + 4 photographs, two models, few paths."""
-    folder = tmp_path_factory.mktemp("real")
-    sample = folder / "sample"
+def sample(tmp_path_factory):
+    """A folder with a small phantom: scan, fibers and photographs."""
+    sample = tmp_path_factory.mktemp("sample")
     subprocess.run([os.path.join(BIN, "selvedge-phantom"), "cloth", "--weave", "plain", "--fibers-per-yarn", "7", "--diameter-voxel", "6",
                     "--out", str(sample)], check=True, stdout=subprocess.DEVNULL)
     subprocess.run([os.path.join(BIN, "selvedge-phantom"), "photograph", "--fibers", str(sample / "truth.hair"), "--out", str(sample),
                     "--px", "32", "--paths", "4096", "--param", "C_TT=0.7,0.5,0.3"], check=True, stdout=subprocess.DEVNULL)
+    return sample
+
+
+@pytest.fixture(scope="module")
+def real(sample, tmp_path_factory):
+    """A daemon with the real worker, and a small real job in it: volume, 9 + 4 photographs, two models, few paths."""
     photographs = json.loads((sample / "photographs.json").read_text())
     document = {"sample": "small plain weave", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0},
                 "photographs": photographs[:9] + photographs[16:20],
@@ -32,7 +40,7 @@ def real(tmp_path_factory):
                         "candidates": [{"light_theta_deg": t, "light_phi_deg": 0, "camera_theta_deg": 60, "camera_phi_deg": 180}
                                        for t in (20, 65)]}}
     (sample / "job.json").write_text(json.dumps(document))
-    process, url = start_daemon(folder / "data")
+    process, url = start_daemon(tmp_path_factory.mktemp("data"))
     yield url, selvedge.Client(url).submit(str(sample / "job.json"))
     stop_daemon(process)
 
@@ -100,6 +108,92 @@ def test_real_job_live_and_finished(real, browser):
     assert browser.execute_script("return getComputedStyle(document.querySelector('td.number')).textAlign") == "right"
     keep(browser, "quality")
     assert complaints(browser) == []
+
+
+@pytest.fixture(scope="module")
+def other(real, sample):
+    """A second job in the daemon of `real`: the true fibers, the photographs but one, another light budget, one model."""
+    url, first = real
+    first.wait()
+    document = first.state().raw["document"]
+    document["fit"]["path_budget"] = 100000
+    del document["volume"], document["fit"]["models"], document["fit"]["candidates"]
+    document.update(sample="true <i>fibers</i>", fibers={"file": "truth.hair"}, photographs=[p for i, p in enumerate(document["photographs"]) if i != LEFT_OUT])
+    document["fit"].update(model="two_lobe.v1", fixed={"beta_R": 8})
+    second = selvedge.Client(url).submit(document, str(sample))
+    second.wait()
+    return second
+
+
+def test_compare_two_jobs(real, other, browser):
+    """Numbers of the comparison are those of both results; marks are recomputed here."""
+    url, first = real
+    unknown = "00000000-0000-0000-0000-000000000000"
+    draft = selvedge.Client(url).create({"sample": "a draft", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"}})
+    # from the list
+    browser.get(url + "/")
+    wait_for(browser, "document.querySelectorAll('#jobs tbody tr').length >= 3")
+    for id in (first.id, other.id):
+        browser.execute_script("document.querySelector(`#jobs a[href='#${arguments[0]}']`).closest('tr').querySelector('input').click()", id)
+    next(b for b in browser.find_elements(By.CSS_SELECTOR, "#bulk button") if b.text == "Compare").click()
+    wait_for(browser, "document.querySelector('#compare-parameters')")
+    assert browser.current_url.endswith(f"#compare/{first.id},{other.id}")
+    assert browser.find_elements(By.CSS_SELECTOR, "main i") == [] and "true <i>fibers</i>" in browser.find_element(By.ID, "compare").text
+    a, b = first.result().raw, other.result().raw
+
+    def cells(card, title):
+        return browser.execute_script("""return [...document.querySelectorAll(`#${arguments[0]} tr`)].filter((r) => r.querySelector('th[scope=row]')?.textContent.startsWith(arguments[1]))
+            .map((r) => [...r.querySelectorAll('td')].map((d) => d.textContent.trim()))""", card, title)
+    held = cells("compare-errors", "held out")[0]
+    assert all(text.endswith(f"{100 * r['heldout_rel_rms']:.2f} ± {100 * r['heldout_rel_rms_se']:.2f} %") for text, r in zip(held, (a, b)))
+    assert cells("compare-errors", "plain BRDF, held")[0] == [f"{100 * r['skill']['plain_brdf']['heldout_rel_rms']:.2f} %" for r in (a, b)]
+    assert cells("compare-errors", "rows")[0] == ["9 + 4", "8 + 4"]
+    assert "fitted rows are not the same" in browser.find_element(By.CSS_SELECTOR, "#compare-errors .note").text
+    # parameters of the model that both have; the other model has one column
+    mine = {p["name"]: p for p in next(m for m in a["models"] if m["id"] == "two_lobe.v1")["parameters"]}
+    for p in b["parameters"]:
+        pair, q = cells("compare-parameters", p["name"])[0], mine[p["name"]]
+        known = p["determined"] and q["determined"]
+        n = (p["value"] - q["value"]) / ((p["standard_error"] or 0) ** 2 + (q["standard_error"] or 0) ** 2) ** 0.5
+        assert len(pair) == 2 and ("s.e." in pair[1]) == (known and abs(n) > 2) and "s.e." not in pair[0], (p, q, pair)
+    assert len(cells("compare-parameters", "alpha")[0]) == 1 and "fixed" in cells("compare-parameters", "beta_R")[0][1]
+    # every row, and every photograph once with both renderings
+    rows = browser.find_elements(By.CSS_SELECTOR, "#compare-rows tbody tr")
+    assert len(rows) == 13 and sum("–" in r.text for r in rows) == 1
+    browser.execute_script("[...document.querySelectorAll('#compare-pictures button')].forEach((b) => b.click()); for (const i of document.images) i.loading = 'eager'")
+    wait_for(browser, "[...document.images].every((i) => i.complete && i.naturalWidth > 0)")
+    assert len(browser.find_elements(By.CSS_SELECTOR, "#compare-pictures img")) == 13 + 13 + 12
+    # the job without the brightest photograph wrote brighter pictures, which are dimmed to those of the other
+    assert b["png_exposure"] > a["png_exposure"]
+    assert len(browser.find_elements(By.CSS_SELECTOR, "#compare-pictures img[style*=dim-B]")) == 12
+    slope = browser.execute_script("return Number(document.querySelector('#dim-B feFuncG').getAttribute('slope'))")
+    assert abs(slope - a["png_exposure"] / b["png_exposure"]) < 1e-9
+    # settings: those that differ, and no others
+    settings = browser.find_element(By.ID, "compare-settings").text
+    assert cells("compare-settings", "fit.path_budget")[0] == ["300000", "100000"] and cells("compare-settings", "volume.voxel_size_um")[0] == ["2", "not set"]
+    assert "fit.render_px" not in settings and "SHA-256 of truth.hair" in settings
+    missing = first.state().raw["document"]["photographs"][LEFT_OUT]["file"]
+    assert {t for t in browser.execute_script("return [...document.querySelectorAll('#compare-settings th[scope=row]')].map((t) => t.textContent)")
+            if t.startswith("photographs[")} == {f"photographs[{missing}].{k}" for k in first.state().raw["document"]["photographs"][LEFT_OUT]}
+    keep(browser, "compare")
+    with sized(browser, 375, 800):
+        assert browser.execute_script("return document.documentElement.scrollWidth <= innerWidth")
+        keep(browser, "compare-375", 375, 6000)
+    # what cannot be compared says so
+    browser.get(f"{url}/#compare/{first.id},{draft.id},{unknown},{other.id}")
+    wait_for(browser, "document.querySelectorAll('#compare .note').length === 2")
+    said = browser.find_element(By.ID, "compare").text
+    assert f"{unknown}: There is no such job" in said and "B, a draft, has no result: it was not started" in said
+    browser.execute_script("document.querySelector('#compare .compared .button:nth-child(3)').click()")
+    wait_for(browser, f"location.hash === '#compare/{draft.id},{unknown},{other.id}'")
+    many = ",".join([first.id, other.id, *(f"job-{i}" for i in range(7))])
+    browser.get(f"{url}/#compare/{many}")
+    wait_for(browser, "document.querySelector('#compare .note')?.textContent.includes('of the 9 in the address')")
+    browser.get(f"{url}/#compare/{first.id}")
+    wait_for(browser, "document.querySelector('#compare .note')?.textContent.includes('not two jobs')")
+    draft.delete()
+    # an unknown job is a 404 that the browser writes into the console
+    assert [c for c in complaints(browser) if "404" not in c] == []
 
 
 def test_parameters_of_two_groups(real, browser, tmp_path):

@@ -1,4 +1,5 @@
 // What can be done with the selected jobs of the list.
+import { compareAddress, MOST } from "../compare/compare_page.js";
 import { el } from "../page_parts.js";
 import { sendJson } from "../server_link.js";
 
@@ -31,8 +32,9 @@ export function bulkActions(picked, { clear, done }) {
   const withTag = (key) => () => { if (tag.value.trim()) send("tag", { [key]: tag.value.trim().split(/[\s,]+/) }); };
   const button = (text, onclick) => el("button", { type: "button", onclick }, text);
   const cancel = button("Cancel jobs", () => send("cancel")), retry = button("Retry", () => send("retry"));
+  const compare = button("Compare", () => { location.hash = compareAddress([...picked.keys()]); });
   const remove = button("Delete", () => { if (sure) send("delete"); sure = !sure; show(); });
-  const node = el("div", { class: "bulk hidden", id: "bulk", role: "toolbar", "aria-label": "selected jobs" }, count, cancel, retry, remove, tag, button("Add tag", withTag("add_tags")),
+  const node = el("div", { class: "bulk hidden", id: "bulk", role: "toolbar", "aria-label": "selected jobs" }, count, compare, cancel, retry, remove, tag, button("Add tag", withTag("add_tags")),
     button("Remove tag", withTag("remove_tags")), button("Select none", () => { clear(); }), said);
   tag.addEventListener("keydown", (e) => { if (e.key === "Enter") withTag("add_tags")(); });
   function show() {
@@ -40,6 +42,8 @@ export function bulkActions(picked, { clear, done }) {
     count.textContent = jobs.length ? `${jobs.length} selected` : "";
     cancel.disabled = !jobs.some((j) => LIVE.has(j.state) || j.state === "draft");
     retry.disabled = !jobs.some((j) => ENDED.has(j.state));
+    compare.disabled = jobs.length < 2 || jobs.length > MOST;
+    compare.title = compare.disabled ? `Select two to ${MOST} jobs to compare them.` : "side by side";
     remove.textContent = sure ? `Really delete ${jobs.length}?` : "Delete";
     for (const control of [remove, tag]) control.disabled = jobs.length === 0;
     node.classList.toggle("hidden", jobs.length === 0 && said.textContent === "");

@@ -1,0 +1,91 @@
+// Two to eight jobs side by side: "#compare/ID,ID". Each job is a column under the same letter in all tables.
+import { comparedPictures, pictureRows } from "./compare_pictures.js";
+import { documentTable } from "./compare_documents.js";
+import { errorTable, parameterTables, rowTable } from "./compare_tables.js";
+import { el, stateTag, timeLeft, verdictTag } from "../page_parts.js";
+import { configurations } from "../result_view.js";
+import { getJson, poll } from "../server_link.js";
+
+export const MOST = 8;
+const LIVE = new Set(["queued", "running", "paused"]);
+
+export const compareAddress = (ids) => `#compare/${ids.join(",")}`;
+
+// Gets a job with its result and the addresses of its files: {id, job, urls}, or {id, missing} when there is no such job.
+async function fetchColumn(id) {
+  if (!/^[A-Za-z0-9_-]{1,80}$/.test(id)) return { id, missing: "This is no id of a job." };
+  try {
+    const job = { ...await getJson(`/v1/jobs/${id}`) };
+    job.result = job.result_url ? await getJson(job.result_url) : null;
+    job.parameters = job.result?.parameters ?? null;
+    const list = job.result ? await getJson(`/v1/jobs/${id}/results`) : { files: [] };
+    return { id, job, urls: new Map(list.files.map((f) => [f.path, f.url])) };
+  } catch (error) {
+    if (error.status === 404) return { id, missing: "There is no such job: it was deleted, belongs to somebody else, or the address is mistyped." };
+    throw error;
+  }
+}
+
+// Why a job has nothing to compare but its settings; null when it has a result.
+function lackOf({ job }) {
+  if (job.result) return null;
+  if (LIVE.has(job.state)) return `has no result yet (${job.state}${job.state === "running" ? `, ${timeLeft(job)} left` : ""}). This page shows it when it is there.`;
+  if (job.error) return `has no result: ${job.error.text}`;
+  return job.state === "draft" ? "has no result: it was not started." : "has no result.";
+}
+
+function notes(columns, unknown, asked) {
+  const list = [];
+  if (asked > MOST) list.push(`At most ${MOST} jobs are compared: of the ${asked} in the address, these are the first ${MOST}.`);
+  for (const { id, missing } of unknown) list.push(`${id}: ${missing}`);
+  for (const c of columns) if (lackOf(c)) list.push(`${c.letter}, ${c.job.sample}, ${lackOf(c)}`);
+  if (columns.length < 2) list.push("There are not two jobs to compare. Select two to eight jobs in the list, then press “Compare”.");
+  return list.map((text) => el("p", { class: "note" }, text));
+}
+
+function headCard(columns, ids, reference, choose) {
+  const without = (id) => ids.filter((other) => other !== id);
+  const people = columns.map((c) => el("li", {}, el("b", { class: "letter" }, c.letter), el("div", {}, el("a", { href: `#${c.id}` }, c.job.sample || "(no name)"), " ", stateTag(c.job.state), " ", verdictTag(c.job.verdict)),
+    columns.length > 2 ? el("a", { class: "button", href: compareAddress(without(c.id)), "aria-label": `leave ${c.letter}, ${c.job.sample}, out` }, "Leave out") : null));
+  const select = el("select", { onchange: () => choose(select.value) }, columns.map((c) => el("option", { value: c.id, selected: c.id === reference }, `${c.letter}, ${c.job.sample}`)));
+  return [el("ul", { class: "compared" }, people), columns.length > 1 ? el("label", { class: "reference" }, "Differences are from ", select) : null];
+}
+
+const card = (id, title, ...content) => el("section", { class: "card", id }, el("h2", {}, title), ...content);
+
+// columns: [{id, letter, job, urls, list}], the first of which is not always the reference
+function cards(columns, reference) {
+  const ended = columns.filter((c) => c.job.result), base = ended.find((c) => c.id === reference) ?? ended[0], parts = [];
+  if (ended.length) {
+    const parameters = parameterTables(ended, base), rows = pictureRows(ended);
+    parts.push(card("compare-errors", "Verdicts and errors", errorTable(columns, base, rows)));
+    if (parameters.length) parts.push(card("compare-parameters", "Parameters", ...parameters));
+    if (rows.length) parts.push(card("compare-rows", "Errors by row", ...rowTable(ended, base, rows)));
+    if (rows.length) parts.push(card("compare-pictures", "The same photograph with each rendering", ...comparedPictures(ended, rows)));
+  }
+  if (columns.length > 1) parts.push(card("compare-settings", "Settings that differ", ...documentTable(columns)));
+  return parts;
+}
+
+export function comparePage(page, text) {
+  const asked = [...new Set(text.split(",").filter((id) => id !== ""))], ids = asked.slice(0, MOST);
+  const head = el("section", { class: "card", id: "compare" }), rest = el("div");
+  let reference = ids[0], shown = "", columns = [], unknown = [], gone = false;
+  document.title = "Comparison – Selvedge";
+  page.append(head, rest);
+
+  const show = () => {
+    head.replaceChildren(el("h1", {}, "Comparison"), ...headCard(columns, ids, reference, (id) => { reference = id; show(); head.querySelector("select").focus(); }).filter(Boolean), ...notes(columns, unknown, asked.length));
+    rest.replaceChildren(...cards(columns, reference));
+  };
+  const poller = poll(async () => {
+    const all = await Promise.all(ids.map(fetchColumn));
+    if (gone) return 5;
+    columns = all.filter((c) => c.job).map((c, i) => ({ ...c, letter: "ABCDEFGH"[i], list: configurations(c.job, c.urls) }));
+    unknown = all.filter((c) => c.missing);
+    const key = JSON.stringify(all.map(({ id, job }) => [id, job?.state, job?.generation, job?.sample, job?.verdict, job?.error, job?.document, job?.result_url]));
+    if (key !== shown) { shown = key; show(); }
+    return columns.some((c) => LIVE.has(c.job.state)) ? 3 : 30;
+  });
+  return () => { gone = true; poller.stop(); };
+}
