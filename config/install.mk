@@ -21,15 +21,15 @@ purpose_selvedge-phantom := make artificial cloth with known fibers and scatteri
 purpose_selvedge-camera := show how Selvedge reads photographs, and calibrate cameras
 HELP2MAN := $(shell command -v help2man)
 
+DASHBOARD_FOLDERS := $(notdir $(patsubst %/,%,$(wildcard clients/dashboard/*/)))
+
 ##@ Installation
 # configuration: kept where there is one; the default is beside the dashboard
 install: all       ## install below PREFIX (/usr/local) of DESTDIR: programs, dashboard, documents, unit, configuration
-	$(INSTALL) -d $(addprefix "$(DESTDIR)",$(PREFIX)/bin $(SHAREDIR)/dashboard/twin $(SHAREDIR)/dashboard/list $(SHAREDIR)/dashboard/compare $(DOCDIR)/docs/images $(DOCDIR)/examples)
+	$(INSTALL) -d $(addprefix "$(DESTDIR)",$(PREFIX)/bin $(addprefix $(SHAREDIR)/dashboard/,$(DASHBOARD_FOLDERS)) $(DOCDIR)/docs/images $(DOCDIR)/examples)
 	$(INSTALL) $(PROGRAMS) "$(DESTDIR)$(PREFIX)/bin"
 	$(INSTALL) -m 644 $(filter-out %.md,$(wildcard clients/dashboard/*.*)) "$(DESTDIR)$(SHAREDIR)/dashboard"
-	$(INSTALL) -m 644 $(wildcard clients/dashboard/twin/*) "$(DESTDIR)$(SHAREDIR)/dashboard/twin"
-	$(INSTALL) -m 644 $(wildcard clients/dashboard/list/*) "$(DESTDIR)$(SHAREDIR)/dashboard/list"
-	$(INSTALL) -m 644 $(wildcard clients/dashboard/compare/*) "$(DESTDIR)$(SHAREDIR)/dashboard/compare"
+	for folder in $(DASHBOARD_FOLDERS); do $(INSTALL) -m 644 clients/dashboard/$$folder/* "$(DESTDIR)$(SHAREDIR)/dashboard/$$folder" || exit 1; done
 	$(INSTALL) -m 644 config/openapi.json config/result.schema.json config/selvedge.conf "$(DESTDIR)$(SHAREDIR)"
 	$(INSTALL) -m 644 README.md CHANGELOG.md LICENSE "$(DESTDIR)$(DOCDIR)"
 	$(INSTALL) -m 644 docs/*.md "$(DESTDIR)$(DOCDIR)/docs"

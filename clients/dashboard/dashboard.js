@@ -1,5 +1,5 @@
 // Entry point of the dashboard: "#" shows the list of jobs, "#?state=failed" a part of it, "#ID" one job, "#new" the
-// form for a new job, "#compare/ID,ID" several jobs side by side.
+// form for a new job ("#new?copy=ID" filled with the document of another), "#compare/ID,ID" several jobs side by side.
 import { comparePage } from "./compare/compare_page.js";
 import { el } from "./page_parts.js";
 import { droppedFiles } from "./dropped_files.js";
@@ -24,7 +24,7 @@ function route() {
   if (id === "new") {
     document.title = "New job – Selvedge";
     crumb.append(el("a", { href: "#" }, "Jobs"), " › New job");
-    page.append(submitPanel(handed));
+    page.append(submitPanel(handed, new URLSearchParams(query ?? "").get("copy")));
     handed = [];
     leave = null;
   } else if (id.startsWith("compare/")) {

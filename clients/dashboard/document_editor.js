@@ -45,6 +45,14 @@ export function documentEditor(changed) {
     el("summary", {}, "Write or edit the job document"), note, el("div", { class: "columns editor" }, body, text));
   return {
     node,
+    // Opens the form with a document that another job has, and returns its text: indented, if no number is rounded by that.
+    load(now) {
+      const doc = JSON.parse(now);
+      source = holdsLargeNumber(doc) ? now : JSON.stringify(doc, null, 2);
+      render();
+      node.open = true;
+      return source;
+    },
     show(now) { source = now; render(); }, // a document from a file
     async mark(field, message) {
       node.open = true;

@@ -137,6 +137,7 @@ export function jobPage(page, id) {
     job.state === "draft" && !job.missing_files.length ? el("button", { class: "main", onclick: act("start") }, "Start") : null,
     LIVE.has(job.state) ? el("button", { onclick: act("cancel"), disabled: job.cancel_requested }, job.cancel_requested ? "Stopping ..." : "Cancel") : null,
     job.state === "failed" || job.state === "cancelled" ? el("button", { class: "main", onclick: act("retry") }, "Retry from checkpoint") : null,
+    el("a", { class: "button", href: `#new?copy=${id}` }, "Copy with changes"),
     LIVE.has(job.state) ? null : el("button", { onclick: act("delete") }, "Delete"),
   ];
 

@@ -1,5 +1,6 @@
 // Drag and drop of a job document (*.json) and the files that it names. Files are uploaded by tus; uploads continue
 // after a broken connection.
+import { copiedJob } from "./copied_job.js";
 import { documentEditor } from "./document_editor.js";
 import { droppedFiles } from "./dropped_files.js";
 import { el, size } from "./page_parts.js";
@@ -74,23 +75,29 @@ async function declare(job, f, file) {
   return sendJson("POST", url, ask);
 }
 
-// handed: files that were dropped on another page.
-export function submitPanel(handed = []) {
+// handed: files that were dropped on another page. copy: the id of a job whose document is the beginning.
+export function submitPanel(handed = [], copy = null) {
   const dropped = new Map();
-  let doc = null, source = null, busy = false;
+  let doc = null, source = null, busy = false, before = null;
   // kept while the document is the same, so that another try continues an interrupted submit
   let key = null, sent = new Map();
   const list = el("ul"), message = el("p", { class: "hint" }), go = el("button", { class: "main", disabled: true }, "Submit");
   const say = (text, bad) => { message.textContent = text; message.className = bad ? "note bad" : "hint"; };
   const wanted = () => (doc ? filesOf(doc) : []);
   const allow = () => { go.disabled = busy || doc === null || wanted().some((f) => !dropped.has(f.name)); };
+  // What is known of a file from the copied job.
+  const otherSize = (name) => {
+    const known = before?.files.get(name), now = dropped.get(name)?.size;
+    if (known === undefined || now === known) return null;
+    return now === undefined ? el("span", { class: "hint" }, `${size(known)} in the copied job`) : el("span", { class: "tag warn" }, `another file: ${size(known)} in the copied job`);
+  };
   const show = () => {
     const missing = wanted().filter((f) => !dropped.has(f.name));
     list.replaceChildren(...wanted().map((f) => el("li", {}, el("span", { class: "mono" }, f.name),
-      el("span", {}, dropped.has(f.name) ? size(dropped.get(f.name).size) : el("span", { class: "tag warn" }, "still missing")))));
+      el("span", {}, otherSize(f.name), " ", dropped.has(f.name) ? size(dropped.get(f.name).size) : el("span", { class: "tag warn" }, "still missing")))));
     allow();
     if (busy) return;
-    if (doc && missing.length) say(`${missing.length} of ${wanted().length} files are still missing; drop them here.`);
+    if (doc && missing.length) say(`${missing.length} of ${wanted().length} files are still missing; drop them here.${before ? " A copy takes the document, not the files." : ""}`);
     else if (doc) say("Ready.");
   };
   const use = (now) => {
@@ -114,6 +121,17 @@ export function submitPanel(handed = []) {
   const folder = el("input", { type: "file", webkitdirectory: true, onchange: () => take([...folder.files].filter((f) => !f.name.startsWith("."))) });
   const drop = el("div", { class: "drop" }, "Drop a job document (.json) and its files here, or a folder; or choose ", el("label", { class: "file" }, "files", input), " or ",
     el("label", { class: "file" }, "a folder", folder), list, message, go);
+  const from = el("p", { class: "hint" });
+  const begin = async () => {
+    try {
+      before = await copiedJob(copy);
+      const safe = editor.load(before.source);
+      use(safe);
+      from.append("A copy of ", el("a", { href: `#${before.id}` }, before.sample || "(no name)"), ". Change the document below, then submit it: the earlier job stays as it is.");
+      show();
+    } catch (error) { say(error.status === 404 ? `The job to copy is not there: ${error.message}` : error.message, true); }
+  };
+  if (copy !== null) begin();
   if (handed.length) take(handed);
   drop.addEventListener("dragover", (e) => { e.preventDefault(); drop.classList.add("over"); });
   drop.addEventListener("dragleave", () => drop.classList.remove("over"));
@@ -147,5 +165,5 @@ export function submitPanel(handed = []) {
     busy = false;
     allow();
   });
-  return el("section", { class: "card", id: "submit" }, el("h2", {}, "New job"), drop, editor.node);
+  return el("section", { class: "card", id: "submit" }, el("h2", {}, copy === null ? "New job" : "New job, from another one"), from, drop, editor.node);
 }

@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
-from browser_page import ROOT, complaints, keep, start_daemon, stop_daemon, submit, wait_for  # noqa: E402
+from browser_page import ROOT, complaints, keep, sized, start_daemon, stop_daemon, submit, wait_for  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 
 
@@ -187,3 +187,57 @@ def test_the_document_is_sent_as_it_was_written(stub, browser):
     wait_for(browser, "location.hash.length > 10")
     job = selvedge.Client(url).job(browser.execute_script("return location.hash.slice(1)"))
     assert job.document() == document
+
+
+LARGE_SEED = 2 ** 60 + 1  # a double cannot hold it
+
+
+def test_copy_a_job_with_changes(stub, browser, tmp_path):
+    """The form begins with the document of another job; its files are asked for; the other job stays as it is."""
+    url, folder = stub
+    first, sample = submit(url, folder, "copied <b>twill")
+    first.wait()
+    browser.get(f"{url}/#{first.id}")
+    wait_for(browser, "document.querySelector('#state a.button')")
+    click(browser, browser.find_element(By.CSS_SELECTOR, "#state a.button"))
+    wait_for(browser, "document.querySelector('.drop').textContent.includes('2 of 2 files are still missing')")
+    assert browser.current_url.endswith(f"#new?copy={first.id}") and written(browser) == first.state().raw["document"]
+    asked = browser.find_element(By.CSS_SELECTOR, ".drop ul").text
+    assert "scan.tif" in asked and "cloth.csv" in asked and "4 B in the copied job" in asked
+    assert "copied <b>twill" in browser.find_element(By.ID, "submit").text and browser.find_elements(By.CSS_SELECTOR, "#submit p b") == []
+    wait_for(browser, "document.querySelectorAll('#editor .options > *').length >= 9")
+    fill_in(browser, "sample", "changed twill")
+    fill_in(browser, "volume.voxel_size_um", "2.5")
+    (tmp_path / "cloth.csv").write_text("another table\n")
+    drop_in(browser, sample / "scan.tif", tmp_path / "cloth.csv")
+    assert "another file: 4 B in the copied job" in browser.find_element(By.CSS_SELECTOR, ".drop ul").text
+    keep(browser, "copy")
+    with sized(browser, 375, 800):
+        assert browser.execute_script("return document.documentElement.scrollWidth <= innerWidth")
+        keep(browser, "copy-375", 375, 800)
+    click(browser, browser.find_element(By.CSS_SELECTOR, ".drop button"))
+    wait_for(browser, "document.querySelector('.state.succeeded')", 60)
+    made = selvedge.Client(url).job(browser.execute_script("return location.hash.slice(1)")).state().raw
+    assert made["id"] != first.id and made["document"] == {**first.state().raw["document"], "sample": "changed twill", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.5}}
+    assert first.state().raw["document"]["sample"] == "copied <b>twill"
+    assert complaints(browser) == []
+
+
+def test_copy_from_the_list_keeps_large_numbers(stub, browser):
+    url, _ = stub
+    document = {"sample": "seed, \"document\": {", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"}, "fit": {"seed": LARGE_SEED}}
+    job = selvedge.Client(url).create(document)
+    browser.get(f"{url}/#")
+    wait_for(browser, f"document.querySelector('#jobs a[href=\"#{job.id}\"]')")
+    click(browser, browser.find_element(By.CSS_SELECTOR, f"#jobs tr:has(a[href='#{job.id}']) input"))
+    press = {b.text: b for b in browser.find_elements(By.CSS_SELECTOR, "#bulk button")}
+    assert press["Copy"].is_enabled() and not press["Compare"].is_enabled()
+    click(browser, press["Copy"])
+    wait_for(browser, "document.querySelector('#document')?.textContent.includes('seed')")
+    assert written(browser) == document and str(LARGE_SEED) in browser.find_element(By.ID, "document").text
+    browser.get(f"{url}/#new?copy=00000000-0000-0000-0000-000000000000")
+    wait_for(browser, "document.querySelector('.drop .note.bad')?.textContent.includes('The job to copy is not there')")
+    browser.get(f"{url}/#new?copy=%22%3E")
+    wait_for(browser, "document.querySelector('.drop .note.bad')?.textContent.includes('names no job')")
+    job.delete()
+    assert [c for c in complaints(browser) if "404" not in c] == []

@@ -33,8 +33,9 @@ export function bulkActions(picked, { clear, done }) {
   const button = (text, onclick) => el("button", { type: "button", onclick }, text);
   const cancel = button("Cancel jobs", () => send("cancel")), retry = button("Retry", () => send("retry"));
   const compare = button("Compare", () => { location.hash = compareAddress([...picked.keys()]); });
+  const copy = button("Copy", () => { location.hash = `#new?copy=${[...picked.keys()][0]}`; });
   const remove = button("Delete", () => { if (sure) send("delete"); sure = !sure; show(); });
-  const node = el("div", { class: "bulk hidden", id: "bulk", role: "toolbar", "aria-label": "selected jobs" }, count, compare, cancel, retry, remove, tag, button("Add tag", withTag("add_tags")),
+  const node = el("div", { class: "bulk hidden", id: "bulk", role: "toolbar", "aria-label": "selected jobs" }, count, compare, copy, cancel, retry, remove, tag, button("Add tag", withTag("add_tags")),
     button("Remove tag", withTag("remove_tags")), button("Select none", () => { clear(); }), said);
   tag.addEventListener("keydown", (e) => { if (e.key === "Enter") withTag("add_tags")(); });
   function show() {
@@ -44,6 +45,8 @@ export function bulkActions(picked, { clear, done }) {
     retry.disabled = !jobs.some((j) => ENDED.has(j.state));
     compare.disabled = jobs.length < 2 || jobs.length > MOST;
     compare.title = compare.disabled ? `Select two to ${MOST} jobs to compare them.` : "side by side";
+    copy.disabled = jobs.length !== 1;
+    copy.title = copy.disabled ? "Select one job to copy it." : "a new job with this document, to be changed";
     remove.textContent = sure ? `Really delete ${jobs.length}?` : "Delete";
     for (const control of [remove, tag]) control.disabled = jobs.length === 0;
     node.classList.toggle("hidden", jobs.length === 0 && said.textContent === "");
