@@ -6,6 +6,8 @@ import { JobCharts } from "./job_charts.js";
 import { LogTail, WholeLog } from "./log_tail.js";
 import { duration, el, isNumber, percent, percentWithError, refill, size, stateTag, timeLeft, verdictTag, when, withError } from "./page_parts.js";
 import { qualityCard } from "./quality_card.js";
+import { correlationTable } from "./record/correlation_table.js";
+import { jobRecord } from "./record/job_record.js";
 import { channelErrors, choiceOf, configurations, fiberFile, fitted, models, radiusSearch, residuals, sliceFiles } from "./result_view.js";
 import { getJson, poll, sendJson } from "./server_link.js";
 import { SurfacePictures } from "./surface_card.js";
@@ -108,7 +110,7 @@ function downloads(job, list) {
 
 export function jobPage(page, id) {
   const head = el("div", { class: "head" }), stages = el("div", { class: "stages" }), facts = el("div", { class: "facts" }), verdict = el("div"), notes = el("div");
-  const fitCard = el("div"), curveCard = el("div"), surfaces = el("div"), results = el("div", { id: "results" }), logNode = el("pre", { class: "log" });
+  const fitCard = el("div"), curveCard = el("div"), surfaces = el("div"), results = el("div", { id: "results" }), record = el("div"), logNode = el("pre", { class: "log" });
   const charts = new JobCharts(fitCard, curveCard), log = new LogTail(logNode), pictures = new SurfacePictures(surfaces, id);
   const wholeLog = el("details", { id: "whole-log", ontoggle: () => {
     if (!wholeLog.open || wholeLog.childElementCount > 1) return;
@@ -118,7 +120,7 @@ export function jobPage(page, id) {
   } }, el("summary", {}, "Whole log"));
   const curves = el("div", { class: "columns" }, card("Fit", fitCard), card("Parameters over the steps", curveCard));
   page.append(el("section", { class: "card", id: "state" }, head, stages, verdict, facts, notes),
-    curves, surfaces, results,
+    curves, surfaces, results, record,
     el("section", { class: "card" }, el("h2", {}, "Log ", el("small", {}, "its last lines")), logNode, wholeLog));
   let about = null, generation = null, closeFibers = null, closeTwin = null, gone = false;
 
@@ -147,7 +149,7 @@ export function jobPage(page, id) {
     if (gone || results.childElementCount > 0) return;
     const compared = configurations(job, new Map(list.files.map((f) => [f.path, f.url])));
     const slices = sliceFiles(list.files), hair = fiberFile(list.files);
-    const details = fitDetails(job);
+    const details = fitDetails(job), correlated = correlationTable(job);
     const fibers = hair ? fiberView(hair) : null;
     const quality = qualityCard(job, list.files);
     closeFibers = fibers?.close ?? null;
@@ -160,6 +162,7 @@ export function jobPage(page, id) {
       job.result?.models?.length === 0 ? "" : // a job of geometry only has none
         el("div", { class: "columns" }, card("Fitted parameters", parameterTable(fitted(job), "parameters")), card("Measured and rendered means", scatterPlot(compared))),
       details ? card("More results of the fit", details) : "",
+      correlated ? card("Correlation of the parameters", correlated) : "",
       radius ? card("Fiber radius", radiusPlot(radius)) : "",
       compared.length ? card("Measured and rendered pictures", gallery(compared, job.result?.png_exposure)) : "",
       quality ? card("Quality of the geometry", quality) : "",
@@ -193,6 +196,7 @@ export function jobPage(page, id) {
     refill(facts, [job.state, job.message, job.fraction, job.eta_s, job.step, job.objective, job.attempt, job.peak_rss_bytes, job.finished_unix_s], () => factsOf(job));
     refill(verdict, job.verdict, () => [verdictOf(job.verdict)]);
     refill(notes, [job.warnings, job.error, job.state, job.missing_files], () => notesOf(job));
+    refill(record, [job.state, job.generation, job.attempt, job.finished_unix_s, job.missing_files, job.document, job.result_url, job.files], () => [jobRecord(job, about)]);
     curves.hidden = !job.document?.photographs && !job.document?.measurements; // nothing is fitted
     await charts.update(job);
     await log.update(id);

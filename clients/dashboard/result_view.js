@@ -93,6 +93,13 @@ export function channelErrors(job) {
   const of = (set, key) => ({ set, rgb: (job.result?.[key] ?? []).map((value, c) => ({ value, se: job.result[`${key}_se`]?.[c] })) });
   return [of("fitted", "fit_channel_rel_rms"), of("held out", "heldout_channel_rel_rms")].filter(({ rgb }) => rgb.length && rgb.every(({ value }) => isNumber(value)));
 }
+// The correlations of the parameters that are not fixed: {names, matrix}; null for fewer than two.
+export function correlations(job) {
+  const all = job.result?.parameters ?? [], full = job.result?.correlation;
+  const free = all.map((_, i) => i).filter((i) => !all[i].fixed);
+  if (!full || full.length !== all.length || free.length < 2) return null;
+  return { names: free.map((i) => all[i].name), matrix: free.map((i) => free.map((j) => full[i][j])) };
+}
 // By what the best of several models was chosen, as a sentence.
 export const choiceOf = (job) => (job.result?.chosen_by === "cross_validation"
   ? "The best model has the lowest error over fitted rows that were left out in turn (cross-validation); held-out rows have no part in the choice."

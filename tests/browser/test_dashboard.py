@@ -110,6 +110,36 @@ def test_real_job_live_and_finished(real, browser):
     assert complaints(browser) == []
 
 
+def test_correlations_and_record(real, browser):
+    """The shaded table and its words are the matrix of result.json; inputs have the hashes of their bytes."""
+    url, job = real
+    job.wait()
+    browser.get(f"{url}/#{job.id}")
+    wait_for(browser, "document.querySelector('#correlation')")
+    result, state = job.result().raw, job.state().raw
+    free = [i for i, p in enumerate(result["parameters"]) if not p["fixed"]]
+    shown = browser.execute_script("return [...document.querySelectorAll('#correlation tbody tr')].map((r) => [...r.querySelectorAll('td')].map((d) => Number(d.textContent.replace('−', '-'))))")
+    wanted = [[result["correlation"][i][j] for j in free] for i in free]
+    assert all(abs(a - b) <= 0.005 + 1e-9 for x, y in zip(shown, wanted) for a, b in zip(x, y)) and [len(x) for x in shown] == [len(free)] * len(free)
+    strong = max(((abs(wanted[i][j]), i, j) for i in range(len(free)) for j in range(i)))
+    names = [result["parameters"][i]["name"] for i in free]
+    assert strong[0] < 0.7 or f"Strongest: {names[strong[2]]} and {names[strong[1]]} (" in browser.find_element(By.ID, "correlation-words").text
+    inputs = [e.text for e in browser.find_elements(By.CSS_SELECTOR, "#record-inputs tbody tr")]
+    assert len(inputs) == 14 and all(f["name"] in t and f["sha256"] in t for f, t in zip(state["files"], inputs))
+    dates = browser.find_element(By.ID, "record-dates").text
+    assert job.id in dates and result["program"] in dates and len(browser.find_elements(By.CSS_SELECTOR, "#record-dates time[title$=UTC]")) == 4
+    browser.execute_script("document.querySelector('#record details').open = true")
+    settings = browser.find_element(By.ID, "record-settings").text
+    assert "volume.voxel_size_um 2" in settings and f"photographs[{state['document']['photographs'][0]['file']}].light_theta_deg" in settings
+    keep(browser, "record")
+    with sized(browser, 375, 800):
+        assert browser.execute_script("return document.documentElement.scrollWidth <= innerWidth")
+        for part in ("correlation", "record"):
+            browser.execute_script("document.getElementById(arguments[0]).scrollIntoView()", part)
+            keep(browser, f"{part}-375", 375, 800)
+    assert complaints(browser) == []
+
+
 @pytest.fixture(scope="module")
 def other(real, sample):
     """A second job in the daemon of `real`: the true fibers, the photographs but one, another light budget, one model."""

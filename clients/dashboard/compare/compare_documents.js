@@ -12,13 +12,16 @@ function elementNames(list) {
   return files.every((f) => f !== null) && new Set(files).size === files.length ? files : list.map((_, i) => String(i));
 }
 
+// A whole number above 2^53, which reading has rounded.
+const isRounded = (x) => Number.isInteger(x) && !Number.isSafeInteger(x);
+
 // Fills `out` with path -> value as JSON, for every value of the document; a list of plain values is one value.
 export function flatten(value, path = "", out = new Map()) {
   if (isObject(value) && Object.keys(value).length) for (const [key, inner] of Object.entries(value)) flatten(inner, path ? `${path}.${key}` : key, out);
   else if (Array.isArray(value) && value.some(isObject)) {
     const names = elementNames(value);
     value.forEach((inner, i) => flatten(inner, `${path}[${names[i]}]`, out));
-  } else out.set(path, JSON.stringify(value));
+  } else out.set(path, isRounded(value) ? `about ${value}` : JSON.stringify(value));
   return out;
 }
 

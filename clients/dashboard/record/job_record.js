@@ -1,0 +1,42 @@
+// What a job was made of: settings of its document, input files with sizes and SHA-256, versions and dates.
+import { flatten } from "../compare/compare_documents.js";
+import { el, size, timeOf } from "../page_parts.js";
+
+const OPEN = 14; // settings that are shown without a click
+
+const pair = (name, ...value) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, ...value));
+
+function dates(job, about) {
+  const { result } = job;
+  return el("table", { class: "record", id: "record-dates" }, el("tbody", {}, [
+    pair("id", el("span", { class: "mono" }, job.id)),
+    job.owner ? pair("owner", job.owner) : null,
+    pair("computed by", result?.program ?? "–", el("span", { class: "hint" }, `  (this server: ${about.name} ${about.version})`)),
+    result?.model ? pair("model", el("span", { class: "mono" }, result.model)) : null,
+    result && Number.isSafeInteger(result.seed) ? pair("seed", el("span", { class: "mono" }, String(result.seed))) : null,
+    pair("created", timeOf(job.created_unix_s)), pair("started", timeOf(job.started_unix_s)), pair("finished", timeOf(job.finished_unix_s)),
+    pair("changed", timeOf(job.updated_unix_s)),
+    pair("fresh starts, attempts", `${job.generation}, ${job.attempt}`),
+  ].filter(Boolean)));
+}
+
+function inputs(job) {
+  const files = job.files ?? [], missing = (job.missing_files ?? []).filter((name) => !files.some((f) => f.name === name));
+  if (files.length + missing.length === 0) return el("p", { class: "hint" }, "This job has no input files.");
+  const line = (f) => el("tr", {}, el("td", {}, f.state === "complete" ? el("a", { href: f.url, class: "mono", download: f.name }, f.name) : el("span", { class: "mono" }, f.name)),
+    el("td", {}, f.role.replaceAll("_", " ")), el("td", { class: "number" }, size(f.size)),
+    el("td", { class: "mono hash" }, f.state === "complete" ? f.sha256 ?? "–" : el("span", { class: "tag warn" }, `${size(f.offset)} have arrived`)));
+  return el("div", { class: "wide", tabIndex: 0, role: "region", "aria-label": "input files" }, el("table", { class: "record", id: "record-inputs" },
+    el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "File"), el("th", { scope: "col" }, "What"), el("th", { scope: "col", class: "number" }, "Size"), el("th", { scope: "col" }, "SHA-256 of its bytes"))),
+    el("tbody", {}, files.map(line), missing.map((name) => el("tr", {}, el("td", { class: "mono" }, name), el("td", {}), el("td", {}), el("td", {}, el("span", { class: "tag warn" }, "missing")))))));
+}
+
+function settings(job) {
+  const rows = [...flatten(job.document ?? {})].map(([path, value]) => pair(el("span", { class: "mono" }, path), el("span", { class: "mono" }, value)));
+  const table = el("table", { class: "record", id: "record-settings" }, el("tbody", {}, rows));
+  const words = el("p", { class: "hint" }, "What the job document sets; for everything else the defaults of the version hold that computed the job.");
+  return rows.length <= OPEN ? [words, table] : [words, el("details", {}, el("summary", {}, `${rows.length} settings`), el("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": "settings" }, table))];
+}
+
+export const jobRecord = (job, about) => el("section", { class: "card", id: "record" }, el("h2", {}, "Settings, inputs, versions and dates"),
+  dates(job, about), el("h3", {}, "Inputs"), inputs(job), el("h3", {}, "Settings"), settings(job));
