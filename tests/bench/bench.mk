@@ -96,7 +96,7 @@ docs-pictures: | deps-test ## make docs/images/{twill,derivatives,cloth-weaves,c
 	@$(BUILD)/tests/bench/pictures/documentation_pictures twill docs/images/twill.png
 	@$(BUILD)/tests/bench/pictures/documentation_pictures derivatives docs/images/derivatives.png
 
-bench-pictures: bench-browser ## figures of pictures
+bench-pictures: bench-browser
 bench-browser: | deps-test ## the twin in headless Chromium against the path-traced picture of the same view (2 minutes; part of bench-pictures)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/pictures/bench_twin.py --build $(BUILD)
