@@ -106,7 +106,7 @@ static status write_picture(const struct textures *t, const struct image *im, co
     snprintf(partial, sizeof partial, "part-%s", name);
     export_path(t->e, name, path);
     export_path(t->e, partial, part);
-    status s;
+    status s = STATUS_OK;
     if (kind == PICTURE_SRGB) s = image_write_png(im, 1.0, part, err);
     if (kind == PICTURE_EXR) s = image_write_exr(im, part, err);
     if (kind == PICTURE_NUMBERS) {
