@@ -118,7 +118,8 @@ def test_correlations_and_record(real, browser):
     wait_for(browser, "document.querySelector('#correlation')")
     result, state = job.result().raw, job.state().raw
     free = [i for i, p in enumerate(result["parameters"]) if not p["fixed"]]
-    shown = browser.execute_script("return [...document.querySelectorAll('#correlation tbody tr')].map((r) => [...r.querySelectorAll('td')].map((d) => Number(d.textContent.replace('−', '-'))))")
+    shown = browser.execute_script("""return [...document.querySelectorAll('#correlation tbody tr')]
+        .map((r) => [...r.querySelectorAll('td')].map((d) => Number(d.textContent.replace('−', '-'))))""")
     wanted = [[result["correlation"][i][j] for j in free] for i in free]
     assert all(abs(a - b) <= 0.005 + 1e-9 for x, y in zip(shown, wanted) for a, b in zip(x, y)) and [len(x) for x in shown] == [len(free)] * len(free)
     strong = max(((abs(wanted[i][j]), i, j) for i in range(len(free)) for j in range(i)))
@@ -172,7 +173,8 @@ def test_compare_two_jobs(real, other, browser):
     a, b = first.result().raw, other.result().raw
 
     def cells(card, title):
-        return browser.execute_script("""return [...document.querySelectorAll(`#${arguments[0]} tr`)].filter((r) => r.querySelector('th[scope=row]')?.textContent.startsWith(arguments[1]))
+        return browser.execute_script("""return [...document.querySelectorAll(`#${arguments[0]} tr`)]
+            .filter((r) => r.querySelector('th[scope=row]')?.textContent.startsWith(arguments[1]))
             .map((r) => [...r.querySelectorAll('td')].map((d) => d.textContent.trim()))""", card, title)
     held = cells("compare-errors", "held out")[0]
     assert all(text.endswith(f"{100 * r['heldout_rel_rms']:.2f} ± {100 * r['heldout_rel_rms_se']:.2f} %") for text, r in zip(held, (a, b)))
@@ -190,7 +192,8 @@ def test_compare_two_jobs(real, other, browser):
     # every row, and every photograph once with both renderings
     rows = browser.find_elements(By.CSS_SELECTOR, "#compare-rows tbody tr")
     assert len(rows) == 13 and sum("–" in r.text for r in rows) == 1
-    browser.execute_script("[...document.querySelectorAll('#compare-pictures button')].forEach((b) => b.click()); for (const i of document.images) i.loading = 'eager'")
+    browser.execute_script("""for (const b of document.querySelectorAll('#compare-pictures button')) b.click();
+        for (const i of document.images) i.loading = 'eager';""")
     wait_for(browser, "[...document.images].every((i) => i.complete && i.naturalWidth > 0)")
     assert len(browser.find_elements(By.CSS_SELECTOR, "#compare-pictures img")) == 13 + 13 + 12
     # the job without the brightest photograph wrote brighter pictures, which are dimmed to those of the other
