@@ -58,7 +58,13 @@ static void job_init(struct job *j, const char *cloth, const char *yarn)
     j->c.observation = (struct observation_set){.n = 2, .item = j->row};
 }
 
-static void job_release(struct job *j) { job_document_free(j->doc); }
+/* The context's other members are the test's own or hold nothing. */
+static void job_release(struct job *j)
+{
+    json_decref(j->c.exports);
+    json_decref(j->c.surface_pictures);
+    job_document_free(j->doc);
+}
 
 static double number(const struct job *j, const char *name)
 {
