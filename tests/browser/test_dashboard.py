@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
 import small_cloth  # noqa: E402
-from browser_page import BIN, complaints, keep, sized, start_daemon, stop_daemon, submit, wait_for  # noqa: E402
+from browser_page import BIN, click_on, complaints, keep, sized, start_daemon, stop_daemon, submit, text_of, texts, wait_for  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 
 
@@ -49,13 +49,13 @@ def test_real_job_live_and_finished(real, browser):
     url, job = real
     browser.get(url + "/")
     wait_for(browser, "document.querySelector('#jobs tbody tr')")
-    assert "small plain weave" in browser.find_element(By.ID, "jobs").text
+    assert "small plain weave" in text_of(browser, "#jobs")
     keep(browser, "list")
-    browser.find_element(By.CSS_SELECTOR, "#jobs tbody tr a").click()
+    click_on(browser, "#jobs tbody tr a")
     wait_for(browser, "document.querySelectorAll('.stage').length === 8")
     # while the job runs: curves appear during the fit
     wait_for(browser, "document.querySelectorAll('.chart canvas').length >= 8", 240)
-    assert any(e.text.startswith("Objective") for e in browser.find_elements(By.CSS_SELECTOR, ".chart-title"))
+    assert any(t.startswith("Objective") for t in texts(browser, ".chart-title"))
     keep(browser, "running")
     # finished
     wait_for(browser, "document.querySelector('.state.succeeded')", 400)
@@ -63,47 +63,47 @@ def test_real_job_live_and_finished(real, browser):
     # the curves of both models under their own names, and the table that compares them
 
     def titles():
-        return [e.text for e in browser.find_elements(By.CSS_SELECTOR, ".chart-title")]
+        return texts(browser, ".chart-title")
     wait_for(browser, "document.querySelectorAll('#models-shown button').length === 2")
     # the curves of the best model, although the other was fitted last
     wait_for(browser, "document.querySelector('#models-shown button.main').textContent === 'two_lobe.v1'")
     wait_for(browser, "document.querySelectorAll('.chart canvas').length >= 14")
     assert any(t.startswith("beta_TT (°)") for t in titles()) and not any(t.startswith("alpha") for t in titles())
-    browser.find_elements(By.CSS_SELECTOR, "#models-shown button")[1].click()
+    click_on(browser, "#models-shown button", 1)
     wait_for(browser, "[...document.querySelectorAll('.chart-title')].some((e) => e.textContent.startsWith('alpha'))")
     assert not any(t.startswith("C_TT") for t in titles())
     keep(browser, "second-model")
-    compared = [e.text for e in browser.find_elements(By.CSS_SELECTOR, "#models tbody tr")]
+    compared = texts(browser, "#models tbody tr")
     assert [c.split()[0] for c in compared] == ["two_lobe.v1", "microflake.v1"] and sum("best" in c for c in compared) == 1 and "best" in compared[0]
     result = job.result().raw
-    rows = [e.text for e in browser.find_elements(By.CSS_SELECTOR, "#parameters tbody tr")]
+    rows = texts(browser, "#parameters tbody tr")
     assert len(rows) == 9 and rows[0].startswith("C_R.r") and "±" in rows[3]
     n_positive = sum(m > 0 and r > 0 for row in result["rows"] for m, r in zip(row["measured"], row["rendered"]))
     assert len(browser.find_elements(By.CSS_SELECTOR, "svg.scatter circle")) == n_positive
-    pairs = browser.find_elements(By.CSS_SELECTOR, ".pair")
-    assert len(pairs) == 13 and sum("held" in p.get_attribute("class") for p in pairs) == 4
+    pairs = browser.execute_script("return [...document.querySelectorAll('.pair')].map((p) => p.className)")
+    assert len(pairs) == 13 and sum("held" in p for p in pairs) == 4
     browser.execute_script("for (const i of document.images) i.loading = 'eager'")
     wait_for(browser, "[...document.images].every((i) => i.complete && i.naturalWidth > 0)")
     assert len(browser.find_elements(By.CSS_SELECTOR, ".pair img")) == 26
     assert len(browser.find_elements(By.CSS_SELECTOR, ".slices img")) == 3
-    assert "passed" in browser.find_element(By.ID, "certificate").text
+    assert "passed" in text_of(browser, "#certificate")
     assert len(browser.find_elements(By.CSS_SELECTOR, "#next-photograph tbody tr")) == 2
-    textures = [e.text for e in browser.find_elements(By.CSS_SELECTOR, "#textures tbody tr")]
+    textures = texts(browser, "#textures tbody tr")
     assert len(textures) == 13 and all("%" in t for t in textures)
     assert all(len(m["rows"][0]["texture"]["rendered_se"]) == 3 for m in result["models"])
-    listed = browser.find_element(By.ID, "files").text
+    listed = text_of(browser, "#files")
     assert "result.json" in listed and "fibers.hair" in listed and "density.vol" in listed
-    assert "stage" in browser.find_element(By.CSS_SELECTOR, "pre.log").text
+    assert "stage" in text_of(browser, "pre.log")
     # fibers in 3D, or a sentence with the reason (a machine without WebGL)
     browser.execute_script("document.querySelector('.view3d button').click()")
     wait_for(browser, "document.querySelector('.view3d canvas') || document.querySelector('.view3d').textContent.includes('not available')")
     # the key figures of the geometry, and the page with all of them
-    quality = browser.find_element(By.ID, "quality").text
+    quality = text_of(browser, "#quality")
     assert "material explained" in quality and "direction noise" in quality and "continue" in quality
     keep(browser, "finished")
     assert complaints(browser) == []
-    browser.get(browser.find_element(By.CSS_SELECTOR, "#quality a").get_attribute("href"))
-    assert job.state().sample in browser.find_element(By.TAG_NAME, "h1").text
+    browser.get(browser.execute_script("return document.querySelector('#quality a').href"))
+    assert job.state().sample in text_of(browser, "h1")
     wait_for(browser, "[...document.images].length === 5 && [...document.images].every((i) => i.complete && i.naturalWidth > 0)")
     assert browser.execute_script("return getComputedStyle(document.querySelector('td.number')).textAlign") == "right"
     keep(browser, "quality")
@@ -124,13 +124,13 @@ def test_correlations_and_record(real, browser):
     assert all(abs(a - b) <= 0.005 + 1e-9 for x, y in zip(shown, wanted) for a, b in zip(x, y)) and [len(x) for x in shown] == [len(free)] * len(free)
     strong = max(((abs(wanted[i][j]), i, j) for i in range(len(free)) for j in range(i)))
     names = [result["parameters"][i]["name"] for i in free]
-    assert strong[0] < 0.7 or f"Strongest: {names[strong[2]]} and {names[strong[1]]} (" in browser.find_element(By.ID, "correlation-words").text
-    inputs = [e.text for e in browser.find_elements(By.CSS_SELECTOR, "#record-inputs tbody tr")]
+    assert strong[0] < 0.7 or f"Strongest: {names[strong[2]]} and {names[strong[1]]} (" in text_of(browser, "#correlation-words")
+    inputs = texts(browser, "#record-inputs tbody tr")
     assert len(inputs) == 14 and all(f["name"] in t and f["sha256"] in t for f, t in zip(state["files"], inputs))
-    dates = browser.find_element(By.ID, "record-dates").text
+    dates = text_of(browser, "#record-dates")
     assert job.id in dates and result["program"] in dates and len(browser.find_elements(By.CSS_SELECTOR, "#record-dates time[title$=UTC]")) == 4
     browser.execute_script("document.querySelector('#record details').open = true")
-    settings = browser.find_element(By.ID, "record-settings").text
+    settings = text_of(browser, "#record-settings")
     assert "volume.voxel_size_um 2" in settings and f"photographs[{state['document']['photographs'][0]['file']}].light_theta_deg" in settings
     keep(browser, "record")
     with sized(browser, 375, 800):
@@ -166,10 +166,10 @@ def test_compare_two_jobs(real, other, browser):
     wait_for(browser, "document.querySelectorAll('#jobs tbody tr').length >= 3")
     for id in (first.id, other.id):
         browser.execute_script("document.querySelector(`#jobs a[href='#${arguments[0]}']`).closest('tr').querySelector('input').click()", id)
-    next(b for b in browser.find_elements(By.CSS_SELECTOR, "#bulk button") if b.text == "Compare").click()
+    click_on(browser, "#bulk button", texts(browser, "#bulk button").index("Compare"))
     wait_for(browser, "document.querySelector('#compare-parameters')")
     assert browser.current_url.endswith(f"#compare/{first.id},{other.id}")
-    assert browser.find_elements(By.CSS_SELECTOR, "main i") == [] and "true <i>fibers</i>" in browser.find_element(By.ID, "compare").text
+    assert browser.find_elements(By.CSS_SELECTOR, "main i") == [] and "true <i>fibers</i>" in text_of(browser, "#compare")
     a, b = first.result().raw, other.result().raw
 
     def cells(card, title):
@@ -180,7 +180,7 @@ def test_compare_two_jobs(real, other, browser):
     assert all(text.endswith(f"{100 * r['heldout_rel_rms']:.2f} ± {100 * r['heldout_rel_rms_se']:.2f} %") for text, r in zip(held, (a, b)))
     assert cells("compare-errors", "plain BRDF, held")[0] == [f"{100 * r['skill']['plain_brdf']['heldout_rel_rms']:.2f} %" for r in (a, b)]
     assert cells("compare-errors", "rows")[0] == ["9 + 4", "8 + 4"]
-    assert "fitted rows are not the same" in browser.find_element(By.CSS_SELECTOR, "#compare-errors .note").text
+    assert "fitted rows are not the same" in text_of(browser, "#compare-errors .note")
     # parameters of the model that both have; the other model has one column
     mine = {p["name"]: p for p in next(m for m in a["models"] if m["id"] == "two_lobe.v1")["parameters"]}
     for p in b["parameters"]:
@@ -202,7 +202,7 @@ def test_compare_two_jobs(real, other, browser):
     slope = browser.execute_script("return Number(document.querySelector('#dim-B feFuncG').getAttribute('slope'))")
     assert abs(slope - a["png_exposure"] / b["png_exposure"]) < 1e-9
     # settings: those that differ, and no others
-    settings = browser.find_element(By.ID, "compare-settings").text
+    settings = text_of(browser, "#compare-settings")
     assert cells("compare-settings", "fit.path_budget")[0] == ["300000", "100000"] and cells("compare-settings", "volume.voxel_size_um")[0] == ["2", "not set"]
     assert "fit.render_px" not in settings and "SHA-256 of truth.hair" in settings
     missing = first.state().raw["document"]["photographs"][LEFT_OUT]["file"]
@@ -215,7 +215,7 @@ def test_compare_two_jobs(real, other, browser):
     # what cannot be compared says so
     browser.get(f"{url}/#compare/{first.id},{draft.id},{unknown},{other.id}")
     wait_for(browser, "document.querySelectorAll('#compare .note').length === 2")
-    said = browser.find_element(By.ID, "compare").text
+    said = text_of(browser, "#compare")
     assert f"{unknown}: There is no such job" in said and "B, a draft, has no result: it was not started" in said
     browser.execute_script("document.querySelector('#compare .compared .button:nth-child(3)').click()")
     wait_for(browser, f"location.hash === '#compare/{draft.id},{unknown},{other.id}'")
@@ -242,7 +242,7 @@ def test_parameters_of_two_groups(real, browser, tmp_path):
     job.wait()
     browser.get(f"{url}/#{job.id}")
     wait_for(browser, "document.querySelector('#parameters')")
-    rows = [e.text for e in browser.find_elements(By.CSS_SELECTOR, "#parameters tbody tr")]
+    rows = texts(browser, "#parameters tbody tr")
     assert len(rows) == 20 and rows[0] == "weft" and rows[1].startswith("C_R.r ") and rows[10] == "warp" and rows[11].startswith("C_R.r ")
     assert "fixed" in rows[7] and "tied to weft.beta_TT" in rows[18]
     wait_for(browser, "document.querySelectorAll('.charts').length === 2")
@@ -265,7 +265,7 @@ def test_corrections(real, browser, tmp_path):
     job.wait()
     browser.get(f"{url}/#{job.id}")
     wait_for(browser, "document.querySelector('#corrections')")
-    text = browser.find_element(By.ID, "corrections").text
+    text = text_of(browser, "#corrections")
     result = job.result().raw
     without = result["without_corrections"]
     keeps = without["heldout_gain"] >= 2 * without["heldout_gain_se"]
@@ -273,7 +273,7 @@ def test_corrections(real, browser, tmp_path):
     assert ("ask for radius" if without["asked_for"] else "ask for none of these corrections") in text
     assert f"{100 * without['heldout_rel_rms']:.2f} % over the held-out rows; with them: {100 * result['fit_rel_rms']:.2f} %" in text
     assert f"{100 * abs(without['heldout_gain']):.2f} % ± {100 * without['heldout_gain_se']:.2f} %" in text
-    assert browser.find_element(By.CSS_SELECTOR, "#cloth-numbers tbody tr").text.startswith("radius")
+    assert text_of(browser, "#cloth-numbers tbody tr").startswith("radius")
     keep(browser, "corrections")
     assert complaints(browser) == []
 
@@ -294,7 +294,7 @@ def test_pictures_grow_on_the_page(real, browser, tmp_path):
     job.wait()
     wait_for(browser, "document.querySelectorAll('#surfaces figure').length === 2 && !document.querySelector('#surfaces .tag')", 60)
     noise = [p["noise"] for p in job.result().raw["pictures"]]
-    shown = [e.text for e in browser.find_elements(By.CSS_SELECTOR, "#surfaces figcaption")]
+    shown = texts(browser, "#surfaces figcaption")
     assert [t.split()[0] for t in shown] == ["cylinder", "flat"] and all("θ 45°" in t for t in shown)
     assert all(abs(float(t.split("noise")[1].split()[0]) - 100 * n) < 0.06 * 100 * n + 0.06 for t, n in zip(shown, noise)), (shown, noise)
     assert browser.execute_script("return [...document.querySelectorAll('#surfaces img')].every(i => i.complete && i.naturalWidth === 32)")
@@ -309,10 +309,10 @@ def test_failed_job_and_hostile_name(stub, browser):
         job.wait()
     browser.get(f"{url}/#{job.id}")
     wait_for(browser, "document.querySelector('.note.bad')")
-    assert "volume.files" in browser.find_element(By.CSS_SELECTOR, ".note.bad").text
-    assert browser.find_element(By.TAG_NAME, "h1").text == "failing <img src=x onerror=alert(1)>"
+    assert "volume.files" in text_of(browser, ".note.bad")
+    assert text_of(browser, "h1") == "failing <img src=x onerror=alert(1)>"
     assert browser.find_elements(By.CSS_SELECTOR, "main img") == []
-    assert "Retry from checkpoint" in browser.find_element(By.ID, "state").text
+    assert "Retry from checkpoint" in text_of(browser, "#state")
     keep(browser, "failed")
     assert complaints(browser) == []
 

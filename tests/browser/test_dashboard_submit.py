@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
-from browser_page import ROOT, complaints, keep, sized, start_daemon, stop_daemon, submit, wait_for  # noqa: E402
+from browser_page import ROOT, click_on, complaints, keep, sized, start_daemon, stop_daemon, submit, text_of, wait_for  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 
 
@@ -21,10 +21,10 @@ def test_submit_by_choosing_files(stub, browser):
     assert not browser.find_element(By.CSS_SELECTOR, ".drop button").is_enabled()
     chooser.send_keys("\n".join(str(sample / n) for n in ("scan.tif", "cloth.csv")))
     wait_for(browser, "!document.querySelector('.drop button').disabled")
-    browser.find_element(By.CSS_SELECTOR, ".drop button").click()
+    click_on(browser, ".drop button")
     wait_for(browser, "location.hash.length > 10")
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)
-    assert browser.find_element(By.TAG_NAME, "h1").text == "dropped twill"
+    assert text_of(browser, "h1") == "dropped twill"
     files = {f["name"]: f for f in selvedge.Client(url).job(browser.execute_script("return location.hash.slice(1)")).state().raw["files"]}
     assert files["scan.tif"]["state"] == "complete" and files["scan.tif"]["sha256"]
     assert complaints(browser) == []
@@ -64,7 +64,7 @@ def fill_in(browser, path, text):
 
 
 def written(browser):
-    return json.loads(browser.find_element(By.ID, "document").text)
+    return json.loads(text_of(browser, "#document"))
 
 
 def test_form_writes_a_job_document(stub, browser, tmp_path):
@@ -126,7 +126,7 @@ def test_form_edits_a_dropped_document(stub, browser):
     (sample / "job.json").write_text(json.dumps({**before, "fit": {"seed": 2**60 + 1}}))
     drop_in(browser, sample / "job.json")
     wait_for(browser, "document.querySelector('#editor').textContent.includes('cannot edit this document')")
-    assert browser.find_elements(By.CSS_SELECTOR, "#editor .option") == [] and str(2**60 + 1) in browser.find_element(By.ID, "document").text
+    assert browser.find_elements(By.CSS_SELECTOR, "#editor .option") == [] and str(2**60 + 1) in text_of(browser, "#document")
     assert complaints(browser) == []
 
 
@@ -138,7 +138,7 @@ def test_pieces_are_no_larger_than_the_server_takes(browser, tmp_path):
         (sample / "scan.tif").write_bytes(os.urandom(2_500_000))
         browser.get(url + "/#new")
         drop_in(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))
-        browser.find_element(By.CSS_SELECTOR, ".drop button").click()
+        click_on(browser, ".drop button")
         wait_for(browser, "document.querySelector('.state.succeeded')")
         assert complaints(browser) == []
     finally:
@@ -183,7 +183,7 @@ def test_the_document_is_sent_as_it_was_written(stub, browser):
     (sample / "job.json").write_text(json.dumps(document))
     browser.get(url + "/#new")
     drop_in(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))
-    browser.find_element(By.CSS_SELECTOR, ".drop button").click()
+    click_on(browser, ".drop button")
     wait_for(browser, "location.hash.length > 10")
     job = selvedge.Client(url).job(browser.execute_script("return location.hash.slice(1)"))
     assert job.document() == document
@@ -202,15 +202,15 @@ def test_copy_a_job_with_changes(stub, browser, tmp_path):
     click(browser, browser.find_element(By.CSS_SELECTOR, "#state a.button"))
     wait_for(browser, "document.querySelector('.drop').textContent.includes('2 of 2 files are still missing')")
     assert browser.current_url.endswith(f"#new?copy={first.id}") and written(browser) == first.state().raw["document"]
-    asked = browser.find_element(By.CSS_SELECTOR, ".drop ul").text
+    asked = text_of(browser, ".drop ul")
     assert "scan.tif" in asked and "cloth.csv" in asked and "4 B in the copied job" in asked
-    assert "copied <b>twill" in browser.find_element(By.ID, "submit").text and browser.find_elements(By.CSS_SELECTOR, "#submit p b") == []
+    assert "copied <b>twill" in text_of(browser, "#submit") and browser.find_elements(By.CSS_SELECTOR, "#submit p b") == []
     wait_for(browser, "document.querySelectorAll('#editor .options > *').length >= 9")
     fill_in(browser, "sample", "changed twill")
     fill_in(browser, "volume.voxel_size_um", "2.5")
     (tmp_path / "cloth.csv").write_text("another table\n")
     drop_in(browser, sample / "scan.tif", tmp_path / "cloth.csv")
-    assert "another file: 4 B in the copied job" in browser.find_element(By.CSS_SELECTOR, ".drop ul").text
+    assert "another file: 4 B in the copied job" in text_of(browser, ".drop ul")
     keep(browser, "copy")
     with sized(browser, 375, 800):
         assert browser.execute_script("return document.documentElement.scrollWidth <= innerWidth")
@@ -235,7 +235,7 @@ def test_copy_from_the_list_keeps_large_numbers(stub, browser):
     assert press["Copy"].is_enabled() and not press["Compare"].is_enabled()
     click(browser, press["Copy"])
     wait_for(browser, "document.querySelector('#document')?.textContent.includes('seed')")
-    assert written(browser) == document and str(LARGE_SEED) in browser.find_element(By.ID, "document").text
+    assert written(browser) == document and str(LARGE_SEED) in text_of(browser, "#document")
     browser.get(f"{url}/#new?copy=00000000-0000-0000-0000-000000000000")
     wait_for(browser, "document.querySelector('.drop .note.bad')?.textContent.includes('The job to copy is not there')")
     browser.get(f"{url}/#new?copy=%22%3E")

@@ -3,7 +3,7 @@ import pytest
 
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
-from browser_page import complaints, keep, sized, submit, wait_for  # noqa: E402
+from browser_page import click_on, complaints, keep, sized, submit, text_of, texts, wait_for  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 
 DOCUMENT = {"volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}, "measurements": {"file": "rows.csv"}}
@@ -38,24 +38,25 @@ def test_every_job_can_be_found(many, browser):
     seen = browser.execute_script(SAMPLES)
     assert seen[:3] == ["failing <b>twill", "blue twill", "draft 122"]
     for _ in range(2):
-        browser.find_elements(By.CSS_SELECTOR, ".pages button")[1].click()
+        click_on(browser, ".pages button", 1)
         wait_for(browser, f"document.querySelector('#jobs tbody td.sample a')?.textContent === 'draft {124 - len(seen):03d}'")
         seen += browser.execute_script(SAMPLES)
-    assert len(seen) == len(set(seen)) == 125 and not browser.find_elements(By.CSS_SELECTOR, ".pages button")[1].is_enabled()
+    assert len(seen) == len(set(seen)) == 125
+    wait_for(browser, "document.querySelectorAll('.pages button')[1]?.disabled")
     choose(browser, "Sample", "TWILL")
     wait_for(browser, "document.querySelectorAll('#jobs tbody tr').length === 2")
     choose(browser, "State", "failed")
     wait_for(browser, "document.querySelectorAll('#jobs tbody tr').length === 1")
-    assert "volume" in browser.find_element(By.CSS_SELECTOR, "#jobs td.why").text and browser.find_elements(By.CSS_SELECTOR, "#jobs b") == []
+    assert "volume" in text_of(browser, "#jobs td.why") and browser.find_elements(By.CSS_SELECTOR, "#jobs b") == []
     assert "state=failed" in browser.current_url and "sample=TWILL" in browser.current_url
     browser.refresh()  # the address has the filters
     wait_for(browser, "document.querySelectorAll('#jobs tbody tr').length === 1")
     choose(browser, "Sample", "")
     choose(browser, "State", "")
-    browser.find_elements(By.CSS_SELECTOR, "#jobs th button")[0].click()
+    click_on(browser, "#jobs th button", 0)
     wait_for(browser, "document.querySelector('#jobs tbody td.sample a')?.textContent === 'blue twill'")
-    assert browser.find_element(By.CSS_SELECTOR, "#jobs th[aria-sort]").get_attribute("aria-sort") == "ascending"
-    assert browser.execute_script("return document.querySelector('#jobs time').title").endswith(" UTC")
+    wait_for(browser, "document.querySelector('#jobs th[aria-sort]')?.getAttribute('aria-sort') === 'ascending'")
+    wait_for(browser, "document.querySelector('#jobs time')?.title.endsWith(' UTC')")
     assert complaints(browser) == []
 
 
@@ -93,16 +94,16 @@ def test_many_jobs_at_once(many, browser):
     url, client, done, failed = many
     browser.get(url + "/#?sample=draft%2000")
     wait_for(browser, "document.querySelectorAll('#jobs tbody tr').length === 10")
-    for box in browser.find_elements(By.CSS_SELECTOR, "#jobs tbody input")[:3]:
-        box.click()
-    assert "3 selected" in browser.find_element(By.ID, "bulk").text
+    for i in range(3):
+        click_on(browser, "#jobs tbody input", i)
+    assert "3 selected" in text_of(browser, "#bulk")
     browser.find_element(By.CSS_SELECTOR, "#bulk input").send_keys("batch-7\n")
     wait_for(browser, "document.querySelectorAll('#jobs .tag.link').length === 3")
     keep(browser, "list-selected")
     assert {j["tag"]: j["jobs"] for j in client.request("GET", "/v1/tags").json()["tags"]} == {"batch-7": 3}
 
     def press(text):
-        next(b for b in browser.find_elements(By.CSS_SELECTOR, "#bulk button") if b.text.startswith(text)).click()
+        click_on(browser, "#bulk button", next(i for i, t in enumerate(texts(browser, "#bulk button")) if t.startswith(text)))
     press("Cancel")
     wait_for(browser, "document.querySelectorAll('#jobs .state.cancelled').length === 3")
     wait_for(browser, "document.querySelector('#bulk').textContent.includes('3 cancelled')")
@@ -112,7 +113,7 @@ def test_many_jobs_at_once(many, browser):
     assert len(browser.find_elements(By.CSS_SELECTOR, "#jobs tbody tr")) == 10
     press("Really delete 3")
     wait_for(browser, "document.querySelectorAll('#jobs tbody tr').length === 7")
-    assert "3 deleted" in browser.find_element(By.ID, "bulk").text
+    assert "3 deleted" in text_of(browser, "#bulk")
     assert complaints(browser) == []
 
 

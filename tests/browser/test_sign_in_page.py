@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
-from browser_page import BIN, keep, wait_for  # noqa: E402
+from browser_page import BIN, click_on, keep, text_of, wait_for  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 
 DOCUMENT = {"sample": "of ann", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}, "measurements": {"file": "rows.csv"}}
@@ -32,7 +32,7 @@ def test_signing_in_and_out(stub, browser):
     wait_for(browser, "document.querySelector('#jobs tbody tr')")
     wait_for(browser, "document.getElementById('user').textContent.includes('ann')")
     keep(browser, "signed_in")
-    text = browser.find_element(By.ID, "jobs").text
+    text = text_of(browser, "#jobs")
     assert "of ann" in text and "of bob" not in text
     # no script of a page can read what stands for the token
     assert browser.execute_script("return document.cookie + JSON.stringify(sessionStorage) + JSON.stringify(localStorage)") == "{}{}"
@@ -43,13 +43,13 @@ def test_signing_in_and_out(stub, browser):
     browser.find_element(By.CSS_SELECTOR, "#sign-in input").send_keys(token["bob"] + "\n")
     wait_for(browser, "document.getElementById('user').textContent.includes('bob')")
     wait_for(browser, "document.querySelector('#jobs tbody tr')")
-    assert "of bob" in browser.find_element(By.ID, "jobs").text
-    browser.find_element(By.ID, "sign-out").click()
+    assert "of bob" in text_of(browser, "#jobs")
+    click_on(browser, "#sign-out")
     wait_for(browser, "document.querySelector('#sign-in input')")
     browser.find_element(By.CSS_SELECTOR, "#sign-in input").send_keys(made.stdout.strip() + "\n")
     wait_for(browser, "document.querySelectorAll('#jobs tbody tr').length === 2")  # an administrator sees whose each job is
-    assert browser.find_element(By.ID, "jobs").text.split().count("ann") == 2
+    assert text_of(browser, "#jobs").split().count("ann") == 2
     keep(browser, "all_owners")
-    browser.find_element(By.ID, "sign-out").click()
+    click_on(browser, "#sign-out")
     wait_for(browser, "document.querySelector('#sign-in input')")
     assert browser.execute_script("return fetch('/v1/jobs').then((r) => r.status)") == 401

@@ -39,6 +39,27 @@ def wait_for(browser, condition, seconds=30):
     raise AssertionError(f"never true: {condition}\n{page[:2000]}")
 
 
+def texts(browser, selector):
+    """Returns the texts that a reader sees in all elements of a selector, read in one script.
+
+    A page renews its elements whenever it polls. Texts that the driver asks for one by one can belong to elements that are
+    gone by then (StaleElementReferenceException)."""
+    return browser.execute_script("return [...document.querySelectorAll(arguments[0])].map((e) => e.innerText.replace(/[ \\t]+/g, ' ').trim())", selector)
+
+
+def text_of(browser, selector):
+    """Returns the text of the first element of a selector, which must be there."""
+    found = texts(browser, selector)
+    assert found, f"nothing on the page matches {selector}"
+    return found[0]
+
+
+def click_on(browser, selector, index=0):
+    """Clicks on one element of a selector, found and clicked in one script."""
+    script = "const found = document.querySelectorAll(arguments[0]); found[arguments[1]]?.click(); return found.length"
+    assert browser.execute_script(script, selector, index) > index, f"nothing on the page matches {selector}[{index}]"
+
+
 @contextlib.contextmanager
 def sized(browser, width, height):
     """A window whose page has this size, also one narrower than Chromium allows."""
