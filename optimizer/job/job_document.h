@@ -236,6 +236,8 @@ double job_texture_cell_mm(const struct job_document *doc);
  * "measurements", "photograph", "camera_noise", "dark_frame", "chart", "white_reference", "mesh"). */
 void job_document_visit_files(const struct job_document *doc,
                               void (*visit)(void *context, const char *name, const char *role), void *context);
+/* Writes the key that names an input file, as "photographs[2].file": the last one where several do, "" where none. */
+void job_document_file_key(const struct job_document *doc, const char *name, char *key, size_t n_key);
 /* Sets and returns the error of a job that fits the density although no fitted row is lit from behind. */
 status job_density_undetermined(bool black_sheet, struct error *err);
 /* Returns STATUS_INVALID with the key `path` when job_file_name_valid is false. */

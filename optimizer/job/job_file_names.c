@@ -1,4 +1,4 @@
-/* Names of input files: which names are allowed, and a visit to all input files of a document. */
+/* Names of input files: which names are allowed, a visit to all input files of a document, and the key of one. */
 #include "optimizer/job/job_document.h"
 
 #include <stdio.h>
@@ -49,4 +49,35 @@ void job_document_visit_files(const struct job_document *doc,
     }
     for (size_t i = 0; i < doc->n_surface_picture; i++)
         if (doc->surface_picture[i].mesh_file[0] != '\0') visit(context, doc->surface_picture[i].mesh_file, "mesh");
+}
+
+static void listed_file_key(const struct job_document *doc, const char *name, char *key, size_t n_key)
+{
+    for (size_t i = 0; i < doc->n_volume_file; i++)
+        if (strcmp(doc->volume_file[i], name) == 0) snprintf(key, n_key, "volume.files[%zu]", i);
+    for (size_t i = 0; i < doc->n_dark_frame; i++)
+        if (strcmp(doc->dark_frame[i], name) == 0) snprintf(key, n_key, "camera.dark_frames[%zu]", i);
+    for (size_t i = 0; i < doc->n_photograph; i++) {
+        const struct job_photograph *p = &doc->photograph[i];
+        if (strcmp(p->file, name) == 0) snprintf(key, n_key, "photographs[%zu].file", i);
+        for (size_t j = 0; j < p->n_exposure; j++)
+            if (strcmp(p->exposure[j].file, name) == 0)
+                snprintf(key, n_key, "photographs[%zu].more_exposures[%zu].file", i, j);
+    }
+    for (size_t i = 0; i < doc->n_surface_picture; i++)
+        if (strcmp(doc->surface_picture[i].mesh_file, name) == 0) snprintf(key, n_key, "pictures[%zu].mesh_file", i);
+}
+
+void job_document_file_key(const struct job_document *doc, const char *name, char *key, size_t n_key)
+{
+    const struct {
+        const char *file, *key;
+    } single[] = {{doc->fiber_file, "fibers.file"},      {doc->measurement_file, "measurements.file"},
+                  {doc->cloth_texture, "cloth.texture"}, {doc->environment_file, "environment.file"},
+                  {doc->rig_file, "rig.file"},           {doc->noise_file, "camera.noise_file"},
+                  {doc->chart.file, "color.chart.file"}, {doc->white.file, "color.white.file"}};
+    snprintf(key, n_key, "%s", "");
+    for (size_t i = 0; i < sizeof single / sizeof single[0]; i++)
+        if (strcmp(single[i].file, name) == 0) snprintf(key, n_key, "%s", single[i].key);
+    listed_file_key(doc, name, key, n_key);
 }

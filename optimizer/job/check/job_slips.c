@@ -59,35 +59,25 @@ static enum file_kind kind_of(const char *name)
 }
 
 struct role_rule {
-    const char *role, *field, *wanted;
+    const char *role, *wanted;
     bool kind[KIND_OTHER + 1]; /* allowed; an unknown ending is allowed everywhere, because the content decides */
 };
 
 #define ANY_PHOTOGRAPH [KIND_UNKNOWN] = true, [KIND_PICTURE] = true, [KIND_TIFF] = true
 static const struct role_rule role_rule[] = {
     {"volume",
-     "volume.files",
      "a scan: TIFF, .mhd, .mha, .nrrd, .nhdr, .vol or raw samples",
      {[KIND_UNKNOWN] = true, [KIND_TIFF] = true, [KIND_VOLUME] = true}},
-    {"fibers", "fibers.file", "fibers: .hair or .txt", {[KIND_UNKNOWN] = true, [KIND_FIBERS] = true}},
-    {"measurements",
-     "measurements.file",
-     "a table: .csv, or a file of a goniophotometer",
-     {[KIND_UNKNOWN] = true, [KIND_TABLE] = true}},
-    {"environment",
-     "environment.file",
-     "an image of the surroundings: .exr",
-     {[KIND_UNKNOWN] = true, [KIND_PICTURE] = true}},
-    {"photograph", "photographs", "a photograph: OpenEXR, TIFF, camera raw, PNG or JPEG", {ANY_PHOTOGRAPH}},
-    {"chart", "color.chart.file", "a photograph: OpenEXR, TIFF, camera raw, PNG or JPEG", {ANY_PHOTOGRAPH}},
-    {"white_reference", "color.white.file", "a photograph: OpenEXR, TIFF, camera raw, PNG or JPEG", {ANY_PHOTOGRAPH}},
-    {"dark_frame", "camera.dark_frames", "a photograph: OpenEXR, TIFF, camera raw, PNG or JPEG", {ANY_PHOTOGRAPH}},
-    {"camera_noise",
-     "camera.noise_file",
-     "a record of `selvedge calibrate-camera`: .json",
-     {[KIND_UNKNOWN] = true, [KIND_JSON] = true}},
-    {"mesh", "pictures", "a mesh: .obj", {[KIND_UNKNOWN] = true, [KIND_MESH] = true}},
-    {"rig", "rig.file", "a rig file: .json", {[KIND_UNKNOWN] = true, [KIND_JSON] = true}},
+    {"fibers", "fibers: .hair or .txt", {[KIND_UNKNOWN] = true, [KIND_FIBERS] = true}},
+    {"measurements", "a table: .csv, or a file of a goniophotometer", {[KIND_UNKNOWN] = true, [KIND_TABLE] = true}},
+    {"environment", "an image of the surroundings: .exr", {[KIND_UNKNOWN] = true, [KIND_PICTURE] = true}},
+    {"photograph", "a photograph: OpenEXR, TIFF, camera raw, PNG or JPEG", {ANY_PHOTOGRAPH}},
+    {"chart", "a photograph: OpenEXR, TIFF, camera raw, PNG or JPEG", {ANY_PHOTOGRAPH}},
+    {"white_reference", "a photograph: OpenEXR, TIFF, camera raw, PNG or JPEG", {ANY_PHOTOGRAPH}},
+    {"dark_frame", "a photograph: OpenEXR, TIFF, camera raw, PNG or JPEG", {ANY_PHOTOGRAPH}},
+    {"camera_noise", "a record of `selvedge calibrate-camera`: .json", {[KIND_UNKNOWN] = true, [KIND_JSON] = true}},
+    {"mesh", "a mesh: .obj", {[KIND_UNKNOWN] = true, [KIND_MESH] = true}},
+    {"rig", "a rig file: .json", {[KIND_UNKNOWN] = true, [KIND_JSON] = true}},
 };
 
 struct slip_search {
@@ -100,11 +90,11 @@ static void check_ending(void *context, const char *name, const char *role)
 {
     const struct slip_search *search = context;
     struct error slip = {0};
+    char field[sizeof slip.field];
     for (size_t i = 0; i < sizeof role_rule / sizeof role_rule[0]; i++) {
         const struct role_rule *r = &role_rule[i];
         if (strcmp(role, r->role) != 0 || r->kind[kind_of(name)]) continue;
-        bool is_texture = strcmp(search->doc->cloth_texture, name) == 0; /* it has the role of a photograph, too */
-        const char *field = is_texture ? "cloth.texture" : r->field;
+        job_document_file_key(search->doc, name, field, sizeof field);
         error_set_field(&slip, STATUS_INVALID, field, "'%s' is '%s', which by its ending is not %s", field, name,
                         r->wanted);
         search->found(search->context, &slip);

@@ -286,23 +286,8 @@ static void collect_name(void *context, const char *name, const char *role)
 /* The error of a file that the document names twice; it names the last of the two keys. */
 static status named_twice(const struct job_document *doc, const char *name, struct error *err)
 {
-    char path[JSON_PATH_BYTES] = "measurements.file";
-    if (strcmp(doc->cloth_texture, name) == 0) snprintf(path, sizeof path, "cloth.texture");
-    if (strcmp(doc->environment_file, name) == 0) snprintf(path, sizeof path, "environment.file");
-    if (strcmp(doc->rig_file, name) == 0) snprintf(path, sizeof path, "rig.file");
-    if (strcmp(doc->noise_file, name) == 0) snprintf(path, sizeof path, "camera.noise_file");
-    if (strcmp(doc->chart.file, name) == 0) snprintf(path, sizeof path, "color.chart.file");
-    if (strcmp(doc->white.file, name) == 0) snprintf(path, sizeof path, "color.white.file");
-    for (size_t i = 0; i < doc->n_volume_file; i++)
-        if (strcmp(doc->volume_file[i], name) == 0) snprintf(path, sizeof path, "volume.files[%zu]", i);
-    for (size_t i = 0; i < doc->n_dark_frame; i++)
-        if (strcmp(doc->dark_frame[i], name) == 0) snprintf(path, sizeof path, "camera.dark_frames[%zu]", i);
-    for (size_t i = 0; i < doc->n_photograph; i++) {
-        if (strcmp(doc->photograph[i].file, name) == 0) snprintf(path, sizeof path, "photographs[%zu].file", i);
-        for (size_t j = 0; j < doc->photograph[i].n_exposure; j++)
-            if (strcmp(doc->photograph[i].exposure[j].file, name) == 0)
-                snprintf(path, sizeof path, "photographs[%zu].more_exposures[%zu].file", i, j);
-    }
+    char path[JSON_PATH_BYTES];
+    job_document_file_key(doc, name, path, sizeof path);
     return error_set_field(err, STATUS_INVALID, path,
                            "'%s' names the file '%s' a second time: each input file has one use", path, name);
 }
