@@ -145,6 +145,8 @@ static const struct cli_option {
     {OPT_PICTURE, 0, "px", "N", "width and height of the picture (default: 512)", offsetof(struct cli_args, px)},
     {OPT_PICTURE, 0, "samples", "N", "paths of a pixel (default: 16)", offsetof(struct cli_args, samples)},
     {OPT_PICTURE, 0, "method", "HOW", "path, fast or corrected (default: path)", offsetof(struct cli_args, method)},
+    {OPT_PICTURE, 0, "reference", NULL, "compare it with path tracing (default: --method fast)",
+     offsetof(struct cli_args, reference)},
     {OPT_PICTURE, 0, "width-mm", "MM", "width of what it shows (default: 40)", offsetof(struct cli_args, width_mm)},
     {OPT_PICTURE, 0, "size-mm", "MM", "edge of the flat or draped piece, length of the cylinder (default: 40)",
      offsetof(struct cli_args, size_mm)},

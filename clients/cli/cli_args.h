@@ -56,7 +56,8 @@ struct cli_args {
     const char *max_age, *max_bytes;                     /* of retention */
     const char *state, *verdict, *tag, *sample, *days;   /* of list */
     bool watch, json, follow, draft, align, once, yes;
-    bool help; /* --help was given: for one command if has_command is set */
+    bool reference; /* --reference: of a picture */
+    bool help;      /* --help was given: for one command if has_command is set */
     bool version;
     bool has_command;
 };

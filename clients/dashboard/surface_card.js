@@ -12,13 +12,17 @@ function captionOf(wanted, entry) {
     el("div", { class: "row" }, el("span", {}, "camera"), el("span", {}, `θ ${degrees(wanted.camera_theta_deg)}  φ ${degrees(wanted.camera_phi_deg)}`)),
     el("div", { class: "row", title: "root mean square of the pixels' standard errors over the mean brightness" },
       el("span", {}, whole ? "noise" : "noise so far"), el("span", {}, isNumber(entry.noise) ? percent(entry.noise) : "–")),
+    !whole || !entry.reference ? null : el("div", { class: "row reference", title: "root mean square difference of fields of 4 x 4 pixels, with the noise of both pictures taken off" },
+      el("span", {}, "from path tracing"), el("span", {}, isNumber(entry.reference.field_difference_rms) ? `${percent(entry.reference.field_difference_rms)} beyond noise of ${percent(entry.reference.field_noise)}` : "–")),
   ];
 }
+
+const soFar = (entry) => `${entry.samples} ${Boolean(entry.reference)}`;
 
 export class SurfacePictures {
   #job;
   #node;
-  #shown = []; // of each picture: {samples, figure, address}
+  #shown = []; // of each picture: {soFar, figure, address}
 
   constructor(node, id) {
     this.#node = node;
@@ -41,10 +45,10 @@ export class SurfacePictures {
 
   async #show(i, wanted) {
     const url = `${this.#job}/results/pictures/on-${i + 1}`, entry = await getJson(`${url}.json`), before = this.#shown[i];
-    if (before?.samples === entry.samples) return;
+    if (before?.soFar === soFar(entry)) return;
     const address = URL.createObjectURL(await (await raw("GET", `${url}.png`)).blob());
     const figure = el("figure", {}, el("a", { href: `${url}.png`, target: "_blank" }, el("img", { src: address, alt: `the cloth, ${entry.on}` })), el("figcaption", {}, captionOf(wanted, entry)));
-    this.#shown[i] = { samples: entry.samples, figure, address };
+    this.#shown[i] = { soFar: soFar(entry), figure, address };
     if (before) URL.revokeObjectURL(before.address);
     this.#node.replaceChildren(el("section", { class: "card", id: "surfaces" }, el("h2", {}, "The cloth on surfaces"),
       el("div", { class: "surfaces" }, this.#shown.filter(Boolean).map((picture) => picture.figure))));

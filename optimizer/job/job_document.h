@@ -90,6 +90,7 @@ struct job_surface_picture {
     double width_mm; /* what the picture shows */
     size_t px, sample;
     enum job_picture_method method;
+    bool reference; /* also path by path, and compared with that */
 };
 
 /* What a kind of yarn in the document counts or names; 0 fibers: not given. */

@@ -285,7 +285,8 @@ def test_pictures_grow_on_the_page(real, browser, tmp_path):
     view = {"light_theta_deg": 45, "light_phi_deg": 0, "camera_theta_deg": 45, "camera_phi_deg": 180, "width_mm": 3}
     (tmp_path / "job.json").write_text(json.dumps({
         "sample": "on surfaces", "fibers": {"file": "cloth.hair"},
-        "pictures": [{"on": "cylinder", "radius_mm": 1, **view, "px": 32, "samples": 16}, {"on": "flat", **view, "px": 32, "samples": 2048}],
+        "pictures": [{"on": "cylinder", "radius_mm": 1, **view, "px": 32, "samples": 16, "method": "fast", "reference": True},
+                     {"on": "flat", **view, "px": 32, "samples": 2048}],
         "fit": {"fixed": {"C_R": [0.1] * 3, "C_TT": [0.6, 0.4, 0.3], "beta_R": 6, "beta_TT": 12, "gamma_TT": 30}, "model": "two_lobe.v1"}}))
     job = selvedge.Client(url).submit(str(tmp_path / "job.json"))
     browser.get(f"{url}/#{job.id}")
@@ -297,6 +298,9 @@ def test_pictures_grow_on_the_page(real, browser, tmp_path):
     shown = texts(browser, "#surfaces figcaption")
     assert [t.split()[0] for t in shown] == ["cylinder", "flat"] and all("θ 45°" in t for t in shown)
     assert all(abs(float(t.split("noise")[1].split()[0]) - 100 * n) < 0.06 * 100 * n + 0.06 for t, n in zip(shown, noise)), (shown, noise)
+    wait_for(browser, "document.querySelectorAll('#surfaces .reference').length === 1")
+    apart = job.result().raw["pictures"][0]["reference"]["field_difference_rms"]
+    assert abs(float(text_of(browser, "#surfaces .reference").split("tracing")[1].split()[0]) - 100 * apart) < 0.06 * 100 * apart + 0.06
     assert browser.execute_script("return [...document.querySelectorAll('#surfaces img')].every(i => i.complete && i.naturalWidth === 32)")
     keep(browser, "pictures")
     assert complaints(browser) == []

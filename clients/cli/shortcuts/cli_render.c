@@ -67,7 +67,9 @@ static status read_picture(const struct cli_args *a, json_t *picture, const char
     if (s == STATUS_OK) s = read_number("radius-mm", a->radius_mm, "radius_mm", false, picture, err);
     if (s == STATUS_OK) s = read_number("wrap-deg", a->wrap_deg, "wrap_deg", false, picture, err);
     if (s == STATUS_OK) s = read_number("mesh-unit-mm", a->mesh_unit_mm, "mesh_unit_mm", false, picture, err);
-    if (a->method != NULL) json_object_set_new(picture, "method", json_string(a->method));
+    const char *method = a->method == NULL && a->reference ? "fast" : a->method;
+    if (method != NULL) json_object_set_new(picture, "method", json_string(method));
+    if (a->reference) json_object_set_new(picture, "reference", json_true());
     bool yes;
     if (s == STATUS_OK) s = read_yes("black-sheet", a->black_sheet, &yes, err);
     if (s == STATUS_OK && a->black_sheet != NULL) json_object_set_new(picture, "black_sheet", json_boolean(yes));
@@ -157,6 +159,44 @@ static status gather_files(struct cli *cli, const char *id, const char *mesh, co
     return symlink(whole, path) == 0 ? STATUS_OK : error_set_errno(err, "cannot use the mesh '%s'", mesh);
 }
 
+static double number_at(const json_t *list, size_t i)
+{
+    const json_t *x = json_array_get(list, i);
+    return json_is_number(x) ? json_number_value(x) : NAN;
+}
+
+/* What the job says of its picture and of the same picture path by path. */
+static void print_comparison(FILE *out, const json_t *picture)
+{
+    const json_t *r = json_object_get(picture, "reference"), *mean = json_object_get(r, "mean_difference"),
+                 *se = json_object_get(r, "mean_difference_se"), *rms = json_object_get(r, "field_difference_rms"),
+                 *noise = json_object_get(r, "field_noise");
+    if (r == NULL) {
+        fputs("no comparison: the picture was rendered path by path, as this model has no tables\n", out);
+        return;
+    }
+    static const char *const channel[] = {"red", "green", "blue"};
+    for (size_t k = 0; k < 3; k++)
+        fprintf(out, "mean radiance in %s: %+.2f %% of path tracing's brightness, standard error %.2f %%\n", channel[k],
+                100.0 * number_at(mean, k), 100.0 * number_at(se, k));
+    fprintf(out, "fields of 4 x 4 pixels: %.2f %% root mean square apart beyond a noise of %.2f %%\n",
+            100.0 * (json_is_number(rms) ? json_number_value(rms) : NAN),
+            100.0 * (json_is_number(noise) ? json_number_value(noise) : NAN));
+}
+
+static status compare(struct cli *cli, const char *id, struct error *err)
+{
+    char path[256];
+    json_t *job = NULL;
+    status s = cli_job_path(id, "", path, sizeof path, err);
+    if (s == STATUS_OK) s = http_json(cli->http, "GET", path, NULL, NULL, &job, err);
+    if (s == STATUS_OK) s = cli_add_result(cli, job, err);
+    if (s == STATUS_OK)
+        print_comparison(cli->out, json_array_get(json_object_get(json_object_get(job, "result"), "pictures"), 0));
+    json_decref(job);
+    return s;
+}
+
 /* Submits the job of the picture and waits for it. */
 static status render(struct cli *cli, const json_t *document, const char *folder, int *exit_code, struct error *err)
 {
@@ -164,6 +204,7 @@ static status render(struct cli *cli, const json_t *document, const char *folder
     status s = cli_submit_document(cli, document, folder, id, err);
     if (s == STATUS_OK) s = cli_watch_job(cli, id, exit_code, err);
     if (s == STATUS_OK && *exit_code == CLI_EXIT_OK) s = cli_results_to_out(cli, id, err);
+    if (s == STATUS_OK && *exit_code == CLI_EXIT_OK && cli->args->reference) s = compare(cli, id, err);
     if (s != STATUS_OK && id[0] != '\0')
         fprintf(cli->note, "continue with: selvedge watch %s, then selvedge results %s\n", id, id);
     return s;

@@ -129,6 +129,10 @@ static status check_picture(const struct job_document *doc, size_t i, struct err
             "'%s' is %g: a flat piece is lit from above, below 90 degrees, or from behind, above 90, "
             "with 'black_sheet' false",
             field, p->light_theta_deg);
+    snprintf(field, sizeof field, "pictures[%zu].reference", i);
+    if (p->reference && p->method == JOB_PICTURE_PATH)
+        return error_set_field(err, STATUS_INVALID, field,
+                               "'%s' is true, but 'method' is \"path\": such a picture is its own reference", field);
     snprintf(field, sizeof field, "pictures[%zu].radius_mm", i);
     if (p->on == JOB_ON_DRAPE && !(p->radius_mm >= 0.02 * p->size_mm && p->radius_mm <= 10.0 * p->size_mm))
         return error_set_field(err, STATUS_INVALID, field,

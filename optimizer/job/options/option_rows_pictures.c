@@ -101,6 +101,12 @@ const struct job_option option_rows_pictures[] = {
      .meaning =
          "`path`: every path is traced. `fast`: light that is scattered often comes from tables, with less noise "
          "and a small error (docs/bent-cloth.md). `corrected`: the same, with whole paths that take the error off."},
+    {.path = "pictures[].reference",
+     .kind = OPTION_BOOL,
+     OF_PICTURE(reference),
+     .standard = "false",
+     .meaning = "Whether a picture by tables is also rendered path by path, with as many samples. The result states "
+                "how far the two are apart. Needs `method` `fast` or `corrected`."},
     {.path = "twin",
      .kind = OPTION_SECTION,
      .left_out = "none",

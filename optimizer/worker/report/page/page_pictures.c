@@ -161,6 +161,13 @@ static status put_surface(const struct pipeline_context *c, const json_t *pictur
     page_escaped(page_string(picture, "on"), out);
     fprintf(out, ", exposure &times; %.3g, noise of a pixel ", page_number(picture, "png_exposure"));
     page_with_error(json_object_get(picture, "noise"), NULL, 100.0, " %", out);
+    const json_t *reference = json_object_get(picture, "reference");
+    if (reference != NULL) {
+        fputs(", fields of 4 &times; 4 pixels are ", out);
+        page_with_error(json_object_get(reference, "field_difference_rms"), NULL, 100.0, " %", out);
+        fputs(" from path tracing beyond a noise of ", out);
+        page_with_error(json_object_get(reference, "field_noise"), NULL, 100.0, " %", out);
+    }
     fputs("</figcaption></figure>\n", out);
     image_release(&small);
     image_release(&im);

@@ -6,6 +6,7 @@
 #include "optimizer/worker/report/result_pictures.h"
 #include "optimizer/worker/report/result_thumbnail.h"
 #include "optimizer/worker/report/surface/surface_cloth.h"
+#include "optimizer/worker/report/surface/surface_difference.h"
 #include "optimizer/worker/report/surface/surface_passes.h"
 #include "optimizer/worker/report/surface/surface_tables.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
@@ -21,13 +22,23 @@ static const double mm = 1e-3;
 static const char *const method_name[] = {"path", "fast", "corrected"};
 static const char *const surface_name[] = {"flat", "cylinder", "drape", "mesh"};
 
+/* One picture of the document. */
+struct one_picture {
+    size_t i;
+    const char *entry_path;
+    struct fast_option fast;
+    enum job_picture_method method; /* the document's; JOB_PICTURE_PATH where the model has no tables */
+};
+
+static double paths_of(const struct job_surface_picture *p)
+{
+    return (double)p->px * (double)p->px * (double)p->sample * (p->reference ? 2.0 : 1.0);
+}
+
 double surface_pictures_paths(const struct pipeline_context *c)
 {
     double n = 0.0;
-    for (size_t i = 0; i < c->doc->n_surface_picture; i++) {
-        const struct job_surface_picture *p = &c->doc->surface_picture[i];
-        n += (double)p->px * (double)p->px * (double)p->sample;
-    }
+    for (size_t i = 0; i < c->doc->n_surface_picture; i++) n += paths_of(&c->doc->surface_picture[i]);
     return n;
 }
 
@@ -46,8 +57,13 @@ static double exposure_of(const struct image *im)
     return sum > 0.0 ? medium * (double)n_lit / sum : 1.0;
 }
 
-/* Mean radiance of each channel, and the root mean square of the pixels' standard errors over the mean brightness. */
-static json_t *picture_json(const struct job_surface_picture *p, const struct surface_passes *so_far, double exposure)
+static json_t *rgb_json(const double rgb[3])
+{
+    return json_pack("[o, o, o]", json_number(rgb[0]), json_number(rgb[1]), json_number(rgb[2]));
+}
+
+/* Returns the root mean square of the pixels' standard errors over the mean brightness. *mean_rgb: mean radiance. */
+static json_t *noise_json(const struct surface_passes *so_far, json_t **mean_rgb)
 {
     const struct image *im = &so_far->image;
     double mean[3] = {0.0, 0.0, 0.0}, variance = 0.0;
@@ -58,13 +74,33 @@ static json_t *picture_json(const struct job_surface_picture *p, const struct su
             variance += (double)im->pixel[i * im->n_channel + 3 + k] / (3.0 * (double)n);
         }
     double brightness = (mean[0] + mean[1] + mean[2]) / 3.0;
+    *mean_rgb = rgb_json(mean);
+    return json_number(brightness > 0.0 && so_far->n_sample > 1 ? sqrt(variance) / brightness : NAN);
+}
+
+static json_t *picture_json(const struct one_picture *one, const struct job_surface_picture *p,
+                            const struct surface_passes *so_far, double exposure)
+{
     char file[80];
+    json_t *mean, *noise = noise_json(so_far, &mean);
     snprintf(file, sizeof file, "pictures/%s.exr", so_far->name);
-    return json_pack("{s:s, s:s, s:s, s:I, s:[o, o, o], s:o, s:o}", "file", file, "on", surface_name[p->on], "method",
-                     method_name[p->method], "samples", (json_int_t)so_far->n_sample, "mean", json_number(mean[0]),
-                     json_number(mean[1]), json_number(mean[2]), "noise",
-                     json_number(brightness > 0.0 && p->sample > 1 ? sqrt(variance) / brightness : NAN), "png_exposure",
-                     json_number(exposure));
+    return json_pack("{s:s, s:s, s:s, s:I, s:o, s:o, s:o}", "file", file, "on", surface_name[p->on], "method",
+                     method_name[one->method], "samples", (json_int_t)so_far->n_sample, "mean", mean, "noise", noise,
+                     "png_exposure", json_number(exposure));
+}
+
+/* The path-traced picture beside one by tables, and how far they are apart. */
+static json_t *reference_json(const struct surface_passes *picture, const struct surface_passes *reference)
+{
+    struct surface_difference d;
+    char file[80];
+    json_t *mean, *noise = noise_json(reference, &mean);
+    surface_difference_of(&picture->image, &reference->image, &d);
+    snprintf(file, sizeof file, "pictures/%s.exr", reference->name);
+    return json_pack("{s:s, s:I, s:o, s:o, s:o, s:o, s:o, s:o}", "file", file, "samples",
+                     (json_int_t)reference->n_sample, "mean", mean, "noise", noise, "mean_difference", rgb_json(d.mean),
+                     "mean_difference_se", rgb_json(d.mean_se), "field_difference_rms", json_number(d.field_rms),
+                     "field_noise", json_number(d.field_noise));
 }
 
 /* Means over the columns of the picture, as profiles across a cylinder are compared. */
@@ -103,70 +139,106 @@ static status write_picture(struct pipeline_context *c, const struct job_surface
     return s == STATUS_OK && whole ? write_columns(c, p, so_far, err) : s;
 }
 
-/* The entry of result.json lies beside the picture and is written last: a picture is finished when its entry has all
- * samples. *out: the entry, of which the caller has a reference. */
-static status write_entry(struct pipeline_context *c, const char *path, const struct job_surface_picture *p,
-                          const struct surface_passes *so_far, json_t **out, struct error *err)
+static status write_json(struct pipeline_context *c, const char *path, const json_t *entry, struct error *err)
 {
-    double exposure = exposure_of(&so_far->image);
-    status s = write_picture(c, p, so_far, exposure, err);
-    if (s != STATUS_OK) return s;
-    json_t *entry = picture_json(p, so_far, exposure);
     char *text = entry != NULL ? json_dumps(entry, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
-    s = text != NULL ? worker_folder_replace(c->folder, path, text, strlen(text), err)
-                     : error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
+    status s = text != NULL ? worker_folder_replace(c->folder, path, text, strlen(text), err)
+                            : error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
     free(text);
-    json_decref(*out);
-    *out = entry;
     return s;
 }
 
-/* One picture of the document. */
-struct one_picture {
-    size_t i;
-    const struct surface_tables *tables;
-    const char *entry_path;
-};
+/* The entry of result.json lies beside the picture and is written last: a picture is finished when its entry has all
+ * samples. *out: the entry, of which the caller has a reference. */
+static status write_entry(struct pipeline_context *c, const struct one_picture *one,
+                          const struct surface_passes *so_far, json_t **out, struct error *err)
+{
+    const struct job_surface_picture *p = &c->doc->surface_picture[one->i];
+    double exposure = exposure_of(&so_far->image);
+    status s = write_picture(c, p, so_far, exposure, err);
+    if (s != STATUS_OK) return s;
+    json_decref(*out);
+    *out = picture_json(one, p, so_far, exposure);
+    return write_json(c, one->entry_path, *out, err);
+}
 
 /* Renders pass by pass until all samples are there. */
+static status render_picture(struct pipeline_context *c, const struct one_picture *one, const struct render_request *q,
+                             const struct progress *progress, struct surface_passes *so_far, json_t **entry,
+                             struct error *err)
+{
+    status s = STATUS_OK;
+    while (s == STATUS_OK && so_far->n_sample < q->n_sample) {
+        s = surface_passes_add(c, q, progress, so_far, err);
+        if (s == STATUS_OK) s = write_entry(c, one, so_far, entry, err);
+    }
+    if (s == STATUS_OK && *entry == NULL) s = write_entry(c, one, so_far, entry, err);
+    return s;
+}
+
+/* The same view path by path, with random numbers of its own, and the comparison into the entry. */
+static status render_reference(struct pipeline_context *c, const struct one_picture *one, struct render_request q,
+                               const struct progress *progress, const struct surface_passes *picture, json_t *entry,
+                               struct error *err)
+{
+    char name[48];
+    struct surface_passes traced;
+    snprintf(name, sizeof name, "%s-reference", picture->name);
+    q.input.fast = NULL;
+    q.stream += JOB_MAX_SURFACE_PICTURE;
+    status s = surface_passes_start(c, name, q.width, q.height, &traced, err);
+    while (s == STATUS_OK && traced.n_sample < q.n_sample) s = surface_passes_add(c, &q, progress, &traced, err);
+    if (s == STATUS_OK)
+        s = result_image_write(c, &traced.image, "pictures", name, exposure_of(&picture->image), true, err);
+    if (s == STATUS_OK) {
+        json_object_set_new(entry, "reference", reference_json(picture, &traced));
+        s = write_json(c, one->entry_path, entry, err);
+    }
+    surface_passes_release(&traced);
+    return s;
+}
+
 static status render(struct pipeline_context *c, const struct one_picture *one, const struct progress *progress,
                      struct surface_passes *so_far, json_t **entry, struct error *err)
 {
-    size_t i = one->i;
-    const struct job_surface_picture *p = &c->doc->surface_picture[i];
-    struct fast_option fast;
-    bool by_tables = surface_tables_option(one->tables, p, &fast);
+    const struct job_surface_picture *p = &c->doc->surface_picture[one->i];
     const struct pipeline_model *model = &c->model[pipeline_best_model(c)];
+    bool by_tables = one->method != JOB_PICTURE_PATH, compared = p->reference && by_tables;
     struct surface_cloth cloth;
     struct configuration view = observation_configuration(
         c->doc, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg, p->camera_phi_deg, p->cloth_rotation_deg);
     view.crop_m = mm * p->width_mm;
     view.crop_aspect = 1.0;
     view.environment = c->environment;
-    status s = surface_cloth_init(c, i, model->appearance.kind, &cloth, err);
-    if (s != STATUS_OK) {
-        surface_cloth_release(&cloth);
-        return s;
-    }
+    status s = surface_cloth_init(c, one->i, model->appearance.kind, &cloth, err);
     const struct render_request q = {
         .input = {.scene = {.fibers = cloth.fibers, .volume = cloth.volume.bent != NULL ? &cloth.volume : NULL},
                   .model = &model->appearance,
                   .param = model->fit.param,
                   .n_set = model->sets.n_set,
-                  .fast = by_tables ? &fast : NULL},
+                  .fast = by_tables ? &one->fast : NULL},
         .configuration = &view,
         .width = p->px,
         .height = p->px,
         .n_sample = p->sample,
         .seed = c->doc->seed ^ 0x73757266616365u,
-        .stream = (uint32_t)(STREAM + i)};
-    while (s == STATUS_OK && so_far->n_sample < p->sample) {
-        s = surface_passes_add(c, &q, progress, so_far, err);
-        if (s == STATUS_OK) s = write_entry(c, one->entry_path, p, so_far, entry, err);
-    }
-    if (s == STATUS_OK && *entry == NULL) s = write_entry(c, one->entry_path, p, so_far, entry, err);
+        .stream = (uint32_t)(STREAM + one->i)};
+    struct progress_part part;
+    struct progress first = progress_begin_part(&part, progress, 0.0, compared ? 0.5 : 1.0);
+    if (s == STATUS_OK) s = render_picture(c, one, &q, &first, so_far, entry, err);
+    first = progress_begin_part(&part, progress, 0.5, 0.5);
+    if (s == STATUS_OK && compared) s = render_reference(c, one, q, &first, so_far, *entry, err);
     surface_cloth_release(&cloth);
-    return s == STATUS_OK || s == STATUS_CANCELLED ? s : error_prefix(err, s, "picture %zu", i + 1);
+    return s == STATUS_OK || s == STATUS_CANCELLED ? s : error_prefix(err, s, "picture %zu", one->i + 1);
+}
+
+/* Whether an entry of an earlier attempt has all that the document asks for. */
+static bool is_finished(const json_t *entry, const struct job_surface_picture *p)
+{
+    const char *method = json_string_value(json_object_get(entry, "method"));
+    if (json_integer_value(json_object_get(entry, "samples")) != (json_int_t)p->sample) return false;
+    return !p->reference || method == NULL || strcmp(method, method_name[JOB_PICTURE_PATH]) == 0 ||
+           json_object_get(entry, "reference") != NULL;
 }
 
 static status write_one(struct pipeline_context *c, size_t i, const struct surface_tables *tables,
@@ -179,12 +251,14 @@ static status write_one(struct pipeline_context *c, size_t i, const struct surfa
     snprintf(relative, sizeof relative, "pictures/%s.json", name);
     worker_folder_path(c->folder, JOB_FOLDER_RESULTS, relative, path);
     json_t *entry = json_load_file(path, 0, NULL);
-    if (entry != NULL && json_integer_value(json_object_get(entry, "samples")) == (json_int_t)p->sample)
+    if (entry != NULL && is_finished(entry, p))
         return json_array_append_new(c->surface_pictures, entry) == 0 ? STATUS_OK : STATUS_NO_MEMORY;
     json_decref(entry);
     entry = NULL;
+    struct one_picture one = {.i = i, .entry_path = path};
+    one.method = surface_tables_option(tables, p, &one.fast) ? p->method : JOB_PICTURE_PATH;
     status s = surface_passes_start(c, name, p->px, p->px, &so_far, err);
-    if (s == STATUS_OK) s = render(c, &(struct one_picture){i, tables, path}, progress, &so_far, &entry, err);
+    if (s == STATUS_OK) s = render(c, &one, progress, &so_far, &entry, err);
     if (s == STATUS_OK)
         json_array_append_new(c->surface_pictures, entry);
     else
@@ -208,7 +282,7 @@ status surface_pictures_write(struct pipeline_context *c, double from, double to
     from += for_tables;
     for (size_t i = 0; i < c->doc->n_surface_picture && s == STATUS_OK; i++) {
         const struct job_surface_picture *p = &c->doc->surface_picture[i];
-        double share = (to - from) * (double)p->px * (double)p->px * (double)p->sample / all;
+        double share = (to - from) * paths_of(p) / all;
         struct progress_part part;
         struct progress progress = progress_begin_part(&part, &c->progress, from + done, share);
         s = write_one(c, i, &tables, &progress, err);

@@ -1,0 +1,19 @@
+/* How far a picture by tables is from a path-traced one of the same view. */
+#ifndef SELVEDGE_OPTIMIZER_SURFACE_DIFFERENCE_H
+#define SELVEDGE_OPTIMIZER_SURFACE_DIFFERENCE_H
+
+#include "renderer/image/image.h"
+
+/* Numbers of the whole picture are relative to its mean brightness in the reference, numbers of fields to the mean
+ * brightness of the lit fields. Fields are squares of 4 x 4 pixels; pixels that hang over at the edges belong to none.
+ * NaN where the reference is black. */
+struct surface_difference {
+    double mean[3], mean_se[3]; /* of the whole picture in red, green and blue, and the standard error of that */
+    double field_rms;           /* root mean square over lit fields and channels, with the noise of both taken off */
+    double field_noise;         /* the noise that was taken off */
+};
+
+/* Both pictures have the same size and six channels: radiance in rgb, and its variance. */
+void surface_difference_of(const struct image *picture, const struct image *reference, struct surface_difference *out);
+
+#endif
