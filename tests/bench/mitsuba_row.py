@@ -92,6 +92,11 @@ def pbrt_surroundings(found, px, spp):
     return others
 
 
+def hair_of_pbrt(m):
+    return {"type": "hair", "longitudinal_roughness": m["beta_m"][0], "azimuthal_roughness": m["beta_n"][0], "scale_tilt": m["alpha"][0],
+            "int_ior": m["eta"][0], "sigma_a": rgb(m["sigma_a"])}
+
+
 def pbrt_scene(folder, row, px, spp):
     found = pbrt_file.read_scene(os.path.join(folder, f"view-{row}.pbrt"))
     fibers = {}
@@ -101,8 +106,7 @@ def pbrt_scene(folder, row, px, spp):
     for i, (m, of_material) in enumerate(fibers.items()):
         m = json.loads(m)
         shapes.append(curves(folder, i, of_material, {
-            "type": "hair", "longitudinal_roughness": m["beta_m"][0], "azimuthal_roughness": m["beta_n"][0], "scale_tilt": m["alpha"][0],
-            "int_ior": m["eta"][0], "sigma_a": rgb(m["sigma_a"])}))
+            "type": "blendbsdf", "weight": m["amount"][0], **{f"hair{k}": hair_of_pbrt(hair) for k, (_, hair) in enumerate(m["materials"])}}))
     others = pbrt_surroundings(found, px, spp)
     return assemble(shapes, [where for _, where in found["instances"]], others)
 

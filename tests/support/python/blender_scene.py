@@ -10,10 +10,13 @@ picture.colorspace_settings.name = "Non-Color"
 pixels = list(picture.pixels)
 hair = [o for o in bpy.data.objects if o.type == "CURVES"]
 curves = hair[0].data
-shader = next(n for n in curves.materials[0].node_tree.nodes if n.type == "BSDF_HAIR_PRINCIPLED")
+tree = curves.materials[0].node_tree
+mix = next(n for n in tree.nodes if n.type == "MIX_SHADER")
+shaders = [mix.inputs[1 + k].links[0].from_node for k in range(2)]
 print("found " + json.dumps({
     "n_object": len(hair), "shared": len({o.data.name for o in hair}), "n_curve": len(curves.curves), "n_point": len(curves.points),
-    "radius": curves.points[0].radius, "absorption": list(shader.inputs["Absorption Coefficient"].default_value),
-    "roughness": shader.inputs["Roughness"].default_value, "radial": shader.inputs["Radial Roughness"].default_value,
-    "index": shader.inputs["IOR"].default_value, "engine": bpy.context.scene.render.engine, "camera": list(bpy.context.scene.camera.location),
+    "radius": curves.points[0].radius, "share": mix.inputs[0].default_value, "hair": [{
+        "absorption": list(s.inputs["Absorption Coefficient"].default_value), "roughness": s.inputs["Roughness"].default_value,
+        "radial": s.inputs["Radial Roughness"].default_value, "index": s.inputs["IOR"].default_value} for s in shaders],
+    "engine": bpy.context.scene.render.engine, "camera": list(bpy.context.scene.camera.location),
     "mean": [sum(pixels[c::4]) / (len(pixels) / 4) for c in range(3)]}))

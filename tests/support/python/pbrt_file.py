@@ -7,7 +7,7 @@ import re
 TOKEN = re.compile(r"\s+|#[^\n]*|(?P<string>\"[^\"\n]*\")|(?P<bracket>[\[\]])|(?P<word>[^\s\"\[\]#]+)")
 NUMBERS = {"LookAt": 9, "Translate": 3, "Scale": 3, "Rotate": 4}
 PLAIN = {"WorldBegin", "AttributeBegin", "AttributeEnd", "ObjectEnd"}
-NAMED = {"ObjectBegin", "ObjectInstance", "Include"}
+NAMED = {"ObjectBegin", "ObjectInstance", "Include", "NamedMaterial"}
 PLUGINS = {
     "Camera": {"orthographic": {"screenwindow": "float"}, "perspective": {"fov": "float"}},
     "Film": {"rgb": {"xresolution": "integer", "yresolution": "integer", "filename": "string"}},
@@ -16,11 +16,13 @@ PLUGINS = {
     "Integrator": {"path": {"maxdepth": "integer"}},
     "LightSource": {"distant": {"from": "point3", "to": "point3", "L": "rgb"}, "infinite": {"L": "rgb"}},
     "AreaLightSource": {"diffuse": {"L": "rgb"}},
-    "Material": {"hair": {"sigma_a": "rgb", "eta": "float", "beta_m": "float", "beta_n": "float", "alpha": "float"}, "diffuse": {"reflectance": "rgb"}},
+    "Material": {"hair": {"sigma_a": "rgb", "eta": "float", "beta_m": "float", "beta_n": "float", "alpha": "float"}, "diffuse": {"reflectance": "rgb"},
+                 "mix": {"materials": "string", "amount": "float"}},
     "Shape": {"curve": {"type": "string", "basis": "string", "width": "float", "P": "point3"}, "bilinearmesh": {"P": "point3", "alpha": "float"}},
 }
 OPTIONS_ONLY = {"Camera", "Film", "PixelFilter", "Sampler", "Integrator"}
-WORLD_ONLY = {"LightSource", "AreaLightSource", "Material", "Shape", "AttributeBegin", "AttributeEnd", "ObjectBegin", "ObjectEnd", "ObjectInstance"}
+WORLD_ONLY = {"LightSource", "AreaLightSource", "Material", "MakeNamedMaterial", "NamedMaterial", "Shape",
+              "AttributeBegin", "AttributeEnd", "ObjectBegin", "ObjectEnd", "ObjectInstance"}
 
 
 def tokens(text):
@@ -62,6 +64,13 @@ class Reader:
         assert self.take("bracket") == "]"
         return found
 
+    def material(self):
+        """Type and parameters of a named material, of which the type is the first parameter."""
+        assert self.take("string") == "string type"
+        (plugin,) = self.values("string")
+        assert plugin in PLUGINS["Material"], f"there is no Material {plugin!r}"
+        return plugin, self.parameters(PLUGINS["Material"][plugin])
+
     def parameters(self, allowed):
         found = {}
         while self.peek()[0] == "string":
@@ -88,6 +97,8 @@ def directives(path):
                 yield from directives(os.path.join(r.folder, what))
             else:
                 yield name, what, None
+        elif name == "MakeNamedMaterial":
+            yield name, r.take("string"), r.material()
         else:
             plugin = r.take("string")
             assert plugin in PLUGINS.get(name, {}), f"there is no {name} {plugin!r}"
@@ -103,7 +114,7 @@ def check_shape(plugin, p):
 def read_scene(path):  # pylint: disable=too-many-branches
     """What a file describes: view, lights, the curves of each object with their material, where it stands, and other shapes."""
     scene = {"view": {}, "lights": [], "objects": {}, "instances": [], "meshes": []}
-    world, stack, object_name = False, [], None
+    world, stack, object_name, named = False, [], None, {}
     state = {"material": None, "light": None, "translate": [0.0, 0.0, 0.0]}
     for name, plugin, p in directives(path):
         assert name not in OPTIONS_ONLY or not world, f"{name} after WorldBegin"
@@ -127,6 +138,11 @@ def read_scene(path):  # pylint: disable=too-many-branches
             state["translate"] = [a + b for a, b in zip(state["translate"], p)]
         elif name == "Material":
             state["material"] = (plugin, p)
+        elif name == "MakeNamedMaterial":
+            assert plugin not in named and (p[0] != "mix" or len(p[1]["materials"]) == 2)
+            named[plugin] = (p[0], {**p[1], "materials": [named[m] for m in p[1]["materials"]]}) if p[0] == "mix" else p
+        elif name == "NamedMaterial":
+            state["material"] = named[plugin]
         elif name == "AreaLightSource":
             state["light"] = p
         elif name == "LightSource":
@@ -181,6 +197,12 @@ def logistic(x, s):
     x = abs((x + math.pi) % (2 * math.pi) - math.pi)
     inside = 2 / (1 + math.exp(-math.pi / s)) - 1
     return math.exp(-x / s) / (s * (1 + math.exp(-x / s)) ** 2) / inside
+
+
+def mixed_density(material, *direction, **more):
+    """The density of a mixture of two hair materials: each point has the second one with the probability `amount`."""
+    share = material["amount"][0]
+    return sum(part * hair_density(m, *direction, **more) for part, (_, m) in zip((1 - share, share), material["materials"]))
 
 
 def hair_density(material, theta_o, theta_i, phi, channel, n_offset=24):

@@ -3,8 +3,9 @@
  *
  *     blender --python cloth.py          or: blender -b --python cloth.py -- picture.exr SAMPLES PX ROW
  *
- * fibers-<group>.txt has the vertices of each fiber with its radius, scene.json what the script makes of them: Hair
- * curves with the Principled Hair BSDF (hair_fit.h; Cycles), instances, black sheet, camera, lamp. Millimetres. */
+ * fibers-<group>.txt has the vertices of each fiber with its radius, scene.json what the script makes of them: hair
+ * curves with two Principled Hair BSDFs mixed (hair_fit.h; Cycles), instances, black sheet, camera, lamp.
+ * Millimetres. */
 #include "optimizer/worker/report/export/export_formats.h"
 #include "optimizer/worker/report/json_number.h"
 
@@ -26,11 +27,24 @@ static const char script_head[] =
     "    tree = material.node_tree\n    tree.nodes.clear()\n    shader = tree.nodes.new(kind)\n"
     "    out = tree.nodes.new('ShaderNodeOutputMaterial')\n"
     "    tree.links.new(shader.outputs[0], out.inputs['Surface'])\n"
-    "    if kind == 'ShaderNodeBsdfHairPrincipled':\n"
-    "        if hasattr(shader, 'model'):\n            shader.model = 'CHIANG'\n"
-    "        shader.parametrization = 'ABSORPTION'\n"
     "    for key, value in inputs.items():\n        shader.inputs[key.replace('_', ' ')].default_value = value\n"
     "    return material\n\n\n"
+    "def blend(name, hairs):\n"
+    "    \"\"\"The second material's share of each point of a fiber.\"\"\"\n"
+    "    material = bpy.data.materials.new(name)\n    material.use_nodes = True\n"
+    "    tree = material.node_tree\n    tree.nodes.clear()\n"
+    "    mix = tree.nodes.new('ShaderNodeMixShader')\n    mix.inputs[0].default_value = hairs[1]['share']\n"
+    "    for k, hair in enumerate(hairs):\n        shader = tree.nodes.new('ShaderNodeBsdfHairPrincipled')\n"
+    "        shader.name = 'hair-%d' % k\n"
+    "        if hasattr(shader, 'model'):\n            shader.model = 'CHIANG'\n"
+    "        shader.parametrization = 'ABSORPTION'\n"
+    "        for key, value in (('Absorption Coefficient', hair['absorption']), ('IOR', hair['index']),\n"
+    "                           ('Roughness', hair['longitudinal_roughness']), ('Coat', 0), ('Offset', 0),\n"
+    "                           ('Radial Roughness', hair['azimuthal_roughness']), ('Random Roughness', 0)):\n"
+    "            shader.inputs[key].default_value = value\n"
+    "        tree.links.new(shader.outputs[0], mix.inputs[1 + k])\n"
+    "    out = tree.nodes.new('ShaderNodeOutputMaterial')\n"
+    "    tree.links.new(mix.outputs[0], out.inputs['Surface'])\n    return material\n\n\n"
     "def put(name, data):\n    thing = bpy.data.objects.new(name, data)\n"
     "    bpy.context.scene.collection.objects.link(thing)\n    return thing\n\n\n"
     "def look(thing, place, up):\n    \"\"\"Cameras and lamps look along -z.\"\"\"\n"
@@ -70,10 +84,7 @@ static const char script_scene[] =
     "    background = scene.world.node_tree.nodes['Background']\n"
     "    background.inputs[0].default_value, background.inputs[1].default_value = (*s['sky'], 1), 1\n"
     "    for g, m in enumerate(s['materials']):\n"
-    "        hair = nodes_of('fiber-%d' % g, 'ShaderNodeBsdfHairPrincipled', Absorption_Coefficient=m['absorption'],\n"
-    "                        Roughness=m['longitudinal_roughness'], Radial_Roughness=m['azimuthal_roughness'], "
-    "Coat=0,\n"
-    "                        IOR=m['index'], Offset=0, Random_Roughness=0)\n"
+    "        hair = blend('fiber-%d' % g, m['hair'])\n"
     "        first = fibers('fibers-%d' % g, os.path.join(HERE, m['file']), hair)\n"
     "        for i, (x, y) in enumerate(s['repeats']):\n"
     "            thing = first if i == 0 else put('fibers-%d-%d' % (g, i), first.data)\n"

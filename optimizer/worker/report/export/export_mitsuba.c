@@ -23,12 +23,17 @@ static void print_fiber(FILE *text, const struct export_scene *e, size_t i)
 }
 
 /* Projected area along the fiber over that across it, of flakes that are tilted so much that they widen a reflected ray
- * as the first group's hair lobes do: by twice their tilt, of which the variance is v (hair_lobes.h, equation of v). */
+ * as the first group's hair materials do: by twice their tilt, of which the variance is v (hair_lobes.h, equation of
+ * v). */
 static double area_along(const struct export_scene *e)
 {
-    const double r = e->hair[0].lobes.longitudinal_roughness;
-    const double sd = 0.726 * r + 0.812 * r * r + 3.7 * pow(r, 20.0);
-    return fmin(fmax(tan(fmin(0.5 * sd, 0.7)), least_along), 1.0);
+    const struct hair_blend *b = &e->hair[0].blend;
+    double variance = 0.0;
+    for (int k = 0; k < HAIR_FIT_N_BLEND; k++) {
+        const double r = b->lobes[k].longitudinal_roughness, sd = 0.726 * r + 0.812 * r * r + 3.7 * pow(r, 20.0);
+        variance += (k == 0 ? 1.0 - b->second_share : b->second_share) * sd * sd;
+    }
+    return fmin(fmax(tan(fmin(0.5 * sqrt(variance), 0.7)), least_along), 1.0);
 }
 
 static status write_volumes(const struct export_scene *e, struct error *err)
@@ -47,7 +52,7 @@ static status write_volumes(const struct export_scene *e, struct error *err)
 
 /* ---- scene.xml ---- */
 
-static void print_material(FILE *text, const struct hair_lobes *l)
+static void print_hair(FILE *text, const struct hair_lobes *l)
 {
     fprintf(text,
             "    <bsdf type=\"hair\">\n"
@@ -61,13 +66,20 @@ static void print_material(FILE *text, const struct hair_lobes *l)
             l->absorption[2]);
 }
 
+static void print_material(FILE *text, const struct hair_blend *b)
+{
+    fprintf(text, "    <bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"%.6g\"/>\n", b->second_share);
+    for (int k = 0; k < HAIR_FIT_N_BLEND; k++) print_hair(text, &b->lobes[k]);
+    fprintf(text, "    </bsdf>\n");
+}
+
 static void print_tile(FILE *text, const struct export_scene *e)
 {
     fprintf(text, "  <shape type=\"shapegroup\" id=\"tile\">\n");
     for (size_t g = 0; g < e->model->sets.n_set; g++) {
         fprintf(text, "   <shape type=\"bsplinecurve\">\n    <string name=\"filename\" value=\"fibers-%zu.txt\"/>\n",
                 g);
-        print_material(text, &e->hair[g].lobes);
+        print_material(text, &e->hair[g].blend);
         fprintf(text, "   </shape>\n");
     }
     fprintf(text, "  </shape>\n");

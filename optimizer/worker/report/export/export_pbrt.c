@@ -1,6 +1,6 @@
 /* results/export/pbrt/: the fitted cloth for pbrt-v4 (pbrt.org/fileformat-v4). cloth.pbrt holds the tile of fibers,
- * repeated, with pbrt's "hair" material (hair_fit.h) and the black sheet; fibers-<group>.pbrt the curves of one group;
- * view-<row>.pbrt lamp, camera and film of one row, and includes the cloth.
+ * repeated, with two of pbrt's "hair" materials mixed (hair_fit.h) and the black sheet; fibers-<group>.pbrt the curves
+ * of one group; view-<row>.pbrt lamp, camera and film of one row, and includes the cloth.
  *
  * pbrt scales a light given as RGB so that its value is the value of the picture with the film's standard sensor. A
  * lamp with alpha 0 lights the cloth but is not seen. Pictures of pbrt are left-handed, therefore the Scale. */
@@ -25,18 +25,31 @@ static void print_fiber(FILE *text, const struct export_scene *e, size_t i)
     fprintf(text, " ]\n");
 }
 
+/* Materials "fiber-<group>-0" and "-1", and "fiber-<group>", which mixes them. */
+static void print_material(FILE *text, size_t group, const struct hair_blend *b)
+{
+    for (int k = 0; k < HAIR_FIT_N_BLEND; k++) {
+        const struct hair_lobes *l = &b->lobes[k];
+        fprintf(text,
+                "MakeNamedMaterial \"fiber-%zu-%d\" \"string type\" \"hair\" \"rgb sigma_a\" [ %.6g %.6g %.6g ] "
+                "\"float eta\" %.6g\n  \"float beta_m\" %.6g \"float beta_n\" %.6g \"float alpha\" 0\n",
+                group, k, l->absorption[0], l->absorption[1], l->absorption[2], l->index, l->longitudinal_roughness,
+                l->azimuthal_roughness);
+    }
+    fprintf(text,
+            "MakeNamedMaterial \"fiber-%zu\" \"string type\" \"mix\" \"string materials\" [ \"fiber-%zu-0\" "
+            "\"fiber-%zu-1\" ] \"float amount\" %.6g\n",
+            group, group, group, b->second_share);
+}
+
 static void print_tile(FILE *text, const struct export_scene *e)
 {
     char name[32];
+    for (size_t g = 0; g < e->model->sets.n_set; g++) print_material(text, g, &e->hair[g].blend);
     fprintf(text, "ObjectBegin \"tile\"\n");
     for (size_t g = 0; g < e->model->sets.n_set; g++) {
-        const struct hair_lobes *l = &e->hair[g].lobes;
         export_fibers_name(g, ".pbrt", name);
-        fprintf(text,
-                "  Material \"hair\" \"rgb sigma_a\" [ %.6g %.6g %.6g ] \"float eta\" %.6g \"float beta_m\" %.6g "
-                "\"float beta_n\" %.6g \"float alpha\" 0\n  Include \"%s\"\n",
-                l->absorption[0], l->absorption[1], l->absorption[2], l->index, l->longitudinal_roughness,
-                l->azimuthal_roughness, name);
+        fprintf(text, "  NamedMaterial \"fiber-%zu\"\n  Include \"%s\"\n", g, name);
     }
     fprintf(text, "ObjectEnd\n");
 }

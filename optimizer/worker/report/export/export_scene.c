@@ -215,15 +215,21 @@ json_t *export_material_json(const struct export_scene *e, size_t group, json_t 
     return material;
 }
 
+static json_t *lobes_json(const struct hair_lobes *l, double share)
+{
+    return json_pack("{s:o, s:o, s:o, s:o, s:o}", "share", json_number(share), "longitudinal_roughness",
+                     json_number(l->longitudinal_roughness), "azimuthal_roughness", json_number(l->azimuthal_roughness),
+                     "index", json_number(l->index), "absorption", json_number_list(l->absorption, 3, 1.0));
+}
+
 static json_t *hair_json(const struct hair_fit *h)
 {
-    return json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "longitudinal_roughness",
-                     json_number(h->lobes.longitudinal_roughness), "azimuthal_roughness",
-                     json_number(h->lobes.azimuthal_roughness), "index", json_number(h->lobes.index), "absorption",
-                     json_number_list(h->lobes.absorption, 3, 1.0), "rel_rms", json_number(h->rel_rms), "fitted_albedo",
-                     json_number_list(h->albedo, 3, 1.0), "albedo", json_number_list(h->lobes_albedo, 3, 1.0),
+    const struct hair_blend *b = &h->blend;
+    return json_pack("{s:[o, o], s:o, s:o, s:o, s:o, s:o}", "hair", lobes_json(&b->lobes[0], 1.0 - b->second_share),
+                     lobes_json(&b->lobes[1], b->second_share), "rel_rms", json_number(h->rel_rms), "fitted_albedo",
+                     json_number_list(h->albedo, 3, 1.0), "albedo", json_number_list(h->blend_albedo, 3, 1.0),
                      "fitted_turned_back", json_number_list(h->turned, 3, 1.0), "turned_back",
-                     json_number_list(h->lobes_turned, 3, 1.0));
+                     json_number_list(h->blend_turned, 3, 1.0));
 }
 
 json_t *export_hair_json(const struct export_scene *e)

@@ -81,7 +81,7 @@ status export_rows_write(const struct export_scene *e, struct error *err);
 
 /* Adds the name of the group to what result.json says of its material. */
 json_t *export_material_json(const struct export_scene *e, size_t group, json_t *material);
-/* Parameters of the hair lobes and the error of the conversion, of all groups. */
+/* Parameters of the hair materials and the error of the conversion, of all groups. */
 json_t *export_hair_json(const struct export_scene *e);
 
 #endif

@@ -10,9 +10,12 @@ enum {
     N_THETA_I = 28,
     N_PHI = 18,
     N_TURN = 4,
-    N_UNKNOWN = 6,
+    N_OF_LOBES = 6, /* unknowns of one hair material */
+    N_UNKNOWN = HAIR_FIT_N_BLEND * N_OF_LOBES + 1,
     N_START = 4,
+    N_SECOND = 5, /* starts of the second material */
     N_EVALUATION = 1000,
+    N_EVALUATION_BLEND = 4000,
     N_WIDTH = 12
 };
 #define N_VALUE ((size_t)N_THETA_O * N_THETA_I * N_PHI * 3)
@@ -20,9 +23,10 @@ enum {
  * that is kept, against what is absorbed, counts more than the shapes of the lobes, and what turns back as much. */
 static const double albedo_weight = 4.0, turned_weight = 1.0, least_absorbed = 0.1, least_turned = 0.005;
 enum side { TURNS_BACK, GOES_ON, N_SIDE };
-/* roughness, roughness, index, ln absorption */
-static const double lower[N_UNKNOWN] = {0.03, 0.05, 1.05, -9.0, -9.0, -9.0},
-                    upper[N_UNKNOWN] = {1.0, 1.0, 3.0, 4.0, 4.0, 4.0};
+/* roughness, roughness, index, ln absorption of each material; share of the second one */
+#define LOWER 0.03, 0.05, 1.05, -9.0, -9.0, -9.0
+#define UPPER 1.0, 1.0, 3.0, 4.0, 4.0, 4.0
+static const double lower[N_UNKNOWN] = {LOWER, LOWER, 0.0}, upper[N_UNKNOWN] = {UPPER, UPPER, 0.95};
 
 struct target {
     double theta_o[N_THETA_O], theta_i[N_THETA_I], phi[N_PHI];
@@ -86,16 +90,23 @@ static void fill_fiber(const struct scattering_model *m, const struct scattering
     add_shares(t, t->fiber, t->share);
 }
 
-static struct hair_lobes lobes_of(const double x[N_UNKNOWN])
+static struct hair_blend blend_of(const double x[N_UNKNOWN])
 {
-    return (struct hair_lobes){x[0], x[1], x[2], {exp(x[3]), exp(x[4]), exp(x[5])}};
+    struct hair_blend b = {.second_share = x[N_UNKNOWN - 1]};
+    for (int k = 0; k < HAIR_FIT_N_BLEND; k++, x += N_OF_LOBES)
+        b.lobes[k] = (struct hair_lobes){x[0], x[1], x[2], {exp(x[3]), exp(x[4]), exp(x[5])}};
+    return b;
 }
 
-static void fill_lobes(const struct hair_lobes *l, struct target *t)
+static void fill_blend(const struct hair_blend *b, struct target *t)
 {
+    const double share[HAIR_FIT_N_BLEND] = {1.0 - b->second_share, b->second_share};
+    memset(t->lobes, 0, N_VALUE * sizeof(double));
     for (size_t o = 0; o < N_THETA_O; o++)
-        hair_lobes_density(l, t->theta_o[o], t->theta_i, N_THETA_I, t->phi, N_PHI,
-                           t->lobes + o * N_THETA_I * N_PHI * 3);
+        for (int k = 0; k < HAIR_FIT_N_BLEND; k++)
+            if (share[k] > 0.0)
+                hair_lobes_density(&b->lobes[k], t->theta_o[o], t->theta_i, N_THETA_I, t->phi, N_PHI, share[k],
+                                   t->lobes + o * N_THETA_I * N_PHI * 3);
 }
 
 /* Mean squared difference over the mean square of the fiber's. */
@@ -126,41 +137,62 @@ static double share_square(const struct target *t)
     return sum / weight;
 }
 
+/* Of one material where n = N_OF_LOBES. */
 static double objective(unsigned n, const double *x, double *gradient, void *data)
 {
-    (void)n, (void)gradient;
+    (void)gradient;
     struct target *t = data;
-    const struct hair_lobes l = lobes_of(x);
-    fill_lobes(&l, t);
+    double all[N_UNKNOWN] = {0};
+    memcpy(all, x, n * sizeof *x);
+    const struct hair_blend b = blend_of(all);
+    fill_blend(&b, t);
     return shape_square(t) + share_square(t);
 }
 
-/* From several starts; the best end counts. */
+/* Takes the end of a search from x for `best` where it is lower than `lowest`. */
+static status search(struct target *t, unsigned n, int n_evaluation, double x[N_UNKNOWN], double *lowest,
+                     double best[N_UNKNOWN], struct error *err)
+{
+    nlopt_opt opt = nlopt_create(n == N_OF_LOBES ? NLOPT_LN_SBPLX : NLOPT_LN_BOBYQA, n);
+    if (opt == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit hair lobes: out of memory");
+    double f = INFINITY;
+    nlopt_set_lower_bounds(opt, lower);
+    nlopt_set_upper_bounds(opt, upper);
+    nlopt_set_min_objective(opt, objective, t);
+    nlopt_set_maxeval(opt, n_evaluation);
+    nlopt_set_ftol_rel(opt, 1e-5);
+    nlopt_optimize(opt, x, &f); /* also when the evaluations are used up, x is the best point so far */
+    nlopt_destroy(opt);
+    if (!(f < *lowest)) return STATUS_OK;
+    *lowest = f;
+    memcpy(best, x, n * sizeof *x);
+    return STATUS_OK;
+}
+
+/* From several starts; the best end counts. One material first, then a second one beside it. */
 static status minimise(struct target *t, double best[N_UNKNOWN], struct error *err)
 {
-    static const double start[N_START][N_UNKNOWN] = {{0.2, 0.4, 1.5, -2.0, -2.0, -2.0},
-                                                     {0.6, 0.8, 1.5, -2.0, -2.0, -2.0},
-                                                     {0.4, 0.2, 1.3, -1.0, -1.0, -1.0},
-                                                     {0.5, 0.3, 1.1, -1.0, -1.0, -1.0}};
-    double lowest = INFINITY;
-    for (int k = 0; k < N_START; k++) {
-        nlopt_opt opt = nlopt_create(NLOPT_LN_SBPLX, N_UNKNOWN);
-        if (opt == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit hair lobes: out of memory");
-        double x[N_UNKNOWN], f = INFINITY;
-        memcpy(x, start[k], sizeof x);
-        nlopt_set_lower_bounds(opt, lower);
-        nlopt_set_upper_bounds(opt, upper);
-        nlopt_set_min_objective(opt, objective, t);
-        nlopt_set_maxeval(opt, N_EVALUATION);
-        nlopt_set_ftol_rel(opt, 1e-5);
-        nlopt_optimize(opt, x, &f); /* also when the evaluations are used up, x is the best point so far */
-        nlopt_destroy(opt);
-        if (!(f < lowest)) continue;
-        lowest = f;
-        memcpy(best, x, sizeof x);
+    static const double start[N_SECOND][N_OF_LOBES] = {{0.2, 0.4, 1.5, -2.0, -2.0, -2.0},
+                                                       {0.6, 0.8, 1.5, -2.0, -2.0, -2.0},
+                                                       {0.4, 0.2, 1.3, -1.0, -1.0, -1.0},
+                                                       {0.5, 0.3, 1.1, -1.0, -1.0, -1.0},
+                                                       {0.2, 0.4, 1.5, 2.0, 2.0, 2.0}}; /* lets nothing through */
+    double lowest = INFINITY, single[N_UNKNOWN] = {0}, x[N_UNKNOWN];
+    status s = STATUS_OK;
+    for (int k = 0; k < N_START && s == STATUS_OK; k++) {
+        memcpy(x, start[k], sizeof start[k]);
+        s = search(t, N_OF_LOBES, N_EVALUATION, x, &lowest, single, err);
     }
-    return isfinite(lowest) ? STATUS_OK
-                            : error_set(err, STATUS_INTERNAL, "the hair lobes of an export have no finite error");
+    memcpy(single + N_OF_LOBES, single, N_OF_LOBES * sizeof *single); /* the same material twice */
+    memcpy(best, single, sizeof single);
+    for (int k = 0; k < N_SECOND && s == STATUS_OK; k++) {
+        memcpy(x, single, sizeof single);
+        memcpy(x + N_OF_LOBES, start[k], sizeof start[k]);
+        x[N_UNKNOWN - 1] = 0.3;
+        s = search(t, N_UNKNOWN, N_EVALUATION_BLEND, x, &lowest, best, err);
+    }
+    if (s != STATUS_OK || isfinite(lowest)) return s;
+    return error_set(err, STATUS_INTERNAL, "the hair lobes of an export have no finite error");
 }
 
 static void mean_share(const struct target *t, double share[N_THETA_O][N_SIDE][3], double turned[3], double all[3])
@@ -278,12 +310,12 @@ static status fit_target(struct target *t, struct hair_fit *fit, struct error *e
     double x[N_UNKNOWN] = {0}, share[N_THETA_O][N_SIDE][3];
     status s = minimise(t, x, err);
     if (s != STATUS_OK) return s;
-    fit->lobes = lobes_of(x);
-    fill_lobes(&fit->lobes, t);
+    fit->blend = blend_of(x);
+    fill_blend(&fit->blend, t);
     fit->rel_rms = sqrt(shape_square(t));
     add_shares(t, t->lobes, share);
     mean_share(t, t->share, fit->turned, fit->albedo);
-    mean_share(t, share, fit->lobes_turned, fit->lobes_albedo);
+    mean_share(t, share, fit->blend_turned, fit->blend_albedo);
     fit_surface(t, fit);
     return STATUS_OK;
 }

@@ -107,20 +107,15 @@ static void azimuthal(const struct hair_lobes *l, double theta_o, double phi, do
 }
 
 void hair_lobes_density(const struct hair_lobes *l, double theta_o_rad, const double *theta_i_rad, size_t n_theta,
-                        const double *phi_rad, size_t n_phi, double *out)
+                        const double *phi_rad, size_t n_phi, double part_of_light, double *out)
 {
-    double v[N_LOBE + 1];
+    double v[N_LOBE + 1], part[HAIR_LOBES_MAX_PHI][N_LOBE + 1][3];
     variances(l->longitudinal_roughness, v);
-    for (size_t j = 0; j < n_phi; j++) {
-        double part[N_LOBE + 1][3];
-        azimuthal(l, theta_o_rad, phi_rad[j], part);
-        for (size_t i = 0; i < n_theta; i++) {
-            double *at = out + 3 * (i * n_phi + j);
-            at[0] = at[1] = at[2] = 0.0;
-            for (int p = 0; p <= N_LOBE; p++) {
-                double m = longitudinal(theta_i_rad[i], theta_o_rad, v[p]);
-                for (int c = 0; c < 3; c++) at[c] += m * part[p][c];
-            }
+    for (size_t j = 0; j < n_phi && j < HAIR_LOBES_MAX_PHI; j++) azimuthal(l, theta_o_rad, phi_rad[j], part[j]);
+    for (size_t i = 0; i < n_theta; i++)
+        for (int p = 0; p <= N_LOBE; p++) {
+            const double m = part_of_light * longitudinal(theta_i_rad[i], theta_o_rad, v[p]);
+            for (size_t j = 0; j < n_phi && j < HAIR_LOBES_MAX_PHI; j++)
+                for (size_t c = 0; c < 3; c++) out[3 * (i * n_phi + j) + c] += m * part[j][p][c];
         }
-    }
 }
