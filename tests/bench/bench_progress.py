@@ -2,20 +2,24 @@
 
     bench_progress.py [--build DIR] [--data DIR] [--threads N] [--keep DIR] [--cpu-clock] [demo] [fiber_ct] [weave_ct] [fleece]
 
-Of each job: worst_eta_ratio_after_10pct, the largest factor between the stated and the true remaining time from a tenth of the wall time on, while at
-least a twentieth of it and 3 s remain; and largest_jump of the stated fraction between two looks. On a machine that others use, too, the remaining
-wall time depends on what they do: cpu_worst_eta_ratio_after_10pct is the same factor in processor time, of the stated time at the share of the
-processors that the job has had so far, and of the processor time that it took from there on. cpu_inside_range_share and cpu_widest_range judge the
-stated range from low to high in the same way: the share of looks where the truth lies in it (25 % either way where none is stated), and the largest
-factor between its ends. Wall and processor time of every stage go to standard error. Each job runs twice on the same folder of remembered speeds, as
-it would on a machine that has run jobs before; the figures with "first" in their name are of the first run, on a machine that knows nothing. --keep
-keeps the jobs with their records.
+Of each job: worst_eta_ratio_after_10pct, the largest factor by which the true remaining time lies outside of what users read, from a tenth of the
+wall time on, while at least a twentieth of it and 3 s remain. Users read a range where the time is not known within a quarter, and the time
+otherwise. worst_point_ratio_after_10pct is the same of the single time that stands in the middle of each range; largest_jump that of the stated
+fraction between two looks. On a machine that others use, too, the remaining wall time depends on what they do: cpu_worst_eta_ratio_after_10pct and
+cpu_worst_point_ratio_after_10pct are the same factors in processor time, of the stated time at the share of the processors that the job has had so
+far, and of the processor time that it took from there on. cpu_inside_range_share, cpu_median_range and cpu_widest_range say how wide ranges are: the
+share of looks where the truth lies in them (25 % either way where none is stated), and the median and largest factor between their ends.
+
+Wall and processor time of every stage go to standard error. Each job runs twice on the same folder of remembered speeds, as it would on a machine
+that has run jobs before; the figures with "first" in their name are of the first run, on a machine that knows nothing. --keep keeps the jobs with
+their records.
 """
 import argparse
 import contextlib
 import json
 import os
 import shutil
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -131,41 +135,47 @@ def record(arguments, job, speeds):
     return looks, wall_s
 
 
-def worst_ratio(looks, wall_s):
-    """Largest factor between stated and true remaining time; infinite while none is stated."""
+def judged(looks, i_clock):
+    """(true remaining time, look, stated seconds to those of the clock) of the looks that count; the clock is 0: wall time, 1: processor time."""
+    total = looks[-1][i_clock]
+    for look in looks:
+        rest = total - look[i_clock]
+        if look[i_clock] >= FROM * total and rest >= max(REST_SHARE * total, REST_S) and look[2]["state"] == "running":
+            yield rest, look[2], look[i_clock] / look[0]
+
+
+def off(rest, low, high):
+    """Factor by which the truth lies outside of what is stated."""
+    return max(1.0, rest / max(high, 1e-3), low / rest)
+
+
+def worst_printed(looks, i_clock):
+    """Largest factor of what users read: the range where one is stated, the time otherwise."""
     worst = 1.0
-    for t, _, look in looks:
-        rest, eta = wall_s - t, look["eta_s"]
-        if t < FROM * wall_s or rest < max(REST_SHARE * wall_s, REST_S) or look["state"] != "running":
-            continue
-        worst = max(worst, max(eta, rest) / max(min(eta, rest), 1e-3) if eta is not None else float("inf"))
+    for rest, look, scale in judged(looks, i_clock):
+        if look["eta_s"] is None:
+            return float("inf")
+        low, high = (look["eta_low_s"], look["eta_high_s"]) if look["eta_low_s"] is not None else (look["eta_s"],) * 2
+        worst = max(worst, off(rest, low * scale, high * scale))
     return worst
 
 
-def worst_cpu_ratio(looks):
-    """The same in processor time."""
-    worst, total = 1.0, looks[-1][1]
-    for t, cpu_s, look in looks:
-        rest = total - cpu_s
-        if cpu_s < FROM * total or rest < max(REST_SHARE * total, REST_S) or look["state"] != "running":
-            continue
-        eta = look["eta_s"] * cpu_s / t if look["eta_s"] is not None else float("inf")
-        worst = max(worst, max(eta, rest) / max(min(eta, rest), 1e-3))
-    return worst
+def worst_point(looks, i_clock):
+    """Largest factor of the single time, also where users read a range."""
+    return max((off(rest, look["eta_s"] * scale, look["eta_s"] * scale) if look["eta_s"] is not None else float("inf")
+                for rest, look, scale in judged(looks, i_clock)), default=1.0)
 
 
 def ranges(looks):
-    """Share of the looks whose range has the true remaining processor time, and the largest factor between the ends of a range."""
-    n, inside, widest, total = 0, 0, 1.0, looks[-1][1]
-    for t, cpu_s, look in looks:
-        rest = total - cpu_s
-        if cpu_s < FROM * total or rest < max(REST_SHARE * total, REST_S) or look["state"] != "running" or look["eta_s"] is None:
+    """Share of the looks whose range has the true remaining processor time, median and largest factor between the ends of a range."""
+    inside, widths = [], []
+    for rest, look, scale in judged(looks, 1):
+        if look["eta_s"] is None:
             continue
         low, high = (look["eta_low_s"], look["eta_high_s"]) if look["eta_low_s"] is not None else (look["eta_s"] / 1.25, look["eta_s"] * 1.25)
-        n += 1
-        inside += low * cpu_s / t <= rest <= high * cpu_s / t
-        widest = max(widest, high / max(low, 1e-3))
-    return inside / max(n, 1), widest
+        inside.append(low * scale <= rest <= high * scale)
+        widths.append(high / max(low, 1e-3))
+    return sum(inside) / max(len(inside), 1), statistics.median(widths or [1.0]), max(widths, default=1.0)
 
 
 def largest_jump(looks):
@@ -188,10 +198,12 @@ def bench(arguments, name, folder, speeds):
         shutil.rmtree(job, ignore_errors=True)
         make_job(sample, job)
         looks, wall_s = record(arguments, job, speeds)
-        figure(f"{name}.{run}worst_eta_ratio_after_10pct", worst_ratio(looks, wall_s), "1")
-        figure(f"{name}.{run}cpu_worst_eta_ratio_after_10pct", worst_cpu_ratio(looks), "1")
-        inside, widest = ranges(looks)
+        for i_clock, clock in enumerate(("", "cpu_")):
+            figure(f"{name}.{run}{clock}worst_eta_ratio_after_10pct", worst_printed(looks, i_clock), "1")
+            figure(f"{name}.{run}{clock}worst_point_ratio_after_10pct", worst_point(looks, i_clock), "1")
+        inside, median, widest = ranges(looks)
         figure(f"{name}.{run}cpu_inside_range_share", inside, "1", "higher")
+        figure(f"{name}.{run}cpu_median_range", median, "1")
         figure(f"{name}.{run}cpu_widest_range", widest, "1")
         figure(f"{name}.{run}largest_jump", largest_jump(looks), "1")
         figure(f"{name}.{run}wall_s", wall_s, "s")

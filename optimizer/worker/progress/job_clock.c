@@ -10,6 +10,7 @@ static const double sd_least = 0.08, sd_factor = 0.4, sd_own = 0.3, usual_jobs =
 /* The same of elapsed time over the passed share x: by a remembered curve, and by a straight line, times
  * (1 - x) / sqrt(x). */
 static const double sd_by_curve = 0.12, sd_by_line = 0.35;
+static const double usual_curve_jobs = 1.0;
 /* Share of a stage's time in one of SPEED_CURVE_POINTS parts of its fraction from which on the fraction has waited. */
 static const double long_wait = 0.1;
 /* A stage below this many seconds is not remembered and says nothing about the others. */
@@ -23,11 +24,17 @@ void job_clock_init(struct job_clock *c, size_t n_stage, const struct speed_book
 
 /* ---- expectations ---- */
 
-static void set_curve(struct job_clock_stage *s, const struct speed_entry *e)
+/* How the time of earlier jobs ran over their fraction. Where the fraction is the stage's own prediction, that says how
+ * such predictions were off, and counts beside the usual curve with its weight in jobs. */
+static void set_curve(struct job_clock_stage *s, const struct speed_entry *e, const struct job_clock_work *work)
 {
-    s->has_curve = e != NULL;
-    for (size_t k = 0; k < SPEED_CURVE_POINTS; k++)
-        s->curve[k] = e != NULL ? e->curve[k] : (double)(k + 1) / SPEED_CURVE_POINTS;
+    const double n_usual = e == NULL || work->predicts_end ? usual_curve_jobs : 0.0, n_job = e != NULL ? e->n_job : 0.0;
+    s->has_curve = e != NULL && !work->predicts_end;
+    for (size_t k = 0; k < SPEED_CURVE_POINTS; k++) {
+        const double straight = (double)(k + 1) / SPEED_CURVE_POINTS;
+        const double usual = work->usual_curve != NULL ? work->usual_curve[k] : straight;
+        s->curve[k] = (n_job * (e != NULL ? e->curve[k] : 0.0) + n_usual * usual) / (n_job + n_usual);
+    }
 }
 
 void job_clock_plan(struct job_clock *c, size_t i, const struct job_clock_work *work)
@@ -46,7 +53,7 @@ void job_clock_plan(struct job_clock *c, size_t i, const struct job_clock_work *
         double var = (usual_jobs * work->log_sd * work->log_sd + e->n_job * e->log_var) / (usual_jobs + e->n_job);
         s->log_sd = sqrt(sd_least * sd_least + var * (1.0 + 1.0 / e->n_job));
     }
-    set_curve(s, work->predicts_end ? NULL : e);
+    set_curve(s, e, work);
 }
 
 void job_clock_plan_own(struct job_clock *c, size_t i, const char *key, double seconds)

@@ -1,13 +1,13 @@
 /* Predicts when a job ends: its stages with the work that they have, the speeds of earlier jobs (speed_book.h), and
  * what this job has shown so far.
  *
- * Before it runs, a stage is expected to take units x seconds per unit, times a factor by which the finished stages of
- * this job were slower than expected. While it runs, that is combined with its elapsed time over the share of its time
- * that has passed at its fraction, each weighted by its uncertainty (logarithms of times are taken to be normal). A
- * stage that predicts its own end (a fit) has a fraction that runs evenly with time; what earlier jobs took of their
- * budget says little about this one, and nothing about the speed of other stages. The
- * stated fraction of the job is elapsed time over elapsed and remaining time; it never falls, and it rises by at most
- * JOB_CLOCK_STEP between two looks. Times are of the monotonic clock, in seconds. Not thread-safe. */
+ * Before it runs, a stage is expected to take units x seconds per unit, times a factor by which the finished stages
+ * of this job were slower than expected. While it runs, that is combined with its elapsed time over the share of its
+ * time that has passed at its fraction, each weighted by its uncertainty (logarithms of times are taken to be
+ * normal). A stage that predicts its own end (a fit) has a fraction that runs evenly with time, but for what such
+ * predictions were off in earlier jobs; its time says nothing about the speed of other stages. The stated fraction of
+ * the job is elapsed time over elapsed and remaining time; it never falls, and it rises by at most JOB_CLOCK_STEP
+ * between two looks. Times are of the monotonic clock, in seconds. Not thread-safe. */
 #ifndef SELVEDGE_OPTIMIZER_JOB_CLOCK_H
 #define SELVEDGE_OPTIMIZER_JOB_CLOCK_H
 
@@ -52,6 +52,8 @@ struct job_clock_work {
     const char *key;
     double units, usual_s, log_sd;
     bool predicts_end; /* its fraction is that of the work that the stage itself expects */
+    /* as speed_entry.curve, of jobs on other machines; NULL: a straight line. Where nothing is remembered. */
+    const double *usual_curve;
 };
 
 /* book: copied. */

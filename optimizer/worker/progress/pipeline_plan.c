@@ -14,10 +14,30 @@
 #include <string.h>
 #include <sys/stat.h>
 
-/* Seconds that a unit takes on one thread of a common processor of 2023, for a machine that has run no job yet: means
- * of the demo's scan and of two real ones, which need up to 1.5 times more or less. */
-static const double read_s_per_voxel = 1e-7, orientation_s_per_voxel = 9e-7, fibers_s_per_voxel = 6e-6,
-                    transfer_s_per_voxel = 4e-7, render_s_per_path = 6e-6;
+/* Stages that go through voxels: seconds that one takes on one thread of a common processor of 2023, for a machine that
+ * has run no job yet, the standard deviation of its logarithm between jobs, and how the time runs over the fraction:
+ * means of the demo's scan, of two real ones and of a felt of 156 million voxels, which need up to 1.5 times more or
+ * less. Filters vary more, because their cost goes with the size of the fibers in voxels. */
+struct voxel_stage {
+    const char *key;
+    double s_per_voxel, log_sd;
+    const double *curve;
+};
+static const double render_s_per_path = 6e-6;
+static const double read_curve[SPEED_CURVE_POINTS] = {0.01, 0.02, 0.02, 0.03, 0.04, 0.05, 0.06, 0.06, 0.07, 0.08,
+                                                      0.08, 0.09, 0.10, 0.11, 0.12, 0.12, 0.94, 0.94, 0.94, 0.94};
+static const double orientation_curve[SPEED_CURVE_POINTS] = {0.18, 0.29, 0.37, 0.38, 0.38, 0.40, 0.44,
+                                                             0.48, 0.52, 0.55, 0.58, 0.62, 0.65, 0.68,
+                                                             0.71, 0.74, 0.77, 0.82, 0.90, 0.97};
+static const double fibers_curve[SPEED_CURVE_POINTS] = {0.10, 0.21, 0.27, 0.28, 0.37, 0.37, 0.47, 0.47, 0.52, 0.52,
+                                                        0.66, 0.66, 0.66, 0.77, 0.80, 0.84, 0.88, 0.92, 0.95, 0.97};
+static const double transfer_curve[SPEED_CURVE_POINTS] = {0.14, 0.18, 0.21, 0.24, 0.29, 0.33, 0.37, 0.41, 0.47, 0.52,
+                                                          0.56, 0.61, 0.65, 0.69, 0.73, 0.75, 0.78, 0.81, 0.84, 0.85};
+static const struct voxel_stage read_stage = {"volume", 1e-7, 0.8, read_curve},
+                                orientation_stage = {"orientation.material", 9e-7, 0.8, orientation_curve},
+                                fibers_stage = {"fibers.material", 6e-6, 0.4, fibers_curve},
+                                transfer_stage = {"directions.material", 4e-7, 0.8, transfer_curve},
+                                report_stage = {"report.geometry", 8e-8, 0.8, NULL};
 /* The same of a path of a fit to rows whose brightest channel has the mean usual_radiance. In bright cloth paths are
  * longer: the time goes with this power of the radiance. */
 static const double fit_s_per_path = 9e-6, usual_radiance = 0.13, radiance_power = 0.4;
@@ -32,10 +52,9 @@ static const double usual_budget = 6e6, fit_share = 1.0 - PIPELINE_SCAN_ERROR_SH
 /* Time of a validated path over that of a fitted one; paths in whose time the rest of a report is made: the gradient
  * certificate, geometry, pages. */
 static const double validated_path = 0.88, rest_of_report_paths = 1.5e5;
-static const double report_s_per_voxel = 2e-7, least_s = 0.05;
-/* Standard deviations of the logarithm of a time where no job has been run; a large one of filters, because their cost
- * goes with the size of the fibers in voxels. */
-static const double sd_of_voxels = 0.4, sd_of_filters = 0.8, sd_of_fit = 0.5, sd_of_rest = 0.5;
+static const double least_s = 0.05;
+/* Standard deviations of the logarithm of a time where no job has been run. */
+static const double sd_of_fit = 0.5, sd_of_rest = 0.5;
 
 /* Voxels of the scan: as read, or by the size of its files, which have one or two bytes a voxel. */
 static double n_voxel(const struct pipeline_context *c)
@@ -53,11 +72,13 @@ static double n_voxel(const struct pipeline_context *c)
 static double n_thread(const struct pipeline_context *c) { return (double)thread_pool_n_thread(c->pool); }
 
 /* A stage that goes through n voxels. */
-static void plan_voxels(struct pipeline_context *c, size_t i, const char *key, double n, double s_per_voxel)
+static void plan_voxels(struct pipeline_context *c, size_t i, const struct voxel_stage *stage, double n)
 {
-    const bool traced = strcmp(key, "fibers.material") == 0;
-    const struct job_clock_work work = {
-        .key = key, .units = n / n_thread(c), .usual_s = s_per_voxel, .log_sd = traced ? sd_of_voxels : sd_of_filters};
+    const struct job_clock_work work = {.key = stage->key,
+                                        .units = n / n_thread(c),
+                                        .usual_s = stage->s_per_voxel,
+                                        .log_sd = stage->log_sd,
+                                        .usual_curve = stage->curve};
     worker_status_plan(c->status, i, &work);
 }
 
@@ -107,7 +128,9 @@ static double usual_s_per_path(const struct pipeline_context *c)
 static void plan_fit(struct pipeline_context *c, size_t i)
 {
     char key[SPEED_BOOK_KEY_BYTES];
-    snprintf(key, sizeof key, "fit.%.40s%s.paths", c->doc->method, kind_of_fit(c));
+    /* a table ends a fit by its misfit, photographs by their noise: both take other shares of what is expected */
+    snprintf(key, sizeof key, "fit.%.40s%s%s.paths", c->doc->method, kind_of_fit(c),
+             c->doc->n_photograph > 0 ? "+photographs" : "+table");
     const double path_s = usual_s_per_path(c), of_fit = c->doc->has_volume ? fit_share : 1.0;
     const double n_path = pipeline_plan_usual_paths(c) * (double)c->n_model;
     const struct job_clock_work work = {.key = key,
@@ -180,13 +203,13 @@ void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
 {
     const struct job_clock_work rest = {.key = name, .units = 1.0, .usual_s = least_s, .log_sd = sd_of_rest};
     if (strcmp(name, "volume") == 0)
-        plan_voxels(c, i, "volume", n_voxel(c), read_s_per_voxel);
+        plan_voxels(c, i, &read_stage, n_voxel(c));
     else if (strcmp(name, "orientation") == 0)
-        plan_voxels(c, i, "orientation.material", n_material(c), orientation_s_per_voxel);
+        plan_voxels(c, i, &orientation_stage, n_material(c));
     else if (strcmp(name, "fibers") == 0 && c->doc->has_volume)
-        plan_voxels(c, i, "fibers.material", n_material(c), fibers_s_per_voxel);
+        plan_voxels(c, i, &fibers_stage, n_material(c));
     else if (strcmp(name, "directions") == 0)
-        plan_voxels(c, i, "directions.material", n_material(c), transfer_s_per_voxel);
+        plan_voxels(c, i, &transfer_stage, n_material(c));
     else if (strcmp(name, "fit") == 0)
         plan_fit(c, i);
     else if (strcmp(name, "validation") == 0)
@@ -194,7 +217,7 @@ void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
     else if (strcmp(name, "report") == 0 && job_document_pictures_only(c->doc))
         plan_pictures(c, i);
     else if (strcmp(name, "report") == 0 && job_document_geometry_only(c->doc))
-        plan_voxels(c, i, "report.geometry", n_voxel(c), report_s_per_voxel);
+        plan_voxels(c, i, &report_stage, n_voxel(c));
     else if (strcmp(name, "report") == 0)
         plan_after_fit(c, i, i - 2,
                        result_renderings_paths(c, fit_paths(c)) + surface_pictures_paths(c) + twin_result_paths(c) +

@@ -121,6 +121,52 @@ static void test_a_stage_that_predicts_its_end(void **state)
     assert_true(fabs(job_clock_expected_s(&c, 1) - 10.0) < 1e-9);
 }
 
+/* A first job whose stage is known to spend most of its time at the beginning. */
+static void test_a_usual_curve(void **state)
+{
+    (void)state;
+    static struct job_clock c;
+    static struct speed_book book;
+    double curve[SPEED_CURVE_POINTS];
+    for (size_t k = 0; k < SPEED_CURVE_POINTS; k++) curve[k] = sqrt((double)(k + 1) / SPEED_CURVE_POINTS);
+    book = empty;
+    for (int known = 0; known < 2; known++) {
+        const struct job_clock_work work = {
+            .key = "felt", .units = 100.0, .usual_s = 1.0, .log_sd = 0.8, .usual_curve = known ? curve : NULL};
+        job_clock_init(&c, 1, &book, 0.0);
+        job_clock_plan(&c, 0, &work);
+        job_clock_begin(&c, 0, 0.0);
+        for (int t = 1; t <= 50; t++) job_clock_fraction(&c, t * t / 1e4, t);
+        double eta = job_clock_look(&c, 50.0).eta_s; /* a quarter of the fraction, half of the time */
+        assert_true(known ? fabs(eta - 50.0) < 3.0 : eta > 60.0);
+    }
+}
+
+/* A fit of which half of the time has passed at a third of its fraction, again and again: the clock learns it. */
+static void test_predictions_that_were_off(void **state)
+{
+    (void)state;
+    static struct job_clock c;
+    static struct speed_book book;
+    double eta[4];
+    book = empty;
+    const struct job_clock_work fit = {
+        .key = "fit", .units = 100.0, .usual_s = 1.0, .log_sd = 0.8, .predicts_end = true};
+    for (int k = 0; k < 4; k++) {
+        job_clock_init(&c, 1, &book, 0.0);
+        job_clock_plan(&c, 0, &fit);
+        job_clock_begin(&c, 0, 0.0);
+        for (int t = 1; t <= 50; t++) job_clock_fraction(&c, 0.3 * t / 50.0, t);
+        eta[k] = job_clock_look(&c, 50.0).eta_s;
+        for (int t = 51; t <= 100; t++) job_clock_fraction(&c, 0.3 + 0.7 * (t - 50) / 50.0, t);
+        job_clock_end(&c, false, 100.0);
+        job_clock_remember(&c, &book);
+    }
+    assert_true(eta[0] > 60.0);
+    for (int k = 1; k < 4; k++) assert_true(fabs(eta[k] - 50.0) < fabs(eta[k - 1] - 50.0));
+    assert_true(fabs(eta[3] - 50.0) < 7.0);
+}
+
 static void test_nothing_known_is_a_range(void **state)
 {
     (void)state;
@@ -225,6 +271,8 @@ int main(void)
         cmocka_unit_test(test_remembered_speeds_predict_the_next_job),
         cmocka_unit_test(test_a_fraction_that_waits),
         cmocka_unit_test(test_a_stage_that_predicts_its_end),
+        cmocka_unit_test(test_a_usual_curve),
+        cmocka_unit_test(test_predictions_that_were_off),
         cmocka_unit_test(test_nothing_known_is_a_range),
         cmocka_unit_test(test_a_resumed_job),
         cmocka_unit_test_setup_teardown(test_the_book_is_a_file, scratch_folder_setup, scratch_folder_teardown),
