@@ -101,12 +101,12 @@ static struct hair_blend blend_of(const double x[N_UNKNOWN])
 static void fill_blend(const struct hair_blend *b, struct target *t)
 {
     const double share[HAIR_FIT_N_BLEND] = {1.0 - b->second_share, b->second_share};
+    const struct hair_directions to = {t->theta_i, t->phi, N_THETA_I, N_PHI};
     memset(t->lobes, 0, N_VALUE * sizeof(double));
     for (size_t o = 0; o < N_THETA_O; o++)
         for (int k = 0; k < HAIR_FIT_N_BLEND; k++)
             if (share[k] > 0.0)
-                hair_lobes_density(&b->lobes[k], t->theta_o[o], t->theta_i, N_THETA_I, t->phi, N_PHI, share[k],
-                                   t->lobes + o * N_THETA_I * N_PHI * 3);
+                hair_lobes_density(&b->lobes[k], share[k], t->theta_o[o], &to, t->lobes + o * N_THETA_I * N_PHI * 3);
 }
 
 /* Mean squared difference over the mean square of the fiber's. */

@@ -106,16 +106,17 @@ static void azimuthal(const struct hair_lobes *l, double theta_o, double phi, do
     }
 }
 
-void hair_lobes_density(const struct hair_lobes *l, double theta_o_rad, const double *theta_i_rad, size_t n_theta,
-                        const double *phi_rad, size_t n_phi, double part_of_light, double *out)
+void hair_lobes_density(const struct hair_lobes *l, double part_of_light, double theta_o_rad,
+                        const struct hair_directions *to, double *out)
 {
+    const size_t n_phi = to->n_phi < HAIR_LOBES_MAX_PHI ? to->n_phi : HAIR_LOBES_MAX_PHI;
     double v[N_LOBE + 1], part[HAIR_LOBES_MAX_PHI][N_LOBE + 1][3];
     variances(l->longitudinal_roughness, v);
-    for (size_t j = 0; j < n_phi && j < HAIR_LOBES_MAX_PHI; j++) azimuthal(l, theta_o_rad, phi_rad[j], part[j]);
-    for (size_t i = 0; i < n_theta; i++)
+    for (size_t j = 0; j < n_phi; j++) azimuthal(l, theta_o_rad, to->phi_rad[j], part[j]);
+    for (size_t i = 0; i < to->n_theta; i++)
         for (int p = 0; p <= N_LOBE; p++) {
-            const double m = part_of_light * longitudinal(theta_i_rad[i], theta_o_rad, v[p]);
-            for (size_t j = 0; j < n_phi && j < HAIR_LOBES_MAX_PHI; j++)
-                for (size_t c = 0; c < 3; c++) out[3 * (i * n_phi + j) + c] += m * part[j][p][c];
+            const double m = part_of_light * longitudinal(to->theta_i_rad[i], theta_o_rad, v[p]);
+            for (size_t j = 0; j < n_phi; j++)
+                for (size_t c = 0; c < 3; c++) out[3 * (i * to->n_phi + j) + c] += m * part[j][p][c];
         }
 }

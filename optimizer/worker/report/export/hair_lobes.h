@@ -19,9 +19,14 @@ struct hair_lobes {
 
 enum { HAIR_LOBES_MAX_PHI = 32 };
 
-/* Adds the density for a part of the light from th_o, in [0, 1], into n_theta angles th_i and n_phi relative azimuths
- * ph_i - ph_o, n_phi <= HAIR_LOBES_MAX_PHI, to out[n_theta][n_phi][3]. */
-void hair_lobes_density(const struct hair_lobes *h, double theta_o_rad, const double *theta_i_rad, size_t n_theta,
-                        const double *phi_rad, size_t n_phi, double part_of_light, double *out);
+/* n_theta angles th_i, and n_phi <= HAIR_LOBES_MAX_PHI relative azimuths ph_i - ph_o. */
+struct hair_directions {
+    const double *theta_i_rad, *phi_rad;
+    size_t n_theta, n_phi;
+};
+
+/* Adds the density for a part of the light from th_o, in [0, 1], to out[n_theta][n_phi][3]. */
+void hair_lobes_density(const struct hair_lobes *h, double part_of_light, double theta_o_rad,
+                        const struct hair_directions *to, double *out);
 
 #endif

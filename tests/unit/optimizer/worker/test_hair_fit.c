@@ -19,7 +19,7 @@ static double energy(const struct hair_lobes *l, double theta_o, int channel)
     for (int k = 0; k < N_PHI; k++) phi[k] = 2.0 * M_PI * (k + 0.5) / N_PHI;
     for (int i = 0; i < N_THETA; i++) theta[i] = asin(-1.0 + (2.0 * i + 1.0) / N_THETA);
     memset(value, 0, sizeof value);
-    hair_lobes_density(l, theta_o, theta, N_THETA, phi, N_PHI, 1.0, value);
+    hair_lobes_density(l, 1.0, theta_o, &(struct hair_directions){theta, phi, N_THETA, N_PHI}, value);
     for (int k = 0; k < N_PHI * N_THETA; k++) sum += value[3 * k + channel] * 4.0 * M_PI / (N_THETA * N_PHI);
     return sum;
 }
