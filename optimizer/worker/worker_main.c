@@ -184,6 +184,33 @@ static void remember_speeds(struct pipeline_context *c, const char *path)
     if (speed_book_write(path, &book, &err) != STATUS_OK) log_info(c->log, "%s", err.text);
 }
 
+/* Warns of every fault of the inputs besides the one that has ended the job, so that all can be mended at once. */
+static void name_other_faults(struct pipeline_context *c, const struct error *first)
+{
+    char path[WORKER_PATH_BYTES], folder[WORKER_PATH_BYTES];
+    json_t *report = NULL;
+    const json_t *fault;
+    size_t i;
+    struct error err = {0};
+    worker_folder_path(c->folder, JOB_FILE_DOCUMENT, NULL, path);
+    worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, folder);
+    if (job_check(path, folder, &report, &err) != STATUS_OK) return;
+    json_array_foreach(json_object_get(report, "faults"), i, fault)
+    {
+        const char *field = json_string_value(json_object_get(fault, "field")),
+                   *detail = json_string_value(json_object_get(fault, "detail"));
+        if (field == NULL || detail == NULL) continue;
+        if (strcmp(field, first->field) == 0 || strcmp(detail, first->text) == 0) continue;
+        worker_status_warn(c->status, "this is wrong, too: %s: %s", field, detail);
+    }
+    json_decref(report);
+}
+
+static bool is_of_input(status s)
+{
+    return s == STATUS_INVALID || s == STATUS_NOT_FOUND || s == STATUS_FORMAT || s == STATUS_UNSUPPORTED;
+}
+
 static status run_job(struct pipeline_context *c, const struct arguments *a, struct error *err)
 {
     struct speed_book book = {.n = 0};
@@ -192,6 +219,7 @@ static status run_job(struct pipeline_context *c, const struct arguments *a, str
     worker_status_stage(c->status, "volume", "Reading the job", 0, 8);
     status s = thread_pool_new(a->n_thread, &c->pool, err);
     if (s == STATUS_OK) s = pipeline_read_inputs(c, err);
+    if (is_of_input(s)) name_other_faults(c, err);
     if (s == STATUS_OK) s = pipeline_run(c, err);
     if (s == STATUS_OK && a->speeds != NULL) remember_speeds(c, a->speeds);
     return s;

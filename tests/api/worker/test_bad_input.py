@@ -274,3 +274,19 @@ def test_the_client_prints_all_faults(tmp_path):
     write(tmp_path, table_job(), files_of(table_job()))
     done = subprocess.run([program("selvedge"), "check", str(tmp_path / "job.json")], capture_output=True, text=True, check=False)
     assert done.returncode == 0 and "the job can be submitted" in done.stdout
+
+
+def test_a_job_that_fails_names_all_faults_of_its_files(tmp_path):
+    """Files are opened by the worker alone: a job that was submitted without `selvedge check` ends with the first fault and warns of the others."""
+    job = photo_job()
+    files = files_of(job)
+    put("photographs.2.file", "p2.png")(job, files)
+    files.update({"p0.exr": b"not a picture, but longer than sixteen bytes", "p2.png": png_rgb(16, lambda x, y: (90 + x, 80, 70))})
+    (tmp_path / "input").mkdir()
+    write(tmp_path / "input", job, files)
+    (tmp_path / "input" / "job.json").rename(tmp_path / "job.json")
+    done = subprocess.run([program("selvedge-worker"), "--quiet", str(tmp_path)], capture_output=True, text=True, check=False)
+    status = json.loads((tmp_path / "status.json").read_text())
+    assert done.returncode != 0 and status["error"]["field"] == "photographs[0].file"
+    (other,) = [w for w in status["warnings"] if "wrong, too" in w]
+    assert "photographs[2].file" in other and "transfer" in other
