@@ -2,6 +2,8 @@
 #include "optimizer/job/options/option_table.h"
 
 #include <math.h>
+#include <stdio.h>
+#include <string.h>
 
 static const char *const kind_name[OPTION_N_KIND] = {
     [OPTION_SECTION] = "section",
@@ -95,4 +97,40 @@ json_t *job_options_json(void)
     const struct job_option *row;
     for (size_t i = 0; (row = job_option_at(i)) != NULL; i++) json_array_append_new(list, option_json(row));
     return json_pack("{s:o}", "options", list);
+}
+
+/* The object of the document in which the key of a path lies; NULL when the document does not have it. */
+static const json_t *section_of(const json_t *document, const char *path, const char **key)
+{
+    char part[80];
+    for (const char *dot; (dot = strchr(path, '.')) != NULL; path = dot + 1) {
+        snprintf(part, sizeof part, "%.*s", (int)(dot - path), path);
+        document = json_object_get(document, part);
+    }
+    *key = path;
+    return document;
+}
+
+json_t *job_options_defaults_json(const json_t *document, bool has_rows)
+{
+    static const char *const of_every_job[] = {"lamp.",       "camera.",       "environment.",
+                                               "black_sheet", "fit.nuisance.", "fit."};
+    json_t *options = job_options_json(), *defaults = json_object();
+    const json_t *option;
+    size_t i;
+    json_array_foreach(json_object_get(options, "options"), i, option)
+    {
+        const char *path = json_string_value(json_object_get(option, "path")), *key;
+        const json_t *section = section_of(document, path, &key);
+        bool applies = section != NULL && (key != path || strcmp(path, "black_sheet") == 0);
+        for (size_t k = 0; k < sizeof of_every_job / sizeof of_every_job[0] && has_rows; k++)
+            applies = applies || (strncmp(path, of_every_job[k], strlen(of_every_job[k])) == 0 &&
+                                  strchr(path + strlen(of_every_job[k]), '.') == NULL);
+        json_t *value = json_object_get(option, "default");
+        applies = applies && strncmp(path, "cloth.", strlen("cloth.")) != 0;
+        if (applies && value != NULL && strchr(path, '[') == NULL && json_object_get(section, key) == NULL)
+            json_object_set(defaults, path, value);
+    }
+    json_decref(options);
+    return defaults;
 }

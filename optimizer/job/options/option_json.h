@@ -3,6 +3,7 @@
 #define SELVEDGE_OPTIMIZER_OPTION_JSON_H
 
 #include <jansson.h>
+#include <stdbool.h>
 
 /* Returns {"options": [...]} in the order of the document, with one object for each key:
  *
@@ -20,5 +21,9 @@
  *
  * Members that do not apply are left out. The caller owns the value; NULL when out of memory. */
 json_t *job_options_json(void);
+/* Settings that a document leaves at their defaults, {"fit.seed": 1}, as far as they have an effect: their section is
+ * given, or every job with rows has it. Not those of `cloth`, of which the result states all that are in use. The
+ * caller owns the value. */
+json_t *job_options_defaults_json(const json_t *document, bool has_rows);
 
 #endif

@@ -66,7 +66,7 @@ def test_the_page_needs_nothing_else(which, request):
     for text in (result["verdict"]["text"], result["reason"], *(p["name"] for p in result["parameters"]), *(r["name"] for r in result["rows"])):
         assert text.replace("<", "&lt;").replace(">", "&gt;") in page
     for title in ("Errors", "Fitted parameters", "Measured and rendered", "Pictures", "Course of the fit", "Correlation of the parameters",
-                  "Gradient certificate", "Geometry", "Settings: the job document", "Inputs", "Program and dates"):
+                  "Gradient certificate", "Geometry", "Settings: the job document", "Settings that have their defaults", "Inputs", "Program and dates"):
         assert f"<h2>{title}</h2>" in page
     pictures = page.count("data:image/png;base64,")
     assert pictures == (3 if which == "of_photographs" else 1) * len(result["rows"])
@@ -76,6 +76,9 @@ def test_the_data_beside_it(of_table):
     data = json.loads((of_table / "report.json").read_text())
     assert data["result"] == json.loads((of_table / "result.json").read_text())
     assert data["document"]["fit"] == FIT and data["program"].startswith("selvedge-worker ")
+    defaults = data["defaults"]
+    assert defaults["lamp.distance_cm"] == 61 and defaults["fit.method"] == "gauss_newton.v1" and defaults["black_sheet"] is True
+    assert not set(FIT) & {key.removeprefix("fit.") for key in defaults} and not any(key.startswith(("volume", "cloth", "twin")) for key in defaults)
     inputs = {i["name"]: i for i in data["inputs"]}
     assert inputs["rows.csv"]["sha256"] == hashlib.sha256(TABLE.encode()).hexdigest() and inputs["rows.csv"]["role"] == "measurements"
     assert inputs["cloth.hair"]["size"] == len(hair())

@@ -113,6 +113,7 @@ void page_errors_over(const json_t *rows, const char *angle_key, const char *tit
         a.x1 = fmax(a.x1, angle);
         if (isfinite(error)) a.y1 = fmax(a.y1, 1.1 * error);
     }
+    a.x1 = 20.0 * ceil(a.x1 / 20.0); /* so that the ticks are round */
     open_chart(&a, title, "relative error, %", out);
     json_array_foreach(rows, i, row)
     {
@@ -141,6 +142,7 @@ void page_curve(const json_t *curve, FILE *out)
         }
     }
     if (!(a.y1 > a.y0)) return;
+    a.x1 = 4.0 * ceil(a.x1 / 4.0); /* the ticks are whole steps */
     open_chart(&a, "step", "objective (ring: below its noise)", out);
     json_array_foreach(curve, i, point)
     {

@@ -149,6 +149,20 @@ static void rgb_cell(const json_t *rgb, FILE *out)
     fputs("</td>", out);
 }
 
+/* False for means over all rotations, and where all rows have the same one. */
+static bool any_turned(const json_t *rows)
+{
+    const double first = page_number(json_array_get(rows, 0), "cloth_rotation_deg");
+    size_t i;
+    const json_t *row;
+    json_array_foreach(rows, i, row)
+    {
+        if (!json_is_true(json_object_get(row, "all_rotations")) && page_number(row, "cloth_rotation_deg") != first)
+            return true;
+    }
+    return false;
+}
+
 static void print_rows(const json_t *rows, FILE *out)
 {
     static const char *const angle[] = {"light_theta_deg", "light_phi_deg", "camera_theta_deg", "camera_phi_deg",
@@ -179,7 +193,7 @@ static void print_rows(const json_t *rows, FILE *out)
     page_scatter(rows, out);
     page_errors_over(rows, "light_theta_deg", "angle of the lamp, degrees", out);
     page_errors_over(rows, "camera_theta_deg", "angle of the camera, degrees", out);
-    page_errors_over(rows, "cloth_rotation_deg", "rotation of the cloth, degrees", out);
+    if (any_turned(rows)) page_errors_over(rows, "cloth_rotation_deg", "rotation of the cloth, degrees", out);
     fputs("</div>\n<p class=\"hint\">Rings, and blue lines of the table: held-out rows.</p>\n", out);
 }
 
@@ -236,6 +250,8 @@ static void print_settings(const json_t *data, FILE *out)
     page_object(json_object_get(result, "geometry"), out);
     heading("Settings: the job document", out);
     page_object(json_object_get(data, "document"), out);
+    heading("Settings that have their defaults", out);
+    page_object(json_object_get(data, "defaults"), out);
     print_inputs(json_object_get(data, "inputs"), out);
     heading("Program and dates", out);
     fputs("<table>\n<tr><td>program</td><td>", out);
