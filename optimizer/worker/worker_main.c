@@ -184,6 +184,19 @@ static void remember_speeds(struct pipeline_context *c, const char *path)
     if (speed_book_write(path, &book, &err) != STATUS_OK) log_info(c->log, "%s", err.text);
 }
 
+/* Takes the folder of the inputs out of a text: users know their files by their names alone. */
+static void shorten_paths(const struct pipeline_context *c, char *text)
+{
+    char folder[WORKER_PATH_BYTES];
+    worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, folder);
+    const size_t n = strlen(folder);
+    for (char *at = text; (at = strstr(at, folder)) != NULL;)
+        if (at[n] == '/')
+            memmove(at, at + n + 1, strlen(at + n + 1) + 1);
+        else
+            at += n;
+}
+
 /* Warns of every fault of the inputs besides the one that has ended the job, so that all can be mended at once. */
 static void name_other_faults(struct pipeline_context *c, const struct error *first)
 {
@@ -199,9 +212,12 @@ static void name_other_faults(struct pipeline_context *c, const struct error *fi
     {
         const char *field = json_string_value(json_object_get(fault, "field")),
                    *detail = json_string_value(json_object_get(fault, "detail"));
+        char text[sizeof err.text];
         if (field == NULL || detail == NULL) continue;
         if (strcmp(field, first->field) == 0 || strcmp(detail, first->text) == 0) continue;
-        worker_status_warn(c->status, "this is wrong, too: %s: %s", field, detail);
+        snprintf(text, sizeof text, "%s", detail);
+        shorten_paths(c, text);
+        worker_status_warn(c->status, "this is wrong, too: %s: %s", field, text);
     }
     json_decref(report);
 }
@@ -221,6 +237,7 @@ static status run_job(struct pipeline_context *c, const struct arguments *a, str
     if (s == STATUS_OK) s = pipeline_read_inputs(c, err);
     if (is_of_input(s)) name_other_faults(c, err);
     if (s == STATUS_OK) s = pipeline_run(c, err);
+    if (s != STATUS_OK) shorten_paths(c, err->text);
     if (s == STATUS_OK && a->speeds != NULL) remember_speeds(c, a->speeds);
     return s;
 }

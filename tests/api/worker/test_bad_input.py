@@ -288,5 +288,6 @@ def test_a_job_that_fails_names_all_faults_of_its_files(tmp_path):
     done = subprocess.run([program("selvedge-worker"), "--quiet", str(tmp_path)], capture_output=True, text=True, check=False)
     status = json.loads((tmp_path / "status.json").read_text())
     assert done.returncode != 0 and status["error"]["field"] == "photographs[0].file"
+    assert "'p0.exr'" in status["error"]["text"] and str(tmp_path) not in json.dumps(status)
     (other,) = [w for w in status["warnings"] if "wrong, too" in w]
     assert "photographs[2].file" in other and "transfer" in other
