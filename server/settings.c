@@ -66,6 +66,8 @@ static const struct setting table[] = {
            "an upload is written to disk durably after this many bytes at the latest"),
     NUMBER("jobs", "max_jobs", max_jobs, 10000, 1, 10000000,
            "number of jobs kept; new jobs are refused until some are deleted"),
+    NUMBER("jobs", "keep_versions", keep_versions, 5, 0, 1000,
+           "number of earlier results that a job keeps when it is edited and run again; 0: none"),
     NUMBER("jobs", "workers", workers, 1, 1, 64, "number of jobs that run at the same time"),
     TEXT("jobs", "worker", worker, "", "the worker program; empty: selvedge-worker beside the daemon"),
     WORD("jobs", "sandbox", sandbox, "auto", sandbox_words,

@@ -19,7 +19,7 @@ struct settings {
     /* [upload] */
     int64_t max_file_bytes, max_patch_bytes, max_files_per_job, commit_bytes;
     /* [jobs] */
-    int64_t max_jobs, workers;
+    int64_t max_jobs, keep_versions, workers;
     char worker[SETTING_TEXT_BYTES], sandbox[SETTING_TEXT_BYTES], pass_environment[SETTING_TEXT_BYTES];
     int64_t threads, scratch_limit_bytes, file_limit_bytes, open_files, oom_score_adj;
     int64_t nice, memory_limit_bytes, resident_limit_bytes, volume_memory_bytes, cancel_grace_s, max_lost_attempts,

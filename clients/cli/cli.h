@@ -32,6 +32,7 @@ status cli_list(struct cli *cli, int *exit_code, struct error *err);
 status cli_cancel(struct cli *cli, int *exit_code, struct error *err);
 status cli_retry(struct cli *cli, int *exit_code, struct error *err);
 status cli_results(struct cli *cli, int *exit_code, struct error *err);
+status cli_versions(struct cli *cli, int *exit_code, struct error *err);
 status cli_log(struct cli *cli, int *exit_code, struct error *err);
 status cli_series(struct cli *cli, int *exit_code, struct error *err);
 status cli_delete(struct cli *cli, int *exit_code, struct error *err);
@@ -58,6 +59,8 @@ status cli_submit_document(struct cli *cli, const json_t *document, const char *
  * files in it. */
 status cli_submit_once(struct cli *cli, const json_t *document, const char *folder, bool (*unchanged)(void *context),
                        void *context, char id[CLI_ID_BYTES], struct error *err);
+/* Downloads files to a folder: the member "files" of a list of results. */
+status cli_files_fetch(struct cli *cli, const json_t *files, const char *folder, struct error *err);
 /* Downloads the results of job `id` to a folder. */
 status cli_results_of(struct cli *cli, const char *id, const char *folder, struct error *err);
 /* The same to --out, or to selvedge-ID, and prints the folder. */

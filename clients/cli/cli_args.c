@@ -1,4 +1,5 @@
 #include "clients/cli/cli_args.h"
+#include "clients/cli/cli_option_bits.h"
 #include "clients/cli/cli_text.h"
 #include "clients/cli/tools/cli_tool.h"
 
@@ -6,39 +7,6 @@
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
-
-enum {
-    OPT_SERVER = 1,
-    OPT_TOKEN = 2,
-    OPT_INPUT = 4,
-    OPT_WATCH = 8,
-    OPT_RESUME = 16,
-    OPT_JSON = 32,
-    OPT_OUT = 64,
-    OPT_FOLLOW = 128,
-    OPT_DRAFT = 256,
-    OPT_HELP = 512,
-    OPT_VERSION = 1024,
-    OPT_ID_FILE = 2048,
-    OPT_VOXEL = 4096,
-    OPT_AXES = 8192,
-    OPT_ALIGN = 16384,
-    OPT_TEMPLATE = 32768,
-    OPT_MARKER = 65536,
-    OPT_QUIET = 131072,
-    OPT_ONCE = 262144,
-    OPT_SCOPE = 524288,
-    OPT_OWNER = 1048576,
-    OPT_REQUESTS = 2097152,
-    OPT_BYTES = 4194304,
-    OPT_JOBS = 8388608,
-    OPT_MAX_AGE = 16777216,
-    OPT_MAX_BYTES = 33554432,
-    OPT_YES = 67108864,
-    OPT_PICTURE = 134217728, /* each of several */
-    OPT_FILTER = 268435456   /* each of several */
-};
-#define OPT_EVERYWHERE (OPT_SERVER | OPT_TOKEN | OPT_HELP)
 
 static const struct cli_command {
     const char *name, *operand, *what, *more;
@@ -82,6 +50,11 @@ static const struct cli_command {
          "Files go to the folder of --out (default: selvedge-ID). A download that breaks continues where it stopped;\n"
          "complete files are not downloaded again.\n",
          OPT_OUT},
+    [CLI_VERSIONS] =
+        {"versions", "ID", "list the results of a job's earlier runs, or download one",
+         "A job that is edited and run again keeps its earlier results, each under the number of its run. With a\n"
+         "NUMBER its files go to the folder of --out (default: selvedge-ID-NUMBER).\n",
+         OPT_OUT | OPT_JSON, NULL, "NUMBER"},
     [CLI_LOG] = {"log", "ID", "print the job's log", "", OPT_FOLLOW},
     [CLI_SERIES] = {"series", "ID", "print the fit step by step: objective, residual, parameters (tab-separated)", "",
                     OPT_JSON},

@@ -21,6 +21,7 @@ enum cli_command_id {
     CLI_CANCEL,
     CLI_RETRY,
     CLI_RESULTS,
+    CLI_VERSIONS,
     CLI_LOG,
     CLI_SERIES,
     CLI_DELETE,
@@ -39,7 +40,7 @@ struct cli_args {
     const char *
         operand; /* a job document for submit and check, a scan for reconstruct, a folder for watch-folder, a job id for
                      the other commands, an action for token */
-    const char *second;    /* the name that follows an action of token */
+    const char *second;    /* the name that follows an action of token, or a number that follows an id */
     const char *input_dir; /* --input-dir: the folder of the files that the document names */
     const char *out_dir;   /* --out */
     const char *resume_id; /* --resume */

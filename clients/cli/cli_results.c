@@ -93,30 +93,37 @@ status cli_results_to_out(struct cli *cli, const char *id, struct error *err)
     return s;
 }
 
-status cli_results_of(struct cli *cli, const char *id, const char *folder, struct error *err)
+status cli_files_fetch(struct cli *cli, const json_t *files, const char *folder, struct error *err)
 {
-    char path[256], size[CLI_SHORT_TEXT];
+    char size[CLI_SHORT_TEXT];
     struct transfer t = {.cli = cli};
-    json_t *list = NULL, *file;
     size_t i, n_fetched = 0;
-    status s = cli_job_path(id, "/results", path, sizeof path, err);
-    if (s == STATUS_OK) s = http_json(cli->http, "GET", path, NULL, NULL, &list, err);
-    if (s != STATUS_OK) return s;
-    const json_t *files = json_object_get(list, "files");
-    if (json_array_size(files) == 0) {
-        s = error_set(err, STATUS_NOT_FOUND, "job %s has no results yet; `selvedge watch %s` waits for them", id, id);
-        goto out;
-    }
+    const json_t *file;
+    status s = STATUS_OK;
     json_array_foreach(files, i, file) t.n_total += (uint64_t)json_integer_value(json_object_get(file, "size"));
     json_array_foreach(files, i, file)
     {
         if ((s = fetch(&t, folder, file, &n_fetched, err)) != STATUS_OK) break;
     }
     if (cli->note_is_terminal) fputs("\r\033[K", cli->note);
-    if (s != STATUS_OK) goto out;
+    if (s != STATUS_OK) return s;
     text_size((double)t.n_total, size);
     fprintf(cli->note, "%zu files (%s) in %s, %zu of them new\n", json_array_size(files), size, folder, n_fetched);
-out:
+    return STATUS_OK;
+}
+
+status cli_results_of(struct cli *cli, const char *id, const char *folder, struct error *err)
+{
+    char path[256];
+    json_t *list = NULL;
+    status s = cli_job_path(id, "/results", path, sizeof path, err);
+    if (s == STATUS_OK) s = http_json(cli->http, "GET", path, NULL, NULL, &list, err);
+    if (s != STATUS_OK) return s;
+    const json_t *files = json_object_get(list, "files");
+    if (json_array_size(files) == 0)
+        s = error_set(err, STATUS_NOT_FOUND, "job %s has no results yet; `selvedge watch %s` waits for them", id, id);
+    else
+        s = cli_files_fetch(cli, files, folder, err);
     json_decref(list);
     return s;
 }

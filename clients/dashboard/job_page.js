@@ -8,6 +8,7 @@ import { duration, el, isNumber, percent, percentWithError, refill, size, stateT
 import { qualityCard } from "./quality_card.js";
 import { correlationTable } from "./record/correlation_table.js";
 import { jobRecord } from "./record/job_record.js";
+import { VersionsCard } from "./record/versions_card.js";
 import { channelErrors, choiceOf, configurations, fiberFile, fitted, models, radiusSearch, residuals, sliceFiles } from "./result_view.js";
 import { getJson, poll, sendJson } from "./server_link.js";
 import { SurfacePictures } from "./surface_card.js";
@@ -110,8 +111,8 @@ function downloads(job, list) {
 
 export function jobPage(page, id) {
   const head = el("div", { class: "head" }), stages = el("div", { class: "stages" }), facts = el("div", { class: "facts" }), verdict = el("div"), notes = el("div");
-  const fitCard = el("div"), curveCard = el("div"), surfaces = el("div"), results = el("div", { id: "results" }), record = el("div"), logNode = el("pre", { class: "log" });
-  const charts = new JobCharts(fitCard, curveCard), log = new LogTail(logNode), pictures = new SurfacePictures(surfaces, id);
+  const fitCard = el("div"), curveCard = el("div"), surfaces = el("div"), results = el("div", { id: "results" }), record = el("div"), versionsNode = el("div"), logNode = el("pre", { class: "log" });
+  const charts = new JobCharts(fitCard, curveCard), log = new LogTail(logNode), pictures = new SurfacePictures(surfaces, id), versions = new VersionsCard(versionsNode, id);
   const wholeLog = el("details", { id: "whole-log", ontoggle: () => {
     if (!wholeLog.open || wholeLog.childElementCount > 1) return;
     const whole = new WholeLog(id);
@@ -120,7 +121,7 @@ export function jobPage(page, id) {
   } }, el("summary", {}, "Whole log"));
   const curves = el("div", { class: "columns" }, card("Fit", fitCard), card("Parameters over the steps", curveCard));
   page.append(el("section", { class: "card", id: "state" }, head, stages, verdict, facts, notes),
-    curves, surfaces, results, record,
+    curves, surfaces, results, versionsNode, record,
     el("section", { class: "card" }, el("h2", {}, "Log ", el("small", {}, "its last lines")), logNode, wholeLog));
   let about = null, generation = null, closeFibers = null, closeTwin = null, gone = false;
 
@@ -201,6 +202,7 @@ export function jobPage(page, id) {
     await charts.update(job);
     await log.update(id);
     await pictures.update(job);
+    await versions.update(job);
     await showResults(job);
     return job.state === "running" ? 1 : LIVE.has(job.state) ? 2 : 10;
   });

@@ -14,6 +14,8 @@
  *   JOB/work/<stage>/       checkpoints of a stage; JOB/work/<stage>.done marks a stage whose outputs are complete
  *   JOB/adopted/            links to another job's geometry, until they are in work/
  *   JOB/results/            the results for the user: result.json, *.hair, *.vol, renderings
+ *   JOB/run.json            the document that an edited job had when it was run last
+ *   JOB/versions/<n>/       the results of run n of a job that was edited and run again, with version.json
  *
  * Keys of status.json:
  *
@@ -45,6 +47,8 @@
 #define JOB_FOLDER_WORK "work"
 #define JOB_FOLDER_ADOPTED "adopted"
 #define JOB_FOLDER_RESULTS "results"
+#define JOB_FILE_RUN "run.json"
+#define JOB_FOLDER_VERSIONS "versions"
 #define JOB_THUMBNAIL "thumbnail.png" /* among the results: a small picture for lists */
 
 /* Exit codes of the worker. */

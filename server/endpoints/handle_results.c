@@ -101,30 +101,23 @@ void handle_list_results(struct http_request *r)
     struct error err = {0};
     struct result_file *file = NULL;
     size_t n = 0;
-    char url[RESULT_PATH_BYTES + 80];
+    char url[128];
     if (!find_job(r, &row)) return;
-    status s = result_list(r->service, row.id, &file, &n, &err);
+    status s = result_list(r->service, row.id, JOB_FOLDER_RESULTS, &file, &n, &err);
     if (s != STATUS_OK) {
         reply_problem(r, NULL, &err, NULL);
         job_row_release(&row);
         return;
     }
-    json_t *list = json_array();
-    for (size_t i = 0; i < n; i++) {
-        snprintf(url, sizeof url, "/v1/jobs/%s/results/%s", row.id, file[i].path);
-        json_array_append_new(list,
-                              json_pack("{s:s,s:I,s:f,s:s,s:s}", "path", file[i].path, "size",
-                                        (json_int_t)file[i].size_bytes, "modified_unix_s", file[i].modified_unix_s,
-                                        "content_type", content_type_of(file[i].path), "url", url));
-    }
+    snprintf(url, sizeof url, "/v1/jobs/%s/results", row.id);
+    json_t *list = result_files_json(file, n, url);
     snprintf(url, sizeof url, "/v1/jobs/%s/results.tar", row.id);
     reply_json_tagged(r, json_pack("{s:o,s:s}", "files", list, "archive", url));
     free(file);
     job_row_release(&row);
 }
 
-/* Pages among the results run no script; they may have styles and pictures inside. */
-static void reply_result(struct http_request *r, int fd, const char *type)
+void reply_result(struct http_request *r, int fd, const char *type)
 {
     static const char header[] = "Content-Security-Policy";
     reply_file(r, fd, type);
@@ -142,7 +135,7 @@ void handle_get_result(struct http_request *r)
     struct error err = {0};
     int fd;
     if (!find_job(r, &row)) return;
-    if (result_open(r->service, row.id, r->param[1], &fd, &err) != STATUS_OK)
+    if (result_open(r->service, row.id, JOB_FOLDER_RESULTS, r->param[1], &fd, &err) != STATUS_OK)
         reply_problem(r, NULL, &err, NULL);
     else
         reply_result(r, fd, content_type_of(r->param[1]));

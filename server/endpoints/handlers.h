@@ -37,6 +37,12 @@ void handle_log(struct http_request *r);
 void handle_list_results(struct http_request *r);
 void handle_get_result(struct http_request *r);
 void handle_archive(struct http_request *r);
+/* Sends an open file of the results. Pages among them run no script; they may have styles and pictures inside. */
+void reply_result(struct http_request *r, int fd, const char *type);
+/* handle_versions.c */
+void handle_list_versions(struct http_request *r);
+void handle_get_version(struct http_request *r);
+void handle_version_file(struct http_request *r);
 /* handle_deliveries.c */
 void handle_list_deliveries(struct http_request *r);
 /* handle_tokens.c */

@@ -29,6 +29,9 @@ static const struct http_route route[] = {
     {"GET", "/v1/jobs/{id}/results", HTTP_BODY_NONE, ACCESS_READ, handle_list_results, NULL, ""},
     {"GET", "/v1/jobs/{id}/results.tar", HTTP_BODY_NONE, ACCESS_READ, handle_archive, NULL, ""},
     {"GET", "/v1/jobs/{id}/results/{path...}", HTTP_BODY_NONE, ACCESS_READ, handle_get_result, NULL, ""},
+    {"GET", "/v1/jobs/{id}/versions", HTTP_BODY_NONE, ACCESS_READ, handle_list_versions, NULL, ""},
+    {"GET", "/v1/jobs/{id}/versions/{version}", HTTP_BODY_NONE, ACCESS_READ, handle_get_version, NULL, ""},
+    {"GET", "/v1/jobs/{id}/versions/{version}/{path...}", HTTP_BODY_NONE, ACCESS_READ, handle_version_file, NULL, ""},
     {"PUT", "/v1/jobs/{id}/keep", HTTP_BODY_NONE, ACCESS_SUBMIT, handle_keep_job, NULL, ""},
     {"DELETE", "/v1/jobs/{id}/keep", HTTP_BODY_NONE, ACCESS_SUBMIT, handle_unkeep_job, NULL, ""},
     {"GET", "/v1/retention", HTTP_BODY_NONE, ACCESS_ADMIN, handle_plan_retention, NULL, "max_age_days max_bytes"},
@@ -51,7 +54,7 @@ static const struct http_route route[] = {
     {"GET", "/{path...}", HTTP_BODY_NONE, ACCESS_OPEN, handle_static, NULL, NULL},
 };
 
-static bool match(const char *pattern, const char *url, char param[2][HTTP_PARAM_BYTES])
+static bool match(const char *pattern, const char *url, char param[HTTP_N_PARAM][HTTP_PARAM_BYTES])
 {
     size_t i_param = 0;
     while (*pattern != '\0') {
@@ -62,7 +65,7 @@ static bool match(const char *pattern, const char *url, char param[2][HTTP_PARAM
         const char *end = strchr(pattern, '}');
         bool rest = strncmp(end - 3, "...", 3) == 0;
         size_t n = rest ? strlen(url) : strcspn(url, "/");
-        if (n == 0 || n >= HTTP_PARAM_BYTES || i_param == 2) return false;
+        if (n == 0 || n >= HTTP_PARAM_BYTES || i_param == HTTP_N_PARAM) return false;
         memcpy(param[i_param], url, n);
         param[i_param++][n] = '\0';
         url += n;
@@ -71,8 +74,8 @@ static bool match(const char *pattern, const char *url, char param[2][HTTP_PARAM
     return *url == '\0';
 }
 
-const struct http_route *http_route_find(const char *method, const char *url, char param[2][HTTP_PARAM_BYTES],
-                                         char *allow, size_t n_allow)
+const struct http_route *http_route_find(const char *method, const char *url,
+                                         char param[HTTP_N_PARAM][HTTP_PARAM_BYTES], char *allow, size_t n_allow)
 {
     size_t n = 0;
     allow[0] = '\0';

@@ -16,7 +16,7 @@ struct http_server;
 struct http_route;
 struct static_files;
 
-enum { HTTP_PARAM_BYTES = 600, HTTP_MAX_STATUS = 600 };
+enum { HTTP_N_PARAM = 3, HTTP_PARAM_BYTES = 600, HTTP_MAX_STATUS = 600 };
 
 struct http_request {
     struct http_server *server;
@@ -25,10 +25,10 @@ struct http_request {
     const struct http_route *route;
     const char *url;
     struct access_desk *desk;
-    struct access_grant grant;       /* what its token allows */
-    char param[2][HTTP_PARAM_BYTES]; /* values of {id}, {name} and {path...} in the path */
-    int64_t content_length;          /* 0: no body */
-    char *body;                      /* JSON body, NUL-terminated */
+    struct access_grant grant;                  /* what its token allows */
+    char param[HTTP_N_PARAM][HTTP_PARAM_BYTES]; /* values of {id}, {name} and {path...} in the path */
+    int64_t content_length;                     /* 0: no body */
+    char *body;                                 /* JSON body, NUL-terminated */
     size_t n_body;
     struct MHD_Response *reply; /* decided reply, queued after the whole body has arrived */
     unsigned reply_status;
@@ -56,8 +56,9 @@ struct http_route {
 
 /* Finds the route of a request and the values of its path's parameters. NULL and *allow "": there is no such path;
  * NULL and *allow "GET, POST": the path has only these methods. */
-typedef const struct http_route *http_route_finder(const char *method, const char *url, char param[2][HTTP_PARAM_BYTES],
-                                                   char *allow, size_t n_allow);
+typedef const struct http_route *http_route_finder(const char *method, const char *url,
+                                                   char param[HTTP_N_PARAM][HTTP_PARAM_BYTES], char *allow,
+                                                   size_t n_allow);
 /* That of the service's endpoints, by the table in http_route.c. */
 http_route_finder http_route_find;
 

@@ -1,4 +1,5 @@
 #include "server/http/tar_stream.h"
+#include "optimizer/job/job_folder.h"
 #include "server/jobs/job_view.h"
 
 #include <archive.h>
@@ -48,7 +49,7 @@ static void next_file(struct tar_stream *t)
 {
     const struct result_file *f = &t->file[t->i_file++];
     struct stat st;
-    if (result_open(t->v, t->job_id, f->path, &t->fd, NULL) != STATUS_OK) {
+    if (result_open(t->v, t->job_id, JOB_FOLDER_RESULTS, f->path, &t->fd, NULL) != STATUS_OK) {
         t->fd = -1;
         return;
     }
@@ -131,7 +132,7 @@ status tar_stream_response(struct job_service *v, const char *job_id, struct MHD
     t->v = v;
     t->fd = -1;
     snprintf(t->job_id, sizeof t->job_id, "%s", job_id);
-    status s = result_list(v, job_id, &t->file, &t->n_file, err);
+    status s = result_list(v, job_id, JOB_FOLDER_RESULTS, &t->file, &t->n_file, err);
     if (s != STATUS_OK) goto out;
     t->archive = archive_write_new();
     if (t->archive == NULL || archive_write_set_format_pax_restricted(t->archive) != ARCHIVE_OK ||

@@ -6,6 +6,7 @@
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
+#include "server/jobs/versions/result_version.h"
 
 #include <sodium.h>
 #include <stdio.h>
@@ -125,10 +126,11 @@ status job_create(struct job_service *v, const struct job_request *request, char
 }
 
 /* The folder first: what is acknowledged is in both, and a rebuild makes a job a draft whose document differs from the
- * journal's checksum. */
-static status replace_document(struct job_service *v, struct job_row *row, struct error *err)
+ * journal's checksum. run: the document that the job was run with, if this is the first edit since; else NULL. */
+static status replace_document(struct job_service *v, struct job_row *row, const char *run, struct error *err)
 {
-    status s = write_document(v, row, err);
+    status s = run != NULL ? version_note_document(v, row, run, err) : STATUS_OK;
+    if (s == STATUS_OK) s = write_document(v, row, err);
     if (s == STATUS_OK) s = store_job_replace(v->store, row, err);
     if (s == STATUS_OK) job_note(v, row->id, &(struct journal_entry){.job = row, .document = true});
     return s;
@@ -150,11 +152,13 @@ status job_replace_document(struct job_service *v, const char *id, const char *d
         s = error_set(err, STATUS_NO_MEMORY, "cannot replace the document: out of memory");
         goto out;
     }
-    free(row.document);
+    char *run = row.attempt > 0 && !row.dirty ? row.document : NULL;
+    if (run == NULL) free(row.document);
     row.document = text;
     job_mark_edited(&row);
-    s = replace_document(v, &row, err);
-    if (s == STATUS_DISK_FULL && ballast_release(v->settings->data)) s = replace_document(v, &row, err);
+    s = replace_document(v, &row, run, err);
+    if (s == STATUS_DISK_FULL && ballast_release(v->settings->data)) s = replace_document(v, &row, run, err);
+    free(run);
 out:
     pthread_mutex_unlock(&v->change);
     job_row_release(&row);

@@ -25,11 +25,15 @@ struct result_file {
     long long size_bytes;
     double modified_unix_s;
 };
-/* Lists the regular files under results/, sorted by path, without links and files whose names have other characters.
- * The caller frees *file. */
-status result_list(struct job_service *v, const char *job_id, struct result_file **file, size_t *n, struct error *err);
+/* Lists the regular files under a folder of the job (JOB_FOLDER_RESULTS, or that of a version), sorted by path, without
+ * links and files whose names have other characters. The caller frees *file. */
+status result_list(struct job_service *v, const char *job_id, const char *folder, struct result_file **file, size_t *n,
+                   struct error *err);
 /* Opens a listed file without following links. STATUS_NOT_FOUND for anything else. */
-status result_open(struct job_service *v, const char *job_id, const char *path, int *fd, struct error *err);
+status result_open(struct job_service *v, const char *job_id, const char *folder, const char *path, int *fd,
+                   struct error *err);
+/* ResultFile of config/openapi.json for n files, whose addresses begin with `root`. */
+json_t *result_files_json(const struct result_file *file, size_t n, const char *root);
 /* Returns the content type for the ending of a name, by default "application/octet-stream". */
 const char *content_type_of(const char *name);
 

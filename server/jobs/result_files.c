@@ -1,5 +1,5 @@
-/* Lists and opens the files under results/, always relative to an open folder and never through a link. */
-#include "optimizer/job/job_folder.h"
+/* Lists and opens the files under results/ or a version of them, always relative to an open folder and never through a
+ * link. */
 #include "server/jobs/job_paths.h"
 #include "server/jobs/job_view.h"
 
@@ -78,17 +78,18 @@ static int by_path(const void *a, const void *b)
     return strcmp(((const struct result_file *)a)->path, ((const struct result_file *)b)->path);
 }
 
-static int open_results(struct job_service *v, const char *job_id)
+static int open_results(struct job_service *v, const char *job_id, const char *folder)
 {
     char path[PATH_BYTES];
-    path_join(path, v->settings->data, "jobs", job_id, JOB_FOLDER_RESULTS, NULL);
+    path_join(path, v->settings->data, "jobs", job_id, folder, NULL);
     return open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
 }
 
-status result_list(struct job_service *v, const char *job_id, struct result_file **file, size_t *n, struct error *err)
+status result_list(struct job_service *v, const char *job_id, const char *folder, struct result_file **file, size_t *n,
+                   struct error *err)
 {
     struct listing l = {0};
-    int fd = open_results(v, job_id);
+    int fd = open_results(v, job_id, folder);
     status s = STATUS_OK;
     if (fd < 0 && errno != ENOENT) return error_set_errno(err, "cannot list results");
     if (fd >= 0) s = walk(fd, "", 0, &l, err);
@@ -102,9 +103,10 @@ status result_list(struct job_service *v, const char *job_id, struct result_file
     return STATUS_OK;
 }
 
-status result_open(struct job_service *v, const char *job_id, const char *path, int *out, struct error *err)
+status result_open(struct job_service *v, const char *job_id, const char *root, const char *path, int *out,
+                   struct error *err)
 {
-    int folder = open_results(v, job_id), fd = -1;
+    int folder = open_results(v, job_id, root), fd = -1;
     char name[RESULT_PATH_BYTES];
     for (int depth = 0; folder >= 0 && depth < RESULT_MAX_DEPTH; depth++) {
         size_t n = strcspn(path, "/");
@@ -157,4 +159,18 @@ const char *content_type_of(const char *name)
         if (n > m && strcasecmp(name + n - m, table[i][0]) == 0) return table[i][1];
     }
     return "application/octet-stream";
+}
+
+json_t *result_files_json(const struct result_file *file, size_t n, const char *root)
+{
+    char url[2 * RESULT_PATH_BYTES];
+    json_t *list = json_array();
+    for (size_t i = 0; i < n; i++) {
+        snprintf(url, sizeof url, "%s/%s", root, file[i].path);
+        json_array_append_new(list,
+                              json_pack("{s:s,s:I,s:f,s:s,s:s}", "path", file[i].path, "size",
+                                        (json_int_t)file[i].size_bytes, "modified_unix_s", file[i].modified_unix_s,
+                                        "content_type", content_type_of(file[i].path), "url", url));
+    }
+    return list;
 }

@@ -4,6 +4,7 @@
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
+#include "server/jobs/versions/result_version.h"
 #include "server/workers/console.h"
 
 #include <signal.h>
@@ -28,13 +29,14 @@ json_t *attempt_read_status(const struct job_service *v, const char *job_id)
     return NULL;
 }
 
-/* Removes the results and checkpoints that belong to the input before an edit. */
-static status clear_folder(struct job_service *v, const char *job_id, struct error *err)
+/* Removes the checkpoints that belong to the input before an edit, and keeps its result as a version. */
+static status clear_folder(struct job_service *v, struct job_row *row, struct error *err)
 {
-    static const char *const stale[] = {JOB_FILE_STATUS, JOB_FILE_SERIES, JOB_FILE_LOG, JOB_FOLDER_WORK,
-                                        JOB_FOLDER_RESULTS};
+    static const char *const stale[] = {JOB_FILE_STATUS, JOB_FILE_SERIES,    JOB_FILE_LOG,
+                                        JOB_FOLDER_WORK, JOB_FOLDER_RESULTS, JOB_FILE_RUN};
     char path[PATH_BYTES];
-    status s = STATUS_OK;
+    const char *job_id = row->id;
+    status s = version_keep(v, row, err);
     for (size_t i = 0; s == STATUS_OK && i < sizeof stale / sizeof stale[0]; i++) {
         path_join(path, v->settings->data, "jobs", job_id, stale[i], NULL);
         s = path_remove_tree(path, err);
@@ -57,7 +59,7 @@ static status prepare_locked(struct job_service *v, struct job_row *row, struct 
 {
     status s = STATUS_OK;
     if (row->state != JOB_QUEUED) return error_set(err, STATUS_CONFLICT, "job %s is not queued any more", row->id);
-    if (row->dirty) s = clear_folder(v, row->id, err);
+    if (row->dirty) s = clear_folder(v, row, err);
     if (s != STATUS_OK) return s;
     if (row->dirty || row->generation == 0) row->generation++;
     row->dirty = false;

@@ -25,9 +25,9 @@ export function flatten(value, path = "", out = new Map()) {
   return out;
 }
 
-function settingsOf({ job }) {
+function settingsOf({ job }, withInputs) {
   const all = flatten(job.document ?? {});
-  for (const f of job.files ?? []) if (f.sha256) all.set(`SHA-256 of ${f.name}`, f.sha256);
+  for (const f of (withInputs && job.files) || []) if (f.sha256) all.set(`SHA-256 of ${f.name}`, f.sha256);
   if (job.result?.program) all.set("program", job.result.program);
   return all;
 }
@@ -45,7 +45,7 @@ function valueCell(text) {
 }
 
 export function documentTable(columns) {
-  const rows = differences(columns.map(settingsOf)).map(([path, values]) => [el("span", { class: "mono value" }, path), values.map(valueCell)]);
+  const rows = differences(columns.map((c) => settingsOf(c, columns.every(({ job }) => job.files)))).map(([path, values]) => [el("span", { class: "mono value" }, path), values.map(valueCell)]);
   if (rows.length === 0) return [el("p", { class: "hint" }, "Nothing: the documents, the bytes of the inputs and the programs are the same.")];
   const parts = [el("p", { class: "hint" }, "From the job documents; “not set” means that the default holds. Photographs are compared by their files."), sideBySide("settings that differ", columns, rows.slice(0, SHOWN))];
   if (rows.length > SHOWN) parts.push(el("details", {}, el("summary", {}, `${rows.length - SHOWN} more`), sideBySide("more settings that differ", columns, rows.slice(SHOWN))));

@@ -1,4 +1,4 @@
-// Two to eight jobs side by side: "#compare/ID,ID". Each job is a column under the same letter in all tables.
+// Two to eight jobs side by side: "#compare/ID,ID@2", where @2 is the result of run 2 of a job. Each job is a column under the same letter in all tables.
 import { comparedPictures, pictureRows } from "./compare_pictures.js";
 import { documentTable } from "./compare_documents.js";
 import { errorTable, parameterTables, rowTable } from "./compare_tables.js";
@@ -11,17 +11,27 @@ const LIVE = new Set(["queued", "running", "paused"]);
 
 export const compareAddress = (ids) => `#compare/${ids.join(",")}`;
 
+// Gets the result of an earlier run, ID@RUN, in the place of the job's present one; returns the addresses of its files. What its inputs were is not kept.
+async function fetchVersion(job, run) {
+  const version = await getJson(`/v1/jobs/${job.id}/versions/${run}`), urls = new Map(version.files.map((f) => [f.path, f.url]));
+  const result = await getJson(`${version.url}/result.json`);
+  Object.assign(job, { sample: `${version.sample}, run ${run}`, state: "succeeded", error: null, started_unix_s: version.started_unix_s, finished_unix_s: version.finished_unix_s, verdict: version.verdict, document: version.document, files: null, result, parameters: result.parameters ?? null });
+  return urls;
+}
+
 // Gets a job with its result and the addresses of its files: {id, job, urls}, or {id, missing} when there is no such job.
 async function fetchColumn(id) {
-  if (!/^[A-Za-z0-9_-]{1,80}$/.test(id)) return { id, missing: "This is no id of a job." };
+  const [, ofJob, run] = /^([A-Za-z0-9_-]{1,80})(?:@([1-9]\d{0,8}))?$/.exec(id) ?? [];
+  if (!ofJob) return { id, missing: "This is no id of a job." };
   try {
-    const job = { ...await getJson(`/v1/jobs/${id}`) };
+    const job = { ...await getJson(`/v1/jobs/${ofJob}`) };
+    if (run) return { id, job, urls: await fetchVersion(job, run) };
     job.result = job.result_url ? await getJson(job.result_url) : null;
     job.parameters = job.result?.parameters ?? null;
     const list = job.result ? await getJson(`/v1/jobs/${id}/results`) : { files: [] };
     return { id, job, urls: new Map(list.files.map((f) => [f.path, f.url])) };
   } catch (error) {
-    if (error.status === 404) return { id, missing: "There is no such job: it was deleted, belongs to somebody else, or the address is mistyped." };
+    if (error.status === 404) return { id, missing: "There is no such job or version: it was deleted, belongs to somebody else, or the address is mistyped." };
     throw error;
   }
 }
@@ -45,7 +55,7 @@ function notes(columns, unknown, asked) {
 
 function headCard(columns, ids, reference, choose) {
   const without = (id) => ids.filter((other) => other !== id);
-  const people = columns.map((c) => el("li", {}, el("b", { class: "letter" }, c.letter), el("div", {}, el("a", { href: `#${c.id}` }, c.job.sample || "(no name)"), " ", stateTag(c.job.state), " ", verdictTag(c.job.verdict)),
+  const people = columns.map((c) => el("li", {}, el("b", { class: "letter" }, c.letter), el("div", {}, el("a", { href: `#${c.job.id}` }, c.job.sample || "(no name)"), " ", stateTag(c.job.state), " ", verdictTag(c.job.verdict)),
     columns.length > 2 ? el("a", { class: "button", href: compareAddress(without(c.id)), "aria-label": `leave ${c.letter}, ${c.job.sample}, out` }, "Leave out") : null));
   const select = el("select", { onchange: () => choose(select.value) }, columns.map((c) => el("option", { value: c.id, selected: c.id === reference }, `${c.letter}, ${c.job.sample}`)));
   return [el("ul", { class: "compared" }, people), columns.length > 1 ? el("label", { class: "reference" }, "Differences are from ", select) : null];

@@ -14,9 +14,9 @@ raises `Unreachable`.
 from .client import Client
 from .documents import files_of
 from .job import Job
-from .records import JobError, JobState, Model, Parameter, Progress, Result, ResultFile, Verdict
+from .records import JobError, JobState, Model, Parameter, Progress, Result, ResultFile, Verdict, Version
 from .transport import JobFailed, Problem, SelvedgeError, Unreachable
 from .version import __version__
 
 __all__ = ["Client", "Job", "JobError", "JobFailed", "JobState", "Model", "Parameter", "Problem", "Progress", "Result", "ResultFile",
-           "SelvedgeError", "Unreachable", "Verdict", "__version__", "files_of"]
+           "SelvedgeError", "Unreachable", "Verdict", "Version", "__version__", "files_of"]

@@ -7,7 +7,7 @@ import urllib.parse
 from typing import IO, TYPE_CHECKING, Any, Callable, Iterable, Optional, Union
 
 from .documents import Document, declaration
-from .records import JobState, Progress, Result, ResultFile
+from .records import JobState, Progress, Result, ResultFile, Version
 from .transport import BROKEN, JobFailed, Problem, Unreachable
 
 if TYPE_CHECKING:
@@ -156,6 +156,19 @@ class Job:
     def results(self) -> list[ResultFile]:
         """Return the list of all files among the results."""
         return [ResultFile.of(raw) for raw in self.client.request("GET", self.path + "/results").json()["files"]]
+
+    def versions(self) -> list[Version]:
+        """Return the results of all runs that are kept, the oldest first. An edited job keeps its earlier results."""
+        return [Version.of(raw) for raw in self.client.request("GET", self.path + "/versions").json()["versions"]]
+
+    def version_result(self, version: int) -> Result:
+        """Return the result of one of these runs."""
+        return Result.of(self.client.request("GET", f"{self.path}/versions/{version}/result.json").json())
+
+    def version_document(self, version: int) -> dict[str, Any]:
+        """Return the job document of one of these runs."""
+        document: dict[str, Any] = self.client.request("GET", f"{self.path}/versions/{version}").json()["document"]
+        return document
 
     def download_file(self, name: str, path: Optional[str] = None) -> str:
         """Download one file of the results, such as "report.html", to a path (by default its own name here); return the path."""

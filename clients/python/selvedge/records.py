@@ -145,6 +145,20 @@ class ResultFile:
 
 
 @dataclass(frozen=True)
+class Version:
+    """The result of one run of a job. `current`: it is the job's present result."""
+    version: int
+    current: bool
+    finished_unix_s: float
+    verdict: Optional[Verdict]
+    raw: Mapping[str, Any] = field(repr=False)
+
+    @classmethod
+    def of(cls, raw: Mapping[str, Any]) -> Version:
+        return cls(raw["version"], raw["current"], raw["finished_unix_s"], Verdict.of(raw.get("verdict")), raw)
+
+
+@dataclass(frozen=True)
 class Progress:
     """How far an upload or a download is: bytes over all files. `phase`: "checking" (hashes), "uploading", "downloading"."""
     phase: str
