@@ -1,8 +1,7 @@
-// Comparison of measured and rendered photographs: pictures side by side, and a scatter plot of the means.
-import { colour, el, percentWithError, svg } from "./page_parts.js";
+// Measured against rendered means: swatches of their colours, a scatter plot, and the curve of the fiber radius.
+import { colour, el, svg } from "./page_parts.js";
 
 const RGB = ["var(--red)", "var(--green)", "var(--blue)"];
-const degrees = (x) => (typeof x === "number" ? `${Number(x.toFixed(1))}°` : "–");
 
 export function picture(url, rgb, exposure, what) {
   if (url) return el("img", { src: url, alt: what, loading: "lazy", title: what });
@@ -15,22 +14,6 @@ export function picture(url, rgb, exposure, what) {
 export function commonExposure(list) {
   const peak = list.filter((c) => c.measured).map((c) => Math.max(...c.measured)).sort((a, b) => a - b);
   return peak.length ? 0.8 / Math.max(peak[Math.floor(0.9 * (peak.length - 1))], 1e-6) : 1;
-}
-
-export function gallery(list, pngExposure) {
-  const exposure = pngExposure ?? commonExposure(list);
-  const cards = list.map((c) => el("div", { class: c.held ? "pair held" : "pair" },
-    el("div", { class: "pictures" }, picture(c.measuredPicture, c.measured, exposure, "measured"), picture(c.renderedPicture, c.rendered, exposure, "rendered")),
-    el("div", { class: "label" },
-      el("div", { class: "row" }, el("b", {}, c.name), c.held ? el("span", { class: "tag" }, "held out") : null),
-      el("div", { class: "row" }, el("span", {}, "light"), el("span", {}, `θ ${degrees(c.angles.light_theta_deg)}  φ ${degrees(c.angles.light_phi_deg)}`)),
-      el("div", { class: "row" }, el("span", {}, "camera"), el("span", {}, `θ ${degrees(c.angles.camera_theta_deg)}  φ ${degrees(c.angles.camera_phi_deg)}`)),
-      el("div", { class: "row" }, el("span", {}, "cloth turned"), el("span", {}, c.angles.all_rotations ? "mean over all" : degrees(c.angles.cloth_rotation_deg))),
-      el("div", { class: "row" }, el("span", {}, "relative error"), el("span", { class: c.error > 0.15 ? "tag warn" : "" }, percentWithError(c.error, c.errorSe, 1))))));
-  return [
-    el("p", { class: "hint" }, "Left: measured; right: rendered with the fitted parameters. Photographs in dashed frames were held out of the fit. Plain squares show mean colours. All pictures have the same exposure."),
-    el("div", { class: "gallery" }, cards),
-  ];
 }
 
 function axisTicks(low, high) {

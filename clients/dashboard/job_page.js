@@ -1,10 +1,11 @@
 // The page of one job: state, stages and live curves; after the end also parameters, comparison, fibers and downloads.
-import { gallery, radiusPlot, scatterPlot } from "./comparison.js";
+import { radiusPlot, scatterPlot } from "./comparison.js";
 import { fiberView } from "./fiber_view.js";
 import { fitDetails } from "./fit_details.js";
 import { JobCharts } from "./job_charts.js";
 import { LogTail, WholeLog } from "./log_tail.js";
 import { duration, el, isNumber, percent, percentWithError, refill, size, stateTag, timeLeft, verdictTag, when, withError } from "./page_parts.js";
+import { pairsCard } from "./pairs/pairs_card.js";
 import { qualityCard } from "./quality_card.js";
 import { correlationTable } from "./record/correlation_table.js";
 import { jobRecord } from "./record/job_record.js";
@@ -123,7 +124,7 @@ export function jobPage(page, id) {
   page.append(el("section", { class: "card", id: "state" }, head, stages, verdict, facts, notes),
     curves, surfaces, results, versionsNode, record,
     el("section", { class: "card" }, el("h2", {}, "Log ", el("small", {}, "its last lines")), logNode, wholeLog));
-  let about = null, generation = null, closeFibers = null, closeTwin = null, gone = false;
+  let about = null, generation = null, closeFibers = null, closeTwin = null, closePairs = null, gone = false;
 
   const act = (verb) => async (event) => {
     event.target.disabled = true;
@@ -156,6 +157,8 @@ export function jobPage(page, id) {
     closeFibers = fibers?.close ?? null;
     const twin = twinCard(job, list.files, compared);
     closeTwin = twin?.close ?? null;
+    const pairs = compared.length ? pairsCard(compared, job.result?.png_exposure) : null;
+    closePairs = pairs?.close ?? null;
     const compete = models(job), radius = radiusSearch(job);
     results.append(
       twin ? card("The twin under the mouse", twin.box) : "",
@@ -165,7 +168,7 @@ export function jobPage(page, id) {
       details ? card("More results of the fit", details) : "",
       correlated ? card("Correlation of the parameters", correlated) : "",
       radius ? card("Fiber radius", radiusPlot(radius)) : "",
-      compared.length ? card("Measured and rendered pictures", gallery(compared, job.result?.png_exposure)) : "",
+      pairs ? card("Measured and rendered pictures", pairs.box) : "",
       quality ? card("Quality of the geometry", quality) : "",
       slices.length ? card("Slices of the scan, detected fibers in red", el("div", { class: "slices" }, slices.map((f) => el("figure", {}, el("img", { src: f.url, alt: f.path, loading: "lazy" }), el("figcaption", {}, f.path))))) : "",
       fibers ? card("Fibers", fibers.box) : "",
@@ -191,7 +194,7 @@ export function jobPage(page, id) {
     job.parameters = job.result?.parameters ?? null;
     if (gone) return 5;
     document.title = `${job.state === "running" ? `${Math.round(100 * job.fraction)} % ` : ""}${job.sample} – Selvedge`;
-    if (job.generation !== generation) { generation = job.generation; log.reset(); pictures.reset(); results.replaceChildren(); closeFibers?.(); closeTwin?.(); closeFibers = closeTwin = null; }
+    if (job.generation !== generation) { generation = job.generation; log.reset(); pictures.reset(); results.replaceChildren(); closeFibers?.(); closeTwin?.(); closePairs?.(); closeFibers = closeTwin = closePairs = null; }
     refill(head, [job.sample, job.state, job.cancel_requested, job.missing_files], () => [el("h1", {}, job.sample), stateTag(job.state), el("span", { class: "space" }), ...buttons(job)]);
     refill(stages, [job.state, job.i_stage, job.stage_fraction], () => stagesOf(job, about.stages));
     refill(facts, [job.state, job.message, job.fraction, job.eta_s, job.step, job.objective, job.attempt, job.peak_rss_bytes, job.finished_unix_s], () => factsOf(job));
@@ -206,5 +209,5 @@ export function jobPage(page, id) {
     await showResults(job);
     return job.state === "running" ? 1 : LIVE.has(job.state) ? 2 : 10;
   });
-  return () => { gone = true; poller.stop(); charts.destroy(); pictures.reset(); closeFibers?.(); closeTwin?.(); };
+  return () => { gone = true; poller.stop(); charts.destroy(); pictures.reset(); closeFibers?.(); closeTwin?.(); closePairs?.(); };
 }

@@ -69,12 +69,14 @@ export function radiusSearch(job) {
   return { value: r.radius_um, se: r.standard_error_um, start: r.start_um, flags, curve };
 }
 
-// Returns all configurations: [{name, held, angles, measured, rendered, measuredPicture, renderedPicture, error, errorSe}], error: the relative error of the row
+// Returns all configurations: [{name, held, angles, measured, rendered, measuredPicture, renderedPicture, measuredLinear, renderedLinear, error, errorSe}],
+// Linear: the OpenEXR files of the pictures; error: the relative error of the row
 export function configurations(job, urls) {
   return (job.result?.rows ?? []).map((c) => {
     return {
       name: c.name, held: c.set === "held-out", angles: c, measured: c.measured, rendered: c.rendered, error: c.rel_error ?? null, errorSe: c.rel_error_se,
       measuredPicture: urls.get(c.photograph_png) ?? null, renderedPicture: urls.get(c.rendering_png) ?? null,
+      measuredLinear: urls.get(c.photograph_png?.replace(/\.png$/, ".exr")) ?? null, renderedLinear: urls.get(c.rendering_exr) ?? null,
     };
   });
 }

@@ -84,7 +84,7 @@ def test_real_job_live_and_finished(real, browser):
     assert len(pairs) == 13 and sum("held" in p for p in pairs) == 4
     browser.execute_script("for (const i of document.images) i.loading = 'eager'")
     wait_for(browser, "[...document.images].every((i) => i.complete && i.naturalWidth > 0)")
-    assert len(browser.find_elements(By.CSS_SELECTOR, ".pair img")) == 26
+    assert len(browser.find_elements(By.CSS_SELECTOR, ".pair canvas")) == 26
     assert len(browser.find_elements(By.CSS_SELECTOR, ".slices img")) == 3
     assert "passed" in text_of(browser, "#certificate")
     assert len(browser.find_elements(By.CSS_SELECTOR, "#next-photograph tbody tr")) == 2

@@ -21,3 +21,27 @@ def exr(width, height, rgb):
         row = [rgb(x, y) for x in range(width)]
         lines += struct.pack("<iI", y, line_bytes) + b"".join(struct.pack(f"<{width}f", *(p["RGB".index(n)] for p in row)) for n in names)
     return head + table + lines
+
+
+def read_exr(data):
+    """Reads what `exr` and the worker write: (width, height, pixel), where pixel(x, y) is (r, g, b)."""
+    assert data[:8] == b"\x76\x2f\x31\x01\x02\0\0\0"
+    at, found = 8, {}
+    while data[at]:
+        name, kind, rest = data[at:].split(b"\0", 2)
+        at += len(name) + len(kind) + 2
+        length = struct.unpack_from("<I", data, at)[0]
+        found[name.decode()] = data[at + 4:at + 4 + length]
+        at += 4 + length
+    assert found["compression"] == b"\0"
+    left, top, right, bottom = struct.unpack("<iiii", found["dataWindow"])
+    width, height, names, channels = right - left + 1, bottom - top + 1, [], found["channels"]
+    while channels[0]:
+        names.append(channels.split(b"\0", 1)[0].decode())
+        channels = channels[len(names[-1]) + 17:]
+    first = at + 1 + 8 * height + 8
+    stride = 8 + 4 * width * len(names)
+
+    def pixel(x, y):
+        return tuple(struct.unpack_from("<f", data, first + y * stride + 4 * (names.index(c) * width + x))[0] for c in "RGB")
+    return width, height, pixel
