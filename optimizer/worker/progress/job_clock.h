@@ -7,7 +7,8 @@
  * normal). A stage that predicts its own end (a fit) has a fraction that runs evenly with time, but for what such
  * predictions were off in earlier jobs; its time says nothing about the speed of other stages. The stated fraction of
  * the job is elapsed time over elapsed and remaining time; it never falls, and it rises by at most JOB_CLOCK_STEP
- * between two looks. Times are of the monotonic clock, in seconds. Not thread-safe. */
+ * between two looks and in a second; in a second also by twice what is even, where a job is short. Times are of the
+ * monotonic clock, in seconds. Not thread-safe. */
 #ifndef SELVEDGE_OPTIMIZER_JOB_CLOCK_H
 #define SELVEDGE_OPTIMIZER_JOB_CLOCK_H
 
@@ -28,7 +29,7 @@ struct job_clock_stage {
     double wall_s;                       /* of an ended stage */
     double passed_s[SPEED_CURVE_POINTS]; /* time at which its fraction reached (k + 1) / SPEED_CURVE_POINTS */
     double curve[SPEED_CURVE_POINTS];    /* of earlier jobs; a straight line where there were none */
-    bool has_curve;
+    double curve_sd;                     /* how uncertain the curve is */
 };
 
 struct job_clock {
@@ -38,6 +39,7 @@ struct job_clock {
     double began_s, stage_began_s; /* of this attempt, of the running stage */
     double from_s, from_share;     /* since when the running stage is measured: not while it replays a journal */
     double fraction, shown;        /* of the running stage, of the job as last stated */
+    double looked_s;               /* when it was stated */
 };
 
 struct job_clock_look {
