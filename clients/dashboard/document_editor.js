@@ -12,7 +12,7 @@ function holdsLargeNumber(value) {
 
 // changed(text) is called when the form has changed the document.
 export function documentEditor(changed) {
-  const text = el("pre", { class: "log", id: "document" }), body = el("div"), note = el("p", { class: "hint" });
+  const text = el("pre", { class: "log", id: "document", tabIndex: 0, role: "region", "aria-label": "the job document" }), body = el("div"), note = el("p", { class: "hint" });
   let source = "", options = null, form = null;
   const build = (doc) => {
     const write = () => {

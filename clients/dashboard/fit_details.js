@@ -3,7 +3,7 @@
 import { el, isNumber, percent, withError } from "./page_parts.js";
 
 function table(id, heads, rows) {
-  return el("div", { class: "scroll" }, el("table", { id }, el("thead", {}, el("tr", {}, heads.map((h) => el("th", { class: h.startsWith("#") ? "number" : null }, h.replace("#", ""))))), el("tbody", {}, rows)));
+  return el("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": `table ${id}` }, el("table", { id }, el("thead", {}, el("tr", {}, heads.map((h) => el("th", { class: h.startsWith("#") ? "number" : null }, h.replace("#", ""))))), el("tbody", {}, rows)));
 }
 
 const number = (text) => el("td", { class: "number" }, text);

@@ -107,12 +107,12 @@ function report(list, path, text) {
 
 function downloads(job, list) {
   const rows = list.files.map((f) => el("tr", {}, el("td", {}, el("a", { href: f.url, class: "mono", download: f.path.split("/").pop() }, f.path)), el("td", { class: "number" }, size(f.size))));
-  return [el("p", {}, report(list, "report.html", "Report"), report(list, "report.pdf", "Report as PDF"), el("a", { class: "button", href: list.archive, download: `selvedge-${job.id}.tar` }, "Everything (tar)")), el("div", { class: "scroll" }, el("table", { id: "files" }, el("tbody", {}, rows)))];
+  return [el("p", {}, report(list, "report.html", "Report"), report(list, "report.pdf", "Report as PDF"), el("a", { class: "button", href: list.archive, download: `selvedge-${job.id}.tar` }, "Everything (tar)")), el("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": "files" }, el("table", { id: "files" }, el("tbody", {}, rows)))];
 }
 
 export function jobPage(page, id) {
   const head = el("div", { class: "head" }), stages = el("div", { class: "stages" }), facts = el("div", { class: "facts" }), verdict = el("div"), notes = el("div");
-  const fitCard = el("div"), curveCard = el("div"), surfaces = el("div"), results = el("div", { id: "results" }), record = el("div"), versionsNode = el("div"), logNode = el("pre", { class: "log" });
+  const fitCard = el("div"), curveCard = el("div"), surfaces = el("div"), results = el("div", { id: "results" }), record = el("div"), versionsNode = el("div"), logNode = el("pre", { class: "log", tabIndex: 0, role: "region", "aria-label": "the last lines of the log" });
   const charts = new JobCharts(fitCard, curveCard), log = new LogTail(logNode), pictures = new SurfacePictures(surfaces, id), versions = new VersionsCard(versionsNode, id);
   const wholeLog = el("details", { id: "whole-log", ontoggle: () => {
     if (!wholeLog.open || wholeLog.childElementCount > 1) return;

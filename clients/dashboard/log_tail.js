@@ -49,7 +49,7 @@ const PAGE = 262144;
 export class WholeLog {
   constructor(id) {
     this.url = `/v1/jobs/${id}/log`;
-    this.text = el("pre", { class: "log", tabIndex: 0, "aria-label": "a part of the log" });
+    this.text = el("pre", { class: "log", tabIndex: 0, role: "region", "aria-label": "a part of the log" });
     this.place = el("span", { class: "hint", role: "status" });
     const button = (text, act) => el("button", { type: "button", onclick: act }, text);
     this.first = button("First", () => this.show(0));

@@ -141,9 +141,10 @@ export function optionForm(options, document, changed) {
     const listed = () => { const value = parent.get()?.[key]; return Array.isArray(value) ? value : []; };
     const element = (i) => {
       const place = elementPlace(listed(), path, i);
-      const remove = el("button", { type: "button", onclick: (e) => { e.preventDefault(); drop(i); } }, "Remove");
-      return folded(place.path, [el("b", {}, `${key}[${i}]`), " ", el("span", { class: "hint" }, place.get().file ?? ""), " ", remove],
+      const remove = el("button", { type: "button", "aria-label": `Remove ${key}[${i}]`, onclick: () => drop(i) }, "Remove");
+      const members = folded(place.path, [el("b", {}, `${key}[${i}]`), " ", el("span", { class: "hint" }, place.get().file ?? "")],
         Object.keys(place.get()).length === 0, () => membersOf(options, `${row.path}[]`).map((member) => part(member, place)));
+      return el("div", { class: "element" }, members, remove);
     };
     const fill = () => items.replaceChildren(...listed().map((_, i) => element(i)));
     const drop = (i) => {

@@ -81,7 +81,7 @@ export function submitPanel(handed = [], copy = null) {
   let doc = null, source = null, busy = false, before = null;
   // kept while the document is the same, so that another try continues an interrupted submit
   let key = null, sent = new Map();
-  const list = el("ul"), message = el("p", { class: "hint" }), go = el("button", { class: "main", disabled: true }, "Submit");
+  const list = el("ul", { tabIndex: 0, "aria-label": "files of the job" }), message = el("p", { class: "hint" }), go = el("button", { class: "main", disabled: true }, "Submit");
   const say = (text, bad) => { message.textContent = text; message.className = bad ? "note bad" : "hint"; };
   const wanted = () => (doc ? filesOf(doc) : []);
   const allow = () => { go.disabled = busy || doc === null || wanted().some((f) => !dropped.has(f.name)); };

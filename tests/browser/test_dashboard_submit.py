@@ -86,7 +86,7 @@ def test_form_writes_a_job_document(stub, browser, tmp_path):
         browser.execute_script("document.querySelector(`#editor details[data-path='photographs'] button.add`).click()")
         for key, text in {"file": f"p{i}.exr", **angles}.items():
             fill_in(browser, f"photographs[{i}].{key}", str(text))
-    browser.execute_script("document.querySelector(`#editor details[data-path='photographs[2]'] button`).click()")
+    browser.execute_script("document.querySelector(`#editor details[data-path='photographs[2]'] + button`).click()")
     keep(browser, "form")
     document = {"sample": "written twill", "fibers": {"file": "cloth.hair", "tile_mm": [0.8, 0.9]}, "lamp": {"side_cm": 12.5}, "black_sheet": False,
                 "fit": {"model": "microflake.v1", "texture": {"block_mm": 0.5}, "fixed": {"gamma": 0.3}},

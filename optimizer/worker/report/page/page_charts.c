@@ -39,7 +39,10 @@ static void text_at(FILE *out, double x, double y, const char *anchor, const cha
 /* Frame, ticks at five places of each axis, labels. */
 static void open_chart(const struct axes *a, const char *x_label, const char *y_label, FILE *out)
 {
-    fprintf(out, "<svg viewBox=\"0 0 %d %d\" width=\"%d\" role=\"img\">\n", WIDTH, HEIGHT, WIDTH);
+    fprintf(out, "<svg viewBox=\"0 0 %d %d\" width=\"%d\" role=\"img\">\n<title>%s over ", WIDTH, HEIGHT, WIDTH,
+            y_label);
+    page_escaped(x_label, out);
+    fputs("</title>\n", out);
     fprintf(out, "<rect x=\"%d\" y=\"%d\" width=\"%d\" height=\"%d\" fill=\"none\" stroke=\"#bbb\"/>\n", LEFT, TOP,
             WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM);
     for (int k = 0; k <= 4; k++) {
@@ -158,7 +161,9 @@ void page_correlation(const json_t *parameters, const json_t *matrix, FILE *out)
     const double cell = 26.0, left = 130.0;
     size_t n = json_array_size(matrix);
     if (n == 0) return;
-    fprintf(out, "<svg viewBox=\"0 0 %.0f %.0f\" width=\"%.0f\" role=\"img\" font-size=\"10\">\n",
+    fprintf(out,
+            "<svg viewBox=\"0 0 %.0f %.0f\" width=\"%.0f\" role=\"img\" font-size=\"10\">\n"
+            "<title>correlations of the parameters</title>\n",
             left + cell * (double)n + 4, cell * (double)n + 70, left + cell * (double)n + 4);
     for (size_t i = 0; i < n; i++) {
         const char *name = page_string(json_array_get(parameters, i), "name");
