@@ -1,54 +1,65 @@
 // Shows the reconstructed fibers in 3D (three.js) from the job's .hair file (docs/file-formats.md), when the user asks
 // for it.
+import { coloursOf, waysToColour } from "./fibers/fiber_colors.js";
 import { el, size } from "./page_parts.js";
 import { raw } from "./server_link.js";
 
 const MAX_SEGMENT = 400000, MAX_BYTES = 200 << 20;
 
-// Returns {position, n, ...}: position is a Float32Array with x, y, z of both ends of every segment in millimetres.
-// Beyond MAX_SEGMENT segments some fibers are left out.
+// The group of a fiber is its colour, a corner of the cube: 7 - r - 2 g - 4 b.
+const groupOf = (rgb, i) => 7 - Math.round(rgb[3 * i]) - 2 * Math.round(rgb[3 * i + 1]) - 4 * Math.round(rgb[3 * i + 2]);
+
+// The axis along which a strand runs from its first to its last point: 0, 1, 2.
+function axisOf(xyz, first, last) {
+  const d = [0, 1, 2].map((c) => Math.abs(xyz[3 * last + c] - xyz[3 * first + c]));
+  return d.indexOf(Math.max(...d));
+}
+
+// Returns, for each of the n segments that are shown: position, a Float32Array with x, y, z of both ends in millimetres,
+// radius in millimetres, kind (the axis along which its fiber runs), and group, or null in a file without groups; also
+// nStrand and nSegment of the file. Beyond MAX_SEGMENT segments some fibers are left out.
 export function readHair(buffer) {
   const view = new DataView(buffer);
   const magic = String.fromCharCode(...new Uint8Array(buffer, 0, 4));
   if (buffer.byteLength < 128 || magic !== "HAIR") throw new Error("not a .hair file");
   const nStrand = view.getUint32(4, true), nPoint = view.getUint32(8, true), flags = view.getUint32(12, true), nDefault = view.getUint32(16, true);
+  const words = String.fromCharCode(...new Uint8Array(buffer, 40, 88));
   let at = 128;
   const segments = new Uint32Array(nStrand);
   for (let i = 0; i < nStrand; i++) segments[i] = flags & 1 ? view.getUint16(at + 2 * i, true) : nDefault;
   if (flags & 1) at += 2 * nStrand;
-  if (!(flags & 2) || at + 12 * nPoint > buffer.byteLength) throw new Error("the .hair file is incomplete");
-  const xyz = new Float32Array(buffer.slice(at, at + 12 * nPoint));
+  const array = (has, width) => {
+    if (!has) return null;
+    if (at + 4 * width * nPoint > buffer.byteLength) throw new Error("the .hair file is incomplete");
+    at += 4 * width * nPoint;
+    return new Float32Array(buffer.slice(at - 4 * width * nPoint, at));
+  };
+  const xyz = array(flags & 2, 3), thickness = array(flags & 4, 1);
+  array(flags & 8, 1);
+  const rgb = array(flags & 16 && words.includes("groups=rgb"), 3), thick = view.getFloat32(20, true);
+  if (!xyz) throw new Error("the .hair file is incomplete");
   const nSegment = segments.reduce((a, b) => a + b, 0);
   const keep = Math.min(1, MAX_SEGMENT / Math.max(1, nSegment));
-  const position = [];
+  const position = [], radius = [], kind = [], group = [];
   let first = 0, due = 0;
   for (let i = 0; i < nStrand; i++) {
     due += keep;
     if (due >= 1) {
       due -= 1;
-      for (let k = first; k < first + segments[i]; k++) for (let c = 0; c < 6; c++) position.push(xyz[3 * k + c]);
+      const axis = axisOf(xyz, first, first + segments[i]);
+      for (let k = first; k < first + segments[i]; k++) {
+        for (let c = 0; c < 6; c++) position.push(xyz[3 * k + c]);
+        radius.push(thickness ? (thickness[k] + thickness[k + 1]) / 4 : thick / 2);
+        kind.push(axis);
+        if (rgb) group.push(groupOf(rgb, k));
+      }
     }
     first += segments[i] + 1;
   }
-  return { position: new Float32Array(position), n: position.length / 6, nStrand, nSegment, thinned: keep < 1 };
-}
-
-// Colours segments by direction (x warm, y cool, z green), shaded by height.
-function colours(position) {
-  const out = new Float32Array(position.length);
-  let low = Infinity, high = -Infinity;
-  for (let i = 2; i < position.length; i += 3) { low = Math.min(low, position[i]); high = Math.max(high, position[i]); }
-  for (let s = 0; s < position.length; s += 6) {
-    const d = [0, 1, 2].map((c) => Math.abs(position[s + 3 + c] - position[s + c]));
-    const n = Math.hypot(...d) || 1;
-    const [x, y, z] = d.map((v) => (v / n) ** 2);
-    const base = [0.98 * x + 0.38 * y + 0.35 * z, 0.76 * x + 0.66 * y + 0.85 * z, 0.40 * x + 0.93 * y + 0.45 * z];
-    for (const e of [0, 3]) {
-      const shade = 0.25 + 0.75 * ((position[s + e + 2] - low) / (high - low || 1));
-      for (let c = 0; c < 3; c++) out[s + e + c] = base[c] * shade;
-    }
-  }
-  return out;
+  return {
+    position: new Float32Array(position), radius: new Float32Array(radius), kind: new Uint8Array(kind), group: rgb ? new Uint8Array(group) : null,
+    n: radius.length, nStrand, nSegment, thinned: keep < 1,
+  };
 }
 
 // Handles the mouse and touch: drag turns, wheel or pinch zooms, shift-drag moves.
@@ -78,7 +89,6 @@ function show(THREE, node, hair) {
   const scene = new THREE.Scene(), camera = new THREE.PerspectiveCamera(35, 1, 0.001, 1000);
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute("position", new THREE.BufferAttribute(hair.position, 3));
-  geometry.setAttribute("color", new THREE.BufferAttribute(colours(hair.position), 3));
   geometry.computeBoundingSphere();
   const { center, radius } = geometry.boundingSphere;
   scene.add(new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ vertexColors: THREE.VertexColors ?? true })));
@@ -102,11 +112,17 @@ function show(THREE, node, hair) {
   orbit(renderer.domElement, state, draw);
   const observer = new ResizeObserver(draw);
   observer.observe(node);
-  return () => { observer.disconnect(); geometry.dispose(); renderer.dispose(); };
+  return {
+    close: () => { observer.disconnect(); geometry.dispose(); renderer.dispose(); },
+    paint: (colours) => {
+      geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
+      draw();
+    },
+  };
 }
 
 export function fiberView(file) {
-  let close = null;
+  let shown = null;
   const hint = el("div", { class: "hint" });
   const node = el("div", { class: "view3d" }, hint);
   const open = async () => {
@@ -114,15 +130,27 @@ export function fiberView(file) {
     try {
       const [THREE, answer] = await Promise.all([import("/vendor/three.module.js"), raw("GET", file.url)]);
       const hair = readHair(await answer.arrayBuffer());
-      close = show(THREE, node, hair);
+      shown = show(THREE, node, hair);
+      offerColours(hair);
       caption.textContent = `${hair.nStrand} fibers, ${hair.nSegment} segments${hair.thinned ? " (some of them are shown)" : ""}; drag turns, wheel zooms, shift-drag moves`;
     } catch (error) {
       hint.replaceChildren(`The 3D view is not available: ${error.message}. The slices above show the same fibers.`);
       if (!hint.isConnected) node.replaceChildren(hint);
     }
   };
-  const caption = el("p", { class: "hint" });
+  const caption = el("p", { class: "hint" }), colours = el("div", { class: "fiber-colours" });
+  const offerColours = (hair) => {
+    const ways = waysToColour(hair), legend = el("span", { class: "legend" });
+    const choose = el("select", { onchange: () => paint() }, ways.map(([name]) => el("option", {}, name)));
+    const paint = () => {
+      const made = coloursOf(hair, ways[choose.selectedIndex][1]);
+      shown.paint(made.colours);
+      legend.replaceChildren(...made.legend.filter((part) => part !== null));
+    };
+    colours.replaceChildren(el("label", {}, "Colour by ", choose), legend);
+    paint();
+  };
   if (file.size > MAX_BYTES) hint.append(`The fiber file is too large for the browser (${size(file.size)}); download it instead.`);
   else hint.append(el("button", { onclick: open }, `Show the fibers in 3D (${size(file.size)})`));
-  return { box: el("div", {}, node, caption), close: () => close?.() };
+  return { box: el("div", {}, node, colours, caption), close: () => shown?.close() };
 }
