@@ -268,8 +268,9 @@ static status send_files(struct submit *u, struct error *err)
     char size[CLI_SHORT_TEXT];
     text_size((double)u->n_before, size);
     if (s == STATUS_OK)
-        fprintf(u->cli->note, "%zu file%s in place (%s), %zu uploaded now, in %.1f s\n", u->list.n_file,
-                u->list.n_file == 1 ? "" : "s", size, n_sent, clock_monotonic_s() - u->started_s);
+        fprintf(u->cli->note, "%zu file%s in place (%s), %zu uploaded now, %zu on the server already, in %.1f s\n",
+                u->list.n_file, u->list.n_file == 1 ? "" : "s", size, n_sent, u->list.n_file - n_sent,
+                clock_monotonic_s() - u->started_s);
     return s;
 }
 

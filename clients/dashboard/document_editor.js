@@ -13,7 +13,21 @@ function holdsLargeNumber(value) {
 // changed(text) is called when the form has changed the document.
 export function documentEditor(changed) {
   const text = el("pre", { class: "log", id: "document", tabIndex: 0, role: "region", "aria-label": "the job document" }), body = el("div"), note = el("p", { class: "hint" });
-  let source = "", options = null, form = null;
+  let source = "", options = null, form = null, wrong = [];
+  const marked = new Map(); // row -> what the server said of it
+  const markFaults = () => {
+    for (const [row, text] of marked) { // but not what the form itself says of a value that it cannot read
+      const problem = row.querySelector(":scope > .problem");
+      if (problem?.textContent !== text) continue;
+      row.classList.remove("bad");
+      problem.textContent = "";
+    }
+    marked.clear();
+    for (const { field, detail } of wrong) {
+      const row = field && !body.querySelector(`.option.bad[data-path="${CSS.escape(field)}"]`) ? form?.mark(field, detail, true) : null;
+      if (row) marked.set(row, detail);
+    }
+  };
   const build = (doc) => {
     const write = () => {
       source = JSON.stringify(doc, null, 2);
@@ -22,6 +36,7 @@ export function documentEditor(changed) {
     };
     form = optionForm(options, doc, write);
     body.replaceChildren(form.node);
+    markFaults();
   };
   const render = () => {
     text.textContent = source;
@@ -54,6 +69,8 @@ export function documentEditor(changed) {
       return source;
     },
     show(now) { source = now; render(); }, // a document from a file
+    // What is wrong with the document: the rows of these fields are marked, and no others.
+    faults(list) { wrong = list; markFaults(); },
     async mark(field, message) {
       node.open = true;
       await open();

@@ -182,18 +182,20 @@ export function optionForm(options, document, changed) {
   const node = el("div", { class: "options" }, ...membersOf(options, "").map((row) => part(row, root)));
 
   // Shows the row of a key that the server refused, and opens the sections that contain it.
-  function mark(path, message) {
+  // quiet: neither opens sections nor scrolls
+  function mark(path, message, quiet = false) {
     const ends = [...path.matchAll(/[.[]/g)].map((m) => m.index).concat(path.length);
     let row = null;
     for (const end of ends) {
       const prefix = path.slice(0, end);
-      sections.get(prefix)?.();
+      if (!quiet) sections.get(prefix)?.();
       row = [...node.querySelectorAll("[data-path]")].find((one) => one.dataset.path === prefix) ?? row;
     }
     row?.classList.add("bad");
     const problem = row?.querySelector(":scope > .problem");
     if (problem) problem.textContent = message;
-    row?.scrollIntoView({ block: "center" });
+    if (!quiet) row?.scrollIntoView({ block: "center" });
+    return row;
   }
   return { node, mark };
 }

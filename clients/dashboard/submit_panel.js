@@ -5,8 +5,9 @@ import { documentEditor } from "./document_editor.js";
 import { droppedFiles } from "./dropped_files.js";
 import { el, size } from "./page_parts.js";
 import { getJson, raw, sendJson } from "./server_link.js";
+import { LiveCheck, sha256 } from "./submit/live_check.js";
 
-const PIECE = 8 << 20, MAX_HASHED = 512 << 20, MAX_TRY = 6;
+const PIECE = 8 << 20, MAX_TRY = 6;
 
 function filesOf(doc) {
   const list = [];
@@ -24,13 +25,6 @@ function filesOf(doc) {
   for (const p of doc.photographs ?? []) for (const q of [p, ...(p?.more_exposures ?? [])]) add(q?.file, "photograph");
   for (const p of doc.pictures ?? []) add(p?.mesh_file, "mesh");
   return list;
-}
-
-// The browser's digest needs the whole file in memory, so larger files are sent without a checksum.
-async function sha256(file) {
-  if (!globalThis.crypto?.subtle || file.size > MAX_HASHED) return null;
-  const digest = await crypto.subtle.digest("SHA-256", await file.arrayBuffer());
-  return [...new Uint8Array(digest)].map((b) => b.toString(16).padStart(2, "0")).join("");
 }
 
 async function pieceBytes() {
@@ -68,8 +62,10 @@ function removeFile(job, name) {
   return raw("DELETE", `/v1/jobs/${job}/files/${name}`).catch((error) => { if (error.status !== 404) throw error; });
 }
 
+// file: what was dropped, or {size, sha256} of an input of the copied job.
 async function declare(job, f, file) {
-  const url = `/v1/jobs/${job}/files`, ask = { name: f.name, role: f.role, size: file.size, sha256: await sha256(file) };
+  const url = `/v1/jobs/${job}/files`, sum = file instanceof File ? await sha256(file) : file.sha256;
+  const ask = { name: f.name, role: f.role, size: file.size, sha256: sum };
   try { return await sendJson("POST", url, ask); } catch (error) { if (error.body?.code !== "exists") throw error; }
   await removeFile(job, f.name); // the file has changed since an earlier try
   return sendJson("POST", url, ask);
@@ -84,20 +80,33 @@ export function submitPanel(handed = [], copy = null) {
   const list = el("ul", { tabIndex: 0, "aria-label": "files of the job" }), message = el("p", { class: "hint" }), go = el("button", { class: "main", disabled: true }, "Submit");
   const say = (text, bad) => { message.textContent = text; message.className = bad ? "note bad" : "hint"; };
   const wanted = () => (doc ? filesOf(doc) : []);
-  const allow = () => { go.disabled = busy || doc === null || wanted().some((f) => !dropped.has(f.name)); };
+  // the file itself, or the input of the copied job, whose bytes are on the server
+  const fileOf = (name) => dropped.get(name) ?? (before?.files.get(name)?.sha256 ? before.files.get(name) : undefined);
+  const faultOf = (name) => (dropped.has(name) ? check.fault(dropped.get(name)) : null);
+  const allow = () => { go.disabled = busy || doc === null || wanted().some((f) => !fileOf(f.name) || faultOf(f.name)); };
   // What is known of a file from the copied job.
   const otherSize = (name) => {
-    const known = before?.files.get(name), now = dropped.get(name)?.size;
+    const known = before?.files.get(name)?.size, now = dropped.get(name)?.size;
     if (known === undefined || now === known) return null;
+    if (now === undefined && fileOf(name)) return el("span", { class: "hint" }, `${size(known)} in the copied job, on the server already: it is not sent again`);
     return now === undefined ? el("span", { class: "hint" }, `${size(known)} in the copied job`) : el("span", { class: "tag warn" }, `another file: ${size(known)} in the copied job`);
   };
+  const stateOf = (name) => {
+    const file = dropped.get(name);
+    if (!file) return fileOf(name) ? null : el("span", { class: "tag warn" }, "still missing");
+    if (faultOf(name)) return el("span", { class: "tag bad" }, faultOf(name));
+    return el("span", {}, size(file.size), check.isKnown(file) ? el("span", { class: "hint" }, ", on the server already: it is not sent again") : null);
+  };
   const show = () => {
-    const missing = wanted().filter((f) => !dropped.has(f.name));
+    const missing = wanted().filter((f) => !fileOf(f.name)), faulty = wanted().filter((f) => faultOf(f.name)), names = new Set(wanted().map((f) => f.name));
+    const unused = [...dropped.keys()].filter((name) => !names.has(name) && !name.endsWith(".json"));
     list.replaceChildren(...wanted().map((f) => el("li", {}, el("span", { class: "mono" }, f.name),
-      el("span", {}, otherSize(f.name), " ", dropped.has(f.name) ? size(dropped.get(f.name).size) : el("span", { class: "tag warn" }, "still missing")))));
+      el("span", {}, otherSize(f.name), " ", stateOf(f.name)))),
+      ...(doc && unused.length ? [el("li", { class: "hint" }, `Not named by the document, so not sent: ${unused.slice(0, 6).join(", ")}${unused.length > 6 ? ` and ${unused.length - 6} more` : ""}`)] : []));
     allow();
     if (busy) return;
-    if (doc && missing.length) say(`${missing.length} of ${wanted().length} files are still missing; drop them here.${before ? " A copy takes the document, not the files." : ""}`);
+    if (doc && missing.length) say(`${missing.length} of ${wanted().length} files are still missing; drop them here.`);
+    else if (doc && faulty.length) say(`${faulty[0].name} ${faultOf(faulty[0].name)}.`, true);
     else if (doc) say("Ready.");
   };
   const use = (now) => {
@@ -105,11 +114,14 @@ export function submitPanel(handed = [], copy = null) {
     source = now;
     doc = null; // when it is no JSON
     doc = JSON.parse(source);
+    check.document(source);
   };
   const editor = documentEditor((now) => { use(now); show(); });
+  const check = new LiveCheck(editor, () => show());
   const take = async (files) => {
     for (const file of files) {
       dropped.set(file.name, file);
+      if (!file.name.endsWith(".json")) check.file(file);
       if (!file.name.endsWith(".json")) continue;
       const now = await file.text();
       try { use(now); } catch (error) { say(`${file.name}: ${error.message}`, true); return; } finally { editor.show(now); }
@@ -120,7 +132,7 @@ export function submitPanel(handed = [], copy = null) {
   const input = el("input", { type: "file", multiple: true, onchange: () => take(input.files) });
   const folder = el("input", { type: "file", webkitdirectory: true, onchange: () => take([...folder.files].filter((f) => !f.name.startsWith("."))) });
   const drop = el("div", { class: "drop" }, "Drop a job document (.json) and its files here, or a folder; or choose ", el("label", { class: "file" }, "files", input), " or ",
-    el("label", { class: "file" }, "a folder", folder), list, message, go);
+    el("label", { class: "file" }, "a folder", folder), list, check.node, message, go);
   const from = el("p", { class: "hint" });
   const begin = async () => {
     try {
@@ -145,13 +157,18 @@ export function submitPanel(handed = [], copy = null) {
       const job = await (await raw("POST", "/v1/jobs", { body: source, header: { "Content-Type": "application/json", "Idempotency-Key": key } })).json();
       const piece = await pieceBytes();
       for (const [i, f] of files.entries()) {
-        const file = dropped.get(f.name), mark = `${job.id} ${file.size} ${file.lastModified}`;
+        const file = fileOf(f.name), mark = `${job.id} ${file.size} ${file.lastModified}`;
         const label = (n) => say(`${i + 1} of ${files.length}: ${f.name}, ${size(n)} of ${size(file.size)}`);
         label(0);
         // a different file of the same name: its bytes must not continue those of the first
         if (known.has(f.name) && known.get(f.name) !== mark) await removeFile(job.id, f.name);
         known.set(f.name, mark);
         const state = await declare(job.id, f, file);
+        if (state.state !== "complete" && !(file instanceof File)) {
+          before.files.get(f.name).sha256 = null; // deleted meanwhile, or of another owner
+          show();
+          throw new Error(`${f.name} of the copied job is not on the server any more; drop it here.`);
+        }
         if (state.state !== "complete") await upload(file, state.upload_url, piece, label);
       }
       await sendJson("POST", `/v1/jobs/${job.id}/start`);

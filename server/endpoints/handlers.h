@@ -23,6 +23,9 @@ void handle_list_files(struct http_request *r);
 void handle_declare_files(struct http_request *r);
 void handle_get_file(struct http_request *r);
 void handle_delete_file(struct http_request *r);
+/* handle_inputs.c */
+void handle_check_document(struct http_request *r);
+void handle_find_input(struct http_request *r);
 /* handle_uploads.c */
 void handle_upload_offset(struct http_request *r);
 void handle_upload_begin(struct http_request *r);

@@ -1,6 +1,8 @@
 /* The input files of a job: which files its document names are missing, declarations, and deletion. */
+#include "base/files/durable.h"
 #include "optimizer/job/job_document.h"
 #include "server/jobs/ballast.h"
+#include "server/jobs/inputs/known_input.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/upload_file.h"
@@ -120,7 +122,30 @@ static status find_declared(struct job_service *v, struct job_declaration *d, st
     return STATUS_OK;
 }
 
-/* Reserves and inserts the files that are new, n_new of them. */
+/* Makes room for the files whose bytes must be uploaded, and links the others: n new files. */
+static status make_places(struct job_service *v, const char *owner, struct file_row *row, size_t n, struct error *err)
+{
+    status s = STATUS_OK;
+    size_t n_part = 0, n_linked = 0;
+    struct file_row *part = calloc(n, sizeof *part);
+    if (part == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot declare files: out of memory");
+    for (size_t i = 0; i < n; i++)
+        if (known_input_link(v, owner, &row[i]))
+            n_linked++;
+        else
+            part[n_part++] = row[i];
+    if (n_part > 0) s = upload_reserve(v->settings->data, part, n_part, err);
+    for (size_t i = 0, k = 0; i < n; i++)
+        if (row[i].state != FILE_COMPLETE) row[i] = part[k++];
+    char path[PATH_BYTES];
+    upload_input_path(v->settings->data, &row[0], path);
+    if (s == STATUS_OK && n_linked > 0) s = durable_sync_folder_of(path, err);
+    for (size_t i = 0; s != STATUS_OK && i < n; i++) upload_discard(v->upload, &row[i]);
+    free(part);
+    return s;
+}
+
+/* Makes places for the files that are new, n_new of them, and inserts them. */
 static status insert_new(struct job_service *v, struct job_row *job, struct job_declaration *file, size_t n,
                          size_t n_new, struct error *err)
 {
@@ -132,7 +157,7 @@ static status insert_new(struct job_service *v, struct job_row *job, struct job_
         job_new_id(file[i].row.id);
         row[k++] = file[i].row;
     }
-    status s = upload_reserve(v->settings->data, row, n_new, err);
+    status s = make_places(v, job->owner, row, n_new, err);
     if (s == STATUS_OK) {
         job_mark_edited(job);
         s = store_file_insert(v->store, row, n_new, job, err);
@@ -145,20 +170,27 @@ static status insert_new(struct job_service *v, struct job_row *job, struct job_
     return s;
 }
 
+/* What new files take. */
+struct room {
+    size_t n_file;
+    int64_t n_bytes, n_upload_bytes; /* of all; of those that must be uploaded */
+};
+
 static status check_room(struct job_service *v, const struct access_grant *grant, const struct job_row *job,
-                         size_t n_new, int64_t n_bytes, struct job_refusal *refusal, struct error *err)
+                         const struct room *room, struct job_refusal *refusal, struct error *err)
 {
     int64_t n_before = 0;
     status s = store_file_count(v->store, job->id, &n_before, err);
     if (s != STATUS_OK) return s;
-    if (n_before + (int64_t)n_new > v->settings->max_files_per_job) {
+    if (n_before + (int64_t)room->n_file > v->settings->max_files_per_job) {
         refusal->code = "too_many";
         return error_set(err, STATUS_TOO_LARGE, "a job may have at most %lld files",
                          (long long)v->settings->max_files_per_job);
     }
     s = job_check_editable(job, err);
-    if (s == STATUS_OK) s = job_check_quota(v, grant, job->owner, &(struct owner_use){.bytes = n_bytes}, refusal, err);
-    return s == STATUS_OK ? job_disk_check(v, n_bytes, err) : s;
+    if (s == STATUS_OK)
+        s = job_check_quota(v, grant, job->owner, &(struct owner_use){.bytes = room->n_bytes}, refusal, err);
+    return s == STATUS_OK ? job_disk_check(v, room->n_upload_bytes, err) : s;
 }
 
 static status declare_locked(struct job_service *v, const struct access_grant *grant, const char *id,
@@ -166,19 +198,20 @@ static status declare_locked(struct job_service *v, const struct access_grant *g
                              struct error *err)
 {
     struct job_row job;
-    size_t n_new = 0;
-    int64_t n_bytes = 0;
+    struct room room = {0};
     status s = job_look(v, id, &job, err);
     for (size_t i = 0; s == STATUS_OK && i < n; i++) {
         snprintf(file[i].row.job_id, sizeof file[i].row.job_id, "%s", id);
         s = find_declared(v, &file[i], err);
         if (s != STATUS_OK) *i_fault = i;
         if (file[i].existed) continue;
-        n_new++;
-        n_bytes += file[i].row.size_bytes; /* at most max_file_bytes each, of at most a megabyte of declarations */
+        file[i].known = s == STATUS_OK && known_input_exists(v, job.owner, &file[i].row);
+        room.n_file++;
+        if (!file[i].known) room.n_upload_bytes += file[i].row.size_bytes;
+        room.n_bytes += file[i].row.size_bytes; /* at most max_file_bytes each, of at most a megabyte of declarations */
     }
-    if (s == STATUS_OK && n_new > 0) s = check_room(v, grant, &job, n_new, n_bytes, refusal, err);
-    return s == STATUS_OK && n_new > 0 ? insert_new(v, &job, file, n, n_new, err) : s;
+    if (s == STATUS_OK && room.n_file > 0) s = check_room(v, grant, &job, &room, refusal, err);
+    return s == STATUS_OK && room.n_file > 0 ? insert_new(v, &job, file, n, room.n_file, err) : s;
 }
 
 static int by_name(const void *a, const void *b)

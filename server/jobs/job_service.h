@@ -83,6 +83,7 @@ status job_look(struct job_service *v, const char *id, struct job_row *row, stru
 struct job_declaration {
     struct file_row row; /* name, role, size and sha256, which are checked; the whole row afterwards */
     bool existed;        /* the same declaration was made before */
+    bool known;          /* a job of the same owner has these bytes (server/jobs/inputs) */
 };
 /* Declares n >= 1 files, all or none, in one transaction. *i_fault: the declaration that an error is about, or n. */
 status job_declare_files(struct job_service *v, const struct access_grant *grant, const char *id,

@@ -152,6 +152,10 @@ status store_file_insert(struct store *store, const struct file_row *row, size_t
 status store_file_get(struct store *store, const char *id, struct file_row *row, struct error *err);
 status store_file_find(struct store *store, const char *job_id, const char *name, struct file_row *row,
                        struct error *err);
+/* Finds a complete file with this SHA-256, and of this size (-1: any), in a job of the owner, the newest of several.
+ * STATUS_NOT_FOUND. */
+status store_file_known(struct store *store, const char *owner, const char *sha256, int64_t size_bytes,
+                        struct file_row *row, struct error *err);
 /* Writes offset, hash state, sha256 and state. STATUS_NOT_FOUND when the row no longer exists. */
 status store_file_update(struct store *store, const struct file_row *row, struct error *err);
 /* Removes a file and updates its job's row (NULL: no job) in one transaction. */

@@ -212,6 +212,7 @@ def test_not_a_selvedge_server(tmp_path):
 
 def test_upload_goes_on_after_broken_connections(daemon, sample):
     """The first connections break in the middle of the scan. The client asks for the offset and continues."""
+    (sample / "cloth.csv").write_text(f"set,{time.time()}\n")  # the server does not have it yet
     proxy = CuttingProxy(daemon.port, [500_000, 700_000, 400, 900_000])
     try:
         done = run(proxy.url, "submit", sample / "job.json", "--watch")

@@ -149,6 +149,8 @@ def test_every_operation_answers_as_documented(daemon, daemon_maker):
     call("uploadOffset", "HEAD", upload, headers=TUS)
     assert daemon.patch(upload, 0, b"0123456789").status_code == 204
     done.add("uploadBytes")
+    call("checkDocument", "POST", "/v1/check", json=DOCUMENT)
+    call("findInput", "GET", "/v1/inputs", params={"sha256": "0" * 64})
     call("listFiles", "GET", f"/v1/jobs/{draft}/files")
     call("getFile", "GET", f"/v1/jobs/{draft}/files/scan.tif")
     call("deleteFile", "DELETE", f"/v1/jobs/{draft}/files/scan.tif")

@@ -1,4 +1,5 @@
 """New jobs in a real browser: files that are chosen or dropped, the form, and uploads that break."""
+import hashlib
 import json
 import os
 
@@ -148,6 +149,7 @@ def test_pieces_are_no_larger_than_the_server_takes(browser, tmp_path):
 def test_submit_goes_on_with_its_job_after_a_broken_upload(stub, browser, tmp_path):
     url, folder = stub
     _, sample = submit(url, folder, "broken twill")
+    (sample / "scan.tif").write_bytes(b"a scan that the server does not have")
 
     def jobs():
         return [j.id for j in selvedge.Client(url).jobs()]
@@ -195,21 +197,21 @@ LARGE_SEED = 2 ** 60 + 1  # a double cannot hold it
 def test_copy_a_job_with_changes(stub, browser, tmp_path):
     """The form begins with the document of another job; its files are asked for; the other job stays as it is."""
     url, folder = stub
-    first, sample = submit(url, folder, "copied <b>twill")
+    first, _ = submit(url, folder, "copied <b>twill")
     first.wait()
     browser.get(f"{url}/#{first.id}")
     wait_for(browser, "document.querySelector('#state a.button')")
     click(browser, browser.find_element(By.CSS_SELECTOR, "#state a.button"))
-    wait_for(browser, "document.querySelector('.drop').textContent.includes('2 of 2 files are still missing')")
+    wait_for(browser, "document.querySelector('.drop').textContent.includes('Ready.')")
     assert browser.current_url.endswith(f"#new?copy={first.id}") and written(browser) == first.state().raw["document"]
     asked = text_of(browser, ".drop ul")
-    assert "scan.tif" in asked and "cloth.csv" in asked and "4 B in the copied job" in asked
+    assert "scan.tif" in asked and "cloth.csv" in asked and "4 B in the copied job, on the server already: it is not sent again" in asked
     assert "copied <b>twill" in text_of(browser, "#submit") and browser.find_elements(By.CSS_SELECTOR, "#submit p b") == []
     wait_for(browser, "document.querySelectorAll('#editor .options > *').length >= 9")
     fill_in(browser, "sample", "changed twill")
     fill_in(browser, "volume.voxel_size_um", "2.5")
     (tmp_path / "cloth.csv").write_text("another table\n")
-    drop_in(browser, sample / "scan.tif", tmp_path / "cloth.csv")
+    drop_in(browser, tmp_path / "cloth.csv")  # the scan is that of the copied job
     assert "another file: 4 B in the copied job" in text_of(browser, ".drop ul")
     keep(browser, "copy")
     with sized(browser, 375, 800):
@@ -221,6 +223,9 @@ def test_copy_a_job_with_changes(stub, browser, tmp_path):
     changed = {"sample": "changed twill", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.5}}
     assert made["id"] != first.id and made["document"] == {**first.state().raw["document"], **changed}
     assert first.state().raw["document"]["sample"] == "copied <b>twill"
+    inputs = {f["name"]: f["sha256"] for f in made["files"]}
+    assert inputs["scan.tif"] == {f["name"]: f["sha256"] for f in first.state().raw["files"]}["scan.tif"]
+    assert inputs["cloth.csv"] == hashlib.sha256(b"another table\n").hexdigest()
     assert complaints(browser) == []
 
 

@@ -164,7 +164,8 @@ def kills_at_everything(figures, tmp_path, seed):
                 alive = [j for j, state in known.items() if state is not None]
                 act = rng.choice(["create", "start", "cancel", "delete", "retry"]) if alive else "create"
                 if act == "create":
-                    known[d.ready_job(rng.choice(["succeed", "fail", "kill_once", "work 0.2"]))] = "draft"
+                    # by uploads, and by links to the inputs of an earlier job
+                    known[d.ready_job(rng.choice(["succeed", "fail", "kill_once", "work 0.2"]), checked=rng.random() < 0.5)] = "draft"
                     figures["facts"] += 1 + 2 * len(FILES)
                 else:
                     j = rng.choice(alive)

@@ -71,6 +71,10 @@ class Client:
         """Return an existing job."""
         return Job(self, job_id)
 
+    def has_input(self, sha256: str) -> bool:
+        """Tell whether a job of this user has an input with these bytes; uploading it to another job then sends nothing."""
+        return bool(self.request("GET", f"/v1/inputs?sha256={sha256}").json()["known"])
+
     def create(self, document: Document, key: Optional[str] = None) -> Job:
         """Create a draft from a job document. A key makes repeats of the call give the same job."""
         answer = self.request("POST", "/v1/jobs", json_body=document, headers={"Idempotency-Key": key or uuid.uuid4().hex})

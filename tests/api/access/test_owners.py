@@ -29,7 +29,7 @@ def shared(tmp_path_factory):
 
 def call(user, path, method, operation, job, upload):
     """A request that would succeed for its owner, as far as one request alone can."""
-    url = path.replace("{id}", job).replace("{upload}", upload).replace("{name}", "scan.tif").replace("{path}", "result.json")
+    url = path.replace("{id}", job).replace("{upload}", upload).replace("{name}", "scan.tif").replace("{path}", "result.json").replace("{version}", "1")
     more = {"headers": {}}
     if "{upload}" in path:
         more["headers"].update(TUS)

@@ -45,7 +45,7 @@ def test_every_reply_about_a_finished_job_is_as_the_description_says(schemathesi
         monkeypatch.setenv(name, value)
     with open(CONFIG) as f:
         text = f.read()
-    places = '"path.id" = "${SELVEDGE_JOB}"\n"path.name" = "${SELVEDGE_FILE}"\n"path.path" = "${SELVEDGE_RESULT}"\n'
+    places = '"path.id" = "${SELVEDGE_JOB}"\n"path.name" = "${SELVEDGE_FILE}"\n"path.path" = "${SELVEDGE_RESULT}"\n"path.version" = "1"\n'
     config = tmp_path / "schemathesis.toml"
     config.write_text(text + places)
     drive(schemathesis, daemon, config, "--include-method", "GET", "--include-path-regex", r"\{id\}", "--max-examples", "40")

@@ -27,6 +27,7 @@ class Service:
 
     def __init__(self, folder):
         self.d = d = Daemon(folder, options={"jobs.workers": 2}).start()
+        d.checked = False  # each job has bytes of its own, which can be damaged alone
         self.jobs = {}
         self.jobs["succeeded"] = d.create(document("series 20"), **KEY)
         for name, (role, data) in FILES.items():
@@ -215,6 +216,9 @@ def test_damaged_inputs_results_and_journals_are_told(daemon_maker):
         d.wait_state(job, "succeeded")
     d.stop()
     folder = os.path.join(d.data, "jobs")
+    os.remove(os.path.join(folder, damaged, "input", "scan.tif"))  # which is a link to the bytes that all have
+    shutil.copyfile(os.path.join(folder, good, "input", "scan.tif"), os.path.join(folder, damaged, "input", "scan.tif"))
+    os.chmod(os.path.join(folder, damaged, "input", "scan.tif"), 0o600)
     with open(os.path.join(folder, damaged, "input", "scan.tif"), "r+b") as f:
         f.write(b"X")
     os.remove(os.path.join(folder, lost, "results", "result.json"))

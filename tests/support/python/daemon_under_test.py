@@ -57,6 +57,8 @@ def wait_until(condition, timeout_s=20, what="the condition"):
 
 
 class Daemon:
+    checked = True  # whether files are declared with their SHA-256, by which jobs share the bytes that they have in common
+
     def __init__(self, folder, worker=FAKE_WORKER, options=None, environment=None, wrapper=None):
         self.data = str(folder)
         self.worker = worker
@@ -165,8 +167,8 @@ class Daemon:
         assert r.status_code == 201, r.text
         return r.json()["id"]
 
-    def declare(self, job, name, data, role="volume", checked=True):
-        declaration = {"name": name, "role": role, "size": len(data), "sha256": sha256(data) if checked else None}
+    def declare(self, job, name, data, role="volume", checked=None):
+        declaration = {"name": name, "role": role, "size": len(data), "sha256": sha256(data) if (self.checked if checked is None else checked) else None}
         r = self.post(f"/v1/jobs/{job}/files", json=declaration)
         assert r.status_code in (200, 201), r.text
         return r.json()
@@ -180,16 +182,20 @@ class Daemon:
         assert r.status_code == 200
         return int(r.headers["Upload-Offset"])
 
-    def upload(self, job, name, data, role="volume"):
-        url = self.declare(job, name, data, role)["upload_url"]
+    def upload(self, job, name, data, role="volume", checked=None):
+        """Declares and sends a file; with its SHA-256 only if the server does not have it yet."""
+        declared = self.declare(job, name, data, role, checked)
+        if declared["state"] == "complete":
+            return None
+        url = declared["upload_url"]
         r = self.patch(url, 0, data)
         assert r.status_code == 204, r.text
         return url
 
-    def ready_job(self, behaviour="succeed", **more):
+    def ready_job(self, behaviour="succeed", checked=None, **more):
         job = self.create(document(behaviour, **more))
         for name, (role, data) in FILES.items():
-            self.upload(job, name, data, role)
+            self.upload(job, name, data, role, checked)
         return job
 
     def start_job(self, behaviour="succeed", **more):

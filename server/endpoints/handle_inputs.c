@@ -1,0 +1,63 @@
+/* What a client may know before it sends something: what is wrong with a document, and which bytes are here already. */
+#include "optimizer/job/check/job_faults.h"
+#include "optimizer/job/job_document.h"
+#include "server/endpoints/handlers.h"
+#include "server/endpoints/request_json.h"
+#include "server/http/http_reply.h"
+#include "server/jobs/job_service.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static void add_file(void *context, const char *name, const char *role)
+{
+    json_array_append_new(context, json_pack("{s:s,s:s}", "name", name, "role", role));
+}
+
+/* Makes nothing; the answer to a document with faults is no error. */
+void handle_check_document(struct http_request *r)
+{
+    struct error err = {0};
+    struct job_document *doc = NULL;
+    json_t *body = request_json(r), *files = json_array();
+    if (body == NULL) {
+        json_decref(files);
+        return;
+    }
+    json_decref(body);
+    struct job_fault_list *list = calloc(1, sizeof *list);
+    if (list != NULL) job_document_inspect(r->body, r->n_body, &doc, list);
+    if (doc != NULL) job_document_visit_files(doc, add_file, files);
+    if (list == NULL) {
+        json_decref(files);
+        error_set(&err, STATUS_NO_MEMORY, "cannot check the document: out of memory");
+        reply_problem(r, NULL, &err, NULL);
+    } else
+        reply_json(r, MHD_HTTP_OK,
+                   json_pack("{s:b,s:o,s:o}", "valid", list->n == 0, "errors", job_faults_json(list), "files", files));
+    job_document_free(doc);
+    free(list);
+}
+
+void handle_find_input(struct http_request *r)
+{
+    struct error err = {0};
+    struct file_row file;
+    const char *sum = MHD_lookup_connection_value(r->connection, MHD_GET_ARGUMENT_KIND, "sha256");
+    if (sum == NULL || strlen(sum) != 64 || strspn(sum, "0123456789abcdef") != 64) {
+        error_set_field(&err, STATUS_INVALID, "sha256",
+                        "query parameter 'sha256' must be a SHA-256 of 64 hexadecimal digits in lower case");
+        reply_problem(r, NULL, &err, NULL);
+        return;
+    }
+    status s = store_file_known(r->service->store, r->grant.owner, sum, -1, &file, &err);
+    if (s != STATUS_OK && s != STATUS_NOT_FOUND)
+        reply_problem(r, NULL, &err, NULL);
+    else if (s == STATUS_NOT_FOUND)
+        reply_json(r, MHD_HTTP_OK,
+                   json_pack("{s:s,s:b,s:n,s:n,s:n}", "sha256", sum, "known", 0, "size", "job", "name"));
+    else
+        reply_json(r, MHD_HTTP_OK,
+                   json_pack("{s:s,s:b,s:I,s:s,s:s}", "sha256", sum, "known", 1, "size", (json_int_t)file.size_bytes,
+                             "job", file.job_id, "name", file.name));
+}
