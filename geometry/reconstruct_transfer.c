@@ -1,9 +1,10 @@
 /* Step "directions": gives voxels near a fiber its direction (fabric thesis, 5.6.7), and measures the share of
- * material explained. */
+ * material explained. Where the scan does not resolve single fibers, directions are averaged then. */
 #include "base/angle.h"
 #include "geometry/reconstruct.h"
 
 #include "geometry/fibers/lines/segment_bricks.h"
+#include "geometry/grade/unresolved_directions.h"
 #include "geometry/orientation/direction_noise.h"
 
 #include <math.h>
@@ -83,6 +84,16 @@ static void reduce(const struct transfer_job *job, size_t n_brick, struct recons
     report->direction_change_mean_deg = all.n_changed > 0 ? all.angle_deg / (double)all.n_changed : 0.0;
 }
 
+/* Averages directions where the lines are none that the scan shows. */
+static status average_unresolved(const struct fiber_set *f, struct direction_volume *d, struct thread_pool *pool,
+                                 const struct reconstruct_report *report, struct error *err)
+{
+    double sum_m = 0.0;
+    if (report->grade.verdict != GRADE_UNRESOLVED || f->n_fiber == 0) return STATUS_OK;
+    for (size_t i = 0; i < f->n_fiber; i++) sum_m += (double)f->radius_m[i];
+    return unresolved_directions_average(d, 2.0 * sum_m / (double)f->n_fiber / d->voxel_size_m[0], pool, NULL, err);
+}
+
 status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *d, struct thread_pool *pool,
                             const struct progress *progress, struct reconstruct_report *report, struct error *err)
 {
@@ -109,6 +120,7 @@ status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *
         if (s != STATUS_OK) error_set(err, s, "transferring directions was cancelled");
     }
     if (s == STATUS_OK) reduce(&job, n_brick, report);
+    if (s == STATUS_OK) s = average_unresolved(f, d, pool, report, err);
     if (s == STATUS_OK) s = direction_noise_measure(d, pool, NULL, &report->direction_noise_deg[1], err);
     free(job.distance2);
     free(job.nearest);

@@ -206,7 +206,6 @@ static status bench_weave_ct(const struct selection *select, struct error *err)
     struct volume v = {0};
     struct direction_volume d = {0};
     struct fiber_set f;
-    struct scan_grade grade;
     const char *path = scan;
     double accuracy = NAN, kept = NAN;
     fiber_set_init(&f);
@@ -218,18 +217,18 @@ static status bench_weave_ct(const struct selection *select, struct error *err)
     if (s == STATUS_OK) s = reconstruct_orientation(&v, &o, pool, NULL, &d, &r, err);
     if (s == STATUS_OK) s = reconstruct_fibers(&v, &d, &o, pool, NULL, &f, &r, err);
     float *safe = s == STATUS_OK ? malloc((f.n_fiber + 1) * sizeof *safe) : NULL;
-    if (s == STATUS_OK) s = scan_grade_measure(&v, &f, pool, NULL, &grade, safe, err);
-    if (s == STATUS_OK && grade.verdict == GRADE_UNRESOLVED) s = scan_grade_sort(&f, safe, &grade, err);
+    if (s == STATUS_OK) s = scan_grade_measure(&v, &f, pool, NULL, &r.grade, safe, err);
+    if (s == STATUS_OK && r.grade.verdict == GRADE_UNRESOLVED) s = scan_grade_sort(&f, safe, &r.grade, err);
     free(safe);
     if (s == STATUS_OK) s = reconstruct_transfer(&f, &d, pool, NULL, &r, err);
     if (s == STATUS_OK) s = weave_label_accuracy(&d, label, &accuracy, &kept, err);
     if (s == STATUS_OK && select->pictures != NULL) s = write_pictures(select->pictures, "weave_ct", &v, &f, err);
     if (s == STATUS_OK) {
-        print("weave_ct", "contrast", grade.contrast, "1", "lower");
-        print("weave_ct", "valley_depth", grade.valley_depth, "1", "lower");
-        print("weave_ct", "safe_share", grade.safe_share, "1", "lower");
+        print("weave_ct", "contrast", r.grade.contrast, "1", "lower");
+        print("weave_ct", "valley_depth", r.grade.valley_depth, "1", "lower");
+        print("weave_ct", "safe_share", r.grade.safe_share, "1", "lower");
         fprintf(stderr, "weave_ct: %zu fibers, %zu left out, %.1f %% of the labelled tow voxels kept\n", f.n_fiber,
-                grade.n_dropped, 100.0 * kept);
+                r.grade.n_dropped, 100.0 * kept);
         print("weave_ct", "axis_class_accuracy", accuracy, "1", "higher");
     }
     volume_release(&v);

@@ -1,6 +1,6 @@
 /* Direction transfer (fabric thesis 5.6.7) against distances computed here: a kept voxel within 2 r of the axis of a
  * fiber takes that fiber's direction, all others keep theirs; the share of fibers that is material counts voxels
- * within r. */
+ * within r. In a scan that does not resolve fibers, directions are means over those around. */
 #include "geometry/reconstruct.h"
 
 #include <math.h>
@@ -86,8 +86,43 @@ static void test_transfer(void **state)
     direction_volume_release(&d);
 }
 
+/* In a yarn along x of an unresolved scan one line crosses: its voxels take the yarn's direction, emptied ones stay
+ * empty, and a yarn along y that is far away keeps its own direction. In a resolved scan nothing is averaged. */
+static void test_unresolved(void **state)
+{
+    (void)state;
+    enum { N = 70, MIDDLE = N / 2 };
+    const size_t n[3] = {N, N, 20};
+    const float x_axis[3] = {1.0f, 0.0f, 0.0f}, y_axis[3] = {0.0f, 1.0f, 0.0f};
+    for (int unresolved = 0; unresolved < 2; unresolved++) {
+        struct reconstruct_report report = {.grade.verdict = unresolved ? GRADE_UNRESOLVED : GRADE_PARTLY};
+        struct fiber_set f;
+        struct direction_volume d;
+        make_fibers(&f);
+        for (size_t i = 0; i < f.n_vertex; i++) f.position_m[3 * i + 2] = -1.0f; /* far from all voxels */
+        assert_int_equal(direction_volume_init(&d, n, voxel_m, NULL), STATUS_OK);
+        for (size_t at = 0; at < volume_n_voxel(n); at++) {
+            const size_t x = at % N, y = at / N % N;
+            d.density[at] = x % 10 == 5 ? 0 : 200; /* some voxels are emptied */
+            direction_volume_set(&d, at, y >= MIDDLE || x / 3 == 10 ? y_axis : x_axis);
+        }
+        assert_int_equal(reconstruct_transfer(&f, &d, NULL, NULL, &report, NULL), STATUS_OK);
+        for (size_t at = 0; at < volume_n_voxel(n); at++) {
+            const size_t x = at % N, y = at / N % N;
+            float got[3];
+            assert_int_equal(d.density[at], x % 10 == 5 ? 0 : 200);
+            if (d.density[at] == 0 || (y + 8 > MIDDLE && y < MIDDLE + 8)) continue;
+            direction_volume_get(&d, at, got);
+            const bool along_y = y >= MIDDLE || (!unresolved && x / 3 == 10);
+            if (fabsf(got[along_y ? 1 : 0]) < 0.9999f) fail_msg("verdict %d, voxel x %zu, y %zu", unresolved, x, y);
+        }
+        fiber_set_release(&f);
+        direction_volume_release(&d);
+    }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_transfer)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_transfer), cmocka_unit_test(test_unresolved)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
