@@ -5,7 +5,7 @@ import { el } from "./page_parts.js";
 import { getJson } from "./server_link.js";
 
 // True when the document has a whole number above 2^53, as a seed may be. Writing it again would round it.
-function holdsLargeNumber(value) {
+export function holdsLargeNumber(value) {
   if (typeof value === "number") return Number.isInteger(value) && !Number.isSafeInteger(value);
   return typeof value === "object" && value !== null && Object.values(value).some(holdsLargeNumber);
 }

@@ -1,11 +1,12 @@
 // Drag and drop of a job document (*.json) and the files that it names. Files are uploaded by tus; uploads continue
 // after a broken connection.
 import { copiedJob } from "./copied_job.js";
-import { documentEditor } from "./document_editor.js";
+import { documentEditor, holdsLargeNumber } from "./document_editor.js";
 import { droppedFiles } from "./dropped_files.js";
 import { el, size } from "./page_parts.js";
 import { getJson, raw, sendJson } from "./server_link.js";
 import { LiveCheck, sha256 } from "./submit/live_check.js";
+import { RigPicker, rigOf } from "./submit/rig_picker.js";
 
 const PIECE = 8 << 20, MAX_TRY = 6;
 
@@ -103,6 +104,7 @@ export function submitPanel(handed = [], copy = null) {
     list.replaceChildren(...wanted().map((f) => el("li", {}, el("span", { class: "mono" }, f.name),
       el("span", {}, otherSize(f.name), " ", stateOf(f.name)))),
       ...(doc && unused.length ? [el("li", { class: "hint" }, `Not named by the document, so not sent: ${unused.slice(0, 6).join(", ")}${unused.length > 6 ? ` and ${unused.length - 6} more` : ""}`)] : []));
+    rig.show(doc, doc && holdsLargeNumber(doc) ? "Views cannot be chosen here: the document holds a whole number above 2^53." : null);
     allow();
     if (busy) return;
     if (doc && missing.length) say(`${missing.length} of ${wanted().length} files are still missing; drop them here.`);
@@ -118,12 +120,19 @@ export function submitPanel(handed = [], copy = null) {
   };
   const editor = documentEditor((now) => { use(now); show(); });
   const check = new LiveCheck(editor, () => show());
+  const rig = new RigPicker((now) => {
+    const text = JSON.stringify(now, null, 2);
+    use(text);
+    editor.show(text);
+    show();
+  });
   const take = async (files) => {
     for (const file of files) {
       dropped.set(file.name, file);
       if (!file.name.endsWith(".json")) check.file(file);
       if (!file.name.endsWith(".json")) continue;
-      const now = await file.text();
+      const now = await file.text(), described = rigOf(now);
+      if (described) { rig.use(file.name, described); check.file(file); continue; }
       try { use(now); } catch (error) { say(`${file.name}: ${error.message}`, true); return; } finally { editor.show(now); }
     }
     if (!doc) say("Drop the job document (.json) as well.");
@@ -139,6 +148,10 @@ export function submitPanel(handed = [], copy = null) {
       before = await copiedJob(copy);
       const safe = editor.load(before.source);
       use(safe);
+      if (doc.rig?.file && before.files.has(doc.rig.file)) {
+        const described = await raw("GET", `/v1/jobs/${before.id}/files/${doc.rig.file}`).then((answer) => answer.text()).then(rigOf).catch(() => null); // not complete
+        if (described) rig.use(doc.rig.file, described);
+      }
       from.append("A copy of ", el("a", { href: `#${before.id}` }, before.sample || "(no name)"), ". Change the document below, then submit it: the earlier job stays as it is.");
       show();
     } catch (error) { say(error.status === 404 ? `The job to copy is not there: ${error.message}` : error.message, true); }
@@ -182,5 +195,5 @@ export function submitPanel(handed = [], copy = null) {
     busy = false;
     allow();
   });
-  return el("section", { class: "card", id: "submit" }, el("h2", {}, copy === null ? "New job" : "New job, from another one"), from, drop, editor.node);
+  return el("section", { class: "card", id: "submit" }, el("h2", {}, copy === null ? "New job" : "New job, from another one"), from, drop, rig.node, editor.node);
 }
