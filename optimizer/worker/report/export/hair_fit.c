@@ -183,7 +183,7 @@ static status minimise(struct target *t, double best[N_UNKNOWN], struct error *e
         memcpy(x, start[k], sizeof start[k]);
         s = search(t, N_OF_LOBES, N_EVALUATION, x, &lowest, single, err);
     }
-    memcpy(single + N_OF_LOBES, single, N_OF_LOBES * sizeof *single); /* the same material twice */
+    for (int i = 0; i < N_OF_LOBES; i++) single[N_OF_LOBES + i] = single[i]; /* the same material twice */
     memcpy(best, single, sizeof single);
     for (int k = 0; k < N_SECOND && s == STATUS_OK; k++) {
         memcpy(x, single, sizeof single);
