@@ -4,6 +4,7 @@ import { fiberView } from "./fiber_view.js";
 import { fitDetails } from "./fit_details.js";
 import { JobCharts } from "./job_charts.js";
 import { LogTail, WholeLog } from "./log_tail.js";
+import { MendPanel, failedByInput } from "./mend/mend_panel.js";
 import { duration, el, isNumber, percent, percentWithError, refill, size, stateTag, timeLeft, verdictTag, when, withError } from "./page_parts.js";
 import { pairsCard } from "./pairs/pairs_card.js";
 import { qualityCard } from "./quality_card.js";
@@ -113,7 +114,7 @@ function downloads(job, list) {
 export function jobPage(page, id) {
   const head = el("div", { class: "head" }), stages = el("div", { class: "stages" }), facts = el("div", { class: "facts" }), verdict = el("div"), notes = el("div");
   const fitCard = el("div"), curveCard = el("div"), surfaces = el("div"), results = el("div", { id: "results" }), record = el("div"), versionsNode = el("div"), logNode = el("pre", { class: "log", tabIndex: 0, role: "region", "aria-label": "the last lines of the log" });
-  const charts = new JobCharts(fitCard, curveCard), log = new LogTail(logNode), pictures = new SurfacePictures(surfaces, id), versions = new VersionsCard(versionsNode, id);
+  const charts = new JobCharts(fitCard, curveCard), log = new LogTail(logNode), mend = new MendPanel(id, () => poller.wake()), pictures = new SurfacePictures(surfaces, id), versions = new VersionsCard(versionsNode, id);
   const wholeLog = el("details", { id: "whole-log", ontoggle: () => {
     if (!wholeLog.open || wholeLog.childElementCount > 1) return;
     const whole = new WholeLog(id);
@@ -121,7 +122,7 @@ export function jobPage(page, id) {
     whole.show(0);
   } }, el("summary", {}, "Whole log"));
   const curves = el("div", { class: "columns" }, card("Fit", fitCard), card("Parameters over the steps", curveCard));
-  page.append(el("section", { class: "card", id: "state" }, head, stages, verdict, facts, notes),
+  page.append(el("section", { class: "card", id: "state" }, head, stages, verdict, facts, notes, mend.node),
     curves, surfaces, results, versionsNode, record,
     el("section", { class: "card" }, el("h2", {}, "Log ", el("small", {}, "its last lines")), logNode, wholeLog));
   let about = null, generation = null, closeFibers = null, closeTwin = null, closePairs = null, gone = false;
@@ -140,7 +141,7 @@ export function jobPage(page, id) {
   const buttons = (job) => [
     job.state === "draft" && !job.missing_files.length ? el("button", { class: "main", onclick: act("start") }, "Start") : null,
     LIVE.has(job.state) ? el("button", { onclick: act("cancel"), disabled: job.cancel_requested }, job.cancel_requested ? "Stopping ..." : "Cancel") : null,
-    job.state === "failed" || job.state === "cancelled" ? el("button", { class: "main", onclick: act("retry") }, "Retry from checkpoint") : null,
+    job.state === "failed" || job.state === "cancelled" ? el("button", { class: failedByInput(job) ? "" : "main", onclick: act("retry") }, "Retry from checkpoint") : null,
     el("a", { class: "button", href: `#new?copy=${id}` }, "Copy with changes"),
     LIVE.has(job.state) ? null : el("button", { onclick: act("delete") }, "Delete"),
   ];
@@ -195,7 +196,7 @@ export function jobPage(page, id) {
     if (gone) return 5;
     document.title = `${job.state === "running" ? `${Math.round(100 * job.fraction)} % ` : ""}${job.sample} – Selvedge`;
     if (job.generation !== generation) { generation = job.generation; log.reset(); pictures.reset(); results.replaceChildren(); closeFibers?.(); closeTwin?.(); closePairs?.(); closeFibers = closeTwin = closePairs = null; }
-    refill(head, [job.sample, job.state, job.cancel_requested, job.missing_files], () => [el("h1", {}, job.sample), stateTag(job.state), el("span", { class: "space" }), ...buttons(job)]);
+    refill(head, [job.sample, job.state, job.error?.code, job.cancel_requested, job.missing_files], () => [el("h1", {}, job.sample), stateTag(job.state), el("span", { class: "space" }), ...buttons(job)]);
     refill(stages, [job.state, job.i_stage, job.stage_fraction], () => stagesOf(job, about.stages));
     refill(facts, [job.state, job.message, job.fraction, job.eta_s, job.step, job.objective, job.attempt, job.peak_rss_bytes, job.finished_unix_s], () => factsOf(job));
     refill(verdict, job.verdict, () => [verdictOf(job.verdict)]);
@@ -203,6 +204,7 @@ export function jobPage(page, id) {
     refill(record, [job.state, job.generation, job.attempt, job.finished_unix_s, job.missing_files, job.document, job.result_url, job.files], () => [jobRecord(job, about)]);
     curves.hidden = !job.document?.photographs && !job.document?.measurements; // nothing is fitted
     await charts.update(job);
+    await mend.update(job);
     await log.update(id);
     await pictures.update(job);
     await versions.update(job);

@@ -197,3 +197,5 @@ export function submitPanel(handed = [], copy = null) {
   });
   return el("section", { class: "card", id: "submit" }, el("h2", {}, copy === null ? "New job" : "New job, from another one"), from, drop, rig.node, editor.node);
 }
+
+export { declare, filesOf, pieceBytes, removeFile, upload };
