@@ -182,7 +182,7 @@ def test_a_cylinder_thinner_than_the_cloth_is_refused(real):
     ({"on": "flat", **VIEW, "light_theta_deg": 120}, "pictures[0].light_theta_deg", "black_sheet"),
     ({"on": "flat", **VIEW, "light_theta_deg": 90, "black_sheet": False}, "pictures[0].light_theta_deg", "below 90"),
     ({"on": "drape", **VIEW, "size_mm": 40, "radius_mm": 0.5}, "pictures[0].radius_mm", "0.8 to 400 mm"),
-    ({"on": "mesh", "mesh_file": "a.png", **VIEW}, "pictures", "a mesh: .obj")])
+    ({"on": "mesh", "mesh_file": "a.png", **VIEW}, "pictures[0].mesh_file", "a mesh: .obj")])
 def test_bad_pictures_are_refused_at_submission(real, picture, field, word):
     assert word in problem(real.post("/v1/jobs", json=document(picture)), 422, "invalid", field)["detail"]
 

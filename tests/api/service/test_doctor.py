@@ -6,7 +6,7 @@ import shutil
 import subprocess
 
 import pytest
-from daemon_under_test import FILES, Daemon, document, program
+from daemon_under_test import Daemon, document, program
 from small_cloth import TABLE
 
 CLOTH = {"sample": "described", "cloth": {"weave": "plain"}, "measurements": {"file": "rows.csv"}}
@@ -31,7 +31,7 @@ def kept(tmp_path_factory):
     with Daemon(tmp_path_factory.mktemp("doctor") / "data") as d:
         d.wait_state(d.start_job("series 20"), "succeeded")
         d.draft = d.create(document("draft"))
-        d.declare(d.draft, "scan.tif", FILES["scan.tif"][1])
+        d.declare(d.draft, "scan.tif", b"bytes that no other job has")
         d.done = d.get("/v1/jobs").json()["jobs"][1]["id"]
     return d
 
