@@ -42,13 +42,13 @@ static bool has_result(const struct job_service *v, const char *id, const char *
     return lstat(path, st) == 0 && S_ISREG(st->st_mode);
 }
 
-/* Fills *number with the numbers of the kept versions, ascending; the caller frees it. */
 static int by_number(const void *a, const void *b)
 {
     int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
     return (x > y) - (x < y);
 }
 
+/* Fills *number with the numbers of the kept versions, ascending, and room for one more; the caller frees it. */
 static status kept_numbers(const struct job_service *v, const char *id, int64_t **number, size_t *n, struct error *err)
 {
     char path[PATH_BYTES], folder[VERSION_FOLDER_BYTES];
