@@ -96,7 +96,8 @@ static status straighten(struct trace_job *job, struct polyline_set *lines, bool
     }
     if (s == STATUS_OK && last)
         s = polylines_trim_disagreeing(lines, job->d, TRACE_DISAGREEMENT_RAD,
-                                       (size_t)(TRACE_END_DIAMETERS * job->diameter + 0.5), min_vertex, &out, err);
+                                       (size_t)(TRACE_END_DIAMETERS * job->diameter + 0.5), min_vertex, job->pool, &out,
+                                       err);
     if (s == STATUS_OK && last) {
         polyline_set_release(lines);
         *lines = out;

@@ -76,10 +76,11 @@ status trace_repair(struct trace_job *job, struct polyline_set *in, bool grow, d
     polyline_set_init(&agreeing);
     polyline_set_init(&single);
     polyline_set_init(&grown);
-    status s = polylines_cut_disagreeing(in, job->d, TRACE_DISAGREEMENT_RAD, TRACE_MIN_PIECE, &agreeing, &n_cut, err);
+    status s = polylines_cut_disagreeing(in, job->d, TRACE_DISAGREEMENT_RAD, TRACE_MIN_PIECE, job->pool, &agreeing,
+                                         &n_cut, err);
     if (s == STATUS_OK)
-        s = polylines_remove_duplicates(&agreeing, job->v->n, job->diameter, touching, TRACE_MIN_PIECE, &single, counts,
-                                        err);
+        s = polylines_remove_duplicates(&agreeing, job->v->n, job->diameter, touching, TRACE_MIN_PIECE, job->pool,
+                                        &single, counts, err);
     if (s == STATUS_OK && grow) s = polylines_grow(&single, job->v, &option, &grown, &n_grown, err);
     if (s == STATUS_OK)
         s = polylines_join(grow ? &grown : &single, job->v, job->diameter, job->o->eps_d, out, counts, err);

@@ -3,9 +3,10 @@
 
 #include <math.h>
 #include <stdbool.h>
+#include <stdint.h>
 #include <stdlib.h>
 
-enum { REACH = 4 };
+enum { REACH = 4, LINES = 32 };    /* LINES: lines in a task */
 static const float OVERLAP = 0.9f; /* share of the sum of the radii */
 
 /* Squared sine of the angle at vertex i; negative if the voxel is empty. */
@@ -34,15 +35,20 @@ struct disagreement {
     const struct direction_volume *d;
     struct vertex_grid grid;
     float limit, most; /* squared sine; largest radius */
-    float *value;      /* of the vertices of one line */
+    float *value;      /* squared sine of every vertex; negative where it is not known */
+    bool *wrong;       /* of every vertex within reach of an end of its line */
+    size_t reach;      /* vertices from the ends */
 };
 
 static status disagreement_init(struct disagreement *w, const struct polyline_set *lines,
-                                const struct direction_volume *d, double max_angle_rad, struct error *err)
+                                const struct direction_volume *d, double max_angle_rad, size_t reach, struct error *err)
 {
-    *w = (struct disagreement){.lines = lines, .d = d, .limit = (float)(sin(max_angle_rad) * sin(max_angle_rad))};
+    *w = (struct disagreement){
+        .lines = lines, .d = d, .limit = (float)(sin(max_angle_rad) * sin(max_angle_rad)), .reach = reach};
     w->value = malloc((lines->n_vertex + 1) * sizeof *w->value);
-    if (w->value == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot check fibers: out of memory");
+    w->wrong = malloc((lines->n_vertex + 1) * sizeof *w->wrong);
+    if (w->value == NULL || w->wrong == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot check fibers: out of memory");
     for (size_t l = 0; l < lines->n_line; l++) w->most = fmaxf(w->most, lines->radius[l]);
     return vertex_grid_init(&w->grid, lines, d->n, fmaxf(3.0f, 2.0f * w->most), err);
 }
@@ -51,42 +57,55 @@ static void disagreement_release(struct disagreement *w)
 {
     vertex_grid_release(&w->grid);
     free(w->value);
+    free(w->wrong);
 }
 
-/* Prepares w->value for a line. */
-static void measure_line(const struct disagreement *w, size_t line)
-{
-    scratch_keep_within(w->d->space);
-    for (size_t i = 0, n = polyline_length(w->lines, line); i < n; i++)
-        w->value[i] = sine2(w->lines, line, w->lines->first[line] + i, w->d);
-}
-
-/* Whether vertex i of a measured line, counted from its first one, disagrees and lies in another fiber. */
+/* Whether vertex i of a line whose values are known, counted from its first one, disagrees and lies in another fiber. */
 static bool is_wrong(const struct disagreement *w, size_t line, size_t i)
 {
     const size_t n = polyline_length(w->lines, line);
+    const float *value = w->value + w->lines->first[line];
     float sum = 0.0f, weight = 0.0f;
     for (size_t k = i >= REACH ? i - REACH : 0; k <= i + REACH && k < n; k++)
-        if (w->value[k] >= 0.0f) {
-            sum += w->value[k];
+        if (value[k] >= 0.0f) {
+            sum += value[k];
             weight += 1.0f;
         }
     return weight > 0.0f && sum > w->limit * weight &&
            polyline_is_overlapped(w->lines, &w->grid, line, w->lines->first[line] + i, OVERLAP, w->most);
 }
 
+static void check_lines(void *context, size_t i_task, size_t i_thread)
+{
+    (void)i_thread;
+    const struct disagreement *w = context;
+    scratch_keep_within(w->d->space);
+    for (size_t l = i_task * LINES; l < w->lines->n_line && l < (i_task + 1) * LINES; l++) {
+        const size_t first = w->lines->first[l], n = polyline_length(w->lines, l);
+        for (size_t i = 0; i < n; i++) w->value[first + i] = sine2(w->lines, l, first + i, w->d);
+        for (size_t i = 0; i < n; i++)
+            if (i < w->reach || n - 1 - i < w->reach) w->wrong[first + i] = is_wrong(w, l, i);
+    }
+}
+
+/* Finds the wrong vertices of all lines. */
+static status check_all(struct disagreement *w, struct thread_pool *pool)
+{
+    return thread_pool_run(pool, (w->lines->n_line + LINES - 1) / LINES, check_lines, w, NULL);
+}
+
 status polylines_cut_disagreeing(const struct polyline_set *lines, const struct direction_volume *d,
-                                 double max_angle_rad, size_t min_vertex, struct polyline_set *result, size_t *n_cut,
-                                 struct error *err)
+                                 double max_angle_rad, size_t min_vertex, struct thread_pool *pool,
+                                 struct polyline_set *result, size_t *n_cut, struct error *err)
 {
     struct disagreement w;
-    status s = disagreement_init(&w, lines, d, max_angle_rad, err);
+    status s = disagreement_init(&w, lines, d, max_angle_rad, SIZE_MAX, err);
     *n_cut = 0;
+    if (s == STATUS_OK) s = check_all(&w, pool);
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
         size_t n = polyline_length(lines, l), run = 0;
-        measure_line(&w, l);
         for (size_t i = 0; i <= n && s == STATUS_OK; i++) {
-            if (i < n && !is_wrong(&w, l, i)) continue;
+            if (i < n && !w.wrong[lines->first[l] + i]) continue;
             if (i - run >= min_vertex)
                 s = polyline_add_part(result, lines, l, lines->first[l] + run, lines->first[l] + i, err);
             *n_cut += i < n;
@@ -98,18 +117,18 @@ status polylines_cut_disagreeing(const struct polyline_set *lines, const struct 
 }
 
 status polylines_trim_disagreeing(const struct polyline_set *lines, const struct direction_volume *d,
-                                  double max_angle_rad, size_t reach, size_t min_vertex, struct polyline_set *result,
-                                  struct error *err)
+                                  double max_angle_rad, size_t reach, size_t min_vertex, struct thread_pool *pool,
+                                  struct polyline_set *result, struct error *err)
 {
     struct disagreement w;
-    status s = disagreement_init(&w, lines, d, max_angle_rad, err);
+    status s = disagreement_init(&w, lines, d, max_angle_rad, reach, err);
+    if (s == STATUS_OK) s = check_all(&w, pool);
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
         size_t n = polyline_length(lines, l), begin = lines->first[l], from = 0, to = n;
-        measure_line(&w, l);
         for (size_t i = 0; i < n && i < reach; i++) {
             size_t k = n - 1 - i;
-            if (is_wrong(&w, l, i)) from = i + 1;
-            if (is_wrong(&w, l, k)) to = k;
+            if (w.wrong[begin + i]) from = i + 1;
+            if (w.wrong[begin + k]) to = k;
         }
         if (to >= from + min_vertex) s = polyline_add_part(result, lines, l, begin + from, begin + to, err);
     }

@@ -3,6 +3,7 @@
 #ifndef SELVEDGE_GEOMETRY_DISAGREEMENT_H
 #define SELVEDGE_GEOMETRY_DISAGREEMENT_H
 
+#include "base/thread_pool.h"
 #include "geometry/fibers/lines/polyline.h"
 #include "geometry/volume/volume.h"
 
@@ -12,12 +13,12 @@
  * of at least min_vertex vertices go to result (initialised, empty). *n_cut: number of vertices removed.
  * STATUS_NO_MEMORY. */
 status polylines_cut_disagreeing(const struct polyline_set *lines, const struct direction_volume *d,
-                                 double max_angle_rad, size_t min_vertex, struct polyline_set *result, size_t *n_cut,
-                                 struct error *err);
+                                 double max_angle_rad, size_t min_vertex, struct thread_pool *pool,
+                                 struct polyline_set *result, size_t *n_cut, struct error *err);
 /* The same only at the ends: removes from each end of a line up to the last such vertex within `reach` vertices of it.
  * STATUS_NO_MEMORY. */
 status polylines_trim_disagreeing(const struct polyline_set *lines, const struct direction_volume *d,
-                                  double max_angle_rad, size_t reach, size_t min_vertex, struct polyline_set *result,
-                                  struct error *err);
+                                  double max_angle_rad, size_t reach, size_t min_vertex, struct thread_pool *pool,
+                                  struct polyline_set *result, struct error *err);
 
 #endif

@@ -6,6 +6,7 @@
 
 /* Vertices to both sides from which a tangent is taken. */
 enum { REACH = 2 };
+enum { LINES = 32 }; /* lines in a task */
 
 /* Line a has precedence over b: it is longer, or the earlier one of equals. */
 static bool wins(const struct polyline_set *p, size_t a, size_t b)
@@ -32,16 +33,21 @@ struct duplicate_search {
     float usual, most, touching; /* radius where it is not known; largest near_distance; joining.h */
 };
 
-/* Returns whether vertex `other` of another line passes within near_distance of x, where `line` has tangent t. */
+/* Returns whether vertex `other` of another line passes within near_distance of x, where `line` has tangent t. Most
+ * vertices are too far away to ask for their tangent. */
 static bool passes(const struct duplicate_search *s, size_t line, const float x[3], const float t[3], size_t other)
 {
     size_t other_line = s->grid.line_of[other];
+    const float widest = near_distance(s->p, other_line, line, s->usual, s->touching);
     float d[3], u[3], along = 0.0f, square = 0.0f, cosine = 0.0f;
-    polyline_tangent(s->p, other_line, other, REACH, u);
     for (int a = 0; a < 3; a++) {
         d[a] = x[a] - s->p->vertex[other][a];
-        along += d[a] * u[a];
         square += d[a] * d[a];
+    }
+    if (square > widest * widest + 1.0f) return false;
+    polyline_tangent(s->p, other_line, other, REACH, u);
+    for (int a = 0; a < 3; a++) {
+        along += d[a] * u[a];
         cosine += t[a] * u[a];
     }
     float near = near_distance(s->p, other_line, line, s->usual, fabsf(cosine) > BESIDE ? s->touching : 0.0f);
@@ -69,27 +75,41 @@ static bool is_duplicate(const struct duplicate_search *s, size_t line, size_t i
     return false;
 }
 
+struct mark_job {
+    const struct duplicate_search *search;
+    bool *mark;
+};
+
+static void mark_lines(void *context, size_t i_task, size_t i_thread)
+{
+    (void)i_thread;
+    const struct mark_job *job = context;
+    const struct polyline_set *p = job->search->p;
+    for (size_t l = i_task * LINES; l < p->n_line && l < (i_task + 1) * LINES; l++)
+        for (size_t i = p->first[l]; i < p->first[l + 1]; i++) job->mark[i] = is_duplicate(job->search, l, i);
+}
+
 status polylines_mark_duplicates(const struct polyline_set *lines, const size_t n_voxel[3], double diameter_voxel,
-                                 double touching, bool *mark, struct error *err)
+                                 double touching, struct thread_pool *pool, bool *mark, struct error *err)
 {
     struct duplicate_search search = {.p = lines, .usual = (float)(0.5 * diameter_voxel), .touching = (float)touching};
+    struct mark_job job = {&search, mark};
     search.most = fmaxf(1.0f, search.usual);
     for (size_t l = 0; l < lines->n_line; l++) search.most = fmaxf(search.most, lines->radius[l]);
     search.most *= fmaxf(1.0f, 2.0f * search.touching);
     status s = vertex_grid_init(&search.grid, lines, n_voxel, (float)fmax(3.0, diameter_voxel), err);
-    for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++)
-        for (size_t i = lines->first[l]; i < lines->first[l + 1]; i++) mark[i] = is_duplicate(&search, l, i);
+    if (s == STATUS_OK) s = thread_pool_run(pool, (lines->n_line + LINES - 1) / LINES, mark_lines, &job, NULL);
     vertex_grid_release(&search.grid);
     return s;
 }
 
 status polylines_remove_duplicates(const struct polyline_set *lines, const size_t n_voxel[3], double diameter_voxel,
-                                   double touching, size_t min_vertex, struct polyline_set *result,
-                                   struct join_counts *counts, struct error *err)
+                                   double touching, size_t min_vertex, struct thread_pool *pool,
+                                   struct polyline_set *result, struct join_counts *counts, struct error *err)
 {
     bool *mark = malloc((lines->n_vertex + 1) * sizeof *mark);
     if (mark == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot look for duplicates of fibers: out of memory");
-    status s = polylines_mark_duplicates(lines, n_voxel, diameter_voxel, touching, mark, err);
+    status s = polylines_mark_duplicates(lines, n_voxel, diameter_voxel, touching, pool, mark, err);
     if (s == STATUS_OK) s = polylines_without(lines, mark, min_vertex, result, NULL, err);
     counts->n_duplicate = 0;
     for (size_t i = 0; i < lines->n_vertex && s == STATUS_OK; i++) counts->n_duplicate += mark[i];
@@ -111,13 +131,14 @@ bool polyline_is_overlapped(const struct polyline_set *p, const struct vertex_gr
                     size_t other = g->vertex[e], other_line = g->line_of[other];
                     if (other_line == line) continue;
                     float near = share * (p->radius[line] + p->radius[other_line]);
-                    float s[3], along = 0.0f, square = 0.0f;
-                    polyline_tangent(p, other_line, other, REACH, s);
+                    float d[3], s[3], along = 0.0f, square = 0.0f;
                     for (int a = 0; a < 3; a++) {
-                        float d = x[a] - p->vertex[other][a];
-                        along += d * s[a];
-                        square += d * d;
+                        d[a] = x[a] - p->vertex[other][a];
+                        square += d[a] * d[a];
                     }
+                    if (square > near * near + 1.01f) continue; /* too far, whatever the tangent is */
+                    polyline_tangent(p, other_line, other, REACH, s);
+                    for (int a = 0; a < 3; a++) along += d[a] * s[a];
                     if (along * along <= 1.0f && square - along * along < near * near) return true;
                 }
             }

@@ -9,6 +9,7 @@
 #ifndef SELVEDGE_GEOMETRY_JOINING_H
 #define SELVEDGE_GEOMETRY_JOINING_H
 
+#include "base/thread_pool.h"
 #include "geometry/fibers/lines/polyline.h"
 #include "geometry/volume/volume.h"
 
@@ -23,12 +24,12 @@ struct join_counts {
  * eps_d: density that counts as material. touching: distance of the
  * axes of two fibers that run beside each other, over the sum of their radii, below which they are one; 0 while radii
  * are not known well. min_vertex: pieces that are shorter after the removal of duplicates are dropped.
- * STATUS_NO_MEMORY. */
+ * pool NULL: one thread. STATUS_NO_MEMORY. */
 status polylines_mark_duplicates(const struct polyline_set *lines, const size_t n_voxel[3], double diameter_voxel,
-                                 double touching, bool *mark, struct error *err);
+                                 double touching, struct thread_pool *pool, bool *mark, struct error *err);
 status polylines_remove_duplicates(const struct polyline_set *lines, const size_t n_voxel[3], double diameter_voxel,
-                                   double touching, size_t min_vertex, struct polyline_set *result,
-                                   struct join_counts *counts, struct error *err);
+                                   double touching, size_t min_vertex, struct thread_pool *pool,
+                                   struct polyline_set *result, struct join_counts *counts, struct error *err);
 /* Returns whether another line passes beside vertex i of `line` within `share` of the sum of their radii; the axes of
  * touching fibers are at 1. most: largest radius of a line. */
 bool polyline_is_overlapped(const struct polyline_set *p, const struct vertex_grid *g, size_t line, size_t i,

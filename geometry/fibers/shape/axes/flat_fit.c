@@ -75,10 +75,10 @@ static void measure_ratio(const struct flat_work *w, struct section_ratio *ratio
 }
 
 /* Makes the lines without suspects. */
-static status find_rest(struct flat_work *w, const size_t n_voxel[3], double diameter, struct error *err)
+static status find_rest(struct flat_work *w, const struct flat_fit *f, struct error *err)
 {
     const struct polyline_set *lines = w->lines;
-    status s = polylines_mark_duplicates(lines, n_voxel, diameter, SUSPECT, w->suspect, err);
+    status s = polylines_mark_duplicates(lines, f->v->n, f->diameter_voxel, SUSPECT, f->pool, w->suspect, err);
     if (s == STATUS_OK) s = polylines_without(lines, w->suspect, LEAST_PIECE, &w->rest, w->origin, err);
     for (size_t k = 0; s == STATUS_OK && k < w->rest.n_vertex; k++) w->rest_section[k] = w->section[w->origin[k]];
     return s;
@@ -174,7 +174,7 @@ static status remove_parts(struct flat_work *w, const struct flat_fit *f, const 
     struct polyline_set kept;
     polyline_set_init(&kept);
     trial.section = w->rest_section;
-    status s = find_rest(w, f->v->n, f->diameter_voxel, err);
+    status s = find_rest(w, f, err);
     if (s != STATUS_OK || w->rest.n_vertex == w->lines->n_vertex) return s; /* there are no suspects */
     s = polylines_fit(&w->rest, f->v, f->diameter_voxel, N_WITHOUT, &trial, f->pool, f->progress, err);
     if (s == STATUS_OK) s = decide(w, f->v->n, n_removed, err);
