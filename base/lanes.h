@@ -22,6 +22,42 @@ static inline lanes lanes_sqrt(lanes x)
     return x;
 }
 
+/* Four floats that lie beside each other, such as the numbers of one voxel. */
+typedef float lane_row __attribute__((vector_size(4 * sizeof(float)), aligned(sizeof(float)), may_alias));
+
+/* Turns LANES rows of four floats into four vectors: float k of row l becomes lane l of vector k. */
+static inline void lanes_of_rows(const lane_row row[LANES], lanes of[4])
+{
+    lanes a[4], low[2], high[2];
+    for (int i = 0; i < 4; i++) a[i] = __builtin_shufflevector(row[i], row[i + 4], 0, 1, 2, 3, 4, 5, 6, 7);
+    for (int i = 0; i < 2; i++) {
+        low[i] = __builtin_shufflevector(a[2 * i], a[2 * i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+        high[i] = __builtin_shufflevector(a[2 * i], a[2 * i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+    }
+    of[0] = __builtin_shufflevector(low[0], low[1], 0, 1, 8, 9, 4, 5, 12, 13);
+    of[1] = __builtin_shufflevector(low[0], low[1], 2, 3, 10, 11, 6, 7, 14, 15);
+    of[2] = __builtin_shufflevector(high[0], high[1], 0, 1, 8, 9, 4, 5, 12, 13);
+    of[3] = __builtin_shufflevector(high[0], high[1], 2, 3, 10, 11, 6, 7, 14, 15);
+}
+
+/* The inverse of lanes_of_rows. */
+static inline void lanes_to_rows(const lanes of[4], lane_row row[LANES])
+{
+    lanes low[2], high[2], a[4];
+    for (int i = 0; i < 2; i++) {
+        low[i] = __builtin_shufflevector(of[2 * i], of[2 * i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+        high[i] = __builtin_shufflevector(of[2 * i], of[2 * i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+    }
+    a[0] = __builtin_shufflevector(low[0], low[1], 0, 1, 8, 9, 4, 5, 12, 13);
+    a[1] = __builtin_shufflevector(low[0], low[1], 2, 3, 10, 11, 6, 7, 14, 15);
+    a[2] = __builtin_shufflevector(high[0], high[1], 0, 1, 8, 9, 4, 5, 12, 13);
+    a[3] = __builtin_shufflevector(high[0], high[1], 2, 3, 10, 11, 6, 7, 14, 15);
+    for (int i = 0; i < 4; i++) {
+        row[i] = __builtin_shufflevector(a[i], a[i], 0, 1, 2, 3);
+        row[i + 4] = __builtin_shufflevector(a[i], a[i], 4, 5, 6, 7);
+    }
+}
+
 static inline float lanes_sum(lanes x) { return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7])); }
 
 #endif

@@ -92,18 +92,18 @@ static void find_places(const struct axis_view *w, const uint16_t *cell, size_t 
     for (int a = 0; a < 3; a++) p->normal[a] = offset[a] * inverse;
 }
 
-/* Entries of the table at places (axis_table_place), 0 beyond its end. */
-static lanes look_up(const float table[AXIS_N_TABLE + 2], lanes at)
+/* Share and slope of the table at places (axis_table_place), 0 beyond its end. */
+static void look_up(const struct axis_table *t, lanes at, lanes *share, lanes *slope)
 {
-    lanes low, high, f;
-    for (int l = 0; l < LANES; l++) {
-        const int i = (int)at[l] < AXIS_N_TABLE ? (int)at[l] : AXIS_N_TABLE;
-        f[l] = (float)i;
-        low[l] = table[i];
-        high[l] = table[i + 1];
-    }
-    const lanes value = low + (at - f) * (high - low), zero = {0.0f};
-    return lanes_choose(at < (float)AXIS_N_TABLE, value, zero);
+    const lanes zero = {0.0f}, last = zero + (float)AXIS_N_TABLE;
+    const lane_mask within = at < last, i = __builtin_convertvector(lanes_choose(within, at, last), lane_mask);
+    const lanes part = at - __builtin_convertvector(i, lanes);
+    lane_row row[LANES];
+    lanes of[4]; /* share and slope of the entry, and of the next one */
+    for (int l = 0; l < LANES; l++) row[l] = *(const lane_row *)t->entry[i[l]];
+    lanes_of_rows(row, of);
+    *share = lanes_choose(within, of[0] + part * (of[2] - of[0]), zero);
+    *slope = lanes_choose(within, of[1] + part * (of[3] - of[1]), zero);
 }
 
 static lanes place_in_table(const struct axis_table *t, lanes depth)
@@ -120,13 +120,13 @@ static void add_to_model(const struct axis_model *m, struct axis_scratch *s, con
         struct axis_places p;
         find_places(w, s->claims.cell + i, to - i, &p);
         const lanes depth = p.depth * m->inverse_blur, at = place_in_table(&m->table, depth);
-        const lanes share = look_up(m->table.share, at), slope = look_up(m->table.slope, at) * m->inverse_blur;
-        const lanes by_radius = slope * p.by_radius, by_blur = slope * depth;
-        for (size_t l = 0; l < p.n; l++) {
-            s->share[p.cell[l]] += share[l];
-            s->by_radius[p.cell[l]] += by_radius[l];
-            s->by_blur[p.cell[l]] -= by_blur[l];
-        }
+        lanes share, slope;
+        look_up(&m->table, at, &share, &slope);
+        slope *= m->inverse_blur;
+        const lanes zero = {0.0f}, add[4] = {share, slope * p.by_radius, -(slope * depth), zero};
+        lane_row row[LANES];
+        lanes_to_rows(add, row);
+        for (size_t l = 0; l < p.n; l++) s->model[p.cell[l]] += row[l];
     }
 }
 
@@ -141,19 +141,21 @@ static void compare_lanes(const struct axis_model *m, struct axis_scratch *s, si
 {
     static const lanes step = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
     const float low = (float)m->profile.low, amplitude = (float)(m->profile.high - m->profile.low);
-    lanes value = {0.0f}, zero = {0.0f}, one = zero + 1.0f, *share = (lanes *)(s->share + at);
+    lanes value = {0.0f}, zero = {0.0f}, one = zero + 1.0f, of[4];
+    lanes_of_rows(s->model + at, of);
+    const lane_mask near = (of[0] > zero) & (step < (float)n);
     if (n >= LANES)
         value = *(const lanes *)density;
     else
         memcpy(&value, density, n * sizeof *density);
-    const lane_mask near = (*share > zero) & (step < (float)n);
-    *share = lanes_choose(*share < one, *share, one);
-    const lanes e = value - low - amplitude * *share, q = one / (one + e * e / (OUTLIER * OUTLIER));
+    const lanes share = lanes_choose(of[0] < one, of[0], one), e = value - low - amplitude * share,
+                q = one / (one + e * e / (OUTLIER * OUTLIER));
     const lanes weight = lanes_choose(near, q * q, zero), weighted = weight * e;
     *(lanes *)(s->weight + at) = weight;
-    *(lanes *)(s->residual + at) = weighted;
-    const lanes by[4] = {amplitude * *(const lanes *)(s->by_radius + at), amplitude * *(const lanes *)(s->by_blur + at),
-                         one - *share, *share};
+    const lanes by[4] = {amplitude * of[1], amplitude * of[2], one - share, share};
+    of[0] = share;
+    of[3] = weighted;
+    lanes_to_rows(of, s->model + at);
     sum->square += weighted * e;
     sum->weight += weight;
     for (int a = 0, i = 0; a < 4; a++) {
@@ -214,9 +216,12 @@ static struct voxel_lanes voxels_of(const struct axis_scratch *s, const struct a
     static const lanes step = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
     const lane_mask counts = (step < (float)p->n) & (p->distance > ON_AXIS);
     const lanes zero = {0.0f};
+    lane_row row[LANES];
+    lanes of[4];
+    for (int l = 0; l < LANES; l++) row[l] = s->model[p->cell[l]];
+    lanes_of_rows(row, of);
     return (struct voxel_lanes){lanes_choose(counts, gather(s->weight, p->cell), zero),
-                                lanes_choose(counts, gather(s->residual, p->cell), zero), gather(s->share, p->cell),
-                                gather(s->by_radius, p->cell), gather(s->by_blur, p->cell)};
+                                lanes_choose(counts, of[3], zero), of[0], of[1], of[2]};
 }
 
 /* Adds places to the normal equations of their segment's ends, of the radius and of the section. */
@@ -226,7 +231,9 @@ static void add_places(const struct axis_model *m, const struct axis_scratch *s,
     const float amplitude = (float)(m->profile.high - m->profile.low);
     const struct voxel_lanes v = voxels_of(s, p);
     const lanes at = place_in_table(&m->table, p->depth * m->inverse_blur);
-    const lanes slope = -amplitude * m->inverse_blur * look_up(m->table.slope, at);
+    lanes share, slope;
+    look_up(&m->table, at, &share, &slope);
+    slope *= -amplitude * m->inverse_blur;
     const lanes by = -slope * p->by_radius, weighted = v.weight * by;
     sum->radius_normal += weighted * by;
     sum->radius_gradient += v.residual * by;
@@ -288,8 +295,7 @@ static void add_pulls(const struct axis_model *m, const struct axis_scratch *s, 
 static void forget_claims(struct axis_scratch *s, size_t n_claim)
 {
     for (size_t i = 0; i < n_claim; i++) {
-        const uint16_t cell = s->claims.cell[i];
-        s->share[cell] = s->by_radius[cell] = s->by_blur[cell] = 0.0f;
+        s->model[s->claims.cell[i]] = (lane_row){0.0f};
     }
 }
 

@@ -3,6 +3,7 @@
 #ifndef SELVEDGE_GEOMETRY_AXIS_BRICK_H
 #define SELVEDGE_GEOMETRY_AXIS_BRICK_H
 
+#include "base/lanes.h"
 #include "geometry/fibers/shape/axes/axis_claim.h"
 #include "geometry/fibers/shape/axes/axis_profile.h"
 #include "geometry/fibers/shape/axes/axis_solve.h"
@@ -21,10 +22,11 @@ struct axis_model {
     float tail, inverse_blur; /* tail: voxels beyond the radius up to which a fiber is modelled */
 };
 
-/* Work of one thread. By voxels of a brick: the share of fibers, 0 between bricks, and its derivatives by all radii and
- * by the blur; the weight, and the weight times the residual. */
+/* Work of one thread. By voxels of a brick, all 0 between bricks: the share of fibers, its derivatives by all radii and by
+ * the blur, and the weight times the residual; the weight. */
 struct axis_scratch {
-    float share[AXIS_N_CELL], by_radius[AXIS_N_CELL], by_blur[AXIS_N_CELL], weight[AXIS_N_CELL], residual[AXIS_N_CELL];
+    lane_row model[AXIS_N_CELL];
+    float weight[AXIS_N_CELL];
     struct axis_claims claims;
 };
 

@@ -13,8 +13,8 @@ void axis_table_init(struct axis_table *t)
     t->scale = (float)(AXIS_N_TABLE / (AXIS_CORE + AXIS_TAIL));
     for (int i = 0; i < AXIS_N_TABLE + 2; i++) {
         double z = i * (AXIS_CORE + AXIS_TAIL) / AXIS_N_TABLE - AXIS_CORE;
-        t->share[i] = (float)(0.5 * erfc(z * M_SQRT1_2));
-        t->slope[i] = (float)(-exp(-0.5 * z * z) / sqrt(2.0 * M_PI));
+        t->entry[i][0] = (float)(0.5 * erfc(z * M_SQRT1_2));
+        t->entry[i][1] = (float)(-exp(-0.5 * z * z) / sqrt(2.0 * M_PI));
     }
 }
 

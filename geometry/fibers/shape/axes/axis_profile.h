@@ -26,8 +26,8 @@ enum { AXIS_N_TABLE = 512 };
 
 /* Share of a blurred fiber in a voxel and its derivative, by the distance from the surface in units of the blur. */
 struct axis_table {
-    float scale, slope_scale; /* entries per unit; 1 / blur */
-    float share[AXIS_N_TABLE + 2], slope[AXIS_N_TABLE + 2];
+    float scale;                      /* entries per unit */
+    float entry[AXIS_N_TABLE + 2][2]; /* share and derivative */
 };
 
 /* A fiber is modelled up to AXIS_TAIL times the blur beyond its surface. */
