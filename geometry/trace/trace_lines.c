@@ -87,6 +87,8 @@ static status straighten(struct trace_job *job, struct polyline_set *lines, bool
 {
     struct polyline_set out;
     size_t n_cut;
+    const struct disagreement_option trim = {
+        TRACE_DISAGREEMENT_RAD, (size_t)(TRACE_END_DIAMETERS * job->diameter + 0.5), min_vertex, job->pool};
     polyline_set_init(&out);
     status s = polylines_cut_kinks(lines, job->diameter, OVER_USUAL_TURN, min_vertex, last, &out, &n_cut, err);
     if (s == STATUS_OK) {
@@ -94,10 +96,7 @@ static status straighten(struct trace_job *job, struct polyline_set *lines, bool
         *lines = out;
         polyline_set_init(&out);
     }
-    if (s == STATUS_OK && last)
-        s = polylines_trim_disagreeing(lines, job->d, TRACE_DISAGREEMENT_RAD,
-                                       (size_t)(TRACE_END_DIAMETERS * job->diameter + 0.5), min_vertex, job->pool, &out,
-                                       err);
+    if (s == STATUS_OK && last) s = polylines_trim_disagreeing(lines, job->d, &trim, &out, err);
     if (s == STATUS_OK && last) {
         polyline_set_release(lines);
         *lines = out;

@@ -8,6 +8,7 @@
 #include "geometry/fibers/slices/centers.h"
 
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 enum {
@@ -72,15 +73,15 @@ status trace_repair(struct trace_job *job, struct polyline_set *in, bool grow, d
 {
     struct polyline_set agreeing, single, grown;
     const struct grow_option option = {(float)job->diameter, (float)job->o->eps_d, MAX_GROWTH};
+    const struct disagreement_option check = {TRACE_DISAGREEMENT_RAD, SIZE_MAX, TRACE_MIN_PIECE, job->pool};
+    const size_t *n = job->v->n;
+    const struct duplicate_option one = {{n[0], n[1], n[2]}, job->diameter, touching, job->pool};
     size_t n_grown = 0, n_cut = 0;
     polyline_set_init(&agreeing);
     polyline_set_init(&single);
     polyline_set_init(&grown);
-    status s = polylines_cut_disagreeing(in, job->d, TRACE_DISAGREEMENT_RAD, TRACE_MIN_PIECE, job->pool, &agreeing,
-                                         &n_cut, err);
-    if (s == STATUS_OK)
-        s = polylines_remove_duplicates(&agreeing, job->v->n, job->diameter, touching, TRACE_MIN_PIECE, job->pool,
-                                        &single, counts, err);
+    status s = polylines_cut_disagreeing(in, job->d, &check, &agreeing, &n_cut, err);
+    if (s == STATUS_OK) s = polylines_remove_duplicates(&agreeing, &one, TRACE_MIN_PIECE, &single, counts, err);
     if (s == STATUS_OK && grow) s = polylines_grow(&single, job->v, &option, &grown, &n_grown, err);
     if (s == STATUS_OK)
         s = polylines_join(grow ? &grown : &single, job->v, job->diameter, job->o->eps_d, out, counts, err);

@@ -95,18 +95,18 @@ static status check_all(struct disagreement *w, struct thread_pool *pool)
 }
 
 status polylines_cut_disagreeing(const struct polyline_set *lines, const struct direction_volume *d,
-                                 double max_angle_rad, size_t min_vertex, struct thread_pool *pool,
-                                 struct polyline_set *result, size_t *n_cut, struct error *err)
+                                 const struct disagreement_option *o, struct polyline_set *result, size_t *n_cut,
+                                 struct error *err)
 {
     struct disagreement w;
-    status s = disagreement_init(&w, lines, d, max_angle_rad, SIZE_MAX, err);
+    status s = disagreement_init(&w, lines, d, o->max_angle_rad, SIZE_MAX, err);
     *n_cut = 0;
-    if (s == STATUS_OK) s = check_all(&w, pool);
+    if (s == STATUS_OK) s = check_all(&w, o->pool);
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
         size_t n = polyline_length(lines, l), run = 0;
         for (size_t i = 0; i <= n && s == STATUS_OK; i++) {
             if (i < n && !w.wrong[lines->first[l] + i]) continue;
-            if (i - run >= min_vertex)
+            if (i - run >= o->min_vertex)
                 s = polyline_add_part(result, lines, l, lines->first[l] + run, lines->first[l] + i, err);
             *n_cut += i < n;
             run = i + 1;
@@ -117,20 +117,19 @@ status polylines_cut_disagreeing(const struct polyline_set *lines, const struct 
 }
 
 status polylines_trim_disagreeing(const struct polyline_set *lines, const struct direction_volume *d,
-                                  double max_angle_rad, size_t reach, size_t min_vertex, struct thread_pool *pool,
-                                  struct polyline_set *result, struct error *err)
+                                  const struct disagreement_option *o, struct polyline_set *result, struct error *err)
 {
     struct disagreement w;
-    status s = disagreement_init(&w, lines, d, max_angle_rad, reach, err);
-    if (s == STATUS_OK) s = check_all(&w, pool);
+    status s = disagreement_init(&w, lines, d, o->max_angle_rad, o->reach, err);
+    if (s == STATUS_OK) s = check_all(&w, o->pool);
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
         size_t n = polyline_length(lines, l), begin = lines->first[l], from = 0, to = n;
-        for (size_t i = 0; i < n && i < reach; i++) {
+        for (size_t i = 0; i < n && i < o->reach; i++) {
             size_t k = n - 1 - i;
             if (w.wrong[begin + i]) from = i + 1;
             if (w.wrong[begin + k]) to = k;
         }
-        if (to >= from + min_vertex) s = polyline_add_part(result, lines, l, begin + from, begin + to, err);
+        if (to >= from + o->min_vertex) s = polyline_add_part(result, lines, l, begin + from, begin + to, err);
     }
     disagreement_release(&w);
     return s;

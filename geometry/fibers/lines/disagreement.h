@@ -7,18 +7,25 @@
 #include "geometry/fibers/lines/polyline.h"
 #include "geometry/volume/volume.h"
 
+/* pool NULL: one thread. */
+struct disagreement_option {
+    double max_angle_rad;
+    size_t reach; /* vertices from the ends of a line that are trimmed */
+    size_t min_vertex;
+    struct thread_pool *pool;
+};
+
 /* Removes the vertices where the angle between line and direction volume, averaged over nine vertices (mean squared
  * sine), exceeds max_angle_rad, and that another line passes within 0.9 of the sum of the radii. (The direction volume
  * alone is not sure enough: where fibers are crowded or thin its own errors reach max_angle_rad.) The remaining pieces
  * of at least min_vertex vertices go to result (initialised, empty). *n_cut: number of vertices removed.
  * STATUS_NO_MEMORY. */
 status polylines_cut_disagreeing(const struct polyline_set *lines, const struct direction_volume *d,
-                                 double max_angle_rad, size_t min_vertex, struct thread_pool *pool,
-                                 struct polyline_set *result, size_t *n_cut, struct error *err);
+                                 const struct disagreement_option *o, struct polyline_set *result, size_t *n_cut,
+                                 struct error *err);
 /* The same only at the ends: removes from each end of a line up to the last such vertex within `reach` vertices of it.
  * STATUS_NO_MEMORY. */
 status polylines_trim_disagreeing(const struct polyline_set *lines, const struct direction_volume *d,
-                                  double max_angle_rad, size_t reach, size_t min_vertex, struct thread_pool *pool,
-                                  struct polyline_set *result, struct error *err);
+                                  const struct disagreement_option *o, struct polyline_set *result, struct error *err);
 
 #endif

@@ -89,27 +89,28 @@ static void mark_lines(void *context, size_t i_task, size_t i_thread)
         for (size_t i = p->first[l]; i < p->first[l + 1]; i++) job->mark[i] = is_duplicate(job->search, l, i);
 }
 
-status polylines_mark_duplicates(const struct polyline_set *lines, const size_t n_voxel[3], double diameter_voxel,
-                                 double touching, struct thread_pool *pool, bool *mark, struct error *err)
+status polylines_mark_duplicates(const struct polyline_set *lines, const struct duplicate_option *o, bool *mark,
+                                 struct error *err)
 {
-    struct duplicate_search search = {.p = lines, .usual = (float)(0.5 * diameter_voxel), .touching = (float)touching};
+    struct duplicate_search search = {
+        .p = lines, .usual = (float)(0.5 * o->diameter_voxel), .touching = (float)o->touching};
     struct mark_job job = {&search, mark};
     search.most = fmaxf(1.0f, search.usual);
     for (size_t l = 0; l < lines->n_line; l++) search.most = fmaxf(search.most, lines->radius[l]);
     search.most *= fmaxf(1.0f, 2.0f * search.touching);
-    status s = vertex_grid_init(&search.grid, lines, n_voxel, (float)fmax(3.0, diameter_voxel), err);
-    if (s == STATUS_OK) s = thread_pool_run(pool, (lines->n_line + LINES - 1) / LINES, mark_lines, &job, NULL);
+    status s = vertex_grid_init(&search.grid, lines, o->n_voxel, (float)fmax(3.0, o->diameter_voxel), err);
+    if (s == STATUS_OK) s = thread_pool_run(o->pool, (lines->n_line + LINES - 1) / LINES, mark_lines, &job, NULL);
     vertex_grid_release(&search.grid);
     return s;
 }
 
-status polylines_remove_duplicates(const struct polyline_set *lines, const size_t n_voxel[3], double diameter_voxel,
-                                   double touching, size_t min_vertex, struct thread_pool *pool,
-                                   struct polyline_set *result, struct join_counts *counts, struct error *err)
+status polylines_remove_duplicates(const struct polyline_set *lines, const struct duplicate_option *o,
+                                   size_t min_vertex, struct polyline_set *result, struct join_counts *counts,
+                                   struct error *err)
 {
     bool *mark = malloc((lines->n_vertex + 1) * sizeof *mark);
     if (mark == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot look for duplicates of fibers: out of memory");
-    status s = polylines_mark_duplicates(lines, n_voxel, diameter_voxel, touching, pool, mark, err);
+    status s = polylines_mark_duplicates(lines, o, mark, err);
     if (s == STATUS_OK) s = polylines_without(lines, mark, min_vertex, result, NULL, err);
     counts->n_duplicate = 0;
     for (size_t i = 0; i < lines->n_vertex && s == STATUS_OK; i++) counts->n_duplicate += mark[i];

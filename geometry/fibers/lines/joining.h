@@ -20,16 +20,22 @@ struct join_counts {
     size_t n_gap_bridged, n_joined; /* summed over calls, so they must start at zero */
 };
 
+/* touching: distance of the axes of two fibers that run beside each other, over the sum of their radii, below which they
+ * are one; 0 while radii are not known well. pool NULL: one thread. */
+struct duplicate_option {
+    size_t n_voxel[3];
+    double diameter_voxel, touching;
+    struct thread_pool *pool;
+};
+
 /* Both steps write to result (initialised, empty); polylines_mark_duplicates marks the vertices that the first removes.
- * eps_d: density that counts as material. touching: distance of the
- * axes of two fibers that run beside each other, over the sum of their radii, below which they are one; 0 while radii
- * are not known well. min_vertex: pieces that are shorter after the removal of duplicates are dropped.
- * pool NULL: one thread. STATUS_NO_MEMORY. */
-status polylines_mark_duplicates(const struct polyline_set *lines, const size_t n_voxel[3], double diameter_voxel,
-                                 double touching, struct thread_pool *pool, bool *mark, struct error *err);
-status polylines_remove_duplicates(const struct polyline_set *lines, const size_t n_voxel[3], double diameter_voxel,
-                                   double touching, size_t min_vertex, struct thread_pool *pool,
-                                   struct polyline_set *result, struct join_counts *counts, struct error *err);
+ * eps_d: density that counts as material. min_vertex: pieces that are shorter after the removal of duplicates are dropped.
+ * STATUS_NO_MEMORY. */
+status polylines_mark_duplicates(const struct polyline_set *lines, const struct duplicate_option *o, bool *mark,
+                                 struct error *err);
+status polylines_remove_duplicates(const struct polyline_set *lines, const struct duplicate_option *o,
+                                   size_t min_vertex, struct polyline_set *result, struct join_counts *counts,
+                                   struct error *err);
 /* Returns whether another line passes beside vertex i of `line` within `share` of the sum of their radii; the axes of
  * touching fibers are at 1. most: largest radius of a line. */
 bool polyline_is_overlapped(const struct polyline_set *p, const struct vertex_grid *g, size_t line, size_t i,

@@ -78,7 +78,9 @@ static void measure_ratio(const struct flat_work *w, struct section_ratio *ratio
 static status find_rest(struct flat_work *w, const struct flat_fit *f, struct error *err)
 {
     const struct polyline_set *lines = w->lines;
-    status s = polylines_mark_duplicates(lines, f->v->n, f->diameter_voxel, SUSPECT, f->pool, w->suspect, err);
+    const size_t *n = f->v->n;
+    const struct duplicate_option o = {{n[0], n[1], n[2]}, f->diameter_voxel, SUSPECT, f->pool};
+    status s = polylines_mark_duplicates(lines, &o, w->suspect, err);
     if (s == STATUS_OK) s = polylines_without(lines, w->suspect, LEAST_PIECE, &w->rest, w->origin, err);
     for (size_t k = 0; s == STATUS_OK && k < w->rest.n_vertex; k++) w->rest_section[k] = w->section[w->origin[k]];
     return s;

@@ -120,7 +120,9 @@ static void test_stray_end_is_cut(void **state)
         assert_int_equal(polyline_add(&lines, x, NULL), STATUS_OK);
     }
     lines.radius[0] = 3.0f;
-    assert_int_equal(polylines_cut_disagreeing(&lines, &d, M_PI / 6.0, 10, NULL, &out, &n_cut, NULL), STATUS_OK);
+    assert_int_equal(polylines_cut_disagreeing(&lines, &d, &(struct disagreement_option){M_PI / 6.0, 0, 10, NULL}, &out,
+                                               &n_cut, NULL),
+                     STATUS_OK);
     assert_true(n_cut == 0 && out.n_line == 1 && out.n_vertex == 50);
     polyline_set_release(&out);
     polyline_set_init(&out);
@@ -128,12 +130,16 @@ static void test_stray_end_is_cut(void **state)
     for (int i = 0; i < 25; i++)
         assert_int_equal(polyline_add(&lines, (const float[3]){(float)i + 0.5f, 17.0f, 8.5f}, NULL), STATUS_OK);
     lines.radius[1] = 3.0f;
-    assert_int_equal(polylines_cut_disagreeing(&lines, &d, M_PI / 6.0, 10, NULL, &out, &n_cut, NULL), STATUS_OK);
+    assert_int_equal(polylines_cut_disagreeing(&lines, &d, &(struct disagreement_option){M_PI / 6.0, 0, 10, NULL}, &out,
+                                               &n_cut, NULL),
+                     STATUS_OK);
     assert_int_equal(out.n_line, 2);
     assert_true(n_cut >= 8 && n_cut <= 12 && polyline_length(&out, 0) == 50 - n_cut && polyline_length(&out, 1) == 25);
     polyline_set_release(&out);
     polyline_set_init(&out);
-    assert_int_equal(polylines_cut_disagreeing(&lines, &d, M_PI / 6.0, 43, NULL, &out, &n_cut, NULL), STATUS_OK);
+    assert_int_equal(polylines_cut_disagreeing(&lines, &d, &(struct disagreement_option){M_PI / 6.0, 0, 43, NULL}, &out,
+                                               &n_cut, NULL),
+                     STATUS_OK);
     assert_int_equal(out.n_line, 0);
     polyline_set_release(&lines);
     polyline_set_release(&out);
@@ -167,7 +173,9 @@ static void test_end_in_another_fiber_is_trimmed(void **state)
         }
         lines.radius[l] = 3.0f;
     }
-    assert_int_equal(polylines_trim_disagreeing(&lines, &d, M_PI / 6.0, 12, 10, NULL, &out, NULL), STATUS_OK);
+    assert_int_equal(
+        polylines_trim_disagreeing(&lines, &d, &(struct disagreement_option){M_PI / 6.0, 12, 10, NULL}, &out, NULL),
+        STATUS_OK);
     assert_int_equal(out.n_line, 4);
     assert_true(polyline_length(&out, 2) >= 40 && polyline_length(&out, 2) <= 44);
     for (size_t l = 0; l < 4; l++) assert_true(l == 2 || polyline_length(&out, l) == (size_t)n_vertex[l]);

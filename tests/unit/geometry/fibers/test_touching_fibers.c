@@ -34,7 +34,9 @@ static void test_touching_fibers(void **state)
         add_line(&in, 0, 59, 2.5f, 20.0f, 16.0f);
         add_line(&in, 0, 31, 10.5f, 24.5f, 16.0f);
         add_line(&in, 1, 60, 50.0f, 2.5f, 20.5f);
-        assert_int_equal(polylines_remove_duplicates(&in, n, 6.0, known == 1 ? 0.85 : 0.0, 4, NULL, &out, &counts, NULL),
+        assert_int_equal(polylines_remove_duplicates(
+                             &in, &(struct duplicate_option){{n[0], n[1], n[2]}, 6.0, known == 1 ? 0.85 : 0.0, NULL}, 4,
+                             &out, &counts, NULL),
                          STATUS_OK);
         assert_int_equal(out.n_line, known == 1 ? 2 : 3);
         assert_int_equal(out.n_vertex, known == 1 ? 59 + 60 : 59 + 31 + 60);

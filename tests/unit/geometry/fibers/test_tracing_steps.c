@@ -108,7 +108,9 @@ static void test_duplicates_and_joins(void **state)
     add_piece(&in, 0, 65.5f, 90.5f, 8.0f); /* and behind a gap */
     add_piece(&in, 0, 2.5f, 46.5f, 22.0f);
     add_piece(&in, 0, 54.5f, 90.5f, 22.0f); /* no material between */
-    assert_int_equal(polylines_remove_duplicates(&in, n, 6.0, 0.0, 4, NULL, &single, &counts, NULL), STATUS_OK);
+    assert_int_equal(polylines_remove_duplicates(&in, &(struct duplicate_option){{n[0], n[1], n[2]}, 6.0, 0.0, NULL}, 4,
+                                                 &single, &counts, NULL),
+                     STATUS_OK);
     assert_int_equal(single.n_line, 5);
     assert_true(counts.n_duplicate >= 4 && counts.n_duplicate < 12);
     assert_int_equal(polylines_join(&single, &v, 6.0, 0.5, &out, &counts, NULL), STATUS_OK);
