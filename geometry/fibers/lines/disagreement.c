@@ -60,7 +60,7 @@ static void disagreement_release(struct disagreement *w)
     free(w->wrong);
 }
 
-/* Whether vertex i of a line whose values are known, counted from its first one, disagrees and lies in another fiber. */
+/* Whether vertex i of a line, counted from its first one, disagrees and lies in another fiber. */
 static bool is_wrong(const struct disagreement *w, size_t line, size_t i)
 {
     const size_t n = polyline_length(w->lines, line);

@@ -20,8 +20,8 @@ struct join_counts {
     size_t n_gap_bridged, n_joined; /* summed over calls, so they must start at zero */
 };
 
-/* touching: distance of the axes of two fibers that run beside each other, over the sum of their radii, below which they
- * are one; 0 while radii are not known well. pool NULL: one thread. */
+/* touching: distance of the axes of two fibers that run beside each other, over the sum of their radii, below which
+ * they are one; 0 while radii are not known well. pool NULL: one thread. */
 struct duplicate_option {
     size_t n_voxel[3];
     double diameter_voxel, touching;
@@ -29,8 +29,8 @@ struct duplicate_option {
 };
 
 /* Both steps write to result (initialised, empty); polylines_mark_duplicates marks the vertices that the first removes.
- * eps_d: density that counts as material. min_vertex: pieces that are shorter after the removal of duplicates are dropped.
- * STATUS_NO_MEMORY. */
+ * eps_d: density that counts as material. min_vertex: pieces that are shorter after the removal of duplicates are
+ * dropped. STATUS_NO_MEMORY. */
 status polylines_mark_duplicates(const struct polyline_set *lines, const struct duplicate_option *o, bool *mark,
                                  struct error *err);
 status polylines_remove_duplicates(const struct polyline_set *lines, const struct duplicate_option *o,

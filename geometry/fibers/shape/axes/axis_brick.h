@@ -22,8 +22,8 @@ struct axis_model {
     float tail, inverse_blur; /* tail: voxels beyond the radius up to which a fiber is modelled */
 };
 
-/* Work of one thread. By voxels of a brick, all 0 between bricks: the share of fibers, its derivatives by all radii and by
- * the blur, and the weight times the residual; the weight. */
+/* Work of one thread. By voxels of a brick, all 0 between bricks: the share of fibers, its derivatives by all radii and
+ * by the blur, and the weight times the residual; the weight. */
 struct axis_scratch {
     lane_row model[AXIS_N_CELL];
     float weight[AXIS_N_CELL];
