@@ -72,9 +72,9 @@ struct job_candidate {
     double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
 };
 
-/* How a picture is rendered: path by path, by the tables of renderer/fast, or by tables with some whole paths, whose
- * expectation is that of path tracing. */
-enum job_picture_method { JOB_PICTURE_PATH, JOB_PICTURE_FAST, JOB_PICTURE_CORRECTED };
+/* How a picture is rendered: path by path, by the tables of renderer/fast, by tables with some whole paths, whose
+ * expectation is that of path tracing, or by dual scattering (renderer/dual). */
+enum job_picture_method { JOB_PICTURE_PATH, JOB_PICTURE_FAST, JOB_PICTURE_CORRECTED, JOB_PICTURE_DUAL };
 
 enum job_surface { JOB_ON_FLAT, JOB_ON_CYLINDER, JOB_ON_DRAPE, JOB_ON_MESH };
 

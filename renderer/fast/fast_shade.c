@@ -2,6 +2,7 @@
 #include "renderer/fast/sphere_harmonics.h"
 #include "renderer/scene/scene_place.h"
 #include "renderer/transport/surface/fiber_frame.h"
+#include "renderer/transport/surface/path_beyond.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -231,22 +232,12 @@ static void add_transfer(const struct fast_setting *s, const struct seen_hit *h,
     }
 }
 
-static void add_beyond(const struct fast_setting *s, const struct scene_ray *ray, float radiance[3])
-{
-    float position[3], beyond[3] = {0, 0, 0};
-    if (scene_sheet_met(s->path.scene, ray)) return;
-    for (int a = 0; a < 3; a++) position[a] = (float)((double)ray->origin_mm[a] + (a < 2 ? ray->offset_mm[a] : 0.0));
-    lights_add_environment(&s->path.lights, ray->direction, 0, beyond);
-    float lamp = s->path.lights.has_lamp ? lights_lamp_beyond(&s->path.lights.lamp, position, ray->direction, 0) : 0;
-    for (int c = 0; c < 3; c++) radiance[c] += lamp + beyond[c];
-}
-
 /* Light that is scattered once as the tables have it. */
 static uint32_t shade_by_tables(const struct fast_setting *s, struct scene_ray *ray, struct rng *rng, float radiance[3])
 {
     struct seen_hit h;
     if (!scene_trace(s->path.scene, ray, &h.hit)) {
-        add_beyond(s, ray, radiance);
+        path_add_beyond(&s->path, ray, radiance);
         return 0;
     }
     describe(s, ray, &h);

@@ -206,7 +206,7 @@ static void build_tile(struct scene *s)
                                sizeof *s->segment_vertex, s->n_segment);
     rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_FLAGS, 0, RTC_FORMAT_UCHAR, s->segment_flag, 0, 1, s->n_segment);
     rtcSetGeometryIntersectFilterFunction(g, reject_back_faces);
-    rtcSetGeometryOccludedFilterFunction(g, reject_back_faces);
+    rtcSetGeometryOccludedFilterFunction(g, scene_occlusion_filter);
     rtcCommitGeometry(g);
     s->tile = rtcNewScene(s->device);
     rtcAttachGeometry(s->tile, g);

@@ -41,6 +41,24 @@ struct scene {
  * span are in units of it. The ray is moved by whole tiles. */
 bool scene_trace_span(const struct scene *scene, struct scene_ray *ray, float span, struct scene_hit *hit,
                       float *distance);
-bool scene_occluded_span(const struct scene *scene, const struct scene_ray *ray, float span);
+/* What scene_visit_ahead hands on to the filter of occlusion rays. Its first member is what Embree knows of it. */
+struct scene_visitor {
+    struct RTCIntersectContext embree;
+    const struct scene *flat;
+    scene_visit *visit; /* NULL: the first front face ends the ray */
+    void *context;
+    float direction[3];      /* unit, of the ray where it is seen */
+    const float *to_seen[3]; /* rows of the map of flat tangents to seen ones; [0] NULL: they are the same */
+    bool stopped;
+};
+
+/* visitor NULL: whether any front face lies ahead. Otherwise each one is visited; true: the visitor has asked to
+ * stop. */
+bool scene_occluded_span(const struct scene *scene, const struct scene_ray *ray, float span,
+                         struct scene_visitor *visitor);
+/* The fibers' filter of occlusion rays, whose context is a scene_visitor. */
+void scene_occlusion_filter(const struct RTCFilterFunctionNArguments *a);
+void scene_visitor_init(struct scene_visitor *v, const struct scene *flat, const float direction[3], scene_visit *visit,
+                        void *context);
 
 #endif

@@ -105,11 +105,51 @@ bool scene_trace_span(const struct scene *s, struct scene_ray *r, float span, st
     return true;
 }
 
-bool scene_occluded_span(const struct scene *s, const struct scene_ray *ray, float span)
+void scene_occlusion_filter(const struct RTCFilterFunctionNArguments *a)
+{
+    struct scene_visitor *v = (struct scene_visitor *)(void *)a->context;
+    const struct RTCRay *ray = (const struct RTCRay *)a->ray; /* single rays: N is 1 */
+    const struct RTCHit *hit = (const struct RTCHit *)a->hit;
+    if (ray->dir_x * hit->Ng_x + ray->dir_y * hit->Ng_y + ray->dir_z * hit->Ng_z > 0) { /* a back face */
+        a->valid[0] = 0;
+        return;
+    }
+    if (v->visit == NULL) return;
+    const struct scene_vertex *p = &v->flat->vertex[v->flat->segment_vertex[hit->primID]];
+    const float flat[3] = {p[1].x - p[0].x, p[1].y - p[0].y, p[1].z - p[0].z};
+    float along = 0, length2 = 0;
+    for (int i = 0; i < 3; i++) {
+        const float *row = v->to_seen[i];
+        float t = v->to_seen[0] != NULL ? row[0] * flat[0] + row[1] * flat[1] + row[2] * flat[2] : flat[i];
+        along += t * v->direction[i];
+        length2 += t * t;
+    }
+    if (v->visit(v->context, hit->primID, along / sqrtf(length2)))
+        a->valid[0] = 0; /* refused, so that Embree goes on looking */
+    else
+        v->stopped = true;
+}
+
+void scene_visitor_init(struct scene_visitor *v, const struct scene *flat, const float direction[3], scene_visit *visit,
+                        void *context)
+{
+    rtcInitIntersectContext(&v->embree);
+    v->flat = flat;
+    v->visit = visit;
+    v->context = context;
+    for (int a = 0; a < 3; a++) {
+        v->direction[a] = direction[a];
+        v->to_seen[a] = NULL;
+    }
+    v->stopped = false;
+}
+
+bool scene_occluded_span(const struct scene *s, const struct scene_ray *ray, float span, struct scene_visitor *visitor)
 {
     struct scene_ray r = *ray;
-    struct RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
+    struct scene_visitor plain, *v = visitor != NULL ? visitor : &plain;
+    plain.visit = NULL;
+    rtcInitIntersectContext(&plain.embree);
     for (int i = 0; i < SCENE_MAX_WRAP; i++) {
         bool leaves;
         wrap(s, &r);
@@ -121,7 +161,7 @@ bool scene_occluded_span(const struct scene *s, const struct scene_ray *ray, flo
         if (t > r.tnear_mm) {
             struct RTCRay q;
             fill_ray(&q, &r, t);
-            rtcOccluded1(s->block, &context, &q);
+            rtcOccluded1(s->block, &v->embree, &q);
             if (q.tfar < 0) return true;
         }
         if (leaves || !isfinite(t)) return false;

@@ -35,6 +35,13 @@ bool scene_trace(const struct scene *scene, struct scene_ray *ray, struct scene_
 /* Whether any front face lies ahead; the ray itself is not changed. */
 bool scene_occluded(const struct scene *scene, const struct scene_ray *ray);
 
+/* A fiber that a ray goes through: its segment, and the sine of the angle between the ray and the plane across the
+ * fiber (positive: the ray runs along the segment's direction). False: no further ones are wanted. */
+typedef bool scene_visit(void *context, uint32_t i_segment, float sin_theta);
+/* Visits every front face ahead of a ray once, in no particular order, in one traversal. The ray itself is not changed.
+ * False: the ray ends on the black sheet of a bent cloth, or visit has asked to stop. */
+bool scene_visit_ahead(const struct scene *scene, const struct scene_ray *ray, scene_visit *visit, void *context);
+
 /* Ray leaving a hit point: starts behind the fiber's far side when it points into the fiber. */
 void scene_ray_leave(const struct scene_hit *hit, const double offset_mm[2], const float direction[3],
                      struct scene_ray *ray);

@@ -12,7 +12,14 @@ bool scene_trace(const struct scene *s, struct scene_ray *r, struct scene_hit *h
 
 bool scene_occluded(const struct scene *s, const struct scene_ray *ray)
 {
-    return s->bent != NULL ? bent_occluded(s, ray) : scene_occluded_span(s, ray, INFINITY);
+    return s->bent != NULL ? bent_occluded(s, ray, NULL) : scene_occluded_span(s, ray, INFINITY, NULL);
+}
+
+bool scene_visit_ahead(const struct scene *s, const struct scene_ray *ray, scene_visit *visit, void *context)
+{
+    struct scene_visitor v;
+    scene_visitor_init(&v, s, ray->direction, visit, context);
+    return s->bent != NULL ? !bent_occluded(s, ray, &v) : !scene_occluded_span(s, ray, INFINITY, &v);
 }
 
 void scene_ray_leave(const struct scene_hit *hit, const double offset_mm[2], const float direction[3],

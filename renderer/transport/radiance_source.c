@@ -1,5 +1,6 @@
 #include "renderer/transport/radiance_source.h"
 
+#include "renderer/dual/dual_radiance.h"
 #include "renderer/fast/fast_radiance.h"
 #include "renderer/transport/surface/surface_radiance.h"
 #include "renderer/transport/volume/volume_radiance.h"
@@ -23,6 +24,7 @@ status radiance_source_init(struct radiance_source *s, const struct radiance_inp
     if (st != STATUS_OK) return st;
     s->tracer = in->model->kind != MODEL_SURFACE ? &volume_radiance
                 : in->fast != NULL               ? &fast_radiance
+                : in->dual != NULL               ? &dual_radiance
                                                  : &surface_radiance;
     s->model = in->model;
     s->n_set = in->n_set > 1 ? in->n_set : 1;

@@ -1,7 +1,8 @@
 /* One cloth with one model of appearance at given parameter values, ready to be traced: what estimates, pictures and
  * the derivative check are made from. Three implementations stand behind one table of functions: fibers with a
  * scattering model (surface/surface_radiance.c), the same by tables (renderer/fast/fast_radiance.c), and a density
- * volume with a phase function (volume/volume_radiance.c).
+ * volume with a phase function (volume/volume_radiance.c). A fourth, for previews, is dual scattering of fibers
+ * (renderer/dual/dual_radiance.c).
  *
  * Derivatives are numbered flat: the parameters of set 0, then of set 1, ...; those of channel c start at c * n_flat.
  * A source is immutable after radiance_source_init: threads share it. It copies nothing of its input.
@@ -19,6 +20,7 @@
 enum { RADIANCE_BLOCK_PATHS = 256, RADIANCE_NAME_BYTES = 56 };
 
 struct fast_option; /* renderer/fast/fast_option.h */
+struct dual_option; /* renderer/dual/dual_option.h */
 
 /* One cloth in the forms in which it is at hand. */
 struct appearance_scene {
@@ -34,6 +36,7 @@ struct radiance_input {
     bool want_derivative;
     const struct fast_option *fast; /* NULL: path tracing; otherwise fibers are rendered by tables, without
                                        derivatives */
+    const struct dual_option *dual; /* NULL, or fibers by dual scattering, without derivatives */
     bool plain_paths; /* trace no guided shadow paths (path_tracer.h): same means, more variance; volumes have none */
 };
 

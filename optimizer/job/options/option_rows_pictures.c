@@ -4,7 +4,7 @@
 #define OF_PICTURE(member) INTO_OF(struct job_surface_picture, member)
 
 static const char *const surface_names[] = {"flat", "cylinder", "drape", "mesh", NULL};
-static const char *const method_names[] = {"path", "fast", "corrected", NULL};
+static const char *const method_names[] = {"path", "fast", "corrected", "dual", NULL};
 
 const struct job_option option_rows_pictures[] = {
     {.path = "pictures",
@@ -100,13 +100,16 @@ const struct job_option option_rows_pictures[] = {
      .standard = "\"path\"",
      .meaning =
          "`path`: every path is traced. `fast`: light that is scattered often comes from tables, with less noise "
-         "and a small error (docs/bent-cloth.md). `corrected`: the same, with whole paths that take the error off."},
+         "and a small error (docs/bent-cloth.md). `corrected`: the same, with whole paths that take the error off. "
+         "`dual`: light that is scattered often is estimated from the number of fibers before the lamp (dual "
+         "scattering), quickly and roughly, as a preview."},
     {.path = "pictures[].reference",
      .kind = OPTION_BOOL,
      OF_PICTURE(reference),
      .standard = "false",
-     .meaning = "Whether a picture by tables is also rendered path by path, with as many samples. The result states "
-                "how far the two are apart. Needs `method` `fast` or `corrected`."},
+     .meaning =
+         "Whether the picture is also rendered path by path, with as many samples. The result states how far the "
+         "two are apart. Needs a `method` other than `path`."},
     {.path = "twin",
      .kind = OPTION_SECTION,
      .left_out = "none",

@@ -15,7 +15,8 @@ struct bent_cloth {
 };
 
 bool bent_trace(const struct scene *s, struct scene_ray *ray, struct scene_hit *hit);
-bool bent_occluded(const struct scene *s, const struct scene_ray *ray);
+/* visitor: as for scene_occluded_span. True also for a ray that ends on the black sheet. */
+bool bent_occluded(const struct scene *s, const struct scene_ray *ray, struct scene_visitor *visitor);
 bool bent_enter(const struct scene *s, const double origin_mm[3], const double direction[3], struct scene_ray *ray);
 void bent_free(struct scene *s);
 size_t bent_memory_bytes(const struct scene *s);

@@ -10,6 +10,7 @@ struct walk_on_shell {
     const struct scene *s;
     const struct bent_cloth *b;
     struct shell_walk on;
+    struct scene_visitor *visitor; /* or NULL */
 };
 
 /* The ray in the flat cloth, from where it is now. */
@@ -53,6 +54,14 @@ static void hit_here(const struct walk_on_shell *w, double t, struct scene_hit *
     hit->i_cell = w->on.i_cell;
 }
 
+/* Whether any front face lies in this cell, or with a visitor, whether it has asked to stop there. */
+static bool occluded_here(struct walk_on_shell *w, const struct scene_ray *r, double span)
+{
+    const struct shell_cell *c = &w->b->space.shell.cell[w->on.i_cell];
+    for (int a = 0; a < 3 && w->visitor != NULL; a++) w->visitor->to_seen[a] = c->to_world[a];
+    return scene_occluded_span(&w->b->flat, r, (float)span, w->visitor);
+}
+
 /* hit NULL: any front face, which it need not describe. */
 static bool walk(struct walk_on_shell *w, double tnear, struct scene_hit *hit)
 {
@@ -71,7 +80,7 @@ static bool walk(struct walk_on_shell *w, double tnear, struct scene_hit *hit)
         float distance;
         to_flat(w, 0.0, &r);
         if (hit == NULL) {
-            if (scene_occluded_span(&w->b->flat, &r, (float)span)) return true;
+            if (occluded_here(w, &r, span)) return true;
         } else if (scene_trace_span(&w->b->flat, &r, (float)span, hit, &distance)) {
             hit_here(w, on->t + (double)distance, hit);
             return true;
@@ -102,10 +111,12 @@ bool bent_trace(const struct scene *s, struct scene_ray *ray, struct scene_hit *
     return false;
 }
 
-bool bent_occluded(const struct scene *s, const struct scene_ray *ray)
+bool bent_occluded(const struct scene *s, const struct scene_ray *ray, struct scene_visitor *visitor)
 {
     struct walk_on_shell w;
     start_walk(s, ray, &w);
+    w.visitor = visitor;
+    if (visitor != NULL) visitor->flat = &s->bent->flat;
     return walk(&w, (double)ray->tnear_mm, NULL) || w.on.i_cell == SHELL_ON_SHEET;
 }
 

@@ -14,11 +14,12 @@
  *
  * bench_pictures [FABRIC...] [--px N] [--path-samples N] [--fast-samples N] [--flat-paths N] [--paths N] [--order N]
  *                [--cell-paths N] [--traced N] [--corrected SHARE] [--by-tables] [--yarns N] [--png FOLDER]
- *                [--no-flat] [--no-drape] [--no-visibility]
+ *                [--no-flat] [--no-drape] [--no-visibility] [--dual DENSITY (in place of the fast renderer)]
  *   FABRIC   gabardine, fleece, silk (tests/support/cloth/fit_fabrics.h); default: all three
  */
 #include "base/angle.h"
 #include "geometry/mesh/mesh_drape.h"
+#include "renderer/dual/dual_option.h"
 #include "renderer/fast/fast_option.h"
 #include "renderer/fast/precompute/fast_precompute.h"
 #include "renderer/transport/estimate/estimate.h"
@@ -38,7 +39,7 @@ enum { N_FLAT = 492, FIELD = 4 };
 static struct {
     size_t px, n_path_sample, n_fast_sample, n_flat_path, n_yarn;
     uint32_t n_path, order, n_traced; /* 0: the defaults of the precomputation and of the renderer */
-    double cell_paths, corrected;
+    double cell_paths, corrected, dual;
     const char *png;
     enum fast_visibility visibility;
     bool flat, drape, no_visibility;
@@ -66,7 +67,6 @@ static void print(const char *fabric, const char *what, double value, const char
            unit, better);
     fflush(stdout);
 }
-
 struct bench {
     const struct fit_fabric *fabric;
     struct fiber_set fiber;
@@ -75,6 +75,8 @@ struct bench {
     double param[SCATTERING_MAX_PARAM];
     struct fast_tables tables;
     struct fast_option fast;
+    struct dual_tables averages;
+    struct dual_option dual;
 };
 
 static void make_cloth(struct bench *b)
@@ -131,10 +133,22 @@ static void make_tables(struct bench *b)
     unlink(path);
 }
 
+static void make_averages(struct bench *b)
+{
+    struct error err = {0};
+    double start = processor_s();
+    check(dual_tables_init(&b->averages, b->flat, b->model.surface, b->param, 1, pool, NULL, &err), &err);
+    b->dual = (struct dual_option){&b->averages, (float)option.dual, (float)option.dual};
+    print(b->fabric->name, "precompute_s", processor_s() - start, "s", "lower");
+}
+
 static struct radiance_input input_of(struct bench *b, const struct scene *scene, bool fast)
 {
-    return (struct radiance_input){
-        .scene = {.fibers = scene}, .model = &b->model, .param = b->param, .fast = fast ? &b->fast : NULL};
+    return (struct radiance_input){.scene = {.fibers = scene},
+                                   .model = &b->model,
+                                   .param = b->param,
+                                   .fast = fast && option.dual == 0 ? &b->fast : NULL,
+                                   .dual = fast && option.dual > 0 ? &b->dual : NULL};
 }
 
 /* Quasi-random points of the unit cube of four dimensions (Roberts' sequence). */
@@ -289,8 +303,7 @@ static void bench_drape(struct bench *b)
     print(b->fabric->name, "speedup_at_3pct", path_to / fast_to, "", "higher");
     write_png(b, &path, "path");
     write_png(b, &fast, "fast");
-    image_release(&path);
-    image_release(&fast);
+    image_release(&path), image_release(&fast);
     scene_free(b->drape);
 }
 
@@ -308,10 +321,14 @@ static void bench_fabric(const char *name)
                                   .n_traced = option.n_traced,
                                   .corrected_share = option.corrected};
     make_cloth(&b);
-    make_tables(&b);
+    if (option.dual > 0)
+        make_averages(&b);
+    else
+        make_tables(&b);
     if (option.flat) bench_flat(&b);
     if (option.drape) bench_drape(&b);
     fast_tables_release(&b.tables);
+    dual_tables_release(&b.averages);
     scene_free(b.flat);
     fiber_set_release(&b.fiber);
 }
@@ -319,44 +336,41 @@ static void bench_fabric(const char *name)
 /* An option with a number; false: there is none of that name. */
 static bool take_number(const char *name, double number)
 {
-    if (strcmp(name, "--px") == 0)
-        option.px = (size_t)number;
-    else if (strcmp(name, "--path-samples") == 0)
-        option.n_path_sample = (size_t)number;
-    else if (strcmp(name, "--fast-samples") == 0)
-        option.n_fast_sample = (size_t)number;
-    else if (strcmp(name, "--paths") == 0)
-        option.n_path = (uint32_t)number;
-    else if (strcmp(name, "--order") == 0)
-        option.order = (uint32_t)number;
-    else if (strcmp(name, "--traced") == 0)
-        option.n_traced = (uint32_t)number;
-    else if (strcmp(name, "--cell-paths") == 0)
-        option.cell_paths = number;
-    else if (strcmp(name, "--yarns") == 0)
-        option.n_yarn = (size_t)number;
-    else if (strcmp(name, "--corrected") == 0)
-        option.corrected = number;
-    else if (strcmp(name, "--flat-paths") == 0)
-        option.n_flat_path = (size_t)number;
-    else
-        return false;
-    return true;
+    const struct {
+        const char *name;
+        size_t *count;
+        uint32_t *small;
+        double *number;
+    } known[] = {{"--px", &option.px, NULL, NULL},
+                 {"--path-samples", &option.n_path_sample, NULL, NULL},
+                 {"--fast-samples", &option.n_fast_sample, NULL, NULL},
+                 {"--flat-paths", &option.n_flat_path, NULL, NULL},
+                 {"--yarns", &option.n_yarn, NULL, NULL},
+                 {"--paths", NULL, &option.n_path, NULL},
+                 {"--order", NULL, &option.order, NULL},
+                 {"--traced", NULL, &option.n_traced, NULL},
+                 {"--cell-paths", NULL, NULL, &option.cell_paths},
+                 {"--corrected", NULL, NULL, &option.corrected},
+                 {"--dual", NULL, NULL, &option.dual}};
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
+        if (strcmp(name, known[i].name) != 0) continue;
+        if (known[i].count != NULL) *known[i].count = (size_t)number;
+        if (known[i].small != NULL) *known[i].small = (uint32_t)number;
+        if (known[i].number != NULL) *known[i].number = number;
+        return true;
+    }
+    return false;
 }
 
 static bool take_flag(const char *name)
 {
-    if (strcmp(name, "--no-flat") == 0)
-        option.flat = false;
-    else if (strcmp(name, "--no-drape") == 0)
-        option.drape = false;
-    else if (strcmp(name, "--no-visibility") == 0)
-        option.no_visibility = true;
-    else if (strcmp(name, "--by-tables") == 0)
-        option.visibility = FAST_TABLES;
-    else
-        return false;
-    return true;
+    bool no_flat = strcmp(name, "--no-flat") == 0, no_drape = strcmp(name, "--no-drape") == 0;
+    bool unseen = strcmp(name, "--no-visibility") == 0, by_tables = strcmp(name, "--by-tables") == 0;
+    option.flat = option.flat && !no_flat;
+    option.drape = option.drape && !no_drape;
+    option.no_visibility = option.no_visibility || unseen;
+    if (by_tables) option.visibility = FAST_TABLES;
+    return no_flat || no_drape || unseen || by_tables;
 }
 
 int main(int argc, char **argv)

@@ -111,7 +111,8 @@ static status check_surface(const struct pipeline_context *c, size_t i, const st
     const struct job_surface_picture *p = &d->surface_picture[i];
     const double mm_per_cm = 10.0;
     double at[3];
-    if (p->method != JOB_PICTURE_PATH && p->black_sheet >= 0 && (p->black_sheet != 0) != d->black_sheet)
+    const bool by_tables = p->method == JOB_PICTURE_FAST || p->method == JOB_PICTURE_CORRECTED;
+    if (by_tables && p->black_sheet >= 0 && (p->black_sheet != 0) != d->black_sheet)
         return error_set(
             err, STATUS_INVALID,
             "a picture by tables has the black sheet of the job, or none like it: leave out black_sheet of "

@@ -19,15 +19,14 @@
 enum { STREAM = 4000 };
 static const double mm = 1e-3;
 
-static const char *const method_name[] = {"path", "fast", "corrected"};
+static const char *const method_name[] = {"path", "fast", "corrected", "dual"};
 static const char *const surface_name[] = {"flat", "cylinder", "drape", "mesh"};
 
 /* One picture of the document. */
 struct one_picture {
     size_t i;
     const char *entry_path;
-    struct fast_option fast;
-    enum job_picture_method method; /* the document's; JOB_PICTURE_PATH where the model has no tables */
+    struct surface_method how;
 };
 
 static double paths_of(const struct job_surface_picture *p)
@@ -85,8 +84,8 @@ static json_t *picture_json(const struct one_picture *one, const struct job_surf
     json_t *mean, *noise = noise_json(so_far, &mean);
     snprintf(file, sizeof file, "pictures/%s.exr", so_far->name);
     return json_pack("{s:s, s:s, s:s, s:I, s:o, s:o, s:o}", "file", file, "on", surface_name[p->on], "method",
-                     method_name[one->method], "samples", (json_int_t)so_far->n_sample, "mean", mean, "noise", noise,
-                     "png_exposure", json_number(exposure));
+                     method_name[one->how.method], "samples", (json_int_t)so_far->n_sample, "mean", mean, "noise",
+                     noise, "png_exposure", json_number(exposure));
 }
 
 /* The path-traced picture beside one by tables, and how far they are apart. */
@@ -185,6 +184,7 @@ static status render_reference(struct pipeline_context *c, const struct one_pict
     struct surface_passes traced;
     snprintf(name, sizeof name, "%s-reference", picture->name);
     q.input.fast = NULL;
+    q.input.dual = NULL;
     q.stream += JOB_MAX_SURFACE_PICTURE;
     status s = surface_passes_start(c, name, q.width, q.height, &traced, err);
     while (s == STATUS_OK && traced.n_sample < q.n_sample) s = surface_passes_add(c, &q, progress, &traced, err);
@@ -203,7 +203,7 @@ static status render(struct pipeline_context *c, const struct one_picture *one, 
 {
     const struct job_surface_picture *p = &c->doc->surface_picture[one->i];
     const struct pipeline_model *model = &c->model[pipeline_best_model(c)];
-    bool by_tables = one->method != JOB_PICTURE_PATH, compared = p->reference && by_tables;
+    bool compared = p->reference && one->how.method != JOB_PICTURE_PATH;
     struct surface_cloth cloth;
     struct configuration view = observation_configuration(
         c->doc, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg, p->camera_phi_deg, p->cloth_rotation_deg);
@@ -211,18 +211,18 @@ static status render(struct pipeline_context *c, const struct one_picture *one, 
     view.crop_aspect = 1.0;
     view.environment = c->environment;
     status s = surface_cloth_init(c, one->i, model->appearance.kind, &cloth, err);
-    const struct render_request q = {
+    struct render_request q = {
         .input = {.scene = {.fibers = cloth.fibers, .volume = cloth.volume.bent != NULL ? &cloth.volume : NULL},
                   .model = &model->appearance,
                   .param = model->fit.param,
-                  .n_set = model->sets.n_set,
-                  .fast = by_tables ? &one->fast : NULL},
+                  .n_set = model->sets.n_set},
         .configuration = &view,
         .width = p->px,
         .height = p->px,
         .n_sample = p->sample,
         .seed = c->doc->seed ^ 0x73757266616365u,
         .stream = (uint32_t)(STREAM + one->i)};
+    surface_method_apply(&one->how, &q.input);
     struct progress_part part;
     struct progress first = progress_begin_part(&part, progress, 0.0, compared ? 0.5 : 1.0);
     if (s == STATUS_OK) s = render_picture(c, one, &q, &first, so_far, entry, err);
@@ -255,8 +255,7 @@ static status write_one(struct pipeline_context *c, size_t i, const struct surfa
         return json_array_append_new(c->surface_pictures, entry) == 0 ? STATUS_OK : STATUS_NO_MEMORY;
     json_decref(entry);
     entry = NULL;
-    struct one_picture one = {.i = i, .entry_path = path};
-    one.method = surface_tables_option(tables, p, &one.fast) ? p->method : JOB_PICTURE_PATH;
+    const struct one_picture one = {.i = i, .entry_path = path, .how = surface_tables_method(tables, p)};
     status s = surface_passes_start(c, name, p->px, p->px, &so_far, err);
     if (s == STATUS_OK) s = render(c, &one, progress, &so_far, &entry, err);
     if (s == STATUS_OK)

@@ -7,29 +7,33 @@
 /* Three traced hits leave a third of the error of one (renderer/fast/NOTES.md); the transfer to a cell has an error of
  * 1 to 2 % by so many paths. */
 enum { N_TRACED = 3, CELL_PATHS = 8000 };
+/* Of dual scattering: cloth is dense (fabric thesis, section 6.6). */
+#define DENSITY 1.0f
 static const double share_of_time = 0.3, corrected_share = 0.25;
 
-static bool wanted(const struct pipeline_context *c)
+static bool by_tables(enum job_picture_method m) { return m == JOB_PICTURE_FAST || m == JOB_PICTURE_CORRECTED; }
+
+static bool wants_tables(const struct pipeline_context *c)
 {
     for (size_t i = 0; i < c->doc->n_surface_picture; i++)
-        if (c->doc->surface_picture[i].method != JOB_PICTURE_PATH) return true;
+        if (by_tables(c->doc->surface_picture[i].method)) return true;
     return false;
 }
 
-double surface_tables_share(const struct pipeline_context *c) { return wanted(c) ? share_of_time : 0.0; }
+static bool wants_averages(const struct pipeline_context *c)
+{
+    for (size_t i = 0; i < c->doc->n_surface_picture; i++)
+        if (c->doc->surface_picture[i].method == JOB_PICTURE_DUAL) return true;
+    return false;
+}
 
-status surface_tables_get(struct pipeline_context *c, const struct progress *progress, struct surface_tables *t,
-                          struct error *err)
+double surface_tables_share(const struct pipeline_context *c) { return wants_tables(c) ? share_of_time : 0.0; }
+
+static status get_tables(struct pipeline_context *c, const struct progress *progress, struct surface_tables *t,
+                         struct error *err)
 {
     const struct pipeline_model *model = &c->model[pipeline_best_model(c)];
     char path[WORKER_PATH_BYTES];
-    *t = (struct surface_tables){0};
-    if (!wanted(c)) return STATUS_OK;
-    if (model->appearance.kind != MODEL_SURFACE || model->appearance.surface->flat_section) {
-        worker_status_warn(c->status, "all pictures are rendered path by path: there are no tables for the model '%s'",
-                           model->appearance.id);
-        return STATUS_OK;
-    }
     const struct fast_precompute_request q = {.scene = c->scene,
                                               .model = model->appearance.surface,
                                               .param = model->fit.param,
@@ -50,13 +54,47 @@ status surface_tables_get(struct pipeline_context *c, const struct progress *pro
     return s;
 }
 
-void surface_tables_release(struct surface_tables *t) { fast_tables_release(&t->tables); }
-
-bool surface_tables_option(const struct surface_tables *t, const struct job_surface_picture *p,
-                           struct fast_option *option)
+status surface_tables_get(struct pipeline_context *c, const struct progress *progress, struct surface_tables *t,
+                          struct error *err)
 {
-    *option = (struct fast_option){.tables = &t->tables,
-                                   .n_traced = N_TRACED,
-                                   .corrected_share = p->method == JOB_PICTURE_CORRECTED ? corrected_share : 0.0};
-    return t->present && p->method != JOB_PICTURE_PATH;
+    const struct pipeline_model *model = &c->model[pipeline_best_model(c)];
+    const bool tables = wants_tables(c), averages = wants_averages(c);
+    *t = (struct surface_tables){0};
+    if (!tables && !averages) return STATUS_OK;
+    if (model->appearance.kind != MODEL_SURFACE || model->appearance.surface->flat_section) {
+        worker_status_warn(c->status, "all pictures are rendered path by path: there are no tables for the model '%s'",
+                           model->appearance.id);
+        return STATUS_OK;
+    }
+    status s = STATUS_OK;
+    if (averages) {
+        struct progress silent = progress_silent(progress);
+        s = dual_tables_init(&t->averages, c->scene, model->appearance.surface, model->fit.param, model->sets.n_set,
+                             c->pool, &silent, err);
+        t->averaged = s == STATUS_OK;
+    }
+    return s == STATUS_OK && tables ? get_tables(c, progress, t, err) : s;
+}
+
+void surface_tables_release(struct surface_tables *t)
+{
+    fast_tables_release(&t->tables);
+    dual_tables_release(&t->averages);
+}
+
+struct surface_method surface_tables_method(const struct surface_tables *t, const struct job_surface_picture *p)
+{
+    const bool dual = p->method == JOB_PICTURE_DUAL, has = dual ? t->averaged : t->present;
+    return (struct surface_method){
+        .method = has ? p->method : JOB_PICTURE_PATH,
+        .fast = {.tables = &t->tables,
+                 .n_traced = N_TRACED,
+                 .corrected_share = p->method == JOB_PICTURE_CORRECTED ? corrected_share : 0.0},
+        .dual = {&t->averages, DENSITY, DENSITY}};
+}
+
+void surface_method_apply(const struct surface_method *m, struct radiance_input *input)
+{
+    input->fast = by_tables(m->method) ? &m->fast : NULL;
+    input->dual = m->method == JOB_PICTURE_DUAL ? &m->dual : NULL;
 }

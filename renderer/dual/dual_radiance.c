@@ -1,0 +1,99 @@
+#include "renderer/dual/dual_radiance.h"
+#include "renderer/dual/dual_shade.h"
+#include "renderer/transport/camera.h"
+
+#include <stdlib.h>
+
+struct dual_state {
+    struct parameter_sets sets;
+    struct dual_setting *setting; /* per configuration */
+    struct camera *camera;        /* per configuration */
+};
+
+static void release(void *state)
+{
+    struct dual_state *s = state;
+    parameter_sets_release(&s->sets);
+    free(s->setting);
+    free(s->camera);
+    free(s);
+}
+
+static status check(const struct radiance_input *in, struct error *err)
+{
+    const struct dual_option *o = in->dual;
+    if (in->want_derivative)
+        return error_set(err, STATUS_INVALID, "cannot render by dual scattering with derivatives: it has none");
+    if (in->model->surface->flat_section)
+        return error_set_field(err, STATUS_INVALID, "model",
+                               "cannot render model '%s' by dual scattering: its fibers are flat", in->model->id);
+    if (!(o->density_forward >= 0 && o->density_forward <= 1 && o->density_backward >= 0 && o->density_backward <= 1))
+        return error_set(err, STATUS_INVALID, "cannot render by dual scattering with densities of %g and %g",
+                         (double)o->density_forward, (double)o->density_backward);
+    if (o->tables->n_set != (in->n_set > 1 ? in->n_set : 1))
+        return error_set(err, STATUS_INVALID, "cannot render by dual scattering: its averages are of another cloth");
+    return STATUS_OK;
+}
+
+static status prepare(const struct radiance_input *in, const struct configuration *c, size_t n_configuration,
+                      void **state, struct error *err)
+{
+    status st = check(in, err);
+    if (st != STATUS_OK) return st;
+    struct dual_state *s = calloc(1, sizeof *s);
+    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot use dual scattering: out of memory");
+    s->setting = calloc(n_configuration + 1, sizeof *s->setting);
+    s->camera = calloc(n_configuration + 1, sizeof *s->camera);
+    st = s->setting != NULL && s->camera != NULL
+             ? parameter_sets_init(&s->sets, in->scene.fibers, in->model->surface, in->param, in->n_set, err)
+             : error_set(err, STATUS_NO_MEMORY, "cannot use dual scattering: out of memory");
+    for (size_t i = 0; i < n_configuration && st == STATUS_OK; i++) {
+        path_setting_init_sets(&s->setting[i].path, in->scene.fibers, &s->sets, &c[i], false);
+        s->setting[i].option = in->dual;
+        camera_init(&s->camera[i], &c[i]);
+    }
+    if (st == STATUS_OK)
+        *state = s;
+    else
+        release(s);
+    return st;
+}
+
+static uint64_t trace(const void *state, const struct radiance_block *b, float *value)
+{
+    const struct dual_state *s = state;
+    const struct dual_setting *setting = &s->setting[b->member[0]];
+    const struct camera *camera = &s->camera[b->member[0]];
+    uint64_t n_hit = 0;
+    for (size_t i = 0; i < b->n_path; i++) {
+        struct scene_ray ray;
+        double xy[2];
+        if (progress_cancelled(b->progress)) break;
+        camera_blur(camera, b->xy[i], &b->rng[i], xy);
+        if (!camera_ray(camera, setting->path.scene, xy, &ray)) continue;
+        n_hit += dual_shade(setting, &ray, &b->rng[i], value + 3 * i);
+    }
+    return n_hit;
+}
+
+/* Closed forms cannot be recorded: they have no derivatives that a record would serve. */
+static void record_nothing(const void *state, size_t i_configuration, const double xy[2], struct rng *rng,
+                           struct radiance_record *record, float *value)
+{
+    (void)state, (void)i_configuration, (void)xy, (void)rng, (void)value;
+    record->n_entry = record->n_bounce = 0;
+}
+
+static double replay_nothing(const void *at, const void *traced, const struct radiance_record *record)
+{
+    (void)at, (void)traced, (void)record;
+    return 0.0;
+}
+
+const struct radiance_tracer dual_radiance = {.max_member = 1,
+                                              .entry_bytes = 1,
+                                              .prepare = prepare,
+                                              .release = release,
+                                              .trace = trace,
+                                              .record = record_nothing,
+                                              .replay = replay_nothing};

@@ -1,0 +1,127 @@
+"""Pictures that are not rendered path by path: by tables, corrected, by dual scattering, and beside their reference."""
+import json
+import math
+import os
+import subprocess
+
+import jsonschema
+import pytest
+from daemon_under_test import ROOT, problem, program
+from small_cloth import hair
+from test_surface_pictures import VIEW, document, render, run, run_worker
+
+
+def test_methods_show_the_same_cloth(tmp_path):
+    """By tables and corrected the means are those of path tracing, the latter within noise; the tables are kept."""
+    folder = tmp_path / "job"
+    (folder / "input").mkdir(parents=True)
+    view = {"on": "flat", "width_mm": 3, **VIEW, "samples": 64}
+    given = {"sample": "s", "fibers": {"file": "cloth.hair"},
+             "pictures": [{**view, "method": m} for m in ("path", "fast", "corrected")],
+             "fit": {"model": "isotropic.v1", "fixed": {"C": [0.8, 0.5, 0.3]}}}
+    (folder / "job.json").write_text(json.dumps(given))
+    (folder / "input/cloth.hair").write_bytes(hair(layers=3))
+    run_worker(folder)
+    path, fast, corrected = (json.loads((folder / f"results/pictures/on-{i}.json").read_text()) for i in (1, 2, 3))
+    assert [p["method"] for p in (path, fast, corrected)] == ["path", "fast", "corrected"]
+    assert (folder / "work/report/fast.tables").read_bytes().startswith(b"SELVFAST")
+    mean = sum(path["mean"]) / 3
+    assert abs(sum(fast["mean"]) / 3 - mean) < 0.1 * mean
+    se = math.hypot(path["noise"], corrected["noise"]) * mean / 16
+    assert abs(sum(corrected["mean"]) / 3 - mean) < 5 * se
+    assert fast["noise"] < path["noise"]
+
+
+def test_dual_scattering_is_a_method_like_the_others(tmp_path):
+    """On a cylinder with a sheet of its own and compared with path tracing: darker than that, and with less noise."""
+    folder = tmp_path / "job"
+    (folder / "input").mkdir(parents=True)
+    view = {"on": "cylinder", "radius_mm": 1, "width_mm": 3, **VIEW, "samples": 64, "method": "dual"}
+    given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "pictures": [{**view, "reference": True}, {**view, "black_sheet": False}],
+             "fit": {"model": "two_lobe.v1", "fixed": {"C_R": [0.1] * 3, "C_TT": [0.6, 0.4, 0.2], "beta_R": 6, "beta_TT": 12, "gamma_TT": 30}}}
+    (folder / "job.json").write_text(json.dumps(given))
+    (folder / "input/cloth.hair").write_bytes(hair(layers=3))
+    run_worker(folder)
+    first, second = (json.loads((folder / f"results/pictures/on-{i}.json").read_text()) for i in (1, 2))
+    assert first["method"] == second["method"] == "dual" and not (folder / "work/report/fast.tables").exists()
+    assert "reference" not in second and first["reference"]["noise"] > first["noise"]
+    for dual, path in zip(first["mean"], first["reference"]["mean"]):
+        assert 0.5 * path < dual < 1.1 * path, first
+    assert (folder / "results/pictures/on-1-reference.png").exists() and (folder / "results/pictures/on-2.exr").exists()
+    with open(os.path.join(ROOT, "config", "result.schema.json"), encoding="utf-8") as text:
+        jsonschema.Draft202012Validator(json.load(text)).validate(json.loads((folder / "results/result.json").read_text()))
+
+
+def test_fibers_without_tables_are_path_traced(tmp_path):
+    folder = tmp_path / "job"
+    (folder / "input").mkdir(parents=True)
+    given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "pictures": [{"on": "flat", **VIEW, "method": "dual"}],
+             "fit": {"model": "microflake.v1", "density_multiplier_per_cm": 3000, "fixed": {"alpha": [0.9, 0.8, 0.7], "gamma": 0.3}}}
+    (folder / "job.json").write_text(json.dumps(given))
+    (folder / "input/cloth.hair").write_bytes(hair(layers=3))
+    run_worker(folder)
+    result = json.loads((folder / "results/result.json").read_text())
+    assert result["pictures"][0]["method"] == "path" and any("no tables" in w for w in result["warnings"]), result["warnings"]
+
+
+def test_a_sheet_of_its_own_has_no_tables(tmp_path):
+    folder = tmp_path / "job"
+    (folder / "input").mkdir(parents=True)
+    given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "black_sheet": True,
+             "pictures": [{"on": "flat", **VIEW, "method": "fast", "black_sheet": False}],
+             "fit": {"model": "isotropic.v1", "fixed": {"C": [0.8, 0.5, 0.3]}}}
+    (folder / "job.json").write_text(json.dumps(given))
+    (folder / "input/cloth.hair").write_bytes(hair(layers=3))
+    p = subprocess.run([program("selvedge-worker"), "--quiet", str(folder)], capture_output=True, timeout=120)
+    assert p.returncode == 1
+    assert "black sheet of the job" in json.loads((folder / "status.json").read_text())["error"]["text"]
+
+
+def test_a_picture_beside_its_reference(tmp_path):
+    """The comparison follows from the two pictures; a run that has lost it makes it again, with the same bits."""
+    folder = tmp_path / "job"
+    (folder / "input").mkdir(parents=True)
+    view = {"on": "flat", "width_mm": 3, **VIEW, "samples": 64, "reference": True}
+    given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "pictures": [{**view, "method": m} for m in ("fast", "corrected")],
+             "fit": {"model": "isotropic.v1", "fixed": {"C": [0.8, 0.5, 0.3]}}}
+    (folder / "job.json").write_text(json.dumps(given))
+    (folder / "input/cloth.hair").write_bytes(hair(layers=3))
+    run_worker(folder)
+    pictures = folder / "results/pictures"
+    for i in (1, 2):
+        p = json.loads((pictures / f"on-{i}.json").read_text())
+        r = p["reference"]
+        assert r["file"] == f"pictures/on-{i}-reference.exr" and r["samples"] == 64
+        assert (pictures / f"on-{i}-reference.png").read_bytes().startswith(b"\x89PNG")
+        brightness = sum(r["mean"]) / 3
+        assert r["mean_difference"] == pytest.approx([(a - b) / brightness for a, b in zip(p["mean"], r["mean"])], abs=1e-5)
+        both = math.hypot(p["noise"] * sum(p["mean"]) / 3, r["noise"] * brightness) / brightness
+        assert math.sqrt(sum(s * s for s in r["mean_difference_se"]) / 3) == pytest.approx(both / 16, rel=1e-3)
+        assert r["field_noise"] == pytest.approx(both / 4, rel=1e-3), "all fields are lit: 16 pixels each"
+        if i == 2:
+            assert all(abs(d) < 5 * s for d, s in zip(r["mean_difference"], r["mean_difference_se"])), "corrected has no error"
+    with open(os.path.join(ROOT, "config", "result.schema.json"), encoding="utf-8") as text:
+        jsonschema.Draft202012Validator(json.load(text)).validate(json.loads((folder / "results/result.json").read_text()))
+    whole = (pictures / "on-1.json").read_bytes()
+    lost = json.loads(whole)
+    del lost["reference"]
+    (pictures / "on-1.json").write_text(json.dumps(lost))
+    (folder / "work/report.done").unlink()
+    os.utime(pictures / "on-1.exr", (1, 1))
+    run_worker(folder)
+    assert (pictures / "on-1.json").read_bytes() == whole
+
+
+def test_a_path_traced_picture_is_its_own_reference(real):
+    doc = {"sample": "s", "fibers": {"file": "a.hair"}, "pictures": [{"on": "flat", **VIEW, "reference": True}], "fit": {"model": "two_lobe.v1"}}
+    assert "method" in problem(real.post("/v1/jobs", json=doc), 422, "invalid", "pictures[0].reference")["detail"]
+
+
+def test_the_command_prints_the_comparison(real, tmp_path):
+    job, _ = run(real, {k: v for k, v in document().items() if k != "pictures"})
+    shown = render(real, job, "--on", "flat", "--px", 16, "--samples", 16, "--width-mm", 3, "--reference", "--out", tmp_path / "out")
+    assert shown.returncode == 0, shown.stderr
+    picture = json.loads((tmp_path / "out/pictures/on-1.json").read_text())
+    assert picture["method"] == "fast"
+    assert f"{100 * picture['reference']['field_difference_rms']:.2f} % root mean square" in shown.stdout, shown.stdout
+    assert f"mean radiance in blue: {100 * picture['reference']['mean_difference'][2]:+.2f} %" in shown.stdout
