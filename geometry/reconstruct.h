@@ -9,8 +9,8 @@
 #include "base/progress.h"
 #include "base/thread_pool.h"
 #include "base/warning.h"
-#include "geometry/fibers/fiber_seam.h"
 #include "geometry/fibers/fiber_set.h"
+#include "geometry/fibers/seam/fiber_seam.h"
 #include "geometry/fibers/shape/radius.h"
 #include "geometry/grade/scan_grade.h"
 #include "geometry/grade/scan_trial.h"
@@ -65,14 +65,14 @@ struct reconstruct_report {
     struct tile_crop tile;                    /* with option "crop" or if a matrix was used; else all zero */
     struct seam_density seam_density;         /* of the volume as used */
     struct fiber_seam seam_found, seam_fiber; /* of the fibers as found, and as used with their ends joined */
-    size_t n_seam_joined;
-    double density_low, density_high; /* scanner values */
-    double separability;              /* of void and material in the histogram, 0..1 (density_map.h) */
-    struct scan_noise noise;          /* of the scan, and after smoothing */
-    double lumen_share;               /* filled lumens over material; 0 if the fibers are solid */
-    bool lumens_found;                /* they were filled because the fibers look hollow */
-    struct lumen_evidence lumen;      /* whether the fibers look hollow */
-    double fiber_diameter_voxel;      /* given, or measured from the volume before the filter */
+    struct seam_join seam_join;               /* all zero if they were not joined */
+    double density_low, density_high;         /* scanner values */
+    double separability;                      /* of void and material in the histogram, 0..1 (density_map.h) */
+    struct scan_noise noise;                  /* of the scan, and after smoothing */
+    double lumen_share;                       /* filled lumens over material; 0 if the fibers are solid */
+    bool lumens_found;                        /* they were filled because the fibers look hollow */
+    struct lumen_evidence lumen;              /* whether the fibers look hollow */
+    double fiber_diameter_voxel;              /* given, or measured from the volume before the filter */
     /* The peak that the measured diameter was preferred to (fiber_diameter.h), and the shares of noise in both; NaN if
      * there is none, or the diameter was given. */
     double other_diameter_voxel, diameter_noise_share, other_diameter_noise_share;

@@ -20,7 +20,9 @@ export function qualityRows(g) {
   const t = g.trial;
   if (t) rows.push(["what this scan can give", `${percent(t.recall, 1)} of the length, axes to ${number(t.axis_rms_voxel, 2)} voxels, ${number(t.fragments)} pieces a fiber, ${number(t.merges, 2)} merges, radii to ${percent(t.radius_rms, 1)}`,
     "of a phantom of these fibers with the noise and blur of this scan"]);
-  rows.push(["fiber ends that continue", pair(g.seam_fibers?.continued, (x) => percent(x, 0)), "across the seams in x / y"]);
+  const s = g.seam_fibers;
+  rows.push(["fiber ends that continue", pair(s?.continued, (x) => percent(x, 0)),
+    s?.found && s.n_joined > 0 ? `across the seams in x / y; ${pair(s.found.continued, (x) => percent(x, 0))} as found, ${s.n_joined} pairs joined` : "across the seams in x / y"]);
   const a = g.alignment;
   if (a) rows.push(["alignment", a.applied ? `turned ${number(a.rotation_deg)}°, sheared ${number(a.shear_deg)}°, tilted ${number(a.tilt_deg)}°` : "not needed or not possible",
     isNumber(a.standard_error_deg) && a.outcome === "found" ? `standard error ${number(a.standard_error_deg, 2)}°` : ""]);

@@ -18,6 +18,7 @@ void pipeline_context_init(struct pipeline_context *c)
     observation_set_init(&c->row);
     observation_set_init(&c->contrast);
     fiber_set_init(&c->fiber);
+    fiber_set_init(&c->traced);
     c->exports = json_array();
     c->surface_pictures = json_array();
     for (size_t i = 0; i < sizeof c->stage_wall_s / sizeof c->stage_wall_s[0]; i++) c->stage_wall_s[i] = NAN;
@@ -37,6 +38,7 @@ void pipeline_context_release(struct pipeline_context *c)
     volume_release(&c->volume);
     direction_volume_release(&c->direction);
     fiber_set_release(&c->fiber);
+    fiber_set_release(&c->traced);
     fiber_set_release(&c->uncorrected);
     scratch_space_free(c->space);
     scene_free(c->scene);

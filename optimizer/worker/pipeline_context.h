@@ -163,6 +163,7 @@ struct pipeline_context {
     struct volume volume; /* empty when not in memory: pipeline_need_volume */
     struct direction_volume direction;
     struct fiber_set fiber;
+    struct fiber_set traced;      /* the fibers of a scan before their ends are joined across the seams; else empty */
     struct fiber_set uncorrected; /* the fibers before the job's corrections; empty without these */
     struct cloth_report cloth;    /* of a described cloth */
     struct pipeline_texture texture;

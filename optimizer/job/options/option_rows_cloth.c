@@ -153,7 +153,8 @@ const struct job_option option_rows_cloth[] = {
      .kind = OPTION_BOOL,
      INTO(join_seams),
      .standard = "true",
-     .meaning = "Ends of fibers that meet across a seam within two radii are brought together."},
+     .meaning = "Yarns and fibers that are cut at a face of the tile are joined to those of the opposite face: a "
+                "smooth warp, then ends within six radii."},
     {.path = "volume.unresolved_fibers",
      .kind = OPTION_BOOL,
      INTO(unresolved_fibers),

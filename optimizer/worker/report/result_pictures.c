@@ -86,7 +86,7 @@ static status write_slice(const struct pipeline_context *c, int axis, struct err
     uint8_t *rgb = NULL;
     size_t width, height;
     status s =
-        reconstruct_slice_picture(&c->volume, &c->fiber, axis, c->volume.n[axis] / 2, &rgb, &width, &height, err);
+        reconstruct_slice_picture(&c->volume, &c->traced, axis, c->volume.n[axis] / 2, &rgb, &width, &height, err);
     if (s != STATUS_OK) return s;
     s = result_picture_write(c, name[axis], rgb, width, height, err);
     if (s == STATUS_OK && axis == 2) s = result_thumbnail_of_bytes(c, rgb, width, height, err);

@@ -65,6 +65,11 @@ def test_alignment_and_crop_can_be_repeated(real, phantom):
     assert g["grade"]["verdict"] in ("resolved", "partly") and 0.5 < g["grade"]["safe_share"] <= 1
     assert g["crop"]["keep"] == 0.6 and len(g["crop"]["mismatch"]) == 2
     assert all(r > 0 for r in g["seam_density"]["ratio"]) and len(g["direction_noise_deg"]) == 2
+    seam = g["seam_fibers"]
+    assert seam["n_joined"] > 0 and all(len(seam[k]) == 2 for k in ("n_end", "offset_um", "angle_deg", "step_inside", "warp_um", "shift_um"))
+    for a in range(2):  # joining closes the seam: more ends continue, and closer
+        assert seam["found"]["continued"][a] <= seam["continued"][a] and seam["continued"][a] > 0.6
+        assert seam["offset_um"][a] < 0.5 * seam["found"]["offset_um"][a] and 0 <= seam["step"][a] <= 1
     assert any("corners from outside of the scan" in w for w in corners["warnings"]) and corners["geometry"]["alignment"] is None
     options = g["options"]
     by_hand = {**volume, "matrix": options["matrix"]}

@@ -138,6 +138,24 @@ static void figure(FILE *out, double v)
         fputs("<td class=\"number\">&ndash;</td>", out);
 }
 
+/* how: what is said of the fibers behind each label. */
+static void print_seam_fibers(const struct fiber_seam *s, const char *how, FILE *out)
+{
+    fprintf(out, "<tr><td>fiber ends that continue in the next tile%s</td>", how);
+    for (int a = 0; a < 2; a++)
+        if (s->n_end[a] > 0)
+            fprintf(out, "<td class=\"number\">%.0f %% of %zu</td>", 100.0 * s->share[a], s->n_end[a]);
+        else
+            fputs("<td class=\"number\">no ends</td>", out);
+    fprintf(out, "</tr>\n<tr><td>their mean offset%s, um</td>", how);
+    for (int a = 0; a < 2; a++) figure(out, s->offset_m[a] * 1e6);
+    fprintf(out, "</tr>\n<tr><td>mean angle between them%s, degrees</td>", how);
+    for (int a = 0; a < 2; a++) figure(out, s->angle_rad[a] * 180.0 / M_PI);
+    fprintf(out, "</tr>\n<tr><td>step of the section that fibers fill%s (0 to 1; within the tile)</td>", how);
+    for (int a = 0; a < 2; a++) fprintf(out, "<td class=\"number\">%.2f (%.2f)</td>", s->step[a], s->step_inside[a]);
+    fputs("</tr>\n", out);
+}
+
 static void print_seam(const struct pipeline_context *c, FILE *out)
 {
     const struct reconstruct_report *g = &c->geometry;
@@ -151,17 +169,14 @@ static void print_seam(const struct pipeline_context *c, FILE *out)
         for (int a = 0; a < 2; a++) figure(out, g->seam_density.ratio[a]);
         fputs("</tr>\n", out);
     }
-    const struct fiber_seam *s = &g->seam_fiber;
-    fputs("<tr><td>fiber ends that continue in the next tile</td>", out);
-    for (int a = 0; a < 2; a++)
-        if (s->n_end[a] > 0)
-            fprintf(out, "<td class=\"number\">%.0f %% of %zu</td>", 100.0 * s->share[a], s->n_end[a]);
-        else
-            fputs("<td class=\"number\">no ends</td>", out);
-    fputs("</tr>\n", out);
-    if (g->n_seam_joined > 0) {
-        fputs("<tr><td>their mean offset before the ends were brought together, um</td>", out);
-        for (int a = 0; a < 2; a++) figure(out, g->seam_found.offset_m[a] * 1e6);
+    const bool joined = g->seam_join.n_joined > 0;
+    print_seam_fibers(&g->seam_fiber, joined ? ", joined" : "", out);
+    if (joined) {
+        print_seam_fibers(&g->seam_found, ", as found", out);
+        fputs("<tr><td>move of the yarns at the seam by a smooth warp of the tile (root mean square), um</td>", out);
+        for (int a = 0; a < 2; a++) figure(out, g->seam_join.warp_m[a] * 1e6);
+        fputs("</tr>\n<tr><td>mean move of the joined ends in addition, um</td>", out);
+        for (int a = 0; a < 2; a++) figure(out, g->seam_join.shift_m[a] * 1e6);
         fputs("</tr>\n", out);
     }
     if (c->option.crop) {
@@ -171,8 +186,8 @@ static void print_seam(const struct pipeline_context *c, FILE *out)
         fputs("</tr>\n", out);
     }
     fputs("</table>\n", out);
-    if (g->n_seam_joined > 0)
-        fprintf(out, "<p>%zu pairs of ends were brought together across the seams.</p>\n", g->n_seam_joined);
+    if (joined)
+        fprintf(out, "<p>%zu pairs of ends were brought together across the seams.</p>\n", g->seam_join.n_joined);
 }
 
 static void print_chosen(const struct pipeline_context *c, FILE *out)

@@ -37,14 +37,28 @@ static json_t *seam_density_json(const struct seam_density *s)
                      json_number_list(s->neighbour, 2, 1.0), "ratio", json_number_list(s->ratio, 2, 1.0));
 }
 
+static json_t *seam_json(const struct fiber_seam *s)
+{
+    json_t *json = json_pack("{s:o, s:o, s:o, s:o}", "n_end", json_count_list(s->n_end, 2), "continued",
+                             json_number_list(s->share, 2, 1.0), "offset_um", json_number_list(s->offset_m, 2, 1e6),
+                             "angle_deg", json_number_list(s->angle_rad, 2, 180.0 / M_PI));
+    json_object_set_new(json, "step", json_number_list(s->step, 2, 1.0));
+    json_object_set_new(json, "step_inside", json_number_list(s->step_inside, 2, 1.0));
+    return json;
+}
+
+/* Of the fibers in use, and as they were found. */
 static json_t *seam_fibers_json(const struct reconstruct_report *g)
 {
-    const struct fiber_seam *s = &g->seam_fiber;
-    const double *found_m = g->seam_found.offset_m;
-    return json_pack("{s:o, s:o, s:o, s:o, s:o}", "offset_found_um",
-                     g->n[0] > 0 ? json_number_list(found_m, 2, 1e6) : json_null(), "n_end",
-                     json_count_list(s->n_end, 2), "continued", json_number_list(s->share, 2, 1.0), "offset_um",
-                     json_number_list(s->offset_m, 2, 1e6), "n_joined", json_count(g->n_seam_joined));
+    const bool scanned = g->n[0] > 0;
+    json_t *json = seam_json(&g->seam_fiber);
+    json_object_set_new(json, "n_joined", json_count(g->seam_join.n_joined));
+    json_object_set_new(json, "found", scanned ? seam_json(&g->seam_found) : json_null());
+    json_object_set_new(json, "offset_found_um",
+                        scanned ? json_number_list(g->seam_found.offset_m, 2, 1e6) : json_null());
+    json_object_set_new(json, "warp_um", scanned ? json_number_list(g->seam_join.warp_m, 2, 1e6) : json_null());
+    json_object_set_new(json, "shift_um", scanned ? json_number_list(g->seam_join.shift_m, 2, 1e6) : json_null());
+    return json;
 }
 
 /* All options that were given or chosen, under their names in the job document. */

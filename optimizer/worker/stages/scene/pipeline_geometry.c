@@ -196,10 +196,24 @@ static void drop_unseen(struct pipeline_context *c)
     c->geometry.total_length_m = fiber_set_length_m(&c->fiber);
 }
 
+/* Joins the ends of the fibers across the seams of the tile, once the voxels of the scan have taken their
+ * directions: the joined fibers no longer lie where the scan shows them near the faces. */
+static status join_seams(struct pipeline_context *c, struct error *err)
+{
+    struct reconstruct_report *g = &c->geometry;
+    if (c->fiber.n_fiber == 0) return STATUS_OK;
+    status s = fiber_set_copy(&c->fiber, &c->traced, err);
+    if (s == STATUS_OK) s = fiber_seam_measure(&c->fiber, &g->seam_found, err);
+    if (s == STATUS_OK && c->doc->join_seams) s = fiber_seam_join(&c->fiber, &g->seam_join, err);
+    if (s == STATUS_OK) s = fiber_set_validate(&c->fiber, err);
+    return s == STATUS_OK ? fiber_seam_measure(&c->fiber, &g->seam_fiber, err) : s;
+}
+
 status stage_directions(struct pipeline_context *c, struct error *err)
 {
     status s = reconstruct_transfer(&c->fiber, &c->direction, c->pool, &c->progress, &c->geometry, err);
     if (s == STATUS_OK) drop_unseen(c);
+    if (s == STATUS_OK) s = join_seams(c, err);
     return s == STATUS_OK ? store_direction(c, "directions", err) : s;
 }
 
@@ -207,7 +221,7 @@ status stage_directions_load(struct pipeline_context *c, struct error *err)
 {
     status s = load_direction(c, "directions", err);
     if (s == STATUS_OK) drop_unseen(c);
-    return s;
+    return s == STATUS_OK ? join_seams(c, err) : s;
 }
 
 /* ---- fibers ---- */
@@ -302,8 +316,6 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
     status s;
     if (c->doc->has_volume) {
         s = trace_fibers(c, err);
-        if (s == STATUS_OK) s = fiber_seam_measure(&c->fiber, &c->geometry.seam_found, err);
-        if (s == STATUS_OK && c->doc->join_seams) s = fiber_seam_join(&c->fiber, &c->geometry.n_seam_joined, err);
         if (s == STATUS_OK) warn_diameter(c);
     } else {
         s = c->doc->cloth != NULL ? build_cloth(c, err) : read_fiber_file(c, err);
@@ -313,7 +325,7 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
     }
     if (s == STATUS_OK) s = fiber_set_validate(&c->fiber, err);
     if (s == STATUS_OK) s = check_groups(c, err);
-    if (s == STATUS_OK) s = fiber_seam_measure(&c->fiber, &c->geometry.seam_fiber, err);
+    if (s == STATUS_OK && !c->doc->has_volume) s = fiber_seam_measure(&c->fiber, &c->geometry.seam_fiber, err);
     if (s == STATUS_OK) s = pipeline_work_path(c, "fibers", "fibers.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
     if (s != STATUS_OK) return s;

@@ -1,6 +1,6 @@
 /* The procedural cloth: it follows its numbers smoothly, closes at the faces, and refuses what cannot be. */
 #include "geometry/cloth/cloth.h"
-#include "geometry/fibers/fiber_seam.h"
+#include "geometry/fibers/seam/fiber_seam.h"
 #include "geometry/phantom/compare.h"
 
 #include <math.h>
