@@ -188,6 +188,7 @@ struct job_document {
     uint64_t path_budget; /* 0: the method's default */
     bool share_camera_paths;
     double plain_prior; /* strength; 0: none */
+    bool discrepancy;
     /* The density multiplier is the last parameter of a volume model. Its entries in job_model.fixed and
      * job_model.start follow from the next two members. */
     double density_multiplier_per_cm; /* NaN: the model's default */

@@ -65,6 +65,13 @@ struct pipeline_scan_error {
     struct pipeline_uncorrected uncorrected;
 };
 
+/* The smooth factor on the renderings of a model's cloth (pipeline_discrepancy.h), and relative RMS errors without
+ * it. */
+struct pipeline_discrepancy {
+    struct discrepancy factor;
+    double fit_rel_rms, heldout_rel_rms; /* NaN without rows of that set */
+};
+
 /* One model of the job: its parameters, and the results of its fit. */
 struct pipeline_model {
     struct appearance appearance;
@@ -75,6 +82,7 @@ struct pipeline_model {
     struct cloth_search_result cloth; /* when numbers of the cloth are fitted; `fit` is its part without the numbers */
     struct pipeline_scan_error scan_error;
     struct validation validation;
+    struct pipeline_discrepancy discrepancy;
     struct derivative_check certificate;  /* of the free parameters at the result; filled in before the report */
     struct pipeline_candidate *candidate; /* doc->n_candidate of them, best first; NULL when none were asked for */
 };

@@ -29,6 +29,8 @@ static status check(const struct radiance_input *in, struct error *err)
     double tile_mm[2];
     if (in->want_derivative)
         return error_set(err, STATUS_INVALID, "cannot render by tables with derivatives: tables have none");
+    if (in->discrepancy != NULL)
+        return error_set(err, STATUS_INVALID, "cannot render by tables with a discrepancy: tables have none");
     if (in->model->surface->flat_section)
         return error_set_field(err, STATUS_INVALID, "model", "cannot render model '%s' by tables: its fibers are flat",
                                in->model->id);

@@ -15,6 +15,7 @@
 #include "renderer/scattering/appearance.h"
 #include "renderer/scene/configuration.h"
 #include "renderer/scene/scene.h"
+#include "renderer/transport/discrepancy.h"
 #include "renderer/transport/volume/volume_scene.h"
 
 enum { RADIANCE_BLOCK_PATHS = 256, RADIANCE_NAME_BYTES = 56 };
@@ -34,7 +35,9 @@ struct radiance_input {
     const double *param; /* max(n_set, 1) * model->n_param, internal units, one set after the other */
     size_t n_set;        /* parameter sets for the material groups of the fibers; 0 and 1: one set for all fibers */
     bool want_derivative;
-    const struct fast_option *fast; /* NULL: path tracing; otherwise fibers are rendered by tables, without
+    const struct discrepancy *discrepancy; /* a factor on what the cloth of a surface model sends to the camera
+                                              (discrepancy.h); NULL: 1. Neither for recorded paths nor by tables */
+    const struct fast_option *fast;        /* NULL: path tracing; otherwise fibers are rendered by tables, without
                                        derivatives */
     const struct dual_option *dual; /* NULL, or fibers by dual scattering, without derivatives */
     bool plain_paths; /* trace no guided shadow paths (path_tracer.h): same means, more variance; volumes have none */

@@ -1,6 +1,7 @@
 """How well are measured fabrics reproduced by described cloths? Prints figures cloth.*, one JSON object on a line.
 
-    bench_cloth.py [--build DIR] [--keep DIR] [--tables DIR] [--models IDS] [--plain-prior X] [--starts N] [WHAT ...]
+    bench_cloth.py [--build DIR] [--keep DIR] [--tables DIR] [--models IDS] [--plain-prior X] [--starts N] [--no-discrepancy]
+                   [WHAT ...]
 
 WHAT: names of tables or of recoveries; default: everything. All tables go through the same procedure: one job for each
 of the descriptions in DESCRIPTIONS, whose cloth numbers are fitted together with the scattering parameters. The job
@@ -91,7 +92,7 @@ def bench_table(arguments, table):
     sample = os.path.splitext(os.path.basename(table))[0]
     fit = {"models": arguments.models.split(","), "render_px": 16, "render_samples": 4,
            "path_budget": arguments.starts * arguments.path_budget, "starts": arguments.starts,
-           "plain_prior": arguments.plain_prior}
+           "plain_prior": arguments.plain_prior, "discrepancy": arguments.discrepancy}
     best, wall_s = None, 0.0
     for name, cloth in DESCRIPTIONS.items():
         document = {"sample": f"{sample} as {name}", "cloth": cloth, "measurements": {"file": os.path.basename(table)}, "fit": fit}
@@ -106,6 +107,8 @@ def bench_table(arguments, table):
     brdf = best["skill"]["plain_brdf"]["heldout_rel_rms"]
     figure(f"cloth.real.{sample}.fit_rel_rms", best["fit_rel_rms"], "1")
     figure(f"cloth.real.{sample}.heldout_rel_rms", best["heldout_rel_rms"], "1")
+    fibers = best["discrepancy"]["heldout_rel_rms_without"] if best["discrepancy"] else best["heldout_rel_rms"]
+    figure(f"cloth.real.{sample}.fibers_heldout_rel_rms", fibers, "1")
     figure(f"cloth.real.{sample}.heldout_worst_channel_rel_rms", max(best["heldout_channel_rel_rms"]), "1")
     figure(f"cloth.real.{sample}.brdf_heldout_rel_rms", brdf, "1")
     figure(f"cloth.real.{sample}.wall_s", round(wall_s, 1), "s")
@@ -311,6 +314,7 @@ def main():
     parser.add_argument("--path-budget", type=int, default=6000000, help="paths of each start")
     parser.add_argument("--starts", type=int, default=1, help="searches of each job of a table, of which cross-validation keeps one")
     parser.add_argument("--plain-prior", type=float, default=1, help="fit.plain_prior of the tables' jobs")
+    parser.add_argument("--discrepancy", action=argparse.BooleanOptionalAction, default=True, help="fit.discrepancy of the tables' jobs")
     parser.add_argument("--recovery-budget", type=int, default=18000000, help="paths of a recovery")
     parser.add_argument("--recovery-model", default="textile.v3", help="model of the recoveries")
     parser.add_argument("what", nargs="*", help="tables or recoveries")

@@ -11,6 +11,10 @@
  * are fitted like the others but not scored. With one gain for each photograph the residuals are without these gains
  * (linear_gain.h).
  *
+ * With a discrepancy (discrepancy_fit.h) each fold has one of its own, by the predicted residuals of the rows left in.
+ * It counts by a share in [0, 1], the same for all folds, which is the one with the lowest error; so the error is too
+ * low by what one number can gain.
+ *
  * Source: Stone 1974, Cross-validatory choice and assessment of statistical predictions; the update of a linear model
  * without some of its rows is as in Hastie, Tibshirani, Friedman 2009, section 7.10.
  */
@@ -28,6 +32,8 @@ struct cross_validation {
     double rel_square;             /* mean square of the relative errors; may be below 0 by noise */
     double rel_rms;                /* sqrt(max(0, rel_square)) */
     double rel_rms_se;             /* by the scatter between folds, which contains that of the model's misfit */
+    double discrepancy_share;      /* 0 where no discrepancy was asked for */
+    double plain_rel_rms;          /* the error with a share of 0 */
     double fold_square[FOLDS_MAX]; /* sum of the squares of a fold */
     double fold_count[FOLDS_MAX];  /* numbers (three for each row) in that sum */
 };
@@ -36,8 +42,8 @@ struct cross_validation {
  * rows when there are fewer than FOLDS_LEAST folds, or when the rows outside a fold have no more
  * numbers than there are free parameters. STATUS_NO_MEMORY, and the errors of bounded_quadratic. */
 status cross_validation_compute(const struct linear_model *m, const struct observation_set *o,
-                                const struct coordinate *k, const bool *fixed, struct cross_validation *out,
-                                struct error *err);
+                                const struct coordinate *k, const bool *fixed, bool discrepancy,
+                                struct cross_validation *out, struct error *err);
 
 /* Difference of rel_square, b minus a, of two fits to the same rows, and its standard error by the scatter of the
  * folds' differences. Both must have folds. */

@@ -67,6 +67,7 @@ struct fit_problem {
     /* standard deviation of ln gain of every configuration, which is marginalised; 0: none. Methods without gains
      * ignore it */
     double gain_sd;
+    bool discrepancy; /* cross-validation with a discrepancy (discrepancy_fit.h), whose share it finds */
 };
 
 struct fit_result {

@@ -211,7 +211,7 @@ static status finish(struct sgd *g, const struct winner *best, struct fit_result
         uncertainty_compute(&model, g->run.coordinate, g->run.fixed, &result->uncertainty);
         judge(best, result);
         s = cross_validation_compute(&model, problem->observation, g->run.coordinate, g->run.fixed,
-                                     &result->cross_validation, err);
+                                     problem->discrepancy, &result->cross_validation, err);
     }
     linear_model_release(&model);
     linear_history_release(&history);

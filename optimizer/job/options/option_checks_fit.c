@@ -30,6 +30,10 @@ status job_check_nuisance(const struct option_value *v, struct error *err)
         return error_set_field(err, STATUS_INVALID, v->path,
                                "'%s' cannot be used with 'fit.plain_prior': the plain BRDF does not know these faults",
                                v->path);
+    if (v->doc->discrepancy && (o->gain != JOB_GAIN_NONE || o->stray_light))
+        return error_set_field(err, STATUS_INVALID, v->path,
+                               "'%s' cannot be used with 'fit.discrepancy': it would take these faults for the cloth's",
+                               v->path);
     return STATUS_OK;
 }
 

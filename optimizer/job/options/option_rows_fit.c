@@ -103,6 +103,15 @@ const struct job_option option_rows_fit[] = {
          "How much the fit listens to a plain BRDF that is fitted to the same rows: 0, not at all; 1, as much as "
          "was best for a dozen measured rows of a described cloth (docs/model.md, section 5). With few rows many "
          "cloths fit them, and differ in between; this chooses among these. Not together with `nuisance`."},
+    {.path = "fit.discrepancy",
+     .kind = OPTION_BOOL,
+     .id = OPTION_DISCREPANCY,
+     INTO(discrepancy),
+     .standard = "false",
+     .meaning =
+         "Whether what the fibers leave of the measured radiances is kept as a smooth factor on all renderings of the "
+         "cloth, as far as it predicts rows that were left out (docs/model.md, section 5). For measured fabrics, whose "
+         "fibers no model describes exactly. Not together with `nuisance`; models of volumes go without it."},
     {.path = "fit.fixed",
      .kind = OPTION_OWN,
      .unit = "degrees for angles",

@@ -2,6 +2,7 @@
 #include "base/angle.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/cloth/result_geometry.h"
+#include "optimizer/worker/report/discrepancy_json.h"
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/report/photograph_json.h"
 #include "optimizer/worker/report/result_numbers.h"
@@ -326,6 +327,7 @@ static json_t *result_json(struct pipeline_context *c, picture_name *picture)
     json_object_set_new(json, "rows", rows);
     json_object_set_new(json, "models", models);
     json_object_set_new(json, "skill", skill_json(c));
+    json_object_set_new(json, "discrepancy", discrepancy_json(best));
     json_object_set_new(json, "radius", radius_json(c));
     json_object_set(json, "exports", c->exports);
     json_object_set(json, "pictures", c->surface_pictures);

@@ -6,6 +6,7 @@
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_thumbnail.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
+#include "optimizer/worker/stages/result/pipeline_discrepancy.h"
 #include "renderer/transport/render.h"
 
 #include <errno.h>
@@ -167,14 +168,17 @@ static status write_rendering(struct pipeline_context *c, size_t i, const char *
     if (exists(path)) return STATUS_OK;
     const struct pipeline_model *m = &c->model[pipeline_best_model(c)];
     const size_t px = result_picture_px(c, (double)m->fit.n_path);
-    const struct render_request q = {
-        .input = {.scene = pipeline_scene(c), .model = &m->appearance, .param = m->fit.param, .n_set = m->sets.n_set},
-        .configuration = &c->observation.item[i].configuration,
-        .width = px,
-        .height = px,
-        .n_sample = result_picture_samples(c, (double)m->fit.n_path),
-        .seed = c->doc->seed ^ 0x70696374757265u,
-        .stream = (uint32_t)i};
+    const struct render_request q = {.input = {.scene = pipeline_scene(c),
+                                               .model = &m->appearance,
+                                               .param = m->fit.param,
+                                               .n_set = m->sets.n_set,
+                                               .discrepancy = pipeline_discrepancy(m)},
+                                     .configuration = &c->observation.item[i].configuration,
+                                     .width = px,
+                                     .height = px,
+                                     .n_sample = result_picture_samples(c, (double)m->fit.n_path),
+                                     .seed = c->doc->seed ^ 0x70696374757265u,
+                                     .stream = (uint32_t)i};
     status s = render_run(&q, c->pool, progress, &im, err);
     if (s != STATUS_OK) return s;
     s = result_image_write(c, &im, "renderings", name, exposure, true, err);

@@ -5,6 +5,7 @@
 #include "optimizer/worker/report/result_numbers.h"
 #include "optimizer/worker/report/result_options_json.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
+#include "optimizer/worker/stages/result/pipeline_discrepancy.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -130,6 +131,17 @@ static void print_skill(const struct pipeline_context *c, FILE *out)
     fprintf(out, "\n");
 }
 
+/* What the fibers alone come to, where the renderings have a factor besides. */
+static void print_discrepancy(const struct pipeline_context *c, FILE *out)
+{
+    const struct pipeline_model *m = &c->model[pipeline_best_model(c)];
+    if (pipeline_discrepancy(m) == NULL) return;
+    fprintf(out, "the fibers alone, without the discrepancy  %.3g %% fitted", 100.0 * m->discrepancy.fit_rel_rms);
+    if (isfinite(m->discrepancy.heldout_rel_rms))
+        fprintf(out, ", %.3g %% held out", 100.0 * m->discrepancy.heldout_rel_rms);
+    fprintf(out, "\n");
+}
+
 static void print_cloth(const struct pipeline_context *c, FILE *out)
 {
     fprintf(out, "cloth    %zu fibers, %zu vertices, tile %.3f x %.3f mm\n", c->fiber.n_fiber, c->fiber.n_vertex,
@@ -183,6 +195,7 @@ static void print_summary(struct pipeline_context *c, FILE *out)
                 c->radius.curve.at_bound ? " (at the edge of its range)" : "");
     print_errors(c, m, out);
     print_skill(c, out);
+    print_discrepancy(c, out);
     fprintf(out, "objective %.5g +- %.2g; rendered means have standard errors below %.2f %%\n\n",
             m->validation.fit.value, m->validation.fit.se, 100.0 * m->validation.worst_rel_se);
     print_parameters(m, out);

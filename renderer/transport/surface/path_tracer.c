@@ -1,4 +1,4 @@
-#include "renderer/transport/surface/path_walk.h"
+#include "renderer/transport/surface/path_discrepancy.h"
 
 #include "renderer/transport/path_value.h"
 
@@ -73,6 +73,7 @@ static float connect_lamp(struct walk *w, const struct lamp *lamp, float weight,
     struct scene_ray shadow;
     leave(w, b, direction, &shadow);
     if (scene_occluded(s->scene, &shadow)) return 0;
+    path_discrepancy_apply(w, b->normal, direction, value);
     add_light(w, value, w->score);
     return light;
 }
@@ -108,6 +109,7 @@ static void connect_image(struct walk *w, const struct bounce *b)
     struct scene_ray shadow;
     leave(w, b, direction, &shadow);
     if (scene_occluded(s->scene, &shadow)) return;
+    path_discrepancy_apply(w, b->normal, direction, value);
     add_light_to_all(w, value, w->score);
     if (w->step != NULL) {
         memcpy(w->step->image_wi, wi, sizeof wi);
@@ -132,6 +134,7 @@ static void add_beyond(struct walk *w, const struct scene_ray *ray, float pdf)
             value[c] = w->throughput[c] * beyond[c];
         }
         w->out = w->first_out + i;
+        path_discrepancy_apply(w, w->normal, ray->direction, value);
         if (value[0] + value[1] + value[2] > 0) add_light(w, value, NULL);
         if (w->step != NULL) memcpy(w->step->escape, beyond, sizeof beyond);
     }
@@ -151,13 +154,15 @@ static void bounce_at(struct walk *w, const struct scene_hit *hit, const struct 
     const float back[3] = {-ray->direction[0], -ray->direction[1], -ray->direction[2]};
     b->hit = *hit;
     memcpy(b->offset_mm, ray->offset_mm, sizeof b->offset_mm);
-    float normal[3];
-    if (!w->s->model->flat_section)
+    const bool flat = w->s->model->flat_section;
+    const bool bent = (flat || w->s->discrepancy != NULL) && scene_bent_normal(w->s->scene, hit, b->normal);
+    if (!flat)
         fiber_frame_from(&b->frame, hit->tangent);
-    else if (scene_bent_normal(w->s->scene, hit, normal))
-        fiber_frame_flat_in(&b->frame, hit->tangent, normal);
+    else if (bent)
+        fiber_frame_flat_in(&b->frame, hit->tangent, b->normal);
     else
         fiber_frame_flat(&b->frame, hit->tangent);
+    if (!bent) memcpy(b->normal, (const float[3]){0, 0, 1}, sizeof b->normal);
     fiber_frame_to_local(&b->frame, back, b->wo);
     if (w->s->n_set == 1) return;
     w->i_set = scene_group_of(w->s->scene, hit->i_segment);
@@ -362,6 +367,7 @@ static void walk_on(struct walk *w, struct scene_ray *ray, struct path_record *r
         w->first_out->n_bounce++;
         w->step = next_step(record);
         bounce_at(w, &hit, ray, &b);
+        if (s->discrepancy != NULL) path_discrepancy_note(w, &b, ray);
         if (w->step != NULL) {
             memcpy(w->step->wo, b.wo, sizeof b.wo);
             w->step->i_group = scene_group_of(s->scene, hit.i_segment);

@@ -10,6 +10,7 @@
 #include "base/rng.h"
 #include "renderer/scattering/scattering.h"
 #include "renderer/scene/scene_ray.h"
+#include "renderer/transport/discrepancy.h"
 #include "renderer/transport/light/light_guide.h"
 #include "renderer/transport/light/lights.h"
 #include "renderer/transport/surface/parameter_sets.h"
@@ -34,6 +35,9 @@ struct path_setting {
     void (*finish)(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,
                    float rgb[3]);
     const void *finish_context;
+    /* Factor on the light that leaves the cloth towards the camera; NULL: 1. Not for recorded paths, nor for what
+     * finish adds. */
+    const struct discrepancy *discrepancy;
     bool want_jacobian;
 };
 

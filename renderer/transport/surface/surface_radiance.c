@@ -43,6 +43,7 @@ static status prepare(const struct radiance_input *in, const struct configuratio
     for (size_t i = 0; i < n_configuration; i++) {
         path_setting_init_sets(&s->setting[i], s->scene, &s->sets, &c[i], in->want_derivative);
         if (in->plain_paths) s->setting[i].guided_paths = false;
+        s->setting[i].discrepancy = in->discrepancy;
         camera_init(&s->camera[i], &c[i]);
     }
     *state = s;

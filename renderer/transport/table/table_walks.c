@@ -20,6 +20,7 @@ status table_walks_init(struct table_walks *w, const struct radiance_input *in, 
     status s = parameter_sets_init(&w->sets, w->scene, in->model->surface, in->param, in->n_set, err);
     if (s != STATUS_OK) return s;
     path_setting_init_sets(&w->setting, w->scene, &w->sets, &none, false);
+    w->setting.discrepancy = in->discrepancy;
     w->setting.guided_paths = false; /* one for each of so many lights would cost more than it gains */
     return STATUS_OK;
 }

@@ -205,7 +205,7 @@ static status finish(struct gauss_newton *g, struct fit_result *result, struct e
     result->prior_penalty = linear_model_penalty(&g->model, g->x);
     uncertainty_compute(&g->model, g->run.coordinate, g->run.fixed, &result->uncertainty);
     return cross_validation_compute(&g->model, g->run.problem->observation, g->run.coordinate, g->run.fixed,
-                                    &result->cross_validation, err);
+                                    g->run.problem->discrepancy, &result->cross_validation, err);
 }
 
 /* Paths of one iteration with the fewest paths. */

@@ -9,6 +9,7 @@
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/report/result_pictures.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
+#include "optimizer/worker/stages/result/pipeline_discrepancy.h"
 #include "renderer/transport/render.h"
 
 #include <math.h>
@@ -51,14 +52,17 @@ static status render_tile(const struct textures *t, bool black_sheet, struct ima
         SAMPLES_OF_A_RENDERING * result_picture_samples(c, (double)c->model[pipeline_best_model(c)].fit.n_path);
     status s = scene_new(&c->fiber, &(struct scene_option){.black_sheet = black_sheet}, &scene, err);
     if (s != STATUS_OK) return s;
-    const struct render_request q = {
-        .input = {.scene = {.fibers = scene}, .model = &m->appearance, .param = m->fit.param, .n_set = m->sets.n_set},
-        .configuration = &above,
-        .width = t->maps.width,
-        .height = t->maps.height,
-        .n_sample = n_sample > MIN_SAMPLE ? n_sample : MIN_SAMPLE,
-        .seed = c->doc->seed ^ 0x74657874757265u,
-        .stream = STREAM};
+    const struct render_request q = {.input = {.scene = {.fibers = scene},
+                                               .model = &m->appearance,
+                                               .param = m->fit.param,
+                                               .n_set = m->sets.n_set,
+                                               .discrepancy = pipeline_discrepancy(m)},
+                                     .configuration = &above,
+                                     .width = t->maps.width,
+                                     .height = t->maps.height,
+                                     .n_sample = n_sample > MIN_SAMPLE ? n_sample : MIN_SAMPLE,
+                                     .seed = c->doc->seed ^ 0x74657874757265u,
+                                     .stream = STREAM};
     s = render_run(&q, c->pool, &c->progress, im, err);
     scene_free(scene);
     return s;

@@ -4,6 +4,7 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/export/export_formats.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
+#include "optimizer/worker/stages/result/pipeline_discrepancy.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -72,6 +73,10 @@ static void warn_of_rest(const struct export_scene *e)
     if (e->c->environment != NULL)
         worker_status_warn(e->c->status, "the exported scenes have no image of the surroundings: add '%s' to them",
                            e->c->doc->environment_file);
+    if (pipeline_discrepancy(e->model) != NULL)
+        worker_status_warn(
+            e->c->status, "the exported fibers are rendered without the discrepancy, which other programs do not know; "
+                          "exported textures contain it");
 }
 
 static bool any_wanted(const struct pipeline_context *c)

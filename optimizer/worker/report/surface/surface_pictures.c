@@ -10,6 +10,7 @@
 #include "optimizer/worker/report/surface/surface_passes.h"
 #include "optimizer/worker/report/surface/surface_tables.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
+#include "optimizer/worker/stages/result/pipeline_discrepancy.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -203,7 +204,7 @@ static status render(struct pipeline_context *c, const struct one_picture *one, 
 {
     const struct job_surface_picture *p = &c->doc->surface_picture[one->i];
     const struct pipeline_model *model = &c->model[pipeline_best_model(c)];
-    bool compared = p->reference && one->how.method != JOB_PICTURE_PATH;
+    bool traced = one->how.method == JOB_PICTURE_PATH, compared = p->reference && !traced;
     struct surface_cloth cloth;
     struct configuration view = observation_configuration(
         c->doc, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg, p->camera_phi_deg, p->cloth_rotation_deg);
@@ -215,7 +216,8 @@ static status render(struct pipeline_context *c, const struct one_picture *one, 
         .input = {.scene = {.fibers = cloth.fibers, .volume = cloth.volume.bent != NULL ? &cloth.volume : NULL},
                   .model = &model->appearance,
                   .param = model->fit.param,
-                  .n_set = model->sets.n_set},
+                  .n_set = model->sets.n_set,
+                  .discrepancy = traced ? pipeline_discrepancy(model) : NULL},
         .configuration = &view,
         .width = p->px,
         .height = p->px,
@@ -225,6 +227,8 @@ static status render(struct pipeline_context *c, const struct one_picture *one, 
     surface_method_apply(&one->how, &q.input);
     struct progress_part part;
     struct progress first = progress_begin_part(&part, progress, 0.0, compared ? 0.5 : 1.0);
+    if (!traced && pipeline_discrepancy(model) != NULL)
+        worker_status_warn(c->status, "picture %zu is not path traced, and goes without the discrepancy", one->i + 1);
     if (s == STATUS_OK) s = render_picture(c, one, &q, &first, so_far, entry, err);
     first = progress_begin_part(&part, progress, 0.5, 0.5);
     if (s == STATUS_OK && compared) s = render_reference(c, one, q, &first, so_far, *entry, err);

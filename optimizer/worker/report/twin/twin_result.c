@@ -4,6 +4,7 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
+#include "optimizer/worker/stages/result/pipeline_discrepancy.h"
 #include "renderer/scene/scene_ray.h"
 
 #include <stdlib.h>
@@ -91,8 +92,11 @@ status twin_result_write(struct pipeline_context *c, double from, double to, str
                                               .n_basis = BASIS,
                                               .n_path = c->doc->twin_paths,
                                               .seed = c->doc->seed ^ 0x7477696eu};
-    const struct radiance_input in = {
-        .scene = {.fibers = c->scene}, .model = &m->appearance, .param = m->fit.param, .n_set = m->sets.n_set};
+    const struct radiance_input in = {.scene = {.fibers = c->scene},
+                                      .model = &m->appearance,
+                                      .param = m->fit.param,
+                                      .n_set = m->sets.n_set,
+                                      .discrepancy = pipeline_discrepancy(m)};
     struct appearance_table t;
     struct progress_part part;
     struct progress progress = progress_begin_part(&part, &c->progress, from, to - from);

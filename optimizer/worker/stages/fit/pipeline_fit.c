@@ -56,6 +56,7 @@ static struct fit_problem problem_of(struct fit_listener *l, const struct progre
                                 .observation = &c->row,
                                 .path_budget = c->doc->path_budget,
                                 .max_iteration = c->doc->max_iteration,
+                                .discrepancy = c->doc->discrepancy,
                                 .report = on_step,
                                 .report_context = l,
                                 .progress = progress};
@@ -260,7 +261,7 @@ static status store_fits(struct pipeline_context *c, struct error *err)
     size_t n = result_sections(c, section);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
-    return s == STATUS_OK ? work_file_write(path, "fit.11", section, n, err) : s;
+    return s == STATUS_OK ? work_file_write(path, "fit.12", section, n, err) : s;
 }
 
 status stage_fit_load(struct pipeline_context *c, struct error *err)
@@ -270,7 +271,7 @@ status stage_fit_load(struct pipeline_context *c, struct error *err)
     size_t n = result_sections(c, section);
     pipeline_correction_priors(c);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
-    if (s == STATUS_OK) s = work_file_read(path, "fit.11", section, n, err);
+    if (s == STATUS_OK) s = work_file_read(path, "fit.12", section, n, err);
     if (s == STATUS_OK && c->doc->fit_radius) s = pipeline_radius_apply(c, err);
     for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) conclude_fit(c, &c->model[i]);
     return s;

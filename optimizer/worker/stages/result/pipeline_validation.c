@@ -5,6 +5,7 @@
 #include "optimizer/worker/stages/fit/pipeline_trace.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
 #include "optimizer/worker/stages/result/pipeline_contrast.h"
+#include "optimizer/worker/stages/result/pipeline_discrepancy.h"
 #include "optimizer/worker/work_file.h"
 
 #include <math.h>
@@ -173,6 +174,8 @@ static status validate_model(struct pipeline_context *c, size_t i_model, size_t 
     s = estimate_validation(c, m, &estimator, &of_means, n_path, err);
     if (s == STATUS_OK) s = pipeline_validate_contrast(c, i_model, n_path, &of_contrasts, err);
     if (s == STATUS_OK) s = score_validation(c, m, err);
+    if (s == STATUS_OK) s = pipeline_find_discrepancy(c, m, err);
+    if (s == STATUS_OK && pipeline_discrepancy(m) != NULL) s = score_validation(c, m, err);
     if (s != STATUS_OK) goto out;
     log_info(c->log,
              "validation of %s: relative RMS error %.4f +- %.4f over the fitted rows, %.4f +- %.4f over the held-out "
@@ -185,35 +188,38 @@ out:
     return s;
 }
 
-_Static_assert(4 * JOB_MAX_MODEL <= WORK_FILE_MAX_SECTION, "a checkpoint has room for the estimates of all models");
-static void estimate_sections(struct pipeline_context *c, struct work_section section[4 * JOB_MAX_MODEL])
+enum { MAX_SECTION = 5 * JOB_MAX_MODEL };
+_Static_assert((int)MAX_SECTION <= (int)WORK_FILE_MAX_SECTION, "a checkpoint has room for the estimates of all models");
+static void estimate_sections(struct pipeline_context *c, struct work_section section[MAX_SECTION])
 {
     for (size_t i = 0; i < 4 * c->n_model; i++) {
         struct validation *v = &c->model[i / 4].validation;
         section[i] = (struct work_section){i % 4 < 2 ? v->replica[i % 2] : v->contrast[i % 2],
                                            c->observation.n * sizeof(struct estimate)};
     }
+    for (size_t i = 0; i < c->n_model; i++)
+        section[4 * c->n_model + i] = (struct work_section){&c->model[i].discrepancy, sizeof c->model[i].discrepancy};
 }
 
 static status store_validations(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    struct work_section section[4 * JOB_MAX_MODEL];
+    struct work_section section[MAX_SECTION];
     estimate_sections(c, section);
     status s = pipeline_work_path(c, "validation", "estimates.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
-    return s == STATUS_OK ? work_file_write(path, "validation.3", section, 4 * c->n_model, err) : s;
+    return s == STATUS_OK ? work_file_write(path, "validation.4", section, 5 * c->n_model, err) : s;
 }
 
 status stage_validation_load(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    struct work_section section[4 * JOB_MAX_MODEL];
+    struct work_section section[MAX_SECTION];
     status s = allocate_validations(c, err);
     if (s == STATUS_OK) s = pipeline_work_path(c, "validation", "estimates.bin", path, err);
     if (s != STATUS_OK) return s;
     estimate_sections(c, section);
-    s = work_file_read(path, "validation.3", section, 4 * c->n_model, err);
+    s = work_file_read(path, "validation.4", section, 5 * c->n_model, err);
     for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) s = score_validation(c, &c->model[i], err);
     if (s == STATUS_OK) pipeline_warn_choice(c);
     return s;

@@ -1,0 +1,15 @@
+/* The discrepancy of a fitted cloth (optimizer/fit/discrepancy): found from the fitted rows' fresh estimates, and
+ * applied to the estimates of all rows. Pictures and tables of the cloth are rendered with it. */
+#ifndef SELVEDGE_OPTIMIZER_PIPELINE_DISCREPANCY_H
+#define SELVEDGE_OPTIMIZER_PIPELINE_DISCREPANCY_H
+
+#include "optimizer/worker/pipeline_context.h"
+
+/* For radiance_input: NULL where there is none. */
+const struct discrepancy *pipeline_discrepancy(const struct pipeline_model *m);
+/* Finds the factor of a model whose rows have been estimated and scored, and multiplies these estimates by it. There
+ * is none where the job does not ask for one, where it does not lower the error of rows that are left out, and for
+ * volumes. The last two give a warning. STATUS_NO_MEMORY. */
+status pipeline_find_discrepancy(struct pipeline_context *c, struct pipeline_model *m, struct error *err);
+
+#endif
