@@ -36,10 +36,11 @@ struct radiance_input {
     size_t n_set;        /* parameter sets for the material groups of the fibers; 0 and 1: one set for all fibers */
     bool want_derivative;
     const struct discrepancy *discrepancy; /* a factor on what the cloth of a surface model sends to the camera
-                                              (discrepancy.h); NULL: 1. Neither for recorded paths nor by tables */
+                                              (discrepancy.h); NULL: 1. Not for recorded paths, by tables or by dual
+                                              scattering */
     const struct fast_option *fast;        /* NULL: path tracing; otherwise fibers are rendered by tables, without
                                        derivatives */
-    const struct dual_option *dual; /* NULL, or fibers by dual scattering, without derivatives */
+    const struct dual_option *dual;        /* NULL, or fibers by dual scattering, without derivatives */
     bool plain_paths; /* trace no guided shadow paths (path_tracer.h): same means, more variance; volumes have none */
 };
 
