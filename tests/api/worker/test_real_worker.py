@@ -113,6 +113,15 @@ def strip(result):
     return [(p["name"], p["value"], p["standard_error"]) for p in result["parameters"]]
 
 
+def command_line(pid):
+    """Empty for a process that has ended meanwhile."""
+    try:
+        with open(f"/proc/{pid}/cmdline", encoding="utf-8", errors="replace") as text:
+            return text.read()
+    except OSError:
+        return ""
+
+
 @pytest.mark.parametrize("victim", ["worker", "daemon"])
 def test_killed_in_mid_fit_and_resumed_bit_for_bit(tmp_path, scan, finished, real, victim):
     whole = real.job(finished[0])["result"]
@@ -124,7 +133,7 @@ def test_killed_in_mid_fit_and_resumed_bit_for_bit(tmp_path, scan, finished, rea
         d.start()
     else:
         folder = os.path.join(d.data, "jobs", job)
-        pids = [p for p in os.listdir("/proc") if p.isdigit() and folder in open(f"/proc/{p}/cmdline").read()]
+        pids = [p for p in os.listdir("/proc") if p.isdigit() and folder in command_line(p)]
         assert len(pids) == 1
         os.kill(int(pids[0]), 9)
     done = d.wait_state(job, "succeeded", "failed", timeout_s=180)
