@@ -110,6 +110,8 @@ static const struct setting table[] = {
     NUMBER("webhook", "max_tries", webhook_max_tries, 16, 1, 1000, "tries after which a delivery is given up"),
     NUMBER("jobs", "time_limit_s", time_limit_s, 0, 0, 31536000,
            "time in seconds that a worker may run; its job then fails, and a retry resumes it; 0: no limit"),
+    NUMBER("jobs", "check_limit_s", check_limit_s, 300, 1, 86400,
+           "time in seconds in which a worker must have judged the files of a job that is not started yet"),
     WORD("access", "required", access_required, "auto", required_words,
          "whether requests need a token: auto, once one was ever made; always, also with a database that has none"),
     NUMBER("access", "requests_per_minute", requests_per_minute, 0, 0, 1000000,

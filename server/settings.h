@@ -23,7 +23,7 @@ struct settings {
     char worker[SETTING_TEXT_BYTES], sandbox[SETTING_TEXT_BYTES], pass_environment[SETTING_TEXT_BYTES];
     int64_t threads, scratch_limit_bytes, file_limit_bytes, open_files, oom_score_adj;
     int64_t nice, memory_limit_bytes, resident_limit_bytes, volume_memory_bytes, cancel_grace_s, max_lost_attempts,
-        heartbeat_timeout_s, time_limit_s;
+        heartbeat_timeout_s, time_limit_s, check_limit_s;
     /* [webhook] */
     char webhook_url[SETTING_TEXT_BYTES], webhook_secret_file[SETTING_TEXT_BYTES];
     int64_t webhook_timeout_s, webhook_retry_s, webhook_max_tries;

@@ -44,7 +44,7 @@ static status run_worker(const char *document, const char *folder, json_t **repo
     return STATUS_OK;
 }
 
-static size_t print_list(const json_t *list, const char *label, FILE *out)
+size_t cli_print_faults(const json_t *list, const char *label, FILE *out)
 {
     size_t i;
     const json_t *item;
@@ -78,8 +78,8 @@ status cli_check(struct cli *cli, int *exit_code, struct error *err)
     }
     size_t n_fault = json_array_size(json_object_get(report, "faults"));
     if (s == STATUS_OK && !a->json) {
-        print_list(json_object_get(report, "faults"), "fault", cli->out);
-        size_t n_warning = print_list(json_object_get(report, "warnings"), "warning", cli->out);
+        cli_print_faults(json_object_get(report, "faults"), "fault", cli->out);
+        size_t n_warning = cli_print_faults(json_object_get(report, "warnings"), "warning", cli->out);
         fprintf(cli->out, "%lld files, %zu faults, %zu warnings%s\n",
                 json_integer_value(json_object_get(report, "n_file")), n_fault, n_warning,
                 n_fault == 0 ? ": the job can be submitted" : "");

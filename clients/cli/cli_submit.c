@@ -282,6 +282,22 @@ static status start_job(struct submit *u, struct error *err)
     return s == STATUS_OK ? s : error_prefix(err, s, "cannot start the job");
 }
 
+/* Prints every fault and warning that the server's worker finds in the files. STATUS_INVALID when there are faults. */
+static status judge_files(struct submit *u, struct error *err)
+{
+    char path[256];
+    json_t *report = NULL;
+    status s = cli_job_path(u->id, "/check", path, sizeof path, err);
+    if (s == STATUS_OK) s = http_json(u->cli->http, "POST", path, NULL, NULL, &report, err);
+    if (s != STATUS_OK) return error_prefix(err, s, "cannot have the files judged");
+    const size_t n = cli_print_faults(json_object_get(report, "errors"), "fault", u->cli->note);
+    cli_print_faults(json_object_get(report, "warnings"), "warning", u->cli->note);
+    json_decref(report);
+    return n == 0 ? STATUS_OK
+                  : error_set(err, STATUS_INVALID, "the input has %zu fault%s, so the job is not started", n,
+                              n == 1 ? "" : "s");
+}
+
 status cli_submit_document(struct cli *cli, const json_t *document, const char *folder, char id[CLI_ID_BYTES],
                            struct error *err)
 {
@@ -341,6 +357,7 @@ status cli_submit(struct cli *cli, int *exit_code, struct error *err)
     if ((s = hash_files(&u, err)) != STATUS_OK) goto out;
     if (cli->args->resume_id == NULL && (s = create_job(&u, err)) != STATUS_OK) goto out;
     if ((s = send_files(&u, err)) != STATUS_OK) goto out;
+    if (!cli->args->draft && (s = judge_files(&u, err)) != STATUS_OK) goto out;
     if (!cli->args->draft && (s = start_job(&u, err)) != STATUS_OK) goto out;
     fprintf(cli->out, "%s\n", u.id);
     fflush(cli->out);

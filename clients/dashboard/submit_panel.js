@@ -184,13 +184,16 @@ export function submitPanel(handed = [], copy = null) {
         }
         if (state.state !== "complete") await upload(file, state.upload_url, piece, label);
       }
-      await sendJson("POST", `/v1/jobs/${job.id}/start`);
+      say("Looking into the files ...");
+      await sendJson("POST", `/v1/jobs/${job.id}/start?check=1`);
       key = newKey(); // submitting the same document again makes another job
       sent = new Map();
       location.hash = job.id;
     } catch (error) {
-      say(error.message, true);
-      if (error.body?.field) editor.mark(error.body.field, error.message);
+      const faults = error.body?.errors ?? [];
+      say(faults.length > 1 ? [`The input has ${faults.length} faults:`, ...faults.map((f) => (f.field ? `${f.field}: ${f.detail}` : f.detail))].join("\n") : error.message, true);
+      if (faults.length > 1) for (const f of faults) if (f.field) await editor.mark(f.field, f.detail);
+      if (faults.length <= 1 && error.body?.field) editor.mark(error.body.field, error.message);
     }
     busy = false;
     allow();

@@ -38,6 +38,7 @@ static const char usage[] =
     "  --quiet            log to JOBDIR/log.txt only\n"
     "  --check JOB.json   check the document and its files (in JOBDIR), and print all faults and warnings as JSON;\n"
     "                     exit status 1 when there are faults\n"
+    "  --no-links         refuse inputs that are links to files outside of JOBDIR, also in a folder made by hand\n"
     "  --catalogue        print the scattering models with their parameters, the descent methods and the codes that\n"
     "                     explain why a fit ended, as JSON\n"
     "  --version, --help\n"
@@ -50,7 +51,7 @@ struct arguments {
     const char *speeds; /* NULL: none are remembered */
     const char *check;  /* a document to check; NULL: the job is run */
     size_t n_thread, memory_mib, scratch_mib;
-    bool quiet;
+    bool quiet, no_links;
     enum confine_mode sandbox;
     struct confinement confinement;
 };
@@ -121,6 +122,7 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
                                            {"sandbox", required_argument, NULL, 'b'},
                                            {"confined", required_argument, NULL, 'C'},
                                            {"quiet", no_argument, NULL, 'q'},
+                                           {"no-links", no_argument, NULL, 'l'},
                                            {"help", no_argument, NULL, 'h'},
                                            {"version", no_argument, NULL, 'v'},
                                            {"catalogue", no_argument, NULL, 'c'},
@@ -130,11 +132,10 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
         if (c == 'h') return fputs(usage, stdout) < 0;
         if (c == 'c') return print_catalogue();
         if (c == 'v') return puts(RESULT_PROGRAM) < 0;
-        if (c == 'q')
-            a->quiet = true;
-        else if (c == '?')
-            return fputs(usage, stderr) < 0 ? WORKER_FAILED : WORKER_USAGE;
-        if (c == 'q' || take_value(c, optarg, a)) continue;
+        if (c == 'q') a->quiet = true;
+        if (c == 'l') a->no_links = true;
+        if (c == '?') return fputs(usage, stderr) < 0 ? WORKER_FAILED : WORKER_USAGE;
+        if (c == 'q' || c == 'l' || take_value(c, optarg, a)) continue;
         fprintf(stderr, "selvedge-worker: '%s' is not an allowed value\n", optarg);
         return WORKER_USAGE;
     }
@@ -235,8 +236,8 @@ static status run_job(struct pipeline_context *c, const struct arguments *a, str
     worker_status_stage(c->status, "volume", "Reading the job", 0, 8);
     status s = thread_pool_new(a->n_thread, &c->pool, err);
     if (s == STATUS_OK) s = pipeline_read_inputs(c, err);
-    if (is_of_input(s)) name_other_faults(c, err);
     if (s == STATUS_OK) s = pipeline_run(c, err);
+    if (is_of_input(s)) name_other_faults(c, err);
     if (s != STATUS_OK) shorten_paths(c, err->text);
     if (s == STATUS_OK && a->speeds != NULL) remember_speeds(c, a->speeds);
     return s;
@@ -290,7 +291,8 @@ static status report_sandbox(struct pipeline_context *c, const struct arguments 
 static void enter_sandbox(struct arguments *a, char **argv, struct error *err)
 {
     struct confinement *c = &a->confinement;
-    const struct confine_files files = {.folder = a->folder, .document = a->check, .speeds = a->speeds};
+    const struct confine_files files = {
+        .folder = a->folder, .document = a->check, .speeds = a->speeds, .no_links = a->no_links};
     if (a->sandbox == CONFINE_OFF) {
         if (a->check == NULL) worker_prepare(a->folder, c);
         return;

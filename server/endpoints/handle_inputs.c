@@ -1,10 +1,12 @@
-/* What a client may know before it sends something: what is wrong with a document, and which bytes are here already. */
+/* What a client may know before it sends or starts something: what is wrong with a document or with the files of a job,
+ * and which bytes are here already. */
 #include "optimizer/job/check/job_faults.h"
 #include "optimizer/job/job_document.h"
 #include "server/endpoints/handlers.h"
 #include "server/endpoints/request_json.h"
 #include "server/http/http_reply.h"
 #include "server/jobs/job_service.h"
+#include "server/workers/input_judge.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -37,6 +39,42 @@ void handle_check_document(struct http_request *r)
                    json_pack("{s:b,s:o,s:o}", "valid", list->n == 0, "errors", job_faults_json(list), "files", files));
     job_document_free(doc);
     free(list);
+}
+
+/* The faults of the job's files; NULL after a reply. */
+static json_t *judge(struct http_request *r)
+{
+    json_t *report = NULL;
+    struct error err = {0};
+    struct job_refusal refusal = {0};
+    if (input_judge(r->service, r->param[0], &report, &refusal, &err) == STATUS_OK) return report;
+    reply_problem(r, refusal.code, &err, NULL);
+    return NULL;
+}
+
+void handle_check_job(struct http_request *r)
+{
+    json_t *report = judge(r);
+    if (report != NULL) reply_json(r, MHD_HTTP_OK, report);
+}
+
+bool check_inputs(struct http_request *r)
+{
+    struct error err = {0};
+    json_t *report = judge(r);
+    if (report == NULL) return false;
+    json_t *errors = json_object_get(report, "errors"), *first = json_array_get(errors, 0);
+    const size_t n = json_array_size(errors);
+    if (n > 0) {
+        const char *field = json_string_value(json_object_get(first, "field")),
+                   *detail = json_string_value(json_object_get(first, "detail"));
+        error_set_field(&err, STATUS_INVALID, field != NULL ? field : "",
+                        n == 1 ? "%s" : "%s (the first of %zu faults of the input)", detail != NULL ? detail : "", n);
+        reply_problem(r, NULL, &err,
+                      json_pack("{s:O, s:O}", "errors", errors, "warnings", json_object_get(report, "warnings")));
+    }
+    json_decref(report);
+    return n == 0;
 }
 
 void handle_find_input(struct http_request *r)

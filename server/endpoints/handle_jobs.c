@@ -167,7 +167,20 @@ static void begin_job(struct http_request *r, bool retry)
         reply_job(r, r->param[0], changed ? MHD_HTTP_ACCEPTED : MHD_HTTP_OK, false, false);
 }
 
-void handle_start_job(struct http_request *r) { begin_job(r, false); }
+/* Whether a start would queue the job: only then are its files judged, on request. */
+static bool would_start(struct http_request *r)
+{
+    struct job_row row;
+    return job_look(r->service, r->param[0], &row, NULL) == STATUS_OK &&
+           (row.state == JOB_DRAFT || row.state == JOB_FAILED || row.state == JOB_CANCELLED);
+}
+
+void handle_start_job(struct http_request *r)
+{
+    long long check;
+    if (!query_integer(r, "check", 0, 1, 0, &check)) return;
+    if (check == 0 || !would_start(r) || check_inputs(r)) begin_job(r, false);
+}
 void handle_retry_job(struct http_request *r) { begin_job(r, true); }
 
 void handle_cancel_job(struct http_request *r)

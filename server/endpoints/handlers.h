@@ -25,6 +25,10 @@ void handle_get_file(struct http_request *r);
 void handle_delete_file(struct http_request *r);
 /* handle_inputs.c */
 void handle_check_document(struct http_request *r);
+void handle_check_job(struct http_request *r);
+/* Judges the files of a job that is to be started. Returns false after deciding a reply: 422 with all faults, or why
+ * they could not be judged. */
+bool check_inputs(struct http_request *r);
 void handle_find_input(struct http_request *r);
 /* handle_uploads.c */
 void handle_upload_offset(struct http_request *r);

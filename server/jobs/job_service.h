@@ -29,6 +29,7 @@ struct job_service {
     struct backup_keeper *backup;  /* NULL when the settings say that there are no backups */
     pthread_mutex_t change;        /* held from reading a row to writing it back */
     atomic_bool stopping;
+    atomic_int n_judging; /* checks of input files that run now (server/workers/input_judge.h) */
     atomic_uint_least64_t n_attempt_total, n_lost_total, n_finished_total[JOB_N_STATE];
 };
 

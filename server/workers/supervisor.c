@@ -202,7 +202,8 @@ static void launch(struct supervisor *u, const struct job_row *row)
     snprintf(slot->job_id, sizeof slot->job_id, "%s", job_id);
     snprintf(slot->owner, sizeof slot->owner, "%s", row->owner);
     path_join(speeds, u->v->settings->data, "speeds.json", NULL);
-    const struct worker_paths paths = {u->worker, folder, console, speeds};
+    const struct worker_paths paths = {
+        .program = u->worker, .job_folder = folder, .console = console, .speeds = speeds};
     s = worker_launch(&paths, u->v->settings, &slot->pid, &err);
     if (s == STATUS_OK) {
         log_info(u->v->log, "job %s: worker %d started", job_id, (int)slot->pid);
@@ -368,6 +369,8 @@ status supervisor_start(struct job_service *v, const char *worker_program, struc
     *out = u;
     return STATUS_OK;
 }
+
+const char *supervisor_program(const struct supervisor *u) { return u->worker; }
 
 void supervisor_wake(struct supervisor *u)
 {

@@ -17,7 +17,7 @@ enum { EXIT_CANNOT_EXECUTE = 127, MAX_VARIABLE = 64, NUMBER_BYTES = 24 };
 struct start {
     const char *program;
     char *const *argv, *const *environment;
-    int console_fd, null_fd;
+    int output_fd, error_fd, null_fd;
     const struct settings *settings;
     char oom_score_adj[NUMBER_BYTES];
     pid_t parent;
@@ -52,7 +52,7 @@ static void set_limits(const struct start *s)
 static _Noreturn void become_worker(const struct start *s)
 {
     setsid();
-    if (dup2(s->null_fd, 0) < 0 || dup2(s->console_fd, 1) < 0 || dup2(s->console_fd, 2) < 0) _exit(EXIT_CANNOT_EXECUTE);
+    if (dup2(s->null_fd, 0) < 0 || dup2(s->output_fd, 1) < 0 || dup2(s->error_fd, 2) < 0) _exit(EXIT_CANNOT_EXECUTE);
     if (close_range(3, ~0U, 0) != 0) _exit(EXIT_CANNOT_EXECUTE);
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() != s->parent) _exit(EXIT_CANNOT_EXECUTE);
@@ -109,9 +109,11 @@ static void set_arguments(const struct worker_paths *p, const struct settings *s
     snprintf(a->memory_mib, NUMBER_BYTES, "%lld", (long long)(s->volume_memory_bytes >> 20));
     snprintf(a->scratch_mib, NUMBER_BYTES, "%lld", (long long)((s->scratch_limit_bytes >> 20) + 1));
     snprintf(a->threads, NUMBER_BYTES, "%lld", (long long)s->threads);
-    const char *const always[] = {p->program, "--memory-mib", a->memory_mib, "--speeds",
-                                  p->speeds,  "--sandbox",    s->sandbox};
+    const char *const always[] = {p->program, "--memory-mib", a->memory_mib, "--sandbox", s->sandbox};
     for (size_t i = 0; i < sizeof always / sizeof *always; i++) add(a, always[i]);
+    add(a, p->document != NULL ? "--check" : "--speeds");
+    add(a, p->document != NULL ? p->document : p->speeds);
+    if (p->document != NULL) add(a, "--no-links");
     if (s->threads > 0) {
         add(a, "--threads");
         add(a, a->threads);
@@ -134,17 +136,22 @@ status worker_launch(const struct worker_paths *paths, const struct settings *se
                         .argv = a.argv,
                         .environment = variable,
                         .settings = settings,
-                        .console_fd = -1,
+                        .output_fd = paths->report_fd,
+                        .error_fd = -1,
                         .null_fd = open("/dev/null", O_RDONLY | O_CLOEXEC),
                         .parent = getpid()};
     snprintf(new.oom_score_adj, NUMBER_BYTES, "%lld", (long long)settings->oom_score_adj);
     if (new.null_fd < 0) return error_set_errno(err, "cannot open '/dev/null'");
-    new.console_fd = open(paths->console, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0600);
-    if (new.console_fd < 0)
-        s = error_set_errno(err, "cannot write '%s'", paths->console);
+    if (paths->document != NULL)
+        new.error_fd = open("/dev/null", O_WRONLY | O_CLOEXEC);
+    else
+        new.output_fd = new.error_fd =
+            open(paths->console, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0600);
+    if (new.error_fd < 0)
+        s = error_set_errno(err, "cannot write '%s'", paths->document != NULL ? "/dev/null" : paths->console);
     else if ((*out = start(&new)) < 0)
         s = error_set_errno(err, "cannot start worker '%s'", paths->program);
-    if (new.console_fd >= 0) close(new.console_fd);
+    if (new.error_fd >= 0) close(new.error_fd);
     close(new.null_fd);
     return s;
 }

@@ -14,8 +14,10 @@
 /* Paths of a worker that is to start. */
 struct worker_paths {
     const char *program, *job_folder;
-    const char *console; /* gets stdout and stderr, and is made new */
-    const char *speeds;  /* of earlier jobs */
+    const char *console;  /* gets stdout and stderr, and is made new */
+    const char *speeds;   /* of earlier jobs */
+    const char *document; /* a job document whose files in job_folder are judged; NULL: the job is run */
+    int report_fd;        /* gets what is found by a check, in place of console and speeds */
 };
 
 struct worker_end {

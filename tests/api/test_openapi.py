@@ -150,6 +150,7 @@ def test_every_operation_answers_as_documented(daemon, daemon_maker):
     assert daemon.patch(upload, 0, b"0123456789").status_code == 204
     done.add("uploadBytes")
     call("checkDocument", "POST", "/v1/check", json=DOCUMENT)
+    call("checkJob", "POST", f"/v1/jobs/{draft}/check")
     call("findInput", "GET", "/v1/inputs", params={"sha256": "0" * 64})
     call("listFiles", "GET", f"/v1/jobs/{draft}/files")
     call("getFile", "GET", f"/v1/jobs/{draft}/files/scan.tif")

@@ -66,6 +66,26 @@ def test_a_file_that_is_too_large(tmp_path, browser):
     stop_daemon(process)
 
 
+def test_faults_of_files_are_all_shown_before_the_job_starts(stub, browser, tmp_path):
+    url, _ = stub
+    (tmp_path / "job.json").write_text(json.dumps({"sample": "faulty files", "volume": {"files": ["scan.tif"], "voxel_size_um": 2},
+                                                   "measurements": {"file": "cloth.csv"}}))
+    (tmp_path / "scan.tif").write_bytes(b"scan")
+    (tmp_path / "cloth.csv").write_text("set\n")
+    browser.get(url + "/#new")
+    choose(browser, *(tmp_path / n for n in ("job.json", "scan.tif", "cloth.csv")))
+    wait_for(browser, "!document.querySelector('.drop button').disabled")
+    click_on(browser, ".drop button")
+    wait_for(browser, "document.querySelector('.drop > p').textContent.includes('2 faults')")
+    said = text_of(browser, ".drop > p")
+    assert "volume.files: cannot read volume 'scan.tif': it is no scan" in said and "measurements.file: line 1 of 'cloth.csv'" in said
+    keep(browser, "faults-of-files")
+    made = next(j for j in selvedge.Client(url).jobs() if j.sample == "faulty files")
+    assert made.state == "draft", "it was not started"
+    # the server's answer to a form whose fault lies in a file is a 422, which browsers note in the console
+    assert all("422" in c for c in complaints(browser))
+
+
 def test_files_that_the_server_has_are_not_sent(stub, browser):
     url, folder = stub
     first, sample = submit(url, folder, "sent once")

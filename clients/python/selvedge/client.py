@@ -80,13 +80,14 @@ class Client:
         answer = self.request("POST", "/v1/jobs", json_body=document, headers={"Idempotency-Key": key or uuid.uuid4().hex})
         return Job(self, answer.json()["id"])
 
-    def submit(self, document: DocumentOrPath, folder: Optional[str] = None, *, start: bool = True, key: Optional[str] = None,
-               on_progress: Callable[[Progress], None] = show_nothing) -> Job:
+    def submit(self, document: DocumentOrPath, folder: Optional[str] = None, *, start: bool = True, check: bool = False,
+               key: Optional[str] = None, on_progress: Callable[[Progress], None] = show_nothing) -> Job:
         """Create a job, upload its files and start it. document: a dict, or the path of a JSON file, whose folder is then the
-        default of `folder`. on_progress is called while files are read and sent."""
+        default of `folder`. check: the job starts only if its files have no fault (Job.start). on_progress is called while files are
+        read and sent."""
         document, beside = read_document(document)
         job = self.create(document, key)
         job.upload_all([(os.path.join(folder or beside, name), role) for name, role in files_of(document)], on_progress)
         if start:
-            job.start()
+            job.start(check)
         return job

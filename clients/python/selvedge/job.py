@@ -95,9 +95,15 @@ class Job:
                 offset = None
                 time.sleep(0.25 * 2 ** failures)
 
-    def start(self) -> JobState:
-        """Queue the job. Raises Problem "files_missing" if inputs are incomplete."""
-        return JobState.of(self.client.request("POST", self.path + "/start").json())
+    def check(self) -> dict[str, Any]:
+        """Have all inputs opened and judged: {"valid", "errors": [{"code", "field", "detail"}], "warnings", "n_file"}."""
+        report: dict[str, Any] = self.client.request("POST", self.path + "/check").json()
+        return report
+
+    def start(self, check: bool = False) -> JobState:
+        """Queue the job. Raises Problem "files_missing" if inputs are incomplete; with check, Problem "invalid" if they have
+        faults, which are then all in its body["errors"]."""
+        return JobState.of(self.client.request("POST", self.path + ("/start?check=1" if check else "/start")).json())
 
     def cancel(self) -> JobState:
         """Ask the worker to stop; its results so far are kept."""

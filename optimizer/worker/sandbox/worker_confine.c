@@ -79,7 +79,7 @@ static int permit_library(struct dl_phdr_info *info, size_t n, void *context)
 
 struct input_links {
     struct path_list *list;
-    const struct worker_folder *folder;
+    const char *folder; /* of the inputs */
 };
 
 /* In a folder made by hand an input may be a link to a file elsewhere. */
@@ -89,7 +89,7 @@ static void permit_link(void *context, const char *name, const char *role)
     const struct input_links *in = context;
     struct stat st;
     char path[WORKER_PATH_BYTES];
-    worker_folder_path(in->folder, JOB_FOLDER_INPUT, name, path);
+    snprintf(path, sizeof path, "%s/%s", in->folder, name);
     if (lstat(path, &st) == 0 && S_ISLNK(st.st_mode)) permit(in->list, SANDBOX_READ, path);
 }
 
@@ -133,9 +133,10 @@ static void list_files(const struct confine_files *files, const char *program, s
                        struct confinement *c)
 {
     struct worker_folder folder = {.lock_fd = -1};
-    char document[WORKER_PATH_BYTES];
+    char document[WORKER_PATH_BYTES], input[WORKER_PATH_BYTES];
     snprintf(folder.path, sizeof folder.path, "%s", files->folder);
     worker_folder_path(&folder, JOB_FILE_DOCUMENT, NULL, document);
+    worker_folder_path(&folder, JOB_FOLDER_INPUT, NULL, input);
     struct job_document *doc = read_document(files->document != NULL ? files->document : document);
     for (size_t i = 0; i < N_USUAL; i++) permit(list, usual[i].right, usual[i].path);
     permit(list, SANDBOX_EXECUTE, program);
@@ -143,8 +144,9 @@ static void list_files(const struct confine_files *files, const char *program, s
     permit(list, files->document != NULL ? SANDBOX_READ : SANDBOX_OWN, files->folder);
     if (files->document != NULL) permit(list, SANDBOX_READ, files->document);
     if (files->speeds != NULL) permit_speeds(list, files->speeds);
-    if (doc != NULL && by_hand(&folder))
-        job_document_visit_files(doc, permit_link, &(struct input_links){list, &folder});
+    if (doc != NULL && !files->no_links && by_hand(&folder))
+        job_document_visit_files(doc, permit_link,
+                                 &(struct input_links){list, files->document != NULL ? files->folder : input});
     if (files->document == NULL) prepare(&folder, doc, c);
     job_document_free(doc);
 }

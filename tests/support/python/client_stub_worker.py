@@ -3,7 +3,7 @@
 but computes nothing.
 
 The sample's name selects its behaviour: "slow ..." takes seconds for each stage, "failing ..." fails in the first
-stage with a field, "twin ..." has tables of a twin among its results, anything else succeeds within a second or two."""
+stage with a field, "twin ..." has tables of a twin among its results, files of "faulty ..." have two faults, anything else succeeds within a second or two."""
 import json
 import math
 import os
@@ -14,6 +14,14 @@ import zlib
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "made"))
 import synthetic_twin  # noqa: E402
+
+if "--check" in sys.argv:
+    with open(sys.argv[sys.argv.index("--check") + 1], encoding="utf-8") as checked:
+        faulty = json.load(checked)["sample"].startswith("faulty")
+    faults = [{"code": "format", "field": "volume.files", "detail": "cannot read volume 'scan.tif': it is no scan"},
+              {"code": "format", "field": "measurements.file", "detail": "line 1 of 'cloth.csv' has no numbers"}] if faulty else []
+    print(json.dumps({"faults": faults, "warnings": [], "n_file": 2}))
+    sys.exit(int(faulty))
 
 FOLDER = sys.argv[-1]
 STAGES = ["volume", "orientation", "fibers", "directions", "scene", "fit", "validation", "report"]

@@ -1,0 +1,163 @@
+#include "server/workers/input_judge.h"
+#include "base/clock.h"
+#include "optimizer/job/job_folder.h"
+#include "server/jobs/job_paths.h"
+#include "server/workers/supervisor.h"
+#include "server/workers/worker_process.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+enum { MAX_REPORT_BYTES = 4 << 20, TURN_LIMIT_S = 30, LOOK_US = 20000 };
+
+/* Takes one of the places for checks, of which there are as many as workers. */
+static status take_turn(struct job_service *v, struct job_refusal *refusal, struct error *err)
+{
+    const double give_up_s = clock_monotonic_s() + TURN_LIMIT_S;
+    while (atomic_fetch_add(&v->n_judging, 1) >= (int)v->settings->workers) {
+        atomic_fetch_sub(&v->n_judging, 1);
+        if (clock_monotonic_s() > give_up_s || atomic_load(&v->stopping)) {
+            refusal->code = "not_ready";
+            return error_set(err, STATUS_CONFLICT, "the files of other jobs are being judged; try again in a minute");
+        }
+        usleep(LOOK_US);
+    }
+    return STATUS_OK;
+}
+
+/* Waits for the worker, and kills it when it holds or takes too much. STATUS_CONFLICT: it was killed. */
+static status wait_for(const struct job_service *v, pid_t pid, struct worker_end *end, struct job_refusal *refusal,
+                       struct error *err)
+{
+    const double give_up_s = clock_monotonic_s() + (double)v->settings->check_limit_s;
+    const int64_t most_bytes = v->settings->resident_limit_bytes;
+    status s = STATUS_OK;
+    while (!worker_ended(pid, end)) {
+        if (s == STATUS_OK && atomic_load(&v->stopping)) {
+            refusal->code = "stopping";
+            s = error_set(err, STATUS_CONFLICT, "the service is stopping; try again in a moment");
+        } else if (s == STATUS_OK && clock_monotonic_s() > give_up_s) {
+            refusal->code = "not_ready";
+            s = error_set(err, STATUS_CONFLICT,
+                          "the files could not be judged within %lld s (jobs.check_limit_s); the job can be started "
+                          "without, its worker judges them too",
+                          (long long)v->settings->check_limit_s);
+        } else if (s == STATUS_OK && most_bytes > 0 && worker_memory_bytes(pid) > most_bytes)
+            worker_signal(pid, SIGKILL);
+        if (s != STATUS_OK) worker_signal(pid, SIGKILL);
+        usleep(LOOK_US);
+    }
+    return s;
+}
+
+/* What the worker has written; NULL when that is no report. */
+static json_t *read_report(int fd)
+{
+    json_t *report = NULL;
+    off_t n = lseek(fd, 0, SEEK_END);
+    char *text = n > 0 && n <= MAX_REPORT_BYTES ? malloc((size_t)n) : NULL;
+    if (text != NULL && pread(fd, text, (size_t)n, 0) == (ssize_t)n)
+        report = json_loadb(text, (size_t)n, JSON_REJECT_DUPLICATES, NULL);
+    free(text);
+    if (json_is_array(json_object_get(report, "faults")) && json_is_array(json_object_get(report, "warnings")))
+        return report;
+    json_decref(report);
+    return NULL;
+}
+
+/* Takes the folder of the inputs out of the text: users know their files by their names alone. */
+static void shorten_detail(json_t *entry, const char *folder)
+{
+    static const char in[] = " in '", quote = '\'';
+    const char *detail = json_string_value(json_object_get(entry, "detail"));
+    const size_t n = strlen(folder);
+    char *text = detail != NULL ? strdup(detail) : NULL;
+    if (text == NULL) return;
+    for (char *at = text; (at = strstr(at, folder)) != NULL;) {
+        char *from = at, *after = at + n;
+        if (*after == '/')
+            after++;
+        else if (*after == quote && at - text >= (ptrdiff_t)strlen(in) && strncmp(at - strlen(in), in, strlen(in)) == 0)
+            from = at - strlen(in), after++;
+        memmove(from, after, strlen(after) + 1);
+        at = from;
+    }
+    json_object_set_new(entry, "detail", json_string(text));
+    free(text);
+}
+
+static void shorten(const json_t *list, const char *folder)
+{
+    size_t i;
+    json_t *entry;
+    json_array_foreach(list, i, entry) shorten_detail(entry, folder);
+}
+
+/* A worker that its input has ended would end so again when the job runs. */
+static json_t *report_of_death(const struct worker_end *end)
+{
+    const bool forbidden = end->by_signal && end->code == SIGSYS;
+    char text[200];
+    if (forbidden)
+        snprintf(text, sizeof text, "a file made the program that read it do what no input may (a forbidden call)");
+    else if (end->by_signal)
+        snprintf(text, sizeof text, "the program that read the files was ended by signal %d (%s)", end->code,
+                 strsignal(end->code));
+    else
+        snprintf(text, sizeof text, "the program that reads the files could not judge them (exit status %d)",
+                 end->code);
+    return json_pack("{s:b, s:[{s:s, s:s, s:s}], s:[], s:i}", "valid", 0, "errors", "code",
+                     forbidden ? "forbidden_call" : "worker_lost", "field", "", "detail", text, "warnings", "n_file",
+                     0);
+}
+
+static json_t *finish(json_t *report, const char *folder)
+{
+    json_t *errors = json_object_get(report, "faults"), *warnings = json_object_get(report, "warnings");
+    shorten(errors, folder);
+    shorten(warnings, folder);
+    json_t *out = json_pack("{s:b, s:O, s:O, s:I}", "valid", json_array_size(errors) == 0, "errors", errors, "warnings",
+                            warnings, "n_file", json_integer_value(json_object_get(report, "n_file")));
+    json_decref(report);
+    return out;
+}
+
+static status judge(struct job_service *v, const char *job_id, int fd, json_t **report, struct job_refusal *refusal,
+                    struct error *err)
+{
+    char job[PATH_BYTES], folder[PATH_BYTES], document[PATH_BYTES];
+    struct worker_end end;
+    pid_t pid;
+    path_join(job, v->settings->data, "jobs", job_id, NULL);
+    path_join(folder, job, JOB_FOLDER_INPUT, NULL);
+    path_join(document, job, JOB_FILE_DOCUMENT, NULL);
+    const struct worker_paths paths = {
+        .program = supervisor_program(v->supervisor), .job_folder = folder, .document = document, .report_fd = fd};
+    status s = worker_launch(&paths, v->settings, &pid, err);
+    if (s == STATUS_OK) s = wait_for(v, pid, &end, refusal, err);
+    if (s != STATUS_OK) return s;
+    json_t *found = end.by_signal ? NULL : read_report(fd);
+    *report = found != NULL ? finish(found, folder) : report_of_death(&end);
+    return *report != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot judge the files: out of memory");
+}
+
+status input_judge(struct job_service *v, const char *job_id, json_t **report, struct job_refusal *refusal,
+                   struct error *err)
+{
+    struct job_row row;
+    status s = job_look(v, job_id, &row, err);
+    if (s == STATUS_OK && v->supervisor == NULL)
+        s = error_set(err, STATUS_INTERNAL, "cannot judge the files: there are no workers");
+    if (s == STATUS_OK) s = take_turn(v, refusal, err);
+    if (s != STATUS_OK) return s;
+    int fd = memfd_create("check", MFD_CLOEXEC);
+    s = fd >= 0 ? judge(v, job_id, fd, report, refusal, err) : error_set_errno(err, "cannot judge the files");
+    if (fd >= 0) close(fd);
+    atomic_fetch_sub(&v->n_judging, 1);
+    return s;
+}
