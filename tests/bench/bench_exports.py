@@ -93,10 +93,14 @@ def main():
             if form == "blender" and shutil.which("blender") is None:
                 print("no figures of blender, because there is none (Debian package blender)", file=sys.stderr)
                 continue
-            error, n, n_row = compare(arguments.python, form, os.path.join(folder, form))
-            whole = whole and n == n_row
-            for key, value in (("rel_rms", error), ("material_rel_rms", export["materials"][0]["rel_rms"])):
-                print(json.dumps({"name": f"exports.{form}{name}.{key}", "value": value, "unit": "1", "better": "lower"}), flush=True)
+            material = export["materials"][0]
+            for seen, rel_rms in ((form, material["rel_rms"]), ("usd_preview", material.get("preview_surface", {}).get("rel_rms"))):
+                if rel_rms is None:
+                    continue
+                error, n, n_row = compare(arguments.python, seen, os.path.join(folder, form))
+                whole = whole and n == n_row
+                for key, value in (("rel_rms", error), ("material_rel_rms", rel_rms)):
+                    print(json.dumps({"name": f"exports.{seen}{name}.{key}", "value": value, "unit": "1", "better": "lower"}), flush=True)
     sys.exit(0 if whole else 1)
 
 

@@ -2,8 +2,8 @@
 has Mitsuba (pip install mitsuba usd-core), in a process of its own, because Mitsuba may end the process on an error.
 
 FORMAT mitsuba: the scene as it is. pbrt: what a reader of pbrt's grammar finds in the view of that row, with Mitsuba's hair material, which is the
-same as pbrt's. usd: what the USD library finds in the stage, with the principled BSDF of the numbers of its preview surface; lamp and camera are those
-of the row in rows.csv, which the stage has for the first row only. textures: a plane with the maps of the U3M material, which has no rotation of the
+same as pbrt's. usd: what the USD library finds in the stage, with the hair material of its MaterialX network; lamp and camera are those of the row in rows.csv,
+which the stage has for the first row only. usd_preview: the same with the principled BSDF of the numbers of its preview surface. textures: a plane with the maps of the U3M material, which has no rotation of the
 anisotropy here."""
 import csv
 import json
@@ -121,12 +121,19 @@ def textures_scene(folder, row, px, spp):
     half = 30.0
 
     def bitmap(key, raw=True):
-        image = front[key]["texture"]["image"]
+        texture = front[key]["texture"]
+        image = texture["image"]
         size = mitsuba.ScalarTransform4f().scale([2 * half / image["width"], 2 * half / image["height"], 1])
-        return {"type": "bitmap", "filename": os.path.join(folder, image["path"]), "raw": raw, "to_uv": size}
+        pixels = mitsuba.Bitmap(os.path.join(folder, image["path"])).convert(component_format=mitsuba.Struct.Type.Float32, srgb_gamma=False)
+        if raw:  # numbers are stored as they are, whatever the file says of a curve
+            pixels = mitsuba.Bitmap(numpy.array(mitsuba.Bitmap(os.path.join(folder, image["path"])), dtype=numpy.float32) / 255.0)
+        factor = texture.get("factor", 1.0)
+        factor = numpy.array([factor[c] for c in "rgb"] if isinstance(factor, dict) else factor, dtype=numpy.float32)
+        return {"type": "bitmap", "bitmap": mitsuba.Bitmap(numpy.array(pixels)[..., :3] * factor), "raw": True, "to_uv": size}
 
     surface = {"type": "principled", "base_color": bitmap("basecolor", raw=False), "roughness": bitmap("roughness"),
-               "anisotropic": bitmap("anisotropy_value"), "specular": front["specular_value"]["constant"]}
+               "anisotropic": bitmap("anisotropy_value"), "specular": front["specular_value"]["constant"],
+               "sheen": front["sheen_value"]["constant"], "sheen_tint": front["sheen_tint"]["constant"]}
     plane = {"type": "rectangle", "to_world": mitsuba.ScalarTransform4f().scale([half, half, 1]),
              "bsdf": {"type": "normalmap", "normalmap": bitmap("normal"), "bsdf": surface}}
     return mitsuba.load_dict({"type": "scene", "integrator": {"type": "path"}, "plane": plane, **pbrt_surroundings(found, px, spp)})
@@ -137,14 +144,25 @@ def preview_surface(surface):
     return {"type": "principled", "base_color": rgb(surface["color"]), "roughness": surface["roughness"], "eta": max(surface["index"], 1.001)}
 
 
-def usd_scene(folder, row, px, spp):
+def hair_of_materialx(mixture):
+    """MaterialX's hair without tilt, with pbrt's ratios of the roughnesses, is that of pbrt and Mitsuba."""
+    hair = [{"type": "hair", "longitudinal_roughness": h["longitudinal"], "azimuthal_roughness": h["azimuthal"], "scale_tilt": 0, "int_ior": h["index"],
+             "sigma_a": rgb(h["absorption"])} for h in mixture["hair"]]
+    return {"type": "blendbsdf", "weight": mixture["share"], "hair0": hair[0], "hair1": hair[1]}
+
+
+def usd_preview_scene(folder, row, px, spp):
+    return usd_scene(folder, row, px, spp, preview=True)
+
+
+def usd_scene(folder, row, px, spp, preview=False):
     # a process of its own: Mitsuba and the USD library in one process end it
     done = subprocess.run([sys.executable, os.path.join(SUPPORT, "usd_stage.py"), os.path.join(folder, "cloth.usda")], stdout=subprocess.PIPE, check=True)
     found = json.loads(done.stdout)
     place = place_of(folder, row)
     lamp, camera, up = ([float(place[f"{name}_{a}"]) for a in "xyz"] for name in ("lamp", "camera", "up"))
-    shapes = [curves(folder, i, [(f["points"], f["radius"]) for f in group["fibers"]], preview_surface(group["surface"]))
-              for i, group in enumerate(found["curves"])]
+    shapes = [curves(folder, i, [(f["points"], f["radius"]) for f in group["fibers"]],
+                     preview_surface(group["surface"]) if preview else hair_of_materialx(group["mixture"])) for i, group in enumerate(found["curves"])]
     turn = mitsuba.ScalarTransform4f().look_at(origin=lamp, target=[0, 0, 0], up=[0, 0.1, 1])
     half = found["lamp"]["side"] / 2
     others = {
@@ -158,7 +176,7 @@ def usd_scene(folder, row, px, spp):
 def main():
     form, folder, row, px, spp = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), int(sys.argv[5])
     mitsuba.set_variant("scalar_rgb")
-    scene = {"mitsuba": mitsuba_scene, "pbrt": pbrt_scene, "usd": usd_scene, "textures": textures_scene}[form](folder, row, px, spp)
+    scene = {"mitsuba": mitsuba_scene, "pbrt": pbrt_scene, "usd": usd_scene, "usd_preview": usd_preview_scene, "textures": textures_scene}[form](folder, row, px, spp)
     picture = numpy.array(mitsuba.render(scene))
     print(json.dumps([float(x) for x in picture[..., :3].mean((0, 1))]))
 

@@ -128,9 +128,16 @@ def test_a_stage_for_usd(results):
     (group,), (material,) = found["curves"], export["materials"]
     assert len(group["fibers"]) == json.loads((results / "result.json").read_text())["geometry"]["n_fiber"]
     assert all(f["radius"] == pytest.approx(0.008, rel=1e-3) for f in group["fibers"])
-    surface = group["surface"]
-    assert surface["color"] == pytest.approx(material["diffuse_color"], rel=1e-5) and group["display"] == pytest.approx(surface["color"])
-    assert surface["index"] == pytest.approx(material["index"]) and surface["roughness"] == pytest.approx(material["roughness"])
+    surface, preview = group["surface"], material["preview_surface"]
+    assert surface["color"] == pytest.approx(preview["diffuse_color"], rel=1e-5) and group["display"] == pytest.approx(surface["color"])
+    assert surface["index"] == pytest.approx(preview["index"]) and surface["roughness"] == pytest.approx(preview["roughness"])
+    # renderers that read MaterialX get the mixture of hair that the other formats have
+    (other,) = conversion_of(results, "pbrt")["materials"]
+    assert group["mixture"]["share"] == pytest.approx(material["hair"][1]["share"], rel=1e-5)
+    for found_hair, hair, same in zip(group["mixture"]["hair"], material["hair"], other["hair"]):
+        assert hair == same
+        for key, name in (("longitudinal", "longitudinal_roughness"), ("azimuthal", "azimuthal_roughness"), ("index", "index"), ("absorption", "absorption")):
+            assert found_hair[key] == pytest.approx(hair[name], rel=1e-5), key
     for mine, library in zip(group["extent"], group["library_extent"]):
         assert mine == pytest.approx(library, abs=1e-3)
     row = next(csv.DictReader((folder / "rows.csv").open()))
@@ -158,7 +165,8 @@ def microfacets(wi, wo, n, index, roughness):
 def test_the_opaque_fiber_of_usd(results):
     """Its own light, the colour by Kubelka and Munk's ratio, and how near it comes to a fiber that scatters evenly, all computed a second time."""
     (material,) = conversion_of(results, "usd")["materials"]
-    color, even = material["diffuse_color"][1], material["fitted_albedo"][1]
+    even, preview = material["fitted_albedo"][1], material["preview_surface"]
+    color = preview["diffuse_color"][1]
     n, weight, back, everything, difference, whole = 20, 0.0, 0.0, 0.0, 0.0, 0.0
     for o in range(6):
         sin_o = (o + 0.5) / 6
@@ -173,17 +181,17 @@ def test_the_opaque_fiber_of_usd(results):
                 value = 0.0
                 for m in range(16):  # normals that see both
                     a = phi - math.pi / 2 + (math.pi - phi) * (m + 0.5) / 16
-                    f = color / math.pi + microfacets(wi, wo, (math.cos(a), math.sin(a), 0), material["index"], material["roughness"])
+                    f = color / math.pi + microfacets(wi, wo, (math.cos(a), math.sin(a), 0), preview["index"], preview["roughness"])
                     value += f * math.cos(a) * math.cos(a - phi) * cos_i / 2 * (math.pi - phi) / 16
                 share = cos_o * value * 4 * math.pi / 28 / n
                 everything += share
                 back += share if phi < math.pi / 2 else 0
                 difference += cos_o * (value - even * cos_i / math.pi ** 2) ** 2
                 whole += cos_o * (even * cos_i / math.pi ** 2) ** 2
-    assert everything / weight == pytest.approx(material["albedo"][1], rel=0.02)
-    assert back / weight == pytest.approx(material["turned_back"][1], rel=0.02)
+    assert everything / weight == pytest.approx(preview["albedo"][1], rel=0.02)
+    assert back / weight == pytest.approx(preview["turned_back"][1], rel=0.02)
     assert (1 - everything / weight) / (back / weight) == pytest.approx((1 - even) / material["fitted_turned_back"][1], rel=0.03)
-    assert (difference / whole) ** 0.5 == pytest.approx(material["rel_rms"], rel=0.05)
+    assert (difference / whole) ** 0.5 == pytest.approx(preview["rel_rms"], rel=0.05)
 
 
 def read_vol(path):
@@ -305,6 +313,16 @@ def test_a_u3m_material(results):
     assert len(maps) == 6
     for image in maps:
         check_image(image, folder)
+    principled = conversion_of(results, "textures")["materials"][0]["principled"]
+    assert front["basecolor"]["texture"]["image"]["path"] == "principled_base_color.png"
+    assert [front["basecolor"]["constant"][c] for c in "rgb"] == pytest.approx(principled["base_color"], rel=1e-6)
+    assert front["roughness"]["texture"]["factor"] == pytest.approx(principled["roughness_factor"], rel=1e-6)
+    assert front["specular_value"]["constant"] == pytest.approx(principled["specular"]) and front["sheen_value"]["constant"] == pytest.approx(principled["sheen"])
+    # the mean of the map is the mean that was fitted
+    rows = read_png(folder / "principled_base_color.png")
+    for c in range(3):
+        linear = [s / 12.92 if s <= 0.04045 else ((s + 0.055) / 1.055) ** 2.4 for row in rows for s in (x / 255 for x in row[c::3])]
+        assert sum(linear) / len(linear) == pytest.approx(principled["base_color"][c], rel=0.03, abs=0.003)
 
 
 def test_textures_of_a_tile(results):
@@ -312,7 +330,9 @@ def test_textures_of_a_tile(results):
     (material,) = export["materials"]
     assert sorted(p.name for p in folder.iterdir()) == sorted([
         "conversion.json", "cloth.mtlx", "cloth.u3m", "maps.exr", *(f"{n}.png" for n in (
-            "base_color", "transmission", "normal", "roughness", "anisotropy", "anisotropy_rotation"))])
+            "base_color", "principled_base_color", "transmission", "normal", "roughness", "anisotropy", "anisotropy_rotation"))])
+    principled = material["principled"]
+    assert 0 < principled["rel_rms"] < 0.5 and 0 < principled["heldout_rel_rms"] < 0.6
     assert 0 < material["rel_rms"] < 0.5 and 0 < material["heldout_rel_rms"] < 0.6 and 0 < material["pixel_rel_se"] < 0.5
     # a fiber that scatters less than all its light makes a cloth that does so, too
     both = [a + b for a, b in zip(material["albedo"], material["transmission"])]

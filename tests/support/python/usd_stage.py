@@ -13,6 +13,32 @@ def surface_of(prim):
             "roughness": surface.GetInput("roughness").Get()}
 
 
+def source_of(shader, name):
+    """The shader that is connected to an input."""
+    (source,), _ = shader.GetInput(name).GetConnectedSources()
+    return UsdShade.Shader(source.source.GetPrim())
+
+
+def hair_of(prim):
+    """The two hair materials of the MaterialX network, {"share", "hair": [{...}, {...}]}; None without one."""
+    material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+    surface, _, _ = material.ComputeSurfaceSource("mtlx")
+    if not surface or surface.GetIdAttr().Get() != "ND_surface":
+        return None
+    mixture = source_of(surface, "bsdf")
+    assert mixture.GetIdAttr().Get() == "ND_mix_bsdf"
+    hair = []
+    for side in ("bg", "fg"):
+        h = source_of(mixture, side)
+        assert h.GetIdAttr().Get() == "ND_chiang_hair_bsdf" and h.GetInput("cuticle_angle").Get() == 0.5
+        rough = [source_of(h, f"roughness_{lobe}") for lobe in ("R", "TT", "TRT")]
+        assert len({r.GetPath() for r in rough}) == 1 and rough[0].GetIdAttr().Get() == "ND_chiang_hair_roughness"
+        assert (rough[0].GetInput("scale_TT").Get(), rough[0].GetInput("scale_TRT").Get()) == (0.5, 2.0)
+        hair.append({"longitudinal": rough[0].GetInput("longitudinal").Get(), "azimuthal": rough[0].GetInput("azimuthal").Get(),
+                     "index": h.GetInput("ior").Get(), "absorption": list(h.GetInput("absorption_coefficient").Get())})
+    return {"share": mixture.GetInput("mix").Get(), "hair": hair}
+
+
 def curves_of(stage, tile):
     found = []
     for prim in Usd.PrimRange(stage.GetPrimAtPath(tile)):
@@ -27,7 +53,7 @@ def curves_of(stage, tile):
         for n, width in zip(counts, widths):
             fibers.append({"points": [list(p) for p in points[at:at + n]], "radius": width / 2})
             at += n
-        found.append({"fibers": fibers, "surface": surface_of(prim), "display": list(c.GetDisplayColorAttr().Get()[0]),
+        found.append({"fibers": fibers, "surface": surface_of(prim), "mixture": hair_of(prim), "display": list(c.GetDisplayColorAttr().Get()[0]),
                       "extent": [list(x) for x in c.GetExtentAttr().Get()], "library_extent": [list(x) for x in right]})
     return found
 

@@ -5,7 +5,7 @@
  * cloth.mtlx and cloth.u3m (texture_documents.h). Of the parameters, texture_surface.h. */
 #include "base/files/durable.h"
 #include "optimizer/worker/report/export/export_formats.h"
-#include "optimizer/worker/report/export/texture_documents.h"
+#include "optimizer/worker/report/export/textures/texture_documents.h"
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/report/result_pictures.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
@@ -18,15 +18,29 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { MIN_EDGE = 16, MAX_EDGE = 512, MIN_SAMPLE = 64, SAMPLES_OF_A_RENDERING = 4, N_CHANNEL = 13, STREAM = 4090 };
-static const char *const channel[N_CHANNEL] = {
-    "R",   "G",   "B",         "transmission.R", "transmission.G", "transmission.B", "N.X",
-    "N.Y", "N.Z", "roughness", "anisotropy",     "direction_rad",  "height_mm"};
+enum { MIN_EDGE = 16, MAX_EDGE = 512, MIN_SAMPLE = 64, SAMPLES_OF_A_RENDERING = 4, N_CHANNEL = 16, STREAM = 4090 };
+static const char *const channel[N_CHANNEL] = {"R",
+                                               "G",
+                                               "B",
+                                               "transmission.R",
+                                               "transmission.G",
+                                               "transmission.B",
+                                               "N.X",
+                                               "N.Y",
+                                               "N.Z",
+                                               "roughness",
+                                               "anisotropy",
+                                               "direction_rad",
+                                               "height_mm",
+                                               "principled.R",
+                                               "principled.G",
+                                               "principled.B"};
 
 struct textures {
     struct export_scene *e;
     struct texture_maps maps;
     struct texture_surface surface;
+    struct texture_principled principled;
     struct image reflected, transmitted; /* 3 channels */
     double noise;                        /* relative standard error of a pixel of `reflected`, root mean square */
 };
@@ -77,12 +91,12 @@ static void take_pixels(struct textures *t, const struct image *dark, const stru
             double a = (double)dark->pixel[i * dark->n_channel + c], b = (double)open->pixel[i * open->n_channel + c];
             t->reflected.pixel[3 * i + c] = (float)a;
             t->transmitted.pixel[3 * i + c] = (float)fmax(b - a, 0.0);
-            t->surface.albedo[c] += a / (double)n;
-            t->surface.transmission[c] += (b - a) / (double)n;
+            t->surface.means.albedo[c] += a / (double)n;
+            t->surface.means.transmission[c] += (b - a) / (double)n;
             variance += (double)dark->pixel[i * dark->n_channel + 3 + c];
             square += a * a;
         }
-    for (size_t c = 0; c < 3; c++) t->surface.transmission[c] = fmax(t->surface.transmission[c], 0.0);
+    for (size_t c = 0; c < 3; c++) t->surface.means.transmission[c] = fmax(t->surface.means.transmission[c], 0.0);
     t->noise = square > 0.0 ? sqrt(variance / square) : 0.0;
 }
 
@@ -131,9 +145,12 @@ static status write_picture(const struct textures *t, const struct image *im, co
 static void pixel_of(const struct textures *t, size_t i, float out[N_CHANNEL])
 {
     for (size_t c = 0; c < 3; c++) {
-        out[c] = (float)texture_base_color(&t->surface, (double)t->reflected.pixel[3 * i + c]);
+        /* in proportion, so that the mean is right in spite of the noise of dark pixels */
+        const double share = (double)t->reflected.pixel[3 * i + c] / fmax(t->surface.means.albedo[c], 1e-9);
+        out[c] = (float)(share * texture_surface_base(&t->surface, c));
         out[3 + c] = t->transmitted.pixel[3 * i + c];
         out[6 + c] = t->maps.normal[3 * i + c];
+        out[13 + c] = (float)(share * t->principled.base[c]);
     }
     out[9] = (float)texture_surface_roughness(&t->surface, i);
     out[10] = (float)texture_surface_anisotropy(&t->surface, i);
@@ -163,7 +180,7 @@ static status write_map(const struct textures *t, const struct image *all, size_
             if (first == 11) value = rotation_turns(value);
             im.pixel[3 * i + c] = value;
         }
-    s = write_picture(t, &im, name, first < 6 ? PICTURE_SRGB : PICTURE_NUMBERS, err);
+    s = write_picture(t, &im, name, first < 6 || first == 13 ? PICTURE_SRGB : PICTURE_NUMBERS, err);
     image_release(&im);
     return s;
 }
@@ -173,8 +190,13 @@ static status write_maps(const struct textures *t, struct error *err)
     static const struct {
         size_t first, n;
         const char *name;
-    } map[] = {{0, 3, "base_color.png"}, {3, 3, "transmission.png"}, {6, 3, "normal.png"},
-               {9, 1, "roughness.png"},  {10, 1, "anisotropy.png"},  {11, 1, "anisotropy_rotation.png"}};
+    } map[] = {{0, 3, "base_color.png"},
+               {3, 3, "transmission.png"},
+               {6, 3, "normal.png"},
+               {9, 1, "roughness.png"},
+               {10, 1, "anisotropy.png"},
+               {11, 1, "anisotropy_rotation.png"},
+               {13, 3, "principled_base_color.png"}};
     struct image all;
     status s = image_init(&all, t->maps.width, t->maps.height, N_CHANNEL, err);
     if (s != STATUS_OK) return s;
@@ -187,14 +209,23 @@ static status write_maps(const struct textures *t, struct error *err)
     return s;
 }
 
+static json_t *principled_json(const struct texture_principled *p)
+{
+    return json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "specular", json_number(p->specular), "roughness_factor",
+                     json_number(p->roughness), "anisotropy_factor", json_number(p->anisotropy), "base_color",
+                     json_number_list(p->base, 3, 1.0), "sheen", json_number(p->sheen), "rel_rms",
+                     json_number(p->rel_rms[0]), "heldout_rel_rms", json_number(p->rel_rms[1]));
+}
+
 static json_t *material_json(const struct textures *t)
 {
     const struct texture_surface *u = &t->surface;
-    return json_pack("[{s:n, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}]", "group", "specular_weight",
+    return json_pack("[{s:n, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}]", "group", "specular_weight",
                      json_number(u->weight), "specular_roughness", json_number(u->roughness), "specular_anisotropy",
-                     json_number(u->anisotropy), "albedo", json_number_list(u->albedo, 3, 1.0), "transmission",
-                     json_number_list(u->transmission, 3, 1.0), "pixel_rel_se", json_number(t->noise), "rel_rms",
-                     json_number(u->fit_rel_rms), "heldout_rel_rms", json_number(u->heldout_rel_rms));
+                     json_number(u->anisotropy), "albedo", json_number_list(u->means.albedo, 3, 1.0), "transmission",
+                     json_number_list(u->means.transmission, 3, 1.0), "pixel_rel_se", json_number(t->noise), "rel_rms",
+                     json_number(u->rel_rms[0]), "heldout_rel_rms", json_number(u->rel_rms[1]), "principled",
+                     principled_json(&t->principled));
 }
 
 static status write_textures(struct export_scene *e, json_t **materials, struct error *err)
@@ -206,9 +237,11 @@ static status write_textures(struct export_scene *e, json_t **materials, struct 
     t.surface.maps = &t.maps;
     if (s == STATUS_OK) s = render_both(&t, err);
     if (s == STATUS_OK) s = texture_surface_fit(&t.surface, e->c, e->model, err);
+    t.principled.open_pbr = &t.surface;
+    if (s == STATUS_OK) s = texture_principled_fit(&t.principled, e->c, e->model, err);
     if (s == STATUS_OK) s = write_maps(&t, err);
     if (s == STATUS_OK) s = texture_materialx_write(e, &t.surface, err);
-    if (s == STATUS_OK) s = texture_u3m_write(e, &t.surface, err);
+    if (s == STATUS_OK) s = texture_u3m_write(e, &t.principled, err);
     if (s == STATUS_OK) *materials = material_json(&t);
     image_release(&t.reflected);
     image_release(&t.transmitted);

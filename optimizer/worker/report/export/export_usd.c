@@ -2,7 +2,9 @@
  * BasisCurves (cubic B-splines) with widths and a display colour, a PointInstancer that repeats their tile, the black
  * sheet as a Mesh, camera and lamp of the first row. Millimetres, z is up.
  *
- * A UsdPreviewSurface has no light that goes through a fiber. It is the opaque fiber of hair_fit.h. */
+ * Each material has two surfaces: for renderers that read MaterialX in USD (outputs:mtlx:surface) the mixture of two
+ * hair materials of hair_fit.h, and for all others a UsdPreviewSurface. That one has no light that goes through a fiber;
+ * it is the opaque fiber of hair_fit.h. */
 #include "optimizer/worker/report/export/export_formats.h"
 #include "optimizer/worker/report/json_number.h"
 
@@ -94,17 +96,65 @@ static void print_tiles(FILE *text, const struct export_scene *e)
     fprintf(text, "        }\n    }\n");
 }
 
-static void print_material(FILE *text, const char *name, const struct surface_fit *f)
+/* One hair material. MaterialX takes a cuticle angle of 0.5 for scales that are not tilted, and the variances of light
+ * that goes through and of light that is reflected inside as 0.5^2 and 2^2 of that of the surface, as pbrt does. */
+static void print_hair(FILE *text, const char *name, size_t i, const struct hair_lobes *h)
 {
+    const double *a = h->absorption;
     fprintf(text,
-            "        def Material \"%s\"\n        {\n"
+            "            def Shader \"roughness_%zu\"\n            {\n"
+            "                uniform token info:id = \"ND_chiang_hair_roughness\"\n"
+            "                float inputs:longitudinal = %.9g\n                float inputs:azimuthal = %.9g\n"
+            "                float inputs:scale_TT = 0.5\n                float inputs:scale_TRT = 2\n"
+            "                float2 outputs:roughness_R\n                float2 outputs:roughness_TT\n"
+            "                float2 outputs:roughness_TRT\n            }\n"
+            "            def Shader \"hair_%zu\"\n            {\n"
+            "                uniform token info:id = \"ND_chiang_hair_bsdf\"\n"
+            "                float inputs:ior = %.9g\n                float inputs:cuticle_angle = 0.5\n"
+            "                float3 inputs:absorption_coefficient = (%.9g, %.9g, %.9g)\n",
+            i, h->longitudinal_roughness, h->azimuthal_roughness, i, h->index, a[0], a[1], a[2]);
+    static const char *const lobe[] = {"R", "TT", "TRT"};
+    for (size_t k = 0; k < sizeof lobe / sizeof lobe[0]; k++)
+        fprintf(text,
+                "                float2 inputs:roughness_%s.connect = "
+                "</Cloth/Materials/%s/roughness_%zu.outputs:roughness_%s>\n",
+                lobe[k], name, i, lobe[k]);
+    fprintf(text, "                token outputs:out\n            }\n");
+}
+
+static void print_blend(FILE *text, const char *name, const struct hair_blend *b)
+{
+    for (size_t i = 0; i < HAIR_FIT_N_BLEND; i++) print_hair(text, name, i, &b->lobes[i]);
+    fprintf(text,
+            "            def Shader \"mixture\"\n            {\n"
+            "                uniform token info:id = \"ND_mix_bsdf\"\n"
+            "                token inputs:bg.connect = </Cloth/Materials/%s/hair_0.outputs:out>\n"
+            "                token inputs:fg.connect = </Cloth/Materials/%s/hair_1.outputs:out>\n"
+            "                float inputs:mix = %.9g\n                token outputs:out\n            }\n"
+            "            def Shader \"hair\"\n            {\n"
+            "                uniform token info:id = \"ND_surface\"\n"
+            "                token inputs:bsdf.connect = </Cloth/Materials/%s/mixture.outputs:out>\n"
+            "                token outputs:out\n            }\n",
+            name, name, b->second_share, name);
+}
+
+/* blend: NULL for a surface that is no fiber. */
+static void print_material(FILE *text, const char *name, const struct surface_fit *f, const struct hair_blend *blend)
+{
+    fprintf(text, "        def Material \"%s\"\n        {\n", name);
+    if (blend != NULL)
+        fprintf(text, "            token outputs:mtlx:surface.connect = </Cloth/Materials/%s/hair.outputs:out>\n",
+                name);
+    fprintf(text,
             "            token outputs:surface.connect = </Cloth/Materials/%s/surface.outputs:surface>\n"
             "            def Shader \"surface\"\n            {\n"
             "                uniform token info:id = \"UsdPreviewSurface\"\n"
             "                color3f inputs:diffuseColor = (%.6g, %.6g, %.6g)\n"
             "                float inputs:ior = %.6g\n                float inputs:roughness = %.6g\n"
-            "                token outputs:surface\n            }\n        }\n",
-            name, name, f->diffuse[0], f->diffuse[1], f->diffuse[2], f->index, f->roughness);
+            "                token outputs:surface\n            }\n",
+            name, f->diffuse[0], f->diffuse[1], f->diffuse[2], f->index, f->roughness);
+    if (blend != NULL) print_blend(text, name, blend);
+    fprintf(text, "        }\n");
 }
 
 static void print_materials(FILE *text, const struct export_scene *e)
@@ -113,9 +163,9 @@ static void print_materials(FILE *text, const struct export_scene *e)
     fprintf(text, "    def Scope \"Materials\"\n    {\n");
     for (size_t g = 0; g < e->model->sets.n_set; g++) {
         snprintf(name, sizeof name, "fiber_%zu", g);
-        print_material(text, name, &e->hair[g].surface);
+        print_material(text, name, &e->hair[g].surface, &e->hair[g].blend);
     }
-    print_material(text, "sheet", &(struct surface_fit){.index = 1.0, .roughness = 1.0});
+    print_material(text, "sheet", &(struct surface_fit){.index = 1.0, .roughness = 1.0}, NULL);
     fprintf(text, "    }\n");
 }
 
@@ -206,14 +256,13 @@ static status write_stage(const struct export_scene *e, struct error *err)
     return export_text_close(e, &t, "cloth.usda", err);
 }
 
-static json_t *material_json(const struct hair_fit *h)
+/* The hair materials, as the other formats have them, and beside them the preview surface. */
+static json_t *preview_json(const struct hair_fit *h)
 {
     const struct surface_fit *f = &h->surface;
-    return json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "diffuse_color", json_number_list(f->diffuse, 3, 1.0),
-                     "index", json_number(f->index), "roughness", json_number(f->roughness), "rel_rms",
-                     json_number(f->rel_rms), "fitted_albedo", json_number_list(h->albedo, 3, 1.0), "albedo",
-                     json_number_list(f->albedo, 3, 1.0), "fitted_turned_back", json_number_list(h->turned, 3, 1.0),
-                     "turned_back", json_number_list(f->turned, 3, 1.0));
+    return json_pack("{s:o, s:o, s:o, s:o, s:o, s:o}", "diffuse_color", json_number_list(f->diffuse, 3, 1.0), "index",
+                     json_number(f->index), "roughness", json_number(f->roughness), "rel_rms", json_number(f->rel_rms),
+                     "albedo", json_number_list(f->albedo, 3, 1.0), "turned_back", json_number_list(f->turned, 3, 1.0));
 }
 
 static status write_usd(struct export_scene *e, json_t **materials, struct error *err)
@@ -221,10 +270,10 @@ static status write_usd(struct export_scene *e, json_t **materials, struct error
     status s = export_rows_write(e, err);
     if (s == STATUS_OK) s = write_stage(e, err);
     if (s != STATUS_OK) return s;
-    *materials = json_array();
+    *materials = export_hair_json(e);
     for (size_t g = 0; g < e->model->sets.n_set; g++)
-        json_array_append_new(*materials, export_material_json(e, g, material_json(&e->hair[g])));
-    return STATUS_OK;
+        json_object_set_new(json_array_get(*materials, g), "preview_surface", preview_json(&e->hair[g]));
+    return *materials != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot export as USD: out of memory");
 }
 
 const struct export_format export_usd = {"usd", offsetof(struct job_document, export_usd), write_usd};

@@ -4,14 +4,12 @@
 #define SELVEDGE_OPTIMIZER_TEXTURE_DOCUMENTS_H
 
 #include "optimizer/worker/report/export/export_scene.h"
-#include "optimizer/worker/report/export/texture_surface.h"
+#include "optimizer/worker/report/export/textures/texture_principled.h"
 
 /* cloth.mtlx: MaterialX 1.39, node open_pbr_surface. Light that the cloth lets through is its thin-walled
  * subsurface. */
 status texture_materialx_write(const struct export_scene *e, const struct texture_surface *t, struct error *err);
 /* cloth.u3m: github.com/vizoogmbh/u3m, version 1.1 (u3m_schema.json). */
-status texture_u3m_write(const struct export_scene *e, const struct texture_surface *t, struct error *err);
-/* What base_color has for a reflected share of `albedo`: the dielectric above it reflects, too. */
-double texture_base_color(const struct texture_surface *t, double albedo);
+status texture_u3m_write(const struct export_scene *e, const struct texture_principled *p, struct error *err);
 
 #endif

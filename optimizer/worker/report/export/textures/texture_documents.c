@@ -1,4 +1,4 @@
-#include "optimizer/worker/report/export/texture_documents.h"
+#include "optimizer/worker/report/export/textures/texture_documents.h"
 
 #include "optimizer/worker/report/json_number.h"
 
@@ -8,11 +8,6 @@
 #include <time.h>
 
 static const double mm_per_inch = 25.4;
-
-double texture_base_color(const struct texture_surface *t, double albedo)
-{
-    return fmax(albedo - t->specular_albedo, 0.0) / (1.0 - t->specular_albedo);
-}
 
 /* ---- MaterialX ---- */
 
@@ -119,10 +114,10 @@ static json_t *image_json(const struct texture_maps *m, const char *file)
 
 static json_t *number_json(double constant) { return json_pack("{s:f, s:n}", "constant", constant, "texture"); }
 
-static json_t *number_map_json(double constant, const struct texture_maps *m, const char *file)
+static json_t *number_map_json(double constant, double factor, const struct texture_maps *m, const char *file)
 {
-    return json_pack("{s:f, s:{s:f, s:f, s:o}}", "constant", constant, "texture", "factor", 1.0, "offset", 0.0, "image",
-                     image_json(m, file));
+    return json_pack("{s:f, s:{s:f, s:f, s:o}}", "constant", constant, "texture", "factor", factor, "offset", 0.0,
+                     "image", image_json(m, file));
 }
 
 static json_t *rgb_json(const double rgb[3])
@@ -145,11 +140,10 @@ static json_t *normal_json(const struct texture_maps *m, const char *file)
     return j;
 }
 
-/* The keys that no map has are those of a plain dielectric without coat, sheen and metal. */
+/* The keys that no map has are those of a plain dielectric without coat and metal. */
 static void add_rest(json_t *v)
 {
-    static const char *const zero[] = {"clearcoat_value", "clearcoat_roughness", "metalness",
-                                       "displacement",    "sheen_value",         "sheen_tint",
+    static const char *const zero[] = {"clearcoat_value", "clearcoat_roughness", "metalness",       "displacement",
                                        "specular_tint",   "subsurface_radius",   "subsurface_value"};
     static const double white[3] = {1.0, 1.0, 1.0};
     for (size_t i = 0; i < sizeof zero / sizeof zero[0]; i++) json_object_set_new(v, zero[i], number_json(0.0));
@@ -169,22 +163,28 @@ static double mean_of(const struct texture_surface *t, double (*value)(const str
     return sum / (double)n;
 }
 
-static json_t *front_json(const struct texture_surface *t)
+static json_t *front_json(const struct texture_principled *p)
 {
+    const struct texture_surface *t = p->open_pbr;
     const struct texture_maps *m = t->maps;
-    double base[3], through = (t->transmission[0] + t->transmission[1] + t->transmission[2]) / 3.0;
-    for (int c = 0; c < 3; c++) base[c] = fmin(texture_base_color(t, t->albedo[c]), 1.0);
+    const double *through = t->means.transmission;
     json_t *v = json_object();
     add_rest(v);
-    json_object_set_new(v, "basecolor", color_map_json(base, m, "base_color.png"));
+    json_object_set_new(v, "basecolor", color_map_json(p->base, m, "principled_base_color.png"));
     json_object_set_new(v, "normal", normal_json(m, "normal.png"));
-    json_object_set_new(v, "roughness", number_map_json(mean_of(t, texture_surface_roughness), m, "roughness.png"));
-    json_object_set_new(v, "anisotropy_value",
-                        number_map_json(mean_of(t, texture_surface_anisotropy), m, "anisotropy.png"));
-    json_object_set_new(v, "anisotropy_rotation", number_map_json(0.0, m, "anisotropy_rotation.png"));
-    json_object_set_new(v, "transmission", number_map_json(fmin(through, 1.0), m, "transmission.png"));
-    /* 1 is 8 % of the light that comes straight; weight 1 is 4 %. */
-    json_object_set_new(v, "specular_value", number_json(0.5 * t->weight));
+    json_object_set_new(v, "roughness",
+                        number_map_json(fmin(p->roughness * mean_of(t, texture_surface_roughness), 1.0), p->roughness,
+                                        m, "roughness.png"));
+    json_object_set_new(
+        v, "anisotropy_value",
+        number_map_json(p->anisotropy * mean_of(t, texture_surface_anisotropy), p->anisotropy, m, "anisotropy.png"));
+    json_object_set_new(v, "anisotropy_rotation", number_map_json(0.0, 1.0, m, "anisotropy_rotation.png"));
+    json_object_set_new(
+        v, "transmission",
+        number_map_json(fmin((through[0] + through[1] + through[2]) / 3.0, 1.0), 1.0, m, "transmission.png"));
+    json_object_set_new(v, "specular_value", number_json(p->specular));
+    json_object_set_new(v, "sheen_value", number_json(p->sheen));
+    json_object_set_new(v, "sheen_tint", number_json(1.0));
     return v;
 }
 
@@ -197,7 +197,7 @@ static void make_uuid(const struct export_scene *e, char text[37])
              (unsigned)(a & 0xfff), (unsigned)(0x8000 | (b >> 48 & 0x3fff)), (unsigned long long)(b & 0xffffffffffffu));
 }
 
-static json_t *u3m_json(const struct export_scene *e, const struct texture_surface *t)
+static json_t *u3m_json(const struct export_scene *e, const struct texture_principled *p)
 {
     char uuid[37], now[32] = "1970-01-01T00:00:00Z";
     time_t clock = time(NULL);
@@ -207,15 +207,15 @@ static json_t *u3m_json(const struct export_scene *e, const struct texture_surfa
     return json_pack(
         "{s:s, s:{s:s, s:s, s:s, s:s, s:s, s:o, s:n, s:n, s:{s:f, s:n, s:n, s:{s:s}, s:n, s:n}, s:n}, s:n}", "schema",
         "1.1", "material", "id", uuid, "name", e->c->doc->sample[0] != '\0' ? e->c->doc->sample : "cloth",
-        "description", "Made by Selvedge.", "created", now, "modified", now, "front", front_json(t), "back", "side",
+        "description", "Made by Selvedge.", "created", now, "modified", now, "front", front_json(p), "back", "side",
         "physics", "thickness", 1e3 * (e->z_high_m - e->z_low_m), "weight", "composition", "devices", "fab", "null",
         "material_type", "construction", "metadata", "custom");
 }
 
-status texture_u3m_write(const struct export_scene *e, const struct texture_surface *t, struct error *err)
+status texture_u3m_write(const struct export_scene *e, const struct texture_principled *p, struct error *err)
 {
     char path[WORKER_PATH_BYTES], *text;
-    json_t *json = u3m_json(e, t);
+    json_t *json = u3m_json(e, p);
     text = json != NULL ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(9)) : NULL;
     json_decref(json);
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write a U3M material: out of memory");

@@ -1,4 +1,4 @@
-#include "optimizer/worker/report/export/texture_maps.h"
+#include "optimizer/worker/report/export/textures/texture_maps.h"
 
 #include <math.h>
 #include <stdbool.h>
