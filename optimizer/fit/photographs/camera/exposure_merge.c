@@ -149,6 +149,52 @@ static void leave_out_all_near_saturation(const struct exposure_set *e, double *
     }
 }
 
+/* Light of exposure i over what the others predict for the same samples; NaN where there is too little of it. */
+static double light_ratio(const struct exposure_set *e, size_t i)
+{
+    static const double least_share = 0.005, most_share = 0.9; /* of the full scale */
+    const size_t n_sample = 3 * e->width * e->height;
+    double own = 0.0, predicted = 0.0;
+    for (size_t p = 0; p < n_sample; p++) {
+        const struct noise_channel *k = channel_noise(e, p % 3);
+        double light = 0.0, time_s = 0.0, here = NAN;
+        for (size_t j = 0; j < e->n; j++) {
+            if ((double)e->image[j]->pixel[p] >= most_share) continue;
+            const double dn = sample_dn(e, j, p) - k->read_mean - e->t_s[j] * k->dark_mean;
+            if (j == i)
+                here = dn;
+            else
+                light += dn, time_s += e->t_s[j];
+        }
+        if (isnan(here) || !(time_s > 0.0)) continue;
+        own += here;
+        predicted += light / time_s * e->t_s[i];
+    }
+    const double least = least_share * e->full_scale[i] * (double)n_sample, most = fmax(own, predicted);
+    return most > least ? fmax(own, 1e-3 * most) / fmax(predicted, 1e-3 * most) : NAN;
+}
+
+status exposure_check_agreement(const struct noise_record *noise, size_t n, const double *t_s, const double *full_scale,
+                                struct image *const *exposure, const char *const *name, struct error *err)
+{
+    static const double most = 1.25;
+    const struct exposure_set e = {noise, n, exposure[0]->width, exposure[0]->height, t_s, full_scale, exposure};
+    double farthest = 0.0, ratio_there = 1.0;
+    size_t worst = 0;
+    for (size_t i = 0; n > 1 && i < n; i++) {
+        const double ratio = light_ratio(&e, i);
+        if (isnan(ratio) || fabs(log(ratio)) <= farthest) continue;
+        farthest = fabs(log(ratio));
+        ratio_there = ratio;
+        worst = i;
+    }
+    if (farthest <= log(most)) return STATUS_OK;
+    return error_set(err, STATUS_INVALID,
+                     "cannot merge the exposures of '%s': '%s' has %.2g times the light that the others and the "
+                     "exposure times predict: check 'exposure_s', and that all show the same view in the same light",
+                     name[0], name[worst], ratio_there);
+}
+
 status exposure_merge_images(const struct noise_record *noise, size_t n, const double *t_s, const double *full_scale,
                              struct image *const *exposure, struct image *variance, double *saturated_share,
                              struct error *err)

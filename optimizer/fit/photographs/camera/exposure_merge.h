@@ -29,6 +29,13 @@ struct merged_sample {
 struct merged_sample exposure_merge(const struct noise_channel *k, size_t n, const double *t_s, const double *y_dn,
                                     size_t n_reweight);
 
+/* Exposures of one view show the same light: another lamp, a moved camera or a wrong exposure time would leave an
+ * average of different things. STATUS_INVALID, with the name of the exposure at fault, where the light of one is more
+ * than 1.25 times what the others and the exposure times predict for the same samples, or less by that; shutters keep
+ * their times to a few percent. Samples that come near saturation are left out, and so is a dark exposure. */
+status exposure_check_agreement(const struct noise_record *noise, size_t n, const double *t_s, const double *full_scale,
+                                struct image *const *exposure, const char *const *name, struct error *err);
+
 /* Merges n pictures of equal size. pixel of exposure[i]: 1 is saturation, full_scale[i] DN. noise NULL: no record. The
  * result replaces exposure[0]: values per second in the same unit, not DN. Where all samples of a pixel are saturated
  * it takes that of the shortest exposure. variance: initialised with the size of the pictures, becomes that of each

@@ -192,6 +192,8 @@ static status merge(const struct photograph_process *k, struct exposures *e, str
     }
     status s = k->has_noise ? image_init(&e->variance, image[0]->width, image[0]->height, 3, err) : STATUS_OK;
     if (s != STATUS_OK) return s;
+    s = exposure_check_agreement(k->has_noise ? &noise : NULL, e->n, t_s, full_scale, image, e->name, err);
+    if (s != STATUS_OK) return s;
     s = exposure_merge_images(k->has_noise ? &noise : NULL, e->n, t_s, full_scale, image,
                               k->has_noise ? &e->variance : NULL, &r->saturated_share, err);
     if (s != STATUS_OK) return s;

@@ -2,6 +2,7 @@
 
 #include "base/files/durable.h"
 #include "base/option_id.h"
+#include "optimizer/job/check/job_slips.h"
 #include "optimizer/job/json/json_field.h"
 
 #include <math.h>
@@ -193,6 +194,28 @@ static status read_board(const struct json_field *rig, struct marker_board *b, s
     return is_charuco ? read_charuco(&charuco, b, err) : read_centers(&f, b, err);
 }
 
+/* Lamps and cameras of the rig together, as far as it gives them by angles. */
+static status check_radians(const struct json_field *rig, struct error *err)
+{
+    static const char *const list[] = {"lamps", "cameras"};
+    struct angle_span span = {0};
+    for (size_t k = 0; k < sizeof list / sizeof list[0]; k++) {
+        const char *name;
+        json_t *station;
+        json_object_foreach(json_object_get(rig->object, list[k]), name, station)
+        {
+            const double theta = json_number_value(json_object_get(station, "theta_deg")),
+                         phi = json_number_value(json_object_get(station, "phi_deg"));
+            if (json_object_get(station, "theta_deg") != NULL) angle_span_add(&span, theta, phi, theta, phi, 0.0);
+        }
+    }
+    if (!angle_span_in_radians(&span)) return STATUS_OK;
+    return error_set(err, STATUS_INVALID,
+                     "the angles of 'lamps' and 'cameras' look like radians: the largest one from the normal is %.3g; "
+                     "write degrees",
+                     span.theta);
+}
+
 static status apply(const json_t *json, struct job_document *doc, struct lens *lens, struct marker_board *board,
                     struct error *err)
 {
@@ -210,6 +233,7 @@ static status apply(const json_t *json, struct job_document *doc, struct lens *l
     if (s == STATUS_OK && present) s = read_vignetting(&f, lens, err);
     if (s == STATUS_OK && present) s = read_distortion(&f, lens, err);
     if (s == STATUS_OK) s = read_board(&rig, board, err);
+    if (s == STATUS_OK) s = check_radians(&rig, err);
     for (size_t i = 0; i < doc->n_photograph && s == STATUS_OK; i++)
         if (doc->photograph[i].view[0] != '\0') s = apply_view(&rig, doc, i, err);
     return s;

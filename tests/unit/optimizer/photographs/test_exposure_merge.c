@@ -6,6 +6,7 @@
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -95,6 +96,37 @@ static void test_pictures(void **state)
     image_release(&im[1]);
 }
 
+/* Exposure times that contradict the light are refused with the exposure at fault; those of a shutter that is 10 % off
+ * are not, and neither are an exposure that is all dark and one that is all saturated. */
+static void test_agreement(void **state)
+{
+    static const char *const name[3] = {"short", "middle", "long"};
+    static const double light[][3] = {
+        {1.0, 4.0, 16.0}, {1.1, 4.0, 16.0}, {100.0, 4.0, 16.0}, {1.0, 4.0, 5.0}, {1.0, 2.0, 16.0}};
+    static const char *const fault[] = {NULL, NULL, "'short' has 1e+02 times", "'long' has 0.31 times",
+                                        "'middle' has 0.5 times"};
+    const double t[3] = {1, 4, 16}, full[3] = {1000, 1000, 1000};
+    struct image im[3], *list[3] = {&im[0], &im[1], &im[2]};
+    (void)state;
+    for (int i = 0; i < 3; i++) assert_int_equal(image_init(&im[i], 8, 8, 3, NULL), STATUS_OK);
+    for (size_t k = 0; k < sizeof light / sizeof light[0]; k++) {
+        struct error err = {0};
+        for (int i = 0; i < 3; i++)
+            for (size_t p = 0; p < 192; p++)
+                im[i].pixel[p] = (float)(0.008 * light[k][i] * (0.5 + 0.5 * (double)(p % 3)));
+        status s = exposure_check_agreement(NULL, 3, t, full, list, name, &err);
+        assert_int_equal(s, fault[k] == NULL ? STATUS_OK : STATUS_INVALID);
+        if (fault[k] != NULL && strstr(err.text, fault[k]) == NULL) fail_msg("%zu: %s", k, err.text);
+    }
+    for (size_t p = 0; p < 192; p++) {
+        im[0].pixel[p] = 1e-4f;
+        im[1].pixel[p] = 1e-4f;
+        im[2].pixel[p] = 1.0f;
+    }
+    assert_int_equal(exposure_check_agreement(NULL, 3, t, full, list, name, NULL), STATUS_OK);
+    for (int i = 0; i < 3; i++) image_release(&im[i]);
+}
+
 /* An even picture whose long exposure is just below the full scale, so that noise takes a part of its samples over it:
  * the mean is right within its error. */
 static void test_near_saturation(void **state)
@@ -134,8 +166,9 @@ static void test_near_saturation(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_golden),   cmocka_unit_test(test_left_out_samples), cmocka_unit_test(test_dark_pixels),
-        cmocka_unit_test(test_pictures), cmocka_unit_test(test_near_saturation),
+        cmocka_unit_test(test_golden),      cmocka_unit_test(test_left_out_samples),
+        cmocka_unit_test(test_dark_pixels), cmocka_unit_test(test_pictures),
+        cmocka_unit_test(test_agreement),   cmocka_unit_test(test_near_saturation),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -35,6 +35,35 @@ static const char *folder_of(void **state)
     return folder;
 }
 
+static void test_radians(void **state)
+{
+    static const struct {
+        const char *stations;
+        bool refused;
+    } given[] = {{"\"a\":{\"theta_deg\":0.349,\"phi_deg\":0},\"b\":{\"theta_deg\":1.117,\"phi_deg\":3.14}", true},
+                 {"\"a\":{\"theta_deg\":20,\"phi_deg\":0},\"b\":{\"theta_deg\":1.117,\"phi_deg\":3.14}", false},
+                 {"\"a\":{\"theta_deg\":1.117,\"phi_deg\":90},\"b\":{\"theta_deg\":1,\"phi_deg\":3.14}", false},
+                 {"\"a\":{\"theta_deg\":1.117,\"phi_deg\":0}", false},
+                 {"\"a\":{\"theta_deg\":0,\"phi_deg\":0},\"b\":{\"theta_deg\":0.1,\"phi_deg\":0}", false}};
+    const char *path = scratch_path(state, "rig.json");
+    struct job_document *doc = job_document_of_text(
+        DOCUMENT("{\"file\":\"a.exr\",\"set\":\"fit\",\"crop_px\":[0,0,9,9],\"light_theta_deg\":10,"
+                 "\"light_phi_deg\":0,\"camera_theta_deg\":5,\"camera_phi_deg\":0}",
+                 RIG));
+    for (size_t i = 0; i < sizeof given / sizeof given[0]; i++) {
+        struct lens lens;
+        struct marker_board board;
+        struct error err = {0};
+        char text[400];
+        snprintf(text, sizeof text, "{\"selvedge_rig\":1,\"lamps\":{%s},\"views\":{}}", given[i].stations);
+        scratch_write(path, text, strlen(text));
+        status s = rig_apply(path, doc, &lens, &board, &err);
+        if (s != (given[i].refused ? STATUS_INVALID : STATUS_OK)) fail_msg("%zu: %s", i, err.text);
+        if (given[i].refused) assert_non_null(strstr(err.text, "look like radians"));
+    }
+    job_document_free(doc);
+}
+
 static void test_views(void **state)
 {
     struct lens lens;
@@ -226,11 +255,9 @@ static void test_light_of_a_view(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_views),
-        cmocka_unit_test(test_bad_rigs),
-        cmocka_unit_test(test_places_in_documents),
-        cmocka_unit_test(test_lens),
-        cmocka_unit_test(test_light_of_a_view),
+        cmocka_unit_test(test_views),    cmocka_unit_test(test_radians),
+        cmocka_unit_test(test_bad_rigs), cmocka_unit_test(test_places_in_documents),
+        cmocka_unit_test(test_lens),     cmocka_unit_test(test_light_of_a_view),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }
