@@ -25,8 +25,6 @@ struct cli {
 };
 
 status cli_submit(struct cli *cli, int *exit_code, struct error *err);
-/* Prints a list of {"field", "detail"}, a line each behind the label. Returns how many there are. */
-size_t cli_print_faults(const json_t *list, const char *label, FILE *out);
 status cli_check(struct cli *cli, int *exit_code, struct error *err);
 status cli_status(struct cli *cli, int *exit_code, struct error *err);
 status cli_watch(struct cli *cli, int *exit_code, struct error *err);

@@ -1,6 +1,7 @@
 /* selvedge check JOB.json: all faults of a job document and of its files before anything is uploaded. The check itself
  * is a mode of `selvedge-worker`, which reads every file format; the client runs it and prints what it says. */
 #include "clients/cli/cli.h"
+#include "clients/cli/cli_report.h"
 #include "clients/cli/cli_text.h"
 #include "clients/cli/tools/cli_sibling.h"
 
@@ -42,23 +43,6 @@ static status run_worker(const char *document, const char *folder, json_t **repo
                          worker);
     if (!json_is_object(*report)) return error_set(err, STATUS_INTERNAL, "'%s' could not check '%s'", worker, document);
     return STATUS_OK;
-}
-
-size_t cli_print_faults(const json_t *list, const char *label, FILE *out)
-{
-    size_t i;
-    const json_t *item;
-    json_array_foreach(list, i, item)
-    {
-        char field[160], detail[700];
-        const char *f = json_string_value(json_object_get(item, "field")),
-                   *d = json_string_value(json_object_get(item, "detail"));
-        text_clean(f != NULL ? f : "", field, sizeof field);
-        text_clean(d != NULL ? d : "", detail, sizeof detail);
-        bool named = field[0] == '\0' || strstr(detail, field) != NULL;
-        fprintf(out, "%s: %s%s%s\n", label, named ? "" : field, named ? "" : ": ", detail);
-    }
-    return json_array_size(list);
 }
 
 status cli_check(struct cli *cli, int *exit_code, struct error *err)

@@ -287,3 +287,20 @@ void report_summary(const json_t *job, FILE *out)
     fprintf(out, "%-36s  %-10s %-17s %4.0f %% %8s  %s\n", id, view.state, verdict,
             isnan(view.fraction) ? 0.0 : 100.0 * view.fraction, eta, sample);
 }
+
+size_t cli_print_faults(const json_t *list, const char *label, FILE *out)
+{
+    size_t i;
+    const json_t *item;
+    json_array_foreach(list, i, item)
+    {
+        char field[160], detail[700];
+        const char *f = json_string_value(json_object_get(item, "field")),
+                   *d = json_string_value(json_object_get(item, "detail"));
+        text_clean(f != NULL ? f : "", field, sizeof field);
+        text_clean(d != NULL ? d : "", detail, sizeof detail);
+        bool named = field[0] == '\0' || strstr(detail, field) != NULL;
+        fprintf(out, "%s: %s%s%s\n", label, named ? "" : field, named ? "" : ": ", detail);
+    }
+    return json_array_size(list);
+}

@@ -18,4 +18,7 @@ void report_result(const json_t *job, FILE *out);
 /* Prints one line of a list. */
 void report_summary(const json_t *job, FILE *out);
 
+/* Prints a list of {"field", "detail"}, a line each behind the label. Returns how many there are. */
+size_t cli_print_faults(const json_t *list, const char *label, FILE *out);
+
 #endif

@@ -1,5 +1,6 @@
 #include "clients/cli/cli.h"
 #include "clients/cli/cli_job_files.h"
+#include "clients/cli/cli_report.h"
 #include "clients/cli/cli_text.h"
 
 #include "base/clock.h"
