@@ -3,8 +3,8 @@
  * sheet as a Mesh, camera and lamp of the first row. Millimetres, z is up.
  *
  * Each material has two surfaces: for renderers that read MaterialX in USD (outputs:mtlx:surface) the mixture of two
- * hair materials of hair_fit.h, and for all others a UsdPreviewSurface. That one has no light that goes through a fiber;
- * it is the opaque fiber of hair_fit.h. */
+ * hair materials of hair_fit.h, and for all others a UsdPreviewSurface. That one lets no light through a fiber; it is
+ * the opaque fiber of hair_fit.h. */
 #include "optimizer/worker/report/export/export_formats.h"
 #include "optimizer/worker/report/json_number.h"
 
