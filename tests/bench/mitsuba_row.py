@@ -2,9 +2,9 @@
 has Mitsuba (pip install mitsuba usd-core), in a process of its own, because Mitsuba may end the process on an error.
 
 FORMAT mitsuba: the scene as it is. pbrt: what a reader of pbrt's grammar finds in the view of that row, with Mitsuba's hair material, which is the
-same as pbrt's. usd: what the USD library finds in the stage, with the hair material of its MaterialX network; lamp and camera are those of the row in rows.csv,
-which the stage has for the first row only. usd_preview: the same with the principled BSDF of the numbers of its preview surface. textures: a plane with the maps of the U3M material, which has no rotation of the
-anisotropy here."""
+same as pbrt's. usd: what the USD library finds in the stage, with the hair material of its MaterialX network; lamp and camera are those of the row
+in rows.csv, which the stage has for the first row only. usd_preview: the same with the principled BSDF of the numbers of its preview surface.
+textures: a plane with the maps of the U3M material, with their factors and without the rotation of the anisotropy."""
 import csv
 import json
 import os
@@ -161,8 +161,10 @@ def usd_scene(folder, row, px, spp, preview=False):
     found = json.loads(done.stdout)
     place = place_of(folder, row)
     lamp, camera, up = ([float(place[f"{name}_{a}"]) for a in "xyz"] for name in ("lamp", "camera", "up"))
-    shapes = [curves(folder, i, [(f["points"], f["radius"]) for f in group["fibers"]],
-                     preview_surface(group["surface"]) if preview else hair_of_materialx(group["mixture"])) for i, group in enumerate(found["curves"])]
+    shapes = []
+    for i, group in enumerate(found["curves"]):
+        material = preview_surface(group["surface"]) if preview else hair_of_materialx(group["mixture"])
+        shapes.append(curves(folder, i, [(f["points"], f["radius"]) for f in group["fibers"]], material))
     turn = mitsuba.ScalarTransform4f().look_at(origin=lamp, target=[0, 0, 0], up=[0, 0.1, 1])
     half = found["lamp"]["side"] / 2
     others = {

@@ -134,10 +134,10 @@ def test_a_stage_for_usd(results):
     # renderers that read MaterialX get the mixture of hair that the other formats have
     (other,) = conversion_of(results, "pbrt")["materials"]
     assert group["mixture"]["share"] == pytest.approx(material["hair"][1]["share"], rel=1e-5)
-    for found_hair, hair, same in zip(group["mixture"]["hair"], material["hair"], other["hair"]):
-        assert hair == same
+    for found_hair, fitted, same in zip(group["mixture"]["hair"], material["hair"], other["hair"]):
+        assert fitted == same
         for key, name in (("longitudinal", "longitudinal_roughness"), ("azimuthal", "azimuthal_roughness"), ("index", "index"), ("absorption", "absorption")):
-            assert found_hair[key] == pytest.approx(hair[name], rel=1e-5), key
+            assert found_hair[key] == pytest.approx(fitted[name], rel=1e-5), key
     for mine, library in zip(group["extent"], group["library_extent"]):
         assert mine == pytest.approx(library, abs=1e-3)
     row = next(csv.DictReader((folder / "rows.csv").open()))
@@ -317,7 +317,8 @@ def test_a_u3m_material(results):
     assert front["basecolor"]["texture"]["image"]["path"] == "principled_base_color.png"
     assert [front["basecolor"]["constant"][c] for c in "rgb"] == pytest.approx(principled["base_color"], rel=1e-6)
     assert front["roughness"]["texture"]["factor"] == pytest.approx(principled["roughness_factor"], rel=1e-6)
-    assert front["specular_value"]["constant"] == pytest.approx(principled["specular"]) and front["sheen_value"]["constant"] == pytest.approx(principled["sheen"])
+    for name in ("specular", "sheen"):
+        assert front[f"{name}_value"]["constant"] == pytest.approx(principled[name])
     # the mean of the map is the mean that was fitted
     rows = read_png(folder / "principled_base_color.png")
     for c in range(3):
