@@ -178,7 +178,8 @@ def usd_scene(folder, row, px, spp, preview=False):
 def main():
     form, folder, row, px, spp = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), int(sys.argv[5])
     mitsuba.set_variant("scalar_rgb")
-    scene = {"mitsuba": mitsuba_scene, "pbrt": pbrt_scene, "usd": usd_scene, "usd_preview": usd_preview_scene, "textures": textures_scene}[form](folder, row, px, spp)
+    makers = {"mitsuba": mitsuba_scene, "pbrt": pbrt_scene, "usd": usd_scene, "usd_preview": usd_preview_scene, "textures": textures_scene}
+    scene = makers[form](folder, row, px, spp)
     picture = numpy.array(mitsuba.render(scene))
     print(json.dumps([float(x) for x in picture[..., :3].mean((0, 1))]))
 
