@@ -1,10 +1,10 @@
 // Shows the reconstructed fibers in 3D (three.js) from the job's .hair file (docs/file-formats.md), when the user asks
 // for it.
 import { coloursOf, waysToColour } from "./fibers/fiber_colors.js";
+import { MOST_BYTES, parseHair } from "./fibers/hair_file.js";
 import { el, size } from "./page_parts.js";
-import { raw } from "./server_link.js";
 
-const MAX_SEGMENT = 400000, MAX_BYTES = 200 << 20;
+const MAX_SEGMENT = 400000;
 
 // The group of a fiber is its colour, a corner of the cube: 7 - r - 2 g - 4 b.
 const groupOf = (rgb, i) => 7 - Math.round(rgb[3 * i]) - 2 * Math.round(rgb[3 * i + 1]) - 4 * Math.round(rgb[3 * i + 2]);
@@ -16,31 +16,14 @@ function axisOf(xyz, first, last) {
 }
 
 // Returns, for each of the n segments that are shown: position, a Float32Array with x, y, z of both ends in millimetres,
-// radius in millimetres, kind (the axis along which its fiber runs), and group, or null in a file without groups; also
-// nStrand and nSegment of the file. Beyond MAX_SEGMENT segments some fibers are left out.
-export function readHair(buffer) {
-  const view = new DataView(buffer);
-  const magic = String.fromCharCode(...new Uint8Array(buffer, 0, 4));
-  if (buffer.byteLength < 128 || magic !== "HAIR") throw new Error("not a .hair file");
-  const nStrand = view.getUint32(4, true), nPoint = view.getUint32(8, true), flags = view.getUint32(12, true), nDefault = view.getUint32(16, true);
-  const words = String.fromCharCode(...new Uint8Array(buffer, 40, 88));
-  let at = 128;
-  const segments = new Uint32Array(nStrand);
-  for (let i = 0; i < nStrand; i++) segments[i] = flags & 1 ? view.getUint16(at + 2 * i, true) : nDefault;
-  if (flags & 1) at += 2 * nStrand;
-  const array = (has, width) => {
-    if (!has) return null;
-    if (at + 4 * width * nPoint > buffer.byteLength) throw new Error("the .hair file is incomplete");
-    at += 4 * width * nPoint;
-    return new Float32Array(buffer.slice(at - 4 * width * nPoint, at));
-  };
-  const xyz = array(flags & 2, 3), thickness = array(flags & 4, 1);
-  array(flags & 8, 1);
-  const rgb = array(flags & 16 && words.includes("groups=rgb"), 3), thick = view.getFloat32(20, true);
-  if (!xyz) throw new Error("the .hair file is incomplete");
+// radius in millimetres, kind (the axis along which its fiber runs), group, or null in a file without groups, and contrast
+// (100: as a scan shows a fiber), or null without a scan; also nStrand and nSegment of the file. contrast: of each point.
+// Beyond MAX_SEGMENT segments some fibers are left out.
+export function readHair(buffer, contrast = null) {
+  const { nStrand, segments, xyz, thickness, thick, rgb } = parseHair(buffer);
   const nSegment = segments.reduce((a, b) => a + b, 0);
   const keep = Math.min(1, MAX_SEGMENT / Math.max(1, nSegment));
-  const position = [], radius = [], kind = [], group = [];
+  const position = [], radius = [], kind = [], group = [], shown = [];
   let first = 0, due = 0;
   for (let i = 0; i < nStrand; i++) {
     due += keep;
@@ -52,12 +35,13 @@ export function readHair(buffer) {
         radius.push(thickness ? (thickness[k] + thickness[k + 1]) / 4 : thick / 2);
         kind.push(axis);
         if (rgb) group.push(groupOf(rgb, k));
+        if (contrast) shown.push((contrast[k] + contrast[k + 1]) / 2);
       }
     }
     first += segments[i] + 1;
   }
   return {
-    position: new Float32Array(position), radius: new Float32Array(radius), kind: new Uint8Array(kind), group: rgb ? new Uint8Array(group) : null,
+    position: new Float32Array(position), radius: new Float32Array(radius), kind: new Uint8Array(kind), group: rgb ? new Uint8Array(group) : null, contrast: contrast ? new Float32Array(shown) : null,
     n: radius.length, nStrand, nSegment, thinned: keep < 1,
   };
 }
@@ -121,15 +105,17 @@ function show(THREE, node, hair) {
   };
 }
 
-export function fiberView(file) {
+// fibers: SharedFibers
+export function fiberView(fibers) {
+  const { file } = fibers;
   let shown = null;
   const hint = el("div", { class: "hint" });
   const node = el("div", { class: "view3d" }, hint);
   const open = async () => {
     hint.replaceChildren("Loading ...");
     try {
-      const [THREE, answer] = await Promise.all([import("/vendor/three.module.js"), raw("GET", file.url)]);
-      const hair = readHair(await answer.arrayBuffer());
+      const [THREE, loaded] = await Promise.all([import("/vendor/three.module.js"), fibers.load()]);
+      const hair = readHair(loaded.buffer, loaded.contrast);
       shown = show(THREE, node, hair);
       offerColours(hair);
       caption.textContent = `${hair.nStrand} fibers, ${hair.nSegment} segments${hair.thinned ? " (some of them are shown)" : ""}; drag turns, wheel zooms, shift-drag moves`;
@@ -150,7 +136,7 @@ export function fiberView(file) {
     colours.replaceChildren(el("label", {}, "Colour by ", choose), legend);
     paint();
   };
-  if (file.size > MAX_BYTES) hint.append(`The fiber file is too large for the browser (${size(file.size)}); download it instead.`);
+  if (file.size > MOST_BYTES) hint.append(`The fiber file is too large for the browser (${size(file.size)}); download it instead.`);
   else hint.append(el("button", { onclick: open }, `Show the fibers in 3D (${size(file.size)})`));
   return { box: el("div", {}, node, colours, caption), close: () => shown?.close() };
 }

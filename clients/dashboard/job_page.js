@@ -1,6 +1,7 @@
 // The page of one job: state, stages and live curves; after the end also parameters, comparison, fibers and downloads.
 import { radiusPlot, scatterPlot } from "./comparison.js";
 import { fiberView } from "./fiber_view.js";
+import { SharedFibers } from "./fibers/hair_file.js";
 import { fitDetails } from "./fit_details.js";
 import { JobCharts } from "./job_charts.js";
 import { LogTail, WholeLog } from "./log_tail.js";
@@ -11,8 +12,9 @@ import { qualityCard } from "./quality_card.js";
 import { correlationTable } from "./record/correlation_table.js";
 import { jobRecord } from "./record/job_record.js";
 import { VersionsCard } from "./record/versions_card.js";
-import { channelErrors, choiceOf, configurations, fiberFile, fitted, models, radiusSearch, residuals, sliceFiles } from "./result_view.js";
+import { channelErrors, choiceOf, configurations, contrastFile, fiberFile, fitted, models, radiusSearch, residuals, sliceFiles } from "./result_view.js";
 import { getJson, poll, sendJson } from "./server_link.js";
+import { sliceView } from "./slices/slice_view.js";
 import { SurfacePictures } from "./surface_card.js";
 import { twinCard } from "./twin/twin_card.js";
 
@@ -153,9 +155,10 @@ export function jobPage(page, id) {
     const compared = configurations(job, new Map(list.files.map((f) => [f.path, f.url])));
     const slices = sliceFiles(list.files), hair = fiberFile(list.files);
     const details = fitDetails(job), correlated = correlationTable(job);
-    const fibers = hair ? fiberView(hair) : null;
+    const shared = hair ? new SharedFibers(hair, contrastFile(list.files)) : null, fibers = shared ? fiberView(shared) : null;
+    const scan = sliceView(list.files, shared);
     const quality = qualityCard(job, list.files);
-    closeFibers = fibers?.close ?? null;
+    closeFibers = () => { fibers?.close(); scan?.close(); };
     const twin = twinCard(job, list.files, compared);
     closeTwin = twin?.close ?? null;
     const pairs = compared.length ? pairsCard(compared, job.result?.png_exposure) : null;
@@ -171,7 +174,7 @@ export function jobPage(page, id) {
       radius ? card("Fiber radius", radiusPlot(radius)) : "",
       pairs ? card("Measured and rendered pictures", pairs.box) : "",
       quality ? card("Quality of the geometry", quality) : "",
-      slices.length ? card("Slices of the scan, detected fibers in red", el("div", { class: "slices" }, slices.map((f) => el("figure", {}, el("img", { src: f.url, alt: f.path, loading: "lazy" }), el("figcaption", {}, f.path))))) : "",
+      scan ? card("Slices of the scan", scan.box) : slices.length ? card("Slices of the scan, detected fibers in red", el("div", { class: "slices" }, slices.map((f) => el("figure", {}, el("img", { src: f.url, alt: f.path, loading: "lazy" }), el("figcaption", {}, f.path))))) : "",
       fibers ? card("Fibers", fibers.box) : "",
       card("Downloads", downloads(job, list)));
   };

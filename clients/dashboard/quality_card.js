@@ -36,7 +36,7 @@ export function qualityCard(job, files) {
   const plot = find("pictures/fiber-lengths.svg"), page = find("quality.html");
   return el("div", { id: "quality" },
     el("div", { class: "columns" },
-      el("table", {}, el("tbody", {}, qualityRows(g).map(([name, value, hint]) => el("tr", {}, el("td", {}, name), el("td", { class: "number" }, value), el("td", { class: "hint" }, hint))))),
+      el("table", {}, el("tbody", {}, qualityRows(g).map(([name, value, hint]) => el("tr", {}, el("td", {}, name, hint ? el("div", { class: "hint" }, hint) : ""), el("td", { class: "number" }, value))))),
       plot ? el("img", { src: plot.url, alt: "length distribution of the fibers", class: "plot", loading: "lazy" }) : null),
     page ? el("p", {}, el("a", { href: page.url, target: "_blank" }, "Full quality report")) : null);
 }

@@ -84,6 +84,8 @@ export function configurations(job, urls) {
 // The pictures of slices and the fiber file among the results.
 export const sliceFiles = (files) => files.filter((f) => /(^|\/)slice[^/]*\.png$/.test(f.path));
 export const fiberFile = (files) => files.find((f) => f.path.endsWith(".hair")) ?? null;
+// How clearly the scan shows each point of that file; null without a scan.
+export const contrastFile = (files) => files.find((f) => f.path === "scan/contrast.u8") ?? null;
 export const residuals = (job) => ({
   fit: job.result?.fit_rel_rms, fitSe: job.result?.fit_rel_rms_se, held: job.result?.heldout_rel_rms, heldSe: job.result?.heldout_rel_rms_se,
   leftOut: job.result?.cross_validation?.rel_rms, leftOutSe: job.result?.cross_validation?.rel_rms_se, converged: job.result?.converged,

@@ -12,7 +12,6 @@ enum {
     HAIR_HEADER_BYTES = 128,
     HAIR_TEXT_OFFSET = 40,
     HAIR_TEXT_BYTES = 88,
-    HAIR_MAX_SEGMENT = 65535,
     HAIR_SEGMENTS = 1,
     HAIR_POINTS = 2,
     HAIR_THICKNESS = 4,
@@ -55,7 +54,7 @@ static float get_f32(const uint8_t *from)
 
 /* Number of strands that a fiber of n vertices is written as, because the format counts a strand's segments in 16
  * bits. */
-static size_t n_strand_of(size_t n) { return (n - 2) / HAIR_MAX_SEGMENT + 1; }
+static size_t n_strand_of(size_t n) { return (n - 2) / FIBER_HAIR_MAX_SEGMENT + 1; }
 
 /* Counts what the file will hold. The vertex between two strands of a fiber is in both. */
 static status count_strands(const struct fiber_set *f, const char *name, size_t *n_strand, size_t *n_point,
@@ -102,7 +101,7 @@ static void put_strands(uint8_t *to, const struct fiber_set *f, size_t n_strand,
     uint8_t *colour = thickness + 4 * n_point;
     for (size_t i = 0; i < f->n_fiber; i++)
         for (size_t from = f->first_vertex[i], last = f->first_vertex[i + 1] - 1; from < last;) {
-            size_t n = last - from < HAIR_MAX_SEGMENT ? last - from : HAIR_MAX_SEGMENT;
+            size_t n = last - from < FIBER_HAIR_MAX_SEGMENT ? last - from : FIBER_HAIR_MAX_SEGMENT;
             put_u16(segments, (uint32_t)n);
             for (size_t k = from; k <= from + n; k++, points += 12, thickness += 4) {
                 for (size_t a = 0; a < 3; a++) put_f32(points + 4 * a, 1000.0f * f->position_m[3 * k + a]);

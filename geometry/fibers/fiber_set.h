@@ -13,6 +13,8 @@
 /* Fibers belong to groups, such as the kinds of yarn of a cloth. Each group may have scattering parameters of its own.
  * Scans and most files have group 0 only. */
 enum { FIBER_MAX_GROUP = 8 };
+/* Largest number of segments of a strand in a .hair file. */
+enum { FIBER_HAIR_MAX_SEGMENT = 65535 };
 
 struct fiber_set {
     size_t n_fiber;

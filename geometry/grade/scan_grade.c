@@ -257,22 +257,62 @@ static void sum_lengths(const struct grade_job *j, struct scan_grade *grade, flo
                                                                   : GRADE_PARTLY;
 }
 
+/* Measures all windows. The caller releases the points and the windows also after an error. */
+static status grade_windows(struct grade_job *j, const struct fiber_set *f, struct thread_pool *pool,
+                            const struct progress *progress, struct error *err)
+{
+    status s = grade_points_make(&j->points, f, j->v->voxel_size_m[0], MOST_APART, err);
+    if (s == STATUS_OK) s = make_windows(j, f, err);
+    if (s != STATUS_OK) return s;
+    s = thread_pool_run(pool, j->n_window, grade_window, j, progress);
+    return s == STATUS_OK ? s : error_set(err, s, "grading the scan was cancelled");
+}
+
+static void grade_job_release(struct grade_job *j)
+{
+    free(j->window);
+    grade_points_release(&j->points);
+}
+
 status scan_grade_measure(const struct volume *v, const struct fiber_set *f, struct thread_pool *pool,
                           const struct progress *progress, struct scan_grade *grade, float *safe, struct error *err)
 {
     struct grade_job j = {.v = v};
     *grade = (struct scan_grade){.valley_depth = NAN, .contrast = NAN};
     for (size_t i = 0; i < f->n_fiber && safe != NULL; i++) safe[i] = 0.0f;
-    status s = grade_points_make(&j.points, f, v->voxel_size_m[0], MOST_APART, err);
-    if (s == STATUS_OK) s = make_windows(&j, f, err);
-    if (s == STATUS_OK) {
-        s = thread_pool_run(pool, j.n_window, grade_window, &j, progress);
-        if (s != STATUS_OK) error_set(err, s, "grading the scan was cancelled");
-    }
+    status s = grade_windows(&j, f, pool, progress, err);
     if (s == STATUS_OK) sum_lengths(&j, grade, safe);
     if (s == STATUS_OK) s = medians(&j, grade, err);
-    free(j.window);
-    grade_points_release(&j.points);
+    grade_job_release(&j);
+    return s;
+}
+
+/* The vertices of a fiber lie between its points, which are half a radius apart (grade_points.h). */
+static void contrast_of_fiber(const struct grade_job *j, const struct fiber_set *f, size_t fiber,
+                              const struct window *w, const struct window *end, float *contrast)
+{
+    double at = 0.0, apart_m = 0.5 * (double)f->radius_m[fiber];
+    for (size_t i = f->first_vertex[fiber]; i < f->first_vertex[fiber + 1]; i++) {
+        const float *p = f->position_m + 3 * i;
+        if (i > f->first_vertex[fiber])
+            at += hypot(hypot((double)(p[0] - p[-3]), (double)(p[1] - p[-2])), (double)(p[2] - p[-1]));
+        size_t point = j->points.first[fiber] + (size_t)(at / apart_m);
+        while (w + 1 < end && point >= w->first + w->n) w++;
+        contrast[i] = w < end ? (float)w->contrast : NAN;
+    }
+}
+
+status scan_grade_contrast(const struct volume *v, const struct fiber_set *f, struct thread_pool *pool,
+                           const struct progress *progress, float *contrast, struct error *err)
+{
+    struct grade_job j = {.v = v};
+    status s = grade_windows(&j, f, pool, progress, err);
+    const struct window *w = j.window, *end = w;
+    for (size_t i = 0; i < f->n_fiber && s == STATUS_OK; i++, w = end) {
+        while (end < j.window + j.n_window && j.points.point[end->first].fiber == i) end++;
+        contrast_of_fiber(&j, f, i, w, end, contrast);
+    }
+    grade_job_release(&j);
     return s;
 }
 

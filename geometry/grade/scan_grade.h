@@ -36,6 +36,11 @@ const char *grade_verdict_name(enum grade_verdict v);
  * the number of threads. STATUS_NO_MEMORY, STATUS_CANCELLED. */
 status scan_grade_measure(const struct volume *v, const struct fiber_set *f, struct thread_pool *pool,
                           const struct progress *progress, struct scan_grade *grade, float *safe, struct error *err);
+/* Contrast at every vertex: that of the window around it, so how clearly the scan shows the fiber there. Below
+ * GRADE_SAFE_CONTRAST the scan does not show it, and the line is filled in. contrast: n_vertex; NaN for a fiber too
+ * short to have a window. Else as scan_grade_measure. */
+status scan_grade_contrast(const struct volume *v, const struct fiber_set *f, struct thread_pool *pool,
+                           const struct progress *progress, float *contrast, struct error *err);
 /* Puts the fibers of which less than half of the length is safe behind the others, and counts them in the grade as to
  * be dropped; none if that is true of all. safe: as measured. STATUS_NO_MEMORY. */
 status scan_grade_sort(struct fiber_set *f, const float *safe, struct scan_grade *grade, struct error *err);

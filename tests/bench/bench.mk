@@ -46,9 +46,10 @@ bench-progress: | deps-test ## predicted against actual remaining time of four j
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/bench_progress.py --build $(BUILD) $(PROGRESS)
 
-bench-dashboard: | deps-test ## what the dashboard costs in a browser: opening a list of 10,000 jobs, bytes of a poll, scripts of a page with a long fit and log (a minute)
-	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/bin/selvedged >&2
-	@/usr/bin/python3 tests/bench/service/bench_dashboard.py --build $(BUILD)
+# DASHBOARD: some of the figures only: list job slices
+bench-dashboard: | deps-test ## what the dashboard costs in a browser: opening a list of 10,000 jobs, bytes of a poll, scripts of a page with a long fit and log, slices of a scan of Fleece's size (three minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/bin/selvedged $(BUILD)/tests/bench/service/bench_scan_slices >&2
+	@/usr/bin/python3 tests/bench/service/bench_dashboard.py --build $(BUILD) $(DASHBOARD)
 
 # SERVICE: some of the figures only: list answers uploads slow_disk declare readers watchers
 bench-service: | deps-test ## what the daemon costs: the list of jobs, other answers, those beside uploads and a slow disk, declarations, slow readers, long polls (two minutes)

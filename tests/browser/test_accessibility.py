@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
 from axe_rules import axe_source, serious_findings  # noqa: E402
-from browser_page import BIN, complaints, keep, sized, start_daemon, stop_daemon, submit, wait_for  # noqa: E402
+from browser_page import BIN, complaints, keep, scrolls_sideways, sized, start_daemon, stop_daemon, submit, wait_for  # noqa: E402
 from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
 
@@ -53,7 +53,7 @@ def check(browser, axe, name, ready):
         with sized(browser, width, height):
             wait_for(browser, ready, 60)
             where = f"{name}, {width} x {height}, {theme}: "
-            if not browser.execute_script("return document.documentElement.scrollWidth <= innerWidth"):
+            if scrolls_sideways(browser):
                 found.append(where + "scrolls sideways")
             if width < 1920:
                 found += [where + f for f in serious_findings(browser, axe)]

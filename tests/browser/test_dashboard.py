@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
 import small_cloth  # noqa: E402
-from browser_page import BIN, click_on, complaints, keep, sized, start_daemon, stop_daemon, submit, text_of, texts, wait_for  # noqa: E402
+from browser_page import BIN, click_on, complaints, keep, scrolls_sideways, sized, start_daemon, stop_daemon, submit, text_of, texts, wait_for  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 
 
@@ -134,7 +134,7 @@ def test_correlations_and_record(real, browser):
     assert "volume.voxel_size_um 2" in settings and f"photographs[{state['document']['photographs'][0]['file']}].light_theta_deg" in settings
     keep(browser, "record")
     with sized(browser, 375, 800):
-        assert browser.execute_script("return document.documentElement.scrollWidth <= innerWidth")
+        assert not scrolls_sideways(browser)
         for part in ("correlation", "record"):
             browser.execute_script("document.getElementById(arguments[0]).scrollIntoView()", part)
             keep(browser, f"{part}-375", 375, 800)
@@ -210,7 +210,7 @@ def test_compare_two_jobs(real, other, browser):
             if t.startswith("photographs[")} == {f"photographs[{missing}].{k}" for k in first.state().raw["document"]["photographs"][LEFT_OUT]}
     keep(browser, "compare")
     with sized(browser, 375, 800):
-        assert browser.execute_script("return document.documentElement.scrollWidth <= innerWidth")
+        assert not scrolls_sideways(browser)
         keep(browser, "compare-375", 375, 6000)
     # what cannot be compared says so
     browser.get(f"{url}/#compare/{first.id},{draft.id},{unknown},{other.id}")

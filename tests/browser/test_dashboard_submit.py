@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
-from browser_page import ROOT, click_on, complaints, keep, sized, start_daemon, stop_daemon, submit, text_of, wait_for  # noqa: E402
+from browser_page import ROOT, click_on, complaints, keep, scrolls_sideways, sized, start_daemon, stop_daemon, submit, text_of, wait_for  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 
 
@@ -215,7 +215,7 @@ def test_copy_a_job_with_changes(stub, browser, tmp_path):
     assert "another file: 4 B in the copied job" in text_of(browser, ".drop ul")
     keep(browser, "copy")
     with sized(browser, 375, 800):
-        assert browser.execute_script("return document.documentElement.scrollWidth <= innerWidth")
+        assert not scrolls_sideways(browser)
         keep(browser, "copy-375", 375, 800)
     click(browser, browser.find_element(By.CSS_SELECTOR, ".drop button"))
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)

@@ -3,7 +3,7 @@ import pytest
 
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
-from browser_page import click_on, complaints, keep, sized, submit, text_of, texts, wait_for  # noqa: E402
+from browser_page import click_on, complaints, keep, scrolls_sideways, sized, submit, text_of, texts, wait_for  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 
 DOCUMENT = {"volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}, "measurements": {"file": "rows.csv"}}
@@ -123,6 +123,6 @@ def test_list_at_three_sizes(many, browser, width, height):
     with sized(browser, width, height):
         browser.get(url + "/")
         wait_for(browser, "document.querySelectorAll('#jobs tbody tr').length === 50")
-        assert browser.execute_script("return document.documentElement.scrollWidth <= innerWidth")
+        assert not scrolls_sideways(browser)
         keep(browser, f"list-{width}", width, height)
         assert complaints(browser) == []

@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
 import small_cloth  # noqa: E402
-from browser_page import click_on, complaints, keep, sized, start_daemon, stop_daemon, text_of, texts, wait_for  # noqa: E402
+from browser_page import click_on, complaints, keep, scrolls_sideways, sized, start_daemon, stop_daemon, text_of, texts, wait_for  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 
 LARGE = 2 ** 53 + 3  # a seed that JavaScript would round
@@ -76,7 +76,7 @@ def test_edit_the_document(client, browser, tmp_path):
     assert json.loads(browser.execute_script("return document.querySelector('#mend-value').value")) == ["weft", "warp", "pile"]
     keep(browser, "mend-document")
     with sized(browser, 375, 800):
-        assert browser.execute_script("return document.documentElement.scrollWidth <= innerWidth")
+        assert not scrolls_sideways(browser)
         keep(browser, "mend-375", 375, 800)
     write(browser, '["weft", "warp"')
     click_on(browser, "#mend-go")

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
 import small_cloth  # noqa: E402
-from browser_page import BIN, click_on, complaints, keep, sized, start_daemon, stop_daemon, text_of, texts, wait_for  # noqa: E402
+from browser_page import BIN, click_on, complaints, keep, scrolls_sideways, sized, start_daemon, stop_daemon, text_of, texts, wait_for  # noqa: E402
 from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
@@ -218,7 +218,7 @@ def test_difference_and_flicker(fitted, browser):
     assert len(browser.find_elements(By.CSS_SELECTOR, "#pair-viewer figure:not([hidden])")) == 1
     press(browser, "s")
     with sized(browser, 375, 800):
-        assert browser.execute_script("return document.documentElement.scrollWidth <= innerWidth")
+        assert not scrolls_sideways(browser)
         browser.execute_script("document.querySelector('#pairs').scrollIntoView()")
         keep(browser, "pairs-375", 375, 800)
     assert complaints(browser) == []

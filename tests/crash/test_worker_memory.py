@@ -10,7 +10,8 @@ from small_cloth import TABLE
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 BUILD = os.environ.get("SELVEDGE_BUILD") or os.path.join(ROOT, "build")
-PRODUCTS = ["fibers.hair", "fibers.txt", "direction.vol", "density.vol", "pictures/slice-x.png", "pictures/slice-y.png", "pictures/slice-z.png"]
+PRODUCTS = ["fibers.hair", "fibers.txt", "direction.vol", "density.vol", "pictures/slice-x.png", "pictures/slice-y.png",
+            "pictures/slice-z.png", "scan/x.slices", "scan/y.slices", "scan/z.slices", "scan/contrast.u8"]
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,6 @@
 // Colours of the fibers in 3D, and the legend that says what they mean. hair: what readHair of fiber_view.js returns.
 import { el } from "../page_parts.js";
+import { FOUND_FROM } from "./hair_file.js";
 
 // Where a fiber runs on the whole, from its first to its last point (colours of the chart of lengths).
 const KINDS = [["weft (along x)", [0.81, 0.55, 0.18]], ["warp (along y)", [0.23, 0.51, 0.75]], ["through the cloth (along z)", [0.35, 0.75, 0.42]]];
@@ -50,8 +51,19 @@ function byRadius(hair) {
   };
 }
 
+// Where the scan shows the fiber, and where the line was carried on through a gap or amid material without fibers.
+const FOUND = [1.0, 0.45, 0.36], FILLED = [0.30, 0.82, 1.0];
+function byContrast(hair) {
+  let filled = 0;
+  for (const c of hair.contrast) if (c < FOUND_FROM) filled++;
+  return {
+    legend: [swatch(css(FOUND), "found: the scan shows the fiber"), swatch(css(FILLED), "filled in: it does not show it clearly"), `${(100 * filled / Math.max(1, hair.n)).toFixed(1)} % of the pieces are filled in`],
+    of: (s) => (hair.contrast[s] < FOUND_FROM ? FILLED : FOUND),
+  };
+}
+
 // The ways that this file has data for: [name, function of hair].
-export const waysToColour = (hair) => [["direction", byDirection], ["class", byKind], ["radius", byRadius], hair.group ? ["material", byGroup] : null].filter(Boolean);
+export const waysToColour = (hair) => [["direction", byDirection], ["class", byKind], ["radius", byRadius], hair.contrast ? ["found or filled in", byContrast] : null, hair.group ? ["material", byGroup] : null].filter(Boolean);
 
 // Three numbers for each end of each segment; what lies deep is darker.
 export function coloursOf(hair, way) {

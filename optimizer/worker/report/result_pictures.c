@@ -3,6 +3,7 @@
 #include "geometry/volume/format/vol_file.h"
 #include "optimizer/fit/photographs/photograph.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/worker/report/cloth/scan_slices.h"
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_thumbnail.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
@@ -102,7 +103,7 @@ status result_geometry_write(struct pipeline_context *c, struct error *err)
     s = write_volumes(c, err);
     if (s == STATUS_OK) s = pipeline_need_volume(c, err);
     for (int axis = 0; axis < 3 && s == STATUS_OK; axis++) s = write_slice(c, axis, err);
-    return s;
+    return s == STATUS_OK ? scan_slices_write(c, err) : s;
 }
 
 /* ---- renderings ---- */

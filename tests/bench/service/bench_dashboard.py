@@ -1,16 +1,22 @@
 """What does the dashboard cost in a browser? Prints figures dashboard.* (headless Chromium, the real daemon).
 
-    bench_dashboard.py [--build DIR]
+    bench_dashboard.py [--build DIR] [--scan-edge N] [list] [job] [slices]
 
 list_10k_ms: time from the navigation until the list shows its 50 rows, with 10,000 jobs in the store (median of 7 loads).
 poll_bytes: bytes of a poll of that list when one row has changed (largest of 10). scripting_ms: time of scripts for each
 poll of the page of a running job whose fit has 100,000 points and whose log has 50 MB, both growing; job_poll_bytes: bytes of
 such a poll. Jobs and series are made up: these figures are about the page, not about fits.
+
+slices.*: the viewer of a scan of the size of Fleece, which bench_scan_slices makes (its figures come first). From the
+request to the drawn slice with its centers: first_ms the first slice of an axis (mean of x and y), jump_ms one
+anywhere in the scan that was not looked at before, step_ms the next one; medians over all axes, and the slowest twentieth
+of jumps and steps. slice_bytes: bytes that a jump transfers, with the slices read ahead, a slice.
 """
 import argparse
 import json
 import os
 import statistics
+import subprocess
 import sys
 import tempfile
 import time
@@ -138,16 +144,75 @@ def bench_job(folder, browser, daemon_type):
         daemon.post(f"/v1/jobs/{job}/cancel")
 
 
+# turns to an axis, jumps to 20 places, and steps through 60 slices; answers with the milliseconds of each
+WALK = """const [axis, done] = arguments, canvas = document.querySelector('canvas.slice'), slider = document.querySelector('#slice-at');
+    const shown = (slice) => new Promise((ready) => {
+      const start = performance.now(), is = `${axis} ${slice} `;
+      const look = () => canvas.dataset.shown?.startsWith(is) && (watch.disconnect(), ready(performance.now() - start));
+      const watch = new MutationObserver(look);
+      watch.observe(canvas, { attributes: true });
+    });
+    const go = (slice) => { const ready = shown(slice); slider.value = slice; slider.dispatchEvent(new Event('input')); return ready; };
+    (async () => {
+      const times = { first: 0, jump: [], step: [] };
+      if (axis !== 'z') {
+        const start = performance.now(), turned = new Promise((ready) => {
+          const watch = new MutationObserver(() => canvas.dataset.shown?.startsWith(`${axis} `) && (watch.disconnect(), ready(performance.now() - start)));
+          watch.observe(canvas, { attributes: true });
+        });
+        document.querySelector(`[aria-label='slices across ${axis}']`).click();
+        times.first = await turned;
+      }
+      const n = Number(slider.max) + 1, quiet = () => new Promise((next) => { setTimeout(next, 300); });
+      await quiet();
+      performance.clearResourceTimings();
+      for (let i = 1; i <= 20; i++) { times.jump.push(await go((i * 37 * 7 + 11) % n)); await quiet(); }
+      const seen = performance.getEntriesByType('resource').filter((e) => e.name.endsWith('.slices'));
+      times.bytes = seen.reduce((sum, e) => sum + e.transferSize, 0) / Math.max(1, seen.length);
+      await go(20);
+      for (let i = 21; i <= 80; i++) times.step.push(await go(i));
+      done(times);
+    })().catch((error) => done(String(error)));"""
+
+
+def bench_slices(folder, browser, daemon_type, edge):
+    with daemon_type(os.path.join(folder, "slices")) as daemon:
+        job = daemon.start_job()
+        daemon.wait_state(job, "succeeded")
+        program = os.path.join(os.environ["SELVEDGE_BUILD"], "tests", "bench", "service", "bench_scan_slices")
+        subprocess.run([program, os.path.join(daemon.data, "jobs", job, "results"), *([str(edge)] if edge else [])], check=True)
+        browser.set_script_timeout(300)
+        browser.get(f"{daemon.url}/#{job}")
+        wait(browser, "document.querySelector('canvas.slice')")
+        browser.execute_script("document.querySelector('canvas.slice').scrollIntoView()")
+        wait(browser, "document.querySelector('canvas.slice').dataset.shown")
+        walks = [browser.execute_async_script(WALK, axis) for axis in "zxy"]
+        assert all(isinstance(w, dict) for w in walks), walks
+        figure("slices.first_ms", statistics.mean(w["first"] for w in walks[1:]), "ms")
+        for kind in ("jump", "step"):
+            times = sorted(t for w in walks for t in w[kind])
+            figure(f"slices.{kind}_ms", statistics.median(times), "ms")
+            figure(f"slices.{kind}_slow_ms", times[int(0.95 * len(times))], "ms")
+        figure("slices.slice_bytes", statistics.mean(w["bytes"] for w in walks), "bytes")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", default="build")
-    os.environ["SELVEDGE_BUILD"] = os.path.join(ROOT, parser.parse_args().build)
+    parser.add_argument("--scan-edge", type=int, help="edge of the scan in voxels instead of Fleece's")
+    parser.add_argument("names", nargs="*", default=["list", "job", "slices"])
+    arguments = parser.parse_args()
+    os.environ["SELVEDGE_BUILD"] = os.path.join(ROOT, arguments.build)
     from daemon_under_test import Daemon  # it reads SELVEDGE_BUILD
     with tempfile.TemporaryDirectory() as folder:
         browser = open_browser(folder)
         try:
-            bench_list(folder, browser, Daemon)
-            bench_job(folder, browser, Daemon)
+            if "list" in arguments.names:
+                bench_list(folder, browser, Daemon)
+            if "job" in arguments.names:
+                bench_job(folder, browser, Daemon)
+            if "slices" in arguments.names:
+                bench_slices(folder, browser, Daemon, arguments.scan_edge)
         finally:
             browser.quit()
 

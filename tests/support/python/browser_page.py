@@ -64,8 +64,17 @@ def click_on(browser, selector, index=0):
 def sized(browser, width, height):
     """A window whose page has this size, also one narrower than Chromium allows."""
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600})
+    browser.page_width = width
     yield
+    del browser.page_width
     browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def scrolls_sideways(browser):
+    """Whether anything is wider than the page. A phone widens innerWidth to what it shows, so that says nothing; and a page
+    without a viewport in its head is laid out for 980 pixels there."""
+    width, whole = browser.execute_script("const e = document.documentElement; return [e.clientWidth, e.scrollWidth]")
+    return whole > width or width > getattr(browser, "page_width", width)
 
 
 def keep(browser, name, width=0, height=0):

@@ -160,6 +160,44 @@ static void test_no_fibers(void **state)
     fiber_set_release(&none);
 }
 
+/* Of a fiber whose scan ends in the middle, the half without it has no contrast. */
+static void test_contrast_along_a_fiber(void **state)
+{
+    (void)state;
+    enum { N = 31 };
+    struct fiber_set f;
+    struct phantom_scan_option o;
+    struct volume v;
+    struct thread_pool *pool;
+    float contrast[2][N];
+    fiber_set_init(&f);
+    assert_int_equal(fiber_set_reserve(&f, 1, N, NULL), STATUS_OK);
+    f.tile_size_m[0] = voxel_m * (double)n_voxel[0];
+    f.tile_size_m[1] = voxel_m * (double)n_voxel[1];
+    f.first_vertex[1] = N;
+    f.radius_m[0] = (float)(3.0 * voxel_m);
+    for (size_t i = 0; i < N; i++) {
+        f.position_m[3 * i] = (float)(voxel_m * 2.0 * (double)i);
+        f.position_m[3 * i + 1] = f.position_m[3 * i + 2] = (float)(voxel_m * 21.0);
+    }
+    phantom_scan_option_default(&o);
+    o.voxel_size_m = voxel_m;
+    assert_int_equal(phantom_scan(&f, n_voxel, &o, NULL, NULL, &v, NULL), STATUS_OK);
+    for (size_t i = 0; i < volume_n_voxel(n_voxel); i++)
+        if (i % n_voxel[0] >= n_voxel[0] / 2) v.density[i] = 0.0f;
+    assert_int_equal(thread_pool_new(2, &pool, NULL), STATUS_OK);
+    assert_int_equal(scan_grade_contrast(&v, &f, NULL, NULL, contrast[0], NULL), STATUS_OK);
+    assert_int_equal(scan_grade_contrast(&v, &f, pool, NULL, contrast[1], NULL), STATUS_OK);
+    assert_memory_equal(contrast[0], contrast[1], sizeof contrast[0]);
+    thread_pool_free(pool);
+    for (size_t i = 0; i < 9; i++) {
+        assert_true(contrast[0][i] > 0.8f);
+        assert_true(fabsf(contrast[0][N - 1 - i]) < 0.1f);
+    }
+    volume_release(&v);
+    fiber_set_release(&f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -170,6 +208,7 @@ int main(void)
         cmocka_unit_test(test_hollow_and_single_fibers),
         cmocka_unit_test(test_unseen_fibers_are_left_out),
         cmocka_unit_test(test_no_fibers),
+        cmocka_unit_test(test_contrast_along_a_fiber),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -26,8 +26,11 @@ static const char style[] =
     ".8em; margin: .4em 0; }\n"
     "figure { margin: 0 0 1.2em; } figcaption { color: #667; font-size: .9em; } img { max-width: 100%; height: auto; "
     "max-height: 640px; background: #000; }\n"
-    "img.plot { background: #fff; } .slices { display: grid; grid-template-columns: repeat(auto-fit, minmax(320px, "
-    "1fr)); gap: 16px; }\n";
+    "img.plot { background: #fff; } .slices { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(320px, "
+    "100%), 1fr)); gap: 16px; }\n"
+    "@media (max-width: 700px) { body { margin: 1em auto; } th, td, code { overflow-wrap: anywhere; padding-right: "
+    ".6em; "
+    "font-size: 12px; } }\n";
 
 static status write_text(const struct pipeline_context *c, const char *name, const char *text, size_t n,
                          struct error *err)

@@ -27,6 +27,10 @@ static const char style[] =
     "figure { margin: 0; min-width: 10em; break-inside: avoid; } figure img { width: 104px; height: 104px; "
     "image-rendering: pixelated; "
     "margin-right: 3px; } figcaption { font-size: .85em; color: #555; width: 0; min-width: 100%; }\n"
+    "@media screen and (max-width: 700px) { body { margin: 1em; } h1, li, td, th, code, pre { overflow-wrap: anywhere; "
+    "} "
+    "pre { white-space: pre-wrap; } th, td { padding-right: .6em; font-size: 12px; } svg, img { max-width: 100%; } "
+    "svg { height: auto; } }\n"
     "@page { size: A4; margin: 15mm; }\n"
     "@media print { body { margin: 0; padding: 0; max-width: none; font-size: 10px; } h2, h2 + p { break-after: avoid; "
     "} tr, "
@@ -284,7 +288,8 @@ static status print_page(struct pipeline_context *c, const json_t *data, FILE *o
 {
     const json_t *result = json_object_get(data, "result");
     status s = STATUS_OK;
-    fputs("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<link rel=\"icon\" href=\"data:,\">\n"
+    fputs("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
+          "content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" href=\"data:,\">\n"
           "<title>",
           out);
     page_escaped(c->doc->sample, out);
