@@ -201,3 +201,11 @@ status store_job_erase(struct store *store, const char *id, struct error *err)
     pthread_mutex_unlock(&store->write.lock);
     return store_report(store, s, id);
 }
+
+status store_job_version_bytes(struct store *store, const char *id, int64_t n_bytes, struct error *err)
+{
+    pthread_mutex_lock(&store->write.lock);
+    status s = store_run(&store->write, NULL, err, "UPDATE job SET version_bytes = ? WHERE id = ?", "is", n_bytes, id);
+    pthread_mutex_unlock(&store->write.lock);
+    return s;
+}

@@ -118,6 +118,18 @@ static const char *const migration[] = {
     "CREATE INDEX job_finished ON job (deleted, finished, serial);"
     "CREATE INDEX job_sample ON job (deleted, sample COLLATE NOCASE, serial);"
     "CREATE INDEX file_content ON file (sha256, size) WHERE state = 2 AND sha256 <> '';",
+    /* bytes of the earlier results that a job keeps, which count as its owner's beside the input files */
+    "ALTER TABLE job ADD COLUMN version_bytes INTEGER NOT NULL DEFAULT 0;"
+    "CREATE TRIGGER use_version_changed AFTER UPDATE OF version_bytes ON job WHEN NEW.deleted = 0 BEGIN"
+    " UPDATE owner_use SET bytes = bytes + NEW.version_bytes - OLD.version_bytes WHERE owner = NEW.owner; END;"
+    "DROP TRIGGER IF EXISTS use_job_hidden;"
+    "CREATE TRIGGER use_job_hidden AFTER UPDATE OF deleted ON job WHEN NEW.deleted <> OLD.deleted BEGIN"
+    " UPDATE owner_use SET bytes = bytes + (OLD.deleted - NEW.deleted) * (NEW.version_bytes"
+    " + (SELECT ifnull(sum(size), 0) FROM file WHERE job_id = NEW.id)) WHERE owner = NEW.owner; END;"
+    "DROP TRIGGER IF EXISTS use_job_removed;"
+    "CREATE TRIGGER use_job_removed AFTER DELETE ON job WHEN OLD.deleted = 0 BEGIN"
+    " UPDATE owner_use SET jobs = jobs - 1, queued = queued - (OLD.state = 1), bytes = bytes - OLD.version_bytes"
+    " WHERE owner = OLD.owner; END;",
 };
 
 const char *const *store_migrations(int *n)

@@ -11,14 +11,15 @@ function filesOf(version) {
   return el("details", { ontoggle: async (event) => {
     if (!event.target.open || list.childElementCount) return;
     try {
-      const { files } = await getJson(version.url), first = files.filter((f) => SHOWN_FILES.includes(f.path)), rest = files.filter((f) => !SHOWN_FILES.includes(f.path));
-      list.replaceChildren(...[...first, ...rest].map((f) => el("li", {}, el("a", { href: f.url, class: "mono", target: "_blank" }, f.path), ` ${size(f.size)}`)));
+      const { files, inputs } = await getJson(version.url), first = files.filter((f) => SHOWN_FILES.includes(f.path)), rest = files.filter((f) => !SHOWN_FILES.includes(f.path));
+      list.replaceChildren(...[...first, ...rest].map((f) => el("li", {}, el("a", { href: f.url, class: "mono", target: "_blank" }, f.path), ` ${size(f.size)}`)),
+        ...(inputs ?? []).map((f) => el("li", {}, "input ", el("span", { class: "mono" }, f.name), ` ${size(f.size)}, SHA-256 `, el("span", { class: "mono hash" }, f.sha256 ?? "–"))));
     } catch (error) { list.replaceChildren(el("li", { class: "note bad" }, error.message)); }
   } }, el("summary", {}, `${version.n_file} files, ${size(version.bytes)}`), list);
 }
 
 const line = (version) => el("tr", { class: version.current ? "best" : "" }, el("td", { class: "number" }, String(version.version)),
-  el("td", {}, timeOf(version.finished_unix_s)), el("td", {}, verdictTag(version.verdict), version.current ? el("span", { class: "tag" }, "present result") : null),
+  el("td", {}, timeOf(version.finished_unix_s)), el("td", {}, verdictTag(version.verdict), version.current ? el("span", { class: "tag" }, "present result") : null, version.damaged ? el("span", { class: "tag bad" }, "its description is damaged") : null),
   el("td", {}, filesOf(version)));
 
 export class VersionsCard {

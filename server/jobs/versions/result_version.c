@@ -70,8 +70,19 @@ static status kept_numbers(const struct job_service *v, const char *id, int64_t 
     return STATUS_OK;
 }
 
+/* The input files of the run with their SHA-256, as the worker has noted them in its report; null without a report. */
+static json_t *inputs_of_run(const struct job_service *v, const char *id)
+{
+    char path[PATH_BYTES];
+    job_file_path(v, id, JOB_FOLDER_RESULTS, "report.json", path);
+    json_t *report = json_load_file(path, JSON_REJECT_DUPLICATES, NULL), *inputs = json_object_get(report, "inputs");
+    inputs = json_is_array(inputs) ? json_incref(inputs) : json_null();
+    json_decref(report);
+    return inputs;
+}
+
 /* What version.json says, made from the job's folder. document: of the run. */
-static json_t *describe(const struct job_service *v, const struct job_row *row, const char *document,
+static json_t *describe(const struct job_service *v, const struct job_row *row, const char *document, bool with_inputs,
                         double finished_unix_s)
 {
     char path[PATH_BYTES];
@@ -81,10 +92,11 @@ static json_t *describe(const struct job_service *v, const struct job_row *row, 
     const json_t *sample = json_object_get(doc, "sample");
     json_t *verdict = json_object_get(st, "verdict"), *started = json_object_get(st, "started_unix_s");
     json_t *out =
-        json_pack("{s:I,s:s,s:O,s:f,s:O,s:o}", "version", (json_int_t)row->generation, "sample",
+        json_pack("{s:I,s:s,s:O,s:f,s:O,s:o,s:o}", "version", (json_int_t)row->generation, "sample",
                   json_is_string(sample) ? json_string_value(sample) : "", "started_unix_s",
                   json_is_number(started) ? started : json_null(), "finished_unix_s", finished_unix_s, "verdict",
-                  json_is_object(verdict) ? verdict : json_null(), "document", doc != NULL ? doc : json_object());
+                  json_is_object(verdict) ? verdict : json_null(), "document", doc != NULL ? doc : json_object(),
+                  "inputs", with_inputs ? inputs_of_run(v, row->id) : json_null());
     json_decref(st);
     return out;
 }
@@ -100,12 +112,39 @@ static char *document_of_run(const struct job_service *v, const struct job_row *
 
 static double time_of(const struct stat *st) { return (double)st->st_mtim.tv_sec + 1e-9 * (double)st->st_mtim.tv_nsec; }
 
-static json_t *describe_present(const struct job_service *v, const struct job_row *row, const struct stat *st)
+static json_t *describe_present(const struct job_service *v, const struct job_row *row, bool with_inputs,
+                                const struct stat *st)
 {
     char *document = document_of_run(v, row);
-    json_t *out = document == NULL ? NULL : describe(v, row, document, time_of(st));
+    json_t *out = document == NULL ? NULL : describe(v, row, document, with_inputs, time_of(st));
     free(document);
     return out;
+}
+
+/* What is known of a version whose version.json is damaged: its files are still there. */
+static json_t *describe_damaged(int64_t number, const struct stat *st)
+{
+    return json_pack("{s:I,s:s,s:n,s:f,s:n,s:{},s:n,s:b}", "version", (json_int_t)number, "sample", "",
+                     "started_unix_s", "finished_unix_s", time_of(st), "verdict", "document", "inputs", "damaged", 1);
+}
+
+/* version.json, or the same for the present result. */
+static json_t *read_description(struct job_service *v, const struct job_row *row, const char *folder, int64_t number,
+                                bool full, const struct stat *st)
+{
+    char path[PATH_BYTES];
+    if (strcmp(folder, JOB_FOLDER_RESULTS) == 0) return describe_present(v, row, full, st);
+    job_file_path(v, row->id, folder, VERSION_FILE, path);
+    json_t *j = json_load_file(path, JSON_REJECT_DUPLICATES, NULL);
+    bool whole = json_is_string(json_object_get(j, "sample")) &&
+                 json_is_number(json_object_get(j, "finished_unix_s")) &&
+                 json_object_get(j, "started_unix_s") != NULL && json_object_get(j, "verdict") != NULL &&
+                 json_is_object(json_object_get(j, "document"));
+    if (whole && json_object_get(j, "inputs") == NULL) json_object_set_new(j, "inputs", json_null());
+    if (whole) return j;
+    json_decref(j);
+    log_warning(v->log, "job %s: the description of version %lld is damaged", row->id, (long long)number);
+    return describe_damaged(number, st);
 }
 
 status version_note_document(struct job_service *v, const struct job_row *row, const char *document, struct error *err)
@@ -132,7 +171,7 @@ static status remove_version(const struct job_service *v, const char *id, int64_
 static status move(struct job_service *v, const struct job_row *row, const struct stat *st, struct error *err)
 {
     char from[PATH_BYTES], to[PATH_BYTES], path[PATH_BYTES], name[VERSION_FOLDER_BYTES];
-    json_t *about = describe_present(v, row, st);
+    json_t *about = describe_present(v, row, true, st);
     char *text = about == NULL ? NULL : json_dumps(about, JSON_INDENT(1));
     json_decref(about);
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot keep the earlier result: out of memory");
@@ -151,6 +190,25 @@ static status move(struct job_service *v, const struct job_row *row, const struc
     return s == STATUS_OK ? durable_sync_folder_of(from, err) : s;
 }
 
+/* Notes how many bytes the versions of the job have, which count as its owner's. */
+static status note_bytes(struct job_service *v, const struct job_row *row, struct error *err)
+{
+    char folder[VERSION_FOLDER_BYTES];
+    struct result_file *file = NULL;
+    int64_t *number = NULL, n_bytes = 0;
+    size_t n = 0, n_file;
+    status s = kept_numbers(v, row->id, &number, &n, err);
+    for (size_t i = 0; s == STATUS_OK && i < n; i++) {
+        snprintf(folder, sizeof folder, JOB_FOLDER_VERSIONS "/%lld", (long long)number[i]);
+        s = result_list(v, row->id, folder, &file, &n_file, err);
+        for (size_t k = 0; s == STATUS_OK && k < n_file; k++) n_bytes += file[k].size_bytes;
+        free(file);
+        file = NULL;
+    }
+    free(number);
+    return s == STATUS_OK ? store_job_version_bytes(v->store, row->id, n_bytes, err) : s;
+}
+
 status version_keep(struct job_service *v, struct job_row *row, struct error *err)
 {
     struct stat st;
@@ -167,7 +225,7 @@ status version_keep(struct job_service *v, struct job_row *row, struct error *er
     for (size_t i = 0; s == STATUS_OK && i < n && (int64_t)(n - i) > most; i++)
         s = remove_version(v, row->id, number[i], err);
     free(number);
-    return s;
+    return s == STATUS_OK && n > 0 ? note_bytes(v, row, err) : s;
 }
 
 /* Where the result of run `number` is; "" if there is none. */
@@ -184,7 +242,7 @@ static void find_folder(const struct job_service *v, const struct job_row *row, 
 static status read_version(struct job_service *v, const struct job_row *row, int64_t number, bool full, json_t **out,
                            struct error *err)
 {
-    char folder[VERSION_FOLDER_BYTES], path[PATH_BYTES], url[128];
+    char folder[VERSION_FOLDER_BYTES], url[128];
     struct stat st;
     struct result_file *file = NULL;
     size_t n = 0;
@@ -192,12 +250,8 @@ static status read_version(struct job_service *v, const struct job_row *row, int
     find_folder(v, row, number, folder, &st);
     if (folder[0] == '\0') return error_set(err, STATUS_NOT_FOUND, "the job has no version of this number");
     bool present = strcmp(folder, JOB_FOLDER_RESULTS) == 0;
-    job_file_path(v, row->id, folder, VERSION_FILE, path);
-    json_t *j = present ? describe_present(v, row, &st) : json_load_file(path, JSON_REJECT_DUPLICATES, NULL);
-    if (!json_is_object(j)) {
-        json_decref(j);
-        return error_set(err, STATUS_IO, "the description of version %lld cannot be read", (long long)number);
-    }
+    json_t *j = read_description(v, row, folder, number, full, &st);
+    if (j == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot describe a version: out of memory");
     status s = result_list(v, row->id, folder, &file, &n, err);
     for (size_t i = 0; i < n; i++) n_bytes += file[i].size_bytes;
     snprintf(url, sizeof url, "/v1/jobs/%s/versions/%lld", row->id, (long long)number);
@@ -208,8 +262,10 @@ static status read_version(struct job_service *v, const struct job_row *row, int
     json_object_set_new(j, "url", json_string(url));
     if (full)
         json_object_set_new(j, "files", result_files_json(file, n, url));
-    else
+    else {
         json_object_del(j, "document");
+        json_object_del(j, "inputs");
+    }
     free(file);
     if (s == STATUS_OK)
         *out = j;

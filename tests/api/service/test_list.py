@@ -155,7 +155,7 @@ def test_the_tags_and_jobs_of_others_are_not_seen(daemon_maker):
 
 
 def test_an_older_database_gets_its_verdicts(daemon_maker):
-    """A database of the schema before this one, in which a job has succeeded with a verdict."""
+    """A database of the schema before verdicts, in which a job has succeeded with a verdict."""
     daemon = daemon_maker()
     job = daemon.start_job()
     daemon.wait_state(job, "succeeded")
@@ -168,7 +168,9 @@ def test_an_older_database_gets_its_verdicts(daemon_maker):
     with contextlib.closing(sqlite3.connect(os.path.join(daemon.data, "selvedge.db"))) as db:
         for index in ("job_finished", "job_sample", "file_content"):
             db.execute(f"DROP INDEX {index}")
-        for column in ("tags", "verdict"):
+        for trigger in ("use_version_changed", "use_job_hidden", "use_job_removed"):
+            db.execute(f"DROP TRIGGER {trigger}")
+        for column in ("tags", "verdict", "version_bytes"):
             db.execute(f"ALTER TABLE job DROP COLUMN {column}")
         db.execute("PRAGMA user_version = 4")
         db.commit()

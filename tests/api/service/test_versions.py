@@ -1,4 +1,5 @@
 """A job that is edited and run again keeps its earlier results as versions, whatever happens meanwhile."""
+import json
 import os
 import subprocess
 import sys
@@ -89,6 +90,62 @@ def test_the_oldest_versions_go(daemon_maker, most):
     folder = os.path.join(d.data, "jobs", job, "versions")
     assert sorted(os.listdir(folder) if os.path.isdir(folder) else []) == [str(n) for n in range(5 - most, 5)]
     assert not os.path.exists(os.path.join(d.data, "jobs", job, "run.json"))
+
+
+def test_a_damaged_description_spoils_no_list(daemon):
+    job = daemon.start_job("succeed")
+    daemon.wait_state(job, "succeeded")
+    for i in range(2):
+        run_again(daemon, job, f"succeed {i}")
+    path = os.path.join(daemon.data, "jobs", job, "versions", "1", "version.json")
+    for text in ('{"version": 1, "sam', "[]", '{"sample": 7}', ""):
+        with open(path, "w", encoding="utf-8") as f:
+            f.write(text)
+        listed = daemon.get(f"/v1/jobs/{job}/versions").json()["versions"]
+        assert [(v["version"], v.get("damaged", False)) for v in listed] == [(1, True), (2, False), (3, False)], text
+        one = daemon.get(f"/v1/jobs/{job}/versions/1").json()
+        assert one["document"] == {} and one["verdict"] is None and one["damaged"] and len(one["files"]) == one["n_file"] > 1
+        assert daemon.get(f"/v1/jobs/{job}/versions/1/result.json").status_code == 200
+
+
+def test_inputs_of_a_version(daemon):
+    """They are those that the worker computed with, also when a file was replaced before the next run."""
+    job = daemon.start_job("succeed")
+    daemon.wait_state(job, "succeeded")
+    inputs = [{"name": "scan.tif", "role": "volume", "size": 4, "sha256": "ab" * 32}]
+    with open(os.path.join(daemon.data, "jobs", job, "results", "report.json"), "w", encoding="utf-8") as f:
+        json.dump({"inputs": inputs, "document": {}}, f)
+    assert daemon.get(f"/v1/jobs/{job}/versions/1").json()["inputs"] == inputs
+    assert daemon.delete(f"/v1/jobs/{job}/files/scan.tif").status_code == 204
+    daemon.upload(job, "scan.tif", b"other bytes")
+    assert daemon.post(f"/v1/jobs/{job}/start").status_code == 202
+    daemon.wait_state(job, "succeeded")
+    assert daemon.get(f"/v1/jobs/{job}/versions/1").json()["inputs"] == inputs
+    assert daemon.get(f"/v1/jobs/{job}/versions/2").json()["inputs"] is None, "a run without a report"
+
+
+def test_versions_count_as_stored_bytes(daemon_maker):
+    d = daemon_maker(options={"jobs.keep_versions": 1})
+    admin = d.of(d.make_token("root"))
+    ann = d.of(admin.post("/v1/tokens", json={"name": "ann", "scope": "submit"}).json()["token"])
+
+    def used():
+        return ann.get("/v1/session").json()["used"]["stored_bytes"]
+    job = ann.start_job("succeed")
+    ann.wait_state(job, "succeeded")
+    inputs = used()
+    for i in range(3):  # the second version takes the place of the first
+        run_again(ann, job, f"succeed {i}")
+        kept = ann.get(f"/v1/jobs/{job}/versions").json()["versions"][0]["bytes"]
+        assert kept > 0 and used() == inputs + kept, i
+    quota = used() + 10
+    bob = d.of(admin.post("/v1/tokens", json={"name": "ann-2", "owner": "ann", "scope": "submit", "stored_bytes": quota}).json()["token"])
+    draft = bob.create()
+    refused = bob.post(f"/v1/jobs/{draft}/files", json={"name": "rows.csv", "role": "measurements", "size": 20})
+    assert refused.status_code == 507 and refused.json()["used"] == used(), refused.text
+    assert ann.delete(f"/v1/jobs/{job}").status_code == 204
+    assert used() == 0
+    assert bob.post(f"/v1/jobs/{draft}/files", json={"name": "rows.csv", "role": "measurements", "size": 20}).status_code == 201
 
 
 def test_another_owner_sees_no_versions(daemon_maker):
