@@ -1,15 +1,13 @@
 """Every page in three sizes, light and dark: WCAG 2.1 AA by axe-core without a serious finding, no sideways scroll, no
 error on the console; and what the keyboard reaches."""
 import json
-import os
-import subprocess
 
 import pytest
 
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
 from axe_rules import axe_source, serious_findings  # noqa: E402
-from browser_page import BIN, complaints, keep, scrolls_sideways, sized, start_daemon, stop_daemon, submit, wait_for  # noqa: E402
+from browser_page import complaints, keep, scrolls_sideways, sized, small_weave, start_daemon, stop_daemon, submit, wait_for  # noqa: E402
 from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
 
@@ -23,10 +21,7 @@ def axe():
 def real(tmp_path_factory):
     """A daemon with the real worker, and two finished jobs: a scan with photographs, whose fit has few paths."""
     sample = tmp_path_factory.mktemp("sample")
-    for words in (["cloth", "--weave", "plain", "--fibers-per-yarn", "7", "--diameter-voxel", "6", "--out", sample],
-                  ["photograph", "--fibers", sample / "truth.hair", "--out", sample, "--px", "32", "--paths", "512"]):
-        subprocess.run([os.path.join(BIN, "selvedge-phantom"), *map(str, words)], check=True, stdout=subprocess.DEVNULL)
-    photographs = json.loads((sample / "photographs.json").read_text())
+    photographs = small_weave(sample, "--px", "32", "--paths", "512")
     document = {"sample": "small plain weave", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0},
                 "photographs": photographs[:4] + photographs[16:18],
                 "pictures": [{"on": "cylinder", "radius_mm": 1, "width_mm": 3, "px": 16, "samples": 2, "light_theta_deg": 45, "light_phi_deg": 0,
@@ -54,7 +49,7 @@ def check(browser, axe, name, ready):
             wait_for(browser, ready, 60)
             where = f"{name}, {width} x {height}, {theme}: "
             if scrolls_sideways(browser):
-                found.append(where + "scrolls sideways")
+                found.append(where + f"scrolls sideways: {scrolls_sideways(browser)}")
             if width < 1920:
                 found += [where + f for f in serious_findings(browser, axe)]
             keep(browser, f"axe-{name}-{width}-{theme}", width, height)

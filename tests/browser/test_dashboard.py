@@ -3,7 +3,6 @@ with a stub worker."""
 import glob
 import json
 import os
-import subprocess
 import time
 
 import pytest
@@ -11,7 +10,8 @@ import pytest
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
 import small_cloth  # noqa: E402
-from browser_page import BIN, click_on, complaints, keep, scrolls_sideways, sized, start_daemon, stop_daemon, submit, text_of, texts, wait_for  # noqa: E402
+from browser_page import (  # noqa: E402
+    click_on, complaints, keep, scrolls_sideways, sized, small_weave, start_daemon, stop_daemon, submit, text_of, texts, wait_for)
 from selenium.webdriver.common.by import By  # noqa: E402
 
 
@@ -22,10 +22,7 @@ LEFT_OUT = 2  # the brightest photograph
 def sample(tmp_path_factory):
     """A folder with a small phantom: scan, fibers and photographs."""
     sample = tmp_path_factory.mktemp("sample")
-    subprocess.run([os.path.join(BIN, "selvedge-phantom"), "cloth", "--weave", "plain", "--fibers-per-yarn", "7", "--diameter-voxel", "6",
-                    "--out", str(sample)], check=True, stdout=subprocess.DEVNULL)
-    subprocess.run([os.path.join(BIN, "selvedge-phantom"), "photograph", "--fibers", str(sample / "truth.hair"), "--out", str(sample),
-                    "--px", "32", "--paths", "4096", "--param", "C_TT=0.7,0.5,0.3"], check=True, stdout=subprocess.DEVNULL)
+    small_weave(sample, "--px", "32", "--paths", "4096", "--param", "C_TT=0.7,0.5,0.3")
     return sample
 
 
@@ -85,7 +82,7 @@ def test_real_job_live_and_finished(real, browser):
     browser.execute_script("for (const i of document.images) i.loading = 'eager'")
     wait_for(browser, "[...document.images].every((i) => i.complete && i.naturalWidth > 0)")
     assert len(browser.find_elements(By.CSS_SELECTOR, ".pair canvas")) == 26
-    assert len(browser.find_elements(By.CSS_SELECTOR, ".slices img")) == 3
+    assert len(browser.find_elements(By.CSS_SELECTOR, "canvas.slice")) == 1
     assert "passed" in text_of(browser, "#certificate")
     assert len(browser.find_elements(By.CSS_SELECTOR, "#next-photograph tbody tr")) == 2
     textures = texts(browser, "#textures tbody tr")
@@ -134,7 +131,7 @@ def test_correlations_and_record(real, browser):
     assert "volume.voxel_size_um 2" in settings and f"photographs[{state['document']['photographs'][0]['file']}].light_theta_deg" in settings
     keep(browser, "record")
     with sized(browser, 375, 800):
-        assert not scrolls_sideways(browser)
+        assert scrolls_sideways(browser) == []
         for part in ("correlation", "record"):
             browser.execute_script("document.getElementById(arguments[0]).scrollIntoView()", part)
             keep(browser, f"{part}-375", 375, 800)
@@ -210,7 +207,7 @@ def test_compare_two_jobs(real, other, browser):
             if t.startswith("photographs[")} == {f"photographs[{missing}].{k}" for k in first.state().raw["document"]["photographs"][LEFT_OUT]}
     keep(browser, "compare")
     with sized(browser, 375, 800):
-        assert not scrolls_sideways(browser)
+        assert scrolls_sideways(browser) == []
         keep(browser, "compare-375", 375, 6000)
     # what cannot be compared says so
     browser.get(f"{url}/#compare/{first.id},{draft.id},{unknown},{other.id}")

@@ -215,7 +215,7 @@ def test_copy_a_job_with_changes(stub, browser, tmp_path):
     assert "another file: 4 B in the copied job" in text_of(browser, ".drop ul")
     keep(browser, "copy")
     with sized(browser, 375, 800):
-        assert not scrolls_sideways(browser)
+        assert scrolls_sideways(browser) == []
         keep(browser, "copy-375", 375, 800)
     click(browser, browser.find_element(By.CSS_SELECTOR, ".drop button"))
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)

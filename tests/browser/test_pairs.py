@@ -1,9 +1,6 @@
 """Measured and rendered pictures on the page of a job: what is drawn and read out is what the OpenEXR files hold."""
 import base64
-import json
 import math
-import os
-import subprocess
 import urllib.request
 
 import pytest
@@ -11,7 +8,7 @@ import pytest
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
 import small_cloth  # noqa: E402
-from browser_page import BIN, click_on, complaints, keep, scrolls_sideways, sized, start_daemon, stop_daemon, text_of, texts, wait_for  # noqa: E402
+from browser_page import click_on, complaints, keep, scrolls_sideways, sized, small_weave, start_daemon, stop_daemon, text_of, texts, wait_for  # noqa: E402
 from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
@@ -24,10 +21,7 @@ FIXED = {"C_R": [0.1, 0.1, 0.1], "beta_R": 8, "beta_TT": 12, "gamma_TT": 30}
 def fitted(tmp_path_factory):
     """A real fit to photographs of a phantom, and one to a table without photographs."""
     folder = tmp_path_factory.mktemp("pairs")
-    for more in (["cloth", "--weave", "plain", "--fibers-per-yarn", "7", "--diameter-voxel", "6"],
-                 ["photograph", "--fibers", str(folder / "truth.hair"), "--px", "32", "--paths", "4096", "--param", "C_TT=0.7,0.5,0.3"]):
-        subprocess.run([os.path.join(BIN, "selvedge-phantom"), *more, "--out", str(folder)], check=True, stdout=subprocess.DEVNULL)
-    photographs = json.loads((folder / "photographs.json").read_text())
+    photographs = small_weave(folder, "--px", "32", "--paths", "4096", "--param", "C_TT=0.7,0.5,0.3")
     (folder / "cloth.hair").write_bytes(small_cloth.hair())
     (folder / "rows.csv").write_text(small_cloth.TABLE)
     fit = {"model": "two_lobe.v1", "path_budget": 100000, "render_px": 24, "render_samples": 4, "fixed": FIXED}
@@ -218,7 +212,7 @@ def test_difference_and_flicker(fitted, browser):
     assert len(browser.find_elements(By.CSS_SELECTOR, "#pair-viewer figure:not([hidden])")) == 1
     press(browser, "s")
     with sized(browser, 375, 800):
-        assert not scrolls_sideways(browser)
+        assert scrolls_sideways(browser) == []
         browser.execute_script("document.querySelector('#pairs').scrollIntoView()")
         keep(browser, "pairs-375", 375, 800)
     assert complaints(browser) == []

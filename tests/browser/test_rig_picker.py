@@ -55,7 +55,8 @@ def test_views_of_a_rig_are_picked(stub, browser, tmp_path):
     assert browser.execute_script("return document.activeElement.dataset.photograph") == "2"  # the focus stays
     assert "no such view" not in text_of(browser, "#rig-picker")
     with sized(browser, 375, 812):
-        assert browser.execute_script("const n = document.querySelector('#rig-picker'); return n.scrollWidth <= n.clientWidth")
+        assert browser.execute_script("""return ['#rig-picker', '#rig-picker .scroll'].every((s) => {
+            const n = document.querySelector(s); return n.scrollWidth <= n.clientWidth; })""")
         keep(browser, "rig-phone", 375, 812)
     wait_for(browser, "!document.querySelector('.drop button').disabled")
     keep(browser, "rig-picker")

@@ -2,16 +2,14 @@
 axes; wheel, keys and fingers; fibers found and filled in, there and in 3D."""
 import json
 import math
-import os
 import struct
-import subprocess
 import urllib.request
 
 import pytest
 
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
-from browser_page import BIN, complaints, keep, scrolls_sideways, sized, start_daemon, stop_daemon, text_of, wait_for  # noqa: E402
+from browser_page import complaints, keep, scrolls_sideways, sized, small_weave, start_daemon, stop_daemon, text_of, wait_for  # noqa: E402
 from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
@@ -23,8 +21,7 @@ SHOWN = "document.querySelector('canvas.slice')?.dataset.shown"
 def scanned(tmp_path_factory):
     """A job that ends with the geometry, of a plain weave whose weft is thicker than its warp."""
     folder = tmp_path_factory.mktemp("scan")
-    subprocess.run([os.path.join(BIN, "selvedge-phantom"), "cloth", "--weave", "plain", "--fibers-per-yarn", "7", "--diameter-voxel", "7,6,6",
-                    "--out", str(folder)], check=True, stdout=subprocess.DEVNULL)
+    small_weave(folder, diameter="7,6,6")
     (folder / "job.json").write_text(json.dumps({"sample": "scanned weave", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}}))
     process, url = start_daemon(tmp_path_factory.mktemp("data"))
     job = selvedge.Client(url).submit(str(folder / "job.json"))
@@ -192,7 +189,7 @@ def test_fingers_on_a_phone(scanned, browser):
     with sized(browser, 375, 800):
         browser.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True, "maxTouchPoints": 2})
         open_page(browser, url, job)
-        assert not scrolls_sideways(browser)
+        assert scrolls_sideways(browser) == []
         browser.execute_script("document.querySelector('canvas.slice').scrollIntoView({block: 'center'})")
         x, y = browser.execute_script("""const b = document.querySelector('canvas.slice').getBoundingClientRect();
             return [b.left + b.width / 2, b.top + b.height / 2]""")

@@ -61,7 +61,7 @@ export class RigPicker {
     const words = locked ?? (views.length === 0 ? "This rig describes no views." : photographs.length === 0 ? "Its views can be chosen here when the document has photographs."
       : doc.rig?.file && doc.rig.file !== this.name ? `The document names another rig, '${doc.rig.file}'; choosing a view puts this one in its place.` : "A view replaces the angles and positions of its photograph.");
     this.node.replaceChildren(el("h3", {}, "Rig ", el("span", { class: "mono" }, this.name), ` with ${views.length} views`), el("p", { class: "hint" }, words),
-      ...(photographs.length && views.length ? [el("div", { class: "scroll" }, el("table", {}, el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "Photograph"), el("th", { scope: "col" }, "View"))), el("tbody", {}, photographs.map(row))))] : []));
+      ...(photographs.length && views.length ? [el("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": "views of the rig" }, el("table", {}, el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "Photograph"), el("th", { scope: "col" }, "View"))), el("tbody", {}, photographs.map(row))))] : []));
     const again = this.node.querySelector(`[data-photograph="${focused}"]`);
     if (again instanceof HTMLElement) again.focus();
   }

@@ -27,6 +27,20 @@ def stop_daemon(process):
     process.stdout.close()
 
 
+def small_weave(folder, *photograph, diameter="6"):
+    """Makes a small plain weave: scan.tif, truth.hair; with options of `selvedge-phantom photograph` also photographs of it,
+    whose part of a job document is returned."""
+    make = [os.path.join(BIN, "selvedge-phantom")]
+    cloth = ["cloth", "--weave", "plain", "--fibers-per-yarn", "7", "--diameter-voxel", diameter]
+    for words in (cloth, ["photograph", "--fibers", f"{folder}/truth.hair", *photograph] if photograph else None):
+        if words:
+            subprocess.run([*make, *words, "--out", str(folder)], check=True, stdout=subprocess.DEVNULL)
+    if not photograph:
+        return []
+    with open(f"{folder}/photographs.json", encoding="utf-8") as f:
+        return json.load(f)
+
+
 def wait_for(browser, condition, seconds=30):
     """Waits until the JavaScript expression is true."""
     end = time.monotonic() + seconds
@@ -70,11 +84,20 @@ def sized(browser, width, height):
     browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
+WIDER = """const e = document.documentElement, found = [];
+    for (const n of document.querySelectorAll("body *")) {
+      let p = n.parentElement;
+      while (p !== document.body && getComputedStyle(p).overflowX === "visible") p = p.parentElement;
+      if (p === document.body && n.getBoundingClientRect().right > e.clientWidth + 1) found.push(`${n.tagName}#${n.id}.${n.className}`);
+    }
+    return [e.clientWidth, e.scrollWidth, found.slice(0, 8)]"""
+
+
 def scrolls_sideways(browser):
-    """Whether anything is wider than the page. A phone widens innerWidth to what it shows, so that says nothing; and a page
-    without a viewport in its head is laid out for 980 pixels there."""
-    width, whole = browser.execute_script("const e = document.documentElement; return [e.clientWidth, e.scrollWidth]")
-    return whole > width or width > getattr(browser, "page_width", width)
+    """What is wider than the page; nothing if all fits. A phone widens innerWidth to what it shows, so that says nothing; and a
+    page without a viewport in its head is laid out for 980 pixels there."""
+    width, whole, found = browser.execute_script(WIDER)
+    return found or [f"{whole} of {width} pixels"] if whole > width or width > getattr(browser, "page_width", width) else []
 
 
 def keep(browser, name, width=0, height=0):
