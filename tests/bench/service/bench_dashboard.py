@@ -8,9 +8,10 @@ poll of the page of a running job whose fit has 100,000 points and whose log has
 such a poll. Jobs and series are made up: these figures are about the page, not about fits.
 
 slices.*: the viewer of a scan of the size of Fleece, which bench_scan_slices makes (its figures come first). From the
-request to the drawn slice with its centers: first_ms the first slice of an axis (mean of x and y), jump_ms one
-anywhere in the scan that was not looked at before, step_ms the next one; medians over all axes, and the slowest twentieth
-of jumps and steps. slice_bytes: bytes that a jump transfers, with the slices read ahead, a slice.
+request to the drawn slice with its centers: first_ms the first slice of an axis (mean of x and y), jump_ms one anywhere in
+the scan that was not looked at before, step_ms the next one; medians over all axes, and the slowest twentieth of jumps and
+steps. main_thread_ms: processor time of the page's main thread for a slice. slice_bytes: bytes that a jump transfers, with
+the slices read ahead, a slice.
 """
 import argparse
 import json
@@ -175,6 +176,11 @@ WALK = """const [axis, done] = arguments, canvas = document.querySelector('canva
     })().catch((error) => done(String(error)));"""
 
 
+def task_s(browser):
+    """Processor seconds of the page's main thread so far."""
+    return next(m["value"] for m in browser.execute_cdp_cmd("Performance.getMetrics", {})["metrics"] if m["name"] == "TaskDuration")
+
+
 def bench_slices(folder, browser, daemon_type, edge):
     with daemon_type(os.path.join(folder, "slices")) as daemon:
         job = daemon.start_job()
@@ -186,8 +192,11 @@ def bench_slices(folder, browser, daemon_type, edge):
         wait(browser, "document.querySelector('canvas.slice')")
         browser.execute_script("document.querySelector('canvas.slice').scrollIntoView()")
         wait(browser, "document.querySelector('canvas.slice').dataset.shown")
+        browser.execute_cdp_cmd("Performance.enable", {"timeDomain": "threadTicks"})
+        before = task_s(browser)
         walks = [browser.execute_async_script(WALK, axis) for axis in "zxy"]
         assert all(isinstance(w, dict) for w in walks), walks
+        figure("slices.main_thread_ms", 1e3 * (task_s(browser) - before) / sum(len(w["jump"]) + len(w["step"]) for w in walks), "ms")
         figure("slices.first_ms", statistics.mean(w["first"] for w in walks[1:]), "ms")
         for kind in ("jump", "step"):
             times = sorted(t for w in walks for t in w[kind])
