@@ -89,8 +89,8 @@ function modelTable(list, choice) {
     el("td", { class: "number" }, isNumber(m.paths) ? `${(m.paths / 1e6).toPrecision(3)} M` : "–"), el("td", { class: "number" }, duration(m.seconds)),
     el("td", {}, m.best ? el("span", { class: "tag" }, "best") : null, m.converged ? null : el("span", { class: "tag warn" }, "not converged"))));
   return [el("p", { class: "hint" }, `Relative RMS errors of mean radiances. ${choice} The rest of this page shows the best model.`),
-    el("table", { id: "models" }, el("thead", {}, el("tr", {}, el("th", {}, "Model"), el("th", { class: "number" }, "Fitted"), el("th", { class: "number" }, "Left out in turn"), el("th", { class: "number" }, "Held out"),
-      el("th", { class: "number" }, "Paths"), el("th", { class: "number" }, "Time"), el("th", {}, "Remarks"))), el("tbody", {}, rows)),
+    el("div", { class: "wide", tabIndex: 0, role: "region", "aria-label": "models compared" }, el("table", { id: "models" }, el("thead", {}, el("tr", {}, el("th", {}, "Model"), el("th", { class: "number" }, "Fitted"), el("th", { class: "number" }, "Left out in turn"), el("th", { class: "number" }, "Held out"),
+      el("th", { class: "number" }, "Paths"), el("th", { class: "number" }, "Time"), el("th", {}, "Remarks"))), el("tbody", {}, rows))),
     ...list.filter((m) => !m.best).map((m) => el("details", {}, el("summary", {}, `Parameters of ${m.id}`), parameterTable(m.parameters)))];
 }
 
