@@ -1,6 +1,6 @@
 // Shows the reconstructed fibers in 3D (three.js) from the job's .hair file (docs/file-formats.md), when the user asks
 // for it.
-import { coloursOf, waysToColour } from "./fibers/fiber_colors.js";
+import { TRACED, coloursOf, waysToColour } from "./fibers/fiber_colors.js";
 import { MOST_BYTES, parseHair } from "./fibers/hair_file.js";
 import { el, size } from "./page_parts.js";
 
@@ -98,15 +98,17 @@ function show(THREE, node, hair) {
   observer.observe(node);
   return {
     close: () => { observer.disconnect(); geometry.dispose(); renderer.dispose(); },
-    paint: (colours) => {
+    // colours and position: three numbers for each end of each segment
+    paint: (colours, position) => {
+      if (geometry.getAttribute("position").array !== position) geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
       geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
       draw();
     },
   };
 }
 
-// fibers: SharedFibers
-export function fiberView(fibers) {
+// fibers: SharedFibers; traced: those that were traced in the scan, with its contrast, or null without a scan
+export function fiberView(fibers, traced) {
   const { file } = fibers;
   let shown = null;
   const hint = el("div", { class: "hint" });
@@ -125,13 +127,24 @@ export function fiberView(fibers) {
     }
   };
   const caption = el("p", { class: "hint" }), colours = el("div", { class: "fiber-colours" });
+  let seen = null; // the traced fibers
+  const tracedHair = async () => {
+    const { buffer, contrast } = await traced.load();
+    if (!contrast) throw new Error("The contrast of the traced fibers is missing.");
+    seen ??= readHair(buffer, contrast);
+    return seen;
+  };
   const offerColours = (hair) => {
-    const ways = waysToColour(hair), legend = el("span", { class: "legend" });
+    const ways = [...waysToColour(hair), ...(traced ? [TRACED] : [])], legend = el("span", { class: "legend" });
     const choose = el("select", { onchange: () => paint() }, ways.map(([name]) => el("option", {}, name)));
-    const paint = () => {
-      const made = coloursOf(hair, ways[choose.selectedIndex][1]);
-      shown.paint(made.colours);
-      legend.replaceChildren(...made.legend.filter((part) => part !== null));
+    const paint = async () => {
+      const way = ways[choose.selectedIndex];
+      try {
+        const one = way === TRACED ? await tracedHair() : hair, made = coloursOf(one, way[1]);
+        if (ways[choose.selectedIndex] !== way) return;
+        shown.paint(made.colours, one.position);
+        legend.replaceChildren(...made.legend.filter((part) => part !== null));
+      } catch (error) { legend.replaceChildren(error.message); }
     };
     colours.replaceChildren(el("label", {}, "Colour by ", choose), legend);
     paint();

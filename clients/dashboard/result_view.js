@@ -83,7 +83,9 @@ export function configurations(job, urls) {
 
 // The pictures of slices and the fiber file among the results.
 export const sliceFiles = (files) => files.filter((f) => /(^|\/)slice[^/]*\.png$/.test(f.path));
-export const fiberFile = (files) => files.find((f) => f.path.endsWith(".hair")) ?? null;
+export const fiberFile = (files) => files.find((f) => f.path === "fibers.hair") ?? null;
+// The fibers as they were traced in a scan, before the seams of the tile were closed.
+export const tracedFile = (files) => files.find((f) => f.path === "scan/fibers.hair") ?? null;
 // How clearly the scan shows each point of that file; null without a scan.
 export const contrastFile = (files) => files.find((f) => f.path === "scan/contrast.u8") ?? null;
 export const residuals = (job) => ({

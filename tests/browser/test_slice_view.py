@@ -139,10 +139,10 @@ def test_wheel_keys_zoom_and_readout(scanned, browser):
 
 
 def test_centers_and_fibers(scanned, browser):
-    """As many fibers cross the middle slices as fibers.txt says; both colours are explained, in the slices and in 3D."""
+    """As many fibers cross the middle slices as were traced; both colours are explained, in the slices and in 3D."""
     url, job = scanned
     n = volume(result(url, job, "density.vol"))[0]
-    lines = [[[float(x) for x in p.split()] for p in fiber.split("\n")] for fiber in result(url, job, "fibers.txt").decode().strip().split("\n\n")]
+    lines = strands(result(url, job, "scan/fibers.hair"))
     contrast = result(url, job, "scan/contrast.u8")
     assert len(contrast) == sum(len(fiber) for fiber in lines) and max(contrast) > 50
     open_page(browser, url, job)
@@ -155,7 +155,7 @@ def test_centers_and_fibers(scanned, browser):
     press(browser, "f")
     wait_for(browser, "document.querySelector('#slice-fibers').checked")
     legend = text_of(browser, "#slices .legend")
-    assert "fiber that the scan shows" in legend and "filled in" in legend
+    assert "traced fiber that the scan shows" in legend and "filled in" in legend
     keep(browser, "slices-fibers")
     red = """const c = document.querySelector('canvas.slice'), d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
         let n = 0; for (let i = 0; i < d.length; i += 4) n += d[i] > 180 && d[i + 1] < 130; return n"""
@@ -168,11 +168,24 @@ def test_centers_and_fibers(scanned, browser):
     wait_for(browser, "document.querySelector('.view3d canvas') || document.querySelector('.view3d').textContent.includes('not available')")
     if browser.execute_script("return Boolean(document.querySelector('.view3d canvas'))"):
         browser.execute_script("""const s = document.querySelector('.fiber-colours select');
-            s.value = 'found or filled in'; s.dispatchEvent(new Event('change'))""")
+            s.value = 'found or filled in, as traced'; s.dispatchEvent(new Event('change'))""")
         pieces = [(contrast[i] + contrast[i + 1]) / 2 < 50 for i in starts(lines)]
-        assert f"{100 * sum(pieces) / len(pieces):.1f} % of the pieces are filled in" in text_of(browser, ".fiber-colours .legend")
+        words = f"{100 * sum(pieces) / len(pieces):.1f} % of the pieces are filled in"
+        wait_for(browser, f"document.querySelector('.fiber-colours .legend').textContent.includes('{words}')")
         keep(browser, "fibers-by-found")
     assert complaints(browser) == []
+
+
+def strands(data):
+    """The points of every strand of a .hair file."""
+    n_strand, n_point = struct.unpack("<2I", data[4:12])
+    n = struct.unpack(f"<{n_strand}H", data[128:128 + 2 * n_strand])
+    xyz = struct.unpack(f"<{3 * n_point}f", data[128 + 2 * n_strand:128 + 2 * n_strand + 12 * n_point])
+    points, at, found = [xyz[i:i + 3] for i in range(0, len(xyz), 3)], 0, []
+    for segments in n:
+        found.append(points[at:at + segments + 1])
+        at += segments + 1
+    return found
 
 
 def starts(lines):

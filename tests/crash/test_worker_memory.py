@@ -11,7 +11,7 @@ from small_cloth import TABLE
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 BUILD = os.environ.get("SELVEDGE_BUILD") or os.path.join(ROOT, "build")
 PRODUCTS = ["fibers.hair", "fibers.txt", "direction.vol", "density.vol", "pictures/slice-x.png", "pictures/slice-y.png",
-            "pictures/slice-z.png", "scan/x.slices", "scan/y.slices", "scan/z.slices", "scan/contrast.u8"]
+            "pictures/slice-z.png", "scan/x.slices", "scan/y.slices", "scan/z.slices", "scan/fibers.hair", "scan/contrast.u8"]
 
 
 @pytest.fixture(scope="module")

@@ -62,8 +62,11 @@ function byContrast(hair) {
   };
 }
 
+// Of the fibers as they were traced, because closing the seams of the tile moves them away from the scan.
+export const TRACED = ["found or filled in, as traced", byContrast];
+
 // The ways that this file has data for: [name, function of hair].
-export const waysToColour = (hair) => [["direction", byDirection], ["class", byKind], ["radius", byRadius], hair.contrast ? ["found or filled in", byContrast] : null, hair.group ? ["material", byGroup] : null].filter(Boolean);
+export const waysToColour = (hair) => [["direction", byDirection], ["class", byKind], ["radius", byRadius], hair.group ? ["material", byGroup] : null].filter(Boolean);
 
 // Three numbers for each end of each segment; what lies deep is darker.
 export function coloursOf(hair, way) {

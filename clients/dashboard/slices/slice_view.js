@@ -163,7 +163,7 @@ class SliceView {
     const index = this.index[this.axis], over = this.checked(0) || this.checked(1);
     this.legend.replaceChildren(
       ...(byDirection ? ["Direction: ", ...["x, weft", "y, warp", "z, through the cloth"].map((name, a) => swatch(css(AXIS_COLOURS[a]), name)), "grey: no fiber"] : ["Density: black 0, white 1"]),
-      ...(over && index ? [swatch(FOUND_COLOUR, index.contrast ? "fiber that the scan shows" : "fiber"), ...(index.contrast ? [swatch(FILLED_COLOUR, "filled in: the scan does not show it clearly")] : []), "circles: the fiber's radius"] : []),
+      ...(over && index ? [swatch(FOUND_COLOUR, index.contrast ? "traced fiber that the scan shows" : "traced fiber"), ...(index.contrast ? [swatch(FILLED_COLOUR, "filled in: the scan does not show it clearly")] : []), "circles: the fiber's radius"] : []),
       ...(this.file.factor > 1 ? [`a voxel here is ${this.file.factor} voxels of the scan wide`] : []));
   }
 

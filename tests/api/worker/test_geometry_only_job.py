@@ -43,7 +43,7 @@ def test_geometry_alone_and_a_job_that_goes_on_from_it(real, scan):
     assert done["directions"] is not None and done["scene"] is None and done["fit"] is None
     listed = {f["path"] for f in real.get(f"/v1/jobs/{first}/results").json()["files"]}
     assert {"result.json", "summary.txt", "fibers.hair", "direction.vol", "density.vol", "quality.html", "pictures/slice-x.png",
-            "scan/x.slices", "scan/y.slices", "scan/z.slices", "scan/contrast.u8"} <= listed
+            "scan/x.slices", "scan/y.slices", "scan/z.slices", "scan/fibers.hair", "scan/contrast.u8"} <= listed
 
     second = start(real, {"geometry": {"job": first}, **ROWS}, [("rows.csv", "measurements", TABLE.encode())])
     fitted = real.wait_state(second, "succeeded", timeout_s=120)["result"]

@@ -6,7 +6,7 @@
  *   dashboard.slices.contrast_cpu_s                              of scan/contrast.u8
  *
  * bench_scan_slices DIR [EDGE]
- *   DIR    gets fibers.hair and scan/
+ *   DIR    gets scan/
  *   EDGE   of the felt's tile in voxels, 540 by default
  * The directions are those of the phantom's fibers, and the densities have noise of a signal-to-noise ratio of 5.
  */
@@ -130,7 +130,7 @@ int main(int argc, char **argv)
     if (s == STATUS_OK) s = make_directions(&f, &v, pool, &d, &err);
     if (s == STATUS_OK) s = write_slices(argv[1], &v, &d, pool, &err);
     if (s == STATUS_OK) s = write_contrast(argv[1], &v, &f, pool, &err);
-    snprintf(path, sizeof path, "%s/fibers.hair", argv[1]);
+    snprintf(path, sizeof path, "%s/scan/fibers.hair", argv[1]);
     if (s == STATUS_OK) s = fiber_set_write_hair(&f, path, &err);
     if (s != STATUS_OK) fprintf(stderr, "bench_scan_slices: %s\n", err.text);
     direction_volume_release(&d);

@@ -55,7 +55,7 @@ static status write_slices(struct pipeline_context *c, struct error *err)
     return s;
 }
 
-/* A byte for each point of fibers.hair, in which long fibers have the point between two strands twice. */
+/* A byte for each point of scan/fibers.hair, in which long fibers have the point between two strands twice. */
 static uint8_t *contrast_bytes(const struct fiber_set *f, const float *contrast, size_t *n_byte)
 {
     uint8_t *bytes = malloc(f->n_vertex + f->n_vertex / FIBER_HAIR_MAX_SEGMENT + 1);
@@ -74,17 +74,29 @@ static status write_contrast(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
     const struct progress silent = progress_silent(&c->progress);
-    float *contrast = malloc((c->fiber.n_vertex + 1) * sizeof *contrast);
+    float *contrast = malloc((c->traced.n_vertex + 1) * sizeof *contrast);
     if (contrast == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot grade the fibers: out of memory");
-    status s = scan_grade_contrast(&c->volume, &c->fiber, c->pool, &silent, contrast, err);
+    status s = scan_grade_contrast(&c->volume, &c->traced, c->pool, &silent, contrast, err);
     size_t n_byte = 0;
-    uint8_t *bytes = s == STATUS_OK ? contrast_bytes(&c->fiber, contrast, &n_byte) : NULL;
+    uint8_t *bytes = s == STATUS_OK ? contrast_bytes(&c->traced, contrast, &n_byte) : NULL;
     if (s == STATUS_OK && bytes == NULL) s = error_set(err, STATUS_NO_MEMORY, "cannot grade the fibers: out of memory");
     worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "scan/contrast.u8", path);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
     if (s == STATUS_OK) s = durable_replace(path, bytes, n_byte, err);
     free(contrast);
     free(bytes);
+    return s;
+}
+
+static status write_traced(struct pipeline_context *c, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
+    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "scan/fibers.hair", path);
+    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "scan/.part", temporary);
+    status s = fiber_set_write_hair(&c->traced, temporary, err);
+    if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
+    if (s == STATUS_OK) return durable_rename(temporary, path, err);
+    unlink(temporary);
     return s;
 }
 
@@ -95,6 +107,7 @@ status scan_slices_write(struct pipeline_context *c, struct error *err)
     status s = durable_make_folder(path, err);
     if (s == STATUS_OK && (missing(c, slice_name[0]) || missing(c, slice_name[1]) || missing(c, slice_name[2])))
         s = write_slices(c, err);
-    if (s == STATUS_OK && missing(c, "scan/contrast.u8")) s = write_contrast(c, err);
+    if (s == STATUS_OK) s = write_traced(c, err);
+    if (s == STATUS_OK) s = write_contrast(c, err);
     return s;
 }
