@@ -57,6 +57,25 @@ bool small_solve_banded(double *m, size_t n, size_t n_band, double *x)
     return true;
 }
 
+bool small_invert_banded(double *m, size_t n, size_t n_band)
+{
+    if (!factor_banded(m, n, n_band)) return false;
+    for (size_t j = n; j-- > 0;) { /* the elements of columns above j are those of the inverse already */
+        double l[SMALL_BAND_MAX];  /* column j of the factor from the diagonal on */
+        const size_t below = n - 1 - j < n_band - 1 ? n - 1 - j : n_band - 1;
+        for (size_t k = 0; k <= below; k++) l[k] = m[(j + k) * n_band + k];
+        for (size_t i = below + 1; i-- > 0;) {
+            double sum = i == 0 ? 1.0 / l[0] : 0.0;
+            for (size_t k = 1; k <= below; k++) {
+                const size_t low = i < k ? i : k, high = i < k ? k : i;
+                sum -= l[k] * m[(j + high) * n_band + high - low];
+            }
+            m[(j + i) * n_band + i] = sum / l[0];
+        }
+    }
+    return true;
+}
+
 bool small_invert(const double *a, size_t n, double *inverse)
 {
     double factor[SMALL_MATRIX_MAX * SMALL_MATRIX_MAX];

@@ -11,8 +11,9 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Largest n of small_eigen, small_clip_eigenvalues and small_invert, which keep copies on the stack. */
-enum { SMALL_MATRIX_MAX = 64 };
+/* Largest n of small_eigen, small_clip_eigenvalues and small_invert, and largest band of small_invert_banded, which
+ * keep copies on the stack. */
+enum { SMALL_MATRIX_MAX = 64, SMALL_BAND_MAX = 8 };
 
 /* Cholesky factor L of a symmetric n x n matrix, in place of its lower triangle; the upper triangle is neither read nor
  * written. Returns false when a pivot is not greater than least_pivot (0 accepts every positive definite matrix). */
@@ -23,6 +24,9 @@ void small_solve(const double *factor, size_t n, double *x, size_t stride);
  * element (i, i - k), k < n_band. m is destroyed and x replaces b. Returns false, with x undefined, when a pivot is
  * not positive. */
 bool small_solve_banded(double *m, size_t n, size_t n_band, double *x);
+/* Replaces a banded symmetric positive definite m, stored as above, by the elements of its inverse within the band
+ * (Takahashi et al. 1973). Returns false, with m destroyed, when a pivot is not positive. */
+bool small_invert_banded(double *m, size_t n, size_t n_band);
 /* Inverse of a symmetric positive definite a; false when a pivot is not positive. */
 bool small_invert(const double *a, size_t n, double *inverse);
 /* out = a b, n x n; out must differ from a and b. */

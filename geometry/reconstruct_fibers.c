@@ -110,6 +110,13 @@ static status to_fiber_set(const struct trace_job *job, const struct polyline_se
         f->axis_class[l] = lines->axis[l];
         f->radius_m[l] = (float)((double)lines->radius[l] * voxel_m);
     }
+    if (lines->shape != NULL) s = fiber_set_add_shapes(f, err);
+    for (size_t i = 0; i < lines->n_vertex && f->shape != NULL; i++) {
+        f->shape[i] = lines->shape[i];
+        f->shape[i].radius = (float)((double)f->shape[i].radius * voxel_m);
+        f->shape[i].radius_se = (float)((double)f->shape[i].radius_se * voxel_m);
+    }
+    if (s != STATUS_OK) return s;
     f->tile_size_m[0] = (double)job->v->n[0] * voxel_m;
     f->tile_size_m[1] = (double)job->v->n[1] * voxel_m;
     job->report->n_fiber = f->n_fiber;

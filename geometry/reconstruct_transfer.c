@@ -31,7 +31,7 @@ static void transfer_voxel(struct transfer_job *job, struct brick_sum *sum, size
     sum->n_kept += kept;
     if (nearest == UINT32_MAX) return;
     const struct segment *g = &job->bricks->segment[nearest];
-    float r = (float)((double)job->fibers->radius_m[g->line] / job->d->voxel_size_m[0]);
+    const float r = g->radius;
     if (distance2 <= r * r) {
         sum->n_fiber++;
         sum->n_both += kept;

@@ -17,10 +17,13 @@ enum {
     HAIR_THICKNESS = 4,
     HAIR_TRANSPARENCY = 8,
     HAIR_COLOUR = 16,
-    HAIR_KNOWN = 31
+    HAIR_KNOWN = 31,
+    SECTION_BYTES = 28 /* of a point, after the arrays of the format */
 };
 
-static const char tile_key[] = "selvedge tile_mm=", group_key[] = " groups=rgb";
+static const char tile_key[] = "selvedge tile_mm=", group_key[] = " groups=rgb", section_key[] = " sections";
+/* Points that are thinner, over the mean thickness of their fiber, count as this thick: rays need some thickness. */
+static const double LEAST_THICKNESS = 0.05;
 
 static void put_u16(uint8_t *to, uint32_t v)
 {
@@ -86,26 +89,38 @@ static void put_header(uint8_t *to, const struct fiber_set *f, size_t n_strand, 
     put_f32(to + 20, f->n_fiber > 0 ? 2000.0f * f->radius_m[0] : 0.0f);
     for (size_t c = 0; c < 3; c++) put_f32(to + 28 + 4 * c, 1.0f);
     char text[HAIR_TEXT_BYTES];
-    int n = snprintf(text, sizeof text, "%s%.17g,%.17g%s", tile_key, 1e3 * f->tile_size_m[0], 1e3 * f->tile_size_m[1],
-                     groups ? group_key : "");
+    int n = snprintf(text, sizeof text, "%s%.17g,%.17g%s%s", tile_key, 1e3 * f->tile_size_m[0], 1e3 * f->tile_size_m[1],
+                     groups ? group_key : "", f->shape != NULL ? section_key : "");
     if (n > 0 && n < HAIR_TEXT_BYTES) memcpy(to + HAIR_TEXT_OFFSET, text, (size_t)n);
 }
 
 /* The colours of groups are the corners of the rgb cube: group 0 is white, and bit c of the group clears channel c. */
 static float group_channel(uint8_t group, size_t c) { return ((uint32_t)group >> c & 1u) != 0 ? 0.0f : 1.0f; }
 
+/* The numbers of a point that the format has no array for. */
+static void put_section(uint8_t *to, const struct fiber_shape *s)
+{
+    const float value[7] = {1000.0f * s->radius_se, s->ratio,        s->ratio_se,    s->angle_se_rad,
+                            s->long_axis[0],        s->long_axis[1], s->long_axis[2]};
+    for (size_t i = 0; i < 7; i++) put_f32(to + 4 * i, value[i]);
+}
+
 /* to: the arrays of the file, after the header. */
 static void put_strands(uint8_t *to, const struct fiber_set *f, size_t n_strand, size_t n_point, bool groups)
 {
     uint8_t *segments = to, *points = segments + 2 * n_strand, *thickness = points + 12 * n_point;
-    uint8_t *colour = thickness + 4 * n_point;
+    uint8_t *colour = thickness + 4 * n_point, *section = colour + (groups ? 12 * n_point : 0);
     for (size_t i = 0; i < f->n_fiber; i++)
         for (size_t from = f->first_vertex[i], last = f->first_vertex[i + 1] - 1; from < last;) {
             size_t n = last - from < FIBER_HAIR_MAX_SEGMENT ? last - from : FIBER_HAIR_MAX_SEGMENT;
             put_u16(segments, (uint32_t)n);
             for (size_t k = from; k <= from + n; k++, points += 12, thickness += 4) {
                 for (size_t a = 0; a < 3; a++) put_f32(points + 4 * a, 1000.0f * f->position_m[3 * k + a]);
-                put_f32(thickness, 2000.0f * f->radius_m[i]);
+                put_f32(thickness, 2000.0f * fiber_radius_m(f, i, k));
+                if (f->shape != NULL) {
+                    put_section(section, &f->shape[k]);
+                    section += SECTION_BYTES;
+                }
                 for (size_t c = 0; groups && c < 3; c++, colour += 4) put_f32(colour, group_channel(f->group[i], c));
             }
             segments += 2;
@@ -120,7 +135,8 @@ status fiber_set_write_hair(const struct fiber_set *f, const char *path, struct 
     status s = count_strands(f, name, &n_strand, &n_point, err);
     if (s != STATUS_OK) return s;
     bool groups = fiber_set_n_group(f) > 1;
-    size_t n_bytes = HAIR_HEADER_BYTES + 2 * n_strand + (groups ? 28 : 16) * n_point;
+    const size_t point_bytes = (groups ? 28u : 16u) + (f->shape != NULL ? SECTION_BYTES : 0u);
+    const size_t n_bytes = HAIR_HEADER_BYTES + 2 * n_strand + point_bytes * n_point;
     uint8_t *data = malloc(n_bytes);
     if (data == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write fibers '%s': out of memory", name);
     put_header(data, f, n_strand, n_point, groups);
@@ -133,6 +149,7 @@ status fiber_set_write_hair(const struct fiber_set *f, const char *path, struct 
 struct hair_header {
     uint32_t n_strand, n_point, flags, default_segments;
     float default_thickness;
+    bool sections; /* they follow the arrays */
 };
 
 /* Checks the counts of the header against the length of the file. *n_bytes: length that follows from the header (at
@@ -149,6 +166,7 @@ static status check_header(const struct hair_header *h, uint64_t file_bytes, con
     if (h->flags & HAIR_THICKNESS) want += 4 * (uint64_t)h->n_point;
     if (h->flags & HAIR_TRANSPARENCY) want += 4 * (uint64_t)h->n_point;
     if (h->flags & HAIR_COLOUR) want += 12 * (uint64_t)h->n_point;
+    if (h->sections) want += SECTION_BYTES * (uint64_t)h->n_point;
     if (want != file_bytes)
         return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': it has %llu bytes, but its header requires %llu",
                          name, (unsigned long long)file_bytes, (unsigned long long)want);
@@ -197,6 +215,40 @@ static status get_radii(struct fiber_set *f, const struct hair_header *h, const 
     return STATUS_OK;
 }
 
+/* Lets the radius vary along fibers whose points differ in thickness. thickness: NULL if the file has none. */
+static status get_varying_radii(struct fiber_set *f, const uint8_t *thickness, const char *name, struct error *err)
+{
+    bool varies = false;
+    for (size_t i = 0; i < f->n_fiber && thickness != NULL; i++)
+        for (size_t k = f->first_vertex[i]; k + 1 < f->first_vertex[i + 1]; k++)
+            varies = varies || get_f32(thickness + 4 * k) != get_f32(thickness + 4 * k + 4);
+    status s = varies ? fiber_set_add_shapes(f, err) : STATUS_OK;
+    for (size_t i = 0; i < f->n_fiber && s == STATUS_OK && thickness != NULL && f->shape != NULL; i++)
+        for (size_t k = f->first_vertex[i]; k < f->first_vertex[i + 1]; k++) {
+            const float r = 0.5e-3f * get_f32(thickness + 4 * k), least = (float)LEAST_THICKNESS * f->radius_m[i];
+            if (!(r >= 0.0f) || !isfinite(r))
+                return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': point %zu has a thickness of %g mm",
+                                 name, k, 2e3 * (double)r);
+            f->shape[k].radius = r > least ? r : least;
+        }
+    return s;
+}
+
+/* data: the sections of all points. */
+static status get_sections(struct fiber_set *f, const uint8_t *data, const char *name, struct error *err)
+{
+    status s = fiber_set_add_shapes(f, err);
+    for (size_t k = 0; k < f->n_vertex && s == STATUS_OK; k++) {
+        struct fiber_shape *to = &f->shape[k];
+        float value[7];
+        for (size_t i = 0; i < 7; i++) value[i] = get_f32(data + SECTION_BYTES * k + 4 * i);
+        if (!fiber_shape_set(to, value))
+            s = error_set(err, STATUS_FORMAT, "cannot read fibers '%s': the numbers of point %zu are no section", name,
+                          k);
+    }
+    return s;
+}
+
 /* The group that a colour stands for, or FIBER_MAX_GROUP for any other colour. */
 static uint8_t get_group(const uint8_t *colour)
 {
@@ -221,32 +273,42 @@ static status get_groups(struct fiber_set *f, const uint8_t *colour, const char 
     return STATUS_OK;
 }
 
-/* Reads the tile size from the text of the header; 0 if another program wrote the file. *groups: the text says that the
- * colours are groups. */
-static void get_text(struct fiber_set *f, const uint8_t *header, bool *groups)
+/* Reads the tile size from the text of the header; 0 if another program wrote the file. *groups, *sections: the text
+ * says that the colours are groups, and that sections follow the arrays. */
+static void get_text(double tile_size_m[2], const uint8_t *header, bool *groups, bool *sections)
 {
     char text[HAIR_TEXT_BYTES + 1];
     memcpy(text, header + HAIR_TEXT_OFFSET, HAIR_TEXT_BYTES);
     text[HAIR_TEXT_BYTES] = '\0';
-    f->tile_size_m[0] = f->tile_size_m[1] = 0.0;
+    tile_size_m[0] = tile_size_m[1] = 0.0;
     const char *at = strstr(text, tile_key);
     *groups = at != NULL && strstr(at, group_key) != NULL;
+    *sections = at != NULL && strstr(at, section_key) != NULL;
     if (at == NULL) return;
     char *end;
     double x = strtod(at + sizeof tile_key - 1, &end);
     if (*end != ',') return;
     double y = strtod(end + 1, &end);
     if (!(x > 0.0) || !(y > 0.0) || !isfinite(x) || !isfinite(y)) return;
-    f->tile_size_m[0] = 1e-3 * x;
-    f->tile_size_m[1] = 1e-3 * y;
+    tile_size_m[0] = 1e-3 * x;
+    tile_size_m[1] = 1e-3 * y;
+}
+
+static struct hair_header get_header(const uint8_t *data, double tile_size_m[2], bool *groups)
+{
+    struct hair_header h = {get_u32(data + 4),  get_u32(data + 8),  get_u32(data + 12),
+                            get_u32(data + 16), get_f32(data + 20), false};
+    get_text(tile_size_m, data, groups, &h.sections);
+    return h;
 }
 
 static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes, const char *name, struct error *err)
 {
     if (n_bytes < HAIR_HEADER_BYTES || memcmp(data, "HAIR", 4) != 0)
         return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': not a .hair file", name);
-    struct hair_header h = {get_u32(data + 4), get_u32(data + 8), get_u32(data + 12), get_u32(data + 16),
-                            get_f32(data + 20)};
+    bool groups;
+    double tile_size_m[2];
+    struct hair_header h = get_header(data, tile_size_m, &groups);
     status s = check_header(&h, n_bytes, name, err);
     if (s == STATUS_OK) s = fiber_set_reserve(f, h.n_strand, h.n_point, err);
     if (s != STATUS_OK) return s;
@@ -258,6 +320,9 @@ static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes,
     const uint8_t *points = at, *thickness = h.flags & HAIR_THICKNESS ? at + 12 * (size_t)h.n_point : NULL;
     s = get_strands(f, &h, segments, name, err);
     if (s == STATUS_OK) s = get_radii(f, &h, thickness, name, err);
+    if (s == STATUS_OK && h.sections)
+        s = get_sections(f, data + n_bytes - SECTION_BYTES * (size_t)h.n_point, name, err);
+    if (s == STATUS_OK) s = get_varying_radii(f, thickness, name, err);
     if (s != STATUS_OK) return s;
     for (size_t k = 0; k < 3 * (size_t)h.n_point; k++) {
         f->position_m[k] = 1e-3f * get_f32(points + 4 * k);
@@ -265,11 +330,10 @@ static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes,
             return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': point %zu is not a finite point", name,
                              k / 3);
     }
-    bool groups;
-    get_text(f, data, &groups);
+    memcpy(f->tile_size_m, tile_size_m, sizeof f->tile_size_m);
     fiber_set_classify(f);
-    return groups && (h.flags & HAIR_COLOUR) != 0 ? get_groups(f, data + n_bytes - 12 * (size_t)h.n_point, name, err)
-                                                  : STATUS_OK;
+    const size_t after_colour = (12u + (h.sections ? SECTION_BYTES : 0u)) * (size_t)h.n_point;
+    return groups && (h.flags & HAIR_COLOUR) != 0 ? get_groups(f, data + n_bytes - after_colour, name, err) : STATUS_OK;
 }
 
 /* Checks the header before the rest is read, so that a wrong count allocates nothing. */
@@ -286,8 +350,9 @@ static status check_file(const char *path, struct error *err)
     else if (fseeko(file, 0, SEEK_END) != 0 || (n_bytes = ftello(file)) < 0)
         s = error_set_errno(err, "cannot read fibers '%s'", name);
     else {
-        struct hair_header h = {get_u32(header + 4), get_u32(header + 8), get_u32(header + 12), get_u32(header + 16),
-                                get_f32(header + 20)};
+        double tile_size_m[2];
+        bool groups;
+        const struct hair_header h = get_header(header, tile_size_m, &groups);
         s = check_header(&h, (uint64_t)n_bytes, name, err);
     }
     fclose(file);

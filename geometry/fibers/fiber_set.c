@@ -14,6 +14,7 @@ void fiber_set_release(struct fiber_set *f)
     free(f->radius_m);
     free(f->axis_class);
     free(f->group);
+    free(f->shape);
     *f = (struct fiber_set){.tile_size_m = {f->tile_size_m[0], f->tile_size_m[1]}};
 }
 
@@ -38,16 +39,74 @@ status fiber_set_reserve(struct fiber_set *f, size_t n_fiber, size_t n_vertex, s
     return STATUS_OK;
 }
 
+status fiber_set_add_shapes(struct fiber_set *f, struct error *err)
+{
+    if (f->shape != NULL) return STATUS_OK;
+    f->shape = malloc((f->n_vertex > 0 ? f->n_vertex : 1) * sizeof *f->shape);
+    if (f->shape == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot hold the sections of %zu vertices: out of memory", f->n_vertex);
+    for (size_t i = 0; i < f->n_fiber; i++)
+        for (size_t k = f->first_vertex[i]; k < f->first_vertex[i + 1]; k++)
+            f->shape[k] = fiber_shape_disc(f->radius_m[i]);
+    return STATUS_OK;
+}
+
+void fiber_set_scale_radius(struct fiber_set *f, size_t i_fiber, double factor)
+{
+    f->radius_m[i_fiber] = (float)((double)f->radius_m[i_fiber] * factor);
+    if (f->shape == NULL) return;
+    for (size_t k = f->first_vertex[i_fiber]; k < f->first_vertex[i_fiber + 1]; k++) {
+        f->shape[k].radius = (float)((double)f->shape[k].radius * factor);
+        f->shape[k].radius_se = (float)((double)f->shape[k].radius_se * factor);
+    }
+}
+
 status fiber_set_copy(const struct fiber_set *from, struct fiber_set *to, struct error *err)
 {
     status s = fiber_set_reserve(to, from->n_fiber, from->n_vertex, err);
     if (s != STATUS_OK) return s;
+    if (from->shape != NULL) {
+        s = fiber_set_add_shapes(to, err);
+        if (s != STATUS_OK) return s;
+        memcpy(to->shape, from->shape, from->n_vertex * sizeof *to->shape);
+    }
     memcpy(to->first_vertex, from->first_vertex, (from->n_fiber + 1) * sizeof *to->first_vertex);
     memcpy(to->position_m, from->position_m, 3 * from->n_vertex * sizeof *to->position_m);
     memcpy(to->radius_m, from->radius_m, from->n_fiber * sizeof *to->radius_m);
     memcpy(to->axis_class, from->axis_class, from->n_fiber);
     memcpy(to->group, from->group, from->n_fiber);
     memcpy(to->tile_size_m, from->tile_size_m, sizeof to->tile_size_m);
+    return STATUS_OK;
+}
+
+bool fiber_shape_set(struct fiber_shape *s, const float value[7])
+{
+    const float *axis = value + 4, length = sqrtf(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
+    for (int i = 0; i < 7; i++)
+        if (!isfinite(value[i]) || (i < 4 && !(value[i] >= 0.0f))) return false;
+    if (!(value[1] >= 1.0f && value[1] <= FIBER_RATIO_MOST) || (length > 0.0f && !(fabsf(length - 1.0f) < 0.01f)))
+        return false;
+    s->radius_se = 1e-3f * value[0];
+    s->ratio = value[1];
+    s->ratio_se = value[2];
+    s->angle_se_rad = value[3];
+    for (int a = 0; a < 3; a++) s->long_axis[a] = length > 0.0f ? axis[a] / length : 0.0f;
+    return true;
+}
+
+static status validate_shape(const struct fiber_set *f, size_t i, struct error *err)
+{
+    for (size_t k = f->first_vertex[i]; k < f->first_vertex[i + 1]; k++) {
+        const struct fiber_shape *s = &f->shape[k];
+        const size_t at = k - f->first_vertex[i];
+        if (!(s->radius > 0.0f) || !isfinite(s->radius))
+            return error_set(err, STATUS_INVALID, "vertex %zu of fiber %zu has radius %g m, it must be positive", at, i,
+                             (double)s->radius);
+        if (!(s->ratio >= 1.0f && s->ratio <= FIBER_RATIO_MOST))
+            return error_set(err, STATUS_INVALID,
+                             "vertex %zu of fiber %zu has a section with axes of the ratio %g, it must be 1 to %g", at,
+                             i, (double)s->ratio, (double)FIBER_RATIO_MOST);
+    }
     return STATUS_OK;
 }
 
@@ -68,7 +127,7 @@ static status validate_fiber(const struct fiber_set *f, size_t i, struct error *
     for (size_t k = 3 * first; k < 3 * end; k++)
         if (!isfinite(f->position_m[k]))
             return error_set(err, STATUS_INVALID, "vertex %zu of fiber %zu is not a finite point", k / 3 - first, i);
-    return STATUS_OK;
+    return f->shape != NULL ? validate_shape(f, i, err) : STATUS_OK;
 }
 
 status fiber_set_validate(const struct fiber_set *f, struct error *err)
@@ -113,7 +172,7 @@ void fiber_set_z_range_m(const struct fiber_set *f, double *z_min_m, double *z_m
     double low = INFINITY, high = -INFINITY;
     for (size_t i = 0; i < f->n_fiber; i++)
         for (size_t k = f->first_vertex[i]; k < f->first_vertex[i + 1]; k++) {
-            double z = f->position_m[3 * k + 2], r = f->radius_m[i];
+            double z = f->position_m[3 * k + 2], r = fiber_radius_m(f, i, k);
             if (z - r < low) low = z - r;
             if (z + r > high) high = z + r;
         }

@@ -1,5 +1,5 @@
-/* Fibers as text: a line "x y z radius" or "x y z radius group" in millimetres for each vertex, and a blank line
- * between fibers (docs/file-formats.md). */
+/* Fibers as text: a line "x y z radius", "x y z radius group", or these and the numbers of a section, in
+ * millimetres for each vertex, and a blank line between fibers (docs/file-formats.md). */
 #include "base/files/durable.h"
 #include "geometry/fibers/fiber_set.h"
 
@@ -8,6 +8,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+static void write_section(FILE *out, const struct fiber_shape *s)
+{
+    fprintf(out, " %.4g %.6g %.4g %.4g %.6g %.6g %.6g", 1e3 * (double)s->radius_se, (double)s->ratio,
+            (double)s->ratio_se, (double)s->angle_se_rad, (double)s->long_axis[0], (double)s->long_axis[1],
+            (double)s->long_axis[2]);
+}
 
 status fiber_set_write_text(const struct fiber_set *f, const char *path, struct error *err)
 {
@@ -22,8 +29,9 @@ status fiber_set_write_text(const struct fiber_set *f, const char *path, struct 
         for (size_t k = f->first_vertex[i]; k < f->first_vertex[i + 1]; k++) {
             const float *p = f->position_m + 3 * k;
             fprintf(out, "%.9g %.9g %.9g %.9g", 1e3 * (double)p[0], 1e3 * (double)p[1], 1e3 * (double)p[2],
-                    1e3 * (double)f->radius_m[i]);
-            if (groups) fprintf(out, " %u", (unsigned)f->group[i]);
+                    1e3 * (double)fiber_radius_m(f, i, k));
+            if (groups || f->shape != NULL) fprintf(out, " %u", (unsigned)f->group[i]);
+            if (f->shape != NULL) write_section(out, &f->shape[k]);
             fputc('\n', out);
         }
     }
@@ -81,23 +89,47 @@ static size_t count_points(const char *data, size_t n_bytes, size_t *n_fiber)
 
 static bool is_end(const char *line) { return line[strspn(line, " \t\r")] == '\0'; }
 
-/* Parses four finite numbers, and after them a group or nothing, which is group 0. Returns false for anything else. */
-static bool parse_point(const char *line, double value[4], uint8_t *group)
+/* One line of the file. */
+struct text_point {
+    double value[4]; /* position and radius */
+    uint8_t group;
+    bool has_section;
+    struct fiber_shape shape; /* in metres */
+};
+
+static bool parse_section(const char *line, struct text_point *p)
+{
+    float value[7];
+    char *end;
+    for (int i = 0; i < 7; i++) {
+        value[i] = strtof(line, &end);
+        if (end == line) return false;
+        line = end;
+    }
+    p->has_section = fiber_shape_set(&p->shape, value);
+    return p->has_section && is_end(line);
+}
+
+/* Parses four finite numbers, and after them a group, a group and a section, or nothing, which is group 0. Returns
+ * false for anything else. */
+static bool parse_point(const char *line, struct text_point *p)
 {
     char *end;
     for (int a = 0; a < 4; a++) {
-        value[a] = strtod(line, &end);
-        if (end == line || !isfinite(value[a])) return false;
+        p->value[a] = strtod(line, &end);
+        if (end == line || !isfinite(p->value[a])) return false;
         line = end;
     }
-    *group = 0;
+    p->group = 0;
+    p->has_section = false;
+    p->shape = fiber_shape_disc((float)(1e-3 * p->value[3]));
     if (!is_end(line)) {
         double number = strtod(line, &end);
         if (end == line || !(number >= 0.0 && number < FIBER_MAX_GROUP) || number != floor(number)) return false;
-        *group = (uint8_t)number;
+        p->group = (uint8_t)number;
         line = end;
     }
-    return is_end(line) && value[3] > 0.0;
+    return (is_end(line) || parse_section(line, p)) && p->value[3] > 0.0;
 }
 
 static status wrong_line(const char *name, size_t i_line, bool other_group, struct error *err)
@@ -108,7 +140,7 @@ static status wrong_line(const char *name, size_t i_line, bool other_group, stru
     return error_set(
         err, STATUS_FORMAT,
         "cannot read fibers '%s': line %zu is not \"x y z radius\" or \"x y z radius group\" with a group of "
-        "0 to %d",
+        "0 to %d, alone or with the seven numbers of a section",
         name, i_line, FIBER_MAX_GROUP - 1);
 }
 
@@ -124,13 +156,15 @@ static status close_fiber(struct fiber_set *f, size_t i_fiber, size_t n_vertex, 
     return STATUS_OK;
 }
 
-static status parse(struct fiber_set *f, const char *data, size_t n_bytes, const char *name, struct error *err)
+/* *shaped: there are sections, or the radius varies along a fiber. */
+static status parse(struct fiber_set *f, const char *data, size_t n_bytes, const char *name, bool *shaped,
+                    struct error *err)
 {
     struct line_reader r = {data, data + n_bytes, 0};
     char line[LINE_BYTES];
     size_t i_fiber = 0, n_vertex = 0;
-    double radius_sum = 0.0, value[4];
-    uint8_t group;
+    double radius_sum = 0.0;
+    struct text_point p;
     for (;;) {
         enum line_kind kind = next_line(&r, line);
         bool inside = n_vertex > f->first_vertex[i_fiber];
@@ -141,11 +175,13 @@ static status parse(struct fiber_set *f, const char *data, size_t n_bytes, const
         }
         if (kind == LINE_END) return STATUS_OK;
         if (kind == LINE_BLANK) continue;
-        if (kind == LINE_TOO_LONG || !parse_point(line, value, &group)) return wrong_line(name, r.i_line, false, err);
-        if (inside && group != f->group[i_fiber]) return wrong_line(name, r.i_line, true, err);
-        f->group[i_fiber] = group;
-        for (size_t a = 0; a < 3; a++) f->position_m[3 * n_vertex + a] = (float)(1e-3 * value[a]);
-        radius_sum += value[3];
+        if (kind == LINE_TOO_LONG || !parse_point(line, &p)) return wrong_line(name, r.i_line, false, err);
+        if (inside && p.group != f->group[i_fiber]) return wrong_line(name, r.i_line, true, err);
+        f->group[i_fiber] = p.group;
+        for (size_t a = 0; a < 3; a++) f->position_m[3 * n_vertex + a] = (float)(1e-3 * p.value[a]);
+        f->shape[n_vertex] = p.shape;
+        *shaped = *shaped || p.has_section || (inside && p.shape.radius != f->shape[n_vertex - 1].radius);
+        radius_sum += p.value[3];
         n_vertex++;
     }
 }
@@ -154,6 +190,7 @@ status fiber_set_read_text(struct fiber_set *f, const char *path, struct error *
 {
     char *data = NULL;
     size_t n_bytes = 0, n_fiber = 0;
+    bool shaped = false;
     struct fiber_set read;
     fiber_set_init(&read);
     status s = file_read_all(path, SIZE_MAX / 2, &data, &n_bytes, err);
@@ -162,7 +199,12 @@ status fiber_set_read_text(struct fiber_set *f, const char *path, struct error *
     if (n_fiber == 0)
         s = error_set(err, STATUS_FORMAT, "cannot read fibers '%s': it has no fiber", path_file_name(path));
     if (s == STATUS_OK) s = fiber_set_reserve(&read, n_fiber, n_vertex, err);
-    if (s == STATUS_OK) s = parse(&read, data, n_bytes, path_file_name(path), err);
+    if (s == STATUS_OK) s = fiber_set_add_shapes(&read, err);
+    if (s == STATUS_OK) s = parse(&read, data, n_bytes, path_file_name(path), &shaped, err);
+    if (!shaped) {
+        free(read.shape);
+        read.shape = NULL;
+    }
     free(data);
     if (s != STATUS_OK) {
         fiber_set_release(&read);

@@ -26,16 +26,29 @@ struct job {
 /* One segment, in metres, with positions relative to the corner of the grid. */
 struct capsule {
     double a[3], d[3], length2, length;
-    double ramp_m, width_m, scale; /* share = scale * clamp(1/2 + (ramp - distance) / width) */
+    /* share = scale * clamp(1/2 + (ramp - distance) / width), with the ramp and the scale at the begin and their change
+     * to the end */
+    double ramp_m, ramp_change_m, width_m, scale, scale_change;
     bool is_first, is_last;
     uint32_t fiber;
 };
+
+/* Ramp and scale of a fiber of radius r in voxels of width w. */
+static void ramp_of(double r, double w, double *ramp_m, double *scale)
+{
+    *ramp_m = sqrt(fmax(0.0, r * r - w * w / 12.0));
+    *scale = 1.0;
+    if (*ramp_m < 0.5 * w) { /* the ramp would not end before the axis, so the fiber is drawn as a cone */
+        *ramp_m = 0.5 * w;
+        *scale = 3.0 * r * r / (w * w);
+    }
+}
 
 static bool capsule_init(struct capsule *c, const struct job *job, size_t i_fiber, size_t i_vertex)
 {
     const struct fiber_set *f = job->f;
     const float *p = f->position_m + 3 * i_vertex;
-    const double *size = job->v->voxel_size_m, r = (double)f->radius_m[i_fiber];
+    const double *size = job->v->voxel_size_m;
     c->length2 = 0.0;
     for (int a = 0; a < 3; a++) {
         c->a[a] = (double)p[a] - (a == 2 ? job->z_low_m : 0.0);
@@ -44,33 +57,40 @@ static bool capsule_init(struct capsule *c, const struct job *job, size_t i_fibe
     }
     c->length = sqrt(c->length2);
     c->width_m = cbrt(size[0] * size[1] * size[2]);
-    c->ramp_m = sqrt(fmax(0.0, r * r - c->width_m * c->width_m / 12.0));
-    c->scale = 1.0;
-    if (c->ramp_m < 0.5 * c->width_m) { /* the ramp would not end before the axis, so the fiber is drawn as a cone */
-        c->ramp_m = 0.5 * c->width_m;
-        c->scale = 3.0 * r * r / (c->width_m * c->width_m);
-    }
+    double ramp_m, scale;
+    ramp_of((double)fiber_radius_m(f, i_fiber, i_vertex), c->width_m, &c->ramp_m, &c->scale);
+    ramp_of((double)fiber_radius_m(f, i_fiber, i_vertex + 1), c->width_m, &ramp_m, &scale);
+    c->ramp_change_m = ramp_m - c->ramp_m;
+    c->scale_change = scale - c->scale;
     c->is_first = i_vertex == f->first_vertex[i_fiber];
     c->is_last = i_vertex + 2 == f->first_vertex[i_fiber + 1];
     c->fiber = (uint32_t)i_fiber + 1;
     return c->length2 > 0.0;
 }
 
-/* Distance of a point from the axis in metres; negative beyond an end of the fiber. */
-static double axis_distance(const struct capsule *c, const double p[3])
+/* Distance of a point from the axis in metres; negative beyond an end of the fiber. *at: place along the segment. */
+static double axis_distance(const struct capsule *c, const double p[3], double *at)
 {
     double q[3] = {p[0] - c->a[0], p[1] - c->a[1], p[2] - c->a[2]}, sum = 0.0;
     double t = (q[0] * c->d[0] + q[1] * c->d[1] + q[2] * c->d[2]) / c->length2;
     if ((t < 0.0 && c->is_first) || (t > 1.0 && c->is_last)) return -1.0;
     t = t < 0.0 ? 0.0 : t > 1.0 ? 1.0 : t;
+    *at = t;
     for (int a = 0; a < 3; a++) sum += (q[a] - t * c->d[a]) * (q[a] - t * c->d[a]);
     return sqrt(sum);
 }
 
-static double share_at(const struct capsule *c, double distance)
+static double share_at(const struct capsule *c, double distance, double at)
 {
     if (distance < 0.0) return 0.0; /* beyond an end */
-    return c->scale * fmin(fmax(0.0, 0.5 + (c->ramp_m - distance) / c->width_m), 1.0);
+    const double ramp_m = c->ramp_m + at * c->ramp_change_m, scale = c->scale + at * c->scale_change;
+    return scale * fmin(fmax(0.0, 0.5 + (ramp_m - distance) / c->width_m), 1.0);
+}
+
+static double share_of(const struct capsule *c, const double p[3])
+{
+    double at = 0.0, distance = axis_distance(c, p, &at);
+    return share_at(c, distance, at);
 }
 
 /* Share of a cone beyond the first and last slice, where the grid ends with the cloth. It is added to that slice. */
@@ -78,14 +98,15 @@ static double share_beyond(const struct job *job, const struct capsule *c, const
 {
     const double step = job->v->voxel_size_m[2];
     double share = 0.0;
-    if (k == 0) share += share_at(c, axis_distance(c, (const double[3]){p[0], p[1], p[2] - step}));
-    if (k + 1 == (long)job->v->n[2]) share += share_at(c, axis_distance(c, (const double[3]){p[0], p[1], p[2] + step}));
+    if (k == 0) share += share_of(c, (const double[3]){p[0], p[1], p[2] - step});
+    if (k + 1 == (long)job->v->n[2]) share += share_of(c, (const double[3]){p[0], p[1], p[2] + step});
     return share;
 }
 
-static void add_share(struct slab *s, size_t at, const struct capsule *c, double distance, double beyond)
+/* all: share of the fiber in the voxel, with what lies beyond the grid. */
+static void add_share(struct slab *s, size_t at, const struct capsule *c, double distance, double all)
 {
-    float share = (float)(share_at(c, distance) + beyond), away = (float)distance;
+    float share = (float)all, away = (float)distance;
     if (s->owner[at] != c->fiber) {
         s->owner[at] = c->fiber;
         s->share[at] = 0.0f;
@@ -104,7 +125,7 @@ static void draw_capsule(const struct job *job, struct slab *s, const struct cap
 {
     const struct direction_volume *v = job->v;
     const long n[2] = {(long)v->n[0], (long)v->n[1]};
-    double reach = c->ramp_m + 0.5 * c->width_m;
+    double reach = c->ramp_m + fmax(0.0, c->ramp_change_m) + 0.5 * c->width_m;
     long low[3], high[3];
     for (int a = 0; a < 3; a++) {
         low[a] = (long)ceil((fmin(c->a[a], c->a[a] + c->d[a]) - reach) * job->per_voxel[a] - 0.5);
@@ -117,10 +138,11 @@ static void draw_capsule(const struct job *job, struct slab *s, const struct cap
             for (long i = low[0]; i <= high[0]; i++) {
                 double p[3] = {((double)i + 0.5) * v->voxel_size_m[0], ((double)j + 0.5) * v->voxel_size_m[1],
                                ((double)k + 0.5) * v->voxel_size_m[2]};
-                double distance = axis_distance(c, p);
+                double along = 0.0, distance = axis_distance(c, p, &along);
                 if (distance < 0.0 || distance >= reach) continue;
                 size_t x = (size_t)((i % n[0] + n[0]) % n[0]), y = (size_t)((j % n[1] + n[1]) % n[1]);
-                add_share(s, volume_index(v->n, x, y, (size_t)(k - z_from)), c, distance, share_beyond(job, c, p, k));
+                add_share(s, volume_index(v->n, x, y, (size_t)(k - z_from)), c, distance,
+                          share_at(c, distance, along) + share_beyond(job, c, p, k));
             }
 }
 
@@ -165,11 +187,12 @@ static void draw_slab(void *context, size_t i_task, size_t i_thread)
     memset(s->density, 0, n * sizeof *s->density);
     for (size_t i = 0; i < n; i++) s->distance[i] = INFINITY;
     for (size_t i = 0; i < f->n_fiber; i++) {
-        double margin = (double)f->radius_m[i] + size[0] + size[1] + size[2];
-        double low = job->z_low_m + (double)z_from * size[2] - margin,
-               high = job->z_low_m + (double)z_to * size[2] + margin;
         for (size_t k = f->first_vertex[i]; k + 1 < f->first_vertex[i + 1]; k++) {
             struct capsule c;
+            double margin =
+                (double)fmaxf(fiber_radius_m(f, i, k), fiber_radius_m(f, i, k + 1)) + size[0] + size[1] + size[2];
+            double low = job->z_low_m + (double)z_from * size[2] - margin,
+                   high = job->z_low_m + (double)z_to * size[2] + margin;
             double z0 = (double)f->position_m[3 * k + 2], z1 = (double)f->position_m[3 * k + 5];
             if (fmax(z0, z1) < low || fmin(z0, z1) > high || !capsule_init(&c, job, i, k)) continue;
             draw_capsule(job, s, &c, z_from, z_to);

@@ -1,8 +1,9 @@
 /* Converts fibers to a volume of densities and directions, for volume models of a cloth that was given as fibers.
  *
  * The density of a voxel is the share of it inside fibers. For a voxel of width w whose centre has distance d from
- * the axis of a fiber it is clamp(1/2 + (r' - d) / w), where r'^2 = r^2 - w^2 / 12 preserves the area of the
- * section, pi (r'^2 + w^2 / 12), if the ramp ends before the axis (r' >= w / 2). Thinner fibers are drawn as cones
+ * the axis of a fiber of radius r there (sections are discs) it is clamp(1/2 + (r' - d) / w), where r'^2 = r^2 -
+ * w^2 / 12 preserves the area of the section, pi (r'^2 + w^2 / 12), if the ramp ends before the axis (r' >= w / 2).
+ * Thinner fibers are drawn as cones
  * of that width and of the fiber's area, 3 r^2 / w^2 (1 - d / w), because narrower profiles would miss the centres
  * of voxels. What extends above or below the cloth is added to its first or last slice. Shares of different fibers
  * add, up to 1. Ends are flat. The direction is the tangent of the fiber whose axis is nearest, as in the direction

@@ -323,6 +323,7 @@ static size_t append_fibers(const struct fiber_set *f, const float *safe, bool w
         size_t first = f->first_vertex[i], length = f->first_vertex[i + 1] - first;
         if ((safe[i] >= 0.5f) != wanted) continue;
         memcpy(to->position_m + 3 * to->first_vertex[n], f->position_m + 3 * first, 3 * length * sizeof *f->position_m);
+        if (f->shape != NULL) memcpy(to->shape + to->first_vertex[n], f->shape + first, length * sizeof *f->shape);
         to->radius_m[n] = f->radius_m[i];
         to->axis_class[n] = f->axis_class[i];
         to->group[n] = f->group[i];
@@ -337,7 +338,11 @@ status scan_grade_sort(struct fiber_set *f, const float *safe, struct scan_grade
     struct fiber_set sorted;
     fiber_set_init(&sorted);
     status s = fiber_set_reserve(&sorted, f->n_fiber, f->n_vertex, err);
-    if (s != STATUS_OK) return s;
+    if (s == STATUS_OK && f->shape != NULL) s = fiber_set_add_shapes(&sorted, err);
+    if (s != STATUS_OK) {
+        fiber_set_release(&sorted);
+        return s;
+    }
     memcpy(sorted.tile_size_m, f->tile_size_m, sizeof sorted.tile_size_m);
     size_t n_safe = append_fibers(f, safe, true, 0, &sorted);
     append_fibers(f, safe, false, n_safe, &sorted);

@@ -180,6 +180,7 @@ status phantom_generate(const struct phantom_option *option, struct thread_pool 
     report->strain_p95 = fit.strain_p95;
     if (st == STATUS_OK) st = strand_emit(&s.set, o.vertex_spacing_m, o.margin_m, f, err);
     for (size_t i = 0; i < f->n_fiber && st == STATUS_OK; i++) f->radius_m[i] = (float)((double)f->radius_m[i] / room);
+    if (st == STATUS_OK) st = phantom_section_shapes(&o.section, f, err);
     if (st == STATUS_OK) st = fiber_set_validate(f, err);
     if (st == STATUS_OK) st = report_fill(&o, f, report, err);
     strand_set_release(&s.set);

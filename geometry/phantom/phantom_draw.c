@@ -5,8 +5,10 @@
 #include <string.h>
 
 struct capsule {
-    double a[3], d[3], length2;            /* voxels */
-    double r, r_ramp, scale;               /* scale: below 1 for fibers thinner than the ramp */
+    double a[3], d[3], length2; /* voxels */
+    struct ramp {
+        double r, ramp, scale;             /* scale: below 1 for fibers thinner than the ramp */
+    } ramp[2];                             /* at both ends */
     const struct phantom_section *section; /* NULL: a full disc */
     double across[2][3];                   /* frame of the section's angle */
     double angle[2];                       /* of the long axis at both ends */
@@ -67,19 +69,23 @@ static void add_share(struct phantom_slab *s, size_t at, uint32_t fiber, float s
 /* Share of a voxel whose centre is q from the axis, at a distance d from it and at the part t of the segment. */
 static double share_at(const struct capsule *c, const double q[3], double d, double t)
 {
-    if (c->section == NULL) return c->scale * fmin(fmax(0.0, 0.5 + c->r_ramp - d), 1.0);
+    const struct ramp *p = c->ramp;
+    const double ramp = p[0].ramp + t * (p[1].ramp - p[0].ramp), scale = p[0].scale + t * (p[1].scale - p[0].scale);
+    if (c->section == NULL) return scale * fmin(fmax(0.0, 0.5 + ramp - d), 1.0);
     double x = 0.0, y = 0.0, angle = c->angle[0] + t * (c->angle[1] - c->angle[0]);
     for (int a = 0; a < 3; a++) {
         x += q[a] * c->across[0][a];
         y += q[a] * c->across[1][a];
     }
-    return phantom_section_share(c->section, c->r, cos(angle) * x + sin(angle) * y, cos(angle) * y - sin(angle) * x);
+    return phantom_section_share(c->section, p[0].r + t * (p[1].r - p[0].r), cos(angle) * x + sin(angle) * y,
+                                 cos(angle) * y - sin(angle) * x);
 }
 
 static void draw_capsule(struct phantom_slab *s, const struct capsule *c, uint32_t fiber, long z_from, long z_to)
 {
     long low[3], high[3], n[2] = {(long)s->n[0], (long)s->n[1]};
-    double reach = c->section == NULL ? c->r_ramp + 0.5 : phantom_section_reach(c->section, c->r);
+    double reach = c->section == NULL ? fmax(c->ramp[0].ramp, c->ramp[1].ramp) + 0.5
+                                      : phantom_section_reach(c->section, fmax(c->ramp[0].r, c->ramp[1].r));
     for (int a = 0; a < 3; a++) {
         low[a] = (long)floor(fmin(c->a[a], c->a[a] + c->d[a]) - reach - 0.5);
         high[a] = (long)ceil(fmax(c->a[a], c->a[a] + c->d[a]) + reach - 0.5);
@@ -101,29 +107,33 @@ static void draw_capsule(struct phantom_slab *s, const struct capsule *c, uint32
 /* Frame of the section's angle (phantom_section.h), from the direction of the segment. */
 static void set_frame(struct capsule *c, uint8_t axis_class)
 {
-    const double ref[3] = {axis_class == 2 ? 1.0 : 0.0, 0.0, axis_class == 2 ? 0.0 : 1.0};
-    double length = sqrt(c->length2), t[3], across2 = 0.0, *e = c->across[0], *o = c->across[1];
+    double length = sqrt(c->length2), t[3];
     for (int a = 0; a < 3; a++) t[a] = c->d[a] / length;
-    for (int a = 0; a < 3; a++) {
-        e[a] = ref[(a + 1) % 3] * t[(a + 2) % 3] - ref[(a + 2) % 3] * t[(a + 1) % 3];
-        across2 += e[a] * e[a];
-    }
-    for (int a = 0; a < 3; a++) e[a] = across2 > 1e-12 ? e[a] / sqrt(across2) : a == 1 ? 1.0 : 0.0;
-    for (int a = 0; a < 3; a++) o[a] = t[(a + 1) % 3] * e[(a + 2) % 3] - t[(a + 2) % 3] * e[(a + 1) % 3];
+    phantom_section_frame(t, axis_class, c->across);
+}
+
+static struct ramp ramp_of(double r)
+{
+    struct ramp p = {r, sqrt(fmax(0.0, r * r - 1.0 / 12.0)), 1.0};
+    if (p.ramp < 0.5) p = (struct ramp){r, 0.5, 3.0 * r * r};
+    return p;
+}
+
+static double largest_radius_m(const struct fiber_set *f, size_t i)
+{
+    double r = 0.0;
+    for (size_t k = f->first_vertex[i]; k < f->first_vertex[i + 1]; k++) r = fmax(r, (double)fiber_radius_m(f, i, k));
+    return r;
 }
 
 static void draw_fiber(struct phantom_slab *s, size_t i, long z_from, long z_to)
 {
     const struct fiber_set *f = s->f;
-    double per_m = 1.0 / s->voxel_size_m, r = (double)f->radius_m[i] * per_m, along_m = 0.0;
+    double per_m = 1.0 / s->voxel_size_m, r = largest_radius_m(f, i) * per_m, along_m = 0.0;
     struct phantom_section section = phantom_section_of(s->section, i);
-    struct capsule c = {.r = r, .r_ramp = sqrt(fmax(0.0, r * r - 1.0 / 12.0)), .scale = 1.0};
+    struct capsule c = {.section = NULL};
     if (!phantom_section_is_disc(s->section)) c.section = &section;
     double reach = c.section != NULL ? phantom_section_reach(c.section, r) + 0.5 : r + 1.0;
-    if (c.r_ramp < 0.5) {
-        c.r_ramp = 0.5;
-        c.scale = 3.0 * r * r;
-    }
     c.end_reach = reach;
     fiber_ends(&c, f, i, per_m);
     for (size_t k = f->first_vertex[i]; k + 1 < f->first_vertex[i + 1]; k++) {
@@ -140,6 +150,7 @@ static void draw_fiber(struct phantom_slab *s, size_t i, long z_from, long z_to)
         c.angle[1] = section.angle_rad + along_m * section.turn_rad_per_m;
         bool here = fmax(z0, z1) + reach >= (double)z_from && fmin(z0, z1) - reach <= (double)z_to;
         if (!here || c.length2 <= 0.0) continue;
+        for (size_t end = 0; end < 2; end++) c.ramp[end] = ramp_of((double)fiber_radius_m(f, i, k + end) * per_m);
         if (c.section != NULL) set_frame(&c, f->axis_class[i]);
         draw_capsule(s, &c, (uint32_t)i + 1, z_from, z_to);
     }

@@ -1,13 +1,17 @@
-/* Sections of the fibers of a phantom that are not discs: hollow, flat, and bean-shaped.
+/* Sections of the fibers of a phantom that are not discs, hollow, flat, and bean-shaped, and radii that vary.
  *
  * A section is an ellipse of the area pi r^2, where r is the radius of the fiber, with half axes r sqrt(aspect) and
  * r / sqrt(aspect). A bean is this ellipse with its long axis bent to a parabola: the point (u, v) of the ellipse moves
  * to v + bean (u^2 / a - a / 4), a the long half axis, which keeps area and centroid. The lumen is the same shape,
- * smaller by the factor `lumen`, and empty. */
+ * smaller by the factor `lumen`, and empty.
+ *
+ * With a taper the radius falls by that share and rises again once on the way through the tile, along x or y, each
+ * radius at a place of its own: r (1 - taper (1 - cos p) / 2), p = 2 pi (x / tile + y / tile) + phase, which closes at
+ * the faces. */
 #ifndef SELVEDGE_GEOMETRY_PHANTOM_SECTION_H
 #define SELVEDGE_GEOMETRY_PHANTOM_SECTION_H
 
-#include "base/status.h"
+#include "geometry/fibers/fiber_set.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -19,6 +23,7 @@ struct phantom_section_law {
     double aspect; /* largest ratio of the half axes, 1 .. 4; 0: 1. Each fiber has its own, even between 1 and it. */
     double bean;   /* bend of the long axis, 0 .. 0.5 */
     double turns_per_m; /* by which the section turns along its fiber, either way */
+    double taper;       /* share by which the radius falls along a fiber, 0 .. 0.5 */
 };
 
 /* The section of one fiber. */
@@ -29,10 +34,16 @@ struct phantom_section {
     double angle_rad, turn_rad_per_m;
 };
 
-/* Whether all sections are full discs. */
+/* Whether all sections are full discs, of any radius. */
 bool phantom_section_is_disc(const struct phantom_section_law *law);
-/* STATUS_INVALID, with err->field "lumen", "aspect", "bean" or "turns_per_m". */
+/* STATUS_INVALID, with err->field "lumen", "aspect", "bean", "turns_per_m" or "taper". */
 status phantom_section_check(const struct phantom_section_law *law, struct error *err);
+/* Writes the sections and radii along the fibers into the set, if any differ from discs of one radius.
+ * STATUS_NO_MEMORY. */
+status phantom_section_shapes(const struct phantom_section_law *law, struct fiber_set *f, struct error *err);
+/* Frame of the section's angle for a fiber of a class along the unit vector t: the direction of angle 0, and the
+ * third. */
+void phantom_section_frame(const double t[3], uint8_t axis_class, double across[2][3]);
 /* The section of fiber i. It depends on the law and i only. */
 struct phantom_section phantom_section_of(const struct phantom_section_law *law, size_t i_fiber);
 /* Factor on the radius at which the fibers of a cloth are pushed apart, for fibers of the mean aspect: the geometric

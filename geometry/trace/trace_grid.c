@@ -32,4 +32,5 @@ void trace_grid_rescale_lines(struct polyline_set *lines, double edge)
     for (size_t i = 0; i < lines->n_vertex; i++)
         for (int a = 0; a < 3; a++) lines->vertex[i][a] *= (float)edge;
     for (size_t l = 0; l < lines->n_line; l++) lines->radius[l] *= (float)edge;
+    polyline_shapes_follow(lines, true);
 }

@@ -17,8 +17,7 @@ static const char usage[] =
     "selvedge-phantom cloth --out DIR [options]\n"
     "\n"
     "Writes DIR/scan.tif (the CT volume), DIR/truth.hair, DIR/truth.txt and DIR/truth-sections.csv (the fibers),\n"
-    "DIR/phantom.json (all numbers), and the pictures\n"
-    "DIR/top.png (heights from above) and DIR/slice-x.png, slice-y.png, slice-z.png (through the middle).\n"
+    "DIR/phantom.json (all numbers), DIR/top.png (heights from above) and DIR/slice-x.png, -y, -z (the middle).\n"
     "\n"
     "DIR/cloth.json describes the cloth as the section \"cloth\" of a job document does (not for --yarn).\n"
     "\n"
@@ -54,6 +53,7 @@ static const char usage_scan[] =
     "  --lumen L               hollow: width of the lumen over that of the fiber, 0 .. 0.8                [0]\n"
     "  --aspect A              flat: each fiber has its own ratio of axes between 1 and A, 1 .. 4         [1]\n"
     "  --bean B                bend of the long axis of a section, 0 .. 0.5                               [0]\n"
+    "  --taper T               share by which the radius falls along a fiber and rises again, 0 to 0.5     [0]\n"
     "  --section-turns T       turns of a section per millimetre of its fiber                             [1]\n"
     "scan\n"
     "  --snr S                 (fiber - void) / noise sd; 0: none                                         [5]\n"
@@ -122,8 +122,9 @@ static status take_input(struct cloth *c, const struct cloth_input *in, struct e
     c->scan.seed = c->phantom.section.seed = c->phantom.seed;
     c->phantom.section.turns_per_m = 1e3 * in->turns_per_mm;
     c->scan.section = c->phantom.section;
-    if (c->described != NULL && (!phantom_section_is_disc(&c->scan.section) || c->phantom.radius_spread > 0.0))
-        return error_set(err, STATUS_INVALID, "sections and --diameter-spread do not go with --description");
+    if (c->described != NULL &&
+        (!phantom_section_is_disc(&c->scan.section) || c->phantom.radius_spread > 0.0 || c->scan.section.taper > 0.0))
+        return error_set(err, STATUS_INVALID, "sections, --taper and --diameter-spread do not go with --description");
     return STATUS_OK;
 }
 
@@ -175,6 +176,7 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
         {.name = "lumen", .kind = OPTION_NUMBER, .to = &c->phantom.section.lumen},
         {.name = "aspect", .kind = OPTION_NUMBER, .to = &c->phantom.section.aspect},
         {.name = "bean", .kind = OPTION_NUMBER, .to = &c->phantom.section.bean},
+        {.name = "taper", .kind = OPTION_NUMBER, .to = &c->phantom.section.taper},
         {.name = "section-turns", .kind = OPTION_NUMBER, .to = &in.turns_per_mm},
         {.name = "noise-sd", .kind = OPTION_NUMBER, .to = &c->scan.noise_sd_voxel},
         {.name = "hardening", .kind = OPTION_NUMBER, .to = &c->scan.beam_hardening},
@@ -195,12 +197,10 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
     /* The options are read twice, because weave and yarn set the defaults of the others. */
     status st = command_options_parse(argc, argv, option, sizeof option / sizeof *option, err);
     if (st == STATUS_OK) st = set_defaults(c, in.weave_name, err);
-    if (st != STATUS_OK) return st;
-    st = command_options_parse(argc, argv, option, sizeof option / sizeof *option, err);
+    if (st == STATUS_OK) st = command_options_parse(argc, argv, option, sizeof option / sizeof *option, err);
     if (st == STATUS_OK && c->yarn != NULL) st = phantom_yarn_read(c->yarn, &c->phantom.yarn, err);
     if (st == STATUS_OK && c->description != NULL) st = phantom_described_read(c->description, &c->described, err);
-    if (st != STATUS_OK) return st;
-    return take_input(c, &in, err);
+    return st == STATUS_OK ? take_input(c, &in, err) : st;
 }
 
 static status write_png_grey(const uint8_t *grey, size_t width, size_t height, const char *path, struct error *err)
@@ -274,10 +274,10 @@ static json_t *describe(const struct cloth *c)
                              c->scan.ring_amplitude, "gradient", c->scan.gradient, "bits", c->file.bits, "void_value",
                              c->file.void_value, "fiber_value", c->file.fiber_value);
     if (cloth != NULL && scan != NULL) {
-        json_object_update_new(cloth,
-                               json_pack("{s:f,s:f,s:f,s:f,s:f}", "diameter_spread", o->radius_spread, "lumen",
-                                         o->section.lumen, "aspect", fmax(1.0, o->section.aspect), "bean",
-                                         o->section.bean, "section_turns_per_mm", 1e-3 * o->section.turns_per_m));
+        json_object_update_new(cloth, json_pack("{s:f,s:f,s:f,s:f,s:f,s:f}", "diameter_spread", o->radius_spread,
+                                                "lumen", o->section.lumen, "aspect", fmax(1.0, o->section.aspect),
+                                                "bean", o->section.bean, "section_turns_per_mm",
+                                                1e-3 * o->section.turns_per_m, "taper", o->section.taper));
         json_object_update_new(scan,
                                json_pack("{s:f,s:f,s:f}", "noise_sd_voxel", c->scan.noise_sd_voxel, "beam_hardening",
                                          c->scan.beam_hardening, "phase_fringes", c->scan.phase_fringes));

@@ -53,6 +53,12 @@ static double n_piece(const float *p, const float *q, float radius_m)
     return fmax(1, ceil(distance(p, q) / (longest_segment_radii * (double)radius_m)));
 }
 
+/* The smaller radius of both ends of a segment of fiber i. */
+static float thinner_m(const struct fiber_set *f, size_t i, size_t vertex)
+{
+    return fminf(fiber_radius_m(f, i, vertex), fiber_radius_m(f, i, vertex + 1));
+}
+
 static status too_far(const double mm[2], int axis, double tile_mm, struct error *err)
 {
     return error_set(err, STATUS_INVALID,
@@ -87,7 +93,7 @@ static status count_vertices(const struct fiber_set *f, size_t *n, struct error 
                                    "least 1/%.0f of it",
                                    i, (double)f->radius_m[i], tile_m, 1 / smallest_radius_of_tile);
         for (size_t v = f->first_vertex[i]; v + 1 < f->first_vertex[i + 1]; v++)
-            sum += n_piece(f->position_m + 3 * v, f->position_m + 3 * (v + 1), f->radius_m[i]) - 1;
+            sum += n_piece(f->position_m + 3 * v, f->position_m + 3 * (v + 1), thinner_m(f, i, v)) - 1;
     }
     if (!(sum <= UINT32_MAX))
         return error_set(err, STATUS_TOO_LARGE, "cannot build scene: %.4g vertices, at most %u can be numbered", sum,
@@ -110,6 +116,31 @@ static void add_vertex(struct scene *s, size_t first, const float *p, const floa
         if (dx * dx + dy * dy + dz * dz < 1e-6f * radius * radius) return;
     }
     s->vertex[s->n_vertex++] = x;
+}
+
+/* Radius at t from vertex v of fiber i to the next. */
+static float radius_mm(const struct fiber_set *f, size_t i, size_t v, double t)
+{
+    const float a = fiber_radius_m(f, i, v), b = t > 0 ? fiber_radius_m(f, i, v + 1) : a;
+    return (a + (float)t * (b - a)) * (float)MM_PER_M;
+}
+
+/* Whether the fibers have sections that are flat in the mean over their vertices. */
+static bool has_flat_sections(const struct fiber_set *f)
+{
+    double sum = 0, n = 0;
+    for (size_t v = 0; v < f->n_vertex && f->shape != NULL; v++) {
+        if (!fiber_shape_has_section(&f->shape[v])) continue;
+        sum += (double)f->shape[v].ratio;
+        n++;
+    }
+    return sum > FIBER_RATIO_FLAT * n;
+}
+
+/* Gives the last vertex the section at vertex v of the set. */
+static void add_section(struct scene *s, const struct fiber_set *f, size_t v)
+{
+    if (s->long_axis != NULL) memcpy(s->long_axis[s->n_vertex - 1], f->shape[v].long_axis, sizeof *s->long_axis);
 }
 
 static void add_segments(struct scene *s, size_t first, size_t i_fiber)
@@ -138,15 +169,23 @@ static status copy_fibers(struct scene *s, const struct fiber_set *f, struct err
     s->segment_flag = malloc(n);
     if (s->vertex == NULL || s->segment_vertex == NULL || s->segment_fiber == NULL || s->segment_flag == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot build scene: no memory for %zu vertices", n);
+    if (has_flat_sections(f)) {
+        s->long_axis = malloc(n * sizeof *s->long_axis);
+        if (s->long_axis == NULL)
+            return error_set(err, STATUS_NO_MEMORY, "cannot build scene: no memory for %zu sections", n);
+    }
     for (size_t i = 0; i < f->n_fiber; i++) {
-        float radius = f->radius_m[i] * (float)MM_PER_M;
         size_t first = s->n_vertex, v = f->first_vertex[i];
-        add_vertex(s, first, f->position_m + 3 * v, f->position_m + 3 * v, 0, z_max_m, radius);
+        add_vertex(s, first, f->position_m + 3 * v, f->position_m + 3 * v, 0, z_max_m, radius_mm(f, i, v, 0));
+        add_section(s, f, v);
         for (; v + 1 < f->first_vertex[i + 1]; v++) {
             const float *p = f->position_m + 3 * v, *q = p + 3;
-            size_t pieces = (size_t)n_piece(p, q, f->radius_m[i]);
-            for (size_t k = 1; k <= pieces; k++)
-                add_vertex(s, first, p, q, (double)k / (double)pieces, z_max_m, radius);
+            size_t pieces = (size_t)n_piece(p, q, thinner_m(f, i, v));
+            for (size_t k = 1; k <= pieces; k++) {
+                const double t = (double)k / (double)pieces;
+                add_vertex(s, first, p, q, t, z_max_m, radius_mm(f, i, v, t));
+                add_section(s, f, t < 0.5 ? v : v + 1);
+            }
         }
         if (s->n_vertex - first < 2)
             s->n_vertex = first;
@@ -282,6 +321,7 @@ void scene_free(struct scene *s)
     free(s->segment_fiber);
     free(s->segment_flag);
     free(s->segment_group);
+    free(s->long_axis);
     free(s);
 }
 
@@ -289,7 +329,8 @@ size_t scene_memory_bytes(const struct scene *s)
 {
     if (s->bent != NULL) return bent_memory_bytes(s);
     long long device = atomic_load(&s->device_bytes);
-    return sizeof *s + (device > 0 ? (size_t)device : 0) + s->n_vertex * sizeof *s->vertex +
+    return sizeof *s + (device > 0 ? (size_t)device : 0) +
+           s->n_vertex * (sizeof *s->vertex + (s->long_axis != NULL ? sizeof *s->long_axis : 0)) +
            s->n_segment * (sizeof *s->segment_vertex + sizeof *s->segment_fiber + 1 + (s->segment_group != NULL));
 }
 

@@ -27,6 +27,8 @@ struct scene {
     uint32_t *segment_fiber;
     unsigned char *segment_flag;
     uint8_t *segment_group; /* NULL: all 0 */
+    float (
+        *long_axis)[3]; /* of each vertex: that of its section, a unit vector; NULL: sections are taken to be round */
     size_t n_group;
     double tile_mm[2];
     int half_block[2];                       /* the block has 2 h + 1 tiles a side, the centre one at [0, tile) */

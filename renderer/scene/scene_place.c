@@ -18,7 +18,7 @@ void scene_segment_at(const struct scene *s, uint32_t i_segment, struct scene_se
     out->middle_mm[1] = 0.5f * (v[0].y + v[1].y);
     out->middle_mm[2] = 0.5f * (v[0].z + v[1].z);
     for (int a = 0; a < 3; a++) out->tangent[a] = d[a] * inv;
-    out->radius_mm = v[0].radius;
+    out->radius_mm = 0.5f * (v[0].radius + v[1].radius);
 }
 
 static float within(double x, double period) { return (float)(x - floor(x / period) * period); }
@@ -43,6 +43,29 @@ void scene_place_of(const struct scene *s, const struct scene_hit *hit, const do
         }
         p->position_mm[a] = a < 2 ? within(x, s->tile_mm[a]) : (float)x;
     }
+}
+
+bool scene_section_normal(const struct scene *s, const struct scene_hit *hit, float normal[3])
+{
+    if (s->long_axis == NULL) return false;
+    const size_t v = s->segment_vertex[hit->i_segment];
+    const float *a = s->long_axis[v], *b = s->long_axis[v + 1], *t = hit->tangent;
+    const float sign = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] < 0 ? -1.0f : 1.0f; /* an axis has no sign */
+    float axis[3] = {a[0] + sign * b[0], a[1] + sign * b[1], a[2] + sign * b[2]}, length2 = 0;
+    if (s->bent != NULL) {
+        const struct shell_cell *c = &s->bent->space.shell.cell[hit->i_cell];
+        const float flat[3] = {axis[0], axis[1], axis[2]};
+        for (int i = 0; i < 3; i++)
+            axis[i] = (float)(c->to_world[i][0] * (double)flat[0] + c->to_world[i][1] * (double)flat[1] +
+                              c->to_world[i][2] * (double)flat[2]);
+    }
+    for (int i = 0; i < 3; i++) {
+        normal[i] = axis[(i + 1) % 3] * t[(i + 2) % 3] - axis[(i + 2) % 3] * t[(i + 1) % 3];
+        length2 += normal[i] * normal[i];
+    }
+    if (!(length2 > 1e-6f)) return false;
+    for (int i = 0; i < 3; i++) normal[i] /= sqrtf(length2);
+    return true;
 }
 
 bool scene_shell_shades(const struct scene *s, const struct scene_hit *hit, const struct scene_place *place,
@@ -84,5 +107,6 @@ uint64_t scene_checksum(const struct scene *s, uint64_t from)
     uint64_t h = add_bytes(from, s->vertex, s->n_vertex * sizeof *s->vertex);
     h = add_bytes(h, s->segment_vertex, s->n_segment * sizeof *s->segment_vertex);
     if (s->segment_group != NULL) h = add_bytes(h, s->segment_group, s->n_segment);
+    if (s->long_axis != NULL) h = add_bytes(h, s->long_axis, s->n_vertex * sizeof *s->long_axis);
     return add_bytes(h, s->tile_mm, sizeof s->tile_mm);
 }

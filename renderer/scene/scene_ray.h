@@ -67,6 +67,10 @@ bool scene_sheet_hides(const struct scene *scene, const float direction[3]);
 bool scene_sheet_met(const struct scene *scene, const struct scene_ray *ray);
 /* The unit normal of a bent cloth where a fiber was hit. False: the cloth is flat, and its normal is z. */
 bool scene_bent_normal(const struct scene *scene, const struct scene_hit *hit, float normal[3]);
+/* The direction of the short axis of the fiber's section where it was hit, unit and across the fiber. Surfaces are
+ * round all the same. False: the sections of the cloth were not measured, or are round (mean ratio of axes up to
+ * FIBER_RATIO_FLAT). */
+bool scene_section_normal(const struct scene *scene, const struct scene_hit *hit, float normal[3]);
 /* z of the lowest fiber surface (the top is 0). */
 double scene_thickness_mm(const struct scene *scene);
 

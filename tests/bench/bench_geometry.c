@@ -14,6 +14,9 @@
  *       precision, recall, fragments, merges, axis_rms_voxel, direction_mean_deg, direction_p95_deg, radius_bias
  *       radius_rms                               root of the mean square of found / true - 1 of single fibers
  *       cpu_us_per_material_voxel                processor time of the reconstruction
+ *       radius_along_rms                         as radius_rms, with the radius at each vertex
+ *       axis_ratio_error, section_turn_deg       medians over the vertices of |found / true - 1| of the ratio of axes,
+ *                                                and of the turn of the long axis where the true ratio is above 1.3
  *   geometry.weave_ct.axis_class_accuracy        share of the labelled tow voxels of a real weave in the right class
  *
  * bench_geometry [--pictures DIR] [--weaves NAMES] [--conditions NAMES] [--seed N] [--yarns N] [TEXT...]
@@ -24,6 +27,8 @@
  *   DIR    slices with the fibers drawn on them are written there
  * Progress, times and counts go to standard error.
  */
+#include "geometry/fibers/shape/section_summary.h"
+#include "geometry/grade/compare_sections.h"
 #include "tests/support/cloth/weave_labels.h"
 #include "tests/support/scan/phantom_reconstruction.h"
 
@@ -60,6 +65,7 @@ static const struct condition condition[] = {
     {"hollow", 0, 7.0, 5.0, .section = {.seed = 1, .lumen = 0.4}},
     {"flat", 0, 7.0, 5.0, .section = {.seed = 1, .aspect = 2.5, .turns_per_m = 1e3}},
     {"cotton", 0, 7.0, 5.0, 0.15, 0.5, .section = {1, .lumen = 0.3, .aspect = 2.0, .bean = 0.3, .turns_per_m = 2e3}},
+    {"taper", 0, 7.0, 5.0, .radius_spread = 0.15, .noise_sd_voxel = 0.5, .section = {.seed = 1, .taper = 0.4}},
     {"hardening", 0, 7.0, 5.0, .beam_hardening = 0.4},
     {"fringes", 0, 7.0, 5.0, .phase_fringes = 1.0},
     {"thick", 0, 7.0, 5.0, .slice_voxel = 1.5},
@@ -154,6 +160,36 @@ static void print_directions(const char *name, const struct phantom_reconstructi
             b->rim.mean_deg, a->rim.p95_deg, b->rim.p95_deg, 100.0 * b->kept_share);
 }
 
+/* Sections of the fibers that were found. */
+static status print_sections(const char *name, bool plain, const struct phantom_reconstruction *r, struct error *err)
+{
+    const struct fiber_set *f = &r->found;
+    struct section_summary s;
+    struct section_compare c;
+    status st = section_summary_make(f, &s, err);
+    if (st == STATUS_OK) st = compare_sections(&r->truth, f, &c, err);
+    if (st == STATUS_OK)
+        fprintf(
+            stderr,
+            "%s: ratios of axes %.2f, %.2f, %.2f (10, 50, 90 %%), median errors %.3f and %.1f degrees, %.0f %% flat; "
+            "the radius of %zu of %zu fibers varies, by %.1f %% (error %.1f %%)\n",
+            name, s.ratio_p10, s.ratio_median, s.ratio_p90, s.ratio_se_median, s.angle_se_median_rad * 180.0 / M_PI,
+            100.0 * s.flat_share, s.n_varying, f->n_fiber, 100.0 * s.variation, 100.0 * s.variation_se_median);
+    if (st == STATUS_OK)
+        fprintf(
+            stderr,
+            "%s: sections: radius %.3f (bias %.3f, %.3f with one a fiber, pull %.1f), ratio of axes %.3f (bias %.3f, "
+            "median %.3f, pull %.1f), turn %.1f degrees (median, pull %.1f)\n",
+            name, c.radius_rms, c.radius_bias, c.mean_radius_rms, c.radius_pull, c.ratio_rms, c.ratio_bias,
+            c.ratio_median, c.ratio_pull, c.turn_median_deg, c.turn_pull);
+    if (st == STATUS_OK && !plain) {
+        print(name, "radius_along_rms", c.radius_rms, "1", "lower");
+        print(name, "axis_ratio_error", c.ratio_median, "1", "lower");
+        print(name, "section_turn_deg", c.turn_median_deg, "deg", "lower");
+    }
+    return st;
+}
+
 static status bench_phantom(const struct selection *s, const char *name, enum phantom_weave w,
                             const struct condition *k, struct error *err)
 {
@@ -184,6 +220,7 @@ static status bench_phantom(const struct selection *s, const char *name, enum ph
                 r.report.fiber_diameter_voxel, c->radius_bias_percent);
         print_directions(name, &r);
         print_figures(name, k, &r);
+        st = print_sections(name, k->plain, &r, err);
     }
     phantom_reconstruction_release(&r);
     return st;

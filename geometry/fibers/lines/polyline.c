@@ -13,6 +13,7 @@ void polyline_set_release(struct polyline_set *p)
     free(p->vertex);
     free(p->axis);
     free(p->radius);
+    free(p->shape);
     *p = (struct polyline_set){0};
 }
 
@@ -56,18 +57,58 @@ status polyline_add(struct polyline_set *p, const float x[3], struct error *err)
         float(*vertex)[3] = realloc(p->vertex, n * sizeof *vertex);
         if (vertex == NULL) return no_memory(err);
         p->vertex = vertex;
+        if (p->shape != NULL) {
+            struct fiber_shape *shape = realloc(p->shape, n * sizeof *shape);
+            if (shape == NULL) return no_memory(err);
+            p->shape = shape;
+        }
         p->vertex_capacity = n;
     }
+    if (p->shape != NULL) p->shape[p->n_vertex] = fiber_shape_disc(0.0f);
     memcpy(p->vertex[p->n_vertex++], x, sizeof *p->vertex);
     p->first[p->n_line] = p->n_vertex;
     return STATUS_OK;
 }
 
+status polyline_shapes_init(struct polyline_set *p, struct error *err)
+{
+    free(p->shape);
+    p->shape = malloc((p->vertex_capacity + 1) * sizeof *p->shape);
+    if (p->shape == NULL) return no_memory(err);
+    for (size_t l = 0; l < p->n_line; l++)
+        for (size_t i = p->first[l]; i < p->first[l + 1]; i++) p->shape[i] = fiber_shape_disc(p->radius[l]);
+    return STATUS_OK;
+}
+
+static float mean_shape_radius(const struct polyline_set *p, size_t line)
+{
+    double sum = 0.0;
+    for (size_t i = p->first[line]; i < p->first[line + 1]; i++) sum += (double)p->shape[i].radius;
+    return (float)(sum / (double)polyline_length(p, line));
+}
+
+void polyline_shapes_follow(struct polyline_set *p, bool scale)
+{
+    for (size_t l = 0; l < p->n_line && p->shape != NULL; l++) {
+        const float mean = mean_shape_radius(p, l), shift = p->radius[l] - mean, factor = p->radius[l] / mean;
+        for (size_t i = p->first[l]; i < p->first[l + 1]; i++) {
+            struct fiber_shape *s = &p->shape[i];
+            s->radius = scale ? s->radius * factor : s->radius + shift;
+            if (scale) s->radius_se *= factor;
+        }
+    }
+}
+
 status polyline_add_part(struct polyline_set *p, const struct polyline_set *from, size_t line, size_t i, size_t end,
                          struct error *err)
 {
-    status s = polyline_begin_like(p, from, line, err);
-    for (; i < end && s == STATUS_OK; i++) s = polyline_add(p, from->vertex[i], err);
+    status s = from->shape != NULL && p->shape == NULL ? polyline_shapes_init(p, err) : STATUS_OK;
+    if (s == STATUS_OK) s = polyline_begin_like(p, from, line, err);
+    for (; i < end && s == STATUS_OK; i++) {
+        s = polyline_add(p, from->vertex[i], err);
+        if (s == STATUS_OK && from->shape != NULL) p->shape[p->n_vertex - 1] = from->shape[i];
+    }
+    if (s == STATUS_OK && from->shape != NULL) p->radius[p->n_line - 1] = mean_shape_radius(p, p->n_line - 1);
     return s;
 }
 

@@ -4,6 +4,7 @@
 #define SELVEDGE_GEOMETRY_POLYLINE_H
 
 #include "base/status.h"
+#include "geometry/fibers/fiber_shape.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -14,6 +15,7 @@ struct polyline_set {
     float (*vertex)[3];
     uint8_t *axis; /* per line: index of the subvolume (slice frame) it was found in; later its axis class */
     float *radius; /* per line: radius of the fiber, voxels; 0 while it is not known */
+    struct fiber_shape *shape; /* per vertex: measured sections, whose mean radius is that of the line; NULL: none */
 };
 
 void polyline_set_init(struct polyline_set *p);
@@ -23,7 +25,12 @@ void polyline_set_release(struct polyline_set *p);
 status polyline_begin(struct polyline_set *p, uint8_t axis, struct error *err);
 status polyline_begin_like(struct polyline_set *p, const struct polyline_set *from, size_t line, struct error *err);
 status polyline_add(struct polyline_set *p, const float x[3], struct error *err);
-/* Copies vertices i .. end - 1 (indices in from->vertex) of a line of `from` as a new line. */
+/* Gives every vertex a disc of the radius of its line. Vertices that are added later begin as discs of no radius.
+ * STATUS_NO_MEMORY. */
+status polyline_shapes_init(struct polyline_set *p, struct error *err);
+/* Makes the mean radius of the sections of each line that of the line, where both were changed apart. */
+void polyline_shapes_follow(struct polyline_set *p, bool scale);
+/* Copies vertices i .. end - 1 (indices in from->vertex) of a line of `from` as a new line, with their sections. */
 status polyline_add_part(struct polyline_set *p, const struct polyline_set *from, size_t line, size_t i, size_t end,
                          struct error *err);
 /* Adds the lines of `from` to p without the marked vertices (one mark for each), in pieces of at least min_vertex.
@@ -33,6 +40,12 @@ status polylines_without(const struct polyline_set *from, const bool *mark, size
 /* Unit tangent at vertex i of a line, by the difference of the vertices `reach` before and after it, or of its ends. */
 void polyline_tangent(const struct polyline_set *p, size_t line, size_t i, size_t reach, float t[3]);
 static inline size_t polyline_length(const struct polyline_set *p, size_t i) { return p->first[i + 1] - p->first[i]; }
+
+/* Radius in the middle of the segment of a line that begins at vertex i. */
+static inline float polyline_segment_radius(const struct polyline_set *p, size_t line, size_t i)
+{
+    return p->shape != NULL ? 0.5f * (p->shape[i].radius + p->shape[i + 1].radius) : p->radius[line];
+}
 
 /* The vertices sorted by the cells of a grid, for neighbour searches. */
 struct vertex_grid {

@@ -86,7 +86,7 @@ static status take_lines(struct segment_bricks *s, const struct polyline_set *li
             memcpy(g->b, lines->vertex[i + 1], sizeof g->b);
             g->line = (uint32_t)l;
             g->axis = lines->axis[l];
-            g->radius = lines->radius[l];
+            g->radius = polyline_segment_radius(lines, l, i);
             g->is_first = i == lines->first[l];
             g->is_last = i + 2 == lines->first[l + 1];
         }
@@ -122,7 +122,8 @@ status segment_bricks_from_fibers(struct segment_bricks *s, const struct fiber_s
             }
             g->line = (uint32_t)l;
             g->axis = f->axis_class[l];
-            g->radius = (float)((double)f->radius_m[l] / voxel_size_m[0]);
+            g->radius = (float)(0.5 * ((double)fiber_radius_m(f, l, i) + (double)fiber_radius_m(f, l, i + 1)) /
+                                voxel_size_m[0]);
             g->is_first = i == f->first_vertex[l];
             g->is_last = i + 2 == f->first_vertex[l + 1];
         }

@@ -11,7 +11,7 @@
 struct segment {
     float a[3], b[3];
     uint32_t line;
-    float radius; /* of the line, voxels; 0 if it is not known */
+    float radius; /* of the line, or in its middle where it varies, voxels; 0 if it is not known */
     uint8_t axis;
     bool is_first, is_last; /* first or last segment of its line */
 };

@@ -110,6 +110,8 @@ static void add_hair(const struct fiber_set *from, size_t i, double grown, struc
     out->radius_m[to] = out->radius_m[fiber];
     out->axis_class[to] = out->axis_class[fiber];
     out->group[to] = out->group[fiber];
+    for (size_t k = out->first_vertex[to]; out->shape != NULL && k < out->first_vertex[to + 1]; k++)
+        out->shape[k] = fiber_shape_disc(out->radius_m[to]);
 }
 
 /* ---- all of them ---- */
@@ -134,7 +136,9 @@ static void copy_fibers(const struct fiber_set *from, const double *value, struc
     memcpy(out->tile_size_m, from->tile_size_m, sizeof out->tile_size_m);
     for (size_t i = 0; i < from->n_fiber; i++) {
         const size_t first = from->first_vertex[i], n = from->first_vertex[i + 1] - first;
-        out->radius_m[i] = (float)((double)from->radius_m[i] * value[CORRECT_RADIUS]);
+        out->radius_m[i] = from->radius_m[i];
+        if (from->shape != NULL) memcpy(out->shape + first, from->shape + first, n * sizeof *out->shape);
+        fiber_set_scale_radius(out, i, value[CORRECT_RADIUS]);
         if (value[CORRECT_SMOOTHING] > 0.0)
             smooth_fiber(from->position_m + 3 * first, n, value[CORRECT_SMOOTHING] * um, out->position_m + 3 * first);
         else
@@ -161,6 +165,7 @@ status fiber_correct(const struct fiber_set *from, const double value[CORRECTION
     double n_hair = value[CORRECT_HAIRS] * from->tile_size_m[0] * from->tile_size_m[1] * mm2_per_m2;
     size_t n = (size_t)ceil(n_hair);
     s = fiber_set_reserve(out, from->n_fiber + n, from->n_vertex + n * (HAIR_SEGMENTS + 1), err);
+    if (s == STATUS_OK && from->shape != NULL) s = fiber_set_add_shapes(out, err);
     if (s != STATUS_OK) return s;
     copy_fibers(from, value, out);
     for (size_t i = 0; i < n; i++) add_hair(from, i, fmax(fmin(n_hair - (double)i, 1.0), 1e-3), out, from->n_fiber + i);

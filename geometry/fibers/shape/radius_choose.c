@@ -77,5 +77,10 @@ void polylines_set_radii(struct polyline_set *lines, const struct radius_measure
     for (size_t l = 0; l < lines->n_line; l++) {
         uint8_t a = lines->axis[l];
         lines->radius[l] = (float)(single ? scale[a] * (double)lines->radius[l] : m->radius_voxel[a]);
+        for (size_t i = lines->first[l]; !single && lines->shape != NULL && i < lines->first[l + 1]; i++) {
+            lines->shape[i].radius = lines->radius[l];
+            lines->shape[i].radius_se = 0.0f;
+        }
     }
+    if (single) polyline_shapes_follow(lines, true);
 }

@@ -155,9 +155,12 @@ static void bounce_at(struct walk *w, const struct scene_hit *hit, const struct 
     b->hit = *hit;
     memcpy(b->offset_mm, ray->offset_mm, sizeof b->offset_mm);
     const bool flat = w->s->model->flat_section;
+    float section[3];
     const bool bent = (flat || w->s->discrepancy != NULL) && scene_bent_normal(w->s->scene, hit, b->normal);
     if (!flat)
         fiber_frame_from(&b->frame, hit->tangent);
+    else if (scene_section_normal(w->s->scene, hit, section))
+        fiber_frame_flat_in(&b->frame, hit->tangent, section);
     else if (bent)
         fiber_frame_flat_in(&b->frame, hit->tangent, b->normal);
     else

@@ -132,7 +132,7 @@ static void add_to_model(const struct axis_model *m, struct axis_scratch *s, con
 
 /* Sums of shared_sum for one plane of the brick. */
 struct plane_sum {
-    lanes gradient[4], normal[10], square, weight;
+    lanes gradient[4], normal[10], square, weight, slope;
 };
 
 /* Finds residual and weight of LANES voxels, of which n are in the brick, and adds those with fibers to the sums. */
@@ -158,6 +158,7 @@ static void compare_lanes(const struct axis_model *m, struct axis_scratch *s, si
     lanes_to_rows(of, s->model + at);
     sum->square += weighted * e;
     sum->weight += weight;
+    sum->slope += weight * (4.0f * q - 3.0f);
     for (int a = 0, i = 0; a < 4; a++) {
         sum->gradient[a] += weighted * by[a];
         for (int b = 0; b <= a; b++, i++) sum->normal[i] += weight * by[a] * by[b];
@@ -168,6 +169,7 @@ static void add_plane(const struct plane_sum *plane, struct shared_sum *sum)
 {
     sum->square += (double)lanes_sum(plane->square);
     sum->weight += (double)lanes_sum(plane->weight);
+    sum->slope += (double)lanes_sum(plane->slope);
     for (int a = 0, i = 0; a < 4; a++) {
         sum->gradient[a] += (double)lanes_sum(plane->gradient[a]);
         for (int b = 0; b <= a; b++, i++) {

@@ -1,6 +1,7 @@
 #include "geometry/fibers/shape/axes/axis_fit.h"
 #include "geometry/fibers/shape/axes/axis_brick.h"
 #include "geometry/fibers/shape/axes/axis_solve.h"
+#include "geometry/fibers/shape/axes/shape_measure.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -33,6 +34,7 @@ static void add_shared(struct shared_sum *to, const struct shared_sum *from)
 {
     to->square += from->square;
     to->weight += from->weight;
+    to->slope += from->slope;
     for (int a = 0; a < 4; a++) {
         to->gradient[a] += from->gradient[a];
         for (int c = 0; c < 4; c++) to->normal[a][c] += from->normal[a][c];
@@ -57,6 +59,7 @@ struct fit_work {
     struct radius_sum *radius;    /* per line */
     double *length;
     struct shared_sum shared;
+    double hold; /* of the sections to discs */
 };
 
 static void release_work(struct fit_work *w)
@@ -135,13 +138,14 @@ static status make_step(struct fit_job *job, struct polyline_set *lines, struct 
             axis_scatter(&w->total[lines->first[l]].radius_gradient, sizeof *w->total / sizeof(float),
                          polyline_length(lines, l), (size_t)fmax(2.0, PIECE_DIAMETERS * diameter));
     axis_profile_step(profile, &shared, w->radius, w->length, lines->n_line, diameter, lines->radius);
+    polyline_shapes_follow(lines, false);
     double sd = profile->measured_curvature ? axis_curvature_sd(lines, diameter) : AXIS_CURVATURE_MOST / diameter;
     double variance = shared.weight > 0.0 ? shared.square / shared.weight : 1.0, stiffness = variance / (sd * sd);
     state_error(axis_information(w->total, lines->n_vertex), variance, stiffness, profile);
     status s = STATUS_OK;
+    w->hold = variance / (FLATNESS_SD * FLATNESS_SD);
     if (w->section != NULL)
-        s = fiber_sections_solve(lines, w->section, SECTION_DIAMETERS * diameter,
-                                 variance / (FLATNESS_SD * FLATNESS_SD), profile->section, err);
+        s = fiber_sections_solve(lines, w->section, SECTION_DIAMETERS * diameter, w->hold, profile->section, err);
     return s == STATUS_OK ? axis_solve_lines(lines, w->total, stiffness, pool, err) : s;
 }
 
@@ -150,7 +154,7 @@ static void find_reach(const struct polyline_set *lines, const struct section_vi
 {
     for (size_t l = 0, n = 0; l < lines->n_line; l++)
         for (size_t i = lines->first[l]; i + 1 < lines->first[l + 1]; i++, n++)
-            reach[n] = (view != NULL ? view[n].stretch : 1.0f) * lines->radius[l] + tail + ROUNDING;
+            reach[n] = (view != NULL ? view[n].stretch : 1.0f) * polyline_segment_radius(lines, l, i) + tail + ROUNDING;
 }
 
 /* Prepares the sections of all segments. */
@@ -265,6 +269,17 @@ status polylines_fit(struct polyline_set *lines, const struct volume *v, double 
     for (int round = 0; round < n_round && s == STATUS_OK; round++)
         s = one_round(job, lines, &work, diameter_voxel, pool, progress, err);
     if (s == STATUS_OK) *profile = job->model.profile;
+    if (s == STATUS_OK && n_round > 0 && profile->section != NULL && profile->measure != NULL) {
+        const struct shape_sums sums = {.pull = work.total,
+                                        .section = work.section,
+                                        .sections = profile->section,
+                                        .diameter = diameter_voxel,
+                                        .section_length = SECTION_DIAMETERS * diameter_voxel,
+                                        .section_hold = work.hold,
+                                        .slope = fmax(0.2, work.shared.slope / work.shared.weight)};
+        fiber_sections_turn(lines, profile->section);
+        s = fiber_shapes_measure(lines, &sums, profile->measure, err);
+    }
     release_work(&work);
     free_job(job, n_thread);
     return s;

@@ -7,6 +7,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+struct shape_measure;
+
 struct axis_profile {
     double blur;      /* voxels */
     double low, high; /* densities of void and fiber */
@@ -14,6 +16,7 @@ struct axis_profile {
      * about to break, which holds back no line that still has to find its fiber. */
     bool measured_curvature;
     struct fiber_section *section; /* of each vertex of the lines, refined too; NULL: discs */
+    struct shape_measure *measure; /* with sections: the last round leaves them with their errors in lines->shape */
     double independent; /* share of the voxels that have values of their own; below 1 where they are interpolated */
     /* Written by the fit: mean radius (voxels, by length), standard deviation of the fibers' radii without the part of
      * errors by white noise (relative), root mean square of the errors of single fibers (relative). */
@@ -40,6 +43,7 @@ void axis_table_init(struct axis_table *t);
 struct shared_sum {
     double normal[4][4], gradient[4];
     double square, weight; /* of the residuals */
+    double slope;          /* sum of the derivatives of weight times residual by the residual */
 };
 
 /* Normal equation of the radius of one line, and the terms that it has in common with the shared ones. */

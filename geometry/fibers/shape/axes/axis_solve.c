@@ -14,6 +14,7 @@ void axis_pull_add(struct axis_pull *to, const struct axis_pull *from)
 {
     for (int i = 0; i < 6; i++) to->normal[i] += from->normal[i];
     for (int i = 0; i < 3; i++) to->gradient[i] += from->gradient[i];
+    to->radius_normal += from->radius_normal;
     to->radius_gradient += from->radius_gradient;
 }
 

@@ -14,7 +14,7 @@ struct axis_pull {
     float radius_normal, radius_gradient, radius_cross[4];
 };
 
-/* Adds the terms of a position, and the gradient of the radius. */
+/* Adds the terms of a position, and those of the radius without the shared ones. */
 void axis_pull_add(struct axis_pull *to, const struct axis_pull *from);
 /* Mean information of the data on one component of the position of a vertex. */
 double axis_information(const struct axis_pull *total, size_t n_vertex);

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BAND = 5 }; /* the diagonal and four below it: second differences of two components */
+enum { BAND = SECTION_BAND }; /* the diagonal and four below it: second differences of two components */
 /* Bounds of the half logarithm of the ratio of axes (a ratio of 4), and of one step of a component. */
 static const double FLATNESS_MOST = 0.69, STEP_MOST = 0.2;
 
@@ -104,27 +104,38 @@ static double information(const struct section_pull *pull, size_t n_vertex)
     return fmax(sum / fmax(1.0, (double)n_vertex), 1e-12);
 }
 
-/* Fills the banded matrix m and the right-hand side x of a line of n vertices. */
-static void fill_line(const struct section_pull *q, const struct fiber_section *section, size_t n, double stiffness,
-                      double hold, double (*m)[BAND], double *x)
+static const double second[3] = {1.0, -2.0, 1.0};
+
+/* Fills the banded matrix m of a line of n vertices. */
+static void fill_matrix(const struct section_pull *q, size_t n, double stiffness, double hold, double (*m)[BAND])
 {
+    memset(m, 0, 2 * n * sizeof *m);
     for (size_t i = 0; i < n; i++) {
-        const double at[2] = {(double)section[i].c, (double)section[i].s};
         m[2 * i][0] += (double)q[i].normal[0] + hold;
         m[2 * i + 1][0] += (double)q[i].normal[2] + hold;
         m[2 * i + 1][1] += (double)q[i].normal[1];
+    }
+    for (size_t i = 0; i + 2 < n; i++)
+        for (size_t a = 0; a < 2; a++)
+            for (size_t r = 0; r < 3; r++)
+                for (size_t c = 0; c <= r; c++) m[2 * (i + r) + a][2 * (r - c)] += stiffness * second[r] * second[c];
+}
+
+/* Fills the right-hand side x of a line of n vertices. */
+static void fill_line(const struct section_pull *q, const struct fiber_section *section, size_t n, double stiffness,
+                      double hold, double *x)
+{
+    memset(x, 0, 2 * n * sizeof *x);
+    for (size_t i = 0; i < n; i++) {
+        const double at[2] = {(double)section[i].c, (double)section[i].s};
         for (size_t a = 0; a < 2; a++) x[2 * i + a] += (double)q[i].gradient[a] - hold * at[a];
     }
-    static const double second[3] = {1.0, -2.0, 1.0};
     for (size_t i = 0; i + 2 < n; i++) {
         const struct fiber_section *q3 = section + i;
         const double bend[2] = {(double)q3[0].c - 2.0 * (double)q3[1].c + (double)q3[2].c,
                                 (double)q3[0].s - 2.0 * (double)q3[1].s + (double)q3[2].s};
         for (size_t a = 0; a < 2; a++)
-            for (size_t r = 0; r < 3; r++) {
-                x[2 * (i + r) + a] -= stiffness * second[r] * bend[a];
-                for (size_t c = 0; c <= r; c++) m[2 * (i + r) + a][2 * (r - c)] += stiffness * second[r] * second[c];
-            }
+            for (size_t r = 0; r < 3; r++) x[2 * (i + r) + a] -= stiffness * second[r] * bend[a];
     }
 }
 
@@ -139,19 +150,37 @@ static void step_line(const double *x, size_t n, struct fiber_section *section)
     }
 }
 
+double fiber_sections_stiffness(const struct section_pull *pull, size_t n_vertex, double length)
+{
+    return pow(length, 4.0) * information(pull, n_vertex);
+}
+
+bool fiber_section_variance(const struct section_pull *pull, size_t n, double stiffness, double hold, double *m,
+                            double (*variance)[3])
+{
+    double(*row)[BAND] = (double(*)[BAND])m;
+    fill_matrix(pull, n, stiffness, hold, row);
+    if (!small_invert_banded(m, 2 * n, BAND)) return false;
+    for (size_t i = 0; i < n; i++) {
+        variance[i][0] = row[2 * i][0];
+        variance[i][1] = row[2 * i + 1][1];
+        variance[i][2] = row[2 * i + 1][0];
+    }
+    return true;
+}
+
 status fiber_sections_solve(const struct polyline_set *lines, const struct section_pull *pull, double length,
                             double hold, struct fiber_section *section, struct error *err)
 {
-    const double stiffness = pow(length, 4.0) * information(pull, lines->n_vertex);
+    const double stiffness = fiber_sections_stiffness(pull, lines->n_vertex, length);
     size_t longest = 0;
     for (size_t l = 0; l < lines->n_line; l++)
         if (polyline_length(lines, l) > longest) longest = polyline_length(lines, l);
     double(*m)[BAND] = malloc((2 * longest + 1) * sizeof *m), *x = malloc((2 * longest + 1) * sizeof *x);
     for (size_t l = 0; l < lines->n_line && m != NULL && x != NULL; l++) {
         size_t n = polyline_length(lines, l), first = lines->first[l];
-        memset(m, 0, 2 * n * sizeof *m);
-        memset(x, 0, 2 * n * sizeof *x);
-        fill_line(pull + first, section + first, n, stiffness, hold, m, x);
+        fill_matrix(pull + first, n, stiffness, hold, m);
+        fill_line(pull + first, section + first, n, stiffness, hold, x);
         if (small_solve_banded(m[0], 2 * n, BAND, x)) step_line(x, n, section + first);
     }
     bool failed = m == NULL || x == NULL;

@@ -53,4 +53,14 @@ struct section_pull {
 status fiber_sections_solve(const struct polyline_set *lines, const struct section_pull *pull, double length,
                             double hold, struct fiber_section *section, struct error *err);
 
+/* Elements of the banded matrix for each component of a section. */
+enum { SECTION_BAND = 5 };
+/* Weight of the penalty on second differences that smooths over `length` vertices. */
+double fiber_sections_stiffness(const struct section_pull *pull, size_t n_vertex, double length);
+/* The inverse of the matrix of the normal equations of one line of n vertices: its elements cc, cs and ss at each
+ * vertex, which are the variances of c and s for a noise of 1 where the penalties describe the fiber. m: room for
+ * 2 SECTION_BAND n numbers. Returns false where the matrix is not positive definite. */
+bool fiber_section_variance(const struct section_pull *pull, size_t n, double stiffness, double hold, double *m,
+                            double (*variance)[3]);
+
 #endif

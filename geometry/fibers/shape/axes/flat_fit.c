@@ -9,8 +9,6 @@ enum {
     N_WITHOUT = 5, /* rounds of the fit without suspects */
     LEAST_PIECE = 2
 };
-/* Mean ratio of axes from which on a cloth has flat fibers. */
-static const double FLAT = 1.15;
 /* Distance of the axes over the sum of the radii below which the shorter line is a suspect. */
 static const double SUSPECT = 1.0;
 /* Share of the way from an axis to its outline within which another line is a part of the same fiber. */
@@ -155,7 +153,7 @@ static status decide(struct flat_work *w, const size_t n_voxel[3], size_t *n_rem
     return s;
 }
 
-/* Moves the lines that cover suspects to where they were fitted without them, with the radius found there. */
+/* Moves the lines that cover suspects to where they were fitted without them, with radius and sections found there. */
 static void take_rest(struct flat_work *w)
 {
     for (size_t l = 0; l < w->rest.n_line; l++) {
@@ -163,8 +161,10 @@ static void take_rest(struct flat_work *w)
         if (!w->covers[line]) continue;
         if (2 * polyline_length(&w->rest, l) > polyline_length(w->lines, line))
             w->lines->radius[line] = w->rest.radius[l];
-        for (size_t i = first; i < w->rest.first[l + 1]; i++)
+        for (size_t i = first; i < w->rest.first[l + 1]; i++) {
             memcpy(w->lines->vertex[w->origin[i]], w->rest.vertex[i], sizeof *w->rest.vertex);
+            w->section[w->origin[i]] = w->rest_section[i];
+        }
     }
 }
 
@@ -182,14 +182,31 @@ static status remove_parts(struct flat_work *w, const struct flat_fit *f, const 
     if (s == STATUS_OK) s = decide(w, f->v->n, n_removed, err);
     if (s == STATUS_OK) {
         take_rest(w);
-        s = polylines_without(w->lines, w->suspect, f->min_vertex, &kept, NULL, err);
+        s = polylines_without(w->lines, w->suspect, f->min_vertex, &kept, w->origin, err);
     }
     if (s == STATUS_OK) {
+        for (size_t i = 0; i < kept.n_vertex; i++) w->section[i] = w->section[w->origin[i]]; /* origins rise */
         polyline_set_release(w->lines);
         *w->lines = kept;
         polyline_set_init(&kept);
     }
     polyline_set_release(&kept);
+    return s;
+}
+
+/* Leaves the sections with their errors in the lines: a radius that varies is nearly a linear change of the model, so
+ * one round at the varied radii is enough. again: lines have changed since the last measurement. */
+static status measure_shapes(struct flat_work *w, const struct flat_fit *f, struct axis_profile *profile, bool again,
+                             struct error *err)
+{
+    status s = STATUS_OK;
+    profile->section = w->section;
+    profile->measure = f->measure;
+    if (again) s = polylines_fit(w->lines, f->v, f->diameter_voxel, 1, profile, f->pool, f->progress, err);
+    if (s == STATUS_OK && f->measure->n_varying > 0)
+        s = polylines_fit(w->lines, f->v, f->diameter_voxel, 1, profile, f->pool, f->progress, err);
+    profile->section = NULL;
+    profile->measure = NULL;
     return s;
 }
 
@@ -202,11 +219,14 @@ status polylines_fit_flat(struct polyline_set *lines, const struct flat_fit *f, 
     if (!flat_work_init(&w, lines))
         s = error_set(err, STATUS_NO_MEMORY, "cannot fit the sections of fibers: out of memory");
     profile->section = w.section;
+    profile->measure = f->measure;
     if (s == STATUS_OK)
         s = polylines_fit(lines, f->v, f->diameter_voxel, f->n_round, profile, f->pool, f->progress, err);
     profile->section = NULL;
+    profile->measure = NULL;
     if (s == STATUS_OK) measure_ratio(&w, ratio);
-    if (s == STATUS_OK && ratio->mean > FLAT) s = remove_parts(&w, f, profile, &ratio->n_removed, err);
+    if (s == STATUS_OK && ratio->mean > FIBER_RATIO_FLAT) s = remove_parts(&w, f, profile, &ratio->n_removed, err);
+    if (s == STATUS_OK && f->measure != NULL) s = measure_shapes(&w, f, profile, ratio->n_removed > 0, err);
     flat_work_release(&w);
     return s;
 }

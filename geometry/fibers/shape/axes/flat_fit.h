@@ -9,6 +9,7 @@
 #define SELVEDGE_GEOMETRY_FLAT_FIT_H
 
 #include "geometry/fibers/shape/axes/axis_fit.h"
+#include "geometry/fibers/shape/axes/shape_measure.h"
 
 /* Ratios of the axes of the fibers' sections. Discs come out as up to some 1.1, because noise is never negative. */
 struct section_ratio {
@@ -23,9 +24,11 @@ struct flat_fit {
     size_t min_vertex; /* shorter pieces that a removal leaves are dropped */
     struct thread_pool *pool;
     const struct progress *progress;
+    struct shape_measure *measure; /* NULL, or the sections with their errors are left in lines->shape */
 };
 
-/* As polylines_fit, with profile->section NULL. STATUS_CANCELLED, STATUS_NO_MEMORY. */
+/* As polylines_fit, with profile->section NULL. Where radii are found to vary along lines, and after a removal, another
+ * round of the fit precedes the last measurement. STATUS_CANCELLED, STATUS_NO_MEMORY. */
 status polylines_fit_flat(struct polyline_set *lines, const struct flat_fit *f, struct axis_profile *profile,
                           struct section_ratio *ratio, struct error *err);
 

@@ -4,6 +4,7 @@
 #include "geometry/phantom/phantom.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/report/cloth/result_geometry.h"
+#include "optimizer/worker/report/cloth/section_report.h"
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/report/result_pictures.h"
 #include "renderer/image/image.h"
@@ -89,6 +90,12 @@ static void print_plot(struct pipeline_context *c, const struct fiber_lengths *l
     fiber_lengths_plot(l, fmax(c->fiber.tile_size_m[0], c->fiber.tile_size_m[1]), out);
 }
 
+static void print_sections(struct pipeline_context *c, const struct fiber_lengths *l, FILE *out)
+{
+    (void)l;
+    section_report_plot(c, out);
+}
+
 /* Writes pictures/top.png: the heights of the fibers of one tile, seen from above with y up. */
 static status write_top(struct pipeline_context *c, struct error *err)
 {
@@ -117,6 +124,8 @@ status quality_write(struct pipeline_context *c, struct error *err)
     status s = fiber_lengths_measure(&c->fiber, &l, err);
     if (s == STATUS_OK) s = write_top(c, err);
     if (s == STATUS_OK) s = write_printed(c, &l, "pictures/fiber-lengths.svg", print_plot, err);
+    if (s == STATUS_OK && section_report_applies(c))
+        s = write_printed(c, &l, "pictures/fiber-sections.svg", print_sections, err);
     if (s == STATUS_OK) s = write_json(c, &l, err);
     if (s == STATUS_OK) s = write_text(c, "quality.css", style, strlen(style), err);
     return s == STATUS_OK ? write_printed(c, &l, "quality.html", quality_page, err) : s;

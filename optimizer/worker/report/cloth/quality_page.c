@@ -2,6 +2,7 @@
 #include "geometry/volume/tile_crop.h"
 #include "optimizer/job/option_key.h"
 #include "optimizer/worker/report/cloth/quality.h"
+#include "optimizer/worker/report/cloth/section_report.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -261,6 +262,7 @@ void quality_page(struct pipeline_context *c, const struct fiber_lengths *l, FIL
         fputs("</p>\n", out);
     }
     print_fibers(c, l, out);
+    section_report_table(c, out);
     if (c->doc->has_volume) print_scan(c, out);
     print_trial(&c->geometry.trial, out);
     print_seam(c, out);

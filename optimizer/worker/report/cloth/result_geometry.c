@@ -1,6 +1,7 @@
 #include "optimizer/worker/report/cloth/result_geometry.h"
 #include "base/angle.h"
 #include "optimizer/worker/report/cloth/result_cloth.h"
+#include "optimizer/worker/report/cloth/section_report.h"
 #include "optimizer/worker/report/cloth/weave_json.h"
 #include "optimizer/worker/report/json_number.h"
 
@@ -175,6 +176,7 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     double radius = 0.0;
     for (size_t i = 0; i < c->fiber.n_fiber; i++) radius += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
     json_object_set_new(json, "mean_radius_um", json_number(radius * um));
+    json_object_set_new(json, "sections", section_report_json(c));
     json_object_set_new(json, "groups", groups_json(c));
     json_object_set_new(json, "seam_fibers", seam_fibers_json(g));
     const double *number = c->number.i_shown > 0 ? c->number.shown : NULL; /* fitted ones; else those of the document */

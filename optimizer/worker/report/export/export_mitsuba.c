@@ -17,7 +17,7 @@ static void print_fiber(FILE *text, const struct export_scene *e, size_t i)
     double p[3];
     for (size_t k = 0; k < export_n_point(e, i); k++) {
         export_point(e, i, k, p);
-        fprintf(text, "%.6f %.6f %.6f %.6f\n", p[0], p[1], p[2], export_radius_mm(e, i));
+        fprintf(text, "%.6f %.6f %.6f %.6f\n", p[0], p[1], p[2], export_point_radius_mm(e, i, k));
     }
     fputc('\n', text);
 }

@@ -65,6 +65,13 @@ void export_point(const struct export_scene *e, size_t i, size_t k, double p_mm[
     }
 }
 
+double export_point_radius_mm(const struct export_scene *e, size_t i, size_t k)
+{
+    const struct fiber_set *f = &e->c->fiber;
+    const size_t first = f->first_vertex[i], last = f->first_vertex[i + 1] - 1, v = k == 0 ? first : first + k - 1;
+    return mm * (double)fiber_radius_m(f, i, v < last ? v : last);
+}
+
 double export_radius_mm(const struct export_scene *e, size_t i) { return mm * (double)e->c->fiber.radius_m[i]; }
 
 void export_fibers_name(size_t group, const char *ending, char name[32])

@@ -47,7 +47,9 @@ bool export_fiber_in(const struct export_scene *e, size_t i, size_t group);
  * second difference. */
 size_t export_n_point(const struct export_scene *e, size_t i);
 void export_point(const struct export_scene *e, size_t i, size_t k, double p_mm[3]);
+/* Mean radius of fiber i, and its radius at point k. */
 double export_radius_mm(const struct export_scene *e, size_t i);
+double export_point_radius_mm(const struct export_scene *e, size_t i, size_t k);
 /* "fibers-<group><ending>" */
 void export_fibers_name(size_t group, const char *ending, char name[32]);
 /* Writes the file of that name, with each fiber of the group as `print` does. */

@@ -27,14 +27,16 @@ static void print_counts(FILE *text, const struct export_scene *e, size_t group)
 
 static void print_widths(FILE *text, const struct export_scene *e, size_t group)
 {
+    const bool varies = e->c->fiber.shape != NULL;
     const char *comma = "";
     fprintf(text, "                float[] widths = [");
     for (size_t i = 0; i < e->c->fiber.n_fiber; i++)
-        if (export_fiber_in(e, i, group)) {
-            fprintf(text, "%s%.6f", comma, 2.0 * export_radius_mm(e, i));
+        for (size_t k = 0; export_fiber_in(e, i, group) && k < (varies ? export_n_point(e, i) : 1); k++) {
+            fprintf(text, "%s%.6f", comma, 2.0 * export_point_radius_mm(e, i, k));
             comma = ", ";
         }
-    fprintf(text, "] (\n                    interpolation = \"uniform\"\n                )\n");
+    fprintf(text, "] (\n                    interpolation = \"%s\"\n                )\n",
+            varies ? "vertex" : "uniform");
 }
 
 /* Also the box of the points, wider by the radius. */
@@ -49,8 +51,8 @@ static void print_points(FILE *text, const struct export_scene *e, size_t group)
             export_point(e, i, k, p);
             fprintf(text, "%s(%.6f, %.6f, %.6f)", comma, p[0], p[1], p[2]);
             for (int a = 0; a < 3; a++) {
-                low[a] = fmin(low[a], p[a] - export_radius_mm(e, i));
-                high[a] = fmax(high[a], p[a] + export_radius_mm(e, i));
+                low[a] = fmin(low[a], p[a] - export_point_radius_mm(e, i, k));
+                high[a] = fmax(high[a], p[a] + export_point_radius_mm(e, i, k));
             }
         }
     }

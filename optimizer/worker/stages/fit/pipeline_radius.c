@@ -21,7 +21,7 @@ static const double budget_share = 0.12, least_paths_a_row = 21000.0;
 struct search {
     struct pipeline_context *c;
     struct worker_series *series;
-    float *radius_m; /* original radii of the cloth */
+    struct fiber_set original; /* the cloth before the search */
     size_t n_done;
     double u[NOISY_MAX_POINT], param[NOISY_MAX_POINT][FIT_MAX_PARAM];
 };
@@ -33,9 +33,15 @@ static double mean_radius_m(const struct fiber_set *f)
     return sum / (double)f->n_fiber;
 }
 
-static void scale_radii(struct fiber_set *f, const float *radius_m, double factor)
+/* Gives f the radii of `from`, which has the same fibers (or is f itself), times a factor. */
+static void scale_radii(struct fiber_set *f, const struct fiber_set *from, double factor)
 {
-    for (size_t i = 0; i < f->n_fiber; i++) f->radius_m[i] = (float)((double)radius_m[i] * factor);
+    for (size_t i = 0; i < f->n_fiber; i++) {
+        const size_t first = f->first_vertex[i], n = f->first_vertex[i + 1] - first;
+        f->radius_m[i] = from->radius_m[i];
+        if (f->shape != NULL && from != f) memcpy(f->shape + first, from->shape + first, n * sizeof *f->shape);
+        fiber_set_scale_radius(f, i, factor);
+    }
 }
 
 /* Starts each fit at the result of the one at the nearest radius. */
@@ -116,7 +122,7 @@ static status evaluate(void *context, double u, double *f, double *se, struct er
     snprintf(name, sizeof name, "radius-%02zu.journal", q->n_done);
     snprintf(message, sizeof message, "fiber radius: trying %.4g um", exp(u) / um);
     worker_status_message(c->status, message);
-    scale_radii(&c->fiber, q->radius_m, exp(u) / c->radius.start_m);
+    scale_radii(&c->fiber, &q->original, exp(u) / c->radius.start_m);
     status s = pipeline_make_surface_scene(c, err);
     if (s != STATUS_OK) return s;
     s = pipeline_trace_open(&trace, c, "fit", name, c->radius.i_model, &c->fitted, err);
@@ -167,9 +173,9 @@ static void report_radius(struct pipeline_context *c)
 
 bool pipeline_radius_used(const struct pipeline_radius *r) { return r->curve.determined || r->curve.at_bound; }
 
-static status use_radius(struct pipeline_context *c, const float *radius_m, struct error *err)
+static status use_radius(struct pipeline_context *c, const struct fiber_set *from, struct error *err)
 {
-    scale_radii(&c->fiber, radius_m, c->radius.radius_m / c->radius.start_m);
+    scale_radii(&c->fiber, from, c->radius.radius_m / c->radius.start_m);
     return pipeline_make_scene(c, err);
 }
 
@@ -207,16 +213,15 @@ static void warn_of_range(struct pipeline_context *c)
 status pipeline_radius_search(struct pipeline_context *c, struct worker_series *series, struct error *err)
 {
     struct search q = {.c = c, .series = series};
-    size_t n_bytes = c->fiber.n_fiber * sizeof *q.radius_m;
     memset(&c->radius, 0, sizeof c->radius);
     c->radius.start_m = mean_radius_m(&c->fiber);
     while (c->model[c->radius.i_model].appearance.kind != MODEL_SURFACE) c->radius.i_model++;
     status s = check_range(c, err);
     if (s != STATUS_OK) return s;
     warn_of_range(c);
-    q.radius_m = malloc(n_bytes);
-    if (q.radius_m == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot look for the fiber radius: out of memory");
-    memcpy(q.radius_m, c->fiber.radius_m, n_bytes);
+    fiber_set_init(&q.original);
+    s = fiber_set_copy(&c->fiber, &q.original, err);
+    if (s != STATUS_OK) goto out;
     const struct noisy_minimum_option option = {.lower = log(c->radius.lower_m),
                                                 .upper = log(c->radius.upper_m),
                                                 .n_first = FIRST_POINTS,
@@ -227,9 +232,10 @@ status pipeline_radius_search(struct pipeline_context *c, struct worker_series *
     if (s == STATUS_OK) {
         conclude(c);
         report_radius(c);
-        s = use_radius(c, q.radius_m, err);
+        s = use_radius(c, &q.original, err);
     }
-    free(q.radius_m);
+out:
+    fiber_set_release(&q.original);
     return s;
 }
 
@@ -237,5 +243,5 @@ status pipeline_radius_apply(struct pipeline_context *c, struct error *err)
 {
     warn_of_range(c);
     report_radius(c);
-    return use_radius(c, c->fiber.radius_m, err);
+    return use_radius(c, &c->fiber, err);
 }

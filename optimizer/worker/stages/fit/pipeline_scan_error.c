@@ -66,7 +66,7 @@ static status make_scene(const struct scan_trace *t, const double *number, struc
     fiber_set_init(&fiber);
     status s = fiber_set_copy(&t->c->fiber, &fiber, err);
     if (s != STATUS_OK) return s;
-    for (size_t i = 0; i < fiber.n_fiber; i++) fiber.radius_m[i] = (float)((double)fiber.radius_m[i] * number[RADIUS]);
+    for (size_t i = 0; i < fiber.n_fiber; i++) fiber_set_scale_radius(&fiber, i, number[RADIUS]);
     noise.direction_sd_rad *= sqrt(number[NOISE]);
     fiber_roughen(&fiber, &noise);
     s = pipeline_fiber_scene(t->c, &fiber, scene, err);

@@ -12,6 +12,7 @@ static uint64_t fingerprint(const struct pipeline_context *c, size_t i_model)
     uint32_t sum = (uint32_t)crc32_z(0, (const void *)f->position_m, 3 * f->n_vertex * sizeof *f->position_m);
     sum = (uint32_t)crc32_z(sum, (const void *)f->radius_m, f->n_fiber * sizeof *f->radius_m);
     sum = (uint32_t)crc32_z(sum, (const void *)f->group, f->n_fiber);
+    if (f->shape != NULL) sum = (uint32_t)crc32_z(sum, (const void *)f->shape, f->n_vertex * sizeof *f->shape);
     sum = (uint32_t)crc32_z(sum, (const void *)id, strlen(id));
     if (c->model[i_model].appearance.kind == MODEL_VOLUME)
         sum = (uint32_t)crc32_z(sum, (const void *)c->direction.density, volume_n_voxel(c->direction.n));

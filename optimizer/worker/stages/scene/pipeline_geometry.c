@@ -340,8 +340,9 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
                                      {f->position_m, 3 * f->n_vertex * sizeof *f->position_m},
                                      {f->radius_m, f->n_fiber * sizeof *f->radius_m},
                                      {f->axis_class, f->n_fiber},
-                                     {f->group, f->n_fiber}};
-    return work_file_write(path, "fibers.3", section, 11, err);
+                                     {f->group, f->n_fiber},
+                                     {f->shape, f->shape != NULL ? f->n_vertex * sizeof *f->shape : 0}};
+    return work_file_write(path, "fibers.4", section, 12, err);
 }
 
 status stage_fibers_load(struct pipeline_context *c, struct error *err)
@@ -361,14 +362,17 @@ status stage_fibers_load(struct pipeline_context *c, struct error *err)
                                      {NULL, 0},
                                      {NULL, 0},
                                      {NULL, 0},
+                                     {NULL, 0},
                                      {NULL, 0}};
-    s = work_file_read(path, "fibers.3", section, 11, err);
+    s = work_file_read(path, "fibers.4", section, 12, err);
     if (s != STATUS_OK) return s;
     f.first_vertex = section[6].data;
     f.position_m = section[7].data;
     f.radius_m = section[8].data;
     f.axis_class = section[9].data;
     f.group = section[10].data;
+    f.shape = section[11].n_bytes > 0 ? section[11].data : NULL;
+    if (f.shape == NULL) free(section[11].data);
     fiber_set_release(&c->fiber);
     c->fiber = f;
     return STATUS_OK;

@@ -268,6 +268,37 @@ static void test_table_of_sections(void **state)
     fiber_set_release(&f);
 }
 
+/* A taper lowers the radius by its share and raises it again, closes at the faces, and is what the scan draws; the
+ * true ratio and long axis are those of the scan's second moments. */
+static void test_sections_along_a_fiber(void **state)
+{
+    (void)state;
+    const struct phantom_section_law law = {.seed = 4, .aspect = 3.0, .turns_per_m = 5e3, .taper = 0.4};
+    struct fiber_set f = straight_fiber(7.0);
+    assert_int_equal(phantom_section_shapes(&law, &f, NULL), STATUS_OK);
+    float least = INFINITY, most = 0.0f;
+    for (size_t k = 0; k < f.n_vertex; k++) {
+        least = fminf(least, f.shape[k].radius);
+        most = fmaxf(most, f.shape[k].radius);
+    }
+    assert_true(fabs((double)most / (7.0 * voxel_m) - 1.0) < 0.01 && fabs((double)(least / most) - 0.6) < 0.01);
+    assert_true(fabsf(f.shape[0].radius / f.shape[f.n_vertex - 1].radius - 1.0f) < 1e-4f);
+    struct volume v = scan_of(&f, &(struct phantom_scan_option){.voxel_size_m = voxel_m, .section = law});
+    for (size_t i = 2; i + 2 < n_voxel[0]; i++) {
+        double m[3], area = moments(&v, i, m);
+        const struct fiber_shape *s = &f.shape[i];
+        const double r = (double)(s->radius + f.shape[i + 1].radius) / (2.0 * voxel_m);
+        assert_true(fabs(area / (M_PI * r * r) - 1.0) < 0.03);
+        const double half = 0.5 * (m[0] - m[2]), spread = sqrt(half * half + m[1] * m[1]), mean = 0.5 * (m[0] + m[2]);
+        assert_true(fabs(sqrt((mean + spread) / (mean - spread)) / (double)s->ratio - 1.0) < 0.05);
+        const double angle = 0.5 * atan2(m[1], half),
+                     cosine = cos(angle) * (double)s->long_axis[1] + sin(angle) * (double)s->long_axis[2];
+        assert_true(fabs(cosine) > 0.99); /* the section turns by 1.8 degrees from vertex to vertex */
+    }
+    volume_release(&v);
+    fiber_set_release(&f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -277,6 +308,7 @@ int main(void)
         cmocka_unit_test(test_noise_is_correlated),
         cmocka_unit_test(test_hardening_and_fringes),
         cmocka_unit_test(test_radii_spread),
+        cmocka_unit_test(test_sections_along_a_fiber),
         cmocka_unit_test(test_wrong_options_are_named),
         cmocka_unit_test_setup_teardown(test_table_of_sections, scratch_folder_setup, scratch_folder_teardown),
     };

@@ -66,7 +66,7 @@ static void add_fibers(const struct raster *r, const struct fiber_set *f)
             for (int k = 0; k < 2; k++)
                 for (size_t a = 0; a < 3; a++)
                     p[k][a] = mm * ((double)f->position_m[3 * (v + (size_t)k) + a] - (a == 2 ? r->z_high_m : 0.0));
-            add_segment(r, p[0], p[1], mm * (double)f->radius_m[i]);
+            add_segment(r, p[0], p[1], 0.5 * mm * (double)(fiber_radius_m(f, i, v) + fiber_radius_m(f, i, v + 1)));
         }
 }
 

@@ -1,0 +1,25 @@
+/* Compares the sections along reconstructed fibers with true ones: radius, ratio of axes, turn of the long axis, and
+ * whether the stated errors are those that were made. */
+#ifndef SELVEDGE_GEOMETRY_COMPARE_SECTIONS_H
+#define SELVEDGE_GEOMETRY_COMPARE_SECTIONS_H
+
+#include "geometry/fibers/fiber_set.h"
+
+/* Over vertices of found fibers that lie within the radius of a true fiber. A pull is the median of |error| over the
+ * standard error, divided by that of a normal variable, 0.6745: 1 where the stated errors are right. Root mean squares
+ * contain places where a line follows no fiber. NaN where there are no values. */
+struct section_compare {
+    size_t n;
+    double radius_rms;                 /* of found / true - 1, with the radius at the vertex */
+    double mean_radius_rms;            /* the same with the mean radius of the found fiber */
+    double radius_bias, radius_pull;   /* mean of found / true - 1; the pull is that of the rest */
+    double ratio_bias, ratio_rms;      /* of found / true - 1 */
+    double ratio_median, ratio_pull;   /* median of |found / true - 1| */
+    double turn_median_deg, turn_pull; /* where the true ratio is above 1.3 */
+};
+
+/* Figures are 0 or NaN where the found set has no sections. STATUS_NO_MEMORY. */
+status compare_sections(const struct fiber_set *truth, const struct fiber_set *found, struct section_compare *out,
+                        struct error *err);
+
+#endif

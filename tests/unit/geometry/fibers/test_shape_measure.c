@@ -1,0 +1,180 @@
+/* Sections along fibers with their errors (geometry/fibers/shape/axes/shape_measure.h), on fibers of known sections:
+ * radius, ratio of axes and turn of the long axis differ from the truth by as much as their errors say, for white and
+ * for correlated noise, and a radius counts as varying only where it does. */
+#include "base/rng.h"
+#include "geometry/fibers/shape/axes/flat_fit.h"
+#include "geometry/phantom/phantom_section.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+/* A fiber along x in the middle of the volume. */
+struct test_fiber {
+    double ratio, taper, radius; /* the radius falls by 2 taper from one end to the other; radius: its mean, voxels */
+    double turn_rad;             /* over the whole length */
+};
+
+enum { LENGTH = 200, WIDTH = 26 };
+
+static double radius_at(const struct test_fiber *f, double x)
+{
+    return f->radius * (1.0 + f->taper * (1.0 - 2.0 * x / LENGTH));
+}
+
+static double angle_at(const struct test_fiber *f, double x) { return -0.4 + f->turn_rad * x / LENGTH; }
+
+/* Independent noise, or means over cubes of two voxels of it, with the same standard deviation. */
+static void add_noise(struct volume *v, double sd, bool correlated, uint64_t seed)
+{
+    const size_t n = volume_n_voxel(v->n);
+    float *white = malloc(n * sizeof *white);
+    struct rng rng;
+    assert_non_null(white);
+    rng_start(&rng, &(struct rng_key){.seed = seed}, 0, 0);
+    for (size_t i = 0; i < n; i++) {
+        double normal[2];
+        rng_normal_pair(&rng, normal);
+        white[i] = (float)normal[0];
+    }
+    for (size_t k = 0; k < v->n[2]; k++)
+        for (size_t j = 0; j < v->n[1]; j++)
+            for (size_t i = 0; i < v->n[0]; i++) {
+                double sum = 0.0;
+                for (size_t c = 0; c < 8; c++)
+                    sum += (double)white[volume_index(v->n, (i + (c & 1)) % v->n[0], (j + (c >> 1 & 1)) % v->n[1],
+                                                      (k + (c >> 2)) % v->n[2])];
+                const size_t at = volume_index(v->n, i, j, k);
+                v->density[at] += (float)(sd * (correlated ? sum / sqrt(8.0) : (double)white[at]));
+            }
+    free(white);
+}
+
+static void draw(struct volume *v, const struct test_fiber *f)
+{
+    const struct phantom_section section = {.aspect = f->ratio};
+    for (size_t k = 0; k < v->n[2]; k++)
+        for (size_t j = 0; j < v->n[1]; j++)
+            for (size_t i = 0; i < v->n[0]; i++) {
+                const double x = (double)i + 0.5, y = (double)j + 0.5 - 13.1, z = (double)k + 0.5 - 12.8,
+                             c = cos(angle_at(f, x)), s = sin(angle_at(f, x));
+                v->density[volume_index(v->n, i, j, k)] =
+                    (float)phantom_section_share(&section, radius_at(f, x), c * y + s * z, c * z - s * y);
+            }
+}
+
+/* Sums over some vertices of some fibers. */
+struct pulls {
+    double radius, ratio, angle, n, radius_error, ratio_error, angle_error;
+    size_t n_varying;
+};
+
+/* Errors of the radius count without their mean over the fiber, which the model of the blur shares with all fibers. */
+static void add_pulls(const struct polyline_set *lines, const struct test_fiber *f, struct pulls *p)
+{
+    double shift = 0.0, n = 0.0;
+    for (size_t i = 12; i + 12 < lines->n_vertex; i++, n += 1.0)
+        shift += (double)lines->shape[i].radius - radius_at(f, (double)lines->vertex[i][0]);
+    shift /= n;
+    for (size_t i = 12; i + 12 < lines->n_vertex; i += 14) {
+        const struct fiber_shape *s = &lines->shape[i];
+        const double x = (double)lines->vertex[i][0], angle = atan2((double)s->long_axis[2], (double)s->long_axis[1]);
+        const double turn = remainder(angle - angle_at(f, x), M_PI), ratio = (double)s->ratio - f->ratio,
+                     radius = (double)s->radius - shift - radius_at(f, x);
+        p->radius += pow(radius / (double)s->radius_se, 2.0);
+        p->ratio += pow(ratio / (double)s->ratio_se, 2.0);
+        p->angle += pow(turn / (double)s->angle_se_rad, 2.0);
+        p->radius_error += radius * radius;
+        p->ratio_error += ratio * ratio;
+        p->angle_error += turn * turn;
+        p->n += 1.0;
+    }
+}
+
+static struct pulls measure(const struct test_fiber *f, double noise, bool correlated, int n_fiber)
+{
+    const size_t n[3] = {LENGTH, WIDTH, WIDTH};
+    const double voxel_m[3] = {2e-6, 2e-6, 2e-6};
+    struct pulls p = {0};
+    for (int k = 0; k < n_fiber; k++) {
+        struct volume v;
+        struct polyline_set lines;
+        struct section_ratio found;
+        struct shape_measure m;
+        struct axis_profile profile = {.radius = 3.2,
+                                       .radius_spread = 0.3,
+                                       .blur = 0.8,
+                                       .high = 1.0,
+                                       .independent = 1.0,
+                                       .measured_curvature = true};
+        assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
+        draw(&v, f);
+        add_noise(&v, noise, correlated, (uint64_t)(k + 1));
+        polyline_set_init(&lines);
+        assert_int_equal(polyline_begin(&lines, 0, NULL), STATUS_OK);
+        lines.radius[0] = 3.2f;
+        for (int i = 0; i < LENGTH; i++)
+            assert_int_equal(polyline_add(&lines, (float[3]){(float)i + 0.5f, 13.4f, 12.6f}, NULL), STATUS_OK);
+        const struct flat_fit fit = {&v, 7.0, 6, 4, NULL, NULL, &m};
+        assert_int_equal(polylines_fit_flat(&lines, &fit, &profile, &found, NULL), STATUS_OK);
+        assert_int_equal(lines.n_line, 1);
+        assert_non_null(lines.shape);
+        p.n_varying += m.n_varying;
+        add_pulls(&lines, f, &p);
+        polyline_set_release(&lines);
+        volume_release(&v);
+    }
+    return p;
+}
+
+static void test_errors_are_those_found(void **state)
+{
+    (void)state;
+    enum { N = 8 };
+    static const struct test_fiber fiber[] = {{1.6, 0.0, 3.5, 0.8}, {2.5, 0.0, 3.5, 0.8}, {1.6, 0.15, 3.5, 0.8}};
+    for (size_t i = 0; i < sizeof fiber / sizeof *fiber; i++)
+        for (int correlated = 0; correlated < 2; correlated++) {
+            const struct pulls p = measure(&fiber[i], 0.2, correlated == 1, N);
+            const double radius = sqrt(p.radius / p.n), ratio = sqrt(p.ratio / p.n), turn = sqrt(p.angle / p.n);
+            print_message("ratio %.1f, taper %.2f, %s noise: %zu of %d vary; pulls of radius %.2f, ratio %.2f, turn "
+                          "%.2f; errors %.3f voxels, %.3f, %.2f degrees\n",
+                          fiber[i].ratio, fiber[i].taper, correlated ? "correlated" : "white", p.n_varying, N, radius,
+                          ratio, turn, sqrt(p.radius_error / p.n), sqrt(p.ratio_error / p.n),
+                          sqrt(p.angle_error / p.n) * 180.0 / M_PI);
+            /* a section that is flat and tapers has errors of the model beside those of the noise */
+            assert_true(ratio > 0.7 && ratio < (fiber[i].taper > 0.0 ? 2.0 : 1.5) && turn > 0.7 && turn < 1.5);
+            assert_true(sqrt(p.ratio_error / p.n) < 0.05 && sqrt(p.angle_error / p.n) < 0.03);
+            if (fiber[i].taper > 0.0) {
+                assert_int_equal(p.n_varying, N);
+                assert_true(radius > 0.7 && radius < 1.4 && sqrt(p.radius_error / p.n) < 0.03);
+            } else {
+                assert_int_equal(p.n_varying, 0);
+            }
+        }
+}
+
+/* A disc comes out as one, and its radius varies only where it does. */
+static void test_discs(void **state)
+{
+    (void)state;
+    enum { N = 8 };
+    static const double taper[3] = {0.0, 0.01, 0.12};
+    for (int k = 0; k < 3; k++) {
+        const struct test_fiber f = {1.0, taper[k], 3.5, 0.0};
+        const struct pulls p = measure(&f, 0.2, k == 0, N);
+        print_message("disc, taper %.2f: %zu of %d vary, ratio off by %.3f, pull of the radius %.2f\n", taper[k],
+                      p.n_varying, N, sqrt(p.ratio_error / p.n), sqrt(p.radius / p.n));
+        assert_int_equal(p.n_varying, taper[k] > 0.1 ? N : 0); /* 1 % is below what counts as variation */
+        assert_true(sqrt(p.ratio_error / p.n) < 0.04);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_errors_are_those_found), cmocka_unit_test(test_discs)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
