@@ -121,6 +121,8 @@ static const struct cli_option {
      offsetof(struct cli_args, method)},
     {OPT_PICTURE, 0, "reference", NULL, "compare it with path tracing (default: --method fast)",
      offsetof(struct cli_args, reference)},
+    {OPT_PICTURE, 0, "filter", NULL, "also make a filtered view with less noise, for the eye",
+     offsetof(struct cli_args, filter)},
     {OPT_PICTURE, 0, "width-mm", "MM", "width of what it shows (default: 40)", offsetof(struct cli_args, width_mm)},
     {OPT_PICTURE, 0, "size-mm", "MM", "edge of the flat or draped piece, length of the cylinder (default: 40)",
      offsetof(struct cli_args, size_mm)},

@@ -58,6 +58,7 @@ struct cli_args {
     const char *state, *verdict, *tag, *sample, *days;   /* of list */
     bool watch, json, follow, draft, align, once, yes;
     bool reference; /* --reference: of a picture */
+    bool filter;    /* --filter: of a picture */
     bool help;      /* --help was given: for one command if has_command is set */
     bool version;
     bool has_command;

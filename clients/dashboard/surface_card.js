@@ -4,10 +4,12 @@ import { getJson, raw } from "./server_link.js";
 
 const degrees = (x) => `${Number((x ?? 0).toFixed(1))}°`;
 
-function captionOf(wanted, entry) {
+function captionOf(wanted, entry, asRendered) {
   const samples = wanted.samples ?? 16, whole = entry.samples >= samples;
   return [
     el("div", { class: "row" }, el("b", {}, entry.on), whole ? null : el("span", { class: "tag" }, `${entry.samples} of ${samples} samples`)),
+    !entry.filtered ? null : el("div", { class: "row filtered", title: "a joint filter has smoothed this preview; the numbers are those of the picture as it was rendered" },
+      el("span", {}, "filtered preview"), el("a", { href: asRendered, target: "_blank" }, "as rendered")),
     el("div", { class: "row" }, el("span", {}, "light"), el("span", {}, `θ ${degrees(wanted.light_theta_deg)}  φ ${degrees(wanted.light_phi_deg)}`)),
     el("div", { class: "row" }, el("span", {}, "camera"), el("span", {}, `θ ${degrees(wanted.camera_theta_deg)}  φ ${degrees(wanted.camera_phi_deg)}`)),
     el("div", { class: "row", title: "root mean square of the pixels' standard errors over the mean brightness" },
@@ -17,7 +19,7 @@ function captionOf(wanted, entry) {
   ];
 }
 
-const soFar = (entry) => `${entry.samples} ${Boolean(entry.reference)}`;
+const soFar = (entry) => `${entry.samples} ${Boolean(entry.reference)} ${Boolean(entry.filtered)}`;
 
 export class SurfacePictures {
   #job;
@@ -46,8 +48,9 @@ export class SurfacePictures {
   async #show(i, wanted) {
     const url = `${this.#job}/results/pictures/on-${i + 1}`, entry = await getJson(`${url}.json`), before = this.#shown[i];
     if (before?.soFar === soFar(entry)) return;
-    const address = URL.createObjectURL(await (await raw("GET", `${url}.png`)).blob());
-    const figure = el("figure", {}, el("a", { href: `${url}.png`, target: "_blank" }, el("img", { src: address, alt: `the cloth, ${entry.on}` })), el("figcaption", {}, captionOf(wanted, entry)));
+    const shown = entry.filtered ? `${url}-filtered.png` : `${url}.png`, alt = `the cloth, ${entry.on}${entry.filtered ? ", filtered" : ""}`;
+    const address = URL.createObjectURL(await (await raw("GET", shown)).blob());
+    const figure = el("figure", {}, el("a", { href: shown, target: "_blank" }, el("img", { src: address, alt })), el("figcaption", {}, captionOf(wanted, entry, `${url}.png`)));
     this.#shown[i] = { soFar: soFar(entry), figure, address };
     if (before) URL.revokeObjectURL(before.address);
     this.#node.replaceChildren(el("section", { class: "card", id: "surfaces" }, el("h2", {}, "The cloth on surfaces"),

@@ -91,6 +91,7 @@ struct job_surface_picture {
     size_t px, sample;
     enum job_picture_method method;
     bool reference; /* also path by path, and compared with that */
+    bool filter;    /* also filtered for the eye (renderer/preview) */
 };
 
 /* What a kind of yarn in the document counts or names; 0 fibers: not given. */

@@ -36,8 +36,8 @@ bool dual_front_of(const struct dual_setting *s, const struct dual_hit *h, const
                    struct dual_front *front)
 {
     struct scene_ray ray;
-    struct count c = {s, front};
     *front = (struct dual_front){.transmitted = {1, 1, 1}};
+    struct count c = {s, front};
     if (scene_sheet_hides(s->path.scene, direction)) return false;
     if (s->path.model->across_width)
         scene_ray_leave_across(&h->hit, h->offset_mm, direction, rng_float(rng), &ray);
@@ -76,7 +76,7 @@ void dual_scattering(const struct dual_setting *s, const struct dual_hit *h, con
 static void add_light(const struct dual_setting *s, const struct dual_hit *h, const float direction[3],
                       const float light[3], struct rng *rng, float radiance[3])
 {
-    struct dual_front front;
+    struct dual_front front = {.n_fiber = 0};
     float wi[3], s_rgb[3];
     if (!(light[0] + light[1] + light[2] > 0) || !dual_front_of(s, h, direction, rng, &front)) return;
     fiber_frame_to_local(&h->frame, direction, wi);

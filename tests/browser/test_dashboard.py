@@ -282,7 +282,7 @@ def test_pictures_grow_on_the_page(real, browser, tmp_path):
     view = {"light_theta_deg": 45, "light_phi_deg": 0, "camera_theta_deg": 45, "camera_phi_deg": 180, "width_mm": 3}
     (tmp_path / "job.json").write_text(json.dumps({
         "sample": "on surfaces", "fibers": {"file": "cloth.hair"},
-        "pictures": [{"on": "cylinder", "radius_mm": 1, **view, "px": 32, "samples": 16, "method": "fast", "reference": True},
+        "pictures": [{"on": "cylinder", "radius_mm": 1, **view, "px": 32, "samples": 16, "method": "fast", "reference": True, "filter": True},
                      {"on": "flat", **view, "px": 32, "samples": 2048}],
         "fit": {"fixed": {"C_R": [0.1] * 3, "C_TT": [0.6, 0.4, 0.3], "beta_R": 6, "beta_TT": 12, "gamma_TT": 30}, "model": "two_lobe.v1"}}))
     job = selvedge.Client(url).submit(str(tmp_path / "job.json"))
@@ -299,6 +299,9 @@ def test_pictures_grow_on_the_page(real, browser, tmp_path):
     apart = job.result().raw["pictures"][0]["reference"]["field_difference_rms"]
     assert abs(float(text_of(browser, "#surfaces .reference").split("tracing")[1].split()[0]) - 100 * apart) < 0.06 * 100 * apart + 0.06
     assert browser.execute_script("return [...document.querySelectorAll('#surfaces img')].every(i => i.complete && i.naturalWidth === 32)")
+    assert texts(browser, "#surfaces .filtered") == ["filtered preview\nas rendered"], "one of both asks for it"
+    links = browser.execute_script("return [...document.querySelectorAll('#surfaces figure:first-child a')].map(a => a.getAttribute('href'))")
+    assert [href.rsplit("/", 1)[1] for href in links] == ["on-1-filtered.png", "on-1.png"], links
     keep(browser, "pictures")
     assert complaints(browser) == []
 

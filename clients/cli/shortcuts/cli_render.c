@@ -70,6 +70,7 @@ static status read_picture(const struct cli_args *a, json_t *picture, const char
     const char *method = a->method == NULL && a->reference ? "fast" : a->method;
     if (method != NULL) json_object_set_new(picture, "method", json_string(method));
     if (a->reference) json_object_set_new(picture, "reference", json_true());
+    if (a->filter) json_object_set_new(picture, "filter", json_true());
     bool yes;
     if (s == STATUS_OK) s = read_yes("black-sheet", a->black_sheet, &yes, err);
     if (s == STATUS_OK && a->black_sheet != NULL) json_object_set_new(picture, "black_sheet", json_boolean(yes));

@@ -110,6 +110,13 @@ const struct job_option option_rows_pictures[] = {
      .meaning =
          "Whether the picture is also rendered path by path, with as many samples. The result states how far the "
          "two are apart. Needs a `method` other than `path`."},
+    {.path = "pictures[].filter",
+     .kind = OPTION_BOOL,
+     OF_PICTURE(filter),
+     .standard = "false",
+     .meaning = "Whether a filtered view is made beside the picture, in which less noise is seen: "
+                "`pictures/on-1-filtered.png`. It is a preview for the eye. The picture itself, its numbers and its "
+                "OpenEXR file stay as they were rendered."},
     {.path = "twin",
      .kind = OPTION_SECTION,
      .left_out = "none",

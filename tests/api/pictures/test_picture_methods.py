@@ -52,16 +52,43 @@ def test_dual_scattering_is_a_method_like_the_others(tmp_path):
         jsonschema.Draft202012Validator(json.load(text)).validate(json.loads((folder / "results/result.json").read_text()))
 
 
+def test_a_filtered_view_stands_beside_the_picture(tmp_path):
+    """The same picture with and without it: only the file and its mark differ. What is lost of it is made again."""
+    made, view = {}, {"on": "cylinder", "radius_mm": 1, "width_mm": 3, **VIEW}
+    for name, filtered in (("with", True), ("without", False)):
+        folder = tmp_path / name
+        (folder / "input").mkdir(parents=True)
+        given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "pictures": [{**view, "filter": filtered}],
+                 "fit": {"model": "two_lobe.v1", "fixed": {"C_R": [0.1] * 3, "C_TT": [0.6] * 3, "beta_R": 6, "beta_TT": 12, "gamma_TT": 30}}}
+        (folder / "job.json").write_text(json.dumps(given))
+        (folder / "input/cloth.hair").write_bytes(hair(layers=3))
+        run_worker(folder)
+        made[name] = folder / "results/pictures"
+    a, b = (json.loads((made[name] / "on-1.json").read_text()) for name in ("with", "without"))
+    assert a.pop("filtered") == {"file": "pictures/on-1-filtered.png", "filter": "joint.v1"} and a == b
+    for file in ("on-1.exr", "on-1.png", "on-1-columns.csv"):
+        assert (made["with"] / file).read_bytes() == (made["without"] / file).read_bytes()
+    png = (made["with"] / "on-1-filtered.png").read_bytes()
+    assert png.startswith(b"\x89PNG") and png != (made["with"] / "on-1.png").read_bytes()
+    assert not (made["without"] / "on-1-filtered.png").exists()
+    (made["with"] / "on-1-filtered.png").unlink()
+    (made["with"] / "on-1.json").write_text(json.dumps(a))
+    (tmp_path / "with/work/report.done").unlink()
+    run_worker(tmp_path / "with")
+    assert (made["with"] / "on-1-filtered.png").read_bytes() == png and "filtered" in json.loads((made["with"] / "on-1.json").read_text())
+
+
 def test_fibers_without_tables_are_path_traced(tmp_path):
     folder = tmp_path / "job"
     (folder / "input").mkdir(parents=True)
-    given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "pictures": [{"on": "flat", **VIEW, "method": "dual"}],
+    given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "pictures": [{"on": "flat", **VIEW, "method": "dual", "filter": True}],
              "fit": {"model": "microflake.v1", "density_multiplier_per_cm": 3000, "fixed": {"alpha": [0.9, 0.8, 0.7], "gamma": 0.3}}}
     (folder / "job.json").write_text(json.dumps(given))
     (folder / "input/cloth.hair").write_bytes(hair(layers=3))
     run_worker(folder)
     result = json.loads((folder / "results/result.json").read_text())
     assert result["pictures"][0]["method"] == "path" and any("no tables" in w for w in result["warnings"]), result["warnings"]
+    assert "filtered" not in result["pictures"][0] and any("picture 1 is not filtered" in w for w in result["warnings"])
 
 
 def test_a_sheet_of_its_own_has_no_tables(tmp_path):

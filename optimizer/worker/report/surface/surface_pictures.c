@@ -7,6 +7,7 @@
 #include "optimizer/worker/report/result_thumbnail.h"
 #include "optimizer/worker/report/surface/surface_cloth.h"
 #include "optimizer/worker/report/surface/surface_difference.h"
+#include "optimizer/worker/report/surface/surface_filter.h"
 #include "optimizer/worker/report/surface/surface_passes.h"
 #include "optimizer/worker/report/surface/surface_tables.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
@@ -28,6 +29,7 @@ struct one_picture {
     size_t i;
     const char *entry_path;
     struct surface_method how;
+    const struct surface_tables *tables;
 };
 
 static double paths_of(const struct job_surface_picture *p)
@@ -151,14 +153,18 @@ static status write_json(struct pipeline_context *c, const char *path, const jso
 /* The entry of result.json lies beside the picture and is written last: a picture is finished when its entry has all
  * samples. *out: the entry, of which the caller has a reference. */
 static status write_entry(struct pipeline_context *c, const struct one_picture *one,
-                          const struct surface_passes *so_far, json_t **out, struct error *err)
+                          const struct surface_filter *filter, const struct surface_passes *so_far,
+                          const struct progress *progress, json_t **out, struct error *err)
 {
     const struct job_surface_picture *p = &c->doc->surface_picture[one->i];
     double exposure = exposure_of(&so_far->image);
+    json_t *filtered = NULL;
     status s = write_picture(c, p, so_far, exposure, err);
+    if (s == STATUS_OK) s = surface_filter_write(c, filter, so_far, exposure, progress, &filtered, err);
     if (s != STATUS_OK) return s;
     json_decref(*out);
     *out = picture_json(one, p, so_far, exposure);
+    if (filtered != NULL) json_object_set_new(*out, "filtered", filtered);
     return write_json(c, one->entry_path, *out, err);
 }
 
@@ -167,12 +173,14 @@ static status render_picture(struct pipeline_context *c, const struct one_pictur
                              const struct progress *progress, struct surface_passes *so_far, json_t **entry,
                              struct error *err)
 {
-    status s = STATUS_OK;
+    struct surface_filter filter;
+    status s = surface_filter_init(c, one->i, q, one->tables, progress, &filter, err);
     while (s == STATUS_OK && so_far->n_sample < q->n_sample) {
         s = surface_passes_add(c, q, progress, so_far, err);
-        if (s == STATUS_OK) s = write_entry(c, one, so_far, entry, err);
+        if (s == STATUS_OK) s = write_entry(c, one, &filter, so_far, progress, entry, err);
     }
-    if (s == STATUS_OK && *entry == NULL) s = write_entry(c, one, so_far, entry, err);
+    if (s == STATUS_OK && *entry == NULL) s = write_entry(c, one, &filter, so_far, progress, entry, err);
+    surface_filter_release(&filter);
     return s;
 }
 
@@ -237,10 +245,11 @@ static status render(struct pipeline_context *c, const struct one_picture *one, 
 }
 
 /* Whether an entry of an earlier attempt has all that the document asks for. */
-static bool is_finished(const json_t *entry, const struct job_surface_picture *p)
+static bool is_finished(const json_t *entry, const struct job_surface_picture *p, bool has_fibers)
 {
     const char *method = json_string_value(json_object_get(entry, "method"));
     if (json_integer_value(json_object_get(entry, "samples")) != (json_int_t)p->sample) return false;
+    if (p->filter && has_fibers && json_object_get(entry, "filtered") == NULL) return false;
     return !p->reference || method == NULL || strcmp(method, method_name[JOB_PICTURE_PATH]) == 0 ||
            json_object_get(entry, "reference") != NULL;
 }
@@ -250,16 +259,18 @@ static status write_one(struct pipeline_context *c, size_t i, const struct surfa
 {
     const struct job_surface_picture *p = &c->doc->surface_picture[i];
     char name[32], relative[64], path[WORKER_PATH_BYTES];
+    const bool has_fibers = c->model[pipeline_best_model(c)].appearance.kind == MODEL_SURFACE;
     struct surface_passes so_far;
     snprintf(name, sizeof name, "on-%zu", i + 1);
     snprintf(relative, sizeof relative, "pictures/%s.json", name);
     worker_folder_path(c->folder, JOB_FOLDER_RESULTS, relative, path);
     json_t *entry = json_load_file(path, 0, NULL);
-    if (entry != NULL && is_finished(entry, p))
+    if (entry != NULL && is_finished(entry, p, has_fibers))
         return json_array_append_new(c->surface_pictures, entry) == 0 ? STATUS_OK : STATUS_NO_MEMORY;
     json_decref(entry);
     entry = NULL;
-    const struct one_picture one = {.i = i, .entry_path = path, .how = surface_tables_method(tables, p)};
+    const struct one_picture one = {
+        .i = i, .entry_path = path, .how = surface_tables_method(tables, p), .tables = tables};
     status s = surface_passes_start(c, name, p->px, p->px, &so_far, err);
     if (s == STATUS_OK) s = render(c, &one, progress, &so_far, &entry, err);
     if (s == STATUS_OK)

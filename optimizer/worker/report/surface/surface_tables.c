@@ -20,10 +20,13 @@ static bool wants_tables(const struct pipeline_context *c)
     return false;
 }
 
-static bool wants_averages(const struct pipeline_context *c)
+/* Filters take the albedo of fibers from the averages. */
+static bool wants_averages(const struct pipeline_context *c, bool of_filters)
 {
-    for (size_t i = 0; i < c->doc->n_surface_picture; i++)
-        if (c->doc->surface_picture[i].method == JOB_PICTURE_DUAL) return true;
+    for (size_t i = 0; i < c->doc->n_surface_picture; i++) {
+        const struct job_surface_picture *p = &c->doc->surface_picture[i];
+        if (p->method == JOB_PICTURE_DUAL || (of_filters && p->filter)) return true;
+    }
     return false;
 }
 
@@ -58,12 +61,14 @@ status surface_tables_get(struct pipeline_context *c, const struct progress *pro
                           struct error *err)
 {
     const struct pipeline_model *model = &c->model[pipeline_best_model(c)];
-    const bool tables = wants_tables(c), averages = wants_averages(c);
+    const bool tables = wants_tables(c), averages = wants_averages(c, true);
     *t = (struct surface_tables){0};
     if (!tables && !averages) return STATUS_OK;
     if (model->appearance.kind != MODEL_SURFACE || model->appearance.surface->flat_section) {
-        worker_status_warn(c->status, "all pictures are rendered path by path: there are no tables for the model '%s'",
-                           model->appearance.id);
+        if (tables || wants_averages(c, false))
+            worker_status_warn(c->status,
+                               "all pictures are rendered path by path: there are no tables for the model '%s'",
+                               model->appearance.id);
         return STATUS_OK;
     }
     status s = STATUS_OK;

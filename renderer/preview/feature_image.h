@@ -1,0 +1,28 @@
+/* What the pixels of a picture see: means over a few eye's rays, and the variances of these means. */
+#ifndef SELVEDGE_RENDERER_FEATURE_IMAGE_H
+#define SELVEDGE_RENDERER_FEATURE_IMAGE_H
+
+#include "base/thread_pool.h"
+#include "renderer/dual/dual_tables.h"
+#include "renderer/image/image.h"
+#include "renderer/scene/configuration.h"
+#include "renderer/scene/scene.h"
+
+/* Albedo of the fiber in rgb, its normal in the cloth's frame, and the distance from the plane of the crop over its
+ * width. 0 where nothing is seen. */
+enum { FEATURE_ALBEDO = 0, FEATURE_NORMAL = 3, FEATURE_DISTANCE = 6, N_FEATURE = 7 };
+
+struct feature_request {
+    const struct scene *scene;
+    const struct dual_tables *averages; /* NULL: the albedo is 1 */
+    const struct configuration *configuration;
+    size_t width, height, n_sample; /* rays a pixel, at least 2 */
+    uint64_t seed;
+};
+
+/* im: initialised here with 2 N_FEATURE channels, means before variances; released on failure. STATUS_INVALID,
+ * STATUS_NO_MEMORY, STATUS_CANCELLED. */
+status feature_image_render(const struct feature_request *q, struct thread_pool *pool, const struct progress *progress,
+                            struct image *im, struct error *err);
+
+#endif
