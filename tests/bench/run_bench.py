@@ -50,6 +50,7 @@ def bench_programs(build):
     for name in sorted(os.listdir(folder)) if os.path.isdir(folder) else []:
         if name.startswith("bench_"):
             subprocess.run([os.path.join(folder, name)], check=True)
+    subprocess.run([os.path.join(folder, "models", "bench_models")], check=True)
 
 
 def bench_service(build):

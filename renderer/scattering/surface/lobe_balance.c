@@ -1,5 +1,7 @@
 #include "renderer/scattering/surface/lobe_balance.h"
 
+#include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { N = LOBE_BALANCE_N };
@@ -121,16 +123,4 @@ double lobe_balance_at_entry(const double *f, int i)
     double before = f[k > 0 ? k - 1 : 1];
     return j == k ? (9 * (f[k] + f[k + 1]) - before - f[k + 2]) / 16
                   : (before - 5 * f[k] + 15 * f[k + 1] + 5 * f[k + 2]) / 16;
-}
-
-/* The tables are read by straight lines, which lie above a convex function, on the average by step^2 f'' / 12: taken
- * off beforehand, as energy would grow by it near the poles of narrow lobes. */
-void lobe_balance_level_lines(struct scattering_state *s, int lobe)
-{
-    float before = s->normal[1].value[lobe]; /* even */
-    for (int i = 0; i < TWO_LOBE_N_TABLE; i++) {
-        float here = s->normal[i].value[lobe], bend = before - 2 * here + s->normal[i + 1].value[lobe];
-        before = here;
-        s->normal[i].value[lobe] = here - bend / 12;
-    }
 }

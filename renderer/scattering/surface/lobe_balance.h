@@ -1,6 +1,6 @@
 /* Balancing of longitudinal lobes: the symmetric scales a(th) and b(th) that make a lobe g(th_o; -th_i, beta)
- * reciprocal and lossless from both sides. two_lobe_balanced.c states the equations. Shared by two_lobe_balanced.v1 and
- * textile.v3.
+ * reciprocal and lossless from both sides. two_lobe_balanced.c states the equations. Shared by two_lobe_balanced.v1,
+ * textile.v3 and dielectric.v1.
  *
  * Functions of an angle are tabulated at LOBE_BALANCE_N equidistant nodes over [0, pi/2]; all are even. Double
  * precision.
@@ -8,9 +8,7 @@
 #ifndef SELVEDGE_RENDERER_LOBE_BALANCE_H
 #define SELVEDGE_RENDERER_LOBE_BALANCE_H
 
-#include "renderer/scattering/surface/two_lobe_core.h"
-
-enum { LOBE_BALANCE_N = TWO_LOBE_N_TABLE / 2 + 1 };
+enum { LOBE_BALANCE_N = 513 };
 
 struct lobe_balance {
     double kernel[LOBE_BALANCE_N][LOBE_BALANCE_N];   /* g (constant + slope k), folded to u >= 0: symmetric */
@@ -43,9 +41,7 @@ void lobe_balance_r(struct lobe_balance *b, double beta, double *a, double *d_ln
 void lobe_balance_share(struct lobe_balance *b, double beta, const double *a, const double *d_ln_a, double *rho,
                         double *d_rho);
 
-/* The value at entry i of a table of TWO_LOBE_N_TABLE + 1 entries. */
+/* The value at entry i of a table of twice as many intervals. */
 double lobe_balance_at_entry(const double *f, int i);
-/* Corrects the table of a lobe's scale for linear interpolation, which lies above a convex function. */
-void lobe_balance_level_lines(struct scattering_state *s, int lobe);
 
 #endif

@@ -98,7 +98,7 @@ static void fill_scales(const struct balance *b, struct scattering_state *s)
         s->sampling[i].energy[1] = (float)rho;
         s->sampling[i].energy[2] = (float)(1 - rho);
     }
-    for (int k = 0; k < 2; k++) lobe_balance_level_lines(s, k);
+    for (int k = 0; k < 2; k++) two_lobe_level_lines(s, k);
     two_lobe_fill_reach(s);
 }
 

@@ -10,6 +10,7 @@
  * widths, through want also on beta_R.
  */
 #include "renderer/scattering/surface/lobe_balance.h"
+#include "renderer/scattering/surface/two_lobe_core.h"
 
 enum { N = LOBE_BALANCE_N };
 
@@ -51,7 +52,7 @@ static void fill_tables(const struct balance *b, struct scattering_state *s)
         s->sampling[i].energy[1] = (float)rho;
         s->sampling[i].energy[2] = (float)(1 - rho);
     }
-    for (int k = 0; k < 2; k++) lobe_balance_level_lines(s, k);
+    for (int k = 0; k < 2; k++) two_lobe_level_lines(s, k);
     two_lobe_fill_reach(s);
 }
 

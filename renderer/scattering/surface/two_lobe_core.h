@@ -56,6 +56,8 @@ struct scattering_state {
 void two_lobe_state_init(struct scattering_state *s, const double *param);
 /* All of two_lobe.v1, in memory of the caller. */
 void two_lobe_init_published(struct scattering_state *s, const double *param);
+/* Corrects the table of a balanced lobe's scale for linear interpolation, which lies above a convex function. */
+void two_lobe_level_lines(struct scattering_state *s, int lobe);
 /* near and far of the sampling table. */
 void two_lobe_fill_reach(struct scattering_state *s);
 

@@ -1,0 +1,274 @@
+/* dielectric.v1: evaluation with scores, and sampling (dielectric.h states the model).
+ *
+ * Sampling of wi: a mode by its energy at th_o and the weights of the channels; th_i from M, an azimuth from N of the
+ * mode at th_d = th_o, averaged over the channels, and 2 % uniform. The density does not know a(th) and takes
+ * th_d = th_o, so weights are bounded but not constant.
+ */
+#include "renderer/scattering/surface/dielectric/dielectric.h"
+#include "renderer/scattering/fiber_direction.h"
+
+#include <stdlib.h>
+
+#define LEAST_PROBABILITY 0.03f /* of a mode: no mode is starved, because all carry derivatives */
+
+static status prepare(const double *param, struct scattering_state **state, struct error *err)
+{
+    status st = param_check(surface_dielectric_param, DIELECTRIC_N_PARAM, surface_dielectric_id, param, err);
+    if (st != STATUS_OK) return st;
+    struct scattering_state *s = malloc(sizeof *s);
+    struct dielectric_energies energies;
+    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
+    for (int p = 0; p < DIELECTRIC_N_LOBE; p++)
+        cone_lobe_init(&s->longitudinal[p], dielectric_width[p] * param[DIELECTRIC_P_BETA]);
+    st = dielectric_tables(s, param, &energies, err);
+    if (st == STATUS_OK) st = dielectric_balance(s, &energies, err);
+    if (st != STATUS_OK) {
+        free(s);
+        return st;
+    }
+    *state = s;
+    return STATUS_OK;
+}
+
+static void release(struct scattering_state *s) { free(s); }
+
+static inline float mix(float a, float b, float t) { return a + t * (b - a); }
+
+static inline float position(float x, int n, int *i)
+{
+    *i = x < (float)(n - 1) ? (int)x : n - 1;
+    return fminf(x - (float)*i, 1);
+}
+
+/* What two directions are to each other: places in the tables. */
+struct place {
+    struct fiber_direction in, out;
+    int row, column, out_row;
+    float x, y, out_x; /* between rows, columns, and rows of th_d = th_o */
+};
+
+static struct place place_of(const float wi[3], const float wo[3])
+{
+    struct place g = {.in = fiber_direction_of(wi), .out = fiber_direction_of(wo)};
+    float c = g.in.cos_theta + g.out.cos_theta, u = wi[0] + wo[0], cos_d = 0.5f * sqrtf(c * c + u * u);
+    float a = g.in.azimuth[0] - g.out.azimuth[0], b = g.in.azimuth[1] - g.out.azimuth[1];
+    float half_sine = 0.5f * sqrtf(a * a + b * b), /* sin(ph / 2) */
+        half_cosine = sqrtf(0.5f * fiber_one_minus_cos_opposite(&g.in, &g.out));
+    g.x = position(cos_d * DIELECTRIC_N_ROW, DIELECTRIC_N_ROW, &g.row);
+    g.y = position(2 * fiber_angle(half_sine, half_cosine) * (float)(DIELECTRIC_N_PHI / M_PI), DIELECTRIC_N_PHI,
+                   &g.column);
+    g.out_x = position(g.out.cos_theta * DIELECTRIC_N_ROW, DIELECTRIC_N_ROW, &g.out_row);
+    return g;
+}
+
+static float scale_at(const struct scattering_state *s, float theta_rad, float d_ln[2])
+{
+    int i;
+    float t = position(fabsf(theta_rad) * (float)((LOBE_BALANCE_N - 1) / M_PI_2), LOBE_BALANCE_N - 1, &i);
+    for (int k = 0; k < 2; k++) d_ln[k] = mix(s->d_ln_scale[k][i], s->d_ln_scale[k][i + 1], t);
+    return mix(s->scale[i], s->scale[i + 1], t);
+}
+
+/* M of each lobe, and d ln M / d beta when wanted. */
+static void longitudinal(const struct scattering_state *s, const float wi[3], const float wo[3], const struct place *g,
+                         float m[DIELECTRIC_N_LOBE], float *d_beta)
+{
+    for (int p = 0; p < DIELECTRIC_N_LOBE; p++) {
+        m[p] = cone_lobe_eval(&s->longitudinal[p], wi[0], g->in.cos_theta, wo[0], g->out.cos_theta,
+                              d_beta != NULL ? &d_beta[p] : NULL);
+        if (d_beta != NULL) d_beta[p] *= (float)dielectric_width[p];
+    }
+}
+
+#define BILINEAR(field)                                                                                                \
+    mix(mix(corner[0]->field, corner[1]->field, g->y), mix(corner[2]->field, corner[3]->field, g->y), g->x)
+
+static struct dielectric_cell cell_at(const struct scattering_state *s, const struct place *g)
+{
+    const struct dielectric_cell *corner[4] = {&s->cell[g->row][g->column], &s->cell[g->row][g->column + 1],
+                                               &s->cell[g->row + 1][g->column], &s->cell[g->row + 1][g->column + 1]};
+    struct dielectric_cell y = {.r = BILINEAR(r)};
+    for (int p = 0; p < 2; p++)
+        for (int c = 0; c < 3; c++) y.inner[p][c] = BILINEAR(inner[p][c]);
+    return y;
+}
+
+static struct dielectric_slope slope_at(const struct scattering_state *s, const struct place *g)
+{
+    const struct dielectric_slope *corner[4] = {&s->slope[g->row][g->column], &s->slope[g->row][g->column + 1],
+                                                &s->slope[g->row + 1][g->column], &s->slope[g->row + 1][g->column + 1]};
+    struct dielectric_slope y;
+    for (int k = 0; k < 2; k++) y.r[k] = BILINEAR(r[k]);
+    for (int p = 0; p < 2; p++)
+        for (int k = 0; k < 3; k++)
+            for (int c = 0; c < 3; c++) y.inner[p][k][c] = BILINEAR(inner[p][k][c]);
+    return y;
+}
+
+/* Probabilities of the modes at th_o. */
+static void mode_probabilities(const struct scattering_state *s, int row, float x, const float *weight_rgb,
+                               float p[DIELECTRIC_N_MODE])
+{
+    const struct dielectric_row *a = &s->row[row], *b = a + 1;
+    float sum = 0;
+    for (int k = 0; k < DIELECTRIC_N_MODE; k++) {
+        p[k] = 0;
+        for (int c = 0; c < 3; c++) {
+            float e = (weight_rgb != NULL ? weight_rgb[c] : 1) * mix(a->energy[k][c], b->energy[k][c], x);
+            p[k] += e * e;
+        }
+        sum += p[k] = sqrtf(p[k]);
+    }
+    for (int k = 0; k < DIELECTRIC_N_MODE; k++) {
+        float share = sum > 0 ? p[k] / sum : 1.0f / DIELECTRIC_N_MODE;
+        p[k] = LEAST_PROBABILITY + (1 - DIELECTRIC_N_MODE * LEAST_PROBABILITY) * share;
+    }
+}
+
+static float density(const struct scattering_state *s, const struct place *g, const float *weight_rgb,
+                     const float m[DIELECTRIC_N_LOBE])
+{
+    const struct dielectric_row *a = &s->row[g->out_row], *b = a + 1;
+    float p[DIELECTRIC_N_MODE];
+    mode_probabilities(s, g->out_row, g->out_x, weight_rgb, p);
+    float sum = p[DIELECTRIC_REST] * m[DIELECTRIC_TRT] * (float)(0.5 / M_PI);
+    for (int k = 0; k < DIELECTRIC_N_LOBE; k++) {
+        float before = mix(a->density[k][g->column], a->density[k][g->column + 1], g->y);
+        float after = mix(b->density[k][g->column], b->density[k][g->column + 1], g->y);
+        sum += p[k] * m[k] * 0.5f * mix(before, after, g->out_x);
+    }
+    return sum;
+}
+
+/* S without the scale is the sum of m N; what the scores need of it. */
+struct terms {
+    const float *m, *d_beta; /* of the longitudinal lobes */
+    struct dielectric_cell n;
+    float rest[3], d_scale[2]; /* d ln of the scales of both directions by eta and by beta */
+};
+
+static void scores(const struct scattering_state *s, const struct place *g, const struct terms *t, float *score)
+{
+    const float *m = t->m, *d_beta = t->d_beta;
+    const struct dielectric_slope d = slope_at(s, g);
+    const struct dielectric_row *a = &s->row[g->row], *b = a + 1;
+    const float m_rest = m[DIELECTRIC_TRT];
+    for (int j = 0; j < 3 * DIELECTRIC_N_PARAM; j++) score[j] = 0;
+    for (int c = 0; c < 3; c++) {
+        float *h = score + c * DIELECTRIC_N_PARAM, part[DIELECTRIC_N_LOBE] = {m[0] * t->n.r};
+        for (int p = 0; p < 2; p++) part[1 + p] = m[1 + p] * t->n.inner[p][c];
+        float sum = part[0] + part[1] + part[2] + m_rest * t->rest[c], inv = sum > 1e-30f ? 1 / sum : 0;
+        float by_c_t = m_rest * mix(a->d_rest[0][c], b->d_rest[0][c], g->x);
+        float by_eta = m_rest * mix(a->d_rest[1][c], b->d_rest[1][c], g->x) + m[0] * d.r[0], by_gamma = m[0] * d.r[1];
+        float by_beta = m_rest * t->rest[c] * d_beta[DIELECTRIC_TRT];
+        for (int p = 0; p < 2; p++) {
+            by_c_t += m[1 + p] * d.inner[p][0][c];
+            by_eta += m[1 + p] * d.inner[p][1][c];
+            by_gamma += m[1 + p] * d.inner[p][2][c];
+        }
+        for (int p = 0; p < DIELECTRIC_N_LOBE; p++) by_beta += part[p] * d_beta[p];
+        h[DIELECTRIC_P_C_T + c] = by_c_t * inv;
+        h[DIELECTRIC_P_ETA] = by_eta * inv + t->d_scale[0];
+        h[DIELECTRIC_P_BETA] = by_beta * inv + t->d_scale[1];
+        h[DIELECTRIC_P_GAMMA] = by_gamma * inv;
+    }
+}
+
+static void eval_at(const struct scattering_state *s, const struct place *g, const float m[DIELECTRIC_N_LOBE],
+                    const float *d_beta, float s_rgb[3], float *score)
+{
+    float d_in[2], d_out[2], scale = scale_at(s, g->in.theta_rad, d_in) * scale_at(s, g->out.theta_rad, d_out);
+    const struct dielectric_row *a = &s->row[g->row], *b = a + 1;
+    struct terms t = {
+        .m = m, .d_beta = d_beta, .n = cell_at(s, g), .d_scale = {d_in[0] + d_out[0], d_in[1] + d_out[1]}};
+    for (int c = 0; c < 3; c++) {
+        t.rest[c] = mix(a->rest[c], b->rest[c], g->x);
+        float sum = m[0] * t.n.r + m[DIELECTRIC_TRT] * t.rest[c];
+        for (int p = 0; p < 2; p++) sum += m[1 + p] * t.n.inner[p][c];
+        s_rgb[c] = scale * sum;
+    }
+    if (score != NULL) scores(s, g, &t, score);
+}
+
+static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb,
+                      float s_rgb[3], float *score)
+{
+    const struct place g = place_of(wi, wo);
+    float m[DIELECTRIC_N_LOBE], d_beta[DIELECTRIC_N_LOBE];
+    longitudinal(s, wi, wo, &g, m, score != NULL ? d_beta : NULL);
+    eval_at(s, &g, m, d_beta, s_rgb, score);
+    return density(s, &g, weight_rgb, m);
+}
+
+static void eval(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
+{
+    const struct place g = place_of(wi, wo);
+    float m[DIELECTRIC_N_LOBE], d_beta[DIELECTRIC_N_LOBE];
+    longitudinal(s, wi, wo, &g, m, score != NULL ? d_beta : NULL);
+    eval_at(s, &g, m, d_beta, s_rgb, score);
+}
+
+static float pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)
+{
+    const struct place g = place_of(wi, wo);
+    float m[DIELECTRIC_N_LOBE];
+    longitudinal(s, wi, wo, &g, m, NULL);
+    return density(s, &g, weight_rgb, m);
+}
+
+/* Stretches u to [0, 1) within an interval that starts at 0. */
+static float stretch(float u, float width) { return fminf(u / width, 0x1.fffffep-1f); }
+
+/* Azimuth in [0, pi] with the piecewise linear density of a row. */
+static float draw_azimuth(const struct dielectric_row *row, int mode, float u)
+{
+    const float *below = row->below[mode], *d = row->density[mode];
+    int low = 0, high = DIELECTRIC_N_PHI;
+    u *= below[DIELECTRIC_N_PHI];
+    while (high - low > 1) {
+        int middle = (low + high) / 2;
+        if (below[middle] <= u)
+            low = middle;
+        else
+            high = middle;
+    }
+    /* the root t of d0 t + (d1 - d0) t^2 / 2 = the rest over the step */
+    const float step = (float)(M_PI / DIELECTRIC_N_PHI);
+    float rest = fmaxf(u - below[low], 0) / step, bend = d[low + 1] - d[low];
+    float t = 2 * rest / (d[low] + sqrtf(fmaxf(d[low] * d[low] + 2 * bend * rest, 0)));
+    return ((float)low + fminf(t, 1)) * step;
+}
+
+static void sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
+                   float wi[3])
+{
+    struct fiber_direction out = fiber_direction_of(wo);
+    float p[DIELECTRIC_N_MODE], rest = u[0], phi = u[2];
+    int row, k = 0;
+    float x = position(out.cos_theta * DIELECTRIC_N_ROW, DIELECTRIC_N_ROW, &row);
+    mode_probabilities(s, row, x, weight_rgb, p);
+    while (k < DIELECTRIC_N_MODE - 1 && rest >= p[k]) rest -= p[k++];
+    rest = stretch(rest, p[k]);
+    int lobe = k < DIELECTRIC_N_LOBE ? k : DIELECTRIC_TRT;
+    float sin_i = cone_lobe_sample(&s->longitudinal[lobe], wo[0], out.cos_theta, u[1], rest);
+    if (k == DIELECTRIC_REST) {
+        phi *= (float)(2 * M_PI);
+    } else { /* a side, then one of the two rows, each with its share */
+        float side = phi < 0.5f ? 1 : -1;
+        phi = stretch(phi < 0.5f ? phi : phi - 0.5f, 0.5f);
+        if (phi < x)
+            phi = draw_azimuth(&s->row[row + 1], k, stretch(phi, x));
+        else
+            phi = draw_azimuth(&s->row[row], k, stretch(phi - x, 1 - x));
+        phi *= side;
+    }
+    float cos_i = sqrtf((1 - sin_i) * (1 + sin_i)), c = cosf(phi), d = sinf(phi);
+    wi[0] = sin_i;
+    wi[1] = cos_i * (c * out.azimuth[0] - d * out.azimuth[1]);
+    wi[2] = cos_i * (d * out.azimuth[0] + c * out.azimuth[1]);
+}
+
+const struct scattering_model scattering_dielectric = {
+    SURFACE_MODEL_ROW(dielectric), .prepare = prepare, .release = release, .eval = eval, .sample = sample, .pdf = pdf,
+    .eval_pdf = eval_pdf,
+};

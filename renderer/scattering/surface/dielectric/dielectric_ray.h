@@ -1,0 +1,88 @@
+/* Geometric optics of a smooth circular dielectric cylinder: what a ray does that meets it at the offset h = sin x from
+ * its axis, and its derivatives by the index of refraction. Marschner et al. 2003, "Light Scattering from Human Hair
+ * Fibers", section 3, with unpolarised Fresnel reflection at the true angle of incidence; the share of paths with more
+ * inner reflections in closed form after Chiang et al. 2016, "A Practical and Controllable Hair and Fur Model for
+ * Production Path Tracing", section 4.
+ *
+ *     F    Fresnel reflectance at cos = cos th cos x
+ *     l    way through the fiber between two meetings with its wall, in diameters: cos gamma_t / cos th_t, where
+ *          sin gamma_t = h / eta', eta' = sqrt(eta^2 - sin^2 th) / cos th (Bravais), sin th_t = sin th / eta
+ *     T    C_T^l, C_T the share of the light that one diameter lets through
+ *     A_R  F     A_TT  (1 - F)^2 T     A_TRT  (1 - F)^2 F T^2     A_rest  (1 - F)^2 F^2 T^3 / (1 - F T)
+ *     azimuth from the direction of the incoming ray: p = 0 (R): -2 x; 1 (TT): pi + 2 gamma_t - 2 x; 2 (TRT):
+ *          4 gamma_t - 2 x + 2 pi
+ * Without absorption the four shares sum to 1 at every offset.
+ */
+#ifndef SELVEDGE_RENDERER_DIELECTRIC_RAY_H
+#define SELVEDGE_RENDERER_DIELECTRIC_RAY_H
+
+#include <math.h>
+
+enum dielectric_mode { DIELECTRIC_R, DIELECTRIC_TT, DIELECTRIC_TRT, DIELECTRIC_REST, DIELECTRIC_N_MODE };
+
+struct dielectric_ray {
+    double fresnel, length;                /* F, l */
+    double gamma_t;                        /* rad */
+    double d_fresnel, d_length, d_gamma_t; /* by eta */
+};
+
+/* F from outside for the cosine of the angle of incidence, and d F / d eta when wanted. */
+static inline double dielectric_fresnel(double cos_i, double eta, double *d_eta)
+{
+    double sin2 = 1 - cos_i * cos_i, cos_t = sqrt(1 - sin2 / (eta * eta)), q = eta * cos_t, a = eta * cos_i;
+    double s = (cos_i - q) / (cos_i + q), p = (a - cos_t) / (a + cos_t);
+    if (d_eta != NULL) {
+        double d_cos_t = sin2 / (eta * eta * eta * cos_t), d_q = cos_t + eta * d_cos_t;
+        double d_s = -2 * cos_i / ((cos_i + q) * (cos_i + q)) * d_q;
+        double d_p = 2 * (cos_t * cos_i - a * d_cos_t) / ((a + cos_t) * (a + cos_t));
+        *d_eta = s * d_s + p * d_p;
+    }
+    return 0.5 * (s * s + p * p);
+}
+
+/* cos_theta > 0; x in [-pi/2, pi/2]; eta > 1. */
+static inline struct dielectric_ray dielectric_ray_at(double cos_theta, double x, double eta)
+{
+    struct dielectric_ray r;
+    double h = sin(x), cos2 = cos_theta * cos_theta, sin2 = 1 - cos2, bravais2 = (eta * eta - sin2) / cos2;
+    double sin_t = h / sqrt(bravais2), cos_t = sqrt(1 - sin_t * sin_t), cos_theta_t = sqrt(1 - sin2 / (eta * eta));
+    r.fresnel = dielectric_fresnel(cos_theta * cos(x), eta, &r.d_fresnel);
+    r.gamma_t = asin(sin_t);
+    r.length = cos_t / cos_theta_t;
+    r.d_gamma_t = -sin_t / cos_t * eta / (bravais2 * cos2); /* d ln eta' / d eta = eta / (eta'^2 cos^2 th) */
+    r.d_length = (-sin_t * r.d_gamma_t - r.length * sin2 / (eta * eta * eta * cos_theta_t)) / cos_theta_t;
+    return r;
+}
+
+/* Shares of the modes for a ray and one transmittance, and their derivatives by eta and by C_T. ln_c_t = ln C_T. */
+struct dielectric_shares {
+    double value[DIELECTRIC_N_MODE], d_eta[DIELECTRIC_N_MODE], d_c_t[DIELECTRIC_N_MODE];
+};
+
+static inline struct dielectric_shares dielectric_shares_of(const struct dielectric_ray *r, double c_t, double ln_c_t)
+{
+    struct dielectric_shares a;
+    double f = r->fresnel, g = 1 - f, t = exp(ln_c_t * r->length), d_ln_t = ln_c_t * r->d_length;
+    double enter = g * g * t, inv = 1 / (1 - f * t);
+    /* d ln A by F and by T; ln T = l ln C_T */
+    const double by_f[DIELECTRIC_N_MODE] = {1 / f, -2 / g, -2 / g + 1 / f, -2 / g + 2 / f + t * inv};
+    const double by_ln_t[DIELECTRIC_N_MODE] = {0, 1, 2, 3 + f * t * inv};
+    a.value[DIELECTRIC_R] = f;
+    a.value[DIELECTRIC_TT] = enter;
+    a.value[DIELECTRIC_TRT] = enter * f * t;
+    a.value[DIELECTRIC_REST] = enter * f * t * f * t * inv;
+    for (int p = 0; p < DIELECTRIC_N_MODE; p++) {
+        a.d_eta[p] = a.value[p] * (by_f[p] * r->d_fresnel + by_ln_t[p] * d_ln_t);
+        a.d_c_t[p] = a.value[p] * by_ln_t[p] * r->length / c_t;
+    }
+    return a;
+}
+
+/* Azimuth of mode p (R, TT, TRT) and its derivative by eta. */
+static inline double dielectric_azimuth(const struct dielectric_ray *r, int p, double x, double *d_eta)
+{
+    *d_eta = 2 * p * r->d_gamma_t;
+    return 2 * p * r->gamma_t - 2 * x + p * M_PI;
+}
+
+#endif

@@ -1,0 +1,192 @@
+/* What every surface model of the catalogue costs, and what light it loses. Prints one JSON object on each line.
+ *
+ *   models.<id>.paths_per_s_core
+ *       Paths with all derivatives on the cloth of the benchmarks, under the 16 configurations. All models take turns,
+ *       and the median of the rounds counts.
+ *   models.<id>.time_over_two_lobe
+ *       Median over the rounds of its time for a path over that of two_lobe.v1 in the same round, in which the machine
+ *       was equally busy.
+ *   models.<id>.furnace_in_error, .furnace_out_error
+ *       Largest part of the light that a fiber loses or gains, over 0, 20, 40, 60 and 80 degrees: light that comes from
+ *       one direction and leaves to all (in), and comes from all and leaves to one (out). Colors at their upper bounds,
+ *       everything else at its start.
+ *   models.<id>.table_bytes, .table_build_s
+ *       Memory of a prepared model, and processor time to prepare it.
+ *
+ * bench_models [PATHS] [ROUNDS]
+ *   PATHS   for each configuration (4096)
+ *   ROUNDS  (5)
+ */
+#include "base/angle.h"
+#include "renderer/transport/estimate/estimate.h"
+#include "tests/support/cloth/hand_weave.h"
+#include "tests/support/tracer/orbit_configurations.h"
+#include "tests/support/tracer/trace_input.h"
+
+#include <malloc.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+enum { N_CONFIGURATION = 16, MAX_MODEL = 64, MAX_ROUND = 64 };
+
+static double processor_s(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void print(const struct scattering_model *m, const char *what, double value, const char *unit,
+                  const char *better)
+{
+    printf("{\"name\":\"models.%s.%s\",\"value\":%.6g,\"unit\":\"%s\",\"better\":\"%s\"}\n", m->id, what, value, unit,
+           better);
+    fflush(stdout);
+}
+
+static void stop(const struct error *err)
+{
+    fprintf(stderr, "%s\n", err->text);
+    exit(1);
+}
+
+static void start_of(const struct scattering_model *m, bool brightest, double *param)
+{
+    for (size_t p = 0; p < m->n_param; p++)
+        param[p] = brightest && m->param[p].channel >= 0 ? m->param[p].upper : m->param[p].start;
+}
+
+static struct scattering_state *prepare(const struct scattering_model *m, const double *param)
+{
+    struct scattering_state *s = NULL;
+    struct error err = {0};
+    if (m->prepare(param, &s, &err) != STATUS_OK) stop(&err);
+    return s;
+}
+
+/* Integral of S cos th over all directions of one side. Where a model distinguishes azimuths about the fiber, the other
+ * direction's is averaged over. */
+static double furnace(const struct scattering_model *m, const struct scattering_state *s, double theta, bool in)
+{
+    enum { N_THETA = 720, N_PHI = 180, N_TURN = 8 };
+    int n_turn = m->flat_section ? N_TURN : 1;
+    double sum = 0;
+    for (int turn = 0; turn < n_turn; turn++)
+        for (int i = 0; i < N_THETA; i++)
+            for (int j = 0; j < N_PHI; j++) {
+                double t = M_PI * ((i + 0.5) / N_THETA - 0.5), phi = 2 * M_PI * (j + 0.5) / N_PHI, c = cos(t),
+                       psi = M_PI * (turn + 0.5) / N_TURN;
+                float at[3] = {(float)sin(theta), (float)(cos(theta) * cos(psi)), (float)(cos(theta) * sin(psi))},
+                      other[3] = {(float)sin(t), (float)(c * cos(phi)), (float)(c * sin(phi))}, rgb[3];
+                m->eval(s, in ? at : other, in ? other : at, rgb, NULL);
+                sum += (double)rgb[0] * c * c * (M_PI / N_THETA) * (2 * M_PI / N_PHI);
+            }
+    return sum / n_turn;
+}
+
+static void bench_light(const struct scattering_model *m)
+{
+    double param[SCATTERING_MAX_PARAM], worst[2] = {0, 0};
+    start_of(m, true, param);
+    struct scattering_state *s = prepare(m, param);
+    for (int side = 0; side < 2; side++)
+        for (int k = 0; k < 5; k++)
+            worst[side] = fmax(worst[side], fabs(1 - furnace(m, s, 20 * k * RAD_PER_DEG, side == 0)));
+    print(m, "furnace_in_error", worst[0], "1", "lower");
+    print(m, "furnace_out_error", worst[1], "1", "lower");
+    print(m, "table_bytes", (double)malloc_usable_size(s), "byte", "lower");
+    m->release(s);
+}
+
+static void bench_tables(const struct scattering_model *m)
+{
+    enum { N = 5 };
+    double param[SCATTERING_MAX_PARAM];
+    start_of(m, false, param);
+    double start = processor_s();
+    for (int i = 0; i < N; i++) m->release(prepare(m, param));
+    print(m, "table_build_s", (processor_s() - start) / N, "s", "lower");
+}
+
+/* Processor time for a path. */
+static double trace(const struct scene *scene, struct thread_pool *pool, const struct scattering_model *m,
+                    size_t n_path)
+{
+    static struct estimate e[N_CONFIGURATION];
+    struct configuration configuration[N_CONFIGURATION];
+    double param[SCATTERING_MAX_PARAM];
+    size_t n[N_CONFIGURATION];
+    struct appearance model;
+    struct error err = {0};
+    orbit_configurations_16(configuration);
+    start_of(m, false, param);
+    for (int i = 0; i < N_CONFIGURATION; i++) n[i] = n_path;
+    struct estimate_request q = {.input = trace_input_surface(scene, m, param, &model),
+                                 .configuration = configuration,
+                                 .n_configuration = N_CONFIGURATION,
+                                 .n_path = n,
+                                 .seed = 1};
+    q.input.want_derivative = true;
+    double start = processor_s();
+    if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) stop(&err);
+    return (processor_s() - start) / (double)(N_CONFIGURATION * n_path);
+}
+
+static int by_size(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double median(double *x, size_t n)
+{
+    qsort(x, n, sizeof *x, by_size);
+    return 0.5 * (x[(n - 1) / 2] + x[n / 2]);
+}
+
+static void bench_speed(size_t n_path, size_t n_round)
+{
+    static double time_s[MAX_MODEL][MAX_ROUND], ratio[MAX_MODEL][MAX_ROUND];
+    const struct scattering_model *const *model = scattering_registry();
+    struct fiber_set f;
+    struct scene *scene = NULL;
+    struct thread_pool *pool = NULL;
+    struct error err = {0};
+    hand_weave_bench(&f);
+    if (scene_new(&f, &(struct scene_option){.black_sheet = true}, &scene, &err) != STATUS_OK) stop(&err);
+    if (thread_pool_new(1, &pool, &err) != STATUS_OK) stop(&err);
+    fiber_set_release(&f);
+    trace(scene, pool, model[0], 256); /* warm up */
+    size_t reference = 0;
+    for (size_t round = 0; round < n_round; round++) {
+        for (size_t k = 0; k < MAX_MODEL && model[k] != NULL; k++) {
+            time_s[k][round] = trace(scene, pool, model[k], n_path);
+            if (model[k] == scattering_find("two_lobe.v1")) reference = k;
+        }
+        for (size_t k = 0; k < MAX_MODEL && model[k] != NULL; k++)
+            ratio[k][round] = time_s[k][round] / time_s[reference][round];
+    }
+    for (size_t k = 0; k < MAX_MODEL && model[k] != NULL; k++) {
+        print(model[k], "paths_per_s_core", 1 / median(time_s[k], n_round), "1/s", "higher");
+        print(model[k], "time_over_two_lobe", median(ratio[k], n_round), "1", "lower");
+    }
+    thread_pool_free(pool);
+    scene_free(scene);
+}
+
+int main(int argc, char **argv)
+{
+    size_t n_path = argc > 1 ? strtoul(argv[1], NULL, 10) : 4096, n_round = argc > 2 ? strtoul(argv[2], NULL, 10) : 5;
+    if (n_path == 0 || n_round == 0 || n_round > MAX_ROUND) {
+        fprintf(stderr, "usage: bench_models [PATHS] [ROUNDS], at most %d rounds\n", MAX_ROUND);
+        return 2;
+    }
+    for (size_t k = 0; scattering_registry()[k] != NULL; k++) {
+        bench_light(scattering_registry()[k]);
+        bench_tables(scattering_registry()[k]);
+    }
+    bench_speed(n_path, n_round);
+    return 0;
+}
