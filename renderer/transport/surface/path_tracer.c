@@ -29,13 +29,6 @@ static void add_light_to_all(struct walk *w, const float value[3], const float *
     }
 }
 
-/* Whether the lamp is found by direct connections alone: at the first hit of a path that always ends there. */
-static inline bool connects_all(const struct walk *w)
-{
-    const struct path_setting *s = w->s;
-    return w->last && s->n_traced == 1 && s->share_beyond == 0 && !s->lights.has_constant && s->lights.image == NULL;
-}
-
 static void leave(struct walk *w, const struct bounce *b, const float direction[3], struct scene_ray *ray)
 {
     if (w->s->model->across_width)
@@ -57,7 +50,7 @@ static float connect_lamp(struct walk *w, const struct lamp *lamp, float weight,
     if (scene_sheet_hides(s->scene, direction)) return 0;
     fiber_frame_to_local(&b->frame, direction, wi);
     float pdf = s->model->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
-    float heuristic = connects_all(w) ? 1 : lights_power_heuristic(pdf_lamp, pdf), value[3],
+    float heuristic = path_walk_connects_all(w) ? 1 : lights_power_heuristic(pdf_lamp, pdf), value[3],
           light = weight * lamp->radiance * fiber_frame_cos_theta(wi) / pdf_lamp * heuristic;
     for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * s_rgb[c] * light;
     float most = path_value_largest(value), survival;
@@ -349,7 +342,7 @@ static bool go_on_beyond_last(struct walk *w, const struct bounce *b, struct sce
         return true;
     }
     struct scene_hit unused;
-    bool rest = share == 0 && !connects_all(w);
+    bool rest = share == 0 && !path_walk_connects_all(w);
     if (rest && scatter(w, b, ray, &pdf) && !scene_trace(s->scene, ray, &unused)) add_beyond(w, ray, pdf);
     return false;
 }

@@ -46,4 +46,11 @@ struct walk {
     float h[PATH_N_DERIVATIVE];            /* running sums of scores, laid out as the derivatives of path_result */
 };
 
+/* Whether the lamp is found by direct connections alone: at the first hit of a path that always ends there. */
+static inline bool path_walk_connects_all(const struct walk *w)
+{
+    const struct path_setting *s = w->s;
+    return w->last && s->n_traced == 1 && s->share_beyond == 0 && !s->lights.has_constant && s->lights.image == NULL;
+}
+
 #endif
