@@ -1,8 +1,8 @@
 /* Predicts when a job ends: its stages with the work that they have, the speeds of earlier jobs (speed_book.h), and
  * what this job has shown so far.
  *
- * Before it runs, a stage is expected to take units x seconds per unit, times a factor by which the finished stages
- * of this job were slower than expected. While it runs, that is combined with its elapsed time over the share of its
+ * Before it runs, a stage is expected to take units x seconds per unit, times a factor by which those finished stages
+ * of this job were slower than expected whose time hardly varies between jobs. While it runs, that is combined with its elapsed time over the share of its
  * time that has passed at its fraction, each weighted by its uncertainty (logarithms of times are taken to be
  * normal). A stage that predicts its own end (a fit) has a fraction that runs evenly with time, but for what such
  * predictions were off in earlier jobs; its time says nothing about the speed of other stages. The stated fraction of

@@ -121,6 +121,25 @@ static void test_a_stage_that_predicts_its_end(void **state)
     assert_true(fabs(job_clock_expected_s(&c, 1) - 10.0) < 1e-9);
 }
 
+/* A stage that took four times as long says that the machine is slow only if its time hardly varies between jobs. */
+static void test_which_stages_tell_the_speed(void **state)
+{
+    (void)state;
+    static struct job_clock c;
+    for (int steady = 0; steady < 2; steady++) {
+        const struct job_clock_work first = {
+            .key = "first", .units = 10.0, .usual_s = 1.0, .log_sd = steady ? 0.4 : 0.8};
+        job_clock_init(&c, 2, &empty, 0.0);
+        job_clock_plan(&c, 0, &first);
+        plan(&c, 1, "after", 10.0, 1.0);
+        job_clock_begin(&c, 0, 0.0);
+        job_clock_fraction(&c, 1.0, 40.0);
+        job_clock_end(&c, false, 40.0);
+        const double expected = job_clock_expected_s(&c, 1);
+        assert_true(steady ? expected > 15.0 && expected < 40.0 : fabs(expected - 10.0) < 1e-9);
+    }
+}
+
 /* A first job whose stage is known to spend most of its time at the beginning. */
 static void test_a_usual_curve(void **state)
 {
@@ -274,6 +293,7 @@ int main(void)
         cmocka_unit_test(test_remembered_speeds_predict_the_next_job),
         cmocka_unit_test(test_a_fraction_that_waits),
         cmocka_unit_test(test_a_stage_that_predicts_its_end),
+        cmocka_unit_test(test_which_stages_tell_the_speed),
         cmocka_unit_test(test_a_usual_curve),
         cmocka_unit_test(test_predictions_that_were_off),
         cmocka_unit_test(test_nothing_known_is_a_range),
