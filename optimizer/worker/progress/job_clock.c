@@ -14,8 +14,8 @@ static const double sd_by_curve = 0.2, sd_by_line = 0.35, sd_by_usual = 1.0;
 static const double usual_curve_jobs = 1.0;
 /* Share of a stage's time in one of SPEED_CURVE_POINTS parts of its fraction from which on the fraction has waited. */
 static const double long_wait = 0.1;
-/* A stage whose time varies by more than this between jobs says nothing about the speed of the machine. The filters of a
- * scan took 0.5 to 4.2 times what is usual where its tracing took 1.0 to 1.3 times that on the same machine. */
+/* A stage whose time varies by more than this between jobs says nothing about the speed of the machine. The filters of
+ * a scan took 0.5 to 4.2 times what is usual where its tracing took 1.0 to 1.3 times that on the same machine. */
 static const double most_sd_of_speed = 0.6;
 /* A stage below this many seconds is not remembered and says nothing about the others. */
 static const double least_s = 0.3;
