@@ -4,11 +4,11 @@
  * Before it runs, a stage is expected to take units x seconds per unit, times a factor by which those finished stages
  * of this job were slower than expected whose time hardly varies between jobs. While it runs, that is combined with
  * its elapsed time over the share of its time that has passed at its fraction, each weighted by its uncertainty
- * (logarithms of times are taken to be normal). A stage that predicts its own end (a fit) has a fraction that runs evenly with time, but for what such
- * predictions were off in earlier jobs; its time says nothing about the speed of other stages. The stated fraction of
- * the job is elapsed time over elapsed and remaining time; it never falls, and it rises by at most JOB_CLOCK_STEP
- * between two looks and in a second; in a second also by twice what is even, where a job is short. Times are of the
- * monotonic clock, in seconds. Not thread-safe. */
+ * (logarithms of times are taken to be normal). A stage that predicts its own end (a fit) has a fraction that runs
+ * evenly with time, but for what such predictions were off in earlier jobs; its time says nothing about the speed of
+ * other stages. The stated fraction of the job is elapsed time over elapsed and remaining time; it never falls, and
+ * it rises by at most JOB_CLOCK_STEP between two looks and in a second; in a second also by twice what is even, where
+ * a job is short. Times are of the monotonic clock, in seconds. Not thread-safe. */
 #ifndef SELVEDGE_OPTIMIZER_JOB_CLOCK_H
 #define SELVEDGE_OPTIMIZER_JOB_CLOCK_H
 
