@@ -90,8 +90,9 @@ status seam_step_measure(const struct fiber_set *f, int axis, double *step, doub
     *inside = 0.0;
     for (int i = 0; i < N_INNER; i++) {
         const double here = step_at(&g, tile * (0.5 + i) / N_INNER, diameter);
-        *inside += isfinite(here) ? here : 0.0;
-        n_inner += isfinite(here);
+        if (!isfinite(here)) continue;
+        *inside += here;
+        n_inner++;
     }
     *inside = n_inner > 0 ? *inside / (double)n_inner : NAN;
     free(g.area);
