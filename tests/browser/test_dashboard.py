@@ -101,7 +101,8 @@ def test_real_job_live_and_finished(real, browser):
     assert complaints(browser) == []
     browser.get(browser.execute_script("return document.querySelector('#quality a').href"))
     assert job.state().sample in text_of(browser, "h1")
-    wait_for(browser, "[...document.images].length === 5 && [...document.images].every((i) => i.complete && i.naturalWidth > 0)")
+    # lengths and sections of the fibers, three slices, the cloth from above
+    wait_for(browser, "[...document.images].length === 6 && [...document.images].every((i) => i.complete && i.naturalWidth > 0)")
     assert browser.execute_script("return getComputedStyle(document.querySelector('td.number')).textAlign") == "right"
     keep(browser, "quality")
     assert complaints(browser) == []

@@ -38,6 +38,19 @@ __attribute__((format(printf, 4, 5))) static void row(FILE *out, const char *nam
 static void open_table(FILE *out, const char *title) { fprintf(out, "<h2>%s</h2>\n<table>\n", title); }
 static void close_table(FILE *out) { fputs("</table>\n", out); }
 
+/* How many radii the fibers have: whether one class has fibers of different radius, in words. */
+static const char *radii_in_words(const struct pipeline_context *c)
+{
+    const struct fiber_set *f = &c->fiber;
+    float first[3] = {0.0f, 0.0f, 0.0f};
+    for (size_t i = 0; i < f->n_fiber; i++) {
+        float *of_class = &first[f->axis_class[i]];
+        if (*of_class == 0.0f) *of_class = f->radius_m[i];
+        if (f->radius_m[i] != *of_class) return "every fiber has its own; the table has the mean of a class";
+    }
+    return c->geometry.radius_per_axis ? "one for each class" : "one for all fibers";
+}
+
 static void print_fibers(const struct pipeline_context *c, const struct fiber_lengths *l, FILE *out)
 {
     static const char *const name[] = {"along x (weft)", "along y (warp)", "along z (pile)"};
@@ -67,8 +80,7 @@ static void print_fibers(const struct pipeline_context *c, const struct fiber_le
     }
     fputs("</table>\n", out);
     if (c->doc->has_volume)
-        fprintf(out, "<p>Radius: %s, with standard errors where it was measured.</p>\n",
-                g->radius_per_axis ? "one for each class" : "one for all fibers");
+        fprintf(out, "<p>Radius: %s, with standard errors where it was measured.</p>\n", radii_in_words(c));
     fprintf(out, "<p>Lengths: median %.3g mm, mean %.3g mm, 80 %% between %.3g and %.3g mm, longest %.3g mm.</p>\n",
             l->median_m * 1e3, l->mean_m * 1e3, l->p10_m * 1e3, l->p90_m * 1e3, l->longest_m * 1e3);
     fputs("<figure><img class=\"plot\" src=\"pictures/fiber-lengths.svg\" alt=\"length distribution of the "
