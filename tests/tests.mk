@@ -1,5 +1,5 @@
 # Tests: their programs, and the targets that run them. tests/README.md says what each one is.
-.PHONY: tsan tsan-requests test-watched-folder deps-test build-tests asan asan-physics fuzz fuzz-smoke fuzz-programs coverage
+.PHONY: screens tsan tsan-requests test-watched-folder deps-test build-tests asan asan-physics fuzz fuzz-smoke fuzz-programs coverage
 # one test program per file tests/{unit,physics}/test_*.c
 TESTS_C := $(shell find tests/unit tests/physics -name 'test_*.c' 2>/dev/null | sort)
 TEST_BINS := $(patsubst %.c,$(BUILD)/%,$(TESTS_C))
@@ -24,6 +24,11 @@ check: | deps-test ## quick inner loop: checks of the sources, unit tests, quick
 test: | deps-test  ## everything that continuous integration runs; ends with "N passed, N failed"
 	@$(MAKE) --no-print-directory -j$$(nproc) all build-tests
 	@/usr/bin/python3 tests/run_tests.py --build $(BUILD)
+
+# PAGES: some of the browser tests only, such as PAGES=test_pairs.py
+screens: | deps-test ## the browser tests, which then keep screenshots of the dashboard's pages in build/screens (ten minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) all
+	@SELVEDGE_SCREENSHOTS="$(CURDIR)/$(BUILD)/screens" /usr/bin/python3 -m pytest -q $(addprefix tests/browser/,$(PAGES))$(if $(PAGES),,tests/browser)
 
 # What takes too long for every commit. One part that fails does not keep the next from running.
 NIGHTLY := asan tsan fuzz-smoke coverage test-crash test-long mutants
