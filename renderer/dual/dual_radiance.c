@@ -1,6 +1,7 @@
 #include "renderer/dual/dual_radiance.h"
 #include "renderer/dual/dual_shade.h"
 #include "renderer/transport/camera.h"
+#include "renderer/transport/radiance_unrecorded.h"
 
 #include <stdlib.h>
 
@@ -24,6 +25,8 @@ static status check(const struct radiance_input *in, struct error *err)
     const struct dual_option *o = in->dual;
     if (in->want_derivative)
         return error_set(err, STATUS_INVALID, "cannot render by dual scattering with derivatives: it has none");
+    if (in->discrepancy != NULL)
+        return error_set(err, STATUS_INVALID, "cannot render by dual scattering with a discrepancy: it has none");
     if (in->model->surface->flat_section)
         return error_set_field(err, STATUS_INVALID, "model",
                                "cannot render model '%s' by dual scattering: its fibers are flat", in->model->id);
@@ -76,24 +79,10 @@ static uint64_t trace(const void *state, const struct radiance_block *b, float *
     return n_hit;
 }
 
-/* Closed forms cannot be recorded: they have no derivatives that a record would serve. */
-static void record_nothing(const void *state, size_t i_configuration, const double xy[2], struct rng *rng,
-                           struct radiance_record *record, float *value)
-{
-    (void)state, (void)i_configuration, (void)xy, (void)rng, (void)value;
-    record->n_entry = record->n_bounce = 0;
-}
-
-static double replay_nothing(const void *at, const void *traced, const struct radiance_record *record)
-{
-    (void)at, (void)traced, (void)record;
-    return 0.0;
-}
-
 const struct radiance_tracer dual_radiance = {.max_member = 1,
                                               .entry_bytes = 1,
                                               .prepare = prepare,
                                               .release = release,
                                               .trace = trace,
-                                              .record = record_nothing,
-                                              .replay = replay_nothing};
+                                              .record = radiance_record_nothing,
+                                              .replay = radiance_replay_nothing};

@@ -2,6 +2,7 @@
 #include "renderer/fast/fast_shade.h"
 #include "renderer/scene/scene_place.h"
 #include "renderer/transport/camera.h"
+#include "renderer/transport/radiance_unrecorded.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -93,24 +94,10 @@ static uint64_t trace(const void *state, const struct radiance_block *b, float *
     return n_bounce;
 }
 
-/* Paths by tables cannot be recorded: they have no derivatives that a record would serve. */
-static void record_nothing(const void *state, size_t i_configuration, const double xy[2], struct rng *rng,
-                           struct radiance_record *record, float *value)
-{
-    (void)state, (void)i_configuration, (void)xy, (void)rng, (void)value;
-    record->n_entry = record->n_bounce = 0;
-}
-
-static double replay_nothing(const void *at, const void *traced, const struct radiance_record *record)
-{
-    (void)at, (void)traced, (void)record;
-    return 0.0;
-}
-
 const struct radiance_tracer fast_radiance = {.max_member = 1,
                                               .entry_bytes = 1,
                                               .prepare = prepare,
                                               .release = release,
                                               .trace = trace,
-                                              .record = record_nothing,
-                                              .replay = replay_nothing};
+                                              .record = radiance_record_nothing,
+                                              .replay = radiance_replay_nothing};

@@ -216,6 +216,10 @@ static void what_is_refused(void **state)
     in.want_derivative = true;
     assert_int_equal(radiance_source_init(&source, &in, view, 1, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "derivatives"));
+    in.want_derivative = false;
+    in.discrepancy = &(const struct discrepancy){.n = 0};
+    assert_int_equal(radiance_source_init(&source, &in, view, 1, &err), STATUS_INVALID);
+    assert_non_null(strstr(err.text, "discrepancy"));
     for (const struct scattering_model *const *m = scattering_registry(); *m != NULL; m++) {
         double start[SCATTERING_MAX_PARAM];
         for (size_t p = 0; p < (*m)->n_param; p++) start[p] = (*m)->param[p].start;
