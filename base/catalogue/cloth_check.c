@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 static size_t divisor(size_t a, size_t b) { return b == 0 ? a : divisor(b, a % b); }
 
@@ -17,6 +18,51 @@ static bool crosses(const struct cloth_description *d, enum cloth_direction dire
     return false;
 }
 
+/* Returns whether yarn b lies above yarn a at a crossing of the draft. Wefts come first, then warps. */
+static bool lies_above(const struct cloth_description *d, size_t a, size_t b)
+{
+    if (a < d->n_weft && b >= d->n_weft) return d->warp_over[a][b - d->n_weft];
+    if (b < d->n_weft && a >= d->n_weft) return !d->warp_over[b][a - d->n_weft];
+    return false;
+}
+
+/* Marks the yarns that come along when yarn 0 is lifted off (up: those above it, those above these, and so on) or taken
+ * away downwards; returns how many. */
+static size_t mark_layer(const struct cloth_description *d, bool up, bool layer[2 * CLOTH_MAX_DRAFT])
+{
+    const size_t n = d->n_weft + d->n_warp;
+    size_t stack[2 * CLOTH_MAX_DRAFT] = {0}, n_stack = 1, n_layer = 1;
+    for (size_t i = 0; i < n; i++) layer[i] = i == 0;
+    while (n_stack > 0) {
+        const size_t a = stack[--n_stack];
+        for (size_t b = 0; b < n; b++) {
+            if (layer[b] || !(up ? lies_above(d, a, b) : lies_above(d, b, a))) continue;
+            layer[b] = true;
+            n_layer++;
+            stack[n_stack++] = b;
+        }
+    }
+    return n_layer;
+}
+
+/* Checks that the cloth hangs together (Clapham 1980, When a fabric hangs together): no set of yarns lies above all
+ * others. Yarns that never cross to the other face are named before. */
+static status check_layers(const struct cloth_description *d, struct error *err)
+{
+    bool layer[2 * CLOTH_MAX_DRAFT];
+    const size_t n = d->n_weft + d->n_warp;
+    for (int up = 1; up >= 0; up--) {
+        size_t n_layer = mark_layer(d, up == 1, layer), warp = d->n_weft;
+        if (n_layer == n) continue;
+        while (warp + 1 < n && !layer[warp]) warp++;
+        return error_set_field(err, STATUS_INVALID, "draft",
+                               "the draft falls apart into two cloths: %zu of its %zu yarns, weft 0 and warp %zu among "
+                               "them, lie %s all others wherever they cross",
+                               n_layer, n, warp - d->n_weft, up == 1 ? "above" : "below");
+    }
+    return STATUS_OK;
+}
+
 static status check_draft(const struct cloth_description *d, struct error *err)
 {
     for (int k = 0; k < 2; k++) {
@@ -28,7 +74,7 @@ static status check_draft(const struct cloth_description *d, struct error *err)
                                        "%s %zu of the draft never crosses to the other face, so it is not held",
                                        direction == CLOTH_WEFT ? "weft" : "warp", i);
     }
-    return STATUS_OK;
+    return check_layers(d, err);
 }
 
 static status check_order(const struct cloth_description *d, enum cloth_direction direction, struct error *err)
@@ -153,6 +199,36 @@ status cloth_number_check_one(const struct cloth_number *n, struct error *err)
     return STATUS_OK;
 }
 
+/* Returns whether a number `name` of kind (-1: of the cloth or of any kind) is fitted or not 0. */
+static bool is_there(const struct cloth_description *d, int kind, const char *name)
+{
+    for (size_t i = 0; i < d->n_number; i++) {
+        const struct cloth_number *n = &d->number[i];
+        if (strcmp(n->info->name, name) == 0 && (kind < 0 || n->kind == kind) && (n->fitted || n->value != 0.0))
+            return true;
+    }
+    return false;
+}
+
+/* Refuses to fit a number that changes nothing, because another one is 0. */
+static status check_effect(const struct cloth_description *d, struct error *err)
+{
+    static const struct {
+        const char *name, *needs;
+    } table[] = {{"hair_length_um", "hairs_per_mm"},
+                 {"nap_tilt_deg", "hairs_per_mm"},
+                 {"nap_direction_deg", "nap_tilt_deg"},
+                 {"pile_direction_deg", "pile_tilt_deg"}};
+    for (size_t i = 0; i < d->n_number; i++)
+        for (size_t k = 0; k < sizeof table / sizeof *table; k++)
+            if (d->number[i].fitted && strcmp(d->number[i].info->name, table[k].name) == 0 &&
+                !is_there(d, d->number[i].kind, table[k].needs))
+                return error_set_field(err, STATUS_INVALID, d->number[i].name,
+                                       "'%s' cannot be fitted: it changes nothing while '%s' is 0", d->number[i].name,
+                                       table[k].needs);
+    return STATUS_OK;
+}
+
 status cloth_description_check(struct cloth_description *d, struct error *err)
 {
     status st = check_kinds(d, err);
@@ -164,5 +240,6 @@ status cloth_description_check(struct cloth_description *d, struct error *err)
     }
     if (st == STATUS_OK) st = check_places(d, err);
     for (size_t i = 0; i < d->n_number && st == STATUS_OK; i++) st = cloth_number_check_one(&d->number[i], err);
+    if (st == STATUS_OK) st = check_effect(d, err);
     return st;
 }

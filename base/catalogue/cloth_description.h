@@ -123,9 +123,10 @@ int cloth_number_index(const struct cloth_description *d, const char *name);
 double cloth_number_value(const struct cloth_description *d, const double *number, int kind, const char *name);
 
 /* Completes d (n_yarn) and checks it. STATUS_INVALID with the field as in the job document after "cloth.": "draft" (a
- * yarn that never crosses), "warp", "weft" (orders that name no kind, or do not repeat within CLOTH_MAX_YARN yarns),
- * "tile_warps", "tile_wefts" (no multiple of the repeat), "yarns" (several kinds in a felt), "yarns[k]" (a kind that no
- * yarn has), "yarns[k].plies", "crimp" and so on for values outside of their ranges. */
+ * yarn that never crosses, or yarns that lie above all others), "warp", "weft" (orders that name no kind, or do not
+ * repeat within CLOTH_MAX_YARN yarns), "tile_warps", "tile_wefts" (no multiple of the repeat), "yarns" (several kinds
+ * in a felt), "yarns[k]" (a kind that no yarn has), "yarns[k].plies", "crimp" and so on for values outside of their
+ * ranges and for fitted numbers that change nothing. */
 status cloth_description_check(struct cloth_description *d, struct error *err);
 
 /* Checks a vector of d->n_number values against the ranges of the catalogue. STATUS_INVALID, field: the number. */

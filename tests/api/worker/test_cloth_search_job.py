@@ -79,10 +79,10 @@ def test_a_budget_that_cannot_be_kept_is_said(tmp_path, sample):
 
 
 def test_numbers_come_back(tmp_path, sample):
-    """The flatness is found again. Hairs have no length where there are none, and the job says so."""
+    """The flatness is found again. Where hairs are as good as none, their length is not determined, and the job says so."""
     job = make_job(tmp_path, "job", sample)
     fixed = {k: TRUTH[k] for k in ("beta_R", "beta_TT", "gamma_TT")}
-    result = run(job, cloth=cloth(hair_length_um={"value": 200, "lower": 100, "upper": 1000}, **FITTED), photographs=photographs(sample),
+    result = run(job, cloth=cloth(hairs_per_mm=0.02, hair_length_um={"value": 200, "lower": 100, "upper": 1000}, **FITTED), photographs=photographs(sample),
                  fit={"model": "two_lobe.v1", "path_budget": 1200000, "fixed": fixed, **OUTPUT})
     numbers = {n["name"]: n for n in result["cloth_numbers"]}
     flatness, hairs = numbers["yarns[0].flatness"], numbers["yarns[0].hair_length_um"]

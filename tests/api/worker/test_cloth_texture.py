@@ -68,6 +68,21 @@ def test_a_contradiction_is_named(real):
     assert "'twill 2/1'" in warning and "the job says 'plain'" in warning
 
 
+def test_a_felt_that_shows_a_weave(real):
+    state = finish(real, {"weave": "felt", "yarns": [{"fibers": 50}]}, png(192, weave(TWILL)))
+    assert state["result"]["geometry"]["texture"]["contradicts_draft"]
+    assert any("'twill 2/1'" in text and "the job says 'felt'" in text for text in state["warnings"])
+
+
+def test_threads_that_the_photograph_contradicts(real):
+    """Yarns of 8 and 10 pixels at 30 pixels in a millimetre are 37.5 and 30 in a centimetre."""
+    state = finish(real, {"texture_px_per_mm": 30, "warp_per_cm": 20, "weft_per_cm": 31, "tile_warps": 3, "tile_wefts": 3},
+                   png(192, weave(TWILL)))
+    said = [text for text in state["warnings"] if "in a centimetre" in text]
+    assert len(said) == 1 and "shows 37.5 warp yarns" in said[0] and "the job says 20" in said[0] and "30 pixels in a millimetre" in said[0]
+    assert state["result"]["geometry"]["cloth"]["description"]["warp_per_cm"] == 20
+
+
 def noisy(draft):
     """A weave under so much noise that its draft is found, but not certain."""
     grey, rng = weave(draft), random.Random(1)

@@ -11,6 +11,8 @@
 
 /* Below this confidence a contradiction is not certain. */
 static const double LEAST_CERTAIN = 0.7;
+/* Counted threads that differ by more than this share from those of the photograph contradict it. */
+static const double THREADS_OFF = 0.1;
 
 /* The job's draft in the order of a detected one: row 0 is the upper weft. The draft of a cloth without one repeat of
  * at most WEAVE_CELL_MAX yarns cannot be compared: false. */
@@ -28,17 +30,41 @@ static void compare_drafts(struct pipeline_context *c)
 {
     struct weave_draft own;
     char shown[32], given[32], text[400];
-    if (!draft_of_job(c->doc->cloth, &own) || weave_draft_same(&own, &c->texture.guess.draft)) return;
+    const bool felt = c->doc->cloth->structure == CLOTH_FELT;
+    if (!felt && (!draft_of_job(c->doc->cloth, &own) || weave_draft_same(&own, &c->texture.guess.draft))) return;
     double confidence = c->texture.guess.draft_confidence;
     c->texture.contradicts = true;
     weave_draft_name(&c->texture.guess.draft, shown, sizeof shown);
-    weave_draft_name(&own, given, sizeof given);
+    if (felt)
+        snprintf(given, sizeof given, "%s", c->doc->cloth->weave);
+    else
+        weave_draft_name(&own, given, sizeof given);
     snprintf(text, sizeof text,
              "photograph '%.120s' shows the weave '%s'%s%s (confidence %.2f), and the job says '%s': %s",
              c->doc->cloth_texture, shown, strcmp(shown, given) == 0 ? " in another" : "",
              strcmp(shown, given) == 0 ? " direction or step" : "", confidence, given,
              confidence < LEAST_CERTAIN ? "the photograph is not certain" : "one of them is wrong");
     pipeline_warn(c, OPTION_CLOTH_TEXTURE, text);
+}
+
+/* Warns of threads that the job counts otherwise than the photograph shows them at its scale. */
+static void compare_threads(struct pipeline_context *c)
+{
+    static const char *const name[] = {"weft", "warp"};
+    const struct cloth_description *d = c->doc->cloth;
+    char text[400];
+    if (!(c->doc->cloth_texture_px_per_mm > 0.0 && c->texture.guess.yarns_confidence > TEXTURE_WORTH_TAKING)) return;
+    for (int a = CLOTH_WEFT; a <= CLOTH_WARP; a++) {
+        double shown = 10.0 * c->doc->cloth_texture_px_per_mm / c->texture.guess.spacing_px[a == CLOTH_WARP ? 0 : 1];
+        if (!(d->threads_per_cm[a] > 0.0) || fabs(log(shown / d->threads_per_cm[a])) < log(1.0 + THREADS_OFF)) continue;
+        snprintf(
+            text, sizeof text,
+            "photograph '%.120s' shows %.3g %s yarns in a centimetre (confidence %.2f), and the job says %.3g: one "
+            "of them or the scale of the photograph, %g pixels in a millimetre, is wrong",
+            c->doc->cloth_texture, shown, name[a], c->texture.guess.yarns_confidence, d->threads_per_cm[a],
+            c->doc->cloth_texture_px_per_mm);
+        pipeline_warn(c, OPTION_CLOTH_TEXTURE, text);
+    }
 }
 
 static void warn_uncertain(struct pipeline_context *c)
@@ -110,6 +136,7 @@ status pipeline_read_texture(struct pipeline_context *c, struct error *err)
              "photograph '%s' shows the weave '%s' (confidence %.2f), warps every %.2f and wefts every %.2f pixels "
              "(confidence %.2f)",
              c->doc->cloth_texture, name, g->draft_confidence, g->spacing_px[0], g->spacing_px[1], g->yarns_confidence);
+    compare_threads(c);
     if (c->doc->cloth_draft_from_texture) {
         warn_uncertain(c);
         return take_draft(c, err);

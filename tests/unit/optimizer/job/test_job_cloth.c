@@ -207,13 +207,44 @@ static void test_sizes_of_drafts(void **state)
     job_document_check_error(CLOTH("\"draft\":[\"11\",\"01\"]"), "cloth.draft", "never crosses");
 }
 
+/* Two plain weaves on top of each other, with nothing that holds them together; one lifted warp stitches them. */
+static void test_drafts_that_fall_apart(void **state)
+{
+    (void)state;
+    job_document_check_error(CLOTH("\"draft\":[\"1110\",\"1011\",\"1000\",\"0010\"]"), "cloth.draft",
+                             "4 of its 8 yarns, weft 0 and warp 0 among them, lie above all others");
+    job_document_check_error(CLOTH("\"draft\":[\"1000\",\"0010\",\"1110\",\"1011\"]"), "cloth.draft",
+                             "4 of its 8 yarns, weft 0 and warp 1 among them, lie below all others");
+    describes_itself(CLOTH("\"draft\":[\"1110\",\"1011\",\"1100\",\"0010\"],\"yarns\":[{}]"));
+}
+
+static void test_fitted_numbers_without_effect(void **state)
+{
+    (void)state;
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"warp\":[0,1],\"yarns\":[{\"hair_length_um\":{}},"
+                                   "{\"hairs_per_mm\":3}]"),
+                             "cloth.yarns[0].hair_length_um", "changes nothing while 'hairs_per_mm' is 0");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"nap_tilt_deg\":{}"), "cloth.nap_tilt_deg", "hairs_per_mm");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"nap_direction_deg\":{},\"yarns\":[{\"hairs_per_mm\":{}}]"),
+                             "cloth.nap_direction_deg", "nap_tilt_deg");
+    job_document_check_error(CLOTH("\"weave\":\"velvet\",\"pile_tilt_deg\":0,\"pile_direction_deg\":{}"),
+                             "cloth.pile_direction_deg", "pile_tilt_deg");
+    describes_itself(CLOTH("\"weave\":\"plain\",\"nap_tilt_deg\":{},\"yarns\":[{\"hairs_per_mm\":{},"
+                           "\"hair_length_um\":{}}]"));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_a_name_is_enough),   cmocka_unit_test(test_everything_given),
-        cmocka_unit_test(test_named_kinds),        cmocka_unit_test(test_a_cloth_describes_itself),
-        cmocka_unit_test(test_mistakes_are_named), cmocka_unit_test(test_what_would_have_no_effect),
+        cmocka_unit_test(test_a_name_is_enough),
+        cmocka_unit_test(test_everything_given),
+        cmocka_unit_test(test_named_kinds),
+        cmocka_unit_test(test_a_cloth_describes_itself),
+        cmocka_unit_test(test_mistakes_are_named),
+        cmocka_unit_test(test_what_would_have_no_effect),
         cmocka_unit_test(test_sizes_of_drafts),
+        cmocka_unit_test(test_drafts_that_fall_apart),
+        cmocka_unit_test(test_fitted_numbers_without_effect),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
