@@ -164,7 +164,8 @@ static double fit_paths(const struct pipeline_context *c)
 static double validation_paths(const struct pipeline_context *c)
 {
     const double n_fit = fit_paths(c);
-    return validated_path * (double)c->n_model * (pipeline_validation_paths(c, n_fit) + pipeline_pilot_paths(n_fit));
+    return validated_path * (double)c->n_model *
+           (pipeline_validation_paths(c, n_fit) + pipeline_factor_paths(c, n_fit) + pipeline_pilot_paths(n_fit));
 }
 
 /* A stage of n_path paths after the fit, which is stage i_fit and counts as a number of paths before it has ended. */

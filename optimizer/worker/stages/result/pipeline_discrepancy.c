@@ -11,6 +11,12 @@ const struct discrepancy *pipeline_discrepancy(const struct pipeline_model *m)
     return m->discrepancy.factor.n > 0 ? &m->discrepancy.factor : NULL;
 }
 
+bool pipeline_discrepancy_expected(const struct pipeline_context *c, const struct pipeline_model *m)
+{
+    return c->doc->discrepancy && m->appearance.kind == MODEL_SURFACE &&
+           m->fit.cross_validation.discrepancy_share > 0.0;
+}
+
 static status fit_factor(const struct pipeline_context *c, struct pipeline_model *m, struct error *err)
 {
     struct discrepancy_row *row = malloc((c->observation.n + 1) * sizeof *row);
@@ -53,7 +59,7 @@ status pipeline_find_discrepancy(struct pipeline_context *c, struct pipeline_mod
     m->discrepancy = (struct pipeline_discrepancy){.fit_rel_rms = m->validation.fit.rel_rms,
                                                    .heldout_rel_rms = m->validation.held_out.rel_rms};
     if (!c->doc->discrepancy) return STATUS_OK;
-    if (m->appearance.kind != MODEL_SURFACE || !(v->discrepancy_share > 0.0)) {
+    if (!pipeline_discrepancy_expected(c, m)) {
         worker_status_warn(c->status, "%s: the fit of %s goes without one, because %s",
                            job_option_key(OPTION_DISCREPANCY), m->appearance.id,
                            m->appearance.kind != MODEL_SURFACE ? "it is a model of a volume"

@@ -1,6 +1,7 @@
 /* Stage "validation": fresh estimates of every configuration at each model's result, scored for fitted and held-out
  * rows apart. */
 #include "optimizer/worker/stages/result/pipeline_validation.h"
+#include "optimizer/fit/discrepancy/discrepancy_fit.h"
 #include "optimizer/worker/stages/fit/pipeline_cloth.h"
 #include "optimizer/worker/stages/fit/pipeline_trace.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
@@ -20,6 +21,9 @@ enum { VALIDATION_PILOT = 8192, VALIDATION_LEAST = 1024, VALIDATION_BLOCK = 256,
  * a fair judgement where the fit needed few. */
 static const double least_rel_se = 0.005, most_rel_se = 0.01, misfit_share = 0.1, validation_share = 0.4,
                     validation_least_paths = 3e5;
+/* The same for fitted rows that give a discrepancy, because their noise goes into the renderings of all others, and the
+ * paths for all of them. */
+static const double factor_rel_se = 0.003, factor_share = 0.2;
 
 static double brightness(const struct observation *o)
 {
@@ -41,6 +45,33 @@ double pipeline_validation_paths(const struct pipeline_context *c, double n_fit_
     double least =
         c->doc->path_budget > 0 ? fmin(validation_least_paths, (double)c->doc->path_budget) : validation_least_paths;
     return fmax(validation_share * n_fit_path, least);
+}
+
+double pipeline_factor_paths(const struct pipeline_context *c, double n_fit_path)
+{
+    return c->doc->discrepancy ? factor_share / validation_share * pipeline_validation_paths(c, n_fit_path) : 0.0;
+}
+
+static bool gives_factor(const struct pipeline_context *c, size_t i)
+{
+    return c->observation.item[i].set == JOB_SET_FIT && discrepancy_applies(&c->observation.item[i]);
+}
+
+static void plan_factor(const struct pipeline_context *c, const struct pipeline_model *m, const struct estimate *pilot,
+                        size_t *n_path)
+{
+    double total = 0.0;
+    if (!pipeline_discrepancy_expected(c, m)) return;
+    for (size_t i = 0; i < c->observation.n; i++)
+        if (gives_factor(c, i))
+            total += relative_path_variance(&c->observation.item[i], &pilot[i]) / (factor_rel_se * factor_rel_se);
+    const double shrink = fmin(1.0, pipeline_factor_paths(c, (double)m->fit.n_path) / fmax(total, 1.0));
+    for (size_t i = 0; i < c->observation.n; i++) {
+        if (!gives_factor(c, i)) continue;
+        const double var = relative_path_variance(&c->observation.item[i], &pilot[i]);
+        const double n = fmin(0.5 * shrink * var / (factor_rel_se * factor_rel_se), VALIDATION_MAX);
+        n_path[i] += (size_t)ceil(n / VALIDATION_BLOCK) * VALIDATION_BLOCK;
+    }
 }
 
 /* Plans the paths per replica so that both together reach that standard error. When the budget is short, all rows get
@@ -147,6 +178,7 @@ static status estimate_validation(struct pipeline_context *c, struct pipeline_mo
     status s = e->run(e->context, &call, &progress, m->validation.replica[0], &wall_s, err);
     if (s != STATUS_OK) return s;
     plan_validation(c, m, m->validation.replica[0], n_path);
+    plan_factor(c, m, m->validation.replica[0], n_path);
     for (uint32_t q = 0; q < 2 && s == STATUS_OK; q++) {
         progress = progress_begin_part(&part, whole, 0.1 + 0.45 * q, 0.45);
         call.iteration = 1;
