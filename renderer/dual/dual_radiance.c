@@ -27,9 +27,9 @@ static status check(const struct radiance_input *in, struct error *err)
         return error_set(err, STATUS_INVALID, "cannot render by dual scattering with derivatives: it has none");
     if (in->discrepancy != NULL)
         return error_set(err, STATUS_INVALID, "cannot render by dual scattering with a discrepancy: it has none");
-    if (in->model->surface->flat_section)
-        return error_set_field(err, STATUS_INVALID, "model",
-                               "cannot render model '%s' by dual scattering: its fibers are flat", in->model->id);
+    if (scattering_frame_reason(in->model->surface) != NULL)
+        return error_set_field(err, STATUS_INVALID, "model", "cannot render model '%s' by dual scattering: %s",
+                               in->model->id, scattering_frame_reason(in->model->surface));
     if (!(o->density_forward >= 0 && o->density_forward <= 1 && o->density_backward >= 0 && o->density_backward <= 1))
         return error_set(err, STATUS_INVALID, "cannot render by dual scattering with densities of %g and %g",
                          (double)o->density_forward, (double)o->density_backward);

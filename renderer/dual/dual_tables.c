@@ -197,9 +197,9 @@ status dual_tables_init(struct dual_tables *t, const struct scene *scene, const 
 {
     struct job j = {.t = t};
     memset(t, 0, sizeof *t);
-    if (model->flat_section)
-        return error_set_field(err, STATUS_INVALID, "model",
-                               "cannot render model '%s' by dual scattering: its fibers are flat", model->id);
+    if (scattering_frame_reason(model) != NULL)
+        return error_set_field(err, STATUS_INVALID, "model", "cannot render model '%s' by dual scattering: %s",
+                               model->id, scattering_frame_reason(model));
     status st = parameter_sets_init(&j.sets, scene, model, param, n_set, err);
     t->n_set = j.sets.n;
     t->average = calloc(t->n_set * DUAL_N_THETA + 1, sizeof *t->average);

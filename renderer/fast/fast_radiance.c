@@ -32,9 +32,9 @@ static status check(const struct radiance_input *in, struct error *err)
         return error_set(err, STATUS_INVALID, "cannot render by tables with derivatives: tables have none");
     if (in->discrepancy != NULL)
         return error_set(err, STATUS_INVALID, "cannot render by tables with a discrepancy: tables have none");
-    if (in->model->surface->flat_section)
-        return error_set_field(err, STATUS_INVALID, "model", "cannot render model '%s' by tables: its fibers are flat",
-                               in->model->id);
+    if (scattering_frame_reason(in->model->surface) != NULL)
+        return error_set_field(err, STATUS_INVALID, "model", "cannot render model '%s' by tables: %s", in->model->id,
+                               scattering_frame_reason(in->model->surface));
     if (!(o->corrected_share >= 0.0 && o->corrected_share <= 1.0) ||
         (o->corrected_share > 0.0 && o->visibility != FAST_TRACED))
         return error_set(err, STATUS_INVALID, "cannot correct a share of %g of the samples", o->corrected_share);

@@ -40,6 +40,10 @@ struct scattering_model {
      * the normal of the flat section (fiber_frame_flat). */
     bool flat_section;
 
+    /* Whether the light depends on where across its width the fiber is seen: then v of the fiber frame must be the
+     * normal of the surface at the hit, and the offset from the axis, in radii, is the sine of the azimuth of wo. */
+    bool near_field;
+
     /* STATUS_INVALID, field = parameter name, for a value that is NaN or outside [lower, upper]. */
     status (*prepare)(const double *param, struct scattering_state **state, struct error *err);
     void (*release)(struct scattering_state *state);
@@ -60,6 +64,14 @@ struct scattering_model {
     float (*eval_pdf)(const struct scattering_state *state, const float wi[3], const float wo[3],
                       const float *weight_rgb, float s_rgb[3], float *score);
 };
+
+/* Why v of the fiber frame matters to a model, for error texts: "its fibers are flat". NULL when it does not: then
+ * renderers may take any v. */
+const char *scattering_frame_reason(const struct scattering_model *m);
+
+/* The azimuth of the k-th of n views that have the same weight in a mean over all views of the fiber: equal steps of
+ * the turn for a section, of the width for a near field. 0 for all other models, of which one view is enough. */
+double scattering_view_azimuth_rad(const struct scattering_model *m, int k, int n);
 
 /* All models, NULL-terminated, in the order of the catalogue; and by id (NULL when unknown). */
 const struct scattering_model *const *scattering_registry(void);

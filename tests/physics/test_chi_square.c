@@ -2,7 +2,7 @@
 #include "base/angle.h"
 #include "base/rng.h"
 #include "renderer/scattering/scattering.h"
-#include "tests/support/model_stream.h"
+#include "tests/support/model/model_stream.h"
 #include "tests/support/statistics_test.h"
 
 #include <math.h>

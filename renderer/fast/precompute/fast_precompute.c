@@ -40,11 +40,11 @@ uint64_t fast_tables_checksum(const struct fast_precompute_request *q)
 
 static status check(const struct fast_precompute_request *q, struct error *err)
 {
-    if (q->model->flat_section)
+    if (scattering_frame_reason(q->model) != NULL)
         return error_set_field(err, STATUS_INVALID, "model",
-                               "cannot render model '%s' by tables: its fibers are flat, and tables are of fibers that "
-                               "look alike from all sides around",
-                               q->model->id);
+                               "cannot render model '%s' by tables: %s, and tables are of fibers that look alike from "
+                               "all sides around",
+                               q->model->id, scattering_frame_reason(q->model));
     if (scene_is_bent(q->scene)) return error_set(err, STATUS_INVALID, "cannot make tables of a bent cloth");
     if (q->order > SPHERE_MAX_ORDER)
         return error_set(err, STATUS_INVALID, "cannot make tables of order %u: at most %d", q->order, SPHERE_MAX_ORDER);

@@ -1,5 +1,6 @@
 #include "renderer/scattering/surface/scattering_registry.h"
 
+#include <math.h>
 #include <string.h>
 
 static const struct scattering_model *const registry[] = {
@@ -21,4 +22,16 @@ const struct scattering_model *scattering_find(const char *id)
 int scattering_param_index(const struct scattering_model *m, const char *name)
 {
     return param_index(m->param, m->n_param, name);
+}
+
+const char *scattering_frame_reason(const struct scattering_model *m)
+{
+    if (m->flat_section) return "its fibers are flat";
+    return m->near_field ? "its light depends on where across the fiber it is seen" : NULL;
+}
+
+double scattering_view_azimuth_rad(const struct scattering_model *m, int k, int n)
+{
+    if (m->near_field) return asin((2 * k + 1.0) / n - 1);
+    return m->flat_section ? 2 * M_PI * (k + 0.5) / n : 0;
 }

@@ -150,7 +150,9 @@ static void bounce_at(struct walk *w, const struct scene_hit *hit, const struct 
     const bool flat = w->s->model->flat_section;
     float section[3];
     const bool bent = (flat || w->s->discrepancy != NULL) && scene_bent_normal(w->s->scene, hit, b->normal);
-    if (!flat)
+    if (w->s->model->near_field)
+        fiber_frame_flat_in(&b->frame, hit->tangent, hit->normal);
+    else if (!flat)
         fiber_frame_from(&b->frame, hit->tangent);
     else if (scene_section_normal(w->s->scene, hit, section))
         fiber_frame_flat_in(&b->frame, hit->tangent, section);

@@ -20,6 +20,7 @@
 #include "base/angle.h"
 #include "renderer/transport/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
+#include "tests/support/model/model_furnace.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/trace_input.h"
 
@@ -66,23 +67,20 @@ static struct scattering_state *prepare(const struct scattering_model *m, const 
     return s;
 }
 
-/* Integral of S cos th over all directions of one side. Where a model distinguishes azimuths about the fiber, the other
- * direction's is averaged over. */
+/* Integral of S cos th over all directions of one side. The mean over the azimuth of the other direction, where a model
+ * distinguishes azimuths about the fiber. */
 static double furnace(const struct scattering_model *m, const struct scattering_state *s, double theta, bool in)
 {
-    enum { N_THETA = 720, N_PHI = 180, N_TURN = 8 };
+    enum { N_TURN = 8 };
+    struct model_furnace q = {.n_theta = 720, .n_phi = 180, .n_view = 32};
     int n_turn = m->flat_section ? N_TURN : 1;
     double sum = 0;
-    for (int turn = 0; turn < n_turn; turn++)
-        for (int i = 0; i < N_THETA; i++)
-            for (int j = 0; j < N_PHI; j++) {
-                double t = M_PI * ((i + 0.5) / N_THETA - 0.5), phi = 2 * M_PI * (j + 0.5) / N_PHI, c = cos(t),
-                       psi = M_PI * (turn + 0.5) / N_TURN;
-                float at[3] = {(float)sin(theta), (float)(cos(theta) * cos(psi)), (float)(cos(theta) * sin(psi))},
-                      other[3] = {(float)sin(t), (float)(c * cos(phi)), (float)(c * sin(phi))}, rgb[3];
-                m->eval(s, in ? at : other, in ? other : at, rgb, NULL);
-                sum += (double)rgb[0] * c * c * (M_PI / N_THETA) * (2 * M_PI / N_PHI);
-            }
+    for (int turn = 0; turn < n_turn; turn++) {
+        double rgb[3];
+        q.azimuth_rad = M_PI * (turn + 0.5) / N_TURN;
+        model_furnace(m, s, &q, theta, in, rgb);
+        sum += rgb[0];
+    }
     return sum / n_turn;
 }
 

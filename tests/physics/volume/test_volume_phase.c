@@ -4,7 +4,7 @@
  */
 #include "base/angle.h"
 #include "renderer/scattering/phase_model.h"
-#include "tests/support/model_stream.h"
+#include "tests/support/model/model_stream.h"
 #include "tests/support/statistics_test.h"
 
 #include <math.h>

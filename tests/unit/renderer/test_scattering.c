@@ -3,7 +3,7 @@
 #include "renderer/scattering/gauss_polynomial.h"
 #include "renderer/scattering/scattering.h"
 #include "renderer/scattering/von_mises.h"
-#include "tests/support/model_stream.h"
+#include "tests/support/model/model_stream.h"
 #include "tests/support/tracer/reference_two_lobe.h"
 
 #include "base/angle.h"

@@ -10,6 +10,7 @@ enum {
     N_THETA_I = 28,
     N_PHI = 18,
     N_TURN = 4,
+    N_VIEW = 32,    /* places across a near field's width */
     N_OF_LOBES = 6, /* unknowns of one hair material */
     N_UNKNOWN = HAIR_FIT_N_BLEND * N_OF_LOBES + 1,
     N_START = 4,
@@ -60,13 +61,14 @@ static void add_fiber(const struct scattering_model *m, const struct scattering_
                       size_t i_value, int o, int i, int k)
 {
     double *at = t->fiber + i_value;
-    for (int turn = 0; turn < 2 * N_TURN; turn++) { /* the other azimuth of each pair mirrors the first */
+    const int n = m->near_field ? N_VIEW : 2 * N_TURN;
+    for (int turn = 0; turn < n; turn++) { /* the other azimuth of each pair mirrors the first */
         float wi[3], wo[3], s[3];
-        double from = M_PI * (turn + 0.5) / (2 * N_TURN);
+        double from = m->near_field ? scattering_view_azimuth_rad(m, turn, n) : M_PI * (turn + 0.5) / n;
         direction(t->theta_o[o], from, wo);
         direction(t->theta_i[i], from + (turn % 2 == 0 ? t->phi[k] : -t->phi[k]), wi);
         m->eval(state, wi, wo, s, NULL);
-        for (int c = 0; c < 3; c++) at[c] += (double)s[c] * cos(t->theta_i[i]) / (2 * N_TURN);
+        for (int c = 0; c < 3; c++) at[c] += (double)s[c] * cos(t->theta_i[i]) / n;
     }
 }
 

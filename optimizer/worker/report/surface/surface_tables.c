@@ -64,7 +64,7 @@ status surface_tables_get(struct pipeline_context *c, const struct progress *pro
     const bool tables = wants_tables(c), averages = wants_averages(c, true);
     *t = (struct surface_tables){0};
     if (!tables && !averages) return STATUS_OK;
-    if (model->appearance.kind != MODEL_SURFACE || model->appearance.surface->flat_section) {
+    if (model->appearance.kind != MODEL_SURFACE || scattering_frame_reason(model->appearance.surface) != NULL) {
         if (tables || wants_averages(c, false))
             worker_status_warn(c->status,
                                "all pictures are rendered path by path: there are no tables for the model '%s'",

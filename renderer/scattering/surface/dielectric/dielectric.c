@@ -16,12 +16,9 @@ static status prepare(const double *param, struct scattering_state **state, stru
     status st = param_check(surface_dielectric_param, DIELECTRIC_N_PARAM, surface_dielectric_id, param, err);
     if (st != STATUS_OK) return st;
     struct scattering_state *s = malloc(sizeof *s);
-    struct dielectric_energies energies;
     if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
-    for (int p = 0; p < DIELECTRIC_N_LOBE; p++)
-        cone_lobe_init(&s->longitudinal[p], dielectric_width[p] * param[DIELECTRIC_P_BETA]);
-    st = dielectric_tables(s, param, &energies, err);
-    if (st == STATUS_OK) st = dielectric_balance(s, &energies, err);
+    st = dielectric_tables(s, param, err);
+    if (st == STATUS_OK) st = dielectric_along_init(&s->along, param[DIELECTRIC_P_ETA], param[DIELECTRIC_P_BETA], err);
     if (st != STATUS_OK) {
         free(s);
         return st;
@@ -33,12 +30,6 @@ static status prepare(const double *param, struct scattering_state **state, stru
 static void release(struct scattering_state *s) { free(s); }
 
 static inline float mix(float a, float b, float t) { return a + t * (b - a); }
-
-static inline float position(float x, int n, int *i)
-{
-    *i = x < (float)(n - 1) ? (int)x : n - 1;
-    return fminf(x - (float)*i, 1);
-}
 
 /* What two directions are to each other: places in the tables. */
 struct place {
@@ -54,30 +45,11 @@ static struct place place_of(const float wi[3], const float wo[3])
     float a = g.in.azimuth[0] - g.out.azimuth[0], b = g.in.azimuth[1] - g.out.azimuth[1];
     float half_sine = 0.5f * sqrtf(a * a + b * b), /* sin(ph / 2) */
         half_cosine = sqrtf(0.5f * fiber_one_minus_cos_opposite(&g.in, &g.out));
-    g.x = position(cos_d * DIELECTRIC_N_ROW, DIELECTRIC_N_ROW, &g.row);
-    g.y = position(2 * fiber_angle(half_sine, half_cosine) * (float)(DIELECTRIC_N_PHI / M_PI), DIELECTRIC_N_PHI,
-                   &g.column);
-    g.out_x = position(g.out.cos_theta * DIELECTRIC_N_ROW, DIELECTRIC_N_ROW, &g.out_row);
+    g.x = dielectric_position(cos_d * DIELECTRIC_N_ROW, DIELECTRIC_N_ROW, &g.row);
+    g.y = dielectric_position(2 * fiber_angle(half_sine, half_cosine) * (float)(DIELECTRIC_N_PHI / M_PI),
+                              DIELECTRIC_N_PHI, &g.column);
+    g.out_x = dielectric_position(g.out.cos_theta * DIELECTRIC_N_ROW, DIELECTRIC_N_ROW, &g.out_row);
     return g;
-}
-
-static float scale_at(const struct scattering_state *s, float theta_rad, float d_ln[2])
-{
-    int i;
-    float t = position(fabsf(theta_rad) * (float)((LOBE_BALANCE_N - 1) / M_PI_2), LOBE_BALANCE_N - 1, &i);
-    for (int k = 0; k < 2; k++) d_ln[k] = mix(s->d_ln_scale[k][i], s->d_ln_scale[k][i + 1], t);
-    return mix(s->scale[i], s->scale[i + 1], t);
-}
-
-/* M of each lobe, and d ln M / d beta when wanted. */
-static void longitudinal(const struct scattering_state *s, const float wi[3], const float wo[3], const struct place *g,
-                         float m[DIELECTRIC_N_LOBE], float *d_beta)
-{
-    for (int p = 0; p < DIELECTRIC_N_LOBE; p++) {
-        m[p] = cone_lobe_eval(&s->longitudinal[p], wi[0], g->in.cos_theta, wo[0], g->out.cos_theta,
-                              d_beta != NULL ? &d_beta[p] : NULL);
-        if (d_beta != NULL) d_beta[p] *= (float)dielectric_width[p];
-    }
 }
 
 #define BILINEAR(field)                                                                                                \
@@ -177,7 +149,9 @@ static void scores(const struct scattering_state *s, const struct place *g, cons
 static void eval_at(const struct scattering_state *s, const struct place *g, const float m[DIELECTRIC_N_LOBE],
                     const float *d_beta, float s_rgb[3], float *score)
 {
-    float d_in[2], d_out[2], scale = scale_at(s, g->in.theta_rad, d_in) * scale_at(s, g->out.theta_rad, d_out);
+    float d_in[2], d_out[2],
+        scale = dielectric_scale_at(&s->along, g->in.theta_rad, d_in) *
+                dielectric_scale_at(&s->along, g->out.theta_rad, d_out);
     const struct dielectric_row *a = &s->row[g->row], *b = a + 1;
     struct terms t = {
         .m = m, .d_beta = d_beta, .n = cell_at(s, g), .d_scale = {d_in[0] + d_out[0], d_in[1] + d_out[1]}};
@@ -195,7 +169,7 @@ static float eval_pdf(const struct scattering_state *s, const float wi[3], const
 {
     const struct place g = place_of(wi, wo);
     float m[DIELECTRIC_N_LOBE], d_beta[DIELECTRIC_N_LOBE];
-    longitudinal(s, wi, wo, &g, m, score != NULL ? d_beta : NULL);
+    dielectric_longitudinal(&s->along, wi[0], g.in.cos_theta, wo[0], g.out.cos_theta, m, score != NULL ? d_beta : NULL);
     eval_at(s, &g, m, d_beta, s_rgb, score);
     return density(s, &g, weight_rgb, m);
 }
@@ -204,7 +178,7 @@ static void eval(const struct scattering_state *s, const float wi[3], const floa
 {
     const struct place g = place_of(wi, wo);
     float m[DIELECTRIC_N_LOBE], d_beta[DIELECTRIC_N_LOBE];
-    longitudinal(s, wi, wo, &g, m, score != NULL ? d_beta : NULL);
+    dielectric_longitudinal(&s->along, wi[0], g.in.cos_theta, wo[0], g.out.cos_theta, m, score != NULL ? d_beta : NULL);
     eval_at(s, &g, m, d_beta, s_rgb, score);
 }
 
@@ -212,7 +186,7 @@ static float pdf(const struct scattering_state *s, const float wi[3], const floa
 {
     const struct place g = place_of(wi, wo);
     float m[DIELECTRIC_N_LOBE];
-    longitudinal(s, wi, wo, &g, m, NULL);
+    dielectric_longitudinal(&s->along, wi[0], g.in.cos_theta, wo[0], g.out.cos_theta, m, NULL);
     return density(s, &g, weight_rgb, m);
 }
 
@@ -245,12 +219,12 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
     struct fiber_direction out = fiber_direction_of(wo);
     float p[DIELECTRIC_N_MODE], rest = u[0], phi = u[2];
     int row, k = 0;
-    float x = position(out.cos_theta * DIELECTRIC_N_ROW, DIELECTRIC_N_ROW, &row);
+    float x = dielectric_position(out.cos_theta * DIELECTRIC_N_ROW, DIELECTRIC_N_ROW, &row);
     mode_probabilities(s, row, x, weight_rgb, p);
     while (k < DIELECTRIC_N_MODE - 1 && rest >= p[k]) rest -= p[k++];
     rest = stretch(rest, p[k]);
     int lobe = k < DIELECTRIC_N_LOBE ? k : DIELECTRIC_TRT;
-    float sin_i = cone_lobe_sample(&s->longitudinal[lobe], wo[0], out.cos_theta, u[1], rest);
+    float sin_i = cone_lobe_sample(&s->along.longitudinal[lobe], wo[0], out.cos_theta, u[1], rest);
     if (k == DIELECTRIC_REST) {
         phi *= (float)(2 * M_PI);
     } else { /* a side, then one of the two rows, each with its share */

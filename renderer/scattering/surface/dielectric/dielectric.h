@@ -21,9 +21,8 @@
 #ifndef SELVEDGE_RENDERER_DIELECTRIC_H
 #define SELVEDGE_RENDERER_DIELECTRIC_H
 
-#include "renderer/scattering/surface/cone_lobe.h"
+#include "renderer/scattering/surface/dielectric/dielectric_along.h"
 #include "renderer/scattering/surface/dielectric/dielectric_ray.h"
-#include "renderer/scattering/surface/lobe_balance.h"
 #include "renderer/scattering/surface/scattering_registry.h"
 
 enum {
@@ -33,7 +32,7 @@ enum {
     DIELECTRIC_P_BETA,
     DIELECTRIC_P_GAMMA
 };
-enum { DIELECTRIC_N_ROW = 64, DIELECTRIC_N_PHI = 180, DIELECTRIC_N_LOBE = 3 };
+enum { DIELECTRIC_N_ROW = 64, DIELECTRIC_N_PHI = 180 };
 
 /* N at one place of the table. The derivatives are of the values, not of their logarithms. */
 struct dielectric_cell {
@@ -54,26 +53,13 @@ struct dielectric_row {
 };
 
 struct scattering_state {
-    struct cone_lobe longitudinal[DIELECTRIC_N_LOBE]; /* R, TT, TRT; the rest has that of TRT */
-    float scale[LOBE_BALANCE_N];                      /* a by |th| */
-    float d_ln_scale[2][LOBE_BALANCE_N];              /* d ln a by eta and by beta */
+    struct dielectric_along along;
     struct dielectric_row row[DIELECTRIC_N_ROW + 1];
     struct dielectric_cell cell[DIELECTRIC_N_ROW + 1][DIELECTRIC_N_PHI + 1];
     struct dielectric_slope slope[DIELECTRIC_N_ROW + 1][DIELECTRIC_N_PHI + 1];
 };
 
-/* Mean shares of the modes without absorption, and their derivative by eta, at each row. */
-struct dielectric_energies {
-    double share[DIELECTRIC_N_ROW + 1][DIELECTRIC_N_MODE], d_eta[DIELECTRIC_N_ROW + 1][DIELECTRIC_N_MODE];
-};
-
-/* Width of a mode's longitudinal lobe over beta: R, TT, TRT. */
-extern const double dielectric_width[DIELECTRIC_N_LOBE];
-
-/* Fills in rows, cells and slopes, and the energies. STATUS_NO_MEMORY. */
-status dielectric_tables(struct scattering_state *s, const double *param, struct dielectric_energies *energies,
-                         struct error *err);
-/* Fills in the scale. The longitudinal lobes are set. STATUS_NO_MEMORY. */
-status dielectric_balance(struct scattering_state *s, const struct dielectric_energies *energies, struct error *err);
+/* Fills in rows, cells and slopes. STATUS_NO_MEMORY. */
+status dielectric_tables(struct scattering_state *s, const double *param, struct error *err);
 
 #endif

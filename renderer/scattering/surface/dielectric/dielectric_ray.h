@@ -20,6 +20,21 @@
 
 enum dielectric_mode { DIELECTRIC_R, DIELECTRIC_TT, DIELECTRIC_TRT, DIELECTRIC_REST, DIELECTRIC_N_MODE };
 
+/* Quadrature over the offset: x at midpoints of (0, pi/2), where the nodes crowd where Fresnel reflection rises. */
+enum { DIELECTRIC_N_OFFSET = 96 };
+#define DIELECTRIC_LEAST_COSINE 1e-3 /* of th: at 0 all light is reflected */
+
+/* x, and the weights cos x dx, of sum 1. */
+static inline void dielectric_offsets(double x[DIELECTRIC_N_OFFSET], double weight[DIELECTRIC_N_OFFSET])
+{
+    double sum = 0;
+    for (int i = 0; i < DIELECTRIC_N_OFFSET; i++) {
+        x[i] = (i + 0.5) * M_PI_2 / DIELECTRIC_N_OFFSET;
+        sum += weight[i] = cos(x[i]);
+    }
+    for (int i = 0; i < DIELECTRIC_N_OFFSET; i++) weight[i] /= sum;
+}
+
 struct dielectric_ray {
     double fresnel, length;                /* F, l */
     double gamma_t;                        /* rad */
@@ -64,15 +79,16 @@ static inline struct dielectric_shares dielectric_shares_of(const struct dielect
     struct dielectric_shares a;
     double f = r->fresnel, g = 1 - f, t = exp(ln_c_t * r->length), d_ln_t = ln_c_t * r->d_length;
     double enter = g * g * t, inv = 1 / (1 - f * t);
-    /* d ln A by F and by T; ln T = l ln C_T */
-    const double by_f[DIELECTRIC_N_MODE] = {1 / f, -2 / g, -2 / g + 1 / f, -2 / g + 2 / f + t * inv};
+    /* d A by F, and d ln A by ln T = l ln C_T */
+    const double by_f[DIELECTRIC_N_MODE] = {1, -2 * g * t, g * (1 - 3 * f) * t * t,
+                                            g * f * t * t * t * inv * (2 - 4 * f + g * f * t * inv)};
     const double by_ln_t[DIELECTRIC_N_MODE] = {0, 1, 2, 3 + f * t * inv};
     a.value[DIELECTRIC_R] = f;
     a.value[DIELECTRIC_TT] = enter;
     a.value[DIELECTRIC_TRT] = enter * f * t;
     a.value[DIELECTRIC_REST] = enter * f * t * f * t * inv;
     for (int p = 0; p < DIELECTRIC_N_MODE; p++) {
-        a.d_eta[p] = a.value[p] * (by_f[p] * r->d_fresnel + by_ln_t[p] * d_ln_t);
+        a.d_eta[p] = by_f[p] * r->d_fresnel + a.value[p] * by_ln_t[p] * d_ln_t;
         a.d_c_t[p] = a.value[p] * by_ln_t[p] * r->length / c_t;
     }
     return a;

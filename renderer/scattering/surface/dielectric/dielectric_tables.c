@@ -3,10 +3,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_OFFSET = 96, N_WAVE = 128 };
+enum { N_WAVE = 128 };
 enum quantity { VALUE, BY_C_T, BY_ETA, N_QUANTITY };
-#define LEAST_FACTOR 5.5  /* waves with k w above this have a factor below exp(-5.5^2 / 2) = 3e-7 */
-#define LEAST_COSINE 1e-3 /* of th_d: at 0 all light is reflected */
+#define LEAST_FACTOR 5.5 /* waves with k w above this have a factor below exp(-5.5^2 / 2) = 3e-7 */
 
 /* Fourier coefficients of one mode: sum over the offsets of A cos(k Phi), and their derivatives by C_T and eta. */
 struct spectrum {
@@ -16,8 +15,8 @@ struct spectrum {
 struct work {
     struct spectrum mode[DIELECTRIC_N_LOBE];
     double cosine[N_WAVE][DIELECTRIC_N_PHI + 1];
-    double column[3][N_QUANTITY + 1][DIELECTRIC_N_PHI + 1]; /* the last one: by gamma */
-    double offset[N_OFFSET], weight[N_OFFSET];              /* x in (0, pi/2) and cos x dx, of sum 1 */
+    double column[3][N_QUANTITY + 1][DIELECTRIC_N_PHI + 1];          /* the last one: by gamma */
+    double offset[DIELECTRIC_N_OFFSET], weight[DIELECTRIC_N_OFFSET]; /* x in (0, pi/2) and cos x dx, of sum 1 */
 };
 
 static double mode_width(int p, double gamma) { return sqrt(p + 1.0) * gamma; }
@@ -30,12 +29,7 @@ static int n_wave(int p, double gamma)
 
 static void fill_work(struct work *w)
 {
-    double sum = 0;
-    for (int i = 0; i < N_OFFSET; i++) {
-        w->offset[i] = (i + 0.5) * M_PI_2 / N_OFFSET;
-        sum += w->weight[i] = cos(w->offset[i]);
-    }
-    for (int i = 0; i < N_OFFSET; i++) w->weight[i] /= sum;
+    dielectric_offsets(w->offset, w->weight);
     for (int k = 0; k < N_WAVE; k++)
         for (int j = 0; j <= DIELECTRIC_N_PHI; j++) w->cosine[k][j] = cos(k * j * M_PI / DIELECTRIC_N_PHI);
 }
@@ -59,15 +53,14 @@ static void add_waves(struct spectrum *mode, int n, const struct dielectric_shar
     }
 }
 
-static void add_offsets(struct work *w, struct scattering_state *s, const double *param, int row,
-                        struct dielectric_energies *energies)
+static void add_offsets(struct work *w, struct scattering_state *s, const double *param, int row)
 {
-    double cosine = fmax((double)row / DIELECTRIC_N_ROW, LEAST_COSINE), eta = param[DIELECTRIC_P_ETA];
+    double cosine = fmax((double)row / DIELECTRIC_N_ROW, DIELECTRIC_LEAST_COSINE), eta = param[DIELECTRIC_P_ETA];
     double rest[3][N_QUANTITY] = {{0}}, energy[DIELECTRIC_N_MODE][3] = {{0}};
-    for (int i = 0; i < N_OFFSET; i++) {
+    for (int i = 0; i < DIELECTRIC_N_OFFSET; i++) {
         double x = w->offset[i];
         struct dielectric_ray ray = dielectric_ray_at(cosine, x, eta);
-        struct dielectric_shares share[3], clear = dielectric_shares_of(&ray, 1, 0);
+        struct dielectric_shares share[3];
         for (int c = 0; c < 3; c++) {
             double c_t = param[DIELECTRIC_P_C_T + c];
             share[c] = dielectric_shares_of(&ray, c_t, log(c_t));
@@ -75,11 +68,8 @@ static void add_offsets(struct work *w, struct scattering_state *s, const double
             rest[c][BY_C_T] += w->weight[i] * share[c].d_c_t[DIELECTRIC_REST];
             rest[c][BY_ETA] += w->weight[i] * share[c].d_eta[DIELECTRIC_REST];
         }
-        for (int p = 0; p < DIELECTRIC_N_MODE; p++) {
-            energies->share[row][p] += w->weight[i] * clear.value[p];
-            energies->d_eta[row][p] += w->weight[i] * clear.d_eta[p];
+        for (int p = 0; p < DIELECTRIC_N_MODE; p++)
             for (int c = 0; c < 3; c++) energy[p][c] += w->weight[i] * share[c].value[p];
-        }
         for (int p = 0; p < DIELECTRIC_N_LOBE; p++) {
             double d_azimuth, azimuth = dielectric_azimuth(&ray, p, x, &d_azimuth);
             add_waves(&w->mode[p], n_wave(p, param[DIELECTRIC_P_GAMMA]), share, p, w->weight[i], azimuth, d_azimuth);
@@ -150,16 +140,14 @@ static void store_density(const struct work *w, struct dielectric_row *row, int 
     }
 }
 
-status dielectric_tables(struct scattering_state *s, const double *param, struct dielectric_energies *energies,
-                         struct error *err)
+status dielectric_tables(struct scattering_state *s, const double *param, struct error *err)
 {
     struct work *w = malloc(sizeof *w);
     if (w == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
     fill_work(w);
-    memset(energies, 0, sizeof *energies);
     for (int row = 0; row <= DIELECTRIC_N_ROW; row++) {
         memset(w->mode, 0, sizeof w->mode);
-        add_offsets(w, s, param, row, energies);
+        add_offsets(w, s, param, row);
         for (int p = 0; p < DIELECTRIC_N_LOBE; p++) {
             sum_waves(w, p, param[DIELECTRIC_P_GAMMA]);
             store(w, s, row, p);

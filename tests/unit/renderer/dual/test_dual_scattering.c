@@ -224,7 +224,7 @@ static void what_is_refused(void **state)
         double start[SCATTERING_MAX_PARAM];
         for (size_t p = 0; p < (*m)->n_param; p++) start[p] = (*m)->param[p].start;
         status s = dual_tables_init(&none, c.scene, *m, start, 0, NULL, NULL, &err);
-        assert_int_equal(s, (*m)->flat_section ? STATUS_INVALID : STATUS_OK);
+        assert_int_equal(s, scattering_frame_reason(*m) != NULL ? STATUS_INVALID : STATUS_OK);
         for (size_t i = 0; i < DUAL_N_THETA && s == STATUS_OK; i++)
             for (int k = 0; k < 3; k++) {
                 const struct dual_average *a = &none.average[i];

@@ -1,23 +1,46 @@
-#include "renderer/scattering/surface/dielectric/dielectric.h"
+#include "renderer/scattering/surface/dielectric/dielectric_along.h"
+#include "renderer/scattering/surface/dielectric/dielectric_ray.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-enum { N = LOBE_BALANCE_N };
+enum { N = LOBE_BALANCE_N, N_ROW = 64 };
 enum { BY_ETA, BY_BETA };
 
 const double dielectric_width[DIELECTRIC_N_LOBE] = {1, 0.5, 2};
+
+/* Mean shares of the modes without absorption, and their derivative by eta, by cos th_d. */
+struct energies {
+    double share[N_ROW + 1][DIELECTRIC_N_MODE], d_eta[N_ROW + 1][DIELECTRIC_N_MODE];
+};
+
+static void fill_energies(double eta, struct energies *e)
+{
+    double x[DIELECTRIC_N_OFFSET], weight[DIELECTRIC_N_OFFSET];
+    dielectric_offsets(x, weight);
+    memset(e, 0, sizeof *e);
+    for (int row = 0; row <= N_ROW; row++)
+        for (int i = 0; i < DIELECTRIC_N_OFFSET; i++) {
+            double cosine = fmax((double)row / N_ROW, DIELECTRIC_LEAST_COSINE);
+            struct dielectric_ray ray = dielectric_ray_at(cosine, x[i], eta);
+            struct dielectric_shares clear = dielectric_shares_of(&ray, 1, 0);
+            for (int p = 0; p < DIELECTRIC_N_MODE; p++) {
+                e->share[row][p] += weight[i] * clear.value[p];
+                e->d_eta[row][p] += weight[i] * clear.d_eta[p];
+            }
+        }
+}
 
 /* Shares of the longitudinal lobes, by half of the distance of so many nodes; TRT's has the rest too. */
 struct shares {
     double of[2 * N][DIELECTRIC_N_LOBE], d_eta[2 * N][DIELECTRIC_N_LOBE];
 };
 
-static void fill_shares(const struct dielectric_energies *e, struct shares *y)
+static void fill_shares(const struct energies *e, struct shares *y)
 {
     for (int i = 0; i < 2 * N; i++) {
-        double x = cos(0.5 * lobe_balance_angle_rad(i)) * DIELECTRIC_N_ROW;
-        int row = x < DIELECTRIC_N_ROW - 1 ? (int)x : DIELECTRIC_N_ROW - 1;
+        double x = cos(0.5 * lobe_balance_angle_rad(i)) * N_ROW;
+        int row = x < N_ROW - 1 ? (int)x : N_ROW - 1;
         x -= row;
         for (int p = 0; p < DIELECTRIC_N_MODE; p++) {
             int lobe = p < DIELECTRIC_N_LOBE ? p : DIELECTRIC_TRT;
@@ -35,7 +58,7 @@ struct pair {
 };
 
 /* Adds light between two directions with the given sines and cosines; th_d is half of so many nodes. */
-static void add_pair(const struct scattering_state *s, const struct shares *y, int half, const float t[2],
+static void add_pair(const struct dielectric_along *s, const struct shares *y, int half, const float t[2],
                      const float u[2], struct pair *sum)
 {
     for (int lobe = 0; lobe < DIELECTRIC_N_LOBE; lobe++) {
@@ -48,7 +71,7 @@ static void add_pair(const struct scattering_state *s, const struct shares *y, i
 }
 
 /* The kernel, with its derivative by beta as the solver's own; by eta in `d_eta`. */
-static void fill_kernel(const struct scattering_state *s, const struct shares *y, struct lobe_balance *b,
+static void fill_kernel(const struct dielectric_along *s, const struct shares *y, struct lobe_balance *b,
                         double (*d_eta)[N])
 {
     float angle[N][2];
@@ -70,17 +93,20 @@ static void fill_kernel(const struct scattering_state *s, const struct shares *y
 
 struct balance {
     struct lobe_balance solver;
+    struct energies energies;
     struct shares shares;
     double d_eta[N][N], a[N], d_ln_a[2][N];
 };
 
-status dielectric_balance(struct scattering_state *s, const struct dielectric_energies *energies, struct error *err)
+status dielectric_along_init(struct dielectric_along *s, double eta, double beta_rad, struct error *err)
 {
     struct balance *b = malloc(sizeof *b);
     if (b == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
+    for (int p = 0; p < DIELECTRIC_N_LOBE; p++) cone_lobe_init(&s->longitudinal[p], dielectric_width[p] * beta_rad);
     lobe_balance_init(&b->solver);
     for (int i = 0; i < N; i++) b->solver.want[i] = 1;
-    fill_shares(energies, &b->shares);
+    fill_energies(eta, &b->energies);
+    fill_shares(&b->energies, &b->shares);
     fill_kernel(s, &b->shares, &b->solver, b->d_eta);
     lobe_balance_solve(&b->solver, b->a);
     lobe_balance_source_of_kernel(&b->solver, b->a);
