@@ -123,6 +123,8 @@ static const struct cli_option {
      offsetof(struct cli_args, reference)},
     {OPT_PICTURE, 0, "filter", NULL, "also make a filtered view with less noise, for the eye",
      offsetof(struct cli_args, filter)},
+    {OPT_PICTURE, 0, "ground-gap-mm", "MM", "a plane with the shadow, so far under the cloth (default: none)",
+     offsetof(struct cli_args, ground_gap_mm)},
     {OPT_PICTURE, 0, "width-mm", "MM", "width of what it shows (default: 40)", offsetof(struct cli_args, width_mm)},
     {OPT_PICTURE, 0, "size-mm", "MM", "edge of the flat or draped piece, length of the cylinder (default: 40)",
      offsetof(struct cli_args, size_mm)},

@@ -59,7 +59,8 @@ struct cli_args {
     bool watch, json, follow, draft, align, once, yes;
     bool reference; /* --reference: of a picture */
     bool filter;    /* --filter: of a picture */
-    bool help;      /* --help was given: for one command if has_command is set */
+    const char *ground_gap_mm;
+    bool help; /* --help was given: for one command if has_command is set */
     bool version;
     bool has_command;
 };

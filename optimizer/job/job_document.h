@@ -90,8 +90,9 @@ struct job_surface_picture {
     double width_mm; /* what the picture shows */
     size_t px, sample;
     enum job_picture_method method;
-    bool reference; /* also path by path, and compared with that */
-    bool filter;    /* also filtered for the eye (renderer/preview) */
+    bool reference;                      /* also path by path, and compared with that */
+    bool filter;                         /* also filtered for the eye (renderer/preview) */
+    double ground_gap_mm, ground_albedo; /* of a plane under the cloth; gap NaN: none */
 };
 
 /* What a kind of yarn in the document counts or names; 0 fibers: not given. */

@@ -32,6 +32,8 @@ status scene_bend(const struct scene *flat, const struct mesh *mesh, bool black_
                   struct error *err);
 /* Whether a point (orbit center at the origin) lies in the cloth, between its upper and its lower side. */
 bool scene_encloses(const struct scene *scene, const double p_mm[3]);
+/* z of the lowest point of the cloth, its thickness included (orbit center at the origin). */
+double scene_lowest_mm(const struct scene *scene);
 /* Whether distant parts of a bent cloth run through each other; at_mm: one of the places. False for a flat one. */
 bool scene_crosses_itself(const struct scene *scene, double at_mm[3]);
 void scene_free(struct scene *scene);

@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-service bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-transport bench-models bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics docs-seam bench-browser bench-pictures bench-weave bench-weave-rendered
+.PHONY: bench bench-service bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-transport bench-models bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics docs-ground docs-seam bench-browser bench-pictures bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -113,6 +113,10 @@ docs-columns: | deps-test ## draw docs/images/cylinder-columns.svg anew: column 
 docs-fabrics: | deps-test ## make docs/images/six-fabrics.png anew: the fabrics of Table 5.3 on a cylinder and draped (8 minutes on one core; kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/pictures/six_fabrics.py --build $(BUILD) --out docs/images/six-fabrics.png
+
+docs-ground: | deps-test ## make docs/images/ground-shadow.png anew: cloths over a plane, as rendered and filtered (half a minute of a core; kept in build)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/pictures/ground_pictures.py --build $(BUILD) --out docs/images/ground-shadow.png
 
 docs-seam: | deps-test ## draw docs/images/seam.png anew: the seam of a scanned twill as traced and joined (a minute; kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2

@@ -67,6 +67,7 @@ static status read_picture(const struct cli_args *a, json_t *picture, const char
     if (s == STATUS_OK) s = read_number("radius-mm", a->radius_mm, "radius_mm", false, picture, err);
     if (s == STATUS_OK) s = read_number("wrap-deg", a->wrap_deg, "wrap_deg", false, picture, err);
     if (s == STATUS_OK) s = read_number("mesh-unit-mm", a->mesh_unit_mm, "mesh_unit_mm", false, picture, err);
+    if (s == STATUS_OK) s = read_number("ground-gap-mm", a->ground_gap_mm, "ground_gap_mm", false, picture, err);
     const char *method = a->method == NULL && a->reference ? "fast" : a->method;
     if (method != NULL) json_object_set_new(picture, "method", json_string(method));
     if (a->reference) json_object_set_new(picture, "reference", json_true());

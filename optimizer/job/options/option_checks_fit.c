@@ -133,6 +133,19 @@ static status check_picture(const struct job_document *doc, size_t i, struct err
             "'%s' is %g: a flat piece is lit from above, below 90 degrees, or from behind, above 90, "
             "with 'black_sheet' false",
             field, p->light_theta_deg);
+    snprintf(field, sizeof field, "pictures[%zu].ground_gap_mm", i);
+    const double *around = doc->environment_rgb;
+    if (!isnan(p->ground_gap_mm) && (p->light_theta_deg >= 90.0 || p->camera_theta_deg >= 90.0))
+        return error_set_field(err, STATUS_INVALID, field,
+                               "'%s' is given, but the ground under the cloth wants lamp and camera above it, below 90 "
+                               "degrees from the vertical",
+                               field);
+    if (!isnan(p->ground_gap_mm) &&
+        (doc->environment_file[0] != '\0' || around[0] > 0.0 || around[1] > 0.0 || around[2] > 0.0))
+        return error_set_field(err, STATUS_INVALID, field,
+                               "'%s' is given, but the ground under the cloth is lit by the lamp alone: leave out "
+                               "'environment'",
+                               field);
     snprintf(field, sizeof field, "pictures[%zu].reference", i);
     if (p->reference && p->method == JOB_PICTURE_PATH)
         return error_set_field(err, STATUS_INVALID, field,

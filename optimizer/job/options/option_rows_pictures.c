@@ -110,13 +110,30 @@ const struct job_option option_rows_pictures[] = {
      .meaning =
          "Whether the picture is also rendered path by path, with as many samples. The result states how far the "
          "two are apart. Needs a `method` other than `path`."},
+    {.path = "pictures[].ground_gap_mm",
+     .kind = OPTION_NUMBER,
+     OF_PICTURE(ground_gap_mm),
+     RANGE(0, 1000),
+     .unit = "mm",
+     .left_out = "no ground",
+     .meaning = "Puts a matte, level plane under the cloth, so far below its lowest point, with the shadow that the "
+                "cloth casts on it. It is lit by the lamp alone, which stands above it as the camera does: the job has "
+                "no `environment`, and the plane gives no light to the cloth."},
+    {.path = "pictures[].ground_albedo",
+     .kind = OPTION_NUMBER,
+     OF_PICTURE(ground_albedo),
+     RANGE(0, 1),
+     .standard = "0.5",
+     .meaning = "Share of the light that this plane reflects, the same in red, green and blue."},
     {.path = "pictures[].filter",
      .kind = OPTION_BOOL,
      OF_PICTURE(filter),
      .standard = "false",
-     .meaning = "Whether a filtered view is made beside the picture, in which less noise is seen: "
-                "`pictures/on-1-filtered.png`. It is a preview for the eye. The picture itself, its numbers and its "
-                "OpenEXR file stay as they were rendered."},
+     .meaning =
+         "Whether a filtered view is made beside the picture, in which less noise is seen: "
+         "`pictures/on-1-filtered.png`. Of a ground it filters the soft shadow (sheared filtering). It is a preview "
+         "for the eye. The picture itself, its numbers and its "
+         "OpenEXR file stay as they were rendered."},
     {.path = "twin",
      .kind = OPTION_SECTION,
      .left_out = "none",

@@ -38,6 +38,11 @@ bool scene_encloses(const struct scene *s, const double p_mm[3])
            0.0;
 }
 
+double scene_lowest_mm(const struct scene *s)
+{
+    return s->bent != NULL ? s->bent->space.shell.low_mm[2] : (double)s->bottom_mm;
+}
+
 /* Whether two faces have a position of the mesh in common. Node i belongs to position i / 2. */
 static bool touch(const uint32_t a[3], const uint32_t b[3])
 {

@@ -32,21 +32,23 @@ status surface_filter_init(const struct pipeline_context *c, size_t i, const str
 void surface_filter_release(struct surface_filter *filter) { image_release(&filter->feature); }
 
 status surface_filter_write(const struct pipeline_context *c, const struct surface_filter *filter,
-                            const struct surface_passes *so_far, double exposure, const struct progress *progress,
+                            const struct surface_ground *ground, const struct surface_passes *so_far, double exposure,
                             json_t **entry, struct error *err)
 {
     char name[64], file[80];
     struct image out;
     *entry = NULL;
     if (filter->feature.pixel == NULL) return STATUS_OK;
-    struct progress silent = progress_silent(progress);
+    struct progress silent = progress_silent(&c->progress);
     status s = joint_filter(&so_far->image, &filter->feature, c->pool, &silent, &out, err);
     if (s != STATUS_OK) return s;
+    surface_ground_add_filtered(ground, &out);
     snprintf(name, sizeof name, "%s-filtered", so_far->name);
     s = result_image_write(c, &out, "pictures", name, exposure, false, err);
     image_release(&out);
     if (s != STATUS_OK) return s;
     snprintf(file, sizeof file, "pictures/%s.png", name);
-    *entry = json_pack("{s:s, s:s}", "file", file, "filter", "joint.v1");
+    *entry = json_pack("{s:s, s:s}", "file", file, "filter",
+                       ground->present && ground->sheared ? "joint.v1+sheared.v1" : "joint.v1");
     return *entry != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", file);
 }

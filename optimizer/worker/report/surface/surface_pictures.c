@@ -8,6 +8,7 @@
 #include "optimizer/worker/report/surface/surface_cloth.h"
 #include "optimizer/worker/report/surface/surface_difference.h"
 #include "optimizer/worker/report/surface/surface_filter.h"
+#include "optimizer/worker/report/surface/surface_ground.h"
 #include "optimizer/worker/report/surface/surface_passes.h"
 #include "optimizer/worker/report/surface/surface_tables.h"
 #include "optimizer/worker/stages/result/pipeline_choice.h"
@@ -30,6 +31,7 @@ struct one_picture {
     const char *entry_path;
     struct surface_method how;
     const struct surface_tables *tables;
+    const struct surface_ground *ground; /* from render on */
 };
 
 static double paths_of(const struct job_surface_picture *p)
@@ -153,17 +155,24 @@ static status write_json(struct pipeline_context *c, const char *path, const jso
 /* The entry of result.json lies beside the picture and is written last: a picture is finished when its entry has all
  * samples. *out: the entry, of which the caller has a reference. */
 static status write_entry(struct pipeline_context *c, const struct one_picture *one,
-                          const struct surface_filter *filter, const struct surface_passes *so_far,
-                          const struct progress *progress, json_t **out, struct error *err)
+                          const struct surface_filter *filter, const struct surface_passes *so_far, json_t **out,
+                          struct error *err)
 {
     const struct job_surface_picture *p = &c->doc->surface_picture[one->i];
-    double exposure = exposure_of(&so_far->image);
     json_t *filtered = NULL;
-    status s = write_picture(c, p, so_far, exposure, err);
-    if (s == STATUS_OK) s = surface_filter_write(c, filter, so_far, exposure, progress, &filtered, err);
+    struct surface_passes shown;
+    status s = surface_ground_add(one->ground, so_far, &shown, err);
     if (s != STATUS_OK) return s;
-    json_decref(*out);
-    *out = picture_json(one, p, so_far, exposure);
+    double exposure = exposure_of(&shown.image);
+    s = write_picture(c, p, &shown, exposure, err);
+    if (s == STATUS_OK) s = surface_filter_write(c, filter, one->ground, so_far, exposure, &filtered, err);
+    if (s == STATUS_OK) {
+        json_decref(*out);
+        *out = picture_json(one, p, &shown, exposure);
+    }
+    surface_passes_release(&shown);
+    if (s != STATUS_OK) return s;
+    if (one->ground->present) json_object_set_new(*out, "ground_z_mm", json_number(one->ground->z_mm));
     if (filtered != NULL) json_object_set_new(*out, "filtered", filtered);
     return write_json(c, one->entry_path, *out, err);
 }
@@ -177,9 +186,9 @@ static status render_picture(struct pipeline_context *c, const struct one_pictur
     status s = surface_filter_init(c, one->i, q, one->tables, progress, &filter, err);
     while (s == STATUS_OK && so_far->n_sample < q->n_sample) {
         s = surface_passes_add(c, q, progress, so_far, err);
-        if (s == STATUS_OK) s = write_entry(c, one, &filter, so_far, progress, entry, err);
+        if (s == STATUS_OK) s = write_entry(c, one, &filter, so_far, entry, err);
     }
-    if (s == STATUS_OK && *entry == NULL) s = write_entry(c, one, &filter, so_far, progress, entry, err);
+    if (s == STATUS_OK && *entry == NULL) s = write_entry(c, one, &filter, so_far, entry, err);
     surface_filter_release(&filter);
     return s;
 }
@@ -197,13 +206,16 @@ static status render_reference(struct pipeline_context *c, const struct one_pict
     q.stream += JOB_MAX_SURFACE_PICTURE;
     status s = surface_passes_start(c, name, q.width, q.height, &traced, err);
     while (s == STATUS_OK && traced.n_sample < q.n_sample) s = surface_passes_add(c, &q, progress, &traced, err);
+    struct surface_passes shown = {0}, shown_picture = {0};
+    if (s == STATUS_OK) s = surface_ground_add(one->ground, &traced, &shown, err);
+    if (s == STATUS_OK) s = surface_ground_add(one->ground, picture, &shown_picture, err);
     if (s == STATUS_OK)
-        s = result_image_write(c, &traced.image, "pictures", name, exposure_of(&picture->image), true, err);
+        s = result_image_write(c, &shown.image, "pictures", name, exposure_of(&shown_picture.image), true, err);
     if (s == STATUS_OK) {
         json_object_set_new(entry, "reference", reference_json(picture, &traced));
         s = write_json(c, one->entry_path, entry, err);
     }
-    surface_passes_release(&traced);
+    surface_passes_release(&shown), surface_passes_release(&shown_picture), surface_passes_release(&traced);
     return s;
 }
 
@@ -237,9 +249,14 @@ static status render(struct pipeline_context *c, const struct one_picture *one, 
     struct progress first = progress_begin_part(&part, progress, 0.0, compared ? 0.5 : 1.0);
     if (!traced && pipeline_discrepancy(model) != NULL)
         worker_status_warn(c->status, "picture %zu is not path traced, and goes without the discrepancy", one->i + 1);
-    if (s == STATUS_OK) s = render_picture(c, one, &q, &first, so_far, entry, err);
+    struct surface_ground ground = {0};
+    struct one_picture with = *one;
+    with.ground = &ground;
+    if (s == STATUS_OK) s = surface_ground_init(c, one->i, &q, &first, &ground, err);
+    if (s == STATUS_OK) s = render_picture(c, &with, &q, &first, so_far, entry, err);
     first = progress_begin_part(&part, progress, 0.5, 0.5);
-    if (s == STATUS_OK && compared) s = render_reference(c, one, q, &first, so_far, *entry, err);
+    if (s == STATUS_OK && compared) s = render_reference(c, &with, q, &first, so_far, *entry, err);
+    surface_ground_release(&ground);
     surface_cloth_release(&cloth);
     return s == STATUS_OK || s == STATUS_CANCELLED ? s : error_prefix(err, s, "picture %zu", one->i + 1);
 }
