@@ -17,8 +17,8 @@ status surface_filter_init(const struct pipeline_context *c, size_t i, const str
                            const struct surface_tables *tables, const struct progress *progress,
                            struct surface_filter *filter, struct error *err);
 void surface_filter_release(struct surface_filter *filter);
-/* Filters the picture so far, which is of the cloth alone, adds the filtered ground, and writes it. *entry: an object for "filtered" of the picture's entry, or NULL if the
- * picture is not filtered. */
+/* Filters the picture so far, which is of the cloth alone, adds the filtered ground, and writes it. *entry: an object
+ * for "filtered" of the picture's entry, or NULL if the picture is not filtered. */
 status surface_filter_write(const struct pipeline_context *c, const struct surface_filter *filter,
                             const struct surface_ground *ground, const struct surface_passes *so_far, double exposure,
                             json_t **entry, struct error *err);
