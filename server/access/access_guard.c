@@ -72,14 +72,20 @@ static bool is_own(struct http_request *r)
 {
     char owner[STORE_OWNER_BYTES] = "";
     struct error err = {0};
-    bool job = strstr(r->route->path, "{id}") != NULL, upload = strstr(r->route->path, "{upload}") != NULL;
-    if (r->grant.all || (!job && !upload)) return true;
+    const bool job = strstr(r->route->path, "{id}") != NULL, upload = strstr(r->route->path, "{upload}") != NULL,
+               batch = strstr(r->route->path, "{batch}") != NULL;
+    if (r->grant.all || (!job && !upload && !batch)) return true;
     status s = !id_valid(r->param[0]) ? STATUS_NOT_FOUND
+               : batch                ? store_batch_owner(r->service->store, r->param[0], owner, &err)
                : job                  ? store_job_owner(r->service->store, r->param[0], owner, &err)
                                       : store_upload_owner(r->service->store, r->param[0], owner, &err);
     if (s == STATUS_OK && strcmp(owner, r->grant.owner) == 0) return true;
     if (s == STATUS_OK || s == STATUS_NOT_FOUND)
-        error_set(&err, STATUS_NOT_FOUND, "%s '%.40s' does not exist", job ? "job" : "upload", r->param[0]);
+        error_set(&err, STATUS_NOT_FOUND, "%s '%.40s' does not exist",
+                  job     ? "job"
+                  : batch ? "batch"
+                          : "upload",
+                  r->param[0]);
     reply_problem(r, NULL, &err, NULL);
     return false;
 }

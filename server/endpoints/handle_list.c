@@ -150,6 +150,7 @@ static bool read_request(struct http_request *r, struct list_request *l)
     q->sample = given(r, "sample");
     q->id = given(r, "id");
     q->tag = given(r, "tag");
+    q->batch = given(r, "batch");
     if (q->id != NULL && (strspn(q->id, "0123456789abcdef-") != strlen(q->id) || strlen(q->id) > 36))
         return refuse(r, "id", "it must be the beginning of an id", q->id);
     q->limit = (size_t)limit + 1; /* one more than asked for, to know whether there is another page */

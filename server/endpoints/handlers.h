@@ -18,6 +18,16 @@ void handle_list_jobs(struct http_request *r);
 void handle_list_tags(struct http_request *r);
 void handle_put_tags(struct http_request *r);
 void handle_act_on_jobs(struct http_request *r);
+/* handle_batches.c */
+void handle_list_batches(struct http_request *r);
+void handle_submit_batch(struct http_request *r);
+void handle_get_batch(struct http_request *r);
+void handle_delete_batch(struct http_request *r);
+void handle_start_batch(struct http_request *r);
+void handle_retry_batch(struct http_request *r);
+void handle_cancel_batch(struct http_request *r);
+void handle_batch_results(struct http_request *r);
+void handle_batch_csv(struct http_request *r);
 /* handle_files.c */
 void handle_list_files(struct http_request *r);
 void handle_declare_files(struct http_request *r);

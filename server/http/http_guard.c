@@ -119,8 +119,10 @@ bool guard_body(struct http_request *r)
 {
     if (r->route->body == HTTP_BODY_NONE) return true;
     const struct settings *s = r->service->settings;
-    bool json = r->route->body == HTTP_BODY_JSON;
-    long long most = json ? s->max_document_bytes : s->max_patch_bytes;
+    bool json = r->route->body != HTTP_BODY_UPLOAD;
+    long long most = r->route->body == HTTP_BODY_BATCH ? s->max_batch_bytes
+                     : json                            ? s->max_document_bytes
+                                                       : s->max_patch_bytes;
     if (request_header(r, "Content-Length") == NULL)
         reply_code(r, "length_required", "Content-Length", "a body with a Content-Length is required");
     else if (!type_is(request_header(r, "Content-Type"), json ? "application/json" : "application/offset+octet-stream"))

@@ -93,7 +93,8 @@ static enum MHD_Result first_call(struct http_server *s, struct MHD_Connection *
     r->entry = info == NULL ? NULL : info->socket_context;
     connection_body_begins(s->connection, r->entry);
     bool now = examine(r, method);
-    if (r->reply == NULL && r->route != NULL && r->route->body == HTTP_BODY_JSON) {
+    if (r->reply == NULL && r->route != NULL &&
+        (r->route->body == HTTP_BODY_JSON || r->route->body == HTTP_BODY_BATCH)) {
         r->body = malloc((size_t)r->content_length + 1);
         if (r->body == NULL) return MHD_NO;
         r->body[0] = '\0';

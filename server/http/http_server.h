@@ -41,8 +41,8 @@ struct http_request {
     struct connection_entry *entry;
 };
 
-/* What a route does with the request's body. */
-enum http_body { HTTP_BODY_NONE, HTTP_BODY_JSON, HTTP_BODY_UPLOAD };
+/* What a route does with the request's body. HTTP_BODY_BATCH: JSON that may be larger. */
+enum http_body { HTTP_BODY_NONE, HTTP_BODY_JSON, HTTP_BODY_BATCH, HTTP_BODY_UPLOAD };
 
 struct http_route {
     const char *method, *path; /* path segments in braces are parameters; {path...} matches the rest of the path */

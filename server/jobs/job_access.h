@@ -18,12 +18,22 @@ void job_mark_edited(struct job_row *row);
 /* Whether the job whose geometry this one adopts, if any, exists and has the same owner. STATUS_INVALID, in the same
  * words for a job of another owner as for one that does not exist. */
 status job_check_adopted(struct job_service *v, const struct job_row *row, struct error *err);
+/* Whether a declared file has an allowed name, role, size and SHA-256, which it puts into lower case. STATUS_INVALID,
+ * STATUS_TOO_LARGE. */
+status job_check_declaration(struct job_service *v, struct file_row *row, struct error *err);
+/* Checks whether a job can be queued, and changes its row so; the caller writes it. The row has its document. */
+status job_make_queued(struct job_service *v, struct job_row *row, struct job_refusal *refusal, struct error *err);
+/* Makes the folders of jobs that have none yet, each with document and journal, and syncs them all at once. The rows
+ * have their documents. */
+status job_make_places(struct job_service *v, const struct job_row *row, size_t n, struct error *err);
 /* Whether an owner, beside what it keeps, may keep further jobs and bytes; else STATUS_DISK_FULL, and the refusal says
  * so with the numbers. */
 status job_check_quota(struct job_service *v, const struct access_grant *grant, const char *owner,
                        const struct owner_use *more, struct job_refusal *refusal, struct error *err);
 /* Repeats in the job's journal what the database holds already. A failure is logged: the database is the owner. */
 void job_note(struct job_service *v, const char *job_id, const struct journal_entry *entry);
+/* The same for many jobs, with one sync. */
+void job_note_all(struct job_service *v, const struct job_row *row, size_t n);
 /* store_job_update, and the journal. */
 status job_update(struct job_service *v, struct job_row *row, struct error *err);
 /* The same for changes that free space or end work: if the disk is full, the ballast file is released for

@@ -8,10 +8,13 @@
 #include "server/jobs/job_paths.h"
 #include "server/jobs/versions/result_version.h"
 
+#include <fcntl.h>
 #include <sodium.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 static status check_document(const char *document, size_t n_bytes, char sample[256], struct error *err)
 {
@@ -43,6 +46,60 @@ static status make_folders(struct job_service *v, const char *id, struct error *
     }
     path_join(path, v->settings->data, "jobs", id, NULL);
     return s == STATUS_OK ? durable_sync_folder_of(path, err) : s;
+}
+
+/* Without syncs. */
+static status make_place(const struct job_row *row, const char *folder, struct error *err)
+{
+    static const char *const part[] = {JOB_FOLDER_INPUT, "upload"};
+    const struct journal_entry all = {.job = row, .document = true};
+    char path[PATH_BYTES];
+    status s = STATUS_OK;
+    for (size_t i = 0; s == STATUS_OK && i < 2; i++) {
+        path_join(path, folder, part[i], NULL);
+        s = durable_make_folder(path, err);
+    }
+    path_join(path, folder, JOB_FILE_DOCUMENT, NULL);
+    if (s == STATUS_OK) s = durable_replace_volatile(path, row->document, strlen(row->document), err);
+    return s == STATUS_OK ? job_journal_append(folder, &all, false, err) : s;
+}
+
+/* Syncs everything that was written to the data folder. */
+static status sync_all(struct job_service *v, struct error *err)
+{
+    int fd = open(v->settings->data, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    status s = fd < 0 || syncfs(fd) != 0 ? error_set_errno(err, "cannot sync '%s'", v->settings->data) : STATUS_OK;
+    if (fd >= 0) close(fd);
+    return s;
+}
+
+status job_make_places(struct job_service *v, const struct job_row *row, size_t n, struct error *err)
+{
+    char folder[PATH_BYTES], path[PATH_BYTES];
+    struct stat st;
+    size_t n_made = 0;
+    status s = STATUS_OK;
+    for (size_t i = 0; s == STATUS_OK && i < n; i++) {
+        path_join(folder, v->settings->data, "jobs", row[i].id, NULL);
+        path_join(path, folder, JOB_FILE_JOURNAL, NULL);
+        if (lstat(path, &st) == 0) continue;
+        s = make_place(&row[i], folder, err);
+        n_made++;
+    }
+    return s == STATUS_OK && n_made > 0 ? sync_all(v, err) : s;
+}
+
+void job_note_all(struct job_service *v, const struct job_row *row, size_t n)
+{
+    char folder[PATH_BYTES];
+    for (size_t i = 0; i < n; i++) {
+        struct error err = {0};
+        path_join(folder, v->settings->data, "jobs", row[i].id, NULL);
+        status s = job_journal_append(folder, &(struct journal_entry){.job = &row[i]}, false, &err);
+        if (s != STATUS_OK && s != STATUS_NOT_FOUND) log_warning(v->log, "job %s: %s", row[i].id, err.text);
+    }
+    struct error err = {0};
+    if (n > 0 && sync_all(v, &err) != STATUS_OK) log_warning(v->log, "%s", err.text);
 }
 
 static void text_hash(const char *text, size_t n_bytes, char out[STORE_HASH_TEXT_BYTES])

@@ -69,7 +69,7 @@ static bool role_valid(const char *role)
     return false;
 }
 
-static status check_declaration(struct job_service *v, struct file_row *row, struct error *err)
+status job_check_declaration(struct job_service *v, struct file_row *row, struct error *err)
 {
     if (!job_file_name_valid(row->name))
         return error_set_field(
@@ -244,7 +244,7 @@ status job_declare_files(struct job_service *v, const struct access_grant *grant
     *i_fault = n;
     status s = STATUS_OK;
     for (size_t i = 0; s == STATUS_OK && i < n; i++) {
-        s = check_declaration(v, &file[i].row, err);
+        s = job_check_declaration(v, &file[i].row, err);
         if (s != STATUS_OK) *i_fault = i;
     }
     if (s == STATUS_OK) s = check_names(file, n, i_fault, err);

@@ -11,7 +11,7 @@ static void wake(struct job_service *v)
     if (v->supervisor != NULL) supervisor_wake(v->supervisor);
 }
 
-static status queue(struct job_service *v, struct job_row *row, struct job_refusal *refusal, struct error *err)
+status job_make_queued(struct job_service *v, struct job_row *row, struct job_refusal *refusal, struct error *err)
 {
     status s = job_disk_check(v, 0, err);
     if (s != STATUS_OK) return s;
@@ -34,7 +34,7 @@ static status queue(struct job_service *v, struct job_row *row, struct job_refus
     row->error_code[0] = row->error_field[0] = row->error_text[0] = '\0';
     row->queued_unix_s = clock_wall_s();
     row->started_unix_s = row->finished_unix_s = 0;
-    return job_update(v, row, err);
+    return STATUS_OK;
 }
 
 static status begin(struct job_service *v, const char *id, bool retry, const int64_t *priority, bool *changed,
@@ -62,7 +62,8 @@ static status begin(struct job_service *v, const char *id, bool retry, const int
         goto out;
     }
     if (row.state == JOB_SUCCEEDED) goto out;
-    s = queue(v, &row, refusal, err);
+    s = job_make_queued(v, &row, refusal, err);
+    if (s == STATUS_OK) s = job_update(v, &row, err);
     *changed = s == STATUS_OK;
     if (*changed) log_info(v->log, "job %s queued", row.id);
 out:

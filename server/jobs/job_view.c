@@ -164,6 +164,9 @@ status job_view(struct job_service *v, const struct job_row *row, bool full, jso
     json_object_set_new(out, "priority", json_integer((json_int_t)row->priority));
     json_object_set_new(out, "owner", row->owner[0] != '\0' ? json_string(row->owner) : json_null());
     json_object_set_new(out, "tags", job_tags_json(row));
+    json_object_set_new(out, "batch",
+                        row->batch[0] == '\0' ? json_null()
+                                              : json_pack("{s:s,s:s}", "id", row->batch, "name", row->batch_name));
     put_place(v, out, row);
     put_progress(out, row, st);
     put_error(out, row);

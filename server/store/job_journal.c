@@ -24,8 +24,9 @@ struct text_column {
     {                                                                                                                  \
 #name, offsetof(struct job_row, name), sizeof((struct job_row *)0)->name                                       \
     }
-static const struct text_column text_column[] = {TEXT(sample),     TEXT(owner), TEXT(error_code), TEXT(error_field),
-                                                 TEXT(error_text), TEXT(tags),  TEXT(verdict)};
+static const struct text_column text_column[] = {TEXT(sample),      TEXT(owner),      TEXT(error_code),
+                                                 TEXT(error_field), TEXT(error_text), TEXT(tags),
+                                                 TEXT(verdict),     TEXT(batch),      TEXT(batch_name)};
 #undef TEXT
 
 struct column {
@@ -37,8 +38,8 @@ struct column {
 #name, offsetof(struct job_row, name)                                                                          \
     }
 static const struct column flag_column[] = {COLUMN(cancel_requested), COLUMN(dirty), COLUMN(deleted)};
-static const struct column number_column[] = {COLUMN(attempt), COLUMN(lost_attempts), COLUMN(generation),
-                                              COLUMN(priority), COLUMN(peak_rss_bytes)};
+static const struct column number_column[] = {COLUMN(attempt),  COLUMN(lost_attempts),  COLUMN(generation),
+                                              COLUMN(priority), COLUMN(peak_rss_bytes), COLUMN(batch_place)};
 static const struct column time_column[] = {COLUMN(created_unix_s), COLUMN(updated_unix_s), COLUMN(queued_unix_s),
                                             COLUMN(started_unix_s), COLUMN(finished_unix_s)};
 #undef COLUMN

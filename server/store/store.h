@@ -17,7 +17,8 @@ enum {
     STORE_HASH_TEXT_BYTES = 65,
     STORE_HASH_STATE_BYTES = 256,
     STORE_TAGS_BYTES = 704,
-    STORE_KEY_BYTES = 256
+    STORE_KEY_BYTES = 256,
+    STORE_NAME_BYTES = 256
 };
 
 enum job_state {
@@ -49,10 +50,13 @@ struct job_row {
     double created_unix_s, updated_unix_s, queued_unix_s, started_unix_s, finished_unix_s; /* 0: not yet */
     char error_code[32], error_field[160], error_text[1024];                               /* error_code "": none */
     int64_t peak_rss_bytes;
-    char owner[STORE_OWNER_BYTES]; /* whose token made the job; "": made without a token. Never changes */
-    int64_t priority;              /* -10..10, higher first among the queued jobs of an owner */
-    char tags[STORE_TAGS_BYTES];   /* "", or tags between spaces: " a b " */
-    char verdict[40];              /* its code, once the job has succeeded; "": none */
+    char owner[STORE_OWNER_BYTES];     /* whose token made the job; "": made without a token. Never changes */
+    int64_t priority;                  /* -10..10, higher first among the queued jobs of an owner */
+    char tags[STORE_TAGS_BYTES];       /* "", or tags between spaces: " a b " */
+    char verdict[40];                  /* its code, once the job has succeeded; "": none */
+    char batch[STORE_ID_BYTES];        /* id of the batch (store_batch.h) that it is a sample of; "": none */
+    int64_t batch_place;               /* its place in the table of the batch, from 0 */
+    char batch_name[STORE_NAME_BYTES]; /* read with the row; only store_import writes it */
 };
 void job_row_release(struct job_row *row);
 
@@ -102,7 +106,8 @@ status store_job_replace(struct store *store, struct job_row *row, struct error 
 /* Removes the row, its files and its idempotency keys. */
 status store_job_erase(struct store *store, const char *id, struct error *err);
 
-enum job_order { JOB_BY_CREATION, JOB_BY_END, JOB_BY_SAMPLE };
+/* JOB_BY_PLACE is for the jobs of one batch, without after_serial. */
+enum job_order { JOB_BY_CREATION, JOB_BY_END, JOB_BY_SAMPLE, JOB_BY_PLACE };
 
 /* Which jobs, and from which place of the list on. What is 0 or NULL selects nothing. */
 struct job_query {
@@ -112,6 +117,7 @@ struct job_query {
     const char *sample; /* a part of the sample's name, whatever the case of A-Z */
     const char *id;     /* the beginning of the id */
     const char *tag;
+    const char *batch;   /* id of a batch */
     const char *verdict; /* one of these codes between commas, such as ",good,usable,"; ",," has the jobs without one */
     double created_after_unix_s, created_before_unix_s;
     enum job_order order;
@@ -124,15 +130,18 @@ struct job_query {
 status store_job_list(struct store *store, const struct job_query *q, struct job_row **row, size_t *n,
                       struct error *err);
 void job_rows_free(struct job_row *row, size_t n);
-/* Lists the first n_each queued jobs of each owner, by priority and then by queued_unix_s, owner by owner. As above. */
-status store_job_heads(struct store *store, size_t n_each, struct job_row **row, size_t *n, struct error *err);
-/* A queued job, as far as its turn depends on it. */
+/* A queued job, as far as its turn depends on it (server/workers/queue_turn.h). */
 struct queued_job {
-    char id[STORE_ID_BYTES], owner[STORE_OWNER_BYTES];
+    char id[STORE_ID_BYTES], owner[STORE_OWNER_BYTES], batch[STORE_ID_BYTES];
+    int64_t priority;
     double queued_unix_s;
+    double last_start_unix_s; /* when a job of this owner and batch was started last; 0: never */
 };
-/* Lists all queued jobs, owner by owner, each owner's in the order of their turn. The caller frees *job. */
-status store_job_queue(struct store *store, struct queued_job **job, size_t *n, struct error *err);
+/* Lists the first n_each queued jobs of each batch of each owner (jobs without a batch count as one batch), by priority
+ * and then by queued_unix_s, owner by owner and batch by batch. The caller frees *job. */
+status store_job_queue(struct store *store, size_t n_each, struct queued_job **job, size_t *n, struct error *err);
+/* store_job_update for many jobs, in one transaction. */
+status store_jobs_update(struct store *store, struct job_row *row, size_t n, struct error *err);
 /* Sets verdicts that are not known yet: read gives the code of a job that has succeeded, or "". */
 status store_fill_verdicts(struct store *store, void (*read)(void *context, const char *id, char code[40]),
                            void *context, struct error *err);

@@ -103,6 +103,12 @@ status store_job_owner(struct store *store, const char *job_id, char owner[STORE
          "s", job_id);
 }
 
+status store_batch_owner(struct store *store, const char *batch_id, char owner[STORE_OWNER_BYTES], struct error *err)
+{
+    LOOK(store, take_owner, owner, "there is no such batch", err, "SELECT owner FROM batch WHERE id = ?", "s",
+         batch_id);
+}
+
 status store_upload_owner(struct store *store, const char *upload_id, char owner[STORE_OWNER_BYTES], struct error *err)
 {
     LOOK(store, take_owner, owner, "there is no such upload", err,

@@ -57,8 +57,9 @@ status store_access_rebuilt(struct store *store, bool require, double now_unix_s
 /* Ends a session. STATUS_OK also when there is none. */
 status store_session_erase(struct store *store, const unsigned char *hash, struct error *err);
 
-/* The owner of a job that is not deleted, or of the job of an upload. STATUS_NOT_FOUND. */
+/* The owner of a job that is not deleted, of a batch, or of the job of an upload. STATUS_NOT_FOUND. */
 status store_job_owner(struct store *store, const char *job_id, char owner[STORE_OWNER_BYTES], struct error *err);
+status store_batch_owner(struct store *store, const char *batch_id, char owner[STORE_OWNER_BYTES], struct error *err);
 status store_upload_owner(struct store *store, const char *upload_id, char owner[STORE_OWNER_BYTES], struct error *err);
 /* The number of jobs that an owner keeps, and the declared bytes of their files, without tombstones. */
 struct owner_use {

@@ -1,6 +1,7 @@
 /* Writes jobs that were read from their folders. */
 #include "server/store/store_sql.h"
 
+#include <stdio.h>
 #include <string.h>
 
 /* Makes the row of a job that the database does not have, with its document and its key. */
@@ -27,6 +28,30 @@ static status replace(struct store *store, const struct job_row *row, const char
     return s;
 }
 
+/* A batch that the database does not have is made from what its jobs say of it, without its template. A journal can say
+ * anything: a batch of another owner is none of this job. */
+static status import_batch(struct store *store, struct job_row *row, struct error *err)
+{
+    static const char *const name[] = {"?3", "?3 || ' ' || substr(?1, 1, 8)"};
+    char sql[240];
+    int n = 0;
+    status s = STATUS_OK;
+    if (row->batch[0] == '\0') return STATUS_OK;
+    for (size_t i = 0; s == STATUS_OK && i < 2; i++) { /* the second name where another batch has the first one */
+        snprintf(sql, sizeof sql,
+                 "INSERT OR IGNORE INTO batch (id, owner, name, template, plan, created, updated) SELECT ?1, ?2, %s, "
+                 "'', '', ?4, ?4 WHERE length(?1) = 36",
+                 name[i]);
+        s = store_run(&store->write, NULL, err, sql, "sssd", row->batch, row->owner, row->batch_name,
+                      row->created_unix_s);
+    }
+    if (s == STATUS_OK)
+        s = store_run(&store->write, &n, err, "UPDATE batch SET updated = updated WHERE id = ? AND owner = ?", "ss",
+                      row->batch, row->owner);
+    if (s == STATUS_OK && n == 0) row->batch[0] = '\0';
+    return s;
+}
+
 static status import(struct store *store, struct job_row *row, const struct file_row *file, size_t n_file,
                      const char *key, const char *body_hash, struct error *err)
 {
@@ -36,6 +61,7 @@ static status import(struct store *store, struct job_row *row, const struct file
     if (s == STATUS_OK)
         s = row->serial > 0 ? replace(store, row, key, body_hash, err) : add(store, row, key, body_hash, err);
     if (s == STATUS_OK) s = store_file_add(store, file, n_file, err);
+    if (s == STATUS_OK) s = import_batch(store, row, err);
     if (s == STATUS_OK) s = store_job_write(store, row, err);
     row->updated_unix_s = updated_unix_s;
     if (s == STATUS_OK)

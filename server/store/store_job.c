@@ -48,6 +48,9 @@ status store_job_read(sqlite3_stmt *q, struct job_row *row, struct error *err)
     row->priority = sqlite3_column_int64(q, 23);
     store_text(q, 24, row->tags, sizeof row->tags);
     store_text(q, 25, row->verdict, sizeof row->verdict);
+    store_text(q, 26, row->batch, sizeof row->batch);
+    row->batch_place = sqlite3_column_int64(q, 27);
+    store_text(q, 28, row->batch_name, sizeof row->batch_name);
     return STATUS_OK;
 }
 
@@ -147,11 +150,12 @@ status store_job_write(struct store *store, struct job_row *r, struct error *err
         &store->write, &n, err,
         "UPDATE job SET revision=revision+1, sample=?, state=?, cancel_requested=?, dirty=?, "
         "deleted=?, attempt=?, lost_attempts=?, generation=?, token=?, updated=?, queued=?, started=?, "
-        "finished=?, error_code=?, error_field=?, error_text=?, peak_rss=?, priority=?, tags=?, verdict=? WHERE id=?",
-        "siiiiiiisddddsssiisss", r->sample, (int64_t)r->state, (int64_t)r->cancel_requested, (int64_t)r->dirty,
+        "finished=?, error_code=?, error_field=?, error_text=?, peak_rss=?, priority=?, tags=?, verdict=?, batch=?, "
+        "batch_place=? WHERE id=?",
+        "siiiiiiisddddsssiisssis", r->sample, (int64_t)r->state, (int64_t)r->cancel_requested, (int64_t)r->dirty,
         (int64_t)r->deleted, r->attempt, r->lost_attempts, r->generation, r->token, r->updated_unix_s, r->queued_unix_s,
         r->started_unix_s, r->finished_unix_s, r->error_code, r->error_field, r->error_text, r->peak_rss_bytes,
-        r->priority, r->tags, r->verdict, r->id);
+        r->priority, r->tags, r->verdict, r->batch, r->batch_place, r->id);
     if (s == STATUS_OK && n == 0) s = error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", r->id);
     return s;
 }
@@ -162,6 +166,20 @@ status store_job_update(struct store *store, struct job_row *row, struct error *
     status s = store_job_write(store, row, err);
     pthread_mutex_unlock(&store->write.lock);
     return store_report(store, s, row->id);
+}
+
+status store_jobs_update(struct store *store, struct job_row *row, size_t n, struct error *err)
+{
+    if (n == 0) return STATUS_OK;
+    pthread_mutex_lock(&store->write.lock);
+    status s = store_begin(&store->write, err);
+    if (s == STATUS_OK) {
+        for (size_t i = 0; s == STATUS_OK && i < n; i++) s = store_job_write(store, &row[i], err);
+        s = store_end(&store->write, s, err);
+    }
+    pthread_mutex_unlock(&store->write.lock);
+    for (size_t i = 0; i < n; i++) store_report(store, s, row[i].id);
+    return s;
 }
 
 static status replace(struct store *store, struct job_row *row, struct error *err)

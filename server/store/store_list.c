@@ -42,18 +42,20 @@ static status read_rows(struct store *store, status s, sqlite3_stmt *q, struct j
 /* Where the list begins behind the job of q->after_serial, whose key may have changed since. */
 static const char *behind(const struct job_query *q)
 {
-    static const char *const sql[3][2] = {
+    static const char *const sql[4][2] = {
         {" AND serial < ?2", " AND serial > ?2"},
         {" AND (finished, serial) < (CAST(?3 AS REAL), ?2)", " AND (finished, serial) > (CAST(?3 AS REAL), ?2)"},
-        {" AND (sample COLLATE NOCASE, serial) < (?3, ?2)", " AND (sample COLLATE NOCASE, serial) > (?3, ?2)"}};
+        {" AND (sample COLLATE NOCASE, serial) < (?3, ?2)", " AND (sample COLLATE NOCASE, serial) > (?3, ?2)"},
+        {"", ""}};
     return q->after_serial > 0 ? sql[q->order][q->ascending] : "";
 }
 
 static const char *order_of(const struct job_query *q)
 {
-    static const char *const sql[3][2] = {{"serial DESC", "serial"},
+    static const char *const sql[4][2] = {{"serial DESC", "serial"},
                                           {"finished DESC, serial DESC", "finished, serial"},
-                                          {"sample COLLATE NOCASE DESC, serial DESC", "sample COLLATE NOCASE, serial"}};
+                                          {"sample COLLATE NOCASE DESC, serial DESC", "sample COLLATE NOCASE, serial"},
+                                          {"batch_place DESC, serial DESC", "batch_place, serial"}};
     return sql[q->order][q->ascending];
 }
 
@@ -72,41 +74,25 @@ status store_job_list(struct store *store, const struct job_query *query, struct
                       struct error *err)
 {
     const struct job_query *q = query;
-    char sql[1600], states[64];
+    char sql[2000], states[64];
     states_of(q->states, states, sizeof states);
     /* a statement for each kind of query: with "?4 = '' OR owner = ?4" no index would find the rows */
     snprintf(sql, sizeof sql,
-             "SELECT " JOB_COLUMNS("NULL") " FROM job WHERE deleted = ?1%s%s%s%s%s%s%s%s%s ORDER BY %s LIMIT ?11",
+             "SELECT " JOB_COLUMNS("NULL") " FROM job WHERE deleted = ?1%s%s%s%s%s%s%s%s%s%s ORDER BY %s LIMIT ?12",
              states, behind(q), q->owner != NULL ? " AND owner = ?4" : "",
              q->sample != NULL ? " AND instr(lower(sample), lower(?5)) > 0" : "",
              q->id != NULL ? " AND id >= ?6 AND id < ?6 || 'g'" : "",
+             q->batch != NULL ? " AND batch = ?11 AND batch <> ''" : "",
              q->tag != NULL ? " AND instr(tags, ' ' || ?7 || ' ') > 0" : "",
              q->verdict != NULL ? " AND instr(?8, ',' || verdict || ',') > 0" : "",
              q->created_after_unix_s > 0 ? " AND created >= ?9" : "",
              q->created_before_unix_s > 0 ? " AND created < ?10" : "", order_of(q));
     sqlite3_stmt *statement = NULL;
     pthread_mutex_lock(&store->read.lock);
-    status s = store_prepare(&store->read, &statement, err, sql, "iissssssddi", (int64_t)q->deleted, q->after_serial,
+    status s = store_prepare(&store->read, &statement, err, sql, "iissssssddsi", (int64_t)q->deleted, q->after_serial,
                              q->after_key, q->owner, q->sample, q->id, q->tag, q->verdict, q->created_after_unix_s,
-                             q->created_before_unix_s, (int64_t)q->limit);
+                             q->created_before_unix_s, q->batch, (int64_t)q->limit);
     s = read_rows(store, s, statement, out, n_out, err);
-    pthread_mutex_unlock(&store->read.lock);
-    return s;
-}
-
-status store_job_heads(struct store *store, size_t n_each, struct job_row **out, size_t *n_out, struct error *err)
-{
-    sqlite3_stmt *q = NULL;
-    pthread_mutex_lock(&store->read.lock);
-    status s = store_prepare(
-        &store->read, &q, err,
-        "SELECT " JOB_COLUMNS(
-            "NULL") " FROM job WHERE serial IN (SELECT i.serial FROM owner_use u "
-                    "CROSS JOIN job i ON i.serial IN (SELECT h.serial FROM job h WHERE h.deleted = 0 AND "
-                    "h.state = 1 AND h.owner = u.owner ORDER BY h.priority DESC, h.queued, h.serial LIMIT ?) "
-                    "WHERE u.queued > 0) ORDER BY owner, priority DESC, queued, serial",
-        "i", (int64_t)n_each);
-    s = read_rows(store, s, q, out, n_out, err);
     pthread_mutex_unlock(&store->read.lock);
     return s;
 }
@@ -128,16 +114,19 @@ status store_job_count(struct store *store, int64_t n[JOB_N_STATE], struct error
     return s;
 }
 
-status store_job_queue(struct store *store, struct queued_job **out, size_t *n_out, struct error *err)
+status store_job_queue(struct store *store, size_t n_each, struct queued_job **out, size_t *n_out, struct error *err)
 {
     struct queued_job *job = NULL;
     size_t n = 0, capacity = 0;
     sqlite3_stmt *q = NULL;
     pthread_mutex_lock(&store->read.lock);
-    status s = store_prepare(&store->read, &q, err,
-                             "SELECT id, owner, queued FROM job WHERE deleted = 0 AND state = 1 "
-                             "ORDER BY owner, priority DESC, queued, serial",
-                             "");
+    status s =
+        store_prepare(&store->read, &q, err,
+                      "SELECT j.id, t.owner, t.batch, j.priority, j.queued, t.last FROM turn t CROSS JOIN job j ON "
+                      "j.serial IN (SELECT h.serial FROM job h WHERE h.deleted = 0 AND h.state = 1 AND "
+                      "h.owner = t.owner AND h.batch = t.batch ORDER BY h.priority DESC, h.queued, h.serial LIMIT ?) "
+                      "WHERE t.queued > 0 ORDER BY t.owner, t.batch, j.priority DESC, j.queued, j.serial",
+                      "i", (int64_t)n_each);
     int rc = SQLITE_DONE;
     while (s == STATUS_OK && (rc = sqlite3_step(q)) == SQLITE_ROW) {
         if (n == capacity) {
@@ -151,7 +140,10 @@ status store_job_queue(struct store *store, struct queued_job **out, size_t *n_o
         }
         store_text(q, 0, job[n].id, sizeof job[n].id);
         store_text(q, 1, job[n].owner, sizeof job[n].owner);
-        job[n++].queued_unix_s = sqlite3_column_double(q, 2);
+        store_text(q, 2, job[n].batch, sizeof job[n].batch);
+        job[n].priority = sqlite3_column_int64(q, 3);
+        job[n].queued_unix_s = sqlite3_column_double(q, 4);
+        job[n++].last_start_unix_s = sqlite3_column_double(q, 5);
     }
     if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(&store->read, "cannot list the queue", err);
     sqlite3_finalize(q);

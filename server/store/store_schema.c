@@ -130,6 +130,32 @@ static const char *const migration[] = {
     "CREATE TRIGGER use_job_removed AFTER DELETE ON job WHEN OLD.deleted = 0 BEGIN"
     " UPDATE owner_use SET jobs = jobs - 1, queued = queued - (OLD.state = 1), bytes = bytes - OLD.version_bytes"
     " WHERE owner = OLD.owner; END;",
+    /* batches, and whose turn it is: for each owner and batch ('': the jobs without one) the number of queued jobs and
+     * the time of the last start, by triggers */
+    "CREATE TABLE batch (serial INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, owner TEXT NOT NULL,"
+    " name TEXT NOT NULL, template TEXT NOT NULL, plan TEXT NOT NULL, created REAL NOT NULL, updated REAL NOT NULL,"
+    " UNIQUE (owner, name));"
+    "ALTER TABLE job ADD COLUMN batch TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE job ADD COLUMN batch_place INTEGER NOT NULL DEFAULT 0;"
+    "CREATE INDEX job_batch ON job (batch, deleted, state) WHERE batch <> '';"
+    "DROP INDEX job_turn;"
+    "CREATE INDEX job_turn ON job (owner, batch, priority DESC, queued, serial) WHERE deleted = 0 AND state = 1;"
+    "CREATE TABLE turn (owner TEXT NOT NULL, batch TEXT NOT NULL, queued INTEGER NOT NULL, last REAL NOT NULL,"
+    " PRIMARY KEY (owner, batch)) WITHOUT ROWID;"
+    "INSERT INTO turn SELECT owner, '', sum(deleted = 0 AND state = 1), max(started) FROM job GROUP BY owner;"
+    "CREATE TRIGGER turn_job_added AFTER INSERT ON job WHEN NEW.deleted = 0 AND NEW.state = 1 BEGIN"
+    " INSERT INTO turn VALUES (NEW.owner, NEW.batch, 1, 0) ON CONFLICT (owner, batch) DO UPDATE SET"
+    " queued = queued + 1; END;"
+    "CREATE TRIGGER turn_job_changed AFTER UPDATE OF state, deleted, batch ON job"
+    " WHEN NEW.state <> OLD.state OR NEW.deleted <> OLD.deleted OR NEW.batch <> OLD.batch BEGIN"
+    " UPDATE turn SET queued = queued - 1 WHERE owner = OLD.owner AND batch = OLD.batch AND OLD.deleted = 0"
+    " AND OLD.state = 1;"
+    " INSERT INTO turn SELECT NEW.owner, NEW.batch, NEW.state = 1, 0 WHERE NEW.deleted = 0 AND NEW.state IN (1, 2)"
+    " ON CONFLICT (owner, batch) DO UPDATE SET queued = queued + excluded.queued;"
+    " UPDATE turn SET last = NEW.updated WHERE owner = NEW.owner AND batch = NEW.batch AND NEW.state = 2"
+    " AND OLD.state <> 2; END;"
+    "CREATE TRIGGER turn_job_removed AFTER DELETE ON job WHEN OLD.deleted = 0 AND OLD.state = 1 BEGIN"
+    " UPDATE turn SET queued = queued - 1 WHERE owner = OLD.owner AND batch = OLD.batch; END;",
 };
 
 const char *const *store_migrations(int *n)

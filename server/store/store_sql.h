@@ -24,7 +24,8 @@ struct store {
     "serial, id, sample, " document                                                                                    \
     ", revision, state, cancel_requested, dirty, deleted, attempt, lost_attempts, generation, "                        \
     "token, created, updated, queued, started, finished, error_code, error_field, error_text, peak_rss, owner, "       \
-    "priority, tags, verdict"
+    "priority, tags, verdict, batch, batch_place, "                                                                    \
+    "CASE WHEN batch = '' THEN '' ELSE (SELECT name FROM batch WHERE batch.id = job.batch) END"
 
 /* Sets err from SQLite's last result; what is for example "cannot write job". */
 status store_error(struct store_link *link, const char *what, struct error *err);

@@ -5,6 +5,7 @@
 #include "server/jobs/job_paths.h"
 #include "server/workers/attempt.h"
 #include "server/workers/console.h"
+#include "server/workers/queue_turn.h"
 #include "server/workers/worker_process.h"
 
 #include <errno.h>
@@ -19,7 +20,7 @@ enum { MAX_WORKER = 64, MAX_WAITING = 256, BURY_AGAIN_S = 60 };
 
 struct slot {
     bool used;
-    char job_id[STORE_ID_BYTES], owner[STORE_OWNER_BYTES];
+    char job_id[STORE_ID_BYTES], owner[STORE_OWNER_BYTES], batch[STORE_ID_BYTES];
     pid_t pid;
     enum attempt_stop stop; /* reason for the request to stop */
     double seen_heartbeat_unix_s,
@@ -175,16 +176,9 @@ static size_t n_running(const struct supervisor *u)
     return n;
 }
 
-static size_t n_running_of(const struct supervisor *u, const char *owner)
+static void launch(struct supervisor *u, const struct queued_job *job)
 {
-    size_t n = 0;
-    for (size_t i = 0; i < MAX_WORKER; i++) n += u->slot[i].used && strcmp(u->slot[i].owner, owner) == 0;
-    return n;
-}
-
-static void launch(struct supervisor *u, const struct job_row *row)
-{
-    const char *job_id = row->id;
+    const char *job_id = job->id;
     struct error err = {0};
     char folder[PATH_BYTES], console[PATH_BYTES], speeds[PATH_BYTES];
     path_join(folder, u->v->settings->data, "jobs", job_id, NULL);
@@ -200,7 +194,8 @@ static void launch(struct supervisor *u, const struct job_row *row)
     while (slot->used) slot++;
     *slot = (struct slot){.used = true, .heartbeat_seen_s = clock_monotonic_s(), .started_s = clock_monotonic_s()};
     snprintf(slot->job_id, sizeof slot->job_id, "%s", job_id);
-    snprintf(slot->owner, sizeof slot->owner, "%s", row->owner);
+    snprintf(slot->owner, sizeof slot->owner, "%s", job->owner);
+    snprintf(slot->batch, sizeof slot->batch, "%s", job->batch);
     path_join(speeds, u->v->settings->data, "speeds.json", NULL);
     const struct worker_paths paths = {
         .program = u->worker, .job_folder = folder, .console = console, .speeds = speeds};
@@ -217,45 +212,32 @@ static void launch(struct supervisor *u, const struct job_row *row)
     waiting_of(u, job_id, true)->until_s = clock_monotonic_s() + 2;
 }
 
-static bool may_start(const struct supervisor *u, const struct job_row *row)
+static bool may_start(struct supervisor *u, const char *job_id)
 {
-    const struct waiting *w = waiting_of((struct supervisor *)(uintptr_t)u, row->id, false);
-    return row->state == JOB_QUEUED && !is_running(u, row->id) && (w == NULL || w->until_s <= clock_monotonic_s());
-}
-
-/* The job whose turn it is: the first one, in the order of its owner's queue, of the owner who has the fewest running
- * jobs; among equals of those, the job that has waited longest. The rows stand owner by owner. NULL: there is none. */
-static struct job_row *next_turn(const struct supervisor *u, struct job_row *row, size_t n)
-{
-    struct job_row *best = NULL, *last = NULL;
-    size_t best_running = 0;
-    for (size_t i = 0; i < n; i++) {
-        if (!may_start(u, &row[i]) || (last != NULL && strcmp(last->owner, row[i].owner) == 0)) continue;
-        last = &row[i];
-        size_t running = n_running_of(u, row[i].owner);
-        if (best != NULL &&
-            (running > best_running || (running == best_running && row[i].queued_unix_s >= best->queued_unix_s)))
-            continue;
-        best = &row[i];
-        best_running = running;
-    }
-    return best;
+    const struct waiting *w = waiting_of(u, job_id, false);
+    return !is_running(u, job_id) && (w == NULL || w->until_s <= clock_monotonic_s());
 }
 
 static void fill_slots(struct supervisor *u)
 {
-    struct job_row *row = NULL, *next;
-    size_t n = 0, n_waiting = 0, free_slots = (size_t)u->v->settings->workers;
+    struct queued_job *job = NULL;
+    size_t n = 0, i, n_waiting = 0, free_slots = (size_t)u->v->settings->workers;
     free_slots -= n_running(u) < free_slots ? n_running(u) : free_slots;
     if (free_slots == 0 || u->below_floor) return;
-    for (size_t i = 0; i < MAX_WAITING; i++) n_waiting += u->waiting[i].until_s > clock_monotonic_s();
-    /* as many of each owner as may have to be passed over, or can start */
-    if (store_job_heads(u->v->store, n_waiting + MAX_WORKER, &row, &n, NULL) != STATUS_OK) return;
-    for (; free_slots > 0 && (next = next_turn(u, row, n)) != NULL; free_slots--) {
-        launch(u, next);
-        next->state = JOB_RUNNING; /* tried, whatever came of it */
+    for (i = 0; i < MAX_WAITING; i++) n_waiting += u->waiting[i].until_s > clock_monotonic_s();
+    /* as many of each owner and batch as may have to be passed over, or can start */
+    if (store_job_queue(u->v->store, n_waiting + MAX_WORKER, &job, &n, NULL) != STATUS_OK || n == 0) return;
+    struct queue_turn *turn = queue_turn_new(job, n);
+    for (i = 0; turn != NULL && i < n; i++)
+        if (!may_start(u, job[i].id)) queue_turn_skip(turn, i);
+    for (i = 0; turn != NULL && i < MAX_WORKER; i++)
+        if (u->slot[i].used) queue_turn_running(turn, u->slot[i].owner, u->slot[i].batch, 1);
+    for (; turn != NULL && free_slots > 0 && (i = queue_turn_next(turn, clock_wall_s())) < n; free_slots--) {
+        launch(u, &job[i]);
+        queue_turn_running(turn, job[i].owner, job[i].batch, 1);
     }
-    job_rows_free(row, n);
+    queue_turn_free(turn);
+    free(job);
 }
 
 static void remove_deleted(struct supervisor *u)

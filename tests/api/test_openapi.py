@@ -179,6 +179,16 @@ def test_every_operation_answers_as_documented(daemon, daemon_maker):
     call("listTags", "GET", "/v1/tags")
     call("actOnJobs", "POST", "/v1/actions", json={"action": "cancel", "jobs": [draft]})
     call("deleteJob", "DELETE", f"/v1/jobs/{draft}")
+    batch = call("submitBatch", "POST", "/v1/batches", json={"name": "b", "template": {"measurements": {"file": "rows.csv"}, "geometry": {"job": job}},
+                 "samples": [{"sample": "fake: fail", "files": [{"name": "rows.csv", "size": 5, "sha256": "0" * 64}]}]}).json()["id"]
+    call("listBatches", "GET", "/v1/batches")
+    call("startBatch", "POST", f"/v1/batches/{batch}/start")
+    call("getBatch", "GET", f"/v1/batches/{batch}")
+    call("cancelBatch", "POST", f"/v1/batches/{batch}/cancel")
+    call("retryBatch", "POST", f"/v1/batches/{batch}/retry")
+    call("getBatchResults", "GET", f"/v1/batches/{batch}/results.json")
+    call("getBatchTable", "GET", f"/v1/batches/{batch}/results.csv")
+    call("deleteBatch", "DELETE", f"/v1/batches/{batch}?jobs=delete")
     call("listDeliveries", "GET", "/v1/deliveries")
     call("keepJob", "PUT", f"/v1/jobs/{job}/keep")
     call("unkeepJob", "DELETE", f"/v1/jobs/{job}/keep")
@@ -208,6 +218,11 @@ NEAR_JOB = st.fixed_dictionaries({}, optional={
     "measurements": JSON, "photographs": JSON, "fit": JSON, "lamp": JSON, "camera": JSON, "fibers": JSON})
 NEAR_FILE = st.fixed_dictionaries({}, optional={"name": st.sampled_from(["a.tif", "../b", ""]) | JSON, "role": st.sampled_from(["volume", "poem"]) | JSON,
                                                 "size": st.integers(-1, 3000) | JSON, "sha256": st.just("0" * 64) | JSON})
+NEAR_ROW = st.fixed_dictionaries({"sample": st.sampled_from(["s", "t", ""]) | JSON}, optional={
+    "replace": st.dictionaries(st.sampled_from(["volume.files[0]", "/fit/seed", "a.b", "a[", ""]), JSON) | JSON,
+    "files": st.lists(NEAR_FILE | JSON, max_size=3) | JSON})
+NEAR_BATCH = st.fixed_dictionaries({"name": st.sampled_from(["a", "b"]), "template": NEAR_JOB | JSON, "samples": st.lists(NEAR_ROW, max_size=4) | JSON},
+                                   optional={"update": st.booleans() | JSON})
 WORD = st.text(st.characters(min_codepoint=33, max_codepoint=126, blacklist_characters="#?/%\\"), min_size=1, max_size=40).filter(
     lambda w: w not in (".", ".."))
 
@@ -235,7 +250,7 @@ def test_random_requests_get_documented_answers(daemon, data):
     if "requestBody" in operation:
         kind = next(iter(operation["requestBody"]["content"]))
         headers["Content-Type"] = data.draw(st.sampled_from([kind] * 4 + ["text/plain"]))
-        near = NEAR_FILE if path.endswith("/files") else NEAR_JOB
+        near = NEAR_FILE if path.endswith("/files") else NEAR_BATCH if path == "/v1/batches" else NEAR_JOB
         body = data.draw((near | JSON).map(lambda j: json.dumps(j).encode()) | st.binary(max_size=60))
     r = daemon.request(method.upper(), url, params=query, headers=headers, data=body)
     assert r.status_code < 500 or r.status_code == 507, r.text

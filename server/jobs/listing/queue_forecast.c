@@ -1,6 +1,7 @@
 #include "server/jobs/listing/queue_forecast.h"
 #include "base/clock.h"
 #include "server/workers/attempt.h"
+#include "server/workers/queue_turn.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -22,7 +23,8 @@ struct queue_forecast {
 
 /* A worker, and whose job it has until when. */
 struct worker_slot {
-    char owner[STORE_OWNER_BYTES];
+    char owner[STORE_OWNER_BYTES], batch[STORE_ID_BYTES];
+    bool busy;
     double free_unix_s; /* INFINITY: unknown */
 };
 
@@ -31,7 +33,7 @@ struct plan {
     size_t n_slot;
     struct queued_job *job;
     size_t n_job;
-    bool *started;
+    struct queue_turn *turn;
     double typical_s; /* INFINITY: unknown */
 };
 
@@ -90,33 +92,12 @@ static void place_running(struct job_service *v, struct plan *p, double now)
     if (store_job_list(v->store, &q, &row, &n, NULL) != STATUS_OK) return;
     for (size_t i = 0; i < n && i < p->n_slot; i++) {
         memcpy(p->slot[i].owner, row[i].owner, sizeof row[i].owner);
+        memcpy(p->slot[i].batch, row[i].batch, sizeof row[i].batch);
+        p->slot[i].busy = true;
+        queue_turn_running(p->turn, row[i].owner, row[i].batch, 1);
         p->slot[i].free_unix_s = end_of(v, &row[i], p->typical_s, now);
     }
     job_rows_free(row, n);
-}
-
-static size_t n_running_of(const struct plan *p, const char *owner, double at)
-{
-    size_t n = 0;
-    for (size_t i = 0; i < p->n_slot; i++) n += p->slot[i].free_unix_s > at && strcmp(p->slot[i].owner, owner) == 0;
-    return n;
-}
-
-/* The job whose turn it is at that time; p->n_job: none is left. */
-static size_t next_turn(const struct plan *p, double at)
-{
-    size_t best = p->n_job, best_running = 0, last = p->n_job;
-    for (size_t i = 0; i < p->n_job; i++) {
-        if (p->started[i] || (last < p->n_job && strcmp(p->job[last].owner, p->job[i].owner) == 0)) continue;
-        last = i;
-        size_t running = n_running_of(p, p->job[i].owner, at);
-        if (best < p->n_job && (running > best_running ||
-                                (running == best_running && p->job[i].queued_unix_s >= p->job[best].queued_unix_s)))
-            continue;
-        best = i;
-        best_running = running;
-    }
-    return best;
 }
 
 static int by_id(const void *a, const void *b)
@@ -131,15 +112,20 @@ static void foresee(struct queue_forecast *f, struct plan *p)
         struct worker_slot *slot = p->slot;
         for (size_t i = 1; i < p->n_slot; i++)
             if (p->slot[i].free_unix_s < slot->free_unix_s) slot = &p->slot[i];
-        size_t next = next_turn(p, slot->free_unix_s);
+        if (slot->busy) queue_turn_running(p->turn, slot->owner, slot->batch, -1);
+        slot->busy = false;
+        size_t next = queue_turn_next(p->turn, slot->free_unix_s);
         if (next == p->n_job) break;
         struct foreseen *one = &f->job[f->n++];
         *one = (struct foreseen){.place.position = (int64_t)f->n};
         memcpy(one->id, p->job[next].id, sizeof one->id);
         if (isfinite(slot->free_unix_s)) one->place.start_unix_s = 30 * ceil(slot->free_unix_s / 30);
         memcpy(slot->owner, p->job[next].owner, sizeof slot->owner);
+        memcpy(slot->batch, p->job[next].batch, sizeof slot->batch);
+        slot->busy = true;
+        queue_turn_running(p->turn, slot->owner, slot->batch, 1);
         slot->free_unix_s += p->typical_s;
-        p->started[next] = true;
+        if (isfinite(slot->free_unix_s)) one->place.end_unix_s = 30 * ceil(slot->free_unix_s / 30);
     }
     qsort(f->job, f->n, sizeof *f->job, by_id);
 }
@@ -150,18 +136,19 @@ static void make(struct job_service *v, struct queue_forecast *f)
     free(f->job);
     f->job = NULL;
     f->n = 0;
-    if (p == NULL || store_job_queue(v->store, &p->job, &p->n_job, NULL) != STATUS_OK || p->n_job == 0) goto out;
+    if (p == NULL || store_job_queue(v->store, SIZE_MAX >> 1, &p->job, &p->n_job, NULL) != STATUS_OK || p->n_job == 0)
+        goto out;
     size_t n_most = p->n_job < FORESEEN_MOST ? p->n_job : FORESEEN_MOST;
     f->job = calloc(n_most, sizeof *f->job);
-    p->started = calloc(p->n_job, sizeof *p->started);
-    if (f->job == NULL || p->started == NULL) goto out;
+    p->turn = queue_turn_new(p->job, p->n_job);
+    if (f->job == NULL || p->turn == NULL) goto out;
     p->typical_s = typical_s(v);
     place_running(v, p, clock_wall_s());
     if (p->n_slot > 0) foresee(f, p);
 out:
     if (p != NULL) {
         free(p->job);
-        free(p->started);
+        queue_turn_free(p->turn);
     }
     free(p);
 }

@@ -13,8 +13,8 @@ struct queue_forecast *queue_forecast_new(void);
 void queue_forecast_free(struct queue_forecast *forecast);
 
 struct queue_place {
-    int64_t position;    /* 1: the next one to start; 0: not queued, or too far behind to say */
-    double start_unix_s; /* rounded to half a minute; 0: unknown */
+    int64_t position;                /* 1: the next one to start; 0: not queued, or too far behind to say */
+    double start_unix_s, end_unix_s; /* rounded to half a minute; 0: unknown */
 };
 struct queue_place queue_forecast_of(struct job_service *v, const char *job_id);
 

@@ -9,7 +9,7 @@ from openapi_check import METHODS, load
 from test_tokens import make
 
 OPERATIONS = [(path, method, item[method]) for path, item in load()["paths"].items() for method in METHODS if method in item]
-ABOUT_JOBS = [o for o in OPERATIONS if "{id}" in o[0] or "{upload}" in o[0]]
+ABOUT_JOBS = [o for o in OPERATIONS if "{id}" in o[0] or "{upload}" in o[0] or "{batch}" in o[0]]
 
 
 @pytest.fixture(scope="module")
@@ -23,12 +23,21 @@ def shared(tmp_path_factory):
         d.job_of_ann = d.ann.start_job("series 20")
         d.ann.wait_state(d.job_of_ann, "succeeded")
         d.draft_of_ann = d.ann.create()
+        d.batch_of_ann = make_batch(d.ann)
         d.upload_of_ann = d.ann.declare(d.draft_of_ann, "scan.tif", b"0123456789")["upload_url"].rsplit("/", 1)[1]
         yield d
 
 
-def call(user, path, method, operation, job, upload):
+def make_batch(user):
+    r = user.post("/v1/batches", json={"name": str(uuid.uuid4()), "template": {"measurements": {"file": "rows.csv"}, "geometry": {"job": str(uuid.uuid4())}},
+                                       "samples": [{"sample": "fake: succeed", "files": [{"name": "rows.csv", "size": 5, "sha256": "0" * 64}]}]})
+    assert r.status_code == 201, r.text
+    return r.json()["id"]
+
+
+def call(user, path, method, operation, job, upload, batch):
     """A request that would succeed for its owner, as far as one request alone can."""
+    path = path.replace("{batch}", batch)
     url = path.replace("{id}", job).replace("{upload}", upload).replace("{name}", "scan.tif").replace("{path}", "result.json").replace("{version}", "1")
     more = {"headers": {}}
     if "{upload}" in path:
@@ -38,6 +47,8 @@ def call(user, path, method, operation, job, upload):
         more["headers"]["Content-Type"] = kind
         more["data"] = {"replaceDocument": json.dumps(DOCUMENT), "uploadBytes": b"01234", "putTags": json.dumps({"tags": ["a"]}),
                         "declareFiles": json.dumps({"name": "more.tif", "role": "volume", "size": 3})}[operation["operationId"]]
+    if operation["operationId"] == "deleteBatch":
+        url += "?jobs=delete"
     if operation["operationId"] == "uploadBytes":
         more["headers"]["Upload-Offset"] = "0"
     return user.request(method.upper(), url, **more)
@@ -53,14 +64,14 @@ def told(reply, *ids):
 
 def test_every_route_hides_the_jobs_of_others(shared):
     """Walks the description of the API, so a new operation is tested without being listed here."""
-    unknown_job, unknown_upload = str(uuid.uuid4()), str(uuid.uuid4())
+    unknown_job, unknown_upload, unknown_batch = str(uuid.uuid4()), str(uuid.uuid4()), str(uuid.uuid4())
     before = shared.ann.get(f"/v1/jobs/{shared.draft_of_ann}").text
     for path, method, operation in ABOUT_JOBS:
         for job in (shared.job_of_ann, shared.draft_of_ann):
-            foreign = call(shared.bob, path, method, operation, job, shared.upload_of_ann)
+            foreign = call(shared.bob, path, method, operation, job, shared.upload_of_ann, shared.batch_of_ann)
             assert foreign.status_code == 404, (path, method, foreign.text)
-            unknown = call(shared.bob, path, method, operation, unknown_job, unknown_upload)
-            assert told(foreign, job, shared.upload_of_ann) == told(unknown, unknown_job, unknown_upload), (path, method)
+            unknown = call(shared.bob, path, method, operation, unknown_job, unknown_upload, unknown_batch)
+            assert told(foreign, job, shared.upload_of_ann, shared.batch_of_ann) == told(unknown, unknown_job, unknown_upload, unknown_batch), (path, method)
     assert shared.ann.get(f"/v1/jobs/{shared.draft_of_ann}").text == before
     assert len(ABOUT_JOBS) >= 19
 
@@ -72,14 +83,16 @@ def test_the_same_requests_work_for_the_owner_and_for_admin(shared):
         shared.ann.wait_state(job, "succeeded")
         draft = shared.ann.create()
         upload = shared.ann.declare(draft, "scan.tif", b"0123456789")["upload_url"].rsplit("/", 1)[1]
+        batch = make_batch(shared.ann)
         for path, method, operation in sorted(ABOUT_JOBS, key=lambda o: o[1] == "delete"):
-            if method == "delete" and "{upload}" not in path:
+            if method == "delete" and "{upload}" not in path:  # deleted below
                 continue
             on = draft if operation["operationId"] in ("replaceDocument", "declareFiles", "cancelJob") else job
-            r = call(user, path, method, operation, on, upload)
+            r = call(user, path, method, operation, on, upload, batch)
             assert r.status_code < 300 or (operation["operationId"], r.status_code) == ("retryJob", 409), (path, method, r.text)
         assert user.delete(f"/v1/jobs/{job}/files/rows.csv").status_code == 204
         assert user.delete(f"/v1/jobs/{job}").status_code == 204
+        assert user.delete(f"/v1/batches/{batch}?jobs=delete").status_code == 204
 
 
 def test_lists_show_the_own_jobs_only(shared):

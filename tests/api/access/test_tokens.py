@@ -1,4 +1,5 @@
 """Access tokens: who needs one, what each scope may do, and how they are made, kept and revoked."""
+import contextlib
 import hashlib
 import json
 import os
@@ -262,6 +263,28 @@ def test_an_older_database_is_migrated(daemon_maker, tmp_path):
     assert d.of(token).job(job)["owner"] is None
     assert user.get(f"/v1/jobs/{job}").status_code == 404 and user.get("/v1/deliveries").json()["deliveries"] == []
     assert d.of(token).delete(f"/v1/jobs/{job}").status_code == 204
+
+
+def test_the_queue_of_an_older_database_is_kept(daemon_maker, tmp_path):
+    """The schema before there were batches, with two queued jobs."""
+    os.makedirs(tmp_path / "data")
+    os.chmod(tmp_path / "data", 0o700)
+    jobs = [SOME_ID, SOME_ID.replace("1", "2")]
+    with contextlib.closing(sqlite3.connect(tmp_path / "data" / "selvedge.db")) as db:
+        for entry in migrations()[:6]:
+            db.executescript(entry)
+        for job in jobs:
+            db.execute("INSERT INTO job (id, sample, state, cancel_requested, dirty, deleted, attempt, lost_attempts, generation, token, created, updated,"
+                       " queued, started, finished, error_code, error_field, error_text, peak_rss)"
+                       " VALUES (?, 's', 1, 0, 0, 0, 0, 0, 0, '', 1, 1, 1, 0, 0, '', '', '', 0)", (job,))
+            db.execute("INSERT INTO document VALUES (?, ?)", (job, json.dumps(DOCUMENT)))
+        db.execute("PRAGMA user_version=6")
+        db.commit()
+    d = daemon_maker()
+    assert os.path.exists(tmp_path / "data" / "selvedge.db.v6")
+    for job in jobs:
+        assert d.wait_state(job, "succeeded")["batch"] is None
+    assert d.get("/v1/batches").json() == {"batches": [], "next_cursor": None}
 
 
 def certificate(folder):

@@ -168,9 +168,14 @@ def test_an_older_database_gets_its_verdicts(daemon_maker):
     with contextlib.closing(sqlite3.connect(os.path.join(daemon.data, "selvedge.db"))) as db:
         for index in ("job_finished", "job_sample", "file_content"):
             db.execute(f"DROP INDEX {index}")
-        for trigger in ("use_version_changed", "use_job_hidden", "use_job_removed"):
+        for trigger in ("use_version_changed", "use_job_hidden", "use_job_removed", "turn_job_added", "turn_job_changed", "turn_job_removed"):
             db.execute(f"DROP TRIGGER {trigger}")
-        for column in ("tags", "verdict", "version_bytes"):
+        db.execute("DROP TABLE batch")
+        db.execute("DROP TABLE turn")
+        db.execute("DROP INDEX job_batch")
+        db.execute("DROP INDEX job_turn")
+        db.execute("CREATE INDEX job_turn ON job (owner, priority DESC, queued, serial) WHERE deleted = 0 AND state = 1")
+        for column in ("tags", "verdict", "version_bytes", "batch", "batch_place"):
             db.execute(f"ALTER TABLE job DROP COLUMN {column}")
         db.execute("PRAGMA user_version = 4")
         db.commit()

@@ -194,12 +194,12 @@ static void insert_job(struct fixture *f, const char *id, const char *owner, enu
 
 static void expect_heads(struct fixture *f, size_t n_each, const char *ids)
 {
-    struct job_row *row = NULL;
+    struct queued_job *job = NULL;
     size_t n = 0;
     char text[64] = "";
-    assert_int_equal(store_job_heads(f->store, n_each, &row, &n, NULL), STATUS_OK);
-    for (size_t i = 0; i < n; i++) strncat(text, row[i].id, sizeof text - strlen(text) - 1);
-    job_rows_free(row, n);
+    assert_int_equal(store_job_queue(f->store, n_each, &job, &n, NULL), STATUS_OK);
+    for (size_t i = 0; i < n; i++) strncat(text, job[i].id, sizeof text - strlen(text) - 1);
+    free(job);
     assert_string_equal(text, ids);
 }
 

@@ -1,0 +1,91 @@
+/* Replacing one member of a document. */
+#include "server/jobs/batches/batch_table.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { NAME_BYTES = 128 };
+
+/* Copies the next name of a JSON pointer, whose '/' has been read, without its escapes. Returns NULL when it is too
+ * long or an escape is wrong. */
+static const char *next_of_pointer(const char *at, char name[NAME_BYTES])
+{
+    size_t n = 0;
+    for (; *at != '\0' && *at != '/'; at++) {
+        char c = *at;
+        if (c == '~') {
+            at++;
+            if (*at != '0' && *at != '1') return NULL;
+            c = *at == '0' ? '~' : '/';
+        }
+        if (n + 1 == NAME_BYTES) return NULL;
+        name[n++] = c;
+    }
+    name[n] = '\0';
+    return *at == '/' ? at + 1 : at;
+}
+
+/* The same for names between dots; a place in brackets is a name of its own. */
+static const char *next_of_names(const char *at, char name[NAME_BYTES])
+{
+    const bool place = *at == '[';
+    if (place) at++;
+    size_t n = strcspn(at, place ? "]" : ".[");
+    if (n == 0 || n >= NAME_BYTES || (place && at[n] != ']')) return NULL;
+    memcpy(name, at, n);
+    name[n] = '\0';
+    at += n + (place ? 1 : 0);
+    if (place && *at != '\0' && *at != '.' && *at != '[') return NULL;
+    if (*at == '.' && at[1] == '\0') return NULL;
+    return *at == '.' ? at + 1 : at;
+}
+
+static bool place_of(const json_t *list, const char *name, size_t *i)
+{
+    if (name[0] == '\0' || strspn(name, "0123456789") != strlen(name) || strlen(name) > 9) return false;
+    *i = (size_t)strtoul(name, NULL, 10);
+    return *i < json_array_size(list);
+}
+
+/* The member `name` of a parent, which is made an object if it is missing. NULL: there is no such place. */
+static json_t *child_of(json_t *parent, const char *name)
+{
+    size_t i;
+    if (json_is_array(parent)) return place_of(parent, name, &i) ? json_array_get(parent, i) : NULL;
+    if (!json_is_object(parent)) return NULL;
+    if (json_object_get(parent, name) == NULL) json_object_set_new(parent, name, json_object());
+    return json_object_get(parent, name);
+}
+
+static bool set_child(json_t *parent, const char *name, const json_t *value)
+{
+    size_t i;
+    if (json_is_object(parent)) return json_object_set_new(parent, name, json_deep_copy(value)) == 0;
+    return json_is_array(parent) && place_of(parent, name, &i) &&
+           json_array_set_new(parent, i, json_deep_copy(value)) == 0;
+}
+
+status batch_replace(json_t *document, const char *path, const json_t *value, struct error *err)
+{
+    char name[NAME_BYTES];
+    const bool pointer = path[0] == '/';
+    const char *at = pointer ? path + 1 : path;
+    json_t *parent = document;
+    for (bool more = path[0] != '\0'; more;) {
+        const char *next = pointer ? next_of_pointer(at, name) : next_of_names(at, name);
+        if (next == NULL) break;
+        more = *next != '\0' || (pointer && next > at && next[-1] == '/');
+        if (!more) {
+            if (set_child(parent, name, value)) return STATUS_OK;
+            return error_set(err, STATUS_INVALID, "the template has no place '%.160s'", path);
+        }
+        parent = child_of(parent, name);
+        at = next;
+        if (parent == NULL) return error_set(err, STATUS_INVALID, "the template has no place '%.160s'", path);
+    }
+    return error_set(err, STATUS_INVALID,
+                     "'%.160s' is no path: write names between dots, as in 'photographs[2].scale', or a JSON pointer, "
+                     "as in '/photographs/2/scale'",
+                     path);
+}

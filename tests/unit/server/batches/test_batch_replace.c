@@ -1,0 +1,63 @@
+/* Paths that name a member of a document. */
+#include "server/jobs/batches/batch_table.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+static void expect(const char *document, const char *path, const char *value, const char *becomes)
+{
+    json_t *doc = json_loads(document, 0, NULL), *new = json_loads(value, JSON_DECODE_ANY, NULL);
+    struct error err = {0};
+    assert_int_equal(batch_replace(doc, path, new, &err), becomes == NULL ? STATUS_INVALID : STATUS_OK);
+    char *text = json_dumps(doc, JSON_COMPACT);
+    if (becomes != NULL)
+        assert_string_equal(text, becomes);
+    else
+        assert_true(err.text[0] != '\0');
+    free(text);
+    json_decref(doc);
+    json_decref(new);
+}
+
+static void test_both_kinds_of_paths(void **state)
+{
+    (void)state;
+    static const char *const both[][2] = {{"a", "/a"}, {"b.c", "/b/c"}, {"l[1].x", "/l/1/x"}, {"l[0]", "/l/0"}};
+    static const char document[] = "{\"a\":1,\"b\":{\"c\":2},\"l\":[3,{\"x\":4}]}";
+    static const char *const becomes[] = {
+        "{\"a\":9,\"b\":{\"c\":2},\"l\":[3,{\"x\":4}]}", "{\"a\":1,\"b\":{\"c\":9},\"l\":[3,{\"x\":4}]}",
+        "{\"a\":1,\"b\":{\"c\":2},\"l\":[3,{\"x\":9}]}", "{\"a\":1,\"b\":{\"c\":2},\"l\":[9,{\"x\":4}]}"};
+    for (size_t i = 0; i < 4; i++)
+        for (size_t k = 0; k < 2; k++) expect(document, both[i][k], "9", becomes[i]);
+}
+
+static void test_names_with_dots_and_slashes(void **state)
+{
+    (void)state;
+    expect("{}", "/fit/start/C_R.g", "0.5", "{\"fit\":{\"start\":{\"C_R.g\":0.5}}}");
+    expect("{}", "/a~1b~0c", "[]", "{\"a/b~c\":[]}");
+    expect("{}", "fit.seed", "7", "{\"fit\":{\"seed\":7}}");
+    expect("{\"a\":{\"\":1}}", "/a/", "2", "{\"a\":{\"\":2}}"); /* the empty name is one, too */
+}
+
+static void test_paths_that_lead_nowhere(void **state)
+{
+    (void)state;
+    static const char *const bad[] = {"",      ".",     "a.",   "a..b",   "a[",    "a[]", "l[2]", "l[x]",
+                                      "l[-1]", "a.b.c", "/l/2", "/a/b/c", "/~2/a", "/a~", "l[1]x"};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) expect("{\"a\":1,\"l\":[3,{\"x\":4}]}", bad[i], "9", NULL);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_both_kinds_of_paths),
+        cmocka_unit_test(test_names_with_dots_and_slashes),
+        cmocka_unit_test(test_paths_that_lead_nowhere),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
