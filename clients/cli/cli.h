@@ -40,6 +40,7 @@ status cli_delete(struct cli *cli, int *exit_code, struct error *err);
 status cli_keep(struct cli *cli, int *exit_code, struct error *err);
 status cli_unkeep(struct cli *cli, int *exit_code, struct error *err);
 status cli_retention(struct cli *cli, int *exit_code, struct error *err);
+status cli_batch(struct cli *cli, int *exit_code, struct error *err);
 
 status cli_reconstruct(struct cli *cli, int *exit_code, struct error *err);
 status cli_render(struct cli *cli, int *exit_code, struct error *err);

@@ -13,6 +13,7 @@ static const struct cli_command {
     int option;
     const char *needs;  /* what the operand is, for the message when it is missing; NULL: a job id */
     const char *second; /* a second operand that may follow; NULL: none */
+    const char *third;  /* the same after the second one */
 } command_table[CLI_N_COMMAND] = {
     [CLI_SUBMIT] =
         {"submit", "JOB.json", "send a job document and its files, and start the job",
@@ -84,6 +85,17 @@ static const struct cli_command {
          "not those that are kept (`selvedge keep ID`), nor those whose geometry an unfinished job asks for. With\n"
          "--yes exactly the listed jobs are removed, and each is named.\n",
          OPT_MAX_AGE | OPT_MAX_BYTES | OPT_YES | OPT_JSON},
+    [CLI_BATCH] =
+        {"batch", "ACTION", "run many samples with one template, or say how they are",
+         "selvedge batch submit TEMPLATE.json TABLE.csv    a job of each row; or a folder with a folder of each "
+         "sample\n"
+         "selvedge batch list\n"
+         "selvedge batch show|start|retry|cancel NAME      or its id; retry queues all that have failed\n"
+         "selvedge batch results NAME                      table of results as CSV (--json; --out FILE)\n"
+         "selvedge batch delete NAME --keep-jobs|--delete-jobs\n"
+         "docs/automation.md describes the table. Submitting a changed table with --update runs only what differs.\n",
+         OPT_BATCH | OPT_DRAFT | OPT_JSON | OPT_OUT,
+         "an action: submit, list, show, start, retry, cancel, results or delete", "NAME", "TABLE"},
 };
 
 static const struct cli_option {
@@ -165,6 +177,12 @@ static const struct cli_option {
      "remove the jobs that ended first until all jobs together have at most N bytes",
      offsetof(struct cli_args, max_bytes)},
     {OPT_YES, 0, "yes", NULL, "remove them; without this nothing is removed", offsetof(struct cli_args, yes)},
+    {OPT_BATCH, 0, "name", "NAME", "name of the batch (default: that of the table)", offsetof(struct cli_args, name)},
+    {OPT_BATCH, 0, "files", "DIR", "folder of the input files (default: the table's folder)",
+     offsetof(struct cli_args, files)},
+    {OPT_BATCH, 0, "update", NULL, "make a batch of this name like the table", offsetof(struct cli_args, update)},
+    {OPT_BATCH, 0, "keep-jobs", NULL, "delete the batch but none of its jobs", offsetof(struct cli_args, keep_jobs)},
+    {OPT_BATCH, 0, "delete-jobs", NULL, "delete its jobs, too", offsetof(struct cli_args, delete_jobs)},
     {OPT_SERVER, 0, "server", "URL", "the daemon (default: SELVEDGE_SERVER or " CLI_DEFAULT_SERVER ")",
      offsetof(struct cli_args, server)},
     {OPT_TOKEN, 0, "token-file", "FILE", "file with the access token (default: SELVEDGE_TOKEN_FILE, SELVEDGE_TOKEN)",
@@ -263,6 +281,10 @@ static status take_word(struct cli_args *a, const char *word, struct error *err)
     }
     if (a->operand != NULL && a->second == NULL && command_table[a->command].second != NULL) {
         a->second = word;
+        return STATUS_OK;
+    }
+    if (a->second != NULL && a->third == NULL && command_table[a->command].third != NULL) {
+        a->third = word;
         return STATUS_OK;
     }
     if (a->operand != NULL) {

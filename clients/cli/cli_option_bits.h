@@ -31,7 +31,8 @@ enum {
     OPT_MAX_BYTES = 33554432,
     OPT_YES = 67108864,
     OPT_PICTURE = 134217728, /* each of several */
-    OPT_FILTER = 268435456   /* each of several */
+    OPT_FILTER = 268435456,  /* each of several */
+    OPT_BATCH = 536870912    /* each of several */
 };
 #define OPT_EVERYWHERE (OPT_SERVER | OPT_TOKEN | OPT_HELP)
 

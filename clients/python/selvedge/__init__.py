@@ -11,6 +11,7 @@
 Every request that the server refuses raises `Problem`, whose text is "field: detail"; a server that cannot be reached
 raises `Unreachable`.
 """
+from .batch import Batch, BatchState
 from .client import Client
 from .documents import files_of
 from .job import Job
@@ -18,5 +19,5 @@ from .records import JobError, JobState, Model, Parameter, Progress, Result, Res
 from .transport import JobFailed, Problem, SelvedgeError, Unreachable
 from .version import __version__
 
-__all__ = ["Client", "Job", "JobError", "JobFailed", "JobState", "Model", "Parameter", "Problem", "Progress", "Result", "ResultFile",
+__all__ = ["Batch", "BatchState", "Client", "Job", "JobError", "JobFailed", "JobState", "Model", "Parameter", "Problem", "Progress", "Result", "ResultFile",
            "SelvedgeError", "Unreachable", "Verdict", "Version", "__version__", "files_of"]

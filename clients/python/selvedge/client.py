@@ -6,6 +6,7 @@ import urllib.parse
 import uuid
 from typing import Any, Callable, Iterator, Optional
 
+from .batch import Batch, Samples, submit_batch
 from .documents import Document, DocumentOrPath, files_of, read_document
 from .job import Job, show_nothing
 from .records import JobState, Progress
@@ -70,6 +71,32 @@ class Client:
     def job(self, job_id: str) -> Job:
         """Return an existing job."""
         return Job(self, job_id)
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield the batches, newest first."""
+        path = "/v1/batches?limit=100"
+        while True:
+            page = self.request("GET", path).json()
+            yield from (Batch(self, raw["id"]) for raw in page["batches"])
+            if not page["next_cursor"]:
+                return
+            path = f"/v1/batches?limit=100&cursor={page['next_cursor']}"
+
+    def batch(self, name_or_id: str) -> Batch:
+        """Return an existing batch. Raises KeyError."""
+        for batch in self.batches():
+            if name_or_id in (batch.id, batch.state().name):
+                return batch
+        raise KeyError(name_or_id)
+
+    def submit_batch(self, name: str, template: DocumentOrPath, samples: Samples, folder: Optional[str] = None, *, update: bool = False,
+                     start: bool = True) -> Batch:
+        """Create a job of each sample, upload what the server does not have, and start them. template: a job document. samples: the
+        path of a CSV file, or dicts of "sample", "replace" ({path: value}) and perhaps "folder". folder: where the files are, by
+        default beside the table; a sample that has a folder of its own name in it has them there. update: a batch of this name becomes
+        like this one, and only samples whose document or files differ run; otherwise that is Problem "exists". The same call may be
+        repeated. `submitted` of the batch says what became of each sample."""
+        return submit_batch(self, name, template, samples, folder, update, start)
 
     def has_input(self, sha256: str) -> bool:
         """Tell whether a job of this user has an input with these bytes; uploading it to another job then sends nothing."""

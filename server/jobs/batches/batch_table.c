@@ -1,4 +1,5 @@
 #include "server/jobs/batches/batch_table.h"
+#include "base/json/document_path.h"
 #include "optimizer/job/job_document.h"
 #include "server/jobs/job_access.h"
 
@@ -135,7 +136,7 @@ static status make_document(const json_t *template_, const json_t *row, struct b
     {
         if (s == STATUS_OK && (strcmp(path, "sample") == 0 || strcmp(path, "/sample") == 0))
             s = error_set(err, STATUS_INVALID, "the name of the sample is the member 'sample' of its row");
-        if (s == STATUS_OK) s = batch_replace(document, path, value, err);
+        if (s == STATUS_OK) s = document_replace(document, path, value, err);
         if (s == STATUS_INVALID && err->field[0] == '\0')
             snprintf(err->field, sizeof err->field, "replace.%.100s", path);
     }

@@ -30,9 +30,4 @@ status batch_table_read(struct job_service *v, const json_t *body, struct batch_
                         struct error *err);
 void batch_table_release(struct batch_table *table);
 
-/* Replaces a member of a document. path: a JSON pointer (RFC 6901) if it begins with '/', else names between dots and
- * places in brackets, as in "photographs[2].scale". Objects that are missing on the way are made; a place of a list
- * must be there. STATUS_INVALID. */
-status batch_replace(json_t *document, const char *path, const json_t *value, struct error *err);
-
 #endif

@@ -1,7 +1,6 @@
-/* Replacing one member of a document. */
-#include "server/jobs/batches/batch_table.h"
+#include "base/json/document_path.h"
 
-#include <stdio.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -66,7 +65,7 @@ static bool set_child(json_t *parent, const char *name, const json_t *value)
            json_array_set_new(parent, i, json_deep_copy(value)) == 0;
 }
 
-status batch_replace(json_t *document, const char *path, const json_t *value, struct error *err)
+status document_replace(json_t *document, const char *path, const json_t *value, struct error *err)
 {
     char name[NAME_BYTES];
     const bool pointer = path[0] == '/';
@@ -85,7 +84,7 @@ status batch_replace(json_t *document, const char *path, const json_t *value, st
         if (parent == NULL) return error_set(err, STATUS_INVALID, "the template has no place '%.160s'", path);
     }
     return error_set(err, STATUS_INVALID,
-                     "'%.160s' is no path: write names between dots, as in 'photographs[2].scale', or a JSON pointer, "
-                     "as in '/photographs/2/scale'",
+                     "'%.160s' is no path: write names between dots, as in 'list[2].name', or a JSON pointer, "
+                     "as in '/list/2/name'",
                      path);
 }

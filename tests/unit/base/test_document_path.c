@@ -1,5 +1,5 @@
 /* Paths that name a member of a document. */
-#include "server/jobs/batches/batch_table.h"
+#include "base/json/document_path.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -12,7 +12,7 @@ static void expect(const char *document, const char *path, const char *value, co
 {
     json_t *doc = json_loads(document, 0, NULL), *new = json_loads(value, JSON_DECODE_ANY, NULL);
     struct error err = {0};
-    assert_int_equal(batch_replace(doc, path, new, &err), becomes == NULL ? STATUS_INVALID : STATUS_OK);
+    assert_int_equal(document_replace(doc, path, new, &err), becomes == NULL ? STATUS_INVALID : STATUS_OK);
     char *text = json_dumps(doc, JSON_COMPACT);
     if (becomes != NULL)
         assert_string_equal(text, becomes);

@@ -1,0 +1,14 @@
+/* Paths of members of a JSON document, such as those by which the rows of a batch replace members of a template. */
+#ifndef SELVEDGE_DOCUMENT_PATH_H
+#define SELVEDGE_DOCUMENT_PATH_H
+
+#include "base/status.h"
+
+#include <jansson.h>
+
+/* Replaces a member of a document. path: a JSON pointer (RFC 6901) if it begins with '/', else names between dots and
+ * places in brackets, as in "photographs[2].scale". Objects that are missing on the way are made; a place of a list
+ * must be there. The value is copied. STATUS_INVALID. */
+status document_replace(json_t *document, const char *path, const json_t *value, struct error *err);
+
+#endif
