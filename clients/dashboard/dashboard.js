@@ -1,5 +1,8 @@
 // Entry point of the dashboard: "#" shows the list of jobs, "#?state=failed" a part of it, "#ID" one job, "#new" the
-// form for a new job ("#new?copy=ID" filled with the document of another), "#compare/ID,ID" several jobs side by side.
+// form for a new job ("#new?copy=ID" filled with the document of another), "#compare/ID,ID" several jobs side by side,
+// "#batches" the batches, "#batch/ID" one of them.
+import { batchPage } from "./batch/batch_page.js";
+import { batchesPage } from "./batch/batches_page.js";
 import { comparePage } from "./compare/compare_page.js";
 import { el } from "./page_parts.js";
 import { droppedFiles } from "./dropped_files.js";
@@ -30,6 +33,12 @@ function route() {
   } else if (id.startsWith("compare/")) {
     crumb.append(el("a", { href: "#" }, "Jobs"), " › Comparison");
     leave = comparePage(page, id.slice("compare/".length));
+  } else if (id === "batches") {
+    crumb.append(el("a", { href: "#" }, "Jobs"), " › Batches");
+    leave = batchesPage(page);
+  } else if (/^batch\/[0-9a-f-]{1,40}$/.test(id)) {
+    crumb.append(el("a", { href: "#" }, "Jobs"), " › ", el("a", { href: "#batches" }, "Batches"), " › Batch");
+    leave = batchPage(page, id.slice("batch/".length));
   } else if (/^[A-Za-z0-9_-]{1,80}$/.test(id)) {
     crumb.append(el("a", { href: "#" }, "Jobs"), " › ", el("span", { class: "mono" }, id));
     leave = jobPage(page, id);

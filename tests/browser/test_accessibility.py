@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
 from axe_rules import axe_source, serious_findings  # noqa: E402
-from browser_page import complaints, keep, scrolls_sideways, sized, small_weave, start_daemon, stop_daemon, submit, wait_for  # noqa: E402
+from browser_page import complaints, keep, made_batch, scrolls_sideways, sized, small_weave, start_daemon, stop_daemon, submit, wait_for  # noqa: E402
 from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
 
@@ -86,6 +86,16 @@ def test_pages_of_other_jobs(stub, browser, axe, name, ready):
         wait_for(browser, "document.querySelector('#twin-open')", 60)
         browser.execute_script("document.querySelector('#twin-open').click()")
     check(browser, axe, name.split()[0], ready)
+
+
+def test_pages_of_batches(stub, browser, axe):
+    url, folder = stub
+    batch = made_batch(url, folder, ["axe one", "failing axe"])
+    batch.wait(60, 0.2)
+    for name, address, ready in (("batches", "/#batches", "document.querySelector('#batches tbody tr')"),
+                                 ("batch", f"/#batch/{batch.id}", "document.querySelector('#results tbody tr') && document.querySelector('.failures li')")):
+        browser.get(url + address)
+        check(browser, axe, name, ready)
 
 
 FOCUSABLE = """const shown = (e) => e.checkVisibility({visibilityProperty: true}) && e.getClientRects().length > 0;

@@ -6,7 +6,7 @@ import { getJson, poll, raw } from "../server_link.js";
 
 const PAGE_SIZE = 50, WAIT_S = 25, STATES = ["draft", "queued", "running", "paused", "succeeded", "failed", "cancelled"];
 const VERDICTS = [["good", "good"], ["usable", "usable with reservations"], ["does_not_describe_this_cloth", "does not describe this cloth"], ["none", "none"]];
-const KEYS = ["sample", "state", "verdict", "tag", "from", "to", "sort", "order"];
+const KEYS = ["sample", "state", "verdict", "tag", "from", "to", "batch", "sort", "order"];
 
 // The beginning of a day in the reader's zone, in seconds since 1970; days: how many days later.
 function dayStart(text, days = 0) {
@@ -17,7 +17,7 @@ function dayStart(text, days = 0) {
 // The query of the API that corresponds to the address.
 function queryOf(wanted) {
   const query = new URLSearchParams({ view: "row", limit: String(PAGE_SIZE) });
-  for (const key of ["sample", "state", "verdict", "tag", "sort", "order"]) if (wanted.get(key)) query.set(key, wanted.get(key));
+  for (const key of ["sample", "state", "verdict", "tag", "batch", "sort", "order"]) if (wanted.get(key)) query.set(key, wanted.get(key));
   if (wanted.get("from")) query.set("created_after", String(dayStart(wanted.get("from"))));
   if (wanted.get("to")) query.set("created_before", String(dayStart(wanted.get("to"), 1)));
   return query;
@@ -39,7 +39,8 @@ function filters(wanted, change) {
   return el("form", { class: "filters", role: "search", onsubmit: (e) => e.preventDefault() },
     el("label", {}, "Sample", el("input", { type: "search", name: "sample", value: wanted.get("sample") ?? "", placeholder: "part of its name", oninput: soon })),
     choice("State", "state", wanted, STATES.map((s) => [s, s]), change), choice("Verdict", "verdict", wanted, VERDICTS, change),
-    el("label", {}, "Tag", tag, tags), day("Made from", "from"), day("to", "to"));
+    el("label", {}, "Tag", tag, tags), day("Made from", "from"), day("to", "to"),
+    wanted.get("batch") ? el("button", { type: "button", onclick: (e) => { e.target.remove(); change("batch", ""); } }, "Jobs of all batches") : null);
 }
 
 // A heading that sorts by its column.
@@ -89,7 +90,7 @@ export function listPage(page, asked) {
     tag = answer.headers.get("ETag");
     next = behind;
     table.update(jobs);
-    const filtered = ["sample", "state", "verdict", "tag", "from", "to"].some((key) => wanted.get(key));
+    const filtered = ["sample", "state", "verdict", "tag", "from", "to", "batch"].some((key) => wanted.get(key));
     empty.textContent = filtered ? "No job fits these filters." : "No jobs yet. Press “New job”, drop a job document and its files on this page, or use `selvedge submit JOB.json`.";
     empty.classList.toggle("hidden", jobs.length > 0);
     back.disabled = cursors.length === 1;

@@ -11,6 +11,7 @@ function dates(job, about) {
   return el("table", { class: "record", id: "record-dates" }, el("tbody", {}, [
     pair("id", el("span", { class: "mono" }, job.id)),
     job.owner ? pair("owner", job.owner) : null,
+    job.batch ? pair("batch", el("a", { href: `#batch/${job.batch.id}` }, job.batch.name)) : null,
     pair("computed by", result?.program ?? "–", el("span", { class: "hint" }, `  (this server: ${about.name} ${about.version})`)),
     result?.model ? pair("model", el("span", { class: "mono" }, result.model)) : null,
     result && Number.isSafeInteger(result.seed) ? pair("seed", el("span", { class: "mono" }, String(result.seed))) : null,

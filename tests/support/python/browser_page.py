@@ -122,6 +122,15 @@ def complaints(browser):
     return [e["message"] for e in browser.get_log("browser") if e["level"] == "SEVERE"]
 
 
+def made_batch(url, folder, samples, start=True):
+    """A batch of samples for the stub worker that share their files."""
+    (folder / "batch").mkdir(exist_ok=True)
+    (folder / "batch" / "scan.tif").write_bytes(b"scan")
+    (folder / "batch" / "cloth.csv").write_text("set\n")
+    template = {"volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}, "measurements": {"file": "cloth.csv"}}
+    return selvedge.Client(url).submit_batch(f"batch of {samples[0]}", template, [{"sample": name} for name in samples], str(folder / "batch"), start=start)
+
+
 def submit(url, folder, name):
     sample = folder / name.replace(" ", "-")
     sample.mkdir()
