@@ -9,7 +9,10 @@
 #include "geometry/fibers/shape/axes/axis_profile.h"
 #include "geometry/reconstruct.h"
 
-enum { TRACE_MIN_PIECE = 4 };   /* least number of centers in a chain before joining */
+enum {
+    TRACE_MIN_PIECE = 4,  /* least number of centers in a chain before joining */
+    TRACE_MAX_GROWTH = 64 /* voxels by which an end may grow */
+};
 #define TRACE_END_DIAMETERS 1.0 /* length at an end, in diameters, that may be wrong */
 /* Angle between a line and the direction of its voxels from which on it may be wrong. */
 #define TRACE_DISAGREEMENT_RAD (30.0 * RAD_PER_DEG)
@@ -39,6 +42,9 @@ status trace_chains(struct trace_job *job, struct polyline_set *chains, struct e
  * emptied. */
 status trace_repair(struct trace_job *job, struct polyline_set *in, bool grow, double touching,
                     struct polyline_set *out, struct join_counts *counts, struct error *err);
+/* Joins the ends of lines that were fitted and cut, where the scan shows one fiber (join_evidence.h); before that, lets
+ * them grow. Adds to the counts of the report. */
+status trace_join(struct trace_job *job, struct polyline_set *lines, bool grow, struct error *err);
 /* Moves lines that are still in pieces towards their axes, and finds their radii. */
 status trace_center(struct trace_job *job, struct polyline_set *lines, struct error *err);
 /* Adds lines to fibers that have none, in what `lines` leave of the scan (trace_leftover.c), where radii differ. The

@@ -151,7 +151,12 @@ status trace_lines(struct trace_job *job, struct polyline_set *lines, struct err
 
 status trace_finish(struct trace_job *job, struct polyline_set *lines, struct error *err)
 {
-    trace_enter_part(job, 0.54, 0.67);
-    status s = fit_axes(job, lines, true, err);
-    return s == STATUS_OK ? straighten(job, lines, true, job->o->min_vertex, err) : s;
+    trace_enter_part(job, 0.54, 0.57);
+    status s = trace_center(job, lines, err);
+    if (s == STATUS_OK) s = straighten(job, lines, true, TRACE_MIN_PIECE, err);
+    if (s == STATUS_OK) s = trace_join(job, lines, true, err);
+    trace_enter_part(job, 0.57, 0.67);
+    if (s == STATUS_OK) s = fit_axes(job, lines, true, err);
+    if (s == STATUS_OK) s = straighten(job, lines, true, job->o->min_vertex, err);
+    return s == STATUS_OK ? trace_join(job, lines, false, err) : s;
 }

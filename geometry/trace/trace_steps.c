@@ -11,10 +11,7 @@
 #include <stdint.h>
 #include <string.h>
 
-enum {
-    N_CENTER = 2,   /* rounds of fitting pieces of lines to the scan */
-    MAX_GROWTH = 64 /* voxels by which an end may grow */
-};
+enum { N_CENTER = 2 }; /* rounds of fitting pieces of lines to the scan */
 
 /* The shares of the parts are means of those of the time that they take on a phantom, on a scan of cotton and on one of
  * a weave. */
@@ -72,8 +69,9 @@ status trace_repair(struct trace_job *job, struct polyline_set *in, bool grow, d
                     struct polyline_set *out, struct join_counts *counts, struct error *err)
 {
     struct polyline_set agreeing, single, grown;
-    const struct grow_option option = {(float)job->diameter, (float)job->o->eps_d, MAX_GROWTH};
+    const struct grow_option option = {(float)job->diameter, (float)job->o->eps_d, TRACE_MAX_GROWTH};
     const struct disagreement_option check = {TRACE_DISAGREEMENT_RAD, SIZE_MAX, TRACE_MIN_PIECE, job->pool};
+    const struct join_option join = {job->diameter, job->o->eps_d, 0.0};
     const size_t *n = job->v->n;
     const struct duplicate_option one = {{n[0], n[1], n[2]}, job->diameter, touching, job->pool};
     size_t n_grown = 0, n_cut = 0;
@@ -83,12 +81,30 @@ status trace_repair(struct trace_job *job, struct polyline_set *in, bool grow, d
     status s = polylines_cut_disagreeing(in, job->d, &check, &agreeing, &n_cut, err);
     if (s == STATUS_OK) s = polylines_remove_duplicates(&agreeing, &one, TRACE_MIN_PIECE, &single, counts, err);
     if (s == STATUS_OK && grow) s = polylines_grow(&single, job->v, &option, &grown, &n_grown, err);
-    if (s == STATUS_OK)
-        s = polylines_join(grow ? &grown : &single, job->v, job->diameter, job->o->eps_d, out, counts, err);
+    if (s == STATUS_OK) s = polylines_join(grow ? &grown : &single, job->v, &join, out, counts, err);
     polyline_set_release(&agreeing);
     polyline_set_release(&single);
     polyline_set_release(&grown);
     polyline_set_release(in);
+    return s;
+}
+
+status trace_join(struct trace_job *job, struct polyline_set *lines, bool grow, struct error *err)
+{
+    const struct grow_option growth = {(float)job->diameter, (float)job->o->eps_d, TRACE_MAX_GROWTH};
+    const struct join_option join = {job->diameter, job->o->eps_d, job->profile.blur};
+    struct join_counts counts = {.n_gap_bridged = job->report->n_gap_bridged, .n_joined = job->report->n_joined};
+    struct polyline_set grown, out;
+    size_t n_grown;
+    polyline_set_init(&grown);
+    polyline_set_init(&out);
+    status s = grow ? polylines_grow(lines, job->v, &growth, &grown, &n_grown, err) : STATUS_OK;
+    if (s == STATUS_OK) s = polylines_join(grow ? &grown : lines, job->v, &join, &out, &counts, err);
+    polyline_set_release(&grown);
+    polyline_set_release(lines);
+    *lines = out;
+    job->report->n_gap_bridged = counts.n_gap_bridged;
+    job->report->n_joined = counts.n_joined;
     return s;
 }
 

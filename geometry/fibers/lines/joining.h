@@ -4,8 +4,9 @@
  * diameter (and at least within a voxel), the vertices of the shorter are removed.
  * 2. Joins: two free ends are joined if one smooth curve passes through the last vertices of both (join_curve.h),
  * and the way between them is short, lies in material and is not on another line. Ends at a face of the volume stay
- * free. The best pairs are joined first. A join within one subvolume bridges a gap where some slices have no center;
- * one between two subvolumes belongs to a fiber that turns from one to the other. */
+ * free. The best pairs are joined first. Where the blur of the scan is known, the scan must also look more like one
+ * fiber there than like two (join_evidence.h). A join within one subvolume bridges a gap where some slices have no
+ * center; one between two subvolumes belongs to a fiber that turns from one to the other. */
 #ifndef SELVEDGE_GEOMETRY_JOINING_H
 #define SELVEDGE_GEOMETRY_JOINING_H
 
@@ -28,8 +29,14 @@ struct duplicate_option {
     struct thread_pool *pool;
 };
 
+/* eps_d: density that counts as material. blur_voxel: standard deviation of the edges of fibers, when lines lie on
+ * their axes and their radii are known; 0: joins are judged by their shape alone. */
+struct join_option {
+    double diameter_voxel, eps_d, blur_voxel;
+};
+
 /* Both steps write to result (initialised, empty); polylines_mark_duplicates marks the vertices that the first removes.
- * eps_d: density that counts as material. min_vertex: pieces that are shorter after the removal of duplicates are
+ * min_vertex: pieces that are shorter after the removal of duplicates are
  * dropped. STATUS_NO_MEMORY. */
 status polylines_mark_duplicates(const struct polyline_set *lines, const struct duplicate_option *o, bool *mark,
                                  struct error *err);
@@ -40,7 +47,8 @@ status polylines_remove_duplicates(const struct polyline_set *lines, const struc
  * touching fibers are at 1. most: largest radius of a line. */
 bool polyline_is_overlapped(const struct polyline_set *p, const struct vertex_grid *g, size_t line, size_t i,
                             float share, float most);
-status polylines_join(const struct polyline_set *lines, const struct volume *v, double diameter_voxel, double eps_d,
+/* Sections of the lines are kept, and interpolated over the gaps. */
+status polylines_join(const struct polyline_set *lines, const struct volume *v, const struct join_option *o,
                       struct polyline_set *result, struct join_counts *counts, struct error *err);
 
 #endif

@@ -1,4 +1,4 @@
-#include "geometry/fibers/lines/join_curve.h"
+#include "geometry/fibers/lines/join/join_curve.h"
 #include "base/small_matrix.h"
 
 #include <math.h>
