@@ -14,19 +14,19 @@ def test_from_the_list_to_the_results(stub, browser):
     wait_for(browser, "document.querySelector('#batches tbody a')")
     assert "4 draft" in text_of(browser, "#batches tbody tr")
     click_on(browser, "#batches tbody a")
-    wait_for(browser, "document.querySelector('.facts')")
+    wait_for(browser, "document.querySelector('.batch-facts')")
     assert text_of(browser, "h1") == "batch of blue twill" and browser.title == "batch of blue twill – Selvedge"
     assert browser.execute_script("return document.querySelector('#failures').classList.contains('hidden')")
-    click_on(browser, ".actions button", 0)
-    wait_for(browser, "document.querySelector('.said')?.textContent === '4 jobs started'")
-    wait_for(browser, "document.querySelector('.facts').textContent.includes('2 succeeded, 2 failed')", 60)
-    wait_for(browser, "document.querySelectorAll('.failures li').length === 1")  # one reason for both
-    assert "2 samples: failing jersey, failing knit" in text_of(browser, ".failures li")
-    wait_for(browser, "document.querySelectorAll('#results tbody tr').length === 4")
-    rows = texts(browser, "#results tbody tr")
+    click_on(browser, ".batch-actions button", 0)
+    wait_for(browser, "document.querySelector('.batch-said')?.textContent === '4 jobs started'")
+    wait_for(browser, "document.querySelector('.batch-facts').textContent.includes('2 succeeded, 2 failed')", 60)
+    wait_for(browser, "document.querySelectorAll('.batch-failures li').length === 1")  # one reason for both
+    assert "2 samples: failing jersey, failing knit" in text_of(browser, ".batch-failures li")
+    wait_for(browser, "document.querySelectorAll('#batch-table tbody tr').length === 4")
+    rows = texts(browser, "#batch-table tbody tr")
     assert "red <b>satin" in rows[1] and "succeeded" in rows[0] and "failed" in rows[2] and "±" in rows[0]
-    assert browser.execute_script("return document.querySelectorAll('#results b').length") == 0
-    hrefs = browser.execute_script("return [...document.querySelectorAll('#batch-results .actions a')].map((a) => a.getAttribute('href'))")
+    assert browser.execute_script("return document.querySelectorAll('#batch-table b').length") == 0
+    hrefs = browser.execute_script("return [...document.querySelectorAll('#batch-results .batch-actions a')].map((a) => a.getAttribute('href'))")
     assert hrefs == [f"/v1/batches/{batch.id}/results.csv", f"/v1/batches/{batch.id}/results.json"]
     keep(browser, "batch")
     for width, height in ((375, 800), (1280, 720)):
@@ -35,7 +35,7 @@ def test_from_the_list_to_the_results(stub, browser):
             keep(browser, f"batch-{width}", width, height)
     before = batch.state().failures
     click_on(browser, "#failures button")
-    wait_for(browser, "document.querySelector('.said')?.textContent === '2 jobs queued again'")
+    wait_for(browser, "document.querySelector('.batch-said')?.textContent === '2 jobs queued again'")
     batch.wait(60, 0.2)
     client = selvedge.Client(url)
     assert all(client.job(one["job"]).state().raw["attempt"] == 2 for one in before)
@@ -46,8 +46,8 @@ def test_the_jobs_of_a_batch_and_back(stub, browser):
     url, folder = stub
     batch = made_batch(url, folder, ["wool one", "wool two"], start=False)
     browser.get(f"{url}/#batch/{batch.id}")
-    wait_for(browser, "document.querySelector('.actions a')")
-    click_on(browser, ".actions a")
+    wait_for(browser, "document.querySelector('.batch-actions a')")
+    click_on(browser, ".batch-actions a")
     wait_for(browser, "document.querySelectorAll('#jobs tbody tr').length === 2")
     assert "Jobs of all batches" in texts(browser, ".filters button")
     job = batch.submitted["samples"][0]["job"]

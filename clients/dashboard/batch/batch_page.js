@@ -11,7 +11,7 @@ const ROWS_SHOWN = 200;
 function summary(batch) {
   const verdicts = Object.entries(batch.verdicts).map(([code, n]) => `${n} ${WORDS[code] ?? code}`).join(", ");
   const fact = (name, ...value) => [el("dt", {}, name), el("dd", {}, ...value)];
-  return [el("h1", {}, batch.name), stateBar(batch), el("dl", { class: "facts" },
+  return [el("h1", {}, batch.name), stateBar(batch), el("dl", { class: "batch-facts" },
     fact("Samples", `${batch.n_sample}: ${stateWords(batch.states)}`), fact("Done", percent(batch.fraction)),
     batch.expected_end_unix_s ? fact("Ends about", timeOf(batch.expected_end_unix_s)) : [],
     verdicts ? fact("Verdicts", verdicts) : [], fact("Submitted", timeOf(batch.updated_unix_s)))];
@@ -43,13 +43,13 @@ function resultLine(row, names) {
 function resultTable(samples) {
   const names = [...new Set(samples.flatMap((s) => s.parameters.map((p) => p.name)))];
   const head = ["Sample", "State", "Verdict", "Held-out error", "Reservations", ...names].map((text) => el("th", { scope: "col" }, text));
-  return [el("div", { class: "wide", tabIndex: 0, role: "region", "aria-label": "table of results" }, el("table", { id: "results" }, el("thead", {}, el("tr", {}, head)), el("tbody", {}, samples.slice(0, ROWS_SHOWN).map((s) => resultLine(s, names))))),
+  return [el("div", { class: "wide", tabIndex: 0, role: "region", "aria-label": "table of results" }, el("table", { id: "batch-table" }, el("thead", {}, el("tr", {}, head)), el("tbody", {}, samples.slice(0, ROWS_SHOWN).map((s) => resultLine(s, names))))),
     samples.length > ROWS_SHOWN ? el("p", { class: "hint" }, `The first ${ROWS_SHOWN} of ${samples.length} samples; the downloads have all.`) : null];
 }
 
 export function batchPage(page, id) {
-  const url = `/v1/batches/${id}`, head = el("section", { class: "card" }), said = el("p", { role: "status", class: "said" });
-  const failed = el("section", { class: "card hidden", id: "failures" }), list = el("ul", { class: "failures" }), results = el("section", { class: "card", id: "batch-results" });
+  const url = `/v1/batches/${id}`, head = el("section", { class: "card" }), said = el("p", { role: "status", class: "batch-said" });
+  const failed = el("section", { class: "card hidden", id: "failures" }), list = el("ul", { class: "batch-failures" }), results = el("section", { class: "card", id: "batch-results" });
   const facts = el("div"), table = el("div");
   let seen = "";
   const act = async (action) => {
@@ -62,9 +62,9 @@ export function batchPage(page, id) {
   };
   const button = (text, action, main = "") => el("button", { type: "button", class: main, onclick: () => act(action) }, text);
   const start = button("Start", "start", "main"), cancel = button("Cancel all", "cancel"), retry = button("Retry all failed", "retry", "main");
-  head.append(facts, el("div", { class: "actions" }, start, cancel, el("a", { class: "button", href: `#?batch=${id}` }, "List its jobs")), said);
+  head.append(facts, el("div", { class: "batch-actions" }, start, cancel, el("a", { class: "button", href: `#?batch=${id}` }, "List its jobs")), said);
   failed.append(el("h2", {}, "Failures"), retry, list);
-  results.append(el("h2", {}, "Results"), el("p", { class: "actions" }, el("a", { class: "button", href: `${url}/results.csv`, download: "results.csv" }, "Download CSV"),
+  results.append(el("h2", {}, "Results"), el("p", { class: "batch-actions" }, el("a", { class: "button", href: `${url}/results.csv`, download: "results.csv" }, "Download CSV"),
     el("a", { class: "button", href: `${url}/results.json`, download: "results.json" }, "Download JSON")), table);
   page.append(head, failed, results);
 

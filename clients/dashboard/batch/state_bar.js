@@ -12,5 +12,5 @@ export function stateBar({ states, n_sample: n }) {
     strip.style.flexGrow = String(states[s]);
     return strip;
   });
-  return el("div", { class: "states", role: "img", "aria-label": n ? stateWords(states) : "no samples" }, strips);
+  return el("div", { class: "batch-states", role: "img", "aria-label": n ? stateWords(states) : "no samples" }, strips);
 }
