@@ -44,11 +44,23 @@ static status clear_folder(struct job_service *v, struct job_row *row, struct er
     return s;
 }
 
+/* Whether the file holds this text. It was synced when it was written, so it need not be written again. */
+static bool holds(const char *path, const char *text)
+{
+    char *there = NULL;
+    size_t n = 0, n_text = strlen(text);
+    bool same =
+        file_read_all(path, n_text, &there, &n, NULL) == STATUS_OK && n == n_text && memcmp(there, text, n) == 0;
+    free(there);
+    return same;
+}
+
 static status write_folder(struct job_service *v, const struct job_row *row, struct error *err)
 {
     char path[PATH_BYTES], text[160];
     path_join(path, v->settings->data, "jobs", row->id, JOB_FILE_DOCUMENT, NULL);
-    status s = durable_replace(path, row->document, strlen(row->document), err);
+    status s =
+        holds(path, row->document) ? STATUS_OK : durable_replace(path, row->document, strlen(row->document), err);
     if (s != STATUS_OK) return s;
     int n = snprintf(text, sizeof text, "{\"attempt\":%lld,\"token\":\"%s\"}\n", (long long)row->attempt, row->token);
     path_join(path, v->settings->data, "jobs", row->id, JOB_FILE_ATTEMPT, NULL);

@@ -9,19 +9,22 @@
 #include "server/workers/worker_process.h"
 
 #include <errno.h>
+#include <poll.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
+#include <sys/eventfd.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
-enum { MAX_WORKER = 64, MAX_WAITING = 256, BURY_AGAIN_S = 60 };
+enum { MAX_WORKER = 64, MAX_WAITING = 256, BURY_AGAIN_S = 60, BUSY_LOOK_MS = 100, IDLE_LOOK_MS = 1000 };
 
 struct slot {
     bool used;
     char job_id[STORE_ID_BYTES], owner[STORE_OWNER_BYTES], batch[STORE_ID_BYTES];
     pid_t pid;
+    int pid_fd;             /* becomes readable when the process ends; -1: the kernel has none */
     enum attempt_stop stop; /* reason for the request to stop */
     double seen_heartbeat_unix_s,
         heartbeat_seen_s; /* the last new heartbeat, and when it was seen (monotonic; at first the start) */
@@ -44,9 +47,8 @@ struct supervisor {
     struct job_service *v;
     char worker[PATH_BYTES];
     pthread_t thread;
-    pthread_mutex_t lock;
-    pthread_cond_t changed;
-    bool woken, stop; /* guarded by lock */
+    int wake_fd; /* an eventfd */
+    atomic_bool stop;
     struct slot slot[MAX_WORKER];
     struct waiting waiting[MAX_WAITING];
     bool below_floor;
@@ -94,6 +96,7 @@ static void record_end(struct supervisor *u, struct slot *slot)
         return;
     }
     slot->used = false;
+    if (slot->pid_fd >= 0) close(slot->pid_fd);
     struct waiting *w = waiting_of(u, slot->job_id, outcome.delay_s > 0);
     if (w == NULL) return;
     w->until_s = clock_monotonic_s() + outcome.delay_s;
@@ -192,7 +195,8 @@ static void launch(struct supervisor *u, const struct queued_job *job)
     }
     struct slot *slot = u->slot;
     while (slot->used) slot++;
-    *slot = (struct slot){.used = true, .heartbeat_seen_s = clock_monotonic_s(), .started_s = clock_monotonic_s()};
+    *slot = (struct slot){
+        .used = true, .pid_fd = -1, .heartbeat_seen_s = clock_monotonic_s(), .started_s = clock_monotonic_s()};
     snprintf(slot->job_id, sizeof slot->job_id, "%s", job_id);
     snprintf(slot->owner, sizeof slot->owner, "%s", job->owner);
     snprintf(slot->batch, sizeof slot->batch, "%s", job->batch);
@@ -201,6 +205,7 @@ static void launch(struct supervisor *u, const struct queued_job *job)
         .program = u->worker, .job_folder = folder, .console = console, .speeds = speeds};
     s = worker_launch(&paths, u->v->settings, &slot->pid, &err);
     if (s == STATUS_OK) {
+        slot->pid_fd = (int)syscall(SYS_pidfd_open, slot->pid, 0);
         log_info(u->v->log, "job %s: worker %d started", job_id, (int)slot->pid);
         return;
     }
@@ -302,25 +307,27 @@ static void stop_all(struct supervisor *u)
     }
 }
 
+/* Waits until a worker ends, supervisor_wake is called, or it is time to look at everything. */
+static void wait_for_news(struct supervisor *u)
+{
+    struct pollfd news[MAX_WORKER + 1] = {{.fd = u->wake_fd, .events = POLLIN}};
+    nfds_t n = 1;
+    uint64_t n_wake;
+    for (size_t i = 0; i < MAX_WORKER; i++)
+        if (u->slot[i].used && !u->slot[i].ended && u->slot[i].pid_fd >= 0)
+            news[n++] = (struct pollfd){.fd = u->slot[i].pid_fd, .events = POLLIN};
+    if (poll(news, n, n_running(u) > 0 ? BUSY_LOOK_MS : IDLE_LOOK_MS) < 0) return;
+    if ((news[0].revents & POLLIN) != 0 && read(u->wake_fd, &n_wake, sizeof n_wake) < 0)
+        log_warning(u->v->log, "the supervisor cannot read its counter: %s", strerror(errno));
+}
+
 static void *run(void *context)
 {
     struct supervisor *u = context;
-    pthread_mutex_lock(&u->lock);
-    while (!u->stop) {
-        u->woken = false;
-        pthread_mutex_unlock(&u->lock);
+    while (!atomic_load(&u->stop)) {
         tick(u);
-        bool busy = n_running(u) > 0;
-        struct timespec until;
-        clock_gettime(CLOCK_MONOTONIC, &until);
-        until.tv_nsec += busy ? 100000000 : 0;
-        until.tv_sec += busy ? until.tv_nsec / 1000000000 : 1;
-        until.tv_nsec %= 1000000000;
-        pthread_mutex_lock(&u->lock);
-        while (!u->woken && !u->stop && pthread_cond_timedwait(&u->changed, &u->lock, &until) == 0) {
-        }
+        wait_for_news(u);
     }
-    pthread_mutex_unlock(&u->lock);
     stop_all(u);
     return NULL;
 }
@@ -334,16 +341,12 @@ status supervisor_start(struct job_service *v, const char *worker_program, struc
     u->v = v;
     u->disk_seen_s = -1e9;
     snprintf(u->worker, sizeof u->worker, "%s", worker_program);
-    pthread_mutex_init(&u->lock, NULL);
-    pthread_condattr_t attr;
-    pthread_condattr_init(&attr);
-    pthread_condattr_setclock(&attr, CLOCK_MONOTONIC);
-    pthread_cond_init(&u->changed, &attr);
-    pthread_condattr_destroy(&attr);
+    u->wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     v->supervisor = u;
-    int e = pthread_create(&u->thread, NULL, run, u);
+    int e = u->wake_fd < 0 ? errno : pthread_create(&u->thread, NULL, run, u);
     if (e != 0) {
         v->supervisor = NULL;
+        if (u->wake_fd >= 0) close(u->wake_fd);
         free(u);
         errno = e;
         return error_set_errno(err, "cannot start the supervisor");
@@ -356,22 +359,19 @@ const char *supervisor_program(const struct supervisor *u) { return u->worker; }
 
 void supervisor_wake(struct supervisor *u)
 {
-    pthread_mutex_lock(&u->lock);
-    u->woken = true;
-    pthread_cond_signal(&u->changed);
-    pthread_mutex_unlock(&u->lock);
+    const uint64_t one = 1;
+    if (write(u->wake_fd, &one, sizeof one) < 0) {
+        /* the counter is full, so the supervisor is awake already */
+    }
 }
 
 void supervisor_stop(struct supervisor *u)
 {
     if (u == NULL) return;
-    pthread_mutex_lock(&u->lock);
-    u->stop = true;
-    pthread_cond_signal(&u->changed);
-    pthread_mutex_unlock(&u->lock);
+    atomic_store(&u->stop, true);
+    supervisor_wake(u);
     pthread_join(u->thread, NULL);
     u->v->supervisor = NULL;
-    pthread_cond_destroy(&u->changed);
-    pthread_mutex_destroy(&u->lock);
+    close(u->wake_fd);
     free(u);
 }

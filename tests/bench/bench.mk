@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-service bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-transport bench-models bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics docs-ground docs-seam bench-browser bench-pictures bench-weave bench-weave-rendered
+.PHONY: bench bench-service bench-scale bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-transport bench-models bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics docs-ground docs-seam bench-browser bench-pictures bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -59,6 +59,11 @@ bench-dashboard: | deps-test ## what the dashboard costs in a browser: opening a
 bench-service: | deps-test ## what the daemon costs: the list of jobs, other answers, those beside uploads and a slow disk, declarations, slow readers, long polls (two minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/bin/selvedged >&2
 	@/usr/bin/python3 tests/bench/service/bench_service.py --build $(BUILD) $(SERVICE)
+
+# SAMPLES: of the batch (1000)
+bench-scale: | deps-test ## what a batch of 1,000 samples costs to submit and to dispatch, and the list of 10,000 queued jobs (three minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/bin/selvedged >&2
+	@SELVEDGE_BUILD=$(BUILD) /usr/bin/python3 tests/bench/service/bench_scale.py $(SAMPLES)
 
 EXPORTS_PYTHON := $(BUILD)/exports-python
 $(EXPORTS_PYTHON)/bin/packages-are-there:
