@@ -93,7 +93,8 @@ def test_pages_of_batches(stub, browser, axe):
     batch = made_batch(url, folder, ["axe one", "failing axe"])
     batch.wait(60, 0.2)
     for name, address, ready in (("batches", "/#batches", "document.querySelector('#batches tbody tr')"),
-                                 ("batch", f"/#batch/{batch.id}", "document.querySelector('#batch-table tbody tr') && document.querySelector('.batch-failures li')")):
+                                 ("batch", f"/#batch/{batch.id}",
+                                  "document.querySelector('#batch-table tbody tr') && document.querySelector('.batch-failures li')")):
         browser.get(url + address)
         check(browser, axe, name, ready)
 
