@@ -10,8 +10,7 @@
 void batch_row_release(struct batch_row *row)
 {
     free(row->template_text);
-    free(row->plan);
-    row->template_text = row->plan = NULL;
+    row->template_text = NULL;
 }
 
 void batch_rows_free(struct batch_row *row, size_t n)
@@ -37,21 +36,20 @@ static status read_row(sqlite3_stmt *q, struct batch_row *row, struct error *err
     store_text(q, 3, row->name, sizeof row->name);
     row->created_unix_s = sqlite3_column_double(q, 4);
     row->updated_unix_s = sqlite3_column_double(q, 5);
-    status s = copy_text(q, 6, &row->template_text, err);
-    return s == STATUS_OK ? copy_text(q, 7, &row->plan, err) : s;
+    return copy_text(q, 6, &row->template_text, err);
 }
 
 static status write_batch(struct store *store, struct batch_row *b, struct error *err)
 {
     int n = 0;
     b->updated_unix_s = clock_wall_s();
-    status s = store_run(&store->write, &n, err, "UPDATE batch SET template = ?, plan = '', updated = ? WHERE id = ?",
-                         "sds", b->template_text, b->updated_unix_s, b->id);
+    status s = store_run(&store->write, &n, err, "UPDATE batch SET template = ?, updated = ? WHERE id = ?", "sds",
+                         b->template_text, b->updated_unix_s, b->id);
     if (s != STATUS_OK || n > 0) return s;
     b->created_unix_s = b->updated_unix_s;
     s = store_run(&store->write, NULL, err,
-                  "INSERT INTO batch (id, owner, name, template, plan, created, updated) VALUES (?,?,?,?,'',?,?)",
-                  "ssssdd", b->id, b->owner, b->name, b->template_text, b->created_unix_s, b->updated_unix_s);
+                  "INSERT INTO batch (id, owner, name, template, created, updated) VALUES (?,?,?,?,?,?)", "ssssdd",
+                  b->id, b->owner, b->name, b->template_text, b->created_unix_s, b->updated_unix_s);
     if (s == STATUS_OK) b->serial = sqlite3_last_insert_rowid(store->write.db);
     return s;
 }
@@ -84,15 +82,6 @@ status store_batch_write(struct store *store, struct batch_row *batch, struct jo
     pthread_mutex_unlock(&store->write.lock);
     report(store, s, new_job, n_new);
     return report(store, s, old_job, n_old);
-}
-
-status store_batch_plan(struct store *store, const char *id, const char *plan, struct error *err)
-{
-    int n = 0;
-    pthread_mutex_lock(&store->write.lock);
-    status s = store_run(&store->write, &n, err, "UPDATE batch SET plan = ? WHERE id = ?", "ss", plan, id);
-    pthread_mutex_unlock(&store->write.lock);
-    return s == STATUS_OK && n == 0 ? error_set(err, STATUS_NOT_FOUND, "batch '%.40s' does not exist", id) : s;
 }
 
 static status erase(struct store *store, const char *id, struct job_row *job, size_t n, struct error *err)
@@ -135,7 +124,7 @@ status store_batch_get(struct store *store, const char *id, struct batch_row *ro
 {
     sqlite3_stmt *q = NULL;
     pthread_mutex_lock(&store->read.lock);
-    status s = store_prepare(&store->read, &q, err, COLUMNS("template, plan") "WHERE id = ?", "s", id);
+    status s = store_prepare(&store->read, &q, err, COLUMNS("template") "WHERE id = ?", "s", id);
     s = one_row(store, s, q, id, row, err);
     pthread_mutex_unlock(&store->read.lock);
     return s;
@@ -146,8 +135,8 @@ status store_batch_find(struct store *store, const char *owner, const char *name
 {
     sqlite3_stmt *q = NULL;
     pthread_mutex_lock(&store->read.lock);
-    status s = store_prepare(&store->read, &q, err, COLUMNS("template, plan") "WHERE owner = ? AND name = ?", "ss",
-                             owner, name);
+    status s =
+        store_prepare(&store->read, &q, err, COLUMNS("template") "WHERE owner = ? AND name = ?", "ss", owner, name);
     s = one_row(store, s, q, name, row, err);
     pthread_mutex_unlock(&store->read.lock);
     return s;
@@ -163,8 +152,8 @@ status store_batch_list(struct store *store, const char *owner, int64_t before_s
     if (row == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot list batches: out of memory");
     pthread_mutex_lock(&store->read.lock);
     status s = store_prepare(&store->read, &q, err,
-                             COLUMNS("NULL, NULL") "WHERE (?1 = 0 OR serial < ?1) AND (?2 IS NULL OR owner = ?2) "
-                                                   "ORDER BY serial DESC LIMIT ?3",
+                             COLUMNS("NULL") "WHERE (?1 = 0 OR serial < ?1) AND (?2 IS NULL OR owner = ?2) "
+                                             "ORDER BY serial DESC LIMIT ?3",
                              "isi", before_serial, owner, (int64_t)limit);
     while (s == STATUS_OK && n < limit && (rc = sqlite3_step(q)) == SQLITE_ROW) {
         s = read_row(q, &row[n], err);

@@ -10,7 +10,6 @@ struct batch_row {
     char id[STORE_ID_BYTES], owner[STORE_OWNER_BYTES];
     char name[STORE_NAME_BYTES]; /* unique among the batches of its owner */
     char *template_text;         /* JSON, owned (batch_row_release); NULL where it was not read */
-    char *plan;                  /* JSON or "", owned; NULL where it was not read */
     double created_unix_s, updated_unix_s;
 };
 void batch_row_release(struct batch_row *row);
@@ -20,15 +19,13 @@ void batch_rows_free(struct batch_row *row, size_t n);
  * as store_job_update does. All in one transaction. Sets the serials of what is new. */
 status store_batch_write(struct store *store, struct batch_row *batch, struct job_row *new_job, size_t n_new,
                          struct job_row *old_job, size_t n_old, struct error *err);
-/* Notes the plan of a batch, a JSON text. STATUS_NOT_FOUND. */
-status store_batch_plan(struct store *store, const char *id, const char *plan, struct error *err);
 /* Removes a batch, and updates n jobs, which leave it or are tombstones, in one transaction. */
 status store_batch_erase(struct store *store, const char *id, struct job_row *job, size_t n, struct error *err);
 /* By id, or by owner and name. The caller releases the row. STATUS_NOT_FOUND. */
 status store_batch_get(struct store *store, const char *id, struct batch_row *row, struct error *err);
 status store_batch_find(struct store *store, const char *owner, const char *name, struct batch_row *row,
                         struct error *err);
-/* The newest batches of an owner (NULL: of all) before a serial (0: from the newest), without template and plan. The
+/* The newest batches of an owner (NULL: of all) before a serial (0: from the newest), without template. The
  * caller calls batch_rows_free. */
 status store_batch_list(struct store *store, const char *owner, int64_t before_serial, size_t limit,
                         struct batch_row **row, size_t *n, struct error *err);

@@ -39,8 +39,8 @@ static status import_batch(struct store *store, struct job_row *row, struct erro
     if (row->batch[0] == '\0') return STATUS_OK;
     for (size_t i = 0; s == STATUS_OK && i < 2; i++) { /* the second name where another batch has the first one */
         snprintf(sql, sizeof sql,
-                 "INSERT OR IGNORE INTO batch (id, owner, name, template, plan, created, updated) SELECT ?1, ?2, %s, "
-                 "'', '', ?4, ?4 WHERE length(?1) = 36",
+                 "INSERT OR IGNORE INTO batch (id, owner, name, template, created, updated) SELECT ?1, ?2, %s, "
+                 "'', ?4, ?4 WHERE length(?1) = 36",
                  name[i]);
         s = store_run(&store->write, NULL, err, sql, "sssd", row->batch, row->owner, row->batch_name,
                       row->created_unix_s);

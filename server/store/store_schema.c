@@ -133,7 +133,7 @@ static const char *const migration[] = {
     /* batches, and whose turn it is: for each owner and batch ('': the jobs without one) the number of queued jobs and
      * the time of the last start, by triggers */
     "CREATE TABLE batch (serial INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, owner TEXT NOT NULL,"
-    " name TEXT NOT NULL, template TEXT NOT NULL, plan TEXT NOT NULL, created REAL NOT NULL, updated REAL NOT NULL,"
+    " name TEXT NOT NULL, template TEXT NOT NULL, created REAL NOT NULL, updated REAL NOT NULL,"
     " UNIQUE (owner, name));"
     "ALTER TABLE job ADD COLUMN batch TEXT NOT NULL DEFAULT '';"
     "ALTER TABLE job ADD COLUMN batch_place INTEGER NOT NULL DEFAULT 0;"

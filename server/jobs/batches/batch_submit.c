@@ -212,7 +212,7 @@ static status find_batch(struct submission *s, const char *owner, bool *text, st
     s->batch = found;
     *text = !s->exists || strcmp(found.template_text, s->table->template_text) != 0;
     batch_row_release(&found);
-    s->batch.template_text = s->batch.plan = NULL;
+    s->batch.template_text = NULL;
     if (s->exists) return batch_jobs(s->v, s->batch.id, &s->old, &s->n_old, err);
     job_new_id(s->batch.id);
     snprintf(s->batch.owner, sizeof s->batch.owner, "%s", owner);

@@ -102,13 +102,11 @@ static void test_erasing_a_batch_leaves_what_it_should(void **state)
     struct job_row job[2] = {job_of(batch_id, "a", 0), job_of(batch_id, "b", 1)}, row;
     struct owner_use use;
     assert_int_equal(store_batch_write(f->store, &b, job, 2, NULL, 0, NULL), STATUS_OK);
-    assert_int_equal(store_batch_plan(f->store, batch_id, "{}", NULL), STATUS_OK);
     job[0].batch[0] = job[1].batch[0] = '\0';
     job[1].deleted = true;
     assert_int_equal(store_batch_erase(f->store, batch_id, job, 2, NULL), STATUS_OK);
     reopen(f);
     assert_int_equal(store_batch_get(f->store, batch_id, &found, NULL), STATUS_NOT_FOUND);
-    assert_int_equal(store_batch_plan(f->store, batch_id, "{}", NULL), STATUS_NOT_FOUND);
     assert_int_equal(store_job_look(f->store, "a", &row, NULL), STATUS_OK);
     assert_string_equal(row.batch, "");
     assert_int_equal(store_owner_use(f->store, "ann", &use, NULL), STATUS_OK);
