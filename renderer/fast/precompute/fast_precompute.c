@@ -77,7 +77,8 @@ status fast_precompute(const struct fast_precompute_request *q, struct thread_po
     status s = check(q, err);
     if (s != STATUS_OK) return s;
     struct fast_precompute_request r = resolved(q);
-    struct precompute_job j = {.q = &r, .pool = pool, .t = t};
+    struct precompute_journal journal = {0};
+    struct precompute_job j = {.q = &r, .pool = pool, .journal = &journal, .t = t};
     t->checksum = fast_tables_checksum(&r);
     t->order = r.order;
     t->n_set = (uint32_t)r.n_set;
@@ -85,7 +86,9 @@ status fast_precompute(const struct fast_precompute_request *q, struct thread_po
     t->bottom_mm = -scene_thickness_mm(r.scene);
     scene_tile_mm(r.scene, t->tile_mm);
     s = parameter_sets_init(&j.sets, r.scene, r.model, r.param, r.n_set, err);
+    if (s == STATUS_OK) s = precompute_journal_open(&journal, r.journal_path, r.journal_every_s, t->checksum, err);
     if (s == STATUS_OK) s = run_parts(&j, progress, err);
+    precompute_journal_release(&journal);
     parameter_sets_release(&j.sets);
     if (s != STATUS_OK) fast_tables_release(t);
     return s;

@@ -18,13 +18,18 @@ struct fast_precompute_request {
     uint32_t n_path;    /* of a cell that is seen often; rarely seen ones have fewer. 0: 50,000, as published */
     double cell_paths;  /* edge of a cell over the mean free path; 0: 2 */
     bool no_visibility; /* leave out what the segments see: n_row is 0 */
+
+    /* A file that keeps what is finished, at least journal_every_s apart, and from which an interrupted call goes on to
+     * the same bits; the caller removes it in the end. NULL: none. A file of another request is overwritten. */
+    const char *journal_path;
+    double journal_every_s;
 };
 
 /* A number that differs for another cloth, other parameters, or another request. */
 uint64_t fast_tables_checksum(const struct fast_precompute_request *q);
 
 /* STATUS_INVALID, field "model": a model that distinguishes directions around the fiber; a bent scene; what
- * parameter_sets_init refuses. STATUS_CANCELLED, STATUS_NO_MEMORY. t: nothing to release on failure. */
+ * parameter_sets_init refuses. STATUS_CANCELLED, STATUS_NO_MEMORY; of the journal STATUS_IO, STATUS_DISK_FULL. t: nothing to release on failure. */
 status fast_precompute(const struct fast_precompute_request *q, struct thread_pool *pool,
                        const struct progress *progress, struct fast_tables *t, struct error *err);
 

@@ -3,13 +3,18 @@
 #define SELVEDGE_RENDERER_PRECOMPUTE_PARTS_H
 
 #include "renderer/fast/precompute/fast_precompute.h"
+#include "renderer/fast/precompute/precompute_journal.h"
 #include "renderer/transport/surface/parameter_sets.h"
+
+/* Numbers of the parts in the journal. */
+enum { JOURNAL_TRANSFER, JOURNAL_OPEN_SEGMENTS, JOURNAL_COMPONENTS, JOURNAL_SEGMENTS };
 
 struct precompute_job {
     const struct fast_precompute_request *q;
     struct parameter_sets sets;
     struct thread_pool *pool;
     const struct progress *progress; /* of the part that runs */
+    struct precompute_journal *journal;
     struct fast_tables *t;
 };
 

@@ -132,7 +132,10 @@ static status find_rows(struct visibility_job *v, struct error *err)
     t->n_segment = (uint32_t)scene_n_segment(v->j->q->scene);
     status s = fast_tables_reserve_segments(t, err);
     if (s != STATUS_OK || v->j->q->no_visibility) return s;
-    s = thread_pool_run(v->j->pool, (t->n_segment + TASK_SEGMENTS - 1) / TASK_SEGMENTS, look_for_open, v, &silent);
+    const struct journal_part part = {
+        JOURNAL_OPEN_SEGMENTS, t->n_segment, 1, {{t->segment_row, sizeof *t->segment_row}}};
+    const struct journal_work work = {look_for_open, v, TASK_SEGMENTS};
+    s = precompute_journal_run(v->j->journal, &part, &work, v->j->pool, &silent, err);
     v->segment = malloc((t->n_segment + 1u) * sizeof *v->segment);
     if (s == STATUS_OK && v->segment == NULL) s = error_set(err, STATUS_NO_MEMORY, "cannot make tables: out of memory");
     for (uint32_t i = 0; i < t->n_segment && s == STATUS_OK; i++) {
@@ -154,10 +157,26 @@ static status find_components(struct visibility_job *v, struct error *err)
     v->number = malloc(((size_t)t->n_row * FAST_N_COMPONENT + 1) * sizeof *v->number);
     if (v->example == NULL || v->component == NULL || v->mean == NULL || v->number == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot make tables: out of memory");
+    const struct journal_part part = {JOURNAL_COMPONENTS,
+                                      1,
+                                      2,
+                                      {{v->mean, SPHERE_GRID * sizeof *v->mean},
+                                       {v->component, FAST_N_COMPONENT * SPHERE_GRID * sizeof *v->component}}};
+    if (precompute_journal_has(v->j->journal, &part)) return STATUS_OK;
     status s = thread_pool_run(v->j->pool, v->n_example, take_example, v, &silent);
-    if (s != STATUS_OK) return s;
-    return distance_components(v->example, v->n_example, SPHERE_GRID, FAST_N_COMPONENT, v->j->pool, v->mean,
-                               v->component, err);
+    if (s == STATUS_OK)
+        s = distance_components(v->example, v->n_example, SPHERE_GRID, FAST_N_COMPONENT, v->j->pool, v->mean,
+                                v->component, err);
+    return s == STATUS_OK ? precompute_journal_keep(v->j->journal, &part, err) : s;
+}
+
+static status fill_all_rows(struct visibility_job *v, struct error *err)
+{
+    struct fast_tables *t = v->j->t;
+    const struct journal_part part = {
+        JOURNAL_SEGMENTS, t->n_row, 2, {{t->gaussian, N_AXIS}, {v->number, FAST_N_COMPONENT * sizeof *v->number}}};
+    const struct journal_work work = {fill_rows, v, TASK_SEGMENTS};
+    return precompute_journal_run(v->j->journal, &part, &work, v->j->pool, v->j->progress, err);
 }
 
 status precompute_visibility(struct precompute_job *j, struct error *err)
@@ -172,7 +191,7 @@ status precompute_visibility(struct precompute_job *j, struct error *err)
     if (s == STATUS_OK && j->t->n_row > 0) {
         s = find_components(v, err);
         if (s == STATUS_OK)
-            s = thread_pool_run(j->pool, (j->t->n_row + TASK_SEGMENTS - 1) / TASK_SEGMENTS, fill_rows, v, j->progress);
+            s = fill_all_rows(v, err);
         if (s == STATUS_OK) keep_numbers(v);
     }
     if (s == STATUS_CANCELLED) error_set(err, s, "cancelled");

@@ -264,7 +264,13 @@ status precompute_transfer(struct precompute_job *j, struct error *err)
         choose_cells(j->t, j->q->cell_paths * j->t->mean_free_path_mm);
         s = make_rows(&x, err);
     }
-    if (s == STATUS_OK) s = thread_pool_run(j->pool, j->t->n_transfer, run_cell, &x, j->progress);
+    if (s == STATUS_OK) {
+        size_t n = fast_n_harmonic(j->t);
+        const struct journal_part part = {
+            JOURNAL_TRANSFER, j->t->n_transfer, 2, {{j->t->transfer, 3 * n * n * sizeof(float)}, {x.sum, sizeof *x.sum}}};
+        const struct journal_work work = {run_cell, &x, 1};
+        s = precompute_journal_run(j->journal, &part, &work, j->pool, j->progress, err);
+    }
     if (s == STATUS_OK) summarise(&x);
     seen_places_release(&x.seen);
     free(x.n_seen);
