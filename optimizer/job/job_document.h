@@ -92,6 +92,7 @@ struct job_surface_picture {
     enum job_picture_method method;
     bool reference;                      /* also path by path, and compared with that */
     bool filter;                         /* also filtered for the eye (renderer/preview) */
+    bool visibility_by_tables;           /* of JOB_PICTURE_FAST */
     double ground_gap_mm, ground_albedo; /* of a plane under the cloth; gap NaN: none */
 };
 

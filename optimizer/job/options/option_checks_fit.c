@@ -150,6 +150,9 @@ static status check_picture(const struct job_document *doc, size_t i, struct err
     if (p->reference && p->method == JOB_PICTURE_PATH)
         return error_set_field(err, STATUS_INVALID, field,
                                "'%s' is true, but 'method' is \"path\": such a picture is its own reference", field);
+    snprintf(field, sizeof field, "pictures[%zu].visibility", i);
+    if (p->visibility_by_tables && p->method != JOB_PICTURE_FAST)
+        return error_set_field(err, STATUS_INVALID, field, "'%s' is \"tables\", but 'method' is not \"fast\"", field);
     snprintf(field, sizeof field, "pictures[%zu].radius_mm", i);
     if (p->on == JOB_ON_DRAPE && !(p->radius_mm >= 0.02 * p->size_mm && p->radius_mm <= 10.0 * p->size_mm))
         return error_set_field(err, STATUS_INVALID, field,

@@ -4,6 +4,7 @@
 #define OF_PICTURE(member) INTO_OF(struct job_surface_picture, member)
 
 static const char *const surface_names[] = {"flat", "cylinder", "drape", "mesh", NULL};
+static const char *const visibility_names[] = {"traced", "tables", NULL};
 static const char *const method_names[] = {"path", "fast", "corrected", "dual", NULL};
 
 const struct job_option option_rows_pictures[] = {
@@ -103,6 +104,15 @@ const struct job_option option_rows_pictures[] = {
          "and a small error (docs/bent-cloth.md). `corrected`: the same, with whole paths that take the error off. "
          "`dual`: light that is scattered often is estimated from the number of fibers before the lamp (dual "
          "scattering), quickly and roughly, as a preview."},
+    {.path = "pictures[].visibility",
+     .kind = OPTION_SWITCH,
+     OF_PICTURE(visibility_by_tables),
+     .choice = visibility_names,
+     .standard = "\"traced\"",
+     .meaning =
+         "Of method `fast`: whether a ray is traced to see if a fiber has the light, or whether tables of what each "
+         "segment sees say so, as published (fabric thesis, section 6.4.1). The tables then hold one hit of a path, "
+         "and take several times as long to make."},
     {.path = "pictures[].reference",
      .kind = OPTION_BOOL,
      OF_PICTURE(reference),

@@ -64,8 +64,7 @@ status precompute_journal_open(struct precompute_journal *j, const char *path, d
     size_t end = sizeof start;
     while (record_at(j, end, &r)) end += sizeof r + r.n_byte;
     j->n_byte = end;
-    if (truncate(path, (off_t)end) == 0) return STATUS_OK;
-    return error_set_errno(err, "cannot shorten '%s'", path_file_name(path));
+    return record_truncate(path, end, err);
 }
 
 void precompute_journal_release(struct precompute_journal *j)
@@ -159,7 +158,8 @@ status precompute_journal_run(struct precompute_journal *j, const struct journal
                               const struct journal_work *work, struct thread_pool *pool,
                               const struct progress *progress, struct error *err)
 {
-    size_t kept = j->path != NULL ? restore(j, part) : 0, n_task = (part->n_row + work->task_rows - 1) / work->task_rows;
+    size_t kept = j->path != NULL ? restore(j, part) : 0,
+           n_task = (part->n_row + work->task_rows - 1) / work->task_rows;
     size_t batch = BATCH_TASKS * (pool != NULL ? thread_pool_n_thread(pool) : 1);
     kept -= kept == part->n_row ? 0 : kept % work->task_rows; /* a task begins at its first row */
     if (j->path == NULL) batch = n_task;

@@ -190,8 +190,7 @@ status precompute_visibility(struct precompute_job *j, struct error *err)
     if (s == STATUS_OK) s = fast_tables_reserve_rows(j->t, err);
     if (s == STATUS_OK && j->t->n_row > 0) {
         s = find_components(v, err);
-        if (s == STATUS_OK)
-            s = fill_all_rows(v, err);
+        if (s == STATUS_OK) s = fill_all_rows(v, err);
         if (s == STATUS_OK) keep_numbers(v);
     }
     if (s == STATUS_CANCELLED) error_set(err, s, "cancelled");

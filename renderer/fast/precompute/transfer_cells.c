@@ -266,8 +266,10 @@ status precompute_transfer(struct precompute_job *j, struct error *err)
     }
     if (s == STATUS_OK) {
         size_t n = fast_n_harmonic(j->t);
-        const struct journal_part part = {
-            JOURNAL_TRANSFER, j->t->n_transfer, 2, {{j->t->transfer, 3 * n * n * sizeof(float)}, {x.sum, sizeof *x.sum}}};
+        const struct journal_part part = {JOURNAL_TRANSFER,
+                                          j->t->n_transfer,
+                                          2,
+                                          {{j->t->transfer, 3 * n * n * sizeof(float)}, {x.sum, sizeof *x.sum}}};
         const struct journal_work work = {run_cell, &x, 1};
         s = precompute_journal_run(j->journal, &part, &work, j->pool, j->progress, err);
     }

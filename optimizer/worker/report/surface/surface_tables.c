@@ -4,14 +4,25 @@
 #include "optimizer/worker/stages/result/pipeline_choice.h"
 #include "renderer/fast/precompute/fast_precompute.h"
 
+#include <unistd.h>
+
 /* Three traced hits leave a third of the error of one (renderer/fast/NOTES.md); the transfer to a cell has an error of
  * 1 to 2 % by so many paths. */
 enum { N_TRACED = 3, CELL_PATHS = 8000 };
+#define JOURNAL_EVERY_S 2.0
 /* Of dual scattering: cloth is dense (fabric thesis, section 6.6). */
 #define DENSITY 1.0f
 static const double share_of_time = 0.3, corrected_share = 0.25;
 
 static bool by_tables(enum job_picture_method m) { return m == JOB_PICTURE_FAST || m == JOB_PICTURE_CORRECTED; }
+
+/* Whether a picture takes from tables what the segments see. */
+static bool wants_visibility(const struct pipeline_context *c)
+{
+    for (size_t i = 0; i < c->doc->n_surface_picture; i++)
+        if (c->doc->surface_picture[i].visibility_by_tables) return true;
+    return false;
+}
 
 static bool wants_tables(const struct pipeline_context *c)
 {
@@ -36,24 +47,31 @@ static status get_tables(struct pipeline_context *c, const struct progress *prog
                          struct error *err)
 {
     const struct pipeline_model *model = &c->model[pipeline_best_model(c)];
-    char path[WORKER_PATH_BYTES];
+    char path[WORKER_PATH_BYTES], journal[WORKER_PATH_BYTES];
     const struct fast_precompute_request q = {.scene = c->scene,
                                               .model = model->appearance.surface,
                                               .param = model->fit.param,
                                               .n_set = model->sets.n_set,
                                               .n_path = CELL_PATHS,
-                                              .no_visibility = true};
+                                              .no_visibility = !wants_visibility(c),
+                                              .journal_path = journal,
+                                              .journal_every_s = JOURNAL_EVERY_S};
+    worker_folder_path(c->folder, JOB_FOLDER_WORK, "report/fast.journal", journal);
     worker_folder_path(c->folder, JOB_FOLDER_WORK, "report", path);
     status s = durable_make_folder(path, err);
     if (s != STATUS_OK) return s;
     worker_folder_path(c->folder, JOB_FOLDER_WORK, "report/fast.tables", path);
     struct error unread;
     t->present = fast_tables_read(&t->tables, path, &unread) == STATUS_OK;
-    if (t->present && t->tables.checksum == fast_tables_checksum(&q)) return STATUS_OK;
+    if (t->present && t->tables.checksum == fast_tables_checksum(&q)) {
+        unlink(journal); /* of an attempt that ended after it had written the tables */
+        return STATUS_OK;
+    }
     fast_tables_release(&t->tables);
     s = fast_precompute(&q, c->pool, progress, &t->tables, err);
     t->present = s == STATUS_OK;
     if (s == STATUS_OK) s = fast_tables_write(&t->tables, path, err);
+    if (s == STATUS_OK && unlink(journal) != 0) s = error_set_errno(err, "cannot remove '%s'", path_file_name(journal));
     return s;
 }
 
@@ -93,6 +111,7 @@ struct surface_method surface_tables_method(const struct surface_tables *t, cons
     return (struct surface_method){
         .method = has ? p->method : JOB_PICTURE_PATH,
         .fast = {.tables = &t->tables,
+                 .visibility = p->visibility_by_tables ? FAST_TABLES : FAST_TRACED,
                  .n_traced = N_TRACED,
                  .corrected_share = p->method == JOB_PICTURE_CORRECTED ? corrected_share : 0.0},
         .dual = {&t->averages, DENSITY, DENSITY}};

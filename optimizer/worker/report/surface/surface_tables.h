@@ -25,7 +25,8 @@ struct surface_method {
  * averages take a second. */
 double surface_tables_share(const struct pipeline_context *c);
 /* Reads the tables of the best model from the job's folder, work/report/fast.tables, if those of this cloth with these
- * parameters are there, and makes and keeps them otherwise; makes averages. Errors of fast_precompute,
+ * parameters are there, and makes and keeps them otherwise, going on with what an interrupted attempt has kept in
+ * fast.journal beside it; makes averages. Errors of fast_precompute,
  * fast_tables_write and dual_tables_init. */
 status surface_tables_get(struct pipeline_context *c, const struct progress *progress, struct surface_tables *t,
                           struct error *err);

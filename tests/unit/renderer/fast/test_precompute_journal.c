@@ -104,18 +104,18 @@ static void interruptions_change_nothing(void **state)
     assert_int_equal(thread_pool_new(2, &pool, NULL), STATUS_OK);
     assert_true(attempt(&q, 2, pool, whole));
     int n = 1;
-    for (size_t last = 0; !attempt(&kept, 0.2, n % 2 ? pool : NULL, pieces); n++) {
+    for (size_t last = 0; !attempt(&kept, 0.3, n % 2 ? pool : NULL, pieces); n++) {
         size_t length = length_of(journal), n_byte;
         assert_true(n < 20 && length >= last);
         last = length;
         char *text = scratch_read(journal, &n_byte); /* the last record was not written whole */
         if (n == 2) scratch_write(journal, text, n_byte - 7);
         if (n == 3) text[n_byte - 9] ^= 1, scratch_write(journal, text, n_byte);
-        last = n == 2 ? 0 : last;
+        last = n == 2 || n == 3 ? 0 : last;
         free(text);
     }
     print_message("%d attempts, %zu bytes kept\n", n, length_of(journal));
-    assert_true(n > 3);
+    assert_true(n > 2);
     assert_same_file(whole, pieces);
     thread_pool_free(pool);
 }
@@ -128,16 +128,16 @@ static void journals_belong_to_their_request(void **state)
     snprintf(other, sizeof other, "%s", scratch_path(state, "other"));
     snprintf(journal, sizeof journal, "%s", scratch_path(state, "journal"));
     struct fast_precompute_request q = request(journal);
+    q.no_visibility = true;
     assert_true(attempt(&q, 2, NULL, whole));
     size_t complete = length_of(journal);
     q.n_path = 1500;
-    q.no_visibility = true;
     assert_true(attempt(&q, 2, NULL, other));
     assert_true(length_of(journal) < complete);
     size_t without = length_of(journal);
     assert_true(attempt(&q, 2, NULL, other));
     assert_int_equal(length_of(journal), without); /* nothing is done again */
-    q = request(journal);
+    q.n_path = 2000;
     assert_true(attempt(&q, 2, NULL, other));
     assert_same_file(whole, other);
     q.journal_path = "/nowhere/at/all";
@@ -151,7 +151,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(interruptions_change_nothing, scratch_folder_setup, scratch_folder_teardown),
-        cmocka_unit_test_setup_teardown(journals_belong_to_their_request, scratch_folder_setup, scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(journals_belong_to_their_request, scratch_folder_setup,
+                                        scratch_folder_teardown),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
