@@ -29,7 +29,8 @@ struct fast_precompute_request {
 uint64_t fast_tables_checksum(const struct fast_precompute_request *q);
 
 /* STATUS_INVALID, field "model": a model that distinguishes directions around the fiber; a bent scene; what
- * parameter_sets_init refuses. STATUS_CANCELLED, STATUS_NO_MEMORY; of the journal STATUS_IO, STATUS_DISK_FULL. t: nothing to release on failure. */
+ * parameter_sets_init refuses. STATUS_CANCELLED, STATUS_NO_MEMORY; of the journal STATUS_IO, STATUS_DISK_FULL. t:
+ * nothing to release on failure. */
 status fast_precompute(const struct fast_precompute_request *q, struct thread_pool *pool,
                        const struct progress *progress, struct fast_tables *t, struct error *err);
 

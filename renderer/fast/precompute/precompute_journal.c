@@ -114,8 +114,9 @@ static status append(struct precompute_journal *j, const struct journal_part *p,
                      struct error *err)
 {
     struct journal_record r = {p->number, (uint32_t)first, (uint32_t)n, (uint32_t)bytes_of(p, n), 0, 0};
-    char *block = malloc(sizeof r + r.n_byte), *to = block + sizeof r;
+    char *block = malloc(sizeof r + r.n_byte);
     if (block == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot keep tables: out of memory");
+    char *to = block + sizeof r;
     for (size_t i = 0; i < p->n_array; i++) {
         size_t row = p->array[i].row_bytes;
         memcpy(to, (const char *)p->array[i].data + first * row, n * row);

@@ -1,6 +1,6 @@
-/* What a precomputation has finished so far, in a file to which it is appended, so that an interrupted one goes on there
- * and ends with the same bits. The file begins with the number of the request; records that are incomplete or damaged
- * end it.
+/* What a precomputation has finished so far, in a file to which it is appended, so that an interrupted one goes on
+ * there and ends with the same bits. The file begins with the number of the request; records that are incomplete or
+ * damaged end it.
  *
  * A part of the work fills arrays row by row, and rows are finished in order, some at a time.
  */
@@ -39,7 +39,8 @@ status precompute_journal_open(struct precompute_journal *j, const char *path, d
                                struct error *err);
 void precompute_journal_release(struct precompute_journal *j);
 
-/* A part that is made as a whole: whether an earlier attempt has made it, from which it is then taken, and keeping it. */
+/* A part that is made as a whole: whether an earlier attempt has made it, from which it is then taken, and keeping
+ * it. */
 bool precompute_journal_has(const struct precompute_journal *j, const struct journal_part *part);
 status precompute_journal_keep(struct precompute_journal *j, const struct journal_part *part, struct error *err);
 
