@@ -32,7 +32,9 @@ status job_check_quota(struct job_service *v, const struct access_grant *grant, 
                        const struct owner_use *more, struct job_refusal *refusal, struct error *err);
 /* Repeats in the job's journal what the database holds already. A failure is logged: the database is the owner. */
 void job_note(struct job_service *v, const char *job_id, const struct journal_entry *entry);
-/* The same for many jobs, with one sync. */
+/* Syncs everything that was written to the data folder. STATUS_IO. */
+status job_sync_all(struct job_service *v, struct error *err);
+/* job_note of the rows of many jobs, with one sync. */
 void job_note_all(struct job_service *v, const struct job_row *row, size_t n);
 /* store_job_update, and the journal. */
 status job_update(struct job_service *v, struct job_row *row, struct error *err);

@@ -64,8 +64,7 @@ static status make_place(const struct job_row *row, const char *folder, struct e
     return s == STATUS_OK ? job_journal_append(folder, &all, false, err) : s;
 }
 
-/* Syncs everything that was written to the data folder. */
-static status sync_all(struct job_service *v, struct error *err)
+status job_sync_all(struct job_service *v, struct error *err)
 {
     int fd = open(v->settings->data, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     status s = fd < 0 || syncfs(fd) != 0 ? error_set_errno(err, "cannot sync '%s'", v->settings->data) : STATUS_OK;
@@ -86,7 +85,7 @@ status job_make_places(struct job_service *v, const struct job_row *row, size_t 
         s = make_place(&row[i], folder, err);
         n_made++;
     }
-    return s == STATUS_OK && n_made > 0 ? sync_all(v, err) : s;
+    return s == STATUS_OK && n_made > 0 ? job_sync_all(v, err) : s;
 }
 
 void job_note_all(struct job_service *v, const struct job_row *row, size_t n)
@@ -99,7 +98,7 @@ void job_note_all(struct job_service *v, const struct job_row *row, size_t n)
         if (s != STATUS_OK && s != STATUS_NOT_FOUND) log_warning(v->log, "job %s: %s", row[i].id, err.text);
     }
     struct error err = {0};
-    if (n > 0 && sync_all(v, &err) != STATUS_OK) log_warning(v->log, "%s", err.text);
+    if (n > 0 && job_sync_all(v, &err) != STATUS_OK) log_warning(v->log, "%s", err.text);
 }
 
 static void text_hash(const char *text, size_t n_bytes, char out[STORE_HASH_TEXT_BYTES])

@@ -1,6 +1,6 @@
 /* Submits a batch: compares its table with the jobs that are there, and makes those that are missing. */
 #include "base/clock.h"
-#include "server/jobs/batches/batch_service.h"
+#include "server/jobs/batches/batch_inputs.h"
 #include "server/jobs/job_access.h"
 #include "server/workers/supervisor.h"
 
@@ -249,24 +249,6 @@ static status submit_locked(struct submission *s, const struct access_grant *gra
     return complete_places(s, err);
 }
 
-/* Declares the files of all samples. What was declared before stays as it is. */
-static status declare_files(struct job_service *v, const struct access_grant *grant, const struct batch_table *t,
-                            const struct batch_outcome *out, struct job_refusal *refusal, struct error *err)
-{
-    status s = STATUS_OK;
-    for (size_t i = 0; s == STATUS_OK && i < t->n; i++) {
-        const struct batch_sample *sample = &t->sample[i];
-        const char *job = json_string_value(json_object_get(json_array_get(out->samples, i), "job"));
-        struct job_declaration *file = calloc(sample->n_file + 1, sizeof *file);
-        size_t i_fault = 0;
-        if (file == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot submit the batch: out of memory");
-        for (size_t k = 0; k < sample->n_file; k++) file[k].row = sample->file[k];
-        if (sample->n_file > 0) s = job_declare_files(v, grant, job, file, sample->n_file, &i_fault, refusal, err);
-        free(file);
-    }
-    return s;
-}
-
 status batch_submit(struct job_service *v, const struct access_grant *grant, const struct batch_table *table,
                     struct batch_outcome *out, struct job_refusal *refusal, struct error *err)
 {
@@ -276,7 +258,7 @@ status batch_submit(struct job_service *v, const struct access_grant *grant, con
     status st = submit_locked(&s, grant, out, refusal, err);
     pthread_mutex_unlock(&v->change);
     if (st == STATUS_OK && v->supervisor != NULL && json_array_size(out->left) > 0) supervisor_wake(v->supervisor);
-    if (st == STATUS_OK) st = declare_files(v, grant, table, out, refusal, err);
+    if (st == STATUS_OK) st = batch_declare_files(v, grant, table, out, refusal, err);
     if (st == STATUS_OK && !out->replayed)
         log_info(v->log, "batch %s '%s': %zu samples, %zu of them new", out->id, table->name, table->n, s.n_new);
     job_rows_free(s.old, s.n_old);
