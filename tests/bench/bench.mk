@@ -1,8 +1,9 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-service bench-scale bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-transport bench-models bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics docs-ground docs-seam bench-browser bench-pictures bench-weave bench-weave-rendered
+.PHONY: bench bench-service bench-scale bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-transport bench-models bench-recovery bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics docs-ground docs-seam bench-browser bench-pictures bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
+$(BUILD)/tests/bench/models/bench_recovery: $(BUILD)/obj/tests/bench/fit_bench.c.o
 
 ##@ Benchmarks and pictures
 bench: | deps-test ## every figure, one JSON object a line
@@ -16,6 +17,11 @@ bench-transport: | deps-test ## the renderer's figures (paths a second, time to 
 bench-models: | deps-test ## what every scattering model costs and what light it loses (two minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/models/bench_models >&2
 	@$(BUILD)/tests/bench/models/bench_models
+
+# MODELS: some of them only, such as MODELS="chiang.v1 elliptical.v1"
+bench-recovery: | deps-test ## whether a fit of each surface model finds its own parameters again (an hour on 2 quiet cores; photographs are kept in build)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/models/bench_recovery >&2
+	@$(BUILD)/tests/bench/models/bench_recovery $(BUILD)/bench-recovery $(MODELS)
 
 # PICTURES: some of the fabrics only, and options of the program, such as PICTURES="silk --px 256"
 bench-pictures: | deps-test ## the fast renderer against path tracing on three fabrics (half an hour on 2 quiet cores)

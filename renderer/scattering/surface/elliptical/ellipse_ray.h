@@ -1,0 +1,59 @@
+/* Geometric optics of a smooth dielectric fiber with an elliptical section: what a ray does that meets it at a place of
+ * its width, by exact hops in the section (Khungurn and Marschner 2017, "Azimuthal Scattering from Elliptical Hair
+ * Fibers"; fabric thesis, section 4.4). Each quantity carries its derivatives by the index of refraction and by the
+ * ratio of axes.
+ *
+ * Section: semi-axes A = sqrt(a), B = 1 / sqrt(a) along v and w, so its area is pi and lengths are in units of the root
+ * of the product of both semi-axes. A ray comes from the azimuth phi at the offset H sin x, H half of the width that
+ * the section shows there. The walls turn it in the section as Snell's law does with Bravais' index eta' = sqrt(eta^2 -
+ * sin^2 th) / cos th; reflectances are those of the true angles in space.
+ *
+ *     hop     from the point (A cos g, B sin g) along the direction t: delta = atan2(sin t / B, cos t / A), next point
+ *             g' = 2 delta - g + pi
+ */
+#ifndef SELVEDGE_RENDERER_ELLIPSE_RAY_H
+#define SELVEDGE_RENDERER_ELLIPSE_RAY_H
+
+#include <math.h>
+
+/* A number and its derivatives by eta and by the ratio of axes. */
+struct dual {
+    double v, d[2];
+};
+
+enum { ELLIPSE_BY_ETA, ELLIPSE_BY_RATIO };
+/* Exits that are followed, and those whose azimuth is known to the model: R, TT, TRT, TRRT. */
+enum { ELLIPSE_N_EXIT = 12, ELLIPSE_N_MODE = 4 };
+
+struct ellipse {
+    struct dual eta, major, minor; /* A and B */
+};
+
+/* What is the same for all longitudinal angles: where a ray meets the section. */
+struct ellipse_entry {
+    double phi;             /* azimuth that it comes from */
+    struct dual gamma, nu;  /* parameter of the point, azimuth of the normal there */
+    struct dual half_width; /* H */
+};
+
+/* At one longitudinal angle. */
+struct ellipse_wall {
+    double cos_theta;
+    struct dual index, unit_length; /* eta'; true length of a unit of length in the section, 1 / cos th_t */
+};
+
+/* Shares of a ray's light by exits 0 (R), 1 (TT), ... without absorption; the last has all that is left. */
+struct ellipse_path {
+    int n;
+    struct dual share[ELLIPSE_N_EXIT + 1], length[ELLIPSE_N_EXIT + 1]; /* true length of the way inside */
+    struct dual azimuth[ELLIPSE_N_MODE];                               /* of exit less that of the ray; any turn */
+};
+
+struct ellipse ellipse_of(double eta, double ratio);
+struct ellipse_entry ellipse_enter(const struct ellipse *e, double phi, double x);
+/* cos_theta > 0. */
+struct ellipse_wall ellipse_wall_at(const struct ellipse *e, double cos_theta);
+void ellipse_follow(const struct ellipse *e, const struct ellipse_wall *w, const struct ellipse_entry *entry,
+                    struct ellipse_path *path);
+
+#endif

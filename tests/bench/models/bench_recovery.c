@@ -1,0 +1,88 @@
+/* Whether a fit of a surface model finds its parameters again: photographs of one cloth are rendered with the model,
+ * and the 16 fitted ones of them are fitted with it. Prints one JSON object on each line, and progress on standard
+ * error.
+ *
+ *   models.<id>.recovery_ratio              relative RMS error of the 24 held-out means at the fitted parameters over
+ *                                           that at the true ones
+ *   models.<id>.recovery_first_order_ratio  the same by derivatives, without noise of paths (fit_phantom.h)
+ *   models.<id>.recovery_s                  time of the fit
+ *
+ * bench_recovery FOLDER [ID ...]
+ *   FOLDER  where photographs and estimates are kept
+ *   ID      models; all without
+ *
+ * True parameters lie between the starts and the bounds, and photographs have a relative error of 0.5 %.
+ */
+#include "base/catalogue/method_catalogue.h"
+#include "optimizer/fit/objective/objective.h"
+#include "tests/bench/fit_bench.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { PHOTOGRAPH_PATHS = 200000, KEPT_PATHS = 100000, SCORE_PATHS = 30000 };
+
+static void print(const char *id, const char *what, double value, const char *unit)
+{
+    printf("{\"name\":\"models.%s.%s\",\"value\":%.6g,\"unit\":\"%s\",\"better\":\"lower\"}\n", id, what, value, unit);
+    fflush(stdout);
+}
+
+/* A dyed fiber whose other parameters are a quarter of the way from their starts to a bound, upwards and downwards in
+ * turn. File units. */
+static void truth_of(const struct scattering_model *m, double *truth)
+{
+    static const double color[3] = {0.75, 0.5, 0.3};
+    for (size_t p = 0; p < m->n_param; p++) {
+        const struct param_info *i = &m->param[p];
+        double bound = p % 2 == 0 ? i->upper : i->lower;
+        double value = i->channel >= 0 ? i->start * color[i->channel] / 0.7 : i->start + 0.25 * (bound - i->start);
+        truth[p] = param_to_file_unit(i, fmin(fmax(value, i->lower), i->upper));
+    }
+}
+
+static void recover(const char *folder, struct thread_pool *pool, const struct scattering_model *m)
+{
+    struct fit_phantom f;
+    struct fit_result r;
+    double truth[SCATTERING_MAX_PARAM];
+    truth_of(m, truth);
+    fprintf(stderr, "%s\n", m->id);
+    fit_phantom_init(&f, folder, pool, PHANTOM_TWILL_2_2, m->id, truth);
+    fit_phantom_photograph(
+        &f, &(struct fit_photography){.n_path = PHOTOGRAPH_PATHS, .noise = BENCH_NOISE, .noise_seed = 1});
+    bench_run_fit(&f, method_gauss_newton.id, 1, 0, NULL, &r, NULL);
+    bench_print_fit(&f, &r);
+    struct fit_score at_truth = fit_phantom_score(&f, JOB_SET_HELD_OUT, f.truth, KEPT_PATHS, f.truth, 0);
+    struct fit_score found = fit_phantom_score(&f, JOB_SET_HELD_OUT, f.truth, KEPT_PATHS, r.param, SCORE_PATHS);
+    double first_order = fit_phantom_first_order(&f, JOB_SET_HELD_OUT, KEPT_PATHS, r.param);
+    fprintf(stderr, "  held out %.4f +- %.4f, the truth %.4f +- %.4f\n", found.rel_rms, found.se, at_truth.rel_rms,
+            at_truth.se);
+    print(m->id, "recovery_ratio", found.rel_rms / at_truth.rel_rms, "1");
+    print(m->id, "recovery_first_order_ratio", sqrt(fmax(1 + first_order / (at_truth.rel_rms * at_truth.rel_rms), 0)),
+          "1");
+    print(m->id, "recovery_s", r.wall_s, "s");
+    fit_phantom_release(&f);
+}
+
+int main(int argc, char **argv)
+{
+    struct thread_pool *pool = NULL;
+    struct error err = {0};
+    if (argc < 2) {
+        fprintf(stderr, "usage: bench_recovery FOLDER [ID ...]\n");
+        return 2;
+    }
+    for (int i = 2; i < argc; i++)
+        if (scattering_find(argv[i]) == NULL) {
+            fprintf(stderr, "model '%s' is unknown\n", argv[i]);
+            return 2;
+        }
+    fit_check(thread_pool_new(0, &pool, &err), &err);
+    for (int i = 2; i < argc; i++) recover(argv[1], pool, scattering_find(argv[i]));
+    for (size_t k = 0; argc == 2 && scattering_registry()[k] != NULL; k++)
+        recover(argv[1], pool, scattering_registry()[k]);
+    thread_pool_free(pool);
+    return 0;
+}
