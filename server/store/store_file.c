@@ -86,16 +86,22 @@ status store_file_find(struct store *store, const char *job_id, const char *name
     return s;
 }
 
+#define OF_OWNER                                                                                                       \
+    " AND EXISTS (SELECT 1 FROM job WHERE id = file.job_id AND owner = ?3 AND deleted = 0) ORDER BY serial DESC "      \
+    "LIMIT 1"
+
 status store_file_known(struct store *store, const char *owner, const char *sha256, int64_t size_bytes,
                         struct file_row *row, struct error *err)
 {
     sqlite3_stmt *q = NULL;
     pthread_mutex_lock(&store->read.lock);
+    /* with the size the index gives the newest one first, however many jobs have these bytes */
     status s = store_prepare(&store->read, &q, err,
-                             "SELECT " COLUMNS " FROM file WHERE state = 2 AND sha256 <> '' AND sha256 = ?"
-                             " AND (size = ? OR ? < 0) AND EXISTS (SELECT 1 FROM job WHERE id = file.job_id"
-                             " AND owner = ? AND deleted = 0) ORDER BY serial DESC LIMIT 1",
-                             "siis", sha256, size_bytes, size_bytes, owner);
+                             size_bytes >= 0 ? "SELECT " COLUMNS " FROM file WHERE state = 2 AND sha256 <> '' AND "
+                                               "sha256 = ?1 AND size = ?2" OF_OWNER
+                                             : "SELECT " COLUMNS " FROM file WHERE state = 2 AND sha256 <> '' AND "
+                                               "sha256 = ?1 AND ?2 < 0" OF_OWNER,
+                             "sis", sha256, size_bytes, owner);
     if (s == STATUS_OK) s = get_one(store, q, sha256, row, err);
     sqlite3_finalize(q);
     pthread_mutex_unlock(&store->read.lock);
