@@ -59,8 +59,14 @@ static status fit_axes(struct trace_job *job, struct polyline_set *lines, bool l
     polyline_set_init(&inside);
     status s = polylines_resample(lines, &even, err);
     struct shape_measure measure;
-    const struct flat_fit fit = {job->v,      job->diameter,         N_FIT, TRACE_MIN_PIECE, job->pool,
-                                 &job->inner, last ? &measure : NULL};
+    const struct flat_fit fit = {job->v,
+                                 job->diameter,
+                                 N_FIT,
+                                 TRACE_MIN_PIECE,
+                                 job->pool,
+                                 &job->inner,
+                                 last ? &measure : NULL,
+                                 job->independent < 1.0};
     if (s == STATUS_OK) s = polylines_fit_flat(&even, &fit, &profile, &ratio, err);
     if (s == STATUS_OK)
         s = polylines_keep_inside(&even, job->v->n, job->o->min_vertex, &inside, job->report->n_short_dropped, err);

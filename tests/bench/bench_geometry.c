@@ -64,6 +64,7 @@ static const struct condition condition[] = {
     {"correlated_snr2", 0, 7.0, 2.0, .noise_sd_voxel = 0.5},
     {"hollow", 0, 7.0, 5.0, .section = {.seed = 1, .lumen = 0.4}},
     {"flat", 0, 7.0, 5.0, .section = {.seed = 1, .aspect = 2.5, .turns_per_m = 1e3}},
+    {"flat_d4", 0, 4.0, 5.0, .section = {.seed = 1, .aspect = 2.5, .turns_per_m = 1e3}},
     {"cotton", 0, 7.0, 5.0, 0.15, 0.5, .section = {1, .lumen = 0.3, .aspect = 2.0, .bean = 0.3, .turns_per_m = 2e3}},
     {"taper", 0, 7.0, 5.0, .radius_spread = 0.15, .noise_sd_voxel = 0.5, .section = {.seed = 1, .taper = 0.4}},
     {"hardening", 0, 7.0, 5.0, .beam_hardening = 0.4},

@@ -25,6 +25,9 @@ struct flat_fit {
     struct thread_pool *pool;
     const struct progress *progress;
     struct shape_measure *measure; /* NULL, or the sections with their errors are left in lines->shape */
+    /* The volume was interpolated because its fibers are thin. The wedges of void beside the contact of two such fibers
+     * are nearly lost in the blur, so lines are removed only from cloths whose fibers are clearly flat. */
+    bool interpolated;
 };
 
 /* As polylines_fit, with profile->section NULL. Where radii are found to vary along lines, and after a removal, another
