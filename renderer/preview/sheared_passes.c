@@ -35,6 +35,13 @@ static size_t bin_of_centre(const struct run *r, float centre)
     return at >= 0 && at < (float)r->n_centre ? (size_t)at : r->n_centre;
 }
 
+/* The bin of a place on the lamp, in half sides. A place just below 1 may round to 1. */
+static size_t bin_of_place(const struct run *r, float place)
+{
+    const size_t bin = (size_t)(0.5f * (place + 1) * (float)r->n_bin);
+    return bin < r->n_bin ? bin : r->n_bin - 1;
+}
+
 /* Step 1a: convolves the rays of a receiver along y of the first edge. out[n_centre][n_side]. */
 static void convolve_rays(const struct run *r, size_t i, struct sum *out)
 {
@@ -69,7 +76,7 @@ static void gather_row(const struct run *r, size_t y, size_t x, const struct sum
         if (b == r->n_centre) continue;
         for (size_t j2 = 0; j2 < l; j2++) {
             const struct sum *s = convolved + ((size_t)u * r->n_centre + b) * l + j2;
-            struct sum *to = out + (size_t)(0.5f * (sheared_place(f, i, 1, j2) + 1) * (float)r->n_bin);
+            struct sum *to = out + bin_of_place(r, sheared_place(f, i, 1, j2));
             to->lit += weight * s->lit;
             to->all += weight * s->all;
         }

@@ -151,9 +151,9 @@ struct tag_count {
     int64_t n;
 };
 status store_tag_count(struct store *store, const char *owner, struct tag_count **tag, size_t *n, struct error *err);
-/* Counts the jobs in each state, without tombstones. */
 /* Notes the bytes of the earlier results that a job keeps; they count as its owner's (owner_use). */
 status store_job_version_bytes(struct store *store, const char *id, int64_t n_bytes, struct error *err);
+/* Counts the jobs in each state, without tombstones. */
 status store_job_count(struct store *store, int64_t n[JOB_N_STATE], struct error *err);
 
 /* Inserts n files and updates their job's row (NULL: no job), as store_job_update does, in one transaction. */

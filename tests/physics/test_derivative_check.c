@@ -110,22 +110,32 @@ static void run_until_visible(struct derivative_check_request *q, struct derivat
     fail_msg("%s: %zu paths do not show an error of %g", q->input.model->id, (size_t)check->n_path, visible_error);
 }
 
+/* Tables of elliptical.v1 are rough in eta and a: they are sums over single rays, some of which begin to be reflected
+ * totally within a step of the differences. Their derivatives are right for smaller steps (test_scattering,
+ * test_derivative) and miss these differences by up to 6 % (eta) and 30 % (a); at a = 1 and alpha = 0 the derivatives
+ * vanish. chiang_albedo.v1 has paths of thousands of steps at its lower bounds, so that too few fit into the check to
+ * show 2 % of eta. */
+static bool left_out(const struct appearance *m, enum place place, size_t p)
+{
+    const char *name = m->param[p].name;
+    if (strcmp(m->id, "chiang_albedo.v1") == 0) return place == LOWER_BOUNDS && strcmp(name, "eta") == 0;
+    if (strcmp(m->id, "elliptical.v1") != 0) return false;
+    return strcmp(name, "a") == 0 || strcmp(name, "eta") == 0 || (place == LOWER_BOUNDS && strcmp(name, "alpha") == 0);
+}
+
 static void every_model(void **state)
 {
     const struct fixture *x = *state;
     struct appearance m;
     for (size_t i = 0; appearance_at(i, &m); i++) {
-        /* Derivatives of the ellipse by a have slopes without bound where total reflection begins, and vanish at a = 1.
-         * These paths show no error of them, nor of chiang_albedo's; test_derivative compares both with differences. */
-        if (strcmp(m.id, "elliptical.v1") == 0 || strcmp(m.id, "chiang_albedo.v1") == 0) {
-            print_message("%-24s not compared\n", m.id);
-            continue;
-        }
         for (enum place place = LOWER_BOUNDS; place < N_PLACE; place++) {
             double param[SCATTERING_MAX_PARAM];
             static struct derivative_check check;
             place_parameters(&m, place, param);
+            bool skip[SCATTERING_MAX_PARAM];
+            for (size_t p = 0; p < m.n_param; p++) skip[p] = left_out(&m, place, p);
             struct derivative_check_request q = request(x, &m, param);
+            q.skip = skip;
             run_until_visible(&q, &check);
             print_message("%-24s %d: worst %.1e, noise %.1e +- %.0e (%s), %zu paths, %zu steps\n", m.id, (int)place,
                           check.error[check.worst], check.noise[check.worst], check.noise_se[check.worst],

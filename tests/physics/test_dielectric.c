@@ -6,6 +6,7 @@
 #include "renderer/scattering/scattering.h"
 #include "renderer/scattering/surface/cone_lobe.h"
 #include "renderer/scattering/surface/dielectric/dielectric_ray.h"
+#include "tests/support/model/fiber_angles.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -13,6 +14,8 @@
 #include <stdlib.h>
 
 #include <cmocka.h>
+
+#include "tests/support/model/prepared_model.h"
 
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -106,21 +109,6 @@ static void published_lobe(void **state)
     cone_lobe_init(&m, 8 * RAD_PER_DEG);
     double got = (double)cone_lobe_eval(&m, (float)sin(i), (float)cos(i), (float)sin(o), (float)cos(o), NULL);
     assert_true(fabs(got / 1.813914147 - 1) < 3e-6); /* float */
-}
-
-static struct scattering_state *prepare(const struct scattering_model *m, const double *param)
-{
-    struct scattering_state *s = NULL;
-    struct error err = {0};
-    if (m->prepare(param, &s, &err) != STATUS_OK) fail_msg("%s", err.text);
-    return s;
-}
-
-static void direction(double theta, double phi, float w[3])
-{
-    w[0] = (float)sin(theta);
-    w[1] = (float)(cos(theta) * cos(phi));
-    w[2] = (float)(cos(theta) * sin(phi));
 }
 
 /* The azimuthal function of one mode by explicit images of the Gaussian. */

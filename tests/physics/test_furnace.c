@@ -5,6 +5,7 @@
 #include "renderer/transport/camera.h"
 #include "renderer/transport/surface/path_tracer.h"
 #include "tests/support/cloth/hand_weave.h"
+#include "tests/support/model/fiber_angles.h"
 #include "tests/support/statistics_test.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/reference_two_lobe.h"
@@ -17,20 +18,7 @@
 
 #include <cmocka.h>
 
-static struct scattering_state *prepare(const struct scattering_model *m, const double *param)
-{
-    struct scattering_state *s = NULL;
-    struct error err = {0};
-    if (m->prepare(param, &s, &err) != STATUS_OK) fail_msg("%s", err.text);
-    return s;
-}
-
-static void direction(double theta, double phi, float w[3])
-{
-    w[0] = (float)sin(theta);
-    w[1] = (float)(cos(theta) * cos(phi));
-    w[2] = (float)(cos(theta) * sin(phi));
-}
+#include "tests/support/model/prepared_model.h"
 
 /* Integral of S cos th_o over all wo, channel 0. */
 static double incident_furnace(const struct scattering_model *m, const struct scattering_state *s, double theta_i)

@@ -5,6 +5,7 @@
 #include "base/angle.h"
 #include "renderer/transport/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
+#include "tests/support/model/fiber_angles.h"
 #include "tests/support/model/model_furnace.h"
 #include "tests/support/tracer/trace_input.h"
 
@@ -15,22 +16,9 @@
 
 #include <cmocka.h>
 
+#include "tests/support/model/prepared_model.h"
+
 static const char *const near_id[3] = {"dielectric_near.v1", "chiang.v1", "chiang_albedo.v1"};
-
-static struct scattering_state *prepare(const struct scattering_model *m, const double *param)
-{
-    struct scattering_state *s = NULL;
-    struct error err = {0};
-    if (m->prepare(param, &s, &err) != STATUS_OK) fail_msg("%s", err.text);
-    return s;
-}
-
-static void direction(double theta, double phi, float w[3])
-{
-    w[0] = (float)sin(theta);
-    w[1] = (float)(cos(theta) * cos(phi));
-    w[2] = (float)(cos(theta) * sin(phi));
-}
 
 /* S of a near field for the view at the azimuth `place` about the normal. */
 static void near_at(const struct scattering_model *m, const struct scattering_state *s, const double theta[2],

@@ -4,6 +4,7 @@
  */
 #include "base/angle.h"
 #include "renderer/scattering/phase_model.h"
+#include "tests/support/model/fiber_angles.h"
 #include "tests/support/model/model_stream.h"
 #include "tests/support/statistics_test.h"
 
@@ -22,13 +23,6 @@ static struct phase_state *prepare(const struct phase_model *m, const double *pa
     struct error err = {0};
     if (m->prepare(param, &s, &err) != STATUS_OK) fail_msg("%s", err.text);
     return s;
-}
-
-static void direction(double theta, double phi, float w[3])
-{
-    w[0] = (float)sin(theta);
-    w[1] = (float)(cos(theta) * cos(phi));
-    w[2] = (float)(cos(theta) * sin(phi));
 }
 
 static void random_direction(struct rng *r, float w[3])

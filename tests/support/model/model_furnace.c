@@ -1,13 +1,7 @@
 #include "tests/support/model/model_furnace.h"
+#include "tests/support/model/fiber_angles.h"
 
 #include <math.h>
-
-static void direction(double theta, double phi, float w[3])
-{
-    w[0] = (float)sin(theta);
-    w[1] = (float)(cos(theta) * cos(phi));
-    w[2] = (float)(cos(theta) * sin(phi));
-}
 
 void model_furnace(const struct scattering_model *m, const struct scattering_state *s, const struct model_furnace *q,
                    double theta_rad, bool from_light, double sum[3])

@@ -18,13 +18,7 @@
 
 #include <cmocka.h>
 
-static struct scattering_state *prepare(const struct scattering_model *m, const double *param)
-{
-    struct scattering_state *s = NULL;
-    struct error err = {0};
-    if (m->prepare(param, &s, &err) != STATUS_OK) fail_msg("%s", err.text);
-    return s;
-}
+#include "tests/support/model/prepared_model.h"
 
 static void random_direction(struct rng *r, float w[3])
 {

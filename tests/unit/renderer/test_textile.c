@@ -11,13 +11,7 @@
 
 #include <cmocka.h>
 
-static struct scattering_state *prepare(const struct scattering_model *m, const double *param)
-{
-    struct scattering_state *s = NULL;
-    struct error err = {0};
-    if (m->prepare(param, &s, &err) != STATUS_OK) fail_msg("%s", err.text);
-    return s;
-}
+#include "tests/support/model/prepared_model.h"
 
 /* The energy of R at C_R and C_TT near 0 is rho alone: near th = 0, for a narrow lobe, the mean over azimuth of
  * (1 - cos(ph/2))^5 under N. Both means are integrals over half an azimuth, made here by quadrature. */

@@ -5,7 +5,7 @@
  * th_d = th_o, so weights are bounded but not constant.
  */
 #include "renderer/scattering/surface/dielectric/dielectric.h"
-#include "renderer/scattering/fiber_direction.h"
+#include "renderer/scattering/surface/azimuth_table.h"
 
 #include <stdlib.h>
 
@@ -29,33 +29,14 @@ static status prepare(const double *param, struct scattering_state **state, stru
 
 static void release(struct scattering_state *s) { free(s); }
 
-static inline float mix(float a, float b, float t) { return a + t * (b - a); }
-
-/* What two directions are to each other: places in the tables. */
-struct place {
-    struct fiber_direction in, out;
-    int row, column, out_row;
-    float x, y, out_x; /* between rows, columns, and rows of th_d = th_o */
-};
-
-static struct place place_of(const float wi[3], const float wo[3])
+static struct azimuth_place place_of(const float wi[3], const float wo[3])
 {
-    struct place g = {.in = fiber_direction_of(wi), .out = fiber_direction_of(wo)};
-    float c = g.in.cos_theta + g.out.cos_theta, u = wi[0] + wo[0], cos_d = 0.5f * sqrtf(c * c + u * u);
-    float a = g.in.azimuth[0] - g.out.azimuth[0], b = g.in.azimuth[1] - g.out.azimuth[1];
-    float half_sine = 0.5f * sqrtf(a * a + b * b), /* sin(ph / 2) */
-        half_cosine = sqrtf(0.5f * fiber_one_minus_cos_opposite(&g.in, &g.out));
-    g.x = dielectric_position(cos_d * DIELECTRIC_N_ROW, DIELECTRIC_N_ROW, &g.row);
-    g.y = dielectric_position(2 * fiber_angle(half_sine, half_cosine) * (float)(DIELECTRIC_N_PHI / M_PI),
-                              DIELECTRIC_N_PHI, &g.column);
-    g.out_x = dielectric_position(g.out.cos_theta * DIELECTRIC_N_ROW, DIELECTRIC_N_ROW, &g.out_row);
-    return g;
+    return azimuth_place_of(wi, wo, DIELECTRIC_N_ROW, DIELECTRIC_N_PHI);
 }
 
-#define BILINEAR(field)                                                                                                \
-    mix(mix(corner[0]->field, corner[1]->field, g->y), mix(corner[2]->field, corner[3]->field, g->y), g->x)
+#define BILINEAR(field) AZIMUTH_BILINEAR(corner, g, field)
 
-static struct dielectric_cell cell_at(const struct scattering_state *s, const struct place *g)
+static struct dielectric_cell cell_at(const struct scattering_state *s, const struct azimuth_place *g)
 {
     const struct dielectric_cell *corner[4] = {&s->cell[g->row][g->column], &s->cell[g->row][g->column + 1],
                                                &s->cell[g->row + 1][g->column], &s->cell[g->row + 1][g->column + 1]};
@@ -65,7 +46,7 @@ static struct dielectric_cell cell_at(const struct scattering_state *s, const st
     return y;
 }
 
-static struct dielectric_slope slope_at(const struct scattering_state *s, const struct place *g)
+static struct dielectric_slope slope_at(const struct scattering_state *s, const struct azimuth_place *g)
 {
     const struct dielectric_slope *corner[4] = {&s->slope[g->row][g->column], &s->slope[g->row][g->column + 1],
                                                 &s->slope[g->row + 1][g->column], &s->slope[g->row + 1][g->column + 1]};
@@ -81,23 +62,11 @@ static struct dielectric_slope slope_at(const struct scattering_state *s, const 
 static void mode_probabilities(const struct scattering_state *s, int row, float x, const float *weight_rgb,
                                float p[DIELECTRIC_N_MODE])
 {
-    const struct dielectric_row *a = &s->row[row], *b = a + 1;
-    float sum = 0;
-    for (int k = 0; k < DIELECTRIC_N_MODE; k++) {
-        p[k] = 0;
-        for (int c = 0; c < 3; c++) {
-            float e = (weight_rgb != NULL ? weight_rgb[c] : 1) * mix(a->energy[k][c], b->energy[k][c], x);
-            p[k] += e * e;
-        }
-        sum += p[k] = sqrtf(p[k]);
-    }
-    for (int k = 0; k < DIELECTRIC_N_MODE; k++) {
-        float share = sum > 0 ? p[k] / sum : 1.0f / DIELECTRIC_N_MODE;
-        p[k] = LEAST_PROBABILITY + (1 - DIELECTRIC_N_MODE * LEAST_PROBABILITY) * share;
-    }
+    azimuth_mode_probabilities(s->row[row].energy, s->row[row + 1].energy, x, DIELECTRIC_N_MODE, weight_rgb,
+                               LEAST_PROBABILITY, p);
 }
 
-static float density(const struct scattering_state *s, const struct place *g, const float *weight_rgb,
+static float density(const struct scattering_state *s, const struct azimuth_place *g, const float *weight_rgb,
                      const float m[DIELECTRIC_N_LOBE])
 {
     const struct dielectric_row *a = &s->row[g->out_row], *b = a + 1;
@@ -105,9 +74,9 @@ static float density(const struct scattering_state *s, const struct place *g, co
     mode_probabilities(s, g->out_row, g->out_x, weight_rgb, p);
     float sum = p[DIELECTRIC_REST] * m[DIELECTRIC_TRT] * (float)(0.5 / M_PI);
     for (int k = 0; k < DIELECTRIC_N_LOBE; k++) {
-        float before = mix(a->density[k][g->column], a->density[k][g->column + 1], g->y);
-        float after = mix(b->density[k][g->column], b->density[k][g->column + 1], g->y);
-        sum += p[k] * m[k] * 0.5f * mix(before, after, g->out_x);
+        float before = table_mix(a->density[k][g->column], a->density[k][g->column + 1], g->y);
+        float after = table_mix(b->density[k][g->column], b->density[k][g->column + 1], g->y);
+        sum += p[k] * m[k] * 0.5f * table_mix(before, after, g->out_x);
     }
     return sum;
 }
@@ -119,7 +88,7 @@ struct terms {
     float rest[3], d_scale[2]; /* d ln of the scales of both directions by eta and by beta */
 };
 
-static void scores(const struct scattering_state *s, const struct place *g, const struct terms *t, float *score)
+static void scores(const struct scattering_state *s, const struct azimuth_place *g, const struct terms *t, float *score)
 {
     const float *m = t->m, *d_beta = t->d_beta;
     const struct dielectric_slope d = slope_at(s, g);
@@ -130,8 +99,9 @@ static void scores(const struct scattering_state *s, const struct place *g, cons
         float *h = score + c * DIELECTRIC_N_PARAM, part[DIELECTRIC_N_LOBE] = {m[0] * t->n.r};
         for (int p = 0; p < 2; p++) part[1 + p] = m[1 + p] * t->n.inner[p][c];
         float sum = part[0] + part[1] + part[2] + m_rest * t->rest[c], inv = sum > 1e-30f ? 1 / sum : 0;
-        float by_c_t = m_rest * mix(a->d_rest[0][c], b->d_rest[0][c], g->x);
-        float by_eta = m_rest * mix(a->d_rest[1][c], b->d_rest[1][c], g->x) + m[0] * d.r[0], by_gamma = m[0] * d.r[1];
+        float by_c_t = m_rest * table_mix(a->d_rest[0][c], b->d_rest[0][c], g->x);
+        float by_eta = m_rest * table_mix(a->d_rest[1][c], b->d_rest[1][c], g->x) + m[0] * d.r[0],
+              by_gamma = m[0] * d.r[1];
         float by_beta = m_rest * t->rest[c] * d_beta[DIELECTRIC_TRT];
         for (int p = 0; p < 2; p++) {
             by_c_t += m[1 + p] * d.inner[p][0][c];
@@ -146,7 +116,7 @@ static void scores(const struct scattering_state *s, const struct place *g, cons
     }
 }
 
-static void eval_at(const struct scattering_state *s, const struct place *g, const float m[DIELECTRIC_N_LOBE],
+static void eval_at(const struct scattering_state *s, const struct azimuth_place *g, const float m[DIELECTRIC_N_LOBE],
                     const float *d_beta, float s_rgb[3], float *score)
 {
     float d_in[2], d_out[2],
@@ -156,7 +126,7 @@ static void eval_at(const struct scattering_state *s, const struct place *g, con
     struct terms t = {
         .m = m, .d_beta = d_beta, .n = cell_at(s, g), .d_scale = {d_in[0] + d_out[0], d_in[1] + d_out[1]}};
     for (int c = 0; c < 3; c++) {
-        t.rest[c] = mix(a->rest[c], b->rest[c], g->x);
+        t.rest[c] = table_mix(a->rest[c], b->rest[c], g->x);
         float sum = m[0] * t.n.r + m[DIELECTRIC_TRT] * t.rest[c];
         for (int p = 0; p < 2; p++) sum += m[1 + p] * t.n.inner[p][c];
         s_rgb[c] = scale * sum;
@@ -167,7 +137,7 @@ static void eval_at(const struct scattering_state *s, const struct place *g, con
 static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb,
                       float s_rgb[3], float *score)
 {
-    const struct place g = place_of(wi, wo);
+    const struct azimuth_place g = place_of(wi, wo);
     float m[DIELECTRIC_N_LOBE], d_beta[DIELECTRIC_N_LOBE];
     dielectric_longitudinal(&s->along, wi[0], g.in.cos_theta, wo[0], g.out.cos_theta, m, score != NULL ? d_beta : NULL);
     eval_at(s, &g, m, d_beta, s_rgb, score);
@@ -176,7 +146,7 @@ static float eval_pdf(const struct scattering_state *s, const float wi[3], const
 
 static void eval(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
 {
-    const struct place g = place_of(wi, wo);
+    const struct azimuth_place g = place_of(wi, wo);
     float m[DIELECTRIC_N_LOBE], d_beta[DIELECTRIC_N_LOBE];
     dielectric_longitudinal(&s->along, wi[0], g.in.cos_theta, wo[0], g.out.cos_theta, m, score != NULL ? d_beta : NULL);
     eval_at(s, &g, m, d_beta, s_rgb, score);
@@ -184,33 +154,15 @@ static void eval(const struct scattering_state *s, const float wi[3], const floa
 
 static float pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)
 {
-    const struct place g = place_of(wi, wo);
+    const struct azimuth_place g = place_of(wi, wo);
     float m[DIELECTRIC_N_LOBE];
     dielectric_longitudinal(&s->along, wi[0], g.in.cos_theta, wo[0], g.out.cos_theta, m, NULL);
     return density(s, &g, weight_rgb, m);
 }
 
-/* Stretches u to [0, 1) within an interval that starts at 0. */
-static float stretch(float u, float width) { return fminf(u / width, 0x1.fffffep-1f); }
-
-/* Azimuth in [0, pi] with the piecewise linear density of a row. */
-static float draw_azimuth(const struct dielectric_row *row, int mode, float u)
+static float draw_azimuth(const struct dielectric_row *row, int lobe, float u)
 {
-    const float *below = row->below[mode], *d = row->density[mode];
-    int low = 0, high = DIELECTRIC_N_PHI;
-    u *= below[DIELECTRIC_N_PHI];
-    while (high - low > 1) {
-        int middle = (low + high) / 2;
-        if (below[middle] <= u)
-            low = middle;
-        else
-            high = middle;
-    }
-    /* the root t of d0 t + (d1 - d0) t^2 / 2 = the rest over the step */
-    const float step = (float)(M_PI / DIELECTRIC_N_PHI);
-    float rest = fmaxf(u - below[low], 0) / step, bend = d[low + 1] - d[low];
-    float t = 2 * rest / (d[low] + sqrtf(fmaxf(d[low] * d[low] + 2 * bend * rest, 0)));
-    return ((float)low + fminf(t, 1)) * step;
+    return azimuth_draw(row->density[lobe], row->below[lobe], DIELECTRIC_N_PHI, u);
 }
 
 static void sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
@@ -219,21 +171,21 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
     struct fiber_direction out = fiber_direction_of(wo);
     float p[DIELECTRIC_N_MODE], rest = u[0], phi = u[2];
     int row, k = 0;
-    float x = dielectric_position(out.cos_theta * DIELECTRIC_N_ROW, DIELECTRIC_N_ROW, &row);
+    float x = table_position(out.cos_theta * DIELECTRIC_N_ROW, DIELECTRIC_N_ROW, &row);
     mode_probabilities(s, row, x, weight_rgb, p);
     while (k < DIELECTRIC_N_MODE - 1 && rest >= p[k]) rest -= p[k++];
-    rest = stretch(rest, p[k]);
+    rest = table_stretch(rest, p[k]);
     int lobe = k < DIELECTRIC_N_LOBE ? k : DIELECTRIC_TRT;
     float sin_i = cone_lobe_sample(&s->along.longitudinal[lobe], wo[0], out.cos_theta, u[1], rest);
     if (k == DIELECTRIC_REST) {
         phi *= (float)(2 * M_PI);
     } else { /* a side, then one of the two rows, each with its share */
         float side = phi < 0.5f ? 1 : -1;
-        phi = stretch(phi < 0.5f ? phi : phi - 0.5f, 0.5f);
+        phi = table_stretch(phi < 0.5f ? phi : phi - 0.5f, 0.5f);
         if (phi < x)
-            phi = draw_azimuth(&s->row[row + 1], k, stretch(phi, x));
+            phi = draw_azimuth(&s->row[row + 1], k, table_stretch(phi, x));
         else
-            phi = draw_azimuth(&s->row[row], k, stretch(phi - x, 1 - x));
+            phi = draw_azimuth(&s->row[row], k, table_stretch(phi - x, 1 - x));
         phi *= side;
     }
     float cos_i = sqrtf((1 - sin_i) * (1 + sin_i)), c = cosf(phi), d = sinf(phi);

@@ -7,6 +7,7 @@
 
 #include "base/status.h"
 #include "renderer/scattering/fiber_direction.h"
+#include "renderer/scattering/surface/azimuth_table.h"
 #include "renderer/scattering/surface/cone_lobe.h"
 #include "renderer/scattering/surface/lobe_balance.h"
 
@@ -24,18 +25,11 @@ extern const double dielectric_width[DIELECTRIC_N_LOBE];
 /* Sets lobes and scale for an index of refraction and a width in rad. STATUS_NO_MEMORY. */
 status dielectric_along_init(struct dielectric_along *s, double eta, double beta_rad, struct error *err);
 
-/* Place of x, at least 0, between the n + 1 nodes 0, 1, ... n of a table: node i and the fraction beyond it. */
-static inline float dielectric_position(float x, int n, int *i)
-{
-    *i = x < (float)(n - 1) ? (int)x : n - 1;
-    return fminf(x - (float)*i, 1);
-}
-
 /* a(th), and d ln a by eta and by beta. */
 static inline float dielectric_scale_at(const struct dielectric_along *s, float theta_rad, float d_ln[2])
 {
     int i;
-    float t = dielectric_position(fabsf(theta_rad) * (float)((LOBE_BALANCE_N - 1) / M_PI_2), LOBE_BALANCE_N - 1, &i);
+    float t = table_position(fabsf(theta_rad) * (float)((LOBE_BALANCE_N - 1) / M_PI_2), LOBE_BALANCE_N - 1, &i);
     for (int k = 0; k < 2; k++) {
         const float *d = s->d_ln_scale[k];
         d_ln[k] = d[i] + t * (d[i + 1] - d[i]);

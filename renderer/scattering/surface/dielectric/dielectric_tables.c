@@ -1,3 +1,4 @@
+#include "renderer/scattering/surface/azimuth_table.h"
 #include "renderer/scattering/surface/dielectric/dielectric.h"
 
 #include <stdlib.h>
@@ -122,22 +123,14 @@ static void store(const struct work *w, struct scattering_state *s, int row, int
     }
 }
 
-/* The density that azimuths are drawn with: piecewise linear, nowhere 0. */
 static void store_density(const struct work *w, struct dielectric_row *row, int p)
 {
-    const double step = M_PI / DIELECTRIC_N_PHI;
-    double mean[DIELECTRIC_N_PHI + 1], sum = 0;
+    double mean[DIELECTRIC_N_PHI + 1];
     for (int j = 0; j <= DIELECTRIC_N_PHI; j++) {
         mean[j] = 0;
         for (int c = 0; c < 3; c++) mean[j] += fmax(w->column[c][VALUE][j], 0) / 3;
-        sum += mean[j] * step * (j == 0 || j == DIELECTRIC_N_PHI ? 0.5 : 1);
     }
-    double scale = sum > 1e-12 ? 0.98 / sum : 0, uniform = (1 - scale * sum) / M_PI, below = 0;
-    for (int j = 0; j <= DIELECTRIC_N_PHI; j++) {
-        row->density[p][j] = (float)(scale * mean[j] + uniform);
-        if (j > 0) below += 0.5 * step * ((double)row->density[p][j - 1] + (double)row->density[p][j]);
-        row->below[p][j] = (float)below;
-    }
+    azimuth_density(mean, DIELECTRIC_N_PHI, row->density[p], row->below[p]);
 }
 
 status dielectric_tables(struct scattering_state *s, const double *param, struct error *err)

@@ -6,7 +6,7 @@
  * are bounded but not constant.
  */
 #include "renderer/scattering/surface/elliptical/elliptical.h"
-#include "renderer/scattering/fiber_direction.h"
+#include "renderer/scattering/surface/azimuth_table.h"
 #include "renderer/scattering/von_mises.h"
 
 #include <stdlib.h>
@@ -38,56 +38,31 @@ static status prepare(const double *param, struct scattering_state **state, stru
 
 static void release(struct scattering_state *s) { free(s); }
 
-static inline float mix(float a, float b, float t) { return a + t * (b - a); }
-
-/* Place of x, at least 0, between the n + 1 nodes 0, 1, ... n of a table: node i and the fraction beyond it. */
-static inline float position(float x, int n, int *i)
+static struct azimuth_place place_of(const float wi[3], const float wo[3])
 {
-    *i = x < (float)(n - 1) ? (int)x : n - 1;
-    return fminf(x - (float)*i, 1);
-}
-
-/* What two directions are to each other: places in the tables. */
-struct place {
-    struct fiber_direction in, out;
-    int row, column, out_row;
-    float x, y, out_x; /* between rows, columns, and rows of th_d = th_o */
-};
-
-static struct place place_of(const float wi[3], const float wo[3])
-{
-    struct place g = {.in = fiber_direction_of(wi), .out = fiber_direction_of(wo)};
-    float c = g.in.cos_theta + g.out.cos_theta, u = wi[0] + wo[0], cos_d = 0.5f * sqrtf(c * c + u * u);
-    float a = g.in.azimuth[0] - g.out.azimuth[0], b = g.in.azimuth[1] - g.out.azimuth[1];
-    float half_sine = 0.5f * sqrtf(a * a + b * b), /* sin(ph / 2) */
-        half_cosine = sqrtf(0.5f * fiber_one_minus_cos_opposite(&g.in, &g.out));
-    g.x = position(cos_d * ELLIPTICAL_N_ROW, ELLIPTICAL_N_ROW, &g.row);
-    g.y = position(2 * fiber_angle(half_sine, half_cosine) * (float)(ELLIPTICAL_N_PHI / M_PI), ELLIPTICAL_N_PHI,
-                   &g.column);
-    g.out_x = position(g.out.cos_theta * ELLIPTICAL_N_ROW, ELLIPTICAL_N_ROW, &g.out_row);
-    return g;
+    return azimuth_place_of(wi, wo, ELLIPTICAL_N_ROW, ELLIPTICAL_N_PHI);
 }
 
 /* a(th); adds d ln a to d_ln. */
 static float scale_at(const struct scattering_state *s, float theta_rad, float d_ln[ELLIPTICAL_N_SCALE])
 {
     int i;
-    float t = position(fabsf(theta_rad) * (float)((LOBE_BALANCE_N - 1) / M_PI_2), LOBE_BALANCE_N - 1, &i);
-    for (int k = 0; k < ELLIPTICAL_N_SCALE; k++) d_ln[k] += mix(s->d_ln_scale[k][i], s->d_ln_scale[k][i + 1], t);
-    return mix(s->scale[i], s->scale[i + 1], t);
+    float t = table_position(fabsf(theta_rad) * (float)((LOBE_BALANCE_N - 1) / M_PI_2), LOBE_BALANCE_N - 1, &i);
+    for (int k = 0; k < ELLIPTICAL_N_SCALE; k++) d_ln[k] += table_mix(s->d_ln_scale[k][i], s->d_ln_scale[k][i + 1], t);
+    return table_mix(s->scale[i], s->scale[i + 1], t);
 }
 
 /* M of each lobe, and its derivatives by shift and width when wanted. */
-static void along(const struct scattering_state *s, const struct place *g, float m[ELLIPTICAL_N_LOBE], float (*d)[2])
+static void along(const struct scattering_state *s, const struct azimuth_place *g, float m[ELLIPTICAL_N_LOBE],
+                  float (*d)[2])
 {
     for (int p = 0; p < ELLIPTICAL_N_LOBE; p++)
         m[p] = elliptical_along(g->in.theta_rad + g->out.theta_rad, s->shift[p], s->width[p], d != NULL ? d[p] : NULL);
 }
 
-#define BILINEAR(field)                                                                                                \
-    mix(mix(corner[0]->field, corner[1]->field, g->y), mix(corner[2]->field, corner[3]->field, g->y), g->x)
+#define BILINEAR(field) AZIMUTH_BILINEAR(corner, g, field)
 
-static struct elliptical_cell cell_at(const struct scattering_state *s, const struct place *g)
+static struct elliptical_cell cell_at(const struct scattering_state *s, const struct azimuth_place *g)
 {
     const struct elliptical_cell *corner[4] = {&s->cell[g->row][g->column], &s->cell[g->row][g->column + 1],
                                                &s->cell[g->row + 1][g->column], &s->cell[g->row + 1][g->column + 1]};
@@ -97,7 +72,7 @@ static struct elliptical_cell cell_at(const struct scattering_state *s, const st
     return y;
 }
 
-static struct elliptical_slope slope_at(const struct scattering_state *s, const struct place *g)
+static struct elliptical_slope slope_at(const struct scattering_state *s, const struct azimuth_place *g)
 {
     const struct elliptical_slope *corner[4] = {&s->slope[g->row][g->column], &s->slope[g->row][g->column + 1],
                                                 &s->slope[g->row + 1][g->column], &s->slope[g->row + 1][g->column + 1]};
@@ -112,20 +87,8 @@ static struct elliptical_slope slope_at(const struct scattering_state *s, const 
 static void mode_probabilities(const struct scattering_state *s, int row, float x, const float *weight_rgb,
                                float p[ELLIPTICAL_N_MODE])
 {
-    const struct elliptical_row *a = &s->row[row], *b = a + 1;
-    float sum = 0;
-    for (int k = 0; k < ELLIPTICAL_N_MODE; k++) {
-        p[k] = 0;
-        for (int c = 0; c < 3; c++) {
-            float e = (weight_rgb != NULL ? weight_rgb[c] : 1) * mix(a->energy[k][c], b->energy[k][c], x);
-            p[k] += e * e;
-        }
-        sum += p[k] = sqrtf(p[k]);
-    }
-    for (int k = 0; k < ELLIPTICAL_N_MODE; k++) {
-        float share = sum > 0 ? p[k] / sum : 1.0f / ELLIPTICAL_N_MODE;
-        p[k] = LEAST_PROBABILITY + (1 - ELLIPTICAL_N_MODE * LEAST_PROBABILITY) * share;
-    }
+    azimuth_mode_probabilities(s->row[row].energy, s->row[row + 1].energy, x, ELLIPTICAL_N_MODE, weight_rgb,
+                               LEAST_PROBABILITY, p);
 }
 
 /* Density of th_i of a lobe, of which m belongs to th_i itself and the rest to angles beyond one of the poles. */
@@ -139,16 +102,16 @@ static float folded(const struct scattering_state *s, int p, float theta_i, floa
     return m;
 }
 
-static float density(const struct scattering_state *s, const struct place *g, const float *weight_rgb,
+static float density(const struct scattering_state *s, const struct azimuth_place *g, const float *weight_rgb,
                      const float m[ELLIPTICAL_N_LOBE])
 {
     const struct elliptical_row *a = &s->row[g->out_row], *b = a + 1;
     float p[ELLIPTICAL_N_MODE], sum = 0;
     mode_probabilities(s, g->out_row, g->out_x, weight_rgb, p);
     for (int k = 0; k < ELLIPTICAL_N_LOBE; k++) {
-        float before = mix(a->density[k][g->column], a->density[k][g->column + 1], g->y);
-        float after = mix(b->density[k][g->column], b->density[k][g->column + 1], g->y);
-        float around = p[k] * 0.5f * mix(before, after, g->out_x);
+        float before = table_mix(a->density[k][g->column], a->density[k][g->column + 1], g->y);
+        float after = table_mix(b->density[k][g->column], b->density[k][g->column + 1], g->y);
+        float around = p[k] * 0.5f * table_mix(before, after, g->out_x);
         if (k == ELLIPTICAL_REST - 1) around += p[ELLIPTICAL_REST] * (float)(0.5 / M_PI);
         sum += around * folded(s, k, g->in.theta_rad, g->out.theta_rad, m[k]);
     }
@@ -162,7 +125,7 @@ struct terms {
     float rest[3], d_scale[ELLIPTICAL_N_SCALE]; /* d ln of the scales of both directions */
 };
 
-static void scores(const struct scattering_state *s, const struct place *g, const struct terms *t, float *score)
+static void scores(const struct scattering_state *s, const struct azimuth_place *g, const struct terms *t, float *score)
 {
     const struct elliptical_slope d = slope_at(s, g);
     const struct elliptical_row *a = &s->row[g->row], *b = a + 1;
@@ -177,7 +140,7 @@ static void scores(const struct scattering_state *s, const struct place *g, cons
             for (int k = 0; k < ELLIPTICAL_N_SLOPE; k++) by[k] += t->m[p] * d.n[p][k][c];
         }
         for (int k = 0; k <= ELLIPTICAL_D_RATIO; k++)
-            by[k] += t->m[ELLIPTICAL_REST - 1] * mix(a->d_rest[k][c], b->d_rest[k][c], g->x);
+            by[k] += t->m[ELLIPTICAL_REST - 1] * table_mix(a->d_rest[k][c], b->d_rest[k][c], g->x);
         float inv = sum > 1e-30f ? 1 / sum : 0;
         h[ELLIPTICAL_P_C_T + c] = by[ELLIPTICAL_D_C_T] * inv;
         h[ELLIPTICAL_P_ETA] = by[ELLIPTICAL_D_ETA] * inv + t->d_scale[ELLIPTICAL_S_ETA];
@@ -189,7 +152,7 @@ static void scores(const struct scattering_state *s, const struct place *g, cons
 }
 
 /* t->m, and t->d when there are scores, are set. */
-static void eval_at(const struct scattering_state *s, const struct place *g, struct terms *t, float s_rgb[3],
+static void eval_at(const struct scattering_state *s, const struct azimuth_place *g, struct terms *t, float s_rgb[3],
                     float *score)
 {
     for (int k = 0; k < ELLIPTICAL_N_SCALE; k++) t->d_scale[k] = 0;
@@ -197,7 +160,7 @@ static void eval_at(const struct scattering_state *s, const struct place *g, str
     const struct elliptical_row *a = &s->row[g->row], *b = a + 1;
     t->n = cell_at(s, g);
     for (int c = 0; c < 3; c++) {
-        t->rest[c] = mix(a->rest[c], b->rest[c], g->x);
+        t->rest[c] = table_mix(a->rest[c], b->rest[c], g->x);
         float sum = t->m[ELLIPTICAL_REST - 1] * t->rest[c];
         for (int p = 0; p < ELLIPTICAL_N_LOBE; p++) sum += t->m[p] * t->n.n[p][c];
         s_rgb[c] = scale * sum;
@@ -208,7 +171,7 @@ static void eval_at(const struct scattering_state *s, const struct place *g, str
 static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb,
                       float s_rgb[3], float *score)
 {
-    const struct place g = place_of(wi, wo);
+    const struct azimuth_place g = place_of(wi, wo);
     struct terms t;
     along(s, &g, t.m, score != NULL ? t.d : NULL);
     eval_at(s, &g, &t, s_rgb, score);
@@ -217,7 +180,7 @@ static float eval_pdf(const struct scattering_state *s, const float wi[3], const
 
 static void eval(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
 {
-    const struct place g = place_of(wi, wo);
+    const struct azimuth_place g = place_of(wi, wo);
     struct terms t;
     along(s, &g, t.m, score != NULL ? t.d : NULL);
     eval_at(s, &g, &t, s_rgb, score);
@@ -225,40 +188,22 @@ static void eval(const struct scattering_state *s, const float wi[3], const floa
 
 static float pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)
 {
-    const struct place g = place_of(wi, wo);
+    const struct azimuth_place g = place_of(wi, wo);
     float m[ELLIPTICAL_N_LOBE];
     along(s, &g, m, NULL);
     return density(s, &g, weight_rgb, m);
 }
 
-/* Stretches u to [0, 1) within an interval that starts at 0. */
-static float stretch(float u, float width) { return fminf(u / width, 0x1.fffffep-1f); }
-
-/* Azimuth in [0, pi] with the piecewise linear density of a row. */
 static float draw_azimuth(const struct elliptical_row *row, int lobe, float u)
 {
-    const float *below = row->below[lobe], *d = row->density[lobe];
-    int low = 0, high = ELLIPTICAL_N_PHI;
-    u *= below[ELLIPTICAL_N_PHI];
-    while (high - low > 1) {
-        int middle = (low + high) / 2;
-        if (below[middle] <= u)
-            low = middle;
-        else
-            high = middle;
-    }
-    /* the root t of d0 t + (d1 - d0) t^2 / 2 = the rest over the step */
-    const float step = (float)(M_PI / ELLIPTICAL_N_PHI);
-    float rest = fmaxf(u - below[low], 0) / step, bend = d[low + 1] - d[low];
-    float t = 2 * rest / (d[low] + sqrtf(fmaxf(d[low] * d[low] + 2 * bend * rest, 0)));
-    return ((float)low + fminf(t, 1)) * step;
+    return azimuth_draw(row->density[lobe], row->below[lobe], ELLIPTICAL_N_PHI, u);
 }
 
 /* th_i about one of both cones of a lobe, folded at the poles. */
 static float draw_theta(const struct scattering_state *s, int lobe, float theta_o, float u)
 {
     float side = u < 0.5f ? 1 : -1;
-    u = stretch(u < 0.5f ? u : u - 0.5f, 0.5f);
+    u = table_stretch(u < 0.5f ? u : u - 0.5f, 0.5f);
     float theta = -theta_o + side * s->shift[lobe] + (float)M_SQRT2 * s->width[lobe] * erf_inverse(2 * u - 1);
     if (fabsf(theta) > (float)M_PI_2) theta = copysignf((float)M_PI, theta) - theta;
     return fminf(fmaxf(theta, (float)-M_PI_2), (float)M_PI_2);
@@ -270,7 +215,7 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
     struct fiber_direction out = fiber_direction_of(wo);
     float p[ELLIPTICAL_N_MODE], rest = u[0], phi = u[2];
     int row, k = 0;
-    float x = position(out.cos_theta * ELLIPTICAL_N_ROW, ELLIPTICAL_N_ROW, &row);
+    float x = table_position(out.cos_theta * ELLIPTICAL_N_ROW, ELLIPTICAL_N_ROW, &row);
     mode_probabilities(s, row, x, weight_rgb, p);
     while (k < ELLIPTICAL_N_MODE - 1 && rest >= p[k]) rest -= p[k++];
     float theta = draw_theta(s, k < ELLIPTICAL_REST ? k : ELLIPTICAL_REST - 1, out.theta_rad, u[1]);
@@ -278,11 +223,11 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
         phi *= (float)(2 * M_PI);
     } else { /* a side, then one of the two rows, each with its share */
         float side = phi < 0.5f ? 1 : -1;
-        phi = stretch(phi < 0.5f ? phi : phi - 0.5f, 0.5f);
+        phi = table_stretch(phi < 0.5f ? phi : phi - 0.5f, 0.5f);
         if (phi < x)
-            phi = draw_azimuth(&s->row[row + 1], k, stretch(phi, x));
+            phi = draw_azimuth(&s->row[row + 1], k, table_stretch(phi, x));
         else
-            phi = draw_azimuth(&s->row[row], k, stretch(phi - x, 1 - x));
+            phi = draw_azimuth(&s->row[row], k, table_stretch(phi - x, 1 - x));
         phi *= side;
     }
     float cos_i = fmaxf(cosf(theta), 0), c = cosf(phi), d = sinf(phi);

@@ -1,3 +1,4 @@
+#include "renderer/scattering/surface/azimuth_table.h"
 #include "renderer/scattering/surface/elliptical/elliptical.h"
 
 #include <stdlib.h>
@@ -6,7 +7,8 @@
 enum { N_WAVE = 96 };
 /* Values of a table, and derivatives; that by gamma follows from the values. */
 enum quantity { VALUE, BY_C_T, BY_ETA, BY_RATIO, N_SUM, BY_GAMMA = N_SUM, N_QUANTITY };
-#define LEAST_FACTOR 5.5  /* waves with k w above this have a factor below exp(-5.5^2 / 2) = 3e-7 */
+#define LEAST_FACTOR 5.5 /* waves with k w above this have a factor below exp(-5.5^2 / 2) = 3e-7 */
+#define FADED 3e-6
 #define LEAST_COSINE 1e-3 /* of th_d: at 0 all light is reflected */
 
 struct work {
@@ -135,34 +137,27 @@ static void sum_waves(struct work *w, int p, double gamma)
     }
 }
 
-/* Where a lobe has faded, the series leaves a ripple of either sign: 0 there. */
+/* Where a lobe has faded, the series leaves a ripple of either sign: 0 there. The ripple is in proportion to the light
+ * of the lobe, which dark fibers have little of. */
 static void store(const struct work *w, struct elliptical_cell *cell, struct elliptical_slope *slope, int p)
 {
     for (int j = 0; j <= ELLIPTICAL_N_PHI; j++)
         for (int c = 0; c < 3; c++) {
-            bool faded = w->column[c][VALUE][j] <= 1e-6;
+            bool faded = w->column[c][VALUE][j] <= FADED * w->wave[p][0][c][VALUE];
             cell[j].n[p][c] = faded ? 0 : (float)w->column[c][VALUE][j];
             for (int k = 0; k < ELLIPTICAL_N_SLOPE; k++)
                 slope[j].n[p][k][c] = faded ? 0 : (float)w->column[c][BY_C_T + k][j];
         }
 }
 
-/* The density that azimuths are drawn with: piecewise linear, nowhere 0. */
 static void store_density(const struct work *w, struct elliptical_row *row, int p)
 {
-    const double step = M_PI / ELLIPTICAL_N_PHI;
-    double mean[ELLIPTICAL_N_PHI + 1], sum = 0;
+    double mean[ELLIPTICAL_N_PHI + 1];
     for (int j = 0; j <= ELLIPTICAL_N_PHI; j++) {
         mean[j] = 0;
         for (int c = 0; c < 3; c++) mean[j] += fmax(w->column[c][VALUE][j], 0) / 3;
-        sum += mean[j] * step * (j == 0 || j == ELLIPTICAL_N_PHI ? 0.5 : 1);
     }
-    double scale = sum > 1e-12 ? 0.98 / sum : 0, uniform = (1 - scale * sum) / M_PI, below = 0;
-    for (int j = 0; j <= ELLIPTICAL_N_PHI; j++) {
-        row->density[p][j] = (float)(scale * mean[j] + uniform);
-        if (j > 0) below += 0.5 * step * ((double)row->density[p][j - 1] + (double)row->density[p][j]);
-        row->below[p][j] = (float)below;
-    }
+    azimuth_density(mean, ELLIPTICAL_N_PHI, row->density[p], row->below[p]);
 }
 
 status elliptical_tables(struct scattering_state *s, const double *param, struct elliptical_energies *energies,
