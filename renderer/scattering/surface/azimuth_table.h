@@ -45,8 +45,9 @@ static inline struct azimuth_place azimuth_place_of(const float wi[3], const flo
     table_mix(table_mix((corner)[0]->field, (corner)[1]->field, (g)->y),                                               \
               table_mix((corner)[2]->field, (corner)[3]->field, (g)->y), (g)->x)
 
-/* Probabilities of n modes from the energies of two rows, each [n][3], x between them: by the root of the sum of squares
- * of the weighted channels. No mode gets less than `least`, because all carry derivatives. weight_rgb NULL: 1. */
+/* Probabilities of n modes from the energies of two rows, each [n][3], x between them: by the root of the sum of the
+ * squares of the weighted channels. No mode gets less than `least`, because all carry derivatives. weight_rgb NULL: 1.
+ */
 static inline void azimuth_mode_probabilities(const float (*before)[3], const float (*after)[3], float x, int n,
                                               const float *weight_rgb, float least, float *p)
 {
