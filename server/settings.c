@@ -32,6 +32,7 @@ struct setting {
 #define GIB (INT64_C(1) << 30)
 
 static const char *const sandbox_words[] = {"auto", "required", "off", NULL};
+static const char *const backend_words[] = {"local", NULL};
 static const char *const required_words[] = {"auto", "always", NULL};
 
 static const struct setting table[] = {
@@ -70,7 +71,9 @@ static const struct setting table[] = {
            "number of jobs kept; new jobs are refused until some are deleted"),
     NUMBER("jobs", "keep_versions", keep_versions, 5, 0, 1000,
            "number of earlier results that a job keeps when it is edited and run again; 0: none"),
-    NUMBER("jobs", "workers", workers, 1, 1, 64, "number of jobs that run at the same time"),
+    NUMBER("jobs", "workers", workers, 1, 1, SETTING_MAX_WORKERS,
+           "number of jobs that run at the same time; with a cluster, that are in its queue"),
+    WORD("jobs", "backend", backend, "local", backend_words, "where jobs run: local, as processes of this machine"),
     TEXT("jobs", "worker", worker, "", "the worker program; empty: selvedge-worker beside the daemon"),
     WORD("jobs", "sandbox", sandbox, "auto", sandbox_words,
          "keeps workers to their job's folder and to the system calls that they need: auto, as far as the kernel can; "

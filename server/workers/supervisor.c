@@ -4,85 +4,65 @@
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_paths.h"
 #include "server/workers/attempt.h"
+#include "server/workers/backends/job_backend.h"
 #include "server/workers/console.h"
 #include "server/workers/queue_turn.h"
-#include "server/workers/worker_process.h"
+#include "server/workers/waiting_list.h"
 
 #include <errno.h>
 #include <poll.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/eventfd.h>
-#include <sys/syscall.h>
 #include <unistd.h>
 
-enum { MAX_WORKER = 64, MAX_WAITING = 256, BURY_AGAIN_S = 60, BUSY_LOOK_MS = 100, IDLE_LOOK_MS = 1000 };
+enum { MAX_WORKER = SETTING_MAX_WORKERS, BURY_AGAIN_S = 60, IDLE_LOOK_MS = 1000 };
 
 struct slot {
     bool used;
     char job_id[STORE_ID_BYTES], owner[STORE_OWNER_BYTES], batch[STORE_ID_BYTES];
-    pid_t pid;
-    int pid_fd;             /* becomes readable when the process ends; -1: the kernel has none */
-    enum attempt_stop stop; /* reason for the request to stop */
+    struct backend_run *run; /* NULL: its start has failed */
+    enum attempt_stop stop;  /* reason for the request to stop */
     double seen_heartbeat_unix_s,
         heartbeat_seen_s; /* the last new heartbeat, and when it was seen (monotonic; at first the start) */
-    double started_s;     /* monotonic time of the start */
+    double started_s;     /* monotonic time of the start; 0: it waits in its engine */
     double asked_s;       /* monotonic time of the request to stop; 0: none */
     bool killed, ended;
     double retry_s; /* monotonic time of the next try to record its end in the database */
     struct worker_end end;
 };
 
-/* A queued job that must not start before a certain time, after a lost attempt or while another process has its
- * folder; or a deleted job whose folder could not be removed. */
-struct waiting {
-    char job_id[STORE_ID_BYTES];
-    double until_s;
-    int n_busy;
-};
-
 struct supervisor {
     struct job_service *v;
+    const struct job_backend *backend;
+    void *engine; /* the backend's state */
     char worker[PATH_BYTES];
     pthread_t thread;
     int wake_fd; /* an eventfd */
     atomic_bool stop;
     struct slot slot[MAX_WORKER];
-    struct waiting waiting[MAX_WAITING];
-    bool below_floor;
+    struct waiting_list waiting;
+    bool below_floor, adopted;
     double disk_seen_s;
 };
 
-static struct waiting *waiting_of(struct supervisor *u, const char *job_id, bool make)
+static void request_stop(struct supervisor *u, struct slot *slot, enum attempt_stop why)
 {
-    struct waiting *oldest = &u->waiting[0];
-    for (size_t i = 0; i < MAX_WAITING; i++) {
-        if (strcmp(u->waiting[i].job_id, job_id) == 0) return &u->waiting[i];
-        if (u->waiting[i].until_s < oldest->until_s) oldest = &u->waiting[i];
-    }
-    if (!make) return NULL;
-    *oldest = (struct waiting){0};
-    snprintf(oldest->job_id, sizeof oldest->job_id, "%s", job_id);
-    return oldest;
-}
-
-static void request_stop(struct slot *slot, enum attempt_stop why)
-{
-    if (slot->ended) return; /* the process has ended, so its id may belong to another process */
+    if (slot->ended) return;
     if (slot->stop == STOP_NONE || why < slot->stop) slot->stop = why;
     if (slot->asked_s > 0) return;
     slot->asked_s = clock_monotonic_s();
-    worker_signal(slot->pid, SIGTERM);
+    u->backend->stop(u->engine, slot->run, false);
 }
 
-static void kill_now(struct slot *slot, enum attempt_stop why)
+static void kill_now(struct supervisor *u, struct slot *slot, enum attempt_stop why)
 {
+    if (slot->killed) return;
     if (slot->stop == STOP_NONE) slot->stop = why;
     if (slot->asked_s <= 0) slot->asked_s = clock_monotonic_s();
     slot->killed = true;
-    worker_signal(slot->pid, SIGKILL);
+    u->backend->stop(u->engine, slot->run, true);
 }
 
 static void record_end(struct supervisor *u, struct slot *slot)
@@ -96,8 +76,8 @@ static void record_end(struct supervisor *u, struct slot *slot)
         return;
     }
     slot->used = false;
-    if (slot->pid_fd >= 0) close(slot->pid_fd);
-    struct waiting *w = waiting_of(u, slot->job_id, outcome.delay_s > 0);
+    if (slot->run != NULL) u->backend->release(u->engine, slot->run);
+    struct waiting *w = waiting_list_find(&u->waiting, slot->job_id, outcome.delay_s > 0);
     if (w == NULL) return;
     w->until_s = clock_monotonic_s() + outcome.delay_s;
     if (!outcome.busy)
@@ -120,18 +100,26 @@ static void check_memory(struct supervisor *u, struct slot *slot)
 {
     const int64_t limit_bytes = u->v->settings->resident_limit_bytes;
     if (limit_bytes <= 0 || slot->killed) return;
-    int64_t held_bytes = worker_memory_bytes(slot->pid);
+    int64_t held_bytes = u->backend->memory_bytes(slot->run);
     if (held_bytes <= limit_bytes) return;
     log_warning(u->v->log, "job %s: the worker holds %.1f MB of memory, more than %.1f MB, and is killed", slot->job_id,
                 (double)held_bytes / 1e6, (double)limit_bytes / 1e6);
-    kill_now(slot, STOP_MEMORY);
+    kill_now(u, slot, STOP_MEMORY);
+}
+
+/* Time limit and heartbeats count from the start of the computation, and not while the worker waits in its engine. */
+static void note_phase(struct slot *slot, enum backend_phase phase, double now_s)
+{
+    slot->ended = phase == BACKEND_ENDED;
+    if (phase == BACKEND_RUNS && slot->started_s <= 0) slot->started_s = slot->heartbeat_seen_s = now_s;
+    if (phase == BACKEND_WAITS) slot->started_s = 0;
 }
 
 static void watch(struct supervisor *u, struct slot *slot)
 {
-    if (!slot->ended) slot->ended = worker_ended(slot->pid, &slot->end);
-    trim_console(u, slot);
     double now = clock_monotonic_s();
+    if (!slot->ended) note_phase(slot, u->backend->look(u->engine, slot->run, &slot->end), now);
+    trim_console(u, slot);
     if (slot->ended) {
         if (now >= slot->retry_s) record_end(u, slot);
         return;
@@ -139,13 +127,14 @@ static void watch(struct supervisor *u, struct slot *slot)
     struct attempt_request request;
     bool known = attempt_read_request(u->v, slot->job_id, &request);
     if (request.deleted)
-        kill_now(slot, STOP_CANCEL);
+        kill_now(u, slot, STOP_CANCEL);
     else if (request.cancel)
-        request_stop(slot, STOP_CANCEL);
+        request_stop(u, slot, STOP_CANCEL);
     else if (u->below_floor)
-        request_stop(slot, STOP_PAUSE);
+        request_stop(u, slot, STOP_PAUSE);
     const int64_t limit_s = u->v->settings->time_limit_s;
-    if (limit_s > 0 && now - slot->started_s > (double)limit_s) request_stop(slot, STOP_TIME);
+    const bool computes = slot->started_s > 0;
+    if (limit_s > 0 && computes && now - slot->started_s > (double)limit_s) request_stop(u, slot, STOP_TIME);
     check_memory(u, slot);
     /* measured with our own clock between heartbeats: the wall clock may be set meanwhile, and one failed read is
      * not silence */
@@ -154,15 +143,13 @@ static void watch(struct supervisor *u, struct slot *slot)
         slot->heartbeat_seen_s = now;
         change_feed_publish(u->v->feed, slot->job_id);
     }
-    double silent_s = known ? now - slot->heartbeat_seen_s : 0;
+    double silent_s = known && computes ? now - slot->heartbeat_seen_s : 0;
     if (silent_s > (double)u->v->settings->heartbeat_timeout_s && !slot->killed) {
         log_warning(u->v->log, "job %s: the worker sent no heartbeat for %.0f s and is killed", slot->job_id, silent_s);
-        kill_now(slot, STOP_SILENT);
+        kill_now(u, slot, STOP_SILENT);
     }
-    if (slot->asked_s > 0 && !slot->killed && now - slot->asked_s > (double)u->v->settings->cancel_grace_s) {
-        slot->killed = true;
-        worker_signal(slot->pid, SIGKILL);
-    }
+    if (slot->asked_s > 0 && now - slot->asked_s > (double)u->v->settings->cancel_grace_s)
+        kill_now(u, slot, slot->stop);
 }
 
 static bool is_running(const struct supervisor *u, const char *job_id)
@@ -179,62 +166,83 @@ static size_t n_running(const struct supervisor *u)
     return n;
 }
 
-static void launch(struct supervisor *u, const struct queued_job *job)
+static struct slot *take_slot(struct supervisor *u, const char *job_id, const char *owner, const char *batch)
 {
-    const char *job_id = job->id;
-    struct error err = {0};
-    char folder[PATH_BYTES], console[PATH_BYTES], speeds[PATH_BYTES];
-    path_join(folder, u->v->settings->data, "jobs", job_id, NULL);
-    path_join(console, folder, "console.txt", NULL);
-    status s = attempt_prepare(u->v, job_id, &err);
-    if (s == STATUS_CONFLICT) return; /* cancelled or deleted meanwhile */
-    if (s != STATUS_OK) {
-        log_error(u->v->log, "job %s cannot be prepared; next try in 5 s: %s", job_id, err.text);
-        waiting_of(u, job_id, true)->until_s = clock_monotonic_s() + 5;
-        return;
-    }
     struct slot *slot = u->slot;
     while (slot->used) slot++;
-    *slot = (struct slot){
-        .used = true, .pid_fd = -1, .heartbeat_seen_s = clock_monotonic_s(), .started_s = clock_monotonic_s()};
+    *slot = (struct slot){.used = true};
     snprintf(slot->job_id, sizeof slot->job_id, "%s", job_id);
-    snprintf(slot->owner, sizeof slot->owner, "%s", job->owner);
-    snprintf(slot->batch, sizeof slot->batch, "%s", job->batch);
-    path_join(speeds, u->v->settings->data, "speeds.json", NULL);
-    const struct worker_paths paths = {
-        .program = u->worker, .job_folder = folder, .console = console, .speeds = speeds};
-    s = worker_launch(&paths, u->v->settings, &slot->pid, &err);
-    if (s == STATUS_OK) {
-        slot->pid_fd = (int)syscall(SYS_pidfd_open, slot->pid, 0);
-        log_info(u->v->log, "job %s: worker %d started", job_id, (int)slot->pid);
-        return;
-    }
-    /* the row already says running, so the slot stays, as that of an ended worker, until the database is corrected */
-    log_error(u->v->log, "job %s: %s", job_id, err.text);
+    snprintf(slot->owner, sizeof slot->owner, "%s", owner);
+    snprintf(slot->batch, sizeof slot->batch, "%s", batch);
+    return slot;
+}
+
+/* The row already says running, so the slot stays, as that of an ended worker, until the database is corrected. */
+static void start_failed(struct supervisor *u, struct slot *slot, const struct error *err)
+{
+    char job_id[STORE_ID_BYTES];
+    snprintf(job_id, sizeof job_id, "%s", slot->job_id);
+    log_error(u->v->log, "job %s: %s", job_id, err->text);
     slot->ended = true;
     slot->end = (struct worker_end){.by_signal = false, .code = 127};
     record_end(u, slot);
-    waiting_of(u, job_id, true)->until_s = clock_monotonic_s() + 2;
+    waiting_list_find(&u->waiting, job_id, true)->until_s = clock_monotonic_s() + 2;
 }
 
-static bool may_start(struct supervisor *u, const char *job_id)
+static void launch(struct supervisor *u, const struct queued_job *job)
 {
-    const struct waiting *w = waiting_of(u, job_id, false);
-    return !is_running(u, job_id) && (w == NULL || w->until_s <= clock_monotonic_s());
+    struct error err = {0};
+    status s = attempt_prepare(u->v, job->id, &err);
+    if (s == STATUS_CONFLICT) return; /* cancelled or deleted meanwhile */
+    if (s != STATUS_OK) {
+        log_error(u->v->log, "job %s cannot be prepared; next try in 5 s: %s", job->id, err.text);
+        waiting_list_find(&u->waiting, job->id, true)->until_s = clock_monotonic_s() + 5;
+        return;
+    }
+    struct slot *slot = take_slot(u, job->id, job->owner, job->batch);
+    if (u->backend->start(u->engine, job->id, &slot->run, &err) != STATUS_OK) start_failed(u, slot, &err);
+}
+
+/* Takes over the jobs that an earlier daemon has started. Those that find no slot now are adopted later. */
+static void adopt(struct supervisor *u)
+{
+    struct job_row *row = NULL;
+    size_t n = 0, n_free = MAX_WORKER - n_running(u);
+    struct job_query q = {.states = 1U << JOB_RUNNING, .limit = MAX_WORKER};
+    if (u->adopted || u->backend->adopt == NULL) return;
+    if (store_job_list(u->v->store, &q, &row, &n, NULL) != STATUS_OK) return;
+    u->adopted = n < MAX_WORKER;
+    for (size_t i = 0; i < n; i++) {
+        struct error err = {0};
+        if (is_running(u, row[i].id)) continue;
+        if (n_free-- == 0) break;
+        struct slot *slot = take_slot(u, row[i].id, row[i].owner, row[i].batch);
+        if (u->backend->adopt(u->engine, row[i].id, &slot->run, &err) != STATUS_OK) start_failed(u, slot, &err);
+    }
+    job_rows_free(row, n);
+}
+
+/* Whether neither a worker has the job nor a time is set before which it must be left alone. */
+static bool is_free(struct supervisor *u, const char *job_id)
+{
+    return !is_running(u, job_id) && !waiting_list_holds(&u->waiting, job_id, clock_monotonic_s());
 }
 
 static void fill_slots(struct supervisor *u)
 {
     struct queued_job *job = NULL;
-    size_t n = 0, i, n_waiting = 0, free_slots = (size_t)u->v->settings->workers;
+    size_t n = 0, i;
+    size_t free_slots = (size_t)u->v->settings->workers;
     free_slots -= n_running(u) < free_slots ? n_running(u) : free_slots;
-    if (free_slots == 0 || u->below_floor) return;
-    for (i = 0; i < MAX_WAITING; i++) n_waiting += u->waiting[i].until_s > clock_monotonic_s();
+    if (free_slots == 0 || u->below_floor || !u->backend->ready(u->engine)) return;
     /* as many of each owner and batch as may have to be passed over, or can start */
-    if (store_job_queue(u->v->store, n_waiting + MAX_WORKER, &job, &n, NULL) != STATUS_OK || n == 0) return;
+    if (store_job_queue(u->v->store, waiting_list_count(&u->waiting, clock_monotonic_s()) + free_slots, &job, &n,
+                        NULL) != STATUS_OK ||
+        n == 0)
+        return;
     struct queue_turn *turn = queue_turn_new(job, n);
     for (i = 0; turn != NULL && i < n; i++)
-        if (!may_start(u, job[i].id)) queue_turn_skip(turn, i);
+        if (!is_free(u, job[i].id)) queue_turn_skip(turn, i);
     for (i = 0; turn != NULL && i < MAX_WORKER; i++)
         if (u->slot[i].used) queue_turn_running(turn, u->slot[i].owner, u->slot[i].batch, 1);
     for (; turn != NULL && free_slots > 0 && (i = queue_turn_next(turn, clock_wall_s())) < n; free_slots--) {
@@ -252,8 +260,7 @@ static void remove_deleted(struct supervisor *u)
     struct job_query q = {.deleted = true, .limit = 64};
     if (store_job_list(u->v->store, &q, &row, &n, NULL) != STATUS_OK) return;
     for (size_t i = 0; i < n; i++) {
-        const struct waiting *w = waiting_of(u, row[i].id, false);
-        if (is_running(u, row[i].id) || (w != NULL && w->until_s > clock_monotonic_s())) continue;
+        if (!is_free(u, row[i].id)) continue;
         char path[PATH_BYTES];
         struct error err = {0};
         path_join(path, u->v->settings->data, "jobs", row[i].id, NULL);
@@ -262,7 +269,7 @@ static void remove_deleted(struct supervisor *u)
         if (s == STATUS_OK) continue;
         log_warning(u->v->log, "job %s is deleted, but a part of it could not be removed; next try in %d s: %s",
                     row[i].id, BURY_AGAIN_S, err.text);
-        waiting_of(u, row[i].id, true)->until_s = clock_monotonic_s() + BURY_AGAIN_S;
+        waiting_list_find(&u->waiting, row[i].id, true)->until_s = clock_monotonic_s() + BURY_AGAIN_S;
     }
     job_rows_free(row, n);
 }
@@ -292,13 +299,15 @@ static void tick(struct supervisor *u)
     for (size_t i = 0; i < MAX_WORKER; i++)
         if (u->slot[i].used) watch(u, &u->slot[i]);
     remove_deleted(u);
+    adopt(u);
     fill_slots(u);
 }
 
 static void stop_all(struct supervisor *u)
 {
+    if (u->backend->outlives_daemon) return;
     for (size_t i = 0; i < MAX_WORKER; i++)
-        if (u->slot[i].used) request_stop(&u->slot[i], STOP_SHUTDOWN);
+        if (u->slot[i].used) request_stop(u, &u->slot[i], STOP_SHUTDOWN);
     double give_up_s = clock_monotonic_s() + (double)u->v->settings->cancel_grace_s + 10;
     while (n_running(u) > 0 && clock_monotonic_s() < give_up_s) {
         for (size_t i = 0; i < MAX_WORKER; i++)
@@ -313,10 +322,12 @@ static void wait_for_news(struct supervisor *u)
     struct pollfd news[MAX_WORKER + 1] = {{.fd = u->wake_fd, .events = POLLIN}};
     nfds_t n = 1;
     uint64_t n_wake;
-    for (size_t i = 0; i < MAX_WORKER; i++)
-        if (u->slot[i].used && !u->slot[i].ended && u->slot[i].pid_fd >= 0)
-            news[n++] = (struct pollfd){.fd = u->slot[i].pid_fd, .events = POLLIN};
-    if (poll(news, n, n_running(u) > 0 ? BUSY_LOOK_MS : IDLE_LOOK_MS) < 0) return;
+    for (size_t i = 0; i < MAX_WORKER; i++) {
+        const struct slot *slot = &u->slot[i];
+        int fd = slot->used && !slot->ended ? u->backend->end_fd(slot->run) : -1;
+        if (fd >= 0) news[n++] = (struct pollfd){.fd = fd, .events = POLLIN};
+    }
+    if (poll(news, n, n_running(u) > 0 ? u->backend->look_ms : IDLE_LOOK_MS) < 0) return;
     if ((news[0].revents & POLLIN) != 0 && read(u->wake_fd, &n_wake, sizeof n_wake) < 0)
         log_warning(u->v->log, "the supervisor cannot read its counter: %s", strerror(errno));
 }
@@ -329,24 +340,30 @@ static void *run(void *context)
         wait_for_news(u);
     }
     stop_all(u);
+    u->backend->close(u->engine);
     return NULL;
 }
 
 status supervisor_start(struct job_service *v, const char *worker_program, struct supervisor **out, struct error *err)
 {
-    if (access(worker_program, X_OK) != 0)
-        return error_set_errno(err, "cannot execute worker program '%s'", worker_program);
     struct supervisor *u = calloc(1, sizeof *u);
     if (u == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start the supervisor: out of memory");
     u->v = v;
     u->disk_seen_s = -1e9;
     snprintf(u->worker, sizeof u->worker, "%s", worker_program);
+    u->backend = job_backend_find(v->settings->backend);
+    status s = u->backend->open(v, u->worker, &u->engine, err);
+    if (s != STATUS_OK) {
+        free(u);
+        return s;
+    }
     u->wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     v->supervisor = u;
     int e = u->wake_fd < 0 ? errno : pthread_create(&u->thread, NULL, run, u);
     if (e != 0) {
         v->supervisor = NULL;
         if (u->wake_fd >= 0) close(u->wake_fd);
+        u->backend->close(u->engine);
         free(u);
         errno = e;
         return error_set_errno(err, "cannot start the supervisor");
