@@ -32,7 +32,7 @@ struct setting {
 #define GIB (INT64_C(1) << 30)
 
 static const char *const sandbox_words[] = {"auto", "required", "off", NULL};
-static const char *const backend_words[] = {"local", NULL};
+static const char *const backend_words[] = {"local", "slurm", NULL};
 static const char *const required_words[] = {"auto", "always", NULL};
 
 static const struct setting table[] = {
@@ -73,7 +73,8 @@ static const struct setting table[] = {
            "number of earlier results that a job keeps when it is edited and run again; 0: none"),
     NUMBER("jobs", "workers", workers, 1, 1, SETTING_MAX_WORKERS,
            "number of jobs that run at the same time; with a cluster, that are in its queue"),
-    WORD("jobs", "backend", backend, "local", backend_words, "where jobs run: local, as processes of this machine"),
+    WORD("jobs", "backend", backend, "local", backend_words,
+         "where jobs run: local, as processes of this machine; slurm, on the nodes of a cluster (docs/cluster.md)"),
     TEXT("jobs", "worker", worker, "", "the worker program; empty: selvedge-worker beside the daemon"),
     WORD("jobs", "sandbox", sandbox, "auto", sandbox_words,
          "keeps workers to their job's folder and to the system calls that they need: auto, as far as the kernel can; "
@@ -117,6 +118,28 @@ static const struct setting table[] = {
            "time in seconds that a worker may run; its job then fails, and a retry resumes it; 0: no limit"),
     NUMBER("jobs", "check_limit_s", check_limit_s, 300, 1, 86400,
            "time in seconds in which a worker must have judged the files of a job that is not started yet"),
+    TEXT(
+        "slurm", "commands", slurm_commands, "",
+        "folder of sbatch, squeue and scancel; empty: found in PATH. Read with jobs.backend = slurm (docs/cluster.md), "
+        "as all of [slurm]"),
+    TEXT("slurm", "partition", slurm_partition, "", "partition of the jobs; empty: the cluster's default"),
+    TEXT("slurm", "account", slurm_account, "", "account that the jobs are charged to; empty: the user's default"),
+    TEXT("slurm", "qos", slurm_qos, "", "quality of service of the jobs; empty: the user's default"),
+    NUMBER("slurm", "time_limit_s", slurm_time_limit_s, 0, 0, 31536000,
+           "time in seconds that one start of a worker asks for; it goes on from a checkpoint in the next one; 0: the "
+           "partition's"),
+    NUMBER("slurm", "warn_s", slurm_warn_s, 120, 10, 65535,
+           "time in seconds before the time limit at which a worker is told to write a checkpoint"),
+    NUMBER("slurm", "cores", slurm_cores, 4, 1, 1024, "cores of a worker where jobs.threads is 0"),
+    NUMBER("slurm", "memory_bytes", slurm_memory_bytes, 0, 0, INT64_MAX / 2,
+           "memory that a worker asks for; 0: by the size of its files"),
+    NUMBER("slurm", "ranks", slurm_ranks, 1, 1, 1024, "processes of a worker, started by srun where there are several"),
+    TEXT("slurm", "mpi", slurm_mpi, "", "kind of MPI that srun starts them with, such as pmix; empty: the cluster's"),
+    NUMBER("slurm", "poll_s", slurm_poll_s, 5, 1, 300, "time in seconds between two looks at Slurm's list of jobs"),
+    NUMBER("slurm", "file_delay_s", slurm_file_delay_s, 10, 0, 600,
+           "time in seconds that the last files of a worker may take to be seen on the shared file system"),
+    TEXT("slurm", "extra_arguments", slurm_extra, "",
+         "more options of sbatch between blanks, such as --constraint=avx2 --nice=10 (docs/cluster.md lists them)"),
     WORD("access", "required", access_required, "auto", required_words,
          "whether requests need a token: auto, once one was ever made; always, also with a database that has none"),
     NUMBER("access", "requests_per_minute", requests_per_minute, 0, 0, 1000000,

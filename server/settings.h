@@ -26,6 +26,11 @@ struct settings {
     int64_t threads, scratch_limit_bytes, file_limit_bytes, open_files, oom_score_adj;
     int64_t nice, memory_limit_bytes, resident_limit_bytes, volume_memory_bytes, cancel_grace_s, max_lost_attempts,
         heartbeat_timeout_s, time_limit_s, check_limit_s;
+    /* [slurm] */
+    char slurm_commands[SETTING_TEXT_BYTES], slurm_partition[SETTING_TEXT_BYTES], slurm_account[SETTING_TEXT_BYTES],
+        slurm_qos[SETTING_TEXT_BYTES], slurm_extra[SETTING_TEXT_BYTES], slurm_mpi[SETTING_TEXT_BYTES];
+    int64_t slurm_time_limit_s, slurm_warn_s, slurm_cores, slurm_memory_bytes, slurm_ranks, slurm_poll_s,
+        slurm_file_delay_s;
     /* [webhook] */
     char webhook_url[SETTING_TEXT_BYTES], webhook_secret_file[SETTING_TEXT_BYTES];
     int64_t webhook_timeout_s, webhook_retry_s, webhook_max_tries;

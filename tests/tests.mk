@@ -1,5 +1,5 @@
 # Tests: their programs, and the targets that run them. tests/README.md says what each one is.
-.PHONY: screens tsan tsan-requests test-watched-folder deps-test build-tests asan asan-physics fuzz fuzz-smoke fuzz-programs coverage
+.PHONY: screens tsan tsan-requests test-watched-folder test-slurm deps-test build-tests asan asan-physics fuzz fuzz-smoke fuzz-programs coverage
 # one test program per file tests/{unit,physics}/test_*.c
 TESTS_C := $(shell find tests/unit tests/physics -name 'test_*.c' 2>/dev/null | sort)
 TEST_BINS := $(patsubst %.c,$(BUILD)/%,$(TESTS_C))
@@ -31,8 +31,8 @@ screens: | deps-test ## the browser tests, which then keep screenshots of the da
 	@SELVEDGE_SCREENSHOTS="$(CURDIR)/$(BUILD)/screens" /usr/bin/python3 -m pytest -q $(addprefix tests/browser/,$(PAGES))$(if $(PAGES),,tests/browser)
 
 # What takes too long for every commit. One part that fails does not keep the next from running.
-NIGHTLY := asan tsan fuzz-smoke coverage test-crash test-long mutants
-nightly:           ## asan, tsan, fuzz-smoke, coverage, test-crash, test-long and mutants: too long for every commit
+NIGHTLY := asan tsan fuzz-smoke coverage test-crash test-slurm test-long mutants
+nightly:           ## asan, tsan, fuzz-smoke, coverage, test-crash, test-slurm, test-long and mutants: too long for every commit
 	@failed=""; for part in $(NIGHTLY); do \
 		echo "== $$part"; $(MAKE) --no-print-directory $$part || failed="$$failed $$part"; done; \
 	[ -z "$$failed" ] || { echo "nightly: failed:$$failed"; exit 1; }
@@ -55,6 +55,10 @@ tsan: | deps-test  ## tests of the daemon under the thread sanitizer (three minu
 
 tsan-requests:     ## those where many requests meet: a part of `make test`
 	@$(MAKE) --no-print-directory tsan THREADED_TESTS="api/service api/test_jobs_api api/test_uploads_api"
+
+test-slurm: | deps-test ## jobs on a real Slurm of two virtual nodes: faults, restarts, time limits (five minutes, mostly of waiting)
+	@$(MAKE) --no-print-directory -j$$(nproc) all
+	@/usr/bin/python3 -m pytest -q tests/slurm
 
 # SAMPLES, KILLS: fewer for a quick look
 test-watched-folder: | deps-test ## 100 samples dropped into a watched folder, real jobs, while the daemon is killed 20 times: each ends once (some minutes)

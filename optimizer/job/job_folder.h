@@ -8,6 +8,9 @@
  *                           them.
  *   JOB/attempt.json        {"attempt":3,"token":"..."}: the attempt that may write. Absent when run by hand.
  *   JOB/lock                The worker holds a flock() on it while it lives.
+ *   JOB/claim-<token>       the start of a worker that has the attempt of this token (option --start), when an engine
+ *                           could start one twice
+ *   JOB/backend.json        where an engine other than the daemon runs the job (server/workers/backends/backend_note.h)
  *   JOB/status.json         The worker replaces it at least every second while it lives.
  *   JOB/series.rec          record file (durable.h), append-only: one JSON object for each step of the fit
  *   JOB/log.txt             the worker's log, append-only
@@ -40,6 +43,8 @@
 #define JOB_FILE_JOURNAL "journal.rec"
 #define JOB_FILE_ATTEMPT "attempt.json"
 #define JOB_FILE_LOCK "lock"
+#define JOB_FILE_BACKEND "backend.json"
+#define JOB_CLAIM_PREFIX "claim-"
 #define JOB_FILE_STATUS "status.json"
 #define JOB_FILE_SERIES "series.rec"
 #define JOB_FILE_LOG "log.txt"

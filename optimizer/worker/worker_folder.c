@@ -2,6 +2,7 @@
 #include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <ftw.h>
@@ -82,6 +83,51 @@ void worker_folder_close(struct worker_folder *f)
 {
     if (f->lock_fd >= 0) close(f->lock_fd);
     f->lock_fd = -1;
+}
+
+/* Removes the claims of earlier attempts. One that stays does no harm. */
+static void remove_claims(const struct worker_folder *f, const char *keep)
+{
+    char path[WORKER_PATH_BYTES];
+    DIR *d = opendir(f->path);
+    for (struct dirent *e; d != NULL && (e = readdir(d)) != NULL;) {
+        if (strncmp(e->d_name, JOB_CLAIM_PREFIX, strlen(JOB_CLAIM_PREFIX)) != 0 || strcmp(e->d_name, keep) == 0)
+            continue;
+        worker_folder_path(f, e->d_name, NULL, path);
+        unlink(path);
+    }
+    if (d != NULL) closedir(d);
+}
+
+/* Whose claim it is, when there is one already: a start that repeats its own request, as a network file system may do,
+ * has it. */
+static status check_claim(const char *path, const char *start, struct error *err)
+{
+    char *text = NULL;
+    size_t n = 0;
+    status s = file_read_all(path, MAX_ATTEMPT_BYTES, &text, &n, err);
+    if (s == STATUS_OK && strcmp(text, start) != 0)
+        s = error_set(err, STATUS_STALE, "this attempt belongs to the start '%.60s', not to '%.60s'", text, start);
+    free(text);
+    return s;
+}
+
+status worker_folder_claim(const struct worker_folder *f, const char *start, struct error *err)
+{
+    char name[sizeof JOB_CLAIM_PREFIX + sizeof f->token], path[WORKER_PATH_BYTES];
+    if (f->token[0] == '\0') return STATUS_OK;
+    if (strchr(f->token, '/') != NULL)
+        return error_set(err, STATUS_FORMAT, "cannot use the token of attempt %lld: it has a '/'", f->attempt);
+    snprintf(name, sizeof name, "%s%s", JOB_CLAIM_PREFIX, f->token);
+    worker_folder_path(f, name, NULL, path);
+    int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
+    if (fd < 0 && errno == EEXIST) return check_claim(path, start, err);
+    if (fd < 0) return error_set_errno(err, "cannot write '%s'", path);
+    bool written = write(fd, start, strlen(start)) == (ssize_t)strlen(start) && fsync(fd) == 0;
+    status s = written ? durable_sync_folder_of(path, err) : error_set_errno(err, "cannot write '%s'", path);
+    close(fd);
+    if (s == STATUS_OK) remove_claims(f, name);
+    return s == STATUS_OK ? worker_folder_check(f, err) : s;
 }
 
 status worker_folder_check(const struct worker_folder *f, struct error *err)

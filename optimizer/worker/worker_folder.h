@@ -20,6 +20,11 @@ struct worker_folder {
  * STATUS_STALE: another worker holds it. */
 status worker_folder_open(struct worker_folder *f, const char *path, struct error *err);
 void worker_folder_close(struct worker_folder *f);
+/* Takes the attempt for one start of a worker, whose name an engine gives (option --start), such as "slurm-123.0": its
+ * number and how often it was started. An engine may start one submission twice, on two nodes, where the lock may not
+ * reach from one to the other; both have the same token. The file claim-<token> is made exclusively, so one start has
+ * the attempt. STATUS_STALE: another start has it. Nothing is done in a folder made by hand. */
+status worker_folder_claim(const struct worker_folder *f, const char *start, struct error *err);
 /* STATUS_STALE when attempt.json names another attempt by now. To be called before every durable write. */
 status worker_folder_check(const struct worker_folder *f, struct error *err);
 /* Writes "JOB/a/b" to path; b may be NULL. */

@@ -35,6 +35,8 @@ static const char usage[] =
     "  --sandbox MODE     auto (default): as far as the kernel can, keep the worker to JOBDIR and to the system calls "
     "that\n"
     "                     it needs; required: fail where the kernel cannot; off\n"
+    "  --start NAME       name of this start, given by an engine that might start a worker twice: one name has an "
+    "attempt\n"
     "  --quiet            log to JOBDIR/log.txt only\n"
     "  --check JOB.json   check the document and its files (in JOBDIR), and print all faults and warnings as JSON;\n"
     "                     exit status 1 when there are faults\n"
@@ -49,6 +51,7 @@ static const char usage[] =
 struct arguments {
     const char *folder;
     const char *speeds; /* NULL: none are remembered */
+    const char *start;  /* name of this start; NULL: none */
     const char *check;  /* a document to check; NULL: the job is run */
     size_t n_thread, memory_mib, scratch_mib;
     bool quiet, no_links;
@@ -102,6 +105,9 @@ static bool take_value(int option, const char *value, struct arguments *a)
         return confine_mode_parse(value, &a->sandbox);
     case 'C':
         return confinement_parse(value, &a->confinement);
+    case 'N':
+        a->start = value;
+        return value[0] != '\0';
     case 's':
         a->speeds = value;
         return true;
@@ -121,6 +127,7 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
                                            {"check", required_argument, NULL, 'k'},
                                            {"sandbox", required_argument, NULL, 'b'},
                                            {"confined", required_argument, NULL, 'C'},
+                                           {"start", required_argument, NULL, 'N'},
                                            {"quiet", no_argument, NULL, 'q'},
                                            {"no-links", no_argument, NULL, 'l'},
                                            {"help", no_argument, NULL, 'h'},
@@ -318,6 +325,8 @@ int main(int argc, char **argv)
     if (a.check != NULL) return print_check(&a);
     set_signals();
     status s = worker_folder_open(&folder, a.folder, &err);
+    if (s == STATUS_OK && a.start != NULL && (s = worker_folder_claim(&folder, a.start, &err)) != STATUS_OK)
+        worker_folder_close(&folder);
     if (s != STATUS_OK) {
         fprintf(stderr, "selvedge-worker: %s\n", err.text);
         return s == STATUS_STALE ? WORKER_STALE : s == STATUS_NOT_FOUND ? WORKER_USAGE : WORKER_FAILED;

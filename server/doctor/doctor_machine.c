@@ -32,7 +32,8 @@ static void examine_processor(struct doctor *d)
 {
     const struct settings *s = d->settings;
     long n = sysconf(_SC_NPROCESSORS_ONLN);
-    long long threads = s->threads > 0 ? s->threads : n, wanted = threads * s->workers;
+    const bool here = strcmp(s->backend, "local") == 0; /* else workers are on other machines */
+    long long threads = s->threads > 0 ? s->threads : n, wanted = here ? threads * s->workers : 1;
 #ifdef __x86_64__
     /* without these even this program would have ended by an illegal instruction, if a part of it had used them */
     bool able = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2");
@@ -67,7 +68,8 @@ static void examine_memory(struct doctor *d)
     const struct settings *s = d->settings;
     long long all = memory_bytes(), available = number_after("/proc/meminfo", "MemAvailable:") * 1024;
     long long each = s->resident_limit_bytes > 0 ? s->resident_limit_bytes : s->volume_memory_bytes + (1LL << 30);
-    long long wanted = each * s->workers + (1LL << 28);
+    const bool here = strcmp(s->backend, "local") == 0;
+    long long wanted = (here ? each * s->workers : 0) + (1LL << 28);
     if (all < 0)
         doctor_say(d, DOCTOR_NOTE, "memory", "its size is not known");
     else if (wanted > all)

@@ -9,6 +9,7 @@
 #include "server/jobs/job_paths.h"
 #include "server/jobs/listing/queue_forecast.h"
 #include "server/workers/attempt.h"
+#include "server/workers/backends/job_backend.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -70,12 +71,14 @@ static status remove_deleted(struct job_service *v, struct error *err)
     return s;
 }
 
-/* Workers die with the daemon, so a job that is running in the database has no worker. */
+/* Where workers die with the daemon, a job that is running in the database has none. */
 static status requeue(struct job_service *v, struct error *err)
 {
     struct job_row *row = NULL;
     size_t n = 0;
     struct job_query q = {.states = 1U << JOB_RUNNING, .limit = SIZE_MAX >> 1};
+    const struct job_backend *backend = job_backend_find(v->settings->backend);
+    if (backend != NULL && backend->outlives_daemon) return STATUS_OK; /* the supervisor adopts them */
     status s = store_job_list(v->store, &q, &row, &n, err);
     for (size_t i = 0; s == STATUS_OK && i < n; i++) {
         row[i].state = row[i].cancel_requested ? JOB_CANCELLED : JOB_QUEUED;

@@ -8,6 +8,8 @@
 #include "server/jobs/listing/queue_forecast.h"
 #include "server/retention/job_keep.h"
 #include "server/workers/attempt.h"
+#include "server/workers/backends/backend_note.h"
+#include "server/workers/supervisor.h"
 
 #include <sodium.h>
 #include <stdio.h>
@@ -62,6 +64,17 @@ static void put_progress(json_t *out, const struct job_row *row, const json_t *s
     put(out, "verdict", row->state == JOB_SUCCEEDED ? st : NULL, "verdict", JSON_OBJECT, json_null());
     json_int_t peak = json_integer_value(json_object_get(st, "peak_rss_bytes"));
     json_object_set_new(out, "peak_rss_bytes", json_integer(peak > row->peak_rss_bytes ? peak : row->peak_rss_bytes));
+}
+
+/* Where an engine has the job, and why it waits there. The engine is asked now and then, so a worker that has written
+ * its status computes, whatever the engine said last. */
+static void put_backend(struct job_service *v, json_t *out, const struct job_row *row, const json_t *st)
+{
+    char message[512];
+    json_object_set_new(out, "backend", backend_note_view(v->settings->data, row, message, sizeof message));
+    if (row->state == JOB_QUEUED && v->supervisor != NULL) supervisor_trouble(v->supervisor, message, sizeof message);
+    bool computes = row->state == JOB_RUNNING && json_integer_value(json_object_get(st, "attempt")) == row->attempt;
+    if (message[0] != '\0' && !computes) json_object_set_new(out, "message", json_string(message));
 }
 
 static void put_place(struct job_service *v, json_t *out, const struct job_row *row)
@@ -169,6 +182,7 @@ status job_view(struct job_service *v, const struct job_row *row, bool full, jso
                                               : json_pack("{s:s,s:s}", "id", row->batch, "name", row->batch_name));
     put_place(v, out, row);
     put_progress(out, row, st);
+    put_backend(v, out, row, st);
     put_error(out, row);
     json_decref(st);
     status s = full ? put_details(v, row, out, err) : STATUS_OK;

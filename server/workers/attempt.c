@@ -32,8 +32,8 @@ json_t *attempt_read_status(const struct job_service *v, const char *job_id)
 /* Removes the checkpoints that belong to the input before an edit, and keeps its result as a version. */
 static status clear_folder(struct job_service *v, struct job_row *row, struct error *err)
 {
-    static const char *const stale[] = {JOB_FILE_STATUS, JOB_FILE_SERIES,    JOB_FILE_LOG,
-                                        JOB_FOLDER_WORK, JOB_FOLDER_RESULTS, JOB_FILE_RUN};
+    static const char *const stale[] = {JOB_FILE_STATUS,    JOB_FILE_SERIES, JOB_FILE_LOG,    JOB_FOLDER_WORK,
+                                        JOB_FOLDER_RESULTS, JOB_FILE_RUN,    JOB_FILE_BACKEND};
     char path[PATH_BYTES];
     const char *job_id = row->id;
     status s = version_keep(v, row, err);
@@ -158,12 +158,41 @@ static void failed(struct job_service *v, struct job_row *row)
     json_decref(j);
 }
 
+/* Where an engine has ended the worker, or has not started it. Returns false when the exit code decides. */
+static bool apply_cause(const struct job_service *v, struct job_row *row, const struct worker_end *end,
+                        struct attempt_outcome *outcome)
+{
+    switch (end->cause) {
+    case WORKER_NOT_STARTED:
+        row->state = JOB_QUEUED;
+        outcome->delay_s = 1;
+        break;
+    case WORKER_INTERRUPTED:
+        row->state = JOB_QUEUED;
+        log_info(v->log, "job %s: attempt %lld was interrupted: %s", row->id, (long long)row->attempt, end->why);
+        break;
+    case WORKER_CANCELLED_OUTSIDE:
+        row->state = JOB_CANCELLED;
+        log_info(v->log, "job %s: %s", row->id, end->why);
+        break;
+    case WORKER_REFUSED:
+        row->state = JOB_FAILED;
+        set_error(row, "backend_refused", "", end->why);
+        break;
+    default:
+        return false;
+    }
+    return true;
+}
+
 static void describe_end(struct job_service *v, const struct job_row *row, const struct worker_end *end,
                          enum attempt_stop stop, char *out, size_t n_out)
 {
-    char tail[300], how[120];
+    char tail[300], how[sizeof end->why];
     last_words(v, row->id, tail, sizeof tail);
-    if (stop == STOP_SILENT)
+    if (end->why[0] != '\0')
+        snprintf(how, sizeof how, "%s", end->why);
+    else if (stop == STOP_SILENT)
         snprintf(how, sizeof how, "the worker sent no heartbeat and was killed");
     else if (end->by_signal && end->code == SIGKILL)
         snprintf(how, sizeof how, "the worker was killed (signal 9), perhaps because memory was out");
@@ -227,9 +256,10 @@ static void apply_end(struct job_service *v, struct job_row *row, const struct w
                       struct attempt_outcome *outcome)
 {
     bool asked = stop == STOP_CANCEL || stop == STOP_SHUTDOWN || stop == STOP_PAUSE;
-    if (!end->by_signal && end->code == WORKER_SUCCEEDED)
+    const bool by_itself = end->cause == WORKER_ENDED && !end->by_signal;
+    if (by_itself && end->code == WORKER_SUCCEEDED)
         succeeded(v, row);
-    else if (!end->by_signal && end->code == WORKER_FAILED)
+    else if (by_itself && end->code == WORKER_FAILED)
         failed(v, row);
     else if (stop == STOP_TIME && !row->cancel_requested)
         time_is_up(v, row);
@@ -239,9 +269,11 @@ static void apply_end(struct job_service *v, struct job_row *row, const struct w
         row->state = stop == STOP_PAUSE && !row->cancel_requested      ? JOB_PAUSED
                      : stop == STOP_SHUTDOWN && !row->cancel_requested ? JOB_QUEUED
                                                                        : JOB_CANCELLED;
-    else if (!end->by_signal && end->code == WORKER_USAGE)
+    else if (stop == STOP_NONE && apply_cause(v, row, end, outcome))
+        return;
+    else if (by_itself && end->code == WORKER_USAGE)
         failed(v, row);
-    else if (!end->by_signal && end->code == WORKER_STALE) {
+    else if (by_itself && end->code == WORKER_STALE) {
         row->state = JOB_QUEUED;
         outcome->busy = true;
         outcome->delay_s = 1;

@@ -374,6 +374,12 @@ status supervisor_start(struct job_service *v, const char *worker_program, struc
 
 const char *supervisor_program(const struct supervisor *u) { return u->worker; }
 
+void supervisor_trouble(const struct supervisor *u, char *text, size_t n_text)
+{
+    text[0] = '\0';
+    if (u->backend->trouble != NULL) u->backend->trouble(u->engine, text, n_text);
+}
+
 void supervisor_wake(struct supervisor *u)
 {
     const uint64_t one = 1;

@@ -11,6 +11,8 @@ status supervisor_start(struct job_service *service, const char *worker_program,
                         struct error *err);
 /* The program that it starts. */
 const char *supervisor_program(const struct supervisor *supervisor);
+/* Writes why no job can be started at present, such as a cluster that cannot be reached; "" otherwise. */
+void supervisor_trouble(const struct supervisor *supervisor, char *text, size_t n_text);
 /* Makes the thread check at once instead of at its next tick. */
 void supervisor_wake(struct supervisor *supervisor);
 /* Stops all workers by SIGTERM and, after the grace time, SIGKILL; their jobs are queued. Workers that outlive the

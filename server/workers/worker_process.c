@@ -11,7 +11,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { EXIT_CANNOT_EXECUTE = 127, MAX_VARIABLE = 64, NUMBER_BYTES = 24 };
+enum { EXIT_CANNOT_EXECUTE = 127, NUMBER_BYTES = 24 };
 
 /* What the new process needs between vfork and exec. */
 struct start {
@@ -74,11 +74,10 @@ static pid_t start(const struct start *s)
     return pid;
 }
 
-/* Collects the daemon's variables whose names the setting lists. */
-static void choose_environment(const char *names, char *variable[MAX_VARIABLE + 1])
+/* Adds the variables whose names are listed to n others. Returns the new number. */
+static size_t choose_variables(const char *names, char *variable[WORKER_MAX_VARIABLE + 1], size_t n)
 {
-    size_t n = 0;
-    for (const char *at = names; *at != '\0' && n < MAX_VARIABLE;) {
+    for (const char *at = names; *at != '\0' && n < WORKER_MAX_VARIABLE;) {
         size_t length = strcspn(at, " ,");
         for (char **e = environ; length > 0 && *e != NULL; e++)
             if (strncmp(*e, at, length) == 0 && (*e)[length] == '=') {
@@ -88,33 +87,35 @@ static void choose_environment(const char *names, char *variable[MAX_VARIABLE + 
         at += length + (at[length] != '\0');
     }
     variable[n] = NULL;
+    return n;
 }
 
-/* Options of selvedge-worker; other programs find the job's folder as the last argument. */
-struct arguments {
-    char memory_mib[NUMBER_BYTES], scratch_mib[NUMBER_BYTES], threads[NUMBER_BYTES];
-    char *argv[16];
-};
+void worker_environment(const struct settings *settings, const char *one_more, char *variable[WORKER_MAX_VARIABLE + 1])
+{
+    size_t n = choose_variables(settings->pass_environment, variable, 0);
+    choose_variables(one_more, variable, n);
+}
 
-static void add(struct arguments *a, const char *text)
+static void add(struct worker_arguments *a, const char *text)
 {
     size_t n = 0;
-    while (a->argv[n] != NULL) n++;
-    a->argv[n] = (char *)(uintptr_t)text;
+    while (a->argument[n] != NULL) n++;
+    a->argument[n] = text;
 }
 
-static void set_arguments(const struct worker_paths *p, const struct settings *s, struct arguments *a)
+void worker_arguments_set(struct worker_arguments *a, const struct worker_paths *p, const struct settings *s)
 {
-    *a = (struct arguments){.argv = {NULL}};
+    const int64_t threads = p->threads > 0 ? p->threads : s->threads;
+    *a = (struct worker_arguments){.argument = {NULL}};
     snprintf(a->memory_mib, NUMBER_BYTES, "%lld", (long long)(s->volume_memory_bytes >> 20));
     snprintf(a->scratch_mib, NUMBER_BYTES, "%lld", (long long)((s->scratch_limit_bytes >> 20) + 1));
-    snprintf(a->threads, NUMBER_BYTES, "%lld", (long long)s->threads);
+    snprintf(a->threads, NUMBER_BYTES, "%lld", (long long)threads);
     const char *const always[] = {p->program, "--memory-mib", a->memory_mib, "--sandbox", s->sandbox};
     for (size_t i = 0; i < sizeof always / sizeof *always; i++) add(a, always[i]);
     add(a, p->document != NULL ? "--check" : "--speeds");
     add(a, p->document != NULL ? p->document : p->speeds);
     if (p->document != NULL) add(a, "--no-links");
-    if (s->threads > 0) {
+    if (threads > 0) {
         add(a, "--threads");
         add(a, a->threads);
     }
@@ -127,13 +128,13 @@ static void set_arguments(const struct worker_paths *p, const struct settings *s
 
 status worker_launch(const struct worker_paths *paths, const struct settings *settings, pid_t *out, struct error *err)
 {
-    char *variable[MAX_VARIABLE + 1];
-    struct arguments a;
+    char *variable[WORKER_MAX_VARIABLE + 1];
+    struct worker_arguments a;
     status s = STATUS_OK;
-    choose_environment(settings->pass_environment, variable);
-    set_arguments(paths, settings, &a);
+    worker_environment(settings, "", variable);
+    worker_arguments_set(&a, paths, settings);
     struct start new = {.program = paths->program,
-                        .argv = a.argv,
+                        .argv = (char *const *)(uintptr_t)a.argument,
                         .environment = variable,
                         .settings = settings,
                         .output_fd = paths->report_fd,

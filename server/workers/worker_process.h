@@ -18,14 +18,42 @@ struct worker_paths {
     const char *speeds;   /* of earlier jobs */
     const char *document; /* a job document whose files in job_folder are judged; NULL: the job is run */
     int report_fd;        /* gets what is found by a check, in place of console and speeds */
+    int64_t threads;      /* computing threads; 0: as the settings say */
+};
+
+/* What has ended a worker, as far as its engine knows more than the exit code. */
+enum worker_cause {
+    WORKER_ENDED,             /* itself, or a signal: see the exit code */
+    WORKER_NOT_STARTED,       /* the engine could not be reached; nothing has run */
+    WORKER_REFUSED,           /* the engine does not take the job */
+    WORKER_CANCELLED_OUTSIDE, /* a user or operator of the engine */
+    WORKER_INTERRUPTED,       /* the engine, which needs the node; the job goes on from its checkpoint */
+    WORKER_OUT_OF_TIME,       /* the engine's time limit, without progress since the attempt before */
+    WORKER_OUT_OF_MEMORY,
+    WORKER_NODE_LOST,
+    WORKER_VANISHED /* the engine does not know it any more */
 };
 
 struct worker_end {
     bool by_signal;
     int code; /* exit code or signal number */
     int64_t peak_rss_bytes;
+    enum worker_cause cause;
+    char why[400]; /* in words; "" with WORKER_ENDED */
 };
 
+/* The command line of a worker: argument is NULL after the last, which is the job's folder. */
+struct worker_arguments {
+    char memory_mib[24], scratch_mib[24], threads[24];
+    const char *argument[16];
+};
+
+enum { WORKER_MAX_VARIABLE = 64 };
+/* Collects the variables of the daemon's environment that workers get, and one more. Ends with NULL. */
+void worker_environment(const struct settings *settings, const char *one_more, char *variable[WORKER_MAX_VARIABLE + 1]);
+/* The paths must outlive the arguments. */
+void worker_arguments_set(struct worker_arguments *a, const struct worker_paths *paths,
+                          const struct settings *settings);
 /* Starts a worker with the limits of the settings. To be called from a thread that lives as long as the daemon. Returns
  * when the program runs, so a daemon that is killed leaves no copy of itself that would hold its lock and socket.
  * STATUS_IO, STATUS_NO_MEMORY. */

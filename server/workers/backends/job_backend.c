@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-static const struct job_backend *const backend[] = {&backend_local};
+static const struct job_backend *const backend[] = {&backend_local, &backend_slurm};
 
 const struct job_backend *job_backend_find(const char *name)
 {

@@ -33,11 +33,13 @@ struct job_backend {
     int64_t (*memory_bytes)(const struct backend_run *run);
     /* A descriptor that becomes readable when the worker ends; -1: there is none. */
     int (*end_fd)(const struct backend_run *run);
+    /* Writes why the engine cannot be used at present, or "". From any thread. NULL: it always can. */
+    void (*trouble)(void *state, char *text, size_t n_text);
     /* Forgets a run; its worker, if it still runs, is left alone. */
     void (*release)(void *state, struct backend_run *run);
 };
 
-extern const struct job_backend backend_local;
+extern const struct job_backend backend_local, backend_slurm;
 
 /* Returns NULL when there is none of this name. */
 const struct job_backend *job_backend_find(const char *name);

@@ -97,6 +97,40 @@ static void test_fingerprint(void **state)
     assert_true(a != crc32_z(0, (const void *)"{\"a\": 1}", 8));
 }
 
+/* Of two starts with one token, one has the attempt, even where locks do not reach. */
+static void test_one_start_has_the_attempt(void **state)
+{
+    const char *folder = *state;
+    struct worker_folder first, second;
+    struct error err = {0};
+    char path[WORKER_PATH_BYTES];
+    assert_int_equal(worker_folder_open(&first, folder, NULL), STATUS_OK);
+    assert_int_equal(worker_folder_claim(&first, "slurm-7.0", NULL), STATUS_OK); /* made by hand: no token */
+    worker_folder_close(&first);
+    write_attempt(folder, "{\"attempt\":3,\"token\":\"abc\"}");
+    assert_int_equal(worker_folder_open(&first, folder, NULL), STATUS_OK);
+    second = first; /* on another node, without the lock */
+    assert_int_equal(worker_folder_claim(&first, "slurm-7.0", NULL), STATUS_OK);
+    assert_int_equal(worker_folder_claim(&second, "slurm-7.1", &err), STATUS_STALE);
+    assert_non_null(strstr(err.text, "slurm-7.0"));
+    assert_int_equal(worker_folder_claim(&first, "slurm-7.0", NULL), STATUS_OK); /* its own request, repeated */
+    /* the next attempt has another token, and removes the claim of this one */
+    write_attempt(folder, "{\"attempt\":4,\"token\":\"def\"}");
+    assert_int_equal(worker_folder_claim(&first, "slurm-7.2", NULL), STATUS_STALE);
+    worker_folder_close(&first);
+    assert_int_equal(worker_folder_open(&second, folder, NULL), STATUS_OK);
+    assert_int_equal(worker_folder_claim(&second, "slurm-8.0", NULL), STATUS_OK);
+    worker_folder_path(&second, JOB_CLAIM_PREFIX "abc", NULL, path);
+    assert_int_not_equal(access(path, F_OK), 0);
+    worker_folder_path(&second, JOB_CLAIM_PREFIX "def", NULL, path);
+    assert_int_equal(access(path, F_OK), 0);
+    worker_folder_close(&second);
+    write_attempt(folder, "{\"attempt\":5,\"token\":\"../../x\"}");
+    assert_int_equal(worker_folder_open(&first, folder, NULL), STATUS_OK);
+    assert_int_equal(worker_folder_claim(&first, "slurm-9.0", NULL), STATUS_FORMAT);
+    worker_folder_close(&first);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -105,6 +139,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_a_worker_of_an_old_attempt_removes_nothing, scratch_folder_setup,
                                         scratch_folder_teardown),
         cmocka_unit_test(test_fingerprint),
+        cmocka_unit_test_setup_teardown(test_one_start_has_the_attempt, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(test_marks_are_removed, scratch_folder_setup, scratch_folder_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

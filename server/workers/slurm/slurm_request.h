@@ -1,0 +1,44 @@
+/* What a job asks of Slurm: the command line of sbatch and the script that it submits. */
+#ifndef SELVEDGE_SERVER_SLURM_REQUEST_H
+#define SELVEDGE_SERVER_SLURM_REQUEST_H
+
+#include "server/jobs/job_paths.h"
+#include "server/workers/slurm/slurm_text.h"
+
+/* What one start of a job needs. */
+struct slurm_need {
+    int64_t cores, memory_bytes;
+};
+
+/* The need of a job by its input files (docs/cluster.md states the rule). least_memory_bytes: what an earlier attempt
+ * has shown to be too little, doubled; 0: nothing. */
+struct slurm_need slurm_need_of(const struct settings *settings, const struct file_row *file, size_t n_file,
+                                int64_t least_memory_bytes);
+
+/* Checks the settings of [slurm] that Slurm itself does not check at the start. STATUS_INVALID names the setting. */
+status slurm_request_check(const struct settings *settings, struct error *err);
+
+/* One submission. */
+struct slurm_submission {
+    const char *sbatch, *program; /* paths of sbatch and of the worker */
+    const struct job_row *row;    /* as attempt_prepare has left it */
+    struct slurm_need need;
+};
+
+enum { SLURM_MAX_ARGUMENT = 64, SLURM_ARGUMENT_BYTES = 4096 };
+
+/* The arguments of sbatch, and the script that it reads. */
+struct slurm_request {
+    const char *argument[SLURM_MAX_ARGUMENT + 1]; /* NULL after the last */
+    char text[4 * PATH_BYTES + SETTING_TEXT_BYTES + SLURM_ARGUMENT_BYTES];
+    char script[4 * PATH_BYTES + SLURM_ARGUMENT_BYTES];
+};
+
+/* STATUS_INVALID when a path is too long. */
+status slurm_request_make(const struct settings *settings, const struct slurm_submission *submission,
+                          struct slurm_request *request, struct error *err);
+
+/* The comment by which a job is found in Slurm: "selvedge:ID:ATTEMPT". */
+void slurm_comment(const char *job_id, int64_t attempt, char comment[SLURM_COMMENT_BYTES]);
+
+#endif
