@@ -55,7 +55,7 @@ void slurm_cancel(struct slurm_desk *d, struct backend_run *run);
 
 /* Notes that Slurm cannot be used, in its own words, and for how long nothing is to be submitted. */
 void slurm_note_trouble(struct slurm_desk *d, const char *command, const char *words);
-/* Ends a run, writes its note, and wakes the supervisor. */
+/* Ends a run and writes its note. */
 void slurm_conclude(struct slurm_desk *d, struct backend_run *run, const struct worker_end *end);
 
 #endif

@@ -2,7 +2,6 @@
 #include "base/clock.h"
 #include "server/workers/slurm/slurm_desk.h"
 #include "server/workers/slurm/slurm_request.h"
-#include "server/workers/supervisor.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -36,7 +35,6 @@ void slurm_conclude(struct slurm_desk *d, struct backend_run *run, const struct 
     run->phase = BACKEND_ENDED;
     run->step = SLURM_OVER;
     pthread_mutex_unlock(&d->lock);
-    supervisor_wake(d->v->supervisor);
 }
 
 /* Makes the console new, as it is for a local worker. */
