@@ -168,15 +168,16 @@ class SlurmCluster:
 
     def lose_node(self, name):
         """Ends a node's slurmd and everything that runs there, as when its power fails."""
-        spool = os.path.join(self.folder, "spool-" + name).encode()
         self.end(name, signal.SIGKILL)
+        found = []
         for pid in self.strays():
             with open(f"/proc/{pid}/cmdline", "rb") as f:
-                line = f.read()
+                watches = b"slurmstepd" in f.read()
             with open(f"/proc/{pid}/environ", "rb") as f:
-                environment = f.read()
-            if f"SLURMD_NODENAME={name}\0".encode() in environment or spool in line or f"slurmstepd-{name}".encode() in line:
-                os.kill(pid, signal.SIGKILL)
+                if watches or f"SLURMD_NODENAME={name}\0".encode() in f.read():
+                    found.append((not watches, pid))
+        for _, pid in sorted(found):  # who watches a worker first, or it would report the worker's end
+            os.kill(pid, signal.SIGKILL)
 
     def jobs(self):
         """Slurm's jobs, {id: state}."""
