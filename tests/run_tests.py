@@ -143,16 +143,17 @@ def main():
     def lanes(n):
         return concurrent.futures.ThreadPoolExecutor(max_workers=n)
 
-    # quick: two lanes compute, two wait for daemons most of the time; otherwise one of each, and then one after the other
-    # the tests that kill daemons, drive a browser, or take all cores
+    # quick: two lanes compute, two wait for daemons and browsers most of the time; otherwise one of each, and then one
+    # after the other the tests that kill daemons or take all cores
     n_lane = 2 if arguments.quick else 1
     with tempfile.TemporaryDirectory() as folder, lanes(n_lane) as computing, lanes(n_lane) as waiting:
         runs = [computing.submit(run_check, name) for name in checks()]
         runs += [computing.submit(run_c, folder, name) for name in c_tests()]
-        runs += [waiting.submit(run_python, folder, name) for name in python_tests(["api"])]
+        waited_for = ["api"] if arguments.quick else ["api", "browser"]
+        runs += [waiting.submit(run_python, folder, name) for name in python_tests(waited_for)]
         for done in runs:
             done.result()
-        for name in python_tests([] if arguments.quick else ["crash", "browser", "real"]):
+        for name in python_tests([] if arguments.quick else ["crash", "real"]):
             run_python(folder, name)
 
     tail = f", {totals.skipped} skipped" if totals.skipped else ""
