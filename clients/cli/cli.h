@@ -4,7 +4,7 @@
 #ifndef SELVEDGE_CLIENTS_CLI_H
 #define SELVEDGE_CLIENTS_CLI_H
 
-#include "clients/cli/cli_args.h"
+#include "clients/cli/arguments/cli_args.h"
 #include "clients/cli/cli_http.h"
 
 #include <stdio.h>
@@ -41,6 +41,7 @@ status cli_keep(struct cli *cli, int *exit_code, struct error *err);
 status cli_unkeep(struct cli *cli, int *exit_code, struct error *err);
 status cli_retention(struct cli *cli, int *exit_code, struct error *err);
 status cli_batch(struct cli *cli, int *exit_code, struct error *err);
+status cli_plan(struct cli *cli, int *exit_code, struct error *err);
 
 status cli_reconstruct(struct cli *cli, int *exit_code, struct error *err);
 status cli_render(struct cli *cli, int *exit_code, struct error *err);

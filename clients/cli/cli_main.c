@@ -28,7 +28,7 @@ static status (*const run[CLI_N_COMMAND])(struct cli *, int *, struct error *) =
     [CLI_RESULTS] = cli_results,     [CLI_VERSIONS] = cli_versions, [CLI_LOG] = cli_log,
     [CLI_SERIES] = cli_series,       [CLI_DELETE] = cli_delete,     [CLI_WATCH_FOLDER] = cli_watch_folder,
     [CLI_TOKEN] = cli_token,         [CLI_KEEP] = cli_keep,         [CLI_UNKEEP] = cli_unkeep,
-    [CLI_RETENTION] = cli_retention, [CLI_BATCH] = cli_batch,
+    [CLI_RETENTION] = cli_retention, [CLI_BATCH] = cli_batch,       [CLI_PLAN] = cli_plan,
 };
 
 static void print_error(const struct error *err)

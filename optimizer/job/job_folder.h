@@ -33,6 +33,7 @@
  *   "warnings"                           list of sentences
  *   "error"                              null, or {"code":"format","field":"volume.files","text":"..."}
  *   "peak_rss_bytes"                     largest resident memory of the worker so far
+ *   "cpu_s"                              processor seconds of this attempt so far
  *
  * docs/file-formats.md describes a record of series.rec.
  */
@@ -46,6 +47,7 @@
 #define JOB_FILE_BACKEND "backend.json"
 #define JOB_CLAIM_PREFIX "claim-"
 #define JOB_FILE_STATUS "status.json"
+#define JOB_FILE_PLAN "plan.json" /* what the job was expected to take (server/workers/input_judge.h) */
 #define JOB_FILE_SERIES "series.rec"
 #define JOB_FILE_LOG "log.txt"
 #define JOB_FOLDER_INPUT "input"

@@ -72,11 +72,11 @@ static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, 
     return worker_folder_mark_stage(c->folder, code->name, err);
 }
 
-static bool is_skipped(const struct pipeline_context *c, size_t i)
+bool pipeline_has_stage(const struct pipeline_context *c, size_t i)
 {
-    return (stage_code[i].of_volume && !c->doc->has_volume) ||
-           (stage_code[i].of_scene && job_document_geometry_only(c->doc)) ||
-           (stage_code[i].of_fit && !job_document_has_rows(c->doc));
+    return (!stage_code[i].of_volume || c->doc->has_volume) &&
+           (!stage_code[i].of_scene || !job_document_geometry_only(c->doc)) &&
+           (!stage_code[i].of_fit || job_document_has_rows(c->doc));
 }
 
 status pipeline_run(struct pipeline_context *c, struct error *err)
@@ -93,11 +93,11 @@ status pipeline_run(struct pipeline_context *c, struct error *err)
     }
     c->progress = (struct progress){.report = report_fraction, .context = c, .cancel = worker_status_cancel(c->status)};
     for (size_t i = 0; i < n_stage; i++) {
-        if (is_skipped(c, i)) continue;
+        if (!pipeline_has_stage(c, i)) continue;
         if (stage_code[i].run == stage_fit) c->n_input_warning = worker_status_n_warning(c->status);
         bool loaded = false;
         for (size_t later = i; later < n_stage; later++)
-            if (!is_skipped(c, later)) pipeline_plan_stage(c, info[later].name, later);
+            if (pipeline_has_stage(c, later)) pipeline_plan_stage(c, info[later].name, later);
         c->stage_fraction = 0.0;
         worker_status_stage(c->status, info[i].name, info[i].title, i, n_stage);
         status s = do_stage(c, i, &earlier_ran, &loaded, err);

@@ -147,6 +147,7 @@ struct pipeline_context {
     struct progress progress;    /* of the running stage */
 
     struct job_document *doc;
+    bool resumed;                       /* an earlier attempt has left work of the same inputs */
     uint64_t fingerprint;               /* of the job document's text and this build of the program */
     struct environment *environment;    /* image of the surroundings; NULL: none */
     struct photograph_process process;  /* what is known of the camera */
@@ -180,6 +181,7 @@ struct pipeline_context {
     bool has_volume_scene;
     double stage_fraction;   /* of the running stage, as last reported */
     double fit_path;         /* that the fits are expected to take, with what follows them in their stage */
+    double usual_wall_s;     /* of the whole job, by the speeds of a common machine (job_need.h) */
     double stage_wall_s[16]; /* by index of the stage table; of this attempt, NaN for a stage that an earlier one did */
 };
 
@@ -187,9 +189,12 @@ void pipeline_context_init(struct pipeline_context *c);
 void pipeline_context_release(struct pipeline_context *c);
 
 /* Reads job.json and the observations: everything that can be wrong with them is found before the first stage. Here
- * and in pipeline_run err->field is a key of the job document. */
+ * and in pipeline_run err->field is a key of the job document. A folder whose lock is not held (lock_fd is -1) is only
+ * looked at: what an earlier run left in it stays. */
 status pipeline_read_inputs(struct pipeline_context *c, struct error *err);
 
+/* Whether this job has the stage with this index of the stage table. */
+bool pipeline_has_stage(const struct pipeline_context *c, size_t i);
 /* Runs all stages that are not done. memory: context of the caller with folder, status, log, pool filled in. */
 status pipeline_run(struct pipeline_context *c, struct error *err);
 
@@ -216,6 +221,8 @@ status pipeline_geometry_lost(const struct pipeline_context *c, const char *why,
 /* Adds a warning to the job's status, with the key of the option that it is about (base/option_id.h). context: a struct
  * pipeline_context. */
 void pipeline_warn(void *context, const char *option, const char *text);
+/* Voxels of the job's scan as its files state them; none of them is read. Errors as of volume_source_open_declared. */
+status pipeline_scan_size(const struct pipeline_context *c, size_t n[3], struct error *err);
 /* Makes sure that the density volume is in memory; reads it from its checkpoint if it was released. */
 status pipeline_need_volume(struct pipeline_context *c, struct error *err);
 /* Writes the path of a stage's checkpoint, JOB/work/<stage>/<name>, and makes its folder. */

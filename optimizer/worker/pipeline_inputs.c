@@ -21,6 +21,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 #include <zlib.h>
 
 enum { NAMED_PHOTOGRAPHS = 3 };
@@ -152,8 +153,13 @@ static status claim_inputs(struct pipeline_context *c, struct error *err)
 {
     struct input_sum input = {.pipeline = c};
     bool changed;
+    char before[WORKER_PATH_BYTES];
+    if (c->folder->lock_fd < 0) return STATUS_OK;
+    worker_folder_path(c->folder, JOB_FOLDER_WORK, WORKER_FILE_FINGERPRINT, before);
+    c->resumed = access(before, F_OK) == 0;
     job_document_visit_files(c->doc, add_input, &input);
     status s = worker_folder_claim_inputs(c->folder, c->fingerprint << 32 | input.sum, &changed, err);
+    c->resumed = c->resumed && !changed;
     if (s == STATUS_OK && changed)
         log_info(c->log, "the inputs, or the program, have changed since the last run: starting anew");
     return s;
@@ -247,6 +253,6 @@ status pipeline_read_inputs(struct pipeline_context *c, struct error *err)
 {
     status s = read_document(c, err);
     if (s == STATUS_OK) s = read_rows(c, err);
-    if (s == STATUS_OK) s = pipeline_adopt_geometry(c, err);
+    if (s == STATUS_OK && c->folder->lock_fd >= 0) s = pipeline_adopt_geometry(c, err);
     return job_option_name_field(s, err);
 }

@@ -170,7 +170,7 @@ status worker_folder_claim_inputs(const struct worker_folder *f, uint64_t finger
     char path[WORKER_PATH_BYTES], series[WORKER_PATH_BYTES], want[32], *have = NULL;
     size_t n = 0;
     snprintf(want, sizeof want, "%016" PRIx64 "\n", fingerprint);
-    worker_folder_path(f, JOB_FOLDER_WORK, "inputs.fingerprint", path);
+    worker_folder_path(f, JOB_FOLDER_WORK, WORKER_FILE_FINGERPRINT, path);
     *changed = false;
     if (file_read_all(path, 64, &have, &n, NULL) == STATUS_OK) {
         *changed = strcmp(have, want) != 0;

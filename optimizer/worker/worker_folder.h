@@ -8,6 +8,8 @@
 #include <stdint.h>
 
 enum { WORKER_PATH_BYTES = 4096 };
+/* In JOB/work: the fingerprint of the inputs of the last run. */
+#define WORKER_FILE_FINGERPRINT "inputs.fingerprint"
 
 struct worker_folder {
     char path[2048];

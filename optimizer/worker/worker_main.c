@@ -1,10 +1,13 @@
 /* selvedge-worker JOBDIR: one job from its folder to its results. Layout of the folder: optimizer/job/job_folder.h. */
+#include "base/files/disk_use.h"
 #include "base/log.h"
+#include "base/machine/process_use.h"
 #include "base/thread_pool.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/json/catalogue_json.h"
 #include "optimizer/worker/check/job_check.h"
 #include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/progress/job_need.h"
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/sandbox/worker_confine.h"
 
@@ -40,6 +43,9 @@ static const char usage[] =
     "  --quiet            log to JOBDIR/log.txt only\n"
     "  --check JOB.json   check the document and its files (in JOBDIR), and print all faults and warnings as JSON;\n"
     "                     exit status 1 when there are faults\n"
+    "  --plan             write nothing, and print what the job in JOBDIR is expected to take as JSON: time, "
+    "processor\n"
+    "                     time, memory and disk, by --speeds; exit status 1 when its inputs cannot be read\n"
     "  --no-links         refuse inputs that are links to files outside of JOBDIR, also in a folder made by hand\n"
     "  --catalogue        print the scattering models with their parameters, the descent methods and the codes that\n"
     "                     explain why a fit ended, as JSON\n"
@@ -54,7 +60,7 @@ struct arguments {
     const char *start;  /* name of this start; NULL: none */
     const char *check;  /* a document to check; NULL: the job is run */
     size_t n_thread, memory_mib, scratch_mib;
-    bool quiet, no_links;
+    bool quiet, no_links, plan;
     enum confine_mode sandbox;
     struct confinement confinement;
 };
@@ -87,6 +93,22 @@ static int print_check(const struct arguments *a)
     }
     bool good = json_array_size(json_object_get(report, "faults")) == 0;
     bool ok = json_dumpf(report, stdout, JSON_INDENT(1)) == 0 && putchar('\n') != EOF;
+    json_decref(report);
+    return good && ok ? WORKER_SUCCEEDED : WORKER_FAILED;
+}
+
+static int print_plan(const struct arguments *a)
+{
+    struct error err = {0};
+    json_t *report = NULL;
+    const struct job_need_machine machine = {
+        .n_thread = a->n_thread, .memory_limit_bytes = a->memory_mib << 20, .speeds = a->speeds};
+    if (job_need_report(a->folder, &machine, &report, &err) != STATUS_OK) {
+        fprintf(stderr, "selvedge-worker: %s\n", err.text);
+        return WORKER_USAGE;
+    }
+    bool good = json_is_null(json_object_get(report, "error"));
+    bool ok = json_dumpf(report, stdout, JSON_INDENT(1) | JSON_REAL_PRECISION(6)) == 0 && putchar('\n') != EOF;
     json_decref(report);
     return good && ok ? WORKER_SUCCEEDED : WORKER_FAILED;
 }
@@ -125,6 +147,7 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
                                            {"scratch-mib", required_argument, NULL, 'S'},
                                            {"speeds", required_argument, NULL, 's'},
                                            {"check", required_argument, NULL, 'k'},
+                                           {"plan", no_argument, NULL, 'p'},
                                            {"sandbox", required_argument, NULL, 'b'},
                                            {"confined", required_argument, NULL, 'C'},
                                            {"start", required_argument, NULL, 'N'},
@@ -142,7 +165,8 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
         if (c == 'q') a->quiet = true;
         if (c == 'l') a->no_links = true;
         if (c == '?') return fputs(usage, stderr) < 0 ? WORKER_FAILED : WORKER_USAGE;
-        if (c == 'q' || c == 'l' || take_value(c, optarg, a)) continue;
+        if (c == 'p') a->plan = true;
+        if (c == 'q' || c == 'l' || c == 'p' || take_value(c, optarg, a)) continue;
         fprintf(stderr, "selvedge-worker: '%s' is not an allowed value\n", optarg);
         return WORKER_USAGE;
     }
@@ -181,14 +205,19 @@ static void set_signals(void)
     signal(SIGPIPE, SIG_IGN);
 }
 
-/* Adds the speeds of this job to the file, which other jobs may have changed meanwhile. What fails is no error of the
- * job. */
+/* Adds what this job took to the file, which other jobs may have changed meanwhile. What fails is no error of the job.
+ * An attempt that went on from an earlier one took only a part of what the job needs. */
 static void remember_speeds(struct pipeline_context *c, const char *path)
 {
     struct speed_book book;
     struct error err = {0};
+    const struct process_use used = process_use();
+    const struct job_need took = {.cpu_s = used.cpu_s,
+                                  .memory_bytes = (double)used.peak_rss_bytes,
+                                  .disk_bytes = (double)disk_use_bytes(c->folder->path)};
     speed_book_read(path, &book);
     worker_status_remember(c->status, &book);
+    if (!c->resumed) job_need_remember(c, &took, &book);
     if (speed_book_write(path, &book, &err) != STATUS_OK) log_info(c->log, "%s", err.text);
 }
 
@@ -239,10 +268,11 @@ static status run_job(struct pipeline_context *c, const struct arguments *a, str
 {
     struct speed_book book = {.n = 0};
     if (a->speeds != NULL) speed_book_read(a->speeds, &book);
-    worker_status_speeds(c->status, &book);
     worker_status_stage(c->status, "volume", "Reading the job", 0, 8);
     status s = thread_pool_new(a->n_thread, &c->pool, err);
     if (s == STATUS_OK) s = pipeline_read_inputs(c, err);
+    if (s == STATUS_OK) job_need_begin(c);
+    worker_status_speeds(c->status, &book);
     if (s == STATUS_OK) s = pipeline_run(c, err);
     if (is_of_input(s)) name_other_faults(c, err);
     if (s != STATUS_OK) shorten_paths(c, err->text);
@@ -298,15 +328,27 @@ static status report_sandbox(struct pipeline_context *c, const struct arguments 
 static void enter_sandbox(struct arguments *a, char **argv, struct error *err)
 {
     struct confinement *c = &a->confinement;
-    const struct confine_files files = {
+    struct worker_folder job = {.lock_fd = -1};
+    char document[WORKER_PATH_BYTES], input[WORKER_PATH_BYTES];
+    struct confine_files files = {
         .folder = a->folder, .document = a->check, .speeds = a->speeds, .no_links = a->no_links};
+    if (a->plan) { /* which reads what a check reads */
+        snprintf(job.path, sizeof job.path, "%s", a->folder);
+        worker_folder_path(&job, JOB_FILE_DOCUMENT, NULL, document);
+        worker_folder_path(&job, JOB_FOLDER_INPUT, NULL, input);
+        files.folder = input;
+        files.document = document;
+    }
     if (a->sandbox == CONFINE_OFF) {
-        if (a->check == NULL) worker_prepare(a->folder, c);
+        if (files.document == NULL) worker_prepare(a->folder, c);
         return;
     }
     if (!c->executed && worker_confine(&files, argv, err) != STATUS_OK) return;
     confinement_complete(c, a->sandbox, err);
 }
+
+/* The job is not run. */
+static bool files_only(const struct arguments *a) { return a->check != NULL || a->plan; }
 
 int main(int argc, char **argv)
 {
@@ -318,11 +360,11 @@ int main(int argc, char **argv)
     int code = parse_arguments(argc, argv, &a);
     if (code >= 0) return code;
     enter_sandbox(&a, argv, &failed);
-    if (a.check != NULL && failed.code != STATUS_OK && a.sandbox == CONFINE_REQUIRED) {
+    if (files_only(&a) && failed.code != STATUS_OK && a.sandbox == CONFINE_REQUIRED) {
         fprintf(stderr, "selvedge-worker: %s\n", failed.text);
         return WORKER_USAGE;
     }
-    if (a.check != NULL) return print_check(&a);
+    if (files_only(&a)) return a.plan ? print_plan(&a) : print_check(&a);
     set_signals();
     status s = worker_folder_open(&folder, a.folder, &err);
     if (s == STATUS_OK && a.start != NULL && (s = worker_folder_claim(&folder, a.start, &err)) != STATUS_OK)

@@ -1,6 +1,7 @@
 #include "optimizer/worker/worker_status.h"
 #include "base/clock.h"
 #include "base/files/durable.h"
+#include "base/machine/process_use.h"
 #include "base/utf8.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/stage_table.h"
@@ -15,7 +16,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/resource.h>
 
 enum { MAX_WARNING = 50, WARNING_BYTES = 512, HEARTBEAT_MS = 400 };
 
@@ -57,12 +57,11 @@ static char *status_text(struct worker_status *st, const char *state, const stru
     struct job_clock_look look = job_clock_look(&st->clock, clock_monotonic_s());
     if (strcmp(state, "running") != 0) look.eta_s = look.eta_low_s = look.eta_high_s = NAN;
     if (strcmp(state, "succeeded") == 0) look.fraction = 1.0;
-    struct rusage usage;
-    getrusage(RUSAGE_SELF, &usage);
+    const struct process_use used = process_use();
     json_t *warnings = json_array();
     for (size_t i = 0; i < st->n_warning; i++) json_array_append_new(warnings, json_string(st->warning[i]));
     json_t *json = json_pack(
-        "{s:s, s:I, s:s, s:I, s:I, s:f, s:f, s:o, s:o, s:o, s:f, s:f, s:s, s:o, s:o, s:o, s:o, s:o, s:I}", "state",
+        "{s:s, s:I, s:s, s:I, s:I, s:f, s:f, s:o, s:o, s:o, s:f, s:f, s:s, s:o, s:o, s:o, s:o, s:o, s:I, s:f}", "state",
         state, "attempt", (json_int_t)st->folder->attempt, "stage", st->stage, "i_stage", (json_int_t)st->i_stage,
         "n_stage", (json_int_t)st->n_stage, "stage_fraction", st->clock.fraction, "fraction", look.fraction, "eta_s",
         json_number(look.eta_s), "eta_low_s", json_number(look.eta_low_s), "eta_high_s", json_number(look.eta_high_s),
@@ -70,7 +69,7 @@ static char *status_text(struct worker_status *st, const char *state, const stru
         st->has_objective ? json_number(st->objective) : json_null(), "objective_se",
         st->has_objective ? json_number(st->objective_se) : json_null(), "step",
         st->has_objective ? json_integer((json_int_t)st->step) : json_null(), "warnings", warnings, "error",
-        error_json(error), "peak_rss_bytes", (json_int_t)usage.ru_maxrss * 1024);
+        error_json(error), "peak_rss_bytes", (json_int_t)used.peak_rss_bytes, "cpu_s", used.cpu_s);
     if (json != NULL)
         json_object_set_new(json, "verdict", st->verdict != NULL ? json_incref(st->verdict) : json_null());
     char *text = json != NULL ? json_dumps(json, JSON_REAL_PRECISION(12)) : NULL;
@@ -116,8 +115,8 @@ static void *heartbeat(void *context)
     return NULL;
 }
 
-status worker_status_start(const struct worker_folder *folder, struct log *log, struct worker_status **out,
-                           struct error *err)
+status worker_status_new(const struct worker_folder *folder, struct log *log, struct worker_status **out,
+                         struct error *err)
 {
     struct worker_status *st = calloc(1, sizeof *st);
     if (st == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start the worker: out of memory");
@@ -130,9 +129,18 @@ status worker_status_start(const struct worker_folder *folder, struct log *log, 
     st->started_unix_s = clock_wall_s();
     snprintf(st->message, sizeof st->message, "starting");
     pthread_mutex_init(&st->mutex, NULL);
+    *out = st;
+    return STATUS_OK;
+}
+
+status worker_status_start(const struct worker_folder *folder, struct log *log, struct worker_status **out,
+                           struct error *err)
+{
+    struct worker_status *st;
+    status s = worker_status_new(folder, log, &st, err);
+    if (s != STATUS_OK) return s;
     if (pthread_create(&st->thread, NULL, heartbeat, st) != 0) {
-        pthread_mutex_destroy(&st->mutex);
-        free(st);
+        worker_status_free(st);
         return error_set(err, STATUS_NO_MEMORY, "cannot start the worker: no thread");
     }
     st->running = true;
@@ -209,6 +217,14 @@ void worker_status_plan_share(struct worker_status *st, size_t i_stage, const ch
     pthread_mutex_lock(&st->mutex);
     job_clock_plan_share(&st->clock, i_stage, key, share, i_of);
     pthread_mutex_unlock(&st->mutex);
+}
+
+struct job_clock_look worker_status_look(struct worker_status *st)
+{
+    pthread_mutex_lock(&st->mutex);
+    struct job_clock_look look = job_clock_look(&st->clock, clock_monotonic_s());
+    pthread_mutex_unlock(&st->mutex);
+    return look;
 }
 
 double worker_status_expected_s(struct worker_status *st, size_t i_stage)

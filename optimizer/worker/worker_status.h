@@ -14,7 +14,10 @@
 
 struct worker_status;
 
-/* Starts the thread. SIGTERM and SIGINT must be blocked in the caller (and so in all threads made later). */
+/* A status without the thread, which is written nowhere: for planning. STATUS_NO_MEMORY. */
+status worker_status_new(const struct worker_folder *folder, struct log *log, struct worker_status **st,
+                         struct error *err);
+/* The same with the thread. SIGTERM and SIGINT must be blocked in the caller (and so in all threads made later). */
 status worker_status_start(const struct worker_folder *folder, struct log *log, struct worker_status **st,
                            struct error *err);
 /* Writes the final state ("succeeded", "failed", "cancelled") durably and ends the thread; error only for "failed". A
@@ -33,6 +36,8 @@ void worker_status_speeds(struct worker_status *st, const struct speed_book *boo
 void worker_status_plan(struct worker_status *st, size_t i_stage, const struct job_clock_work *work);
 void worker_status_plan_own(struct worker_status *st, size_t i_stage, const char *key, double seconds);
 void worker_status_plan_share(struct worker_status *st, size_t i_stage, const char *key, double share, size_t i_of);
+/* Remaining time as it is told to readers. */
+struct job_clock_look worker_status_look(struct worker_status *st);
 double worker_status_expected_s(struct worker_status *st, size_t i_stage);
 /* Begins stage i_stage of n_stage, and ends it; loaded: an earlier attempt has done it. */
 void worker_status_stage(struct worker_status *st, const char *name, const char *title, size_t i_stage, size_t n_stage);

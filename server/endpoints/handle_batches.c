@@ -3,6 +3,7 @@
 #include "server/endpoints/request_json.h"
 #include "server/events/long_poll.h"
 #include "server/http/http_reply.h"
+#include "server/jobs/batches/batch_plan.h"
 #include "server/jobs/batches/batch_service.h"
 #include "server/jobs/batches/batch_view.h"
 
@@ -10,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LIST_MOST = 500, LIST_USUAL = 50, PRIORITY_MOST = 10 };
+enum { LIST_MOST = 500, LIST_USUAL = 50, PRIORITY_MOST = 10, CORE_MOST = 100000 };
 
 /* Reads a batch as a client sees it. */
 static status view_of(struct http_request *r, const char *id, json_t **view, struct error *err)
@@ -146,6 +147,22 @@ static void act(struct http_request *r, enum batch_action action)
 void handle_start_batch(struct http_request *r) { act(r, BATCH_START); }
 void handle_retry_batch(struct http_request *r) { act(r, BATCH_RETRY); }
 void handle_cancel_batch(struct http_request *r) { act(r, BATCH_CANCEL); }
+
+void handle_batch_plan(struct http_request *r)
+{
+    struct error err = {0};
+    struct batch_row row;
+    long long n_core;
+    json_t *plan = NULL;
+    if (!query_integer(r, "cores", 1, CORE_MOST, 0, &n_core)) return;
+    status s = batch_get(r->service, r->param[0], &row, &err);
+    if (s == STATUS_OK) s = batch_plan(r->service, &row, (size_t)n_core, &plan, &err);
+    batch_row_release(&row);
+    if (s == STATUS_OK)
+        reply_json(r, MHD_HTTP_OK, plan);
+    else
+        reply_problem(r, NULL, &err, NULL);
+}
 
 /* The table of results; NULL after a reply. */
 static json_t *results_of(struct http_request *r)

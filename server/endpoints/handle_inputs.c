@@ -58,6 +58,17 @@ void handle_check_job(struct http_request *r)
     if (report != NULL) reply_json(r, MHD_HTTP_OK, report);
 }
 
+void handle_plan_job(struct http_request *r)
+{
+    json_t *plan = NULL;
+    struct error err = {0};
+    struct job_refusal refusal = {0};
+    if (input_plan(r->service, r->param[0], &plan, &refusal, &err) == STATUS_OK)
+        reply_json(r, MHD_HTTP_OK, plan);
+    else
+        reply_problem(r, refusal.code, &err, NULL);
+}
+
 bool check_inputs(struct http_request *r)
 {
     struct error err = {0};

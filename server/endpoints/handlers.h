@@ -26,6 +26,7 @@ void handle_delete_batch(struct http_request *r);
 void handle_start_batch(struct http_request *r);
 void handle_retry_batch(struct http_request *r);
 void handle_cancel_batch(struct http_request *r);
+void handle_batch_plan(struct http_request *r);
 void handle_batch_results(struct http_request *r);
 void handle_batch_csv(struct http_request *r);
 /* handle_files.c */
@@ -36,6 +37,7 @@ void handle_delete_file(struct http_request *r);
 /* handle_inputs.c */
 void handle_check_document(struct http_request *r);
 void handle_check_job(struct http_request *r);
+void handle_plan_job(struct http_request *r);
 /* Judges the files of a job that is to be started. Returns false after deciding a reply: 422 with all faults, or why
  * they could not be judged. */
 bool check_inputs(struct http_request *r);

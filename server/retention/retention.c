@@ -1,17 +1,16 @@
 #include "server/retention/retention.h"
 #include "base/clock.h"
+#include "base/files/disk_use.h"
 #include "base/files/durable.h"
 #include "optimizer/job/job_document.h"
 #include "server/jobs/job_paths.h"
 #include "server/retention/job_keep.h"
 
-#include <fts.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
 #define DAY_S 86400.0
-enum { BLOCK_BYTES = 512 };
 
 const char *retention_reason_name(enum retention_reason reason)
 {
@@ -26,17 +25,9 @@ static bool has_ended(enum job_state state)
 
 static int64_t folder_bytes(const struct job_service *v, const char *id)
 {
-    char path[PATH_BYTES], *root[] = {path, NULL};
-    int64_t sum = 0;
+    char path[PATH_BYTES];
     path_join(path, v->settings->data, "jobs", id, NULL);
-    FTS *tree = fts_open(root, FTS_PHYSICAL | FTS_NOCHDIR, NULL);
-    if (tree == NULL) return 0;
-    for (FTSENT *e; (e = fts_read(tree)) != NULL;)
-        if (e->fts_info == FTS_F || e->fts_info == FTS_D)
-            sum += (int64_t)e->fts_statp->st_blocks * BLOCK_BYTES /
-                   (e->fts_info == FTS_F && e->fts_statp->st_nlink > 1 ? (int64_t)e->fts_statp->st_nlink : 1);
-    fts_close(tree);
-    return sum;
+    return disk_use_bytes(path);
 }
 
 /* ---- jobs whose geometry others ask for ---- */

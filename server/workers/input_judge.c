@@ -1,5 +1,6 @@
 #include "server/workers/input_judge.h"
 #include "base/clock.h"
+#include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
 #include "server/workers/supervisor.h"
@@ -13,7 +14,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-enum { MAX_REPORT_BYTES = 4 << 20, TURN_LIMIT_S = 30, LOOK_US = 20000 };
+enum { MAX_REPORT_BYTES = 4 << 20, MAX_PLAN_BYTES = 1 << 20, TURN_LIMIT_S = 30, LOOK_US = 20000 };
 
 /* Takes one of the places for checks, of which there are as many as workers. */
 static status take_turn(struct job_service *v, struct job_refusal *refusal, struct error *err)
@@ -55,7 +56,7 @@ static status wait_for(const struct job_service *v, pid_t pid, struct worker_end
     return s;
 }
 
-/* What the worker has written; NULL when that is no report. */
+/* What the worker has written; NULL when that is no JSON. */
 static json_t *read_report(int fd)
 {
     json_t *report = NULL;
@@ -64,10 +65,7 @@ static json_t *read_report(int fd)
     if (text != NULL && pread(fd, text, (size_t)n, 0) == (ssize_t)n)
         report = json_loadb(text, (size_t)n, JSON_REJECT_DUPLICATES, NULL);
     free(text);
-    if (json_is_array(json_object_get(report, "faults")) && json_is_array(json_object_get(report, "warnings")))
-        return report;
-    json_decref(report);
-    return NULL;
+    return report;
 }
 
 /* Takes the folder of the inputs out of the text: users know their files by their names alone. */
@@ -127,37 +125,163 @@ static json_t *finish(json_t *report, const char *folder)
     return out;
 }
 
+static bool is_judgement(const json_t *report)
+{
+    return json_is_array(json_object_get(report, "faults")) && json_is_array(json_object_get(report, "warnings"));
+}
+
+static bool is_plan(const json_t *report)
+{
+    return json_is_object(json_object_get(report, "error")) || json_is_number(json_object_get(report, "cpu_s"));
+}
+
+/* Waits for a worker that writes a report. *report is NULL where it wrote none. */
+static status ask(struct job_service *v, const struct worker_paths *paths, json_t **report, struct worker_end *end,
+                  struct job_refusal *refusal, struct error *err)
+{
+    pid_t pid;
+    status s = worker_launch(paths, v->settings, &pid, err);
+    if (s == STATUS_OK) s = wait_for(v, pid, end, refusal, err);
+    if (s == STATUS_OK && !end->by_signal) *report = read_report(paths->report_fd);
+    return s;
+}
+
 static status judge(struct job_service *v, const char *job_id, int fd, json_t **report, struct job_refusal *refusal,
                     struct error *err)
 {
     char job[PATH_BYTES], folder[PATH_BYTES], document[PATH_BYTES];
     struct worker_end end;
-    pid_t pid;
+    json_t *found = NULL;
     path_join(job, v->settings->data, "jobs", job_id, NULL);
     path_join(folder, job, JOB_FOLDER_INPUT, NULL);
     path_join(document, job, JOB_FILE_DOCUMENT, NULL);
     const struct worker_paths paths = {
         .program = supervisor_program(v->supervisor), .job_folder = folder, .document = document, .report_fd = fd};
-    status s = worker_launch(&paths, v->settings, &pid, err);
-    if (s == STATUS_OK) s = wait_for(v, pid, &end, refusal, err);
+    status s = ask(v, &paths, &found, &end, refusal, err);
+    if (s == STATUS_OK) *report = is_judgement(found) ? finish(found, folder) : report_of_death(&end);
+    if (s != STATUS_OK || !is_judgement(found)) json_decref(found);
     if (s != STATUS_OK) return s;
-    json_t *found = end.by_signal ? NULL : read_report(fd);
-    *report = found != NULL ? finish(found, folder) : report_of_death(&end);
     return *report != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot judge the files: out of memory");
+}
+
+/* A place for checks, and a file in memory for the report; the caller calls leave. *fd is -1 after an error. */
+static status enter(struct job_service *v, const char *job_id, int *fd, struct job_row *row,
+                    struct job_refusal *refusal, struct error *err)
+{
+    *fd = -1;
+    status s = job_look(v, job_id, row, err);
+    if (s == STATUS_OK && v->supervisor == NULL)
+        s = error_set(err, STATUS_INTERNAL, "cannot read the files: there are no workers");
+    if (s == STATUS_OK) s = take_turn(v, refusal, err);
+    if (s != STATUS_OK) return s;
+    *fd = memfd_create("report", MFD_CLOEXEC);
+    if (*fd >= 0) return STATUS_OK;
+    atomic_fetch_sub(&v->n_judging, 1);
+    return error_set_errno(err, "cannot read the files");
+}
+
+static void leave(struct job_service *v, int fd)
+{
+    close(fd);
+    atomic_fetch_sub(&v->n_judging, 1);
 }
 
 status input_judge(struct job_service *v, const char *job_id, json_t **report, struct job_refusal *refusal,
                    struct error *err)
 {
     struct job_row row;
-    status s = job_look(v, job_id, &row, err);
-    if (s == STATUS_OK && v->supervisor == NULL)
-        s = error_set(err, STATUS_INTERNAL, "cannot judge the files: there are no workers");
-    if (s == STATUS_OK) s = take_turn(v, refusal, err);
+    int fd;
+    status s = enter(v, job_id, &fd, &row, refusal, err);
     if (s != STATUS_OK) return s;
-    int fd = memfd_create("check", MFD_CLOEXEC);
-    s = fd >= 0 ? judge(v, job_id, fd, report, refusal, err) : error_set_errno(err, "cannot judge the files");
-    if (fd >= 0) close(fd);
-    atomic_fetch_sub(&v->n_judging, 1);
+    s = judge(v, job_id, fd, report, refusal, err);
+    leave(v, fd);
     return s;
+}
+
+/* ---- plans ---- */
+
+static status unreadable(const json_t *report, const struct worker_end *end, const char *folder, struct error *err)
+{
+    json_t *entry = json_object(), *fault = json_object_get(report, "error");
+    const char *field = json_string_value(json_object_get(fault, "field"));
+    if (fault == NULL) {
+        json_decref(entry);
+        return error_set(err, STATUS_INVALID, "the program that reads the files ended %s %d",
+                         end->by_signal ? "by signal" : "with status", end->code);
+    }
+    json_object_set(entry, "detail", json_object_get(fault, "text"));
+    shorten_detail(entry, folder);
+    const char *text = json_string_value(json_object_get(entry, "detail"));
+    error_set_field(err, STATUS_INVALID, field != NULL ? field : "", "%s", text != NULL ? text : "");
+    json_decref(entry);
+    return STATUS_INVALID;
+}
+
+static status keep_plan(const char *job, json_t *plan, struct error *err)
+{
+    char path[PATH_BYTES];
+    path_join(path, job, JOB_FILE_PLAN, NULL);
+    char *text = json_dumps(plan, JSON_INDENT(1) | JSON_REAL_PRECISION(12));
+    if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot plan the job: out of memory");
+    status s = durable_replace(path, text, strlen(text), err);
+    free(text);
+    return s;
+}
+
+static status plan_job(struct job_service *v, const struct job_row *row, int fd, json_t **plan,
+                       struct job_refusal *refusal, struct error *err)
+{
+    char job[PATH_BYTES], folder[PATH_BYTES], speeds[PATH_BYTES];
+    struct worker_end end;
+    json_t *found = NULL;
+    path_join(job, v->settings->data, "jobs", row->id, NULL);
+    path_join(folder, job, JOB_FOLDER_INPUT, NULL);
+    path_join(speeds, v->settings->data, "speeds.json", NULL);
+    const struct worker_paths paths = {.program = supervisor_program(v->supervisor),
+                                       .job_folder = job,
+                                       .speeds = speeds,
+                                       .plan = true,
+                                       .report_fd = fd};
+    status s = ask(v, &paths, &found, &end, refusal, err);
+    if (s == STATUS_OK && (!is_plan(found) || json_is_object(json_object_get(found, "error"))))
+        s = unreadable(found, &end, folder, err);
+    if (s == STATUS_OK) {
+        json_object_del(found, "error");
+        json_object_set_new(found, "planned_unix_s", json_real(clock_wall_s()));
+        json_object_set_new(found, "attempt", json_integer((json_int_t)row->attempt));
+        s = keep_plan(job, found, err);
+    }
+    if (s == STATUS_OK)
+        *plan = found;
+    else
+        json_decref(found);
+    return s;
+}
+
+status input_plan(struct job_service *v, const char *job_id, json_t **plan, struct job_refusal *refusal,
+                  struct error *err)
+{
+    struct job_row row;
+    int fd;
+    status s = enter(v, job_id, &fd, &row, refusal, err);
+    if (s != STATUS_OK) return s;
+    if (row.state == JOB_RUNNING || row.state == JOB_SUCCEEDED)
+        s = error_set(err, STATUS_CONFLICT, "a plan is made before a job runs, and this one %s",
+                      row.state == JOB_RUNNING ? "runs" : "has succeeded");
+    if (s == STATUS_OK) s = plan_job(v, &row, fd, plan, refusal, err);
+    leave(v, fd);
+    return s;
+}
+
+json_t *input_plan_read(const struct job_service *v, const char *job_id)
+{
+    char path[PATH_BYTES], *text = NULL;
+    size_t n = 0;
+    path_join(path, v->settings->data, "jobs", job_id, JOB_FILE_PLAN, NULL);
+    if (file_read_all(path, MAX_PLAN_BYTES, &text, &n, NULL) != STATUS_OK) return NULL;
+    json_t *plan = json_loadb(text, n, 0, NULL);
+    free(text);
+    if (json_is_number(json_object_get(plan, "cpu_s"))) return plan;
+    json_decref(plan);
+    return NULL;
 }

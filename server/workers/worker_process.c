@@ -114,7 +114,8 @@ void worker_arguments_set(struct worker_arguments *a, const struct worker_paths 
     for (size_t i = 0; i < sizeof always / sizeof *always; i++) add(a, always[i]);
     add(a, p->document != NULL ? "--check" : "--speeds");
     add(a, p->document != NULL ? p->document : p->speeds);
-    if (p->document != NULL) add(a, "--no-links");
+    if (p->plan) add(a, "--plan");
+    if (p->document != NULL || p->plan) add(a, "--no-links");
     if (threads > 0) {
         add(a, "--threads");
         add(a, a->threads);
@@ -143,13 +144,14 @@ status worker_launch(const struct worker_paths *paths, const struct settings *se
                         .parent = getpid()};
     snprintf(new.oom_score_adj, NUMBER_BYTES, "%lld", (long long)settings->oom_score_adj);
     if (new.null_fd < 0) return error_set_errno(err, "cannot open '/dev/null'");
-    if (paths->document != NULL)
+    const bool reports = paths->document != NULL || paths->plan;
+    if (reports)
         new.error_fd = open("/dev/null", O_WRONLY | O_CLOEXEC);
     else
         new.output_fd = new.error_fd =
             open(paths->console, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0600);
     if (new.error_fd < 0)
-        s = error_set_errno(err, "cannot write '%s'", paths->document != NULL ? "/dev/null" : paths->console);
+        s = error_set_errno(err, "cannot write '%s'", reports ? "/dev/null" : paths->console);
     else if ((*out = start(&new)) < 0)
         s = error_set_errno(err, "cannot start worker '%s'", paths->program);
     if (new.error_fd >= 0) close(new.error_fd);

@@ -16,8 +16,9 @@ struct worker_paths {
     const char *program, *job_folder;
     const char *console;  /* gets stdout and stderr, and is made new */
     const char *speeds;   /* of earlier jobs */
-    const char *document; /* a job document whose files in job_folder are judged; NULL: the job is run */
-    int report_fd;        /* gets what is found by a check, in place of console and speeds */
+    const char *document; /* a job document whose files in job_folder are judged; NULL: the job is run or planned */
+    bool plan;            /* the job is not run: what it is expected to take is told */
+    int report_fd;        /* gets what a check or a plan says, in place of the console */
     int64_t threads;      /* computing threads; 0: as the settings say */
 };
 

@@ -67,9 +67,10 @@ bench-service: | deps-test ## what the daemon costs: the list of jobs, other ans
 	@/usr/bin/python3 tests/bench/service/bench_service.py --build $(BUILD) $(SERVICE)
 
 # SAMPLES: of the batch (1000)
-bench-scale: | deps-test ## what a batch of 1,000 samples costs to submit and to dispatch, and the list of 10,000 queued jobs (three minutes)
+bench-scale: | deps-test ## what a batch of 1,000 samples costs to submit and to dispatch, the list of 10,000 queued jobs, and how far a plan is off (six minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/bin/selvedged >&2
 	@SELVEDGE_BUILD=$(BUILD) /usr/bin/python3 tests/bench/service/bench_scale.py $(SAMPLES)
+	@SELVEDGE_BUILD=$(BUILD) /usr/bin/python3 tests/bench/service/bench_plan.py
 
 EXPORTS_PYTHON := $(BUILD)/exports-python
 $(EXPORTS_PYTHON)/bin/packages-are-there:

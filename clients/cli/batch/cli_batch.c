@@ -51,19 +51,25 @@ static bool match(void *context, const json_t *batch)
     return true;
 }
 
-/* The path of the batch with this name, id or beginning of an id, and what follows it. */
-static status batch_path(struct cli *cli, const char *tail, char *path, size_t n_path, struct error *err)
+status cli_batch_path(struct cli *cli, const char *batch, const char *tail, char *path, size_t n_path,
+                      struct error *err)
 {
-    struct search f = {.text = cli->args->second};
-    if (f.text == NULL)
-        return error_set(err, STATUS_INVALID, "'selvedge batch %s' needs the name or the id of a batch",
-                         cli->args->operand);
+    struct search f = {.text = batch};
     status s = visit_batches(cli, match, &f, err);
     if (s != STATUS_OK) return s;
     if (f.n == 0) return error_set(err, STATUS_NOT_FOUND, "there is no batch '%s'", f.text);
     if (f.n > 1) return error_set(err, STATUS_INVALID, "there are several batches '%s'; give the id", f.text);
     snprintf(path, n_path, "/v1/batches/%.80s%s", f.id, tail);
     return STATUS_OK;
+}
+
+/* The path of the batch that follows the action. */
+static status batch_path(struct cli *cli, const char *tail, char *path, size_t n_path, struct error *err)
+{
+    if (cli->args->second == NULL)
+        return error_set(err, STATUS_INVALID, "'selvedge batch %s' needs the name or the id of a batch",
+                         cli->args->operand);
+    return cli_batch_path(cli, cli->args->second, tail, path, n_path, err);
 }
 
 /* One request about a batch, whose answer is printed. */

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Iterable, Mapping, Optional, Union
 
 from .documents import Document, DocumentOrPath, declaration, files_of, read_document
 from .job import Job
+from .transport import Problem
 
 if TYPE_CHECKING:
     from .client import Client
@@ -108,6 +109,25 @@ class Batch:
     def delete(self, *, jobs: bool) -> None:
         """Remove the batch, with its jobs or without."""
         self.client.request("DELETE", f"{self.path}?jobs={'delete' if jobs else 'keep'}", n_try=1).read()
+
+    def plan(self, cores: Optional[int] = None) -> dict[str, Any]:
+        """Return what the samples will take together: processor time, time on so many cores (default: those of the service's
+        workers), memory and disk, and for those that ran since they were planned what they took. Samples that have not
+        run are planned anew; `unplanned` has the reasons of those that cannot be, by sample."""
+        path = f"{self.path}/plan" + ("" if cores is None else f"?cores={cores}")
+        unplanned = {}
+        for one in self.client.request("GET", path).json()["samples"]:
+            if one["state"] in ("running", "succeeded"):
+                continue
+            try:
+                self.client.request("POST", f"/v1/jobs/{one['job']}/plan")
+            except Problem as e:
+                if e.status not in (404, 409, 422):
+                    raise
+                if e.status == 422:
+                    unplanned[one["sample"]] = str(e)
+        plan: dict[str, Any] = self.client.request("GET", path).json()
+        return dict(plan, unplanned=unplanned)
 
     def results(self) -> list[dict[str, Any]]:
         """Return the table of results: a dict for each sample, with parameters, standard errors, verdict and flags."""

@@ -200,7 +200,11 @@ static double remaining_s(const struct job_clock *c, double now_s, double *sd_s)
     return sum;
 }
 
-double job_clock_expected_s(const struct job_clock *c, size_t i) { return expected_s(c, &c->stage[i]); }
+double job_clock_expected_s(const struct job_clock *c, size_t i)
+{
+    const struct job_clock_stage *s = &c->stage[i];
+    return expected_s(c, s) * (s->i_of_plus_one > 0 ? expected_s(c, &c->stage[s->i_of_plus_one - 1]) : 1.0);
+}
 
 /* Time that the job has taken, with the expected time of what earlier attempts did. */
 static double taken_s(const struct job_clock *c, double now_s)

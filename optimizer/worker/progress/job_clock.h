@@ -67,7 +67,8 @@ void job_clock_plan_own(struct job_clock *c, size_t i, const char *key, double s
 /* The same, where the stage takes about a share of the time of the earlier stage i_of. */
 void job_clock_plan_share(struct job_clock *c, size_t i, const char *key, double share, size_t i_of);
 
-/* Seconds that a stage is expected to take by what is known without its own progress; 0 where it is not planned. */
+/* Seconds that a stage is expected to take by what is known without its own progress, also one that takes a share of
+ * another's time; 0 where it is not planned. */
 double job_clock_expected_s(const struct job_clock *c, size_t i);
 void job_clock_begin(struct job_clock *c, size_t i, double now_s);
 void job_clock_fraction(struct job_clock *c, double stage_fraction, double now_s);

@@ -56,8 +56,8 @@ static const double least_s = 0.05;
 /* Standard deviations of the logarithm of a time where no job has been run. */
 static const double sd_of_fit = 0.5, sd_of_rest = 0.5;
 
-/* Voxels of the scan: as read, or by the size of its files, which have one or two bytes a voxel. */
-static double n_voxel(const struct pipeline_context *c)
+/* By the size of the files one voxel has one or two bytes. */
+double pipeline_plan_voxels(const struct pipeline_context *c)
 {
     double n = (double)c->geometry.n[0] * (double)c->geometry.n[1] * (double)c->geometry.n[2];
     for (size_t i = 0; i < c->doc->n_volume_file && !(c->geometry.n[0] > 0); i++) {
@@ -85,7 +85,8 @@ static void plan_voxels(struct pipeline_context *c, size_t i, const struct voxel
 /* Voxels of material, of which there are fibers to trace. */
 static double n_material(const struct pipeline_context *c)
 {
-    return c->geometry.n_material_voxel > 0 ? (double)c->geometry.n_material_voxel : usual_material * n_voxel(c);
+    return c->geometry.n_material_voxel > 0 ? (double)c->geometry.n_material_voxel
+                                            : usual_material * pipeline_plan_voxels(c);
 }
 
 /* ---- the fit and what follows it ---- */
@@ -204,7 +205,7 @@ void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
 {
     const struct job_clock_work rest = {.key = name, .units = 1.0, .usual_s = least_s, .log_sd = sd_of_rest};
     if (strcmp(name, "volume") == 0)
-        plan_voxels(c, i, &read_stage, n_voxel(c));
+        plan_voxels(c, i, &read_stage, pipeline_plan_voxels(c));
     else if (strcmp(name, "orientation") == 0)
         plan_voxels(c, i, &orientation_stage, n_material(c));
     else if (strcmp(name, "fibers") == 0 && c->doc->has_volume)
@@ -218,7 +219,7 @@ void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
     else if (strcmp(name, "report") == 0 && job_document_pictures_only(c->doc))
         plan_pictures(c, i);
     else if (strcmp(name, "report") == 0 && job_document_geometry_only(c->doc))
-        plan_voxels(c, i, &report_stage, n_voxel(c));
+        plan_voxels(c, i, &report_stage, pipeline_plan_voxels(c));
     else if (strcmp(name, "report") == 0)
         plan_after_fit(c, i, i - 2,
                        result_renderings_paths(c, fit_paths(c)) + surface_pictures_paths(c) + twin_result_paths(c) +

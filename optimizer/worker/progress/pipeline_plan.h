@@ -8,6 +8,8 @@
 /* Plans stage i, of this name (stage_table.h), by what is known now: before the first stage by the job document and the
  * size of its files, later by what earlier stages have found. */
 void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i);
+/* Voxels of the scan: as read, or by the size of its files before. */
+double pipeline_plan_voxels(const struct pipeline_context *c);
 /* Light paths that the fit of one model of this job usually takes, by its rows and where they come from. */
 double pipeline_plan_usual_paths(const struct pipeline_context *c);
 /* Plans the stages after the fit anew, whose work depends on the paths of the fits: n_path have been traced, and the

@@ -14,6 +14,15 @@ import zlib
 if "--check" in sys.argv:
     print('{"faults": [], "warnings": [], "n_file": 0}')
     sys.exit(0)
+if "--plan" in sys.argv:
+    with open(os.path.join(sys.argv[-1], "job.json")) as f:
+        sample = json.load(f)["sample"]
+    if "unplanned" in sample:
+        print(json.dumps({"error": {"code": "format", "field": "volume.files", "text": "cannot read volume 'scan.tif'"}}))
+        sys.exit(1)
+    print(json.dumps({"error": None, "n_thread": 2, "wall_s": 10, "wall_low_s": 5, "wall_high_s": 20, "cpu_s": 16, "memory_bytes": 1e8,
+                      "disk_bytes": 5e6, "stages": [{"name": "fit", "wall_s": 10}]}))
+    sys.exit(0)
 
 job = sys.argv[-1]
 os.makedirs(os.path.join(job, "work"), exist_ok=True)
@@ -46,7 +55,7 @@ def say(state, fraction, error=None, clock_s=0):
         "state": state, "attempt": attempt, "stage": "fit", "i_stage": 5, "n_stage": 8, "stage_fraction": fraction,
         "fraction": fraction, "eta_s": 10 * (1 - fraction), "heartbeat_unix_s": time.time() + clock_s, "started_unix_s": time.time(),
         "message": f"run {run}", "objective": 1 - fraction, "objective_se": 0.01, "step": int(10 * fraction),
-        "warnings": ["a warning"] if fraction > 0 else [], "error": error, "peak_rss_bytes": 1000000}))
+        "warnings": ["a warning"] if fraction > 0 else [], "error": error, "peak_rss_bytes": 1000000, "cpu_s": 4.0}))
 
 
 def record(step):

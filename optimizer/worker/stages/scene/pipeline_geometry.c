@@ -49,27 +49,43 @@ static void set_options(const struct job_document *doc, struct reconstruct_optio
 
 /* ---- volume ---- */
 
+/* The files of the scan. One allocation holds the list and the paths; the caller frees it. NULL: out of memory. */
+static const char **scan_paths(const struct pipeline_context *c)
+{
+    const size_t n = c->doc->n_volume_file;
+    const char **path = malloc(n * (sizeof *path + WORKER_PATH_BYTES));
+    for (size_t i = 0; path != NULL && i < n; i++) {
+        char *text = (char *)(path + n) + i * WORKER_PATH_BYTES;
+        worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->volume_file[i], text);
+        path[i] = text;
+    }
+    return path;
+}
+
 static status read_volume(struct pipeline_context *c, struct error *err)
 {
-    size_t n = c->doc->n_volume_file;
-    char(*text)[WORKER_PATH_BYTES] = malloc(n * sizeof *text);
-    const char **path = malloc(n * sizeof *path);
-    status s = STATUS_OK;
-    if (text == NULL || path == NULL) {
-        s = error_set(err, STATUS_NO_MEMORY, "cannot read the volume: out of memory");
-        goto out;
-    }
-    for (size_t i = 0; i < n; i++) {
-        worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->volume_file[i], text[i]);
-        path[i] = text[i];
-    }
-    s = reconstruct_read(path, n, &c->option, c->space, c->pool, &c->progress, &c->volume, &c->geometry, err);
+    const char **path = scan_paths(c);
+    if (path == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the volume: out of memory");
+    status s = reconstruct_read(path, c->doc->n_volume_file, &c->option, c->space, c->pool, &c->progress, &c->volume,
+                                &c->geometry, err);
     if (s == STATUS_OK && scratch_file_bytes(c->space) > 0)
         log_info(c->log, "volume: beyond the memory setting of %zu MB, worked on in files",
                  c->memory_limit_bytes / 1000000);
-out:
     free(path);
-    free(text);
+    return s;
+}
+
+status pipeline_scan_size(const struct pipeline_context *c, size_t n[3], struct error *err)
+{
+    struct reconstruct_option option;
+    struct volume_source *source = NULL;
+    const char **path = scan_paths(c);
+    if (path == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the volume: out of memory");
+    set_options(c->doc, &option);
+    status s = volume_source_open_declared(path, c->doc->n_volume_file, &option.raw, &source, err);
+    if (s == STATUS_OK) memcpy(n, volume_source_describe(source)->n, 3 * sizeof *n);
+    volume_source_close(source);
+    free(path);
     return s;
 }
 

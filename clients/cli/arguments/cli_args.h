@@ -31,6 +31,7 @@ enum cli_command_id {
     CLI_UNKEEP,
     CLI_RETENTION,
     CLI_BATCH,
+    CLI_PLAN,
     CLI_N_COMMAND
 };
 
@@ -40,11 +41,12 @@ struct cli_args {
     const char *server, *token, *token_file; /* a token in a file goes before one of the environment */
     const char *
         operand; /* a job document for submit and check, a scan for reconstruct, a folder for watch-folder, a job id for
-                     the other commands, an action for token and batch */
+                     the other commands, an action for token and batch, a batch for plan */
     const char *second; /* the name that follows an action of token or batch, its template for batch submit, or a number
                            that follows an id */
     const char *third;  /* the table of batch submit */
     const char *files, *name; /* of a batch */
+    const char *cores;        /* --cores: of a plan */
     bool update, keep_jobs, delete_jobs;
     const char *input_dir; /* --input-dir: the folder of the files that the document names */
     const char *out_dir;   /* --out */

@@ -32,7 +32,8 @@ enum {
     OPT_YES = 67108864,
     OPT_PICTURE = 134217728, /* each of several */
     OPT_FILTER = 268435456,  /* each of several */
-    OPT_BATCH = 536870912    /* each of several */
+    OPT_BATCH = 536870912,   /* each of several */
+    OPT_CORES = 1073741824
 };
 #define OPT_EVERYWHERE (OPT_SERVER | OPT_TOKEN | OPT_HELP)
 

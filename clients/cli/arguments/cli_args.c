@@ -1,5 +1,6 @@
-#include "clients/cli/cli_args.h"
-#include "clients/cli/cli_option_bits.h"
+#include "clients/cli/arguments/cli_args.h"
+#include "clients/cli/arguments/cli_command_table.h"
+#include "clients/cli/arguments/cli_option_bits.h"
 #include "clients/cli/cli_text.h"
 #include "clients/cli/tools/cli_tool.h"
 
@@ -7,96 +8,6 @@
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
-
-static const struct cli_command {
-    const char *name, *operand, *what, *more;
-    int option;
-    const char *needs;  /* what the operand is, for the message when it is missing; NULL: a job id */
-    const char *second; /* a second operand that may follow; NULL: none */
-    const char *third;  /* the same after the second one */
-} command_table[CLI_N_COMMAND] = {
-    [CLI_SUBMIT] =
-        {"submit", "JOB.json", "send a job document and its files, and start the job",
-         "Every file that the document names is taken from the document's folder (or --input-dir), declared with\n"
-         "its SHA-256 and uploaded. An upload that breaks continues where it stopped; `selvedge submit --resume ID`\n"
-         "continues a submit that was interrupted. Prints the job's id on standard output.\n",
-         OPT_INPUT | OPT_WATCH | OPT_RESUME | OPT_DRAFT | OPT_ID_FILE, "a job document"},
-    [CLI_CHECK] =
-        {"check", "JOB.json", "check a job document and its files, without a server",
-         "Every file is opened and judged, and all faults are printed at once; nothing is uploaded. Files are taken\n"
-         "from the document's folder (or --input-dir). Exit status 1 when there are faults.\n",
-         OPT_INPUT | OPT_JSON, "a job document"},
-    [CLI_RECONSTRUCT] =
-        {"reconstruct", "SCAN", "trace the fibers of a scan, without photographs, and download the results",
-         "SCAN is a file (TIFF, .mhd, .mha, .nrrd, .nhdr, .vol) or a folder of TIFF slices. The job ends with the\n"
-         "geometry; a later job goes on from it (\"geometry\": {\"job\": ID} in its document). The results go to the\n"
-         "folder of --out (default: selvedge-ID).\n",
-         OPT_VOXEL | OPT_AXES | OPT_ALIGN | OPT_OUT | OPT_ID_FILE, "a scan"},
-    [CLI_RENDER] =
-        {"render", "ID", "show the cloth of a finished job on a surface, and download the picture",
-         "A job of its own renders the job's fibers with the fitted parameters, fiber by fiber. The results go to the\n"
-         "folder of --out (default: selvedge-ID): pictures/on-1.png, and on-1.exr with the radiance.\n",
-         OPT_PICTURE | OPT_OUT | OPT_ID_FILE},
-    [CLI_STATUS] = {"status", "ID", "show one job", "Exit status 0 whatever the job's state is.\n", OPT_JSON},
-    [CLI_WATCH] =
-        {"watch", "ID", "follow a job until it ends",
-         "A live progress line in a terminal, one line per change otherwise. Exit status 0 when the job succeeded,\n"
-         "1 when it failed, 3 when it was cancelled.\n",
-         0},
-    [CLI_LIST] = {"list", NULL, "list the jobs, newest first", "", OPT_JSON | OPT_FILTER},
-    [CLI_CANCEL] = {"cancel", "ID", "stop a job; its results so far are kept", "", 0},
-    [CLI_RETRY] = {"retry", "ID", "start a failed or cancelled job again from its last checkpoint", "", 0},
-    [CLI_RESULTS] =
-        {"results", "ID", "download the results",
-         "Files go to the folder of --out (default: selvedge-ID). A download that breaks continues where it stopped;\n"
-         "complete files are not downloaded again.\n",
-         OPT_OUT},
-    [CLI_VERSIONS] =
-        {"versions", "ID", "list the results of a job's earlier runs, or download one",
-         "A job that is edited and run again keeps its earlier results, each under the number of its run. With a\n"
-         "NUMBER its files go to the folder of --out (default: selvedge-ID-NUMBER).\n",
-         OPT_OUT | OPT_JSON, NULL, "NUMBER"},
-    [CLI_LOG] = {"log", "ID", "print the job's log", "", OPT_FOLLOW},
-    [CLI_SERIES] = {"series", "ID", "print the fit step by step: objective, residual, parameters (tab-separated)", "",
-                    OPT_JSON},
-    [CLI_DELETE] = {"delete", "ID", "remove a job and its files",
-                    "A running job is stopped first; its results are lost.\n", 0},
-    [CLI_WATCH_FOLDER] =
-        {"watch-folder", "DIR", "make a job of every sample folder that is put into DIR",
-         "A sample folder NAME is complete when it has the marker file, or has not changed for the quiet time. It "
-         "becomes\n"
-         "a job by its job.json or by the template; results, or the reason why there are none, are then in "
-         "NAME.selvedge\n"
-         "beside it. Runs until it is stopped; what is known is on disk, so it may be killed at any time.\n",
-         OPT_TEMPLATE | OPT_MARKER | OPT_QUIET | OPT_ONCE, "a folder"},
-    [CLI_TOKEN] =
-        {"token", "ACTION", "make, list or revoke access tokens",
-         "selvedge token make NAME --scope SCOPE    prints the token, which is shown only once (--out: into a file)\n"
-         "selvedge token list                       all tokens, newest first\n"
-         "selvedge token revoke NAME                or its id; the next request with it is refused\n"
-         "These need a token with scope admin; the first one is made by `selvedged --make-token NAME`.\n",
-         OPT_SCOPE | OPT_OWNER | OPT_REQUESTS | OPT_BYTES | OPT_JOBS | OPT_JSON | OPT_OUT, "make, list or revoke",
-         "NAME"},
-    [CLI_KEEP] = {"keep", "ID", "keep a job, whatever the limits of retention say", "", 0},
-    [CLI_UNKEEP] = {"unkeep", "ID", "take that back", "", 0},
-    [CLI_RETENTION] =
-        {"retention", NULL, "list the finished jobs that limits of age and size would remove; --yes removes them",
-         "Without options the limits are those of the service's settings. Only jobs that have ended are removed, but\n"
-         "not those that are kept (`selvedge keep ID`), nor those whose geometry an unfinished job asks for. With\n"
-         "--yes exactly the listed jobs are removed, and each is named.\n",
-         OPT_MAX_AGE | OPT_MAX_BYTES | OPT_YES | OPT_JSON},
-    [CLI_BATCH] =
-        {"batch", "ACTION", "run many samples with one template, or say how they are",
-         "selvedge batch submit TEMPLATE.json TABLE.csv    a job of each row; or a folder with a folder of each "
-         "sample\n"
-         "selvedge batch list\n"
-         "selvedge batch show|start|retry|cancel NAME      or its id; retry queues all that have failed\n"
-         "selvedge batch results NAME                      table of results as CSV (--json; --out FILE)\n"
-         "selvedge batch delete NAME --keep-jobs|--delete-jobs\n"
-         "docs/automation.md describes the table. Submitting a changed table with --update runs only what differs.\n",
-         OPT_BATCH | OPT_DRAFT | OPT_JSON | OPT_OUT,
-         "an action: submit, list, show, start, retry, cancel, results or delete", "NAME", "TABLE"},
-};
 
 static const struct cli_option {
     int bit;
@@ -183,6 +94,8 @@ static const struct cli_option {
     {OPT_BATCH, 0, "update", NULL, "make a batch of this name like the table", offsetof(struct cli_args, update)},
     {OPT_BATCH, 0, "keep-jobs", NULL, "delete the batch but none of its jobs", offsetof(struct cli_args, keep_jobs)},
     {OPT_BATCH, 0, "delete-jobs", NULL, "delete its jobs, too", offsetof(struct cli_args, delete_jobs)},
+    {OPT_CORES, 0, "cores", "N", "time on so many cores (default: those of the service's workers)",
+     offsetof(struct cli_args, cores)},
     {OPT_SERVER, 0, "server", "URL", "the daemon (default: SELVEDGE_SERVER or " CLI_DEFAULT_SERVER ")",
      offsetof(struct cli_args, server)},
     {OPT_TOKEN, 0, "token-file", "FILE", "file with the access token (default: SELVEDGE_TOKEN_FILE, SELVEDGE_TOKEN)",
@@ -194,25 +107,25 @@ enum { N_OPTION = sizeof option_table / sizeof option_table[0], OPTION_CODE = 25
 
 bool cli_operand_is_id(enum cli_command_id id)
 {
-    return command_table[id].operand != NULL && command_table[id].needs == NULL;
+    return cli_command_table[id].operand != NULL && cli_command_table[id].needs == NULL;
 }
 
 const char *cli_command_name(enum cli_command_id id)
 {
-    return (unsigned)id < CLI_N_COMMAND ? command_table[id].name : "?";
+    return (unsigned)id < CLI_N_COMMAND ? cli_command_table[id].name : "?";
 }
 
 static status find_command(const char *word, enum cli_command_id *id, struct error *err)
 {
     size_t best = 99;
     for (int i = 0; i < CLI_N_COMMAND; i++) {
-        size_t d = text_distance(word, command_table[i].name);
+        size_t d = text_distance(word, cli_command_table[i].name);
         if (d < best) best = d, *id = (enum cli_command_id)i;
     }
     if (best == 0) return STATUS_OK;
     if (best <= 2)
         return error_set(err, STATUS_INVALID, "unknown command '%s'; did you mean '%s'?", word,
-                         command_table[*id].name);
+                         cli_command_table[*id].name);
     return error_set(err, STATUS_INVALID, "unknown command '%s'; `selvedge --help` lists them", word);
 }
 
@@ -279,18 +192,18 @@ static status take_word(struct cli_args *a, const char *word, struct error *err)
         a->has_command = s == STATUS_OK;
         return s;
     }
-    if (a->operand != NULL && a->second == NULL && command_table[a->command].second != NULL) {
+    if (a->operand != NULL && a->second == NULL && cli_command_table[a->command].second != NULL) {
         a->second = word;
         return STATUS_OK;
     }
-    if (a->second != NULL && a->third == NULL && command_table[a->command].third != NULL) {
+    if (a->second != NULL && a->third == NULL && cli_command_table[a->command].third != NULL) {
         a->third = word;
         return STATUS_OK;
     }
     if (a->operand != NULL) {
-        const char *operand = command_table[a->command].operand;
+        const char *operand = cli_command_table[a->command].operand;
         return error_set(err, STATUS_INVALID, "'selvedge %s' takes one %s, but '%s' follows '%s'",
-                         command_table[a->command].name, operand == NULL ? "command" : operand, word, a->operand);
+                         cli_command_table[a->command].name, operand == NULL ? "command" : operand, word, a->operand);
     }
     a->operand = word;
     return STATUS_OK;
@@ -305,7 +218,7 @@ static bool is_given(const struct cli_args *a, const struct cli_option *o)
 /* Options and operands must belong to the command. */
 static status check(const struct cli_args *a, int given, struct error *err)
 {
-    const struct cli_command *c = &command_table[a->command];
+    const struct cli_command *c = &cli_command_table[a->command];
     int foreign = given & ~(c->option | OPT_EVERYWHERE | OPT_VERSION);
     for (size_t i = 0; i < N_OPTION; i++)
         if ((foreign & option_table[i].bit) != 0 && is_given(a, &option_table[i]))
@@ -376,7 +289,7 @@ void cli_help(const struct cli_args *args, char *text, size_t n_bytes)
 {
     size_t at = 0;
     if (args->has_command) {
-        const struct cli_command *c = &command_table[args->command];
+        const struct cli_command *c = &cli_command_table[args->command];
         put(text, n_bytes, &at, "usage: selvedge %s%s%s [options]\n\n%s%s.\n%s%s\noptions:\n", c->name,
             c->operand == NULL ? "" : " ", c->operand == NULL ? "" : c->operand, "", c->what,
             c->more[0] == '\0' ? "" : "\n", c->more);
@@ -388,7 +301,7 @@ void cli_help(const struct cli_args *args, char *text, size_t n_bytes)
         "usage: selvedge COMMAND [options]\n\ncommands:\n");
     for (int i = 0; i < CLI_N_COMMAND; i++) {
         char left[32];
-        const struct cli_command *c = &command_table[i];
+        const struct cli_command *c = &cli_command_table[i];
         snprintf(left, sizeof left, "%s %s", c->name, c->operand == NULL ? "" : c->operand);
         put(text, n_bytes, &at, "  %-18s %s\n", left, c->what);
     }

@@ -1,0 +1,135 @@
+/* selvedge plan BATCH: what the samples of a batch will take, and how far off that was. */
+#include "clients/cli/batch/cli_batch.h"
+#include "clients/cli/cli_text.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static const char *text_of(const json_t *object, const char *key)
+{
+    const char *text = json_string_value(json_object_get(object, key));
+    return text == NULL ? "" : text;
+}
+
+static double number_of(const json_t *object, const char *key)
+{
+    return json_number_value(json_object_get(object, key));
+}
+
+/* A job that has not begun, or that will begin anew. */
+static bool will_run(const json_t *sample)
+{
+    static const char *const state[] = {"draft", "queued", "failed", "cancelled", "paused"};
+    for (size_t i = 0; i < sizeof state / sizeof *state; i++)
+        if (strcmp(text_of(sample, "state"), state[i]) == 0) return true;
+    return false;
+}
+
+/* Has every sample planned that will run. Says on standard error which cannot be planned, and counts them. */
+static status plan_samples(struct cli *cli, const json_t *samples, size_t *n_failed, struct error *err)
+{
+    const json_t *one;
+    size_t i, n = json_array_size(samples);
+    json_array_foreach((json_t *)(uintptr_t)samples, i, one)
+    {
+        char path[200], sample[300], why[700];
+        struct error fault = {0};
+        if (!will_run(one)) continue;
+        snprintf(path, sizeof path, "/v1/jobs/%.80s/plan", text_of(one, "job"));
+        status s = http_json(cli->http, "POST", path, NULL, NULL, NULL, &fault);
+        if (s == STATUS_CONFLICT) continue; /* it has begun meanwhile */
+        if (s == STATUS_INVALID || s == STATUS_NOT_FOUND) {
+            text_clean(text_of(one, "sample"), sample, sizeof sample);
+            text_clean(fault.text, why, sizeof why);
+            fprintf(cli->note, "%s: cannot be planned: %s%s%s\n", sample, fault.field,
+                    fault.field[0] != '\0' ? ": " : "", why);
+            (*n_failed)++;
+        } else if (s != STATUS_OK) {
+            *err = fault;
+            return s;
+        }
+        if (cli->note_is_terminal)
+            fprintf(cli->note, "\rplanned %zu of %zu samples%s", i + 1, n, i + 1 < n ? "" : "\n");
+    }
+    return STATUS_OK;
+}
+
+static void print_needs(FILE *out, const char *label, const json_t *need)
+{
+    char memory[CLI_SHORT_TEXT], disk[CLI_SHORT_TEXT];
+    text_size(number_of(need, "memory_bytes"), memory);
+    text_size(number_of(need, "disk_bytes"), disk);
+    fprintf(out, "%-10s %.3g core hours, %s of memory, %s of disk\n", label, number_of(need, "cpu_s") / 3600.0, memory,
+            disk);
+}
+
+static void print_time(FILE *out, const json_t *plan, const json_t *expected)
+{
+    char likely[CLI_SHORT_TEXT], low[CLI_SHORT_TEXT], high[CLI_SHORT_TEXT];
+    const long long n_core = (long long)json_integer_value(json_object_get(plan, "n_core")),
+                    n_at_once = (long long)json_integer_value(json_object_get(expected, "n_at_once"));
+    text_duration(number_of(expected, "wall_s"), likely);
+    text_duration(number_of(expected, "wall_low_s"), low);
+    text_duration(number_of(expected, "wall_high_s"), high);
+    fprintf(out, "%-10s %s (%s to %s) on %lld core%s, %lld at a time\n", "time", likely, low, high, n_core,
+            n_core == 1 ? "" : "s", n_at_once);
+}
+
+static void print_ratio(FILE *out, const json_t *ratio)
+{
+    static const struct {
+        const char *key, *name;
+    } part[] = {{"cpu_s", "core hours"}, {"job_s", "time of jobs"}, {"memory_bytes", "memory"}, {"disk_bytes", "disk"}};
+    fprintf(out, "%-10s", "took over");
+    for (size_t i = 0; i < sizeof part / sizeof *part; i++)
+        if (json_is_number(json_object_get(ratio, part[i].key)))
+            fprintf(out, "%s %s %.2f", i == 0 ? "" : ",", part[i].name, number_of(ratio, part[i].key));
+    fprintf(out, "\n");
+}
+
+static void print_plan(struct cli *cli, const json_t *plan)
+{
+    char name[300];
+    FILE *out = cli->out;
+    const json_t *expected = json_object_get(plan, "expected"), *took = json_object_get(plan, "took"),
+                 *ratio = json_object_get(plan, "ratio");
+    const long long n_sample = (long long)json_integer_value(json_object_get(plan, "n_sample")),
+                    n_planned = (long long)json_integer_value(json_object_get(expected, "n")),
+                    n_took = (long long)json_integer_value(json_object_get(took, "n"));
+    text_clean(text_of(plan, "name"), name, sizeof name);
+    fprintf(out, "%-10s %s\n%-10s %lld, of which %lld are planned\n", "batch", name, "samples", n_sample, n_planned);
+    if (n_planned == 0) return;
+    print_needs(out, "expected", expected);
+    print_time(out, plan, expected);
+    if (n_took == 0) return;
+    fprintf(out, "%-10s %lld of these\n", "ended", n_took);
+    print_needs(out, "expected", json_object_get(plan, "expected_of_ended"));
+    print_needs(out, "took", took);
+    print_ratio(out, ratio);
+}
+
+status cli_plan(struct cli *cli, int *exit_code, struct error *err)
+{
+    char path[200], tail[60] = "/plan";
+    json_t *plan = NULL, *before = NULL;
+    size_t n_failed = 0;
+    if (cli->args->cores != NULL) {
+        char *end;
+        const unsigned long n = strtoul(cli->args->cores, &end, 10);
+        if (*end != '\0' || cli->args->cores[0] < '0' || cli->args->cores[0] > '9' || n == 0)
+            return error_set(err, STATUS_INVALID, "--cores: '%s' is no number of cores", cli->args->cores);
+        snprintf(tail, sizeof tail, "/plan?cores=%lu", n);
+    }
+    status s = cli_batch_path(cli, cli->args->operand, tail, path, sizeof path, err);
+    if (s == STATUS_OK) s = http_json(cli->http, "GET", path, NULL, NULL, &before, err);
+    if (s == STATUS_OK) s = plan_samples(cli, json_object_get(before, "samples"), &n_failed, err);
+    if (s == STATUS_OK) s = http_json(cli->http, "GET", path, NULL, NULL, &plan, err);
+    if (s == STATUS_OK && cli->args->json)
+        cli_print_json(plan, cli->out);
+    else if (s == STATUS_OK)
+        print_plan(cli, plan);
+    if (n_failed > 0) *exit_code = CLI_EXIT_ERROR;
+    json_decref(plan);
+    json_decref(before);
+    return s;
+}
