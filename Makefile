@@ -56,7 +56,7 @@ LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lseccomp -lraw_r -ljpeg -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive -lcurl $(LINK_BASE)
 
-.PHONY: all generate deps help check test nightly demo demo-camera night clean
+.PHONY: all generate deps help check test nightly demo demo-camera night cluster-demo clean
 ##@ Build and run
 all: $(PROGRAMS)   ## build the programs into build/bin
 
@@ -74,6 +74,11 @@ demo-camera: | deps ## the same from raw files of a simulated camera: noise, thr
 night: | deps      ## a night's run: ten synthetic samples in a watched folder (a few minutes; docs/automation.md)
 	@$(MAKE) --no-print-directory -j$$(nproc) all
 	@./clients/night.sh
+
+cluster-demo:      ## a batch of six samples on a Slurm of two virtual nodes started here, a worker killed, results compared (docs/cluster.md)
+	@./config/install-dependencies cluster
+	@$(MAKE) --no-print-directory -j$$(nproc) all
+	@/usr/bin/python3 tests/slurm/cluster_demo.py
 
 clean:             ## remove build/
 	rm -rf build

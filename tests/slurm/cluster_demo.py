@@ -1,0 +1,198 @@
+#!/usr/bin/python3
+"""make cluster-demo: a batch of six small samples on a Slurm of two virtual nodes, one worker killed in mid-fit, and every
+result compared bit by bit with that of the local backend. Everything is in a folder below build/, and is stopped at the
+end, also after Ctrl-C. Exit status 77: the packages are not installed."""
+import argparse
+import hashlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path.insert(0, os.path.join(os.path.dirname(HERE), "support", "python"))
+from daemon_under_test import BUILD, Daemon, program  # noqa: E402
+from fit_outcome import outcome  # noqa: E402
+from slurm_cluster import SlurmCluster, missing  # noqa: E402
+from small_cloth import TABLE, hair  # noqa: E402
+
+SKIPPED = 77
+N_SAMPLE = 6
+TEMPLATE = {"sample": "", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"},
+            "fit": {"model": "two_lobe.v1", "path_budget": 120000, "max_iterations": 8, "render_px": 8, "render_samples": 1, "seed": 7}}
+# files whose bytes have times in them: outcome() compares what else is in result.json, from which the pages are made
+WITH_TIMES = ("result.json", "report.json", ".html")
+
+
+def say(text):
+    print(text, flush=True)
+
+
+def make_samples(folder):
+    """A template, a table, and a folder of each sample: cloths of other radii and colours."""
+    os.makedirs(folder)
+    with open(os.path.join(folder, "template.json"), "w") as f:
+        json.dump(TEMPLATE, f)
+    with open(os.path.join(folder, "week.csv"), "w") as f:
+        f.write("sample\n" + "".join(f"cloth {i + 1}\n" for i in range(N_SAMPLE)))
+    for i in range(N_SAMPLE):
+        sample = os.path.join(folder, f"cloth {i + 1}")
+        os.makedirs(sample)
+        with open(os.path.join(sample, "cloth.hair"), "wb") as f:
+            f.write(hair(radius_mm=0.007 + 0.0004 * i))
+        head, *rows = TABLE.splitlines()[1:]
+        with open(os.path.join(sample, "rows.csv"), "w") as f:
+            f.write(head + "\n")
+            for row in rows:
+                cells = row.split(",")
+                f.write(",".join(cells[:6] + [f"{float(c) * (0.8 + 0.06 * i):.5f}" for c in cells[6:]]) + "\n")
+    return folder
+
+
+class Batch:
+    """The batch on one daemon."""
+
+    def __init__(self, daemon, samples):
+        self.daemon = daemon
+        self.cli("submit", os.path.join(samples, "template.json"), os.path.join(samples, "week.csv"))
+        jobs = daemon.get("/v1/jobs", params={"limit": 100}).json()["jobs"]
+        self.job = {j["sample"]: j["id"] for j in jobs}
+        assert len(self.job) == N_SAMPLE, self.job
+
+    def cli(self, *arguments):
+        done = subprocess.run([program("selvedge"), "batch", *arguments, "--server", self.daemon.url], capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise RuntimeError(f"selvedge batch {arguments[0]}: {done.stdout}{done.stderr}")
+        return done.stdout
+
+    def folder(self, sample):
+        return os.path.join(self.daemon.data, "jobs", self.job[sample])
+
+    def wait(self, patience_s=300):
+        """Waits for the end of all jobs; returns them, {sample: job}."""
+        end = time.monotonic() + patience_s
+        while time.monotonic() < end:
+            jobs = {s: self.daemon.get(f"/v1/jobs/{j}").json() for s, j in self.job.items()}
+            if all(j["state"] in ("succeeded", "failed", "cancelled") for j in jobs.values()):
+                for sample, job in jobs.items():
+                    if job["state"] != "succeeded":
+                        raise RuntimeError(f"'{sample}' is {job['state']}: {job['error']}")
+                return jobs
+            time.sleep(0.1)
+        raise RuntimeError("the batch did not end")
+
+    def results(self, sample):
+        """(result and series without times, {file: SHA-256})."""
+        top, sums = os.path.join(self.folder(sample), "results"), {}
+        for folder, _, names in os.walk(top):
+            for name in names:
+                path = os.path.join(folder, name)
+                if not name.endswith(WITH_TIMES):
+                    with open(path, "rb") as f:
+                        sums[os.path.relpath(path, top)] = hashlib.sha256(f.read()).hexdigest()
+        return outcome(self.folder(sample)), sums
+
+
+def kill_a_worker(batch, cluster):
+    """Kills the worker of the first sample whose fit has made a step; returns (sample, steps, its Slurm job)."""
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
+        for pid in cluster.strays():
+            try:
+                with open(f"/proc/{pid}/cmdline", "rb") as f:
+                    folder = f.read().rstrip(b"\0").split(b"\0")[-1].decode()
+                sample = next((s for s in batch.job if batch.folder(s) == folder), None)
+                with open(os.path.join(folder, "series.rec")) as f:
+                    steps = len(f.read().splitlines())
+                if sample is None or steps < 1:
+                    continue
+                os.kill(pid, signal.SIGKILL)
+                with open(os.path.join(folder, "backend.json")) as f:
+                    return sample, steps, json.load(f)["id"]
+            except (OSError, ProcessLookupError):
+                continue
+        time.sleep(0.01)
+    raise RuntimeError("no worker was seen in mid-fit")
+
+
+def on_cluster(folder, samples, options):
+    with SlurmCluster(os.path.join(folder, "cluster")) as cluster:
+        say(f"Slurm {cluster.run('sinfo', '--version').split()[-1]} with nodes {', '.join(cluster.nodes)}")
+        settings = cluster.options(**{"slurm.memory_bytes": 0, **options})
+        with Daemon(os.path.join(folder, "slurm"), worker=program("selvedge-worker"), options=settings, environment=cluster.environment) as daemon:
+            batch = Batch(daemon, samples)
+            sample, steps, number = kill_a_worker(batch, cluster)
+            say(f"killed the worker of '{sample}' (Slurm job {number}) after {steps} step(s) of its fit")
+            jobs = batch.wait()
+            if jobs[sample]["attempt"] != 2 or jobs[sample]["lost_attempts"] != 1:
+                raise RuntimeError(f"the killed job has {jobs[sample]['attempt']} attempts")
+            say(cluster.run("squeue", "--states=all", "--sort=i", "--format=%.6i %.20j %.10T %.6N").rstrip())
+            return {s: batch.results(s) for s in jobs}
+
+
+def on_this_machine(folder, samples, options):
+    with Daemon(os.path.join(folder, "local"), worker=program("selvedge-worker"), options={"jobs.workers": 2, "jobs.threads": 1, **options}) as daemon:
+        batch = Batch(daemon, samples)
+        jobs = batch.wait()
+        for line in batch.cli("results", "week").splitlines():
+            say("  " + " ".join(f"{cell:.22s}".ljust(16) for cell in (line.split(",")[i] for i in (0, 2, 3, 4, 5, 7))))
+        return {s: batch.results(s) for s in jobs}
+
+
+def run(folder, options):
+    """Returns the number of samples whose results differ."""
+    samples, start = make_samples(os.path.join(folder, "samples")), time.monotonic()
+    cluster = on_cluster(folder, samples, options)
+    middle = time.monotonic()
+    local = on_this_machine(folder, samples, options)
+    n_other = 0
+    for sample in sorted(cluster):
+        same = cluster[sample] == local[sample]
+        n_other += not same
+        say(f"{'same ' if same else 'OTHER'} {sample}: objective {local[sample][0][0]['models'][0]['objective']!r}, {len(local[sample][0][1])} steps, "
+            f"{len(local[sample][1])} further files")
+    say(f"{len(cluster) - n_other} of {len(cluster)} samples have the same results bit by bit; cluster {middle - start:.1f} s with its start, "
+        f"this machine {time.monotonic() - middle:.1f} s")
+    return n_other
+
+
+def stop(number, unused):
+    raise SystemExit(128 + number)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="a setting of both daemons")
+    parser.add_argument("--keep", action="store_true", help="keep the folder")
+    arguments = parser.parse_args()
+    reason = missing()
+    if reason:
+        say(f"cluster-demo is skipped: {reason}")
+        return SKIPPED
+    signal.signal(signal.SIGTERM, stop)
+    signal.signal(signal.SIGHUP, stop)
+    folder = tempfile.mkdtemp(prefix="cluster-demo-", dir=BUILD)
+    try:
+        n_other = run(folder, dict(pair.split("=", 1) for pair in arguments.set))
+        arguments.keep = arguments.keep or n_other > 0
+        return 1 if n_other else 0
+    except KeyboardInterrupt:
+        say("stopped")
+        return 130
+    except Exception as e:  # the folder tells more than a traceback
+        arguments.keep = True
+        say(f"error: {type(e).__name__}: {e}")
+        return 1
+    finally:
+        if arguments.keep:
+            say(f"the folder is kept: {folder}")
+        else:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
