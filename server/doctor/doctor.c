@@ -10,6 +10,7 @@ status doctor_run(const struct settings *settings, const char *worker, const cha
     } else {
         doctor_examine_machine(&d);
         doctor_examine_service(&d);
+        doctor_examine_cluster(&d);
     }
     fprintf(out, "%d ok, %d notes, %d faults\n", d.n[DOCTOR_OK], d.n[DOCTOR_NOTE], d.n[DOCTOR_FAULT]);
     fflush(out);

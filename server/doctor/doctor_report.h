@@ -28,6 +28,8 @@ status doctor_execute(char *const *argv, char *text, size_t n_text, int *code, s
 void doctor_examine_machine(struct doctor *d);
 /* Data folder, disk, database, backups, secrets, the worker and its sandbox, dashboard. */
 void doctor_examine_service(struct doctor *d);
+/* With jobs.backend = slurm: whether it takes jobs. */
+void doctor_examine_cluster(struct doctor *d);
 /* A job by its id or by the path of its folder. STATUS_NOT_FOUND. */
 status doctor_examine_job(struct doctor *d, const char *job, struct error *err);
 

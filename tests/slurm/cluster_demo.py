@@ -25,7 +25,7 @@ N_SAMPLE = 6
 TEMPLATE = {"sample": "", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"},
             "fit": {"model": "two_lobe.v1", "path_budget": 120000, "max_iterations": 8, "render_px": 8, "render_samples": 1, "seed": 7}}
 # files whose bytes have times in them: outcome() compares what else is in result.json, from which the pages are made
-WITH_TIMES = ("result.json", "report.json", ".html")
+WITH_TIMES = ("result.json", "report.json", "summary.txt", ".html")
 
 
 def say(text):
@@ -86,19 +86,24 @@ class Batch:
         raise RuntimeError("the batch did not end")
 
     def results(self, sample):
+        return self.results_of(self.folder(sample))
+
+    @staticmethod
+    def results_of(job):
         """(result and series without times, {file: SHA-256})."""
-        top, sums = os.path.join(self.folder(sample), "results"), {}
+        top, sums = os.path.join(job, "results"), {}
         for folder, _, names in os.walk(top):
             for name in names:
                 path = os.path.join(folder, name)
                 if not name.endswith(WITH_TIMES):
                     with open(path, "rb") as f:
                         sums[os.path.relpath(path, top)] = hashlib.sha256(f.read()).hexdigest()
-        return outcome(self.folder(sample)), sums
+        return outcome(job), sums
 
 
-def kill_a_worker(batch, cluster):
-    """Kills the worker of the first sample whose fit has made a step; returns (sample, steps, its Slurm job)."""
+def kill_a_worker(batch, cluster, instead=None):
+    """Kills the worker of the first sample whose fit has made a step, or calls instead(its Slurm job); returns (sample,
+    steps, its Slurm job)."""
     end = time.monotonic() + 60
     while time.monotonic() < end:
         for pid in cluster.strays():
@@ -110,9 +115,13 @@ def kill_a_worker(batch, cluster):
                     steps = len(f.read().splitlines())
                 if sample is None or steps < 1:
                     continue
-                os.kill(pid, signal.SIGKILL)
                 with open(os.path.join(folder, "backend.json")) as f:
-                    return sample, steps, json.load(f)["id"]
+                    number = json.load(f)["id"]
+                if instead is None:
+                    os.kill(pid, signal.SIGKILL)
+                else:
+                    instead(number)
+                return sample, steps, number
             except (OSError, ProcessLookupError):
                 continue
         time.sleep(0.01)

@@ -6,7 +6,7 @@ import signal
 import time
 
 import pytest
-from daemon_under_test import document, wait_until
+from daemon_under_test import Daemon, document, selvedged, wait_until
 
 
 def slurm_id(daemon, job):
@@ -123,6 +123,28 @@ def test_slurm_refuses_a_job(daemon_maker):
     assert error["code"] == "backend_refused" and "Memory specification can not be satisfied" in error["text"]
 
 
+def test_the_doctor_asks_slurm(daemon_maker, cluster, tmp_path, monkeypatch):
+    for name, value in cluster.environment.items():
+        monkeypatch.setenv(name, value)
+    options = [f"--set={key}={value}" for key, value in cluster.options().items()]
+    told = selvedged(tmp_path / "data", *options, "--doctor")
+    assert re.search(r"ok +cluster +Slurm would take a job of 1 cores and 600 MiB\n", told)
+    before = cluster.jobs()
+    told = selvedged(tmp_path / "data", *options, "--set=slurm.partition=nowhere", "--doctor", expect=1)
+    assert re.search(r"FAULT +cluster .*invalid partition specified: nowhere", told)
+    told = selvedged(tmp_path / "data", *options, "--set=slurm.commands=/nowhere", "--doctor", expect=1)
+    assert re.search(r"FAULT +cluster .*there is no program '/nowhere/sbatch'", told)
+    assert cluster.jobs() == before
+
+
+def test_settings_that_slurm_cannot_have(cluster, tmp_path):
+    for key, value, text in [("slurm.extra_arguments", "--array=1-9", "'--array=1-9'"), ("slurm.commands", "/nowhere", "/nowhere/sbatch"),
+                             ("slurm.account", "a b", "'a b'")]:
+        options = dict(cluster.options(), **{key: value})
+        with pytest.raises(AssertionError, match="(?s)did not start.*" + re.escape(text)):
+            Daemon(tmp_path / "data", options=options, environment=cluster.environment).start()
+
+
 def test_jobs_stay_queued_while_slurm_is_away(daemon_maker, cluster):
     d = daemon_maker()
     running = d.start_job("work 1")
@@ -191,6 +213,14 @@ def test_a_lost_node(daemon_maker, cluster):
         assert "its node was lost" in d.log_text()
     finally:
         cluster.start_node(node)
+
+
+def test_a_job_longer_than_the_time_limit_goes_on(daemon_maker):
+    """Slurm sends its signal up to a minute early, here soon after the start."""
+    d = daemon_maker(options={"slurm.time_limit_s": 120, "slurm.warn_s": 100})
+    done = d.wait_state(d.start_job("step_once"), "succeeded", timeout_s=200)
+    assert done["attempt"] == 2 and done["lost_attempts"] == 0 and done["result"]["run"] == 2
+    assert "Slurm has asked it to stop, and it has written a checkpoint" in d.log_text()
 
 
 @pytest.mark.parametrize("behaviour", ["work_once", "ignore_term"])

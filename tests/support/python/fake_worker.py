@@ -146,6 +146,11 @@ elif behaviour == "climb":  # makes progress until it is stopped
     for i in range(100000):
         say("running", min(0.9, 0.1 + 1e-3 * i))
         time.sleep(0.2)
+elif behaviour == "step_once":  # makes steps until it is stopped; the next run succeeds
+    for step in range(100000 if run == 1 else 0):
+        record(step)
+        work(0.2)
+    finish()
 elif behaviour == "work_once":  # until it is killed; the next run succeeds
     if run == 1:
         work(3600)

@@ -1,0 +1,50 @@
+"""Real jobs on the cluster of make cluster-demo, and the demo when it is interrupted."""
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from cluster_demo import Batch, kill_a_worker, make_samples
+from daemon_under_test import BUILD, ROOT, program, wait_until
+
+DEMO = os.path.join(ROOT, "tests", "slurm", "cluster_demo.py")
+
+
+def test_a_worker_that_slurm_stops_goes_on_with_the_same_numbers(cluster, daemon_maker, tmp_path):
+    """The signal that Slurm sends before the time limit, or before it gives a node away."""
+    d = daemon_maker(worker=program("selvedge-worker"), options={"slurm.memory_bytes": 0})
+    batch = Batch(d, make_samples(str(tmp_path / "samples")))
+    sample, _, number = kill_a_worker(batch, cluster, lambda number: cluster.run("scancel", "--batch", "--signal=TERM", number))
+    jobs = batch.wait()
+    assert jobs[sample]["attempt"] == 2 and jobs[sample]["lost_attempts"] == 0
+    with open(os.path.join(batch.folder(sample), "log.txt")) as f:
+        assert "cancelled" in f.read()
+    alone = tmp_path / "alone"
+    os.makedirs(alone)
+    for name in ("job.json", "input"):
+        subprocess.run(["cp", "-r", os.path.join(batch.folder(sample), name), alone], check=True)
+    subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "1", str(alone)], check=True)
+    assert batch.results(sample) == batch.results_of(str(alone))
+    assert cluster.jobs()[number] == "FAILED"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_demo_leaves_nothing(cluster, number):
+    before = set(os.listdir(BUILD))
+    demo = subprocess.Popen([sys.executable, DEMO], stdout=subprocess.PIPE, text=True, start_new_session=True)
+    folder = wait_until(lambda: [n for n in os.listdir(BUILD) if n.startswith("cluster-demo-") and n not in before])[0]
+    wait_until(lambda: os.path.exists(os.path.join(BUILD, folder, "slurm", "jobs")))
+    time.sleep(1)
+    os.killpg(demo.pid, number)  # as Ctrl-C in a terminal does
+    demo.communicate(timeout=60)
+    assert demo.returncode == 128 + number
+    assert set(os.listdir(BUILD)) == before
+    mark = f"/{folder}/".encode()
+    for pid in filter(str.isdigit, os.listdir("/proc")):
+        try:
+            with open(f"/proc/{pid}/cmdline", "rb") as line, open(f"/proc/{pid}/environ", "rb") as environment:
+                assert mark not in line.read() + environment.read(), f"process {pid} is left"
+        except OSError:
+            continue
