@@ -38,7 +38,8 @@ CXXFLAGS_ALL := -std=c++17 -pthread $(COMMON) $(WARN) $(CXXFLAGS)
 
 # every *_main.c is a program; everything else in its part goes into the part's library
 MAINS := $(shell find base geometry renderer optimizer server clients -name '*_main.c' 2>/dev/null)
-srcs = $(filter-out %_main.c,$(shell find $(1) -name '*.c' -o -name '*.cpp' 2>/dev/null | sort))
+# every *_plugin.c is a shared object, which is built where its library is
+srcs = $(filter-out %_main.c %_plugin.c,$(shell find $(1) -name '*.c' -o -name '*.cpp' 2>/dev/null | sort))
 objs = $(patsubst %,$(BUILD)/obj/%.o,$(1))
 PARTS := base geometry renderer job optimizer server
 folder_base := base
@@ -50,6 +51,7 @@ folder_server := server
 LIBS := $(foreach p,$(PARTS),$(BUILD)/lib/lib$(p).a)
 
 PROGRAMS := $(BUILD)/bin/selvedge $(BUILD)/bin/selvedged $(BUILD)/bin/selvedge-worker $(BUILD)/bin/selvedge-phantom $(BUILD)/bin/selvedge-camera
+PLUGINS := $(if $(shell pkg-config --exists libpq 2>/dev/null && echo yes),$(BUILD)/lib/selvedge-postgresql.so)
 LINK_BASE := -lz -lm -pthread -Wl,--undefined=processor_required
 LINK_GEOMETRY := $(shell pkg-config --libs libtiff-4 libzstd 2>/dev/null) -Wl,--as-needed -lopencv_mcc -lopencv_aruco -Wl,--no-as-needed -lopencv_imgproc -lopencv_core -lstdc++ $(LINK_BASE)
 LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng $(LINK_GEOMETRY)
@@ -58,7 +60,7 @@ LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive
 
 .PHONY: all generate deps help check test nightly demo demo-camera night cluster-demo clean
 ##@ Build and run
-all: $(PROGRAMS)   ## build the programs into build/bin
+all: $(PROGRAMS) $(PLUGINS) ## build the programs into build/bin
 
 deps:              ## install the Debian packages that are missing (as root or through sudo)
 	@./config/install-dependencies build
@@ -122,6 +124,14 @@ $(BUILD)/bin/selvedge-camera: $(BUILD)/obj/optimizer/camera/camera_main.c.o $(L)
 $(BUILD)/bin/selvedged: $(BUILD)/obj/server/daemon_main.c.o $(L)server.a $(L)job.a $(L)base.a
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_SERVER)
+# nothing but the daemon, when its settings ask for it, loads libpq
+$(BUILD)/lib/selvedge-postgresql.so: $(addprefix $(BUILD)/obj/shared/,server/store/drivers/plugin/postgres_plugin.c.o base/utf8.c.o)
+	@mkdir -p $(@D)
+	$(CC) $(LDFLAGS) -shared -Wl,--exclude-libs,ALL -o $@ $^ -lpq
+$(BUILD)/obj/shared/%.c.o: %.c
+	@mkdir -p $(@D)
+	@echo "  CC   $<"
+	@$(CC) $(CFLAGS_ALL) -fPIC $(shell pkg-config --cflags libpq 2>/dev/null | sed 's/-I/-isystem /g') -MMD -MP -c $< -o $@
 $(BUILD)/bin/selvedge: $(call objs,$(shell find clients/cli -name '*.c' 2>/dev/null)) $(L)base.a
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ -lcurl -ljansson -lsodium $(LINK_BASE)

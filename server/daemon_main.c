@@ -3,6 +3,7 @@
 #include "base/files/durable.h"
 #include "base/version.h"
 #include "server/access/first_token.h"
+#include "server/cluster/store_settings.h"
 #include "server/events/webhook.h"
 #include "server/http/http_server.h"
 #include "server/http/static_files.h"
@@ -12,6 +13,7 @@
 #include "server/rescue/rebuild.h"
 #include "server/rescue/rescue_commands.h"
 #include "server/retention/retention_watch.h"
+#include "server/store/store_cluster.h"
 #include "server/workers/supervisor.h"
 
 #include <errno.h>
@@ -148,8 +150,9 @@ static status check_owner(const struct settings *s, struct error *err)
     return STATUS_OK;
 }
 
-/* tries: how often another process may be found to hold the lock; STATUS_CONFLICT after that. */
-static status lock_data(const struct settings *s, int tries, int *fd, struct error *err)
+/* lock: LOCK_EX, or LOCK_SH of daemons that share a database. tries: how often another process may be found to hold it;
+ * STATUS_CONFLICT after that. */
+static status lock_data(const struct settings *s, int lock, int tries, int *fd, struct error *err)
 {
     char path[PATH_BYTES];
     status r = durable_make_folder(s->data, err);
@@ -161,7 +164,7 @@ static status lock_data(const struct settings *s, int tries, int *fd, struct err
     /* a process that a killed daemon was starting holds the lock until it becomes a worker, or ends */
     for (int i = 0; i < tries; i++) {
         if (i > 0) usleep(LOCK_PAUSE_US);
-        if (flock(*fd, LOCK_EX | LOCK_NB) == 0) return STATUS_OK;
+        if (flock(*fd, lock | LOCK_NB) == 0) return STATUS_OK;
     }
     return error_set(err, STATUS_CONFLICT, "cannot use data folder '%s': another selvedged is using it", s->data);
 }
@@ -268,6 +271,7 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     if (r == STATUS_OK) r = http_server_start(service, http_route_find, files, &server, url, err);
     if (r == STATUS_OK) {
         announce(s, url, log);
+        if (store_daemon_announce(service->store, url, err) != STATUS_OK) log_warning(log, "%s", err->text);
         wait_for_signal(signals, server, log);
     }
     if (service != NULL) atomic_store(&service->stopping, true);
@@ -291,11 +295,11 @@ static int make_token(struct settings *s, const struct token_wish *wish)
     umask(077);
     status r = sodium_init() < 0 ? error_set(&err, STATUS_INTERNAL, "cannot start libsodium") : STATUS_OK;
     if (r == STATUS_OK) r = make_absolute(s->data, &err);
-    if (r == STATUS_OK) r = lock_data(s, 1, &lock_fd, &err);
+    if (r == STATUS_OK) r = lock_data(s, LOCK_EX, 1, &lock_fd, &err);
     bool used = r == STATUS_CONFLICT;
     /* a new database in place of a lost one would hide that it is lost */
     if (r == STATUS_OK) r = rebuild_is_needed(s, &err);
-    if (r == STATUS_OK || used) r = first_token_make(s->data, used, wish->name, wish->scope, text, &err);
+    if (r == STATUS_OK || used) r = first_token_make(s, used, wish->name, wish->scope, text, &err);
     if (lock_fd >= 0) close(lock_fd);
     if (r == STATUS_OK) {
         fprintf(stderr, "token '%s' with scope %s; it is shown only now:\n", wish->name,
@@ -334,8 +338,9 @@ int main(int argc, char **argv)
     status r = sodium_init() < 0 ? error_set(&err, STATUS_INTERNAL, "cannot start libsodium") : STATUS_OK;
     if (r == STATUS_OK) r = make_absolute(settings.data, &err);
     if (r == STATUS_OK) r = make_absolute(settings.worker, &err);
+    int lock = rescue.command == RESCUE_NONE && store_settings_shared(&settings) ? LOCK_SH : LOCK_EX;
     if (r == STATUS_OK && (rescue.command == RESCUE_NONE || rescue_needs_lock(&rescue)))
-        r = lock_data(&settings, LOCK_TRIES, &lock_fd, &err);
+        r = lock_data(&settings, lock, LOCK_TRIES, &lock_fd, &err);
     if (r == STATUS_OK) r = log_open(NULL, stderr, LOG_LEVEL_INFO, &log, &err);
     if (r == STATUS_OK) fit_descriptors(&settings, log);
     if (r == STATUS_OK && rescue.command != RESCUE_NONE) {

@@ -4,11 +4,12 @@
 #define SELVEDGE_SERVER_FIRST_TOKEN_H
 
 #include "server/access/access_secret.h"
+#include "server/settings.h"
 
 /* Makes a token with the default quotas. running: a daemon uses the data folder meanwhile; it asks for tokens from its
  * next request on. STATUS_CONFLICT when that daemon's database is of another version; else as access_token_make and
  * store_open. */
-status first_token_make(const char *data_folder, bool running, const char *name, enum access_scope scope,
+status first_token_make(const struct settings *settings, bool running, const char *name, enum access_scope scope,
                         char text[ACCESS_SECRET_TEXT_BYTES], struct error *err);
 
 #endif

@@ -9,8 +9,8 @@
 #include "server/rescue/backup_files.h"
 #include "server/rescue/rebuild.h"
 #include "server/secret_file.h"
+#include "server/store/drivers/store_backup.h"
 #include "server/store/store.h"
-#include "server/store/store_backup.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -1,8 +1,10 @@
 #include "server/events/webhook.h"
 #include "base/clock.h"
 #include "base/version.h"
+#include "server/cluster/lease_keeper.h"
 #include "server/events/change_feed.h"
 #include "server/secret_file.h"
+#include "server/store/store_cluster.h"
 #include "server/store/store_delivery.h"
 
 #include <curl/curl.h>
@@ -13,7 +15,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SECRET_LEAST = 16, SECRET_MOST = 1024, ANSWER_MOST = 1 << 16, KEPT = 10000, PAUSE_MOST_S = 3600, IDLE_S = 60 };
+enum {
+    SECRET_LEAST = 16,
+    SECRET_MOST = 1024,
+    ANSWER_MOST = 1 << 16,
+    KEPT = 10000,
+    PAUSE_MOST_S = 3600,
+    IDLE_S = 60,
+    SHARED_IDLE_S = 2
+};
 
 struct webhook {
     struct job_service *v;
@@ -190,10 +200,11 @@ static void *run(void *context)
     struct webhook *w = context;
     while (!atomic_load(&w->stop)) {
         struct delivery_row d;
-        double wait_s = IDLE_S;
-        if (store_delivery_next(w->v->store, &d, NULL) == STATUS_OK) {
+        /* with a shared database, jobs end at other daemons too, and one daemon sends all deliveries */
+        double wait_s = store_is_shared(w->v->store) ? SHARED_IDLE_S : IDLE_S;
+        if (store_duty_is_mine(w->v->store, "webhook") && store_delivery_next(w->v->store, &d, NULL) == STATUS_OK) {
             /* a clock that was set back must not delay a delivery by more than the longest pause */
-            wait_s = fmin(d.next_unix_s - clock_wall_s(), PAUSE_MOST_S);
+            wait_s = fmin(d.next_unix_s - clock_wall_s(), store_is_shared(w->v->store) ? SHARED_IDLE_S : PAUSE_MOST_S);
             if (wait_s <= 0) try_once(w, &d);
         }
         if (wait_s > 0) change_watch_wait(w->watch, -1, clock_monotonic_s() + wait_s);
@@ -210,7 +221,9 @@ status webhook_start(struct job_service *v, struct webhook **out, struct error *
 {
     const char *url = v->settings->webhook_url;
     *out = NULL;
-    status s = store_webhook_enable(v->store, url[0] != '\0', err);
+    status s = STATUS_OK;
+    /* a daemon that joins others without an address does not switch off what they send */
+    if (url[0] != '\0' || lease_keeper_is_eldest(v)) s = store_webhook_enable(v->store, url[0] != '\0', err);
     if (s != STATUS_OK || url[0] == '\0') return s;
     if (!address_valid(url))
         return error_set_field(err, STATUS_INVALID, "webhook.url", "'%.200s' is not an http:// or https:// address",

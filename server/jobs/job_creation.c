@@ -3,6 +3,7 @@
 #include "base/files/durable.h"
 #include "optimizer/job/job_document.h"
 #include "optimizer/job/job_folder.h"
+#include "server/cluster/job_change.h"
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
@@ -172,9 +173,9 @@ status job_create(struct job_service *v, const struct job_request *request, char
     row.document = strndup(request->document, request->n_bytes);
     if (row.document == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot create job: out of memory");
     snprintf(row.owner, sizeof row.owner, "%s", request->grant->owner);
-    pthread_mutex_lock(&v->change);
+    job_change_begin(v, NULL, row.owner);
     s = create_locked(v, &row, request, body_hash, replayed, refusal, err);
-    pthread_mutex_unlock(&v->change);
+    job_change_end(v);
     if (s == STATUS_OK) snprintf(id, STORE_ID_BYTES, "%s", row.id);
     if (s == STATUS_OK && !*replayed) log_info(v->log, "job %s created: '%s'", row.id, row.sample);
     job_row_release(&row);
@@ -205,7 +206,7 @@ status job_replace_document(struct job_service *v, const char *id, const char *d
                             void *context, struct error *err)
 {
     struct job_row row;
-    pthread_mutex_lock(&v->change);
+    job_change_begin(v, id, NULL);
     status s = job_get(v, id, &row, err);
     if (s == STATUS_OK && may_edit != NULL) s = may_edit(context, &row, err);
     if (s == STATUS_OK) s = check_document(document, n_bytes, row.sample, err);
@@ -225,7 +226,7 @@ status job_replace_document(struct job_service *v, const char *id, const char *d
     if (s == STATUS_OK) forget_plan(v, id);
     free(run);
 out:
-    pthread_mutex_unlock(&v->change);
+    job_change_end(v);
     job_row_release(&row);
     return s;
 }

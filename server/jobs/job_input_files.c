@@ -1,6 +1,7 @@
 /* The input files of a job: which files its document names are missing, declarations, and deletion. */
 #include "base/files/durable.h"
 #include "optimizer/job/job_document.h"
+#include "server/cluster/job_change.h"
 #include "server/jobs/ballast.h"
 #include "server/jobs/inputs/known_input.h"
 #include "server/jobs/job_access.h"
@@ -249,9 +250,9 @@ status job_declare_files(struct job_service *v, const struct access_grant *grant
     }
     if (s == STATUS_OK) s = check_names(file, n, i_fault, err);
     if (s != STATUS_OK) return s;
-    pthread_mutex_lock(&v->change);
+    job_change_begin(v, id, grant->owner);
     s = declare_locked(v, grant, id, file, n, i_fault, refusal, err);
-    pthread_mutex_unlock(&v->change);
+    job_change_end(v);
     return s;
 }
 
@@ -259,7 +260,7 @@ status job_delete_file(struct job_service *v, const char *id, const char *name, 
 {
     struct job_row job;
     struct file_row file;
-    pthread_mutex_lock(&v->change);
+    job_change_begin(v, id, NULL);
     status s = job_look(v, id, &job, err);
     if (s == STATUS_OK) s = store_file_find(v->store, id, name, &file, err);
     if (s == STATUS_OK) s = job_check_editable(&job, err);
@@ -271,7 +272,7 @@ status job_delete_file(struct job_service *v, const char *id, const char *name, 
     if (s == STATUS_OK) job_note(v, id, &(struct journal_entry){.job = &job, .removed = name});
     if (s == STATUS_OK) upload_discard(v->upload, &file);
 out:
-    pthread_mutex_unlock(&v->change);
+    job_change_end(v);
     return s;
 }
 

@@ -4,6 +4,10 @@
 #include "base/clock.h"
 #include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
+#include "server/cluster/job_change.h"
+#include "server/cluster/lease_keeper.h"
+#include "server/cluster/shared_folder.h"
+#include "server/cluster/store_settings.h"
 #include "server/events/change_feed.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
@@ -193,30 +197,39 @@ static void read_verdict(void *context, const char *job_id, char code[40])
     json_decref(st);
 }
 
+/* With a shared database, the daemon that began before all others does this, and keeps them from changes meanwhile. */
+static status recover(struct job_service *v, struct error *err)
+{
+    job_change_begin(v, NULL, NULL);
+    status s = remove_deleted(v, err);
+    if (s == STATUS_OK) s = quarantine_unknown(v, err);
+    if (s == STATUS_OK && v->keeper == NULL) s = requeue(v, err);
+    if (s == STATUS_OK) s = store_fill_verdicts(v->store, read_verdict, v, err);
+    if (s == STATUS_OK) s = restore_folders(v, err);
+    if (s == STATUS_OK) s = upload_recover(v->upload, err);
+    job_change_end(v);
+    return s;
+}
+
 static void publish(void *context, const char *job_id) { change_feed_publish(context, job_id); }
 
 status job_service_open(const struct settings *settings, struct log *log, struct job_service **out, struct error *err)
 {
-    char path[PATH_BYTES];
     struct job_service *v = calloc(1, sizeof *v);
     if (v == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start: out of memory");
     v->settings = settings;
     v->log = log;
     pthread_mutex_init(&v->change, NULL);
     status s = make_data_folders(settings->data, err);
-    path_join(path, settings->data, "selvedge.db", NULL);
-    if (s == STATUS_OK) s = store_open(path, &v->store, err);
+    if (s == STATUS_OK) s = store_settings_open(settings, false, &v->store, err);
+    if (s == STATUS_OK) s = shared_folder_admit(v, err);
+    if (s == STATUS_OK) s = lease_keeper_start(v, &v->keeper, err);
     if (s == STATUS_OK) s = change_feed_new(&v->feed, err);
     v->forecast = queue_forecast_new();
     if (s == STATUS_OK && v->forecast == NULL) s = error_set(err, STATUS_NO_MEMORY, "cannot start: out of memory");
     if (s == STATUS_OK) store_on_change(v->store, publish, v->feed);
     if (s == STATUS_OK) s = upload_set_new(v->store, settings->data, settings->commit_bytes, log, &v->upload, err);
-    if (s == STATUS_OK) s = remove_deleted(v, err);
-    if (s == STATUS_OK) s = quarantine_unknown(v, err);
-    if (s == STATUS_OK) s = requeue(v, err);
-    if (s == STATUS_OK) s = store_fill_verdicts(v->store, read_verdict, v, err);
-    if (s == STATUS_OK) s = restore_folders(v, err);
-    if (s == STATUS_OK) s = upload_recover(v->upload, err);
+    if (s == STATUS_OK && lease_keeper_is_eldest(v)) s = recover(v, err);
     if (s != STATUS_OK) {
         job_service_close(v);
         return error_prefix(err, s, "cannot open data folder '%s'", settings->data);
@@ -228,6 +241,7 @@ status job_service_open(const struct settings *settings, struct log *log, struct
 void job_service_close(struct job_service *v)
 {
     if (v == NULL) return;
+    lease_keeper_stop(v->keeper);
     upload_set_free(v->upload);
     store_close(v->store);
     queue_forecast_free(v->forecast);

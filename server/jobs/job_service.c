@@ -1,6 +1,7 @@
 /* What users can do with a job: start, retry, cancel, delete. */
 #include "server/jobs/job_service.h"
 #include "base/clock.h"
+#include "server/cluster/job_change.h"
 #include "server/jobs/job_access.h"
 #include "server/workers/supervisor.h"
 
@@ -42,7 +43,7 @@ static status begin(struct job_service *v, const char *id, bool retry, const int
 {
     struct job_row row;
     *changed = false;
-    pthread_mutex_lock(&v->change);
+    job_change_begin(v, id, NULL);
     status s = job_get(v, id, &row, err);
     if (s != STATUS_OK) goto out;
     bool other = priority != NULL && *priority != row.priority;
@@ -67,7 +68,7 @@ static status begin(struct job_service *v, const char *id, bool retry, const int
     *changed = s == STATUS_OK;
     if (*changed) log_info(v->log, "job %s queued", row.id);
 out:
-    pthread_mutex_unlock(&v->change);
+    job_change_end(v);
     job_row_release(&row);
     if (*changed) wake(v);
     return s;
@@ -89,7 +90,7 @@ status job_cancel(struct job_service *v, const char *id, bool *changed, struct e
 {
     struct job_row row;
     *changed = false;
-    pthread_mutex_lock(&v->change);
+    job_change_begin(v, id, NULL);
     status s = job_get(v, id, &row, err);
     if (s != STATUS_OK || row.state == JOB_SUCCEEDED || row.state == JOB_FAILED || row.state == JOB_CANCELLED) goto out;
     if (row.state == JOB_RUNNING) {
@@ -104,7 +105,7 @@ status job_cancel(struct job_service *v, const char *id, bool *changed, struct e
     s = job_update_surely(v, &row, err);
     if (s == STATUS_OK) log_info(v->log, "job %s: cancellation requested", row.id);
 out:
-    pthread_mutex_unlock(&v->change);
+    job_change_end(v);
     job_row_release(&row);
     if (*changed) wake(v);
     return s;
@@ -120,14 +121,14 @@ status job_remove(struct job_service *v, const char *id,
                   struct error *err)
 {
     struct job_row row;
-    pthread_mutex_lock(&v->change);
+    job_change_begin(v, id, NULL);
     status s = job_get(v, id, &row, err);
     if (s == STATUS_OK && may_remove != NULL) s = may_remove(context, &row, err);
     if (s == STATUS_OK) {
         row.deleted = true;
         s = job_update_surely(v, &row, err);
     }
-    pthread_mutex_unlock(&v->change);
+    job_change_end(v);
     if (s == STATUS_OK) {
         upload_discard_job(v->upload, row.id);
         log_info(v->log, "job %s deleted", row.id);

@@ -17,6 +17,7 @@ struct supervisor;
 struct change_feed;
 struct backup_keeper;
 struct queue_forecast;
+struct lease_keeper;
 
 struct job_service {
     const struct settings *settings;
@@ -27,7 +28,8 @@ struct job_service {
     struct log *log;
     struct supervisor *supervisor; /* notified of changes; NULL in tests */
     struct backup_keeper *backup;  /* NULL when the settings say that there are no backups */
-    pthread_mutex_t change;        /* held from reading a row to writing it back */
+    struct lease_keeper *keeper;   /* NULL unless other daemons may use the database */
+    pthread_mutex_t change;        /* held from reading a row to writing it back (server/cluster/job_change.h) */
     atomic_bool stopping;
     atomic_int n_judging; /* checks of input files that run now (server/workers/input_judge.h) */
     atomic_uint_least64_t n_attempt_total, n_lost_total, n_finished_total[JOB_N_STATE];

@@ -1,5 +1,5 @@
 /* The folder of backups: files named selvedge-20261124T041500Z.db by the time (UTC) of their making, each examined
- * before it got its name (server/store/store_backup.h). */
+ * before it got its name (server/store/drivers/store_backup.h). */
 #ifndef SELVEDGE_SERVER_BACKUP_FILES_H
 #define SELVEDGE_SERVER_BACKUP_FILES_H
 

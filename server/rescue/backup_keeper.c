@@ -1,8 +1,9 @@
 #include "server/rescue/backup_keeper.h"
 #include "base/clock.h"
 #include "base/files/durable.h"
+#include "server/cluster/store_settings.h"
 #include "server/rescue/backup_files.h"
-#include "server/store/store_backup.h"
+#include "server/store/drivers/store_backup.h"
 
 #include <errno.h>
 #include <stdlib.h>
@@ -124,7 +125,8 @@ static void *run(void *context)
 status backup_keeper_start(struct job_service *v, struct backup_keeper **out, struct error *err)
 {
     *out = NULL;
-    if (v->settings->backup_every_s == 0) return STATUS_OK;
+    /* a server is backed up by its own means (docs/cluster.md) */
+    if (v->settings->backup_every_s == 0 || store_settings_shared(v->settings)) return STATUS_OK;
     struct backup_keeper *k = calloc(1, sizeof *k);
     if (k == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start backups: out of memory");
     k->v = v;

@@ -1,5 +1,6 @@
 #include "server/rescue/quarantine.h"
 #include "base/files/durable.h"
+#include "server/cluster/store_settings.h"
 #include "server/jobs/job_paths.h"
 #include "server/rescue/rebuild.h"
 #include "server/store/job_journal.h"
@@ -98,8 +99,7 @@ status quarantine_restore(const struct settings *settings, const char *name, FIL
     s = rebuild_is_needed(settings, err);
     path_join(path, settings->data, "jobs", id, NULL);
     if (s == STATUS_OK && lstat(path, &st) == 0) s = error_set(err, STATUS_CONFLICT, "there is a folder '%s'", path);
-    path_join(path, settings->data, "selvedge.db", NULL);
-    if (s == STATUS_OK) s = store_open(path, &store, err);
+    if (s == STATUS_OK) s = store_settings_open(settings, false, &store, err);
     if (s == STATUS_OK) s = store_webhook_enable(store, false, err);
     if (s != STATUS_OK) goto out;
     s = store_job_look(store, id, &row, err);

@@ -1,10 +1,11 @@
 #include "server/rescue/rebuild.h"
 #include "base/clock.h"
 #include "base/files/durable.h"
+#include "server/cluster/store_settings.h"
 #include "server/rescue/backup_files.h"
 #include "server/rescue/job_evidence.h"
+#include "server/store/drivers/store_backup.h"
 #include "server/store/store_access.h"
-#include "server/store/store_backup.h"
 #include "server/store/store_delivery.h"
 
 #include <dirent.h>
@@ -82,6 +83,7 @@ status rebuild_is_needed(const struct settings *settings, struct error *err)
     struct folder *folder = NULL;
     size_t n = 0;
     struct error why = {0};
+    if (store_settings_shared(settings)) return STATUS_OK;
     database_path(settings, path);
     status s = store_examine(path, false, NULL, &why);
     if (s == STATUS_NOT_FOUND && list_folders(settings->data, false, &folder, &n, NULL) == STATUS_OK && n > 0) {
@@ -285,7 +287,9 @@ status rebuild(const struct settings *settings, bool resume, FILE *report, struc
     bool kept = false;
     path_join(folder, settings->data, "rebuild", NULL);
     path_join(made, folder, "selvedge.db", NULL);
-    status s = path_remove_tree(folder, err);
+    status s = store_settings_need_file(settings, "--rebuild", "bring the database back with pg_restore", err);
+    if (s != STATUS_OK) return s;
+    s = path_remove_tree(folder, err);
     if (s == STATUS_OK) s = durable_make_folder(folder, err);
     if (s == STATUS_OK) s = copy_base(settings, made, &kept, report, err);
     if (s == STATUS_OK) s = fill(settings, made, kept, resume, report, err);

@@ -1,9 +1,10 @@
 #include "server/rescue/rescue_commands.h"
+#include "server/cluster/store_settings.h"
 #include "server/doctor/doctor.h"
 #include "server/jobs/job_paths.h"
 #include "server/rescue/quarantine.h"
 #include "server/rescue/rebuild.h"
-#include "server/store/store_backup.h"
+#include "server/store/drivers/store_backup.h"
 
 #include <string.h>
 
@@ -30,8 +31,10 @@ static status back_up(const struct settings *settings, const char *to, FILE *out
 {
     char path[PATH_BYTES];
     struct store_summary found;
+    status s = store_settings_need_file(settings, "--backup", "copy the database with pg_dump", err);
+    if (s != STATUS_OK) return s;
     path_join(path, settings->data, "selvedge.db", NULL);
-    status s = store_backup(path, to, &found, err);
+    s = store_backup(path, to, &found, err);
     if (s == STATUS_OK)
         fprintf(out, "'%s': %lld jobs, %lld files, %lld bytes\n", to, (long long)found.n_job, (long long)found.n_file,
                 (long long)found.n_bytes);

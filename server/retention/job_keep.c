@@ -1,5 +1,6 @@
 #include "server/retention/job_keep.h"
 #include "base/files/durable.h"
+#include "server/cluster/job_change.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
 
@@ -30,13 +31,13 @@ static status set_mark(const struct job_service *v, const char *id, bool keep, s
 status job_keep(struct job_service *v, const char *id, bool keep, struct error *err)
 {
     struct job_row row;
-    pthread_mutex_lock(&v->change);
+    job_change_begin(v, id, NULL);
     status s = job_look(v, id, &row, err);
     if (s == STATUS_OK && job_is_kept(v, id) != keep) {
         s = set_mark(v, id, keep, err);
         if (s == STATUS_OK) s = job_update_surely(v, &row, err); /* a new revision: those who watch the job see it */
         if (s == STATUS_OK) log_info(v->log, "job %s is %s", id, keep ? "kept from now on" : "no longer kept");
     }
-    pthread_mutex_unlock(&v->change);
+    job_change_end(v);
     return s;
 }

@@ -1,5 +1,6 @@
 #include "server/retention/retention_watch.h"
 #include "server/retention/retention.h"
+#include "server/store/store_cluster.h"
 
 #include <errno.h>
 #include <stdlib.h>
@@ -27,6 +28,7 @@ static void look(struct retention_watch *w)
     struct retention_plan plan;
     struct retention_job removed = {0};
     struct error err = {0};
+    if (!store_duty_is_mine(w->v->store, "retention")) return;
     if (retention_plan_make(w->v, &w->limits, &plan, &err) != STATUS_OK) {
         log_warning(w->v->log, "retention: %s", err.text);
         return;

@@ -1,12 +1,14 @@
-/* The database of jobs, in SQLite with WAL and synchronous=FULL, so the changes of a call that returned STATUS_OK
- * survive power loss. One connection writes, a second one reads, each guarded by a mutex: reading waits for no sync. A
- * call reads what every call that has returned before has written. The version of the schema is PRAGMA user_version; an
- * older file is copied to <path>.v<old> and migrated, a newer one is refused. All functions may be called from any
- * thread; all may fail with STATUS_IO, STATUS_DISK_FULL or STATUS_NO_MEMORY. */
+/* The database of jobs: SQLite in a file, or PostgreSQL (drivers/store_driver.h). The changes of a call that returned
+ * STATUS_OK survive power loss; where the reply to a commit is lost, the call fails. One connection writes, a second one
+ * reads, each guarded by a mutex: reading waits for no sync. A call reads what every call that has returned before has
+ * written. A database of an older version is migrated (the file of SQLite is copied to <path>.v<old> first), a newer
+ * one is refused. All functions may be called from any thread; all may fail with STATUS_IO, STATUS_DISK_FULL or
+ * STATUS_NO_MEMORY. */
 #ifndef SELVEDGE_SERVER_STORE_H
 #define SELVEDGE_SERVER_STORE_H
 
 #include "base/status.h"
+#include "server/store/drivers/store_driver.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -75,15 +77,20 @@ struct file_row {
 
 struct store;
 
-/* Whether a database may lie at this path: STATUS_UNSUPPORTED on a network file system, whose locks are not reliable;
- * STATUS_IO. */
-status store_check_place(const char *path, struct error *err);
+/* Whether a database may lie at this path or address: STATUS_UNSUPPORTED on a network file system, whose locks are not
+ * reliable enough for SQLite; STATUS_IO. */
+status store_check_place(const char *address, struct error *err);
 
-/* STATUS_UNSUPPORTED on a network file system or for a newer schema. */
+/* Wipes and frees the password. */
+void store_place_release(struct store_place *place);
+
+/* Opens a database and brings its schema to the present version. STATUS_UNSUPPORTED on a network file system, for a
+ * newer schema, or where a package is missing that the database needs. */
 status store_open(const char *path, struct store **store, struct error *err);
+status store_open_place(const struct store_place *place, struct store **store, struct error *err);
 /* Opens the database of a daemon that runs. It is not migrated: STATUS_CONFLICT when its version is not that of this
  * program. */
-status store_open_beside(const char *path, struct store **store, struct error *err);
+status store_open_place_beside(const struct store_place *place, struct store **store, struct error *err);
 void store_close(struct store *store);
 /* From now on `changed` is called with the id of a job after each change of it or of its files, by the thread that made
  * the change. To be called once, before other threads use the store. */

@@ -3,6 +3,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <uuid/uuid.h>
 
 #define COLUMNS "t.serial, t.id, t.name, t.owner, t.scope, t.created, t.used, t.revoked, t.requests, t.bytes, t.jobs"
 
@@ -20,42 +21,41 @@ bool access_scope_parse(const char *name, enum access_scope *scope)
     return false;
 }
 
-static void read_row(sqlite3_stmt *q, struct token_row *row)
+static void read_row(struct store_query *q, struct token_row *row)
 {
     memset(row, 0, sizeof *row);
-    row->serial = sqlite3_column_int64(q, 0);
+    row->serial = store_int64(q, 0);
     store_text(q, 1, row->id, sizeof row->id);
     store_text(q, 2, row->name, sizeof row->name);
     store_text(q, 3, row->owner, sizeof row->owner);
-    row->scope = (enum access_scope)sqlite3_column_int(q, 4);
-    row->created_unix_s = sqlite3_column_double(q, 5);
-    row->used_unix_s = sqlite3_column_double(q, 6);
-    row->revoked_unix_s = sqlite3_column_double(q, 7);
-    row->quota =
-        (struct access_quota){sqlite3_column_int64(q, 8), sqlite3_column_int64(q, 9), sqlite3_column_int64(q, 10)};
+    row->scope = (enum access_scope)(int)store_int64(q, 4);
+    row->created_unix_s = store_real(q, 5);
+    row->used_unix_s = store_real(q, 6);
+    row->revoked_unix_s = store_real(q, 7);
+    row->quota = (struct access_quota){store_int64(q, 8), store_int64(q, 9), store_int64(q, 10)};
 }
 
 /* Takes the only row of a query that was prepared with status s: STATUS_NOT_FOUND with a text when there is none.
  * Finalizes the query. */
-static status one_row(struct store *store, status s, sqlite3_stmt *q, void (*take)(sqlite3_stmt *q, void *out),
-                      void *out, const char *missing, struct error *err)
+static status one_row(struct store *store, status s, struct store_query *q,
+                      void (*take)(struct store_query *q, void *out), void *out, const char *missing, struct error *err)
 {
     if (s == STATUS_OK) {
-        int rc = sqlite3_step(q);
-        if (rc == SQLITE_ROW)
+        enum store_step rc = store_step(q);
+        if (rc == STORE_ROW)
             take(q, out);
         else
-            s = rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "%s", missing)
-                                  : store_error(&store->read, "cannot look up who may do what", err);
+            s = rc == STORE_DONE ? error_set(err, STATUS_NOT_FOUND, "%s", missing)
+                                 : store_error(&store->read, "cannot look up who may do what", err);
     }
-    sqlite3_finalize(q);
+    store_finish(q);
     return s;
 }
 
 /* One query for one row, under the lock of the reading connection. */
 #define LOOK(store, take, out, missing, err, ...)                                                                      \
     do {                                                                                                               \
-        sqlite3_stmt *q_ = NULL;                                                                                       \
+        struct store_query *q_ = NULL;                                                                                 \
         pthread_mutex_lock(&(store)->read.lock);                                                                       \
         status look_ = store_prepare(&(store)->read, &q_, err, __VA_ARGS__);                                           \
         look_ = one_row(store, look_, q_, take, out, missing, err);                                                    \
@@ -63,12 +63,12 @@ static status one_row(struct store *store, status s, sqlite3_stmt *q, void (*tak
         return look_;                                                                                                  \
     } while (0)
 
-static void take_token(sqlite3_stmt *q, void *out) { read_row(q, out); }
-static void take_bool(sqlite3_stmt *q, void *out) { *(bool *)out = sqlite3_column_int(q, 0) != 0; }
-static void take_owner(sqlite3_stmt *q, void *out) { store_text(q, 0, out, STORE_OWNER_BYTES); }
-static void take_use(sqlite3_stmt *q, void *out)
+static void take_token(struct store_query *q, void *out) { read_row(q, out); }
+static void take_bool(struct store_query *q, void *out) { *(bool *)out = (int)store_int64(q, 0) != 0; }
+static void take_owner(struct store_query *q, void *out) { store_text(q, 0, out, STORE_OWNER_BYTES); }
+static void take_use(struct store_query *q, void *out)
 {
-    *(struct owner_use *)out = (struct owner_use){sqlite3_column_int64(q, 0), sqlite3_column_int64(q, 1)};
+    *(struct owner_use *)out = (struct owner_use){store_int64(q, 0), store_int64(q, 1)};
 }
 
 status store_token_any(struct store *store, bool *any, struct error *err)
@@ -118,19 +118,18 @@ status store_upload_owner(struct store *store, const char *upload_id, char owner
 status store_owner_use(struct store *store, const char *owner, struct owner_use *use, struct error *err)
 {
     LOOK(store, take_use, use, "", err,
-         "SELECT ifnull(sum(jobs), 0), ifnull(sum(bytes), 0) FROM owner_use WHERE owner = ?", "s", owner);
+         "SELECT coalesce(sum(jobs), 0), coalesce(sum(bytes), 0) FROM owner_use WHERE owner = ?", "s", owner);
 }
 
 status store_token_insert(struct store *store, struct token_row *r, struct error *err)
 {
     pthread_mutex_lock(&store->write.lock);
-    status s =
-        store_run(&store->write, NULL, err,
-                  "INSERT INTO access_token (id, name, owner, scope, hash, created, used, revoked, requests, "
-                  "bytes, jobs) VALUES (?,?,?,?,?,?,0,0,?,?,?)",
-                  "sssibdiii", r->id, r->name, r->owner, (int64_t)r->scope, r->hash, (int)STORE_SECRET_HASH_BYTES,
-                  r->created_unix_s, r->quota.requests_per_minute, r->quota.stored_bytes, r->quota.jobs);
-    if (s == STATUS_OK) r->serial = sqlite3_last_insert_rowid(store->write.db);
+    status s = store_run_serial(
+        &store->write, &r->serial, err,
+        "INSERT INTO access_token (id, name, owner, scope, hash, created, used, revoked, requests, "
+        "bytes, jobs) VALUES (?,?,?,?,?,?,0,0,?,?,?) RETURNING serial",
+        "sssibdiii", r->id, r->name, r->owner, (int64_t)r->scope, r->hash, (int)STORE_SECRET_HASH_BYTES,
+        r->created_unix_s, r->quota.requests_per_minute, r->quota.stored_bytes, r->quota.jobs);
     if (s == STATUS_EXISTS)
         s = error_set_field(err, STATUS_EXISTS, "name", "a token named '%s' exists; revoke it first", r->name);
     pthread_mutex_unlock(&store->write.lock);
@@ -160,8 +159,8 @@ status store_token_used(struct store *store, const struct token_row *row, size_t
     status s = store_begin(&store->write, err);
     if (s == STATUS_OK) {
         for (size_t i = 0; s == STATUS_OK && i < n; i++)
-            s = store_run(&store->write, NULL, err, "UPDATE access_token SET used = max(used, ?) WHERE id = ?", "ds",
-                          row[i].used_unix_s, row[i].id);
+            s = store_run(&store->write, NULL, err, "UPDATE access_token SET used = ?1 WHERE id = ?2 AND used < ?1",
+                          "ds", row[i].used_unix_s, row[i].id);
         s = store_end(&store->write, s, err);
     }
     pthread_mutex_unlock(&store->write.lock);
@@ -171,19 +170,18 @@ status store_token_used(struct store *store, const struct token_row *row, size_t
 status store_token_list(struct store *store, int64_t before, size_t limit, struct token_row **out, size_t *n_out,
                         struct error *err)
 {
-    sqlite3_stmt *q = NULL;
+    struct store_query *q = NULL;
     size_t n = 0;
-    int rc = SQLITE_DONE;
+    enum store_step rc = STORE_DONE;
     struct token_row *row = calloc(limit, sizeof *row);
     if (row == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot list tokens: out of memory");
     pthread_mutex_lock(&store->read.lock);
     status s = store_prepare(&store->read, &q, err,
                              "SELECT " COLUMNS " FROM access_token t WHERE serial < ? ORDER BY serial DESC LIMIT ?",
                              "ii", before > 0 ? before : INT64_MAX, (int64_t)limit);
-    while (s == STATUS_OK && n < limit && (rc = sqlite3_step(q)) == SQLITE_ROW) read_row(q, &row[n++]);
-    if (s == STATUS_OK && rc != SQLITE_DONE && rc != SQLITE_ROW)
-        s = store_error(&store->read, "cannot list tokens", err);
-    sqlite3_finalize(q);
+    while (s == STATUS_OK && n < limit && (rc = store_step(q)) == STORE_ROW) read_row(q, &row[n++]);
+    if (s == STATUS_OK && rc != STORE_DONE && rc != STORE_ROW) s = store_error(&store->read, "cannot list tokens", err);
+    store_finish(q);
     pthread_mutex_unlock(&store->read.lock);
     if (s != STATUS_OK) {
         free(row);
@@ -215,14 +213,17 @@ status store_access_rebuilt(struct store *store, bool require, double now_unix_s
     pthread_mutex_lock(&store->write.lock);
     status s = store_run(&store->write, NULL, err, "DELETE FROM session", "");
     /* a token that is revoked, and whose hash is that of no text, says that tokens were once made */
-    if (s == STATUS_OK && require)
+    if (s == STATUS_OK && require) {
+        char id[STORE_ID_BYTES];
+        uuid_t u;
+        uuid_generate_random(u);
+        uuid_unparse_lower(u, id);
         s = store_run(
             &store->write, NULL, err,
             "INSERT INTO access_token (id, name, owner, scope, hash, created, used, revoked, requests, bytes, "
-            "jobs) VALUES (lower(hex(randomblob(4)) || '-' || hex(randomblob(2)) || '-' || "
-            "hex(randomblob(2)) || '-' || hex(randomblob(2)) || '-' || hex(randomblob(6))), 'lost', 'lost', "
-            "?, zeroblob(1), ?, 0, ?, -1, -1, -1)",
-            "idd", (int64_t)ACCESS_READ, now_unix_s, now_unix_s);
+            "jobs) VALUES (?, 'lost', 'lost', ?, ?, ?, 0, ?, -1, -1, -1)",
+            "sibdd", id, (int64_t)ACCESS_READ, "", 1, now_unix_s, now_unix_s);
+    }
     pthread_mutex_unlock(&store->write.lock);
     return s;
 }

@@ -19,23 +19,23 @@ void batch_rows_free(struct batch_row *row, size_t n)
     free(row);
 }
 
-static status copy_text(sqlite3_stmt *q, int column, char **out, struct error *err)
+static status copy_text(struct store_query *q, int column, char **out, struct error *err)
 {
-    const char *text = (const char *)sqlite3_column_text(q, column);
+    const char *text = store_column_text(q, column);
     *out = text == NULL ? NULL : strdup(text);
     return text != NULL && *out == NULL ? error_set(err, STATUS_NO_MEMORY, "cannot read batch: out of memory")
                                         : STATUS_OK;
 }
 
-static status read_row(sqlite3_stmt *q, struct batch_row *row, struct error *err)
+static status read_row(struct store_query *q, struct batch_row *row, struct error *err)
 {
     memset(row, 0, sizeof *row);
-    row->serial = sqlite3_column_int64(q, 0);
+    row->serial = store_int64(q, 0);
     store_text(q, 1, row->id, sizeof row->id);
     store_text(q, 2, row->owner, sizeof row->owner);
     store_text(q, 3, row->name, sizeof row->name);
-    row->created_unix_s = sqlite3_column_double(q, 4);
-    row->updated_unix_s = sqlite3_column_double(q, 5);
+    row->created_unix_s = store_real(q, 4);
+    row->updated_unix_s = store_real(q, 5);
     return copy_text(q, 6, &row->template_text, err);
 }
 
@@ -47,11 +47,10 @@ static status write_batch(struct store *store, struct batch_row *b, struct error
                          b->template_text, b->updated_unix_s, b->id);
     if (s != STATUS_OK || n > 0) return s;
     b->created_unix_s = b->updated_unix_s;
-    s = store_run(&store->write, NULL, err,
-                  "INSERT INTO batch (id, owner, name, template, created, updated) VALUES (?,?,?,?,?,?)", "ssssdd",
-                  b->id, b->owner, b->name, b->template_text, b->created_unix_s, b->updated_unix_s);
-    if (s == STATUS_OK) b->serial = sqlite3_last_insert_rowid(store->write.db);
-    return s;
+    return store_run_serial(&store->write, &b->serial, err,
+                            "INSERT INTO batch (id, owner, name, template, created, updated) VALUES (?,?,?,?,?,?) "
+                            "RETURNING serial",
+                            "ssssdd", b->id, b->owner, b->name, b->template_text, b->created_unix_s, b->updated_unix_s);
 }
 
 static status write_all(struct store *store, struct batch_row *batch, struct job_row *new_job, size_t n_new,
@@ -105,24 +104,24 @@ status store_batch_erase(struct store *store, const char *id, struct job_row *jo
 }
 
 /* Takes the only row of a query that was prepared with status s, and finalizes it. */
-static status one_row(struct store *store, status s, sqlite3_stmt *q, const char *what, struct batch_row *row,
+static status one_row(struct store *store, status s, struct store_query *q, const char *what, struct batch_row *row,
                       struct error *err)
 {
-    int rc = s == STATUS_OK ? sqlite3_step(q) : SQLITE_DONE;
+    enum store_step rc = s == STATUS_OK ? store_step(q) : STORE_DONE;
     memset(row, 0, sizeof *row);
-    if (s == STATUS_OK && rc == SQLITE_ROW)
+    if (s == STATUS_OK && rc == STORE_ROW)
         s = read_row(q, row, err);
     else if (s == STATUS_OK)
-        s = rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "batch '%.255s' does not exist", what)
-                              : store_error(&store->read, "cannot read batch", err);
-    sqlite3_finalize(q);
+        s = rc == STORE_DONE ? error_set(err, STATUS_NOT_FOUND, "batch '%.255s' does not exist", what)
+                             : store_error(&store->read, "cannot read batch", err);
+    store_finish(q);
     if (s != STATUS_OK) batch_row_release(row);
     return s;
 }
 
 status store_batch_get(struct store *store, const char *id, struct batch_row *row, struct error *err)
 {
-    sqlite3_stmt *q = NULL;
+    struct store_query *q = NULL;
     pthread_mutex_lock(&store->read.lock);
     status s = store_prepare(&store->read, &q, err, COLUMNS("template") "WHERE id = ?", "s", id);
     s = one_row(store, s, q, id, row, err);
@@ -133,7 +132,7 @@ status store_batch_get(struct store *store, const char *id, struct batch_row *ro
 status store_batch_find(struct store *store, const char *owner, const char *name, struct batch_row *row,
                         struct error *err)
 {
-    sqlite3_stmt *q = NULL;
+    struct store_query *q = NULL;
     pthread_mutex_lock(&store->read.lock);
     status s =
         store_prepare(&store->read, &q, err, COLUMNS("template") "WHERE owner = ? AND name = ?", "ss", owner, name);
@@ -145,23 +144,23 @@ status store_batch_find(struct store *store, const char *owner, const char *name
 status store_batch_list(struct store *store, const char *owner, int64_t before_serial, size_t limit,
                         struct batch_row **out, size_t *n_out, struct error *err)
 {
-    sqlite3_stmt *q = NULL;
+    struct store_query *q = NULL;
     struct batch_row *row = calloc(limit, sizeof *row);
     size_t n = 0;
-    int rc = SQLITE_DONE;
+    enum store_step rc = STORE_DONE;
     if (row == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot list batches: out of memory");
     pthread_mutex_lock(&store->read.lock);
     status s = store_prepare(&store->read, &q, err,
                              COLUMNS("NULL") "WHERE (?1 = 0 OR serial < ?1) AND (?2 IS NULL OR owner = ?2) "
                                              "ORDER BY serial DESC LIMIT ?3",
                              "isi", before_serial, owner, (int64_t)limit);
-    while (s == STATUS_OK && n < limit && (rc = sqlite3_step(q)) == SQLITE_ROW) {
+    while (s == STATUS_OK && n < limit && (rc = store_step(q)) == STORE_ROW) {
         s = read_row(q, &row[n], err);
         if (s == STATUS_OK) n++;
     }
-    if (s == STATUS_OK && rc != SQLITE_DONE && rc != SQLITE_ROW)
+    if (s == STATUS_OK && rc != STORE_DONE && rc != STORE_ROW)
         s = store_error(&store->read, "cannot list batches", err);
-    sqlite3_finalize(q);
+    store_finish(q);
     pthread_mutex_unlock(&store->read.lock);
     if (s != STATUS_OK) {
         batch_rows_free(row, n);
@@ -174,20 +173,20 @@ status store_batch_list(struct store *store, const char *owner, int64_t before_s
 
 status store_batch_count(struct store *store, const char *id, int64_t n[JOB_N_STATE], struct error *err)
 {
-    sqlite3_stmt *q = NULL;
-    int rc = SQLITE_DONE;
+    struct store_query *q = NULL;
+    enum store_step rc = STORE_DONE;
     for (int i = 0; i < JOB_N_STATE; i++) n[i] = 0;
     pthread_mutex_lock(&store->read.lock);
     status s = store_prepare(&store->read, &q, err,
                              "SELECT state, count(*) FROM job WHERE batch = ? AND batch <> '' AND deleted = 0 GROUP BY "
                              "state",
                              "s", id);
-    while (s == STATUS_OK && (rc = sqlite3_step(q)) == SQLITE_ROW) {
-        int state = sqlite3_column_int(q, 0);
-        if (state >= 0 && state < JOB_N_STATE) n[state] = sqlite3_column_int64(q, 1);
+    while (s == STATUS_OK && (rc = store_step(q)) == STORE_ROW) {
+        int state = (int)store_int64(q, 0);
+        if (state >= 0 && state < JOB_N_STATE) n[state] = store_int64(q, 1);
     }
-    if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(&store->read, "cannot count the jobs of a batch", err);
-    sqlite3_finalize(q);
+    if (s == STATUS_OK && rc != STORE_DONE) s = store_error(&store->read, "cannot count the jobs of a batch", err);
+    store_finish(q);
     pthread_mutex_unlock(&store->read.lock);
     return s;
 }

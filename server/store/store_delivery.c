@@ -8,25 +8,25 @@
     "serial, id, job_id, sample, job_state, attempt, error_code, error_field, error_text, created, state, tries, "     \
     "next, status, error, delivered"
 
-static void read_row(sqlite3_stmt *q, struct delivery_row *row)
+static void read_row(struct store_query *q, struct delivery_row *row)
 {
     memset(row, 0, sizeof *row);
-    row->serial = sqlite3_column_int64(q, 0);
+    row->serial = store_int64(q, 0);
     store_text(q, 1, row->id, sizeof row->id);
     store_text(q, 2, row->job_id, sizeof row->job_id);
     store_text(q, 3, row->sample, sizeof row->sample);
-    row->job_state = (enum job_state)sqlite3_column_int(q, 4);
-    row->attempt = sqlite3_column_int64(q, 5);
+    row->job_state = (enum job_state)(int)store_int64(q, 4);
+    row->attempt = store_int64(q, 5);
     store_text(q, 6, row->error_code, sizeof row->error_code);
     store_text(q, 7, row->error_field, sizeof row->error_field);
     store_text(q, 8, row->error_text, sizeof row->error_text);
-    row->created_unix_s = sqlite3_column_double(q, 9);
-    row->state = (enum delivery_state)sqlite3_column_int(q, 10);
-    row->n_try = sqlite3_column_int64(q, 11);
-    row->next_unix_s = sqlite3_column_double(q, 12);
-    row->http_status = sqlite3_column_int64(q, 13);
+    row->created_unix_s = store_real(q, 9);
+    row->state = (enum delivery_state)(int)store_int64(q, 10);
+    row->n_try = store_int64(q, 11);
+    row->next_unix_s = store_real(q, 12);
+    row->http_status = store_int64(q, 13);
     store_text(q, 14, row->error, sizeof row->error);
-    row->delivered_unix_s = sqlite3_column_double(q, 15);
+    row->delivered_unix_s = store_real(q, 15);
 }
 
 /* One statement that changes something, under the lock. */
@@ -41,7 +41,7 @@ static void read_row(sqlite3_stmt *q, struct delivery_row *row)
 status store_webhook_enable(struct store *store, bool enabled, struct error *err)
 {
     struct store_link *w = &store->write;
-    if (enabled) CHANGE(store, err, "INSERT OR IGNORE INTO webhook VALUES (1)", "");
+    if (enabled) CHANGE(store, err, "INSERT INTO webhook (one) VALUES (1) ON CONFLICT DO NOTHING", "");
     pthread_mutex_lock(&w->lock);
     status s = store_begin(w, err);
     if (s == STATUS_OK) {
@@ -71,20 +71,20 @@ status store_delivery_prune(struct store *store, int64_t most, struct error *err
 
 status store_delivery_next(struct store *store, struct delivery_row *row, struct error *err)
 {
-    sqlite3_stmt *q = NULL;
+    struct store_query *q = NULL;
     memset(row, 0, sizeof *row);
     pthread_mutex_lock(&store->read.lock);
     status s = store_prepare(&store->read, &q, err,
                              "SELECT " COLUMNS " FROM delivery WHERE state = 0 ORDER BY next, serial LIMIT 1", "");
     if (s != STATUS_OK) goto out;
-    int rc = sqlite3_step(q);
-    if (rc == SQLITE_ROW)
+    enum store_step rc = store_step(q);
+    if (rc == STORE_ROW)
         read_row(q, row);
     else
-        s = rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "no delivery waits")
-                              : store_error(&store->read, "cannot read deliveries", err);
+        s = rc == STORE_DONE ? error_set(err, STATUS_NOT_FOUND, "no delivery waits")
+                             : store_error(&store->read, "cannot read deliveries", err);
 out:
-    sqlite3_finalize(q);
+    store_finish(q);
     pthread_mutex_unlock(&store->read.lock);
     return s;
 }
@@ -97,22 +97,22 @@ status store_delivery_list(struct store *store, const char *owner, const char *j
     /* one statement for each index, as for jobs; the deliveries of a job are few */
     static const char *const sql[2][2] = {
         {WANTED "AND ?3 = '' AND ?4 = ''" NEWEST, WANTED "AND ?3 = '' AND owner = ?4" NEWEST},
-        {WANTED "AND job_id = ?3 AND ?4 = ''" NEWEST, WANTED "AND job_id = ?3 AND +owner = ?4" NEWEST}};
+        {WANTED "AND job_id = ?3 AND ?4 = ''" NEWEST, WANTED "AND job_id = ?3 AND owner || '' = ?4" NEWEST}};
 #undef WANTED
 #undef NEWEST
-    sqlite3_stmt *q = NULL;
+    struct store_query *q = NULL;
     size_t n = 0;
-    int rc = SQLITE_DONE;
+    enum store_step rc = STORE_DONE;
     struct delivery_row *row = calloc(limit, sizeof *row);
     if (row == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot list deliveries: out of memory");
     if (before <= 0) before = INT64_MAX;
     pthread_mutex_lock(&store->read.lock);
     status s = store_prepare(&store->read, &q, err, sql[job_id != NULL][owner != NULL], "iiss", before, (int64_t)limit,
                              job_id == NULL ? "" : job_id, owner == NULL ? "" : owner);
-    while (s == STATUS_OK && n < limit && (rc = sqlite3_step(q)) == SQLITE_ROW) read_row(q, &row[n++]);
-    if (s == STATUS_OK && rc != SQLITE_DONE && rc != SQLITE_ROW)
+    while (s == STATUS_OK && n < limit && (rc = store_step(q)) == STORE_ROW) read_row(q, &row[n++]);
+    if (s == STATUS_OK && rc != STORE_DONE && rc != STORE_ROW)
         s = store_error(&store->read, "cannot list deliveries", err);
-    sqlite3_finalize(q);
+    store_finish(q);
     pthread_mutex_unlock(&store->read.lock);
     if (s != STATUS_OK) {
         free(row);

@@ -3,21 +3,21 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define COLUMNS "id, job_id, name, role, size, offset, sha256, state, hash_state"
+#define COLUMNS "id, job_id, name, role, size, \"offset\", sha256, state, hash_state"
 
-static void read_row(sqlite3_stmt *q, struct file_row *row)
+static void read_row(struct store_query *q, struct file_row *row)
 {
     memset(row, 0, sizeof *row);
     store_text(q, 0, row->id, sizeof row->id);
     store_text(q, 1, row->job_id, sizeof row->job_id);
     store_text(q, 2, row->name, sizeof row->name);
     store_text(q, 3, row->role, sizeof row->role);
-    row->size_bytes = sqlite3_column_int64(q, 4);
-    row->offset_bytes = sqlite3_column_int64(q, 5);
+    row->size_bytes = store_int64(q, 4);
+    row->offset_bytes = store_int64(q, 5);
     store_text(q, 6, row->sha256, sizeof row->sha256);
-    row->state = (enum file_state)sqlite3_column_int(q, 7);
-    const void *blob = sqlite3_column_blob(q, 8);
-    int n = sqlite3_column_bytes(q, 8);
+    row->state = (enum file_state)(int)store_int64(q, 7);
+    size_t n = 0;
+    const void *blob = q->calls->blob(q, 8, &n);
     if (blob != NULL && n == STORE_HASH_STATE_BYTES) memcpy(row->hash_state, blob, STORE_HASH_STATE_BYTES);
 }
 
@@ -51,24 +51,25 @@ status store_file_insert(struct store *store, const struct file_row *row, size_t
     return store_report(store, s, row->job_id);
 }
 
-static status get_one(struct store *store, sqlite3_stmt *q, const char *what, struct file_row *row, struct error *err)
+static status get_one(struct store *store, struct store_query *q, const char *what, struct file_row *row,
+                      struct error *err)
 {
-    int rc = sqlite3_step(q);
-    if (rc == SQLITE_ROW) {
+    enum store_step rc = store_step(q);
+    if (rc == STORE_ROW) {
         read_row(q, row);
         return STATUS_OK;
     }
-    return rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "file '%.127s' does not exist", what)
-                             : store_error(&store->read, "cannot read file", err);
+    return rc == STORE_DONE ? error_set(err, STATUS_NOT_FOUND, "file '%.127s' does not exist", what)
+                            : store_error(&store->read, "cannot read file", err);
 }
 
 status store_file_get(struct store *store, const char *id, struct file_row *row, struct error *err)
 {
-    sqlite3_stmt *q = NULL;
+    struct store_query *q = NULL;
     pthread_mutex_lock(&store->read.lock);
     status s = store_prepare(&store->read, &q, err, "SELECT " COLUMNS " FROM file WHERE id = ?", "s", id);
     if (s == STATUS_OK) s = get_one(store, q, id, row, err);
-    sqlite3_finalize(q);
+    store_finish(q);
     pthread_mutex_unlock(&store->read.lock);
     return s;
 }
@@ -76,12 +77,12 @@ status store_file_get(struct store *store, const char *id, struct file_row *row,
 status store_file_find(struct store *store, const char *job_id, const char *name, struct file_row *row,
                        struct error *err)
 {
-    sqlite3_stmt *q = NULL;
+    struct store_query *q = NULL;
     pthread_mutex_lock(&store->read.lock);
     status s = store_prepare(&store->read, &q, err, "SELECT " COLUMNS " FROM file WHERE job_id = ? AND name = ?", "ss",
                              job_id, name);
     if (s == STATUS_OK) s = get_one(store, q, name, row, err);
-    sqlite3_finalize(q);
+    store_finish(q);
     pthread_mutex_unlock(&store->read.lock);
     return s;
 }
@@ -93,7 +94,7 @@ status store_file_find(struct store *store, const char *job_id, const char *name
 status store_file_known(struct store *store, const char *owner, const char *sha256, int64_t size_bytes,
                         struct file_row *row, struct error *err)
 {
-    sqlite3_stmt *q = NULL;
+    struct store_query *q = NULL;
     pthread_mutex_lock(&store->read.lock);
     /* with the size the index gives the newest one first, however many jobs have these bytes */
     status s = store_prepare(&store->read, &q, err,
@@ -103,7 +104,7 @@ status store_file_known(struct store *store, const char *owner, const char *sha2
                                                "sha256 = ?1 AND ?2 < 0" OF_OWNER,
                              "sis", sha256, size_bytes, owner);
     if (s == STATUS_OK) s = get_one(store, q, sha256, row, err);
-    sqlite3_finalize(q);
+    store_finish(q);
     pthread_mutex_unlock(&store->read.lock);
     return s;
 }
@@ -112,9 +113,9 @@ status store_file_update(struct store *store, const struct file_row *r, struct e
 {
     int n = 0;
     pthread_mutex_lock(&store->write.lock);
-    status s = store_run(&store->write, &n, err, "UPDATE file SET offset=?, sha256=?, state=?, hash_state=? WHERE id=?",
-                         "isibs", r->offset_bytes, r->sha256, (int64_t)r->state, r->hash_state,
-                         (int)STORE_HASH_STATE_BYTES, r->id);
+    status s = store_run(
+        &store->write, &n, err, "UPDATE file SET \"offset\"=?, sha256=?, state=?, hash_state=? WHERE id=?", "isibs",
+        r->offset_bytes, r->sha256, (int64_t)r->state, r->hash_state, (int)STORE_HASH_STATE_BYTES, r->id);
     pthread_mutex_unlock(&store->write.lock);
     if (s == STATUS_OK && n == 0) s = error_set(err, STATUS_NOT_FOUND, "file '%s' no longer exists", r->name);
     return store_report(store, s, r->job_id);
@@ -139,29 +140,29 @@ status store_file_erase(struct store *store, const char *id, struct job_row *job
 
 status store_file_count(struct store *store, const char *job_id, int64_t *n, struct error *err)
 {
-    sqlite3_stmt *q = NULL;
+    struct store_query *q = NULL;
     pthread_mutex_lock(&store->read.lock);
     status s = store_prepare(&store->read, &q, err, "SELECT count(*) FROM file WHERE job_id = ?", "s", job_id);
-    if (s == STATUS_OK && sqlite3_step(q) != SQLITE_ROW) s = store_error(&store->read, "cannot count files", err);
-    if (s == STATUS_OK) *n = sqlite3_column_int64(q, 0);
-    sqlite3_finalize(q);
+    if (s == STATUS_OK && store_step(q) != STORE_ROW) s = store_error(&store->read, "cannot count files", err);
+    if (s == STATUS_OK) *n = store_int64(q, 0);
+    store_finish(q);
     pthread_mutex_unlock(&store->read.lock);
     return s;
 }
 
 status store_file_list(struct store *store, const char *job_id, struct file_row **out, size_t *n_out, struct error *err)
 {
-    sqlite3_stmt *q = NULL;
+    struct store_query *q = NULL;
     struct file_row *row = NULL;
     size_t n = 0, capacity = 0;
-    int rc = SQLITE_DONE;
+    enum store_step rc = STORE_DONE;
     pthread_mutex_lock(&store->read.lock);
     status s =
         job_id != NULL
             ? store_prepare(&store->read, &q, err, "SELECT " COLUMNS " FROM file WHERE job_id = ? ORDER BY serial", "s",
                             job_id)
             : store_prepare(&store->read, &q, err, "SELECT " COLUMNS " FROM file WHERE state <> 2 ORDER BY serial", "");
-    while (s == STATUS_OK && (rc = sqlite3_step(q)) == SQLITE_ROW) {
+    while (s == STATUS_OK && (rc = store_step(q)) == STORE_ROW) {
         if (n == capacity) {
             capacity = capacity == 0 ? 64 : capacity * 2;
             struct file_row *more = realloc(row, capacity * sizeof *more);
@@ -173,8 +174,8 @@ status store_file_list(struct store *store, const char *job_id, struct file_row 
         }
         read_row(q, &row[n++]);
     }
-    if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(&store->read, "cannot list files", err);
-    sqlite3_finalize(q);
+    if (s == STATUS_OK && rc != STORE_DONE) s = store_error(&store->read, "cannot list files", err);
+    store_finish(q);
     pthread_mutex_unlock(&store->read.lock);
     if (s != STATUS_OK) {
         free(row);

@@ -1,4 +1,5 @@
 /* Writes jobs that were read from their folders. */
+#include "base/clock.h"
 #include "server/store/store_sql.h"
 
 #include <stdio.h>
@@ -18,12 +19,13 @@ static status add(struct store *store, struct job_row *row, const char *key, con
 static status replace(struct store *store, const struct job_row *row, const char *key, const char *body_hash,
                       struct error *err)
 {
-    status s = store_run(&store->write, NULL, err, "INSERT OR REPLACE INTO document (job_id, text) VALUES (?,?)", "ss",
-                         row->id, row->document);
+    status s = store_run(
+        &store->write, NULL, err,
+        "INSERT INTO document (job_id, text) VALUES (?,?) ON CONFLICT (job_id) DO UPDATE SET text = excluded.text",
+        "ss", row->id, row->document);
     if (s == STATUS_OK && key != NULL)
-        s = store_run(&store->write, NULL, err,
-                      "INSERT OR REPLACE INTO idempotency (owner, key, job_id, body_hash, created) VALUES (?,?,?,?,?)",
-                      "ssssd", row->owner, key, row->id, body_hash, row->created_unix_s);
+        s = store_run(&store->write, NULL, err, STORE_KEY_WRITE, "ssssd", row->owner, key, row->id, body_hash,
+                      row->created_unix_s);
     if (s == STATUS_OK) s = store_run(&store->write, NULL, err, "DELETE FROM file WHERE job_id = ?", "s", row->id);
     return s;
 }
@@ -39,8 +41,8 @@ static status import_batch(struct store *store, struct job_row *row, struct erro
     if (row->batch[0] == '\0') return STATUS_OK;
     for (size_t i = 0; s == STATUS_OK && i < 2; i++) { /* the second name where another batch has the first one */
         snprintf(sql, sizeof sql,
-                 "INSERT OR IGNORE INTO batch (id, owner, name, template, created, updated) SELECT ?1, ?2, %s, "
-                 "'', ?4, ?4 WHERE length(?1) = 36",
+                 "INSERT INTO batch (id, owner, name, template, created, updated) SELECT ?1, ?2, %s, "
+                 "'', ?4, ?4 WHERE length(?1) = 36 ON CONFLICT DO NOTHING",
                  name[i]);
         s = store_run(&store->write, NULL, err, sql, "sssd", row->batch, row->owner, row->batch_name,
                       row->created_unix_s);
@@ -67,9 +69,9 @@ static status import(struct store *store, struct job_row *row, const struct file
     if (s == STATUS_OK)
         /* tags and ids of deliveries are made of the revision, so it must rise over all that clients may have seen */
         s = store_run(&store->write, NULL, err,
-                      "UPDATE job SET updated = ?, revision = max(revision, CAST(strftime('%s', 'now') AS INTEGER)) "
-                      "WHERE id = ?",
-                      "ds", updated_unix_s, row->id);
+                      "UPDATE job SET updated = ?1, revision = CASE WHEN revision < ?2 THEN ?2 ELSE revision END "
+                      "WHERE id = ?3",
+                      "dis", updated_unix_s, (int64_t)clock_wall_s(), row->id);
     return store_end(&store->write, s, err);
 }
 

@@ -16,61 +16,59 @@ void job_rows_free(struct job_row *row, size_t n)
     free(row);
 }
 
-status store_job_read(sqlite3_stmt *q, struct job_row *row, struct error *err)
+status store_job_read(struct store_query *q, struct job_row *row, struct error *err)
 {
     memset(row, 0, sizeof *row);
-    row->serial = sqlite3_column_int64(q, 0);
+    row->serial = store_int64(q, 0);
     store_text(q, 1, row->id, sizeof row->id);
     store_text(q, 2, row->sample, sizeof row->sample);
-    const char *document = (const char *)sqlite3_column_text(q, 3);
+    const char *document = store_column_text(q, 3);
     if (document != NULL) row->document = strdup(document);
-    if (row->document == NULL && sqlite3_column_type(q, 3) != SQLITE_NULL)
+    if (row->document == NULL && !store_is_null(q, 3))
         return error_set(err, STATUS_NO_MEMORY, "cannot read job: out of memory");
-    row->revision = sqlite3_column_int64(q, 4);
-    row->state = (enum job_state)sqlite3_column_int(q, 5);
-    row->cancel_requested = sqlite3_column_int(q, 6) != 0;
-    row->dirty = sqlite3_column_int(q, 7) != 0;
-    row->deleted = sqlite3_column_int(q, 8) != 0;
-    row->attempt = sqlite3_column_int64(q, 9);
-    row->lost_attempts = sqlite3_column_int64(q, 10);
-    row->generation = sqlite3_column_int64(q, 11);
+    row->revision = store_int64(q, 4);
+    row->state = (enum job_state)(int)store_int64(q, 5);
+    row->cancel_requested = (int)store_int64(q, 6) != 0;
+    row->dirty = (int)store_int64(q, 7) != 0;
+    row->deleted = (int)store_int64(q, 8) != 0;
+    row->attempt = store_int64(q, 9);
+    row->lost_attempts = store_int64(q, 10);
+    row->generation = store_int64(q, 11);
     store_text(q, 12, row->token, sizeof row->token);
-    row->created_unix_s = sqlite3_column_double(q, 13);
-    row->updated_unix_s = sqlite3_column_double(q, 14);
-    row->queued_unix_s = sqlite3_column_double(q, 15);
-    row->started_unix_s = sqlite3_column_double(q, 16);
-    row->finished_unix_s = sqlite3_column_double(q, 17);
+    row->created_unix_s = store_real(q, 13);
+    row->updated_unix_s = store_real(q, 14);
+    row->queued_unix_s = store_real(q, 15);
+    row->started_unix_s = store_real(q, 16);
+    row->finished_unix_s = store_real(q, 17);
     store_text(q, 18, row->error_code, sizeof row->error_code);
     store_text(q, 19, row->error_field, sizeof row->error_field);
     store_text(q, 20, row->error_text, sizeof row->error_text);
-    row->peak_rss_bytes = sqlite3_column_int64(q, 21);
+    row->peak_rss_bytes = store_int64(q, 21);
     store_text(q, 22, row->owner, sizeof row->owner);
-    row->priority = sqlite3_column_int64(q, 23);
+    row->priority = store_int64(q, 23);
     store_text(q, 24, row->tags, sizeof row->tags);
     store_text(q, 25, row->verdict, sizeof row->verdict);
     store_text(q, 26, row->batch, sizeof row->batch);
-    row->batch_place = sqlite3_column_int64(q, 27);
+    row->batch_place = store_int64(q, 27);
     store_text(q, 28, row->batch_name, sizeof row->batch_name);
     return STATUS_OK;
 }
 
 status store_job_add(struct store *store, struct job_row *r, const char *key, const char *body_hash, struct error *err)
 {
-    status s =
-        store_run(&store->write, NULL, err,
-                  "INSERT INTO job (id, sample, state, cancel_requested, dirty, deleted, attempt, "
-                  "lost_attempts, generation, token, created, "
-                  "updated, queued, started, finished, error_code, error_field, error_text, peak_rss, owner) VALUES "
-                  "(?,?,?,0,0,0,0,0,0,'',?,?,0,0,0,'','','',0,?)",
-                  "ssidds", r->id, r->sample, (int64_t)r->state, r->created_unix_s, r->created_unix_s, r->owner);
-    if (s == STATUS_OK) r->serial = sqlite3_last_insert_rowid(store->write.db);
+    status s = store_run_serial(
+        &store->write, &r->serial, err,
+        "INSERT INTO job (id, sample, state, cancel_requested, dirty, deleted, attempt, "
+        "lost_attempts, generation, token, created, "
+        "updated, queued, started, finished, error_code, error_field, error_text, peak_rss, owner) VALUES "
+        "(?,?,?,0,0,0,0,0,0,'',?,?,0,0,0,'','','',0,?) RETURNING serial",
+        "ssidds", r->id, r->sample, (int64_t)r->state, r->created_unix_s, r->created_unix_s, r->owner);
     if (s == STATUS_OK)
         s = store_run(&store->write, NULL, err, "INSERT INTO document (job_id, text) VALUES (?,?)", "ss", r->id,
                       r->document);
     if (s == STATUS_OK && key != NULL)
-        s = store_run(&store->write, NULL, err,
-                      "INSERT OR REPLACE INTO idempotency (owner, key, job_id, body_hash, created) VALUES (?,?,?,?,?)",
-                      "ssssd", r->owner, key, r->id, body_hash, r->created_unix_s);
+        s = store_run(&store->write, NULL, err, STORE_KEY_WRITE, "ssssd", r->owner, key, r->id, body_hash,
+                      r->created_unix_s);
     return s;
 }
 
@@ -93,41 +91,41 @@ status store_job_insert(struct store *store, struct job_row *row, const char *id
 status store_idempotency_find(struct store *store, const char *owner, const char *key, char job_id[STORE_ID_BYTES],
                               char body_hash[STORE_HASH_TEXT_BYTES], struct error *err)
 {
-    sqlite3_stmt *q = NULL;
+    struct store_query *q = NULL;
     pthread_mutex_lock(&store->read.lock);
     status s = store_prepare(&store->read, &q, err,
                              "SELECT i.job_id, i.body_hash FROM idempotency i JOIN job j ON j.id = i.job_id WHERE "
                              "i.owner = ? AND i.key = ? AND j.deleted = 0",
                              "ss", owner, key);
     if (s != STATUS_OK) goto out;
-    int rc = sqlite3_step(q);
-    if (rc == SQLITE_ROW) {
+    enum store_step rc = store_step(q);
+    if (rc == STORE_ROW) {
         store_text(q, 0, job_id, STORE_ID_BYTES);
         store_text(q, 1, body_hash, STORE_HASH_TEXT_BYTES);
     } else
-        s = rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "key is new")
-                              : store_error(&store->read, "cannot look up a key", err);
+        s = rc == STORE_DONE ? error_set(err, STATUS_NOT_FOUND, "key is new")
+                             : store_error(&store->read, "cannot look up a key", err);
 out:
-    sqlite3_finalize(q);
+    store_finish(q);
     pthread_mutex_unlock(&store->read.lock);
     return s;
 }
 
 static status get(struct store *store, const char *sql, const char *id, struct job_row *row, struct error *err)
 {
-    sqlite3_stmt *q = NULL;
+    struct store_query *q = NULL;
     memset(row, 0, sizeof *row);
     pthread_mutex_lock(&store->read.lock);
     status s = store_prepare(&store->read, &q, err, sql, "s", id);
     if (s != STATUS_OK) goto out;
-    int rc = sqlite3_step(q);
-    if (rc == SQLITE_ROW)
+    enum store_step rc = store_step(q);
+    if (rc == STORE_ROW)
         s = store_job_read(q, row, err);
     else
-        s = rc == SQLITE_DONE ? error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", id)
-                              : store_error(&store->read, "cannot read job", err);
+        s = rc == STORE_DONE ? error_set(err, STATUS_NOT_FOUND, "job '%.40s' does not exist", id)
+                             : store_error(&store->read, "cannot read job", err);
 out:
-    sqlite3_finalize(q);
+    store_finish(q);
     pthread_mutex_unlock(&store->read.lock);
     return s;
 }

@@ -1,19 +1,39 @@
-/* Internals of the store: its two connections, and helpers around SQLite statements. */
+/* Internals of the store: its connections, and helpers around the statements of a driver (drivers/store_driver.h). */
 #ifndef SELVEDGE_SERVER_STORE_SQL_H
 #define SELVEDGE_SERVER_STORE_SQL_H
 
+#include "server/store/drivers/store_driver.h"
 #include "server/store/store.h"
 
 #include <pthread.h>
-#include <sqlite3.h>
+#include <stdatomic.h>
+
+struct store_gate;
 
 struct store_link {
-    sqlite3 *db;
+    const struct store_calls *calls;
+    void *db;
+    const struct store_phrases *phrase;
+    struct store_gate *gate; /* changes are refused while their thread is behind a gate that has failed; may be NULL */
     pthread_mutex_t lock;
 };
 
+/* Keeps other daemons from what is being changed (store_cluster.h). link.lock is held by the thread behind it. */
+struct store_gate {
+    struct store_link link; /* a connection of its own, because its locks last longer than a transaction */
+    atomic_bool entered;
+    pthread_t thread;
+    status fault;
+    struct error why;
+};
+
 struct store {
+    const struct store_driver *driver;
+    struct store_place place;
+    char application[STORE_APPLICATION_BYTES];          /* name of the connections at a server */
+    char daemon[STORE_ID_BYTES];                        /* id of this daemon; guarded by write.lock when it changes */
     struct store_link write, read;                      /* no function holds both locks */
+    struct store_gate gate;                             /* without a connection unless the driver is shared */
     void (*changed)(void *context, const char *job_id); /* NULL: nobody asks */
     void *changed_context;
 };
@@ -27,15 +47,33 @@ struct store {
     "priority, tags, verdict, batch, batch_place, "                                                                    \
     "CASE WHEN batch = '' THEN '' ELSE (SELECT name FROM batch WHERE batch.id = job.batch) END"
 
-/* Sets err from SQLite's last result; what is for example "cannot write job". */
+/* Writes a key of idempotency: owner, key, job, hash of the body, time. */
+#define STORE_KEY_WRITE                                                                                                \
+    "INSERT INTO idempotency (owner, key, job_id, body_hash, created) VALUES (?,?,?,?,?) ON CONFLICT (owner, key) DO " \
+    "UPDATE SET job_id = excluded.job_id, body_hash = excluded.body_hash, created = excluded.created"
+
+/* Sets err from the database's last failure; what is for example "cannot write job". */
 status store_error(struct store_link *link, const char *what, struct error *err);
-/* Prepares a statement and binds the values by format: s text, i int64_t, d double, b blob (pointer and int size). */
-status store_prepare(struct store_link *link, sqlite3_stmt **statement, struct error *err, const char *sql,
+/* Starts a statement with values by format: s text, i int64_t, d double, b blob (pointer and int size). *query is NULL
+ * after an error. The caller calls store_finish. */
+status store_prepare(struct store_link *link, struct store_query **query, struct error *err, const char *sql,
                      const char *format, ...);
-/* Prepares a statement, binds its values and runs it to the end. *n_changed may be NULL. */
+/* Runs a statement to the end. *n_changed may be NULL. */
 status store_run(struct store_link *link, int *n_changed, struct error *err, const char *sql, const char *format, ...);
+/* Runs a statement that ends with RETURNING and gives one number. */
+status store_run_serial(struct store_link *link, int64_t *serial, struct error *err, const char *sql,
+                        const char *format, ...);
+/* Runs statements without values. */
+status store_script(struct store_link *link, const char *sql, const char *what, struct error *err);
+/* The next row of a statement, and its columns; query NULL: STORE_FAILED. */
+enum store_step store_step(struct store_query *query);
+bool store_is_null(struct store_query *query, int column);
+int64_t store_int64(struct store_query *query, int column);
+double store_real(struct store_query *query, int column);
+const char *store_column_text(struct store_query *query, int column); /* NULL: null */
+void store_finish(struct store_query *query);
 /* Copies the columns of JOB_COLUMNS to a row. STATUS_NO_MEMORY. */
-status store_job_read(sqlite3_stmt *statement, struct job_row *row, struct error *err);
+status store_job_read(struct store_query *query, struct job_row *row, struct error *err);
 /* A transaction, while link->lock is held. store_end commits it, or rolls it back when so_far is an error or the
  * commit fails. */
 status store_begin(struct store_link *link, struct error *err);
@@ -49,9 +87,13 @@ status store_file_add(struct store *store, const struct file_row *row, size_t n,
 status store_job_write(struct store *store, struct job_row *row, struct error *err);
 /* Reports a change of a job, unless s is an error. Returns s. To be called without locks. */
 status store_report(const struct store *store, status s, const char *job_id);
-/* Statements of which entry i changes the schema from version i to version i + 1. */
+/* STATUS_OK unless this thread is behind the gate (may be NULL) and its locks are not there. */
+status store_gate_check(struct store_gate *gate, struct error *err);
+/* Statements of which entry i changes the schema of SQLite from version i to version i + 1. */
 const char *const *store_migrations(int *n);
+/* The same of PostgreSQL: lists of scripts, which NULL ends. */
+const char *const *const *store_postgres_migrations(int *n);
 /* Copies a text column into a buffer; NULL becomes "". */
-void store_text(sqlite3_stmt *statement, int column, char *out, size_t n_out);
+void store_text(struct store_query *query, int column, char *out, size_t n_out);
 
 #endif

@@ -34,20 +34,20 @@ status store_tag_count(struct store *store, const char *owner, struct tag_count 
 {
     struct tag_count *tag = NULL;
     size_t n = 0, capacity = 0, n_kind = 0;
-    sqlite3_stmt *q = NULL;
+    struct store_query *q = NULL;
     pthread_mutex_lock(&store->read.lock);
     status s = store_prepare(&store->read, &q, err,
                              owner == NULL ? "SELECT tags FROM job WHERE deleted = 0 AND tags <> '' AND ?1 IS NULL"
                                            : "SELECT tags FROM job WHERE deleted = 0 AND tags <> '' AND owner = ?1",
                              "s", owner);
-    int rc = SQLITE_DONE;
-    while (s == STATUS_OK && (rc = sqlite3_step(q)) == SQLITE_ROW) {
+    enum store_step rc = STORE_DONE;
+    while (s == STATUS_OK && (rc = store_step(q)) == STORE_ROW) {
         char text[STORE_TAGS_BYTES];
         store_text(q, 0, text, sizeof text);
         s = add_tags(text, &tag, &n, &capacity, err);
     }
-    if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(&store->read, "cannot count tags", err);
-    sqlite3_finalize(q);
+    if (s == STATUS_OK && rc != STORE_DONE) s = store_error(&store->read, "cannot count tags", err);
+    store_finish(q);
     pthread_mutex_unlock(&store->read.lock);
     if (s != STATUS_OK) {
         free(tag);
@@ -67,19 +67,19 @@ status store_tag_count(struct store *store, const char *owner, struct tag_count 
 static status fill(struct store *store, void (*read)(void *context, const char *id, char code[40]), void *context,
                    struct error *err)
 {
-    sqlite3_stmt *q = NULL;
-    int rc = SQLITE_DONE;
+    struct store_query *q = NULL;
+    enum store_step rc = STORE_DONE;
     status s = store_begin(&store->write, err);
     if (s != STATUS_OK) return s;
     s = store_prepare(&store->write, &q, err, "SELECT id FROM job WHERE verdict = '?'", "");
-    while (s == STATUS_OK && (rc = sqlite3_step(q)) == SQLITE_ROW) {
+    while (s == STATUS_OK && (rc = store_step(q)) == STORE_ROW) {
         char id[STORE_ID_BYTES], code[40] = "";
         store_text(q, 0, id, sizeof id);
         read(context, id, code);
         s = store_run(&store->write, NULL, err, "UPDATE job SET verdict = ? WHERE id = ?", "ss", code, id);
     }
-    if (s == STATUS_OK && rc != SQLITE_DONE) s = store_error(&store->write, "cannot read the jobs", err);
-    sqlite3_finalize(q);
+    if (s == STATUS_OK && rc != STORE_DONE) s = store_error(&store->write, "cannot read the jobs", err);
+    store_finish(q);
     return store_end(&store->write, s, err);
 }
 

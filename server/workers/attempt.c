@@ -2,9 +2,11 @@
 #include "base/clock.h"
 #include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
+#include "server/cluster/job_change.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/versions/result_version.h"
+#include "server/store/store_cluster.h"
 #include "server/workers/console.h"
 
 #include <signal.h>
@@ -86,15 +88,19 @@ static status prepare_locked(struct job_service *v, struct job_row *row, struct 
     return job_update(v, row, err);
 }
 
-status attempt_prepare(struct job_service *v, const char *job_id, struct error *err)
+status attempt_prepare(struct job_service *v, const char *job_id, char token[STORE_ID_BYTES], struct error *err)
 {
     struct job_row row;
-    pthread_mutex_lock(&v->change);
-    status s = job_get(v, job_id, &row, err);
+    status s = store_job_claim(v->store, job_id, err);
+    if (s != STATUS_OK) return s;
+    job_change_begin(v, job_id, NULL);
+    s = job_get(v, job_id, &row, err);
     if (s == STATUS_NOT_FOUND) s = STATUS_CONFLICT;
     if (s == STATUS_OK) s = prepare_locked(v, &row, err);
-    pthread_mutex_unlock(&v->change);
+    job_change_end(v);
     if (s == STATUS_OK) atomic_fetch_add(&v->n_attempt_total, 1);
+    if (s != STATUS_OK) store_job_unclaim(v->store, job_id, NULL);
+    snprintf(token, STORE_ID_BYTES, "%s", row.token);
     job_row_release(&row);
     return s;
 }
@@ -281,13 +287,17 @@ static void apply_end(struct job_service *v, struct job_row *row, const struct w
         lost(v, row, end, stop, outcome);
 }
 
-status attempt_finish(struct job_service *v, const char *job_id, const struct worker_end *end, enum attempt_stop stop,
-                      struct attempt_outcome *outcome, struct error *err)
+status attempt_finish(struct job_service *v, const char *job_id, const char *token, const struct worker_end *end,
+                      enum attempt_stop stop, struct attempt_outcome *outcome, struct error *err)
 {
     struct job_row row;
-    pthread_mutex_lock(&v->change);
+    job_change_begin(v, job_id, NULL);
     status s = store_job_look(v->store, job_id, &row, err);
     if (s != STATUS_OK) goto out;
+    if (row.state != JOB_RUNNING || strcmp(row.token, token) != 0) {
+        log_warning(v->log, "job %s: the end of an attempt counts for nothing, because the job was taken over", job_id);
+        goto out;
+    }
     apply_end(v, &row, end, stop, outcome);
     if (end->peak_rss_bytes > row.peak_rss_bytes) row.peak_rss_bytes = end->peak_rss_bytes;
     bool over = row.state == JOB_SUCCEEDED || row.state == JOB_FAILED || row.state == JOB_CANCELLED;
@@ -299,7 +309,7 @@ status attempt_finish(struct job_service *v, const char *job_id, const struct wo
         log_info(v->log, "job %s is %s%s%s", job_id, job_state_name(row.state), row.error_text[0] ? ": " : "",
                  row.error_text);
 out:
-    pthread_mutex_unlock(&v->change);
+    job_change_end(v);
     job_row_release(&row);
     return s == STATUS_NOT_FOUND ? STATUS_OK : s;
 }
@@ -307,7 +317,7 @@ out:
 status attempt_fail(struct job_service *v, const char *job_id, const char *why, struct error *err)
 {
     struct job_row row;
-    pthread_mutex_lock(&v->change);
+    job_change_begin(v, job_id, NULL);
     status s = job_get(v, job_id, &row, err);
     if (s == STATUS_OK && row.state == JOB_QUEUED) {
         row.state = JOB_FAILED;
@@ -315,7 +325,7 @@ status attempt_fail(struct job_service *v, const char *job_id, const char *why, 
         set_error(&row, "conflict", "", why);
         s = job_update(v, &row, err);
     }
-    pthread_mutex_unlock(&v->change);
+    job_change_end(v);
     job_row_release(&row);
     return s;
 }
@@ -325,12 +335,16 @@ void attempt_resume_paused(struct job_service *v)
     struct job_row *row = NULL;
     size_t n = 0;
     struct job_query q = {.states = 1U << JOB_PAUSED, .limit = 1000};
-    pthread_mutex_lock(&v->change);
-    if (store_job_list(v->store, &q, &row, &n, NULL) == STATUS_OK)
+    if (store_job_list(v->store, &q, &row, &n, NULL) != STATUS_OK) return;
+    job_rows_free(row, n);
+    if (n == 0) return;
+    job_change_begin(v, NULL, NULL);
+    if (store_job_list(v->store, &q, &row, &n, NULL) == STATUS_OK) {
         for (size_t i = 0; i < n; i++) {
             row[i].state = JOB_QUEUED;
             job_update(v, &row[i], NULL);
         }
-    pthread_mutex_unlock(&v->change);
-    job_rows_free(row, n);
+        job_rows_free(row, n);
+    }
+    job_change_end(v);
 }

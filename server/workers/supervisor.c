@@ -1,8 +1,10 @@
 #include "server/workers/supervisor.h"
 #include "base/clock.h"
+#include "server/cluster/lease_keeper.h"
 #include "server/events/change_feed.h"
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_paths.h"
+#include "server/store/store_cluster.h"
 #include "server/workers/attempt.h"
 #include "server/workers/backends/job_backend.h"
 #include "server/workers/console.h"
@@ -21,7 +23,7 @@ enum { MAX_WORKER = SETTING_MAX_WORKERS, BURY_AGAIN_S = 60, IDLE_LOOK_MS = 1000 
 
 struct slot {
     bool used;
-    char job_id[STORE_ID_BYTES], owner[STORE_OWNER_BYTES], batch[STORE_ID_BYTES];
+    char job_id[STORE_ID_BYTES], owner[STORE_OWNER_BYTES], batch[STORE_ID_BYTES], token[STORE_ID_BYTES];
     struct backend_run *run; /* NULL: its start has failed */
     enum attempt_stop stop;  /* reason for the request to stop */
     double seen_heartbeat_unix_s,
@@ -44,7 +46,8 @@ struct supervisor {
     struct slot slot[MAX_WORKER];
     struct waiting_list waiting;
     bool below_floor, adopted;
-    double disk_seen_s;
+    double disk_seen_s, lease_seen_s;
+    unsigned n_loss; /* of the lease, as far as it was seen */
 };
 
 static void request_stop(struct supervisor *u, struct slot *slot, enum attempt_stop why)
@@ -69,7 +72,7 @@ static void record_end(struct supervisor *u, struct slot *slot)
 {
     struct error err = {0};
     struct attempt_outcome outcome = {0};
-    if (attempt_finish(u->v, slot->job_id, &slot->end, slot->stop, &outcome, &err) != STATUS_OK) {
+    if (attempt_finish(u->v, slot->job_id, slot->token, &slot->end, slot->stop, &outcome, &err) != STATUS_OK) {
         /* the database could not be written, so the row still says running: keep the slot and try again */
         log_error(u->v->log, "job %s: %s", slot->job_id, err.text);
         slot->retry_s = clock_monotonic_s() + 1;
@@ -189,18 +192,22 @@ static void start_failed(struct supervisor *u, struct slot *slot, const struct e
     waiting_list_find(&u->waiting, job_id, true)->until_s = clock_monotonic_s() + 2;
 }
 
-static void launch(struct supervisor *u, const struct queued_job *job)
+/* Returns whether the job takes a slot. */
+static bool launch(struct supervisor *u, const struct queued_job *job)
 {
     struct error err = {0};
-    status s = attempt_prepare(u->v, job->id, &err);
-    if (s == STATUS_CONFLICT) return; /* cancelled or deleted meanwhile */
+    char token[STORE_ID_BYTES];
+    status s = attempt_prepare(u->v, job->id, token, &err);
+    if (s == STATUS_CONFLICT) return false; /* cancelled or deleted meanwhile, or another daemon was faster */
     if (s != STATUS_OK) {
         log_error(u->v->log, "job %s cannot be prepared; next try in 5 s: %s", job->id, err.text);
         waiting_list_find(&u->waiting, job->id, true)->until_s = clock_monotonic_s() + 5;
-        return;
+        return false;
     }
     struct slot *slot = take_slot(u, job->id, job->owner, job->batch);
+    memcpy(slot->token, token, sizeof token);
     if (u->backend->start(u->engine, job->id, &slot->run, &err) != STATUS_OK) start_failed(u, slot, &err);
+    return true;
 }
 
 /* Takes over the jobs that an earlier daemon has started. Those that find no slot now are adopted later. */
@@ -214,9 +221,10 @@ static void adopt(struct supervisor *u)
     u->adopted = n < MAX_WORKER;
     for (size_t i = 0; i < n; i++) {
         struct error err = {0};
-        if (is_running(u, row[i].id)) continue;
+        if (is_running(u, row[i].id) || store_job_take(u->v->store, row[i].id, &err) != STATUS_OK) continue;
         if (n_free-- == 0) break;
         struct slot *slot = take_slot(u, row[i].id, row[i].owner, row[i].batch);
+        memcpy(slot->token, row[i].token, sizeof slot->token);
         if (u->backend->adopt(u->engine, row[i].id, &slot->run, &err) != STATUS_OK) start_failed(u, slot, &err);
     }
     job_rows_free(row, n);
@@ -245,8 +253,9 @@ static void fill_slots(struct supervisor *u)
         if (!is_free(u, job[i].id)) queue_turn_skip(turn, i);
     for (i = 0; turn != NULL && i < MAX_WORKER; i++)
         if (u->slot[i].used) queue_turn_running(turn, u->slot[i].owner, u->slot[i].batch, 1);
-    for (; turn != NULL && free_slots > 0 && (i = queue_turn_next(turn, clock_wall_s())) < n; free_slots--) {
-        launch(u, &job[i]);
+    while (turn != NULL && free_slots > 0 && (i = queue_turn_next(turn, clock_wall_s())) < n) {
+        if (!launch(u, &job[i])) continue;
+        free_slots--;
         queue_turn_running(turn, job[i].owner, job[i].batch, 1);
     }
     queue_turn_free(turn);
@@ -257,9 +266,12 @@ static void remove_deleted(struct supervisor *u)
 {
     struct job_row *row = NULL;
     size_t n = 0;
+    bool elsewhere = false;
     struct job_query q = {.deleted = true, .limit = 64};
     if (store_job_list(u->v->store, &q, &row, &n, NULL) != STATUS_OK) return;
-    for (size_t i = 0; i < n; i++) {
+    bool mine = n > 0 && store_duty_is_mine(u->v->store, "removal");
+    for (size_t i = 0; mine && i < n; i++) {
+        if (store_job_elsewhere(u->v->store, row[i].id, &elsewhere, NULL) != STATUS_OK || elsewhere) continue;
         if (!is_free(u, row[i].id)) continue;
         char path[PATH_BYTES];
         struct error err = {0};
@@ -289,9 +301,24 @@ static void check_disk(struct supervisor *u)
     if (!u->below_floor) ballast_keep(u->v->settings->data, u->v->settings->ballast_bytes);
 }
 
+/* Kills the workers when the lease was lost, since others have their jobs, and takes over jobs that nobody holds: a
+ * backend whose workers outlive their daemon adopts them, others begin again. */
+static void keep_to_lease(struct supervisor *u, double now)
+{
+    if (u->v->keeper == NULL || now - u->lease_seen_s < 1) return;
+    u->lease_seen_s = now;
+    unsigned n_loss = lease_keeper_losses(u->v->keeper);
+    for (size_t i = 0; n_loss != u->n_loss && i < MAX_WORKER; i++)
+        if (u->slot[i].used && !u->slot[i].ended) kill_now(u, &u->slot[i], STOP_SHUTDOWN);
+    u->n_loss = n_loss;
+    u->adopted = false;
+    if (u->backend->adopt == NULL) lease_keeper_adopt(u->v);
+}
+
 static void tick(struct supervisor *u)
 {
     double now = clock_monotonic_s();
+    keep_to_lease(u, now);
     if (now - u->disk_seen_s > 2) {
         u->disk_seen_s = now;
         check_disk(u);

@@ -1,4 +1,5 @@
 #include "server/jobs/batches/batch_inputs.h"
+#include "server/cluster/job_change.h"
 #include "server/jobs/inputs/known_input.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
@@ -96,9 +97,9 @@ static status link_known(struct job_service *v, const struct access_grant *grant
     for (size_t i = 0; i < t->n; i++) n += t->sample[i].n_file;
     struct linked l = {.row = calloc(n + 1, sizeof *l.row)};
     if (l.row == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot submit the batch: out of memory");
-    pthread_mutex_lock(&v->change);
+    job_change_begin(v, NULL, NULL);
     status s = link_locked(v, grant, t, out, &l, err);
-    pthread_mutex_unlock(&v->change);
+    job_change_end(v);
     free(l.row);
     return s;
 }

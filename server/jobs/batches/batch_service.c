@@ -1,5 +1,6 @@
 #include "server/jobs/batches/batch_service.h"
 #include "base/clock.h"
+#include "server/cluster/job_change.h"
 #include "server/http/http_problem.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
@@ -114,11 +115,11 @@ status batch_act(struct job_service *v, const char *id, enum batch_action action
     size_t n = 0;
     *n_changed = 0;
     *refused = json_array();
-    pthread_mutex_lock(&v->change);
+    job_change_begin(v, NULL, NULL);
     status s = batch_get(v, id, &batch, err);
     if (s == STATUS_OK) s = batch_jobs(v, id, &row, &n, err);
     if (s == STATUS_OK) s = act_locked(&deed, row, n, n_changed, *refused, err);
-    pthread_mutex_unlock(&v->change);
+    job_change_end(v);
     if (s == STATUS_OK && *n_changed > 0) log_info(v->log, "batch %s: %zu jobs %s", id, *n_changed, verb[action]);
     if (s == STATUS_OK && *n_changed > 0 && v->supervisor != NULL) supervisor_wake(v->supervisor);
     free(row); /* without documents; rows moved to the front must not be released twice */
@@ -131,7 +132,7 @@ status batch_delete(struct job_service *v, const char *id, bool delete_jobs, str
     struct batch_row batch;
     struct job_row *row = NULL;
     size_t n = 0;
-    pthread_mutex_lock(&v->change);
+    job_change_begin(v, NULL, NULL);
     status s = batch_get(v, id, &batch, err);
     if (s == STATUS_OK) s = batch_jobs(v, id, &row, &n, err);
     for (size_t i = 0; s == STATUS_OK && i < n; i++) {
@@ -141,7 +142,7 @@ status batch_delete(struct job_service *v, const char *id, bool delete_jobs, str
     }
     if (s == STATUS_OK) s = store_batch_erase(v->store, id, row, n, err);
     if (s == STATUS_OK) job_note_all(v, row, n);
-    pthread_mutex_unlock(&v->change);
+    job_change_end(v);
     if (s == STATUS_OK) {
         for (size_t i = 0; delete_jobs && i < n; i++) upload_discard_job(v->upload, row[i].id);
         log_info(v->log, "batch %s '%s' deleted, its %zu jobs %s", id, batch.name, n, delete_jobs ? "too" : "stay");

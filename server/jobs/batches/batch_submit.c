@@ -1,5 +1,6 @@
 /* Submits a batch: compares its table with the jobs that are there, and makes those that are missing. */
 #include "base/clock.h"
+#include "server/cluster/job_change.h"
 #include "server/jobs/batches/batch_inputs.h"
 #include "server/jobs/job_access.h"
 #include "server/workers/supervisor.h"
@@ -254,9 +255,9 @@ status batch_submit(struct job_service *v, const struct access_grant *grant, con
 {
     struct submission s = {.v = v, .table = table};
     *out = (struct batch_outcome){.samples = json_array(), .left = json_array()};
-    pthread_mutex_lock(&v->change);
+    job_change_begin(v, NULL, NULL);
     status st = submit_locked(&s, grant, out, refusal, err);
-    pthread_mutex_unlock(&v->change);
+    job_change_end(v);
     if (st == STATUS_OK && v->supervisor != NULL && json_array_size(out->left) > 0) supervisor_wake(v->supervisor);
     if (st == STATUS_OK) st = batch_declare_files(v, grant, table, out, refusal, err);
     if (st == STATUS_OK && !out->replayed)

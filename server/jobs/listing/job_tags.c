@@ -1,4 +1,5 @@
 #include "server/jobs/listing/job_tags.h"
+#include "server/cluster/job_change.h"
 #include "server/jobs/job_access.h"
 
 #include <stdio.h>
@@ -85,7 +86,7 @@ status job_edit_tags(struct job_service *v, const char *id, const struct tag_edi
     struct job_row row;
     char before[STORE_TAGS_BYTES];
     *changed = false;
-    pthread_mutex_lock(&v->change);
+    job_change_begin(v, id, NULL);
     status s = job_look(v, id, &row, err);
     if (s != STATUS_OK) goto out;
     json_t *had = job_tags_json(&row), *tags = json_array();
@@ -98,6 +99,6 @@ status job_edit_tags(struct job_service *v, const char *id, const struct tag_edi
     *changed = s == STATUS_OK && strcmp(before, row.tags) != 0;
     if (*changed) s = job_update_surely(v, &row, err);
 out:
-    pthread_mutex_unlock(&v->change);
+    job_change_end(v);
     return s;
 }

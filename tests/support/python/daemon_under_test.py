@@ -1,18 +1,23 @@
 """A daemon for tests on a free loopback port with a data folder of its own, and helpers for the API.
 
 with Daemon(folder) as d: d.post("/v1/jobs", json=document)
-Programs come from SELVEDGE_BUILD (default: build/ of this tree)."""
+Programs come from SELVEDGE_BUILD (default: build/ of this tree). With SELVEDGE_TEST_STORE=postgresql every daemon has a
+database of a PostgreSQL server that is started for the tests."""
+import atexit
 import copy
 import hashlib
 import os
 import signal
+import shutil
 import subprocess
 import sys
+import tempfile
 import time
 
 import requests
 
 from openapi_check import OpenApiCheck
+from postgres_server import PostgresServer
 
 ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..", ".."))
 BUILD = os.path.join(ROOT, os.environ.get("SELVEDGE_BUILD") or "build")
@@ -39,9 +44,49 @@ def sha256(data):
     return hashlib.sha256(data).hexdigest()
 
 
+class SharedStore:
+    """One PostgreSQL server for all tests of a process, with a database for each data folder."""
+    server = None
+    databases = {}
+
+    @classmethod
+    def options(cls, data):
+        """Settings of a daemon with this data folder."""
+        if os.environ.get("SELVEDGE_TEST_STORE", "sqlite") == "sqlite":
+            return {}
+        if cls.server is None:
+            cls.folder = tempfile.mkdtemp(prefix="selvedge-postgres-")
+            cls.server = PostgresServer(os.path.join(cls.folder, "server")).__enter__()
+            atexit.register(cls.end)
+        if not os.path.isdir(data):  # a new folder of an old name
+            cls.databases.pop(data, None)
+        database = cls.databases.setdefault(data, None) or cls.server.make_database()
+        cls.databases[data] = database
+        return store_options(cls.server, database, cls.folder)
+
+    @classmethod
+    def end(cls):
+        cls.server.__exit__()
+        shutil.rmtree(cls.folder, ignore_errors=True)
+
+
+def store_options(server, database, folder):
+    """Settings of a daemon for a database of a PostgresServer; the file with the password is put into the folder."""
+    path = os.path.join(str(folder), "store-password")
+    with open(path, "w") as f:
+        f.write(server.password + "\n")
+    os.chmod(path, 0o600)
+    return {"server.store": server.address(database), "server.store_password_file": path}
+
+
+def settings_arguments(options):
+    return [argument for key, value in options.items() for argument in ("--set", f"{key}={value}")]
+
+
 def selvedged(data, *arguments, expect=0):
     """Runs a command of an operator; what it prints."""
-    done = subprocess.run([program("selvedged"), "--data", str(data), *arguments], capture_output=True, text=True, check=False, timeout=60)
+    store = settings_arguments(SharedStore.options(str(data)))
+    done = subprocess.run([program("selvedged"), "--data", str(data), *store, *arguments], capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == expect, done.stdout + done.stderr
     return done.stdout + done.stderr
 
@@ -62,7 +107,7 @@ class Daemon:
     def __init__(self, folder, worker=FAKE_WORKER, options=None, environment=None, wrapper=None):
         self.data = str(folder)
         self.worker = worker
-        self.options = {"disk.floor_bytes": 0, "jobs.cancel_grace_s": 1, **SANITIZED, **(options or {})}
+        self.options = {"disk.floor_bytes": 0, "jobs.cancel_grace_s": 1, **SANITIZED, **SharedStore.options(self.data), **(options or {})}
         self.environment = environment or {}
         self.wrapper = wrapper if wrapper is not None else os.environ.get("SELVEDGE_TEST_WRAPPER", "").split()
         self.process = None
@@ -80,9 +125,7 @@ class Daemon:
         command = [*self.wrapper, program("selvedged"), "--data", self.data, "--port", "0"]
         if self.worker:
             command += ["--worker", self.worker]
-        for key, value in self.options.items():
-            command += ["--set", f"{key}={value}"]
-        return command
+        return command + settings_arguments(self.options)
 
     def start(self):
         os.makedirs(os.path.dirname(self.data), exist_ok=True)
@@ -130,8 +173,8 @@ class Daemon:
 
     def make_token(self, name, scope=None):
         """Makes a token by selvedged --make-token, while the daemon runs or not."""
-        made = subprocess.run([program("selvedged"), "--data", self.data, "--make-token", name, *(["--scope", scope] if scope else [])],
-                              capture_output=True, text=True, check=False)
+        made = subprocess.run([program("selvedged"), "--data", self.data, *settings_arguments(self.options), "--make-token", name,
+                               *(["--scope", scope] if scope else [])], capture_output=True, text=True, check=False)
         assert made.returncode == 0, made.stderr
         return made.stdout.strip()
 

@@ -1,0 +1,218 @@
+/* SQLite, embedded: the database of a single daemon, with WAL and synchronous=FULL. */
+#include "server/store/store_sql.h"
+
+#include <errno.h>
+#include <sqlite3.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/vfs.h>
+
+struct sqlite_query {
+    struct store_query base;
+    sqlite3_stmt *statement;
+    sqlite3 *db;
+};
+
+extern const struct store_calls store_sqlite_calls;
+
+static sqlite3_stmt *statement_of(struct store_query *query)
+{
+    return ((struct sqlite_query *)(void *)query)->statement;
+}
+
+static status check_place(const char *path, struct error *err)
+{
+    char folder[4096];
+    snprintf(folder, sizeof folder, "%s", path);
+    char *slash = strrchr(folder, '/');
+    if (slash != NULL) *slash = '\0';
+    struct statfs fs;
+    if (statfs(slash == NULL ? "." : folder, &fs) != 0) return error_set_errno(err, "cannot examine '%s'", folder);
+    static const unsigned long network[] = {0x6969, 0x517B, 0xFF534D42, 0xFE534D42, 0x5346414F, 0x00C36400, 0x01021997};
+    for (size_t i = 0; i < sizeof network / sizeof network[0]; i++)
+        if (((unsigned long)fs.f_type & 0xffffffffUL) == network[i])
+            return error_set(err, STATUS_UNSUPPORTED,
+                             "cannot keep the database in '%s': network file systems do not lock reliably", folder);
+    return STATUS_OK;
+}
+
+static status open_db(const struct store_place *place, const char *application, bool only_reads, bool create,
+                      void **out)
+{
+    sqlite3 *db = NULL;
+    int access = only_reads ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | (create ? SQLITE_OPEN_CREATE : 0);
+    const char *pragma =
+        only_reads
+            ? "PRAGMA trusted_schema=OFF"
+            : "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON; PRAGMA trusted_schema=OFF";
+    (void)application;
+    int rc = sqlite3_open_v2(place->address, &db, access | SQLITE_OPEN_FULLMUTEX, NULL);
+    if (rc == SQLITE_OK) sqlite3_busy_timeout(db, 5000);
+    if (rc == SQLITE_OK) rc = sqlite3_exec(db, pragma, NULL, NULL, NULL);
+    *out = db;
+    return rc == SQLITE_OK ? STATUS_OK : STATUS_IO;
+}
+
+static void close_db(void *db) { sqlite3_close_v2(db); }
+
+static status script(void *db, const char *sql)
+{
+    return sqlite3_exec(db, sql, NULL, NULL, NULL) == SQLITE_OK ? STATUS_OK : STATUS_IO;
+}
+
+static int bind(sqlite3_stmt *statement, int i, const struct store_value *v)
+{
+    if (v->kind == 'i') return sqlite3_bind_int64(statement, i, v->integer);
+    if (v->kind == 'd') return sqlite3_bind_double(statement, i, v->real);
+    if (v->kind == 's')
+        return sqlite3_bind_text(statement, i, v->bytes, v->bytes == NULL ? -1 : (int)v->n_bytes, SQLITE_TRANSIENT);
+    return sqlite3_bind_blob(statement, i, v->bytes, (int)v->n_bytes, SQLITE_TRANSIENT);
+}
+
+static status query(void *db, const char *sql, const struct store_value *value, size_t n, struct store_query **out)
+{
+    sqlite3_stmt *statement = NULL;
+    int rc = sqlite3_prepare_v2(db, sql, -1, &statement, NULL);
+    for (size_t i = 0; rc == SQLITE_OK && i < n; i++) rc = bind(statement, (int)i + 1, &value[i]);
+    struct sqlite_query *q = rc == SQLITE_OK ? calloc(1, sizeof *q) : NULL;
+    if (q == NULL) {
+        sqlite3_finalize(statement);
+        return STATUS_IO;
+    }
+    *q = (struct sqlite_query){{&store_sqlite_calls}, statement, db};
+    *out = &q->base;
+    return STATUS_OK;
+}
+
+static enum store_step step(struct store_query *query)
+{
+    int rc = sqlite3_step(statement_of(query));
+    return rc == SQLITE_ROW ? STORE_ROW : rc == SQLITE_DONE ? STORE_DONE : STORE_FAILED;
+}
+
+static bool is_null(struct store_query *query, int column)
+{
+    return sqlite3_column_type(statement_of(query), column) == SQLITE_NULL;
+}
+static int64_t integer(struct store_query *query, int column)
+{
+    return sqlite3_column_int64(statement_of(query), column);
+}
+static double real(struct store_query *query, int column) { return sqlite3_column_double(statement_of(query), column); }
+static const char *text(struct store_query *query, int column)
+{
+    return (const char *)sqlite3_column_text(statement_of(query), column);
+}
+
+static const void *blob(struct store_query *query, int column, size_t *n)
+{
+    const void *bytes = sqlite3_column_blob(statement_of(query), column);
+    *n = (size_t)sqlite3_column_bytes(statement_of(query), column);
+    return bytes;
+}
+
+static int64_t n_changed(struct store_query *query)
+{
+    return sqlite3_changes(((struct sqlite_query *)(void *)query)->db);
+}
+
+static void finish(struct store_query *query)
+{
+    sqlite3_finalize(statement_of(query));
+    free(query);
+}
+
+static status fault(void *db, char *why, size_t n_why)
+{
+    snprintf(why, n_why, "%s", sqlite3_errmsg(db));
+    return sqlite3_errcode(db) == SQLITE_FULL                           ? STATUS_DISK_FULL
+           : (sqlite3_extended_errcode(db) & 0xff) == SQLITE_CONSTRAINT ? STATUS_EXISTS
+                                                                        : STATUS_IO;
+}
+
+static bool is_alive(void *db) { return db != NULL; }
+
+const struct store_calls store_sqlite_calls = {
+    STORE_CALLS_VERSION, open_db, close_db, script,  query, step, is_null, integer, real, text, blob,
+    n_changed,           finish,  fault,    is_alive};
+
+static status load(const struct store_calls **calls, struct error *err)
+{
+    (void)err;
+    *calls = &store_sqlite_calls;
+    return STATUS_OK;
+}
+
+static status read_version(struct store_link *link, int *version, struct error *err)
+{
+    struct store_query *q = NULL;
+    status s = store_prepare(link, &q, err, "PRAGMA user_version", "");
+    if (s == STATUS_OK && store_step(q) == STORE_ROW)
+        *version = (int)store_int64(q, 0);
+    else if (s == STATUS_OK)
+        s = store_error(link, "cannot read the database's version", err);
+    store_finish(q);
+    return s;
+}
+
+static status migrate(struct store_link *link, const char *path, struct error *err)
+{
+    int version = 0, n_migration;
+    const char *const *migration = store_migrations(&n_migration);
+    status s = read_version(link, &version, err);
+    if (s != STATUS_OK || version == n_migration) return s;
+    if (version > n_migration)
+        return error_set(err, STATUS_UNSUPPORTED,
+                         "cannot open database '%s': its version is %d, but this program supports versions up to %d",
+                         path, version, n_migration);
+    if (version > 0) {
+        char backup[4096 + 32];
+        snprintf(backup, sizeof backup, "%s.v%d", path, version);
+        s = store_run(link, NULL, err, "VACUUM INTO ?", "s", backup);
+        if (s != STATUS_OK) return error_prefix(err, s, "cannot back up the database before its migration");
+    }
+    for (; version < n_migration; version++) {
+        char done[64];
+        snprintf(done, sizeof done, "PRAGMA user_version=%d; COMMIT", version + 1);
+        s = store_script(link, link->phrase->begin, "cannot migrate the database", err);
+        if (s == STATUS_OK) s = store_script(link, migration[version], "cannot migrate the database", err);
+        if (s == STATUS_OK) s = store_script(link, done, "cannot migrate the database", err);
+        if (s != STATUS_OK) {
+            script(link->db, "ROLLBACK");
+            return s;
+        }
+    }
+    return STATUS_OK;
+}
+
+/* A running daemon has migrated its database when it started. */
+static status check_version(struct store_link *link, const char *path, struct error *err)
+{
+    int version = 0, n_migration;
+    store_migrations(&n_migration);
+    status s = read_version(link, &version, err);
+    if (s != STATUS_OK || version == n_migration) return s;
+    return error_set(err, STATUS_CONFLICT,
+                     "database '%s' has version %d, and this program writes version %d: the daemon that uses it is of "
+                     "another version; stop it first",
+                     path, version, n_migration);
+}
+
+static status prepare(struct store_link *link, const char *address, bool may_migrate, struct error *err)
+{
+    return may_migrate ? migrate(link, address, err) : check_version(link, address, err);
+}
+
+const struct store_driver store_sqlite = {
+    .id = "sqlite.v1",
+    .scheme = "",
+    .phrase = {.begin = "BEGIN IMMEDIATE",
+               .sample_key = "sample COLLATE NOCASE",
+               .queue = "SELECT j.id, t.owner, t.batch, j.priority, j.queued, t.last FROM turn t CROSS JOIN job j ON "
+                        "j.serial IN (SELECT h.serial FROM job h WHERE h.deleted = 0 AND h.state = 1 AND "
+                        "h.owner = t.owner AND h.batch = t.batch ORDER BY h.priority DESC, h.queued, h.serial LIMIT ?) "
+                        "WHERE t.queued > 0 ORDER BY t.owner, t.batch, j.priority DESC, j.queued, j.serial"},
+    .load = load,
+    .check_place = check_place,
+    .prepare = prepare};
