@@ -5,8 +5,8 @@
 #include "server/settings.h"
 #include "server/store/store.h"
 
-/* The caller calls store_place_release. STATUS_INVALID: the address is not one of PostgreSQL, or other users may read the
- * file with its password; STATUS_IO. */
+/* The caller calls store_place_release. STATUS_INVALID: the address is not one of PostgreSQL, or other users may read
+ * the file with its password; STATUS_IO. */
 status store_settings_place(const struct settings *s, struct store_place *place, struct error *err);
 /* Whether a server has the database, which other daemons may use too. */
 bool store_settings_shared(const struct settings *s);

@@ -1,9 +1,9 @@
 /* The database of jobs: SQLite in a file, or PostgreSQL (drivers/store_driver.h). The changes of a call that returned
- * STATUS_OK survive power loss; where the reply to a commit is lost, the call fails. One connection writes, a second one
- * reads, each guarded by a mutex: reading waits for no sync. A call reads what every call that has returned before has
- * written. A database of an older version is migrated (the file of SQLite is copied to <path>.v<old> first), a newer
- * one is refused. All functions may be called from any thread; all may fail with STATUS_IO, STATUS_DISK_FULL or
- * STATUS_NO_MEMORY. */
+ * STATUS_OK survive power loss; where the reply to a commit is lost, the call fails. One connection writes, a second
+ * one reads, each guarded by a mutex: reading waits for no sync. A call reads what every call that has returned
+ * before has written. A database of an older version is migrated (the file of SQLite is copied to <path>.v<old>
+ * first), a newer one is refused. All functions may be called from any thread; all may fail with STATUS_IO,
+ * STATUS_DISK_FULL or STATUS_NO_MEMORY. */
 #ifndef SELVEDGE_SERVER_STORE_H
 #define SELVEDGE_SERVER_STORE_H
 

@@ -317,11 +317,3 @@ void store_gate_leave(struct store *store)
         store_run(&gate->link, NULL, NULL, "SELECT pg_advisory_unlock_all()", "");
     pthread_mutex_unlock(&gate->link.lock);
 }
-
-status store_gate_check(struct store_gate *gate, struct error *err)
-{
-    if (gate == NULL || !atomic_load(&gate->entered) || !pthread_equal(gate->thread, pthread_self())) return STATUS_OK;
-    if (gate->fault != STATUS_OK) return error_set(err, gate->fault, "%s", gate->why.text);
-    if (gate->link.calls->is_alive(gate->link.db)) return STATUS_OK;
-    return error_set(err, STATUS_IO, "the connection that keeps other daemons from this change was lost");
-}

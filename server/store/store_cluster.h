@@ -1,9 +1,10 @@
-/* Several daemons on one database, where the driver allows it (store_is_shared). Each daemon has a row with a lease, which
- * it renews; times are those of the server's clock. A daemon without its row has lost its lease: another one has taken over
- * what it held. A daemon claims a queued job before it starts it, by a lock of the row that others skip. What is to be
- * done once for all daemons is a duty, which one daemon has as long as it lives. Changes of a job, which are made from a
- * row that was read before, are made behind a gate, by locks of the server that end with the connection.
- * With a database of one daemon, claims and duties are granted, and the rest does nothing. As all of store.h. */
+/* Several daemons on one database, where the driver allows it (store_is_shared). Each daemon has a row with a lease,
+ * which it renews; times are those of the server's clock. A daemon without its row has lost its lease: another one has
+ * taken over what it held. A daemon claims a queued job before it starts it, by a lock of the row that others skip.
+ * What is to be done once for all daemons is a duty, which one daemon has as long as it lives. Changes of a job,
+ * which are made from a row that was read before, are made behind a gate, by locks of the server that end with the
+ * connection. With a database of one daemon, claims and duties are granted, and the rest does nothing. As all of
+ * store.h. */
 #ifndef SELVEDGE_SERVER_STORE_CLUSTER_H
 #define SELVEDGE_SERVER_STORE_CLUSTER_H
 
@@ -34,9 +35,9 @@ status store_daemon_renew(struct store *store, double lease_s, bool *held, struc
 status store_daemon_end(struct store *store, struct error *err);
 /* Removes the row of a daemon that is known to have ended. */
 status store_daemon_remove(struct store *store, const char *id, struct error *err);
-/* Removes the daemons whose lease has ended, and ends the connections of daemons that have no row, so that their changes
- * are rolled back and their locks are free. Connections that are younger than grace_s are spared: their row may be in
- * the making. */
+/* Removes the daemons whose lease has ended, and ends the connections of daemons that have no row, so that their
+ * changes are rolled back and their locks are free. Connections that are younger than grace_s are spared: their row
+ * may be in the making. */
 status store_daemons_bury(struct store *store, double grace_s, int *n_ended, struct error *err);
 /* All daemons, the oldest first. The caller frees *row. */
 status store_daemon_list(struct store *store, struct daemon_row **row, size_t *n, struct error *err);
@@ -58,9 +59,9 @@ status store_job_orphans(struct store *store, char (**id)[STORE_ID_BYTES], size_
 /* Whether a duty is this daemon's: it is, or no daemon that lives has it. An error counts as no. */
 bool store_duty_is_mine(struct store *store, const char *duty);
 
-/* Enters the gate for the changes of a job, of what an owner keeps, or of both; without either for changes of all. Waits
- * for others at most 30 s. After an error, and when the connection with the locks is lost, every change that this thread
- * tries before it leaves is refused with that error. One thread of a daemon at a time. */
+/* Enters the gate for the changes of a job, of what an owner keeps, or of both; without either for changes of all.
+ * Waits for others at most 30 s. After an error, and when the connection with the locks is lost, every change that this
+ * thread tries before it leaves is refused with that error. One thread of a daemon at a time. */
 void store_gate_enter(struct store *store, const char *job_id, const char *owner);
 void store_gate_leave(struct store *store);
 

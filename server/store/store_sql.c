@@ -14,6 +14,14 @@ status store_error(struct store_link *link, const char *what, struct error *err)
     return error_set(err, s, "%s: database says '%s'", what, why);
 }
 
+status store_gate_check(struct store_gate *gate, struct error *err)
+{
+    if (gate == NULL || !atomic_load(&gate->entered) || !pthread_equal(gate->thread, pthread_self())) return STATUS_OK;
+    if (gate->fault != STATUS_OK) return error_set(err, gate->fault, "%s", gate->why.text);
+    if (gate->link.calls->is_alive(gate->link.db)) return STATUS_OK;
+    return error_set(err, STATUS_IO, "the connection that keeps other daemons from this change was lost");
+}
+
 static size_t read_values(struct store_value value[VALUES_MOST], const char *format, va_list args)
 {
     size_t n = 0;

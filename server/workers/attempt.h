@@ -19,15 +19,15 @@ struct attempt_request {
     double heartbeat_unix_s; /* by the clock of the worker; 0: none of this attempt, or it cannot be read */
 };
 
-/* Changes a job from queued to running: claims it, sets a new attempt number and token, writes job.json and attempt.json,
- * and clears the folder after an edit. token: that of the attempt. STATUS_CONFLICT when the job is no longer queued, or
- * another daemon has claimed it. */
+/* Changes a job from queued to running: claims it, sets a new attempt number and token, writes job.json and
+ * attempt.json, and clears the folder after an edit. token: that of the attempt. STATUS_CONFLICT when the job is no
+ * longer queued, or another daemon has claimed it. */
 status attempt_prepare(struct job_service *v, const char *job_id, char token[STORE_ID_BYTES], struct error *err);
 /* Reads what users have requested for a running job, and the last heartbeat of its worker. Returns false, with no
  * request, when the database cannot be read. */
 bool attempt_read_request(struct job_service *v, const char *job_id, struct attempt_request *request);
-/* Changes a job whose worker has ended from running to succeeded, failed, cancelled, paused or queued. Nothing is changed
- * when the job's token is no longer that of this attempt: another daemon has taken the job over. */
+/* Changes a job whose worker has ended from running to succeeded, failed, cancelled, paused or queued. Nothing is
+ * changed when the job's token is no longer that of this attempt: another daemon has taken the job over. */
 status attempt_finish(struct job_service *v, const char *job_id, const char *token, const struct worker_end *end,
                       enum attempt_stop stop, struct attempt_outcome *outcome, struct error *err);
 /* Changes a job from queued to failed. */

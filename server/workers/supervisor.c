@@ -9,6 +9,7 @@
 #include "server/workers/backends/job_backend.h"
 #include "server/workers/console.h"
 #include "server/workers/queue_turn.h"
+#include "server/workers/removal.h"
 #include "server/workers/waiting_list.h"
 
 #include <errno.h>
@@ -19,7 +20,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-enum { MAX_WORKER = SETTING_MAX_WORKERS, BURY_AGAIN_S = 60, IDLE_LOOK_MS = 1000 };
+enum { MAX_WORKER = SETTING_MAX_WORKERS, IDLE_LOOK_MS = 1000 };
 
 struct slot {
     bool used;
@@ -231,8 +232,9 @@ static void adopt(struct supervisor *u)
 }
 
 /* Whether neither a worker has the job nor a time is set before which it must be left alone. */
-static bool is_free(struct supervisor *u, const char *job_id)
+static bool is_free(void *context, const char *job_id)
 {
+    struct supervisor *u = context;
     return !is_running(u, job_id) && !waiting_list_holds(&u->waiting, job_id, clock_monotonic_s());
 }
 
@@ -260,30 +262,6 @@ static void fill_slots(struct supervisor *u)
     }
     queue_turn_free(turn);
     free(job);
-}
-
-static void remove_deleted(struct supervisor *u)
-{
-    struct job_row *row = NULL;
-    size_t n = 0;
-    bool elsewhere = false;
-    struct job_query q = {.deleted = true, .limit = 64};
-    if (store_job_list(u->v->store, &q, &row, &n, NULL) != STATUS_OK) return;
-    bool mine = n > 0 && store_duty_is_mine(u->v->store, "removal");
-    for (size_t i = 0; mine && i < n; i++) {
-        if (store_job_elsewhere(u->v->store, row[i].id, &elsewhere, NULL) != STATUS_OK || elsewhere) continue;
-        if (!is_free(u, row[i].id)) continue;
-        char path[PATH_BYTES];
-        struct error err = {0};
-        path_join(path, u->v->settings->data, "jobs", row[i].id, NULL);
-        status s = path_remove_tree(path, &err);
-        if (s == STATUS_OK) s = store_job_erase(u->v->store, row[i].id, &err);
-        if (s == STATUS_OK) continue;
-        log_warning(u->v->log, "job %s is deleted, but a part of it could not be removed; next try in %d s: %s",
-                    row[i].id, BURY_AGAIN_S, err.text);
-        waiting_list_find(&u->waiting, row[i].id, true)->until_s = clock_monotonic_s() + BURY_AGAIN_S;
-    }
-    job_rows_free(row, n);
 }
 
 static void check_disk(struct supervisor *u)
@@ -325,7 +303,7 @@ static void tick(struct supervisor *u)
     }
     for (size_t i = 0; i < MAX_WORKER; i++)
         if (u->slot[i].used) watch(u, &u->slot[i]);
-    remove_deleted(u);
+    removal_run(u->v, &u->waiting, is_free, u);
     adopt(u);
     fill_slots(u);
 }

@@ -1,4 +1,5 @@
-/* PostgreSQL as the database of several daemons. libpq is reached through a plug-in, so that no other service needs it. */
+/* PostgreSQL as the database of several daemons. libpq is reached through a plug-in, so that no other service needs
+ * it. */
 #include "server/store/store_sql.h"
 
 #include <dlfcn.h>

@@ -1,6 +1,6 @@
 /* The databases that a store can use, one row of a table each. The SQL of the store is the subset that all of them
- * understand; what differs stands in the row. The calls of a row may come from a plug-in, a shared object that is loaded
- * when the settings ask for it (drivers/plugin): this header is all that it shares with the daemon. */
+ * understand; what differs stands in the row. The calls of a row may come from a plug-in, a shared object that is
+ * loaded when the settings ask for it (drivers/plugin): this header is all that it shares with the daemon. */
 #ifndef SELVEDGE_SERVER_STORE_DRIVER_H
 #define SELVEDGE_SERVER_STORE_DRIVER_H
 

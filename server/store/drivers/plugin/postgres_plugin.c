@@ -1,6 +1,6 @@
-/* The calls of the store for PostgreSQL, over libpq: a shared object that the daemon loads when its settings name such a
- * database. A connection that was lost is opened again before the next statement outside of a transaction. Nothing that
- * may have changed the database is ever sent twice. */
+/* The calls of the store for PostgreSQL, over libpq: a shared object that the daemon loads when its settings name
+ * such a database. A connection that was lost is opened again before the next statement outside of a transaction.
+ * Nothing that may have changed the database is ever sent twice. */
 #include "base/utf8.h"
 #include "server/store/drivers/store_driver.h"
 
@@ -111,8 +111,8 @@ static status connect_db(struct pg_db *d)
     return s;
 }
 
-/* Makes sure, as far as that can be known, that there is a connection. One that was lost in a transaction stays lost until
- * the transaction is ended. */
+/* Makes sure, as far as that can be known, that there is a connection. One that was lost in a transaction stays lost
+ * until the transaction is ended. */
 static status ensure(struct pg_db *d)
 {
     if (d->in_transaction)
