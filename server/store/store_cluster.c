@@ -28,13 +28,14 @@ void store_daemon_id(struct store *store, char id[STORE_ID_BYTES])
         return changed_;                                                                                               \
     } while (0)
 
-/* Asks the connection that writes for one value; text is "" where there is none. */
-static status ask(struct store *store, char *text, size_t n_text, struct error *err, const char *sql,
-                  const char *format, const char *first, const char *second)
+/* Asks the connection that writes for one value; text is "" where there is none. first and second (NULL: none) are the
+ * parameters. */
+static status ask(struct store *store, char *text, size_t n_text, struct error *err, const char *sql, const char *first,
+                  const char *second)
 {
     struct store_query *q = NULL;
     pthread_mutex_lock(&store->write.lock);
-    status s = store_prepare(&store->write, &q, err, sql, format, first, second);
+    status s = store_prepare(&store->write, &q, err, sql, first == NULL ? "" : "ss", first, second);
     enum store_step step = s == STATUS_OK ? store_step(q) : STORE_DONE;
     text[0] = '\0';
     if (step == STORE_ROW) store_text(q, 0, text, n_text);
@@ -46,13 +47,13 @@ static status ask(struct store *store, char *text, size_t n_text, struct error *
 
 status store_identity(struct store *store, char id[STORE_ID_BYTES], struct error *err)
 {
-    return ask(store, id, STORE_ID_BYTES, err, "SELECT id FROM identity WHERE one = 1", "", NULL, NULL);
+    return ask(store, id, STORE_ID_BYTES, err, "SELECT id FROM identity WHERE one = 1", NULL, NULL);
 }
 
 status store_clock(struct store *store, double *now_unix_s, struct error *err)
 {
     char text[64];
-    status s = ask(store, text, sizeof text, err, "SELECT " NOW, "", NULL, NULL);
+    status s = ask(store, text, sizeof text, err, "SELECT " NOW, NULL, NULL);
     *now_unix_s = strtod(text, NULL);
     return s;
 }
@@ -219,9 +220,8 @@ status store_job_elsewhere(struct store *store, const char *id, bool *elsewhere,
     char text[STORE_ID_BYTES] = "";
     *elsewhere = false;
     if (!store_is_shared(store)) return STATUS_OK;
-    status s =
-        ask(store, text, sizeof text, err, "SELECT holder FROM job WHERE id = ?1 AND holder <> ?2 AND " LIVES("holder"),
-            "ss", id, store->daemon);
+    status s = ask(store, text, sizeof text, err,
+                   "SELECT holder FROM job WHERE id = ?1 AND holder <> ?2 AND " LIVES("holder"), id, store->daemon);
     *elsewhere = text[0] != '\0';
     return s;
 }
@@ -265,7 +265,7 @@ bool store_duty_is_mine(struct store *store, const char *duty)
     int n = 0;
     if (!store_is_shared(store)) return true;
     if (ask(store, mine, sizeof mine, NULL, "SELECT name FROM duty WHERE name = ?1 AND daemon = ?2 AND " LIVES("?2"),
-            "ss", duty, store->daemon) != STATUS_OK)
+            duty, store->daemon) != STATUS_OK)
         return false;
     if (mine[0] != '\0') return true;
     pthread_mutex_lock(&store->write.lock);

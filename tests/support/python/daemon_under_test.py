@@ -17,7 +17,7 @@ import time
 import requests
 
 from openapi_check import OpenApiCheck
-from postgres_server import PostgresServer
+from servers.postgres_server import PostgresServer
 
 ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..", ".."))
 BUILD = os.path.join(ROOT, os.environ.get("SELVEDGE_BUILD") or "build")
