@@ -2,12 +2,12 @@
 #include "base/clock.h"
 #include "server/cluster/lease_keeper.h"
 #include "server/events/change_feed.h"
-#include "server/jobs/ballast.h"
 #include "server/jobs/job_paths.h"
 #include "server/store/store_cluster.h"
 #include "server/workers/attempt.h"
 #include "server/workers/backends/job_backend.h"
 #include "server/workers/console.h"
+#include "server/workers/disk_watch.h"
 #include "server/workers/queue_turn.h"
 #include "server/workers/removal.h"
 #include "server/workers/waiting_list.h"
@@ -20,7 +20,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-enum { MAX_WORKER = SETTING_MAX_WORKERS, IDLE_LOOK_MS = 1000 };
+enum { MAX_WORKER = SETTING_MAX_WORKERS, IDLE_LOOK_MS = 1000, SHARED_RUNNING = 10000, RIVALS = 16 };
 
 struct slot {
     bool used;
@@ -216,14 +216,16 @@ static void adopt(struct supervisor *u)
 {
     struct job_row *row = NULL;
     size_t n = 0, n_free = MAX_WORKER - n_running(u);
-    struct job_query q = {.states = 1U << JOB_RUNNING, .limit = MAX_WORKER};
+    struct job_query q = {.states = 1U << JOB_RUNNING, .limit = u->v->keeper != NULL ? SHARED_RUNNING : MAX_WORKER};
     if (u->adopted || u->backend->adopt == NULL) return;
     if (store_job_list(u->v->store, &q, &row, &n, NULL) != STATUS_OK) return;
-    u->adopted = n < MAX_WORKER;
+    u->adopted = n < q.limit;
     for (size_t i = 0; i < n; i++) {
         struct error err = {0};
-        if (is_running(u, row[i].id) || store_job_take(u->v->store, row[i].id, &err) != STATUS_OK) continue;
-        if (n_free-- == 0) break;
+        if (is_running(u, row[i].id)) continue;
+        if (n_free == 0) break;
+        if (store_job_take(u->v->store, row[i].id, &err) != STATUS_OK) continue;
+        n_free--;
         struct slot *slot = take_slot(u, row[i].id, row[i].owner, row[i].batch);
         memcpy(slot->token, row[i].token, sizeof slot->token);
         if (u->backend->adopt(u->engine, row[i].id, &slot->run, &err) != STATUS_OK) start_failed(u, slot, &err);
@@ -241,15 +243,13 @@ static bool is_free(void *context, const char *job_id)
 static void fill_slots(struct supervisor *u)
 {
     struct queued_job *job = NULL;
-    size_t n = 0, i;
-    size_t free_slots = (size_t)u->v->settings->workers;
+    size_t n = 0, i, free_slots = (size_t)u->v->settings->workers;
     free_slots -= n_running(u) < free_slots ? n_running(u) : free_slots;
     if (free_slots == 0 || u->below_floor || !u->backend->ready(u->engine)) return;
-    /* as many of each owner and batch as may have to be passed over, or can start */
-    if (store_job_queue(u->v->store, waiting_list_count(&u->waiting, clock_monotonic_s()) + free_slots, &job, &n,
-                        NULL) != STATUS_OK ||
-        n == 0)
-        return;
+    /* of each owner and batch those that may have to be passed over, that others may claim first, and that can start */
+    size_t n_each = waiting_list_count(&u->waiting, clock_monotonic_s()) + free_slots;
+    if (u->v->keeper != NULL) n_each += RIVALS;
+    if (store_job_queue(u->v->store, n_each, &job, &n, NULL) != STATUS_OK || n == 0) return;
     struct queue_turn *turn = queue_turn_new(job, n);
     for (i = 0; turn != NULL && i < n; i++)
         if (!is_free(u, job[i].id)) queue_turn_skip(turn, i);
@@ -264,31 +264,25 @@ static void fill_slots(struct supervisor *u)
     free(job);
 }
 
-static void check_disk(struct supervisor *u)
+/* Others have the jobs of a lease that was lost: workers are killed, but for those that others adopt. */
+static void leave_jobs(struct supervisor *u)
 {
-    long long free_bytes = 0;
-    if (path_free_bytes(u->v->settings->data, &free_bytes, NULL) != STATUS_OK) return;
-    int64_t floor_bytes = u->v->settings->floor_bytes;
-    bool was = u->below_floor;
-    /* hysteresis, so that jobs do not pause and resume repeatedly */
-    u->below_floor = free_bytes < (was ? floor_bytes + floor_bytes / 10 : floor_bytes);
-    if (u->below_floor && !was)
-        log_warning(u->v->log, "%lld bytes are free, %lld are kept in reserve, so running jobs pause", free_bytes,
-                    (long long)floor_bytes);
-    if (!u->below_floor) attempt_resume_paused(u->v);
-    if (!u->below_floor) ballast_keep(u->v->settings->data, u->v->settings->ballast_bytes);
+    for (size_t i = 0; i < MAX_WORKER; i++) {
+        struct slot *slot = &u->slot[i];
+        if (!slot->used || slot->ended) continue;
+        slot->used = !u->backend->outlives_daemon;
+        slot->used ? kill_now(u, slot, STOP_SHUTDOWN) : u->backend->release(u->engine, slot->run);
+    }
 }
 
-/* Kills the workers when the lease was lost, since others have their jobs, and takes over jobs that nobody holds: a
- * backend whose workers outlive their daemon adopts them, others begin again. */
+/* Takes over jobs that no daemon holds: backends whose workers outlive it adopt them, the others restart. */
 static void keep_to_lease(struct supervisor *u, double now)
 {
+    unsigned n_loss = lease_keeper_losses(u->v->keeper);
+    if (n_loss != u->n_loss) leave_jobs(u);
+    u->n_loss = n_loss;
     if (u->v->keeper == NULL || now - u->lease_seen_s < 1) return;
     u->lease_seen_s = now;
-    unsigned n_loss = lease_keeper_losses(u->v->keeper);
-    for (size_t i = 0; n_loss != u->n_loss && i < MAX_WORKER; i++)
-        if (u->slot[i].used && !u->slot[i].ended) kill_now(u, &u->slot[i], STOP_SHUTDOWN);
-    u->n_loss = n_loss;
     u->adopted = false;
     if (u->backend->adopt == NULL) lease_keeper_adopt(u->v);
 }
@@ -299,7 +293,7 @@ static void tick(struct supervisor *u)
     keep_to_lease(u, now);
     if (now - u->disk_seen_s > 2) {
         u->disk_seen_s = now;
-        check_disk(u);
+        u->below_floor = disk_watch(u->v, u->below_floor);
     }
     for (size_t i = 0; i < MAX_WORKER; i++)
         if (u->slot[i].used) watch(u, &u->slot[i]);
