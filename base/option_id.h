@@ -60,6 +60,7 @@
 #define OPTION_METHOD "method"
 #define OPTION_PATH_BUDGET "path_budget"
 #define OPTION_PLAIN_PRIOR "plain_prior"
+#define OPTION_PRECISION "precision"
 #define OPTION_DISCREPANCY "discrepancy"
 #define OPTION_START "start"
 #define OPTION_STARTS "starts"

@@ -120,7 +120,7 @@ static status check_kinds(const struct cloth_description *d, struct error *err)
         return error_set_field(err, STATUS_INVALID, "yarns", "a cloth has 1 to %d kinds of yarn", CLOTH_MAX_KIND);
     for (size_t k = 0; k < d->n_kind; k++) {
         const struct cloth_kind *kind = &d->kind[k];
-        size_t most = d->structure == CLOTH_FELT ? 100000 : CLOTH_MAX_FIBER;
+        size_t most = d->structure == CLOTH_FELT ? CLOTH_MAX_FELT_FIBER : CLOTH_MAX_FIBER;
         char field[48];
         snprintf(field, sizeof field, "yarns[%zu].fibers", k);
         if (kind->n_fiber < 1 || kind->n_fiber > most)
@@ -135,6 +135,28 @@ static status check_kinds(const struct cloth_description *d, struct error *err)
         if (kind->melange_with >= (int)d->n_kind || kind->melange_with == (int)k)
             return error_set_field(err, STATUS_INVALID, field, "'%s' is %d: it must be another kind, below %zu", field,
                                    kind->melange_with, d->n_kind);
+    }
+    return STATUS_OK;
+}
+
+status cloth_description_enlarge(const struct cloth_description *d, size_t times, struct cloth_description *to,
+                                 struct error *err)
+{
+    *to = *d;
+    if (d->structure == CLOTH_FELT) {
+        to->kind[0].n_fiber = d->kind[0].n_fiber * times * times;
+        if (to->kind[0].n_fiber <= CLOTH_MAX_FELT_FIBER) return STATUS_OK;
+        return error_set_field(err, STATUS_INVALID, "final_tiles",
+                               "'final_tiles' is %zu: the tile would have %zu fibers, at most %d are allowed", times,
+                               to->kind[0].n_fiber, CLOTH_MAX_FELT_FIBER);
+    }
+    for (int a = CLOTH_WEFT; a <= CLOTH_WARP; a++) {
+        to->n_yarn[a] = d->n_yarn[a] * times;
+        if (to->n_yarn[a] > CLOTH_MAX_YARN)
+            return error_set_field(err, STATUS_INVALID, "final_tiles",
+                                   "'final_tiles' is %zu: the tile would have %zu yarns of the %s, at most %d are "
+                                   "allowed",
+                                   times, to->n_yarn[a], a == CLOTH_WEFT ? "weft" : "warp", CLOTH_MAX_YARN);
     }
     return STATUS_OK;
 }

@@ -24,6 +24,7 @@ enum {
     CLOTH_MAX_YARN = 128,  /* yarns of one direction in a tile */
     CLOTH_MAX_NUMBER = 96, /* numbers of a cloth */
     CLOTH_MAX_FIBER = 1000,
+    CLOTH_MAX_FELT_FIBER = 100000, /* fibers in the tile of a felt */
     CLOTH_MAX_PLY = 8
 };
 
@@ -128,6 +129,12 @@ double cloth_number_value(const struct cloth_description *d, const double *numbe
  * in a felt), "yarns[k]" (a kind that no yarn has), "yarns[k].plies", "crimp" and so on for values outside of their
  * ranges and for fitted numbers that change nothing. */
 status cloth_description_check(struct cloth_description *d, struct error *err);
+
+/* Sets `to` to the cloth d, which has passed cloth_description_check, with a tile that is `times` as long along both
+ * edges: so many times the yarns of both directions, or times^2 the fibers of a felt. STATUS_INVALID, field
+ * "final_tiles", where that is more than a cloth can have. */
+status cloth_description_enlarge(const struct cloth_description *d, size_t times, struct cloth_description *to,
+                                 struct error *err);
 
 /* Checks a vector of d->n_number values against the ranges of the catalogue. STATUS_INVALID, field: the number. */
 status cloth_number_check(const struct cloth_description *d, const double *number, struct error *err);

@@ -8,12 +8,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Terms of the objective that not every method knows. */
+/* Terms of the objective, and ends of a fit, that not every method knows. */
 enum method_ability {
-    METHOD_TAKES_PRIORS = 1,   /* Gaussian priors of parameters */
-    METHOD_TAKES_NUISANCE = 2, /* gains and stray light of the photographs, which have priors of their own */
-    METHOD_TAKES_TEXTURE = 4,  /* contrasts of the photographs, with a weight above 0 */
-    METHOD_N_ABILITY = 3
+    METHOD_TAKES_PRIORS = 1,    /* Gaussian priors of parameters */
+    METHOD_TAKES_NUISANCE = 2,  /* gains and stray light of the photographs, which have priors of their own */
+    METHOD_TAKES_TEXTURE = 4,   /* contrasts of the photographs, with a weight above 0 */
+    METHOD_TAKES_PRECISION = 8, /* a goal of precision */
+    METHOD_N_ABILITY = 4
 };
 
 struct method_info {

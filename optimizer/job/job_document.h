@@ -147,6 +147,7 @@ struct job_document {
     bool cloth_texture_colors;              /* start C_TT of the kinds at the colors of the photograph */
     bool cloth_draft_from_texture;          /* neither weave nor draft is given */
     size_t cloth_tile_yarn[2];              /* of enum cloth_direction; 0: not given */
+    size_t cloth_final_tiles;               /* times that the tile of the final fit is as long along both edges */
     double cloth_threads_per_cm[2];         /* NaN: not given */
     uint64_t cloth_seed;
     size_t n_cloth_yarn;
@@ -189,6 +190,7 @@ struct job_document {
     uint64_t seed;
     size_t max_iteration; /* 0: the method's default */
     uint64_t path_budget; /* 0: the method's default */
+    double precision;     /* noise of tracing over the photographs' errors at which the fit ends; 0: none */
     bool share_camera_paths;
     double plain_prior; /* strength; 0: none */
     bool discrepancy;
@@ -224,6 +226,10 @@ bool job_document_pictures_only(const struct job_document *doc);
 /* Puts the section "cloth" before the field that a check or the builder of a described cloth named, in the error's text
  * too. */
 void job_cloth_name_field(struct error *err);
+
+/* STATUS_INVALID, field "final_tiles", where the described cloth has no fitted numbers, or its tile cannot be made as
+ * large as the document asks for. */
+status job_cloth_check_final_tiles(const struct job_document *doc, struct error *err);
 
 struct param_info;
 /* Bounds, start and fixed flag of each parameter of a model, with ties, bounds and priors taken into account. out has

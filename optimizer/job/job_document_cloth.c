@@ -233,12 +233,28 @@ static status read_names(struct job_document *doc, struct error *err)
     return s;
 }
 
+status job_cloth_check_final_tiles(const struct job_document *doc, struct error *err)
+{
+    bool fitted = false;
+    for (size_t i = 0; i < doc->cloth->n_number; i++) fitted = fitted || doc->cloth->number[i].fitted;
+    if (!fitted && doc->cloth_final_tiles > 1)
+        return error_set_field(err, STATUS_INVALID, "final_tiles",
+                               "'final_tiles' is for a cloth whose numbers are fitted: this one has none, so its tile "
+                               "is that of 'tile_warps' and 'tile_wefts', or of 'fibers' in a felt");
+    struct cloth_description *large = malloc(sizeof *large);
+    if (large == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
+    status st = cloth_description_enlarge(doc->cloth, doc->cloth_final_tiles, large, err);
+    free(large);
+    return st;
+}
+
 status job_check_cloth(const struct option_value *v, struct error *err)
 {
     v->doc->cloth = calloc(1, sizeof *v->doc->cloth);
     if (v->doc->cloth == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
     status st = read_cloth(v, v->doc->cloth, err);
     if (st == STATUS_OK) st = read_names(v->doc, err);
+    if (st == STATUS_OK) st = job_cloth_check_final_tiles(v->doc, err);
     if (st == STATUS_INVALID) job_cloth_name_field(err);
     return st;
 }

@@ -203,7 +203,7 @@ static status parse_each(const struct reader *r, const struct json_field *fit, c
     return s;
 }
 
-/* Refuses priors and nuisance terms that the method does not take. */
+/* Refuses priors, nuisance terms and a goal of precision that the method does not take. */
 static status check_method(const struct job_document *doc, struct error *err)
 {
     bool has_prior = false;
@@ -211,11 +211,14 @@ static status check_method(const struct job_document *doc, struct error *err)
         for (size_t p = 0; p < JOB_MAX_PARAM; p++) has_prior = has_prior || !isnan(doc->model[i].option.prior_mean[p]);
     const struct job_fit_option *o = &doc->model[0].option;
     unsigned wanted = (has_prior ? METHOD_TAKES_PRIORS : 0u) |
-                      (o->gain != JOB_GAIN_NONE || o->stray_light ? METHOD_TAKES_NUISANCE : 0u);
+                      (o->gain != JOB_GAIN_NONE || o->stray_light ? METHOD_TAKES_NUISANCE : 0u) |
+                      (doc->precision > 0.0 ? METHOD_TAKES_PRECISION : 0u);
     unsigned missing = wanted & ~method_catalogue_find(doc->method)->takes;
     if (missing == 0) return STATUS_OK;
-    const char *path = (missing & METHOD_TAKES_PRIORS) != 0 ? "fit.priors" : "fit.nuisance";
-    return error_set_field(err, STATUS_INVALID, path, "'%s' needs the method '%s': '%s' has no such terms", path,
+    const char *path = (missing & METHOD_TAKES_PRIORS) != 0     ? "fit.priors"
+                       : (missing & METHOD_TAKES_NUISANCE) != 0 ? "fit.nuisance"
+                                                                : "fit.precision";
+    return error_set_field(err, STATUS_INVALID, path, "'%s' needs the method '%s': '%s' does not know it", path,
                            method_catalogue_taking(wanted)->id, doc->method);
 }
 

@@ -39,6 +39,9 @@ struct cloth_source {
     size_t n_number;
     status (*estimate)(void *context, const double *number, const struct estimator_call *call,
                        const struct progress *progress, struct estimate *out, double *wall_s, struct error *err);
+    /* Says whether the estimates that follow belong to a final fit (cloth_search.h), for which the source may make
+     * larger tiles. NULL: it makes no difference. */
+    void (*set_final)(void *context, bool final);
 };
 
 struct cloth_estimator {

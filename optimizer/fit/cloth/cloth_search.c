@@ -206,7 +206,10 @@ static status run_joint(struct search *s, struct error *err)
     option.n_extra_start = 0;
     snprintf(s->kind, sizeof s->kind, "numbers of the cloth");
     if (q->n_screen > 0) problem.path_budget = joint_budget(s);
-    problem.first_path = problem.path_budget / (JOINT_STEPS * 2 * problem.observation->n);
+    /* with a goal of precision the budget says little about the paths that are needed, and few of them come first */
+    const uint64_t usual = q->method->info->default_path_budget;
+    const uint64_t expected = problem.precision > 0.0 && problem.path_budget > usual ? usual : problem.path_budget;
+    problem.first_path = expected / (JOINT_STEPS * 2 * problem.observation->n);
     problem.parameter = s->parameter;
     problem.progress = &progress;
     return run_fit(s, &problem, &option, &s->result->joint, err);
@@ -216,6 +219,7 @@ static status run_final(struct search *s, const double *number, const double *st
                         struct fit_result *fit, struct error *err)
 {
     const struct cloth_search *q = s->search;
+    const struct cloth_source *source = &q->cloth->source;
     struct progress_part part;
     struct progress progress =
         progress_begin_part(&part, q->problem->progress, 1.0 - q->final_share * (1.0 - from), 0.5 * q->final_share);
@@ -223,7 +227,10 @@ static status run_final(struct search *s, const double *number, const double *st
     snprintf(s->kind, sizeof s->kind, "chosen cloth");
     problem.path_budget = q->final_budget;
     problem.progress = &progress;
-    return fit_on_cloth(s, number, start, &problem, fit, err);
+    if (source->set_final != NULL) source->set_final(source->context, true);
+    status st = fit_on_cloth(s, number, start, &problem, fit, err);
+    if (source->set_final != NULL) source->set_final(source->context, false);
+    return st;
 }
 
 /* Fits the cloth of the joint fit, and that of the screening where the joint fit ended worse. */

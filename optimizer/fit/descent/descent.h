@@ -57,6 +57,9 @@ struct fit_problem {
     const struct observation_set *observation;
     const struct estimator *estimator;
     uint64_t path_budget; /* 0: the method's default */
+    /* Ends the fit when the noise of tracing in the fitted means is at most this share of what the photographs' stated
+     * errors make of them; the budget is then the most that it takes. 0: no such goal. Methods without it ignore it. */
+    double precision;
     size_t max_iteration; /* 0: the method's default */
     size_t first_path;    /* of a configuration and replica in the first estimate; 0: the method's default */
     status (*report)(void *context, const struct fit_step *step, struct error *err); /* NULL: nobody listens */

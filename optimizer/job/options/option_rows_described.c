@@ -105,6 +105,16 @@ const struct job_option option_rows_described[] = {
      RANGE(1, 128),
      .left_out = "whole repeats, at least 8; courses: 4",
      .meaning = "Weft yarns, or courses, in the tile."},
+    {.path = "cloth.final_tiles",
+     .kind = OPTION_COUNT,
+     INTO(cloth_final_tiles),
+     RANGE(1, 8),
+     .standard = "1",
+     .meaning =
+         "Where numbers of the cloth are fitted: how many times as long along both edges the tile is in the last "
+         "fit, on the chosen cloth, and in the result. Radiances of a small tile show the random places of its "
+         "fibers; the search, which makes many cloths, is fast with small ones, and the result is better with a "
+         "large one."},
     {.path = "cloth.warp_per_cm",
      .kind = OPTION_NUMBER,
      INTO(cloth_threads_per_cm[1]),

@@ -55,7 +55,8 @@ const struct job_option option_rows_fit[] = {
      .choice_at = job_method_id,
      .meaning = "`published_sgd.v1` is the published method, for comparison. When no budget is stated it has the "
                 "published one: six runs of 60 iterations, two replicas, 64 x 64 pixels of 64 samples, which is 550 "
-                "times the light paths of `gauss_newton.v1`. It takes no `priors`, no `nuisance` and no `texture` of a "
+                "times the light paths of `gauss_newton.v1`. It takes no `priors`, no `nuisance`, no `precision` and "
+                "no `texture` of a "
                 "weight above 0."},
     {.path = "fit.seed",
      .kind = OPTION_LARGE_COUNT,
@@ -84,6 +85,19 @@ const struct job_option option_rows_fit[] = {
                 "number for smaller errors, a smaller one for a quick trial; it is used up unless the fit is precise "
                 "before. A budget below the least that a fit takes gives a warning that names it (docs/model.md, "
                 "section 5)."},
+    {.path = "fit.precision",
+     .kind = OPTION_NUMBER,
+     .id = OPTION_PRECISION,
+     INTO(precision),
+     .lower = 0.05,
+     .upper = 10,
+     .left_out = "no goal",
+     .allowed = "0.05..10",
+     .meaning =
+         "Goal of precision of `gauss_newton.v1`: the fit ends when the noise of tracing makes an error of the fitted "
+         "means that is so many times the one that the photographs' stated errors make; 0.5 leaves the errors 12 % "
+         "larger than exact renderings would. `path_budget` is then the most that it takes, so give a large one. "
+         "Measurements without stated errors have no such goal."},
     {.path = "fit.share_camera_paths",
      .kind = OPTION_BOOL,
      INTO(share_camera_paths),

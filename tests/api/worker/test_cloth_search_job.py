@@ -82,7 +82,8 @@ def test_numbers_come_back(tmp_path, sample):
     """The flatness is found again. Where hairs are as good as none, their length is not determined, and the job says so."""
     job = make_job(tmp_path, "job", sample)
     fixed = {k: TRUTH[k] for k in ("beta_R", "beta_TT", "gamma_TT")}
-    result = run(job, cloth=cloth(hairs_per_mm=0.02, hair_length_um={"value": 200, "lower": 100, "upper": 1000}, **FITTED), photographs=photographs(sample),
+    described = cloth(hairs_per_mm=0.02, hair_length_um={"value": 200, "lower": 100, "upper": 1000}, **FITTED)
+    result = run(job, cloth={**described, "final_tiles": 2}, photographs=photographs(sample),
                  fit={"model": "two_lobe.v1", "path_budget": 1200000, "fixed": fixed, **OUTPUT})
     numbers = {n["name"]: n for n in result["cloth_numbers"]}
     flatness, hairs = numbers["yarns[0].flatness"], numbers["yarns[0].hair_length_um"]
@@ -94,6 +95,9 @@ def test_numbers_come_back(tmp_path, sample):
     assert folds["cloth_numbers_held"] and folds["with_cloth_numbers"]["rel_rms"] >= 0 and folds["with_cloth_numbers"]["rel_rms_se"] > 0
     shown = {n["name"]: n for n in result["geometry"]["cloth"]["numbers"]}
     assert abs(shown["yarns[0].flatness"]["value"] - flatness["value"]) < 1e-9
+    made = result["geometry"]["cloth"]
+    assert made["made"]["tile_yarns"] == [8, 8] and made["description"]["tile_warps"] == made["description"]["tile_wefts"] == 8
+    assert result["geometry"]["n_fiber"] >= 4 * 8 * 20
     summary = (job / "results" / "summary.txt").read_text()
     assert "yarns[0].flatness" in summary and "these measurements do not determine it" in summary
     assert sum(s["best"] for s in result["cloth_screening"]) == 1

@@ -111,7 +111,7 @@ void fake_numbers_init(struct fake_numbers *x, const double number[FAKE_N_NUMBER
     observation_set_init(&x->observation);
     assert_int_equal(fake_observe(&x->cloth, x->truth, rel_noise, seed, &x->observation), STATUS_OK);
     observe(x, seed, rel_noise, misfit);
-    const struct cloth_source source = {x, FAKE_N_NUMBER, estimate};
+    const struct cloth_source source = {x, FAKE_N_NUMBER, estimate, NULL};
     assert_int_equal(cloth_estimator_init(&x->numbers, &source, FAKE_N_PARAM, FAKE_N_FIT, x->info + FAKE_N_PARAM,
                                           x->parameter + FAKE_N_PARAM, NULL),
                      STATUS_OK);

@@ -169,7 +169,8 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
         bool arrived = gauss_newton_arrived(g);
         result->converged = arrived && !failed && g->history.n_step > 2;
         bool precise = gauss_newton_precise(g, f, se);
-        if (result->converged && (precise || gauss_newton_as_good_as_photographs(g)) && !g->pulls) {
+        bool fine = precise || gauss_newton_as_good_as_photographs(g) || gauss_newton_as_precise_as_asked(g);
+        if (result->converged && fine && !g->pulls) {
             gauss_newton_explain_end(g, precise, f, se, result);
             return STATUS_OK;
         }

@@ -55,6 +55,9 @@ bool gauss_newton_precise(const struct gauss_newton *g, double f, double se);
 /* Whether the noise is small beside the photographs' own errors; false when the job states a budget. */
 bool gauss_newton_as_good_as_photographs(const struct gauss_newton *g);
 
+/* Whether the noise is small enough for the job's goal of precision; false when it states none. */
+bool gauss_newton_as_precise_as_asked(const struct gauss_newton *g);
+
 /* Whether the fit has arrived with the pull, and misfit, not noise, makes the residuals there. */
 bool gauss_newton_pulled_to_misfit(const struct gauss_newton *g);
 /* Whether a step from such a place has led to where the noise is far larger: narrow lobes, whose few rare bright paths
@@ -78,7 +81,7 @@ double gauss_newton_paths_to_misfit(const struct gauss_newton *g);
 double gauss_newton_expected_paths(const struct gauss_newton *g, double f, double se, size_t n_left);
 
 /* Fills in stop and reason of a fit that ended because it had arrived. precise: gauss_newton_precise; otherwise it is
- * as good as the photographs. */
+ * as good as the photographs, or as precise as the job asks for. */
 void gauss_newton_explain_end(const struct gauss_newton *g, bool precise, double f, double se,
                               struct fit_result *result);
 /* The state of a fit whose paths or iterations are used up. */

@@ -8,7 +8,8 @@
  *
  * The fit ends when it has arrived, there is no pull any more, and the noise is good enough too: below target_share
  * of the plain objective or target_rel_rms, or, where no budget was asked for, below photograph_share of the variance
- * of a residual by the photographs' own errors. A fit whose paths or iterations are used up before that has converged
+ * of a residual by the photographs' own errors, or where the job states a goal of precision, when that is reached. A
+ * fit whose paths or iterations are used up before that has converged
  * if it had arrived. */
 #include "optimizer/fit/descent/gauss_newton/gauss_newton.h"
 
@@ -57,10 +58,29 @@ static double noise_ratio(const struct gauss_newton *g)
     return g->noise * (double)g->model.n_row / photograph;
 }
 
+/* Error of the fitted means through the noise of tracing over that through the photographs' stated errors; infinite
+ * where they state none. Both are sums of squares over the rows: what noise adds to the weighted objective by way of the
+ * parameters, and for the photographs their mean variance for each free parameter. */
+static double error_ratio(const struct gauss_newton *g)
+{
+    double photograph = 0.0;
+    for (size_t row = 0; row < g->model.n_row; row++) photograph += g->model.weight[row] * g->model.photograph_var[row];
+    return sqrt(g->noise_decrease * (double)g->model.n_row / (photograph * (double)g->n_free));
+}
+
+bool gauss_newton_as_precise_as_asked(const struct gauss_newton *g)
+{
+    return g->run.problem->precision > 0.0 && error_ratio(g) <= g->run.problem->precision;
+}
+
 double gauss_newton_paths_to_grow(const struct gauss_newton *g, double f, double se)
 {
     double precise =
         2.0 * (double)g->n_free * linear_model_mean_noise(&g->model) / good_enough(g, fmax(0.0, f - 2.0 * se));
+    if (g->run.problem->precision > 0.0) {
+        const double ratio = error_ratio(g) / g->run.problem->precision;
+        return fmin(precise, ratio * ratio);
+    }
     if (g->run.problem->path_budget > 0) return precise;
     return fmin(precise, fmax(noise_ratio(g) / photograph_share, least_effective / g->model.n_effective));
 }
@@ -149,10 +169,16 @@ void gauss_newton_explain_end(const struct gauss_newton *g, bool precise, double
 {
     char *text = result->reason;
     size_t n = sizeof result->reason;
+    const double ratio = g->run.problem->precision > 0.0 ? error_ratio(g) : 0.0;
     result->stop = precise ? STOP_ARRIVED : STOP_ARRIVED_WITHIN_PHOTOGRAPHS;
     if (precise)
         snprintf(text, n, "further steps promise to lower the objective, %.3g with a noise of %.1g, by %g %%", f, se,
                  promised_percent(g));
+    else if (ratio > 0.0)
+        snprintf(text, n,
+                 "further steps promise to lower the objective by %g %%, and the noise of tracing makes %.2g times the "
+                 "error of the fitted means that the photographs' own errors make",
+                 promised_percent(g), ratio);
     else
         snprintf(
             text, n,

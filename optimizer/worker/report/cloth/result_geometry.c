@@ -5,6 +5,8 @@
 #include "optimizer/worker/report/cloth/weave_json.h"
 #include "optimizer/worker/report/json_number.h"
 
+#include <stdlib.h>
+
 static json_t *alignment_json(const struct reconstruct_option *o, const struct reconstruct_report *g)
 {
     static const char *const outcome[] = {
@@ -162,6 +164,19 @@ static void set_densities(json_t *json, const struct reconstruct_report *g)
     json_object_set_new(json, "smoothed_noise_sd", json_number(g->noise.mapped_sd));
 }
 
+/* The cloth of the fitted numbers, with the tile of the final fit; before the fit, that of the document. */
+static json_t *described_json(const struct pipeline_context *c)
+{
+    const bool fitted = c->number.i_shown > 0;
+    struct cloth_description *d = malloc(sizeof *d);
+    struct error unused;
+    if (d == NULL) return json_null();
+    const status s = cloth_description_enlarge(c->doc->cloth, fitted ? c->doc->cloth_final_tiles : 1, d, &unused);
+    json_t *json = s == STATUS_OK ? result_cloth_json(d, fitted ? c->number.shown : NULL, &c->cloth) : json_null();
+    free(d);
+    return json;
+}
+
 json_t *result_geometry_json(const struct pipeline_context *c)
 {
     const struct reconstruct_report *g = &c->geometry;
@@ -179,8 +194,7 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "sections", section_report_json(c));
     json_object_set_new(json, "groups", groups_json(c));
     json_object_set_new(json, "seam_fibers", seam_fibers_json(g));
-    const double *number = c->number.i_shown > 0 ? c->number.shown : NULL; /* fitted ones; else those of the document */
-    if (c->doc->cloth != NULL) json_object_set_new(json, "cloth", result_cloth_json(c->doc->cloth, number, &c->cloth));
+    if (c->doc->cloth != NULL) json_object_set_new(json, "cloth", described_json(c));
     if (c->texture.found) json_object_set_new(json, "texture", texture_json(c));
     if (!c->doc->has_volume) return json;
     const struct reconstruct_option *o = &c->option;

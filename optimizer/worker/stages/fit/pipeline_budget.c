@@ -1,5 +1,6 @@
 #include "optimizer/worker/stages/fit/pipeline_budget.h"
 #include "base/option_id.h"
+#include "optimizer/fit/objective/objective.h"
 #include "optimizer/job/option_key.h"
 #include "optimizer/worker/stages/fit/pipeline_cloth.h"
 #include "optimizer/worker/stages/fit/pipeline_fit_option.h"
@@ -32,8 +33,22 @@ static status least_budget(const struct pipeline_context *c, size_t i_model, uin
     return s;
 }
 
+/* Warns of a goal of precision where no fitted row states an error that could be the measure. */
+static void warn_precision(struct pipeline_context *c)
+{
+    bool stated = false;
+    for (size_t i = 0; i < c->row.n; i++)
+        for (size_t k = 0; k < 3; k++) stated = stated || objective_photograph_variance(&c->row.item[i], k) > 0.0;
+    if (!stated && c->doc->precision > 0.0)
+        worker_status_warn(c->status,
+                           "%s: the measurements state no errors that the noise of tracing could be compared with, so "
+                           "the fit has no such goal",
+                           job_option_key(OPTION_PRECISION));
+}
+
 status pipeline_warn_budget(struct pipeline_context *c, struct error *err)
 {
+    warn_precision(c);
     for (size_t i = 0; i < c->n_model && c->doc->path_budget > 0; i++) {
         const struct pipeline_model *m = &c->model[i];
         uint64_t least;

@@ -124,22 +124,36 @@ struct pipeline_cloth_trace {
     struct cloth_estimator cloth;
     struct estimator live;
     struct estimate_journal *journal;
+    bool final;             /* the next cloths are those of a final fit */
     size_t n_built, i_next; /* the cloths of one iteration; the next of them to be replaced */
     struct built {
         double number[CLOTH_MAX_FITTED];
+        bool final;
         struct scene *scene;
     } built[CLOTH_MAX_MOVED + 1];
 };
 
+/* Makes the fibers of the described cloth at the values of all of its numbers. final: with the tile of the final fit. */
+static status build_tile(struct pipeline_context *c, const double *value, bool final, struct fiber_set *f,
+                         struct cloth_report *report, struct error *err)
+{
+    const struct progress progress = {.cancel = c->progress.cancel};
+    struct cloth_description *d = malloc(sizeof *d);
+    if (d == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make the cloth: out of memory");
+    status s = cloth_description_enlarge(c->doc->cloth, final ? c->doc->cloth_final_tiles : 1, d, err);
+    if (s == STATUS_OK) s = cloth_build(d, value, c->pool, &progress, f, report, err);
+    free(d);
+    return s;
+}
+
 /* Makes the fibers at given values of the fitted numbers. Where these contradict each other (a crimp that yarns cannot
  * follow), the nearest of a few cloths on the line to the start values takes their place, so that a search that meets
  * such a cloth goes on. */
-static status make_fibers(struct pipeline_context *c, const double *number, double value[CLOTH_MAX_NUMBER],
+static status make_fibers(struct pipeline_context *c, const double *number, bool final, double value[CLOTH_MAX_NUMBER],
                           struct fiber_set *f, struct cloth_report *report, struct error *err)
 {
     size_t n_number;
     const struct cloth_number *list = numbers_of(c, &n_number);
-    const struct progress progress = {.cancel = c->progress.cancel};
     status s = STATUS_OK;
     for (int k = 0; k <= SHORTENINGS; k++) {
         double share = 1.0 - (double)k / SHORTENINGS;
@@ -148,7 +162,7 @@ static status make_fibers(struct pipeline_context *c, const double *number, doub
             double start = c->number.range[i].start;
             value[c->number.item[i].index] = k == 0 ? number[i] : start + share * (number[i] - start);
         }
-        s = c->doc->cloth != NULL ? cloth_build(c->doc->cloth, value, c->pool, &progress, f, report, err)
+        s = c->doc->cloth != NULL ? build_tile(c, value, final, f, report, err)
                                   : fiber_correct(&c->uncorrected, value, f, err);
         if (s != STATUS_INVALID) return s;
     }
@@ -162,7 +176,8 @@ static status scene_of(struct pipeline_cloth_trace *t, const double *number, con
     struct fiber_set fiber;
     const size_t n_bytes = t->c->number.n * sizeof *number;
     for (size_t i = 0; i < t->n_built; i++)
-        if (t->built[i].scene != NULL && memcmp(number, t->built[i].number, n_bytes) == 0) {
+        if (t->built[i].scene != NULL && t->built[i].final == t->final &&
+            memcmp(number, t->built[i].number, n_bytes) == 0) {
             *scene = t->built[i].scene;
             return STATUS_OK;
         }
@@ -173,10 +188,11 @@ static status scene_of(struct pipeline_cloth_trace *t, const double *number, con
     fiber_set_init(&fiber);
     struct cloth_report report;
     double value[CLOTH_MAX_NUMBER];
-    status s = make_fibers(t->c, number, value, &fiber, &report, err);
+    status s = make_fibers(t->c, number, t->final, value, &fiber, &report, err);
     if (s == STATUS_OK) s = pipeline_fiber_scene(t->c, &fiber, &to->scene, err);
     fiber_set_release(&fiber);
     memcpy(to->number, number, n_bytes);
+    to->final = t->final;
     *scene = to->scene;
     return s;
 }
@@ -199,6 +215,8 @@ static status estimate(void *context, const double *number, const struct estimat
     return s;
 }
 
+static void set_final(void *context, bool final) { ((struct pipeline_cloth_trace *)context)->final = final; }
+
 status pipeline_cloth_open(struct pipeline_context *c, size_t i_model, const struct pipeline_joint *j,
                            struct pipeline_cloth_trace **trace, struct estimate_journal **journal, struct error *err)
 {
@@ -209,7 +227,7 @@ status pipeline_cloth_open(struct pipeline_context *c, size_t i_model, const str
     t->i_model = i_model;
     t->configuration = trace_configurations(&c->row);
     if (t->configuration == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit a cloth: out of memory");
-    const struct cloth_source source = {t, c->number.n, estimate};
+    const struct cloth_source source = {t, c->number.n, estimate, set_final};
     status s = cloth_estimator_init(&t->cloth, &source, j->n_scattering, c->row.n, j->param + j->n_scattering,
                                     j->parameter + j->n_scattering, err);
     if (s != STATUS_OK) return s;
@@ -314,7 +332,7 @@ status pipeline_cloth_use(struct pipeline_context *c, size_t i_model, struct err
 {
     const struct pipeline_model *m = &c->model[i_model];
     if (c->number.n == 0 || c->number.i_shown == i_model + 1) return STATUS_OK;
-    status s = make_fibers(c, m->cloth.number, c->number.shown, &c->fiber, &c->cloth, err);
+    status s = make_fibers(c, m->cloth.number, true, c->number.shown, &c->fiber, &c->cloth, err);
     if (s == STATUS_OK) s = pipeline_make_scene(c, err);
     if (s == STATUS_OK) warn_of_contradiction(c, m);
     c->number.i_shown = s == STATUS_OK ? i_model + 1 : 0;

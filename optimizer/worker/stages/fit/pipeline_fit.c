@@ -55,6 +55,7 @@ static struct fit_problem problem_of(struct fit_listener *l, const struct progre
                                 .parameter = l->joint->parameter,
                                 .observation = &c->row,
                                 .path_budget = c->doc->path_budget,
+                                .precision = c->doc->precision,
                                 .max_iteration = c->doc->max_iteration,
                                 .discrepancy = c->doc->discrepancy,
                                 .report = on_step,

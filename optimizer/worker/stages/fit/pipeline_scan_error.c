@@ -116,7 +116,7 @@ static status run_joint(struct scan_trace *t, struct pipeline_joint *j, const st
 {
     const struct pipeline_context *c = t->c;
     const size_t n = j->n_scattering, n_path = (size_t)(path_share * (double)c->model[t->i_model].fit.n_path);
-    const struct cloth_source source = {t, N_NUMBER, estimate};
+    const struct cloth_source source = {t, N_NUMBER, estimate, NULL};
     status s = cloth_estimator_init(&t->cloth, &source, n, c->row.n, j->param + n, j->parameter + n, err);
     if (s != STATUS_OK) return s;
     t->cloth.moves = CLOTH_MOVES_SINGLE; /* a single iteration */

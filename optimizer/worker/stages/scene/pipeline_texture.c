@@ -94,6 +94,7 @@ static status take_draft(struct pipeline_context *c, struct error *err)
     for (int a = CLOTH_WEFT; a <= CLOTH_WARP; a++) d->n_yarn[a] = c->doc->cloth_tile_yarn[a];
     if (s == STATUS_OK) s = texture_take_widths(c, err);
     if (s == STATUS_OK) s = cloth_description_check(d, err);
+    if (s == STATUS_OK) s = job_cloth_check_final_tiles(c->doc, err);
     if (s == STATUS_INVALID) job_cloth_name_field(err);
     return s;
 }

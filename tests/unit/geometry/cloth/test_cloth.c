@@ -304,6 +304,37 @@ static void test_threads_per_cm(void **state)
     fiber_set_release(&f);
 }
 
+/* A tile that is twice as long along both edges has four times the fibers of the same cloth, and counts that no cloth
+ * can have are refused. */
+static void test_larger_tiles(void **state)
+{
+    (void)state;
+    const char *const weave[] = {"plain", "jersey", "velvet", "felt"};
+    for (size_t i = 0; i < sizeof weave / sizeof *weave; i++) {
+        struct cloth_description d = small_cloth(weave[i]), large;
+        struct cloth_report small_report, r;
+        struct fiber_set small, f;
+        struct error err = {0};
+        assert_int_equal(cloth_description_enlarge(&d, 2, &large, &err), STATUS_OK);
+        assert_int_equal(cloth_description_check(&large, &err), STATUS_OK);
+        build(&d, NULL, NULL, &small, &small_report);
+        build(&large, NULL, NULL, &f, &r);
+        size_t n[2] = {0};
+        for (size_t k = 0; k < d.n_kind; k++) {
+            n[0] += small_report.n_fiber[k];
+            n[1] += r.n_fiber[k];
+        }
+        print_message("%s: %zu fibers, %zu in the larger tile\n", weave[i], n[0], n[1]);
+        for (int a = 0; a < 2; a++) assert_true(fabs(r.tile_m[a] / small_report.tile_m[a] - 2.0) < 0.01);
+        assert_true(fabs(r.body_thickness_m / small_report.body_thickness_m - 1.0) < 0.3);
+        assert_true(fabs(r.volume_fraction / small_report.volume_fraction - 1.0) < 0.3);
+        assert_true(cloth_description_enlarge(&d, 1000, &large, &err) == STATUS_INVALID &&
+                    strcmp(err.field, "final_tiles") == 0);
+        fiber_set_release(&small);
+        fiber_set_release(&f);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -316,6 +347,7 @@ int main(void)
         cmocka_unit_test(test_roots_of_hairs),
         cmocka_unit_test(test_melange),
         cmocka_unit_test(test_threads_per_cm),
+        cmocka_unit_test(test_larger_tiles),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -94,7 +94,7 @@ static void test_balanced_moves(void **state)
         struct param_info info[CLOTH_MAX_FITTED];
         struct fit_parameter parameter[CLOTH_MAX_FITTED];
         struct cloth_estimator e;
-        const struct cloth_source source = {&n, n, linear_mean};
+        const struct cloth_source source = {&n, n, linear_mean, NULL};
         double number[CLOTH_MAX_FITTED] = {0}, wall_s;
         const size_t n_path[1] = {100000};
         struct estimate out[2];

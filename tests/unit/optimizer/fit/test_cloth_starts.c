@@ -72,11 +72,51 @@ static void test_too_many(void **state)
     free(r);
 }
 
+/* Watches which cloths the search asks for while it says that a final fit is made. */
+struct watch {
+    struct cloth_source inner;
+    bool final;
+    size_t n_final, n_search;
+    double number[FAKE_N_NUMBER]; /* of the final fit */
+};
+
+static void watch_final(void *context, bool final) { ((struct watch *)context)->final = final; }
+
+static status watch_estimate(void *context, const double *number, const struct estimator_call *call,
+                             const struct progress *progress, struct estimate *out, double *wall_s, struct error *err)
+{
+    struct watch *w = context;
+    if (w->n_final == 0 && w->final) memcpy(w->number, number, sizeof w->number);
+    if (w->final) assert_memory_equal(number, w->number, sizeof w->number);
+    w->n_final += w->final;
+    w->n_search += !w->final;
+    return w->inner.estimate(w->inner.context, number, call, progress, out, wall_s, err);
+}
+
+/* The final fit, and nothing else, is said to be one: it sees the chosen cloth alone. */
+static void test_final_fit_is_announced(void **state)
+{
+    (void)state;
+    struct fake_numbers x;
+    struct cloth_search_result *r = malloc(sizeof *r);
+    fake_numbers_init(&x, mid_cloth, 5, 1.0, 0.01, 0.0);
+    struct watch w = {.inner = x.numbers.source};
+    x.numbers.source = (struct cloth_source){&w, FAKE_N_NUMBER, watch_estimate, watch_final};
+    x.problem.max_iteration = 6;
+    fake_numbers_run(&x, r);
+    assert_false(r->took_screened);
+    assert_true(w.n_final > 0 && w.n_search > w.n_final && !w.final);
+    assert_memory_equal(w.number, r->number, sizeof w.number);
+    fake_numbers_release(&x);
+    free(r);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_best_prediction_is_kept),
         cmocka_unit_test(test_too_many),
+        cmocka_unit_test(test_final_fit_is_announced),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

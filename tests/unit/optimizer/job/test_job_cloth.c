@@ -163,6 +163,10 @@ static void test_mistakes_are_named(void **state)
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":\"NaN\""), "cloth.crimp", "but it is a text");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":1e308"), "cloth.crimp", "1e+308");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"tile_warps\":-4"), "cloth.tile_warps", "-4");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"final_tiles\":2"), "cloth.final_tiles", "numbers are fitted");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{},\"final_tiles\":2,\"tile_wefts\":80"),
+                             "cloth.final_tiles", "160 yarns of the weft");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{},\"final_tiles\":0"), "cloth.final_tiles", "0");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"warp\":[]"), "cloth.warp", "1 to 64");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"warp\":[\"red\"],\"yarns\":[{\"name\":\"red\"}]"),
                              "cloth.warp", "element 0");

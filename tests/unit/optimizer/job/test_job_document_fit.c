@@ -327,6 +327,7 @@ static void test_methods_get_what_they_take(void **state)
         {METHOD_TAKES_NUISANCE, "fit.nuisance", "\"nuisance\":{\"gain\":\"global\"}"},
         {METHOD_TAKES_NUISANCE, "fit.nuisance", "\"nuisance\":{\"stray_light\":true}"},
         {METHOD_TAKES_TEXTURE, "fit.texture", "\"texture\":{\"block_mm\":1}"},
+        {METHOD_TAKES_PRECISION, "fit.precision", "\"precision\":0.5"},
     };
     (void)state;
     const struct method_info *m;
