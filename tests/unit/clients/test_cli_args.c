@@ -1,9 +1,10 @@
 /* The command line of `selvedge`: the tables of commands and options. The source file is included here, because the
  * parts of the client are in no library. */
-#include "clients/cli/cli_args.c"          /* NOLINT */
-#include "clients/cli/cli_text.c"          /* NOLINT */
-#include "clients/cli/tools/cli_sibling.c" /* NOLINT */
-#include "clients/cli/tools/cli_tool.c"    /* NOLINT */
+#include "clients/cli/arguments/cli_args.c"          /* NOLINT */
+#include "clients/cli/arguments/cli_command_table.c" /* NOLINT */
+#include "clients/cli/cli_text.c"                    /* NOLINT */
+#include "clients/cli/tools/cli_sibling.c"           /* NOLINT */
+#include "clients/cli/tools/cli_tool.c"              /* NOLINT */
 
 #include <setjmp.h>
 #include <stdarg.h>
