@@ -10,8 +10,8 @@
  *    below what matters (gauss_newton.v1).
  *
  * 3. Final fit: the scattering parameters alone on the cloth of the joint fit. Where its objective is higher than that
- *    of the best cloth of the screening beyond doubt, that cloth is fitted as well and the lower one is taken. The source may make
- *    larger tiles of these cloths, in which the random places of single fibers count less.
+ *    of the best cloth of the screening beyond doubt, that cloth is fitted as well and the lower one is taken. The
+ *    source may make larger tiles of these cloths, in which the random places of single fibers count less.
  *
  * With several starts (fit_option.n_start) all of this is done as often. Each later search screens one cloth of its
  * own, the next one of the evenly spread sequence, and the search whose final fit predicts left-out rows best

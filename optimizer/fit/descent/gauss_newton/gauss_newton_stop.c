@@ -59,8 +59,8 @@ static double noise_ratio(const struct gauss_newton *g)
 }
 
 /* Error of the fitted means through the noise of tracing over that through the photographs' stated errors; infinite
- * where they state none. Both are sums of squares over the rows: what noise adds to the weighted objective by way of the
- * parameters, and for the photographs their mean variance for each free parameter. */
+ * where they state none. Both are sums of squares over the rows: what noise adds to the weighted objective by way of
+ * the parameters, and for the photographs their mean variance for each free parameter. */
 static double error_ratio(const struct gauss_newton *g)
 {
     double photograph = 0.0;

@@ -133,7 +133,7 @@ struct pipeline_cloth_trace {
     } built[CLOTH_MAX_MOVED + 1];
 };
 
-/* Makes the fibers of the described cloth at the values of all of its numbers. final: with the tile of the final fit. */
+/* Makes the fibers of the described cloth at the values of all of its numbers. final: with the tile of the last fit. */
 static status build_tile(struct pipeline_context *c, const double *value, bool final, struct fiber_set *f,
                          struct cloth_report *report, struct error *err)
 {
