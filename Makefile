@@ -52,6 +52,11 @@ LIBS := $(foreach p,$(PARTS),$(BUILD)/lib/lib$(p).a)
 
 PROGRAMS := $(BUILD)/bin/selvedge $(BUILD)/bin/selvedged $(BUILD)/bin/selvedge-worker $(BUILD)/bin/selvedge-phantom $(BUILD)/bin/selvedge-camera
 PLUGINS := $(if $(shell pkg-config --exists libpq 2>/dev/null && echo yes),$(BUILD)/lib/selvedge-postgresql.so)
+# ranks of a job: built where Open MPI is installed, without which everything else works
+MPICC := $(shell command -v mpicc 2>/dev/null)
+ifneq ($(MPICC),)
+PROGRAMS += $(BUILD)/bin/selvedge-mpi
+endif
 LINK_BASE := -lz -lm -pthread -Wl,--undefined=processor_required
 LINK_GEOMETRY := $(shell pkg-config --libs libtiff-4 libzstd 2>/dev/null) -Wl,--as-needed -lopencv_mcc -lopencv_aruco -Wl,--no-as-needed -lopencv_imgproc -lopencv_core -lstdc++ $(LINK_BASE)
 LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng $(LINK_GEOMETRY)
@@ -115,6 +120,11 @@ L = $(BUILD)/lib/lib
 $(BUILD)/bin/selvedge-worker: $(BUILD)/obj/optimizer/worker/worker_main.c.o $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_OPTIMIZER)
+# (MPI's headers include casts that our warnings refuse)
+$(BUILD)/obj/optimizer/worker/ranks/selvedge_mpi_main.c.o: CFLAGS_ALL += $(patsubst -I%,-isystem %,$(shell pkg-config --cflags-only-I ompi-c 2>/dev/null))
+$(BUILD)/bin/selvedge-mpi: $(BUILD)/obj/optimizer/worker/ranks/selvedge_mpi_main.c.o
+	@mkdir -p $(@D)
+	$(CC) $(LDFLAGS) -o $@ $^ $(shell pkg-config --libs ompi-c)
 $(BUILD)/bin/selvedge-phantom: $(BUILD)/obj/optimizer/phantom/phantom_main.c.o $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_OPTIMIZER)

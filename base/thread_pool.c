@@ -19,11 +19,13 @@ struct thread_pool {
     bool stop;
 
     task_function run;
+    task_source source; /* NULL: the tasks 0 .. n_task - 1 */
     void *context;
     const struct progress *progress;
     size_t n_task;
     atomic_size_t next;
     size_t n_done;
+    struct rank_team *team;
 };
 
 struct start_argument {
@@ -78,6 +80,10 @@ static size_t available_processors(void)
 
 static void run_tasks(struct thread_pool *p, size_t i_thread)
 {
+    if (p->source != NULL) {
+        for (size_t i; p->source(p->context, i_thread, &i);) p->run(p->context, i, i_thread);
+        return;
+    }
     while (!progress_cancelled(p->progress)) {
         size_t i = atomic_fetch_add(&p->next, 1);
         if (i >= p->n_task) break;
@@ -169,14 +175,10 @@ static status run_in_caller(size_t n_task, task_function run, void *context, con
     return STATUS_OK;
 }
 
-static status run_in_all(struct thread_pool *p, size_t n_task, task_function run, void *context,
-                         const struct progress *progress)
+/* The tasks that the caller has written to p. */
+static status run_in_all(struct thread_pool *p)
 {
     pthread_mutex_lock(&p->lock);
-    p->run = run;
-    p->context = context;
-    p->progress = progress;
-    p->n_task = n_task;
     p->n_done = 0;
     atomic_store(&p->next, 0);
     p->n_busy = p->n_started;
@@ -186,7 +188,7 @@ static status run_in_all(struct thread_pool *p, size_t n_task, task_function run
     run_tasks(p, 0);
     pthread_mutex_lock(&p->lock);
     while (p->n_busy > 0) pthread_cond_wait(&p->done, &p->lock);
-    bool complete = p->n_done == n_task;
+    bool complete = p->n_done == p->n_task;
     pthread_mutex_unlock(&p->lock);
     return complete ? STATUS_OK : STATUS_CANCELLED;
 }
@@ -196,9 +198,34 @@ status thread_pool_run(struct thread_pool *p, size_t n_task, task_function run, 
                        const struct progress *progress)
 {
     unsigned long mode = float_mode();
+    status s;
     set_flush_to_zero();
-    status s =
-        p == NULL ? run_in_caller(n_task, run, context, progress) : run_in_all(p, n_task, run, context, progress);
+    if (p == NULL) {
+        s = run_in_caller(n_task, run, context, progress);
+    } else {
+        p->run = run;
+        p->source = NULL;
+        p->context = context;
+        p->progress = progress;
+        p->n_task = n_task;
+        s = run_in_all(p);
+    }
     set_float_mode(mode);
     return s;
 }
+
+void thread_pool_run_from(struct thread_pool *p, task_source source, task_function run, void *context)
+{
+    unsigned long mode = float_mode();
+    set_flush_to_zero();
+    p->run = run;
+    p->source = source;
+    p->context = context;
+    p->progress = NULL;
+    p->n_task = 0;
+    run_in_all(p);
+    set_float_mode(mode);
+}
+
+void thread_pool_join_team(struct thread_pool *p, struct rank_team *team) { p->team = team; }
+struct rank_team *thread_pool_team(const struct thread_pool *p) { return p == NULL ? NULL : p->team; }

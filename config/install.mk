@@ -19,6 +19,10 @@ purpose_selvedged := service that makes digital twins of cloth
 purpose_selvedge-worker := run one job of Selvedge in its folder
 purpose_selvedge-phantom := make artificial cloth with known fibers and scattering
 purpose_selvedge-camera := show how Selvedge reads photographs, and calibrate cameras
+purpose_selvedge-mpi := carry the messages of the ranks of one job of Selvedge
+ifneq ($(MPICC),)
+MAN_PAGES += $(BUILD)/man/selvedge-mpi.1
+endif
 HELP2MAN := $(shell command -v help2man)
 
 DASHBOARD_FOLDERS := $(notdir $(patsubst %/,%,$(wildcard clients/dashboard/*/)))

@@ -90,6 +90,8 @@ static const struct setting table[] = {
     TEXT("jobs", "pass_environment", pass_environment, "PATH LANG LC_ALL TZ OPENBLAS_NUM_THREADS",
          "names of the environment variables that workers get from the daemon; they see no others"),
     NUMBER("jobs", "threads", threads, 0, 0, 1024, "computing threads of a worker; 0: one for each processor"),
+    NUMBER("jobs", "ranks", ranks, 1, 1, 4096,
+           "processes of the local backend that share the paths of one job by MPI; 1: none but the worker"),
     NUMBER("jobs", "nice", nice, 10, 0, 19, "niceness of workers (their scheduling priority)"),
     NUMBER("jobs", "memory_limit_bytes", memory_limit_bytes, 0, 0, INT64_MAX / 2,
            "limit on a worker's address space, which includes the files that it maps (see volume_memory_bytes); 0: no "

@@ -64,7 +64,8 @@ enum worker_exit {
     WORKER_FAILED = 1,    /* status.json says why */
     WORKER_USAGE = 2,     /* wrong arguments */
     WORKER_CANCELLED = 3, /* by SIGTERM */
-    WORKER_STALE = 4      /* another attempt may write now, or another worker has locked the folder */
+    WORKER_STALE = 4,     /* another attempt may write now, or another worker has locked the folder */
+    WORKER_LOST = 75      /* of several ranks one is lost: the job goes on from its checkpoint when it is run again */
 };
 
 #endif

@@ -6,19 +6,20 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/json/catalogue_json.h"
 #include "optimizer/worker/check/job_check.h"
+#include "optimizer/worker/check/other_faults.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/progress/job_need.h"
+#include "optimizer/worker/ranks/worker_launcher.h"
+#include "optimizer/worker/ranks/worker_team.h"
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/sandbox/worker_confine.h"
+#include "optimizer/worker/worker_signals.h"
 
 #include <errno.h>
 #include <getopt.h>
-#include <pthread.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <ucontext.h>
 #include <unistd.h>
 
 static const char usage[] =
@@ -40,6 +41,11 @@ static const char usage[] =
     "                     it needs; required: fail where the kernel cannot; off\n"
     "  --start NAME       name of this start, given by an engine that might start a worker twice: one name has an "
     "attempt\n"
+    "  --ranks N          run the job with N ranks (processes that share its paths) by mpirun, and start them again "
+    "when\n"
+    "                     one is lost; the processors are divided among them unless --threads is given. Results do "
+    "not\n"
+    "                     depend on it. mpirun and srun may also start this program themselves\n"
     "  --quiet            log to JOBDIR/log.txt only\n"
     "  --check JOB.json   check the document and its files (in JOBDIR), and print all faults and warnings as JSON;\n"
     "                     exit status 1 when there are faults\n"
@@ -52,14 +58,15 @@ static const char usage[] =
     "  --version, --help\n"
     "\n"
     "Exit status: 0 succeeded, 1 failed (JOBDIR/status.json says why), 2 usage, 3 cancelled by SIGTERM, 4 another "
-    "attempt owns the job.\n";
+    "attempt owns the job, 75 a rank is lost.\n";
 
 struct arguments {
     const char *folder;
     const char *speeds; /* NULL: none are remembered */
     const char *start;  /* name of this start; NULL: none */
     const char *check;  /* a document to check; NULL: the job is run */
-    size_t n_thread, memory_mib, scratch_mib;
+    size_t n_thread, n_rank, memory_mib, scratch_mib;
+    struct worker_team_place team;
     bool quiet, no_links, plan;
     enum confine_mode sandbox;
     struct confinement confinement;
@@ -119,6 +126,10 @@ static bool take_value(int option, const char *value, struct arguments *a)
     switch (option) {
     case 't':
         return parse_count(value, 1024, &a->n_thread);
+    case 'r':
+        return parse_count(value, RANK_TEAM_MOST, &a->n_rank);
+    case 'T':
+        return worker_team_parse(value, &a->team);
     case 'm':
         return parse_count(value, (size_t)1 << 32, &a->memory_mib);
     case 'S':
@@ -143,6 +154,8 @@ static bool take_value(int option, const char *value, struct arguments *a)
 static int parse_arguments(int argc, char **argv, struct arguments *a)
 {
     static const struct option option[] = {{"threads", required_argument, NULL, 't'},
+                                           {"ranks", required_argument, NULL, 'r'},
+                                           {"team", required_argument, NULL, 'T'},
                                            {"memory-mib", required_argument, NULL, 'm'},
                                            {"scratch-mib", required_argument, NULL, 'S'},
                                            {"speeds", required_argument, NULL, 's'},
@@ -157,7 +170,8 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
                                            {"version", no_argument, NULL, 'v'},
                                            {"catalogue", no_argument, NULL, 'c'},
                                            {NULL, 0, NULL, 0}};
-    *a = (struct arguments){.memory_mib = 2048, .sandbox = CONFINE_AUTO, .confinement.pdf.order_fd = -1};
+    *a = (struct arguments){
+        .n_rank = 1, .team.fd = -1, .memory_mib = 2048, .sandbox = CONFINE_AUTO, .confinement.pdf.order_fd = -1};
     for (int c; (c = getopt_long(argc, argv, "", option, NULL)) != -1;) {
         if (c == 'h') return fputs(usage, stdout) < 0;
         if (c == 'c') return print_catalogue();
@@ -178,36 +192,9 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
     return -1;
 }
 
-/* Handles a signal that reaches a thread which a library has started before main (OpenBLAS does, where OpenCV loads it)
- * and which therefore does not block the signal: blocks it in that thread from now on and sends it again, until the
- * status thread's sigtimedwait takes it. */
-static void pass_on(int signal_number, siginfo_t *info, void *context)
-{
-    (void)info;
-    ucontext_t *interrupted = context;
-    sigaddset(&interrupted->uc_sigmask, signal_number);
-    kill(getpid(), signal_number);
-}
-
-/* Blocks SIGTERM and SIGINT, which the status thread waits for, and ignores SIGPIPE, so that a broken pipe is an
- * error of write. */
-static void set_signals(void)
-{
-    struct sigaction action = {.sa_sigaction = pass_on, .sa_flags = SA_SIGINFO | SA_RESTART};
-    sigset_t set;
-    sigemptyset(&action.sa_mask);
-    sigaction(SIGTERM, &action, NULL);
-    sigaction(SIGINT, &action, NULL);
-    sigemptyset(&set);
-    sigaddset(&set, SIGTERM);
-    sigaddset(&set, SIGINT);
-    pthread_sigmask(SIG_BLOCK, &set, NULL);
-    signal(SIGPIPE, SIG_IGN);
-}
-
 /* Adds what this job took to the file, which other jobs may have changed meanwhile. What fails is no error of the job.
- * An attempt that went on from an earlier one took only a part of what the job needs. */
-static void remember_speeds(struct pipeline_context *c, const char *path)
+ * An attempt that went on from an earlier one, and rank 0 of several, took only a part of what the job needs. */
+static void remember_speeds(struct pipeline_context *c, const char *path, bool alone)
 {
     struct speed_book book;
     struct error err = {0};
@@ -217,66 +204,33 @@ static void remember_speeds(struct pipeline_context *c, const char *path)
                                   .disk_bytes = (double)disk_use_bytes(c->folder->path)};
     speed_book_read(path, &book);
     worker_status_remember(c->status, &book);
-    if (!c->resumed) job_need_remember(c, &took, &book);
+    if (!c->resumed && alone) job_need_remember(c, &took, &book);
     if (speed_book_write(path, &book, &err) != STATUS_OK) log_info(c->log, "%s", err.text);
 }
 
-/* Takes the folder of the inputs out of a text: users know their files by their names alone. */
-static void shorten_paths(const struct pipeline_context *c, char *text)
-{
-    char folder[WORKER_PATH_BYTES];
-    worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, folder);
-    const size_t n = strlen(folder);
-    for (char *at = text; (at = strstr(at, folder)) != NULL;)
-        if (at[n] == '/')
-            memmove(at, at + n + 1, strlen(at + n + 1) + 1);
-        else
-            at += n;
-}
-
-/* Warns of every fault of the inputs besides the one that has ended the job, so that all can be mended at once. */
-static void name_other_faults(struct pipeline_context *c, const struct error *first)
-{
-    char path[WORKER_PATH_BYTES], folder[WORKER_PATH_BYTES];
-    json_t *report = NULL;
-    const json_t *fault;
-    size_t i;
-    struct error err = {0};
-    worker_folder_path(c->folder, JOB_FILE_DOCUMENT, NULL, path);
-    worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, folder);
-    if (job_check(path, folder, &report, &err) != STATUS_OK) return;
-    json_array_foreach(json_object_get(report, "faults"), i, fault)
-    {
-        const char *field = json_string_value(json_object_get(fault, "field")),
-                   *detail = json_string_value(json_object_get(fault, "detail"));
-        char text[sizeof err.text];
-        if (field == NULL || detail == NULL) continue;
-        if (strcmp(field, first->field) == 0 || strcmp(detail, first->text) == 0) continue;
-        snprintf(text, sizeof text, "%s", detail);
-        shorten_paths(c, text);
-        worker_status_warn(c->status, "this is wrong, too: %s: %s", field, text);
-    }
-    json_decref(report);
-}
-
-static bool is_of_input(status s)
-{
-    return s == STATUS_INVALID || s == STATUS_NOT_FOUND || s == STATUS_FORMAT || s == STATUS_UNSUPPORTED;
-}
-
-static status run_job(struct pipeline_context *c, const struct arguments *a, struct error *err)
+static status run_stages(struct pipeline_context *c, const struct arguments *a, struct error *err)
 {
     struct speed_book book = {.n = 0};
     if (a->speeds != NULL) speed_book_read(a->speeds, &book);
-    worker_status_stage(c->status, "volume", "Reading the job", 0, 8);
-    status s = thread_pool_new(a->n_thread, &c->pool, err);
-    if (s == STATUS_OK) s = pipeline_read_inputs(c, err);
+    status s = pipeline_read_inputs(c, err);
     if (s == STATUS_OK) job_need_begin(c);
     worker_status_speeds(c->status, &book);
     if (s == STATUS_OK) s = pipeline_run(c, err);
-    if (is_of_input(s)) name_other_faults(c, err);
-    if (s != STATUS_OK) shorten_paths(c, err->text);
-    if (s == STATUS_OK && a->speeds != NULL) remember_speeds(c, a->speeds);
+    other_faults_name(c, s, err);
+    if (s == STATUS_OK && a->speeds != NULL) remember_speeds(c, a->speeds, a->team.fd < 0);
+    return s;
+}
+
+/* *lost: another rank is lost, so the status is no end of the job. */
+static status run_job(struct pipeline_context *c, const struct arguments *a, bool *lost, struct error *err)
+{
+    struct worker_team team = {.team = NULL};
+    worker_status_stage(c->status, "volume", "Reading the job", 0, 8);
+    status s = thread_pool_new(a->n_thread, &c->pool, err);
+    if (s == STATUS_OK) s = worker_team_open(&team, &a->team, c->pool, err);
+    if (s == STATUS_OK) s = run_stages(c, a, err);
+    *lost = worker_team_lost(&team);
+    worker_team_close(&team, c->pool, c->log);
     return s;
 }
 
@@ -324,6 +278,12 @@ static status report_sandbox(struct pipeline_context *c, const struct arguments 
     return STATUS_OK;
 }
 
+/* Another rank than the first. */
+static bool is_helper(const struct arguments *a) { return a->team.fd >= 0 && a->team.rank > 0; }
+
+/* The job is not run. */
+static bool files_only(const struct arguments *a) { return a->check != NULL || a->plan; }
+
 /* Enters the sandbox. Returns only in it, or without one; report_sandbox says what then failed. */
 static void enter_sandbox(struct arguments *a, char **argv, struct error *err)
 {
@@ -331,7 +291,7 @@ static void enter_sandbox(struct arguments *a, char **argv, struct error *err)
     struct worker_folder job = {.lock_fd = -1};
     char document[WORKER_PATH_BYTES], input[WORKER_PATH_BYTES];
     struct confine_files files = {
-        .folder = a->folder, .document = a->check, .speeds = a->speeds, .no_links = a->no_links};
+        .folder = a->folder, .document = a->check, .speeds = a->speeds, .no_links = a->no_links, .none = is_helper(a)};
     if (a->plan) { /* which reads what a check reads */
         snprintf(job.path, sizeof job.path, "%s", a->folder);
         worker_folder_path(&job, JOB_FILE_DOCUMENT, NULL, document);
@@ -340,15 +300,12 @@ static void enter_sandbox(struct arguments *a, char **argv, struct error *err)
         files.document = document;
     }
     if (a->sandbox == CONFINE_OFF) {
-        if (files.document == NULL) worker_prepare(a->folder, c);
+        if (files.document == NULL && !is_helper(a)) worker_prepare(a->folder, c);
         return;
     }
     if (!c->executed && worker_confine(&files, argv, err) != STATUS_OK) return;
     confinement_complete(c, a->sandbox, err);
 }
-
-/* The job is not run. */
-static bool files_only(const struct arguments *a) { return a->check != NULL || a->plan; }
 
 int main(int argc, char **argv)
 {
@@ -358,14 +315,17 @@ int main(int argc, char **argv)
     struct error err = {0}, failed = {0};
     char log_path[WORKER_PATH_BYTES];
     int code = parse_arguments(argc, argv, &a);
+    if (code < 0 && !files_only(&a) && !a.team.given && !a.confinement.executed)
+        code = worker_ranks_start(argv, a.folder, a.n_rank, a.n_thread);
     if (code >= 0) return code;
     enter_sandbox(&a, argv, &failed);
-    if (files_only(&a) && failed.code != STATUS_OK && a.sandbox == CONFINE_REQUIRED) {
+    if ((files_only(&a) || is_helper(&a)) && failed.code != STATUS_OK && a.sandbox == CONFINE_REQUIRED) {
         fprintf(stderr, "selvedge-worker: %s\n", failed.text);
         return WORKER_USAGE;
     }
+    if (is_helper(&a)) return worker_team_help(&a.team, a.n_thread);
     if (files_only(&a)) return a.plan ? print_plan(&a) : print_check(&a);
-    set_signals();
+    worker_signals_set();
     status s = worker_folder_open(&folder, a.folder, &err);
     if (s == STATUS_OK && a.start != NULL && (s = worker_folder_claim(&folder, a.start, &err)) != STATUS_OK)
         worker_folder_close(&folder);
@@ -386,8 +346,9 @@ int main(int argc, char **argv)
         code = WORKER_FAILED;
     } else {
         s = report_sandbox(&context, &a, &failed, &err);
-        if (s == STATUS_OK) s = run_job(&context, &a, &err);
-        code = conclude(context.status, context.log, s, &err);
+        bool lost = false;
+        if (s == STATUS_OK) s = run_job(&context, &a, &lost, &err);
+        code = lost ? WORKER_LOST : conclude(context.status, context.log, s, &err);
     }
     worker_status_free(context.status);
     pipeline_context_release(&context);

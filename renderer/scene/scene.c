@@ -1,3 +1,4 @@
+#include "base/ranks/unique_number.h"
 #include "renderer/scene/bent/bent_scene.h"
 #include "renderer/scene/scene_data.h"
 
@@ -269,40 +270,40 @@ static void build_block(struct scene *s)
     rtcCommitScene(s->block);
 }
 
-status scene_new(const struct fiber_set *f, const struct scene_option *o, struct scene **scene, struct error *err)
+status scene_build(struct scene *s, struct error *err)
 {
-    status st = fiber_set_validate(f, err);
-    if (st != STATUS_OK) return st;
     struct error device_error = {0};
-    struct scene *s = calloc(1, sizeof *s);
-    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot build scene: out of memory");
-    s->black_sheet = o->black_sheet;
-    st = copy_fibers(s, f, err);
-    if (st == STATUS_OK) st = copy_groups(s, f, err);
-    if (st != STATUS_OK) goto out;
-    st = choose_block(s, f, err);
-    if (st != STATUS_OK) goto out;
+    s->number = unique_number();
     /* one build thread: the order of the tree's leaves, which decides ties, must not depend on timing */
-    s->device = rtcNewDevice(o->no_avx512 ? "threads=1,set_affinity=0,isa=avx2" : "threads=1,set_affinity=0");
-    if (s->device == NULL) {
-        st = error_set(err, STATUS_UNSUPPORTED, "cannot build scene: Embree does not start (error %d)",
-                       (int)rtcGetDeviceError(NULL));
-        goto out;
-    }
+    s->device = rtcNewDevice(s->no_avx512 ? "threads=1,set_affinity=0,isa=avx2" : "threads=1,set_affinity=0");
+    if (s->device == NULL)
+        return error_set(err, STATUS_UNSUPPORTED, "cannot build scene: Embree does not start (error %d)",
+                         (int)rtcGetDeviceError(NULL));
     rtcSetDeviceErrorFunction(s->device, on_device_error, &device_error);
     rtcSetDeviceMemoryMonitorFunction(s->device, count_device_memory, s);
     build_tile(s);
     build_block(s);
     rtcSetDeviceErrorFunction(s->device, NULL, NULL); /* device_error is on this stack */
-    if (device_error.code != STATUS_OK) {
-        st = device_error.code;
-        if (err != NULL) *err = device_error;
-        goto out;
-    }
-    *scene = s;
-    s = NULL;
-out:
-    scene_free(s);
+    if (device_error.code != STATUS_OK && err != NULL) *err = device_error;
+    return device_error.code;
+}
+
+status scene_new(const struct fiber_set *f, const struct scene_option *o, struct scene **scene, struct error *err)
+{
+    status st = fiber_set_validate(f, err);
+    if (st != STATUS_OK) return st;
+    struct scene *s = calloc(1, sizeof *s);
+    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot build scene: out of memory");
+    s->black_sheet = o->black_sheet;
+    s->no_avx512 = o->no_avx512;
+    st = copy_fibers(s, f, err);
+    if (st == STATUS_OK) st = copy_groups(s, f, err);
+    if (st == STATUS_OK) st = choose_block(s, f, err);
+    if (st == STATUS_OK) st = scene_build(s, err);
+    if (st == STATUS_OK)
+        *scene = s;
+    else
+        scene_free(s);
     return st;
 }
 

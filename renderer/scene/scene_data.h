@@ -34,11 +34,14 @@ struct scene {
     int half_block[2];                       /* the block has 2 h + 1 tiles a side, the centre one at [0, tile) */
     float inset_low_mm[2], inset_high_mm[2]; /* where every fiber of the endless cloth is present */
     float bottom_mm;                         /* < 0; the top is 0 */
-    bool black_sheet;
+    bool black_sheet, no_avx512;
+    uint64_t number;         /* that no other scene of this process has had */
     struct bent_cloth *bent; /* NULL: the cloth is flat. Otherwise device, tile and block are those of the flat cloth */
     atomic_llong device_bytes;
 };
 
+/* Builds Embree's trees of a scene whose other members are filled in. STATUS_UNSUPPORTED, STATUS_NO_MEMORY. */
+status scene_build(struct scene *s, struct error *err);
 /* The nearest front face of the flat cloth over `span` of a ray, whose direction may have any length; *distance and
  * span are in units of it. The ray is moved by whole tiles. */
 bool scene_trace_span(const struct scene *scene, struct scene_ray *ray, float span, struct scene_hit *hit,

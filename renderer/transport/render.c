@@ -1,5 +1,8 @@
 #include "renderer/transport/render.h"
 
+#include "base/ranks/rank_team.h"
+#include "renderer/transport/ranks/rank_orders.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -75,6 +78,47 @@ static void run_task(void *context, size_t i_task, size_t i_thread)
     for (size_t i = first; i < last && i < r->n_pixel && !progress_cancelled(r->progress); i++) render_pixel(r, i);
 }
 
+/* ---- pixels that other ranks have rendered ---- */
+
+static size_t task_pixels(const struct run *r, size_t i_task, float **pixel)
+{
+    size_t first = i_task * r->pixels_per_task, n = r->n_pixel - first;
+    *pixel = r->im->pixel + first * r->im->n_channel;
+    return (n < r->pixels_per_task ? n : r->pixels_per_task) * r->im->n_channel * sizeof **pixel;
+}
+
+static size_t pack_task(const void *context, size_t i_task, void *to)
+{
+    float *pixel;
+    size_t n = task_pixels(context, i_task, &pixel);
+    memcpy(to, pixel, n);
+    return n;
+}
+
+static bool unpack_task(void *context, size_t i_task, const void *from, size_t n_bytes)
+{
+    float *pixel;
+    if (n_bytes != task_pixels(context, i_task, &pixel)) return false;
+    memcpy(pixel, from, n_bytes);
+    return true;
+}
+
+static status run_tasks(struct run *r, size_t n_task, struct thread_pool *pool, struct error *err)
+{
+    struct rank_team *team = thread_pool_team(pool);
+    float *pixel;
+    const struct rank_work work = {.n_task = n_task,
+                                   .most_bytes = task_pixels(r, 0, &pixel),
+                                   .run = run_task,
+                                   .pack = pack_task,
+                                   .unpack = unpack_task,
+                                   .context = r};
+    if (team == NULL || !rank_orders_can_share(r->q->configuration, 1, &r->q->input))
+        return thread_pool_run(pool, n_task, run_task, r, r->progress);
+    status st = rank_team_rank(team) == 0 ? rank_orders_picture(team, r->q, err) : STATUS_OK;
+    return st == STATUS_OK ? rank_team_share(team, &work, pool, r->progress, err) : st;
+}
+
 /* One block: the array of pointers, then the texts. */
 static status name_channels(const struct radiance_source *source, struct image *im, struct error *err)
 {
@@ -121,6 +165,13 @@ static status check_request(const struct render_request *q, struct error *err)
     return configuration_check(q->configuration, 1, err);
 }
 
+/* The picture of a helper lacks what other ranks have rendered. */
+static bool is_helper(const struct thread_pool *pool)
+{
+    const struct rank_team *team = thread_pool_team(pool);
+    return team != NULL && rank_team_rank(team) > 0;
+}
+
 static status render_pixels(struct run *r, struct thread_pool *pool, struct error *err)
 {
     const struct render_request *q = r->q;
@@ -128,11 +179,11 @@ static status render_pixels(struct run *r, struct thread_pool *pool, struct erro
     status st = image_init(r->im, q->width, q->height, 6 + 3 * r->source->n_flat, err);
     if (st == STATUS_OK) st = name_channels(r->source, r->im, err);
     if (st == STATUS_OK) {
-        st = thread_pool_run(pool, n_task, run_task, r, r->progress);
+        st = run_tasks(r, n_task, pool, err);
         if (st == STATUS_OK && progress_cancelled(r->progress)) st = STATUS_CANCELLED;
-        if (st != STATUS_OK) error_set(err, st, "rendering was cancelled");
+        if (st == STATUS_CANCELLED) error_set(err, st, "rendering was cancelled");
     }
-    if (st == STATUS_OK) st = check_finite(r->im, q->input.model->id, err);
+    if (st == STATUS_OK && !is_helper(pool)) st = check_finite(r->im, q->input.model->id, err);
     if (st != STATUS_OK) image_release(r->im);
     return st;
 }

@@ -120,6 +120,11 @@ void worker_arguments_set(struct worker_arguments *a, const struct worker_paths 
         add(a, "--threads");
         add(a, a->threads);
     }
+    if (p->ranks > 1 && p->document == NULL) {
+        snprintf(a->ranks, NUMBER_BYTES, "%lld", (long long)p->ranks);
+        add(a, "--ranks");
+        add(a, a->ranks);
+    }
     if (s->scratch_limit_bytes > 0) {
         add(a, "--scratch-mib");
         add(a, a->scratch_mib);

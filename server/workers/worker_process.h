@@ -20,6 +20,7 @@ struct worker_paths {
     bool plan;            /* the job is not run: what it is expected to take is told */
     int report_fd;        /* gets what a check or a plan says, in place of the console */
     int64_t threads;      /* computing threads; 0: as the settings say */
+    int64_t ranks; /* processes that share the paths of the job, started by the worker; 0 and 1: none but itself */
 };
 
 /* What has ended a worker, as far as its engine knows more than the exit code. */
@@ -45,8 +46,8 @@ struct worker_end {
 
 /* The command line of a worker: argument is NULL after the last, which is the job's folder. */
 struct worker_arguments {
-    char memory_mib[24], scratch_mib[24], threads[24];
-    const char *argument[16];
+    char memory_mib[24], scratch_mib[24], threads[24], ranks[24];
+    const char *argument[20];
 };
 
 enum { WORKER_MAX_VARIABLE = 64 };

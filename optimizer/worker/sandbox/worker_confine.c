@@ -137,10 +137,11 @@ static void list_files(const struct confine_files *files, const char *program, s
     snprintf(folder.path, sizeof folder.path, "%s", files->folder);
     worker_folder_path(&folder, JOB_FILE_DOCUMENT, NULL, document);
     worker_folder_path(&folder, JOB_FOLDER_INPUT, NULL, input);
-    struct job_document *doc = read_document(files->document != NULL ? files->document : document);
     for (size_t i = 0; i < N_USUAL; i++) permit(list, usual[i].right, usual[i].path);
     permit(list, SANDBOX_EXECUTE, program);
     dl_iterate_phdr(permit_library, list);
+    if (files->none) return;
+    struct job_document *doc = read_document(files->document != NULL ? files->document : document);
     permit(list, files->document != NULL ? SANDBOX_READ : SANDBOX_OWN, files->folder);
     if (files->document != NULL) permit(list, SANDBOX_READ, files->document);
     if (files->speeds != NULL) permit_speeds(list, files->speeds);
@@ -158,6 +159,7 @@ static bool owns_everything(const struct confine_files *files)
     struct worker_folder folder = {.lock_fd = -1};
     struct stat st;
     snprintf(folder.path, sizeof folder.path, "%s", files->folder);
+    if (files->none) return true;
     return files->document == NULL && !by_hand(&folder) && stat(files->folder, &st) == 0 && st.st_uid == geteuid();
 }
 

@@ -16,6 +16,7 @@ struct confine_files {
     const char *folder;
     const char *document; /* of a check; NULL: the job of the folder is run */
     const char *speeds;   /* NULL: none. Made when it is missing. */
+    bool none;            /* of a rank that sees no file of the job */
     bool no_links;        /* links of inputs out of the folder stay out of reach: a worker may have made them */
 };
 

@@ -35,6 +35,13 @@ void contrast_plan_release(struct contrast_plan *c)
     c->sum = NULL;
 }
 
+size_t contrast_task_sums(const struct contrast_plan *c, size_t i_task, double **sum)
+{
+    size_t first = i_task * c->cells_per_task, n = c->n_cell - first;
+    *sum = sums_of(c, first, 0);
+    return (n < c->cells_per_task ? n : c->cells_per_task) * 2 * set_size(c);
+}
+
 static void add_path(const struct contrast_plan *c, const float *value, double *sum)
 {
     size_t n = 3 + c->n_jac, n_param = c->n_jac / 3;

@@ -31,6 +31,8 @@ void contrast_plan_release(struct contrast_plan *c);
 /* All paths of task i_task; value: room for RADIANCE_BLOCK_PATHS x (3 + n_jac). Result: the number of bounces. */
 uint64_t contrast_trace_task(const struct estimate_blocks *b, const struct contrast_plan *c, size_t i_group,
                              size_t i_task, float *value);
+/* The sums of task i_task, which lie in a row, and how many they are. */
+size_t contrast_task_sums(const struct contrast_plan *c, size_t i_task, double **sum);
 /* Mean, variance and derivatives of the contrast, n_path; false when *bad_value is not finite. */
 bool contrast_reduce(const struct contrast_plan *c, struct estimate *e, size_t *bad_value);
 

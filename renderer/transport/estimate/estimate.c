@@ -2,6 +2,7 @@
 
 #include "renderer/transport/estimate/estimate_blocks.h"
 #include "renderer/transport/estimate/rotation_mean.h"
+#include "renderer/transport/ranks/rank_orders.h"
 
 #include <stdint.h>
 
@@ -25,6 +26,11 @@ static status make_groups(const struct estimate_request *q, const struct radianc
     return path_groups_shared(groups, q->configuration, q->n_path, q->n_configuration, max_member, err);
 }
 
+static status announce(struct rank_team *team, const void *context, struct error *err)
+{
+    return rank_orders_estimate(team, context, err);
+}
+
 static status estimate_separate(const struct estimate_request *q, struct thread_pool *pool,
                                 const struct progress *progress, struct estimate *out, struct error *err)
 {
@@ -37,12 +43,15 @@ static status estimate_separate(const struct estimate_request *q, struct thread_
     st = radiance_source_init(&source, &q->input, q->configuration, q->n_configuration, err);
     if (st != STATUS_OK) return st;
     st = make_groups(q, &source, &groups, err);
-    const struct estimate_blocks blocks = {.source = &source,
-                                           .configuration = q->configuration,
-                                           .n_configuration = q->n_configuration,
-                                           .groups = &groups,
-                                           .key = {.seed = q->seed, .iteration = q->iteration, .replica = q->replica},
-                                           .progress = progress};
+    const struct estimate_blocks blocks = {
+        .source = &source,
+        .configuration = q->configuration,
+        .n_configuration = q->n_configuration,
+        .groups = &groups,
+        .key = {.seed = q->seed, .iteration = q->iteration, .replica = q->replica},
+        .progress = progress,
+        .announce = rank_orders_can_share(q->configuration, q->n_configuration, &q->input) ? announce : NULL,
+        .announce_context = q};
     if (st == STATUS_OK) st = estimate_blocks_run(&blocks, pool, out, &fault, err);
     if (st == STATUS_NUMERIC) st = numeric_error(q, &fault, err);
     path_groups_release(&groups);

@@ -1,3 +1,4 @@
+#include "base/ranks/rank_team.h"
 #include "renderer/transport/estimate/contrast_blocks.h"
 
 #include <math.h>
@@ -29,6 +30,7 @@ struct run {
     struct task_sum *sum;           /* per task */
     struct contrast_plan *contrast; /* per group; n_cell 0: its mean is wanted */
     double *sum_storage;
+    size_t n_value, n_pair; /* the most of any group */
 };
 
 size_t estimate_n_value(const struct estimate_blocks *b, size_t i_group)
@@ -137,9 +139,9 @@ static uint64_t blocks_of(const struct run *r, size_t i_group, uint64_t *per_tas
     return n_block;
 }
 
-static void fill_tasks(struct run *r, size_t n_value, size_t n_pair)
+static void fill_tasks(struct run *r)
 {
-    size_t n = 0;
+    size_t n = 0, n_value = r->n_value, n_pair = r->n_pair;
     for (size_t i = 0; i < r->b->groups->n; i++) {
         uint64_t per_task, n_block = blocks_of(r, i, &per_task);
         for (uint64_t b = 0; b < n_block; b += per_task, n++) {
@@ -173,7 +175,9 @@ static status make_tasks(struct run *r, struct error *err)
     r->sum_storage = calloc(n + 1, (2 * n_value + n_pair + 1) * sizeof *r->sum_storage);
     if (r->task == NULL || r->sum == NULL || r->sum_storage == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot estimate radiance: no memory for %zu tasks", n);
-    fill_tasks(r, n_value, n_pair);
+    r->n_value = n_value;
+    r->n_pair = n_pair;
+    fill_tasks(r);
     return STATUS_OK;
 }
 
@@ -248,7 +252,6 @@ static status reduce(const struct run *r, struct estimate *out, struct estimate_
 {
     size_t i_task = 0;
     status st = STATUS_OK;
-    memset(out, 0, r->b->n_configuration * sizeof *out);
     for (size_t i = 0; i < r->b->groups->n && st == STATUS_OK; i++) {
         double x[N_VALUE] = {0}, x2[N_VALUE] = {0}, pair[N_PAIR] = {0};
         struct task_sum total = {0, 0, x, x2, pair};
@@ -267,6 +270,72 @@ static status reduce(const struct run *r, struct estimate *out, struct estimate_
     return st;
 }
 
+/* ---- tasks that other ranks have run ---- */
+
+static size_t sum_bytes(const struct run *r, size_t i_task, double **sum)
+{
+    const struct task *t = &r->task[i_task];
+    const struct contrast_plan *contrast = &r->contrast[t->i_group];
+    if (contrast->n_cell > 0) return contrast_task_sums(contrast, t->first_block, sum) * sizeof **sum;
+    *sum = r->sum[i_task].x;
+    return (2 * r->n_value + r->n_pair) * sizeof **sum;
+}
+
+static size_t most_bytes(const struct run *r)
+{
+    size_t most = 0;
+    double *sum;
+    for (size_t i = 0; i < r->n_task; i++) most = sum_bytes(r, i, &sum) > most ? sum_bytes(r, i, &sum) : most;
+    return most + 2 * sizeof(uint64_t);
+}
+
+static size_t pack_task(const void *context, size_t i_task, void *to)
+{
+    const struct run *r = context;
+    double *sum;
+    const uint64_t count[2] = {r->sum[i_task].n_path, r->sum[i_task].n_bounce};
+    size_t n = sum_bytes(r, i_task, &sum);
+    memcpy(to, count, sizeof count);
+    memcpy((char *)to + sizeof count, sum, n);
+    return n + sizeof count;
+}
+
+static bool unpack_task(void *context, size_t i_task, const void *from, size_t n_bytes)
+{
+    struct run *r = context;
+    double *sum;
+    uint64_t count[2];
+    size_t n = sum_bytes(r, i_task, &sum);
+    if (n_bytes != n + sizeof count) return false;
+    memcpy(count, from, sizeof count);
+    memcpy(sum, (const char *)from + sizeof count, n);
+    r->sum[i_task].n_path = count[0];
+    r->sum[i_task].n_bounce = count[1];
+    return true;
+}
+
+static status share_tasks(struct run *r, struct rank_team *team, struct thread_pool *pool, struct error *err)
+{
+    const struct rank_work work = {.n_task = r->n_task,
+                                   .most_bytes = most_bytes(r),
+                                   .run = run_task,
+                                   .pack = pack_task,
+                                   .unpack = unpack_task,
+                                   .context = r};
+    status st = rank_team_rank(team) == 0 ? r->b->announce(team, r->b->announce_context, err) : STATUS_OK;
+    return st == STATUS_OK ? rank_team_share(team, &work, pool, r->b->progress, err) : st;
+}
+
+static status run_tasks(struct run *r, struct thread_pool *pool, struct error *err)
+{
+    struct rank_team *team = r->b->announce != NULL ? thread_pool_team(pool) : NULL;
+    status st =
+        team != NULL ? share_tasks(r, team, pool, err) : thread_pool_run(pool, r->n_task, run_task, r, r->b->progress);
+    if (st == STATUS_OK && progress_cancelled(r->b->progress))
+        st = STATUS_CANCELLED; /* a task may have stopped early */
+    return st == STATUS_CANCELLED ? error_set(err, st, "radiance estimate was cancelled") : st;
+}
+
 status estimate_blocks_run(const struct estimate_blocks *b, struct thread_pool *pool, struct estimate *out,
                            struct estimate_fault *fault, struct error *err)
 {
@@ -274,13 +343,11 @@ status estimate_blocks_run(const struct estimate_blocks *b, struct thread_pool *
     status st = plan_contrasts(&r, err);
     if (st == STATUS_OK) st = make_tasks(&r, err);
     if (st != STATUS_OK) goto out;
-    st = thread_pool_run(pool, r.n_task, run_task, &r, b->progress);
-    if (st == STATUS_OK && progress_cancelled(b->progress)) st = STATUS_CANCELLED; /* a task may have stopped early */
-    if (st != STATUS_OK) {
-        error_set(err, st, "radiance estimate was cancelled");
-        goto out;
-    }
-    st = reduce(&r, out, fault, err);
+    st = run_tasks(&r, pool, err);
+    if (st != STATUS_OK) goto out;
+    memset(out, 0, b->n_configuration * sizeof *out);
+    if (b->announce == NULL || thread_pool_team(pool) == NULL || rank_team_rank(thread_pool_team(pool)) == 0)
+        st = reduce(&r, out, fault, err);
 out:
     for (size_t i = 0; i < b->groups->n && r.contrast != NULL; i++) contrast_plan_release(&r.contrast[i]);
     free(r.contrast);

@@ -14,6 +14,9 @@ struct estimate_blocks {
     const struct path_groups *groups; /* a group's paths are rounded up to whole blocks */
     struct rng_key key;               /* key.configuration is replaced by the number of the group */
     const struct progress *progress;  /* may be NULL */
+    /* Tells the helpers of the pool's team what is estimated, right before the tasks are shared; NULL: they are not. */
+    status (*announce)(struct rank_team *team, const void *context, struct error *err);
+    const void *announce_context;
 };
 
 /* Which value is not finite: the index of a configuration and that into its values, radiance first. */
@@ -21,7 +24,8 @@ struct estimate_fault {
     size_t i_configuration, i_value;
 };
 
-/* out: n_configuration estimates, zero for those in no group. STATUS_CANCELLED, STATUS_TOO_LARGE, STATUS_NO_MEMORY;
+/* out: n_configuration estimates, zero for those in no group. In a helper of a team (base/ranks/rank_team.h) all of
+ * them are zero: the root has them. STATUS_CANCELLED, STATUS_TOO_LARGE, STATUS_NO_MEMORY;
  * STATUS_NUMERIC when a value is not finite: *fault says which. */
 status estimate_blocks_run(const struct estimate_blocks *b, struct thread_pool *pool, struct estimate *out,
                            struct estimate_fault *fault, struct error *err);

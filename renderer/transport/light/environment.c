@@ -1,5 +1,7 @@
 #include "renderer/transport/light/environment.h"
 
+#include "base/ranks/unique_number.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,6 +13,7 @@ struct environment {
     float *radiance;         /* height x width x 3 */
     float *row_cdf;          /* height + 1 */
     float *column_cdf;       /* height x (width + 1) */
+    uint64_t number;         /* that no other environment of this process has had */
     float pdf_per_luminance; /* density of a pixel per its luminance; 0: all black */
 };
 
@@ -64,23 +67,32 @@ static status copy_pixels(struct environment *e, const struct image *im, double 
     return STATUS_OK;
 }
 
+/* Room for an image of a size that is allowed. */
+static struct environment *make_room(size_t width, size_t height, struct error *err)
+{
+    struct environment *e = calloc(1, sizeof *e);
+    if (e != NULL) {
+        e->number = unique_number();
+        e->width = width;
+        e->height = height;
+        e->radiance = malloc(3 * width * height * sizeof *e->radiance);
+        e->row_cdf = malloc((height + 1) * sizeof *e->row_cdf);
+        e->column_cdf = malloc(height * (width + 1) * sizeof *e->column_cdf);
+        if (e->radiance != NULL && e->row_cdf != NULL && e->column_cdf != NULL) return e;
+    }
+    environment_free(e);
+    error_set(err, STATUS_NO_MEMORY, "cannot use environment: no memory for %zu x %zu pixels", width, height);
+    return NULL;
+}
+
 status environment_new(const struct image *im, double scale, struct environment **out, struct error *err)
 {
     if (im->width == 0 || im->height == 0 || im->n_channel < 3 || im->width > MAX_PIXEL / im->height || !(scale > 0))
         return error_set(err, STATUS_INVALID, "cannot use environment: %zu x %zu pixels of %zu channels, scale %g",
                          im->width, im->height, im->n_channel, scale);
-    struct environment *e = calloc(1, sizeof *e);
-    if (e == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot use environment: out of memory");
-    e->width = im->width;
-    e->height = im->height;
-    e->radiance = malloc(3 * e->width * e->height * sizeof *e->radiance);
-    e->row_cdf = malloc((e->height + 1) * sizeof *e->row_cdf);
-    e->column_cdf = malloc(e->height * (e->width + 1) * sizeof *e->column_cdf);
-    status st = STATUS_OK;
-    if (e->radiance == NULL || e->row_cdf == NULL || e->column_cdf == NULL)
-        st = error_set(err, STATUS_NO_MEMORY, "cannot use environment: no memory for %zu x %zu pixels", e->width,
-                       e->height);
-    if (st == STATUS_OK) st = copy_pixels(e, im, scale, err);
+    struct environment *e = make_room(im->width, im->height, err);
+    if (e == NULL) return STATUS_NO_MEMORY;
+    status st = copy_pixels(e, im, scale, err);
     if (st == STATUS_OK) st = make_tables(e, err);
     if (st != STATUS_OK) {
         environment_free(e);
@@ -106,6 +118,34 @@ void environment_free(struct environment *e)
     free(e->row_cdf);
     free(e->column_cdf);
     free(e);
+}
+
+uint64_t environment_number(const struct environment *e) { return e->number; }
+
+void environment_pack(const struct environment *e, struct byte_pack *p)
+{
+    BYTE_PACK(p, e->width);
+    BYTE_PACK(p, e->height);
+    byte_pack_put(p, e->radiance, 3 * e->width * e->height * sizeof *e->radiance);
+}
+
+status environment_unpack(struct byte_view *v, struct environment **out, struct error *err)
+{
+    size_t width, height;
+    BYTE_VIEW(v, width);
+    BYTE_VIEW(v, height);
+    if (width == 0 || height == 0 || width > MAX_PIXEL / height)
+        return error_set(err, STATUS_FORMAT, "an environment of another rank has %zu x %zu pixels", width, height);
+    struct environment *e = make_room(width, height, err);
+    if (e == NULL) return STATUS_NO_MEMORY;
+    byte_view_get(v, e->radiance, 3 * width * height * sizeof *e->radiance);
+    status st = byte_view_check(v, err);
+    if (st == STATUS_OK) st = make_tables(e, err);
+    if (st == STATUS_OK)
+        *out = e;
+    else
+        environment_free(e);
+    return st;
 }
 
 static size_t clamped(float x, size_t n)

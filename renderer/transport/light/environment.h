@@ -7,9 +7,11 @@
 #ifndef SELVEDGE_RENDERER_ENVIRONMENT_H
 #define SELVEDGE_RENDERER_ENVIRONMENT_H
 
+#include "base/ranks/byte_pack.h"
 #include "renderer/image/image.h"
 
 #include <stdbool.h>
+#include <stdint.h>
 
 struct environment;
 
@@ -19,6 +21,12 @@ status environment_new(const struct image *im, double scale, struct environment 
 /* From an OpenEXR file; also STATUS_FORMAT and what image_read_exr gives. */
 status environment_read_exr(const char *path, double scale, struct environment **environment, struct error *err);
 void environment_free(struct environment *environment);
+/* A number that no other environment of this process has had. */
+uint64_t environment_number(const struct environment *environment);
+/* An environment as bytes, and the same environment made of them by another process. STATUS_FORMAT,
+ * STATUS_NO_MEMORY. */
+void environment_pack(const struct environment *environment, struct byte_pack *pack);
+status environment_unpack(struct byte_view *view, struct environment **environment, struct error *err);
 
 /* Radiance along a unit direction (from the scene outwards), and the density with which environment_sample would have
  * chosen it. */

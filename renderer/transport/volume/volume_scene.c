@@ -1,3 +1,4 @@
+#include "base/ranks/unique_number.h"
 #include "renderer/transport/volume/volume_bent.h"
 
 #include <math.h>
@@ -154,6 +155,7 @@ status volume_scene_init(struct volume_scene *s, const struct direction_volume *
     if (!find_slab(s, v)) return error_set(err, STATUS_INVALID, "cannot trace a volume in which every voxel is empty");
     for (int a = 0; a < 2; a++) s->n_voxel[a] = (float)v->n[a];
     s->black_sheet = o->black_sheet;
+    s->number = unique_number();
     status st = number_bricks(s, v, err);
     if (st == STATUS_OK) st = fill_bricks(s, v, err);
     if (st != STATUS_OK) volume_scene_release(s);
@@ -170,6 +172,38 @@ void volume_scene_release(struct volume_scene *s)
     free(s->voxel);
     s->brick = NULL;
     s->voxel = NULL;
+}
+
+void volume_scene_pack(const struct volume_scene *s, struct byte_pack *p)
+{
+    const size_t n[3] = {(size_t)s->n_brick[0], (size_t)s->n_brick[1], (size_t)s->n_brick[2]};
+    struct volume_scene plain = *s;
+    plain.brick = NULL;
+    plain.voxel = NULL;
+    BYTE_PACK(p, plain);
+    byte_pack_put(p, s->brick, volume_n_voxel(n) * sizeof *s->brick);
+    byte_pack_put(p, s->voxel, s->n_stored * VOLUME_BRICK_VOXELS * sizeof *s->voxel);
+}
+
+status volume_scene_unpack(struct byte_view *v, struct volume_scene *s, struct error *err)
+{
+    BYTE_VIEW(v, *s);
+    s->brick = NULL;
+    s->voxel = NULL;
+    s->bent = NULL;
+    s->number = unique_number();
+    size_t n_brick = 1;
+    for (int a = 0; a < 3; a++) {
+        v->failed |= s->n_brick[a] < 1 || n_brick > SIZE_MAX / (size_t)s->n_brick[a];
+        if (!v->failed) n_brick *= (size_t)s->n_brick[a];
+    }
+    s->brick = byte_view_array(v, n_brick, sizeof *s->brick);
+    s->voxel = byte_view_array(v, s->n_stored, VOLUME_BRICK_VOXELS * sizeof *s->voxel);
+    for (size_t i = 0; i < n_brick && !v->failed; i++)
+        v->failed = s->brick[i] >= 0 && (size_t)s->brick[i] >= s->n_stored;
+    status st = byte_view_check(v, err);
+    if (st != STATUS_OK) volume_scene_release(s);
+    return st;
 }
 
 uint32_t volume_scene_voxel(const struct volume_scene *s, size_t i, size_t j, size_t k)

@@ -12,6 +12,7 @@
 #ifndef SELVEDGE_RENDERER_VOLUME_SCENE_H
 #define SELVEDGE_RENDERER_VOLUME_SCENE_H
 
+#include "base/ranks/byte_pack.h"
 #include "geometry/volume/volume.h"
 
 #include <math.h>
@@ -39,6 +40,7 @@ struct volume_scene {
     uint32_t *voxel; /* owned; VOLUME_BRICK_VOXELS a stored brick, x fastest: density << 24 | q << 12 | p */
     size_t n_stored; /* bricks */
     bool black_sheet;
+    uint64_t number;          /* that no other volume scene of this process has had */
     struct volume_bent *bent; /* owned; NULL: the cloth is flat. Otherwise brick and voxel are those of the flat one */
 };
 
@@ -51,6 +53,10 @@ struct volume_scene_option {
 status volume_scene_init(struct volume_scene *scene, const struct direction_volume *v,
                          const struct volume_scene_option *o, struct error *err);
 void volume_scene_release(struct volume_scene *scene);
+/* A flat scene as bytes, and the same scene made of them by another process. STATUS_FORMAT, STATUS_NO_MEMORY; the scene
+ * is released on failure. */
+void volume_scene_pack(const struct volume_scene *scene, struct byte_pack *pack);
+status volume_scene_unpack(struct byte_view *view, struct volume_scene *scene, struct error *err);
 /* Everything that the scene holds. */
 size_t volume_scene_memory_bytes(const struct volume_scene *scene);
 double volume_scene_thickness_mm(const struct volume_scene *scene);

@@ -40,8 +40,11 @@ static status start(void *state, const char *job_id, struct backend_run **out, s
     path_join(folder, l->v->settings->data, "jobs", job_id, NULL);
     path_join(console, folder, "console.txt", NULL);
     path_join(speeds, l->v->settings->data, "speeds.json", NULL);
-    const struct worker_paths paths = {
-        .program = l->program, .job_folder = folder, .console = console, .speeds = speeds};
+    const struct worker_paths paths = {.program = l->program,
+                                       .job_folder = folder,
+                                       .console = console,
+                                       .speeds = speeds,
+                                       .ranks = l->v->settings->ranks};
     struct backend_run *run = calloc(1, sizeof *run);
     if (run == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start a worker: out of memory");
     status s = worker_launch(&paths, l->v->settings, &run->pid, err);

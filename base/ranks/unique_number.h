@@ -1,0 +1,10 @@
+/* Numbers that this process has not used before: by them one knows a thing again that others have a copy of. */
+#ifndef SELVEDGE_BASE_UNIQUE_NUMBER_H
+#define SELVEDGE_BASE_UNIQUE_NUMBER_H
+
+#include <stdint.h>
+
+/* At least 1. May be called from any thread. */
+uint64_t unique_number(void);
+
+#endif

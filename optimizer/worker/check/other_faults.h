@@ -1,0 +1,11 @@
+/* What a worker says of the inputs when a job has ended with an error. */
+#ifndef SELVEDGE_OPTIMIZER_OTHER_FAULTS_H
+#define SELVEDGE_OPTIMIZER_OTHER_FAULTS_H
+
+#include "optimizer/worker/pipeline_context.h"
+
+/* When the status s is one that inputs cause, warns of their other faults. Takes the folder of the inputs out of the
+ * text of err, because users know their files by their names alone. Does nothing for STATUS_OK. */
+void other_faults_name(struct pipeline_context *c, status s, struct error *err);
+
+#endif

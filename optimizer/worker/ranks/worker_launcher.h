@@ -1,0 +1,15 @@
+/* Runs a job with several ranks on this machine, or on those that mpirun knows of: starts mpirun, passes signals on,
+ * and starts it again when a rank is lost, so that the job goes on from its checkpoint. */
+#ifndef SELVEDGE_OPTIMIZER_WORKER_LAUNCHER_H
+#define SELVEDGE_OPTIMIZER_WORKER_LAUNCHER_H
+
+#include <stddef.h>
+
+/* Makes this process a rank of several, or their launcher, where that is wanted: when mpirun or srun has started it
+ * as one of several, or when n_rank is above 1. argv: the program's own arguments, of which "--ranks N" is left out
+ * for the ranks. n_thread 0: the processors of this machine are divided among the ranks. Returns -1 to go on alone,
+ * otherwise the exit status: that of rank 0, WORKER_LOST after more than three losses between which the job has not
+ * gone on, WORKER_USAGE without MPI. */
+int worker_ranks_start(char **argv, const char *job_folder, size_t n_rank, size_t n_thread);
+
+#endif

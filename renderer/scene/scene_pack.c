@@ -1,0 +1,86 @@
+#include "renderer/scene/scene_pack.h"
+
+#include "renderer/scene/scene_data.h"
+
+#include <stdlib.h>
+
+/* What a scene holds besides its arrays. */
+struct scene_head {
+    uint64_t n_vertex, n_segment, n_group;
+    double tile_mm[2];
+    int32_t half_block[2];
+    float inset_low_mm[2], inset_high_mm[2], bottom_mm;
+    uint8_t black_sheet, no_avx512, has_group, has_axis;
+};
+
+uint64_t scene_number(const struct scene *s) { return s->number; }
+
+void scene_pack(const struct scene *s, struct byte_pack *p)
+{
+    struct scene_head h = {.n_vertex = s->n_vertex,
+                           .n_segment = s->n_segment,
+                           .n_group = s->n_group,
+                           .bottom_mm = s->bottom_mm,
+                           .black_sheet = s->black_sheet,
+                           .no_avx512 = s->no_avx512,
+                           .has_group = s->segment_group != NULL,
+                           .has_axis = s->long_axis != NULL};
+    for (int a = 0; a < 2; a++) {
+        h.tile_mm[a] = s->tile_mm[a];
+        h.half_block[a] = s->half_block[a];
+        h.inset_low_mm[a] = s->inset_low_mm[a];
+        h.inset_high_mm[a] = s->inset_high_mm[a];
+    }
+    BYTE_PACK(p, h);
+    byte_pack_put(p, s->vertex, s->n_vertex * sizeof *s->vertex);
+    byte_pack_put(p, s->segment_vertex, s->n_segment * sizeof *s->segment_vertex);
+    byte_pack_put(p, s->segment_fiber, s->n_segment * sizeof *s->segment_fiber);
+    byte_pack_put(p, s->segment_flag, s->n_segment);
+    if (h.has_group) byte_pack_put(p, s->segment_group, s->n_segment);
+    if (h.has_axis) byte_pack_put(p, s->long_axis, s->n_vertex * sizeof *s->long_axis);
+}
+
+static bool in_range(const struct scene *s)
+{
+    bool good = s->n_segment > 0 && s->n_group >= 1 && s->n_group <= FIBER_MAX_GROUP;
+    for (int a = 0; a < 2; a++)
+        good = good && s->half_block[a] >= 1 && s->half_block[a] <= SCENE_MAX_HALF_BLOCK && s->tile_mm[a] > 0;
+    for (size_t i = 0; good && i < s->n_segment; i++)
+        good = s->segment_vertex[i] + (size_t)1 < s->n_vertex &&
+               (s->segment_group == NULL || s->segment_group[i] < s->n_group);
+    return good;
+}
+
+status scene_unpack(struct byte_view *v, struct scene **scene, struct error *err)
+{
+    struct scene_head h;
+    struct scene *s = calloc(1, sizeof *s);
+    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot build scene: out of memory");
+    BYTE_VIEW(v, h);
+    s->n_vertex = h.n_vertex;
+    s->n_segment = h.n_segment;
+    s->n_group = h.n_group;
+    s->bottom_mm = h.bottom_mm;
+    s->black_sheet = h.black_sheet != 0;
+    s->no_avx512 = h.no_avx512 != 0;
+    for (int a = 0; a < 2; a++) {
+        s->tile_mm[a] = h.tile_mm[a];
+        s->half_block[a] = h.half_block[a];
+        s->inset_low_mm[a] = h.inset_low_mm[a];
+        s->inset_high_mm[a] = h.inset_high_mm[a];
+    }
+    s->vertex = byte_view_array(v, s->n_vertex, sizeof *s->vertex);
+    s->segment_vertex = byte_view_array(v, s->n_segment, sizeof *s->segment_vertex);
+    s->segment_fiber = byte_view_array(v, s->n_segment, sizeof *s->segment_fiber);
+    s->segment_flag = byte_view_array(v, s->n_segment, 1);
+    if (h.has_group) s->segment_group = byte_view_array(v, s->n_segment, 1);
+    if (h.has_axis) s->long_axis = byte_view_array(v, s->n_vertex, sizeof *s->long_axis);
+    status st = byte_view_check(v, err);
+    if (st == STATUS_OK && !in_range(s)) st = error_set(err, STATUS_FORMAT, "a scene of another rank is none");
+    if (st == STATUS_OK) st = scene_build(s, err);
+    if (st == STATUS_OK)
+        *scene = s;
+    else
+        scene_free(s);
+    return st;
+}

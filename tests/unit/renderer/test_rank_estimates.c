@@ -1,0 +1,227 @@
+/* Estimates and pictures that two ranks share: the same bits as those of one rank. The ranks are two processes, joined
+ * by a socket as selvedge-mpi joins them by MPI. */
+#include "base/ranks/byte_pack.h"
+#include "base/ranks/rank_team.h"
+#include "renderer/transport/ranks/rank_helper.h"
+#include "renderer/transport/ranks/rank_orders.h"
+#include "tests/support/tracer/estimate_fixture.h"
+
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static struct estimate_fixture fixture;
+
+static int set_up(void **state)
+{
+    (void)state;
+    signal(SIGPIPE, SIG_IGN);
+    return estimate_fixture_init(&fixture);
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    estimate_fixture_release(&fixture);
+    return 0;
+}
+
+/* A root in this process and a helper in another one. */
+struct two_ranks {
+    struct rank_team *team;
+    struct thread_pool *pool;
+    struct shared_cloth cloth;
+    pid_t helper;
+};
+
+static int helper_main(int fd, size_t n_thread)
+{
+    struct rank_team *team = NULL;
+    struct thread_pool *pool = NULL;
+    struct error err = {0};
+    if (thread_pool_new(n_thread, &pool, &err) != STATUS_OK) return 1;
+    if (rank_team_open(fd, 1, 2, &team, &err) != STATUS_OK) return 1;
+    thread_pool_join_team(pool, team);
+    status s = rank_helper_serve(team, pool, "the test", &err);
+    if (s != STATUS_OK) fprintf(stderr, "helper: %s\n", err.text);
+    rank_team_close(team);
+    thread_pool_free(pool);
+    return s != STATUS_OK;
+}
+
+static void start(struct two_ranks *r, size_t n_thread)
+{
+    int end[2];
+    struct error err = {0};
+    memset(r, 0, sizeof *r);
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, end), 0);
+    r->helper = fork();
+    if (r->helper == 0) {
+        close(end[0]);
+        _exit(helper_main(end[1], n_thread));
+    }
+    close(end[1]);
+    assert_int_equal(rank_team_open(end[0], 0, 2, &r->team, &err), STATUS_OK);
+    rank_team_accompany(r->team, &r->cloth);
+    assert_int_equal(thread_pool_new(n_thread, &r->pool, &err), STATUS_OK);
+    thread_pool_join_team(r->pool, r->team);
+}
+
+/* Returns how the helper has ended. */
+static int end(struct two_ranks *r)
+{
+    int how = 0;
+    rank_team_close(r->team);
+    thread_pool_free(r->pool);
+    shared_cloth_release(&r->cloth);
+    waitpid(r->helper, &how, 0);
+    return how;
+}
+
+/* Means, a mean over rotations, a contrast, shared paths: with 1 and 2 threads a rank. */
+static void two_ranks_estimate_the_same_bits(void **state)
+{
+    (void)state;
+    enum { N = 4 };
+    const size_t n_path[N] = {3000, 1280, 0, 2000};
+    for (size_t n_thread = 1; n_thread <= 2; n_thread++)
+        for (int how = 0; how < 3; how++) {
+            struct configuration c[N];
+            struct estimate alone[N], together[N];
+            struct two_ranks r;
+            struct error err = {0};
+            struct estimate_request q = estimate_fixture_request(&fixture, n_path, N);
+            memcpy(c, q.configuration, sizeof c);
+            if (how == 1) c[1].n_rotation = 3;
+            if (how == 2) c[3].contrast_cells = 6;
+            q.configuration = c;
+            q.share_camera_paths = how == 0;
+            estimate_fixture_run(&q, 1, alone);
+            start(&r, n_thread);
+            for (int again = 0; again < 2; again++) {
+                assert_int_equal(estimate_run(&q, r.pool, NULL, together, &err), STATUS_OK);
+                assert_memory_equal(alone, together, sizeof alone);
+            }
+            assert_true(rank_team_traffic(r.team)->result_bytes > 0); /* the helper has done a part of it */
+            assert_int_equal(rank_team_traffic(r.team)->n_order, 3);  /* the cloth is sent once */
+            assert_int_equal(end(&r), 0);
+        }
+}
+
+static void two_ranks_render_the_same_bits(void **state)
+{
+    (void)state;
+    const size_t n_path[1] = {256};
+    struct estimate_request e = estimate_fixture_request(&fixture, n_path, 1);
+    const struct render_request q = {
+        .input = e.input, .configuration = e.configuration, .width = 24, .height = 16, .n_sample = 40, .seed = 3};
+    struct image alone, together;
+    struct two_ranks r;
+    struct error err = {0};
+    assert_int_equal(render_run(&q, NULL, NULL, &alone, &err), STATUS_OK);
+    start(&r, 1);
+    assert_int_equal(render_run(&q, r.pool, NULL, &together, &err), STATUS_OK);
+    assert_true(rank_team_traffic(r.team)->result_bytes > 0);
+    assert_memory_equal(alone.pixel, together.pixel, 24 * 16 * alone.n_channel * sizeof *alone.pixel);
+    assert_int_equal(end(&r), 0);
+    image_release(&alone);
+    image_release(&together);
+}
+
+static void set_cancel(void *context, double fraction)
+{
+    if (fraction > 0.02) atomic_store((atomic_bool *)context, true);
+}
+
+/* A cancelled estimate ends soon in both ranks, and the next one is whole. */
+static void a_cancelled_estimate_leaves_no_trace(void **state)
+{
+    (void)state;
+    const size_t few[2] = {4096, 4096}, many[2] = {100000, 100000};
+    struct estimate alone[2], together[2];
+    struct two_ranks r;
+    struct error err = {0};
+    atomic_bool cancel = false;
+    const struct progress progress = {.report = set_cancel, .context = &cancel, .cancel = &cancel};
+    struct estimate_request q = estimate_fixture_request(&fixture, few, 2);
+    estimate_fixture_run(&q, 1, alone);
+    start(&r, 1);
+    q.n_path = many;
+    for (int again = 0; again < 2; again++) { /* before it begins, and in the middle */
+        atomic_store(&cancel, again == 0);
+        assert_int_equal(estimate_run(&q, r.pool, &progress, together, &err), STATUS_CANCELLED);
+    }
+    q.n_path = few;
+    assert_int_equal(estimate_run(&q, r.pool, NULL, together, &err), STATUS_OK);
+    assert_memory_equal(alone, together, sizeof alone);
+    assert_int_equal(end(&r), 0);
+}
+
+static void ranks_of_another_program_are_refused(void **state)
+{
+    (void)state;
+    struct two_ranks r;
+    struct error err = {0};
+    start(&r, 1);
+    assert_int_equal(rank_orders_agree(r.team, "the test", &err), STATUS_OK);
+    assert_int_equal(rank_orders_agree(r.team, "another", &err), STATUS_INVALID);
+    assert_non_null(strstr(err.text, "this rank runs 'the test', rank 0 runs 'another'"));
+    assert_int_equal(end(&r), 0);
+}
+
+static void a_lost_helper_ends_the_estimate(void **state)
+{
+    (void)state;
+    const size_t n_path[1] = {2000000};
+    struct estimate out[1];
+    struct two_ranks r;
+    struct error err = {0};
+    struct estimate_request q = estimate_fixture_request(&fixture, n_path, 1);
+    start(&r, 1);
+    kill(r.helper, SIGKILL);
+    assert_int_equal(estimate_run(&q, r.pool, NULL, out, &err), STATUS_IO);
+    assert_true(rank_team_broken(r.team));
+    assert_int_equal(WTERMSIG(end(&r)), SIGKILL);
+}
+
+static void views_never_read_more_than_there_is(void **state)
+{
+    (void)state;
+    const uint32_t words[3] = {1, 2, 3};
+    struct byte_pack p = {0};
+    struct error err = {0};
+    byte_pack_put(&p, words, sizeof words);
+    assert_int_equal(byte_pack_check(&p, &err), STATUS_OK);
+    struct byte_view v = {.data = p.data, .n = p.n};
+    uint32_t first, *rest;
+    BYTE_VIEW(&v, first);
+    assert_int_equal(first, 1);
+    assert_int_equal(byte_view_check(&v, &err), STATUS_FORMAT); /* something is left */
+    assert_null(byte_view_array(&(struct byte_view){.data = v.data, .n = v.n}, SIZE_MAX / 2, 4));
+    rest = byte_view_array(&v, 2, sizeof *rest);
+    assert_memory_equal(rest, words + 1, 2 * sizeof *rest);
+    assert_int_equal(byte_view_check(&v, &err), STATUS_OK);
+    BYTE_VIEW(&v, first);
+    assert_int_equal(first, 0);
+    assert_int_equal(byte_view_check(&v, &err), STATUS_FORMAT);
+    free(rest);
+    byte_pack_release(&p);
+}
+
+int main(void)
+{
+    const struct CMUnitTest test[] = {
+        cmocka_unit_test(two_ranks_estimate_the_same_bits),     cmocka_unit_test(two_ranks_render_the_same_bits),
+        cmocka_unit_test(a_cancelled_estimate_leaves_no_trace), cmocka_unit_test(ranks_of_another_program_are_refused),
+        cmocka_unit_test(a_lost_helper_ends_the_estimate),      cmocka_unit_test(views_never_read_more_than_there_is)};
+    return cmocka_run_group_tests(test, set_up, tear_down);
+}
