@@ -29,7 +29,7 @@ static status ask(struct doctor *d, struct slurm_request *request, struct error 
     static const char *const command[] = {"sbatch", "squeue", "scancel"};
     char path[3][PATH_BYTES];
     struct slurm_output out = {0};
-    const struct slurm_need need = slurm_need_of(d->settings, NULL, 0, 0);
+    const struct slurm_need need = slurm_need_of(d->settings, NULL, 0, (struct slurm_memory){0});
     status s = slurm_request_check(d->settings, err);
     for (int i = 0; i < 3 && s == STATUS_OK; i++)
         s = slurm_command_find(d->settings, command[i], path[i], sizeof path[i], err);

@@ -14,7 +14,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-enum { MAX_REPORT_BYTES = 4 << 20, MAX_PLAN_BYTES = 1 << 20, TURN_LIMIT_S = 30, LOOK_US = 20000 };
+enum { MAX_REPORT_BYTES = 4 << 20, TURN_LIMIT_S = 30, LOOK_US = 20000 };
 
 /* Takes one of the places for checks, of which there are as many as workers. */
 static status take_turn(struct job_service *v, struct job_refusal *refusal, struct error *err)
@@ -271,17 +271,4 @@ status input_plan(struct job_service *v, const char *job_id, json_t **plan, stru
     if (s == STATUS_OK) s = plan_job(v, &row, fd, plan, refusal, err);
     leave(v, fd);
     return s;
-}
-
-json_t *input_plan_read(const struct job_service *v, const char *job_id)
-{
-    char path[PATH_BYTES], *text = NULL;
-    size_t n = 0;
-    path_join(path, v->settings->data, "jobs", job_id, JOB_FILE_PLAN, NULL);
-    if (file_read_all(path, MAX_PLAN_BYTES, &text, &n, NULL) != STATUS_OK) return NULL;
-    json_t *plan = json_loadb(text, n, 0, NULL);
-    free(text);
-    if (json_is_number(json_object_get(plan, "cpu_s"))) return plan;
-    json_decref(plan);
-    return NULL;
 }

@@ -18,7 +18,5 @@ status input_judge(struct job_service *v, const char *job_id, json_t **report, s
  * STATUS_INVALID, with a field, when its inputs cannot be read. */
 status input_plan(struct job_service *v, const char *job_id, json_t **plan, struct job_refusal *refusal,
                   struct error *err);
-/* The plan that is kept; NULL when there is none. */
-json_t *input_plan_read(const struct job_service *v, const char *job_id);
 
 #endif

@@ -4,6 +4,7 @@
 #include "server/jobs/job_paths.h"
 #include "server/workers/attempt.h"
 #include "server/workers/input_judge.h"
+#include "server/workers/kept_plan.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -147,7 +148,7 @@ static json_t *need_json(const struct need *n, bool expected)
 
 static void add_job(struct job_service *v, const struct job_row *row, struct sums *s)
 {
-    json_t *plan = input_plan_read(v, row->id), *expected = json_null(), *took_json = json_null();
+    json_t *plan = kept_plan_read(v->settings->data, row->id), *expected = json_null(), *took_json = json_null();
     struct need took;
     if (plan != NULL) {
         const struct need n = planned(plan);

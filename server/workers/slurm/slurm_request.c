@@ -7,10 +7,10 @@
 #define MIB (INT64_C(1) << 20)
 
 /* Memory of a job without scan and photographs, and of each core's own buffers. */
-static const int64_t base_bytes = 512 * MIB, core_bytes = 64 * MIB;
+static const int64_t base_bytes = 256 * MIB, core_bytes = 32 * MIB;
 /* Memory for each byte of a scan's files: 22 bytes for a voxel of one byte, and files are compressed to a quarter at
  * best. Of other files: photographs of one or two bytes a channel are decoded to numbers of four bytes, twice. */
-enum { SCAN_BYTES = 22 * 4, OTHER_BYTES = 16, SECONDS_OF_MINUTE = 60 };
+enum { SCAN_BYTES = 22 * 4, OTHER_BYTES = 16, PLAN_PERCENT = 150, SECONDS_OF_MINUTE = 60 };
 
 /* Options of sbatch that slurm.extra_arguments may have. Others are set by the daemon, or would make it lose its jobs:
  * another cluster, arrays, another name. */
@@ -107,7 +107,7 @@ status slurm_request_check(const struct settings *s, struct error *err)
 }
 
 struct slurm_need slurm_need_of(const struct settings *s, const struct file_row *file, size_t n_file,
-                                int64_t least_memory_bytes)
+                                struct slurm_memory known)
 {
     struct slurm_need need = {.cores = s->threads > 0 ? s->threads : s->slurm_cores};
     int64_t scan_bytes = 0, other_bytes = 0;
@@ -118,9 +118,11 @@ struct slurm_need slurm_need_of(const struct settings *s, const struct file_row 
             other_bytes += file[i].size_bytes;
     }
     scan_bytes = scan_bytes > s->volume_memory_bytes / SCAN_BYTES ? s->volume_memory_bytes : scan_bytes * SCAN_BYTES;
-    need.memory_bytes = base_bytes + need.cores * core_bytes + scan_bytes + other_bytes * OTHER_BYTES;
+    need.memory_bytes = base_bytes + need.cores * core_bytes;
+    need.memory_bytes +=
+        known.planned_bytes > 0 ? known.planned_bytes / 100 * PLAN_PERCENT : scan_bytes + other_bytes * OTHER_BYTES;
     if (s->slurm_memory_bytes > 0) need.memory_bytes = s->slurm_memory_bytes;
-    if (least_memory_bytes > need.memory_bytes) need.memory_bytes = least_memory_bytes;
+    if (known.least_bytes > need.memory_bytes) need.memory_bytes = known.least_bytes;
     if (s->resident_limit_bytes > 0 && need.memory_bytes > s->resident_limit_bytes)
         need.memory_bytes = s->resident_limit_bytes;
     return need;

@@ -10,10 +10,15 @@ struct slurm_need {
     int64_t cores, memory_bytes;
 };
 
-/* The need of a job by its input files (docs/cluster.md states the rule). least_memory_bytes: what an earlier attempt
- * has shown to be too little, doubled; 0: nothing. */
+/* What is known of a job's memory besides its files; 0: nothing. */
+struct slurm_memory {
+    int64_t planned_bytes; /* by the job's plan (server/workers/input_judge.h) */
+    int64_t least_bytes;   /* what an earlier attempt has shown to be too little, doubled */
+};
+
+/* The need of a job by its input files (docs/cluster.md states the rule). */
 struct slurm_need slurm_need_of(const struct settings *settings, const struct file_row *file, size_t n_file,
-                                int64_t least_memory_bytes);
+                                struct slurm_memory known);
 
 /* Checks the settings of [slurm] that Slurm itself does not check at the start. STATUS_INVALID names the setting. */
 status slurm_request_check(const struct settings *settings, struct error *err);

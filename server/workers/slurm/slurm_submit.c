@@ -1,5 +1,6 @@
 /* Submits and cancels jobs. */
 #include "base/clock.h"
+#include "server/workers/kept_plan.h"
 #include "server/workers/slurm/slurm_desk.h"
 #include "server/workers/slurm/slurm_request.h"
 
@@ -48,6 +49,15 @@ static status renew_console(const char *data, const char *job_id, struct error *
     return STATUS_OK;
 }
 
+/* Memory that the job's plan says; 0 without a plan. */
+static int64_t planned_bytes(const struct slurm_desk *d, const char *job_id)
+{
+    json_t *plan = kept_plan_read(d->v->settings->data, job_id);
+    const double bytes = json_number_value(json_object_get(plan, "memory_bytes"));
+    json_decref(plan);
+    return bytes > 0 && bytes < 1e15 ? (int64_t)bytes : 0;
+}
+
 /* Prepares what sbatch needs. */
 static status prepare(struct slurm_desk *d, struct backend_run *run, struct slurm_request *request, struct error *err)
 {
@@ -60,11 +70,9 @@ static status prepare(struct slurm_desk *d, struct backend_run *run, struct slur
     s = store_file_list(d->v->store, run->job_id, &file, &n, err);
     if (s == STATUS_OK) s = renew_console(settings->data, run->job_id, err);
     if (s == STATUS_OK) {
-        const struct slurm_submission submission = {.sbatch = d->sbatch,
-                                                    .program = d->program,
-                                                    .row = &row,
-                                                    .need =
-                                                        slurm_need_of(settings, file, n, run->note.least_memory_bytes)};
+        const struct slurm_memory known = {planned_bytes(d, run->job_id), run->note.least_memory_bytes};
+        const struct slurm_submission submission = {
+            .sbatch = d->sbatch, .program = d->program, .row = &row, .need = slurm_need_of(settings, file, n, known)};
         s = slurm_request_make(settings, &submission, request, err);
         run->note.attempt = row.attempt;
         run->note.memory_bytes = submission.need.memory_bytes;

@@ -132,20 +132,22 @@ static void test_the_need(void **state)
     struct file_row file[3] = {{.role = "volume", .size_bytes = 10 * MIB},
                                {.role = "photograph", .size_bytes = 3 * MIB},
                                {.role = "photograph", .size_bytes = 2 * MIB}};
-    struct slurm_need none = slurm_need_of(&s, NULL, 0, 0), need = slurm_need_of(&s, file, 3, 0);
+    const struct slurm_memory unknown = {0}, planned = {.planned_bytes = 200 * MIB}, more = {.least_bytes = 5000 * MIB};
+    struct slurm_need none = slurm_need_of(&s, NULL, 0, unknown), need = slurm_need_of(&s, file, 3, unknown);
     assert_int_equal(none.cores, 4);
-    assert_int_equal(none.memory_bytes, (512 + 4 * 64) * MIB);
+    assert_int_equal(none.memory_bytes, (256 + 4 * 32) * MIB);
     assert_int_equal(need.memory_bytes, none.memory_bytes + 10 * MIB * 88 + 5 * MIB * 16);
     /* a scan takes no more than volume_memory_bytes; the rest is in files */
     file[0].size_bytes = INT64_C(1) << 40;
-    assert_int_equal(slurm_need_of(&s, file, 1, 0).memory_bytes, none.memory_bytes + s.volume_memory_bytes);
-    assert_int_equal(slurm_need_of(&s, NULL, 0, 5000 * MIB).memory_bytes, 5000 * MIB);
+    assert_int_equal(slurm_need_of(&s, file, 1, planned).memory_bytes, none.memory_bytes + 300 * MIB);
+    assert_int_equal(slurm_need_of(&s, file, 1, unknown).memory_bytes, none.memory_bytes + s.volume_memory_bytes);
+    assert_int_equal(slurm_need_of(&s, NULL, 0, more).memory_bytes, 5000 * MIB);
     s.slurm_memory_bytes = 900 * MIB;
-    assert_int_equal(slurm_need_of(&s, file, 3, 0).memory_bytes, 900 * MIB);
+    assert_int_equal(slurm_need_of(&s, file, 3, unknown).memory_bytes, 900 * MIB);
     s.resident_limit_bytes = 800 * MIB;
     s.threads = 2;
-    assert_int_equal(slurm_need_of(&s, file, 3, 5000 * MIB).memory_bytes, 800 * MIB);
-    assert_int_equal(slurm_need_of(&s, file, 3, 0).cores, 2);
+    assert_int_equal(slurm_need_of(&s, file, 3, more).memory_bytes, 800 * MIB);
+    assert_int_equal(slurm_need_of(&s, file, 3, unknown).cores, 2);
 }
 
 int main(void)
