@@ -7,9 +7,19 @@ import time
 
 import pytest
 from cluster_demo import Batch, kill_a_worker, make_samples
-from daemon_under_test import BUILD, ROOT, program, wait_until
+from daemon_under_test import BUILD, ROOT, Daemon, program, wait_until
+from slurm_cluster import SlurmCluster, missing
 
 DEMO = os.path.join(ROOT, "tests", "slurm", "cluster_demo.py")
+
+
+def alone(batch, sample, folder):
+    """What the same job finds without a daemon, uninterrupted."""
+    os.makedirs(folder)
+    for name in ("job.json", "input"):
+        subprocess.run(["cp", "-r", os.path.join(batch.folder(sample), name), folder], check=True)
+    subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "1", str(folder)], check=True)
+    return batch.results_of(str(folder))
 
 
 def test_a_worker_that_slurm_stops_goes_on_with_the_same_numbers(cluster, daemon_maker, tmp_path):
@@ -21,13 +31,29 @@ def test_a_worker_that_slurm_stops_goes_on_with_the_same_numbers(cluster, daemon
     assert jobs[sample]["attempt"] == 2 and jobs[sample]["lost_attempts"] == 0
     with open(os.path.join(batch.folder(sample), "log.txt")) as f:
         assert "cancelled" in f.read()
-    alone = tmp_path / "alone"
-    os.makedirs(alone)
-    for name in ("job.json", "input"):
-        subprocess.run(["cp", "-r", os.path.join(batch.folder(sample), name), alone], check=True)
-    subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "1", str(alone)], check=True)
-    assert batch.results(sample) == batch.results_of(str(alone))
+    assert batch.results(sample) == alone(batch, sample, tmp_path / "alone")
     assert cluster.jobs()[number] == "FAILED"
+
+
+@pytest.mark.skipif(not os.path.exists(program("selvedge-mpi")), reason="selvedge-mpi is not built: libopenmpi-dev is missing")
+@pytest.mark.parametrize("instead", ["--signal=TERM", None])
+def test_ranks(tmp_path, instead):
+    """Two ranks that srun starts, one of which is killed, or all asked to stop. Both are on one node, because the PMIx of
+    two virtual nodes would use the same folder of /tmp."""
+    reason = missing()
+    if reason:
+        pytest.skip(reason)
+    samples = make_samples(str(tmp_path / "samples"))
+    with SlurmCluster(tmp_path / "cluster", n_node=1, n_cpu=2) as c:
+        options = c.options(**{"slurm.ranks": 2, "slurm.mpi": "pmix", "slurm.memory_bytes": 0})
+        with Daemon(tmp_path / "data", worker=program("selvedge-worker"), options=options, environment=c.environment) as d:
+            batch = Batch(d, samples)
+            sample, _, _ = kill_a_worker(batch, c, instead and (lambda number: c.run("scancel", instead, number)))
+            jobs = batch.wait()
+            assert (jobs[sample]["attempt"], jobs[sample]["lost_attempts"]) == (2, 0)
+            with open(os.path.join(batch.folder(sample), "log.txt")) as f:
+                assert "2 ranks shared" in f.read()
+            assert batch.results(sample) == alone(batch, sample, tmp_path / "alone")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
