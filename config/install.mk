@@ -32,6 +32,7 @@ DASHBOARD_FOLDERS := $(notdir $(patsubst %/,%,$(wildcard clients/dashboard/*/)))
 install: all       ## install below PREFIX (/usr/local) of DESTDIR: programs, dashboard, documents, unit, configuration
 	$(INSTALL) -d $(addprefix "$(DESTDIR)",$(PREFIX)/bin $(addprefix $(SHAREDIR)/dashboard/,$(DASHBOARD_FOLDERS)) $(DOCDIR)/docs/images $(DOCDIR)/examples)
 	$(INSTALL) $(PROGRAMS) "$(DESTDIR)$(PREFIX)/bin"
+	$(if $(PLUGINS),$(INSTALL) -d "$(DESTDIR)$(PREFIX)/lib/selvedge" && $(INSTALL) -m 644 $(PLUGINS) "$(DESTDIR)$(PREFIX)/lib/selvedge")
 	$(INSTALL) -m 644 $(filter-out %.md,$(wildcard clients/dashboard/*.*)) "$(DESTDIR)$(SHAREDIR)/dashboard"
 	for folder in $(DASHBOARD_FOLDERS); do $(INSTALL) -m 644 clients/dashboard/$$folder/* "$(DESTDIR)$(SHAREDIR)/dashboard/$$folder" || exit 1; done
 	$(INSTALL) -m 644 config/openapi.json config/result.schema.json config/selvedge.conf "$(DESTDIR)$(SHAREDIR)"
@@ -59,7 +60,7 @@ endif
 # data and configuration are the administrator's
 uninstall:         ## remove what install has put there, but neither configuration nor data
 	rm -f $(patsubst %,"$(DESTDIR)$(PREFIX)/bin/%",$(notdir $(PROGRAMS)))
-	rm -rf "$(DESTDIR)$(SHAREDIR)" "$(DESTDIR)$(DOCDIR)"
+	rm -rf "$(DESTDIR)$(SHAREDIR)" "$(DESTDIR)$(DOCDIR)" "$(DESTDIR)$(PREFIX)/lib/selvedge"
 	rm -f "$(DESTDIR)$(UNITDIR)/selvedge.service" "$(DESTDIR)$(SYSUSERSDIR)/selvedge.conf"
 	rm -f $(foreach p,$(notdir $(MAN_PAGES)),"$(DESTDIR)$(MANDIR)/man$(patsubst .%,%,$(suffix $(p)))/$(p)")
 	@echo "kept: $(DESTDIR)$(SYSCONFDIR)/selvedge, the data and the user 'selvedge'"

@@ -1,5 +1,5 @@
 # Tests: their programs, and the targets that run them. tests/README.md says what each one is.
-.PHONY: screens tsan tsan-requests test-watched-folder test-slurm deps-test build-tests asan asan-physics fuzz fuzz-smoke fuzz-programs coverage
+.PHONY: test-cluster-kills test-postgresql screens tsan tsan-requests test-watched-folder test-slurm deps-test build-tests asan asan-physics fuzz fuzz-smoke fuzz-programs coverage
 # one test program per file tests/{unit,physics}/test_*.c
 TESTS_C := $(shell find tests/unit tests/physics -name 'test_*.c' 2>/dev/null | sort)
 TEST_BINS := $(patsubst %.c,$(BUILD)/%,$(TESTS_C))
@@ -31,8 +31,8 @@ screens: | deps-test ## the browser tests, which then keep screenshots of the da
 	@SELVEDGE_SCREENSHOTS="$(CURDIR)/$(BUILD)/screens" /usr/bin/python3 -m pytest -q $(addprefix tests/browser/,$(PAGES))$(if $(PAGES),,tests/browser)
 
 # What takes too long for every commit. One part that fails does not keep the next from running.
-NIGHTLY := asan tsan fuzz-smoke coverage test-crash test-slurm test-long mutants
-nightly:           ## asan, tsan, fuzz-smoke, coverage, test-crash, test-slurm, test-long and mutants: too long for every commit
+NIGHTLY := asan tsan fuzz-smoke coverage test-crash test-cluster-kills test-postgresql test-slurm test-long mutants
+nightly:           ## asan, tsan, fuzz-smoke, coverage, test-crash, test-cluster-kills, test-postgresql, test-slurm, test-long and mutants: too long for every commit
 	@failed=""; for part in $(NIGHTLY); do \
 		echo "== $$part"; $(MAKE) --no-print-directory $$part || failed="$$failed $$part"; done; \
 	[ -z "$$failed" ] || { echo "nightly: failed:$$failed"; exit 1; }
@@ -64,6 +64,18 @@ test-slurm: | deps-test ## jobs on a real Slurm of two virtual nodes: faults, re
 test-watched-folder: | deps-test ## 100 samples dropped into a watched folder, real jobs, while the daemon is killed 20 times: each ends once (some minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) all
 	@/usr/bin/python3 tests/crash/watched_folder_kills.py --build $(BUILD) $(if $(SAMPLES),--samples $(SAMPLES)) $(if $(KILLS),--kills $(KILLS))
+
+# KILLS, SEED
+test-cluster-kills: | deps-test ## two daemons on one PostgreSQL, killed 200 times: nothing acknowledged is lost, no job has two results (ten minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) all
+	@SELVEDGE_BUILD=$(BUILD) /usr/bin/python3 tests/crash/cluster_kills.py $(if $(KILLS),--kills $(KILLS)) $(if $(SEED),--seed $(SEED))
+
+# tests that open the file of SQLite, or ask for what only such a file has, are left out
+STORE_TESTS := tests/api/test_jobs_api.py tests/api/test_uploads_api.py tests/api/test_results_api.py tests/api/test_supervision.py \
+	tests/api/test_durable_replies.py tests/api/service/test_list.py tests/api/service/test_retention.py tests/api/access tests/api/batches
+test-postgresql: | deps-test ## tests of the API with PostgreSQL in place of SQLite (five minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) all
+	@SELVEDGE_BUILD=$(BUILD) SELVEDGE_TEST_STORE=postgresql /usr/bin/python3 -m pytest -q $(STORE_TESTS)
 
 asan-physics: | deps-test ## the renderer's physics tests under the same sanitizers (an hour or more when the machine is busy)
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/asan SANITIZE=address,undefined OPTIMIZE=-O2 \

@@ -125,11 +125,40 @@ static status find_replay(struct job_service *v, const char *owner, const char *
     return STATUS_OK;
 }
 
+static status fill_place(struct job_service *v, const struct job_row *row, const char *key, const char *body_hash,
+                         struct error *err)
+{
+    char path[PATH_BYTES];
+    path_join(path, v->settings->data, "jobs", row->id, NULL);
+    const struct journal_entry all = {.job = row, .document = true, .idempotency_key = key, .body_hash = body_hash};
+    status s = make_folders(v, row->id, err);
+    if (s == STATUS_OK) s = write_document(v, row, err);
+    if (s == STATUS_OK) s = job_journal_append(path, &all, true, err);
+    return s;
+}
+
+/* A daemon that was killed between row and folder, or whose commit was made without its knowledge, has left a job
+ * without a whole folder: the client that repeats its request gets it whole. */
+static status complete_place(struct job_service *v, const char *id, const char *key, const char *body_hash,
+                             struct error *err)
+{
+    char path[PATH_BYTES];
+    struct stat st;
+    struct job_row row;
+    path_join(path, v->settings->data, "jobs", id, JOB_FILE_JOURNAL, NULL);
+    if (lstat(path, &st) == 0) return STATUS_OK;
+    status s = store_job_get(v->store, id, &row, err);
+    if (s == STATUS_OK) s = fill_place(v, &row, key, body_hash, err);
+    job_row_release(&row);
+    return s;
+}
+
 static status create_locked(struct job_service *v, struct job_row *row, const struct job_request *request,
                             const char *body_hash, bool *replayed, struct job_refusal *refusal, struct error *err)
 {
     const char *key = request->idempotency_key;
     status s = key == NULL ? STATUS_OK : find_replay(v, row->owner, key, body_hash, row->id, replayed, refusal, err);
+    if (s == STATUS_OK && *replayed) s = complete_place(v, row->id, key, body_hash, err);
     if (s != STATUS_OK || *replayed) return s;
     int64_t count[JOB_N_STATE], n = 0;
     s = store_job_count(v->store, count, err);
@@ -146,13 +175,10 @@ static status create_locked(struct job_service *v, struct job_row *row, const st
     row->created_unix_s = clock_wall_s();
     s = store_job_insert(v->store, row, key, body_hash, err);
     if (s != STATUS_OK) return s;
-    char path[PATH_BYTES];
-    path_join(path, v->settings->data, "jobs", row->id, NULL);
-    const struct journal_entry all = {.job = row, .document = true, .idempotency_key = key, .body_hash = body_hash};
-    s = make_folders(v, row->id, err);
-    if (s == STATUS_OK) s = write_document(v, row, err);
-    if (s == STATUS_OK) s = job_journal_append(path, &all, true, err);
+    s = fill_place(v, row, key, body_hash, err);
     if (s != STATUS_OK) {
+        char path[PATH_BYTES];
+        path_join(path, v->settings->data, "jobs", row->id, NULL);
         path_remove_tree(path, NULL);
         store_job_erase(v->store, row->id, NULL);
     }

@@ -73,6 +73,7 @@ struct file_row {
     char sha256[STORE_HASH_TEXT_BYTES]; /* as declared or, once verified, as computed; "" if neither */
     enum file_state state;
     unsigned char hash_state[STORE_HASH_STATE_BYTES]; /* of the first offset_bytes bytes */
+    int64_t stored_offset_bytes; /* offset_bytes of the database when the row was read or written last */
 };
 
 struct store;
@@ -174,8 +175,9 @@ status store_file_find(struct store *store, const char *job_id, const char *name
  * STATUS_NOT_FOUND. */
 status store_file_known(struct store *store, const char *owner, const char *sha256, int64_t size_bytes,
                         struct file_row *row, struct error *err);
-/* Writes offset, hash state, sha256 and state. STATUS_NOT_FOUND when the row no longer exists. */
-status store_file_update(struct store *store, const struct file_row *row, struct error *err);
+/* Writes offset, hash state, sha256 and state. STATUS_NOT_FOUND when the row no longer exists, STATUS_STALE when the
+ * database has another offset than stored_offset_bytes: another daemon has gone on with the upload. */
+status store_file_update(struct store *store, struct file_row *row, struct error *err);
 /* Removes a file and updates its job's row (NULL: no job) in one transaction. */
 status store_file_erase(struct store *store, const char *id, struct job_row *job, struct error *err);
 status store_file_count(struct store *store, const char *job_id, int64_t *n, struct error *err);

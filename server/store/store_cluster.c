@@ -259,6 +259,14 @@ status store_job_orphans(struct store *store, char (**out)[STORE_ID_BYTES], size
     return STATUS_OK;
 }
 
+void store_read_changes(struct store *store)
+{
+    if (store->read.calls->notices == NULL || store->changed == NULL) return;
+    pthread_mutex_lock(&store->read.lock);
+    store->read.calls->notices(store->read.db, store->changed, store->changed_context);
+    pthread_mutex_unlock(&store->read.lock);
+}
+
 bool store_duty_is_mine(struct store *store, const char *duty)
 {
     char mine[STORE_DUTY_BYTES];

@@ -56,6 +56,9 @@ status store_job_elsewhere(struct store *store, const char *id, bool *elsewhere,
 /* Running jobs that no daemon holds. The caller frees *id. */
 status store_job_orphans(struct store *store, char (**id)[STORE_ID_BYTES], size_t *n, struct error *err);
 
+/* Calls what store_on_change has named for the jobs that any daemon has changed since the last call. */
+void store_read_changes(struct store *store);
+
 /* Whether a duty is this daemon's: it is, or no daemon that lives has it. An error counts as no. */
 bool store_duty_is_mine(struct store *store, const char *duty);
 

@@ -13,7 +13,7 @@ static void read_row(struct store_query *q, struct file_row *row)
     store_text(q, 2, row->name, sizeof row->name);
     store_text(q, 3, row->role, sizeof row->role);
     row->size_bytes = store_int64(q, 4);
-    row->offset_bytes = store_int64(q, 5);
+    row->offset_bytes = row->stored_offset_bytes = store_int64(q, 5);
     store_text(q, 6, row->sha256, sizeof row->sha256);
     row->state = (enum file_state)(int)store_int64(q, 7);
     size_t n = 0;
@@ -109,15 +109,21 @@ status store_file_known(struct store *store, const char *owner, const char *sha2
     return s;
 }
 
-status store_file_update(struct store *store, const struct file_row *r, struct error *err)
+status store_file_update(struct store *store, struct file_row *r, struct error *err)
 {
     int n = 0;
+    struct file_row there;
     pthread_mutex_lock(&store->write.lock);
-    status s = store_run(
-        &store->write, &n, err, "UPDATE file SET \"offset\"=?, sha256=?, state=?, hash_state=? WHERE id=?", "isibs",
-        r->offset_bytes, r->sha256, (int64_t)r->state, r->hash_state, (int)STORE_HASH_STATE_BYTES, r->id);
+    status s = store_run(&store->write, &n, err,
+                         "UPDATE file SET \"offset\"=?, sha256=?, state=?, hash_state=? WHERE id=? AND \"offset\"=?",
+                         "isibsi", r->offset_bytes, r->sha256, (int64_t)r->state, r->hash_state,
+                         (int)STORE_HASH_STATE_BYTES, r->id, r->stored_offset_bytes);
     pthread_mutex_unlock(&store->write.lock);
-    if (s == STATUS_OK && n == 0) s = error_set(err, STATUS_NOT_FOUND, "file '%s' no longer exists", r->name);
+    if (s == STATUS_OK && n > 0) r->stored_offset_bytes = r->offset_bytes;
+    if (s == STATUS_OK && n == 0)
+        s = store_file_get(store, r->id, &there, NULL) == STATUS_OK
+                ? error_set(err, STATUS_STALE, "another request has taken over the upload of '%s'", r->name)
+                : error_set(err, STATUS_NOT_FOUND, "file '%s' no longer exists", r->name);
     return store_report(store, s, r->job_id);
 }
 

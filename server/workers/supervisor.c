@@ -283,6 +283,7 @@ static void keep_to_lease(struct supervisor *u, double now)
     u->n_loss = n_loss;
     if (u->v->keeper == NULL || now - u->lease_seen_s < 1) return;
     u->lease_seen_s = now;
+    store_read_changes(u->v->store);
     u->adopted = false;
     if (u->backend->adopt == NULL) lease_keeper_adopt(u->v);
 }

@@ -1,3 +1,4 @@
+import inspect
 import os
 import sys
 
@@ -6,6 +7,18 @@ import pytest
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support", "python"))
 from daemon_under_test import Daemon, program  # noqa: E402
 from system_calls import build_shim  # noqa: E402
+
+OF_SQLITE = ("sqlite3", "selvedge.db", "--rebuild", "database(", "older_database", "shim", "EXPLAIN")
+
+
+def pytest_collection_modifyitems(items):
+    """With another store than SQLite (SELVEDGE_TEST_STORE), tests that open its file or rebuild it are left out."""
+    if os.environ.get("SELVEDGE_TEST_STORE", "sqlite") == "sqlite":
+        return
+    for item in items:
+        source = inspect.getsource(item.function)
+        if any(word in source for word in OF_SQLITE):
+            item.add_marker(pytest.mark.skip("it is about the file of SQLite"))
 
 
 @pytest.fixture(scope="module")

@@ -63,6 +63,9 @@ struct store_calls {
     /* Whether the connection is as it was opened; false when it was lost since, which ends its locks. It says nothing
      * about the next moment. */
     bool (*is_alive)(void *db);
+    /* Calls `changed` with the id of each job that any daemon has changed since the last call; the connection is one
+     * that reads. NULL: there are no other daemons. */
+    void (*notices)(void *db, void (*changed)(void *context, const char *job_id), void *context);
 };
 
 struct store_link;

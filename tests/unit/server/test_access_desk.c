@@ -1,6 +1,7 @@
 /* Tokens in the store, what they grant, how their requests are counted, and what owners keep. */
 #include "server/access/access_desk.h"
 #include "server/access/access_secret.h"
+#include "tests/support/store/store_fixture.h"
 
 #include <pthread.h>
 #include <setjmp.h>
@@ -14,7 +15,7 @@
 #include <cmocka.h>
 
 struct fixture {
-    char folder[64], path[96];
+    struct store_fixture db;
     struct settings settings;
     struct store *store;
     struct access_desk *desk;
@@ -23,22 +24,18 @@ struct fixture {
 static int set_up(void **state)
 {
     struct fixture *f = calloc(1, sizeof *f);
-    snprintf(f->folder, sizeof f->folder, "/tmp/selvedge-access-XXXXXX");
-    if (f == NULL || mkdtemp(f->folder) == NULL) return 1;
-    snprintf(f->path, sizeof f->path, "%s/selvedge.db", f->folder);
+    if (f == NULL || store_fixture_begin(&f->db) != 0) return 1;
+    f->store = f->db.store;
     settings_init(&f->settings);
     *state = f;
-    return store_open(f->path, &f->store, NULL) != STATUS_OK ||
-           access_desk_new(f->store, &f->settings, &f->desk, NULL) != STATUS_OK;
+    return access_desk_new(f->store, &f->settings, &f->desk, NULL) != STATUS_OK;
 }
 
 static int tear_down(void **state)
 {
     struct fixture *f = *state;
     access_desk_free(f->desk);
-    store_close(f->store);
-    unlink(f->path);
-    rmdir(f->folder);
+    store_fixture_end(&f->db);
     free(f);
     return 0;
 }
@@ -258,7 +255,7 @@ static void test_what_an_owner_keeps(void **state)
     expect_use(f, "bob", 0, 0);
 }
 
-int main(void)
+static int run(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_tokens_are_needed_from_the_first_one_on, set_up, tear_down),
@@ -271,3 +268,5 @@ int main(void)
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
+
+int main(void) { return store_fixture_each(run); }

@@ -5,12 +5,21 @@
 #include "server/store/drivers/store_driver.h"
 
 #include <libpq-fe.h>
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
-enum { PARAMETERS_MOST = 32, NUMBER_BYTES = 40, OID_BYTEA = 17, OID_INT8 = 20, OID_TEXT = 25, OID_FLOAT8 = 701 };
+enum {
+    PARAMETERS_MOST = 32,
+    READS_MOST = 16,
+    NUMBER_BYTES = 40,
+    OID_BYTEA = 17,
+    OID_INT8 = 20,
+    OID_TEXT = 25,
+    OID_FLOAT8 = 701
+};
 
 struct pg_db {
     PGconn *c;
@@ -58,7 +67,13 @@ static bool is_lost(const struct pg_db *d) { return d->c == NULL || PQstatus(d->
 static bool is_alive(void *db)
 {
     struct pg_db *d = db;
-    return !is_lost(d) && PQconsumeInput(d->c) == 1 && PQstatus(d->c) == CONNECTION_OK;
+    /* a server that stops sends a last message before it closes the connection, so all that has come is read */
+    for (int i = 0; i < READS_MOST; i++) {
+        if (is_lost(d) || PQconsumeInput(d->c) == 0 || PQstatus(d->c) != CONNECTION_OK) return false;
+        struct pollfd more = {.fd = PQsocket(d->c), .events = POLLIN};
+        if (poll(&more, 1, 0) <= 0) break;
+    }
+    return true;
 }
 
 static status set_up(struct pg_db *d)
@@ -71,7 +86,7 @@ static status set_up(struct pg_db *d)
     bool done = PQresultStatus(r) == PGRES_TUPLES_OK;
     if (done && d->only_reads) {
         PQclear(r);
-        r = PQexec(d->c, "SET default_transaction_read_only = on");
+        r = PQexec(d->c, "LISTEN selvedge_job; SET default_transaction_read_only = on");
         done = PQresultStatus(r) == PGRES_COMMAND_OK;
     }
     status s = done ? STATUS_OK : fail_by(d, r);
@@ -339,6 +354,13 @@ static void finish(struct store_query *base)
     free(q);
 }
 
+static void notices(void *db, void (*changed)(void *context, const char *job_id), void *context)
+{
+    struct pg_db *d = db;
+    if (ensure(d) != STATUS_OK) return;
+    for (PGnotify *n; (n = PQnotifies(d->c)) != NULL; PQfreemem(n)) changed(context, n->extra);
+}
+
 const struct store_calls selvedge_store_calls = {
-    STORE_CALLS_VERSION, open_db, close_db, script,  query, step, is_null, integer, real, text, blob,
-    n_changed,           finish,  fault,    is_alive};
+    STORE_CALLS_VERSION, open_db, close_db, script,   query,  step, is_null, integer, real, text, blob,
+    n_changed,           finish,  fault,    is_alive, notices};

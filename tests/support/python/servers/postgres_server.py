@@ -8,6 +8,8 @@ import pwd
 import shutil
 import socket
 import subprocess
+import sys
+import tempfile
 import uuid
 
 
@@ -27,7 +29,8 @@ def programs():
 
 
 class PostgresServer:
-    def __init__(self, folder):
+    def __init__(self, folder, sync=False):
+        self.sync = sync  # whether the server syncs its files, which only a power cut would miss
         self.bin = programs()
         self.folder = str(folder)
         self.data = os.path.join(self.folder, "cluster")
@@ -54,7 +57,7 @@ class PostgresServer:
             while above != "/" and os.stat(above).st_uid == 0 and not os.stat(above).st_mode & 0o001:
                 os.chmod(above, os.stat(above).st_mode | 0o011)
                 above = os.path.dirname(above)
-        self.run("initdb", "--pgdata", self.data, "--auth=scram-sha-256", "--username=selvedge", "--encoding=UTF8", "--locale=C.UTF-8",
+        self.run("initdb", "--no-sync", "--pgdata", self.data, "--auth=scram-sha-256", "--username=selvedge", "--encoding=UTF8", "--locale=C.UTF-8",
                  "--pwfile=" + self.write_password())
         self.start()
         return self
@@ -74,7 +77,8 @@ class PostgresServer:
 
     def start(self):
         self.run("pg_ctl", "--pgdata", self.data, "--wait", "--log", os.path.join(self.folder, "server.log"), "--options",
-                 f"-p {self.port} -c listen_addresses=127.0.0.1 -c unix_socket_directories={self.folder} -c max_connections=60", "start")
+                 f"-p {self.port} -c listen_addresses=127.0.0.1 -c unix_socket_directories={self.folder} -c max_connections=60 "
+                 f"-c fsync={'on' if self.sync else 'off'}", "start")
 
     def stop(self, mode="fast"):
         self.run("pg_ctl", "--pgdata", self.data, "--wait", "--mode", mode, "stop")
@@ -94,3 +98,21 @@ class PostgresServer:
         name = "t" + uuid.uuid4().hex[:12]
         self.query(f"CREATE DATABASE {name}")
         return name
+
+
+def serve():
+    """For programs of tests: prints the password, then the address of a new database for each line that is read, until there are none."""
+    folder = tempfile.mkdtemp(prefix="selvedge-postgres-")
+    try:
+        with PostgresServer(os.path.join(folder, "server")) as server:
+            print("password", server.password, flush=True)
+            for _ in sys.stdin:
+                print(server.address(server.make_database()), flush=True)
+    except PostgresMissing as why:
+        print(why, flush=True)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+if __name__ == "__main__":
+    serve()

@@ -1,6 +1,7 @@
 /* Batches in the database. */
 #include "server/store/store_access.h"
 #include "server/store/store_batch.h"
+#include "tests/support/store/store_fixture.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -15,33 +16,31 @@
 static const char batch_id[] = "11111111-1111-1111-1111-111111111111";
 
 struct fixture {
-    char folder[64], path[96];
+    struct store_fixture db;
     struct store *store;
 };
 
 static void reopen(struct fixture *f)
 {
-    store_close(f->store);
-    assert_int_equal(store_open(f->path, &f->store, NULL), STATUS_OK);
+    store_fixture_reopen(&f->db);
+    f->store = f->db.store;
+    assert_non_null(f->store);
 }
 
 static int set_up(void **state)
 {
     struct fixture *f = calloc(1, sizeof *f);
     if (f == NULL) return 1;
-    snprintf(f->folder, sizeof f->folder, "/tmp/selvedge-batch-XXXXXX");
-    if (mkdtemp(f->folder) == NULL) return 1;
-    snprintf(f->path, sizeof f->path, "%s/selvedge.db", f->folder);
     *state = f;
-    return store_open(f->path, &f->store, NULL) != STATUS_OK;
+    if (store_fixture_begin(&f->db) != 0) return 1;
+    f->store = f->db.store;
+    return 0;
 }
 
 static int tear_down(void **state)
 {
     struct fixture *f = *state;
-    store_close(f->store);
-    unlink(f->path);
-    rmdir(f->folder);
+    store_fixture_end(&f->db);
     free(f);
     return 0;
 }
@@ -178,7 +177,7 @@ static void test_jobs_bring_their_batch_with_them(void **state)
     assert_string_equal(row.batch, "");
 }
 
-int main(void)
+static int run(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_a_batch_and_its_jobs_are_written_together, set_up, tear_down),
@@ -188,3 +187,5 @@ int main(void)
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
+
+int main(void) { return store_fixture_each(run); }
