@@ -41,7 +41,7 @@ bench-fit: | deps-test ## recovery of known parameters, errors, seeds, grazing h
 
 # TABLES: a folder of tables of measured reflectance, each judged by the same procedure. CLOTH: some of the tables, recoveries and photo
 # pairs only, and of scanned cloths "demo" and "scan"
-bench-cloth: | deps-test ## described cloths: fit of measured tables, recovery of known cloths, photo pairs (two hours on 2 quiet cores)
+bench-cloth: | deps-test ## described cloths: fit of measured tables, recovery of known cloths, photo pairs (several hours on 2 quiet cores)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/bench_cloth.py --build $(BUILD) $(if $(TABLES),--tables $(TABLES)) $(CLOTH)
 	@$(if $(TABLES),,/usr/bin/python3 tests/bench/bench_pairs.py --build $(BUILD) $(CLOTH))
