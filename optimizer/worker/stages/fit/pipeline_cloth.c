@@ -334,6 +334,7 @@ status pipeline_cloth_use(struct pipeline_context *c, size_t i_model, struct err
     if (c->number.n == 0 || c->number.i_shown == i_model + 1) return STATUS_OK;
     status s = make_fibers(c, m->cloth.number, true, c->number.shown, &c->fiber, &c->cloth, err);
     if (s == STATUS_OK) s = pipeline_make_scene(c, err);
+    if (s == STATUS_OK) c->geometry.total_length_m = fiber_set_length_m(&c->fiber);
     if (s == STATUS_OK) warn_of_contradiction(c, m);
     c->number.i_shown = s == STATUS_OK ? i_model + 1 : 0;
     return s;
