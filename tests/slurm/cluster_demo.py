@@ -1,8 +1,9 @@
 #!/usr/bin/python3
-"""make cluster-demo: a batch of six small samples on a Slurm of two virtual nodes, one worker killed in mid-fit, and every
-result compared bit by bit with that of the local backend. Everything is in a folder below build/, and is stopped at the
-end, also after Ctrl-C. Exit status 77: the packages are not installed."""
+"""make cluster-demo: a batch of six small samples on a Slurm of two virtual nodes, with its database in PostgreSQL, one
+worker killed in mid-fit, and every result compared bit by bit with that of the local backend on SQLite. Everything is in
+a folder below build/, and is stopped at the end, also after Ctrl-C. Exit status 77: the packages are not installed."""
 import argparse
+import contextlib
 import hashlib
 import json
 import os
@@ -15,8 +16,9 @@ import time
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, os.path.join(os.path.dirname(HERE), "support", "python"))
-from daemon_under_test import BUILD, Daemon, program  # noqa: E402
+from daemon_under_test import BUILD, Daemon, program, store_options  # noqa: E402
 from fit_outcome import outcome  # noqa: E402
+from servers.postgres_server import PostgresMissing, PostgresServer, programs  # noqa: E402
 from slurm_cluster import SlurmCluster, missing  # noqa: E402
 from small_cloth import TABLE, hair  # noqa: E402
 
@@ -128,10 +130,31 @@ def kill_a_worker(batch, cluster, instead=None):
     raise RuntimeError("no worker was seen in mid-fit")
 
 
-def on_cluster(folder, samples, options):
-    with SlurmCluster(os.path.join(folder, "cluster")) as cluster:
+@contextlib.contextmanager
+def database(folder, kind):
+    """Settings of a daemon with this kind of database."""
+    if kind == "sqlite":
+        yield {}
+        return
+    with PostgresServer(os.path.join(folder, "postgresql")) as server:
+        say(server.query("SELECT split_part(version(), ' (', 1)"))
+        yield store_options(server, server.make_database(), folder)
+
+
+def missing_postgresql():
+    """Why the daemon cannot use PostgreSQL here, or None."""
+    try:
+        programs()
+    except PostgresMissing as e:
+        return str(e)
+    plugin = os.path.join(BUILD, "lib", "selvedge-postgresql.so")
+    return None if os.path.exists(plugin) else "it was built without libpq-dev"
+
+
+def on_cluster(folder, samples, options, kind):
+    with SlurmCluster(os.path.join(folder, "cluster")) as cluster, database(folder, kind) as store:
         say(f"Slurm {cluster.run('sinfo', '--version').split()[-1]} with nodes {', '.join(cluster.nodes)}")
-        settings = cluster.options(**{"slurm.memory_bytes": 0, **options})
+        settings = cluster.options(**{"slurm.memory_bytes": 0, **store, **options})
         with Daemon(os.path.join(folder, "slurm"), worker=program("selvedge-worker"), options=settings, environment=cluster.environment) as daemon:
             batch = Batch(daemon, samples)
             sample, steps, number = kill_a_worker(batch, cluster)
@@ -152,10 +175,10 @@ def on_this_machine(folder, samples, options):
         return {s: batch.results(s) for s in jobs}
 
 
-def run(folder, options):
+def run(folder, options, kind):
     """Returns the number of samples whose results differ."""
     samples, start = make_samples(os.path.join(folder, "samples")), time.monotonic()
-    cluster = on_cluster(folder, samples, options)
+    cluster = on_cluster(folder, samples, options, kind)
     middle = time.monotonic()
     local = on_this_machine(folder, samples, options)
     n_other = 0
@@ -176,9 +199,10 @@ def stop(number, unused):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="a setting of both daemons")
+    parser.add_argument("--store", choices=["sqlite", "postgresql"], default="postgresql", help="the database of the daemon with the cluster")
     parser.add_argument("--keep", action="store_true", help="keep the folder")
     arguments = parser.parse_args()
-    reason = missing()
+    reason = missing() or (missing_postgresql() if arguments.store == "postgresql" else None)
     if reason:
         say(f"cluster-demo is skipped: {reason}")
         return SKIPPED
@@ -186,7 +210,7 @@ def main():
     signal.signal(signal.SIGHUP, stop)
     folder = tempfile.mkdtemp(prefix="cluster-demo-", dir=BUILD)
     try:
-        n_other = run(folder, dict(pair.split("=", 1) for pair in arguments.set))
+        n_other = run(folder, dict(pair.split("=", 1) for pair in arguments.set), arguments.store)
         arguments.keep = arguments.keep or n_other > 0
         return 1 if n_other else 0
     except KeyboardInterrupt:
