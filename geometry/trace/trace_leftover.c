@@ -3,12 +3,15 @@
  * Thin fibers between thicker ones are missed at first: filters have the scale of the typical fiber, so the directions
  * inside of thin fibers are those of their neighbours. Once whole lines are fitted, their fibers are subtracted from
  * the scan (matching pursuit, Mallat and Zhang 1993), and what is left is filtered and traced like a scan of thinner
- * fibers. The lines found there join the others before ends grow and touching lines are compared. */
+ * fibers. Flat fibers are subtracted with their sections, because what a disc leaves of them looks like thin fibers at
+ * their sides. The lines found there join the others before ends grow and touching lines are compared. */
 #include "geometry/trace/trace_job.h"
 
+#include "geometry/fibers/shape/axes/fiber_section.h"
 #include "geometry/filter_directions.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* Diameter of the fibers looked for, over the typical one; centers are found from 0.55 to 1.5 times this diameter. */
@@ -20,25 +23,60 @@ static const float PAD = 0.3f; /* voxels added to subtracted radii, so that no r
 static const double LEAST_SPREAD = 0.1, MOST_SPREAD = 0.3, LEAST_LEFT = 0.03;
 static const double LEAST_DIAMETERS = 1.5; /* length of the lines that are added */
 
-/* Lowers the density around vertex x to what a fiber of this radius leaves. width: of its blurred edge. */
-static void subtract_ball(const struct volume *v, const float x[3], float radius, float width, struct volume *left)
+/* A piece of a fiber around a vertex, one voxel to either side of it. section: NULL for a ball. */
+struct piece {
+    const float *x;
+    float t[3], radius, reach;
+    const struct section_view *section;
+};
+
+/* Distance of a point beyond the surface of a piece; d: from the vertex. */
+static float depth_in(const struct piece *p, const float d[3])
 {
-    const float reach = radius + 0.5f * width;
+    if (p->section == NULL) return sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) - p->radius;
+    const float along = d[0] * p->t[0] + d[1] * p->t[1] + d[2] * p->t[2];
+    const float across[3] = {d[0] - along * p->t[0], d[1] - along * p->t[1], d[2] - along * p->t[2]};
+    if (fabsf(along) > 1.0f) return INFINITY;
+    return fiber_section_place(p->section, p->radius, across).depth;
+}
+
+/* Lowers the density around a vertex to what a piece of a fiber leaves. width: of its blurred edge. */
+static void subtract_piece(const struct volume *v, const struct piece *p, float width, struct volume *left)
+{
     size_t from[3], to[3];
     for (int a = 0; a < 3; a++) {
-        const float lo = floorf(x[a] - reach), hi = ceilf(x[a] + reach), last = (float)v->n[a];
+        const float lo = floorf(p->x[a] - p->reach), hi = ceilf(p->x[a] + p->reach), last = (float)v->n[a];
         from[a] = (size_t)fminf(fmaxf(lo, 0.0f), last);
         to[a] = (size_t)fminf(fmaxf(hi, 0.0f), last);
     }
     for (size_t k = from[2]; k < to[2]; k++)
         for (size_t j = from[1]; j < to[1]; j++)
             for (size_t i = from[0]; i < to[0]; i++) {
-                const float d[3] = {(float)i + 0.5f - x[0], (float)j + 0.5f - x[1], (float)k + 0.5f - x[2]};
-                const float distance = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-                const float share = fminf(1.0f, 0.5f + (radius - distance) / width);
+                const float d[3] = {(float)i + 0.5f - p->x[0], (float)j + 0.5f - p->x[1], (float)k + 0.5f - p->x[2]};
+                const float share = fminf(1.0f, 0.5f - depth_in(p, d) / width);
                 const size_t at = volume_index(v->n, i, j, k);
                 if (share > 0.0f) left->density[at] = fmaxf(0.0f, fminf(left->density[at], v->density[at] - share));
             }
+}
+
+/* Subtracts the fiber around vertex i of a line. */
+static void subtract_vertex(const struct trace_job *job, const struct polyline_set *lines, size_t line, size_t i,
+                            struct volume *left)
+{
+    const float width = (float)(sqrt(2.0 * M_PI) * job->profile.blur), origin[3] = {0.0f, 0.0f, 0.0f};
+    const float radius = lines->radius[line] > 0.0f ? lines->radius[line] : (float)(0.5 * job->diameter);
+    struct piece p = {.x = lines->vertex[i], .radius = radius + PAD};
+    struct section_view view;
+    p.reach = p.radius + 0.5f * width; /* width: one over the slope of the edge */
+    if (lines->shape != NULL) {
+        polyline_tangent(lines, line, i, 1, p.t);
+        struct fiber_section section = {{0.0f, 0.0f, 0.0f}, 0.0f, 0.0f};
+        fiber_section_take_shape(&lines->shape[i], p.t, &section);
+        view = fiber_section_view(&section, &section, origin, p.t);
+        p.section = &view;
+        p.reach = p.radius * view.stretch + 0.5f * width;
+    }
+    subtract_piece(job->v, &p, width, left);
 }
 
 static size_t count_material(const struct volume *v, double eps_d)
@@ -57,7 +95,6 @@ static status subtract_lines(const struct trace_job *job, const struct polyline_
 {
     const struct volume *v = job->v;
     const size_t n_slice = v->n[0] * v->n[1];
-    const float width = (float)(sqrt(2.0 * M_PI) * job->profile.blur); /* one over the slope of the edge */
     status s = volume_init_in(left, v->n, v->voxel_size_m, v->space, err);
     for (size_t k = 0; k < v->n[2] && s == STATUS_OK; k++) {
         memcpy(left->density + k * n_slice, v->density + k * n_slice, n_slice * sizeof *v->density);
@@ -66,9 +103,7 @@ static status subtract_lines(const struct trace_job *job, const struct polyline_
     if (s != STATUS_OK) return s;
     const size_t n_material = count_material(v, job->o->eps_d);
     for (size_t l = 0; l < lines->n_line; l++) {
-        const float radius = lines->radius[l] > 0.0f ? lines->radius[l] : (float)(0.5 * job->diameter);
-        for (size_t i = lines->first[l]; i < lines->first[l + 1]; i++)
-            subtract_ball(v, lines->vertex[i], radius + PAD, width, left);
+        for (size_t i = lines->first[l]; i < lines->first[l + 1]; i++) subtract_vertex(job, lines, l, i, left);
         scratch_keep_within(v->space);
     }
     *share = n_material > 0 ? (double)count_material(left, job->o->eps_d) / (double)n_material : 0.0;
@@ -108,14 +143,24 @@ static status add_lines(const struct trace_job *job, const struct volume *left, 
     return s;
 }
 
+/* Sections and the lines that are added do not belong together. */
+static void forget_sections(struct polyline_set *lines)
+{
+    free(lines->shape);
+    lines->shape = NULL;
+}
+
 status trace_leftover(struct trace_job *job, struct polyline_set *lines, struct error *err)
 {
     struct volume left = {0};
     const size_t n_before = lines->n_line;
     double share = 0.0;
     const double spread = job->report->radius_spread;
-    if (!(spread >= LEAST_SPREAD && spread <= MOST_SPREAD)) return STATUS_OK;
-    status s = subtract_lines(job, lines, &left, &share, err);
+    status s = STATUS_OK;
+    const bool look = spread >= LEAST_SPREAD && spread <= MOST_SPREAD;
+    if (look) s = subtract_lines(job, lines, &left, &share, err);
+    forget_sections(lines);
+    if (!look) return STATUS_OK;
     if (s == STATUS_OK && share >= LEAST_LEFT) s = add_lines(job, &left, lines, err);
     volume_release(&left);
     if (s != STATUS_OK || lines->n_line == n_before) return s;

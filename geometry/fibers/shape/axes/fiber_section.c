@@ -89,6 +89,30 @@ struct section_place fiber_section_place(const struct section_view *w, float rad
     return place;
 }
 
+void fiber_section_to_shape(const struct fiber_section *section, const float t[3], struct fiber_shape *shape)
+{
+    const float angle = 0.5f * atan2f(section->s, section->c), cosine = cosf(angle), sine = sinf(angle);
+    const float *u = section->u;
+    shape->ratio = fiber_section_ratio(section);
+    for (int a = 0; a < 3; a++)
+        shape->long_axis[a] =
+            cosine * u[a] + sine * (t[(a + 1) % 3] * u[(a + 2) % 3] - t[(a + 2) % 3] * u[(a + 1) % 3]);
+}
+
+void fiber_section_take_shape(const struct fiber_shape *shape, const float t[3], struct fiber_section *section)
+{
+    const float flatness = fiber_shape_has_section(shape) ? 0.5f * logf(shape->ratio) : 0.0f;
+    float cosine = 0.0f, sine = 0.0f, *u = section->u;
+    make_perpendicular(t, u);
+    for (int a = 0; a < 3; a++) {
+        cosine += shape->long_axis[a] * u[a];
+        sine += shape->long_axis[a] * (t[(a + 1) % 3] * u[(a + 2) % 3] - t[(a + 2) % 3] * u[(a + 1) % 3]);
+    }
+    const float square = fmaxf(cosine * cosine + sine * sine, 1e-6f);
+    section->c = flatness * (cosine * cosine - sine * sine) / square;
+    section->s = flatness * 2.0f * cosine * sine / square;
+}
+
 float fiber_section_ratio(const struct fiber_section *section)
 {
     return expf(2.0f * sqrtf(section->c * section->c + section->s * section->s));

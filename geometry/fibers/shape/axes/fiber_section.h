@@ -40,6 +40,10 @@ struct section_view fiber_section_view(const struct fiber_section *first, const 
                                        const float a[3], const float b[3]);
 /* offset: of a point from the axis, not zero. */
 struct section_place fiber_section_place(const struct section_view *w, float radius, const float offset[3]);
+/* Writes the ratio of axes and the long axis of a section of a fiber along the unit vector t, without errors. */
+void fiber_section_to_shape(const struct fiber_section *section, const float t[3], struct fiber_shape *shape);
+/* The inverse: sets c and s in the frame of the section, which is made perpendicular to t. */
+void fiber_section_take_shape(const struct fiber_shape *shape, const float t[3], struct fiber_section *section);
 /* Ratio of the axes. */
 float fiber_section_ratio(const struct fiber_section *section);
 

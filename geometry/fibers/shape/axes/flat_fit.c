@@ -213,6 +213,20 @@ static status measure_shapes(struct flat_work *w, const struct flat_fit *f, stru
     return s;
 }
 
+/* Leaves the sections in the lines. */
+static status keep_sections(const struct flat_work *w, struct error *err)
+{
+    struct polyline_set *lines = w->lines;
+    status s = polyline_shapes_init(lines, err);
+    for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++)
+        for (size_t i = lines->first[l]; i < lines->first[l + 1]; i++) {
+            float t[3];
+            polyline_tangent(lines, l, i, 1, t);
+            fiber_section_to_shape(&w->section[i], t, &lines->shape[i]);
+        }
+    return s;
+}
+
 status polylines_fit_flat(struct polyline_set *lines, const struct flat_fit *f, struct axis_profile *profile,
                           struct section_ratio *ratio, struct error *err)
 {
@@ -228,8 +242,9 @@ status polylines_fit_flat(struct polyline_set *lines, const struct flat_fit *f, 
     profile->section = NULL;
     profile->measure = NULL;
     if (s == STATUS_OK) measure_ratio(&w, ratio);
-    if (s == STATUS_OK && ratio->mean > (f->interpolated ? RATIO_FLAT_THIN : FIBER_RATIO_FLAT))
-        s = remove_parts(&w, f, profile, &ratio->n_removed, err);
+    const bool flat = ratio->mean > (f->interpolated ? RATIO_FLAT_THIN : FIBER_RATIO_FLAT);
+    if (s == STATUS_OK && flat) s = remove_parts(&w, f, profile, &ratio->n_removed, err);
+    if (s == STATUS_OK && flat && f->measure == NULL) s = keep_sections(&w, err);
     if (s == STATUS_OK && f->measure != NULL) s = measure_shapes(&w, f, profile, ratio->n_removed > 0, err);
     flat_work_release(&w);
     return s;

@@ -24,7 +24,9 @@ struct flat_fit {
     size_t min_vertex; /* shorter pieces that a removal leaves are dropped */
     struct thread_pool *pool;
     const struct progress *progress;
-    struct shape_measure *measure; /* NULL, or the sections with their errors are left in lines->shape */
+    /* NULL, or the sections with their errors are left in lines->shape. Without it that has the sections of flat fibers
+     * without errors, and is NULL where fibers are round. */
+    struct shape_measure *measure;
     /* The volume was interpolated because its fibers are thin. The wedges of void beside the contact of two such fibers
      * are nearly lost in the blur, so lines are removed only from cloths whose fibers are clearly flat. */
     bool interpolated;
