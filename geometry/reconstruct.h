@@ -72,6 +72,7 @@ struct reconstruct_report {
     double lumen_share;                       /* filled lumens over material; 0 if the fibers are solid */
     bool lumens_found;                        /* they were filled because the fibers look hollow */
     struct lumen_evidence lumen;              /* whether the fibers look hollow */
+    bool lumens_measured;                     /* each fiber has a lumen of its own with an error (fiber_shape.h) */
     double fiber_diameter_voxel;              /* given, or measured from the volume before the filter */
     /* The peak that the measured diameter was preferred to (fiber_diameter.h), and the shares of noise in both; NaN if
      * there is none, or the diameter was given. */

@@ -47,9 +47,10 @@ static status make_lines(struct trace_job *job, struct polyline_set *lines, stru
     trace_classify(lines);
     polylines_reach_faces(lines, job->v, job->o->eps_d, TRACE_END_DIAMETERS * job->diameter);
     if (lines->n_line == 0)
-        s = error_set_field(err, STATUS_INVALID, OPTION_SCAN_FILES,
-                            "cannot find fibers: none of the chains of centers has %zu vertices", job->o->min_vertex);
-    return s;
+        return error_set_field(err, STATUS_INVALID, OPTION_SCAN_FILES,
+                               "cannot find fibers: none of the chains of centers has %zu vertices",
+                               job->o->min_vertex);
+    return trace_lumens(job, lines, err);
 }
 
 /* Mean radius of the lines by length, voxels. */
@@ -76,6 +77,9 @@ static status find_radius(struct trace_job *job, struct polyline_set *lines, str
     status s = distance_histogram_measure(job->v, lines, job->o->eps_d, fmax(4.0, 1.25 * job->diameter), job->pool,
                                           &job->inner, part, err);
     if (s == STATUS_OK) s = radius_choose(part, job->o->radius_rule, &m, err);
+    /* the mass is that of filled lumens, whose walls are thin and not as dense as 1 */
+    if (s == STATUS_OK && report->lumens_measured && job->o->radius_rule == RADIUS_AUTO)
+        radius_measure_lines(lines, &m);
     if (s == STATUS_OK) {
         all = part + RADIUS_PARTS;
         distance_histogram_sum(part, RADIUS_PARTS, all);
@@ -138,6 +142,7 @@ status reconstruct_fibers(const struct volume *v, const struct direction_volume 
     polyline_set_init(&lines);
     fiber_set_init(f);
     for (int a = 0; a < 3; a++) report->n_short_dropped[a] = 0;
+    report->lumens_measured = false;
     if (!(job.diameter > 0.0))
         return error_set(err, STATUS_INVALID, "cannot trace fibers: the report has no fiber diameter");
     status s = make_lines(&job, &lines, err);

@@ -17,11 +17,11 @@ enum {
     HAIR_THICKNESS = 4,
     HAIR_TRANSPARENCY = 8,
     HAIR_COLOUR = 16,
-    HAIR_KNOWN = 31,
-    SECTION_BYTES = 28 /* of a point, after the arrays of the format */
+    HAIR_KNOWN = 31
 };
 
-static const char tile_key[] = "selvedge tile_mm=", group_key[] = " groups=rgb", section_key[] = " sections";
+static const char tile_key[] = "selvedge tile_mm=", group_key[] = " groups=rgb", section_key[] = " sections",
+                  lumen_key[] = " lumens";
 /* Points that are thinner, over the mean thickness of their fiber, count as this thick: rays need some thickness. */
 static const double LEAST_THICKNESS = 0.05;
 
@@ -79,7 +79,9 @@ static status count_strands(const struct fiber_set *f, const char *name, size_t 
     return STATUS_OK;
 }
 
-static void put_header(uint8_t *to, const struct fiber_set *f, size_t n_strand, size_t n_point, bool groups)
+/* numbers: of a section (fiber_shape.h), here and below; 0: there are none. */
+static void put_header(uint8_t *to, const struct fiber_set *f, size_t n_strand, size_t n_point, bool groups,
+                       int numbers)
 {
     memset(to, 0, HAIR_HEADER_BYTES);
     memcpy(to, "HAIR", 4);
@@ -90,7 +92,10 @@ static void put_header(uint8_t *to, const struct fiber_set *f, size_t n_strand, 
     for (size_t c = 0; c < 3; c++) put_f32(to + 28 + 4 * c, 1.0f);
     char text[HAIR_TEXT_BYTES];
     int n = snprintf(text, sizeof text, "%s%.17g,%.17g%s%s", tile_key, 1e3 * f->tile_size_m[0], 1e3 * f->tile_size_m[1],
-                     groups ? group_key : "", f->shape != NULL ? section_key : "");
+                     groups ? group_key : "",
+                     numbers == 0                     ? ""
+                     : numbers == FIBER_SHAPE_NUMBERS ? section_key
+                                                      : lumen_key);
     if (n > 0 && n < HAIR_TEXT_BYTES) memcpy(to + HAIR_TEXT_OFFSET, text, (size_t)n);
 }
 
@@ -98,15 +103,21 @@ static void put_header(uint8_t *to, const struct fiber_set *f, size_t n_strand, 
 static float group_channel(uint8_t group, size_t c) { return ((uint32_t)group >> c & 1u) != 0 ? 0.0f : 1.0f; }
 
 /* The numbers of a point that the format has no array for. */
-static void put_section(uint8_t *to, const struct fiber_shape *s)
+static void put_section(uint8_t *to, const struct fiber_shape *s, int numbers)
 {
-    const float value[7] = {1000.0f * s->radius_se, s->ratio,        s->ratio_se,    s->angle_se_rad,
-                            s->long_axis[0],        s->long_axis[1], s->long_axis[2]};
-    for (size_t i = 0; i < 7; i++) put_f32(to + 4 * i, value[i]);
+    float value[FIBER_SHAPE_WITH_LUMEN];
+    fiber_shape_numbers(s, value);
+    for (int i = 0; i < numbers; i++) put_f32(to + 4 * i, value[i]);
+}
+
+static int section_numbers(const struct fiber_set *f)
+{
+    return f->shape == NULL ? 0 : fiber_set_has_lumens(f) ? FIBER_SHAPE_WITH_LUMEN : FIBER_SHAPE_NUMBERS;
 }
 
 /* to: the arrays of the file, after the header. */
-static void put_strands(uint8_t *to, const struct fiber_set *f, size_t n_strand, size_t n_point, bool groups)
+static void put_strands(uint8_t *to, const struct fiber_set *f, size_t n_strand, size_t n_point, bool groups,
+                        int numbers)
 {
     uint8_t *segments = to, *points = segments + 2 * n_strand, *thickness = points + 12 * n_point;
     uint8_t *colour = thickness + 4 * n_point, *section = colour + (groups ? 12 * n_point : 0);
@@ -117,10 +128,8 @@ static void put_strands(uint8_t *to, const struct fiber_set *f, size_t n_strand,
             for (size_t k = from; k <= from + n; k++, points += 12, thickness += 4) {
                 for (size_t a = 0; a < 3; a++) put_f32(points + 4 * a, 1000.0f * f->position_m[3 * k + a]);
                 put_f32(thickness, 2000.0f * fiber_radius_m(f, i, k));
-                if (f->shape != NULL) {
-                    put_section(section, &f->shape[k]);
-                    section += SECTION_BYTES;
-                }
+                if (numbers > 0) put_section(section, &f->shape[k], numbers);
+                section += 4 * numbers;
                 for (size_t c = 0; groups && c < 3; c++, colour += 4) put_f32(colour, group_channel(f->group[i], c));
             }
             segments += 2;
@@ -135,12 +144,13 @@ status fiber_set_write_hair(const struct fiber_set *f, const char *path, struct 
     status s = count_strands(f, name, &n_strand, &n_point, err);
     if (s != STATUS_OK) return s;
     bool groups = fiber_set_n_group(f) > 1;
-    const size_t point_bytes = (groups ? 28u : 16u) + (f->shape != NULL ? SECTION_BYTES : 0u);
+    const int numbers = section_numbers(f);
+    const size_t point_bytes = (groups ? 28u : 16u) + 4u * (size_t)numbers;
     const size_t n_bytes = HAIR_HEADER_BYTES + 2 * n_strand + point_bytes * n_point;
     uint8_t *data = malloc(n_bytes);
     if (data == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write fibers '%s': out of memory", name);
-    put_header(data, f, n_strand, n_point, groups);
-    put_strands(data + HAIR_HEADER_BYTES, f, n_strand, n_point, groups);
+    put_header(data, f, n_strand, n_point, groups, numbers);
+    put_strands(data + HAIR_HEADER_BYTES, f, n_strand, n_point, groups, numbers);
     s = durable_replace(path, data, n_bytes, err);
     free(data);
     return s;
@@ -149,7 +159,7 @@ status fiber_set_write_hair(const struct fiber_set *f, const char *path, struct 
 struct hair_header {
     uint32_t n_strand, n_point, flags, default_segments;
     float default_thickness;
-    bool sections; /* they follow the arrays */
+    int numbers; /* of the section of each point, after the arrays */
 };
 
 /* Checks the counts of the header against the length of the file. *n_bytes: length that follows from the header (at
@@ -166,7 +176,7 @@ static status check_header(const struct hair_header *h, uint64_t file_bytes, con
     if (h->flags & HAIR_THICKNESS) want += 4 * (uint64_t)h->n_point;
     if (h->flags & HAIR_TRANSPARENCY) want += 4 * (uint64_t)h->n_point;
     if (h->flags & HAIR_COLOUR) want += 12 * (uint64_t)h->n_point;
-    if (h->sections) want += SECTION_BYTES * (uint64_t)h->n_point;
+    want += 4 * (uint64_t)h->numbers * (uint64_t)h->n_point;
     if (want != file_bytes)
         return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': it has %llu bytes, but its header requires %llu",
                          name, (unsigned long long)file_bytes, (unsigned long long)want);
@@ -235,14 +245,14 @@ static status get_varying_radii(struct fiber_set *f, const uint8_t *thickness, c
 }
 
 /* data: the sections of all points. */
-static status get_sections(struct fiber_set *f, const uint8_t *data, const char *name, struct error *err)
+static status get_sections(struct fiber_set *f, const uint8_t *data, int numbers, const char *name, struct error *err)
 {
     status s = fiber_set_add_shapes(f, err);
     for (size_t k = 0; k < f->n_vertex && s == STATUS_OK; k++) {
         struct fiber_shape *to = &f->shape[k];
-        float value[7];
-        for (size_t i = 0; i < 7; i++) value[i] = get_f32(data + SECTION_BYTES * k + 4 * i);
-        if (!fiber_shape_set(to, value))
+        float value[FIBER_SHAPE_WITH_LUMEN];
+        for (int i = 0; i < numbers; i++) value[i] = get_f32(data + 4 * ((size_t)numbers * k + (size_t)i));
+        if (!fiber_shape_set(to, value, numbers))
             s = error_set(err, STATUS_FORMAT, "cannot read fibers '%s': the numbers of point %zu are no section", name,
                           k);
     }
@@ -273,9 +283,9 @@ static status get_groups(struct fiber_set *f, const uint8_t *colour, const char 
     return STATUS_OK;
 }
 
-/* Reads the tile size from the text of the header; 0 if another program wrote the file. *groups, *sections: the text
- * says that the colours are groups, and that sections follow the arrays. */
-static void get_text(double tile_size_m[2], const uint8_t *header, bool *groups, bool *sections)
+/* Reads the tile size from the text of the header; 0 if another program wrote the file. *groups, *numbers: the text says
+ * that the colours are groups, and that sections of so many numbers follow the arrays. */
+static void get_text(double tile_size_m[2], const uint8_t *header, bool *groups, int *numbers)
 {
     char text[HAIR_TEXT_BYTES + 1];
     memcpy(text, header + HAIR_TEXT_OFFSET, HAIR_TEXT_BYTES);
@@ -283,7 +293,9 @@ static void get_text(double tile_size_m[2], const uint8_t *header, bool *groups,
     tile_size_m[0] = tile_size_m[1] = 0.0;
     const char *at = strstr(text, tile_key);
     *groups = at != NULL && strstr(at, group_key) != NULL;
-    *sections = at != NULL && strstr(at, section_key) != NULL;
+    *numbers = at != NULL && strstr(at, section_key) != NULL ? FIBER_SHAPE_NUMBERS
+               : at != NULL && strstr(at, lumen_key) != NULL ? FIBER_SHAPE_WITH_LUMEN
+                                                             : 0;
     if (at == NULL) return;
     char *end;
     double x = strtod(at + sizeof tile_key - 1, &end);
@@ -297,8 +309,8 @@ static void get_text(double tile_size_m[2], const uint8_t *header, bool *groups,
 static struct hair_header get_header(const uint8_t *data, double tile_size_m[2], bool *groups)
 {
     struct hair_header h = {get_u32(data + 4),  get_u32(data + 8),  get_u32(data + 12),
-                            get_u32(data + 16), get_f32(data + 20), false};
-    get_text(tile_size_m, data, groups, &h.sections);
+                            get_u32(data + 16), get_f32(data + 20), 0};
+    get_text(tile_size_m, data, groups, &h.numbers);
     return h;
 }
 
@@ -320,8 +332,8 @@ static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes,
     const uint8_t *points = at, *thickness = h.flags & HAIR_THICKNESS ? at + 12 * (size_t)h.n_point : NULL;
     s = get_strands(f, &h, segments, name, err);
     if (s == STATUS_OK) s = get_radii(f, &h, thickness, name, err);
-    if (s == STATUS_OK && h.sections)
-        s = get_sections(f, data + n_bytes - SECTION_BYTES * (size_t)h.n_point, name, err);
+    const size_t section_bytes = 4 * (size_t)h.numbers * (size_t)h.n_point;
+    if (s == STATUS_OK && h.numbers > 0) s = get_sections(f, data + n_bytes - section_bytes, h.numbers, name, err);
     if (s == STATUS_OK) s = get_varying_radii(f, thickness, name, err);
     if (s != STATUS_OK) return s;
     for (size_t k = 0; k < 3 * (size_t)h.n_point; k++) {
@@ -332,7 +344,7 @@ static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes,
     }
     memcpy(f->tile_size_m, tile_size_m, sizeof f->tile_size_m);
     fiber_set_classify(f);
-    const size_t after_colour = (12u + (h.sections ? SECTION_BYTES : 0u)) * (size_t)h.n_point;
+    const size_t after_colour = 12u * (size_t)h.n_point + section_bytes;
     return groups && (h.flags & HAIR_COLOUR) != 0 ? get_groups(f, data + n_bytes - after_colour, name, err) : STATUS_OK;
 }
 

@@ -79,19 +79,37 @@ status fiber_set_copy(const struct fiber_set *from, struct fiber_set *to, struct
     return STATUS_OK;
 }
 
-bool fiber_shape_set(struct fiber_shape *s, const float value[7])
+void fiber_shape_numbers(const struct fiber_shape *s, float value[FIBER_SHAPE_WITH_LUMEN])
+{
+    const float number[FIBER_SHAPE_WITH_LUMEN] = {1000.0f * s->radius_se, s->ratio,        s->ratio_se,
+                                                  s->angle_se_rad,        s->long_axis[0], s->long_axis[1],
+                                                  s->long_axis[2],        s->lumen,        s->lumen_se};
+    memcpy(value, number, sizeof number);
+}
+
+bool fiber_shape_set(struct fiber_shape *s, const float *value, int n)
 {
     const float *axis = value + 4, length = sqrtf(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
-    for (int i = 0; i < 7; i++)
-        if (!isfinite(value[i]) || (i < 4 && !(value[i] >= 0.0f))) return false;
+    for (int i = 0; i < n; i++)
+        if (!isfinite(value[i]) || ((i < 4 || i > 6) && !(value[i] >= 0.0f))) return false;
     if (!(value[1] >= 1.0f && value[1] <= FIBER_RATIO_MOST) || (length > 0.0f && !(fabsf(length - 1.0f) < 0.01f)))
         return false;
+    if (n == FIBER_SHAPE_WITH_LUMEN && value[7] > FIBER_LUMEN_MOST) return false;
     s->radius_se = 1e-3f * value[0];
     s->ratio = value[1];
     s->ratio_se = value[2];
     s->angle_se_rad = value[3];
     for (int a = 0; a < 3; a++) s->long_axis[a] = length > 0.0f ? axis[a] / length : 0.0f;
+    s->lumen = n == FIBER_SHAPE_WITH_LUMEN ? value[7] : 0.0f;
+    s->lumen_se = n == FIBER_SHAPE_WITH_LUMEN ? value[8] : 0.0f;
     return true;
+}
+
+bool fiber_set_has_lumens(const struct fiber_set *f)
+{
+    for (size_t k = 0; k < f->n_vertex && f->shape != NULL; k++)
+        if (f->shape[k].lumen > 0.0f || f->shape[k].lumen_se > 0.0f) return true;
+    return false;
 }
 
 static status validate_shape(const struct fiber_set *f, size_t i, struct error *err)

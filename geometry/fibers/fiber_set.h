@@ -47,6 +47,8 @@ status fiber_set_reserve(struct fiber_set *f, size_t n_fiber, size_t n_vertex, s
 status fiber_set_add_shapes(struct fiber_set *f, struct error *err);
 /* Multiplies the radius of a fiber, also along it. */
 void fiber_set_scale_radius(struct fiber_set *f, size_t i_fiber, double factor);
+/* Whether any vertex has a lumen, or was found to have none. */
+bool fiber_set_has_lumens(const struct fiber_set *f);
 /* Makes `to` (initialised) a copy. STATUS_NO_MEMORY. */
 status fiber_set_copy(const struct fiber_set *from, struct fiber_set *to, struct error *err);
 /* STATUS_INVALID, naming the fiber, for NaN, fewer than two vertices, radius <= 0, group >= FIBER_MAX_GROUP; also for
@@ -66,7 +68,7 @@ void fiber_set_classify(struct fiber_set *f);
  * without it the tile size is 0 after reading and the caller must set it. If a fiber has another group than 0, the text
  * goes on with " groups=rgb" and the colours of the points are the groups; colours without this text are ignored. If
  * the fibers have sections, the text ends with " sections", and seven numbers for each point follow the format's own
- * arrays. Reading sets axis classes from the directions, takes half the mean thickness of a fiber's points as its
+ * arrays; or with " lumens", and nine. Reading sets axis classes from the directions, takes half the mean thickness of a fiber's points as its
  * radius, and applies default segments and thickness of files of other programs; where the thickness varies along a
  * fiber, so does its radius, and points thinner than a twentieth of the mean get that. It checks the header against
  * the length of the file before it allocates. It replaces the content of f, or leaves f unchanged on failure. A fiber
@@ -78,7 +80,7 @@ status fiber_set_write_hair(const struct fiber_set *f, const char *path, struct 
 status fiber_set_read_hair(struct fiber_set *f, const char *path, struct error *err);
 /* Text: a line "x y z radius" in millimetres for each vertex, and a blank line between fibers. If a fiber has another
  * group than 0, every line is "x y z radius group"; when read, all lines of a fiber must agree. If the fibers have
- * sections, seven numbers follow the group, also where it is 0 (docs/file-formats.md). The format has no tile size:
+ * sections, seven numbers follow the group, or nine with lumens, also where it is 0 (docs/file-formats.md). The format has no tile size:
  * reading sets it to 0 and the caller must set it. The radius of a fiber is the mean of its lines, and varies along it
  * as they do. STATUS_FORMAT names the line; else as above. */
 status fiber_set_write_text(const struct fiber_set *f, const char *path, struct error *err);

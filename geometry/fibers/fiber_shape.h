@@ -11,6 +11,7 @@ struct fiber_shape {
     float ratio, ratio_se;   /* long over short axis of the section, at least 1 */
     float long_axis[3];      /* unit vector across the fiber; zero where the section was not measured */
     float angle_se_rad;      /* of the turn of the long axis about the fiber */
+    float lumen, lumen_se;   /* width of the lumen over that of the outline; with an error of 0: not measured */
 };
 
 /* Largest ratio of axes that files may state; that of the fit is 4. */
@@ -23,9 +24,15 @@ static inline struct fiber_shape fiber_shape_disc(float radius)
 {
     return (struct fiber_shape){.radius = radius, .ratio = 1.0f};
 }
-/* Sets everything but the radius from the numbers of a file: radius_se in millimetres, ratio, ratio_se, angle_se_rad
- * and long_axis, which is made a unit vector. Returns false for numbers that no section has. */
-bool fiber_shape_set(struct fiber_shape *s, const float value[7]);
+/* Numbers of a section in files, beside the radius: radius_se in millimetres, ratio, ratio_se, angle_se_rad, long_axis,
+ * and where lumens were measured, lumen and lumen_se. */
+enum { FIBER_SHAPE_NUMBERS = 7, FIBER_SHAPE_WITH_LUMEN = 9 };
+/* Widest lumen that files may state; that of the fit is 0.9. */
+#define FIBER_LUMEN_MOST 0.99f
+void fiber_shape_numbers(const struct fiber_shape *s, float value[FIBER_SHAPE_WITH_LUMEN]);
+/* Sets everything but the radius from n of these numbers. long_axis is made a unit vector. Returns false for numbers
+ * that no section has. */
+bool fiber_shape_set(struct fiber_shape *s, const float *value, int n);
 /* Whether the section was measured. */
 static inline bool fiber_shape_has_section(const struct fiber_shape *s)
 {

@@ -9,11 +9,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void write_section(FILE *out, const struct fiber_shape *s)
+static void write_section(FILE *out, const struct fiber_shape *s, bool lumens)
 {
     fprintf(out, " %.4g %.6g %.4g %.4g %.6g %.6g %.6g", 1e3 * (double)s->radius_se, (double)s->ratio,
             (double)s->ratio_se, (double)s->angle_se_rad, (double)s->long_axis[0], (double)s->long_axis[1],
             (double)s->long_axis[2]);
+    if (lumens) fprintf(out, " %.4g %.4g", (double)s->lumen, (double)s->lumen_se);
 }
 
 status fiber_set_write_text(const struct fiber_set *f, const char *path, struct error *err)
@@ -23,7 +24,7 @@ status fiber_set_write_text(const struct fiber_set *f, const char *path, struct 
     FILE *out = open_memstream(&text, &n_bytes);
     const char *name = path_file_name(path);
     if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write fibers '%s': out of memory", name);
-    bool groups = fiber_set_n_group(f) > 1;
+    const bool groups = fiber_set_n_group(f) > 1, lumens = fiber_set_has_lumens(f);
     for (size_t i = 0; i < f->n_fiber; i++) {
         if (i > 0) fputc('\n', out);
         for (size_t k = f->first_vertex[i]; k < f->first_vertex[i + 1]; k++) {
@@ -31,7 +32,7 @@ status fiber_set_write_text(const struct fiber_set *f, const char *path, struct 
             fprintf(out, "%.9g %.9g %.9g %.9g", 1e3 * (double)p[0], 1e3 * (double)p[1], 1e3 * (double)p[2],
                     1e3 * (double)fiber_radius_m(f, i, k));
             if (groups || f->shape != NULL) fprintf(out, " %u", (unsigned)f->group[i]);
-            if (f->shape != NULL) write_section(out, &f->shape[k]);
+            if (f->shape != NULL) write_section(out, &f->shape[k], lumens);
             fputc('\n', out);
         }
     }
@@ -99,14 +100,16 @@ struct text_point {
 
 static bool parse_section(const char *line, struct text_point *p)
 {
-    float value[7];
-    char *end;
-    for (int i = 0; i < 7; i++) {
-        value[i] = strtof(line, &end);
+    float value[FIBER_SHAPE_WITH_LUMEN];
+    int n = 0;
+    while (n < FIBER_SHAPE_WITH_LUMEN && !is_end(line)) {
+        char *end;
+        value[n++] = strtof(line, &end);
         if (end == line) return false;
         line = end;
     }
-    p->has_section = fiber_shape_set(&p->shape, value);
+    if (n != FIBER_SHAPE_NUMBERS && n != FIBER_SHAPE_WITH_LUMEN) return false;
+    p->has_section = fiber_shape_set(&p->shape, value, n);
     return p->has_section && is_end(line);
 }
 
@@ -140,7 +143,7 @@ static status wrong_line(const char *name, size_t i_line, bool other_group, stru
     return error_set(
         err, STATUS_FORMAT,
         "cannot read fibers '%s': line %zu is not \"x y z radius\" or \"x y z radius group\" with a group of "
-        "0 to %d, alone or with the seven numbers of a section",
+        "0 to %d, alone or with the seven or nine numbers of a section",
         name, i_line, FIBER_MAX_GROUP - 1);
 }
 

@@ -10,7 +10,7 @@ static const double NORMAL_MEDIAN = 0.6745;
 
 /* One vertex: errors, NaN where there are none, and standard errors, 0 where they are not known. */
 struct vertex_error {
-    float radius, radius_se, ratio, ratio_se, turn, turn_se;
+    float radius, radius_se, ratio, ratio_se, turn, turn_se, lumen, lumen_se;
 };
 
 struct errors {
@@ -39,7 +39,9 @@ static struct vertex_error error_of(const struct fiber_shape *truth, const struc
                              .ratio = found->ratio / truth->ratio - 1.0f,
                              .ratio_se = found->ratio_se / truth->ratio,
                              .turn = NAN,
-                             .turn_se = found->angle_se_rad};
+                             .turn_se = found->angle_se_rad,
+                             .lumen = found->lumen_se > 0.0f ? found->lumen - truth->lumen : NAN,
+                             .lumen_se = found->lumen_se};
     if (!((double)truth->ratio > FLAT_TRUTH) || !fiber_shape_has_section(found)) return e;
     float cosine = 0.0f;
     for (int a = 0; a < 3; a++) cosine += truth->long_axis[a] * found->long_axis[a];
@@ -75,11 +77,16 @@ static double median(struct errors *e, size_t offset, const size_t *se_offset, f
 static void sum_up(struct errors *e, double mean_radius2, struct section_compare *out)
 {
     double radius = 0.0, radius2 = 0.0, ratio = 0.0, ratio2 = 0.0, n = (double)e->n;
+    double lumen = 0.0, lumen2 = 0.0, n_lumen = 0.0;
     for (size_t i = 0; i < e->n; i++) {
         radius += (double)e->item[i].radius / n;
         radius2 += (double)e->item[i].radius * (double)e->item[i].radius / n;
         ratio += (double)e->item[i].ratio / n;
         ratio2 += (double)e->item[i].ratio * (double)e->item[i].ratio / n;
+        if (!isfinite(e->item[i].lumen)) continue;
+        lumen += (double)e->item[i].lumen;
+        lumen2 += (double)e->item[i].lumen * (double)e->item[i].lumen;
+        n_lumen += 1.0;
     }
     *out = (struct section_compare){.n = e->n,
                                     .radius_rms = e->n > 0 ? sqrt(radius2) : NAN,
@@ -91,7 +98,11 @@ static void sum_up(struct errors *e, double mean_radius2, struct section_compare
                                     .ratio_median = MEDIAN(e, ratio, 0.0f),
                                     .ratio_pull = PULL(e, ratio, 0.0f),
                                     .turn_median_deg = angle_to_deg(MEDIAN(e, turn, 0.0f)),
-                                    .turn_pull = PULL(e, turn, 0.0f)};
+                                    .turn_pull = PULL(e, turn, 0.0f),
+                                    .lumen_rms = n_lumen > 0.0 ? sqrt(lumen2 / n_lumen) : NAN,
+                                    .lumen_bias = n_lumen > 0.0 ? lumen / n_lumen : NAN,
+                                    .lumen_pull = PULL(e, lumen, 0.0f),
+                                    .lumen_share = e->n > 0 ? n_lumen / n : NAN};
 }
 
 status compare_sections(const struct fiber_set *truth, const struct fiber_set *found, struct section_compare *out,

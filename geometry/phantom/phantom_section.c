@@ -16,11 +16,9 @@ status phantom_section_check(const struct phantom_section_law *law, struct error
     const struct {
         const char *field;
         double value, lower, upper;
-    } range[] = {{"lumen", law->lumen, 0.0, 0.8},
-                 {"aspect", law->aspect, 0.0, 4.0},
-                 {"bean", law->bean, 0.0, 0.5},
-                 {"turns_per_m", law->turns_per_m, 0.0, 1e5},
-                 {"taper", law->taper, 0.0, 0.5}};
+    } range[] = {{"lumen", law->lumen, 0.0, 0.8}, {"aspect", law->aspect, 0.0, 4.0},
+                 {"bean", law->bean, 0.0, 0.5},   {"turns_per_m", law->turns_per_m, 0.0, 1e5},
+                 {"taper", law->taper, 0.0, 0.5}, {"lumen_spread", law->lumen_spread, 0.0, 1.0}};
     for (size_t i = 0; i < sizeof range / sizeof *range; i++)
         if (!(range[i].value >= range[i].lower && range[i].value <= range[i].upper))
             return error_set_field(err, STATUS_INVALID, range[i].field,
@@ -35,7 +33,8 @@ struct phantom_section phantom_section_of(const struct phantom_section_law *law,
     struct rng rng;
     rng_start(&rng, &key, (uint32_t)i_fiber, 0);
     double stretch = rng_double(&rng), angle_rad = M_PI * rng_double(&rng), side = rng_double(&rng) < 0.5 ? -1.0 : 1.0;
-    return (struct phantom_section){.lumen = law->lumen,
+    const double narrower = law->lumen_spread * rng_double(&rng);
+    return (struct phantom_section){.lumen = law->lumen * (1.0 - narrower),
                                     .aspect = 1.0 + stretch * fmax(0.0, law->aspect - 1.0),
                                     .bean = law->bean,
                                     .angle_rad = angle_rad,
@@ -94,6 +93,7 @@ static void shape_fiber(const struct phantom_section_law *law, struct fiber_set 
         struct fiber_shape *s = &f->shape[k];
         s->radius = (float)(r * (1.0 - 0.5 * law->taper * (1.0 - cos(2.0 * M_PI * turns + phase))));
         s->ratio = (float)section.aspect;
+        s->lumen = (float)section.lumen;
         for (int a = 0; a < 3 && section.aspect > 1.0; a++)
             s->long_axis[a] = (float)(cos(angle) * across[0][a] + sin(angle) * across[1][a]);
         along_m += length_m;
@@ -104,7 +104,7 @@ static void shape_fiber(const struct phantom_section_law *law, struct fiber_set 
 
 status phantom_section_shapes(const struct phantom_section_law *law, struct fiber_set *f, struct error *err)
 {
-    if (law->aspect <= 1.0 && law->taper <= 0.0) return STATUS_OK;
+    if (law->aspect <= 1.0 && law->taper <= 0.0 && law->lumen <= 0.0) return STATUS_OK;
     status s = fiber_set_add_shapes(f, err);
     for (size_t i = 0; i < f->n_fiber && s == STATUS_OK; i++) shape_fiber(law, f, i);
     return s;

@@ -24,6 +24,8 @@ struct phantom_section_law {
     double bean;   /* bend of the long axis, 0 .. 0.5 */
     double turns_per_m; /* by which the section turns along its fiber, either way */
     double taper;       /* share by which the radius falls along a fiber, 0 .. 0.5 */
+    /* Each fiber has its own lumen, even between (1 - lumen_spread) lumen and lumen; 0 .. 1. */
+    double lumen_spread;
 };
 
 /* The section of one fiber. */
@@ -36,9 +38,10 @@ struct phantom_section {
 
 /* Whether all sections are full discs, of any radius. */
 bool phantom_section_is_disc(const struct phantom_section_law *law);
-/* STATUS_INVALID, with err->field "lumen", "aspect", "bean", "turns_per_m" or "taper". */
+/* STATUS_INVALID, with err->field "lumen", "aspect", "bean", "turns_per_m", "taper" or
+ * "lumen_spread". */
 status phantom_section_check(const struct phantom_section_law *law, struct error *err);
-/* Writes the sections and radii along the fibers into the set, if any differ from discs of one radius.
+/* Writes the sections, lumens and radii along the fibers into the set, if any differ from full discs of one radius.
  * STATUS_NO_MEMORY. */
 status phantom_section_shapes(const struct phantom_section_law *law, struct fiber_set *f, struct error *err);
 /* Frame of the section's angle for a fiber of a class along the unit vector t: the direction of angle 0, and the

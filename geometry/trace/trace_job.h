@@ -34,6 +34,8 @@ struct trace_job {
 void trace_enter_part(struct trace_job *job, double from, double to);
 /* A profile to start a fit from. */
 struct axis_profile trace_start_profile(const struct trace_job *job);
+/* Writes what a fit found for all fibers into the report. */
+void trace_state_profile(const struct trace_job *job, const struct axis_profile *profile);
 /* Sets the class of each line: the axis along which it extends most. */
 void trace_classify(struct polyline_set *lines);
 /* Finds chains of fiber centers in slices of nine directions. Counts them in the report. */
@@ -53,5 +55,8 @@ status trace_leftover(struct trace_job *job, struct polyline_set *lines, struct 
 /* Finds lines and repairs them, until only the last fit is left, which trace_finish makes: it drops what deviates. */
 status trace_lines(struct trace_job *job, struct polyline_set *lines, struct error *err);
 status trace_finish(struct trace_job *job, struct polyline_set *lines, struct error *err);
+/* Where lumens were filled, fits the finished lines once more to the scan as it was, with a lumen for each
+ * (hollow_fit.h); not where fibers are so thin that they were traced in an interpolated volume. */
+status trace_lumens(struct trace_job *job, struct polyline_set *lines, struct error *err);
 
 #endif

@@ -52,7 +52,6 @@ static status fit_axes(struct trace_job *job, struct polyline_set *lines, bool l
     struct axis_profile profile = trace_start_profile(job);
     profile.measured_curvature = last;
     if (last) profile.independent = job->independent;
-    const double voxel_m = job->v->voxel_size_m[0];
     struct section_ratio ratio;
     struct polyline_set even, inside;
     polyline_set_init(&even);
@@ -71,14 +70,9 @@ static status fit_axes(struct trace_job *job, struct polyline_set *lines, bool l
     if (s == STATUS_OK)
         s = polylines_keep_inside(&even, job->v->n, job->o->min_vertex, &inside, job->report->n_short_dropped, err);
     if (s == STATUS_OK) {
-        job->report->axis_position_se_m = profile.position_se * voxel_m;
-        job->report->axis_direction_se_rad = profile.direction_se_rad;
-        job->report->profile_radius_m = profile.radius * voxel_m;
-        job->report->profile_blur_m = profile.blur * voxel_m;
-        job->report->radius_spread = profile.radius_spread;
+        trace_state_profile(job, &profile);
         job->report->axis_ratio = ratio.mean;
         job->report->axis_ratio_spread = ratio.sd;
-        job->report->single_radius_se_m = profile.radius_se * profile.radius * voxel_m;
         polyline_set_release(lines);
         *lines = inside;
         polyline_set_init(&inside);

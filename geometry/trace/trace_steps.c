@@ -114,6 +114,18 @@ struct axis_profile trace_start_profile(const struct trace_job *job)
         .radius = 0.5 * job->diameter, .radius_spread = 0.3, .blur = 0.8, .high = 1.0, .independent = 1.0};
 }
 
+void trace_state_profile(const struct trace_job *job, const struct axis_profile *profile)
+{
+    struct reconstruct_report *r = job->report;
+    const double voxel_m = job->v->voxel_size_m[0];
+    r->axis_position_se_m = profile->position_se * voxel_m;
+    r->axis_direction_se_rad = profile->direction_se_rad;
+    r->profile_radius_m = profile->radius * voxel_m;
+    r->profile_blur_m = profile->blur * voxel_m;
+    r->radius_spread = profile->radius_spread;
+    r->single_radius_se_m = profile->radius_se * profile->radius * voxel_m;
+}
+
 status trace_center(struct trace_job *job, struct polyline_set *lines, struct error *err)
 {
     return polylines_fit(lines, job->v, job->diameter, N_CENTER, &job->profile, job->pool, &job->inner, err);

@@ -39,7 +39,21 @@ void volume_release(struct volume *v)
 {
     if (v == NULL) return;
     scratch_release(v->space, v->density);
+    scratch_release(v->space, v->filled.voxel);
+    scratch_release(v->space, v->filled.density);
     *v = (struct volume){0};
+}
+
+status volume_copy_unfilled(const struct volume *v, struct volume *to, struct error *err)
+{
+    const size_t n_slice = v->n[0] * v->n[1];
+    status s = volume_init_in(to, v->n, v->voxel_size_m, v->space, err);
+    for (size_t k = 0; k < v->n[2] && s == STATUS_OK; k++) {
+        memcpy(to->density + k * n_slice, v->density + k * n_slice, n_slice * sizeof *v->density);
+        scratch_keep_within(v->space);
+    }
+    for (size_t i = 0; i < v->filled.n && s == STATUS_OK; i++) to->density[v->filled.voxel[i]] = v->filled.density[i];
+    return s;
 }
 
 status direction_volume_init_in(struct direction_volume *v, const size_t n[3], const double voxel_size_m[3],

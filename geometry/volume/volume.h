@@ -13,10 +13,17 @@
 
 #include <stdint.h>
 
+/* Voxels whose density was replaced by 1 because they lie in lumens (lumen_fill.h), by index, with what they had. */
+struct volume_filled {
+    size_t n, *voxel;
+    float *density;
+};
+
 struct volume {
     size_t n[3];
     double voxel_size_m[3];
     float *density;              /* n[0]*n[1]*n[2]; in [0, 1] after density_map_apply, raw scanner values before */
+    struct volume_filled filled; /* from the same space */
     struct scratch_space *space; /* not owned */
 };
 
@@ -25,6 +32,8 @@ status volume_init(struct volume *v, const size_t n[3], const double voxel_size_
 status volume_init_in(struct volume *v, const size_t n[3], const double voxel_size_m[3], struct scratch_space *space,
                       struct error *err);
 void volume_release(struct volume *v);
+/* Makes a copy (uninitialised `to`) with the densities that filled voxels had. STATUS_NO_MEMORY, STATUS_DISK_FULL. */
+status volume_copy_unfilled(const struct volume *v, struct volume *to, struct error *err);
 
 static inline size_t volume_n_voxel(const size_t n[3]) { return n[0] * n[1] * n[2]; }
 static inline size_t volume_index(const size_t n[3], size_t i, size_t j, size_t k) { return (k * n[1] + j) * n[0] + i; }

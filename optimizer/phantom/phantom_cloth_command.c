@@ -51,6 +51,7 @@ static const char usage_scan[] =
     "fibers that are not alike, and not discs (truth-sections.csv lists radius and section of each)\n"
     "  --diameter-spread S     standard deviation of the diameters over their mean, 0 .. 0.3              [0]\n"
     "  --lumen L               hollow: width of the lumen over that of the fiber, 0 .. 0.8                [0]\n"
+    "  --lumen-spread S        lumens of single fibers, even between (1 - S) L and L, 0 .. 1             [0]\n"
     "  --aspect A              flat: each fiber has its own ratio of axes between 1 and A, 1 .. 4         [1]\n"
     "  --bean B                bend of the long axis of a section, 0 .. 0.5                               [0]\n"
     "  --taper T               share by which the radius falls along a fiber and rises again, 0 to 0.5     [0]\n"
@@ -174,6 +175,7 @@ static status parse_cloth(struct cloth *c, int argc, char **argv, struct error *
         {.name = "felt-thickness-um", .kind = OPTION_NUMBER, .to = &in.felt_um[1]},
         {.name = "diameter-spread", .kind = OPTION_NUMBER, .to = &c->phantom.radius_spread},
         {.name = "lumen", .kind = OPTION_NUMBER, .to = &c->phantom.section.lumen},
+        {.name = "lumen-spread", .kind = OPTION_NUMBER, .to = &c->phantom.section.lumen_spread},
         {.name = "aspect", .kind = OPTION_NUMBER, .to = &c->phantom.section.aspect},
         {.name = "bean", .kind = OPTION_NUMBER, .to = &c->phantom.section.bean},
         {.name = "taper", .kind = OPTION_NUMBER, .to = &c->phantom.section.taper},

@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-service bench-scale bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-transport bench-models bench-recovery bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics docs-ground docs-seam bench-browser bench-pictures bench-weave bench-weave-rendered
+.PHONY: bench bench-service bench-scale bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics docs-ground docs-seam bench-browser bench-pictures bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -33,6 +33,10 @@ bench-geometry: | deps-test ## accuracy of reconstructed fibers on phantoms and 
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %/bench_geometry %/bench_geometry_size,$(BENCH_BINS)) >&2
 	@$(BUILD)/tests/bench/bench_geometry $(if $(WEAVES),--weaves $(WEAVES)) $(if $(CONDITIONS),--conditions $(CONDITIONS))
 	@$(if $(WEAVES)$(CONDITIONS),,$(BUILD)/tests/bench/bench_geometry_size)
+
+bench-geometry-bars: | deps-test ## the figures of flat and of thin fibers that must not fall, in three of the scans of bench-geometry
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_geometry >&2
+	@$(BUILD)/tests/bench/bench_geometry --bars 1
 
 # FIT: some of the figures only, such as FIT="gabardine seeds"
 bench-fit: | deps-test ## recovery of known parameters, errors, seeds, grazing highlights, real tables (1 h 45 min on 2 quiet cores; photographs are kept in build)

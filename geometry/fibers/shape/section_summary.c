@@ -76,7 +76,7 @@ static bool varies(const struct fiber_set *f, size_t i, double *variation)
 }
 
 struct lists {
-    struct list ratio, ratio_se, angle_se, radius_se;
+    struct list ratio, ratio_se, angle_se, radius_se, lumen, lumen_se;
 };
 
 static void add_fiber(const struct fiber_set *f, size_t i, struct section_summary *out, struct lists *l, double *all)
@@ -90,6 +90,10 @@ static void add_fiber(const struct fiber_set *f, size_t i, struct section_summar
         const double length = length_at(f, i, k);
         *all += length;
         if (varying && s->radius_se > 0.0f) add(&l->radius_se, (double)(s->radius_se / s->radius), length);
+        if (s->lumen_se > 0.0f) {
+            add(&l->lumen, (double)s->lumen, length);
+            add(&l->lumen_se, (double)s->lumen_se, length);
+        }
         if (!fiber_shape_has_section(s)) continue;
         const double bin = SECTION_N_BIN * ((double)s->ratio - RATIO_FIRST) / (RATIO_LAST - RATIO_FIRST);
         const size_t b = bin < SECTION_N_BIN ? (size_t)bin : SECTION_N_BIN - 1;
@@ -113,25 +117,31 @@ static void finish(struct section_summary *out, struct lists *l, double all)
     out->angle_se_median_rad = sorted_quantile(&l->angle_se, 0.5);
     out->flat_share = measured > 0.0 ? out->flat_share / measured : NAN;
     for (int b = 0; b < SECTION_N_BIN; b++) out->bin_share[b] = measured > 0.0 ? out->bin_share[b] / measured : 0.0;
+    out->lumen_share = all > 0.0 ? l->lumen.length / all : 0.0;
+    out->lumen_p10 = sorted_quantile(&l->lumen, 0.1);
+    out->lumen_median = quantile(&l->lumen, 0.5);
+    out->lumen_p90 = quantile(&l->lumen, 0.9);
+    out->lumen_se_median = sorted_quantile(&l->lumen_se, 0.5);
     out->variation = out->n_varying > 0 ? out->variation / (double)out->n_varying : NAN;
     out->variation_se_median = sorted_quantile(&l->radius_se, 0.5);
 }
 
 status section_summary_make(const struct fiber_set *f, struct section_summary *out, struct error *err)
 {
-    struct lists l = {{0}, {0}, {0}, {0}};
-    struct list *const list[4] = {&l.ratio, &l.ratio_se, &l.angle_se, &l.radius_se};
+    struct lists l = {{0}};
+    struct list *const list[] = {&l.ratio, &l.ratio_se, &l.angle_se, &l.radius_se, &l.lumen, &l.lumen_se};
+    enum { N_LIST = sizeof list / sizeof *list };
     double all = 0.0;
     bool failed = false;
     *out = (struct section_summary){0};
     for (int b = 0; b <= SECTION_N_BIN; b++)
         out->bin_edge[b] = RATIO_FIRST + (RATIO_LAST - RATIO_FIRST) * b / SECTION_N_BIN;
-    for (int k = 0; k < 4; k++) {
+    for (int k = 0; k < N_LIST; k++) {
         list[k]->item = malloc((f->n_vertex + 1) * sizeof *list[k]->item);
         failed = failed || list[k]->item == NULL;
     }
     for (size_t i = 0; i < f->n_fiber && f->shape != NULL && !failed; i++) add_fiber(f, i, out, &l, &all);
     if (!failed) finish(out, &l, all);
-    for (int k = 0; k < 4; k++) free(list[k]->item);
+    for (int k = 0; k < N_LIST; k++) free(list[k]->item);
     return failed ? error_set(err, STATUS_NO_MEMORY, "cannot summarize sections of fibers: out of memory") : STATUS_OK;
 }

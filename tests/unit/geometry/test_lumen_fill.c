@@ -82,6 +82,11 @@ static void test_lumens_are_filled(void **state)
         if (hypot((double)(at / 72 % 72) - 36.0, (double)(at / (72 * 72)) - 36.0) > 24.0)
             assert_true(v.density[at] == before.density[at]);
     }
+    struct volume unfilled; /* what was filled is not lost */
+    assert_true(v.filled.n > 0);
+    assert_int_equal(volume_copy_unfilled(&v, &unfilled, NULL), STATUS_OK);
+    assert_memory_equal(unfilled.density, before.density, volume_n_voxel(n_voxel) * sizeof *v.density);
+    volume_release(&unfilled);
     volume_release(&v);
     volume_release(&before);
 }

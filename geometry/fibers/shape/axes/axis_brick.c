@@ -1,4 +1,5 @@
 #include "geometry/fibers/shape/axes/axis_brick.h"
+#include "geometry/fibers/shape/axes/axis_compare.h"
 
 #include "base/lanes.h"
 
@@ -7,7 +8,6 @@
 #include <string.h>
 
 enum { BRICK = AXIS_BRICK, SHIFT = 5, BOUND = BRICK - 1 };
-static const float OUTLIER = 0.6f;  /* difference of densities beyond which a residual comes from another fiber */
 static const float ON_AXIS = 1e-3f; /* distance below which a voxel has no direction from the axis */
 
 void axis_scratch_init(struct axis_scratch *s)
@@ -22,12 +22,15 @@ void axis_scratch_release(struct axis_scratch *s) { axis_claims_release(&s->clai
 struct axis_view {
     float a[3], u[3], inverse_length2, radius; /* a: begin from the centre of the brick's first voxel; u: to its end */
     const struct section_view *section;        /* NULL: a disc */
+    const struct lumen_view *lumen;            /* NULL: solid */
 };
 
 static struct axis_view view_of(const struct axis_model *m, uint32_t i_segment, const size_t from[3])
 {
     const struct segment *g = &m->bricks->segment[i_segment];
-    struct axis_view w = {.radius = g->radius, .section = m->section != NULL ? &m->section[i_segment] : NULL};
+    struct axis_view w = {.radius = g->radius,
+                          .section = m->section != NULL ? &m->section[i_segment] : NULL,
+                          .lumen = m->lumen != NULL ? &m->lumen[i_segment] : NULL};
     float length2 = 0.0f;
     for (int a = 0; a < 3; a++) {
         w.a[a] = (g->a[a] - (float)from[a]) - 0.5f;
@@ -43,6 +46,7 @@ struct axis_places {
     const uint16_t *cell;
     size_t n;
     lanes along, distance, depth, normal[3], by_radius, by_c, by_s;
+    lanes x, y, curvature; /* with sections: in the frame of the section, and of its outline on the ray */
 };
 
 /* The places in a section that is not a disc (fiber_section_place). offset: from the axis. */
@@ -60,6 +64,10 @@ static void place_in_section(const struct section_view *s, float radius, const l
     p->by_c = (y * h - x * g) * outline;
     p->by_s = -(y * g + x * h) * outline;
     for (int a = 0; a < 3; a++) p->normal[a] = (g * s->u[a] + h * s->v[a]) * inverse;
+    const lanes flat = share * inverse;
+    p->curvature = radius * radius * flat * flat * flat;
+    p->x = x;
+    p->y = y;
 }
 
 /* Finds the places of the first n of LANES voxels of a segment. */
@@ -112,6 +120,28 @@ static lanes place_in_table(const struct axis_table *t, lanes depth)
     return lanes_choose(at > zero, at, zero);
 }
 
+/* Depths in units of the blur. The blurred edge of a round fiber has half of the density inside of its outline, by half
+ * the squared blur times the curvature, which would pass for a lumen. *bend: the change of depth by that, or 0. */
+static lanes depth_in_blur(const struct axis_model *m, const struct axis_view *w, const struct axis_places *p,
+                           lanes *bend)
+{
+    const lanes zero = {0.0f};
+    *bend = zero;
+    if (w->lumen != NULL) *bend = p->curvature * (0.5f / m->inverse_blur);
+    return p->depth * m->inverse_blur + *bend;
+}
+
+/* Subtracts the lumen from the share in LANES voxels and from its derivatives. */
+static void subtract_lumen(const struct axis_model *m, struct axis_scratch *s, const struct axis_view *w,
+                           const struct axis_places *p, lanes add[4])
+{
+    const struct lumen_lanes q = lumen_lanes_at(w->lumen, m->lumen_table, p->x, p->y);
+    add[0] -= q.share;
+    add[1] -= q.by_radius;
+    add[2] -= q.by_blur;
+    for (size_t l = 0; l < p->n; l++) s->lumen[p->cell[l]] -= q.by_area[l];
+}
+
 /* Adds the claims of a segment to the model. */
 static void add_to_model(const struct axis_model *m, struct axis_scratch *s, const struct axis_view *w, size_t from,
                          size_t to)
@@ -119,80 +149,19 @@ static void add_to_model(const struct axis_model *m, struct axis_scratch *s, con
     for (size_t i = from; i < to; i += LANES) {
         struct axis_places p;
         find_places(w, s->claims.cell + i, to - i, &p);
-        const lanes depth = p.depth * m->inverse_blur, at = place_in_table(&m->table, depth);
-        lanes share, slope;
+        lanes share, slope, bend;
+        const lanes depth = depth_in_blur(m, w, &p, &bend), at = place_in_table(&m->table, depth);
         look_up(&m->table, at, &share, &slope);
         slope *= m->inverse_blur;
-        const lanes zero = {0.0f}, add[4] = {share, slope * p.by_radius, -(slope * depth), zero};
+        const lanes zero = {0.0f};
+        lanes add[4] = {share, slope * p.by_radius, -(slope * depth), zero};
+        if (w->lumen != NULL) {
+            add[2] += 2.0f * slope * bend;
+            subtract_lumen(m, s, w, &p, add);
+        }
         lane_row row[LANES];
         lanes_to_rows(add, row);
         for (size_t l = 0; l < p.n; l++) s->model[p.cell[l]] += row[l];
-    }
-}
-
-/* Sums of shared_sum for one plane of the brick. */
-struct plane_sum {
-    lanes gradient[4], normal[10], square, weight, slope;
-};
-
-/* Finds residual and weight of LANES voxels, of which n are in the brick, and adds those with fibers to the sums. */
-static void compare_lanes(const struct axis_model *m, struct axis_scratch *s, size_t at, const float *density, size_t n,
-                          struct plane_sum *sum)
-{
-    static const lanes step = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
-    const float low = (float)m->profile.low, amplitude = (float)(m->profile.high - m->profile.low);
-    lanes value = {0.0f}, zero = {0.0f}, one = zero + 1.0f, of[4];
-    lanes_of_rows(s->model + at, of);
-    const lane_mask near = (of[0] > zero) & (step < (float)n);
-    if (n >= LANES)
-        value = *(const lanes *)density;
-    else
-        memcpy(&value, density, n * sizeof *density);
-    const lanes share = lanes_choose(of[0] < one, of[0], one), e = value - low - amplitude * share,
-                q = one / (one + e * e / (OUTLIER * OUTLIER));
-    const lanes weight = lanes_choose(near, q * q, zero), weighted = weight * e;
-    *(lanes *)(s->weight + at) = weight;
-    const lanes by[4] = {amplitude * of[1], amplitude * of[2], one - share, share};
-    of[0] = share;
-    of[3] = weighted;
-    lanes_to_rows(of, s->model + at);
-    sum->square += weighted * e;
-    sum->weight += weight;
-    sum->slope += weight * (4.0f * q - 3.0f);
-    for (int a = 0, i = 0; a < 4; a++) {
-        sum->gradient[a] += weighted * by[a];
-        for (int b = 0; b <= a; b++, i++) sum->normal[i] += weight * by[a] * by[b];
-    }
-}
-
-static void add_plane(const struct plane_sum *plane, struct shared_sum *sum)
-{
-    sum->square += (double)lanes_sum(plane->square);
-    sum->weight += (double)lanes_sum(plane->weight);
-    sum->slope += (double)lanes_sum(plane->slope);
-    for (int a = 0, i = 0; a < 4; a++) {
-        sum->gradient[a] += (double)lanes_sum(plane->gradient[a]);
-        for (int b = 0; b <= a; b++, i++) {
-            const double value = (double)lanes_sum(plane->normal[i]);
-            sum->normal[a][b] += value;
-            if (b < a) sum->normal[b][a] += value;
-        }
-    }
-}
-
-/* Compares the model with the scan, and adds to the normal equations of what fibers share: a change of all radii, blur,
- * low, high. Shares above 1 become 1. */
-static void compare(const struct axis_model *m, struct axis_scratch *s, const size_t from[3], const size_t n[3],
-                    struct shared_sum *sum)
-{
-    for (size_t k = 0; k < n[2]; k++) {
-        struct plane_sum plane = {0};
-        for (size_t j = 0; j < n[1]; j++) {
-            const float *density = m->v->density + volume_index(m->v->n, from[0], from[1] + j, from[2] + k);
-            for (size_t i = 0; i < n[0]; i += LANES)
-                compare_lanes(m, s, (k * BRICK + j) * BRICK + i, density + i, n[0] - i, &plane);
-        }
-        add_plane(&plane, sum);
     }
 }
 
@@ -200,11 +169,12 @@ static void compare(const struct axis_model *m, struct axis_scratch *s, const si
 struct segment_sum {
     lanes gradient[2][3], normal[2][6], radius_normal, radius_gradient, radius_cross[4];
     lanes section_gradient[2], section_normal[3];
+    lanes area_normal, area_gradient, area_by_radius, area_cross[AXIS_N_SHARED], radius_shared;
 };
 
 /* The work's arrays at the voxels of some places; the weight is 0 where a place does not count. */
 struct voxel_lanes {
-    lanes weight, residual, share, by_radius, by_blur;
+    lanes weight, residual, share, by_radius, by_blur, by_area;
 };
 
 static lanes gather(const float *value, const uint16_t c[LANES])
@@ -223,20 +193,77 @@ static struct voxel_lanes voxels_of(const struct axis_scratch *s, const struct a
     for (int l = 0; l < LANES; l++) row[l] = s->model[p->cell[l]];
     lanes_of_rows(row, of);
     return (struct voxel_lanes){lanes_choose(counts, gather(s->weight, p->cell), zero),
-                                lanes_choose(counts, of[3], zero), of[0], of[1], of[2]};
+                                lanes_choose(counts, of[3], zero),
+                                of[0],
+                                of[1],
+                                of[2],
+                                gather(s->lumen, p->cell)};
+}
+
+/* Adds places to the normal equation of the area of the lumen. by_radius: of the densities. */
+static void add_lumen(float amplitude, const struct voxel_lanes *v, lanes by_area, lanes by_radius,
+                      struct segment_sum *sum)
+{
+    const lanes weighted = v->weight * by_area;
+    const lanes shared[AXIS_N_SHARED] = {amplitude * v->by_radius, amplitude * v->by_blur, 1.0f - v->share, v->share,
+                                         amplitude * v->by_area};
+    sum->area_normal += weighted * by_area;
+    sum->area_gradient += v->residual * by_area;
+    sum->area_by_radius += weighted * by_radius;
+    for (int i = 0; i < AXIS_N_SHARED; i++) sum->area_cross[i] += weighted * shared[i];
+    sum->radius_shared += v->weight * by_radius * shared[4];
+}
+
+/* Derivatives of the densities at LANES voxels by the numbers of a segment: slope times normal is that by the axis. */
+struct place_slopes {
+    lanes slope, normal[3], by_radius, by_c, by_s, by_area;
+};
+
+/* Takes the lumen into account. */
+static void slopes_of_lumen(const struct axis_model *m, const struct axis_view *w, const struct axis_places *p,
+                            struct place_slopes *d)
+{
+    const float amplitude = (float)(m->profile.high - m->profile.low);
+    const struct lumen_lanes q = lumen_lanes_at(w->lumen, m->lumen_table, p->x, p->y);
+    const lanes zero = {0.0f}, one = zero + 1.0f;
+    lanes by_axis[3], square = zero;
+    for (int a = 0; a < 3; a++) {
+        by_axis[a] =
+            d->slope * d->normal[a] - amplitude * (q.by_axis[0] * w->section->u[a] + q.by_axis[1] * w->section->v[a]);
+        square += by_axis[a] * by_axis[a];
+    }
+    d->slope = lanes_sqrt(square);
+    for (int a = 0; a < 3; a++) d->normal[a] = by_axis[a] / lanes_choose(d->slope > zero, d->slope, one);
+    d->by_radius -= amplitude * q.by_radius;
+    d->by_c -= amplitude * q.by_c;
+    d->by_s -= amplitude * q.by_s;
+    d->by_area = -amplitude * q.by_area;
+}
+
+static struct place_slopes slopes_at(const struct axis_model *m, const struct axis_view *w, const struct axis_places *p)
+{
+    const float amplitude = (float)(m->profile.high - m->profile.low);
+    lanes share, slope, bend;
+    const lanes at = place_in_table(&m->table, depth_in_blur(m, w, p, &bend));
+    look_up(&m->table, at, &share, &slope);
+    slope *= -amplitude * m->inverse_blur;
+    struct place_slopes d = {.slope = slope,
+                             .normal = {p->normal[0], p->normal[1], p->normal[2]},
+                             .by_radius = -slope * p->by_radius,
+                             .by_c = -slope * p->by_c,
+                             .by_s = -slope * p->by_s};
+    if (w->lumen != NULL) slopes_of_lumen(m, w, p, &d);
+    return d;
 }
 
 /* Adds places to the normal equations of their segment's ends, of the radius and of the section. */
-static void add_places(const struct axis_model *m, const struct axis_scratch *s, const struct axis_places *p,
-                       struct segment_sum *sum)
+static void add_places(const struct axis_model *m, const struct axis_scratch *s, const struct axis_view *w,
+                       const struct axis_places *p, struct segment_sum *sum)
 {
     const float amplitude = (float)(m->profile.high - m->profile.low);
     const struct voxel_lanes v = voxels_of(s, p);
-    const lanes at = place_in_table(&m->table, p->depth * m->inverse_blur);
-    lanes share, slope;
-    look_up(&m->table, at, &share, &slope);
-    slope *= -amplitude * m->inverse_blur;
-    const lanes by = -slope * p->by_radius, weighted = v.weight * by;
+    const struct place_slopes d = slopes_at(m, w, p);
+    const lanes by = d.by_radius, weighted = v.weight * by;
     sum->radius_normal += weighted * by;
     sum->radius_gradient += v.residual * by;
     sum->radius_cross[0] += weighted * amplitude * v.by_radius;
@@ -245,19 +272,28 @@ static void add_places(const struct axis_model *m, const struct axis_scratch *s,
     sum->radius_cross[3] += weighted * v.share;
     for (int end = 0; end < 2; end++) {
         const lanes part = end == 0 ? (lanes)(1.0f - p->along) : p->along;
-        const lanes pull = part * slope * v.residual, hold = part * slope * slope * v.weight;
+        const lanes pull = part * d.slope * v.residual, hold = part * d.slope * d.slope * v.weight;
         for (int a = 0, i = 0; a < 3; a++) {
-            sum->gradient[end][a] += pull * p->normal[a];
-            for (int b = 0; b <= a; b++, i++) sum->normal[end][i] += hold * p->normal[a] * p->normal[b];
+            sum->gradient[end][a] += pull * d.normal[a];
+            for (int b = 0; b <= a; b++, i++) sum->normal[end][i] += hold * d.normal[a] * d.normal[b];
         }
     }
-    if (m->section == NULL) return;
-    const lanes by_c = -slope * p->by_c, by_s = -slope * p->by_s;
-    sum->section_gradient[0] += v.residual * by_c;
-    sum->section_gradient[1] += v.residual * by_s;
-    sum->section_normal[0] += v.weight * by_c * by_c;
-    sum->section_normal[1] += v.weight * by_c * by_s;
-    sum->section_normal[2] += v.weight * by_s * by_s;
+    if (w->section == NULL) return;
+    sum->section_gradient[0] += v.residual * d.by_c;
+    sum->section_gradient[1] += v.residual * d.by_s;
+    sum->section_normal[0] += v.weight * d.by_c * d.by_c;
+    sum->section_normal[1] += v.weight * d.by_c * d.by_s;
+    sum->section_normal[2] += v.weight * d.by_s * d.by_s;
+    if (w->lumen != NULL) add_lumen(amplitude, &v, d.by_area, by, sum);
+}
+
+static void keep_lumen(const struct segment_sum *sum, struct lumen_pull *pull)
+{
+    pull->normal = lanes_sum(sum->area_normal);
+    pull->gradient = lanes_sum(sum->area_gradient);
+    pull->by_radius = lanes_sum(sum->area_by_radius);
+    for (int i = 0; i < AXIS_N_SHARED; i++) pull->cross[i] = lanes_sum(sum->area_cross[i]);
+    pull->radius_shared = lanes_sum(sum->radius_shared);
 }
 
 /* pull: of both ends. section: NULL for discs. */
@@ -287,10 +323,11 @@ static void add_pulls(const struct axis_model *m, const struct axis_scratch *s, 
         for (size_t i = s->claims.first[e]; i < end; i += LANES) {
             struct axis_places p;
             find_places(&w, s->claims.cell + i, end - i, &p);
-            add_places(m, s, &p, &total);
+            add_places(m, s, &w, &p, &total);
         }
         sum->pull[2 * e].segment = sum->pull[2 * e + 1].segment = i_segment;
         keep_sum(&total, &sum->pull[2 * e], sum->section != NULL ? &sum->section[e] : NULL);
+        if (sum->lumen != NULL) keep_lumen(&total, &sum->lumen[e]);
     }
 }
 
@@ -298,6 +335,7 @@ static void forget_claims(struct axis_scratch *s, size_t n_claim)
 {
     for (size_t i = 0; i < n_claim; i++) {
         s->model[s->claims.cell[i]] = (lane_row){0.0f};
+        s->lumen[s->claims.cell[i]] = 0.0f;
     }
 }
 
@@ -309,14 +347,17 @@ bool axis_brick_fit(const struct axis_model *model, size_t i_brick, struct axis_
     if (n_segment == 0) return true;
     sum->pull = calloc(2 * n_segment, sizeof *sum->pull);
     if (model->section != NULL) sum->section = calloc(n_segment, sizeof *sum->section);
-    if (sum->pull == NULL || (model->section != NULL && sum->section == NULL)) return false;
+    if (model->lumen != NULL) sum->lumen = calloc(n_segment, sizeof *sum->lumen);
+    if (sum->pull == NULL || (model->section != NULL && sum->section == NULL) ||
+        (model->lumen != NULL && sum->lumen == NULL))
+        return false;
     if (!axis_claims_find(&s->claims, b, model->section, model->tail, i_brick)) return false;
     segment_brick_box(b, i_brick, from, n);
     for (size_t e = 0; e < n_segment; e++) {
         const struct axis_view w = view_of(model, b->index[b->first[i_brick] + e], from);
         add_to_model(model, s, &w, s->claims.first[e], s->claims.first[e + 1]);
     }
-    compare(model, s, from, n, &sum->shared);
+    axis_compare(model, s, from, n, &sum->shared);
     add_pulls(model, s, i_brick, from, sum);
     forget_claims(s, s->claims.first[n_segment]);
     return true;

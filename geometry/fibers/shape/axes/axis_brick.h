@@ -8,6 +8,7 @@
 #include "geometry/fibers/shape/axes/axis_profile.h"
 #include "geometry/fibers/shape/axes/axis_solve.h"
 #include "geometry/fibers/shape/axes/fiber_section.h"
+#include "geometry/fibers/shape/axes/lumen/axis_lumen.h"
 #include "geometry/volume/volume.h"
 
 #include <stdbool.h>
@@ -17,16 +18,19 @@ struct axis_model {
     const struct volume *v;
     const struct segment_bricks *bricks; /* with edge AXIS_BRICK */
     const struct section_view *section;  /* of each segment; NULL: discs */
+    const struct lumen_view *lumen;      /* of each segment, with sections; NULL: solid fibers */
+    const struct lumen_table *lumen_table;
     struct axis_profile profile;
     struct axis_table table;
     float tail, inverse_blur; /* tail: voxels beyond the radius up to which a fiber is modelled */
 };
 
 /* Work of one thread. By voxels of a brick, all 0 between bricks: the share of fibers, its derivatives by all radii and
- * by the blur, and the weight times the residual; the weight. */
+ * by the blur, and the weight times the residual; the weight; the derivative by the areas of all lumens. */
 struct axis_scratch {
     lane_row model[AXIS_N_CELL];
     float weight[AXIS_N_CELL];
+    float lumen[AXIS_N_CELL];
     struct axis_claims claims;
 };
 
@@ -37,6 +41,7 @@ void axis_scratch_release(struct axis_scratch *s);
 struct axis_brick_sum {
     struct axis_pull *pull;       /* two for each segment of the brick, in the order of its list */
     struct section_pull *section; /* one for each segment; NULL for discs */
+    struct lumen_pull *lumen;     /* one for each segment; NULL for solid fibers */
     struct shared_sum shared;
 };
 

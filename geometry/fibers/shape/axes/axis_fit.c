@@ -1,4 +1,5 @@
 #include "geometry/fibers/shape/axes/axis_fit.h"
+#include "base/small_matrix.h"
 #include "geometry/fibers/shape/axes/axis_brick.h"
 #include "geometry/fibers/shape/axes/axis_solve.h"
 #include "geometry/fibers/shape/axes/shape_measure.h"
@@ -35,9 +36,9 @@ static void add_shared(struct shared_sum *to, const struct shared_sum *from)
     to->square += from->square;
     to->weight += from->weight;
     to->slope += from->slope;
-    for (int a = 0; a < 4; a++) {
+    for (int a = 0; a < AXIS_N_SHARED; a++) {
         to->gradient[a] += from->gradient[a];
-        for (int c = 0; c < 4; c++) to->normal[a][c] += from->normal[a][c];
+        for (int c = 0; c < AXIS_N_SHARED; c++) to->normal[a][c] += from->normal[a][c];
     }
 }
 
@@ -51,15 +52,19 @@ static void state_error(double information, double variance, double stiffness, s
 
 /* What a fit keeps from round to round. */
 struct fit_work {
-    uint32_t *first_vertex_of;    /* per segment */
-    struct axis_pull *total;      /* per vertex */
-    float *reach;                 /* per segment */
-    struct section_view *view;    /* per segment; NULL for discs, as the next */
-    struct section_pull *section; /* per vertex */
-    struct radius_sum *radius;    /* per line */
+    uint32_t *first_vertex_of;     /* per segment */
+    struct axis_pull *total;       /* per vertex */
+    float *reach;                  /* per segment */
+    struct section_view *view;     /* per segment; NULL for discs, as the next */
+    struct section_pull *section;  /* per vertex */
+    struct lumen_view *lumen_view; /* per segment; NULL for solid fibers, as the next two */
+    struct lumen_pull *lumen;      /* per vertex: of the segment after it */
+    struct lumen_table *lumen_table;
+    struct radius_sum *radius; /* per line */
     double *length;
     struct shared_sum shared;
-    double hold; /* of the sections to discs */
+    double hold;        /* of the sections to discs */
+    double last_square; /* mean square of the residuals in the round before */
 };
 
 static void release_work(struct fit_work *w)
@@ -69,11 +74,14 @@ static void release_work(struct fit_work *w)
     free(w->reach);
     free(w->view);
     free(w->section);
+    free(w->lumen_view);
+    free(w->lumen);
+    free(w->lumen_table);
     free(w->radius);
     free(w->length);
 }
 
-static bool init_work(struct fit_work *w, const struct polyline_set *lines, bool with_sections)
+static bool init_work(struct fit_work *w, const struct polyline_set *lines, bool with_sections, bool with_lumens)
 {
     size_t n_segment = 0;
     *w = (struct fit_work){.first_vertex_of = malloc((lines->n_vertex + 1) * sizeof *w->first_vertex_of),
@@ -87,6 +95,13 @@ static bool init_work(struct fit_work *w, const struct polyline_set *lines, bool
         w->view = malloc((lines->n_vertex + 1) * sizeof *w->view);
         w->section = malloc((lines->n_vertex + 1) * sizeof *w->section);
         if (w->view == NULL || w->section == NULL) return false;
+    }
+    if (with_lumens) {
+        w->lumen_view = malloc((lines->n_vertex + 1) * sizeof *w->lumen_view);
+        w->lumen = malloc((lines->n_vertex + 1) * sizeof *w->lumen);
+        w->lumen_table = malloc(sizeof *w->lumen_table);
+        if (w->lumen_view == NULL || w->lumen == NULL || w->lumen_table == NULL) return false;
+        lumen_table_init(w->lumen_table);
     }
     for (size_t l = 0; l < lines->n_line; l++) {
         for (size_t i = lines->first[l]; i + 1 < lines->first[l + 1]; i++)
@@ -103,6 +118,17 @@ static void add_section(struct section_pull *ends, const struct section_pull *q)
         for (int i = 0; i < 3; i++) ends[end].normal[i] += 0.5f * q->normal[i];
         for (int i = 0; i < 2; i++) ends[end].gradient[i] += 0.5f * q->gradient[i];
     }
+}
+
+/* Adds the terms of a segment to the lumen of its line, and keeps them at its first vertex. */
+static void add_lumen(struct fit_work *w, uint32_t segment, const struct lumen_pull *q, struct radius_sum *r)
+{
+    lumen_pull_add(&w->lumen[w->first_vertex_of[segment]], q);
+    r->area_normal += (double)q->normal;
+    r->area_gradient += (double)q->gradient;
+    r->area_by_radius += (double)q->by_radius;
+    for (int a = 0; a < AXIS_N_SHARED; a++) r->area_cross[a] += (double)q->cross[a];
+    r->cross[4] += (double)q->radius_shared;
 }
 
 /* Adds the bricks of a batch in order, so that sums do not depend on the number of threads. */
@@ -122,8 +148,20 @@ static void add_batch(const struct fit_job *job, size_t n_brick, struct fit_work
         }
         for (size_t e = 0; sum->section != NULL && e < first[1] - first[0]; e++)
             add_section(&w->section[w->first_vertex_of[sum->pull[2 * e].segment]], &sum->section[e]);
+        for (size_t e = 0; sum->lumen != NULL && e < first[1] - first[0]; e++) {
+            const uint32_t segment = sum->pull[2 * e].segment;
+            add_lumen(w, segment, &sum->lumen[e], &w->radius[bricks->segment[segment].line]);
+        }
         add_shared(&w->shared, &sum->shared);
     }
+}
+
+/* Damps the steps more where the last one was too long, and less where it was not. */
+static void damp(struct fit_work *w, struct axis_profile *p)
+{
+    const double square = w->shared.weight > 0.0 ? w->shared.square / w->shared.weight : 0.0;
+    if (w->last_square > 0.0) p->damping *= square > w->last_square ? 4.0 : 0.5;
+    w->last_square = square;
 }
 
 /* Steps all vertices, radii and the profile from the sums of all bricks. */
@@ -137,6 +175,7 @@ static status make_step(struct fit_job *job, struct polyline_set *lines, struct 
         w->radius[l].scatter =
             axis_scatter(&w->total[lines->first[l]].radius_gradient, sizeof *w->total / sizeof(float),
                          polyline_length(lines, l), (size_t)fmax(2.0, PIECE_DIAMETERS * diameter));
+    if (profile->lumen != NULL) damp(w, profile);
     axis_profile_step(profile, &shared, w->radius, w->length, lines->n_line, diameter, lines->radius);
     polyline_shapes_follow(lines, false);
     double sd = profile->measured_curvature ? axis_curvature_sd(lines, diameter) : AXIS_CURVATURE_MOST / diameter;
@@ -164,6 +203,14 @@ static void view_sections(const struct polyline_set *lines, struct fiber_section
     for (size_t l = 0; l < lines->n_line; l++)
         for (size_t i = lines->first[l]; i + 1 < lines->first[l + 1]; i++)
             *view++ = fiber_section_view(&section[i], &section[i + 1], lines->vertex[i], lines->vertex[i + 1]);
+}
+
+static void view_lumens(const struct polyline_set *lines, const struct axis_profile *p,
+                        const struct section_view *section, struct lumen_view *view)
+{
+    for (size_t l = 0; l < lines->n_line; l++)
+        for (size_t i = lines->first[l]; i + 1 < lines->first[l + 1]; i++)
+            *view++ = lumen_view_make(section++, polyline_segment_radius(lines, l, i), p->lumen[l], (float)p->blur);
 }
 
 /* Number of bricks from job->first_brick on that are fitted before their sums are added: at least one layer of bricks,
@@ -194,6 +241,7 @@ static status fit_batch(struct fit_job *job, size_t n_brick, struct fit_work *w,
     for (size_t b = 0; job->sum != NULL && b < n_brick; b++) {
         free(job->sum[b].pull);
         free(job->sum[b].section);
+        free(job->sum[b].lumen);
     }
     free(job->sum);
     job->sum = NULL;
@@ -211,7 +259,13 @@ static status one_round(struct fit_job *job, struct polyline_set *lines, struct 
         view_sections(lines, m->profile.section, w->view);
         memset(w->section, 0, lines->n_vertex * sizeof *w->section);
     }
+    if (w->lumen_view != NULL) {
+        view_lumens(lines, &m->profile, w->view, w->lumen_view);
+        memset(w->lumen, 0, lines->n_vertex * sizeof *w->lumen);
+    }
     m->section = w->view;
+    m->lumen = w->lumen_view;
+    m->lumen_table = w->lumen_table;
     find_reach(lines, w->view, m->tail, w->reach);
     status s = segment_bricks_init_each(&bricks, lines, m->v->n, AXIS_BRICK, w->reach, err);
     if (s != STATUS_OK) return s;
@@ -253,6 +307,14 @@ static void free_job(struct fit_job *job, size_t n_thread)
     free(job);
 }
 
+/* Variance of a change of the areas of all lumens together, for a noise of 1. */
+static double shared_variance(const struct shared_sum *shared)
+{
+    double inverse[AXIS_N_SHARED * AXIS_N_SHARED];
+    return small_invert(shared->normal[0], AXIS_N_SHARED, inverse) ? inverse[AXIS_N_SHARED * AXIS_N_SHARED - 1]
+                                                                   : INFINITY;
+}
+
 status polylines_fit(struct polyline_set *lines, const struct volume *v, double diameter_voxel, int n_round,
                      struct axis_profile *profile, struct thread_pool *pool, const struct progress *progress,
                      struct error *err)
@@ -262,7 +324,7 @@ status polylines_fit(struct polyline_set *lines, const struct volume *v, double 
     struct fit_work work = {0};
     status s = STATUS_OK;
     if (job == NULL || job->scratch == NULL || job->failed == NULL ||
-        !init_work(&work, lines, profile->section != NULL))
+        !init_work(&work, lines, profile->section != NULL, profile->section != NULL && profile->lumen != NULL))
         s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
     for (size_t l = 0; l < lines->n_line; l++)
         if (!(lines->radius[l] > 0.0f)) lines->radius[l] = (float)(0.5 * diameter_voxel);
@@ -273,6 +335,9 @@ status polylines_fit(struct polyline_set *lines, const struct volume *v, double 
         const struct shape_sums sums = {.pull = work.total,
                                         .section = work.section,
                                         .sections = profile->section,
+                                        .lumen = work.lumen,
+                                        .area = profile->lumen,
+                                        .shared_area = shared_variance(&work.shared),
                                         .diameter = diameter_voxel,
                                         .section_length = SECTION_DIAMETERS * diameter_voxel,
                                         .section_hold = work.hold,

@@ -16,6 +16,9 @@ struct axis_profile {
      * about to break, which holds back no line that still has to find its fiber. */
     bool measured_curvature;
     struct fiber_section *section; /* of each vertex of the lines, refined too; NULL: discs */
+    float *lumen; /* with sections: area of the lumen of each line over that of its outline, refined too; NULL: solid */
+    double damping;  /* of the steps of shared numbers and lumens; 0 for solid fibers */
+    double clamp_sd; /* with lumens: noise of the voxels before they were clamped to [0, 1]; 0: they were not */
     struct shape_measure *measure; /* with sections: the last round leaves them with their errors in lines->shape */
     double independent; /* share of the voxels that have values of their own; below 1 where they are interpolated */
     /* Written by the fit: mean radius (voxels, by length), standard deviation of the fibers' radii without the part of
@@ -39,17 +42,21 @@ struct axis_table {
 
 void axis_table_init(struct axis_table *t);
 
-/* Normal equations of what all fibers share: a change of all radii, blur, low, high. */
+enum { AXIS_N_SHARED = 5 };
+
+/* Normal equations of what all fibers share: a change of all radii, blur, low, high, and of the areas of all lumens. */
 struct shared_sum {
-    double normal[4][4], gradient[4];
+    double normal[AXIS_N_SHARED][AXIS_N_SHARED], gradient[AXIS_N_SHARED];
     double square, weight; /* of the residuals */
     double slope;          /* sum of the derivatives of weight times residual by the residual */
 };
 
 /* Normal equation of the radius of one line, and the terms that it has in common with the shared ones. */
 struct radius_sum {
-    double normal, gradient, cross[4];
+    double normal, gradient, cross[AXIS_N_SHARED];
     double scatter; /* variance of the gradient, from the scatter of pieces of the line */
+    /* The same of the area of its lumen, and the term of both; 0 for solid fibers. */
+    double area_normal, area_gradient, area_by_radius, area_cross[AXIS_N_SHARED];
 };
 
 /* Variance of the sum of n values about their mean, from that between pieces of `piece` values. Within a piece they may

@@ -16,6 +16,8 @@ static const double PRIOR_PIECES = 10.0;
 /* The radius varies where chi^2 has a probability below that of so many standard deviations of a normal variable, and
  * the variation, without noise, is at least this share of the radius. */
 static const double LEAST_DEVIATION = 4.0, LEAST_VARIATION = 0.03;
+/* The same of the area of a lumen, and the standard deviation of widths between 0 and 0.8. */
+static const double LEAST_AREA_VARIATION = 0.03, AREA_MOST = 0.3, ANY_LUMEN_SE = 0.23;
 /* Standard deviation of an angle that may be any between 0 and pi: pi / sqrt 12. */
 static const double ANY_ANGLE_SE = 0.9069;
 
@@ -50,22 +52,53 @@ static void add_differences(const struct piece_sum *piece, size_t n_piece, const
 /* One line, and work for the longest. */
 struct line_work {
     size_t n, first;
-    double *gradient, *information; /* at each vertex */
-    double *x, *m;                  /* solution and banded matrix */
+    double radius_by_area, area_by_radius; /* part of one gradient in the other, of the whole line */
+    double *gradient, *information;        /* at each vertex */
+    double *x, *m;                         /* solution and banded matrix */
     struct piece_sum *piece;
     double (*variance)[3]; /* of c and s: cc, cs, ss, per noise */
 };
 
+/* Terms of a segment of a line for the radius, without what the lumen explains. */
+static struct piece_sum radius_terms(const struct line_work *w, const struct shape_sums *sums, size_t i)
+{
+    const struct axis_pull *p = &sums->pull[w->first + i];
+    struct piece_sum t = {(double)p->radius_gradient, (double)p->radius_normal};
+    if (sums->lumen != NULL) {
+        const struct lumen_pull *q = &sums->lumen[w->first + i];
+        const double part = w->radius_by_area;
+        t.gradient -= part * (double)q->gradient;
+        t.information += part * (part * (double)q->normal - 2.0 * (double)q->by_radius);
+    }
+    t.information *= sums->slope;
+    return t;
+}
+
+/* Terms for the area of the lumen, without what the radius explains. */
+static struct piece_sum area_terms(const struct line_work *w, const struct shape_sums *sums, size_t i)
+{
+    const struct axis_pull *p = &sums->pull[w->first + i];
+    const struct lumen_pull *q = &sums->lumen[w->first + i];
+    const double part = w->area_by_radius;
+    return (struct piece_sum){
+        (double)q->gradient - part * (double)p->radius_gradient,
+        sums->slope * ((double)q->normal - 2.0 * part * (double)q->by_radius + part * part * (double)p->radius_normal)};
+}
+
+typedef struct piece_sum terms_of(const struct line_work *w, const struct shape_sums *sums, size_t i);
+
 /* Shares the terms of each segment between the vertices at its ends. */
-static void take_radius(struct line_work *w, const struct axis_pull *pull, double slope)
+static void take_terms(struct line_work *w, const struct shape_sums *sums, terms_of *terms)
 {
     memset(w->gradient, 0, w->n * sizeof *w->gradient);
     memset(w->information, 0, w->n * sizeof *w->information);
-    for (size_t i = 0; i + 1 < w->n; i++)
+    for (size_t i = 0; i + 1 < w->n; i++) {
+        const struct piece_sum t = terms(w, sums, i);
         for (size_t end = 0; end < 2; end++) {
-            w->gradient[i + end] += 0.5 * (double)pull[w->first + i].radius_gradient;
-            w->information[i + end] += 0.5 * slope * (double)pull[w->first + i].radius_normal;
+            w->gradient[i + end] += 0.5 * t.gradient;
+            w->information[i + end] += 0.5 * t.information;
         }
+    }
 }
 
 static size_t take_pieces(struct line_work *w, size_t length)
@@ -84,13 +117,13 @@ static size_t take_pieces(struct line_work *w, size_t length)
 static size_t piece_length(double diameters, double diameter) { return (size_t)fmax(2.0, diameters * diameter + 0.5); }
 
 /* Segments, not vertices: the halves of neighbouring vertices would be correlated. */
-static void radius_scatter(struct line_work *w, const struct shape_sums *sums, struct scatter *to)
+static void segment_scatter(struct line_work *w, const struct shape_sums *sums, terms_of *terms, struct scatter *to)
 {
-    const struct axis_pull *pull = sums->pull;
     static const double fourth[5] = {1.0, -4.0, 6.0, -4.0, 1.0};
     for (size_t i = 0; i < w->n; i++) {
-        w->gradient[i] = (double)pull[w->first + i].radius_gradient;
-        w->information[i] = sums->slope * (double)pull[w->first + i].radius_normal;
+        const struct piece_sum t = terms(w, sums, i);
+        w->gradient[i] = t.gradient;
+        w->information[i] = t.information;
     }
     add_differences(w->piece, take_pieces(w, piece_length(RADIUS_PIECE, sums->diameter)), fourth, 5, to);
 }
@@ -115,7 +148,7 @@ static double line_noise(const struct scatter *own, const struct scatter *all)
     return fmax(common, own->n > 0.0 ? weight * noise_of(own) + (1.0 - weight) * common : common);
 }
 
-/* Takes the gradient of the radius of the whole line from those of its vertices. Returns the line's information. */
+/* Takes the gradient of the radius, or of the lumen, of the whole line from those of its vertices. Returns the line's information. */
 static double centre_gradient(struct line_work *w)
 {
     double gradient = 0.0, information = 0.0;
@@ -127,8 +160,8 @@ static double centre_gradient(struct line_work *w)
     return information;
 }
 
-/* Whether the radius of a line varies. The gradients are about the radius of the line. */
-static bool radius_varies(struct line_work *w, double noise, double radius, double diameter)
+/* Whether a number varies along a line, by at least `least`. The gradients are about the mean of the line. */
+static bool course_varies(struct line_work *w, double noise, double least, double diameter)
 {
     const size_t n_piece = take_pieces(w, piece_length(TEST_PIECE, diameter));
     double chi2 = 0.0, information = 0.0, square = 0.0;
@@ -145,11 +178,11 @@ static bool radius_varies(struct line_work *w, double noise, double radius, doub
     /* Wilson and Hilferty 1931: the cube root of chi^2 over its degrees of freedom is nearly normal */
     const double spread = 2.0 / (9.0 * freedom), deviation = (cbrt(chi2 / freedom) - (1.0 - spread)) / sqrt(spread);
     const double variation = sqrt(fmax(0.0, square - freedom * noise) / information);
-    return deviation > LEAST_DEVIATION && variation > LEAST_VARIATION * radius;
+    return deviation > LEAST_DEVIATION && variation > least;
 }
 
 /* Fills the banded matrix m = N + stiffness D'D. */
-static void fill_radius(struct line_work *w, double stiffness, double hold)
+static void fill_course(struct line_work *w, double stiffness, double hold)
 {
     static const double second[3] = {1.0, -2.0, 1.0};
     memset(w->m, 0, BAND * w->n * sizeof *w->m);
@@ -159,38 +192,62 @@ static void fill_radius(struct line_work *w, double stiffness, double hold)
             for (size_t c = 0; c <= r; c++) w->m[BAND * (i + r) + r - c] += stiffness * second[r] * second[c];
 }
 
-/* Solves for the course of the radius about that of the line, and writes radii with their errors. The gradients are
- * about the radius of the line. Returns whether that was possible. */
-static bool vary_radius(struct line_work *w, double noise, double length, double radius, struct fiber_shape *shape)
+/* Solves for the course of a number about its mean on the line, at most `most` from it: x. The variances for a noise of
+ * 1 are on the diagonal of m. The gradients are about the mean. Returns whether that was possible. */
+static bool find_course(struct line_work *w, double length, double most)
 {
     double information = 0.0, mean = 0.0;
     for (size_t i = 0; i < w->n; i++) information += w->information[i] / (double)w->n;
-    const double stiffness = pow(length, 4.0) * information, hold = 1e-3 * information, most = 0.5 * radius;
+    const double stiffness = pow(length, 4.0) * information, hold = 1e-3 * information;
     memcpy(w->x, w->gradient, w->n * sizeof *w->x);
-    fill_radius(w, stiffness, hold);
+    fill_course(w, stiffness, hold);
     if (!small_solve_banded(w->m, w->n, BAND, w->x)) return false;
     for (size_t i = 0; i < w->n; i++) mean += w->x[i] / (double)w->n;
-    fill_radius(w, stiffness, hold);
-    if (!small_invert_banded(w->m, w->n, BAND)) return false;
-    for (size_t i = 0; i < w->n; i++) {
-        shape[i].radius = (float)(radius + fmin(most, fmax(-most, w->x[i] - mean)));
-        shape[i].radius_se = (float)sqrt(SMOOTH * noise * w->m[BAND * i]);
-    }
-    return true;
+    for (size_t i = 0; i < w->n; i++) w->x[i] = fmin(most, fmax(-most, w->x[i] - mean));
+    fill_course(w, stiffness, hold);
+    return small_invert_banded(w->m, w->n, BAND);
 }
 
 static bool measure_radius(struct line_work *w, const struct shape_sums *sums, double noise, double radius,
                            struct fiber_shape *shape)
 {
-    take_radius(w, sums->pull, sums->slope);
+    take_terms(w, sums, radius_terms);
     for (size_t i = 0; i < w->n; i++) w->gradient[i] += w->information[i] * ((double)shape[i].radius - radius);
     const double information = centre_gradient(w);
-    const bool varies = radius_varies(w, noise, radius, sums->diameter) &&
-                        vary_radius(w, noise, RADIUS_LENGTH * sums->diameter, radius, shape);
-    for (size_t i = 0; i < w->n && !varies; i++) {
-        shape[i].radius = (float)radius;
-        shape[i].radius_se = information > 0.0 ? (float)sqrt(noise / information) : 0.0f;
+    const bool varies = course_varies(w, noise, LEAST_VARIATION * radius, sums->diameter) &&
+                        find_course(w, RADIUS_LENGTH * sums->diameter, 0.5 * radius);
+    for (size_t i = 0; i < w->n; i++) {
+        shape[i].radius = (float)(varies ? radius + w->x[i] : radius);
+        shape[i].radius_se = varies              ? (float)sqrt(SMOOTH * noise * w->m[BAND * i])
+                             : information > 0.0 ? (float)sqrt(noise / information)
+                                                 : 0.0f;
     }
+    return varies;
+}
+
+/* Writes the width of a lumen whose area has the variance `variance`, where the scan tells it. */
+static void set_lumen(double area, double variance, struct fiber_shape *shape)
+{
+    const double width = sqrt(fmax(0.0, area)), se = sqrt(width * width + sqrt(variance)) - width;
+    const bool told = se <= ANY_LUMEN_SE;
+    shape->lumen = told ? (float)width : 0.0f;
+    shape->lumen_se = told ? (float)se : 0.0f;
+}
+
+static bool measure_lumen(struct line_work *w, const struct shape_sums *sums, double noise, double area,
+                          struct fiber_shape *shape)
+{
+    take_terms(w, sums, area_terms);
+    const double information = centre_gradient(w);
+    const bool varies = course_varies(w, noise, LEAST_AREA_VARIATION, sums->diameter) &&
+                        find_course(w, RADIUS_LENGTH * sums->diameter, AREA_MOST);
+    const double shared = noise * sums->shared_area / sums->slope;
+    for (size_t i = 0; i < w->n; i++)
+        set_lumen(varies ? area + w->x[i] : area,
+                  shared + (varies              ? SMOOTH * noise * w->m[BAND * i]
+                            : information > 0.0 ? noise / information
+                                                : INFINITY),
+                  &shape[i]);
     return varies;
 }
 
@@ -253,35 +310,54 @@ static void line_work_release(struct line_work *w)
     free(w->variance);
 }
 
-static void start_line(struct line_work *w, const struct polyline_set *lines, size_t line)
+static void start_line(struct line_work *w, const struct polyline_set *lines, size_t line,
+                       const struct shape_sums *sums)
 {
+    double radius = 0.0, area = 0.0, both = 0.0;
     w->first = lines->first[line];
     w->n = polyline_length(lines, line);
+    for (size_t i = w->first; i < w->first + w->n && sums->lumen != NULL; i++) {
+        radius += (double)sums->pull[i].radius_normal;
+        area += (double)sums->lumen[i].normal;
+        both += (double)sums->lumen[i].by_radius;
+    }
+    w->radius_by_area = area > 0.0 ? both / area : 0.0;
+    w->area_by_radius = radius > 0.0 ? both / radius : 0.0;
+}
+
+/* Adds the scatter of a line's gradients: of the radius, of the section, and of the lumen. */
+static void add_scatter(struct line_work *w, const struct shape_sums *sums, struct scatter to[3])
+{
+    segment_scatter(w, sums, radius_terms, &to[0]);
+    section_scatter(w, sums, &to[1]);
+    if (sums->lumen != NULL) segment_scatter(w, sums, area_terms, &to[2]);
 }
 
 status fiber_shapes_measure(struct polyline_set *lines, const struct shape_sums *sums, struct shape_measure *measure,
                             struct error *err)
 {
     struct line_work w;
-    struct scatter radius = {0}, section = {0};
+    struct scatter all[3] = {{0}};
     const double stiffness = fiber_sections_stiffness(sums->section, lines->n_vertex, sums->section_length);
     status s = lines->shape == NULL ? polyline_shapes_init(lines, err) : STATUS_OK;
     if (!line_work_init(&w, lines) && s == STATUS_OK)
         s = error_set(err, STATUS_NO_MEMORY, "cannot measure the sections of fibers: out of memory");
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
-        start_line(&w, lines, l);
-        radius_scatter(&w, sums, &radius);
-        section_scatter(&w, sums, &section);
+        start_line(&w, lines, l, sums);
+        add_scatter(&w, sums, all);
     }
-    *measure = (struct shape_measure){.radius_noise = noise_of(&radius), .section_noise = noise_of(&section)};
+    *measure = (struct shape_measure){
+        .radius_noise = noise_of(&all[0]), .section_noise = noise_of(&all[1]), .lumen_noise = noise_of(&all[2])};
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
-        struct scatter own[2] = {{0}};
-        start_line(&w, lines, l);
-        radius_scatter(&w, sums, &own[0]);
-        section_scatter(&w, sums, &own[1]);
-        measure->n_varying +=
-            measure_radius(&w, sums, line_noise(&own[0], &radius), (double)lines->radius[l], lines->shape + w.first);
-        measure_section(&w, sums, stiffness, line_noise(&own[1], &section), lines, l);
+        struct scatter own[3] = {{0}};
+        start_line(&w, lines, l, sums);
+        add_scatter(&w, sums, own);
+        struct fiber_shape *shape = lines->shape + w.first;
+        measure->n_varying += measure_radius(&w, sums, line_noise(&own[0], &all[0]), (double)lines->radius[l], shape);
+        measure_section(&w, sums, stiffness, line_noise(&own[1], &all[1]), lines, l);
+        if (sums->lumen != NULL)
+            measure->n_varying_lumen +=
+                measure_lumen(&w, sums, line_noise(&own[2], &all[2]), (double)sums->area[l], shape);
     }
     line_work_release(&w);
     return s;

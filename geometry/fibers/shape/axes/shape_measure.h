@@ -14,26 +14,37 @@
  * variance of its component across is subtracted from its square.
  *
  * Radius. chi^2 of the radii of pieces of two diameters about the radius of the line says whether it varies. Where it
- * does, the radius follows the data by the same kind of equation. */
+ * does, the radius follows the data by the same kind of equation.
+ *
+ * Lumen. The area of the lumen is measured like the radius, each with what is left of its gradient without the part that
+ * the other explains. The width follows as the root of the area, so its error is that of a root: sqrt(a + e) - sqrt(a)
+ * for an area a with the error e. Where that exceeds the standard deviation of widths that may be anything from 0 to 0.8,
+ * the scan tells nothing, and width and error are 0. The variance has a part that all fibers share: density and blur of
+ * the walls are not known beforehand, and walls that are thinner than the blur look like less dense ones. */
 #ifndef SELVEDGE_GEOMETRY_SHAPE_MEASURE_H
 #define SELVEDGE_GEOMETRY_SHAPE_MEASURE_H
 
 #include "geometry/fibers/lines/polyline.h"
 #include "geometry/fibers/shape/axes/axis_solve.h"
 #include "geometry/fibers/shape/axes/fiber_section.h"
+#include "geometry/fibers/shape/axes/lumen/axis_lumen.h"
 
 /* What the last round leaves. */
 struct shape_sums {
     const struct axis_pull *pull; /* of each vertex; radius_normal and radius_gradient are of the segment after it */
     const struct section_pull *section;   /* of each vertex */
     const struct fiber_section *sections; /* as fitted */
+    const struct lumen_pull *lumen;       /* of each vertex: of the segment after it; NULL: solid fibers */
+    const float *area;                    /* of the lumen of each line, as fitted */
+    double shared_area;                   /* variance of a change of all areas together, for a noise of 1 */
     double diameter, section_length, section_hold;
     double slope; /* of weighted residuals by residuals, over the mean weight: the share of N in the true curvature */
 };
 
 struct shape_measure {
-    size_t n_varying;                   /* lines whose radius varies */
-    double radius_noise, section_noise; /* v, per (voxel density)^2 */
+    size_t n_varying; /* lines whose radius varies */
+    size_t n_varying_lumen;
+    double radius_noise, section_noise, lumen_noise; /* v, per (voxel density)^2 */
 };
 
 /* Writes lines->shape, which is made first if it is NULL. Where the set has one, its radii are those that the gradients

@@ -23,6 +23,11 @@ json_t *section_report_json(const struct pipeline_context *c)
                   {"angle_error_deg", angle_to_deg(s.angle_se_median_rad)},
                   {"flat_share", s.flat_share},
                   {"radius_variation", s.variation},
+                  {"lumen_told_share", s.lumen_share},
+                  {"lumen_p10", s.lumen_p10},
+                  {"lumen_median", s.lumen_median},
+                  {"lumen_p90", s.lumen_p90},
+                  {"lumen_error", s.lumen_se_median},
                   {"radius_variation_error", s.variation_se_median}};
     for (size_t i = 0; i < sizeof figure / sizeof *figure; i++)
         json_object_set_new(json, figure[i].key, json_number(figure[i].value));
@@ -54,6 +59,19 @@ static void print_ratios(const struct section_summary *s, FILE *out)
     close_row(out, "the same of the long axis about the fiber, where the section is flat");
 }
 
+static void print_lumens(const struct section_summary *s, FILE *out)
+{
+    open_row(out, "width of the lumens");
+    fprintf(out, "%.2f (%.2f &hellip; %.2f)", s->lumen_median, s->lumen_p10, s->lumen_p90);
+    close_row(out, "over that of the fiber: median over the length, and 80 % of it");
+    open_row(out, "error of a lumen");
+    fprintf(out, "%.3f", s->lumen_se_median);
+    close_row(out, "median standard error of this width for one fiber");
+    open_row(out, "length whose lumen the scan tells");
+    fprintf(out, "%.0f %%", 100.0 * s->lumen_share);
+    close_row(out, "elsewhere fibers may be hollow or solid");
+}
+
 void section_report_table(const struct pipeline_context *c, FILE *out)
 {
     struct section_summary s;
@@ -74,6 +92,7 @@ void section_report_table(const struct pipeline_context *c, FILE *out)
         fprintf(out, "%.1f %%", 100.0 * c->geometry.lumen_share);
         close_row(out, "share of the material that was filled because the fibers are hollow");
     }
+    if (s.lumen_share > 0.0) print_lumens(&s, out);
     fputs("</table>\n", out);
     if (s.measured_share > 0.0)
         fputs("<figure><img class=\"plot\" src=\"pictures/fiber-sections.svg\" alt=\"distribution of the ratio of the "

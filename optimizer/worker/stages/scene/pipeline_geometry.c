@@ -98,12 +98,15 @@ status stage_volume(struct pipeline_context *c, struct error *err)
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
     if (s != STATUS_OK) return s;
     reconstruct_warn_volume(&c->option, &c->geometry, &(struct warning_sink){pipeline_warn, c});
+    const struct volume_filled *filled = &c->volume.filled;
     struct work_section section[] = {{&c->option, sizeof c->option},
                                      {&c->geometry, sizeof c->geometry},
                                      {c->volume.n, sizeof c->volume.n},
                                      {c->volume.voxel_size_m, sizeof c->volume.voxel_size_m},
-                                     {c->volume.density, volume_n_voxel(c->volume.n) * sizeof(float), c->space}};
-    return work_file_write(path, "volume.1", section, 5, err);
+                                     {c->volume.density, volume_n_voxel(c->volume.n) * sizeof(float), c->space},
+                                     {filled->voxel, filled->n * sizeof *filled->voxel, c->space},
+                                     {filled->density, filled->n * sizeof *filled->density, c->space}};
+    return work_file_write(path, "volume.2", section, 7, err);
 }
 
 static status load_volume(struct pipeline_context *c, struct reconstruct_option *option,
@@ -113,14 +116,13 @@ static status load_volume(struct pipeline_context *c, struct reconstruct_option 
     struct volume v = {.space = c->space};
     status s = pipeline_work_path(c, "volume", "volume.bin", path, err);
     if (s != STATUS_OK) return s;
-    struct work_section section[] = {{option, sizeof *option},
-                                     {report, sizeof *report},
-                                     {v.n, sizeof v.n},
-                                     {v.voxel_size_m, sizeof v.voxel_size_m},
-                                     {NULL, 0, c->space}};
-    s = work_file_read(path, "volume.1", section, 5, err);
+    struct work_section section[] = {
+        {option, sizeof *option}, {report, sizeof *report}, {v.n, sizeof v.n},  {v.voxel_size_m, sizeof v.voxel_size_m},
+        {NULL, 0, c->space},      {NULL, 0, c->space},      {NULL, 0, c->space}};
+    s = work_file_read(path, "volume.2", section, 7, err);
     if (s != STATUS_OK) return s;
     v.density = section[4].data;
+    v.filled = (struct volume_filled){section[5].n_bytes / sizeof(size_t), section[5].data, section[6].data};
     volume_release(&c->volume);
     c->volume = v;
     return STATUS_OK;
@@ -358,7 +360,7 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
                                      {f->axis_class, f->n_fiber},
                                      {f->group, f->n_fiber},
                                      {f->shape, f->shape != NULL ? f->n_vertex * sizeof *f->shape : 0}};
-    return work_file_write(path, "fibers.4", section, 12, err);
+    return work_file_write(path, "fibers.5", section, 12, err);
 }
 
 status stage_fibers_load(struct pipeline_context *c, struct error *err)
@@ -380,7 +382,7 @@ status stage_fibers_load(struct pipeline_context *c, struct error *err)
                                      {NULL, 0},
                                      {NULL, 0},
                                      {NULL, 0}};
-    s = work_file_read(path, "fibers.4", section, 12, err);
+    s = work_file_read(path, "fibers.5", section, 12, err);
     if (s != STATUS_OK) return s;
     f.first_vertex = section[6].data;
     f.position_m = section[7].data;

@@ -268,6 +268,29 @@ static void test_table_of_sections(void **state)
     fiber_set_release(&f);
 }
 
+/* Each fiber has a lumen of its own between the narrowest and the widest, which the set states; without lumens nothing
+ * about the other numbers changes. */
+static void test_lumens_of_single_fibers(void **state)
+{
+    (void)state;
+    const struct phantom_section_law law = {.seed = 4, .lumen = 0.6, .aspect = 3.0, .lumen_spread = 0.5},
+                                     solid = {.seed = 4, .aspect = 3.0};
+    double least = 1.0, most = 0.0;
+    for (size_t i = 0; i < 200; i++) {
+        const struct phantom_section s = phantom_section_of(&law, i);
+        least = fmin(least, s.lumen);
+        most = fmax(most, s.lumen);
+        assert_true(s.aspect == phantom_section_of(&solid, i).aspect);
+    }
+    assert_true(least >= 0.3 && least < 0.32 && most <= 0.6 && most > 0.58);
+    const struct phantom_section_law discs = {.seed = 4, .lumen = 0.6, .lumen_spread = 0.5};
+    struct fiber_set f = straight_fiber(7.0);
+    assert_int_equal(phantom_section_shapes(&discs, &f, NULL), STATUS_OK);
+    assert_non_null(f.shape);
+    assert_true(fabs((double)f.shape[0].lumen - phantom_section_of(&discs, 0).lumen) < 1e-6);
+    fiber_set_release(&f);
+}
+
 /* A taper lowers the radius by its share and raises it again, closes at the faces, and is what the scan draws; the
  * true ratio and long axis are those of the scan's second moments. */
 static void test_sections_along_a_fiber(void **state)
@@ -309,6 +332,7 @@ int main(void)
         cmocka_unit_test(test_hardening_and_fringes),
         cmocka_unit_test(test_radii_spread),
         cmocka_unit_test(test_sections_along_a_fiber),
+        cmocka_unit_test(test_lumens_of_single_fibers),
         cmocka_unit_test(test_wrong_options_are_named),
         cmocka_unit_test_setup_teardown(test_table_of_sections, scratch_folder_setup, scratch_folder_teardown),
     };

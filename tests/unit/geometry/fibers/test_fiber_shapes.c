@@ -44,6 +44,15 @@ static struct fiber_set tapered(bool groups)
     return f;
 }
 
+/* Adds lumens: of the first fiber as measured, of the second not known. */
+static void make_hollow(struct fiber_set *f)
+{
+    for (size_t k = 0; k < N_VERTEX; k++) {
+        f->shape[k].lumen = 0.3f + 0.05f * (float)k;
+        f->shape[k].lumen_se = 0.02f;
+    }
+}
+
 static void compare_shapes(const struct fiber_set *a, const struct fiber_set *b)
 {
     assert_int_equal(b->n_vertex, a->n_vertex);
@@ -53,6 +62,7 @@ static void compare_shapes(const struct fiber_set *a, const struct fiber_set *b)
         assert_true(fabsf(y->radius / x->radius - 1.0f) < 1e-5f && fabsf(y->radius_se / x->radius_se - 1.0f) < 1e-3f);
         assert_true(fabsf(y->ratio - x->ratio) < 1e-5f && fabsf(y->ratio_se - x->ratio_se) < 1e-5f);
         assert_true(fabsf(y->angle_se_rad - x->angle_se_rad) < 1e-4f);
+        assert_true(fabsf(y->lumen - x->lumen) < 1e-5f && fabsf(y->lumen_se - x->lumen_se) < 1e-6f);
         for (int c = 0; c < 3; c++) assert_true(fabsf(y->long_axis[c] - x->long_axis[c]) < 1e-5f);
     }
     for (size_t i = 0; i < a->n_fiber; i++) {
@@ -64,13 +74,15 @@ static void compare_shapes(const struct fiber_set *a, const struct fiber_set *b)
 static void test_files_keep_sections(void **state)
 {
     const char *path = scratch_path(state, "sections.hair");
-    for (int groups = 0; groups < 2; groups++)
+    for (int kind = 0; kind < 4; kind++)
         for (int text = 0; text < 2; text++) {
-            struct fiber_set f = tapered(groups == 1), g;
+            struct fiber_set f = tapered(kind % 2 == 1), g;
             fiber_set_init(&g);
+            if (kind >= 2) make_hollow(&f);
             assert_int_equal((text ? fiber_set_write_text : fiber_set_write_hair)(&f, path, NULL), STATUS_OK);
             assert_int_equal((text ? fiber_set_read_text : fiber_set_read_hair)(&g, path, NULL), STATUS_OK);
             compare_shapes(&f, &g);
+            assert_int_equal(fiber_set_has_lumens(&g), kind >= 2);
             if (!text) assert_int_equal(fiber_set_validate(&g, NULL), STATUS_OK);
             fiber_set_release(&f);
             fiber_set_release(&g);
@@ -139,10 +151,14 @@ static void test_damaged_sections_are_refused(void **state)
     assert_int_equal(fiber_set_read_hair(&g, path, &err), STATUS_FORMAT);
     assert_non_null(strstr(err.text, "its header requires"));
     free(data);
-    static const char text[] = "0 0 0 0.1 0 0 1.5 0 0 0 1 0\n1 0 0 0.1 0 0 0.9 0 0 0 1 0\n";
-    scratch_write(path, text, sizeof text - 1);
-    assert_int_equal(fiber_set_read_text(&g, path, &err), STATUS_FORMAT);
-    assert_non_null(strstr(err.text, "line 2 is not"));
+    static const char *const text[] = {"0 0 0 0.1 0 0 1.5 0 0 0 1 0\n1 0 0 0.1 0 0 0.9 0 0 0 1 0\n",
+                                       "0 0 0 0.1 0 0 1.5 0 0 0 1 0 0.3 0.1\n1 0 0 0.1 0 0 1.5 0 0 0 1 0 1.2 0.1\n",
+                                       "0 0 0 0.1 0 0 1.5 0 0 0 1 0 0.3 0.1\n1 0 0 0.1 0 0 1.5 0 0 0 1 0 0.3\n"};
+    for (int k = 0; k < 3; k++) { /* a ratio below 1, a lumen wider than the fiber, and one without its error */
+        scratch_write(path, text[k], strlen(text[k]));
+        assert_int_equal(fiber_set_read_text(&g, path, &err), STATUS_FORMAT);
+        assert_non_null(strstr(err.text, "line 2 is not"));
+    }
     fiber_set_release(&f);
     fiber_set_release(&g);
 }

@@ -1,0 +1,23 @@
+/* The lumens of traced fibers, in the scan whose lumens were not filled. */
+#include "geometry/trace/trace_job.h"
+
+#include "geometry/fibers/shape/axes/lumen/hollow_fit.h"
+
+status trace_lumens(struct trace_job *job, struct polyline_set *lines, struct error *err)
+{
+    struct volume scan;
+    struct shape_measure measure;
+    struct axis_profile profile = trace_start_profile(job);
+    if (job->v->filled.n == 0 || lines->shape == NULL || job->report->trace_edge_voxel < 1.0) return STATUS_OK;
+    profile.measured_curvature = true;
+    profile.clamp_sd = job->report->noise.mapped_sd;
+    status s = volume_copy_unfilled(job->v, &scan, err);
+    if (s != STATUS_OK) return s;
+    const struct hollow_fit fit = {&scan, job->diameter, job->pool, &job->inner};
+    s = polylines_fit_hollow(lines, &fit, &profile, &measure, err);
+    volume_release(&scan);
+    if (s != STATUS_OK) return s;
+    trace_state_profile(job, &profile);
+    job->report->lumens_measured = true;
+    return STATUS_OK;
+}
