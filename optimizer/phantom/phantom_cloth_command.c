@@ -271,19 +271,17 @@ static json_t *describe(const struct cloth *c)
                               o->flatness, "cover_designed", o->cover, "twist_turns", r->twist_turns, "migration",
                               o->migration, "flyaways_per_yarn", (int)o->n_flyaway_per_yarn, "fiber_diameter_voxel",
                               2.0 * o->fiber_radius_m[0] / o->voxel_size_m, "yarn_width_um", um * r->yarn_width_m);
-    json_t *scan = json_pack("{s:f,s:f,s:f,s:f,s:f,s:i,s:f,s:f}", "snr", c->scan.snr, "blur_sd_voxel",
-                             c->scan.blur_sd_voxel, "poisson_count", c->scan.poisson_count, "ring_amplitude",
-                             c->scan.ring_amplitude, "gradient", c->scan.gradient, "bits", c->file.bits, "void_value",
-                             c->file.void_value, "fiber_value", c->file.fiber_value);
-    if (cloth != NULL && scan != NULL) {
-        json_object_update_new(cloth, json_pack("{s:f,s:f,s:f,s:f,s:f,s:f}", "diameter_spread", o->radius_spread,
-                                                "lumen", o->section.lumen, "aspect", fmax(1.0, o->section.aspect),
-                                                "bean", o->section.bean, "section_turns_per_mm",
-                                                1e-3 * o->section.turns_per_m, "taper", o->section.taper));
-        json_object_update_new(scan,
-                               json_pack("{s:f,s:f,s:f}", "noise_sd_voxel", c->scan.noise_sd_voxel, "beam_hardening",
-                                         c->scan.beam_hardening, "phase_fringes", c->scan.phase_fringes));
-    }
+    json_t *scan = json_pack(
+        "{s:f,s:f,s:f,s:f,s:f,s:i,s:f,s:f,s:f,s:f,s:f}", "snr", c->scan.snr, "blur_sd_voxel", c->scan.blur_sd_voxel,
+        "poisson_count", c->scan.poisson_count, "ring_amplitude", c->scan.ring_amplitude, "gradient", c->scan.gradient,
+        "bits", c->file.bits, "void_value", c->file.void_value, "fiber_value", c->file.fiber_value, "noise_sd_voxel",
+        c->scan.noise_sd_voxel, "beam_hardening", c->scan.beam_hardening, "phase_fringes", c->scan.phase_fringes);
+    if (cloth != NULL)
+        json_object_update_new(cloth,
+                               json_pack("{s:f,s:f,s:f,s:f,s:f,s:f,s:f}", "diameter_spread", o->radius_spread, "lumen",
+                                         o->section.lumen, "lumen_spread", o->section.lumen_spread, "aspect",
+                                         fmax(1.0, o->section.aspect), "bean", o->section.bean, "section_turns_per_mm",
+                                         1e-3 * o->section.turns_per_m, "taper", o->section.taper));
     json_t *size = json_pack("{s:[i,i,i],s:[f,f],s:[f,f],s:i,s:i,s:f,s:f,s:f,s:f,s:f,s:f}", "n_voxel",
                              (int)r->n_voxel[0], (int)r->n_voxel[1], (int)r->n_voxel[2], "tile_mm",
                              1e3 * c->fibers.tile_size_m[0], 1e3 * c->fibers.tile_size_m[1], "yarn_spacing_um",

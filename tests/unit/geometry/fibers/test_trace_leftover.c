@@ -1,6 +1,6 @@
 /* A thin fiber between three thick ones that touch it, of which only the thick ones have lines: the second look finds
- * it where radii differ. It is left out where fibers are alike, and where radii spread like those of no yarn. Flat fibers
- * leave nothing at their sides. */
+ * it where radii differ. It is left out where fibers are alike, and where radii spread like those of no yarn. Flat
+ * fibers leave nothing at their sides. */
 #include "geometry/phantom/phantom_section.h"
 #include "geometry/trace/trace_job.h"
 
