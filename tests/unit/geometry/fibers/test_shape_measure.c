@@ -225,9 +225,10 @@ static struct lumen_errors measure_lumens(const struct test_fiber *f, bool corre
     return (struct lumen_errors){sqrt(e.error / n), sqrt(e.pull / n), sqrt(e.radius / n), e.bias / n, e.n_varying};
 }
 
-/* Of a single fiber neither the density nor the blur of its walls is known, so that its lumen is known less well than in
- * a cloth, which its stated error contains: hardly at all where walls are as thin as the blur (a lumen of 0.6). The scan
- * is drawn with voxels that are not means over cubes, which shifts the lumen along the same valley by up to 0.03. */
+/* Of a single fiber neither the density nor the blur of its walls is known, so that its lumen is known less well than
+ * in a cloth, which its stated error contains: hardly at all where walls are as thin as the blur (a lumen of 0.6). The
+ * scan is drawn with voxels that are not means over cubes, which shifts the lumen along the same valley by up to 0.03.
+ */
 static void test_lumens(void **state)
 {
     (void)state;
