@@ -283,8 +283,8 @@ static status get_groups(struct fiber_set *f, const uint8_t *colour, const char 
     return STATUS_OK;
 }
 
-/* Reads the tile size from the text of the header; 0 if another program wrote the file. *groups, *numbers: the text says
- * that the colours are groups, and that sections of so many numbers follow the arrays. */
+/* Reads the tile size from the text of the header; 0 if another program wrote the file. *groups, *numbers: the text
+ * says that the colours are groups, and that sections of so many numbers follow the arrays. */
 static void get_text(double tile_size_m[2], const uint8_t *header, bool *groups, int *numbers)
 {
     char text[HAIR_TEXT_BYTES + 1];

@@ -65,24 +65,25 @@ void fiber_set_classify(struct fiber_set *f);
 
 /* Cem Yuksel's .hair (docs/file-formats.md): positions in millimetres, and per point the thickness, which is the
  * diameter in millimetres. The 88-byte text of the header contains "selvedge tile_mm=<x>,<y>", the tile size;
- * without it the tile size is 0 after reading and the caller must set it. If a fiber has another group than 0, the text
- * goes on with " groups=rgb" and the colours of the points are the groups; colours without this text are ignored. If
- * the fibers have sections, the text ends with " sections", and seven numbers for each point follow the format's own
- * arrays; or with " lumens", and nine. Reading sets axis classes from the directions, takes half the mean thickness of a fiber's points as its
- * radius, and applies default segments and thickness of files of other programs; where the thickness varies along a
- * fiber, so does its radius, and points thinner than a twentieth of the mean get that. It checks the header against
- * the length of the file before it allocates. It replaces the content of f, or leaves f unchanged on failure. A fiber
- * of more than 65,536 vertices is written as several strands that share a vertex, and is read back as several fibers.
- * Errors name the file without its folder: STATUS_FORMAT (not a .hair file, counts that contradict each other or the
- * length, no thickness, not finite, a colour that is no group, numbers that are no section), STATUS_TOO_LARGE (more
- * vertices than the header can count, 2^32), STATUS_NOT_FOUND, STATUS_IO, STATUS_DISK_FULL, STATUS_NO_MEMORY. */
+ * without it the tile size is 0 after reading and the caller must set it. If a fiber has another group than 0, the
+ * text goes on with " groups=rgb" and the colours of the points are the groups; colours without this text are
+ * ignored. If the fibers have sections, the text ends with " sections", and seven numbers for each point follow the
+ * format's own arrays; or with " lumens", and nine. Reading sets axis classes from the directions, takes half the
+ * mean thickness of a fiber's points as its radius, and applies default segments and thickness of files of other
+ * programs; where the thickness varies along a fiber, so does its radius, and points thinner than a twentieth of the
+ * mean get that. It checks the header against the length of the file before it allocates. It replaces the content of
+ * f, or leaves f unchanged on failure. A fiber of more than 65,536 vertices is written as several strands that share
+ * a vertex, and is read back as several fibers. Errors name the file without its folder: STATUS_FORMAT (not a .hair
+ * file, counts that contradict each other or the length, no thickness, not finite, a colour that is no group,
+ * numbers that are no section), STATUS_TOO_LARGE (more vertices than the header can count, 2^32), STATUS_NOT_FOUND,
+ * STATUS_IO, STATUS_DISK_FULL, STATUS_NO_MEMORY. */
 status fiber_set_write_hair(const struct fiber_set *f, const char *path, struct error *err);
 status fiber_set_read_hair(struct fiber_set *f, const char *path, struct error *err);
-/* Text: a line "x y z radius" in millimetres for each vertex, and a blank line between fibers. If a fiber has another
- * group than 0, every line is "x y z radius group"; when read, all lines of a fiber must agree. If the fibers have
- * sections, seven numbers follow the group, or nine with lumens, also where it is 0 (docs/file-formats.md). The format has no tile size:
- * reading sets it to 0 and the caller must set it. The radius of a fiber is the mean of its lines, and varies along it
- * as they do. STATUS_FORMAT names the line; else as above. */
+/* Text: a line "x y z radius" in millimetres for each vertex, and a blank line between fibers. If a fiber has
+ * another group than 0, every line is "x y z radius group"; when read, all lines of a fiber must agree. If the
+ * fibers have sections, seven numbers follow the group, or nine with lumens, also where it is 0
+ * (docs/file-formats.md). The format has no tile size: reading sets it to 0 and the caller must set it. The radius
+ * of a fiber is the mean of its lines, and varies along it as they do. STATUS_FORMAT names the line; else as above. */
 status fiber_set_write_text(const struct fiber_set *f, const char *path, struct error *err);
 status fiber_set_read_text(struct fiber_set *f, const char *path, struct error *err);
 

@@ -16,7 +16,7 @@ struct section_compare {
     double ratio_bias, ratio_rms;      /* of found / true - 1 */
     double ratio_median, ratio_pull;   /* median of |found / true - 1| */
     double turn_median_deg, turn_pull; /* where the true ratio is above 1.3 */
-    /* Of found - true width of the lumen over that of the fiber, and the share of the vertices where the scan tells it. */
+    /* Of found - true width of the lumen over that of the fiber; share of the vertices where the scan tells it. */
     double lumen_rms, lumen_bias, lumen_pull, lumen_share;
 };
 

@@ -10,8 +10,8 @@
 
 #include "geometry/volume/volume.h"
 
-/* Sets the density in lumens to 1, and keeps what they had in v->filled. v: densities in [0, 1]. noise_sd: of a voxel. *filled_share: voxels filled over
- * those of material. STATUS_NO_MEMORY; with a scratch space also STATUS_DISK_FULL. */
+/* Sets the density in lumens to 1, and keeps what they had in v->filled. v: densities in [0, 1]. noise_sd: of a voxel.
+ * *filled_share: voxels filled over those of material. STATUS_NO_MEMORY; with a scratch space also STATUS_DISK_FULL. */
 status lumens_fill(struct volume *v, double noise_sd, double *filled_share, struct error *err);
 
 #endif

@@ -11,8 +11,8 @@ struct plane_sum {
     lanes gradient[AXIS_N_SHARED], normal[15], square, weight, slope;
 };
 
-/* Mean of a normal variable of standard deviation sd about `value` after it was clamped to [0, 1], and its derivative by
- * the value. */
+/* Mean of a normal variable of standard deviation sd about `value` after it was clamped to [0, 1], and its
+ * derivative by the value. */
 static void clamp_mean(float sd, lanes *value, lanes *slope)
 {
     for (int l = 0; l < LANES; l++) {

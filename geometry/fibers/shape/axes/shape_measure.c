@@ -148,7 +148,8 @@ static double line_noise(const struct scatter *own, const struct scatter *all)
     return fmax(common, own->n > 0.0 ? weight * noise_of(own) + (1.0 - weight) * common : common);
 }
 
-/* Takes the gradient of the radius, or of the lumen, of the whole line from those of its vertices. Returns the line's information. */
+/* Takes the gradient of the radius, or of the lumen, of the whole line from those of its vertices. Returns the
+ * line's information. */
 static double centre_gradient(struct line_work *w)
 {
     double gradient = 0.0, information = 0.0;

@@ -1,26 +1,28 @@
-/* Sections along lines with their errors, from the normal equations that the last round of a fit leaves (axis_fit.h).
+/* Sections along lines with their errors, from the normal equations that the last round of a fit leaves
+ * (axis_fit.h).
  *
- * Noise. What the residuals of neighbouring voxels have in common, by correlated noise or by what the model leaves out,
- * is in the gradients of single vertices, so their scatter is measured instead of counting voxels: sums of gradients
- * over pieces of a line have a variance of v times their information. Differences of order two (section: pieces of half
- * a diameter) and four (radius: pieces of a diameter) of neighbouring pieces give v without what varies slowly. v is
- * that of all lines, or that of a line itself where it is larger.
+ * Noise. What the residuals of neighbouring voxels have in common, by correlated noise or by what the model leaves
+ * out, is in the gradients of single vertices, so their scatter is measured instead of counting voxels: sums of
+ * gradients over pieces of a line have a variance of v times their information. Differences of order two (section:
+ * pieces of half a diameter) and four (radius: pieces of a diameter) of neighbouring pieces give v without what
+ * varies slowly. v is that of all lines, or that of a line itself where it is larger.
  *
  * Curvature. The weights of the fit fall with the residuals, so the gradient of a converged fit changes by less than
  * the N of the normal equations for a step of 1: by `slope` N, which stands for N below.
  *
- * Section. The fit has smoothed c and s (fiber_section.h) over one diameter by M = N + L D'D + hold. The covariance of
- * a smooth section is v M^-1 N M^-1, far from ends 3/4 v M^-1. A flatness of 0 is measured as more than 0, so the
+ * Section. The fit has smoothed c and s (fiber_section.h) over one diameter by M = N + L D'D + hold. The covariance
+ * of a smooth section is v M^-1 N M^-1, far from ends 3/4 v M^-1. A flatness of 0 is measured as more than 0, so the
  * variance of its component across is subtracted from its square.
  *
- * Radius. chi^2 of the radii of pieces of two diameters about the radius of the line says whether it varies. Where it
- * does, the radius follows the data by the same kind of equation.
+ * Radius. chi^2 of the radii of pieces of two diameters about the radius of the line says whether it varies. Where
+ * it does, the radius follows the data by the same kind of equation.
  *
- * Lumen. The area of the lumen is measured like the radius, each with what is left of its gradient without the part that
- * the other explains. The width follows as the root of the area, so its error is that of a root: sqrt(a + e) - sqrt(a)
- * for an area a with the error e. Where that exceeds the standard deviation of widths that may be anything from 0 to 0.8,
- * the scan tells nothing, and width and error are 0. The variance has a part that all fibers share: density and blur of
- * the walls are not known beforehand, and walls that are thinner than the blur look like less dense ones. */
+ * Lumen. The area of the lumen is measured like the radius, each with what is left of its gradient without the part
+ * that the other explains. The width follows as the root of the area, so its error is that of a root: sqrt(a + e) -
+ * sqrt(a) for an area a with the error e. Where that exceeds the standard deviation of widths that may be anything
+ * from 0 to 0.8, the scan tells nothing, and width and error are 0. The variance has a part that all fibers share:
+ * density and blur of the walls are not known beforehand, and walls that are thinner than the blur look like less
+ * dense ones. */
 #ifndef SELVEDGE_GEOMETRY_SHAPE_MEASURE_H
 #define SELVEDGE_GEOMETRY_SHAPE_MEASURE_H
 
