@@ -28,6 +28,8 @@ status doctor_execute(char *const *argv, char *text, size_t n_text, int *code, s
 void doctor_examine_machine(struct doctor *d);
 /* Data folder, disk, database, backups, secrets, the worker and its sandbox, dashboard. */
 void doctor_examine_service(struct doctor *d);
+/* With server.store: the database and the folder that daemons share. */
+void doctor_examine_store(struct doctor *d);
 /* With jobs.backend = slurm: whether it takes jobs. */
 void doctor_examine_cluster(struct doctor *d);
 /* A job by its id or by the path of its folder. STATUS_NOT_FOUND. */

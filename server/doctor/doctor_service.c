@@ -1,6 +1,7 @@
 /* The data folder and what else the service needs with these settings. */
 #include "base/clock.h"
 #include "base/version.h"
+#include "server/cluster/store_settings.h"
 #include "server/doctor/doctor_report.h"
 #include "server/http/http_listen.h"
 #include "server/http/http_tls.h"
@@ -78,7 +79,7 @@ static void examine_disk(struct doctor *d)
     double free_gb = (double)fs.f_bavail * (double)fs.f_frsize / 1e9, floor_gb = (double)d->settings->floor_bytes / 1e9;
     double sync_s = try_sync(data, &err);
     path_join(database, data, "selvedge.db", NULL);
-    if (sync_s < 0 || store_check_place(database, &err) != STATUS_OK)
+    if (sync_s < 0 || (!store_settings_shared(d->settings) && store_check_place(database, &err) != STATUS_OK))
         doctor_say(d, DOCTOR_FAULT, "disk", "%s", err.text);
     else if (free_gb < floor_gb)
         doctor_say(d, DOCTOR_FAULT, "disk",
@@ -101,8 +102,10 @@ static bool daemon_runs(const struct doctor *d)
 {
     char path[PATH_BYTES];
     path_join(path, d->settings->data, "lock", NULL);
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    bool held = fd >= 0 && flock(fd, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+    int fd = open(path, O_RDWR | O_CLOEXEC);
+    /* daemons that share a database share the lock */
+    int lock = store_settings_shared(d->settings) ? LOCK_EX : LOCK_SH;
+    bool held = fd >= 0 && flock(fd, lock | LOCK_NB) != 0 && errno == EWOULDBLOCK;
     if (fd >= 0) close(fd); /* and with it the lock */
     return held;
 }
@@ -283,8 +286,12 @@ void doctor_examine_service(struct doctor *d)
     bool usable = examine_folder(d), runs = usable && daemon_runs(d);
     if (usable) {
         examine_disk(d);
-        examine_database(d);
-        examine_backups(d, runs);
+        if (store_settings_shared(d->settings))
+            doctor_examine_store(d);
+        else {
+            examine_database(d);
+            examine_backups(d, runs);
+        }
         examine_quarantine(d);
     }
     examine_address(d, runs);

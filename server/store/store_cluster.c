@@ -50,6 +50,27 @@ status store_identity(struct store *store, char id[STORE_ID_BYTES], struct error
     return ask(store, id, STORE_ID_BYTES, err, "SELECT id FROM identity WHERE one = 1", NULL, NULL);
 }
 
+status store_server_look(struct store *store, struct store_server *server, struct error *err)
+{
+    char how[8];
+    *server = (struct store_server){0};
+    status s = ask(store, server->version, sizeof server->version, err, "SELECT current_setting('server_version')",
+                   NULL, NULL);
+    /* three letters, t or f each */
+    if (s == STATUS_OK)
+        s = ask(store, how, sizeof how, err,
+                "SELECT concat(current_setting('fsync') = 'on' AND current_setting('full_page_writes') = 'on', "
+                "coalesce((SELECT ssl FROM pg_stat_ssl WHERE pid = pg_backend_pid()), false), "
+                "coalesce(inet_client_addr() = inet_server_addr() OR inet_client_addr() <<= '127.0.0.0/8', true))",
+                NULL, NULL);
+    if (s != STATUS_OK) return s;
+    server->version[strcspn(server->version, " ")] = '\0';
+    server->syncs = how[0] == 't';
+    server->encrypted = how[0] != '\0' && how[1] == 't';
+    server->local = how[0] != '\0' && how[1] != '\0' && how[2] == 't';
+    return STATUS_OK;
+}
+
 status store_clock(struct store *store, double *now_unix_s, struct error *err)
 {
     char text[64];

@@ -23,6 +23,14 @@ struct daemon_row {
 bool store_is_shared(const struct store *store);
 /* An id that the database got when it was made. */
 status store_identity(struct store *store, char id[STORE_ID_BYTES], struct error *err);
+/* What kind of server it is. */
+struct store_server {
+    char version[64];
+    bool syncs;     /* it writes so that changes survive power loss */
+    bool encrypted; /* the connection is */
+    bool local;     /* the connection does not leave this machine */
+};
+status store_server_look(struct store *store, struct store_server *server, struct error *err);
 /* The server's clock. */
 status store_clock(struct store *store, double *now_unix_s, struct error *err);
 

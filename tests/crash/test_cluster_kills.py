@@ -8,7 +8,7 @@ import pytest
 import requests
 
 from cluster_kills import pair, run
-from daemon_under_test import wait_until
+from daemon_under_test import selvedged, settings_arguments, wait_until
 from servers.postgres_server import PostgresMissing, PostgresServer
 
 
@@ -91,6 +91,19 @@ def test_what_a_shared_folder_refuses(daemons, server, tmp_path):
     del embedded.options["server.store"]
     with pytest.raises(AssertionError, match="another selvedged is using it"):
         embedded.start()
+
+
+def test_the_doctor_looks_at_database_and_folder(daemons, server):
+    one, two = daemons
+    settings = settings_arguments(one.options)
+    said = selvedged(one.data, *settings, "--doctor", expect=1)  # the server of the tests does not sync
+    assert "does not write safely" in said and "locks, syncs, O_EXCL and renames work" in said and "it is running" in said
+    assert all(f"process {d.process.pid}, {d.url}: its lease lasts" in said for d in (one, two))
+    assert server.password not in said and server.password not in one.log_text()
+    said = selvedged(one.data, *settings, "--backup", "/nowhere", expect=1)
+    assert "pg_dump" in said
+    said = selvedged(one.data, "--set", f"server.store={server.address('none')}", "--doctor", expect=1)
+    assert "no password supplied" in said
 
 
 def test_a_list_that_waits_learns_of_changes_at_the_other_daemon(daemons):
