@@ -51,7 +51,7 @@ static const struct setting table[] = {
          "folder of the database and of all jobs, on a local file system; with a shared database, on a shared one"),
     TEXT("server", "store", store, "",
          "address postgresql://USER@HOST/DATABASE of a database that several daemons share; empty: a file in the data "
-         "folder (docs/cluster.md)"),
+         "folder (docs/shared-database.md)"),
     TEXT("server", "store_password_file", store_password_file, "",
          "file with the password of that database, which other users must not be able to read"),
     NUMBER("server", "lease_s", lease_s, 15, 2, 3600,

@@ -19,7 +19,8 @@
 
 static status unfit(const char *folder, const char *what, struct error *err)
 {
-    return error_set(err, STATUS_UNSUPPORTED, "cannot share data folder '%s': %s (docs/cluster.md)", folder, what);
+    return error_set(err, STATUS_UNSUPPORTED, "cannot share data folder '%s': %s (docs/shared-database.md)", folder,
+                     what);
 }
 
 /* Two descriptors of a file: the second one must not get the lock of the first one. */

@@ -125,7 +125,7 @@ static void *run(void *context)
 status backup_keeper_start(struct job_service *v, struct backup_keeper **out, struct error *err)
 {
     *out = NULL;
-    /* a server is backed up by its own means (docs/cluster.md) */
+    /* a server is backed up by its own means (docs/shared-database.md) */
     if (v->settings->backup_every_s == 0 || store_settings_shared(v->settings)) return STATUS_OK;
     struct backup_keeper *k = calloc(1, sizeof *k);
     if (k == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start backups: out of memory");
