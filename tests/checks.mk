@@ -1,5 +1,5 @@
 # Checks of the sources. `make test` and `make check` count each of them as a test.
-.PHONY: every-program layers format format-check columns clang lint lint-c lint-javascript lint-python lint-shell
+.PHONY: every-object layers format format-check columns clang lint lint-c lint-javascript lint-python lint-shell
 # clang-format 14, that of Debian 12: other versions break lines elsewhere
 FORMATTED = $(shell find base geometry renderer optimizer server clients tests -name '*.[ch]' -o -name '*.cpp')
 SHELL_SCRIPTS = $(shell git ls-files '*.sh') config/install-dependencies .ci/run
@@ -19,12 +19,13 @@ layers:            ## includes and calls go one way, the daemon holds no symbol 
 columns:           ## no line of a C source is longer than 120 columns, comments included
 	@/usr/bin/python3 tests/check_columns.py $(FORMATTED)
 
-# benchmarks and fuzzers, which no other target of continuous integration compiles, are part of it
-EVERY_PROGRAM = all build-tests $(BENCH_BINS) $(BUILD)/tests/bench/pictures/documentation_pictures $(call objs,$(wildcard tests/fuzz/*.c))
-every-program: $(EVERY_PROGRAM)
+# objects of all sources, none of them linked; benchmarks and fuzzers, which no other target of continuous integration
+# compiles, are part of it
+EVERY_SOURCE = $(shell find $(foreach p,$(PARTS),$(folder_$p)) clients/cli tests -name '*.c' -o -name '*.cpp')
+every-object: $(call objs,$(EVERY_SOURCE))
 
 clang:             ## clang compiles every source, benchmarks and fuzzers too, without a warning (gcc does in every build)
-	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/clang CC=clang CXX=clang++ OPTIMIZE=-O0 every-program
+	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/clang CC=clang CXX=clang++ OPTIMIZE=-O0 CFLAGS=-g0 CXXFLAGS=-g0 every-object
 	@echo "clang ok"
 
 lint: lint-c lint-javascript lint-python lint-shell ## all of the next four

@@ -13,7 +13,7 @@
 
 #include <cmocka.h>
 
-enum { N_THETA = 48, N_PHI = 48, SUB = 24, N_SAMPLE = 200000 };
+enum { N_THETA = 48, N_PHI = 48, LEAST_SUB = 6, MOST_SUB = 48, N_SAMPLE = 200000 };
 
 static size_t cell_of(const float w[3])
 {
@@ -23,22 +23,44 @@ static size_t cell_of(const float w[3])
     return i * N_PHI + j;
 }
 
-/* Integrates the density over each cell. Returns the sum of the integrals. */
-static double expected_counts(const struct scattering_model *m, const struct scattering_state *s, const float wo[3],
-                              const float *weight, double *expected)
+/* A density of one outgoing direction. */
+struct density {
+    const struct scattering_model *m;
+    const struct scattering_state *s;
+    const float *wo, *weight;
+};
+
+/* Integrates the density over a cell by the midpoints of sub x sub parts of it. */
+static double cell_integral(const struct density *d, size_t i_theta, size_t i_phi, size_t sub)
 {
-    double total = 0, h_theta = M_PI / (N_THETA * SUB), h_phi = 2 * M_PI / (N_PHI * SUB);
-    memset(expected, 0, N_THETA * N_PHI * sizeof *expected);
-    for (size_t i = 0; i < N_THETA * SUB; i++) {
+    double sum = 0, h_theta = M_PI / (double)(N_THETA * sub), h_phi = 2 * M_PI / (double)(N_PHI * sub);
+    for (size_t i = i_theta * sub; i < (i_theta + 1) * sub; i++) {
         double theta = -M_PI_2 + ((double)i + 0.5) * h_theta;
-        for (size_t j = 0; j < N_PHI * SUB; j++) {
+        for (size_t j = i_phi * sub; j < (i_phi + 1) * sub; j++) {
             double phi = -M_PI + ((double)j + 0.5) * h_phi;
             float wi[3] = {(float)sin(theta), (float)(cos(theta) * cos(phi)), (float)(cos(theta) * sin(phi))};
-            double p = (double)m->pdf(s, wi, wo, weight) * cos(theta) * h_theta * h_phi;
-            expected[i / SUB * N_PHI + j / SUB] += p * N_SAMPLE;
-            total += p;
+            sum += (double)d->m->pdf(d->s, wi, d->wo, d->weight) * cos(theta) * h_theta * h_phi;
         }
     }
+    return sum;
+}
+
+/* Counts that are expected in each cell. Parts are halved until that changes a count by less than a fiftieth of its
+ * standard deviation, or of 1, and so chi-square of all cells by far less than its own. Returns the sum of the
+ * integrals. */
+static double expected_counts(const struct density *d, double *expected)
+{
+    double total = 0;
+    for (size_t i = 0; i < N_THETA; i++)
+        for (size_t j = 0; j < N_PHI; j++) {
+            double n = N_SAMPLE * cell_integral(d, i, j, LEAST_SUB), before = INFINITY;
+            for (size_t sub = 2 * LEAST_SUB; sub <= MOST_SUB && fabs(n - before) > 0.02 * sqrt(fmax(n, 1)); sub *= 2) {
+                before = n;
+                n = N_SAMPLE * cell_integral(d, i, j, sub);
+            }
+            expected[i * N_PHI + j] = n;
+            total += n / N_SAMPLE;
+        }
     return total;
 }
 
@@ -49,7 +71,7 @@ static void check(const struct scattering_model *m, const double *param, const f
     struct scattering_state *s = NULL;
     struct error err = {0};
     if (m->prepare(param, &s, &err) != STATUS_OK) fail_msg("%s", err.text);
-    double total = expected_counts(m, s, wo, weight, expected), n_degree;
+    double total = expected_counts(&(struct density){m, s, wo, weight}, expected), n_degree;
     if (fabs(total - 1) > 2e-3)
         fail_msg("%s: density integrates to %.6f for wo = %g %g %g", m->id, total, (double)wo[0], (double)wo[1],
                  (double)wo[2]);
