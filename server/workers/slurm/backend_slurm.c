@@ -152,33 +152,44 @@ static void trouble(void *state, char *text, size_t n_text)
     pthread_mutex_unlock(&d->lock);
 }
 
-/* Adds a run that begins with this step, unless its note tells more. */
+/* Begins a run: a new one is submitted, one that is adopted is known by its note or must be found. */
+static void begin_run(const struct slurm_desk *d, struct backend_run *run, const struct job_row *row, bool adopt)
+{
+    struct backend_note *note = &run->note;
+    snprintf(run->job_id, sizeof run->job_id, "%s", row->id);
+    run->attempt = row->attempt;
+    run->phase = BACKEND_WAITS;
+    slurm_comment(row->id, row->attempt, run->comment);
+    backend_note_read(d->v->settings->data, row->id, note);
+    snprintf(note->backend, sizeof note->backend, "slurm");
+    bool noted = note->attempt == row->attempt && note->id[0] != '\0';
+    run->step = !adopt ? SLURM_TO_SUBMIT : noted ? SLURM_KNOWN : SLURM_TO_FIND;
+    if (run->step != SLURM_TO_FIND) return;
+    note->attempt = row->attempt;
+    note->id[0] = '\0';
+}
+
+static void enlist(struct slurm_desk *d, struct backend_run *run)
+{
+    pthread_mutex_lock(&d->lock);
+    run->next = d->first;
+    d->first = run;
+    if (run->step != SLURM_TO_SUBMIT) d->looked_s = -1e9;
+    pthread_cond_signal(&d->changed);
+    pthread_mutex_unlock(&d->lock);
+}
+
 static status add_run(struct slurm_desk *d, const char *job_id, bool adopt, struct backend_run **out, struct error *err)
 {
     struct job_row row;
     status s = store_job_look(d->v->store, job_id, &row, err);
     if (s != STATUS_OK) return s;
-    struct backend_run *run = calloc(1, sizeof *run);
-    if (run == NULL) s = error_set(err, STATUS_NO_MEMORY, "cannot submit job %s: out of memory", job_id);
-    if (s == STATUS_OK) {
-        snprintf(run->job_id, sizeof run->job_id, "%s", job_id);
-        run->attempt = row.attempt;
-        run->phase = BACKEND_WAITS;
-        slurm_comment(job_id, row.attempt, run->comment);
-        backend_note_read(d->v->settings->data, job_id, &run->note);
-        bool noted = run->note.attempt == row.attempt && run->note.id[0] != '\0';
-        run->step = !adopt ? SLURM_TO_SUBMIT : noted ? SLURM_KNOWN : SLURM_TO_FIND;
-        if (run->step == SLURM_TO_FIND) run->note.attempt = row.attempt;
-        if (run->step == SLURM_TO_FIND) run->note.id[0] = '\0';
-        snprintf(run->note.backend, sizeof run->note.backend, "slurm");
-        pthread_mutex_lock(&d->lock);
-        run->next = d->first;
-        d->first = run;
-        if (adopt) d->looked_s = -1e9;
-        pthread_cond_signal(&d->changed);
-        pthread_mutex_unlock(&d->lock);
-        *out = run;
-    }
+    *out = calloc(1, sizeof **out);
+    if (*out != NULL) {
+        begin_run(d, *out, &row, adopt);
+        enlist(d, *out);
+    } else
+        s = error_set(err, STATUS_NO_MEMORY, "cannot submit job %s: out of memory", job_id);
     job_row_release(&row);
     return s;
 }

@@ -43,7 +43,7 @@ struct slurm_desk {
     struct backend_run *first;
     char trouble[SLURM_ERROR_BYTES]; /* why Slurm takes no jobs; "": it does */
     double not_before_s, pause_s;    /* no submission before; the last pause between two tries */
-    double looked_s;                 /* of the desk's thread: when the list was read last */
+    double looked_s;                 /* when the list was read last */
 };
 
 /* What the desk's thread does. All of them are called without the lock, for runs that only this thread removes. */

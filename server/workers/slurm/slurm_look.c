@@ -180,7 +180,9 @@ void slurm_look(struct slurm_desk *d)
     snprintf(user, sizeof user, "--user=%u", (unsigned)geteuid());
     const char *const argument[] = {d->squeue, "--noheader", user, "--states=all", "--Format=" SLURM_COLUMNS, NULL};
     status s = slurm_command_run(d->v->settings, argument, NULL, &out, &err);
+    pthread_mutex_lock(&d->lock);
     d->looked_s = clock_monotonic_s();
+    pthread_mutex_unlock(&d->lock);
     if (s == STATUS_OK && out.code == 0) s = slurm_parse_jobs(out.text, &job, &n, &err);
     if (s != STATUS_OK || out.code != 0) {
         slurm_note_trouble(d, "squeue", s != STATUS_OK ? err.text : out.error);
