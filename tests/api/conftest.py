@@ -8,7 +8,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(
 from daemon_under_test import Daemon, program  # noqa: E402
 from system_calls import build_shim  # noqa: E402
 
-OF_SQLITE = ("sqlite3", "selvedge.db", "--rebuild", "database(", "older_database", "shim", "EXPLAIN")
+OF_SQLITE = ("sqlite3", "selvedge.db", "--rebuild", "database(", "older_database", "shim", "EXPLAIN", "file_rows_locked")
 
 
 def pytest_collection_modifyitems(items):

@@ -116,26 +116,33 @@ def finish(traffic, daemons):
     return sum(ends.values())
 
 
-def run(server, folder, n_kills, seed):
-    """Returns counts of kills, facts and jobs with a result."""
+def run(server, folder, n_kills, seed, pauses_s=(0, 0.2, 1.5 * LEASE_S)):
+    """pauses_s: how long the other daemon goes on alone. Returns counts of kills, facts and jobs with a result."""
     rng = random.Random(seed)
-    daemons, traffic, kills = [d.start() for d in pair(server, folder)], Traffic(rng), 0
+    daemons = [d.start() for d in pair(server, folder)]
+    try:
+        kills, facts, results = loop(daemons, n_kills, pauses_s, rng)
+    finally:
+        for d in daemons:
+            d.stop()
+    return {"kills": kills, "facts": facts, "results": results}
+
+
+def loop(daemons, n_kills, pauses_s, rng):
+    traffic, kills = Traffic(rng), 0
     while kills < n_kills:
         victims = list(daemons) if kills % 10 == 9 and kills + 2 <= n_kills else [rng.choice(daemons)]
         one_round(traffic, daemons, victims, rng)
         kills += len(victims)
         others = [d for d in daemons if d not in victims]
-        if others:  # the other one has all facts at once, and goes on for a while, at times longer than a lease
+        if others:  # the other one has all facts at once, and goes on for a while
             traffic.confirm(others[0])
-            end = time.monotonic() + rng.choice([0, 0.2, 1.5 * LEASE_S])
+            end = time.monotonic() + rng.choice(pauses_s)
             while time.monotonic() < end:
                 traffic.request(others[0])
         for d in victims:
             d.start()
-    results = finish(traffic, daemons)
-    for d in daemons:
-        d.stop()
-    return {"kills": kills, "facts": traffic.facts, "results": results}
+    return kills, traffic.facts, finish(traffic, daemons)
 
 
 def main():

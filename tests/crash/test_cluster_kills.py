@@ -31,7 +31,7 @@ def daemons(server, tmp_path):
 
 
 def test_nothing_acknowledged_is_lost(server, tmp_path):
-    count = run(server, str(tmp_path), 10, seed=7)
+    count = run(server, str(tmp_path), 10, seed=7, pauses_s=(0, 0.2))
     assert count["kills"] >= 10 and count["facts"] > 50
 
 
@@ -66,7 +66,7 @@ def test_a_server_that_restarts_ends_no_job(daemons, server):
 def test_a_daemon_that_was_stopped_for_long_finds_its_jobs_taken(daemons):
     """SIGSTOP for longer than the lease, then SIGCONT: the other daemon has the jobs, and each has one result."""
     one, two = daemons
-    jobs = [one.start_job("work 3") for _ in range(3)]
+    jobs = [one.start_job("work 2") for _ in range(3)]
     wait_until(lambda: sum(two.job(j)["state"] == "running" for j in jobs) == 3)
     one.process.send_signal(19)
     try:

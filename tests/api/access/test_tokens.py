@@ -11,7 +11,7 @@ import time
 
 import pytest
 import requests
-from daemon_under_test import DOCUMENT, ROOT, Daemon, problem, program
+from daemon_under_test import DOCUMENT, ROOT, Daemon, problem, program, settings_arguments
 from openapi_check import METHODS, load
 
 OPERATIONS = [(path, method, item[method]) for path, item in load()["paths"].items() for method in METHODS if method in item]
@@ -71,7 +71,8 @@ def test_the_first_token(daemon_maker, running):
     problem(r, 401, "token", "Authorization")
     assert r.headers["WWW-Authenticate"] == 'Bearer realm="selvedge"'
     assert [j["id"] for j in d.of(token).get("/v1/jobs").json()["jobs"]] == [job]
-    again = subprocess.run([program("selvedged"), "--data", d.data, "--make-token", "root"], capture_output=True, text=True, check=False)
+    again = subprocess.run([program("selvedged"), "--data", d.data, *settings_arguments(d.options), "--make-token", "root"],
+                           capture_output=True, text=True, check=False)
     assert again.returncode == 1 and "a token named 'root' exists" in again.stderr and again.stdout == ""
 
 
