@@ -150,8 +150,12 @@ static bool take_in_root(void *context, size_t i_thread, size_t *i_task)
 static void run_in_root(void *context, size_t i_task, size_t i_thread)
 {
     struct share *s = context;
+    double begin_s = clock_thread_s();
     s->work->run(s->work->context, i_task, i_thread);
+    begin_s = clock_thread_s() - begin_s;
     pthread_mutex_lock(&s->lock);
+    s->team->traffic.own_cpu_s += begin_s;
+    s->team->traffic.n_own++;
     s->n_done++;
     progress_report(s->progress, (double)s->n_done / (double)s->work->n_task);
     pthread_mutex_unlock(&s->lock);

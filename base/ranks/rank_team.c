@@ -1,3 +1,4 @@
+#include "base/clock.h"
 #include "base/ranks/rank_team_data.h"
 
 #include <stdio.h>
@@ -39,7 +40,14 @@ size_t rank_team_n_rank(const struct rank_team *t) { return t->n_rank; }
 bool rank_team_broken(const struct rank_team *t) { return t->broken; }
 void rank_team_accompany(struct rank_team *t, void *companion) { t->companion = companion; }
 void *rank_team_companion(const struct rank_team *t) { return t->companion; }
-const struct rank_traffic *rank_team_traffic(const struct rank_team *t) { return &t->traffic; }
+
+struct rank_traffic rank_team_traffic(const struct rank_team *t)
+{
+    struct rank_traffic traffic = t->traffic;
+    traffic.cpu_s = clock_process_s();
+    return traffic;
+}
+
 const atomic_bool *rank_team_cancel(const struct rank_team *t) { return &t->cancel; }
 
 status rank_team_send(struct rank_team *t, size_t peer, enum rank_message kind, const void *data, size_t n_bytes,

@@ -22,6 +22,9 @@ struct rank_traffic {
     size_t n_order, n_share, n_task, n_message; /* messages: those that the root has received */
     uint64_t order_bytes, result_bytes;         /* of orders once, however many ranks get them */
     double share_s, wait_s; /* in rank_team_share, and in it after the root's own last task, waiting for helpers */
+    size_t n_own;           /* tasks that the root has run itself */
+    double own_cpu_s;       /* processor time of these */
+    double cpu_s;           /* of the process, until now */
 };
 
 struct rank_order {
@@ -41,7 +44,7 @@ bool rank_team_broken(const struct rank_team *team);
 /* Something of the caller's that goes with the team: what the ranks share. Not owned. */
 void rank_team_accompany(struct rank_team *team, void *companion);
 void *rank_team_companion(const struct rank_team *team);
-const struct rank_traffic *rank_team_traffic(const struct rank_team *team);
+struct rank_traffic rank_team_traffic(const struct rank_team *team);
 /* Set in a helper while the root has cancelled the tasks that are shared. */
 const atomic_bool *rank_team_cancel(const struct rank_team *team);
 

@@ -5,6 +5,7 @@
 #include "optimizer/job/stage_table.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/progress/pipeline_plan.h"
+#include "optimizer/worker/ranks/worker_team.h"
 
 #include <math.h>
 
@@ -65,10 +66,13 @@ static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, 
     status s = code->load != NULL && !*earlier_ran ? unmark_from(c, i, err) : STATUS_OK;
     if (code->load != NULL) *earlier_ran = true;
     log_info(c->log, "stage %s", code->name);
+    struct rank_traffic before = {.n_share = 0};
+    worker_team_begin_stage(c->pool, &before);
     if (s == STATUS_OK) s = code->run(c, err);
     if (s != STATUS_OK) return job_option_name_field(s, err);
     c->stage_wall_s[i] = clock_monotonic_s() - start_s;
     log_info(c->log, "stage %s: %.1f s", code->name, c->stage_wall_s[i]);
+    worker_team_end_stage(c->pool, &before, code->name, c->log);
     return worker_folder_mark_stage(c->folder, code->name, err);
 }
 

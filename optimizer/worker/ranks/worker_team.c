@@ -104,20 +104,37 @@ bool worker_team_lost(const struct worker_team *t) { return t->team != NULL && r
 void worker_team_close(struct worker_team *t, struct thread_pool *pool, struct log *log)
 {
     if (t->team == NULL) return;
-    const struct rank_traffic *r = rank_team_traffic(t->team);
     if (rank_team_broken(t->team))
         log_error(log, "another rank is lost: the job goes on from its checkpoint when it runs again");
-    else
-        log_info(
-            log,
-            "%zu ranks shared %zu estimates and pictures (%zu tasks, %.2f s): %zu orders of %llu bytes, %llu bytes "
-            "of results in %zu messages; rank 0 waited %.3f s for others",
-            rank_team_n_rank(t->team), r->n_share, r->n_task, r->share_s, r->n_order,
-            (unsigned long long)r->order_bytes, (unsigned long long)r->result_bytes, r->n_message, r->wait_s);
     if (pool != NULL) thread_pool_join_team(pool, NULL);
     rank_team_close(t->team);
     shared_cloth_release(&t->cloth);
     t->team = NULL;
+}
+
+void worker_team_begin_stage(struct thread_pool *pool, struct rank_traffic *before)
+{
+    const struct rank_team *team = thread_pool_team(pool);
+    if (team != NULL) *before = rank_team_traffic(team);
+}
+
+void worker_team_end_stage(struct thread_pool *pool, const struct rank_traffic *before, const char *stage,
+                           struct log *log)
+{
+    const struct rank_team *team = thread_pool_team(pool);
+    if (team == NULL) return;
+    const struct rank_traffic r = rank_team_traffic(team);
+    if (r.n_share == before->n_share) return;
+    log_info(
+        log,
+        "stage %s: %zu ranks shared %zu estimates and pictures (%zu tasks, %.2f s): %zu orders of %llu bytes, %llu "
+        "bytes of results in %zu messages; rank 0 waited %.3f s for others, and ran %zu tasks in %.3f of its %.3f "
+        "s of processor time",
+        stage, rank_team_n_rank(team), r.n_share - before->n_share, r.n_task - before->n_task,
+        r.share_s - before->share_s, r.n_order - before->n_order,
+        (unsigned long long)(r.order_bytes - before->order_bytes),
+        (unsigned long long)(r.result_bytes - before->result_bytes), r.n_message - before->n_message,
+        r.wait_s - before->wait_s, r.n_own - before->n_own, r.own_cpu_s - before->own_cpu_s, r.cpu_s - before->cpu_s);
 }
 
 int worker_team_help(const struct worker_team_place *place, size_t n_thread)

@@ -111,8 +111,8 @@ static void two_ranks_estimate_the_same_bits(void **state)
                 assert_int_equal(estimate_run(&q, r.pool, NULL, together, &err), STATUS_OK);
                 assert_memory_equal(alone, together, sizeof alone);
             }
-            assert_true(rank_team_traffic(r.team)->result_bytes > 0); /* the helper has done a part of it */
-            assert_int_equal(rank_team_traffic(r.team)->n_order, 3);  /* the cloth is sent once */
+            assert_true(rank_team_traffic(r.team).result_bytes > 0); /* the helper has done a part of it */
+            assert_int_equal(rank_team_traffic(r.team).n_order, 3);  /* the cloth is sent once */
             assert_int_equal(end(&r), 0);
         }
 }
@@ -130,7 +130,7 @@ static void two_ranks_render_the_same_bits(void **state)
     assert_int_equal(render_run(&q, NULL, NULL, &alone, &err), STATUS_OK);
     start(&r, 1);
     assert_int_equal(render_run(&q, r.pool, NULL, &together, &err), STATUS_OK);
-    assert_true(rank_team_traffic(r.team)->result_bytes > 0);
+    assert_true(rank_team_traffic(r.team).result_bytes > 0);
     assert_memory_equal(alone.pixel, together.pixel, 24 * 16 * alone.n_channel * sizeof *alone.pixel);
     assert_int_equal(end(&r), 0);
     image_release(&alone);
