@@ -307,7 +307,7 @@ status rank_team_share(struct rank_team *t, const struct rank_work *work, struct
 {
     struct share s = {.team = t, .work = work, .progress = progress, .n_thread = thread_pool_n_thread(pool)};
     const bool root = t->rank == 0;
-    double start_s = clock_monotonic_s();
+    double start_s = clock_monotonic_s(), cpu_s = clock_process_s();
     status st = prepare(&s, err);
     if (st == STATUS_OK) {
         thread_pool_run_from(pool, root ? take_in_root : take_in_helper, root ? run_in_root : run_in_helper, &s);
@@ -320,6 +320,7 @@ status rank_team_share(struct rank_team *t, const struct rank_work *work, struct
     t->traffic.n_share++;
     t->traffic.n_task += work->n_task;
     t->traffic.share_s += clock_monotonic_s() - start_s;
+    t->traffic.share_cpu_s += clock_process_s() - cpu_s;
     pthread_mutex_destroy(&s.lock);
     pthread_cond_destroy(&s.more);
     free(s.done);

@@ -24,6 +24,7 @@ struct rank_traffic {
     double share_s, wait_s; /* in rank_team_share, and in it after the root's own last task, waiting for helpers */
     size_t n_own;           /* tasks that the root has run itself */
     double own_cpu_s;       /* processor time of these */
+    double share_cpu_s;     /* processor time of the process in rank_team_share */
     double cpu_s;           /* of the process, until now */
 };
 
@@ -65,7 +66,7 @@ status rank_team_gather(struct rank_team *team, struct error *err);
 struct rank_work {
     size_t n_task, most_bytes;
     task_function run;
-    size_t (*pack)(const void *context, size_t i_task, void *to);
+    size_t (*pack)(void *context, size_t i_task, void *to);
     bool (*unpack)(void *context, size_t i_task, const void *from, size_t n_bytes);
     void *context;
 };

@@ -87,7 +87,7 @@ static size_t task_pixels(const struct run *r, size_t i_task, float **pixel)
     return (n < r->pixels_per_task ? n : r->pixels_per_task) * r->im->n_channel * sizeof **pixel;
 }
 
-static size_t pack_task(const void *context, size_t i_task, void *to)
+static size_t pack_task(void *context, size_t i_task, void *to)
 {
     float *pixel;
     size_t n = task_pixels(context, i_task, &pixel);

@@ -223,6 +223,9 @@ static status run(void *context, const struct estimator_call *call, const struct
     const double share = differ ? 1.0 / cloth_estimator_cost(e->moves, free_numbers(e)) : 1.0;
     struct progress_part part;
     struct progress first = progress_begin_part(&part, progress, 0.0, share);
+    struct estimator_call alone = *call;
+    alone.pair = NULL; /* moved cloths come between the replicas */
+    call = &alone;
     status s = e->source.estimate(e->source.context, call->param + e->n_scattering, call, &first, out, wall_s, err);
     for (size_t i = 0; i < e->n_configuration && s == STATUS_OK; i++) {
         widen(e->n_scattering, e->source.n_number, out[i].jac);

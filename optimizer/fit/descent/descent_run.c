@@ -83,10 +83,12 @@ status descent_estimate(struct descent_run *run, const double *param, uint32_t i
                                 .context = &part,
                                 .cancel = run->problem->progress != NULL ? run->problem->progress->cancel : NULL};
     for (size_t i = 0; i < e->n_configuration; i++) part.n_path_call += (double)run->n_path[i];
+    struct estimator_pair pair = {.next = run->replica[1]};
     run->n_path_step = 0;
     for (uint32_t q = 0; q < 2; q++) {
-        struct estimator_call call = {param,         run->n_path,     iteration, q == 0 ? REPLICA_FIT_A : REPLICA_FIT_B,
-                                      want_jacobian, run->plain_paths};
+        struct estimator_call call = {
+            param,         run->n_path,      iteration, q == 0 ? REPLICA_FIT_A : REPLICA_FIT_B,
+            want_jacobian, run->plain_paths, &pair};
         double wall_s = 0.0;
         status s = e->run(e->context, &call, &progress, run->replica[q], &wall_s, err);
         if (s != STATUS_OK) return s;

@@ -20,12 +20,21 @@ enum estimator_replica {
     REPLICA_CANDIDATE_B = 8
 };
 
+/* Estimates of the next replica at the same parameters, which will be asked for next. An estimator whose work several
+ * processes share may make them at the same time, because more tasks at once keep all of them busy. */
+struct estimator_pair {
+    struct estimate *next;       /* room for n_configuration */
+    bool ready;                  /* they are there: a call with `out` = next, for these two numbers, keeps them */
+    uint32_t iteration, replica; /* of them */
+};
+
 struct estimator_call {
     const double *param;  /* internal units */
     const size_t *n_path; /* per configuration */
     uint32_t iteration, replica;
     bool want_jacobian;
-    bool plain_paths; /* without guided shadow paths (path_tracer.h), as the published method traces them */
+    bool plain_paths;            /* without guided shadow paths (path_tracer.h), as the published method traces them */
+    struct estimator_pair *pair; /* NULL: the next call is not known */
 };
 
 struct estimator {

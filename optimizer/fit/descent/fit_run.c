@@ -14,6 +14,7 @@ struct fit {
     const struct fit_option *option;
     struct fit_layout layout;
     struct estimate *buffer; /* what the renderer gave */
+    struct estimator_pair pair;
     size_t i_start, n_start; /* n_start: with the extra ones */
     size_t n_step;           /* steps of the starts before this one; the next two likewise */
     uint64_t n_path;
@@ -32,13 +33,18 @@ static status estimate(void *context, const struct estimator_call *call, const s
     fit_layout_full(&f->layout, call->param, full);
     struct estimator_call inner = *call;
     inner.param = full;
+    struct estimate *to = f->buffer;
+    if (call->pair != NULL) inner.pair = &f->pair;
+    f->pair.ready = f->pair.ready && f->pair.iteration == inner.iteration && f->pair.replica == inner.replica;
+    if (f->pair.ready) to = f->pair.next; /* the replica that was made with the one before */
     inner.iteration += (uint32_t)(f->i_start * KEY_STRIDE);
-    status s = e->run(e->context, &inner, progress, f->buffer, wall_s, err);
+    status s = e->run(e->context, &inner, progress, to, wall_s, err);
+    if (to != f->buffer) f->pair.ready = false;
     struct fit_layout bare = f->layout; /* contrasts do not change with a gain */
     bare.i_gain = bare.i_stray = SIZE_MAX;
     for (size_t i = 0; i < e->n_configuration && s == STATUS_OK; i++) {
         bool contrast = observation_is_contrast(&f->problem->observation->item[i]);
-        fit_layout_estimate(contrast ? &bare : &f->layout, call->param, call->want_jacobian, &f->buffer[i], &out[i]);
+        fit_layout_estimate(contrast ? &bare : &f->layout, call->param, call->want_jacobian, &to[i], &out[i]);
     }
     return s;
 }
@@ -289,10 +295,13 @@ status fit_run(const struct descent_method *method, const struct fit_problem *pr
     size_t n = problem->estimator->n_configuration;
     f->path_budget = problem->path_budget / f->n_start;
     f->buffer = calloc(n > 0 ? n : 1, sizeof *f->buffer);
-    s = f->buffer != NULL ? run_starts(f, method, result, err)
-                          : error_set(err, STATUS_NO_MEMORY, "cannot fit %zu observations: out of memory", n);
+    f->pair.next = calloc(n > 0 ? n : 1, sizeof *f->pair.next);
+    s = f->buffer != NULL && f->pair.next != NULL
+            ? run_starts(f, method, result, err)
+            : error_set(err, STATUS_NO_MEMORY, "cannot fit %zu observations: out of memory", n);
 out:
     free(f->buffer);
+    free(f->pair.next);
     free(f);
     return s;
 }

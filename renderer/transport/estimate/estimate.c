@@ -38,7 +38,7 @@ static status estimate_separate(const struct estimate_request *q, struct thread_
     struct path_groups groups = {0};
     struct estimate_fault fault;
     status st = configuration_check(q->configuration, q->n_configuration, err);
-    if (st == STATUS_OK) st = estimate_check_key(q->iteration, q->replica, err);
+    if (st == STATUS_OK) st = estimate_check_key(q->iteration, q->replica + q->next_replica_too, err);
     if (st != STATUS_OK) return st;
     st = radiance_source_init(&source, &q->input, q->configuration, q->n_configuration, err);
     if (st != STATUS_OK) return st;
@@ -49,6 +49,7 @@ static status estimate_separate(const struct estimate_request *q, struct thread_
         .n_configuration = q->n_configuration,
         .groups = &groups,
         .key = {.seed = q->seed, .iteration = q->iteration, .replica = q->replica},
+        .next_replica_too = q->next_replica_too,
         .progress = progress,
         .announce = rank_orders_can_share(q->configuration, q->n_configuration, &q->input) ? announce : NULL,
         .announce_context = q};

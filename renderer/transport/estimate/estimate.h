@@ -15,6 +15,8 @@ struct estimate_request {
     const size_t *n_path; /* per configuration; rounded up as estimate_n_path says; 0: skip, result n_path = 0 */
     uint64_t seed;
     uint32_t iteration, replica; /* rng.h; configuration i uses stream configuration = i */
+    bool next_replica_too;       /* estimates replica + 1 as well, from the same shared tasks: n_configuration more
+                                    estimates in out. Not for means over rotations */
     bool share_camera_paths;     /* configurations that differ in their lamp only are estimated from the same paths (as
                                     many as the one that asks for most): 1.4 to 1.9 times the paths in the same time for
                                     two lamps. The errors of such configurations go together (estimate.partner). Volumes

@@ -289,9 +289,29 @@ static size_t most_bytes(const struct run *r)
     return most + 2 * sizeof(uint64_t);
 }
 
-static size_t pack_task(const void *context, size_t i_task, void *to)
+/* The tasks of one replica, then those of the next one. */
+struct replicas {
+    struct run run[2];
+    struct estimate_blocks blocks[2]; /* differ in their replica */
+    size_t n;
+};
+
+static struct run *run_of(struct replicas *p, size_t *i_task)
 {
-    const struct run *r = context;
+    struct run *r = &p->run[*i_task / p->run[0].n_task];
+    *i_task %= p->run[0].n_task;
+    return r;
+}
+
+static void run_any_task(void *context, size_t i_task, size_t i_thread)
+{
+    struct run *r = run_of(context, &i_task);
+    run_task(r, i_task, i_thread);
+}
+
+static size_t pack_task(void *context, size_t i_task, void *to)
+{
+    const struct run *r = run_of(context, &i_task);
     double *sum;
     const uint64_t count[2] = {r->sum[i_task].n_path, r->sum[i_task].n_bounce};
     size_t n = sum_bytes(r, i_task, &sum);
@@ -302,7 +322,7 @@ static size_t pack_task(const void *context, size_t i_task, void *to)
 
 static bool unpack_task(void *context, size_t i_task, const void *from, size_t n_bytes)
 {
-    struct run *r = context;
+    struct run *r = run_of(context, &i_task);
     double *sum;
     uint64_t count[2];
     size_t n = sum_bytes(r, i_task, &sum);
@@ -314,46 +334,57 @@ static bool unpack_task(void *context, size_t i_task, const void *from, size_t n
     return true;
 }
 
-static status share_tasks(struct run *r, struct rank_team *team, struct thread_pool *pool, struct error *err)
+static status share_tasks(struct replicas *p, struct rank_team *team, struct thread_pool *pool, struct error *err)
 {
-    const struct rank_work work = {.n_task = r->n_task,
-                                   .most_bytes = most_bytes(r),
-                                   .run = run_task,
+    const struct estimate_blocks *b = p->blocks;
+    const struct rank_work work = {.n_task = p->n * p->run[0].n_task,
+                                   .most_bytes = most_bytes(&p->run[0]),
+                                   .run = run_any_task,
                                    .pack = pack_task,
                                    .unpack = unpack_task,
-                                   .context = r};
-    status st = rank_team_rank(team) == 0 ? r->b->announce(team, r->b->announce_context, err) : STATUS_OK;
-    return st == STATUS_OK ? rank_team_share(team, &work, pool, r->b->progress, err) : st;
+                                   .context = p};
+    status st = rank_team_rank(team) == 0 ? b->announce(team, b->announce_context, err) : STATUS_OK;
+    return st == STATUS_OK ? rank_team_share(team, &work, pool, b->progress, err) : st;
 }
 
-static status run_tasks(struct run *r, struct thread_pool *pool, struct error *err)
+static status run_tasks(struct replicas *p, struct rank_team *team, struct thread_pool *pool, struct error *err)
 {
-    struct rank_team *team = r->b->announce != NULL ? thread_pool_team(pool) : NULL;
-    status st =
-        team != NULL ? share_tasks(r, team, pool, err) : thread_pool_run(pool, r->n_task, run_task, r, r->b->progress);
-    if (st == STATUS_OK && progress_cancelled(r->b->progress))
-        st = STATUS_CANCELLED; /* a task may have stopped early */
+    const struct progress *progress = p->blocks[0].progress;
+    status st = team != NULL ? share_tasks(p, team, pool, err)
+                             : thread_pool_run(pool, p->n * p->run[0].n_task, run_any_task, p, progress);
+    if (st == STATUS_OK && progress_cancelled(progress)) st = STATUS_CANCELLED; /* a task may have stopped early */
     return st == STATUS_CANCELLED ? error_set(err, st, "radiance estimate was cancelled") : st;
+}
+
+static void release(struct run *r)
+{
+    for (size_t i = 0; i < r->b->groups->n && r->contrast != NULL; i++) contrast_plan_release(&r->contrast[i]);
+    free(r->contrast);
+    free(r->sum_storage);
+    free(r->sum);
+    free(r->task);
 }
 
 status estimate_blocks_run(const struct estimate_blocks *b, struct thread_pool *pool, struct estimate *out,
                            struct estimate_fault *fault, struct error *err)
 {
-    struct run r = {.b = b};
-    status st = plan_contrasts(&r, err);
-    if (st == STATUS_OK) st = make_tasks(&r, err);
-    if (st != STATUS_OK) goto out;
-    st = run_tasks(&r, pool, err);
-    if (st != STATUS_OK) goto out;
-    memset(out, 0, b->n_configuration * sizeof *out);
-    if (b->announce == NULL || thread_pool_team(pool) == NULL || rank_team_rank(thread_pool_team(pool)) == 0)
-        st = reduce(&r, out, fault, err);
-out:
-    for (size_t i = 0; i < b->groups->n && r.contrast != NULL; i++) contrast_plan_release(&r.contrast[i]);
-    free(r.contrast);
-    free(r.sum_storage);
-    free(r.sum);
-    free(r.task);
+    struct replicas p = {.n = b->next_replica_too ? 2 : 1};
+    struct rank_team *team = b->announce != NULL ? thread_pool_team(pool) : NULL;
+    status st = STATUS_OK;
+    for (size_t i = 0; i < p.n; i++) {
+        p.blocks[i] = *b;
+        p.blocks[i].key.replica += (uint32_t)i;
+        p.run[i].b = &p.blocks[i];
+        if (st == STATUS_OK) st = plan_contrasts(&p.run[i], err);
+        if (st == STATUS_OK) st = make_tasks(&p.run[i], err);
+    }
+    if (st == STATUS_OK) st = run_tasks(&p, team, pool, err);
+    if (st == STATUS_OK) memset(out, 0, p.n * b->n_configuration * sizeof *out);
+    for (size_t i = 0; i < p.n; i++) {
+        if (st == STATUS_OK && (team == NULL || rank_team_rank(team) == 0))
+            st = reduce(&p.run[i], out + i * b->n_configuration, fault, err);
+        release(&p.run[i]);
+    }
     return st;
 }
 

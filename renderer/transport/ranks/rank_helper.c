@@ -65,8 +65,9 @@ static status run_estimate(const struct request *q, struct thread_pool *pool, co
                                        .seed = h->seed,
                                        .iteration = h->iteration,
                                        .replica = h->replica,
-                                       .share_camera_paths = h->share_camera_paths != 0};
-    struct estimate *none = calloc(h->n_configuration + 1, sizeof *none);
+                                       .share_camera_paths = h->share_camera_paths != 0,
+                                       .next_replica_too = h->next_replica_too != 0};
+    struct estimate *none = calloc(2 * h->n_configuration + 1, sizeof *none);
     if (none == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot estimate radiance: out of memory");
     status s = estimate_run(&e, pool, progress, none, err);
     free(none);

@@ -62,7 +62,8 @@ status rank_orders_estimate(struct rank_team *team, const struct estimate_reques
                              .seed = q->seed,
                              .iteration = q->iteration,
                              .replica = q->replica,
-                             .share_camera_paths = q->share_camera_paths};
+                             .share_camera_paths = q->share_camera_paths,
+                             .next_replica_too = q->next_replica_too};
     status s = begin(team, &q->input, q->configuration, &h, &p, err);
     byte_pack_put(&p, q->n_path, q->n_configuration * sizeof *q->n_path);
     return finish(team, RANK_ORDER_ESTIMATE, &p, s, err);

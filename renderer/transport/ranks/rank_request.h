@@ -14,7 +14,7 @@ struct rank_request {
     uint64_t n_set, n_configuration, seed;
     uint64_t width, height, n_sample, first_sample; /* of a picture */
     uint32_t stream, iteration, replica;
-    uint8_t want_derivative, plain_paths, share_camera_paths, has_discrepancy;
+    uint8_t want_derivative, plain_paths, share_camera_paths, next_replica_too, has_discrepancy;
 };
 
 /* Values in radiance_input.param. */

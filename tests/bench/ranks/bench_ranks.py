@@ -17,9 +17,12 @@ import rank_model  # noqa: E402
 BUILD = os.path.abspath(sys.argv[1])
 WORKER = os.path.join(BUILD, "bin", "selvedge-worker")
 ROOT_MAY = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+# in which a helper prepares an estimate of 10 rows with derivatives (radiance_source_init; least of 50, 2026-11-25)
+PREPARE_S = 7e-4
 RANKS = [1, 2, 4, 8, 16, 32, 64]
 LOG = re.compile(r"stage fit: 2 ranks shared (\d+) estimates and pictures \((\d+) tasks, [\d.]+ s\): (\d+) orders of (\d+) bytes, (\d+) bytes of results in "
-                 r"(\d+) messages; rank 0 waited ([\d.]+) s for others, and ran (\d+) tasks in ([\d.]+) of its ([\d.]+) s")
+                 r"(\d+) messages; rank 0 waited ([\d.]+) s for others, and ran (\d+) tasks in [\d.]+ s of "
+                 r"processor time, of ([\d.]+) s for shared work and ([\d.]+) s in all")
 
 
 def print_figure(name, value):
@@ -49,12 +52,13 @@ def look(folder):
     """What the model needs of the fit of a job that two ranks have run."""
     with open(os.path.join(folder, "log.txt")) as f:
         found = LOG.search(f.read())
-    n_share, _, n_order, order_bytes, result_bytes, _, _, n_own = (float(v) for v in found.groups()[:8])
-    own_s, all_s = (float(v) for v in found.groups()[8:])
-    n_task = float(found.group(2))
+    n_share, n_task, n_order, order_bytes, result_bytes, _, _, n_own = (float(v) for v in found.groups()[:8])
+    shared_s, all_s = (float(v) for v in found.groups()[8:])
     there_s, bytes_per_s, handle_s = messages()
-    tasks = rank_model.tasks_of(os.path.join(folder, "work", "fit", "estimates.journal"))
-    return {"tasks": tasks, "task_s": own_s / n_own, "serial_s": all_s - own_s, "there_s": there_s, "handle_s": handle_s,
+    replicas = rank_model.tasks_of(os.path.join(folder, "work", "fit", "estimates.journal"))
+    tasks = [a + b for a, b in zip(replicas[::2], replicas[1::2])]  # both replicas of a step are handed out together
+    assert len(tasks) == n_share, "the log and the checkpoint do not agree"
+    return {"tasks": tasks, "task_s": shared_s / n_own, "serial_s": all_s - shared_s, "prepare_s": PREPARE_S, "there_s": there_s, "handle_s": handle_s,
             "bytes_per_s": bytes_per_s, "order_bytes": order_bytes / n_order, "result_bytes": result_bytes / (n_task - n_own)}
 
 

@@ -1,8 +1,9 @@
 """The model by which the time of a fit with many ranks is predicted (docs/ranks.md).
 
-Inputs, all measured: the numbers of tasks of every estimate, the processor time of a task, that of everything which rank
-0 does besides tasks, the time of a message there and back, the rate of long messages, and the sizes of messages. The
-hand-out of base/ranks/rank_share.c is followed task by task."""
+Inputs, all measured: the numbers of tasks of every estimate, the processor time of a task with all that handing it out
+takes, that of everything which rank 0 does besides, the time in which a helper prepares an estimate, the time of a
+message there and back, the rate of long messages, and the sizes of messages. The hand-out of base/ranks/rank_share.c is
+followed task by task."""
 import heapq
 import struct
 
@@ -49,12 +50,13 @@ class Helper:
         return ask_s
 
 
-def share_s(n_task, ranks, task_s, there_s, handle_s, order_s, result_s):
-    """Time of one estimate. there_s: of a short message one way; handle_s: that rank 0 spends on a message; order_s: of an
-    order over one branch of the tree; result_s: that the results of a task take on their way into rank 0."""
+def share_s(n_task, ranks, m, order_s, result_s):
+    """Time of one estimate. order_s: of an order over one branch of the tree; result_s: that the results of a task take on
+    their way into rank 0."""
+    task_s, there_s, handle_s = m["task_s"], m["there_s"], m["handle_s"]
     span, now, own, ended = n_task // (2 * ranks), 0.0, n_task // (2 * ranks), 1
     left = n_task - ranks * span
-    helpers = [None] + [Helper(depth(r) * order_s, span, task_s) for r in range(1, ranks)]
+    helpers = [None] + [Helper(depth(r) * order_s + m["prepare_s"], span, task_s) for r in range(1, ranks)]
     messages = [(h.ask_s + there_s, r, False) for r, h in enumerate(helpers) if h]
     heapq.heapify(messages)
     while True:
@@ -79,14 +81,14 @@ def share_s(n_task, ranks, task_s, there_s, handle_s, order_s, result_s):
 
 
 def fit_s(measured, ranks):
-    """Seconds of the fit. measured: tasks (of each estimate), task_s, serial_s, there_s, handle_s, bytes_per_s,
-    order_bytes, result_bytes (of a task)."""
+    """Seconds of the fit. measured: tasks (of each estimate), task_s, serial_s, prepare_s, there_s (of a short message one
+    way), handle_s (that rank 0 spends on a message), bytes_per_s, order_bytes, result_bytes (of a task)."""
     m = measured
     if ranks == 1:
         return m["serial_s"] + sum(m["tasks"]) * m["task_s"]
     order_s = m["there_s"] + m["order_bytes"] / m["bytes_per_s"]
     result_s = m["result_bytes"] / m["bytes_per_s"]
-    return m["serial_s"] + sum(share_s(n, ranks, m["task_s"], m["there_s"], m["handle_s"], order_s, result_s) for n in m["tasks"])
+    return m["serial_s"] + sum(share_s(n, ranks, m, order_s, result_s) for n in m["tasks"])
 
 
 def efficiency(measured, ranks):

@@ -87,6 +87,21 @@ static int end(struct two_ranks *r)
     return how;
 }
 
+/* The tasks of two replicas are shared at once: the same bits as one after the other. */
+static void two_replicas_at_once(struct estimate_request *q, const struct estimate *first, struct thread_pool *pool)
+{
+    struct estimate next[4], both[8];
+    struct error err = {0};
+    q->replica++;
+    estimate_fixture_run(q, 1, next);
+    q->replica--;
+    q->next_replica_too = true;
+    assert_int_equal(estimate_run(q, pool, NULL, both, &err), STATUS_OK);
+    assert_memory_equal(both, first, sizeof next);
+    assert_memory_equal(both + 4, next, sizeof next);
+    q->next_replica_too = false;
+}
+
 /* Means, a mean over rotations, a contrast, shared paths: with 1 and 2 threads a rank. */
 static void two_ranks_estimate_the_same_bits(void **state)
 {
@@ -111,8 +126,9 @@ static void two_ranks_estimate_the_same_bits(void **state)
                 assert_int_equal(estimate_run(&q, r.pool, NULL, together, &err), STATUS_OK);
                 assert_memory_equal(alone, together, sizeof alone);
             }
+            if (how != 1) two_replicas_at_once(&q, alone, r.pool);
             assert_true(rank_team_traffic(r.team).result_bytes > 0); /* the helper has done a part of it */
-            assert_int_equal(rank_team_traffic(r.team).n_order, 3);  /* the cloth is sent once */
+            assert_int_equal(rank_team_traffic(r.team).n_order, how != 1 ? 4 : 3); /* the cloth is sent once */
             assert_int_equal(end(&r), 0);
         }
 }
