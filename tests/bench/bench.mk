@@ -71,15 +71,15 @@ bench-service: | deps-test ## what the daemon costs: the list of jobs, other ans
 	@/usr/bin/python3 tests/bench/service/bench_service.py --build $(BUILD) $(SERVICE)
 
 # SAMPLES: of the batch (1000)
-bench-scale: | deps-test ## what a batch of 1,000 samples costs to submit and to dispatch, the list of 10,000 queued jobs, and how far a plan is off (six minutes)
-	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/bin/selvedged >&2
+bench-scale: | deps-test ## what a batch of 1,000 samples costs to submit and to dispatch, the list of 10,000 queued jobs, how far a plan is off, and the scaling over ranks (eight minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@SELVEDGE_BUILD=$(BUILD) /usr/bin/python3 tests/bench/service/bench_scale.py $(SAMPLES)
+	@SELVEDGE_BUILD=$(BUILD) /usr/bin/python3 tests/bench/service/bench_plan.py
 	@$(MAKE) --no-print-directory bench-ranks
 
 bench-ranks: | deps-test ## strong scaling of one fit over ranks: 2 measured, 64 by a model (two minutes on 2 quiet cores; part of bench-scale)
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(BUILD)/tests/bench/ranks/rank_messages >&2
 	@/usr/bin/python3 tests/bench/ranks/bench_ranks.py $(BUILD)
-	@SELVEDGE_BUILD=$(BUILD) /usr/bin/python3 tests/bench/service/bench_plan.py
 
 EXPORTS_PYTHON := $(BUILD)/exports-python
 $(EXPORTS_PYTHON)/bin/packages-are-there:
