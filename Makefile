@@ -63,7 +63,7 @@ LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lseccomp -lraw_r -ljpeg -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive -lcurl $(LINK_BASE)
 
-.PHONY: all generate deps help check test nightly demo demo-camera night cluster-demo clean
+.PHONY: all generate medulla-tables deps help check test nightly demo demo-camera night cluster-demo clean
 ##@ Build and run
 all: $(PROGRAMS) $(PLUGINS) ## build the programs into build/bin
 
@@ -154,6 +154,14 @@ $(PRINT_OPTIONS): $(BUILD)/obj/optimizer/job/options/print_options_main.c.o $(L)
 generate: $(PRINT_OPTIONS) $(BUILD)/bin/selvedge-worker ## write what follows from the tables of options and models: config/openapi.json, tables in docs/
 	@/usr/bin/python3 config/generate_options.py $(PRINT_OPTIONS)
 	@/usr/bin/python3 config/generate_model_tables.py $(BUILD)/bin/selvedge-worker
+
+# tables of light that is scattered in the medulla of a hair, checked in as source; made again after a change of their grid
+MEDULLA := renderer/scattering/surface/fur/medulla
+$(BUILD)/tools/medulla-tables: $(BUILD)/obj/$(MEDULLA)/medulla_tables_main.c.o $(L)renderer.a $(L)base.a
+	@mkdir -p $(@D)
+	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_BASE)
+medulla-tables: $(BUILD)/tools/medulla-tables ## make the tables of the medulla of fur.v1 again (a minute on two cores)
+	@$(BUILD)/tools/medulla-tables $(MEDULLA)
 
 include config/install.mk
 include tests/tests.mk

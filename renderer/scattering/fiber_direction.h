@@ -45,6 +45,15 @@ static inline struct fiber_direction fiber_direction_of(const float w[3])
     return d;
 }
 
+/* A direction from its longitudinal angle and the cosine and sine of its azimuth beyond that of w. */
+static inline void fiber_direction_beyond(const struct fiber_direction *w, float sin_theta, float cos_theta, float c,
+                                          float d, float beyond[3])
+{
+    beyond[0] = sin_theta;
+    beyond[1] = cos_theta * (c * w->azimuth[0] - d * w->azimuth[1]);
+    beyond[2] = cos_theta * (d * w->azimuth[0] + c * w->azimuth[1]);
+}
+
 /* 1 - cos(ph_a - ph_b - pi), without cancellation where the two are opposite. */
 static inline float fiber_one_minus_cos_opposite(const struct fiber_direction *a, const struct fiber_direction *b)
 {

@@ -85,6 +85,16 @@ static inline float azimuth_draw(const float *density, const float *below, int n
     return ((float)low + fminf(t, 1)) * step;
 }
 
+/* Azimuth in [-pi, pi], x between the densities of two rows: a side, then one of the rows, each with its share. */
+static inline float azimuth_draw_side(const float *density, const float *below, const float *next_density,
+                                      const float *next_below, int n, float x, float u)
+{
+    float side = u < 0.5f ? 1 : -1;
+    u = table_stretch(u < 0.5f ? u : u - 0.5f, 0.5f);
+    if (u < x) return side * azimuth_draw(next_density, next_below, n, table_stretch(u, x));
+    return side * azimuth_draw(density, below, n, table_stretch(u - x, 1 - x));
+}
+
 /* A density of integral 1 over [0, pi], with 98 % in proportion to values that are at least 0 and the rest uniform, so
  * that it is nowhere 0. */
 static inline void azimuth_density(const double *value, int n, float *density, float *below)

@@ -11,6 +11,7 @@ double lobe_balance_angle_rad(int i) { return i * M_PI_2 / (N - 1); }
 void lobe_balance_init(struct lobe_balance *b)
 {
     const double h = M_PI_2 / (N - 1);
+    b->n = N;
     for (int i = 0; i < N; i++) {
         double c = cos(i * h);
         b->weight[i] = c * c * h * (i == 0 ? 0.5 : 1); /* the weight of the pole is 0 */
@@ -41,21 +42,22 @@ void lobe_balance_fill_kernel(struct lobe_balance *b, double beta, double consta
 /* y_i = sum of m_ij weight_j x_j, column by column so that it vectorises. */
 void lobe_balance_multiply(const struct lobe_balance *b, double (*m)[N], const double *x, double *y)
 {
-    memset(y, 0, N * sizeof *y);
-    for (int j = 0; j < N; j++) {
+    const int n = b->n;
+    memset(y, 0, (size_t)n * sizeof *y);
+    for (int j = 0; j < n; j++) {
         double wx = b->weight[j] * x[j];
-        for (int i = 0; i < N; i++) y[i] += m[j][i] * wx;
+        for (int i = 0; i < n; i++) y[i] += m[j][i] * wx;
     }
 }
 
 /* The positive x with x_i (K x)_i = want_i. */
 void lobe_balance_solve(struct lobe_balance *b, double *x)
 {
-    for (int i = 0; i < N; i++) x[i] = 1;
+    for (int i = 0; i < b->n; i++) x[i] = 1;
     for (int iteration = 0; iteration < 200; iteration++) {
         lobe_balance_multiply(b, b->kernel, x, b->work);
         double worst = 0;
-        for (int i = 0; i < N; i++) {
+        for (int i = 0; i < b->n; i++) {
             worst = fmax(worst, fabs(x[i] * b->work[i] / b->want[i] - 1));
             x[i] = sqrt(x[i] * b->want[i] / b->work[i]);
         }
@@ -68,12 +70,12 @@ void lobe_balance_solve(struct lobe_balance *b, double *x)
 void lobe_balance_solve_derivative(struct lobe_balance *b, const double *x, double *d)
 {
     double xd[N];
-    for (int i = 0; i < N; i++) d[i] = 0.5 * b->source[i];
+    for (int i = 0; i < b->n; i++) d[i] = 0.5 * b->source[i];
     for (int iteration = 0; iteration < 200; iteration++) {
-        for (int i = 0; i < N; i++) xd[i] = x[i] * d[i];
+        for (int i = 0; i < b->n; i++) xd[i] = x[i] * d[i];
         lobe_balance_multiply(b, b->kernel, xd, b->work);
         double worst = 0;
-        for (int i = 0; i < N; i++) {
+        for (int i = 0; i < b->n; i++) {
             double residual = d[i] + x[i] / b->want[i] * b->work[i] - b->source[i];
             worst = fmax(worst, fabs(residual));
             d[i] -= 0.5 * residual;
@@ -86,7 +88,7 @@ void lobe_balance_solve_derivative(struct lobe_balance *b, const double *x, doub
 void lobe_balance_source_of_kernel(struct lobe_balance *b, const double *x)
 {
     lobe_balance_multiply(b, b->d_kernel, x, b->source);
-    for (int i = 0; i < N; i++) b->source[i] *= -x[i] / b->want[i];
+    for (int i = 0; i < b->n; i++) b->source[i] *= -x[i] / b->want[i];
 }
 
 void lobe_balance_r(struct lobe_balance *b, double beta, double *a, double *d_ln_a)

@@ -11,6 +11,7 @@
 enum { LOBE_BALANCE_N = 513 };
 
 struct lobe_balance {
+    int n;                                           /* nodes: LOBE_BALANCE_N unless the caller sets fewer */
     double kernel[LOBE_BALANCE_N][LOBE_BALANCE_N];   /* g (constant + slope k), folded to u >= 0: symmetric */
     double d_kernel[LOBE_BALANCE_N][LOBE_BALANCE_N]; /* by beta */
     double weight[LOBE_BALANCE_N];                   /* cos^2 u du */
@@ -18,7 +19,8 @@ struct lobe_balance {
     double want[LOBE_BALANCE_N], work[LOBE_BALANCE_N], source[LOBE_BALANCE_N];
 };
 
-/* Fills in the weights; the share is 0. */
+/* Fills in the weights of LOBE_BALANCE_N nodes; the share is 0. The functions that multiply and solve also serve other
+ * nodes, whose number, weights and kernel the caller sets. */
 void lobe_balance_init(struct lobe_balance *b);
 /* Angle of node i, or of the distance of so many nodes. */
 double lobe_balance_angle_rad(int i);

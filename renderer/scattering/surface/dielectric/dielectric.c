@@ -160,11 +160,6 @@ static float pdf(const struct scattering_state *s, const float wi[3], const floa
     return density(s, &g, weight_rgb, m);
 }
 
-static float draw_azimuth(const struct dielectric_row *row, int lobe, float u)
-{
-    return azimuth_draw(row->density[lobe], row->below[lobe], DIELECTRIC_N_PHI, u);
-}
-
 static void sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
                    float wi[3])
 {
@@ -177,21 +172,12 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
     rest = table_stretch(rest, p[k]);
     int lobe = k < DIELECTRIC_N_LOBE ? k : DIELECTRIC_TRT;
     float sin_i = cone_lobe_sample(&s->along.longitudinal[lobe], wo[0], out.cos_theta, u[1], rest);
-    if (k == DIELECTRIC_REST) {
+    const struct dielectric_row *a = &s->row[row], *b = a + 1;
+    if (k == DIELECTRIC_REST)
         phi *= (float)(2 * M_PI);
-    } else { /* a side, then one of the two rows, each with its share */
-        float side = phi < 0.5f ? 1 : -1;
-        phi = table_stretch(phi < 0.5f ? phi : phi - 0.5f, 0.5f);
-        if (phi < x)
-            phi = draw_azimuth(&s->row[row + 1], k, table_stretch(phi, x));
-        else
-            phi = draw_azimuth(&s->row[row], k, table_stretch(phi - x, 1 - x));
-        phi *= side;
-    }
-    float cos_i = sqrtf((1 - sin_i) * (1 + sin_i)), c = cosf(phi), d = sinf(phi);
-    wi[0] = sin_i;
-    wi[1] = cos_i * (c * out.azimuth[0] - d * out.azimuth[1]);
-    wi[2] = cos_i * (d * out.azimuth[0] + c * out.azimuth[1]);
+    else
+        phi = azimuth_draw_side(a->density[k], a->below[k], b->density[k], b->below[k], DIELECTRIC_N_PHI, x, phi);
+    fiber_direction_beyond(&out, sin_i, sqrtf((1 - sin_i) * (1 + sin_i)), cosf(phi), sinf(phi), wi);
 }
 
 const struct scattering_model scattering_dielectric = {

@@ -41,18 +41,28 @@ struct dielectric_ray {
     double d_fresnel, d_length, d_gamma_t; /* by eta */
 };
 
-/* F from outside for the cosine of the angle of incidence, and d F / d eta when wanted. */
-static inline double dielectric_fresnel(double cos_i, double eta, double *d_eta)
+/* Reflectances from outside of light that is polarised across (s) and in (p) the plane of incidence, for the cosine of
+ * the angle of incidence, and their derivatives by eta when d_eta is not NULL. */
+static inline void dielectric_polarised(double cos_i, double eta, double sp[2], double d_eta[2])
 {
     double sin2 = 1 - cos_i * cos_i, cos_t = sqrt(1 - sin2 / (eta * eta)), q = eta * cos_t, a = eta * cos_i;
     double s = (cos_i - q) / (cos_i + q), p = (a - cos_t) / (a + cos_t);
+    sp[0] = s * s;
+    sp[1] = p * p;
     if (d_eta != NULL) {
         double d_cos_t = sin2 / (eta * eta * eta * cos_t), d_q = cos_t + eta * d_cos_t;
-        double d_s = -2 * cos_i / ((cos_i + q) * (cos_i + q)) * d_q;
-        double d_p = 2 * (cos_t * cos_i - a * d_cos_t) / ((a + cos_t) * (a + cos_t));
-        *d_eta = s * d_s + p * d_p;
+        d_eta[0] = -4 * s * cos_i / ((cos_i + q) * (cos_i + q)) * d_q;
+        d_eta[1] = 4 * p * (cos_t * cos_i - a * d_cos_t) / ((a + cos_t) * (a + cos_t));
     }
-    return 0.5 * (s * s + p * p);
+}
+
+/* F of unpolarised light from outside for the cosine of the angle of incidence, and d F / d eta when wanted. */
+static inline double dielectric_fresnel(double cos_i, double eta, double *d_eta)
+{
+    double sp[2], d[2];
+    dielectric_polarised(cos_i, eta, sp, d_eta != NULL ? d : NULL);
+    if (d_eta != NULL) *d_eta = 0.5 * (d[0] + d[1]);
+    return 0.5 * (sp[0] + sp[1]);
 }
 
 /* cos_theta > 0; x in [-pi/2, pi/2]; eta > 1. */

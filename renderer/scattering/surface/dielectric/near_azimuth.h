@@ -10,6 +10,7 @@
 #include "renderer/scattering/von_mises.h"
 
 #include <math.h>
+#include <stddef.h>
 
 enum near_azimuth_kind { NEAR_GAUSSIAN, NEAR_LOGISTIC };
 

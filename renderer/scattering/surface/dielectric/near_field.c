@@ -2,12 +2,12 @@
  * from M, and then the azimuth from D about the true Phi(th_d, h). */
 #include "renderer/scattering/surface/dielectric/near_field.h"
 #include "renderer/scattering/surface/dielectric/dielectric_ray.h"
+#include "renderer/scattering/surface/dielectric/near_view.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 #define LEAST_PROBABILITY 0.03 /* of a mode: no mode is starved, because all carry derivatives */
-#define LEAST_COSINE_D 1e-6    /* of th_d: rays are those of this angle beyond it */
 
 status near_field_finish(struct scattering_state *s, double beta_rad, struct scattering_state **state,
                          struct error *err)
@@ -23,36 +23,16 @@ status near_field_finish(struct scattering_state *s, double beta_rad, struct sca
 
 void near_field_release(struct scattering_state *s) { free(s); }
 
-/* The offset h = sin x of a direction of view. */
-static double offset_angle(const struct fiber_direction *out)
-{
-    return atan2((double)out->azimuth[1], fabs((double)out->azimuth[0]));
-}
-
 /* A pair of directions. */
 struct pair {
-    struct fiber_direction in, out;
-    double x, phi;             /* offset angle; ph_i - ph_o */
+    struct near_view view;
     struct dielectric_ray ray; /* at th_d */
 };
 
-/* cos th_d, th_d = (th_i - th_o) / 2, from the sines and cosines of both angles. */
-static double cosine_d(double sin_i, double cos_i, double sin_o, double cos_o)
-{
-    double c = cos_i + cos_o, u = sin_i + sin_o;
-    return fmax(0.5 * sqrt(c * c + u * u), LEAST_COSINE_D);
-}
-
 static struct pair pair_of(const struct scattering_state *s, const float wi[3], const float wo[3])
 {
-    struct pair g = {.in = fiber_direction_of(wi), .out = fiber_direction_of(wo)};
-    const float *a = g.in.azimuth, *b = g.out.azimuth;
-    double across = (double)a[1] * (double)b[0] - (double)a[0] * (double)b[1];
-    double along = (double)a[0] * (double)b[0] + (double)a[1] * (double)b[1];
-    g.x = offset_angle(&g.out);
-    g.phi = atan2(across, along);
-    g.ray = dielectric_ray_at(cosine_d((double)wi[0], (double)g.in.cos_theta, (double)wo[0], (double)g.out.cos_theta),
-                              g.x, s->eta);
+    struct pair g = {.view = near_view_of(wi, wo)};
+    g.ray = dielectric_ray_at(g.view.cos_d, g.view.x, s->eta);
     return g;
 }
 
@@ -61,8 +41,8 @@ static void azimuths(const struct scattering_state *s, const struct pair *g, dou
                      double (*d)[2])
 {
     for (int p = 0; p < DIELECTRIC_N_LOBE; p++) {
-        double d_eta, centre = dielectric_azimuth(&g->ray, p, g->x, &d_eta), by[2];
-        value[p] = near_azimuth_eval(&s->azimuth[p], remainder(g->phi - centre, 2 * M_PI), d != NULL ? by : NULL);
+        double d_eta, centre = dielectric_azimuth(&g->ray, p, g->view.x, &d_eta), by[2];
+        value[p] = near_azimuth_eval(&s->azimuth[p], remainder(g->view.phi - centre, 2 * M_PI), d != NULL ? by : NULL);
         if (d == NULL) continue;
         d[p][0] = -by[0] * d_eta;
         d[p][1] = by[1] * s->d_width[p];
@@ -73,7 +53,7 @@ static void azimuths(const struct scattering_state *s, const struct pair *g, dou
 static void mode_probabilities(const struct scattering_state *s, const struct fiber_direction *out, double x,
                                const float *weight_rgb, double p[DIELECTRIC_N_MODE])
 {
-    struct dielectric_ray ray = dielectric_ray_at(fmax((double)out->cos_theta, LEAST_COSINE_D), x, s->eta);
+    struct dielectric_ray ray = dielectric_ray_at(fmax((double)out->cos_theta, NEAR_LEAST_COSINE_D), x, s->eta);
     double sum = 0;
     memset(p, 0, DIELECTRIC_N_MODE * sizeof *p);
     for (int c = 0; c < 3; c++) {
@@ -92,7 +72,7 @@ static float density(const struct scattering_state *s, const struct pair *g, con
                      const float m[DIELECTRIC_N_LOBE], const double azimuth[DIELECTRIC_N_LOBE])
 {
     double p[DIELECTRIC_N_MODE];
-    mode_probabilities(s, &g->out, g->x, weight_rgb, p);
+    mode_probabilities(s, &g->view.out, g->view.x, weight_rgb, p);
     double sum = p[DIELECTRIC_REST] * (double)m[DIELECTRIC_TRT] * (0.5 / M_PI);
     for (int k = 0; k < DIELECTRIC_N_LOBE; k++) sum += p[k] * (double)m[k] * azimuth[k];
     return (float)sum;
@@ -107,7 +87,7 @@ struct factors {
 static void factors_of(const struct scattering_state *s, const struct pair *g, const float wi[3], const float wo[3],
                        bool want_scores, struct factors *f)
 {
-    dielectric_longitudinal(&s->along, wi[0], g->in.cos_theta, wo[0], g->out.cos_theta, f->m,
+    dielectric_longitudinal(&s->along, wi[0], g->view.in.cos_theta, wo[0], g->view.out.cos_theta, f->m,
                             want_scores ? f->d_beta : NULL);
     azimuths(s, g, f->azimuth, want_scores ? f->d_azimuth : NULL);
 }
@@ -138,8 +118,8 @@ static void eval_at(const struct scattering_state *s, const struct pair *g, cons
                     float *score)
 {
     float d_in[2], d_out[2];
-    double scale = (double)dielectric_scale_at(&s->along, g->in.theta_rad, d_in) *
-                   (double)dielectric_scale_at(&s->along, g->out.theta_rad, d_out);
+    double scale = (double)dielectric_scale_at(&s->along, g->view.in.theta_rad, d_in) *
+                   (double)dielectric_scale_at(&s->along, g->view.out.theta_rad, d_out);
     const double d_scale[2] = {(double)(d_in[0] + d_out[0]), (double)(d_in[1] + d_out[1])};
     for (int c = 0; c < 3; c++) {
         struct dielectric_shares a = dielectric_shares_of(&g->ray, s->c_t[c], s->ln_c_t[c]);
@@ -181,7 +161,7 @@ void near_field_sample(const struct scattering_state *s, const float wo[3], cons
                        float wi[3])
 {
     const struct fiber_direction out = fiber_direction_of(wo);
-    const double x = offset_angle(&out);
+    const double x = near_offset_angle(&out);
     double p[DIELECTRIC_N_MODE], rest = (double)u[0], phi = 2 * M_PI * (double)u[2];
     int k = 0;
     mode_probabilities(s, &out, x, weight_rgb, p);
@@ -191,12 +171,9 @@ void near_field_sample(const struct scattering_state *s, const float wo[3], cons
     float sin_i = cone_lobe_sample(lobe, wo[0], out.cos_theta, u[1], left);
     float cos_i = sqrtf((1 - sin_i) * (1 + sin_i));
     if (k < DIELECTRIC_N_LOBE) {
-        double d_eta, cos_d = cosine_d((double)sin_i, (double)cos_i, (double)wo[0], (double)out.cos_theta);
+        double d_eta, cos_d = near_cosine_d((double)sin_i, (double)cos_i, (double)wo[0], (double)out.cos_theta);
         struct dielectric_ray ray = dielectric_ray_at(cos_d, x, s->eta);
         phi = dielectric_azimuth(&ray, k, x, &d_eta) + near_azimuth_sample(&s->azimuth[k], u[2]);
     }
-    float c = (float)cos(phi), d = (float)sin(phi);
-    wi[0] = sin_i;
-    wi[1] = cos_i * (c * out.azimuth[0] - d * out.azimuth[1]);
-    wi[2] = cos_i * (d * out.azimuth[0] + c * out.azimuth[1]);
+    near_direction(&out, sin_i, cos_i, phi, wi);
 }

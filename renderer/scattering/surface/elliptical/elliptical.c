@@ -7,7 +7,6 @@
  */
 #include "renderer/scattering/surface/elliptical/elliptical.h"
 #include "renderer/scattering/surface/azimuth_table.h"
-#include "renderer/scattering/von_mises.h"
 
 #include <stdlib.h>
 
@@ -22,8 +21,8 @@ static status prepare(const double *param, struct scattering_state **state, stru
     if (s == NULL || energies == NULL)
         st = error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
     for (int p = 0; p < ELLIPTICAL_N_LOBE && st == STATUS_OK; p++) {
-        s->shift[p] = (float)(elliptical_shift[p] * param[ELLIPTICAL_P_ALPHA]);
-        s->width[p] = (float)(elliptical_width[p] * param[ELLIPTICAL_P_BETA]);
+        s->along[p].shift = (float)(elliptical_shift[p] * param[ELLIPTICAL_P_ALPHA]);
+        s->along[p].width = (float)(elliptical_width[p] * param[ELLIPTICAL_P_BETA]);
     }
     if (st == STATUS_OK) st = elliptical_tables(s, param, energies, err);
     if (st == STATUS_OK) st = elliptical_balance(s, energies, err);
@@ -57,7 +56,7 @@ static void along(const struct scattering_state *s, const struct azimuth_place *
                   float (*d)[2])
 {
     for (int p = 0; p < ELLIPTICAL_N_LOBE; p++)
-        m[p] = elliptical_along(g->in.theta_rad + g->out.theta_rad, s->shift[p], s->width[p], d != NULL ? d[p] : NULL);
+        m[p] = tilted_lobe_eval(&s->along[p], g->in.theta_rad + g->out.theta_rad, d != NULL ? d[p] : NULL);
 }
 
 #define BILINEAR(field) AZIMUTH_BILINEAR(corner, g, field)
@@ -91,17 +90,6 @@ static void mode_probabilities(const struct scattering_state *s, int row, float 
                                LEAST_PROBABILITY, p);
 }
 
-/* Density of th_i of a lobe, of which m belongs to th_i itself and the rest to angles beyond one of the poles. */
-static float folded(const struct scattering_state *s, int p, float theta_i, float theta_o, float m)
-{
-    const float reach = 6 * s->width[p] + s->shift[p];
-    for (int side = -1; side <= 1; side += 2) {
-        float beyond = (float)side * (float)M_PI - theta_i + theta_o;
-        if (fabsf(beyond) < reach) m += elliptical_along(beyond, s->shift[p], s->width[p], NULL);
-    }
-    return m;
-}
-
 static float density(const struct scattering_state *s, const struct azimuth_place *g, const float *weight_rgb,
                      const float m[ELLIPTICAL_N_LOBE])
 {
@@ -113,7 +101,7 @@ static float density(const struct scattering_state *s, const struct azimuth_plac
         float after = table_mix(b->density[k][g->column], b->density[k][g->column + 1], g->y);
         float around = p[k] * 0.5f * table_mix(before, after, g->out_x);
         if (k == ELLIPTICAL_REST - 1) around += p[ELLIPTICAL_REST] * (float)(0.5 / M_PI);
-        sum += around * folded(s, k, g->in.theta_rad, g->out.theta_rad, m[k]);
+        sum += around * tilted_lobe_density(&s->along[k], g->in.theta_rad, g->out.theta_rad, m[k]);
     }
     return sum / fmaxf(g->in.cos_theta, FIBER_COS_MIN);
 }
@@ -194,21 +182,6 @@ static float pdf(const struct scattering_state *s, const float wi[3], const floa
     return density(s, &g, weight_rgb, m);
 }
 
-static float draw_azimuth(const struct elliptical_row *row, int lobe, float u)
-{
-    return azimuth_draw(row->density[lobe], row->below[lobe], ELLIPTICAL_N_PHI, u);
-}
-
-/* th_i about one of both cones of a lobe, folded at the poles. */
-static float draw_theta(const struct scattering_state *s, int lobe, float theta_o, float u)
-{
-    float side = u < 0.5f ? 1 : -1;
-    u = table_stretch(u < 0.5f ? u : u - 0.5f, 0.5f);
-    float theta = -theta_o + side * s->shift[lobe] + (float)M_SQRT2 * s->width[lobe] * erf_inverse(2 * u - 1);
-    if (fabsf(theta) > (float)M_PI_2) theta = copysignf((float)M_PI, theta) - theta;
-    return fminf(fmaxf(theta, (float)-M_PI_2), (float)M_PI_2);
-}
-
 static void sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
                    float wi[3])
 {
@@ -218,22 +191,13 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
     float x = table_position(out.cos_theta * ELLIPTICAL_N_ROW, ELLIPTICAL_N_ROW, &row);
     mode_probabilities(s, row, x, weight_rgb, p);
     while (k < ELLIPTICAL_N_MODE - 1 && rest >= p[k]) rest -= p[k++];
-    float theta = draw_theta(s, k < ELLIPTICAL_REST ? k : ELLIPTICAL_REST - 1, out.theta_rad, u[1]);
-    if (k == ELLIPTICAL_REST) {
+    float theta = tilted_lobe_sample(&s->along[k < ELLIPTICAL_REST ? k : ELLIPTICAL_REST - 1], out.theta_rad, u[1]);
+    const struct elliptical_row *a = &s->row[row], *b = a + 1;
+    if (k == ELLIPTICAL_REST)
         phi *= (float)(2 * M_PI);
-    } else { /* a side, then one of the two rows, each with its share */
-        float side = phi < 0.5f ? 1 : -1;
-        phi = table_stretch(phi < 0.5f ? phi : phi - 0.5f, 0.5f);
-        if (phi < x)
-            phi = draw_azimuth(&s->row[row + 1], k, table_stretch(phi, x));
-        else
-            phi = draw_azimuth(&s->row[row], k, table_stretch(phi - x, 1 - x));
-        phi *= side;
-    }
-    float cos_i = fmaxf(cosf(theta), 0), c = cosf(phi), d = sinf(phi);
-    wi[0] = sinf(theta);
-    wi[1] = cos_i * (c * out.azimuth[0] - d * out.azimuth[1]);
-    wi[2] = cos_i * (d * out.azimuth[0] + c * out.azimuth[1]);
+    else
+        phi = azimuth_draw_side(a->density[k], a->below[k], b->density[k], b->below[k], ELLIPTICAL_N_PHI, x, phi);
+    fiber_direction_beyond(&out, sinf(theta), fmaxf(cosf(theta), 0), cosf(phi), sinf(phi), wi);
 }
 
 const struct scattering_model scattering_elliptical = {

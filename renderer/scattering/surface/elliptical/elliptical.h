@@ -26,6 +26,7 @@
 #include "renderer/scattering/surface/elliptical/ellipse_ray.h"
 #include "renderer/scattering/surface/lobe_balance.h"
 #include "renderer/scattering/surface/scattering_registry.h"
+#include "renderer/scattering/surface/tilted_lobe.h"
 
 enum {
     ELLIPTICAL_P_C_T = 0,
@@ -68,8 +69,8 @@ struct elliptical_row {
 };
 
 struct scattering_state {
-    float shift[ELLIPTICAL_N_LOBE], width[ELLIPTICAL_N_LOBE]; /* rad */
-    float scale[LOBE_BALANCE_N];                              /* a by |th| */
+    struct tilted_lobe along[ELLIPTICAL_N_LOBE];
+    float scale[LOBE_BALANCE_N]; /* a by |th| */
     float d_ln_scale[ELLIPTICAL_N_SCALE][LOBE_BALANCE_N];
     struct elliptical_row row[ELLIPTICAL_N_ROW + 1];
     struct elliptical_cell cell[ELLIPTICAL_N_ROW + 1][ELLIPTICAL_N_PHI + 1];
@@ -84,22 +85,10 @@ struct elliptical_energies {
 /* Shift and width of a lobe over alpha and beta. */
 extern const double elliptical_shift[ELLIPTICAL_N_LOBE], elliptical_width[ELLIPTICAL_N_LOBE];
 
-/* M of a lobe for th_i + th_o = x, and its derivatives by its shift and its width when wanted. */
-static inline float elliptical_along(float x, float shift, float width, float d[2])
-{
-    float inv = 1 / width, p = (x - shift) * inv, q = (x + shift) * inv, norm = 0.19947114f * inv;
-    float a = norm * expf(-0.5f * p * p), b = norm * expf(-0.5f * q * q);
-    if (d != NULL) {
-        d[0] = (a * p - b * q) * inv;
-        d[1] = (a * (p * p - 1) + b * (q * q - 1)) * inv;
-    }
-    return a + b;
-}
-
 /* Fills in rows, cells and slopes, and the energies. STATUS_NO_MEMORY. */
 status elliptical_tables(struct scattering_state *s, const double *param, struct elliptical_energies *energies,
                          struct error *err);
-/* Fills in the scale; shifts and widths are set. STATUS_NO_MEMORY. */
+/* Fills in the scale; the lobes are set. STATUS_NO_MEMORY. */
 status elliptical_balance(struct scattering_state *s, const struct elliptical_energies *energies, struct error *err);
 
 #endif

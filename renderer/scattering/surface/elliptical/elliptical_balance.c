@@ -38,7 +38,7 @@ static void add_pair(const struct scattering_state *s, const struct balance *b, 
     for (int p = 0; p < ELLIPTICAL_N_LOBE; p++) {
         float d[2];
         const struct dual *share = &b->share[half][p];
-        double m = (double)elliptical_along((float)lobe_balance_angle_rad(distance), s->shift[p], s->width[p], d);
+        double m = (double)tilted_lobe_eval(&s->along[p], (float)lobe_balance_angle_rad(distance), d);
         sum[ELLIPTICAL_S_ETA] += share->d[ELLIPSE_BY_ETA] * m;
         sum[ELLIPTICAL_S_RATIO] += share->d[ELLIPSE_BY_RATIO] * m;
         sum[ELLIPTICAL_S_ALPHA] += share->v * (double)d[0] * elliptical_shift[p];

@@ -1,0 +1,221 @@
+#include "renderer/scattering/surface/fur/fur_far.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { N_WAVE = 272, N_MEDULLA_WAVE = 48, LEAST_OFFSET = 160 };
+/* Values of a table, and derivatives in the order of fur_far_by; that by gamma follows from the values. */
+enum { VALUE, BY = 1, N_SUM = BY + FUR_F_GAMMA, BY_GAMMA = N_SUM, N_QUANTITY };
+#define LEAST_FACTOR 5.5 /* waves with k w above this have a factor below exp(-5.5^2 / 2) = 3e-7 */
+#define FADED 3e-6
+
+struct work {
+    double wave[FUR_FAR_N_LOBE][N_WAVE][3][N_SUM]; /* Fourier coefficients: mean of A cos(k Phi), and derivatives */
+    double cosine[N_WAVE][FUR_N_PHI + 1];
+    double column[3][N_QUANTITY][FUR_N_PHI + 1];
+    double rest[3][N_SUM], energy[FUR_FAR_N_MODE][3];
+    struct fur_fiber fiber;
+    struct medulla_around around;
+    float even[N_MEDULLA_WAVE][MEDULLA_ROUND_RANK], odd[N_MEDULLA_WAVE][MEDULLA_ROUND_RANK];
+    double c_t[3], gamma;
+};
+
+static double mode_width(int p, double gamma) { return sqrt(p + 1.0) * gamma; }
+
+static int n_wave(int p, double gamma)
+{
+    if (p == FUR_FAR_S) return N_MEDULLA_WAVE;
+    int n = (int)(LEAST_FACTOR / mode_width(p, gamma)) + 2;
+    return n < N_WAVE ? n : N_WAVE;
+}
+
+/* Weight times share of a mode in one channel, and its derivatives. */
+static void amplitude(const struct work *w, const struct fur_ray *ray, double weight, int c,
+                      double out[FUR_N_MODE][N_SUM])
+{
+    const double ln_c = log(w->c_t[c]);
+    const struct fur_shares a = fur_shares_of(&w->fiber, ray, ln_c);
+    double part[FUR_N_PART][FUR_N_BY];
+    fur_parts(&w->fiber, ray, ln_c, part);
+    for (int mode = 0; mode < FUR_N_MODE; mode++) {
+        double slope[FUR_N_BY];
+        fur_share_slopes(&a, mode, part, slope);
+        out[mode][VALUE] = weight * a.value[mode];
+        for (int k = 0; k < FUR_N_BY; k++) out[mode][BY + k] = weight * slope[k];
+        out[mode][BY + FUR_F_C] /= w->c_t[c];
+        out[mode][BY + FUR_F_G] = 0;
+    }
+}
+
+/* Adds one mode: wave k has the factor even_k cos(k Phi) - odd_k sin(k Phi), whose derivatives by eta, kappa, sigma_ms
+ * and g are in d. */
+struct wave_factor {
+    double v, d[FUR_F_GAMMA];
+};
+
+static void add_wave(double to[3][N_SUM], double a[3][N_SUM], const struct wave_factor *f)
+{
+    for (int c = 0; c < 3; c++) {
+        to[c][VALUE] += a[c][VALUE] * f->v;
+        for (int q = 0; q < FUR_F_GAMMA; q++) to[c][BY + q] += a[c][BY + q] * f->v + a[c][VALUE] * f->d[q];
+    }
+}
+
+static void add_lobe(struct work *w, const struct fur_ray *ray, int p, double x, double a[3][N_SUM])
+{
+    const double phi = 2 * p * ray->gamma_t - 2 * x + p * M_PI, c1 = cos(phi), s1 = sin(phi);
+    double c = 1, s = 0;
+    for (int k = 0; k < n_wave(p, w->gamma); k++) {
+        struct wave_factor f = {c, {0}};
+        f.d[FUR_F_ETA] = -2.0 * p * k * ray->d_gamma_t * s;
+        add_wave(w->wave[p][k], a, &f);
+        double next = c * c1 - s * s1;
+        s = s * c1 + c * s1;
+        c = next;
+    }
+}
+
+/* Waves of the density of one ray, and their derivatives. */
+struct medulla_spectrum {
+    double even[1 + MEDULLA_RAY_N_BY], odd[1 + MEDULLA_RAY_N_BY];
+};
+
+static void fill_spectrum(const struct work *w, const struct medulla_ray *m, struct medulla_spectrum *y)
+{
+    for (int k = 0; k < N_MEDULLA_WAVE; k++)
+        for (int q = 0; q <= MEDULLA_RAY_N_BY; q++) {
+            const float *weight = q == 0 ? m->weight : m->d[q - 1];
+            float even = 0, odd = 0;
+            for (int r = 0; r < MEDULLA_ROUND_RANK; r++) {
+                even += weight[r] * w->even[k][r];
+                odd += weight[r] * w->odd[k][r];
+            }
+            y[k].even[q] = (double)even;
+            y[k].odd[q] = (double)odd;
+        }
+}
+
+static void add_segment(struct work *w, const struct fur_ray *ray, const struct medulla_spectrum *y, int segment,
+                        double x, double a[3][N_SUM])
+{
+    double d_eta, phi = fur_segment_azimuth(ray, segment, x, &d_eta), d_depth[3];
+    fur_depth(&w->fiber, ray, d_depth);
+    for (int k = 0; k < N_MEDULLA_WAVE; k++) {
+        const double c = cos(k * phi), s = sin(k * phi);
+        double by[1 + MEDULLA_RAY_N_BY];
+        for (int q = 0; q <= MEDULLA_RAY_N_BY; q++) by[q] = c * y[k].even[q] - s * y[k].odd[q];
+        const double by_depth = by[1 + MEDULLA_RAY_BY_DEPTH], by_offset = by[1 + MEDULLA_RAY_BY_OFFSET];
+        struct wave_factor f = {by[0], {0}};
+        f.d[FUR_F_ETA] =
+            by_depth * d_depth[0] + by_offset * ray->offset.eta - k * d_eta * (s * y[k].even[0] + c * y[k].odd[0]);
+        f.d[FUR_F_KAPPA] = by_depth * d_depth[1] + by_offset * ray->offset.kappa;
+        f.d[FUR_F_MS] = by_depth * d_depth[2];
+        f.d[FUR_F_G] = by[1 + MEDULLA_RAY_BY_G];
+        add_wave(w->wave[FUR_FAR_S][k], a, &f);
+    }
+}
+
+/* One offset. All rays carry lobes; every `coarse`th carries the scattered light, which is smooth, with their weight.
+ * */
+static void add_ray(struct work *w, double cosine, double x, double weight, int coarse)
+{
+    const struct fur_ray ray = fur_ray_at(&w->fiber, cosine, x);
+    double a[FUR_N_MODE][3][N_SUM];
+    for (int c = 0; c < 3; c++) {
+        double out[FUR_N_MODE][N_SUM];
+        amplitude(w, &ray, weight, c, out);
+        for (int mode = 0; mode < FUR_N_MODE; mode++) memcpy(a[mode][c], out[mode], sizeof out[mode]);
+        for (int p = 0; p < FUR_N_LOBE; p++) w->energy[p][c] += out[p][VALUE];
+        w->energy[FUR_FAR_S][c] += out[FUR_TT_S][VALUE] + out[FUR_TRT_S][VALUE];
+        w->energy[FUR_FAR_REST][c] += out[FUR_REST][VALUE];
+        for (int q = 0; q < N_SUM; q++) w->rest[c][q] += out[FUR_REST][q];
+    }
+    for (int p = 0; p < FUR_N_LOBE; p++) add_lobe(w, &ray, p, x, a[p]);
+    if (coarse == 0) return;
+    struct medulla_ray m;
+    struct medulla_spectrum y[N_MEDULLA_WAVE];
+    double unused[3];
+    medulla_ray_init(&w->around, fur_depth(&w->fiber, &ray, unused), ray.offset.v, &m);
+    fill_spectrum(w, &m, y);
+    for (int segment = 1; segment <= FUR_N_SEGMENT; segment++) {
+        double(*b)[N_SUM] = a[FUR_TT_S + segment - 1];
+        for (int c = 0; c < 3; c++)
+            for (int q = 0; q < N_SUM; q++) b[c][q] *= coarse;
+        add_segment(w, &ray, y, segment, x, b);
+    }
+}
+
+/* Offsets x crowd at the rims; narrow lobes need as many as they have waves, three times LEAST_OFFSET at most. */
+static void add_rays(struct work *w, struct fur_row *row, double cosine)
+{
+    const int coarse = n_wave(FUR_R, w->gamma) > LEAST_OFFSET - 20 ? 3 : 1, n = coarse * LEAST_OFFSET;
+    double sum = 0;
+    memset(w->wave, 0, sizeof w->wave);
+    memset(w->rest, 0, sizeof w->rest);
+    memset(w->energy, 0, sizeof w->energy);
+    for (int i = 0; i < n; i++) sum += cos((i + 0.5) * M_PI_2 / n);
+    for (int i = 0; i < n; i++) {
+        double x = (i + 0.5) * M_PI_2 / n;
+        add_ray(w, cosine, x, cos(x) / sum, i % coarse == coarse / 2 ? coarse : 0);
+    }
+    for (int c = 0; c < 3; c++) {
+        row->rest[c] = (float)(w->rest[c][VALUE] * (0.5 / M_PI));
+        for (int q = 0; q < FUR_F_G; q++) row->d_rest[q][c] = (float)(w->rest[c][BY + q] * (0.5 / M_PI));
+        for (int p = 0; p < FUR_FAR_N_MODE; p++) row->energy[p][c] = (float)w->energy[p][c];
+    }
+}
+
+/* N and its derivatives over the azimuths, from the coefficients. */
+static void sum_waves(struct work *w, int p)
+{
+    const bool lobe = p < FUR_N_LOBE;
+    double width = lobe ? mode_width(p, w->gamma) : 0, d_width = sqrt(p + 1.0);
+    memset(w->column, 0, sizeof w->column);
+    for (int k = 0; k < n_wave(p, w->gamma); k++) {
+        double factor = exp(-0.5 * k * k * width * width) * (k == 0 ? 0.5 / M_PI : 1 / M_PI);
+        double by_gamma = -(double)k * k * width * d_width;
+        for (int c = 0; c < 3; c++)
+            for (int q = 0; q < N_QUANTITY; q++) {
+                double v = factor * (q < N_SUM ? w->wave[p][k][c][q] : w->wave[p][k][c][VALUE] * by_gamma);
+                for (int j = 0; j <= FUR_N_PHI; j++) w->column[c][q][j] += v * w->cosine[k][j];
+            }
+    }
+}
+
+/* Where a lobe has faded, the series leaves a ripple of either sign: 0 there. */
+static void store(const struct work *w, struct fur_cell *cell, struct fur_slope *slope, struct fur_row *row, int p)
+{
+    double mean[FUR_N_PHI + 1];
+    for (int j = 0; j <= FUR_N_PHI; j++) {
+        mean[j] = 0;
+        for (int c = 0; c < 3; c++) {
+            bool faded = w->column[c][VALUE][j] <= FADED * w->wave[p][0][c][VALUE];
+            mean[j] += faded ? 0 : w->column[c][VALUE][j] / 3;
+            cell[j].n[p][c] = faded ? 0 : (float)w->column[c][VALUE][j];
+            for (int q = 0; q < FUR_F_N; q++) slope[j].n[p][q][c] = faded ? 0 : (float)w->column[c][BY + q][j];
+        }
+    }
+    azimuth_density(mean, FUR_N_PHI, row->density[p], row->below[p]);
+}
+
+status fur_far_tables(struct scattering_state *s, const double *param, struct error *err)
+{
+    struct work *w = malloc(sizeof *w);
+    if (w == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
+    w->fiber = fur_fiber_of(param);
+    w->gamma = param[FUR_P_GAMMA];
+    for (int c = 0; c < 3; c++) w->c_t[c] = param[FUR_P_C_T + c];
+    medulla_around_init(&w->around, param[FUR_P_G]);
+    medulla_waves(N_MEDULLA_WAVE, w->even, w->odd);
+    for (int k = 0; k < N_WAVE; k++)
+        for (int j = 0; j <= FUR_N_PHI; j++) w->cosine[k][j] = cos(k * j * M_PI / FUR_N_PHI);
+    for (int row = 0; row <= FUR_FAR_ROW; row++) {
+        add_rays(w, &s->row[row], fmax((double)row / FUR_FAR_ROW, FUR_LEAST_COSINE));
+        for (int p = 0; p < FUR_FAR_N_LOBE; p++) {
+            sum_waves(w, p);
+            store(w, s->cell[row], s->slope[row], &s->row[row], p);
+        }
+    }
+    free(w);
+    return STATUS_OK;
+}

@@ -1,0 +1,99 @@
+#include "renderer/scattering/surface/fur/fur_means.h"
+#include "renderer/scattering/surface/fur/fur.h"
+
+#include <string.h>
+
+enum { N_WAVE = 16, N_OFFSET = 160 };
+
+struct work {
+    struct medulla_around around;
+    float cosine[N_WAVE][MEDULLA_ROUND_RANK], sine[N_WAVE][MEDULLA_ROUND_RANK];
+};
+
+/* The mean of |ph| / pi of scattered light, which is the weight of the half that goes through: |ph| is a sum of odd
+ * waves, (pi / 2) - (4 / pi) sum cos(k ph) / k^2. */
+static struct fur_mean through_weight(const struct work *b, const struct fur_fiber *f, const struct fur_ray *ray,
+                                      const struct medulla_ray *m, int segment, double x)
+{
+    double d_eta, azimuth = fur_segment_azimuth(ray, segment, x, &d_eta), d_depth[3], by[MEDULLA_RAY_N_BY] = {0};
+    struct fur_mean w = {0.5, {0}};
+    fur_depth(f, ray, d_depth);
+    for (int k = 1; k < N_WAVE; k += 2) {
+        const double c = cos(k * azimuth), s = sin(k * azimuth), factor = -4 / (M_PI * M_PI * k * k);
+        double even = 0, odd = 0;
+        for (int r = 0; r < MEDULLA_ROUND_RANK; r++) {
+            double turned = c * (double)b->cosine[k][r] - s * (double)b->sine[k][r];
+            even += (double)m->weight[r] * turned;
+            odd += (double)m->weight[r] * (s * (double)b->cosine[k][r] + c * (double)b->sine[k][r]);
+            for (int q = 0; q < MEDULLA_RAY_N_BY; q++) by[q] += factor * (double)m->d[q][r] * turned;
+        }
+        w.v += factor * even;
+        w.d[FUR_M_ETA] -= factor * k * d_eta * odd;
+    }
+    const double by_depth = by[MEDULLA_RAY_BY_DEPTH], by_offset = by[MEDULLA_RAY_BY_OFFSET];
+    w.d[FUR_M_ETA] += by_depth * d_depth[0] + by_offset * ray->offset.eta;
+    w.d[FUR_M_KAPPA] = by_depth * d_depth[1] + by_offset * ray->offset.kappa;
+    w.d[FUR_M_MS] = by_depth * d_depth[2];
+    w.d[FUR_M_G] = by[MEDULLA_RAY_BY_G];
+    return w;
+}
+
+static void add_ray(const struct work *b, const struct fur_fiber *f, double cosine, double x, double weight,
+                    struct fur_mean row[FUR_N_PART_OF_LIGHT])
+{
+    static const int by[FUR_N_BY] = {-1, FUR_M_ETA, FUR_M_KAPPA, FUR_M_LAYERS, FUR_M_MS, -1};
+    const struct fur_ray ray = fur_ray_at(f, cosine, x);
+    const struct fur_shares a = fur_shares_of(f, &ray, 0);
+    double part[FUR_N_PART][FUR_N_BY], d_depth[3];
+    struct medulla_ray m;
+    fur_parts(f, &ray, 0, part);
+    medulla_ray_init(&b->around, fur_depth(f, &ray, d_depth), ray.offset.v, &m);
+    for (int mode = 0; mode < FUR_N_MODE; mode++) {
+        double slope[FUR_N_BY];
+        struct fur_mean share = {weight * a.value[mode], {0}};
+        fur_share_slopes(&a, mode, part, slope);
+        for (int k = 0; k < FUR_N_BY; k++)
+            if (by[k] >= 0) share.d[by[k]] = weight * slope[k];
+        bool scattered = mode == FUR_TT_S || mode == FUR_TRT_S;
+        struct fur_mean w = {0, {0}};
+        if (scattered) w = through_weight(b, f, &ray, &m, mode == FUR_TT_S ? 1 : 2, x);
+        struct fur_mean *to = &row[scattered ? FUR_PART_BACK : mode == FUR_REST ? FUR_TRT : mode];
+        to->v += share.v * (1 - w.v);
+        for (int k = 0; k < FUR_N_MEAN_BY; k++) to->d[k] += share.d[k] * (1 - w.v) - share.v * w.d[k];
+        if (!scattered) continue;
+        row[FUR_PART_THROUGH].v += share.v * w.v;
+        for (int k = 0; k < FUR_N_MEAN_BY; k++) row[FUR_PART_THROUGH].d[k] += share.d[k] * w.v + share.v * w.d[k];
+    }
+}
+
+void fur_means_fill(struct fur_means *m, const double *param)
+{
+    struct fur_fiber f = fur_fiber_of(param);
+    struct work b;
+    double sum = 0;
+    f.sigma_ma = 0;
+    for (int i = 0; i < N_OFFSET; i++) sum += cos((i + 0.5) * M_PI_2 / N_OFFSET);
+    medulla_around_init(&b.around, param[FUR_P_G]);
+    medulla_waves(N_WAVE, b.cosine, b.sine);
+    memset(m, 0, sizeof *m);
+    for (int row = 0; row <= FUR_N_ROW; row++) {
+        struct fur_mean *part = m->row[row];
+        for (int i = 0; i < N_OFFSET; i++) {
+            double x = (i + 0.5) * M_PI_2 / N_OFFSET;
+            add_ray(&b, &f, fmax((double)row / FUR_N_ROW, FUR_LEAST_COSINE), x, cos(x) / sum, part);
+        }
+        part[FUR_PART_SCATTERED].v = part[FUR_PART_BACK].v + part[FUR_PART_THROUGH].v;
+        for (int k = 0; k < FUR_N_MEAN_BY; k++)
+            part[FUR_PART_SCATTERED].d[k] = part[FUR_PART_BACK].d[k] + part[FUR_PART_THROUGH].d[k];
+    }
+}
+
+struct fur_mean fur_mean_at(const struct fur_means *m, double cos_theta, int part)
+{
+    double x = fmin(cos_theta, 1) * FUR_N_ROW;
+    int row = x < FUR_N_ROW - 1 ? (int)x : FUR_N_ROW - 1;
+    const struct fur_mean *a = &m->row[row][part], *b = &m->row[row + 1][part];
+    struct fur_mean y = {a->v + (x - row) * (b->v - a->v), {0}};
+    for (int k = 0; k < FUR_N_MEAN_BY; k++) y.d[k] = a->d[k] + (x - row) * (b->d[k] - a->d[k]);
+    return y;
+}

@@ -1,0 +1,23 @@
+/* Shares of light in the mean over the offset of a fiber with a medulla, without absorption, by cos th_d, and their
+ * derivatives: what the balance along the fiber knows of light around it (fur.h). */
+#ifndef SELVEDGE_RENDERER_FUR_MEANS_H
+#define SELVEDGE_RENDERER_FUR_MEANS_H
+
+/* R, TT, TRT with all longer paths, light scattered in the medulla that leaves back and that goes through, and both. */
+enum fur_part_of_light { FUR_PART_BACK = 3, FUR_PART_THROUGH, FUR_PART_SCATTERED, FUR_N_PART_OF_LIGHT };
+enum fur_mean_by { FUR_M_ETA, FUR_M_KAPPA, FUR_M_LAYERS, FUR_M_MS, FUR_M_G, FUR_N_MEAN_BY };
+enum { FUR_N_ROW = 64 };
+
+struct fur_mean {
+    double v, d[FUR_N_MEAN_BY];
+};
+
+struct fur_means {
+    struct fur_mean row[FUR_N_ROW + 1][FUR_N_PART_OF_LIGHT];
+};
+
+void fur_means_fill(struct fur_means *m, const double *param);
+/* Between two rows by straight lines. */
+struct fur_mean fur_mean_at(const struct fur_means *m, double cos_theta, int part);
+
+#endif
