@@ -64,7 +64,11 @@ struct fur_along {
 /* Shift and width of a lobe over alpha and beta. */
 extern const double fur_shift[FUR_N_LOBE], fur_width[FUR_N_LOBE];
 
-struct fur_fiber fur_fiber_of(const double *param);
+static inline struct fur_fiber fur_fiber_of(const double *param)
+{
+    return (struct fur_fiber){param[FUR_P_ETA], param[FUR_P_KAPPA], param[FUR_P_LAYERS], param[FUR_P_MS],
+                              param[FUR_P_MA]};
+}
 /* STATUS_NO_MEMORY. */
 status fur_along_init(struct fur_along *s, const double *param, struct error *err);
 

@@ -20,12 +20,6 @@ struct balance {
     double a[N], d_ln_a[N], d_want[FUR_N_SCALE][N], source[FUR_N_SCALE][N];
 };
 
-struct fur_fiber fur_fiber_of(const double *param)
-{
-    return (struct fur_fiber){param[FUR_P_ETA], param[FUR_P_KAPPA], param[FUR_P_LAYERS], param[FUR_P_MS],
-                              param[FUR_P_MA]};
-}
-
 /* ---- the scale of scattered light ---- */
 
 /* Light that the medulla scatters from one angle to another, where the mean over h and ph has the share 1. */
