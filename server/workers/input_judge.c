@@ -114,6 +114,7 @@ static json_t *report_of_death(const struct worker_end *end)
                      0);
 }
 
+/* What the API says of a judgement, which is released. */
 static json_t *finish(json_t *report, const char *folder)
 {
     json_t *errors = json_object_get(report, "faults"), *warnings = json_object_get(report, "warnings");
@@ -158,9 +159,10 @@ static status judge(struct job_service *v, const char *job_id, int fd, json_t **
     const struct worker_paths paths = {
         .program = supervisor_program(v->supervisor), .job_folder = folder, .document = document, .report_fd = fd};
     status s = ask(v, &paths, &found, &end, refusal, err);
-    if (s == STATUS_OK) *report = is_judgement(found) ? finish(found, folder) : report_of_death(&end);
-    if (s != STATUS_OK || !is_judgement(found)) json_decref(found);
+    const bool judged = s == STATUS_OK && is_judgement(found);
+    if (!judged) json_decref(found);
     if (s != STATUS_OK) return s;
+    *report = judged ? finish(found, folder) : report_of_death(&end);
     return *report != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot judge the files: out of memory");
 }
 

@@ -224,7 +224,7 @@ def test_names_are_unique_and_the_list_has_pages(guarded):
 
 def migrations():
     """The statements of each migration, from the source."""
-    with open(os.path.join(ROOT, "server", "store", "store_schema.c"), encoding="utf-8") as f:
+    with open(os.path.join(ROOT, "server", "store", "drivers", "store_schema.c"), encoding="utf-8") as f:
         text = f.read().split("migration[] = {")[1].split("\n};")[0]
     entries = [""]
     for literal, comma in re.findall(r'"((?:[^"\\]|\\.)*)"|(,)', re.sub(r"/\*.*?\*/", "", text, flags=re.S)):

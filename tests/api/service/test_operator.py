@@ -86,7 +86,7 @@ def test_a_clock_that_goes_back_by_a_year(tmp_path, next_year):
 @pytest.mark.parametrize("text, words", [
     ("[server]\nprot = 1\n", "line 2: setting 'server.prot' does not exist"),
     ("[jobs]\n\nworkers = two\n", "line 3: setting 'jobs.workers' is 'two', which is not a whole number"),
-    ("[jobs]\nworkers = 65\n", "line 2: setting 'jobs.workers' is 65, which is outside 1..64"),
+    ("[jobs]\nworkers = 1025\n", "line 2: setting 'jobs.workers' is 1025, which is outside 1..1024"),
     ("workers\n", "line 1 is not 'name = value'"),
 ])
 def test_settings_with_a_mistake(tmp_path, text, words):
