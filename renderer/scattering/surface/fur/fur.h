@@ -15,7 +15,7 @@
  * What differs from the publication, besides fur_ray.h: scales tilt light to both sides alike (tilted_lobe.h); a(th)
  * takes the place of 1 / cos^2 th_i. In the mean over h and without absorption the medulla scatters the share B(th) of
  * light from th, and b(th) balances M_s to that: taken at th_d alone, as published, grazing light that a wide lobe
- * sends to the middle would be scattered as if it came from there, and fibers would gain up to half of it. a(th)
+ * sends to the middle would be scattered as if it came from there, and fibers would give back more than they get. a(th)
  * balances R, TT, TRT and the rest to 1 - B(th), as in dielectric.v1. So nothing is lost or gained, and the mean is
  * reciprocal. For narrow lobes a a M_p is the published Gaussian over cos th_i cos th_o, and b b / B is 1. The optical
  * radius of the medulla around the fiber is kappa sigma_ms / cos th_t, that along it kappa sigma_ms, as the unit circle
