@@ -16,20 +16,10 @@
 
 #include <cmocka.h>
 
+#include "tests/support/model/near_view_sum.h"
 #include "tests/support/model/prepared_model.h"
 
 static const char *const near_id[3] = {"dielectric_near.v1", "chiang.v1", "chiang_albedo.v1"};
-
-/* S of a near field for the view at the azimuth `place` about the normal. */
-static void near_at(const struct scattering_model *m, const struct scattering_state *s, const double theta[2],
-                    double phi, double place, double sum[3])
-{
-    float wi[3], wo[3], rgb[3];
-    direction(theta[1], place, wo);
-    direction(theta[0], place + phi, wi);
-    m->eval(s, wi, wo, rgb, NULL);
-    for (int c = 0; c < 3; c++) sum[c] += (double)rgb[c];
-}
 
 /* The tables of dielectric.v1 are read by straight lines: between azimuths, a Gaussian of width w is off by at most
  * step^2 / (8 w^2) of its peak, 0.8 % for R of 4 degrees, and R is a part of the largest S (test_dielectric.c). */

@@ -16,6 +16,7 @@
 
 #include <cmocka.h>
 
+#include "tests/support/model/near_view_sum.h"
 #include "tests/support/model/prepared_model.h"
 
 enum { N_FIBER = 10, N_NUMBER = 10 };
@@ -120,16 +121,6 @@ static void share_derivatives(void **unused)
             }
         }
     }
-}
-
-static void near_at(const struct scattering_model *m, const struct scattering_state *s, const double theta[2],
-                    double phi, double place, double sum[3])
-{
-    float wi[3], wo[3], rgb[3];
-    direction(theta[1], place, wo);
-    direction(theta[0], place + phi, wi);
-    m->eval(s, wi, wo, rgb, NULL);
-    for (int c = 0; c < 3; c++) sum[c] += (double)rgb[c];
 }
 
 /* Within 1 % of the largest S, for the narrowest lobes (cat, 2 degrees) and wide ones (dog). Places of the width are
