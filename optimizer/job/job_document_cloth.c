@@ -233,12 +233,15 @@ static status read_names(struct job_document *doc, struct error *err)
     return s;
 }
 
+/* A key of the cloth: job_cloth_name_field makes it one of the document. */
+static const char final_tiles_key[] = "final_tiles";
+
 status job_cloth_check_final_tiles(const struct job_document *doc, struct error *err)
 {
     bool fitted = false;
     for (size_t i = 0; i < doc->cloth->n_number; i++) fitted = fitted || doc->cloth->number[i].fitted;
     if (!fitted && doc->cloth_final_tiles > 1)
-        return error_set_field(err, STATUS_INVALID, "final_tiles",
+        return error_set_field(err, STATUS_INVALID, final_tiles_key,
                                "'final_tiles' is for a cloth whose numbers are fitted: this one has none, so its tile "
                                "is that of 'tile_warps' and 'tile_wefts', or of 'fibers' in a felt");
     struct cloth_description *large = malloc(sizeof *large);

@@ -11,11 +11,11 @@ struct store_fixture {
     struct store *store;
 };
 
-/* Runs the tests of a program over each kind of database; without PostgreSQL it prints why and leaves it out. Returns
- * the number of failures. */
-int store_fixture_each(int (*run)(void));
+/* Runs the tests of a program over each kind of database, whose name is that of the group of tests; without PostgreSQL
+ * it prints why, and that group has one test that is skipped. Returns the number of failures. */
+int store_fixture_each(int (*run)(const char *database));
 /* The same with PostgreSQL alone. */
-int store_fixture_shared(int (*run)(void));
+int store_fixture_shared(int (*run)(const char *database));
 
 /* Makes and opens an empty database of the present kind. Returns 0, or -1 after an error that it prints. */
 int store_fixture_begin(struct store_fixture *f);

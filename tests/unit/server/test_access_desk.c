@@ -255,7 +255,7 @@ static void test_what_an_owner_keeps(void **state)
     expect_use(f, "bob", 0, 0);
 }
 
-static int run(void)
+static int run(const char *database)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_tokens_are_needed_from_the_first_one_on, set_up, tear_down),
@@ -266,7 +266,7 @@ static int run(void)
         cmocka_unit_test_setup_teardown(test_the_heads_of_all_queues, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_what_an_owner_keeps, set_up, tear_down),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests_name(database, tests, NULL, NULL);
 }
 
 int main(void) { return store_fixture_each(run); }

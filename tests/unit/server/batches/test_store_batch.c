@@ -177,7 +177,7 @@ static void test_jobs_bring_their_batch_with_them(void **state)
     assert_string_equal(row.batch, "");
 }
 
-static int run(void)
+static int run(const char *database)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_a_batch_and_its_jobs_are_written_together, set_up, tear_down),
@@ -185,7 +185,7 @@ static int run(void)
         cmocka_unit_test_setup_teardown(test_the_queue_is_known_by_batch, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_jobs_bring_their_batch_with_them, set_up, tear_down),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests_name(database, tests, NULL, NULL);
 }
 
 int main(void) { return store_fixture_each(run); }

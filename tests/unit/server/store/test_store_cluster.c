@@ -318,7 +318,7 @@ static void test_both_databases_have_the_same_columns(void **state)
     rmdir(folder);
 }
 
-static int run(void)
+static int run(const char *database)
 {
 #define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
     const struct CMUnitTest tests[] = {
@@ -334,7 +334,7 @@ static int run(void)
         TEST(test_both_databases_have_the_same_columns),
     };
 #undef TEST
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests_name(database, tests, NULL, NULL);
 }
 
 int main(void) { return store_fixture_shared(run); }
