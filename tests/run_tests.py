@@ -53,6 +53,16 @@ def run(command, timeout_s, environment):
         return code, log.read().decode(errors="replace"), time.monotonic() - start
 
 
+def run_lane(own, other):
+    """Runs what is in the list `own` from its front, then what is left of the other from its end; other lanes share both."""
+    while own or other:
+        try:
+            task = own.pop(0) if own else other.pop()
+        except IndexError:  # another lane was quicker
+            continue
+        task()
+
+
 class Totals:
     def __init__(self):
         self.passed = self.failed = self.skipped = 0
@@ -148,21 +158,17 @@ def main():
             return
         totals.add(name, junit, code, output, seconds)
 
-    def lanes(n):
-        return concurrent.futures.ThreadPoolExecutor(max_workers=n)
-
-    # quick: two lanes compute, two wait for daemons and browsers most of the time; otherwise one of each, and then one
-    # after the other the tests that kill daemons or take all cores
-    n_lane = 2 if arguments.quick else 1
-    with tempfile.TemporaryDirectory() as folder, lanes(n_lane) as computing, lanes(n_lane) as waiting:
-        runs = [computing.submit(run_check, name) for name in checks()]
-        runs += [computing.submit(run_c, folder, name) for name in c_tests()]
-        waited_for = ["api"] if arguments.quick else ["api", "browser"]
-        runs += [waiting.submit(run_python, folder, name) for name in python_tests(waited_for)]
-        for done in runs:
-            done.result()
-        for name in python_tests([] if arguments.quick else ["crash", "real"]):
-            run_python(folder, name)
+    # One lane computes and one waits for daemons and browsers most of the time; with --quick there are two of each. A lane
+    # that has nothing left takes the last of the other's.
+    with tempfile.TemporaryDirectory() as folder:
+        computing = [lambda name=name: run_check(name) for name in checks()]
+        computing += [lambda name=name: run_c(folder, name) for name in c_tests()]
+        waiting = [lambda name=name: run_python(folder, name) for name in python_tests(["api"] if arguments.quick else ["api", "browser"])]
+        computing += [lambda name=name: run_python(folder, name) for name in python_tests([] if arguments.quick else ["crash", "real"])]
+        lanes = [computing, waiting] * (2 if arguments.quick else 1)
+        with concurrent.futures.ThreadPoolExecutor(max_workers=len(lanes)) as pool:
+            for done in [pool.submit(run_lane, own, waiting if own is computing else computing) for own in lanes]:
+                done.result()
 
     tail = f", {totals.skipped} skipped" if totals.skipped else ""
     print(f"{totals.passed} passed, {totals.failed} failed{tail}", flush=True)
