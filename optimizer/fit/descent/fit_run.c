@@ -35,9 +35,9 @@ static status estimate(void *context, const struct estimator_call *call, const s
     inner.param = full;
     struct estimate *to = f->buffer;
     if (call->pair != NULL) inner.pair = &f->pair;
+    inner.iteration += (uint32_t)(f->i_start * KEY_STRIDE);
     f->pair.ready = f->pair.ready && f->pair.iteration == inner.iteration && f->pair.replica == inner.replica;
     if (f->pair.ready) to = f->pair.next; /* the replica that was made with the one before */
-    inner.iteration += (uint32_t)(f->i_start * KEY_STRIDE);
     status s = e->run(e->context, &inner, progress, to, wall_s, err);
     if (to != f->buffer) f->pair.ready = false;
     struct fit_layout bare = f->layout; /* contrasts do not change with a gain */

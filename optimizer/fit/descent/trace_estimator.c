@@ -46,7 +46,7 @@ static status trace(void *context, const struct estimator_call *call, const stru
     double start_s = clock_monotonic_s();
     *wall_s = 0.0;
     if (is_ready(call, out)) return STATUS_OK;
-    const bool both = call->pair != NULL && thread_pool_team(t->pool) != NULL &&
+    const bool both = call->pair != NULL && call->replica == REPLICA_FIT_A && thread_pool_team(t->pool) != NULL &&
                       !rotation_mean_wanted(q.configuration, q.n_configuration);
     status s =
         both ? trace_pair(&q, t->pool, call->pair, progress, out, err) : estimate_run(&q, t->pool, progress, out, err);

@@ -96,8 +96,10 @@ const struct job_option option_rows_fit[] = {
      .meaning =
          "Goal of precision of `gauss_newton.v1`: the fit ends when the noise of tracing makes an error of the fitted "
          "means that is so many times the one that the photographs' stated errors make; 0.5 leaves the errors 12 % "
-         "larger than exact renderings would. `path_budget` is then the most that it takes, so give a large one. "
-         "Measurements without stated errors have no such goal."},
+         "larger than exact renderings would. `path_budget` is then the most that it takes: without one, 6 million "
+         "paths "
+         "(more with over some 240 fitted rows), so give a large one. Measurements without stated errors have no such "
+         "goal."},
     {.path = "fit.share_camera_paths",
      .kind = OPTION_BOOL,
      INTO(share_camera_paths),

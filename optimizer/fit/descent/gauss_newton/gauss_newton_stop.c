@@ -7,10 +7,10 @@
  * little, so such fits would end on their way.
  *
  * The fit ends when it has arrived, there is no pull any more, and the noise is good enough too: below target_share
- * of the plain objective or target_rel_rms, or, where no budget was asked for, below photograph_share of the variance
- * of a residual by the photographs' own errors, or where the job states a goal of precision, when that is reached. A
- * fit whose paths or iterations are used up before that has converged
- * if it had arrived. */
+ * of the plain objective or target_rel_rms, or, where neither a budget nor a goal of precision was asked for,
+ * below photograph_share of the variance of a residual by the photographs' own errors, or where the job states a goal
+ * of precision, when that is reached. A fit whose paths or iterations are used up before that has converged if it had
+ * arrived. */
 #include "optimizer/fit/descent/gauss_newton/gauss_newton.h"
 
 #include <math.h>
@@ -96,8 +96,8 @@ double gauss_newton_paths_to_misfit(const struct gauss_newton *g)
 
 bool gauss_newton_as_good_as_photographs(const struct gauss_newton *g)
 {
-    return g->run.problem->path_budget == 0 && g->model.n_effective >= least_effective &&
-           noise_ratio(g) <= photograph_share;
+    return g->run.problem->path_budget == 0 && !(g->run.problem->precision > 0.0) &&
+           g->model.n_effective >= least_effective && noise_ratio(g) <= photograph_share;
 }
 
 bool gauss_newton_arrived(const struct gauss_newton *g)

@@ -1,4 +1,5 @@
 /* Nuisance terms of a fit: one gain and stray light of all photographs, or a gain of each. */
+#include "base/option_id.h"
 #include "tests/support/fit_fixture.h"
 
 #include <math.h>
@@ -125,13 +126,32 @@ static void test_own_gains_leave_no_bias(void **state)
     assert_true(4.0 * se < 0.1 * exact);
 }
 
+/* Nuisance terms count as unknowns. */
+static void test_too_many_unknowns(void **state)
+{
+    (void)state;
+    struct fit_option o;
+    struct fit_layout l;
+    struct error err = {0};
+    struct param_info info[FIT_MAX_PARAM];
+    struct fit_parameter p[FIT_MAX_PARAM];
+    fit_option_init(&o);
+    for (size_t i = 0; i < FIT_MAX_PARAM; i++) {
+        info[i] = fake_param[0];
+        p[i] = (struct fit_parameter){0.1, 0.9, 0.5, false};
+    }
+    assert_int_equal(fit_layout_init(&l, info, p, FIT_MAX_PARAM, &o, &err), STATUS_OK);
+    o.global_gain_sd = 0.1;
+    assert_int_equal(fit_layout_init(&l, info, p, FIT_MAX_PARAM, &o, &err), STATUS_INVALID);
+    assert_string_equal(err.field, OPTION_NUISANCE);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_global_gain_and_stray_light),
-        cmocka_unit_test(test_gain_of_each_photograph),
-        cmocka_unit_test(test_photograph_gain_estimate),
-        cmocka_unit_test(test_own_gains_leave_no_bias),
+        cmocka_unit_test(test_global_gain_and_stray_light), cmocka_unit_test(test_gain_of_each_photograph),
+        cmocka_unit_test(test_photograph_gain_estimate),    cmocka_unit_test(test_own_gains_leave_no_bias),
+        cmocka_unit_test(test_too_many_unknowns),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -269,6 +269,52 @@ static void test_starts(void **state)
     fit_fixture_release(&x);
 }
 
+/* Makes replica B with A, as the tracer does where several processes share its work, and counts the estimates. */
+struct pairing {
+    struct estimator inner;
+    size_t n_made, n_asked;
+};
+
+static status run_pairing(void *context, const struct estimator_call *call, const struct progress *progress,
+                          struct estimate *out, double *wall_s, struct error *err)
+{
+    struct pairing *p = context;
+    struct estimator_pair *pair = call->pair;
+    p->n_asked++;
+    if (pair != NULL && pair->ready && pair->next == out && pair->iteration == call->iteration &&
+        pair->replica == call->replica)
+        return STATUS_OK;
+    p->n_made++;
+    status s = p->inner.run(p->inner.context, call, progress, out, wall_s, err);
+    if (s != STATUS_OK || pair == NULL || call->replica != REPLICA_FIT_A) return s;
+    struct estimator_call next = *call;
+    next.replica = REPLICA_FIT_B;
+    p->n_made++;
+    *pair = (struct estimator_pair){pair->next, true, next.iteration, next.replica};
+    return p->inner.run(p->inner.context, &next, progress, pair->next, wall_s, err);
+}
+
+/* No replica is made twice in any start, and the result is that of single ones. */
+static void test_replicas_made_together(void **state)
+{
+    (void)state;
+    struct fit_fixture x;
+    struct fit_result want, got;
+    fit_fixture_init(&x, fit_fixture_mid_range, 17, false, 0.005);
+    x.problem.max_iteration = 4;
+    x.option.n_start = 2;
+    fit_fixture_run(&x, &want);
+    struct pairing p = {.inner = x.estimator};
+    x.estimator.context = &p;
+    x.estimator.run = run_pairing;
+    x.n_reported = 0;
+    fit_fixture_run(&x, &got);
+    assert_true(p.n_asked > 0);
+    assert_int_equal(p.n_made, p.n_asked);
+    assert_memory_equal(got.param, want.param, sizeof got.param);
+    fit_fixture_release(&x);
+}
+
 /* A fit with all options that is stopped again and again has the same result as an uninterrupted fit. */
 static void test_resume(void **state)
 {
@@ -306,25 +352,6 @@ static void test_resume(void **state)
     fit_fixture_release(&x);
 }
 
-static void test_too_many_unknowns(void **state)
-{
-    (void)state;
-    struct fit_option o;
-    struct fit_layout l;
-    struct error err = {0};
-    struct param_info info[FIT_MAX_PARAM];
-    struct fit_parameter p[FIT_MAX_PARAM];
-    fit_option_init(&o);
-    for (size_t i = 0; i < FIT_MAX_PARAM; i++) {
-        info[i] = fake_param[0];
-        p[i] = (struct fit_parameter){0.1, 0.9, 0.5, false};
-    }
-    assert_int_equal(fit_layout_init(&l, info, p, FIT_MAX_PARAM, &o, &err), STATUS_OK);
-    o.global_gain_sd = 0.1;
-    assert_int_equal(fit_layout_init(&l, info, p, FIT_MAX_PARAM, &o, &err), STATUS_INVALID);
-    assert_string_equal(err.field, OPTION_NUISANCE);
-}
-
 /* A prior changes the result of a method that takes priors, and no number of any other method. */
 static void test_methods_take_priors_as_they_declare(void **state)
 {
@@ -359,8 +386,8 @@ int main(void)
         cmocka_unit_test(test_starts),
         cmocka_unit_test(test_starts_begin_apart),
         cmocka_unit_test(test_extra_starts),
+        cmocka_unit_test(test_replicas_made_together),
         cmocka_unit_test(test_resume),
-        cmocka_unit_test(test_too_many_unknowns),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }

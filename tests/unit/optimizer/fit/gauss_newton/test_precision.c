@@ -17,7 +17,8 @@ static const double photograph_error = 0.02;
 static const uint64_t most = 60000000;
 
 /* Fits photographs of the seed, which state their errors or not, from the defaults. */
-static void fit(uint64_t seed, double noise, double precision, bool stated, struct fake_cloth *f, struct fit_result *r)
+static void fit_within(uint64_t seed, double noise, double precision, bool stated, uint64_t budget,
+                       struct fake_cloth *f, struct fit_result *r)
 {
     struct fit_parameter parameter[FAKE_N_PARAM];
     struct observation_set o;
@@ -37,10 +38,15 @@ static void fit(uint64_t seed, double noise, double precision, bool stated, stru
                                   .parameter = parameter,
                                   .observation = &o,
                                   .estimator = &e,
-                                  .path_budget = most,
+                                  .path_budget = budget,
                                   .precision = precision};
     if (descent_find(method_gauss_newton.id)->run(&problem, r, &err) != STATUS_OK) fail_msg("%s", err.text);
     observation_set_release(&o);
+}
+
+static void fit(uint64_t seed, double noise, double precision, bool stated, struct fake_cloth *f, struct fit_result *r)
+{
+    fit_within(seed, noise, precision, stated, most, f, r);
 }
 
 /* The error of the fitted means through the noise of tracing is the difference from the fit with exact renderings; that
@@ -89,9 +95,37 @@ static void test_no_goal_without_stated_errors(void **state)
     assert_memory_equal(r.param, without.param, FAKE_N_PARAM * sizeof *r.param);
 }
 
+/* Without a budget the fit ends at the goal or with the default budget, and not where the noise is merely some share
+ * of the photographs' variance. */
+static void test_goal_without_a_budget(void **state)
+{
+    (void)state;
+    enum { SEEDS = 8 };
+    static const double goal = 0.5;
+    size_t n_reached = 0;
+    for (uint64_t seed = 1; seed <= SEEDS; seed++) {
+        struct fake_cloth f;
+        struct fit_result r;
+        fit_within(seed, 1.0, goal, true, 0, &f, &r);
+        if (r.stop == STOP_ARRIVED_WITHIN_PHOTOGRAPHS) {
+            double ratio = NAN;
+            const char *makes = strstr(r.reason, "makes ");
+            assert_non_null(makes);
+            assert_int_equal(sscanf(makes, "makes %lf times the error", &ratio), 1);
+            assert_true(ratio < goal + 0.005); /* as printed with two digits */
+            n_reached++;
+        } else {
+            assert_int_equal(r.stop, STOP_PATH_BUDGET);
+            assert_true((double)r.n_path > 0.9 * (double)method_gauss_newton.default_path_budget);
+        }
+    }
+    print_message("without a budget %zu of %d reach the goal of %.2g\n", n_reached, SEEDS, goal);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_ends_where_the_goal_is_reached),
-                                       cmocka_unit_test(test_no_goal_without_stated_errors)};
+                                       cmocka_unit_test(test_no_goal_without_stated_errors),
+                                       cmocka_unit_test(test_goal_without_a_budget)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
