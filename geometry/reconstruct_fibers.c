@@ -73,13 +73,13 @@ static status find_radius(struct trace_job *job, struct polyline_set *lines, str
     double voxel_m = job->v->voxel_size_m[0];
     const bool is_given = !isnan(job->o->radius_m[0]);
     if (part == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber radius: out of memory");
-    trace_enter_part(job, 0.67, 1.0);
+    trace_enter_part(job, report->lumens_measured ? TRACE_LUMENS_END : 0.67, 1.0);
     status s = distance_histogram_measure(job->v, lines, job->o->eps_d, fmax(4.0, 1.25 * job->diameter), job->pool,
                                           &job->inner, part, err);
     if (s == STATUS_OK) s = radius_choose(part, job->o->radius_rule, &m, err);
     /* the mass is that of filled lumens, whose walls are thin and not as dense as 1 */
-    if (s == STATUS_OK && report->lumens_measured && job->o->radius_rule == RADIUS_AUTO)
-        radius_measure_lines(lines, &m);
+    const bool of_lines = report->lumens_measured && job->o->radius_rule == RADIUS_AUTO;
+    if (s == STATUS_OK && of_lines) radius_measure_lines(lines, job->shared_radius_se, &m);
     if (s == STATUS_OK) {
         all = part + RADIUS_PARTS;
         distance_histogram_sum(part, RADIUS_PARTS, all);
@@ -94,9 +94,11 @@ static status find_radius(struct trace_job *job, struct polyline_set *lines, str
     }
     for (int a = 0; a < 3; a++) m.radius_voxel[a] = job->o->radius_m[a] / voxel_m;
     if (s == STATUS_OK) polylines_set_radii(lines, &m, !is_given && job->o->radius_rule == RADIUS_AUTO);
-    /* edges and mass disagree by the errors of both models, which every fiber shares */
-    report->single_radius_se_m =
-        hypot(report->single_radius_se_m, mean_radius(lines) * voxel_m - report->profile_radius_m);
+    /* edges and mass disagree by the errors of both models, which every fiber shares; of hollow fibers there are only
+     * the radii by the edges, with what noise makes of all of them */
+    const double shared_m = of_lines && !is_given ? job->shared_radius_se * voxel_m
+                                                  : mean_radius(lines) * voxel_m - report->profile_radius_m;
+    report->single_radius_se_m = hypot(report->single_radius_se_m, shared_m);
     free(part);
     return s;
 }

@@ -124,6 +124,10 @@ static status validate_shape(const struct fiber_set *f, size_t i, struct error *
             return error_set(err, STATUS_INVALID,
                              "vertex %zu of fiber %zu has a section with axes of the ratio %g, it must be 1 to %g", at,
                              i, (double)s->ratio, (double)FIBER_RATIO_MOST);
+        if (!(s->lumen >= 0.0f && s->lumen <= FIBER_LUMEN_MOST))
+            return error_set(err, STATUS_INVALID,
+                             "vertex %zu of fiber %zu has a lumen of %g of its width, it must be 0 to %g", at, i,
+                             (double)s->lumen, (double)FIBER_LUMEN_MOST);
     }
     return STATUS_OK;
 }

@@ -13,6 +13,7 @@ enum {
     TRACE_MIN_PIECE = 4,  /* least number of centers in a chain before joining */
     TRACE_MAX_GROWTH = 64 /* voxels by which an end may grow */
 };
+#define TRACE_LUMENS_END 0.85   /* of the progress of the step "fibers", where lumens are measured; from 0.67 on */
 #define TRACE_END_DIAMETERS 1.0 /* length at an end, in diameters, that may be wrong */
 /* Angle between a line and the direction of its voxels from which on it may be wrong. */
 #define TRACE_DISAGREEMENT_RAD (30.0 * RAD_PER_DEG)
@@ -28,6 +29,7 @@ struct trace_job {
     double diameter;             /* voxels */
     double independent;          /* of the voxels of v (axis_profile.h) */
     struct axis_profile profile; /* of the lines so far */
+    double shared_radius_se;     /* voxels, with lumens that were measured: of all radii together (shape_measure.h) */
 };
 
 /* States which part of the progress of the step "fibers" comes next. */

@@ -37,6 +37,7 @@ static float depth_in(const struct piece *p, const float d[3])
     const float along = d[0] * p->t[0] + d[1] * p->t[1] + d[2] * p->t[2];
     const float across[3] = {d[0] - along * p->t[0], d[1] - along * p->t[1], d[2] - along * p->t[2]};
     if (fabsf(along) > 1.0f) return INFINITY;
+    if (!(across[0] * across[0] + across[1] * across[1] + across[2] * across[2] > 0.0f)) return -p->radius;
     return fiber_section_place(p->section, p->radius, across).depth;
 }
 

@@ -66,8 +66,8 @@ struct radius_measure {
 status radius_choose(const struct distance_histogram part[RADIUS_PARTS], enum radius_rule rule,
                      struct radius_measure *m, struct error *err);
 
-/* Replaces the radii of the classes by those that the lines have, without their errors. */
-void radius_measure_lines(const struct polyline_set *lines, struct radius_measure *m);
+/* Replaces the radii of the classes by those that the lines have. se_voxel: their standard error, which all share. */
+void radius_measure_lines(const struct polyline_set *lines, double se_voxel, struct radius_measure *m);
 /* Gives every line the radius of its class. single: scales the radii that the lines have, of their profiles, together
  * to the mass of the class (of all lines, if the classes share a radius). */
 void polylines_set_radii(struct polyline_set *lines, const struct radius_measure *m, bool single);

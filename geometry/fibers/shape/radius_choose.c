@@ -70,11 +70,14 @@ static double rms_radius(const struct polyline_set *lines, int class)
     return length > 0.0 ? sqrt(square / length) : 1.0;
 }
 
-void radius_measure_lines(const struct polyline_set *lines, struct radius_measure *m)
+void radius_measure_lines(const struct polyline_set *lines, double se_voxel, struct radius_measure *m)
 {
     bool any[3] = {false, false, false};
     for (size_t l = 0; l < lines->n_line; l++) any[lines->axis[l]] = true;
-    for (int a = 0; a < 3; a++) m->radius_voxel[a] = rms_radius(lines, m->per_axis && any[a] ? a : 3);
+    for (int a = 0; a < 3; a++) {
+        m->radius_voxel[a] = rms_radius(lines, m->per_axis && any[a] ? a : 3);
+        m->se_voxel[a] = se_voxel;
+    }
 }
 
 void polylines_set_radii(struct polyline_set *lines, const struct radius_measure *m, bool single)

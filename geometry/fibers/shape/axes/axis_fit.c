@@ -307,12 +307,16 @@ static void free_job(struct fit_job *job, size_t n_thread)
     free(job);
 }
 
-/* Variance of a change of the areas of all lumens together, for a noise of 1. */
-static double shared_variance(const struct shared_sum *shared)
+/* Variances of a change of all radii, and of the areas of all lumens, together, for a noise of 1. n: of the shared
+ * numbers that the fit has, 4 without lumens. */
+static void shared_variances(const struct shared_sum *shared, size_t n, double *radius, double *area)
 {
-    double inverse[AXIS_N_SHARED * AXIS_N_SHARED];
-    return small_invert(shared->normal[0], AXIS_N_SHARED, inverse) ? inverse[AXIS_N_SHARED * AXIS_N_SHARED - 1]
-                                                                   : INFINITY;
+    double m[AXIS_N_SHARED * AXIS_N_SHARED], inverse[AXIS_N_SHARED * AXIS_N_SHARED];
+    for (size_t a = 0; a < n; a++)
+        for (size_t b = 0; b < n; b++) m[n * a + b] = shared->normal[a][b];
+    const bool known = small_invert(m, n, inverse);
+    *radius = known ? inverse[0] : INFINITY;
+    *area = known && n == AXIS_N_SHARED ? inverse[n * n - 1] : INFINITY;
 }
 
 status polylines_fit(struct polyline_set *lines, const struct volume *v, double diameter_voxel, int n_round,
@@ -328,20 +332,24 @@ status polylines_fit(struct polyline_set *lines, const struct volume *v, double 
         s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
     for (size_t l = 0; l < lines->n_line; l++)
         if (!(lines->radius[l] > 0.0f)) lines->radius[l] = (float)(0.5 * diameter_voxel);
-    for (int round = 0; round < n_round && s == STATUS_OK; round++)
-        s = one_round(job, lines, &work, diameter_voxel, pool, progress, err);
+    for (int round = 0; round < n_round && s == STATUS_OK; round++) {
+        struct progress_part part = {progress, (double)round / n_round, 1.0 / n_round};
+        const struct progress inner = progress_of_part(&part);
+        s = one_round(job, lines, &work, diameter_voxel, pool, &inner, err);
+    }
     if (s == STATUS_OK) *profile = job->model.profile;
     if (s == STATUS_OK && n_round > 0 && profile->section != NULL && profile->measure != NULL) {
-        const struct shape_sums sums = {.pull = work.total,
-                                        .section = work.section,
-                                        .sections = profile->section,
-                                        .lumen = work.lumen,
-                                        .area = profile->lumen,
-                                        .shared_area = shared_variance(&work.shared),
-                                        .diameter = diameter_voxel,
-                                        .section_length = SECTION_DIAMETERS * diameter_voxel,
-                                        .section_hold = work.hold,
-                                        .slope = fmax(0.2, work.shared.slope / work.shared.weight)};
+        struct shape_sums sums = {.pull = work.total,
+                                  .section = work.section,
+                                  .sections = profile->section,
+                                  .lumen = work.lumen,
+                                  .area = profile->lumen,
+                                  .diameter = diameter_voxel,
+                                  .section_length = SECTION_DIAMETERS * diameter_voxel,
+                                  .section_hold = work.hold,
+                                  .slope = fmax(0.2, work.shared.slope / work.shared.weight)};
+        shared_variances(&work.shared, profile->lumen != NULL ? AXIS_N_SHARED : AXIS_N_SHARED - 1, &sums.shared_radius,
+                         &sums.shared_area);
         fiber_sections_turn(lines, profile->section);
         s = fiber_shapes_measure(lines, &sums, profile->measure, err);
     }

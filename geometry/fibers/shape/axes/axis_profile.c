@@ -5,10 +5,10 @@
 
 /* Bounds of the radius of a fiber, per typical diameter, and of a step, voxels. */
 static const double RADIUS_LEAST = 0.2, RADIUS_MOST = 1.0, RADIUS_STEP = 0.3;
-/* Bounds of the area of a lumen over that of its outline, and of a step; share of the information about it that must
- * be left beside the radius. */
 /* Largest density of the walls of hollow fibers: void and brightest voxels are at 0 and 1. */
 static const double HIGH_OF_WALLS = 3.0;
+/* Bounds of the area of a lumen over that of its outline, and of a step; share of the information about it that must
+ * be left beside the radius. */
 static const double AREA_MOST = 0.81, AREA_STEP = 0.1, AREA_KNOWN = 1e-6;
 /* Lower bound of the spread of the radii, relative. */
 static const double SPREAD_LEAST = 0.01;

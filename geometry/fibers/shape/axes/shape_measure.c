@@ -17,7 +17,9 @@ static const double PRIOR_PIECES = 10.0;
  * the variation, without noise, is at least this share of the radius. */
 static const double LEAST_DEVIATION = 4.0, LEAST_VARIATION = 0.03;
 /* The same of the area of a lumen, and the standard deviation of widths between 0 and 0.8. */
-static const double LEAST_AREA_VARIATION = 0.03, AREA_MOST = 0.3, ANY_LUMEN_SE = 0.23;
+static const double LEAST_AREA_VARIATION = 0.03, AREA_CHANGE_MOST = 0.3, ANY_LUMEN_SE = 0.23;
+/* Largest area of a lumen over that of its outline, as in the fit (axis_profile.c). */
+static const double AREA_MOST = 0.81;
 /* Standard deviation of an angle that may be any between 0 and pi: pi / sqrt 12. */
 static const double ANY_ANGLE_SE = 0.9069;
 
@@ -229,7 +231,7 @@ static bool measure_radius(struct line_work *w, const struct shape_sums *sums, d
 /* Writes the width of a lumen whose area has the variance `variance`, where the scan tells it. */
 static void set_lumen(double area, double variance, struct fiber_shape *shape)
 {
-    const double width = sqrt(fmax(0.0, area)), se = sqrt(width * width + sqrt(variance)) - width;
+    const double width = sqrt(fmin(fmax(0.0, area), AREA_MOST)), se = sqrt(width * width + sqrt(variance)) - width;
     const bool told = se <= ANY_LUMEN_SE;
     shape->lumen = told ? (float)width : 0.0f;
     shape->lumen_se = told ? (float)se : 0.0f;
@@ -241,7 +243,7 @@ static bool measure_lumen(struct line_work *w, const struct shape_sums *sums, do
     take_terms(w, sums, area_terms);
     const double information = centre_gradient(w);
     const bool varies = course_varies(w, noise, LEAST_AREA_VARIATION, sums->diameter) &&
-                        find_course(w, RADIUS_LENGTH * sums->diameter, AREA_MOST);
+                        find_course(w, RADIUS_LENGTH * sums->diameter, AREA_CHANGE_MOST);
     const double shared = noise * sums->shared_area / sums->slope;
     for (size_t i = 0; i < w->n; i++)
         set_lumen(varies ? area + w->x[i] : area,
@@ -349,6 +351,7 @@ status fiber_shapes_measure(struct polyline_set *lines, const struct shape_sums 
     }
     *measure = (struct shape_measure){
         .radius_noise = noise_of(&all[0]), .section_noise = noise_of(&all[1]), .lumen_noise = noise_of(&all[2])};
+    measure->shared_radius_se = sqrt(measure->radius_noise * sums->shared_radius / sums->slope);
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
         struct scatter own[3] = {{0}};
         start_line(&w, lines, l, sums);

@@ -38,7 +38,7 @@ struct shape_sums {
     const struct fiber_section *sections; /* as fitted */
     const struct lumen_pull *lumen;       /* of each vertex: of the segment after it; NULL: solid fibers */
     const float *area;                    /* of the lumen of each line, as fitted */
-    double shared_area;                   /* variance of a change of all areas together, for a noise of 1 */
+    double shared_area, shared_radius;    /* variances of a change of all areas, or of all radii, for a noise of 1 */
     double diameter, section_length, section_hold;
     double slope; /* of weighted residuals by residuals, over the mean weight: the share of N in the true curvature */
 };
@@ -47,6 +47,7 @@ struct shape_measure {
     size_t n_varying; /* lines whose radius varies */
     size_t n_varying_lumen;
     double radius_noise, section_noise, lumen_noise; /* v, per (voxel density)^2 */
+    double shared_radius_se;                         /* voxels, of a change of all radii together */
 };
 
 /* Writes lines->shape, which is made first if it is NULL. Where the set has one, its radii are those that the gradients

@@ -44,11 +44,11 @@ static struct fiber_set tapered(bool groups)
     return f;
 }
 
-/* Adds lumens: of the first fiber as measured, of the second not known. */
+/* Adds lumens: of the first fiber as measured, up to walls of 3 % of the radius; of the second not known. */
 static void make_hollow(struct fiber_set *f)
 {
     for (size_t k = 0; k < N_VERTEX; k++) {
-        f->shape[k].lumen = 0.3f + 0.05f * (float)k;
+        f->shape[k].lumen = 0.97f - 0.05f * (float)k;
         f->shape[k].lumen_se = 0.02f;
     }
 }
@@ -231,6 +231,12 @@ static void test_validation(void **state)
     f.shape[2].radius = 0.0f;
     assert_int_equal(fiber_set_validate(&f, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "vertex 2 of fiber 0 has radius 0 m"));
+    f.shape[2].radius = 40e-6f;
+    f.shape[7].lumen = 1.0f;
+    assert_int_equal(fiber_set_validate(&f, &err), STATUS_INVALID);
+    assert_non_null(strstr(err.text, "vertex 2 of fiber 1 has a lumen of 1 of its width"));
+    f.shape[7].lumen = 0.97f;
+    assert_int_equal(fiber_set_validate(&f, &err), STATUS_OK);
     fiber_set_release(&f);
 }
 

@@ -8,6 +8,7 @@
 #define SELVEDGE_GEOMETRY_AXIS_LUMEN_H
 
 #include "base/lanes.h"
+#include "geometry/fibers/shape/axes/axis_profile.h"
 #include "geometry/fibers/shape/axes/fiber_section.h"
 #include "geometry/fibers/shape/axes/lumen/lumen_table.h"
 
@@ -34,7 +35,7 @@ struct lumen_lanes lumen_lanes_at(const struct lumen_view *w, const struct lumen
 /* Normal equation of the area of one line, and the terms that it has in common with the radius and with what all
  * fibers share (axis_profile.h); radius_shared: of the radius with a change of all areas. */
 struct lumen_pull {
-    float normal, gradient, by_radius, cross[5], radius_shared;
+    float normal, gradient, by_radius, cross[AXIS_N_SHARED], radius_shared;
 };
 
 void lumen_pull_add(struct lumen_pull *to, const struct lumen_pull *from);
