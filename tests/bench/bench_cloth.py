@@ -24,8 +24,8 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 DATA = os.environ.get("SELVEDGE_DATA") or os.path.join(ROOT, "..", "shared", "data")
 
 # What a user writes who knows no more than that it is woven, or a felt. {} is a number that is fitted within its range. Small
-# tiles keep the search fast. The last fit has tiles of 16 x 16 yarns, whose random places move radiances by at most 0.3 %:
-# those of 4 x 4 yarns move them by 1.7 %.
+# tiles keep the search fast. The last fit has tiles of 16 x 16 yarns, whose random places move radiances less
+# (optimizer/fit/NOTES.md, "What limits the recoveries").
 WOVEN_YARN = {"fibers": 40, "flatness": {"lower": 1.2}, "packing": {"lower": 0.35}, "twist_per_m": {"lower": 0, "upper": 1500},
               "fiber_angle_deg": {}, "hairs_per_mm": {}}
 DESCRIPTIONS = {
@@ -158,8 +158,8 @@ def woven(weave, numbers, kinds=1, **cloth):
 
 # Yarns along an edge of the tile: of the photographed cloth, whose tile is as large as the crop of a photograph (1 cm), so that
 # nothing repeats in it as nothing does in a real cloth; and of the job's, in the search and in the last fit. The random places
-# of the cloths differ, and radiances of single tiles scatter: by 1.7 % for 4 x 4 yarns of 40 fibers, by about
-# 1 % for 8 x 8, and by at most 0.3 % for 16 x 16. The noise of the photographs is 0.6 %.
+# of the cloths differ, and radiances of single tiles scatter, those of larger ones less (optimizer/fit/NOTES.md, "What limits the
+# recoveries").
 TRUE_YARNS, JOB_YARNS, FINAL_TILES = {"plain": 48, "twill": 48, "satin": 45}, {"plain": 16, "twill": 16, "satin": 15}, 2
 
 

@@ -328,6 +328,7 @@ int main(int argc, char **argv)
             if (strcmp(argv[at], setting[i].name) == 0) *setting[i].value = argv[at + 1];
     select.text = argv + at;
     select.n = argc - at;
+    size_t n_row = 0;
     for (size_t w = 0; w < sizeof weave / sizeof *weave; w++)
         for (size_t k = 0; k < sizeof condition / sizeof *condition && s == STATUS_OK; k++) {
             char name[64];
@@ -335,9 +336,14 @@ int main(int argc, char **argv)
             if (!selected(&select, name) || !listed(select.weaves, phantom_weave_name(weave[w])) ||
                 !listed(select.conditions, condition[k].name) || (select.bars != NULL && bar_of(name) == NULL))
                 continue;
+            n_row++;
             s = bench_phantom(&select, name, weave[w], &condition[k], &err);
             if (s != STATUS_OK) fprintf(stderr, "bench_geometry: %s: %s\n", name, err.text);
         }
+    if (select.bars != NULL && n_row == 0) {
+        fprintf(stderr, "bench_geometry: none of the rows that have a bar is among those asked for\n");
+        return 1;
+    }
     if (s == STATUS_OK && select.bars == NULL && selected(&select, "weave_ct") && listed(select.weaves, "weave_ct")) {
         s = bench_weave_ct(&select, &err);
         if (s != STATUS_OK) fprintf(stderr, "bench_geometry: weave_ct: %s\n", err.text);

@@ -47,7 +47,7 @@ def run_batch(d, folder, name):
                     "--name", name, "--draft"], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     before = plan(d, name)
     assert before["expected"]["n"] == len(WEAVES), before
-    batch = d.get(f"/v1/batches/{before['id']}/plan").json()["id"]
+    batch = before["id"]
     d.post(f"/v1/batches/{batch}/start")
     wait_until(lambda: d.get(f"/v1/batches/{batch}").json()["states"]["succeeded"] == len(WEAVES), 3600)
     jobs = d.get(f"/v1/jobs?limit=50&batch={batch}").json()["jobs"]
