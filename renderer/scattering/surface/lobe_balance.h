@@ -1,6 +1,6 @@
 /* Balancing of longitudinal lobes: the symmetric scales a(th) and b(th) that make a lobe g(th_o; -th_i, beta)
- * reciprocal and lossless from both sides. two_lobe_balanced.c states the equations. Shared by two_lobe_balanced.v1,
- * textile.v3, dielectric.v1 and its near fields.
+ * reciprocal and lossless from both sides. two_lobe_balanced.c states the equations. Shared by all
+ * models whose lobes are balanced.
  *
  * Functions of an angle are tabulated at LOBE_BALANCE_N equidistant nodes over [0, pi/2]; all are even. Double
  * precision.

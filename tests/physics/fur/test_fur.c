@@ -71,15 +71,14 @@ static void cuticle(void **unused)
             stack += 0.5 * (r + t * t * r / (1 - r * r));
         }
         struct fur_fiber f = {eta, 0.7, 1, 2, 0};
-        double one = fur_ray_at(&f, 1, x).fresnel, sum = one, t = 1 - one;
+        double one = fur_ray_at(&f, 1, x).fresnel, sum = one;
         assert_true(fabs(one - stack) < 1e-12);
         f.layers = 0.5;
         largest = fmax(largest, fabs(fur_ray_at(&f, 1, x).fresnel - 0.5 * (single[0] + single[1])));
         for (int n = 2; n <= 3; n++) { /* one more layer: F + T^2 F_1 / (1 - F F_1) */
-            t = 1 - sum;
+            double t = 1 - sum;
             sum += t * t * one / (1 - sum * one);
             f.layers = n;
-            t = 1 - one;
             double closed = n * one / (1 + (n - 1) * one);
             assert_true(fabs(fur_ray_at(&f, 1, x).fresnel - closed) < 1e-12);
             assert_true(fabs(sum - closed) < 1e-9);

@@ -7,8 +7,8 @@
  *     C_p = density of the medulla (medulla.h) at ph - Phi^s_p;  Phi^s_1 = gamma_t - x, Phi^s_2 = 3 gamma_t - x + pi
  *     M_p = (g(th_o + th_i - alpha_p; beta_p) + g(th_o + th_i + alpha_p; beta_p)) / 2, g a Gaussian
  *           alpha_p / alpha = 1, -1/2, -3/2    beta_p / beta = 1, 1/2, 3/2
- *     M_s = that of the medulla which leaves back at ph = 0, that which goes through at ph = pi, in between in
- *     proportion ph  = ph_i - ph_o,  h = sin x the offset of the view (near_field.h), shares A of fur_ray.h at th_d
+ *     M_s = (1 - |ph| / pi) M_back + (|ph| / pi) M_through, the two longitudinal functions of the medulla (medulla.h)
+ *     ph = ph_i - ph_o in [-pi, pi];  h = sin x, the offset of the view (near_field.h);  shares A of fur_ray.h at th_d
  *
  * fur_near.v1 takes h from the place of the fiber that is seen; fur.v1 is the mean over h.
  *

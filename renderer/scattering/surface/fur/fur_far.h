@@ -3,8 +3,8 @@
  *
  * The means are sums over offsets as Fourier series in ph: a wrapped Gaussian is a factor exp(-k^2 w^2 / 2), and the
  * density of the medulla a factor of each of its functions of the azimuth. The publication integrates pieces between
- * few offsets in closed form, which is off by up to half of R (its light is 42 % too much in the mean of its ten
- * fibers). Derivatives are exact for what is tabulated.
+ * few offsets in closed form, with shares and angles linear within each piece, which makes R too bright at the rim.
+ * Derivatives are exact for what is tabulated.
  */
 #ifndef SELVEDGE_RENDERER_FUR_FAR_H
 #define SELVEDGE_RENDERER_FUR_FAR_H

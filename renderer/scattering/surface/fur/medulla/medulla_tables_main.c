@@ -130,7 +130,7 @@ int main(int argc, char **argv)
     if (argc < 2 || argc > 3) stop("usage: medulla-tables FOLDER [SEED]");
     if (raw == NULL || thread_pool_new(0, &pool, NULL) != STATUS_OK) stop("out of memory");
     raw->seed = argc > 2 ? strtoull(argv[2], NULL, 10) : 1;
-    thread_pool_run(pool, N_MEDIUM, trace_medium, raw, NULL);
+    if (thread_pool_run(pool, N_MEDIUM, trace_medium, raw, NULL) != STATUS_OK) stop("the walks were not all made");
     thread_pool_free(pool);
     for (int i = 0; i < N_MEDIUM; i++)
         if (raw->status[i] != STATUS_OK) stop("out of memory");
