@@ -26,15 +26,16 @@ static status make_request(const struct doctor *d, const char *sbatch, struct sl
 
 static status ask(struct doctor *d, struct slurm_request *request, struct error *err)
 {
-    static const char *const command[] = {"sbatch", "squeue", "scancel"};
-    char path[3][PATH_BYTES];
+    static const char *const command[] = {"sbatch", "squeue", "scancel", "srun"};
+    const int n_command = d->settings->slurm_ranks > 1 ? 4 : 3;
+    char path[4][PATH_BYTES];
     struct slurm_output out = {0};
     const struct slurm_need need = slurm_need_of(d->settings, NULL, 0, (struct slurm_memory){0});
     status s = slurm_request_check(d->settings, err);
-    for (int i = 0; i < 3 && s == STATUS_OK; i++)
+    for (int i = 0; i < n_command && s == STATUS_OK; i++)
         s = slurm_command_find(d->settings, command[i], path[i], sizeof path[i], err);
     if (s == STATUS_OK) s = make_request(d, path[0], need, request, err);
-    if (s == STATUS_OK) s = slurm_command_run(d->settings, request->argument, request->script, &out, err);
+    if (s == STATUS_OK) s = slurm_command_run(d->settings, request->argument, request->script, NULL, &out, err);
     if (s != STATUS_OK) return s;
     if (out.code == 0)
         doctor_say(d, DOCTOR_OK, "cluster", "Slurm would take a job of %lld cores and %lld MiB", (long long)need.cores,

@@ -105,15 +105,15 @@ status attempt_prepare(struct job_service *v, const char *job_id, char token[STO
     return s;
 }
 
-bool attempt_read_request(struct job_service *v, const char *job_id, struct attempt_request *request)
+bool attempt_read_request(struct job_service *v, const char *job_id, bool computes, struct attempt_request *request)
 {
     struct job_row row;
     *request = (struct attempt_request){0};
     if (store_job_look(v->store, job_id, &row, NULL) != STATUS_OK) return false;
     request->cancel = row.cancel_requested;
     request->deleted = row.deleted;
-    json_t *j = attempt_read_status(v, job_id);
-    if (json_integer_value(json_object_get(j, "attempt")) == row.attempt)
+    json_t *j = computes ? attempt_read_status(v, job_id) : NULL;
+    if (j != NULL && json_integer_value(json_object_get(j, "attempt")) == row.attempt)
         request->heartbeat_unix_s = json_number_value(json_object_get(j, "heartbeat_unix_s"));
     json_decref(j);
     job_row_release(&row);
@@ -196,10 +196,10 @@ static void describe_end(struct job_service *v, const struct job_row *row, const
 {
     char tail[300], how[sizeof end->why];
     last_words(v, row->id, tail, sizeof tail);
-    if (end->why[0] != '\0')
-        snprintf(how, sizeof how, "%s", end->why);
-    else if (stop == STOP_SILENT)
+    if (stop == STOP_SILENT)
         snprintf(how, sizeof how, "the worker sent no heartbeat and was killed");
+    else if (end->why[0] != '\0')
+        snprintf(how, sizeof how, "%s", end->why);
     else if (end->by_signal && end->code == SIGKILL)
         snprintf(how, sizeof how, "the worker was killed (signal 9), perhaps because memory was out");
     else if (end->by_signal && end->code == SIGSYS)

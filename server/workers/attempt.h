@@ -23,9 +23,9 @@ struct attempt_request {
  * attempt.json, and clears the folder after an edit. token: that of the attempt. STATUS_CONFLICT when the job is no
  * longer queued, or another daemon has claimed it. */
 status attempt_prepare(struct job_service *v, const char *job_id, char token[STORE_ID_BYTES], struct error *err);
-/* Reads what users have requested for a running job, and the last heartbeat of its worker. Returns false, with no
- * request, when the database cannot be read. */
-bool attempt_read_request(struct job_service *v, const char *job_id, struct attempt_request *request);
+/* Reads what users have requested for a running job and, while its worker computes, its last heartbeat. Returns false,
+ * with no request, when the database cannot be read. */
+bool attempt_read_request(struct job_service *v, const char *job_id, bool computes, struct attempt_request *request);
 /* Changes a job whose worker has ended from running to succeeded, failed, cancelled, paused or queued. Nothing is
  * changed when the job's token is no longer that of this attempt: another daemon has taken the job over. */
 status attempt_finish(struct job_service *v, const char *job_id, const char *token, const struct worker_end *end,

@@ -2,6 +2,7 @@
 #include "base/clock.h"
 #include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
+#include "server/cluster/job_change.h"
 #include "server/jobs/job_paths.h"
 #include "server/workers/supervisor.h"
 #include "server/workers/worker_process.h"
@@ -230,6 +231,28 @@ static status keep_plan(const char *job, json_t *plan, struct error *err)
     return s;
 }
 
+/* Whether the job still is what was planned. */
+static bool is_same(const struct job_row *planned, const struct job_row *now)
+{
+    return now->state != JOB_RUNNING && now->state != JOB_SUCCEEDED && now->attempt == planned->attempt &&
+           strcmp(now->document, planned->document) == 0;
+}
+
+/* A document that is replaced takes the plan with it, which must not come back later. */
+static status keep_plan_of(struct job_service *v, const struct job_row *row, const char *job, json_t *plan,
+                           struct error *err)
+{
+    struct job_row now = {0};
+    job_change_begin(v, row->id, NULL);
+    status s = job_get(v, row->id, &now, err);
+    if (s == STATUS_OK && !is_same(row, &now))
+        s = error_set(err, STATUS_CONFLICT, "the job has changed while it was planned; plan it again");
+    if (s == STATUS_OK) s = keep_plan(job, plan, err);
+    job_change_end(v);
+    job_row_release(&now);
+    return s;
+}
+
 static status plan_job(struct job_service *v, const struct job_row *row, int fd, json_t **plan,
                        struct job_refusal *refusal, struct error *err)
 {
@@ -251,7 +274,7 @@ static status plan_job(struct job_service *v, const struct job_row *row, int fd,
         json_object_del(found, "error");
         json_object_set_new(found, "planned_unix_s", json_real(clock_wall_s()));
         json_object_set_new(found, "attempt", json_integer((json_int_t)row->attempt));
-        s = keep_plan(job, found, err);
+        s = keep_plan_of(v, row, job, found, err);
     }
     if (s == STATUS_OK)
         *plan = found;
@@ -267,10 +290,13 @@ status input_plan(struct job_service *v, const char *job_id, json_t **plan, stru
     int fd;
     status s = enter(v, job_id, &fd, &row, refusal, err);
     if (s != STATUS_OK) return s;
-    if (row.state == JOB_RUNNING || row.state == JOB_SUCCEEDED)
+    job_row_release(&row);
+    s = job_get(v, job_id, &row, err); /* as it is after the wait for a place */
+    if (s == STATUS_OK && (row.state == JOB_RUNNING || row.state == JOB_SUCCEEDED))
         s = error_set(err, STATUS_CONFLICT, "a plan is made before a job runs, and this one %s",
                       row.state == JOB_RUNNING ? "runs" : "has succeeded");
     if (s == STATUS_OK) s = plan_job(v, &row, fd, plan, refusal, err);
     leave(v, fd);
+    job_row_release(&row);
     return s;
 }

@@ -28,9 +28,9 @@ struct slot {
     struct backend_run *run; /* NULL: its start has failed */
     enum attempt_stop stop;  /* reason for the request to stop */
     double seen_heartbeat_unix_s,
-        heartbeat_seen_s; /* the last new heartbeat, and when it was seen (monotonic; at first the start) */
-    double started_s;     /* monotonic time of the start; 0: it waits in its engine */
-    double asked_s;       /* monotonic time of the request to stop; 0: none */
+        heartbeat_seen_s;         /* the last new heartbeat, and when it was seen (monotonic; at first the start) */
+    double started_s, computed_s; /* since when it computes (monotonic; 0: it waits), and how long it had before */
+    double asked_s;               /* monotonic time of the request to stop; 0: none */
     bool killed, ended;
     double retry_s; /* monotonic time of the next try to record its end in the database */
     struct worker_end end;
@@ -111,11 +111,12 @@ static void check_memory(struct supervisor *u, struct slot *slot)
     kill_now(u, slot, STOP_MEMORY);
 }
 
-/* Time limit and heartbeats count from the start of the computation, and not while the worker waits in its engine. */
+/* Time limit and heartbeats do not count while the worker waits in its engine. */
 static void note_phase(struct slot *slot, enum backend_phase phase, double now_s)
 {
     slot->ended = phase == BACKEND_ENDED;
     if (phase == BACKEND_RUNS && slot->started_s <= 0) slot->started_s = slot->heartbeat_seen_s = now_s;
+    if (phase == BACKEND_WAITS && slot->started_s > 0) slot->computed_s += now_s - slot->started_s;
     if (phase == BACKEND_WAITS) slot->started_s = 0;
 }
 
@@ -123,13 +124,12 @@ static void watch(struct supervisor *u, struct slot *slot)
 {
     double now = clock_monotonic_s();
     if (!slot->ended) note_phase(slot, u->backend->look(u->engine, slot->run, &slot->end), now);
-    trim_console(u, slot);
-    if (slot->ended) {
-        if (now >= slot->retry_s) record_end(u, slot);
-        return;
-    }
+    const bool computes = slot->started_s > 0;
+    if (computes || slot->ended) trim_console(u, slot);
+    if (slot->ended && now >= slot->retry_s) record_end(u, slot);
+    if (slot->ended) return;
     struct attempt_request request;
-    bool known = attempt_read_request(u->v, slot->job_id, &request);
+    const bool known = attempt_read_request(u->v, slot->job_id, computes, &request);
     if (request.deleted)
         kill_now(u, slot, STOP_CANCEL);
     else if (request.cancel)
@@ -137,11 +137,10 @@ static void watch(struct supervisor *u, struct slot *slot)
     else if (u->below_floor)
         request_stop(u, slot, STOP_PAUSE);
     const int64_t limit_s = u->v->settings->time_limit_s;
-    const bool computes = slot->started_s > 0;
-    if (limit_s > 0 && computes && now - slot->started_s > (double)limit_s) request_stop(u, slot, STOP_TIME);
+    if (limit_s > 0 && computes && slot->computed_s + now - slot->started_s > (double)limit_s)
+        request_stop(u, slot, STOP_TIME);
     check_memory(u, slot);
-    /* measured with our own clock between heartbeats: the wall clock may be set meanwhile, and one failed read is
-     * not silence */
+    /* by our own clock, because the wall clock may be set meanwhile; one failed read is not silence */
     if (request.heartbeat_unix_s > 0 && request.heartbeat_unix_s != slot->seen_heartbeat_unix_s) {
         slot->seen_heartbeat_unix_s = request.heartbeat_unix_s;
         slot->heartbeat_seen_s = now;
@@ -257,7 +256,7 @@ static void fill_slots(struct supervisor *u)
         if (u->slot[i].used) queue_turn_running(turn, u->slot[i].owner, u->slot[i].batch, 1);
     while (turn != NULL && free_slots > 0 && (i = queue_turn_next(turn, clock_wall_s())) < n) {
         if (!launch(u, &job[i])) continue;
-        free_slots--;
+        free_slots = u->backend->ready(u->engine) ? free_slots - 1 : 0;
         queue_turn_running(turn, job[i].owner, job[i].batch, 1);
     }
     queue_turn_free(turn);

@@ -31,20 +31,22 @@ static void reap(struct slurm_desk *d)
     }
 }
 
-/* Returns a run with work for this step, or NULL. Called with the lock. */
+/* Returns the earliest run with work for this step, or NULL. New runs are put in front. Called with the lock. */
 static struct backend_run *next_work(struct slurm_desk *d, bool submit, double now_s)
 {
+    struct backend_run *found = NULL;
     for (struct backend_run *run = d->first; run != NULL; run = run->next) {
         if (run->released) continue;
-        if (submit ? run->step == SLURM_TO_SUBMIT : wants_cancel(run, now_s)) return run;
+        if (submit ? run->step == SLURM_TO_SUBMIT : wants_cancel(run, now_s)) found = run;
     }
-    return NULL;
+    return found;
 }
 
+/* Submits one job, so that cancelling and looking need not wait for many. */
 static void work(struct slurm_desk *d)
 {
     struct backend_run *run;
-    while (!d->stop && (run = next_work(d, true, 0)) != NULL) {
+    if (!d->stop && (run = next_work(d, true, 0)) != NULL) {
         pthread_mutex_unlock(&d->lock);
         slurm_submit(d, run);
         pthread_mutex_lock(&d->lock);
@@ -55,8 +57,8 @@ static void work(struct slurm_desk *d)
         pthread_mutex_lock(&d->lock);
     }
     double poll_s = (double)d->v->settings->slurm_poll_s;
-    bool look = d->trouble[0] != '\0' ? clock_monotonic_s() >= d->not_before_s
-                                      : d->first != NULL && clock_monotonic_s() - d->looked_s >= poll_s;
+    bool look = d->trouble[0] != '\0' && !d->full ? clock_monotonic_s() >= d->not_before_s
+                                                  : d->first != NULL && clock_monotonic_s() - d->looked_s >= poll_s;
     if (d->stop || !look) return;
     pthread_mutex_unlock(&d->lock);
     slurm_look(d);
@@ -82,10 +84,12 @@ static void *run_desk(void *context)
 static status find_commands(struct slurm_desk *d, struct error *err)
 {
     const struct settings *settings = d->v->settings;
+    char srun[PATH_BYTES]; /* the nodes look for it anew, in the same way */
     status s = slurm_request_check(settings, err);
     if (s == STATUS_OK) s = slurm_command_find(settings, "sbatch", d->sbatch, sizeof d->sbatch, err);
     if (s == STATUS_OK) s = slurm_command_find(settings, "squeue", d->squeue, sizeof d->squeue, err);
     if (s == STATUS_OK) s = slurm_command_find(settings, "scancel", d->scancel, sizeof d->scancel, err);
+    if (s == STATUS_OK && settings->slurm_ranks > 1) s = slurm_command_find(settings, "srun", srun, sizeof srun, err);
     if (s == STATUS_OK && slurm_command_find(settings, "sacct", d->sacct, sizeof d->sacct, NULL) != STATUS_OK)
         d->sacct[0] = '\0';
     return s;
@@ -139,7 +143,8 @@ static bool ready(void *state)
 {
     struct slurm_desk *d = state;
     pthread_mutex_lock(&d->lock);
-    bool is = d->trouble[0] == '\0' && clock_monotonic_s() >= d->not_before_s;
+    bool is = (d->trouble[0] == '\0' || d->full) && clock_monotonic_s() >= d->not_before_s &&
+              (!d->one_by_one || next_work(d, true, 0) == NULL);
     pthread_mutex_unlock(&d->lock);
     return is;
 }

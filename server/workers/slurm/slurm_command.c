@@ -15,7 +15,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { LONGEST_S = 60, MOST_BYTES = 16 << 20, STEP_BYTES = 16384, END_LOOK_US = 5000 };
+enum { LONGEST_S = 60, STOPPING_S = 3, LOOK_MS = 200, MOST_BYTES = 16 << 20, STEP_BYTES = 16384, END_LOOK_US = 5000 };
 
 /* The ends of the pipes that the daemon holds; -1: closed. */
 struct pipes {
@@ -105,16 +105,27 @@ static void give(int *fd, const char **input)
     if (**input == '\0' || (k < 0 && errno != EINTR)) shut(fd);
 }
 
-/* Feeds the command and reads from it until it has closed its outputs. Returns false when it takes too long. */
-static bool converse(struct pipes *p, const char *input, struct text *out, struct text *error)
+/* How long the daemon waits for a command. */
+struct patience {
+    double end_s;
+    const atomic_bool *stop; /* NULL: it does not stop */
+};
+
+static double left_s(struct patience *w)
 {
-    double end_s = clock_monotonic_s() + LONGEST_S;
+    const double now_s = clock_monotonic_s();
+    if (w->stop != NULL && atomic_load(w->stop) && w->end_s > now_s + STOPPING_S) w->end_s = now_s + STOPPING_S;
+    return w->end_s - now_s;
+}
+
+/* Feeds the command and reads from it until it has closed its outputs. Returns false when it takes too long. */
+static bool converse(struct pipes *p, const char *input, struct patience *w, struct text *out, struct text *error)
+{
     if (input == NULL || *input == '\0') shut(&p->in);
     while (p->out >= 0 || p->error >= 0) {
         struct pollfd fd[3] = {{p->out, POLLIN, 0}, {p->error, POLLIN, 0}, {p->in, POLLOUT, 0}};
-        double left_s = end_s - clock_monotonic_s();
-        if (left_s <= 0) return false;
-        if (poll(fd, 3, (int)(left_s * 1e3) + 1) < 0 && errno != EINTR) return false;
+        if (left_s(w) <= 0) return false;
+        if (poll(fd, 3, LOOK_MS) < 0 && errno != EINTR) return false;
         if (fd[0].revents != 0) take(&p->out, out);
         if (fd[1].revents != 0) take(&p->error, error);
         if (fd[2].revents != 0) give(&p->in, &input);
@@ -122,11 +133,10 @@ static bool converse(struct pipes *p, const char *input, struct text *out, struc
     return true;
 }
 
-static int wait_for(pid_t pid, bool in_time)
+static int wait_for(pid_t pid, struct patience *w)
 {
     int state = 0;
-    double end_s = clock_monotonic_s() + LONGEST_S;
-    while (in_time && clock_monotonic_s() < end_s) {
+    while (left_s(w) > 0) {
         pid_t got = waitpid(pid, &state, WNOHANG);
         if (got == pid) return WIFEXITED(state) ? WEXITSTATUS(state) : -1;
         if (got < 0 && errno != EINTR) return -1;
@@ -150,8 +160,15 @@ static void one_line(const struct text *t, char *out, size_t n_out)
     out[k] = '\0';
 }
 
+/* Adds words to those of the command. They replace its last ones where there is no room. */
+static void add_words(char *text, size_t n_text, const char *words)
+{
+    const size_t n_words = strlen(words) + 3, n = strlen(text), most = n_text - n_words;
+    snprintf(text + (n < most ? n : most), n_words, "%s%s", n > 0 ? "; " : "", words);
+}
+
 status slurm_command_run(const struct settings *settings, const char *const *argument, const char *input,
-                         struct slurm_output *out, struct error *err)
+                         const atomic_bool *stop, struct slurm_output *out, struct error *err)
 {
     struct pipes p;
     struct text text = {0}, error = {0};
@@ -159,13 +176,15 @@ status slurm_command_run(const struct settings *settings, const char *const *arg
     *out = (struct slurm_output){.code = -1};
     status s = spawn(settings, argument, &p, &pid, err);
     if (s != STATUS_OK) return s;
-    bool in_time = converse(&p, input, &text, &error);
+    struct patience patience = {clock_monotonic_s() + LONGEST_S, stop};
+    bool in_time = converse(&p, input, &patience, &text, &error);
     shut(&p.in);
     shut(&p.out);
     shut(&p.error);
-    out->code = wait_for(pid, in_time);
+    if (!in_time) patience.end_s = 0;
+    out->code = wait_for(pid, &patience);
     one_line(&error, out->error, sizeof out->error);
-    if (!in_time) snprintf(out->error, sizeof out->error, "the command gave no answer for %d s", LONGEST_S);
+    if (!in_time) add_words(out->error, sizeof out->error, "the command gave no answer in time and was ended");
     free(error.bytes);
     out->text = text.bytes != NULL ? text.bytes : calloc(1, 1);
     if (out->text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot run '%s': out of memory", argument[0]);

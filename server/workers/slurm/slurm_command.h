@@ -6,6 +6,7 @@
 #include "base/status.h"
 #include "server/settings.h"
 
+#include <stdatomic.h>
 #include <stddef.h>
 
 enum { SLURM_ERROR_BYTES = 600 };
@@ -20,8 +21,9 @@ struct slurm_output {
 status slurm_command_find(const struct settings *settings, const char *name, char *path, size_t n_path,
                           struct error *err);
 /* argument: NULL after the last; argument[0] is the path of the command. input: its standard input; NULL: none. Waits
- * for its end, or ends it after a minute. STATUS_IO, STATUS_NO_MEMORY. */
+ * for its end, or ends it after a minute, or a few seconds after *stop (which may be NULL) has become true. STATUS_IO,
+ * STATUS_NO_MEMORY. */
 status slurm_command_run(const struct settings *settings, const char *const *argument, const char *input,
-                         struct slurm_output *out, struct error *err);
+                         const atomic_bool *stop, struct slurm_output *out, struct error *err);
 
 #endif

@@ -8,6 +8,7 @@
 #include "server/workers/slurm/slurm_text.h"
 
 #include <pthread.h>
+#include <stdatomic.h>
 
 enum slurm_step {
     SLURM_TO_SUBMIT,
@@ -35,13 +36,15 @@ struct backend_run {
 struct slurm_desk {
     struct job_service *v;
     const char *program;
-    char sbatch[PATH_BYTES], squeue[PATH_BYTES], scancel[PATH_BYTES], sacct[PATH_BYTES]; /* sacct "": there is none */
+    char sbatch[PATH_BYTES], squeue[PATH_BYTES], scancel[PATH_BYTES], sacct[PATH_BYTES]; /* sacct "": no accounts */
     pthread_t thread;
     pthread_mutex_t lock;
     pthread_cond_t changed;
-    bool stop;
+    atomic_bool stop;
     struct backend_run *first;
     char trouble[SLURM_ERROR_BYTES]; /* why Slurm takes no jobs; "": it does */
+    bool full;                       /* the trouble is a limit of Slurm's alone: its list of jobs can be read */
+    bool one_by_one;                 /* a limit was met once: a job starts when the one before it is submitted */
     double not_before_s, pause_s;    /* no submission before; the last pause between two tries */
     double looked_s;                 /* when the list was read last */
 };
@@ -53,8 +56,9 @@ void slurm_submit(struct slurm_desk *d, struct backend_run *run);
 void slurm_look(struct slurm_desk *d);
 void slurm_cancel(struct slurm_desk *d, struct backend_run *run);
 
-/* Notes that Slurm cannot be used, in its own words, and for how long nothing is to be submitted. */
-void slurm_note_trouble(struct slurm_desk *d, const char *command, const char *words);
+/* Notes that Slurm cannot be used, in its own words, and for how long nothing is to be submitted. full: because of a
+ * limit of Slurm's. */
+void slurm_note_trouble(struct slurm_desk *d, const char *command, const char *words, bool full);
 /* Ends a run and writes its note. */
 void slurm_conclude(struct slurm_desk *d, struct backend_run *run, const struct worker_end *end);
 

@@ -49,17 +49,20 @@ static void measure_progress(struct slurm_desk *d, const struct backend_run *run
     snprintf(out, n_out, "%d stages, %lld bytes", n_done, (long long)st.st_size);
 }
 
-/* A start that ended at its time limit is no loss when it got further than the one before. */
+/* A start that ended at its time limit, or by the loss of a rank, is no loss when it got further than the one
+ * before. */
 static void judge_progress(struct slurm_desk *d, struct backend_run *run, struct worker_end *end)
 {
     char now[sizeof run->note.progress], text[sizeof end->why];
     measure_progress(d, run, now, sizeof now);
+    /* TIMEOUT, or the signal before it; not a rank that was lost */
+    const bool by_limit = end->cause == WORKER_OUT_OF_TIME || (!end->by_signal && end->code == WORKER_CANCELLED);
     bool moved = strcmp(now, run->note.progress) != 0 && strcmp(now, "0 stages, 0 bytes") != 0;
     snprintf(run->note.progress, sizeof run->note.progress, "%s", now);
     end->cause = moved ? WORKER_INTERRUPTED : WORKER_OUT_OF_TIME;
     if (moved) return;
-    snprintf(text, sizeof text, "%.250s; the attempt finished no stage and no step (slurm.time_limit_s, slurm.warn_s)",
-             end->why);
+    snprintf(text, sizeof text, "%.250s; the attempt finished no stage and no step%s", end->why,
+             by_limit ? " (slurm.time_limit_s, slurm.warn_s)" : "");
     snprintf(end->why, sizeof end->why, "%s", text);
 }
 
@@ -111,9 +114,9 @@ static bool ask_accounting(struct slurm_desk *d, const struct backend_run *run, 
     const char *const argument[] = {
         d->sacct, "--noheader", "--parsable2", "--allocations", "--format=" SLURM_ACCOUNT_COLUMNS, of, NULL};
     if (d->sacct[0] == '\0' || run->step != SLURM_KNOWN) return false;
-    if (slurm_command_run(d->v->settings, argument, NULL, &out, NULL) != STATUS_OK) return false;
+    if (slurm_command_run(d->v->settings, argument, NULL, &d->stop, &out, NULL) != STATUS_OK) return false;
     bool found = out.code == 0 && slurm_parse_account(out.text, run->note.id, job);
-    if (out.code != 0) d->sacct[0] = '\0'; /* this cluster keeps no accounts */
+    if (strstr(out.error, "accounting storage is disabled") != NULL) d->sacct[0] = '\0';
     free(out.text);
     return found;
 }
@@ -179,17 +182,17 @@ void slurm_look(struct slurm_desk *d)
     char user[32];
     snprintf(user, sizeof user, "--user=%u", (unsigned)geteuid());
     const char *const argument[] = {d->squeue, "--noheader", user, "--states=all", "--Format=" SLURM_COLUMNS, NULL};
-    status s = slurm_command_run(d->v->settings, argument, NULL, &out, &err);
+    status s = slurm_command_run(d->v->settings, argument, NULL, &d->stop, &out, &err);
     pthread_mutex_lock(&d->lock);
     d->looked_s = clock_monotonic_s();
     pthread_mutex_unlock(&d->lock);
     if (s == STATUS_OK && out.code == 0) s = slurm_parse_jobs(out.text, &job, &n, &err);
     if (s != STATUS_OK || out.code != 0) {
-        slurm_note_trouble(d, "squeue", s != STATUS_OK ? err.text : out.error);
+        slurm_note_trouble(d, "squeue", s != STATUS_OK ? err.text : out.error, false);
     } else {
         pthread_mutex_lock(&d->lock);
-        bool was = d->trouble[0] != '\0';
-        d->trouble[0] = '\0';
+        bool was = d->trouble[0] != '\0' && !d->full;
+        if (was) d->trouble[0] = '\0';
         pthread_mutex_unlock(&d->lock);
         if (was) log_info(d->v->log, "Slurm can be used again");
         for (struct backend_run *run = NULL; (run = next_to_look(d, run)) != NULL;) update(d, run, job, n);

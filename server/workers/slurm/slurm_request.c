@@ -233,10 +233,11 @@ static void write_script(const struct settings *s, const struct slurm_submission
     if (s->memory_limit_bytes > 0) print(w, "ulimit -v %lld\n", (long long)(s->memory_limit_bytes / 1024));
     print(w, "exec ");
     if (s->slurm_ranks > 1) {
-        if (s->slurm_mpi[0] != '\0')
-            print(w, "srun --mpi=%s --kill-on-bad-exit=0 ", s->slurm_mpi);
-        else
-            print(w, "srun --kill-on-bad-exit=0 ");
+        char srun[PATH_BYTES] = "srun";
+        if (s->slurm_commands[0] != '\0') path_join(srun, s->slurm_commands, "srun", NULL);
+        print_quoted(w, srun);
+        if (s->slurm_mpi[0] != '\0') print(w, " --mpi=%s", s->slurm_mpi);
+        print(w, " --kill-on-bad-exit=0 ");
     }
     for (size_t i = 0; a.argument[i] != NULL; i++) {
         /* each start claims the attempt under a name of its own, so one that Slurm repeats finds it taken */

@@ -13,16 +13,21 @@
 
 static const double first_pause_s = 1, longest_pause_s = 60;
 
-void slurm_note_trouble(struct slurm_desk *d, const char *command, const char *words)
+void slurm_note_trouble(struct slurm_desk *d, const char *command, const char *words, bool full)
 {
     pthread_mutex_lock(&d->lock);
+    if (full != d->full) d->pause_s = 0;
     d->pause_s = d->pause_s > 0 ? d->pause_s * 2 : first_pause_s;
     if (d->pause_s > longest_pause_s) d->pause_s = longest_pause_s;
     d->not_before_s = clock_monotonic_s() + d->pause_s;
-    bool begins = d->trouble[0] == '\0';
+    /* a limit is met again and again, and is logged once */
+    bool begins = full ? !d->one_by_one : d->trouble[0] == '\0' || d->full;
+    d->full = full;
+    d->one_by_one = d->one_by_one || full;
     snprintf(d->trouble, sizeof d->trouble, "waits, because Slurm takes no jobs now: %.500s", words);
     pthread_mutex_unlock(&d->lock);
-    if (begins) log_warning(d->v->log, "Slurm cannot be used (%s): %s", command, words);
+    if (begins && full) log_warning(d->v->log, "Slurm takes no more jobs at present (%s): %s", command, words);
+    if (begins && !full) log_warning(d->v->log, "Slurm cannot be used (%s): %s", command, words);
 }
 
 void slurm_conclude(struct slurm_desk *d, struct backend_run *run, const struct worker_end *end)
@@ -108,6 +113,8 @@ static void submitted(struct slurm_desk *d, struct backend_run *run, const char 
     run->step = SLURM_KNOWN;
     d->pause_s = 0;
     d->not_before_s = 0;
+    if (d->full) d->trouble[0] = '\0';
+    d->full = false;
     pthread_mutex_unlock(&d->lock);
 }
 
@@ -116,7 +123,7 @@ static void not_submitted(struct slurm_desk *d, struct backend_run *run, const s
     struct worker_end end = {.cause = WORKER_NOT_STARTED};
     const char *words = out->error[0] != '\0' ? out->error : "sbatch gave no number of a job";
     enum slurm_failure failure = slurm_failure_of(out);
-    if (failure != SLURM_REFUSED) slurm_note_trouble(d, "sbatch", words);
+    if (failure != SLURM_REFUSED) slurm_note_trouble(d, "sbatch", words, failure == SLURM_FULL);
     if (failure == SLURM_UNCERTAIN) {
         run->gone_s = 0;
         set_step(d, run, SLURM_TO_FIND);
@@ -129,11 +136,11 @@ static void not_submitted(struct slurm_desk *d, struct backend_run *run, const s
     slurm_conclude(d, run, &end);
 }
 
-/* Whether the supervisor has given the run up, or Slurm was lost meanwhile: then nothing is submitted. */
+/* Whether the supervisor has given the run up, or Slurm takes no jobs now: then nothing is submitted. */
 static bool is_off(struct slurm_desk *d, const struct backend_run *run)
 {
     pthread_mutex_lock(&d->lock);
-    bool off = run->stop || d->trouble[0] != '\0';
+    bool off = run->stop || (d->full ? clock_monotonic_s() < d->not_before_s : d->trouble[0] != '\0');
     pthread_mutex_unlock(&d->lock);
     return off;
 }
@@ -150,7 +157,7 @@ void slurm_submit(struct slurm_desk *d, struct backend_run *run)
         return;
     }
     status s = prepare(d, run, request, &err);
-    if (s == STATUS_OK) s = slurm_command_run(d->v->settings, request->argument, request->script, &out, &err);
+    if (s == STATUS_OK) s = slurm_command_run(d->v->settings, request->argument, request->script, &d->stop, &out, &err);
     if (s != STATUS_OK) {
         log_error(d->v->log, "job %s cannot be submitted: %s", run->job_id, err.text);
         if (s == STATUS_INVALID) end.cause = WORKER_REFUSED;
@@ -177,8 +184,8 @@ void slurm_cancel(struct slurm_desk *d, struct backend_run *run)
     run->stop_sent_s = clock_monotonic_s();
     d->looked_s = -1e9; /* the end is near */
     pthread_mutex_unlock(&d->lock);
-    if (at_once && slurm_command_run(d->v->settings, kill, NULL, &out, &err) == STATUS_OK) free(out.text);
-    status s = slurm_command_run(d->v->settings, end, NULL, &out, &err);
+    if (at_once && slurm_command_run(d->v->settings, kill, NULL, &d->stop, &out, &err) == STATUS_OK) free(out.text);
+    status s = slurm_command_run(d->v->settings, end, NULL, &d->stop, &out, &err);
     if (s != STATUS_OK || out.code != 0)
         log_warning(d->v->log, "job %s: Slurm's job %s cannot be cancelled; next try in 30 s: %s", run->job_id,
                     run->note.id, s != STATUS_OK ? err.text : out.error);

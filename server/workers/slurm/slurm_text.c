@@ -121,10 +121,11 @@ bool slurm_parse_account(const char *text, const char *id, struct slurm_job *job
             copy(job->id, sizeof job->id, c[0], n[0]);
             copy(job->state, sizeof job->state, c[1], strcspn(c[1], " |\n")); /* "CANCELLED by 1000" */
             copy(job->nodes, sizeof job->nodes, c[3], n[3]);
-            char *end;
-            long code = strtol(c[2], &end, 10), number = *end == ':' ? strtol(end + 1, NULL, 10) : 0;
+            char *rest;
+            long code = strtol(c[2], &rest, 10), number = *rest == ':' ? strtol(rest + 1, NULL, 10) : 0;
             job->wait_status = (int)(code << 8 | number);
-            if (strcmp(job->id, id) == 0) return true;
+            struct worker_end end;
+            if (strcmp(job->id, id) == 0) return slurm_phase_of(job, false, &end) == BACKEND_ENDED;
         }
         at += length + (at[length] == '\n');
     }
@@ -137,26 +138,26 @@ enum slurm_failure slurm_failure_of(const struct slurm_output *output)
     static const struct {
         const char *text;
         enum slurm_failure kind;
-    } known[] = {{"Unable to contact slurm controller", SLURM_AWAY},
-                 {"Unable to establish configuration source", SLURM_AWAY},
-                 {"Connection refused", SLURM_AWAY},
-                 {"No route to host", SLURM_AWAY},
-                 {"in standby mode", SLURM_AWAY},
-                 {"temporarily unable to accept job", SLURM_AWAY},
-                 {"Resource temporarily unavailable", SLURM_AWAY},
-                 {"job submit limit", SLURM_AWAY},
-                 {"Job violates accounting/QOS policy", SLURM_AWAY},
-                 {"munge", SLURM_AWAY},
-                 {"uthentication", SLURM_AWAY},
-                 {"Socket timed out", SLURM_UNCERTAIN},
+    } known[] = {{"Socket timed out", SLURM_UNCERTAIN}, /* these first: some commands try again, and print each try */
                  {"Zero Bytes were transmitted", SLURM_UNCERTAIN},
                  {"Unexpected message received", SLURM_UNCERTAIN},
                  {"Transport endpoint", SLURM_UNCERTAIN},
                  {"Connection reset", SLURM_UNCERTAIN},
-                 {"Message receive failure", SLURM_UNCERTAIN}};
+                 {"Message receive failure", SLURM_UNCERTAIN},
+                 {"Unable to contact slurm controller", SLURM_AWAY},
+                 {"Unable to establish configuration source", SLURM_AWAY},
+                 {"Connection refused", SLURM_AWAY},
+                 {"No route to host", SLURM_AWAY},
+                 {"in standby mode", SLURM_AWAY},
+                 {"Resource temporarily unavailable", SLURM_AWAY},
+                 {"munge", SLURM_AWAY},
+                 {"uthentication", SLURM_AWAY},
+                 {"temporarily unable to accept job", SLURM_FULL},
+                 {"Job violates accounting/QOS policy", SLURM_FULL}};
+    if (output->code < 0) return SLURM_UNCERTAIN; /* it was ended while it tried */
     for (size_t i = 0; i < sizeof known / sizeof *known; i++)
         if (strstr(output->error, known[i].text) != NULL) return known[i].kind;
-    return output->code < 0 ? SLURM_UNCERTAIN : SLURM_REFUSED;
+    return SLURM_REFUSED;
 }
 
 static void read_code(int wait_status, bool ranks, struct worker_end *end)

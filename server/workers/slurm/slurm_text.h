@@ -24,12 +24,14 @@ bool slurm_parse_id(const char *text, char id[SLURM_ID_BYTES]);
 /* Reads lines of SLURM_COLUMNS; a line that has other columns is passed over. *job, an array of *n, is owned by the
  * caller. STATUS_NO_MEMORY. */
 status slurm_parse_jobs(const char *text, struct slurm_job **job, size_t *n, struct error *err);
-/* Reads the line of this id from those of SLURM_ACCOUNT_COLUMNS. Returns false when there is none. */
+/* Reads the line of this id from those of SLURM_ACCOUNT_COLUMNS. Returns false when there is none, or when the job has
+ * not ended by it: the accounts of a job that Slurm lists no longer may say for ever that it runs. */
 bool slurm_parse_account(const char *text, const char *id, struct slurm_job *job);
 
 enum slurm_failure {
     SLURM_REFUSED,  /* the job or the settings are at fault: the same request would fail again */
-    SLURM_AWAY,     /* Slurm cannot be reached, or takes no jobs at present; the request had no effect */
+    SLURM_AWAY,     /* Slurm cannot be reached; the request had no effect */
+    SLURM_FULL,     /* a limit of Slurm's is reached, such as that of a user's jobs; the request had no effect */
     SLURM_UNCERTAIN /* the request may have had its effect, although no answer came */
 };
 /* What an error message of a command means. */

@@ -4,9 +4,10 @@ import os
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from daemon_under_test import ROOT, document, problem, program, sha256
+from daemon_under_test import ROOT, document, problem, program, sha256, wait_until
 
 sys.path.insert(0, os.path.join(ROOT, "clients", "python"))
 import selvedge  # noqa: E402
@@ -71,6 +72,31 @@ def test_a_plan_is_of_one_document(daemon):
     assert daemon.get(f"/v1/batches/{batch['id']}/plan").json()["expected"]["n"] == 1
     assert daemon.put(f"/v1/jobs/{job}/document", json=document("succeed e", fit={"seed": 5})).status_code == 200
     assert daemon.get(f"/v1/batches/{batch['id']}/plan").json()["expected"]["n"] == 0
+
+
+def test_a_plan_of_a_document_that_was_replaced_meanwhile_is_not_kept(daemon):
+    batch = fake_batch(daemon, "raced", ["fake: succeed r"])
+    job = batch["samples"][0]["job"]
+    folder = os.path.join(daemon.data, "jobs", job)
+    hold = os.path.join(folder, "hold")
+    with open(hold, "w"), ThreadPoolExecutor() as pool:
+        answer = pool.submit(daemon.post, f"/v1/jobs/{job}/plan")
+        wait_until(lambda: any(is_planner(pid, folder) for pid in filter(str.isdigit, os.listdir("/proc"))), what="a worker that plans")
+        assert daemon.put(f"/v1/jobs/{job}/document", json=document("succeed r", fit={"seed": 5})).status_code == 200
+        os.remove(hold)
+        problem(answer.result(), 409, "conflict")
+    assert daemon.get(f"/v1/batches/{batch['id']}/plan").json()["expected"]["n"] == 0
+    assert not os.path.exists(os.path.join(folder, "plan.json"))
+    assert daemon.post(f"/v1/jobs/{job}/plan").json()["wall_s"] == 10
+
+
+def is_planner(pid, folder):
+    try:
+        with open(f"/proc/{pid}/cmdline", "rb") as f:
+            words = f.read().rstrip(b"\0").split(b"\0")
+        return words[-1] == folder.encode() and b"--plan" in words
+    except OSError:
+        return False
 
 
 def test_what_cannot_be_planned_is_named(daemon):

@@ -20,6 +20,8 @@ if "--plan" in sys.argv:
     if "unplanned" in sample:
         print(json.dumps({"error": {"code": "format", "field": "volume.files", "text": "cannot read volume 'scan.tif'"}}))
         sys.exit(1)
+    while os.path.exists(os.path.join(sys.argv[-1], "hold")):
+        time.sleep(0.01)
     print(json.dumps({"error": None, "n_thread": 2, "wall_s": 10, "wall_low_s": 5, "wall_high_s": 20, "cpu_s": 16, "memory_bytes": 1e8,
                       "disk_bytes": 5e6, "stages": [{"name": "fit", "wall_s": 10}]}))
     sys.exit(0)

@@ -80,7 +80,10 @@ static void test_ranks(void **state)
     assert_true(has(q, "--ntasks=7") && has(q, "--mem-per-cpu=176M") && !begins(q, "--mem=") && !begins(q, "--nodes"));
     /* srun's steps get the signal, which the script's shell would not pass on */
     assert_true(has(q, "--signal=TERM@120") && !begins(q, "--time"));
-    assert_non_null(strstr(q->script, "exec srun --mpi=pmix --kill-on-bad-exit=0 '/opt/worker' "));
+    assert_non_null(strstr(q->script, "exec 'srun' --mpi=pmix --kill-on-bad-exit=0 '/opt/worker' "));
+    assert_int_equal(settings_set(&s, "slurm.commands", "/opt/it's slurm", NULL), STATUS_OK);
+    make(&s, "twill", q);
+    assert_non_null(strstr(q->script, "exec '/opt/it'\\''s slurm/srun' --mpi=pmix "));
     free(q);
 }
 

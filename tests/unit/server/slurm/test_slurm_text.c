@@ -136,7 +136,8 @@ static void test_accounts(void **state)
 {
     (void)state;
     static const char text[] =
-        "16|COMPLETED|0:0|n1\n17|CANCELLED by 1000|0:15|n2\n18|TIMEOUT|0:0|n1\n19|FAILED|3:0|n2\n";
+        "16|COMPLETED|0:0|n1\n17|CANCELLED by "
+        "1000|0:15|n2\n18|TIMEOUT|0:0|n1\n19|FAILED|3:0|n2\n20|RUNNING|0:0|n1\n21|PENDING|0:0|None assigned\n";
     struct slurm_job job;
     struct worker_end end;
     assert_true(slurm_parse_account(text, "17", &job));
@@ -147,6 +148,8 @@ static void test_accounts(void **state)
     assert_true(slurm_parse_account(text, "19", &job));
     assert_int_equal(slurm_phase_of(&job, false, &end), BACKEND_ENDED);
     assert_true(!end.by_signal && end.code == 3 && end.cause == WORKER_INTERRUPTED);
+    /* accounts that never got the job's end */
+    assert_false(slurm_parse_account(text, "20", &job) || slurm_parse_account(text, "21", &job));
     assert_false(slurm_parse_account(text, "1", &job));
     assert_false(slurm_parse_account("", "1", &job));
 }
@@ -173,8 +176,24 @@ static void test_failures(void **state)
         {1, "sbatch: error: Batch job submission failed: Socket timed out on send/recv operation", SLURM_UNCERTAIN},
         {1, "sbatch: error: Batch job submission failed: Zero Bytes were transmitted or received", SLURM_UNCERTAIN},
         {1, "sbatch: error: Batch job submission failed: Slurm temporarily unable to accept job, sleeping and retrying",
-         SLURM_AWAY},
-        {-1, "the command gave no answer for 60 s", SLURM_UNCERTAIN},
+         SLURM_FULL},
+        {1,
+         "sbatch: error: Slurm temporarily unable to accept job, sleeping and retrying; sbatch: error: Batch job "
+         "submission failed: Socket timed out on send/recv operation",
+         SLURM_UNCERTAIN},
+        {1,
+         "sbatch: error: QOSMaxSubmitJobPerUserLimit; sbatch: error: Batch job submission failed: Job violates "
+         "accounting/QOS policy (job submit limit, user's size and/or time limits)",
+         SLURM_FULL},
+        {1,
+         "sbatch: error: AssocMaxSubmitJobLimit; sbatch: error: Batch job submission failed: Job violates "
+         "accounting/QOS policy (job submit limit, user's size and/or time limits)",
+         SLURM_FULL},
+        {-1, "the command gave no answer in time and was ended", SLURM_UNCERTAIN},
+        {-1,
+         "sbatch: error: Slurm temporarily unable to accept job, sleeping and retrying; the command gave no answer in "
+         "time and was ended",
+         SLURM_UNCERTAIN},
         {1, "", SLURM_REFUSED}};
     for (size_t i = 0; i < sizeof row / sizeof *row; i++) {
         struct slurm_output output = {.code = row[i].code};
