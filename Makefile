@@ -53,8 +53,8 @@ LIBS := $(foreach p,$(PARTS),$(BUILD)/lib/lib$(p).a)
 PROGRAMS := $(BUILD)/bin/selvedge $(BUILD)/bin/selvedged $(BUILD)/bin/selvedge-worker $(BUILD)/bin/selvedge-phantom $(BUILD)/bin/selvedge-camera
 PLUGINS := $(if $(shell pkg-config --exists libpq 2>/dev/null && echo yes),$(BUILD)/lib/selvedge-postgresql.so)
 # ranks of a job: built where Open MPI is installed, without which everything else works
-MPICC := $(shell command -v mpicc 2>/dev/null)
-ifneq ($(MPICC),)
+OPENMPI := $(shell pkg-config --exists ompi-c 2>/dev/null && echo yes)
+ifneq ($(OPENMPI),)
 PROGRAMS += $(BUILD)/bin/selvedge-mpi
 endif
 LINK_BASE := -lz -lm -pthread -Wl,--undefined=processor_required
@@ -85,7 +85,7 @@ night: | deps      ## a night's run: ten synthetic samples in a watched folder (
 cluster-demo:      ## a batch of six samples on a Slurm of two virtual nodes started here, a worker killed, results compared (docs/cluster.md)
 	@./config/install-dependencies cluster
 	@$(MAKE) --no-print-directory -j$$(nproc) all
-	@/usr/bin/python3 tests/slurm/cluster_demo.py
+	@SELVEDGE_BUILD=$(BUILD) /usr/bin/python3 tests/slurm/cluster_demo.py
 
 clean:             ## remove build/
 	rm -rf build

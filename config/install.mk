@@ -20,7 +20,7 @@ purpose_selvedge-worker := run one job of Selvedge in its folder
 purpose_selvedge-phantom := make artificial cloth with known fibers and scattering
 purpose_selvedge-camera := show how Selvedge reads photographs, and calibrate cameras
 purpose_selvedge-mpi := carry the messages of the ranks of one job of Selvedge
-ifneq ($(MPICC),)
+ifneq ($(OPENMPI),)
 MAN_PAGES += $(BUILD)/man/selvedge-mpi.1
 endif
 HELP2MAN := $(shell command -v help2man)

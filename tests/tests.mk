@@ -58,7 +58,7 @@ tsan-requests:     ## those where many requests meet: a part of `make test`
 
 test-slurm: | deps-test ## jobs on a real Slurm of two virtual nodes: faults, restarts, time limits (five minutes, mostly of waiting)
 	@$(MAKE) --no-print-directory -j$$(nproc) all
-	@/usr/bin/python3 -m pytest -q tests/slurm
+	@SELVEDGE_BUILD=$(BUILD) /usr/bin/python3 -m pytest -q tests/slurm
 
 # SAMPLES, KILLS: fewer for a quick look
 test-watched-folder: | deps-test ## 100 samples dropped into a watched folder, real jobs, while the daemon is killed 20 times: each ends once (some minutes)

@@ -12,7 +12,6 @@ def store():
     reason = missing_postgresql()
     if reason:
         pytest.skip(reason)
-    # pytest keeps its folders from other users, and the server does not run as root
     with tempfile.TemporaryDirectory(prefix="selvedge-postgres-") as folder, database(folder, "postgresql") as options:
         yield options
 

@@ -13,6 +13,10 @@ from slurm_cluster import SlurmCluster, missing
 DEMO = os.path.join(ROOT, "tests", "slurm", "cluster_demo.py")
 
 
+def folders():
+    return {name for name in os.listdir(BUILD) if name.startswith("cluster-demo-")}
+
+
 def alone(batch, sample, folder):
     """What the same job finds without a daemon, uninterrupted."""
     os.makedirs(folder)
@@ -58,15 +62,15 @@ def test_ranks(tmp_path, instead):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_demo_leaves_nothing(cluster, number):
-    before = set(os.listdir(BUILD))
+    before = folders()
     demo = subprocess.Popen([sys.executable, DEMO], stdout=subprocess.PIPE, text=True, start_new_session=True)
-    folder = wait_until(lambda: [n for n in os.listdir(BUILD) if n.startswith("cluster-demo-") and n not in before])[0]
+    folder = wait_until(lambda: folders() - before).pop()
     wait_until(lambda: os.path.exists(os.path.join(BUILD, folder, "slurm", "jobs")))
     time.sleep(1)
     os.killpg(demo.pid, number)  # as Ctrl-C in a terminal does
     demo.communicate(timeout=60)
     assert demo.returncode == 128 + number
-    assert set(os.listdir(BUILD)) == before
+    assert folders() == before
     mark = f"/{folder}/".encode()
     for pid in filter(str.isdigit, os.listdir("/proc")):
         try:

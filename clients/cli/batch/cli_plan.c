@@ -25,32 +25,48 @@ static bool will_run(const json_t *sample)
     return false;
 }
 
+/* Whether the server refused this request alone: it still tells of the job. */
+static bool answers(struct cli *cli, const char *job)
+{
+    char path[200];
+    struct error unused = {0};
+    snprintf(path, sizeof path, "/v1/jobs/%.80s", job);
+    return http_json(cli->http, "GET", path, NULL, NULL, NULL, &unused) == STATUS_OK;
+}
+
+static void say_unplanned(struct cli *cli, const char *name, const struct error *fault)
+{
+    char sample[300], field[200], why[700];
+    text_clean(name, sample, sizeof sample);
+    text_clean(fault->field, field, sizeof field);
+    text_clean(fault->text, why, sizeof why);
+    fprintf(cli->note, "%s%s: cannot be planned: %s%s%s\n", cli->note_is_terminal ? "\r" : "", sample, field,
+            field[0] != '\0' ? ": " : "", why);
+}
+
 /* Has every sample planned that will run. Says on standard error which cannot be planned, and counts them. */
 static status plan_samples(struct cli *cli, const json_t *samples, size_t *n_failed, struct error *err)
 {
     const json_t *one;
-    size_t i, n = json_array_size(samples);
+    size_t i, n = json_array_size(samples), n_said = 0;
     json_array_foreach((json_t *)(uintptr_t)samples, i, one)
     {
-        char path[200], sample[300], why[700];
+        char path[200];
         struct error fault = {0};
         if (!will_run(one)) continue;
         snprintf(path, sizeof path, "/v1/jobs/%.80s/plan", text_of(one, "job"));
         status s = http_json(cli->http, "POST", path, NULL, NULL, NULL, &fault);
         if (s == STATUS_CONFLICT) continue; /* it has begun meanwhile */
-        if (s == STATUS_INVALID || s == STATUS_NOT_FOUND) {
-            text_clean(text_of(one, "sample"), sample, sizeof sample);
-            text_clean(fault.text, why, sizeof why);
-            fprintf(cli->note, "%s: cannot be planned: %s%s%s\n", sample, fault.field,
-                    fault.field[0] != '\0' ? ": " : "", why);
+        if (s == STATUS_INVALID || s == STATUS_NOT_FOUND || (s == STATUS_IO && answers(cli, text_of(one, "job")))) {
+            say_unplanned(cli, text_of(one, "sample"), &fault);
             (*n_failed)++;
         } else if (s != STATUS_OK) {
             *err = fault;
             return s;
         }
-        if (cli->note_is_terminal)
-            fprintf(cli->note, "\rplanned %zu of %zu samples%s", i + 1, n, i + 1 < n ? "" : "\n");
+        if (cli->note_is_terminal) n_said += fprintf(cli->note, "\rplanned %zu of %zu samples", i + 1, n) > 0;
     }
+    if (n_said > 0) fprintf(cli->note, "\n");
     return STATUS_OK;
 }
 

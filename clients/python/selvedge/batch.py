@@ -122,10 +122,10 @@ class Batch:
             try:
                 self.client.request("POST", f"/v1/jobs/{one['job']}/plan")
             except Problem as e:
-                if e.status not in (404, 409, 422):
-                    raise
-                if e.status == 422:
+                if e.status in (404, 422, 429, 500, 503):
                     unplanned[one["sample"]] = str(e)
+                elif e.status != 409:  # it has begun meanwhile
+                    raise
         plan: dict[str, Any] = self.client.request("GET", path).json()
         return dict(plan, unplanned=unplanned)
 

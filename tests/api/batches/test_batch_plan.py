@@ -108,6 +108,15 @@ def test_what_cannot_be_planned_is_named(daemon):
     assert "there is no batch 'quarter'" in plan(daemon, "quarter", expect=1)
 
 
+def test_a_sample_that_takes_too_long_does_not_end_the_others(daemon_maker):
+    d = daemon_maker(options={"jobs.check_limit_s": 1})
+    batch = fake_batch(d, "one holds", ["fake: a", "fake: b", "fake: c"])
+    with open(os.path.join(d.data, "jobs", batch["samples"][0]["job"], "hold"), "w"):
+        said = plan(d, "one holds", expect=1)
+    assert "fake: a: cannot be planned: " in said and "jobs.check_limit_s" in said and "3, of which 2 are planned" in said
+    assert list(selvedge.Client(d.url).batch("one holds").plan()["unplanned"]) == ["fake: a"]
+
+
 @pytest.fixture
 def tables(tmp_path):
     """A template of a described cloth, and a folder with a table of reflectances for each of two samples."""
