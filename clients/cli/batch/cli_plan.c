@@ -49,6 +49,7 @@ static status plan_samples(struct cli *cli, const json_t *samples, size_t *n_fai
 {
     const json_t *one;
     size_t i, n = json_array_size(samples), n_said = 0;
+    status result = STATUS_OK;
     json_array_foreach((json_t *)(uintptr_t)samples, i, one)
     {
         char path[200];
@@ -62,12 +63,13 @@ static status plan_samples(struct cli *cli, const json_t *samples, size_t *n_fai
             (*n_failed)++;
         } else if (s != STATUS_OK) {
             *err = fault;
-            return s;
+            result = s;
+            break;
         }
         if (cli->note_is_terminal) n_said += fprintf(cli->note, "\rplanned %zu of %zu samples", i + 1, n) > 0;
     }
     if (n_said > 0) fprintf(cli->note, "\n");
-    return STATUS_OK;
+    return result;
 }
 
 static void print_needs(FILE *out, const char *label, const json_t *need)

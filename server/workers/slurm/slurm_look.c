@@ -195,7 +195,7 @@ void slurm_look(struct slurm_desk *d)
         if (was) d->trouble[0] = '\0';
         pthread_mutex_unlock(&d->lock);
         if (was) log_info(d->v->log, "Slurm can be used again");
-        for (struct backend_run *run = NULL; (run = next_to_look(d, run)) != NULL;) update(d, run, job, n);
+        for (struct backend_run *run = NULL; !d->stop && (run = next_to_look(d, run)) != NULL;) update(d, run, job, n);
     }
     free(job);
     free(out.text);

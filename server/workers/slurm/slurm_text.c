@@ -152,6 +152,7 @@ enum slurm_failure slurm_failure_of(const struct slurm_output *output)
                  {"Resource temporarily unavailable", SLURM_AWAY},
                  {"munge", SLURM_AWAY},
                  {"uthentication", SLURM_AWAY},
+                 {"PerJob", SLURM_REFUSED}, /* a limit of one job's size, as QOSMaxWallDurationPerJobLimit */
                  {"temporarily unable to accept job", SLURM_FULL},
                  {"Job violates accounting/QOS policy", SLURM_FULL}};
     if (output->code < 0) return SLURM_UNCERTAIN; /* it was ended while it tried */

@@ -189,6 +189,10 @@ static void test_failures(void **state)
          "sbatch: error: AssocMaxSubmitJobLimit; sbatch: error: Batch job submission failed: Job violates "
          "accounting/QOS policy (job submit limit, user's size and/or time limits)",
          SLURM_FULL},
+        {1,
+         "sbatch: error: QOSMaxWallDurationPerJobLimit; sbatch: error: Batch job submission failed: Job violates "
+         "accounting/QOS policy (job submit limit, user's size and/or time limits)",
+         SLURM_REFUSED},
         {-1, "the command gave no answer in time and was ended", SLURM_UNCERTAIN},
         {-1,
          "sbatch: error: Slurm temporarily unable to accept job, sleeping and retrying; the command gave no answer in "
