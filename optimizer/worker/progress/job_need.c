@@ -12,20 +12,25 @@
 /* Share of the threads' time that a job computes in: the rest is read, written and waited for. */
 static const double usual_busy = 0.85;
 /* Resident memory of the program with its libraries; of a voxel of a scan, up to the limit of the geometry stages; of
- * a byte of a file of fibers, whose segments are traced; of a cloth that is made from its description. Measured on
- * scans of 2 and 17 million voxels (78 and 357 MB), a table of a described cloth of 320 fibers (46 MB) and a file of
- * fibers of 0.3 MB (33 MB). */
-static const double program_bytes = 31e6, voxel_bytes = 19.0, fiber_file_bytes = 10.0, described_bytes = 12e6;
+ * a byte of a file of fibers, whose segments are traced; of a described cloth, by its size (pipeline_plan_cloth_size).
+ * Measured on scans of 2 and 17 million voxels (78 and 357 MB), a file of fibers of 0.3 MB (33 MB), and weaves and
+ * felts of sizes from 8,000 to 518,000 (33 to 214 MB). */
+static const double program_bytes = 31e6, voxel_bytes = 19.0, fiber_file_bytes = 10.0, cloth_bytes = 355.0;
 /* Disk of results: pages, renderings and the journal of a fit; of a voxel of a scan, whose density, directions and
- * checkpoints are kept; of a byte of a file of fibers; of a described cloth. Measured on the same jobs (51, 405, 13
- * and 6 MB in all). */
-static const double result_bytes = 5e6, voxel_result_bytes = 22.0, fiber_result_bytes = 1.5,
-                    described_result_bytes = 8e6;
+ * checkpoints are kept; of a byte of a file of fibers; of a described cloth. Measured on the same jobs (51, 405, 6, and
+ * 3 to 94 MB in all). */
+static const double result_bytes = 3e6, voxel_result_bytes = 22.0, fiber_result_bytes = 1.5, cloth_result_bytes = 180.0;
+
+/* The geometry is that of another job, which this one cannot look at before it runs: neither can its size be known. */
+static bool is_adopted(const struct pipeline_context *c) { return c->doc->geometry_job[0] != '\0'; }
 
 /* What the needs of a job go with. */
 static void key_of(const struct pipeline_context *c, const char *what, char key[SPEED_BOOK_KEY_BYTES])
 {
-    const char *cloth = c->doc->has_volume ? "scan" : c->doc->cloth != NULL ? "described" : "fibers";
+    const char *cloth = is_adopted(c)           ? "adopted"
+                        : c->doc->has_volume    ? "scan"
+                        : c->doc->cloth != NULL ? "described"
+                                                : "fibers";
     const char *work = job_document_pictures_only(c->doc)   ? "+pictures"
                        : job_document_geometry_only(c->doc) ? ""
                        : c->number.n > 0                    ? "+search"
@@ -64,15 +69,15 @@ static struct job_need model_of(const struct pipeline_context *c)
 {
     struct input_bytes input = {.c = c};
     job_document_visit_files(c->doc, add_input, &input);
-    const double n_voxel = c->doc->has_volume ? pipeline_plan_voxels(c) : 0.0;
+    const double n_voxel = c->doc->has_volume && !is_adopted(c) ? pipeline_plan_voxels(c) : 0.0;
     double geometry_bytes = voxel_bytes * n_voxel;
     if (c->memory_limit_bytes > 0) geometry_bytes = fmin(geometry_bytes, (double)c->memory_limit_bytes);
-    const double described = c->doc->cloth != NULL ? 1.0 : 0.0;
+    const double size = pipeline_plan_cloth_size(c);
     return (struct job_need){.cpu_s = usual_busy * c->usual_wall_s * (double)thread_pool_n_thread(c->pool),
-                             .memory_bytes = program_bytes + geometry_bytes + fiber_file_bytes * input.fibers +
-                                             described_bytes * described,
+                             .memory_bytes =
+                                 program_bytes + geometry_bytes + fiber_file_bytes * input.fibers + cloth_bytes * size,
                              .disk_bytes = input.all + result_bytes + voxel_result_bytes * n_voxel +
-                                           fiber_result_bytes * input.fibers + described_result_bytes * described};
+                                           fiber_result_bytes * input.fibers + cloth_result_bytes * size};
 }
 
 /* The mean ratio of what jobs of this kind took to what the model said; 1 where none has run. */

@@ -144,7 +144,9 @@ static void list_files(const struct confine_files *files, const char *program, s
     struct job_document *doc = read_document(files->document != NULL ? files->document : document);
     permit(list, files->document != NULL ? SANDBOX_READ : SANDBOX_OWN, files->folder);
     if (files->document != NULL) permit(list, SANDBOX_READ, files->document);
-    if (files->speeds != NULL) permit_speeds(list, files->speeds);
+    if (files->speeds != NULL && files->document == NULL) permit_speeds(list, files->speeds);
+    if (files->speeds != NULL && files->document != NULL && access(files->speeds, F_OK) == 0)
+        permit(list, SANDBOX_READ, files->speeds); /* a plan changes nothing */
     if (doc != NULL && !files->no_links && by_hand(&folder))
         job_document_visit_files(doc, permit_link,
                                  &(struct input_links){list, files->document != NULL ? files->folder : input});

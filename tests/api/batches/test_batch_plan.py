@@ -150,3 +150,29 @@ def test_a_real_batch(real, tables):
         assert p["took"]["n"] == 2 and all(p["took"][k] > 0 and p["expected_of_ended"][k] > 0 for k in KEYS), p
         assert p["expected"]["wall_low_s"] < p["expected"]["wall_s"] < p["expected"]["wall_high_s"]
     assert 0.5 < second["ratio"]["cpu_s"] < 2 and 0.8 < second["ratio"]["memory_bytes"] < 1.25 and 0.8 < second["ratio"]["disk_bytes"] < 1.25, second
+
+
+def plan_of(folder, *options):
+    return json.loads(subprocess.run([program("selvedge-worker"), "--plan", *options, folder], check=True, capture_output=True, timeout=60).stdout)
+
+
+@pytest.mark.parametrize("cloth", [{"weave": "plain", "tile_warps": 4, "tile_wefts": 4, "yarns": [{"fibers": 20}]},
+                                   {"weave": "twill", "tile_warps": 12, "tile_wefts": 12, "yarns": [{"fibers": 40}]},
+                                   {"weave": "felt", "yarns": [{"fibers": 2500}]}])
+def test_a_described_cloth_is_planned_by_its_size(tables, cloth):
+    """Memory and disk within a factor of 1.6, on a service that has run nothing; processor time within 2.5, because the speeds are
+    those of one common machine and this one may be slower. Pages and renderings of a small job, some 3 MB, are planned as a constant
+    whatever the number of its rows."""
+    job = tables / "job"
+    os.makedirs(job / "input")
+    shutil.copy(tables / "samples" / "a" / "rows.csv", job / "input")
+    document = json.loads((tables / "template.json").read_text())
+    (job / "job.json").write_text(json.dumps(dict(document, sample="s", cloth=cloth)))
+    p = plan_of(job, "--speeds", tables / "speeds.json")
+    assert sorted(os.listdir(job)) == ["input", "job.json"] and not (tables / "speeds.json").exists(), "a plan writes nothing"
+    subprocess.run([program("selvedge-worker"), "--quiet", job], check=True, timeout=120)
+    status = json.loads((job / "status.json").read_text())
+    disk = sum(os.stat(os.path.join(place, name)).st_blocks * 512 for place, _, names in os.walk(job) for name in names)
+    for took, planned, factor, slack in ((status["cpu_s"], p["cpu_s"], 2.5, 0), (status["peak_rss_bytes"], p["memory_bytes"], 1.6, 0),
+                                         (disk, p["disk_bytes"], 1.6, 3e6)):
+        assert 1 / factor < took / planned < factor or abs(took - planned) < slack, (took, planned, p)
