@@ -61,13 +61,13 @@ def test_a_running_daemon_is_found_and_not_disturbed(tmp_path):
     ("data", "other users may write into it", lambda data, s: os.chmod(data, 0o777)),
     ("disk", "keeps 4000000000.00 GB in reserve", lambda data, s: s.update(disk__floor_bytes=4 * 10**18)),
     ("database", "is damaged", lambda data, s: open(os.path.join(data, "selvedge.db"), "r+b").write(b"x" * 5000)),
-    ("worker", "No such file", lambda data, s: s.update(jobs__worker="/nonexistent/worker")),
+    ("worker", "No such file", lambda data, s: s.update(jobs__worker=data + "/missing/worker")),
     ("worker", "has version", lambda data, s: s.update(jobs__worker="/bin/echo")),
     ("worker", "does not run", lambda data, s: s.update(jobs__worker="/bin/false")),
-    ("dashboard", "cannot read the dashboard's folder", lambda data, s: s.update(server__web="/nonexistent")),
+    ("dashboard", "cannot read the dashboard's folder", lambda data, s: s.update(server__web=data + "/missing")),
     ("address", "cannot", lambda data, s: s.update(server__listen="192.0.2.1")),
-    ("TLS", "cannot read", lambda data, s: s.update(server__tls_certificate="/nonexistent.pem", server__tls_key="/nonexistent.key")),
-    ("webhook", "cannot read", lambda data, s: s.update(webhook__url="http://localhost:1/", webhook__secret_file="/nonexistent")),
+    ("TLS", "cannot read", lambda data, s: s.update(server__tls_certificate=data + "/missing.pem", server__tls_key=data + "/missing.key")),
+    ("webhook", "cannot read", lambda data, s: s.update(webhook__url="http://localhost:1/", webhook__secret_file=data + "/missing")),
 ])
 def test_faults_of_a_machine(tmp_path, subject, words, spoil):
     """Each is found, named, and the only one."""
