@@ -23,11 +23,11 @@ struct share {
     pthread_mutex_t lock;
     pthread_cond_t more;
     struct span own; /* tasks at hand that no other rank has */
+    size_t common;   /* root: the first task that nobody has; helper: the first one that it may still be given */
     bool stop;       /* cancelled, or failed */
     struct error error;
     size_t n_thread;
     /* root */
-    size_t common; /* the first task that nobody has */
     size_t n_done, n_ended;
     bool told; /* the helpers know that they are to stop */
     /* helper */
@@ -193,13 +193,17 @@ static void take_note(struct share *s, const struct rank_frame *frame)
         rank_team_end_early(s->team);
         return;
     }
-    if (frame->kind == RANK_ASSIGN && frame->n_bytes == sizeof span) memcpy(span, s->team->buffer, sizeof span);
-    if (span[0] > s->work->n_task || span[1] > s->work->n_task - span[0]) {
-        error_set(&err, STATUS_FORMAT, "rank %u assigned tasks that do not exist", frame->peer);
+    bool good = frame->kind == RANK_ASSIGN && s->asked && frame->n_bytes == sizeof span;
+    if (good) memcpy(span, s->team->buffer, sizeof span);
+    /* the root gives later tasks each time, so no task comes twice, and done has room for all */
+    if (!good || span[0] < s->common || span[0] > s->work->n_task || span[1] > s->work->n_task - span[0]) {
+        error_set(&err, STATUS_FORMAT, "rank %u sent message %u, which assigns no tasks of rank %zu", frame->peer,
+                  frame->kind, s->team->rank);
         fail(s, &err);
         return;
     }
-    s->ahead = (struct span){span[0], span[0] + span[1]};
+    s->common = span[0] + span[1];
+    s->ahead = (struct span){span[0], s->common};
     s->asked = false;
     s->last = span[1] == 0;
 }
@@ -312,8 +316,8 @@ status rank_team_share(struct rank_team *t, const struct rank_work *work, struct
     if (st == STATUS_OK) {
         thread_pool_run_from(pool, root ? take_in_root : take_in_helper, root ? run_in_root : run_in_helper, &s);
         st = conclude(&s, err);
-        if (!root && !t->broken && !t->ended) {
-            send_results(&s, RANK_DONE);
+        if (!root && !t->broken && !t->ended && (st == STATUS_OK || st == STATUS_CANCELLED)) {
+            send_results(&s, RANK_DONE); /* after anything else, the caller's rank_team_refuse tells the reason */
             t->answered = t->serial;
         }
     }

@@ -15,6 +15,14 @@ struct scene_head {
 
 uint64_t scene_number(const struct scene *s) { return s->number; }
 
+unsigned scene_engine_version(void)
+{
+    RTCDevice device = rtcNewDevice("threads=1,set_affinity=0");
+    const unsigned version = device != NULL ? (unsigned)rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION) : 0;
+    if (device != NULL) rtcReleaseDevice(device);
+    return version;
+}
+
 void scene_pack(const struct scene *s, struct byte_pack *p)
 {
     struct scene_head h = {.n_vertex = s->n_vertex,

@@ -10,6 +10,8 @@
 
 /* A number that no other scene of this process has had. */
 uint64_t scene_number(const struct scene *scene);
+/* Version of the Embree that this process runs with, as 10000 major + 100 minor + patch; 0 when it does not start. */
+unsigned scene_engine_version(void);
 /* scene: not bent. */
 void scene_pack(const struct scene *scene, struct byte_pack *pack);
 /* STATUS_FORMAT, STATUS_NO_MEMORY, and what scene_new gives. */

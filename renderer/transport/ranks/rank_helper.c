@@ -39,6 +39,9 @@ static status read_request(const struct rank_order *order, struct shared_cloth *
     if (!appearance_find(h->model, &q->model) || h->n_set > SCATTERING_MAX_SET)
         return error_set(err, STATUS_FORMAT, "another rank asks for model '%s' with %llu sets", h->model,
                          (unsigned long long)h->n_set);
+    if (order->kind == RANK_ORDER_PICTURE && h->n_configuration != 1)
+        return error_set(err, STATUS_FORMAT, "another rank asks for a picture of %llu configurations",
+                         (unsigned long long)h->n_configuration);
     in->model = &q->model;
     in->n_set = h->n_set;
     in->want_derivative = h->want_derivative != 0;
@@ -48,6 +51,8 @@ static status read_request(const struct rank_order *order, struct shared_cloth *
     q->configuration = byte_view_array(&v, h->n_configuration, sizeof *q->configuration);
     if (order->kind == RANK_ORDER_ESTIMATE) q->n_path = byte_view_array(&v, h->n_configuration, sizeof *q->n_path);
     status s = byte_view_check(&v, err);
+    if (s == STATUS_OK && in->discrepancy != NULL && in->discrepancy->n > DISCREPANCY_MAX_PLACE)
+        s = error_set(err, STATUS_FORMAT, "another rank asks for a discrepancy with %zu places", in->discrepancy->n);
     if (s == STATUS_OK) s = shared_cloth_find(cloth, &h->numbers, &in->scene, &q->environment, err);
     for (size_t i = 0; s == STATUS_OK && i < h->n_configuration; i++)
         if (q->configuration[i].environment != NULL) q->configuration[i].environment = q->environment;

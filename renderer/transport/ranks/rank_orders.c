@@ -3,6 +3,7 @@
 #include "renderer/scene/scene_place.h"
 #include "renderer/transport/ranks/rank_request.h"
 
+#include <stdio.h>
 #include <string.h>
 
 static const struct environment *only_environment(const struct configuration *c, size_t n, bool *one)
@@ -32,7 +33,7 @@ static status begin(struct rank_team *team, const struct radiance_input *in, con
     bool one, surface = in->model->kind == MODEL_SURFACE;
     const struct appearance_scene needed = {.fibers = surface ? in->scene.fibers : NULL,
                                             .volume = surface ? NULL : in->scene.volume};
-    strcpy(h->model, in->model->id);
+    snprintf(h->model, sizeof h->model, "%s", in->model->id);
     h->n_set = in->n_set;
     h->want_derivative = in->want_derivative;
     h->plain_paths = in->plain_paths;

@@ -134,29 +134,36 @@ static bool find_slab(struct volume_scene *s, const struct direction_volume *v)
     return most > 0;
 }
 
+/* Sets the size of an empty scene, and all that follows from it. */
+static status set_size(struct volume_scene *s, const size_t n[3], const double voxel_size_m[3], struct error *err)
+{
+    size_t n_brick = 1;
+    memset(s, 0, sizeof *s);
+    for (int a = 0; a < 3; a++) {
+        s->voxel_mm[a] = (float)(1e3 * voxel_size_m[a]);
+        if (n[a] == 0 || n[a] > (1u << 24) || !(s->voxel_mm[a] > 0) || !isfinite(s->voxel_mm[a]))
+            return error_set(err, STATUS_INVALID, "cannot trace a volume of %zu x %zu x %zu voxels", n[0], n[1], n[2]);
+        s->n[a] = n[a];
+        s->voxel_size_m[a] = voxel_size_m[a];
+        s->n_brick[a] = (int32_t)((n[a] + VOLUME_BRICK_EDGE - 1) >> VOLUME_BRICK_SHIFT);
+        if (n_brick <= INT32_MAX) n_brick *= (size_t)s->n_brick[a]; /* three factors may be more than 2^64 */
+    }
+    if (n_brick > INT32_MAX)
+        return error_set(err, STATUS_INVALID, "cannot trace a volume of %zu x %zu x %zu voxels: too many", n[0], n[1],
+                         n[2]);
+    for (int a = 0; a < 2; a++) s->n_voxel[a] = (float)n[a];
+    s->number = unique_number();
+    return STATUS_OK;
+}
+
 status volume_scene_init(struct volume_scene *s, const struct direction_volume *v, const struct volume_scene_option *o,
                          struct error *err)
 {
-    memset(s, 0, sizeof *s);
-    size_t n_brick = 1;
-    for (int a = 0; a < 3; a++) {
-        if (v->n[a] == 0 || v->n[a] > (1u << 24) || !(v->voxel_size_m[a] > 0))
-            return error_set(err, STATUS_INVALID, "cannot trace a volume of %zu x %zu x %zu voxels", v->n[0], v->n[1],
-                             v->n[2]);
-        s->n[a] = v->n[a];
-        s->voxel_size_m[a] = v->voxel_size_m[a];
-        s->voxel_mm[a] = (float)(1e3 * v->voxel_size_m[a]);
-        s->n_brick[a] = (int32_t)((v->n[a] + VOLUME_BRICK_EDGE - 1) >> VOLUME_BRICK_SHIFT);
-        n_brick *= (size_t)s->n_brick[a];
-    }
-    if (n_brick > INT32_MAX)
-        return error_set(err, STATUS_INVALID, "cannot trace a volume of %zu x %zu x %zu voxels: too many", v->n[0],
-                         v->n[1], v->n[2]);
+    status st = set_size(s, v->n, v->voxel_size_m, err);
+    if (st != STATUS_OK) return st;
     if (!find_slab(s, v)) return error_set(err, STATUS_INVALID, "cannot trace a volume in which every voxel is empty");
-    for (int a = 0; a < 2; a++) s->n_voxel[a] = (float)v->n[a];
     s->black_sheet = o->black_sheet;
-    s->number = unique_number();
-    status st = number_bricks(s, v, err);
+    st = number_bricks(s, v, err);
     if (st == STATUS_OK) st = fill_bricks(s, v, err);
     if (st != STATUS_OK) volume_scene_release(s);
     return st;
@@ -174,34 +181,60 @@ void volume_scene_release(struct volume_scene *s)
     s->voxel = NULL;
 }
 
-void volume_scene_pack(const struct volume_scene *s, struct byte_pack *p)
+/* What a scene holds besides its bricks, and what does not follow from its size. */
+struct volume_head {
+    size_t n[3], n_stored;
+    double voxel_size_m[3];
+    float low, high, largest_density;
+    uint32_t black_sheet;
+};
+
+static size_t count_bricks(const struct volume_scene *s)
 {
     const size_t n[3] = {(size_t)s->n_brick[0], (size_t)s->n_brick[1], (size_t)s->n_brick[2]};
-    struct volume_scene plain = *s;
-    plain.brick = NULL;
-    plain.voxel = NULL;
-    BYTE_PACK(p, plain);
-    byte_pack_put(p, s->brick, volume_n_voxel(n) * sizeof *s->brick);
+    return volume_n_voxel(n);
+}
+
+void volume_scene_pack(const struct volume_scene *s, struct byte_pack *p)
+{
+    struct volume_head h = {.n_stored = s->n_stored,
+                            .low = s->low,
+                            .high = s->high,
+                            .largest_density = s->largest_density,
+                            .black_sheet = s->black_sheet};
+    memcpy(h.n, s->n, sizeof h.n);
+    memcpy(h.voxel_size_m, s->voxel_size_m, sizeof h.voxel_size_m);
+    BYTE_PACK(p, h);
+    byte_pack_put(p, s->brick, count_bricks(s) * sizeof *s->brick);
     byte_pack_put(p, s->voxel, s->n_stored * VOLUME_BRICK_VOXELS * sizeof *s->voxel);
+}
+
+/* Whether rays stay inside of the arrays. */
+static bool in_range(const struct volume_scene *s)
+{
+    bool good = s->n_stored > 0 && s->low >= 0 && s->low < s->high && s->high <= (float)s->n[2] &&
+                s->largest_density > 0 && s->largest_density <= 1;
+    const size_t n_brick = count_bricks(s);
+    for (size_t i = 0; good && i < n_brick; i++)
+        good = s->brick[i] < 0 ? s->brick[i] >= -VOLUME_EMPTY_MAX : (size_t)s->brick[i] < s->n_stored;
+    return good;
 }
 
 status volume_scene_unpack(struct byte_view *v, struct volume_scene *s, struct error *err)
 {
-    BYTE_VIEW(v, *s);
-    s->brick = NULL;
-    s->voxel = NULL;
-    s->bent = NULL;
-    s->number = unique_number();
-    size_t n_brick = 1;
-    for (int a = 0; a < 3; a++) {
-        v->failed |= s->n_brick[a] < 1 || n_brick > SIZE_MAX / (size_t)s->n_brick[a];
-        if (!v->failed) n_brick *= (size_t)s->n_brick[a];
-    }
-    s->brick = byte_view_array(v, n_brick, sizeof *s->brick);
+    struct volume_head h;
+    BYTE_VIEW(v, h);
+    status st = set_size(s, h.n, h.voxel_size_m, err);
+    if (st != STATUS_OK) return error_set(err, STATUS_FORMAT, "a volume of another rank is none");
+    s->n_stored = h.n_stored;
+    s->low = h.low;
+    s->high = h.high;
+    s->largest_density = h.largest_density;
+    s->black_sheet = h.black_sheet != 0;
+    s->brick = byte_view_array(v, count_bricks(s), sizeof *s->brick);
     s->voxel = byte_view_array(v, s->n_stored, VOLUME_BRICK_VOXELS * sizeof *s->voxel);
-    for (size_t i = 0; i < n_brick && !v->failed; i++)
-        v->failed = s->brick[i] >= 0 && (size_t)s->brick[i] >= s->n_stored;
-    status st = byte_view_check(v, err);
+    st = byte_view_check(v, err);
+    if (st == STATUS_OK && !in_range(s)) st = error_set(err, STATUS_FORMAT, "a volume of another rank is none");
     if (st != STATUS_OK) volume_scene_release(s);
     return st;
 }
@@ -214,8 +247,7 @@ uint32_t volume_scene_voxel(const struct volume_scene *s, size_t i, size_t j, si
 
 size_t volume_scene_memory_bytes(const struct volume_scene *s)
 {
-    const size_t n[3] = {(size_t)s->n_brick[0], (size_t)s->n_brick[1], (size_t)s->n_brick[2]};
-    return sizeof *s + volume_n_voxel(n) * sizeof *s->brick + s->n_stored * VOLUME_BRICK_VOXELS * sizeof *s->voxel;
+    return sizeof *s + count_bricks(s) * sizeof *s->brick + s->n_stored * VOLUME_BRICK_VOXELS * sizeof *s->voxel;
 }
 
 double volume_scene_thickness_mm(const struct volume_scene *s) { return (double)((s->high - s->low) * s->voxel_mm[2]); }
