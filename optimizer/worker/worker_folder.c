@@ -126,6 +126,7 @@ status worker_folder_claim(const struct worker_folder *f, const char *start, str
     bool written = write(fd, start, strlen(start)) == (ssize_t)strlen(start) && fsync(fd) == 0;
     status s = written ? durable_sync_folder_of(path, err) : error_set_errno(err, "cannot write '%s'", path);
     close(fd);
+    if (!written) unlink(path); /* an empty claim would refuse the same start when it comes again */
     if (s == STATUS_OK) remove_claims(f, name);
     return s == STATUS_OK ? worker_folder_check(f, err) : s;
 }

@@ -6,10 +6,12 @@
 #include "tests/support/scratch_folder.h"
 
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
@@ -131,6 +133,25 @@ static void test_one_start_has_the_attempt(void **state)
     worker_folder_close(&first);
 }
 
+/* A claim that cannot be written refuses nobody, once there is room again. */
+static void test_a_full_disk_leaves_no_claim(void **state)
+{
+    struct worker_folder f;
+    struct rlimit before, nothing;
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
+    nothing = before;
+    nothing.rlim_cur = 0;
+    signal(SIGXFSZ, SIG_IGN);
+    write_attempt(*state, "{\"attempt\":1,\"token\":\"abc\"}");
+    assert_int_equal(worker_folder_open(&f, *state, NULL), STATUS_OK);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &nothing), 0);
+    status s = worker_folder_claim(&f, "slurm-7.0", NULL);
+    setrlimit(RLIMIT_FSIZE, &before);
+    assert_int_not_equal(s, STATUS_OK);
+    assert_int_equal(worker_folder_claim(&f, "slurm-7.0", NULL), STATUS_OK);
+    worker_folder_close(&f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -140,6 +161,8 @@ int main(void)
                                         scratch_folder_teardown),
         cmocka_unit_test(test_fingerprint),
         cmocka_unit_test_setup_teardown(test_one_start_has_the_attempt, scratch_folder_setup, scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(test_a_full_disk_leaves_no_claim, scratch_folder_setup,
+                                        scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(test_marks_are_removed, scratch_folder_setup, scratch_folder_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
