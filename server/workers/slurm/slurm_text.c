@@ -184,7 +184,7 @@ enum backend_phase slurm_phase_of(const struct slurm_job *job, bool ranks, struc
     if (strcmp(job->state, "FAILED") == 0 && job->nodes[0] == '\0') {
         end->cause = WORKER_REFUSED; /* it never had a node, and no worker has run */
         snprintf(end->why, sizeof end->why, "Slurm gave up the job before it started: %s", job->reason);
-    } else if (ranks && (end->by_signal || end->code == WORKER_LOST)) {
+    } else if (ranks && (end->by_signal ? end->code != SIGSYS : end->code == WORKER_LOST)) {
         end->cause = WORKER_INTERRUPTED; /* the other ranks end with it, and the job goes on from its checkpoint */
         snprintf(end->why, sizeof end->why, "a rank was lost (code %d)", end->code);
     } else if (!end->by_signal && end->code == WORKER_CANCELLED) {

@@ -97,6 +97,7 @@ static void test_states(void **state)
                {"FAILED", WORKER_CANCELLED << 8, false, BACKEND_ENDED, WORKER_INTERRUPTED, false, WORKER_CANCELLED},
                {"FAILED", WORKER_STALE << 8, false, BACKEND_ENDED, WORKER_ENDED, false, WORKER_STALE},
                {"FAILED", (128 + SIGKILL) << 8, true, BACKEND_ENDED, WORKER_INTERRUPTED, true, SIGKILL},
+               {"FAILED", (128 + SIGSYS) << 8, true, BACKEND_ENDED, WORKER_ENDED, true, SIGSYS},
                {"FAILED", WORKER_LOST << 8, true, BACKEND_ENDED, WORKER_INTERRUPTED, false, WORKER_LOST},
                {"FAILED", WORKER_FAILED << 8, true, BACKEND_ENDED, WORKER_ENDED, false, WORKER_FAILED},
                {"FAILED", 139 << 8, false, BACKEND_ENDED, WORKER_ENDED, false, 139},
