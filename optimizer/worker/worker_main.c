@@ -281,6 +281,17 @@ static status report_sandbox(struct pipeline_context *c, const struct arguments 
 /* Another rank than the first. */
 static bool is_helper(const struct arguments *a) { return a->team.fd >= 0 && a->team.rank > 0; }
 
+/* Says where this rank has less of a sandbox than its command line asks for: the log of the job tells of rank 0. */
+static void report_sandbox_of_helper(const struct arguments *a, const struct error *failed)
+{
+    char text[200];
+    const bool whole = confinement_describe(&a->confinement, a->sandbox, text, sizeof text);
+    if (failed->code != STATUS_OK)
+        fprintf(stderr, "selvedge-worker: rank %zu runs without its whole sandbox: %s\n", a->team.rank, failed->text);
+    else if (!whole && a->sandbox != CONFINE_OFF)
+        fprintf(stderr, "selvedge-worker: rank %zu: %s\n", a->team.rank, text);
+}
+
 /* The job is not run. */
 static bool files_only(const struct arguments *a) { return a->check != NULL || a->plan; }
 
@@ -323,7 +334,10 @@ int main(int argc, char **argv)
         fprintf(stderr, "selvedge-worker: %s\n", failed.text);
         return WORKER_USAGE;
     }
-    if (is_helper(&a)) return worker_team_help(&a.team, a.n_thread);
+    if (is_helper(&a)) {
+        report_sandbox_of_helper(&a, &failed);
+        return worker_team_help(&a.team, a.n_thread);
+    }
     if (files_only(&a)) return a.plan ? print_plan(&a) : print_check(&a);
     worker_signals_set();
     status s = worker_folder_open(&folder, a.folder, &err);

@@ -4,7 +4,8 @@
  * "--team none" when it is alone.
  *
  * The loop sleeps while nothing happens, and wakes at once when the worker sends. Exit status: that of the worker;
- * EXIT_LOST when another rank is lost, whereupon MPI ends all of them. */
+ * EXIT_LOST when another rank is lost, whereupon MPI ends all of them; EXIT_FORBIDDEN when a rank was lost because its
+ * sandbox has ended it. */
 #include "base/ranks/rank_link.h"
 #include "base/version.h"
 
@@ -22,7 +23,8 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { EXIT_USAGE = 2, EXIT_LOST = 75, EXIT_CANNOT_EXECUTE = 127, CLOSE_KIND = 1000, QUEUE_MOST_BYTES = 64 << 20 };
+enum { EXIT_USAGE = 2, EXIT_LOST = 75, EXIT_CANNOT_EXECUTE = 127, EXIT_FORBIDDEN = 128 + SIGSYS };
+enum { CLOSE_KIND = 1000, QUEUE_MOST_BYTES = 64 << 20 };
 
 /* A message on its way. */
 struct message {
@@ -59,9 +61,10 @@ static void want_stop(int signal_number)
 
 static _Noreturn void lost(const struct agent *a, const char *what)
 {
+    const int code = a->code == EXIT_FORBIDDEN ? EXIT_FORBIDDEN : EXIT_LOST;
     fprintf(stderr, "selvedge-mpi: rank %d is lost: %s\n", a->rank, what);
-    MPI_Abort(MPI_COMM_WORLD, EXIT_LOST);
-    _exit(EXIT_LOST);
+    MPI_Abort(MPI_COMM_WORLD, code);
+    _exit(code);
 }
 
 static struct message *message_new(const struct agent *a, const struct rank_frame *frame)
@@ -97,36 +100,51 @@ static _Noreturn void become_worker(int fd, pid_t parent, char **argv)
     int place[2];
     char team[64];
     size_t n = 0;
+    ssize_t got;
     prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (getppid() != parent || read(fd, place, sizeof place) != (ssize_t)sizeof place) _exit(EXIT_CANNOT_EXECUTE);
+    setpgid(0, 0); /* mpirun signals whole process groups, and means this program */
+    signal(SIGUSR1, SIG_IGN);
+    signal(SIGPIPE, SIG_DFL);
+    signal(SIGTERM, SIG_DFL);
+    signal(SIGINT, SIG_DFL);
+    if (getppid() != parent) _exit(EXIT_CANNOT_EXECUTE);
+    do got = read(fd, place, sizeof place);
+    while (got < 0 && errno == EINTR);
+    if (got != (ssize_t)sizeof place) _exit(EXIT_CANNOT_EXECUTE);
     while (argv[n] != NULL) n++;
     char **again = calloc(n + 3, sizeof *again);
     if (again == NULL) _exit(EXIT_CANNOT_EXECUTE);
-    snprintf(team, sizeof team, "%d,%d,%d", fd, place[0], place[1]);
-    if (place[1] == 1) strcpy(team, "none");
+    if (place[1] == 1)
+        snprintf(team, sizeof team, "none");
+    else
+        snprintf(team, sizeof team, "%d,%d,%d", fd, place[0], place[1]);
     again[0] = argv[0];
     again[1] = (char *)(uintptr_t) "--team";
     again[2] = team;
     memcpy(again + 3, argv + 1, (n - 1) * sizeof *again);
-    signal(SIGTERM, SIG_DFL);
-    signal(SIGINT, SIG_DFL);
-    signal(SIGUSR1, SIG_IGN); /* mpirun sends it to the whole process group: it is meant for this program */
     execv(argv[0], again);
     fprintf(stderr, "selvedge-mpi: cannot execute '%s': %s\n", argv[0], strerror(errno));
     _exit(EXIT_CANNOT_EXECUTE);
 }
 
-/* The child is made before MPI starts threads and opens devices, of which it must not have a copy. */
+/* The child is made before MPI starts threads and opens devices, of which it must not have a copy. It blocks SIGTERM
+ * and SIGINT, so that one that comes before the worker can take it is kept for it. */
 static bool start_worker(struct agent *a, char **argv)
 {
     int end[2];
+    sigset_t stop, before;
     const pid_t self = getpid();
     if (socketpair(AF_UNIX, SOCK_STREAM, 0, end) != 0) return false;
+    sigemptyset(&stop);
+    sigaddset(&stop, SIGTERM);
+    sigaddset(&stop, SIGINT);
+    sigprocmask(SIG_BLOCK, &stop, &before);
     a->worker = fork();
     if (a->worker == 0) {
         close(end[0]);
         become_worker(end[1], self, argv);
     }
+    sigprocmask(SIG_SETMASK, &before, NULL);
     close(end[1]);
     a->fd = end[0];
     return a->worker > 0 && fcntl(a->fd, F_SETFD, FD_CLOEXEC) == 0;
@@ -237,8 +255,10 @@ static void close_others(struct agent *a)
 static void look_at_worker(struct agent *a)
 {
     int how;
-    if (stop_wanted && a->rank == 0) kill(a->worker, SIGTERM);
-    stop_wanted = 0;
+    if (stop_wanted) {
+        stop_wanted = 0;
+        if (a->rank == 0 && !a->worker_ended) kill(a->worker, SIGTERM);
+    }
     if (a->worker_ended || waitpid(a->worker, &how, WNOHANG) != a->worker) return;
     a->worker_ended = true;
     while (read_worker(a)) finish_sends(a); /* its last messages */
@@ -284,13 +304,17 @@ static bool is_lonely(const struct agent *a)
     return a->n_rank == 1 && n != NULL && strtol(n, NULL, 10) > 1;
 }
 
+/* mpirun passes SIGUSR1 on, which asks for an end; SIGTERM it sends to the ranks that are left when one is lost, and
+ * that is no end of the job. srun passes SIGTERM on. */
 static void set_signals(void)
 {
     struct sigaction action = {.sa_handler = want_stop};
     sigemptyset(&action.sa_mask);
+    sigaction(SIGUSR1, &action, NULL);
+    signal(SIGPIPE, SIG_IGN); /* a connection of MPI to a rank that is lost */
+    if (getenv("OMPI_COMM_WORLD_SIZE") != NULL && getenv("SLURM_STEP_NUM_TASKS") == NULL) return;
     sigaction(SIGTERM, &action, NULL);
     sigaction(SIGINT, &action, NULL);
-    sigaction(SIGUSR1, &action, NULL);
 }
 
 static int print_usage(int argc, char **argv)

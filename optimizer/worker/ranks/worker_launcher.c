@@ -1,12 +1,12 @@
 #include "optimizer/worker/ranks/worker_launcher.h"
 
+#include "base/files/disk_use.h"
 #include "base/status.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/ranks/worker_team.h"
 
 #include <errno.h>
 #include <fcntl.h>
-#include <ftw.h>
 #include <sched.h>
 #include <signal.h>
 #include <stdio.h>
@@ -17,7 +17,8 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { PATH_BYTES_MOST = 4096, NUMBER_BYTES = 24, MAX_LOSSES = 3, EXIT_NO_PROGRAM = 127, OPEN_FOLDERS = 16 };
+enum { PATH_BYTES_MOST = 4096, NUMBER_BYTES = 24, MAX_LOSSES = 3, STOP_AGAIN_MS = 500 };
+enum { EXIT_NO_PROGRAM = 127, EXIT_FORBIDDEN = 128 + SIGSYS };
 
 struct command {
     char agent[PATH_BYTES_MOST], own[PATH_BYTES_MOST], ranks[NUMBER_BYTES], threads[NUMBER_BYTES];
@@ -81,7 +82,8 @@ static _Noreturn void become_mpirun(const struct command *c, pid_t parent, const
 {
     int nothing = open("/dev/null", O_RDONLY | O_CLOEXEC);
     setpgid(0, 0);
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    prctl(PR_SET_PDEATHSIG, SIGTERM); /* by which mpirun ends the ranks and removes its files; SIGKILL left those */
+    signal(SIGUSR1, SIG_IGN);         /* until mpirun handles it */
     if (getppid() != parent) _exit(EXIT_NO_PROGRAM);
     if (nothing >= 0) dup2(nothing, STDIN_FILENO);
     if (geteuid() == 0) { /* a worker of a daemon that runs as root has no more rights than its parent */
@@ -94,74 +96,74 @@ static _Noreturn void become_mpirun(const struct command *c, pid_t parent, const
     _exit(EXIT_NO_PROGRAM);
 }
 
-/* Runs mpirun once. *stopped: the job was asked to end. SIGUSR1 is what mpirun passes on to the ranks. */
-static int run_once(const struct command *c, bool *stopped)
+/* Runs mpirun once. mask: the signals that mpirun is to block. *stopped: the job was asked to end. SIGUSR1 is what
+ * mpirun passes on to the ranks; one that it gets before it has started them is lost, so it gets more of them. */
+static int run_once(const struct command *c, const sigset_t *awaited, const sigset_t *mask, bool *stopped)
 {
-    sigset_t set, before;
-    siginfo_t info;
+    const struct timespec again = {.tv_nsec = STOP_AGAIN_MS * 1000000L};
     int how = 0;
     const pid_t self = getpid();
-    sigemptyset(&set);
-    sigaddset(&set, SIGTERM);
-    sigaddset(&set, SIGINT);
-    sigaddset(&set, SIGCHLD);
-    sigprocmask(SIG_BLOCK, &set, &before);
     pid_t pid = fork();
-    if (pid == 0) become_mpirun(c, self, &before);
+    if (pid == 0) become_mpirun(c, self, mask);
     while (pid > 0 && waitpid(pid, &how, WNOHANG) != pid) {
-        int got = sigwaitinfo(&set, &info);
-        if (got != SIGTERM && got != SIGINT) continue;
-        *stopped = true;
-        kill(pid, SIGUSR1);
+        int got = sigtimedwait(awaited, NULL, &again);
+        if (got == SIGTERM || got == SIGINT) *stopped = true;
+        if (*stopped) kill(pid, SIGUSR1);
     }
     if (pid < 0) return WORKER_FAILED;
     return WIFEXITED(how) ? WEXITSTATUS(how) : 128 + WTERMSIG(how);
 }
 
-static long long n_byte_found;
+static bool is_of_worker(int code) { return code >= WORKER_SUCCEEDED && code <= WORKER_STALE; }
 
-static int count_file(const char *path, const struct stat *st, int type, struct FTW *where)
-{
-    (void)path;
-    (void)where;
-    if (type == FTW_F) n_byte_found += (long long)st->st_size;
-    return 0;
-}
-
-/* Bytes of what the job has stored so far: they grow as it goes on. */
-static long long bytes_of_work(const char *job_folder)
+/* Runs mpirun until the job has ended, or is lost several times at the same place. What the job has stored grows as it
+ * goes on. */
+static int run_until_end(const struct command *c, const char *job_folder)
 {
     char path[PATH_BYTES_MOST];
+    sigset_t awaited, mask;
+    bool stopped = false;
+    int64_t work = -1;
+    sigemptyset(&awaited);
+    sigaddset(&awaited, SIGTERM);
+    sigaddset(&awaited, SIGINT);
+    sigaddset(&awaited, SIGCHLD);
+    sigprocmask(SIG_BLOCK, &awaited, &mask);
     snprintf(path, sizeof path, "%s/%s", job_folder, JOB_FOLDER_WORK);
-    n_byte_found = 0;
-    nftw(path, count_file, OPEN_FOLDERS, FTW_PHYS);
-    return n_byte_found;
+    for (int n_loss = 0;;) {
+        int code = run_once(c, &awaited, &mask, &stopped);
+        if (is_of_worker(code) || code == EXIT_NO_PROGRAM || code == EXIT_FORBIDDEN) return code;
+        if (stopped) return WORKER_CANCELLED;
+        int64_t now = disk_content_bytes(path);
+        n_loss = now > work ? 1 : n_loss + 1;
+        work = now;
+        if (n_loss == MAX_LOSSES) {
+            fprintf(stderr, "selvedge-worker: ranks are lost again and again; the job does not go on\n");
+            return WORKER_LOST;
+        }
+        fprintf(stderr, "selvedge-worker: a rank is lost; the job goes on from its checkpoint\n");
+        nanosleep(&(struct timespec){.tv_sec = 1}, NULL); /* the kernel ends the workers of ranks that were lost */
+    }
 }
 
-static bool is_of_worker(int code) { return code >= WORKER_SUCCEEDED && code <= WORKER_STALE; }
+/* Ends this process as the sandbox has ended a rank, so that whoever has started it sees that. */
+static void end_as_forbidden(void)
+{
+    signal(SIGSYS, SIG_DFL);
+    raise(SIGSYS);
+}
 
 static int launch(char **argv, const char *job_folder, size_t n_rank, size_t n_thread)
 {
     struct command c;
     struct error err = {0};
-    bool stopped = false;
-    long long work = -1;
     if (make_command(&c, argv, n_rank, n_thread, &err) != STATUS_OK) {
         fprintf(stderr, "selvedge-worker: %s\n", err.text);
         return WORKER_USAGE;
     }
-    int code = WORKER_LOST;
-    for (int n_loss = 0; n_loss <= MAX_LOSSES; n_loss++) {
-        code = run_once(&c, &stopped);
-        if (is_of_worker(code) || code == EXIT_NO_PROGRAM || stopped) break;
-        code = WORKER_LOST;
-        long long now = bytes_of_work(job_folder);
-        if (now != work) n_loss = 0;
-        work = now;
-        fprintf(stderr, "selvedge-worker: a rank is lost; the job goes on from its checkpoint\n");
-        nanosleep(&(struct timespec){.tv_sec = 1}, NULL); /* the kernel ends the workers of ranks that were lost */
-    }
+    int code = run_until_end(&c, job_folder);
     free(c.argv);
+    if (code == EXIT_FORBIDDEN) end_as_forbidden();
     return code == EXIT_NO_PROGRAM ? WORKER_USAGE : code;
 }
 

@@ -3,10 +3,12 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/document_fingerprint.h"
 #include "optimizer/worker/report/result_json.h"
+#include "renderer/scene/scene_pack.h"
 #include "renderer/transport/ranks/rank_helper.h"
 #include "renderer/transport/ranks/rank_orders.h"
 
 #include <fcntl.h>
+#include <gnu/libc-version.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -42,7 +44,7 @@ status worker_team_program(char *path, size_t n_bytes, struct error *err)
     if (n <= 0) return error_set_errno(err, "cannot find this program");
     path[n] = '\0';
     char *slash = strrchr(path, '/');
-    strcpy(slash != NULL ? slash + 1 : path, name);
+    memcpy(slash != NULL ? slash + 1 : path, name, sizeof name);
     return access(path, X_OK) == 0
                ? STATUS_OK
                : error_set(err, STATUS_NOT_FOUND,
@@ -80,8 +82,9 @@ static void describe_self(char text[TEXT_BYTES])
 #ifdef __x86_64__
     processor = __builtin_cpu_supports("avx512f") ? "AVX-512" : "AVX2";
 #endif
-    snprintf(text, TEXT_BYTES, "%s, build %016llx, processor with %s", RESULT_PROGRAM,
-             (unsigned long long)document_fingerprint("", 0), processor);
+    snprintf(text, TEXT_BYTES, "%s, build %08llx, Embree %u, libc %s, processor with %s", RESULT_PROGRAM,
+             (unsigned long long)document_fingerprint("", 0), scene_engine_version(), gnu_get_libc_version(),
+             processor);
 }
 
 status worker_team_open(struct worker_team *t, const struct worker_team_place *place, struct thread_pool *pool,
