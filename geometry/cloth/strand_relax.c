@@ -1,14 +1,14 @@
 /* Pushes fibers apart. Overlapping nodes of different fibers each move by half of the overlap, across their fibers.
  * Then the displacements are smoothed along each strand (not the positions, so crimp and twist stay), and bends that
  * would break a fiber are straightened. These are Jacobi rounds: all nodes are evaluated before any node moves. */
-#include "geometry/cloth/strand.h"
+#include "geometry/cloth/strand_grid.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* N_UNBEND: steps per round. MAX_CELLS limits the memory of the grid that finds neighbours. */
-enum { NODES_PER_TASK = 2048, N_UNBEND = 6, MAX_CELLS = 1 << 26 };
+/* N_UNBEND: steps per round. */
+enum { NODES_PER_TASK = 2048, N_UNBEND = 6 };
 
 /* Share of its last step by which a node moves again (heavy-ball momentum). A stack of fibers then separates in a
  * sixth of the rounds. */
@@ -25,13 +25,10 @@ struct relax {
     enum strand_rule rule;
     uint32_t *strand_of;           /* node -> strand */
     double (*move)[3], (*step)[3]; /* wanted by the overlaps, and taken last */
+    double *n_contact;             /* of a node, as its rule counts them */
     double *depth;                 /* deepest overlap of a node, over the sum of radii */
-    double r_max, per_tile[2];
-    size_t n_cell[3];
-    double cell_m[3], z_low_m;
-    size_t *cell_first; /* counting sort by cell */
-    uint32_t *cell_node;
-    uint32_t *cell_of;
+    double per_tile[2];
+    struct strand_grid grid;
 };
 
 static void relax_release(struct relax *r)
@@ -39,80 +36,24 @@ static void relax_release(struct relax *r)
     free(r->strand_of);
     free(r->move);
     free(r->step);
+    free(r->n_contact);
     free(r->depth);
-    free(r->cell_first);
-    free(r->cell_node);
-    free(r->cell_of);
-}
-
-static size_t wrap_cell(double x, double cell_m, size_t n_cell)
-{
-    double c = fmod(floor(x / cell_m), (double)n_cell);
-    if (c < 0.0) c += (double)n_cell;
-    return (size_t)c < n_cell ? (size_t)c : n_cell - 1;
-}
-
-static size_t clamp_cell(double x, double cell_m, size_t n_cell)
-{
-    double c = floor(x / cell_m);
-    return c < 0.0 ? 0 : c >= (double)n_cell ? n_cell - 1 : (size_t)c;
-}
-
-/* Divides the space into cells at least a diameter wide; thin fibers in a high pile get wider ones. */
-static void choose_cells(struct relax *r, const double extent_m[3])
-{
-    double edge_m = 2.0 * r->r_max, n_cell[3];
-    do {
-        for (int a = 0; a < 3; a++) n_cell[a] = fmax(1.0, floor(extent_m[a] / edge_m));
-        edge_m *= 1.25;
-    } while (n_cell[0] * n_cell[1] * n_cell[2] > MAX_CELLS);
-    for (int a = 0; a < 3; a++) {
-        r->n_cell[a] = (size_t)n_cell[a];
-        r->cell_m[a] = extent_m[a] / n_cell[a];
-    }
+    strand_grid_release(&r->grid);
 }
 
 static status relax_init(struct relax *r, struct strand_set *s, enum strand_rule rule, struct error *err)
 {
     *r = (struct relax){.s = s, .rule = rule, .per_tile = {1.0 / s->tile_m[0], 1.0 / s->tile_m[1]}};
-    double low = INFINITY, high = -INFINITY;
-    for (size_t i = 0; i < s->n_strand; i++) r->r_max = fmax(r->r_max, s->strand[i].radius_m);
-    for (size_t k = 0; k < s->n_node; k++) {
-        low = fmin(low, s->start[k][2]);
-        high = fmax(high, s->start[k][2]);
-    }
-    r->z_low_m = low - 4.0 * r->r_max;
-    choose_cells(r, (const double[3]){s->tile_m[0], s->tile_m[1], high - low + 8.0 * r->r_max});
-    size_t n_cell = r->n_cell[0] * r->n_cell[1] * r->n_cell[2];
     r->strand_of = calloc(s->n_node, sizeof *r->strand_of);
     r->move = calloc(s->n_node, sizeof *r->move);
     r->step = calloc(s->n_node, sizeof *r->step);
+    r->n_contact = calloc(s->n_node, sizeof *r->n_contact);
     r->depth = calloc(s->n_node, sizeof *r->depth);
-    r->cell_first = calloc(n_cell + 2, sizeof *r->cell_first);
-    r->cell_node = calloc(s->n_node, sizeof *r->cell_node);
-    r->cell_of = calloc(s->n_node, sizeof *r->cell_of);
-    if (!r->strand_of || !r->move || !r->step || !r->depth || !r->cell_first || !r->cell_node || !r->cell_of)
+    if (!r->strand_of || !r->move || !r->step || !r->n_contact || !r->depth)
         return error_set(err, STATUS_NO_MEMORY, "cannot make the fibers: out of memory");
     for (size_t i = 0; i < s->n_strand; i++)
         for (size_t k = 0; k < s->strand[i].n; k++) r->strand_of[s->strand[i].first + k] = (uint32_t)i;
-    return STATUS_OK;
-}
-
-static void sort_into_cells(struct relax *r)
-{
-    const struct strand_set *s = r->s;
-    size_t n_cell = r->n_cell[0] * r->n_cell[1] * r->n_cell[2];
-    memset(r->cell_first, 0, (n_cell + 2) * sizeof *r->cell_first);
-    for (size_t k = 0; k < s->n_node; k++) {
-        size_t c = (clamp_cell(s->p[k][2] - r->z_low_m, r->cell_m[2], r->n_cell[2]) * r->n_cell[1] +
-                    wrap_cell(s->p[k][1], r->cell_m[1], r->n_cell[1])) *
-                       r->n_cell[0] +
-                   wrap_cell(s->p[k][0], r->cell_m[0], r->n_cell[0]);
-        r->cell_of[k] = (uint32_t)c;
-        r->cell_first[c + 2]++;
-    }
-    for (size_t c = 0; c < n_cell; c++) r->cell_first[c + 2] += r->cell_first[c + 1];
-    for (size_t k = 0; k < s->n_node; k++) r->cell_node[r->cell_first[r->cell_of[k] + 1]++] = (uint32_t)k;
+    return strand_grid_init(&r->grid, s, err);
 }
 
 /* Finds node k + step along its strand. Returns false beyond an open end. */
@@ -129,11 +70,11 @@ static bool neighbour(const struct strand *t, size_t k, long step, double (*from
 }
 
 /* Nodes that are near each other along one strand belong to one fiber and do not push each other apart. */
-static bool same_fiber(const struct strand_set *s, const uint32_t *strand_of, size_t i, size_t j)
+static bool same_fiber(const struct strand_set *s, const struct grid_node *a, const struct grid_node *b)
 {
-    if (strand_of[i] != strand_of[j]) return false;
-    const struct strand *t = &s->strand[strand_of[i]];
-    size_t gap = i > j ? i - j : j - i;
+    if (a->strand != b->strand) return false;
+    const struct strand *t = &s->strand[a->strand];
+    size_t gap = a->node > b->node ? a->node - b->node : b->node - a->node;
     if (t->n_period > 0 && t->n - gap < gap) gap = t->n - gap;
     return gap < 8; /* nodes are a radius apart: longer than a half circle of radius 2 r */
 }
@@ -154,16 +95,20 @@ static void push_smoothly(struct push *push, const double d[3], double distance,
     push->n += share * share * (3.0 - 2.0 * share);
 }
 
-static void push_from(const struct relax *r, size_t i, size_t j, struct push *push)
+/* Vector from node j to node i, to the nearest one of all tiles; returns its squared length. */
+static inline double apart(const struct relax *r, const struct grid_node *i, const struct grid_node *j, double d[3])
 {
-    const struct strand_set *s = r->s;
-    double want = s->strand[r->strand_of[i]].radius_m + s->strand[r->strand_of[j]].radius_m, d[3];
     for (int a = 0; a < 3; a++) {
-        d[a] = s->p[i][a] - s->p[j][a];
-        if (a < 2) d[a] -= s->tile_m[a] * rint(d[a] * r->per_tile[a]);
+        d[a] = i->p[a] - j->p[a];
+        if (a < 2) d[a] -= r->s->tile_m[a] * rint(d[a] * r->per_tile[a]);
     }
-    double d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    if (d2 >= want * want || same_fiber(s, r->strand_of, i, j)) return;
+    return d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+}
+
+static void push_from(const struct relax *r, const struct grid_node *i, const struct grid_node *j, struct push *push)
+{
+    double want = i->radius_m + j->radius_m, d[3], d2 = apart(r, i, j, d);
+    if (same_fiber(r->s, i, j)) return;
     double distance = sqrt(d2), depth = want - distance;
     if (r->rule == STRAND_SMOOTH) {
         push_smoothly(push, d, distance, want);
@@ -171,7 +116,7 @@ static void push_from(const struct relax *r, size_t i, size_t j, struct push *pu
     }
     if (distance < 1e-9 * want) { /* on top of each other: the lower number goes down */
         d[0] = d[1] = 0.0;
-        d[2] = i < j ? -1.0 : 1.0;
+        d[2] = i->node < j->node ? -1.0 : 1.0;
         distance = 1.0;
     }
     for (int a = 0; a < 3; a++) push->sum[a] += 0.5 * depth * d[a] / distance;
@@ -179,47 +124,73 @@ static void push_from(const struct relax *r, size_t i, size_t j, struct push *pu
     push->n += 1.0;
 }
 
-static void push_from_cell_row(const struct relax *r, size_t i, size_t z, size_t y, size_t at_x, struct push *push)
+/* run: the cells around that of the node. The nodes that are near enough are found first, in a loop that does little
+ * else, because most are not. */
+static void look_from(struct relax *r, const struct grid_node *from, const struct grid_run *run, size_t n_run)
 {
-    size_t reach = r->n_cell[0] >= 3 ? 3 : r->n_cell[0]; /* on a very small tile the neighbours would repeat */
-    for (size_t dx = 0; dx < reach; dx++) {
-        size_t x = (at_x + r->n_cell[0] + dx - 1) % r->n_cell[0];
-        size_t cell = (z * r->n_cell[1] + y) * r->n_cell[0] + x;
-        for (size_t k = r->cell_first[cell]; k < r->cell_first[cell + 1]; k++) push_from(r, i, r->cell_node[k], push);
+    enum { MOST_NEAR = 64 };
+    const struct grid_node *near[MOST_NEAR];
+    const size_t i = from->node;
+    size_t n_near = 0;
+    struct push push = {{0.0, 0.0, 0.0}, 0.0, 0.0};
+    for (size_t c = 0; c < n_run; c++)
+        for (const struct grid_node *j = r->grid.sorted + run[c].from; j < r->grid.sorted + run[c].to; j++) {
+            double d[3], want = from->radius_m + j->radius_m;
+            near[n_near] = j;
+            n_near += apart(r, from, j, d) < want * want;
+            if (n_near < MOST_NEAR) continue;
+            for (size_t k = 0; k < n_near; k++) push_from(r, from, near[k], &push);
+            n_near = 0;
+        }
+    for (size_t k = 0; k < n_near; k++) push_from(r, from, near[k], &push);
+    memcpy(r->move[i], push.sum, sizeof push.sum);
+    r->n_contact[i] = push.n;
+    r->depth[i] = push.depth;
+}
+
+/* Looks from nodes in the order of their cells, so that neighbours of one node are those of the next. */
+static void look(void *context, size_t i_task, size_t i_thread)
+{
+    struct relax *r = context;
+    const struct strand_grid *g = &r->grid;
+    size_t end = (i_task + 1) * NODES_PER_TASK < r->s->n_node ? (i_task + 1) * NODES_PER_TASK : r->s->n_node, n_run = 0;
+    struct grid_run run[GRID_MAX_RUN];
+    uint32_t cell = UINT32_MAX;
+    (void)i_thread;
+    for (size_t k = i_task * NODES_PER_TASK; k < end; k++) {
+        const struct grid_node *from = &g->sorted[k];
+        if (g->cell_of[from->node] != cell) n_run = strand_grid_around(g, cell = g->cell_of[from->node], run);
+        look_from(r, from, run, n_run);
     }
 }
 
-static void look_from(struct relax *r, size_t i)
+/* Makes the moves of the sums of contacts: their means, without the part along the fiber, which would only shuffle
+ * nodes. */
+static void settle_at(struct relax *r, size_t i)
 {
     const struct strand_set *s = r->s;
-    struct push push = {{0.0, 0.0, 0.0}, 0.0, 0.0};
-    size_t c = r->cell_of[i],
-           at[3] = {c % r->n_cell[0], c / r->n_cell[0] % r->n_cell[1], c / (r->n_cell[0] * r->n_cell[1])};
-    size_t reach = r->n_cell[1] >= 3 ? 3 : r->n_cell[1];
-    size_t z_from = at[2] > 0 ? at[2] - 1 : 0, z_to = at[2] + 1 < r->n_cell[2] ? at[2] + 1 : at[2];
-    for (size_t z = z_from; z <= z_to; z++)
-        for (size_t dy = 0; dy < reach; dy++)
-            push_from_cell_row(r, i, z, (at[1] + r->n_cell[1] + dy - 1) % r->n_cell[1], at[0], &push);
     const struct strand *t = &s->strand[r->strand_of[i]];
-    double before[3], after[3], along[3], length2 = 0.0, dot = 0.0;
+    double before[3], after[3], along[3], length2 = 0.0, dot = 0.0, n = r->n_contact[i];
+    if (n == 0.0) { /* nothing touches it */
+        for (int a = 0; a < 3; a++) r->move[i][a] = 0.0;
+        return;
+    }
     if (!neighbour(t, i, -1, s->p, before)) memcpy(before, s->p[i], sizeof before);
     if (!neighbour(t, i, 1, s->p, after)) memcpy(after, s->p[i], sizeof after);
     for (int a = 0; a < 3; a++) {
         along[a] = after[a] - before[a];
         length2 += along[a] * along[a];
-        dot += along[a] * push.sum[a];
+        dot += along[a] * r->move[i][a];
     }
-    for (int a = 0; a < 3; a++) /* the part along the fiber would only shuffle nodes */
-        r->move[i][a] = push.n == 0.0 ? 0.0 : (push.sum[a] - dot * along[a] / length2) / (0.5 * push.n + 0.5);
-    r->depth[i] = push.depth;
+    for (int a = 0; a < 3; a++) r->move[i][a] = (r->move[i][a] - dot * along[a] / length2) / (0.5 * n + 0.5);
 }
 
-static void look(void *context, size_t i_task, size_t i_thread)
+static void settle(void *context, size_t i_task, size_t i_thread)
 {
     struct relax *r = context;
     size_t end = (i_task + 1) * NODES_PER_TASK < r->s->n_node ? (i_task + 1) * NODES_PER_TASK : r->s->n_node;
     (void)i_thread;
-    for (size_t i = i_task * NODES_PER_TASK; i < end; i++) look_from(r, i);
+    for (size_t i = i_task * NODES_PER_TASK; i < end; i++) settle_at(r, i);
 }
 
 /* p = start + displacement, smoothed once with weights 1/4 1/2 1/4 blended by `amount`. */
@@ -247,39 +218,57 @@ static void smooth(struct relax *r, double amount)
     }
 }
 
-/* Computes the bend at node i + step of a strand: the second difference of the positions, and half of the squared
- * chord. Returns false beyond open ends. */
-static bool bend_at(const struct strand_set *s, const struct strand *t, size_t i, long step, double bend[3],
-                    double *bend_m, double *chord2)
+/* The bend at the middle one of three nodes: the second difference of the positions. Returns its square and that of
+ * half of the chord. */
+static double bend_of(const double before[3], const double at[3], const double after[3], double bend[3], double *chord2)
 {
-    double before[3], at[3], after[3], bend2 = 0.0;
-    if (!neighbour(t, i, step - 1, s->p, before) || !neighbour(t, i, step, s->p, at) ||
-        !neighbour(t, i, step + 1, s->p, after))
-        return false;
+    double bend2 = 0.0;
     *chord2 = 0.0;
     for (int a = 0; a < 3; a++) {
         bend[a] = before[a] - 2.0 * at[a] + after[a];
         bend2 += bend[a] * bend[a];
         *chord2 += 0.25 * (after[a] - before[a]) * (after[a] - before[a]);
     }
-    *bend_m = sqrt(bend2);
-    return true;
+    return bend2;
 }
 
-/* Where a strand bends more sharply than fibers can, three nodes move towards a straight line until the bend is
- * allowed. Computes the sum of the moves of node i for the bends at node i and its two neighbours. */
+/* Adds what the bend at the middle one of three nodes wants: where a strand bends more sharply than fibers can, the
+ * three move towards a straight line until the bend is allowed. weight: of the node that is moved. */
+static inline void add_unbend(const double before[3], const double at[3], const double after[3], double most_per_chord2,
+                              double weight, double sum[3])
+{
+    double bend[3], chord2, bend2 = bend_of(before, at, after, bend, &chord2), most = most_per_chord2 * chord2;
+    if (!(bend2 > most * most)) return;
+    double share = UNBEND * weight / 6.0 * (1.0 - most / sqrt(bend2));
+    for (int a = 0; a < 3; a++) sum[a] += share * bend[a];
+}
+
+/* The same where a strand ends, or meets itself. */
+static void unbend_end(const struct relax *r, const struct strand *t, size_t i, double most, double sum[3])
+{
+    double q[5][3] = {{0.0}}; /* nodes i - 2 to i + 2 */
+    bool there[5];
+    for (long k = 0; k < 5; k++) there[k] = neighbour(t, i, k - 2, r->s->p, q[k]);
+    for (int k = 1; k <= 3; k++)
+        if (there[k - 1] && there[k] && there[k + 1])
+            add_unbend(q[k - 1], q[k], q[k + 1], most, k == 2 ? 2.0 : -1.0, sum);
+}
+
+/* Computes the sum of the moves of node i for the bends at node i and its two neighbours. */
 static void unbend_at(struct relax *r, size_t i)
 {
     const struct strand *t = &r->s->strand[r->strand_of[i]];
-    for (int a = 0; a < 3; a++) r->move[i][a] = 0.0;
-    for (long step = -1; step <= 1; step++) {
-        double bend[3], bend_m, chord2;
-        if (!bend_at(r->s, t, i, step, bend, &bend_m, &chord2)) continue;
-        double most = MAX_STRAIN / t->radius_m * chord2;
-        if (!(bend_m > most)) continue;
-        double share = UNBEND * (step == 0 ? 2.0 : -1.0) / 6.0 * (1.0 - most / bend_m);
-        for (int a = 0; a < 3; a++) r->move[i][a] += share * bend[a];
+    const double most = MAX_STRAIN / t->radius_m;
+    const size_t from_start = i - t->first;
+    double sum[3] = {0.0, 0.0, 0.0}, (*q)[3] = r->s->p + i;
+    if (from_start >= 2 && from_start + 2 < t->n) {
+        add_unbend(q[-2], q[-1], q[0], most, -1.0, sum);
+        add_unbend(q[-1], q[0], q[1], most, 2.0, sum);
+        add_unbend(q[0], q[1], q[2], most, -1.0, sum);
+    } else {
+        unbend_end(r, t, i, most, sum);
     }
+    memcpy(r->move[i], sum, sizeof sum);
 }
 
 static void unbend(void *context, size_t i_task, size_t i_thread)
@@ -302,9 +291,10 @@ static double strain_p95(struct relax *r)
     size_t n = 0;
     for (size_t i = 0; i < r->s->n_node; i++) {
         const struct strand *t = &r->s->strand[r->strand_of[i]];
-        double bend[3], bend_m, chord2;
-        if (bend_at(r->s, t, i, 0, bend, &bend_m, &chord2) && chord2 > 0.0)
-            r->depth[n++] = t->radius_m * bend_m / chord2;
+        double before[3], after[3], bend[3], chord2;
+        if (!neighbour(t, i, -1, r->s->p, before) || !neighbour(t, i, 1, r->s->p, after)) continue;
+        double bend2 = bend_of(before, r->s->p[i], after, bend, &chord2);
+        if (chord2 > 0.0) r->depth[n++] = t->radius_m * sqrt(bend2) / chord2;
     }
     qsort(r->depth, n, sizeof *r->depth, ascending);
     return n > 0 ? r->depth[(size_t)(0.95 * (double)(n - 1))] : 0.0;
@@ -322,10 +312,12 @@ status strand_relax(struct strand_set *s, const struct strand_relax_option *o, s
     size_t n_task = (s->n_node + NODES_PER_TASK - 1) / NODES_PER_TASK;
     const struct progress quiet = progress_silent(progress);
     for (size_t i_round = 0; i_round <= n_round; i_round++) {
-        sort_into_cells(&r);
+        strand_grid_sort(&r.grid, s, r.strand_of);
         st = thread_pool_run(pool, n_task, look, &r, &quiet);
         if (st != STATUS_OK) goto out;
         if (i_round == n_round) break; /* the last look only measures */
+        st = thread_pool_run(pool, n_task, settle, &r, &quiet);
+        if (st != STATUS_OK) goto out;
         for (size_t k = 0; k < s->n_node; k++)
             for (int a = 0; a < 3; a++) {
                 r.step[k][a] = r.move[k][a] + momentum * r.step[k][a];
