@@ -206,6 +206,8 @@ static void describe_end(struct job_service *v, const struct job_row *row, const
         snprintf(how, sizeof how, "the worker's sandbox ended it, because it made a forbidden system call");
     else if (end->by_signal)
         snprintf(how, sizeof how, "the worker crashed with signal %d (%s)", end->code, strsignal(end->code));
+    else if (end->code == WORKER_LOST)
+        snprintf(how, sizeof how, "ranks of the job were lost again and again without progress");
     else if (end->code == 127)
         snprintf(how, sizeof how, "the worker could not be started");
     else
