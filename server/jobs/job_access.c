@@ -1,9 +1,11 @@
 #include "server/jobs/job_access.h"
+#include "optimizer/job/job_folder.h"
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_paths.h"
 
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 #include <uuid/uuid.h>
 
 void job_new_id(char out[STORE_ID_BYTES])
@@ -11,6 +13,13 @@ void job_new_id(char out[STORE_ID_BYTES])
     uuid_t u;
     uuid_generate_random(u);
     uuid_unparse_lower(u, out);
+}
+
+void job_forget_plan(const struct job_service *v, const char *id)
+{
+    char path[PATH_BYTES];
+    path_join(path, v->settings->data, "jobs", id, JOB_FILE_PLAN, NULL);
+    unlink(path);
 }
 
 status job_disk_check(struct job_service *v, int64_t n_bytes, struct error *err)

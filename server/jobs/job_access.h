@@ -15,6 +15,8 @@ status job_check_editable(const struct job_row *row, struct error *err);
 /* Marks the row of a job whose document or files were edited: the job becomes a draft, and its next start discards
  * earlier progress. The caller writes the row together with the edit, so that a job whose edit fails is unchanged. */
 void job_mark_edited(struct job_row *row);
+/* Removes the job's plan, if it has one: that of another document or of other files says nothing. */
+void job_forget_plan(const struct job_service *v, const char *id);
 /* Whether the job whose geometry this one adopts, if any, exists and has the same owner. STATUS_INVALID, in the same
  * words for a job of another owner as for one that does not exist. */
 status job_check_adopted(struct job_service *v, const struct job_row *row, struct error *err);

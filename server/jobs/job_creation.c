@@ -219,14 +219,6 @@ static status replace_document(struct job_service *v, struct job_row *row, const
     return s;
 }
 
-/* A plan of another document says nothing. */
-static void forget_plan(const struct job_service *v, const char *id)
-{
-    char path[PATH_BYTES];
-    path_join(path, v->settings->data, "jobs", id, JOB_FILE_PLAN, NULL);
-    unlink(path);
-}
-
 status job_replace_document(struct job_service *v, const char *id, const char *document, size_t n_bytes,
                             status (*may_edit)(void *context, const struct job_row *row, struct error *err),
                             void *context, struct error *err)
@@ -249,7 +241,7 @@ status job_replace_document(struct job_service *v, const char *id, const char *d
     job_mark_edited(&row);
     s = replace_document(v, &row, run, err);
     if (s == STATUS_DISK_FULL && ballast_release(v->settings->data)) s = replace_document(v, &row, run, err);
-    if (s == STATUS_OK) forget_plan(v, id);
+    if (s == STATUS_OK) job_forget_plan(v, id);
     free(run);
 out:
     job_change_end(v);

@@ -164,6 +164,7 @@ static status insert_new(struct job_service *v, struct job_row *job, struct job_
         s = store_file_insert(v->store, row, n_new, job, err);
         for (k = 0; s != STATUS_OK && k < n_new; k++) upload_discard(v->upload, &row[k]);
         if (s == STATUS_OK) job_note(v, job->id, &(struct journal_entry){.job = job, .file = row, .n_file = n_new});
+        if (s == STATUS_OK) job_forget_plan(v, job->id);
     }
     for (size_t i = 0, j = 0; s == STATUS_OK && i < n; i++)
         if (!file[i].existed) file[i].row = row[j++];
@@ -270,6 +271,7 @@ status job_delete_file(struct job_service *v, const char *id, const char *name, 
     s = store_file_erase(v->store, file.id, &job, err);
     if (s == STATUS_DISK_FULL && ballast_release(v->settings->data)) s = store_file_erase(v->store, file.id, &job, err);
     if (s == STATUS_OK) job_note(v, id, &(struct journal_entry){.job = &job, .removed = name});
+    if (s == STATUS_OK) job_forget_plan(v, id);
     if (s == STATUS_OK) upload_discard(v->upload, &file);
 out:
     job_change_end(v);

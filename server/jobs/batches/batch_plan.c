@@ -30,6 +30,7 @@ static double number_of(const json_t *object, const char *key)
 
 static struct need planned(const json_t *plan)
 {
+    enum { THREADS_MOST = 1024 };
     const double n_thread = number_of(plan, "n_thread");
     return (struct need){.wall_s = number_of(plan, "wall_s"),
                          .wall_low_s = number_of(plan, "wall_low_s"),
@@ -37,7 +38,7 @@ static struct need planned(const json_t *plan)
                          .cpu_s = number_of(plan, "cpu_s"),
                          .memory_bytes = number_of(plan, "memory_bytes"),
                          .disk_bytes = number_of(plan, "disk_bytes"),
-                         .n_thread = n_thread >= 1.0 ? (size_t)n_thread : 1};
+                         .n_thread = (size_t)fmin(fmax(n_thread, 1.0), THREADS_MOST)};
 }
 
 /* Whether the job has succeeded in the first attempt after its plan, and what that took. */

@@ -99,6 +99,21 @@ def is_planner(pid, folder):
         return False
 
 
+def test_a_plan_is_of_the_files_that_it_read(daemon):
+    batch = fake_batch(daemon, "refiled", ["fake: succeed f"])
+    job = batch["samples"][0]["job"]
+
+    def n_planned():
+        return daemon.get(f"/v1/batches/{batch['id']}/plan").json()["expected"]["n"]
+    assert daemon.post(f"/v1/jobs/{job}/plan").status_code == 200 and n_planned() == 1
+    assert daemon.delete(f"/v1/jobs/{job}/files/scan.tif").status_code == 204
+    assert n_planned() == 0, "a file was deleted"
+    daemon.upload(job, "scan.tif", SCAN + b"y")
+    assert daemon.post(f"/v1/jobs/{job}/plan").status_code == 200 and n_planned() == 1
+    daemon.upload(job, "more.csv", ROWS, "measurements")
+    assert n_planned() == 0, "a file was declared"
+
+
 def test_what_cannot_be_planned_is_named(daemon):
     fake_batch(daemon, "half", ["fake: succeed", "fake: unplanned"])
     said = plan(daemon, "half", expect=1)
