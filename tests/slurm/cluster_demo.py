@@ -136,8 +136,7 @@ def database(folder, kind):
     if kind == "sqlite":
         yield {}
         return
-    # below /tmp, which every user may enter: the server does not run as root, and would open the folders above its own
-    with tempfile.TemporaryDirectory(prefix="cluster-demo-") as open_folder, PostgresServer(os.path.join(open_folder, "postgresql")) as server:
+    with PostgresServer() as server:
         say(server.query("SELECT split_part(version(), ' (', 1)"))
         yield store_options(server, server.make_database(), folder)
 

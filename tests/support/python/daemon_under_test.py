@@ -56,7 +56,7 @@ class SharedStore:
             return {}
         if cls.server is None:
             cls.folder = tempfile.mkdtemp(prefix="selvedge-postgres-")
-            cls.server = PostgresServer(os.path.join(cls.folder, "server")).__enter__()
+            cls.server = PostgresServer().__enter__()
             atexit.register(cls.end)
         if not os.path.isdir(data):  # a new folder of an old name
             cls.databases.pop(data, None)

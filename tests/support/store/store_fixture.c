@@ -32,8 +32,10 @@ static void find_plugin(void)
     setenv("SELVEDGE_PLUGINS", path, 1);
 }
 
-/* Returns whether there is a server; prints the reason when not. */
-static bool start(void)
+enum start { STARTED, MISSING, BROKEN };
+
+/* Starts the server; prints the reason when there is none. It is missing only where its program says so. */
+static enum start start(void)
 {
     static const char program[] = "tests/support/python/servers/postgres_server.py";
     int to[2], from[2];
@@ -41,8 +43,8 @@ static bool start(void)
     find_plugin();
     signal(SIGPIPE, SIG_IGN);
     if (access(program, R_OK) != 0 || pipe(to) != 0 || pipe(from) != 0) {
-        printf("PostgreSQL left out: '%s' is not found from here\n", program);
-        return false;
+        printf("'%s' is not found from here\n", program);
+        return BROKEN;
     }
     server.pid = fork();
     if (server.pid == 0) {
@@ -56,14 +58,14 @@ static bool start(void)
     close(from[1]);
     server.to = fdopen(to[1], "w");
     server.from = fdopen(from[0], "r");
-    if (server.to == NULL || server.from == NULL || fgets(line, sizeof line, server.from) == NULL) return false;
+    if (server.to == NULL || server.from == NULL || fgets(line, sizeof line, server.from) == NULL) return BROKEN;
     chomp(line);
     if (strncmp(line, "password ", 9) != 0) {
         printf("PostgreSQL left out: %s\n", line);
-        return false;
+        return strncmp(line, "missing: ", 9) == 0 ? MISSING : BROKEN;
     }
     snprintf(server.password, sizeof server.password, "%.200s", line + 9);
-    return true;
+    return STARTED;
 }
 
 static void stop(void)
@@ -81,11 +83,21 @@ static void postgresql_is_missing(void **state)
     skip();
 }
 
+static void postgresql_does_not_start(void **state)
+{
+    (void)state;
+    fail_msg("%s", "the PostgreSQL server of the tests does not start");
+}
+
 int store_fixture_shared(int (*run)(const char *database))
 {
     static const char name[] = "postgresql";
     const struct CMUnitTest none[] = {cmocka_unit_test(postgresql_is_missing)};
-    int n = start() ? run(name) : cmocka_run_group_tests_name(name, none, NULL, NULL);
+    const struct CMUnitTest broken[] = {cmocka_unit_test(postgresql_does_not_start)};
+    const enum start started = start();
+    int n = started == STARTED   ? run(name)
+            : started == MISSING ? cmocka_run_group_tests_name(name, none, NULL, NULL)
+                                 : cmocka_run_group_tests_name(name, broken, NULL, NULL);
     stop();
     return n;
 }

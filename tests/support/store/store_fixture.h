@@ -12,7 +12,8 @@ struct store_fixture {
 };
 
 /* Runs the tests of a program over each kind of database, whose name is that of the group of tests; without PostgreSQL
- * it prints why, and that group has one test that is skipped. Returns the number of failures. */
+ * it prints why, and that group has one test that is skipped (that fails, where PostgreSQL is installed and does not
+ * start). Returns the number of failures. */
 int store_fixture_each(int (*run)(const char *database));
 /* The same with PostgreSQL alone. */
 int store_fixture_shared(int (*run)(const char *database));

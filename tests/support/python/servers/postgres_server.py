@@ -1,6 +1,6 @@
-"""A PostgreSQL server of its own for tests: initdb and pg_ctl as an unprivileged user in a temporary folder.
+"""A PostgreSQL server for tests: initdb and pg_ctl as an unprivileged user, in a temporary folder that only the server uses.
 
-with PostgresServer(folder) as server: server.make_database() -> address
+with PostgresServer() as server: server.make_database() -> address
 Raises PostgresMissing, with the reason, where the package is absent."""
 import glob
 import os
@@ -29,11 +29,10 @@ def programs():
 
 
 class PostgresServer:
-    def __init__(self, folder, sync=False):
+    def __init__(self, sync=False):
         self.sync = sync  # whether the server syncs its files, which only a power cut would miss
         self.bin = programs()
-        self.folder = str(folder)
-        self.data = os.path.join(self.folder, "cluster")
+        self.folder = self.data = None
         # PostgreSQL refuses to run as root
         self.user = pwd.getpwnam("postgres").pw_name if os.geteuid() == 0 else None
         with socket.socket() as probe:
@@ -49,21 +48,28 @@ class PostgresServer:
         return done.stdout
 
     def __enter__(self):
-        os.makedirs(self.folder, exist_ok=True)
+        # not below a folder of the tests, which the server's user may not be able to pass
+        self.folder = tempfile.mkdtemp(prefix="selvedge-postgres-")
+        self.data = os.path.join(self.folder, "cluster")
+        try:
+            self.begin()
+        except BaseException:
+            shutil.rmtree(self.folder, ignore_errors=True)
+            raise
+        return self
+
+    def begin(self):
         if self.user:
-            # the folders above belong to the tests; the server's user must be able to pass them
             shutil.chown(self.folder, self.user)
-            above = os.path.dirname(self.folder)
-            while above != "/" and os.stat(above).st_uid == 0 and not os.stat(above).st_mode & 0o001:
-                os.chmod(above, os.stat(above).st_mode | 0o011)
-                above = os.path.dirname(above)
         self.run("initdb", "--no-sync", "--pgdata", self.data, "--auth=scram-sha-256", "--username=selvedge", "--encoding=UTF8", "--locale=C.UTF-8",
                  "--pwfile=" + self.write_password())
         self.start()
-        return self
 
     def __exit__(self, *unused):
-        self.stop("immediate")
+        try:
+            self.stop("immediate")
+        finally:
+            shutil.rmtree(self.folder, ignore_errors=True)
 
     def write_password(self):
         self.password = uuid.uuid4().hex
@@ -102,16 +108,13 @@ class PostgresServer:
 
 def serve():
     """For programs of tests: prints the password, then the address of a new database for each line that is read, until there are none."""
-    folder = tempfile.mkdtemp(prefix="selvedge-postgres-")
     try:
-        with PostgresServer(os.path.join(folder, "server")) as server:
+        with PostgresServer() as server:
             print("password", server.password, flush=True)
             for _ in sys.stdin:
                 print(server.address(server.make_database()), flush=True)
     except PostgresMissing as why:
-        print(why, flush=True)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        print("missing:", why, flush=True)
 
 
 if __name__ == "__main__":
