@@ -1,6 +1,7 @@
 /* selvedged, the daemon: HTTP server, database of jobs and supervision of workers. It never reads volumes or
  * pictures and computes nothing; workers do. */
 #include "base/files/durable.h"
+#include "base/machine/program_folder.h"
 #include "base/version.h"
 #include "server/access/first_token.h"
 #include "server/cluster/store_settings.h"
@@ -124,10 +125,7 @@ static int read_options(int argc, char **argv, struct settings *s, struct token_
 static void worker_path(const struct settings *s, char out[PATH_BYTES])
 {
     char program[PATH_BYTES];
-    ssize_t n = readlink("/proc/self/exe", program, sizeof program - 1);
-    program[n > 0 ? n : 0] = '\0';
-    char *slash = strrchr(program, '/');
-    if (slash != NULL) *slash = '\0';
+    program_folder(program, sizeof program);
     if (s->worker[0] != '\0')
         snprintf(out, PATH_BYTES, "%s", s->worker);
     else

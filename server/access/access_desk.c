@@ -125,6 +125,12 @@ out:
     return wait_s;
 }
 
+static int by_id(const void *a, const void *b)
+{
+    const struct token_row *x = a, *y = b;
+    return strcmp(x->id, y->id);
+}
+
 void access_desk_flush(struct access_desk *d, bool now)
 {
     struct token_row *row = NULL;
@@ -143,6 +149,8 @@ void access_desk_flush(struct access_desk *d, bool now)
         }
     }
     pthread_mutex_unlock(&d->lock);
+    /* in one order everywhere, so that daemons that write the same tokens wait for each other in no circle */
+    if (n > 0) qsort(row, n, sizeof *row, by_id);
     if (n > 0) store_token_used(d->store, row, n, NULL);
     free(row);
 }

@@ -14,8 +14,7 @@ status first_token_make(const struct settings *settings, bool running, const cha
                                sizeof row.name - 1);
     snprintf(row.name, sizeof row.name, "%s", name);
     status s = store_settings_open(settings, running, &store, err);
-    if (s != STATUS_OK) return s;
-    s = access_token_make(store, &row, text, err);
+    if (s == STATUS_OK) s = access_token_make(store, &row, text, err);
     store_close(store);
     return s;
 }

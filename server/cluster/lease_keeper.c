@@ -17,7 +17,8 @@ struct lease_keeper {
     pthread_mutex_t lock;
     pthread_cond_t wake;
     bool stop;           /* guarded by lock */
-    double good_since_s; /* monotonic time of the first renewal since the last one that failed; 0: it failed */
+    double good_since_s; /* monotonic time since which renewals have been in time; 0: the last one failed */
+    double renewed_s;    /* monotonic time at which the last renewal that succeeded began */
     char host[STORE_HOST_BYTES];
     atomic_uint n_loss;
 };
@@ -41,7 +42,7 @@ void lease_host_name(char *out, size_t n_out)
 }
 
 /* Daemons of this machine whose process has ended are known to have ended before their lease does. */
-static void bury_neighbours(struct job_service *v, const char *host)
+static void remove_neighbours(struct job_service *v, const char *host)
 {
     struct daemon_row *row = NULL;
     size_t n = 0;
@@ -65,9 +66,9 @@ static void take_over(struct lease_keeper *k)
     const double lease_s = (double)v->settings->lease_s;
     struct error err = {0};
     int n = 0;
-    bury_neighbours(v, k->host);
+    remove_neighbours(v, k->host);
     if (k->good_since_s <= 0 || clock_monotonic_s() - k->good_since_s < lease_s) return;
-    if (store_daemons_bury(v->store, lease_s, &n, &err) != STATUS_OK)
+    if (store_daemons_remove(v->store, lease_s, &n, &err) != STATUS_OK)
         log_warning(v->log, "lease: %s", err.text);
     else if (n > 0)
         log_warning(v->log, "the lease of %d daemon%s has ended; the jobs are taken over", n, n == 1 ? "" : "s");
@@ -77,6 +78,7 @@ static void renew(struct lease_keeper *k)
 {
     struct job_service *v = k->v;
     const double lease_s = (double)v->settings->lease_s;
+    const double begin_s = clock_monotonic_s();
     struct error err = {0};
     bool held = true;
     status s = store_daemon_renew(v->store, lease_s, &held, &err);
@@ -90,8 +92,12 @@ static void renew(struct lease_keeper *k)
         k->good_since_s = 0;
         return;
     }
-    if (k->good_since_s <= 0) k->good_since_s = clock_monotonic_s();
-    take_over(k);
+    /* what has held this renewal up may have held up those of others, whose leases count again from here */
+    const double end_s = clock_monotonic_s();
+    const bool late = !held || end_s - begin_s > lease_s / 4 || begin_s - k->renewed_s > lease_s / 2;
+    k->renewed_s = begin_s;
+    if (late || k->good_since_s <= 0) k->good_since_s = end_s;
+    if (!late) take_over(k);
 }
 
 static void *run(void *context)
@@ -122,14 +128,14 @@ status lease_keeper_start(struct job_service *v, struct lease_keeper **out, stru
     struct lease_keeper *k = calloc(1, sizeof *k);
     if (k == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot keep a lease: out of memory");
     k->v = v;
-    k->good_since_s = clock_monotonic_s();
+    k->good_since_s = k->renewed_s = clock_monotonic_s();
     lease_host_name(k->host, sizeof k->host);
     status s = store_daemon_begin(v->store, k->host, (int64_t)getpid(), (double)v->settings->lease_s, err);
     if (s != STATUS_OK) {
         free(k);
         return s;
     }
-    bury_neighbours(v, k->host);
+    remove_neighbours(v, k->host);
     pthread_mutex_init(&k->lock, NULL);
     pthread_condattr_t attr;
     pthread_condattr_init(&attr);
@@ -172,7 +178,10 @@ bool lease_keeper_is_eldest(struct job_service *v)
     char mine[STORE_ID_BYTES];
     if (!store_is_shared(v->store)) return true;
     store_daemon_id(v->store, mine);
-    bool eldest = store_daemon_list(v->store, &row, &n, NULL) == STATUS_OK && n > 0 && strcmp(row[0].id, mine) == 0;
+    size_t i = 0;
+    bool eldest = store_daemon_list(v->store, &row, &n, NULL) == STATUS_OK;
+    while (i < n && row[i].ended) i++; /* rows of daemons that have died, which nobody has removed yet */
+    eldest = eldest && i < n && strcmp(row[i].id, mine) == 0;
     free(row);
     return eldest;
 }

@@ -3,7 +3,7 @@
  * (lease_keeper_adopt). A daemon that finds its own row gone has been taken over: it gets a new lease under a new id,
  * and its workers, whose jobs others have by then, are to be killed. They could not write any more: the token of their
  * attempt is not that of the folder. While the server does not answer no lease ends: a daemon ends those of others only
- * when it has renewed its own for a whole lease without an error. */
+ * when it has renewed its own for a whole lease without an error or a delay. */
 #ifndef SELVEDGE_SERVER_LEASE_KEEPER_H
 #define SELVEDGE_SERVER_LEASE_KEEPER_H
 

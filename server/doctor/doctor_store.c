@@ -79,13 +79,8 @@ void doctor_examine_store(struct doctor *d)
     struct error err = {0};
     examine_shared_folder(d);
     status s = store_settings_open(d->settings, true, &store, &err);
-    if (s == STATUS_CONFLICT)
-        doctor_say(d, DOCTOR_NOTE, "database", "%s", err.text);
-    else if (s != STATUS_OK)
-        doctor_say(d, DOCTOR_FAULT, "database", "%s", err.text);
-    else {
-        examine_server(d, store);
-        examine_daemons(d, store);
-    }
+    if (s != STATUS_OK) doctor_say(d, s == STATUS_CONFLICT ? DOCTOR_NOTE : DOCTOR_FAULT, "database", "%s", err.text);
+    if (store != NULL) examine_server(d, store);
+    if (s == STATUS_OK) examine_daemons(d, store);
     store_close(store);
 }

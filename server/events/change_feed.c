@@ -53,7 +53,7 @@ void change_feed_publish(struct change_feed *f, const char *job_id)
 {
     pthread_mutex_lock(&f->lock);
     for (struct change_watch *w = f->first; w != NULL; w = w->next)
-        if (w->job_id[0] == '\0' || strcmp(w->job_id, job_id) == 0) wake(w);
+        if (job_id == NULL || w->job_id[0] == '\0' || strcmp(w->job_id, job_id) == 0) wake(w);
     pthread_mutex_unlock(&f->lock);
 }
 

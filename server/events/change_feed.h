@@ -12,7 +12,7 @@ struct change_watch;
 status change_feed_new(struct change_feed **feed, struct error *err);
 /* No watch may be left. */
 void change_feed_free(struct change_feed *feed);
-/* Wakes the watches of the job and of the list. */
+/* Wakes the watches of the job and of the list; job_id NULL: all watches. */
 void change_feed_publish(struct change_feed *feed, const char *job_id);
 
 /* Begins to watch a job (NULL: the list of jobs): changes that are published from now on end the next wait.

@@ -1,4 +1,5 @@
 #include "server/http/static_files.h"
+#include "base/machine/program_folder.h"
 
 #include <dirent.h>
 #include <stdbool.h>
@@ -73,11 +74,7 @@ static void add_folder(struct static_files *f, const char *folder, const char *u
 static bool find_beside(const char *in_tree, const char *installed, char out[1024])
 {
     char program[800];
-    ssize_t n = readlink("/proc/self/exe", program, sizeof program - 1);
-    if (n <= 0) return false;
-    program[n] = '\0';
-    char *slash = strrchr(program, '/');
-    if (slash != NULL) *slash = '\0';
+    if (!program_folder(program, sizeof program)) return false;
     snprintf(out, 1024, "%s/../share/selvedge/%s", program, installed);
     if (access(out, R_OK) == 0) return true;
     static const char *const up[] = {"../..", "../../.."};

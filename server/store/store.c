@@ -49,7 +49,8 @@ void store_place_release(struct store_place *place)
 static status open_link(struct store *store, struct store_link *link, bool only_reads, bool create, struct error *err)
 {
     link->phrase = &store->driver->phrase;
-    if (link->calls->open(&store->place, store->application, only_reads, create, &link->db) == STATUS_OK)
+    snprintf(link->application, sizeof link->application, "selvedge-tool");
+    if (link->calls->open(&store->place, link->application, only_reads, create, &link->db) == STATUS_OK)
         return STATUS_OK;
     if (link->db == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot open the database: out of memory");
     return store_error(link, "cannot open the database", err);
@@ -71,11 +72,12 @@ static status open_links(struct store *store, bool migrate, struct error *err)
     const struct store_calls *calls = NULL;
     status s = store->driver->load(&calls, err);
     if (s != STATUS_OK) return s;
-    store->write.calls = store->read.calls = store->gate.link.calls = calls;
+    store->write.calls = store->read.calls = store->gate.link.calls = store->lease.calls = calls;
     s = open_link(store, &store->write, false, migrate, err);
     if (s == STATUS_OK) s = store->driver->prepare(&store->write, store->place.address, migrate, err);
     if (s == STATUS_OK) s = open_link(store, &store->read, true, false, err);
     if (s == STATUS_OK && store->driver->shared) s = open_link(store, &store->gate.link, false, false, err);
+    if (s == STATUS_OK && store->driver->shared) s = open_link(store, &store->lease, false, false, err);
     store->write.gate = &store->gate;
     return s;
 }
@@ -87,16 +89,18 @@ static status open_store(const struct store_place *place, bool migrate, struct s
     struct store *store = calloc(1, sizeof *store);
     if (store == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot open the database: out of memory");
     store->driver = store_driver_of(place->address);
-    snprintf(store->application, sizeof store->application, "selvedge-tool");
     pthread_mutex_init(&store->write.lock, NULL);
     pthread_mutex_init(&store->read.lock, NULL);
     pthread_mutex_init(&store->gate.link.lock, NULL);
+    pthread_mutex_init(&store->lease.lock, NULL);
+    pthread_mutex_init(&store->name_lock, NULL);
     s = copy_place(store, place, err);
     if (s == STATUS_OK) s = open_links(store, migrate, err);
-    if (s != STATUS_OK)
-        store_close(store);
-    else
+    *out = NULL;
+    if (s == STATUS_OK || (s == STATUS_CONFLICT && !migrate))
         *out = store;
+    else
+        store_close(store);
     return s;
 }
 
@@ -129,6 +133,8 @@ void store_close(struct store *store)
     close_link(&store->read); /* first, so that the last connection can write and remove the WAL of SQLite */
     close_link(&store->write);
     close_link(&store->gate.link);
+    close_link(&store->lease);
+    pthread_mutex_destroy(&store->name_lock);
     store_place_release(&store->place);
     free(store);
 }

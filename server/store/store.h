@@ -90,11 +90,12 @@ void store_place_release(struct store_place *place);
 status store_open(const char *path, struct store **store, struct error *err);
 status store_open_place(const struct store_place *place, struct store **store, struct error *err);
 /* Opens the database of a daemon that runs. It is not migrated: STATUS_CONFLICT when its version is not that of this
- * program. */
+ * program. *store is set then too, and may be asked about its server (store_server_look, store_clock) and closed. */
 status store_open_place_beside(const struct store_place *place, struct store **store, struct error *err);
 void store_close(struct store *store);
 /* From now on `changed` is called with the id of a job after each change of it or of its files, by the thread that made
- * the change. To be called once, before other threads use the store. */
+ * the change, and with NULL when any job may have changed (store_read_changes). To be called once, before other threads
+ * use the store. */
 void store_on_change(struct store *store, void (*changed)(void *context, const char *job_id), void *context);
 
 /* Inserts a job, and its idempotency key with body_hash (key NULL: none), in one transaction. Sets row->serial. */

@@ -18,6 +18,7 @@ struct daemon_row {
     int64_t pid;
     char url[STORE_URL_BYTES]; /* "" before it listens */
     double started_unix_s, until_unix_s;
+    bool ended; /* until_unix_s is past by the server's clock */
 };
 
 bool store_is_shared(const struct store *store);
@@ -43,10 +44,10 @@ status store_daemon_renew(struct store *store, double lease_s, bool *held, struc
 status store_daemon_end(struct store *store, struct error *err);
 /* Removes the row of a daemon that is known to have ended. */
 status store_daemon_remove(struct store *store, const char *id, struct error *err);
-/* Removes the daemons whose lease has ended, and ends the connections of daemons that have no row, so that their
+/* Removes the other daemons whose lease has ended, and ends the connections of daemons that have no row, so that their
  * changes are rolled back and their locks are free. Connections that are younger than grace_s are spared: their row
  * may be in the making. */
-status store_daemons_bury(struct store *store, double grace_s, int *n_ended, struct error *err);
+status store_daemons_remove(struct store *store, double grace_s, int *n_ended, struct error *err);
 /* All daemons, the oldest first. The caller frees *row. */
 status store_daemon_list(struct store *store, struct daemon_row **row, size_t *n, struct error *err);
 /* The id of this daemon; "" before it has begun. */
@@ -64,7 +65,8 @@ status store_job_elsewhere(struct store *store, const char *id, bool *elsewhere,
 /* Running jobs that no daemon holds. The caller frees *id. */
 status store_job_orphans(struct store *store, char (**id)[STORE_ID_BYTES], size_t *n, struct error *err);
 
-/* Calls what store_on_change has named for the jobs that any daemon has changed since the last call. */
+/* Calls what store_on_change has named for the jobs that any daemon has changed since the last call, or with NULL where
+ * that is not known. */
 void store_read_changes(struct store *store);
 
 /* Whether a duty is this daemon's: it is, or no daemon that lives has it. An error counts as no. */

@@ -11,12 +11,14 @@ status store_error(struct store_link *link, const char *what, struct error *err)
 {
     char why[STORE_WHY_BYTES] = "";
     status s = link->calls->fault(link->db, why, sizeof why);
+    if (s == STATUS_CONFLICT) return error_set(err, s, "%s", why); /* it is about what is changed, not the database */
     return error_set(err, s, "%s: database says '%s'", what, why);
 }
 
 status store_gate_check(struct store_gate *gate, struct error *err)
 {
-    if (gate == NULL || !atomic_load(&gate->entered) || !pthread_equal(gate->thread, pthread_self())) return STATUS_OK;
+    if (gate == NULL || !atomic_load(&gate->entered) || !pthread_equal(atomic_load(&gate->thread), pthread_self()))
+        return STATUS_OK;
     if (gate->fault != STATUS_OK) return error_set(err, gate->fault, "%s", gate->why.text);
     if (gate->link.calls->is_alive(gate->link.db)) return STATUS_OK;
     return error_set(err, STATUS_IO, "the connection that keeps other daemons from this change was lost");
@@ -51,7 +53,7 @@ static status prepare(struct store_link *link, struct store_query **query, struc
     *query = NULL;
     return link->calls->query(link->db, sql, value, n, query) == STATUS_OK
                ? STATUS_OK
-               : store_error(link, "cannot prepare a query", err);
+               : store_error(link, "cannot run a query", err);
 }
 
 status store_prepare(struct store_link *link, struct store_query **query, struct error *err, const char *sql,

@@ -14,6 +14,7 @@ struct store_link {
     const struct store_calls *calls;
     void *db;
     const struct store_phrases *phrase;
+    char application[STORE_APPLICATION_BYTES]; /* name of the connection at a server; guarded by lock */
     struct store_gate *gate; /* changes are refused while their thread is behind a gate that has failed; may be NULL */
     pthread_mutex_t lock;
 };
@@ -22,18 +23,19 @@ struct store_link {
 struct store_gate {
     struct store_link link; /* a connection of its own, because its locks last longer than a transaction */
     atomic_bool entered;
-    pthread_t thread;
-    status fault;
+    _Atomic(pthread_t) thread; /* which has entered; set before entered is */
+    status fault;              /* of this entry; it and why are that thread's */
     struct error why;
 };
 
 struct store {
     const struct store_driver *driver;
     struct store_place place;
-    char application[STORE_APPLICATION_BYTES];          /* name of the connections at a server */
-    char daemon[STORE_ID_BYTES];                        /* id of this daemon; guarded by write.lock when it changes */
+    pthread_mutex_t name_lock;                          /* held for no statement */
+    char daemon[STORE_ID_BYTES];                        /* id of this daemon; guarded by name_lock */
     struct store_link write, read;                      /* no function holds both locks */
     struct store_gate gate;                             /* without a connection unless the driver is shared */
+    struct store_link lease;                            /* as gate; renews while a long change holds `write` */
     void (*changed)(void *context, const char *job_id); /* NULL: nobody asks */
     void *changed_context;
 };

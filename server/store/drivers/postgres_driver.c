@@ -1,5 +1,6 @@
 /* PostgreSQL as the database of several daemons. libpq is reached through a plug-in, so that no other service needs
  * it. */
+#include "base/machine/program_folder.h"
 #include "server/store/store_sql.h"
 
 #include <dlfcn.h>
@@ -24,10 +25,7 @@ static void *open_plugin(char why[STORE_WHY_BYTES])
         if (library == NULL) snprintf(why, STORE_WHY_BYTES, "%s", dlerror());
         return library;
     }
-    ssize_t n = readlink("/proc/self/exe", program, sizeof program - 1);
-    program[n > 0 ? n : 0] = '\0';
-    char *slash = strrchr(program, '/');
-    if (slash != NULL) *slash = '\0';
+    program_folder(program, sizeof program);
     snprintf(why, STORE_WHY_BYTES, "'" PLUGIN "' is not installed");
     for (size_t i = 0; i < sizeof below / sizeof below[0]; i++) {
         snprintf(path, sizeof path, "%s%s" PLUGIN, program, below[i]);
@@ -114,9 +112,16 @@ static status migrate(struct store_link *link, bool may_migrate, struct error *e
     const char *const *const *migration = store_postgres_migrations(&n);
     status s = read_version(link, &version, err);
     if (s != STATUS_OK || version == n) return s;
-    if (!may_migrate || version > n)
-        return error_set(err, version > n ? STATUS_UNSUPPORTED : STATUS_CONFLICT,
+    if (version > n)
+        return error_set(err, STATUS_UNSUPPORTED,
                          "the database has version %ld, and this program writes version %d: use the program that made "
+                         "it",
+                         version, n);
+    if (!may_migrate && version == 0)
+        return error_set(err, STATUS_CONFLICT, "the database has no tables yet; the first daemon makes them");
+    if (!may_migrate)
+        return error_set(err, STATUS_CONFLICT,
+                         "the database has version %ld, and this program writes version %d: start a daemon to migrate "
                          "it",
                          version, n);
     for (; s == STATUS_OK && version < n; version++) s = migrate_one(link, version, migration[version], err);

@@ -58,13 +58,15 @@ struct store_calls {
     /* The number of rows that a finished statement has changed. */
     int64_t (*n_changed)(struct store_query *query);
     void (*finish)(struct store_query *query);
-    /* The kind and the text of the last failure: STATUS_DISK_FULL, STATUS_EXISTS (a constraint) or STATUS_IO. */
+    /* The kind and the text of the last failure: STATUS_DISK_FULL, STATUS_EXISTS (a constraint), STATUS_CONFLICT (the
+     * wait for a lock has ended in vain), STATUS_INVALID (the address) or STATUS_IO. */
     status (*fault)(void *db, char *text, size_t n_text);
     /* Whether the connection is as it was opened; false when it was lost since, which ends its locks. It says nothing
      * about the next moment. */
     bool (*is_alive)(void *db);
-    /* Calls `changed` with the id of each job that any daemon has changed since the last call; the connection is one
-     * that reads. NULL: there are no other daemons. */
+    /* Calls `changed` with the id of each job that any daemon has changed since the last call, and with NULL when the
+     * connection was lost meanwhile, so that ids may be missing; the connection is one that reads. Without other
+     * daemons this function is NULL. */
     void (*notices)(void *db, void (*changed)(void *context, const char *job_id), void *context);
 };
 
@@ -79,7 +81,7 @@ struct store_phrases {
 
 struct store_driver {
     const char *id;     /* "sqlite.v1"; also in the report of the doctor */
-    const char *scheme; /* how addresses begin: "postgresql:"; "": any path */
+    const char *scheme; /* how addresses begin: "postgres"; "": any path */
     bool shared;        /* several daemons may use the database at once (store_cluster.h) */
     struct store_phrases phrase;
     /* Gives the calls, and loads them first where they are a plug-in. STATUS_UNSUPPORTED names what is missing. */

@@ -26,6 +26,7 @@ struct pg_db {
     const struct store_place *place;
     const char *application;
     bool only_reads, in_transaction;
+    bool missed;      /* the connection was opened again since the last call of notices */
     time_t failed_at; /* when a connection was last tried in vain; 0: not since the last one */
     status fault;
     char why[STORE_WHY_BYTES];
@@ -53,6 +54,9 @@ static status fail_by(struct pg_db *d, const PGresult *r)
     const char *state = r == NULL ? NULL : PQresultErrorField(r, PG_DIAG_SQLSTATE);
     const char *why = r == NULL ? PQerrorMessage(d->c) : PQresultErrorMessage(r);
     if (state == NULL) state = "";
+    /* a lock that was waited for in vain, and a deadlock */
+    if (strcmp(state, "55P03") == 0 || strcmp(state, "40P01") == 0)
+        return fail(d, STATUS_CONFLICT, "another daemon is changing this; repeat the request");
     return fail(d,
                 strncmp(state, "23", 2) == 0  ? STATUS_EXISTS
                 : strcmp(state, "53100") == 0 ? STATUS_DISK_FULL
@@ -78,7 +82,7 @@ static bool is_alive(void *db)
 
 static status set_up(struct pg_db *d)
 {
-    /* a server that answers commits before they are on disk is not asked to by default only */
+    /* Some servers answer commits before they are on disk by default; ask this one not to. */
     PGresult *r = PQexec(d->c, "SET lock_timeout = '30s'; SET idle_in_transaction_session_timeout = '60s'; "
                                "SET bytea_output = hex; SET standard_conforming_strings = on; SELECT "
                                "set_config('synchronous_commit', 'on', false) WHERE "
@@ -95,6 +99,28 @@ static status set_up(struct pg_db *d)
 }
 
 static void ignore_notice(void *context, const char *text) { (void)context, (void)text; }
+
+/* Whether a part of an address can be what libpq takes it for, and not a piece of a password. */
+static bool is_sound(const PQconninfoOption *part)
+{
+    if (part->val == NULL) return true;
+    if (strcmp(part->keyword, "port") == 0) return part->val[strspn(part->val, "0123456789,")] == '\0';
+    if (strcmp(part->keyword, "host") != 0 && strcmp(part->keyword, "dbname") != 0) return true;
+    return strchr(part->val + (part->val[0] == '@'), '@') == NULL; /* an abstract socket begins with '@' */
+}
+
+/* libpq's messages quote parts of an address. A password that has '/', '@' or '%' and is not percent-encoded is cut at
+ * them, and its rest would be quoted as a host, a port or a database. */
+static status check_address(struct pg_db *d)
+{
+    PQconninfoOption *parsed = PQconninfoParse(d->place->address, NULL);
+    bool sound = parsed != NULL;
+    for (const PQconninfoOption *part = parsed; sound && part->keyword != NULL; part++) sound = is_sound(part);
+    PQconninfoFree(parsed);
+    if (sound) return STATUS_OK;
+    return fail(d, STATUS_INVALID,
+                "the address is malformed (percent-encode the password, or use server.store_password_file)");
+}
 
 static status connect_db(struct pg_db *d)
 {
@@ -119,6 +145,7 @@ static status connect_db(struct pg_db *d)
     if (s == STATUS_OK) PQsetNoticeProcessor(d->c, ignore_notice, NULL);
     if (s == STATUS_OK) s = set_up(d);
     d->failed_at = s == STATUS_OK ? 0 : time(NULL);
+    d->missed = true;
     if (s != STATUS_OK && d->c != NULL) {
         PQfinish(d->c);
         d->c = NULL;
@@ -145,7 +172,10 @@ static status open_db(const struct store_place *place, const char *application, 
     d->place = place;
     d->application = application;
     d->only_reads = only_reads;
-    return connect_db(d);
+    status s = check_address(d);
+    if (s == STATUS_OK) s = connect_db(d);
+    d->missed = false;
+    return s;
 }
 
 static void close_db(void *db)
@@ -358,6 +388,8 @@ static void notices(void *db, void (*changed)(void *context, const char *job_id)
 {
     struct pg_db *d = db;
     if (ensure(d) != STATUS_OK) return;
+    if (d->missed) changed(context, NULL);
+    d->missed = false;
     for (PGnotify *n; (n = PQnotifies(d->c)) != NULL; PQfreemem(n)) changed(context, n->extra);
 }
 

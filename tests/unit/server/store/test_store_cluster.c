@@ -146,7 +146,7 @@ static void test_a_claim_ends_with_the_state_that_it_was_for(void **state)
 
 /* ---- leases */
 
-static void test_a_lease_that_has_ended_is_buried_with_its_connections(void **state)
+static void test_a_lease_that_has_ended_is_removed_with_its_connections(void **state)
 {
     struct fixture *f = *state;
     int n = 0;
@@ -154,7 +154,7 @@ static void test_a_lease_that_has_ended_is_buried_with_its_connections(void **st
     struct error err = {0};
     assert_int_equal(store_daemon_renew(f->one, -1, &held, NULL), STATUS_OK); /* it ended a second ago */
     store_gate_enter(f->one, "a", NULL);
-    assert_int_equal(store_daemons_bury(f->two, 0, &n, NULL), STATUS_OK);
+    assert_int_equal(store_daemons_remove(f->two, 0, &n, NULL), STATUS_OK);
     assert_int_equal(n, 1);
     usleep(200000);
     /* the gate is open to others, and shut to who held it */
@@ -166,7 +166,7 @@ static void test_a_lease_that_has_ended_is_buried_with_its_connections(void **st
     /* a new lease, over connections that are opened again */
     assert_int_equal(store_daemon_begin(f->one, "here", 1, LEASE_S, &err), STATUS_OK);
     assert_int_equal(store_probe(f->one, NULL), STATUS_OK);
-    assert_int_equal(store_daemons_bury(f->two, 0, &n, NULL), STATUS_OK);
+    assert_int_equal(store_daemons_remove(f->two, 0, &n, NULL), STATUS_OK);
     assert_int_equal(n, 0);
 }
 
@@ -219,7 +219,7 @@ static void test_a_change_whose_connection_is_lost_is_an_error_and_not_made(void
     assert_int_equal(s, STATUS_OK);
     assert_int_equal(store_run(&f->two->write, NULL, NULL,
                                "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = ?", "s",
-                               f->one->application),
+                               f->one->write.application),
                      STATUS_OK);
     usleep(200000);
     assert_int_equal(store_end(&f->one->write, s, &err), STATUS_IO);
@@ -262,6 +262,44 @@ static void test_changes_at_one_daemon_are_told_to_others(void **state)
     usleep(100000);
     store_read_changes(f->two);
     assert_true(n > 0);
+}
+
+static void count_unknown(void *context, const char *job_id)
+{
+    if (job_id == NULL) ++*(int *)context;
+}
+
+static void test_a_connection_that_was_lost_may_have_missed_changes(void **state)
+{
+    struct fixture *f = *state;
+    int n = 0;
+    store_on_change(f->two, count_unknown, &n);
+    store_read_changes(f->two);
+    assert_int_equal(n, 0);
+    assert_int_equal(store_run(&f->one->write, NULL, NULL,
+                               "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = ?", "s",
+                               f->two->read.application),
+                     STATUS_OK);
+    usleep(200000);
+    store_read_changes(f->two);
+    store_read_changes(f->two);
+    assert_int_equal(n, 1);
+}
+
+static void test_a_password_in_a_malformed_address_is_not_quoted(void **state)
+{
+    static const char *const address[] = {"postgresql://u:secret%zz@127.0.0.1/d", "postgresql://u:p@secret@127.0.0.1/d",
+                                          "postgresql://u:1/secret@127.0.0.1/d", "postgresql://u:secret"};
+    (void)state;
+    for (size_t i = 0; i < sizeof address / sizeof address[0]; i++) {
+        struct store_place place = {0};
+        struct store *store = NULL;
+        struct error err = {0};
+        snprintf(place.address, sizeof place.address, "%s", address[i]);
+        assert_int_equal(store_open_place(&place, &store, &err), STATUS_INVALID);
+        assert_non_null(strstr(err.text, "the address is malformed"));
+        assert_null(strstr(err.text, "secret"));
+    }
 }
 
 static void test_texts_that_are_cut_within_a_character_can_be_stored(void **state)
@@ -325,11 +363,13 @@ static int run(const char *database)
         TEST(test_a_job_is_claimed_by_one),
         TEST(test_what_a_daemon_held_can_be_had_when_it_has_ended),
         TEST(test_a_claim_ends_with_the_state_that_it_was_for),
-        TEST(test_a_lease_that_has_ended_is_buried_with_its_connections),
+        TEST(test_a_lease_that_has_ended_is_removed_with_its_connections),
         TEST(test_the_gate_admits_one_for_a_job),
         TEST(test_a_change_whose_connection_is_lost_is_an_error_and_not_made),
         TEST(test_an_upload_goes_on_at_one_daemon),
         TEST(test_changes_at_one_daemon_are_told_to_others),
+        TEST(test_a_connection_that_was_lost_may_have_missed_changes),
+        cmocka_unit_test(test_a_password_in_a_malformed_address_is_not_quoted),
         TEST(test_texts_that_are_cut_within_a_character_can_be_stored),
         TEST(test_both_databases_have_the_same_columns),
     };
