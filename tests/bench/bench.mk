@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-service bench-scale bench-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics docs-ground docs-seam bench-browser bench-pictures bench-weave bench-weave-rendered
+.PHONY: bench bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics docs-ground docs-seam bench-browser bench-pictures bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -80,6 +80,9 @@ bench-scale: | deps-test ## what a batch of 1,000 samples costs to submit and to
 bench-ranks: | deps-test ## strong scaling of one fit over ranks: 2 measured, 64 by a model (two minutes on 2 quiet cores; part of bench-scale)
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(BUILD)/tests/bench/ranks/rank_messages >&2
 	@/usr/bin/python3 tests/bench/ranks/bench_ranks.py $(BUILD)
+
+docs-ranks:        ## draw docs/images/ranks-scaling.svg anew from the tables of docs/ranks.md, whose rows bench-ranks prints (a second)
+	@/usr/bin/python3 tests/bench/ranks/plot_scaling.py docs/ranks.md docs/images/ranks-scaling.svg
 
 EXPORTS_PYTHON := $(BUILD)/exports-python
 $(EXPORTS_PYTHON)/bin/packages-are-there:

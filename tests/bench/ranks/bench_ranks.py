@@ -1,7 +1,7 @@
 """Strong scaling of one fit over ranks. `scale.ranks2_efficiency` is measured: the time of a fit of a million paths with one
 rank over twice that with two, each with one thread, the better of two runs of each. `scale.ranks64_simulated_efficiency`
-follows from the model of rank_model.py for the same fit with the default budget; its inputs go to stderr. One JSON line
-per figure. Usage: bench_ranks.py BUILD [PATH_BUDGET_OF_THE_MEASURED_FITS]"""
+follows from the model of rank_model.py for the same fit with the default budget; its inputs go to stderr, as the rows of
+docs/ranks.md from which plot_scaling.py draws. One JSON line per figure. Usage: bench_ranks.py BUILD [PATH_BUDGET_OF_THE_MEASURED_FITS]"""
 import json
 import os
 import re
@@ -11,6 +11,7 @@ import sys
 import tempfile
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import plot_scaling  # noqa: E402
 import rank_job  # noqa: E402
 import rank_model  # noqa: E402
 
@@ -29,11 +30,11 @@ def print_figure(name, value):
     print(json.dumps({"name": f"scale.{name}", "value": round(value, 4), "unit": "1", "better": "higher"}), flush=True)
 
 
-def run(folder, rows, ranks, **fit):
+def run(folder, rows, ranks, threads=1, **fit):
     """Runs the job, and returns the seconds of its fit."""
     shutil.rmtree(folder, ignore_errors=True)
     rank_job.write_job(folder, rows, fit)
-    subprocess.run([WORKER, "--quiet", "--threads", "1", "--ranks", str(ranks), folder], check=True, stdin=subprocess.DEVNULL)
+    subprocess.run([WORKER, "--quiet", "--threads", str(threads), "--ranks", str(ranks), folder], check=True, stdin=subprocess.DEVNULL)
     with open(os.path.join(folder, "results", "result.json")) as f:
         return json.load(f)["fit_wall_s"]
 
@@ -72,11 +73,14 @@ def main():
         rows = rank_job.true_rows(WORKER, os.path.join(top, "truth"))
         for ranks in (1, 2, 1, 2):
             took[ranks].append(run(folder, rows, ranks, path_budget=budget))
+        threads_s = min(run(folder, rows, 1, 2, path_budget=budget) for _ in range(2))
+        print(f"two threads of one process: efficiency {min(took[1]) / (2 * threads_s):.3f}", file=sys.stderr)
         print(f"seconds of the fit with {budget} paths: {took}; load {os.getloadavg()[0]:.1f}", file=sys.stderr)
         print_figure("ranks2_efficiency", min(took[1]) / (2 * min(took[2])))
         run(folder, rows, 2)
         measured = look(folder)
-    print({**measured, "tasks": f"{len(measured['tasks'])} estimates, {sum(measured['tasks'])} tasks"}, file=sys.stderr)
+    print(f"rows of docs/ranks.md, for `make docs-ranks` ({len(measured['tasks'])} steps, {sum(measured['tasks'])} tasks):", file=sys.stderr)
+    print("\n".join(plot_scaling.rows_of_inputs(measured)), file=sys.stderr)
     for ranks in RANKS:
         print(f"{ranks:3d} ranks: {rank_model.fit_s(measured, ranks):8.3f} s, efficiency {rank_model.efficiency(measured, ranks):.3f}", file=sys.stderr)
     print_figure("ranks64_simulated_efficiency", rank_model.efficiency(measured, 64))
