@@ -102,6 +102,8 @@ def test_the_doctor_looks_at_database_and_folder(daemons, server):
     assert "pg_dump" in said
     said = selvedged(one.data, "--set", f"server.store={server.address('none')}", "--doctor", expect=1)
     assert "no password supplied" in said
+    said = selvedged(one.data, *settings, "--set", f"server.store={server.address(server.make_database())}", "--doctor", expect=1)
+    assert "note   database     the database has no tables yet" in said and "its lease lasts" not in said
 
 
 def test_a_list_that_waits_learns_of_changes_at_the_other_daemon(daemons):
