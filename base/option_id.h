@@ -53,6 +53,7 @@
 /* the measurements */
 #define OPTION_MEASUREMENT_FILE "measurement_file"
 #define OPTION_MEASURED_ROWS "measured_rows"
+#define OPTION_PROFILE_FILE "profile_file"
 #define OPTION_PHOTOGRAPHS "photographs"
 #define OPTION_PHOTOGRAPH_FILE "photograph_file"
 /* the fit */
@@ -65,6 +66,7 @@
 #define OPTION_START "start"
 #define OPTION_STARTS "starts"
 #define OPTION_PRIORS "priors"
+#define OPTION_PROFILE_JOB "profile_job"
 #define OPTION_NUISANCE "nuisance"
 #define OPTION_TEXTURE_BLOCK "texture_block"
 #define OPTION_FIT_RADIUS "fit_radius"

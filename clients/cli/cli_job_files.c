@@ -46,6 +46,7 @@ static const struct named_file named[] = {
     {{"cloth", NULL}, "texture", "photograph", "cloth.texture"},
     {{"environment", NULL}, "file", "environment", "environment.file"},
     {{"measurements", NULL}, "file", "measurements", "measurements.file"},
+    {{"profile", NULL}, "file", "profile", "profile.file"},
     {{"rig", NULL}, "file", "rig", "rig.file"},
     {{"camera", NULL}, "noise_file", "camera_noise", "camera.noise_file"},
     {{"color", "chart"}, "file", "chart", "color.chart.file"},

@@ -226,6 +226,25 @@ static void print_geometry(const json_t *g, FILE *out)
             100.0 * member_number(trial, "radius_rms"));
 }
 
+/* The residuals of models that were fitted to the profile of a fiber. */
+static void print_profile(const json_t *profile, FILE *out)
+{
+    size_t i;
+    const json_t *m;
+    fprintf(out, "%-24s %10s %10s %14s %8s\n", "model (residual)", "of range", "relative", "scale", "time");
+    json_array_foreach(json_object_get(profile, "models"), i, m)
+    {
+        char id[64], range[48], relative[48], time[CLI_SHORT_TEXT];
+        text_clean(member_text(m, "id"), id, sizeof id);
+        percent(m, "nrmse", range, sizeof range);
+        percent(m, "rel_rms", relative, sizeof relative);
+        text_duration(member_number(m, "fit_wall_s"), time);
+        fprintf(out, "  %-22s %10s %10s %14.5g %8s  %s%s\n", id, range, relative, member_number(m, "scale"), time,
+                json_is_true(json_object_get(m, "best")) ? "best " : "",
+                json_is_false(json_object_get(m, "converged")) ? "not converged" : "");
+    }
+}
+
 static void report_verdict(const json_t *verdict, FILE *out)
 {
     size_t i;
@@ -246,6 +265,11 @@ void report_result(const json_t *job, FILE *out)
     const json_t *parameter, *parameters = json_object_get(job, "parameters"), *result = json_object_get(job, "result");
     const json_t *models = json_object_get(result, "models");
     report_verdict(json_object_get(job, "verdict"), out);
+    if (json_is_object(json_object_get(result, "profile"))) {
+        print_profile(json_object_get(result, "profile"), out);
+        print_parameters(parameters, out);
+        return;
+    }
     if (json_is_array(models) && json_array_size(models) == 0) { /* of geometry only */
         print_geometry(json_object_get(result, "geometry"), out);
         return;

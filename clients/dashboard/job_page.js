@@ -113,6 +113,18 @@ function downloads(job, list) {
   return [el("p", {}, report(list, "report.html", "Report"), report(list, "report.pdf", "Report as PDF"), el("a", { class: "button", href: list.archive, download: `selvedge-${job.id}.tar` }, "Everything (tar)")), el("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": "files" }, el("table", { id: "files" }, el("tbody", {}, rows)))];
 }
 
+// What was fitted to the profile of a single fiber.
+function profileCards(profile) {
+  if (!profile) return [];
+  const rows = profile.models.map((m) => el("tr", { class: m.best ? "best" : "" }, el("td", { title: m.title }, el("span", { class: "mono" }, m.id)), el("td", { class: "number" }, percentWithError(m.nrmse)),
+    el("td", { class: "number" }, percentWithError(m.rel_rms)), el("td", { class: "number" }, withError(m.scale, m.scale_se || undefined)), el("td", { class: "number" }, duration(m.fit_wall_s)),
+    el("td", {}, m.best ? el("span", { class: "tag" }, "best") : null, m.converged ? null : el("span", { class: "tag warn" }, "not converged"))));
+  const table = el("div", { class: "wide", tabIndex: 0, role: "region", "aria-label": "models of the profile" }, el("table", { id: "profile-models" }, el("thead", {}, el("tr", {}, el("th", {}, "Model"), el("th", { class: "number" }, "Residual, of the range"),
+    el("th", { class: "number" }, "Relative residual"), el("th", { class: "number" }, "Scale"), el("th", { class: "number" }, "Time"), el("th", {}, "Remarks"))), el("tbody", {}, rows)));
+  return [card("Models fitted to the profile", table, el("p", { class: "hint" }, "The report shows the profile, measured and fitted.")),
+    ...profile.models.map((m) => card(`Parameters of ${m.id}`, parameterTable(fitted(m), m.best ? "parameters" : undefined)))];
+}
+
 export function jobPage(page, id) {
   const head = el("div", { class: "head" }), stages = el("div", { class: "stages" }), facts = el("div", { class: "facts" }), verdict = el("div"), notes = el("div");
   const fitCard = el("div"), curveCard = el("div"), surfaces = el("div"), results = el("div", { id: "results" }), record = el("div"), versionsNode = el("div"), logNode = el("pre", { class: "log", tabIndex: 0, role: "region", "aria-label": "the last lines of the log" });
@@ -167,6 +179,7 @@ export function jobPage(page, id) {
     results.append(
       twin ? card("The twin under the mouse", twin.box) : "",
       compete.length > 1 ? card("Models compared", modelTable(compete, choiceOf(job))) : "",
+      ...profileCards(job.result?.profile),
       job.result?.models?.length === 0 ? "" : // a job of geometry only has none
         el("div", { class: "columns" }, card("Fitted parameters", parameterTable(fitted(job), "parameters")), card("Measured and rendered means", scatterPlot(compared))),
       details ? card("More results of the fit", details) : "",

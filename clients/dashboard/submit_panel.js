@@ -19,6 +19,7 @@ function filesOf(doc) {
   add(doc.environment?.file, "environment");
   add(doc.measurements?.file, "measurements");
   add(doc.rig?.file, "rig");
+  add(doc.profile?.file, "profile");
   add(doc.camera?.noise_file, "camera_noise");
   for (const name of doc.camera?.dark_frames ?? []) add(name, "dark_frame");
   add(doc.color?.chart?.file, "chart");

@@ -178,6 +178,8 @@ struct job_document {
     bool black_sheet;
     /* observations */
     char measurement_file[JOB_MAX_NAME_BYTES]; /* "" when photographs are given */
+    char profile_file[JOB_MAX_NAME_BYTES];     /* of a single fiber; "" for a job with a cloth */
+    double profile_theta_i_deg, profile_scale; /* NaN: a column of the profile; fitted */
     size_t n_measured_row;                     /* 0: the default ones; of files of measured BRDFs */
     struct job_measured_row *measured_row;
     enum job_symmetry measurement_symmetry;
@@ -191,6 +193,7 @@ struct job_document {
     size_t max_iteration; /* 0: the method's default */
     uint64_t path_budget; /* 0: the method's default */
     double precision;     /* noise of tracing over the photographs' errors at which the fit ends; 0: none */
+    char profile_job[64]; /* id of a job with a profile, whose results are priors; "" when none is given */
     bool share_camera_paths;
     double plain_prior; /* strength; 0: none */
     bool discrepancy;
@@ -221,6 +224,8 @@ bool job_document_has_rows(const struct job_document *doc);
 /* Whether a job without rows ends with the geometry of its scan, or renders pictures of its cloth with the parameters
  * that the document holds fixed. */
 bool job_document_geometry_only(const struct job_document *doc);
+/* Whether the job fits models to the profile of a single fiber; it then has no cloth. */
+bool job_document_of_profile(const struct job_document *doc);
 bool job_document_pictures_only(const struct job_document *doc);
 
 /* Puts the section "cloth" before the field that a check or the builder of a described cloth named, in the error's text
@@ -244,7 +249,7 @@ size_t job_texture_cells(const struct job_document *doc);
 double job_texture_cell_mm(const struct job_document *doc);
 
 /* Calls visit for every input file that the document names, with its role ("volume", "fibers", "environment",
- * "measurements", "photograph", "camera_noise", "dark_frame", "chart", "white_reference", "mesh"). */
+ * "measurements", "photograph", "camera_noise", "dark_frame", "chart", "white_reference", "mesh", "profile"). */
 void job_document_visit_files(const struct job_document *doc,
                               void (*visit)(void *context, const char *name, const char *role), void *context);
 /* Writes the key that names an input file, as "photographs[2].file": the last one where several do, "" where none. */

@@ -206,7 +206,7 @@ static status parse_each(const struct reader *r, const struct json_field *fit, c
 /* Refuses priors, nuisance terms and a goal of precision that the method does not take. */
 static status check_method(const struct job_document *doc, struct error *err)
 {
-    bool has_prior = false;
+    bool has_prior = doc->profile_job[0] != '\0';
     for (size_t i = 0; i < doc->n_model; i++)
         for (size_t p = 0; p < JOB_MAX_PARAM; p++) has_prior = has_prior || !isnan(doc->model[i].option.prior_mean[p]);
     const struct job_fit_option *o = &doc->model[0].option;
@@ -215,7 +215,8 @@ static status check_method(const struct job_document *doc, struct error *err)
                       (doc->precision > 0.0 ? METHOD_TAKES_PRECISION : 0u);
     unsigned missing = wanted & ~method_catalogue_find(doc->method)->takes;
     if (missing == 0) return STATUS_OK;
-    const char *path = (missing & METHOD_TAKES_PRIORS) != 0     ? "fit.priors"
+    const char *path = (missing & METHOD_TAKES_PRIORS) != 0
+                           ? doc->profile_job[0] != '\0' ? "fit.profile_job" : "fit.priors"
                        : (missing & METHOD_TAKES_NUISANCE) != 0 ? "fit.nuisance"
                                                                 : "fit.precision";
     return error_set_field(err, STATUS_INVALID, path, "'%s' needs the method '%s': '%s' does not know it", path,

@@ -37,6 +37,7 @@ void job_document_visit_files(const struct job_document *doc,
     if (doc->cloth_texture[0] != '\0') visit(context, doc->cloth_texture, "photograph");
     if (doc->environment_file[0] != '\0') visit(context, doc->environment_file, "environment");
     if (doc->measurement_file[0] != '\0') visit(context, doc->measurement_file, "measurements");
+    if (doc->profile_file[0] != '\0') visit(context, doc->profile_file, "profile");
     if (doc->rig_file[0] != '\0') visit(context, doc->rig_file, "rig");
     if (doc->noise_file[0] != '\0') visit(context, doc->noise_file, "camera_noise");
     for (size_t i = 0; i < doc->n_dark_frame; i++) visit(context, doc->dark_frame[i], "dark_frame");
@@ -72,10 +73,15 @@ void job_document_file_key(const struct job_document *doc, const char *name, cha
 {
     const struct {
         const char *file, *key;
-    } single[] = {{doc->fiber_file, "fibers.file"},      {doc->measurement_file, "measurements.file"},
-                  {doc->cloth_texture, "cloth.texture"}, {doc->environment_file, "environment.file"},
-                  {doc->rig_file, "rig.file"},           {doc->noise_file, "camera.noise_file"},
-                  {doc->chart.file, "color.chart.file"}, {doc->white.file, "color.white.file"}};
+    } single[] = {{doc->fiber_file, "fibers.file"},
+                  {doc->measurement_file, "measurements.file"},
+                  {doc->cloth_texture, "cloth.texture"},
+                  {doc->environment_file, "environment.file"},
+                  {doc->rig_file, "rig.file"},
+                  {doc->profile_file, "profile.file"},
+                  {doc->noise_file, "camera.noise_file"},
+                  {doc->chart.file, "color.chart.file"},
+                  {doc->white.file, "color.white.file"}};
     snprintf(key, n_key, "%s", "");
     for (size_t i = 0; i < sizeof single / sizeof single[0]; i++)
         if (strcmp(single[i].file, name) == 0) snprintf(key, n_key, "%s", single[i].key);

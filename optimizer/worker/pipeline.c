@@ -16,6 +16,8 @@ struct stage_code {
     bool of_volume;                                                /* skipped when the job gives fibers */
     bool of_scene;                                                 /* skipped when the job ends with the geometry */
     bool of_fit;                                                   /* skipped when the job has no measurements */
+    /* what the stage does for the profile of a fiber, always anew; NULL: such a job skips it */
+    status (*run_profile)(struct pipeline_context *c, struct error *err);
 };
 
 /* In the order of pipeline_stage_table (a test compares the names). */
@@ -25,9 +27,9 @@ static const struct stage_code stage_code[] = {
     {"fibers", stage_fibers, stage_fibers_load},
     {"directions", stage_directions, stage_directions_load, .of_volume = true},
     {"scene", stage_scene, NULL, .of_scene = true},
-    {"fit", stage_fit, stage_fit_load, .of_scene = true, .of_fit = true},
+    {"fit", stage_fit, stage_fit_load, .of_scene = true, .of_fit = true, .run_profile = stage_profile_fit},
     {"validation", stage_validation, stage_validation_load, .of_scene = true, .of_fit = true},
-    {"report", stage_report, NULL},
+    {"report", stage_report, NULL, .run_profile = stage_profile_report},
 };
 
 static void report_fraction(void *context, double fraction)
@@ -50,7 +52,12 @@ static status unmark_from(struct pipeline_context *c, size_t i, struct error *er
 /* A finished stage is loaded; if its checkpoint cannot be read it runs again, and so do all later ones. */
 static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, bool *loaded, struct error *err)
 {
-    const struct stage_code *code = &stage_code[i];
+    struct stage_code own = stage_code[i];
+    const struct stage_code *code = &own;
+    if (job_document_of_profile(c->doc)) {
+        own.run = own.run_profile;
+        own.load = NULL;
+    }
     double start_s = clock_monotonic_s();
     if (code->load != NULL && !*earlier_ran && worker_folder_stage_done(c->folder, code->name)) {
         struct error why = {0};
@@ -78,6 +85,7 @@ static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, 
 
 bool pipeline_has_stage(const struct pipeline_context *c, size_t i)
 {
+    if (job_document_of_profile(c->doc)) return stage_code[i].run_profile != NULL;
     return (!stage_code[i].of_volume || c->doc->has_volume) &&
            (!stage_code[i].of_scene || !job_document_geometry_only(c->doc)) &&
            (!stage_code[i].of_fit || job_document_has_rows(c->doc));

@@ -32,6 +32,7 @@ void pipeline_context_release(struct pipeline_context *c)
     observation_set_release(&c->fitted);
     observation_set_release(&c->row);
     observation_set_release(&c->contrast);
+    fiber_profile_release(&c->profile);
     environment_free(c->environment);
     json_decref(c->exports);
     json_decref(c->surface_pictures);
@@ -49,6 +50,7 @@ void pipeline_context_release(struct pipeline_context *c)
             free(c->model[i].validation.contrast[q]);
         }
         free(c->model[i].candidate);
+        profile_fit_release(&c->model[i].profile);
     }
     free(c->model);
 }

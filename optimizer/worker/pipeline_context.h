@@ -22,6 +22,7 @@
 #include "optimizer/fit/objective/noisy_minimum.h"
 #include "optimizer/fit/photographs/camera/photograph_develop.h"
 #include "optimizer/fit/photographs/observation.h"
+#include "optimizer/fit/profile/profile_fit.h"
 #include "optimizer/fit/verdict/verdict.h"
 #include "optimizer/job/job_document.h"
 #include "optimizer/job/stage_table.h"
@@ -81,6 +82,7 @@ struct pipeline_model {
     struct fit_result fit;
     struct cloth_search_result cloth; /* when numbers of the cloth are fitted; `fit` is its part without the numbers */
     struct pipeline_scan_error scan_error;
+    struct profile_fit profile; /* of a job with the profile of a fiber; `fit` has its parameters and errors */
     struct validation validation;
     struct pipeline_discrepancy discrepancy;
     struct derivative_check certificate;  /* of the free parameters at the result; filled in before the report */
@@ -157,6 +159,7 @@ struct pipeline_context {
     struct observation_set row;
     struct expected_rows expected;
     struct observation_set contrast; /* of all observations, in their order; empty when not asked for */
+    struct fiber_profile profile;    /* empty for a job with a cloth */
     size_t n_model;
     struct pipeline_model *model; /* in the order of the document */
     struct pipeline_numbers number;
@@ -214,6 +217,9 @@ status stage_fit_load(struct pipeline_context *c, struct error *err);
 status stage_validation(struct pipeline_context *c, struct error *err);
 status stage_validation_load(struct pipeline_context *c, struct error *err);
 status stage_report(struct pipeline_context *c, struct error *err);
+/* of a job with the profile of a fiber, in place of the stages "fit" and "report" (pipeline_profile.c) */
+status stage_profile_fit(struct pipeline_context *c, struct error *err);
+status stage_profile_report(struct pipeline_context *c, struct error *err);
 
 /* The error of a job that took over a geometry (pipeline_adopt.h) which cannot be read. */
 status pipeline_geometry_lost(const struct pipeline_context *c, const char *why, struct error *err);

@@ -11,6 +11,7 @@
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/stages/fit/pipeline_budget.h"
 #include "optimizer/worker/stages/fit/pipeline_cloth.h"
+#include "optimizer/worker/stages/fit/pipeline_profile_prior.h"
 #include "optimizer/worker/stages/scene/pipeline_adopt.h"
 #include "optimizer/worker/stages/scene/pipeline_texture.h"
 #include "optimizer/worker/stages/scene/texture_start.h"
@@ -231,10 +232,22 @@ static status take_values(struct pipeline_context *c, struct error *err)
     return s == STATUS_OK ? load_environment(c, err) : s;
 }
 
+/* Of a job without a cloth. */
+static status read_profile(struct pipeline_context *c, struct error *err)
+{
+    char folder[WORKER_PATH_BYTES];
+    worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, folder);
+    status s = claim_inputs(c, err);
+    return s == STATUS_OK ? fiber_profile_load(&c->profile, c->doc, folder, err) : s;
+}
+
 static status read_rows(struct pipeline_context *c, struct error *err)
 {
     if (job_document_geometry_only(c->doc)) return claim_inputs(c, err);
-    status s = set_models(c, err);
+    status s = pipeline_profile_priors(c, err);
+    if (s == STATUS_OK) s = set_models(c, err);
+    if (s == STATUS_OK && job_document_of_profile(c->doc)) s = read_profile(c, err);
+    if (job_document_of_profile(c->doc)) return s;
     if (s == STATUS_OK && job_document_pictures_only(c->doc)) return take_values(c, err);
     if (s == STATUS_OK) s = pipeline_read_texture(c, err);
     if (s == STATUS_OK) s = pipeline_cloth_inputs(c, err);

@@ -46,16 +46,24 @@ out:
     return s;
 }
 
+/* A job that a document names, "" where it names none, belongs to the same owner. */
+static status check_other_job(struct job_service *v, const struct job_row *row, const char *key, const char *id,
+                              struct error *err)
+{
+    char owner[STORE_OWNER_BYTES] = "";
+    if (id[0] == '\0') return STATUS_OK;
+    status s = store_job_owner(v->store, id, owner, err);
+    if (s == STATUS_NOT_FOUND || (s == STATUS_OK && strcmp(owner, row->owner) != 0))
+        return error_set_field(err, STATUS_INVALID, key, "job '%.40s' does not exist", id);
+    return s;
+}
+
 status job_check_adopted(struct job_service *v, const struct job_row *row, struct error *err)
 {
     struct job_document *doc = NULL;
-    char owner[STORE_OWNER_BYTES] = "";
     status s = job_document_parse(row->document, strlen(row->document), &doc, err);
-    if (s == STATUS_OK && doc->geometry_job[0] != '\0') {
-        s = store_job_owner(v->store, doc->geometry_job, owner, err);
-        if (s == STATUS_NOT_FOUND || (s == STATUS_OK && strcmp(owner, row->owner) != 0))
-            s = error_set_field(err, STATUS_INVALID, "geometry.job", "job '%.40s' does not exist", doc->geometry_job);
-    }
+    if (s == STATUS_OK) s = check_other_job(v, row, "geometry.job", doc->geometry_job, err);
+    if (s == STATUS_OK) s = check_other_job(v, row, "fit.profile_job", doc->profile_job, err);
     job_document_free(doc);
     return s;
 }
@@ -64,7 +72,7 @@ static bool role_valid(const char *role)
 {
     static const char *const known[] = {"volume",          "fibers", "measurements", "photograph",
                                         "environment",     "chart",  "dark_frame",   "camera_noise",
-                                        "white_reference", "rig",    "mesh"};
+                                        "white_reference", "rig",    "mesh",         "profile"};
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
         if (strcmp(role, known[i]) == 0) return true;
     return false;
@@ -80,7 +88,7 @@ status job_check_declaration(struct job_service *v, struct file_row *row, struct
         return error_set_field(
             err, STATUS_INVALID, "role",
             "role '%.31s' is not one of volume, fibers, measurements, photograph, environment, chart, dark_frame, "
-            "camera_noise, white_reference, rig",
+            "camera_noise, white_reference, rig, mesh, profile",
             row->role);
     if (row->size_bytes < 1)
         return error_set_field(err, STATUS_INVALID, "size",

@@ -30,7 +30,7 @@ static int64_t folder_bytes(const struct job_service *v, const char *id)
     return disk_use_bytes(path);
 }
 
-/* ---- jobs whose geometry others ask for ---- */
+/* ---- jobs whose geometry, or whose fit to a profile, others ask for ---- */
 
 struct id_set {
     char (*id)[STORE_ID_BYTES];
@@ -44,25 +44,29 @@ static bool set_holds(const struct id_set *set, const char *id)
     return false;
 }
 
-/* Adds the job whose geometry a document asks for, if it does. */
+/* "": none. */
+static status add_id(struct id_set *set, const char *id, struct error *err)
+{
+    if (id[0] == '\0' || set_holds(set, id)) return STATUS_OK;
+    void *more = realloc(set->id, (set->n + 1) * sizeof *set->id);
+    if (more == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot list the jobs that others need: out of memory");
+    set->id = more;
+    snprintf(set->id[set->n++], STORE_ID_BYTES, "%.*s", STORE_ID_BYTES - 1, id);
+    return STATUS_OK;
+}
+
+/* Adds the jobs that a document asks for, if it does. */
 static status add_source(struct id_set *set, const char *document, struct error *err)
 {
     struct job_document *doc = NULL;
     if (document == NULL || job_document_parse(document, strlen(document), &doc, NULL) != STATUS_OK) return STATUS_OK;
-    status s = STATUS_OK;
-    if (doc->geometry_job[0] != '\0' && !set_holds(set, doc->geometry_job)) {
-        void *more = realloc(set->id, (set->n + 1) * sizeof *set->id);
-        if (more != NULL) {
-            set->id = more;
-            snprintf(set->id[set->n++], STORE_ID_BYTES, "%.*s", STORE_ID_BYTES - 1, doc->geometry_job);
-        } else
-            s = error_set(err, STATUS_NO_MEMORY, "cannot list the sources of geometry: out of memory");
-    }
+    status s = add_id(set, doc->geometry_job, err);
+    if (s == STATUS_OK) s = add_id(set, doc->profile_job, err);
     job_document_free(doc);
     return s;
 }
 
-/* Collects the jobs whose geometry a job asks for that has not ended. */
+/* Collects the jobs that a job asks for which has not ended. */
 static status find_sources(struct job_service *v, struct id_set *set, struct error *err)
 {
     static const enum job_state open[] = {JOB_DRAFT, JOB_QUEUED, JOB_RUNNING, JOB_PAUSED};

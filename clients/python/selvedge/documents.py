@@ -13,7 +13,7 @@ DocumentOrPath = Union[Document, str, "os.PathLike[str]"]
 def files_of(document: Document) -> list[tuple[str, str]]:
     """Return the input files that a job document names, each once: [(name, role), ...]."""
     names = [(n, "volume") for n in document.get("volume", {}).get("files", [])]
-    for key in ("fibers", "environment", "measurements", "rig"):
+    for key in ("fibers", "environment", "measurements", "rig", "profile"):
         if "file" in document.get(key, {}):
             names.append((document[key]["file"], key))
     if "texture" in document.get("cloth", {}):

@@ -9,8 +9,8 @@
 status job_check_document(const struct option_value *v, struct error *err);
 status job_check_sample(const struct option_value *v, struct error *err);
 /* the cloth */
-/* Refuses ids that could leave the folder of the jobs. */
-status job_check_geometry_job(const struct option_value *v, struct error *err);
+/* Refuses ids that could leave the folder of the jobs; of any option that is the id of a job. */
+status job_check_job_id(const struct option_value *v, struct error *err);
 status job_check_volume(const struct option_value *v, struct error *err);
 status job_check_raw(const struct option_value *v, struct error *err);
 status job_check_axes(const struct option_value *v, struct error *err);
@@ -23,6 +23,9 @@ status job_check_cloth(const struct option_value *v, struct error *err);
 status job_check_correction(const struct option_value *v, struct error *err);
 /* Also reads the names of the groups of fibers. */
 status job_check_fibers(const struct option_value *v, struct error *err);
+/* the profile of a fiber */
+/* Of a job with a profile: nothing of a cloth is given, and the models are of fibers. */
+status job_check_profile_document(const struct option_value *v, struct error *err);
 /* the set-up and the photographs */
 status job_check_lamp(const struct option_value *v, struct error *err);
 status job_check_camera(const struct option_value *v, struct error *err);

@@ -18,9 +18,9 @@ status job_check_sample(const struct option_value *v, struct error *err)
     return STATUS_OK;
 }
 
-status job_check_geometry_job(const struct option_value *v, struct error *err)
+status job_check_job_id(const struct option_value *v, struct error *err)
 {
-    const char *id = v->doc->geometry_job;
+    const char *id = v->target;
     size_t n = strspn(id, "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-");
     if (n > 0 && id[n] == '\0') return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, v->path, "'%s' is '%s', which is not the id of a job", v->path, id);
@@ -310,8 +310,9 @@ static status check_files(const struct job_document *doc, struct error *err)
 
 status job_check_document(const struct option_value *v, struct error *err)
 {
-    status s = check_one_cloth(v, err);
-    if (s == STATUS_OK) s = check_one_measurement(v, err);
+    const bool of_profile = job_document_of_profile(v->doc);
+    status s = of_profile ? job_check_profile_document(v, err) : check_one_cloth(v, err);
+    if (s == STATUS_OK && !of_profile) s = check_one_measurement(v, err);
     if (s == STATUS_OK) s = check_free(v, err);
     if (s == STATUS_OK) s = check_density(v->doc, err);
     return s == STATUS_OK ? check_files(v->doc, err) : s;

@@ -8,7 +8,7 @@
 
 /* Each ends with a row without a path. */
 extern const struct job_option option_rows_cloth[], option_rows_described[], option_rows_setup[], option_rows_camera[],
-    option_rows_fit[], option_rows_pictures[];
+    option_rows_fit[], option_rows_pictures[], option_rows_profile[];
 
 /* Words of enum job_transfer. */
 extern const char *const job_transfer_names[];

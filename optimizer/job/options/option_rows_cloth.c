@@ -17,6 +17,11 @@ static const char *const none_auto[] = {"none", "auto", NULL};
     "{\"allOf\": [{\"required\": [\"pictures\", \"fit\"]}, "                                                           \
     "{\"not\": {\"anyOf\": [" REQUIRED("measurements") ", " REQUIRED("photographs") ", " REQUIRED(                     \
         "correction") "]}}]}"
+/* A job with the profile of a single fiber: it has no cloth. */
+#define NOT(a) "{\"not\": " REQUIRED(a) "}"
+#define PROFILE_ONLY                                                                                                   \
+    "{\"allOf\": [" REQUIRED("profile") ", " NONE_OF_FOUR("volume", "geometry", "fibers", "cloth") ", " NONE_OF_FOUR(  \
+        "measurements", "photographs", "pictures", "correction") "]}"
 /* A job of geometry only: a scan without photographs. */
 #define GEOMETRY_ONLY                                                                                                  \
     "{\"allOf\": [" REQUIRED("volume") ", " NONE_OF_FOUR("measurements", "photographs", "fit", "correction") "]}"
@@ -25,8 +30,10 @@ const struct job_option option_rows_cloth[] = {
     {.path = "",
      .kind = OPTION_SECTION,
      .check = job_check_document,
-     .schema = "{\"allOf\": [" ONE_OF_FOUR("volume", "geometry", "fibers", "cloth") ", {\"anyOf\": [" ONE_OF(
-         "measurements", "photographs") ", " GEOMETRY_ONLY ", " PICTURES_ONLY "]}]}",
+     .schema = "{\"anyOf\": [" PROFILE_ONLY ", {\"allOf\": [" NOT("profile") ", " ONE_OF_FOUR(
+         "volume", "geometry", "fibers",
+         "cloth") ", {\"anyOf\": [" ONE_OF("measurements", "photographs") ", " GEOMETRY_ONLY ", " PICTURES_ONLY
+                                                                          "]}]}]}",
      .meaning = "Units, defaults and meaning: docs/sample-preparation.md, section 4. The daemon checks every field and "
                 "names the one at fault."},
     {.path = "sample",
@@ -292,7 +299,7 @@ const struct job_option option_rows_cloth[] = {
      .id = OPTION_GEOMETRY_JOB,
      TEXT_INTO(geometry_job),
      .required = true,
-     .check = job_check_geometry_job,
+     .check = job_check_job_id,
      .allowed = "the id of a job with `volume`",
      .meaning =
          "The job whose scan, fibers and directions are taken over. Its stages up to `directions` must be done, by "

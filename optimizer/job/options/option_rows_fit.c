@@ -100,6 +100,18 @@ const struct job_option option_rows_fit[] = {
          "paths "
          "(more with over some 240 fitted rows), so give a large one. Measurements without stated errors have no such "
          "goal."},
+    {.path = "fit.profile_job",
+     .kind = OPTION_TEXT,
+     .id = OPTION_PROFILE_JOB,
+     TEXT_INTO(profile_job),
+     .check = job_check_job_id,
+     .left_out = "none",
+     .allowed = "the id of a job with `profile`",
+     .meaning =
+         "A job that has fitted models to the profile of a fiber of this cloth. What it found of a model that is "
+         "fitted here becomes the `priors` of its parameters, with their standard errors; parameters that are "
+         "`fixed` or tied here, have priors of their own, or were not determined there, take none. The other "
+         "job may be deleted once this job runs."},
     {.path = "fit.share_camera_paths",
      .kind = OPTION_BOOL,
      INTO(share_camera_paths),

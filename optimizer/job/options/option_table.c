@@ -3,8 +3,9 @@
 
 #include <string.h>
 
-static const struct job_option *const part[] = {option_rows_cloth,  option_rows_described, option_rows_setup,
-                                                option_rows_camera, option_rows_fit,       option_rows_pictures};
+static const struct job_option *const part[] = {option_rows_cloth,   option_rows_described, option_rows_setup,
+                                                option_rows_camera,  option_rows_profile,   option_rows_fit,
+                                                option_rows_pictures};
 
 const struct job_option *job_option_at(size_t i)
 {

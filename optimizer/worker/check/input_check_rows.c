@@ -8,6 +8,7 @@
 #include "optimizer/fit/photographs/observation_load.h"
 #include "optimizer/fit/photographs/photograph.h"
 #include "optimizer/fit/photographs/table/brdf_file.h"
+#include "optimizer/fit/profile/fiber_profile.h"
 #include "optimizer/worker/check/input_check.h"
 
 #include <stdio.h>
@@ -149,11 +150,24 @@ static void judge_rows(struct input_check *c, const struct photograph_process *p
     observation_set_release(&rows);
 }
 
+/* The profile of a fiber, which a job has in place of a cloth. */
+static void check_profile(struct input_check *c)
+{
+    struct fiber_profile profile;
+    struct error fault = {0};
+    if (!input_check_has(c, c->doc->profile_file)) return;
+    if (fiber_profile_load(&profile, c->doc, c->folder, &fault) == STATUS_OK)
+        fiber_profile_release(&profile);
+    else
+        input_check_fault(c, &fault);
+}
+
 void input_check_rows(struct input_check *c)
 {
     struct photograph_process process;
     struct error fault = {0};
     bool usable;
+    if (job_document_of_profile(c->doc)) check_profile(c);
     if (!job_document_has_rows(c->doc)) return;
     photograph_process_init(&process);
     if (c->doc->measurement_file[0] != '\0')

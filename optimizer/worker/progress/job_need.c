@@ -35,7 +35,10 @@ static void key_of(const struct pipeline_context *c, const char *what, char key[
                        : job_document_geometry_only(c->doc) ? ""
                        : c->number.n > 0                    ? "+search"
                                                             : "+fit";
-    snprintf(key, SPEED_BOOK_KEY_BYTES, "need.%s.%s%s", what, cloth, work);
+    if (job_document_of_profile(c->doc))
+        snprintf(key, SPEED_BOOK_KEY_BYTES, "need.%s.profile", what);
+    else
+        snprintf(key, SPEED_BOOK_KEY_BYTES, "need.%s.%s%s", what, cloth, work);
 }
 
 static void plan_stages(struct pipeline_context *c)

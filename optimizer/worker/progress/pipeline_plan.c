@@ -53,6 +53,8 @@ static const double usual_budget = 6e6, fit_share = 1.0 - PIPELINE_SCAN_ERROR_SH
  * certificate, geometry, pages. */
 static const double validated_path = 0.88, rest_of_report_paths = 1.5e5;
 static const double least_s = 0.05;
+/* Time of one thread in which a model is fitted to the profile of a fiber. */
+static const double usual_profile_s = 3.0;
 /* Standard deviations of the logarithm of a time where no job has been run. */
 static const double sd_of_fit = 0.5, sd_of_rest = 0.5;
 
@@ -239,8 +241,14 @@ void pipeline_plan_fit_paths(struct pipeline_context *c, double n_path)
 
 void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
 {
-    const struct job_clock_work rest = {.key = name, .units = 1.0, .usual_s = least_s, .log_sd = sd_of_rest};
-    if (strcmp(name, "volume") == 0)
+    const struct job_clock_work rest = {.key = name, .units = 1.0, .usual_s = least_s, .log_sd = sd_of_rest},
+                                profile = {.key = "fit.profile",
+                                           .units = (double)c->n_model / n_thread(c),
+                                           .usual_s = usual_profile_s,
+                                           .log_sd = sd_of_rest};
+    if (job_document_of_profile(c->doc))
+        worker_status_plan(c->status, i, strcmp(name, "fit") == 0 ? &profile : &rest);
+    else if (strcmp(name, "volume") == 0)
         plan_voxels(c, i, &read_stage, pipeline_plan_voxels(c));
     else if (strcmp(name, "orientation") == 0)
         plan_voxels(c, i, &orientation_stage, n_material(c));

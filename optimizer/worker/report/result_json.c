@@ -5,6 +5,7 @@
 #include "optimizer/worker/report/discrepancy_json.h"
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/report/photograph_json.h"
+#include "optimizer/worker/report/profile/profile_report.h"
 #include "optimizer/worker/report/result_numbers.h"
 #include "optimizer/worker/report/result_options_json.h"
 #include "optimizer/worker/report/verdict_json.h"
@@ -72,7 +73,7 @@ static json_t *at_bound(const struct pipeline_model *m, size_t p)
     return json_string(m->fit.param[p] - k->lower < k->upper - m->fit.param[p] ? "lower" : "upper");
 }
 
-static json_t *parameters_json(const struct pipeline_model *m)
+json_t *result_parameters_json(const struct pipeline_model *m)
 {
     json_t *list = json_array();
     for (size_t p = 0; p < m->sets.info.n_param; p++) {
@@ -156,7 +157,7 @@ static void put_fit(json_t *json, const struct pipeline_context *c, const struct
     json_object_set_new(json, "converged", json_boolean(m->fit.converged));
     json_object_set_new(json, "reason", json_string(m->fit.reason));
     json_object_set_new(json, "reason_code", json_string(stop_reason_info(m->fit.stop)->id));
-    json_object_set_new(json, "parameters", parameters_json(m));
+    json_object_set_new(json, "parameters", result_parameters_json(m));
     json_object_set_new(json, "correlation", correlation_json(m));
     json_object_set_new(json, "objective", json_number(m->validation.fit.value));
     json_object_set_new(json, "objective_se", json_number(m->validation.fit.se));
@@ -301,14 +302,17 @@ static json_t *definitions_json(void)
         "null", "a number that does not exist");
 }
 
-/* Adds what every job has, also one of geometry only. */
+/* Adds what every job has, also one of geometry only; a fiber without a cloth has neither geometry nor verdict. */
 static void put_job(json_t *json, struct pipeline_context *c)
 {
+    const bool of_cloth = !job_document_of_profile(c->doc);
     json_object_set_new(json, "definitions", definitions_json());
     json_object_set_new(json, "verdict", verdict_json(&c->verdict));
-    json_object_set_new(json, "geometry", result_geometry_json(c));
-    json_object_set_new(json, "color", photograph_color_json(&c->process, c->doc));
-    json_object_set_new(json, "quality", json_pack("{s:s, s:s}", "page", "quality.html", "numbers", "quality.json"));
+    json_object_set_new(json, "geometry", of_cloth ? result_geometry_json(c) : json_null());
+    json_object_set_new(json, "color", of_cloth ? photograph_color_json(&c->process, c->doc) : json_null());
+    json_object_set_new(json, "quality",
+                        of_cloth ? json_pack("{s:s, s:s}", "page", "quality.html", "numbers", "quality.json")
+                                 : json_null());
     json_object_set_new(json, "stages", stages_json(c));
     json_object_set_new(json, "warnings", result_warnings_json(c));
     json_object_set_new(json, "program", json_string(RESULT_PROGRAM));
@@ -361,9 +365,19 @@ status result_pictures_json_write(struct pipeline_context *c, struct error *err)
 {
     const struct pipeline_model *m = c->model;
     json_t *json = json_pack("{s:i, s:s, s:s, s:n, s:o, s:[], s:[], s:I}", "format", 1, "sample", c->doc->sample,
-                             "model", m->appearance.id, "method", "parameters", parameters_json(m), "rows", "models",
-                             "seed", (json_int_t)c->doc->seed);
+                             "model", m->appearance.id, "method", "parameters", result_parameters_json(m), "rows",
+                             "models", "seed", (json_int_t)c->doc->seed);
     json_object_set(json, "pictures", c->surface_pictures);
+    put_job(json, c);
+    return write_result(c, json, err);
+}
+
+status result_profile_json_write(struct pipeline_context *c, struct error *err)
+{
+    const struct pipeline_model *m = &c->model[profile_best_model(c)];
+    json_t *json = json_pack("{s:i, s:s, s:s, s:n, s:o, s:[], s:[], s:I, s:o}", "format", 1, "sample", c->doc->sample,
+                             "model", m->appearance.id, "method", "parameters", result_parameters_json(m), "rows",
+                             "models", "seed", (json_int_t)c->doc->seed, "profile", profile_json(c));
     put_job(json, c);
     return write_result(c, json, err);
 }

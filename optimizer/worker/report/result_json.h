@@ -21,6 +21,7 @@
  *                                                   results of options of the fit (result_options_json.h)
  *   "rows"                                          each measurement: angles, measured and rendered colour, pictures
  *   "models"                                        the keys above for each model, in the order of the job document
+ *   "profile"                                       models fitted to the profile of a fiber (profile_report.h)
  *   "radius"                                        the search for the fiber radius, or null
  *   "skill"                                         comparison with a plain BRDF fitted to the same rows
  *                                                   (plain_brdf.h), or null
@@ -57,6 +58,10 @@ double result_row_error(const struct pipeline_context *c, const struct pipeline_
 status result_geometry_json_write(struct pipeline_context *c, struct error *err);
 /* The same of a job that renders given parameters: without rows, models and a method. */
 status result_pictures_json_write(struct pipeline_context *c, struct error *err);
+/* The same of a job with the profile of a fiber: its models are in "profile" (profile_report.h). */
+status result_profile_json_write(struct pipeline_context *c, struct error *err);
+/* "parameters" of a model. */
+json_t *result_parameters_json(const struct pipeline_model *m);
 status result_json_write(struct pipeline_context *c, struct error *err);
 status result_summary_write(struct pipeline_context *c, struct error *err);
 

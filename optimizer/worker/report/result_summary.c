@@ -1,6 +1,7 @@
 /* results/summary.txt: the result on one page, for people. */
 #include "base/angle.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/worker/report/profile/profile_report.h"
 #include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/report/result_numbers.h"
 #include "optimizer/worker/report/result_options_json.h"
@@ -30,7 +31,7 @@ static void print_parameters(const struct pipeline_model *m, FILE *out)
                 k->fixed                    ? "fixed "
                 : m->option->leader[p] != p ? "tied "
                                             : "",
-                u->at_bound[p] ? "at a bound " : "", u->determined[p] ? "" : "not determined by these photographs");
+                u->at_bound[p] ? "at a bound " : "", u->determined[p] ? "" : "not determined by these measurements");
     }
 }
 
@@ -226,13 +227,27 @@ static void print_pictures(struct pipeline_context *c, FILE *out)
     print_warnings(c, out);
 }
 
+/* Of a job with the profile of a fiber. */
+static void print_profile(struct pipeline_context *c, FILE *out)
+{
+    fprintf(out, "%s\n\n", c->doc->sample);
+    for (size_t i = 0; i < c->n_model; i++) {
+        profile_print(c, i, out);
+        print_parameters(&c->model[i], out);
+        fputs("\n", out);
+    }
+    print_warnings(c, out);
+}
+
 status result_summary_write(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES], *text = NULL;
     size_t n = 0;
     FILE *out = open_memstream(&text, &n);
     if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the summary: out of memory");
-    if (job_document_geometry_only(c->doc))
+    if (job_document_of_profile(c->doc))
+        print_profile(c, out);
+    else if (job_document_geometry_only(c->doc))
         print_geometry(c, out);
     else if (job_document_pictures_only(c->doc))
         print_pictures(c, out);

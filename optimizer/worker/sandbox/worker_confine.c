@@ -5,6 +5,7 @@
 #include "optimizer/worker/report/page/report_pdf.h"
 #include "optimizer/worker/sandbox/sandbox_calls.h"
 #include "optimizer/worker/sandbox/sandbox_files.h"
+#include "optimizer/worker/stages/fit/pipeline_profile_prior.h"
 #include "optimizer/worker/stages/scene/pipeline_adopt.h"
 
 #include <errno.h>
@@ -112,6 +113,7 @@ static void prepare(const struct worker_folder *folder, const struct job_documen
     if (doc == NULL) return;
     if (doc->export_pdf) report_pdf_start_helper(folder, &c->pdf);
     pipeline_link_geometry(folder, doc);
+    pipeline_copy_profile(folder, doc);
 }
 
 static bool by_hand(const struct worker_folder *folder)

@@ -130,6 +130,30 @@ void page_errors_over(const json_t *rows, const char *angle_key, const char *tit
     fputs("</svg>\n", out);
 }
 
+void page_measured_and_fitted(const char *x_label, const struct page_point *point, size_t n, size_t n_channel,
+                              FILE *out)
+{
+    struct axes a = {.x0 = point[0].x, .x1 = point[n - 1].x, .y0 = 0.0, .y1 = 0.0};
+    for (size_t i = 0; i < n * n_channel; i++) a.y1 = fmax(a.y1, 1.05 * fmax(point[i].measured, point[i].fitted));
+    if (!(a.y1 > a.y0) || !(a.x1 > a.x0)) return;
+    open_chart(&a, x_label, "radiance", out);
+    for (size_t c = 0; c < n_channel; c++) {
+        const struct page_point *p = point + c * n;
+        const char *color = n_channel == 1 ? "#2457a6" : channel_color[c];
+        for (size_t i = 0; i < n; i++) {
+            const double x = x_of(&a, p[i].x);
+            if (p[i].se > 0.0)
+                fprintf(out, "<line x1=\"%.1f\" x2=\"%.1f\" y1=\"%.1f\" y2=\"%.1f\" stroke=\"#aaa\"/>\n", x, x,
+                        y_of(&a, p[i].measured - p[i].se), y_of(&a, p[i].measured + p[i].se));
+            mark(out, x, y_of(&a, p[i].measured), color, false);
+        }
+        fputs("<polyline fill=\"none\" stroke-width=\"1.6\" stroke=\"#1c1f24\" points=\"", out);
+        for (size_t i = 0; i < n; i++) fprintf(out, "%.1f,%.1f ", x_of(&a, p[i].x), y_of(&a, p[i].fitted));
+        fputs("\"/>\n", out);
+    }
+    fputs("</svg>\n", out);
+}
+
 void page_curve(const json_t *curve, FILE *out)
 {
     struct axes a = {.x0 = 0.0, .x1 = 1.0, .y0 = INFINITY, .y1 = 0.0, .log_y = true};

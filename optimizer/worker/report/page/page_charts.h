@@ -10,6 +10,13 @@
 void page_scatter(const json_t *rows, FILE *out);
 /* Relative error of the rows, in per cent, over one of their angles. */
 void page_errors_over(const json_t *rows, const char *angle_key, const char *title, FILE *out);
+/* Points of one channel after the other, n of each, in the order of x: dots with bars of one standard error where it is
+ * stated, and a line through what was fitted. */
+struct page_point {
+    double x, measured, se, fitted;
+};
+void page_measured_and_fitted(const char *x_label, const struct page_point *point, size_t n, size_t n_channel,
+                              FILE *out);
 /* curve: [{"step", "objective", "objective_se"}], of one model: the objective over the steps, logarithmic where it is
  * above its noise. */
 void page_curve(const json_t *curve, FILE *out);

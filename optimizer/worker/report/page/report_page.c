@@ -4,6 +4,7 @@
 #include "optimizer/worker/report/page/page_pictures.h"
 #include "optimizer/worker/report/page/page_text.h"
 #include "optimizer/worker/report/page/report_data.h"
+#include "optimizer/worker/report/profile/profile_report.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -231,6 +232,24 @@ static status print_surfaces(struct pipeline_context *c, const json_t *result, F
     return page_surface_pictures(c, list, out, err);
 }
 
+/* Models that were fitted to the profile of a fiber, the best one first. */
+static void print_profile(const struct pipeline_context *c, const json_t *result, FILE *out)
+{
+    size_t i;
+    const json_t *m, *profile = json_object_get(result, "profile");
+    heading("Profile of the fiber", out);
+    page_object(json_object_get(profile, "table"), out);
+    for (int best = 1; best >= 0; best--) json_array_foreach(json_object_get(profile, "models"), i, m)
+        {
+            if (json_is_true(json_object_get(m, "best")) != (best == 1)) continue;
+            char title[160];
+            snprintf(title, sizeof title, "%s%s", page_string(m, "id"), best ? ", the best model" : "");
+            heading(title, out);
+            profile_page(c, i, out);
+            print_parameters("Fitted parameters", json_object_get(m, "parameters"), out);
+        }
+}
+
 static void print_inputs(const json_t *inputs, FILE *out)
 {
     size_t i;
@@ -250,8 +269,10 @@ static void print_inputs(const json_t *inputs, FILE *out)
 static void print_settings(const json_t *data, FILE *out)
 {
     const json_t *result = json_object_get(data, "result");
-    heading("Geometry", out);
-    page_object(json_object_get(result, "geometry"), out);
+    if (json_is_object(json_object_get(result, "geometry"))) {
+        heading("Geometry", out);
+        page_object(json_object_get(result, "geometry"), out);
+    }
     heading("Settings: the job document", out);
     page_object(json_object_get(data, "document"), out);
     heading("Settings that have their defaults", out);
@@ -298,7 +319,7 @@ static status print_page(struct pipeline_context *c, const json_t *data, FILE *o
     fputs("</h1>\n<p class=\"hint\">", out);
     if (json_is_string(json_object_get(result, "model"))) {
         page_escaped(page_string(result, "model"), out);
-        fputs(", ", out);
+        if (page_string(result, "method")[0] != '\0') fputs(", ", out);
         page_escaped(page_string(result, "method"), out);
         fputs(". ", out);
     }
@@ -306,7 +327,10 @@ static status print_page(struct pipeline_context *c, const json_t *data, FILE *o
     print_verdict(json_object_get(result, "verdict"), out);
     print_warnings(json_object_get(result, "warnings"), out);
     if (job_document_has_rows(c->doc)) s = print_fit(c, data, out, err);
-    if (s == STATUS_OK) s = print_surfaces(c, result, out, err);
+    if (job_document_of_profile(c->doc))
+        print_profile(c, result, out);
+    else if (s == STATUS_OK)
+        s = print_surfaces(c, result, out, err);
     print_settings(data, out);
     fputs("</body>\n</html>\n", out);
     return s;

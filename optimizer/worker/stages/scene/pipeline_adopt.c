@@ -20,12 +20,11 @@ static const struct {
                   {"directions", "direction.bin"}};
 enum { N_CHECKPOINT = sizeof checkpoint / sizeof *checkpoint };
 
-/* Writes the path of the other job's folder, which lies beside this one's. false: it is too long. */
-static bool other_path(const struct worker_folder *own, const struct job_document *doc, struct worker_folder *other)
+bool pipeline_other_folder(const struct worker_folder *own, const char *job, struct worker_folder *other)
 {
     const char *slash = strrchr(own->path, '/');
     int length = slash == NULL ? 0 : (int)(slash - own->path) + 1;
-    int n = snprintf(other->path, sizeof other->path, "%.*s%s", length, own->path, doc->geometry_job);
+    int n = snprintf(other->path, sizeof other->path, "%.*s%s", length, own->path, job);
     return n > 0 && (size_t)n < sizeof other->path;
 }
 
@@ -76,7 +75,8 @@ void pipeline_link_geometry(const struct worker_folder *own, const struct job_do
 {
     struct worker_folder other = {.lock_fd = -1};
     char folder[WORKER_PATH_BYTES], name[160];
-    if (doc->geometry_job[0] == '\0' || stages_done(own) || !other_path(own, doc, &other)) return;
+    if (doc->geometry_job[0] == '\0' || stages_done(own) || !pipeline_other_folder(own, doc->geometry_job, &other))
+        return;
     if (access(own->path, F_OK) != 0 || access(other.path, F_OK) != 0) return;
     for (size_t i = 0; i < N_CHECKPOINT; i++) {
         snprintf(name, sizeof name, JOB_FOLDER_WORK "/%s", checkpoint[i].stage);
@@ -90,7 +90,7 @@ void pipeline_link_geometry(const struct worker_folder *own, const struct job_do
 static status other_folder(const struct pipeline_context *c, struct worker_folder *f, struct error *err)
 {
     struct worker_folder other = {.lock_fd = -1};
-    if (!other_path(c->folder, c->doc, &other))
+    if (!pipeline_other_folder(c->folder, c->doc->geometry_job, &other))
         return error_set(err, STATUS_INVALID, "the job folder's path is too long");
     snprintf(f->path, sizeof f->path, "%.2000s/%s", c->folder->path, JOB_FOLDER_ADOPTED);
     if (access(other.path, F_OK) == 0) return STATUS_OK;

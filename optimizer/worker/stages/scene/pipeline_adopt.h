@@ -4,6 +4,8 @@
 
 #include "optimizer/worker/pipeline_context.h"
 
+/* Writes the path of another job's folder, which lies beside this one's. false: it is too long. */
+bool pipeline_other_folder(const struct worker_folder *own, const char *job, struct worker_folder *other);
 /* Links what the next function needs of the other job to JOB/adopted/: before the worker enters its sandbox, in which
  * it sees its own folder alone. What is missing is reported by the next function. */
 void pipeline_link_geometry(const struct worker_folder *own, const struct job_document *doc);

@@ -1,0 +1,47 @@
+/* A measured profile of a single fiber: the radiance that leaves it, by the angles of light and view.
+ *
+ * The table (csv_table.h) has the columns
+ *   theta_o_deg   angle of the view from the normal plane of the fiber, -90..90
+ *   phi_deg       azimuth of the view about the fiber, from that of the light: 0 back to the light, 180 straight on
+ *   radiance      any unit; or radiance_r, radiance_g, radiance_b for three channels
+ *   theta_i_deg   angle of the light from the normal plane; not where the job states one angle for the whole table
+ *   radiance_se   standard error (also radiance_r_se ...); optional
+ * as the goniometer of Yan et al. 2015 gives them: theta_i -40 degrees, theta_o 10 to 50 degrees in steps of 2, phi -20
+ * to 200 in steps of 5. A view at theta_o = -theta_i sees the mirrored light. Angles here are radians.
+ */
+#ifndef SELVEDGE_OPTIMIZER_FIBER_PROFILE_H
+#define SELVEDGE_OPTIMIZER_FIBER_PROFILE_H
+
+#include "base/status.h"
+#include "optimizer/job/job_document.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+enum { PROFILE_MAX_ROW = 20000 };
+
+struct profile_row {
+    double theta_i_rad, theta_o_rad, phi_rad;
+    double radiance[3], se[3]; /* se: 0 where the table states none */
+};
+
+struct fiber_profile {
+    size_t n, n_channel; /* 1 or 3 */
+    bool has_se;
+    size_t last_line; /* of the table, for errors */
+    struct profile_row *row;
+};
+
+/* text: the table, NUL-terminated, n_bytes without the NUL; name: what errors call it. theta_i_deg: of the whole table,
+ * or NaN. Errors are those of csv_table.h with the option OPTION_PROFILE_FILE: a column that is missing, or given twice
+ * over (theta_i_deg in the table and in the job; radiance and radiance_r), angles out of range or in radians, a
+ * negative radiance, a standard error that is not above 0, no row, or radiances that are all 0. STATUS_TOO_LARGE above
+ * PROFILE_MAX_ROW rows. */
+status fiber_profile_parse(struct fiber_profile *profile, const char *text, size_t n_bytes, const char *name,
+                           double theta_i_deg, struct error *err);
+/* Reads the profile that a job document names from the folder of its files. Errors also of reading the file. */
+status fiber_profile_load(struct fiber_profile *profile, const struct job_document *doc, const char *folder,
+                          struct error *err);
+void fiber_profile_release(struct fiber_profile *profile);
+
+#endif

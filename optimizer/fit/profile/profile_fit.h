@@ -1,0 +1,58 @@
+/* Fits a scattering model to the profile of a single fiber, by damped Gauss-Newton steps (Levenberg-Marquardt) in fit
+ * coordinates, with the bounds, ties, priors and starts of fit_layout.h and with a scale between profile and model.
+ *
+ *   minimised: sum over values m of ((s L - m) / e)^2 + priors,   e^2 = se^2 + (t (m + 0.02 mean of m))^2
+ *
+ * s is the scale, L the model's radiance (profile_model.h), se the stated error and t the relative misfit: what the
+ * model leaves beyond those errors, chosen so that the sum is the number of values less that of unknowns, and 0 where
+ * the stated errors explain the residuals. Without stated errors all of e is misfit, and the fit is one of relative
+ * residuals, like the published one of logarithms (Yan et al. 2017, section 5.1), which a value of 0 does not break.
+ *
+ * Standard errors: the larger one, for each unknown, of two covariances: that of independent residuals of variance e^2,
+ * and the sandwich with the residuals of groups of rows of neighbouring phi, in which the misfit of neighbours goes
+ * together. It is the sandwich that counts where the model does not describe the fiber exactly.
+ */
+#ifndef SELVEDGE_OPTIMIZER_PROFILE_FIT_H
+#define SELVEDGE_OPTIMIZER_PROFILE_FIT_H
+
+#include "base/progress.h"
+#include "optimizer/fit/objective/fit_layout.h"
+#include "optimizer/fit/profile/profile_model.h"
+
+/* A profile is fitted from at least so many starts: the model's own and others spread over the bounds. */
+enum { PROFILE_LEAST_START = 4 };
+
+struct profile_problem {
+    const struct scattering_model *model;
+    const struct fiber_profile *profile;
+    const struct fit_parameter *parameter; /* n_param, internal units */
+    const struct fit_option *option;       /* nuisance terms and extra starts are ignored */
+    double scale;                          /* NaN: fitted */
+    size_t max_iteration;                  /* of one start; 0: 40 */
+    struct thread_pool *pool;              /* NULL runs in the caller */
+    const struct progress *progress;       /* NULL: none */
+};
+
+struct profile_fit {
+    double param[FIT_MAX_PARAM], se_param[FIT_MAX_PARAM]; /* internal units; se 0 for fixed parameters */
+    bool at_bound[FIT_MAX_PARAM], determined[FIT_MAX_PARAM];
+    double scale, scale_se; /* scale_se: 0 for a given scale */
+    double *value;          /* s L of every row and channel; the caller frees it with profile_fit_release */
+    size_t n_value, n_free; /* unknowns: parameters and the scale */
+    double nrmse;           /* root mean square of s L - m over the range of m, as published */
+    double rel_rms;         /* root mean square of (s L - m) / (m + 0.02 mean of m) */
+    double misfit;          /* t */
+    double chi_square; /* the minimised sum without priors and with t = 0, per value less unknown; NaN without se */
+    size_t n_start, n_agree; /* starts, and those that came within 1 % of the least rel_rms */
+    size_t n_evaluation;
+    bool converged;
+    double wall_s;
+};
+
+/* STATUS_INVALID with the field OPTION_PROFILE_FILE for fewer values than unknowns; STATUS_CANCELLED; errors of
+ * fit_layout_init and of the model. */
+status profile_fit_run(const struct profile_problem *problem, const char *table_name, struct profile_fit *fit,
+                       struct error *err);
+void profile_fit_release(struct profile_fit *fit);
+
+#endif

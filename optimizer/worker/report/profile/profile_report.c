@@ -1,0 +1,109 @@
+#include "optimizer/worker/report/profile/profile_report.h"
+#include "base/angle.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/worker/report/json_number.h"
+#include "optimizer/worker/report/result_json.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+static double bic(const struct profile_fit *f)
+{
+    const double n = (double)f->n_value;
+    return n * log(f->rel_rms * f->rel_rms) + (double)f->n_free * log(n);
+}
+
+size_t profile_best_model(const struct pipeline_context *c)
+{
+    size_t best = 0;
+    for (size_t i = 1; i < c->n_model; i++)
+        if (bic(&c->model[i].profile) < bic(&c->model[best].profile)) best = i;
+    return best;
+}
+
+static json_t *model_json(const struct pipeline_context *c, size_t i)
+{
+    const struct pipeline_model *m = &c->model[i];
+    const struct profile_fit *f = &m->profile;
+    json_t *json = json_pack("{s:s, s:s, s:b, s:o, s:o, s:o, s:b}", "id", m->appearance.id, "title",
+                             m->appearance.title, "best", (int)(i == profile_best_model(c)), "parameters",
+                             result_parameters_json(m), "scale", json_number(f->scale), "scale_se",
+                             json_number(f->scale_se), "scale_fitted", (int)isnan(c->doc->profile_scale));
+    json_object_set_new(json, "nrmse", json_number(f->nrmse));
+    json_object_set_new(json, "rel_rms", json_number(f->rel_rms));
+    json_object_set_new(json, "misfit", json_number(f->misfit));
+    json_object_set_new(json, "chi_square", json_number(f->chi_square));
+    json_object_set_new(json, "bic", json_number(bic(f)));
+    json_object_set_new(json, "n_unknown", json_count(f->n_free));
+    json_object_set_new(json, "n_start", json_count(f->n_start));
+    json_object_set_new(json, "n_agree", json_count(f->n_agree));
+    json_object_set_new(json, "n_evaluation", json_count(f->n_evaluation));
+    json_object_set_new(json, "converged", json_boolean(f->converged));
+    json_object_set_new(json, "fit_wall_s", json_number(f->wall_s));
+    return json;
+}
+
+static json_t *table_json(const struct pipeline_context *c)
+{
+    const struct fiber_profile *p = &c->profile;
+    double range[3][2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
+    for (size_t i = 0; i < p->n; i++) {
+        const double angle[3] = {p->row[i].theta_i_rad, p->row[i].theta_o_rad, p->row[i].phi_rad};
+        for (int k = 0; k < 3; k++) {
+            range[k][0] = fmin(range[k][0], angle_to_deg(angle[k]));
+            range[k][1] = fmax(range[k][1], angle_to_deg(angle[k]));
+        }
+    }
+    return json_pack("{s:s, s:o, s:o, s:b, s:o, s:o, s:o}", "file", c->doc->profile_file, "n_row", json_count(p->n),
+                     "n_channel", json_count(p->n_channel), "has_errors", (int)p->has_se, "theta_i_deg",
+                     json_number_list(range[0], 2, 1.0), "theta_o_deg", json_number_list(range[1], 2, 1.0), "phi_deg",
+                     json_number_list(range[2], 2, 1.0));
+}
+
+json_t *profile_json(const struct pipeline_context *c)
+{
+    json_t *models = json_array();
+    for (size_t i = 0; i < c->n_model; i++) json_array_append_new(models, model_json(c, i));
+    return json_pack("{s:o, s:s, s:s, s:o}", "table", table_json(c), "chosen_by", "bic", "csv", "profile.csv", "models",
+                     models);
+}
+
+status profile_csv_write(const struct pipeline_context *c, struct error *err)
+{
+    const struct fiber_profile *p = &c->profile;
+    char path[WORKER_PATH_BYTES], *text = NULL;
+    size_t n = 0;
+    FILE *out = open_memstream(&text, &n);
+    if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the profile: out of memory");
+    fputs("theta_i_deg,theta_o_deg,phi_deg,channel,radiance", out);
+    for (size_t i = 0; i < c->n_model; i++) fprintf(out, ",%s", c->model[i].appearance.id);
+    fputs("\n", out);
+    for (size_t k = 0; k < p->n * p->n_channel; k++) {
+        const struct profile_row *row = &p->row[k / p->n_channel];
+        fprintf(out, "%.6g,%.6g,%.6g,%s,%.9g", angle_to_deg(row->theta_i_rad), angle_to_deg(row->theta_o_rad),
+                angle_to_deg(row->phi_rad), p->n_channel == 1 ? "grey" : (const char *[]){"r", "g", "b"}[k % 3],
+                row->radiance[k % p->n_channel]);
+        for (size_t i = 0; i < c->n_model; i++) fprintf(out, ",%.9g", c->model[i].profile.value[k]);
+        fputs("\n", out);
+    }
+    fclose(out);
+    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "profile.csv", path);
+    status s = worker_folder_replace(c->folder, path, text, n, err);
+    free(text);
+    return s;
+}
+
+void profile_print(const struct pipeline_context *c, size_t i, FILE *out)
+{
+    const struct pipeline_model *m = &c->model[i];
+    const struct profile_fit *f = &m->profile;
+    fprintf(out, "model    %s (%s)%s, fitted to the profile of a fiber\n", m->appearance.id, m->appearance.title,
+            c->n_model > 1 && i == profile_best_model(c) ? ", the best" : "");
+    fprintf(out, "residual %.2f %% of the range of %zu radiances; relative %.2f %%", 100.0 * f->nrmse, f->n_value,
+            100.0 * f->rel_rms);
+    if (isfinite(f->chi_square)) fprintf(out, "; %.3g times the stated variance", f->chi_square);
+    fprintf(out, "\nscale    %.5g", f->scale);
+    if (f->scale_se > 0.0) fprintf(out, " +- %.2g", f->scale_se);
+    fprintf(out, "\nstarts   %zu of %zu came to this result%s\n", f->n_agree, f->n_start,
+            f->converged ? "" : "; the steps ended before the residual was at its least");
+}
