@@ -102,13 +102,14 @@ class Model:
 
     @classmethod
     def of(cls, raw: Mapping[str, Any]) -> Model:
-        return cls(raw["id"], bool(raw.get("best")), raw.get("fit_rel_rms"), raw.get("heldout_rel_rms"),
+        return cls(raw["id"], bool(raw.get("best")), raw.get("fit_rel_rms", raw.get("rel_rms")), raw.get("heldout_rel_rms"),
                    tuple(Parameter.of(p) for p in raw.get("parameters", ())), raw)
 
 
 @dataclass(frozen=True)
 class Result:
-    """result.json. Jobs that end with the geometry have no parameters and no errors."""
+    """result.json. Jobs that end with the geometry have no parameters and no errors. The models of a job with the profile
+    of a fiber have their relative residual as fit_rel_rms."""
     verdict: Optional[Verdict]
     converged: Optional[bool]
     fit_rel_rms: Optional[float]
@@ -121,8 +122,8 @@ class Result:
     @classmethod
     def of(cls, raw: Mapping[str, Any]) -> Result:
         return cls(Verdict.of(raw.get("verdict")), raw.get("converged"), raw.get("fit_rel_rms"), raw.get("heldout_rel_rms"),
-                   tuple(Parameter.of(p) for p in raw.get("parameters") or ()), tuple(Model.of(m) for m in raw.get("models") or ()),
-                   tuple(raw.get("warnings") or ()), raw)
+                   tuple(Parameter.of(p) for p in raw.get("parameters") or ()),
+                   tuple(Model.of(m) for m in raw.get("models") or (raw.get("profile") or {}).get("models") or ()), tuple(raw.get("warnings") or ()), raw)
 
     def parameter(self, name: str, set: Optional[str] = None) -> Parameter:
         """Return one parameter. Raises KeyError."""

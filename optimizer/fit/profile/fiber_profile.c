@@ -2,7 +2,7 @@
 #include "base/angle.h"
 #include "base/files/durable.h"
 #include "base/option_id.h"
-#include "optimizer/fit/photographs/table/csv_table.h"
+#include "optimizer/fit/photographs/table/number_table.h"
 #include "optimizer/job/check/job_slips.h"
 
 #include <math.h>
@@ -36,41 +36,41 @@ struct reader {
     double brightest;
 };
 
-static status missing_column(const struct csv_table *t, size_t column, const char *besides, struct error *err)
+static status missing_column(const struct number_table *t, size_t column, const char *besides, struct error *err)
 {
-    return csv_table_error(t, STATUS_FORMAT, "column '%s' is missing%s", t->file, t->line, column_name[column],
-                           besides);
+    return number_table_error(t, STATUS_FORMAT, "column '%s' is missing%s", t->file, t->line, column_name[column],
+                              besides);
 }
 
-static status both_given(const struct csv_table *t, const char *first, const char *second, struct error *err)
+static status both_given(const struct number_table *t, const char *first, const char *second, struct error *err)
 {
-    return csv_table_error(t, STATUS_FORMAT, "column '%s' is given, and so is %s: one of them counts", t->file, t->line,
-                           first, second);
+    return number_table_error(t, STATUS_FORMAT, "column '%s' is given, and so is %s: one of them counts", t->file,
+                              t->line, first, second);
 }
 
 /* Which columns the table has: one radiance or three, standard errors of all or of none. */
-static status check_header(void *context, struct csv_table *t, struct error *err)
+static status check_header(void *context, struct number_table *t, struct error *err)
 {
     struct reader *r = context;
-    bool grey = csv_table_has(t, COLUMN_GREY), colored = false, stated = !isnan(r->theta_i_deg);
+    bool grey = number_table_has(t, COLUMN_GREY), colored = false, stated = !isnan(r->theta_i_deg);
     for (size_t c = 0; c < 3; c++)
-        colored = colored || csv_table_has(t, COLUMN_R + c) || csv_table_has(t, COLUMN_R_SE + c);
+        colored = colored || number_table_has(t, COLUMN_R + c) || number_table_has(t, COLUMN_R_SE + c);
     if (grey && colored) return both_given(t, "radiance", "one of a single channel", err);
     if (!grey && !colored)
         return missing_column(t, COLUMN_GREY, " (or 'radiance_r', 'radiance_g' and 'radiance_b')", err);
-    if (!stated && !csv_table_has(t, COLUMN_THETA_I))
-        return missing_column(t, COLUMN_THETA_I, ", and the job states no 'profile.theta_i_deg'", err);
-    if (stated && csv_table_has(t, COLUMN_THETA_I)) return both_given(t, "theta_i_deg", "the job's", err);
+    if (!stated && !number_table_has(t, COLUMN_THETA_I))
+        return missing_column(t, COLUMN_THETA_I, ", and the job states no angle of the light for all rows", err);
+    if (stated && number_table_has(t, COLUMN_THETA_I)) return both_given(t, "theta_i_deg", "the job's", err);
     r->profile->n_channel = grey ? 1 : 3;
     const size_t first = grey ? COLUMN_GREY : COLUMN_R, first_se = grey ? COLUMN_GREY_SE : COLUMN_R_SE;
     size_t n_se = 0;
     for (size_t c = 0; c < r->profile->n_channel; c++) {
-        if (!csv_table_has(t, first + c)) return missing_column(t, first + c, "", err);
-        n_se += csv_table_has(t, first_se + c);
+        if (!number_table_has(t, first + c)) return missing_column(t, first + c, "", err);
+        n_se += number_table_has(t, first_se + c);
     }
-    if (colored && csv_table_has(t, COLUMN_GREY_SE)) return both_given(t, "radiance_se", "radiance_r", err);
+    if (colored && number_table_has(t, COLUMN_GREY_SE)) return both_given(t, "radiance_se", "radiance_r", err);
     for (size_t c = 0; c < r->profile->n_channel && n_se > 0; c++)
-        if (!csv_table_has(t, first_se + c)) return missing_column(t, first_se + c, "", err);
+        if (!number_table_has(t, first_se + c)) return missing_column(t, first_se + c, "", err);
     r->profile->has_se = n_se > 0;
     return STATUS_OK;
 }
@@ -89,66 +89,66 @@ static status append(struct reader *r, const struct profile_row *row, struct err
     return STATUS_OK;
 }
 
-static status read_radiance(struct reader *r, const struct csv_table *t, struct profile_row *row, struct error *err)
+static status read_radiance(struct reader *r, const struct number_table *t, struct profile_row *row, struct error *err)
 {
     const size_t first = r->profile->n_channel == 1 ? COLUMN_GREY : COLUMN_R,
                  first_se = r->profile->n_channel == 1 ? COLUMN_GREY_SE : COLUMN_R_SE;
     status s = STATUS_OK;
     for (size_t c = 0; c < r->profile->n_channel && s == STATUS_OK; c++) {
-        s = csv_table_not_negative(t, first + c, 0.0, most_radiance, &row->radiance[c], err);
-        if (s == STATUS_OK) s = csv_table_not_negative(t, first_se + c, 0.0, most_radiance, &row->se[c], err);
+        s = number_table_not_negative(t, first + c, 0.0, most_radiance, &row->radiance[c], err);
+        if (s == STATUS_OK) s = number_table_not_negative(t, first_se + c, 0.0, most_radiance, &row->se[c], err);
         if (s == STATUS_OK && r->profile->has_se && !(row->se[c] > 0.0))
-            s = csv_table_error(t, STATUS_INVALID, "column '%s' is 0: a standard error must be above it", t->file,
-                                t->line, column_name[first_se + c]);
+            s = number_table_error(t, STATUS_INVALID, "column '%s' is 0: a standard error must be above it", t->file,
+                                   t->line, column_name[first_se + c]);
         r->brightest = fmax(r->brightest, row->radiance[c]);
     }
     return s;
 }
 
-static status read_row(void *context, struct csv_table *t, struct error *err)
+static status read_row(void *context, struct number_table *t, struct error *err)
 {
     struct reader *r = context;
     struct profile_row row = {.theta_i_rad = 0.0};
     double theta_i = r->theta_i_deg, theta_o, phi;
     r->profile->last_line = t->line;
     if (r->profile->n >= PROFILE_MAX_ROW)
-        return csv_table_error(t, STATUS_TOO_LARGE, "more than %d rows", t->file, t->line, PROFILE_MAX_ROW);
-    status s = csv_table_angle(t, COLUMN_THETA_O, -most_theta_deg, most_theta_deg, &theta_o, err);
-    if (s == STATUS_OK) s = csv_table_angle(t, COLUMN_PHI, -most_phi_deg, most_phi_deg, &phi, err);
-    if (s == STATUS_OK && csv_table_has(t, COLUMN_THETA_I))
-        s = csv_table_angle(t, COLUMN_THETA_I, -most_theta_deg, most_theta_deg, &theta_i, err);
+        return number_table_error(t, STATUS_TOO_LARGE, "more than %d rows", t->file, t->line, PROFILE_MAX_ROW);
+    status s = number_table_angle(t, COLUMN_THETA_O, -most_theta_deg, most_theta_deg, &theta_o, err);
+    if (s == STATUS_OK) s = number_table_angle(t, COLUMN_PHI, -most_phi_deg, most_phi_deg, &phi, err);
+    if (s == STATUS_OK && number_table_has(t, COLUMN_THETA_I))
+        s = number_table_angle(t, COLUMN_THETA_I, -most_theta_deg, most_theta_deg, &theta_i, err);
     if (s == STATUS_OK) s = read_radiance(r, t, &row, err);
     if (s != STATUS_OK) return s;
-    angle_span_add(&r->span, csv_table_has(t, COLUMN_THETA_I) ? theta_i : 0.0, 0.0, theta_o, phi, 0.0);
+    angle_span_add(&r->span, number_table_has(t, COLUMN_THETA_I) ? theta_i : 0.0, 0.0, theta_o, phi, 0.0);
     row.theta_i_rad = theta_i * RAD_PER_DEG;
     row.theta_o_rad = theta_o * RAD_PER_DEG;
     row.phi_rad = phi * RAD_PER_DEG;
     return append(r, &row, err);
 }
 
-static status check_whole(const struct reader *r, const struct csv_table *t, struct error *err)
+static status check_whole(const struct reader *r, const struct number_table *t, struct error *err)
 {
-    if (r->profile->n == 0) return csv_table_error(t, STATUS_INVALID, "the table has no row", t->file, t->line);
+    if (r->profile->n == 0) return number_table_error(t, STATUS_INVALID, "the table has no row", t->file, t->line);
     if (angle_span_in_radians(&r->span))
-        return csv_table_error(t, STATUS_INVALID,
-                               "up to this line the angles of the columns '%s' and '%s' look like radians: the largest "
-                               "are %.3g and %.3g; write degrees",
-                               t->file, t->line, column_name[COLUMN_THETA_O], column_name[COLUMN_PHI], r->span.theta,
-                               r->span.phi);
+        return number_table_error(
+            t, STATUS_INVALID,
+            "up to this line the angles of the columns '%s' and '%s' look like radians: the largest "
+            "are %.3g and %.3g; write degrees",
+            t->file, t->line, column_name[COLUMN_THETA_O], column_name[COLUMN_PHI], r->span.theta, r->span.phi);
     if (!(r->brightest > 0.0))
-        return csv_table_error(t, STATUS_INVALID, "up to this line the column '%s' is 0", t->file, t->line,
-                               column_name[r->profile->n_channel == 1 ? COLUMN_GREY : COLUMN_R]);
+        return number_table_error(t, STATUS_INVALID, "up to this line the column '%s' is 0", t->file, t->line,
+                                  column_name[r->profile->n_channel == 1 ? COLUMN_GREY : COLUMN_R]);
     return STATUS_OK;
 }
 
 status fiber_profile_parse(struct fiber_profile *profile, const char *text, size_t n_bytes, const char *name,
                            double theta_i_deg, struct error *err)
 {
-    struct csv_table t = {
+    struct number_table t = {
         .file = name, .option = OPTION_PROFILE_FILE, .column_name = column_name, .n_required = COLUMN_N_REQUIRED};
     struct reader r = {.profile = profile, .theta_i_deg = theta_i_deg};
     *profile = (struct fiber_profile){0};
-    status s = csv_table_read(&t, text, n_bytes, check_header, read_row, &r, err);
+    status s = number_table_read(&t, text, n_bytes, check_header, read_row, &r, err);
     if (s == STATUS_OK) s = check_whole(&r, &t, err);
     if (s != STATUS_OK) fiber_profile_release(profile);
     return s;

@@ -1,6 +1,6 @@
 /* A measured profile of a single fiber: the radiance that leaves it, by the angles of light and view.
  *
- * The table (csv_table.h) has the columns
+ * The table (number_table.h) has the columns
  *   theta_o_deg   angle of the view from the normal plane of the fiber, -90..90
  *   phi_deg       azimuth of the view about the fiber, from that of the light: 0 back to the light, 180 straight on
  *   radiance      any unit; or radiance_r, radiance_g, radiance_b for three channels
@@ -33,8 +33,8 @@ struct fiber_profile {
 };
 
 /* text: the table, NUL-terminated, n_bytes without the NUL; name: what errors call it. theta_i_deg: of the whole table,
- * or NaN. Errors are those of csv_table.h with the option OPTION_PROFILE_FILE: a column that is missing, or given twice
- * over (theta_i_deg in the table and in the job; radiance and radiance_r), angles out of range or in radians, a
+ * or NaN. Errors are those of number_table.h with the option OPTION_PROFILE_FILE: a column that is missing, or given
+ * twice over (theta_i_deg in the table and in the job; radiance and radiance_r), angles out of range or in radians, a
  * negative radiance, a standard error that is not above 0, no row, or radiances that are all 0. STATUS_TOO_LARGE above
  * PROFILE_MAX_ROW rows. */
 status fiber_profile_parse(struct fiber_profile *profile, const char *text, size_t n_bytes, const char *name,

@@ -30,7 +30,7 @@ static status target_values(struct profile_target *t, struct error *err)
         t->measured[i] = p->row[i / p->n_channel].radiance[i % p->n_channel];
         mean += t->measured[i] / (double)t->n_value;
     }
-    for (size_t i = 0; i < t->n_value; i++) t->base[i] = t->measured[i] + dark_part * mean;
+    for (size_t i = 0; i < t->n_value; i++) t->base[i] = fmax(t->measured[i], 0.0) + dark_part * mean;
     return STATUS_OK;
 }
 
@@ -71,7 +71,7 @@ static status target_init(struct profile_target *t, const struct profile_problem
     if (t->n_value <= *n_free)
         return error_set_field(err, STATUS_INVALID, OPTION_PROFILE_FILE,
                                "cannot use table '%s': it ends at line %zu with %zu radiances, but the fit of '%s' has "
-                               "%zu unknowns%s: give more rows, or hold parameters by 'fit.fixed'",
+                               "%zu unknowns%s: give more rows, or hold some parameters fixed",
                                table_name, problem->profile->last_line, t->n_value, problem->model->id, *n_free,
                                isnan(problem->scale) ? " with the scale" : "");
     return target_values(t, err);

@@ -13,7 +13,7 @@ struct profile_target {
     struct coordinate coordinate[FIT_MAX_PARAM];
     size_t n_unknown, n_value;
     bool fixed[PROFILE_MAX_UNKNOWN];
-    double *measured, *base; /* m, and m + 0.02 mean of m; one of each value */
+    double *measured, *base; /* m, and max(m, 0) + 0.02 mean of m; one of each value */
 };
 
 /* A place of a search. */

@@ -14,7 +14,7 @@ const struct job_option option_rows_profile[] = {
      .id = OPTION_PROFILE_FILE,
      INTO(profile_file),
      .required = true,
-     .allowed = "CSV (docs/fiber-profiles.md)",
+     .allowed = "CSV, section 3",
      .meaning = "The table of a goniometer, with the columns `theta_o_deg`, `phi_deg` and `radiance`. Upload it with "
                 "the role `profile`."},
     {.path = "profile.theta_i_deg",

@@ -5,7 +5,6 @@
 #include "optimizer/worker/report/discrepancy_json.h"
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/report/photograph_json.h"
-#include "optimizer/worker/report/profile/profile_report.h"
 #include "optimizer/worker/report/result_numbers.h"
 #include "optimizer/worker/report/result_options_json.h"
 #include "optimizer/worker/report/verdict_json.h"
@@ -353,12 +352,17 @@ static status write_result(const struct pipeline_context *c, json_t *json, struc
     return s;
 }
 
+status result_json_finish(struct pipeline_context *c, json_t *json, struct error *err)
+{
+    put_job(json, c);
+    return write_result(c, json, err);
+}
+
 status result_geometry_json_write(struct pipeline_context *c, struct error *err)
 {
     json_t *json = json_pack("{s:i, s:s, s:n, s:n, s:[], s:[], s:[]}", "format", 1, "sample", c->doc->sample, "model",
                              "method", "parameters", "rows", "models");
-    put_job(json, c);
-    return write_result(c, json, err);
+    return result_json_finish(c, json, err);
 }
 
 status result_pictures_json_write(struct pipeline_context *c, struct error *err)
@@ -368,18 +372,7 @@ status result_pictures_json_write(struct pipeline_context *c, struct error *err)
                              "model", m->appearance.id, "method", "parameters", result_parameters_json(m), "rows",
                              "models", "seed", (json_int_t)c->doc->seed);
     json_object_set(json, "pictures", c->surface_pictures);
-    put_job(json, c);
-    return write_result(c, json, err);
-}
-
-status result_profile_json_write(struct pipeline_context *c, struct error *err)
-{
-    const struct pipeline_model *m = &c->model[profile_best_model(c)];
-    json_t *json = json_pack("{s:i, s:s, s:s, s:n, s:o, s:[], s:[], s:I, s:o}", "format", 1, "sample", c->doc->sample,
-                             "model", m->appearance.id, "method", "parameters", result_parameters_json(m), "rows",
-                             "models", "seed", (json_int_t)c->doc->seed, "profile", profile_json(c));
-    put_job(json, c);
-    return write_result(c, json, err);
+    return result_json_finish(c, json, err);
 }
 
 status result_json_write(struct pipeline_context *c, struct error *err)

@@ -58,8 +58,8 @@ double result_row_error(const struct pipeline_context *c, const struct pipeline_
 status result_geometry_json_write(struct pipeline_context *c, struct error *err);
 /* The same of a job that renders given parameters: without rows, models and a method. */
 status result_pictures_json_write(struct pipeline_context *c, struct error *err);
-/* The same of a job with the profile of a fiber: its models are in "profile" (profile_report.h). */
-status result_profile_json_write(struct pipeline_context *c, struct error *err);
+/* Adds what every job has to its own part of result.json, writes the file, and releases json. */
+status result_json_finish(struct pipeline_context *c, json_t *json, struct error *err);
 /* "parameters" of a model. */
 json_t *result_parameters_json(const struct pipeline_model *m);
 status result_json_write(struct pipeline_context *c, struct error *err);

@@ -193,8 +193,10 @@ double fiber_rays_profile(const struct ray_fiber *fiber, double theta_i_rad, uin
         struct rng rng;
         rng_start(&rng, &key, i, 0);
         const double h = 2 * rng_double(&rng) - 1;
+        struct ray_fiber f = *fiber;
+        if (f.either_way && rng_double(&rng) < 0.5) f.alpha_rad = -f.alpha_rad;
         struct ray r = {{0, sqrt(1 - h * h), h}, {-sin(theta_i_rad), -cos(theta_i_rad), 0}, false};
-        if (!follow(fiber, &r, &rng)) continue;
+        if (!follow(&f, &r, &rng)) continue;
         n_left++;
         const int bin = bin_of(r.d);
         if (bin >= 0) count[bin]++;

@@ -19,6 +19,7 @@
 
 struct ray_fiber {
     double eta, kappa, layers, alpha_rad, beta_rad, gamma_rad, sigma_ms, sigma_ma, g, sigma_ca;
+    bool either_way; /* half of the rays meet a fiber whose scales are tilted the other way */
 };
 
 enum { PUBLISHED_N_FIBER = 10 };
@@ -27,9 +28,8 @@ struct ray_fiber published_fiber(int i);
 extern const char *const published_fiber_name[PUBLISHED_N_FIBER];
 
 /* Follows n_ray rays of light from theta_i and counts them in the bins of the goniometer of Yan et al. 2015: theta_o 10
- * to 50 degrees in steps of 2, phi -20 to 200 in steps of 5. A bin of n rays has the relative standard error of a count,
- * and an empty one that of a ray. Returns the share of the rays that leave the fiber. The caller releases the profile.
- */
+ * to 50 degrees in steps of 2, phi -20 to 200 in steps of 5. A bin has the standard error of a count, and an empty one
+ * that of one ray. Returns the share of the rays that leave the fiber. The caller releases the profile. */
 double fiber_rays_profile(const struct ray_fiber *fiber, double theta_i_rad, uint32_t n_ray, uint64_t seed,
                           struct fiber_profile *profile);
 /* The same as a table of a job, without the column theta_i_deg. */

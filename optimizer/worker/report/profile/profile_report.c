@@ -13,7 +13,7 @@ static double bic(const struct profile_fit *f)
     return n * log(f->rel_rms * f->rel_rms) + (double)f->n_free * log(n);
 }
 
-size_t profile_best_model(const struct pipeline_context *c)
+static size_t profile_best_model(const struct pipeline_context *c)
 {
     size_t best = 0;
     for (size_t i = 1; i < c->n_model; i++)
@@ -60,12 +60,21 @@ static json_t *table_json(const struct pipeline_context *c)
                      json_number_list(range[2], 2, 1.0));
 }
 
-json_t *profile_json(const struct pipeline_context *c)
+static json_t *profile_json(const struct pipeline_context *c)
 {
     json_t *models = json_array();
     for (size_t i = 0; i < c->n_model; i++) json_array_append_new(models, model_json(c, i));
     return json_pack("{s:o, s:s, s:s, s:o}", "table", table_json(c), "chosen_by", "bic", "csv", "profile.csv", "models",
                      models);
+}
+
+status profile_json_write(struct pipeline_context *c, struct error *err)
+{
+    const struct pipeline_model *m = &c->model[profile_best_model(c)];
+    json_t *json = json_pack("{s:i, s:s, s:s, s:n, s:o, s:[], s:[], s:I, s:o}", "format", 1, "sample", c->doc->sample,
+                             "model", m->appearance.id, "method", "parameters", result_parameters_json(m), "rows",
+                             "models", "seed", (json_int_t)c->doc->seed, "profile", profile_json(c));
+    return result_json_finish(c, json, err);
 }
 
 status profile_csv_write(const struct pipeline_context *c, struct error *err)

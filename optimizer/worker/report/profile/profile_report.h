@@ -12,12 +12,10 @@
 
 #include "optimizer/worker/pipeline_context.h"
 
-#include <jansson.h>
 #include <stdio.h>
 
-/* Index of the best model. */
-size_t profile_best_model(const struct pipeline_context *c);
-json_t *profile_json(const struct pipeline_context *c);
+/* result.json of such a job. */
+status profile_json_write(struct pipeline_context *c, struct error *err);
 /* results/profile.csv: theta_i_deg, theta_o_deg, phi_deg, radiance, and the radiance by each model; one line for each
  * row and channel. */
 status profile_csv_write(const struct pipeline_context *c, struct error *err);

@@ -67,7 +67,7 @@ status stage_profile_fit(struct pipeline_context *c, struct error *err)
 
 status stage_profile_report(struct pipeline_context *c, struct error *err)
 {
-    status s = result_profile_json_write(c, err);
+    status s = profile_json_write(c, err);
     if (s == STATUS_OK) s = result_summary_write(c, err);
     if (s == STATUS_OK) s = profile_csv_write(c, err);
     return s == STATUS_OK ? report_write(c, err) : s;

@@ -1,0 +1,145 @@
+"""Jobs with the profile of a single fiber: through the API, the command line and the Python client; their result as the prior of
+a cloth; and tables and documents that are refused. The profile is that of a fiber that scatters evenly, whose radiance is known:
+albedo / pi^2 times cos theta_i."""
+import json
+import math
+import os
+import random
+import subprocess
+import sys
+
+import jsonschema
+import pytest
+from daemon_under_test import ROOT, problem, program
+from small_cloth import TABLE, hair
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
+ALBEDO, ERROR = 0.6, 0.02
+DOCUMENT = {"sample": "wool fiber", "profile": {"file": "fiber.csv", "theta_i_deg": -40, "scale": 2}, "fit": {"models": ["kajiya_kay.v1", "isotropic.v1"]}}
+
+
+def table(seed=3):
+    rng, lines = random.Random(seed), ["theta_o_deg,phi_deg,radiance,radiance_se"]
+    for theta_o in range(10, 51, 5):
+        for phi in range(-20, 201, 20):
+            true = 2 * ALBEDO / math.pi**2 * math.cos(math.radians(40))
+            lines.append(f"{theta_o},{phi},{true * (1 + ERROR * rng.gauss(0, 1)):.6g},{true * ERROR:.4g}")
+    return "\n".join(lines) + "\n"
+
+
+def start(d, document, files):
+    job = d.create(document)
+    for name, role, data in files:
+        d.upload(job, name, data, role)
+    assert d.post(f"/v1/jobs/{job}/start").status_code == 202
+    return job
+
+
+@pytest.fixture(scope="module")
+def finished(real):
+    job = start(real, DOCUMENT, [("fiber.csv", "profile", table().encode())])
+    return job, real.wait_state(job, "succeeded", timeout_s=120)["result"]
+
+
+def test_the_result(real, finished):
+    job, result = finished
+    with open(os.path.join(ROOT, "config", "result.schema.json"), encoding="utf-8") as f:
+        jsonschema.validate(result, json.load(f))
+    assert result["model"] == "isotropic.v1" and result["geometry"] is None and result["verdict"] is None
+    models = {m["id"]: m for m in result["profile"]["models"]}
+    best = models["isotropic.v1"]
+    assert best["best"] and best["converged"] and best["parameters"] == result["parameters"] and best["scale"] == 2 and best["scale_se"] == 0
+    red, green, blue = result["parameters"]
+    assert red["value"] == green["value"] == blue["value"], "a grey profile has one value for all channels"
+    n = result["profile"]["table"]["n_row"]
+    assert n == 108 and 0.7 < red["standard_error"] / (ALBEDO * ERROR / math.sqrt(n)) < 2
+    assert abs(red["value"] - ALBEDO) < 4 * red["standard_error"]
+    assert 0.015 < best["rel_rms"] < 0.025 and abs(best["chi_square"] - 1) < 4 * math.sqrt(2 / n)
+    assert models["kajiya_kay.v1"]["bic"] > best["bic"]
+    lines = real.get(f"/v1/jobs/{job}/results/profile.csv").text.splitlines()
+    assert lines[0] == "theta_i_deg,theta_o_deg,phi_deg,channel,radiance,kajiya_kay.v1,isotropic.v1" and len(lines) == 109
+    assert float(lines[1].split(",")[6]) == pytest.approx(2 * red["value"] / math.pi**2 * math.cos(math.radians(40)), rel=1e-6)
+    page, summary = (real.get(f"/v1/jobs/{job}/results/{name}").text for name in ("report.html", "summary.txt"))
+    assert page.count("<polyline") == 16 and "isotropic.v1, the best model" in page, "eight charts for each of two models"
+    assert "residual" in summary and "108 radiances" in summary
+    done = {s["name"] for s in result["stages"] if s["wall_s"] is not None}
+    assert done == {"fit"}, "the report is not done while it is written"
+
+
+def cloth(profile_job, **fit):
+    return {"sample": "cloth of it", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"},
+            "fit": {"model": "isotropic.v1", "max_iterations": 1, "path_budget": 4000, "render_px": 8, "render_samples": 1, "profile_job": profile_job, **fit}}
+
+
+def start_cloth(d, document):
+    return start(d, document, [("cloth.hair", "fibers", hair()), ("rows.csv", "measurements", TABLE.encode())])
+
+
+def test_the_prior_of_a_cloth(real, finished):
+    job, result = finished
+    fitted = real.wait_state(start_cloth(real, cloth(job, fixed={"C.b": 0.3})), "succeeded", timeout_s=120)["result"]
+    found = result["parameters"][0]
+    for p, name in zip(fitted["parameters"], ("C.r", "C.g", "C.b")):
+        assert p["name"] == name
+        if name == "C.b":
+            assert p["fixed"] and p.get("prior") is None, "a fixed parameter takes none"
+        else:
+            assert p["prior"]["mean"] == pytest.approx(found["value"]) and p["prior"]["se"] == pytest.approx(found["standard_error"])
+            assert abs(p["value"] - ALBEDO) < 0.1, "a sharp prior holds what six rows of another cloth say little of"
+
+
+def test_priors_that_cannot_be_taken(real, finished):
+    job, _ = finished
+    draft = real.create(DOCUMENT)
+    for document, text in ((cloth(job, model="two_lobe.v1"), "none of this job's models"), (cloth(draft), "no result yet")):
+        error = real.wait_state(start_cloth(real, document), "failed", timeout_s=60)["error"]
+        assert error["field"] == "fit.profile_job" and text in error["text"]
+
+
+def test_a_job_that_does_not_exist(real):
+    job = real.create(cloth("nothing"))
+    real.upload(job, "cloth.hair", hair(), "fibers")
+    real.upload(job, "rows.csv", TABLE.encode(), "measurements")
+    assert "does not exist" in problem(real.post(f"/v1/jobs/{job}/start"), 422, "invalid", "fit.profile_job")["detail"]
+
+
+@pytest.mark.parametrize("text,says", [
+    ("theta_o_deg,radiance\n10,1\n", ("line 1", "'phi_deg' is missing")),
+    ("theta_o_deg,phi_deg,radiance\n10,0,1\n95,0,1\n", ("line 3", "'theta_o_deg' is 95")),
+    ("theta_o_deg,phi_deg,radiance\n.17,-.35,1\n.87,3.14,1\n", ("line 3", "radians")),
+    ("theta_o_deg,phi_deg,radiance\n10,0,-1\n", ("line 2", "'radiance' is -1")),
+    ("theta_o_deg,phi_deg,radiance\n10,0,1\n", ("line 2", "unknowns")),
+])
+def test_tables_that_are_refused(tmp_path, text, says):
+    (tmp_path / "input").mkdir()
+    (tmp_path / "input" / "fiber.csv").write_text(text)
+    (tmp_path / "job.json").write_text(json.dumps({**DOCUMENT, "fit": {"model": "kajiya_kay.v1"}}))
+    done = subprocess.run([program("selvedge-worker"), str(tmp_path)], capture_output=True, text=True, timeout=60)
+    error = json.loads((tmp_path / "status.json").read_text())["error"]
+    assert done.returncode != 0 and error["field"] == "profile.file" and all(s in error["text"] for s in says), error
+
+
+@pytest.mark.parametrize("document,field", [
+    ({**DOCUMENT, "fibers": {"file": "a.hair"}}, "fibers"), ({**DOCUMENT, "black_sheet": True}, "black_sheet"),
+    ({**DOCUMENT, "fit": {"model": "microflake.v1"}}, "fit.models"), ({**DOCUMENT, "fit": {"path_budget": 5000}}, "fit.path_budget"),
+    ({**DOCUMENT, "profile": {"file": "a.csv", "theta_i_deg": 95}}, "profile.theta_i_deg"), ({**DOCUMENT, "profile": {}}, "profile.file"),
+    ({**DOCUMENT, "fit": {"fixed": {"C_R": 0.1, "C_TT": 0.5}, "model": "two_lobe.v1", "bounds": {"beta_R": [9, 3]}}}, "fit.bounds.beta_R"),
+])
+def test_documents_that_are_refused(real, document, field):
+    assert problem(real.post("/v1/jobs", json=document), 422, "invalid", field)
+
+
+def test_command_line_and_python(real, tmp_path):
+    (tmp_path / "fiber.csv").write_text(table())
+    (tmp_path / "job.json").write_text(json.dumps({**DOCUMENT, "fit": {"model": "isotropic.v1"}}))
+    environment = dict(os.environ, SELVEDGE_SERVER=real.url, SELVEDGE_TOKEN="", PYTHONPATH=os.path.join(ROOT, "clients", "python"))
+    done = subprocess.run([program("selvedge"), "submit", str(tmp_path / "job.json"), "--watch"], env=environment, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert "isotropic.v1" in done.stdout and "of range" in done.stdout and "C.r" in done.stdout, done.stdout
+    script = f"""import selvedge
+job = selvedge.Client({real.url!r}).submit({str(tmp_path / 'job.json')!r})
+assert job.wait(timeout_s=60).state == "succeeded"
+result = job.result()
+print(result.models[0].id, result.models[0].fit_rel_rms, result.parameter("C.r").value)"""
+    done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0 and done.stdout.startswith("isotropic.v1 0."), done.stderr
