@@ -51,10 +51,17 @@ static json_t *error_json(const struct error *error)
     return json_pack("{s:s, s:s, s:s}", "code", status_name(error->code), "field", error->field, "text", error->text);
 }
 
+/* Between the speeds and the first stage the stages are still being planned, and a part of the plan is no forecast. */
+static struct job_clock_look look_at(struct worker_status *st)
+{
+    if (st->clock.stage[st->clock.i_stage].began) return job_clock_look(&st->clock, clock_monotonic_s());
+    return (struct job_clock_look){.eta_s = NAN, .eta_low_s = NAN, .eta_high_s = NAN, .fraction = st->clock.shown};
+}
+
 /* To be called with the mutex held. */
 static char *status_text(struct worker_status *st, const char *state, const struct error *error)
 {
-    struct job_clock_look look = job_clock_look(&st->clock, clock_monotonic_s());
+    struct job_clock_look look = look_at(st);
     if (strcmp(state, "running") != 0) look.eta_s = look.eta_low_s = look.eta_high_s = NAN;
     if (strcmp(state, "succeeded") == 0) look.fraction = 1.0;
     const struct process_use used = process_use();

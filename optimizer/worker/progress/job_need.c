@@ -122,12 +122,17 @@ void job_need_remember(const struct pipeline_context *c, const struct job_need *
 
 void job_need_begin(struct pipeline_context *c)
 {
-    const struct speed_book none = {.n = 0};
+    struct worker_status *shown = c->status, *usual; /* readers of the job's own status would see half a plan */
+    struct error unused = {0};
     size_t n[3];
     if (c->doc->n_volume_file > 0 && pipeline_scan_size(c, n, NULL) == STATUS_OK) memcpy(c->geometry.n, n, sizeof n);
-    worker_status_speeds(c->status, &none);
+    c->usual_wall_s = 0.0;
+    if (worker_status_new(c->folder, NULL, &usual, &unused) != STATUS_OK) return;
+    c->status = usual;
     plan_stages(c);
-    c->usual_wall_s = worker_status_look(c->status).eta_s;
+    c->usual_wall_s = worker_status_look(usual).eta_s;
+    c->status = shown;
+    worker_status_free(usual);
 }
 
 static json_t *stages_json(struct pipeline_context *c)

@@ -39,11 +39,11 @@ static void start(struct desk *d, void **state)
 }
 
 /* Ends the status and returns status.json. */
-static json_t *finish(struct desk *d, const struct error *error)
+static json_t *finish_as(struct desk *d, const char *end, const struct error *error)
 {
     struct error err = {0};
     char path[512];
-    assert_int_equal(worker_status_finish(d->status, "failed", error, &err), STATUS_OK);
+    assert_int_equal(worker_status_finish(d->status, end, error, &err), STATUS_OK);
     snprintf(path, sizeof path, "%s/%s", d->folder, JOB_FILE_STATUS);
     json_t *json = json_load_file(path, 0, NULL);
     assert_non_null(json);
@@ -52,6 +52,8 @@ static json_t *finish(struct desk *d, const struct error *error)
     worker_folder_close(&d->hold);
     return json;
 }
+
+static json_t *finish(struct desk *d, const struct error *error) { return finish_as(d, "failed", error); }
 
 static void test_warnings_beyond_the_list_are_counted(void **state)
 {
@@ -94,10 +96,32 @@ static void test_texts_that_are_no_utf8(void **state)
     json_decref(json);
 }
 
+/* While stages are planned one by one, what is planned of them is not stated as the remaining time. */
+static void test_a_part_of_the_plan_is_no_forecast(void **state)
+{
+    static const struct speed_book none = {.n = 0};
+    for (int begun = 0; begun < 2; begun++) {
+        struct desk d = {0};
+        start(&d, state);
+        worker_status_stage(d.status, "volume", "Reading the job", 0, 8);
+        worker_status_speeds(d.status, &none);
+        worker_status_plan_own(d.status, 0, "volume", 1000.0);
+        if (begun) worker_status_stage(d.status, "volume", "Reading the scan", 0, 8);
+        json_t *json = finish_as(&d, "running", NULL), *eta = json_object_get(json, "eta_s");
+        if (begun)
+            assert_true(json_number_value(eta) > 900.0);
+        else
+            assert_true(json_is_null(eta) && json_number_value(json_object_get(json, "fraction")) == 0.0);
+        json_decref(json);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_warnings_beyond_the_list_are_counted, scratch_folder_setup,
+                                        scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(test_a_part_of_the_plan_is_no_forecast, scratch_folder_setup,
                                         scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(test_texts_that_are_no_utf8, scratch_folder_setup, scratch_folder_teardown)};
     return cmocka_run_group_tests(tests, NULL, NULL);
