@@ -241,13 +241,17 @@ static bool receive(struct agent *a)
     return any;
 }
 
-/* The job has ended: so do the workers of the other ranks. */
-static void close_others(struct agent *a)
+/* The job has ended: so do the workers of the other ranks. This takes the way of the worker's orders
+ * (base/ranks/rank_team.c: to the ranks whose number without its highest bit is this one), so that it does not overtake
+ * the last of them. */
+static void close_children(struct agent *a)
 {
-    for (int r = 1; r < a->n_rank; r++) {
-        const struct rank_frame f = {.peer = (uint32_t)r, .kind = CLOSE_KIND};
+    int bit = 1;
+    while (bit <= a->rank) bit <<= 1;
+    for (; a->rank + bit < a->n_rank; bit <<= 1) {
+        const struct rank_frame f = {.peer = (uint32_t)(a->rank + bit), .kind = CLOSE_KIND};
         struct message *m = message_new(a, &f);
-        MPI_Isend(&m->frame, (int)m->n_bytes, MPI_BYTE, r, 0, MPI_COMM_WORLD, &m->request);
+        MPI_Isend(&m->frame, (int)m->n_bytes, MPI_BYTE, (int)f.peer, 0, MPI_COMM_WORLD, &m->request);
         append(&a->to_rank, m);
     }
 }
@@ -264,10 +268,8 @@ static void look_at_worker(struct agent *a)
     while (read_worker(a)) finish_sends(a); /* its last messages */
     a->code = WIFEXITED(how) ? WEXITSTATUS(how) : 128 + WTERMSIG(how);
     if (!WIFEXITED(how)) lost(a, strsignal(WTERMSIG(how)));
-    if (a->rank == 0)
-        close_others(a);
-    else if (a->code != 0 && !a->closing)
-        lost(a, "its worker has failed");
+    if (a->rank != 0 && a->code != 0 && !a->closing) lost(a, "its worker has failed");
+    close_children(a);
 }
 
 /* Sleeps longer the longer nothing has happened; a message of the worker ends the sleep. */
