@@ -6,7 +6,7 @@
 
 struct process_use {
     double cpu_s;           /* processor seconds of all its threads, in user and system code */
-    int64_t peak_rss_bytes; /* largest resident memory */
+    int64_t peak_rss_bytes; /* largest resident memory since the program began */
 };
 
 struct process_use process_use(void);
