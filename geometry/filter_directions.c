@@ -9,6 +9,7 @@
 #include "geometry/filter_directions.h"
 #include "base/option_id.h"
 #include "geometry/filter_choice.h"
+#include "geometry/ranks/direction_share.h"
 
 #include "geometry/orientation/consensus.h"
 #include "geometry/orientation/lines/line_bound.h"
@@ -25,6 +26,7 @@ enum { N_FINE = 900, N_CONSENSUS_BLUR = 3, MAX_CLIMB = 19 };
 /* difference of two minima of J up to which noise and touching fibers may decide between them */
 #define J_TOLERANCE 0.07
 #define AGREEMENT_COSINE 0.94f
+#define TENSOR_DIAMETERS 0.28  /* standard deviation of the structure tensor's window */
 #define J_UNIT (1.0 / 40000.0) /* J at ridges is stored in 16 bits, as a share of J in solid material */
 
 struct orientation_job {
@@ -35,16 +37,16 @@ struct orientation_job {
     struct line_filter *filter;
     struct tensor_window window;
     float eps_d, eps_j;
-    double j_full; /* J in solid material */
-    int n_climb;   /* most steps to the ridge */
+    double j_full;                             /* J in solid material */
+    int n_climb;                               /* most steps to the ridge */
+    size_t begin, end, climb_begin, climb_end; /* rows that are wanted, and those that have an effect on them */
     struct line_bound bound;
     uint16_t *ridge;           /* per voxel of material: packed offset of its ridge voxel */
     _Atomic uint16_t *j_ridge; /* 0: not a ridge; at ridges J in J_UNIT * j_full, at least 1 */
     struct consensus consensus;
     float *scratch; /* per thread */
     size_t scratch_per_thread;
-    size_t *n_material, *n_kept; /* per band; per slice */
-    ptrdiff_t neighbour[26];     /* offsets in the volume, in ascending order */
+    ptrdiff_t neighbour[26]; /* offsets in the volume, in ascending order */
 };
 
 enum { BAND = 32 }; /* rows of a slice in one task; short, so that a cancellation is noticed soon */
@@ -147,20 +149,19 @@ static void climb_band(void *context, size_t i_task, size_t i_thread)
     struct orientation_job *o = context;
     const size_t *n = o->v->n;
     const struct band b = band_of(o, i_task);
-    size_t material = 0;
     scratch_keep_within(o->v->space);
-    for (size_t j = b.j0; j < b.j1; j++)
+    for (size_t j = b.j0; j < b.j1; j++) {
+        if (j < o->climb_begin || j >= o->climb_end) continue;
         for (size_t i = 0; i < n[0]; i++) {
             size_t at = volume_index(n, i, j, b.k), x[3] = {i, j, b.k};
             if (o->v->density[at] < o->eps_d) continue;
-            material++;
             if (!line_bound_reaches(&o->bound, i, j, b.k)) continue;
             const size_t from[3] = {i, j, b.k};
             climb(o, x);
             o->ridge[at] = pack_offset(o, from, x);
             set_j(o, volume_index(n, x[0], x[1], x[2]), 0.0);
         }
-    o->n_material[i_task] = material;
+    }
 }
 
 /* Descends at ridge voxel x from the node nearest to `start`. Writes the direction to d, and returns J as a share of
@@ -251,20 +252,45 @@ static void assign_slice(void *context, size_t k, size_t i_thread)
 {
     (void)i_thread;
     struct orientation_job *o = context;
-    size_t n = o->v->n[0] * o->v->n[1], kept = 0;
+    const size_t n = o->v->n[0] * o->v->n[1], end = k * n + o->end * o->v->n[0];
     scratch_keep_within(o->v->space);
-    for (size_t at = k * n; at < (k + 1) * n; at++) { /* densities are 0 at first */
+    for (size_t at = k * n + o->begin * o->v->n[0]; at < end; at++) { /* densities are 0 at first */
         float density = o->v->density[at];
         if (density < o->eps_d || !line_bound_reaches(&o->bound, at % o->v->n[0], at % n / o->v->n[0], k)) continue;
         size_t top = ridge_index(o, at);
         if (get_j(o, top) * J_UNIT * o->j_full > (double)o->eps_j) continue;
-        kept++;
         long byte = lrintf(255.0f * density);
         o->d->density[at] = (uint8_t)(byte < 1 ? 1 : byte > 255 ? 255 : byte);
         if (get_j(o, at) == 0)
             memcpy(o->d->octahedral + 2 * at, o->d->octahedral + 2 * top, 2 * sizeof *o->d->octahedral);
     }
-    o->n_kept[k] = kept;
+}
+
+static int climb_of(double diameter_voxel) { return (int)fmin(ceil(0.5 * diameter_voxel), MAX_CLIMB); }
+static size_t cell_of(double diameter_voxel) { return (size_t)fmax(2.0, 0.5 * diameter_voxel + 0.5); }
+/* Rows beyond a voxel whose cells have a part in its consensus. */
+static size_t consensus_reach(double diameter_voxel) { return (N_CONSENSUS_BLUR + 1) * cell_of(diameter_voxel); }
+
+static size_t common_multiple(size_t a, size_t b)
+{
+    size_t m = a;
+    while (m % b != 0) m += a;
+    return m;
+}
+
+size_t filter_directions_alignment(double diameter_voxel)
+{
+    return common_multiple(cell_of(diameter_voxel), LINE_BOUND_CELL);
+}
+
+size_t filter_directions_halo(const struct reconstruct_option *option, double diameter_voxel)
+{
+    struct tensor_window window;
+    tensor_window_init(&window, TENSOR_DIAMETERS * diameter_voxel);
+    const size_t climb = (size_t)climb_of(diameter_voxel), line = option->h / 2 + 3;
+    const size_t bound = climb + option->h / 2 + 2 + 2 * LINE_BOUND_CELL, tensor = (size_t)window.reach + 2;
+    const size_t looks = bound > tensor ? bound : tensor > line ? tensor : line;
+    return 3 * climb + consensus_reach(diameter_voxel) + looks + line_filter_blur_reach(option->s, option->t);
 }
 
 static status prepare(struct orientation_job *o, const struct reconstruct_option *option, double diameter_voxel,
@@ -276,7 +302,7 @@ static status prepare(struct orientation_job *o, const struct reconstruct_option
     status s = direction_set_init(&o->fine, N_FINE, err);
     if (s == STATUS_OK) s = line_filter_new(&o->fine, option->h, n, &o->filter, err);
     if (s != STATUS_OK) return s;
-    s = consensus_init(&o->consensus, n, (size_t)fmax(2.0, 0.5 * diameter_voxel + 0.5), o->v->space, err);
+    s = consensus_init(&o->consensus, n, cell_of(diameter_voxel), o->v->space, err);
     if (s == STATUS_OK) s = scratch_new(o->v->space, n_voxel * sizeof *o->ridge, "the ridges of fibers", &array, err);
     o->ridge = array;
     array = NULL;
@@ -285,16 +311,15 @@ static status prepare(struct orientation_job *o, const struct reconstruct_option
     if (s != STATUS_OK) return s;
     o->scratch_per_thread = line_filter_scratch(o->filter);
     o->scratch = calloc(n_thread, o->scratch_per_thread * sizeof *o->scratch);
-    o->n_material = calloc(n[2] * n_band(o), sizeof *o->n_material);
-    o->n_kept = calloc(n[2], sizeof *o->n_kept);
-    if (o->scratch == NULL || o->n_material == NULL || o->n_kept == NULL)
-        return error_set(err, STATUS_NO_MEMORY, "cannot filter directions: out of memory");
+    if (o->scratch == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot filter directions: out of memory");
     o->eps_d = (float)option->eps_d;
     o->eps_j = (float)option->eps_j;
     o->j_full = filter_solid_j(option->s, option->t, option->h);
-    tensor_window_init(&o->window, 0.28 * diameter_voxel);
-    o->n_climb = (int)ceil(0.5 * diameter_voxel);
-    if (o->n_climb > MAX_CLIMB) o->n_climb = MAX_CLIMB;
+    tensor_window_init(&o->window, TENSOR_DIAMETERS * diameter_voxel);
+    o->n_climb = climb_of(diameter_voxel);
+    const size_t reach = 2 * (size_t)o->n_climb + consensus_reach(diameter_voxel);
+    o->climb_begin = o->begin > reach ? o->begin - reach : 0;
+    o->climb_end = o->end + reach;
     for (ptrdiff_t c = 0, m = 0; c < 27; c++)
         if (c != 13)
             o->neighbour[m++] = c % 3 - 1 + (c / 3 % 3 - 1) * (ptrdiff_t)n[0] + (c / 9 - 1) * (ptrdiff_t)(n[0] * n[1]);
@@ -311,8 +336,6 @@ static void release(struct orientation_job *o)
     scratch_release(o->v->space, o->ridge);
     scratch_release(o->v->space, (void *)o->j_ridge);
     free(o->scratch);
-    free(o->n_material);
-    free(o->n_kept);
 }
 
 /* Runs all passes over the volume. Their progress continues that of the blur. */
@@ -330,13 +353,44 @@ static status search(struct orientation_job *o, struct thread_pool *pool, const 
     return s == STATUS_CANCELLED ? error_set(err, s, "finding fiber directions was cancelled") : s;
 }
 
-static status count_voxels(const struct orientation_job *o, const struct reconstruct_option *option,
+/* Voxels of a slice. */
+struct slice_count {
+    const struct volume *v;
+    const struct direction_volume *d;
+    float eps_d;
+    size_t *n_material, *n_kept;
+};
+
+static void count_slice(void *context, size_t k, size_t i_thread)
+{
+    (void)i_thread;
+    const struct slice_count *c = context;
+    const size_t n = c->v->n[0] * c->v->n[1];
+    size_t n_material = 0, n_kept = 0;
+    scratch_keep_within(c->v->space);
+    for (size_t at = k * n; at < (k + 1) * n; at++) {
+        n_material += c->v->density[at] >= c->eps_d;
+        n_kept += c->d->density[at] > 0;
+    }
+    c->n_material[k] = n_material;
+    c->n_kept[k] = n_kept;
+}
+
+static status count_voxels(const struct volume *v, const struct direction_volume *d,
+                           const struct reconstruct_option *option, struct thread_pool *pool,
                            struct reconstruct_report *report, struct error *err)
 {
-    size_t n_slice = o->v->n[2];
+    const size_t n_slice = v->n[2];
+    size_t *n = calloc(2 * n_slice, sizeof *n);
+    if (n == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot filter directions: out of memory");
+    struct slice_count c = {v, d, (float)option->eps_d, n, n + n_slice};
+    thread_pool_run(pool, n_slice, count_slice, &c, NULL);
     report->n_material_voxel = report->n_kept_voxel = 0;
-    for (size_t t = 0; t < n_slice * n_band(o); t++) report->n_material_voxel += o->n_material[t];
-    for (size_t k = 0; k < n_slice; k++) report->n_kept_voxel += o->n_kept[k];
+    for (size_t k = 0; k < n_slice; k++) {
+        report->n_material_voxel += c.n_material[k];
+        report->n_kept_voxel += c.n_kept[k];
+    }
+    free(n);
     if (report->n_kept_voxel > 0) return STATUS_OK;
     const char *at_fault = report->n_material_voxel > 0 ? OPTION_FILTER_ANSWER : OPTION_FILTER_DENSITY;
     return error_set_field(err, STATUS_INVALID, at_fault,
@@ -344,29 +398,43 @@ static status count_voxels(const struct orientation_job *o, const struct reconst
                            report->n_material_voxel, option->eps_d, option->eps_j);
 }
 
+status filter_directions_rows(const struct volume *v, const size_t row[2], double diameter_voxel,
+                              const struct reconstruct_option *option, struct thread_pool *pool,
+                              const struct progress *progress, struct direction_volume *d, struct error *err)
+{
+    struct orientation_job o = {.v = v, .d = d, .begin = row[0], .end = row[1]};
+    struct progress_part part = {progress, 0.0, 0.2};
+    const struct progress inner = progress_of_part(&part);
+    *d = (struct direction_volume){0};
+    status s = prepare(&o, option, diameter_voxel, thread_pool_n_thread(pool), err);
+    if (s == STATUS_OK) s = direction_volume_init_in(d, v->n, v->voxel_size_m, v->space, err);
+    if (s == STATUS_OK) s = line_filter_blur(v, option->s, option->t, pool, &inner, &o.blurred, err);
+    if (s == STATUS_OK) /* the climb, half a line, and the taps of its interpolation */
+        s = line_bound_init(&o.bound, &o.blurred, (size_t)o.n_climb + option->h / 2 + 2,
+                            -option->eps_j / (double)option->h, pool, err);
+    if (s == STATUS_OK) s = search(&o, pool, &inner, &part, err);
+    release(&o);
+    if (s != STATUS_OK) direction_volume_release(d);
+    return s;
+}
+
 status filter_directions(const struct volume *v, double diameter_voxel, struct reconstruct_option *option,
                          struct thread_pool *pool, const struct progress *progress, struct direction_volume *d,
                          struct reconstruct_report *report, struct error *err)
 {
-    struct orientation_job o = {.v = v, .d = d};
-    struct progress_part part = {progress, 0.0, 0.2};
-    const struct progress inner = progress_of_part(&part);
+    struct volume_slabs slabs = {0};
+    const size_t all[2] = {0, v->n[1]};
     *d = (struct direction_volume){0};
     filter_choose(option, v, diameter_voxel);
     status s = filter_check(option, err);
+    if (s == STATUS_OK) s = direction_share_deal(&slabs, v, diameter_voxel, option, pool, err);
     if (s != STATUS_OK) return s;
-    s = prepare(&o, option, diameter_voxel, thread_pool_n_thread(pool), err);
-    if (s == STATUS_OK) s = direction_volume_init_in(d, v->n, v->voxel_size_m, v->space, err);
-    if (s != STATUS_OK) goto out;
-    s = line_filter_blur(v, option->s, option->t, pool, &inner, &o.blurred, err);
-    if (s == STATUS_OK) /* the climb, half a line, and the taps of its interpolation */
-        s = line_bound_init(&o.bound, &o.blurred, (size_t)o.n_climb + option->h / 2 + 2,
-                            -option->eps_j / (double)option->h, pool, err);
-    if (s != STATUS_OK) goto out;
-    s = search(&o, pool, &inner, &part, err);
-    if (s == STATUS_OK) s = count_voxels(&o, option, report, err);
-out:
-    release(&o);
+    if (slabs.first != NULL)
+        s = direction_share_filter(&slabs, v, diameter_voxel, option, pool, progress, d, err);
+    else
+        s = filter_directions_rows(v, all, diameter_voxel, option, pool, progress, d, err);
+    volume_slabs_release(&slabs);
+    if (s == STATUS_OK) s = count_voxels(v, d, option, pool, report, err);
     if (s != STATUS_OK) direction_volume_release(d);
     return s;
 }

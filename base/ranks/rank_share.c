@@ -236,6 +236,12 @@ static bool next_task(struct share *s, size_t *i_task)
     return !s->stop && take_from(&s->own, i_task);
 }
 
+/* Sends results as soon as they may fill a message, so that they travel while this rank works on. */
+static void send_early(struct share *s)
+{
+    if (s->n_unsent * s->work->most_bytes > RESULT_MESSAGE_BYTES) send_results(s, RANK_RESULT);
+}
+
 /* Asks for more before the last tasks at hand are begun, so that the answer is there when they are done. */
 static void ask_in_time(struct share *s)
 {
@@ -273,6 +279,7 @@ static void run_in_helper(void *context, size_t i_task, size_t i_thread)
     s->work->run(s->work->context, i_task, i_thread);
     pthread_mutex_lock(&s->lock);
     s->done[s->n_unsent++] = i_task;
+    send_early(s);
     pthread_mutex_unlock(&s->lock);
 }
 
@@ -280,9 +287,10 @@ static void run_in_helper(void *context, size_t i_task, size_t i_thread)
 
 static status prepare(struct share *s, struct error *err)
 {
-    const size_t span = first_span(s), rank = s->team->rank;
-    s->own = (struct span){rank * span, (rank + 1) * span};
-    s->common = s->team->n_rank * span;
+    const size_t span = first_span(s), rank = s->team->rank, *first = s->work->first;
+    s->own =
+        first != NULL ? (struct span){first[rank], first[rank + 1]} : (struct span){rank * span, (rank + 1) * span};
+    s->common = first != NULL ? s->work->n_task : s->team->n_rank * span;
     pthread_mutex_init(&s->lock, NULL);
     pthread_cond_init(&s->more, NULL);
     if (rank == 0) return STATUS_OK;

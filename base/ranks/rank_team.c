@@ -8,7 +8,8 @@
 
 struct order_head {
     uint64_t n_bytes;
-    uint32_t kind, spare;
+    uint32_t kind;
+    uint32_t alone; /* 1: the order is for one helper, which does not pass it on */
 };
 
 status rank_team_open(int fd, size_t rank, size_t n_rank, struct rank_team **team, struct error *err)
@@ -87,19 +88,33 @@ static status send_on(struct rank_team *t, enum rank_message kind, const void *d
     return s;
 }
 
-status rank_team_order(struct rank_team *t, uint32_t kind, const void *data, size_t n_bytes, struct error *err)
+/* Root: sends an order to one helper, or, with rank 0, along the tree to all of them. */
+static status send_order(struct rank_team *t, size_t rank, const struct order_head *head, const void *data,
+                         struct error *err)
 {
-    const struct order_head head = {.n_bytes = n_bytes, .kind = kind};
     t->serial++;
     t->traffic.n_order++;
-    t->traffic.order_bytes += n_bytes;
-    status s = send_on(t, RANK_ORDER, &head, sizeof head, err);
-    for (size_t done = 0; done < n_bytes && s == STATUS_OK;) {
-        size_t n = n_bytes - done < RANK_MESSAGE_MOST ? n_bytes - done : RANK_MESSAGE_MOST;
-        s = send_on(t, RANK_PIECE, (const char *)data + done, n, err);
+    t->traffic.order_bytes += head->n_bytes;
+    status s = rank > 0 ? rank_team_send(t, rank, RANK_ORDER, head, sizeof *head, err)
+                        : send_on(t, RANK_ORDER, head, sizeof *head, err);
+    for (size_t done = 0; done < head->n_bytes && s == STATUS_OK;) {
+        size_t n = head->n_bytes - done < RANK_MESSAGE_MOST ? head->n_bytes - done : RANK_MESSAGE_MOST;
+        const char *piece = (const char *)data + done;
+        s = rank > 0 ? rank_team_send(t, rank, RANK_PIECE, piece, n, err) : send_on(t, RANK_PIECE, piece, n, err);
         done += n;
     }
     return s;
+}
+
+status rank_team_order(struct rank_team *t, uint32_t kind, const void *data, size_t n_bytes, struct error *err)
+{
+    return send_order(t, 0, &(struct order_head){.n_bytes = n_bytes, .kind = kind}, data, err);
+}
+
+status rank_team_order_to(struct rank_team *t, size_t rank, uint32_t kind, const void *data, size_t n_bytes,
+                          struct error *err)
+{
+    return send_order(t, rank, &(struct order_head){.n_bytes = n_bytes, .kind = kind, .alone = 1}, data, err);
 }
 
 /* Waits for a message of one kind. Besides it only an assignment can come, for a helper that was cancelled
@@ -132,16 +147,25 @@ status rank_team_wait(struct rank_team *t, struct rank_order *order, struct erro
     if (order->data == NULL)
         return error_set(err, STATUS_NO_MEMORY, "rank %zu has no memory for an order of %llu bytes", t->rank,
                          (unsigned long long)head.n_bytes);
-    s = send_on(t, RANK_ORDER, &head, sizeof head, err);
+    if (!head.alone) s = send_on(t, RANK_ORDER, &head, sizeof head, err);
     for (size_t done = 0; done < head.n_bytes && s == STATUS_OK; done += frame.n_bytes) {
         s = expect(t, RANK_PIECE, &frame, err);
         if (s != STATUS_OK) break;
         if (frame.n_bytes == 0 || frame.n_bytes > head.n_bytes - done)
             return error_set(err, STATUS_FORMAT, "rank %u sent an order that is too long", frame.peer);
         memcpy((char *)order->data + done, t->buffer, frame.n_bytes);
-        s = send_on(t, RANK_PIECE, t->buffer, frame.n_bytes, err);
+        if (!head.alone) s = send_on(t, RANK_PIECE, t->buffer, frame.n_bytes, err);
     }
     return s;
+}
+
+void rank_team_heed(struct rank_team *t)
+{
+    struct rank_frame frame;
+    bool got = true;
+    while (got && !t->ended && rank_team_receive(t, 0, &got, &frame, NULL) == STATUS_OK)
+        if (got && frame.kind == RANK_ORDER) rank_team_end_early(t);
+    if (t->broken) atomic_store(&t->cancel, true);
 }
 
 void rank_team_end_early(struct rank_team *t)

@@ -9,13 +9,14 @@
 #define SELVEDGE_BASE_RANK_TEAM_H
 
 #include "base/progress.h"
+#include "base/ranks/rank_order_kind.h"
 #include "base/thread_pool.h"
 
 #include <stdint.h>
 
 struct rank_team;
 
-enum { RANK_TEAM_MOST = 65536, RANK_ORDER_END = 0 }; /* the order that ends a helper; others are their callers' */
+enum { RANK_TEAM_MOST = 65536 };
 
 /* What the ranks of a job have exchanged, and how the root has spent its time. */
 struct rank_traffic {
@@ -51,6 +52,9 @@ const atomic_bool *rank_team_cancel(const struct rank_team *team);
 
 /* Root: sends an order to all helpers. STATUS_IO. */
 status rank_team_order(struct rank_team *team, uint32_t kind, const void *data, size_t n_bytes, struct error *err);
+/* Root: sends an order to one helper alone. It has no tasks. STATUS_IO. */
+status rank_team_order_to(struct rank_team *team, size_t rank, uint32_t kind, const void *data, size_t n_bytes,
+                          struct error *err);
 /* Helper: waits for the next order, and passes it on. STATUS_IO when the root is gone. */
 status rank_team_wait(struct rank_team *team, struct rank_order *order, struct error *err);
 void rank_order_release(struct rank_order *order);
@@ -60,11 +64,17 @@ void rank_team_refuse(struct rank_team *team, const struct error *why);
 /* Helper: tells the root that an order without tasks is done. Root: waits until all helpers have said so. */
 void rank_team_confirm(struct rank_team *team);
 status rank_team_gather(struct rank_team *team, struct error *err);
+/* Helper, while it works for long on an order without sharing tasks: takes note of what the root has sent, so that
+ * rank_team_cancel is set when the root cancels the order or ends this rank. From one thread at a time. */
+void rank_team_heed(struct rank_team *team);
 
 /* Tasks that all ranks share. pack writes the result of a task, at most most_bytes, and returns its size; unpack, in
  * the root, puts it into the task's slot and returns false when it cannot be one. */
 struct rank_work {
     size_t n_task, most_bytes;
+    /* Where every rank can run its own tasks only: rank r runs first[r] .. first[r + 1] - 1. NULL: any rank can run
+     * any task. */
+    const size_t *first;
     task_function run;
     size_t (*pack)(void *context, size_t i_task, void *to);
     bool (*unpack)(void *context, size_t i_task, const void *from, size_t n_bytes);
@@ -72,8 +82,8 @@ struct rank_work {
 };
 
 /* Root, after an order, and every helper that follows it, with the same tasks: runs all tasks. In the root all slots
- * are filled afterwards. Half of the tasks are dealt out beforehand, the others in ever smaller parts to ranks that
- * ask. STATUS_CANCELLED; in the root also what a helper has refused with, STATUS_IO, STATUS_NO_MEMORY. */
+ * are filled afterwards. Unless every rank has its own, half of the tasks are dealt out beforehand, the others in ever
+ * smaller parts to ranks that ask. STATUS_CANCELLED; in the root also what a helper has refused with, STATUS_IO, STATUS_NO_MEMORY. */
 status rank_team_share(struct rank_team *team, const struct rank_work *work, struct thread_pool *pool,
                        const struct progress *progress, struct error *err);
 

@@ -19,12 +19,16 @@ struct volume_filled {
     float *density;
 };
 
+struct volume_slabs;
+
 struct volume {
     size_t n[3];
     double voxel_size_m[3];
     float *density;              /* n[0]*n[1]*n[2]; in [0, 1] after density_map_apply, raw scanner values before */
     struct volume_filled filled; /* from the same space */
     struct scratch_space *space; /* not owned */
+    /* Which parts of it other ranks have (geometry/ranks/volume_slabs.h); NULL: none. Not owned. */
+    const struct volume_slabs *slabs;
 };
 
 /* Makes a volume of zeros. STATUS_INVALID, STATUS_TOO_LARGE, STATUS_NO_MEMORY; with a space also STATUS_DISK_FULL. */

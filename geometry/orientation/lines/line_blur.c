@@ -23,11 +23,15 @@ struct blur_job {
     size_t scratch_per_thread;
 };
 
+static double reach_of(double a) { return ceil(3.5 / sqrt(2.0 * a)); }
+
+size_t line_filter_blur_reach(double s, double t) { return (size_t)reach_of(fmin(s, t)); }
+
 /* Samples exp(-a x^2), scaled so that the sum equals the integral. Returns false when memory is out. */
 static bool make_kernel(double a, struct kernel *k)
 {
-    double sigma = 1.0 / sqrt(2.0 * a), sum = 0.0;
-    k->reach = (int)ceil(3.5 * sigma);
+    double sum = 0.0;
+    k->reach = (int)reach_of(a);
     if (k->reach > MAX_REACH) return false;
     for (int i = -k->reach; i <= k->reach; i++) sum += exp(-a * i * i);
     for (int i = -k->reach; i <= k->reach; i++)

@@ -28,6 +28,9 @@
 status line_filter_blur(const struct volume *v, double s, double t, struct thread_pool *pool,
                         const struct progress *progress, struct volume *out, struct error *err);
 
+/* Voxels along an axis up to which L looks. */
+size_t line_filter_blur_reach(double s, double t);
+
 struct line_filter;
 
 /* Makes the tables for lines of length h voxels in volumes of n voxels. STATUS_INVALID for h < 3 or > 63;

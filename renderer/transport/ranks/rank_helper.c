@@ -1,5 +1,6 @@
 #include "renderer/transport/ranks/rank_helper.h"
 
+#include "geometry/ranks/slab_helper.h"
 #include "renderer/transport/ranks/rank_orders.h"
 #include "renderer/transport/ranks/rank_request.h"
 
@@ -122,6 +123,7 @@ static status agree(struct rank_team *team, const struct rank_order *order, cons
 status rank_helper_serve(struct rank_team *team, struct thread_pool *pool, const char *mine, struct error *err)
 {
     struct shared_cloth cloth = {.n_use = 0};
+    struct slab_helper slab = {.n_slice = 0};
     struct error lacks = {0}; /* why a cloth could not be taken: the next request is refused with it */
     status s = STATUS_OK;
     for (bool end = false; !end && s == STATUS_OK;) {
@@ -132,6 +134,8 @@ status rank_helper_serve(struct rank_team *team, struct thread_pool *pool, const
         if (s == STATUS_OK && !end) {
             if (order.kind == RANK_ORDER_CLOTH)
                 shared_cloth_take(&cloth, &order, &lacks);
+            else if (slab_helper_takes(order.kind))
+                refused.code = slab_helper_follow(&slab, team, &order, pool, &refused);
             else if (order.kind == RANK_ORDER_AGREE)
                 agree(team, &order, mine, &refused);
             else if (lacks.code == STATUS_OK)
@@ -140,6 +144,7 @@ status rank_helper_serve(struct rank_team *team, struct thread_pool *pool, const
         }
         rank_order_release(&order);
     }
+    slab_helper_release(&slab);
     shared_cloth_release(&cloth);
     return s;
 }

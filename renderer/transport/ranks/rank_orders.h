@@ -7,13 +7,6 @@
 #include "renderer/transport/ranks/shared_cloth.h"
 #include "renderer/transport/render.h"
 
-enum rank_order_kind {
-    RANK_ORDER_CLOTH = RANK_ORDER_END + 1, /* shared_cloth.h */
-    RANK_ORDER_ESTIMATE,
-    RANK_ORDER_PICTURE,
-    RANK_ORDER_AGREE /* a text; helpers refuse when theirs is another */
-};
-
 /* Whether helpers can trace it: a flat cloth by path tracing, one environment at most. */
 bool rank_orders_can_share(const struct configuration *c, size_t n_configuration, const struct radiance_input *in);
 /* Root: orders that come right before rank_team_share. The team's companion is a struct shared_cloth. STATUS_IO,

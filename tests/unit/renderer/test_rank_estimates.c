@@ -1,9 +1,8 @@
-/* Estimates and pictures that two ranks share: the same bits as those of one rank. The ranks are two processes, joined
- * by a socket as selvedge-mpi joins them by MPI. */
+/* Estimates and pictures that two ranks share: the same bits as those of one rank. */
 #include "base/ranks/byte_pack.h"
 #include "base/ranks/rank_team.h"
-#include "renderer/transport/ranks/rank_helper.h"
 #include "renderer/transport/ranks/rank_orders.h"
+#include "tests/support/ranks/two_ranks.h"
 #include "tests/support/tracer/estimate_fixture.h"
 
 #include <setjmp.h>
@@ -13,9 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/socket.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -33,58 +30,6 @@ static int tear_down(void **state)
     (void)state;
     estimate_fixture_release(&fixture);
     return 0;
-}
-
-/* A root in this process and a helper in another one. */
-struct two_ranks {
-    struct rank_team *team;
-    struct thread_pool *pool;
-    struct shared_cloth cloth;
-    pid_t helper;
-};
-
-static int helper_main(int fd, size_t n_thread)
-{
-    struct rank_team *team = NULL;
-    struct thread_pool *pool = NULL;
-    struct error err = {0};
-    if (thread_pool_new(n_thread, &pool, &err) != STATUS_OK) return 1;
-    if (rank_team_open(fd, 1, 2, &team, &err) != STATUS_OK) return 1;
-    thread_pool_join_team(pool, team);
-    status s = rank_helper_serve(team, pool, "the test", &err);
-    if (s != STATUS_OK) fprintf(stderr, "helper: %s\n", err.text);
-    rank_team_close(team);
-    thread_pool_free(pool);
-    return s != STATUS_OK;
-}
-
-static void start(struct two_ranks *r, size_t n_thread)
-{
-    int end[2];
-    struct error err = {0};
-    memset(r, 0, sizeof *r);
-    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, end), 0);
-    r->helper = fork();
-    if (r->helper == 0) {
-        close(end[0]);
-        _exit(helper_main(end[1], n_thread));
-    }
-    close(end[1]);
-    assert_int_equal(rank_team_open(end[0], 0, 2, &r->team, &err), STATUS_OK);
-    rank_team_accompany(r->team, &r->cloth);
-    assert_int_equal(thread_pool_new(n_thread, &r->pool, &err), STATUS_OK);
-    thread_pool_join_team(r->pool, r->team);
-}
-
-/* Returns how the helper has ended. */
-static int end(struct two_ranks *r)
-{
-    int how = 0;
-    rank_team_close(r->team);
-    thread_pool_free(r->pool);
-    shared_cloth_release(&r->cloth);
-    waitpid(r->helper, &how, 0);
-    return how;
 }
 
 /* The tasks of two replicas are shared at once: the same bits as one after the other. */
@@ -121,7 +66,7 @@ static void two_ranks_estimate_the_same_bits(void **state)
             q.configuration = c;
             q.share_camera_paths = how == 0;
             estimate_fixture_run(&q, 1, alone);
-            start(&r, n_thread);
+            two_ranks_start(&r, n_thread);
             for (int again = 0; again < 2; again++) {
                 assert_int_equal(estimate_run(&q, r.pool, NULL, together, &err), STATUS_OK);
                 assert_memory_equal(alone, together, sizeof alone);
@@ -129,7 +74,7 @@ static void two_ranks_estimate_the_same_bits(void **state)
             if (how != 1) two_replicas_at_once(&q, alone, r.pool);
             assert_true(rank_team_traffic(r.team).result_bytes > 0); /* the helper has done a part of it */
             assert_int_equal(rank_team_traffic(r.team).n_order, how != 1 ? 4 : 3); /* the cloth is sent once */
-            assert_int_equal(end(&r), 0);
+            assert_int_equal(two_ranks_end(&r), 0);
         }
 }
 
@@ -144,11 +89,11 @@ static void two_ranks_render_the_same_bits(void **state)
     struct two_ranks r;
     struct error err = {0};
     assert_int_equal(render_run(&q, NULL, NULL, &alone, &err), STATUS_OK);
-    start(&r, 1);
+    two_ranks_start(&r, 1);
     assert_int_equal(render_run(&q, r.pool, NULL, &together, &err), STATUS_OK);
     assert_true(rank_team_traffic(r.team).result_bytes > 0);
     assert_memory_equal(alone.pixel, together.pixel, 24 * 16 * alone.n_channel * sizeof *alone.pixel);
-    assert_int_equal(end(&r), 0);
+    assert_int_equal(two_ranks_end(&r), 0);
     image_release(&alone);
     image_release(&together);
 }
@@ -170,7 +115,7 @@ static void a_cancelled_estimate_leaves_no_trace(void **state)
     const struct progress progress = {.report = set_cancel, .context = &cancel, .cancel = &cancel};
     struct estimate_request q = estimate_fixture_request(&fixture, few, 2);
     estimate_fixture_run(&q, 1, alone);
-    start(&r, 1);
+    two_ranks_start(&r, 1);
     q.n_path = many;
     for (int again = 0; again < 2; again++) { /* before it begins, and in the middle */
         atomic_store(&cancel, again == 0);
@@ -179,7 +124,7 @@ static void a_cancelled_estimate_leaves_no_trace(void **state)
     q.n_path = few;
     assert_int_equal(estimate_run(&q, r.pool, NULL, together, &err), STATUS_OK);
     assert_memory_equal(alone, together, sizeof alone);
-    assert_int_equal(end(&r), 0);
+    assert_int_equal(two_ranks_end(&r), 0);
 }
 
 static void ranks_of_another_program_are_refused(void **state)
@@ -187,11 +132,11 @@ static void ranks_of_another_program_are_refused(void **state)
     (void)state;
     struct two_ranks r;
     struct error err = {0};
-    start(&r, 1);
+    two_ranks_start(&r, 1);
     assert_int_equal(rank_orders_agree(r.team, "the test", &err), STATUS_OK);
     assert_int_equal(rank_orders_agree(r.team, "another", &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "this rank runs 'the test', rank 0 runs 'another'"));
-    assert_int_equal(end(&r), 0);
+    assert_int_equal(two_ranks_end(&r), 0);
 }
 
 static void a_lost_helper_ends_the_estimate(void **state)
@@ -202,11 +147,11 @@ static void a_lost_helper_ends_the_estimate(void **state)
     struct two_ranks r;
     struct error err = {0};
     struct estimate_request q = estimate_fixture_request(&fixture, n_path, 1);
-    start(&r, 1);
+    two_ranks_start(&r, 1);
     kill(r.helper, SIGKILL);
     assert_int_equal(estimate_run(&q, r.pool, NULL, out, &err), STATUS_IO);
     assert_true(rank_team_broken(r.team));
-    assert_int_equal(WTERMSIG(end(&r)), SIGKILL);
+    assert_int_equal(WTERMSIG(two_ranks_end(&r)), SIGKILL);
 }
 
 static void views_never_read_more_than_there_is(void **state)

@@ -16,6 +16,7 @@
 /* What all bricks share. */
 struct axis_model {
     const struct volume *v;
+    size_t first_row;                    /* of the whole volume that v begins with; 0 but in ranks with a slab of it */
     const struct segment_bricks *bricks; /* with edge AXIS_BRICK */
     const struct section_view *section;  /* of each segment; NULL: discs */
     const struct lumen_view *lumen;      /* of each segment, with sections; NULL: solid fibers */

@@ -1,8 +1,9 @@
 #include "geometry/fibers/shape/axes/axis_fit.h"
 #include "base/small_matrix.h"
-#include "geometry/fibers/shape/axes/axis_brick.h"
+#include "geometry/fibers/shape/axes/axis_round.h"
 #include "geometry/fibers/shape/axes/axis_solve.h"
 #include "geometry/fibers/shape/axes/shape_measure.h"
+#include "geometry/ranks/axis_share.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -13,23 +14,6 @@ static const double SECTION_DIAMETERS = 1.0; /* length over which sections are s
 /* Standard deviation of the flatness of fibers (fiber_section.h) that holds sections to discs. */
 static const double FLATNESS_SD = 0.3;
 static const double PIECE_DIAMETERS = 2.0; /* length of the pieces that show the error of a radius */
-static const float ROUNDING = 0.01f;       /* voxels added to the reach of segments */
-
-struct fit_job {
-    struct axis_model model;
-    size_t first_brick;           /* of the batch */
-    struct axis_scratch *scratch; /* one per thread */
-    struct axis_brick_sum *sum;   /* one per brick of the batch */
-    bool *failed;                 /* one per thread */
-};
-
-static void fit_brick(void *context, size_t i_task, size_t i_thread)
-{
-    struct fit_job *job = context;
-    scratch_keep_within(job->model.v->space);
-    if (!axis_brick_fit(&job->model, job->first_brick + i_task, &job->scratch[i_thread], &job->sum[i_task]))
-        job->failed[i_thread] = true;
-}
 
 static void add_shared(struct shared_sum *to, const struct shared_sum *from)
 {
@@ -132,10 +116,10 @@ static void add_lumen(struct fit_work *w, uint32_t segment, const struct lumen_p
 }
 
 /* Adds the bricks of a batch in order, so that sums do not depend on the number of threads. */
-static void add_batch(const struct fit_job *job, size_t n_brick, struct fit_work *w)
+static void add_batch(const struct axis_batch *job, struct fit_work *w)
 {
     const struct segment_bricks *bricks = job->model.bricks;
-    for (size_t b = 0; b < n_brick; b++) {
+    for (size_t b = 0; b < job->n_brick; b++) {
         const struct axis_brick_sum *sum = &job->sum[b];
         const size_t *first = &bricks->first[job->first_brick + b];
         for (size_t e = 0; e < 2 * (first[1] - first[0]); e++) {
@@ -165,7 +149,7 @@ static void damp(struct fit_work *w, struct axis_profile *p)
 }
 
 /* Steps all vertices, radii and the profile from the sums of all bricks. */
-static status make_step(struct fit_job *job, struct polyline_set *lines, struct fit_work *w, double diameter,
+static status make_step(struct axis_batch *job, struct polyline_set *lines, struct fit_work *w, double diameter,
                         struct thread_pool *pool, struct error *err)
 {
     struct axis_profile *profile = &job->model.profile;
@@ -188,23 +172,6 @@ static status make_step(struct fit_job *job, struct polyline_set *lines, struct 
     return s == STATUS_OK ? axis_solve_lines(lines, w->total, stiffness, pool, err) : s;
 }
 
-/* Finds how far each segment's fiber reaches in the model. view: NULL for discs. */
-static void find_reach(const struct polyline_set *lines, const struct section_view *view, float tail, float *reach)
-{
-    for (size_t l = 0, n = 0; l < lines->n_line; l++)
-        for (size_t i = lines->first[l]; i + 1 < lines->first[l + 1]; i++, n++)
-            reach[n] = (view != NULL ? view[n].stretch : 1.0f) * polyline_segment_radius(lines, l, i) + tail + ROUNDING;
-}
-
-/* Prepares the sections of all segments. */
-static void view_sections(const struct polyline_set *lines, struct fiber_section *section, struct section_view *view)
-{
-    fiber_sections_turn(lines, section);
-    for (size_t l = 0; l < lines->n_line; l++)
-        for (size_t i = lines->first[l]; i + 1 < lines->first[l + 1]; i++)
-            *view++ = fiber_section_view(&section[i], &section[i + 1], lines->vertex[i], lines->vertex[i + 1]);
-}
-
 static void view_lumens(const struct polyline_set *lines, const struct axis_profile *p,
                         const struct section_view *section, struct lumen_view *view)
 {
@@ -215,7 +182,7 @@ static void view_lumens(const struct polyline_set *lines, const struct axis_prof
 
 /* Number of bricks from job->first_brick on that are fitted before their sums are added: at least one layer of bricks,
  * and more while they have at most MAX_BATCH segments. */
-static size_t batch_size(const struct fit_job *job)
+static size_t batch_size(const struct axis_batch *job)
 {
     const struct segment_bricks *b = job->model.bricks;
     size_t layer = b->n_brick[0] * b->n_brick[1], end = job->first_brick + layer;
@@ -223,88 +190,58 @@ static size_t batch_size(const struct fit_job *job)
     return end - job->first_brick;
 }
 
-/* Fits a batch of bricks and adds their sums to the work. */
-static status fit_batch(struct fit_job *job, size_t n_brick, struct fit_work *w, struct thread_pool *pool,
+/* Fits a batch of bricks, with the other ranks where they have the volume, and adds their sums to the work. */
+static status fit_batch(struct axis_batch *job, struct fit_work *w, struct thread_pool *pool,
                         const struct progress *progress, struct error *err)
 {
     const struct progress quiet = progress_silent(progress);
-    job->sum = calloc(n_brick, sizeof *job->sum);
-    bool failed = job->sum == NULL;
-    status s = failed ? STATUS_OK : thread_pool_run(pool, n_brick, fit_brick, job, &quiet);
-    for (size_t t = 0; t < thread_pool_n_thread(pool); t++) failed = failed || job->failed[t];
-    if (s != STATUS_OK)
-        error_set(err, s, "fitting fibers was cancelled");
-    else if (failed)
-        s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
+    bool failed = false;
+    status s = axis_batch_start(job, err);
+    if (s != STATUS_OK) return s;
+    if (axis_share_can(job))
+        s = axis_share_bricks(job, pool, &quiet, err);
     else
-        add_batch(job, n_brick, w);
-    for (size_t b = 0; job->sum != NULL && b < n_brick; b++) {
-        free(job->sum[b].pull);
-        free(job->sum[b].section);
-        free(job->sum[b].lumen);
-    }
-    free(job->sum);
-    job->sum = NULL;
+        s = thread_pool_run(pool, job->n_brick, axis_batch_fit, job, &quiet);
+    for (size_t t = 0; t < thread_pool_n_thread(pool); t++) failed = failed || job->failed[t];
+    if (s == STATUS_CANCELLED)
+        error_set(err, s, "fitting fibers was cancelled");
+    else if (s == STATUS_OK && failed)
+        s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
+    else if (s == STATUS_OK)
+        add_batch(job, w);
+    axis_batch_end(job);
     return s;
 }
 
-static status one_round(struct fit_job *job, struct polyline_set *lines, struct fit_work *w, double diameter,
+static status one_round(struct axis_batch *job, struct polyline_set *lines, struct fit_work *w, double diameter,
                         struct thread_pool *pool, const struct progress *progress, struct error *err)
 {
     struct segment_bricks bricks = {0};
     struct axis_model *m = &job->model;
-    m->tail = (float)(AXIS_TAIL * m->profile.blur);
-    m->inverse_blur = (float)(1.0 / m->profile.blur);
-    if (w->view != NULL) {
-        view_sections(lines, m->profile.section, w->view);
-        memset(w->section, 0, lines->n_vertex * sizeof *w->section);
-    }
+    status s = STATUS_OK;
+    if (m->v->slabs != NULL && m->profile.lumen == NULL) s = axis_share_round(m, lines, err);
+    if (s == STATUS_OK) s = axis_round_prepare(m, lines, m->v->n, w->view, w->reach, &bricks, err);
+    if (s != STATUS_OK) return s;
+    if (w->view != NULL) memset(w->section, 0, lines->n_vertex * sizeof *w->section);
     if (w->lumen_view != NULL) {
         view_lumens(lines, &m->profile, w->view, w->lumen_view);
         memset(w->lumen, 0, lines->n_vertex * sizeof *w->lumen);
     }
-    m->section = w->view;
     m->lumen = w->lumen_view;
     m->lumen_table = w->lumen_table;
-    find_reach(lines, w->view, m->tail, w->reach);
-    status s = segment_bricks_init_each(&bricks, lines, m->v->n, AXIS_BRICK, w->reach, err);
-    if (s != STATUS_OK) return s;
-    size_t n_brick = segment_n_brick(&bricks), n_batch;
-    m->bricks = &bricks;
+    const size_t n_brick = segment_n_brick(&bricks);
     memset(w->total, 0, lines->n_vertex * sizeof *w->total);
     memset(w->radius, 0, lines->n_line * sizeof *w->radius);
     w->shared = (struct shared_sum){0};
-    for (job->first_brick = 0; job->first_brick < n_brick && s == STATUS_OK; job->first_brick += n_batch) {
-        n_batch = batch_size(job);
-        s = fit_batch(job, n_batch, w, pool, progress, err);
-        progress_report(progress, (double)(job->first_brick + n_batch) / (double)n_brick);
+    for (job->first_brick = 0; job->first_brick < n_brick && s == STATUS_OK; job->first_brick += job->n_brick) {
+        job->n_brick = batch_size(job);
+        s = fit_batch(job, w, pool, progress, err);
+        progress_report(progress, (double)(job->first_brick + job->n_brick) / (double)n_brick);
     }
     if (s == STATUS_OK) s = make_step(job, lines, w, diameter, pool, err);
     m->bricks = NULL;
     segment_bricks_release(&bricks);
     return s;
-}
-
-static struct fit_job *new_job(const struct volume *v, const struct axis_profile *profile, size_t n_thread)
-{
-    struct fit_job *job = calloc(1, sizeof *job);
-    if (job == NULL) return NULL;
-    job->model.v = v;
-    job->model.profile = *profile;
-    axis_table_init(&job->model.table);
-    job->scratch = malloc(n_thread * sizeof *job->scratch);
-    job->failed = calloc(n_thread, sizeof *job->failed);
-    for (size_t t = 0; t < n_thread && job->scratch != NULL; t++) axis_scratch_init(&job->scratch[t]);
-    return job;
-}
-
-static void free_job(struct fit_job *job, size_t n_thread)
-{
-    if (job == NULL) return;
-    for (size_t t = 0; t < n_thread && job->scratch != NULL; t++) axis_scratch_release(&job->scratch[t]);
-    free(job->scratch);
-    free(job->failed);
-    free(job);
 }
 
 /* Variances of a change of all radii, and of the areas of all lumens, together, for a noise of 1. n: of the shared
@@ -324,10 +261,13 @@ status polylines_fit(struct polyline_set *lines, const struct volume *v, double 
                      struct error *err)
 {
     const size_t n_thread = thread_pool_n_thread(pool);
-    struct fit_job *job = new_job(v, profile, n_thread);
+    struct axis_batch *job = calloc(1, sizeof *job);
     struct fit_work work = {0};
-    status s = STATUS_OK;
-    if (job == NULL || job->scratch == NULL || job->failed == NULL ||
+    if (job == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
+    job->model.v = v;
+    job->model.profile = *profile;
+    status s = axis_batch_init(job, n_thread, err);
+    if (s == STATUS_OK &&
         !init_work(&work, lines, profile->section != NULL, profile->section != NULL && profile->lumen != NULL))
         s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
     for (size_t l = 0; l < lines->n_line; l++)
@@ -354,6 +294,7 @@ status polylines_fit(struct polyline_set *lines, const struct volume *v, double 
         s = fiber_shapes_measure(lines, &sums, profile->measure, err);
     }
     release_work(&work);
-    free_job(job, n_thread);
+    axis_batch_release(job, n_thread);
+    free(job);
     return s;
 }
