@@ -128,17 +128,16 @@ void worker_team_end_stage(struct thread_pool *pool, const struct rank_traffic *
     if (team == NULL) return;
     const struct rank_traffic r = rank_team_traffic(team);
     if (r.n_share == before->n_share) return;
-    log_info(
-        log,
-        "stage %s: %zu ranks shared %zu estimates and pictures (%zu tasks, %.2f s): %zu orders of %llu bytes, %llu "
-        "bytes of results in %zu messages; rank 0 waited %.3f s for others, and ran %zu tasks in %.3f s of "
-        "processor time, of %.3f s for shared work and %.3f s in all",
-        stage, rank_team_n_rank(team), r.n_share - before->n_share, r.n_task - before->n_task,
-        r.share_s - before->share_s, r.n_order - before->n_order,
-        (unsigned long long)(r.order_bytes - before->order_bytes),
-        (unsigned long long)(r.result_bytes - before->result_bytes), r.n_message - before->n_message,
-        r.wait_s - before->wait_s, r.n_own - before->n_own, r.own_cpu_s - before->own_cpu_s,
-        r.share_cpu_s - before->share_cpu_s, r.cpu_s - before->cpu_s);
+    log_info(log,
+             "stage %s: %zu ranks shared work %zu times (%zu tasks, %.2f s): %zu orders of %llu bytes, %llu "
+             "bytes of results in %zu messages; rank 0 waited %.3f s for others, and ran %zu tasks in %.3f s of "
+             "processor time, of %.3f s for shared work and %.3f s in all",
+             stage, rank_team_n_rank(team), r.n_share - before->n_share, r.n_task - before->n_task,
+             r.share_s - before->share_s, r.n_order - before->n_order,
+             (unsigned long long)(r.order_bytes - before->order_bytes),
+             (unsigned long long)(r.result_bytes - before->result_bytes), r.n_message - before->n_message,
+             r.wait_s - before->wait_s, r.n_own - before->n_own, r.own_cpu_s - before->own_cpu_s,
+             r.share_cpu_s - before->share_cpu_s, r.cpu_s - before->cpu_s);
 }
 
 int worker_team_help(const struct worker_team_place *place, size_t n_thread)

@@ -21,7 +21,7 @@ ROOT_MAY = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT
 # in which a helper prepares an estimate of 10 rows with derivatives (radiance_source_init; least of 50, 2026-11-25)
 PREPARE_S = 7e-4
 RANKS = [1, 2, 4, 8, 16, 32, 64]
-LOG = re.compile(r"stage fit: 2 ranks shared (\d+) estimates and pictures \((\d+) tasks, [\d.]+ s\): (\d+) orders of (\d+) bytes, (\d+) bytes of results in "
+LOG = re.compile(r"stage fit: 2 ranks shared work (\d+) times \((\d+) tasks, [\d.]+ s\): (\d+) orders of (\d+) bytes, (\d+) bytes of results in "
                  r"(\d+) messages; rank 0 waited ([\d.]+) s for others, and ran (\d+) tasks in [\d.]+ s of "
                  r"processor time, of ([\d.]+) s for shared work and ([\d.]+) s in all")
 
