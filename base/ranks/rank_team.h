@@ -83,7 +83,8 @@ struct rank_work {
 
 /* Root, after an order, and every helper that follows it, with the same tasks: runs all tasks. In the root all slots
  * are filled afterwards. Unless every rank has its own, half of the tasks are dealt out beforehand, the others in ever
- * smaller parts to ranks that ask. STATUS_CANCELLED; in the root also what a helper has refused with, STATUS_IO, STATUS_NO_MEMORY. */
+ * smaller parts to ranks that ask. STATUS_CANCELLED; in the root also what a helper has refused with, STATUS_IO,
+ * STATUS_NO_MEMORY. */
 status rank_team_share(struct rank_team *team, const struct rank_work *work, struct thread_pool *pool,
                        const struct progress *progress, struct error *err);
 

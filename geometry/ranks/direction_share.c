@@ -2,7 +2,7 @@
 
 #include "base/ranks/byte_pack.h"
 #include "geometry/filter_choice.h"
-#include "geometry/filter_directions.h"
+#include "geometry/filter_rows.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -125,8 +125,8 @@ status direction_share_deal(struct volume_slabs *slabs, const struct volume *v, 
 {
     size_t most = 0;
     *slabs = (struct volume_slabs){.team = thread_pool_team(pool),
-                                   .halo = filter_directions_halo(option, diameter_voxel),
-                                   .align = filter_directions_alignment(diameter_voxel)};
+                                   .halo = filter_rows_halo(option, diameter_voxel),
+                                   .align = filter_rows_alignment(diameter_voxel)};
     if (slabs->team == NULL) return STATUS_OK;
     status s = volume_slabs_deal(slabs, v, err);
     for (size_t r = 0; s == STATUS_OK && r < slabs->n_rank; r++) {
@@ -156,7 +156,7 @@ static status filter_own(const struct volume_slabs *slabs, const struct volume *
                n[0] * n[1] * sizeof *v->density);
         scratch_keep_within(v->space);
     }
-    s = filter_directions_rows(&slab, own, diameter_voxel, option, pool, progress, part, err);
+    s = filter_rows(&slab, own, diameter_voxel, option, pool, progress, part, err);
     volume_release(&slab);
     return s;
 }
@@ -228,12 +228,12 @@ status direction_share_help(struct slab_helper *h, const struct rank_order *orde
     option.eps_d = o.eps_d;
     option.eps_j = o.eps_j;
     const bool right = s == STATUS_OK && order_makes_sense(&o) && filter_check(&option, NULL) == STATUS_OK &&
-                       h->slabs.halo == filter_directions_halo(&option, o.diameter_voxel) &&
-                       h->slabs.align == filter_directions_alignment(o.diameter_voxel);
+                       h->slabs.halo == filter_rows_halo(&option, o.diameter_voxel) &&
+                       h->slabs.align == filter_rows_alignment(o.diameter_voxel);
     if (!right) return error_set(err, STATUS_FORMAT, "another rank asks for directions of fibers that cannot be");
     const struct progress progress = {.report = heed_root, .context = team, .cancel = rank_team_cancel(team)};
     if (h->volume.density != NULL)
-        s = filter_directions_rows(&h->volume, own, o.diameter_voxel, &option, pool, &progress, &part, err);
+        s = filter_rows(&h->volume, own, o.diameter_voxel, &option, pool, &progress, &part, err);
     struct gather g = {.slabs = &h->slabs, .part = &part, .part_row = r->with_halo};
     if (s == STATUS_OK) s = gather_rows(&g, pool, &(struct progress){.cancel = progress.cancel}, err);
     direction_volume_release(&part);

@@ -1,7 +1,7 @@
 /* The geometry of a scan by slabs over two ranks: the same bits as by one rank alone. Orders that make no sense are
  * refused. */
 #include "base/ranks/byte_pack.h"
-#include "geometry/filter_directions.h"
+#include "geometry/filter_rows.h"
 #include "geometry/ranks/axis_share.h"
 #include "geometry/ranks/direction_share.h"
 #include "geometry/reconstruct.h"
@@ -120,7 +120,7 @@ static void rows_depend_on_no_more_than_their_halo(void **state)
     struct direction_volume part;
     struct volume slab;
     struct error err = {0};
-    const size_t align = filter_directions_alignment(5.0), halo = filter_directions_halo(o, 5.0);
+    const size_t align = filter_rows_alignment(5.0), halo = filter_rows_halo(o, 5.0);
     for (size_t begin = halo; begin + 1 < NY - halo; begin += 29) { /* rows far from the faces, one at a time */
         const size_t from = (begin - halo) / align * align, n[3] = {NX, begin + 1 + halo - from, NZ};
         const size_t row[2] = {begin - from, begin - from + 1};
@@ -128,7 +128,7 @@ static void rows_depend_on_no_more_than_their_halo(void **state)
         for (size_t k = 0; k < NZ; k++)
             memcpy(slab.density + volume_index(n, 0, 0, k), scan.density + volume_index(scan.n, 0, from, k),
                    n[0] * n[1] * sizeof *slab.density);
-        assert_int_equal(filter_directions_rows(&slab, row, 5.0, o, NULL, NULL, &part, &err), STATUS_OK);
+        assert_int_equal(filter_rows(&slab, row, 5.0, o, NULL, NULL, &part, &err), STATUS_OK);
         for (size_t k = 0; k < NZ; k++) {
             const size_t a = volume_index(n, 0, row[0], k), b = volume_index(scan.n, 0, begin, k);
             assert_memory_equal(part.density + a, whole->density + b, NX);
