@@ -19,6 +19,7 @@ void pipeline_context_init(struct pipeline_context *c)
     observation_set_init(&c->contrast);
     fiber_set_init(&c->fiber);
     fiber_set_init(&c->traced);
+    c->path_share = 1.0;
     c->exports = json_array();
     c->surface_pictures = json_array();
     for (size_t i = 0; i < sizeof c->stage_wall_s / sizeof c->stage_wall_s[0]; i++) c->stage_wall_s[i] = NAN;

@@ -185,6 +185,8 @@ struct pipeline_context {
     double stage_fraction;   /* of the running stage, as last reported */
     double fit_path;         /* that the fits are expected to take, with what follows them in their stage */
     double usual_wall_s;     /* of the whole job, by the speeds of a common machine (job_need.h) */
+    double certificate_s;    /* processor time of the gradient certificates, on one thread (plan_probe.h) */
+    double path_share;       /* time of a path in this cloth over that in a closed one */
     double stage_wall_s[16]; /* by index of the stage table; of this attempt, NaN for a stage that an earlier one did */
 };
 

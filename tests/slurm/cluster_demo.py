@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """make cluster-demo: a batch of six small samples on a Slurm of two virtual nodes, with its database in PostgreSQL, one
-worker killed in mid-fit, and every result compared bit by bit with that of the local backend on SQLite. Everything is in
-a folder below build/, and is stopped at the end, also after Ctrl-C. Exit status 77: the packages are not installed."""
+worker killed in mid-fit, and every result compared bit by bit with that of the local backend on SQLite; what `selvedge
+plan` expected of the batch, and what it took. Everything is in a folder below build/, and is stopped at the end, also
+after Ctrl-C. Exit status 77: the packages are not installed."""
 import argparse
 import contextlib
 import hashlib
@@ -56,20 +57,26 @@ def make_samples(folder):
 
 
 class Batch:
-    """The batch on one daemon."""
+    """The batch on one daemon, planned before it starts."""
 
     def __init__(self, daemon, samples):
         self.daemon = daemon
-        self.cli("submit", os.path.join(samples, "template.json"), os.path.join(samples, "week.csv"))
+        self.cli("batch", "submit", os.path.join(samples, "template.json"), os.path.join(samples, "week.csv"), "--draft")
+        self.cli("plan", "week")
+        self.cli("batch", "start", "week")
         jobs = daemon.get("/v1/jobs", params={"limit": 100}).json()["jobs"]
         self.job = {j["sample"]: j["id"] for j in jobs}
         assert len(self.job) == N_SAMPLE, self.job
 
     def cli(self, *arguments):
-        done = subprocess.run([program("selvedge"), "batch", *arguments, "--server", self.daemon.url], capture_output=True, text=True, check=False)
+        done = subprocess.run([program("selvedge"), *arguments, "--server", self.daemon.url], capture_output=True, text=True, check=False)
         if done.returncode != 0:
-            raise RuntimeError(f"selvedge batch {arguments[0]}: {done.stdout}{done.stderr}")
+            raise RuntimeError(f"selvedge {' '.join(arguments[:2])}: {done.stdout}{done.stderr}")
         return done.stdout
+
+    def say_plan(self):
+        """What was expected, and what the samples with one attempt took."""
+        say("selvedge plan week\n" + "".join(f"  {line}\n" for line in self.cli("plan", "week").splitlines()).rstrip())
 
     def folder(self, sample):
         return os.path.join(self.daemon.data, "jobs", self.job[sample])
@@ -163,6 +170,7 @@ def on_cluster(folder, samples, options, kind):
             if jobs[sample]["attempt"] != 2 or jobs[sample]["lost_attempts"] != 1:
                 raise RuntimeError(f"the killed job has {jobs[sample]['attempt']} attempts")
             say(cluster.run("squeue", "--states=all", "--sort=i", "--format=%.6i %.20j %.10T %.6N").rstrip())
+            batch.say_plan()
             return {s: batch.results(s) for s in jobs}
 
 
@@ -170,8 +178,9 @@ def on_this_machine(folder, samples, options):
     with Daemon(os.path.join(folder, "local"), worker=program("selvedge-worker"), options={"jobs.workers": 2, "jobs.threads": 1, **options}) as daemon:
         batch = Batch(daemon, samples)
         jobs = batch.wait()
-        for line in batch.cli("results", "week").splitlines():
+        for line in batch.cli("batch", "results", "week").splitlines():
             say("  " + " ".join(f"{cell:.22s}".ljust(16) for cell in (line.split(",")[i] for i in (0, 2, 3, 4, 5, 7))))
+        batch.say_plan()
         return {s: batch.results(s) for s in jobs}
 
 

@@ -2,7 +2,9 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/stage_table.h"
 #include "optimizer/worker/progress/pipeline_plan.h"
+#include "optimizer/worker/progress/plan_probe.h"
 #include "optimizer/worker/report/json_number.h"
+#include "optimizer/worker/report/result_pictures.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -16,10 +18,12 @@ static const double usual_busy = 0.85;
  * Measured on scans of 2 and 17 million voxels (78 and 357 MB), a file of fibers of 0.3 MB (33 MB), and weaves and
  * felts of sizes from 8,000 to 518,000 (33 to 214 MB). */
 static const double program_bytes = 31e6, voxel_bytes = 19.0, fiber_file_bytes = 10.0, cloth_bytes = 355.0;
-/* Disk of results: pages, renderings and the journal of a fit; of a voxel of a scan, whose density, directions and
- * checkpoints are kept; of a byte of a file of fibers; of a described cloth. Measured on the same jobs (51, 405, 6, and
- * 3 to 94 MB in all). */
-static const double result_bytes = 3e6, voxel_result_bytes = 22.0, fiber_result_bytes = 1.5, cloth_result_bytes = 180.0;
+/* Disk of results: pages, and the journal of a fit; of a pixel of a rendering; both together of a job without a fit; of
+ * a voxel of a scan, whose density, directions and checkpoints are kept; of a byte of a file of fibers; of a described
+ * cloth. Measured on the same jobs (51, 405, 6, and 3 to 94 MB in all), and with renderings of 8 and of 94 pixels (0.9
+ * and 2.6 MB). */
+static const double result_bytes = 1e6, pixel_bytes = 28.0, unfitted_bytes = 3e6, voxel_result_bytes = 22.0,
+                    fiber_result_bytes = 1.5, cloth_result_bytes = 180.0;
 
 /* The geometry is that of another job, which this one cannot look at before it runs: neither can its size be known. */
 static bool is_adopted(const struct pipeline_context *c) { return c->doc->geometry_job[0] != '\0'; }
@@ -67,6 +71,14 @@ static void add_input(void *context, const char *name, const char *role)
     if (strcmp(name, sum->c->doc->fiber_file) == 0) sum->fibers = (double)file.st_size;
 }
 
+/* Pages and renderings. */
+static double page_bytes(const struct pipeline_context *c)
+{
+    if (c->fitted.n == 0) return unfitted_bytes;
+    const double px = (double)result_picture_px(c, pipeline_plan_usual_paths(c));
+    return result_bytes + pixel_bytes * px * px * (double)c->observation.n;
+}
+
 /* What the models say without corrections. */
 static struct job_need model_of(const struct pipeline_context *c)
 {
@@ -75,11 +87,12 @@ static struct job_need model_of(const struct pipeline_context *c)
     const double n_voxel = c->doc->has_volume && !is_adopted(c) ? pipeline_plan_voxels(c) : 0.0;
     double geometry_bytes = voxel_bytes * n_voxel;
     if (c->memory_limit_bytes > 0) geometry_bytes = fmin(geometry_bytes, (double)c->memory_limit_bytes);
-    const double size = pipeline_plan_cloth_size(c);
-    return (struct job_need){.cpu_s = usual_busy * c->usual_wall_s * (double)thread_pool_n_thread(c->pool),
+    const double size = pipeline_plan_cloth_size(c), n_thread = (double)thread_pool_n_thread(c->pool),
+                 thread_s = c->usual_wall_s * n_thread - c->certificate_s * (n_thread - 1.0);
+    return (struct job_need){.cpu_s = usual_busy * thread_s,
                              .memory_bytes =
                                  program_bytes + geometry_bytes + fiber_file_bytes * input.fibers + cloth_bytes * size,
-                             .disk_bytes = input.all + result_bytes + voxel_result_bytes * n_voxel +
+                             .disk_bytes = input.all + page_bytes(c) + voxel_result_bytes * n_voxel +
                                            fiber_result_bytes * input.fibers + cloth_result_bytes * size};
 }
 
@@ -126,6 +139,7 @@ void job_need_begin(struct pipeline_context *c)
     struct error unused = {0};
     size_t n[3];
     if (c->doc->n_volume_file > 0 && pipeline_scan_size(c, n, NULL) == STATUS_OK) memcpy(c->geometry.n, n, sizeof n);
+    plan_probe_take(c);
     c->usual_wall_s = 0.0;
     if (worker_status_new(c->folder, NULL, &usual, &unused) != STATUS_OK) return;
     c->status = usual;

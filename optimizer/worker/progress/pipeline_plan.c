@@ -49,9 +49,9 @@ static const double usual_material = 0.4;
 static const double misfit_row_paths = 62500.0, noise_row_paths = 264000.0, cloth_share = 0.7;
 /* Of the time of the fit, the share of the fit where a scan's errors are carried on. */
 static const double usual_budget = 6e6, fit_share = 1.0 - PIPELINE_SCAN_ERROR_SHARE;
-/* Time of a validated path over that of a fitted one; paths in whose time the rest of a report is made: the gradient
- * certificate, geometry, pages. */
-static const double validated_path = 0.88, rest_of_report_paths = 1.5e5;
+/* Time of a validated path over that of a fitted one; paths in whose time the rest of a report is made, without what
+ * its gradient certificate takes to prepare the models: pages, and the geometry of a scan. */
+static const double validated_path = 0.88, page_paths = 2e4, scan_page_paths = 7e4;
 static const double least_s = 0.05;
 /* Time of one thread in which a model is fitted to the profile of a fiber. */
 static const double usual_profile_s = 3.0;
@@ -152,7 +152,7 @@ double pipeline_plan_usual_paths(const struct pipeline_context *c)
     return fmin((c->doc->n_photograph > 0 ? noise_row_paths : misfit_row_paths) * (double)c->fitted.n, budget);
 }
 
-/* Seconds that a path of the fit takes, by how bright its rows are. */
+/* Seconds that a path of the fit takes, by how bright its rows are and how thin the cloth is. */
 static double usual_s_per_path(const struct pipeline_context *c)
 {
     double sum = 0.0, n = (double)c->fitted.n;
@@ -161,7 +161,7 @@ static double usual_s_per_path(const struct pipeline_context *c)
         sum += fmax(rgb[0], fmax(rgb[1], rgb[2])) / n;
     }
     double bright = fmin(fmax(sum / usual_radiance, 0.1), 5.0); /* one, where no row has been read */
-    return fit_s_per_path * (n > 0.0 ? pow(bright, radiance_power) : 1.0);
+    return c->path_share * fit_s_per_path * (n > 0.0 ? pow(bright, radiance_power) : 1.0);
 }
 
 static void plan_fit(struct pipeline_context *c, size_t i)
@@ -205,6 +205,15 @@ static double validation_paths(const struct pipeline_context *c)
     const double n_fit = fit_paths(c);
     return validated_path * (double)c->n_model *
            (pipeline_validation_paths(c, n_fit) + pipeline_factor_paths(c, n_fit) + pipeline_pilot_paths(n_fit));
+}
+
+/* Paths of a report. Its certificate runs on one thread. */
+static double report_paths(const struct pipeline_context *c)
+{
+    const double n_fit = fit_paths(c), path_s = s_per_path(c),
+                 certificate_path_s = isfinite(path_s) ? path_s : usual_s_per_path(c) / n_thread(c);
+    return result_renderings_paths(c, n_fit) + surface_pictures_paths(c) + twin_result_paths(c) +
+           (c->doc->has_volume ? scan_page_paths : page_paths) + c->certificate_s / certificate_path_s;
 }
 
 /* A stage of n_path paths after the fit, which is stage i_fit and counts as a number of paths before it has ended. */
@@ -267,9 +276,7 @@ void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
     else if (strcmp(name, "report") == 0 && job_document_geometry_only(c->doc))
         plan_voxels(c, i, &report_stage, pipeline_plan_voxels(c));
     else if (strcmp(name, "report") == 0)
-        plan_after_fit(c, i, i - 2,
-                       result_renderings_paths(c, fit_paths(c)) + surface_pictures_paths(c) + twin_result_paths(c) +
-                           rest_of_report_paths);
+        plan_after_fit(c, i, i - 2, report_paths(c));
     else
         worker_status_plan(c->status, i, &rest);
 }

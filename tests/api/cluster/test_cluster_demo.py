@@ -40,5 +40,8 @@ def test_the_demo():
     assert done.returncode == 0, done.stdout + done.stderr
     assert "6 of 6 samples have the same results bit by bit" in done.stdout
     assert re.search(r"killed the worker of 'cloth \d' \(Slurm job \d+\) after \d+ step", done.stdout)
+    # on the cluster and on this machine; within a factor of 2, because the speeds are those of one common machine
+    off = [float(x) for x in re.findall(r"took over  core hours ([\d.]+)", done.stdout)]
+    assert len(off) == 2 and all(0.5 < x < 2 for x in off), done.stdout
     assert not of_demo(), "processes are left"
     assert folders() == before, "files are left"

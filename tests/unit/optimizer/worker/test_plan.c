@@ -1,14 +1,17 @@
 /* What a job expects of its fit and its pictures: paths of the fit by its rows, size and samples of the renderings. */
 #include "optimizer/worker/progress/pipeline_plan.h"
+#include "optimizer/worker/progress/plan_probe.h"
 #include "optimizer/worker/report/result_pictures.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
+#include <math.h>
 
 enum { N_ROW = 16, N_ALL = 40 };
 
@@ -74,9 +77,71 @@ static void test_pictures_cost_less_than_the_fit(void **state)
     assert_true(result_picture_px(&j->c, 1e4) == 48);
 }
 
+/* n straight fibers of 10 um radius and 1 mm length, each of two pieces, in a tile of 1 mm x 1 mm. */
+static void make_layers(struct fiber_set *f, size_t n)
+{
+    fiber_set_init(f);
+    assert_int_equal(fiber_set_reserve(f, n, 3 * n, NULL), STATUS_OK);
+    f->tile_size_m[0] = f->tile_size_m[1] = 1e-3;
+    for (size_t i = 0; i < n; i++) {
+        f->first_vertex[i] = 3 * i;
+        f->radius_m[i] = 1e-5f;
+        for (size_t k = 0; k < 3; k++)
+            memcpy(f->position_m + 9 * i + 3 * k, (float[3]){5e-4f * (float)k, 1e-5f * (float)i, 0.0f},
+                   3 * sizeof(float));
+    }
+    f->first_vertex[n] = 3 * n;
+}
+
+/* 125 fibers of 0.02 mm2 cover the tile 2.5 times. */
+static void test_paths_in_a_thin_cloth_are_shorter(void **state)
+{
+    (void)state;
+    static const struct {
+        size_t n;
+        double share;
+    } row[] = {{1, 0.1}, {125, 0.63212}, {250, 0.86466}, {2500, 1.0}};
+    for (size_t i = 0; i < sizeof row / sizeof *row; i++) {
+        struct fiber_set f;
+        make_layers(&f, row[i].n);
+        assert_true(fabs(plan_probe_path_share(&f) - row[i].share) < 1e-4);
+        fiber_set_release(&f);
+    }
+}
+
+static double certificate_s_of(const char *id, size_t n_fixed)
+{
+    static struct job_document doc;
+    struct pipeline_context c = {.doc = &doc, .n_model = 1};
+    struct pipeline_model *m = calloc(1, sizeof *m);
+    assert_non_null(m);
+    snprintf(doc.measurement_file, sizeof doc.measurement_file, "rows.csv");
+    doc.n_model = 1;
+    assert_true(appearance_find(id, &m->appearance));
+    assert_int_equal(model_sets_init(&m->sets, model_catalogue_find(id), NULL, 0, NULL), STATUS_OK);
+    for (size_t p = 0; p < m->sets.info.n_param; p++)
+        m->parameter[p] = (struct fit_parameter){.start = m->sets.info.param[p].start, .fixed = p < n_fixed};
+    c.model = m;
+    plan_probe_take(&c);
+    assert_true(c.path_share == 1.0);
+    free(m);
+    return c.certificate_s;
+}
+
+/* The tables of an elliptical fiber take some hundred times as long as those of an isotropic one. */
+static void test_the_certificate_goes_with_the_model(void **state)
+{
+    (void)state;
+    const double tables = certificate_s_of("elliptical.v1", 0);
+    assert_true(tables > 10.0 * certificate_s_of("isotropic.v1", 0) && tables > 0.0);
+    assert_true(certificate_s_of("elliptical.v1", MODEL_MAX_PARAM) == 0.0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_paths_follow_from_the_rows),
-                                       cmocka_unit_test(test_pictures_cost_less_than_the_fit)};
+                                       cmocka_unit_test(test_pictures_cost_less_than_the_fit),
+                                       cmocka_unit_test(test_paths_in_a_thin_cloth_are_shorter),
+                                       cmocka_unit_test(test_the_certificate_goes_with_the_model)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
