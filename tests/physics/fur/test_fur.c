@@ -1,11 +1,10 @@
-/* fur.v1 and fur_near.v1: shares of a ray in closed form and with their derivatives; the mean of the near field over
- * the width is the far field; light that the medulla scatters, against a random walk in the section; energy from both
- * sides.
+/* fur.v1 and fur_near.v1: shares of a ray in closed form and with their derivatives; of the ten published fibers, mean
+ * shares by the published equations, and the mean of the near field over the width, which is the far field; light that
+ * the medulla scatters, against a random walk in the section; energy from both sides.
  */
 #include "base/angle.h"
 #include "base/rng.h"
-#include "renderer/scattering/surface/fur/fur_ray.h"
-#include "renderer/scattering/surface/fur/medulla/medulla.h"
+#include "renderer/scattering/surface/fur/fur_far.h"
 #include "tests/support/model/fiber_angles.h"
 
 #include <math.h>
@@ -19,7 +18,7 @@
 #include "tests/support/model/near_view_sum.h"
 #include "tests/support/model/prepared_model.h"
 
-enum { N_FIBER = 10, N_NUMBER = 10 };
+enum { N_FIBER = 10, N_NUMBER = 10, MAN = 9 };
 /* Yan, Jensen and Ramamoorthi 2017, table 4: eta, kappa, l, alpha, beta_m, beta_n (degrees), sigma_ms, sigma_ma, g,
  * sigma_ca of bobcat, cat, deer, dog, mouse, rabbit, raccoon, red fox, springbok and man. */
 static const double published[N_FIBER][N_NUMBER] = {
@@ -29,14 +28,15 @@ static const double published[N_FIBER][N_NUMBER] = {
     {1.19, .65, 2.00, 1.81, 7.44, 6.88, 2.30, .14, .08, .25}, {1.49, .86, .68, 2.64, 9.45, 17.63, 3.15, .21, .79, .39},
     {1.48, .82, .46, 4.61, 8.02, 11.46, 2.45, .31, .19, .32}, {1.20, .36, 1.79, .70, 2.05, 3.75, 3.49, .00, .28, .41}};
 
-/* sigma_ma of the dog and of man, 0, and the cat's beta_n of 1.34 degrees are below the ranges of the model. */
+/* What is outside of the ranges of the models is at their bounds: sigma_ma of the dog and of man, 0.00, and the cat's
+ * beta_n of 1.34 degrees. */
 static void parameters_of(const double *fiber, double *param)
 {
-    for (int c = 0; c < 3; c++) param[c] = fmin(exp(-2 * fiber[9]), 0.999);
+    const struct param_info *info = scattering_find("fur.v1")->param;
+    for (int c = 0; c < 3; c++) param[c] = exp(-2 * fiber[9]);
     for (int k = 0; k < 9; k++) param[3 + k] = fiber[k];
     for (int k = 6; k < 9; k++) param[k] *= RAD_PER_DEG;
-    param[8] = fmax(param[8], 2 * RAD_PER_DEG);
-    param[10] = fmax(param[10], 0.01);
+    for (int p = 0; p < FUR_N_PARAM; p++) param[p] = fmin(fmax(param[p], info[p].lower), info[p].upper);
 }
 
 /* Without absorption the six shares sum to 1, and the five of the publication to 1 - (1 - F) F^2 T^2. */
@@ -122,45 +122,94 @@ static void share_derivatives(void **unused)
     }
 }
 
-/* Within 1 % of the largest S, for the narrowest lobes (cat, 2 degrees) and wide ones (dog). Places of the width are
- * equidistant in asin h, because narrow lobes of the rim would pass between those that are equidistant in h. */
-static void mean_is_the_far_field(void **unused)
+/* Mean shares at th_d = 0 by the published equations, with TT^s mended and s_m rounded off by `edge` (fur_ray.h). */
+static void published_means(const double *fiber, double ma, double edge, double mean[FUR_FAR_N_LOBE])
+{
+    enum { N = 4000 };
+    double eta = fiber[0], kappa = fiber[1], l = fiber[2], ms = fiber[6], c = fiber[9];
+    for (int p = 0; p < FUR_FAR_N_LOBE; p++) mean[p] = 0;
+    for (int i = 0; i < N; i++) {
+        double h = (i + 0.5) / N, cos_i = sqrt(1 - h * h), cos_t = sqrt(1 - h * h / (eta * eta));
+        double s = (cos_i - eta * cos_t) / (cos_i + eta * cos_t), p = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
+        double one = s * s / (1 + s * s) + p * p / (1 + p * p), f = l * one / (1 + (l - 1) * one);
+        double q = kappa * kappa - h * h / (eta * eta), way_m = sqrt(fmax(0, 0.5 * (q + hypot(q, edge))));
+        double way_c = cos_t - way_m, t = exp(-2 * way_c * c - 2 * way_m * (ms + ma)),
+               scattered = -expm1(-2 * way_m * ms);
+        mean[FUR_R] += f / N;
+        mean[FUR_TT] += (1 - f) * (1 - f) * t / N;
+        mean[FUR_TRT] += (1 - f) * (1 - f) * f * t * t / N;
+        mean[FUR_FAR_S] += (1 - f) * scattered * exp(-(way_c + 1 - kappa) * c - kappa * ma) / N;
+        mean[FUR_FAR_S] +=
+            (1 - f) * f * scattered * exp(-(3 * way_c + 1 - kappa) * c - (2 * way_m + kappa) * ma - 2 * way_m * ms) / N;
+    }
+}
+
+/* Largest misses of all fibers. */
+struct largest {
+    double mean, edge, far[2];
+};
+
+/* Means of the tables are those of the equations within 1e-4, far above what 160 offsets leave. */
+static void check_means(int k, const double *param, const struct scattering_state *s, struct largest *largest)
+{
+    double want[FUR_FAR_N_LOBE], sharp[FUR_FAR_N_LOBE];
+    published_means(published[k], param[FUR_P_MA], FUR_EDGE, want);
+    published_means(published[k], param[FUR_P_MA], 0, sharp);
+    for (int p = 0; p < FUR_FAR_N_LOBE; p++) {
+        double got = (double)s->row[FUR_FAR_ROW].energy[p][0];
+        largest->edge = fmax(largest->edge, fabs(want[p] - sharp[p]));
+        largest->mean = fmax(largest->mean, fabs(got - want[p]));
+        if (!(fabs(got - want[p]) < 1e-4)) fail_msg("fiber %d, mode %d: %.6f, published %.6f", k, p, got, want[p]);
+    }
+}
+
+/* The far field against the mean over the width. Places of the width are equidistant in asin h, because narrow lobes of
+ * the rim would pass between those that are equidistant in h. Returns the largest miss over the largest S. */
+static double far_field_miss(const struct scattering_state *near_state, const struct scattering_state *far_state,
+                             const double theta_deg[2])
+{
+    enum { N_PLACE = 600, N_PHI = 13 };
+    const struct scattering_model *near = scattering_find("fur_near.v1"), *far = scattering_find("fur.v1");
+    const double theta[2] = {theta_deg[0] * RAD_PER_DEG, theta_deg[1] * RAD_PER_DEG};
+    double top = 0, miss = 0;
+    for (int j = 0; j < N_PHI; j++) {
+        double phi = j * 14.7 * RAD_PER_DEG, want[3] = {0}, got = 0;
+        for (int i = 0; i < N_PLACE; i++) {
+            double x = M_PI * ((i + 0.5) / N_PLACE - 0.5), here[3] = {0};
+            near_at(near, near_state, theta, phi, x, here);
+            got += 0.5 * here[0] * cos(x) * M_PI / N_PLACE;
+        }
+        near_at(far, far_state, theta, phi, 0.4, want);
+        top = fmax(top, want[0]);
+        miss = fmax(miss, fabs(got - want[0]));
+    }
+    return miss / top;
+}
+
+/* The goal of the far field is 1 % of the largest S, and it is met on a row of the table and between two rows. Only for
+ * man, whose index of 1.2 moves the azimuth of TRT fastest, straight lines between two rows miss by 1.4 %. */
+static void published_fibers(void **unused)
 {
     (void)unused;
-    enum { N_PLACE = 600, N_PHI = 13 };
-    static const int fiber[2] = {1, 3};
-    static const double theta_deg[2][2] = {{0, 0}, {-40, 35}};
+    static const double on_a_row[2] = {0, 0}, between[2] = {-40, 35};
     const struct scattering_model *near = scattering_find("fur_near.v1"), *far = scattering_find("fur.v1");
-    double worst = 0;
-    for (int k = 0; k < 2; k++) {
+    struct largest largest = {0};
+    for (int k = 0; k < N_FIBER; k++) {
         double param[SCATTERING_MAX_PARAM];
-        parameters_of(published[fiber[k]], param);
+        parameters_of(published[k], param);
         struct scattering_state *a = prepare(near, param), *b = prepare(far, param);
+        check_means(k, param, b, &largest);
+        const double miss[2] = {far_field_miss(a, b, on_a_row), far_field_miss(a, b, between)};
         for (int t = 0; t < 2; t++) {
-            const double theta[2] = {theta_deg[t][0] * RAD_PER_DEG, theta_deg[t][1] * RAD_PER_DEG};
-            double got[N_PHI] = {0}, want[N_PHI], top = 0;
-            for (int j = 0; j < N_PHI; j++) {
-                double phi = j * 14.7 * RAD_PER_DEG, sum[3] = {0};
-                for (int i = 0; i < N_PLACE; i++) {
-                    double x = M_PI * ((i + 0.5) / N_PLACE - 0.5), here[3] = {0};
-                    near_at(near, a, theta, phi, x, here);
-                    got[j] += 0.5 * here[0] * cos(x) * M_PI / N_PLACE;
-                }
-                near_at(far, b, theta, phi, 0.4, sum);
-                want[j] = sum[0];
-                top = fmax(top, want[j]);
-            }
-            for (int j = 0; j < N_PHI; j++) {
-                worst = fmax(worst, fabs(got[j] - want[j]) / top);
-                if (!(fabs(got[j] - want[j]) < 0.01 * top))
-                    fail_msg("fiber %d, angles %d, azimuth %g: mean %g, far field %g (largest %g)", fiber[k], t,
-                             j * 14.7, got[j], want[j], top);
-            }
+            largest.far[t] = fmax(largest.far[t], miss[t]);
+            if (!(miss[t] < (t == 1 && k == MAN ? 0.02 : 0.01))) fail_msg("fiber %d, angles %d: %.4f", k, t, miss[t]);
         }
         near->release(a);
         far->release(b);
     }
-    print_message("far field and mean over the width differ by at most %.4f of the largest S\n", worst);
+    print_message("means are off by at most %.6f; the rounded edge of the medulla moves them by at most %.4f\n"
+                  "far field and mean over the width differ by at most %.4f of the largest S, %.4f between two rows\n",
+                  largest.mean, largest.edge, largest.far[0], largest.far[1]);
 }
 
 /* ---- a random walk in the section ---- */
@@ -213,8 +262,9 @@ static bool scattered_azimuth(struct rng *r, const struct fur_fiber *f, double g
     }
 }
 
-/* The share and the azimuths of light that the medulla scatters, on both sides of the axis. The table may be off by 3 %
- * of its root mean square. */
+/* The share and the azimuths of light that the medulla scatters, on both sides of the axis. The share without the
+ * rounded edge is within 4 standard errors of the walks, and the edge moves it by what fur_ray.h says. The table may be
+ * off by 3 % of its root mean square, the goal of the tables; the noise of the walks, at most 2 %, is taken off. */
 static void walk_in_the_section(void **unused)
 {
     (void)unused;
@@ -235,8 +285,11 @@ static void walk_in_the_section(void **unused)
                     count[(int)((azimuth / (2 * M_PI) + 0.5) * N_BIN) % N_BIN]++;
                     n++;
                 }
-            double share = -expm1(-2 * ray.medulla.v * f.sigma_ms), se = sqrt(share * (1 - share) / N_WALK);
-            assert_true(fabs(n / N_WALK - share) < 4 * se + 1e-3); /* 1e-3: the rounded edge */
+            double way2 = f.kappa * f.kappa - pow(offset[k] / f.eta, 2), share = -expm1(-2 * sqrt(way2) * f.sigma_ms);
+            double rounded = -expm1(-2 * ray.medulla.v * f.sigma_ms), more = FUR_EDGE * FUR_EDGE / (8 * pow(way2, 1.5));
+            assert_true(fabs(n / N_WALK - share) < 4 * sqrt(share * (1 - share) / N_WALK));
+            assert_true(rounded >= share &&
+                        rounded < share + 2 * f.sigma_ms * more); /* root(x^2 + e^2) < x + e^2 / 2x */
             medulla_around_init(&around, g[k]);
             medulla_ray_init(&around, fur_depth(&f, &ray, unused_d), ray.offset.v, &m);
             for (int j = 0; j < N_BIN; j++) {
@@ -284,8 +337,8 @@ static double clear_light(const struct scattering_model *m, const struct scatter
     return sum;
 }
 
-/* 1.5e-3: scores change on the way to no absorption, and few places stand for the width. Lobes of dog and rabbit are
- * those that the quadrature resolves. */
+/* 1e-3 is what all balanced models keep (test_furnace). Lobes of dog and rabbit are those that the quadrature
+ * resolves. */
 static void energy_from_both_sides(void **unused)
 {
     (void)unused;
@@ -298,13 +351,13 @@ static void energy_from_both_sides(void **unused)
             double param[SCATTERING_MAX_PARAM];
             parameters_of(published[fiber], param);
             param[0] = param[1] = param[2] = 0.999;
-            param[10] = 0.01;
+            param[FUR_P_MA] = m->param[FUR_P_MA].lower;
             struct scattering_state *s = prepare(m, param);
             for (int t = 0; t < 4; t++)
                 for (int side = 0; side < 2; side++) {
                     double sum = clear_light(m, s, param, theta_deg[t] * RAD_PER_DEG, side == 0);
                     worst = fmax(worst, fabs(sum - 1));
-                    if (!(fabs(sum - 1) < 1.5e-3))
+                    if (!(fabs(sum - 1) < 1e-3))
                         fail_msg("%s, fiber %d, %g degrees, side %d: %.5f", m->id, fiber, theta_deg[t], side, sum);
                 }
             m->release(s);
@@ -316,7 +369,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shares_sum_to_one),   cmocka_unit_test(cuticle),
-        cmocka_unit_test(share_derivatives),   cmocka_unit_test(mean_is_the_far_field),
+        cmocka_unit_test(share_derivatives),   cmocka_unit_test(published_fibers),
         cmocka_unit_test(walk_in_the_section), cmocka_unit_test(energy_from_both_sides),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
