@@ -9,7 +9,7 @@
 struct order_head {
     uint64_t n_bytes;
     uint32_t kind;
-    uint32_t alone; /* 1: the order is for one helper, which does not pass it on */
+    uint32_t to; /* the one rank that the order is for; 0: all helpers */
 };
 
 status rank_team_open(int fd, size_t rank, size_t n_rank, struct rank_team **team, struct error *err)
@@ -77,30 +77,30 @@ status rank_team_receive(struct rank_team *t, int wait_ms, bool *got, struct ran
     return s;
 }
 
-/* Sends to the children of this rank in the binomial tree: to those whose number without its highest bit is its own. */
-static status send_on(struct rank_team *t, enum rank_message kind, const void *data, size_t n_bytes, struct error *err)
+/* Sends to the children of this rank in the binomial tree: to those whose number without its highest bit is its own.
+ * An order for one rank takes its way along the tree, too, whose ranks keep the order of messages: sent straight, it
+ * would overtake those for all that are on their way. */
+static status send_on(struct rank_team *t, size_t to, enum rank_message kind, const void *data, size_t n_bytes,
+                      struct error *err)
 {
     status s = STATUS_OK;
     size_t bit = 1;
     while (bit <= t->rank) bit <<= 1;
     for (; t->rank + bit < t->n_rank && s == STATUS_OK; bit <<= 1)
-        s = rank_team_send(t, t->rank + bit, kind, data, n_bytes, err);
+        if (to == 0 || (to & (2 * bit - 1)) == t->rank + bit)
+            s = rank_team_send(t, t->rank + bit, kind, data, n_bytes, err);
     return s;
 }
 
-/* Root: sends an order to one helper, or, with rank 0, along the tree to all of them. */
-static status send_order(struct rank_team *t, size_t rank, const struct order_head *head, const void *data,
-                         struct error *err)
+static status send_order(struct rank_team *t, const struct order_head *head, const void *data, struct error *err)
 {
     t->serial++;
     t->traffic.n_order++;
     t->traffic.order_bytes += head->n_bytes;
-    status s = rank > 0 ? rank_team_send(t, rank, RANK_ORDER, head, sizeof *head, err)
-                        : send_on(t, RANK_ORDER, head, sizeof *head, err);
+    status s = send_on(t, head->to, RANK_ORDER, head, sizeof *head, err);
     for (size_t done = 0; done < head->n_bytes && s == STATUS_OK;) {
         size_t n = head->n_bytes - done < RANK_MESSAGE_MOST ? head->n_bytes - done : RANK_MESSAGE_MOST;
-        const char *piece = (const char *)data + done;
-        s = rank > 0 ? rank_team_send(t, rank, RANK_PIECE, piece, n, err) : send_on(t, RANK_PIECE, piece, n, err);
+        s = send_on(t, head->to, RANK_PIECE, (const char *)data + done, n, err);
         done += n;
     }
     return s;
@@ -108,13 +108,13 @@ static status send_order(struct rank_team *t, size_t rank, const struct order_he
 
 status rank_team_order(struct rank_team *t, uint32_t kind, const void *data, size_t n_bytes, struct error *err)
 {
-    return send_order(t, 0, &(struct order_head){.n_bytes = n_bytes, .kind = kind}, data, err);
+    return send_order(t, &(struct order_head){.n_bytes = n_bytes, .kind = kind}, data, err);
 }
 
 status rank_team_order_to(struct rank_team *t, size_t rank, uint32_t kind, const void *data, size_t n_bytes,
                           struct error *err)
 {
-    return send_order(t, rank, &(struct order_head){.n_bytes = n_bytes, .kind = kind, .alone = 1}, data, err);
+    return send_order(t, &(struct order_head){.n_bytes = n_bytes, .kind = kind, .to = (uint32_t)rank}, data, err);
 }
 
 /* Waits for a message of one kind. Besides it only an assignment can come, for a helper that was cancelled
@@ -129,12 +129,11 @@ static status expect(struct rank_team *t, enum rank_message kind, struct rank_fr
     return s;
 }
 
-status rank_team_wait(struct rank_team *t, struct rank_order *order, struct error *err)
+/* Waits for an order, and passes it on; order->data is NULL for one that is for another rank alone. */
+static status take_order(struct rank_team *t, struct rank_order *order, struct error *err)
 {
     struct rank_frame frame;
     struct order_head head;
-    memset(order, 0, sizeof *order);
-    if (t->ended) return STATUS_OK;
     status s = expect(t, RANK_ORDER, &frame, err);
     if (s == STATUS_OK && frame.n_bytes != sizeof head)
         s = error_set(err, STATUS_FORMAT, "rank %u sent an order of %u bytes", frame.peer, frame.n_bytes);
@@ -143,19 +142,28 @@ status rank_team_wait(struct rank_team *t, struct rank_order *order, struct erro
     t->serial = frame.serial;
     atomic_store(&t->cancel, t->cancelled == t->serial);
     *order = (struct rank_order){.kind = head.kind, .n_bytes = head.n_bytes};
-    order->data = malloc(head.n_bytes > 0 ? head.n_bytes : 1);
-    if (order->data == NULL)
+    const bool mine = head.to == 0 || head.to == t->rank;
+    if (mine) order->data = malloc(head.n_bytes > 0 ? head.n_bytes : 1);
+    if (mine && order->data == NULL)
         return error_set(err, STATUS_NO_MEMORY, "rank %zu has no memory for an order of %llu bytes", t->rank,
                          (unsigned long long)head.n_bytes);
-    if (!head.alone) s = send_on(t, RANK_ORDER, &head, sizeof head, err);
+    s = send_on(t, head.to, RANK_ORDER, &head, sizeof head, err);
     for (size_t done = 0; done < head.n_bytes && s == STATUS_OK; done += frame.n_bytes) {
         s = expect(t, RANK_PIECE, &frame, err);
         if (s != STATUS_OK) break;
         if (frame.n_bytes == 0 || frame.n_bytes > head.n_bytes - done)
             return error_set(err, STATUS_FORMAT, "rank %u sent an order that is too long", frame.peer);
-        memcpy((char *)order->data + done, t->buffer, frame.n_bytes);
-        if (!head.alone) s = send_on(t, RANK_PIECE, t->buffer, frame.n_bytes, err);
+        if (mine) memcpy((char *)order->data + done, t->buffer, frame.n_bytes);
+        s = send_on(t, head.to, RANK_PIECE, t->buffer, frame.n_bytes, err);
     }
+    return s;
+}
+
+status rank_team_wait(struct rank_team *t, struct rank_order *order, struct error *err)
+{
+    status s = STATUS_OK;
+    memset(order, 0, sizeof *order);
+    while (!t->ended && order->data == NULL && s == STATUS_OK) s = take_order(t, order, err);
     return s;
 }
 
@@ -173,7 +181,7 @@ void rank_team_end_early(struct rank_team *t)
     struct order_head head = {.kind = RANK_ORDER_END};
     t->ended = true;
     atomic_store(&t->cancel, true);
-    send_on(t, RANK_ORDER, &head, sizeof head, NULL);
+    send_on(t, 0, RANK_ORDER, &head, sizeof head, NULL);
 }
 
 void rank_order_release(struct rank_order *order)

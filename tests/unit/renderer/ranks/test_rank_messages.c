@@ -117,6 +117,77 @@ static void only_tasks_that_were_asked_for_are_run(void **state)
     }
 }
 
+/* ---- orders ---- */
+
+enum { N_TREE = 12, ORDER_KIND = 7 };
+
+/* A rank of the tree, whose messages the test carries. */
+struct carried_rank {
+    struct rank_team *team;
+    int fd; /* the other end of its socket */
+};
+
+static struct carried_rank join(size_t rank)
+{
+    int end[2];
+    struct carried_rank r = {.team = NULL};
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, end), 0);
+    assert_int_equal(rank_team_open(end[1], rank, N_TREE, &r.team, NULL), STATUS_OK);
+    r.fd = end[0];
+    return r;
+}
+
+/* Hands what a rank has sent to the rank that it is for, after which nothing more comes, and returns which one. */
+static size_t carry(const struct carried_rank *from, struct carried_rank *to)
+{
+    struct rank_frame f;
+    size_t peer = 0;
+    bool got = true;
+    char *buffer = malloc(RANK_MESSAGE_MOST);
+    while (rank_link_receive(from->fd, 0, &got, &f, buffer, NULL) == STATUS_OK && got) {
+        if (peer == 0) *to = join(f.peer);
+        if (peer > 0) assert_int_equal(f.peer, peer);
+        peer = f.peer;
+        assert_int_equal(rank_link_send(to->fd, &f, buffer, NULL), STATUS_OK);
+    }
+    assert_in_range(peer, 1, N_TREE - 1);
+    shutdown(to->fd, SHUT_WR);
+    free(buffer);
+    return peer;
+}
+
+static void leave(struct carried_rank *r)
+{
+    rank_team_close(r->team);
+    close(r->fd);
+}
+
+/* A rank gets all orders from its parent in the tree, whose number is its own without the highest bit: with two ways to
+ * a rank, one order could overtake another. Ranks on the way pass the order on and do not follow it. */
+static void an_order_for_one_rank_takes_the_way_of_all(void **state)
+{
+    (void)state;
+    for (size_t to = 1; to < N_TREE; to++) {
+        size_t parent = 0, rank = 0, before = 0;
+        struct rank_order order;
+        struct carried_rank from = join(0), next;
+        for (size_t bit = 1; bit <= to; bit *= 2) parent = to % bit;
+        assert_int_equal(rank_team_order_to(from.team, to, ORDER_KIND, "rows", 4, NULL), STATUS_OK);
+        for (; rank != to; from = next) {
+            before = rank;
+            rank = carry(&from, &next);
+            leave(&from);
+            assert_int_equal(rank_team_wait(next.team, &order, NULL), rank == to ? STATUS_OK : STATUS_IO);
+        }
+        assert_int_equal(before, parent);
+        assert_int_equal(order.kind, ORDER_KIND);
+        assert_int_equal(order.n_bytes, 4);
+        assert_memory_equal(order.data, "rows", 4);
+        rank_order_release(&order);
+        leave(&from);
+    }
+}
+
 /* ---- cloths ---- */
 
 static status unpack_volume(const struct byte_pack *p, size_t n_bytes)
@@ -243,7 +314,8 @@ static void an_environment_is_taken_only_whole(void **state)
 int main(void)
 {
     const struct CMUnitTest test[] = {
-        cmocka_unit_test(only_tasks_that_were_asked_for_are_run), cmocka_unit_test(a_volume_is_taken_only_whole),
+        cmocka_unit_test(only_tasks_that_were_asked_for_are_run),
+        cmocka_unit_test(an_order_for_one_rank_takes_the_way_of_all), cmocka_unit_test(a_volume_is_taken_only_whole),
         cmocka_unit_test(fibers_are_taken_only_whole), cmocka_unit_test(an_environment_is_taken_only_whole)};
     signal(SIGPIPE, SIG_IGN);
     alarm(60); /* a helper that waits for what never comes ends the test */
