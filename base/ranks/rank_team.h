@@ -1,8 +1,8 @@
 /* The ranks of one job: rank 0, the root, runs the job; the others, its helpers, wait for orders and share the tasks of
- * some of them. Orders go from rank to rank along a binomial tree, those for one helper, too, so that each rank gets its
- * orders in the order in which the root has sent them. Which rank runs which task is not determined, and
- * neither is the order in which results arrive, so a task writes to a slot of its own (thread_pool.h), and the root
- * combines the slots in order: results do not depend on the ranks.
+ * some of them. Orders go from rank to rank along a binomial tree, those for one helper, too, so that each rank gets
+ * its orders in the order in which the root has sent them. Which rank runs which task is not determined, and neither is
+ * the order in which results arrive, so a task writes to a slot of its own (thread_pool.h), and the root combines the
+ * slots in order: results do not depend on the ranks.
  *
  * All functions but those of one rank_team_share are called by the thread that runs the job.
  */

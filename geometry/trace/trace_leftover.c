@@ -9,6 +9,7 @@
 
 #include "geometry/fibers/shape/axes/fiber_section.h"
 #include "geometry/filter_directions.h"
+#include "geometry/ranks/volume_slabs.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -133,6 +134,8 @@ static status add_lines(const struct trace_job *job, const struct volume *left, 
     status s = filter_directions(left, look.diameter, &option, job->pool, &look.inner, &d, &report, err);
     const bool nothing = s == STATUS_INVALID; /* no voxel looks like a part of a fiber */
     if (nothing) s = STATUS_OK;
+    if (s == STATUS_OK && job->v->slabs != NULL) /* other ranks have one slab at a time: that of `left` until here */
+        s = volume_slabs_send(job->v->slabs, job->v, err);
     if (s == STATUS_OK && !nothing) s = trace_chains(&look, &part[0], err);
     if (s == STATUS_OK && !nothing) s = trace_repair(&look, &part[0], false, 0.0, &part[1], &counts, err);
     if (s == STATUS_OK && !nothing) s = trace_repair(&look, &part[1], true, 0.0, &part[2], &counts, err);

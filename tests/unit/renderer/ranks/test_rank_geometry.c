@@ -5,6 +5,7 @@
 #include "geometry/ranks/axis_share.h"
 #include "geometry/ranks/direction_share.h"
 #include "geometry/reconstruct.h"
+#include "geometry/trace/trace_job.h"
 #include "tests/support/ranks/two_ranks.h"
 #include "tests/support/scan/scan_files.h"
 
@@ -109,6 +110,49 @@ static void two_ranks_find_the_same_fibers(void **state)
         release(&together);
         assert_int_equal(two_ranks_end(&r), 0);
     }
+}
+
+/* Finds what one line along the first cylinder leaves of the scan, of which the other ranks have slabs. */
+static void look_again(struct thread_pool *pool, struct polyline_set *lines)
+{
+    struct volume v = scan;
+    struct volume_slabs slabs;
+    struct direction_volume d = {0};
+    struct reconstruct_option o = alone.o;
+    struct reconstruct_report report = {.radius_spread = 0.2};
+    struct trace_job job = {.v = &v, .d = &d, .o = &o, .pool = pool, .report = &report, .diameter = 5.0};
+    struct error err = {0};
+    polyline_set_init(lines);
+    assert_int_equal(polyline_begin(lines, 1, &err), STATUS_OK);
+    lines->radius[0] = (float)cylinder[0].radius;
+    for (int j = 0; j < NY; j++) {
+        const float y = (float)j + 0.5f, x[3] = {10.0f + 0.1f * y, y, 8.0f + 0.02f * y};
+        assert_int_equal(polyline_add(lines, x, &err), STATUS_OK);
+    }
+    job.inner = progress_of_part(&job.part);
+    job.profile = trace_start_profile(&job);
+    assert_int_equal(volume_slabs_share(&slabs, thread_pool_team(pool), &v, &err), STATUS_OK);
+    if (trace_leftover(&job, lines, &err) != STATUS_OK) fail_msg("%s", err.text);
+    volume_slabs_release(&slabs);
+}
+
+/* The directions of what is left are found amid the fits, whose slabs the ranks have again afterwards. */
+static void a_second_look_at_the_scan_is_shared(void **state)
+{
+    (void)state;
+    struct two_ranks r;
+    struct polyline_set a, b;
+    look_again(NULL, &a);
+    two_ranks_start(&r, 1);
+    look_again(r.pool, &b);
+    assert_true(a.n_line > 3);
+    assert_int_equal(a.n_line, b.n_line);
+    assert_int_equal(a.n_vertex, b.n_vertex);
+    assert_memory_equal(a.vertex, b.vertex, a.n_vertex * sizeof *a.vertex);
+    assert_memory_equal(a.radius, b.radius, a.n_line * sizeof *a.radius);
+    polyline_set_release(&a);
+    polyline_set_release(&b);
+    assert_int_equal(two_ranks_end(&r), 0);
 }
 
 /* One row at a time, with no more than what surrounds it: a halo that is too short would change some of them. */
@@ -330,6 +374,7 @@ static void work_that_does_not_fit_the_slab_is_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest test[] = {cmocka_unit_test(two_ranks_find_the_same_fibers),
+                                      cmocka_unit_test(a_second_look_at_the_scan_is_shared),
                                       cmocka_unit_test(rows_depend_on_no_more_than_their_halo),
                                       cmocka_unit_test(a_cancelled_geometry_leaves_no_trace),
                                       cmocka_unit_test(a_lost_helper_ends_the_geometry),
