@@ -11,6 +11,18 @@
 /* Ratio of diameters that are the same peak. */
 static const double SAME_PEAK = 1.3;
 
+/* Takes the diameter of the fibers that noise hid in the scan, if only their yarns are left since it was smoothed. */
+static void prefer_hidden(const struct scan_noise *noise, struct fiber_diameter *d)
+{
+    const double hidden = noise->hidden_diameter_voxel;
+    if (!(hidden > 0.0) || hidden * FIBER_DIAMETER_FINER > d->voxel) return;
+    d->other_voxel = d->voxel;
+    d->other_noise_share = d->noise_share;
+    d->voxel = hidden;
+    d->noise_share = noise->hidden_noise_share;
+    d->hidden = true;
+}
+
 /* Takes the fiber diameter of the job, or measures it. */
 static status find_diameter(const struct volume *v, const struct reconstruct_option *option, struct thread_pool *pool,
                             const struct progress *progress, struct reconstruct_report *report, struct error *err)
@@ -18,7 +30,10 @@ static status find_diameter(const struct volume *v, const struct reconstruct_opt
     struct fiber_diameter d = {.voxel = option->fiber_diameter_voxel, .noise_share = NAN, .other_voxel = NAN};
     status s = STATUS_OK;
     d.other_noise_share = NAN;
-    if (isnan(d.voxel)) s = fiber_diameter_measure(v, pool, progress, &d, err);
+    if (isnan(d.voxel)) {
+        s = fiber_diameter_measure(v, pool, progress, &d, err);
+        if (s == STATUS_OK) prefer_hidden(&report->noise, &d);
+    }
     report->fiber_diameter_voxel = d.voxel;
     report->diameter_noise_share = d.noise_share;
     report->other_diameter_voxel = d.other_voxel;

@@ -14,6 +14,9 @@ struct scan_noise {
     double scan_sd;      /* of the scan */
     double smooth_voxel; /* standard deviation of the Gaussian (noise_smoothing.h); 0: not smoothed */
     double mapped_sd;    /* of the densities */
+    /* Diameter of fibers that noise hides in the scan, and the share of noise in their peak (fiber_diameter.h). NaN:
+     * there are none, or none were looked for. */
+    double hidden_diameter_voxel, hidden_noise_share;
 };
 
 /* Maps the values of v, low for void and high for material (density_map_apply, with its errors), and smooths them if

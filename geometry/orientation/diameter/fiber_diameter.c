@@ -16,6 +16,9 @@ static const float MIN_BLURRED = 0.35f;
 static const double LEAST_MATERIAL = 0.02;
 enum { NEAR_MATERIAL = 2 };           /* voxels; peaks of the noise in void must not count */
 static const double MOST_NOISE = 0.5; /* share of a peak that noise may have */
+/* No scanner resolves less than about half a voxel, so a blur by that lowers the noise more than the fibers. It is used
+ * only for diameters below the chosen one divided by FIBER_DIAMETER_FINER. */
+static const double SECOND_BLUR_VOXEL = 0.5;
 
 /* Mean third power of the bright response: without the part of the noise, and as it is. */
 struct energy {
@@ -34,6 +37,8 @@ struct job {
     const struct volume *v;
     struct brick brick[MAX_BRICK], void_brick[MAX_VOID_BRICK];
     size_t n_brick, n_void_brick;
+    double blur_voxel;         /* by which bricks are blurred first; 0: not at all */
+    int n_scale;               /* scales to measure */
     double noise_var[N_SCALE]; /* of the response */
     float *scratch;            /* three bricks per thread */
     uint8_t *far;              /* one brick per thread */
@@ -64,13 +69,16 @@ static struct energy bright_energy(const float *a, const uint8_t *far, const siz
     return (struct energy){sum * per_voxel, raw * per_voxel};
 }
 
-static void load_brick(const struct volume *v, const struct brick *b, float *a)
+/* Copies a brick to a, and blurs it if the job says so. tmp: scratch of the same size. */
+static void load_brick(const struct job *job, const struct brick *b, float *a, float *tmp)
 {
+    const struct volume *v = job->v;
     scratch_keep_within(v->space);
     for (size_t k = 0; k < b->n[2]; k++)
         for (size_t j = 0; j < b->n[1]; j++)
             memcpy(a + (k * b->n[1] + j) * b->n[0],
                    v->density + volume_index(v->n, b->from[0], b->from[1] + j, b->from[2] + k), b->n[0] * sizeof *a);
+    if (job->blur_voxel > 0.0) scale_blur(a, tmp, b->n, job->blur_voxel);
 }
 
 static void measure_noise(void *context, size_t i_brick, size_t i_thread)
@@ -78,7 +86,8 @@ static void measure_noise(void *context, size_t i_brick, size_t i_thread)
     struct job *job = context;
     struct brick *b = &job->void_brick[i_brick];
     float *density = job->scratch + i_thread * 3 * N_CELL;
-    load_brick(job->v, b, density);
+    load_brick(job, b, density, density + N_CELL);
+    b->noise = (struct scale_noise){0};
     scale_noise_add(&b->noise, density, density + N_CELL, density + 2 * (size_t)N_CELL, job->far + i_thread * N_CELL,
                     b->n);
     b->voxel_noise_var = scale_noise_of_voxels(density, b->n);
@@ -90,10 +99,10 @@ static void measure_brick(void *context, size_t i_brick, size_t i_thread)
     struct brick *b = &job->brick[i_brick];
     float *density = job->scratch + i_thread * 3 * N_CELL, *a = density + N_CELL, *tmp = a + N_CELL;
     uint8_t *far = job->far + i_thread * N_CELL;
-    load_brick(job->v, b, density);
+    load_brick(job, b, density, tmp);
     scale_find_void(density, a, tmp, far, b->n);
     memcpy(a, density, b->n[0] * b->n[1] * b->n[2] * sizeof *a);
-    for (int s = 0; s < N_SCALE; s++) {
+    for (int s = 0; s < job->n_scale; s++) {
         scale_blur_on(a, tmp, b->n, s);
         b->energy[s] = bright_energy(a, far, b->n, scale_sigma(s), job->noise_var[s]);
     }
@@ -202,10 +211,62 @@ static void choose_peak(const struct energy e[N_SCALE], struct fiber_diameter *d
     for (int i = 0; i < N_SCALE; i++)
         if (e[i].signal > e[most].signal) most = i;
     if (best < 0) best = most;
+    d->hidden = false;
     d->voxel = diameter_at(e, best);
     d->noise_share = noise_share(e[best]);
     d->other_voxel = other >= 0 ? diameter_at(e, other) : NAN;
     d->other_noise_share = other >= 0 ? noise_share(e[other]) : NAN;
+}
+
+/* Measures the noise and the energy of the first n_scale scales, with the bricks blurred first. */
+static status measure_energy(struct job *job, double blur_voxel, int n_scale, struct thread_pool *pool,
+                             const struct progress *progress, struct energy energy[N_SCALE], bool *noise_measured)
+{
+    const struct progress quiet = progress_silent(progress);
+    job->blur_voxel = blur_voxel;
+    job->n_scale = n_scale;
+    status s = thread_pool_run(pool, job->n_void_brick, measure_noise, job, &quiet);
+    if (s == STATUS_OK) *noise_measured = reduce_noise(job);
+    if (s == STATUS_OK) s = thread_pool_run(pool, job->n_brick, measure_brick, job, progress);
+    memset(energy, 0, N_SCALE * sizeof *energy);
+    for (int i = 0; i < n_scale && s == STATUS_OK; i++)
+        for (size_t b = 0; b < job->n_brick; b++) {
+            energy[i].signal += job->brick[b].energy[i].signal;
+            energy[i].raw += job->brick[b].energy[i].raw;
+        }
+    return s;
+}
+
+/* Number of scales that say whether there is a peak well below the diameter: those of smaller diameters, and the two
+ * beyond them that a peak is compared with. 0 if noise hides no peak there. */
+static int hidden_scales(const struct energy e[N_SCALE], double diameter)
+{
+    int n = 0;
+    bool hidden = false;
+    for (; n + 2 < N_SCALE && DIAMETER_OVER_SIGMA * scale_sigma(n) * FIBER_DIAMETER_FINER < diameter; n++)
+        hidden = hidden || noise_share(e[n]) > MOST_NOISE;
+    return hidden ? n + 2 : 0;
+}
+
+/* Looks for a finer peak than the chosen one in blurred bricks, and takes the finest that is not mostly noise. */
+static status look_finer(struct job *job, int n_scale, struct thread_pool *pool, const struct progress *progress,
+                         struct fiber_diameter *d)
+{
+    struct energy e[N_SCALE];
+    bool measured;
+    const struct progress quiet = progress_silent(progress);
+    status s = measure_energy(job, SECOND_BLUR_VOXEL, n_scale, pool, &quiet, e, &measured);
+    for (int i = 1; i + 2 < n_scale && s == STATUS_OK; i++) {
+        if (!is_peak(e, i) || noise_share(e[i]) > MOST_NOISE || diameter_at(e, i) * FIBER_DIAMETER_FINER > d->voxel)
+            continue;
+        d->other_voxel = d->voxel;
+        d->other_noise_share = d->noise_share;
+        d->voxel = diameter_at(e, i);
+        d->noise_share = noise_share(e[i]);
+        d->hidden = true;
+        break;
+    }
+    return s;
 }
 
 status fiber_diameter_measure(const struct volume *v, struct thread_pool *pool, const struct progress *progress,
@@ -223,20 +284,12 @@ status fiber_diameter_measure(const struct volume *v, struct thread_pool *pool, 
         s = error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber diameter: out of memory");
     if (s == STATUS_OK) s = choose_bricks(job, err);
     if (s == STATUS_OK) {
-        const struct progress quiet = progress_silent(progress);
-        s = thread_pool_run(pool, job->n_void_brick, measure_noise, job, &quiet);
-        if (s == STATUS_OK) diameter->noise_measured = reduce_noise(job);
-        if (s == STATUS_OK) s = thread_pool_run(pool, job->n_brick, measure_brick, job, progress);
+        struct energy energy[N_SCALE];
+        s = measure_energy(job, 0.0, N_SCALE, pool, progress, energy, &diameter->noise_measured);
+        if (s == STATUS_OK) choose_peak(energy, diameter);
+        const int n_hidden = s == STATUS_OK ? hidden_scales(energy, diameter->voxel) : 0;
+        if (n_hidden > 0) s = look_finer(job, n_hidden, pool, progress, diameter);
         if (s != STATUS_OK) error_set(err, s, "measuring the fiber diameter was cancelled");
-    }
-    if (s == STATUS_OK) {
-        struct energy energy[N_SCALE] = {0};
-        for (int i = 0; i < N_SCALE; i++)
-            for (size_t b = 0; b < job->n_brick; b++) {
-                energy[i].signal += job->brick[b].energy[i].signal;
-                energy[i].raw += job->brick[b].energy[i].raw;
-            }
-        choose_peak(energy, diameter);
     }
     if (job != NULL) {
         free(job->scratch);

@@ -1,8 +1,6 @@
 /* The line filter and the search for its minimum. */
 #include "base/angle.h"
 #include "base/option_id.h"
-#include "geometry/orientation/diameter/fiber_diameter.h"
-#include "geometry/orientation/diameter/scale_space.h"
 #include "geometry/orientation/lines/line_filter.h"
 #include "geometry/orientation/structure_tensor.h"
 #include "geometry/reconstruct.h"
@@ -162,133 +160,11 @@ static void test_straight_fibers(void **state)
                       r.fiber_diameter_voxel);
         assert_true(count > 1500.0);
         assert_true(sum / count < 2.0);
-        /* a single fiber in noise is measured as 8.3 to 8.4 voxels; fibers side by side are not (below) */
+        /* a single fiber in noise is measured as 8.3 to 8.4 voxels; fibers side by side are not */
         assert_true(r.fiber_diameter_voxel > 7.0 && r.fiber_diameter_voxel < 8.6);
         volume_release(&v);
         direction_volume_release(&d);
     }
-}
-
-enum { N_SIDE = 64, N_BUNDLE = 16 };
-
-/* A bundle of 16 fibers of a diameter (voxels) in a cube of 64 voxels, with noise of signal-to-noise 2 if noisy. */
-static void make_bundle(struct volume *v, double diameter, bool noisy)
-{
-    const size_t n[3] = {N_SIDE, N_SIDE, N_SIDE};
-    struct test_cylinder c[N_BUNDLE];
-    for (int i = 0; i < N_BUNDLE; i++) {
-        double y = 32.0 + 1.15 * diameter * (i % 4 - 1.5), z = 32.0 + 1.15 * diameter * (i / 4 - 1.5);
-        c[i] = (struct test_cylinder){{32.0, y, z}, {1.0, 0.1 * (i % 3), 0.05 * (i % 2)}, 0.5 * diameter};
-    }
-    assert_int_equal(volume_init(v, n, voxel_m, NULL), STATUS_OK);
-    test_fill_cylinders(v, c, N_BUNDLE, noisy ? 0.5 : 0.0, 7);
-}
-
-/* Measures after clamping to 0..1, as scans are mapped, and releases the volume. */
-static struct fiber_diameter measure_clamped(struct volume *v)
-{
-    struct fiber_diameter d;
-    for (size_t i = 0; i < volume_n_voxel(v->n); i++) v->density[i] = fminf(1.0f, fmaxf(0.0f, v->density[i]));
-    assert_int_equal(fiber_diameter_measure(v, NULL, NULL, &d, NULL), STATUS_OK);
-    volume_release(v);
-    return d;
-}
-
-/* The diameter of fibers side by side is the same at signal-to-noise 2 as without noise. */
-static void test_diameter_in_strong_noise(void **state)
-{
-    (void)state;
-    static const double diameter[3] = {4.0, 7.0, 12.0};
-    for (int k = 0; k < 3; k++) {
-        struct fiber_diameter measured[2];
-        for (int noisy = 0; noisy < 2; noisy++) {
-            struct volume v;
-            make_bundle(&v, diameter[k], noisy);
-            measured[noisy] = measure_clamped(&v);
-        }
-        print_message("diameter %g: measured %.2f, in strong noise %.2f\n", diameter[k], measured[0].voxel,
-                      measured[1].voxel);
-        assert_true(fabs(measured[0].voxel / diameter[k] - 1.0) < 0.1);
-        assert_true(fabs(measured[1].voxel / measured[0].voxel - 1.0) < 0.03);
-    }
-}
-
-/* Adds noise of a standard deviation whose neighbours are correlated by a Gaussian of 0.5 voxels. */
-static void add_correlated_noise(struct volume *v, double sd)
-{
-    size_t n_voxel = volume_n_voxel(v->n);
-    struct volume white;
-    assert_int_equal(volume_init(&white, v->n, v->voxel_size_m, NULL), STATUS_OK);
-    float *scratch = malloc(n_voxel * sizeof *scratch);
-    double square = 0.0;
-    test_fill_cylinders(&white, NULL, 0, 1.0, 3);
-    scale_blur(white.density, scratch, white.n, 0.5);
-    for (size_t i = 0; i < n_voxel; i++) square += (double)(white.density[i] * white.density[i]);
-    float scale = (float)(sd / sqrt(square / (double)n_voxel));
-    for (size_t i = 0; i < n_voxel; i++) v->density[i] += scale * white.density[i];
-    free(scratch);
-    volume_release(&white);
-}
-
-/* Noise correlated over half a voxel has the strongest response at a diameter of 3. It must not be taken for fibers. */
-static void test_diameter_in_correlated_noise(void **state)
-{
-    (void)state;
-    static const double diameter[3] = {4.0, 7.0, 12.0};
-    for (int k = 0; k < 3; k++) {
-        struct volume v;
-        make_bundle(&v, diameter[k], false);
-        add_correlated_noise(&v, 0.5);
-        struct fiber_diameter d = measure_clamped(&v);
-        print_message("diameter %g: measured %.2f (noise %.0f %%), other %.2f (noise %.0f %%)\n", diameter[k], d.voxel,
-                      100.0 * d.noise_share, d.other_voxel, 100.0 * d.other_noise_share);
-        assert_true(d.noise_measured);
-        assert_true(fabs(d.voxel / diameter[k] - 1.0) < 0.15);
-    }
-}
-
-/* A given diameter is used as it is. */
-static void test_given_diameter(void **state)
-{
-    (void)state;
-    struct volume v;
-    struct direction_volume d;
-    struct reconstruct_option o;
-    struct reconstruct_report r = {0};
-    make_bundle(&v, 7.0, false);
-    reconstruct_option_default(&o);
-    o.fiber_diameter_voxel = 5.0;
-    assert_int_equal(reconstruct_orientation(&v, &o, NULL, NULL, &d, &r, NULL), STATUS_OK);
-    assert_true(r.fiber_diameter_voxel == 5.0 && isnan(r.other_diameter_voxel));
-    assert_int_equal(o.h, 15);
-    volume_release(&v);
-    direction_volume_release(&d);
-}
-
-static void keep_warning(void *context, const char *option, const char *text)
-{
-    if (strcmp(option, OPTION_FIBER_DIAMETER) == 0) snprintf(context, 600, "%s", text);
-}
-
-/* The user reads which diameter was chosen over which, and why. */
-static void test_diameter_warning(void **state)
-{
-    (void)state;
-    char text[600] = "";
-    float radius_m[5] = {7e-6f, 7e-6f, 7e-6f, 7e-6f, 7e-6f};
-    const struct fiber_set f = {.n_fiber = 5, .radius_m = radius_m};
-    const struct warning_sink sink = {keep_warning, text};
-    struct reconstruct_report r = {.fiber_diameter_voxel = 7.0, .diameter_noise_share = 0.1};
-    r.other_diameter_voxel = NAN;
-    reconstruct_warn_fibers(&r, &f, &sink);
-    assert_string_equal(text, "");
-    r.other_diameter_voxel = 3.0;
-    r.other_diameter_noise_share = 0.67;
-    reconstruct_warn_fibers(&r, &f, &sink);
-    assert_non_null(strstr(text, "7.0 voxels was chosen over one of 3.0, because 67 %"));
-    r.other_diameter_voxel = 20.0;
-    reconstruct_warn_fibers(&r, &f, &sink);
-    assert_non_null(strstr(text, "7.0 voxels was chosen over one of 20.0, which responds more strongly"));
 }
 
 static void test_nothing_kept(void **state)
@@ -315,10 +191,6 @@ int main(void)
         cmocka_unit_test(test_j_is_the_published_filter),
         cmocka_unit_test(test_search_agrees_with_brute_force),
         cmocka_unit_test(test_straight_fibers),
-        cmocka_unit_test(test_diameter_in_strong_noise),
-        cmocka_unit_test(test_diameter_in_correlated_noise),
-        cmocka_unit_test(test_given_diameter),
-        cmocka_unit_test(test_diameter_warning),
         cmocka_unit_test(test_nothing_kept),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
