@@ -26,7 +26,7 @@ static const char *const column_name[] = {"theta_o_deg",   "phi_deg",       "the
                                           "radiance_r_se", "radiance_g_se", "radiance_b_se", NULL};
 
 enum { MAX_TABLE_BYTES = 16 << 20 };
-static const double most_theta_deg = 89.9, most_phi_deg = 360.0, most_radiance = 1e12;
+static const double most_theta_deg = 89.9, most_phi_deg = 360.0, most_radiance = 1e12, least_brightest = 1e-12;
 
 struct reader {
     struct fiber_profile *profile;
@@ -135,9 +135,11 @@ static status check_whole(const struct reader *r, const struct number_table *t, 
             "up to this line the angles of the columns '%s' and '%s' look like radians: the largest "
             "are %.3g and %.3g; write degrees",
             t->file, t->line, column_name[COLUMN_THETA_O], column_name[COLUMN_PHI], r->span.theta, r->span.phi);
-    if (!(r->brightest > 0.0))
-        return number_table_error(t, STATUS_INVALID, "up to this line the column '%s' is 0", t->file, t->line,
-                                  column_name[r->profile->n_channel == 1 ? COLUMN_GREY : COLUMN_R]);
+    if (!(r->brightest >= least_brightest))
+        return number_table_error(t, STATUS_INVALID,
+                                  "up to this line the largest '%s' is %g: it must be at least %g; choose another unit",
+                                  t->file, t->line, column_name[r->profile->n_channel == 1 ? COLUMN_GREY : COLUMN_R],
+                                  r->brightest, least_brightest);
     return STATUS_OK;
 }
 

@@ -34,7 +34,18 @@ static status target_values(struct profile_target *t, struct error *err)
     return STATUS_OK;
 }
 
-/* A grey profile says one thing of a colour, so its channels have one value. */
+/* Makes q follow the leader of p, with all that follow q. */
+static void follow(struct fit_option *o, size_t n_param, size_t q, size_t p)
+{
+    for (size_t k = 0; k < n_param; k++) {
+        if (o->leader[k] != q) continue;
+        o->leader[k] = o->leader[p];
+        o->ratio[k] *= o->ratio[p];
+    }
+}
+
+/* A grey profile says one thing of a colour, so its channels have one value. The ties of the job stay as they are: a
+ * channel that follows another parameter is not tied again. */
 static void tie_channels(const struct profile_problem *problem, struct fit_option *o)
 {
     const struct param_info *info = problem->model->param;
@@ -42,10 +53,8 @@ static void tie_channels(const struct profile_problem *problem, struct fit_optio
     for (size_t p = 0; p + 2 < problem->model->n_param; p++) {
         if (info[p].kind != PARAM_COLOUR || info[p].channel != 0) continue;
         for (size_t q = p + 1; q < p + 3; q++)
-            if (o->leader[q] == q && !problem->parameter[q].fixed && !problem->parameter[p].fixed) {
-                o->leader[q] = o->leader[p];
-                o->ratio[q] = o->ratio[p];
-            }
+            if (o->leader[q] == q && o->leader[p] != q && !problem->parameter[q].fixed && !problem->parameter[p].fixed)
+                follow(o, problem->model->n_param, q, p);
     }
 }
 

@@ -39,7 +39,7 @@ struct profile_fit {
     double scale, scale_se; /* scale_se: 0 for a given scale */
     double *value;          /* s L of every row and channel; the caller frees it with profile_fit_release */
     size_t n_value, n_free; /* unknowns: parameters and the scale */
-    double nrmse;           /* root mean square of s L - m over the range of m, as published */
+    double nrmse;           /* root mean square of s L - m over the range of m, as published; NaN without a range */
     double rel_rms;         /* root mean square of (s L - m) / (m + 0.02 mean of m) */
     double misfit;          /* t */
     double chi_square; /* the minimised sum without priors and with t = 0, per value less unknown; NaN without se */

@@ -33,8 +33,8 @@ static status check_keys(const json_t *section, const char *before, const char *
 status job_check_profile_document(const struct option_value *v, struct error *err)
 {
     static const char *const of_document[] = {"sample", "profile", "fit", NULL},
-                             *const of_fit[] = {"model",  "models", "seed",   "fixed",  "start",          "tied",
-                                                "bounds", "priors", "starts", "method", "max_iterations", NULL};
+                             *const of_fit[] = {"model",  "models", "seed",   "fixed",          "start", "tied",
+                                                "bounds", "priors", "starts", "max_iterations", NULL};
     status s = check_keys(v->value, "", of_document, err);
     const json_t *fit = json_object_get(v->value, "fit");
     if (s == STATUS_OK && fit != NULL) s = check_keys(fit, "fit.", of_fit, err);

@@ -110,8 +110,8 @@ const struct job_option option_rows_fit[] = {
      .meaning =
          "A job that has fitted models to the profile of a fiber of this cloth. What it found of a model that is "
          "fitted here becomes the `priors` of its parameters, with their standard errors; parameters that are "
-         "`fixed` or tied here, have priors of their own, or were not determined there, take none. The other "
-         "job may be deleted once this job runs."},
+         "`fixed` or tied here, have priors of their own, or were not determined there, take none, nor do colors "
+         "where the profile is grey. The other job may be deleted once this job runs."},
     {.path = "fit.share_camera_paths",
      .kind = OPTION_BOOL,
      INTO(share_camera_paths),

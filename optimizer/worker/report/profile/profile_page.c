@@ -83,7 +83,8 @@ void profile_page(const struct pipeline_context *c, size_t i, FILE *out)
 {
     const struct profile_fit *f = &c->model[i].profile;
     fputs("<table>\n", out);
-    fprintf(out, "<tr><td>residual, of the range of the radiances</td><td>%.2f %%</td></tr>\n", 100.0 * f->nrmse);
+    if (isfinite(f->nrmse))
+        fprintf(out, "<tr><td>residual, of the range of the radiances</td><td>%.2f %%</td></tr>\n", 100.0 * f->nrmse);
     fprintf(out, "<tr><td>relative residual</td><td>%.2f %%</td></tr>\n", 100.0 * f->rel_rms);
     fprintf(out, "<tr><td>of it misfit, beyond stated errors</td><td>%.2f %%</td></tr>\n", 100.0 * f->misfit);
     if (isfinite(f->chi_square))

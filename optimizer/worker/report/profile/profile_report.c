@@ -108,8 +108,9 @@ void profile_print(const struct pipeline_context *c, size_t i, FILE *out)
     const struct profile_fit *f = &m->profile;
     fprintf(out, "model    %s (%s)%s, fitted to the profile of a fiber\n", m->appearance.id, m->appearance.title,
             c->n_model > 1 && i == profile_best_model(c) ? ", the best" : "");
-    fprintf(out, "residual %.2f %% of the range of %zu radiances; relative %.2f %%", 100.0 * f->nrmse, f->n_value,
-            100.0 * f->rel_rms);
+    fputs("residual ", out);
+    if (isfinite(f->nrmse)) fprintf(out, "%.2f %% of the range of %zu radiances; ", 100.0 * f->nrmse, f->n_value);
+    fprintf(out, "relative %.2f %%", 100.0 * f->rel_rms);
     if (isfinite(f->chi_square)) fprintf(out, "; %.3g times the stated variance", f->chi_square);
     fprintf(out, "\nscale    %.5g", f->scale);
     if (f->scale_se > 0.0) fprintf(out, " +- %.2g", f->scale_se);

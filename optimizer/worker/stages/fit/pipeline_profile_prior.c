@@ -38,8 +38,9 @@ static bool is_tied(const struct job_fit_option *o, size_t n_param, size_t p)
     return false;
 }
 
-/* Adds the prior that one parameter of the other job gives; returns the number of parameters that took it. */
-static size_t take_parameter(struct job_model *m, const struct model_sets *sets, const json_t *found)
+/* Adds the prior that one parameter of the other job gives; returns the number of parameters that took it. is_grey: the
+ * profile has one channel. It does not tell the channels of a color apart, so a color takes nothing from it. */
+static size_t take_parameter(struct job_model *m, const struct model_sets *sets, const json_t *found, bool is_grey)
 {
     const char *name = json_string_value(json_object_get(found, "name"));
     const json_t *value = json_object_get(found, "value"), *se = json_object_get(found, "standard_error");
@@ -51,7 +52,7 @@ static size_t take_parameter(struct job_model *m, const struct model_sets *sets,
     for (size_t p = 0; p < sets->info.n_param; p++) {
         const struct param_info *info = &sets->info.param[p];
         if (strcmp(param_own_name(info), name) != 0 || !isnan(m->fixed[p]) || !isnan(m->option.prior_mean[p]) ||
-            is_tied(&m->option, sets->info.n_param, p))
+            is_tied(&m->option, sets->info.n_param, p) || (is_grey && info->kind == PARAM_COLOUR))
             continue;
         m->option.prior_mean[p] = json_number_value(value);
         m->option.prior_se[p] = json_number_value(se);
@@ -61,9 +62,11 @@ static size_t take_parameter(struct job_model *m, const struct model_sets *sets,
 }
 
 /* Adds the priors of model i; *n_prior counts them, and *found is set when the other job has fitted the model. */
-static status take_model(struct pipeline_context *c, size_t i, const json_t *models, size_t *n_prior, bool *found,
+static status take_model(struct pipeline_context *c, size_t i, const json_t *profile, size_t *n_prior, bool *found,
                          struct error *err)
 {
+    const json_t *models = json_object_get(profile, "models");
+    const bool is_grey = json_integer_value(json_object_get(json_object_get(profile, "table"), "n_channel")) == 1;
     struct job_model *m = &c->doc->model[i];
     const struct job_document *doc = c->doc;
     struct model_sets sets;
@@ -78,7 +81,7 @@ static status take_model(struct pipeline_context *c, size_t i, const json_t *mod
         *found = true;
         size_t p;
         json_array_foreach(json_object_get(model, "parameters"), p, parameter) *n_prior +=
-            take_parameter(m, &sets, parameter);
+            take_parameter(m, &sets, parameter, is_grey);
     }
     return STATUS_OK;
 }
@@ -97,18 +100,19 @@ status pipeline_profile_priors(struct pipeline_context *c, struct error *err)
     if (c->doc->profile_job[0] == '\0' || c->folder->lock_fd < 0) return STATUS_OK;
     worker_folder_path(c->folder, ADOPTED_PROFILE, "result.json", path);
     json_t *result = json_load_file(path, 0, NULL);
-    const json_t *models = json_object_get(json_object_get(result, "profile"), "models");
+    const json_t *profile = json_object_get(result, "profile");
     status s = STATUS_OK;
     if (result == NULL)
         s = refuse(c, "there is no such job, or it has no result yet", err);
-    else if (!json_is_array(models))
+    else if (!json_is_array(json_object_get(profile, "models")))
         s = refuse(c, "it has not fitted the profile of a fiber", err);
-    for (size_t i = 0; i < c->doc->n_model && s == STATUS_OK; i++) s = take_model(c, i, models, &n_prior, &found, err);
+    for (size_t i = 0; i < c->doc->n_model && s == STATUS_OK; i++) s = take_model(c, i, profile, &n_prior, &found, err);
     json_decref(result);
     if (s == STATUS_OK && !found) s = refuse(c, "it has fitted none of this job's models", err);
     if (s == STATUS_OK) log_info(c->log, "%zu priors come from the profile of job %s", n_prior, c->doc->profile_job);
     if (s == STATUS_OK && n_prior == 0)
-        worker_status_warn(c->status, "the profile of job '%s' determines no free parameter: no prior was taken",
+        worker_status_warn(c->status,
+                           "the profile of job '%s' determines no parameter that could take a prior: none was taken",
                            c->doc->profile_job);
     return s;
 }

@@ -59,8 +59,8 @@ status stage_profile_fit(struct pipeline_context *c, struct error *err)
         if (s != STATUS_OK) return s;
         take_fit(m);
         warn(c, m);
-        log_info(c->log, "'%s' fits the profile with a residual of %.2f %% of its range, %zu evaluations, %.1f s",
-                 m->appearance.id, 100.0 * m->profile.nrmse, m->profile.n_evaluation, m->profile.wall_s);
+        log_info(c->log, "'%s' fits the profile with a relative residual of %.2f %%, %zu evaluations, %.1f s",
+                 m->appearance.id, 100.0 * m->profile.rel_rms, m->profile.n_evaluation, m->profile.wall_s);
     }
     return s;
 }

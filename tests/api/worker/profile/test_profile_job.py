@@ -18,12 +18,13 @@ ALBEDO, ERROR = 0.6, 0.02
 DOCUMENT = {"sample": "wool fiber", "profile": {"file": "fiber.csv", "theta_i_deg": -40, "scale": 2}, "fit": {"models": ["kajiya_kay.v1", "isotropic.v1"]}}
 
 
-def table(seed=3):
-    rng, lines = random.Random(seed), ["theta_o_deg,phi_deg,radiance,radiance_se"]
+def table(seed=3, channels=("",)):
+    rng, lines = random.Random(seed), [",".join(["theta_o_deg", "phi_deg"] + ["radiance" + c for c in channels] + [f"radiance{c}_se" for c in channels])]
     for theta_o in range(10, 51, 5):
         for phi in range(-20, 201, 20):
             true = 2 * ALBEDO / math.pi**2 * math.cos(math.radians(40))
-            lines.append(f"{theta_o},{phi},{true * (1 + ERROR * rng.gauss(0, 1)):.6g},{true * ERROR:.4g}")
+            measured = [f"{true * (1 + ERROR * rng.gauss(0, 1)):.6g}" for _ in channels]
+            lines.append(",".join([str(theta_o), str(phi), *measured] + [f"{true * ERROR:.4g}"] * len(channels)))
     return "\n".join(lines) + "\n"
 
 
@@ -75,17 +76,24 @@ def start_cloth(d, document):
     return start(d, document, [("cloth.hair", "fibers", hair()), ("rows.csv", "measurements", TABLE.encode())])
 
 
-def test_the_prior_of_a_cloth(real, finished):
-    job, result = finished
+def test_the_prior_of_a_cloth(real):
+    document = {**DOCUMENT, "fit": {"model": "isotropic.v1"}}
+    job = start(real, document, [("fiber.csv", "profile", table(channels=("_r", "_g", "_b")).encode())])
+    result = real.wait_state(job, "succeeded", timeout_s=120)["result"]
     fitted = real.wait_state(start_cloth(real, cloth(job, fixed={"C.b": 0.3})), "succeeded", timeout_s=120)["result"]
-    found = result["parameters"][0]
-    for p, name in zip(fitted["parameters"], ("C.r", "C.g", "C.b")):
-        assert p["name"] == name
+    for p, found, name in zip(fitted["parameters"], result["parameters"], ("C.r", "C.g", "C.b")):
+        assert p["name"] == found["name"] == name
         if name == "C.b":
             assert p["fixed"] and p.get("prior") is None, "a fixed parameter takes none"
         else:
             assert p["prior"]["mean"] == pytest.approx(found["value"]) and p["prior"]["se"] == pytest.approx(found["standard_error"])
             assert abs(p["value"] - ALBEDO) < 0.1, "a sharp prior holds what six rows of another cloth say little of"
+
+
+def test_colors_take_nothing_from_a_grey_profile(real, finished):
+    job, _ = finished
+    done = real.wait_state(start_cloth(real, cloth(job)), "succeeded", timeout_s=120)["result"]
+    assert all(p["prior"] is None for p in done["parameters"]) and any("none was taken" in w for w in done["warnings"])
 
 
 def test_priors_that_cannot_be_taken(real, finished):
@@ -109,6 +117,7 @@ def test_a_job_that_does_not_exist(real):
     ("theta_o_deg,phi_deg,radiance\n.17,-.35,1\n.87,3.14,1\n", ("line 3", "radians")),
     ("theta_o_deg,phi_deg,radiance\n10,0,-1\n", ("line 2", "'radiance' is -1")),
     ("theta_o_deg,phi_deg,radiance\n10,0,1\n", ("line 2", "unknowns")),
+    ("theta_o_deg,phi_deg,radiance\n10,0,1e-200\n20,0,0\n", ("line 3", "1e-200", "another unit")),
 ])
 def test_tables_that_are_refused(tmp_path, text, says):
     (tmp_path / "input").mkdir()
@@ -120,6 +129,7 @@ def test_tables_that_are_refused(tmp_path, text, says):
 
 
 @pytest.mark.parametrize("document,field", [
+    ({**DOCUMENT, "fit": {"method": "published_sgd.v1"}}, "fit.method"),
     ({**DOCUMENT, "fibers": {"file": "a.hair"}}, "fibers"), ({**DOCUMENT, "black_sheet": True}, "black_sheet"),
     ({**DOCUMENT, "fit": {"model": "microflake.v1"}}, "fit.models"), ({**DOCUMENT, "fit": {"path_budget": 5000}}, "fit.path_budget"),
     ({**DOCUMENT, "profile": {"file": "a.csv", "theta_i_deg": 95}}, "profile.theta_i_deg"), ({**DOCUMENT, "profile": {}}, "profile.file"),

@@ -68,6 +68,7 @@ static void refused(void **unused)
          {"line 4", "'theta_o_deg' and 'phi_deg'", "radians"}},
         {"theta_o_deg,phi_deg,radiance\n", 0, {"line 1", "no row"}},
         {"theta_o_deg,phi_deg,radiance\n10,0,0\n20,0,0\n", 0, {"line 3", "'radiance' is 0"}},
+        {"theta_o_deg,phi_deg,radiance\n10,0,0\n20,0,1e-200\n", 0, {"line 3", "'radiance' is 1e-200", "another unit"}},
     };
     (void)unused;
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {

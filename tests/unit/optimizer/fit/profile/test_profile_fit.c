@@ -183,6 +183,30 @@ static void priors_and_bounds(void **unused)
     end(&f);
 }
 
+/* Ties of the job hold in a grey profile too, where the channels of each color are tied besides. */
+static void ties_of_a_grey_profile(void **unused)
+{
+    struct fit_case f;
+    struct profile_fit fit;
+    (void)unused;
+    begin(&f, "two_lobe.v1", 1, 1);
+    measure(&f, 1, 11);
+    f.option.leader[1] = 4; /* C_R.g is half of C_TT.g */
+    f.option.ratio[1] = 0.5;
+    run(&f, &fit);
+    assert_true(fabs(fit.param[1] / (0.5 * fit.param[4]) - 1) < 1e-12);
+    assert_true(fit.param[0] == fit.param[2] && fit.param[3] == fit.param[4] && fit.param[3] == fit.param[5]);
+    profile_fit_release(&fit);
+    f.option.leader[1] = 1;
+    f.option.leader[0] = 1; /* C_R.r is half of C_R.g */
+    f.option.ratio[1] = 1;
+    f.option.ratio[0] = 0.5;
+    run(&f, &fit);
+    assert_true(fabs(fit.param[0] / (0.5 * fit.param[1]) - 1) < 1e-12);
+    profile_fit_release(&fit);
+    end(&f);
+}
+
 static void too_few_rows(void **unused)
 {
     struct fit_case f;
@@ -202,8 +226,11 @@ static void too_few_rows(void **unused)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(errors_are_as_stated), cmocka_unit_test(colors_and_near_field),
-                                       cmocka_unit_test(misfit), cmocka_unit_test(priors_and_bounds),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(errors_are_as_stated),
+                                       cmocka_unit_test(colors_and_near_field),
+                                       cmocka_unit_test(misfit),
+                                       cmocka_unit_test(priors_and_bounds),
+                                       cmocka_unit_test(ties_of_a_grey_profile),
                                        cmocka_unit_test(too_few_rows)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
