@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+_Static_assert((int)SLAB_EDGE == (int)AXIS_BRICK, "a column of a slab is one of bricks");
+
 /* Bytes of a brick's sums that fit into one message with those of others. */
 enum { BRICK_MOST_BYTES = RANK_MESSAGE_MOST / 4 };
 
@@ -259,7 +261,7 @@ static bool lines_make_sense(const struct axis_round *r, const struct axes_order
 {
     const float most = 1e7f;
     const struct polyline_set *p = &r->lines;
-    bool good = first[0] == 0 && first[o->n_line] == o->n_vertex && isfinite(o->blur) && o->blur > 0.0 &&
+    bool good = first[0] == 0 && first[o->n_line] == o->n_vertex && o->blur > 0.0 && o->blur <= (double)most &&
                 isfinite(o->low) && isfinite(o->high);
     for (size_t l = 0; l < o->n_line && good; l++) good = first[l] <= first[l + 1];
     good =

@@ -175,11 +175,12 @@ status direction_share_filter(const struct volume_slabs *slabs, const struct vol
     const struct progress quiet = progress_silent(progress), cancelled = {.cancel = &stop};
     struct direction_volume part = {0};
     *d = (struct direction_volume){0};
-    status s = direction_volume_init_in(d, v->n, v->voxel_size_m, v->space, err);
-    if (s == STATUS_OK) s = volume_slabs_send(slabs, v, err);
+    status s = volume_slabs_send(slabs, v, err);
     if (s == STATUS_OK) s = rank_team_order(slabs->team, RANK_ORDER_DIRECTIONS, &o, sizeof o, err);
     if (s == STATUS_OK) {
         s = filter_own(slabs, v, diameter_voxel, option, pool, progress, &part, err);
+        /* not before: the filter needs its memory */
+        if (s == STATUS_OK) s = direction_volume_init_in(d, v->n, v->voxel_size_m, v->space, err);
         struct gather g = {.slabs = slabs, .part = &part, .whole = d, .part_row = volume_slabs_own(slabs, 0).with_halo};
         if (s == STATUS_OK)
             s = gather_rows(&g, pool, &quiet, err);

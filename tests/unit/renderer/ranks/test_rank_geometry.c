@@ -304,6 +304,7 @@ enum wrong_lines {
     FALLING_VERTICES,
     TOO_MANY,
     NO_BLUR,
+    HUGE_BLUR,
     WITHOUT_ROWS,
     ROWS_OF_TOO_MANY_SLICES,
     WITHOUT_LINES,
@@ -331,6 +332,7 @@ static void wrong_lines_and_rows_are_refused(void **state)
         if (wrong == FALLING_VERTICES) first[1] = 7;
         if (wrong == TOO_MANY) o.n_line = UINT64_MAX / 4;
         if (wrong == NO_BLUR) o.blur = 0.0;
+        if (wrong == HUGE_BLUR) o.blur = 1e300;
         send_slab(&r, wrong == WITHOUT_ROWS ? 0 : wrong == ROWS_OF_TOO_MANY_SLICES ? NZ - 1 : NZ);
         if (wrong == ROWS_OF_TOO_MANY_SLICES) {
             const struct rows_order rows = {NZ - 1, 2};
