@@ -78,9 +78,10 @@ bench-scale: | deps-test ## what a batch of 1,000 samples costs to submit and to
 	@SELVEDGE_BUILD=$(BUILD) /usr/bin/python3 tests/bench/service/bench_plan.py
 	@$(MAKE) --no-print-directory bench-ranks
 
-bench-ranks: | deps-test ## strong scaling of one fit over ranks: 2 measured, 64 by a model (two minutes on 2 quiet cores; part of bench-scale)
+bench-ranks: | deps-test ## strong scaling of one fit over ranks: 2 measured, 64 by a model; of the geometry of a scan over 2 (three minutes on 2 quiet cores; part of bench-scale)
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(BUILD)/tests/bench/ranks/rank_messages >&2
 	@/usr/bin/python3 tests/bench/ranks/bench_ranks.py $(BUILD)
+	@/usr/bin/python3 tests/bench/ranks/bench_rank_scan.py $(BUILD)
 
 docs-ranks:        ## draw docs/images/ranks-scaling.svg anew from the tables of docs/ranks.md, whose rows bench-ranks prints (a second)
 	@/usr/bin/python3 tests/bench/ranks/plot_scaling.py docs/ranks.md docs/images/ranks-scaling.svg
