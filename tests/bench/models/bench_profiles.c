@@ -9,6 +9,8 @@
  *       The same where half of the rays meet the fiber turned round, as the model has it.
  *   models.fur.profile.<fiber>.published_nrmse
  *       What the published fit left of the measured fiber (Yan et al. 2017, table 4).
+ *   models.mie.published_error
+ *       Largest difference of an efficiency of the exact cylinder (mie_cylinder.h) from its published value.
  *
  * bench_profiles [RAYS] [FIBERS]
  *   RAYS    of a profile (900000)
@@ -17,6 +19,7 @@
 #include "base/angle.h"
 #include "optimizer/fit/profile/profile_fit.h"
 #include "tests/support/fiber/fiber_rays.h"
+#include "tests/support/wave/mie_cylinder.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -65,6 +68,8 @@ int main(int argc, char **argv)
         fprintf(stderr, "usage: bench_profiles [RAYS] [FIBERS], at most %d fibers\n", PUBLISHED_N_FIBER);
         return 2;
     }
+    printf("{\"name\":\"models.mie.published_error\",\"value\":%.3g,\"unit\":\"1\",\"better\":\"lower\"}\n",
+           mie_published_error());
     for (int k = 0; k < n_fiber; k++) {
         struct ray_fiber f = published_fiber(k);
         struct fiber_profile profile;
