@@ -1,9 +1,10 @@
 /* Exact scattering of a plane wave by an infinite circular cylinder, the wave vector across its axis (Lorenz-Mie;
- * Bohren and Huffman 1983, "Absorption and Scattering of Light by Small Particles", section 8.4): the reference for wave
- * optics of fibers.
+ * Bohren and Huffman 1983, "Absorption and Scattering of Light by Small Particles", section 8.4): the reference for
+ * wave optics of fibers.
  *
- * Waves go with exp(-i omega t), so that an absorbing index has a positive imaginary part. x = 2 pi radius / wavelength;
- * the index m is that of the cylinder over that of the medium. The field is along the axis (TM) or across it (TE):
+ * Waves go with exp(-i omega t), so that an absorbing index has a positive imaginary part. x = 2 pi radius over the
+ * wavelength; the index m is that of the cylinder over that of the medium. The field is along the axis (TM) or across
+ * it (TE):
  *
  *     T(d) = t_0 + 2 sum over n of t_n cos(n d),   d from straight on
  *     Q_ext = 2 / x Re T(0),   Q_sca = 1 / (pi x) integral of |T|^2 dd
@@ -26,7 +27,8 @@ struct mie_cylinder {
     double complex t[MIE_MAX_ORDER];
 };
 
-/* Computes the coefficients; m = INFINITY is a perfect mirror. x is at most about 3900, so that they fit. Returns 0, or -1 when x is too large. */
+/* Computes the coefficients; m = INFINITY is a perfect mirror. x is at most about 3900, so that they fit. Returns 0, or
+ * -1 when x is too large. */
 int mie_cylinder_init(struct mie_cylinder *c, double x, double complex m, enum mie_field field);
 double mie_extinction(const struct mie_cylinder *c);
 double mie_scattering(const struct mie_cylinder *c);
