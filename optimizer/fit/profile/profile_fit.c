@@ -199,9 +199,11 @@ static void put_residuals(const struct profile_search *s, struct profile_fit *fi
 {
     const struct profile_target *t = s->target;
     double least = INFINITY, most = 0.0, sum = 0.0;
+    fit->bic = (double)fit->n_free * log((double)t->n_value);
     for (size_t i = 0; i < t->n_value; i++) {
         const double r = s->here.value[i] - t->measured[i];
         sum += r * r;
+        fit->bic += r * r / (s->error[i] * s->error[i]) + 2.0 * log(s->error[i]);
         least = fmin(least, t->measured[i]);
         most = fmax(most, t->measured[i]);
     }

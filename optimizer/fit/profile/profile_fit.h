@@ -43,6 +43,7 @@ struct profile_fit {
     double rel_rms;         /* root mean square of (s L - m) / (m + 0.02 mean of m) */
     double misfit;          /* t */
     double chi_square; /* the minimised sum without priors and with t = 0, per value less unknown; NaN without se */
+    double bic;        /* sum of ((s L - m) / e)^2 + 2 ln e over all values, plus n_free ln n_value */
     size_t n_start, n_agree; /* starts, and those that came within 1 % of the least rel_rms */
     size_t n_evaluation;
     bool converged;

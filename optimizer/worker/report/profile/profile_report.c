@@ -7,17 +7,11 @@
 #include <math.h>
 #include <stdlib.h>
 
-static double bic(const struct profile_fit *f)
-{
-    const double n = (double)f->n_value;
-    return n * log(f->rel_rms * f->rel_rms) + (double)f->n_free * log(n);
-}
-
 static size_t profile_best_model(const struct pipeline_context *c)
 {
     size_t best = 0;
     for (size_t i = 1; i < c->n_model; i++)
-        if (bic(&c->model[i].profile) < bic(&c->model[best].profile)) best = i;
+        if (c->model[i].profile.bic < c->model[best].profile.bic) best = i;
     return best;
 }
 
@@ -33,7 +27,7 @@ static json_t *model_json(const struct pipeline_context *c, size_t i)
     json_object_set_new(json, "rel_rms", json_number(f->rel_rms));
     json_object_set_new(json, "misfit", json_number(f->misfit));
     json_object_set_new(json, "chi_square", json_number(f->chi_square));
-    json_object_set_new(json, "bic", json_number(bic(f)));
+    json_object_set_new(json, "bic", json_number(f->bic));
     json_object_set_new(json, "n_unknown", json_count(f->n_free));
     json_object_set_new(json, "n_start", json_count(f->n_start));
     json_object_set_new(json, "n_agree", json_count(f->n_agree));

@@ -2,7 +2,7 @@
  *
  * "profile" of result.json:
  *   "table"      file, n_row, n_channel, has_errors, and the ranges of theta_i_deg, theta_o_deg and phi_deg
- *   "chosen_by"  "bic": the best model has the least n ln(rel_rms^2) + k ln n, n values and k unknowns
+ *   "chosen_by"  "bic": the best model has the least profile_fit.bic
  *   "csv"        name of the table of measured and fitted radiances, of all models
  *   "models"     of each: id, title, best, parameters, scale and its error, nrmse, rel_rms, misfit, chi_square, bic,
  *                n_unknown, n_start, n_agree, n_evaluation, converged, fit_wall_s (profile_fit.h)

@@ -161,6 +161,32 @@ static void misfit(void **unused)
     end(&other);
 }
 
+/* Dark rows whose stated errors are above all radiances do not choose the model, though they make its relative
+ * residual: the rows of the highlight read 0, which the model without a highlight comes closer to. */
+static void rows_of_large_errors_do_not_choose(void **unused)
+{
+    struct fit_case f, other;
+    struct profile_fit own, wrong;
+    double most = 0;
+    (void)unused;
+    begin(&f, "two_lobe.v1", 1, 1);
+    measure(&f, 1, 3);
+    for (size_t i = 0; i < f.profile.n; i++) most = fmax(most, f.profile.row[i].radiance[0]);
+    for (size_t i = 5 * N_PHI; i < 6 * N_PHI; i++) {
+        f.profile.row[i].radiance[0] = 0;
+        f.profile.row[i].se[0] = 3 * most;
+    }
+    run(&f, &own);
+    begin(&other, "isotropic.v1", 1, 1);
+    fiber_profile_release(&other.profile);
+    other.problem.profile = &f.profile;
+    run(&other, &wrong);
+    assert_true(own.rel_rms > wrong.rel_rms && own.bic < wrong.bic - 100);
+    profile_fit_release(&own);
+    profile_fit_release(&wrong);
+    end(&f);
+}
+
 /* A sharp prior keeps a parameter where it says, bounds are kept, and what is held stays. */
 static void priors_and_bounds(void **unused)
 {
@@ -230,6 +256,7 @@ int main(void)
                                        cmocka_unit_test(colors_and_near_field),
                                        cmocka_unit_test(misfit),
                                        cmocka_unit_test(priors_and_bounds),
+                                       cmocka_unit_test(rows_of_large_errors_do_not_choose),
                                        cmocka_unit_test(ties_of_a_grey_profile),
                                        cmocka_unit_test(too_few_rows)};
     return cmocka_run_group_tests(tests, NULL, NULL);
