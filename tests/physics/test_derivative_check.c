@@ -1,6 +1,7 @@
 /* The gradient certificate: every model passes it at its defaults and at its bounds, and wrong derivatives fail it. */
 #include "renderer/transport/derivative_check.h"
 #include "tests/support/cloth/hand_weave.h"
+#include "tests/support/model/compared_range.h"
 #include "tests/support/scan/hand_volume.h"
 #include "tests/support/tracer/orbit_configurations.h"
 
@@ -83,9 +84,9 @@ static void place_parameters(const struct appearance *m, enum place place, doubl
 {
     for (size_t p = 0; p < m->n_param; p++) {
         const struct param_info *i = &m->param[p];
-        param[p] = place == LOWER_BOUNDS ? i->lower : place == UPPER_BOUNDS ? i->upper : i->start;
+        param[p] = place == LOWER_BOUNDS ? compared_range_lower(m->id, i) : place == UPPER_BOUNDS ? i->upper : i->start;
         if (i->channel < 0 || place == DEFAULTS) continue;
-        param[p] = place == LOWER_BOUNDS ? 0.2 : place == CLEAR_CLOTH && p < 3 ? i->lower : 0.9;
+        param[p] = place == LOWER_BOUNDS ? 0.2 : place == CLEAR_CLOTH && p < 3 ? compared_range_lower(m->id, i) : 0.9;
     }
     if (m->kind == MODEL_VOLUME) param[m->n_param - 1] = m->param[m->n_param - 1].start;
 }

@@ -3,6 +3,7 @@
 #include "renderer/scattering/gauss_polynomial.h"
 #include "renderer/scattering/scattering.h"
 #include "renderer/scattering/von_mises.h"
+#include "tests/support/model/compared_range.h"
 #include "tests/support/model/model_stream.h"
 #include "tests/support/tracer/reference_two_lobe.h"
 
@@ -28,13 +29,14 @@ static void random_direction(struct rng *r, float w[3])
     w[2] = c * sinf(phi);
 }
 
-/* Point k of the parameter ranges: the lower bounds, the upper bounds, the start, combinations, then random points. */
+/* Point k of the compared ranges: the lower bounds, the upper bounds, the start, combinations, then random points. */
 static void box_point(const struct scattering_model *m, unsigned k, struct rng *r, double *param)
 {
     for (size_t p = 0; p < m->n_param; p++) {
         const struct param_info *i = &m->param[p];
         double t = k == 0 ? 0 : k == 1 ? 1 : k < 10 ? (double)(k >> (p % 4) & 1) : (double)rng_float(r);
-        param[p] = i->lower + t * (i->upper - i->lower);
+        double lower = compared_range_lower(m->id, i);
+        param[p] = lower + t * (i->upper - lower);
         if (k == 2) param[p] = i->start;
     }
 }
@@ -159,10 +161,11 @@ static double truncation(const double ln_s[3], double h, double slope)
 
 /* Step of a difference over the room that a parameter has. The tables of elliptical.v1 are sums over single rays, some
  * of which begin to be reflected totally within a larger step. Azimuths of fur_near.v1 follow the index of refraction,
- * and its narrowest lobes are of a degree. */
+ * and its narrowest lobes are of a degree. Tilts of up to ten degrees move lobes of one degree. */
 static double difference_step(const struct scattering_model *m, const struct param_info *info)
 {
     if (strcmp(m->id, "elliptical.v1") == 0 && info->kind == PARAM_SHAPE) return 3e-4;
+    if (strcmp(info->symbol, "alpha") == 0) return 2e-3;
     return strcmp(m->id, "fur_near.v1") == 0 && info->kind == PARAM_SHAPE ? 1e-3 : 5e-3;
 }
 

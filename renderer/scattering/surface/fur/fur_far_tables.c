@@ -3,8 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Waves for widths from 2 degrees, the least gamma. */
-enum { N_WAVE = 160, N_MEDULLA_WAVE = 48, LEAST_OFFSET = 160 };
+/* Waves for widths from a degree, the least gamma. */
+enum { N_WAVE = 320, N_MEDULLA_WAVE = 48, LEAST_OFFSET = 160 };
 /* Values of a table, and derivatives in the order of fur_far_by; that by gamma follows from the values. */
 enum { VALUE, BY = 1, N_SUM = BY + FUR_F_GAMMA, BY_GAMMA = N_SUM, N_QUANTITY };
 #define LEAST_FACTOR 5.5 /* waves with k w above this have a factor below exp(-5.5^2 / 2) = 3e-7 */
