@@ -171,7 +171,7 @@ static void examine_results(struct doctor *d, const struct patient *p)
 }
 
 /* What the worker has last said, and whether it still runs. */
-static void examine_worker(struct doctor *d, const struct patient *p)
+static void examine_worker(struct doctor *d, struct patient *p)
 {
     struct error err = {0};
     json_t *said = read_object(p->folder, ".", JOB_FILE_STATUS, DOCUMENT_MOST_BYTES, &err);
@@ -179,7 +179,8 @@ static void examine_worker(struct doctor *d, const struct patient *p)
     const char *state = json_string_value(json_object_get(said, "state")),
                *stage = json_string_value(json_object_get(said, "stage"));
     double age_s = clock_wall_s() - json_number_value(json_object_get(said, "heartbeat_unix_s"));
-    bool running = state != NULL && strcmp(state, "running") == 0;
+    const bool running = state != NULL && strcmp(state, "running") == 0;
+    p->at_work = p->at_work || lock_held(p); /* it may have begun since the doctor looked first */
     if (said == NULL && err.code == STATUS_NOT_FOUND)
         doctor_say(d, DOCTOR_OK, "worker", p->at_work ? "it is starting" : "none has run yet");
     else if (state == NULL)
