@@ -13,9 +13,11 @@
 #include <string.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
-enum { MAX_ATTEMPT_BYTES = 4096 };
+/* Who only looks whether a worker runs, as the doctor does, has the lock for a moment. */
+enum { MAX_ATTEMPT_BYTES = 4096, TRIES_OF_LOCK = 10 };
 
 void worker_folder_path(const struct worker_folder *f, const char *a, const char *b, char path[WORKER_PATH_BYTES])
 {
@@ -53,7 +55,12 @@ static status take_lock(struct worker_folder *f, struct error *err)
     worker_folder_path(f, JOB_FILE_LOCK, NULL, path);
     f->lock_fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
     if (f->lock_fd < 0) return error_set_errno(err, "cannot lock job folder '%s'", f->path);
-    if (flock(f->lock_fd, LOCK_EX | LOCK_NB) == 0) return STATUS_OK;
+    const struct timespec pause = {0, 10000000};
+    for (int i = 0; i < TRIES_OF_LOCK; i++) {
+        if (flock(f->lock_fd, LOCK_EX | LOCK_NB) == 0) return STATUS_OK;
+        if (errno != EWOULDBLOCK) break;
+        if (i + 1 < TRIES_OF_LOCK) nanosleep(&pause, NULL);
+    }
     if (errno == EWOULDBLOCK)
         return error_set(err, STATUS_STALE, "job folder '%s' is in use by another worker", f->path);
     return error_set_errno(err, "cannot lock job folder '%s'", f->path);

@@ -38,9 +38,16 @@ static bool is_tied(const struct job_fit_option *o, size_t n_param, size_t p)
     return false;
 }
 
+/* Whether a value within three standard errors lies in the bounds that the job states, as for priors of its own. */
+static bool agrees(const struct job_fit_option *o, size_t p, double value, double se)
+{
+    return !(value + 3.0 * se < o->lower[p]) && !(value - 3.0 * se > o->upper[p]);
+}
+
 /* Adds the prior that one parameter of the other job gives; returns the number of parameters that took it. is_grey: the
  * profile has one channel. It does not tell the channels of a color apart, so a color takes nothing from it. */
-static size_t take_parameter(struct job_model *m, const struct model_sets *sets, const json_t *found, bool is_grey)
+static size_t take_parameter(struct pipeline_context *c, struct job_model *m, const struct model_sets *sets,
+                             const json_t *found, bool is_grey)
 {
     const char *name = json_string_value(json_object_get(found, "name"));
     const json_t *value = json_object_get(found, "value"), *se = json_object_get(found, "standard_error");
@@ -54,6 +61,13 @@ static size_t take_parameter(struct job_model *m, const struct model_sets *sets,
         if (strcmp(param_own_name(info), name) != 0 || !isnan(m->fixed[p]) || !isnan(m->option.prior_mean[p]) ||
             is_tied(&m->option, sets->info.n_param, p) || (is_grey && info->kind == PARAM_COLOUR))
             continue;
+        if (!agrees(&m->option, p, json_number_value(value), json_number_value(se))) {
+            worker_status_warn(c->status,
+                               "the profile of job '%s' has '%s' at %g +- %g, outside of the bounds of this job: it "
+                               "gives no prior",
+                               c->doc->profile_job, name, json_number_value(value), json_number_value(se));
+            continue;
+        }
         m->option.prior_mean[p] = json_number_value(value);
         m->option.prior_se[p] = json_number_value(se);
         n++;
@@ -81,7 +95,7 @@ static status take_model(struct pipeline_context *c, size_t i, const json_t *pro
         *found = true;
         size_t p;
         json_array_foreach(json_object_get(model, "parameters"), p, parameter) *n_prior +=
-            take_parameter(m, &sets, parameter, is_grey);
+            take_parameter(c, m, &sets, parameter, is_grey);
     }
     return STATUS_OK;
 }

@@ -80,11 +80,14 @@ def test_the_prior_of_a_cloth(real):
     document = {**DOCUMENT, "fit": {"model": "isotropic.v1"}}
     job = start(real, document, [("fiber.csv", "profile", table(channels=("_r", "_g", "_b")).encode())])
     result = real.wait_state(job, "succeeded", timeout_s=120)["result"]
-    fitted = real.wait_state(start_cloth(real, cloth(job, fixed={"C.b": 0.3})), "succeeded", timeout_s=120)["result"]
+    document = cloth(job, fixed={"C.b": 0.3}, bounds={"C.g": [0.02, 0.05]})
+    fitted = real.wait_state(start_cloth(real, document), "succeeded", timeout_s=120)["result"]
     for p, found, name in zip(fitted["parameters"], result["parameters"], ("C.r", "C.g", "C.b")):
         assert p["name"] == found["name"] == name
         if name == "C.b":
             assert p["fixed"] and p.get("prior") is None, "a fixed parameter takes none"
+        elif name == "C.g":
+            assert p["prior"] is None and any("'C.g'" in w and "outside of the bounds" in w for w in fitted["warnings"])
         else:
             assert p["prior"]["mean"] == pytest.approx(found["value"]) and p["prior"]["se"] == pytest.approx(found["standard_error"])
             assert abs(p["value"] - ALBEDO) < 0.1, "a sharp prior holds what six rows of another cloth say little of"

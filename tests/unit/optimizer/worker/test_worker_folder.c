@@ -5,14 +5,17 @@
 #include "optimizer/worker/worker_folder.h"
 #include "tests/support/scratch_folder.h"
 
+#include <fcntl.h>
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 #include <zlib.h>
 
@@ -69,6 +72,37 @@ static void test_a_worker_of_an_old_attempt_removes_nothing(void **state)
     assert_int_equal(worker_folder_claim_inputs(&f, 2, &changed, &err), STATUS_STALE);
     assert_true(has_result(&f) && worker_folder_stage_done(&f, "trace"));
     worker_folder_close(&f);
+}
+
+/* Opens the folder while another process holds its lock for so long. */
+static status open_while_held(const char *folder, int how, unsigned held_us)
+{
+    struct worker_folder f;
+    char path[512], byte = 0;
+    int begun[2];
+    snprintf(path, sizeof path, "%s/%s", folder, JOB_FILE_LOCK);
+    assert_int_equal(pipe(begun), 0);
+    const pid_t pid = fork();
+    if (pid == 0) {
+        const int fd = open(path, O_RDWR | O_CREAT, 0600);
+        if (flock(fd, how) != 0 || write(begun[1], &byte, 1) != 1) _exit(1);
+        usleep(held_us);
+        _exit(0);
+    }
+    close(begun[1]);
+    assert_int_equal(read(begun[0], &byte, 1), 1);
+    const status s = worker_folder_open(&f, folder, NULL);
+    if (s == STATUS_OK) worker_folder_close(&f);
+    kill(pid, SIGKILL);
+    waitpid(pid, NULL, 0);
+    close(begun[0]);
+    return s;
+}
+
+static void test_a_look_at_the_lock_stops_no_worker(void **state)
+{
+    assert_int_equal(open_while_held(*state, LOCK_SH, 30000), STATUS_OK);
+    assert_int_equal(open_while_held(*state, LOCK_EX, 10000000), STATUS_STALE);
 }
 
 /* That there is no mark is no error; a mark that cannot be removed is one. */
@@ -162,6 +196,8 @@ int main(void)
         cmocka_unit_test(test_fingerprint),
         cmocka_unit_test_setup_teardown(test_one_start_has_the_attempt, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(test_a_full_disk_leaves_no_claim, scratch_folder_setup,
+                                        scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(test_a_look_at_the_lock_stops_no_worker, scratch_folder_setup,
                                         scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(test_marks_are_removed, scratch_folder_setup, scratch_folder_teardown),
     };
