@@ -2,14 +2,17 @@
 
 C tests are cmocka programs build/tests/{unit,physics}/test_*, Python tests are pytest folders. A program that crashes,
 hangs or writes no results counts as one failed test. Each check of the sources (tests/checks.mk) counts as one test.
---quick runs the checks, the unit tests and the quick API tests, C beside Python: two compute while two wait for daemons
-most of the time. --programs leaves out the checks of the sources, which neither sanitizers nor coverage change.
+Each line says how long a test took and how many seconds of a core that were. Tests of the API and the browser wait for
+daemons most of the time, so two of them run beside one that computes. --quick runs the checks, the unit tests and the
+quick API tests, two of each side by side. --programs leaves out the checks of the sources, which neither sanitizers nor
+coverage change.
 """
 import argparse
 import concurrent.futures
 import glob
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -22,6 +25,11 @@ CHECKS = ["layers", "format-check", "columns", "lint-c", "lint-javascript", "lin
 SLOW_CHECKS = ["clang", "tsan-requests"]
 TIMEOUT_S = 600
 PYTEST_TIMEOUT_S = 1500
+# Those that take longest start first, so that no lane waits for one of them at the end.
+LONGEST = ["physics/test_derivative_check", "unit/renderer/test_scattering", "physics/test_reconstruct_phantom", "physics/test_chi_square",
+           "real/test_real_input", "api/driven/test_openapi_driven", "browser/test_accessibility", "browser/test_dashboard",
+           "api/worker/test_groups", "api/worker/test_cloth_search_job", "browser/test_mending", "browser/test_dashboard_submit",
+           "api/worker/test_described_cloth", "crash/test_daemon_disk", "crash/test_daemon_kill", "crash/test_worker_resume"]
 
 
 def count_junit(path):
@@ -41,16 +49,24 @@ def count_junit(path):
 
 
 def run(command, timeout_s, environment):
+    """Returns the exit code, the output and how long it took: in seconds, and in seconds of a core with all children."""
     start = time.monotonic()
     # a file instead of a pipe, because a process that outlives its test would keep a pipe open
     with tempfile.TemporaryFile() as log:
-        try:
-            code = subprocess.run(command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stdout=log,
-                                  stderr=subprocess.STDOUT, timeout=timeout_s).returncode
-        except subprocess.TimeoutExpired:
-            code = f"no end after {timeout_s} s"
+        process = subprocess.Popen(command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT)
+        late = threading.Timer(timeout_s, process.kill)
+        late.start()
+        _, status, used = os.wait4(process.pid, 0)
+        late.cancel()
+        seconds = time.monotonic() - start
+        process.returncode = os.waitstatus_to_exitcode(status)
+        code = f"no end after {timeout_s} s" if process.returncode < 0 and seconds >= timeout_s else process.returncode
         log.seek(0)
-        return code, log.read().decode(errors="replace"), time.monotonic() - start
+        return code, log.read().decode(errors="replace"), f"{seconds:.1f} s, of a core {used.ru_utime + used.ru_stime:.1f} s"
+
+
+def longest_first(names):
+    return sorted(names, key=lambda name: LONGEST.index(name) if name in LONGEST else len(LONGEST))
 
 
 def run_lane(own, other):
@@ -68,13 +84,13 @@ class Totals:
         self.passed = self.failed = self.skipped = 0
         self.lock = threading.Lock()
 
-    def add_one(self, name, code, output, seconds):
+    def add_one(self, name, code, output, time_taken):
         with self.lock:
             self.passed += code == 0
             self.failed += code != 0
-            print(f"{'ok' if code == 0 else 'FAILED':7s}{name} ({seconds:.1f} s)" + ("" if code == 0 else "\n" + output), flush=True)
+            print(f"{'ok' if code == 0 else 'FAILED':7s}{name} ({time_taken})" + ("" if code == 0 else "\n" + output), flush=True)
 
-    def add(self, name, junit, code, output, seconds):
+    def add(self, name, junit, code, output, time_taken):
         """junit: pattern of the files with the results, one for each group of tests."""
         passed = failed = skipped = 0
         bad, why = [], []
@@ -97,7 +113,7 @@ class Totals:
             self.failed += failed
             self.skipped += skipped
             state = "FAILED" if failed else "ok"
-            print(f"{state:7s}{name}: {passed} passed, {failed} failed, {skipped} skipped ({seconds:.1f} s)", flush=True)
+            print(f"{state:7s}{name}: {passed} passed, {failed} failed, {skipped} skipped ({time_taken})", flush=True)
             for line in why:
                 print(f"       skipped {line}")
             if failed:
@@ -136,9 +152,8 @@ def main():
 
     def run_c(folder, name):
         junit = os.path.join(folder, name.replace("/", "."))
-        code, output, seconds = run([os.path.join(ROOT, arguments.build, "tests", name)], TIMEOUT_S,
-                                    dict(environment, CMOCKA_MESSAGE_OUTPUT="xml", CMOCKA_XML_FILE=junit + ".%g.xml"))
-        totals.add(name, junit + ".*.xml", code, output, seconds)
+        totals.add(name, junit + ".*.xml", *run([os.path.join(ROOT, arguments.build, "tests", name)], TIMEOUT_S,
+                                                dict(environment, CMOCKA_MESSAGE_OUTPUT="xml", CMOCKA_XML_FILE=junit + ".%g.xml")))
 
     def python_tests(kinds):
         for kind in kinds:
@@ -149,23 +164,27 @@ def main():
 
     def run_python(folder, name):
         junit = os.path.join(folder, name.replace("/", ".") + ".xml")
-        command = ["/usr/bin/python3", "-m", "pytest", "-q", "-ra", "-p", "no:cacheprovider",
+        # A folder of its own: otherwise pytest removes the files of an earlier run before it ends, which takes many
+        # seconds where there are thousands.
+        files = tempfile.mkdtemp(dir=folder)
+        command = ["/usr/bin/python3", "-m", "pytest", "-q", "-ra", "-p", "no:cacheprovider", f"--basetemp={files}",
                    f"--junitxml={junit}", os.path.join("tests", name + ".py")]
         if arguments.quick:
             command += ["-m", "not slow"]
-        code, output, seconds = run(command, PYTEST_TIMEOUT_S, environment)
+        code, output, time_taken = run(command, PYTEST_TIMEOUT_S, environment)
+        cleaner.submit(shutil.rmtree, files, ignore_errors=True)
         if code == 5 and arguments.quick:  # all tests of the file are slow ones
             return
-        totals.add(name, junit, code, output, seconds)
+        totals.add(name, junit, code, output, time_taken)
 
-    # One lane computes and one waits for daemons and browsers most of the time; with --quick there are two of each. A lane
-    # that has nothing left takes the last of the other's.
-    with tempfile.TemporaryDirectory() as folder:
+    # A lane that has nothing left takes the last of the others'.
+    with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(max_workers=1) as cleaner:
+        of_c, of_python = list(c_tests()), list(python_tests(["api"] if arguments.quick else ["api", "browser", "crash"]))
+        real = list(python_tests([] if arguments.quick else ["real"]))
         computing = [lambda name=name: run_check(name) for name in checks()]
-        computing += [lambda name=name: run_c(folder, name) for name in c_tests()]
-        waiting = [lambda name=name: run_python(folder, name) for name in python_tests(["api"] if arguments.quick else ["api", "browser"])]
-        computing += [lambda name=name: run_python(folder, name) for name in python_tests([] if arguments.quick else ["crash", "real"])]
-        lanes = [computing, waiting] * (2 if arguments.quick else 1)
+        computing += [lambda name=name: (run_c if name in of_c else run_python)(folder, name) for name in longest_first(of_c + real)]
+        waiting = [lambda name=name: run_python(folder, name) for name in longest_first(of_python)]
+        lanes = [computing, computing, waiting, waiting] if arguments.quick else [computing, waiting, waiting]
         with concurrent.futures.ThreadPoolExecutor(max_workers=len(lanes)) as pool:
             for done in [pool.submit(run_lane, own, waiting if own is computing else computing) for own in lanes]:
                 done.result()

@@ -22,17 +22,47 @@ def stub(tmp_path_factory):
     stop_daemon(process)
 
 
-@pytest.fixture
-def browser(tmp_path):
-    webdriver = pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
+def start_chromium(profile):
+    from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
-    if not os.path.exists(DRIVER):
-        pytest.skip("chromedriver is not installed")
     options = webdriver.ChromeOptions()
-    for flag in [*FLAGS, f"--user-data-dir={tmp_path / 'profile'}"]:
+    for flag in [*FLAGS, f"--user-data-dir={profile}"]:
         options.add_argument(flag)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     driver = webdriver.Chrome(service=Service(DRIVER), options=options)
     driver.set_script_timeout(30)
+    return driver
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    """The running Chromium, by the name "driver"; empty until a test needs it."""
+    running = {}
+    yield running
+    if running:
+        running["driver"].quit()
+
+
+@pytest.fixture
+def browser(chromium, tmp_path):
+    """A new window without cookies and cache, in the Chromium that all tests of a run share: a start takes two seconds of a
+    core. A test that leaves a Chromium that no longer answers takes it along."""
+    pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
+    from selenium.common.exceptions import WebDriverException
+    if not os.path.exists(DRIVER):
+        pytest.skip("chromedriver is not installed")
+    if not chromium:
+        chromium["driver"] = start_chromium(tmp_path / "profile")
+    driver = chromium["driver"]
+    first = driver.current_window_handle
+    driver.switch_to.new_window("window")
+    driver.execute_cdp_cmd("Network.clearBrowserCookies", {})
+    driver.execute_cdp_cmd("Network.clearBrowserCache", {})
     yield driver
-    driver.quit()
+    try:
+        driver.get_log("browser")  # what is read here is no complaint of the next test
+        driver.close()
+        driver.switch_to.window(first)
+    except WebDriverException:
+        driver.quit()
+        chromium.clear()

@@ -43,11 +43,12 @@ def small_weave(folder, *photograph, diameter="6"):
 
 def wait_for(browser, condition, seconds=30):
     """Waits until the JavaScript expression is true."""
-    end = time.monotonic() + seconds
+    end, pause_s = time.monotonic() + seconds, 0.02
     while time.monotonic() < end:
         if browser.execute_script(f"return Boolean({condition})"):
             return
-        time.sleep(0.2)
+        time.sleep(pause_s)
+        pause_s = min(0.2, 1.5 * pause_s)
     keep(browser, "timeout")
     page = browser.find_element("tag name", "body").text
     raise AssertionError(f"never true: {condition}\n{page[:2000]}")
