@@ -1,0 +1,268 @@
+#include "renderer/scattering/wave/wave_solver.h"
+
+#include "renderer/scattering/wave/complex_lu.h"
+#include "renderer/scattering/wave/cylinder_functions.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#define EULER 0.57721566490153286061
+#define MOST_ABSORPTION 20.0 /* of Im(k m) times a distance: the range of the cylinder functions */
+
+struct node {
+    double complex at, normal; /* x + i y; outward unit normal */
+    double speed, curvature;   /* |dx / dt|, positive where convex */
+};
+
+enum { OUTSIDE, INSIDE, N_MEDIUM };
+
+struct wave_solver {
+    size_t n; /* nodes */
+    double k, step;
+    double complex k_of[N_MEDIUM], q;
+    struct node *node;
+    double *log_weight;                     /* of a kernel's logarithmic part, by the distance in nodes */
+    struct complex_matrix matrix, solution; /* u at all nodes, then v / k */
+    size_t *pivot;
+    double *angle_rad;
+};
+
+size_t wave_solver_nodes(const struct wave_outline *o, double k, double index, double per_wave)
+{
+    double fastest = 0;
+    for (int i = 0; i < 720; i++) {
+        double complex d;
+        wave_outline_at(o, i * M_PI / 360, &d, NULL);
+        fastest = fmax(fastest, cabs(d));
+    }
+    return 2 * (size_t)ceil(0.5 * (per_wave * fastest * k * fmax(index, 1) + 32));
+}
+
+static double dot(double complex a, double complex b) { return creal(conj(a) * b); }
+
+static void place_nodes(struct wave_solver *s, const struct wave_outline *o)
+{
+    for (size_t i = 0; i < s->n; i++) {
+        struct node *p = &s->node[i];
+        double complex d, dd;
+        p->at = wave_outline_at(o, s->step * (double)i, &d, &dd);
+        p->speed = cabs(d);
+        p->normal = -I * d / p->speed;
+        p->curvature = cimag(conj(d) * dd) / (p->speed * p->speed * p->speed);
+    }
+}
+
+/* Integrals of ln(4 sin^2(t / 2)) times the trigonometric polynomials through the nodes, less what the quadrature of
+ * equal weights makes of it: a kernel K with the logarithmic part L ln(4 sin^2) has the weight K step + L log_weight.
+ * At distance 0: the integral alone. */
+static void weigh_logarithm(struct wave_solver *s)
+{
+    const size_t half = s->n / 2;
+    for (size_t j = 0; j <= half; j++) {
+        const double t = s->step * (double)j, sine = sin(0.5 * t);
+        double sum = (j % 2 == 0 ? 1 : -1) / (2.0 * (double)half);
+        for (size_t m = 1; m < half; m++) sum += cos((double)(m * j % s->n) * s->step) / (double)m;
+        s->log_weight[j] = -2 * s->step * sum;
+        if (j > 0) s->log_weight[j] -= s->step * log(4 * sine * sine);
+    }
+}
+
+/* The kernels of one medium from node j (source) to node i (target), times weights but not times speeds. */
+struct kernels {
+    double complex single, twice, twice_prime, slope; /* S, D, D', T */
+};
+
+static struct kernels kernels_between(const struct wave_solver *s, double complex k, size_t i, size_t j)
+{
+    const struct node *to = &s->node[i], *from = &s->node[j];
+    const size_t apart = i > j ? i - j : j - i, steps = apart < s->n - apart ? apart : s->n - apart;
+    const double complex away = to->at - from->at;
+    const double r = cabs(away), a = dot(to->normal, away) / r, b = dot(from->normal, away) / r;
+    const double log_part = -s->log_weight[steps] / (4 * M_PI);
+    struct cylinder_functions f;
+    cylinder_functions_at(k * r, &f);
+    const double complex z0 = 0.25 * I * s->step * f.h[0] + log_part * f.j[0],
+                         z1 = k * (0.25 * I * s->step * f.h[1] + log_part * f.j[1]);
+    return (struct kernels){z0, b * z1, -a * z1,
+                            dot(to->normal, from->normal) * z1 / r + a * b * (k * k * z0 - 2 * z1 / r)};
+}
+
+/* The limits at a node. Those of D and D' are of Laplace's equation and the same in both media; of T all but the
+ * strongest singularity, which cancels between the media. */
+static struct kernels kernels_at(const struct wave_solver *s, double complex k, size_t i)
+{
+    const struct node *p = &s->node[i];
+    const double complex log_half = clog(0.5 * k * p->speed) + EULER, square = k * k;
+    const double log_weight = s->log_weight[0], bend = -s->step * p->curvature / (4 * M_PI);
+    return (struct kernels){-log_weight / (4 * M_PI) + s->step * (0.25 * I - log_half / (2 * M_PI)), bend, bend,
+                            -square / (8 * M_PI) * log_weight +
+                                s->step * square * (0.125 * I - log_half / (4 * M_PI) + 1 / (8 * M_PI))};
+}
+
+static void set(struct complex_matrix *m, size_t i, size_t j, double complex value)
+{
+    m->re[i * m->stride + j] = creal(value);
+    m->im[i * m->stride + j] = cimag(value);
+}
+
+/* What source j adds to the two equations at node i. */
+static void set_pair(struct wave_solver *s, size_t i, size_t j, const struct kernels kernel[N_MEDIUM])
+{
+    const struct kernels *e = &kernel[OUTSIDE], *in = &kernel[INSIDE];
+    const double speed = s->node[j].speed, same = i == j ? 1 : 0;
+    set(&s->matrix, i, j, same + speed * (in->twice - e->twice));
+    set(&s->matrix, i, s->n + j, speed * s->k * (e->single - s->q * in->single));
+    set(&s->matrix, s->n + i, j, -speed / s->k * (e->slope - in->slope));
+    set(&s->matrix, s->n + i, s->n + j, same * 0.5 * (1 + s->q) + speed * (e->twice_prime - s->q * in->twice_prime));
+}
+
+static void assemble(struct wave_solver *s)
+{
+    struct kernels kernel[N_MEDIUM], back[N_MEDIUM];
+    for (size_t i = 0; i < s->n; i++) {
+        for (int m = 0; m < N_MEDIUM; m++) kernel[m] = kernels_at(s, s->k_of[m], i);
+        set_pair(s, i, i, kernel);
+        for (size_t j = 0; j < i; j++) {
+            for (int m = 0; m < N_MEDIUM; m++) { /* the other way round, D and D' change places */
+                kernel[m] = kernels_between(s, s->k_of[m], i, j);
+                back[m] = (struct kernels){kernel[m].single, kernel[m].twice_prime, kernel[m].twice, kernel[m].slope};
+            }
+            set_pair(s, i, j, kernel);
+            set_pair(s, j, i, back);
+        }
+    }
+}
+
+static status check_problem(const struct wave_problem *p, struct error *err)
+{
+    const double reach = wave_outline_length(p->outline) / 2;
+    if (!(p->k > 0) || !isfinite(p->k))
+        return error_set_field(err, STATUS_INVALID, "k", "the wave number is %g, which is not positive", p->k);
+    if (!(creal(p->index) > 0) || !(cimag(p->index) >= 0) || !isfinite(cabs(p->index)))
+        return error_set_field(err, STATUS_INVALID, "index", "the index %g + %g i is not that of a medium that absorbs",
+                               creal(p->index), cimag(p->index));
+    if (!(cimag(p->index) * p->k * reach <= MOST_ABSORPTION))
+        return error_set_field(err, STATUS_INVALID, "index",
+                               "the fiber absorbs too much: exp(-%.3g) across it, at most exp(-%g)",
+                               cimag(p->index) * p->k * reach, MOST_ABSORPTION);
+    if (p->n_node < 8 || p->n_node % 2 != 0)
+        return error_set_field(err, STATUS_INVALID, "n_node", "%zu nodes are not an even number of at least 8",
+                               p->n_node);
+    return STATUS_OK;
+}
+
+status wave_solver_new(const struct wave_problem *problem, struct wave_solver **solver, struct error *err)
+{
+    status st = check_problem(problem, err);
+    if (st != STATUS_OK) return st;
+    const size_t n = problem->n_node;
+    struct wave_solver *s = calloc(1, sizeof *s);
+    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot set up a wave solver: out of memory");
+    s->n = n;
+    s->k = problem->k;
+    s->step = 2 * M_PI / (double)n;
+    s->k_of[OUTSIDE] = problem->k;
+    s->k_of[INSIDE] = problem->k * problem->index;
+    s->q = problem->field == WAVE_ALONG ? 1 : problem->index * problem->index;
+    s->node = malloc(n * sizeof *s->node);
+    s->log_weight = malloc((n / 2 + 1) * sizeof *s->log_weight);
+    s->pivot = malloc(2 * n * sizeof *s->pivot);
+    if (s->node == NULL || s->log_weight == NULL || s->pivot == NULL)
+        st = error_set(err, STATUS_NO_MEMORY, "cannot set up a wave solver: out of memory");
+    if (st == STATUS_OK) st = complex_matrix_init(&s->matrix, 2 * n, 2 * n, err);
+    if (st == STATUS_OK) {
+        place_nodes(s, problem->outline);
+        weigh_logarithm(s);
+        assemble(s);
+        st = complex_lu_factor(&s->matrix, s->pivot, err);
+    }
+    if (st != STATUS_OK) {
+        wave_solver_free(s);
+        return st;
+    }
+    *solver = s;
+    return STATUS_OK;
+}
+
+void wave_solver_free(struct wave_solver *s)
+{
+    if (s == NULL) return;
+    complex_matrix_release(&s->matrix);
+    complex_matrix_release(&s->solution);
+    free(s->node);
+    free(s->log_weight);
+    free(s->pivot);
+    free(s->angle_rad);
+    free(s);
+}
+
+static double complex direction(double angle_rad) { return CMPLX(cos(angle_rad), sin(angle_rad)); }
+
+status wave_solver_solve(struct wave_solver *s, const double *angle_rad, size_t n, struct error *err)
+{
+    struct complex_matrix b;
+    status st = complex_matrix_init(&b, 2 * s->n, n, err);
+    double *kept = realloc(s->angle_rad, (n > 0 ? n : 1) * sizeof *kept);
+    if (kept != NULL) s->angle_rad = kept;
+    if (st == STATUS_OK && kept == NULL) {
+        complex_matrix_release(&b);
+        st = error_set(err, STATUS_NO_MEMORY, "cannot hold %zu waves: out of memory", n);
+    }
+    if (st != STATUS_OK) return st;
+    for (size_t w = 0; w < n; w++) {
+        const double complex d = direction(angle_rad[w]);
+        s->angle_rad[w] = angle_rad[w];
+        for (size_t i = 0; i < s->n; i++) {
+            const double complex u = cexp(I * s->k * dot(d, s->node[i].at));
+            set(&b, i, w, u);
+            set(&b, s->n + i, w, I * dot(d, s->node[i].normal) * u);
+        }
+    }
+    complex_lu_solve(&s->matrix, s->pivot, &b);
+    complex_matrix_release(&s->solution);
+    s->solution = b;
+    return STATUS_OK;
+}
+
+static double complex at(const struct wave_solver *s, size_t row, size_t i_wave)
+{
+    const size_t i = row * s->solution.stride + i_wave;
+    return CMPLX(s->solution.re[i], s->solution.im[i]);
+}
+
+double complex wave_solver_amplitude(const struct wave_solver *s, size_t i_wave, double angle_rad)
+{
+    const double complex d = direction(angle_rad);
+    double complex sum = 0;
+    for (size_t i = 0; i < s->n; i++) {
+        const struct node *p = &s->node[i];
+        sum += p->speed * (I * dot(d, p->normal) * at(s, i, i_wave) + at(s, s->n + i, i_wave)) *
+               cexp(-I * s->k * dot(d, p->at));
+    }
+    return 0.25 * I * s->k * s->step * sum;
+}
+
+void wave_solver_amplitudes(const struct wave_solver *s, size_t i_wave, double complex *t, size_t n_angle)
+{
+    for (size_t j = 0; j < n_angle; j++)
+        t[j] = wave_solver_amplitude(s, i_wave, 2 * M_PI * (double)j / (double)n_angle);
+}
+
+double wave_solver_extinction(const struct wave_solver *s, size_t i_wave)
+{
+    return 4 / s->k * creal(wave_solver_amplitude(s, i_wave, s->angle_rad[i_wave]));
+}
+
+double wave_scattering_of(double k, const double complex *t, size_t n)
+{
+    double sum = 0;
+    for (size_t j = 0; j < n; j++) sum += creal(t[j]) * creal(t[j]) + cimag(t[j]) * cimag(t[j]);
+    return 4 / k * sum / (double)n;
+}
+
+double wave_solver_absorption(const struct wave_solver *s, size_t i_wave)
+{
+    double sum = 0;
+    for (size_t i = 0; i < s->n; i++) sum += s->node[i].speed * cimag(conj(at(s, i, i_wave)) * at(s, s->n + i, i_wave));
+    return -s->step * sum;
+}
