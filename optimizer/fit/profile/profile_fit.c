@@ -212,15 +212,24 @@ static void put_residuals(const struct profile_search *s, struct profile_fit *fi
     fit->chi_square = t->problem->profile->has_se ? reduced_sum(s, fit->n_free, 0.0) : NAN;
 }
 
+size_t profile_fit_starts(const struct fit_option *option)
+{
+    if (option->n_start < PROFILE_LEAST_START) return PROFILE_LEAST_START;
+    return option->n_start < MOST_START ? option->n_start : MOST_START;
+}
+
+size_t profile_fit_bytes(const struct fiber_profile *profile, size_t n_param, size_t n_start)
+{
+    return 2 * sizeof(double) * profile->n * profile->n_channel + n_start * profile_search_bytes(profile, n_param);
+}
+
 static status fit_target(struct profile_target *t, struct profile_fit *fit, struct error *err)
 {
     struct starts *all = calloc(1, sizeof *all);
     size_t best = 0;
     if (all == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit a profile: out of memory");
     all->target = t;
-    fit->n_start = t->problem->option->n_start;
-    if (fit->n_start < PROFILE_LEAST_START) fit->n_start = PROFILE_LEAST_START;
-    if (fit->n_start > MOST_START) fit->n_start = MOST_START;
+    fit->n_start = profile_fit_starts(t->problem->option);
     status s = run_starts(all, fit, &best, err);
     struct profile_search *search = &all->search[best];
     const size_t before = search->n_evaluation;

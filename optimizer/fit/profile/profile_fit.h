@@ -50,6 +50,11 @@ struct profile_fit {
     double wall_s;
 };
 
+/* Starts of a fit with this option. */
+size_t profile_fit_starts(const struct fit_option *option);
+/* Memory that a fit of n_start starts takes besides the profile and the states of its model. */
+size_t profile_fit_bytes(const struct fiber_profile *profile, size_t n_param, size_t n_start);
+
 /* STATUS_INVALID with the field OPTION_PROFILE_FILE for fewer values than unknowns; STATUS_CANCELLED; errors of
  * fit_layout_init and of the model. */
 status profile_fit_run(const struct profile_problem *problem, const char *table_name, struct profile_fit *fit,

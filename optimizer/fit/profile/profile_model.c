@@ -52,9 +52,10 @@ static void predict_rows(void *context, size_t i_task, size_t i_thread)
 }
 
 status profile_model_predict(const struct scattering_model *model, const double *param,
-                             const struct fiber_profile *profile, struct thread_pool *pool, double *value, double *jac,
-                             struct error *err)
+                             const struct fiber_profile *profile, const struct profile_work *work, double *value,
+                             double *jac, struct error *err)
 {
+    const struct progress silent = progress_silent(work->progress);
     struct scattering_state *state = NULL;
     status s = model->prepare(param, &state, err);
     if (s != STATUS_OK) return s;
@@ -66,7 +67,7 @@ status profile_model_predict(const struct scattering_model *model, const double 
                                                            : 1,
                            .value = value,
                            .jac = jac};
-    thread_pool_run(pool, (profile->n + ROWS_OF_TASK - 1) / ROWS_OF_TASK, predict_rows, &d, NULL);
+    s = thread_pool_run(work->pool, (profile->n + ROWS_OF_TASK - 1) / ROWS_OF_TASK, predict_rows, &d, &silent);
     model->release(state);
-    return STATUS_OK;
+    return s == STATUS_OK ? s : error_set(err, s, "cancelled");
 }

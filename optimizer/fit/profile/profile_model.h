@@ -9,11 +9,17 @@
 #include "optimizer/fit/profile/fiber_profile.h"
 #include "renderer/scattering/scattering.h"
 
+/* How the rows are computed. */
+struct profile_work {
+    struct thread_pool *pool;        /* NULL runs in the caller */
+    const struct progress *progress; /* only its `cancel` counts; NULL: none */
+};
+
 /* Computes value[i * n_channel + c] of row i and, if jac is not NULL, its derivative by parameter p,
  * jac[(i * n_channel + c) * n_param + p], in internal units. A profile of one channel has that of the model's first.
- * pool: NULL runs in the caller. Errors are those of the model's prepare. */
+ * Errors are those of the model's prepare; STATUS_CANCELLED, at most 32 rows after the flag was set. */
 status profile_model_predict(const struct scattering_model *model, const double *param,
-                             const struct fiber_profile *profile, struct thread_pool *pool, double *value, double *jac,
-                             struct error *err);
+                             const struct fiber_profile *profile, const struct profile_work *work, double *value,
+                             double *jac, struct error *err);
 
 #endif

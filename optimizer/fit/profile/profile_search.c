@@ -71,8 +71,9 @@ static status evaluate(struct profile_search *s, struct profile_point *p, struct
     unknowns_of(s->target, p->x, unknown);
     fit_layout_full(&s->target->layout, unknown, full);
     s->n_evaluation++;
+    const struct profile_work work = {s->pool, s->target->problem->progress};
     status code =
-        profile_model_predict(model_of(s), full, s->target->problem->profile, s->pool, p->value, s->by_param, err);
+        profile_model_predict(model_of(s), full, s->target->problem->profile, &work, p->value, s->by_param, err);
     if (code != STATUS_OK) return code;
     chain(s, p, unknown);
     p->f = sum_of(s, p);
@@ -122,6 +123,12 @@ status profile_search_begin(struct profile_search *s, const struct profile_targe
     for (size_t i = 0; i < target->n_value; i++) s->here.value[i] *= scale;
     s->here.f = sum_of(s, &s->here);
     return STATUS_OK;
+}
+
+size_t profile_search_bytes(const struct fiber_profile *profile, size_t n_param)
+{
+    const size_t n_jac = n_param + 1, of_value = 1 + n_param + 2 * (1 + n_jac); /* see profile_search_begin */
+    return sizeof(double) * profile->n * profile->n_channel * of_value;
 }
 
 void profile_search_end(struct profile_search *s)

@@ -37,6 +37,8 @@ struct profile_search {
 status profile_search_begin(struct profile_search *s, const struct profile_target *target, struct thread_pool *pool,
                             const double *unknown, double misfit, struct error *err);
 void profile_search_end(struct profile_search *s);
+/* Memory of one search. */
+size_t profile_search_bytes(const struct fiber_profile *profile, size_t n_param);
 /* Goes on for at most max_iteration steps. */
 status profile_search_run(struct profile_search *s, size_t max_iteration, struct error *err);
 /* The error e of each value for a relative misfit t. */

@@ -5,6 +5,7 @@
 #include "optimizer/worker/progress/plan_probe.h"
 #include "optimizer/worker/report/json_number.h"
 #include "optimizer/worker/report/result_pictures.h"
+#include "optimizer/worker/stages/fit/pipeline_fit_option.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -79,6 +80,19 @@ static double page_bytes(const struct pipeline_context *c)
     return result_bytes + pixel_bytes * px * px * (double)c->observation.n;
 }
 
+/* Memory of the rows of a fiber's profile, and of the largest fit to them. */
+static double profile_bytes(const struct pipeline_context *c)
+{
+    double most = 0.0;
+    for (size_t i = 0; i < c->n_model && c->profile.n > 0; i++) {
+        struct fit_option option;
+        const struct model_info *info = &c->model[i].sets.info;
+        pipeline_fit_option(c->model[i].option, info->param, info->n_param, &option);
+        most = fmax(most, (double)profile_fit_bytes(&c->profile, info->n_param, profile_fit_starts(&option)));
+    }
+    return most + (double)(c->profile.n * sizeof *c->profile.row);
+}
+
 /* What the models say without corrections. */
 static struct job_need model_of(const struct pipeline_context *c)
 {
@@ -90,8 +104,8 @@ static struct job_need model_of(const struct pipeline_context *c)
     const double size = pipeline_plan_cloth_size(c), n_thread = (double)thread_pool_n_thread(c->pool),
                  thread_s = c->usual_wall_s * n_thread - c->certificate_s * (n_thread - 1.0);
     return (struct job_need){.cpu_s = usual_busy * thread_s,
-                             .memory_bytes =
-                                 program_bytes + geometry_bytes + fiber_file_bytes * input.fibers + cloth_bytes * size,
+                             .memory_bytes = program_bytes + geometry_bytes + fiber_file_bytes * input.fibers +
+                                             cloth_bytes * size + profile_bytes(c),
                              .disk_bytes = input.all + page_bytes(c) + voxel_result_bytes * n_voxel +
                                            fiber_result_bytes * input.fibers + cloth_result_bytes * size};
 }

@@ -19,7 +19,11 @@ struct work {
     struct medulla_around around;
     float even[N_MEDULLA_WAVE][MEDULLA_ROUND_RANK], odd[N_MEDULLA_WAVE][MEDULLA_ROUND_RANK];
     double c_t[3], gamma;
+    int n_color; /* 1 where all channels have the same C_T, and so the same tables; else 3 */
 };
+
+/* The channel whose tables channel c has. */
+static int color_of(const struct work *w, int c) { return w->n_color == 1 ? 0 : c; }
 
 static double mode_width(int p, double gamma) { return sqrt(p + 1.0) * gamma; }
 
@@ -54,9 +58,9 @@ struct wave_factor {
     double v, d[FUR_F_GAMMA];
 };
 
-static void add_wave(double to[3][N_SUM], double a[3][N_SUM], const struct wave_factor *f)
+static void add_wave(const struct work *w, double to[3][N_SUM], double a[3][N_SUM], const struct wave_factor *f)
 {
-    for (int c = 0; c < 3; c++) {
+    for (int c = 0; c < w->n_color; c++) {
         to[c][VALUE] += a[c][VALUE] * f->v;
         for (int q = 0; q < FUR_F_GAMMA; q++) to[c][BY + q] += a[c][BY + q] * f->v + a[c][VALUE] * f->d[q];
     }
@@ -69,7 +73,7 @@ static void add_lobe(struct work *w, const struct fur_ray *ray, int p, double x,
     for (int k = 0; k < n_wave(p, w->gamma); k++) {
         struct wave_factor f = {c, {0}};
         f.d[FUR_F_ETA] = -2.0 * p * k * ray->d_gamma_t * s;
-        add_wave(w->wave[p][k], a, &f);
+        add_wave(w, w->wave[p][k], a, &f);
         double next = c * c1 - s * s1;
         s = s * c1 + c * s1;
         c = next;
@@ -101,8 +105,9 @@ static void add_segment(struct work *w, const struct fur_ray *ray, const struct 
 {
     double d_eta, phi = fur_segment_azimuth(ray, segment, x, &d_eta), d_depth[3];
     fur_depth(&w->fiber, ray, d_depth);
+    const double c1 = cos(phi), s1 = sin(phi);
+    double c = 1, s = 0;
     for (int k = 0; k < N_MEDULLA_WAVE; k++) {
-        const double c = cos(k * phi), s = sin(k * phi);
         double by[1 + MEDULLA_RAY_N_BY];
         for (int q = 0; q <= MEDULLA_RAY_N_BY; q++) by[q] = c * y[k].even[q] - s * y[k].odd[q];
         const double by_depth = by[1 + MEDULLA_RAY_BY_DEPTH], by_offset = by[1 + MEDULLA_RAY_BY_OFFSET];
@@ -112,7 +117,10 @@ static void add_segment(struct work *w, const struct fur_ray *ray, const struct 
         f.d[FUR_F_KAPPA] = by_depth * d_depth[1] + by_offset * ray->offset.kappa;
         f.d[FUR_F_MS] = by_depth * d_depth[2];
         f.d[FUR_F_G] = by[1 + MEDULLA_RAY_BY_G];
-        add_wave(w->wave[FUR_FAR_S][k], a, &f);
+        add_wave(w, w->wave[FUR_FAR_S][k], a, &f);
+        const double next = c * c1 - s * s1;
+        s = s * c1 + c * s1;
+        c = next;
     }
 }
 
@@ -122,7 +130,7 @@ static void add_ray(struct work *w, double cosine, double x, double weight, int 
 {
     const struct fur_ray ray = fur_ray_at(&w->fiber, cosine, x);
     double a[FUR_N_MODE][3][N_SUM];
-    for (int c = 0; c < 3; c++) {
+    for (int c = 0; c < w->n_color; c++) {
         double out[FUR_N_MODE][N_SUM];
         amplitude(w, &ray, weight, c, out);
         for (int mode = 0; mode < FUR_N_MODE; mode++) memcpy(a[mode][c], out[mode], sizeof out[mode]);
@@ -140,7 +148,7 @@ static void add_ray(struct work *w, double cosine, double x, double weight, int 
     fill_spectrum(w, &m, y);
     for (int segment = 1; segment <= FUR_N_SEGMENT; segment++) {
         double(*b)[N_SUM] = a[FUR_TT_S + segment - 1];
-        for (int c = 0; c < 3; c++)
+        for (int c = 0; c < w->n_color; c++)
             for (int q = 0; q < N_SUM; q++) b[c][q] *= coarse;
         add_segment(w, &ray, y, segment, x, b);
     }
@@ -160,9 +168,10 @@ static void add_rays(struct work *w, struct fur_row *row, double cosine)
         add_ray(w, cosine, x, cos(x) / sum, i % coarse == coarse / 2 ? coarse : 0);
     }
     for (int c = 0; c < 3; c++) {
-        row->rest[c] = (float)(w->rest[c][VALUE] * (0.5 / M_PI));
-        for (int q = 0; q < FUR_F_G; q++) row->d_rest[q][c] = (float)(w->rest[c][BY + q] * (0.5 / M_PI));
-        for (int p = 0; p < FUR_FAR_N_MODE; p++) row->energy[p][c] = (float)w->energy[p][c];
+        const int of = color_of(w, c);
+        row->rest[c] = (float)(w->rest[of][VALUE] * (0.5 / M_PI));
+        for (int q = 0; q < FUR_F_G; q++) row->d_rest[q][c] = (float)(w->rest[of][BY + q] * (0.5 / M_PI));
+        for (int p = 0; p < FUR_FAR_N_MODE; p++) row->energy[p][c] = (float)w->energy[p][of];
     }
 }
 
@@ -175,7 +184,7 @@ static void sum_waves(struct work *w, int p)
     for (int k = 0; k < n_wave(p, w->gamma); k++) {
         double factor = exp(-0.5 * k * k * width * width) * (k == 0 ? 0.5 / M_PI : 1 / M_PI);
         double by_gamma = -(double)k * k * width * d_width;
-        for (int c = 0; c < 3; c++)
+        for (int c = 0; c < w->n_color; c++)
             for (int q = 0; q < N_QUANTITY; q++) {
                 double v = factor * (q < N_SUM ? w->wave[p][k][c][q] : w->wave[p][k][c][VALUE] * by_gamma);
                 for (int j = 0; j <= FUR_N_PHI; j++) w->column[c][q][j] += v * w->cosine[k][j];
@@ -190,13 +199,23 @@ static void store(const struct work *w, struct fur_cell *cell, struct fur_slope 
     for (int j = 0; j <= FUR_N_PHI; j++) {
         mean[j] = 0;
         for (int c = 0; c < 3; c++) {
-            bool faded = w->column[c][VALUE][j] <= FADED * w->wave[p][0][c][VALUE];
-            mean[j] += faded ? 0 : w->column[c][VALUE][j] / 3;
-            cell[j].n[p][c] = faded ? 0 : (float)w->column[c][VALUE][j];
-            for (int q = 0; q < FUR_F_N; q++) slope[j].n[p][q][c] = faded ? 0 : (float)w->column[c][BY + q][j];
+            const int of = color_of(w, c);
+            bool faded = w->column[of][VALUE][j] <= FADED * w->wave[p][0][of][VALUE];
+            mean[j] += faded ? 0 : w->column[of][VALUE][j] / 3;
+            cell[j].n[p][c] = faded ? 0 : (float)w->column[of][VALUE][j];
+            for (int q = 0; q < FUR_F_N; q++) slope[j].n[p][q][c] = faded ? 0 : (float)w->column[of][BY + q][j];
         }
     }
     azimuth_density(mean, FUR_N_PHI, row->density[p], row->below[p]);
+}
+
+/* cos(k ph) at the azimuths of the table, each of which is one of the 2 FUR_N_PHI of a turn. */
+static void fill_cosines(struct work *w)
+{
+    double of_turn[2 * FUR_N_PHI];
+    for (int i = 0; i < 2 * FUR_N_PHI; i++) of_turn[i] = cos(i * M_PI / FUR_N_PHI);
+    for (int k = 0; k < N_WAVE; k++)
+        for (int j = 0; j <= FUR_N_PHI; j++) w->cosine[k][j] = of_turn[k * j % (2 * FUR_N_PHI)];
 }
 
 status fur_far_tables(struct scattering_state *s, const double *param, struct error *err)
@@ -206,10 +225,12 @@ status fur_far_tables(struct scattering_state *s, const double *param, struct er
     w->fiber = fur_fiber_of(param);
     w->gamma = param[FUR_P_GAMMA];
     for (int c = 0; c < 3; c++) w->c_t[c] = param[FUR_P_C_T + c];
+    w->n_color =
+        memcmp(&w->c_t[0], &w->c_t[1], sizeof(double)) == 0 && memcmp(&w->c_t[0], &w->c_t[2], sizeof(double)) == 0 ? 1
+                                                                                                                   : 3;
+    fill_cosines(w);
     medulla_around_init(&w->around, param[FUR_P_G]);
     medulla_waves(N_MEDULLA_WAVE, w->even, w->odd);
-    for (int k = 0; k < N_WAVE; k++)
-        for (int j = 0; j <= FUR_N_PHI; j++) w->cosine[k][j] = cos(k * j * M_PI / FUR_N_PHI);
     for (int row = 0; row <= FUR_FAR_ROW; row++) {
         add_rays(w, &s->row[row], fmax((double)row / FUR_FAR_ROW, FUR_LEAST_COSINE));
         for (int p = 0; p < FUR_FAR_N_LOBE; p++) {

@@ -7,7 +7,7 @@ enum { N_WAVE = 16, N_OFFSET = 160 };
 
 struct work {
     struct medulla_around around;
-    float cosine[N_WAVE][MEDULLA_ROUND_RANK], sine[N_WAVE][MEDULLA_ROUND_RANK];
+    double cosine[N_WAVE][MEDULLA_ROUND_RANK], sine[N_WAVE][MEDULLA_ROUND_RANK];
 };
 
 /* The mean of |ph| / pi of scattered light, which is the weight of the half that goes through: |ph| is a sum of odd
@@ -18,17 +18,23 @@ static struct fur_mean through_weight(const struct work *b, const struct fur_fib
     double d_eta, azimuth = fur_segment_azimuth(ray, segment, x, &d_eta), d_depth[3], by[MEDULLA_RAY_N_BY] = {0};
     struct fur_mean w = {0.5, {0}};
     fur_depth(f, ray, d_depth);
+    double around[MEDULLA_ROUND_RANK] = {0}, turned[MEDULLA_ROUND_RANK] = {0}; /* of each function; by the azimuth */
+    double c = cos(azimuth), s = sin(azimuth);
+    const double c2 = c * c - s * s, s2 = 2 * s * c;
     for (int k = 1; k < N_WAVE; k += 2) {
-        const double c = cos(k * azimuth), s = sin(k * azimuth), factor = -4 / (M_PI * M_PI * k * k);
-        double even = 0, odd = 0;
+        const double factor = -4 / (M_PI * M_PI * k * k), kc = factor * c, ks = factor * s;
         for (int r = 0; r < MEDULLA_ROUND_RANK; r++) {
-            double turned = c * (double)b->cosine[k][r] - s * (double)b->sine[k][r];
-            even += (double)m->weight[r] * turned;
-            odd += (double)m->weight[r] * (s * (double)b->cosine[k][r] + c * (double)b->sine[k][r]);
-            for (int q = 0; q < MEDULLA_RAY_N_BY; q++) by[q] += factor * (double)m->d[q][r] * turned;
+            around[r] += kc * b->cosine[k][r] - ks * b->sine[k][r];
+            turned[r] += k * (ks * b->cosine[k][r] + kc * b->sine[k][r]);
         }
-        w.v += factor * even;
-        w.d[FUR_M_ETA] -= factor * k * d_eta * odd;
+        const double next = c * c2 - s * s2; /* of wave k + 2 */
+        s = s * c2 + c * s2;
+        c = next;
+    }
+    for (int r = 0; r < MEDULLA_ROUND_RANK; r++) {
+        w.v += (double)m->weight[r] * around[r];
+        w.d[FUR_M_ETA] -= d_eta * (double)m->weight[r] * turned[r];
+        for (int q = 0; q < MEDULLA_RAY_N_BY; q++) by[q] += (double)m->d[q][r] * around[r];
     }
     const double by_depth = by[MEDULLA_RAY_BY_DEPTH], by_offset = by[MEDULLA_RAY_BY_OFFSET];
     w.d[FUR_M_ETA] += by_depth * d_depth[0] + by_offset * ray->offset.eta;
@@ -74,7 +80,13 @@ void fur_means_fill(struct fur_means *m, const double *param)
     f.sigma_ma = 0;
     for (int i = 0; i < N_OFFSET; i++) sum += cos((i + 0.5) * M_PI_2 / N_OFFSET);
     medulla_around_init(&b.around, param[FUR_P_G]);
-    medulla_waves(N_WAVE, b.cosine, b.sine);
+    float cosine[N_WAVE][MEDULLA_ROUND_RANK], sine[N_WAVE][MEDULLA_ROUND_RANK];
+    medulla_waves(N_WAVE, cosine, sine);
+    for (int k = 0; k < N_WAVE; k++)
+        for (int r = 0; r < MEDULLA_ROUND_RANK; r++) {
+            b.cosine[k][r] = (double)cosine[k][r];
+            b.sine[k][r] = (double)sine[k][r];
+        }
     memset(m, 0, sizeof *m);
     for (int row = 0; row <= FUR_N_ROW; row++) {
         struct fur_mean *part = m->row[row];

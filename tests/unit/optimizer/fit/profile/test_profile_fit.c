@@ -54,7 +54,9 @@ static void measure(struct fit_case *f, double scale, uint64_t seed)
     double *value = calloc(n, sizeof *value), most = 0;
     struct error err = {0};
     assert_non_null(value);
-    assert_int_equal(profile_model_predict(f->model, f->truth, &f->profile, NULL, value, NULL, &err), STATUS_OK);
+    assert_int_equal(
+        profile_model_predict(f->model, f->truth, &f->profile, &(struct profile_work){0}, value, NULL, &err),
+        STATUS_OK);
     for (size_t i = 0; i < n; i++) most = fmax(most, scale * value[i]);
     for (size_t i = 0; i < n; i++) {
         struct rng r;
@@ -233,6 +235,47 @@ static void ties_of_a_grey_profile(void **unused)
     end(&f);
 }
 
+/* The model of a fit that is cancelled after so many evaluations, and how many follow. */
+static const struct scattering_model *cancelled_model;
+static atomic_bool cancel;
+static size_t n_before_cancel, n_after_cancel;
+
+static void eval_and_cancel(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3],
+                            float *score)
+{
+    if (n_before_cancel > 0 && --n_before_cancel == 0) atomic_store(&cancel, true);
+    n_after_cancel += atomic_load(&cancel);
+    cancelled_model->eval(s, wi, wo, s_rgb, score);
+}
+
+/* A fit ends within the rows of one task, in the first evaluation of a start as in the last ones. */
+static void cancelled_soon(void **unused)
+{
+    enum { VIEWS_OF_TASK = 32 * 128 };
+    const size_t when[] = {1, 5000, 100000};
+    (void)unused;
+    for (size_t k = 0; k < sizeof when / sizeof *when; k++) {
+        struct fit_case f;
+        struct profile_fit fit;
+        struct error err = {0};
+        const struct progress progress = {.cancel = &cancel};
+        begin(&f, "chiang.v1", 1, NAN);
+        measure(&f, 1, 3);
+        struct scattering_model m = *f.model;
+        cancelled_model = f.model;
+        m.eval = eval_and_cancel;
+        f.problem.model = &m;
+        f.problem.progress = &progress;
+        atomic_store(&cancel, false);
+        n_before_cancel = when[k];
+        n_after_cancel = 0;
+        assert_int_equal(profile_fit_run(&f.problem, "p.csv", &fit, &err), STATUS_CANCELLED);
+        assert_true(n_after_cancel > 0 && n_after_cancel <= VIEWS_OF_TASK);
+        profile_fit_release(&fit);
+        end(&f);
+    }
+}
+
 static void too_few_rows(void **unused)
 {
     struct fit_case f;
@@ -258,6 +301,7 @@ int main(void)
                                        cmocka_unit_test(priors_and_bounds),
                                        cmocka_unit_test(rows_of_large_errors_do_not_choose),
                                        cmocka_unit_test(ties_of_a_grey_profile),
+                                       cmocka_unit_test(cancelled_soon),
                                        cmocka_unit_test(too_few_rows)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
