@@ -1,10 +1,12 @@
 #include "geometry/fibers/slices/center_refine.h"
 
+#include "base/lanes.h"
+
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
 
-enum { N_ROUND = 6, LANES = 8 };
+enum { N_ROUND = 6 };
 static const float WINDOW_RADII = 1.2f;
 static const float FLOOR = 0.15f; /* densities up to this count as void, so that noise there has no effect */
 
@@ -44,20 +46,19 @@ static void clear_row(float *distance, ptrdiff_t n)
     for (ptrdiff_t u = 0; u < n; u++) distance[u] = INFINITY;
 }
 
-/* Gives n pixels of a row to a center if it is the nearest so far. du0, dv: place of the first from the center. The
- * distance is perpendicular to the axis. Without branches, so that the loop is vectorised. */
-static void claim_row(const struct window *w, float index, float du0, float dv, int n, float *restrict distance,
-                      float *restrict owner)
+static const lanes STEP = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
+
+/* Gives LANES pixels of a row, of which n count, to a center if it is the nearest so far. du, dv: their places from the
+ * center. The distance is perpendicular to the axis. */
+static inline void claim_lanes(const struct window *w, float index, lanes du, float dv, ptrdiff_t n, float *distance,
+                               float *owner)
 {
-    const float slope_u = w->slope_u, along_v = dv * w->slope_v, dv2 = dv * dv, stretch2 = w->stretch2;
-    const float radius2 = w->radius2, edge2 = w->edge2;
-    for (int u = 0; u < n; u++) {
-        float du = du0 + (float)u, along = du * slope_u + along_v;
-        float d2 = du * du + dv2 - along * along / stretch2, own = d2 - radius2, old = distance[u], other = owner[u];
-        bool mine = d2 < edge2 && own < old;
-        distance[u] = mine ? own : old;
-        owner[u] = mine ? index : other;
-    }
+    const lanes along = du * w->slope_u + dv * w->slope_v;
+    const lanes d2 = du * du + dv * dv - along * along / w->stretch2, own = d2 - w->radius2;
+    const lanes old = *(const lanes *)distance, other = *(const lanes *)owner, zero = {0.0f};
+    const lane_mask mine = (STEP < (float)n) & (d2 < w->edge2) & (own < old);
+    *(lanes *)distance = lanes_choose(mine, own, old);
+    *(lanes *)owner = lanes_choose(mine, zero + index, other);
 }
 
 static void claim_pixels(const struct refine_slice *s, const struct window *window, size_t n)
@@ -72,38 +73,40 @@ static void claim_pixels(const struct refine_slice *s, const struct window *wind
         const struct window *w = &window[i];
         const struct box *b = &w->box;
         for (ptrdiff_t v = b->v0; v < b->v1; v++) {
-            ptrdiff_t at = v * (ptrdiff_t)s->width + b->u0;
-            claim_row(w, (float)i, (float)b->u0 + 0.5f - w->u, (float)v + 0.5f - w->v, (int)(b->u1 - b->u0),
-                      s->distance + at, s->owner + at);
+            for (ptrdiff_t u = b->u0; u < b->u1; u += LANES) {
+                const ptrdiff_t at = v * (ptrdiff_t)s->width + u;
+                const lanes du = (float)b->u0 + 0.5f - w->u + (STEP + (float)(u - b->u0));
+                claim_lanes(w, (float)i, du, (float)v + 0.5f - w->v, b->u1 - u, s->distance + at, s->owner + at);
+            }
         }
     }
 }
 
 /* Sums over the pixels of a center: their weight, and the weight times the place from the center. */
 struct centroid {
-    float sum[LANES], du[LANES], dv[LANES];
+    lanes sum, du, dv;
 };
 
-/* Adds at most LANES pixels of a row from number `at` on. place: of the first from the center. Pixels beyond limit
- * along the row have no mirror image in the picture. */
-static void add_pixels(const struct refine_slice *s, ptrdiff_t at, float index, const float place[2], int n,
-                       float limit, struct centroid *c)
+/* Adds LANES pixels of a row from number `at` on, of which n count. place: of the first from the center. Pixels beyond
+ * limit along the row have no mirror image in the picture. */
+static inline void add_pixels(const struct refine_slice *s, ptrdiff_t at, float index, const float place[2],
+                              ptrdiff_t n, float limit, struct centroid *c)
 {
-    const float *image = s->image + at, *owner = s->owner + at, *distance = s->distance + at;
-    for (int u = 0; u < n; u++) {
-        float du = place[0] + (float)u, w = image[u] - FLOOR;
-        bool mine = distance[u] < INFINITY && owner[u] == index && w > 0.0f && fabsf(du) <= limit;
-        w = mine ? w : 0.0f;
-        c->sum[u] += w;
-        c->du[u] += w * du;
-        c->dv[u] += w * place[1];
-    }
+    const lanes owner = *(const lanes *)(s->owner + at), distance = *(const lanes *)(s->distance + at), zero = {0.0f};
+    const lanes du = place[0] + STEP;
+    lanes w = *(const lanes *)(s->image + at) - FLOOR;
+    const lane_mask mine =
+        (STEP < (float)n) & (distance < INFINITY) & (owner == index) & (w > zero) & (du <= limit) & (du >= -limit);
+    w = lanes_choose(mine, w, zero);
+    c->sum += w;
+    c->du += w * du;
+    c->dv += w * place[1];
 }
 
 /* Moves a center to the centroid of its pixels. Pixels whose mirror image is cut off by the border do not count. */
 static void move_to_centroid(const struct refine_slice *s, const struct window *w, float index, struct center *c)
 {
-    struct centroid sums = {{0.0f}, {0.0f}, {0.0f}};
+    struct centroid sums = {0};
     const struct box *b = &w->box;
     float limit_u = fminf(w->u, (float)s->width - w->u), limit_v = fminf(w->v, (float)s->height - w->v);
     for (ptrdiff_t v = b->v0; v < b->v1; v++) {
@@ -111,8 +114,7 @@ static void move_to_centroid(const struct refine_slice *s, const struct window *
         if (fabsf(dv) > limit_v) continue;
         for (ptrdiff_t u = b->u0; u < b->u1; u += LANES) {
             const float place[2] = {(float)u + 0.5f - w->u, dv};
-            int n = b->u1 - u < LANES ? (int)(b->u1 - u) : LANES;
-            add_pixels(s, v * (ptrdiff_t)s->width + u, index, place, n, limit_u, &sums);
+            add_pixels(s, v * (ptrdiff_t)s->width + u, index, place, b->u1 - u, limit_u, &sums);
         }
     }
     float sum = 0.0f, du = 0.0f, dv = 0.0f;

@@ -13,9 +13,11 @@
 #include <stdbool.h>
 
 struct refine_slice {
-    const float *image; /* width x height densities */
+    /* width x height densities, and scratch arrays of the same size. Each has LANES more floats (base/lanes.h) that may be
+     * read, and written as they are. */
+    const float *image;
     size_t width, height;
-    float *owner, *distance; /* scratch arrays of the same size */
+    float *owner, *distance;
 };
 
 /* Returns false when memory is out. */

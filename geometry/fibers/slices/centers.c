@@ -1,15 +1,22 @@
 #include "geometry/fibers/slices/centers.h"
 
+#include "base/lanes.h"
+#include "geometry/fibers/slices/blob_response.h"
 #include "geometry/fibers/slices/center_refine.h"
+#include "geometry/fibers/slices/pixel_bits.h"
 #include "geometry/fibers/slices/slice_image.h"
-#include "geometry/vision/vision.h"
+#include "geometry/fibers/slices/slice_peaks.h"
 
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_SCALE = 5 };
+enum {
+    N_SCALE = 5,
+    PEAK_REACH = 2, /* pixels to a kept voxel's from a peak that has a slope (find_slope) */
+    N_BYTES = 3     /* sets of pixels in the work of a thread */
+};
 static const double scale_factor[N_SCALE] = {0.58, 0.70, 0.85, 1.03, 1.25}; /* of diameter / (2 sqrt 2) */
 
 /* An isolated disk has response 0.74; a disk inside a dense bundle, whose neighbours fill the surround of the
@@ -24,7 +31,7 @@ static const double RADIUS_OVER_SIGMA = 1.7, LEAST_RADIUS = 0.55, MOST_RADIUS = 
 struct slice_result {
     struct center *center;
     size_t n, capacity;
-    status failed;
+    bool failed; /* memory was out */
 };
 
 struct detect_job {
@@ -32,24 +39,25 @@ struct detect_job {
     const struct direction_volume *d;
     const uint16_t *mask;
     const struct slice_frame *frame;
-    size_t first;            /* slice of task 0 of the slab */
-    float *image;            /* pictures of the slab */
-    struct pixel_range *own; /* per slice of the slab */
-    size_t margin;           /* pixels that a picture needs around its own */
+    size_t first;                   /* slice of task 0 of the slab */
+    struct slice_pictures pictures; /* of the slab */
+    size_t margin;                  /* pixels that a picture needs around its own */
     double sigma[N_SCALE];
+    struct blob_kernel kernel[N_SCALE];
     float min_distance;
     double diameter;
-    float *scratch; /* per thread: a part of the picture and N_SCALE responses */
-    size_t scratch_per_thread;
+    float *scratch; /* per thread: a part of the picture, N_SCALE responses and the work of blob_response */
+    uint8_t *bytes; /* per thread: N_BYTES sets of pixels, and the marks of a row */
+    size_t scratch_per_thread, bytes_per_thread;
     struct slice_result *slice;
-    struct error *error; /* one per thread */
 };
 
 /* The part of a slice's picture that is used. */
 struct view {
     size_t i_slice, width, height;
     float origin[2]; /* position of pixel (0, 0) in the whole picture */
-    float *image, *response;
+    float *image, *response, *work;
+    uint8_t *candidate, *mark; /* pixels where peaks may be; marks of a row */
 };
 
 void center_list_release(struct center_list *l)
@@ -69,61 +77,6 @@ static bool voxel_at(const size_t n[3], const float x[3], size_t at[3])
         at[a] = x[a] <= 0.0f ? 0 : x[a] >= (float)n[a] - 1.0f ? n[a] - 1 : (size_t)x[a];
     }
     return inside;
-}
-
-/* Whether a pixel at the border of a picture is a peak among its neighbours there; of equal pixels the first is. */
-static bool is_border_peak(const struct view *w, const float *response, size_t u, size_t v)
-{
-    float c = response[v * w->width + u];
-    for (size_t y = v > 0 ? v - 1 : 0; y <= v + 1 && y < w->height; y++)
-        for (size_t x = u > 0 ? u - 1 : 0; x <= u + 1 && x < w->width; x++) {
-            float r = response[y * w->width + x];
-            if (r > c || (r == c && (y < v || (y == v && x < u)))) return false;
-        }
-    return true;
-}
-
-/* The same for n inner pixels of a row: marks the strong peaks. Without branches, so that the loop is vectorised. */
-static void mark_peaks(const float *p, size_t width, size_t n, uint8_t *restrict mark)
-{
-    const float *before = p - width, *after = p + width;
-    for (size_t u = 0; u < n; u++) {
-        float c = p[u];
-        mark[u] = (c >= MIN_STRENGTH) & (c > p[u - 1]) & (c >= p[u + 1]) & (c > before[u - 1]) & (c > before[u]) &
-                  (c > before[u + 1]) & (c >= after[u - 1]) & (c >= after[u]) & (c >= after[u + 1]);
-    }
-}
-
-/* Marks the strong peaks of one row of a response. */
-static void mark_row(const struct view *w, const float *response, size_t v, uint8_t *mark)
-{
-    const float *row = response + v * w->width;
-    bool inner = v > 0 && v + 1 < w->height && w->width > 2;
-    if (inner) mark_peaks(row + 1, w->width, w->width - 2, mark + 1);
-    for (size_t u = 0; u < w->width; u = inner && u == 0 ? w->width - 1 : u + 1)
-        mark[u] = row[u] >= MIN_STRENGTH && is_border_peak(w, response, u, v);
-}
-
-/* Offset of the maximum of the paraboloid through 3 x 3 pixels, at most one pixel. */
-static void refine_position(const struct view *w, const float *response, size_t u, size_t v, float offset[2])
-{
-    offset[0] = offset[1] = 0.0f;
-    if (u == 0 || v == 0 || u + 1 >= w->width || v + 1 >= w->height) return;
-    const float *p = response + v * w->width + u;
-    size_t pitch = w->width;
-    float gu = 0.0f, gv = 0.0f, uu = 0.0f, vv = 0.0f;
-    for (ptrdiff_t r = -1; r <= 1; r++) {
-        const float *q = p + r * (ptrdiff_t)pitch;
-        gu += (q[1] - q[-1]) / 6.0f;
-        uu += (q[1] - 2.0f * q[0] + q[-1]) / 3.0f;
-        gv += (p[pitch + (size_t)(r + 1) - 1] - p[-(ptrdiff_t)pitch + r]) / 6.0f;
-        vv += (p[(ptrdiff_t)pitch + r] - 2.0f * p[r] + p[-(ptrdiff_t)pitch + r]) / 3.0f;
-    }
-    float uv = (p[pitch + 1] - p[pitch - 1] - p[-(ptrdiff_t)pitch + 1] + p[-(ptrdiff_t)pitch - 1]) / 4.0f;
-    float det = uu * vv - uv * uv;
-    if (!(det > 0.0f) || !(uu < 0.0f)) return;
-    offset[0] = fminf(1.0f, fmaxf(-1.0f, (uv * gv - vv * gu) / det));
-    offset[1] = fminf(1.0f, fmaxf(-1.0f, (uv * gu - uu * gv) / det));
 }
 
 /* Computes the mean direction of the class's voxels within one pixel of (u, v), as slopes. Returns false if there
@@ -182,35 +135,40 @@ static float radius_at(const struct detect_job *job, const float *peak, size_t n
     return (float)fmin(MOST_RADIUS * half, fmax(LEAST_RADIUS * half, r));
 }
 
-/* Adds the center of the peak at a pixel of scale s, if it is a peak among the scales too. */
-static bool add_peak(const struct detect_job *job, const struct view *w, int s, size_t u, size_t v,
-                     struct slice_result *r)
+/* The peaks of one scale. */
+struct scale_peaks {
+    const struct detect_job *job;
+    const struct view *view;
+    struct peak_search search;
+    int s;
+    struct slice_result *result;
+};
+
+/* Adds the center of the peak at a pixel, if it is a peak among the scales too. */
+static bool add_peak(void *context, size_t u, size_t v)
 {
+    const struct scale_peaks *p = context;
+    const struct view *w = p->view;
     const size_t n_pixel = w->width * w->height, at = v * w->width + u;
-    const float *map = w->response + (size_t)s * n_pixel;
-    if ((s > 0 && map[at - n_pixel] > map[at]) || (s + 1 < N_SCALE && map[at + n_pixel] > map[at])) return true;
+    const float *map = p->search.response;
+    if ((p->s > 0 && map[at - n_pixel] > map[at]) || (p->s + 1 < N_SCALE && map[at + n_pixel] > map[at])) return true;
     float offset[2];
-    refine_position(w, map, u, v, offset);
+    peak_offset(&p->search, u, v, offset);
     struct center c = {.u = w->origin[0] + (float)u + 0.5f + offset[0],
                        .v = w->origin[1] + (float)v + 0.5f + offset[1],
-                       .radius = radius_at(job, map + at, n_pixel, s),
+                       .radius = radius_at(p->job, map + at, n_pixel, p->s),
                        .strength = map[at]};
-    return !find_slope(job, w->i_slice, &c) || push(r, &c);
+    return !find_slope(p->job, w->i_slice, &c) || push(p->result, &c);
 }
 
 static bool collect_peaks(const struct detect_job *job, const struct view *w, struct slice_result *r)
 {
-    const size_t n_pixel = w->width * w->height;
-    uint8_t *mark = malloc(w->width + 1);
-    bool fits = mark != NULL;
-    for (int s = 0; s < N_SCALE && fits; s++)
-        for (size_t v = 0; v < w->height && fits; v++) {
-            mark_row(w, w->response + (size_t)s * n_pixel, v, mark);
-            const uint8_t *end = mark + w->width;
-            for (const uint8_t *m = mark; (m = memchr(m, 1, (size_t)(end - m))) != NULL && fits; m++)
-                fits = add_peak(job, w, s, (size_t)(m - mark), v, r);
-        }
-    free(mark);
+    bool fits = true;
+    for (int s = 0; s < N_SCALE && fits; s++) {
+        const float *response = w->response + (size_t)s * w->width * w->height;
+        struct scale_peaks peaks = {job, w, {response, w->width, w->height, w->candidate, MIN_STRENGTH}, s, r};
+        fits = peaks_visit(&peaks.search, w->mark, add_peak, &peaks);
+    }
     return fits;
 }
 
@@ -267,19 +225,41 @@ static bool thin_out(const struct detect_job *job, const struct view *w, struct 
     return true;
 }
 
-/* Copies the slice's own pixels and a margin around them from the slab. */
+/* Copies the slice's own pixels and a margin around them from the slab, from a whole byte of bits on. */
 static struct view cut_view(const struct detect_job *job, size_t i_task, float *scratch)
 {
     const struct slice_frame *f = job->frame;
-    const struct pixel_range *own = &job->own[i_task];
-    size_t m = job->margin, u0 = own->u0 > m ? own->u0 - m : 0, v0 = own->v0 > m ? own->v0 - m : 0;
+    const struct pixel_range *own = &job->pictures.own[i_task];
+    const size_t m = job->margin, u0 = own->u0 > m ? (own->u0 - m) / 8 * 8 : 0, v0 = own->v0 > m ? own->v0 - m : 0;
     size_t u1 = own->u1 + m < f->width ? own->u1 + m : f->width, v1 = own->v1 + m < f->height ? own->v1 + m : f->height;
-    struct view w = {job->first + i_task,    u1 - u0, v1 - v0,
-                     {(float)u0, (float)v0}, scratch, scratch + (u1 - u0) * (v1 - v0)};
-    const float *from = job->image + i_task * f->width * f->height;
+    struct view w = {.i_slice = job->first + i_task,
+                     .width = u1 - u0,
+                     .height = v1 - v0,
+                     .origin = {(float)u0, (float)v0},
+                     .image = scratch,
+                     .response = scratch + (u1 - u0) * (v1 - v0),
+                     .work = scratch + (N_SCALE + 1) * (u1 - u0) * (v1 - v0)};
+    const float *from = job->pictures.image + i_task * f->width * f->height;
     for (size_t v = 0; v < w.height; v++)
         memcpy(w.image + v * w.width, from + (v0 + v) * f->width + u0, w.width * sizeof *from);
     return w;
+}
+
+/* Finds the pixels where peaks may be, and computes the responses there and beside them. bytes: work of the thread. */
+static void respond(const struct detect_job *job, size_t i_task, struct view *w, uint8_t *bytes)
+{
+    const size_t pitch = slice_row_bytes(job->frame), n_byte = blob_n_block(w->width), n = n_byte * w->height;
+    const uint8_t *kept =
+        job->pictures.kept + (i_task * job->frame->height + (size_t)w->origin[1]) * pitch + (size_t)w->origin[0] / 8;
+    uint8_t *work = bytes, *asked = bytes + n;
+    w->candidate = bytes + 2 * n;
+    w->mark = bytes + N_BYTES * n;
+    pixel_bits_near(kept, pitch, n_byte, w->height, PEAK_REACH, work, w->candidate);
+    pixel_bits_near(kept, pitch, n_byte, w->height, PEAK_REACH + 1, work, asked);
+    for (size_t b = 0; b < n; b++) asked[b] = asked[b] != 0;
+    const struct blob_picture picture = {w->image, w->width, w->height, asked};
+    for (int s = 0; s < N_SCALE; s++)
+        blob_response(&job->kernel[s], &picture, w->work, work, w->response + (size_t)s * w->width * w->height);
 }
 
 static void move_centers(struct slice_result *r, float du, float dv)
@@ -294,19 +274,14 @@ static void detect_slice(void *context, size_t i_task, size_t i_thread)
 {
     struct detect_job *job = context;
     scratch_keep_within(job->v->space);
-    if (job->own[i_task].u0 >= job->own[i_task].u1) return; /* the slice has no voxel of the class */
+    if (job->pictures.own[i_task].u0 >= job->pictures.own[i_task].u1) return; /* no voxel of the class */
     struct view w = cut_view(job, i_task, job->scratch + i_thread * job->scratch_per_thread);
     struct slice_result *r = &job->slice[w.i_slice];
-    size_t n_pixel = w.width * w.height;
-    for (int s = 0; s < N_SCALE && r->failed == STATUS_OK; s++)
-        r->failed = vision_blob_response(w.image, w.width, w.height, job->sigma[s], w.response + (size_t)s * n_pixel,
-                                         &job->error[i_thread]);
-    if (r->failed != STATUS_OK) return;
+    respond(job, i_task, &w, job->bytes + i_thread * job->bytes_per_thread);
     bool fits = collect_peaks(job, &w, r) && thin_out(job, &w, r);
     move_centers(r, -w.origin[0], -w.origin[1]);
-    const struct refine_slice slice = {w.image, w.width, w.height, w.response, w.response + n_pixel};
-    if (!fits || !centers_refine(&slice, r->center, r->n))
-        r->failed = error_set(&job->error[i_thread], STATUS_NO_MEMORY, "cannot find fiber centers: out of memory");
+    const struct refine_slice slice = {w.image, w.width, w.height, w.response, w.response + w.width * w.height};
+    r->failed = !fits || !centers_refine(&slice, r->center, r->n);
     move_centers(r, w.origin[0], w.origin[1]);
     if (r->n > 0) qsort(r->center, r->n, sizeof *r->center, lower_v_first);
 }
@@ -337,15 +312,13 @@ static status detect_slabs(struct detect_job *job, const struct slice_source *so
     status s = STATUS_OK;
     for (job->first = 0; job->first < n && s == STATUS_OK; job->first += n_slab) {
         size_t n_here = job->first + n_slab < n ? n_slab : n - job->first;
-        s = slice_images_fill(source, job->first, n_here, pool, job->image, job->own, err);
+        s = slice_images_fill(source, job->first, n_here, pool, &job->pictures, err);
         if (s == STATUS_OK) s = thread_pool_run(pool, n_here, detect_slice, job, &quiet);
         if (s == STATUS_CANCELLED) error_set(err, s, "finding fiber centers was cancelled");
         progress_report(progress, (double)(job->first + n_here) / (double)n);
     }
-    for (size_t t = 0, n_thread = thread_pool_n_thread(pool); t < n_thread && s == STATUS_OK; t++) {
-        s = job->error[t].code;
-        if (s != STATUS_OK && err != NULL) *err = job->error[t];
-    }
+    for (size_t k = 0; k < n && s == STATUS_OK; k++)
+        if (job->slice[k].failed) s = error_set(err, STATUS_NO_MEMORY, "cannot find fiber centers: out of memory");
     return s;
 }
 
@@ -353,6 +326,17 @@ static status detect_slabs(struct detect_job *job, const struct slice_source *so
 static size_t picture_margin(double largest_sigma, double diameter)
 {
     return (size_t)ceil(4.0 * largest_sigma + MOST_RADIUS * diameter) + 8;
+}
+
+/* Chooses the scales of the filters from the diameter, and their margin. */
+static bool scales_init(struct detect_job *job)
+{
+    for (int i = 0; i < N_SCALE; i++) {
+        job->sigma[i] = fmax(0.6, scale_factor[i] * job->diameter / (2.0 * M_SQRT2));
+        if (!blob_kernel_init(&job->kernel[i], job->sigma[i])) return false;
+    }
+    job->margin = picture_margin(job->sigma[N_SCALE - 1], job->diameter);
+    return true;
 }
 
 status centers_detect(const struct center_search *search, struct thread_pool *pool, const struct progress *progress,
@@ -366,35 +350,38 @@ status centers_detect(const struct center_search *search, struct thread_pool *po
     struct slice_source source = {.v = v, .mask = sub->mask, .frame = frame};
     size_t n_slice = frame->n_slice, n_thread = thread_pool_n_thread(pool), n_pixel = frame->width * frame->height;
     size_t n_slab = scratch_buffer_bytes(v->space) / (n_pixel * sizeof(float));
+    status s = STATUS_OK;
     *list = (struct center_list){0};
-    status s = vision_init(err);
-    if (s != STATUS_OK) return s;
     n_slab = n_slab < n_thread ? n_thread : n_slab > n_slice ? n_slice : n_slab;
-    for (int i = 0; i < N_SCALE; i++) job.sigma[i] = fmax(0.6, scale_factor[i] * diameter_voxel / (2.0 * M_SQRT2));
     job.diameter = diameter_voxel;
     job.min_distance = MIN_SPACING * (float)(MOST_RADIUS * diameter_voxel);
-    job.margin = picture_margin(job.sigma[N_SCALE - 1], diameter_voxel);
+    if (!scales_init(&job)) return error_set(err, STATUS_INVALID, "cannot find fibers %g voxels thick", diameter_voxel);
     for (int a = 0; a < 3; a++) { /* pictures are void beyond this; diagonals need 3/2 of the margin */
         size_t reach = job.margin * 3 / 2;
         source.from[a] = sub->from[a] > reach ? sub->from[a] - reach : 0;
         source.to[a] = sub->to[a] + reach < v->n[a] ? sub->to[a] + reach : v->n[a];
     }
-    job.scratch_per_thread = n_pixel * (N_SCALE + 1);
+    const size_t n_byte = slice_row_bytes(frame) * frame->height;
+    job.scratch_per_thread = n_pixel * (N_SCALE + 1) + blob_scratch(frame->width, job.kernel[N_SCALE - 1].reach);
+    job.bytes_per_thread = N_BYTES * n_byte + frame->width + 1;
     job.scratch = malloc(n_thread * job.scratch_per_thread * sizeof *job.scratch);
-    job.image = malloc(n_slab * n_pixel * sizeof *job.image);
-    job.own = malloc(n_slab * sizeof *job.own);
+    job.bytes = malloc(n_thread * job.bytes_per_thread);
+    job.pictures.image = malloc(n_slab * n_pixel * sizeof *job.pictures.image);
+    job.pictures.kept = malloc(n_slab * n_byte);
+    job.pictures.own = malloc(n_slab * sizeof *job.pictures.own);
     job.slice = calloc(n_slice, sizeof *job.slice);
-    job.error = calloc(n_thread, sizeof *job.error);
-    if (job.scratch == NULL || job.image == NULL || job.own == NULL || job.slice == NULL || job.error == NULL)
+    if (job.scratch == NULL || job.bytes == NULL || job.pictures.image == NULL || job.pictures.kept == NULL ||
+        job.pictures.own == NULL || job.slice == NULL)
         s = error_set(err, STATUS_NO_MEMORY, "cannot find fiber centers: out of memory");
     if (s == STATUS_OK) s = detect_slabs(&job, &source, n_slab, pool, progress, err);
     if (s == STATUS_OK) s = gather(&job, n_slice, list, err);
     for (size_t k = 0; job.slice != NULL && k < n_slice; k++) free(job.slice[k].center);
     free(job.scratch);
-    free(job.image);
-    free(job.own);
+    free(job.bytes);
+    free(job.pictures.image);
+    free(job.pictures.kept);
+    free(job.pictures.own);
     free(job.slice);
-    free(job.error);
     if (s != STATUS_OK) center_list_release(list);
     return s;
 }

@@ -25,10 +25,20 @@ struct pixel_range {
     size_t u0, u1, v0, v1;
 };
 
-/* Fills image[n_slice][height][width] with slices first .. first + n_slice - 1: the density where the voxel belongs
- * to the frame, 0 elsewhere, interpolated bilinearly in the plane of the two diagonal axes. own[n_slice]: the pixels
- * that kept voxels of the class reach. STATUS_NO_MEMORY. */
+/* Pictures of n_slice slices. image[n_slice][height][width]: the density where the voxel belongs to the frame, 0
+ * elsewhere, interpolated bilinearly in the plane of the two diagonal axes. kept: a bit for each pixel that kept voxels of
+ * the class reach, pixel u of a row in bit u % 8 of byte u / 8, slice_row_bytes bytes a row. own[n_slice]: the range of
+ * these pixels. */
+struct slice_pictures {
+    float *image;
+    uint8_t *kept;
+    struct pixel_range *own;
+};
+
+static inline size_t slice_row_bytes(const struct slice_frame *f) { return (f->width + 7) / 8; }
+
+/* Fills the pictures of slices first .. first + n_slice - 1. STATUS_NO_MEMORY. */
 status slice_images_fill(const struct slice_source *source, size_t first, size_t n_slice, struct thread_pool *pool,
-                         float *image, struct pixel_range *own, struct error *err);
+                         const struct slice_pictures *pictures, struct error *err);
 
 #endif
