@@ -10,13 +10,13 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { BRICK = 32 };
+enum { BRICK = 32, N_VOXEL = BRICK * BRICK * BRICK + SEGMENT_SLACK };
 
 struct transfer_job {
     const struct segment_bricks *bricks;
     const struct fiber_set *fibers;
     struct direction_volume *d;
-    float *distance2; /* BRICK^3 per thread */
+    float *distance2; /* N_VOXEL per thread */
     uint32_t *nearest;
     struct brick_sum {
         double angle_deg;
@@ -56,8 +56,8 @@ static void transfer_voxel(struct transfer_job *job, struct brick_sum *sum, size
 static void transfer_brick(void *context, size_t i_brick, size_t i_thread)
 {
     struct transfer_job *job = context;
-    float *distance2 = job->distance2 + i_thread * BRICK * BRICK * BRICK;
-    uint32_t *nearest = job->nearest + i_thread * BRICK * BRICK * BRICK;
+    float *distance2 = job->distance2 + i_thread * N_VOXEL;
+    uint32_t *nearest = job->nearest + i_thread * N_VOXEL;
     struct point_lattice l = segment_brick_lattice(job->bricks, i_brick, 1);
     size_t from[3], n[3], p = 0;
     scratch_keep_within(job->d->space);
@@ -110,8 +110,8 @@ status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *
     }
     size_t n_brick = segment_n_brick(&bricks);
     struct transfer_job job = {.bricks = &bricks, .fibers = f, .d = d};
-    job.distance2 = malloc(n_thread * BRICK * BRICK * BRICK * sizeof *job.distance2);
-    job.nearest = malloc(n_thread * BRICK * BRICK * BRICK * sizeof *job.nearest);
+    job.distance2 = malloc(n_thread * N_VOXEL * sizeof *job.distance2);
+    job.nearest = malloc(n_thread * N_VOXEL * sizeof *job.nearest);
     job.sum = calloc(n_brick, sizeof *job.sum);
     if (job.distance2 == NULL || job.nearest == NULL || job.sum == NULL) {
         s = error_set(err, STATUS_NO_MEMORY, "cannot transfer directions: out of memory");

@@ -1,5 +1,7 @@
 #include "geometry/fibers/lines/segment_bricks.h"
 
+#include "base/lanes.h"
+
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -155,6 +157,7 @@ struct point_lattice segment_brick_lattice(const struct segment_bricks *s, size_
 /* A segment seen from the lattice: the numbers that the inner loops need. */
 struct view {
     float u[3], inverse2;       /* b - a, 1 / |u|^2 */
+    float inverse;              /* 1 / |u| */
     float from_voxel, to_voxel; /* slab along u, measured from a in voxels */
     float across[3];            /* distance by which points at `reach` may lie beyond the segment's box on each axis */
 };
@@ -164,6 +167,7 @@ static struct view view_of(const struct segment *g, float reach)
     struct view w = {.u = {g->b[0] - g->a[0], g->b[1] - g->a[1], g->b[2] - g->a[2]}};
     float length2 = w.u[0] * w.u[0] + w.u[1] * w.u[1] + w.u[2] * w.u[2], length = sqrtf(length2);
     w.inverse2 = length2 > 0.0f ? 1.0f / length2 : 0.0f;
+    w.inverse = sqrtf(w.inverse2);
     w.from_voxel = g->is_first || !(length2 > 0.0f) ? -reach : -1.0f;
     w.to_voxel = length + (g->is_last || !(length2 > 0.0f) ? reach : 1.0f);
     for (int a = 0; a < 3; a++) {
@@ -207,7 +211,7 @@ static float reach_of_row(const struct lattice_row *r)
 /* Finds the part from .. to - 1 of a row that lies in the slab. Returns false if there is none. */
 static bool slab_range(const struct view *w, const struct lattice_row *r, size_t *from, size_t *to)
 {
-    float scale = sqrtf(w->inverse2), c = w->u[0] * scale, fixed = (r->y * w->u[1] + r->z * w->u[2]) * scale;
+    float c = w->u[0] * w->inverse, fixed = (r->y * w->u[1] + r->z * w->u[2]) * w->inverse;
     *from = 0;
     *to = r->n;
     if (fabsf(c) < 0.05f)
@@ -220,37 +224,26 @@ static bool slab_range(const struct view *w, const struct lattice_row *r, size_t
     return *from < *to;
 }
 
-/* Squared distance of a point, relative to g->a, from the segment. Uses comparisons instead of fminf so that loops
- * are vectorised. */
-static inline float squared_distance(float px, float py, float pz, const float u[3], float inverse2)
-{
-    float t = (px * u[0] + py * u[1] + pz * u[2]) * inverse2;
-    t = t < 0.0f ? 0.0f : t;
-    t = t > 1.0f ? 1.0f : t;
-    float dx = px - t * u[0], dy = py - t * u[1], dz = pz - t * u[2];
-    return dx * dx + dy * dy + dz * dz;
-}
+static const lanes STEP = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
 
-static void stamp_row(const struct view *w, const struct lattice_row *row, float *restrict distance2)
+/* Gives the points of a row to the segment where it is the nearest so far. LANES points beyond the row are read too, and
+ * written as they are. */
+static void stamp_row(const struct view *w, const struct lattice_row *r, uint32_t id, float *distance2,
+                      uint32_t *nearest)
 {
-    const struct lattice_row r = *row;
-    const float u[3] = {w->u[0], w->u[1], w->u[2]}, inverse2 = w->inverse2;
-    for (size_t i = 0; i < r.n; i++) {
-        float d2 = squared_distance(r.x0 + (float)(int)i * r.spacing, r.y, r.z, u, inverse2);
-        distance2[i] = d2 < distance2[i] ? d2 : distance2[i];
-    }
-}
-
-static void stamp_row_nearest(const struct view *w, const struct lattice_row *row, uint32_t id,
-                              float *restrict distance2, uint32_t *restrict nearest)
-{
-    const struct lattice_row r = *row;
-    const float u[3] = {w->u[0], w->u[1], w->u[2]}, inverse2 = w->inverse2;
-    for (size_t i = 0; i < r.n; i++) {
-        float d2 = squared_distance(r.x0 + (float)(int)i * r.spacing, r.y, r.z, u, inverse2), old = distance2[i];
-        uint32_t old_id = nearest[i];
-        nearest[i] = d2 < old ? id : old_id;
-        distance2[i] = d2 < old ? d2 : old;
+    const float along_y = r->y * w->u[1], along_z = r->z * w->u[2];
+    const lanes zero = {0.0f}, one = zero + 1.0f;
+    for (size_t i = 0; i < r->n; i += LANES) {
+        const lanes x = r->x0 + (STEP + (float)(int)i) * r->spacing;
+        lanes t = (x * w->u[0] + along_y + along_z) * w->inverse2;
+        t = lanes_choose(t < zero, zero, t);
+        t = lanes_choose(t > one, one, t);
+        const lanes dx = x - t * w->u[0], dy = r->y - t * w->u[1], dz = r->z - t * w->u[2];
+        const lanes d2 = dx * dx + dy * dy + dz * dz, old = *(const lanes *)(distance2 + i);
+        const lane_mask take = (d2 < old) & (STEP < (float)(int)(r->n - i));
+        lane_mask *own = (lane_mask *)(nearest + i);
+        *(lanes *)(distance2 + i) = lanes_choose(take, d2, old);
+        *own = (*own & ~take) | (take & (int32_t)id);
     }
 }
 
@@ -259,7 +252,7 @@ void segment_distances(const struct segment_bricks *s, size_t i_brick, const str
 {
     size_t n_point = l->n[0] * l->n[1] * l->n[2];
     for (size_t i = 0; i < n_point; i++) distance2[i] = s->reach * s->reach;
-    for (size_t i = 0; nearest != NULL && i < n_point; i++) nearest[i] = UINT32_MAX;
+    for (size_t i = 0; i < n_point; i++) nearest[i] = UINT32_MAX;
     for (size_t e = s->first[i_brick]; e < s->first[i_brick + 1]; e++) {
         const struct segment *g = &s->segment[s->index[e]];
         size_t from[3], to[3];
@@ -277,10 +270,7 @@ void segment_distances(const struct segment_bricks *s, size_t i_brick, const str
                 if (!slab_range(&w, &r, &i0, &i1)) continue;
                 r.x0 = px + (float)i0 * l->spacing;
                 r.n = i1 - i0;
-                if (nearest == NULL)
-                    stamp_row(&w, &r, distance2 + at + i0);
-                else
-                    stamp_row_nearest(&w, &r, s->index[e], distance2 + at + i0, nearest + at + i0);
+                stamp_row(&w, &r, s->index[e], distance2 + at + i0, nearest + at + i0);
             }
     }
 }

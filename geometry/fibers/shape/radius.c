@@ -5,14 +5,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BRICK = 16, FINE = BRICK * RADIUS_UPSAMPLING, MAX_BRICK = 500 };
+enum { BRICK = 16, FINE = BRICK * RADIUS_UPSAMPLING, N_FINE = FINE * FINE * FINE + SEGMENT_SLACK, MAX_BRICK = 500 };
 
 struct radius_job {
     const struct volume *v;
     const struct segment_bricks *bricks;
     float eps_d;
     struct distance_histogram *histogram; /* RADIUS_PARTS per thread */
-    float *distance2;                     /* FINE^3 per thread */
+    float *distance2;                     /* N_FINE per thread */
     uint32_t *nearest;
     const uint32_t *chosen; /* numbers of the bricks that are measured */
     uint8_t *part;          /* part of each segment */
@@ -76,8 +76,8 @@ static void measure_brick(void *context, size_t i_task, size_t i_thread)
     size_t i_brick = job->chosen[i_task];
     scratch_keep_within(job->v->space);
     struct distance_histogram *own = &job->histogram[i_thread * RADIUS_PARTS], *far = own + part_of(i_brick);
-    float *distance2 = job->distance2 + i_thread * FINE * FINE * FINE;
-    uint32_t *nearest = job->nearest + i_thread * FINE * FINE * FINE;
+    float *distance2 = job->distance2 + i_thread * N_FINE;
+    uint32_t *nearest = job->nearest + i_thread * N_FINE;
     struct point_lattice l = segment_brick_lattice(job->bricks, i_brick, RADIUS_UPSAMPLING);
     segment_distances(job->bricks, i_brick, &l, distance2, nearest);
     float inverse_bin = (float)(1.0 / own->bin_voxel), row[FINE];
@@ -168,8 +168,8 @@ status distance_histogram_measure(const struct volume *v, const struct polyline_
     struct radius_job job = {.v = v, .bricks = &bricks, .eps_d = (float)eps_d};
     status s = segment_bricks_init(&bricks, lines, v->n, BRICK, (float)farthest_voxel, err);
     job.histogram = calloc(n_thread * RADIUS_PARTS, sizeof *job.histogram);
-    job.distance2 = malloc(n_thread * FINE * FINE * FINE * sizeof *job.distance2);
-    job.nearest = malloc(n_thread * FINE * FINE * FINE * sizeof *job.nearest);
+    job.distance2 = malloc(n_thread * N_FINE * sizeof *job.distance2);
+    job.nearest = malloc(n_thread * N_FINE * sizeof *job.nearest);
     uint32_t *chosen = s == STATUS_OK ? malloc(segment_n_brick(&bricks) * sizeof *chosen) : NULL;
     bool *is_chosen = s == STATUS_OK ? calloc(segment_n_brick(&bricks), sizeof *is_chosen) : NULL;
     job.chosen = chosen;

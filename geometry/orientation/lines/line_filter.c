@@ -143,6 +143,10 @@ static void copy_neighbourhood(const struct line_filter *f, const struct volume 
     for (ptrdiff_t z = -half; z <= half; z++)
         for (ptrdiff_t y = -half; y <= half; y++, out += f->edge_x) {
             const float *row = row_of(v, centre[1] + y, centre[2] + z);
+            if (row != NULL && centre[0] >= half && centre[0] + half < n) {
+                memcpy(out, row + centre[0] - half, f->edge * sizeof *out);
+                continue;
+            }
             const float *mirrored = row_of(v, centre[1] - y, centre[2] - z);
             for (ptrdiff_t x = -half; x <= half; x++) {
                 ptrdiff_t at = centre[0] + x, back = centre[0] - x;
