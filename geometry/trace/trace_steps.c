@@ -71,7 +71,7 @@ status trace_repair(struct trace_job *job, struct polyline_set *in, bool grow, d
     struct polyline_set agreeing, single, grown;
     const struct grow_option option = {(float)job->diameter, (float)job->o->eps_d, TRACE_MAX_GROWTH};
     const struct disagreement_option check = {TRACE_DISAGREEMENT_RAD, SIZE_MAX, TRACE_MIN_PIECE, job->pool};
-    const struct join_option join = {job->diameter, job->o->eps_d, 0.0};
+    const struct join_option join = {job->diameter, job->o->eps_d, 0.0, job->pool};
     const size_t *n = job->v->n;
     const struct duplicate_option one = {{n[0], n[1], n[2]}, job->diameter, touching, job->pool};
     size_t n_grown = 0, n_cut = 0;
@@ -92,7 +92,7 @@ status trace_repair(struct trace_job *job, struct polyline_set *in, bool grow, d
 status trace_join(struct trace_job *job, struct polyline_set *lines, bool grow, struct error *err)
 {
     const struct grow_option growth = {(float)job->diameter, (float)job->o->eps_d, TRACE_MAX_GROWTH};
-    const struct join_option join = {job->diameter, job->o->eps_d, job->profile.blur};
+    const struct join_option join = {job->diameter, job->o->eps_d, job->profile.blur, job->pool};
     struct join_counts counts = {.n_gap_bridged = job->report->n_gap_bridged, .n_joined = job->report->n_joined};
     struct polyline_set grown, out;
     size_t n_grown;

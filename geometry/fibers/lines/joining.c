@@ -1,5 +1,6 @@
 #include "geometry/fibers/lines/joining.h"
 
+#include "geometry/fibers/lines/join/join_emit.h"
 #include "geometry/fibers/lines/join/join_evidence.h"
 
 #include <math.h>
@@ -7,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_TRIM = 6, TRIM_STEP = 3 };
+enum { MAX_TRIM = 6, TRIM_STEP = 3, ENDS = 64 };
 /* Limits of a join. Lines stay within a tenth of a diameter of smooth curves; fibers bend with radii of about a
  * diameter or more. */
 static const float FACE_STEPS = 1.5f;                              /* voxels along the fiber to a face */
@@ -199,43 +200,83 @@ static bool is_at_face(const struct join_job *job, uint32_t end)
     return false;
 }
 
-/* Finds pairs of ends that may be joined. The ends are put into a grid as a polyline set with one "line" of 2 n
- * vertices. */
-static status find_joins(const struct join_job *job, struct join_list *joins, struct error *err)
+/* The search for pairs of ends in tasks of ENDS ends. */
+struct end_search {
+    const struct join_job *job;
+    struct polyline_set points; /* one "line" of all ends */
+    struct vertex_grid grid;    /* of the points */
+    float reach;
+    struct join_list *found; /* per task */
+    bool *failed;            /* per task: memory was out */
+};
+
+/* Finds the ends of a cell that end e may be joined to, of later ones only. */
+static bool search_cell(const struct end_search *q, uint32_t e, size_t cell, struct join_list *found)
 {
-    struct polyline_set points;
-    struct vertex_grid g = {0};
-    float reach = (float)fmax(4.0, MAX_GAP * job->diameter);
-    uint32_t n_end = (uint32_t)(2 * job->lines->n_line);
-    polyline_set_init(&points);
-    status s = polyline_begin(&points, 0, err);
-    for (uint32_t e = 0; e < n_end && s == STATUS_OK; e++)
-        s = polyline_add(&points, line_end_vertex(job->lines, e, 0), err);
-    if (s == STATUS_OK) s = vertex_grid_init(&g, &points, job->v->n, reach, err);
-    for (uint32_t e = 0; e < n_end && s == STATUS_OK; e++) {
-        if (is_at_face(job, e)) continue;
+    const float *x = q->points.vertex[e];
+    for (size_t k = q->grid.first[cell]; k < q->grid.first[cell + 1]; k++) {
+        const uint32_t f = q->grid.vertex[k];
+        const float *y = q->points.vertex[f];
+        float d2 = 0.0f;
+        for (int a = 0; a < 3; a++) d2 += (x[a] - y[a]) * (x[a] - y[a]);
+        if (f <= e || f / 2 == e / 2 || d2 > q->reach * q->reach || is_at_face(q->job, f)) continue;
+        struct join join = best_join(q->job, e, f);
+        if (join.cost < INFINITY && !push_join(found, join)) return false;
+    }
+    return true;
+}
+
+static void search_ends(void *context, size_t i_task, size_t i_thread)
+{
+    (void)i_thread;
+    const struct end_search *q = context;
+    scratch_keep_within(q->job->v->space);
+    for (size_t e = i_task * ENDS; e < q->points.n_vertex && e < (i_task + 1) * ENDS; e++) {
         size_t from[3], to[3], c[3];
-        scratch_keep_within(job->v->space);
-        const float *x = points.vertex[e];
-        vertex_grid_range(&g, x, reach, from, to);
+        if (is_at_face(q->job, (uint32_t)e)) continue;
+        vertex_grid_range(&q->grid, q->points.vertex[e], q->reach, from, to);
         for (c[2] = from[2]; c[2] <= to[2]; c[2]++)
             for (c[1] = from[1]; c[1] <= to[1]; c[1]++)
-                for (c[0] = from[0]; c[0] <= to[0]; c[0]++) {
-                    size_t cell = (c[2] * g.n[1] + c[1]) * g.n[0] + c[0];
-                    for (size_t k = g.first[cell]; k < g.first[cell + 1]; k++) {
-                        uint32_t f = g.vertex[k];
-                        const float *y = points.vertex[f];
-                        float d2 = (x[0] - y[0]) * (x[0] - y[0]) + (x[1] - y[1]) * (x[1] - y[1]) +
-                                   (x[2] - y[2]) * (x[2] - y[2]);
-                        if (f <= e || f / 2 == e / 2 || d2 > reach * reach || is_at_face(job, f)) continue;
-                        struct join join = best_join(job, e, f);
-                        if (join.cost < INFINITY && !push_join(joins, join))
-                            s = error_set(err, STATUS_NO_MEMORY, "cannot join fibers: out of memory");
-                    }
-                }
+                for (c[0] = from[0]; c[0] <= to[0]; c[0]++)
+                    if (!search_cell(q, (uint32_t)e, (c[2] * q->grid.n[1] + c[1]) * q->grid.n[0] + c[0],
+                                     &q->found[i_task]))
+                        q->failed[i_task] = true;
     }
-    vertex_grid_release(&g);
-    polyline_set_release(&points);
+}
+
+/* Adds the joins of all tasks in order. Returns false when memory is, or was, out. */
+static bool gather_joins(const struct end_search *q, size_t n_task, struct join_list *joins)
+{
+    bool fits = true;
+    for (size_t t = 0; t < n_task; t++) {
+        fits = fits && !q->failed[t];
+        for (size_t i = 0; i < q->found[t].n && fits; i++) fits = push_join(joins, q->found[t].join[i]);
+        free(q->found[t].join);
+    }
+    return fits;
+}
+
+/* Finds pairs of ends that may be joined. */
+static status find_joins(const struct join_job *job, struct thread_pool *pool, struct join_list *joins,
+                         struct error *err)
+{
+    struct end_search q = {.job = job, .reach = (float)fmax(4.0, MAX_GAP * job->diameter)};
+    const size_t n_end = 2 * job->lines->n_line, n_task = (n_end + ENDS - 1) / ENDS;
+    polyline_set_init(&q.points);
+    status s = polyline_begin(&q.points, 0, err);
+    for (uint32_t e = 0; e < n_end && s == STATUS_OK; e++)
+        s = polyline_add(&q.points, line_end_vertex(job->lines, e, 0), err);
+    if (s == STATUS_OK) s = vertex_grid_init(&q.grid, &q.points, job->v->n, q.reach, err);
+    q.found = calloc(n_task + 1, sizeof *q.found);
+    q.failed = calloc(n_task + 1, sizeof *q.failed);
+    bool fits = q.found != NULL && q.failed != NULL;
+    if (s == STATUS_OK && fits) s = thread_pool_run(pool, n_task, search_ends, &q, NULL);
+    fits = fits && gather_joins(&q, n_task, joins);
+    if (s == STATUS_OK && !fits) s = error_set(err, STATUS_NO_MEMORY, "cannot join fibers: out of memory");
+    free(q.found);
+    free(q.failed);
+    vertex_grid_release(&q.grid);
+    polyline_set_release(&q.points);
     return s;
 }
 
@@ -266,82 +307,6 @@ static void accept_joins(const struct join_list *joins, const struct polyline_se
     }
 }
 
-/* The section at a share of the way from one end of a gap to the other. */
-static struct fiber_shape shape_between(const struct fiber_shape *a, const struct fiber_shape *b, float share)
-{
-    struct fiber_shape s = share < 0.5f ? *a : *b;
-    s.radius = a->radius + share * (b->radius - a->radius);
-    s.radius_se = fmaxf(a->radius_se, b->radius_se);
-    s.ratio = a->ratio + share * (b->ratio - a->ratio);
-    s.ratio_se = fmaxf(a->ratio_se, b->ratio_se);
-    return s;
-}
-
-/* Index of vertex k from an end. */
-static size_t end_index(const struct polyline_set *p, uint32_t end, size_t k)
-{
-    return (end & 1u) != 0 ? p->first[end / 2 + 1] - 1 - k : p->first[end / 2] + k;
-}
-
-/* Adds vertices about one voxel apart on the curve over a gap. */
-static status fill_gap(const struct polyline_set *lines, uint32_t a, uint32_t b, const uint8_t *trim,
-                       struct polyline_set *out, struct error *err)
-{
-    struct join_curve j;
-    const uint8_t own_trim[2] = {trim[a], trim[b]};
-    status s = STATUS_OK;
-    if (!join_curve_fit(lines, a, b, own_trim, &j))
-        return error_set(err, STATUS_INTERNAL, "cannot join fibers: an accepted join cannot be fitted again");
-    int n = (int)lrint(j.gap);
-    for (int i = 1; i < n && s == STATUS_OK; i++) {
-        double y[3];
-        join_curve_at(&j, j.from + (j.to - j.from) * i / n, y);
-        s = polyline_add(out, (const float[3]){(float)y[0], (float)y[1], (float)y[2]}, err);
-        if (s == STATUS_OK && lines->shape != NULL)
-            out->shape[out->n_vertex - 1] =
-                shape_between(&lines->shape[end_index(lines, a, trim[a])], &lines->shape[end_index(lines, b, trim[b])],
-                              (float)i / (float)n);
-    }
-    return s;
-}
-
-/* Appends the vertices of a line from end e on, without those that are trimmed. */
-static status append_line(const struct polyline_set *lines, uint32_t e, const uint8_t *trim, struct polyline_set *out,
-                          struct error *err)
-{
-    size_t n = polyline_length(lines, e / 2);
-    status s = STATUS_OK;
-    for (size_t k = trim[e]; k + trim[e ^ 1u] < n && s == STATUS_OK; k++) {
-        s = polyline_add(out, line_end_vertex(lines, e, k), err);
-        if (s == STATUS_OK && lines->shape != NULL)
-            out->shape[out->n_vertex - 1] = lines->shape[end_index(lines, e, k)];
-    }
-    return s;
-}
-
-/* Goes from every free end through partners to the other free end. */
-static status emit_joined(const struct polyline_set *lines, const uint32_t *partner, const uint8_t *trim, bool *done,
-                          struct polyline_set *out, struct error *err)
-{
-    status s = lines->shape != NULL ? polyline_shapes_init(out, err) : STATUS_OK;
-    for (uint32_t e = 0; e < 2 * lines->n_line && s == STATUS_OK; e++) {
-        if (partner[e] != UINT32_MAX || done[e / 2]) continue;
-        double sum = 0.0, weight = 0.0;
-        s = polyline_begin_like(out, lines, e / 2, err);
-        for (uint32_t at = e; at != UINT32_MAX && s == STATUS_OK; at = partner[at ^ 1u]) {
-            double length = lines->radius[at / 2] > 0.0f ? (double)polyline_length(lines, at / 2) : 0.0;
-            sum += length * (double)lines->radius[at / 2];
-            weight += length;
-            if (at != e) s = fill_gap(lines, partner[at], at, trim, out, err);
-            if (s == STATUS_OK) s = append_line(lines, at, trim, out, err);
-            done[at / 2] = true;
-        }
-        if (s == STATUS_OK && weight > 0.0) out->radius[out->n_line - 1] = (float)(sum / weight);
-    }
-    polyline_shapes_follow(out, false);
-    return s;
-}
-
 status polylines_join(const struct polyline_set *lines, const struct volume *v, const struct join_option *o,
                       struct polyline_set *result, struct join_counts *counts, struct error *err)
 {
@@ -364,11 +329,11 @@ status polylines_join(const struct polyline_set *lines, const struct volume *v, 
     job.largest_radius = (float)(0.5 * o->diameter_voxel);
     for (size_t l = 0; l < n; l++) job.largest_radius = fmaxf(job.largest_radius, lines->radius[l]);
     s = vertex_grid_init(&job.grid, lines, v->n, (float)fmax(3.0, o->diameter_voxel), err);
-    if (s == STATUS_OK) s = find_joins(&job, &joins, err);
+    if (s == STATUS_OK) s = find_joins(&job, o->pool, &joins, err);
     if (s != STATUS_OK) goto out;
     if (joins.n > 0) qsort(joins.join, joins.n, sizeof *joins.join, cheaper_first);
     accept_joins(&joins, lines, partner, trim, parent, counts);
-    s = emit_joined(lines, partner, trim, done, result, err);
+    s = joins_emit(lines, &(struct join_partners){partner, trim}, done, result, err);
 out:
     vertex_grid_release(&job.grid);
     free(joins.join);

@@ -30,9 +30,10 @@ struct duplicate_option {
 };
 
 /* eps_d: density that counts as material. blur_voxel: standard deviation of the edges of fibers, when lines lie on
- * their axes and their radii are known; 0: joins are judged by their shape alone. */
+ * their axes and their radii are known; 0: joins are judged by their shape alone. pool NULL: one thread. */
 struct join_option {
     double diameter_voxel, eps_d, blur_voxel;
+    struct thread_pool *pool;
 };
 
 /* Both steps write to result (initialised, empty); polylines_mark_duplicates marks the vertices that the first removes.

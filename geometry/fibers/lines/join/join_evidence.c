@@ -44,7 +44,8 @@ static float nearest2(float (*x)[3], int i, int end, const float at[3])
     float least = INFINITY;
     for (; i < end; i++) {
         const float d0 = x[i][0] - at[0], d1 = x[i][1] - at[1], d2 = x[i][2] - at[2];
-        least = fminf(least, d0 * d0 + d1 * d1 + d2 * d2);
+        const float distance2 = d0 * d0 + d1 * d1 + d2 * d2;
+        least = distance2 < least ? distance2 : least; /* fminf would be a call */
     }
     return least;
 }

@@ -44,7 +44,7 @@ static size_t count_joined(const struct volume *v, const struct polyline_set *li
     struct polyline_set out;
     struct join_counts counts = {0};
     polyline_set_init(&out);
-    assert_int_equal(polylines_join(lines, v, &(struct join_option){DIAMETER, 0.5, blur}, &out, &counts, NULL),
+    assert_int_equal(polylines_join(lines, v, &(struct join_option){DIAMETER, 0.5, blur, NULL}, &out, &counts, NULL),
                      STATUS_OK);
     assert_int_equal(out.n_line + counts.n_gap_bridged + counts.n_joined, lines->n_line);
     polyline_set_release(&out);
@@ -99,7 +99,7 @@ static void test_sections_are_kept(void **state)
         lines.shape[i].ratio = 1.0f + 0.01f * lines.vertex[i][0];
         lines.shape[i].ratio_se = 0.1f;
     }
-    assert_int_equal(polylines_join(&lines, &v, &(struct join_option){DIAMETER, 0.5, BLUR}, &out, &counts, NULL),
+    assert_int_equal(polylines_join(&lines, &v, &(struct join_option){DIAMETER, 0.5, BLUR, NULL}, &out, &counts, NULL),
                      STATUS_OK);
     assert_int_equal(out.n_line, 1);
     assert_non_null(out.shape);

@@ -113,7 +113,8 @@ static void test_duplicates_and_joins(void **state)
                      STATUS_OK);
     assert_int_equal(single.n_line, 5);
     assert_true(counts.n_duplicate >= 4 && counts.n_duplicate < 12);
-    assert_int_equal(polylines_join(&single, &v, &(struct join_option){6.0, 0.5, 0.0}, &out, &counts, NULL), STATUS_OK);
+    assert_int_equal(polylines_join(&single, &v, &(struct join_option){6.0, 0.5, 0.0, NULL}, &out, &counts, NULL),
+                     STATUS_OK);
     assert_int_equal(out.n_line, 3);
     assert_int_equal(counts.n_joined, 2); /* both joints of the middle piece */
     assert_int_equal(counts.n_gap_bridged, 0);
