@@ -226,8 +226,8 @@ static bool slab_range(const struct view *w, const struct lattice_row *r, size_t
 
 static const lanes STEP = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
 
-/* Gives the points of a row to the segment where it is the nearest so far. LANES points beyond the row are read too, and
- * written as they are. */
+/* Gives the points of a row to the segment where it is the nearest so far. LANES points beyond the row are read too,
+ * and written as they are. */
 static void stamp_row(const struct view *w, const struct lattice_row *r, uint32_t id, float *distance2,
                       uint32_t *nearest)
 {

@@ -1,8 +1,8 @@
-/* Scale-normalised Laplacian of Gaussian of a picture (Lindeberg 1998), with the sign that makes bright blobs maxima, at
- * those pixels where it is asked for.
+/* Scale-normalised Laplacian of Gaussian of a picture (Lindeberg 1998), with the sign that makes bright blobs maxima,
+ * at those pixels where it is asked for.
  *
- * Kernels are sampled and then corrected to sum 1 (Gaussian), and to sum 0 and second moment 2 (its second derivative),
- * so that scales below a pixel answer alike. The picture is mirrored at its borders. Units are pixels. */
+ * Kernels are sampled and then corrected to sum 1 (Gaussian), and to sum 0 and second moment 2 (its second
+ * derivative), so that scales below a pixel answer alike. The picture is mirrored at its borders. Units are pixels. */
 #ifndef SELVEDGE_GEOMETRY_BLOB_RESPONSE_H
 #define SELVEDGE_GEOMETRY_BLOB_RESPONSE_H
 

@@ -13,8 +13,8 @@
 #include <stdbool.h>
 
 struct refine_slice {
-    /* width x height densities, and scratch arrays of the same size. Each has LANES more floats (base/lanes.h) that may be
-     * read, and written as they are. */
+    /* width x height densities, and scratch arrays of the same size. Each has LANES more floats (base/lanes.h) that
+     * may be read, and written as they are. */
     const float *image;
     size_t width, height;
     float *owner, *distance;

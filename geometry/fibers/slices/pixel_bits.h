@@ -5,8 +5,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Finds the pixels that have one of a set within `reach` (at most 8) along both axes. bits: rows of n_byte bytes that lie
- * `pitch` bytes apart. work, near: n_byte x height bytes. Bits beyond the end of a row may be set too. */
+/* Finds the pixels that have one of a set within `reach` (at most 8) along both axes. bits: rows of n_byte bytes that
+ * lie `pitch` bytes apart. work, near: n_byte x height bytes. Bits beyond the end of a row may be set too. */
 void pixel_bits_near(const uint8_t *bits, size_t pitch, size_t n_byte, size_t height, unsigned reach, uint8_t *work,
                      uint8_t *near);
 

@@ -26,9 +26,9 @@ struct pixel_range {
 };
 
 /* Pictures of n_slice slices. image[n_slice][height][width]: the density where the voxel belongs to the frame, 0
- * elsewhere, interpolated bilinearly in the plane of the two diagonal axes. kept: a bit for each pixel that kept voxels of
- * the class reach, pixel u of a row in bit u % 8 of byte u / 8, slice_row_bytes bytes a row. own[n_slice]: the range of
- * these pixels. */
+ * elsewhere, interpolated bilinearly in the plane of the two diagonal axes. kept: a bit for each pixel that kept
+ * voxels of the class reach, pixel u of a row in bit u % 8 of byte u / 8, slice_row_bytes bytes a row. own[n_slice]:
+ * the range of these pixels. */
 struct slice_pictures {
     float *image;
     uint8_t *kept;
