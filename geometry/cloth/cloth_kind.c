@@ -78,6 +78,12 @@ void wave_draw(struct wave *v, double n_least, struct rng *rng)
     }
 }
 
+void wave_draw_band(struct wave *v, double n_longest, double step, struct rng *rng)
+{
+    wave_draw(v, 0.0, rng);
+    for (int i = 0; i < N_WAVE; i++) v->k[i] = fmax(1.0, round(n_longest + step * ((double)i - 0.5 + rng_double(rng))));
+}
+
 double wave_at(const struct wave *v, double s)
 {
     double sum = 0.0;

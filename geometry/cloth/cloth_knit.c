@@ -9,6 +9,8 @@
 
 enum { POINTS_PER_LOOP = 120 };
 static const double WIDE = 1.5, HIGH = 4.0, DEEP = 1.0, COURSE = 5.0;
+/* Length of the longest waves of a course about its place, in wales: one length for all tiles. */
+static const double WAVE_WALES = 4.0;
 /* Radius of the round yarn, in units, at cover 1. */
 static const double YARN = 0.8;
 
@@ -30,10 +32,11 @@ static void course_path(const struct cloth_work *w, size_t i, double unit, struc
 {
     const struct rng_key key = {.seed = w->d->seed, .iteration = STREAM_DISORDER};
     double disorder = work_number(w, "disorder"), deep = DEEP * work_number(w, "compression");
+    double longest = (double)w->d->n_yarn[CLOTH_WARP] / WAVE_WALES;
     struct wave aside[2];
     struct rng rng;
     rng_start(&rng, &key, (uint32_t)i, 0);
-    for (int a = 0; a < 2; a++) wave_draw(&aside[a], 1.0, &rng);
+    for (int a = 0; a < 2; a++) wave_draw_band(&aside[a], longest, longest, &rng);
     for (size_t k = 0; k < y->n; k++) {
         double t = 2.0 * M_PI * (double)k / POINTS_PER_LOOP, s = (double)k / (double)y->n;
         y->point[k][0] = (t + WIDE * sin(2.0 * t) + disorder * COURSE * wave_at(&aside[0], s)) * unit;

@@ -5,11 +5,15 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* A path may bend until its radius of curvature is this share of the yarn's half height; fibers on the inner side would
- * run backwards beyond. */
+/* A path may bend until its radius of curvature is this share of the yarn's half height; fibers on the inner side
+ * would run backwards beyond. */
 static const double SHARPEST_BEND = 0.5;
 /* Range of the cover that follows from given threads per cm. */
 static const double LEAST_COVER = 0.2, MOST_COVER = 1.7;
+
+/* Length of the longest waves of a yarn about its place, in yarns that it crosses. It is one length for all tiles,
+ * so that disorder means the same cloth in each of them. */
+static const double WAVE_YARNS = 16.0;
 
 struct weave {
     struct cloth_work *w;
@@ -29,8 +33,8 @@ static bool weft_over(const struct cloth_description *d, size_t i_weft, size_t i
     return !d->warp_over[i_weft % d->n_weft][i_warp % d->n_warp];
 }
 
-/* Edge of the tile across the yarns of a direction, and the borders of their slots (NULL: not wanted). number: NULL for
- * the description's own values. */
+/* Edge of the tile across the yarns of a direction, and the borders of their slots (NULL: not wanted). number: NULL
+ * for the description's own values. */
 static double lay_out(const struct cloth_work *w, int direction, const double *number, double *border_m)
 {
     const struct cloth_description *d = w->d;
@@ -69,13 +73,14 @@ static status weave_lay_out(struct weave *v, struct error *err)
     for (int direction = CLOTH_WEFT; direction <= CLOTH_WARP && st == STATUS_OK; direction++) {
         const struct rng_key key = {.seed = w->d->seed, .iteration = STREAM_DISORDER};
         int across = 1 - direction; /* wefts follow each other along y */
+        double longest = (double)w->d->n_yarn[across] / WAVE_YARNS;
         w->set.tile_m[across] = lay_out(w, direction, w->number, v->border_m[direction]);
         v->nominal_tile_m[across] = lay_out(w, direction, NULL, NULL);
         w->spacing_m[across] = w->set.tile_m[across] / (double)w->d->n_yarn[direction];
         for (size_t i = 0; i < w->d->n_yarn[direction]; i++) {
             struct rng rng;
             rng_start(&rng, &key, (uint32_t)(2 * i + (size_t)direction), 0);
-            wave_draw(&v->aside[direction][i], 1.0, &rng);
+            wave_draw_band(&v->aside[direction][i], longest, longest, &rng);
         }
         st = check_threads(w, direction, w->set.tile_m[across], err);
     }

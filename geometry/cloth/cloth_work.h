@@ -46,6 +46,10 @@ struct wave {
 struct rng;
 /* n_least: waves per period of the longest; they follow each other. */
 void wave_draw(struct wave *v, double n_least, struct rng *rng);
+/* Waves of a band that does not depend on the period: the longest have n_longest periods in it, which need not be
+ * whole, and the others follow in steps of step. Each number of waves is drawn at random within its step, is whole
+ * and at least 1. So a longer period has more waves of the same lengths, and no pattern repeats in it. */
+void wave_draw_band(struct wave *v, double n_longest, double step, struct rng *rng);
 double wave_at(const struct wave *v, double s);
 /* Standard deviation of the slope by s. */
 double wave_slope_sd(const struct wave *v);

@@ -8,13 +8,17 @@
 #include <stdlib.h>
 
 static const double GOLDEN_RAD = 2.39996322972865332; /* pi (3 - sqrt 5): Vogel 1979 */
-/* Steps of the additive recurrence in two dimensions (Roberts 2018, "R2"): the starts of staples are spread over the
- * yarn, independently of their places in the section. */
+/* Step of the additive recurrence in two dimensions (Roberts 2018, "R2"): the starts of staples are spread over the
+ * seam of their yarn, independently of their places in the section. */
 static const double START_STEP = 0.7548776662466927;
 /* Nodes of a fiber are this many radii apart at the description's own values. */
 static const double NODE_STEP_RADII = 1.5;
-/* Lengths, in radii, of the longest waves of a fiber about its place, and of a migration. */
-static const double WANDER_RADII = 120.0, MIGRATION_RADII = 150.0;
+/* Length, in radii, of the part of a yarn in which its staples begin and end. The places turn with the twist, and as
+ * one tile seldom holds whole turns, those of fibers that begin and of fibers that end do not fit each other. Both
+ * are in the section only here; elsewhere fibers would overlap, by how much the length of the tile would decide. */
+static const double SEAM_RADII = 24.0;
+/* Lengths, in radii, of the longest waves of a fiber about its place, of a section's size, and of a migration. */
+static const double WANDER_RADII = 120.0, THICK_RADII = 480.0, MIGRATION_RADII = 150.0;
 enum { LEAST_NODES = 12, HAIR_NODES = 24 };
 
 /* A yarn while it is filled. */
@@ -93,8 +97,10 @@ struct wander {
 
 static void draw_wander(const struct filling *y, struct wander *v, struct rng *rng)
 {
-    for (int a = 0; a < 2; a++) wave_draw(&v->side[a], fmax(1.0, round(y->nominal_radii / WANDER_RADII)), rng);
-    v->amplitude_m = tan(y->shape->fiber_angle_rad) * y->length_m[y->path->n] / wave_slope_sd(&v->side[0]) / sqrt(2.0);
+    double longest = y->nominal_radii / WANDER_RADII;
+    for (int a = 0; a < 2; a++) wave_draw_band(&v->side[a], longest, 0.5 * longest, rng);
+    double slope = hypot(wave_slope_sd(&v->side[0]), wave_slope_sd(&v->side[1]));
+    v->amplitude_m = tan(y->shape->fiber_angle_rad) * y->length_m[y->path->n] / slope;
     v->migration_turns = y->nominal_radii / MIGRATION_RADII * (0.7 + 0.6 * rng_double(rng));
     v->migration_rad = 2.0 * M_PI * rng_double(rng);
 }
@@ -150,8 +156,8 @@ static status add_staple(struct filling *y, size_t i, double start, struct error
     return STATUS_OK;
 }
 
-/* Adds hair number i, grown to the given share of its length: it leaves the surface of the yarn and curls. Lengths are
- * exponentially distributed, cut off at three means. */
+/* Adds hair number i, grown to the given share of its length: it leaves the surface of the yarn and curls. Lengths
+ * are exponentially distributed, cut off at three means. */
 static status add_hair(struct filling *y, size_t i, double grown, struct error *err)
 {
     const struct rng_key key = {.seed = y->w->d->seed, .iteration = STREAM_HAIR};
@@ -211,12 +217,12 @@ status yarn_fill(struct cloth_work *w, size_t kind, const struct yarn *path, dou
            towards = RAD_PER_DEG * work_number(w, "nap_direction_deg");
     y.nap[0] = lean * cos(towards);
     y.nap[1] = lean * sin(towards);
-    wave_draw(&y.thick, 1.0, &rng);
-    double start = rng_double(&rng);
+    wave_draw_band(&y.thick, y.nominal_radii / THICK_RADII, y.nominal_radii / THICK_RADII, &rng);
+    double start = rng_double(&rng), seam = fmin(1.0, SEAM_RADII / y.nominal_radii);
     status st = work_has_room(w, yarn_nodes(w, kind, nominal_m), err);
     if (st == STATUS_OK) st = measure_path(&y, err);
     for (size_t i = 0; i < y.shape->n_fiber && st == STATUS_OK; i++) {
-        double at = start + START_STEP * (double)i;
+        double spread = START_STEP * (double)i, at = start + seam * (spread - floor(spread));
         st = add_staple(&y, i, at - floor(at), err);
     }
     if (st == STATUS_OK) st = add_hairs(&y, err);

@@ -97,7 +97,8 @@ def test_numbers_come_back(tmp_path, sample):
     assert abs(shown["yarns[0].flatness"]["value"] - flatness["value"]) < 1e-9
     made = result["geometry"]["cloth"]
     assert made["made"]["tile_yarns"] == [8, 8] and made["description"]["tile_warps"] == made["description"]["tile_wefts"] == 8
-    assert result["geometry"]["n_fiber"] >= 4 * 8 * 20
+    # a staple that ends at the face of the tile is not cut there
+    assert result["geometry"]["n_fiber"] >= 0.95 * (4 * 8 * 20)
     again = make_job(tmp_path, "again", sample)
     run(again, cloth=made["description"], photographs=photographs(sample), fit={"model": "two_lobe.v1", "path_budget": 1000, "max_iterations": 1, **OUTPUT})
     alike = json.loads((again / "results" / "result.json").read_text())["geometry"]
