@@ -51,10 +51,19 @@ static json_t *error_json(const struct error *error)
     return json_pack("{s:s, s:s, s:s}", "code", status_name(error->code), "field", error->field, "text", error->text);
 }
 
-/* Between the speeds and the first stage the stages are still being planned, and a part of the plan is no forecast. */
+static bool any_stage_planned(const struct job_clock *c)
+{
+    for (size_t i = 0; i < c->n_stage; i++)
+        if (c->stage[i].planned) return true;
+    return false;
+}
+
+/* While the job is read no stage is planned yet, and between the speeds and the first stage they are being planned: no
+ * plan and a part of one are no forecast. */
 static struct job_clock_look look_at(struct worker_status *st)
 {
-    if (st->clock.stage[st->clock.i_stage].began) return job_clock_look(&st->clock, clock_monotonic_s());
+    if (st->clock.stage[st->clock.i_stage].began && any_stage_planned(&st->clock))
+        return job_clock_look(&st->clock, clock_monotonic_s());
     return (struct job_clock_look){.eta_s = NAN, .eta_low_s = NAN, .eta_high_s = NAN, .fraction = st->clock.shown};
 }
 

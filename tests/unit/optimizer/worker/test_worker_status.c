@@ -96,19 +96,23 @@ static void test_texts_that_are_no_utf8(void **state)
     json_decref(json);
 }
 
-/* While stages are planned one by one, what is planned of them is not stated as the remaining time. */
+/* While the job is read, before anything is planned, and while stages are planned one by one, nothing is stated as the
+ * remaining time. */
 static void test_a_part_of_the_plan_is_no_forecast(void **state)
 {
+    enum { READING, PLANNING, BEGUN, N_CASE };
     static const struct speed_book none = {.n = 0};
-    for (int begun = 0; begun < 2; begun++) {
+    for (int at = READING; at < N_CASE; at++) {
         struct desk d = {0};
         start(&d, state);
         worker_status_stage(d.status, "volume", "Reading the job", 0, 8);
-        worker_status_speeds(d.status, &none);
-        worker_status_plan_own(d.status, 0, "volume", 1000.0);
-        if (begun) worker_status_stage(d.status, "volume", "Reading the scan", 0, 8);
+        if (at >= PLANNING) {
+            worker_status_speeds(d.status, &none);
+            worker_status_plan_own(d.status, 0, "volume", 1000.0);
+        }
+        if (at == BEGUN) worker_status_stage(d.status, "volume", "Reading the scan", 0, 8);
         json_t *json = finish_as(&d, "running", NULL), *eta = json_object_get(json, "eta_s");
-        if (begun)
+        if (at == BEGUN)
             assert_true(json_number_value(eta) > 900.0);
         else
             assert_true(json_is_null(eta) && json_number_value(json_object_get(json, "fraction")) == 0.0);
