@@ -65,7 +65,7 @@ static struct estimate run(const struct scene *s, const struct configuration *c)
     struct estimate e;
     struct error err = {0};
     struct appearance model;
-    const size_t n_path = 65536;
+    const size_t n_path = 32768;
     struct estimate_request q = {.input = trace_input_surface(s, scattering_find("two_lobe.v1"), param, &model),
                                  .configuration = c,
                                  .n_configuration = 1,
@@ -76,8 +76,8 @@ static struct estimate run(const struct scene *s, const struct configuration *c)
 }
 
 /* Radiances are means over places of an endless cloth. The quarter of the cloth that the tile holds differs from
- * the whole by some per cent in single directions, so those are compared with each other loosely, and their mean
- * closely. */
+ * the whole by some per cent in single directions, so those are compared with each other loosely (10 %), and their mean
+ * closely: with a standard error of 0.3 % of each cloth an error of 2.2 % is beyond what noise and 1 % explain. */
 static void tiles_keep_the_mean(void **state)
 {
     (void)state;

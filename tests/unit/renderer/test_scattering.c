@@ -173,13 +173,14 @@ static double difference_step(const struct scattering_model *m, const struct par
 static void check_scores(const struct scattering_model *m, const double *param, struct rng *r)
 {
     enum { N_DIRECTION = 12 };
-    float wi[N_DIRECTION][3], wo[N_DIRECTION][3], score[N_DIRECTION][3 * SCATTERING_MAX_PARAM], rgb[3][N_DIRECTION][3];
+    float wi[N_DIRECTION][3], wo[N_DIRECTION][3], score[N_DIRECTION][3 * SCATTERING_MAX_PARAM], rgb[3][N_DIRECTION][3],
+        unmoved[N_DIRECTION][3];
     struct scattering_state *s = prepare(m, param);
     for (int i = 0; i < N_DIRECTION; i++) {
         float u[3] = {rng_float(r), rng_float(r), rng_float(r)};
         random_direction(r, wo[i]);
         m->sample(s, wo[i], NULL, u, wi[i]);
-        m->eval(s, wi[i], wo[i], rgb[0][i], score[i]);
+        m->eval(s, wi[i], wo[i], unmoved[i], score[i]);
     }
     m->release(s);
     for (size_t p = 0; p < m->n_param; p++) {
@@ -194,8 +195,11 @@ static void check_scores(const struct scattering_model *m, const double *param, 
             for (int j = 0; j < 3; j++) at[j] += coordinate_shift * h;
             memcpy(weight, one_sided[coordinate_shift > 0 ? 0 : 1], sizeof weight);
         }
+        const int here = 1 - (int)coordinate_shift; /* of the three points, where the parameter is not moved */
+        memcpy(rgb[here], unmoved, sizeof unmoved);
         for (int j = 0; j < 3; j++) {
             double moved[SCATTERING_MAX_PARAM];
+            if (j == here) continue;
             memcpy(moved, param, m->n_param * sizeof *param);
             moved[p] = at[j];
             s = prepare(m, moved);
