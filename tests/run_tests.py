@@ -3,7 +3,7 @@
 C tests are cmocka programs build/tests/{unit,physics}/test_*, Python tests are pytest folders. A program that crashes,
 hangs or writes no results counts as one failed test. Each check of the sources (tests/checks.mk) counts as one test.
 Each line says how long a test took and how many seconds of a core that were. Tests of the API and the browser wait for
-daemons most of the time, so two of them run beside one that computes. --quick runs the checks, the unit tests and the
+daemons most of the time, so three of them run beside one that computes. --quick runs the checks, the unit tests and the
 quick API tests, two of each side by side. --programs leaves out the checks of the sources, which neither sanitizers nor
 coverage change.
 """
@@ -184,7 +184,7 @@ def main():
         computing = [lambda name=name: run_check(name) for name in checks()]
         computing += [lambda name=name: (run_c if name in of_c else run_python)(folder, name) for name in longest_first(of_c + real)]
         waiting = [lambda name=name: run_python(folder, name) for name in longest_first(of_python)]
-        lanes = [computing, computing, waiting, waiting] if arguments.quick else [computing, waiting, waiting]
+        lanes = [computing, computing, waiting, waiting] if arguments.quick else [computing, waiting, waiting, waiting]
         with concurrent.futures.ThreadPoolExecutor(max_workers=len(lanes)) as pool:
             for done in [pool.submit(run_lane, own, waiting if own is computing else computing) for own in lanes]:
                 done.result()

@@ -284,11 +284,11 @@ def test_pictures_grow_on_the_page(real, browser, tmp_path):
     (tmp_path / "job.json").write_text(json.dumps({
         "sample": "on surfaces", "fibers": {"file": "cloth.hair"},
         "pictures": [{"on": "cylinder", "radius_mm": 1, **view, "px": 32, "samples": 16, "method": "fast", "reference": True, "filter": True},
-                     {"on": "flat", **view, "px": 32, "samples": 2048}],
+                     {"on": "flat", **view, "px": 32, "samples": 1024}],
         "fit": {"fixed": {"C_R": [0.1] * 3, "C_TT": [0.6, 0.4, 0.3], "beta_R": 6, "beta_TT": 12, "gamma_TT": 30}, "model": "two_lobe.v1"}}))
     job = selvedge.Client(url).submit(str(tmp_path / "job.json"))
     browser.get(f"{url}/#{job.id}")
-    wait_for(browser, "document.querySelector('#surfaces .tag') && / of 2048 samples/.test(document.querySelector('#surfaces').textContent)", 60)
+    wait_for(browser, "document.querySelector('#surfaces .tag') && / of 1024 samples/.test(document.querySelector('#surfaces').textContent)", 60)
     keep(browser, "pictures-growing")
     job.wait()
     wait_for(browser, "document.querySelectorAll('#surfaces figure').length === 2 && !document.querySelector('#surfaces .tag')", 60)

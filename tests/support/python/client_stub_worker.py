@@ -2,7 +2,7 @@
 """A stub of selvedge-worker for tests of clients. It reports all stages and writes invented curves and results,
 but computes nothing.
 
-The sample's name selects its behaviour: "slow ..." takes seconds for each stage, "failing ..." fails in the first
+The sample's name selects its behaviour: "slow ..." takes 40 s for the fit, "failing ..." fails in the first
 stage with a field, "twin ..." has tables of a twin among its results, files of "faulty ..." have two faults, anything else succeeds within a second or two."""
 import json
 import math
@@ -53,7 +53,7 @@ def log(text):
 def series(step):
     objective = 0.02 + 2 * math.exp(-step)
     text = json.dumps({"step": step, "phase": "gauss_newton", "wall_s": 0.1 * step, "n_path": 1000, "n_path_total": 1000 * (step + 1),
-                       "objective": objective, "objective_se": 0.02 * objective, "parameter": [0.1] * 3 + [0.85 - 0.02 * step] * 3 + [5, 20, 18],
+                       "objective": objective, "objective_se": 0.02 * objective, "parameter": [0.1] * 3 + [max(0.2, 0.85 - 0.02 * step)] * 3 + [5, 20, 18],
                        "parameter_se": [0.01] * 6 + [0.5, 1, 1], "rel_rms": math.sqrt(objective / 3), "rendered": [], "note": ""})
     with open(path("series.rec"), "a", encoding="utf-8") as f:
         f.write(f"{zlib.crc32(text.encode()):08x} {text}\n")
@@ -82,15 +82,17 @@ def main():
     if sample.startswith("failing"):
         status(state="failed", error={"code": "format", "field": "volume.files", "text": "cannot read volume 'scan.tif': page 2 is 8-bit, page 1 is 16-bit"})
         return 1
-    pause = 0.5 if sample.startswith("slow") else 0.01
+    # The fit must last so long that a client that polls once a second sees it.
+    n_step, pause_s = (80, 0.5) if sample.startswith("slow") else (10, 0.15)
     for i, stage in enumerate(STAGES):
         log(f"stage {stage}")
-        for k in range(10):
+        n = n_step if stage == "fit" else 10
+        for k in range(n):
             objective = series(k) if stage == "fit" else None
-            status(stage=stage, i_stage=i, stage_fraction=k / 10, fraction=(10 * i + k) / 80, eta_s=(80 - 10 * i - k) * pause, objective=objective,
-                   objective_se=None if objective is None else 0.02 * objective, step=None if objective is None else k)
-            # The fit must last so long that a client that polls once a second sees it.
-            time.sleep(15 * pause if stage == "fit" and pause < 0.1 else pause)
+            fraction = (i + k / n) / len(STAGES)
+            status(stage=stage, i_stage=i, stage_fraction=k / n, fraction=fraction, eta_s=n_step * pause_s * (1 - fraction),
+                   objective=objective, objective_se=None if objective is None else 0.02 * objective, step=None if objective is None else k)
+            time.sleep(pause_s if stage == "fit" else 0.01)
     results()
     if sample.startswith("twin"):
         synthetic_twin.write(path("results"), sample)
