@@ -17,7 +17,7 @@ def folder(tmp_path):
 
 
 def ended(folder, name, state="succeeded"):
-    return wait_until(lambda: (lambda o: o if o.get("state") == state else None)(outcome(folder, name)), 30, f"{name} {state}")
+    return wait_until(lambda: (lambda o: o if o.get("state") == state else None)(outcome(folder, name)), 90, f"{name} {state}")
 
 
 def jobs(daemon):
