@@ -21,7 +21,7 @@ enum { STRIP_LOBE_N = 512 }; /* intervals of the table of c, equidistant in A / 
 
 struct strip_lobe {
     double band;                   /* s */
-    double integral[STRIP_LOBE_N]; /* c / (A / (1 + A)); the last node but one is A = 511 */
+    double integral[STRIP_LOBE_N]; /* c (1 + A) / A; node i is A = i / (N - i) */
 };
 
 /* h, and y h' when wanted. */
