@@ -54,6 +54,11 @@
 #define OPTION_MEASUREMENT_FILE "measurement_file"
 #define OPTION_MEASURED_ROWS "measured_rows"
 #define OPTION_PROFILE_FILE "profile_file"
+#define OPTION_BOWL_PHOTOGRAPH "bowl_photograph"
+#define OPTION_BOWL_MARKS "bowl_marks"
+#define OPTION_BOWL_MARK "bowl_mark"
+#define OPTION_BOWL_FOCAL "bowl_focal"
+#define OPTION_BOWL_MASK "bowl_mask"
 #define OPTION_PHOTOGRAPHS "photographs"
 #define OPTION_PHOTOGRAPH_FILE "photograph_file"
 /* the fit */

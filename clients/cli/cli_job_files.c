@@ -47,6 +47,7 @@ static const struct named_file named[] = {
     {{"environment", NULL}, "file", "environment", "environment.file"},
     {{"measurements", NULL}, "file", "measurements", "measurements.file"},
     {{"profile", NULL}, "file", "profile", "profile.file"},
+    {{"profile", "bowl"}, "mask", "photograph", "profile.bowl.mask"},
     {{"rig", NULL}, "file", "rig", "rig.file"},
     {{"camera", NULL}, "noise_file", "camera_noise", "camera.noise_file"},
     {{"color", "chart"}, "file", "chart", "color.chart.file"},
@@ -77,6 +78,10 @@ static status add_list(const json_t *names, const char *folder, const char *role
         const json_t *name = json_is_object(item) ? json_object_get(item, "file") : item;
         snprintf(path, sizeof path, "%s[%zu]%s", field, i, json_is_object(item) ? ".file" : "");
         status s = add(list, folder, name, role, path, err);
+        if (s != STATUS_OK) return s;
+        const json_t *background = json_object_get(item, "background"); /* of photographs of a bowl */
+        snprintf(path, sizeof path, "%s[%zu].background", field, i);
+        if (background != NULL) s = add(list, folder, background, role, path, err);
         if (s != STATUS_OK) return s;
         json_array_foreach(json_object_get(item, "more_exposures"), j, more)
         {
@@ -115,6 +120,9 @@ status cli_job_files_list(const json_t *document, const char *folder, struct cli
         s = add_list(json_object_get(camera, "dark_frames"), folder, "dark_frame", "camera.dark_frames", list, err);
     if (s == STATUS_OK)
         s = add_list(json_object_get(document, "photographs"), folder, "photograph", "photographs", list, err);
+    const json_t *bowl = json_object_get(json_object_get(document, "profile"), "bowl");
+    if (s == STATUS_OK)
+        s = add_list(json_object_get(bowl, "photographs"), folder, "photograph", "profile.bowl.photographs", list, err);
     if (s == STATUS_OK) s = add_meshes(json_object_get(document, "pictures"), folder, list, err);
     if (s != STATUS_OK) cli_job_files_release(list);
     return s;

@@ -25,6 +25,11 @@ function filesOf(doc) {
   add(doc.color?.chart?.file, "chart");
   add(doc.color?.white?.file, "white_reference");
   for (const p of doc.photographs ?? []) for (const q of [p, ...(p?.more_exposures ?? [])]) add(q?.file, "photograph");
+  add(doc.profile?.bowl?.mask, "photograph");
+  for (const p of doc.profile?.bowl?.photographs ?? []) {
+    for (const q of [p, ...(p?.more_exposures ?? [])]) add(q?.file, "photograph");
+    add(p?.background, "photograph");
+  }
   for (const p of doc.pictures ?? []) add(p?.mesh_file, "mesh");
   return list;
 }

@@ -1,13 +1,16 @@
-/* The commands of the program selvedge-camera, which `selvedge photo` and `selvedge calibrate-camera` run. A command
+/* The commands of the program selvedge-camera, which `selvedge photo`, `selvedge bowl` and
+ * `selvedge calibrate-camera` run. A command
  * writes to stdout and stderr and returns the exit code: 0 done, 1 failed, 2 wrong arguments. */
 #ifndef SELVEDGE_OPTIMIZER_CAMERA_COMMANDS_H
 #define SELVEDGE_OPTIMIZER_CAMERA_COMMANDS_H
 
 #include "base/status.h"
+#include "optimizer/job/job_document.h"
 #include "renderer/image/image.h"
 
 int camera_command_photo(int argc, char **argv);
 int camera_command_calibrate(int argc, char **argv);
+int camera_command_bowl(int argc, char **argv);
 
 /* An option of a command: --name followed by words up to the next option. */
 struct camera_option {
@@ -23,6 +26,10 @@ status camera_options_parse(int argc, char **argv, struct camera_option *option,
 status camera_option_number(const struct camera_option *o, double *out, struct error *err);
 /* undeclared, linear or srgb. */
 status camera_option_transfer(const struct camera_option *o, unsigned *transfer, struct error *err);
+
+/* Reads a job document and the name of its folder, in which its files are. */
+status camera_read_document(const char *path, char *folder, size_t n_folder, struct job_document **doc,
+                            struct error *err);
 
 /* Draws the outline of the crop (all 0: the whole picture) into the picture, and writes it as PNG whose white is the
  * 99th percentile of the values. STATUS_IO as image_write_png. */

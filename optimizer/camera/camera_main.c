@@ -12,6 +12,8 @@ static const char usage[] =
     "  selvedge photo FILE... [options]                  what becomes of a photograph, step by step\n"
     "  selvedge calibrate-camera --dark FILE... --flat FILE... --out RECORD.json [options]\n"
     "                                                    the record of a camera's noise\n"
+    "  selvedge bowl JOB.json --out PROFILE.csv [--picture PICTURE.png]\n"
+    "                                                    the profile of a fiber from photographs of a bowl\n"
     "\n"
     "options of photo:\n"
     "  --crop-px X0 Y0 X1 Y1    the part that is used (default: all)\n"
@@ -27,13 +29,18 @@ static const char usage[] =
     "  --flat FILE...           at least 2 frames of an evenly lit white surface, out of focus, not saturated\n"
     "  --transfer linear        for integer TIFF or PNG\n"
     "  --exposure-s S           of frames that do not state it\n"
+    "options of bowl:\n"
+    "  --picture PICTURE.png    the first photograph with lines of theta_o (blue) and azimuth (orange) every 15 "
+    "degrees,\n"
+    "                           and in red what does not count\n"
     "\n"
     "Exit codes: 0 done, 1 failed, 2 wrong arguments.\n";
 
 static const struct {
     const char *name;
     int (*run)(int argc, char **argv);
-} command[] = {{"photo", camera_command_photo}, {"calibrate-camera", camera_command_calibrate}};
+} command[] = {
+    {"photo", camera_command_photo}, {"calibrate-camera", camera_command_calibrate}, {"bowl", camera_command_bowl}};
 
 int main(int argc, char **argv)
 {

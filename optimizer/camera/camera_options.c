@@ -1,8 +1,9 @@
 #include "optimizer/camera/camera_commands.h"
 
-#include "optimizer/job/job_document.h"
+#include "base/files/durable.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -58,4 +59,18 @@ status camera_option_transfer(const struct camera_option *o, unsigned *transfer,
     else
         return error_set(err, STATUS_INVALID, "'--%s %s': allowed are linear, srgb", o->name, o->word[0]);
     return STATUS_OK;
+}
+
+status camera_read_document(const char *path, char *folder, size_t n_folder, struct job_document **doc,
+                            struct error *err)
+{
+    char *text = NULL;
+    size_t n = 0;
+    const char *name = path_file_name(path);
+    snprintf(folder, n_folder, "%.*s", (int)(name - path), path);
+    if (folder[0] == '\0') snprintf(folder, n_folder, ".");
+    status s = file_read_all(path, JOB_MAX_DOCUMENT_BYTES, &text, &n, err);
+    if (s == STATUS_OK) s = job_document_parse(text, n, doc, err);
+    free(text);
+    return s;
 }

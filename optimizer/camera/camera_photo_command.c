@@ -108,20 +108,6 @@ static int preview_files(const struct camera_option *o, const struct job_photogr
     return exit_code;
 }
 
-static status read_document(const char *path, char *folder, size_t n_folder, struct job_document **doc,
-                            struct error *err)
-{
-    char *text = NULL;
-    size_t n = 0;
-    const char *name = path_file_name(path);
-    snprintf(folder, n_folder, "%.*s", (int)(name - path), path);
-    if (folder[0] == '\0') snprintf(folder, n_folder, ".");
-    status s = file_read_all(path, JOB_MAX_DOCUMENT_BYTES, &text, &n, err);
-    if (s == STATUS_OK) s = job_document_parse(text, n, doc, err);
-    free(text);
-    return s;
-}
-
 static void print_color(const struct photograph_process *k)
 {
     if (!k->has_color) return;
@@ -212,7 +198,7 @@ static int preview_job(const char *path, const char *json_path, const char *pict
     json_t *rows = json_array();
     bool whole = true;
     photograph_process_init(&process);
-    status s = read_document(path, folder, sizeof folder, &doc, &err);
+    status s = camera_read_document(path, folder, sizeof folder, &doc, &err);
     if (s == STATUS_OK) s = photograph_process_load(&process, doc, folder, &err);
     if (s == STATUS_OK) print_color(&process);
     if (s == STATUS_OK && pictures != NULL) s = begin_pictures(&process, pictures, &err);

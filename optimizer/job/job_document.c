@@ -35,6 +35,9 @@ void job_document_free(struct job_document *doc)
     free(doc->cloth);
     for (size_t i = 0; i < doc->n_photograph; i++) free(doc->photograph[i].exposure);
     free(doc->photograph);
+    for (size_t i = 0; i < doc->bowl.n_photograph; i++) free(doc->bowl.photograph[i].picture.exposure);
+    free(doc->bowl.photograph);
+    free(doc->bowl.mark);
     free(doc->measured_row);
     free(doc->dark_frame);
     free(doc->candidate);

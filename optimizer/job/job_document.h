@@ -27,6 +27,8 @@ enum {
     JOB_MAX_SURFACE_PICTURE = 32,
     JOB_MAX_MEASURED_ROW = 455, /* as many means over rotations as a table may have */
     JOB_MAX_TEXTURE_CELLS = 32, /* blocks along the edge of a crop; the renderer has the same limit */
+    JOB_MAX_BOWL_MARK = 100,
+    JOB_MAX_BOWL_PHOTOGRAPH = 64,
     JOB_MAX_MODEL = 8
 };
 
@@ -65,6 +67,29 @@ struct job_photograph {
     double exposure_s, iso, aperture, black_level; /* NaN: as the file states */
     size_t n_exposure;                             /* besides the first one, which is `file` */
     struct job_exposure *exposure;
+};
+
+/* A place on the bowl of a single fiber, and where the photographs show it. */
+struct job_bowl_mark {
+    double at_mm[3], px[2];
+};
+
+struct job_bowl_photograph {
+    struct job_photograph picture;       /* members that belong to a view of the cloth are unused */
+    char background[JOB_MAX_NAME_BYTES]; /* "": none */
+    double theta_i_deg, phi_i_deg;
+};
+
+/* A bowl into which a single fiber scatters (option_rows_profile.c). */
+struct job_bowl {
+    bool given, is_rgb;
+    double radius_mm, height_mm, reflectance[3], fiber_mm[3]; /* height NaN: not given; see job_check_bowl */
+    double focal_px, center_px[2];                            /* NaN: not given */
+    double rim_deg, fiber_mask_mm, cell_deg;
+    char mask[JOB_MAX_NAME_BYTES]; /* "": none */
+    size_t n_mark, n_photograph;
+    struct job_bowl_mark *mark;
+    struct job_bowl_photograph *photograph;
 };
 
 /* A configuration of which a photograph might be taken. */
@@ -180,6 +205,7 @@ struct job_document {
     char measurement_file[JOB_MAX_NAME_BYTES]; /* "" when photographs are given */
     char profile_file[JOB_MAX_NAME_BYTES];     /* of a single fiber; "" for a job with a cloth */
     double profile_theta_i_deg, profile_scale; /* NaN: a column of the profile; fitted */
+    struct job_bowl bowl;                      /* in place of profile_file */
     size_t n_measured_row;                     /* 0: the default ones; of files of measured BRDFs */
     struct job_measured_row *measured_row;
     enum job_symmetry measurement_symmetry;
@@ -226,6 +252,8 @@ bool job_document_has_rows(const struct job_document *doc);
 bool job_document_geometry_only(const struct job_document *doc);
 /* Whether the job fits models to the profile of a single fiber; it then has no cloth. */
 bool job_document_of_profile(const struct job_document *doc);
+/* The file that messages name the profile by: its table, or the first photograph of the bowl. */
+const char *job_document_profile_name(const struct job_document *doc);
 bool job_document_pictures_only(const struct job_document *doc);
 
 /* Puts the section "cloth" before the field that a check or the builder of a described cloth named, in the error's text

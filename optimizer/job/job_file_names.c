@@ -29,6 +29,21 @@ status job_check_file_name(const char *path, const char *name, struct error *err
         path, name, JOB_MAX_NAME_BYTES - 1);
 }
 
+/* Several photographs of a bowl may name one background. */
+static void visit_bowl(const struct job_bowl *bowl, void (*visit)(void *context, const char *name, const char *role),
+                       void *context)
+{
+    if (bowl->mask[0] != '\0') visit(context, bowl->mask, "photograph");
+    for (size_t i = 0; i < bowl->n_photograph; i++) {
+        const struct job_bowl_photograph *p = &bowl->photograph[i];
+        bool again = p->background[0] == '\0';
+        for (size_t j = 0; j < i; j++) again = again || strcmp(bowl->photograph[j].background, p->background) == 0;
+        visit(context, p->picture.file, "photograph");
+        for (size_t j = 0; j < p->picture.n_exposure; j++) visit(context, p->picture.exposure[j].file, "photograph");
+        if (!again) visit(context, p->background, "photograph");
+    }
+}
+
 void job_document_visit_files(const struct job_document *doc,
                               void (*visit)(void *context, const char *name, const char *role), void *context)
 {
@@ -38,6 +53,7 @@ void job_document_visit_files(const struct job_document *doc,
     if (doc->environment_file[0] != '\0') visit(context, doc->environment_file, "environment");
     if (doc->measurement_file[0] != '\0') visit(context, doc->measurement_file, "measurements");
     if (doc->profile_file[0] != '\0') visit(context, doc->profile_file, "profile");
+    visit_bowl(&doc->bowl, visit, context);
     if (doc->rig_file[0] != '\0') visit(context, doc->rig_file, "rig");
     if (doc->noise_file[0] != '\0') visit(context, doc->noise_file, "camera_noise");
     for (size_t i = 0; i < doc->n_dark_frame; i++) visit(context, doc->dark_frame[i], "dark_frame");
@@ -50,6 +66,18 @@ void job_document_visit_files(const struct job_document *doc,
     }
     for (size_t i = 0; i < doc->n_surface_picture; i++)
         if (doc->surface_picture[i].mesh_file[0] != '\0') visit(context, doc->surface_picture[i].mesh_file, "mesh");
+}
+
+static void bowl_file_key(const struct job_bowl *bowl, const char *name, char *key, size_t n_key)
+{
+    for (size_t i = 0; i < bowl->n_photograph; i++) {
+        const struct job_bowl_photograph *p = &bowl->photograph[i];
+        if (strcmp(p->picture.file, name) == 0) snprintf(key, n_key, "profile.bowl.photographs[%zu].file", i);
+        if (strcmp(p->background, name) == 0) snprintf(key, n_key, "profile.bowl.photographs[%zu].background", i);
+        for (size_t j = 0; j < p->picture.n_exposure; j++)
+            if (strcmp(p->picture.exposure[j].file, name) == 0)
+                snprintf(key, n_key, "profile.bowl.photographs[%zu].more_exposures[%zu].file", i, j);
+    }
 }
 
 static void listed_file_key(const struct job_document *doc, const char *name, char *key, size_t n_key)
@@ -73,17 +101,14 @@ void job_document_file_key(const struct job_document *doc, const char *name, cha
 {
     const struct {
         const char *file, *key;
-    } single[] = {{doc->fiber_file, "fibers.file"},
-                  {doc->measurement_file, "measurements.file"},
-                  {doc->cloth_texture, "cloth.texture"},
-                  {doc->environment_file, "environment.file"},
-                  {doc->rig_file, "rig.file"},
-                  {doc->profile_file, "profile.file"},
-                  {doc->noise_file, "camera.noise_file"},
-                  {doc->chart.file, "color.chart.file"},
-                  {doc->white.file, "color.white.file"}};
+    } single[] = {{doc->fiber_file, "fibers.file"},      {doc->measurement_file, "measurements.file"},
+                  {doc->cloth_texture, "cloth.texture"}, {doc->environment_file, "environment.file"},
+                  {doc->rig_file, "rig.file"},           {doc->profile_file, "profile.file"},
+                  {doc->bowl.mask, "profile.bowl.mask"}, {doc->noise_file, "camera.noise_file"},
+                  {doc->chart.file, "color.chart.file"}, {doc->white.file, "color.white.file"}};
     snprintf(key, n_key, "%s", "");
     for (size_t i = 0; i < sizeof single / sizeof single[0]; i++)
         if (strcmp(single[i].file, name) == 0) snprintf(key, n_key, "%s", single[i].key);
     listed_file_key(doc, name, key, n_key);
+    bowl_file_key(&doc->bowl, name, key, n_key);
 }

@@ -22,6 +22,7 @@
 #include "optimizer/fit/objective/noisy_minimum.h"
 #include "optimizer/fit/photographs/camera/photograph_develop.h"
 #include "optimizer/fit/photographs/observation.h"
+#include "optimizer/fit/profile/bowl/bowl_profile.h"
 #include "optimizer/fit/profile/profile_fit.h"
 #include "optimizer/fit/verdict/verdict.h"
 #include "optimizer/job/job_document.h"
@@ -160,6 +161,7 @@ struct pipeline_context {
     struct expected_rows expected;
     struct observation_set contrast; /* of all observations, in their order; empty when not asked for */
     struct fiber_profile profile;    /* empty for a job with a cloth */
+    struct bowl_record bowl;         /* of a profile from photographs of a bowl */
     size_t n_model;
     struct pipeline_model *model; /* in the order of the document */
     struct pipeline_numbers number;

@@ -238,7 +238,13 @@ static status read_profile(struct pipeline_context *c, struct error *err)
     char folder[WORKER_PATH_BYTES];
     worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, folder);
     status s = claim_inputs(c, err);
-    return s == STATUS_OK ? fiber_profile_load(&c->profile, c->doc, folder, err) : s;
+    if (s != STATUS_OK || !c->doc->bowl.given)
+        return s == STATUS_OK ? fiber_profile_load(&c->profile, c->doc, folder, err) : s;
+    s = bowl_profile_load(&c->profile, c->doc, folder, &c->bowl, err);
+    if (s == STATUS_OK)
+        log_info(c->log, "%zu photographs of a bowl give %zu cells; the marks are off by %.2g pixels", c->bowl.n_shot,
+                 c->profile.n, c->bowl.camera.rms_px);
+    return s;
 }
 
 static status read_rows(struct pipeline_context *c, struct error *err)

@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics docs-ground docs-seam bench-browser bench-pictures bench-weave bench-weave-rendered
+.PHONY: bench bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-pictures bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -147,6 +147,12 @@ docs-ground: | deps-test ## make docs/images/ground-shadow.png anew: cloths over
 docs-seam: | deps-test ## draw docs/images/seam.png anew: the seam of a scanned twill as traced and joined (a minute; kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/pictures/seam_pictures.py --build $(BUILD) --out docs/images/seam.png
+
+docs-bowl: | deps-test ## make docs/images/fiber-bowl.png anew: a bowl below a fiber by rays, and the angles that are found in it (some seconds)
+	@$(MAKE) --no-print-directory -j$$(nproc) all $(BUILD)/tests/bench/models/bench_bowl >&2
+	@mkdir -p $(BUILD)/docs-bowl
+	@$(BUILD)/tests/bench/models/bench_bowl $(BUILD)/docs-bowl
+	@$(BUILD)/bin/selvedge bowl $(BUILD)/docs-bowl/job.json --out $(BUILD)/docs-bowl/hair.csv --picture docs/images/fiber-bowl.png
 
 bench-weave: | deps-test ## share of drawn weaves whose yarns and draft are found (3 minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_weave >&2

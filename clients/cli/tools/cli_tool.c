@@ -11,6 +11,7 @@ static const struct {
     const char *word, *program, *option;
 } command[] = {{"photo", "selvedge-camera", NULL},
                {"calibrate-camera", "selvedge-camera", NULL},
+               {"bowl", "selvedge-camera", NULL},
                {"doctor", "selvedged", "--doctor"}};
 enum { N_COMMAND = sizeof command / sizeof *command, MOST_ARGUMENTS = 60 };
 
@@ -28,7 +29,8 @@ const char *cli_tool_help(void)
 {
     return "  doctor [JOB]       examine this machine and the service's data, or a job (needs no daemon)\n"
            "  photo FILE...      show what becomes of a photograph (needs no daemon)\n"
-           "  calibrate-camera   make the record of a camera's noise from dark and flat frames (needs no daemon)\n";
+           "  calibrate-camera   make the record of a camera's noise from dark and flat frames (needs no daemon)\n"
+           "  bowl JOB.json      make the profile of a fiber from photographs of a bowl (needs no daemon)\n";
 }
 
 static bool names_a_service(char *const *argv)

@@ -24,6 +24,11 @@ def files_of(document: Document) -> list[tuple[str, str]]:
     names += [(color[key]["file"], role) for key, role in (("chart", "chart"), ("white", "white_reference")) if key in color]
     for p in document.get("photographs", []):
         names += [(q["file"], "photograph") for q in (p, *p.get("more_exposures", []))]
+    bowl = document.get("profile", {}).get("bowl", {})
+    names += [(bowl["mask"], "photograph")] if "mask" in bowl else []
+    for p in bowl.get("photographs", []):
+        names += [(q["file"], "photograph") for q in (p, *p.get("more_exposures", []))]
+        names += [(p["background"], "photograph")] if "background" in p else []
     names += [(p["mesh_file"], "mesh") for p in document.get("pictures", []) if "mesh_file" in p]
     return list(dict.fromkeys(names))
 

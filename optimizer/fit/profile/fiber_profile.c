@@ -26,7 +26,8 @@ static const char *const column_name[] = {"theta_o_deg",   "phi_deg",       "the
                                           "radiance_r_se", "radiance_g_se", "radiance_b_se", NULL};
 
 enum { MAX_TABLE_BYTES = 16 << 20 };
-static const double most_theta_deg = 89.9, most_phi_deg = 360.0, most_radiance = 1e12, least_brightest = 1e-12;
+static const double most_theta_deg = 89.9, most_phi_deg = 360.0, most_radiance = 1e12, least_brightest = 1e-12,
+                    most_negative = 5.0; /* standard errors */
 
 struct reader {
     struct fiber_profile *profile;
@@ -95,8 +96,10 @@ static status read_radiance(struct reader *r, const struct number_table *t, stru
                  first_se = r->profile->n_channel == 1 ? COLUMN_GREY_SE : COLUMN_R_SE;
     status s = STATUS_OK;
     for (size_t c = 0; c < r->profile->n_channel && s == STATUS_OK; c++) {
-        s = number_table_not_negative(t, first + c, 0.0, most_radiance, &row->radiance[c], err);
-        if (s == STATUS_OK) s = number_table_not_negative(t, first_se + c, 0.0, most_radiance, &row->se[c], err);
+        s = number_table_not_negative(t, first_se + c, 0.0, most_radiance, &row->se[c], err);
+        if (s == STATUS_OK) s = number_table_number(t, first + c, 0.0, &row->radiance[c], err);
+        if (s == STATUS_OK && !(row->radiance[c] >= -most_negative * row->se[c] && row->radiance[c] <= most_radiance))
+            s = number_table_not_negative(t, first + c, 0.0, most_radiance, &row->radiance[c], err);
         if (s == STATUS_OK && r->profile->has_se && !(row->se[c] > 0.0))
             s = number_table_error(t, STATUS_INVALID, "column '%s' is 0: a standard error must be above it", t->file,
                                    t->line, column_name[first_se + c]);
@@ -168,6 +171,27 @@ status fiber_profile_load(struct fiber_profile *profile, const struct job_docume
     if (s == STATUS_OK) s = fiber_profile_parse(profile, text, n, doc->profile_file, doc->profile_theta_i_deg, err);
     free(text);
     return s;
+}
+
+void fiber_profile_print(const struct fiber_profile *profile, FILE *out)
+{
+    static const char *const channel[] = {"_r", "_g", "_b"};
+    fputs("theta_i_deg,theta_o_deg,phi_deg", out);
+    for (size_t c = 0; c < profile->n_channel; c++) {
+        const char *name = profile->n_channel == 1 ? "" : channel[c];
+        fprintf(out, profile->has_se ? ",radiance%s,radiance%s_se" : ",radiance%s", name, name);
+    }
+    fputs("\n", out);
+    for (size_t i = 0; i < profile->n; i++) {
+        const struct profile_row *row = &profile->row[i];
+        fprintf(out, "%.6g,%.6g,%.6g", angle_to_deg(row->theta_i_rad), angle_to_deg(row->theta_o_rad),
+                angle_to_deg(row->phi_rad));
+        for (size_t c = 0; c < profile->n_channel; c++) {
+            fprintf(out, ",%.7g", row->radiance[c]);
+            if (profile->has_se) fprintf(out, ",%.4g", row->se[c]);
+        }
+        fputs("\n", out);
+    }
 }
 
 void fiber_profile_release(struct fiber_profile *profile)

@@ -17,6 +17,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdio.h>
 
 enum { PROFILE_MAX_ROW = 20000 };
 
@@ -35,13 +36,15 @@ struct fiber_profile {
 /* text: the table, NUL-terminated, n_bytes without the NUL; name: what errors call it. theta_i_deg: of the whole table,
  * or NaN. Errors are those of number_table.h with the option OPTION_PROFILE_FILE: a column that is missing, or given
  * twice over (theta_i_deg in the table and in the job; radiance and radiance_r), angles out of range or in radians, a
- * negative radiance, a standard error that is not above 0, no row, or radiances that are all below 1e-12.
- * STATUS_TOO_LARGE above PROFILE_MAX_ROW rows. */
+ * radiance that is negative by more than five times its standard error, a standard error that is not above 0, no row,
+ * or radiances that are all below 1e-12. STATUS_TOO_LARGE above PROFILE_MAX_ROW rows. */
 status fiber_profile_parse(struct fiber_profile *profile, const char *text, size_t n_bytes, const char *name,
                            double theta_i_deg, struct error *err);
 /* Reads the profile that a job document names from the folder of its files. Errors also of reading the file. */
 status fiber_profile_load(struct fiber_profile *profile, const struct job_document *doc, const char *folder,
                           struct error *err);
+/* Writes the table, with the column theta_i_deg. */
+void fiber_profile_print(const struct fiber_profile *profile, FILE *out);
 void fiber_profile_release(struct fiber_profile *profile);
 
 #endif

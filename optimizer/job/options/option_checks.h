@@ -26,6 +26,10 @@ status job_check_fibers(const struct option_value *v, struct error *err);
 /* the profile of a fiber */
 /* Of a job with a profile: nothing of a cloth is given, and the models are of fibers. */
 status job_check_profile_document(const struct option_value *v, struct error *err);
+/* Exactly one of a table and a bowl. */
+status job_check_profile(const struct option_value *v, struct error *err);
+/* The shape of the bowl, the place of the fiber, the marks and the lamps. */
+status job_check_bowl(const struct option_value *v, struct error *err);
 /* the set-up and the photographs */
 status job_check_lamp(const struct option_value *v, struct error *err);
 status job_check_camera(const struct option_value *v, struct error *err);

@@ -8,7 +8,7 @@
 #include "optimizer/fit/photographs/observation_load.h"
 #include "optimizer/fit/photographs/photograph.h"
 #include "optimizer/fit/photographs/table/brdf_file.h"
-#include "optimizer/fit/profile/fiber_profile.h"
+#include "optimizer/fit/profile/bowl/bowl_profile.h"
 #include "optimizer/worker/check/input_check.h"
 
 #include <stdio.h>
@@ -150,13 +150,31 @@ static void judge_rows(struct input_check *c, const struct photograph_process *p
     observation_set_release(&rows);
 }
 
+struct photographs_there {
+    const struct input_check *check;
+    bool all;
+};
+
+static void look_for_photograph(void *context, const char *name, const char *role)
+{
+    struct photographs_there *there = context;
+    (void)role;
+    there->all = input_check_has(there->check, name) && there->all;
+}
+
 /* The profile of a fiber, which a job has in place of a cloth. */
 static void check_profile(struct input_check *c)
 {
     struct fiber_profile profile;
     struct error fault = {0};
-    if (!input_check_has(c, c->doc->profile_file)) return;
-    if (fiber_profile_load(&profile, c->doc, c->folder, &fault) == STATUS_OK)
+    struct photographs_there there = {c, true};
+    if (c->doc->bowl.given)
+        job_document_visit_files(c->doc, look_for_photograph, &there);
+    else
+        there.all = input_check_has(c, c->doc->profile_file);
+    if (!there.all) return;
+    if ((c->doc->bowl.given ? bowl_profile_load(&profile, c->doc, c->folder, NULL, &fault)
+                            : fiber_profile_load(&profile, c->doc, c->folder, &fault)) == STATUS_OK)
         fiber_profile_release(&profile);
     else
         input_check_fault(c, &fault);

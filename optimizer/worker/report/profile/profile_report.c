@@ -48,18 +48,39 @@ static json_t *table_json(const struct pipeline_context *c)
             range[k][1] = fmax(range[k][1], angle_to_deg(angle[k]));
         }
     }
-    return json_pack("{s:s, s:o, s:o, s:b, s:o, s:o, s:o}", "file", c->doc->profile_file, "n_row", json_count(p->n),
-                     "n_channel", json_count(p->n_channel), "has_errors", (int)p->has_se, "theta_i_deg",
-                     json_number_list(range[0], 2, 1.0), "theta_o_deg", json_number_list(range[1], 2, 1.0), "phi_deg",
-                     json_number_list(range[2], 2, 1.0));
+    return json_pack("{s:s, s:o, s:o, s:b, s:o, s:o, s:o}", "file", job_document_profile_name(c->doc), "n_row",
+                     json_count(p->n), "n_channel", json_count(p->n_channel), "has_errors", (int)p->has_se,
+                     "theta_i_deg", json_number_list(range[0], 2, 1.0), "theta_o_deg",
+                     json_number_list(range[1], 2, 1.0), "phi_deg", json_number_list(range[2], 2, 1.0));
+}
+
+/* How the photographs of a bowl became the table; NULL without them. */
+static json_t *bowl_json(const struct pipeline_context *c)
+{
+    const struct job_bowl *b = &c->doc->bowl;
+    const struct bowl_record *r = &c->bowl;
+    json_t *shots = json_array();
+    for (size_t i = 0; i < r->n_shot; i++) {
+        const struct bowl_shot *s = &r->shot[i];
+        json_array_append_new(shots, json_pack("{s:s, s:o, s:o, s:o, s:o, s:o}", "file", b->photograph[i].picture.file,
+                                               "n_pixel", json_count(s->n_pixel), "n_saturated",
+                                               json_count(s->n_saturated), "n_cell", json_count(s->n_cell),
+                                               "background_share", json_number(s->background / s->mean),
+                                               "reflected_share", json_number(s->reflected / s->mean)));
+    }
+    return json_pack("{s:o, s:o, s:o, s:o}", "camera_mm", json_number_list(r->camera.position_mm, 3, 1.0), "focal_px",
+                     json_number(r->camera.focal_px), "marks_rms_px", json_number(r->camera.rms_px), "photographs",
+                     shots);
 }
 
 static json_t *profile_json(const struct pipeline_context *c)
 {
     json_t *models = json_array();
     for (size_t i = 0; i < c->n_model; i++) json_array_append_new(models, model_json(c, i));
-    return json_pack("{s:o, s:s, s:s, s:o}", "table", table_json(c), "chosen_by", "bic", "csv", "profile.csv", "models",
-                     models);
+    json_t *json = json_pack("{s:o, s:s, s:s, s:o}", "table", table_json(c), "chosen_by", "bic", "csv", "profile.csv",
+                             "models", models);
+    if (c->doc->bowl.given) json_object_set_new(json, "bowl", bowl_json(c));
+    return json;
 }
 
 status profile_json_write(struct pipeline_context *c, struct error *err)

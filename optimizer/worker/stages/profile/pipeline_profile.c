@@ -55,7 +55,7 @@ status stage_profile_fit(struct pipeline_context *c, struct error *err)
                                                 .max_iteration = c->doc->max_iteration,
                                                 .pool = c->pool,
                                                 .progress = &progress};
-        s = profile_fit_run(&problem, c->doc->profile_file, &m->profile, err);
+        s = profile_fit_run(&problem, job_document_profile_name(c->doc), &m->profile, err);
         if (s != STATUS_OK) return s;
         take_fit(m);
         warn(c, m);
