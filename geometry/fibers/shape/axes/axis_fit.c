@@ -115,29 +115,73 @@ static void add_lumen(struct fit_work *w, uint32_t segment, const struct lumen_p
     r->cross[4] += (double)q->radius_shared;
 }
 
-/* Adds the bricks of a batch in order, so that sums do not depend on the number of threads. */
-static void add_batch(const struct axis_batch *job, struct fit_work *w)
+/* The sums of a batch, added in PARTS parts of whole lines. */
+enum { PARTS = 16 };
+struct batch_sums {
+    const struct axis_batch *job;
+    struct fit_work *work;
+};
+
+/* First segment of part i, which begins a line. */
+static uint32_t part_begin(const struct segment_bricks *bricks, size_t i)
 {
-    const struct segment_bricks *bricks = job->model.bricks;
-    for (size_t b = 0; b < job->n_brick; b++) {
-        const struct axis_brick_sum *sum = &job->sum[b];
-        const size_t *first = &bricks->first[job->first_brick + b];
-        for (size_t e = 0; e < 2 * (first[1] - first[0]); e++) {
-            const struct axis_pull *q = &sum->pull[e];
-            struct radius_sum *r = &w->radius[bricks->segment[q->segment].line];
-            axis_pull_add(&w->total[w->first_vertex_of[q->segment] + e % 2], q);
-            r->normal += (double)q->radius_normal;
-            r->gradient += (double)q->radius_gradient;
-            for (int a = 0; a < 4; a++) r->cross[a] += (double)q->radius_cross[a];
-        }
-        for (size_t e = 0; sum->section != NULL && e < first[1] - first[0]; e++)
-            add_section(&w->section[w->first_vertex_of[sum->pull[2 * e].segment]], &sum->section[e]);
-        for (size_t e = 0; sum->lumen != NULL && e < first[1] - first[0]; e++) {
-            const uint32_t segment = sum->pull[2 * e].segment;
-            add_lumen(w, segment, &sum->lumen[e], &w->radius[bricks->segment[segment].line]);
-        }
-        add_shared(&w->shared, &sum->shared);
+    size_t s = bricks->n_segment * i / PARTS;
+    while (s > 0 && s < bricks->n_segment && bricks->segment[s].line == bricks->segment[s - 1].line) s++;
+    return (uint32_t)s;
+}
+
+/* Place of the first of n rising segments of a brick's list that is not before one. */
+static size_t first_from(const uint32_t *index, size_t n, uint32_t segment)
+{
+    size_t low = 0, high = n;
+    while (low < high) {
+        const size_t middle = (low + high) / 2;
+        if (index[middle] < segment)
+            low = middle + 1;
+        else
+            high = middle;
     }
+    return low;
+}
+
+/* Adds a segment of a brick, number e of its list. */
+static void add_segment(struct fit_work *w, const struct axis_brick_sum *sum, size_t e, uint32_t line)
+{
+    struct radius_sum *r = &w->radius[line];
+    const uint32_t segment = sum->pull[2 * e].segment, vertex = w->first_vertex_of[segment];
+    for (uint32_t end = 0; end < 2; end++) {
+        const struct axis_pull *q = &sum->pull[2 * e + end];
+        axis_pull_add(&w->total[vertex + end], q);
+        r->normal += (double)q->radius_normal;
+        r->gradient += (double)q->radius_gradient;
+        for (int a = 0; a < 4; a++) r->cross[a] += (double)q->radius_cross[a];
+    }
+    if (sum->section != NULL) add_section(&w->section[vertex], &sum->section[e]);
+    if (sum->lumen != NULL) add_lumen(w, segment, &sum->lumen[e], r);
+}
+
+static void add_part(void *context, size_t i_part, size_t i_thread)
+{
+    (void)i_thread;
+    const struct batch_sums *sums = context;
+    const struct axis_batch *job = sums->job;
+    const struct segment_bricks *bricks = job->model.bricks;
+    const uint32_t begin = part_begin(bricks, i_part), end = part_begin(bricks, i_part + 1);
+    for (size_t b = 0; b < job->n_brick; b++) {
+        const size_t *first = &bricks->first[job->first_brick + b];
+        const uint32_t *index = bricks->index + first[0];
+        const size_t n = first[1] - first[0];
+        for (size_t e = first_from(index, n, begin); e < n && index[e] < end; e++)
+            add_segment(sums->work, &job->sum[b], e, bricks->segment[index[e]].line);
+    }
+}
+
+/* Adds the bricks of a batch, for each line in order, so that sums do not depend on the number of threads. */
+static void add_batch(const struct axis_batch *job, struct fit_work *w, struct thread_pool *pool)
+{
+    struct batch_sums sums = {job, w};
+    thread_pool_run(pool, PARTS, add_part, &sums, NULL);
+    for (size_t b = 0; b < job->n_brick; b++) add_shared(&w->shared, &job->sum[b].shared);
 }
 
 /* Damps the steps more where the last one was too long, and less where it was not. */
@@ -168,7 +212,7 @@ static status make_step(struct axis_batch *job, struct polyline_set *lines, stru
     status s = STATUS_OK;
     w->hold = variance / (FLATNESS_SD * FLATNESS_SD);
     if (w->section != NULL)
-        s = fiber_sections_solve(lines, w->section, SECTION_DIAMETERS * diameter, w->hold, profile->section, err);
+        s = fiber_sections_solve(lines, w->section, SECTION_DIAMETERS * diameter, w->hold, profile->section, pool, err);
     return s == STATUS_OK ? axis_solve_lines(lines, w->total, stiffness, pool, err) : s;
 }
 
@@ -208,7 +252,7 @@ static status fit_batch(struct axis_batch *job, struct fit_work *w, struct threa
     else if (s == STATUS_OK && failed)
         s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
     else if (s == STATUS_OK)
-        add_batch(job, w);
+        add_batch(job, w, pool);
     axis_batch_end(job);
     return s;
 }

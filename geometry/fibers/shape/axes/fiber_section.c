@@ -2,6 +2,7 @@
 #include "base/small_matrix.h"
 
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -193,22 +194,41 @@ bool fiber_section_variance(const struct section_pull *pull, size_t n, double st
     return true;
 }
 
-status fiber_sections_solve(const struct polyline_set *lines, const struct section_pull *pull, double length,
-                            double hold, struct fiber_section *section, struct error *err)
+struct section_job {
+    const struct polyline_set *lines;
+    const struct section_pull *pull;
+    struct fiber_section *section;
+    double stiffness, hold;
+    atomic_bool failed; /* memory was out */
+};
+
+static void solve_line(void *context, size_t l, size_t i_thread)
 {
-    const double stiffness = fiber_sections_stiffness(pull, lines->n_vertex, length);
-    size_t longest = 0;
-    for (size_t l = 0; l < lines->n_line; l++)
-        if (polyline_length(lines, l) > longest) longest = polyline_length(lines, l);
-    double(*m)[BAND] = malloc((2 * longest + 1) * sizeof *m), *x = malloc((2 * longest + 1) * sizeof *x);
-    for (size_t l = 0; l < lines->n_line && m != NULL && x != NULL; l++) {
-        size_t n = polyline_length(lines, l), first = lines->first[l];
-        fill_matrix(pull + first, n, stiffness, hold, m);
-        fill_line(pull + first, section + first, n, stiffness, hold, x);
-        if (small_solve_banded(m[0], 2 * n, BAND, x)) step_line(x, n, section + first);
+    (void)i_thread;
+    struct section_job *job = context;
+    const size_t n = polyline_length(job->lines, l), first = job->lines->first[l];
+    double(*m)[BAND] = malloc((2 * n + 1) * sizeof *m), *x = malloc((2 * n + 1) * sizeof *x);
+    if (m != NULL && x != NULL) {
+        fill_matrix(job->pull + first, n, job->stiffness, job->hold, m);
+        fill_line(job->pull + first, job->section + first, n, job->stiffness, job->hold, x);
+        if (small_solve_banded(m[0], 2 * n, BAND, x)) step_line(x, n, job->section + first);
+    } else {
+        job->failed = true;
     }
-    bool failed = m == NULL || x == NULL;
     free(m);
     free(x);
-    return failed ? error_set(err, STATUS_NO_MEMORY, "cannot fit the sections of fibers: out of memory") : STATUS_OK;
+}
+
+status fiber_sections_solve(const struct polyline_set *lines, const struct section_pull *pull, double length,
+                            double hold, struct fiber_section *section, struct thread_pool *pool, struct error *err)
+{
+    struct section_job job = {.lines = lines,
+                              .pull = pull,
+                              .section = section,
+                              .stiffness = fiber_sections_stiffness(pull, lines->n_vertex, length),
+                              .hold = hold};
+    status s = thread_pool_run(pool, lines->n_line, solve_line, &job, NULL);
+    if (s == STATUS_OK && job.failed)
+        s = error_set(err, STATUS_NO_MEMORY, "cannot fit the sections of fibers: out of memory");
+    return s;
 }

@@ -55,7 +55,7 @@ struct section_pull {
 /* Steps the sections to the minimum of their data terms, a penalty on their second differences along the line, which
  * smooths them over `length` vertices, and one on their size of weight `hold`. Bounded. STATUS_NO_MEMORY. */
 status fiber_sections_solve(const struct polyline_set *lines, const struct section_pull *pull, double length,
-                            double hold, struct fiber_section *section, struct error *err);
+                            double hold, struct fiber_section *section, struct thread_pool *pool, struct error *err);
 
 /* Elements of the banded matrix for each component of a section. */
 enum { SECTION_BAND = 5 };
