@@ -55,7 +55,7 @@ status job_check_profile(const struct option_value *v, struct error *err)
     const struct job_document *doc = v->doc;
     const bool file = doc->profile_file[0] != '\0';
     if (file == doc->bowl.given)
-        return error_set_field(err, STATUS_INVALID, "profile",
+        return error_set_field(err, STATUS_INVALID, file ? "profile" : "profile.file",
                                file ? "'profile.file' and 'profile.bowl' are both given: one of them counts"
                                     : "'profile' needs 'file', a table, or 'bowl', photographs");
     if (doc->bowl.given && !isnan(doc->profile_theta_i_deg))
