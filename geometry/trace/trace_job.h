@@ -27,6 +27,7 @@ struct trace_job {
     struct progress inner;
     struct progress_part part;   /* progress that inner reports to */
     double diameter;             /* voxels */
+    bool flat;                   /* the first fit of whole lines has found flat fibers (flat_fit.h) */
     double independent;          /* of the voxels of v (axis_profile.h) */
     struct axis_profile profile; /* of the lines so far */
     double shared_radius_se;     /* voxels, with lumens that were measured: of all radii together (shape_measure.h) */

@@ -22,6 +22,9 @@ static const float PAD = 0.3f; /* voxels added to subtracted radii, so that no r
  * that are alike are all found at first, and only rims of them are left (spread up to 0.04, material up to 0.05). Radii
  * that spread by more than those of yarns do (0.1 to 0.25) are those of lines that the scan does not resolve. */
 static const double LEAST_SPREAD = 0.1, MOST_SPREAD = 0.3, LEAST_LEFT = 0.03;
+/* Fibers so thin that voxels are interpolated are missed where they touch, also where they are alike; lines on missed
+ * neighbours then spread their radii by 0.09 to 0.15. */
+static const double LEAST_SPREAD_THIN = 0.05;
 static const double LEAST_DIAMETERS = 1.5; /* length of the lines that are added */
 
 /* A piece of a fiber around a vertex, one voxel to either side of it. section: NULL for a ball. */
@@ -161,7 +164,7 @@ status trace_leftover(struct trace_job *job, struct polyline_set *lines, struct 
     double share = 0.0;
     const double spread = job->report->radius_spread;
     status s = STATUS_OK;
-    const bool look = spread >= LEAST_SPREAD && spread <= MOST_SPREAD;
+    const bool look = spread >= (job->independent < 1.0 ? LEAST_SPREAD_THIN : LEAST_SPREAD) && spread <= MOST_SPREAD;
     if (look) s = subtract_lines(job, lines, &left, &share, err);
     forget_sections(lines);
     if (!look) return STATUS_OK;

@@ -3,6 +3,10 @@
 
 #include "geometry/fibers/shape/axes/lumen/hollow_fit.h"
 
+/* Error of the model of a hollow fiber, as a density: images of lumens are right to 0.006 to 0.012 (geometry/NOTES.md,
+ * "Lumens of single fibers"). */
+static const double MODEL_ERROR = 0.01;
+
 status trace_lumens(struct trace_job *job, struct polyline_set *lines, struct error *err)
 {
     struct volume scan;
@@ -10,6 +14,7 @@ status trace_lumens(struct trace_job *job, struct polyline_set *lines, struct er
     struct axis_profile profile = trace_start_profile(job);
     if (job->v->filled.n == 0 || lines->shape == NULL || job->report->trace_edge_voxel < 1.0) return STATUS_OK;
     profile.measured_curvature = true;
+    profile.model_error = MODEL_ERROR;
     profile.clamp_sd = job->report->noise.mapped_sd;
     status s = volume_copy_unfilled(job->v, &scan, err);
     if (s != STATUS_OK) return s;

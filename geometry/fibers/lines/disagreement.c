@@ -7,7 +7,7 @@
 #include <stdlib.h>
 
 enum { REACH = 4, LINES = 32 };    /* LINES: lines in a task */
-static const float OVERLAP = 0.9f; /* share of the sum of the radii */
+static const double OVERLAP = 0.9; /* share of the sum of the radii where the option has none */
 
 /* Squared sine of the angle at vertex i; negative if the voxel is empty. */
 static float sine2(const struct polyline_set *p, size_t line, size_t i, const struct direction_volume *d)
@@ -35,16 +35,21 @@ struct disagreement {
     const struct direction_volume *d;
     struct vertex_grid grid;
     float limit, most; /* squared sine; largest radius */
+    float overlap;     /* of the option */
     float *value;      /* squared sine of every vertex; negative where it is not known */
     bool *wrong;       /* of every vertex within reach of an end of its line */
     size_t reach;      /* vertices from the ends */
 };
 
 static status disagreement_init(struct disagreement *w, const struct polyline_set *lines,
-                                const struct direction_volume *d, double max_angle_rad, size_t reach, struct error *err)
+                                const struct direction_volume *d, const struct disagreement_option *o, size_t reach,
+                                struct error *err)
 {
-    *w = (struct disagreement){
-        .lines = lines, .d = d, .limit = (float)(sin(max_angle_rad) * sin(max_angle_rad)), .reach = reach};
+    *w = (struct disagreement){.lines = lines,
+                               .d = d,
+                               .limit = (float)(sin(o->max_angle_rad) * sin(o->max_angle_rad)),
+                               .overlap = (float)(o->overlap > 0.0 ? o->overlap : OVERLAP),
+                               .reach = reach};
     w->value = malloc((lines->n_vertex + 1) * sizeof *w->value);
     w->wrong = malloc((lines->n_vertex + 1) * sizeof *w->wrong);
     if (w->value == NULL || w->wrong == NULL)
@@ -72,7 +77,7 @@ static bool is_wrong(const struct disagreement *w, size_t line, size_t i)
             weight += 1.0f;
         }
     return weight > 0.0f && sum > w->limit * weight &&
-           polyline_is_overlapped(w->lines, &w->grid, line, w->lines->first[line] + i, OVERLAP, w->most);
+           polyline_is_overlapped(w->lines, &w->grid, line, w->lines->first[line] + i, w->overlap, w->most);
 }
 
 static void check_lines(void *context, size_t i_task, size_t i_thread)
@@ -99,7 +104,7 @@ status polylines_cut_disagreeing(const struct polyline_set *lines, const struct 
                                  struct error *err)
 {
     struct disagreement w;
-    status s = disagreement_init(&w, lines, d, o->max_angle_rad, SIZE_MAX, err);
+    status s = disagreement_init(&w, lines, d, o, SIZE_MAX, err);
     *n_cut = 0;
     if (s == STATUS_OK) s = check_all(&w, o->pool);
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
@@ -120,7 +125,7 @@ status polylines_trim_disagreeing(const struct polyline_set *lines, const struct
                                   const struct disagreement_option *o, struct polyline_set *result, struct error *err)
 {
     struct disagreement w;
-    status s = disagreement_init(&w, lines, d, o->max_angle_rad, o->reach, err);
+    status s = disagreement_init(&w, lines, d, o, o->reach, err);
     if (s == STATUS_OK) s = check_all(&w, o->pool);
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
         size_t n = polyline_length(lines, l), begin = lines->first[l], from = 0, to = n;

@@ -13,10 +13,11 @@ struct disagreement_option {
     size_t reach; /* vertices from the ends of a line that are trimmed */
     size_t min_vertex;
     struct thread_pool *pool;
+    double overlap; /* share of the sum of the radii within which another line passes; 0: 0.9 */
 };
 
 /* Removes the vertices where the angle between line and direction volume, averaged over nine vertices (mean squared
- * sine), exceeds max_angle_rad, and that another line passes within 0.9 of the sum of the radii. (The direction volume
+ * sine), exceeds max_angle_rad, and that another line passes within `overlap`. (The direction volume
  * alone is not sure enough: where fibers are crowded or thin its own errors reach max_angle_rad.) The remaining pieces
  * of at least min_vertex vertices go to result (initialised, empty). *n_cut: number of vertices removed.
  * STATUS_NO_MEMORY. */

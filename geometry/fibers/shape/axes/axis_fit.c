@@ -26,12 +26,18 @@ static void add_shared(struct shared_sum *to, const struct shared_sum *from)
     }
 }
 
-/* States the errors of the axes that the step has made (axis_fit.h). */
-static void state_error(double information, double variance, double stiffness, struct axis_profile *p)
+/* States the errors of the axes that the step has made (axis_fit.h), as means over n vertices. */
+static void state_error(double information, double variance, const double *stiffness, size_t n, struct axis_profile *p)
 {
-    double length = pow(stiffness / information, 0.25);
-    p->position_se = sqrt(variance / (2.0 * M_SQRT2 * information * length));
-    p->direction_se_rad = p->position_se / length;
+    double position = 0.0, direction = 0.0; /* over the part that is the same everywhere */
+    for (size_t i = 0; i < n; i++) {
+        const double inverse_length = sqrt(sqrt(information / stiffness[i]));
+        position += inverse_length;
+        direction += inverse_length * inverse_length * inverse_length;
+    }
+    const double square = variance / (2.0 * M_SQRT2 * information * fmax((double)n, 1.0));
+    p->position_se = sqrt(square * position);
+    p->direction_se_rad = sqrt(square * direction);
 }
 
 /* What a fit keeps from round to round. */
@@ -39,6 +45,7 @@ struct fit_work {
     uint32_t *first_vertex_of;     /* per segment */
     struct axis_pull *total;       /* per vertex */
     float *reach;                  /* per segment */
+    double *stiffness;             /* per vertex */
     struct section_view *view;     /* per segment; NULL for discs, as the next */
     struct section_pull *section;  /* per vertex */
     struct lumen_view *lumen_view; /* per segment; NULL for solid fibers, as the next two */
@@ -56,6 +63,7 @@ static void release_work(struct fit_work *w)
     free(w->first_vertex_of);
     free(w->total);
     free(w->reach);
+    free(w->stiffness);
     free(w->view);
     free(w->section);
     free(w->lumen_view);
@@ -71,9 +79,11 @@ static bool init_work(struct fit_work *w, const struct polyline_set *lines, bool
     *w = (struct fit_work){.first_vertex_of = malloc((lines->n_vertex + 1) * sizeof *w->first_vertex_of),
                            .total = malloc((lines->n_vertex + 1) * sizeof *w->total),
                            .reach = malloc((lines->n_vertex + 1) * sizeof *w->reach),
+                           .stiffness = malloc((lines->n_vertex + 1) * sizeof *w->stiffness),
                            .radius = malloc((lines->n_line + 1) * sizeof *w->radius),
                            .length = malloc((lines->n_line + 1) * sizeof *w->length)};
-    if (w->first_vertex_of == NULL || w->total == NULL || w->reach == NULL || w->radius == NULL || w->length == NULL)
+    if (w->first_vertex_of == NULL || w->total == NULL || w->reach == NULL || w->stiffness == NULL ||
+        w->radius == NULL || w->length == NULL)
         return false;
     if (with_sections) {
         w->view = malloc((lines->n_vertex + 1) * sizeof *w->view);
@@ -206,14 +216,18 @@ static status make_step(struct axis_batch *job, struct polyline_set *lines, stru
     if (profile->lumen != NULL) damp(w, profile);
     axis_profile_step(profile, &shared, w->radius, w->length, lines->n_line, diameter, lines->radius);
     polyline_shapes_follow(lines, false);
-    double sd = profile->measured_curvature ? axis_curvature_sd(lines, diameter) : AXIS_CURVATURE_MOST / diameter;
-    double variance = shared.weight > 0.0 ? shared.square / shared.weight : 1.0, stiffness = variance / (sd * sd);
-    state_error(axis_information(w->total, lines->n_vertex), variance, stiffness, profile);
+    const double variance = shared.weight > 0.0 ? shared.square / shared.weight : 1.0,
+                 sd = AXIS_CURVATURE_MOST / diameter;
+    if (profile->measured_curvature)
+        axis_local_stiffness(lines, diameter, variance, w->stiffness);
+    else
+        for (size_t i = 0; i < lines->n_vertex; i++) w->stiffness[i] = variance / (sd * sd);
+    state_error(axis_information(w->total, lines->n_vertex), variance, w->stiffness, lines->n_vertex, profile);
     status s = STATUS_OK;
     w->hold = variance / (FLATNESS_SD * FLATNESS_SD);
     if (w->section != NULL)
         s = fiber_sections_solve(lines, w->section, SECTION_DIAMETERS * diameter, w->hold, profile->section, pool, err);
-    return s == STATUS_OK ? axis_solve_lines(lines, w->total, stiffness, pool, err) : s;
+    return s == STATUS_OK ? axis_solve_lines(lines, w->total, w->stiffness, pool, err) : s;
 }
 
 static void view_lumens(const struct polyline_set *lines, const struct axis_profile *p,
@@ -334,6 +348,7 @@ status polylines_fit(struct polyline_set *lines, const struct volume *v, double 
                                   .slope = fmax(0.2, work.shared.slope / work.shared.weight)};
         shared_variances(&work.shared, profile->lumen != NULL ? AXIS_N_SHARED : AXIS_N_SHARED - 1, &sums.shared_radius,
                          &sums.shared_area);
+        sums.model_square = profile->model_error * profile->model_error * work.shared.weight;
         fiber_sections_turn(lines, profile->section);
         s = fiber_shapes_measure(lines, &sums, profile->measure, err);
     }

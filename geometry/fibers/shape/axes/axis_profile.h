@@ -17,8 +17,9 @@ struct axis_profile {
     bool measured_curvature;
     struct fiber_section *section; /* of each vertex of the lines, refined too; NULL: discs */
     float *lumen; /* with sections: area of the lumen of each line over that of its outline, refined too; NULL: solid */
-    double damping;  /* of the steps of shared numbers and lumens; 0 for solid fibers */
-    double clamp_sd; /* with lumens: noise of the voxels before they were clamped to [0, 1]; 0: they were not */
+    double damping;     /* of the steps of shared numbers and lumens; 0 for solid fibers */
+    double clamp_sd;    /* with lumens: noise of the voxels before they were clamped to [0, 1]; 0: they were not */
+    double model_error; /* with lumens: that of the fitted densities beside noise, for the stated errors; 0: none */
     struct shape_measure *measure; /* with sections: the last round leaves them with their errors in lines->shape */
     double independent; /* share of the voxels that have values of their own; below 1 where they are interpolated */
     /* Written by the fit: mean radius (voxels, by length), standard deviation of the fibers' radii without the part of

@@ -8,6 +8,10 @@
 /* Lower bound of the measured standard deviation of a fiber's curvature, per diameter. */
 static const double CURVATURE_LEAST = 0.05;
 
+/* Length to either side over which the curvature at a vertex is measured, and the length of line as which that of all
+ * lines counts beside it. */
+static const double WINDOW_DIAMETERS = 2.0, PRIOR_DIAMETERS = 2.0;
+
 enum { BAND = 7 }; /* the diagonal and six below it: second differences of three coordinates */
 
 void axis_pull_add(struct axis_pull *to, const struct axis_pull *from)
@@ -29,7 +33,8 @@ double axis_information(const struct axis_pull *total, size_t n_vertex)
 struct solve_job {
     struct polyline_set *lines;
     const struct axis_pull *pull;
-    double stiffness, hold;
+    const double *stiffness; /* of the second difference at each vertex */
+    double hold;
     bool *failed; /* one per line */
 };
 
@@ -40,6 +45,7 @@ static void solve_line(void *context, size_t l, size_t i_thread)
     size_t n = polyline_length(job->lines, l);
     float(*p)[3] = job->lines->vertex + job->lines->first[l];
     const struct axis_pull *q = job->pull + job->lines->first[l];
+    const double *stiffness = job->stiffness + job->lines->first[l];
     static const double second[3] = {1.0, -2.0, 1.0};
     double(*m)[BAND] = calloc(3 * n, sizeof *m), *x = calloc(3 * n, sizeof *x);
     if (m == NULL || x == NULL) {
@@ -56,9 +62,9 @@ static void solve_line(void *context, size_t l, size_t i_thread)
         for (size_t a = 0; a < 3; a++) {
             double bend = (double)p[i][a] - 2.0 * (double)p[i + 1][a] + (double)p[i + 2][a];
             for (size_t r = 0; r < 3; r++) {
-                x[3 * (i + r) + a] -= job->stiffness * second[r] * bend;
+                x[3 * (i + r) + a] -= stiffness[i + 1] * second[r] * bend;
                 for (size_t c = 0; c <= r; c++)
-                    m[3 * (i + r) + a][3 * (r - c)] += job->stiffness * second[r] * second[c];
+                    m[3 * (i + r) + a][3 * (r - c)] += stiffness[i + 1] * second[r] * second[c];
             }
         }
     if (!small_solve_banded(m[0], 3 * n, BAND, x)) goto out; /* the line stays as it is */
@@ -71,7 +77,7 @@ out:
     free(x);
 }
 
-status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull, double stiffness,
+status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull, const double *stiffness,
                         struct thread_pool *pool, struct error *err)
 {
     struct solve_job job = {.lines = lines, .pull = pull, .failed = calloc(lines->n_line + 1, sizeof(bool))};
@@ -90,17 +96,47 @@ status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull
     return s;
 }
 
+/* Vertices to either side between which the chords of a bend lie. */
+static size_t bend_span(double diameter) { return diameter > 4.0 ? (size_t)(0.5 * diameter) : 2; }
+
+/* Square of the bend at vertex i of the lines: the second difference over 2 h vertices. */
+static double bend_square(const struct polyline_set *lines, size_t i, size_t h)
+{
+    double square = 0.0;
+    for (int a = 0; a < 3; a++) {
+        const double bend =
+            (double)lines->vertex[i - h][a] - 2.0 * (double)lines->vertex[i][a] + (double)lines->vertex[i + h][a];
+        square += bend * bend;
+    }
+    return square;
+}
+
 double axis_curvature_sd(const struct polyline_set *lines, double diameter)
 {
-    size_t h = diameter > 4.0 ? (size_t)(0.5 * diameter) : 2;
+    const size_t h = bend_span(diameter);
     double square = 0.0, n = 0.0;
     for (size_t l = 0; l < lines->n_line; l++)
         for (size_t i = lines->first[l] + h; i + h < lines->first[l + 1]; i++, n += 2.0)
-            for (int a = 0; a < 3; a++) {
-                double bend = (double)lines->vertex[i - h][a] - 2.0 * (double)lines->vertex[i][a] +
-                              (double)lines->vertex[i + h][a];
-                square += bend * bend;
-            }
+            square += bend_square(lines, i, h);
     double sd = n > 0.0 ? sqrt(square / n) / (double)(h * h) : INFINITY;
     return fmin(fmax(sd, CURVATURE_LEAST / diameter), AXIS_CURVATURE_MOST / diameter);
+}
+
+void axis_local_stiffness(const struct polyline_set *lines, double diameter, double variance, double *stiffness)
+{
+    const size_t h = bend_span(diameter), reach = (size_t)(WINDOW_DIAMETERS * diameter + 0.5);
+    const double sd = axis_curvature_sd(lines, diameter), least = CURVATURE_LEAST / diameter,
+                 most = AXIS_CURVATURE_MOST / diameter, prior = PRIOR_DIAMETERS * diameter,
+                 scale = 2.0 * (double)(h * h * h * h);
+    for (size_t l = 0; l < lines->n_line; l++) {
+        /* bends are known from h vertices after the first to h before the last */
+        const size_t end = lines->first[l + 1] > h ? lines->first[l + 1] - h : 0;
+        double square = 0.0;
+        for (size_t i = lines->first[l], from = i + h, to = from; i < lines->first[l + 1]; i++) {
+            for (; to < end && to <= i + reach; to++) square += bend_square(lines, to, h);
+            for (; from < to && from + reach < i; from++) square -= bend_square(lines, from, h);
+            const double n = (double)(to - from), local = (fmax(square, 0.0) / scale + prior * sd * sd) / (n + prior);
+            stiffness[i] = variance / fmin(fmax(local, least * least), most * most);
+        }
+    }
 }

@@ -228,11 +228,16 @@ static bool measure_radius(struct line_work *w, const struct shape_sums *sums, d
     return varies;
 }
 
-/* Writes the width of a lumen whose area has the variance `variance`, where the scan tells it. */
-static void set_lumen(double area, double variance, struct fiber_shape *shape)
+/* Error of the width of a lumen whose area has the variance `variance`. */
+static double width_se(double width, double variance) { return sqrt(width * width + sqrt(variance)) - width; }
+
+/* Writes the width of a lumen, where the scan tells it. variance: of its area, by noise; model: by errors of the
+ * model. */
+static void set_lumen(double area, double variance, double model, struct fiber_shape *shape)
 {
-    const double width = sqrt(fmin(fmax(0.0, area), AREA_MOST)), se = sqrt(width * width + sqrt(variance)) - width;
-    const bool told = se <= ANY_LUMEN_SE;
+    const double width = sqrt(fmin(fmax(0.0, area), AREA_MOST)),
+                 se = fmin(ANY_LUMEN_SE, width_se(width, variance + model));
+    const bool told = width_se(width, variance) <= ANY_LUMEN_SE;
     shape->lumen = told ? (float)width : 0.0f;
     shape->lumen_se = told ? (float)se : 0.0f;
 }
@@ -244,13 +249,13 @@ static bool measure_lumen(struct line_work *w, const struct shape_sums *sums, do
     const double information = centre_gradient(w);
     const bool varies = course_varies(w, noise, LEAST_AREA_VARIATION, sums->diameter) &&
                         find_course(w, RADIUS_LENGTH * sums->diameter, AREA_CHANGE_MOST);
-    const double shared = noise * sums->shared_area / sums->slope;
+    const double shared = noise * sums->shared_area / sums->slope, model = sums->model_square * sums->shared_area;
     for (size_t i = 0; i < w->n; i++)
         set_lumen(varies ? area + w->x[i] : area,
                   shared + (varies              ? SMOOTH * noise * w->m[BAND * i]
                             : information > 0.0 ? noise / information
                                                 : INFINITY),
-                  &shape[i]);
+                  model, &shape[i]);
     return varies;
 }
 
@@ -351,7 +356,7 @@ status fiber_shapes_measure(struct polyline_set *lines, const struct shape_sums 
     }
     *measure = (struct shape_measure){
         .radius_noise = noise_of(&all[0]), .section_noise = noise_of(&all[1]), .lumen_noise = noise_of(&all[2])};
-    measure->shared_radius_se = sqrt(measure->radius_noise * sums->shared_radius / sums->slope);
+    measure->shared_radius_se = sqrt((measure->radius_noise / sums->slope + sums->model_square) * sums->shared_radius);
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
         struct scatter own[3] = {{0}};
         start_line(&w, lines, l, sums);

@@ -22,7 +22,12 @@
  * sqrt(a) for an area a with the error e. Where that exceeds the standard deviation of widths that may be anything
  * from 0 to 0.8, the scan tells nothing, and width and error are 0. The variance has a part that all fibers share:
  * density and blur of the walls are not known beforehand, and walls that are thinner than the blur look like less
- * dense ones. */
+ * dense ones.
+ *
+ * Errors of the model do not fall with the number of voxels, as noise does. With residuals e of weights w, and shared
+ * variances C for a noise of 1, they shift a shared number by at most sqrt(C sum w e^2) (Cauchy and Schwarz). That is
+ * added to the errors of the radii of all fibers and of the lumens, up to the standard deviation of any width. It is
+ * small where lumens differ, which fixes the density of the walls, and dominates where they are alike. */
 #ifndef SELVEDGE_GEOMETRY_SHAPE_MEASURE_H
 #define SELVEDGE_GEOMETRY_SHAPE_MEASURE_H
 
@@ -39,6 +44,7 @@ struct shape_sums {
     const struct lumen_pull *lumen;       /* of each vertex: of the segment after it; NULL: solid fibers */
     const float *area;                    /* of the lumen of each line, as fitted */
     double shared_area, shared_radius;    /* variances of a change of all areas, or of all radii, for a noise of 1 */
+    double model_square; /* largest variance of a shared number by errors of the model, over the same; 0: none */
     double diameter, section_length, section_hold;
     double slope; /* of weighted residuals by residuals, over the mean weight: the share of N in the true curvature */
 };

@@ -307,9 +307,51 @@ static void test_widest_lumens(void **state)
     volume_release(&v);
 }
 
+/* Lumen, with its stated error in the middle of a line, of a fiber in a scan with hardly any noise. */
+static void measure_quiet_lumen(const struct test_fiber *f, double model_error, double *error, double *stated,
+                                double *radius_se)
+{
+    struct volume v;
+    struct polyline_set lines;
+    struct shape_measure m;
+    struct axis_profile profile = start_profile;
+    profile.model_error = model_error;
+    make_scan(f, 0.01, false, 1, &v, &lines);
+    assert_int_equal(polyline_shapes_init(&lines, NULL), STATUS_OK);
+    const struct hollow_fit fit = {&v, 7.0, NULL, NULL};
+    assert_int_equal(polylines_fit_hollow(&lines, &fit, &profile, &m, NULL), STATUS_OK);
+    const size_t i = lines.n_vertex / 2;
+    *error = (double)lines.shape[i].lumen - f->lumen;
+    *stated = (double)lines.shape[i].lumen_se;
+    *radius_se = m.shared_radius_se;
+    polyline_set_release(&lines);
+    volume_release(&v);
+}
+
+/* Without noise, what shifts a lumen is that the scan is not drawn as the model has it. The stated error covers that once
+ * it is told how large the errors of the model are. It still tells something: it stays below the standard deviation of a
+ * width that may be any. */
+static void test_model_error(void **state)
+{
+    (void)state;
+    static const double lumen[] = {0.3, 0.4, 0.5};
+    for (size_t i = 0; i < sizeof lumen / sizeof *lumen; i++) {
+        const struct test_fiber f = {1.0, 0.0, 3.5, 0.0, lumen[i], 0.0, 0.7, 0.02};
+        double error, noise_only, stated, radius_noise, radius;
+        measure_quiet_lumen(&f, 0.0, &error, &noise_only, &radius_noise);
+        measure_quiet_lumen(&f, 0.01, &error, &stated, &radius);
+        print_message("lumen %.1f: error %.4f, stated %.4f by noise and %.4f with errors of the model; radius %.4f, "
+                      "%.4f voxels\n",
+                      lumen[i], error, noise_only, stated, radius_noise, radius);
+        assert_true(fabs(error) < stated);
+        assert_true(stated > noise_only && radius > radius_noise && stated < 0.2);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_errors_are_those_found), cmocka_unit_test(test_discs),
-                                       cmocka_unit_test(test_lumens), cmocka_unit_test(test_widest_lumens)};
+                                       cmocka_unit_test(test_lumens), cmocka_unit_test(test_widest_lumens),
+                                       cmocka_unit_test(test_model_error)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
