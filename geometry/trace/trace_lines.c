@@ -152,9 +152,9 @@ status trace_lines(struct trace_job *job, struct polyline_set *lines, struct err
     return s;
 }
 
-/* Where fibers are so thin that voxels are interpolated, looks once more at what no line explains: cuts have freed fibers
- * that others had grown into, and lines on them keep the others from growing back. Not of flat fibers, whose sections are
- * not known any more. */
+/* Where fibers are so thin that voxels are interpolated, looks once more at what no line explains: cuts have freed
+ * fibers that others had grown into, and lines on them keep the others from growing back. Flat fibers are left alone,
+ * because their sections are not known any more. */
 static status look_again(struct trace_job *job, struct polyline_set *lines, struct error *err)
 {
     const size_t n_before = lines->n_line;
