@@ -329,8 +329,8 @@ static void measure_quiet_lumen(const struct test_fiber *f, double model_error, 
 }
 
 /* Without noise, what shifts a lumen is that the scan is not drawn as the model has it. The stated error covers that
- * once it is told how large the errors of the model are. It still tells something: it stays below the standard deviation
- * of a width that may be any. */
+ * once it is told how large the errors of the model are. It still tells something: it stays below the standard
+ * deviation of a width that may be any. */
 static void test_model_error(void **state)
 {
     (void)state;
