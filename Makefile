@@ -63,7 +63,7 @@ LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lseccomp -lraw_r -ljpeg -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive -lcurl $(LINK_BASE)
 
-.PHONY: all generate medulla-tables deps help check test nightly demo demo-camera night cluster-demo clean
+.PHONY: all generate medulla-tables wave-tables deps help check test nightly demo demo-camera night cluster-demo clean
 ##@ Build and run
 all: $(PROGRAMS) $(PLUGINS) ## build the programs into build/bin
 
@@ -167,6 +167,15 @@ $(BUILD)/tools/medulla-tables: $(BUILD)/obj/$(MEDULLA)/medulla_tables_main.c.o $
 	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_BASE)
 medulla-tables: $(BUILD)/tools/medulla-tables ## make the tables of the medulla of fur.v1 again (a minute on two cores)
 	@$(BUILD)/tools/medulla-tables $(MEDULLA)
+
+# tables of waves that fibers scatter, checked in as source; made again after a change of a section or of the mean over sizes
+WAVE := renderer/scattering/surface/wave
+$(BUILD)/tools/wave-tables: $(BUILD)/obj/$(WAVE)/wave_tables_main.c.o $(BUILD)/obj/$(WAVE)/wave_sections.c.o \
+		$(patsubst %,$(BUILD)/obj/%.o,$(wildcard renderer/scattering/wave/*.c)) $(L)base.a
+	@mkdir -p $(@D)
+	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_BASE)
+wave-tables: $(BUILD)/tools/wave-tables ## make the tables of wave_silk.v1 and its like again (a minute of a core)
+	@$(BUILD)/tools/wave-tables $(WAVE)
 
 include config/install.mk
 include tests/tests.mk

@@ -230,16 +230,48 @@ static double complex at(const struct wave_solver *s, size_t row, size_t i_wave)
     return CMPLX(s->solution.re[i], s->solution.im[i]);
 }
 
+/* What node i contributes to T towards d: factors of u and of v / k. */
+static void far_factors(const struct wave_solver *s, double complex d, size_t i, double complex factor[2])
+{
+    const struct node *p = &s->node[i];
+    factor[1] = 0.25 * I * s->k * s->step * p->speed * cexp(-I * s->k * dot(d, p->at));
+    factor[0] = I * dot(d, p->normal) * factor[1];
+}
+
 double complex wave_solver_amplitude(const struct wave_solver *s, size_t i_wave, double angle_rad)
 {
     const double complex d = direction(angle_rad);
     double complex sum = 0;
     for (size_t i = 0; i < s->n; i++) {
-        const struct node *p = &s->node[i];
-        sum += p->speed * (I * dot(d, p->normal) * at(s, i, i_wave) + at(s, s->n + i, i_wave)) *
-               cexp(-I * s->k * dot(d, p->at));
+        double complex factor[2];
+        far_factors(s, d, i, factor);
+        sum += factor[0] * at(s, i, i_wave) + factor[1] * at(s, s->n + i, i_wave);
     }
-    return 0.25 * I * s->k * s->step * sum;
+    return sum;
+}
+
+void wave_solver_towards(const struct wave_solver *s, double angle_rad, double complex *t)
+{
+    enum { CHUNK = 80 };
+    const double complex d = direction(angle_rad);
+    const struct complex_matrix *x = &s->solution;
+    for (size_t first = 0; first < x->n_column; first += CHUNK) {
+        const size_t n = x->n_column - first < CHUNK ? x->n_column - first : CHUNK;
+        double re[CHUNK] = {0}, im[CHUNK] = {0};
+        for (size_t i = 0; i < s->n; i++) {
+            double complex factor[2];
+            far_factors(s, d, i, factor);
+            for (int half = 0; half < 2; half++) {
+                const double f = creal(factor[half]), g = cimag(factor[half]);
+                const size_t row = ((size_t)half * s->n + i) * x->stride + first;
+                for (size_t w = 0; w < n; w++) {
+                    re[w] += f * x->re[row + w] - g * x->im[row + w];
+                    im[w] += f * x->im[row + w] + g * x->re[row + w];
+                }
+            }
+        }
+        for (size_t w = 0; w < n; w++) t[first + w] = CMPLX(re[w], im[w]);
+    }
 }
 
 void wave_solver_amplitudes(const struct wave_solver *s, size_t i_wave, double complex *t, size_t n_angle)

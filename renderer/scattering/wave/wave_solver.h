@@ -47,7 +47,8 @@ void wave_solver_free(struct wave_solver *s);
 
 /* Solves for waves that travel towards each of n angles from the x axis. STATUS_NO_MEMORY. */
 status wave_solver_solve(struct wave_solver *s, const double *angle_rad, size_t n, struct error *err);
-/* T of the wave i_wave towards n_angle equidistant angles from the x axis, the first 0. */
+/* T of all n waves towards one angle from the x axis; of one wave towards n_angle equidistant ones, the first 0. */
+void wave_solver_towards(const struct wave_solver *s, double angle_rad, double complex *t);
 void wave_solver_amplitudes(const struct wave_solver *s, size_t i_wave, double complex *t, size_t n_angle);
 double complex wave_solver_amplitude(const struct wave_solver *s, size_t i_wave, double angle_rad);
 

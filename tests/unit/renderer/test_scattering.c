@@ -284,9 +284,10 @@ static void nothing_is_nan(void **state)
 static void reciprocal_models_are(void **state)
 {
     (void)state;
-    static const char *const id[] = {"two_lobe_balanced.v1", "isotropic.v1", "kajiya_kay.v1",
-                                     "marschner.v1",         "textile.v3",   "dielectric.v1",
-                                     "elliptical.v1",        "fur.v1",       "dielectric_diffraction.v1"};
+    static const char *const id[] = {"two_lobe_balanced.v1", "isotropic.v1",     "kajiya_kay.v1",
+                                     "marschner.v1",         "textile.v3",       "dielectric.v1",
+                                     "elliptical.v1",        "fur.v1",           "dielectric_diffraction.v1",
+                                     "wave_silk.v1",         "wave_trilobal.v1", "wave_cotton.v1"};
     for (size_t k = 0; k < sizeof id / sizeof id[0]; k++) {
         const struct scattering_model *m = scattering_find(id[k]);
         struct rng r;
