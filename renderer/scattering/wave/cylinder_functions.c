@@ -1,5 +1,7 @@
 #include "renderer/scattering/wave/cylinder_functions.h"
 
+#include "renderer/scattering/wave/complex_parts.h"
+
 #include <math.h>
 
 #define EULER 0.57721566490153286061
@@ -10,7 +12,7 @@ enum { N_TERM = 34 };
 /* Products without the checks for infinities that C asks for. */
 static inline double complex times(double complex a, double complex b)
 {
-    return CMPLX(creal(a) * creal(b) - cimag(a) * cimag(b), creal(a) * cimag(b) + cimag(a) * creal(b));
+    return complex_of(creal(a) * creal(b) - cimag(a) * cimag(b), creal(a) * cimag(b) + cimag(a) * creal(b));
 }
 
 static void by_recurrence(double complex z, struct cylinder_functions *f)

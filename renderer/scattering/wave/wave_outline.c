@@ -1,5 +1,7 @@
 #include "renderer/scattering/wave/wave_outline.h"
 
+#include "renderer/scattering/wave/complex_parts.h"
+
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -35,7 +37,7 @@ void wave_outline_scale(struct wave_outline *o, double factor)
 
 double complex wave_outline_at(const struct wave_outline *o, double t, double complex *first, double complex *second)
 {
-    const double complex turn = CMPLX(cos(t), sin(t));
+    const double complex turn = complex_of(cos(t), sin(t));
     double complex z = 0, d = 0, dd = 0, wave = 1;
     for (int k = 1; k <= o->n_wave; k++) {
         wave *= turn;
@@ -68,7 +70,10 @@ double wave_outline_length(const struct wave_outline *o)
 }
 
 /* Component of z to the left of the direction. */
-static double across(double complex z, double angle_rad) { return cimag(z * CMPLX(cos(angle_rad), -sin(angle_rad))); }
+static double across(double complex z, double angle_rad)
+{
+    return cimag(z * complex_of(cos(angle_rad), -sin(angle_rad)));
+}
 
 void wave_outline_extent(const struct wave_outline *o, double angle_rad, double range[2])
 {
@@ -156,7 +161,7 @@ status wave_outline_from_points(struct wave_outline *o, const double *xy, size_t
     if (at == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot hold the outline: out of memory");
     double area = 0, length = 0;
     status st = STATUS_OK;
-    for (size_t i = 0; i < n; i++) at[i] = CMPLX(xy[2 * i], xy[2 * i + 1]);
+    for (size_t i = 0; i < n; i++) at[i] = complex_of(xy[2 * i], xy[2 * i + 1]);
     for (size_t i = 0; i < n; i++) {
         area += 0.5 * cimag(conj(at[i]) * at[(i + 1) % n]);
         length += cabs(at[(i + 1) % n] - at[i]);

@@ -1,6 +1,7 @@
 #include "renderer/scattering/wave/wave_solver.h"
 
 #include "renderer/scattering/wave/complex_lu.h"
+#include "renderer/scattering/wave/complex_parts.h"
 #include "renderer/scattering/wave/cylinder_functions.h"
 
 #include <math.h>
@@ -196,7 +197,7 @@ void wave_solver_free(struct wave_solver *s)
     free(s);
 }
 
-static double complex direction(double angle_rad) { return CMPLX(cos(angle_rad), sin(angle_rad)); }
+static double complex direction(double angle_rad) { return complex_of(cos(angle_rad), sin(angle_rad)); }
 
 status wave_solver_solve(struct wave_solver *s, const double *angle_rad, size_t n, struct error *err)
 {
@@ -227,7 +228,7 @@ status wave_solver_solve(struct wave_solver *s, const double *angle_rad, size_t 
 static double complex at(const struct wave_solver *s, size_t row, size_t i_wave)
 {
     const size_t i = row * s->solution.stride + i_wave;
-    return CMPLX(s->solution.re[i], s->solution.im[i]);
+    return complex_of(s->solution.re[i], s->solution.im[i]);
 }
 
 /* What node i contributes to T towards d: factors of u and of v / k. */
@@ -270,7 +271,7 @@ void wave_solver_towards(const struct wave_solver *s, double angle_rad, double c
                 }
             }
         }
-        for (size_t w = 0; w < n; w++) t[first + w] = CMPLX(re[w], im[w]);
+        for (size_t w = 0; w < n; w++) t[first + w] = complex_of(re[w], im[w]);
     }
 }
 
