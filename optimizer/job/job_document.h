@@ -112,7 +112,8 @@ struct job_surface_picture {
     double wrap_deg;           /* of the cylinder */
     int black_sheet;           /* 0, 1, or -1: as in the document */
     double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
-    double width_mm; /* what the picture shows */
+    double lamp_sharpness; /* of a Gaussian lamp in place of the document's; NaN: the document's */
+    double width_mm;       /* what the picture shows */
     size_t px, sample;
     enum job_picture_method method;
     bool reference;                      /* also path by path, and compared with that */

@@ -92,7 +92,7 @@ static void add_lamp(const struct dual_setting *s, const struct dual_hit *h, str
     u[0] = rng_float(rng);
     u[1] = rng_float(rng);
     if (!lamp_sample(lamp, position, u, direction, &pdf)) return;
-    const float light = lamp->radiance / pdf, rgb[3] = {light, light, light};
+    const float light = lamp_radiance(lamp, direction) / pdf, rgb[3] = {light, light, light};
     add_light(s, h, direction, rgb, rng, radiance);
 }
 

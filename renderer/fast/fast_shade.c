@@ -1,4 +1,5 @@
 #include "renderer/fast/fast_shade.h"
+#include "renderer/fast/gaussian_light.h"
 #include "renderer/fast/sphere_harmonics.h"
 #include "renderer/scene/scene_place.h"
 #include "renderer/transport/surface/fiber_frame.h"
@@ -6,6 +7,8 @@
 
 #include <stdlib.h>
 #include <string.h>
+
+enum { GAUSSIAN_DIRECTIONS = 1024 }; /* of a Gaussian lamp over a flat cloth */
 
 /* The hit of an eye's ray. */
 struct seen_hit {
@@ -68,10 +71,31 @@ static void add_lamp(const struct fast_setting *s, const struct seen_hit *h, str
     if (!lamp_sample(lamp, h->position_mm, u, direction, &pdf)) return;
     fiber_frame_to_local(&h->frame, direction, wi);
     s->path.model->eval(h->state, wi, h->wo, rgb, NULL);
-    float light = lamp->radiance * fiber_frame_cos_theta(wi) / pdf;
+    float light = lamp_radiance(lamp, direction) * fiber_frame_cos_theta(wi) / pdf;
     if (!((rgb[0] + rgb[1] + rgb[2]) * light > 0)) return;
     if (!reaches(s, h, direction)) return;
     for (int c = 0; c < 3; c++) radiance[c] += rgb[c] * light;
+}
+
+/* A Gaussian lamp in closed form; the shell of a bent cloth stands before it or not in one of its directions. */
+static void add_gaussian_lamp(const struct fast_setting *s, const struct seen_hit *h, struct rng *rng,
+                              float radiance[3])
+{
+    static const float no_shift[2] = {0, 0};
+    const struct lamp *lamp = &s->path.lights.lamp;
+    struct gaussian_fiber f = {.model = s->path.model, .state = h->state, .i_segment = h->hit.i_segment};
+    float u[2], direction[3], pdf, axis[3], rgb[3];
+    const float middle[3] = {-lamp->normal[0], -lamp->normal[1], -lamp->normal[2]};
+    u[0] = rng_float(rng);
+    u[1] = rng_float(rng);
+    if (!lamp_sample(lamp, h->position_mm, u, direction, &pdf) ||
+        scene_shell_shades(s->path.scene, &h->hit, &h->place, no_shift, direction))
+        return;
+    to_cloth(&h->place, h->hit.tangent, f.tangent);
+    to_cloth(&h->place, h->wo_scene, f.wo);
+    to_cloth(&h->place, middle, axis);
+    gaussian_light_scatter(s->option->tables, &f, axis, lamp->sharpness, rgb);
+    for (int c = 0; c < 3; c++) radiance[c] += lamp->radiance * rgb[c];
 }
 
 /* One direction of the image, and one that the fiber scatters from, combined by the power heuristic. */
@@ -101,9 +125,15 @@ static void add_environment(const struct fast_setting *s, const struct seen_hit 
 
 /* ---- light that is scattered more often ---- */
 
-/* Irradiance of a surface that faces the lamp, and the direction to it. */
-static float lamp_irradiance(const struct lamp *lamp, const float position_mm[3], float direction[3])
+/* Irradiance of a surface that faces the lamp, and the direction to it; of a Gaussian lamp its light, and one of its
+ * directions, chosen by u. */
+static float lamp_irradiance(const struct lamp *lamp, const float position_mm[3], const float u[2], float direction[3])
 {
+    if (lamp->sharpness > 0) {
+        float unused;
+        lamp_sample(lamp, position_mm, u, direction, &unused);
+        return lamp_gaussian_light(lamp);
+    }
     if (lamp->directional) {
         for (int a = 0; a < 3; a++) direction[a] = -lamp->normal[a];
         return (float)M_PI;
@@ -129,19 +159,30 @@ static void add_direction(const struct fast_tables *t, const float d[3], const f
         for (k = 0; k < n; k++) coefficient[c * n + k] += rgb[c] * y[k];
 }
 
-/* Coefficients of all light from outside in the flat cloth at a place; 3 x n_harmonic. */
-static void light_coefficients(const struct fast_setting *s, const struct scene_place *place,
-                               const float position_mm[3], float *coefficient)
+/* The same for the lamp, of which n directions count. u: chooses one of n = 1 of a Gaussian lamp. */
+static void add_lamp_directions(const struct fast_setting *s, const struct scene_place *place,
+                                const float position_mm[3], const float u[2], size_t n, float *coefficient)
 {
-    const struct fast_tables *t = s->option->tables;
-    float direction[3], d[3];
-    memset(coefficient, 0, 3 * fast_n_harmonic(t) * sizeof *coefficient);
-    if (s->path.lights.has_lamp) {
-        float e = lamp_irradiance(&s->path.lights.lamp, position_mm, direction);
+    for (size_t i = 0; i < n; i++) {
+        float direction[3], d[3], even[2] = {((float)i + 0.5f) / (float)n, fmodf(0.61803399f * (float)i, 1)};
+        float e = lamp_irradiance(&s->path.lights.lamp, position_mm, n > 1 ? even : u, direction) / (float)n;
         const float rgb[3] = {e, e, e};
         to_cloth(place, direction, d);
-        add_direction(t, d, rgb, NULL, coefficient);
+        add_direction(s->option->tables, d, rgb, NULL, coefficient);
     }
+}
+
+/* Coefficients of all light from outside in the flat cloth at a place; 3 x n_harmonic. u NULL: many directions of a
+ * Gaussian lamp, otherwise one of them. */
+static void light_coefficients(const struct fast_setting *s, const struct scene_place *place,
+                               const float position_mm[3], const float u[2], float *coefficient)
+{
+    const struct fast_tables *t = s->option->tables;
+    float d[3];
+    bool gaussian = s->path.lights.lamp.sharpness > 0;
+    memset(coefficient, 0, 3 * fast_n_harmonic(t) * sizeof *coefficient);
+    if (s->path.lights.has_lamp)
+        add_lamp_directions(s, place, position_mm, u, gaussian && u == NULL ? GAUSSIAN_DIRECTIONS : 1, coefficient);
     for (size_t i = 0; i < s->mixture.n; i++) {
         to_cloth(place, s->mixture.direction[i], d);
         add_direction(t, d, s->mixture.rgb[i], s->mixture.zonal, coefficient);
@@ -184,12 +225,13 @@ static float table_frame(const struct seen_hit *h, float row[3][3])
 
 /* Share of the light from outside that the shell of a bent cloth lets through, at a place beside the hit where light
  * may have entered. */
-static bool shell_lets_through(const struct fast_setting *s, const struct seen_hit *h, struct rng *rng)
+static bool shell_lets_through(const struct fast_setting *s, const struct seen_hit *h, const float u[2],
+                               struct rng *rng)
 {
     if (s->arriving != NULL) return true;
     float direction[3], shift[2];
     double normal[2];
-    float lamp = s->path.lights.has_lamp ? lamp_irradiance(&s->path.lights.lamp, h->position_mm, direction) : 0;
+    float lamp = s->path.lights.has_lamp ? lamp_irradiance(&s->path.lights.lamp, h->position_mm, u, direction) : 0;
     if (s->mixture.n > 0) {
         size_t k = light_mixture_pick(&s->mixture, rng_float(rng));
         float sky = 0;
@@ -207,17 +249,19 @@ static void add_transfer(const struct fast_setting *s, const struct seen_hit *h,
     size_t n = fast_n_harmonic(t);
     uint32_t cell = fast_tables_cell_at(t, h->place.position_mm);
     float scale = 1, computed[3 * SPHERE_MAX_COUNT], turned[3 * SPHERE_MAX_COUNT], rotation[SPHERE_MAX_ROTATION];
+    float u[2] = {0.5f, 0.5f}; /* chooses a direction of a Gaussian lamp */
     const float *arriving = computed;
-    if (cell == FAST_NO_ROW || !shell_lets_through(s, h, rng)) return;
+    for (int k = 0; k < 2 && s->arriving == NULL && s->path.lights.lamp.sharpness > 0; k++) u[k] = rng_float(rng);
+    if (cell == FAST_NO_ROW || !shell_lets_through(s, h, u, rng)) return;
     if (s->arriving != NULL) {
         float unused[3], centre[3] = {0, 0, 0};
         const struct lamp *lamp = &s->path.lights.lamp;
         arriving = s->arriving + (size_t)cell * 3 * n;
         if (s->path.lights.has_lamp && s->mixture.n == 0)
-            scale = lamp_irradiance(lamp, h->position_mm, unused) / lamp_irradiance(lamp, centre, unused);
+            scale = lamp_irradiance(lamp, h->position_mm, u, unused) / lamp_irradiance(lamp, centre, u, unused);
     } else {
         float light[3 * SPHERE_MAX_COUNT];
-        light_coefficients(s, &h->place, h->position_mm, light);
+        light_coefficients(s, &h->place, h->position_mm, u, light);
         apply_transfer(t, cell, light, computed);
     }
     float row[3][3], theta = table_frame(h, row);
@@ -241,7 +285,10 @@ static uint32_t shade_by_tables(const struct fast_setting *s, struct scene_ray *
         return 0;
     }
     describe(s, ray, &h);
-    if (s->path.lights.has_lamp) add_lamp(s, &h, rng, radiance);
+    const struct lamp *lamp = &s->path.lights.lamp;
+    bool closed = s->path.lights.has_lamp && lamp->sharpness > 0 && s->path.model->gaussian != NULL;
+    if (closed) add_gaussian_lamp(s, &h, rng, radiance);
+    if (s->path.lights.has_lamp && !closed) add_lamp(s, &h, rng, radiance);
     if (s->mixture.n > 0) add_environment(s, &h, rng, radiance);
     add_transfer(s, &h, rng, radiance);
     return 1;
@@ -277,7 +324,7 @@ static status fill_arriving(struct fast_setting *s, struct error *err)
     size_t n = 3 * fast_n_harmonic(t);
     s->arriving = malloc((t->n_transfer * n + 1) * sizeof *s->arriving);
     if (s->arriving == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot use tables: out of memory");
-    light_coefficients(s, &flat, centre, light);
+    light_coefficients(s, &flat, centre, NULL, light);
     for (uint32_t i = 0; i < t->n_transfer; i++) apply_transfer(t, i, light, s->arriving + i * n);
     return STATUS_OK;
 }

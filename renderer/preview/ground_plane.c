@@ -20,7 +20,7 @@ status ground_plane_init(struct ground_plane *g, const struct ground_request *q,
     camera_init(&g->camera, q->configuration);
     lamp_init(&g->lamp, q->configuration);
     if (q->configuration->light == LIGHT_NO_LAMP || !(g->lamp.normal[2] < 0) ||
-        (!g->lamp.directional && !((double)g->lamp.centre_mm[2] > q->z_mm)) || !(g->camera.eye_mm[2] > q->z_mm))
+        (!g->lamp.distant && !((double)g->lamp.centre_mm[2] > q->z_mm)) || !(g->camera.eye_mm[2] > q->z_mm))
         return error_set(err, STATUS_INVALID, "the ground under a cloth wants a lamp and a camera above it");
     return STATUS_OK;
 }
@@ -48,7 +48,7 @@ float ground_plane_lit(const struct ground_plane *g, const double p_mm[3], const
     const float position[3] = {(float)p_mm[0], (float)p_mm[1], (float)p_mm[2]}, pi = 3.14159265f;
     float pdf;
     if (!lamp_sample(&g->lamp, position, u, direction, &pdf) || !(direction[2] > 0)) return 0;
-    return g->lamp.radiance * (float)g->q->albedo / pi * direction[2] / pdf;
+    return lamp_radiance(&g->lamp, direction) * (float)g->q->albedo / pi * direction[2] / pdf;
 }
 
 void ground_plane_random(const struct ground_plane *g, size_t i_pixel, bool of_grid, struct rng *rng)

@@ -63,6 +63,10 @@ struct scattering_model {
      * values. */
     float (*eval_pdf)(const struct scattering_state *state, const float wi[3], const float wo[3],
                       const float *weight_rgb, float s_rgb[3], float *score);
+    /* The integral of S cos th_i exp(sharpness (wi . axis - 1)) over wi, in closed form: an approximation for a
+     * sharpness of at least 100. NULL: the model has none. */
+    void (*gaussian)(const struct scattering_state *state, const float axis[3], float sharpness, const float wo[3],
+                     float rgb[3]);
 };
 
 /* Why v of the fiber frame matters to a model, for error texts: "its fibers are flat". NULL when it does not: then

@@ -19,6 +19,7 @@ static bool lights_make_sense(const struct configuration *c)
 {
     bool lamp = c->light != LIGHT_SQUARE_LAMP || (c->light_distance_m > 0 && c->lamp_side_m > 0);
     bool environment = true;
+    if (c->light == LIGHT_GAUSSIAN) lamp = c->light_sharpness >= 1 && c->light_sharpness <= 1e5;
     for (int k = 0; k < 3; k++) environment &= c->environment_rgb[k] >= 0 && isfinite(c->environment_rgb[k]);
     return lamp && environment && c->light <= LIGHT_NO_LAMP;
 }

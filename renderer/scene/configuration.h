@@ -21,6 +21,8 @@ struct environment; /* renderer/transport/light/environment.h */
 enum configuration_light {
     LIGHT_SQUARE_LAMP = 0,
     LIGHT_DIRECTIONAL, /* parallel light from (light_theta, light_phi) with irradiance pi; no distance, no side */
+    LIGHT_GAUSSIAN,    /* from around (light_theta, light_phi), infinitely far: a spherical Gaussian of light_sharpness,
+                          with irradiance pi on a surface that faces it; no distance, no side */
     LIGHT_NO_LAMP      /* only the environment, if any */
 };
 
@@ -54,6 +56,7 @@ struct configuration {
     const struct environment *environment; /* an image around the scene, fixed to the world (not turned with the cloth),
                                               besides the lamp; not owned; NULL: none */
     enum configuration_light light;
+    double light_sharpness; /* of LIGHT_GAUSSIAN: radiance falls as exp(sharpness (cos - 1)); 1 to 100,000 */
     enum configuration_camera camera;
     uint32_t contrast_cells; /* 0: estimates are of the crop's mean radiance; 2 or more: of the contrast between so many
                                 equal parts of the crop a side (transport/estimate/contrast_blocks.h) */

@@ -36,6 +36,8 @@ static const struct cli_option {
      offsetof(struct cli_args, on)},
     {OPT_PICTURE, 0, "lamp", "THETA,PHI", "angles of the lamp in degrees (default: 45,0; docs/sample-preparation.md)",
      offsetof(struct cli_args, lamp)},
+    {OPT_PICTURE, 0, "lamp-sharpness", "N", "a Gaussian lamp: 10 is soft, 1000 sharp (default: the lamp of the job)",
+     offsetof(struct cli_args, lamp_sharpness)},
     {OPT_PICTURE, 0, "camera", "THETA,PHI", "angles of the camera (default: 30,180)",
      offsetof(struct cli_args, camera)},
     {OPT_PICTURE, 0, "px", "N", "width and height of the picture (default: 512)", offsetof(struct cli_args, px)},

@@ -59,6 +59,7 @@ static status read_picture(const struct cli_args *a, json_t *picture, const char
         return error_set(err, STATUS_INVALID, "option '--on' takes flat, cylinder, drape or a mesh NAME.obj: '%s'", on);
     json_object_set_new(picture, "on", json_string(shape ? on : "mesh"));
     status s = read_angles("lamp", a->lamp, 45.0, 0.0, picture, "light", err);
+    if (s == STATUS_OK) s = read_number("lamp-sharpness", a->lamp_sharpness, "lamp_sharpness", false, picture, err);
     if (s == STATUS_OK) s = read_angles("camera", a->camera, 30.0, 180.0, picture, "camera", err);
     if (s == STATUS_OK) s = read_number("px", a->px, "px", true, picture, err);
     if (s == STATUS_OK) s = read_number("samples", a->samples, "samples", true, picture, err);

@@ -73,6 +73,16 @@ const struct job_option option_rows_pictures[] = {
           .allowed = "0 to 180; for a flat piece not 90, and above it only without the black sheet",
           .meaning = "Angle of the lamp from the vertical. Above 90 the lamp is below."),
     OTHER_ANGLES("pictures[]", struct job_surface_picture, .required = true),
+    {.path = "pictures[].lamp_sharpness",
+     .kind = OPTION_NUMBER,
+     OF_PICTURE(lamp_sharpness),
+     RANGE(1, 100000),
+     .left_out = "`lamp` of the job",
+     .meaning =
+         "Lights the cloth with a spherical Gaussian in place of the lamp of the job: light from infinitely far "
+         "whose radiance falls off around the lamp's direction as exp(sharpness (cos - 1)). Its half width is "
+         "67 degrees over the root of the sharpness: 10 is soft, 200 about as wide as a lamp of 10 cm at 61 cm. A "
+         "surface that faces it has the light that it has from the lamp of the job."},
     {.path = "pictures[].width_mm",
      .kind = OPTION_NUMBER,
      OF_PICTURE(width_mm),

@@ -1,5 +1,6 @@
 /* two_lobe.v1: the textile fiber model of the fabric thesis, section 5.4, as published. */
 #include "renderer/scattering/gauss_polynomial.h"
+#include "renderer/scattering/surface/cone_lobe.h"
 #include "renderer/scattering/surface/two_lobe_core.h"
 
 /* What a uniform environment brings to th_o through each lobe, before colours. */
@@ -76,7 +77,49 @@ static float eval_pdf(const struct scattering_state *s, const float wi[3], const
     return two_lobe_eval_pdf(s, false, wi, wo, weight_rgb, s_rgb, score);
 }
 
+/* The product of a lobe's normal density of th_i about -th_o and of the Gaussian, a normal density of variance
+ * 1 / sharpness about its axis' angle: its integral over th_i. *theta: its middle, weighted by 1 / beta^2 and the
+ * sharpness (fabric thesis, section 6.5.2, where the weight of th_o is misprinted as beta^2). */
+static float product_integral(const struct scattering_state *s, int lobe, float theta_o, float theta_axis,
+                              float sharpness, float *theta)
+{
+    float narrow = 2 * s->inv_2var[lobe], both = narrow + sharpness, sum = theta_o + theta_axis,
+          root = sqrtf(0.5f * both);
+    *theta = (sharpness * theta_axis - narrow * theta_o) / both;
+    float inside = erff(root * ((float)M_PI_2 - *theta)) + erff(root * ((float)M_PI_2 + *theta));
+    return s->peak[lobe] * expf(-0.5f * narrow * sharpness / both * sum * sum) * 0.5f * sqrtf((float)M_PI) / root *
+           inside;
+}
+
+/* Fabric thesis, equation 6.2 and appendix C.2: the rest of the integrand is taken at the middle of that product. I0 is
+ * scaled by exp(-x) throughout. */
+static void gaussian(const struct scattering_state *s, const float axis[3], float sharpness, const float wo[3],
+                     float rgb[3])
+{
+    struct fiber_direction a = fiber_direction_of(axis), o = fiber_direction_of(wo);
+    float value[2], k[2], opposite = fiber_one_minus_cos_opposite(&a, &o), kappa = s->azimuth.kappa;
+    for (int lobe = 0; lobe < 2; lobe++) {
+        float theta, scale[2], unused[2];
+        value[lobe] = product_integral(s, lobe, o.theta_rad, a.theta_rad, sharpness, &theta);
+        two_lobe_scale_at(s, false, theta, scale, unused);
+        float cos_t = fmaxf(cosf(theta), 0), x = sharpness * a.cos_theta * cos_t;
+        k[lobe] = two_lobe_schlick(cos_t);
+        value[lobe] *= scale[lobe] * cos_t * cos_t;
+        if (lobe == TWO_LOBE_R) {
+            value[lobe] *= cone_lobe_bessel(x, NULL);
+            continue;
+        }
+        /* 2 pi I0(m) / exp(kappa + x), with m the length of the sum of vectors of length kappa and x */
+        float all = kappa + x, m = sqrtf(fmaxf(all * all - 2 * kappa * x * opposite, 0));
+        float loss = all + m > 0 ? 2 * kappa * x * opposite / (all + m) : 0; /* all - m without cancellation */
+        value[lobe] *= (float)(2 * M_PI) * s->azimuth.norm * cone_lobe_bessel(m, NULL) * expf(-loss);
+    }
+    for (int c = 0; c < 3; c++)
+        rgb[c] = (s->c_r[c] + s->not_c_r[c] * k[TWO_LOBE_R]) * value[TWO_LOBE_R] +
+                 s->c_tt[c] * s->not_c_r[c] * (1 - k[TWO_LOBE_TT]) * value[TWO_LOBE_TT];
+}
+
 const struct scattering_model scattering_two_lobe = {
     SURFACE_MODEL_ROW(two_lobe), .prepare = prepare,  .release = two_lobe_release, .eval = eval,
-    .sample = two_lobe_sample,   .pdf = two_lobe_pdf, .eval_pdf = eval_pdf,
+    .sample = two_lobe_sample,   .pdf = two_lobe_pdf, .eval_pdf = eval_pdf,        .gaussian = gaussian,
 };

@@ -21,14 +21,39 @@ void lamp_init(struct lamp *l, const struct configuration *c)
         l->edge[1][a] = (float)other[a];
     }
     l->directional = c->light == LIGHT_DIRECTIONAL;
+    l->distant = l->directional || c->light == LIGHT_GAUSSIAN;
+    l->sharpness = c->light == LIGHT_GAUSSIAN ? (float)c->light_sharpness : 0;
+    l->half_side_mm = 0;
     if (l->directional) {
         l->radiance = (float)M_PI * DIRECTIONAL_PER_SR;
+        return;
+    }
+    if (c->light == LIGHT_GAUSSIAN) { /* pi over the irradiance of exp(k (cos - 1)) on a surface that faces it */
+        double k = c->light_sharpness;
+        l->radiance = (float)(M_PI / (2 * M_PI * (1 / k + expm1(-k) / (k * k))));
         return;
     }
     l->half_side_mm = (float)(500 * c->lamp_side_m);
     /* irradiance at the orbit centre per radiance, in closed form: a square seen from its axis */
     double x = 0.5 * c->lamp_side_m / c->light_distance_m, y = x / sqrt(1 + x * x);
     l->radiance = (float)(M_PI / (4 * y * atan(y)));
+}
+
+float lamp_gaussian_light(const struct lamp *l)
+{
+    return l->radiance * (float)(-2 * M_PI * expm1(-2.0 * (double)l->sharpness)) / l->sharpness;
+}
+
+/* von Mises-Fisher. */
+static void sample_gaussian(const struct lamp *l, const float u[2], float direction[3])
+{
+    float off = -log1pf(u[0] * expm1f(-2 * l->sharpness)) / l->sharpness; /* 1 - cos */
+    off = fminf(fmaxf(off, 0), 2);
+    float sine = sqrtf(off * (2 - off)), x = sine * cosf((float)(2 * M_PI) * u[1]),
+          y = sine * sinf((float)(2 * M_PI) * u[1]);
+    for (int a = 0; a < 3; a++) direction[a] = (off - 1) * l->normal[a] + x * l->edge[0][a] + y * l->edge[1][a];
+    float inv = 1 / sqrtf(dot(direction, direction));
+    for (int a = 0; a < 3; a++) direction[a] *= inv;
 }
 
 bool lamp_sample(const struct lamp *l, const float position_mm[3], const float u[2], float direction[3],
@@ -38,6 +63,11 @@ bool lamp_sample(const struct lamp *l, const float position_mm[3], const float u
         for (int a = 0; a < 3; a++) direction[a] = -l->normal[a];
         *pdf_per_sr = DIRECTIONAL_PER_SR;
         return true;
+    }
+    if (l->sharpness > 0) {
+        sample_gaussian(l, u, direction);
+        *pdf_per_sr = lamp_pdf(l, position_mm, direction);
+        return *pdf_per_sr > 0;
     }
     float x = (2 * u[0] - 1) * l->half_side_mm, y = (2 * u[1] - 1) * l->half_side_mm, to[3];
     for (int a = 0; a < 3; a++) to[a] = l->centre_mm[a] + x * l->edge[0][a] + y * l->edge[1][a] - position_mm[a];
@@ -51,6 +81,7 @@ bool lamp_sample(const struct lamp *l, const float position_mm[3], const float u
 float lamp_pdf(const struct lamp *l, const float position_mm[3], const float direction[3])
 {
     float to[3], cos_l = -dot(direction, l->normal);
+    if (l->sharpness > 0) return lamp_radiance(l, direction) / lamp_gaussian_light(l);
     if (!(cos_l > 0) || l->directional) return 0;
     for (int a = 0; a < 3; a++) to[a] = l->centre_mm[a] - position_mm[a];
     float t = -dot(to, l->normal) / cos_l;

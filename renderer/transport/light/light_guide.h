@@ -28,7 +28,7 @@ void light_guide_energy_of(const struct scattering_model *m, const struct scatte
 /* Unit direction from position_mm (unwrapped) to the lamp's centre. */
 static inline void light_guide_towards(const struct lamp *lamp, const float position_mm[3], float towards[3])
 {
-    if (lamp->directional) {
+    if (lamp->distant) {
         for (int a = 0; a < 3; a++) towards[a] = -lamp->normal[a];
         return;
     }

@@ -49,7 +49,7 @@ static inline float lights_lamp_beyond(const struct lamp *lamp, const float posi
                                        float pdf)
 {
     float pdf_lamp = lamp_pdf(lamp, position_mm, direction);
-    return pdf_lamp > 0 ? lamp->radiance * (pdf > 0 ? lights_power_heuristic(pdf, pdf_lamp) : 1) : 0;
+    return pdf_lamp > 0 ? lamp_radiance(lamp, direction) * (pdf > 0 ? lights_power_heuristic(pdf, pdf_lamp) : 1) : 0;
 }
 
 /* Adds the radiance of both environments, that of the image times its share beside light samples. */

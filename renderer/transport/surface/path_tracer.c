@@ -51,7 +51,7 @@ static float connect_lamp(struct walk *w, const struct lamp *lamp, float weight,
     fiber_frame_to_local(&b->frame, direction, wi);
     float pdf = s->model->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
     float heuristic = path_walk_connects_all(w) ? 1 : lights_power_heuristic(pdf_lamp, pdf), value[3],
-          light = weight * lamp->radiance * fiber_frame_cos_theta(wi) / pdf_lamp * heuristic;
+          light = weight * lamp_radiance(lamp, direction) * fiber_frame_cos_theta(wi) / pdf_lamp * heuristic;
     for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * s_rgb[c] * light;
     float most = path_value_largest(value), survival;
     if (!(most > 0)) {

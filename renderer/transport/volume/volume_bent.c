@@ -137,8 +137,10 @@ static void connect_lights(struct bent_path *p, const double position[3])
     float u[2] = {rng_float(p->rng), rng_float(p->rng)}, direction[3], radiance[3], pdf;
     if (l->has_lamp) {
         const float at[3] = {(float)position[0], (float)position[1], (float)position[2]};
-        for (int c = 0; c < 3; c++) radiance[c] = l->lamp.radiance;
-        if (lamp_sample(&l->lamp, at, u, direction, &pdf)) connect(p, position, direction, radiance, pdf);
+        if (lamp_sample(&l->lamp, at, u, direction, &pdf)) {
+            for (int c = 0; c < 3; c++) radiance[c] = lamp_radiance(&l->lamp, direction);
+            connect(p, position, direction, radiance, pdf);
+        }
     }
     if (l->image == NULL) return;
     u[0] = rng_float(p->rng);

@@ -206,7 +206,7 @@ static bool sample_light(const struct volume_setting *s, struct volume_path *l, 
     if (to == LAMP) {
         volume_ray_position_mm(s->scene, &l->bounce, position_mm);
         if (!lamp_sample(&s->lights.lamp, position_mm, u, direction, pdf)) return false;
-        for (int c = 0; c < 3; c++) radiance[c] = s->lights.lamp.radiance;
+        for (int c = 0; c < 3; c++) radiance[c] = lamp_radiance(&s->lights.lamp, direction);
         return true;
     }
     return lights_sample_image(&s->lights, u, direction, radiance, pdf);

@@ -32,6 +32,31 @@ def test_methods_show_the_same_cloth(tmp_path):
     assert fast["noise"] < path["noise"]
 
 
+def test_a_gaussian_lamp_lights_every_method(tmp_path):
+    """Sharp, it is the parallel light of the job. By tables of what segments see, the picture is near the traced one."""
+    folder = tmp_path / "job"
+    (folder / "input").mkdir(parents=True)
+    view = {"on": "flat", "width_mm": 3, **VIEW, "samples": 64}
+    soft = {**view, "lamp_sharpness": 40}
+    given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "lamp": {"kind": "directional"},
+             "pictures": [view, {**view, "lamp_sharpness": 50000}, soft, {**soft, "method": "fast"},
+                          {**soft, "method": "fast", "visibility": "tables"}],
+             "fit": {"model": "two_lobe.v1", "fixed": {"C_R": [0.1] * 3, "C_TT": [0.6, 0.4, 0.2], "beta_R": 10, "beta_TT": 30, "gamma_TT": 40}}}
+    (folder / "job.json").write_text(json.dumps(given))
+    (folder / "input/cloth.hair").write_bytes(hair(layers=3))
+    run_worker(folder)
+    shown = json.loads((folder / "results/result.json").read_text())["pictures"]
+    mean = [sum(p["mean"]) / 3 for p in shown]
+    se = [p["noise"] * m / VIEW["px"] for p, m in zip(shown, mean)]
+    assert abs(mean[1] - mean[0]) < 5 * math.hypot(se[0], se[1]) < 0.1 * mean[0]
+    assert abs(mean[2] - mean[0]) > 5 * math.hypot(se[0], se[2]), "a soft lamp is seen to be soft"
+    assert abs(mean[3] - mean[2]) < 0.1 * mean[2] and abs(mean[4] - mean[2]) < 0.2 * mean[2]
+    given["pictures"] = [{**view, "lamp_sharpness": 0.5}]
+    (folder / "job.json").write_text(json.dumps(given))
+    p = subprocess.run([program("selvedge-worker"), "--quiet", str(folder)], capture_output=True, timeout=60)
+    assert p.returncode == 1 and "pictures[0].lamp_sharpness" in (folder / "status.json").read_text()
+
+
 def test_dual_scattering_is_a_method_like_the_others(tmp_path):
     """On a cylinder with a sheet of its own and compared with path tracing: darker than that, and with less noise."""
     folder = tmp_path / "job"

@@ -277,7 +277,7 @@ def test_what_the_command_refuses(real, tmp_path):
     draft = real.create(document({"on": "flat", **VIEW}))
     cases = [([draft], "no fitted model"), ([draft, "--on", "sphere"], "NAME.obj"), ([draft, "--lamp", "45"], "such as 45,180"),
              ([draft, "--px", "1.5"], "whole number"), ([draft, "--black-sheet", "maybe"], "yes or no"),
-             ([draft, "--twin", "perhaps"], "yes or no"),
+             ([draft, "--twin", "perhaps"], "yes or no"), ([draft, "--lamp-sharpness", "soft"], "takes a number"),
              ([draft, "--json"], "has no option '--json'"), (["nonsense"], "nonsense")]
     for words, said in cases:
         refused = render(real, *words)

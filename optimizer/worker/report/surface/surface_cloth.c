@@ -124,7 +124,7 @@ static status check_surface(const struct pipeline_context *c, size_t i, const st
                          "camera",
                          d->camera_distance_cm);
     point_from(p->light_theta_deg, p->light_phi_deg - p->cloth_rotation_deg, mm_per_cm * d->lamp_distance_cm, at);
-    if (!d->lamp_directional && scene_encloses(bent, at))
+    if (!d->lamp_directional && isnan(p->lamp_sharpness) && scene_encloses(bent, at))
         return error_set(err, STATUS_INVALID,
                          "the lamp, %g cm from the orbit center, stands inside the cloth: move the mesh, or the "
                          "lamp",

@@ -32,7 +32,7 @@ status surface_ground_init(const struct pipeline_context *c, size_t i, const str
                                      .stream = q->stream};
     struct progress silent = progress_silent(progress);
     status s = ground_render(&g, c->pool, &silent, &ground->layer, err);
-    ground->sheared = q->configuration->light != LIGHT_DIRECTIONAL;
+    ground->sheared = q->configuration->light == LIGHT_SQUARE_LAMP;
     if (s == STATUS_OK && p->filter && ground->sheared)
         s = ground_render_filtered(&g, &(struct ground_filter){.n_side = FILTER_SIDE}, c->pool, &silent,
                                    &ground->filtered, err);

@@ -231,6 +231,10 @@ static status render(struct pipeline_context *c, const struct one_picture *one, 
     view.crop_m = mm * p->width_mm;
     view.crop_aspect = 1.0;
     view.environment = c->environment;
+    if (!isnan(p->lamp_sharpness)) {
+        view.light = LIGHT_GAUSSIAN;
+        view.light_sharpness = p->lamp_sharpness;
+    }
     status s = surface_cloth_init(c, one->i, model->appearance.kind, &cloth, err);
     struct render_request q = {
         .input = {.scene = {.fibers = cloth.fibers, .volume = cloth.volume.bent != NULL ? &cloth.volume : NULL},
