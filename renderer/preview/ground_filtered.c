@@ -193,7 +193,8 @@ status ground_render_filtered(const struct ground_request *q, const struct groun
     status s = ground_plane_init(&g, q, err);
     if (s == STATUS_OK && g.lamp.distant)
         s = error_set(err, STATUS_INVALID,
-                      "cannot filter the shadow of a directional or Gaussian lamp, only of a square");
+                      g.lamp.directional ? "cannot filter the shadow of a directional lamp: it is sharp"
+                                         : "cannot filter the shadow of a Gaussian lamp, only that of a square one");
     if (s == STATUS_OK) s = image_init(im, q->width, q->height, 3, err);
     if (s != STATUS_OK || !lay_grid(&r, n)) return s;
     const double cell[2] = {r.field.cell[0], r.field.cell[1]};

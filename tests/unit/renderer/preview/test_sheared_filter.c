@@ -268,6 +268,11 @@ static void faults_are_refused(void **state)
     view.light = LIGHT_DIRECTIONAL;
     assert_int_equal(ground_render_filtered(&q, &how, NULL, NULL, &im, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "sharp"));
+    view.light = LIGHT_GAUSSIAN;
+    view.light_sharpness = 100;
+    assert_int_equal(ground_render_filtered(&q, &how, NULL, NULL, &im, &err), STATUS_INVALID);
+    assert_non_null(strstr(err.text, "Gaussian"));
+    view.light = LIGHT_DIRECTIONAL;
     assert_int_equal(ground_render(&q, NULL, NULL, &im, &err), STATUS_OK);
     image_release(&im);
     scene_free(bent);
