@@ -13,9 +13,10 @@ static const double GOLDEN_RAD = 2.39996322972865332; /* pi (3 - sqrt 5): Vogel 
 static const double START_STEP = 0.7548776662466927;
 /* Nodes of a fiber are this many radii apart at the description's own values. */
 static const double NODE_STEP_RADII = 1.5;
-/* Length, in radii, of the part of a yarn in which its staples begin and end. The places turn with the twist, and as
- * one tile seldom holds whole turns, those of fibers that begin and of fibers that end do not fit each other. Both
- * are in the section only here; elsewhere fibers would overlap, by how much the length of the tile would decide. */
+/* Length, in radii, of the part of a yarn in which its staples begin and end. The places turn with the twist, and one
+ * tile seldom holds whole turns, so those of fibers that begin and of fibers that end do not fit each other. Both are
+ * in the section only here. With ends all along the yarn, radiances depended on the length of the tile by 1 to 2 %
+ * (optimizer/fit/NOTES.md, "The size of the tile"). */
 static const double SEAM_RADII = 24.0;
 /* Lengths, in radii, of the longest waves of a fiber about its place, of a section's size, and of a migration. */
 static const double WANDER_RADII = 120.0, THICK_RADII = 480.0, MIGRATION_RADII = 150.0;

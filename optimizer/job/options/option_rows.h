@@ -61,6 +61,29 @@ extern const char *const job_transfer_names[];
         .meaning = "The value that stands for no light. Not for `srgb`."                                               \
     }
 
+/* Rows of the further exposures of a picture: `pointer` and `count` are members of the struct `type`. */
+#define EXPOSURES(list, type, pointer, count, text)                                                                    \
+    {.path = list ".more_exposures",                                                                                   \
+     .kind = OPTION_LIST,                                                                                              \
+     .stored = true,                                                                                                   \
+     .at = offsetof(type, pointer),                                                                                    \
+     .count_at = offsetof(type, count),                                                                                \
+     .element_bytes = sizeof(struct job_exposure),                                                                     \
+     .upper = JOB_MAX_MORE_EXPOSURES,                                                                                  \
+     .left_out = "none",                                                                                               \
+     .items = "exposures",                                                                                             \
+     .meaning = text},                                                                                                 \
+        {.path = list ".more_exposures[].file",                                                                        \
+         .kind = OPTION_FILE_NAME,                                                                                     \
+         INTO_OF(struct job_exposure, file),                                                                           \
+         .required = true,                                                                                             \
+         .allowed = "as `photographs[].file`",                                                                         \
+         .meaning = "The picture."},                                                                                   \
+    {                                                                                                                  \
+        .path = list ".more_exposures[].exposure_s", .kind = OPTION_NUMBER, INTO_OF(struct job_exposure, exposure_s),  \
+        RANGE(1e-9, 1e6), .unit = "s", .left_out = "from the file", .meaning = "Its exposure time."                    \
+    }
+
 /* Rows of the angles of a photograph or of a candidate: members of the struct `type` in the list `list`. */
 #define ANGLE(list, type, name, from, to, ...)                                                                         \
     {                                                                                                                  \

@@ -237,31 +237,9 @@ const struct job_option option_rows_setup[] = {
      .allowed = "x0, y0, x1, y1",
      .meaning = "The part of the picture that is used. x1, y1 are excluded; row 0 is at the top."},
     PICTURE("photographs[]", INTO_PHOTOGRAPH, job_transfer_names),
-    {.path = "photographs[].more_exposures",
-     .kind = OPTION_LIST,
-     .stored = true,
-     .at = offsetof(struct job_photograph, exposure),
-     .count_at = offsetof(struct job_photograph, n_exposure),
-     .element_bytes = sizeof(struct job_exposure),
-     .upper = JOB_MAX_MORE_EXPOSURES,
-     .left_out = "none",
-     .items = "exposures",
-     .meaning =
-         "More exposures of the same view: the camera, its ISO value and its f-number unchanged. They are merged "
-         "with `file` by their exposure times and the camera's noise (`camera.noise_file`); what one saturates, "
-         "the others supply."},
-    {.path = "photographs[].more_exposures[].file",
-     .kind = OPTION_FILE_NAME,
-     INTO_OF(struct job_exposure, file),
-     .required = true,
-     .allowed = "as `photographs[].file`",
-     .meaning = "The picture."},
-    {.path = "photographs[].more_exposures[].exposure_s",
-     .kind = OPTION_NUMBER,
-     INTO_OF(struct job_exposure, exposure_s),
-     RANGE(1e-9, 1e6),
-     .unit = "s",
-     .left_out = "from the file",
-     .meaning = "Its exposure time."},
+    EXPOSURES("photographs[]", struct job_photograph, exposure, n_exposure,
+              "More exposures of the same view: the camera, its ISO value and its f-number unchanged. They are merged "
+              "with `file` by their exposure times and the camera's noise (`camera.noise_file`); what one saturates, "
+              "the others supply."),
     {.path = NULL},
 };

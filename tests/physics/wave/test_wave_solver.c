@@ -4,6 +4,7 @@
 #include "renderer/scattering/wave/complex_lu.h"
 #include "renderer/scattering/wave/cylinder_functions.h"
 #include "renderer/scattering/wave/wave_solver.h"
+#include "tests/support/scratch_folder.h"
 #include "tests/support/wave/mie_cylinder.h"
 
 #include <math.h>
@@ -12,7 +13,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -305,32 +305,24 @@ static void measures_of_outlines(void **unused)
     assert_true(fabs(wave_outline_area(&o) / (M_PI * a * b) - 1) < 1e-14); /* bending keeps it */
 }
 
-static void outlines_from_files(void **unused)
+static void outlines_from_files(void **state)
 {
-    (void)unused;
     static const struct {
         const char *text, *error;
     } file[] = {{"# silk\n0,0\n\n2, 0\n 1.0 ,1.5\n", NULL},
                 {"0,0\n2,0\n1;1\n", "line 3 of outline"},
                 {"0,0\n2,0\n1,1,1\n", "line 3 of outline"},
                 {"0,0\n2,0\n", "needs 3 points, not 2"}};
-    char path[] = "/tmp/selvedge-outline-XXXXXX";
+    const char *path = scratch_path(state, "outline.csv");
     struct wave_outline o;
     struct error err = {0};
-    const int fd = mkstemp(path);
-    assert_true(fd >= 0);
-    close(fd);
     for (size_t i = 0; i < sizeof file / sizeof *file; i++) {
-        FILE *f = fopen(path, "w");
-        assert_non_null(f);
-        fputs(file[i].text, f);
-        fclose(f);
+        scratch_write(path, file[i].text, strlen(file[i].text));
         const status st = wave_outline_load(&o, path, 20, &err);
         assert_int_equal(st, file[i].error == NULL ? STATUS_OK : STATUS_INVALID);
         if (file[i].error != NULL) assert_non_null(strstr(err.text, file[i].error));
     }
-    unlink(path);
-    assert_int_equal(wave_outline_load(&o, path, 20, &err), STATUS_NOT_FOUND);
+    assert_int_equal(wave_outline_load(&o, scratch_path(state, "missing.csv"), 20, &err), STATUS_NOT_FOUND);
 }
 
 static void problems_that_are_refused(void **unused)
@@ -356,15 +348,16 @@ static void problems_that_are_refused(void **unused)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(cylinder_functions),
-                                       cmocka_unit_test(systems_of_equations),
-                                       cmocka_unit_test(circle),
-                                       cmocka_unit_test(energy),
-                                       cmocka_unit_test(reciprocity),
-                                       cmocka_unit_test(convergence),
-                                       cmocka_unit_test(outlines_from_points),
-                                       cmocka_unit_test(measures_of_outlines),
-                                       cmocka_unit_test(outlines_from_files),
-                                       cmocka_unit_test(problems_that_are_refused)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(cylinder_functions),
+        cmocka_unit_test(systems_of_equations),
+        cmocka_unit_test(circle),
+        cmocka_unit_test(energy),
+        cmocka_unit_test(reciprocity),
+        cmocka_unit_test(convergence),
+        cmocka_unit_test(outlines_from_points),
+        cmocka_unit_test(measures_of_outlines),
+        cmocka_unit_test_setup_teardown(outlines_from_files, scratch_folder_setup, scratch_folder_teardown),
+        cmocka_unit_test(problems_that_are_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
