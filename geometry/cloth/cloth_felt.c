@@ -38,15 +38,21 @@ static status add_fiber(struct web *b, size_t i, struct error *err)
     double radius_m = b->kind->radius_m * fmax(0.3, 1.0 + b->kind->radius_spread * fmax(-2.0, fmin(2.0, z[1])));
     double half_m = fmax(0.5 * b->thickness_m - radius_m, 0.1 * b->thickness_m);
     double tilt = fmax(-0.45 * M_PI, fmin(0.45 * M_PI, b->tilt_rad * z[0])), step_m = b->length_m / (FELT_NODES - 1);
-    struct strand like = {.radius_m = radius_m, .cut = CUT_FACE_XY};
+    struct strand like = {.radius_m = radius_m, .ratio = b->kind->fiber_flatness, .cut = CUT_FACE_XY};
     status st = work_has_room(b->w, FELT_NODES, err);
     if (st == STATUS_OK) st = strand_add(&b->w->set, &like, FELT_NODES, &node, err);
     if (st != STATUS_OK) return st;
+    double(*axis)[3] = strand_axis(&b->w->set), flat_rad = strand_section_rad(key.seed, 0, (uint32_t)i);
     for (size_t j = 0; j < FELT_NODES; j++) {
         double now = heading + b->curl * wave_at(&turn, (double)j / FELT_NODES);
         node[j][0] = at[0];
         node[j][1] = at[1];
         node[j][2] = half_m * fold(at[2]);
+        if (axis != NULL) {
+            axis[j][0] = -sin(now) * cos(flat_rad);
+            axis[j][1] = cos(now) * cos(flat_rad);
+            axis[j][2] = sin(flat_rad);
+        }
         at[0] += step_m * cos(tilt) * cos(now);
         at[1] += step_m * cos(tilt) * sin(now);
         at[2] += step_m * sin(tilt) / half_m;

@@ -43,6 +43,7 @@ static void shape(const struct cloth_work *w, const double *number, size_t k, st
                              .melange_with = kind->melange_with,
                              .radius_m = 1e-6 * of_kind(w, number, k, "fiber_radius_um", 8.0),
                              .radius_spread = of_kind(w, number, k, "radius_spread", 0.0),
+                             .fiber_flatness = of_kind(w, number, k, "fiber_flatness", 1.0),
                              .packing = of_kind(w, number, k, "packing", 0.6),
                              .flatness = of_kind(w, number, k, "flatness", 1.0),
                              .twist_per_m = of_kind(w, number, k, "twist_per_m", 0.0),
@@ -64,6 +65,7 @@ void kind_shapes(struct cloth_work *w)
     for (size_t k = 0; k < w->d->n_kind; k++) {
         shape(w, w->number, k, &w->kind[k]);
         shape(w, NULL, k, &w->nominal[k]);
+        if (w->kind[k].fiber_flatness > 1.0) w->set.flat = true;
     }
 }
 

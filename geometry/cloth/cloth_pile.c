@@ -32,11 +32,13 @@ static status add_fiber(const struct pile *p, const double root_m[2], uint32_t t
     double rho_m = k->radius_m * 1.9 * sqrt((double)i + 0.5), angle = turn_rad + 2.39996322972865332 * (double)i;
     double length_m = (p->height_m + p->ground_m) * (1.0 + 0.04 * fmax(-2.0, fmin(2.0, u[0])));
     struct strand like = {.radius_m = k->radius_m * fmax(0.3, 1.0 + k->radius_spread * fmax(-2.0, fmin(2.0, u[1]))),
+                          .ratio = k->fiber_flatness,
                           .axis_class = 2,
                           .group = (uint8_t)p->w->d->pile_kind,
                           .cut = CUT_NONE};
     status st = strand_add(&p->w->set, &like, PILE_NODES, &node, err);
     if (st != STATUS_OK) return st;
+    double(*axis)[3] = strand_axis(&p->w->set), flat_rad = strand_section_rad(key.seed, ~tuft, (uint32_t)i);
     double at[3] = {root_m[0] + rho_m * cos(angle), root_m[1] + rho_m * sin(angle), -0.5 * p->ground_m};
     for (size_t j = 0; j < PILE_NODES; j++) {
         double t = (double)j / (PILE_NODES - 1), bend = fmin(1.0, 2.0 * t),
@@ -45,6 +47,7 @@ static status add_fiber(const struct pile *p, const double root_m[2], uint32_t t
         node[j][0] = at[0] + (spread - 1.0) * rho_m * cos(angle);
         node[j][1] = at[1] + (spread - 1.0) * rho_m * sin(angle);
         node[j][2] = at[2];
+        for (int a = 0; a < 2 && axis != NULL; a++) axis[j][a] = a == 0 ? cos(flat_rad) : sin(flat_rad);
         for (int a = 0; a < 2; a++) at[a] += step_m * sin(now) * towards[a];
         at[2] += step_m * cos(now);
     }

@@ -11,7 +11,8 @@ enum { POINTS_PER_CROSSING = 24, N_WAVE = 4, MAX_CLOTH_NODES = 20000000 };
 struct kind_shape {
     size_t n_fiber, n_ply;
     int melange_with;
-    double radius_m, radius_spread, packing, flatness, twist_per_m, ply_twist_per_m, migration, fiber_angle_rad;
+    double radius_m, radius_spread, fiber_flatness, packing, flatness, twist_per_m, ply_twist_per_m, migration,
+        fiber_angle_rad;
     double hairs_per_m, hair_length_m, melange;
     double round_m;        /* radius of the yarn's round section */
     double half_m[2];      /* of the flattened section: width, height */

@@ -90,6 +90,17 @@ static struct place place_of(const struct filling *y, size_t i)
                           .angle_rad = GOLDEN_RAD * (double)j};
 }
 
+/* The long axis of a section that turns with the twist, length_m along the yarn: angle_rad is its angle at 0. */
+static void section_axis(const struct filling *y, double angle_rad, double s, double axis[3])
+{
+    const struct kind_shape *k = y->shape;
+    const struct yarn_section as_is = {.wide = 1.0, .high = 1.0};
+    double turns = 2.0 * M_PI * k->turn_of_twist * length_at(y, s) * k->twist_per_m, centre[3];
+    yarn_point(y->path, &as_is, s, 0.0, 0.0, centre);
+    yarn_point(y->path, &as_is, s, cos(angle_rad + turns), sin(angle_rad + turns), axis);
+    for (int a = 0; a < 3; a++) axis[a] -= centre[a];
+}
+
 /* Where a fiber of the present yarn may differ from its place. */
 struct wander {
     struct wave side[2];
@@ -136,6 +147,7 @@ static status add_staple(struct filling *y, size_t i, double start, struct error
     draw_wander(y, &v, &rng);
     size_t n = staple_nodes(y->nominal_radii);
     struct strand like = {.radius_m = k->radius_m * fmax(0.3, 1.0 + k->radius_spread * fmax(-2.0, fmin(2.0, z[0]))),
+                          .ratio = k->fiber_flatness,
                           .axis_class = y->path->axis_class,
                           .group = (uint8_t)y->kind,
                           .cut = y->path->cut};
@@ -145,8 +157,10 @@ static status add_staple(struct filling *y, size_t i, double start, struct error
     }
     status st = strand_add(&y->w->set, &like, n, &node, err);
     if (st != STATUS_OK) return st;
+    double(*axis)[3] = strand_axis(&y->w->set), angle_rad = strand_section_rad(key.seed, y->path->number, (uint32_t)i);
     for (size_t j = 0; j < n; j++) {
         double t = (double)j / (double)(n - 1), s = start + t, at[2];
+        if (axis != NULL) section_axis(y, angle_rad, s, axis[j]);
         double scale = 1.0 + y->disorder * wave_at(&y->thick, s);
         double rho_m = q.rho_m * (1.0 + k->migration * cos(2.0 * M_PI * v.migration_turns * t + v.migration_rad));
         round_point(y, &q, rho_m, length_at(y, s), at);
@@ -171,6 +185,7 @@ static status add_hair(struct filling *y, size_t i, double grown, struct error *
     double curl = 2.0 * (rng_double(&rng) - 0.5), bend = 0.6 + rng_double(&rng), (*node)[3];
     if (length_m < 2.0 * k->radius_m) return STATUS_OK;
     struct strand like = {.radius_m = k->radius_m,
+                          .ratio = k->fiber_flatness,
                           .axis_class = y->path->axis_class,
                           .group = (uint8_t)y->kind,
                           .hair = true,
@@ -178,6 +193,7 @@ static status add_hair(struct filling *y, size_t i, double grown, struct error *
     status st = work_has_room(y->w, HAIR_NODES, err);
     if (st == STATUS_OK) st = strand_add(&y->w->set, &like, HAIR_NODES, &node, err);
     if (st != STATUS_OK) return st;
+    double(*axis)[3] = strand_axis(&y->w->set), angle_rad = strand_section_rad(key.seed, y->path->number, ~(uint32_t)i);
     double along = side * cos(rise) * length_m / y->length_m[y->path->n], out_m = sin(rise) * length_m;
     for (size_t j = 0; j < HAIR_NODES; j++) {
         double t = (double)j / (HAIR_NODES - 1), turned = angle + curl * t;
@@ -186,6 +202,7 @@ static status add_hair(struct filling *y, size_t i, double grown, struct error *
         yarn_point(y->path, &as_is, from + along * t, (k->half_m[0] + above_m) * cos(turned),
                    (k->half_m[1] + above_m) * sin(turned), node[j]);
         for (int a = 0; a < 2; a++) node[j][a] += above_m * y->nap[a];
+        if (axis != NULL) section_axis(y, angle_rad, from, axis[j]);
     }
     return STATUS_OK;
 }

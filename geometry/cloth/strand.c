@@ -8,6 +8,7 @@ void strand_set_release(struct strand_set *s)
     free(s->strand);
     free(s->start);
     free(s->p);
+    free(s->axis);
     *s = (struct strand_set){0};
 }
 
@@ -19,7 +20,10 @@ static status grow_nodes(struct strand_set *s, size_t n, struct error *err)
     if (start != NULL) s->start = start;
     void *p = realloc(s->p, capacity * sizeof *s->p);
     if (p != NULL) s->p = p;
-    if (start == NULL || p == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make the fibers: out of memory");
+    void *axis = s->flat ? realloc(s->axis, capacity * sizeof *s->axis) : NULL;
+    if (axis != NULL) s->axis = axis;
+    if (start == NULL || p == NULL || (s->flat && axis == NULL))
+        return error_set(err, STATUS_NO_MEMORY, "cannot make the fibers: out of memory");
     s->node_capacity = capacity;
     return STATUS_OK;
 }
@@ -40,6 +44,7 @@ status strand_add(struct strand_set *s, const struct strand *like, size_t n, dou
     new->first = s->n_node;
     new->n = n;
     memset(s->start + s->n_node, 0, n * sizeof *s->start);
+    if (s->axis != NULL) memset(s->axis + s->n_node, 0, n * sizeof *s->axis);
     *node = s->start + s->n_node;
     s->n_node += n;
     return STATUS_OK;

@@ -17,6 +17,7 @@ struct strand {
     double shift[2]; /* of a closed strand; 0, 0 if open */
     size_t n_period; /* 0: open */
     double radius_m;
+    double ratio; /* long over short axis of the section; up to 1: round */
     uint8_t axis_class;
     uint8_t group; /* of its fibers (fiber_set.h) */
     bool hair;     /* protrudes from a yarn */
@@ -33,6 +34,8 @@ struct strand_set {
     size_t n_node, node_capacity;
     double (*start)[3]; /* where the design put the node */
     double (*p)[3];     /* where it is now */
+    bool flat;          /* whether sections may be flat; set before the first strand */
+    double (*axis)[3];  /* a vector along the long axis of the section at each node; NULL unless flat */
 };
 
 /* Random streams of the parts of a cloth; STREAM_NOISE, STREAM_RING and STREAM_WHITE are those of a simulated scan. */
@@ -50,13 +53,26 @@ enum cloth_stream {
     STREAM_WEB,
     STREAM_SPREAD,
     STREAM_SECTION,
-    STREAM_WHITE
+    STREAM_WHITE,
+    STREAM_FLAT
 };
 
 void strand_set_release(struct strand_set *s);
 /* Appends a strand of n nodes at zero. *node is the place to write them, valid until the next call.
  * STATUS_NO_MEMORY. */
 status strand_add(struct strand_set *s, const struct strand *like, size_t n, double (**node)[3], struct error *err);
+
+/* The long axes of the strand that was added last, to be written as its nodes are; NULL where all sections are round.
+ * They need not be perpendicular to the strand nor of length 1. */
+double (*strand_axis(const struct strand_set *s))[3];
+/* The angle of the section of a fiber of a described cloth, in [0, pi). */
+double strand_section_rad(uint64_t seed, uint32_t i_yarn, uint32_t i_fiber);
+/* The section of a vertex of a fiber: a vector along its long axis and the ratio of both axes. */
+struct strand_section {
+    float axis[3], ratio;
+};
+/* Gives the fibers the sections of their vertices, with long axes across the fibers. STATUS_NO_MEMORY. */
+status strand_set_sections(const struct strand_section *section, struct fiber_set *f, struct error *err);
 
 /* What is left of interpenetration and sharp bends. */
 struct strand_fit {

@@ -10,8 +10,9 @@ struct emitter {
     double tile_m[2];
     double z_shift_m;
     const struct strand *strand;
-    uint8_t group;       /* of the present piece */
-    struct fiber_set *f; /* NULL: count */
+    uint8_t group;                        /* of the present piece */
+    struct fiber_set *f;                  /* NULL: count */
+    struct strand_section here, *section; /* at the present place; of each vertex, NULL where all are round */
     size_t n_fiber, n_vertex;
     size_t n_here; /* vertices of the present piece */
     long cell[2];  /* tile of the present piece */
@@ -24,6 +25,7 @@ static void put_vertex(struct emitter *e, const double p[3])
         to[0] = (float)(p[0] - (double)e->cell[0] * e->tile_m[0]);
         to[1] = (float)(p[1] - (double)e->cell[1] * e->tile_m[1]);
         to[2] = (float)(p[2] + e->z_shift_m);
+        if (e->section != NULL) e->section[e->n_vertex] = e->here;
     }
     e->n_vertex++;
     e->n_here++;
@@ -99,6 +101,15 @@ static void curve_point(const struct strand_set *s, const struct strand *t, size
     }
 }
 
+/* Sets the section of the vertices that follow to that at w between nodes i and i + 1 of an open strand. */
+static void set_section(struct emitter *e, const struct strand_set *s, const struct strand *t, size_t i, double w)
+{
+    if (e->section == NULL) return;
+    const double *a = s->axis[t->first + i], *b = s->axis[t->first + (i + 1 < t->n ? i + 1 : i)];
+    for (int k = 0; k < 3; k++) e->here.axis[k] = (float)(a[k] + w * (b[k] - a[k]));
+    e->here.ratio = (float)t->ratio;
+}
+
 /* A closed strand starts at its first cut, so that no piece is split at node 0 as well. */
 static size_t first_cut(struct emitter *e, const struct strand_set *s, const struct strand *t)
 {
@@ -140,11 +151,13 @@ static void emit_strand(struct emitter *e, const struct strand_set *s, const str
     /* a node outside of a face belongs to the previous tile; open strands stay whole in the tile of their first node */
     for (int k = 0; k < 2; k++)
         e->cell[k] = faces && (t->cut & (k == 0 ? CUT_FACE_X : CUT_FACE_Y)) == 0 ? 0 : cell_of(e, a, k);
+    set_section(e, s, t, from, 0.0);
     if (started) put_vertex(e, a);
     /* with faces, once around and then to the first cut again */
     for (size_t i = 0; i < n_interval + (faces ? 1 : 0); i++) {
         for (size_t k = 1; k <= n_sub; k++) {
             curve_point(s, t, from + i, (double)k / (double)n_sub, b);
+            set_section(e, s, t, from + i, (double)k / (double)n_sub);
             double step = (double)n_interval * t->start_share * (double)n_sub - (double)(i * n_sub + k - 1);
             bool here = changes && step >= 0.0 && step < 1.0, cut = !here && advance(e, a, b);
             if (here) advance_past_change(e, a, b, step);
@@ -201,10 +214,16 @@ status strand_emit(const struct strand_set *s, double spacing_m, double margin_m
     if (st != STATUS_OK) return st;
     emit.f = f;
     emit.z_shift_m = margin_m - low;
+    if (s->axis != NULL) {
+        emit.section = malloc((count.n_vertex + 16) * sizeof *emit.section);
+        if (emit.section == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make the fibers: out of memory");
+    }
     emit_all(&emit, s, spacing_m);
     f->n_vertex = emit.n_vertex;
     f->tile_size_m[0] = s->tile_m[0];
     f->tile_size_m[1] = s->tile_m[1];
     recentre(f);
-    return STATUS_OK;
+    if (emit.section != NULL) st = strand_set_sections(emit.section, f, err);
+    free(emit.section);
+    return st;
 }
