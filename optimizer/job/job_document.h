@@ -174,6 +174,7 @@ struct job_document {
     bool cloth_draft_from_texture;          /* neither weave nor draft is given */
     size_t cloth_tile_yarn[2];              /* of enum cloth_direction; 0: not given */
     size_t cloth_final_tiles;               /* times that the tile of the final fit is as long along both edges */
+    bool cloth_renew_places;                /* other random places in each estimate of the joint fit */
     double cloth_threads_per_cm[2];         /* NaN: not given */
     uint64_t cloth_seed;
     size_t n_cloth_yarn;
@@ -261,8 +262,8 @@ bool job_document_pictures_only(const struct job_document *doc);
  * too. */
 void job_cloth_name_field(struct error *err);
 
-/* STATUS_INVALID, field "final_tiles", where the described cloth has no fitted numbers, or its tile cannot be made as
- * large as the document asks for. */
+/* STATUS_INVALID, field "final_tiles" or "renew_places", where the described cloth has no fitted numbers, or its tile
+ * cannot be made as large as the document asks for. */
 status job_cloth_check_final_tiles(const struct job_document *doc, struct error *err);
 
 struct param_info;

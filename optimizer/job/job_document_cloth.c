@@ -234,7 +234,7 @@ static status read_names(struct job_document *doc, struct error *err)
 }
 
 /* A key of the cloth: job_cloth_name_field makes it one of the document. */
-static const char final_tiles_key[] = "final_tiles";
+static const char final_tiles_key[] = "final_tiles", renew_places_key[] = "renew_places";
 
 status job_cloth_check_final_tiles(const struct job_document *doc, struct error *err)
 {
@@ -244,6 +244,10 @@ status job_cloth_check_final_tiles(const struct job_document *doc, struct error 
         return error_set_field(err, STATUS_INVALID, final_tiles_key,
                                "'final_tiles' is for a cloth whose numbers are fitted: this one has none, so its tile "
                                "is that of 'tile_warps' and 'tile_wefts', or of 'fibers' in a felt");
+    if (!fitted && doc->cloth_renew_places)
+        return error_set_field(err, STATUS_INVALID, renew_places_key,
+                               "'renew_places' is for a cloth whose numbers are fitted: this one has none, so it is "
+                               "made once");
     struct cloth_description *large = malloc(sizeof *large);
     if (large == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
     status st = cloth_description_enlarge(doc->cloth, doc->cloth_final_tiles, large, err);

@@ -160,7 +160,7 @@ def woven(weave, numbers, kinds=1, **cloth):
 # nothing repeats in it as nothing does in a real cloth; and of the job's, in the search and in the last fit. The random places
 # of the cloths differ, and radiances of single tiles scatter, those of larger ones less (optimizer/fit/NOTES.md, "What limits the
 # recoveries").
-TRUE_YARNS, JOB_YARNS, FINAL_TILES = {"plain": 48, "twill": 48, "satin": 45}, {"plain": 16, "twill": 16, "satin": 15}, 2
+TRUE_YARNS, JOB_YARNS, FINAL_TILES = {"plain": 48, "twill": 48, "satin": 45}, {"plain": 16, "twill": 16, "satin": 15}, 3
 
 
 def of_size(cloth, yarns):
@@ -293,7 +293,7 @@ def bench_recovery(arguments, name, cloth, sets):
     named = json.loads(json.dumps(cloth))
     for yarn, group in zip(named["yarns"], groups if len(groups) > 1 else []):
         yarn["name"] = group
-    searched = json.loads(json.dumps(dict(of_size(named, JOB_YARNS), final_tiles=FINAL_TILES)))
+    searched = json.loads(json.dumps(dict(of_size(named, JOB_YARNS), seed=1000, renew_places=True, final_tiles=FINAL_TILES)))
     for yarn in searched["yarns"]:
         yarn.update(FITTED)
     document = {"sample": name, "cloth": searched, "photographs": photographs, "fit": fit}

@@ -115,6 +115,14 @@ const struct job_option option_rows_described[] = {
          "fit, on the chosen cloth, and in the result. Radiances of a small tile show the random places of its "
          "fibers; the search, which makes many cloths, is fast with small ones, and the result is better with a "
          "large one."},
+    {.path = "cloth.renew_places",
+     .kind = OPTION_BOOL,
+     INTO(cloth_renew_places),
+     .standard = "false",
+     .meaning =
+         "Where numbers of the cloth are fitted: whether every estimate of the search has fibers at other random "
+         "places, so that what single tiles scatter averages out. It makes twice as many cloths, and needs tiles "
+         "that scatter by less than about 1 %, such as 16 x 16 yarns."},
     {.path = "cloth.warp_per_cm",
      .kind = OPTION_NUMBER,
      INTO(cloth_threads_per_cm[1]),

@@ -117,6 +117,12 @@ static size_t n_free_number(const struct pipeline_context *c)
 
 /* ---- one cloth after the other ---- */
 
+/* Which cloth of given numbers is made. */
+struct variant {
+    bool final;      /* with the tile of the last fit */
+    uint64_t places; /* added to the seed of the fibers' random places */
+};
+
 struct pipeline_cloth_trace {
     struct pipeline_context *c;
     size_t i_model;
@@ -128,19 +134,20 @@ struct pipeline_cloth_trace {
     size_t n_built, i_next; /* the cloths of one iteration; the next of them to be replaced */
     struct built {
         double number[CLOTH_MAX_FITTED];
-        bool final;
+        struct variant variant;
         struct scene *scene;
     } built[CLOTH_MAX_MOVED + 1];
 };
 
-/* Makes the fibers of the described cloth at the values of all of its numbers. final: with the tile of the last fit. */
-static status build_tile(struct pipeline_context *c, const double *value, bool final, struct fiber_set *f,
+/* Makes the fibers of the described cloth at the values of all of its numbers. */
+static status build_tile(struct pipeline_context *c, const double *value, struct variant variant, struct fiber_set *f,
                          struct cloth_report *report, struct error *err)
 {
     const struct progress progress = {.cancel = c->progress.cancel};
     struct cloth_description *d = malloc(sizeof *d);
     if (d == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make the cloth: out of memory");
-    status s = cloth_description_enlarge(c->doc->cloth, final ? c->doc->cloth_final_tiles : 1, d, err);
+    status s = cloth_description_enlarge(c->doc->cloth, variant.final ? c->doc->cloth_final_tiles : 1, d, err);
+    d->seed += variant.places;
     if (s == STATUS_OK) s = cloth_build(d, value, c->pool, &progress, f, report, err);
     free(d);
     return s;
@@ -149,8 +156,9 @@ static status build_tile(struct pipeline_context *c, const double *value, bool f
 /* Makes the fibers at given values of the fitted numbers. Where these contradict each other (a crimp that yarns cannot
  * follow), the nearest of a few cloths on the line to the start values takes their place, so that a search that meets
  * such a cloth goes on. */
-static status make_fibers(struct pipeline_context *c, const double *number, bool final, double value[CLOTH_MAX_NUMBER],
-                          struct fiber_set *f, struct cloth_report *report, struct error *err)
+static status make_fibers(struct pipeline_context *c, const double *number, struct variant variant,
+                          double value[CLOTH_MAX_NUMBER], struct fiber_set *f, struct cloth_report *report,
+                          struct error *err)
 {
     size_t n_number;
     const struct cloth_number *list = numbers_of(c, &n_number);
@@ -162,22 +170,33 @@ static status make_fibers(struct pipeline_context *c, const double *number, bool
             double start = c->number.range[i].start;
             value[c->number.item[i].index] = k == 0 ? number[i] : start + share * (number[i] - start);
         }
-        s = c->doc->cloth != NULL ? build_tile(c, value, final, f, report, err)
+        s = c->doc->cloth != NULL ? build_tile(c, value, variant, f, report, err)
                                   : fiber_correct(&c->uncorrected, value, f, err);
         if (s != STATUS_INVALID) return s;
     }
     return s;
 }
 
-/* Finds or builds the scene of a cloth. Both replicas of an iteration ask for the same cloths. */
-static status scene_of(struct pipeline_cloth_trace *t, const double *number, const struct scene **scene,
-                       struct error *err)
+/* The cloth that an estimate sees. Where places are renewed, each replica of each iteration of the joint fit has places
+ * of its own, so that the scatter of a tile is independent between the replicas, whose products make the objective. All
+ * cloths of one replica share theirs, so that their differences do not hold it. */
+static struct variant variant_of(const struct pipeline_cloth_trace *t, const struct estimator_call *call)
+{
+    struct variant v = {.final = t->final};
+    if (t->c->doc->cloth != NULL && t->c->doc->cloth_renew_places && t->cloth.number_derivatives)
+        v.places = 2 * (uint64_t)call->iteration + (call->replica == REPLICA_FIT_B ? 2 : 1);
+    return v;
+}
+
+/* Finds or builds the scene of a cloth. Unless places are renewed, both replicas of an iteration ask for the same. */
+static status scene_of(struct pipeline_cloth_trace *t, const double *number, struct variant variant,
+                       const struct scene **scene, struct error *err)
 {
     struct fiber_set fiber;
     const size_t n_bytes = t->c->number.n * sizeof *number;
     for (size_t i = 0; i < t->n_built; i++)
-        if (t->built[i].scene != NULL && t->built[i].final == t->final &&
-            memcmp(number, t->built[i].number, n_bytes) == 0) {
+        if (t->built[i].scene != NULL && t->built[i].variant.final == variant.final &&
+            t->built[i].variant.places == variant.places && memcmp(number, t->built[i].number, n_bytes) == 0) {
             *scene = t->built[i].scene;
             return STATUS_OK;
         }
@@ -188,11 +207,11 @@ static status scene_of(struct pipeline_cloth_trace *t, const double *number, con
     fiber_set_init(&fiber);
     struct cloth_report report;
     double value[CLOTH_MAX_NUMBER];
-    status s = make_fibers(t->c, number, t->final, value, &fiber, &report, err);
+    status s = make_fibers(t->c, number, variant, value, &fiber, &report, err);
     if (s == STATUS_OK) s = pipeline_fiber_scene(t->c, &fiber, &to->scene, err);
     fiber_set_release(&fiber);
     memcpy(to->number, number, n_bytes);
-    to->final = t->final;
+    to->variant = variant;
     *scene = to->scene;
     return s;
 }
@@ -205,7 +224,7 @@ static status estimate(void *context, const double *number, const struct estimat
     double start_s = clock_monotonic_s();
     struct trace_estimator live;
     const struct scene *scene = NULL;
-    status s = scene_of(t, number, &scene, err);
+    status s = scene_of(t, number, variant_of(t, call), &scene, err);
     if (s != STATUS_OK) return s;
     pipeline_trace_request(&live, c, t->i_model, t->configuration, t->cloth.n_configuration);
     live.request.input.scene = (struct appearance_scene){.fibers = scene};
@@ -332,7 +351,8 @@ status pipeline_cloth_use(struct pipeline_context *c, size_t i_model, struct err
 {
     const struct pipeline_model *m = &c->model[i_model];
     if (c->number.n == 0 || c->number.i_shown == i_model + 1) return STATUS_OK;
-    status s = make_fibers(c, m->cloth.number, true, c->number.shown, &c->fiber, &c->cloth, err);
+    status s =
+        make_fibers(c, m->cloth.number, (struct variant){.final = true}, c->number.shown, &c->fiber, &c->cloth, err);
     if (s == STATUS_OK) s = pipeline_make_scene(c, err);
     if (s == STATUS_OK) c->geometry.total_length_m = fiber_set_length_m(&c->fiber);
     if (s == STATUS_OK) warn_of_contradiction(c, m);

@@ -167,6 +167,10 @@ static void test_mistakes_are_named(void **state)
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{},\"final_tiles\":2,\"tile_wefts\":80"),
                              "cloth.final_tiles", "160 yarns of the weft");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{},\"final_tiles\":0"), "cloth.final_tiles", "0");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"renew_places\":true"), "cloth.renew_places",
+                             "numbers are fitted");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"crimp\":{},\"renew_places\":2"), "cloth.renew_places",
+                             "true or false");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"warp\":[]"), "cloth.warp", "1 to 64");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"warp\":[\"red\"],\"yarns\":[{\"name\":\"red\"}]"),
                              "cloth.warp", "element 0");
