@@ -58,6 +58,19 @@ static inline void lanes_to_rows(const lanes of[4], lane_row row[LANES])
     }
 }
 
+/* The lanes where the mask is true: bit l is lane l. */
+static inline unsigned lanes_bits(lane_mask m)
+{
+#ifdef __AVX__
+    typedef float vector __attribute__((vector_size(LANES * sizeof(float))));
+    return (unsigned)__builtin_ia32_movmskps256((vector)m);
+#else
+    unsigned bits = 0;
+    for (int l = 0; l < LANES; l++) bits |= ((unsigned)m[l] & 1u) << l;
+    return bits;
+#endif
+}
+
 static inline float lanes_sum(lanes x) { return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7])); }
 
 #endif

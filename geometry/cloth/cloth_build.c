@@ -96,16 +96,16 @@ status cloth_build(const struct cloth_description *d, const double *number, stru
     struct cloth_work w = {.d = d, .number = own};
     const struct strand_relax_option relax = {.n_round = RELAX_ROUNDS, .rule = STRAND_SMOOTH};
     struct strand_fit fit = {0};
-    memset(report, 0, sizeof *report);
+    if (report != NULL) memset(report, 0, sizeof *report);
     status st = cloth_number_check(d, own, err);
     if (st != STATUS_OK) return st;
     kind_shapes(&w);
     st = make(&w, err);
-    if (st == STATUS_OK) st = strand_relax(&w.set, &relax, pool, progress, &fit, err);
+    if (st == STATUS_OK) st = strand_relax(&w.set, &relax, pool, progress, report != NULL ? &fit : NULL, err);
     /* vertices at the nodes alone: they are near enough for the bends that fibers can have */
     if (st == STATUS_OK) st = strand_emit(&w.set, thickest_m(&w.set), 0.0, f, err);
     if (st == STATUS_OK) st = fiber_set_validate(f, err);
-    if (st == STATUS_OK) st = report_fill(&w, &fit, f, report, err);
+    if (st == STATUS_OK && report != NULL) st = report_fill(&w, &fit, f, report, err);
     strand_set_release(&w.set);
     return st;
 }

@@ -91,7 +91,8 @@ struct strand_relax_option {
 };
 
 /* Pushes nodes of different fibers apart until their distance is at least the sum of their radii, with smooth
- * displacements along fibers and no bends sharper than fibers can bear. STATUS_NO_MEMORY, STATUS_CANCELLED. */
+ * displacements along fibers and no bends sharper than fibers can bear. fit: NULL saves a round, because its overlaps
+ * take one. STATUS_NO_MEMORY, STATUS_CANCELLED. */
 status strand_relax(struct strand_set *s, const struct strand_relax_option *o, struct thread_pool *pool,
                     const struct progress *progress, struct strand_fit *fit, struct error *err);
 

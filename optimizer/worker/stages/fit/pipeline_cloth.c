@@ -139,7 +139,7 @@ struct pipeline_cloth_trace {
     } built[CLOTH_MAX_MOVED + 1];
 };
 
-/* Makes the fibers of the described cloth at the values of all of its numbers. */
+/* Makes the fibers of the described cloth at the values of all of its numbers. report: NULL if not wanted. */
 static status build_tile(struct pipeline_context *c, const double *value, struct variant variant, struct fiber_set *f,
                          struct cloth_report *report, struct error *err)
 {
@@ -205,9 +205,8 @@ static status scene_of(struct pipeline_cloth_trace *t, const double *number, str
     scene_free(to->scene);
     to->scene = NULL;
     fiber_set_init(&fiber);
-    struct cloth_report report;
     double value[CLOTH_MAX_NUMBER];
-    status s = make_fibers(t->c, number, variant, value, &fiber, &report, err);
+    status s = make_fibers(t->c, number, variant, value, &fiber, NULL, err);
     if (s == STATUS_OK) s = pipeline_fiber_scene(t->c, &fiber, &to->scene, err);
     fiber_set_release(&fiber);
     memcpy(to->number, number, n_bytes);

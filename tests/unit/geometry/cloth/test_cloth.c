@@ -41,7 +41,7 @@ static void build(const struct cloth_description *d, const double *number, struc
     if (st != STATUS_OK) fail_msg("%s: %s", err.field, err.text);
 }
 
-/* Every weave makes fibers that continue across the faces, and the same ones with two threads. */
+/* Every weave makes fibers that continue across the faces, and the same ones with two threads, and without a report. */
 static void test_every_weave(void **state)
 {
     (void)state;
@@ -49,14 +49,17 @@ static void test_every_weave(void **state)
     assert_int_equal(thread_pool_new(2, &pool, NULL), STATUS_OK);
     for (const char *const *weave = cloth_weave_names; *weave != NULL; weave++) {
         struct cloth_description d = small_cloth(*weave);
-        struct fiber_set f, g;
+        struct fiber_set f, g, bare;
         struct cloth_report r, again;
         struct fiber_seam seam;
         build(&d, NULL, NULL, &f, &r);
         build(&d, NULL, pool, &g, &again);
+        build(&d, NULL, NULL, &bare, NULL);
         assert_int_equal(f.n_vertex, g.n_vertex);
         assert_memory_equal(f.position_m, g.position_m, 3 * f.n_vertex * sizeof *f.position_m);
         assert_memory_equal(&r, &again, sizeof r);
+        assert_int_equal(f.n_vertex, bare.n_vertex);
+        assert_memory_equal(f.position_m, bare.position_m, 3 * f.n_vertex * sizeof *f.position_m);
         assert_int_equal(fiber_seam_measure(&f, &seam, NULL), STATUS_OK);
         /* staples that end within a radius of a face by chance have no partner there */
         if (d.structure != CLOTH_VELVET) assert_true(seam.n_end[0] > 20 && seam.share[0] > 0.8);
@@ -65,6 +68,7 @@ static void test_every_weave(void **state)
         assert_int_equal(fiber_set_n_group(&f), d.n_kind);
         fiber_set_release(&f);
         fiber_set_release(&g);
+        fiber_set_release(&bare);
     }
     thread_pool_free(pool);
 }
