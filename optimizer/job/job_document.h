@@ -98,8 +98,14 @@ struct job_candidate {
 };
 
 /* How a picture is rendered: path by path, by the tables of renderer/fast, by tables with some whole paths, whose
- * expectation is that of path tracing, or by dual scattering (renderer/dual). */
-enum job_picture_method { JOB_PICTURE_PATH, JOB_PICTURE_FAST, JOB_PICTURE_CORRECTED, JOB_PICTURE_DUAL };
+ * expectation is that of path tracing, by dual scattering (renderer/dual), or by diffusion (renderer/diffusion). */
+enum job_picture_method {
+    JOB_PICTURE_PATH,
+    JOB_PICTURE_FAST,
+    JOB_PICTURE_CORRECTED,
+    JOB_PICTURE_DUAL,
+    JOB_PICTURE_DIFFUSION
+};
 
 enum job_surface { JOB_ON_FLAT, JOB_ON_CYLINDER, JOB_ON_DRAPE, JOB_ON_MESH };
 

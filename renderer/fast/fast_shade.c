@@ -24,14 +24,6 @@ struct seen_hit {
 
 static float dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-/* A direction of the scene in the flat cloth. */
-static void to_cloth(const struct scene_place *p, const float d[3], float out[3])
-{
-    for (int a = 0; a < 3; a++) out[a] = dot(p->to_cloth[a], d);
-    float inv = 1 / sqrtf(dot(out, out));
-    for (int a = 0; a < 3; a++) out[a] *= inv;
-}
-
 static void describe(const struct fast_setting *s, const struct scene_ray *ray, struct seen_hit *h)
 {
     memcpy(h->offset_mm, ray->offset_mm, sizeof h->offset_mm);
@@ -58,7 +50,7 @@ static bool reaches(const struct fast_setting *s, const struct seen_hit *h, cons
     uint32_t row = t->segment_row[h->hit.i_segment];
     float d[3];
     if (row == FAST_NO_ROW) return false;
-    to_cloth(&h->place, direction, d);
+    scene_place_to_cloth(&h->place, direction, d);
     return fast_tables_distance(t, row, d) > 0 && !scene_shell_shades(scene, &h->hit, &h->place, no_shift, direction);
 }
 
@@ -91,9 +83,9 @@ static void add_gaussian_lamp(const struct fast_setting *s, const struct seen_hi
     if (!lamp_sample(lamp, h->position_mm, u, direction, &pdf) ||
         scene_shell_shades(s->path.scene, &h->hit, &h->place, no_shift, direction))
         return;
-    to_cloth(&h->place, h->hit.tangent, f.tangent);
-    to_cloth(&h->place, h->wo_scene, f.wo);
-    to_cloth(&h->place, middle, axis);
+    scene_place_to_cloth(&h->place, h->hit.tangent, f.tangent);
+    scene_place_to_cloth(&h->place, h->wo_scene, f.wo);
+    scene_place_to_cloth(&h->place, middle, axis);
     gaussian_light_scatter(s->option->tables, &f, axis, lamp->sharpness, rgb);
     for (int c = 0; c < 3; c++) radiance[c] += lamp->radiance * rgb[c];
 }
@@ -167,7 +159,7 @@ static void add_lamp_directions(const struct fast_setting *s, const struct scene
         float direction[3], d[3], even[2] = {((float)i + 0.5f) / (float)n, fmodf(0.61803399f * (float)i, 1)};
         float e = lamp_irradiance(&s->path.lights.lamp, position_mm, n > 1 ? even : u, direction) / (float)n;
         const float rgb[3] = {e, e, e};
-        to_cloth(place, direction, d);
+        scene_place_to_cloth(place, direction, d);
         add_direction(s->option->tables, d, rgb, NULL, coefficient);
     }
 }
@@ -184,7 +176,7 @@ static void light_coefficients(const struct fast_setting *s, const struct scene_
     if (s->path.lights.has_lamp)
         add_lamp_directions(s, place, position_mm, u, gaussian && u == NULL ? GAUSSIAN_DIRECTIONS : 1, coefficient);
     for (size_t i = 0; i < s->mixture.n; i++) {
-        to_cloth(place, s->mixture.direction[i], d);
+        scene_place_to_cloth(place, s->mixture.direction[i], d);
         add_direction(t, d, s->mixture.rgb[i], s->mixture.zonal, coefficient);
     }
 }
@@ -205,8 +197,8 @@ static void apply_transfer(const struct fast_tables *t, uint32_t row, const floa
 static float table_frame(const struct seen_hit *h, float row[3][3])
 {
     float wo[3];
-    to_cloth(&h->place, h->hit.tangent, row[2]);
-    to_cloth(&h->place, h->wo_scene, wo);
+    scene_place_to_cloth(&h->place, h->hit.tangent, row[2]);
+    scene_place_to_cloth(&h->place, h->wo_scene, wo);
     float along = dot(wo, row[2]);
     for (int a = 0; a < 3; a++) row[0][a] = wo[a] - along * row[2][a];
     float length2 = dot(row[0], row[0]);

@@ -6,6 +6,8 @@
 
 #include "renderer/scene/scene_ray.h"
 
+#include <math.h>
+
 /* A hit in the flat cloth. */
 struct scene_place {
     float position_mm[3]; /* x and y within the tile */
@@ -16,6 +18,18 @@ struct scene_place {
 struct scene_segment {
     float middle_mm[3], tangent[3], radius_mm;
 };
+
+/* A direction of the scene in the flat cloth, of length 1. */
+static inline void scene_place_to_cloth(const struct scene_place *p, const float d[3], float out[3])
+{
+    float length2 = 0;
+    for (int a = 0; a < 3; a++) {
+        out[a] = p->to_cloth[a][0] * d[0] + p->to_cloth[a][1] * d[1] + p->to_cloth[a][2] * d[2];
+        length2 += out[a] * out[a];
+    }
+    float inv = 1 / sqrtf(length2);
+    for (int a = 0; a < 3; a++) out[a] *= inv;
+}
 
 bool scene_is_bent(const struct scene *scene);
 void scene_segment_at(const struct scene *scene, uint32_t i_segment, struct scene_segment *segment);

@@ -1,5 +1,6 @@
 #include "renderer/transport/radiance_source.h"
 
+#include "renderer/diffusion/diffusion_radiance.h"
 #include "renderer/dual/dual_radiance.h"
 #include "renderer/fast/fast_radiance.h"
 #include "renderer/transport/surface/surface_radiance.h"
@@ -25,6 +26,7 @@ status radiance_source_init(struct radiance_source *s, const struct radiance_inp
     s->tracer = in->model->kind != MODEL_SURFACE ? &volume_radiance
                 : in->fast != NULL               ? &fast_radiance
                 : in->dual != NULL               ? &dual_radiance
+                : in->diffusion != NULL          ? &diffusion_radiance
                                                  : &surface_radiance;
     s->model = in->model;
     s->n_set = in->n_set > 1 ? in->n_set : 1;

@@ -1,8 +1,8 @@
 /* One cloth with one model of appearance at given parameter values, ready to be traced: what estimates, pictures and
  * the derivative check are made from. Three implementations stand behind one table of functions: fibers with a
  * scattering model (surface/surface_radiance.c), the same by tables (renderer/fast/fast_radiance.c), and a density
- * volume with a phase function (volume/volume_radiance.c). A fourth, for previews, is dual scattering of fibers
- * (renderer/dual/dual_radiance.c).
+ * volume with a phase function (volume/volume_radiance.c). Two more serve previews: dual scattering of fibers
+ * (renderer/dual/dual_radiance.c), and diffusion in a pile (renderer/diffusion/diffusion_radiance.c).
  *
  * Derivatives are numbered flat: the parameters of set 0, then of set 1, ...; those of channel c start at c * n_flat.
  * A source is immutable after radiance_source_init: threads share it. It copies nothing of its input.
@@ -20,8 +20,9 @@
 
 enum { RADIANCE_BLOCK_PATHS = 256, RADIANCE_NAME_BYTES = 56 };
 
-struct fast_option; /* renderer/fast/fast_option.h */
-struct dual_option; /* renderer/dual/dual_option.h */
+struct fast_option;      /* renderer/fast/fast_option.h */
+struct dual_option;      /* renderer/dual/dual_option.h */
+struct diffusion_option; /* renderer/diffusion/diffusion_option.h */
 
 /* One cloth in the forms in which it is at hand. */
 struct appearance_scene {
@@ -35,12 +36,13 @@ struct radiance_input {
     const double *param; /* max(n_set, 1) * model->n_param, internal units, one set after the other */
     size_t n_set;        /* parameter sets for the material groups of the fibers; 0 and 1: one set for all fibers */
     bool want_derivative;
-    const struct discrepancy *discrepancy; /* a factor on what the cloth of a surface model sends to the camera
-                                              (discrepancy.h); NULL: 1. Not for recorded paths, by tables or by dual
-                                              scattering */
-    const struct fast_option *fast;        /* NULL: path tracing; otherwise fibers are rendered by tables, without
+    const struct discrepancy *discrepancy;    /* a factor on what the cloth of a surface model sends to the camera
+                                              (discrepancy.h); NULL: 1. Not for recorded paths, by tables, by dual
+                                              scattering or by diffusion */
+    const struct fast_option *fast;           /* NULL: path tracing; otherwise fibers are rendered by tables, without
                                        derivatives */
-    const struct dual_option *dual;        /* NULL, or fibers by dual scattering, without derivatives */
+    const struct dual_option *dual;           /* NULL, or fibers by dual scattering, without derivatives */
+    const struct diffusion_option *diffusion; /* NULL, or cloths with a pile by diffusion, without derivatives */
     bool plain_paths; /* trace no guided shadow paths (path_tracer.h): same means, more variance; volumes have none */
 };
 

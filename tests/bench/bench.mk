@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-pictures bench-weave bench-weave-rendered
+.PHONY: bench bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-pictures bench-pile bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -28,6 +28,11 @@ bench-recovery: | deps-test ## whether a fit of each surface model finds its own
 bench-pictures: | deps-test ## the fast renderer against path tracing on three fabrics (half an hour on 2 quiet cores)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/pictures/bench_pictures >&2
 	@$(BUILD)/tests/bench/pictures/bench_pictures $(PICTURES)
+
+# PILE: some of the cloths only, and options of the program, such as PILE="dark --paths 1024"
+bench-pile: | deps-test ## previews of velvets by dual scattering and by diffusion against path tracing (a minute on 2 quiet cores)
+	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/pictures/bench_pile >&2
+	@$(BUILD)/tests/bench/pictures/bench_pile $(PILE)
 
 # WEAVES, CONDITIONS: comma-separated, such as WEAVES=twill CONDITIONS=spread,hollow; then without time and memory
 bench-geometry: | deps-test ## accuracy of reconstructed fibers on phantoms and real scans; time and memory

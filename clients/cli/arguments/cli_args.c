@@ -42,7 +42,7 @@ static const struct cli_option {
      offsetof(struct cli_args, camera)},
     {OPT_PICTURE, 0, "px", "N", "width and height of the picture (default: 512)", offsetof(struct cli_args, px)},
     {OPT_PICTURE, 0, "samples", "N", "paths of a pixel (default: 16)", offsetof(struct cli_args, samples)},
-    {OPT_PICTURE, 0, "method", "HOW", "path, fast, corrected or dual (default: path)",
+    {OPT_PICTURE, 0, "method", "HOW", "path, fast, corrected, dual or diffusion (default: path)",
      offsetof(struct cli_args, method)},
     {OPT_PICTURE, 0, "reference", NULL, "compare it with path tracing (default: --method fast)",
      offsetof(struct cli_args, reference)},

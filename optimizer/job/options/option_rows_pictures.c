@@ -5,7 +5,7 @@
 
 static const char *const surface_names[] = {"flat", "cylinder", "drape", "mesh", NULL};
 static const char *const visibility_names[] = {"traced", "tables", NULL};
-static const char *const method_names[] = {"path", "fast", "corrected", "dual", NULL};
+static const char *const method_names[] = {"path", "fast", "corrected", "dual", "diffusion", NULL};
 
 const struct job_option option_rows_pictures[] = {
     {.path = "pictures",
@@ -113,7 +113,9 @@ const struct job_option option_rows_pictures[] = {
          "`path`: every path is traced. `fast`: light that is scattered often comes from tables, with less noise "
          "and a small error (docs/bent-cloth.md). `corrected`: the same, with whole paths that take the error off. "
          "`dual`: light that is scattered often is estimated from the number of fibers before the lamp (dual "
-         "scattering), quickly and roughly, as a preview."},
+         "scattering), quickly and roughly, as a preview. `diffusion`: for cloths with a pile, two hits of each path "
+         "are "
+         "traced, and light that is scattered more often diffuses through the pile, as a preview."},
     {.path = "pictures[].visibility",
      .kind = OPTION_SWITCH,
      OF_PICTURE(visibility_by_tables),

@@ -1,8 +1,7 @@
 #include "renderer/fast/precompute/seen_places.h"
-#include "base/rng.h"
 #include "renderer/scene/scene_place.h"
+#include "renderer/transport/surface/fiber_walk.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,17 +16,10 @@ struct find_job {
 static void find_one(const struct scene *s, uint32_t i, struct seen_place *out)
 {
     struct rng rng;
-    double tile_mm[2];
-    rng_start(&rng, &key, i, 0);
-    scene_tile_mm(s, tile_mm);
-    double u = rng_double(&rng), r = sqrt(u), phi = 2.0 * M_PI * rng_double(&rng);
-    bool below = !scene_has_black_sheet(s) && i % 2 == 1;
-    double z = sqrt(1.0 - u) + 1e-6, side = below ? -1.0 : 1.0;
-    const double d[3] = {r * cos(phi), r * sin(phi), -side * z};
-    double start[3] = {tile_mm[0] * rng_double(&rng), tile_mm[1] * rng_double(&rng),
-                       below ? -scene_thickness_mm(s) - 0.01 : 0.01};
     struct scene_ray ray;
-    out->met = scene_ray_enter(s, start, d, &ray) && scene_trace(s, &ray, &out->hit);
+    rng_start(&rng, &key, i, 0);
+    bool below = !scene_has_black_sheet(s) && i % 2 == 1;
+    out->met = fiber_walk_enter(s, below, &rng, &ray) && scene_trace(s, &ray, &out->hit);
     if (!out->met) return;
     struct scene_place place;
     scene_place_of(s, &out->hit, ray.offset_mm, &place);

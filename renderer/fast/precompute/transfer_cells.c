@@ -7,13 +7,12 @@
 #include "renderer/fast/precompute/precompute_parts.h"
 #include "renderer/fast/precompute/seen_places.h"
 #include "renderer/fast/sphere_harmonics.h"
-#include "renderer/transport/path_value.h"
-#include "renderer/transport/surface/fiber_frame.h"
+#include "renderer/transport/surface/fiber_walk.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_BOUNCE = 10000, PILOT_PATHS = 8192, LEAST_PATHS = 1024, MOST_CELL = 200000, FROM_VERTEX = 5 };
+enum { PILOT_PATHS = 8192, LEAST_PATHS = 1024, MOST_CELL = 200000, FROM_VERTEX = 5 };
 static const struct rng_key walk_key = {.seed = 0x7472616e73666572u};
 
 /* A path from a place that is seen, to where it leaves the cloth. */
@@ -32,43 +31,6 @@ static void uniform_direction(struct rng *rng, float d[3])
     d[0] = r * cosf(phi);
     d[1] = r * sinf(phi);
     d[2] = z;
-}
-
-static void leave(const struct precompute_job *j, const struct scene_hit *hit, const double offset_mm[2],
-                  const float direction[3], struct rng *rng, struct scene_ray *ray)
-{
-    if (j->sets.model->across_width)
-        scene_ray_leave_across(hit, offset_mm, direction, rng_float(rng), ray);
-    else
-        scene_ray_leave(hit, offset_mm, direction, ray);
-}
-
-/* Scatters the path at a hit into ray. False: it ends there. */
-static bool scatter(const struct precompute_job *j, const struct scene_hit *hit, struct scene_ray *ray, struct rng *rng,
-                    float throughput[3])
-{
-    const struct scattering_model *m = j->sets.model;
-    const struct scattering_state *state =
-        j->sets.state[j->sets.n > 1 ? scene_group_of(j->q->scene, hit->i_segment) : 0];
-    const float back[3] = {-ray->direction[0], -ray->direction[1], -ray->direction[2]};
-    const double offset_mm[2] = {ray->offset_mm[0], ray->offset_mm[1]};
-    struct fiber_frame frame;
-    float wo[3], wi[3], u[3], rgb[3], direction[3], next[3], survival = 1;
-    fiber_frame_from(&frame, hit->tangent);
-    fiber_frame_to_local(&frame, back, wo);
-    for (int a = 0; a < 3; a++) u[a] = rng_float(rng);
-    m->sample(state, wo, throughput, u, wi);
-    float pdf = m->eval_pdf(state, wi, wo, throughput, rgb, NULL);
-    if (!(pdf > 0)) return false;
-    for (int c = 0; c < 3; c++) next[c] = throughput[c] * rgb[c] * fiber_frame_cos_theta(wi) / pdf;
-    float most = path_value_largest(next);
-    if (!(most > 0)) return false;
-    if (most < PATH_SURFACE_ROULETTE_BELOW && !path_value_survives(most, PATH_SURFACE_ROULETTE_BELOW, rng, &survival))
-        return false;
-    for (int c = 0; c < 3; c++) throughput[c] = next[c] / survival;
-    fiber_frame_to_world(&frame, wi, direction);
-    leave(j, hit, offset_mm, direction, rng, ray);
-    return true;
 }
 
 static void true_position(const struct scene_hit *hit, const struct scene_ray *ray, double x[3])
@@ -92,8 +54,8 @@ static void walk(const struct precompute_job *j, const struct seen_place *place,
     for (int a = 0; a < 3; a++) start[a] = x[a] = (double)hit.position_mm[a];
     *end = (struct walk_end){.throughput = {1, 1, 1}};
     uniform_direction(rng, end->from);
-    leave(j, &hit, no_offset, end->from, rng, &ray);
-    for (int i = 0; i < MOST_BOUNCE; i++) {
+    fiber_walk_leave(j->sets.model, &hit, no_offset, end->from, rng, &ray);
+    for (int i = 0; i < FIBER_WALK_MOST_STEPS; i++) {
         if (!scene_trace(j->q->scene, &ray, &hit)) {
             end->lit = i > 0 && !scene_sheet_met(j->q->scene, &ray);
             memcpy(end->outside, ray.direction, sizeof end->outside);
@@ -106,7 +68,7 @@ static void walk(const struct precompute_job *j, const struct seen_place *place,
             end->flight_mm += sqrt(distance2(x, before, 3));
             end->n_flight += 1.0;
         }
-        if (!scatter(j, &hit, &ray, rng, end->throughput)) return;
+        if (!fiber_walk_step(j->q->scene, &j->sets, &hit, &ray, rng, end->throughput)) return;
     }
 }
 

@@ -4,6 +4,7 @@
 #include "geometry/mesh/mesh_drape.h"
 #include "geometry/mesh/mesh_shapes.h"
 #include "optimizer/job/job_folder.h"
+#include "renderer/diffusion/diffusion_tables.h"
 #include "renderer/transport/volume/volume_bent.h"
 
 #include <math.h>
@@ -111,12 +112,17 @@ static status check_surface(const struct pipeline_context *c, size_t i, const st
     const struct job_surface_picture *p = &d->surface_picture[i];
     const double mm_per_cm = 10.0;
     double at[3];
-    const bool by_tables = p->method == JOB_PICTURE_FAST || p->method == JOB_PICTURE_CORRECTED;
+    const bool pile = p->method == JOB_PICTURE_DIFFUSION;
+    const bool by_tables = p->method == JOB_PICTURE_FAST || p->method == JOB_PICTURE_CORRECTED || pile;
     if (by_tables && p->black_sheet >= 0 && (p->black_sheet != 0) != d->black_sheet)
         return error_set(
             err, STATUS_INVALID,
             "a picture by tables has the black sheet of the job, or none like it: leave out black_sheet of "
             "the picture, or take the method path");
+    if (pile) {
+        status s = diffusion_check_pile(c->scene, NULL, err);
+        if (s != STATUS_OK) return s;
+    }
     point_from(p->camera_theta_deg, p->camera_phi_deg - p->cloth_rotation_deg, mm_per_cm * d->camera_distance_cm, at);
     if (!d->camera_far_field && scene_encloses(bent, at))
         return error_set(err, STATUS_INVALID,

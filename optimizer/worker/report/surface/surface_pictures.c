@@ -22,7 +22,7 @@
 enum { STREAM = 4000 };
 static const double mm = 1e-3;
 
-static const char *const method_name[] = {"path", "fast", "corrected", "dual"};
+static const char *const method_name[] = {"path", "fast", "corrected", "dual", "diffusion"};
 static const char *const surface_name[] = {"flat", "cylinder", "drape", "mesh"};
 
 /* One picture of the document. */
@@ -203,6 +203,7 @@ static status render_reference(struct pipeline_context *c, const struct one_pict
     snprintf(name, sizeof name, "%s-reference", picture->name);
     q.input.fast = NULL;
     q.input.dual = NULL;
+    q.input.diffusion = NULL;
     q.stream += JOB_MAX_SURFACE_PICTURE;
     status s = surface_passes_start(c, name, q.width, q.height, &traced, err);
     while (s == STATUS_OK && traced.n_sample < q.n_sample) s = surface_passes_add(c, &q, progress, &traced, err);

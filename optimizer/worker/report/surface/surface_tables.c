@@ -9,6 +9,8 @@
 /* Three traced hits leave a third of the error of one (renderer/fast/NOTES.md); the transfer to a cell has an error of
  * 1 to 2 % by so many paths. */
 enum { N_TRACED = 3, CELL_PATHS = 8000 };
+/* Two hits before diffusion leave its means without a part that stays (renderer/diffusion/NOTES.md). */
+enum { N_TRACED_IN_PILE = 2 };
 #define JOURNAL_EVERY_S 2.0
 /* Of dual scattering: cloth is dense (fabric thesis, section 6.6). */
 #define DENSITY 1.0f
@@ -38,6 +40,13 @@ static bool wants_averages(const struct pipeline_context *c, bool of_filters)
         const struct job_surface_picture *p = &c->doc->surface_picture[i];
         if (p->method == JOB_PICTURE_DUAL || (of_filters && p->filter)) return true;
     }
+    return false;
+}
+
+static bool wants_method(const struct pipeline_context *c, enum job_picture_method m)
+{
+    for (size_t i = 0; i < c->doc->n_surface_picture; i++)
+        if (c->doc->surface_picture[i].method == m) return true;
     return false;
 }
 
@@ -75,15 +84,31 @@ static status get_tables(struct pipeline_context *c, const struct progress *prog
     return s;
 }
 
+static status get_pile(struct pipeline_context *c, const struct progress *progress, struct surface_tables *t,
+                       struct error *err)
+{
+    const struct pipeline_model *model = &c->model[pipeline_best_model(c)];
+    const struct diffusion_request q = {.scene = c->scene,
+                                        .model = model->appearance.surface,
+                                        .param = model->fit.param,
+                                        .n_set = model->sets.n_set,
+                                        .n_traced = N_TRACED_IN_PILE};
+    struct progress silent = progress_silent(progress);
+    status s = diffusion_tables_make(&q, c->pool, &silent, &t->pile, err);
+    t->piled = s == STATUS_OK;
+    return s;
+}
+
 status surface_tables_get(struct pipeline_context *c, const struct progress *progress, struct surface_tables *t,
                           struct error *err)
 {
     const struct pipeline_model *model = &c->model[pipeline_best_model(c)];
-    const bool tables = wants_tables(c), averages = wants_averages(c, true);
+    const bool tables = wants_tables(c), averages = wants_averages(c, true),
+               pile = wants_method(c, JOB_PICTURE_DIFFUSION);
     *t = (struct surface_tables){0};
-    if (!tables && !averages) return STATUS_OK;
+    if (!tables && !averages && !pile) return STATUS_OK;
     if (model->appearance.kind != MODEL_SURFACE || scattering_frame_reason(model->appearance.surface) != NULL) {
-        if (tables || wants_averages(c, false))
+        if (tables || pile || wants_averages(c, false))
             worker_status_warn(c->status,
                                "all pictures are rendered path by path: there are no tables for the model '%s'",
                                model->appearance.id);
@@ -96,6 +121,7 @@ status surface_tables_get(struct pipeline_context *c, const struct progress *pro
                              c->pool, &silent, err);
         t->averaged = s == STATUS_OK;
     }
+    if (s == STATUS_OK && pile) s = get_pile(c, progress, t, err);
     return s == STATUS_OK && tables ? get_tables(c, progress, t, err) : s;
 }
 
@@ -107,18 +133,22 @@ void surface_tables_release(struct surface_tables *t)
 
 struct surface_method surface_tables_method(const struct surface_tables *t, const struct job_surface_picture *p)
 {
-    const bool dual = p->method == JOB_PICTURE_DUAL, has = dual ? t->averaged : t->present;
+    const bool has = p->method == JOB_PICTURE_DUAL        ? t->averaged
+                     : p->method == JOB_PICTURE_DIFFUSION ? t->piled
+                                                          : t->present;
     return (struct surface_method){
         .method = has ? p->method : JOB_PICTURE_PATH,
         .fast = {.tables = &t->tables,
                  .visibility = p->visibility_by_tables ? FAST_TABLES : FAST_TRACED,
                  .n_traced = N_TRACED,
                  .corrected_share = p->method == JOB_PICTURE_CORRECTED ? corrected_share : 0.0},
-        .dual = {&t->averages, DENSITY, DENSITY}};
+        .dual = {&t->averages, DENSITY, DENSITY},
+        .diffusion = {&t->pile}};
 }
 
 void surface_method_apply(const struct surface_method *m, struct radiance_input *input)
 {
     input->fast = by_tables(m->method) ? &m->fast : NULL;
     input->dual = m->method == JOB_PICTURE_DUAL ? &m->dual : NULL;
+    input->diffusion = m->method == JOB_PICTURE_DIFFUSION ? &m->diffusion : NULL;
 }
