@@ -12,9 +12,9 @@ struct last_hit {
     float leaving[2][3];  /* fraction of the light of each side that goes towards the eye */
 };
 
-/* Whether the cloth, where it is bent, stands before light from a direction at a place around the hit: light enters at a
- * distance that is drawn from the dipole of one channel. weight: density of the distance in each channel over that with
- * which it was drawn. */
+/* Whether the cloth, where it is bent, stands before light from a direction at a place around the hit: light enters at
+ * a distance that is drawn from the dipole of one channel. weight: density of the distance in each channel over that
+ * with which it was drawn. */
 static bool enters_around(const struct diffusion_setting *s, const struct last_hit *h, size_t side,
                           const float direction[3], struct rng *rng, float weight[3])
 {

@@ -1,10 +1,11 @@
 /* Previews of cloths with a pile against path tracing: dual scattering, and diffusion with different numbers of traced
- * hits, in its own form (diffusion) and without the factor on pairs of directions (product). Prints one JSON object on each line, and details to standard error.
+ * hits, in its own form (diffusion) and without the factor on pairs of directions (product). Prints one JSON object on
+ * each line, and details to standard error.
  *
  *   pictures.pile.<cloth>.<method>.rel_rms
  *       Root mean square of the differences between the mean radiances of 27 configurations (three elevations of the
- *       lamp, three azimuths, three of the camera) and 3 channels, over the mean of path tracing. What the noise of both
- *       adds is taken off.
+ *       lamp, three azimuths, three of the camera) and 3 channels, over the mean of path tracing. What the noise of
+ *       both adds is taken off.
  *   pictures.pile.<cloth>.<method>.rel_mean
  *       Difference of the means over all of them, over that of path tracing.
  *

@@ -1,4 +1,5 @@
-/* The dipole: closed forms against quadrature, samples against their distribution, and the medium that is found again. */
+/* The dipole: closed forms against quadrature, samples against their distribution, and the medium that is found again.
+ */
 #include "base/rng.h"
 #include "renderer/diffusion/diffuse_dipole.h"
 #include "tests/support/statistics_test.h"
