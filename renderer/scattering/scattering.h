@@ -11,6 +11,7 @@
 
 #include "base/catalogue/model_catalogue.h"
 #include "base/status.h"
+#include "base/thread_pool.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -46,6 +47,9 @@ struct scattering_model {
 
     /* STATUS_INVALID, field = parameter name, for a value that is NaN or outside [lower, upper]. */
     status (*prepare)(const double *param, struct scattering_state **state, struct error *err);
+    /* The same with the threads of a pool, and with the same bits. NULL: there is nothing to share among threads. */
+    status (*prepare_shared)(const double *param, struct thread_pool *pool, struct scattering_state **state,
+                             struct error *err);
     void (*release)(struct scattering_state *state);
 
     /* S in rgb, and if score != NULL the derivative of ln S_c by each flat parameter: score[c * n_param + p] (zero
@@ -68,6 +72,11 @@ struct scattering_model {
     void (*gaussian)(const struct scattering_state *state, const float axis[3], float sharpness, const float wo[3],
                      float rgb[3]);
 };
+
+/* Prepares a model with the threads of a pool where it can share them; NULL: in the caller alone. Not to be called by a
+ * task of the pool. */
+status scattering_prepare(const struct scattering_model *m, const double *param, struct thread_pool *pool,
+                          struct scattering_state **state, struct error *err);
 
 /* Why v of the fiber frame matters to a model, for error texts: "its fibers are flat". NULL when it does not: then
  * renderers may take any v. */

@@ -57,7 +57,7 @@ status profile_model_predict(const struct scattering_model *model, const double 
 {
     const struct progress silent = progress_silent(work->progress);
     struct scattering_state *state = NULL;
-    status s = model->prepare(param, &state, err);
+    status s = scattering_prepare(model, param, work->pool, &state, err);
     if (s != STATUS_OK) return s;
     struct prediction d = {.model = model,
                            .state = state,

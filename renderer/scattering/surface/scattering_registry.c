@@ -24,6 +24,13 @@ int scattering_param_index(const struct scattering_model *m, const char *name)
     return param_index(m->param, m->n_param, name);
 }
 
+status scattering_prepare(const struct scattering_model *m, const double *param, struct thread_pool *pool,
+                          struct scattering_state **state, struct error *err)
+{
+    return pool != NULL && m->prepare_shared != NULL ? m->prepare_shared(param, pool, state, err)
+                                                     : m->prepare(param, state, err);
+}
+
 const char *scattering_frame_reason(const struct scattering_model *m)
 {
     if (m->flat_section) return "its fibers are flat";

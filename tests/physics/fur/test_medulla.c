@@ -66,7 +66,7 @@ static void along_against_walks(void **unused)
         for (int k = 0; k < 2; k++)
             assert_int_equal(medulla_trace_slab(&medium, N_WALK, (uint64_t)(6000 + 2 * i + k), walk[k], &err),
                              STATUS_OK);
-        assert_int_equal(medulla_along_init(&along, medium.depth, medium.g, &err), STATUS_OK);
+        assert_int_equal(medulla_along_init(&along, medium.depth, medium.g, NULL, &err), STATUS_OK);
         for (int a = 0; a < MEDULLA_N_SUM; a++)
             for (int b = 0; b < MEDULLA_N_DIFFERENCE; b++) {
                 double sum = a * M_PI / (MEDULLA_N_SUM - 1), difference = b * M_PI / (MEDULLA_N_DIFFERENCE - 1);
@@ -121,7 +121,7 @@ static void along_keeps_all_light(void **unused)
     static struct medulla_along along;
     struct error err;
     enum { N = 2000 };
-    assert_int_equal(medulla_along_init(&along, 1.7, 0.6, &err), STATUS_OK);
+    assert_int_equal(medulla_along_init(&along, 1.7, 0.6, NULL, &err), STATUS_OK);
     for (double theta = -1.5; theta < 1.55; theta += 0.3) {
         double integral[MEDULLA_N_HALF] = {0};
         for (int i = 0; i < N; i++) {

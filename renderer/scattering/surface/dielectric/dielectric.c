@@ -5,26 +5,24 @@
  * th_d = th_o, so weights are bounded but not constant.
  */
 #include "renderer/scattering/surface/dielectric/dielectric.h"
+#include "renderer/scattering/scattering_state.h"
 #include "renderer/scattering/surface/azimuth_table.h"
 
 #include <stdlib.h>
 
 #define LEAST_PROBABILITY 0.03f /* of a mode: no mode is starved, because all carry derivatives */
 
+static status fill(struct scattering_state *s, const double *param, struct thread_pool *pool, struct error *err)
+{
+    (void)pool;
+    const status st = dielectric_tables(s, param, err);
+    if (st != STATUS_OK) return st;
+    return dielectric_along_init(&s->along, param[DIELECTRIC_P_ETA], param[DIELECTRIC_P_BETA], err);
+}
+
 static status prepare(const double *param, struct scattering_state **state, struct error *err)
 {
-    status st = param_check(surface_dielectric_param, DIELECTRIC_N_PARAM, surface_dielectric_id, param, err);
-    if (st != STATUS_OK) return st;
-    struct scattering_state *s = malloc(sizeof *s);
-    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
-    st = dielectric_tables(s, param, err);
-    if (st == STATUS_OK) st = dielectric_along_init(&s->along, param[DIELECTRIC_P_ETA], param[DIELECTRIC_P_BETA], err);
-    if (st != STATUS_OK) {
-        free(s);
-        return st;
-    }
-    *state = s;
-    return STATUS_OK;
+    return scattering_state_new(&scattering_dielectric, param, fill, sizeof **state, NULL, state, err);
 }
 
 static void release(struct scattering_state *s) { free(s); }

@@ -69,8 +69,8 @@ static inline struct fur_fiber fur_fiber_of(const double *param)
     return (struct fur_fiber){param[FUR_P_ETA], param[FUR_P_KAPPA], param[FUR_P_LAYERS], param[FUR_P_MS],
                               param[FUR_P_MA]};
 }
-/* STATUS_NO_MEMORY. */
-status fur_along_init(struct fur_along *s, const double *param, struct error *err);
+/* The pool may be NULL. STATUS_NO_MEMORY. */
+status fur_along_init(struct fur_along *s, const double *param, struct thread_pool *pool, struct error *err);
 
 /* a(th); adds d ln a to d_ln. */
 float fur_scale_at(const struct fur_along *s, float theta_rad, float d_ln[FUR_N_SCALE]);

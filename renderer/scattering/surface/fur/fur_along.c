@@ -14,10 +14,10 @@ struct lobe_value {
 
 struct balance {
     struct lobe_balance solver;
-    struct fur_means means;
     struct fur_mean part[2 * N][FUR_N_LOBE];    /* shares by th_d of half so many nodes */
     struct lobe_value along[2 * N][FUR_N_LOBE]; /* M by th_i + th_o of so many nodes */
     double a[N], d_ln_a[N], d_want[FUR_N_SCALE][N], source[FUR_N_SCALE][N];
+    const struct fur_means *means;
 };
 
 /* ---- the scale of scattered light ---- */
@@ -31,8 +31,8 @@ static struct exchange exchange_of(const struct fur_along *s, const struct balan
                                    const double *param)
 {
     const double cosine = cos(0.5 * difference);
-    const struct fur_mean back = fur_mean_at(&b->means, cosine, FUR_PART_BACK),
-                          through = fur_mean_at(&b->means, cosine, FUR_PART_THROUGH);
+    const struct fur_mean back = fur_mean_at(b->means, cosine, FUR_PART_BACK),
+                          through = fur_mean_at(b->means, cosine, FUR_PART_THROUGH);
     const double all = back.v + through.v, w = through.v / all;
     float half[MEDULLA_N_HALF], d_half[MEDULLA_N_BY][MEDULLA_N_HALF];
     medulla_along_at(&s->medulla, (float)sum, (float)difference, half, d_half);
@@ -58,7 +58,7 @@ static void balance_scattered(struct fur_along *s, struct balance *b, const doub
     for (int i = 0; i < N_WIDE; i++) {
         double c = i < N_WIDE - 1 ? cos(i * step) : 0;
         y->weight[i] = c * c * step * (i == 0 ? 0.5 : 1);
-        share[i] = fur_mean_at(&b->means, c, FUR_PART_SCATTERED);
+        share[i] = fur_mean_at(b->means, c, FUR_PART_SCATTERED);
         y->want[i] = share[i].v;
     }
     for (int pass = 0; pass < 2; pass++) { /* first the scale, then its derivatives */
@@ -82,7 +82,7 @@ static void balance_scattered(struct fur_along *s, struct balance *b, const doub
         for (int i = 0; i < N_WIDE; i++) s->d_ln_wide[k][i] = (float)b->d_ln_a[i];
     }
     for (int row = 0; row <= FUR_N_ROW; row++) {
-        const struct fur_mean *m = &b->means.row[row][FUR_PART_SCATTERED];
+        const struct fur_mean *m = &b->means->row[row][FUR_PART_SCATTERED];
         s->share[row] = (float)m->v;
         for (int k = 0; k < FUR_N_MEAN_BY; k++) s->d_share[k][row] = (float)m->d[k];
     }
@@ -96,7 +96,7 @@ static void fill_nodes(const struct fur_along *s, struct balance *b)
     memset(b->d_want, 0, sizeof b->d_want);
     for (int i = 0; i < N; i++) {
         const struct fur_mean scattered =
-            fur_mean_at(&b->means, i < N - 1 ? cos(lobe_balance_angle_rad(i)) : 0, FUR_PART_SCATTERED);
+            fur_mean_at(b->means, i < N - 1 ? cos(lobe_balance_angle_rad(i)) : 0, FUR_PART_SCATTERED);
         b->solver.want[i] = 1 - scattered.v;
         for (int k = 0; k < FUR_N_MEAN_BY; k++) b->d_want[k][i] = -scattered.d[k];
     }
@@ -107,7 +107,7 @@ static void fill_nodes(const struct fur_along *s, struct balance *b)
             b->along[i][p].v = (double)tilted_lobe_eval(&s->lobe[p], (float)angle, d);
             b->along[i][p].alpha = (double)d[0] * fur_shift[p];
             b->along[i][p].beta = (double)d[1] * fur_width[p];
-            b->part[i][p] = fur_mean_at(&b->means, fmax(cos(0.5 * angle), 0), p);
+            b->part[i][p] = fur_mean_at(b->means, fmax(cos(0.5 * angle), 0), p);
         }
 }
 
@@ -168,21 +168,42 @@ static void balance_lobes(struct fur_along *s, struct balance *b)
     }
 }
 
-status fur_along_init(struct fur_along *s, const double *param, struct error *err)
+/* Both scales, which do not depend on each other. */
+enum { SCATTERED, LOBES, N_BALANCE };
+struct balances {
+    struct fur_along *along;
+    const double *param;
+    struct fur_means means;
+    struct balance balance[N_BALANCE];
+};
+
+static void balance_either(void *context, size_t which, size_t i_thread)
 {
-    struct balance *b = malloc(sizeof *b);
+    struct balances *all = context;
+    (void)i_thread;
+    all->balance[which].means = &all->means;
+    if (which == SCATTERED)
+        balance_scattered(all->along, &all->balance[which], all->param);
+    else
+        balance_lobes(all->along, &all->balance[which]);
+}
+
+status fur_along_init(struct fur_along *s, const double *param, struct thread_pool *pool, struct error *err)
+{
+    struct balances *b = malloc(sizeof *b);
     if (b == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
+    b->along = s;
+    b->param = param;
     s->fiber = fur_fiber_of(param);
-    status st = medulla_along_init(&s->medulla, param[FUR_P_KAPPA] * param[FUR_P_MS], param[FUR_P_G], err);
-    if (st != STATUS_OK) goto out;
-    for (int p = 0; p < FUR_N_LOBE; p++) {
-        s->lobe[p].shift = (float)(fur_shift[p] * param[FUR_P_ALPHA]);
-        s->lobe[p].width = (float)(fur_width[p] * param[FUR_P_BETA]);
+    status st = medulla_along_init(&s->medulla, param[FUR_P_KAPPA] * param[FUR_P_MS], param[FUR_P_G], pool, err);
+    if (st == STATUS_OK) {
+        for (int p = 0; p < FUR_N_LOBE; p++) {
+            s->lobe[p].shift = (float)(fur_shift[p] * param[FUR_P_ALPHA]);
+            s->lobe[p].width = (float)(fur_width[p] * param[FUR_P_BETA]);
+        }
+        fur_means_fill(&b->means, param, pool);
+        st = thread_pool_run(pool, N_BALANCE, balance_either, b, NULL);
     }
-    fur_means_fill(&b->means, param);
-    balance_scattered(s, b, param);
-    balance_lobes(s, b);
-out:
     free(b);
     return st;
 }

@@ -3,6 +3,7 @@
  * direction; an azimuth from N of the mode at th_d = th_o, averaged over the channels, and 2 % uniform.
  */
 #include "renderer/scattering/surface/fur/fur_far.h"
+#include "renderer/scattering/scattering_state.h"
 #include "renderer/scattering/surface/scattering_registry.h"
 
 #include <stdlib.h>
@@ -12,19 +13,21 @@
 static const int param_of[FUR_F_N] = {-1,       FUR_P_ETA, FUR_P_KAPPA, FUR_P_LAYERS,
                                       FUR_P_MS, FUR_P_MA,  FUR_P_G,     FUR_P_GAMMA};
 
+static status fill(struct scattering_state *s, const double *param, struct thread_pool *pool, struct error *err)
+{
+    const status st = fur_along_init(&s->along, param, pool, err);
+    return st == STATUS_OK ? fur_far_tables(s, param, pool, err) : st;
+}
+
+static status prepare_shared(const double *param, struct thread_pool *pool, struct scattering_state **state,
+                             struct error *err)
+{
+    return scattering_state_new(&scattering_fur, param, fill, sizeof **state, pool, state, err);
+}
+
 static status prepare(const double *param, struct scattering_state **state, struct error *err)
 {
-    status st = param_check(surface_fur_param, FUR_N_PARAM, surface_fur_id, param, err);
-    if (st != STATUS_OK) return st;
-    struct scattering_state *s = malloc(sizeof *s);
-    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
-    st = fur_along_init(&s->along, param, err);
-    if (st == STATUS_OK) st = fur_far_tables(s, param, err);
-    if (st == STATUS_OK)
-        *state = s;
-    else
-        free(s);
-    return st;
+    return prepare_shared(param, NULL, state, err);
 }
 
 static void release(struct scattering_state *s) { free(s); }

@@ -39,7 +39,7 @@ struct scattering_state {
     struct fur_slope slope[FUR_FAR_ROW + 1][FUR_N_PHI + 1];
 };
 
-/* Fills in rows, cells and slopes. STATUS_NO_MEMORY. */
-status fur_far_tables(struct scattering_state *s, const double *param, struct error *err);
+/* Fills in rows, cells and slopes. The pool may be NULL. STATUS_NO_MEMORY. */
+status fur_far_tables(struct scattering_state *s, const double *param, struct thread_pool *pool, struct error *err);
 
 #endif

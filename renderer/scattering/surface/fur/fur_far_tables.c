@@ -10,20 +10,26 @@ enum { VALUE, BY = 1, N_SUM = BY + FUR_F_GAMMA, BY_GAMMA = N_SUM, N_QUANTITY };
 #define LEAST_FACTOR 5.5 /* waves with k w above this have a factor below exp(-5.5^2 / 2) = 3e-7 */
 #define FADED 3e-6
 
-struct work {
-    double wave[FUR_FAR_N_LOBE][N_WAVE][3][N_SUM]; /* Fourier coefficients: mean of A cos(k Phi), and derivatives */
+/* What all rows need. */
+struct common {
     double cosine[N_WAVE][FUR_N_PHI + 1];
-    double column[3][N_QUANTITY][FUR_N_PHI + 1];
-    double rest[3][N_SUM], energy[FUR_FAR_N_MODE][3];
     struct fur_fiber fiber;
     struct medulla_around around;
-    float even[N_MEDULLA_WAVE][MEDULLA_ROUND_RANK], odd[N_MEDULLA_WAVE][MEDULLA_ROUND_RANK];
+    float even[MEDULLA_ROUND_RANK][N_MEDULLA_WAVE], odd[MEDULLA_ROUND_RANK][N_MEDULLA_WAVE];
     double c_t[3], gamma;
     int n_color; /* 1 where all channels have the same C_T, and so the same tables; else 3 */
 };
 
+/* A row at hand. */
+struct work {
+    const struct common *all;
+    double wave[FUR_FAR_N_LOBE][N_WAVE][3][N_SUM]; /* Fourier coefficients: mean of A cos(k Phi), and derivatives */
+    double column[3][N_QUANTITY][FUR_N_PHI + 1];
+    double rest[3][N_SUM], energy[FUR_FAR_N_MODE][3];
+};
+
 /* The channel whose tables channel c has. */
-static int color_of(const struct work *w, int c) { return w->n_color == 1 ? 0 : c; }
+static int color_of(const struct work *w, int c) { return w->all->n_color == 1 ? 0 : c; }
 
 static double mode_width(int p, double gamma) { return sqrt(p + 1.0) * gamma; }
 
@@ -38,16 +44,16 @@ static int n_wave(int p, double gamma)
 static void amplitude(const struct work *w, const struct fur_ray *ray, double weight, int c,
                       double out[FUR_N_MODE][N_SUM])
 {
-    const double ln_c = log(w->c_t[c]);
-    const struct fur_shares a = fur_shares_of(&w->fiber, ray, ln_c);
+    const double ln_c = log(w->all->c_t[c]);
+    const struct fur_shares a = fur_shares_of(&w->all->fiber, ray, ln_c);
     double part[FUR_N_PART][FUR_N_BY];
-    fur_parts(&w->fiber, ray, ln_c, part);
+    fur_parts(&w->all->fiber, ray, ln_c, part);
     for (int mode = 0; mode < FUR_N_MODE; mode++) {
         double slope[FUR_N_BY];
         fur_share_slopes(&a, mode, part, slope);
         out[mode][VALUE] = weight * a.value[mode];
         for (int k = 0; k < FUR_N_BY; k++) out[mode][BY + k] = weight * slope[k];
-        out[mode][BY + FUR_F_C] /= w->c_t[c];
+        out[mode][BY + FUR_F_C] /= w->all->c_t[c];
         out[mode][BY + FUR_F_G] = 0;
     }
 }
@@ -60,7 +66,7 @@ struct wave_factor {
 
 static void add_wave(const struct work *w, double to[3][N_SUM], double a[3][N_SUM], const struct wave_factor *f)
 {
-    for (int c = 0; c < w->n_color; c++) {
+    for (int c = 0; c < w->all->n_color; c++) {
         to[c][VALUE] += a[c][VALUE] * f->v;
         for (int q = 0; q < FUR_F_GAMMA; q++) to[c][BY + q] += a[c][BY + q] * f->v + a[c][VALUE] * f->d[q];
     }
@@ -70,7 +76,7 @@ static void add_lobe(struct work *w, const struct fur_ray *ray, int p, double x,
 {
     const double phi = 2 * p * ray->gamma_t - 2 * x + p * M_PI, c1 = cos(phi), s1 = sin(phi);
     double c = 1, s = 0;
-    for (int k = 0; k < n_wave(p, w->gamma); k++) {
+    for (int k = 0; k < n_wave(p, w->all->gamma); k++) {
         struct wave_factor f = {c, {0}};
         f.d[FUR_F_ETA] = -2.0 * p * k * ray->d_gamma_t * s;
         add_wave(w, w->wave[p][k], a, &f);
@@ -85,26 +91,28 @@ struct medulla_spectrum {
     double even[1 + MEDULLA_RAY_N_BY], odd[1 + MEDULLA_RAY_N_BY];
 };
 
-static void fill_spectrum(const struct work *w, const struct medulla_ray *m, struct medulla_spectrum *y)
+static void fill_spectrum(const struct common *all, const struct medulla_ray *m, struct medulla_spectrum *y)
 {
-    for (int k = 0; k < N_MEDULLA_WAVE; k++)
-        for (int q = 0; q <= MEDULLA_RAY_N_BY; q++) {
-            const float *weight = q == 0 ? m->weight : m->d[q - 1];
-            float even = 0, odd = 0;
-            for (int r = 0; r < MEDULLA_ROUND_RANK; r++) {
-                even += weight[r] * w->even[k][r];
-                odd += weight[r] * w->odd[k][r];
+    for (int q = 0; q <= MEDULLA_RAY_N_BY; q++) {
+        const float *weight = q == 0 ? m->weight : m->d[q - 1];
+        float even[N_MEDULLA_WAVE] = {0}, odd[N_MEDULLA_WAVE] = {0};
+        for (int r = 0; r < MEDULLA_ROUND_RANK; r++)
+            for (int k = 0; k < N_MEDULLA_WAVE; k++) {
+                even[k] += weight[r] * all->even[r][k];
+                odd[k] += weight[r] * all->odd[r][k];
             }
-            y[k].even[q] = (double)even;
-            y[k].odd[q] = (double)odd;
+        for (int k = 0; k < N_MEDULLA_WAVE; k++) {
+            y[k].even[q] = (double)even[k];
+            y[k].odd[q] = (double)odd[k];
         }
+    }
 }
 
 static void add_segment(struct work *w, const struct fur_ray *ray, const struct medulla_spectrum *y, int segment,
                         double x, double a[3][N_SUM])
 {
     double d_eta, phi = fur_segment_azimuth(ray, segment, x, &d_eta), d_depth[3];
-    fur_depth(&w->fiber, ray, d_depth);
+    fur_depth(&w->all->fiber, ray, d_depth);
     const double c1 = cos(phi), s1 = sin(phi);
     double c = 1, s = 0;
     for (int k = 0; k < N_MEDULLA_WAVE; k++) {
@@ -128,9 +136,9 @@ static void add_segment(struct work *w, const struct fur_ray *ray, const struct 
  * */
 static void add_ray(struct work *w, double cosine, double x, double weight, int coarse)
 {
-    const struct fur_ray ray = fur_ray_at(&w->fiber, cosine, x);
+    const struct fur_ray ray = fur_ray_at(&w->all->fiber, cosine, x);
     double a[FUR_N_MODE][3][N_SUM];
-    for (int c = 0; c < w->n_color; c++) {
+    for (int c = 0; c < w->all->n_color; c++) {
         double out[FUR_N_MODE][N_SUM];
         amplitude(w, &ray, weight, c, out);
         for (int mode = 0; mode < FUR_N_MODE; mode++) memcpy(a[mode][c], out[mode], sizeof out[mode]);
@@ -144,11 +152,11 @@ static void add_ray(struct work *w, double cosine, double x, double weight, int 
     struct medulla_ray m;
     struct medulla_spectrum y[N_MEDULLA_WAVE];
     double unused[3];
-    medulla_ray_init(&w->around, fur_depth(&w->fiber, &ray, unused), ray.offset.v, &m);
-    fill_spectrum(w, &m, y);
+    medulla_ray_init(&w->all->around, fur_depth(&w->all->fiber, &ray, unused), ray.offset.v, &m);
+    fill_spectrum(w->all, &m, y);
     for (int segment = 1; segment <= FUR_N_SEGMENT; segment++) {
         double(*b)[N_SUM] = a[FUR_TT_S + segment - 1];
-        for (int c = 0; c < w->n_color; c++)
+        for (int c = 0; c < w->all->n_color; c++)
             for (int q = 0; q < N_SUM; q++) b[c][q] *= coarse;
         add_segment(w, &ray, y, segment, x, b);
     }
@@ -157,7 +165,7 @@ static void add_ray(struct work *w, double cosine, double x, double weight, int 
 /* Offsets x crowd at the rims; narrow lobes need as many as they have waves, three times LEAST_OFFSET at most. */
 static void add_rays(struct work *w, struct fur_row *row, double cosine)
 {
-    const int coarse = n_wave(FUR_R, w->gamma) > LEAST_OFFSET - 20 ? 3 : 1, n = coarse * LEAST_OFFSET;
+    const int coarse = n_wave(FUR_R, w->all->gamma) > LEAST_OFFSET - 20 ? 3 : 1, n = coarse * LEAST_OFFSET;
     double sum = 0;
     memset(w->wave, 0, sizeof w->wave);
     memset(w->rest, 0, sizeof w->rest);
@@ -179,15 +187,15 @@ static void add_rays(struct work *w, struct fur_row *row, double cosine)
 static void sum_waves(struct work *w, int p)
 {
     const bool lobe = p < FUR_N_LOBE;
-    double width = lobe ? mode_width(p, w->gamma) : 0, d_width = sqrt(p + 1.0);
+    double width = lobe ? mode_width(p, w->all->gamma) : 0, d_width = sqrt(p + 1.0);
     memset(w->column, 0, sizeof w->column);
-    for (int k = 0; k < n_wave(p, w->gamma); k++) {
+    for (int k = 0; k < n_wave(p, w->all->gamma); k++) {
         double factor = exp(-0.5 * k * k * width * width) * (k == 0 ? 0.5 / M_PI : 1 / M_PI);
         double by_gamma = -(double)k * k * width * d_width;
-        for (int c = 0; c < w->n_color; c++)
+        for (int c = 0; c < w->all->n_color; c++)
             for (int q = 0; q < N_QUANTITY; q++) {
                 double v = factor * (q < N_SUM ? w->wave[p][k][c][q] : w->wave[p][k][c][VALUE] * by_gamma);
-                for (int j = 0; j <= FUR_N_PHI; j++) w->column[c][q][j] += v * w->cosine[k][j];
+                for (int j = 0; j <= FUR_N_PHI; j++) w->column[c][q][j] += v * w->all->cosine[k][j];
             }
     }
 }
@@ -210,34 +218,64 @@ static void store(const struct work *w, struct fur_cell *cell, struct fur_slope 
 }
 
 /* cos(k ph) at the azimuths of the table, each of which is one of the 2 FUR_N_PHI of a turn. */
-static void fill_cosines(struct work *w)
+static void fill_cosines(struct common *all)
 {
     double of_turn[2 * FUR_N_PHI];
     for (int i = 0; i < 2 * FUR_N_PHI; i++) of_turn[i] = cos(i * M_PI / FUR_N_PHI);
     for (int k = 0; k < N_WAVE; k++)
-        for (int j = 0; j <= FUR_N_PHI; j++) w->cosine[k][j] = of_turn[k * j % (2 * FUR_N_PHI)];
+        for (int j = 0; j <= FUR_N_PHI; j++) all->cosine[k][j] = of_turn[k * j % (2 * FUR_N_PHI)];
 }
 
-status fur_far_tables(struct scattering_state *s, const double *param, struct error *err)
+static void fill_common(struct common *all, const double *param)
 {
-    struct work *w = malloc(sizeof *w);
-    if (w == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
-    w->fiber = fur_fiber_of(param);
-    w->gamma = param[FUR_P_GAMMA];
-    for (int c = 0; c < 3; c++) w->c_t[c] = param[FUR_P_C_T + c];
-    w->n_color =
-        memcmp(&w->c_t[0], &w->c_t[1], sizeof(double)) == 0 && memcmp(&w->c_t[0], &w->c_t[2], sizeof(double)) == 0 ? 1
-                                                                                                                   : 3;
-    fill_cosines(w);
-    medulla_around_init(&w->around, param[FUR_P_G]);
-    medulla_waves(N_MEDULLA_WAVE, w->even, w->odd);
-    for (int row = 0; row <= FUR_FAR_ROW; row++) {
-        add_rays(w, &s->row[row], fmax((double)row / FUR_FAR_ROW, FUR_LEAST_COSINE));
-        for (int p = 0; p < FUR_FAR_N_LOBE; p++) {
-            sum_waves(w, p);
-            store(w, s->cell[row], s->slope[row], &s->row[row], p);
+    const double *c_t = all->c_t;
+    float even[N_MEDULLA_WAVE][MEDULLA_ROUND_RANK], odd[N_MEDULLA_WAVE][MEDULLA_ROUND_RANK];
+    all->fiber = fur_fiber_of(param);
+    all->gamma = param[FUR_P_GAMMA];
+    for (int c = 0; c < 3; c++) all->c_t[c] = param[FUR_P_C_T + c];
+    all->n_color =
+        memcmp(&c_t[0], &c_t[1], sizeof(double)) == 0 && memcmp(&c_t[0], &c_t[2], sizeof(double)) == 0 ? 1 : 3;
+    fill_cosines(all);
+    medulla_around_init(&all->around, param[FUR_P_G]);
+    medulla_waves(N_MEDULLA_WAVE, even, odd);
+    for (int k = 0; k < N_MEDULLA_WAVE; k++)
+        for (int r = 0; r < MEDULLA_ROUND_RANK; r++) {
+            all->even[r][k] = even[k][r];
+            all->odd[r][k] = odd[k][r];
         }
+}
+
+struct rows {
+    struct scattering_state *state;
+    struct work *work; /* of each thread */
+};
+
+static void fill_row(void *context, size_t row, size_t i_thread)
+{
+    const struct rows *r = context;
+    struct scattering_state *s = r->state;
+    struct work *w = &r->work[i_thread];
+    add_rays(w, &s->row[row], fmax((double)row / FUR_FAR_ROW, FUR_LEAST_COSINE));
+    for (int p = 0; p < FUR_FAR_N_LOBE; p++) {
+        sum_waves(w, p);
+        store(w, s->cell[row], s->slope[row], &s->row[row], p);
     }
-    free(w);
-    return STATUS_OK;
+}
+
+status fur_far_tables(struct scattering_state *s, const double *param, struct thread_pool *pool, struct error *err)
+{
+    const size_t n_thread = thread_pool_n_thread(pool);
+    struct common *all = malloc(sizeof *all);
+    struct rows rows = {s, calloc(n_thread, sizeof *rows.work)};
+    status st = STATUS_OK;
+    if (all == NULL || rows.work == NULL) {
+        st = error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
+    } else {
+        fill_common(all, param);
+        for (size_t i = 0; i < n_thread; i++) rows.work[i].all = all;
+        st = thread_pool_run(pool, FUR_FAR_ROW + 1, fill_row, &rows, NULL);
+    }
+    free(all);
+    free(rows.work);
+    return st;
 }

@@ -72,32 +72,42 @@ static void add_ray(const struct work *b, const struct fur_fiber *f, double cosi
     }
 }
 
-void fur_means_fill(struct fur_means *m, const double *param)
+struct rows {
+    struct work work;
+    struct fur_fiber fiber;
+    double weights; /* their sum */
+    struct fur_means *means;
+};
+
+static void fill_row(void *context, size_t row, size_t i_thread)
 {
-    struct fur_fiber f = fur_fiber_of(param);
-    struct work b;
-    double sum = 0;
-    f.sigma_ma = 0;
-    for (int i = 0; i < N_OFFSET; i++) sum += cos((i + 0.5) * M_PI_2 / N_OFFSET);
-    medulla_around_init(&b.around, param[FUR_P_G]);
+    const struct rows *r = context;
+    struct fur_mean *part = r->means->row[row];
+    (void)i_thread;
+    for (int i = 0; i < N_OFFSET; i++) {
+        double x = (i + 0.5) * M_PI_2 / N_OFFSET;
+        add_ray(&r->work, &r->fiber, fmax((double)row / FUR_N_ROW, FUR_LEAST_COSINE), x, cos(x) / r->weights, part);
+    }
+    part[FUR_PART_SCATTERED].v = part[FUR_PART_BACK].v + part[FUR_PART_THROUGH].v;
+    for (int k = 0; k < FUR_N_MEAN_BY; k++)
+        part[FUR_PART_SCATTERED].d[k] = part[FUR_PART_BACK].d[k] + part[FUR_PART_THROUGH].d[k];
+}
+
+void fur_means_fill(struct fur_means *m, const double *param, struct thread_pool *pool)
+{
+    struct rows r = {.fiber = fur_fiber_of(param), .means = m};
     float cosine[N_WAVE][MEDULLA_ROUND_RANK], sine[N_WAVE][MEDULLA_ROUND_RANK];
+    r.fiber.sigma_ma = 0;
+    for (int i = 0; i < N_OFFSET; i++) r.weights += cos((i + 0.5) * M_PI_2 / N_OFFSET);
+    medulla_around_init(&r.work.around, param[FUR_P_G]);
     medulla_waves(N_WAVE, cosine, sine);
     for (int k = 0; k < N_WAVE; k++)
-        for (int r = 0; r < MEDULLA_ROUND_RANK; r++) {
-            b.cosine[k][r] = (double)cosine[k][r];
-            b.sine[k][r] = (double)sine[k][r];
+        for (int q = 0; q < MEDULLA_ROUND_RANK; q++) {
+            r.work.cosine[k][q] = (double)cosine[k][q];
+            r.work.sine[k][q] = (double)sine[k][q];
         }
     memset(m, 0, sizeof *m);
-    for (int row = 0; row <= FUR_N_ROW; row++) {
-        struct fur_mean *part = m->row[row];
-        for (int i = 0; i < N_OFFSET; i++) {
-            double x = (i + 0.5) * M_PI_2 / N_OFFSET;
-            add_ray(&b, &f, fmax((double)row / FUR_N_ROW, FUR_LEAST_COSINE), x, cos(x) / sum, part);
-        }
-        part[FUR_PART_SCATTERED].v = part[FUR_PART_BACK].v + part[FUR_PART_THROUGH].v;
-        for (int k = 0; k < FUR_N_MEAN_BY; k++)
-            part[FUR_PART_SCATTERED].d[k] = part[FUR_PART_BACK].d[k] + part[FUR_PART_THROUGH].d[k];
-    }
+    thread_pool_run(pool, FUR_N_ROW + 1, fill_row, &r, NULL);
 }
 
 struct fur_mean fur_mean_at(const struct fur_means *m, double cos_theta, int part)

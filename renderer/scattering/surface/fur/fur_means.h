@@ -3,6 +3,8 @@
 #ifndef SELVEDGE_RENDERER_FUR_MEANS_H
 #define SELVEDGE_RENDERER_FUR_MEANS_H
 
+#include "base/thread_pool.h"
+
 /* R, TT, TRT with all longer paths, light scattered in the medulla that leaves back and that goes through, and both. */
 enum fur_part_of_light { FUR_PART_BACK = 3, FUR_PART_THROUGH, FUR_PART_SCATTERED, FUR_N_PART_OF_LIGHT };
 enum fur_mean_by { FUR_M_ETA, FUR_M_KAPPA, FUR_M_LAYERS, FUR_M_MS, FUR_M_G, FUR_N_MEAN_BY };
@@ -16,7 +18,8 @@ struct fur_means {
     struct fur_mean row[FUR_N_ROW + 1][FUR_N_PART_OF_LIGHT];
 };
 
-void fur_means_fill(struct fur_means *m, const double *param);
+/* The pool may be NULL. */
+void fur_means_fill(struct fur_means *m, const double *param, struct thread_pool *pool);
 /* Between two rows by straight lines. */
 struct fur_mean fur_mean_at(const struct fur_means *m, double cos_theta, int part);
 

@@ -1,6 +1,7 @@
 /* fur_near.v1: the near field (fur.h states the model). Sampling: a mode by its share at th_d = th_o and the weights of
  * the channels; of R, TT, TRT th_i from M and the azimuth from D about the true Phi(th_d, h); of the rest th_i from the
  * lobe of TRT and any azimuth; of scattered light any direction. */
+#include "renderer/scattering/scattering_state.h"
 #include "renderer/scattering/surface/dielectric/near_azimuth.h"
 #include "renderer/scattering/surface/dielectric/near_view.h"
 #include "renderer/scattering/surface/fur/fur.h"
@@ -19,12 +20,8 @@ struct scattering_state {
     double c_t[3], ln_c_t[3];
 };
 
-static status prepare(const double *param, struct scattering_state **state, struct error *err)
+static status fill(struct scattering_state *s, const double *param, struct thread_pool *pool, struct error *err)
 {
-    status st = param_check(surface_fur_near_param, FUR_N_PARAM, surface_fur_near_id, param, err);
-    if (st != STATUS_OK) return st;
-    struct scattering_state *s = calloc(1, sizeof *s);
-    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
     medulla_around_init(&s->around, param[FUR_P_G]);
     for (int p = 0; p < FUR_N_LOBE; p++)
         near_azimuth_init(&s->azimuth[p], NEAR_GAUSSIAN, sqrt(p + 1.0) * param[FUR_P_GAMMA]);
@@ -32,12 +29,18 @@ static status prepare(const double *param, struct scattering_state **state, stru
         s->c_t[c] = param[FUR_P_C_T + c];
         s->ln_c_t[c] = log(s->c_t[c]);
     }
-    st = fur_along_init(&s->along, param, err);
-    if (st == STATUS_OK)
-        *state = s;
-    else
-        free(s);
-    return st;
+    return fur_along_init(&s->along, param, pool, err);
+}
+
+static status prepare_shared(const double *param, struct thread_pool *pool, struct scattering_state **state,
+                             struct error *err)
+{
+    return scattering_state_new(&scattering_fur_near, param, fill, sizeof **state, pool, state, err);
+}
+
+static status prepare(const double *param, struct scattering_state **state, struct error *err)
+{
+    return prepare_shared(param, NULL, state, err);
 }
 
 static void release(struct scattering_state *s) { free(s); }
@@ -246,12 +249,7 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
 }
 
 const struct scattering_model scattering_fur_near = {
-    SURFACE_MODEL_ROW(fur_near),
-    .near_field = true,
-    .prepare = prepare,
-    .release = release,
-    .eval = eval,
-    .sample = sample,
-    .pdf = pdf,
+    SURFACE_MODEL_ROW(fur_near), .near_field = true, .prepare = prepare, .prepare_shared = prepare_shared,
+    .release = release,          .eval = eval,       .sample = sample,   .pdf = pdf,
     .eval_pdf = eval_pdf,
 };

@@ -5,6 +5,7 @@
  * uniform. The density does not know a(th) and takes th_d = th_o, so weights are bounded but not constant.
  */
 #include "renderer/scattering/surface/wave/wave_fiber.h"
+#include "renderer/scattering/scattering_state.h"
 #include "renderer/scattering/surface/azimuth_table.h"
 
 #include <stdlib.h>
@@ -26,22 +27,11 @@ static status balance(struct scattering_state *s, double beta, struct error *err
     return STATUS_OK;
 }
 
-static status prepare(const struct wave_table *table, const struct param_info *info, const char *id,
-                      const double *param, struct scattering_state **state, struct error *err)
+static status fill(struct scattering_state *s, const struct wave_table *table, const double *param, struct error *err)
 {
-    status st = param_check(info, WAVE_N_PARAM, id, param, err);
-    if (st != STATUS_OK) return st;
-    struct scattering_state *s = malloc(sizeof *s);
-    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
     s->along = (struct tilted_lobe){.shift = 0, .width = (float)param[WAVE_P_BETA]};
-    st = wave_fiber_tables(s, table, param, err);
-    if (st == STATUS_OK) st = balance(s, param[WAVE_P_BETA], err);
-    if (st != STATUS_OK) {
-        free(s);
-        return st;
-    }
-    *state = s;
-    return STATUS_OK;
+    const status st = wave_fiber_tables(s, table, param, err);
+    return st == STATUS_OK ? balance(s, param[WAVE_P_BETA], err) : st;
 }
 
 static void release(struct scattering_state *s) { free(s); }
@@ -152,9 +142,15 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
 }
 
 #define WAVE_MODEL(name)                                                                                               \
+    static status fill_##name(struct scattering_state *s, const double *param, struct thread_pool *pool,               \
+                              struct error *err)                                                                       \
+    {                                                                                                                  \
+        (void)pool;                                                                                                    \
+        return fill(s, &name##_table, param, err);                                                                     \
+    }                                                                                                                  \
     static status prepare_##name(const double *param, struct scattering_state **state, struct error *err)              \
     {                                                                                                                  \
-        return prepare(&name##_table, surface_##name##_param, surface_##name##_id, param, state, err);                 \
+        return scattering_state_new(&scattering_##name, param, fill_##name, sizeof **state, NULL, state, err);         \
     }                                                                                                                  \
     const struct scattering_model scattering_##name = {                                                                \
         SURFACE_MODEL_ROW(name), .prepare = prepare_##name,                                                            \

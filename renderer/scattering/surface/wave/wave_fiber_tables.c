@@ -64,7 +64,6 @@ status wave_fiber_tables(struct scattering_state *s, const struct wave_table *ta
     if (w == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
     for (int k = 0; k <= N_WAVE; k++)
         for (int j = 0; j <= WAVE_N_PHI; j++) w->cosine[k][j] = cos(k * j * M_PI / WAVE_N_PHI);
-    memset(s->row, 0, sizeof s->row);
     for (int row = 0; row <= WAVE_N_ROW; row++)
         for (int channel = 0; channel < 3; channel++) fill_channel(s, w, table, row, channel, param);
     free(w);

@@ -17,6 +17,7 @@
 #define SELVEDGE_RENDERER_MEDULLA_H
 
 #include "base/status.h"
+#include "base/thread_pool.h"
 #include "renderer/scattering/surface/fur/medulla/medulla_grid.h"
 
 extern const float medulla_round_depth[MEDULLA_N_DEPTH][MEDULLA_ROUND_RANK];
@@ -65,8 +66,8 @@ struct medulla_along {
     float d[MEDULLA_N_BY][MEDULLA_FINE_SUM][MEDULLA_FINE_DIFFERENCE][MEDULLA_N_HALF];
 };
 
-/* STATUS_NO_MEMORY. */
-status medulla_along_init(struct medulla_along *m, double depth, double g, struct error *err);
+/* The pool may be NULL. STATUS_NO_MEMORY. */
+status medulla_along_init(struct medulla_along *m, double depth, double g, struct thread_pool *pool, struct error *err);
 /* M of both halves for th_i + th_o and th_i - th_o, and its derivatives when d is not NULL. */
 void medulla_along_at(const struct medulla_along *m, float sum, float difference, float value[MEDULLA_N_HALF],
                       float (*d)[MEDULLA_N_HALF]);

@@ -44,36 +44,49 @@ static void fill_half(struct medulla_along *m, int half, float (*weight)[SLAB])
     }
 }
 
-static void fill(struct medulla_along *m, double depth, double g)
+static void fill(struct medulla_along *m, int half, double depth, double g)
 {
-    float depth_slope, g_slope;
+    float a[SLAB], d_a[SLAB], b[SLAB], d_b[SLAB], weight[1 + MEDULLA_N_BY][SLAB], depth_slope, g_slope;
     const struct medulla_taps by_depth = medulla_depth_taps(depth, &depth_slope), by_g = medulla_g_taps(g, &g_slope);
-    for (int half = 0; half < MEDULLA_N_HALF; half++) {
-        float a[SLAB], d_a[SLAB], b[SLAB], d_b[SLAB], weight[1 + MEDULLA_N_BY][SLAB];
-        medulla_read_factor(&by_depth, slab[half].depth, SLAB, depth_slope, a, d_a);
-        medulla_read_factor(&by_g, slab[half].g, SLAB, g_slope, b, d_b);
-        for (int r = 0; r < SLAB; r++) {
-            weight[0][r] = a[r] * b[r];
-            weight[1 + MEDULLA_BY_DEPTH][r] = d_a[r] * b[r];
-            weight[1 + MEDULLA_BY_G][r] = a[r] * d_b[r];
-        }
-        fill_half(m, half, weight);
+    medulla_read_factor(&by_depth, slab[half].depth, SLAB, depth_slope, a, d_a);
+    medulla_read_factor(&by_g, slab[half].g, SLAB, g_slope, b, d_b);
+    for (int r = 0; r < SLAB; r++) {
+        weight[0][r] = a[r] * b[r];
+        weight[1 + MEDULLA_BY_DEPTH][r] = d_a[r] * b[r];
+        weight[1 + MEDULLA_BY_G][r] = a[r] * d_b[r];
     }
+    fill_half(m, half, weight);
+}
+
+/* Where the table is read for two angles. */
+struct place {
+    int i, j;
+    float x, y;
+};
+
+static struct place place_of(float sum, float difference)
+{
+    struct place g;
+    g.x = table_position(fabsf(sum) * (float)((MEDULLA_FINE_SUM - 1) / M_PI), MEDULLA_FINE_SUM - 1, &g.i);
+    g.y = table_position(fabsf(difference) * (float)((MEDULLA_FINE_DIFFERENCE - 1) / M_PI), MEDULLA_FINE_DIFFERENCE - 1,
+                         &g.j);
+    return g;
+}
+
+static inline float read_half(const float (*table)[MEDULLA_FINE_DIFFERENCE][MEDULLA_N_HALF], const struct place *g,
+                              int half)
+{
+    const float(*row)[MEDULLA_N_HALF] = &table[g->i][g->j], (*next)[MEDULLA_N_HALF] = &table[g->i + 1][g->j];
+    return table_mix(table_mix(row[0][half], row[1][half], g->y), table_mix(next[0][half], next[1][half], g->y), g->x);
 }
 
 void medulla_along_at(const struct medulla_along *m, float sum, float difference, float value[MEDULLA_N_HALF],
                       float (*d)[MEDULLA_N_HALF])
 {
-    int i, j;
-    float x = table_position(fabsf(sum) * (float)((MEDULLA_FINE_SUM - 1) / M_PI), MEDULLA_FINE_SUM - 1, &i);
-    float y = table_position(fabsf(difference) * (float)((MEDULLA_FINE_DIFFERENCE - 1) / M_PI),
-                             MEDULLA_FINE_DIFFERENCE - 1, &j);
+    const struct place g = place_of(sum, difference);
     for (int half = 0; half < MEDULLA_N_HALF; half++) {
-        value[half] = table_mix(table_mix(m->m[i][j][half], m->m[i][j + 1][half], y),
-                                table_mix(m->m[i + 1][j][half], m->m[i + 1][j + 1][half], y), x);
-        for (int q = 0; q < MEDULLA_N_BY && d != NULL; q++)
-            d[q][half] = table_mix(table_mix(m->d[q][i][j][half], m->d[q][i][j + 1][half], y),
-                                   table_mix(m->d[q][i + 1][j][half], m->d[q][i + 1][j + 1][half], y), x);
+        value[half] = read_half(m->m, &g, half);
+        for (int q = 0; q < MEDULLA_N_BY && d != NULL; q++) d[q][half] = read_half(m->d[q], &g, half);
     }
 }
 
@@ -83,27 +96,28 @@ void medulla_along_at(const struct medulla_along *m, float sum, float difference
 enum { N_THETA = 129 };
 
 struct balance {
+    struct medulla_along *along;
+    double depth, g;
     struct lobe_balance solver;
-    int half; /* at hand */
+    int half;
     double d_kernel[MEDULLA_N_BY][LOBE_BALANCE_N][LOBE_BALANCE_N];
     double scale[N_THETA], d_ln[MEDULLA_N_BY][N_THETA];
 };
 
-/* M is the same for both angles with the other sign, so angles below 0 are folded to those above. */
+/* M is the same for both angles with the other sign, so angles below 0 are folded to those above. Reads its own half
+ * alone: another thread writes the other one. */
 static void fill_kernel(const struct medulla_along *m, struct balance *b)
 {
     const float step = (float)(M_PI_2 / (N_THETA - 1));
     for (int i = 0; i < N_THETA; i++)
         for (int j = 0; j <= i; j++) {
-            float sum = (float)(i + j) * step, difference = (float)(i - j) * step;
-            float near[MEDULLA_N_HALF], far[MEDULLA_N_HALF], d_near[MEDULLA_N_BY][MEDULLA_N_HALF],
-                d_far[MEDULLA_N_BY][MEDULLA_N_HALF];
-            medulla_along_at(m, difference, sum, near, d_near);
-            medulla_along_at(m, sum, difference, far, d_far);
-            b->solver.kernel[i][j] = (double)(near[b->half] + far[b->half]);
+            const float sum = (float)(i + j) * step, difference = (float)(i - j) * step;
+            const struct place near = place_of(difference, sum), far = place_of(sum, difference);
+            b->solver.kernel[i][j] = b->solver.kernel[j][i] =
+                (double)(read_half(m->m, &near, b->half) + read_half(m->m, &far, b->half));
             for (int q = 0; q < MEDULLA_N_BY; q++)
-                b->d_kernel[q][i][j] = b->d_kernel[q][j][i] = (double)(d_near[q][b->half] + d_far[q][b->half]);
-            b->solver.kernel[j][i] = b->solver.kernel[i][j];
+                b->d_kernel[q][i][j] = b->d_kernel[q][j][i] =
+                    (double)(read_half(m->d[q], &near, b->half) + read_half(m->d[q], &far, b->half));
         }
 }
 
@@ -130,9 +144,12 @@ static void apply(struct medulla_along *m, const struct balance *b)
         }
 }
 
-/* The integral of M cos^2 th_o dth_o becomes 1 for each half. */
-static void balance_half(struct medulla_along *m, struct balance *b)
+/* The integral of M cos^2 th_o dth_o becomes 1 for a half. */
+static void balance_half(void *context, size_t half, size_t i_thread)
 {
+    struct balance *b = (struct balance *)context + half;
+    struct medulla_along *m = b->along;
+    (void)i_thread;
     const double step = M_PI_2 / (N_THETA - 1);
     b->solver.n = N_THETA;
     for (int i = 0; i < N_THETA; i++) {
@@ -140,22 +157,29 @@ static void balance_half(struct medulla_along *m, struct balance *b)
         b->solver.weight[i] = c * c * step * (i == 0 ? 0.5 : 1);
         b->solver.want[i] = 1;
     }
+    fill(m, b->half, b->depth, b->g);
     fill_kernel(m, b);
     lobe_balance_solve(&b->solver, b->scale);
     for (int q = 0; q < MEDULLA_N_BY; q++) {
-        memcpy(b->solver.d_kernel, b->d_kernel[q], sizeof b->solver.d_kernel);
+        for (int i = 0; i < N_THETA; i++)
+            memcpy(b->solver.d_kernel[i], b->d_kernel[q][i], N_THETA * sizeof b->d_kernel[q][i][0]);
         lobe_balance_source_of_kernel(&b->solver, b->scale);
         lobe_balance_solve_derivative(&b->solver, b->scale, b->d_ln[q]);
     }
     apply(m, b);
 }
 
-status medulla_along_init(struct medulla_along *m, double depth, double g, struct error *err)
+status medulla_along_init(struct medulla_along *m, double depth, double g, struct thread_pool *pool, struct error *err)
 {
-    struct balance *b = calloc(1, sizeof *b);
+    struct balance *b = calloc(MEDULLA_N_HALF, sizeof *b);
     if (b == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
-    fill(m, depth, g);
-    for (b->half = 0; b->half < MEDULLA_N_HALF; b->half++) balance_half(m, b);
+    for (int half = 0; half < MEDULLA_N_HALF; half++) {
+        b[half].along = m;
+        b[half].depth = depth;
+        b[half].g = g;
+        b[half].half = half;
+    }
+    const status st = thread_pool_run(pool, MEDULLA_N_HALF, balance_half, b, NULL);
     free(b);
-    return STATUS_OK;
+    return st;
 }
