@@ -4,6 +4,7 @@
 #define SELVEDGE_BASE_LANES_H
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdint.h>
 
 enum { LANES = 8 };
@@ -14,6 +15,14 @@ typedef int32_t lane_mask __attribute__((vector_size(LANES * sizeof(int32_t)), a
 static inline lanes lanes_choose(lane_mask m, lanes a, lanes b)
 {
     return (lanes)(((lane_mask)a & m) | ((lane_mask)b & ~m));
+}
+
+/* Whether the mask is true anywhere. */
+static inline bool lanes_any(lane_mask m)
+{
+    int32_t any = 0;
+    for (int l = 0; l < LANES; l++) any |= m[l];
+    return any != 0;
 }
 
 static inline lanes lanes_sqrt(lanes x)

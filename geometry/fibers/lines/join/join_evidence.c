@@ -1,5 +1,7 @@
 #include "geometry/fibers/lines/join/join_evidence.h"
 
+#include "base/lanes.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -38,17 +40,30 @@ static void path_add(struct path *p, const float x[3])
     if (p->n < MAX_PATH) memcpy(p->x[p->n++], x, sizeof *p->x);
 }
 
-/* Smallest squared distance of points i .. end - 1 from `at`. */
-static float nearest2(float (*x)[3], int i, int end, const float at[3])
+static const lanes PLACE = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f}; /* voxels from the first of a row */
+
+/* LANES voxels of a row that follow each other. x: of the first one. */
+struct row_part {
+    float x[3];
+    lane_mask within; /* those that are in the box */
+};
+
+/* Smallest squared distances of points i .. end - 1 from the voxels. */
+static lanes nearest2(const float (*x)[3], int i, int end, const struct row_part *at)
 {
-    float least = INFINITY;
+    const lanes along = PLACE + at->x[0];
+    lanes least = PLACE - PLACE + INFINITY;
     for (; i < end; i++) {
-        const float d0 = x[i][0] - at[0], d1 = x[i][1] - at[1], d2 = x[i][2] - at[2];
-        const float distance2 = d0 * d0 + d1 * d1 + d2 * d2;
-        least = distance2 < least ? distance2 : least; /* fminf would be a call */
+        const float d1 = x[i][1] - at->x[1], d2 = x[i][2] - at->x[2];
+        const lanes d0 = along - x[i][0], distance2 = d0 * d0 + d1 * d1 + d2 * d2;
+        least = lanes_choose(distance2 < least, distance2, least);
     }
     return least;
 }
+
+static lanes nearest2_path(const struct path *p, const struct row_part *at) { return nearest2(p->x, 0, p->n, at); }
+
+static lanes lesser(lanes a, lanes b) { return lanes_choose(a < b, a, b); }
 
 static float radius_of(const struct join_scene *s, size_t line)
 {
@@ -155,28 +170,55 @@ static void take_others(const struct join_scene *s, const float lo[3], const flo
     }
 }
 
-/* Adds a voxel at x to the sums of join_evidence. */
-static void compare_voxel(const struct join_scene *s, struct gap_view *g, struct near_lines *near, const float x[3],
-                          float density, double *better, double *differ)
+/* The densities at the voxels of a row with one fiber through the gap, and with two that end. */
+struct row_model {
+    lanes one, two;
+};
+
+/* Returns the voxels whose densities differ between the two. */
+static lane_mask model_row(const struct join_scene *s, const struct gap_view *g, const struct row_part *at,
+                           struct row_model *m)
 {
-    const float way = nearest2(g->way.x, 0, g->way.n, x);
-    const float on[2] = {nearest2(g->on[0].x, 0, g->on[0].n, x), nearest2(g->on[1].x, 0, g->on[1].n, x)};
-    if (fminf(way, fminf(on[0], on[1])) > g->most2) return;
-    const float side[2] = {nearest2(g->side[0].x, 0, g->side[0].n, x), nearest2(g->side[1].x, 0, g->side[1].n, x)};
-    const float own = fminf(way, fminf(side[0], side[1]));
-    const float radius = own == way       ? 0.5f * (g->radius[0] + g->radius[1])
-                         : own == side[0] ? g->radius[0]
-                                          : g->radius[1];
-    const float one = fiber_at(s, own, radius);
-    const float two =
-        fiber_at(s, fminf(side[0], on[0]), g->radius[0]) + fiber_at(s, fminf(side[1], on[1]), g->radius[1]);
-    if (fabsf(two - one) < SAME) return;
-    for (int l = 0; l < near->n; l++) {
-        const struct near_line *n = &near->line[l];
-        density -= fiber_at(s, nearest2(near->x, n->first, n->end, x), n->radius);
+    const lanes way = nearest2_path(&g->way, at);
+    const lanes on[2] = {nearest2_path(&g->on[0], at), nearest2_path(&g->on[1], at)};
+    lane_mask differs = at->within & (lesser(way, lesser(on[0], on[1])) <= g->most2);
+    if (!lanes_any(differs)) return differs;
+    const lanes side[2] = {nearest2_path(&g->side[0], at), nearest2_path(&g->side[1], at)};
+    const lanes own = lesser(way, lesser(side[0], side[1])), end[2] = {lesser(side[0], on[0]), lesser(side[1], on[1])};
+    for (int l = 0; l < LANES; l++) {
+        if (!differs[l]) continue;
+        const float radius = own[l] == way[l]       ? 0.5f * (g->radius[0] + g->radius[1])
+                             : own[l] == side[0][l] ? g->radius[0]
+                                                    : g->radius[1];
+        m->one[l] = fiber_at(s, own[l], radius);
+        m->two[l] = fiber_at(s, end[0][l], g->radius[0]) + fiber_at(s, end[1][l], g->radius[1]);
+        if (fabsf(m->two[l] - m->one[l]) < SAME) differs[l] = 0;
     }
-    *better += (double)((density - two) * (density - two) - (density - one) * (density - one));
-    *differ += (double)((two - one) * (two - one));
+    return differs;
+}
+
+/* Adds voxels of a row to the sums of join_evidence. density: of the first one. */
+static void compare_row(const struct join_scene *s, const struct gap_view *g, const struct near_lines *near,
+                        const struct row_part *at, const float *density, double sum[2])
+{
+    struct row_model m;
+    const lane_mask differs = model_row(s, g, at, &m);
+    if (!lanes_any(differs)) return;
+    lanes rest = {0.0f};
+    for (int l = 0; l < LANES; l++)
+        if (differs[l]) rest[l] = density[l];
+    for (int i = 0; i < near->n; i++) {
+        const struct near_line *n = &near->line[i];
+        const lanes distance2 = nearest2(near->x, n->first, n->end, at);
+        for (int l = 0; l < LANES; l++)
+            if (differs[l]) rest[l] -= fiber_at(s, distance2[l], n->radius);
+    }
+    for (int l = 0; l < LANES; l++) {
+        if (!differs[l]) continue;
+        const float one = m.one[l], two = m.two[l];
+        sum[0] += (double)((rest[l] - two) * (rest[l] - two) - (rest[l] - one) * (rest[l] - one));
+        sum[1] += (double)((two - one) * (two - one));
+    }
 }
 
 double join_evidence(const struct join_scene *s, const struct join_curve *j, uint32_t a, uint32_t b)
@@ -187,7 +229,7 @@ double join_evidence(const struct join_scene *s, const struct join_curve *j, uin
     const float ahead = AHEAD_DIAMETERS * (float)s->diameter + 0.5f * (float)j->gap;
     float lo[3], hi[3];
     size_t from[3], to[3], c[3];
-    double better = 0.0, differ = 0.0;
+    double sum[2] = {0.0, 0.0};
     for (int e = 0; e < 2; e++) {
         g.radius[e] = radius_of(s, end[e] / 2);
         take_end(s, end[e], j->trim[e], ahead, &g.side[e], &g.on[e]);
@@ -202,10 +244,10 @@ double join_evidence(const struct join_scene *s, const struct join_curve *j, uin
     }
     for (c[2] = from[2]; c[2] < to[2]; c[2]++)
         for (c[1] = from[1]; c[1] < to[1]; c[1]++)
-            for (c[0] = from[0]; c[0] < to[0]; c[0]++) {
-                const float x[3] = {(float)c[0] + 0.5f, (float)c[1] + 0.5f, (float)c[2] + 0.5f};
-                compare_voxel(s, &g, &near, x, s->v->density[volume_index(s->v->n, c[0], c[1], c[2])], &better,
-                              &differ);
+            for (c[0] = from[0]; c[0] < to[0]; c[0] += LANES) {
+                const struct row_part at = {{(float)c[0] + 0.5f, (float)c[1] + 0.5f, (float)c[2] + 0.5f},
+                                            PLACE < (float)(to[0] - c[0])};
+                compare_row(s, &g, &near, &at, s->v->density + volume_index(s->v->n, c[0], c[1], c[2]), sum);
             }
-    return differ > 0.0 ? better / differ : 0.0;
+    return sum[1] > 0.0 ? sum[0] / sum[1] : 0.0;
 }
