@@ -28,31 +28,57 @@ void small_solve(const double *factor, size_t n, double *x, size_t stride)
     }
 }
 
+/* Row i of a band matrix and of its factor, with n_before columns before the diagonal. inverse: in [d] that of the
+ * factor's diagonal d rows before. Inlined with numbers that are known, so that its loops are unrolled. */
+static inline bool factor_row(double *row, size_t n_band, size_t n_before, double *inverse)
+{
+    for (size_t d = n_before; d > 0; d--) {
+        const double *other = row - d * n_band;
+        double sum = row[d];
+        for (size_t k = n_before; k > d; k--) sum -= row[k] * other[k - d];
+        row[d] = sum * inverse[d];
+    }
+    double sum = row[0];
+    for (size_t k = n_before; k > 0; k--) sum -= row[k] * row[k];
+    if (!(sum > 0.0)) return false;
+    row[0] = sqrt(sum);
+    for (size_t d = n_band - 1; d > 1; d--) inverse[d] = inverse[d - 1];
+    inverse[1] = 1.0 / row[0];
+    return true;
+}
+
+/* The band of second differences of points in space, which most systems have. */
+enum { BAND_OF_POINTS = 7 };
+
 static bool factor_banded(double *m, size_t n, size_t n_band)
 {
-    for (size_t i = 0; i < n; i++) {
-        double *row = m + i * n_band;
-        size_t first = i >= n_band - 1 ? i - (n_band - 1) : 0;
-        for (size_t j = first; j <= i; j++) {
-            double sum = row[i - j];
-            for (size_t k = first; k < j; k++) sum -= row[i - k] * m[j * n_band + j - k];
-            if (i == j && !(sum > 0.0)) return false;
-            row[i - j] = i == j ? sqrt(sum) : sum / m[j * n_band];
-        }
+    double inverse[SMALL_BAND_MAX + 1] = {0.0};
+    size_t i = 0;
+    for (; i < n && i + 1 < n_band; i++)
+        if (!factor_row(m + i * n_band, n_band, i, inverse)) return false;
+    if (n_band == BAND_OF_POINTS) {
+        for (; i < n; i++)
+            if (!factor_row(m + i * BAND_OF_POINTS, BAND_OF_POINTS, BAND_OF_POINTS - 1, inverse)) return false;
     }
+    for (; i < n; i++)
+        if (!factor_row(m + i * n_band, n_band, n_band - 1, inverse)) return false;
     return true;
 }
 
 bool small_solve_banded(double *m, size_t n, size_t n_band, double *x)
 {
     if (!factor_banded(m, n, n_band)) return false;
+    /* the unknown found last comes last into the sums, so that the others do not wait for it */
     for (size_t i = 0; i < n; i++) {
-        for (size_t k = 1; k < n_band && k <= i; k++) x[i] -= m[i * n_band + k] * x[i - k];
-        x[i] /= m[i * n_band];
+        double sum = x[i];
+        for (size_t k = i < n_band - 1 ? i : n_band - 1; k > 0; k--) sum -= m[i * n_band + k] * x[i - k];
+        x[i] = sum / m[i * n_band];
     }
     for (size_t i = n; i-- > 0;) {
-        for (size_t k = 1; k < n_band && i + k < n; k++) x[i] -= m[(i + k) * n_band + k] * x[i + k];
-        x[i] /= m[i * n_band];
+        double sum = x[i];
+        for (size_t k = n - 1 - i < n_band - 1 ? n - 1 - i : n_band - 1; k > 0; k--)
+            sum -= m[(i + k) * n_band + k] * x[i + k];
+        x[i] = sum / m[i * n_band];
     }
     return true;
 }
