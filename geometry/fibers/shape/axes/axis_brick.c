@@ -161,7 +161,10 @@ static void add_to_model(const struct axis_model *m, struct axis_scratch *s, con
         }
         lane_row row[LANES];
         lanes_to_rows(add, row);
-        for (size_t l = 0; l < p.n; l++) s->model[p.cell[l]] += row[l];
+        for (size_t l = 0; l < p.n; l++) {
+            s->model[p.cell[l]] += row[l];
+            s->touched[p.cell[l] / LANES] = true;
+        }
     }
 }
 
@@ -183,7 +186,7 @@ static lanes gather(const float *value, const uint16_t c[LANES])
                    value[c[4]], value[c[5]], value[c[6]], value[c[7]]};
 }
 
-static struct voxel_lanes voxels_of(const struct axis_scratch *s, const struct axis_places *p)
+static struct voxel_lanes voxels_of(const struct axis_scratch *s, const struct axis_places *p, bool lumens)
 {
     static const lanes step = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
     const lane_mask counts = (step < (float)p->n) & (p->distance > ON_AXIS);
@@ -197,7 +200,7 @@ static struct voxel_lanes voxels_of(const struct axis_scratch *s, const struct a
                                 of[0],
                                 of[1],
                                 of[2],
-                                gather(s->lumen, p->cell)};
+                                lumens ? gather(s->lumen, p->cell) : zero};
 }
 
 /* Adds places to the normal equation of the area of the lumen. by_radius: of the densities. */
@@ -261,7 +264,7 @@ static void add_places(const struct axis_model *m, const struct axis_scratch *s,
                        const struct axis_places *p, struct segment_sum *sum)
 {
     const float amplitude = (float)(m->profile.high - m->profile.low);
-    const struct voxel_lanes v = voxels_of(s, p);
+    const struct voxel_lanes v = voxels_of(s, p, w->lumen != NULL);
     const struct place_slopes d = slopes_at(m, w, p);
     const lanes by = d.by_radius, weighted = v.weight * by;
     sum->radius_normal += weighted * by;
@@ -331,11 +334,13 @@ static void add_pulls(const struct axis_model *m, const struct axis_scratch *s, 
     }
 }
 
-static void forget_claims(struct axis_scratch *s, size_t n_claim)
+static void forget_claims(struct axis_scratch *s, bool lumens)
 {
-    for (size_t i = 0; i < n_claim; i++) {
-        s->model[s->claims.cell[i]] = (lane_row){0.0f};
-        s->lumen[s->claims.cell[i]] = 0.0f;
+    for (size_t b = 0; b < AXIS_N_CELL / LANES; b++) {
+        if (!s->touched[b]) continue;
+        memset(s->model + b * LANES, 0, LANES * sizeof *s->model);
+        if (lumens) memset(s->lumen + b * LANES, 0, LANES * sizeof *s->lumen);
+        s->touched[b] = false;
     }
 }
 
@@ -359,6 +364,6 @@ bool axis_brick_fit(const struct axis_model *model, size_t i_brick, struct axis_
     }
     axis_compare(model, s, from, n, &sum->shared);
     add_pulls(model, s, i_brick, from, sum);
-    forget_claims(s, s->claims.first[n_segment]);
+    forget_claims(s, model->lumen != NULL);
     return true;
 }

@@ -27,11 +27,13 @@ struct axis_model {
 };
 
 /* Work of one thread. By voxels of a brick, all 0 between bricks: the share of fibers, its derivatives by all radii and
- * by the blur, and the weight times the residual; the weight; the derivative by the areas of all lumens. */
+ * by the blur, and the weight times the residual; the derivative by the areas of all lumens; whether any of LANES voxels
+ * that follow each other has a claim. The weight is that of claimed voxels. */
 struct axis_scratch {
     lane_row model[AXIS_N_CELL];
     float weight[AXIS_N_CELL];
     float lumen[AXIS_N_CELL];
+    bool touched[AXIS_N_CELL / LANES];
     struct axis_claims claims;
 };
 

@@ -12,7 +12,10 @@ static const float ROUNDING = 0.05f; /* voxels by which slabs of neighbours over
 void axis_claims_init(struct axis_claims *c)
 {
     memset(c, 0, sizeof *c);
-    for (size_t i = 0; i < AXIS_N_CELL + LANES; i++) c->own2[i] = INFINITY;
+    for (size_t i = 0; i < AXIS_N_CELL + LANES; i++) {
+        c->own2[i] = INFINITY;
+        c->own[i] = OFF_LINE;
+    }
 }
 
 void axis_claims_release(struct axis_claims *c)
@@ -22,7 +25,8 @@ void axis_claims_release(struct axis_claims *c)
 }
 
 /* A brick, and a line in it. Rows of voxels run along the axis that the line is least parallel to, so that few of them
- * are near a segment: coordinates are in the order of `axis`. */
+ * are near a segment, and follow each other across the axis that it is most parallel to, so that LANES of them are near
+ * it at a time: coordinates are in the order of `axis`. */
 struct line_view {
     const struct segment_bricks *bricks;
     const struct section_view *section;
@@ -208,8 +212,9 @@ static void choose_axes(struct line_view *v, const uint32_t *index, size_t n)
         for (int a = 0; a < 3; a++)
             along[a] += fabsf(v->bricks->segment[index[e]].b[a] - v->bricks->segment[index[e]].a[a]);
     v->axis[0] = along[0] <= along[1] && along[0] <= along[2] ? 0 : along[1] <= along[2] ? 1 : 2;
-    v->axis[1] = v->axis[0] == 0 ? 1 : 0;
-    v->axis[2] = 3 - v->axis[0] - v->axis[1];
+    const int a = v->axis[0] == 0 ? 1 : 0, b = 3 - v->axis[0] - a;
+    v->axis[1] = along[a] <= along[b] ? a : b;
+    v->axis[2] = along[a] <= along[b] ? b : a;
 }
 
 static bool make_room(struct axis_claims *c, size_t n_claim)
@@ -223,17 +228,15 @@ static bool make_room(struct axis_claims *c, size_t n_claim)
     return true;
 }
 
-/* Counts the claims of the line's segments, and returns the number of all. count: by number in the brick's list. */
-static uint32_t count_claims(const struct axis_claims *c, uint32_t *count)
+/* Counts the claims of the line's segments, and returns the number of voxels in the ranges of its rows. place: by number
+ * in the brick's list; OFF_LINE counts the others, so that no branch depends on a voxel. */
+static uint32_t count_claims(const struct axis_claims *c, uint32_t *place)
 {
     uint32_t n = 0;
     for (size_t r = 0; r < c->n_row; r++) {
-        const size_t row = c->row[r];
-        for (size_t at = row * BRICK + c->row_begin[row]; at < row * BRICK + c->row_end[row]; at++) {
-            if (c->own2[at] == INFINITY || c->own[at] == OFF_LINE) continue;
-            count[c->own[at]]++;
-            n++;
-        }
+        const size_t row = c->row[r], begin = row * BRICK + c->row_begin[row], end = row * BRICK + c->row_end[row];
+        for (size_t at = begin; at < end; at++) place[c->own[at]]++;
+        n += (uint32_t)(end - begin);
     }
     return n;
 }
@@ -246,10 +249,9 @@ static void place_claims(struct axis_claims *c, const int axis[3], uint32_t *pla
         const uint32_t start = (row & BOUND) << SHIFT * axis[1] | row >> SHIFT << SHIFT * axis[2];
         for (uint32_t i = c->row_begin[row]; i < c->row_end[row]; i++) {
             const uint32_t at = row * BRICK + i;
-            if (c->own2[at] == INFINITY) continue;
-            c->own2[at] = INFINITY;
-            if (c->own[at] == OFF_LINE) continue;
             c->cell[place[c->own[at]]++] = (uint16_t)(start | i << SHIFT * axis[0]);
+            c->own2[at] = INFINITY;
+            c->own[at] = OFF_LINE;
         }
         c->row_end[row] = 0;
     }
@@ -257,7 +259,7 @@ static void place_claims(struct axis_claims *c, const int axis[3], uint32_t *pla
 }
 
 /* Sorts the claims of a line by segment: those of segments first .. end - 1 of the brick's list follow those of the
- * lines before. */
+ * lines before. Voxels without a claim go behind them, where the next line writes. */
 static bool keep_claims(struct axis_claims *c, const int axis[3], size_t first, size_t end)
 {
     uint32_t *place = c->first + 1; /* of segment e in place[e]: number of its claims, then begin, then end */
@@ -269,7 +271,9 @@ static bool keep_claims(struct axis_claims *c, const int axis[3], size_t first, 
         place[e] = begin;
         begin += n;
     }
+    place[OFF_LINE] = begin;
     place_claims(c, axis, place);
+    place[OFF_LINE] = 0; /* the begin of the first segment's claims */
     return true;
 }
 

@@ -19,7 +19,7 @@ struct axis_claims {
     uint32_t *first; /* claim of each segment in the order of the brick's list, and the number of all */
     size_t capacity, first_capacity;
     /* Work for one line, with axes in an order of its own: squared distance of the nearest segment, infinite between
-     * lines, and the number of that segment in the brick's list, -1 beyond an end of the line. */
+     * lines, and the number of that segment in the brick's list, -1 between lines and beyond an end of the line. */
     float own2[AXIS_N_CELL + LANES];
     int32_t own[AXIS_N_CELL + LANES];
     /* The rows that the line has reached, and the range of voxels in each row of the brick. Between lines every end is

@@ -92,8 +92,10 @@ void axis_compare(const struct axis_model *m, struct axis_scratch *s, const size
         for (size_t j = 0; j < n[1]; j++) {
             const size_t row = from[1] + j - m->first_row;
             const float *density = m->v->density + volume_index(m->v->n, from[0], row, from[2] + k);
-            for (size_t i = 0; i < n[0]; i += LANES)
-                compare_lanes(m, s, (k * BRICK + j) * BRICK + i, density + i, n[0] - i, &plane);
+            for (size_t i = 0; i < n[0]; i += LANES) {
+                const size_t at = (k * BRICK + j) * BRICK + i;
+                if (s->touched[at / LANES]) compare_lanes(m, s, at, density + i, n[0] - i, &plane);
+            }
         }
         add_plane(&plane, sum);
     }
