@@ -1,4 +1,5 @@
 #include "geometry/volume/density_map.h"
+#include "base/lanes.h"
 #include "base/option_id.h"
 
 #include "geometry/volume/volume_align.h"
@@ -30,28 +31,54 @@ static float mean27(const struct volume *v, size_t i, size_t j, size_t k)
     return sum / 27.0f;
 }
 
+/* Widens the range by n values, without those outside. Returns false if one of the others is not finite. */
+static bool widen_range(const float *value, size_t n, lanes *least, lanes *most)
+{
+    const lanes zero = {0.0f}, outside = zero + VOLUME_OUTSIDE;
+    lane_mask wrong = {0};
+    for (size_t i = 0; i < n; i += LANES) {
+        lanes x = outside;
+        if (i + LANES <= n)
+            x = *(const lanes *)(value + i);
+        else
+            memcpy(&x, value + i, (n - i) * sizeof *value);
+        const lane_mask counts = x != outside, finite = (x > -INFINITY) & (x < INFINITY);
+        *least = lanes_choose(counts & (x < *least), x, *least);
+        *most = lanes_choose(counts & (x > *most), x, *most);
+        wrong |= counts & ~finite;
+    }
+    return !lanes_any(wrong);
+}
+
+/* Names the first value of n that is not finite. */
+static status refuse_value(const struct volume *v, size_t first, size_t n, struct error *err)
+{
+    size_t i = first;
+    while (i + 1 < first + n && (isfinite(v->density[i]) || v->density[i] == VOLUME_OUTSIDE)) i++;
+    const size_t row = i / v->n[0];
+    return error_set_field(err, STATUS_INVALID, OPTION_SCAN_FILES, "cannot use the volume: voxel (%zu, %zu, %zu) is %s",
+                           i % v->n[0], row % v->n[1], row / v->n[1], isnan(v->density[i]) ? "NaN" : "infinite");
+}
+
 static status check_values(const struct volume *v, float *least, float *most, struct error *err)
 {
-    float lo = INFINITY, hi = -INFINITY;
-    size_t n = volume_n_voxel(v->n), n_slice = v->n[0] * v->n[1];
-    for (size_t i = 0; i < n; i++) {
-        float x = v->density[i];
-        if (i % n_slice == 0) scratch_keep_within(v->space);
-        if (x == VOLUME_OUTSIDE) continue;
-        if (!isfinite(x)) {
-            size_t row = i / v->n[0];
-            return error_set_field(err, STATUS_INVALID, OPTION_SCAN_FILES,
-                                   "cannot use the volume: voxel (%zu, %zu, %zu) is %s", i % v->n[0], row % v->n[1],
-                                   row / v->n[1], isnan(x) ? "NaN" : "infinite");
-        }
-        lo = fminf(lo, x);
-        hi = fmaxf(hi, x);
+    const size_t n_slice = v->n[0] * v->n[1];
+    const lanes zero = {0.0f};
+    lanes low = zero + INFINITY, high = zero - INFINITY;
+    for (size_t k = 0; k < v->n[2]; k++) {
+        scratch_keep_within(v->space);
+        if (!widen_range(v->density + k * n_slice, n_slice, &low, &high))
+            return refuse_value(v, k * n_slice, n_slice, err);
     }
-    if (!(hi > lo))
+    *least = INFINITY;
+    *most = -INFINITY;
+    for (int l = 0; l < LANES; l++) {
+        *least = fminf(*least, low[l]);
+        *most = fmaxf(*most, high[l]);
+    }
+    if (!(*most > *least))
         return error_set_field(err, STATUS_INVALID, OPTION_SCAN_FILES,
-                               "cannot use the volume: every voxel has the value %g", (double)hi);
-    *least = lo;
-    *most = hi;
+                               "cannot use the volume: every voxel has the value %g", (double)*most);
     return STATUS_OK;
 }
 
