@@ -20,6 +20,7 @@
 #include "base/clock.h"
 #include "geometry/phantom/phantom.h"
 #include "geometry/reconstruct.h"
+#include "geometry/volume/tile_crop.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -118,6 +119,8 @@ static status make_scan(const struct sample *p, const char *folder, const char *
     if (s == STATUS_OK && (r.n_voxel[0] < p->n[0] || r.n_voxel[1] < p->n[1]))
         s = error_set(err, STATUS_INTERNAL, "the phantom has only %zu x %zu voxels", r.n_voxel[0], r.n_voxel[1]);
     if (s == STATUS_OK) s = phantom_scan_in(&f, r.n_voxel, &scan, space, pool, NULL, &v, err);
+    /* the tile of a phantom is at least as large as the scan */
+    if (s == STATUS_OK && p->n_made == 0) volume_crop(&v, (const size_t[6]){0, 0, 0, p->n[0], p->n[1], p->n[2]});
     if (s == STATUS_OK && p->n_made > 0)
         s = write_bytes(&v, p->n, path, err);
     else if (s == STATUS_OK)
