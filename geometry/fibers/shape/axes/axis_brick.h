@@ -26,9 +26,9 @@ struct axis_model {
     float tail, inverse_blur; /* tail: voxels beyond the radius up to which a fiber is modelled */
 };
 
-/* Work of one thread. By voxels of a brick, all 0 between bricks: the share of fibers, its derivatives by all radii and
- * by the blur, and the weight times the residual; the derivative by the areas of all lumens; whether any of LANES voxels
- * that follow each other has a claim. The weight is that of claimed voxels. */
+/* Work of one thread. By voxels of a brick, 0 between bricks: the share of fibers, its derivatives by all radii and
+ * by the blur, and the weight times the residual; the derivative by the areas of all lumens; whether any of LANES
+ * voxels that follow each other has a claim. The weight is that of claimed voxels, and not 0 between bricks. */
 struct axis_scratch {
     lane_row model[AXIS_N_CELL];
     float weight[AXIS_N_CELL];

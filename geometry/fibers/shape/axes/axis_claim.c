@@ -228,8 +228,8 @@ static bool make_room(struct axis_claims *c, size_t n_claim)
     return true;
 }
 
-/* Counts the claims of the line's segments, and returns the number of voxels in the ranges of its rows. place: by number
- * in the brick's list; OFF_LINE counts the others, so that no branch depends on a voxel. */
+/* Counts the claims of the line's segments, and returns the number of voxels in the ranges of its rows. place: by
+ * number in the brick's list; OFF_LINE counts the others, so that no branch depends on a voxel. */
 static uint32_t count_claims(const struct axis_claims *c, uint32_t *place)
 {
     uint32_t n = 0;
