@@ -144,12 +144,16 @@ static void check_until_visible(struct derivative_check_request *q, enum place p
 /* Tables of elliptical.v1 are rough in eta and a: they are sums over single rays, some of which begin to be reflected
  * totally within a step of the differences. Their derivatives are right for smaller steps (test_scattering,
  * test_derivative) and miss these differences by up to 6 % (eta) and 30 % (a); at a = 1 and alpha = 0 the derivatives
- * vanish. chiang_albedo.v1 has paths of thousands of steps at its lower bounds, so that too few fit into the check to
- * show 2 % of eta. */
+ * vanish, as at tau = 0. At its upper bounds microfacet_ellipse.v1 has differences by eta of so much noise that 2 % do
+ * not show (test_scattering compares them). chiang_albedo.v1 has paths of thousands of steps at its lower bounds, so
+ * that too few fit into the check to show 2 % of eta. */
 static bool left_out(const struct appearance *m, enum place place, size_t p)
 {
     const char *name = m->param[p].name;
     if (strcmp(m->id, "chiang_albedo.v1") == 0) return place == LOWER_BOUNDS && strcmp(name, "eta") == 0;
+    if (strcmp(m->id, "microfacet_ellipse.v1") == 0)
+        return (place == LOWER_BOUNDS && strcmp(name, "tau") == 0) ||
+               (place == UPPER_BOUNDS && strcmp(name, "eta") == 0);
     if (strcmp(m->id, "elliptical.v1") != 0) return false;
     return strcmp(name, "a") == 0 || strcmp(name, "eta") == 0 || (place == LOWER_BOUNDS && strcmp(name, "alpha") == 0);
 }

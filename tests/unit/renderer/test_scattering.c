@@ -161,12 +161,14 @@ static double truncation(const double ln_s[3], double h, double slope)
 
 /* Step of a difference over the room that a parameter has. The tables of elliptical.v1 are sums over single rays, some
  * of which begin to be reflected totally within a larger step. Azimuths of fur_near.v1 follow the index of refraction,
- * and its narrowest lobes are of a degree. Tilts of up to ten degrees move lobes of one degree. */
+ * and its narrowest lobes are of a degree. Tables of microfacet_ellipse.v1 are linear between nodes of a grid of its
+ * parameters, and a larger step reaches beyond the next nodes. Tilts of up to ten degrees move lobes of one degree. */
 static double difference_step(const struct scattering_model *m, const struct param_info *info)
 {
     if (strcmp(m->id, "elliptical.v1") == 0 && info->kind == PARAM_SHAPE) return 3e-4;
     if (strcmp(info->symbol, "alpha") == 0) return 2e-3;
-    return strcmp(m->id, "fur_near.v1") == 0 && info->kind == PARAM_SHAPE ? 1e-3 : 5e-3;
+    bool small = strcmp(m->id, "fur_near.v1") == 0 || strcmp(m->id, "microfacet_ellipse.v1") == 0;
+    return small && info->kind == PARAM_SHAPE ? 1e-3 : 5e-3;
 }
 
 /* ln S by each parameter: three-point differences, one-sided where a bound is near. */
@@ -287,7 +289,8 @@ static void reciprocal_models_are(void **state)
     static const char *const id[] = {"two_lobe_balanced.v1", "isotropic.v1",     "kajiya_kay.v1",
                                      "marschner.v1",         "textile.v3",       "dielectric.v1",
                                      "elliptical.v1",        "fur.v1",           "dielectric_diffraction.v1",
-                                     "wave_silk.v1",         "wave_trilobal.v1", "wave_cotton.v1"};
+                                     "wave_silk.v1",         "wave_trilobal.v1", "wave_cotton.v1",
+                                     "microfacet_ellipse.v1"};
     for (size_t k = 0; k < sizeof id / sizeof id[0]; k++) {
         const struct scattering_model *m = scattering_find(id[k]);
         struct rng r;

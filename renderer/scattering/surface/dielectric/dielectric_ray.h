@@ -17,6 +17,7 @@
 #define SELVEDGE_RENDERER_DIELECTRIC_RAY_H
 
 #include <math.h>
+#include <stddef.h>
 
 enum dielectric_mode { DIELECTRIC_R, DIELECTRIC_TT, DIELECTRIC_TRT, DIELECTRIC_REST, DIELECTRIC_N_MODE };
 

@@ -1,5 +1,8 @@
 #include "renderer/scattering/surface/elliptical/ellipse_ray.h"
 
+#include <stdbool.h>
+#include <stddef.h>
+
 #define GRAZING 0.02    /* square of the cosine of an angle outside, 82 degrees */
 #define LEAST_LEFT 2e-3 /* share of a ray's light below which its last exits are taken together */
 
@@ -37,15 +40,18 @@ static inline struct dual angle(struct dual y, struct dual x)
     return chain2(atan2(y.v, x.v), x.v / n, y, -y.v / n, x);
 }
 
-/* Cosine of the angle outside from its square, which is negative where the reflection is total. The root has an
- * infinite slope at 0, so the derivatives of a sum over rays would be noisy. Below GRAZING a polynomial with the
- * slope 0 at 0, the same value and slope at GRAZING and the same integral takes its place. */
+double ellipse_cosine_outside(double square, double *slope)
+{
+    double root = sqrt(fmax(square, GRAZING)), t = fmax(square / GRAZING, 0), size = sqrt(GRAZING);
+    bool grazing = square < GRAZING;
+    if (slope != NULL) *slope = grazing ? size * t * (17.5 + t * (-42 + 25 * t)) / GRAZING : 0.5 / root;
+    return grazing ? size * t * t * (8.75 + t * (-14 + 6.25 * t)) : root;
+}
+
 static struct dual cosine_outside(struct dual square)
 {
-    if (square.v >= GRAZING) return root(square);
-    double t = fmax(square.v / GRAZING, 0), size = sqrt(GRAZING);
-    return chain(size * t * t * (8.75 + t * (-14 + 6.25 * t)), size * t * (17.5 + t * (-42 + 25 * t)) / GRAZING,
-                 square);
+    double slope, v = ellipse_cosine_outside(square.v, &slope);
+    return chain(v, slope, square);
 }
 
 struct ellipse ellipse_of(double eta, double ratio)

@@ -56,4 +56,9 @@ struct ellipse_wall ellipse_wall_at(const struct ellipse *e, double cos_theta);
 void ellipse_follow(const struct ellipse *e, const struct ellipse_wall *w, const struct ellipse_entry *entry,
                     struct ellipse_path *path);
 
+/* Cosine of the angle outside from its square, which is negative where the reflection is total, and its slope when
+ * wanted. The root has an infinite slope at 0, so the derivatives of a sum over rays would be noisy. At more than 82
+ * degrees a polynomial with the slope 0 at 0, the same value and slope there and the same integral takes its place. */
+double ellipse_cosine_outside(double square, double *slope);
+
 #endif
