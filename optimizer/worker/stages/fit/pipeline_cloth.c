@@ -147,8 +147,10 @@ static status build_tile(struct pipeline_context *c, const double *value, struct
     struct cloth_description *d = malloc(sizeof *d);
     if (d == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make the cloth: out of memory");
     status s = cloth_description_enlarge(c->doc->cloth, variant.final ? c->doc->cloth_final_tiles : 1, d, err);
-    d->seed += variant.places;
-    if (s == STATUS_OK) s = cloth_build(d, value, c->pool, &progress, f, report, err);
+    if (s == STATUS_OK) {
+        d->seed += variant.places;
+        s = cloth_build(d, value, c->pool, &progress, f, report, err);
+    }
     free(d);
     return s;
 }
