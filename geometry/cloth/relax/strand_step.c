@@ -117,7 +117,10 @@ static void unbend(const struct strand *t, struct rows *q, struct rows *want)
 {
     const bool closed = t->n_period > 0;
     const long n = (long)t->n, from = closed ? -1 : 1, to = closed ? n + 1 : n - 1;
-    for (int a = 0; a < 3; a++) want->row[a][-1] = want->row[a][0] = want->row[a][n - 1] = want->row[a][n] = 0.0;
+    for (int a = 0; a < 3; a++) {
+        double *row = want->row[a], *before = row - 1;
+        *before = row[0] = row[n - 1] = row[n] = 0.0;
+    }
     for (int i = 0; i < N_UNBEND; i++) {
         pad(t, t->shift, q);
         if (!find_bends(q, from, to, MAX_STRAIN / t->radius_m, want)) return; /* nor would the next steps move it */
