@@ -6,8 +6,8 @@
 #include "renderer/transport/surface/path_tracer.h"
 
 struct diffusion_setting {
+    struct path_setting path; /* first; scene, model, lights; it ends paths at their last traced hit */
     const struct diffusion_option *option;
-    struct path_setting path; /* scene, model, lights; it ends paths at their last traced hit */
 };
 
 /* s->path is filled in. s must stay where it is. */

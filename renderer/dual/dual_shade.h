@@ -7,8 +7,8 @@
 #include "renderer/transport/surface/path_tracer.h"
 
 struct dual_setting {
+    struct path_setting path; /* first; scene, model, parameter sets, lights; no paths are traced */
     const struct dual_option *option;
-    struct path_setting path; /* scene, model, parameter sets, lights; no paths are traced */
 };
 
 /* Where an eye's ray meets a fiber. */

@@ -118,6 +118,9 @@ def test_killed_jobs_end_with_the_same_bits(tmp_path, sample):
                 "fit": {"model": "two_lobe.v1", "path_budget": 300000, "max_iterations": 4, **OUTPUT}}
     document["cloth"]["renew_places"] = True
     want = without_times(run(make_job(tmp_path, "whole", sample), **document))
+    one_tile = {**document, "cloth": {k: v for k, v in document["cloth"].items() if k != "renew_places"}}
+    other = without_times(run(make_job(tmp_path, "one-tile", sample), **one_tile))
+    assert other["cloth_numbers"][0]["value"] != want["cloth_numbers"][0]["value"], "renew_places changes the cloths of the search"
     job = make_job(tmp_path, "killed", sample)
     (job / "job.json").write_text(json.dumps({"sample": "known numbers", **document}))
     journal = job / "work" / "fit" / "estimates.journal"

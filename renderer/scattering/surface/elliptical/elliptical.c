@@ -6,33 +6,31 @@
  * are bounded but not constant.
  */
 #include "renderer/scattering/surface/elliptical/elliptical.h"
+#include "renderer/scattering/scattering_state.h"
 #include "renderer/scattering/surface/azimuth_table.h"
 
 #include <stdlib.h>
 
 #define LEAST_PROBABILITY 0.03f /* of a mode: no mode is starved, because all carry derivatives */
 
-static status prepare(const double *param, struct scattering_state **state, struct error *err)
+static status fill(struct scattering_state *s, const double *param, struct thread_pool *pool, struct error *err)
 {
-    status st = param_check(surface_elliptical_param, ELLIPTICAL_N_PARAM, surface_elliptical_id, param, err);
-    if (st != STATUS_OK) return st;
-    struct scattering_state *s = malloc(sizeof *s);
+    (void)pool;
     struct elliptical_energies *energies = malloc(sizeof *energies);
-    if (s == NULL || energies == NULL)
-        st = error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
-    for (int p = 0; p < ELLIPTICAL_N_LOBE && st == STATUS_OK; p++) {
+    if (energies == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
+    for (int p = 0; p < ELLIPTICAL_N_LOBE; p++) {
         s->along[p].shift = (float)(elliptical_shift[p] * param[ELLIPTICAL_P_ALPHA]);
         s->along[p].width = (float)(elliptical_width[p] * param[ELLIPTICAL_P_BETA]);
     }
-    if (st == STATUS_OK) st = elliptical_tables(s, param, energies, err);
+    status st = elliptical_tables(s, param, energies, err);
     if (st == STATUS_OK) st = elliptical_balance(s, energies, err);
     free(energies);
-    if (st != STATUS_OK) {
-        free(s);
-        return st;
-    }
-    *state = s;
-    return STATUS_OK;
+    return st;
+}
+
+static status prepare(const double *param, struct scattering_state **state, struct error *err)
+{
+    return scattering_state_new(&scattering_elliptical, param, fill, sizeof **state, NULL, state, err);
 }
 
 static void release(struct scattering_state *s) { free(s); }

@@ -6,6 +6,7 @@
  * a(th) and takes th_d = th_o, so weights are bounded but not constant.
  */
 #include "renderer/scattering/surface/microfacet/microfacet.h"
+#include "renderer/scattering/scattering_state.h"
 #include "renderer/scattering/surface/azimuth_table.h"
 #include "renderer/scattering/surface/tilted_lobe.h"
 
@@ -14,29 +15,23 @@
 #define MOST_WIDTH 0.8f         /* of samples along the fiber: they go beyond one pole, not beyond both */
 #define LEAST_PROBABILITY 0.04f /* of a lobe: no lobe is starved, because all carry derivatives */
 
-static status prepare(const double *param, struct scattering_state **state, struct error *err)
+static status fill(struct scattering_state *s, const double *param, struct thread_pool *pool, struct error *err)
 {
-    status st =
-        param_check(surface_microfacet_ellipse_param, MICROFACET_N_PARAM, surface_microfacet_ellipse_id, param, err);
-    if (st != STATUS_OK) return st;
-    struct scattering_state *s = malloc(sizeof *s);
+    (void)pool;
     struct microfacet_clear *clear = malloc((MICROFACET_N_ROW + 1) * sizeof *clear);
-    if (s == NULL || clear == NULL)
-        st = error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
-    if (st == STATUS_OK) {
-        const double tilt = tan(param[MICROFACET_P_TAU]);
-        s->surface = (struct microfacet_surface){(float)param[MICROFACET_P_ETA], (float)param[MICROFACET_P_ROUGHNESS],
-                                                 (float)tilt, (float)(1 + tilt * tilt)};
-        st = microfacet_tables(s, param, clear, err);
-    }
+    if (clear == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
+    const double tilt = tan(param[MICROFACET_P_TAU]);
+    s->surface = (struct microfacet_surface){(float)param[MICROFACET_P_ETA], (float)param[MICROFACET_P_ROUGHNESS],
+                                             (float)tilt, (float)(1 + tilt * tilt)};
+    status st = microfacet_tables(s, param, clear, err);
     if (st == STATUS_OK) st = microfacet_balance(s, clear, err);
     free(clear);
-    if (st != STATUS_OK) {
-        free(s);
-        return st;
-    }
-    *state = s;
-    return STATUS_OK;
+    return st;
+}
+
+static status prepare(const double *param, struct scattering_state **state, struct error *err)
+{
+    return scattering_state_new(&scattering_microfacet_ellipse, param, fill, sizeof **state, NULL, state, err);
 }
 
 static void release(struct scattering_state *s) { free(s); }

@@ -1,0 +1,42 @@
+/* What radiance sources of fibers share that add up what a function of their own finds for each eye's ray, in place of
+ * whole paths: by tables, by dual scattering, by diffusion. They have no derivatives, and no records of paths.
+ */
+#ifndef SELVEDGE_RENDERER_SHADED_RADIANCE_H
+#define SELVEDGE_RENDERER_SHADED_RADIANCE_H
+
+#include "renderer/transport/radiance_source.h"
+#include "renderer/transport/surface/path_tracer.h"
+
+/* One way to shade. A setting is what it needs of one configuration: a struct that begins with a path_setting. */
+struct shaded_method {
+    const char *name; /* as in "cannot render by <name>" */
+    size_t setting_bytes;
+    /* What the method asks of the input besides a scattering model without a frame of its own, no derivatives and no
+     * discrepancy. */
+    status (*check)(const struct radiance_input *in, struct error *err);
+    /* Fills in the rest of a setting, which is all 0 after its path_setting. STATUS_NO_MEMORY. */
+    status (*init)(void *setting, const struct radiance_input *in, struct error *err);
+    /* Of a setting whose init was called, also if that failed; NULL: there is nothing to release. */
+    void (*release)(void *setting);
+    /* ray: from camera_ray; it is changed. Adds to radiance. Result: the number of bounces. */
+    uint32_t (*shade)(const void *setting, struct scene_ray *ray, struct rng *rng, float radiance[3]);
+};
+
+/* The functions of a radiance_tracer, whose prepare calls this one with its method. max_member and entry_bytes of the
+ * tracer are 1. */
+status shaded_prepare(const struct shaded_method *m, const struct radiance_input *in, const struct configuration *c,
+                      size_t n_configuration, void **state, struct error *err);
+void shaded_release(void *state);
+uint64_t shaded_trace(const void *state, const struct radiance_block *b, float *value);
+void shaded_record_nothing(const void *state, size_t i_configuration, const double xy[2], struct rng *rng,
+                           struct radiance_record *record, float *value);
+double shaded_replay_nothing(const void *at, const void *traced, const struct radiance_record *record);
+
+/* A radiance_tracer with this prepare. */
+#define SHADED_TRACER(prepare_method)                                                                                  \
+    {                                                                                                                  \
+        .max_member = 1, .entry_bytes = 1, .prepare = prepare_method, .release = shaded_release,                       \
+        .trace = shaded_trace, .record = shaded_record_nothing, .replay = shaded_replay_nothing                        \
+    }
+
+#endif
