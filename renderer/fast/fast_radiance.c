@@ -10,6 +10,12 @@ static status check(const struct radiance_input *in, struct error *err)
     if (!(o->corrected_share >= 0.0 && o->corrected_share <= 1.0) ||
         (o->corrected_share > 0.0 && o->visibility != FAST_TRACED))
         return error_set(err, STATUS_INVALID, "cannot correct a share of %g of the samples", o->corrected_share);
+    if (o->deep && (o->visibility != FAST_TRACED || o->corrected_share > 0.0))
+        return error_set(err, STATUS_INVALID,
+                         "cannot take deep light from its table with visibility by tables or with corrected samples");
+    if (o->deep && (o->n_traced == 0 || o->tables->deep.n_traced != o->n_traced))
+        return error_set(err, STATUS_INVALID, "cannot trace %u hits: the table of deep light is for %u", o->n_traced,
+                         o->tables->deep.n_traced);
     scene_tile_mm(in->scene.fibers, tile_mm);
     size_t n_set = in->n_set > 1 ? in->n_set : 1;
     if (o->tables->n_set != n_set || o->tables->tile_mm[0] != tile_mm[0] || o->tables->tile_mm[1] != tile_mm[1])

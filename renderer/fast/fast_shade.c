@@ -215,14 +215,25 @@ static float table_frame(const struct seen_hit *h, float row[3][3])
     return asinf(fminf(fmaxf(along, -1), 1));
 }
 
-/* Share of the light from outside that the shell of a bent cloth lets through, at a place beside the hit where light
- * may have entered. */
+/* Whether the shell of a bent cloth lets light from a direction through, to a place beside the hit where it may have
+ * entered. */
+static bool shell_is_open(const struct fast_setting *s, const struct seen_hit *h, const float direction[3],
+                          struct rng *rng)
+{
+    if (!scene_is_bent(s->path.scene)) return true;
+    float shift[2];
+    double normal[2];
+    rng_normal_pair(rng, normal);
+    for (int a = 0; a < 2; a++) shift[a] = (float)(normal[a] * s->option->tables->spread_mm);
+    return !scene_shell_shades(s->path.scene, &h->hit, &h->place, shift, direction);
+}
+
+/* The same for all light from outside, of which one direction is chosen. */
 static bool shell_lets_through(const struct fast_setting *s, const struct seen_hit *h, const float u[2],
                                struct rng *rng)
 {
-    if (s->arriving != NULL) return true;
-    float direction[3], shift[2];
-    double normal[2];
+    if (!scene_is_bent(s->path.scene)) return true;
+    float direction[3];
     float lamp = s->path.lights.has_lamp ? lamp_irradiance(&s->path.lights.lamp, h->position_mm, u, direction) : 0;
     if (s->mixture.n > 0) {
         size_t k = light_mixture_pick(&s->mixture, rng_float(rng));
@@ -230,9 +241,7 @@ static bool shell_lets_through(const struct fast_setting *s, const struct seen_h
         for (size_t i = 0; i < s->mixture.n; i++) sky += s->mixture.rgb[i][1];
         if (rng_float(rng) * (lamp + sky) >= lamp) memcpy(direction, s->mixture.direction[k], sizeof direction);
     }
-    rng_normal_pair(rng, normal);
-    for (int a = 0; a < 2; a++) shift[a] = (float)(normal[a] * s->option->tables->spread_mm);
-    return !scene_shell_shades(s->path.scene, &h->hit, &h->place, shift, direction);
+    return shell_is_open(s, h, direction, rng);
 }
 
 static void add_transfer(const struct fast_setting *s, const struct seen_hit *h, struct rng *rng, float radiance[3])
@@ -266,6 +275,43 @@ static void add_transfer(const struct fast_setting *s, const struct seen_hit *h,
         for (size_t k = 0; k < n; k++) sum += scatter[c * n + k] * turned[c * n + k];
         radiance[c] += scale * sum; /* not cut at 0: the mean over fibers would be too bright */
     }
+}
+
+/* ---- light that is scattered more than n_traced times, at the first hit ---- */
+
+static void add_deep(const struct fast_setting *s, const struct seen_hit *h, struct rng *rng, float radiance[3])
+{
+    const struct deep_light *deep = &s->option->tables->deep;
+    const struct lights *l = &s->path.lights;
+    float direction[3], wi[3], wo[3], pdf, scale[3];
+    scene_place_to_cloth(&h->place, h->wo_scene, wo);
+    if (l->has_lamp) {
+        float u[2];
+        u[0] = rng_float(rng);
+        u[1] = rng_float(rng);
+        if (lamp_sample(&l->lamp, h->position_mm, u, direction, &pdf) && shell_is_open(s, h, direction, rng)) {
+            scene_place_to_cloth(&h->place, direction, wi);
+            for (int c = 0; c < 3; c++) scale[c] = lamp_radiance(&l->lamp, direction) / pdf * (float)M_1_PI;
+            deep_light_add(deep, wo, wi, scale, radiance);
+        }
+    }
+    if (s->mixture.n == 0) return;
+    size_t k = light_mixture_pick(&s->mixture, rng_float(rng));
+    if (!shell_is_open(s, h, s->mixture.direction[k], rng)) return;
+    float share = s->mixture.cumulative[k] - (k > 0 ? s->mixture.cumulative[k - 1] : 0);
+    scene_place_to_cloth(&h->place, s->mixture.direction[k], wi);
+    for (int c = 0; c < 3; c++) scale[c] = s->mixture.rgb[k][c] / share * (float)M_1_PI;
+    deep_light_add(deep, wo, wi, scale, radiance);
+}
+
+/* path_setting.begin */
+static void begin(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,
+                  float rgb[3])
+{
+    const struct fast_setting *s = context;
+    struct seen_hit h = {.hit = *hit};
+    describe(s, ray, &h);
+    add_deep(s, &h, rng, rgb);
 }
 
 /* Light that is scattered once as the tables have it. */
@@ -327,11 +373,12 @@ status fast_setting_init(struct fast_setting *s, const struct fast_option *optio
     s->arriving = NULL;
     s->path.n_traced = option->n_traced > 0 ? option->n_traced : 1;
     s->path.share_beyond = (float)option->corrected_share;
-    s->path.finish = finish;
+    s->path.finish = option->deep ? NULL : finish;
+    s->path.begin = option->deep ? begin : NULL;
     s->path.finish_context = s;
     if (s->path.n_traced == 1 && !(s->path.share_beyond > 0)) s->path.guided_paths = false;
     light_mixture_init(&s->mixture, &s->path.lights);
-    return scene_is_bent(s->path.scene) ? STATUS_OK : fill_arriving(s, err);
+    return option->deep || scene_is_bent(s->path.scene) ? STATUS_OK : fill_arriving(s, err);
 }
 
 void fast_setting_release(struct fast_setting *s) { free(s->arriving); }

@@ -44,6 +44,11 @@ status fast_tables_reserve_rows(struct fast_tables *t, struct error *err)
     return s == STATUS_OK ? take((void **)&t->gaussian, (size_t)t->n_row * 2 * FAST_N_GAUSSIAN, 1, err) : s;
 }
 
+status fast_tables_reserve_deep(struct fast_tables *t, struct error *err)
+{
+    return take((void **)&t->deep.value, deep_light_n_value(&t->deep), sizeof *t->deep.value, err);
+}
+
 void fast_tables_release(struct fast_tables *t)
 {
     free(t->cell);
@@ -54,6 +59,7 @@ void fast_tables_release(struct fast_tables *t)
     free(t->component_scale);
     free(t->component);
     free(t->gaussian);
+    free(t->deep.value);
     *t = (struct fast_tables){0};
 }
 

@@ -19,6 +19,7 @@
 #define SELVEDGE_RENDERER_FAST_TABLES_H
 
 #include "base/status.h"
+#include "renderer/fast/deep_light.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -53,6 +54,7 @@ struct fast_tables {
     float *component_scale; /* FAST_N_COMPONENT: value of one step */
     int8_t *component;      /* n_row x FAST_N_COMPONENT */
     uint8_t *gaussian;      /* n_row x 2 FAST_N_GAUSSIAN */
+    struct deep_light deep;
 };
 
 static inline uint32_t fast_n_harmonic(const struct fast_tables *t) { return (t->order + 1) * (t->order + 1); }
@@ -67,6 +69,7 @@ status fast_tables_reserve_transfer(struct fast_tables *t, struct error *err); /
 status fast_tables_reserve_scatter(struct fast_tables *t, struct error *err);  /* n_set, order */
 status fast_tables_reserve_segments(struct fast_tables *t, struct error *err); /* n_segment */
 status fast_tables_reserve_rows(struct fast_tables *t, struct error *err);     /* n_row */
+status fast_tables_reserve_deep(struct fast_tables *t, struct error *err);     /* sizes of deep */
 void fast_tables_release(struct fast_tables *t);
 
 /* The row of transfer at a place within the tile, FAST_NO_ROW where there is none. */

@@ -10,7 +10,7 @@
 #include <zlib.h>
 
 static const char magic[8] = "SELVFAST";
-enum { VERSION = 1, MOST_BYTES = 1 << 30, MOST_CELL = 1 << 22, MOST_SET = 64, MOST_SEGMENT = 1 << 28 };
+enum { VERSION = 2, MOST_BYTES = 1 << 30, MOST_CELL = 1 << 22, MOST_SET = 64, MOST_SEGMENT = 1 << 28 };
 
 struct header {
     char magic[8];
@@ -20,9 +20,11 @@ struct header {
     uint32_t order, mirrored, n_set, n_cell[3], n_transfer, n_segment, n_row;
     float transfer_error;
     uint32_t n_theta, n_component, n_gaussian, n_grid;
+    uint32_t deep_traced, deep_edge, deep_side;
+    float deep_error;
 };
 
-_Static_assert(sizeof(struct header) == 120, "docs/file-formats.md states the layout");
+_Static_assert(sizeof(struct header) == 136, "docs/file-formats.md states the layout");
 
 /* An array of the file. */
 struct part {
@@ -30,7 +32,7 @@ struct part {
     size_t n_bytes;
 };
 
-enum { N_PART = 9 };
+enum { N_PART = 10 };
 
 /* scaled and scale hold the transfer as it is in the file. */
 static void list_parts(const struct fast_tables *t, int16_t *scaled, float *scale, struct part part[N_PART])
@@ -46,6 +48,7 @@ static void list_parts(const struct fast_tables *t, int16_t *scaled, float *scal
         {t->component_scale, sizeof *t->component_scale * FAST_N_COMPONENT},
         {t->component, (size_t)t->n_row * FAST_N_COMPONENT},
         {t->gaussian, (size_t)t->n_row * 2 * FAST_N_GAUSSIAN},
+        {t->deep.value, deep_light_n_value(&t->deep) * sizeof *t->deep.value},
     };
     memcpy(part, all, sizeof all);
 }
@@ -99,7 +102,11 @@ static void fill_header(const struct fast_tables *t, struct header *h)
                          .n_theta = FAST_N_THETA,
                          .n_component = FAST_N_COMPONENT,
                          .n_gaussian = FAST_N_GAUSSIAN,
-                         .n_grid = FAST_N_GRID};
+                         .n_grid = FAST_N_GRID,
+                         .deep_traced = t->deep.n_traced,
+                         .deep_edge = t->deep.edge,
+                         .deep_side = t->deep.n_side,
+                         .deep_error = t->deep.error};
     memcpy(h->magic, magic, sizeof magic);
 }
 
@@ -149,6 +156,7 @@ static status check_header(const struct header *h, const char *name, struct erro
     if (!cells || h->order > SPHERE_MAX_ORDER || h->n_set == 0 || h->n_set > MOST_SET || h->n_transfer > MOST_CELL ||
         h->n_segment > MOST_SEGMENT || h->n_row > h->n_segment || h->n_theta != FAST_N_THETA ||
         h->n_component != FAST_N_COMPONENT || h->n_gaussian != FAST_N_GAUSSIAN || h->n_grid != FAST_N_GRID ||
+        h->deep_edge < 2 || h->deep_edge > DEEP_LIGHT_MOST_EDGE || h->deep_side == 0 || h->deep_side > 2 ||
         h->mirrored > 1 || !(h->tile_mm[0] > 0.0) || !(h->tile_mm[1] > 0.0) || !(h->bottom_mm < 0.0))
         return error_set(err, STATUS_FORMAT, "cannot read tables '%s': its header has counts that make no sense", name);
     return STATUS_OK;
@@ -156,19 +164,21 @@ static status check_header(const struct header *h, const char *name, struct erro
 
 static void take_header(struct fast_tables *t, const struct header *h)
 {
-    *t = (struct fast_tables){.checksum = h->checksum,
-                              .tile_mm = {h->tile_mm[0], h->tile_mm[1]},
-                              .bottom_mm = h->bottom_mm,
-                              .mean_free_path_mm = h->mean_free_path_mm,
-                              .spread_mm = h->spread_mm,
-                              .order = h->order,
-                              .mirrored = h->mirrored,
-                              .n_set = h->n_set,
-                              .n_cell = {h->n_cell[0], h->n_cell[1], h->n_cell[2]},
-                              .n_transfer = h->n_transfer,
-                              .n_segment = h->n_segment,
-                              .n_row = h->n_row,
-                              .transfer_error = h->transfer_error};
+    *t = (struct fast_tables){
+        .checksum = h->checksum,
+        .tile_mm = {h->tile_mm[0], h->tile_mm[1]},
+        .bottom_mm = h->bottom_mm,
+        .mean_free_path_mm = h->mean_free_path_mm,
+        .spread_mm = h->spread_mm,
+        .order = h->order,
+        .mirrored = h->mirrored,
+        .n_set = h->n_set,
+        .n_cell = {h->n_cell[0], h->n_cell[1], h->n_cell[2]},
+        .n_transfer = h->n_transfer,
+        .n_segment = h->n_segment,
+        .n_row = h->n_row,
+        .transfer_error = h->transfer_error,
+        .deep = {.n_traced = h->deep_traced, .edge = h->deep_edge, .n_side = h->deep_side, .error = h->deep_error}};
 }
 
 /* Rows that tables point to must exist, whatever a file says. */
@@ -193,6 +203,7 @@ static status take_parts(struct fast_tables *t, const char *from, struct error *
     if (s == STATUS_OK) s = fast_tables_reserve_scatter(t, err);
     if (s == STATUS_OK) s = fast_tables_reserve_segments(t, err);
     if (s == STATUS_OK) s = fast_tables_reserve_rows(t, err);
+    if (s == STATUS_OK) s = fast_tables_reserve_deep(t, err);
     if (s == STATUS_OK) {
         struct part part[N_PART];
         list_parts(t, scaled, scale, part);

@@ -4,6 +4,7 @@ BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
 $(BUILD)/tests/bench/models/bench_recovery: $(BUILD)/obj/tests/bench/fit_bench.c.o
+$(BUILD)/tests/bench/pictures/bench_pictures: $(BUILD)/obj/tests/bench/pictures/field_comparison.c.o
 
 ##@ Benchmarks and pictures
 bench: | deps-test ## every figure, one JSON object a line

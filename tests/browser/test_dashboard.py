@@ -283,7 +283,8 @@ def test_pictures_grow_on_the_page(real, browser, tmp_path):
     view = {"light_theta_deg": 45, "light_phi_deg": 0, "camera_theta_deg": 45, "camera_phi_deg": 180, "width_mm": 3}
     (tmp_path / "job.json").write_text(json.dumps({
         "sample": "on surfaces", "fibers": {"file": "cloth.hair"},
-        "pictures": [{"on": "cylinder", "radius_mm": 1, **view, "px": 32, "samples": 16, "method": "fast", "reference": True, "filter": True},
+        "pictures": [{"on": "cylinder", "radius_mm": 1, **view, "px": 32, "samples": 16, "method": "fast", "deep_light": "cells",
+                      "reference": True, "filter": True},
                      {"on": "flat", **view, "px": 32, "samples": 1024}],
         "fit": {"fixed": {"C_R": [0.1] * 3, "C_TT": [0.6, 0.4, 0.3], "beta_R": 6, "beta_TT": 12, "gamma_TT": 30}, "model": "two_lobe.v1"}}))
     job = selvedge.Client(url).submit(str(tmp_path / "job.json"))

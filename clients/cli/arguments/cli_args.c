@@ -44,6 +44,8 @@ static const struct cli_option {
     {OPT_PICTURE, 0, "samples", "N", "paths of a pixel (default: 16)", offsetof(struct cli_args, samples)},
     {OPT_PICTURE, 0, "method", "HOW", "path, fast, corrected, dual or diffusion (default: path)",
      offsetof(struct cli_args, method)},
+    {OPT_PICTURE, 0, "deep-light", "HOW", "of --method fast: directions or cells (default: directions)",
+     offsetof(struct cli_args, deep_light)},
     {OPT_PICTURE, 0, "reference", NULL, "compare it with path tracing (default: --method fast)",
      offsetof(struct cli_args, reference)},
     {OPT_PICTURE, 0, "filter", NULL, "also make a filtered view with less noise, for the eye",

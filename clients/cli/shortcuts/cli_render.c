@@ -71,6 +71,7 @@ static status read_picture(const struct cli_args *a, json_t *picture, const char
     if (s == STATUS_OK) s = read_number("ground-gap-mm", a->ground_gap_mm, "ground_gap_mm", false, picture, err);
     const char *method = a->method == NULL && a->reference ? "fast" : a->method;
     if (method != NULL) json_object_set_new(picture, "method", json_string(method));
+    if (a->deep_light != NULL) json_object_set_new(picture, "deep_light", json_string(a->deep_light));
     if (a->reference) json_object_set_new(picture, "reference", json_true());
     if (a->filter) json_object_set_new(picture, "filter", json_true());
     bool yes;

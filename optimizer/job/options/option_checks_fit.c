@@ -153,6 +153,9 @@ static status check_picture(const struct job_document *doc, size_t i, struct err
     snprintf(field, sizeof field, "pictures[%zu].visibility", i);
     if (p->visibility_by_tables && p->method != JOB_PICTURE_FAST)
         return error_set_field(err, STATUS_INVALID, field, "'%s' is \"tables\", but 'method' is not \"fast\"", field);
+    snprintf(field, sizeof field, "pictures[%zu].deep_light", i);
+    if (p->deep_by_cells && p->method != JOB_PICTURE_FAST)
+        return error_set_field(err, STATUS_INVALID, field, "'%s' is \"cells\", but 'method' is not \"fast\"", field);
     snprintf(field, sizeof field, "pictures[%zu].radius_mm", i);
     if (p->on == JOB_ON_DRAPE && !(p->radius_mm >= 0.02 * p->size_mm && p->radius_mm <= 10.0 * p->size_mm))
         return error_set_field(err, STATUS_INVALID, field,

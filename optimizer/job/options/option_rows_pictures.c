@@ -4,6 +4,7 @@
 #define OF_PICTURE(member) INTO_OF(struct job_surface_picture, member)
 
 static const char *const surface_names[] = {"flat", "cylinder", "drape", "mesh", NULL};
+static const char *const deep_light_names[] = {"directions", "cells", NULL};
 static const char *const visibility_names[] = {"traced", "tables", NULL};
 static const char *const method_names[] = {"path", "fast", "corrected", "dual", "diffusion", NULL};
 
@@ -125,6 +126,25 @@ const struct job_option option_rows_pictures[] = {
          "Of method `fast`: whether a ray is traced to see if a fiber has the light, or whether tables of what each "
          "segment sees say so, as published (fabric thesis, section 6.4.1). The tables then hold one hit of a path, "
          "and take several times as long to make."},
+    {.path = "pictures[].deep_light",
+     .kind = OPTION_SWITCH,
+     OF_PICTURE(deep_by_cells),
+     .choice = deep_light_names,
+     .standard = "\"directions\"",
+     .meaning =
+         "Of method `fast`: where the light comes from that is scattered more than three times. `directions`: from a "
+         "table of view and light, as the mean over the repeat, so that places of the repeat do not differ in this "
+         "light. `cells`: from a table of the place where the third hit lies, in spherical harmonics of order 4, which "
+         "is made faster. With `visibility` `tables`, and with method `corrected`, it always comes from cells."},
+    {.path = "pictures[].deep_light_paths",
+     .kind = OPTION_COUNT,
+     OF_PICTURE(n_deep_path),
+     RANGE(1000, 1000000000),
+     .unit = "paths",
+     .standard = "8000000",
+     .meaning =
+         "Of `deep_light` `directions`: paths that make its table, in 10 to 20 microseconds of a processor each. "
+         "The largest number of all pictures counts."},
     {.path = "pictures[].reference",
      .kind = OPTION_BOOL,
      OF_PICTURE(reference),

@@ -161,7 +161,8 @@ status precompute_journal_run(struct precompute_journal *j, const struct journal
 {
     size_t kept = j->path != NULL ? restore(j, part) : 0,
            n_task = (part->n_row + work->task_rows - 1) / work->task_rows;
-    size_t batch = BATCH_TASKS * (pool != NULL ? thread_pool_n_thread(pool) : 1);
+    size_t batch =
+        (work->batch_tasks > 0 ? work->batch_tasks : BATCH_TASKS) * (pool != NULL ? thread_pool_n_thread(pool) : 1);
     kept -= kept == part->n_row ? 0 : kept % work->task_rows; /* a task begins at its first row */
     if (j->path == NULL) batch = n_task;
     for (size_t done = kept; done < part->n_row;) {

@@ -50,6 +50,7 @@ struct journal_work {
     task_function run;
     void *context;
     size_t task_rows;
+    size_t batch_tasks; /* run at least so many of them for each thread before they are kept; 0: 16 */
 };
 status precompute_journal_run(struct precompute_journal *j, const struct journal_part *part,
                               const struct journal_work *work, struct thread_pool *pool,

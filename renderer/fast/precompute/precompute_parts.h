@@ -7,7 +7,7 @@
 #include "renderer/transport/surface/parameter_sets.h"
 
 /* Numbers of the parts in the journal. */
-enum { JOURNAL_TRANSFER, JOURNAL_OPEN_SEGMENTS, JOURNAL_COMPONENTS, JOURNAL_SEGMENTS };
+enum { JOURNAL_TRANSFER, JOURNAL_OPEN_SEGMENTS, JOURNAL_COMPONENTS, JOURNAL_SEGMENTS, JOURNAL_DEEP };
 
 struct precompute_job {
     const struct fast_precompute_request *q;
@@ -22,6 +22,8 @@ struct precompute_job {
 status precompute_scatter(struct precompute_job *j, struct error *err);
 /* transfer_cells.c: cells and transfer, mean free path, spread. */
 status precompute_transfer(struct precompute_job *j, struct error *err);
+/* deep_walks.c: t->deep, whose sizes are set. */
+status precompute_deep(struct precompute_job *j, struct error *err);
 /* segment_visibility.c: what the segments see. */
 status precompute_visibility(struct precompute_job *j, struct error *err);
 

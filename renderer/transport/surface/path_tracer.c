@@ -333,7 +333,7 @@ static bool go_on_beyond_last(struct walk *w, const struct bounce *b, struct sce
 {
     const struct path_setting *s = w->s;
     float rgb[3] = {0, 0, 0}, value[3], share = s->share_beyond, pdf;
-    s->finish(s->finish_context, &b->hit, ray, w->rng, rgb);
+    if (s->finish != NULL) s->finish(s->finish_context, &b->hit, ray, w->rng, rgb);
     bool goes_on = share > 0 && (share >= 1 || rng_float(w->rng) < share);
     for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * (goes_on ? rgb[c] * (1 - 1 / share) : rgb[c]);
     add_light_to_all(w, value, NULL);
@@ -343,9 +343,8 @@ static bool go_on_beyond_last(struct walk *w, const struct bounce *b, struct sce
         w->last = false;
         return true;
     }
-    struct scene_hit unused;
-    bool rest = share == 0 && !path_walk_connects_all(w);
-    if (rest && scatter(w, b, ray, &pdf) && !scene_trace(s->scene, ray, &unused)) add_beyond(w, ray, pdf);
+    if (share != 0 || path_walk_connects_all(w)) return false;
+    if (scatter(w, b, ray, &pdf) && !scene_trace(s->scene, ray, &(struct scene_hit){0})) add_beyond(w, ray, pdf);
     return false;
 }
 
@@ -370,6 +369,9 @@ static void walk_on(struct walk *w, struct scene_ray *ray, struct path_record *r
             memcpy(w->step->wo, b.wo, sizeof b.wo);
             w->step->i_group = scene_group_of(s->scene, hit.i_segment);
         }
+        float rgb[3] = {0, 0, 0};
+        if (i == 0 && s->begin != NULL) s->begin(s->finish_context, &hit, ray, w->rng, rgb);
+        if (i == 0 && s->begin != NULL) add_light_to_all(w, rgb, NULL);
         connect_lamps(w, &b);
         if (s->lights.image != NULL) connect_image(w, &b);
         if (w->last && !go_on_beyond_last(w, &b, ray)) return;

@@ -34,7 +34,11 @@ struct path_setting {
     float share_beyond;
     void (*finish)(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,
                    float rgb[3]);
-    const void *finish_context;
+    /* Radiance along the ray reversed that is added at the first hit, as finish; NULL: none. With n_traced, finish may
+     * then be NULL, too, for nothing. */
+    void (*begin)(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,
+                  float rgb[3]);
+    const void *finish_context; /* of both */
     /* Factor on the light that leaves the cloth towards the camera; NULL: 1. Not for recorded paths, nor for what
      * finish adds. */
     const struct discrepancy *discrepancy;

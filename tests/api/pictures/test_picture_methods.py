@@ -17,7 +17,7 @@ def test_methods_show_the_same_cloth(tmp_path):
     (folder / "input").mkdir(parents=True)
     view = {"on": "flat", "width_mm": 3, **VIEW, "samples": 64}
     given = {"sample": "s", "fibers": {"file": "cloth.hair"},
-             "pictures": [{**view, "method": m} for m in ("path", "fast", "corrected")],
+             "pictures": [{**view, "method": m, "deep_light_paths": 100000} for m in ("path", "fast", "corrected")],
              "fit": {"model": "isotropic.v1", "fixed": {"C": [0.8, 0.5, 0.3]}}}
     (folder / "job.json").write_text(json.dumps(given))
     (folder / "input/cloth.hair").write_bytes(hair(layers=3))
@@ -39,7 +39,7 @@ def test_a_gaussian_lamp_lights_every_method(tmp_path):
     view = {"on": "flat", "width_mm": 3, **VIEW, "samples": 64}
     soft = {**view, "lamp_sharpness": 40}
     given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "lamp": {"kind": "directional"},
-             "pictures": [view, {**view, "lamp_sharpness": 50000}, soft, {**soft, "method": "fast"},
+             "pictures": [view, {**view, "lamp_sharpness": 50000}, soft, {**soft, "method": "fast", "deep_light_paths": 100000},
                           {**soft, "method": "fast", "visibility": "tables"}],
              "fit": {"model": "two_lobe.v1", "fixed": {"C_R": [0.1] * 3, "C_TT": [0.6, 0.4, 0.2], "beta_R": 10, "beta_TT": 30, "gamma_TT": 40}}}
     (folder / "job.json").write_text(json.dumps(given))
@@ -146,7 +146,7 @@ def test_a_sheet_of_its_own_has_no_tables(tmp_path):
     folder = tmp_path / "job"
     (folder / "input").mkdir(parents=True)
     given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "black_sheet": True,
-             "pictures": [{"on": "flat", **VIEW, "method": "fast", "black_sheet": False}],
+             "pictures": [{"on": "flat", **VIEW, "method": "fast", "deep_light": "cells", "black_sheet": False}],
              "fit": {"model": "isotropic.v1", "fixed": {"C": [0.8, 0.5, 0.3]}}}
     (folder / "job.json").write_text(json.dumps(given))
     (folder / "input/cloth.hair").write_bytes(hair(layers=3))
@@ -160,7 +160,7 @@ def test_a_picture_beside_its_reference(tmp_path):
     folder = tmp_path / "job"
     (folder / "input").mkdir(parents=True)
     view = {"on": "flat", "width_mm": 3, **VIEW, "samples": 64, "reference": True}
-    given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "pictures": [{**view, "method": m} for m in ("fast", "corrected")],
+    given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "pictures": [{**view, "method": m, "deep_light_paths": 100000} for m in ("fast", "corrected")],
              "fit": {"model": "isotropic.v1", "fixed": {"C": [0.8, 0.5, 0.3]}}}
     (folder / "job.json").write_text(json.dumps(given))
     (folder / "input/cloth.hair").write_bytes(hair(layers=3))
@@ -197,7 +197,7 @@ def test_a_path_traced_picture_is_its_own_reference(real):
 
 def test_the_command_prints_the_comparison(real, tmp_path):
     job, _ = run(real, {k: v for k, v in document().items() if k != "pictures"})
-    shown = render(real, job, "--on", "flat", "--px", 16, "--samples", 16, "--width-mm", 3, "--reference", "--out", tmp_path / "out")
+    shown = render(real, job, "--on", "flat", "--px", 16, "--samples", 16, "--width-mm", 3, "--reference", "--deep-light", "cells", "--out", tmp_path / "out")
     assert shown.returncode == 0, shown.stderr
     picture = json.loads((tmp_path / "out/pictures/on-1.json").read_text())
     assert picture["method"] == "fast"

@@ -2,6 +2,7 @@
 import json
 import os
 import signal
+import struct
 import subprocess
 import time
 
@@ -47,12 +48,29 @@ def test_visibility_from_tables(tmp_path):
     """The means are near those of path tracing, with the error of one traced hit, and the tables are longer."""
     view = {"on": "flat", "width_mm": 3, **VIEW, "samples": 64}
     both = folder_of(tmp_path / "tables", {**view, "method": "fast", "visibility": "tables"}, view)
-    traced = folder_of(tmp_path / "traced", {**view, "method": "fast"})
+    traced = folder_of(tmp_path / "traced", {**view, "method": "fast", "deep_light": "cells"})
     run_worker(both)
     run_worker(traced)
     tables, path = (sum(json.loads((both / f"results/pictures/on-{i}.json").read_text())["mean"]) / 3 for i in (1, 2))
     assert abs(tables - path) < 0.25 * path
     assert size_of(both / "work/report/fast.tables") > size_of(traced / "work/report/fast.tables") + 1000
+
+
+def test_deep_light_by_directions(tmp_path):
+    """The mean of a flat cloth is that of path tracing within the noise of both and the stated one of the table, and the tables hold it."""
+    view = {"on": "flat", "width_mm": 3, **VIEW, "samples": 16, "px": 64}
+    folder = folder_of(tmp_path / "deep", {**view, "method": "fast", "deep_light_paths": 100000}, view)
+    run_worker(folder)
+    deep, path = (json.loads((folder / f"results/pictures/on-{i}.json").read_text())["mean"] for i in (1, 2))
+    tables = (folder / "work/report/fast.tables").read_bytes()
+    traced, edge, side, error = struct.unpack_from("<IIIf", tables, 120)
+    assert (traced, edge, side) == (3, 12, 1) and 0 < error < 1
+    assert all(abs(a - b) < 0.05 * b for a, b in zip(deep, path, strict=True))
+
+
+def test_deep_light_belongs_to_the_fast_method(real):
+    doc = {"sample": "s", "fibers": {"file": "a.hair"}, "pictures": [{"on": "flat", **VIEW, "deep_light": "cells"}], "fit": {"model": "two_lobe.v1"}}
+    assert "method" in problem(real.post("/v1/jobs", json=doc), 422, "invalid", "pictures[0].deep_light")["detail"]
 
 
 def test_visibility_belongs_to_the_fast_method(real):

@@ -13,8 +13,12 @@
  *       renderer, both from one run; 0 where the part that stays is above 3 %. Details go to standard error.
  *
  * bench_pictures [FABRIC...] [--px N] [--path-samples N] [--fast-samples N] [--flat-paths N] [--paths N] [--order N]
- *                [--cell-paths N] [--traced N] [--corrected SHARE] [--by-tables] [--yarns N] [--png FOLDER]
+ *                [--cell-paths N] [--traced HITS] [--corrected SHARE] [--by-tables] [--yarns N] [--png FOLDER]
+ *                [--deep HITS] [--deep-edge N] [--deep-paths N] [--cells-too]
  *                [--no-flat] [--no-drape] [--no-visibility] [--dual DENSITY (in place of the fast renderer)]
+ *   --deep       hits before the table of deep light, 3 by default; 0: light from cells in its place, as with --traced,
+ *                --corrected and --by-tables
+ *   --cells-too  also compares the drape with cells in place of that table; to standard error
  *   FABRIC   gabardine, fleece, silk (tests/support/cloth/fit_fabrics.h); default: all three
  */
 #include "base/angle.h"
@@ -24,6 +28,7 @@
 #include "renderer/fast/precompute/fast_precompute.h"
 #include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/render.h"
+#include "tests/bench/pictures/field_comparison.h"
 #include "tests/support/cloth/fit_fabrics.h"
 
 #include <math.h>
@@ -38,12 +43,11 @@ enum { N_FLAT = 492, FIELD = 4 };
 
 static struct {
     size_t px, n_path_sample, n_fast_sample, n_flat_path, n_yarn;
-    uint32_t n_path, order, n_traced; /* 0: the defaults of the precomputation and of the renderer */
-    double cell_paths, corrected, dual;
+    uint32_t n_path, order, n_traced, deep, deep_edge; /* 0: the defaults of the precomputation and of the renderer */
+    double cell_paths, corrected, dual, deep_paths;
     const char *png;
-    enum fast_visibility visibility;
-    bool flat, drape, no_visibility;
-} option = {.px = 512, .n_path_sample = 16, .n_fast_sample = 16, .n_flat_path = 3072, .flat = true, .drape = true};
+    bool no_flat, no_drape, no_visibility, by_tables, cells_too;
+} option = {.px = 512, .n_path_sample = 16, .n_fast_sample = 16, .n_flat_path = 3072, .deep = 3};
 
 static struct thread_pool *pool;
 
@@ -109,24 +113,28 @@ static void make_tables(struct bench *b)
     char path[] = "/tmp/selvedge-tables-XXXXXX";
     struct stat info;
     int fd = mkstemp(path);
+    const uint32_t n_path = option.n_path == 0 && b->fast.deep && !option.cells_too ? 1 : option.n_path;
     double start = processor_s();
     const struct fast_precompute_request q = {.scene = b->flat,
                                               .model = b->model.surface,
                                               .param = b->param,
-                                              .n_path = option.n_path,
+                                              .n_path = n_path,
                                               .order = option.order,
                                               .cell_paths = option.cell_paths,
-                                              .no_visibility = option.no_visibility};
+                                              .no_visibility = option.no_visibility,
+                                              .deep_traced = b->fast.deep ? option.deep : 0,
+                                              .deep_edge = option.deep_edge,
+                                              .deep_paths = option.deep_paths};
     check(fast_precompute(&q, pool, NULL, &b->tables, &err), &err);
     double seconds = processor_s() - start;
     const struct fast_tables *t = &b->tables;
     check(fast_tables_write(t, path, &err), &err);
-    fprintf(
-        stderr,
-        "%s: free path %.4f mm, spread %.4f mm, cells %u x %u x %u, %u seen, transfer error %.4f, %u of %u segments "
-        "see\n",
-        b->fabric->name, t->mean_free_path_mm, t->spread_mm, t->n_cell[0], t->n_cell[1], t->n_cell[2], t->n_transfer,
-        (double)t->transfer_error, t->n_row, t->n_segment);
+    fprintf(stderr,
+            "%s: free path %.4f mm, spread %.4f mm, cells %u x %u x %u, %u seen, transfer error %.4f, %u of %u see\n",
+            b->fabric->name, t->mean_free_path_mm, t->spread_mm, t->n_cell[0], t->n_cell[1], t->n_cell[2],
+            t->n_transfer, (double)t->transfer_error, t->n_row, t->n_segment);
+    if (t->deep.n_traced > 0)
+        fprintf(stderr, "%s: noise of deep light %.2f %%\n", b->fabric->name, 100.0 * (double)t->deep.error);
     if (fd < 0 || fstat(fd, &info) != 0 || stat(path, &info) != 0) abort();
     print(b->fabric->name, "precompute_s", seconds, "s", "lower");
     print(b->fabric->name, "precompute_bytes", (double)info.st_size, "bytes", "lower");
@@ -233,44 +241,6 @@ static double render(struct bench *b, bool fast, struct image *im)
     return processor_s() - start;
 }
 
-/* Sums over a field of FIELD x FIELD pixels: mean and variance of the mean of each channel. */
-static void field_of(const struct image *im, size_t x, size_t y, double mean[3], double var[3])
-{
-    double n = FIELD * FIELD;
-    for (int c = 0; c < 3; c++) mean[c] = var[c] = 0.0;
-    for (size_t k = 0; k < FIELD * FIELD; k++) {
-        const float *p = im->pixel + ((y * FIELD + k / FIELD) * im->width + x * FIELD + k % FIELD) * im->n_channel;
-        for (int c = 0; c < 3; c++) {
-            mean[c] += (double)p[c] / n;
-            var[c] += (double)p[3 + c] / (n * n);
-        }
-    }
-}
-
-struct comparison {
-    double mean, difference, error2, path_noise2, fast_noise2, n;
-};
-
-static struct comparison compare(const struct image *path, const struct image *fast)
-{
-    struct comparison r = {0};
-    for (size_t y = 0; y < path->height / FIELD; y++)
-        for (size_t x = 0; x < path->width / FIELD; x++) {
-            double a[3], va[3], f[3], vf[3];
-            field_of(path, x, y, a, va);
-            field_of(fast, x, y, f, vf);
-            if (!(a[0] + a[1] + a[2] > 0.0) && !(f[0] + f[1] + f[2] > 0.0)) continue;
-            for (int c = 0; c < 3; c++, r.n += 1.0) {
-                r.mean += a[c];
-                r.difference += f[c] - a[c];
-                r.error2 += (f[c] - a[c]) * (f[c] - a[c]);
-                r.path_noise2 += va[c];
-                r.fast_noise2 += vf[c];
-            }
-        }
-    return r;
-}
-
 static void write_png(const struct bench *b, const struct image *im, const char *how)
 {
     char file[512];
@@ -278,6 +248,30 @@ static void write_png(const struct bench *b, const struct image *im, const char 
     if (option.png == NULL) return;
     snprintf(file, sizeof file, "%s/%s-%s.png", option.png, b->fabric->name, how);
     check(image_write_png(im, 2.0, file, &err), &err);
+}
+
+/* Details of a comparison. Result: processor seconds of path tracing to an error of 3 % over those of the second
+ * picture. */
+static double print_drape(const char *how, const struct image *path, double path_s, const struct image *fast,
+                          double fast_s)
+{
+    struct field_comparison r = field_comparison_of(path, fast, FIELD);
+    double mean = r.mean / r.n, goal2 = 0.03 * 0.03, scale = r.n * mean * mean,
+           stays2 = pow(field_comparison_stays(&r), 2.0);
+    double path_to = path_s * r.noise2[0] / scale / goal2;
+    double fast_to = stays2 < goal2 ? fast_s * r.noise2[1] / scale / (goal2 - stays2) : INFINITY;
+    fprintf(
+        stderr,
+        "%s drape: mean %.4f, fast above it by %.2f %%; path %.1f s with noise %.2f %%, fast %.1f s with noise %.2f "
+        "%%; stays %.2f %%",
+        how, mean, 100.0 * r.difference / r.mean, path_s, 100.0 * sqrt(r.noise2[0] / scale), fast_s,
+        100.0 * sqrt(r.noise2[1] / scale), 100.0 * sqrt(stays2));
+    for (size_t edge = 2 * FIELD; edge <= 8 * FIELD; edge *= 2) {
+        struct field_comparison wide = field_comparison_of(path, fast, edge);
+        fprintf(stderr, ", %.2f %% over %zu x %zu pixels", 100.0 * field_comparison_stays(&wide), edge, edge);
+    }
+    fprintf(stderr, "; to 3 %%: %.1f s and %.1f s\n", path_to, fast_to);
+    return path_to / fast_to;
 }
 
 static void bench_drape(struct bench *b)
@@ -289,20 +283,16 @@ static void bench_drape(struct bench *b)
     check(scene_bend(b->flat, &m, true, &b->drape, &err), &err);
     mesh_release(&m);
     double path_s = render(b, false, &path), fast_s = render(b, true, &fast);
-    struct comparison r = compare(&path, &fast);
-    double mean = r.mean / r.n, goal2 = 0.03 * 0.03, scale = r.n * mean * mean;
-    double stays2 = fmax(0.0, (r.error2 - r.path_noise2 - r.fast_noise2) / scale);
-    double path_to = path_s * r.path_noise2 / scale / goal2;
-    double fast_to = stays2 < goal2 ? fast_s * r.fast_noise2 / scale / (goal2 - stays2) : INFINITY;
-    fprintf(
-        stderr,
-        "%s drape: mean %.4f, fast above it by %.2f %%; path %.1f s with noise %.2f %%, fast %.1f s with noise %.2f "
-        "%%; stays %.2f %%; to 3 %%: %.1f s and %.1f s\n",
-        b->fabric->name, mean, 100.0 * r.difference / r.mean, path_s, 100.0 * sqrt(r.path_noise2 / scale), fast_s,
-        100.0 * sqrt(r.fast_noise2 / scale), 100.0 * sqrt(stays2), path_to, fast_to);
-    print(b->fabric->name, "speedup_at_3pct", path_to / fast_to, "", "higher");
+    print(b->fabric->name, "speedup_at_3pct", print_drape(b->fabric->name, &path, path_s, &fast, fast_s), "", "higher");
     write_png(b, &path, "path");
     write_png(b, &fast, "fast");
+    if (option.cells_too) {
+        image_release(&fast);
+        b->fast.deep = false;
+        fast_s = render(b, true, &fast);
+        print_drape("by cells,", &path, path_s, &fast, fast_s);
+        write_png(b, &fast, "cells");
+    }
     image_release(&path), image_release(&fast);
     scene_free(b->drape);
 }
@@ -310,6 +300,7 @@ static void bench_drape(struct bench *b)
 static void bench_fabric(const char *name)
 {
     struct bench b = {.fabric = fit_fabric_find(name)};
+    const bool deep = option.deep > 0 && option.n_traced == 0 && !(option.corrected > 0) && !option.by_tables;
     if (b.fabric == NULL || !appearance_find(b.fabric->model_id, &b.model) || b.model.kind != MODEL_SURFACE) {
         fprintf(stderr, "no such fabric: %s\n", name);
         exit(2);
@@ -317,16 +308,17 @@ static void bench_fabric(const char *name)
     for (size_t p = 0; p < b.model.n_param; p++)
         b.param[p] = param_from_file_unit(&b.model.param[p], b.fabric->truth[p]);
     b.fast = (struct fast_option){.tables = &b.tables,
-                                  .visibility = option.visibility,
-                                  .n_traced = option.n_traced,
+                                  .visibility = option.by_tables ? FAST_TABLES : FAST_TRACED,
+                                  .n_traced = deep ? option.deep : option.n_traced,
+                                  .deep = deep,
                                   .corrected_share = option.corrected};
     make_cloth(&b);
     if (option.dual > 0)
         make_averages(&b);
     else
         make_tables(&b);
-    if (option.flat) bench_flat(&b);
-    if (option.drape) bench_drape(&b);
+    if (!option.no_flat) bench_flat(&b);
+    if (!option.no_drape) bench_drape(&b);
     fast_tables_release(&b.tables);
     dual_tables_release(&b.averages);
     scene_free(b.flat);
@@ -348,6 +340,9 @@ static bool take_number(const char *name, double number)
                  {"--yarns", &option.n_yarn, NULL, NULL},
                  {"--paths", NULL, &option.n_path, NULL},
                  {"--order", NULL, &option.order, NULL},
+                 {"--deep", NULL, &option.deep, NULL},
+                 {"--deep-edge", NULL, &option.deep_edge, NULL},
+                 {"--deep-paths", NULL, NULL, &option.deep_paths},
                  {"--traced", NULL, &option.n_traced, NULL},
                  {"--cell-paths", NULL, NULL, &option.cell_paths},
                  {"--corrected", NULL, NULL, &option.corrected},
@@ -364,13 +359,17 @@ static bool take_number(const char *name, double number)
 
 static bool take_flag(const char *name)
 {
-    bool no_flat = strcmp(name, "--no-flat") == 0, no_drape = strcmp(name, "--no-drape") == 0;
-    bool unseen = strcmp(name, "--no-visibility") == 0, by_tables = strcmp(name, "--by-tables") == 0;
-    option.flat = option.flat && !no_flat;
-    option.drape = option.drape && !no_drape;
-    option.no_visibility = option.no_visibility || unseen;
-    if (by_tables) option.visibility = FAST_TABLES;
-    return no_flat || no_drape || unseen || by_tables;
+    const struct {
+        const char *name;
+        bool *flag;
+    } known[] = {{"--no-flat", &option.no_flat},
+                 {"--no-drape", &option.no_drape},
+                 {"--no-visibility", &option.no_visibility},
+                 {"--by-tables", &option.by_tables},
+                 {"--cells-too", &option.cells_too}};
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+        if (strcmp(name, known[i].name) == 0) return *known[i].flag = true;
+    return false;
 }
 
 int main(int argc, char **argv)

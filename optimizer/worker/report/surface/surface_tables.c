@@ -8,13 +8,17 @@
 
 /* Three traced hits leave a third of the error of one (renderer/fast/NOTES.md); the transfer to a cell has an error of
  * 1 to 2 % by so many paths. */
-enum { N_TRACED = 3, CELL_PATHS = 8000 };
+enum { N_TRACED = 3, CELL_PATHS = 8000, SPREAD_PATHS = 1024 };
 /* Two hits before diffusion leave its means without a part that stays (renderer/diffusion/NOTES.md). */
 enum { N_TRACED_IN_PILE = 2 };
 #define JOURNAL_EVERY_S 2.0
 /* Of dual scattering: cloth is dense (fabric thesis, section 6.6). */
 #define DENSITY 1.0f
-static const double share_of_time = 0.3, corrected_share = 0.25;
+static const double corrected_share = 0.25;
+/* Rough processor seconds on a twill of 26,000 segments: of a path of the table of directions, of a path of all cells,
+ * of the tables of what segments see, and of a sample of a picture by tables and path by path. */
+static const double deep_path_s = 12e-6, cell_path_s = 3e-3, visibility_s = 60.0, fast_sample_s = 5e-6,
+                    path_sample_s = 20e-6;
 
 static bool by_tables(enum job_picture_method m) { return m == JOB_PICTURE_FAST || m == JOB_PICTURE_CORRECTED; }
 
@@ -31,6 +35,33 @@ static bool wants_tables(const struct pipeline_context *c)
     for (size_t i = 0; i < c->doc->n_surface_picture; i++)
         if (by_tables(c->doc->surface_picture[i].method)) return true;
     return false;
+}
+
+/* Whether a picture takes light that is scattered often from the table of directions. Otherwise from cells. */
+static bool by_directions(const struct job_surface_picture *p)
+{
+    return p->method == JOB_PICTURE_FAST && !p->visibility_by_tables && !p->deep_by_cells;
+}
+
+/* Paths for that table; 0: no picture asks for it. */
+static size_t deep_paths(const struct pipeline_context *c)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < c->doc->n_surface_picture; i++) {
+        const struct job_surface_picture *p = &c->doc->surface_picture[i];
+        if (by_directions(p) && p->n_deep_path > n) n = p->n_deep_path;
+    }
+    return n;
+}
+
+/* Paths of a cell; without a picture by cells they only say how far light spreads. */
+static uint32_t cell_paths(const struct pipeline_context *c)
+{
+    for (size_t i = 0; i < c->doc->n_surface_picture; i++) {
+        const struct job_surface_picture *p = &c->doc->surface_picture[i];
+        if (by_tables(p->method) && !by_directions(p)) return CELL_PATHS;
+    }
+    return SPREAD_PATHS;
 }
 
 /* Filters take the albedo of fibers from the averages. */
@@ -50,7 +81,20 @@ static bool wants_method(const struct pipeline_context *c, enum job_picture_meth
     return false;
 }
 
-double surface_tables_share(const struct pipeline_context *c) { return wants_tables(c) ? share_of_time : 0.0; }
+double surface_tables_share(const struct pipeline_context *c)
+{
+    if (!wants_tables(c)) return 0.0;
+    double tables_s =
+        deep_path_s * (double)deep_paths(c) + cell_path_s * cell_paths(c) + (wants_visibility(c) ? visibility_s : 0.0);
+    double pictures_s = 0.0;
+    for (size_t i = 0; i < c->doc->n_surface_picture; i++) {
+        const struct job_surface_picture *p = &c->doc->surface_picture[i];
+        double n_sample = (double)(p->px * p->px * p->sample);
+        pictures_s += n_sample * (p->method == JOB_PICTURE_FAST ? fast_sample_s : path_sample_s);
+        if (p->reference) pictures_s += n_sample * path_sample_s;
+    }
+    return tables_s / (tables_s + pictures_s);
+}
 
 static status get_tables(struct pipeline_context *c, const struct progress *progress, struct surface_tables *t,
                          struct error *err)
@@ -61,8 +105,10 @@ static status get_tables(struct pipeline_context *c, const struct progress *prog
                                               .model = model->appearance.surface,
                                               .param = model->fit.param,
                                               .n_set = model->sets.n_set,
-                                              .n_path = CELL_PATHS,
+                                              .n_path = cell_paths(c),
                                               .no_visibility = !wants_visibility(c),
+                                              .deep_traced = deep_paths(c) > 0 ? N_TRACED : 0,
+                                              .deep_paths = (double)deep_paths(c),
                                               .journal_path = journal,
                                               .journal_every_s = JOURNAL_EVERY_S};
     worker_folder_path(c->folder, JOB_FOLDER_WORK, "report/fast.journal", journal);
@@ -141,6 +187,7 @@ struct surface_method surface_tables_method(const struct surface_tables *t, cons
         .fast = {.tables = &t->tables,
                  .visibility = p->visibility_by_tables ? FAST_TABLES : FAST_TRACED,
                  .n_traced = N_TRACED,
+                 .deep = by_directions(p),
                  .corrected_share = p->method == JOB_PICTURE_CORRECTED ? corrected_share : 0.0},
         .dual = {&t->averages, DENSITY, DENSITY},
         .diffusion = {&t->pile}};

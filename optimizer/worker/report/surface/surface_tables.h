@@ -25,8 +25,8 @@ struct surface_method {
     struct diffusion_option diffusion;
 };
 
-/* Share of the pictures' time that the tables are expected to take; 0 when no picture asks for those of renderer/fast:
- * averages take a second. */
+/* Share of the time of the tables and the pictures together that the tables are expected to take; 0 when no picture
+ * asks for those of renderer/fast: averages take a second. */
 double surface_tables_share(const struct pipeline_context *c);
 /* Reads the tables of the best model from the job's folder, work/report/fast.tables, if those of this cloth with these
  * parameters are there, and makes and keeps them otherwise, going on with what an interrupted attempt has kept in

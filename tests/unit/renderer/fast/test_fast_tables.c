@@ -49,7 +49,10 @@ static void make_cloth(struct cloth *c, const char *model, bool black_sheet, boo
                                               .param = c->param,
                                               .n_path = 12000,
                                               .cell_paths = 3,
-                                              .no_visibility = no_visibility};
+                                              .no_visibility = no_visibility,
+                                              .deep_traced = black_sheet ? 1 : 0,
+                                              .deep_edge = 3,
+                                              .deep_paths = 2000};
     if (fast_precompute(&q, NULL, NULL, &c->tables, &err) != STATUS_OK) fail_msg("%s", err.text);
     assert_true(c->tables.checksum == fast_tables_checksum(&q));
 }
@@ -259,6 +262,9 @@ static void file_round_trip(void **state)
     assert_memory_equal(back.segment_row, t->segment_row, t->n_segment * sizeof *t->segment_row);
     assert_memory_equal(back.component, t->component, (size_t)t->n_row * FAST_N_COMPONENT);
     assert_memory_equal(back.scatter, t->scatter, FAST_N_THETA * 3 * fast_n_harmonic(t) * sizeof *t->scatter);
+    assert_true(back.deep.n_traced == 1 && back.deep.edge == 3 && back.deep.n_side == 1);
+    assert_true(back.deep.error > 0 && back.deep.error == t->deep.error);
+    assert_memory_equal(back.deep.value, t->deep.value, deep_light_n_value(&t->deep) * sizeof *t->deep.value);
     for (size_t i = 0; i < n_number; i++) {
         float most = fabsf(t->transfer[i - i % (n_number / t->n_transfer)]);
         assert_true(fabsf(back.transfer[i] - t->transfer[i]) < 1e-3f * most + 1e-3f);

@@ -151,12 +151,41 @@ static void journals_belong_to_their_request(void **state)
     assert_true(strlen(err.text) > 10);
 }
 
+/* Interrupted while paths of the table of deep light are traced: its finished rows are kept. */
+static void deep_light_goes_on(void **state)
+{
+    char whole[256], pieces[256], cells[256], journal[256];
+    snprintf(whole, sizeof whole, "%s", scratch_path(state, "whole"));
+    snprintf(pieces, sizeof pieces, "%s", scratch_path(state, "pieces"));
+    snprintf(cells, sizeof cells, "%s", scratch_path(state, "cells"));
+    snprintf(journal, sizeof journal, "%s", scratch_path(state, "journal"));
+    struct fast_precompute_request q = request(cells);
+    struct thread_pool *pool;
+    assert_int_equal(thread_pool_new(2, &pool, NULL), STATUS_OK);
+    q.no_visibility = true;
+    assert_true(attempt(&q, 2, pool, whole));
+    q.journal_path = journal;
+    q.deep_traced = 1;
+    q.deep_edge = 4;
+    q.deep_paths = 60000;
+    assert_false(attempt(&q, 0.85, pool, pieces)); /* the table is made from 0.73 on */
+    size_t kept = length_of(journal);
+    assert_true(kept > length_of(cells));
+    assert_true(attempt(&q, 2, NULL, pieces));
+    assert_true(length_of(journal) > kept);
+    q.journal_path = NULL;
+    assert_true(attempt(&q, 2, pool, whole));
+    assert_same_file(whole, pieces);
+    thread_pool_free(pool);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(interruptions_change_nothing, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(journals_belong_to_their_request, scratch_folder_setup,
                                         scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(deep_light_goes_on, scratch_folder_setup, scratch_folder_teardown),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,0 +1,40 @@
+#include "renderer/fast/deep_light.h"
+
+#include <math.h>
+
+void deep_light_nodes(const struct deep_light *d, const double direction[3], size_t node[4], double weight[4])
+{
+    size_t at[2], last = d->edge - 1;
+    double part[2], across = sqrt(direction[0] * direction[0] + direction[1] * direction[1]);
+    double scale = across > 0.0 ? M_2_PI * atan2(across, fabs(direction[2])) / across : 0.0;
+    for (int a = 0; a < 2; a++) {
+        double x = (0.5 + 0.5 * scale * direction[a]) * (double)last;
+        x = fmin(fmax(x, 0.0), (double)last);
+        at[a] = (size_t)x < last ? (size_t)x : last - 1;
+        part[a] = x - (double)at[a];
+    }
+    size_t side = d->n_side > 1 && direction[2] < 0.0 ? 1 : 0;
+    for (size_t k = 0; k < 4; k++) {
+        node[k] = (side * d->edge + at[1] + (k >> 1)) * d->edge + at[0] + (k & 1);
+        weight[k] = ((k & 1) ? part[0] : 1.0 - part[0]) * ((k >> 1) ? part[1] : 1.0 - part[1]);
+    }
+}
+
+void deep_light_add(const struct deep_light *d, const float wo[3], const float wi[3], const float scale[3],
+                    float rgb[3])
+{
+    size_t view[4], light[4], n_node = deep_light_n_node(d);
+    double view_weight[4], light_weight[4], from[3] = {(double)wi[0], (double)wi[1], (double)wi[2]},
+                                            to[3] = {(double)wo[0], (double)wo[1], (double)wo[2]};
+    float sum[3] = {0, 0, 0};
+    if (d->n_side == 1 && from[2] <= 0.0) return;
+    if (d->n_side == 1) to[2] = fmax(to[2], 0.0);
+    deep_light_nodes(d, to, view, view_weight);
+    deep_light_nodes(d, from, light, light_weight);
+    for (size_t k = 0; k < 16; k++) {
+        const float *value = d->value + (view[k / 4] * n_node + light[k % 4]) * 3;
+        float weight = (float)(view_weight[k / 4] * light_weight[k % 4]);
+        for (int c = 0; c < 3; c++) sum[c] += weight * value[c];
+    }
+    for (int c = 0; c < 3; c++) rgb[c] += scale[c] * (float)fabs(from[2]) * sum[c];
+}

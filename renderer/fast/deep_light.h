@@ -1,0 +1,38 @@
+/* Light that a flat, endless cloth has scattered more than n_traced times, as the mean over its tile: the radiance
+ * towards wo, at each hit of a fiber by rays from there, under parallel light from wi with irradiance pi on a surface
+ * that faces it, is |cos th_i| times the value, which is linear between the nodes of two grids.
+ *
+ * A grid has edge x edge nodes on each side of the cloth, evenly over the square around the unit disk to which a
+ * hemisphere is mapped: a direction lies at (2 / pi) theta from the middle, at its azimuth, and the horizon is the rim.
+ * View (side, row, column), light likewise, channels last; side 0 is above. Lights and views are not exchangeable: a
+ * cloth of packed fibers is not reciprocal. */
+#ifndef SELVEDGE_RENDERER_DEEP_LIGHT_H
+#define SELVEDGE_RENDERER_DEEP_LIGHT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum { DEEP_LIGHT_MOST_EDGE = 24 };
+
+struct deep_light {
+    uint32_t n_traced; /* 0: there is no table */
+    uint32_t edge;     /* nodes along an edge of each grid */
+    uint32_t n_side;   /* 1: views and lights are above only, because a black sheet lies below */
+    float error;       /* relative standard error of the value, root mean square, of the paths that made it */
+    float *value;      /* n_node x n_node x 3 */
+};
+
+static inline size_t deep_light_n_node(const struct deep_light *d) { return (size_t)d->n_side * d->edge * d->edge; }
+/* Numbers in value. */
+static inline size_t deep_light_n_value(const struct deep_light *d)
+{
+    return d->n_traced > 0 ? 3 * deep_light_n_node(d) * deep_light_n_node(d) : 0;
+}
+/* The four nodes around a direction and their weights, which sum to 1. */
+void deep_light_nodes(const struct deep_light *d, const double direction[3], size_t node[4], double weight[4]);
+/* Adds the radiance times scale. wo, wi: unit vectors. A view from below where there is a black sheet counts as one
+ * along the cloth; light from there as none. */
+void deep_light_add(const struct deep_light *d, const float wo[3], const float wi[3], const float scale[3],
+                    float rgb[3]);
+
+#endif

@@ -1,0 +1,196 @@
+/* The table of light that is scattered more than n_traced times (deep_light.h).
+ *
+ * Paths that come from random directions and meet the cloth at random places are traced until they leave it; those
+ * that met more than n_traced fibers count for the direction in which they leave, which is the light's. So a path needs
+ * no connection to a light, and narrow lobes cost nothing. Over the two disks of directions across the cloth (x, y of
+ * the unit vectors), the density of pairs (from, to) is the value over pi times the density of views.
+ *
+ * The value is the function between the nodes that is nearest to what the paths show in the mean of squares over both
+ * disks: with B the weights of nodes, M the matrix of the means of B_m B_n, and b those of the paths, M_o v M_i = b.
+ * It is approached from b divided by the sums of rows of M, in N_STEP steps of the residual divided in the same way;
+ * more of them follow the noise. Each keeps the sum over all pairs, and so the energy.
+ *
+ * Each row of the part is the sum over some of the paths, which follow from its number: results do not depend on the
+ * number of threads. Differences between even and odd rows give the error. */
+#include "renderer/fast/precompute/precompute_parts.h"
+#include "renderer/transport/surface/fiber_walk.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { N_ROW = 64, N_STEP = 2, N_FINE = 1024, MOST_MISS = 1000 };
+static const struct rng_key walk_key = {.seed = 0x646565706c696768u};
+
+struct deep_job {
+    struct precompute_job *j;
+    struct deep_light *d;
+    size_t n_path, n_node, n_value; /* paths of a row */
+    float *sum;                     /* N_ROW x n_value */
+    double *overlap;                /* n_node x n_node: the matrix M, integrals of weights over the disk */
+    double *area;                   /* n_node: sums of its rows */
+};
+
+static void fill_overlap(const struct deep_job *x)
+{
+    for (size_t i = 0; i < (size_t)x->d->n_side * N_FINE * N_FINE; i++) {
+        size_t node[4];
+        double weight[4], v[3] = {((double)(i % N_FINE) + 0.5) * 2.0 / N_FINE - 1.0,
+                                  ((double)(i / N_FINE % N_FINE) + 0.5) * 2.0 / N_FINE - 1.0, 0.0};
+        double z2 = 1.0 - v[0] * v[0] - v[1] * v[1], part = 4.0 / ((double)N_FINE * N_FINE);
+        if (z2 <= 0.0) continue;
+        v[2] = i < N_FINE * N_FINE ? sqrt(z2) : -sqrt(z2);
+        deep_light_nodes(x->d, v, node, weight);
+        for (size_t k = 0; k < 16; k++)
+            x->overlap[node[k / 4] * x->n_node + node[k % 4]] += part * weight[k / 4] * weight[k % 4];
+        for (size_t k = 0; k < 4; k++) x->area[node[k]] += part * weight[k];
+    }
+}
+
+/* A place, from a point of the tile's plane z = 0, where rays towards -wo meet the cloth. False: none was found. */
+static bool meet(const struct deep_job *x, const double wo[3], struct rng *rng, struct scene_ray *ray,
+                 struct scene_hit *hit)
+{
+    const struct precompute_job *j = x->j;
+    double away = (wo[2] > 0.0 ? 1.0 : 1.0 + scene_thickness_mm(j->q->scene)) / fabs(wo[2]);
+    for (int i = 0; i < MOST_MISS; i++) {
+        double origin[3], towards[3];
+        for (int a = 0; a < 3; a++) {
+            origin[a] = (a < 2 ? rng_double(rng) * j->t->tile_mm[a] : 0.0) + away * wo[a];
+            towards[a] = -wo[a];
+        }
+        if (scene_ray_enter(j->q->scene, origin, towards, ray) && scene_trace(j->q->scene, ray, hit)) return true;
+    }
+    return false;
+}
+
+static void count(const struct deep_job *x, const double wo[3], const struct scene_ray *ray, const float throughput[3],
+                  float *sum)
+{
+    size_t view[4], light[4];
+    double view_weight[4], light_weight[4];
+    const double wi[3] = {(double)ray->direction[0], (double)ray->direction[1], (double)ray->direction[2]};
+    if (x->d->n_side == 1 && wi[2] <= 0.0) return;
+    deep_light_nodes(x->d, wo, view, view_weight);
+    deep_light_nodes(x->d, wi, light, light_weight);
+    /* views are even over solid angles: 1 over their density on the disk is 2 pi cos for each side */
+    double scale = M_PI * 2.0 * M_PI * fabs(wo[2]) * x->d->n_side / ((double)x->n_path * N_ROW);
+    for (size_t k = 0; k < 16; k++) {
+        float *to = sum + (view[k / 4] * x->n_node + light[k % 4]) * 3;
+        for (int c = 0; c < 3; c++) to[c] += (float)(scale * view_weight[k / 4] * light_weight[k % 4]) * throughput[c];
+    }
+}
+
+static void walk(const struct deep_job *x, const double wo[3], struct rng *rng, float *sum)
+{
+    const struct precompute_job *j = x->j;
+    float throughput[3] = {1, 1, 1};
+    struct scene_ray ray;
+    struct scene_hit hit;
+    if (!meet(x, wo, rng, &ray, &hit)) return;
+    for (uint32_t i = 1; i < (uint32_t)FIBER_WALK_MOST_STEPS; i++) {
+        if (!fiber_walk_step(j->q->scene, &j->sets, &hit, &ray, rng, throughput)) return;
+        if (scene_trace(j->q->scene, &ray, &hit)) continue;
+        if (i > x->d->n_traced && !scene_sheet_met(j->q->scene, &ray)) count(x, wo, &ray, throughput, sum);
+        return;
+    }
+}
+
+static void run_row(void *context, size_t i_row, size_t i_thread)
+{
+    const struct deep_job *x = context;
+    double start[2];
+    struct rng rng;
+    (void)i_thread;
+    rng_start(&rng, &walk_key, (uint32_t)i_row, UINT32_MAX);
+    for (int k = 0; k < 2; k++) start[k] = rng_double(&rng);
+    for (size_t i = 0; i < x->n_path; i++) {
+        if (i % 64 == 0 && progress_cancelled(x->j->progress)) break;
+        rng_start(&rng, &walk_key, (uint32_t)i_row, (uint32_t)i);
+        /* Roberts' sequence in two dimensions */
+        double u = start[0] + (double)(i + 1) * 0.7548776662466927, v = start[1] + (double)(i + 1) * 0.5698402909980532;
+        double z = fmax(u - floor(u), 1e-3), phi = 2.0 * M_PI * v, across = sqrt(1.0 - z * z);
+        const double wo[3] = {across * cos(phi), across * sin(phi), x->d->n_side > 1 && i % 2 == 1 ? -z : z};
+        walk(x, wo, &rng, x->sum + i_row * x->n_value);
+    }
+}
+
+/* out = M v M, all n_node x n_node x 3. spare: as large. */
+static void apply_overlap(const struct deep_job *x, const double *v, double *spare, double *out)
+{
+    size_t n = x->n_node;
+    memset(spare, 0, x->n_value * sizeof *spare);
+    memset(out, 0, x->n_value * sizeof *out);
+    for (size_t m = 0; m < n; m++)
+        for (size_t k = 0; k < n; k++) {
+            double overlap = x->overlap[m * n + k];
+            for (size_t i = 0; i < 3 * n && overlap > 0.0; i++) spare[3 * m * n + i] += overlap * v[3 * k * n + i];
+        }
+    for (size_t m = 0; m < n; m++)
+        for (size_t k = 0; k < n; k++) {
+            double overlap = x->overlap[m * n + k];
+            for (size_t r = 0; r < n && overlap > 0.0; r++)
+                for (size_t c = 0; c < 3; c++) out[3 * (r * n + m) + c] += overlap * spare[3 * (r * n + k) + c];
+        }
+}
+
+/* Values from the sums b over paths. work: 3 n_value, the first of which are the values. */
+static void solve(const struct deep_job *x, const double *b, double *work)
+{
+    double *v = work, *spare = work + x->n_value, *shown = work + 2 * x->n_value;
+    memset(work, 0, 3 * x->n_value * sizeof *work);
+    for (int step = 0; step <= N_STEP; step++) {
+        if (step > 0) apply_overlap(x, v, spare, shown);
+        for (size_t i = 0; i < x->n_value; i++) {
+            double area = x->area[i / 3 / x->n_node] * x->area[i / 3 % x->n_node];
+            if (area > 0.0) v[i] += (b[i] - shown[i]) / area;
+        }
+    }
+}
+
+/* Sums the rows, and makes the table and its error. work: 6 n_value. */
+static void finish(const struct deep_job *x, double *work)
+{
+    double *half[2] = {work, work + x->n_value}, *rest = work + 2 * x->n_value, *even = work + 5 * x->n_value;
+    double square = 0.0, difference = 0.0;
+    memset(work, 0, 2 * x->n_value * sizeof *work);
+    for (size_t i = 0; i < N_ROW * x->n_value; i++) half[i / x->n_value % 2][i % x->n_value] += 2.0 * (double)x->sum[i];
+    solve(x, half[0], rest);
+    memcpy(even, rest, x->n_value * sizeof *even);
+    solve(x, half[1], rest);
+    for (size_t i = 0; i < x->n_value; i++) {
+        double mean = 0.5 * (even[i] + rest[i]), off = 0.5 * (even[i] - rest[i]);
+        double area = x->area[i / 3 / x->n_node] * x->area[i / 3 % x->n_node];
+        x->d->value[i] = (float)mean;
+        square += area * mean * mean;
+        difference += area * off * off;
+    }
+    x->d->error = square > 0.0 ? (float)sqrt(difference / square) : 0;
+}
+
+status precompute_deep(struct precompute_job *j, struct error *err)
+{
+    struct deep_light *d = &j->t->deep;
+    if (d->n_traced == 0) return STATUS_OK;
+    status s = fast_tables_reserve_deep(j->t, err);
+    if (s != STATUS_OK) return s;
+    struct deep_job x = {.j = j, .d = d, .n_node = deep_light_n_node(d), .n_value = deep_light_n_value(d)};
+    x.n_path = (size_t)ceil(j->q->deep_paths / N_ROW);
+    x.sum = calloc(N_ROW * x.n_value, sizeof *x.sum);
+    x.overlap = calloc(x.n_node * (x.n_node + 1), sizeof *x.overlap);
+    double *work = malloc(6 * x.n_value * sizeof *work);
+    if (x.sum == NULL || x.overlap == NULL || work == NULL)
+        s = error_set(err, STATUS_NO_MEMORY, "cannot make tables: out of memory");
+    else {
+        const struct journal_part part = {JOURNAL_DEEP, N_ROW, 1, {{x.sum, x.n_value * sizeof *x.sum}}};
+        const struct journal_work paths = {run_row, &x, 1, .batch_tasks = 1};
+        x.area = x.overlap + x.n_node * x.n_node;
+        fill_overlap(&x);
+        s = precompute_journal_run(j->journal, &part, &paths, j->pool, j->progress, err);
+    }
+    if (s == STATUS_OK) finish(&x, work);
+    free(x.sum);
+    free(x.overlap);
+    free(work);
+    return s;
+}
