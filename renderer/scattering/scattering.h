@@ -67,6 +67,10 @@ struct scattering_model {
      * values. */
     float (*eval_pdf)(const struct scattering_state *state, const float wi[3], const float wo[3],
                       const float *weight_rgb, float s_rgb[3], float *score);
+    /* The width that the section shows towards a direction, over the diameter of a round fiber of the same area; score:
+     * the derivatives of its logarithm by each parameter, NULL when not wanted. NULL: 1, the section is round or turned
+     * at random. */
+    float (*width)(const struct scattering_state *state, const float w[3], float *score);
     /* The integral of S cos th_i exp(sharpness (wi . axis - 1)) over wi, in closed form: an approximation for a
      * sharpness of at least 100. NULL: the model has none. */
     void (*gaussian)(const struct scattering_state *state, const float axis[3], float sharpness, const float wo[3],

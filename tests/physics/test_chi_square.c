@@ -67,13 +67,10 @@ static double expected_counts(const struct density *d, double *expected)
     return total;
 }
 
-static void check(const struct scattering_model *m, const double *param, const float wo[3], const float *weight,
-                  struct rng *r, double least_p)
+static void check(const struct scattering_model *m, const struct scattering_state *s, const float wo[3],
+                  const float *weight, struct rng *r, double least_p)
 {
     static double expected[N_THETA * N_PHI], count[N_THETA * N_PHI];
-    struct scattering_state *s = NULL;
-    struct error err = {0};
-    if (m->prepare(param, &s, &err) != STATUS_OK) fail_msg("%s", err.text);
     double total = expected_counts(&(struct density){m, s, wo, weight}, expected), n_degree;
     if (fabs(total - 1) > 2e-3)
         fail_msg("%s: density integrates to %.6f for wo = %g %g %g", m->id, total, (double)wo[0], (double)wo[1],
@@ -85,11 +82,24 @@ static void check(const struct scattering_model *m, const double *param, const f
         m->sample(s, wo, weight, u, wi);
         count[cell_of(wi)]++;
     }
-    m->release(s);
     double x = chi_square_statistic(count, expected, N_THETA * N_PHI, &n_degree), p = chi_square_tail(x, n_degree);
     if (p < least_p)
         fail_msg("%s: chi-square %.1f at %.0f degrees of freedom (p = %.2g) for wo = %g %g %g", m->id, x, n_degree, p,
                  (double)wo[0], (double)wo[1], (double)wo[2]);
+}
+
+/* Start; everything largest; narrow lobes; shares least. */
+static void set_parameters(const struct scattering_model *m, int set, double *param)
+{
+    for (size_t p = 0; p < m->n_param; p++) {
+        const struct param_info *i = &m->param[p];
+        bool angle = i->channel < 0, share = angle && i->unit != PARAM_UNIT_DEG;
+        param[p] = set == 0   ? i->start
+                   : set == 1 ? i->upper
+                   : set == 3 ? (share ? i->lower : i->start)
+                   : angle    ? i->lower + 0.1 * (i->upper - i->lower)
+                              : 0.2 + 0.3 * (i->channel % 2);
+    }
 }
 
 static void samples_follow_the_density(void **state)
@@ -107,22 +117,19 @@ static void samples_follow_the_density(void **state)
         const struct scattering_model *m = scattering_registry()[k];
         struct rng r;
         model_stream_start(&r, 11, m->id);
-        for (int set = 0; set < N_SET; set++)
+        for (int set = 0; set < N_SET; set++) {
+            double param[SCATTERING_MAX_PARAM];
+            struct scattering_state *s = NULL;
+            struct error err = {0};
+            set_parameters(m, set, param);
+            if (m->prepare(param, &s, &err) != STATUS_OK) fail_msg("%s", err.text);
             for (int a = 0; a < N_ANGLE; a++) {
-                double param[SCATTERING_MAX_PARAM], theta = angle_deg[a][0] * RAD_PER_DEG,
-                                                    phi = angle_deg[a][1] * RAD_PER_DEG;
-                for (size_t p = 0; p < m->n_param; p++) { /* start; everything largest; narrow lobes; shares least */
-                    const struct param_info *i = &m->param[p];
-                    bool angle = i->channel < 0, share = angle && i->unit != PARAM_UNIT_DEG;
-                    param[p] = set == 0   ? i->start
-                               : set == 1 ? i->upper
-                               : set == 3 ? (share ? i->lower : i->start)
-                               : angle    ? i->lower + 0.1 * (i->upper - i->lower)
-                                          : 0.2 + 0.3 * (i->channel % 2);
-                }
+                double theta = angle_deg[a][0] * RAD_PER_DEG, phi = angle_deg[a][1] * RAD_PER_DEG;
                 float wo[3] = {(float)sin(theta), (float)(cos(theta) * cos(phi)), (float)(cos(theta) * sin(phi))};
-                check(m, param, wo, weight[(set + a) % 3], &r, least_p);
+                check(m, s, wo, weight[(set + a) % 3], &r, least_p);
             }
+            m->release(s);
+        }
     }
 }
 

@@ -26,9 +26,8 @@ static void predict_row(const struct prediction *d, size_t i)
 {
     const struct profile_row *row = &d->profile->row[i];
     const size_t n = d->model->n_param, n_channel = d->profile->n_channel;
-    const double share = cos(row->theta_i_rad) / (double)d->n_view;
     double *value = d->value + i * n_channel, *jac = d->jac != NULL ? d->jac + i * n_channel * n : NULL;
-    float s_rgb[3], score[3 * SCATTERING_MAX_FLAT], wi[3], wo[3];
+    float s_rgb[3], score[3 * SCATTERING_MAX_FLAT], by[SCATTERING_MAX_PARAM] = {0}, wi[3], wo[3];
     memset(value, 0, n_channel * sizeof *value);
     if (jac != NULL) memset(jac, 0, n_channel * n * sizeof *jac);
     for (size_t k = 0; k < d->n_view; k++) {
@@ -36,10 +35,12 @@ static void predict_row(const struct prediction *d, size_t i)
         set_direction(row->theta_o_rad, azimuth, wo);
         set_direction(row->theta_i_rad, azimuth - row->phi_rad, wi);
         d->model->eval(d->state, wi, wo, s_rgb, jac != NULL ? score : NULL);
+        const double width = d->model->width != NULL ? (double)d->model->width(d->state, wi, by) : 1,
+                     share = cos(row->theta_i_rad) * width / (double)d->n_view;
         for (size_t c = 0; c < n_channel; c++) {
             const double part = share * (double)s_rgb[c];
             value[c] += part;
-            for (size_t p = 0; p < n && jac != NULL; p++) jac[c * n + p] += part * (double)score[c * n + p];
+            for (size_t p = 0; p < n && jac != NULL; p++) jac[c * n + p] += part * (double)(score[c * n + p] + by[p]);
         }
     }
 }

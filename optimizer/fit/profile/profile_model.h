@@ -1,6 +1,7 @@
 /* What a scattering model says of a fiber's profile: the radiance that leaves the fiber, per irradiance of parallel
  * light across its direction, L = S(th_i, th_o, phi) cos th_i (scattering.h), as a mean over the width of the fiber for
- * models of the near field, and over the turn of the section for flat fibers, which twist within the lit length.
+ * models of the near field, and over the turn of the section for flat fibers, which twist within the lit length. Where
+ * a model states the width that its section shows, each turn has as much light as it shows width to the light.
  */
 #ifndef SELVEDGE_OPTIMIZER_PROFILE_MODEL_H
 #define SELVEDGE_OPTIMIZER_PROFILE_MODEL_H

@@ -50,16 +50,14 @@ void lobe_balance_multiply(const struct lobe_balance *b, double (*m)[N], const d
     }
 }
 
-/* The positive x with x_i (K x)_i = want_i. */
-void lobe_balance_solve(struct lobe_balance *b, double *x)
+void balance_equation_solve(const struct balance_equation *e, double *x)
 {
-    for (int i = 0; i < b->n; i++) x[i] = 1;
     for (int iteration = 0; iteration < 200; iteration++) {
-        lobe_balance_multiply(b, b->kernel, x, b->work);
+        e->multiply(e->kernel, x, e->work);
         double worst = 0;
-        for (int i = 0; i < b->n; i++) {
-            worst = fmax(worst, fabs(x[i] * b->work[i] / b->want[i] - 1));
-            x[i] = sqrt(x[i] * b->want[i] / b->work[i]);
+        for (int i = 0; i < e->n; i++) {
+            worst = fmax(worst, fabs(x[i] * e->work[i] / e->want[i] - 1));
+            x[i] = sqrt(x[i] * e->want[i] / e->work[i]);
         }
         if (worst < 1e-9) break;
     }
@@ -67,21 +65,45 @@ void lobe_balance_solve(struct lobe_balance *b, double *x)
 
 /* d ln x of the equation above: (I + P) d = source, P = diag(x / want) K diag(x), whose rows sum to 1; half steps
  * converge. */
-void lobe_balance_solve_derivative(struct lobe_balance *b, const double *x, double *d)
+void balance_equation_derivative(const struct balance_equation *e, const double *x, const double *source, double *d)
 {
-    double xd[N];
-    for (int i = 0; i < b->n; i++) d[i] = 0.5 * b->source[i];
+    double *xd = e->work + e->n;
+    for (int i = 0; i < e->n; i++) d[i] = 0.5 * source[i];
     for (int iteration = 0; iteration < 200; iteration++) {
-        for (int i = 0; i < b->n; i++) xd[i] = x[i] * d[i];
-        lobe_balance_multiply(b, b->kernel, xd, b->work);
+        for (int i = 0; i < e->n; i++) xd[i] = x[i] * d[i];
+        e->multiply(e->kernel, xd, e->work);
         double worst = 0;
-        for (int i = 0; i < b->n; i++) {
-            double residual = d[i] + x[i] / b->want[i] * b->work[i] - b->source[i];
+        for (int i = 0; i < e->n; i++) {
+            double residual = d[i] + x[i] / e->want[i] * e->work[i] - source[i];
             worst = fmax(worst, fabs(residual));
             d[i] -= 0.5 * residual;
         }
         if (worst < 1e-7) break;
     }
+}
+
+static void multiply(void *balance, const double *x, double *y)
+{
+    struct lobe_balance *b = balance;
+    lobe_balance_multiply(b, b->kernel, x, y);
+}
+
+static struct balance_equation equation_of(struct lobe_balance *b)
+{
+    return (struct balance_equation){b->n, multiply, b, b->want, b->work};
+}
+
+void lobe_balance_solve(struct lobe_balance *b, double *x)
+{
+    const struct balance_equation e = equation_of(b);
+    for (int i = 0; i < b->n; i++) x[i] = 1;
+    balance_equation_solve(&e, x);
+}
+
+void lobe_balance_solve_derivative(struct lobe_balance *b, const double *x, double *d)
+{
+    const struct balance_equation e = equation_of(b);
+    balance_equation_derivative(&e, x, b->source, d);
 }
 
 /* source = -x (dK x) / want: the kernel's own width. */

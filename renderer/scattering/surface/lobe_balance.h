@@ -10,13 +10,26 @@
 
 enum { LOBE_BALANCE_N = 513 };
 
+/* The equation x_i (K x)_i = want_i for a symmetric kernel of any layout. */
+struct balance_equation {
+    int n;
+    void (*multiply)(void *kernel, const double *x, double *y); /* y = K x */
+    void *kernel;
+    const double *want;
+    double *work; /* 2 n */
+};
+/* Finds the positive solution, beginning with the positive x. */
+void balance_equation_solve(const struct balance_equation *e, double *x);
+/* Derivative of ln x from `source`, the derivative of ln want less x (dK x) / want. */
+void balance_equation_derivative(const struct balance_equation *e, const double *x, const double *source, double *d);
+
 struct lobe_balance {
     int n;                                           /* nodes: LOBE_BALANCE_N unless the caller sets fewer */
     double kernel[LOBE_BALANCE_N][LOBE_BALANCE_N];   /* g (constant + slope k), folded to u >= 0: symmetric */
     double d_kernel[LOBE_BALANCE_N][LOBE_BALANCE_N]; /* by beta */
     double weight[LOBE_BALANCE_N];                   /* cos^2 u du */
     double share[2 * LOBE_BALANCE_N];                /* k of half an angle of so many nodes; filled in by the caller */
-    double want[LOBE_BALANCE_N], work[LOBE_BALANCE_N], source[LOBE_BALANCE_N];
+    double want[LOBE_BALANCE_N], work[2 * LOBE_BALANCE_N], source[LOBE_BALANCE_N];
 };
 
 /* Fills in the weights of LOBE_BALANCE_N nodes; the share is 0. The functions that multiply and solve also serve other

@@ -18,12 +18,9 @@ static status fill(struct scattering_state *s, const double *param, struct threa
     (void)pool;
     struct elliptical_energies *energies = malloc(sizeof *energies);
     if (energies == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
-    for (int p = 0; p < ELLIPTICAL_N_LOBE; p++) {
-        s->along[p].shift = (float)(elliptical_shift[p] * param[ELLIPTICAL_P_ALPHA]);
-        s->along[p].width = (float)(elliptical_width[p] * param[ELLIPTICAL_P_BETA]);
-    }
+    elliptical_lobes_set(s->along, param);
     status st = elliptical_tables(s, param, energies, err);
-    if (st == STATUS_OK) st = elliptical_balance(s, energies, err);
+    if (st == STATUS_OK) st = elliptical_balance(s->along, energies, &s->scale, err);
     free(energies);
     return st;
 }
@@ -40,21 +37,10 @@ static struct azimuth_place place_of(const float wi[3], const float wo[3])
     return azimuth_place_of(wi, wo, ELLIPTICAL_N_ROW, ELLIPTICAL_N_PHI);
 }
 
-/* a(th); adds d ln a to d_ln. */
-static float scale_at(const struct scattering_state *s, float theta_rad, float d_ln[ELLIPTICAL_N_SCALE])
-{
-    int i;
-    float t = table_position(fabsf(theta_rad) * (float)((LOBE_BALANCE_N - 1) / M_PI_2), LOBE_BALANCE_N - 1, &i);
-    for (int k = 0; k < ELLIPTICAL_N_SCALE; k++) d_ln[k] += table_mix(s->d_ln_scale[k][i], s->d_ln_scale[k][i + 1], t);
-    return table_mix(s->scale[i], s->scale[i + 1], t);
-}
-
-/* M of each lobe, and its derivatives by shift and width when wanted. */
 static void along(const struct scattering_state *s, const struct azimuth_place *g, float m[ELLIPTICAL_N_LOBE],
                   float (*d)[2])
 {
-    for (int p = 0; p < ELLIPTICAL_N_LOBE; p++)
-        m[p] = tilted_lobe_eval(&s->along[p], g->in.theta_rad + g->out.theta_rad, d != NULL ? d[p] : NULL);
+    elliptical_along(s->along, g->in.theta_rad + g->out.theta_rad, m, d);
 }
 
 #define BILINEAR(field) AZIMUTH_BILINEAR(corner, g, field)
@@ -142,7 +128,8 @@ static void eval_at(const struct scattering_state *s, const struct azimuth_place
                     float *score)
 {
     for (int k = 0; k < ELLIPTICAL_N_SCALE; k++) t->d_scale[k] = 0;
-    float scale = scale_at(s, g->in.theta_rad, t->d_scale) * scale_at(s, g->out.theta_rad, t->d_scale);
+    float scale = elliptical_scale_at(&s->scale, g->in.theta_rad, t->d_scale) *
+                  elliptical_scale_at(&s->scale, g->out.theta_rad, t->d_scale);
     const struct elliptical_row *a = &s->row[g->row], *b = a + 1;
     t->n = cell_at(s, g);
     for (int c = 0; c < 3; c++) {

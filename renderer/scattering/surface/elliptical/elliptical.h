@@ -23,41 +23,13 @@
 #ifndef SELVEDGE_RENDERER_ELLIPTICAL_H
 #define SELVEDGE_RENDERER_ELLIPTICAL_H
 
-#include "renderer/scattering/surface/elliptical/ellipse_ray.h"
-#include "renderer/scattering/surface/lobe_balance.h"
+#include "renderer/scattering/surface/elliptical/elliptical_lobes.h"
 #include "renderer/scattering/surface/scattering_registry.h"
-#include "renderer/scattering/surface/tilted_lobe.h"
 
 enum {
-    ELLIPTICAL_P_C_T = 0,
-    ELLIPTICAL_P_ETA = 3,
-    ELLIPTICAL_P_RATIO,
-    ELLIPTICAL_P_ALPHA,
-    ELLIPTICAL_P_BETA,
-    ELLIPTICAL_P_GAMMA,
-    ELLIPTICAL_N_PARAM
-};
-enum {
-    ELLIPTICAL_N_ROW = 32,
     ELLIPTICAL_N_PHI = 180,
     ELLIPTICAL_N_RAY = 1499,
-    ELLIPTICAL_RAY_STEP = 565,          /* of the lattice: N_RAY over it is near the square of the golden ratio */
-    ELLIPTICAL_N_LOBE = ELLIPSE_N_MODE, /* R, TT, TRT, TRRT; the rest has the lobe of TRRT along the fiber */
-    ELLIPTICAL_REST = ELLIPTICAL_N_LOBE,
-    ELLIPTICAL_N_MODE = ELLIPTICAL_N_LOBE + 1,
-    ELLIPTICAL_N_INNER = ELLIPTICAL_N_LOBE - 1 /* lobes with a color */
-};
-
-/* Derivatives that the tables hold, and those of the scale a(th). */
-enum { ELLIPTICAL_D_C_T, ELLIPTICAL_D_ETA, ELLIPTICAL_D_RATIO, ELLIPTICAL_D_GAMMA, ELLIPTICAL_N_SLOPE };
-enum { ELLIPTICAL_S_ETA, ELLIPTICAL_S_RATIO, ELLIPTICAL_S_ALPHA, ELLIPTICAL_S_BETA, ELLIPTICAL_N_SCALE };
-
-/* N at one place of the table, and its derivatives. */
-struct elliptical_cell {
-    float n[ELLIPTICAL_N_LOBE][3];
-};
-struct elliptical_slope {
-    float n[ELLIPTICAL_N_LOBE][ELLIPTICAL_N_SLOPE][3];
+    ELLIPTICAL_RAY_STEP = 565 /* of the lattice: N_RAY over it is near the square of the golden ratio */
 };
 
 /* By cos th_d. */
@@ -70,25 +42,14 @@ struct elliptical_row {
 
 struct scattering_state {
     struct tilted_lobe along[ELLIPTICAL_N_LOBE];
-    float scale[LOBE_BALANCE_N]; /* a by |th| */
-    float d_ln_scale[ELLIPTICAL_N_SCALE][LOBE_BALANCE_N];
+    struct elliptical_scale scale;
     struct elliptical_row row[ELLIPTICAL_N_ROW + 1];
     struct elliptical_cell cell[ELLIPTICAL_N_ROW + 1][ELLIPTICAL_N_PHI + 1];
     struct elliptical_slope slope[ELLIPTICAL_N_ROW + 1][ELLIPTICAL_N_PHI + 1];
 };
 
-/* Mean shares of the modes without absorption, and their derivatives by eta and by the ratio, at each row. */
-struct elliptical_energies {
-    struct dual share[ELLIPTICAL_N_ROW + 1][ELLIPTICAL_N_MODE];
-};
-
-/* Shift and width of a lobe over alpha and beta. */
-extern const double elliptical_shift[ELLIPTICAL_N_LOBE], elliptical_width[ELLIPTICAL_N_LOBE];
-
 /* Fills in rows, cells and slopes, and the energies. STATUS_NO_MEMORY. */
 status elliptical_tables(struct scattering_state *s, const double *param, struct elliptical_energies *energies,
                          struct error *err);
-/* Fills in the scale; the lobes are set. STATUS_NO_MEMORY. */
-status elliptical_balance(struct scattering_state *s, const struct elliptical_energies *energies, struct error *err);
 
 #endif

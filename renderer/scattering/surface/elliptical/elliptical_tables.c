@@ -6,7 +6,15 @@
 
 enum { N_WAVE = 96 };
 /* Values of a table, and derivatives; that by gamma follows from the values. */
-enum quantity { VALUE, BY_C_T, BY_ETA, BY_RATIO, N_SUM, BY_GAMMA = N_SUM, N_QUANTITY };
+enum quantity {
+    VALUE = ELLIPTICAL_VALUE,
+    BY_C_T = ELLIPTICAL_BY_C_T,
+    BY_ETA = ELLIPTICAL_BY_ETA,
+    BY_RATIO = ELLIPTICAL_BY_RATIO,
+    N_SUM = ELLIPTICAL_N_SUM,
+    BY_GAMMA = N_SUM,
+    N_QUANTITY
+};
 #define LEAST_FACTOR 5.5 /* waves with k w above this have a factor below exp(-5.5^2 / 2) = 3e-7 */
 #define FADED 3e-6
 #define LEAST_COSINE 1e-3 /* of th_d: at 0 all light is reflected */
@@ -49,16 +57,6 @@ static void enter_rays(struct work *w, const struct ellipse *e)
     }
 }
 
-/* Weight times share times absorption of one exit in one channel, and its derivatives by C_T, eta and the ratio. The
- * way inside is in radii, C_T of a diameter. */
-static void absorbed(struct dual share, struct dual length, double c_t, double ln_c_t, double out[N_SUM])
-{
-    double t = exp(0.5 * ln_c_t * length.v);
-    out[VALUE] = share.v * t;
-    out[BY_C_T] = out[VALUE] * 0.5 * length.v / c_t;
-    for (int k = 0; k < 2; k++) out[BY_ETA + k] = t * (share.d[k] + share.v * 0.5 * ln_c_t * length.d[k]);
-}
-
 static void add_waves(double (*wave)[3][N_SUM], int n, double a[3][N_SUM], struct dual azimuth)
 {
     double c1 = cos(azimuth.v), s1 = sin(azimuth.v), c = 1, s = 0;
@@ -77,23 +75,17 @@ static void add_waves(double (*wave)[3][N_SUM], int n, double a[3][N_SUM], struc
     }
 }
 
-static struct dual weighted(struct dual w, struct dual x)
-{
-    return (struct dual){w.v * x.v, {w.v * x.d[0] + w.d[0] * x.v, w.v * x.d[1] + w.d[1] * x.v}};
-}
-
 static void add_ray(struct work *w, const struct ellipse_path *path, struct dual weight, const double *param,
                     struct dual energies[ELLIPTICAL_N_MODE])
 {
     for (int p = 0; p < path->n; p++) {
-        struct dual share = weighted(weight, path->share[p]);
+        struct dual share = elliptical_weighted(weight, path->share[p]);
         int mode = p < ELLIPTICAL_REST ? p : ELLIPTICAL_REST;
         double a[3][N_SUM];
         energies[mode].v += share.v;
         for (int k = 0; k < 2; k++) energies[mode].d[k] += share.d[k];
         for (int c = 0; c < 3; c++) {
-            double c_t = param[ELLIPTICAL_P_C_T + c];
-            absorbed(share, path->length[p], c_t, log(c_t), a[c]);
+            elliptical_absorbed(share, path->length[p], param[ELLIPTICAL_P_C_T + c], a[c]);
             w->energy[mode][c] += a[c][VALUE];
             for (int q = 0; q < N_SUM && mode == ELLIPTICAL_REST; q++) w->rest[c][q] += a[c][q];
         }

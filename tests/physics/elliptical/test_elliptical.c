@@ -6,6 +6,7 @@
 #include "renderer/scattering/scattering.h"
 #include "renderer/scattering/surface/dielectric/dielectric_ray.h"
 #include "renderer/scattering/surface/elliptical/ellipse_ray.h"
+#include "tests/support/model/space_ray.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -141,26 +142,6 @@ static void round_section(void **state)
 
 /* ---- rays in space ---- */
 
-static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-/* Snell's law for a unit ray d that meets a wall with the unit normal n, which points towards where it comes from, by
- * amplitudes of both polarisations. Returns the reflectance, 1 for total reflection. */
-static double refract(const double d[3], const double n[3], double n1, double n2, double out[3])
-{
-    double c1 = -dot(d, n), k = n1 / n2, c2 = 1 - k * k * (1 - c1 * c1);
-    if (c2 <= 0) return 1;
-    c2 = sqrt(c2);
-    for (int i = 0; i < 3; i++) out[i] = k * d[i] + (k * c1 - c2) * n[i];
-    double rs = (n1 * c1 - n2 * c2) / (n1 * c1 + n2 * c2), rp = (n2 * c1 - n1 * c2) / (n2 * c1 + n1 * c2);
-    return 0.5 * (rs * rs + rp * rp);
-}
-
-static void reflect(const double d[3], const double n[3], double out[3])
-{
-    double c = dot(d, n);
-    for (int i = 0; i < 3; i++) out[i] = d[i] - 2 * c * n[i];
-}
-
 enum { N_BIN = 72, N_RAY = 10000000, MOST_EXIT = 60 };
 
 struct histogram {
@@ -170,14 +151,6 @@ struct histogram {
 /* The fiber of the test. */
 static const double axes[2] = {1.3416407864998738, 0.7453559924999299}; /* ratio 1.8, area pi */
 static const double cos_theta = 0.75, eta = 1.5, c_t = 0.5, gamma_rad = 6 * RAD_PER_DEG;
-
-static void normal_of(const double at[3], double n[3])
-{
-    double v = at[1] / (axes[0] * axes[0]), w = at[2] / (axes[1] * axes[1]), size = sqrt(v * v + w * w);
-    n[0] = 0;
-    n[1] = v / size;
-    n[2] = w / size;
-}
 
 /* Adds one exit at an azimuth from that of the ray, blurred. */
 static void add_exit(struct histogram *h, struct rng *r, double power, double azimuth, int p)
@@ -195,32 +168,23 @@ static void trace_ray(struct histogram *h, struct rng *r, const double lobe[4])
     double phi = 2 * M_PI * rng_double(r), place = 2 * rng_double(r) - 1;
     double half = hypot(axes[0] * sin(phi), axes[1] * cos(phi)), s = place * half, sin_theta = sqrt(1 - 0.75 * 0.75);
     double d[3] = {-sin_theta, -cos_theta * cos(phi), -cos_theta * sin(phi)}, at[3], n[3], out[3], mirrored[3];
-    /* meets the section first where t is largest along (cos phi, sin phi) from the point s (-sin phi, cos phi) */
-    double a = pow(cos(phi) / axes[0], 2) + pow(sin(phi) / axes[1], 2);
-    double b = s * sin(phi) * cos(phi) * (1 / (axes[1] * axes[1]) - 1 / (axes[0] * axes[0]));
-    double c = s * s * (pow(sin(phi) / axes[0], 2) + pow(cos(phi) / axes[1], 2)) - 1;
-    double t = (-b + sqrt(fmax(b * b - a * c, 0))) / a;
-    at[0] = 0;
-    at[1] = -s * sin(phi) + t * cos(phi);
-    at[2] = s * cos(phi) + t * sin(phi);
-    normal_of(at, n);
-    double f = refract(d, n, 1, eta, out),
+    space_enter(axes, phi, s, at);
+    space_normal(axes, at, n);
+    double f = space_refract(d, n, 1, eta, out),
            left = half * (1 - f); /* the weight of a ray is the width that it stands for */
-    reflect(d, n, mirrored);
+    space_reflect(d, n, mirrored);
     add_exit(h, r, half * f * lobe[0], atan2(mirrored[2], mirrored[1]) - phi, 0);
     for (int p = 1; p < MOST_EXIT && left > 1e-5; p++) {
         double leaving[3], turned[3];
-        double q[2] = {out[1] / axes[0], out[2] / axes[1]}, o[2] = {at[1] / axes[0], at[2] / axes[1]};
-        double way = -2 * (q[0] * o[0] + q[1] * o[1]) / (q[0] * q[0] + q[1] * q[1]);
-        for (int i = 0; i < 3; i++) at[i] += way * out[i];
+        double way = space_cross(axes, out, at);
         left *= pow(c_t, 0.5 * way);
-        normal_of(at, n);
+        space_normal(axes, at, n);
         for (int i = 0; i < 3; i++) n[i] = -n[i];
-        f = refract(out, n, eta, 1, leaving);
+        f = space_refract(out, n, eta, 1, leaving);
         if (p < 4 && f < 1) add_exit(h, r, left * (1 - f) * lobe[p], atan2(leaving[2], leaving[1]) - phi, p);
         if (p >= 4) h->rest += left * (1 - f) * lobe[3];
         left *= f;
-        reflect(out, n, turned);
+        space_reflect(out, n, turned);
         for (int i = 0; i < 3; i++) out[i] = turned[i];
     }
 }
