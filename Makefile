@@ -61,6 +61,7 @@ LINK_BASE := -lz -lm -pthread -Wl,--undefined=processor_required
 LINK_GEOMETRY := $(shell pkg-config --libs libtiff-4 libzstd 2>/dev/null) -Wl,--as-needed -lopencv_mcc -lopencv_aruco -Wl,--no-as-needed -lopencv_imgproc -lopencv_core -lstdc++ $(LINK_BASE)
 LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lseccomp -lraw_r -ljpeg -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
+LINK_WAVE := -llapacke # the solver of waves, which no installed program contains
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive -lcurl $(LINK_BASE)
 
 .PHONY: all generate medulla-tables wave-tables deps help check test nightly demo demo-camera night cluster-demo clean
@@ -173,8 +174,8 @@ WAVE := renderer/scattering/surface/wave
 $(BUILD)/tools/wave-tables: $(BUILD)/obj/$(WAVE)/wave_tables_main.c.o $(BUILD)/obj/$(WAVE)/wave_sections.c.o \
 		$(patsubst %,$(BUILD)/obj/%.o,$(wildcard renderer/scattering/wave/*.c)) $(L)base.a
 	@mkdir -p $(@D)
-	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_BASE)
-wave-tables: $(BUILD)/tools/wave-tables ## make the tables of wave_silk.v1 and its like again (a minute of a core)
+	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_WAVE) $(LINK_BASE)
+wave-tables: $(BUILD)/tools/wave-tables ## make the tables of wave_silk.v1 and its like again (two minutes of a core; a third of it with libopenblas0-serial)
 	@$(BUILD)/tools/wave-tables $(WAVE)
 
 include config/install.mk

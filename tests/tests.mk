@@ -10,7 +10,8 @@ TEST_LINKER := $(if $(shell command -v ld.gold),-fuse-ld=gold)
 $(BUILD)/tests/%: $(BUILD)/obj/tests/%.c.o $(TEST_SUPPORT) $(L)server.a $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
 	@mkdir -p $(@D)
 	@echo "  LINK $@"
-	@$(CC) $(TEST_LINKER) $(LDFLAGS) -o $@ $(filter %.o,$^) $(filter %.a,$^) -lcmocka $(LINK_SERVER) $(LINK_OPTIMIZER)
+	@$(CC) $(TEST_LINKER) $(LDFLAGS) -o $@ $(filter %.o,$^) $(filter %.a,$^) -lcmocka $(LINK_TEST) $(LINK_SERVER) $(LINK_OPTIMIZER)
+$(BUILD)/tests/physics/wave/%: LINK_TEST := $(LINK_WAVE)
 .SECONDARY:
 
 ##@ Tests

@@ -1,12 +1,14 @@
 #include "renderer/scattering/wave/wave_solver.h"
 
-#include "renderer/scattering/wave/complex_lu.h"
 #include "renderer/scattering/wave/complex_parts.h"
 #include "renderer/scattering/wave/cylinder_functions.h"
 
+#include <lapacke.h>
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 
+enum { MOST_NODE = 16384 }; /* 17 GB */
 #define EULER 0.57721566490153286061
 #define MOST_ABSORPTION 20.0 /* of Im(k m) times a distance: the range of the cylinder functions */
 
@@ -22,10 +24,12 @@ struct wave_solver {
     double k, step;
     double complex k_of[N_MEDIUM], q;
     struct node *node;
-    double *log_weight;                     /* of a kernel's logarithmic part, by the distance in nodes */
-    struct complex_matrix matrix, solution; /* u at all nodes, then v / k */
-    size_t *pivot;
+    double *log_weight;     /* of a kernel's logarithmic part, by the distance in nodes */
+    double complex *matrix; /* of 2 n unknowns, u at all nodes, then v / k; column after column; its factors L and U */
+    lapack_int *pivot;
+    size_t n_wave; /* of the solution */
     double *angle_rad;
+    double *re, *im; /* parts of the solution, by unknown and wave: loops over the waves are vectorised */
 };
 
 size_t wave_solver_nodes(const struct wave_outline *o, double k, double index, double per_wave)
@@ -100,10 +104,9 @@ static struct kernels kernels_at(const struct wave_solver *s, double complex k, 
                                 s->step * square * (0.125 * I - log_half / (4 * M_PI) + 1 / (8 * M_PI))};
 }
 
-static void set(struct complex_matrix *m, size_t i, size_t j, double complex value)
+static void set(struct wave_solver *s, size_t i, size_t j, double complex value)
 {
-    m->re[i * m->stride + j] = creal(value);
-    m->im[i * m->stride + j] = cimag(value);
+    s->matrix[j * 2 * s->n + i] = value;
 }
 
 /* What source j adds to the two equations at node i. */
@@ -111,10 +114,10 @@ static void set_pair(struct wave_solver *s, size_t i, size_t j, const struct ker
 {
     const struct kernels *e = &kernel[OUTSIDE], *in = &kernel[INSIDE];
     const double speed = s->node[j].speed, same = i == j ? 1 : 0;
-    set(&s->matrix, i, j, same + speed * (in->twice - e->twice));
-    set(&s->matrix, i, s->n + j, speed * s->k * (e->single - s->q * in->single));
-    set(&s->matrix, s->n + i, j, -speed / s->k * (e->slope - in->slope));
-    set(&s->matrix, s->n + i, s->n + j, same * 0.5 * (1 + s->q) + speed * (e->twice_prime - s->q * in->twice_prime));
+    set(s, i, j, same + speed * (in->twice - e->twice));
+    set(s, i, s->n + j, speed * s->k * (e->single - s->q * in->single));
+    set(s, s->n + i, j, -speed / s->k * (e->slope - in->slope));
+    set(s, s->n + i, s->n + j, same * 0.5 * (1 + s->q) + speed * (e->twice_prime - s->q * in->twice_prime));
 }
 
 static void assemble(struct wave_solver *s)
@@ -146,10 +149,18 @@ static status check_problem(const struct wave_problem *p, struct error *err)
         return error_set_field(err, STATUS_INVALID, "index",
                                "the fiber absorbs too much: exp(-%.3g) across it, at most exp(-%g)",
                                cimag(p->index) * p->k * reach, MOST_ABSORPTION);
-    if (p->n_node < 8 || p->n_node % 2 != 0)
-        return error_set_field(err, STATUS_INVALID, "n_node", "%zu nodes are not an even number of at least 8",
-                               p->n_node);
+    if (p->n_node < 8 || p->n_node % 2 != 0 || p->n_node > MOST_NODE)
+        return error_set_field(err, STATUS_INVALID, "n_node", "%zu nodes are not an even number from 8 to %d",
+                               p->n_node, MOST_NODE);
     return STATUS_OK;
+}
+
+static status factorise(struct wave_solver *s, struct error *err)
+{
+    const lapack_int n = (lapack_int)(2 * s->n), info = LAPACKE_zgetrf(LAPACK_COL_MAJOR, n, n, s->matrix, n, s->pivot);
+    return info == 0 ? STATUS_OK
+                     : error_set(err, STATUS_INVALID, "the equations of %zu nodes have no solution (zgetrf: %d)", s->n,
+                                 (int)info);
 }
 
 status wave_solver_new(const struct wave_problem *problem, struct wave_solver **solver, struct error *err)
@@ -168,14 +179,14 @@ status wave_solver_new(const struct wave_problem *problem, struct wave_solver **
     s->node = malloc(n * sizeof *s->node);
     s->log_weight = malloc((n / 2 + 1) * sizeof *s->log_weight);
     s->pivot = malloc(2 * n * sizeof *s->pivot);
-    if (s->node == NULL || s->log_weight == NULL || s->pivot == NULL)
+    s->matrix = malloc(4 * n * n * sizeof *s->matrix);
+    if (s->node == NULL || s->log_weight == NULL || s->pivot == NULL || s->matrix == NULL)
         st = error_set(err, STATUS_NO_MEMORY, "cannot set up a wave solver: out of memory");
-    if (st == STATUS_OK) st = complex_matrix_init(&s->matrix, 2 * n, 2 * n, err);
     if (st == STATUS_OK) {
         place_nodes(s, problem->outline);
         weigh_logarithm(s);
         assemble(s);
-        st = complex_lu_factor(&s->matrix, s->pivot, err);
+        st = factorise(s, err);
     }
     if (st != STATUS_OK) {
         wave_solver_free(s);
@@ -188,8 +199,9 @@ status wave_solver_new(const struct wave_problem *problem, struct wave_solver **
 void wave_solver_free(struct wave_solver *s)
 {
     if (s == NULL) return;
-    complex_matrix_release(&s->matrix);
-    complex_matrix_release(&s->solution);
+    free(s->matrix);
+    free(s->re);
+    free(s->im);
     free(s->node);
     free(s->log_weight);
     free(s->pivot);
@@ -199,36 +211,57 @@ void wave_solver_free(struct wave_solver *s)
 
 static double complex direction(double angle_rad) { return complex_of(cos(angle_rad), sin(angle_rad)); }
 
+/* Makes room for the solution of n waves. */
+static status reserve(struct wave_solver *s, size_t n, struct error *err)
+{
+    double **part[3] = {&s->angle_rad, &s->re, &s->im};
+    const size_t size[3] = {n, 2 * s->n * n, 2 * s->n * n};
+    s->n_wave = 0;
+    for (int k = 0; k < 3; k++) {
+        double *kept = n > 0 ? realloc(*part[k], size[k] * sizeof *kept) : *part[k];
+        if (kept == NULL && n > 0) return error_set(err, STATUS_NO_MEMORY, "cannot hold %zu waves: out of memory", n);
+        *part[k] = kept;
+    }
+    return STATUS_OK;
+}
+
 status wave_solver_solve(struct wave_solver *s, const double *angle_rad, size_t n, struct error *err)
 {
-    struct complex_matrix b;
-    status st = complex_matrix_init(&b, 2 * s->n, n, err);
-    double *kept = realloc(s->angle_rad, (n > 0 ? n : 1) * sizeof *kept);
-    if (kept != NULL) s->angle_rad = kept;
-    if (st == STATUS_OK && kept == NULL) {
-        complex_matrix_release(&b);
-        st = error_set(err, STATUS_NO_MEMORY, "cannot hold %zu waves: out of memory", n);
+    const size_t n_row = 2 * s->n;
+    status st = reserve(s, n, err);
+    if (st != STATUS_OK || n == 0) return st;
+    double complex *b = malloc(n_row * n * sizeof *b); /* column after column */
+    if (b == NULL || n > INT_MAX) {
+        free(b);
+        return error_set(err, STATUS_NO_MEMORY, "cannot hold %zu waves: out of memory", n);
     }
-    if (st != STATUS_OK) return st;
     for (size_t w = 0; w < n; w++) {
         const double complex d = direction(angle_rad[w]);
         s->angle_rad[w] = angle_rad[w];
         for (size_t i = 0; i < s->n; i++) {
             const double complex u = cexp(I * s->k * dot(d, s->node[i].at));
-            set(&b, i, w, u);
-            set(&b, s->n + i, w, I * dot(d, s->node[i].normal) * u);
+            b[w * n_row + i] = u;
+            b[w * n_row + s->n + i] = I * dot(d, s->node[i].normal) * u;
         }
     }
-    complex_lu_solve(&s->matrix, s->pivot, &b);
-    complex_matrix_release(&s->solution);
-    s->solution = b;
-    return STATUS_OK;
+    const lapack_int rows = (lapack_int)n_row;
+    const lapack_int info =
+        LAPACKE_zgetrs(LAPACK_COL_MAJOR, 'N', rows, (lapack_int)n, s->matrix, rows, s->pivot, b, rows);
+    if (info != 0) st = error_set(err, STATUS_INVALID, "cannot solve for %zu waves (zgetrs: %d)", n, (int)info);
+    for (size_t i = 0; i < n_row && st == STATUS_OK; i++)
+        for (size_t w = 0; w < n; w++) {
+            s->re[i * n + w] = creal(b[w * n_row + i]);
+            s->im[i * n + w] = cimag(b[w * n_row + i]);
+        }
+    if (st == STATUS_OK) s->n_wave = n;
+    free(b);
+    return st;
 }
 
 static double complex at(const struct wave_solver *s, size_t row, size_t i_wave)
 {
-    const size_t i = row * s->solution.stride + i_wave;
-    return complex_of(s->solution.re[i], s->solution.im[i]);
+    const size_t i = row * s->n_wave + i_wave;
+    return complex_of(s->re[i], s->im[i]);
 }
 
 /* What node i contributes to T towards d: factors of u and of v / k. */
@@ -255,19 +288,18 @@ void wave_solver_towards(const struct wave_solver *s, double angle_rad, double c
 {
     enum { CHUNK = 80 };
     const double complex d = direction(angle_rad);
-    const struct complex_matrix *x = &s->solution;
-    for (size_t first = 0; first < x->n_column; first += CHUNK) {
-        const size_t n = x->n_column - first < CHUNK ? x->n_column - first : CHUNK;
+    for (size_t first = 0; first < s->n_wave; first += CHUNK) {
+        const size_t n = s->n_wave - first < CHUNK ? s->n_wave - first : CHUNK;
         double re[CHUNK] = {0}, im[CHUNK] = {0};
         for (size_t i = 0; i < s->n; i++) {
             double complex factor[2];
             far_factors(s, d, i, factor);
             for (int half = 0; half < 2; half++) {
                 const double f = creal(factor[half]), g = cimag(factor[half]);
-                const size_t row = ((size_t)half * s->n + i) * x->stride + first;
+                const size_t row = ((size_t)half * s->n + i) * s->n_wave + first;
                 for (size_t w = 0; w < n; w++) {
-                    re[w] += f * x->re[row + w] - g * x->im[row + w];
-                    im[w] += f * x->im[row + w] + g * x->re[row + w];
+                    re[w] += f * s->re[row + w] - g * s->im[row + w];
+                    im[w] += f * s->im[row + w] + g * s->re[row + w];
                 }
             }
         }

@@ -40,8 +40,8 @@ struct wave_problem {
 size_t wave_solver_nodes(const struct wave_outline *o, double k, double index, double per_wave);
 
 struct wave_solver;
-/* Sets up the equations and factorises them, which takes n_node^3 and holds 64 n_node^2 bytes. STATUS_INVALID with the
- * field "index", "k", "n_node"; STATUS_NO_MEMORY. */
+/* Sets up the equations and factorises them by LAPACK, which takes n_node^3 and holds 64 n_node^2 bytes. STATUS_INVALID
+ * with the field "index", "k", "n_node"; STATUS_NO_MEMORY. */
 status wave_solver_new(const struct wave_problem *problem, struct wave_solver **s, struct error *err);
 void wave_solver_free(struct wave_solver *s);
 

@@ -1,5 +1,5 @@
 /* Makes the tables of azimuthal scattering by waves (wave_table.h): solves for every size over wavelength, polarisation
- * and absorption, and writes them as C source. A quarter of a minute of a core for each section.
+ * and absorption, and writes them as C source. 40 s of a core for each section.
  *
  * wave-tables FOLDER [SECTION]
  *   FOLDER   where wave_SECTION_table.c is written
