@@ -283,14 +283,15 @@ static void add_deep(const struct fast_setting *s, const struct seen_hit *h, str
 {
     const struct deep_light *deep = &s->option->tables->deep;
     const struct lights *l = &s->path.lights;
-    float direction[3], wi[3], wo[3], pdf, scale[3];
-    scene_place_to_cloth(&h->place, h->wo_scene, wo);
+    float row[3][3], direction[3], wi[3], wo[3], pdf, scale[3];
+    scene_place_rotation(&h->place, row);
+    for (int a = 0; a < 3; a++) wo[a] = dot(row[a], h->wo_scene);
     if (l->has_lamp) {
         float u[2];
         u[0] = rng_float(rng);
         u[1] = rng_float(rng);
         if (lamp_sample(&l->lamp, h->position_mm, u, direction, &pdf) && shell_is_open(s, h, direction, rng)) {
-            scene_place_to_cloth(&h->place, direction, wi);
+            for (int a = 0; a < 3; a++) wi[a] = dot(row[a], direction);
             for (int c = 0; c < 3; c++) scale[c] = lamp_radiance(&l->lamp, direction) / pdf * (float)M_1_PI;
             deep_light_add(deep, wo, wi, scale, radiance);
         }
@@ -299,7 +300,7 @@ static void add_deep(const struct fast_setting *s, const struct seen_hit *h, str
     size_t k = light_mixture_pick(&s->mixture, rng_float(rng));
     if (!shell_is_open(s, h, s->mixture.direction[k], rng)) return;
     float share = s->mixture.cumulative[k] - (k > 0 ? s->mixture.cumulative[k - 1] : 0);
-    scene_place_to_cloth(&h->place, s->mixture.direction[k], wi);
+    for (int a = 0; a < 3; a++) wi[a] = dot(row[a], s->mixture.direction[k]);
     for (int c = 0; c < 3; c++) scale[c] = s->mixture.rgb[k][c] / share * (float)M_1_PI;
     deep_light_add(deep, wo, wi, scale, radiance);
 }

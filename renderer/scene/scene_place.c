@@ -68,6 +68,32 @@ bool scene_section_normal(const struct scene *s, const struct scene_hit *hit, fl
     return true;
 }
 
+static void scaled_to_one(float v[3])
+{
+    float length = sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    for (int a = 0; a < 3; a++) v[a] /= length;
+}
+
+void scene_place_rotation(const struct scene_place *p, float row[3][3])
+{
+    float sum[3], difference[3];
+    memcpy(row, p->to_cloth, sizeof p->to_cloth);
+    scaled_to_one(row[2]);
+    for (int k = 0; k < 2; k++) {
+        float along = row[k][0] * row[2][0] + row[k][1] * row[2][1] + row[k][2] * row[2][2];
+        for (int a = 0; a < 3; a++) row[k][a] -= along * row[2][a];
+        scaled_to_one(row[k]);
+    }
+    /* sum and difference of two vectors of equal length are at right angles: those between weft and warp stay */
+    for (int a = 0; a < 3; a++) sum[a] = row[0][a] + row[1][a], difference[a] = row[0][a] - row[1][a];
+    scaled_to_one(sum);
+    scaled_to_one(difference);
+    for (int a = 0; a < 3; a++) {
+        row[0][a] = (sum[a] + difference[a]) * (float)M_SQRT1_2;
+        row[1][a] = (sum[a] - difference[a]) * (float)M_SQRT1_2;
+    }
+}
+
 bool scene_shell_shades(const struct scene *s, const struct scene_hit *hit, const struct scene_place *place,
                         const float shift_mm[2], const float direction[3])
 {

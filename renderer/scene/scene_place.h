@@ -36,6 +36,9 @@ void scene_segment_at(const struct scene *scene, uint32_t i_segment, struct scen
 /* offset_mm: that of the ray that hit. */
 void scene_place_of(const struct scene *scene, const struct scene_hit *hit, const double offset_mm[2],
                     struct scene_place *place);
+/* Rows of the rotation into the flat cloth that is nearest to place->to_cloth among those that keep the normal of the
+ * cloth: for angles between a light and the cloth, which to_cloth changes where threads are sheared. */
+void scene_place_rotation(const struct scene_place *place, float row[3][3]);
 /* Whether the shell of a bent cloth lies in a direction from a point of its surface: of the upper side if the direction
  * points out of it, of the lower one otherwise. The point lies over the hit, moved by shift_mm in the plane of the
  * cloth there. Flat cloth never shades itself so. */

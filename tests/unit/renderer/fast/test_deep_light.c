@@ -1,7 +1,9 @@
 /* The table of light that is scattered more often than the paths of a fast picture are traced: a furnace, means of a
- * cloth with narrow lobes against path tracing, which the cells' harmonics miss, and any number of threads. */
+ * cloth with narrow lobes against path tracing, which the cells' harmonics miss, any number of threads, and directions
+ * in a sheared cloth. */
 #include "renderer/fast/fast_option.h"
 #include "renderer/fast/precompute/fast_precompute.h"
+#include "renderer/scene/scene_place.h"
 #include "renderer/transport/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/orbit_configurations.h"
@@ -192,9 +194,30 @@ static void refusals(void **state)
     assert_non_null(strstr(err.text, "1 node"));
 }
 
+/* Into a flat cloth that is turned and sheared: the rotation keeps the normal and the lines between weft and warp, and
+ * is the map itself where nothing is sheared. */
+static void rotation_of_a_sheared_place(void **state)
+{
+    (void)state;
+    const float c = cosf(0.4f), s = sinf(0.4f), shear = 0.2f;
+    const float turn[3][3] = {{c, 0, s}, {0, 1, 0}, {-s, 0, c}};
+    for (int sheared = 0; sheared < 2; sheared++) {
+        struct scene_place p = {0};
+        float row[3][3];
+        for (int a = 0; a < 3; a++) {
+            p.to_cloth[0][a] = turn[0][a] + (sheared ? shear * turn[1][a] : 0);
+            p.to_cloth[1][a] = turn[1][a] + (sheared ? shear * turn[0][a] : 0);
+            p.to_cloth[2][a] = 1.5f * turn[2][a];
+        }
+        scene_place_rotation(&p, row);
+        for (int k = 0; k < 3; k++)
+            for (int a = 0; a < 3; a++) assert_true(fabsf(row[k][a] - turn[k][a]) < 1e-6f);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(furnace), cmocka_unit_test(means), cmocka_unit_test(threads),
-                                       cmocka_unit_test(refusals)};
+                                       cmocka_unit_test(refusals), cmocka_unit_test(rotation_of_a_sheared_place)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
