@@ -15,6 +15,9 @@ enum {
 };
 #define TRACE_LUMENS_END 0.85   /* of the progress of the step "fibers", where lumens are measured; from 0.67 on */
 #define TRACE_END_DIAMETERS 1.0 /* length at an end, in diameters, that may be wrong */
+/* Spread of the radii of single fibers, over their mean, above which lines are those of a scan that does not resolve
+ * its fibers: yarns have 0.1 to 0.25, weave-ct 0.39. */
+#define TRACE_MOST_SPREAD 0.3
 /* Angle between a line and the direction of its voxels from which on it may be wrong. */
 #define TRACE_DISAGREEMENT_RAD (30.0 * RAD_PER_DEG)
 

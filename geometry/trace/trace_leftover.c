@@ -20,8 +20,8 @@ static const double THINNER = 0.72;
 static const float PAD = 0.3f; /* voxels added to subtracted radii, so that no rims are left */
 /* Spread of the radii, and material that is left over all material, below which there is nothing to look for: fibers
  * that are alike are all found at first, and only rims of them are left (spread up to 0.04, material up to 0.05). Radii
- * that spread by more than those of yarns do (0.1 to 0.25) are those of lines that the scan does not resolve. */
-static const double LEAST_SPREAD = 0.1, MOST_SPREAD = 0.3, LEAST_LEFT = 0.03;
+ * that spread by more than TRACE_MOST_SPREAD are those of lines that the scan does not resolve. */
+static const double LEAST_SPREAD = 0.1, LEAST_LEFT = 0.03;
 /* Fibers so thin that voxels are interpolated are missed where they touch, also where they are alike; lines on missed
  * neighbours then spread their radii by 0.09 to 0.15. */
 static const double LEAST_SPREAD_THIN = 0.05;
@@ -164,7 +164,8 @@ status trace_leftover(struct trace_job *job, struct polyline_set *lines, struct 
     double share = 0.0;
     const double spread = job->report->radius_spread;
     status s = STATUS_OK;
-    const bool look = spread >= (job->independent < 1.0 ? LEAST_SPREAD_THIN : LEAST_SPREAD) && spread <= MOST_SPREAD;
+    const bool look =
+        spread >= (job->independent < 1.0 ? LEAST_SPREAD_THIN : LEAST_SPREAD) && spread <= TRACE_MOST_SPREAD;
     if (look) s = subtract_lines(job, lines, &left, &share, err);
     forget_sections(lines);
     if (!look) return STATUS_OK;

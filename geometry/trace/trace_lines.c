@@ -12,10 +12,16 @@
 #include <stdlib.h>
 
 enum {
-    N_REPAIR = 2, /* rounds of growing, joining and cutting */
-    N_FIT = 4     /* rounds of fitting whole lines */
+    N_REPAIR = 2,    /* rounds of growing, joining and cutting */
+    N_FIT = 4,       /* rounds of fitting whole lines */
+    N_SETTLE = 3,    /* most rounds of fitting, cutting and joining before the last fit beyond the first one */
+    N_SETTLE_FIT = 3 /* fits in each of them */
 };
 
+/* Lines are repaired once more while more than this share of their ends lies in the middle of material, and the last
+ * round has joined more than that share of the lines (geometry/NOTES.md, "Rounds of fitting, cutting and joining"). */
+#define LOST_SHARE 0.03
+#define JOINED_SHARE 0.02
 /* Turn of a kink relative to the usual turn. Less cuts fibers of plain weaves into pieces; more keeps jumps between
  * fibers. */
 #define OVER_USUAL_TURN 2.1
@@ -171,13 +177,40 @@ static status look_again(struct trace_job *job, struct polyline_set *lines, stru
     return s;
 }
 
+/* One round of the last repair: fits the lines n_fit times, cuts them where they change to another fiber, and lets the
+ * ends that this frees grow and join. first: looks again before they grow. *n_join: number of joins. */
+static status settle_once(struct trace_job *job, struct polyline_set *lines, int n_fit, bool first, size_t *n_join,
+                          struct error *err)
+{
+    const struct reconstruct_report *r = job->report;
+    const size_t n_before = r->n_gap_bridged + r->n_joined;
+    status s = STATUS_OK;
+    for (int k = 0; k < n_fit && s == STATUS_OK; k++) s = trace_center(job, lines, err);
+    if (s == STATUS_OK) s = straighten(job, lines, true, TRACE_MIN_PIECE, err);
+    if (s == STATUS_OK && first) s = look_again(job, lines, err);
+    if (s == STATUS_OK) s = trace_join(job, lines, true, err);
+    *n_join = r->n_gap_bridged + r->n_joined - n_before;
+    return s;
+}
+
+/* Whether another round may join what is in pieces. Lines of a scan that does not resolve its fibers are left alone,
+ * and so are flat fibers: fitted as discs, they would get second lines at their sides. */
+static bool has_lost_ends(const struct trace_job *job, const struct polyline_set *lines)
+{
+    const size_t n_lost = polylines_count_lost_ends(lines, job->v, job->o->eps_d, 0.5 * job->diameter);
+    const bool fits = !job->flat && job->report->radius_spread <= TRACE_MOST_SPREAD;
+    return fits && (double)n_lost > LOST_SHARE * 2.0 * (double)lines->n_line;
+}
+
 status trace_finish(struct trace_job *job, struct polyline_set *lines, struct error *err)
 {
+    size_t n_join = 0;
     trace_enter_part(job, 0.54, 0.57);
-    status s = trace_center(job, lines, err);
-    if (s == STATUS_OK) s = straighten(job, lines, true, TRACE_MIN_PIECE, err);
-    if (s == STATUS_OK) s = look_again(job, lines, err);
-    if (s == STATUS_OK) s = trace_join(job, lines, true, err);
+    status s = settle_once(job, lines, 1, true, &n_join, err);
+    for (int k = 0; k < N_SETTLE && s == STATUS_OK && has_lost_ends(job, lines); k++) {
+        if (k > 0 && (double)n_join <= JOINED_SHARE * (double)lines->n_line) break; /* nothing moves any more */
+        s = settle_once(job, lines, N_SETTLE_FIT, false, &n_join, err);
+    }
     trace_enter_part(job, 0.57, 0.67);
     if (s == STATUS_OK) s = fit_axes(job, lines, true, err);
     if (s == STATUS_OK) s = straighten(job, lines, true, job->o->min_vertex, err);

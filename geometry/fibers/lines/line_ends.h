@@ -14,4 +14,8 @@ void polylines_reach_faces(struct polyline_set *lines, const struct volume *v, d
 status polylines_keep_inside(const struct polyline_set *in, const size_t n_voxel[3], size_t min_vertex,
                              struct polyline_set *out, size_t n_dropped[3], struct error *err);
 
+/* Number of ends in the middle of material: the `ahead` voxels beyond them are inside of the volume, and their mean
+ * density is at least eps_d. A line that ends there has lost its fiber, unless another one touches the fiber's end. */
+size_t polylines_count_lost_ends(const struct polyline_set *lines, const struct volume *v, double eps_d, double ahead);
+
 #endif
