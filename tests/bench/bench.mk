@@ -15,12 +15,13 @@ bench-transport: | deps-test ## the renderer's figures (paths a second, time to 
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %transport,$(BENCH_BINS)) >&2
 	@for b in $(filter %transport,$(BENCH_BINS)); do $$b || exit 1; done
 
+# MODELS: some of them only, such as MODELS="chiang.v1 elliptical.v1"
 bench-models: | deps-test ## what every scattering model costs and what light it loses; fur fitted to profiles of single fibers (four minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/models/bench_models $(BUILD)/tests/bench/models/bench_profiles >&2
-	@$(BUILD)/tests/bench/models/bench_models
+	@$(BUILD)/tests/bench/models/bench_models 4096 5 $(MODELS)
 	@$(BUILD)/tests/bench/models/bench_profiles
 
-# MODELS: some of them only, such as MODELS="chiang.v1 elliptical.v1"
+# MODELS: as above
 bench-recovery: | deps-test ## whether a fit of each surface model finds its own parameters again (an hour on 2 quiet cores; photographs are kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/models/bench_recovery >&2
 	@$(BUILD)/tests/bench/models/bench_recovery $(BUILD)/bench-recovery $(MODELS)

@@ -1,21 +1,18 @@
 /* What every surface model of the catalogue costs, and what light it loses. Prints one JSON object on each line.
  *
- *   models.<id>.paths_per_s_core
- *       Paths with all derivatives on the cloth of the benchmarks, under the 16 configurations. All models take turns,
- *       and the median of the rounds counts.
- *   models.<id>.time_over_two_lobe
- *       Median over the rounds of its time for a path over that of two_lobe.v1 in the same round, in which the machine
- *       was equally busy.
- *   models.<id>.furnace_in_error, .furnace_out_error
- *       Largest part of the light that a fiber loses or gains, over 0, 20, 40, 60 and 80 degrees: light that comes from
- *       one direction and leaves to all (in), and comes from all and leaves to one (out). Colors at their upper bounds,
- *       everything else at its start.
- *   models.<id>.table_bytes, .table_build_s
- *       Memory of a prepared model, and processor time to prepare it.
+ * models.<id>.paths_per_s_core       Paths with all derivatives on the cloth of the benchmarks, under the 16
+ * configurations. All models take turns,       and the median of the rounds counts.   models.<id>.time_over_two_lobe
+ * Median over the rounds of its time for a path over that of two_lobe.v1 in the same round, in which the machine
+ * was equally busy.   models.<id>.furnace_in_error, .furnace_out_error       Largest part of the light that a fiber
+ * loses or gains, over 0, 20, 40, 60 and 80 degrees: light that comes from       one direction and leaves to all (in),
+ * and comes from all and leaves to one (out; by the widths of sections whose       width the model states). Colors at
+ * their upper bounds,       everything else at its start.   models.<id>.table_bytes, .table_build_s       Memory of a
+ * prepared model, and processor time to prepare it.
  *
- * bench_models [PATHS] [ROUNDS]
+ * bench_models [PATHS [ROUNDS [ID ...]]]
  *   PATHS   for each configuration (4096)
  *   ROUNDS  (5)
+ *   ID      models; all without
  */
 #include "base/angle.h"
 #include "renderer/transport/estimate/estimate.h"
@@ -28,6 +25,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 
 enum { N_CONFIGURATION = 16, MAX_MODEL = 64, MAX_ROUND = 64 };
@@ -151,10 +149,9 @@ static double median(double *x, size_t n)
     return 0.5 * (x[(n - 1) / 2] + x[n / 2]);
 }
 
-static void bench_speed(size_t n_path, size_t n_round)
+static void bench_speed(const struct scattering_model **model, size_t n_path, size_t n_round)
 {
     static double time_s[MAX_MODEL][MAX_ROUND], ratio[MAX_MODEL][MAX_ROUND];
-    const struct scattering_model *const *model = scattering_registry();
     struct fiber_set f;
     struct scene *scene = NULL;
     struct thread_pool *pool = NULL;
@@ -163,17 +160,15 @@ static void bench_speed(size_t n_path, size_t n_round)
     if (scene_new(&f, &(struct scene_option){.black_sheet = true}, &scene, &err) != STATUS_OK) stop(&err);
     if (thread_pool_new(1, &pool, &err) != STATUS_OK) stop(&err);
     fiber_set_release(&f);
-    trace(scene, pool, model[0], 256); /* warm up */
-    size_t reference = 0;
+    trace(scene, pool, scattering_find("two_lobe.v1"), 256); /* warm up */
     for (size_t round = 0; round < n_round; round++) {
-        for (size_t k = 0; k < MAX_MODEL && model[k] != NULL; k++) {
+        const double reference_s = trace(scene, pool, scattering_find("two_lobe.v1"), n_path);
+        for (size_t k = 0; model[k] != NULL; k++) {
             time_s[k][round] = trace(scene, pool, model[k], n_path);
-            if (model[k] == scattering_find("two_lobe.v1")) reference = k;
+            ratio[k][round] = time_s[k][round] / reference_s;
         }
-        for (size_t k = 0; k < MAX_MODEL && model[k] != NULL; k++)
-            ratio[k][round] = time_s[k][round] / time_s[reference][round];
     }
-    for (size_t k = 0; k < MAX_MODEL && model[k] != NULL; k++) {
+    for (size_t k = 0; model[k] != NULL; k++) {
         print(model[k], "paths_per_s_core", 1 / median(time_s[k], n_round), "1/s", "higher");
         print(model[k], "time_over_two_lobe", median(ratio[k], n_round), "1", "lower");
     }
@@ -181,17 +176,34 @@ static void bench_speed(size_t n_path, size_t n_round)
     scene_free(scene);
 }
 
+/* Whether the arguments from `first` on name the model, or are none. */
+static bool is_wanted(const struct scattering_model *m, int argc, char **argv, int first)
+{
+    for (int i = first; i < argc; i++)
+        if (strcmp(argv[i], m->id) == 0) return true;
+    return argc <= first;
+}
+
 int main(int argc, char **argv)
 {
+    static const struct scattering_model *model[MAX_MODEL + 1];
+    size_t n_model = 0;
     size_t n_path = argc > 1 ? strtoul(argv[1], NULL, 10) : 4096, n_round = argc > 2 ? strtoul(argv[2], NULL, 10) : 5;
     if (n_path == 0 || n_round == 0 || n_round > MAX_ROUND) {
-        fprintf(stderr, "usage: bench_models [PATHS] [ROUNDS], at most %d rounds\n", MAX_ROUND);
+        fprintf(stderr, "usage: bench_models [PATHS [ROUNDS [ID ...]]], at most %d rounds\n", MAX_ROUND);
         return 2;
     }
-    for (size_t k = 0; scattering_registry()[k] != NULL; k++) {
-        bench_light(scattering_registry()[k]);
-        bench_tables(scattering_registry()[k]);
+    for (int i = 3; i < argc; i++)
+        if (scattering_find(argv[i]) == NULL) {
+            fprintf(stderr, "model '%s' is unknown\n", argv[i]);
+            return 2;
+        }
+    for (size_t k = 0; scattering_registry()[k] != NULL && n_model < MAX_MODEL; k++)
+        if (is_wanted(scattering_registry()[k], argc, argv, 3)) model[n_model++] = scattering_registry()[k];
+    for (size_t k = 0; k < n_model; k++) {
+        bench_light(model[k]);
+        bench_tables(model[k]);
     }
-    bench_speed(n_path, n_round);
+    bench_speed(model, n_path, n_round);
     return 0;
 }

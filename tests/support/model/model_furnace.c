@@ -22,7 +22,9 @@ void model_furnace(const struct scattering_model *m, const struct scattering_sta
                 direction(theta_rad, at, one);
                 direction(theta, other, all);
                 m->eval(s, from_light ? one : all, from_light ? all : one, rgb, NULL);
+                const bool by_width = !from_light && m->width != NULL;
+                double widths = by_width ? (double)(m->width(s, all, NULL) / m->width(s, one, NULL)) : 1;
                 for (int k = 0; k < 3; k++)
-                    sum[k] += (double)rgb[k] * c * c * (M_PI / q->n_theta) * (2 * M_PI / q->n_phi) / n_view;
+                    sum[k] += (double)rgb[k] * widths * c * c * (M_PI / q->n_theta) * (2 * M_PI / q->n_phi) / n_view;
             }
 }

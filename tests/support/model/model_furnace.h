@@ -11,7 +11,9 @@ struct model_furnace {
 };
 
 /* Integral of S cos th over all directions of one side, per channel: over all that light leaves to, of light that comes
- * from theta_rad (from_light), or over all that it comes from, of what leaves to theta_rad. */
+ * from theta_rad (from_light), or over all that it comes from, of what leaves to theta_rad. There light counts by the
+ * width that the section shows to it, over that which it shows to the view, for models that state it (fabric thesis,
+ * equation 2.11). */
 void model_furnace(const struct scattering_model *m, const struct scattering_state *s, const struct model_furnace *q,
                    double theta_rad, bool from_light, double sum[3]);
 
