@@ -13,7 +13,6 @@
 
 static status fill(struct scattering_state *s, const double *param, struct thread_pool *pool, struct error *err)
 {
-    (void)pool;
     struct elliptical_energies *energies = malloc(sizeof *energies);
     struct oriented_row *row = malloc((ELLIPTICAL_N_ROW + 1) * sizeof *row);
     status st = STATUS_OK;
@@ -21,7 +20,7 @@ static status fill(struct scattering_state *s, const double *param, struct threa
         st = error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
     elliptical_lobes_set(s->along, param);
     s->ratio = (float)param[ELLIPTICAL_P_RATIO];
-    if (st == STATUS_OK) st = oriented_tables(s, param, row, energies, err);
+    if (st == STATUS_OK) st = oriented_tables(s, param, pool, row, energies, err);
     if (st == STATUS_OK) st = elliptical_balance(s->along, energies, &s->scale, err);
     if (st == STATUS_OK) st = oriented_balance(s, row, err);
     free(energies);
@@ -29,9 +28,15 @@ static status fill(struct scattering_state *s, const double *param, struct threa
     return st;
 }
 
+static status prepare_shared(const double *param, struct thread_pool *pool, struct scattering_state **state,
+                             struct error *err)
+{
+    return scattering_state_new(&scattering_elliptical_oriented, param, fill, sizeof **state, pool, state, err);
+}
+
 static status prepare(const double *param, struct scattering_state **state, struct error *err)
 {
-    return scattering_state_new(&scattering_elliptical_oriented, param, fill, sizeof **state, NULL, state, err);
+    return prepare_shared(param, NULL, state, err);
 }
 
 static void release(struct scattering_state *s) { free(s); }
@@ -266,6 +271,7 @@ const struct scattering_model scattering_elliptical_oriented = {
     .flat_section = true,
     .width = width,
     .prepare = prepare,
+    .prepare_shared = prepare_shared,
     .release = release,
     .eval = eval,
     .sample = sample,

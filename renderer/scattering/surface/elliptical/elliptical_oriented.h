@@ -84,9 +84,10 @@ static inline int oriented_fold(int i, int half)
 }
 
 typedef double oriented_plane[ORIENTED_N + 1][ORIENTED_N + 1]; /* by psi and Delta */
-/* Fills in cells, slopes, views, the rows and the energies. STATUS_NO_MEMORY. */
-status oriented_tables(struct scattering_state *s, const double *param, struct oriented_row *row,
-                       struct elliptical_energies *energies, struct error *err);
+/* Fills in cells, slopes, views, the rows and the energies; threads of the pool, which may be NULL, share the rows.
+ * STATUS_NO_MEMORY. */
+status oriented_tables(struct scattering_state *s, const double *param, struct thread_pool *pool,
+                       struct oriented_row *row, struct elliptical_energies *energies, struct error *err);
 /* Folds a plane of F. */
 void oriented_fold_plane(oriented_plane plane, oriented_folded out);
 /* Fills in m; lobes, scale and ratio are set. STATUS_NO_MEMORY. */

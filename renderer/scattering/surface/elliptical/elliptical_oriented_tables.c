@@ -278,21 +278,39 @@ static void store_view(struct elliptical_cell (*cell)[N + 1], int i, struct orie
     }
 }
 
-status oriented_tables(struct scattering_state *s, const double *param, struct oriented_row *row,
-                       struct elliptical_energies *energies, struct error *err)
+/* What the tasks of the rows share. */
+struct rows {
+    struct scattering_state *s;
+    const struct ellipse *e;
+    const double *param;
+    struct oriented_row *row;
+    struct elliptical_energies *energies;
+    struct work *work; /* one for each thread */
+};
+
+static void fill_row(void *context, size_t i, size_t i_thread)
 {
-    struct work *w = malloc(sizeof *w);
+    const struct rows *r = context;
+    struct work *w = &r->work[i_thread];
+    add_rays(w, r->e, r->param, (double)i / ELLIPTICAL_N_ROW, r->energies->share[i]);
+    blur_all(w);
+    store(w, r->s->cell[i], r->s->slope[i], &r->row[i]);
+    for (int k = 0; k <= N_TURN; k++) store_view(r->s->cell[i], k, &r->s->view[i][k]);
+}
+
+status oriented_tables(struct scattering_state *s, const double *param, struct thread_pool *pool,
+                       struct oriented_row *row, struct elliptical_energies *energies, struct error *err)
+{
+    const size_t n_thread = thread_pool_n_thread(pool);
+    struct work *w = malloc(n_thread * sizeof *w);
     if (w == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
     const struct ellipse e = ellipse_of(param[ELLIPTICAL_P_ETA], param[ELLIPTICAL_P_RATIO]);
+    struct rows rows = {s, &e, param, row, energies, w};
     set_factors(w, param[ELLIPTICAL_P_GAMMA]);
     enter_rays(w, &e);
+    for (size_t i = 1; i < n_thread; i++) w[i] = w[0];
     memset(energies, 0, sizeof *energies);
-    for (int i = 0; i <= ELLIPTICAL_N_ROW; i++) {
-        add_rays(w, &e, param, (double)i / ELLIPTICAL_N_ROW, energies->share[i]);
-        blur_all(w);
-        store(w, s->cell[i], s->slope[i], &row[i]);
-        for (int k = 0; k <= N_TURN; k++) store_view(s->cell[i], k, &s->view[i][k]);
-    }
+    const status st = thread_pool_run(pool, ELLIPTICAL_N_ROW + 1, fill_row, &rows, NULL);
     free(w);
-    return STATUS_OK;
+    return st;
 }
