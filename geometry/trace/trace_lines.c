@@ -12,10 +12,11 @@
 #include <stdlib.h>
 
 enum {
-    N_REPAIR = 2,    /* rounds of growing, joining and cutting */
-    N_FIT = 4,       /* rounds of fitting whole lines */
-    N_SETTLE = 3,    /* most rounds of fitting, cutting and joining before the last fit beyond the first one */
-    N_SETTLE_FIT = 3 /* fits in each of them */
+    N_REPAIR = 2,      /* rounds of growing, joining and cutting */
+    N_FIT = 4,         /* rounds of fitting whole lines */
+    N_SETTLE = 3,      /* most rounds of fitting, cutting and joining before the last fit beyond the first one */
+    N_SETTLE_THIN = 2, /* the same where voxels are interpolated: a third round loses length there */
+    N_SETTLE_FIT = 3   /* fits in each of them */
 };
 
 /* Lines are repaired once more while more than this share of their ends lies in the middle of material, and the last
@@ -205,9 +206,10 @@ static bool has_lost_ends(const struct trace_job *job, const struct polyline_set
 status trace_finish(struct trace_job *job, struct polyline_set *lines, struct error *err)
 {
     size_t n_join = 0;
+    const int n_settle = job->independent < 1.0 ? N_SETTLE_THIN : N_SETTLE;
     trace_enter_part(job, 0.54, 0.57);
     status s = settle_once(job, lines, 1, true, &n_join, err);
-    for (int k = 0; k < N_SETTLE && s == STATUS_OK && has_lost_ends(job, lines); k++) {
+    for (int k = 0; k < n_settle && s == STATUS_OK && has_lost_ends(job, lines); k++) {
         if (k > 0 && (double)n_join <= JOINED_SHARE * (double)lines->n_line) break; /* nothing moves any more */
         s = settle_once(job, lines, N_SETTLE_FIT, false, &n_join, err);
     }
