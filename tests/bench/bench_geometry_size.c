@@ -58,13 +58,6 @@ struct outcome {
     char text[640];
 };
 
-static double processor_s(int who)
-{
-    struct rusage u;
-    getrusage(who, &u);
-    return (double)(u.ru_utime.tv_sec + u.ru_stime.tv_sec) + 1e-6 * (double)(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
-}
-
 /* Writes n voxels of the scan as bytes without a header: the slices of v in the middle, cropped to n[0] x n[1], and
  * void from its ends, of which it has PAD slices at least. */
 static status write_bytes(const struct volume *v, const size_t n[3], const char *path, struct error *err)
@@ -187,7 +180,7 @@ static struct outcome in_child(const struct sample *p, const size_t *n, const ch
         struct error err = {0};
         o.s = n == NULL ? make_scan(p, folder, path, &err) : reconstruct(p, path, n, folder, &o.report, &err);
         snprintf(o.text, sizeof o.text, "%s", err.text);
-        o.cpu_s = processor_s(RUSAGE_SELF);
+        o.cpu_s = clock_process_s();
         ssize_t put = write(end[1], &o, sizeof o);
         _exit(put == (ssize_t)sizeof o ? 0 : 1);
     }

@@ -27,6 +27,7 @@
  *   PATHS   for each configuration (16384); published_iteration has its own number
  *   NAME    run only this set, "fleece" or "published"
  */
+#include "base/clock.h"
 #include "base/rng.h"
 #include "renderer/transport/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
@@ -39,7 +40,6 @@
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 enum { N_CONFIGURATION = 16 };
@@ -53,15 +53,6 @@ static const struct {
     {"silk", {0.745, 0.008, 0.070, 0.620, 0.553, 0.562, 1, 10, 19.823}},
     {"cotton", {0.989, 0.959, 0.874, 0.999, 0.999, 0.999, 1, 27.197, 38.269}},
 };
-
-/* Processor time of this thread, which does all the work. It depends less on other load of the machine than wall
- * time. */
-static double processor_s(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 static void print(const char *set, const char *what, double value, const char *unit, const char *better)
 {
@@ -208,12 +199,12 @@ static double trace(const struct bench *b, const double param[9], size_t n_path,
                                  .share_camera_paths = share};
     q.input.want_derivative = true;
     q.input.plain_paths = plain;
-    double t0 = processor_s();
+    double t0 = clock_process_s();
     if (estimate_run(&q, b->pool, NULL, e, &err) != STATUS_OK) {
         fprintf(stderr, "%s\n", err.text);
         exit(1);
     }
-    return processor_s() - t0;
+    return clock_process_s() - t0;
 }
 
 /* Prints the times to 1 % of the mean and to 5 % of the derivative by C_TT, as means over the configurations.

@@ -8,6 +8,7 @@
  *
  * Arguments: paths for each configuration (4096), voxels along an edge (500).
  */
+#include "base/clock.h"
 #include "renderer/transport/estimate/estimate.h"
 #include "tests/support/scan/hand_volume.h"
 #include "tests/support/tracer/orbit_configurations.h"
@@ -16,16 +17,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
-
-/* Processor time of this thread, which does all the work. It depends less on other load of the machine than wall
- * time. */
-static double processor_s(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 static void print(const char *set, const char *what, double value, const char *unit, const char *better)
 {
@@ -59,14 +50,14 @@ static void measure(const char *set, const struct volume_scene *scene, double mu
     q.input.want_derivative = true;
     double t0 = 0;
     for (int pass = 0; pass < 2; pass++) {
-        t0 = processor_s();
+        t0 = clock_process_s();
         if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) {
             fprintf(stderr, "%s\n", err.text);
             exit(1);
         }
         q.n_path = n;
     }
-    double per_path = (processor_s() - t0) / (16.0 * (double)n_path), s_mean = 0, bounce = 0;
+    double per_path = (clock_process_s() - t0) / (16.0 * (double)n_path), s_mean = 0, bounce = 0;
     for (int i = 0; i < 16; i++) {
         double mean = 0, se = 0;
         for (int ch = 0; ch < 3; ch++) { /* channels are correlated, so their standard errors are added */

@@ -1,13 +1,17 @@
 /* What every surface model of the catalogue costs, and what light it loses. Prints one JSON object on each line.
  *
- * models.<id>.paths_per_s_core       Paths with all derivatives on the cloth of the benchmarks, under the 16
- * configurations. All models take turns,       and the median of the rounds counts.   models.<id>.time_over_two_lobe
- * Median over the rounds of its time for a path over that of two_lobe.v1 in the same round, in which the machine
- * was equally busy.   models.<id>.furnace_in_error, .furnace_out_error       Largest part of the light that a fiber
- * loses or gains, over 0, 20, 40, 60 and 80 degrees: light that comes from       one direction and leaves to all (in),
- * and comes from all and leaves to one (out; by the widths of sections whose       width the model states). Colors at
- * their upper bounds,       everything else at its start.   models.<id>.table_bytes, .table_build_s       Memory of a
- * prepared model, and processor time to prepare it.
+ *   models.<id>.paths_per_s_core
+ *       Paths with all derivatives on the cloth of the benchmarks, under the 16 configurations. All models take turns,
+ *       and the median of the rounds counts.
+ *   models.<id>.time_over_two_lobe
+ *       Median over the rounds of its time for a path over that of two_lobe.v1 in the same round, in which the machine
+ *       was equally busy.
+ *   models.<id>.furnace_in_error, .furnace_out_error
+ *       Largest part of the light that a fiber loses or gains, over 0, 20, 40, 60 and 80 degrees: light that comes from
+ *       one direction and leaves to all (in), and comes from all and leaves to one (out; by the widths of sections whose
+ *       width the model states). Colors at their upper bounds, everything else at its start.
+ *   models.<id>.table_bytes, .table_build_s
+ *       Memory of a prepared model, and processor time to prepare it.
  *
  * bench_models [PATHS [ROUNDS [ID ...]]]
  *   PATHS   for each configuration (4096)
@@ -15,6 +19,7 @@
  *   ID      models; all without
  */
 #include "base/angle.h"
+#include "base/clock.h"
 #include "renderer/transport/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/model/model_furnace.h"
@@ -26,16 +31,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum { N_CONFIGURATION = 16, MAX_MODEL = 64, MAX_ROUND = 64 };
-
-static double processor_s(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 static void print(const struct scattering_model *m, const char *what, double value, const char *unit,
                   const char *better)
@@ -108,9 +105,9 @@ static void bench_tables(const struct scattering_model *m)
     enum { N = 5 };
     double param[SCATTERING_MAX_PARAM];
     start_of(m, false, param);
-    double start = processor_s();
+    double start = clock_process_s();
     for (int i = 0; i < N; i++) m->release(prepare(m, param));
-    print(m, "table_build_s", (processor_s() - start) / N, "s", "lower");
+    print(m, "table_build_s", (clock_process_s() - start) / N, "s", "lower");
 }
 
 /* Processor time for a path. */
@@ -132,9 +129,9 @@ static double trace(const struct scene *scene, struct thread_pool *pool, const s
                                  .n_path = n,
                                  .seed = 1};
     q.input.want_derivative = true;
-    double start = processor_s();
+    double start = clock_process_s();
     if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) stop(&err);
-    return (processor_s() - start) / (double)(N_CONFIGURATION * n_path);
+    return (clock_process_s() - start) / (double)(N_CONFIGURATION * n_path);
 }
 
 static int by_size(const void *a, const void *b)

@@ -22,6 +22,7 @@
  *   FABRIC   gabardine, fleece, silk (tests/support/cloth/fit_fabrics.h); default: all three
  */
 #include "base/angle.h"
+#include "base/clock.h"
 #include "geometry/mesh/mesh_drape.h"
 #include "renderer/dual/dual_option.h"
 #include "renderer/fast/fast_option.h"
@@ -36,7 +37,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
 enum { N_FLAT = 492, FIELD = 4 };
@@ -56,13 +56,6 @@ static void check(status s, const struct error *err)
     if (s == STATUS_OK) return;
     fprintf(stderr, "%s\n", err->text);
     exit(1);
-}
-
-static double processor_s(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
 static void print(const char *fabric, const char *what, double value, const char *unit, const char *better)
@@ -114,7 +107,7 @@ static void make_tables(struct bench *b)
     struct stat info;
     int fd = mkstemp(path);
     const uint32_t n_path = option.n_path == 0 && b->fast.deep && !option.cells_too ? 1 : option.n_path;
-    double start = processor_s();
+    double start = clock_process_s();
     const struct fast_precompute_request q = {.scene = b->flat,
                                               .model = b->model.surface,
                                               .param = b->param,
@@ -126,7 +119,7 @@ static void make_tables(struct bench *b)
                                               .deep_edge = option.deep_edge,
                                               .deep_paths = option.deep_paths};
     check(fast_precompute(&q, pool, NULL, &b->tables, &err), &err);
-    double seconds = processor_s() - start;
+    double seconds = clock_process_s() - start;
     const struct fast_tables *t = &b->tables;
     check(fast_tables_write(t, path, &err), &err);
     fprintf(stderr,
@@ -144,10 +137,10 @@ static void make_tables(struct bench *b)
 static void make_averages(struct bench *b)
 {
     struct error err = {0};
-    double start = processor_s();
+    double start = clock_process_s();
     check(dual_tables_init(&b->averages, b->flat, b->model.surface, b->param, 1, pool, NULL, &err), &err);
     b->dual = (struct dual_option){&b->averages, (float)option.dual, (float)option.dual};
-    print(b->fabric->name, "precompute_s", processor_s() - start, "s", "lower");
+    print(b->fabric->name, "precompute_s", clock_process_s() - start, "s", "lower");
 }
 
 static struct radiance_input input_of(struct bench *b, const struct scene *scene, bool fast)
@@ -182,7 +175,7 @@ static void flat_configuration(size_t i, struct configuration *c)
 static double flat_means(struct bench *b, bool fast, size_t n_path, struct estimate *e)
 {
     struct error err = {0};
-    double start = processor_s();
+    double start = clock_process_s();
     for (size_t i = 0; i < N_FLAT; i++) {
         struct configuration c;
         flat_configuration(i, &c);
@@ -194,7 +187,7 @@ static double flat_means(struct bench *b, bool fast, size_t n_path, struct estim
                                            .replica = fast};
         check(estimate_run(&q, pool, NULL, e + i, &err), &err);
     }
-    return processor_s() - start;
+    return clock_process_s() - start;
 }
 
 static void bench_flat(struct bench *b)
@@ -236,9 +229,9 @@ static double render(struct bench *b, bool fast, struct image *im)
                                      .n_sample = fast ? option.n_fast_sample : option.n_path_sample,
                                      .seed = 5,
                                      .stream = fast};
-    double start = processor_s();
+    double start = clock_process_s();
     check(render_run(&q, pool, NULL, im, &err), &err);
-    return processor_s() - start;
+    return clock_process_s() - start;
 }
 
 static void write_png(const struct bench *b, const struct image *im, const char *how)

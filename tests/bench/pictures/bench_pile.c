@@ -13,6 +13,7 @@
  *   CLOTH   dark, medium, bright (the fibers of a velvet whose pile is 0.5 mm high), tall (medium, 1.5 mm)
  */
 #include "base/angle.h"
+#include "base/clock.h"
 #include "geometry/phantom/phantom.h"
 #include "renderer/diffusion/diffusion_option.h"
 #include "renderer/dual/dual_option.h"
@@ -23,7 +24,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum { N_VIEW = 27 };
 
@@ -49,13 +49,6 @@ static void check(status s, const struct error *err)
     exit(1);
 }
 
-static double processor_s(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static void view_of(size_t i, struct configuration *c)
 {
     static const double light[3] = {15, 45, 75}, around[3] = {0, 90, 180}, camera[3] = {5, 40, 70};
@@ -74,7 +67,7 @@ static void view_of(size_t i, struct configuration *c)
 static double means_of(const struct radiance_input *input, uint64_t seed, struct estimate e[N_VIEW])
 {
     struct error err = {0};
-    double start = processor_s();
+    double start = clock_process_s();
     for (size_t i = 0; i < N_VIEW; i++) {
         struct configuration c;
         view_of(i, &c);
@@ -82,7 +75,7 @@ static double means_of(const struct radiance_input *input, uint64_t seed, struct
             .input = *input, .configuration = &c, .n_configuration = 1, .n_path = &n_path, .seed = seed + i};
         check(estimate_run(&q, pool, NULL, e + i, &err), &err);
     }
-    return processor_s() - start;
+    return clock_process_s() - start;
 }
 
 static void compare(const char *cloth, const char *method, const struct estimate *path, const struct estimate *other,
@@ -126,10 +119,10 @@ static void bench_diffusion(const struct pile_cloth *k, const struct radiance_in
         const struct diffusion_option option = {&t};
         struct radiance_input in = *input;
         char method[32];
-        double start = processor_s();
+        double start = clock_process_s();
         check(diffusion_tables_make(&q, pool, NULL, &t, &err), &err);
         fprintf(stderr, "%s: tables of %u hits in %.2f s; share %.4f +- %.4f, %.4f, %.4f; distance %.3f mm\n", k->name,
-                n_traced, processor_s() - start, t.share[0][0], t.share_se[0][0], t.share[0][1], t.share[0][2],
+                n_traced, clock_process_s() - start, t.share[0][0], t.share_se[0][0], t.share[0][1], t.share[0][2],
                 sqrt(t.mean_square_mm2[0][1]));
         in.diffusion = &option;
         snprintf(method, sizeof method, "%s%u", product ? "product" : "diffusion", n_traced);

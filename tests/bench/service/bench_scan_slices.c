@@ -19,18 +19,10 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 
 static const double VOXEL_M = 2e-6, DIAMETER_VOXEL = 5.0;
 static const float MATERIAL = 0.3f;
-
-static double processor_s(void)
-{
-    struct rusage u;
-    getrusage(RUSAGE_SELF, &u);
-    return (double)(u.ru_utime.tv_sec + u.ru_stime.tv_sec) + 1e-6 * (double)(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
-}
 
 static void figure(const char *name, double value, const char *unit)
 {
@@ -78,7 +70,7 @@ static status write_slices(const char *folder, const struct volume *v, const str
     struct slice_codes codes;
     struct stat made;
     char path[512];
-    double cpu_s = processor_s(), start_s = clock_monotonic_s(), n_byte = 0.0;
+    double cpu_s = clock_process_s(), start_s = clock_monotonic_s(), n_byte = 0.0;
     status s = slice_codes_make(v, d, SLICE_MOST_VOXEL, pool, NULL, &codes, err);
     for (int axis = 0; axis < 3 && s == STATUS_OK; axis++) {
         snprintf(path, sizeof path, "%s/scan/%c.slices", folder, "xyz"[axis]);
@@ -88,7 +80,7 @@ static status write_slices(const char *folder, const struct volume *v, const str
     slice_codes_release(&codes);
     if (s != STATUS_OK) return s;
     fprintf(stderr, "%zu x %zu x %zu voxels\n", v->n[0], v->n[1], v->n[2]);
-    figure("make_cpu_s", processor_s() - cpu_s, "s");
+    figure("make_cpu_s", clock_process_s() - cpu_s, "s");
     figure("make_s", clock_monotonic_s() - start_s, "s");
     figure("bytes", n_byte, "bytes");
     figure("bytes_per_voxel", n_byte / (double)volume_n_voxel(v->n), "bytes");
@@ -100,10 +92,10 @@ static status write_contrast(const char *folder, const struct volume *v, const s
 {
     char path[512];
     float *contrast = malloc(f->n_vertex * sizeof *contrast);
-    double cpu_s = processor_s();
+    double cpu_s = clock_process_s();
     status s = contrast == NULL ? error_set(err, STATUS_NO_MEMORY, "out of memory")
                                 : scan_grade_contrast(v, f, pool, NULL, contrast, err);
-    if (s == STATUS_OK) figure("contrast_cpu_s", processor_s() - cpu_s, "s");
+    if (s == STATUS_OK) figure("contrast_cpu_s", clock_process_s() - cpu_s, "s");
     snprintf(path, sizeof path, "%s/scan/contrast.u8", folder);
     FILE *file = s == STATUS_OK ? fopen(path, "wb") : NULL;
     for (size_t i = 0; file != NULL && i < f->n_vertex; i++)

@@ -6,7 +6,6 @@
 #include "geometry/volume/volume_align.h"
 
 #include <math.h>
-#include <sys/resource.h>
 
 void phantom_cloth_of_diameter(struct phantom_option *o, enum phantom_weave weave, double diameter_voxel)
 {
@@ -19,32 +18,25 @@ void phantom_cloth_of_diameter(struct phantom_option *o, enum phantom_weave weav
     if (weave == PHANTOM_PLAIN || weave == PHANTOM_VELVET) o->n_yarn[0] = o->n_yarn[1] = 4;
 }
 
-static double processor_s(void)
-{
-    struct rusage u;
-    getrusage(RUSAGE_SELF, &u);
-    return (double)(u.ru_utime.tv_sec + u.ru_stime.tv_sec) + 1e-6 * (double)(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
-}
-
 /* Compares the directions with the truth, outside of the measured time. */
 static status compare(struct phantom_reconstruction *r, const struct direction_volume *d, struct thread_pool *pool,
                       struct direction_compare *result, struct error *err)
 {
-    double start_s = clock_monotonic_s(), start_cpu_s = processor_s();
+    double start_s = clock_monotonic_s(), start_cpu_s = clock_process_s();
     status s = compare_directions(&r->truth, d, pool, result, err);
     r->wall_s -= clock_monotonic_s() - start_s;
-    r->cpu_s -= processor_s() - start_cpu_s;
+    r->cpu_s -= clock_process_s() - start_cpu_s;
     return s;
 }
 
 /* Grades the scan, as a job does before directions are transferred, outside of the measured time. */
 static status grade(struct phantom_reconstruction *r, struct thread_pool *pool, struct error *err)
 {
-    double start_s = clock_monotonic_s(), start_cpu_s = processor_s();
+    double start_s = clock_monotonic_s(), start_cpu_s = clock_process_s();
     status s = scan_grade_measure(&r->v, &r->found, pool, NULL, &r->grade, NULL, err);
     r->report.grade = r->grade;
     r->wall_s -= clock_monotonic_s() - start_s;
-    r->cpu_s -= processor_s() - start_cpu_s;
+    r->cpu_s -= clock_process_s() - start_cpu_s;
     return s;
 }
 
@@ -131,11 +123,11 @@ status phantom_reconstruct_scan(const struct phantom_option *o, const struct pha
         s = thicken(o, &scan, made.n_voxel, r, pool, err);
     else if (s == STATUS_OK)
         s = phantom_scan(&r->truth, made.n_voxel, &scan, pool, NULL, &r->v, err);
-    double start_s = clock_monotonic_s(), start_cpu_s = processor_s();
+    double start_s = clock_monotonic_s(), start_cpu_s = clock_process_s();
     if (s == STATUS_OK && r->slice_voxel > 0.0) s = make_cubes(r, pool, err);
     if (s == STATUS_OK) s = reconstruct(r, pool, err);
     r->wall_s += clock_monotonic_s() - start_s;
-    r->cpu_s += processor_s() - start_cpu_s;
+    r->cpu_s += clock_process_s() - start_cpu_s;
     const struct compare_option c = {.voxel_size_m = o->voxel_size_m};
     if (s == STATUS_OK) s = compare_fibers(&r->truth, &r->found, &c, &r->compare, err);
     thread_pool_free(pool);
