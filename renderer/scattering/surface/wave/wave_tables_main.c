@@ -2,8 +2,13 @@
  * and absorption, and writes them as C source. 40 s of a core for each section.
  *
  * wave-tables FOLDER [SECTION]
- *   FOLDER   where wave_SECTION_table.c is written
- *   SECTION  one of the names of wave_sections.c; all without it
+ * wave-tables FOLDER NAME OUTLINE.csv RADIUS_UM INDEX
+ *   FOLDER     where wave_SECTION_table.c, or wave_NAME_table.c, is written
+ *   SECTION    one of the names of wave_sections.c; all without it
+ *   OUTLINE    a closed polygon, such as one traced in a micrograph: a line "x,y" for each corner, in any unit. Corners
+ *              become as round as a series of OUTLINE_WAVES waves makes them
+ *   RADIUS_UM  of a circle of the section's area
+ *   INDEX      of refraction
  * Prints for each section the time, the size and three errors, each the root mean square over azimuths of a difference,
  * over that of N, for a blur of 5 degrees: what another half of the sizes makes of it (speckle), what lies between the
  * values of C, and how far the light that a fiber meets is from its width, which the tables do not know.
@@ -19,6 +24,7 @@
 
 enum { N_SIZE = 9, N_CLEAR = WAVE_TABLE_N_CLEAR, CHECK = N_CLEAR, N_COLUMN, N_WAVE = WAVE_TABLE_N_WAVE };
 enum { CHECK_STEP = 4 }; /* so many sizes apart, values of C are checked */
+enum { OUTLINE_WAVES = 32 };
 enum { N_TASK = N_SIZE * N_COLUMN * WAVE_N_FIELD, MOST_COLUMN = 118 };
 
 #define CHECK_CLEAR 0.5 /* a value of C between those of the table */
@@ -183,7 +189,8 @@ static void write_table(const struct job *job, const char *folder)
     if (fclose(f) != 0) stop("cannot write to the folder");
 }
 
-static void make(struct thread_pool *pool, const struct wave_section *section, const char *folder)
+static void make(struct thread_pool *pool, const struct wave_section *section, const struct wave_outline *outline,
+                 const char *folder)
 {
     struct job *job = calloc(1, sizeof *job);
     struct error err = {0};
@@ -191,7 +198,7 @@ static void make(struct thread_pool *pool, const struct wave_section *section, c
     double least = INFINITY, most = 0;
     if (job == NULL) stop("out of memory");
     job->section = section;
-    section->outline(&job->outline);
+    job->outline = *outline;
     wave_outline_scale(&job->outline, 1 / sqrt(wave_outline_area(&job->outline) / M_PI));
     if (wave_outline_check(&job->outline, &err) != STATUS_OK) stop(err.text);
     if (thread_pool_run(pool, N_TASK, solve, job, NULL) != STATUS_OK) stop("not all was solved");
@@ -208,18 +215,51 @@ static void make(struct thread_pool *pool, const struct wave_section *section, c
     free(job);
 }
 
+static void make_known(struct thread_pool *pool, const char *folder, const char *name)
+{
+    bool found = false;
+    for (int i = 0; i < WAVE_N_SECTION; i++) {
+        struct wave_outline outline;
+        if (name != NULL && strcmp(name, wave_sections[i].name) != 0) continue;
+        wave_sections[i].outline(&outline);
+        make(pool, &wave_sections[i], &outline, folder);
+        found = true;
+    }
+    if (!found) stop("there is no such section");
+}
+
+static double number(const char *text, double lower, double upper, const char *otherwise)
+{
+    char *end;
+    const double value = strtod(text, &end);
+    if (end == text || *end != '\0' || !(value >= lower && value <= upper)) stop(otherwise);
+    return value;
+}
+
+static void make_outlined(struct thread_pool *pool, char **argument)
+{
+    struct wave_outline outline;
+    struct error err = {0};
+    const char *name = argument[1];
+    if (name[strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789_")] != '\0' || name[0] == '\0' || strlen(name) > 40)
+        stop("NAME has at most 40 small letters, digits and _");
+    const struct wave_section section = {name,
+                                         1e-6 * number(argument[3], 0.5, 20, "RADIUS_UM is a number from 0.5 to 20"),
+                                         number(argument[4], 1.1, 3, "INDEX is a number from 1.1 to 3"), NULL};
+    if (wave_outline_load(&outline, argument[2], OUTLINE_WAVES, &err) != STATUS_OK) stop(err.text);
+    make(pool, &section, &outline, argument[0]);
+}
+
 int main(int argc, char **argv)
 {
     struct thread_pool *pool = NULL;
-    bool found = false;
-    if (argc < 2 || argc > 3) stop("usage: wave-tables FOLDER [SECTION]");
+    if (argc != 2 && argc != 3 && argc != 6)
+        stop("usage: wave-tables FOLDER [SECTION], or wave-tables FOLDER NAME OUTLINE.csv RADIUS_UM INDEX");
     if (thread_pool_new(0, &pool, NULL) != STATUS_OK) stop("out of memory");
-    for (int i = 0; i < WAVE_N_SECTION; i++) {
-        if (argc > 2 && strcmp(argv[2], wave_sections[i].name) != 0) continue;
-        make(pool, &wave_sections[i], argv[1]);
-        found = true;
-    }
+    if (argc == 6)
+        make_outlined(pool, argv + 1);
+    else
+        make_known(pool, argv[1], argc > 2 ? argv[2] : NULL);
     thread_pool_free(pool);
-    if (!found) stop("there is no such section");
     return 0;
 }
