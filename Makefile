@@ -64,7 +64,7 @@ LINK_OPTIMIZER := -lseccomp -lraw_r -ljpeg -lnlopt -ljansson -lsodium -larchive 
 LINK_WAVE := -llapacke # the solver of waves, which no installed program contains
 LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive -lcurl $(LINK_BASE)
 
-.PHONY: all generate medulla-tables wave-tables deps help check test nightly demo demo-camera night cluster-demo clean
+.PHONY: all generate medulla-tables wave-tables speckle-tables deps help check test nightly demo demo-camera night cluster-demo clean
 ##@ Build and run
 all: $(PROGRAMS) $(PLUGINS) ## build the programs into build/bin
 
@@ -177,6 +177,15 @@ $(BUILD)/tools/wave-tables: $(BUILD)/obj/$(WAVE)/wave_tables_main.c.o $(BUILD)/o
 	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_WAVE) $(LINK_BASE)
 wave-tables: $(BUILD)/tools/wave-tables ## make the tables of wave_silk.v1 and its like again (two minutes of a core; a third of it with libopenblas0-serial)
 	@$(BUILD)/tools/wave-tables $(WAVE)
+
+# tables of speckle, checked in as source; made again after a change of a section, of the roughness or of the bands
+SPECKLE := renderer/scattering/speckle
+$(BUILD)/tools/speckle-tables: $(addprefix $(BUILD)/obj/$(SPECKLE)/,speckle_tables_main.c.o speckle_instances.c.o speckle.c.o) \
+		$(BUILD)/obj/$(WAVE)/wave_sections.c.o $(patsubst %,$(BUILD)/obj/%.o,$(wildcard renderer/scattering/wave/*.c)) $(L)base.a
+	@mkdir -p $(@D)
+	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_WAVE) $(LINK_BASE)
+speckle-tables: $(BUILD)/tools/speckle-tables ## make the tables of speckle of wave_silk.v1 and its like again (two minutes of a core)
+	@$(BUILD)/tools/speckle-tables $(SPECKLE)
 
 include config/install.mk
 include tests/tests.mk

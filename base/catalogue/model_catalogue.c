@@ -35,6 +35,13 @@ static const struct model_nesting nesting[] = {
 #include "base/catalogue/models.def"
 };
 
+static const char *const with_speckle[] = {
+#define SURFACE_MODEL(...)
+#define VOLUME_MODEL(...)
+#define MODEL_HAS_SPECKLE(name) surface_##name##_id,
+#include "base/catalogue/models.def"
+};
+
 const struct model_info *model_catalogue_at(size_t i)
 {
     return i < sizeof catalogue / sizeof *catalogue ? &catalogue[i] : NULL;
@@ -45,6 +52,18 @@ const struct model_info *model_catalogue_find(const char *id)
     for (size_t i = 0; i < sizeof catalogue / sizeof *catalogue; i++)
         if (strcmp(catalogue[i].id, id) == 0) return &catalogue[i];
     return NULL;
+}
+
+const char *model_catalogue_with_speckle(size_t i)
+{
+    return i < sizeof with_speckle / sizeof *with_speckle ? with_speckle[i] : NULL;
+}
+
+bool model_catalogue_has_speckle(const char *id)
+{
+    for (size_t i = 0; i < sizeof with_speckle / sizeof *with_speckle; i++)
+        if (strcmp(with_speckle[i], id) == 0) return true;
+    return false;
 }
 
 const struct model_nesting *model_catalogue_nesting(size_t i)

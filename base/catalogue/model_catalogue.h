@@ -8,6 +8,8 @@
 #include "base/angle.h"
 #include "base/catalogue/param_info.h"
 
+#include <stdbool.h>
+
 /* Parameters of one model, parameter sets of one model in a cloth of several groups of fibers, and parameters of all
  * sets together. */
 enum { MODEL_MAX_PARAM = 16, MODEL_MAX_SET = 8, MODEL_MAX_FLAT = 64 };
@@ -40,6 +42,11 @@ struct model_nesting {
 
 /* The i-th, NULL behind the last. */
 const struct model_nesting *model_catalogue_nesting(size_t i);
+/* The id of the i-th model with speckle (renderer/scattering/speckle), NULL behind the last, and whether a model has
+ * it. */
+const char *model_catalogue_with_speckle(size_t i);
+bool model_catalogue_has_speckle(const char *id);
+
 /* The rows as constants, for the implementations of models: a scattering_model or a phase_model begins with
  * SURFACE_MODEL_ROW(name) or VOLUME_MODEL_ROW(name). n_param of a volume model's row does not count the density
  * multiplier, which belongs to the volume and not to the phase function. */

@@ -127,6 +127,7 @@ struct job_surface_picture {
     bool visibility_by_tables;           /* of JOB_PICTURE_FAST */
     bool deep_by_cells;                  /* of JOB_PICTURE_FAST; with visibility_by_tables in any case */
     size_t n_deep_path;                  /* that make the table in place of the cells */
+    bool speckle;                        /* of single fibers (renderer/scattering/speckle) */
     double ground_gap_mm, ground_albedo; /* of a plane under the cloth; gap NaN: none */
 };
 

@@ -25,6 +25,7 @@ enum {
 /* A model with its parameters fixed and its tables made (G, d ln G / d beta, normalisers). Immutable: shared by
  * threads. */
 struct scattering_state;
+struct speckle_table;
 
 struct scattering_model {
     const char *id, *title; /* these four: SURFACE_MODEL_ROW of the catalogue */
@@ -44,6 +45,9 @@ struct scattering_model {
     /* Whether the light depends on where across its width the fiber is seen: then v of the fiber frame must be the
      * normal of the surface at the hit, and the offset from the axis, in radii, is the sine of the azimuth of wo. */
     bool near_field;
+
+    /* What the speckle of pictures is made from (speckle/speckle.h); NULL: the model has none. */
+    const struct speckle_table *speckle;
 
     /* STATUS_INVALID, field = parameter name, for a value that is NaN or outside [lower, upper]. */
     status (*prepare)(const double *param, struct scattering_state **state, struct error *err);

@@ -66,6 +66,7 @@ struct cli_args {
     bool watch, json, follow, draft, align, once, yes;
     bool reference; /* --reference: of a picture */
     bool filter;    /* --filter: of a picture */
+    bool speckle;   /* --speckle: likewise */
     const char *ground_gap_mm;
     const char *lamp_sharpness;
     bool help; /* --help was given: for one command if has_command is set */

@@ -112,6 +112,23 @@ status job_check_export(const struct option_value *v, struct error *err)
                            "'%s' needs a fitted model: give 'photographs' or 'measurements'", v->path);
 }
 
+/* Speckle is of path-traced pictures of models that have it, whichever of the job's models will be the best. */
+static status check_speckle(const struct job_document *doc, size_t i, struct error *err)
+{
+    const struct job_surface_picture *p = &doc->surface_picture[i];
+    char field[64];
+    if (!p->speckle) return STATUS_OK;
+    snprintf(field, sizeof field, "pictures[%zu].speckle", i);
+    if (p->method != JOB_PICTURE_PATH)
+        return error_set_field(err, STATUS_INVALID, field, "'%s' is true, but 'method' is not \"path\"", field);
+    for (size_t k = 0; k < doc->n_model; k++)
+        if (!model_catalogue_has_speckle(doc->model[k].id))
+            return error_set_field(err, STATUS_INVALID, field,
+                                   "'%s' is true, but model '%s' has no speckle: models of waves have, such as '%s'",
+                                   field, doc->model[k].id, model_catalogue_with_speckle(0));
+    return STATUS_OK;
+}
+
 static status check_picture(const struct job_document *doc, size_t i, struct error *err)
 {
     const struct job_surface_picture *p = &doc->surface_picture[i];
@@ -161,7 +178,7 @@ static status check_picture(const struct job_document *doc, size_t i, struct err
         return error_set_field(err, STATUS_INVALID, field,
                                "'%s' is %g: the ball under a draped piece of %g mm may have a radius of %g to %g mm",
                                field, p->radius_mm, p->size_mm, 0.02 * p->size_mm, 10.0 * p->size_mm);
-    return STATUS_OK;
+    return check_speckle(doc, i, err);
 }
 
 status job_check_pictures(const struct option_value *v, struct error *err)

@@ -145,6 +145,14 @@ const struct job_option option_rows_pictures[] = {
      .meaning =
          "Of `deep_light` `directions`: paths that make its table, in 10 to 20 microseconds of a processor each. "
          "The largest number of all pictures counts."},
+    {.path = "pictures[].speckle",
+     .kind = OPTION_BOOL,
+     OF_PICTURE(speckle),
+     .standard = "false",
+     .meaning =
+         "Whether each fiber has a random pattern of bright and dark directions of its own, as light has from rough "
+         "fibers. It has the mean 1 and the seed `fit.seed`, and is for pictures alone: fits have none. Needs "
+         "method `path` and models with it: those of waves, `wave_silk.v1` and its like (docs/bent-cloth.md)."},
     {.path = "pictures[].reference",
      .kind = OPTION_BOOL,
      OF_PICTURE(reference),

@@ -11,8 +11,7 @@ enum { N = WAVE_MEAN_N_ANGLE, N_TURN = WAVE_MEAN_N_TURN, PER_TURN = N / N_TURN }
 /* sin(x) / x. */
 static double sinc(double x) { return fabs(x) < 1e-4 ? 1 - x * x / 6 : sin(x) / x; }
 
-/* T_s at the angle d for a shadow of this range across the direction of travel. */
-static double complex shadow_amplitude(double k, const double range[2], double d)
+double complex wave_shadow_amplitude(double k, const double range[2], double d)
 {
     const double width = range[1] - range[0], middle = 0.5 * (range[0] + range[1]), q = k * sin(d);
     const double part = d * cbrt(0.5 * k * width) / PENUMBRA;
@@ -28,7 +27,7 @@ static void add_amplitudes(const struct wave_solver *s, double k, double (*range
         for (size_t w = 0; w < N_TURN; w++) {
             const size_t i = (j + N - w * PER_TURN) % N;
             const double complex left =
-                t[w] - shadow_amplitude(k, range[w], remainder(2 * M_PI * (double)i / N, 2 * M_PI));
+                t[w] - wave_shadow_amplitude(k, range[w], remainder(2 * M_PI * (double)i / N, 2 * M_PI));
             power[i] += creal(left) * creal(left) + cimag(left) * cimag(left);
         }
     }

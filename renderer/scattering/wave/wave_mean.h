@@ -34,6 +34,10 @@ struct wave_mean {
     double extinction;                 /* over the same: about 2 */
 };
 
+/* T_s at the angle d from straight on, |d| <= pi, for a shadow of this range across the direction of travel
+ * (wave_outline_extent). */
+double complex wave_shadow_amplitude(double k, const double range[2], double d);
+
 /* Each orientation has the weight of the width that it shows. Errors of wave_solver.h; STATUS_INVALID with the field
  * "k" when there are too few angles for so short a wave. */
 status wave_mean_over_turns(const struct wave_problem *problem, struct wave_mean *mean, struct error *err);

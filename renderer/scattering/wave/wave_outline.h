@@ -7,6 +7,7 @@
 #ifndef SELVEDGE_RENDERER_WAVE_OUTLINE_H
 #define SELVEDGE_RENDERER_WAVE_OUTLINE_H
 
+#include "base/rng.h"
 #include "base/status.h"
 
 #include <complex.h>
@@ -34,6 +35,12 @@ status wave_outline_from_points(struct wave_outline *o, const double *xy, size_t
 /* Such a polygon from a file of lines "x,y"; empty lines and lines that begin with # are skipped. STATUS_NOT_FOUND,
  * STATUS_IO, STATUS_INVALID with the line. */
 status wave_outline_load(struct wave_outline *o, const char *path, int n_wave, struct error *err);
+
+/* A rough surface: moves the outline along its normal by a random height with a normal distribution, the standard
+ * deviation height_sd, and the correlation exp(-(distance / length)^2) along the outline; the root mean square of its
+ * slope is sqrt(2) height_sd / length. The series then has WAVE_OUTLINE_MAX waves; the roughness has those that a turn
+ * of so many resolves. */
+void wave_outline_roughen(struct wave_outline *o, double height_sd, double length, struct rng *rng);
 
 void wave_outline_scale(struct wave_outline *o, double factor);
 

@@ -1,4 +1,4 @@
-#include "renderer/transport/surface/path_discrepancy.h"
+#include "renderer/transport/surface/path_factor.h"
 
 #include "renderer/transport/path_value.h"
 
@@ -66,7 +66,7 @@ static float connect_lamp(struct walk *w, const struct lamp *lamp, float weight,
     struct scene_ray shadow;
     leave(w, b, direction, &shadow);
     if (scene_occluded(s->scene, &shadow)) return 0;
-    path_discrepancy_apply(w, b->normal, direction, value);
+    path_factor_apply(w, b, direction, value);
     add_light(w, value, w->score);
     return light;
 }
@@ -102,7 +102,7 @@ static void connect_image(struct walk *w, const struct bounce *b)
     struct scene_ray shadow;
     leave(w, b, direction, &shadow);
     if (scene_occluded(s->scene, &shadow)) return;
-    path_discrepancy_apply(w, b->normal, direction, value);
+    path_factor_apply(w, b, direction, value);
     add_light_to_all(w, value, w->score);
     if (w->step != NULL) {
         memcpy(w->step->image_wi, wi, sizeof wi);
@@ -127,7 +127,7 @@ static void add_beyond(struct walk *w, const struct scene_ray *ray, float pdf)
             value[c] = w->throughput[c] * beyond[c];
         }
         w->out = w->first_out + i;
-        path_discrepancy_apply(w, w->normal, ray->direction, value);
+        path_factor_apply(w, NULL, ray->direction, value);
         if (value[0] + value[1] + value[2] > 0) add_light(w, value, NULL);
         if (w->step != NULL) memcpy(w->step->escape, beyond, sizeof beyond);
     }
@@ -146,10 +146,11 @@ static void bounce_at(struct walk *w, const struct scene_hit *hit, const struct 
 {
     const float back[3] = {-ray->direction[0], -ray->direction[1], -ray->direction[2]};
     b->hit = *hit;
+    b->has_speckle = false;
     memcpy(b->offset_mm, ray->offset_mm, sizeof b->offset_mm);
     const bool flat = w->s->model->flat_section;
     float section[3];
-    const bool bent = (flat || w->s->discrepancy != NULL) && scene_bent_normal(w->s->scene, hit, b->normal);
+    const bool bent = (flat || path_factor_wanted(w->s)) && scene_bent_normal(w->s->scene, hit, b->normal);
     if (w->s->model->near_field)
         fiber_frame_flat_in(&b->frame, hit->tangent, hit->normal);
     else if (!flat)
@@ -167,8 +168,7 @@ static void bounce_at(struct walk *w, const struct scene_hit *hit, const struct 
     w->state = w->s->state[w->i_set];
 }
 
-/* The part of a guided path beyond the present bounce. The walk carries the throughput and scores of the guided path
- * while it is traced. */
+/* The part of a guided path beyond the present bounce. The walk carries its throughput and scores meanwhile. */
 static void follow_guided_path(struct walk *w, size_t i_lamp, const struct bounce *from, const float direction[3],
                                float weight)
 {
@@ -364,7 +364,7 @@ static void walk_on(struct walk *w, struct scene_ray *ray, struct path_record *r
         w->first_out->n_bounce++;
         w->step = next_step(record);
         bounce_at(w, &hit, ray, &b);
-        if (s->discrepancy != NULL) path_discrepancy_note(w, &b, ray);
+        if (path_factor_wanted(s)) path_factor_note(w, &b, ray);
         if (w->step != NULL) {
             memcpy(w->step->wo, b.wo, sizeof b.wo);
             w->step->i_group = scene_group_of(s->scene, hit.i_segment);

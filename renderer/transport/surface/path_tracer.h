@@ -9,6 +9,7 @@
 
 #include "base/rng.h"
 #include "renderer/scattering/scattering.h"
+#include "renderer/scattering/speckle/speckle.h"
 #include "renderer/scene/scene_ray.h"
 #include "renderer/transport/discrepancy.h"
 #include "renderer/transport/light/light_guide.h"
@@ -42,6 +43,9 @@ struct path_setting {
     /* Factor on the light that leaves the cloth towards the camera; NULL: 1. Not for recorded paths, nor for what
      * finish adds. */
     const struct discrepancy *discrepancy;
+    /* With a table: a random factor of each fiber on light that it alone scatters from the lights to the camera. Not
+     * for recorded paths, nor for what finish adds. */
+    struct speckle speckle;
     bool want_jacobian;
 };
 

@@ -17,8 +17,9 @@ struct bounce {
     struct scene_hit hit;
     double offset_mm[2]; /* of the ray that hit, in whole tiles */
     struct fiber_frame frame;
-    float wo[3];     /* towards where the path comes from, in the fiber frame */
-    float normal[3]; /* of the cloth; only with a discrepancy */
+    float wo[3];      /* towards where the path comes from, in the fiber frame */
+    float normal[3];  /* of the cloth; only with a discrepancy or speckle */
+    bool has_speckle; /* this is the first bounce of a walk with speckle */
 };
 
 /* The state that a path carries. */
@@ -34,9 +35,12 @@ struct walk {
     const struct scattering_state *state; /* of the fiber that was hit */
     size_t i_set;                         /* its parameter set */
     bool last;                            /* the present bounce is the n_traced-th */
-    float to_camera[3], cos_camera; /* direction to the camera from the first bounce, and its cosine to the cloth's
-                                       normal there; only with a discrepancy, after the first bounce */
-    float normal[3];                /* of the cloth at the present bounce; likewise */
+    float to_camera[3], cos_camera;   /* direction to the camera from the first bounce, and its cosine to the cloth's
+                                       normal there; only with a factor (path_factor.h), after the first bounce */
+    struct fiber_frame speckle_frame; /* of the first bounce, the direction to the camera in it, and its fiber; only */
+    float speckle_wo[3];              /* with speckle, after the first bounce */
+    uint32_t i_fiber;
+    float normal[3]; /* of the cloth at the present bounce; likewise */
     float throughput[3];
     float towards[PATH_MAX_LAMP][3]; /* directions from the present bounce to the lamps, which guide its guided paths */
     float p_guided;                  /* probability of a guided path there */

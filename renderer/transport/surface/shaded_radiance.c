@@ -30,6 +30,8 @@ static status check(const struct shaded_method *m, const struct radiance_input *
     if (in->discrepancy != NULL)
         return error_set(err, STATUS_INVALID, "cannot render by %s with a discrepancy: path tracing alone has it",
                          m->name);
+    if (in->has_speckle)
+        return error_set(err, STATUS_INVALID, "cannot render by %s with speckle: path tracing alone has it", m->name);
     if (scattering_frame_reason(in->model->surface) != NULL)
         return error_set_field(err, STATUS_INVALID, "model", "cannot render model '%s' by %s: %s", in->model->id,
                                m->name, scattering_frame_reason(in->model->surface));

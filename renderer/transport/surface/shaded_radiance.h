@@ -11,8 +11,8 @@
 struct shaded_method {
     const char *name; /* as in "cannot render by <name>" */
     size_t setting_bytes;
-    /* What the method asks of the input besides a scattering model without a frame of its own, no derivatives and no
-     * discrepancy. */
+    /* What the method asks of the input besides a scattering model without a frame of its own, no derivatives, no
+     * discrepancy and no speckle. */
     status (*check)(const struct radiance_input *in, struct error *err);
     /* Fills in the rest of a setting, which is all 0 after its path_setting. STATUS_NO_MEMORY. */
     status (*init)(void *setting, const struct radiance_input *in, struct error *err);

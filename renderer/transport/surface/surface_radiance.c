@@ -9,6 +9,7 @@
 struct surface_state {
     const struct scene *scene;
     struct parameter_sets sets;
+    struct speckle_numbers numbers; /* only with speckle */
     size_t n_jac;
     struct path_setting *setting; /* per configuration */
     struct camera *camera;        /* per configuration */
@@ -27,6 +28,12 @@ static status prepare(const struct radiance_input *in, const struct configuratio
                       void **state, struct error *err)
 {
     const struct scattering_model *m = in->model->surface;
+    if (in->has_speckle && m->speckle == NULL)
+        return error_set_field(err, STATUS_INVALID, "model", "cannot render model '%s' with speckle: it has none",
+                               m->id);
+    if (in->has_speckle && in->want_derivative)
+        return error_set(err, STATUS_INVALID,
+                         "cannot trace with speckle and derivatives: speckle is of pictures alone");
     struct surface_state *s = calloc(1, sizeof *s);
     if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot trace fibers: out of memory");
     s->scene = in->scene.fibers;
@@ -39,11 +46,13 @@ static status prepare(const struct radiance_input *in, const struct configuratio
         release(s);
         return st;
     }
+    if (in->has_speckle) speckle_numbers_init(&s->numbers);
     s->n_jac = in->want_derivative ? 3 * s->sets.n * m->n_param : 0;
     for (size_t i = 0; i < n_configuration; i++) {
         path_setting_init_sets(&s->setting[i], s->scene, &s->sets, &c[i], in->want_derivative);
         if (in->plain_paths) s->setting[i].guided_paths = false;
         s->setting[i].discrepancy = in->discrepancy;
+        if (in->has_speckle) s->setting[i].speckle = (struct speckle){m->speckle, &s->numbers, in->speckle_seed};
         camera_init(&s->camera[i], &c[i]);
     }
     *state = s;

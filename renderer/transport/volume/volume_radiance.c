@@ -32,6 +32,9 @@ static status check_input(const struct radiance_input *in, struct error *err)
         return error_set_field(err, STATUS_INVALID, "n_set",
                                "cannot use %zu parameter sets of model '%s': volumes have no material groups",
                                in->n_set, m->id);
+    if (in->has_speckle)
+        return error_set_field(err, STATUS_INVALID, "model", "cannot render model '%s' with speckle: it has none",
+                               m->id);
     if (in->want_derivative && in->scene.volume->bent != NULL)
         return error_set(err, STATUS_INVALID, "a bent volume is traced without derivatives");
     if (d > 0 && d <= 1e9) return STATUS_OK;

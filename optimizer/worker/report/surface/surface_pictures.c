@@ -172,6 +172,7 @@ static status write_entry(struct pipeline_context *c, const struct one_picture *
     }
     surface_passes_release(&shown);
     if (s != STATUS_OK) return s;
+    if (p->speckle) json_object_set_new(*out, "speckle", json_true());
     if (one->ground->present) json_object_set_new(*out, "ground_z_mm", json_number(one->ground->z_mm));
     if (filtered != NULL) json_object_set_new(*out, "filtered", filtered);
     return write_json(c, one->entry_path, *out, err);
@@ -242,7 +243,9 @@ static status render(struct pipeline_context *c, const struct one_picture *one, 
                   .model = &model->appearance,
                   .param = model->fit.param,
                   .n_set = model->sets.n_set,
-                  .discrepancy = traced ? pipeline_discrepancy(model) : NULL},
+                  .discrepancy = traced ? pipeline_discrepancy(model) : NULL,
+                  .has_speckle = p->speckle,
+                  .speckle_seed = c->doc->seed},
         .configuration = &view,
         .width = p->px,
         .height = p->px,

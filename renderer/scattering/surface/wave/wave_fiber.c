@@ -6,6 +6,7 @@
  */
 #include "renderer/scattering/surface/wave/wave_fiber.h"
 #include "renderer/scattering/scattering_state.h"
+#include "renderer/scattering/speckle/speckle_tables.h"
 #include "renderer/scattering/surface/azimuth_table.h"
 
 #include <stdlib.h>
@@ -141,7 +142,7 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
     fiber_direction_beyond(&out, sinf(theta), fmaxf(cosf(theta), 0), cosf(phi), sinf(phi), wi);
 }
 
-#define WAVE_MODEL(name)                                                                                               \
+#define WAVE_MODEL(name, speckle_table)                                                                                \
     static status fill_##name(struct scattering_state *s, const double *param, struct thread_pool *pool,               \
                               struct error *err)                                                                       \
     {                                                                                                                  \
@@ -153,12 +154,16 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
         return scattering_state_new(&scattering_##name, param, fill_##name, sizeof **state, NULL, state, err);         \
     }                                                                                                                  \
     const struct scattering_model scattering_##name = {                                                                \
-        SURFACE_MODEL_ROW(name), .prepare = prepare_##name,                                                            \
-        .release = release,      .eval = eval,                                                                         \
-        .sample = sample,        .pdf = pdf,                                                                           \
+        SURFACE_MODEL_ROW(name),                                                                                       \
+        .prepare = prepare_##name,                                                                                     \
+        .speckle = speckle_table,                                                                                      \
+        .release = release,                                                                                            \
+        .eval = eval,                                                                                                  \
+        .sample = sample,                                                                                              \
+        .pdf = pdf,                                                                                                    \
         .eval_pdf = eval_pdf,                                                                                          \
     };
 
-WAVE_MODEL(wave_silk)
-WAVE_MODEL(wave_trilobal)
-WAVE_MODEL(wave_cotton)
+WAVE_MODEL(wave_silk, &wave_silk_speckle)
+WAVE_MODEL(wave_trilobal, &wave_trilobal_speckle)
+WAVE_MODEL(wave_cotton, &wave_cotton_speckle)
