@@ -8,8 +8,8 @@
  *       was equally busy.
  *   models.<id>.furnace_in_error, .furnace_out_error
  *       Largest part of the light that a fiber loses or gains, over 0, 20, 40, 60 and 80 degrees: light that comes from
- *       one direction and leaves to all (in), and comes from all and leaves to one (out; by the widths of sections whose
- *       width the model states). Colors at their upper bounds, everything else at its start.
+ *       one direction and leaves to all (in), and comes from all and leaves to one (out; by the widths of sections
+ *       whose width the model states). Colors at their upper bounds, everything else at its start.
  *   models.<id>.table_bytes, .table_build_s
  *       Memory of a prepared model, and processor time to prepare it.
  *
