@@ -4,7 +4,7 @@ import sys
 import pytest
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support", "python"))
-from daemon_under_test import Daemon  # noqa: E402
+from daemon_fixtures import made_daemons  # noqa: E402
 from slurm_cluster import SlurmCluster, missing  # noqa: E402
 
 
@@ -21,13 +21,6 @@ def cluster(tmp_path_factory):
 @pytest.fixture
 def daemon_maker(tmp_path, cluster):
     """Makes daemons whose jobs run on the cluster, and stops those that still run at the end of the test."""
-    made = []
-
-    def make(name="data", options=None, **more):
-        made.append(Daemon(tmp_path / name, options=cluster.options(**(options or {})), environment=cluster.environment, **more))
-        return made[-1].start()
-
-    yield make
-    for d in made:
-        d.stop()
+    with made_daemons(tmp_path, environment=cluster.environment) as make:
+        yield lambda name="data", options=None, **more: make(name, options=cluster.options(**(options or {})), **more)
     cluster.run("scancel", "--me", check=False)
