@@ -332,7 +332,7 @@ def main():
     parser.add_argument("--plain-prior", type=float, default=1, help="fit.plain_prior of the tables' jobs")
     parser.add_argument("--discrepancy", action=argparse.BooleanOptionalAction, default=True, help="fit.discrepancy of the tables' jobs")
     parser.add_argument("--recovery-budget", type=int, default=72000000, help="most paths of a recovery")
-    parser.add_argument("--recovery-precision", type=float, default=0.5, help="fit.precision of the recoveries, which ends them")
+    parser.add_argument("--recovery-precision", type=float, default=1, help="fit.precision of the recoveries, which ends them")
     parser.add_argument("--recovery-model", default="textile.v3", help="model of the recoveries")
     parser.add_argument("what", nargs="*", help="tables or recoveries")
     arguments = parser.parse_args()
