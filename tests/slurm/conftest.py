@@ -4,7 +4,7 @@ import sys
 import pytest
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support", "python"))
-from daemon_fixtures import made_daemons  # noqa: E402
+from servers.daemon_fixtures import made_daemons  # noqa: E402
 from slurm_cluster import SlurmCluster, missing  # noqa: E402
 
 
