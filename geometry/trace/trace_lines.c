@@ -20,8 +20,10 @@ enum {
 };
 
 /* Lines are repaired once more while more than this share of their ends lies in the middle of material, and the last
- * round has joined more than that share of the lines (geometry/NOTES.md, "Rounds of fitting, cutting and joining"). */
+ * round has joined more than that share of the lines. Where too many are lost, lines are so wrong that rounds lose
+ * length, but not in interpolated voxels (geometry/NOTES.md, "Rounds of fitting, cutting and joining"). */
 #define LOST_SHARE 0.03
+#define MOST_LOST_SHARE 0.4
 #define JOINED_SHARE 0.02
 /* Turn of a kink relative to the usual turn. Less cuts fibers of plain weaves into pieces; more keeps jumps between
  * fibers. */
@@ -198,9 +200,10 @@ static status settle_once(struct trace_job *job, struct polyline_set *lines, int
  * and so are flat fibers: fitted as discs, they would get second lines at their sides. */
 static bool has_lost_ends(const struct trace_job *job, const struct polyline_set *lines)
 {
-    const size_t n_lost = polylines_count_lost_ends(lines, job->v, job->o->eps_d, 0.5 * job->diameter);
+    const double n_lost = (double)polylines_count_lost_ends(lines, job->v, job->o->eps_d, 0.5 * job->diameter);
+    const double share = n_lost / (2.0 * (double)lines->n_line + 1.0);
     const bool fits = !job->flat && job->report->radius_spread <= TRACE_MOST_SPREAD;
-    return fits && (double)n_lost > LOST_SHARE * 2.0 * (double)lines->n_line;
+    return fits && share > LOST_SHARE && (share < MOST_LOST_SHARE || job->independent < 1.0);
 }
 
 status trace_finish(struct trace_job *job, struct polyline_set *lines, struct error *err)
