@@ -184,7 +184,7 @@ $(BUILD)/tools/speckle-tables: $(addprefix $(BUILD)/obj/$(SPECKLE)/,speckle_tabl
 		$(BUILD)/obj/$(WAVE)/wave_sections.c.o $(patsubst %,$(BUILD)/obj/%.o,$(wildcard renderer/scattering/wave/*.c)) $(L)base.a
 	@mkdir -p $(@D)
 	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_WAVE) $(LINK_BASE)
-speckle-tables: $(BUILD)/tools/speckle-tables ## make the tables of speckle of wave_silk.v1 and its like again (two minutes of a core)
+speckle-tables: $(BUILD)/tools/speckle-tables ## make the tables of speckle of wave_silk.v1 and its like again (three minutes of a core)
 	@$(BUILD)/tools/speckle-tables $(SPECKLE)
 
 include config/install.mk

@@ -96,7 +96,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "speckle_pictures FILE.png [samples]\n");
         return 2;
     }
-    const size_t n_sample = argc > 2 ? strtoul(argv[2], NULL, 10) : 64;
+    const size_t n_sample = argc > 2 ? strtoul(argv[2], NULL, 10) : 24;
     status st = thread_pool_new(0, &pool, &err);
     if (st == STATUS_OK) st = make_cloth(pool, &scene, &err);
     if (st == STATUS_OK) st = draw(pool, scene, n_sample, argv[1], &err);
