@@ -47,3 +47,12 @@ void estimate_fixture_run(const struct estimate_request *q, size_t n_thread, str
     if (estimate_run(q, pool, NULL, e, &err) != STATUS_OK) fail_msg("%s", err.text);
     thread_pool_free(pool);
 }
+
+void render_fixture_run(const struct render_request *q, size_t n_thread, struct image *im)
+{
+    struct thread_pool *pool = NULL;
+    struct error err = {0};
+    assert_int_equal(thread_pool_new(n_thread, &pool, &err), STATUS_OK);
+    if (render_run(q, pool, NULL, im, &err) != STATUS_OK) fail_msg("%s", err.text);
+    thread_pool_free(pool);
+}

@@ -1,8 +1,10 @@
-/* A small weave, its configurations and estimates of them, for tests of estimate_run. Failures fail the test. */
+/* A small weave, its configurations and estimates of them, for tests of estimate_run, and runs of render_run. Failures
+ * fail the test. */
 #ifndef SELVEDGE_TESTS_ESTIMATE_FIXTURE_H
 #define SELVEDGE_TESTS_ESTIMATE_FIXTURE_H
 
 #include "renderer/transport/estimate/estimate.h"
+#include "renderer/transport/render.h"
 
 #include <stdint.h>
 
@@ -20,5 +22,6 @@ void estimate_fixture_release(struct estimate_fixture *x);
 struct estimate_request estimate_fixture_request(struct estimate_fixture *x, const size_t *n_path,
                                                  size_t n_configuration);
 void estimate_fixture_run(const struct estimate_request *q, size_t n_thread, struct estimate *e);
+void render_fixture_run(const struct render_request *q, size_t n_thread, struct image *im);
 
 #endif

@@ -2,6 +2,7 @@
 #include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/render.h"
 #include "tests/support/cloth/hand_weave.h"
+#include "tests/support/tracer/estimate_fixture.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/trace_input.h"
 
@@ -37,15 +38,6 @@ static struct scene *small_cloth(bool black_sheet)
     return scene;
 }
 
-static void render(const struct render_request *q, size_t n_thread, struct image *im)
-{
-    struct thread_pool *pool = NULL;
-    struct error err = {0};
-    assert_int_equal(thread_pool_new(n_thread, &pool, &err), STATUS_OK);
-    if (render_run(q, pool, NULL, im, &err) != STATUS_OK) fail_msg("%s", err.text);
-    thread_pool_free(pool);
-}
-
 static struct render_request request(const struct scene *scene, const struct configuration *c)
 {
     struct render_request q = {.input = trace_input_surface(scene, scattering_find("two_lobe.v1"), start, &model),
@@ -64,8 +56,8 @@ static void layers_and_threads(void **state)
     struct scene *scene = small_cloth(true);
     struct render_request q = request(scene, &configuration[1]);
     struct image one, two;
-    render(&q, 1, &one);
-    render(&q, 2, &two);
+    render_fixture_run(&q, 1, &one);
+    render_fixture_run(&q, 2, &two);
     assert_int_equal(one.n_channel, 6 + 27);
     assert_memory_equal(one.pixel, two.pixel, one.width * one.height * one.n_channel * sizeof(float));
     assert_string_equal(one.channel_name[2], "B");
@@ -95,7 +87,7 @@ static void agrees_with_estimate(void **state)
         struct estimate e;
         struct error err = {0};
         q.n_sample = 100;
-        render(&q, 2, &im);
+        render_fixture_run(&q, 2, &im);
         struct estimate_request r = {
             .input = q.input, .configuration = &configuration[k], .n_configuration = 1, .n_path = n_path, .seed = 6};
         if (estimate_run(&r, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
@@ -120,9 +112,9 @@ static void variance_is_that_of_the_mean(void **state)
     struct image one, two;
     double square = 0, var = 0;
     q.n_sample = 40;
-    render(&q, 2, &one);
+    render_fixture_run(&q, 2, &one);
     q.seed++;
-    render(&q, 2, &two);
+    render_fixture_run(&q, 2, &two);
     for (size_t i = 0; i < one.width * one.height; i++)
         for (size_t k = i * one.n_channel; k < i * one.n_channel + 3; k++) {
             square += pow((double)one.pixel[k] - (double)two.pixel[k], 2);

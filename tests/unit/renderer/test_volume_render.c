@@ -4,6 +4,7 @@
 #include "renderer/transport/render.h"
 #include "tests/support/scan/hand_volume.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/tracer/estimate_fixture.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/trace_input.h"
 
@@ -56,21 +57,12 @@ static struct render_request request(const struct configuration *c)
     return q;
 }
 
-static void render(const struct render_request *q, size_t n_thread, struct image *im)
-{
-    struct thread_pool *pool = NULL;
-    struct error err = {0};
-    assert_int_equal(thread_pool_new(n_thread, &pool, &err), STATUS_OK);
-    if (render_run(q, pool, NULL, im, &err) != STATUS_OK) fail_msg("%s", err.text);
-    thread_pool_free(pool);
-}
-
 static void layers_and_threads(void **state)
 {
     (void)state;
     struct render_request q = request(&configuration[1]);
     struct image im[3];
-    for (size_t i = 0; i < 3; i++) render(&q, i + 1, &im[i]);
+    for (size_t i = 0; i < 3; i++) render_fixture_run(&q, i + 1, &im[i]);
     assert_int_equal(im[0].n_channel, 6 + 39);
     for (size_t i = 1; i < 3; i++)
         assert_memory_equal(im[0].pixel, im[i].pixel, 24 * 20 * im[0].n_channel * sizeof(float));
@@ -94,7 +86,7 @@ static void agrees_with_estimate(void **state)
         struct estimate e;
         struct error err = {0};
         q.n_sample = N_PATH / (24 * 20);
-        render(&q, 2, &im);
+        render_fixture_run(&q, 2, &im);
         struct estimate_request r = {
             .input = q.input, .configuration = &configuration[k], .n_configuration = 1, .n_path = n_path, .seed = 6};
         if (estimate_run(&r, NULL, NULL, &e, &err) != STATUS_OK) fail_msg("%s", err.text);
@@ -124,7 +116,7 @@ static void files(void **state)
     struct image im, back;
     struct error err = {0};
     const char *exr = scratch_path(state, "v.exr"), *png = scratch_path(state, "v.png");
-    render(&q, 1, &im);
+    render_fixture_run(&q, 1, &im);
     if (image_write_exr(&im, exr, &err) != STATUS_OK) fail_msg("%s", err.text);
     if (image_write_png(&im, 2, png, &err) != STATUS_OK) fail_msg("%s", err.text);
     if (image_read_exr(&back, exr, 1000, &err) != STATUS_OK) fail_msg("%s", err.text);

@@ -4,6 +4,7 @@
 #include "renderer/transport/render.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
+#include "tests/support/tracer/estimate_fixture.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/trace_input.h"
 
@@ -52,15 +53,6 @@ static struct render_request request(const struct configuration *c)
                                    .seed = 5};
 }
 
-static void render(const struct render_request *q, size_t n_thread, struct image *im)
-{
-    struct thread_pool *pool = NULL;
-    struct error err = {0};
-    assert_int_equal(thread_pool_new(n_thread, &pool, &err), STATUS_OK);
-    if (render_run(q, pool, NULL, im, &err) != STATUS_OK) fail_msg("%s", err.text);
-    thread_pool_free(pool);
-}
-
 static double mean_of(const struct image *im, size_t channel)
 {
     double sum = 0;
@@ -83,11 +75,11 @@ static void the_mean_stays(void **state)
         struct render_request q = request(&c);
         struct image plain, with;
         struct sample_mean off[3] = {0};
-        render(&q, 1, &plain);
+        render_fixture_run(&q, 1, &plain);
         for (uint64_t seed = 0; seed < N_SEED; seed++) {
             q.input.has_speckle = true;
             q.input.speckle_seed = seed;
-            render(&q, 1, &with);
+            render_fixture_run(&q, 1, &with);
             for (size_t k = 0; k < 3; k++) sample_mean_add(&off[k], mean_of(&with, k) / mean_of(&plain, k) - 1);
             image_release(&with);
         }
@@ -106,15 +98,15 @@ static void a_seed_makes_the_same_picture(void **state)
     struct render_request q = request(&configuration[2]);
     struct image plain, one, two, other, without;
     const size_t n_byte = PX * PX * 6 * sizeof(float);
-    render(&q, 1, &plain);
+    render_fixture_run(&q, 1, &plain);
     q.input.has_speckle = true;
     q.input.speckle_seed = 4;
-    render(&q, 1, &one);
-    render(&q, 2, &two);
+    render_fixture_run(&q, 1, &one);
+    render_fixture_run(&q, 2, &two);
     q.input.speckle_seed = 5;
-    render(&q, 1, &other);
+    render_fixture_run(&q, 1, &other);
     q.input.has_speckle = false;
-    render(&q, 1, &without);
+    render_fixture_run(&q, 1, &without);
     assert_memory_equal(one.pixel, two.pixel, n_byte);
     assert_memory_equal(plain.pixel, without.pixel, n_byte);
     assert_true(memcmp(one.pixel, other.pixel, n_byte) != 0 && memcmp(one.pixel, plain.pixel, n_byte) != 0);
@@ -129,9 +121,9 @@ static void the_picture_has_more_contrast(void **state)
     struct image plain, with;
     double spread[2] = {0}, mean = 0;
     q.n_sample = 64;
-    render(&q, 2, &plain);
+    render_fixture_run(&q, 2, &plain);
     q.input.has_speckle = true;
-    render(&q, 2, &with);
+    render_fixture_run(&q, 2, &with);
     mean = mean_of(&plain, 1);
     for (size_t i = 0; i < PX * PX; i++) {
         spread[0] += pow((double)plain.pixel[i * plain.n_channel + 1] - mean, 2);
