@@ -13,7 +13,7 @@
 
 /* Largest n of small_eigen, small_clip_eigenvalues and small_invert, and largest band of small_invert_banded, which
  * keep copies on the stack. */
-enum { SMALL_MATRIX_MAX = 64, SMALL_BAND_MAX = 8 };
+enum { SMALL_MATRIX_MAX = 64, SMALL_BAND_MAX = 10 };
 
 /* Cholesky factor L of a symmetric n x n matrix, in place of its lower triangle; the upper triangle is neither read nor
  * written. Returns false when a pivot is not greater than least_pivot (0 accepts every positive definite matrix). */

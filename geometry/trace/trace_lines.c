@@ -65,6 +65,8 @@ static status fit_axes(struct trace_job *job, struct polyline_set *lines, bool l
     struct polyline_set even, inside;
     polyline_set_init(&even);
     polyline_set_init(&inside);
+    /* what is missing up to a face follows the density, and not only the tangent of the end */
+    if (last) polylines_reach_faces(lines, job->v, job->o->eps_d, TRACE_END_DIAMETERS * job->diameter);
     status s = polylines_resample(lines, &even, err);
     struct shape_measure measure;
     const struct flat_fit fit = {job->v,

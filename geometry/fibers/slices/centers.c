@@ -47,7 +47,7 @@ struct detect_job {
     float min_distance;
     double diameter;
     float *scratch; /* per thread: a part of the picture, N_SCALE responses and the work of blob_response */
-    uint8_t *bytes; /* per thread: N_BYTES sets of pixels, and the marks of a row */
+    uint8_t *bytes; /* per thread: N_BYTES sets of pixels */
     size_t scratch_per_thread, bytes_per_thread;
     struct slice_result *slice;
 };
@@ -57,7 +57,7 @@ struct view {
     size_t i_slice, width, height;
     float origin[2]; /* position of pixel (0, 0) in the whole picture */
     float *image, *response, *work;
-    uint8_t *candidate, *mark; /* pixels where peaks may be; marks of a row */
+    uint8_t *candidate; /* pixels where peaks may be */
 };
 
 void center_list_release(struct center_list *l)
@@ -167,7 +167,7 @@ static bool collect_peaks(const struct detect_job *job, const struct view *w, st
     for (int s = 0; s < N_SCALE && fits; s++) {
         const float *response = w->response + (size_t)s * w->width * w->height;
         struct scale_peaks peaks = {job, w, {response, w->width, w->height, w->candidate, MIN_STRENGTH}, s, r};
-        fits = peaks_visit(&peaks.search, w->mark, add_peak, &peaks);
+        fits = peaks_visit(&peaks.search, add_peak, &peaks);
     }
     return fits;
 }
@@ -253,7 +253,6 @@ static void respond(const struct detect_job *job, size_t i_task, struct view *w,
         job->pictures.kept + (i_task * job->frame->height + (size_t)w->origin[1]) * pitch + (size_t)w->origin[0] / 8;
     uint8_t *work = bytes, *asked = bytes + n;
     w->candidate = bytes + 2 * n;
-    w->mark = bytes + N_BYTES * n;
     pixel_bits_near(kept, pitch, n_byte, w->height, PEAK_REACH, work, w->candidate);
     pixel_bits_near(kept, pitch, n_byte, w->height, PEAK_REACH + 1, work, asked);
     for (size_t b = 0; b < n; b++) asked[b] = asked[b] != 0;
@@ -363,7 +362,7 @@ status centers_detect(const struct center_search *search, struct thread_pool *po
     }
     const size_t n_byte = slice_row_bytes(frame) * frame->height;
     job.scratch_per_thread = n_pixel * (N_SCALE + 1) + blob_scratch(frame->width, job.kernel[N_SCALE - 1].reach);
-    job.bytes_per_thread = N_BYTES * n_byte + frame->width + 1;
+    job.bytes_per_thread = N_BYTES * n_byte;
     job.scratch = malloc(n_thread * job.scratch_per_thread * sizeof *job.scratch);
     job.bytes = malloc(n_thread * job.bytes_per_thread);
     job.pictures.image = malloc(n_slab * n_pixel * sizeof *job.pictures.image);

@@ -1,9 +1,10 @@
 #include "geometry/fibers/slices/slice_peaks.h"
 
-#include <math.h>
-#include <string.h>
+#include "base/lanes.h"
 
-/* Whether a pixel at the border of a picture is a peak among its neighbours there; of equal pixels the first is. */
+#include <math.h>
+
+/* Whether a pixel, perhaps at the border of a picture, is a peak among its neighbours; of equal pixels the first is. */
 static bool is_border_peak(const struct peak_search *s, size_t u, size_t v)
 {
     const float c = s->response[v * s->width + u];
@@ -15,53 +16,39 @@ static bool is_border_peak(const struct peak_search *s, size_t u, size_t v)
     return true;
 }
 
-/* The same for n inner pixels of a row: marks the strong peaks. Without branches, so that the loop is vectorised. */
-static void mark_peaks(const float *p, size_t width, size_t n, float least, uint8_t *restrict mark)
+/* The strong peaks among LANES inner pixels of a row from p on, as bits. Of equal pixels the first is a peak. */
+static inline unsigned inner_peaks(const float *p, size_t width, float least)
 {
+    const lanes c = *(const lanes *)p;
+    const lane_mask higher = (c >= least) & (c > *(const lanes *)(p - 1)) & (c >= *(const lanes *)(p + 1));
+    if (lanes_bits(higher) == 0) return 0;
     const float *before = p - width, *after = p + width;
-    for (size_t u = 0; u < n; u++) {
-        float c = p[u];
-        mark[u] = (c >= least) & (c > p[u - 1]) & (c >= p[u + 1]) & (c > before[u - 1]) & (c > before[u]) &
-                  (c > before[u + 1]) & (c >= after[u - 1]) & (c >= after[u]) & (c >= after[u + 1]);
-    }
+    return lanes_bits(higher & (c > *(const lanes *)(before - 1)) & (c > *(const lanes *)before) &
+                      (c > *(const lanes *)(before + 1)) & (c >= *(const lanes *)(after - 1)) &
+                      (c >= *(const lanes *)after) & (c >= *(const lanes *)(after + 1)));
 }
 
-/* Marks the strong peaks among pixels from .. end - 1 of row v. */
-static void mark_part(const struct peak_search *s, size_t v, size_t from, size_t end, uint8_t *mark)
+/* The same for the block of pixels from u on, which may lie at the border of the picture. */
+static unsigned block_peaks(const struct peak_search *s, size_t u, size_t v)
 {
     const float *row = s->response + v * s->width;
-    const bool inner = v > 0 && v + 1 < s->height;
-    const size_t first = from > 0 ? from : 1, last = end < s->width ? end : s->width - 1;
-    if (inner && first < last) mark_peaks(row + first, s->width, last - first, s->least, mark + first);
-    for (size_t u = from; u < end; u++)
-        if (!inner || u == 0 || u + 1 == s->width) mark[u] = row[u] >= s->least && is_border_peak(s, u, v);
+    if (v > 0 && v + 1 < s->height && u > 0 && u + LANES < s->width) return inner_peaks(row + u, s->width, s->least);
+    unsigned peaks = 0;
+    for (size_t l = 0; l < LANES && u + l < s->width; l++)
+        if (row[u + l] >= s->least && is_border_peak(s, u + l, v)) peaks |= 1u << l;
+    return peaks;
 }
 
-static bool is_candidate(const uint8_t *candidate, size_t u) { return (candidate[u / 8] >> u % 8 & 1u) != 0; }
-
-/* Visits the peaks of row v in one run of blocks with candidates, pixels from .. end - 1. */
-static bool visit_part(const struct peak_search *s, size_t v, size_t from, size_t end, uint8_t *mark,
-                       peak_visitor visit, void *context)
+bool peaks_visit(const struct peak_search *s, peak_visitor visit, void *context)
 {
-    const uint8_t *candidate = s->candidate + v * ((s->width + 7) / 8);
-    mark_part(s, v, from, end, mark);
-    for (const uint8_t *m = mark + from; (m = memchr(m, 1, (size_t)(mark + end - m))) != NULL; m++) {
-        const size_t u = (size_t)(m - mark);
-        if (is_candidate(candidate, u) && !visit(context, u, v)) return false;
-    }
-    return true;
-}
-
-bool peaks_visit(const struct peak_search *s, uint8_t *mark, peak_visitor visit, void *context)
-{
-    const size_t n_byte = (s->width + 7) / 8;
+    const size_t n_byte = (s->width + LANES - 1) / LANES;
     for (size_t v = 0; v < s->height; v++) {
         const uint8_t *candidate = s->candidate + v * n_byte;
         for (size_t b = 0; b < n_byte; b++) {
-            const size_t from = b;
-            while (b < n_byte && candidate[b] != 0) b++;
-            const size_t end = b * 8 < s->width ? b * 8 : s->width;
-            if (from * 8 < end && b > from && !visit_part(s, v, from * 8, end, mark, visit, context)) return false;
+            if (candidate[b] == 0) continue;
+            unsigned peaks = block_peaks(s, b * LANES, v) & candidate[b];
+            for (; peaks != 0; peaks &= peaks - 1)
+                if (!visit(context, b * LANES + (size_t)__builtin_ctz(peaks), v)) return false;
         }
     }
     return true;

@@ -15,9 +15,9 @@ struct peak_search {
 
 /* Takes a peak. Returns false to end the search. */
 typedef bool (*peak_visitor)(void *context, size_t u, size_t v);
-/* Visits the peaks row by row: pixels that are higher than their eight neighbours, of equal pixels the first. mark:
- * work of width + 1 bytes. Returns false if a visitor did. */
-bool peaks_visit(const struct peak_search *s, uint8_t *mark, peak_visitor visit, void *context);
+/* Visits the peaks row by row: pixels that are higher than their eight neighbours, of equal pixels the first. Returns
+ * false if a visitor did. */
+bool peaks_visit(const struct peak_search *s, peak_visitor visit, void *context);
 /* Offset of the maximum of the paraboloid through the 3 x 3 pixels around a peak, at most one pixel. */
 void peak_offset(const struct peak_search *s, size_t u, size_t v, float offset[2]);
 

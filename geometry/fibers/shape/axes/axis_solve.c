@@ -12,7 +12,11 @@ static const double CURVATURE_LEAST = 0.05;
  * lines counts beside it. */
 static const double WINDOW_DIAMETERS = 2.0, PRIOR_DIAMETERS = 2.0;
 
-enum { BAND = 7 }; /* the diagonal and six below it: second differences of three coordinates */
+/* Length over which a fiber's curvature is correlated. */
+static const double BEND_DIAMETERS = 2.5;
+
+/* The diagonal and six below it: second differences of three coordinates. Nine: differences of these. */
+enum { BAND = 7, BAND_CORRELATED = 10 };
 
 void axis_pull_add(struct axis_pull *to, const struct axis_pull *from)
 {
@@ -34,20 +38,56 @@ struct solve_job {
     struct polyline_set *lines;
     const struct axis_pull *pull;
     const double *stiffness; /* of the second difference at each vertex */
-    double hold;
+    double correlation, hold;
     bool *failed; /* one per line */
 };
+
+/* The equations of one line: n vertices p, a band matrix m and the right side x. */
+struct line_system {
+    const float (*p)[3];
+    size_t n, band;
+    double *m, *x;
+};
+
+/* Adds weight times the square of sum_r factor[r] p[r], r < n_factor, to the equations of a line from vertex `first`
+ * on, for each coordinate. */
+static void add_square(struct line_system *y, size_t first, const double *factor, size_t n_factor, double weight)
+{
+    for (size_t a = 0; a < 3; a++) {
+        double sum = 0.0;
+        for (size_t r = 0; r < n_factor; r++) sum += factor[r] * (double)y->p[first + r][a];
+        for (size_t r = 0; r < n_factor; r++) {
+            const size_t row = 3 * (first + r) + a;
+            y->x[row] -= weight * factor[r] * sum;
+            for (size_t c = 0; c <= r; c++) y->m[row * y->band + 3 * (r - c)] += weight * factor[r] * factor[c];
+        }
+    }
+}
+
+/* Adds the terms of the bends. */
+static void add_bends(struct line_system *y, const double *stiffness, double correlation)
+{
+    const double weight = 1.0 / (1.0 - correlation * correlation);
+    for (size_t i = 0; i + 2 < y->n; i++) {
+        const double own = sqrt(stiffness[i + 1]);
+        if (i == 0 || !(correlation > 0.0)) {
+            add_square(y, i, (const double[3]){own, -2.0 * own, own}, 3, 1.0);
+            continue;
+        }
+        const double before = correlation * sqrt(stiffness[i]);
+        add_square(y, i - 1, (const double[4]){-before, own + 2.0 * before, -2.0 * own - before, own}, 4, weight);
+    }
+}
 
 static void solve_line(void *context, size_t l, size_t i_thread)
 {
     (void)i_thread;
     struct solve_job *job = context;
-    size_t n = polyline_length(job->lines, l);
+    const size_t n = polyline_length(job->lines, l), band = job->correlation > 0.0 ? BAND_CORRELATED : BAND;
     float(*p)[3] = job->lines->vertex + job->lines->first[l];
     const struct axis_pull *q = job->pull + job->lines->first[l];
-    const double *stiffness = job->stiffness + job->lines->first[l];
-    static const double second[3] = {1.0, -2.0, 1.0};
-    double(*m)[BAND] = calloc(3 * n, sizeof *m), *x = calloc(3 * n, sizeof *x);
+    double *m = calloc(3 * n * band, sizeof *m), *x = calloc(3 * n, sizeof *x);
+    struct line_system system = {(const float(*)[3])p, n, band, m, x};
     if (m == NULL || x == NULL) {
         job->failed[l] = true;
         goto out;
@@ -55,19 +95,11 @@ static void solve_line(void *context, size_t l, size_t i_thread)
     for (size_t i = 0; i < n; i++)
         for (size_t a = 0, c = 0; a < 3; a++) {
             x[3 * i + a] = (double)q[i].gradient[a];
-            m[3 * i + a][0] += job->hold;
-            for (size_t b = 0; b <= a; b++, c++) m[3 * i + a][a - b] += (double)q[i].normal[c];
+            m[(3 * i + a) * band] += job->hold;
+            for (size_t b = 0; b <= a; b++, c++) m[(3 * i + a) * band + a - b] += (double)q[i].normal[c];
         }
-    for (size_t i = 0; i + 2 < n; i++)
-        for (size_t a = 0; a < 3; a++) {
-            double bend = (double)p[i][a] - 2.0 * (double)p[i + 1][a] + (double)p[i + 2][a];
-            for (size_t r = 0; r < 3; r++) {
-                x[3 * (i + r) + a] -= stiffness[i + 1] * second[r] * bend;
-                for (size_t c = 0; c <= r; c++)
-                    m[3 * (i + r) + a][3 * (r - c)] += stiffness[i + 1] * second[r] * second[c];
-            }
-        }
-    if (!small_solve_banded(m[0], 3 * n, BAND, x)) goto out; /* the line stays as it is */
+    add_bends(&system, job->stiffness + job->lines->first[l], job->correlation);
+    if (!small_solve_banded(m, 3 * n, band, x)) goto out; /* the line stays as it is */
     for (size_t i = 0; i < n; i++) {
         double length = sqrt(x[3 * i] * x[3 * i] + x[3 * i + 1] * x[3 * i + 1] + x[3 * i + 2] * x[3 * i + 2]);
         for (size_t a = 0; a < 3; a++) p[i][a] += (float)(x[3 * i + a] * (length > 1.0 ? 1.0 / length : 1.0));
@@ -78,9 +110,10 @@ out:
 }
 
 status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull, const double *stiffness,
-                        struct thread_pool *pool, struct error *err)
+                        double correlation, struct thread_pool *pool, struct error *err)
 {
-    struct solve_job job = {.lines = lines, .pull = pull, .failed = calloc(lines->n_line + 1, sizeof(bool))};
+    struct solve_job job = {
+        .lines = lines, .pull = pull, .correlation = correlation, .failed = calloc(lines->n_line + 1, sizeof(bool))};
     double mean = 0.0;
     if (job.failed == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
     /* half the trace, because the direction along the fiber contributes nothing */
@@ -95,6 +128,8 @@ status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull
     free(job.failed);
     return s;
 }
+
+double axis_bend_correlation(double diameter) { return exp(-1.0 / (BEND_DIAMETERS * diameter)); }
 
 /* Vertices to either side between which the chords of a bend lie. */
 static size_t bend_span(double diameter) { return diameter > 4.0 ? (size_t)(0.5 * diameter) : 2; }

@@ -31,9 +31,16 @@ double axis_curvature_sd(const struct polyline_set *lines, double diameter);
  * bounds are those of axis_curvature_sd. */
 void axis_local_stiffness(const struct polyline_set *lines, double diameter, double variance, double *stiffness);
 
-/* Moves the vertices of every line to the minimum of its data terms plus stiffness |second difference|^2, by at most
- * one voxel. stiffness: of each vertex. STATUS_NO_MEMORY. */
+/* Correlation of a fiber's curvature between neighbouring vertices, from the length over which it is correlated. A
+ * fiber has a bending stiffness, so its curvature changes little over a diameter; without that, noise would show as
+ * bends. */
+double axis_bend_correlation(double diameter);
+
+/* Moves the vertices of every line to the minimum of its data terms plus those of its bends u_i, the second differences
+ * times the root of the stiffness, by at most one voxel. The bends are a stationary sequence whose neighbours have this
+ * correlation: u_1^2 + sum (u_{i+1} - correlation u_i)^2 / (1 - correlation^2). With 0 the terms are stiffness |second
+ * difference|^2. stiffness: of each vertex. STATUS_NO_MEMORY. */
 status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull, const double *stiffness,
-                        struct thread_pool *pool, struct error *err);
+                        double correlation, struct thread_pool *pool, struct error *err);
 
 #endif
