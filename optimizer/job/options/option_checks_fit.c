@@ -129,6 +129,20 @@ static status check_speckle(const struct job_document *doc, size_t i, struct err
     return STATUS_OK;
 }
 
+/* Paths are refused where no table of view and light is made of them. */
+static status check_deep_paths(const struct job_surface_picture *p, const json_t *given, size_t i, struct error *err)
+{
+    char field[64];
+    const char *why = p->method != JOB_PICTURE_FAST ? "'method' is not \"fast\""
+                      : p->visibility_by_tables     ? "'visibility' is \"tables\", with light from cells"
+                      : p->deep_by_cells            ? "'deep_light' is \"cells\""
+                                                    : NULL;
+    if (why == NULL || json_object_get(given, "deep_light_paths") == NULL) return STATUS_OK;
+    snprintf(field, sizeof field, "pictures[%zu].deep_light_paths", i);
+    return error_set_field(err, STATUS_INVALID, field,
+                           "'%s' is given, but the picture has no table of view and light: %s", field, why);
+}
+
 static status check_picture(const struct job_document *doc, size_t i, struct error *err)
 {
     const struct job_surface_picture *p = &doc->surface_picture[i];
@@ -184,7 +198,10 @@ static status check_picture(const struct job_document *doc, size_t i, struct err
 status job_check_pictures(const struct option_value *v, struct error *err)
 {
     status s = STATUS_OK;
-    for (size_t i = 0; i < v->doc->n_surface_picture && s == STATUS_OK; i++) s = check_picture(v->doc, i, err);
+    for (size_t i = 0; i < v->doc->n_surface_picture && s == STATUS_OK; i++) {
+        s = check_picture(v->doc, i, err);
+        if (s == STATUS_OK) s = check_deep_paths(&v->doc->surface_picture[i], json_array_get(v->value, i), i, err);
+    }
     return s;
 }
 

@@ -144,7 +144,7 @@ const struct job_option option_rows_pictures[] = {
      .standard = "8000000",
      .meaning =
          "Of `deep_light` `directions`: paths that make its table, in 10 to 20 microseconds of a processor each. "
-         "The largest number of all pictures counts."},
+         "The largest number of all pictures counts. Refused in pictures that have no such table."},
     {.path = "pictures[].speckle",
      .kind = OPTION_BOOL,
      OF_PICTURE(speckle),

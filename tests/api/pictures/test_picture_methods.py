@@ -17,7 +17,7 @@ def test_methods_show_the_same_cloth(tmp_path):
     (folder / "input").mkdir(parents=True)
     view = {"on": "flat", "width_mm": 3, **VIEW, "samples": 64}
     given = {"sample": "s", "fibers": {"file": "cloth.hair"},
-             "pictures": [{**view, "method": m, "deep_light_paths": 100000} for m in ("path", "fast", "corrected")],
+             "pictures": [{**view, "method": "path"}, {**view, "method": "fast", "deep_light_paths": 100000}, {**view, "method": "corrected"}],
              "fit": {"model": "isotropic.v1", "fixed": {"C": [0.8, 0.5, 0.3]}}}
     (folder / "job.json").write_text(json.dumps(given))
     (folder / "input/cloth.hair").write_bytes(hair(layers=3))
@@ -160,7 +160,7 @@ def test_a_picture_beside_its_reference(tmp_path):
     folder = tmp_path / "job"
     (folder / "input").mkdir(parents=True)
     view = {"on": "flat", "width_mm": 3, **VIEW, "samples": 64, "reference": True}
-    given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "pictures": [{**view, "method": m, "deep_light_paths": 100000} for m in ("fast", "corrected")],
+    given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "pictures": [{**view, "method": "fast", "deep_light_paths": 100000}, {**view, "method": "corrected"}],
              "fit": {"model": "isotropic.v1", "fixed": {"C": [0.8, 0.5, 0.3]}}}
     (folder / "job.json").write_text(json.dumps(given))
     (folder / "input/cloth.hair").write_bytes(hair(layers=3))
