@@ -38,3 +38,18 @@ void deep_light_add(const struct deep_light *d, const float wo[3], const float w
     }
     for (int c = 0; c < 3; c++) rgb[c] += scale[c] * (float)fabs(from[2]) * sum[c];
 }
+
+void deep_light_shift(const struct deep_light *d, const float wo[3], const float wi[3], float shift_mm[2])
+{
+    const float *direction[2] = {wo, wi};
+    shift_mm[0] = shift_mm[1] = 0;
+    for (size_t i = 0; i < 2; i++) {
+        size_t node[4];
+        double weight[4], z = (double)direction[i][2];
+        const double at[3] = {(double)direction[i][0], (double)direction[i][1], d->n_side == 1 ? fmax(z, 0.0) : z};
+        deep_light_nodes(d, at, node, weight);
+        for (size_t k = 0; k < 4; k++)
+            for (int a = 0; a < 2; a++)
+                shift_mm[a] += (float)weight[k] * d->shift[i * deep_light_n_node(d) + node[k]][a];
+    }
+}

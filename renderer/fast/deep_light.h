@@ -5,7 +5,11 @@
  * A grid has edge x edge nodes on each side of the cloth, evenly over the square around the unit disk to which a
  * hemisphere is mapped: a direction lies at (2 / pi) theta from the middle, at its azimuth, and the horizon is the rim.
  * View (side, row, column), light likewise, channels last; side 0 is above. Lights and views are not exchangeable: a
- * cloth of packed fibers is not reciprocal. */
+ * cloth of packed fibers is not reciprocal.
+ *
+ * Deep light enters the cloth beside the hit, so that on a bent cloth it meets another normal there. The mean of the
+ * way from the hit to that place, in the plane of the cloth, is shift[view] + shift[n_node + light]; its deviations
+ * along each axis have the standard deviation spread_mm. */
 #ifndef SELVEDGE_RENDERER_DEEP_LIGHT_H
 #define SELVEDGE_RENDERER_DEEP_LIGHT_H
 
@@ -19,7 +23,9 @@ struct deep_light {
     uint32_t edge;     /* nodes along an edge of each grid */
     uint32_t n_side;   /* 1: views and lights are above only, because a black sheet lies below */
     float error;       /* relative standard error of the value, root mean square, of the paths that made it */
+    float spread_mm;
     float *value;      /* n_node x n_node x 3 */
+    float (*shift)[2]; /* mm: n_node of views, then n_node of lights */
 };
 
 static inline size_t deep_light_n_node(const struct deep_light *d) { return (size_t)d->n_side * d->edge * d->edge; }
@@ -28,11 +34,17 @@ static inline size_t deep_light_n_value(const struct deep_light *d)
 {
     return d->n_traced > 0 ? 3 * deep_light_n_node(d) * deep_light_n_node(d) : 0;
 }
+static inline size_t deep_light_n_shift(const struct deep_light *d)
+{
+    return d->n_traced > 0 ? 2 * deep_light_n_node(d) : 0;
+}
 /* The four nodes around a direction and their weights, which sum to 1. */
 void deep_light_nodes(const struct deep_light *d, const double direction[3], size_t node[4], double weight[4]);
 /* Adds the radiance times scale. wo, wi: unit vectors. A view from below where there is a black sheet counts as one
  * along the cloth; light from there as none. */
 void deep_light_add(const struct deep_light *d, const float wo[3], const float wi[3], const float scale[3],
                     float rgb[3]);
+/* Mean way from a hit to where light from wi that is seen from wo enters the cloth; as in deep_light_add. */
+void deep_light_shift(const struct deep_light *d, const float wo[3], const float wi[3], float shift_mm[2]);
 
 #endif

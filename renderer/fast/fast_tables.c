@@ -46,7 +46,8 @@ status fast_tables_reserve_rows(struct fast_tables *t, struct error *err)
 
 status fast_tables_reserve_deep(struct fast_tables *t, struct error *err)
 {
-    return take((void **)&t->deep.value, deep_light_n_value(&t->deep), sizeof *t->deep.value, err);
+    status s = take((void **)&t->deep.value, deep_light_n_value(&t->deep), sizeof *t->deep.value, err);
+    return s == STATUS_OK ? take((void **)&t->deep.shift, deep_light_n_shift(&t->deep), sizeof *t->deep.shift, err) : s;
 }
 
 void fast_tables_release(struct fast_tables *t)
@@ -60,6 +61,7 @@ void fast_tables_release(struct fast_tables *t)
     free(t->component);
     free(t->gaussian);
     free(t->deep.value);
+    free(t->deep.shift);
     *t = (struct fast_tables){0};
 }
 

@@ -10,7 +10,7 @@
 #include <zlib.h>
 
 static const char magic[8] = "SELVFAST";
-enum { VERSION = 2, MOST_BYTES = 1 << 30, MOST_CELL = 1 << 22, MOST_SET = 64, MOST_SEGMENT = 1 << 28 };
+enum { VERSION = 3, MOST_BYTES = 1 << 30, MOST_CELL = 1 << 22, MOST_SET = 64, MOST_SEGMENT = 1 << 28 };
 
 struct header {
     char magic[8];
@@ -21,10 +21,11 @@ struct header {
     float transfer_error;
     uint32_t n_theta, n_component, n_gaussian, n_grid;
     uint32_t deep_traced, deep_edge, deep_side;
-    float deep_error;
+    float deep_error, deep_spread_mm;
+    uint32_t unused;
 };
 
-_Static_assert(sizeof(struct header) == 136, "docs/file-formats.md states the layout");
+_Static_assert(sizeof(struct header) == 144, "docs/file-formats.md states the layout");
 
 /* An array of the file. */
 struct part {
@@ -32,7 +33,7 @@ struct part {
     size_t n_bytes;
 };
 
-enum { N_PART = 10 };
+enum { N_PART = 11 };
 
 /* scaled and scale hold the transfer as it is in the file. */
 static void list_parts(const struct fast_tables *t, int16_t *scaled, float *scale, struct part part[N_PART])
@@ -49,6 +50,7 @@ static void list_parts(const struct fast_tables *t, int16_t *scaled, float *scal
         {t->component, (size_t)t->n_row * FAST_N_COMPONENT},
         {t->gaussian, (size_t)t->n_row * 2 * FAST_N_GAUSSIAN},
         {t->deep.value, deep_light_n_value(&t->deep) * sizeof *t->deep.value},
+        {t->deep.shift, deep_light_n_shift(&t->deep) * sizeof *t->deep.shift},
     };
     memcpy(part, all, sizeof all);
 }
@@ -106,7 +108,8 @@ static void fill_header(const struct fast_tables *t, struct header *h)
                          .deep_traced = t->deep.n_traced,
                          .deep_edge = t->deep.edge,
                          .deep_side = t->deep.n_side,
-                         .deep_error = t->deep.error};
+                         .deep_error = t->deep.error,
+                         .deep_spread_mm = t->deep.spread_mm};
     memcpy(h->magic, magic, sizeof magic);
 }
 
@@ -164,21 +167,24 @@ static status check_header(const struct header *h, const char *name, struct erro
 
 static void take_header(struct fast_tables *t, const struct header *h)
 {
-    *t = (struct fast_tables){
-        .checksum = h->checksum,
-        .tile_mm = {h->tile_mm[0], h->tile_mm[1]},
-        .bottom_mm = h->bottom_mm,
-        .mean_free_path_mm = h->mean_free_path_mm,
-        .spread_mm = h->spread_mm,
-        .order = h->order,
-        .mirrored = h->mirrored,
-        .n_set = h->n_set,
-        .n_cell = {h->n_cell[0], h->n_cell[1], h->n_cell[2]},
-        .n_transfer = h->n_transfer,
-        .n_segment = h->n_segment,
-        .n_row = h->n_row,
-        .transfer_error = h->transfer_error,
-        .deep = {.n_traced = h->deep_traced, .edge = h->deep_edge, .n_side = h->deep_side, .error = h->deep_error}};
+    *t = (struct fast_tables){.checksum = h->checksum,
+                              .tile_mm = {h->tile_mm[0], h->tile_mm[1]},
+                              .bottom_mm = h->bottom_mm,
+                              .mean_free_path_mm = h->mean_free_path_mm,
+                              .spread_mm = h->spread_mm,
+                              .order = h->order,
+                              .mirrored = h->mirrored,
+                              .n_set = h->n_set,
+                              .n_cell = {h->n_cell[0], h->n_cell[1], h->n_cell[2]},
+                              .n_transfer = h->n_transfer,
+                              .n_segment = h->n_segment,
+                              .n_row = h->n_row,
+                              .transfer_error = h->transfer_error,
+                              .deep = {.n_traced = h->deep_traced,
+                                       .edge = h->deep_edge,
+                                       .n_side = h->deep_side,
+                                       .error = h->deep_error,
+                                       .spread_mm = h->deep_spread_mm}};
 }
 
 /* Rows that tables point to must exist, whatever a file says. */

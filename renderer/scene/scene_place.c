@@ -6,6 +6,7 @@
 
 /* A ray that begins on the shell begins so far above it, so that the surface it leaves does not shade it. */
 static const float lift_mm = 0.02f;
+enum { MOST_CELLS_BESIDE = 64 };
 
 bool scene_is_bent(const struct scene *s) { return s->bent != NULL; }
 
@@ -92,6 +93,33 @@ void scene_place_rotation(const struct scene_place *p, float row[3][3])
         row[0][a] = (sum[a] + difference[a]) * (float)M_SQRT1_2;
         row[1][a] = (sum[a] - difference[a]) * (float)M_SQRT1_2;
     }
+}
+
+void scene_hit_beside(const struct scene *s, const struct scene_hit *hit, const float shift_mm[2],
+                      struct scene_hit *beside)
+{
+    *beside = *hit;
+    if (s->bent == NULL) {
+        for (int a = 0; a < 2; a++) beside->position_mm[a] += shift_mm[a];
+        return;
+    }
+    struct shell_walk w = {.space = &s->bent->space, .i_cell = hit->i_cell, .from_face = -1};
+    double left = 1.0; /* of the way, which is straight in the flat cloth and has a direction of its own in each cell */
+    for (int a = 0; a < 3; a++) w.origin[a] = (double)hit->position_mm[a];
+    for (int i = 0; i < MOST_CELLS_BESIDE && left > 0.0; i++) {
+        const struct shell_cell *c = &w.space->shell.cell[w.i_cell];
+        int face;
+        for (int a = 0; a < 3; a++)
+            w.direction[a] = (double)(c->to_world[a][0] * shift_mm[0] + c->to_world[a][1] * shift_mm[1]);
+        w.t = 0.0;
+        double t = fmin(shell_walk_exit(&w, &face), left);
+        beside->i_cell = w.i_cell;
+        shell_walk_point(&w, t, w.origin);
+        left -= t;
+        if (left > 0.0) shell_walk_on(&w, 0.0, face);
+        if (w.i_cell == SHELL_OUTSIDE) break;
+    }
+    for (int a = 0; a < 3; a++) beside->position_mm[a] = (float)w.origin[a];
 }
 
 bool scene_shell_shades(const struct scene *s, const struct scene_hit *hit, const struct scene_place *place,

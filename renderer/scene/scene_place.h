@@ -39,6 +39,10 @@ void scene_place_of(const struct scene *scene, const struct scene_hit *hit, cons
 /* Rows of the rotation into the flat cloth that is nearest to place->to_cloth among those that keep the normal of the
  * cloth: for angles between a light and the cloth, which to_cloth changes where threads are sheared. */
 void scene_place_rotation(const struct scene_place *place, float row[3][3]);
+/* The hit moved by a way in the plane of the flat cloth, at its depth; it stays on the border of a mesh that ends
+ * before. Only its position and its place in a bent cloth change. */
+void scene_hit_beside(const struct scene *scene, const struct scene_hit *hit, const float shift_mm[2],
+                      struct scene_hit *beside);
 /* Whether the shell of a bent cloth lies in a direction from a point of its surface: of the upper side if the direction
  * points out of it, of the lower one otherwise. The point lies over the hit, moved by shift_mm in the plane of the
  * cloth there. Flat cloth never shades itself so. */

@@ -10,6 +10,9 @@
  * It is approached from b divided by the sums of rows of M, in N_STEP steps of the residual divided in the same way;
  * more of them follow the noise. Each keeps the sum over all pairs, and so the energy.
  *
+ * Beside them stand the means of the ways from the first hit to the last one, in the plane of the cloth, weighted by
+ * throughput: of each view and of each light, less the mean over all of them.
+ *
  * Each row of the part is the sum over some of the paths, which follow from its number: results do not depend on the
  * number of threads. Differences between even and odd rows give the error. */
 #include "renderer/fast/precompute/precompute_parts.h"
@@ -26,7 +29,8 @@ struct deep_job {
     struct precompute_job *j;
     struct deep_light *d;
     size_t n_path, n_node, n_value; /* paths of a row */
-    float *sum;                     /* N_ROW x n_value */
+    size_t n_sum;                   /* numbers of a row: n_value of the table, then n_way */
+    float *sum;                     /* N_ROW x n_sum */
     double *overlap;                /* n_node x n_node: the matrix M, integrals of weights over the disk */
     double *area;                   /* n_node: sums of its rows */
 };
@@ -64,8 +68,22 @@ static bool meet(const struct deep_job *x, const double wo[3], struct rng *rng, 
     return false;
 }
 
+/* Numbers about ways: weight, x and y of each view, the same of each light, and the sum of squares. */
+static size_t n_way(const struct deep_job *x) { return 6 * x->n_node + 1; }
+
+/* Adds the way of a path, whose weight has the two factors. sum: where those of a view or a light begin. */
+static void count_way(const double way_mm[2], double scale, const size_t node[4], const double weight[4], float *sum)
+{
+    for (size_t k = 0; k < 4; k++) {
+        float *to = sum + 3 * node[k], w = (float)(scale * weight[k]);
+        to[0] += w;
+        for (int a = 0; a < 2; a++) to[1 + a] += w * (float)way_mm[a];
+    }
+}
+
+/* way_mm: from the first hit to the last one. */
 static void count(const struct deep_job *x, const double wo[3], const struct scene_ray *ray, const float throughput[3],
-                  float *sum)
+                  const double way_mm[2], float *sum)
 {
     size_t view[4], light[4];
     double view_weight[4], light_weight[4];
@@ -75,10 +93,21 @@ static void count(const struct deep_job *x, const double wo[3], const struct sce
     deep_light_nodes(x->d, wi, light, light_weight);
     /* views are even over solid angles: 1 over their density on the disk is 2 pi cos for each side */
     double scale = M_PI * 2.0 * M_PI * fabs(wo[2]) * x->d->n_side / ((double)x->n_path * N_ROW);
+    float *way = sum + x->n_value;
+    double brightness = scale * ((double)throughput[0] + (double)throughput[1] + (double)throughput[2]);
+    count_way(way_mm, brightness, view, view_weight, way);
+    count_way(way_mm, brightness, light, light_weight, way + 3 * x->n_node);
+    way[6 * x->n_node] += (float)(brightness * (way_mm[0] * way_mm[0] + way_mm[1] * way_mm[1]));
     for (size_t k = 0; k < 16; k++) {
         float *to = sum + (view[k / 4] * x->n_node + light[k % 4]) * 3;
         for (int c = 0; c < 3; c++) to[c] += (float)(scale * view_weight[k / 4] * light_weight[k % 4]) * throughput[c];
     }
+}
+
+/* Where a hit lies in the endless cloth. */
+static void place_of(const struct scene_hit *hit, const struct scene_ray *ray, double place_mm[2])
+{
+    for (int a = 0; a < 2; a++) place_mm[a] = (double)hit->position_mm[a] + ray->offset_mm[a];
 }
 
 static void walk(const struct deep_job *x, const double wo[3], struct rng *rng, float *sum)
@@ -88,10 +117,16 @@ static void walk(const struct deep_job *x, const double wo[3], struct rng *rng, 
     struct scene_ray ray;
     struct scene_hit hit;
     if (!meet(x, wo, rng, &ray, &hit)) return;
+    double first_mm[2], last_mm[2];
+    place_of(&hit, &ray, first_mm);
     for (uint32_t i = 1; i < (uint32_t)FIBER_WALK_MOST_STEPS; i++) {
+        place_of(&hit, &ray, last_mm);
         if (!fiber_walk_step(j->q->scene, &j->sets, &hit, &ray, rng, throughput)) return;
         if (scene_trace(j->q->scene, &ray, &hit)) continue;
-        if (i > x->d->n_traced && !scene_sheet_met(j->q->scene, &ray)) count(x, wo, &ray, throughput, sum);
+        if (i > x->d->n_traced && !scene_sheet_met(j->q->scene, &ray)) {
+            const double way_mm[2] = {last_mm[0] - first_mm[0], last_mm[1] - first_mm[1]};
+            count(x, wo, &ray, throughput, way_mm, sum);
+        }
         return;
     }
 }
@@ -111,7 +146,7 @@ static void run_row(void *context, size_t i_row, size_t i_thread)
         double u = start[0] + (double)(i + 1) * 0.7548776662466927, v = start[1] + (double)(i + 1) * 0.5698402909980532;
         double z = fmax(u - floor(u), 1e-3), phi = 2.0 * M_PI * v, across = sqrt(1.0 - z * z);
         const double wo[3] = {across * cos(phi), across * sin(phi), x->d->n_side > 1 && i % 2 == 1 ? -z : z};
-        walk(x, wo, &rng, x->sum + i_row * x->n_value);
+        walk(x, wo, &rng, x->sum + i_row * x->n_sum);
     }
 }
 
@@ -148,13 +183,34 @@ static void solve(const struct deep_job *x, const double *b, double *work)
     }
 }
 
+/* Mean ways and their spread from the sums over paths. */
+static void finish_ways(const struct deep_job *x)
+{
+    size_t n = x->n_node;
+    double square = 0.0, mean[3] = {0.0}, explained = 0.0;
+    for (size_t r = 0; r < N_ROW; r++) square += (double)x->sum[r * x->n_sum + x->n_value + 6 * n];
+    for (size_t i = 0; i < 2 * n; i++) {
+        double sum[3] = {0.0};
+        for (size_t r = 0; r < N_ROW; r++)
+            for (size_t a = 0; a < 3; a++) sum[a] += (double)x->sum[r * x->n_sum + x->n_value + 3 * i + a];
+        for (size_t a = 0; a < 3 && i < n; a++) mean[a] += sum[a];
+        for (size_t a = 0; a < 2 && sum[0] > 0.0; a++) {
+            double way = sum[1 + a] / sum[0], overall = mean[1 + a] / mean[0];
+            x->d->shift[i][a] = (float)(i < n ? way : way - overall);
+            explained += i < n ? sum[0] * way * way : sum[0] * (way - overall) * (way - overall);
+        }
+    }
+    x->d->spread_mm = mean[0] > 0.0 ? (float)sqrt(fmax(0.0, 0.5 * (square - explained) / mean[0])) : 0;
+}
+
 /* Sums the rows, and makes the table and its error. work: 6 n_value. */
 static void finish(const struct deep_job *x, double *work)
 {
     double *half[2] = {work, work + x->n_value}, *rest = work + 2 * x->n_value, *even = work + 5 * x->n_value;
     double square = 0.0, difference = 0.0;
     memset(work, 0, 2 * x->n_value * sizeof *work);
-    for (size_t i = 0; i < N_ROW * x->n_value; i++) half[i / x->n_value % 2][i % x->n_value] += 2.0 * (double)x->sum[i];
+    for (size_t r = 0; r < N_ROW; r++)
+        for (size_t i = 0; i < x->n_value; i++) half[r % 2][i] += 2.0 * (double)x->sum[r * x->n_sum + i];
     solve(x, half[0], rest);
     memcpy(even, rest, x->n_value * sizeof *even);
     solve(x, half[1], rest);
@@ -176,19 +232,21 @@ status precompute_deep(struct precompute_job *j, struct error *err)
     if (s != STATUS_OK) return s;
     struct deep_job x = {.j = j, .d = d, .n_node = deep_light_n_node(d), .n_value = deep_light_n_value(d)};
     x.n_path = (size_t)ceil(j->q->deep_paths / N_ROW);
-    x.sum = calloc(N_ROW * x.n_value, sizeof *x.sum);
+    x.n_sum = x.n_value + n_way(&x);
+    x.sum = calloc(N_ROW * x.n_sum, sizeof *x.sum);
     x.overlap = calloc(x.n_node * (x.n_node + 1), sizeof *x.overlap);
     double *work = malloc(6 * x.n_value * sizeof *work);
     if (x.sum == NULL || x.overlap == NULL || work == NULL)
         s = error_set(err, STATUS_NO_MEMORY, "cannot make tables: out of memory");
     else {
-        const struct journal_part part = {JOURNAL_DEEP, N_ROW, 1, {{x.sum, x.n_value * sizeof *x.sum}}};
+        const struct journal_part part = {JOURNAL_DEEP, N_ROW, 1, {{x.sum, x.n_sum * sizeof *x.sum}}};
         const struct journal_work paths = {run_row, &x, 1, .batch_tasks = 1};
         x.area = x.overlap + x.n_node * x.n_node;
         fill_overlap(&x);
         s = precompute_journal_run(j->journal, &part, &paths, j->pool, j->progress, err);
     }
     if (s == STATUS_OK) finish(&x, work);
+    if (s == STATUS_OK) finish_ways(&x);
     free(x.sum);
     free(x.overlap);
     free(work);

@@ -1,5 +1,6 @@
 /* Shell maps: a flat mesh changes nothing, fibers lie where a bent cloth has them, no light is lost between cells. */
 #include "geometry/mesh/mesh_shapes.h"
+#include "renderer/scene/scene_place.h"
 #include "renderer/scene/scene_ray.h"
 #include "renderer/transport/camera.h"
 #include "renderer/transport/surface/path_tracer.h"
@@ -322,6 +323,41 @@ static void pieces_that_cross(void **state)
     scene_free(flat);
 }
 
+/* A hit that moves in the plane of the cloth goes around a cylinder by the arc, keeps its distance from the axis within
+ * the sagitta of a cell, and stays on the border of the mesh where the way leads beyond. */
+static void a_hit_moves_on_a_cylinder(void **state)
+{
+    (void)state;
+    struct fiber_set f;
+    hand_weave_small(&f);
+    enum { N_CELL = 400 };
+    struct scene *flat = flat_scene(&f, false), *bent = on_cylinder(flat, N_CELL);
+    const double cell = 2 * 1.5 / N_CELL, sagitta_mm = radius_mm * cell * cell / 8;
+    size_t n = 0;
+    for (uint32_t i = 0; i < 500; i++) {
+        struct rng r;
+        struct scene_ray ray;
+        struct scene_hit hit, to;
+        rng_start(&r, &(struct rng_key){7, 0, 0, 0}, i, 0);
+        const double o[3] = {20 * rng_double(&r) - 10, 10 * rng_double(&r) - 5, 5}, d[3] = {0, 0, -1};
+        float way[2] = {(float)(4 * rng_double(&r) - 2), (float)(4 * rng_double(&r) - 2)};
+        if (!scene_ray_enter(bent, o, d, &ray) || !scene_trace(bent, &ray, &hit)) continue;
+        scene_hit_beside(bent, &hit, way, &to);
+        double from[2] = {(double)hit.position_mm[0], (double)hit.position_mm[2] + radius_mm};
+        double at[2] = {(double)to.position_mm[0], (double)to.position_mm[2] + radius_mm};
+        assert_true(fabs(atan2(at[0], at[1]) - atan2(from[0], from[1]) - (double)way[0] / radius_mm) < 1e-4);
+        assert_true(fabs(hypot(at[0], at[1]) - hypot(from[0], from[1])) < 2 * sagitta_mm);
+        assert_true(fabsf(to.position_mm[1] - hit.position_mm[1] - way[1]) < 1e-3f);
+        way[1] = 100;
+        scene_hit_beside(bent, &hit, way, &to);
+        assert_true(fabs((double)to.position_mm[1] - 0.5 * length_mm) < 1e-3);
+        n++;
+    }
+    assert_true(n > 200);
+    scene_free(bent);
+    scene_free(flat);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -334,6 +370,7 @@ int main(void)
         cmocka_unit_test(a_surface_that_bends_too_tightly_is_refused),
         cmocka_unit_test(points_inside_of_the_cloth),
         cmocka_unit_test(pieces_that_cross),
+        cmocka_unit_test(a_hit_moves_on_a_cylinder),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,6 +1,7 @@
 /* The table of light that is scattered more often than the paths of a fast picture are traced: a furnace, means of a
  * cloth with narrow lobes against path tracing, which the cells' harmonics miss, any number of threads, and directions
- * in a sheared cloth. */
+ * in a sheared cloth, and where deep light enters a bent one. */
+#include "geometry/mesh/mesh_shapes.h"
 #include "renderer/fast/fast_option.h"
 #include "renderer/fast/precompute/fast_precompute.h"
 #include "renderer/scene/scene_place.h"
@@ -215,9 +216,77 @@ static void rotation_of_a_sheared_place(void **state)
     }
 }
 
+/* Seen from above, light enters the cloth towards the lamp; under a lamp above, away from the camera. */
+static void ways_lead_to_the_lamp(void **state)
+{
+    (void)state;
+    static const float up[3] = {0, 0, 1};
+    for (int i = 0; i < 8; i++) {
+        const float azimuth[2] = {cosf((float)M_PI_4 * (float)i), sinf((float)M_PI_4 * (float)i)};
+        const float low[3] = {0.9f * azimuth[0], 0.9f * azimuth[1], sqrtf(0.19f)};
+        float lit[2], seen[2];
+        deep_light_shift(&narrow.tables.deep, up, low, lit);
+        deep_light_shift(&narrow.tables.deep, low, up, seen);
+        assert_true(lit[0] * azimuth[0] + lit[1] * azimuth[1] > 0);
+        assert_true(seen[0] * azimuth[0] + seen[1] * azimuth[1] < 0);
+    }
+    assert_true(narrow.tables.deep.spread_mm > 0);
+}
+
+/* Radiance of a small cylinder on which a low lamp shines across, seen from above, over that of the flat cloth. */
+static double bent_over_flat(const struct scene *bent, const struct fast_option *fast, double *var)
+{
+    const struct configuration c = {.light = LIGHT_DIRECTIONAL,
+                                    .light_theta_rad = 1.3,
+                                    .camera_distance_m = 1.0,
+                                    .crop_m = 0.5e-3};
+    const size_t n_path = fast != NULL ? 8192 : 65536;
+    struct estimate flat, seen;
+    struct cloth on_cylinder = narrow;
+    on_cylinder.scene = (struct scene *)(uintptr_t)bent;
+    estimate_of(&narrow, &c, fast, n_path, &flat);
+    estimate_of(&on_cylinder, &c, fast, n_path, &seen);
+    double ratio = seen.mean[0] / flat.mean[0];
+    *var = ratio * ratio * (seen.var[0] / (seen.mean[0] * seen.mean[0]) + flat.var[0] / (flat.mean[0] * flat.mean[0]));
+    return ratio;
+}
+
+/* Low light enters a convex cloth where it falls more steeply than where it is seen. Tables without the ways miss that
+ * by more than the noise, and with them by less than half as much. */
+static void a_bent_cloth_is_lit_beside_the_hit(void **state)
+{
+    (void)state;
+    struct mesh m;
+    struct scene *bent;
+    struct error err = {0};
+    struct fast_tables no_ways = narrow.tables;
+    const struct fast_option fast[2] = {{.tables = &no_ways, .n_traced = TRACED, .deep = true},
+                                        {.tables = &narrow.tables, .n_traced = TRACED, .deep = true}};
+    double var[3], path, off[2];
+    no_ways.deep.spread_mm = 0;
+    no_ways.deep.shift = calloc(deep_light_n_shift(&no_ways.deep), sizeof *no_ways.deep.shift);
+    assert_non_null(no_ways.deep.shift);
+    assert_int_equal(mesh_cylinder(1.2, 6, 1.4, 200, &m, NULL), STATUS_OK);
+    if (scene_bend(narrow.scene, &m, true, &bent, &err) != STATUS_OK) fail_msg("%s", err.text);
+    path = bent_over_flat(bent, NULL, &var[2]);
+    for (int k = 0; k < 2; k++) off[k] = bent_over_flat(bent, &fast[k], &var[k]) - path;
+    print_message("bent over flat %.4f +- %.4f; without ways %+.4f, with them %+.4f +- %.4f\n", path, sqrt(var[2]),
+                  off[0], off[1], sqrt(var[1]));
+    assert_true(fabs(off[0]) > 4 * sqrt(var[0] + var[2]));
+    assert_true(fabs(off[1]) < 0.5 * fabs(off[0]));
+    free(no_ways.deep.shift);
+    mesh_release(&m);
+    scene_free(bent);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(furnace), cmocka_unit_test(means), cmocka_unit_test(threads),
-                                       cmocka_unit_test(refusals), cmocka_unit_test(rotation_of_a_sheared_place)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(furnace),
+                                       cmocka_unit_test(means),
+                                       cmocka_unit_test(threads),
+                                       cmocka_unit_test(refusals),
+                                       cmocka_unit_test(rotation_of_a_sheared_place),
+                                       cmocka_unit_test(ways_lead_to_the_lamp),
+                                       cmocka_unit_test(a_bent_cloth_is_lit_beside_the_hit)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -265,6 +265,8 @@ static void file_round_trip(void **state)
     assert_true(back.deep.n_traced == 1 && back.deep.edge == 3 && back.deep.n_side == 1);
     assert_true(back.deep.error > 0 && back.deep.error == t->deep.error);
     assert_memory_equal(back.deep.value, t->deep.value, deep_light_n_value(&t->deep) * sizeof *t->deep.value);
+    assert_true(back.deep.spread_mm > 0 && back.deep.spread_mm == t->deep.spread_mm);
+    assert_memory_equal(back.deep.shift, t->deep.shift, deep_light_n_shift(&t->deep) * sizeof *t->deep.shift);
     for (size_t i = 0; i < n_number; i++) {
         float most = fabsf(t->transfer[i - i % (n_number / t->n_transfer)]);
         assert_true(fabsf(back.transfer[i] - t->transfer[i]) < 1e-3f * most + 1e-3f);
