@@ -1,4 +1,5 @@
 #include "renderer/fast/fast_shade.h"
+#include "renderer/fast/deep_shade.h"
 #include "renderer/fast/gaussian_light.h"
 #include "renderer/fast/sphere_harmonics.h"
 #include "renderer/scene/scene_place.h"
@@ -277,79 +278,7 @@ static void add_transfer(const struct fast_setting *s, const struct seen_hit *h,
     }
 }
 
-/* ---- light that is scattered more than n_traced times, at the first hit ---- */
-
-/* Adds deep light of one direction, of which a surface that faces it has the irradiance pi times scale. The light
- * enters beside the hit, where a bent cloth has another normal and another view of the light. at: the hit moved there;
- * its place is of that, too. */
-static void add_deep_from(const struct fast_setting *s, const struct seen_hit *h, const struct scene_hit *at,
-                          const float direction[3], const float scale[3], float radiance[3])
-{
-    static const float no_shift[2] = {0, 0};
-    const struct scene *scene = s->path.scene;
-    struct scene_place place;
-    float row[3][3], wi[3], wo[3];
-    scene_place_of(scene, at, h->offset_mm, &place);
-    if (scene_shell_shades(scene, at, &place, no_shift, direction)) return;
-    scene_place_rotation(&place, row);
-    for (int a = 0; a < 3; a++) wi[a] = dot(row[a], direction);
-    scene_place_rotation(&h->place, row);
-    for (int a = 0; a < 3; a++) wo[a] = dot(row[a], h->wo_scene);
-    deep_light_add(&s->option->tables->deep, wo, wi, scale, radiance);
-}
-
-/* The hit moved to a place where light from a direction may have entered the cloth. */
-static void enter_beside(const struct fast_setting *s, const struct seen_hit *h, const float direction[3],
-                         struct rng *rng, struct scene_hit *at)
-{
-    const struct deep_light *deep = &s->option->tables->deep;
-    float row[3][3], wi[3], wo[3], shift[2];
-    double normal[2];
-    if (!scene_is_bent(s->path.scene)) {
-        *at = h->hit;
-        return;
-    }
-    scene_place_rotation(&h->place, row);
-    for (int a = 0; a < 3; a++) {
-        wi[a] = dot(row[a], direction);
-        wo[a] = dot(row[a], h->wo_scene);
-    }
-    deep_light_shift(deep, wo, wi, shift);
-    rng_normal_pair(rng, normal);
-    for (int a = 0; a < 2; a++) shift[a] += (float)normal[a] * deep->spread_mm;
-    scene_hit_beside(s->path.scene, &h->hit, shift, at);
-}
-
-static void add_deep(const struct fast_setting *s, const struct seen_hit *h, struct rng *rng, float radiance[3])
-{
-    const struct lights *l = &s->path.lights;
-    struct scene_hit at;
-    float direction[3], pdf, scale[3], u[2];
-    if (l->has_lamp) {
-        for (int k = 0; k < 2; k++) u[k] = rng_float(rng);
-        if (lamp_sample(&l->lamp, h->position_mm, u, direction, &pdf)) {
-            for (int c = 0; c < 3; c++) scale[c] = lamp_radiance(&l->lamp, direction) / pdf * (float)M_1_PI;
-            enter_beside(s, h, direction, rng, &at);
-            add_deep_from(s, h, &at, direction, scale, radiance);
-        }
-    }
-    if (s->mixture.n == 0) return;
-    size_t k = light_mixture_pick(&s->mixture, rng_float(rng));
-    float share = s->mixture.cumulative[k] - (k > 0 ? s->mixture.cumulative[k - 1] : 0);
-    for (int c = 0; c < 3; c++) scale[c] = s->mixture.rgb[k][c] / share * (float)M_1_PI;
-    enter_beside(s, h, s->mixture.direction[k], rng, &at);
-    add_deep_from(s, h, &at, s->mixture.direction[k], scale, radiance);
-}
-
-/* path_setting.begin */
-static void begin(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,
-                  float rgb[3])
-{
-    const struct fast_setting *s = context;
-    struct seen_hit h = {.hit = *hit};
-    describe(s, ray, &h);
-    add_deep(s, &h, rng, rgb);
-}
+/* ---- a whole ray ---- */
 
 /* Light that is scattered once as the tables have it. */
 static uint32_t shade_by_tables(const struct fast_setting *s, struct scene_ray *ray, struct rng *rng, float radiance[3])
@@ -411,7 +340,7 @@ status fast_setting_init(struct fast_setting *s, const struct fast_option *optio
     s->path.n_traced = option->n_traced > 0 ? option->n_traced : 1;
     s->path.share_beyond = (float)option->corrected_share;
     s->path.finish = option->deep ? NULL : finish;
-    s->path.begin = option->deep ? begin : NULL;
+    s->path.begin = option->deep ? deep_shade_begin : NULL;
     s->path.finish_context = s;
     if (s->path.n_traced == 1 && !(s->path.share_beyond > 0)) s->path.guided_paths = false;
     light_mixture_init(&s->mixture, &s->path.lights);

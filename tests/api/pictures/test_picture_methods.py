@@ -160,7 +160,8 @@ def test_a_picture_beside_its_reference(tmp_path):
     folder = tmp_path / "job"
     (folder / "input").mkdir(parents=True)
     view = {"on": "flat", "width_mm": 3, **VIEW, "samples": 64, "reference": True}
-    given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "pictures": [{**view, "method": "fast", "deep_light_paths": 100000}, {**view, "method": "corrected"}],
+    given = {"sample": "s", "fibers": {"file": "cloth.hair"},
+             "pictures": [{**view, "method": "fast", "deep_light_paths": 100000}, {**view, "method": "corrected"}],
              "fit": {"model": "isotropic.v1", "fixed": {"C": [0.8, 0.5, 0.3]}}}
     (folder / "job.json").write_text(json.dumps(given))
     (folder / "input/cloth.hair").write_bytes(hair(layers=3))

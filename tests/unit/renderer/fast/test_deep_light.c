@@ -236,10 +236,8 @@ static void ways_lead_to_the_lamp(void **state)
 /* Radiance of a small cylinder on which a low lamp shines across, seen from above, over that of the flat cloth. */
 static double bent_over_flat(const struct scene *bent, const struct fast_option *fast, double *var)
 {
-    const struct configuration c = {.light = LIGHT_DIRECTIONAL,
-                                    .light_theta_rad = 1.3,
-                                    .camera_distance_m = 1.0,
-                                    .crop_m = 0.5e-3};
+    const struct configuration c = {
+        .light = LIGHT_DIRECTIONAL, .light_theta_rad = 1.3, .camera_distance_m = 1.0, .crop_m = 0.5e-3};
     const size_t n_path = fast != NULL ? 8192 : 65536;
     struct estimate flat, seen;
     struct cloth on_cylinder = narrow;

@@ -1,0 +1,84 @@
+#include "renderer/fast/deep_shade.h"
+#include "renderer/scene/scene_place.h"
+
+#include <string.h>
+
+/* What is seen, in the flat cloth. */
+struct deep_hit {
+    const struct scene_hit *hit;
+    double offset_mm[2];
+    float position_mm[3]; /* true place in the scene */
+    float row[3][3];      /* of the rotation into the flat cloth at the hit */
+    float wo[3];
+};
+
+static void turn(const float row[3][3], const float d[3], float out[3])
+{
+    for (int k = 0; k < 3; k++) out[k] = row[k][0] * d[0] + row[k][1] * d[1] + row[k][2] * d[2];
+}
+
+/* The hit moved to a place where light from a direction may have entered the cloth. */
+static void enter_beside(const struct fast_setting *s, const struct deep_hit *h, const float direction[3],
+                         struct rng *rng, struct scene_hit *at)
+{
+    const struct deep_light *deep = &s->option->tables->deep;
+    float wi[3], shift[2];
+    double normal[2];
+    if (!scene_is_bent(s->path.scene)) {
+        *at = *h->hit;
+        return;
+    }
+    turn(h->row, direction, wi);
+    deep_light_shift(deep, h->wo, wi, shift);
+    rng_normal_pair(rng, normal);
+    for (int a = 0; a < 2; a++) shift[a] += (float)normal[a] * deep->spread_mm;
+    scene_hit_beside(s->path.scene, h->hit, shift, at);
+}
+
+/* Adds light of one direction, of which a surface that faces it has the irradiance pi times scale. It enters beside
+ * the hit, where a bent cloth has another normal and other shadows. */
+static void add_from(const struct fast_setting *s, const struct deep_hit *h, const float direction[3],
+                     const float scale[3], struct rng *rng, float radiance[3])
+{
+    static const float no_shift[2] = {0, 0};
+    const struct scene *scene = s->path.scene;
+    struct scene_hit at;
+    struct scene_place place;
+    float row[3][3], wi[3];
+    enter_beside(s, h, direction, rng, &at);
+    scene_place_of(scene, &at, h->offset_mm, &place);
+    if (scene_shell_shades(scene, &at, &place, no_shift, direction)) return;
+    scene_place_rotation(&place, row);
+    turn((const float(*)[3])row, direction, wi);
+    deep_light_add(&s->option->tables->deep, h->wo, wi, scale, radiance);
+}
+
+void deep_shade_begin(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,
+                      float rgb[3])
+{
+    const struct fast_setting *s = context;
+    const struct lights *l = &s->path.lights;
+    struct deep_hit h = {.hit = hit};
+    struct scene_place place;
+    float back[3], direction[3], pdf, scale[3], u[2];
+    for (int a = 0; a < 3; a++) {
+        back[a] = -ray->direction[a];
+        if (a < 2) h.offset_mm[a] = ray->offset_mm[a];
+        h.position_mm[a] = (float)((double)hit->position_mm[a] + (a < 2 ? h.offset_mm[a] : 0.0));
+    }
+    scene_place_of(s->path.scene, hit, h.offset_mm, &place);
+    scene_place_rotation(&place, h.row);
+    turn((const float(*)[3])h.row, back, h.wo);
+    if (l->has_lamp) {
+        for (int k = 0; k < 2; k++) u[k] = rng_float(rng);
+        if (lamp_sample(&l->lamp, h.position_mm, u, direction, &pdf)) {
+            for (int c = 0; c < 3; c++) scale[c] = lamp_radiance(&l->lamp, direction) / pdf * (float)M_1_PI;
+            add_from(s, &h, direction, scale, rng, rgb);
+        }
+    }
+    if (s->mixture.n == 0) return;
+    size_t k = light_mixture_pick(&s->mixture, rng_float(rng));
+    float share = s->mixture.cumulative[k] - (k > 0 ? s->mixture.cumulative[k - 1] : 0);
+    for (int c = 0; c < 3; c++) scale[c] = s->mixture.rgb[k][c] / share * (float)M_1_PI;
+    add_from(s, &h, s->mixture.direction[k], scale, rng, rgb);
+}

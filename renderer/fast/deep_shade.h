@@ -1,0 +1,12 @@
+/* Light that is scattered more than n_traced times, by its table: path_setting.begin of a fast_setting whose option has
+ * deep. */
+#ifndef SELVEDGE_RENDERER_DEEP_SHADE_H
+#define SELVEDGE_RENDERER_DEEP_SHADE_H
+
+#include "renderer/fast/fast_shade.h"
+
+/* context: the fast_setting. Adds the radiance along the ray reversed at its first hit. */
+void deep_shade_begin(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,
+                      float rgb[3]);
+
+#endif
