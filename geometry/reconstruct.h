@@ -15,7 +15,7 @@
 #include "geometry/grade/scan_grade.h"
 #include "geometry/grade/scan_trial.h"
 #include "geometry/orientation/alignment.h"
-#include "geometry/orientation/lumen_evidence.h"
+#include "geometry/orientation/lumen/lumen_evidence.h"
 #include "geometry/scan_densities.h"
 #include "geometry/volume/tile_crop.h"
 #include "geometry/volume/volume.h"
@@ -38,7 +38,7 @@ struct reconstruct_option {
      * or estimated, or voxels are not cubes: 2^30 by default. */
     size_t trim_above_voxel;
     double density_low, density_high; /* scanner values mapped to 0 and 1 */
-    /* Whether lumens are filled when the volume is read (lumen_fill.h): 0, 1, or -1 (default) where the evidence is
+    /* Whether lumens are filled when the volume is read (lumen_sift.h): 0, 1, or -1 (default) where the evidence is
      * clear; the decision is written back. */
     int hollow_fibers;
     double fiber_diameter_voxel; /* typical diameter, from which scales and reaches follow */
@@ -116,9 +116,9 @@ status reconstruct_read(const char *const *path, size_t n_path, struct reconstru
                         struct volume *v, struct reconstruct_report *report, struct error *err);
 
 /* The part of the step "volume" that looks for lumens and fills them. v: densities in [0, 1]; report->noise is known.
- * STATUS_NO_MEMORY; with a scratch space also STATUS_DISK_FULL. */
-status reconstruct_lumens(struct volume *v, struct reconstruct_option *o, struct reconstruct_report *report,
-                          struct error *err);
+ * STATUS_CANCELLED, STATUS_NO_MEMORY; with a scratch space also STATUS_DISK_FULL. */
+status reconstruct_lumens(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
+                          struct reconstruct_report *report, struct error *err);
 
 /* Step "orientation": computes directions d from v by the line filter (orientation/line_filter.h), which starts from
  * the structure tensor and refines J locally. STATUS_INVALID when no voxel is kept: field OPTION_FILTER_DENSITY if

@@ -175,8 +175,9 @@ const struct job_option option_rows_cloth[] = {
      INTO(hollow_fibers),
      .left_out = "decided from the scan",
      .meaning =
-         "`true` for hollow fibers, as of cotton: void that is enclosed in material is filled before tracing, and "
-         "radii are those of the fibers' outlines. `false` for solid fibers, whose enclosed gaps would be filled. Left "
+         "`true` for hollow fibers, as of cotton: void that is enclosed in fibers is filled before tracing, and "
+         "radii are those of the fibers' outlines. `false` for solid fibers, some of whose enclosed gaps would "
+         "be filled. Left "
          "out: `true` where the scan shows lumens clearly, which a warning states; where it shows them faintly, a "
          "warning asks for the answer."},
     {.path = "volume.trial",

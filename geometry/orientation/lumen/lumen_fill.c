@@ -1,4 +1,4 @@
-#include "geometry/orientation/lumen_fill.h"
+#include "geometry/orientation/lumen/lumen_fill.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -7,7 +7,7 @@
 
 enum {
     UNIT = 250, /* of the blurred density as a byte */
-    BLOCK = 12, /* edge of the blocks that show the outside: wider than a lumen */
+    CELL = 6,   /* blocks of two cells to each side show the outside: wider than a lumen */
     MAX_SWEEP = 64,
     MARK = 255
 };
@@ -56,38 +56,94 @@ static bool blur_box(const struct lumen_box *b)
     return sum != NULL;
 }
 
-/* Mean density of block c, in units of a byte. */
-static double block_mean(const struct lumen_box *b, const size_t c[3], size_t end[3])
+/* Sums of the blurred density over cells of CELL voxels to each side, fewer at the ends of the axes. */
+struct cell_sums {
+    size_t n[3];
+    double *sum;
+    uint8_t *outside;
+};
+
+static size_t cell_end(const struct lumen_box *b, const size_t c[3], int axis)
 {
+    return CELL * (c[axis] + 1) < b->n[axis] ? CELL * (c[axis] + 1) : b->n[axis];
+}
+
+static void sum_cells(const struct lumen_box *b, struct cell_sums *cells)
+{
+    for (size_t k = 0; k < b->n[2]; k++)
+        for (size_t j = 0; j < b->n[1]; j++)
+            for (size_t i = 0; i < b->n[0]; i++)
+                cells->sum[volume_index(cells->n, i / CELL, j / CELL, k / CELL)] +=
+                    (double)b->density[volume_index(b->n, i, j, k)];
+}
+
+/* Sets from and to to the cells of block c, which begins with cell c - 1 on each axis, and returns its mean density in
+ * units of a byte; INFINITY where less than half of it is inside of the volume. */
+static double block_mean(const struct lumen_box *b, const struct cell_sums *cells, const size_t c[3], size_t from[3],
+                         size_t to[3])
+{
+    size_t n_voxel = 1, n_whole = 1;
     double sum = 0.0;
-    for (int a = 0; a < 3; a++) end[a] = BLOCK * (c[a] + 1) < b->n[a] ? BLOCK * (c[a] + 1) : b->n[a];
-    for (size_t k = BLOCK * c[2]; k < end[2]; k++)
-        for (size_t j = BLOCK * c[1]; j < end[1]; j++)
-            for (size_t i = BLOCK * c[0]; i < end[0]; i++) sum += b->density[volume_index(b->n, i, j, k)];
-    return sum / (double)((end[0] - BLOCK * c[0]) * (end[1] - BLOCK * c[1]) * (end[2] - BLOCK * c[2]));
+    for (int a = 0; a < 3; a++) {
+        from[a] = c[a] > 0 ? c[a] - 1 : 0;
+        to[a] = c[a] < cells->n[a] ? c[a] + 1 : cells->n[a];
+        n_voxel *= (CELL * to[a] < b->n[a] ? CELL * to[a] : b->n[a]) - CELL * from[a];
+        n_whole *= 2 * CELL < b->n[a] ? 2 * CELL : b->n[a];
+    }
+    if (2 * n_voxel < n_whole) return INFINITY;
+    for (size_t k = from[2]; k < to[2]; k++)
+        for (size_t j = from[1]; j < to[1]; j++)
+            for (size_t i = from[0]; i < to[0]; i++) sum += cells->sum[volume_index(cells->n, i, j, k)];
+    return sum / (double)n_voxel;
+}
+
+/* Finds the cells of the emptiest blocks. Blocks overlap by a cell, and those at a face may have half of their
+ * thickness, so that a thin layer of void above a cloth is outside wherever it begins. */
+static void find_outside(const struct lumen_box *b, struct cell_sums *cells)
+{
+    size_t c[3], from[3], to[3];
+    double least = INFINITY;
+    for (int pass = 0; pass < 2; pass++)
+        for (c[2] = 0; c[2] <= cells->n[2]; c[2]++)
+            for (c[1] = 0; c[1] <= cells->n[1]; c[1]++)
+                for (c[0] = 0; c[0] <= cells->n[0]; c[0]++) {
+                    const double mean = block_mean(b, cells, c, from, to);
+                    if (pass == 0) least = fmin(least, mean);
+                    if (pass == 0 || mean > least + BLOCK_RANGE * UNIT) continue;
+                    for (size_t k = from[2]; k < to[2]; k++)
+                        for (size_t j = from[1]; j < to[1]; j++)
+                            memset(cells->outside + volume_index(cells->n, from[0], j, k), 1, to[0] - from[0]);
+                }
 }
 
 /* Sets the height of void in the emptiest blocks, which is outside, to its density, and all other to MARK. */
-static void mark_outside(const struct lumen_box *b)
+static bool mark_outside(const struct lumen_box *b)
 {
-    size_t n_block[3], c[3], end[3];
-    double least = INFINITY;
-    for (int a = 0; a < 3; a++) n_block[a] = b->n[a] / BLOCK > 0 ? b->n[a] / BLOCK : 1;
+    struct cell_sums cells;
+    size_t c[3];
+    for (int a = 0; a < 3; a++) cells.n[a] = (b->n[a] + CELL - 1) / CELL;
+    cells.sum = calloc(volume_n_voxel(cells.n), sizeof *cells.sum);
+    cells.outside = calloc(volume_n_voxel(cells.n), 1);
+    const bool done = cells.sum != NULL && cells.outside != NULL;
     memset(b->height, MARK, volume_n_voxel(b->n));
-    for (int pass = 0; pass < 2; pass++)
-        for (c[2] = 0; c[2] < n_block[2]; c[2]++)
-            for (c[1] = 0; c[1] < n_block[1]; c[1]++)
-                for (c[0] = 0; c[0] < n_block[0]; c[0]++) {
-                    double mean = block_mean(b, c, end);
-                    if (pass == 0) least = fmin(least, mean);
-                    if (pass == 0 || mean > least + BLOCK_RANGE * UNIT) continue;
-                    for (size_t k = BLOCK * c[2]; k < end[2]; k++)
-                        for (size_t j = BLOCK * c[1]; j < end[1]; j++)
-                            for (size_t i = BLOCK * c[0]; i < end[0]; i++) {
-                                size_t at = volume_index(b->n, i, j, k);
-                                if (b->density[at] < VOID_DENSITY * UNIT) b->height[at] = b->density[at];
-                            }
-                }
+    if (done) {
+        sum_cells(b, &cells);
+        find_outside(b, &cells);
+    }
+    for (c[2] = 0; c[2] < cells.n[2] && done; c[2]++)
+        for (c[1] = 0; c[1] < cells.n[1]; c[1]++)
+            for (c[0] = 0; c[0] < cells.n[0]; c[0]++) {
+                if (!cells.outside[volume_index(cells.n, c[0], c[1], c[2])]) continue;
+                for (size_t k = CELL * c[2]; k < cell_end(b, c, 2); k++)
+                    for (size_t j = CELL * c[1]; j < cell_end(b, c, 1); j++)
+                        for (size_t i = CELL * c[0]; i < cell_end(b, c, 0); i++) {
+                            const size_t at = volume_index(b->n, i, j, k);
+                            if (b->density[at] < VOID_DENSITY * UNIT) b->height[at] = b->density[at];
+                        }
+            }
+    free(cells.sum);
+    free(cells.outside);
+    return done;
 }
 
 /* New height of voxel `at` of a box, from its neighbours; marked: spreads marks within basins instead. */
@@ -129,11 +185,11 @@ static void sweep(const struct lumen_box *b, bool marked)
     }
 }
 
-/* Marks the basins with a place deeper than `depth` and returns their share of the material. */
-static double mark_basins(const struct lumen_box *b, double depth)
+/* Marks the basins with a place deeper than `depth`. *share: of the material. Returns false without memory. */
+static bool mark_basins(const struct lumen_box *b, double depth, double *share)
 {
     size_t n = volume_n_voxel(b->n), n_material = 0, n_basin = 0;
-    mark_outside(b);
+    if (!mark_outside(b)) return false;
     sweep(b, false);
     for (size_t i = 0; i < n; i++) {
         int deep = b->height[i] - b->density[i]; /* MARK was not reached: a place that sweeps leave out */
@@ -143,7 +199,8 @@ static double mark_basins(const struct lumen_box *b, double depth)
     sweep(b, true);
     for (size_t i = 0; i < n; i++)
         if (b->height[i] == MARK) n_basin++;
-    return n_material > 0 ? (double)n_basin / (double)n_material : 0.0;
+    *share = n_material > 0 ? (double)n_basin / (double)n_material : 0.0;
+    return true;
 }
 
 static status box_share(struct lumen_box *b, double depth, double *share, struct error *err)
@@ -154,8 +211,8 @@ static status box_share(struct lumen_box *b, double depth, double *share, struct
     if (s == STATUS_OK) s = scratch_new(b->v->space, n, "the lumens of fibers", &array[1], err);
     b->density = array[0];
     b->height = array[1];
-    if (s == STATUS_OK && !blur_box(b)) s = error_set(err, STATUS_NO_MEMORY, "cannot look for lumens: out of memory");
-    if (s == STATUS_OK) *share = mark_basins(b, depth);
+    if (s == STATUS_OK && (!blur_box(b) || !mark_basins(b, depth, share)))
+        s = error_set(err, STATUS_NO_MEMORY, "cannot look for lumens: out of memory");
     return s;
 }
 

@@ -1,6 +1,6 @@
-#include "geometry/orientation/lumen_evidence.h"
+#include "geometry/orientation/lumen/lumen_evidence.h"
 #include "geometry/orientation/diameter/scale_space.h"
-#include "geometry/orientation/lumen_fill.h"
+#include "geometry/orientation/lumen/lumen_fill.h"
 
 #include <math.h>
 #include <stdbool.h>

@@ -1,0 +1,20 @@
+/* Tells lumens from the gaps between fibers among the basins that were filled (lumen_fill.h), and fills lumens whole.
+ *
+ * A filled lumen is the middle of a fiber, and a filled gap is not: there the scale-normalised Laplacian of the filled
+ * scan at the scale of the fibers (Lindeberg 1998) has a ridge and a saddle. A single voxel does not tell in the noise
+ * and among neighbours, but the mean over a whole basin does, which is a tube as long as its fiber stays inside of the
+ * scan. Basins with too small a mean are emptied. That is done twice, because filled gaps lower the response of the
+ * lumens beside them. The walls next to the lumens that are left are filled by one voxel, because the rim of a lumen is
+ * shallower than its basin has to be. */
+#ifndef SELVEDGE_GEOMETRY_LUMEN_SIFT_H
+#define SELVEDGE_GEOMETRY_LUMEN_SIFT_H
+
+#include "base/thread_pool.h"
+#include "geometry/volume/volume.h"
+
+/* v: with v->filled of lumens_fill. diameter_voxel: of the fibers, as measured in v. *filled_share: that of lumens_fill
+ * is lowered to what is left of it. STATUS_CANCELLED, STATUS_NO_MEMORY; with a scratch space also STATUS_DISK_FULL. */
+status lumens_sift(struct volume *v, double diameter_voxel, struct thread_pool *pool, double *filled_share,
+                   struct error *err);
+
+#endif
