@@ -63,21 +63,26 @@ void balance_equation_solve(const struct balance_equation *e, double *x)
     }
 }
 
-/* d ln x of the equation above: (I + P) d = source, P = diag(x / want) K diag(x), whose rows sum to 1; half steps
- * converge. */
+/* d ln x of the equation above: (I + P) d = source, P = diag(x / want) K diag(x), whose rows sum to 1. Chebyshev's
+ * iteration for eigenvalues of I + P in [1, 2]: each step leaves 0.17 of the error. Eigenvalues below 1 take more steps
+ * and converge all the same. */
 void balance_equation_derivative(const struct balance_equation *e, const double *x, const double *source, double *d)
 {
-    double *xd = e->work + e->n;
-    for (int i = 0; i < e->n; i++) d[i] = 0.5 * source[i];
+    const double middle = 1.5, half = 0.5;
+    double *xd = e->work + e->n, *step = e->work + 2 * e->n, rho = half / middle;
+    for (int i = 0; i < e->n; i++) d[i] = step[i] = source[i] / middle;
     for (int iteration = 0; iteration < 200; iteration++) {
         for (int i = 0; i < e->n; i++) xd[i] = x[i] * d[i];
         e->multiply(e->kernel, xd, e->work);
+        const double next = 1 / (2 * middle / half - rho);
         double worst = 0;
         for (int i = 0; i < e->n; i++) {
-            double residual = d[i] + x[i] / e->want[i] * e->work[i] - source[i];
+            double residual = source[i] - d[i] - x[i] / e->want[i] * e->work[i];
             worst = fmax(worst, fabs(residual));
-            d[i] -= 0.5 * residual;
+            step[i] = next * rho * step[i] + 2 * next / half * residual;
+            d[i] += step[i];
         }
+        rho = next;
         if (worst < 1e-7) break;
     }
 }

@@ -16,7 +16,7 @@ struct balance_equation {
     void (*multiply)(void *kernel, const double *x, double *y); /* y = K x */
     void *kernel;
     const double *want;
-    double *work; /* 2 n */
+    double *work; /* 3 n */
 };
 /* Finds the positive solution, beginning with the positive x. */
 void balance_equation_solve(const struct balance_equation *e, double *x);
@@ -29,7 +29,7 @@ struct lobe_balance {
     double d_kernel[LOBE_BALANCE_N][LOBE_BALANCE_N]; /* by beta */
     double weight[LOBE_BALANCE_N];                   /* cos^2 u du */
     double share[2 * LOBE_BALANCE_N];                /* k of half an angle of so many nodes; filled in by the caller */
-    double want[LOBE_BALANCE_N], work[2 * LOBE_BALANCE_N], source[LOBE_BALANCE_N];
+    double want[LOBE_BALANCE_N], work[3 * LOBE_BALANCE_N], source[LOBE_BALANCE_N];
 };
 
 /* Fills in the weights of LOBE_BALANCE_N nodes; the share is 0. The functions that multiply and solve also serve other

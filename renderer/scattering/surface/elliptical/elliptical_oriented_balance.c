@@ -32,7 +32,7 @@ typedef double nodes[N_NODE]; /* the azimuths of one angle along the fiber after
 struct balance {
     oriented_folded block[N_BLOCK]; /* of angles t >= u */
     nodes weight, want, x, source, d_ln_x;
-    double work[2 * N_NODE];
+    double work[3 * N_NODE];
 };
 
 /* Mean over the four images of the azimuth j, seen from the azimuth i. */

@@ -23,7 +23,7 @@ struct common {
 /* A row at hand. */
 struct work {
     const struct common *all;
-    double wave[FUR_FAR_N_LOBE][N_WAVE][3][N_SUM]; /* Fourier coefficients: mean of A cos(k Phi), and derivatives */
+    double wave[FUR_FAR_N_LOBE][3][N_SUM][N_WAVE]; /* Fourier coefficients: mean of A cos(k Phi), and derivatives */
     double column[3][N_QUANTITY][FUR_N_PHI + 1];
     double rest[3][N_SUM], energy[FUR_FAR_N_MODE][3];
 };
@@ -58,83 +58,124 @@ static void amplitude(const struct work *w, const struct fur_ray *ray, double we
     }
 }
 
-/* Adds one mode: wave k has the factor even_k cos(k Phi) - odd_k sin(k Phi), whose derivatives by eta, kappa, sigma_ms
- * and g are in d. */
-struct wave_factor {
-    double v, d[FUR_F_GAMMA];
+/* cos(k phi) and sin(k phi) by k, in steps of N_STEP so that neighbours are made side by side. */
+enum { N_STEP = 8 };
+_Static_assert(N_WAVE % N_STEP == 0 && N_MEDULLA_WAVE % N_STEP == 0, "waves come in whole steps");
+
+struct turns {
+    double c[N_WAVE], s[N_WAVE];
 };
 
-static void add_wave(const struct work *w, double to[3][N_SUM], double a[3][N_SUM], const struct wave_factor *f)
+static void fill_turns(struct turns *t, double phi, int n)
 {
-    for (int c = 0; c < w->all->n_color; c++) {
-        to[c][VALUE] += a[c][VALUE] * f->v;
-        for (int q = 0; q < FUR_F_GAMMA; q++) to[c][BY + q] += a[c][BY + q] * f->v + a[c][VALUE] * f->d[q];
-    }
-}
-
-static void add_lobe(struct work *w, const struct fur_ray *ray, int p, double x, double a[3][N_SUM])
-{
-    const double phi = 2 * p * ray->gamma_t - 2 * x + p * M_PI, c1 = cos(phi), s1 = sin(phi);
-    double c = 1, s = 0;
-    for (int k = 0; k < n_wave(p, w->all->gamma); k++) {
-        struct wave_factor f = {c, {0}};
-        f.d[FUR_F_ETA] = -2.0 * p * k * ray->d_gamma_t * s;
-        add_wave(w, w->wave[p][k], a, &f);
-        double next = c * c1 - s * s1;
-        s = s * c1 + c * s1;
-        c = next;
-    }
-}
-
-/* Waves of the density of one ray, and their derivatives. */
-struct medulla_spectrum {
-    double even[1 + MEDULLA_RAY_N_BY], odd[1 + MEDULLA_RAY_N_BY];
-};
-
-static void fill_spectrum(const struct common *all, const struct medulla_ray *m, struct medulla_spectrum *y)
-{
-    for (int q = 0; q <= MEDULLA_RAY_N_BY; q++) {
-        const float *weight = q == 0 ? m->weight : m->d[q - 1];
-        float even[N_MEDULLA_WAVE] = {0}, odd[N_MEDULLA_WAVE] = {0};
-        for (int r = 0; r < MEDULLA_ROUND_RANK; r++)
-            for (int k = 0; k < N_MEDULLA_WAVE; k++) {
-                even[k] += weight[r] * all->even[r][k];
-                odd[k] += weight[r] * all->odd[r][k];
-            }
-        for (int k = 0; k < N_MEDULLA_WAVE; k++) {
-            y[k].even[q] = (double)even[k];
-            y[k].odd[q] = (double)odd[k];
-        }
-    }
-}
-
-static void add_segment(struct work *w, const struct fur_ray *ray, const struct medulla_spectrum *y, int segment,
-                        double x, double a[3][N_SUM])
-{
-    double d_eta, phi = fur_segment_azimuth(ray, segment, x, &d_eta), d_depth[3];
-    fur_depth(&w->all->fiber, ray, d_depth);
     const double c1 = cos(phi), s1 = sin(phi);
-    double c = 1, s = 0;
-    for (int k = 0; k < N_MEDULLA_WAVE; k++) {
-        double by[1 + MEDULLA_RAY_N_BY];
-        for (int q = 0; q <= MEDULLA_RAY_N_BY; q++) by[q] = c * y[k].even[q] - s * y[k].odd[q];
-        const double by_depth = by[1 + MEDULLA_RAY_BY_DEPTH], by_offset = by[1 + MEDULLA_RAY_BY_OFFSET];
-        struct wave_factor f = {by[0], {0}};
-        f.d[FUR_F_ETA] =
-            by_depth * d_depth[0] + by_offset * ray->offset.eta - k * d_eta * (s * y[k].even[0] + c * y[k].odd[0]);
-        f.d[FUR_F_KAPPA] = by_depth * d_depth[1] + by_offset * ray->offset.kappa;
-        f.d[FUR_F_MS] = by_depth * d_depth[2];
-        f.d[FUR_F_G] = by[1 + MEDULLA_RAY_BY_G];
-        add_wave(w, w->wave[FUR_FAR_S][k], a, &f);
+    double c = 1, s = 0; /* of N_STEP times the angle, in the end */
+    for (int k = 0; k < N_STEP; k++) {
+        t->c[k] = c;
+        t->s[k] = s;
         const double next = c * c1 - s * s1;
         s = s * c1 + c * s1;
         c = next;
     }
+    for (int k = N_STEP; k < n; k += N_STEP)
+        for (int i = 0; i < N_STEP; i++) {
+            const double c0 = t->c[k - N_STEP + i], s0 = t->s[k - N_STEP + i];
+            t->c[k + i] = c0 * c - s0 * s;
+            t->s[k + i] = s0 * c + c0 * s;
+        }
 }
 
-/* One offset. All rays carry lobes; every `coarse`th carries the scattered light, which is smooth, with their weight.
- * */
-static void add_ray(struct work *w, double cosine, double x, double weight, int coarse)
+/* Several rays at a time, so that each sum is read and written once for all of them. */
+enum { N_SIDE = 4 };
+_Static_assert(LEAST_OFFSET % N_SIDE == 0, "rays come in whole groups");
+
+struct lobe_rays {
+    double a[FUR_N_LOBE][3][N_SUM][N_SIDE]; /* weight times share of each lobe in each colour, and derivatives */
+    double phi[FUR_N_LOBE][N_SIDE], d_phi[FUR_N_LOBE][N_SIDE]; /* azimuth of exit; by eta */
+};
+
+static void put_lobes(struct lobe_rays *y, int side, const struct fur_ray *ray, double x,
+                      double a[FUR_N_MODE][3][N_SUM], int n_color)
+{
+    for (int p = 0; p < FUR_N_LOBE; p++) {
+        y->phi[p][side] = 2 * p * ray->gamma_t - 2 * x + p * M_PI;
+        y->d_phi[p][side] = 2 * p * ray->d_gamma_t;
+        for (int c = 0; c < n_color; c++)
+            for (int q = 0; q < N_SUM; q++) y->a[p][c][q][side] = a[p][c][q];
+    }
+}
+
+/* Adds the waves cos(k Phi) of one lobe of all rays. Quantities on which a lobe does not depend are 0 for all. */
+static void add_lobe(struct work *w, const struct lobe_rays *y, int p)
+{
+    struct turns t[N_SIDE];
+    const int n = n_wave(p, w->all->gamma);
+    for (int i = 0; i < N_SIDE; i++) fill_turns(&t[i], y->phi[p][i], n);
+    for (int c = 0; c < w->all->n_color; c++)
+        for (int q = 0; q < N_SUM; q++) {
+            const double *a = y->a[p][c][q], a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
+            double *restrict to = w->wave[p][c][q];
+            if (a0 == 0 && a1 == 0 && a2 == 0 && a3 == 0) continue;
+            for (int k = 0; k < n; k++) to[k] += a0 * t[0].c[k] + a1 * t[1].c[k] + a2 * t[2].c[k] + a3 * t[3].c[k];
+        }
+    for (int c = 0; c < w->all->n_color && p > 0; c++) {
+        double *restrict to = w->wave[p][c][BY + FUR_F_ETA], turn[N_SIDE];
+        for (int i = 0; i < N_SIDE; i++) turn[i] = y->a[p][c][VALUE][i] * y->d_phi[p][i];
+        for (int k = 0; k < n; k++)
+            to[k] -= k * (turn[0] * t[0].s[k] + turn[1] * t[1].s[k] + turn[2] * t[2].s[k] + turn[3] * t[3].s[k]);
+    }
+}
+
+/* Waves of the density of one ray, even and odd ones, and their derivatives. */
+struct medulla_spectrum {
+    float even[1 + MEDULLA_RAY_N_BY][N_MEDULLA_WAVE], odd[1 + MEDULLA_RAY_N_BY][N_MEDULLA_WAVE];
+};
+
+static void fill_spectrum(const struct common *all, const struct medulla_ray *m, struct medulla_spectrum *y)
+{
+    memset(y, 0, sizeof *y);
+    for (int q = 0; q <= MEDULLA_RAY_N_BY; q++) {
+        const float *weight = q == 0 ? m->weight : m->d[q - 1];
+        medulla_add_waves(weight, all->even[0], N_MEDULLA_WAVE, y->even[q]);
+        medulla_add_waves(weight, all->odd[0], N_MEDULLA_WAVE, y->odd[q]);
+    }
+}
+
+/* Adds the light of one segment: wave k has the factor even_k cos(k Phi) - odd_k sin(k Phi). */
+static void add_segment(struct work *w, const struct fur_ray *ray, const struct medulla_spectrum *y, int segment,
+                        double x, double a[3][N_SUM])
+{
+    double d_eta, phi = fur_segment_azimuth(ray, segment, x, &d_eta), d_depth[3];
+    double by[1 + MEDULLA_RAY_N_BY][N_MEDULLA_WAVE], turned[N_MEDULLA_WAVE],
+        factor[FUR_F_GAMMA][N_MEDULLA_WAVE] = {{0}};
+    struct turns t;
+    fur_depth(&w->all->fiber, ray, d_depth);
+    fill_turns(&t, phi, N_MEDULLA_WAVE);
+    for (int q = 0; q <= MEDULLA_RAY_N_BY; q++)
+        for (int k = 0; k < N_MEDULLA_WAVE; k++)
+            by[q][k] = t.c[k] * (double)y->even[q][k] - t.s[k] * (double)y->odd[q][k];
+    for (int k = 0; k < N_MEDULLA_WAVE; k++)
+        turned[k] = k * d_eta * (t.s[k] * (double)y->even[0][k] + t.c[k] * (double)y->odd[0][k]);
+    const double *by_depth = by[1 + MEDULLA_RAY_BY_DEPTH], *by_offset = by[1 + MEDULLA_RAY_BY_OFFSET];
+    for (int k = 0; k < N_MEDULLA_WAVE; k++) {
+        factor[FUR_F_ETA][k] = by_depth[k] * d_depth[0] + by_offset[k] * ray->offset.eta - turned[k];
+        factor[FUR_F_KAPPA][k] = by_depth[k] * d_depth[1] + by_offset[k] * ray->offset.kappa;
+        factor[FUR_F_MS][k] = by_depth[k] * d_depth[2];
+        factor[FUR_F_G][k] = by[1 + MEDULLA_RAY_BY_G][k];
+    }
+    for (int c = 0; c < w->all->n_color; c++)
+        for (int q = 0; q < N_SUM; q++) {
+            const double of_share = a[c][q], of_factor = q >= BY ? a[c][VALUE] : 0;
+            const double *slope = factor[q >= BY ? q - BY : 0];
+            double *restrict to = w->wave[FUR_FAR_S][c][q];
+            for (int k = 0; k < N_MEDULLA_WAVE; k++) to[k] += of_share * by[0][k] + of_factor * slope[k];
+        }
+}
+
+/* One offset. All rays carry lobes, which go to one side of `lobes`; every `coarse`th carries the scattered light, which
+ * is smooth, with their weight. */
+static void add_ray(struct work *w, double cosine, double x, double weight, int coarse, struct lobe_rays *lobes,
+                    int side)
 {
     const struct fur_ray ray = fur_ray_at(&w->all->fiber, cosine, x);
     double a[FUR_N_MODE][3][N_SUM];
@@ -147,18 +188,18 @@ static void add_ray(struct work *w, double cosine, double x, double weight, int 
         w->energy[FUR_FAR_REST][c] += out[FUR_REST][VALUE];
         for (int q = 0; q < N_SUM; q++) w->rest[c][q] += out[FUR_REST][q];
     }
-    for (int p = 0; p < FUR_N_LOBE; p++) add_lobe(w, &ray, p, x, a[p]);
+    put_lobes(lobes, side, &ray, x, a, w->all->n_color);
     if (coarse == 0) return;
     struct medulla_ray m;
-    struct medulla_spectrum y[N_MEDULLA_WAVE];
+    struct medulla_spectrum y;
     double unused[3];
     medulla_ray_init(&w->all->around, fur_depth(&w->all->fiber, &ray, unused), ray.offset.v, &m);
-    fill_spectrum(w->all, &m, y);
+    fill_spectrum(w->all, &m, &y);
     for (int segment = 1; segment <= FUR_N_SEGMENT; segment++) {
         double(*b)[N_SUM] = a[FUR_TT_S + segment - 1];
         for (int c = 0; c < w->all->n_color; c++)
             for (int q = 0; q < N_SUM; q++) b[c][q] *= coarse;
-        add_segment(w, &ray, y, segment, x, b);
+        add_segment(w, &ray, &y, segment, x, b);
     }
 }
 
@@ -166,14 +207,16 @@ static void add_ray(struct work *w, double cosine, double x, double weight, int 
 static void add_rays(struct work *w, struct fur_row *row, double cosine)
 {
     const int coarse = n_wave(FUR_R, w->all->gamma) > LEAST_OFFSET - 20 ? 3 : 1, n = coarse * LEAST_OFFSET;
+    struct lobe_rays lobes;
     double sum = 0;
-    memset(w->wave, 0, sizeof w->wave);
+    for (int p = 0; p < FUR_FAR_N_LOBE; p++) memset(w->wave[p], 0, (size_t)w->all->n_color * sizeof w->wave[p][0]);
     memset(w->rest, 0, sizeof w->rest);
     memset(w->energy, 0, sizeof w->energy);
     for (int i = 0; i < n; i++) sum += cos((i + 0.5) * M_PI_2 / n);
     for (int i = 0; i < n; i++) {
         double x = (i + 0.5) * M_PI_2 / n;
-        add_ray(w, cosine, x, cos(x) / sum, i % coarse == coarse / 2 ? coarse : 0);
+        add_ray(w, cosine, x, cos(x) / sum, i % coarse == coarse / 2 ? coarse : 0, &lobes, i % N_SIDE);
+        for (int p = 0; p < FUR_N_LOBE && i % N_SIDE == N_SIDE - 1; p++) add_lobe(w, &lobes, p);
     }
     for (int c = 0; c < 3; c++) {
         const int of = color_of(w, c);
@@ -189,12 +232,13 @@ static void sum_waves(struct work *w, int p)
     const bool lobe = p < FUR_N_LOBE;
     double width = lobe ? mode_width(p, w->all->gamma) : 0, d_width = sqrt(p + 1.0);
     memset(w->column, 0, sizeof w->column);
-    for (int k = 0; k < n_wave(p, w->all->gamma); k++) {
+    for (int k = 0, n = n_wave(p, w->all->gamma); k < n; k++) {
         double factor = exp(-0.5 * k * k * width * width) * (k == 0 ? 0.5 / M_PI : 1 / M_PI);
         double by_gamma = -(double)k * k * width * d_width;
         for (int c = 0; c < w->all->n_color; c++)
             for (int q = 0; q < N_QUANTITY; q++) {
-                double v = factor * (q < N_SUM ? w->wave[p][k][c][q] : w->wave[p][k][c][VALUE] * by_gamma);
+                const double v = factor * (q < N_SUM ? w->wave[p][c][q][k] : w->wave[p][c][VALUE][k] * by_gamma);
+                if (v == 0) continue;
                 for (int j = 0; j <= FUR_N_PHI; j++) w->column[c][q][j] += v * w->all->cosine[k][j];
             }
     }
@@ -208,7 +252,7 @@ static void store(const struct work *w, struct fur_cell *cell, struct fur_slope 
         mean[j] = 0;
         for (int c = 0; c < 3; c++) {
             const int of = color_of(w, c);
-            bool faded = w->column[of][VALUE][j] <= FADED * w->wave[p][0][of][VALUE];
+            bool faded = w->column[of][VALUE][j] <= FADED * w->wave[p][of][VALUE][0];
             mean[j] += faded ? 0 : w->column[of][VALUE][j] / 3;
             cell[j].n[p][c] = faded ? 0 : (float)w->column[of][VALUE][j];
             for (int q = 0; q < FUR_F_N; q++) slope[j].n[p][q][c] = faded ? 0 : (float)w->column[of][BY + q][j];

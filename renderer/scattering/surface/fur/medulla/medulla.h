@@ -56,6 +56,13 @@ void medulla_ray_init(const struct medulla_around *m, double depth, double offse
 double medulla_ray_density(const struct medulla_ray *ray, double psi, double *d);
 /* Coefficients of cos(k psi) and sin(k psi) of each function of psi, whose integral is 1: integrals of the products. */
 void medulla_waves(int n_wave, float (*cosine)[MEDULLA_ROUND_RANK], float (*sine)[MEDULLA_ROUND_RANK]);
+/* Adds the waves of a ray, of[r * n + k] being those of function r of psi. */
+static inline void medulla_add_waves(const float weight[MEDULLA_ROUND_RANK], const float *of, int n,
+                                     float *restrict sum)
+{
+    for (int r = 0; r < MEDULLA_ROUND_RANK; r++)
+        for (int k = 0; k < n; k++) sum[k] += weight[r] * of[r * n + k];
+}
 
 /* ---- along the fiber ---- */
 
