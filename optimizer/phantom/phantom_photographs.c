@@ -107,7 +107,7 @@ static status load_scene(const struct phantom_photograph_option *o, struct scene
         if (o->tile_mm[a] > 0.0) f.tile_size_m[a] = 1e-3 * o->tile_mm[a];
     if (st == STATUS_OK) st = fiber_set_validate(&f, err);
     if (st == STATUS_OK) {
-        const struct scene_option option = {.black_sheet = o->black_sheet};
+        const struct scene_option option = {.black_sheet = o->black_sheet, .sections = o->model->width != NULL};
         st = scene_new(&f, &option, scene, err);
         json_object_set_new(truth, "n_fiber", json_integer((json_int_t)f.n_fiber));
         json_object_set_new(truth, "tile_mm", json_pack("[f,f]", 1e3 * f.tile_size_m[0], 1e3 * f.tile_size_m[1]));

@@ -1,6 +1,6 @@
 #include "base/ranks/unique_number.h"
 #include "renderer/scene/bent/bent_scene.h"
-#include "renderer/scene/scene_data.h"
+#include "renderer/scene/scene_ellipse.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -138,10 +138,28 @@ static bool has_flat_sections(const struct fiber_set *f)
     return sum > FIBER_RATIO_FLAT * n;
 }
 
+/* Lowest and highest z of the surfaces, those of elliptical sections as of a level fiber, which reaches farthest. */
+static void z_range(const struct fiber_set *f, bool sections, double *z_min_m, double *z_max_m)
+{
+    fiber_set_z_range_m(f, z_min_m, z_max_m);
+    if (!sections) return;
+    *z_min_m = INFINITY;
+    *z_max_m = -INFINITY;
+    for (size_t v = 0; v < f->n_vertex; v++) {
+        const struct fiber_shape *y = &f->shape[v];
+        const double ratio = (double)y->ratio, up2 = (double)(y->long_axis[2] * y->long_axis[2]),
+                     reach = (double)y->radius * sqrt(ratio * up2 + (1 - up2) / ratio),
+                     z = (double)f->position_m[3 * v + 2];
+        *z_min_m = fmin(*z_min_m, z - reach);
+        *z_max_m = fmax(*z_max_m, z + reach);
+    }
+}
+
 /* Gives the last vertex the section at vertex v of the set. */
 static void add_section(struct scene *s, const struct fiber_set *f, size_t v)
 {
     if (s->long_axis != NULL) memcpy(s->long_axis[s->n_vertex - 1], f->shape[v].long_axis, sizeof *s->long_axis);
+    if (s->ratio != NULL) s->ratio[s->n_vertex - 1] = f->shape[v].ratio;
 }
 
 static void add_segments(struct scene *s, size_t first, size_t i_fiber)
@@ -155,14 +173,14 @@ static void add_segments(struct scene *s, size_t first, size_t i_fiber)
 }
 
 /* Vertices in millimetres, z from the top; repeated points are left out, and fibers of one point with them. */
-static status copy_fibers(struct scene *s, const struct fiber_set *f, struct error *err)
+static status copy_fibers(struct scene *s, const struct fiber_set *f, const struct scene_option *o, struct error *err)
 {
     double z_min_m, z_max_m;
     size_t n = 0;
     status st = check_reach(f, err);
     if (st == STATUS_OK) st = count_vertices(f, &n, err);
     if (st != STATUS_OK) return st;
-    fiber_set_z_range_m(f, &z_min_m, &z_max_m);
+    z_range(f, o->sections && has_flat_sections(f), &z_min_m, &z_max_m);
     s->bottom_mm = (float)((z_min_m - z_max_m) * MM_PER_M);
     s->vertex = malloc(n * sizeof *s->vertex);
     s->segment_vertex = malloc(n * sizeof *s->segment_vertex);
@@ -172,7 +190,8 @@ static status copy_fibers(struct scene *s, const struct fiber_set *f, struct err
         return error_set(err, STATUS_NO_MEMORY, "cannot build scene: no memory for %zu vertices", n);
     if (has_flat_sections(f)) {
         s->long_axis = malloc(n * sizeof *s->long_axis);
-        if (s->long_axis == NULL)
+        if (o->sections) s->ratio = malloc(n * sizeof *s->ratio);
+        if (s->long_axis == NULL || (o->sections && s->ratio == NULL))
             return error_set(err, STATUS_NO_MEMORY, "cannot build scene: no memory for %zu sections", n);
     }
     for (size_t i = 0; i < f->n_fiber; i++) {
@@ -215,6 +234,7 @@ static status choose_block(struct scene *s, const struct fiber_set *f, struct er
     float lo[2] = {INFINITY, INFINITY}, hi[2] = {-INFINITY, -INFINITY};
     for (size_t v = 0; v < s->n_vertex; v++) {
         float p[2] = {s->vertex[v].x, s->vertex[v].y}, r = s->vertex[v].radius;
+        if (s->ratio != NULL) r *= sqrtf(s->ratio[v]);
         for (int a = 0; a < 2; a++) {
             lo[a] = fminf(lo[a], p[a] - r);
             hi[a] = fmaxf(hi[a], p[a] + r);
@@ -237,7 +257,7 @@ static status choose_block(struct scene *s, const struct fiber_set *f, struct er
     return STATUS_OK;
 }
 
-static void build_tile(struct scene *s)
+static RTCGeometry round_geometry(struct scene *s)
 {
     RTCGeometry g = rtcNewGeometry(s->device, RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE);
     rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, s->vertex, 0, sizeof *s->vertex,
@@ -247,6 +267,12 @@ static void build_tile(struct scene *s)
     rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_FLAGS, 0, RTC_FORMAT_UCHAR, s->segment_flag, 0, 1, s->n_segment);
     rtcSetGeometryIntersectFilterFunction(g, reject_back_faces);
     rtcSetGeometryOccludedFilterFunction(g, scene_occlusion_filter);
+    return g;
+}
+
+static void build_tile(struct scene *s)
+{
+    RTCGeometry g = s->ellipse != NULL ? scene_ellipse_geometry(s) : round_geometry(s);
     rtcCommitGeometry(g);
     s->tile = rtcNewScene(s->device);
     rtcAttachGeometry(s->tile, g);
@@ -273,6 +299,8 @@ static void build_block(struct scene *s)
 status scene_build(struct scene *s, struct error *err)
 {
     struct error device_error = {0};
+    status st = s->ratio != NULL ? scene_ellipse_fill(s, err) : STATUS_OK;
+    if (st != STATUS_OK) return st;
     s->number = unique_number();
     /* one build thread: the order of the tree's leaves, which decides ties, must not depend on timing */
     s->device = rtcNewDevice(s->no_avx512 ? "threads=1,set_affinity=0,isa=avx2" : "threads=1,set_affinity=0");
@@ -296,7 +324,7 @@ status scene_new(const struct fiber_set *f, const struct scene_option *o, struct
     if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot build scene: out of memory");
     s->black_sheet = o->black_sheet;
     s->no_avx512 = o->no_avx512;
-    st = copy_fibers(s, f, err);
+    st = copy_fibers(s, f, o, err);
     if (st == STATUS_OK) st = copy_groups(s, f, err);
     if (st == STATUS_OK) st = choose_block(s, f, err);
     if (st == STATUS_OK) st = scene_build(s, err);
@@ -323,6 +351,8 @@ void scene_free(struct scene *s)
     free(s->segment_flag);
     free(s->segment_group);
     free(s->long_axis);
+    free(s->ratio);
+    free(s->ellipse);
     free(s);
 }
 
@@ -331,7 +361,9 @@ size_t scene_memory_bytes(const struct scene *s)
     if (s->bent != NULL) return bent_memory_bytes(s);
     long long device = atomic_load(&s->device_bytes);
     return sizeof *s + (device > 0 ? (size_t)device : 0) +
-           s->n_vertex * (sizeof *s->vertex + (s->long_axis != NULL ? sizeof *s->long_axis : 0)) +
+           s->n_vertex * (sizeof *s->vertex + (s->long_axis != NULL ? sizeof *s->long_axis : 0) +
+                          (s->ratio != NULL ? sizeof *s->ratio : 0)) +
+           (s->ellipse != NULL ? s->n_segment * sizeof *s->ellipse : 0) +
            s->n_segment * (sizeof *s->segment_vertex + sizeof *s->segment_fiber + 1 + (s->segment_group != NULL));
 }
 

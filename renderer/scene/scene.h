@@ -1,6 +1,6 @@
-/* A cloth ready for ray tracing: fibers as Embree round linear curves, one tile, instanced in a block; beyond the block
- * rays are wrapped by whole tiles, so the cloth has no edge. Immutable after scene_new: shared by threads. Millimetres
- * inside.
+/* A cloth ready for ray tracing: fibers as Embree round linear curves, or as elliptical cylinders, one tile, instanced
+ * in a block; beyond the block rays are wrapped by whole tiles, so the cloth has no edge. Immutable after scene_new:
+ * shared by threads. Millimetres inside.
  */
 #ifndef SELVEDGE_RENDERER_SCENE_H
 #define SELVEDGE_RENDERER_SCENE_H
@@ -16,6 +16,7 @@ struct scene;
 
 struct scene_option {
     bool black_sheet; /* true: light that passes the cloth downwards is absorbed and none comes from below */
+    bool sections;    /* true: fibers with measured flat sections have them as surfaces, as ellipses of the same area */
     bool no_avx512;   /* Embree may use AVX2 at most: what a machine without AVX-512 does */
 };
 

@@ -13,6 +13,7 @@ enum { SCENE_MAX_HALF_BLOCK = 12 };
 #define SCENE_MARGIN_MM 1e-3f
 
 struct bent_cloth;
+struct scene_ellipse;
 
 struct scene_vertex {
     float x, y, z, radius; /* Embree's FLOAT4 */
@@ -29,6 +30,8 @@ struct scene {
     uint8_t *segment_group; /* NULL: all 0 */
     float (
         *long_axis)[3]; /* of each vertex: that of its section, a unit vector; NULL: sections are taken to be round */
+    float *ratio;       /* of each vertex: long over short axis; NULL: surfaces are round tubes */
+    struct scene_ellipse *ellipse; /* of each segment, where there are ratios (scene_ellipse.h) */
     size_t n_group;
     double tile_mm[2];
     int half_block[2];                       /* the block has 2 h + 1 tiles a side, the centre one at [0, tile) */
@@ -42,6 +45,9 @@ struct scene {
 
 /* Builds Embree's trees of a scene whose other members are filled in. STATUS_UNSUPPORTED, STATUS_NO_MEMORY. */
 status scene_build(struct scene *s, struct error *err);
+/* The short axis of the section of a segment whose unit tangent is given, unit and across it. False: its long axis runs
+ * along the segment. */
+bool scene_short_axis(const struct scene *s, size_t i_segment, const float tangent[3], float axis[3]);
 /* The nearest front face of the flat cloth over `span` of a ray, whose direction may have any length; *distance and
  * span are in units of it. The ray is moved by whole tiles. */
 bool scene_trace_span(const struct scene *scene, struct scene_ray *ray, float span, struct scene_hit *hit,

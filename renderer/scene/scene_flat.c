@@ -1,5 +1,5 @@
 /* Rays through the flat cloth: from block to block of its tiles. */
-#include "renderer/scene/scene_data.h"
+#include "renderer/scene/scene_ellipse.h"
 
 #include <math.h>
 
@@ -64,7 +64,8 @@ static void fill_hit(const struct scene *s, const struct scene_ray *r, const str
     float t[3] = {v[1].x - v[0].x, v[1].y - v[0].y, v[1].z - v[0].z};
     inv = 1 / sqrtf(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
     for (int a = 0; a < 3; a++) hit->tangent[a] = t[a] * inv;
-    hit->radius_mm = v[0].radius + q->hit.u * (v[1].radius - v[0].radius);
+    hit->radius_mm = s->ellipse != NULL ? s->ellipse[hit->i_segment].sharpest_mm
+                                        : v[0].radius + q->hit.u * (v[1].radius - v[0].radius);
     hit->i_cell = 0;
 }
 

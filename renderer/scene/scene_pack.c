@@ -10,7 +10,7 @@ struct scene_head {
     double tile_mm[2];
     int32_t half_block[2];
     float inset_low_mm[2], inset_high_mm[2], bottom_mm;
-    uint8_t black_sheet, no_avx512, has_group, has_axis;
+    uint8_t black_sheet, no_avx512, has_group, has_axis, has_ratio;
 };
 
 uint64_t scene_number(const struct scene *s) { return s->number; }
@@ -32,7 +32,8 @@ void scene_pack(const struct scene *s, struct byte_pack *p)
                            .black_sheet = s->black_sheet,
                            .no_avx512 = s->no_avx512,
                            .has_group = s->segment_group != NULL,
-                           .has_axis = s->long_axis != NULL};
+                           .has_axis = s->long_axis != NULL,
+                           .has_ratio = s->ratio != NULL};
     for (int a = 0; a < 2; a++) {
         h.tile_mm[a] = s->tile_mm[a];
         h.half_block[a] = s->half_block[a];
@@ -46,6 +47,7 @@ void scene_pack(const struct scene *s, struct byte_pack *p)
     byte_pack_put(p, s->segment_flag, s->n_segment);
     if (h.has_group) byte_pack_put(p, s->segment_group, s->n_segment);
     if (h.has_axis) byte_pack_put(p, s->long_axis, s->n_vertex * sizeof *s->long_axis);
+    if (h.has_ratio) byte_pack_put(p, s->ratio, s->n_vertex * sizeof *s->ratio);
 }
 
 static bool in_range(const struct scene *s)
@@ -83,6 +85,7 @@ status scene_unpack(struct byte_view *v, struct scene **scene, struct error *err
     s->segment_flag = byte_view_array(v, s->n_segment, 1);
     if (h.has_group) s->segment_group = byte_view_array(v, s->n_segment, 1);
     if (h.has_axis) s->long_axis = byte_view_array(v, s->n_vertex, sizeof *s->long_axis);
+    if (h.has_ratio) s->ratio = byte_view_array(v, s->n_vertex, sizeof *s->ratio);
     status st = byte_view_check(v, err);
     if (st == STATUS_OK && !in_range(s)) st = error_set(err, STATUS_FORMAT, "a scene of another rank is none");
     if (st == STATUS_OK) st = scene_build(s, err);

@@ -46,20 +46,19 @@ void scene_place_of(const struct scene *s, const struct scene_hit *hit, const do
     }
 }
 
-bool scene_section_normal(const struct scene *s, const struct scene_hit *hit, float normal[3])
+/* The mean long axis of both ends of a segment; an axis has no sign. */
+static void long_axis_of(const struct scene *s, size_t i_segment, float axis[3])
 {
-    if (s->long_axis == NULL) return false;
-    const size_t v = s->segment_vertex[hit->i_segment];
-    const float *a = s->long_axis[v], *b = s->long_axis[v + 1], *t = hit->tangent;
-    const float sign = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] < 0 ? -1.0f : 1.0f; /* an axis has no sign */
-    float axis[3] = {a[0] + sign * b[0], a[1] + sign * b[1], a[2] + sign * b[2]}, length2 = 0;
-    if (s->bent != NULL) {
-        const struct shell_cell *c = &s->bent->space.shell.cell[hit->i_cell];
-        const float flat[3] = {axis[0], axis[1], axis[2]};
-        for (int i = 0; i < 3; i++)
-            axis[i] = (float)(c->to_world[i][0] * (double)flat[0] + c->to_world[i][1] * (double)flat[1] +
-                              c->to_world[i][2] * (double)flat[2]);
-    }
+    const size_t v = s->segment_vertex[i_segment];
+    const float *a = s->long_axis[v], *b = s->long_axis[v + 1];
+    const float sign = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] < 0 ? -1.0f : 1.0f;
+    for (int i = 0; i < 3; i++) axis[i] = a[i] + sign * b[i];
+}
+
+/* Unit vector at right angles with a long axis and a tangent. */
+static bool across_both(const float axis[3], const float t[3], float normal[3])
+{
+    float length2 = 0;
     for (int i = 0; i < 3; i++) {
         normal[i] = axis[(i + 1) % 3] * t[(i + 2) % 3] - axis[(i + 2) % 3] * t[(i + 1) % 3];
         length2 += normal[i] * normal[i];
@@ -68,6 +67,30 @@ bool scene_section_normal(const struct scene *s, const struct scene_hit *hit, fl
     for (int i = 0; i < 3; i++) normal[i] /= sqrtf(length2);
     return true;
 }
+
+bool scene_short_axis(const struct scene *s, size_t i_segment, const float tangent[3], float axis[3])
+{
+    float along[3];
+    long_axis_of(s, i_segment, along);
+    return across_both(along, tangent, axis);
+}
+
+bool scene_section_normal(const struct scene *s, const struct scene_hit *hit, float normal[3])
+{
+    if (s->long_axis == NULL) return false;
+    float axis[3];
+    long_axis_of(s, hit->i_segment, axis);
+    if (s->bent != NULL) {
+        const struct shell_cell *c = &s->bent->space.shell.cell[hit->i_cell];
+        const float flat[3] = {axis[0], axis[1], axis[2]};
+        for (int i = 0; i < 3; i++)
+            axis[i] = (float)(c->to_world[i][0] * (double)flat[0] + c->to_world[i][1] * (double)flat[1] +
+                              c->to_world[i][2] * (double)flat[2]);
+    }
+    return across_both(axis, hit->tangent, normal);
+}
+
+bool scene_shows_sections(const struct scene *s) { return s->ratio != NULL; }
 
 static void scaled_to_one(float v[3])
 {
@@ -162,5 +185,6 @@ uint64_t scene_checksum(const struct scene *s, uint64_t from)
     h = add_bytes(h, s->segment_vertex, s->n_segment * sizeof *s->segment_vertex);
     if (s->segment_group != NULL) h = add_bytes(h, s->segment_group, s->n_segment);
     if (s->long_axis != NULL) h = add_bytes(h, s->long_axis, s->n_vertex * sizeof *s->long_axis);
+    if (s->ratio != NULL) h = add_bytes(h, s->ratio, s->n_vertex * sizeof *s->ratio);
     return add_bytes(h, s->tile_mm, sizeof s->tile_mm);
 }

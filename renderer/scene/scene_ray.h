@@ -24,9 +24,9 @@ struct scene_hit {
     float position_mm[3]; /* local to the ray's final offset */
     float normal[3];      /* unit, out of the fiber */
     float tangent[3];     /* unit, along the fiber */
-    float radius_mm;
-    uint32_t i_segment; /* scene_fiber_of gives its fiber */
-    uint32_t i_cell;    /* of a bent cloth */
+    float radius_mm;      /* of an elliptical section: its least radius of curvature */
+    uint32_t i_segment;   /* scene_fiber_of gives its fiber */
+    uint32_t i_cell;      /* of a bent cloth */
 };
 
 /* Nearest front face. The ray is moved along by whole tiles (offset and origin change together). False: the ray leaves
@@ -67,10 +67,11 @@ bool scene_sheet_hides(const struct scene *scene, const float direction[3]);
 bool scene_sheet_met(const struct scene *scene, const struct scene_ray *ray);
 /* The unit normal of a bent cloth where a fiber was hit. False: the cloth is flat, and its normal is z. */
 bool scene_bent_normal(const struct scene *scene, const struct scene_hit *hit, float normal[3]);
-/* The direction of the short axis of the fiber's section where it was hit, unit and across the fiber. Surfaces are
- * round all the same. False: the sections of the cloth were not measured, or are round (mean ratio of axes up to
- * FIBER_RATIO_FLAT). */
+/* The direction of the short axis of the fiber's section where it was hit, unit and across the fiber. False: the
+ * sections of the cloth were not measured, or are round (mean ratio of axes up to FIBER_RATIO_FLAT). */
 bool scene_section_normal(const struct scene *scene, const struct scene_hit *hit, float normal[3]);
+/* Whether surfaces are elliptical cylinders with these sections (scene_option.sections), and not round tubes. */
+bool scene_shows_sections(const struct scene *scene);
 /* z of the lowest fiber surface (the top is 0). */
 double scene_thickness_mm(const struct scene *scene);
 

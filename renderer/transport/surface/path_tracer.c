@@ -1,4 +1,6 @@
+#include "renderer/transport/surface/fiber_walk.h"
 #include "renderer/transport/surface/path_factor.h"
+#include "renderer/transport/surface/path_scatter.h"
 
 #include "renderer/transport/path_value.h"
 
@@ -31,10 +33,7 @@ static void add_light_to_all(struct walk *w, const float value[3], const float *
 
 static void leave(struct walk *w, const struct bounce *b, const float direction[3], struct scene_ray *ray)
 {
-    if (w->s->model->across_width)
-        scene_ray_leave_across(&b->hit, b->offset_mm, direction, rng_float(w->rng), ray);
-    else
-        scene_ray_leave(&b->hit, b->offset_mm, direction, ray);
+    fiber_walk_leave(w->s->model, &b->hit, b->offset_mm, direction, w->rng, ray);
 }
 
 /* Next-event estimation from a bounce to one point on the lamp. weight: multiple-importance weight of this connection,
@@ -49,7 +48,7 @@ static float connect_lamp(struct walk *w, const struct lamp *lamp, float weight,
     if (!lamp_sample(lamp, position, u, direction, &pdf_lamp)) return 0;
     if (scene_sheet_hides(s->scene, direction)) return 0;
     fiber_frame_to_local(&b->frame, direction, wi);
-    float pdf = s->model->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
+    float pdf = path_scatter(w, b, wi, s_rgb);
     float heuristic = path_walk_connects_all(w) ? 1 : lights_power_heuristic(pdf_lamp, pdf), value[3],
           light = weight * lamp_radiance(lamp, direction) * fiber_frame_cos_theta(wi) / pdf_lamp * heuristic;
     for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * s_rgb[c] * light;
@@ -81,7 +80,7 @@ static void connect_image(struct walk *w, const struct bounce *b)
     if (!lights_sample_image(&s->lights, u, direction, radiance, &pdf_image)) return;
     if (scene_sheet_hides(s->scene, direction)) return;
     fiber_frame_to_local(&b->frame, direction, wi);
-    float pdf = s->model->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
+    float pdf = path_scatter(w, b, wi, s_rgb);
     float weight = fiber_frame_cos_theta(wi) / pdf_image * lights_power_heuristic(pdf_image, pdf);
     for (int c = 0; c < 3; c++) {
         radiance[c] *= weight;
@@ -200,7 +199,7 @@ static void trace_guided_path(struct walk *w, size_t i_lamp, const struct bounce
     u[1] = rng_float(w->rng);
     light_guide_sample(w->towards[i_lamp], u, direction);
     fiber_frame_to_local(&b->frame, direction, wi);
-    float pdf = s->model->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
+    float pdf = path_scatter(w, b, wi, s_rgb);
     float weight = fiber_frame_cos_theta(wi) / (pdf + w->p_guided * light_guide_pdf(w->towards[i_lamp], direction));
     for (int c = 0; c < 3; c++) next[c] = w->throughput[c] * s_rgb[c] * weight;
     float most = path_value_largest(next);
@@ -273,7 +272,7 @@ static bool scatter(struct walk *w, const struct bounce *b, struct scene_ray *ra
     float u[3], wi[3], s_rgb[3], direction[3], survival = 1;
     for (int a = 0; a < 3; a++) u[a] = rng_float(w->rng);
     s->model->sample(w->state, b->wo, w->throughput, u, wi);
-    float pdf = s->model->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, s->want_jacobian ? w->score : NULL);
+    float pdf = path_scatter(w, b, wi, s_rgb);
     if (pdf == 0) return false; /* rounding gave a direction along the fiber, into which nothing is scattered */
     float weight = fiber_frame_cos_theta(wi) / pdf, next[3];
     for (int c = 0; c < 3; c++) next[c] = w->throughput[c] * s_rgb[c] * weight;

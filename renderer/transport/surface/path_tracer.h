@@ -26,6 +26,7 @@ struct path_setting {
     struct lights lights;
     bool guided_paths;                                    /* trace guided shadow paths: less variance, same mean */
     struct light_guide_energy energy[SCATTERING_MAX_SET]; /* by material group: sets how many guided paths there are */
+    bool shows_width;     /* the scene has the sections of the fibers as surfaces, and the model states their widths */
     float roulette_below; /* throughput under which paths are ended at random; 0: never */
     /* Ends paths at their n_traced-th hit (0: nowhere): what that scatters of light that nothing scattered before is
      * added as ever, and of the other light what finish knows: rgb, radiance along the ray reversed. A share of the
@@ -98,7 +99,8 @@ void path_trace(const struct path_setting *s, struct scene_ray *ray, struct rng 
 void path_trace_lamps(const struct path_setting *s, const struct lamp *lamp, size_t n_lamp, struct scene_ray *ray,
                       struct rng *rng, struct path_result *out);
 
-/* Sum over channels of the radiance that a recorded path has with other parameters, by the formula at path_step. */
-double path_replay(const struct parameter_sets *sets, const struct path_record *record);
+/* Sum over channels of the radiance that a recorded path has with other parameters, by the formula at path_step.
+ * shows_width: that of the path's setting; S has the widths as a factor then. */
+double path_replay(const struct parameter_sets *sets, const struct path_record *record, bool shows_width);
 
 #endif

@@ -105,10 +105,10 @@ static void record_path(const void *state, size_t i_configuration, const double 
 
 static double replay(const void *at, const void *traced, const struct radiance_record *record)
 {
-    (void)traced; /* its sampling is in the record */
+    const struct surface_state *by = traced; /* its sampling is in the record */
     const struct parameter_sets *sets = &((const struct surface_state *)at)->sets;
     const struct path_record steps = {record->n_entry, record->capacity, record->entry};
-    return path_replay(sets, &steps);
+    return path_replay(sets, &steps, by->setting[0].shows_width);
 }
 
 const struct radiance_tracer surface_radiance = {.max_member = PATH_MAX_LAMP,

@@ -63,10 +63,24 @@ static void release_scenes(struct pipeline_context *c)
     c->has_volume_scene = false;
 }
 
+/* Whether fibers are traced with their measured sections: where all models of fibers state the width that a section
+ * shows. The others are made for round tubes. */
+static bool wants_sections(const struct pipeline_context *c)
+{
+    bool has_surface = false;
+    for (size_t i = 0; i < c->n_model; i++) {
+        const struct appearance *a = &c->model[i].appearance;
+        if (a->kind != MODEL_SURFACE) continue;
+        if (a->surface->width == NULL) return false;
+        has_surface = true;
+    }
+    return has_surface;
+}
+
 status pipeline_fiber_scene(const struct pipeline_context *c, const struct fiber_set *f, struct scene **scene,
                             struct error *err)
 {
-    const struct scene_option option = {.black_sheet = c->doc->black_sheet};
+    const struct scene_option option = {.black_sheet = c->doc->black_sheet, .sections = wants_sections(c)};
     return scene_new(f, &option, scene, err);
 }
 

@@ -23,7 +23,7 @@
  *
  * In a scene of round tubes the two projected widths are those of the tube and drop out of what leaves along wo
  * (thesis, equation 2.11): the light that leaves a fiber towards each side is right, and its shadows are those of the
- * tube. */
+ * tube. In a scene of elliptical sections (scene_option.sections) their ratio is a factor (path_scatter.h). */
 #ifndef SELVEDGE_RENDERER_ELLIPTICAL_ORIENTED_H
 #define SELVEDGE_RENDERER_ELLIPTICAL_ORIENTED_H
 

@@ -172,8 +172,8 @@ static void add_segment(struct work *w, const struct fur_ray *ray, const struct 
         }
 }
 
-/* One offset. All rays carry lobes, which go to one side of `lobes`; every `coarse`th carries the scattered light, which
- * is smooth, with their weight. */
+/* One offset. All rays carry lobes, which go to one side of `lobes`; every `coarse`th carries the scattered light,
+ * which is smooth, with their weight. */
 static void add_ray(struct work *w, double cosine, double x, double weight, int coarse, struct lobe_rays *lobes,
                     int side)
 {

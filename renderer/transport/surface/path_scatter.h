@@ -1,0 +1,25 @@
+/* What a fiber scatters at a bounce of a path. Inside of path_tracer.c. */
+#ifndef SELVEDGE_RENDERER_PATH_SCATTER_H
+#define SELVEDGE_RENDERER_PATH_SCATTER_H
+
+#include "renderer/transport/surface/path_walk.h"
+
+/* Width that a section shows to the light over that which it shows to wo: D(ph_i) / D(ph_o) of the fabric thesis,
+ * equation 2.11. score: NULL, or [3 * n_param], to which the derivatives of its logarithm are added. */
+float path_scatter_widths(const struct scattering_model *m, const struct scattering_state *state, const float wi[3],
+                          const float wo[3], float *score);
+
+/* S of the fiber at bounce b in rgb, with the widths of its section where the scene shows them, and the density of the
+ * sample; with a Jacobian, the derivatives of ln S to walk.score. */
+static inline float path_scatter(struct walk *w, const struct bounce *b, const float wi[3], float s_rgb[3])
+{
+    const struct path_setting *s = w->s;
+    float *score = s->want_jacobian ? w->score : NULL;
+    const float pdf = s->model->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, score);
+    if (!s->shows_width) return pdf;
+    const float widths = path_scatter_widths(s->model, w->state, wi, b->wo, score);
+    for (int c = 0; c < 3; c++) s_rgb[c] *= widths;
+    return pdf;
+}
+
+#endif
