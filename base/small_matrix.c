@@ -47,8 +47,8 @@ static inline bool factor_row(double *row, size_t n_band, size_t n_before, doubl
     return true;
 }
 
-/* The band of second differences of points in space, which most systems have. */
-enum { BAND_OF_POINTS = 7 };
+/* The band of second differences of points in space, which most systems have, and of differences of these. */
+enum { BAND_OF_POINTS = 7, BAND_OF_BENDS = 10 };
 
 static bool factor_banded(double *m, size_t n, size_t n_band)
 {
@@ -59,6 +59,10 @@ static bool factor_banded(double *m, size_t n, size_t n_band)
     if (n_band == BAND_OF_POINTS) {
         for (; i < n; i++)
             if (!factor_row(m + i * BAND_OF_POINTS, BAND_OF_POINTS, BAND_OF_POINTS - 1, inverse)) return false;
+    }
+    if (n_band == BAND_OF_BENDS) {
+        for (; i < n; i++)
+            if (!factor_row(m + i * BAND_OF_BENDS, BAND_OF_BENDS, BAND_OF_BENDS - 1, inverse)) return false;
     }
     for (; i < n; i++)
         if (!factor_row(m + i * n_band, n_band, n_band - 1, inverse)) return false;

@@ -3,6 +3,7 @@
 #include "base/lanes.h"
 #include "geometry/fibers/slices/blob_response.h"
 #include "geometry/fibers/slices/center_refine.h"
+#include "geometry/fibers/slices/center_slope.h"
 #include "geometry/fibers/slices/pixel_bits.h"
 #include "geometry/fibers/slices/slice_image.h"
 #include "geometry/fibers/slices/slice_peaks.h"
@@ -14,7 +15,7 @@
 
 enum {
     N_SCALE = 5,
-    PEAK_REACH = 2, /* pixels to a kept voxel's from a peak that has a slope (find_slope) */
+    PEAK_REACH = 2, /* pixels to a kept voxel's from a peak that has a slope (center_slope.h) */
     N_BYTES = 3     /* sets of pixels in the work of a thread */
 };
 static const double scale_factor[N_SCALE] = {0.58, 0.70, 0.85, 1.03, 1.25}; /* of diameter / (2 sqrt 2) */
@@ -35,9 +36,8 @@ struct slice_result {
 };
 
 struct detect_job {
+    const struct center_search *search;
     const struct volume *v;
-    const struct direction_volume *d;
-    const uint16_t *mask;
     const struct slice_frame *frame;
     size_t first;                   /* slice of task 0 of the slab */
     struct slice_pictures pictures; /* of the slab */
@@ -68,46 +68,13 @@ void center_list_release(struct center_list *l)
     *l = (struct center_list){0};
 }
 
-/* Finds the voxel that holds point x. Returns false, with the nearest voxel, if x lies outside of the volume. */
-static bool voxel_at(const size_t n[3], const float x[3], size_t at[3])
+/* Finds the slopes of the centers, and leaves out those without one. */
+static void find_slopes(const struct detect_job *job, size_t i_slice, struct slice_result *r)
 {
-    bool inside = true;
-    for (int a = 0; a < 3; a++) {
-        inside = inside && x[a] >= 0.0f && x[a] < (float)n[a];
-        at[a] = x[a] <= 0.0f ? 0 : x[a] >= (float)n[a] - 1.0f ? n[a] - 1 : (size_t)x[a];
-    }
-    return inside;
-}
-
-/* Computes the mean direction of the class's voxels within one pixel of (u, v), as slopes. Returns false if there
- * are none or the center lies outside of the volume. */
-static bool find_slope(const struct detect_job *job, size_t i_slice, struct center *c)
-{
-    const struct slice_frame *f = job->frame;
-    float sum[3] = {0.0f, 0.0f, 0.0f}, x[3]; /* along u, v, w */
-    size_t at[3];
-    slice_frame_point(f, c->u, c->v, (float)i_slice + 0.5f, x);
-    if (!voxel_at(job->v->n, x, at)) return false;
-    for (int v = -1; v <= 1; v++)
-        for (int u = -1; u <= 1; u++) {
-            slice_frame_point(f, c->u + (float)u, c->v + (float)v, (float)i_slice + 0.5f, x);
-            if (!voxel_at(job->v->n, x, at)) continue;
-            size_t voxel = volume_index(job->v->n, at[0], at[1], at[2]);
-            if ((job->mask[voxel] >> f->index & 1) == 0 || job->mask[voxel] < CLASS_KEPT) continue;
-            float d[3], local[3] = {0.0f, 0.0f, 0.0f};
-            direction_volume_get(job->d, voxel, d);
-            for (int a = 0; a < 3; a++) {
-                local[0] += d[a] * f->u[a];
-                local[1] += d[a] * f->v[a];
-                local[2] += d[a] * f->w[a];
-            }
-            float sign = local[2] < 0.0f ? -1.0f : 1.0f;
-            for (int a = 0; a < 3; a++) sum[a] += sign * local[a];
-        }
-    if (!(sum[2] > 0.0f)) return false;
-    c->slope_u = sum[0] / sum[2];
-    c->slope_v = sum[1] / sum[2];
-    return true;
+    size_t kept = 0;
+    for (size_t i = 0; i < r->n; i++)
+        if (center_find_slope(job->search, i_slice, &r->center[i])) r->center[kept++] = r->center[i];
+    r->n = kept;
 }
 
 static bool push(struct slice_result *r, const struct center *c)
@@ -158,7 +125,7 @@ static bool add_peak(void *context, size_t u, size_t v)
                        .v = w->origin[1] + (float)v + 0.5f + offset[1],
                        .radius = radius_at(p->job, map + at, n_pixel, p->s),
                        .strength = map[at]};
-    return !find_slope(p->job, w->i_slice, &c) || push(p->result, &c);
+    return !center_has_voxel(p->job->search, w->i_slice, &c) || push(p->result, &c);
 }
 
 static bool collect_peaks(const struct detect_job *job, const struct view *w, struct slice_result *r)
@@ -278,6 +245,7 @@ static void detect_slice(void *context, size_t i_task, size_t i_thread)
     struct slice_result *r = &job->slice[w.i_slice];
     respond(job, i_task, &w, job->bytes + i_thread * job->bytes_per_thread);
     bool fits = collect_peaks(job, &w, r) && thin_out(job, &w, r);
+    find_slopes(job, w.i_slice, r);
     move_centers(r, -w.origin[0], -w.origin[1]);
     const struct refine_slice slice = {w.image, w.width, w.height, w.response, w.response + w.width * w.height};
     r->failed = !fits || !centers_refine(&slice, r->center, r->n);
@@ -345,7 +313,7 @@ status centers_detect(const struct center_search *search, struct thread_pool *po
     const struct subvolumes *sub = search->sub;
     const struct slice_frame *frame = search->frame;
     const double diameter_voxel = search->diameter_voxel;
-    struct detect_job job = {.v = v, .d = search->d, .mask = sub->mask, .frame = frame};
+    struct detect_job job = {.search = search, .v = v, .frame = frame};
     struct slice_source source = {.v = v, .mask = sub->mask, .frame = frame};
     size_t n_slice = frame->n_slice, n_thread = thread_pool_n_thread(pool), n_pixel = frame->width * frame->height;
     size_t n_slab = scratch_buffer_bytes(v->space) / (n_pixel * sizeof(float));

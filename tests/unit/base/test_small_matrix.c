@@ -75,29 +75,37 @@ static void test_banded(void **state)
     assert_false(small_solve_banded(m, N, BAND, x));
 }
 
-/* Systems of a band of 7, which has loops of its own, of fewer rows than the band and of more. A dense solution of the
- * same system has the same unknowns. */
-static void test_band_of_points(void **state)
+/* Systems of a band, of fewer rows than the band and of more. A dense solution of the same system has the same
+ * unknowns. */
+static void check_band(size_t band)
 {
-    (void)state;
-    enum { BAND = 7, MOST = 23 };
+    enum { MOST = 23 };
     for (size_t n = 1; n <= MOST; n++) {
-        double m[MOST * BAND] = {0}, dense[MOST * MOST] = {0}, x[MOST], want[MOST];
+        double m[MOST * SMALL_BAND_MAX] = {0}, dense[MOST * MOST] = {0}, x[MOST], want[MOST];
         for (size_t i = 0; i < n; i++) {
             want[i] = x[i] = sin(1.0 + 3.0 * (double)i);
-            for (size_t k = 0; k < BAND && k <= i; k++) {
-                m[i * BAND + k] = k == 0 ? 4.0 + (double)(i % 3) : cos((double)(7 * i + k)) / (double)(k + 1);
-                dense[i * n + i - k] = dense[(i - k) * n + i] = m[i * BAND + k];
+            for (size_t k = 0; k < band && k <= i; k++) {
+                m[i * band + k] = k == 0 ? 4.0 + (double)(i % 3) : cos((double)(7 * i + k)) / (double)(k + 1);
+                dense[i * n + i - k] = dense[(i - k) * n + i] = m[i * band + k];
             }
         }
         assert_true(small_factor(dense, n, 0.0));
         small_solve(dense, n, want, 1);
-        assert_true(small_solve_banded(m, n, BAND, x));
+        assert_true(small_solve_banded(m, n, band, x));
         for (size_t i = 0; i < n; i++) assert_near(x[i], want[i], 1e-12);
         memset(m, 0, sizeof m);
-        for (size_t i = 0; i < n; i++) m[i * BAND] = i + 1 < n ? 1.0 : -1.0;
-        assert_false(small_solve_banded(m, n, BAND, x));
+        for (size_t i = 0; i < n; i++) m[i * band] = i + 1 < n ? 1.0 : -1.0;
+        assert_false(small_solve_banded(m, n, band, x));
     }
+}
+
+/* Bands of 7 and 10 have loops of their own. */
+static void test_bands(void **state)
+{
+    (void)state;
+    check_band(7);
+    check_band(10);
+    check_band(4);
 }
 
 /* Eigenvalue j of the matrix with 2 on the diagonal and -1 beside it: 2 - 2 cos(j pi / (N + 1)). */
@@ -171,9 +179,9 @@ static void test_random(void **state)
 int main(void)
 {
     const struct CMUnitTest test[] = {
-        cmocka_unit_test(test_factor_and_solve), cmocka_unit_test(test_least_pivot),    cmocka_unit_test(test_invert),
-        cmocka_unit_test(test_banded),           cmocka_unit_test(test_eigen),          cmocka_unit_test(test_eigen_3),
-        cmocka_unit_test(test_random),           cmocka_unit_test(test_band_of_points),
+        cmocka_unit_test(test_factor_and_solve), cmocka_unit_test(test_least_pivot), cmocka_unit_test(test_invert),
+        cmocka_unit_test(test_banded),           cmocka_unit_test(test_eigen),       cmocka_unit_test(test_eigen_3),
+        cmocka_unit_test(test_random),           cmocka_unit_test(test_bands),
     };
     return cmocka_run_group_tests(test, NULL, NULL);
 }
