@@ -1,4 +1,5 @@
 #include "renderer/scattering/speckle/speckle.h"
+#include "renderer/scattering/quadratic_spline.h"
 
 #include <math.h>
 
@@ -28,13 +29,11 @@ static inline uint32_t mix(uint32_t x)
 /* The place on one axis: first of three nodes, and their weights over the root of the sum of squares. */
 static inline int32_t spline(float at, float weight[3])
 {
-    const float nearest = floorf(at + 0.5f), t = at - nearest;
-    weight[0] = 0.5f * (0.5f - t) * (0.5f - t);
-    weight[1] = 0.75f - t * t;
-    weight[2] = 0.5f * (0.5f + t) * (0.5f + t);
-    const float scale = 1 / sqrtf(weight[0] * weight[0] + weight[1] * weight[1] + weight[2] * weight[2]);
-    for (int k = 0; k < 3; k++) weight[k] *= scale;
-    return (int32_t)nearest - 1;
+    double whole[3];
+    const int nearest = quadratic_spline((double)at, whole, NULL);
+    const double scale = 1 / sqrt(whole[0] * whole[0] + whole[1] * whole[1] + whole[2] * whole[2]);
+    for (int k = 0; k < 3; k++) weight[k] = (float)(scale * whole[k]);
+    return nearest - 1;
 }
 
 void speckle_amplitude(const struct speckle *s, uint32_t i_fiber, uint32_t i_band, const float place[3], float re_im[2])

@@ -1,6 +1,7 @@
 /* Tables of elliptical_oriented.v1: rays are spread over a quarter of the plane of psi and Delta by quadratic
  * B-splines, and the sums are blurred as cosine series in both. The factors of the series take off what the B-splines
  * blur, and in the tables that are read by straight lines also what these do. */
+#include "renderer/scattering/quadratic_spline.h"
 #include "renderer/scattering/surface/azimuth_table.h"
 #include "renderer/scattering/surface/elliptical/elliptical_oriented.h"
 
@@ -67,26 +68,14 @@ static void enter_rays(struct work *w, const struct ellipse *e)
     }
 }
 
-/* Weights of the three nodes about x of a quadratic B-spline, and their slopes. Returns the middle node. */
-static int spline(double x, double weight[3], double slope[3])
-{
-    const double middle = round(x), t = x - middle;
-    weight[0] = 0.5 * (0.5 - t) * (0.5 - t);
-    weight[1] = 0.75 - t * t;
-    weight[2] = 0.5 * (0.5 + t) * (0.5 + t);
-    slope[0] = t - 0.5;
-    slope[1] = -2 * t;
-    slope[2] = t + 0.5;
-    return (int)middle;
-}
-
 /* Adds an exit with the planes `a`, whose azimuth is turned against that of the ray. */
 static void add_exit(oriented_plane *plane, const double a[N_PLANE], double phi, struct dual turn)
 {
     const double per_psi = N / M_PI_2, per_delta = N / M_PI;
     double u[3], du[3], v[3], dv[3];
     const double delta = remainder(turn.v, 2 * M_PI);
-    const int i = spline((phi + 0.5 * delta) * per_psi, u, du), j = spline(delta * per_delta, v, dv);
+    const int i = quadratic_spline((phi + 0.5 * delta) * per_psi, u, du),
+              j = quadratic_spline(delta * per_delta, v, dv);
     for (int m = 0; m < 3; m++)
         for (int n = 0; n < 3; n++) {
             const int row = oriented_fold(i + m - 1, N), column = oriented_fold(j + n - 1, N);
@@ -109,7 +98,7 @@ static void add_exit(oriented_plane *plane, const double a[N_PLANE], double phi,
 static void add_rest(struct work *w, const double a[N_PLANE], double phi)
 {
     double u[3], du[3];
-    const int i = spline(phi * (N_TURN / M_PI_2), u, du);
+    const int i = quadratic_spline(phi * (N_TURN / M_PI_2), u, du);
     for (int m = 0; m < 3; m++) {
         const int at = oriented_fold(i + m - 1, N_TURN);
         for (int q = 0; q < N_PLANE; q++) w->rest[q][at] += a[q] * u[m];

@@ -1,3 +1,4 @@
+#include "renderer/scattering/quadratic_spline.h"
 #include "renderer/scattering/surface/azimuth_table.h"
 #include "renderer/scattering/surface/microfacet/microfacet.h"
 #include "renderer/scattering/von_mises.h"
@@ -52,9 +53,8 @@ static void draw_all(struct microfacet_draw *draw)
 /* Light of one exit, shared by the three nodes about its azimuth with the weights of a quadratic spline. */
 static void add_exit(const struct work *w, double (*circle)[N_SUM], const struct microfacet_exit *e, double width)
 {
-    const double turn = e->azimuth * (N_CIRCLE / (2 * M_PI)), node = floor(turn + 0.5), y = turn - node;
-    const double weight[3] = {0.5 * (0.5 - y) * (0.5 - y), 0.75 - y * y, 0.5 * (0.5 + y) * (0.5 + y)};
-    double sum[N_SUM];
+    double sum[N_SUM], weight[3];
+    const int at = quadratic_spline(e->azimuth * (N_CIRCLE / (2 * M_PI)), weight, NULL) + 2 * N_CIRCLE - 1;
     sum[CLEAR] = width * e->share;
     sum[SQUARE] = sum[CLEAR] * e->off * e->off;
     sum[LEANING] = sum[CLEAR] * e->off * e->lean;
@@ -62,7 +62,6 @@ static void add_exit(const struct work *w, double (*circle)[N_SUM], const struct
         sum[LIGHT + c] = sum[CLEAR] * exp(0.5 * e->length * w->ln_c_t[c]);
         sum[BY_C_T + c] = sum[LIGHT + c] * 0.5 * e->length / w->c_t[c];
     }
-    const int at = (int)node + 2 * N_CIRCLE - 1;
     for (int k = 0; k < 3; k++)
         for (int q = 0; q < N_SUM; q++) circle[(at + k) % N_CIRCLE][q] += weight[k] * sum[q];
 }
