@@ -76,8 +76,8 @@ status scene_ellipse_fill(struct scene *s, struct error *err)
     for (size_t i = 0; i < s->n_segment; i++) fill_cylinder(s, i, &s->ellipse[i]);
     for (size_t i = 0; i < s->n_segment; i++) {
         struct scene_ellipse *e = &s->ellipse[i];
-        const bool left = (s->segment_flag[i] & RTC_CURVE_FLAG_NEIGHBOR_LEFT) != 0,
-                   right = (s->segment_flag[i] & RTC_CURVE_FLAG_NEIGHBOR_RIGHT) != 0;
+        const bool left = i > 0 && (s->segment_flag[i] & RTC_CURVE_FLAG_NEIGHBOR_LEFT) != 0,
+                   right = i + 1 < s->n_segment && (s->segment_flag[i] & RTC_CURVE_FLAG_NEIGHBOR_RIGHT) != 0;
         fill_end(e, left ? e - 1 : NULL, e->begin, &e->beyond[0]);
         fill_end(e, right ? e + 1 : NULL, e->end, &e->beyond[1]);
     }

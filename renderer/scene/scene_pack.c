@@ -52,7 +52,8 @@ void scene_pack(const struct scene *s, struct byte_pack *p)
 
 static bool in_range(const struct scene *s)
 {
-    bool good = s->n_segment > 0 && s->n_group >= 1 && s->n_group <= FIBER_MAX_GROUP;
+    bool good = s->n_segment > 0 && s->n_group >= 1 && s->n_group <= FIBER_MAX_GROUP &&
+                (s->ratio == NULL || s->long_axis != NULL);
     for (int a = 0; a < 2; a++)
         good = good && s->half_block[a] >= 1 && s->half_block[a] <= SCENE_MAX_HALF_BLOCK && s->tile_mm[a] > 0;
     for (size_t i = 0; good && i < s->n_segment; i++)
