@@ -13,7 +13,8 @@
 
 enum {
     N_REPAIR = 2,      /* rounds of growing, joining and cutting */
-    N_FIT = 4,         /* rounds of fitting whole lines */
+    N_FIT = 4,         /* rounds of fitting whole lines, and of all fits of flat fibers */
+    N_LAST_FIT = 2,    /* rounds of the last fit, whose lines have been fitted before */
     N_SETTLE = 3,      /* most rounds of fitting, cutting and joining before the last fit beyond the first one */
     N_SETTLE_THIN = 2, /* the same where voxels are interpolated: a third round loses length there */
     N_SETTLE_FIT = 3   /* fits in each of them */
@@ -58,7 +59,9 @@ static status smooth_and_drop(struct trace_job *job, const struct polyline_set *
 /* Moves lines to where they explain the scan best. `last`: as smoothly as fibers are, with errors for the report. */
 static status fit_axes(struct trace_job *job, struct polyline_set *lines, bool last, struct error *err)
 {
-    struct axis_profile profile = trace_start_profile(job);
+    /* lines and profile of the last fit are nearly right from the rounds before, but sections begin as discs */
+    const bool soon = last && !job->flat;
+    struct axis_profile profile = soon ? job->profile : trace_start_profile(job);
     profile.measured_curvature = last;
     if (last) profile.independent = job->independent;
     struct section_ratio ratio;
@@ -69,14 +72,8 @@ static status fit_axes(struct trace_job *job, struct polyline_set *lines, bool l
     if (last) polylines_reach_faces(lines, job->v, job->o->eps_d, TRACE_END_DIAMETERS * job->diameter);
     status s = polylines_resample(lines, &even, err);
     struct shape_measure measure;
-    const struct flat_fit fit = {job->v,
-                                 job->diameter,
-                                 N_FIT,
-                                 TRACE_MIN_PIECE,
-                                 job->pool,
-                                 &job->inner,
-                                 last ? &measure : NULL,
-                                 job->independent < 1.0};
+    const struct flat_fit fit = {job->v,    job->diameter, soon ? N_LAST_FIT : N_FIT, TRACE_MIN_PIECE,
+                                 job->pool, &job->inner,   last ? &measure : NULL,    job->independent < 1.0};
     if (s == STATUS_OK) s = polylines_fit_flat(&even, &fit, &profile, &ratio, err);
     if (!last) job->flat = even.shape != NULL;
     if (s == STATUS_OK)

@@ -247,13 +247,11 @@ static void place_claims(struct axis_claims *c, const int axis[3], uint32_t *pla
     for (size_t r = 0; r < c->n_row; r++) {
         const uint32_t row = c->row[r];
         const uint32_t start = (row & BOUND) << SHIFT * axis[1] | row >> SHIFT << SHIFT * axis[2];
-        const uint32_t begin = c->row_begin[row], n = c->row_end[row] - begin;
-        int32_t *own = c->own + row * BRICK + begin;
-        float *own2 = c->own2 + row * BRICK + begin;
-        for (uint32_t i = 0; i < n; i++) c->cell[place[own[i]]++] = (uint16_t)(start | (begin + i) << SHIFT * axis[0]);
-        for (uint32_t i = 0; i < n; i++) { /* a loop of its own, which is vectorised */
-            own2[i] = INFINITY;
-            own[i] = OFF_LINE;
+        for (uint32_t i = c->row_begin[row]; i < c->row_end[row]; i++) {
+            const uint32_t at = row * BRICK + i;
+            c->cell[place[c->own[at]]++] = (uint16_t)(start | i << SHIFT * axis[0]);
+            c->own2[at] = INFINITY;
+            c->own[at] = OFF_LINE;
         }
         c->row_end[row] = 0;
     }
