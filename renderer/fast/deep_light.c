@@ -20,8 +20,8 @@ void deep_light_nodes(const struct deep_light *d, const double direction[3], siz
     }
 }
 
-void deep_light_add(const struct deep_light *d, const float wo[3], const float wi[3], const float scale[3],
-                    float rgb[3])
+void deep_light_add(const struct deep_light *d, size_t i_class, const float wo[3], const float wi[3],
+                    const float scale[3], float rgb[3])
 {
     size_t view[4], light[4], n_node = deep_light_n_node(d);
     double view_weight[4], light_weight[4], from[3] = {(double)wi[0], (double)wi[1], (double)wi[2]},
@@ -32,7 +32,7 @@ void deep_light_add(const struct deep_light *d, const float wo[3], const float w
     deep_light_nodes(d, to, view, view_weight);
     deep_light_nodes(d, from, light, light_weight);
     for (size_t k = 0; k < 16; k++) {
-        const float *value = d->value + (view[k / 4] * n_node + light[k % 4]) * 3;
+        const float *value = d->value + ((i_class * n_node + view[k / 4]) * n_node + light[k % 4]) * 3;
         float weight = (float)(view_weight[k / 4] * light_weight[k % 4]);
         for (int c = 0; c < 3; c++) sum[c] += weight * value[c];
     }

@@ -10,6 +10,9 @@
  * It is approached from b divided by the sums of rows of M, in N_STEP steps of the residual divided in the same way;
  * more of them follow the noise. Each keeps the sum over all pairs, and so the energy.
  *
+ * Each class of fibers has as many paths, whose places are drawn until a fiber of the class is met; where that takes
+ * more than CLASS_TRIES hits, any fiber counts, which fills the tables of classes that a cloth does not have.
+ *
  * Beside them stand the means of the ways from the first hit to the last one, in the plane of the cloth, weighted by
  * throughput: of each view and of each light, less the mean over all of them.
  *
@@ -22,17 +25,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_ROW = 64, N_STEP = 2, N_FINE = 1024, MOST_MISS = 1000 };
+enum { N_ROW = 32, CLASS_TRIES = 32, N_STEP = 2, N_FINE = 1024, MOST_MISS = 1000 };
 static const struct rng_key walk_key = {.seed = 0x646565706c696768u};
 
 struct deep_job {
     struct precompute_job *j;
     struct deep_light *d;
-    size_t n_path, n_node, n_value; /* paths of a row */
-    size_t n_sum;                   /* numbers of a row: n_value of the table, then n_way */
-    float *sum;                     /* N_ROW x n_sum */
-    double *overlap;                /* n_node x n_node: the matrix M, integrals of weights over the disk */
-    double *area;                   /* n_node: sums of its rows */
+    size_t n_path, n_node; /* paths of a row; nodes of a grid */
+    size_t n_value, n_all; /* numbers of the table of a class; of all classes */
+    size_t n_sum;          /* numbers of a row: n_all of the tables, then n_way */
+    float *sum;            /* N_ROW x n_sum */
+    double *overlap;       /* n_node x n_node: the matrix M, integrals of weights over the disk */
+    double *area;          /* n_node: sums of its rows */
 };
 
 static void fill_overlap(const struct deep_job *x)
@@ -51,19 +55,21 @@ static void fill_overlap(const struct deep_job *x)
     }
 }
 
-/* A place, from a point of the tile's plane z = 0, where rays towards -wo meet the cloth. False: none was found. */
-static bool meet(const struct deep_job *x, const double wo[3], struct rng *rng, struct scene_ray *ray,
+/* A place, from a point of the tile's plane z = 0, where rays towards -wo meet a fiber of a class. False: none was
+ * found. */
+static bool meet(const struct deep_job *x, size_t i_class, const double wo[3], struct rng *rng, struct scene_ray *ray,
                  struct scene_hit *hit)
 {
     const struct precompute_job *j = x->j;
     double away = (wo[2] > 0.0 ? 1.0 : 1.0 + scene_thickness_mm(j->q->scene)) / fabs(wo[2]);
-    for (int i = 0; i < MOST_MISS; i++) {
+    for (int i = 0, n_other = 0; i < MOST_MISS; i++) {
         double origin[3], towards[3];
         for (int a = 0; a < 3; a++) {
             origin[a] = (a < 2 ? rng_double(rng) * j->t->tile_mm[a] : 0.0) + away * wo[a];
             towards[a] = -wo[a];
         }
-        if (scene_ray_enter(j->q->scene, origin, towards, ray) && scene_trace(j->q->scene, ray, hit)) return true;
+        if (!scene_ray_enter(j->q->scene, origin, towards, ray) || !scene_trace(j->q->scene, ray, hit)) continue;
+        if (deep_light_class(hit->tangent) == i_class || ++n_other > CLASS_TRIES) return true;
     }
     return false;
 }
@@ -81,9 +87,9 @@ static void count_way(const double way_mm[2], double scale, const size_t node[4]
     }
 }
 
-/* way_mm: from the first hit to the last one. */
-static void count(const struct deep_job *x, const double wo[3], const struct scene_ray *ray, const float throughput[3],
-                  const double way_mm[2], float *sum)
+/* way_mm: from the first hit to the last one. sum: of the row. */
+static void count(const struct deep_job *x, size_t i_class, const double wo[3], const struct scene_ray *ray,
+                  const float throughput[3], const double way_mm[2], float *sum)
 {
     size_t view[4], light[4];
     double view_weight[4], light_weight[4];
@@ -92,14 +98,14 @@ static void count(const struct deep_job *x, const double wo[3], const struct sce
     deep_light_nodes(x->d, wo, view, view_weight);
     deep_light_nodes(x->d, wi, light, light_weight);
     /* views are even over solid angles: 1 over their density on the disk is 2 pi cos for each side */
-    double scale = M_PI * 2.0 * M_PI * fabs(wo[2]) * x->d->n_side / ((double)x->n_path * N_ROW);
-    float *way = sum + x->n_value;
+    double scale = DEEP_LIGHT_N_CLASS * M_PI * 2.0 * M_PI * fabs(wo[2]) * x->d->n_side / ((double)x->n_path * N_ROW);
+    float *way = sum + x->n_all;
     double brightness = scale * ((double)throughput[0] + (double)throughput[1] + (double)throughput[2]);
     count_way(way_mm, brightness, view, view_weight, way);
     count_way(way_mm, brightness, light, light_weight, way + 3 * x->n_node);
     way[6 * x->n_node] += (float)(brightness * (way_mm[0] * way_mm[0] + way_mm[1] * way_mm[1]));
     for (size_t k = 0; k < 16; k++) {
-        float *to = sum + (view[k / 4] * x->n_node + light[k % 4]) * 3;
+        float *to = sum + i_class * x->n_value + (view[k / 4] * x->n_node + light[k % 4]) * 3;
         for (int c = 0; c < 3; c++) to[c] += (float)(scale * view_weight[k / 4] * light_weight[k % 4]) * throughput[c];
     }
 }
@@ -110,13 +116,13 @@ static void place_of(const struct scene_hit *hit, const struct scene_ray *ray, d
     for (int a = 0; a < 2; a++) place_mm[a] = (double)hit->position_mm[a] + ray->offset_mm[a];
 }
 
-static void walk(const struct deep_job *x, const double wo[3], struct rng *rng, float *sum)
+static void walk(const struct deep_job *x, size_t i_class, const double wo[3], struct rng *rng, float *sum)
 {
     const struct precompute_job *j = x->j;
     float throughput[3] = {1, 1, 1};
     struct scene_ray ray;
     struct scene_hit hit;
-    if (!meet(x, wo, rng, &ray, &hit)) return;
+    if (!meet(x, i_class, wo, rng, &ray, &hit)) return;
     double first_mm[2], last_mm[2];
     place_of(&hit, &ray, first_mm);
     for (uint32_t i = 1; i < (uint32_t)FIBER_WALK_MOST_STEPS; i++) {
@@ -125,7 +131,7 @@ static void walk(const struct deep_job *x, const double wo[3], struct rng *rng, 
         if (scene_trace(j->q->scene, &ray, &hit)) continue;
         if (i > x->d->n_traced && !scene_sheet_met(j->q->scene, &ray)) {
             const double way_mm[2] = {last_mm[0] - first_mm[0], last_mm[1] - first_mm[1]};
-            count(x, wo, &ray, throughput, way_mm, sum);
+            count(x, i_class, wo, &ray, throughput, way_mm, sum);
         }
         return;
     }
@@ -146,7 +152,7 @@ static void run_row(void *context, size_t i_row, size_t i_thread)
         double u = start[0] + (double)(i + 1) * 0.7548776662466927, v = start[1] + (double)(i + 1) * 0.5698402909980532;
         double z = fmax(u - floor(u), 1e-3), phi = 2.0 * M_PI * v, across = sqrt(1.0 - z * z);
         const double wo[3] = {across * cos(phi), across * sin(phi), x->d->n_side > 1 && i % 2 == 1 ? -z : z};
-        walk(x, wo, &rng, x->sum + i_row * x->n_sum);
+        walk(x, i / 2 % DEEP_LIGHT_N_CLASS, wo, &rng, x->sum + i_row * x->n_sum);
     }
 }
 
@@ -188,11 +194,11 @@ static void finish_ways(const struct deep_job *x)
 {
     size_t n = x->n_node;
     double square = 0.0, mean[3] = {0.0}, explained = 0.0;
-    for (size_t r = 0; r < N_ROW; r++) square += (double)x->sum[r * x->n_sum + x->n_value + 6 * n];
+    for (size_t r = 0; r < N_ROW; r++) square += (double)x->sum[r * x->n_sum + x->n_all + 6 * n];
     for (size_t i = 0; i < 2 * n; i++) {
         double sum[3] = {0.0};
         for (size_t r = 0; r < N_ROW; r++)
-            for (size_t a = 0; a < 3; a++) sum[a] += (double)x->sum[r * x->n_sum + x->n_value + 3 * i + a];
+            for (size_t a = 0; a < 3; a++) sum[a] += (double)x->sum[r * x->n_sum + x->n_all + 3 * i + a];
         for (size_t a = 0; a < 3 && i < n; a++) mean[a] += sum[a];
         for (size_t a = 0; a < 2 && sum[0] > 0.0; a++) {
             double way = sum[1 + a] / sum[0], overall = mean[1 + a] / mean[0];
@@ -203,23 +209,25 @@ static void finish_ways(const struct deep_job *x)
     x->d->spread_mm = mean[0] > 0.0 ? (float)sqrt(fmax(0.0, 0.5 * (square - explained) / mean[0])) : 0;
 }
 
-/* Sums the rows, and makes the table and its error. work: 6 n_value. */
+/* Sums the rows, and makes the tables and their error. work: 6 n_value. */
 static void finish(const struct deep_job *x, double *work)
 {
     double *half[2] = {work, work + x->n_value}, *rest = work + 2 * x->n_value, *even = work + 5 * x->n_value;
     double square = 0.0, difference = 0.0;
-    memset(work, 0, 2 * x->n_value * sizeof *work);
-    for (size_t r = 0; r < N_ROW; r++)
-        for (size_t i = 0; i < x->n_value; i++) half[r % 2][i] += 2.0 * (double)x->sum[r * x->n_sum + i];
-    solve(x, half[0], rest);
-    memcpy(even, rest, x->n_value * sizeof *even);
-    solve(x, half[1], rest);
-    for (size_t i = 0; i < x->n_value; i++) {
-        double mean = 0.5 * (even[i] + rest[i]), off = 0.5 * (even[i] - rest[i]);
-        double area = x->area[i / 3 / x->n_node] * x->area[i / 3 % x->n_node];
-        x->d->value[i] = (float)mean;
-        square += area * mean * mean;
-        difference += area * off * off;
+    for (size_t from = 0; from < x->n_all; from += x->n_value) {
+        memset(work, 0, 2 * x->n_value * sizeof *work);
+        for (size_t r = 0; r < N_ROW; r++)
+            for (size_t i = 0; i < x->n_value; i++) half[r % 2][i] += 2.0 * (double)x->sum[r * x->n_sum + from + i];
+        solve(x, half[0], rest);
+        memcpy(even, rest, x->n_value * sizeof *even);
+        solve(x, half[1], rest);
+        for (size_t i = 0; i < x->n_value; i++) {
+            double mean = 0.5 * (even[i] + rest[i]), off = 0.5 * (even[i] - rest[i]);
+            double area = x->area[i / 3 / x->n_node] * x->area[i / 3 % x->n_node];
+            x->d->value[from + i] = (float)mean;
+            square += area * mean * mean;
+            difference += area * off * off;
+        }
     }
     x->d->error = square > 0.0 ? (float)sqrt(difference / square) : 0;
 }
@@ -230,9 +238,10 @@ status precompute_deep(struct precompute_job *j, struct error *err)
     if (d->n_traced == 0) return STATUS_OK;
     status s = fast_tables_reserve_deep(j->t, err);
     if (s != STATUS_OK) return s;
-    struct deep_job x = {.j = j, .d = d, .n_node = deep_light_n_node(d), .n_value = deep_light_n_value(d)};
-    x.n_path = (size_t)ceil(j->q->deep_paths / N_ROW);
-    x.n_sum = x.n_value + n_way(&x);
+    struct deep_job x = {.j = j, .d = d, .n_node = deep_light_n_node(d), .n_all = deep_light_n_value(d)};
+    x.n_path = 4 * (size_t)ceil(j->q->deep_paths / (4 * N_ROW)); /* as many of each class and side */
+    x.n_value = x.n_all / DEEP_LIGHT_N_CLASS;
+    x.n_sum = x.n_all + n_way(&x);
     x.sum = calloc(N_ROW * x.n_sum, sizeof *x.sum);
     x.overlap = calloc(x.n_node * (x.n_node + 1), sizeof *x.overlap);
     double *work = malloc(6 * x.n_value * sizeof *work);

@@ -2,7 +2,7 @@
  * cloth with narrow lobes against path tracing, which the cells' harmonics miss, any number of threads, and directions
  * in a sheared cloth, and where deep light enters a bent one. */
 #include "geometry/mesh/mesh_shapes.h"
-#include "renderer/fast/fast_option.h"
+#include "renderer/fast/deep_shade.h"
 #include "renderer/fast/precompute/fast_precompute.h"
 #include "renderer/scene/scene_place.h"
 #include "renderer/transport/estimate/estimate.h"
@@ -137,6 +137,37 @@ static void means(void **state)
                       100 * sqrt(error2[m]) / mean, 100 * sqrt(noise2[m]) / mean);
     print_message("noise of the table: %.2f %%\n", 100 * (double)narrow.tables.deep.error);
     assert_true(error2[1] < 0.5 * error2[0]);
+}
+
+/* What is shaded has the class of the fiber that is hit: with tables of 0 and of 1, one class alone has deep light. */
+static void a_hit_has_the_table_of_its_fiber(void **state)
+{
+    (void)state;
+    const struct configuration c = {.light = LIGHT_DIRECTIONAL, .camera_distance_m = 1.0, .crop_m = 0.01};
+    struct fast_tables marked = narrow.tables;
+    const struct fast_option option = {.tables = &marked, .n_traced = TRACED, .deep = true};
+    struct fast_setting fast = {.option = &option};
+    size_t n_value = deep_light_n_value(&marked.deep), n[2] = {0, 0};
+    marked.deep.value = calloc(n_value, sizeof *marked.deep.value);
+    assert_non_null(marked.deep.value);
+    for (size_t i = n_value / 2; i < n_value; i++) marked.deep.value[i] = 1;
+    fast.path.scene = narrow.scene;
+    lights_init(&fast.path.lights, &c);
+    for (uint32_t i = 0; i < 200; i++) {
+        struct rng rng;
+        struct scene_ray ray;
+        struct scene_hit hit;
+        float rgb[3] = {0, 0, 0};
+        rng_start(&rng, &(struct rng_key){3, 0, 0, 0}, i, 0);
+        const double from[3] = {0.5 * rng_double(&rng), 0.5 * rng_double(&rng), 1}, down[3] = {0, 0, -1};
+        if (!scene_ray_enter(narrow.scene, from, down, &ray) || !scene_trace(narrow.scene, &ray, &hit)) continue;
+        size_t k = deep_light_class(hit.tangent);
+        deep_shade_begin(&fast, &hit, &ray, &rng, rgb);
+        assert_true(fabsf(rgb[0] - (float)k) < 1e-4f); /* light from above has the cosine 1, and the irradiance pi */
+        n[k]++;
+    }
+    assert_true(n[0] > 20 && n[1] > 20);
+    free(marked.deep.value);
 }
 
 /* The same table for any number of threads. */
@@ -281,6 +312,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(furnace),
                                        cmocka_unit_test(means),
+
+                                       cmocka_unit_test(a_hit_has_the_table_of_its_fiber),
                                        cmocka_unit_test(threads),
                                        cmocka_unit_test(refusals),
                                        cmocka_unit_test(rotation_of_a_sheared_place),
