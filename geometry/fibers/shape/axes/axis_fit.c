@@ -3,7 +3,6 @@
 #include "geometry/fibers/shape/axes/axis_round.h"
 #include "geometry/fibers/shape/axes/axis_solve.h"
 #include "geometry/fibers/shape/axes/shape_measure.h"
-#include "geometry/fibers/shape/axis_error.h"
 #include "geometry/ranks/axis_share.h"
 
 #include <math.h>
@@ -28,16 +27,17 @@ static void add_shared(struct shared_sum *to, const struct shared_sum *from)
 }
 
 /* States the errors of the axes that the step has made (axis_fit.h), as means over n vertices. */
-static void state_error(double information, double variance, const double *stiffness, double correlation, size_t n,
-                        struct axis_profile *p)
+static void state_error(double information, double variance, const double *stiffness, size_t n, struct axis_profile *p)
 {
-    double mean[2] = {0.0, 0.0};
-    struct axis_errors errors;
-    axis_errors_init(&errors, correlation);
-    for (size_t i = 0; i < n; i++) axis_errors_add(&errors, information / stiffness[i], mean);
-    const double square = variance / (information * fmax((double)n, 1.0));
-    p->position_se = sqrt(square * mean[0]);
-    p->direction_se_rad = sqrt(square * mean[1]);
+    double position = 0.0, direction = 0.0; /* over the part that is the same everywhere */
+    for (size_t i = 0; i < n; i++) {
+        const double inverse_length = sqrt(sqrt(information / stiffness[i]));
+        position += inverse_length;
+        direction += inverse_length * inverse_length * inverse_length;
+    }
+    const double square = variance / (2.0 * M_SQRT2 * information * fmax((double)n, 1.0));
+    p->position_se = sqrt(square * position);
+    p->direction_se_rad = sqrt(square * direction);
 }
 
 /* What a fit keeps from round to round. */
@@ -223,8 +223,7 @@ static status make_step(struct axis_batch *job, struct polyline_set *lines, stru
         axis_local_stiffness(lines, diameter, variance, w->stiffness);
     else
         for (size_t i = 0; i < lines->n_vertex; i++) w->stiffness[i] = variance / (sd * sd);
-    state_error(axis_information(w->total, lines->n_vertex), variance, w->stiffness, correlation, lines->n_vertex,
-                profile);
+    state_error(axis_information(w->total, lines->n_vertex), variance, w->stiffness, lines->n_vertex, profile);
     status s = STATUS_OK;
     w->hold = variance / (FLATNESS_SD * FLATNESS_SD);
     if (w->section != NULL)

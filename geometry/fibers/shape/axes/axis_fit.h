@@ -14,11 +14,11 @@
  * bends.
  *
  * The errors of the axes follow from the same sum. With data of information n a vertex, residuals of variance s and
- * terms of the bends of spectrum P(k), the posterior spectrum of the position is s / (n + P). Its integral, and that of
- * k^2 times it, are the squares of the errors of position and direction (axis_error.h). Without a correlation P is
- * L k^4 for the stiffness L, and they are position^2 = s / (2 sqrt 2 n l) and direction^2 = position^2 / l^2, with the
- * length l = (L / n)^(1/4) voxels over which the axes are smoothed. The noise of voxels counts as independent, so that
- * the errors are lower limits where a scanner's filter has blurred its noise. */
+ * stiffness L, the posterior spectrum of the position is s / (n + L k^4). Its integral, and that of k^2 times it, are
+ *     position^2 = s / (2 sqrt 2 n l),   direction^2 = position^2 / l^2,   l = (L / n)^(1/4) voxels,
+ * l being the length over which the axes are smoothed. The noise of voxels counts as independent, so that the errors
+ * are lower limits where a scanner's filter has blurred its noise. They do not count on the correlation of bends: with
+ * it the spectrum says little more than half of the direction errors that phantoms have (NOTES.md of geometry). */
 #ifndef SELVEDGE_GEOMETRY_AXIS_FIT_H
 #define SELVEDGE_GEOMETRY_AXIS_FIT_H
 

@@ -1,8 +1,6 @@
 /* The stiffness of axes in their last fit follows the curvature of the fibers from place to place, and their bends are
- * correlated along the fiber (geometry/fibers/shape/axes/axis_solve.h); the errors that are stated for them
- * (geometry/fibers/shape/axis_error.h). */
+ * correlated along the fiber (geometry/fibers/shape/axes/axis_solve.h). */
 #include "geometry/fibers/shape/axes/axis_solve.h"
-#include "geometry/fibers/shape/axis_error.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -68,35 +66,6 @@ static void test_bounds(void **state)
     axis_local_stiffness(&lines, DIAMETER, VARIANCE, stiffness);
     assert_true(fabs(VARIANCE / stiffness[2 * STRAIGHT + BENT] / (most * most) - 1.0) < 1e-6);
     polyline_set_release(&lines);
-}
-
-/* Without a correlation P = L k^4, whose integrals are known: position^2 = 1 / (2 sqrt 2 l) and direction^2 =
- * position^2 / l^2 for a noise of 1 and l = (L / n)^(1/4). The table has steps of 5 %. */
-static void test_errors_without_correlation(void **state)
-{
-    (void)state;
-    struct axis_errors e;
-    axis_errors_init(&e, 0.0);
-    for (double length = 0.8; length < 20.0; length *= 1.37) {
-        double variance[2] = {0.0, 0.0};
-        axis_errors_add(&e, pow(length, -4.0), variance);
-        assert_true(fabs(variance[0] * 2.0 * M_SQRT2 * length - 1.0) < 1e-3);
-        assert_true(fabs(variance[1] * 2.0 * M_SQRT2 * length * length * length - 1.0) < 1e-3);
-    }
-}
-
-/* Nearly all of the spectrum is c k^6 / (1 - c^2) for a correlation near 1: the integrals of 1 / (1 + x^6) and of x^2
- * times it over positive x are pi / 3 and pi / 6. */
-static void test_errors_with_correlation(void **state)
-{
-    (void)state;
-    struct axis_errors e;
-    const double c = 0.9999, ratio = 1.0, length = pow(c / (1.0 - c * c) / ratio, 1.0 / 6.0);
-    double variance[2] = {0.0, 0.0};
-    axis_errors_init(&e, c);
-    axis_errors_add(&e, ratio, variance);
-    assert_true(fabs(variance[0] * 3.0 * length - 1.0) < 0.01);
-    assert_true(fabs(variance[1] * 6.0 * length * length * length - 1.0) < 0.01);
 }
 
 /* A wave in the plane z = 3, as fibers have that cross others: at x, with an amplitude and a wave length. */
@@ -179,7 +148,6 @@ static void test_wave(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_follows_curvature), cmocka_unit_test(test_bounds),
-                                       cmocka_unit_test(test_errors_without_correlation),
-                                       cmocka_unit_test(test_errors_with_correlation), cmocka_unit_test(test_wave)};
+                                       cmocka_unit_test(test_wave)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
