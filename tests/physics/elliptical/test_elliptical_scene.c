@@ -1,5 +1,5 @@
 /* A scene of fibers with elliptical sections: hits against the closed form, the mean free path in a random medium,
- * energy from the side of the camera, reciprocity, and derivatives of recorded paths.
+ * energy from the side of the camera, reciprocity of a single layer, and the derivative of the factor of the widths.
  */
 #include "base/angle.h"
 #include "renderer/transport/camera.h"
