@@ -70,7 +70,7 @@ def test_ranks_change_no_bit_of_the_geometry(alone, scan, tmp_path, ranks, stage
 def test_a_rank_that_is_lost_amid_the_geometry_costs_no_more_than_time(alone, scan, tmp_path):
     folder = make_job(tmp_path / "job", scan)
     worker, deadline = start(folder, 2), time.monotonic() + 60
-    while not (folder / "work" / "orientation" / "direction.bin").exists():
+    while not (folder / "work" / "orientation.done").exists():
         assert worker.poll() is None and time.monotonic() < deadline, "the job does not come so far"
         time.sleep(0.002)
     lost = processes_of(folder, 1)
