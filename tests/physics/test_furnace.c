@@ -2,11 +2,10 @@
  * (sampling against quadrature), and by a periodic cloth in a uniform environment.
  */
 #include "base/angle.h"
-#include "renderer/transport/camera.h"
-#include "renderer/transport/surface/path_tracer.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/model/fiber_angles.h"
 #include "tests/support/statistics_test.h"
+#include "tests/support/tracer/environment/uniform_environment.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/reference_two_lobe.h"
 
@@ -195,18 +194,11 @@ static void cloth_furnace(const struct scene *scene, const struct scattering_mod
     struct camera camera;
     path_setting_init(&setting, scene, m, s, c, want_jacobian);
     camera_init(&camera, c);
-    setting.lights.has_lamp = false;
-    setting.lights.has_constant = true;
+    uniform_environment_set(&setting);
     *worst = 0;
-    for (int k = 0; k < 3; k++) setting.lights.constant[k] = 1;
     for (uint32_t i = 0; i < n; i++) {
-        struct rng r;
-        struct scene_ray ray;
         struct path_result path;
-        rng_start(&r, &(struct rng_key){6, 0, 0, 0}, i, 0);
-        const double x = rng_double(&r), xy[2] = {x, rng_double(&r)};
-        assert_true(camera_ray(&camera, scene, xy, &ray));
-        path_trace(&setting, &ray, &r, &path, NULL);
+        uniform_environment_trace(&setting, &camera, 6, i, &path);
         for (int k = 0; k < 3; k++) {
             sample_mean_add(&mean[k], (double)path.radiance[k]);
             *worst = fmax(*worst, fabs((double)path.radiance[k] - 1));

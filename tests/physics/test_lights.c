@@ -5,8 +5,8 @@
 #include "renderer/transport/light/environment.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
+#include "tests/support/tracer/environment/painted_environment.h"
 #include "tests/support/tracer/orbit_configurations.h"
-#include "tests/support/tracer/painted_environment.h"
 #include "tests/support/tracer/reference_two_lobe.h"
 
 #include <math.h>

@@ -3,8 +3,8 @@
  * where the camera's ray hits, packed fibers break it.
  */
 #include "base/angle.h"
-#include "renderer/transport/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
+#include "tests/support/tracer/estimate_fixture.h"
 #include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
@@ -58,12 +58,10 @@ static void asymmetry(const struct scattering_model *m, double *worst_se, double
     static const double param[] = {0.1, 0.1, 0.1, 0.6, 0.6, 0.6, 10 * RAD_PER_DEG, 30 * RAD_PER_DEG, 40 * RAD_PER_DEG,
                                    0.5, 0.5, 0.4, 0.7};
     struct scene *scene = packed_fibers();
-    struct thread_pool *pool = NULL;
     struct appearance model;
     struct configuration c[2 * N_PAIR];
     size_t n_path[2 * N_PAIR];
     struct estimate e[2 * N_PAIR];
-    struct error err = {0};
     for (int k = 0; k < N_PAIR; k++) {
         c[2 * k] = far_away(angles_deg[k], angles_deg[k] + 2);
         c[2 * k + 1] = far_away(angles_deg[k] + 2, angles_deg[k]);
@@ -74,8 +72,7 @@ static void asymmetry(const struct scattering_model *m, double *worst_se, double
                                  .n_configuration = 2 * N_PAIR,
                                  .n_path = n_path,
                                  .seed = 5};
-    assert_int_equal(thread_pool_new(0, &pool, NULL), STATUS_OK);
-    if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) fail_msg("%s", err.text);
+    estimate_fixture_run(&q, 0, e);
     *worst = *worst_se = 0;
     for (int k = 0; k < N_PAIR; k++) {
         const struct estimate *a = &e[2 * k], *b = a + 1;
@@ -86,7 +83,6 @@ static void asymmetry(const struct scattering_model *m, double *worst_se, double
         *worst_se = fmax(*worst_se, fabs(ratio - 1) / se);
         *worst = fmax(*worst, fabs(ratio - 1));
     }
-    thread_pool_free(pool);
     scene_free(scene);
 }
 

@@ -2,11 +2,12 @@
  * energy from the side of the camera, reciprocity of a single layer, and the derivative of the factor of the widths.
  */
 #include "base/angle.h"
-#include "renderer/transport/camera.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "geometry/mesh/mesh_shapes.h"
 #include "renderer/transport/surface/path_scatter.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
+#include "tests/support/tracer/environment/uniform_environment.h"
+#include "tests/support/tracer/estimate_fixture.h"
 #include "tests/support/tracer/trace_input.h"
 
 #include <math.h>
@@ -228,18 +229,12 @@ static double furnace(const struct scene *scene, const struct configuration *c, 
     assert_true(setting.shows_width);
     setting.shows_width = shows_width;
     camera_init(&camera, c);
-    setting.guided_paths = setting.lights.has_lamp = false;
-    setting.lights.has_constant = true;
+    uniform_environment_set(&setting);
+    setting.guided_paths = false;
     *n_bounce = 0;
-    for (int k = 0; k < 3; k++) setting.lights.constant[k] = 1;
     for (uint32_t i = 0; i < N_PATH; i++) {
-        struct rng r;
-        struct scene_ray ray;
         struct path_result path;
-        rng_start(&r, &(struct rng_key){94, 0, 0, 0}, i, 0);
-        const double x = rng_double(&r), xy[2] = {x, rng_double(&r)};
-        assert_true(camera_ray(&camera, scene, xy, &ray));
-        path_trace(&setting, &ray, &r, &path, NULL);
+        uniform_environment_trace(&setting, &camera, 94, i, &path);
         for (int k = 0; k < 3; k++) sample_mean_add(&mean[k], (double)path.radiance[k]);
         *n_bounce += path.n_bounce / (double)N_PATH;
     }
@@ -268,6 +263,30 @@ static void lossless_cloth(void **state)
     assert_true(worst_without > 0.01);
 }
 
+/* The same on a cylinder, where rays reach the sections in cells of the shell that are sheared and turned. */
+static void lossless_bent_cloth(void **state)
+{
+    (void)state;
+    const double h = 3.75 * RAD_PER_DEG, each = 1e-3 + (RATIO * RATIO - 1) * h * h / 8;
+    struct mesh m;
+    struct scene *bent = NULL;
+    struct error err = {0};
+    double se, n, unused;
+    assert_int_equal(mesh_cylinder(15, 20, 1.5, 200, &m, NULL), STATUS_OK);
+    if (mesh_check(&m, &err) != STATUS_OK || scene_bend(with_sections.scene, &m, false, &bent, &err) != STATUS_OK)
+        fail_msg("%s", err.text);
+    const struct configuration c = {.camera_theta_rad = 30 * RAD_PER_DEG,
+                                    .camera_distance_m = 0.6,
+                                    .camera_phi_rad = M_PI_2,
+                                    .crop_m = 0.01,
+                                    .light = LIGHT_DIRECTIONAL};
+    const double white = furnace(bent, &c, true, &se, &n), without = furnace(bent, &c, false, &unused, &unused);
+    print_message("%.5f +- %.5f after %.2f bounces; without widths %.5f\n", white, se, n, without);
+    assert_true(n > 1 && fabs(white - 1) < 4 * se + n * each && fabs(without - 1) > 0.01);
+    scene_free(bent);
+    mesh_release(&m);
+}
+
 /* Exchanging lamp and camera leaves radiance over cos(theta of the lamp) the same: fibers of one layer that do not
  * shade each other, all turned by the same angle. Light leaves this model's fibers where they are seen, so cloth that
  * shades parts of their widths is not reciprocal (test_reciprocity.c). */
@@ -286,17 +305,14 @@ static void reciprocal_cloth(void **state)
     }
     row.scene = make_scene(&row, N_ROW, 0.4 * RADIUS_MM);
     struct appearance model;
-    struct thread_pool *pool = NULL;
     struct estimate e[2 * N_PAIR];
-    struct error err = {0};
     const struct estimate_request q = {
         .input = trace_input_surface(row.scene, scattering_find("elliptical_oriented.v1"), param, &model),
         .configuration = c,
         .n_configuration = 2 * N_PAIR,
         .n_path = n_path,
         .seed = 7};
-    assert_int_equal(thread_pool_new(0, &pool, NULL), STATUS_OK);
-    if (estimate_run(&q, pool, NULL, e, &err) != STATUS_OK) fail_msg("%s", err.text);
+    estimate_fixture_run(&q, 0, e);
     for (int k = 0; k < N_PAIR; k++) {
         const struct estimate *a = &e[2 * k], *b = a + 1;
         const double ratio =
@@ -305,7 +321,6 @@ static void reciprocal_cloth(void **state)
         print_message("pair %d: ratio %.4f +- %.4f\n", k, ratio, se);
         assert_true(se < 0.02 && fabs(ratio - 1) < 3.5 * se);
     }
-    thread_pool_free(pool);
     scene_free(row.scene);
 }
 
@@ -353,8 +368,9 @@ static void derivatives_of_the_widths(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(hits_lie_on_the_ellipses), cmocka_unit_test(mean_free_path),
-                                       cmocka_unit_test(lossless_cloth), cmocka_unit_test(reciprocal_cloth),
-                                       cmocka_unit_test(derivatives_of_the_widths)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(hits_lie_on_the_ellipses), cmocka_unit_test(mean_free_path),
+        cmocka_unit_test(lossless_cloth),           cmocka_unit_test(lossless_bent_cloth),
+        cmocka_unit_test(reciprocal_cloth),         cmocka_unit_test(derivatives_of_the_widths)};
     return cmocka_run_group_tests(tests, make_all, free_all);
 }

@@ -6,8 +6,8 @@
 #include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/light/environment.h"
 #include "tests/support/scan/hand_volume.h"
+#include "tests/support/tracer/environment/painted_environment.h"
 #include "tests/support/tracer/orbit_configurations.h"
-#include "tests/support/tracer/painted_environment.h"
 #include "tests/support/tracer/trace_input.h"
 
 #include <math.h>

@@ -2,9 +2,8 @@
 #include "geometry/mesh/mesh_shapes.h"
 #include "renderer/scene/scene_place.h"
 #include "renderer/scene/scene_ray.h"
-#include "renderer/transport/camera.h"
-#include "renderer/transport/surface/path_tracer.h"
 #include "tests/support/cloth/hand_weave.h"
+#include "tests/support/tracer/environment/uniform_environment.h"
 
 #include "base/angle.h"
 #include "base/rng.h"
@@ -197,19 +196,12 @@ static void no_light_is_lost_on_the_cylinder(void **state)
     struct camera camera;
     path_setting_init(&setting, bent, m, s, &c, false);
     camera_init(&camera, &c);
-    setting.lights.has_lamp = false;
-    setting.lights.has_constant = true;
-    for (int k = 0; k < 3; k++) setting.lights.constant[k] = 1;
+    uniform_environment_set(&setting);
     double worst = 0;
     uint64_t n_bounce = 0;
     for (uint32_t i = 0; i < 5000; i++) {
-        struct rng r;
-        struct scene_ray ray;
         struct path_result path;
-        rng_start(&r, &(struct rng_key){6, 0, 0, 0}, i, 0);
-        const double x = rng_double(&r), xy[2] = {x, rng_double(&r)};
-        assert_true(camera_ray(&camera, bent, xy, &ray));
-        path_trace(&setting, &ray, &r, &path, NULL);
+        uniform_environment_trace(&setting, &camera, 6, i, &path);
         n_bounce += path.n_bounce;
         for (int k = 0; k < 3; k++) worst = fmax(worst, fabs((double)path.radiance[k] - 1));
     }

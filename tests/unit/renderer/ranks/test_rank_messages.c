@@ -7,8 +7,8 @@
 #include "renderer/scene/scene_pack.h"
 #include "renderer/transport/ranks/rank_orders.h"
 #include "renderer/transport/volume/volume_scene.h"
+#include "tests/support/tracer/environment/painted_environment.h"
 #include "tests/support/tracer/estimate_fixture.h"
-#include "tests/support/tracer/painted_environment.h"
 
 #include <pthread.h>
 #include <setjmp.h>

@@ -1,4 +1,4 @@
-#include "tests/support/tracer/painted_environment.h"
+#include "tests/support/tracer/environment/painted_environment.h"
 
 #include <math.h>
 #include <stdio.h>
