@@ -29,7 +29,7 @@ enum {
     JOB_MAX_TEXTURE_CELLS = 32, /* blocks along the edge of a crop; the renderer has the same limit */
     JOB_MAX_BOWL_MARK = 100,
     JOB_MAX_BOWL_PHOTOGRAPH = 64,
-    JOB_MAX_MODEL = 8
+    JOB_MAX_MODEL = 32 /* more than there are models, so that a job can compare all of them */
 };
 
 /* One model to be fitted. */

@@ -12,7 +12,7 @@
 
 enum { CHUNK = 8 << 20 };
 
-static const char magic[8] = {'S', 'E', 'L', 'V', 'W', 'R', 'K', '1'};
+static const char magic[8] = {'S', 'E', 'L', 'V', 'W', 'R', 'K', '2'};
 
 struct work_header {
     char magic[8];

@@ -8,7 +8,7 @@
 #include "base/files/scratch_space.h"
 #include "base/status.h"
 
-enum { WORK_FILE_MAX_SECTION = 40, WORK_FILE_TAG_BYTES = 16 };
+enum { WORK_FILE_MAX_SECTION = 160, WORK_FILE_TAG_BYTES = 16 };
 
 struct work_section {
     void *data;

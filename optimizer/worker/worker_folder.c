@@ -173,6 +173,32 @@ static status empty_folder(const struct worker_folder *f, const char *name, stru
     return STATUS_OK;
 }
 
+/* Whether a file is one that a writer renames when it is whole: "x.part", or durable_replace's "x.tmp-AbCdEf". */
+static bool is_temporary(const char *name)
+{
+    static const char part[] = ".part", tmp[] = ".tmp-";
+    size_t n = strlen(name), n_random = 6;
+    if (n >= sizeof part - 1 && strcmp(name + n - (sizeof part - 1), part) == 0) return true;
+    return n >= sizeof tmp - 1 + n_random && strncmp(name + n - n_random - (sizeof tmp - 1), tmp, sizeof tmp - 1) == 0;
+}
+
+static int remove_temporary(const char *path, const struct stat *st, int kind, struct FTW *at)
+{
+    (void)st;
+    if (kind == FTW_F && is_temporary(path + at->base)) unlink(path);
+    return 0;
+}
+
+void worker_folder_sweep(const struct worker_folder *f)
+{
+    static const char *const folder[] = {JOB_FOLDER_WORK, JOB_FOLDER_RESULTS};
+    char path[WORKER_PATH_BYTES];
+    for (size_t i = 0; i < sizeof folder / sizeof folder[0]; i++) {
+        worker_folder_path(f, folder[i], NULL, path);
+        nftw(path, remove_temporary, 16, FTW_PHYS);
+    }
+}
+
 status worker_folder_claim_inputs(const struct worker_folder *f, uint64_t fingerprint, bool *changed, struct error *err)
 {
     char path[WORKER_PATH_BYTES], series[WORKER_PATH_BYTES], want[32], *have = NULL;

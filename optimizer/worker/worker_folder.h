@@ -35,6 +35,10 @@ void worker_folder_path(const struct worker_folder *f, const char *a, const char
 status worker_folder_replace(const struct worker_folder *f, const char *path, const void *data, size_t n_bytes,
                              struct error *err);
 
+/* Removes the temporary files in work/ and results/ that a worker left that was killed while it wrote. To be called
+ * before anything is written; one that cannot be removed does no harm. */
+void worker_folder_sweep(const struct worker_folder *f);
+
 /* Compares the fingerprint of the inputs with that of the run before. When it is another one (a document or a file was
  * edited by hand) or there is none, everything that was computed before is removed: work/, results/, series.rec.
  * *changed: there was another one. */

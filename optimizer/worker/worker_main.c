@@ -347,6 +347,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "selvedge-worker: %s\n", err.text);
         return s == STATUS_STALE ? WORKER_STALE : s == STATUS_NOT_FOUND ? WORKER_USAGE : WORKER_FAILED;
     }
+    worker_folder_sweep(&folder);
     pipeline_context_init(&context);
     context.folder = &folder;
     context.pdf = a.confinement.pdf;

@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-pictures bench-pile bench-weave bench-weave-rendered
+.PHONY: bench bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-pictures bench-pile bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -7,7 +7,7 @@ $(BUILD)/tests/bench/models/bench_recovery: $(BUILD)/obj/tests/bench/fit_bench.c
 $(BUILD)/tests/bench/pictures/bench_pictures: $(BUILD)/obj/tests/bench/pictures/field_comparison.c.o
 
 ##@ Benchmarks and pictures
-bench: | deps-test ## every figure, one JSON object a line
+bench: | deps-test ## every figure, one JSON object a line (a night on 2 quiet cores)
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(BENCH_BINS) >&2
 	@/usr/bin/python3 tests/bench/run_bench.py --build $(BUILD)
 
@@ -25,6 +25,11 @@ bench-models: | deps-test ## what every scattering model costs and what light it
 bench-recovery: | deps-test ## whether a fit of each surface model finds its own parameters again (an hour on 2 quiet cores; photographs are kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/models/bench_recovery >&2
 	@$(BUILD)/tests/bench/models/bench_recovery $(BUILD)/bench-recovery $(MODELS)
+
+# SAMPLES: some of the tables only. TABLES: a folder of other tables
+bench-model-tables: | deps-test ## all models fitted to the measured tables, on one cloth (an hour on 2 quiet cores; jobs are kept in build)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/models/bench_model_tables.py --build $(BUILD) $(if $(TABLES),--tables $(TABLES)) $(SAMPLES)
 
 # PICTURES: some of the fabrics only, and options of the program, such as PICTURES="silk --px 256"
 bench-pictures: | deps-test ## the fast renderer against path tracing on three fabrics (half an hour on 2 quiet cores)

@@ -90,24 +90,12 @@ static struct fit_score score(const struct bench *b, const struct fit_phantom *f
  * curves need nine values each, in one replica. */
 static double published_paths(void) { return 16.0 * 64 * 64 * 64 * (2.0 * (6 * 60 + 1 + 10) + 5 * 9); }
 
-/* The score of the truth that follows from the stated errors of the held-out photographs, without rendering. */
-static double expected_score(const struct fit_phantom *f)
-{
-    struct observation_set part;
-    struct error err = {0};
-    observation_set_init(&part);
-    fit_check(observation_set_select(&f->observation, JOB_SET_HELD_OUT, &part, &err), &err);
-    double score = sqrt(objective_mean_photograph_variance(&part));
-    observation_set_release(&part);
-    return score;
-}
-
 /* The held-out error over that of the truth, from the stated errors of the photographs and the error of the fit to
  * first order, so that it has no noise of score paths. Both terms are unbiased; where derivatives are noisy they can
  * therefore be negative. */
 static double first_order_ratio(const struct bench *b, const struct fit_phantom *f, const struct fit_result *r)
 {
-    double photographs = expected_score(f), square = photographs * photographs;
+    double photographs = fit_phantom_stated_score(f, JOB_SET_HELD_OUT), square = photographs * photographs;
     double fit = fit_phantom_first_order(f, JOB_SET_HELD_OUT, b->kept_paths, r->param),
            stated = fit_phantom_expected(f, JOB_SET_HELD_OUT, b->kept_paths, r->uncertainty.cov);
     double ratio = sqrt(fmax(1.0 + fit / square, 0.0));
@@ -126,7 +114,7 @@ static void bench_fabric(const struct bench *b, const char *name)
     open_fabric(b, name, &f);
     struct fit_score truth = score(b, &f, f.truth);
     fprintf(stderr, "  the truth scores %.4f +- %.4f, %.4f expected from the photographs' stated errors\n",
-            truth.rel_rms, truth.se, expected_score(&f));
+            truth.rel_rms, truth.se, fit_phantom_stated_score(&f, JOB_SET_HELD_OUT));
     if (!b->prepare) {
         bench_run_fit(&f, method_gauss_newton.id, 1, b->path_budget, NULL, &r, NULL);
         bench_print_fit(&f, &r);

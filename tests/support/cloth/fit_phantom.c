@@ -169,7 +169,7 @@ void fit_phantom_photograph(struct fit_phantom *f, const struct fit_photography 
     fit_check_memory(t);
     fit_check_memory(e);
     views(t, configuration);
-    const struct kept_call call = {f->truth, configuration, FIT_N_VIEW, SEED_PHOTOGRAPH, 0, .plain_paths = true};
+    const struct kept_call call = {f->truth, configuration, FIT_N_VIEW, SEED_PHOTOGRAPH, 0, .plain_paths = !f->guided};
     kept_estimate(f, &call, how->part * kept_n_chunks(how->n_path), how->n_path, e);
     rng_start(&rng, &(struct rng_key){.seed = how->noise_seed, .iteration = 65533}, 0, 0);
     observation_set_init(&o);

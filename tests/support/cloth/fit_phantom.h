@@ -2,10 +2,10 @@
  * fits are scored against the true parameters.
  *
  * Photographs are path-traced mean radiances of the 16 + 24 built-in configurations (phantom_view_table.h). They use
- * seeds that no fit uses, and plain paths, so that a fault of the guided shadow paths of fits would appear as a
- * misfit. They are made in chunks of at most FIT_CHUNK paths for each configuration. Each chunk is a file, so that an
- * interrupted run can be continued. The name of a file is a checksum of everything that it depends on, except the
- * renderer itself: empty the folder after a change of the renderer.
+ * seeds that no fit uses, and plain paths unless fit_phantom.guided is set, so that a fault of the guided shadow
+ * paths of fits would appear as a misfit. They are made in chunks of at most FIT_CHUNK paths for each configuration.
+ * Each chunk is a file, so that an interrupted run can be continued. The name of a file is a checksum of everything
+ * that it depends on, except the renderer itself: empty the folder after a change of the renderer.
  *
  * The score of a parameter set is the relative RMS error of the held-out means (objective.h), from two independent
  * replicas and without Monte-Carlo bias. Estimates at the truth, which are also kept, and estimates at the parameters
@@ -37,6 +37,8 @@ struct fit_phantom {
     const char *folder; /* where estimates are kept */
     struct fit_cloth cloth;
     bool shares_cloth; /* true: the caller owns and releases the cloth */
+    /* true: photographs and scores have guided shadow paths, too: less noise with as many paths */
+    bool guided;
     struct appearance model;
     double truth[FIT_MAX_PARAM];                /* internal units */
     struct observation_set observation, fitted; /* all observations; those of the set "fit" */
@@ -93,6 +95,9 @@ uint64_t fit_phantom_fingerprint(const struct fit_phantom *f);
 struct fit_score {
     double rel_rms, se; /* se: standard error of rel_rms from Monte-Carlo noise alone */
 };
+
+/* The score of the truth that follows from the stated errors of one set's photographs, without rendering. */
+double fit_phantom_stated_score(const struct fit_phantom *f, enum job_set set);
 
 /* Score of param on the observations of one set. at: parameters of the kept estimates, which have 2 x n_kept paths for
  * each configuration (usually the truth; NULL: no kept estimates). n_path: new paths for each configuration and replica

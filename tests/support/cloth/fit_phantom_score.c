@@ -54,8 +54,8 @@ static void scorer_release(struct scorer *s)
 static void append_kept(struct scorer *s, const struct fit_phantom *f, const double *at, size_t n_kept)
 {
     for (uint32_t q = 0; q < 2; q++)
-        kept_estimate(f, &(struct kept_call){at, s->configuration, s->part.n, SEED_KEPT, q, true}, 0, n_kept,
-                      s->replica[q]);
+        kept_estimate(f, &(struct kept_call){at, s->configuration, s->part.n, SEED_KEPT, q, true, !f->guided}, 0,
+                      n_kept, s->replica[q]);
     append_here(s, f, at);
 }
 
@@ -75,10 +75,21 @@ static struct fit_score score_of(const struct linear_model *m)
     return score;
 }
 
+double fit_phantom_stated_score(const struct fit_phantom *f, enum job_set set)
+{
+    struct observation_set part;
+    struct error err = {0};
+    observation_set_init(&part);
+    fit_check(observation_set_select(&f->observation, set, &part, &err), &err);
+    double score = sqrt(objective_mean_photograph_variance(&part));
+    observation_set_release(&part);
+    return score;
+}
+
 static void append_score_paths(struct scorer *s, const struct fit_phantom *f, const double *param, size_t n_path)
 {
     for (uint32_t q = 0; q < 2; q++)
-        kept_run(f, &(struct kept_call){param, s->configuration, s->part.n, SEED_SCORE, q, true}, 0, n_path,
+        kept_run(f, &(struct kept_call){param, s->configuration, s->part.n, SEED_SCORE, q, true, !f->guided}, 0, n_path,
                  s->replica[q]);
     append_here(s, f, param);
 }

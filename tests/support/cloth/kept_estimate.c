@@ -55,6 +55,7 @@ uint32_t kept_call_sum(const struct fit_phantom *f, const struct kept_call *c, u
         sum = (uint32_t)crc32_z(sum, (const void *)angle, sizeof angle);
         if (k->n_rotation > 1) sum = (uint32_t)crc32_z(sum, (const void *)&k->n_rotation, sizeof k->n_rotation);
     }
+    if (f->guided) sum = (uint32_t)crc32_z(sum, (const void *)"guided", 6);
     return (uint32_t)crc32_z(sum, (const void *)number, sizeof number);
 }
 

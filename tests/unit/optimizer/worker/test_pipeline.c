@@ -89,6 +89,36 @@ static void test_work_file_of_many_sections(void **state)
     assert_int_equal(work_file_read(path, "m.1", to, WORK_FILE_MAX_SECTION + 1, NULL), STATUS_INTERNAL);
 }
 
+static void test_folder_sweep(void **state)
+{
+    static const char *const gone[] = {"work/fit.bin.part", "results/result.json.tmp-AbCdEf", "results/scan/.part"},
+                             *const kept[] = {"work/fit.bin", "results/result.json", "results/scan/x.part.png",
+                                              "results/x.tmp-AbCde"};
+    struct worker_folder f;
+    char path[2000];
+    assert_int_equal(durable_make_folder(scratch_path(state, "swept/results/scan"), NULL), STATUS_OK);
+    snprintf(path, sizeof path, "%s", scratch_path(state, "swept"));
+    assert_int_equal(worker_folder_open(&f, path, NULL), STATUS_OK);
+    for (size_t i = 0; i < 3; i++) {
+        snprintf(path, sizeof path, "swept/%s", gone[i]);
+        scratch_write(scratch_path(state, path), "x", 1);
+    }
+    for (size_t i = 0; i < 4; i++) {
+        snprintf(path, sizeof path, "swept/%s", kept[i]);
+        scratch_write(scratch_path(state, path), "x", 1);
+    }
+    worker_folder_sweep(&f);
+    for (size_t i = 0; i < 3; i++) {
+        snprintf(path, sizeof path, "swept/%s", gone[i]);
+        assert_int_equal(access(scratch_path(state, path), F_OK), -1);
+    }
+    for (size_t i = 0; i < 4; i++) {
+        snprintf(path, sizeof path, "swept/%s", kept[i]);
+        assert_int_equal(access(scratch_path(state, path), F_OK), 0);
+    }
+    worker_folder_close(&f);
+}
+
 static void test_folder(void **state)
 {
     struct worker_folder a, b;
@@ -239,6 +269,7 @@ int main(void)
                                        cmocka_unit_test(test_work_file),
                                        cmocka_unit_test(test_work_file_of_many_sections),
                                        cmocka_unit_test(test_folder),
+                                       cmocka_unit_test(test_folder_sweep),
                                        cmocka_unit_test(test_series),
                                        cmocka_unit_test(test_inputs),
                                        cmocka_unit_test(test_fibers_wider_than_the_tile)};
