@@ -1,10 +1,14 @@
 /* Light that a flat, endless cloth has scattered more than n_traced times, as a mean over its tile: the radiance
- * towards wo, at each hit by rays from there of a fiber of one class, under parallel light from wi with irradiance pi
+ * towards wo, at each hit by rays from there of a fiber of one kind, under parallel light from wi with irradiance pi
  * on a surface that faces it, is |cos th_i| times the value, which is linear between the nodes of two grids.
+ *
+ * The kind of a fiber is its class, weft or warp, and its tilt there: the sine of the angle at which it rises along x
+ * or along y. Where threads cross, fibers rise and fall, and send light elsewhere. The value is linear between
+ * DEEP_LIGHT_N_TILT nodes from -DEEP_LIGHT_TILT to DEEP_LIGHT_TILT, and constant beyond.
  *
  * A grid has edge x edge nodes on each side of the cloth, evenly over the square around the unit disk to which a
  * hemisphere is mapped: a direction lies at (2 / pi) theta from the middle, at its azimuth, and the horizon is the rim.
- * Class, view (side, row, column), light likewise, channels last; side 0 is above. Lights and views are not
+ * Class, tilt, view (side, row, column), light likewise, channels last; side 0 is above. Lights and views are not
  * exchangeable: a cloth of packed fibers is not reciprocal.
  *
  * Deep light enters the cloth beside the hit, so that on a bent cloth it meets another normal there. The mean of the
@@ -13,19 +17,19 @@
 #ifndef SELVEDGE_RENDERER_DEEP_LIGHT_H
 #define SELVEDGE_RENDERER_DEEP_LIGHT_H
 
-#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
 
-enum { DEEP_LIGHT_MOST_EDGE = 24, DEEP_LIGHT_N_CLASS = 2 };
+enum { DEEP_LIGHT_MOST_EDGE = 24, DEEP_LIGHT_N_CLASS = 2, DEEP_LIGHT_N_TILT = 3 };
+#define DEEP_LIGHT_TILT 0.45f
 
 struct deep_light {
     uint32_t n_traced; /* 0: there is no table */
     uint32_t edge;     /* nodes along an edge of each grid */
     uint32_t n_side;   /* 1: views and lights are above only, because a black sheet lies below */
-    float error;       /* relative standard error of the value, root mean square, of the paths that made it */
+    float error;       /* relative standard error, root mean square, of light around the nodes: noise of the paths */
     float spread_mm;
-    float *value;      /* DEEP_LIGHT_N_CLASS x n_node x n_node x 3 */
+    float *value;      /* DEEP_LIGHT_N_CLASS x DEEP_LIGHT_N_TILT x n_node x n_node x 3 */
     float (*shift)[2]; /* mm: n_node of views, then n_node of lights */
 };
 
@@ -33,7 +37,8 @@ static inline size_t deep_light_n_node(const struct deep_light *d) { return (siz
 /* Numbers in value. */
 static inline size_t deep_light_n_value(const struct deep_light *d)
 {
-    return d->n_traced > 0 ? (size_t)DEEP_LIGHT_N_CLASS * 3 * deep_light_n_node(d) * deep_light_n_node(d) : 0;
+    const size_t n_kind = (size_t)DEEP_LIGHT_N_CLASS * DEEP_LIGHT_N_TILT, n = deep_light_n_node(d);
+    return d->n_traced > 0 ? 3 * n_kind * n * n : 0;
 }
 static inline size_t deep_light_n_shift(const struct deep_light *d)
 {
@@ -42,10 +47,13 @@ static inline size_t deep_light_n_shift(const struct deep_light *d)
 /* The four nodes around a direction and their weights, which sum to 1. */
 void deep_light_nodes(const struct deep_light *d, const double direction[3], size_t node[4], double weight[4]);
 /* Class of a fiber by its tangent in the flat cloth: 1 when it lies along x, the weft, rather than along y. */
-static inline size_t deep_light_class(const float tangent[3]) { return fabsf(tangent[0]) > fabsf(tangent[1]); }
-/* Adds the radiance times scale. wo, wi: unit vectors. A view from below where there is a black sheet counts as one
- * along the cloth; light from there as none. */
-void deep_light_add(const struct deep_light *d, size_t i_class, const float wo[3], const float wi[3],
+size_t deep_light_class(const float tangent[3]);
+/* The two kinds around that of a fiber, class * DEEP_LIGHT_N_TILT + node of tilt, and their weights, which sum to 1. A
+ * tangent and its opposite are the same. */
+void deep_light_kinds(const float tangent[3], size_t kind[2], double weight[2]);
+/* Adds the radiance times scale. wo, wi: unit vectors; tangent: of the fiber in the flat cloth. A view from below where
+ * there is a black sheet counts as one along the cloth; light from there as none. */
+void deep_light_add(const struct deep_light *d, const float tangent[3], const float wo[3], const float wi[3],
                     const float scale[3], float rgb[3]);
 /* Mean way from a hit to where light from wi that is seen from wo enters the cloth; as in deep_light_add. */
 void deep_light_shift(const struct deep_light *d, const float wo[3], const float wi[3], float shift_mm[2]);

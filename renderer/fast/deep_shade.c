@@ -10,7 +10,7 @@ struct deep_hit {
     float position_mm[3]; /* true place in the scene */
     float row[3][3];      /* of the rotation into the flat cloth at the hit */
     float wo[3];
-    size_t i_class; /* of the fiber */
+    float tangent[3]; /* of the fiber, in the flat cloth */
 };
 
 static void turn(const float row[3][3], const float d[3], float out[3])
@@ -51,7 +51,7 @@ static void add_from(const struct fast_setting *s, const struct deep_hit *h, con
     if (scene_shell_shades(scene, &at, &place, no_shift, direction)) return;
     scene_place_rotation(&place, row);
     turn((const float(*)[3])row, direction, wi);
-    deep_light_add(&s->option->tables->deep, h->i_class, h->wo, wi, scale, radiance);
+    deep_light_add(&s->option->tables->deep, h->tangent, h->wo, wi, scale, radiance);
 }
 
 void deep_shade_begin(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,
@@ -61,7 +61,7 @@ void deep_shade_begin(const void *context, const struct scene_hit *hit, const st
     const struct lights *l = &s->path.lights;
     struct deep_hit h = {.hit = hit};
     struct scene_place place;
-    float back[3], direction[3], tangent[3], pdf, scale[3], u[2];
+    float back[3], direction[3], pdf, scale[3], u[2];
     for (int a = 0; a < 3; a++) {
         back[a] = -ray->direction[a];
         if (a < 2) h.offset_mm[a] = ray->offset_mm[a];
@@ -70,8 +70,7 @@ void deep_shade_begin(const void *context, const struct scene_hit *hit, const st
     scene_place_of(s->path.scene, hit, h.offset_mm, &place);
     scene_place_rotation(&place, h.row);
     turn((const float(*)[3])h.row, back, h.wo);
-    scene_place_to_cloth(&place, hit->tangent, tangent);
-    h.i_class = deep_light_class(tangent);
+    scene_place_to_cloth(&place, hit->tangent, h.tangent);
     if (l->has_lamp) {
         for (int k = 0; k < 2; k++) u[k] = rng_float(rng);
         if (lamp_sample(&l->lamp, h.position_mm, u, direction, &pdf)) {

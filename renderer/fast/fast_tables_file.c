@@ -10,7 +10,7 @@
 #include <zlib.h>
 
 static const char magic[8] = "SELVFAST";
-enum { VERSION = 4, MOST_BYTES = 1 << 30, MOST_CELL = 1 << 22, MOST_SET = 64, MOST_SEGMENT = 1 << 28 };
+enum { VERSION = 5, MOST_BYTES = 1 << 30, MOST_CELL = 1 << 22, MOST_SET = 64, MOST_SEGMENT = 1 << 28 };
 
 struct header {
     char magic[8];

@@ -133,10 +133,11 @@ const struct job_option option_rows_pictures[] = {
      .standard = "\"directions\"",
      .meaning =
          "Of method `fast`: where the light comes from that is scattered more than three times. `directions`: from a "
-         "table of view and light for threads along the weft and one along the warp, as means over the repeat, so that "
-         "places of like threads do not differ in this light. `cells`: from a table of the place where the third hit "
-         "lies, in spherical harmonics of order 4, which "
-         "is made faster. With `visibility` `tables`, and with method `corrected`, it always comes from cells."},
+         "table of view and light for threads along the weft and along the warp that rise, lie level and fall, as "
+         "means "
+         "over the repeat, so that places of like threads do not differ in this light. `cells`: from a table of the "
+         "place where the third hit lies, in spherical harmonics of order 4, which is made faster. With `visibility` "
+         "`tables`, and with method `corrected`, it always comes from cells."},
     {.path = "pictures[].deep_light_paths",
      .kind = OPTION_COUNT,
      OF_PICTURE(n_deep_path),

@@ -120,7 +120,7 @@ status distance_components(float *x, size_t n, size_t n_number, size_t n_compone
         struct rng rng;
         rng_start(&rng, &(struct rng_key){.seed = 0x636f6d70u}, 0, 0);
         for (size_t i = 0; i < s.n_vector * n_number; i++) s.q[i] = rng_float(&rng) - 0.5f;
-        subtract_mean(x, n, n_number, mean);
+        if (mean != NULL) subtract_mean(x, n, n_number, mean);
         make_orthonormal(&s);
     }
     for (int i = 0; i < N_ITERATION && st == STATUS_OK; i++) {

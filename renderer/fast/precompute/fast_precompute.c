@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-enum { DEFAULT_ORDER = 4, DEFAULT_PATHS = 50000, DEFAULT_DEEP_EDGE = 12, METHOD_VERSION = 4 };
+enum { DEFAULT_ORDER = 4, DEFAULT_PATHS = 50000, DEFAULT_DEEP_EDGE = 12, METHOD_VERSION = 5 };
 #define DEFAULT_DEEP_PATHS 8e6
 
 static uint64_t add_bytes(uint64_t h, const void *data, size_t n)
