@@ -262,7 +262,7 @@ static status fill_lumens(struct volume *v, double diameter_voxel, struct thread
                           struct reconstruct_report *report, struct error *err)
 {
     struct fiber_diameter d = {.voxel = diameter_voxel};
-    status s = lumens_fill(v, report->noise.mapped_sd, &report->lumen_share, err);
+    status s = lumens_fill_along(v, pool, &report->lumen_share, err);
     if (s == STATUS_OK && isnan(diameter_voxel)) s = fiber_diameter_measure(v, pool, NULL, &d, err);
     if (s == STATUS_OK) s = lumens_sift(v, d.voxel, pool, &report->lumen_share, err);
     return s;

@@ -1,5 +1,7 @@
 #include "geometry/orientation/lumen/lumen_fill.h"
 
+#include "geometry/orientation/lumen/along_smooth.h"
+
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -203,7 +205,9 @@ static bool mark_basins(const struct lumen_box *b, double depth, double *share)
     return true;
 }
 
-static status box_share(struct lumen_box *b, double depth, double *share, struct error *err)
+/* along: whether the density is smoothed along the fibers, and not on all sides. */
+static status box_share(struct lumen_box *b, bool along, struct thread_pool *pool, double depth, double *share,
+                        struct error *err)
 {
     void *array[2] = {NULL, NULL};
     const size_t n = volume_n_voxel(b->n);
@@ -211,7 +215,8 @@ static status box_share(struct lumen_box *b, double depth, double *share, struct
     if (s == STATUS_OK) s = scratch_new(b->v->space, n, "the lumens of fibers", &array[1], err);
     b->density = array[0];
     b->height = array[1];
-    if (s == STATUS_OK && (!blur_box(b) || !mark_basins(b, depth, share)))
+    if (s == STATUS_OK && along) s = density_smooth_along(b->v, pool, UNIT, b->density, err);
+    if (s == STATUS_OK && ((!along && !blur_box(b)) || !mark_basins(b, depth, share)))
         s = error_set(err, STATUS_NO_MEMORY, "cannot look for lumens: out of memory");
     return s;
 }
@@ -248,13 +253,24 @@ static status fill_marked(const struct lumen_box *b, struct volume *v, struct er
     return s;
 }
 
-status lumens_fill(struct volume *v, double noise_sd, double *filled_share, struct error *err)
+static status fill(struct volume *v, bool along, struct thread_pool *pool, double depth, double *filled_share,
+                   struct error *err)
 {
     struct lumen_box all = {.v = v, .n = {v->n[0], v->n[1], v->n[2]}};
-    double depth = fmax(LEAST_DEPTH, isfinite(noise_sd) ? NOISE_DEPTH * BLUR_OF_NOISE * noise_sd : 0.0);
     *filled_share = 0.0;
-    status s = box_share(&all, depth, filled_share, err);
+    status s = box_share(&all, along, pool, depth, filled_share, err);
     if (s == STATUS_OK) s = fill_marked(&all, v, err);
     release_box(&all);
     return s;
+}
+
+status lumens_fill(struct volume *v, double noise_sd, double *filled_share, struct error *err)
+{
+    const double noise = isfinite(noise_sd) ? NOISE_DEPTH * BLUR_OF_NOISE * noise_sd : 0.0;
+    return fill(v, false, NULL, fmax(LEAST_DEPTH, noise), filled_share, err);
+}
+
+status lumens_fill_along(struct volume *v, struct thread_pool *pool, double *filled_share, struct error *err)
+{
+    return fill(v, true, pool, LEAST_DEPTH, filled_share, err);
 }

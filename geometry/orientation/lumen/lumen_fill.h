@@ -8,10 +8,14 @@
 #ifndef SELVEDGE_GEOMETRY_LUMEN_FILL_H
 #define SELVEDGE_GEOMETRY_LUMEN_FILL_H
 
+#include "base/thread_pool.h"
 #include "geometry/volume/volume.h"
 
 /* Sets the density in lumens to 1, and keeps what they had in v->filled. v: densities in [0, 1]. noise_sd: of a voxel.
  * *filled_share: voxels filled over those of material. STATUS_NO_MEMORY; with a scratch space also STATUS_DISK_FULL. */
 status lumens_fill(struct volume *v, double noise_sd, double *filled_share, struct error *err);
+/* The same for fibers known to be hollow: the density is smoothed along the fibers only (along_smooth.h), so that thin
+ * walls still close lumens, and basins may be shallow, because lumens_sift empties those that are none. */
+status lumens_fill_along(struct volume *v, struct thread_pool *pool, double *filled_share, struct error *err);
 
 #endif

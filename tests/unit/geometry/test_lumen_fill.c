@@ -1,6 +1,7 @@
 /* Lumens of hollow fibers are filled, and nothing outside of the fibers. */
 #include "base/rng.h"
 #include "geometry/orientation/diameter/fiber_diameter.h"
+#include "geometry/orientation/lumen/along_smooth.h"
 #include "geometry/orientation/lumen/lumen_evidence.h"
 #include "geometry/orientation/lumen/lumen_fill.h"
 #include "geometry/orientation/lumen/lumen_sift.h"
@@ -29,14 +30,17 @@ static void middle_of(int i, double pitch, double *y, double *z)
 }
 
 /* Density at a distance from the middle of a fiber with a lumen, blurred by 0.7 voxels. */
-static double profile(double distance, double lumen)
+static double profile_of(double distance, double outer, double lumen)
 {
     const double blur = 0.7 * M_SQRT2;
     double hole = lumen > 0.0 ? 0.5 * erfc((distance - lumen) / blur) : 0.0;
-    return 0.5 * erfc((distance - radius) / blur) - hole;
+    return 0.5 * erfc((distance - outer) / blur) - hole;
 }
 
-static void make_bundle(double lumen, double pitch, struct volume *v)
+static double profile(double distance, double lumen) { return profile_of(distance, radius, lumen); }
+
+/* 19 fibers of radius `outer`. */
+static void make_bundle_of(double outer, double lumen, double pitch, double sd, struct volume *v)
 {
     const struct rng_key key = {.seed = 5};
     struct rng r;
@@ -47,11 +51,17 @@ static void make_bundle(double lumen, double pitch, struct volume *v)
         for (int i = 0; i < 19; i++) {
             double cy, cz;
             middle_of(i, pitch, &cy, &cz);
-            sum += profile(hypot((double)(at / 72 % 72) + 0.5 - cy, (double)(at / (72 * 72)) + 0.5 - cz), lumen);
+            sum +=
+                profile_of(hypot((double)(at / 72 % 72) + 0.5 - cy, (double)(at / (72 * 72)) + 0.5 - cz), outer, lumen);
         }
         rng_normal_pair(&r, z);
-        v->density[at] = (float)fmin(1.0, fmax(0.0, fmin(1.0, sum) + noise_sd * z[0]));
+        v->density[at] = (float)fmin(1.0, fmax(0.0, fmin(1.0, sum) + sd * z[0]));
     }
+}
+
+static void make_bundle(double lumen, double pitch, struct volume *v)
+{
+    make_bundle_of(radius, lumen, pitch, noise_sd, v);
 }
 
 /* Mean density within `reach` of the middles of fibers. */
@@ -194,6 +204,72 @@ static void test_gaps_are_sifted_out(void **state)
     volume_release(&before);
 }
 
+/* Walls of 1.6 voxels in noise of a fourth of the step close a lumen only where the scan is smoothed along its fibers.
+ */
+static void test_lumens_of_thin_fibers(void **state)
+{
+    (void)state;
+    const double outer = 2.7, lumen = 0.4 * outer, pitch = 6.2, sd = 0.25;
+    double share, filled[2];
+    for (int along = 0; along < 2; along++) {
+        struct volume v;
+        make_bundle_of(outer, lumen, pitch, sd, &v);
+        if (along == 1)
+            assert_int_equal(lumens_fill_along(&v, NULL, &share, NULL), STATUS_OK);
+        else
+            assert_int_equal(lumens_fill(&v, sd, &share, NULL), STATUS_OK);
+        filled[along] = middle_density(&v, pitch, 1.0);
+        volume_release(&v);
+    }
+    print_message("density of the middles of thin fibers, smoothed on all sides %.3f, along the fibers %.3f\n",
+                  filled[0], filled[1]);
+    assert_true(filled[1] > 0.9 && filled[1] > filled[0] + 0.1);
+}
+
+/* Along a slanting fiber the mean has less noise, and the section stays as sharp. A Gaussian of 2 voxels leaves 0.38 of
+ * white noise along an axis, and less in between, where voxels are interpolated. */
+static void test_smoothing_along_a_fiber(void **state)
+{
+    (void)state;
+    static uint8_t smooth[40 * 40 * 40];
+    const size_t n[3] = {40, 40, 40};
+    const double u[3] = {0.8, 0.48, 0.36}, sd = 0.2;
+    const struct rng_key key = {.seed = 9};
+    double sum[3] = {0.0}, square = 0.0; /* error amid the fiber, at its edge, and outside of it */
+    size_t count[3] = {0};
+    struct rng r;
+    struct volume v;
+    rng_start(&r, &key, 0, 0);
+    assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
+    for (int pass = 0; pass < 2; pass++) {
+        for (size_t at = 0; at < volume_n_voxel(n); at++) {
+            const double p[3] = {(double)(at % 40) - 19.6, (double)(at / 40 % 40) - 19.3, (double)(at / 1600) - 19.4};
+            const double t = p[0] * u[0] + p[1] * u[1] + p[2] * u[2];
+            const double distance = sqrt(fmax(0.0, p[0] * p[0] + p[1] * p[1] + p[2] * p[2] - t * t));
+            const double true_density = 0.2 + 0.6 * profile(distance, 0.0);
+            double z[2];
+            rng_normal_pair(&r, z);
+            if (pass == 0) v.density[at] = (float)fmin(1.0, fmax(0.0, true_density + sd * z[0]));
+            if (pass == 0 || fabs(t) > 12.0) continue;
+            const int place = distance < 2.0 ? 0 : fabs(distance - radius) < 0.5 ? 1 : distance > 5.0 ? 2 : -1;
+            if (place < 0 || distance > 7.0) continue;
+            const double error = (double)smooth[at] / 250.0 - true_density;
+            sum[place] += error;
+            square += place == 0 ? error * error : 0.0;
+            count[place]++;
+        }
+        if (pass == 0) assert_int_equal(density_smooth_along(&v, NULL, 250, smooth, NULL), STATUS_OK);
+    }
+    for (int i = 0; i < 3; i++) sum[i] /= (double)count[i];
+    const double noise = sqrt(square / (double)count[0] - sum[0] * sum[0]);
+    print_message("errors %.3f, %.3f and %.3f; noise %.3f of %.3f\n", sum[0], sum[1], sum[2], noise, sd);
+    /* clamping costs 0.02 at densities of 0.2 and 0.8; linear interpolation blurs the edge by a variance of 1/6 to 1/4
+     * voxel, which moves none of its mean */
+    for (int i = 0; i < 3; i++) assert_true(fabs(sum[i]) < 0.05);
+    assert_true(noise < 0.38 * sd);
+    volume_release(&v);
+}
+
 /* The diameter of hollow fibers is that of their outlines, not of their walls, also under thin layers of void. */
 static void test_diameter_of_hollow_fibers(void **state)
 {
@@ -236,6 +312,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_lumens_are_filled),         cmocka_unit_test(test_nothing_is_enclosed),
         cmocka_unit_test(test_hollow_fibers_are_noticed), cmocka_unit_test(test_thin_void_is_outside),
-        cmocka_unit_test(test_gaps_are_sifted_out),       cmocka_unit_test(test_diameter_of_hollow_fibers)};
+        cmocka_unit_test(test_gaps_are_sifted_out),       cmocka_unit_test(test_lumens_of_thin_fibers),
+        cmocka_unit_test(test_smoothing_along_a_fiber),   cmocka_unit_test(test_diameter_of_hollow_fibers)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
