@@ -1,6 +1,7 @@
 /* Step "orientation": the fiber diameter, and the direction of the fiber through every voxel of material. */
 #include "geometry/reconstruct.h"
 
+#include "geometry/filter_choice.h"
 #include "geometry/filter_directions.h"
 #include "geometry/orientation/diameter/fiber_diameter.h"
 #include "geometry/trace/trace_grid.h"
@@ -10,6 +11,10 @@
 
 /* Ratio of diameters that are the same peak. */
 static const double SAME_PEAK = 1.3;
+/* Noise over the step from void to material from which on thin fibers get the usual filter: a narrow one sees more of
+ * it. It lies between a half, at which some cloths gain by the narrow one and others lose, and a fifth, at which all
+ * that touch gain (geometry/NOTES.md, "Thin fibers: the filter was too wide"). */
+static const double MOST_NOISE = 1.0 / 3.0;
 
 /* Takes the diameter of the fibers that noise hid in the scan, if only their yarns are left since it was smoothed. */
 static void prefer_hidden(const struct scan_noise *noise, struct fiber_diameter *d)
@@ -65,6 +70,8 @@ static status filter_rescaled(const struct volume *v, double edge, struct recons
     if (s == STATUS_OK && isnan(option->fiber_diameter_voxel))
         s = measure_again(&grid, edge, pool, &quiet, report, err);
     trace_grid_rescale_option(option, edge);
+    if (edge < 1.0 && report->noise.scan_sd < MOST_NOISE)
+        filter_choose_thin(option, report->fiber_diameter_voxel / edge);
     if (s == STATUS_OK)
         s = filter_directions(&grid, report->fiber_diameter_voxel / edge, option, pool, progress, &on_grid, report,
                               err);
