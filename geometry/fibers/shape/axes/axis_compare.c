@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { BRICK = AXIS_BRICK };
+enum { BRICK = AXIS_BRICK, AHEAD = 8, LINE = 16 };
 static const float OUTLIER = 0.6f; /* difference of densities beyond which a residual comes from another fiber */
 
 /* Sums of shared_sum for one plane of the brick. */
@@ -84,6 +84,14 @@ static void add_plane(const struct plane_sum *plane, struct shared_sum *sum)
     }
 }
 
+/* Asks for the densities of a row of n voxels, so that they are there when they are compared: rows of a volume are too
+ * far from each other for the processor to guess the next. */
+static void fetch_row(const float *density, size_t n)
+{
+    for (size_t i = 0; i < n; i += LINE) __builtin_prefetch(density + i);
+    __builtin_prefetch(density + n - 1);
+}
+
 void axis_compare(const struct axis_model *m, struct axis_scratch *s, const size_t from[3], const size_t n[3],
                   struct shared_sum *sum)
 {
@@ -92,6 +100,7 @@ void axis_compare(const struct axis_model *m, struct axis_scratch *s, const size
         for (size_t j = 0; j < n[1]; j++) {
             const size_t row = from[1] + j - m->first_row;
             const float *density = m->v->density + volume_index(m->v->n, from[0], row, from[2] + k);
+            if (j + AHEAD < n[1]) fetch_row(density + AHEAD * m->v->n[0], n[0]);
             for (size_t i = 0; i < n[0]; i += LANES) {
                 const size_t at = (k * BRICK + j) * BRICK + i;
                 if (s->touched[at / LANES]) compare_lanes(m, s, at, density + i, n[0] - i, &plane);
