@@ -19,6 +19,7 @@ struct axis_round {
     struct section_view *view;
     float *reach;
     struct segment_bricks bricks;
+    struct segment *claiming;
     struct axis_batch batch;
     size_t n_thread;
 };
@@ -201,7 +202,7 @@ bool axis_share_can(const struct axis_batch *b)
            most_bytes_of(largest_brick(b), m->section != NULL) <= BRICK_MOST_BYTES;
 }
 
-status axis_share_round(const struct axis_model *m, const struct polyline_set *lines, struct error *err)
+status axis_share_round(const struct axis_model *m, const struct polyline_set *lines, bool follows, struct error *err)
 {
     const struct axis_profile *profile = &m->profile;
     struct byte_pack p = {0};
@@ -214,6 +215,7 @@ status axis_share_round(const struct axis_model *m, const struct polyline_set *l
     o.high = profile->high;
     o.has_shape = lines->shape != NULL;
     o.has_section = profile->section != NULL;
+    o.follows = follows;
     BYTE_PACK(&p, o);
     for (size_t l = 0; l <= lines->n_line; l++) BYTE_PACK(&p, (uint64_t){lines->n_line > 0 ? lines->first[l] : 0});
     byte_pack_put(&p, lines->vertex, lines->n_vertex * sizeof *lines->vertex);
@@ -246,6 +248,7 @@ void axis_round_free(struct axis_round *r)
     free(r->view);
     free(r->reach);
     segment_bricks_release(&r->bricks);
+    free(r->claiming);
     free(r);
 }
 
@@ -301,11 +304,26 @@ static status read_lines(struct axis_round *r, const struct rank_order *order, s
     return s;
 }
 
-status axis_share_take(struct slab_helper *h, const struct rank_order *order, struct thread_pool *pool,
-                       struct error *err)
+/* Takes the bricks of the round before for its lines at other places. */
+static status follow_round(struct axis_round *r, struct axis_round *before, struct error *err)
+{
+    const struct polyline_set *p = &r->lines;
+    bool same =
+        before != NULL && before->bricks.segment != NULL && r->section == NULL && p->n_line == before->lines.n_line;
+    for (size_t l = 0; same && l <= p->n_line; l++) same = p->first[l] == before->lines.first[l];
+    if (!same) return error_set(err, STATUS_FORMAT, "another rank goes on with a fit of lines that are not there");
+    r->bricks = before->bricks;
+    r->claiming = before->claiming;
+    before->bricks = (struct segment_bricks){0};
+    before->claiming = NULL;
+    r->batch.model.claim_tail = before->batch.model.claim_tail;
+    return axis_round_follow(&r->batch.model, &r->lines, &r->bricks, &r->claiming, err);
+}
+
+static status take_round(struct slab_helper *h, const struct rank_order *order, struct axis_round *before,
+                         struct thread_pool *pool, struct error *err)
 {
     struct axes_order o;
-    axis_round_free(h->round);
     struct axis_round *r = h->round = calloc(1, sizeof *r);
     if (r == NULL) return error_set(err, STATUS_NO_MEMORY, "no memory for lines");
     status s = read_lines(r, order, &o, err);
@@ -320,7 +338,18 @@ status axis_share_take(struct slab_helper *h, const struct rank_order *order, st
     m->first_row = h->rows.with_halo;
     m->profile = (struct axis_profile){.blur = o.blur, .low = o.low, .high = o.high, .section = r->section};
     s = axis_batch_init(&r->batch, r->n_thread, err);
+    if (s == STATUS_OK && o.follows) return follow_round(r, before, err);
     return s == STATUS_OK ? axis_round_prepare(m, &r->lines, h->slabs.n, r->view, r->reach, &r->bricks, err) : s;
+}
+
+status axis_share_take(struct slab_helper *h, const struct rank_order *order, struct thread_pool *pool,
+                       struct error *err)
+{
+    struct axis_round *before = h->round;
+    h->round = NULL;
+    status s = take_round(h, order, before, pool, err);
+    axis_round_free(before);
+    return s;
 }
 
 status axis_share_help(struct slab_helper *h, const struct rank_order *order, struct thread_pool *pool,

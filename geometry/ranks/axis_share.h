@@ -14,6 +14,7 @@ struct axes_order {
     uint64_t n_line, n_vertex;
     double blur, low, high; /* of the profile */
     uint8_t has_shape, has_section;
+    uint8_t follows; /* whether the claims are those of the last order that does not follow (axis_round_follow) */
 };
 
 /* Data of an order RANK_ORDER_BRICKS. */
@@ -22,7 +23,7 @@ struct bricks_order {
 };
 
 /* Root: sends the lines of a round, before they are prepared. STATUS_IO, STATUS_NO_MEMORY. */
-status axis_share_round(const struct axis_model *m, const struct polyline_set *lines, struct error *err);
+status axis_share_round(const struct axis_model *m, const struct polyline_set *lines, bool follows, struct error *err);
 /* Root: whether the other ranks can fit bricks of the batch: solid fibers in a volume of which they have slabs. */
 bool axis_share_can(const struct axis_batch *b);
 /* Root: fits the bricks of the batch with all ranks. STATUS_CANCELLED, STATUS_IO, STATUS_NO_MEMORY. */

@@ -173,5 +173,5 @@ status trace_leftover(struct trace_job *job, struct polyline_set *lines, struct 
     volume_release(&left);
     if (s != STATUS_OK || lines->n_line == n_before) return s;
     trace_classify(lines);
-    return trace_center(job, lines, err);
+    return trace_center(job, lines, 1, err);
 }

@@ -130,10 +130,10 @@ status trace_lines(struct trace_job *job, struct polyline_set *lines, struct err
     for (int round = 0; round < N_REPAIR && s == STATUS_OK; round++) { /* grow and join, then cut wrong parts */
         const double from = 0.14 + 0.2 * round / N_REPAIR;
         trace_enter_part(job, from, from + 0.14 / N_REPAIR);
-        s = trace_center(job, &part[1], err);
+        s = trace_center(job, &part[1], 1, err);
         if (s == STATUS_OK) s = trace_repair(job, &part[1], true, 0.0, &part[2], &counts, err);
         trace_enter_part(job, from + 0.14 / N_REPAIR, from + 0.2 / N_REPAIR);
-        if (s == STATUS_OK) s = trace_center(job, &part[2], err);
+        if (s == STATUS_OK) s = trace_center(job, &part[2], 1, err);
         if (s == STATUS_OK) s = trace_repair(job, &part[2], false, 0.0, &part[1], &counts, err);
     }
     if (s == STATUS_OK) s = trace_repair(job, &part[1], true, 0.0, &part[0], &counts, err);
@@ -143,7 +143,7 @@ status trace_lines(struct trace_job *job, struct polyline_set *lines, struct err
         s = smooth_and_drop(job, &part[0], lines, err);
     }
     trace_enter_part(job, 0.35, 0.4);
-    if (s == STATUS_OK) s = trace_center(job, lines, err);
+    if (s == STATUS_OK) s = trace_center(job, lines, 1, err);
     trace_enter_part(job, 0.4, 0.5);
     if (s == STATUS_OK) s = fit_axes(job, lines, false, err);
     if (s == STATUS_OK) s = straighten(job, lines, false, TRACE_MIN_PIECE, err);
@@ -186,8 +186,8 @@ static status settle_once(struct trace_job *job, struct polyline_set *lines, int
 {
     const struct reconstruct_report *r = job->report;
     const size_t n_before = r->n_gap_bridged + r->n_joined;
-    status s = STATUS_OK;
-    for (int k = 0; k < n_fit && s == STATUS_OK; k++) s = trace_center(job, lines, err);
+    job->profile.at_rest = true;
+    status s = trace_center(job, lines, n_fit, err);
     if (s == STATUS_OK) s = straighten(job, lines, true, TRACE_MIN_PIECE, err);
     if (s == STATUS_OK && first) s = look_again(job, lines, err);
     if (s == STATUS_OK) s = trace_join(job, lines, true, err);

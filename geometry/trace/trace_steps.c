@@ -126,7 +126,7 @@ void trace_state_profile(const struct trace_job *job, const struct axis_profile 
     r->single_radius_se_m = profile->radius_se * profile->radius * voxel_m;
 }
 
-status trace_center(struct trace_job *job, struct polyline_set *lines, struct error *err)
+status trace_center(struct trace_job *job, struct polyline_set *lines, int n_fit, struct error *err)
 {
-    return polylines_fit(lines, job->v, job->diameter, N_CENTER, &job->profile, job->pool, &job->inner, err);
+    return polylines_fit(lines, job->v, job->diameter, n_fit * N_CENTER, &job->profile, job->pool, &job->inner, err);
 }

@@ -75,15 +75,13 @@ static status start(struct segment_bricks *s, size_t n_segment, const size_t n_v
     return STATUS_OK;
 }
 
-/* Makes the segments, without the lists of the bricks. */
-static status take_lines(struct segment_bricks *s, const struct polyline_set *lines, const size_t n_voxel[3],
-                         size_t edge, float reach, struct error *err)
+/* Writes the segments of the lines, and returns their number. */
+static size_t write_segments(const struct polyline_set *lines, struct segment *segment)
 {
-    status st = start(s, lines->n_vertex, n_voxel, edge, reach, err);
-    if (st != STATUS_OK) return st;
+    size_t n = 0;
     for (size_t l = 0; l < lines->n_line; l++)
         for (size_t i = lines->first[l]; i + 1 < lines->first[l + 1]; i++) {
-            struct segment *g = &s->segment[s->n_segment++];
+            struct segment *g = &segment[n++];
             memcpy(g->a, lines->vertex[i], sizeof g->a);
             memcpy(g->b, lines->vertex[i + 1], sizeof g->b);
             g->line = (uint32_t)l;
@@ -92,6 +90,26 @@ static status take_lines(struct segment_bricks *s, const struct polyline_set *li
             g->is_first = i == lines->first[l];
             g->is_last = i + 2 == lines->first[l + 1];
         }
+    return n;
+}
+
+/* Makes the segments, without the lists of the bricks. */
+static status take_lines(struct segment_bricks *s, const struct polyline_set *lines, const size_t n_voxel[3],
+                         size_t edge, float reach, struct error *err)
+{
+    status st = start(s, lines->n_vertex, n_voxel, edge, reach, err);
+    if (st == STATUS_OK) s->n_segment = write_segments(lines, s->segment);
+    return st;
+}
+
+status segment_bricks_move(struct segment_bricks *s, const struct polyline_set *lines, struct segment **first,
+                           struct error *err)
+{
+    struct segment *moved = *first != NULL ? s->segment : malloc((lines->n_vertex + 1) * sizeof *moved);
+    if (moved == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot sort fiber segments: out of memory");
+    if (*first == NULL) *first = s->segment;
+    s->segment = moved;
+    write_segments(lines, moved);
     return STATUS_OK;
 }
 

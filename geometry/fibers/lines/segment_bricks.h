@@ -33,6 +33,11 @@ status segment_bricks_init(struct segment_bricks *s, const struct polyline_set *
 /* The list of a brick has the segments that reach it. reach: of each segment, in the order of the lines. */
 status segment_bricks_init_each(struct segment_bricks *s, const struct polyline_set *lines, const size_t n_voxel[3],
                                 size_t edge, const float *reach, struct error *err);
+/* Takes new places and radii of the lines that the lists were made from. The lists stay as they are, and *first
+ * becomes the segments that they were made from, unless it has them from an earlier move (else NULL); the caller frees
+ * it. STATUS_NO_MEMORY. */
+status segment_bricks_move(struct segment_bricks *s, const struct polyline_set *lines, struct segment **first,
+                           struct error *err);
 status segment_bricks_from_fibers(struct segment_bricks *s, const struct fiber_set *f, const size_t n_voxel[3],
                                   const double voxel_size_m[3], size_t edge, float reach, struct error *err);
 void segment_bricks_release(struct segment_bricks *s);

@@ -143,12 +143,12 @@ static void subtract_lumen(const struct axis_model *m, struct axis_scratch *s, c
 }
 
 /* Adds the claims of a segment to the model. */
-static void add_to_model(const struct axis_model *m, struct axis_scratch *s, const struct axis_view *w, size_t from,
-                         size_t to)
+static void add_to_model(const struct axis_model *m, struct axis_scratch *s, const struct axis_view *w,
+                         const uint16_t *cell, size_t n)
 {
-    for (size_t i = from; i < to; i += LANES) {
+    for (size_t i = 0; i < n; i += LANES) {
         struct axis_places p;
-        find_places(w, s->claims.cell + i, to - i, &p);
+        find_places(w, cell + i, n - i, &p);
         lanes share, slope, bend;
         const lanes depth = depth_in_blur(m, w, &p, &bend), at = place_in_table(&m->table, depth);
         look_up(&m->table, at, &share, &slope);
@@ -315,17 +315,17 @@ static void keep_sum(const struct segment_sum *sum, struct axis_pull *pull, stru
 }
 
 /* Adds the claims to the normal equations of the segments. */
-static void add_pulls(const struct axis_model *m, const struct axis_scratch *s, size_t i_brick, const size_t from[3],
-                      const struct axis_brick_sum *sum)
+static void add_pulls(const struct axis_model *m, const struct axis_scratch *s, const struct claim_list *claims,
+                      size_t i_brick, const size_t from[3], const struct axis_brick_sum *sum)
 {
     const struct segment_bricks *b = m->bricks;
     for (size_t e = 0; e < b->first[i_brick + 1] - b->first[i_brick]; e++) {
-        const uint32_t i_segment = b->index[b->first[i_brick] + e], end = s->claims.first[e + 1];
+        const uint32_t i_segment = b->index[b->first[i_brick] + e], end = claims->first[e + 1];
         const struct axis_view w = view_of(m, i_segment, from);
         struct segment_sum total = {0};
-        for (size_t i = s->claims.first[e]; i < end; i += LANES) {
+        for (size_t i = claims->first[e]; i < end; i += LANES) {
             struct axis_places p;
-            find_places(&w, s->claims.cell + i, end - i, &p);
+            find_places(&w, claims->cell + i, end - i, &p);
             add_places(m, s, &w, &p, &total);
         }
         sum->pull[2 * e].segment = sum->pull[2 * e + 1].segment = i_segment;
@@ -344,6 +344,19 @@ static void forget_claims(struct axis_scratch *s, bool lumens)
     }
 }
 
+/* Finds the claims of a brick, or takes those that are kept. */
+static bool find_claims(const struct axis_model *m, size_t i_brick, struct axis_scratch *s, struct claim_list *claims)
+{
+    struct segment_bricks of = *m->bricks;
+    if (m->claiming != NULL) of.segment = m->claiming;
+    if (m->claiming != NULL && m->store != NULL && claim_store_find(m->store, i_brick, claims)) return true;
+    if (!axis_claims_find(&s->claims, &of, m->section, m->claim_tail, i_brick)) return false;
+    *claims = (struct claim_list){s->claims.cell, s->claims.first};
+    if (m->claiming == NULL && m->store != NULL)
+        claim_store_add(m->store, i_brick, claims, of.first[i_brick + 1] - of.first[i_brick]);
+    return true;
+}
+
 bool axis_brick_fit(const struct axis_model *model, size_t i_brick, struct axis_scratch *s, struct axis_brick_sum *sum)
 {
     const struct segment_bricks *b = model->bricks;
@@ -356,14 +369,15 @@ bool axis_brick_fit(const struct axis_model *model, size_t i_brick, struct axis_
     if (sum->pull == NULL || (model->section != NULL && sum->section == NULL) ||
         (model->lumen != NULL && sum->lumen == NULL))
         return false;
-    if (!axis_claims_find(&s->claims, b, model->section, model->tail, i_brick)) return false;
+    struct claim_list claims;
+    if (!find_claims(model, i_brick, s, &claims)) return false;
     segment_brick_box(b, i_brick, from, n);
     for (size_t e = 0; e < n_segment; e++) {
         const struct axis_view w = view_of(model, b->index[b->first[i_brick] + e], from);
-        add_to_model(model, s, &w, s->claims.first[e], s->claims.first[e + 1]);
+        add_to_model(model, s, &w, claims.cell + claims.first[e], claims.first[e + 1] - claims.first[e]);
     }
     axis_compare(model, s, from, n, &sum->shared);
-    add_pulls(model, s, i_brick, from, sum);
+    add_pulls(model, s, &claims, i_brick, from, sum);
     forget_claims(s, model->lumen != NULL);
     return true;
 }

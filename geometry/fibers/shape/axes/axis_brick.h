@@ -8,6 +8,7 @@
 #include "geometry/fibers/shape/axes/axis_profile.h"
 #include "geometry/fibers/shape/axes/axis_solve.h"
 #include "geometry/fibers/shape/axes/fiber_section.h"
+#include "geometry/fibers/shape/axes/kept/claim_store.h"
 #include "geometry/fibers/shape/axes/lumen/axis_lumen.h"
 #include "geometry/volume/volume.h"
 
@@ -24,6 +25,11 @@ struct axis_model {
     struct axis_profile profile;
     struct axis_table table;
     float tail, inverse_blur; /* tail: voxels beyond the radius up to which a fiber is modelled */
+    /* The claims are those of these segments, in the order of the bricks', up to claim_tail: the lines where they were
+     * some rounds before. NULL: those of the bricks. */
+    struct segment *claiming;
+    float claim_tail;
+    struct claim_store *store; /* keeps the claims of the bricks, or has those of `claiming`; may be NULL */
 };
 
 /* Work of one thread. By voxels of a brick, 0 between bricks: the share of fibers, its derivatives by all radii and

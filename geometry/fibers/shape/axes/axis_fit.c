@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_BATCH = 1 << 20 };                /* segments, of 128 bytes each */
-static const double SECTION_DIAMETERS = 1.0; /* length over which sections are smoothed */
+enum { MAX_BATCH = 1 << 20, ROUNDS_OF_CLAIMS = 3 }; /* MAX_BATCH: segments, of 128 bytes each */
+static const double SECTION_DIAMETERS = 1.0;        /* length over which sections are smoothed */
 /* Standard deviation of the flatness of fibers (fiber_section.h) that holds sections to discs. */
 static const double FLATNESS_SD = 0.3;
 static const double PIECE_DIAMETERS = 2.0; /* length of the pieces that show the error of a radius */
@@ -53,13 +53,25 @@ struct fit_work {
     struct lumen_table *lumen_table;
     struct radius_sum *radius; /* per line */
     double *length;
+    struct segment_bricks bricks; /* of the round */
+    struct segment *claiming;     /* segments of the round whose claims are used; NULL: this one */
+    struct claim_store store;
     struct shared_sum shared;
     double hold;        /* of the sections to discs */
     double last_square; /* mean square of the residuals in the round before */
 };
 
+static void release_round(struct fit_work *w)
+{
+    free(w->claiming);
+    w->claiming = NULL;
+    claim_store_release(&w->store);
+    segment_bricks_release(&w->bricks);
+}
+
 static void release_work(struct fit_work *w)
 {
+    release_round(w);
     free(w->first_vertex_of);
     free(w->total);
     free(w->reach);
@@ -123,6 +135,18 @@ static void add_lumen(struct fit_work *w, uint32_t segment, const struct lumen_p
     r->area_by_radius += (double)q->by_radius;
     for (int a = 0; a < AXIS_N_SHARED; a++) r->area_cross[a] += (double)q->cross[a];
     r->cross[4] += (double)q->radius_shared;
+}
+
+/* Whether a round uses the claims of an earlier one, and whether the next one uses those of this one. */
+struct round_kind {
+    bool follows, is_followed;
+};
+
+/* Lines at rest keep their claims for ROUNDS_OF_CLAIMS rounds. Sections are left out, because their outlines change. */
+static struct round_kind kind_of(const struct axis_profile *p, int round, int n_round)
+{
+    const bool keeps = p->at_rest && p->section == NULL, first = round % ROUNDS_OF_CLAIMS == 0;
+    return (struct round_kind){keeps && !first, keeps && first && round + 1 < n_round};
 }
 
 /* The sums of a batch, added in PARTS parts of whole lines. */
@@ -272,15 +296,30 @@ static status fit_batch(struct axis_batch *job, struct fit_work *w, struct threa
     return s;
 }
 
+/* Prepares the model. kind.follows: the claims of an earlier round are used; kind.is_followed: the next round uses
+ * those of this one. */
+static status start_round(struct axis_model *m, const struct polyline_set *lines, struct fit_work *w,
+                          struct round_kind kind, struct error *err)
+{
+    status s = STATUS_OK;
+    if (m->v->slabs != NULL && m->profile.lumen == NULL) s = axis_share_round(m, lines, kind.follows, err);
+    if (s != STATUS_OK) return s;
+    if (kind.follows) return axis_round_follow(m, lines, &w->bricks, &w->claiming, err);
+    release_round(w);
+    s = axis_round_prepare(m, lines, m->v->n, w->view, w->reach, &w->bricks, err);
+    m->store = NULL;
+    if (s != STATUS_OK || !kind.is_followed) return s;
+    if (!claim_store_init(&w->store, segment_n_brick(&w->bricks), scratch_buffer_bytes(m->v->space)))
+        return error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
+    m->store = &w->store;
+    return s;
+}
+
 static status one_round(struct axis_batch *job, struct polyline_set *lines, struct fit_work *w, double diameter,
                         struct thread_pool *pool, const struct progress *progress, struct error *err)
 {
-    struct segment_bricks bricks = {0};
     struct axis_model *m = &job->model;
     status s = STATUS_OK;
-    if (m->v->slabs != NULL && m->profile.lumen == NULL) s = axis_share_round(m, lines, err);
-    if (s == STATUS_OK) s = axis_round_prepare(m, lines, m->v->n, w->view, w->reach, &bricks, err);
-    if (s != STATUS_OK) return s;
     if (w->view != NULL) memset(w->section, 0, lines->n_vertex * sizeof *w->section);
     if (w->lumen_view != NULL) {
         view_lumens(lines, &m->profile, w->view, w->lumen_view);
@@ -288,7 +327,7 @@ static status one_round(struct axis_batch *job, struct polyline_set *lines, stru
     }
     m->lumen = w->lumen_view;
     m->lumen_table = w->lumen_table;
-    const size_t n_brick = segment_n_brick(&bricks);
+    const size_t n_brick = segment_n_brick(&w->bricks);
     memset(w->total, 0, lines->n_vertex * sizeof *w->total);
     memset(w->radius, 0, lines->n_line * sizeof *w->radius);
     w->shared = (struct shared_sum){0};
@@ -298,8 +337,6 @@ static status one_round(struct axis_batch *job, struct polyline_set *lines, stru
         progress_report(progress, (double)(job->first_brick + job->n_brick) / (double)n_brick);
     }
     if (s == STATUS_OK) s = make_step(job, lines, w, diameter, pool, err);
-    m->bricks = NULL;
-    segment_bricks_release(&bricks);
     return s;
 }
 
@@ -334,7 +371,8 @@ status polylines_fit(struct polyline_set *lines, const struct volume *v, double 
     for (int round = 0; round < n_round && s == STATUS_OK; round++) {
         struct progress_part part = {progress, (double)round / n_round, 1.0 / n_round};
         const struct progress inner = progress_of_part(&part);
-        s = one_round(job, lines, &work, diameter_voxel, pool, &inner, err);
+        s = start_round(&job->model, lines, &work, kind_of(profile, round, n_round), err);
+        if (s == STATUS_OK) s = one_round(job, lines, &work, diameter_voxel, pool, &inner, err);
     }
     if (s == STATUS_OK) *profile = job->model.profile;
     if (s == STATUS_OK && n_round > 0 && profile->section != NULL && profile->measure != NULL) {

@@ -68,14 +68,32 @@ static void view_sections(const struct polyline_set *lines, struct fiber_section
             *view++ = fiber_section_view(&section[i], &section[i + 1], lines->vertex[i], lines->vertex[i + 1]);
 }
 
-status axis_round_prepare(struct axis_model *m, const struct polyline_set *lines, const size_t n[3],
-                          struct section_view *view, float *reach, struct segment_bricks *bricks, struct error *err)
+static void prepare_profile(struct axis_model *m)
 {
     m->tail = (float)(AXIS_TAIL * m->profile.blur);
     m->inverse_blur = (float)(1.0 / m->profile.blur);
+}
+
+status axis_round_prepare(struct axis_model *m, const struct polyline_set *lines, const size_t n[3],
+                          struct section_view *view, float *reach, struct segment_bricks *bricks, struct error *err)
+{
+    prepare_profile(m);
     if (view != NULL) view_sections(lines, m->profile.section, view);
     find_reach(lines, view, m->tail, reach);
     m->section = view;
     m->bricks = bricks;
+    m->claiming = NULL;
+    m->claim_tail = m->tail;
     return segment_bricks_init_each(bricks, lines, n, AXIS_BRICK, reach, err);
+}
+
+status axis_round_follow(struct axis_model *m, const struct polyline_set *lines, struct segment_bricks *bricks,
+                         struct segment **claiming, struct error *err)
+{
+    prepare_profile(m);
+    status s = segment_bricks_move(bricks, lines, claiming, err);
+    m->section = NULL;
+    m->bricks = bricks;
+    m->claiming = *claiming;
+    return s;
 }

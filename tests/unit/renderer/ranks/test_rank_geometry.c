@@ -308,6 +308,7 @@ enum wrong_lines {
     WITHOUT_ROWS,
     ROWS_OF_TOO_MANY_SLICES,
     WITHOUT_LINES,
+    FOLLOWS_NOTHING,
     N_WRONG_LINES
 };
 
@@ -333,6 +334,7 @@ static void wrong_lines_and_rows_are_refused(void **state)
         if (wrong == TOO_MANY) o.n_line = UINT64_MAX / 4;
         if (wrong == NO_BLUR) o.blur = 0.0;
         if (wrong == HUGE_BLUR) o.blur = 1e300;
+        if (wrong == FOLLOWS_NOTHING) o.follows = 1;
         send_slab(&r, wrong == WITHOUT_ROWS ? 0 : wrong == ROWS_OF_TOO_MANY_SLICES ? NZ - 1 : NZ);
         if (wrong == ROWS_OF_TOO_MANY_SLICES) {
             const struct rows_order rows = {NZ - 1, 2};
@@ -351,6 +353,7 @@ static void wrong_lines_and_rows_are_refused(void **state)
                            : wrong == WITHOUT_ROWS            ? "slab that it has not sent"
                            : wrong == ROWS_OF_TOO_MANY_SLICES ? "densities of a slab that are none"
                            : wrong == WITHOUT_LINES           ? "lines that are not there"
+                           : wrong == FOLLOWS_NOTHING         ? "goes on with a fit of lines that are not there"
                                                               : "lines of another rank are none");
     }
     assert_int_equal(two_ranks_end(&r), 0);
