@@ -25,13 +25,16 @@ struct field_comparison field_comparison_of(const struct image *first, const str
             field_of(first, x, y, edge, a, va);
             field_of(second, x, y, edge, b, vb);
             if (!(a[0] + a[1] + a[2] > 0.0) && !(b[0] + b[1] + b[2] > 0.0)) continue;
+            double of_field = 0.0;
             for (int c = 0; c < 3; c++, r.n += 1.0) {
                 r.mean += a[c];
                 r.difference += b[c] - a[c];
                 r.error2 += (b[c] - a[c]) * (b[c] - a[c]);
                 r.noise2[0] += va[c];
                 r.noise2[1] += vb[c];
+                of_field += (b[c] - a[c]) * (b[c] - a[c]) - va[c] - vb[c];
             }
+            r.square2 += of_field * of_field;
         }
     return r;
 }
@@ -39,4 +42,10 @@ struct field_comparison field_comparison_of(const struct image *first, const str
 double field_comparison_stays(const struct field_comparison *r)
 {
     return sqrt(fmax(0.0, r->error2 - r->noise2[0] - r->noise2[1]) * r->n) / r->mean;
+}
+
+double field_comparison_square_se(const struct field_comparison *r)
+{
+    double sum = r->error2 - r->noise2[0] - r->noise2[1], n_field = r->n / 3.0;
+    return sqrt(fmax(0.0, r->square2 - sum * sum / n_field)) * r->n / (r->mean * r->mean);
 }

@@ -10,6 +10,7 @@ struct field_comparison {
     double difference; /* of the second less the first */
     double error2;     /* of the squares of these differences */
     double noise2[2];  /* of the variances of the fields' means, of each picture */
+    double square2;    /* of the squares of what each field adds to error2 less noise2, all channels in one */
     double n;
 };
 
@@ -19,5 +20,8 @@ struct field_comparison {
 struct field_comparison field_comparison_of(const struct image *first, const struct image *second, size_t edge);
 /* Root mean square of the differences over the mean, without what the noise of both adds. */
 double field_comparison_stays(const struct field_comparison *r);
+/* Standard error of the square of that, from how it varies between fields: a few bright paths make noise that pictures
+ * with tens of paths a pixel do not tell from an error of some percent. */
+double field_comparison_square_se(const struct field_comparison *r);
 
 #endif
