@@ -5,13 +5,16 @@
 One job a table compares all models of the catalogue, as `fit.models` does for a user. All fit the same rows on the same cloth, which
 nobody scanned: a felt where the name of the table has "felt", else a plain weave of single yarns, both with the numbers that a
 description has when none are given. No number of the cloth is fitted, so a model is not helped by a cloth of its own. Held-out rows
-choose nothing. The jobs' folders are kept, and a job that is there already is not run again. Standard errors of the tracing and the
-plain BRDF of each table go to standard error.
+choose nothing. The jobs' folders are kept, and a job that is there already is not run again. Standard error has the plain BRDF of each
+table, and where each model is too bright or too dark: the median of rendered over measured radiance, and in brackets the relative RMS
+error, over the held-out rows of each kind in KINDS.
 """
 import argparse
 import glob
+import math
 import os
 import re
+import statistics
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -26,6 +29,36 @@ def model_ids():
         return re.findall(r'^(?:SURFACE|VOLUME)_MODEL\(\w+,\s*"([^"]+)"', f.read(), re.MULTILINE)
 
 
+KINDS = ["low highlight", "highlight", "towards the lamp", "low", "rest"]
+
+
+def direction(theta_deg, phi_deg):
+    theta, phi = math.radians(theta_deg), math.radians(phi_deg)
+    return math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)
+
+
+def kind(row):
+    """Highlights are within 25 degrees of the mirror direction; "low" is a lamp or a camera at 60 degrees or more."""
+    camera = direction(row["camera_theta_deg"], row["camera_phi_deg"])
+    near = math.cos(math.radians(25))
+    low = max(row["light_theta_deg"], row["camera_theta_deg"]) >= 60
+    for turn, name in ((180, "highlight"), (0, "towards the lamp")):
+        other = direction(row["light_theta_deg"], row["light_phi_deg"] + turn)
+        if sum(a * b for a, b in zip(camera, other)) >= near:
+            return "low highlight" if low and turn else name
+    return "low" if low else "rest"
+
+
+def by_kind(rows):
+    text = []
+    for name in KINDS:
+        of = [r for r in rows if r["set"] == "held-out" and kind(r) == name]
+        ratio = [sum(r["rendered"]) / sum(r["measured"]) for r in of]
+        if of:
+            text.append(f"{statistics.median(ratio):.2f} ({math.sqrt(sum(r['rel_error'] ** 2 for r in of) / len(of)):.2f})")
+    return ", ".join(text)
+
+
 def bench_table(arguments, table):
     sample = os.path.splitext(os.path.basename(table))[0]
     document = {"sample": sample, "cloth": FELT if "felt" in sample else WEAVE, "measurements": {"file": os.path.basename(table)},
@@ -33,13 +66,14 @@ def bench_table(arguments, table):
                         "discrepancy": False}}
     result, seconds = run_job(arguments.build, os.path.join(arguments.keep, sample), document, [table])
     brdf = result["skill"]["plain_brdf"] if result["skill"] else None
-    print(f"{sample}: {seconds:.0f} s; plain BRDF {brdf and brdf['fit_rel_rms']} fitted, {brdf and brdf['heldout_rel_rms']} held out",
-          file=sys.stderr)
+    print(f"{sample}: {seconds:.0f} s; plain BRDF {brdf and brdf['fit_rel_rms']} fitted, {brdf and brdf['heldout_rel_rms']} held out; "
+          + ", ".join(f"{name}: {sum(r['set'] == 'held-out' and kind(r) == name for r in result['rows'])}" for name in KINDS), file=sys.stderr)
     for model in result["models"]:
         figure(f"models.real.{sample}.{model['id']}.fit_rel_rms", model["fit_rel_rms"], "1")
         figure(f"models.real.{sample}.{model['id']}.heldout_rel_rms", model["heldout_rel_rms"], "1")
+        rows = [{**a, **b} for a, b in zip(result["rows"], model["rows"])]
         print(f"  {model['id']:26} fitted {model['fit_rel_rms']:.4f}, held out {model['heldout_rel_rms']:.4f}, "
-              f"{'converged' if model['converged'] else 'not converged'}", file=sys.stderr)
+              f"{'converged' if model['converged'] else 'not converged'}; {by_kind(rows)}", file=sys.stderr)
 
 
 def main():
@@ -47,7 +81,7 @@ def main():
     parser.add_argument("--build", default="build")
     parser.add_argument("--keep", default=None, help="default: bench-model-tables in the build folder")
     parser.add_argument("--tables", default=os.path.join(DATA, "measured-reflectance-dense"))
-    parser.add_argument("--path-budget", type=int, default=1000000, help="of each model's fit")
+    parser.add_argument("--path-budget", type=int, default=600000, help="of each model's fit")
     parser.add_argument("what", nargs="*", metavar="SAMPLE")
     arguments = parser.parse_args()
     arguments.build = os.path.join(ROOT, arguments.build)

@@ -8,9 +8,10 @@
  *   models.<id>.recovery_first_order_ratio  the same by derivatives, with less noise of paths (fit_phantom.h)
  *   models.<id>.recovery_s                  time of the fit
  *
- * bench_recovery FOLDER [ID ...]
- *   FOLDER  where photographs and estimates are kept
- *   ID      models; all without
+ * bench_recovery FOLDER [--path-budget N] [ID ...]
+ *   FOLDER         where photographs and estimates are kept
+ *   --path-budget  paths of each fit at most; default: the method's own, 6 million
+ *   ID             models; all without
  *
  * True parameters lie between the starts and the bounds, and photographs have a relative error of 0.5 %.
  */
@@ -21,6 +22,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { PHOTOGRAPH_PATHS = 100000, KEPT_PATHS = 20000, SCORE_PATHS = 10000 };
 
@@ -43,7 +45,7 @@ static void truth_of(const struct scattering_model *m, double *truth)
     }
 }
 
-static void recover(const char *folder, struct thread_pool *pool, const struct scattering_model *m)
+static void recover(const char *folder, struct thread_pool *pool, const struct scattering_model *m, uint64_t budget)
 {
     struct fit_phantom f;
     struct fit_result r;
@@ -54,7 +56,7 @@ static void recover(const char *folder, struct thread_pool *pool, const struct s
     f.guided = true;
     fit_phantom_photograph(
         &f, &(struct fit_photography){.n_path = PHOTOGRAPH_PATHS, .noise = BENCH_NOISE, .noise_seed = 1});
-    bench_run_fit(&f, method_gauss_newton.id, 1, 0, NULL, &r, NULL);
+    bench_run_fit(&f, method_gauss_newton.id, 1, budget, NULL, &r, NULL);
     bench_print_fit(&f, &r);
     const double stated = fit_phantom_stated_score(&f, JOB_SET_HELD_OUT),
                  own = fit_phantom_true_error(&f, JOB_SET_HELD_OUT, KEPT_PATHS, r.param, SCORE_PATHS),
@@ -75,19 +77,26 @@ int main(int argc, char **argv)
 {
     struct thread_pool *pool = NULL;
     struct error err = {0};
-    if (argc < 2) {
-        fprintf(stderr, "usage: bench_recovery FOLDER [ID ...]\n");
+    const char *folder = argv[1];
+    uint64_t budget = 0;
+    int first = 2;
+    if (argc > 3 && strcmp(argv[2], "--path-budget") == 0) {
+        budget = strtoull(argv[3], NULL, 10);
+        first = 4;
+    }
+    if (argc < 2 || (first == 4 && budget == 0)) {
+        fprintf(stderr, "usage: bench_recovery FOLDER [--path-budget N] [ID ...]\n");
         return 2;
     }
-    for (int i = 2; i < argc; i++)
+    for (int i = first; i < argc; i++)
         if (scattering_find(argv[i]) == NULL) {
             fprintf(stderr, "model '%s' is unknown\n", argv[i]);
             return 2;
         }
     fit_check(thread_pool_new(0, &pool, &err), &err);
-    for (int i = 2; i < argc; i++) recover(argv[1], pool, scattering_find(argv[i]));
-    for (size_t k = 0; argc == 2 && scattering_registry()[k] != NULL; k++)
-        recover(argv[1], pool, scattering_registry()[k]);
+    for (int i = first; i < argc; i++) recover(folder, pool, scattering_find(argv[i]), budget);
+    for (size_t k = 0; argc == first && scattering_registry()[k] != NULL; k++)
+        recover(folder, pool, scattering_registry()[k], budget);
     thread_pool_free(pool);
     return 0;
 }
