@@ -262,7 +262,7 @@ static status fill_lumens(struct volume *v, double diameter_voxel, struct thread
                           struct reconstruct_report *report, struct error *err)
 {
     struct fiber_diameter d = {.voxel = diameter_voxel};
-    status s = lumens_fill_along(v, pool, &report->lumen_share, err);
+    status s = lumens_fill(v, report->noise.mapped_sd, pool, &report->lumen_share, err);
     if (s == STATUS_OK && isnan(diameter_voxel)) s = fiber_diameter_measure(v, pool, NULL, &d, err);
     if (s == STATUS_OK) s = lumens_sift(v, d.voxel, pool, &report->lumen_share, err);
     return s;
@@ -272,7 +272,7 @@ status reconstruct_lumens(struct volume *v, struct reconstruct_option *o, struct
                           struct reconstruct_report *report, struct error *err)
 {
     report->lumen_share = 0.0;
-    status s = lumen_evidence_measure(v, report->noise.mapped_sd, &report->lumen, err);
+    status s = lumen_evidence_measure(v, report->noise.mapped_sd, pool, &report->lumen, err);
     report->lumens_found = o->hollow_fibers < 0 && lumen_evidence_judge(&report->lumen) == LUMENS_CLEAR;
     if (o->hollow_fibers < 0) o->hollow_fibers = report->lumens_found;
     if (s == STATUS_OK && o->hollow_fibers > 0) s = fill_lumens(v, o->fiber_diameter_voxel, pool, report, err);

@@ -13,7 +13,7 @@ static const double SCALE_PER_WIDTH[3] = {0.85, 1.05, 1.3};
 static const float MIDDLE = 0.3f;          /* response in the middle of a fiber */
 static const double LEAST_ENCLOSED = 1e-3; /* share below which there are too few places to look at */
 /* middle_share, and its share of what is enclosed, from which on lumens are possible, and clear. */
-static const double POSSIBLE[2] = {0.0003, 0.015}, CLEAR[2] = {0.002, 0.035};
+static const double POSSIBLE[2] = {0.001, 0.015}, CLEAR[2] = {0.002, 0.015};
 
 /* A box in the middle of the scan: as it is, and filled. */
 struct evidence_box {
@@ -118,13 +118,14 @@ enum lumen_verdict lumen_evidence_judge(const struct lumen_evidence *e)
     return middle >= POSSIBLE[0] && of_enclosed >= POSSIBLE[1] ? LUMENS_POSSIBLE : LUMENS_NOT_SEEN;
 }
 
-status lumen_evidence_measure(const struct volume *v, double noise_sd, struct lumen_evidence *e, struct error *err)
+status lumen_evidence_measure(const struct volume *v, double noise_sd, struct thread_pool *pool,
+                              struct lumen_evidence *e, struct error *err)
 {
     struct evidence_box b = {0};
     *e = (struct lumen_evidence){0};
     status s = copy_middle(v, &b.scan, err);
     if (s == STATUS_OK) s = copy_middle(v, &b.filled, err);
-    if (s == STATUS_OK) s = lumens_fill(&b.filled, noise_sd, &e->enclosed_share, err);
+    if (s == STATUS_OK) s = lumens_fill(&b.filled, noise_sd, pool, &e->enclosed_share, err);
     if (s == STATUS_OK) e->width_voxel = width_of(&b);
     if (s == STATUS_OK && e->enclosed_share > LEAST_ENCLOSED && e->width_voxel > 0.0) {
         for (int i = 0; i < 3; i++) b.brick[i] = malloc(N_CELL * sizeof *b.brick[i]);

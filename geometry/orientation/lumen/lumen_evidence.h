@@ -7,6 +7,7 @@
 #ifndef SELVEDGE_GEOMETRY_LUMEN_EVIDENCE_H
 #define SELVEDGE_GEOMETRY_LUMEN_EVIDENCE_H
 
+#include "base/thread_pool.h"
 #include "geometry/volume/volume.h"
 
 struct lumen_evidence {
@@ -15,15 +16,16 @@ struct lumen_evidence {
     double middle_share;   /* voxels filled that are in the middle of a fiber over those of material */
 };
 
-/* What the evidence says. Of 29 phantoms of solid fibers of 4 to 12 voxels none has both a middle_share of 0.002 and
- * 0.035 of enclosed_share in it: the largest are 0.0043 with 0.011 and 0.0010 with 0.044. Lumens of 0.3 to 0.6 of the
- * width have at least 0.0067 and 0.045 at 7 voxels and signal-to-noise 5; at 2, and at 4 voxels, most of them cannot be
- * told from gaps between solid fibers (geometry/NOTES.md). */
+/* What the evidence says. Of phantoms of solid fibers of 4 to 12 voxels none has a middle_share of 0.001 that is 0.015
+ * of enclosed_share. Lumens of 0.3 and 0.4 of the width have at least 0.0032 and 0.022 at 7 voxels and signal-to-noise
+ * 3, also where radii differ; at 2, and at 4 voxels, most of them cannot be told from gaps between solid fibers
+ * (geometry/NOTES.md). */
 enum lumen_verdict { LUMENS_NOT_SEEN, LUMENS_POSSIBLE, LUMENS_CLEAR };
 enum lumen_verdict lumen_evidence_judge(const struct lumen_evidence *e);
 
-/* v: densities in [0, 1]; noise_sd: of a voxel. At most 160 voxels along each axis are looked at, with 40 MB of memory.
- * STATUS_NO_MEMORY; with a scratch space also STATUS_DISK_FULL. */
-status lumen_evidence_measure(const struct volume *v, double noise_sd, struct lumen_evidence *e, struct error *err);
+/* v: densities in [0, 1]; noise_sd: of a voxel. At most 160 voxels along each axis are looked at, with 60 MB of memory.
+ * STATUS_CANCELLED, STATUS_NO_MEMORY; with a scratch space also STATUS_DISK_FULL. */
+status lumen_evidence_measure(const struct volume *v, double noise_sd, struct thread_pool *pool,
+                              struct lumen_evidence *e, struct error *err);
 
 #endif

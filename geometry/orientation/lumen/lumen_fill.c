@@ -8,57 +8,23 @@
 #include <string.h>
 
 enum {
-    UNIT = 250, /* of the blurred density as a byte */
+    UNIT = 250, /* of the smoothed density as a byte */
     CELL = 6,   /* blocks of two cells to each side show the outside: wider than a lumen */
     MAX_SWEEP = 64,
     MARK = 255
 };
-/* Depth of the basin of a lumen, and in units of the noise that the blur leaves. */
-static const double LEAST_DEPTH = 0.1, NOISE_DEPTH = 3.0, BLUR_OF_NOISE = 0.23; /* of white noise: (3/8)^(3/2) */
+/* Depth of the basin of a lumen, and in units of the noise that the mean along a fiber leaves of white noise. */
+static const double LEAST_DEPTH = 0.1, NOISE_DEPTH = 3.0, NOISE_LEFT = 0.26;
 static const double VOID_DENSITY = 0.3, BLOCK_RANGE = 0.05;
 
-/* A volume: its blurred density, and the height of the ways to the outside, later the depth of basins. */
+/* A volume: its smoothed density, and the height of the ways to the outside, later the depth of basins. */
 struct lumen_box {
     const struct volume *v;
     size_t n[3];
     uint8_t *density, *height;
 };
 
-static size_t clamped(size_t at, int step, size_t n)
-{
-    return step < 0 && at == 0 ? 0 : step > 0 && at + 1 >= n ? n - 1 : at + (size_t)(ptrdiff_t)step;
-}
-
-/* Writes the density of a row, blurred by 1/4 1/2 1/4 along each axis. sum: scratch of a row and two voxels more. */
-static void blur_row(const struct lumen_box *b, size_t j, size_t k, float *sum, uint8_t *out)
-{
-    static const float weight[3] = {0.25f, 0.5f, 0.25f};
-    const size_t *n = b->n;
-    memset(sum, 0, (b->n[0] + 2) * sizeof *sum);
-    for (int dz = -1; dz <= 1; dz++)
-        for (int dy = -1; dy <= 1; dy++) {
-            const float *row = b->v->density + volume_index(n, 0, clamped(j, dy, n[1]), clamped(k, dz, n[2]));
-            const float w = weight[dy + 1] * weight[dz + 1];
-            for (size_t i = 0; i < b->n[0]; i++) sum[i + 1] += w * row[i];
-        }
-    sum[0] = sum[1];
-    sum[b->n[0] + 1] = sum[b->n[0]];
-    for (size_t i = 0; i < b->n[0]; i++)
-        out[i] = (uint8_t)((float)UNIT * (0.25f * (sum[i] + sum[i + 2]) + 0.5f * sum[i + 1]) + 0.5f);
-}
-
-static bool blur_box(const struct lumen_box *b)
-{
-    float *sum = malloc((b->n[0] + 2) * sizeof *sum);
-    for (size_t k = 0; k < b->n[2] && sum != NULL; k++) {
-        for (size_t j = 0; j < b->n[1]; j++) blur_row(b, j, k, sum, b->density + volume_index(b->n, 0, j, k));
-        scratch_keep_within(b->v->space);
-    }
-    free(sum);
-    return sum != NULL;
-}
-
-/* Sums of the blurred density over cells of CELL voxels to each side, fewer at the ends of the axes. */
+/* Sums of the smoothed density over cells of CELL voxels to each side, fewer at the ends of the axes. */
 struct cell_sums {
     size_t n[3];
     double *sum;
@@ -205,9 +171,7 @@ static bool mark_basins(const struct lumen_box *b, double depth, double *share)
     return true;
 }
 
-/* along: whether the density is smoothed along the fibers, and not on all sides. */
-static status box_share(struct lumen_box *b, bool along, struct thread_pool *pool, double depth, double *share,
-                        struct error *err)
+static status box_share(struct lumen_box *b, double depth, struct thread_pool *pool, double *share, struct error *err)
 {
     void *array[2] = {NULL, NULL};
     const size_t n = volume_n_voxel(b->n);
@@ -215,8 +179,8 @@ static status box_share(struct lumen_box *b, bool along, struct thread_pool *poo
     if (s == STATUS_OK) s = scratch_new(b->v->space, n, "the lumens of fibers", &array[1], err);
     b->density = array[0];
     b->height = array[1];
-    if (s == STATUS_OK && along) s = density_smooth_along(b->v, pool, UNIT, b->density, err);
-    if (s == STATUS_OK && ((!along && !blur_box(b)) || !mark_basins(b, depth, share)))
+    if (s == STATUS_OK) s = density_smooth_along(b->v, pool, UNIT, b->density, err);
+    if (s == STATUS_OK && !mark_basins(b, depth, share))
         s = error_set(err, STATUS_NO_MEMORY, "cannot look for lumens: out of memory");
     return s;
 }
@@ -253,24 +217,13 @@ static status fill_marked(const struct lumen_box *b, struct volume *v, struct er
     return s;
 }
 
-static status fill(struct volume *v, bool along, struct thread_pool *pool, double depth, double *filled_share,
-                   struct error *err)
+status lumens_fill(struct volume *v, double noise_sd, struct thread_pool *pool, double *filled_share, struct error *err)
 {
+    const double depth = fmax(LEAST_DEPTH, isfinite(noise_sd) ? NOISE_DEPTH * NOISE_LEFT * noise_sd : 0.0);
     struct lumen_box all = {.v = v, .n = {v->n[0], v->n[1], v->n[2]}};
     *filled_share = 0.0;
-    status s = box_share(&all, along, pool, depth, filled_share, err);
+    status s = box_share(&all, depth, pool, filled_share, err);
     if (s == STATUS_OK) s = fill_marked(&all, v, err);
     release_box(&all);
     return s;
-}
-
-status lumens_fill(struct volume *v, double noise_sd, double *filled_share, struct error *err)
-{
-    const double noise = isfinite(noise_sd) ? NOISE_DEPTH * BLUR_OF_NOISE * noise_sd : 0.0;
-    return fill(v, false, NULL, fmax(LEAST_DEPTH, noise), filled_share, err);
-}
-
-status lumens_fill_along(struct volume *v, struct thread_pool *pool, double *filled_share, struct error *err)
-{
-    return fill(v, true, pool, LEAST_DEPTH, filled_share, err);
 }
