@@ -110,7 +110,7 @@ def test_command_line_prints_the_comparison(real, finished):
 
 @pytest.mark.parametrize("fit,field,says", [
     ({"models": ["two_lobe.v1", "no_model.v1"]}, "fit.models[1]", "microflake.v1"),
-    ({"models": []}, "fit.models", "1 to 8"),
+    ({"models": []}, "fit.models", "1 to 32"),
     ({"models": "two_lobe.v1"}, "fit.models", "list"),
     ({"models": ["two_lobe.v1", "two_lobe.v1"]}, "fit.models[1]", "second time"),
     ({"model": "two_lobe.v1"}, "fit.models", "both"),

@@ -2,6 +2,7 @@
 #include "base/small_matrix.h"
 #include "geometry/fibers/shape/axes/axis_round.h"
 #include "geometry/fibers/shape/axes/axis_solve.h"
+#include "geometry/fibers/shape/axes/kept/claim_rounds.h"
 #include "geometry/fibers/shape/axes/shape_measure.h"
 #include "geometry/ranks/axis_share.h"
 
@@ -9,8 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_BATCH = 1 << 20, ROUNDS_OF_CLAIMS = 3 }; /* MAX_BATCH: segments, of 128 bytes each */
-static const double SECTION_DIAMETERS = 1.0;        /* length over which sections are smoothed */
+enum { MAX_BATCH = 1 << 20 };                /* segments, of 128 bytes each */
+static const double SECTION_DIAMETERS = 1.0; /* length over which sections are smoothed */
 /* Standard deviation of the flatness of fibers (fiber_section.h) that holds sections to discs. */
 static const double FLATNESS_SD = 0.3;
 static const double PIECE_DIAMETERS = 2.0; /* length of the pieces that show the error of a radius */
@@ -56,6 +57,7 @@ struct fit_work {
     struct segment_bricks bricks; /* of the round */
     struct segment *claiming;     /* segments of the round whose claims are used; NULL: this one */
     struct claim_store store;
+    struct claim_rounds rounds;
     struct shared_sum shared;
     double hold;        /* of the sections to discs */
     double last_square; /* mean square of the residuals in the round before */
@@ -83,6 +85,7 @@ static void release_work(struct fit_work *w)
     free(w->lumen_table);
     free(w->radius);
     free(w->length);
+    claim_rounds_release(&w->rounds);
 }
 
 static bool init_work(struct fit_work *w, const struct polyline_set *lines, bool with_sections, bool with_lumens)
@@ -135,18 +138,6 @@ static void add_lumen(struct fit_work *w, uint32_t segment, const struct lumen_p
     r->area_by_radius += (double)q->by_radius;
     for (int a = 0; a < AXIS_N_SHARED; a++) r->area_cross[a] += (double)q->cross[a];
     r->cross[4] += (double)q->radius_shared;
-}
-
-/* Whether a round uses the claims of an earlier one, and whether the next one uses those of this one. */
-struct round_kind {
-    bool follows, is_followed;
-};
-
-/* Lines at rest keep their claims for ROUNDS_OF_CLAIMS rounds. Sections are left out, because their outlines change. */
-static struct round_kind kind_of(const struct axis_profile *p, int round, int n_round)
-{
-    const bool keeps = p->at_rest && p->section == NULL, first = round % ROUNDS_OF_CLAIMS == 0;
-    return (struct round_kind){keeps && !first, keeps && first && round + 1 < n_round};
 }
 
 /* The sums of a batch, added in PARTS parts of whole lines. */
@@ -252,7 +243,10 @@ static status make_step(struct axis_batch *job, struct polyline_set *lines, stru
     w->hold = variance / (FLATNESS_SD * FLATNESS_SD);
     if (w->section != NULL)
         s = fiber_sections_solve(lines, w->section, SECTION_DIAMETERS * diameter, w->hold, profile->section, pool, err);
-    return s == STATUS_OK ? axis_solve_lines(lines, w->total, w->stiffness, correlation, pool, err) : s;
+    claim_rounds_before_step(&w->rounds, lines);
+    if (s == STATUS_OK) s = axis_solve_lines(lines, w->total, w->stiffness, correlation, pool, err);
+    claim_rounds_after_step(&w->rounds, lines);
+    return s;
 }
 
 static void view_lumens(const struct polyline_set *lines, const struct axis_profile *p,
@@ -366,12 +360,16 @@ status polylines_fit(struct polyline_set *lines, const struct volume *v, double 
     if (s == STATUS_OK &&
         !init_work(&work, lines, profile->section != NULL, profile->section != NULL && profile->lumen != NULL))
         s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
+    /* sections are left out, because their outlines change */
+    if (s == STATUS_OK && profile->at_rest && profile->section == NULL &&
+        !claim_rounds_start(&work.rounds, lines->n_vertex))
+        s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
     for (size_t l = 0; l < lines->n_line; l++)
         if (!(lines->radius[l] > 0.0f)) lines->radius[l] = (float)(0.5 * diameter_voxel);
     for (int round = 0; round < n_round && s == STATUS_OK; round++) {
         struct progress_part part = {progress, (double)round / n_round, 1.0 / n_round};
         const struct progress inner = progress_of_part(&part);
-        s = start_round(&job->model, lines, &work, kind_of(profile, round, n_round), err);
+        s = start_round(&job->model, lines, &work, claim_rounds_next(&work.rounds, round + 1 == n_round), err);
         if (s == STATUS_OK) s = one_round(job, lines, &work, diameter_voxel, pool, &inner, err);
     }
     if (s == STATUS_OK) *profile = job->model.profile;

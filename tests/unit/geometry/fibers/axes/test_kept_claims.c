@@ -1,6 +1,7 @@
 /* Fits of lines at rest, which keep the claims of voxels for some rounds: the result does not depend on how many of
  * them there is room for, and is that of fits that find them anew. */
 #include "geometry/fibers/shape/axes/axis_fit.h"
+#include "geometry/fibers/shape/axes/kept/claim_rounds.h"
 #include "geometry/fibers/shape/axes/kept/claim_store.h"
 #include "tests/support/scratch_folder.h"
 
@@ -137,10 +138,47 @@ static void test_store(void **state)
     claim_store_release(&s); /* an empty store */
 }
 
+/* Makes a step that moves all vertices by d voxels, and returns the kind of the round after it. */
+static struct round_kind after_step(struct claim_rounds *r, struct polyline_set *lines, float d, bool is_last)
+{
+    claim_rounds_before_step(r, lines);
+    for (size_t i = 0; i < lines->n_vertex; i++) lines->vertex[i][1] += d;
+    claim_rounds_after_step(r, lines);
+    return claim_rounds_next(r, is_last);
+}
+
+/* Claims serve three rounds and are found anew after a step of more than a tenth of a voxel. The last round keeps
+ * none. */
+static void test_rounds(void **state)
+{
+    (void)state;
+    static const float vertex[2][3] = {{1, 2, 3}, {2, 2, 3}};
+    struct claim_rounds r = {0};
+    struct polyline_set lines;
+    polyline_set_init(&lines);
+    assert_int_equal(polyline_begin(&lines, 0, NULL), STATUS_OK);
+    for (int i = 0; i < 2; i++) assert_int_equal(polyline_add(&lines, vertex[i], NULL), STATUS_OK);
+    struct round_kind k = claim_rounds_next(&r, false); /* not of lines at rest */
+    assert_false(k.follows || k.is_followed);
+    assert_true(claim_rounds_start(&r, lines.n_vertex));
+    k = claim_rounds_next(&r, false);
+    assert_true(!k.follows && k.is_followed);
+    for (int i = 0; i < 2; i++) assert_true(after_step(&r, &lines, 0.05f, false).follows);
+    k = after_step(&r, &lines, 0.05f, false);
+    assert_true(!k.follows && k.is_followed);
+    k = after_step(&r, &lines, 0.2f, false);
+    assert_true(!k.follows && k.is_followed);
+    assert_true(after_step(&r, &lines, 0.05f, true).follows);
+    k = after_step(&r, &lines, 0.2f, true);
+    assert_false(k.follows || k.is_followed);
+    claim_rounds_release(&r);
+    polyline_set_release(&lines);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_room_for_claims, scratch_folder_setup, scratch_folder_teardown),
-        cmocka_unit_test(test_same_axes), cmocka_unit_test(test_store)};
+        cmocka_unit_test(test_same_axes), cmocka_unit_test(test_rounds), cmocka_unit_test(test_store)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
