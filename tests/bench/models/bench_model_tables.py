@@ -81,7 +81,7 @@ def main():
     parser.add_argument("--build", default="build")
     parser.add_argument("--keep", default=None, help="default: bench-model-tables in the build folder")
     parser.add_argument("--tables", default=os.path.join(DATA, "measured-reflectance-dense"))
-    parser.add_argument("--path-budget", type=int, default=600000, help="of each model's fit")
+    parser.add_argument("--path-budget", type=int, default=2000000, help="of each model's fit")
     parser.add_argument("what", nargs="*", metavar="SAMPLE")
     arguments = parser.parse_args()
     arguments.build = os.path.join(ROOT, arguments.build)
