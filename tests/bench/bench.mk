@@ -26,10 +26,10 @@ bench-recovery: | deps-test ## whether a fit of each surface model finds its own
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/models/bench_recovery >&2
 	@$(BUILD)/tests/bench/models/bench_recovery $(BUILD)/bench-recovery $(MODELS)
 
-# SAMPLES: some of the tables only. TABLES: a folder of other tables
+# FABRICS: some of the tables only, such as FABRICS=merl-blue-fabric. TABLES: a folder of other tables
 bench-model-tables: | deps-test ## all models fitted to the measured tables, on one cloth (more than an hour on 2 quiet cores; jobs are kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
-	@/usr/bin/python3 tests/bench/models/bench_model_tables.py --build $(BUILD) $(if $(TABLES),--tables $(TABLES)) $(SAMPLES)
+	@/usr/bin/python3 tests/bench/models/bench_model_tables.py --build $(BUILD) $(if $(TABLES),--tables $(TABLES)) $(FABRICS)
 
 # PICTURES: some of the fabrics only, and options of the program, such as PICTURES="silk --px 256"
 bench-pictures: | deps-test ## the fast renderer against path tracing on three fabrics (half an hour on 2 quiet cores)

@@ -130,7 +130,7 @@ static void test_weave_ct(void **state)
     assert_int_equal(weave_label_accuracy(&s.d, labels, &accuracy, &kept, NULL), STATUS_OK);
     print_message("weave_ct: %.1f %% of the labelled tow voxels kept, %.1f %% of those in the right axis class\n",
                   100.0 * kept, 100.0 * accuracy);
-    assert_true(accuracy >= 0.925); /* 0.936; without the mean of directions 0.914 */
+    assert_true(accuracy >= 0.925); /* 0.926; without the mean of directions it was 0.914 where this was 0.936 */
     assert_true(kept >= 0.9);
     assert_int_equal(s.r.grade.verdict, GRADE_UNRESOLVED); /* its tows show hardly any single fibers */
     assert_true(s.r.grade.valley_depth < 0.15);

@@ -11,22 +11,24 @@ error, over the held-out rows of each kind in KINDS.
 """
 import argparse
 import glob
+import json
 import math
 import os
-import re
 import statistics
+import subprocess
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-from bench_cloth import DATA, ROOT, Failure, figure, run_job  # noqa: E402
+from bench_cloth import DATA, ROOT, Failure, each, figure, run_job  # noqa: E402
 
 WEAVE = {"weave": "plain", "tile_warps": 8, "tile_wefts": 8, "yarns": [{"fibers": 40}]}
 FELT = {"weave": "felt", "yarns": [{"fibers": 600}]}
 
 
-def model_ids():
-    with open(os.path.join(ROOT, "base", "catalogue", "models.def"), encoding="utf-8") as f:
-        return re.findall(r'^(?:SURFACE|VOLUME)_MODEL\(\w+,\s*"([^"]+)"', f.read(), re.MULTILINE)
+def model_ids(build):
+    """The catalogue, as the worker prints it."""
+    said = subprocess.run([os.path.join(build, "bin", "selvedge-worker"), "--catalogue"], check=True, capture_output=True, text=True)
+    return [model["id"] for model in json.loads(said.stdout)["models"]]
 
 
 KINDS = ["low highlight", "highlight", "towards the lamp", "low", "rest"]
@@ -54,19 +56,21 @@ def by_kind(rows):
     for name in KINDS:
         of = [r for r in rows if r["set"] == "held-out" and kind(r) == name]
         ratio = [sum(r["rendered"]) / sum(r["measured"]) for r in of]
-        if of:
-            text.append(f"{statistics.median(ratio):.2f} ({math.sqrt(sum(r['rel_error'] ** 2 for r in of) / len(of)):.2f})")
+        rms = math.sqrt(sum(r["rel_error"] ** 2 for r in of) / len(of)) if of else None
+        text.append(f"{statistics.median(ratio):.2f} ({rms:.2f})" if of else "-")
     return ", ".join(text)
 
 
 def bench_table(arguments, table):
     sample = os.path.splitext(os.path.basename(table))[0]
     document = {"sample": sample, "cloth": FELT if "felt" in sample else WEAVE, "measurements": {"file": os.path.basename(table)},
-                "fit": {"models": model_ids(), "path_budget": arguments.path_budget, "render_px": 16, "render_samples": 4,
+                "fit": {"models": model_ids(arguments.build), "path_budget": arguments.path_budget, "render_px": 16, "render_samples": 4,
                         "discrepancy": False}}
     result, seconds = run_job(arguments.build, os.path.join(arguments.keep, sample), document, [table])
-    brdf = result["skill"]["plain_brdf"] if result["skill"] else None
-    print(f"{sample}: {seconds:.0f} s; plain BRDF {brdf and brdf['fit_rel_rms']} fitted, {brdf and brdf['heldout_rel_rms']} held out; "
+    if result["heldout_rel_rms"] is None or not result["skill"]:
+        raise Failure(f"{table}: it has no held-out rows, or rows that a plain BRDF does not describe")
+    brdf = result["skill"]["plain_brdf"]
+    print(f"{sample}: {seconds:.0f} s; plain BRDF {brdf['fit_rel_rms']:.4f} fitted, {brdf['heldout_rel_rms']:.4f} held out; held-out rows: "
           + ", ".join(f"{name}: {sum(r['set'] == 'held-out' and kind(r) == name for r in result['rows'])}" for name in KINDS), file=sys.stderr)
     for model in result["models"]:
         figure(f"models.real.{sample}.{model['id']}.fit_rel_rms", model["fit_rel_rms"], "1")
@@ -89,15 +93,11 @@ def main():
     tables = sorted(glob.glob(os.path.join(arguments.tables, "*.csv")))
     if not tables:
         print(f"skipped models.real: no tables (*.csv) in {arguments.tables} (set SELVEDGE_DATA)", file=sys.stderr)
-    whole = True
-    for table in tables:
-        if arguments.what and os.path.splitext(os.path.basename(table))[0] not in arguments.what:
-            continue
-        try:
-            bench_table(arguments, table)
-        except (Failure, OSError) as failure:
-            print(f"FAILED {table}: {failure}", file=sys.stderr)
-            whole = False
+    named = {os.path.splitext(os.path.basename(table))[0]: table for table in tables}
+    unknown = [sample for sample in arguments.what if sample not in named]
+    if tables and unknown:
+        parser.error(f"no table of {', '.join(unknown)} in {arguments.tables}: there are {', '.join(named)}")
+    _, whole = each([named[sample] for sample in arguments.what or named if sample in named], lambda table: bench_table(arguments, table))
     return 0 if whole else 1
 
 

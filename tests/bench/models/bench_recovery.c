@@ -5,7 +5,8 @@
  *   models.<id>.recovery_ratio              relative RMS error of the 24 held-out means at the fitted parameters over
  *                                           that at the true ones, in the mean over the noise of held-out photographs:
  *                                           the root of 1 and the square of what the fit adds to their stated errors
- *   models.<id>.recovery_first_order_ratio  the same by derivatives, with less noise of paths (fit_phantom.h)
+ *   models.<id>.recovery_first_order_ratio  the same by derivatives at the truth, with less noise of paths;
+ *                                           far too large where a parameter that is not determined lies far from it
  *   models.<id>.recovery_s                  time of the fit
  *
  * bench_recovery FOLDER [--path-budget N] [ID ...]

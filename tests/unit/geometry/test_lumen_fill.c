@@ -119,7 +119,7 @@ static void test_nothing_is_enclosed(void **state)
     struct volume v;
     double share;
     assert_int_equal(volume_init(&v, n_voxel, voxel_m, NULL), STATUS_OK);
-    assert_int_equal(lumens_fill(&v, 0.0, NULL, &share, NULL), STATUS_OK);
+    assert_int_equal(lumens_fill(&v, NAN, NULL, &share, NULL), STATUS_OK);
     assert_true(share == 0.0);
     for (size_t at = 0; at < volume_n_voxel(n_voxel); at++)
         v.density[at] = (float)profile(hypot((double)(at / 72 % 72) - 30.0, (double)(at / (72 * 72)) - 36.0), 0.0);

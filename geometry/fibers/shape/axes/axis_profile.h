@@ -15,8 +15,8 @@ struct axis_profile {
     /* The variance of the curvature is measured on the lines at every round. Otherwise it is that of fibers that are
      * about to break, which holds back no line that still has to find its fiber. */
     bool measured_curvature;
-    /* Lines move little from round to round, so that the nearest segments of voxels serve several, unless a
-     * step shows otherwise (axis_fit.c). */
+    /* Lines move little from round to round, so that the nearest segments of voxels serve several, unless a step
+     * shows otherwise (kept/claim_rounds.h). */
     bool at_rest;
     struct fiber_section *section; /* of each vertex of the lines, refined too; NULL: discs */
     float *lumen; /* with sections: area of the lumen of each line over that of its outline, refined too; NULL: solid */
