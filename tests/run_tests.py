@@ -3,9 +3,9 @@
 C tests are cmocka programs build/tests/{unit,physics}/test_*, Python tests are pytest folders. A program that crashes,
 hangs or writes no results counts as one failed test. Each check of the sources (tests/checks.mk) counts as one test.
 Each line says how long a test took and how many seconds of a core that were. Tests of the API and the browser wait for
-daemons most of the time, so three of them run beside one that computes. --quick runs the checks, the unit tests and the
-quick API tests, two of each side by side. --programs leaves out the checks of the sources, which neither sanitizers nor
-coverage change.
+daemons most of the time, so three of them run beside one that computes. --quick runs the checks, the unit tests that take
+at most 4 s of a core and the quick API tests, three that wait beside two that compute. --programs leaves out the checks
+of the sources, which neither sanitizers nor coverage change, and runs the long unit tests in spite of --quick.
 """
 import argparse
 import concurrent.futures
@@ -23,13 +23,21 @@ import xml.etree.ElementTree as ElementTree
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 CHECKS = ["layers", "format-check", "columns", "lint-c", "lint-javascript", "lint-python", "lint-shell"]
 SLOW_CHECKS = ["clang", "tsan-requests"]
+# unit tests that take more than 4 s of a core, which the inner loop leaves to `make test`
+LONG_UNIT_TESTS = ["unit/renderer/test_scattering", "unit/renderer/fast/test_precompute_journal", "unit/renderer/preview/test_joint_filter",
+                   "unit/renderer/dual/test_dual_scattering", "unit/geometry/test_lumen_fill", "unit/renderer/fast/test_deep_light",
+                   "unit/geometry/mesh/test_drape", "unit/renderer/fast/test_fast_tables", "unit/geometry/fibers/test_shape_measure",
+                   "unit/geometry/weave/test_weave_detect", "unit/renderer/preview/test_sheared_filter", "unit/optimizer/worker/test_hair_fit",
+                   "unit/geometry/volume/test_slice_tiles", "unit/renderer/fast/test_gaussian_light", "unit/geometry/test_alignment",
+                   "unit/geometry/volume/test_bad_input", "unit/geometry/test_reconstruct", "unit/renderer/table/test_appearance_table"]
 TIMEOUT_S = 600
 PYTEST_TIMEOUT_S = 1500
 # Those that take longest start first, so that no lane waits for one of them at the end.
 LONGEST = ["physics/test_derivative_check", "unit/renderer/test_scattering", "physics/test_reconstruct_phantom", "physics/test_chi_square",
            "real/test_real_input", "api/driven/test_openapi_driven", "browser/test_accessibility", "browser/test_dashboard",
            "api/worker/test_groups", "api/worker/test_cloth_search_job", "browser/test_mending", "browser/test_dashboard_submit",
-           "api/worker/test_described_cloth", "crash/test_daemon_disk", "crash/test_daemon_kill", "crash/test_worker_resume"]
+           "api/worker/test_described_cloth", "crash/test_daemon_disk", "crash/test_daemon_kill", "crash/test_worker_resume",
+           "api/test_supervision", "api/test_cli", "api/batches/test_batch_plan", "api/batches/test_batches", "api/service/test_rescue"]
 
 
 def count_junit(path):
@@ -144,11 +152,13 @@ def main():
     def run_check(name):
         totals.add_one(name, *run(["make", "--silent", f"BUILD={arguments.build}", name], TIMEOUT_S, environment))
 
+    left_out = LONG_UNIT_TESTS if arguments.quick and not arguments.programs and arguments.only is None else []
+
     def c_tests():
         for kind in ["unit"] if arguments.quick else ["unit", "physics"]:
             for source in sorted(pathlib.Path(ROOT, "tests", kind).rglob("test_*.c")):
                 name = str(source.relative_to(os.path.join(ROOT, "tests")))[:-2]  # "unit/base/test_rng"
-                if wanted(name):
+                if wanted(name) and name not in left_out:
                     yield name
 
     def run_c(folder, name):
@@ -185,7 +195,7 @@ def main():
         computing = [lambda name=name: run_check(name) for name in checks()]
         computing += [lambda name=name: (run_c if name in of_c else run_python)(folder, name) for name in longest_first(of_c + real)]
         waiting = [lambda name=name: run_python(folder, name) for name in longest_first(of_python)]
-        lanes = [computing, computing, waiting, waiting] if arguments.quick else [computing, waiting, waiting, waiting]
+        lanes = [computing, computing, waiting, waiting, waiting] if arguments.quick else [computing, waiting, waiting, waiting]
         with concurrent.futures.ThreadPoolExecutor(max_workers=len(lanes)) as pool:
             for done in [pool.submit(run_lane, own, waiting if own is computing else computing) for own in lanes]:
                 done.result()

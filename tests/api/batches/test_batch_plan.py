@@ -124,7 +124,7 @@ def test_what_cannot_be_planned_is_named(daemon):
 
 
 def test_a_sample_that_takes_too_long_does_not_end_the_others(daemon_maker):
-    d = daemon_maker(options={"jobs.check_limit_s": 1})
+    d = daemon_maker(options={"jobs.check_limit_s": 3})
     batch = fake_batch(d, "one holds", ["fake: a", "fake: b", "fake: c"])
     with open(os.path.join(d.data, "jobs", batch["samples"][0]["job"], "hold"), "w"):
         said = plan(d, "one holds", expect=1)
@@ -145,6 +145,7 @@ def tables(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_a_real_batch(real, tables):
     """The second plan knows what the first batch took, so its processor time is that of the first within the scatter of two
     runs of the same jobs; that is below a factor of 2 even where other programs take the processor's caches."""

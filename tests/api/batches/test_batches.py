@@ -305,6 +305,7 @@ def test_a_rebuild_brings_batches_back(daemon_maker):
     assert d.get(f"/v1/batches/{made['id']}").json()["template"] == document()
 
 
+@pytest.mark.slow
 def test_kills_leave_whole_batches(daemon_maker):
     """The daemon is killed while batches are submitted, started and retried. What was acknowledged is there."""
     d = daemon_maker(options={"jobs.workers": 2})

@@ -25,6 +25,7 @@ def save(real, job, folder):
     return sorted(os.path.basename(p) for p in files)
 
 
+@pytest.mark.slow
 def test_a_scene_for_mitsuba(real, tmp_path):
     job = start_small_job(real, document())
     result = real.wait_state(job, "succeeded", timeout_s=120)["result"]
@@ -44,6 +45,7 @@ def test_a_scene_for_mitsuba(real, tmp_path):
     assert all(x > 0 for x in map(float, done.stdout.strip("[]\n").split(",")))
 
 
+@pytest.mark.slow
 def test_what_the_scene_lacks_is_said(real):
     """A square of 40 cm shows more of this small tile than is written."""
     result = real.wait_state(start_small_job(real, {**document(), "camera": {"crop_cm": 40}}), "succeeded", timeout_s=120)["result"]

@@ -121,6 +121,7 @@ def test_photo_draws_the_photographs_of_a_job(folder, tmp_path):
     assert red == {(x, y) for x in range(4, 20) for y in range(6, 22) if x in (4, 19) or y in (6, 21)}
 
 
+@pytest.mark.slow
 def test_a_job_of_raw_exposures(real, folder):
     document = json.loads((folder / "job.json").read_text())
     job = real.create(document)

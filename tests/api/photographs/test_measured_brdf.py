@@ -44,6 +44,7 @@ def lobe(light, camera):
     return 0.2 + 0.3 * math.exp(-((h[0] / 0.8) ** 2) - (h[1] / 0.6) ** 2)
 
 
+@pytest.mark.slow
 def test_a_diffuse_brdf_comes_back(real, tmp_path):
     albedo = (0.6, 0.3, 0.1)
     rows = measured(real, tmp_path, RglWriter(lambda light, camera: [a / math.pi for a in albedo], n_vndf=16, n_sample=16))
@@ -51,6 +52,7 @@ def test_a_diffuse_brdf_comes_back(real, tmp_path):
         assert row["measured"] == pytest.approx([a * light[2] for a in albedo], rel=0.03)
 
 
+@pytest.mark.slow
 def test_an_anisotropic_brdf_comes_back_and_mitsuba_sees_the_same(real, tmp_path):
     writer = RglWriter(lambda light, camera: [lobe(light, camera)] * 16, phi_i=HALF_TURN, n_vndf=16, n_sample=16, wavelengths=range(400, 701, 20))
     rows = measured(real, tmp_path, writer)

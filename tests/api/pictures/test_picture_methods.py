@@ -32,6 +32,7 @@ def test_methods_show_the_same_cloth(tmp_path):
     assert fast["noise"] < path["noise"]
 
 
+@pytest.mark.slow
 def test_a_gaussian_lamp_lights_every_method(tmp_path):
     """Sharp, it is the parallel light of the job. By tables of what segments see, the picture is near the traced one."""
     folder = tmp_path / "job"
@@ -155,6 +156,7 @@ def test_a_sheet_of_its_own_has_no_tables(tmp_path):
     assert "black sheet of the job" in json.loads((folder / "status.json").read_text())["error"]["text"]
 
 
+@pytest.mark.slow
 def test_a_picture_beside_its_reference(tmp_path):
     """The comparison follows from the two pictures; a run that has lost it makes it again, with the same bits."""
     folder = tmp_path / "job"
@@ -196,6 +198,7 @@ def test_a_path_traced_picture_is_its_own_reference(real):
     assert "method" in problem(real.post("/v1/jobs", json=doc), 422, "invalid", "pictures[0].reference")["detail"]
 
 
+@pytest.mark.slow
 def test_the_command_prints_the_comparison(real, tmp_path):
     job, _ = run(real, {k: v for k, v in document().items() if k != "pictures"})
     shown = render(real, job, "--on", "flat", "--px", 16, "--samples", 16, "--width-mm", 3, "--reference", "--deep-light", "cells", "--out", tmp_path / "out")

@@ -76,6 +76,7 @@ def test_a_finished_picture_is_not_rendered_again(tmp_path):
     assert json.loads((pictures / "on-1.json").read_text()) == entry, "the same seed makes the same picture"
 
 
+@pytest.mark.slow
 def test_a_picture_grows_in_passes_and_goes_on_where_it_was(tmp_path):
     """A run that is ended between two passes and one that is not make the same bits; what there was could be looked at."""
     given = {"sample": "s", "fibers": {"file": "cloth.hair"}, "pictures": [{"on": "flat", **VIEW, "samples": 4096}],
@@ -110,6 +111,7 @@ def test_a_picture_grows_in_passes_and_goes_on_where_it_was(tmp_path):
     assert [sum(c[k] for c in columns) / 16 for k in (1, 2, 3)] == pytest.approx(entry["mean"], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_drape_with_and_without_the_black_sheet(real):
     """Lit from below, light comes through a drape without the sheet and none, but at its edges, with it."""
     below = {"on": "drape", "size_mm": 4, "radius_mm": 1, "width_mm": 4, **VIEW, "light_theta_deg": 150}
@@ -124,6 +126,7 @@ def test_a_drape_with_and_without_the_black_sheet(real):
     assert mesh.count(b"\nv ") == mesh.count(b"\nvt ") == 257**2 and mesh.count(b"\nf ") == 256**2
 
 
+@pytest.mark.slow
 def test_a_cylinder_may_be_wrapped_all_around(real):
     """The lamp below: only a cloth that goes on around the cylinder shows light at its sides, the black sheet inside."""
     view = {"on": "cylinder", "radius_mm": 1, "width_mm": 3, **VIEW, "light_theta_deg": 100, "camera_theta_deg": 0, "samples": 64}
@@ -186,6 +189,7 @@ def test_bad_pictures_are_refused_at_submission(real, picture, field, word):
     assert word in problem(real.post("/v1/jobs", json=document(picture)), 422, "invalid", field)["detail"]
 
 
+@pytest.mark.slow
 def test_pictures_of_given_parameters(real):
     """What a fit has found, given as fixed parameters, makes the same picture, but for the noise; nothing is fitted."""
     flat = {"on": "flat", "width_mm": 3, **VIEW, "samples": 64}
@@ -228,6 +232,7 @@ def test_a_volume_model_on_a_cylinder(real):
     assert all(abs(a - b) < 5 * se for a, b in zip(flat["mean"], mesh["mean"])), done["result"]["pictures"]
 
 
+@pytest.mark.slow
 def test_a_twin_is_written_as_its_description_says(real):
     """The only test of the worker's tables as a file; their numbers are those of tests/unit/renderer/table."""
     flat = {"on": "flat", "width_mm": 3, **VIEW, "samples": 2}

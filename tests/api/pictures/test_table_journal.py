@@ -6,6 +6,8 @@ import struct
 import subprocess
 import time
 
+import pytest
+
 from daemon_under_test import problem, program
 from small_cloth import hair
 from test_surface_pictures import VIEW, run_worker
@@ -25,6 +27,7 @@ def size_of(path):
     return path.stat().st_size if path.exists() else 0
 
 
+@pytest.mark.slow
 def test_a_killed_attempt_goes_on(tmp_path):
     """Killed once the journal has a record; the next attempt ends with the bytes of one that was not killed."""
     view = {"on": "flat", "width_mm": 3, **VIEW, "method": "fast", "visibility": "tables"}
@@ -44,6 +47,7 @@ def test_a_killed_attempt_goes_on(tmp_path):
     assert (killed / "results/pictures/on-1.exr").read_bytes() == (whole / "results/pictures/on-1.exr").read_bytes()
 
 
+@pytest.mark.slow
 def test_visibility_from_tables(tmp_path):
     """The means are near those of path tracing, with the error of one traced hit, and the tables are longer."""
     view = {"on": "flat", "width_mm": 3, **VIEW, "samples": 64}

@@ -48,6 +48,7 @@ def run(real, document, rows):
     return real.wait_state(start_small_job(real, document, rows), "succeeded", timeout_s=240)["result"]
 
 
+@pytest.mark.slow
 def test_all_rows_are_rendered_with_the_factor(real):
     without, result = run(real, document(), table()), run(real, document(discrepancy=True), table())
     found = result["discrepancy"]
@@ -71,6 +72,7 @@ def test_all_rows_are_rendered_with_the_factor(real):
     assert max(changed) / min(changed) > 1.05, "the case does not try the factor any more"
 
 
+@pytest.mark.slow
 def test_rows_that_give_the_factor_have_less_noise(real):
     """Their noise would go into all renderings."""
     without, result = (run(real, document(discrepancy=wanted), table()) for wanted in (False, True))

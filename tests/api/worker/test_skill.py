@@ -13,6 +13,7 @@ def document(**more):
             "fit": {"path_budget": 20000, "render_px": 8, "render_samples": 1}, **more}
 
 
+@pytest.mark.slow
 def test_the_plain_brdf_stands_beside_the_fit(real):
     result = real.wait_state(start_small_job(real, document()), "succeeded", timeout_s=120)["result"]
     plain = result["skill"]["plain_brdf"]
@@ -27,6 +28,7 @@ def test_the_plain_brdf_stands_beside_the_fit(real):
     assert worse, "the case does not try the warning any more"
 
 
+@pytest.mark.slow
 def test_a_fit_that_listens_to_the_plain_brdf(real):
     """Expected rows weigh in the fit, and are no rows of the result."""
     fit = document()["fit"]
