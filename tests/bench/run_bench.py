@@ -50,7 +50,8 @@ def bench_programs(build):
     for name in sorted(os.listdir(folder)) if os.path.isdir(folder) else []:
         if name.startswith("bench_"):
             subprocess.run([os.path.join(folder, name)], check=True)
-    subprocess.run([os.path.join(folder, "models", "bench_models")], check=True)
+    for name in ("bench_models", "bench_profiles"):
+        subprocess.run([os.path.join(folder, "models", name)], check=True)
 
 
 def bench_service(build):
