@@ -44,6 +44,7 @@ void pipeline_context_release(struct pipeline_context *c)
     fiber_set_release(&c->uncorrected);
     scratch_space_free(c->space);
     scene_free(c->scene);
+    scene_free(c->section_scene);
     if (c->has_volume_scene) volume_scene_release(&c->volume_scene);
     for (size_t i = 0; i < c->n_model; i++) {
         for (int q = 0; q < 2; q++) {
@@ -78,11 +79,6 @@ status pipeline_model_path(const struct pipeline_context *c, const char *stage, 
     else
         snprintf(numbered, sizeof numbered, "%.*s-%zu%s", n, name, i_model, name + n);
     return pipeline_work_path(c, stage, numbered, path, err);
-}
-
-struct appearance_scene pipeline_scene(const struct pipeline_context *c)
-{
-    return (struct appearance_scene){.fibers = c->scene, .volume = c->has_volume_scene ? &c->volume_scene : NULL};
 }
 
 void pipeline_warn(void *context, const char *option, const char *text)

@@ -182,6 +182,7 @@ struct pipeline_context {
     struct cloth_report cloth;    /* of a described cloth */
     struct pipeline_texture texture;
     struct scene *scene;
+    struct scene *section_scene;      /* the fibers with their flat sections; NULL where all models see `scene` */
     struct volume_scene volume_scene; /* of `direction`; only when a volume model is fitted */
     bool has_volume_scene;
     double stage_fraction;   /* of the running stage, as last reported */
@@ -242,15 +243,16 @@ status pipeline_work_path(const struct pipeline_context *c, const char *stage, c
  * it for surface models only. */
 status pipeline_make_scene(struct pipeline_context *c, struct error *err);
 status pipeline_make_surface_scene(struct pipeline_context *c, struct error *err);
-/* The scene of other fibers, with the options of the job; the caller frees it. */
-status pipeline_fiber_scene(const struct pipeline_context *c, const struct fiber_set *f, struct scene **scene,
-                            struct error *err);
+/* The scene of other fibers as a model sees them, with the options of the job; the caller frees it. */
+status pipeline_fiber_scene(const struct pipeline_context *c, size_t i_model, const struct fiber_set *f,
+                            struct scene **scene, struct error *err);
 /* The same as pipeline_work_path, with a number in the name for all models but the first: "estimates.journal",
  * "estimates-1.journal". */
 status pipeline_model_path(const struct pipeline_context *c, const char *stage, const char *name, size_t i_model,
                            char path[WORKER_PATH_BYTES], struct error *err);
-/* The scene of the fibers, and that of the volume when there is one. */
-struct appearance_scene pipeline_scene(const struct pipeline_context *c);
+/* The scene of the fibers as a model sees them: with their flat sections where it states the width that a section
+ * shows, else as round tubes. And that of the volume when there is one. */
+struct appearance_scene pipeline_scene(const struct pipeline_context *c, const struct pipeline_model *m);
 /* Number of unknowns of a model's fit: parameters that are neither fixed nor tied to another one. */
 size_t pipeline_n_free(const struct pipeline_model *m);
 

@@ -169,7 +169,7 @@ static status write_rendering(struct pipeline_context *c, size_t i, const char *
     if (exists(path)) return STATUS_OK;
     const struct pipeline_model *m = &c->model[pipeline_best_model(c)];
     const size_t px = result_picture_px(c, (double)m->fit.n_path);
-    const struct render_request q = {.input = {.scene = pipeline_scene(c),
+    const struct render_request q = {.input = {.scene = pipeline_scene(c, m),
                                                .model = &m->appearance,
                                                .param = m->fit.param,
                                                .n_set = m->sets.n_set,

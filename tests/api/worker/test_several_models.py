@@ -93,6 +93,25 @@ def test_series_says_what_its_numbers_are(real, finished):
         assert len(p.get("parameter_min", p["parameter"])) == len(few["models"][p["i_model"]]["parameters"])
 
 
+def test_each_model_sees_its_own_sections(real):
+    """Flat fibers are ellipses for a model that states the width of a section, and round tubes for others, whichever models stand beside it."""
+    cloth = {"weave": "plain", "tile_warps": 2, "tile_wefts": 2, "yarns": [{"fibers": 9, "fiber_flatness": 2.5}]}
+    fixed = {"eta": 1.55, "a": 2.5, "alpha": 2, "beta": 8, "gamma": 15}
+
+    def fit(models, **more):
+        job = real.create({"sample": "flat fibers", "cloth": cloth, "measurements": {"file": "rows.csv"},
+                           "fit": {"models": models, "max_iterations": 2, "path_budget": 20000, "render_px": 8, "render_samples": 1, **more}})
+        real.upload(job, "rows.csv", TABLE.encode(), "measurements")
+        assert real.post(f"/v1/jobs/{job}/start").status_code == 202
+        return {m["id"]: m for m in real.wait_state(job, "succeeded", timeout_s=300)["result"]["models"]}
+
+    together = fit(["isotropic.v1", "elliptical_oriented.v1"], fixed=fixed)
+    alone = fit(["isotropic.v1"]) | fit(["elliptical_oriented.v1"], fixed=fixed)
+    for model, m in together.items():
+        for key in ("parameters", "rows", "fit_rel_rms"):
+            assert m[key] == alone[model][key], (model, key)
+
+
 def test_python_client(real, finished):
     job, state = finished
     assert selvedge.Client(real.url).job(job).result().raw["models"] == state["result"]["models"]

@@ -74,17 +74,16 @@ static status name_picture(size_t i, enum job_surface on, status s, struct error
     return error_prefix(err, s, "picture %zu", i + 1);
 }
 
-status surface_cloth_init(const struct pipeline_context *c, size_t i, enum model_kind kind, struct surface_cloth *cloth,
-                          struct error *err)
+status surface_cloth_init(const struct pipeline_context *c, size_t i, const struct scene *fibers,
+                          struct surface_cloth *cloth, struct error *err)
 {
     const struct job_surface_picture *p = &c->doc->surface_picture[i];
     const bool black_sheet = p->black_sheet < 0 ? c->doc->black_sheet : p->black_sheet != 0;
     struct mesh m = {0};
     memset(cloth, 0, sizeof *cloth);
     status s = make_mesh(c, i, &m, err);
-    if (s == STATUS_OK && kind == MODEL_SURFACE) s = scene_bend(c->scene, &m, black_sheet, &cloth->fibers, err);
-    if (s == STATUS_OK && kind != MODEL_SURFACE)
-        s = volume_scene_bend(&c->volume_scene, &m, black_sheet, &cloth->volume, err);
+    if (s == STATUS_OK && fibers != NULL) s = scene_bend(fibers, &m, black_sheet, &cloth->fibers, err);
+    if (s == STATUS_OK && fibers == NULL) s = volume_scene_bend(&c->volume_scene, &m, black_sheet, &cloth->volume, err);
     mesh_release(&m);
     return name_picture(i, p->on, s, err);
 }
@@ -149,7 +148,7 @@ status surface_cloth_check(const struct pipeline_context *c, struct error *err)
     status s = STATUS_OK;
     for (size_t i = 0; i < c->doc->n_surface_picture && c->scene != NULL && s == STATUS_OK; i++) {
         struct surface_cloth cloth;
-        s = surface_cloth_init(c, i, MODEL_SURFACE, &cloth, err);
+        s = surface_cloth_init(c, i, c->scene, &cloth, err);
         if (s == STATUS_OK)
             s = name_picture(i, c->doc->surface_picture[i].on, check_surface(c, i, cloth.fibers, err), err);
         surface_cloth_release(&cloth);

@@ -10,11 +10,12 @@ struct surface_cloth {
     struct volume_scene volume;
 };
 
-/* The cloth of c->scene, or for a volume model of c->volume_scene, as picture i shows it; c must outlive it.
+/* The cloth of a scene of fibers, or without one (NULL) of c->volume_scene, as picture i shows it; these must outlive
+ * it.
  * STATUS_FORMAT and STATUS_INVALID (field: option id), naming the picture: a mesh that cannot be used or that bends too
  * tightly. STATUS_NO_MEMORY. Release in any case. */
-status surface_cloth_init(const struct pipeline_context *c, size_t i, enum model_kind kind, struct surface_cloth *cloth,
-                          struct error *err);
+status surface_cloth_init(const struct pipeline_context *c, size_t i, const struct scene *fibers,
+                          struct surface_cloth *cloth, struct error *err);
 void surface_cloth_release(struct surface_cloth *cloth);
 /* Whether the cloth can be laid on the surfaces of all pictures, so that a fault is found before the fit. Errors as
  * above. */

@@ -237,7 +237,8 @@ static status render(struct pipeline_context *c, const struct one_picture *one, 
         view.light = LIGHT_GAUSSIAN;
         view.light_sharpness = p->lamp_sharpness;
     }
-    status s = surface_cloth_init(c, one->i, model->appearance.kind, &cloth, err);
+    const struct scene *fibers = model->appearance.kind == MODEL_SURFACE ? pipeline_scene(c, model).fibers : NULL;
+    status s = surface_cloth_init(c, one->i, fibers, &cloth, err);
     struct render_request q = {
         .input = {.scene = {.fibers = cloth.fibers, .volume = cloth.volume.bent != NULL ? &cloth.volume : NULL},
                   .model = &model->appearance,

@@ -92,7 +92,7 @@ status twin_result_write(struct pipeline_context *c, double from, double to, str
                                               .n_basis = BASIS,
                                               .n_path = c->doc->twin_paths,
                                               .seed = c->doc->seed ^ 0x7477696eu};
-    const struct radiance_input in = {.scene = {.fibers = c->scene},
+    const struct radiance_input in = {.scene = pipeline_scene(c, m),
                                       .model = &m->appearance,
                                       .param = m->fit.param,
                                       .n_set = m->sets.n_set,

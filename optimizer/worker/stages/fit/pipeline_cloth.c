@@ -209,7 +209,7 @@ static status scene_of(struct pipeline_cloth_trace *t, const double *number, str
     fiber_set_init(&fiber);
     double value[CLOTH_MAX_NUMBER];
     status s = make_fibers(t->c, number, variant, value, &fiber, NULL, err);
-    if (s == STATUS_OK) s = pipeline_fiber_scene(t->c, &fiber, &to->scene, err);
+    if (s == STATUS_OK) s = pipeline_fiber_scene(t->c, t->i_model, &fiber, &to->scene, err);
     fiber_set_release(&fiber);
     memcpy(to->number, number, n_bytes);
     to->variant = variant;

@@ -120,7 +120,7 @@ status pipeline_correction_compare(struct pipeline_context *c, size_t i_model, c
     struct scene *scene = NULL;
     struct fit_result *r = malloc(sizeof *r);
     if (r == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot compare fits: out of memory");
-    status s = pipeline_fiber_scene(c, &c->uncorrected, &scene, err);
+    status s = pipeline_fiber_scene(c, i_model, &c->uncorrected, &scene, err);
     if (s == STATUS_OK) s = fit_uncorrected(c, i_model, scene, &fit, r, err);
     struct progress rest = progress_begin_part(&last, progress, 0.8, 0.2);
     if (s == STATUS_OK) s = score_uncorrected(c, i_model, scene, &rest, r, err);

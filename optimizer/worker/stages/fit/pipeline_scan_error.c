@@ -69,7 +69,7 @@ static status make_scene(const struct scan_trace *t, const double *number, struc
     for (size_t i = 0; i < fiber.n_fiber; i++) fiber_set_scale_radius(&fiber, i, number[RADIUS]);
     noise.direction_sd_rad *= sqrt(number[NOISE]);
     fiber_roughen(&fiber, &noise);
-    s = pipeline_fiber_scene(t->c, &fiber, scene, err);
+    s = pipeline_fiber_scene(t->c, t->i_model, &fiber, scene, err);
     fiber_set_release(&fiber);
     return s;
 }

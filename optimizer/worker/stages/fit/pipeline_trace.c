@@ -35,7 +35,7 @@ void pipeline_trace_request(struct trace_estimator *t, const struct pipeline_con
 {
     const struct pipeline_model *m = &c->model[i_model];
     *t = (struct trace_estimator){
-        .request = {.input = {.scene = pipeline_scene(c), .model = &m->appearance, .n_set = m->sets.n_set},
+        .request = {.input = {.scene = pipeline_scene(c, m), .model = &m->appearance, .n_set = m->sets.n_set},
                     .configuration = configuration,
                     .n_configuration = n_configuration,
                     .seed = c->doc->seed,

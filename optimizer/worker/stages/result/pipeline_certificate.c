@@ -37,15 +37,17 @@ static status certify(struct pipeline_context *c, struct pipeline_model *m, cons
     bool skip[FIT_MAX_PARAM];
     double start_s = clock_monotonic_s();
     for (size_t p = 0; p < m->sets.info.n_param; p++) skip[p] = m->parameter[p].fixed;
-    const struct derivative_check_request q = {
-        .input = {.scene = pipeline_scene(c), .model = &m->appearance, .param = m->fit.param, .n_set = m->sets.n_set},
-        .skip = skip,
-        .configuration = configuration,
-        .weight = weight,
-        .n_configuration = c->fitted.n,
-        .n_path = N_PATH,
-        .seed = c->doc->seed,
-        .replica = REPLICA_CERTIFICATE};
+    const struct derivative_check_request q = {.input = {.scene = pipeline_scene(c, m),
+                                                         .model = &m->appearance,
+                                                         .param = m->fit.param,
+                                                         .n_set = m->sets.n_set},
+                                               .skip = skip,
+                                               .configuration = configuration,
+                                               .weight = weight,
+                                               .n_configuration = c->fitted.n,
+                                               .n_path = N_PATH,
+                                               .seed = c->doc->seed,
+                                               .replica = REPLICA_CERTIFICATE};
     status s = derivative_check_run(&q, &c->progress, &m->certificate, err);
     if (s != STATUS_OK) return s;
     const struct derivative_check *k = &m->certificate;

@@ -5,6 +5,7 @@
 #include "geometry/reconstruct.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/report/surface/surface_cloth.h"
+#include "renderer/scene/scene_ray.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -58,36 +59,49 @@ static status make_volume_scene(struct pipeline_context *c, struct error *err)
 static void release_scenes(struct pipeline_context *c)
 {
     scene_free(c->scene);
-    c->scene = NULL;
+    scene_free(c->section_scene);
+    c->scene = c->section_scene = NULL;
     if (c->has_volume_scene) volume_scene_release(&c->volume_scene);
     c->has_volume_scene = false;
 }
 
-/* Whether fibers are traced with their measured sections: where all models of fibers state the width that a section
- * shows. The others are made for round tubes. */
-static bool wants_sections(const struct pipeline_context *c)
+/* Whether a model sees the sections of the fibers: one that states the width that a section shows. The others are made
+ * for round tubes. */
+static bool sees_sections(const struct appearance *a) { return a->kind == MODEL_SURFACE && a->surface->width != NULL; }
+
+static status make_fiber_scene(const struct pipeline_context *c, const struct fiber_set *f, bool sections,
+                               struct scene **scene, struct error *err)
 {
-    bool has_surface = false;
-    for (size_t i = 0; i < c->n_model; i++) {
-        const struct appearance *a = &c->model[i].appearance;
-        if (a->kind != MODEL_SURFACE) continue;
-        if (a->surface->width == NULL) return false;
-        has_surface = true;
-    }
-    return has_surface;
+    return scene_new(f, &(struct scene_option){.black_sheet = c->doc->black_sheet, .sections = sections}, scene, err);
 }
 
-status pipeline_fiber_scene(const struct pipeline_context *c, const struct fiber_set *f, struct scene **scene,
-                            struct error *err)
+status pipeline_fiber_scene(const struct pipeline_context *c, size_t i_model, const struct fiber_set *f,
+                            struct scene **scene, struct error *err)
 {
-    const struct scene_option option = {.black_sheet = c->doc->black_sheet, .sections = wants_sections(c)};
-    return scene_new(f, &option, scene, err);
+    return make_fiber_scene(c, f, sees_sections(&c->model[i_model].appearance), scene, err);
+}
+
+struct appearance_scene pipeline_scene(const struct pipeline_context *c, const struct pipeline_model *m)
+{
+    const bool sections = c->section_scene != NULL && sees_sections(&m->appearance);
+    return (struct appearance_scene){.fibers = sections ? c->section_scene : c->scene,
+                                     .volume = c->has_volume_scene ? &c->volume_scene : NULL};
 }
 
 status pipeline_make_surface_scene(struct pipeline_context *c, struct error *err)
 {
+    bool sections = false, tubes = false;
     release_scenes(c);
-    return pipeline_fiber_scene(c, &c->fiber, &c->scene, err);
+    for (size_t i = 0; i < c->n_model; i++) {
+        const struct appearance *a = &c->model[i].appearance;
+        sections |= sees_sections(a);
+        tubes |= a->kind == MODEL_SURFACE && !sees_sections(a);
+    }
+    status s = make_fiber_scene(c, &c->fiber, sections, &c->scene, err);
+    if (s != STATUS_OK || !tubes || !scene_shows_sections(c->scene)) return s;
+    c->section_scene = c->scene;
+    c->scene = NULL;
+    return make_fiber_scene(c, &c->fiber, false, &c->scene, err);
 }
 
 status pipeline_make_scene(struct pipeline_context *c, struct error *err)
@@ -96,6 +110,9 @@ status pipeline_make_scene(struct pipeline_context *c, struct error *err)
     if (s != STATUS_OK) return s;
     log_info(c->log, "scene: %zu fibers, %zu segments, %.0f MB", c->fiber.n_fiber, scene_n_segment(c->scene),
              (double)scene_memory_bytes(c->scene) / 1e6);
+    if (c->section_scene != NULL)
+        log_info(c->log, "scene of their flat sections, for models that state the width: %.0f MB",
+                 (double)scene_memory_bytes(c->section_scene) / 1e6);
     if (!wants_volume_scene(c)) return STATUS_OK;
     if (!c->doc->has_volume) {
         direction_volume_release(&c->direction);
