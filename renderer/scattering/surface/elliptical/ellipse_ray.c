@@ -3,7 +3,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#define GRAZING 0.02    /* square of the cosine of an angle outside, 82 degrees */
+#define GRAZING 0.05    /* square of the cosine of an angle outside, 77 degrees */
 #define LEAST_LEFT 2e-3 /* share of a ray's light below which its last exits are taken together */
 
 static inline struct dual constant(double v) { return (struct dual){v, {0, 0}}; }
@@ -42,10 +42,11 @@ static inline struct dual angle(struct dual y, struct dual x)
 
 double ellipse_cosine_outside(double square, double *slope)
 {
-    double root = sqrt(fmax(square, GRAZING)), t = fmax(square / GRAZING, 0), size = sqrt(GRAZING);
-    bool grazing = square < GRAZING;
-    if (slope != NULL) *slope = grazing ? size * t * (17.5 + t * (-42 + 25 * t)) / GRAZING : 0.5 / root;
-    return grazing ? size * t * t * (8.75 + t * (-14 + 6.25 * t)) : root;
+    const double t = fmax(0.5 * (square / GRAZING + 1), 0), size = sqrt(GRAZING);
+    const bool grazing = square < GRAZING;
+    const double root = grazing ? size * t * t * t * (2 - t * t) : sqrt(square);
+    if (slope != NULL) *slope = grazing ? size * t * t * (6 - 5 * t * t) / (2 * GRAZING) : 0.5 / root;
+    return root;
 }
 
 static struct dual cosine_outside(struct dual square)

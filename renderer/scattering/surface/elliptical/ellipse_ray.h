@@ -57,8 +57,9 @@ void ellipse_follow(const struct ellipse *e, const struct ellipse_wall *w, const
                     struct ellipse_path *path);
 
 /* Cosine of the angle outside from its square, which is negative where the reflection is total, and its slope when
- * wanted. The root has an infinite slope at 0, so the derivatives of a sum over rays would be noisy. At more than 82
- * degrees a polynomial with the slope 0 at 0, the same value and slope there and the same integral takes its place. */
+ * wanted. The root has an infinite slope at 0, so the derivatives of a sum over rays would be noisy. Between -G and G,
+ * the square of the cosine of 77 degrees, root(G) (2 t^3 - t^5) takes its place, t = (square / G + 1) / 2. It has value
+ * and slope 0 at -G, those of the root at G, and the integral of the root. */
 double ellipse_cosine_outside(double square, double *slope);
 
 #endif
