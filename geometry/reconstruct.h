@@ -69,11 +69,11 @@ struct reconstruct_report {
     double density_low, density_high;         /* scanner values */
     double separability;                      /* of void and material in the histogram, 0..1 (density_map.h) */
     struct scan_noise noise;                  /* of the scan, and after smoothing */
-    double lumen_share;                       /* filled lumens over material; 0 if the fibers are solid */
-    bool lumens_found;                        /* they were filled because the fibers look hollow */
-    struct lumen_evidence lumen;              /* whether the fibers look hollow */
-    bool lumens_measured;                     /* each fiber has a lumen of its own with an error (fiber_shape.h) */
-    double fiber_diameter_voxel;              /* given, or measured from the volume before the filter */
+    double lumen_share;          /* enclosed void that is filled over material; 0 if the fibers are solid */
+    bool lumens_found;           /* they were filled because the fibers look hollow */
+    struct lumen_evidence lumen; /* whether the fibers look hollow */
+    bool lumens_measured;        /* each fiber has a lumen of its own with an error (fiber_shape.h) */
+    double fiber_diameter_voxel; /* given, or measured from the volume before the filter */
     /* The peak that the measured diameter was preferred to (fiber_diameter.h), and the shares of noise in both; NaN if
      * there is none, or the diameter was given. */
     double other_diameter_voxel, diameter_noise_share, other_diameter_noise_share;
@@ -115,10 +115,14 @@ status reconstruct_read(const char *const *path, size_t n_path, struct reconstru
                         struct scratch_space *space, struct thread_pool *pool, const struct progress *progress,
                         struct volume *v, struct reconstruct_report *report, struct error *err);
 
-/* The part of the step "volume" that looks for lumens and fills them. v: densities in [0, 1]; report->noise is known.
- * STATUS_CANCELLED, STATUS_NO_MEMORY; with a scratch space also STATUS_DISK_FULL. */
+/* The part of the step "volume" that looks for lumens and fills what is enclosed. v: densities in [0, 1]; report->noise
+ * is known. STATUS_CANCELLED, STATUS_NO_MEMORY; with a scratch space also STATUS_DISK_FULL. */
 status reconstruct_lumens(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
                           struct reconstruct_report *report, struct error *err);
+/* The part after it, where anything was filled: traces fibers, and where their diameters differ fills their inner parts
+ * as well. Otherwise v stays as it is. Errors as before. */
+status reconstruct_refill_lumens(struct volume *v, const struct reconstruct_option *o, struct thread_pool *pool,
+                                 const struct reconstruct_report *report, struct error *err);
 
 /* Step "orientation": computes directions d from v by the line filter (orientation/line_filter.h), which starts from
  * the structure tensor and refines J locally. STATUS_INVALID when no voxel is kept: field OPTION_FILTER_DENSITY if

@@ -3,8 +3,6 @@
 #include "geometry/reconstruct.h"
 
 #include "geometry/orientation/diameter/fiber_diameter.h"
-#include "geometry/orientation/lumen/lumen_fill.h"
-#include "geometry/orientation/lumen/lumen_sift.h"
 #include "geometry/orientation/repeat_direction.h"
 #include "geometry/volume/density_map.h"
 #include "geometry/volume/void_trim.h"
@@ -15,30 +13,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-void reconstruct_option_default(struct reconstruct_option *o)
-{
-    *o = (struct reconstruct_option){
-        .voxel_size_m = {NAN, NAN, NAN},
-        .axes = "xyz",
-        .crop_keep = 0.5,
-        .trim_above_voxel = (size_t)1 << 30,
-        .matrix = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
-        .density_low = NAN,
-        .density_high = NAN,
-        .hollow_fibers = -1,
-        .fiber_diameter_voxel = NAN,
-        .s = NAN,
-        .t = NAN,
-        .eps_d = NAN,
-        .eps_j = NAN,
-        .link_sigma_voxel = 5.0,
-        .min_vertex = 10,
-        .smooth_alpha = 0.1,
-        .radius_m = {NAN, NAN, NAN},
-        .radius_rule = RADIUS_AUTO,
-    };
-}
 
 /* What must be done to the grid of the file. "stored": after the permutation of axes, before matrix and cubic
  * resampling. */
@@ -257,28 +231,6 @@ static void state_trim(const struct plan *p, struct reconstruct_option *o, struc
     }
 }
 
-/* Fills lumens, at the scale of the fibers as they are once all enclosed void is filled. */
-static status fill_lumens(struct volume *v, double diameter_voxel, struct thread_pool *pool,
-                          struct reconstruct_report *report, struct error *err)
-{
-    struct fiber_diameter d = {.voxel = diameter_voxel};
-    status s = lumens_fill(v, report->noise.mapped_sd, pool, &report->lumen_share, err);
-    if (s == STATUS_OK && isnan(diameter_voxel)) s = fiber_diameter_measure(v, pool, NULL, &d, err);
-    if (s == STATUS_OK) s = lumens_sift(v, d.voxel, pool, &report->lumen_share, err);
-    return s;
-}
-
-status reconstruct_lumens(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
-                          struct reconstruct_report *report, struct error *err)
-{
-    report->lumen_share = 0.0;
-    status s = lumen_evidence_measure(v, report->noise.mapped_sd, pool, &report->lumen, err);
-    report->lumens_found = o->hollow_fibers < 0 && lumen_evidence_judge(&report->lumen) == LUMENS_CLEAR;
-    if (o->hollow_fibers < 0) o->hollow_fibers = report->lumens_found;
-    if (s == STATUS_OK && o->hollow_fibers > 0) s = fill_lumens(v, o->fiber_diameter_voxel, pool, report, err);
-    return s;
-}
-
 static status map_densities(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
                             struct reconstruct_report *report, struct error *err)
 {
@@ -306,6 +258,7 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
     report->density_high = o->density_high;
     report->separability = m.separability;
     s = reconstruct_lumens(v, o, pool, report, err);
+    if (s == STATUS_OK) s = reconstruct_refill_lumens(v, o, pool, report, err);
     if (s != STATUS_OK) return s;
     seam_density_measure(v, &report->seam_density);
     return STATUS_OK;

@@ -15,8 +15,10 @@ enum {
 };
 #define TRACE_LUMENS_END 0.85   /* of the progress of the step "fibers", where lumens are measured; from 0.67 on */
 #define TRACE_END_DIAMETERS 1.0 /* length at an end, in diameters, that may be wrong */
-/* Spread of the radii of single fibers, over their mean, above which lines are those of a scan that does not resolve
- * its fibers: yarns have 0.1 to 0.25, weave-ct 0.39. */
+/* Spread of the radii of single fibers, over their mean: below the first, fibers are alike and all found at first (0.04
+ * and less); above the second, lines are those of a scan that does not resolve its fibers: yarns have 0.1 to 0.25,
+ * weave-ct 0.39. */
+#define TRACE_LEAST_SPREAD 0.1
 #define TRACE_MOST_SPREAD 0.3
 /* Angle between a line and the direction of its voxels from which on it may be wrong. */
 #define TRACE_DISAGREEMENT_RAD (30.0 * RAD_PER_DEG)
@@ -30,12 +32,16 @@ struct trace_job {
     struct progress inner;
     struct progress_part part;   /* progress that inner reports to */
     double diameter;             /* voxels */
+    bool hollow;                 /* the scan has lumens that were filled */
     bool flat;                   /* the first fit of whole lines has found flat fibers (flat_fit.h) */
     double independent;          /* of the voxels of v (axis_profile.h) */
     struct axis_profile profile; /* of the lines so far */
     double shared_radius_se;     /* voxels, with lumens that were measured: of all radii together (shape_measure.h) */
 };
 
+/* Sets what follows from the other members at the start: whether fibers are hollow, the diameter of
+ * the report, and a profile. */
+void trace_job_start(struct trace_job *job);
 /* States which part of the progress of the step "fibers" comes next. */
 void trace_enter_part(struct trace_job *job, double from, double to);
 /* A profile to start a fit from. */
@@ -61,6 +67,14 @@ status trace_leftover(struct trace_job *job, struct polyline_set *lines, struct 
 /* Finds lines and repairs them, until only the last fit is left, which trace_finish makes: it drops what deviates. */
 status trace_lines(struct trace_job *job, struct polyline_set *lines, struct error *err);
 status trace_finish(struct trace_job *job, struct polyline_set *lines, struct error *err);
+/* In place of trace_finish where lines need not be exact: one round of its repairs. */
+status trace_settle(struct trace_job *job, struct polyline_set *lines, struct error *err);
+/* Finds the lines of a scan (trace_scan.c), to the end (finish) or until they are settled. They are in voxels of the
+ * scan. */
+status trace_scan(struct trace_job *job, bool finish, struct polyline_set *lines, struct error *err);
+/* Marks the voxels in the inner parts of fibers (trace_cores.c), in a volume of n. Voxels that have a mark keep it. */
+void trace_mark_cores(const struct polyline_set *lines, double diameter, const size_t n[3], uint8_t value,
+                      uint8_t *mark);
 /* Where lumens were filled, fits the finished lines once more to the scan as it was, with a lumen for each
  * (hollow_fit.h); not where fibers are so thin that they were traced in an interpolated volume. */
 status trace_lumens(struct trace_job *job, struct polyline_set *lines, struct error *err);

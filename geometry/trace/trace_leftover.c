@@ -18,14 +18,15 @@
 /* Diameter of the fibers looked for, over the typical one; centers are found from 0.55 to 1.5 times this diameter. */
 static const double THINNER = 0.72;
 static const float PAD = 0.3f; /* voxels added to subtracted radii, so that no rims are left */
-/* Spread of the radii, and material that is left over all material, below which there is nothing to look for: fibers
- * that are alike are all found at first, and only rims of them are left (spread up to 0.04, material up to 0.05). Radii
- * that spread by more than TRACE_MOST_SPREAD are those of lines that the scan does not resolve. */
-static const double LEAST_SPREAD = 0.1, LEAST_LEFT = 0.03;
+/* Material that is left over all material below which there is nothing to look for, as where radii spread by less than
+ * TRACE_LEAST_SPREAD: only rims of fibers are left (up to 0.05). */
+static const double LEAST_LEFT = 0.03;
 /* Fibers so thin that voxels are interpolated are missed where they touch, also where they are alike; lines on missed
  * neighbours then spread their radii by 0.09 to 0.15. */
 static const double LEAST_SPREAD_THIN = 0.05;
 static const double LEAST_DIAMETERS = 1.5; /* length of the lines that are added */
+/* Density of thin hollow fibers whose lumens were not filled: blurred walls have 0.75 at most, and the middle 0.55. */
+static const float HOLLOW_DENSITY = 0.62f;
 
 /* A piece of a fiber around a vertex, one voxel to either side of it. section: NULL for a ball. */
 struct piece {
@@ -115,6 +116,17 @@ static status subtract_lines(const struct trace_job *job, const struct polyline_
     return STATUS_OK;
 }
 
+/* In a scan with lumens, gives the thin hollow fibers that are left the density of solid ones. */
+static void raise_hollow(const struct trace_job *job, struct volume *left)
+{
+    const size_t n_slice = left->n[0] * left->n[1];
+    for (size_t k = 0; k < left->n[2] && job->hollow; k++) {
+        float *slice = left->density + k * n_slice;
+        for (size_t i = 0; i < n_slice; i++) slice[i] = fminf(1.0f, slice[i] / HOLLOW_DENSITY);
+        scratch_keep_within(left->space);
+    }
+}
+
 /* Traces the fibers of the volume that is left, and adds them. */
 static status add_lines(const struct trace_job *job, const struct volume *left, struct polyline_set *lines,
                         struct error *err)
@@ -165,10 +177,11 @@ status trace_leftover(struct trace_job *job, struct polyline_set *lines, struct 
     const double spread = job->report->radius_spread;
     status s = STATUS_OK;
     const bool look =
-        spread >= (job->independent < 1.0 ? LEAST_SPREAD_THIN : LEAST_SPREAD) && spread <= TRACE_MOST_SPREAD;
+        spread >= (job->independent < 1.0 ? LEAST_SPREAD_THIN : TRACE_LEAST_SPREAD) && spread <= TRACE_MOST_SPREAD;
     if (look) s = subtract_lines(job, lines, &left, &share, err);
     forget_sections(lines);
     if (!look) return STATUS_OK;
+    if (s == STATUS_OK) raise_hollow(job, &left);
     if (s == STATUS_OK && share >= LEAST_LEFT) s = add_lines(job, &left, lines, err);
     volume_release(&left);
     if (s != STATUS_OK || lines->n_line == n_before) return s;

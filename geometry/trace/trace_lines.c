@@ -160,15 +160,16 @@ status trace_lines(struct trace_job *job, struct polyline_set *lines, struct err
     return s;
 }
 
-/* Where fibers are so thin that voxels are interpolated, looks once more at what no line explains: cuts have freed
- * fibers that others had grown into, and lines on them keep the others from growing back. Flat fibers are left alone,
- * because their sections are not known any more. */
+/* Where fibers are so thin that voxels are interpolated, and where they are hollow and traced in the scan's own voxels,
+ * looks once more at what no line explains: cuts have freed fibers that others had grown into, and lines on them keep
+ * the others from growing back. Flat fibers are left alone, because their sections are not known any more. */
 static status look_again(struct trace_job *job, struct polyline_set *lines, struct error *err)
 {
     const size_t n_before = lines->n_line;
     struct join_counts counts = {.n_gap_bridged = job->report->n_gap_bridged, .n_joined = job->report->n_joined};
     struct polyline_set out;
-    if (!(job->independent < 1.0) || job->flat) return STATUS_OK;
+    const bool hollow = job->hollow && job->report->trace_edge_voxel == 1.0;
+    if (!(hollow || job->independent < 1.0) || job->flat) return STATUS_OK;
     status s = trace_leftover(job, lines, err);
     if (s != STATUS_OK || lines->n_line == n_before) return s;
     polyline_set_init(&out);
@@ -203,6 +204,12 @@ static bool has_lost_ends(const struct trace_job *job, const struct polyline_set
     const double share = n_lost / (2.0 * (double)lines->n_line + 1.0);
     const bool fits = !job->flat && job->report->radius_spread <= TRACE_MOST_SPREAD;
     return fits && share > LOST_SHARE && (share < MOST_LOST_SHARE || job->independent < 1.0);
+}
+
+status trace_settle(struct trace_job *job, struct polyline_set *lines, struct error *err)
+{
+    size_t n_join;
+    return settle_once(job, lines, 1, true, &n_join, err);
 }
 
 status trace_finish(struct trace_job *job, struct polyline_set *lines, struct error *err)

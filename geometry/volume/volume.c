@@ -56,6 +56,32 @@ status volume_copy_unfilled(const struct volume *v, struct volume *to, struct er
     return s;
 }
 
+status volume_fill_marked(struct volume *v, const uint8_t *mark, uint8_t least, struct error *err)
+{
+    const size_t n_slice = v->n[0] * v->n[1], n_all = volume_n_voxel(v->n);
+    void *array[2] = {NULL, NULL};
+    size_t n = 0;
+    for (size_t i = 0; i < v->filled.n; i++) v->density[v->filled.voxel[i]] = v->filled.density[i];
+    scratch_release(v->space, v->filled.voxel);
+    scratch_release(v->space, v->filled.density);
+    v->filled = (struct volume_filled){0};
+    for (size_t i = 0; i < n_all; i++) n += mark[i] >= least;
+    if (n == 0) return STATUS_OK;
+    status s = scratch_new(v->space, n * sizeof *v->filled.voxel, "the lumens of fibers", &array[0], err);
+    if (s == STATUS_OK)
+        s = scratch_new(v->space, n * sizeof *v->filled.density, "the lumens of fibers", &array[1], err);
+    v->filled.voxel = array[0];
+    v->filled.density = array[1];
+    for (size_t i = 0; s == STATUS_OK && i < n_all; i++) {
+        if (i % n_slice == 0) scratch_keep_within(v->space);
+        if (mark[i] < least) continue;
+        v->filled.voxel[v->filled.n] = i;
+        v->filled.density[v->filled.n++] = v->density[i];
+        v->density[i] = 1.0f;
+    }
+    return s;
+}
+
 status direction_volume_init_in(struct direction_volume *v, const size_t n[3], const double voxel_size_m[3],
                                 struct scratch_space *space, struct error *err)
 {

@@ -38,6 +38,9 @@ status volume_init_in(struct volume *v, const size_t n[3], const double voxel_si
 void volume_release(struct volume *v);
 /* Makes a copy (uninitialised `to`) with the densities that filled voxels had. STATUS_NO_MEMORY, STATUS_DISK_FULL. */
 status volume_copy_unfilled(const struct volume *v, struct volume *to, struct error *err);
+/* Fills the voxels whose mark is at least `least` (mark: one for each voxel), and empties all others that were filled.
+ * STATUS_NO_MEMORY, STATUS_DISK_FULL. */
+status volume_fill_marked(struct volume *v, const uint8_t *mark, uint8_t least, struct error *err);
 
 static inline size_t volume_n_voxel(const size_t n[3]) { return n[0] * n[1] * n[2]; }
 static inline size_t volume_index(const size_t n[3], size_t i, size_t j, size_t k) { return (k * n[1] + j) * n[0] + i; }

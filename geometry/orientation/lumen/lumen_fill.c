@@ -192,38 +192,13 @@ static void release_box(struct lumen_box *b)
     b->density = b->height = NULL;
 }
 
-/* Fills the marked voxels, and keeps their densities. */
-static status fill_marked(const struct lumen_box *b, struct volume *v, struct error *err)
-{
-    void *array[2] = {NULL, NULL};
-    size_t n = 0, n_slice = v->n[0] * v->n[1], n_all = volume_n_voxel(v->n);
-    for (size_t i = 0; i < n_all; i++) n += b->height[i] == MARK;
-    scratch_release(v->space, v->filled.voxel);
-    scratch_release(v->space, v->filled.density);
-    v->filled = (struct volume_filled){0};
-    if (n == 0) return STATUS_OK;
-    status s = scratch_new(v->space, n * sizeof *v->filled.voxel, "the lumens of fibers", &array[0], err);
-    if (s == STATUS_OK)
-        s = scratch_new(v->space, n * sizeof *v->filled.density, "the lumens of fibers", &array[1], err);
-    v->filled.voxel = array[0];
-    v->filled.density = array[1];
-    for (size_t i = 0; s == STATUS_OK && i < n_all; i++) {
-        if (i % n_slice == 0) scratch_keep_within(v->space);
-        if (b->height[i] != MARK) continue;
-        v->filled.voxel[v->filled.n] = i;
-        v->filled.density[v->filled.n++] = v->density[i];
-        v->density[i] = 1.0f;
-    }
-    return s;
-}
-
 status lumens_fill(struct volume *v, double noise_sd, struct thread_pool *pool, double *filled_share, struct error *err)
 {
     const double depth = fmax(LEAST_DEPTH, isfinite(noise_sd) ? NOISE_DEPTH * NOISE_LEFT * noise_sd : 0.0);
     struct lumen_box all = {.v = v, .n = {v->n[0], v->n[1], v->n[2]}};
     *filled_share = 0.0;
     status s = box_share(&all, depth, pool, filled_share, err);
-    if (s == STATUS_OK) s = fill_marked(&all, v, err);
+    if (s == STATUS_OK) s = volume_fill_marked(v, all.height, MARK, err);
     release_box(&all);
     return s;
 }

@@ -126,12 +126,11 @@ static status sift_round(struct sift *s, float least, struct thread_pool *pool, 
 
 enum { FILLED = 1, RIM = 2 };
 
-/* Marks the basins that are kept and the voxels beside them, and returns how many. mark: zeros for all voxels. */
-static size_t mark_lumens(const struct sift *s, uint8_t *mark)
+/* Marks the basins that are kept and the voxels beside them. mark: zeros for all voxels. */
+static void mark_lumens(const struct sift *s, uint8_t *mark)
 {
     const struct volume_filled *f = &s->v->filled;
     const size_t *n = s->v->n, step[3] = {1, n[0], n[0] * n[1]};
-    size_t n_marked = 0;
     for (size_t i = 0; i < f->n; i++)
         if (s->sum[s->basin[i]] > 0.0f) mark[f->voxel[i]] = FILLED;
     for (size_t i = 0; i < f->n; i++) {
@@ -143,33 +142,6 @@ static size_t mark_lumens(const struct sift *s, uint8_t *mark)
             if (x + 1 < n[a] && mark[at + step[a]] == 0) mark[at + step[a]] = RIM;
         }
     }
-    for (size_t i = 0; i < volume_n_voxel(n); i++) n_marked += mark[i] != 0;
-    return n_marked;
-}
-
-/* Makes the marked voxels those that are filled. */
-static status fill_lumens(const struct sift *s, const uint8_t *mark, size_t n_marked, struct error *err)
-{
-    struct volume *v = s->v;
-    void *array[2] = {NULL, NULL};
-    for (size_t i = 0; i < v->filled.n; i++) v->density[v->filled.voxel[i]] = v->filled.density[i];
-    scratch_release(v->space, v->filled.voxel);
-    scratch_release(v->space, v->filled.density);
-    v->filled = (struct volume_filled){0};
-    if (n_marked == 0) return STATUS_OK;
-    status st = scratch_new(v->space, n_marked * sizeof *v->filled.voxel, "the lumens of fibers", &array[0], err);
-    if (st == STATUS_OK)
-        st = scratch_new(v->space, n_marked * sizeof *v->filled.density, "the lumens of fibers", &array[1], err);
-    v->filled.voxel = array[0];
-    v->filled.density = array[1];
-    for (size_t i = 0; st == STATUS_OK && i < volume_n_voxel(v->n); i++) {
-        if (i % (v->n[0] * v->n[1]) == 0) scratch_keep_within(v->space);
-        if (mark[i] == 0) continue;
-        v->filled.voxel[v->filled.n] = i;
-        v->filled.density[v->filled.n++] = v->density[i];
-        v->density[i] = 1.0f;
-    }
-    return st;
 }
 
 static status new_array(const struct volume *v, size_t n_byte, void *array, struct error *err)
@@ -204,8 +176,8 @@ status lumens_sift(struct volume *v, double diameter_voxel, struct thread_pool *
     if (st == STATUS_CANCELLED) error_set(err, st, "looking for lumens was cancelled");
     if (st == STATUS_OK) {
         memset(array[3], 0, volume_n_voxel(v->n));
-        const size_t n_marked = mark_lumens(&s, array[3]);
-        st = fill_lumens(&s, array[3], n_marked, err);
+        mark_lumens(&s, array[3]);
+        st = volume_fill_marked(v, array[3], FILLED, err);
         *filled_share *= (double)n_kept / (double)n_before;
     }
     free(s.scratch);
