@@ -4,7 +4,8 @@ BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
 $(BUILD)/tests/bench/models/bench_recovery: $(BUILD)/obj/tests/bench/fit_bench.c.o
-$(BUILD)/tests/bench/pictures/bench_pictures: $(BUILD)/obj/tests/bench/pictures/field_comparison.c.o
+$(BUILD)/tests/bench/pictures/bench_pictures: $(patsubst %,$(BUILD)/obj/tests/bench/pictures/%.c.o,field_pair field_samples field_comparison)
+$(BUILD)/tests/unit/renderer/test_field_comparison: $(BUILD)/obj/tests/bench/pictures/field_comparison.c.o
 
 ##@ Benchmarks and pictures
 bench: | deps-test ## every figure, one JSON object a line (a night on 2 quiet cores)

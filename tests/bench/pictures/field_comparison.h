@@ -1,10 +1,20 @@
-/* How far two pictures of the same cloth are apart, over square fields of pixels. */
+/* How far two pictures of the same cloth are apart, over square fields of them, and what follows for the time that
+ * each takes to a given error. */
 #ifndef SELVEDGE_BENCH_FIELD_COMPARISON_H
 #define SELVEDGE_BENCH_FIELD_COMPARISON_H
 
-#include "renderer/image/image.h"
+#include <stdbool.h>
+#include <stddef.h>
 
-/* Sums over n pairs of field and channel, of fields that show cloth in either picture. */
+/* Sums over the n samples of one field, each channel: of their radiances, and of the squares of these. */
+struct field_sum {
+    double n, x[3], x2[3];
+};
+
+/* Sums over n pairs of field and channel, of lit fields: those whose mean radiance in both pictures is at least
+ * FIELD_LIT of that of all fields. Background counts for nothing, nor does cloth in deep shadow, which would divide the
+ * error by a smaller mean. "Not 0" is no criterion: rare paths light more fields the more samples there are. */
+#define FIELD_LIT 0.01
 struct field_comparison {
     double mean;       /* of the first picture */
     double difference; /* of the second less the first */
@@ -14,14 +24,30 @@ struct field_comparison {
     double n;
 };
 
-/* first, second: of one size, with the variances of their pixels after red, green and blue
- * (renderer/transport/render.h). edge: pixels along a field; what is left at the right and below counts for nothing.
- */
-struct field_comparison field_comparison_of(const struct image *first, const struct image *second, size_t edge);
-/* Root mean square of the differences over the mean, without what the noise of both adds. */
-double field_comparison_stays(const struct field_comparison *r);
-/* Standard error of the square of that, from how it varies between fields: a few bright paths make noise that pictures
- * with tens of paths a pixel do not tell from an error of some percent. */
+/* The time that the first picture takes to an error over that of the second, of which a part does not fall with the
+ * time. It is `value` for the estimated square of that part, and `least` for that square and two standard errors more.
+ * Both are 0 where that part is shown to be above the error, and where neither is shown. */
+struct field_speedup {
+    enum { FIELD_SPEEDUP_SHOWN, FIELD_SPEEDUP_ABOVE, FIELD_SPEEDUP_NOT_RESOLVED } verdict;
+    double value, least;
+};
+
+/* Each sum is of at least two samples. */
+struct field_comparison field_comparison_of(const struct field_sum *first, const struct field_sum *second,
+                                            size_t n_field);
+/* Mean square of the differences over the squared mean radiance, without what the noise of both adds. Below 0 by
+ * chance. Needs two lit fields. */
+double field_comparison_square(const struct field_comparison *r);
+/* Standard error of that, from how it varies between fields. */
 double field_comparison_square_se(const struct field_comparison *r);
+/* Relative noise of the fields' means of one picture, 0 or 1: root mean square. */
+double field_comparison_noise(const struct field_comparison *r, size_t i_picture);
+
+/* at_equal_noise: the time of the first picture over that of the second when both have the same noise. error: relative,
+ * as the square. */
+struct field_speedup field_speedup_of(double at_equal_noise, double square, double square_se, double error);
+/* Whether more samples would say little more: the part that stays is shown to be above the error; or to be below it,
+ * and its square is known to an eighth of the squared error. */
+bool field_speedup_is_settled(double square, double square_se, double error);
 
 #endif
