@@ -138,8 +138,9 @@ status reconstruct_fibers(const struct volume *v, const struct direction_volume 
 
 /* Optional part of the step "fibers": scans a phantom of the fibers f with the noise (its strength and its correlation)
  * and the blur of the scan v, reconstructs it, and writes into report->trial how well f is found again. At most 2^24
- * voxels from the middle of the scan are tried. report: as filled by reconstruct_fibers. The fibers of the phantom are
- * solid discs. What cannot be reconstructed is no error: the trial then is not made. */
+ * voxels from the middle of the scan are tried. report: as filled by reconstruct_fibers. The phantom's fibers have the
+ * radii, sections and lumens that were measured along f (grade/trial_fibers.h); sections that are no ellipses, such as
+ * beans, become ellipses. What cannot be reconstructed is no error: the trial then is not made. */
 status reconstruct_trial(const struct volume *v, const struct fiber_set *f, const struct reconstruct_option *option,
                          struct thread_pool *pool, const struct progress *progress, struct reconstruct_report *report,
                          struct error *err);

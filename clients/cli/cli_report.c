@@ -206,6 +206,16 @@ static void print_radius(const json_t *radius, FILE *out)
             json_is_true(json_object_get(radius, "at_bound")) ? "  at the edge of its range" : "");
 }
 
+/* What the phantom of a trial was made of. */
+static void print_trial_fibers(const json_t *trial, FILE *out)
+{
+    const double ratio = member_number(trial, "axis_ratio"), lumen = member_number(trial, "lumen");
+    fprintf(out, "phantom of these fibers: radii spread by %.1f %%", 100.0 * member_number(trial, "radius_spread"));
+    if (ratio > 1.0) fprintf(out, ", ratios of axes %.2f +- %.2f", ratio, member_number(trial, "axis_ratio_spread"));
+    if (lumen > 0.0) fprintf(out, ", lumens %.2f +- %.2f of the width", lumen, member_number(trial, "lumen_spread"));
+    fputs(ratio > 1.0 || lumen > 0.0 ? "\n" : ", solid discs\n", out);
+}
+
 /* The geometry of a job without a fit. */
 static void print_geometry(const json_t *g, FILE *out)
 {
@@ -216,7 +226,8 @@ static void print_geometry(const json_t *g, FILE *out)
         fprintf(out, "single fibers in the scan: %s, %.0f %% of their length is sure\n", member_text(grade, "verdict"),
                 100.0 * member_number(grade, "safe_share"));
     const json_t *trial = json_object_get(g, "trial");
-    if (json_is_object(trial))
+    if (json_is_object(trial)) {
+        print_trial_fibers(trial, out);
         fprintf(
             out,
             "what this scan can give: %.1f %% of the length, axes to %.2f voxels, %.2f pieces a fiber, %.3f merges, "
@@ -224,6 +235,7 @@ static void print_geometry(const json_t *g, FILE *out)
             100.0 * member_number(trial, "recall"), member_number(trial, "axis_rms_voxel"),
             member_number(trial, "fragments"), member_number(trial, "merges"),
             100.0 * member_number(trial, "radius_rms"));
+    }
 }
 
 /* The residuals of models that were fitted to the profile of a fiber. */

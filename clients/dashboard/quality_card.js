@@ -6,6 +6,12 @@ const pair = (v, show) => (v ? v.map((x) => (isNumber(x) ? show(x) : "–")).joi
 
 const radius = (g) => (g.radius_per_axis ? g.radius_um.map((r, i) => withError(r, g.radius_se_um?.[i])).join(" / ") : withError(g.mean_radius_um, g.radius_se_um?.[0])) + " µm";
 
+// What the phantom of a trial was made of.
+const phantomFibers = (t) => [`radii spread by ${percent(t.radius_spread, 1)}`,
+  t.axis_ratio > 1 && `ratios of axes ${number(t.axis_ratio)} ± ${number(t.axis_ratio_spread, 2)}`,
+  t.lumen > 0 && `lumens ${number(t.lumen, 2)} ± ${number(t.lumen_spread, 2)} of the width`,
+  !(t.axis_ratio > 1) && !(t.lumen > 0) && "solid discs"].filter(Boolean).join(", ");
+
 // Returns rows [name, value, meaning] from the geometry of result.json.
 export function qualityRows(g) {
   const rows = [["fibers", `${g.n_fiber}, ${number(g.total_length_mm)} mm`, ""], ["radius", radius(g), g.radius_per_axis ? "weft / warp / pile" : ""]];
@@ -19,7 +25,7 @@ export function qualityRows(g) {
     ["density step at the seams", pair(g.seam_density?.ratio, (x) => number(x)), "across x / y; 1 is no seam"]);
   const t = g.trial;
   if (t) rows.push(["what this scan can give", `${percent(t.recall, 1)} of the length, axes to ${number(t.axis_rms_voxel, 2)} voxels, ${number(t.fragments)} pieces a fiber, ${number(t.merges, 2)} merges, radii to ${percent(t.radius_rms, 1)}`,
-    "of a phantom of these fibers with the noise and blur of this scan"]);
+    `of a phantom of these fibers (${phantomFibers(t)}) with the noise and blur of this scan`]);
   const s = g.seam_fibers;
   rows.push(["fiber ends that continue", pair(s?.continued, (x) => percent(x, 0)),
     s?.found && s.n_joined > 0 ? `across the seams in x / y; ${pair(s.found.continued, (x) => percent(x, 0))} as found, ${s.n_joined} pairs joined` : "across the seams in x / y"]);

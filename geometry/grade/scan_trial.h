@@ -11,9 +11,15 @@ struct scan_trial {
     double snr;                         /* of the phantom; 0: no noise */
     double noise_sd_voxel;              /* of the Gaussian that correlates its noise; 0: white */
     double blur_sd_voxel;
+    /* The fibers of the phantom: standard deviation of their radii over the mean; mean ratio of the axes of their
+     * sections (1: round) and mean width of their lumens over that of the fibers (0: solid), with standard deviations.
+     * All are taken over the length, where the scan was measured, so deviations contain the errors of that. */
+    double radius_spread, axis_ratio, axis_ratio_spread, lumen, lumen_spread;
     /* Figures of geometry/phantom/compare.h; NaN if nothing was found. */
-    double recall, precision, fragments, merges, axis_rms_voxel, direction_mean_deg, direction_p95_deg;
+    double recall, recall_se, precision, fragments, fragments_se, merges, axis_rms_voxel, direction_mean_deg,
+        direction_p95_deg;
     double radius_bias, radius_rms;                           /* of found / true - 1 */
+    double lumen_rms;                                         /* of found - true width; NaN for solid fibers */
     double voxel_direction_mean_deg, voxel_direction_p95_deg; /* of compare_directions.h, inside of fibers */
 };
 

@@ -249,7 +249,7 @@ static status from_found(const struct fiber_set *truth, const struct fiber_set *
 static status count_fragments(const struct walk *of_truth, struct walk *w, size_t run_min, struct compare_report *r,
                               struct error *err)
 {
-    bool *seen = calloc(of_truth->n_piece, sizeof *seen);
+    uint32_t *seen = calloc(of_truth->n_piece, sizeof *seen); /* fragments of each true fiber */
     uint32_t *length = calloc(of_truth->n_piece, sizeof *length);
     size_t n_pair = 0, n_with_pair = 0, n_seen = 0;
     uint32_t last_found = NONE;
@@ -269,11 +269,15 @@ static status count_fragments(const struct walk *of_truth, struct walk *w, size_
         n_pair++;
         if (s->piece != last_found) n_with_pair++;
         last_found = s->piece;
-        if (!seen[s->other_piece]) n_seen++;
-        seen[s->other_piece] = true;
+        n_seen += seen[s->other_piece]++ == 0;
     }
     r->merges_per_fiber = (double)(n_pair - n_with_pair) / (double)r->n_true_piece;
     r->fragments_per_fiber = n_seen > 0 ? (double)n_pair / (double)n_seen : NAN;
+    double square = 0.0;
+    for (size_t i = 0; i < of_truth->n_piece; i++)
+        if (seen[i] > 0)
+            square += ((double)seen[i] - r->fragments_per_fiber) * ((double)seen[i] - r->fragments_per_fiber);
+    r->fragments_se = n_seen > 1 ? sqrt(square / ((double)n_seen * (double)(n_seen - 1))) : NAN;
     r->missed = 1.0 - (double)n_seen / (double)r->n_true_piece;
     free(seen);
     free(length);
@@ -284,9 +288,9 @@ static status count_fragments(const struct walk *of_truth, struct walk *w, size_
 static void from_truth(const struct walk *w, struct compare_report *r)
 {
     size_t n_match = 0, n_along = 0, n_gap = 0, n_fiber = 0;
-    double run_sum = 0.0;
+    double run_sum = 0.0, lost2 = 0.0, lost_length = 0.0, length2 = 0.0; /* squares and products of the fibers */
     for (size_t i = 0, end; i < w->n; i = end) {
-        size_t longest = 0, run = 0, since_match = 0;
+        size_t longest = 0, run = 0, since_match = 0, n_before = n_match;
         bool any = false;
         for (end = i; end < w->n && w->sample[end].fiber == w->sample[i].fiber; end++) {
             const struct sample *s = &w->sample[end];
@@ -299,10 +303,18 @@ static void from_truth(const struct walk *w, struct compare_report *r)
             run = !match ? 0 : end > i && s[-1].other == s->other ? run + 1 : 1;
             longest = run > longest ? run : longest;
         }
-        run_sum += (double)longest / (double)(end - i);
+        const double length = (double)(end - i), lost = length - (double)(n_match - n_before);
+        lost2 += lost * lost;
+        lost_length += lost * length;
+        length2 += length * length;
+        run_sum += (double)longest / length;
         n_fiber++;
     }
     r->center_recall = w->n > 0 ? (double)n_match / (double)w->n : NAN;
+    /* of a ratio of sums over fibers */
+    const double share = 1.0 - r->center_recall, square = lost2 - 2.0 * share * lost_length + share * share * length2;
+    r->center_recall_se =
+        n_fiber > 1 ? sqrt(fmax(0.0, square) * (double)n_fiber / (double)(n_fiber - 1)) / (double)w->n : NAN;
     r->length_recovered = w->n > 0 ? (double)n_along / (double)w->n : NAN;
     r->gaps_per_fiber = n_fiber > 0 ? (double)n_gap / (double)n_fiber : NAN;
     r->longest_run = n_fiber > 0 ? run_sum / (double)n_fiber : NAN;

@@ -25,7 +25,8 @@ struct compare_report {
     double fiber_diameter_voxel; /* of the truth, weighted by length */
     double length_true_m, length_found_m;
 
-    double center_recall; /* matched true samples / true samples */
+    double center_recall;    /* matched true samples / true samples */
+    double center_recall_se; /* its standard error, from the scatter between true fibers; NaN for a single one */
     /* (Matched found samples without second hits) / found samples. A second hit: another found fiber is matched
      * nearer to the same voxel of the same true fiber. */
     double center_precision;
@@ -38,6 +39,7 @@ struct compare_report {
     double longest_run;
     double missed;              /* share of true fibers without a fragment */
     double fragments_per_fiber; /* fragments / true fibers that have one */
+    double fragments_se;        /* standard error of that, from the scatter between these; NaN for a single one */
     double gaps_per_fiber;      /* runs of unmatched samples between matched ones / true fibers */
     double merges_per_fiber; /* sum over found fibers of (true fibers of which it has a fragment - 1) / true fibers */
     double direction_mean_deg, direction_p95_deg; /* of matched found samples from the direction of the true polyline */

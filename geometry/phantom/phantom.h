@@ -127,6 +127,7 @@ struct phantom_scan_option {
     double beam_hardening; /* share of the signal that is lost amid material; 0: none */
     double phase_fringes;  /* strength of the fringes at outlines; 0: none (phantom_raster.c) */
     struct phantom_section_law section; /* that with which the fibers were made */
+    bool own_sections; /* draws the sections that the fibers state (fiber_shape.h), instead of those of the law */
 };
 
 void phantom_scan_option_default(struct phantom_scan_option *o);

@@ -182,7 +182,7 @@ static status scan_init(struct scan *s, struct error *err)
            slice_bytes = n_slice * (sizeof *d->drawn + sizeof *d->owner + sizeof *d->share + sizeof(float));
     s->n_slab = scratch_buffer_bytes(s->v->space) / slice_bytes;
     s->n_slab = s->n_slab < 2 * SLAB ? 2 * SLAB : s->n_slab > s->v->n[2] ? s->v->n[2] : s->n_slab;
-    bool disc = phantom_section_is_disc(d->section);
+    const bool disc = phantom_slab_is_disc(d);
     d->drawn = malloc(s->n_slab * n_slice * sizeof *d->drawn);
     d->owner = malloc(s->n_slab * n_slice * sizeof *d->owner);
     d->share = malloc(s->n_slab * n_slice * sizeof *d->share);
@@ -258,8 +258,8 @@ status phantom_scan_in(const struct fiber_set *f, const size_t n[3], const struc
     st = volume_init_in(v, n, size_m, space, err);
     if (st != STATUS_OK) return st;
     struct scan s = {.o = o, .v = v};
-    s.slab =
-        (struct phantom_slab){.f = f, .section = &o->section, .voxel_size_m = o->voxel_size_m, .n = {n[0], n[1], n[2]}};
+    s.slab = (struct phantom_slab){.f = f, .voxel_size_m = o->voxel_size_m, .n = {n[0], n[1], n[2]}};
+    s.slab.section = o->own_sections ? NULL : &o->section;
     choose_blurs(&s);
     const size_t reach = largest_reach(&s);
     const struct progress quiet = progress_silent(progress);

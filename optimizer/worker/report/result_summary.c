@@ -143,6 +143,15 @@ static void print_discrepancy(const struct pipeline_context *c, FILE *out)
     fprintf(out, "\n");
 }
 
+/* What the phantom of the trial was made of. */
+static void print_trial_fibers(const struct scan_trial *t, FILE *out)
+{
+    fprintf(out, "         a phantom of these fibers (radii spread by %.1f %%", 100.0 * t->radius_spread);
+    if (t->axis_ratio > 1.0) fprintf(out, ", ratios of axes %.2f +- %.2f", t->axis_ratio, t->axis_ratio_spread);
+    if (t->lumen > 0.0) fprintf(out, ", lumens %.2f +- %.2f of the width", t->lumen, t->lumen_spread);
+    fprintf(out, "%s) was scanned and reconstructed:\n", t->axis_ratio > 1.0 || t->lumen > 0.0 ? "" : ", solid discs");
+}
+
 static void print_cloth(const struct pipeline_context *c, FILE *out)
 {
     fprintf(out, "cloth    %zu fibers, %zu vertices, tile %.3f x %.3f mm\n", c->fiber.n_fiber, c->fiber.n_vertex,
@@ -155,12 +164,14 @@ static void print_cloth(const struct pipeline_context *c, FILE *out)
                 "         they explain the material to %.3f (Dice); density steps at the seams x %.2f, y %.2f of those "
                 "inside\n",
                 c->geometry.dice, c->geometry.seam_density.ratio[0], c->geometry.seam_density.ratio[1]);
-    if (c->geometry.trial.made)
+    if (c->geometry.trial.made) {
+        print_trial_fibers(&c->geometry.trial, out);
         fprintf(out,
                 "         such a scan can give %.1f %% of the length, axes to %.2f voxels, %.2f pieces a fiber, %.3f "
                 "merges, radii to %.1f %%\n",
                 100.0 * c->geometry.trial.recall, c->geometry.trial.axis_rms_voxel, c->geometry.trial.fragments,
                 c->geometry.trial.merges, 100.0 * c->geometry.trial.radius_rms);
+    }
     fprintf(out, "         quality.html shows how good the geometry is\n\n");
 }
 

@@ -122,20 +122,39 @@ static void print_scan(const struct pipeline_context *c, FILE *out)
     close_table(out);
 }
 
+/* What the phantom was made of. */
+static void print_trial_fibers(const struct scan_trial *t, FILE *out)
+{
+    row(out, "radii of the phantom", "standard deviation over the mean, as traced", "%.1f %%",
+        100.0 * t->radius_spread);
+    if (t->axis_ratio > 1.0)
+        row(out, "sections of the phantom", "ratio of the axes of the ellipses, and its standard deviation",
+            "%.2f &plusmn; %.2f", t->axis_ratio, t->axis_ratio_spread);
+    if (t->lumen > 0.0)
+        row(out, "lumens of the phantom", "width over that of the fiber, and its standard deviation",
+            "%.2f &plusmn; %.2f", t->lumen, t->lumen_spread);
+    if (!(t->axis_ratio > 1.0) && !(t->lumen > 0.0))
+        row(out, "sections of the phantom", "those of the scan are neither flat nor hollow", "solid discs");
+}
+
 /* What such a scan can give. */
 static void print_trial(const struct scan_trial *t, FILE *out)
 {
     if (!t->made) return;
     open_table(out, "What this scan can give");
-    row(out, "length found again", "of a phantom of these fibers with the noise and blur of the scan", "%.1f %%",
-        100.0 * t->recall);
+    row(out, "length found again", "of a phantom of these fibers with the noise and blur of the scan",
+        "%.1f %% &plusmn; %.1f", 100.0 * t->recall, 100.0 * (isfinite(t->recall_se) ? t->recall_se : 0.0));
     row(out, "axes", "root mean square distance from the true ones", "%.2f voxels", t->axis_rms_voxel);
-    row(out, "pieces of a fiber", "1: no fiber is broken", "%.2f", t->fragments);
+    row(out, "pieces of a fiber", "1: no fiber is broken", "%.2f &plusmn; %.2f", t->fragments,
+        isfinite(t->fragments_se) ? t->fragments_se : 0.0);
     row(out, "merges", "joins of different fibers, per fiber", "%.3f", t->merges);
     row(out, "radius of a fiber", "mean error, and root mean square", "%+.1f %%, %.1f %%", 100.0 * t->radius_bias,
         100.0 * t->radius_rms);
     row(out, "directions of voxels", "mean error, and what 95 % stay below", "%.1f&deg;, %.1f&deg;",
         t->voxel_direction_mean_deg, t->voxel_direction_p95_deg);
+    if (isfinite(t->lumen_rms))
+        row(out, "width of a lumen", "root mean square error, over the width of the fiber", "%.3f", t->lumen_rms);
+    print_trial_fibers(t, out);
     row(out, "noise of the phantom", "signal-to-noise, and the blur that correlates it", "%.1f, %.2f voxels", t->snr,
         t->noise_sd_voxel);
     row(out, "blur of the phantom", "standard deviation", "%.2f voxels", t->blur_sd_voxel);

@@ -38,6 +38,8 @@ def test_geometry_alone_and_a_job_that_goes_on_from_it(real, scan):
     assert made["geometry"]["n_fiber"] > 20 and made["geometry"]["grade"]["verdict"] == "resolved" and made["geometry"]["from_job"] is None
     trial = made["geometry"]["trial"]
     assert trial["recall"] > 0.9 and trial["axis_rms_voxel"] < 0.5 and trial["n_true"] == made["geometry"]["n_fiber"]
+    assert trial["axis_ratio"] == 1 and trial["lumen"] == trial["lumen_spread"] == 0 and trial["lumen_rms"] is None and 0 <= trial["radius_spread"] < 0.1
+    assert 0 <= trial["recall_error"] < 0.05 and 0 <= trial["fragments_error"] < 0.2
     assert 3 < trial["signal_to_noise"] < 8 and trial["noise_sd_voxel"] < 0.4 and 0.4 < trial["blur_sd_voxel"] < 1.0
     done = {s["name"]: s["wall_s"] for s in made["stages"]}
     assert done["directions"] is not None and done["scene"] is None and done["fit"] is None

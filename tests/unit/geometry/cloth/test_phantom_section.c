@@ -322,6 +322,44 @@ static void test_sections_along_a_fiber(void **state)
     fiber_set_release(&f);
 }
 
+/* Sections that the fibers state give the scan of the law that made them, also where they turn and radii vary. Shapes
+ * are stored in single precision: an angle is off by up to 1e-7, and so is a share. */
+static void test_own_sections(void **state)
+{
+    (void)state;
+    struct phantom_scan_option o;
+    struct fiber_set f = straight_fiber(6.0);
+    phantom_scan_option_default(&o);
+    o.voxel_size_m = voxel_m;
+    o.snr = 0.0;
+    o.section = (struct phantom_section_law){.seed = 5, .lumen = 0.5, .aspect = 2.5, .turns_per_m = 2e3, .taper = 0.3};
+    assert_int_equal(phantom_section_shapes(&o.section, &f, NULL), STATUS_OK);
+    struct volume by_law = scan_of(&f, &o);
+    o.section = (struct phantom_section_law){0};
+    struct volume disc = scan_of(&f, &o);
+    o.own_sections = true;
+    struct volume own = scan_of(&f, &o);
+    double most = 0.0, most_disc = 0.0;
+    for (size_t i = 0; i < volume_n_voxel(n_voxel); i++) {
+        most = fmax(most, fabs((double)own.density[i] - (double)by_law.density[i]));
+        most_disc = fmax(most_disc, fabs((double)disc.density[i] - (double)by_law.density[i]));
+    }
+    print_message("largest difference %.2g, of a disc %.2g\n", most, most_disc);
+    assert_true(most < 1e-5 && most_disc > 0.5);
+    free(f.shape); /* fibers without sections are discs */
+    f.shape = NULL;
+    struct volume none = scan_of(&f, &o);
+    o.own_sections = false;
+    struct volume as_ever = scan_of(&f, &o);
+    assert_memory_equal(none.density, as_ever.density, volume_n_voxel(n_voxel) * sizeof *none.density);
+    volume_release(&by_law);
+    volume_release(&disc);
+    volume_release(&own);
+    volume_release(&none);
+    volume_release(&as_ever);
+    fiber_set_release(&f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -332,6 +370,7 @@ int main(void)
         cmocka_unit_test(test_hardening_and_fringes),
         cmocka_unit_test(test_radii_spread),
         cmocka_unit_test(test_sections_along_a_fiber),
+        cmocka_unit_test(test_own_sections),
         cmocka_unit_test(test_lumens_of_single_fibers),
         cmocka_unit_test(test_wrong_options_are_named),
         cmocka_unit_test_setup_teardown(test_table_of_sections, scratch_folder_setup, scratch_folder_teardown),
