@@ -52,6 +52,8 @@ static const struct cli_option {
      offsetof(struct cli_args, filter)},
     {OPT_PICTURE, 0, "speckle", NULL, "the speckle of single fibers, of models of waves",
      offsetof(struct cli_args, speckle)},
+    {OPT_PICTURE, 0, "field-by-pixel", NULL, "near fields of fibers become far fields in wide pixels: less noise",
+     offsetof(struct cli_args, field_by_pixel)},
     {OPT_PICTURE, 0, "ground-gap-mm", "MM", "a plane with the shadow, so far under the cloth (default: none)",
      offsetof(struct cli_args, ground_gap_mm)},
     {OPT_PICTURE, 0, "width-mm", "MM", "width of what it shows (default: 40)", offsetof(struct cli_args, width_mm)},

@@ -67,6 +67,7 @@ struct cli_args {
     bool reference; /* --reference: of a picture */
     bool filter;    /* --filter: of a picture */
     bool speckle;   /* --speckle: likewise */
+    bool field_by_pixel;
     const char *ground_gap_mm;
     const char *lamp_sharpness;
     bool help; /* --help was given: for one command if has_command is set */

@@ -74,6 +74,7 @@ static status read_picture(const struct cli_args *a, json_t *picture, const char
     if (a->deep_light != NULL) json_object_set_new(picture, "deep_light", json_string(a->deep_light));
     if (a->reference) json_object_set_new(picture, "reference", json_true());
     if (a->speckle) json_object_set_new(picture, "speckle", json_true());
+    if (a->field_by_pixel) json_object_set_new(picture, "field_by_pixel", json_true());
     if (a->filter) json_object_set_new(picture, "filter", json_true());
     bool yes;
     if (s == STATUS_OK) s = read_yes("black-sheet", a->black_sheet, &yes, err);

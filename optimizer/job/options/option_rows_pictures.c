@@ -155,6 +155,16 @@ const struct job_option option_rows_pictures[] = {
          "Whether each fiber has a random pattern of bright and dark directions of its own, as light has from rough "
          "fibers. It has the mean 1 and the seed `fit.seed`, and is for pictures alone: fits have none. Needs "
          "method `path` and models with it: those of waves, `wave_silk.v1` and its like (docs/bent-cloth.md)."},
+    {.path = "pictures[].field_by_pixel",
+     .kind = OPTION_BOOL,
+     OF_PICTURE(field_by_pixel),
+     .standard = "false",
+     .meaning =
+         "Of `fur_near.v1` and `dielectric_near.v1`: whether the picture takes the far field, the mean over the width "
+         "of "
+         "a fiber (`fur.v1`, `dielectric.v1`), where a pixel is at least as wide as a fiber. It has less noise then, "
+         "and "
+         "another mean in dense cloths (docs/bent-cloth.md). `model` of the result names the model that is shown."},
     {.path = "pictures[].reference",
      .kind = OPTION_BOOL,
      OF_PICTURE(reference),

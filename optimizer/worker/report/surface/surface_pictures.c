@@ -7,6 +7,7 @@
 #include "optimizer/worker/report/result_thumbnail.h"
 #include "optimizer/worker/report/surface/surface_cloth.h"
 #include "optimizer/worker/report/surface/surface_difference.h"
+#include "optimizer/worker/report/surface/surface_field.h"
 #include "optimizer/worker/report/surface/surface_filter.h"
 #include "optimizer/worker/report/surface/surface_ground.h"
 #include "optimizer/worker/report/surface/surface_passes.h"
@@ -31,7 +32,8 @@ struct one_picture {
     const char *entry_path;
     struct surface_method how;
     const struct surface_tables *tables;
-    const struct surface_ground *ground; /* from render on */
+    const struct surface_ground *ground; /* from render on, and the next */
+    const struct appearance *model;      /* that is shown */
 };
 
 static double paths_of(const struct job_surface_picture *p)
@@ -88,9 +90,9 @@ static json_t *picture_json(const struct one_picture *one, const struct job_surf
     char file[80];
     json_t *mean, *noise = noise_json(so_far, &mean);
     snprintf(file, sizeof file, "pictures/%s.exr", so_far->name);
-    return json_pack("{s:s, s:s, s:s, s:I, s:o, s:o, s:o}", "file", file, "on", surface_name[p->on], "method",
-                     method_name[one->how.method], "samples", (json_int_t)so_far->n_sample, "mean", mean, "noise",
-                     noise, "png_exposure", json_number(exposure));
+    return json_pack("{s:s, s:s, s:s, s:s, s:I, s:o, s:o, s:o}", "file", file, "on", surface_name[p->on], "method",
+                     method_name[one->how.method], "model", one->model->id, "samples", (json_int_t)so_far->n_sample,
+                     "mean", mean, "noise", noise, "png_exposure", json_number(exposure));
 }
 
 /* The path-traced picture beside one by tables, and how far they are apart. */
@@ -228,6 +230,8 @@ static status render(struct pipeline_context *c, const struct one_picture *one, 
     const struct pipeline_model *model = &c->model[pipeline_best_model(c)];
     bool traced = one->how.method == JOB_PICTURE_PATH, compared = p->reference && !traced;
     struct surface_cloth cloth;
+    struct appearance far;
+    const struct appearance *shown = surface_field_model(c, one->i, &model->appearance, &far);
     struct configuration view = observation_configuration(
         c->doc, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg, p->camera_phi_deg, p->cloth_rotation_deg);
     view.crop_m = mm * p->width_mm;
@@ -241,7 +245,7 @@ static status render(struct pipeline_context *c, const struct one_picture *one, 
     status s = surface_cloth_init(c, one->i, fibers, &cloth, err);
     struct render_request q = {
         .input = {.scene = {.fibers = cloth.fibers, .volume = cloth.volume.bent != NULL ? &cloth.volume : NULL},
-                  .model = &model->appearance,
+                  .model = shown,
                   .param = model->fit.param,
                   .n_set = model->sets.n_set,
                   .discrepancy = traced ? pipeline_discrepancy(model) : NULL,
@@ -261,6 +265,7 @@ static status render(struct pipeline_context *c, const struct one_picture *one, 
     struct surface_ground ground = {0};
     struct one_picture with = *one;
     with.ground = &ground;
+    with.model = shown;
     if (s == STATUS_OK) s = surface_ground_init(c, one->i, &q, &first, &ground, err);
     if (s == STATUS_OK) s = render_picture(c, &with, &q, &first, so_far, entry, err);
     first = progress_begin_part(&part, progress, 0.5, 0.5);
