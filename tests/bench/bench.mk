@@ -28,7 +28,7 @@ bench-recovery: | deps-test ## whether a fit of each surface model finds its own
 	@$(BUILD)/tests/bench/models/bench_recovery $(BUILD)/bench-recovery $(MODELS)
 
 # FABRICS: some of the tables only, such as FABRICS=merl-blue-fabric. TABLES: a folder of other tables
-bench-model-tables: | deps-test ## all models fitted to the measured tables, on one cloth (more than an hour on 2 quiet cores; jobs are kept in build)
+bench-model-tables: | deps-test ## all models fitted to the measured tables, on one cloth (40 minutes on 2 quiet cores; jobs are kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/models/bench_model_tables.py --build $(BUILD) $(if $(TABLES),--tables $(TABLES)) $(FABRICS)
 

@@ -61,6 +61,11 @@ def by_kind(rows):
     return ", ".join(text)
 
 
+def with_se(model, what):
+    """The noise of the renderings is taken off, so an error may come out as 0; its standard error tells what that is worth."""
+    return f"{model[what]:.4f} +- {model[what + '_se']:.4f}"
+
+
 def bench_table(arguments, table):
     sample = os.path.splitext(os.path.basename(table))[0]
     document = {"sample": sample, "cloth": FELT if "felt" in sample else WEAVE, "measurements": {"file": os.path.basename(table)},
@@ -73,11 +78,11 @@ def bench_table(arguments, table):
     print(f"{sample}: {seconds:.0f} s; plain BRDF {brdf['fit_rel_rms']:.4f} fitted, {brdf['heldout_rel_rms']:.4f} held out; held-out rows: "
           + ", ".join(f"{name}: {sum(r['set'] == 'held-out' and kind(r) == name for r in result['rows'])}" for name in KINDS), file=sys.stderr)
     for model in result["models"]:
-        figure(f"models.real.{sample}.{model['id']}.fit_rel_rms", model["fit_rel_rms"], "1")
-        figure(f"models.real.{sample}.{model['id']}.heldout_rel_rms", model["heldout_rel_rms"], "1")
+        for what in ("fit_rel_rms", "heldout_rel_rms"):
+            figure(f"models.real.{sample}.{model['id']}.{what}", model[what], "1")
         rows = [{**a, **b} for a, b in zip(result["rows"], model["rows"])]
-        print(f"  {model['id']:26} fitted {model['fit_rel_rms']:.4f}, held out {model['heldout_rel_rms']:.4f}, "
-              f"{'converged' if model['converged'] else 'not converged'}; {by_kind(rows)}", file=sys.stderr)
+        print(f"  {model['id']:26} fitted {with_se(model, 'fit_rel_rms')}, "
+              f"held out {with_se(model, 'heldout_rel_rms')}, {'converged' if model['converged'] else 'not converged'}; {by_kind(rows)}", file=sys.stderr)
 
 
 def main():
@@ -85,7 +90,7 @@ def main():
     parser.add_argument("--build", default="build")
     parser.add_argument("--keep", default=None, help="default: bench-model-tables in the build folder")
     parser.add_argument("--tables", default=os.path.join(DATA, "measured-reflectance-dense"))
-    parser.add_argument("--path-budget", type=int, default=2000000, help="of each model's fit")
+    parser.add_argument("--path-budget", type=int, default=1000000, help="of each model's fit")
     parser.add_argument("what", nargs="*", metavar="SAMPLE")
     arguments = parser.parse_args()
     arguments.build = os.path.join(ROOT, arguments.build)
