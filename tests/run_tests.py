@@ -25,7 +25,8 @@ CHECKS = ["layers", "format-check", "columns", "lint-c", "lint-javascript", "lin
 SLOW_CHECKS = ["clang", "tsan-requests"]
 # unit tests that take more than 4 s of a core, which the inner loop leaves to `make test`
 LONG_UNIT_TESTS = ["unit/renderer/test_scattering", "unit/renderer/fast/test_precompute_journal", "unit/renderer/preview/test_joint_filter",
-                   "unit/renderer/dual/test_dual_scattering", "unit/geometry/test_lumen_fill", "unit/renderer/fast/test_deep_light",
+                   "unit/renderer/dual/test_dual_scattering", "unit/geometry/test_lumen_fill", "unit/geometry/test_lumen_refill",
+                   "unit/renderer/fast/test_deep_light",
                    "unit/geometry/mesh/test_drape", "unit/renderer/fast/test_fast_tables", "unit/geometry/fibers/test_shape_measure",
                    "unit/geometry/weave/test_weave_detect", "unit/renderer/preview/test_sheared_filter", "unit/optimizer/worker/test_hair_fit",
                    "unit/geometry/volume/test_slice_tiles", "unit/renderer/fast/test_gaussian_light", "unit/geometry/test_alignment",
