@@ -153,7 +153,7 @@ docs-columns: | deps-test ## draw docs/images/cylinder-columns.svg anew: column 
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/pictures/cylinder_columns.py --build $(BUILD) --out docs/images/cylinder-columns.svg
 
-docs-fabrics: | deps-test ## make docs/images/six-fabrics.png anew: the fabrics of Table 5.3 on a cylinder and draped (8 minutes on one core; kept in build)
+docs-fabrics: | deps-test ## make docs/images/six-fabrics.png anew: the fabrics of Table 5.3 on a cylinder and draped (15 minutes on two cores; kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/pictures/six_fabrics.py --build $(BUILD) --out docs/images/six-fabrics.png
 

@@ -1,9 +1,10 @@
-"""The six fabrics of the fabric thesis on a cylinder and draped: six_fabrics.py --build DIR --out PICTURE.png [--px N] [--samples N]
+"""The six fabrics of the fabric thesis on a cylinder and draped: six_fabrics.py --build DIR --out PICTURE.png [--px N] [--share S]
 
 Scattering parameters are those of Table 5.3 (fibers, two_lobe.v1). The thesis' scans are not public, so each cloth is a
 described one of the same kind of weave: the pictures show how the published parameters look on such cloths, not the
 samples of the thesis. Each fabric is a job of its own, run by the worker in DIR/six-fabrics; a picture that is finished
-there is not rendered again. NAME ...: these fabrics only, and no contact sheet.
+there is not rendered again. Samples of a pixel are as many as the fabric needs (SAMPLES), or the share S of these for a
+quick look. NAME ...: these fabrics only, and no contact sheet.
 """
 import argparse
 import json
@@ -37,6 +38,8 @@ FABRIC = {
                 "yarns": [yarn(40, 7, twist_per_m=700, hairs_per_mm=9, hair_length_um=500)]},
                [0.989, 0.959, 0.874], [0.999, 0.999, 0.999], 1.0, 27.197, 38.269),
 }
+# Lobes of one or two degrees meet the camera from few fibers, which takes many samples.
+SAMPLES = {"fleece": 300, "gabardine": 250, "silk": 600, "velvet": 600, "twill": 500, "cotton": 600}
 LIGHT = {"light_theta_deg": 50, "light_phi_deg": 0, "camera_theta_deg": 0, "camera_phi_deg": 0}
 VIEW = [{"on": "cylinder", "radius_mm": 15, "size_mm": 40, "width_mm": 32, "wrap_deg": 200, **LIGHT},
         {"on": "drape", "radius_mm": 10, "size_mm": 40, "width_mm": 36, **LIGHT, "light_phi_deg": 200, "camera_theta_deg": 55, "camera_phi_deg": 250}]
@@ -68,10 +71,10 @@ def main():
     p.add_argument("--build", required=True)
     p.add_argument("--out")
     p.add_argument("--px", type=int, default=144)
-    p.add_argument("--samples", type=int, default=40)
+    p.add_argument("--share", type=float, default=1)
     p.add_argument("names", nargs="*")
     a = p.parse_args()
-    shown = [render(a.build, name, a.px, a.samples) for name in a.names or FABRIC]
+    shown = [render(a.build, name, a.px, max(1, round(a.share * SAMPLES[name]))) for name in a.names or FABRIC]
     if a.out:
         write_png(a.out, compose([[pictures[k] for pictures in shown] for k in range(len(VIEW))], a.px))
 
