@@ -120,9 +120,10 @@ status reconstruct_read(const char *const *path, size_t n_path, struct reconstru
 status reconstruct_lumens(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
                           struct reconstruct_report *report, struct error *err);
 /* The part after it, where anything was filled: traces fibers, and where their diameters differ fills their inner parts
- * as well. Otherwise v stays as it is. Errors as before. */
+ * as well. Otherwise v stays as it is. progress may be NULL; only its cancellation is heeded. Errors as before. */
 status reconstruct_refill_lumens(struct volume *v, const struct reconstruct_option *o, struct thread_pool *pool,
-                                 const struct reconstruct_report *report, struct error *err);
+                                 const struct progress *progress, const struct reconstruct_report *report,
+                                 struct error *err);
 
 /* Step "orientation": computes directions d from v by the line filter (orientation/line_filter.h), which starts from
  * the structure tensor and refines J locally. STATUS_INVALID when no voxel is kept: field OPTION_FILTER_DENSITY if

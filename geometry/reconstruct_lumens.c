@@ -27,15 +27,25 @@ static status fill_enclosed(struct volume *v, double diameter_voxel, struct thre
     return s;
 }
 
+/* What is traced, and how. Its progress only tells of a cancellation. */
+struct refill {
+    struct volume *v;
+    const struct reconstruct_option *o;
+    struct thread_pool *pool;
+    struct progress progress;
+    uint8_t *mark; /* of the voxels: ENCLOSED where void was enclosed */
+};
+
 /* Traces lines in the volume as it is filled. report: a copy. None where voxels would be interpolated, or where nothing
  * looks like a fiber. */
-static status trace_filled(const struct volume *v, const struct reconstruct_option *o, struct thread_pool *pool,
-                           struct reconstruct_report *report, struct polyline_set *lines, struct error *err)
+static status trace_filled(const struct refill *r, struct reconstruct_report *report, struct polyline_set *lines,
+                           struct error *err)
 {
-    struct reconstruct_option option = *o;
+    struct reconstruct_option option = *r->o;
     struct direction_volume d = {0};
-    struct trace_job job = {.v = v, .d = &d, .o = &option, .pool = pool, .report = report};
-    status s = reconstruct_orientation(v, &option, pool, NULL, &d, report, err);
+    struct trace_job job = {
+        .v = r->v, .d = &d, .o = &option, .pool = r->pool, .report = report, .part = {.outer = &r->progress}};
+    status s = reconstruct_orientation(r->v, &option, r->pool, &r->progress, &d, report, err);
     if (s == STATUS_OK && report->trace_edge_voxel >= 1.0) {
         trace_job_start(&job);
         s = trace_scan(&job, false, lines, err);
@@ -44,22 +54,23 @@ static status trace_filled(const struct volume *v, const struct reconstruct_opti
     return s == STATUS_INVALID ? STATUS_OK : s;
 }
 
-/* Fills the inner parts of traced fibers besides the void that was enclosed. mark: ENCLOSED there. *again: whether the
- * diameters of the fibers differ, so that lines were found that the next tracing may improve. */
-static status refill_once(struct volume *v, const struct reconstruct_option *o, struct thread_pool *pool,
-                          const struct reconstruct_report *report, uint8_t *mark, bool *again, struct error *err)
+/* Fills the inner parts of traced fibers besides the void that was enclosed. *again: whether the diameters of the
+ * fibers differ, so that lines were found that the next tracing may improve. */
+static status refill_once(const struct refill *r, const struct reconstruct_report *report, bool *again,
+                          struct error *err)
 {
+    uint8_t *mark = r->mark;
     struct reconstruct_report look = *report;
     struct polyline_set lines;
     polyline_set_init(&lines);
     look.radius_spread = 0.0;
-    status s = trace_filled(v, o, pool, &look, &lines, err);
+    status s = trace_filled(r, &look, &lines, err);
     *again = s == STATUS_OK && lines.n_line > 0 && look.radius_spread >= TRACE_LEAST_SPREAD &&
              look.radius_spread <= TRACE_MOST_SPREAD;
     if (*again) {
-        for (size_t i = 0; i < volume_n_voxel(v->n); i++) mark[i] = mark[i] == ENCLOSED ? ENCLOSED : 0;
-        trace_mark_cores(&lines, look.fiber_diameter_voxel, v->n, CORE, mark);
-        s = volume_fill_marked(v, mark, ENCLOSED, err);
+        for (size_t i = 0; i < volume_n_voxel(r->v->n); i++) mark[i] = mark[i] == ENCLOSED ? ENCLOSED : 0;
+        trace_mark_cores(&lines, look.fiber_diameter_voxel, r->v->n, CORE, mark);
+        s = volume_fill_marked(r->v, mark, ENCLOSED, err);
     }
     polyline_set_release(&lines);
     return s;
@@ -77,7 +88,8 @@ status reconstruct_lumens(struct volume *v, struct reconstruct_option *o, struct
 }
 
 status reconstruct_refill_lumens(struct volume *v, const struct reconstruct_option *o, struct thread_pool *pool,
-                                 const struct reconstruct_report *report, struct error *err)
+                                 const struct progress *progress, const struct reconstruct_report *report,
+                                 struct error *err)
 {
     void *mark = NULL;
     bool again = true;
@@ -86,8 +98,8 @@ status reconstruct_refill_lumens(struct volume *v, const struct reconstruct_opti
     if (s != STATUS_OK) return s;
     memset(mark, 0, volume_n_voxel(v->n));
     for (size_t i = 0; i < v->filled.n; i++) ((uint8_t *)mark)[v->filled.voxel[i]] = ENCLOSED;
-    for (int round = 0; round < N_REFILL && again && s == STATUS_OK; round++)
-        s = refill_once(v, o, pool, report, mark, &again, err);
+    const struct refill r = {.v = v, .o = o, .pool = pool, .progress = progress_silent(progress), .mark = mark};
+    for (int round = 0; round < N_REFILL && again && s == STATUS_OK; round++) s = refill_once(&r, report, &again, err);
     scratch_release(v->space, mark);
     return s;
 }

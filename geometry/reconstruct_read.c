@@ -232,7 +232,7 @@ static void state_trim(const struct plan *p, struct reconstruct_option *o, struc
 }
 
 static status map_densities(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
-                            struct reconstruct_report *report, struct error *err)
+                            const struct progress *progress, struct reconstruct_report *report, struct error *err)
 {
     struct density_modes m;
     status s = density_modes_find(v, &m, err);
@@ -258,7 +258,7 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
     report->density_high = o->density_high;
     report->separability = m.separability;
     s = reconstruct_lumens(v, o, pool, report, err);
-    if (s == STATUS_OK) s = reconstruct_refill_lumens(v, o, pool, report, err);
+    if (s == STATUS_OK) s = reconstruct_refill_lumens(v, o, pool, progress, report, err);
     if (s != STATUS_OK) return s;
     seam_density_measure(v, &report->seam_density);
     return STATUS_OK;
@@ -300,7 +300,7 @@ status reconstruct_read(const char *const *path, size_t n_path, struct reconstru
     }
     if (s == STATUS_OK) s = choose_crop(v, o, pool, NULL, report, err);
     if (s == STATUS_OK && p.trimmed) state_trim(&p, o, &report->tile);
-    if (s == STATUS_OK) s = map_densities(v, o, pool, report, err);
+    if (s == STATUS_OK) s = map_densities(v, o, pool, progress, report, err);
     if (s != STATUS_OK) goto out;
     memcpy(report->n, v->n, sizeof report->n);
     memcpy(report->voxel_size_m, v->voxel_size_m, sizeof report->voxel_size_m);

@@ -184,11 +184,11 @@ const struct job_option option_rows_cloth[] = {
      .kind = OPTION_BOOL,
      INTO(trial),
      .standard = "false",
-     .meaning = "`true`: the traced fibers, with their sections and lumens, are drawn as a scan with the noise and the "
-                "blur of "
-                "this one, which is reconstructed and compared with them; the result states what such a scan can give. "
-                "Takes as long as tracing again, at most "
-                "a minute or two (16.8 million voxels from the middle of the scan are tried)."},
+     .meaning =
+         "`true`: the traced fibers, with their sections and lumens, are drawn as a scan with the noise and the blur "
+         "of this one, which is reconstructed and compared with them; the result states what such a scan can give. "
+         "Takes as long as tracing again, at most a minute or two (16.8 million voxels from the middle of the scan "
+         "are tried)."},
     {.path = "volume.density_low",
      .kind = OPTION_NUMBER,
      .id = OPTION_DENSITY_LOW,

@@ -160,11 +160,10 @@ const struct job_option option_rows_pictures[] = {
      OF_PICTURE(field_by_pixel),
      .standard = "false",
      .meaning =
-         "Of `fur_near.v1` and `dielectric_near.v1`: whether the picture takes the far field, the mean over the width "
-         "of "
-         "a fiber (`fur.v1`, `dielectric.v1`), where a pixel is at least as wide as a fiber. It has less noise then, "
-         "and "
-         "another mean in dense cloths (docs/bent-cloth.md). `model` of the result names the model that is shown."},
+         "Of `fur_near.v1` and `dielectric_near.v1`: whether the picture takes the far field, the mean over the "
+         "width of a fiber (`fur.v1`, `dielectric.v1`), where a pixel is at least as wide as a fiber. It has less "
+         "noise then, and another mean in dense cloths (docs/bent-cloth.md). `model` of the result names the model "
+         "that is shown."},
     {.path = "pictures[].reference",
      .kind = OPTION_BOOL,
      OF_PICTURE(reference),

@@ -48,7 +48,7 @@ static status reconstruct(struct phantom_reconstruction *r, struct thread_pool *
     if (s == STATUS_OK)
         s = scan_densities_map(&r->v, m.low, m.high, r->option.fiber_diameter_voxel, pool, &r->report.noise, err);
     if (s == STATUS_OK) s = reconstruct_lumens(&r->v, &r->option, pool, &r->report, err);
-    if (s == STATUS_OK) s = reconstruct_refill_lumens(&r->v, &r->option, pool, &r->report, err);
+    if (s == STATUS_OK) s = reconstruct_refill_lumens(&r->v, &r->option, pool, NULL, &r->report, err);
     if (s == STATUS_OK) s = reconstruct_orientation(&r->v, &r->option, pool, NULL, &d, &r->report, err);
     if (s == STATUS_OK) s = compare(r, &d, pool, &r->filtered, err);
     if (s == STATUS_OK) s = reconstruct_fibers(&r->v, &d, &r->option, pool, NULL, &r->found, &r->report, err);

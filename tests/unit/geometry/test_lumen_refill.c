@@ -104,7 +104,11 @@ static bool fill_plain(double radius_spread, double *before, double *after)
     float *density = malloc(n_byte);
     assert_non_null(density);
     memcpy(density, v.density, n_byte);
-    assert_int_equal(reconstruct_refill_lumens(&v, &option, pool, &report, NULL), STATUS_OK);
+    atomic_bool stop = true;
+    const struct progress cancelled = {.cancel = &stop};
+    assert_int_equal(reconstruct_refill_lumens(&v, &option, pool, &cancelled, &report, NULL), STATUS_CANCELLED);
+    assert_memory_equal(density, v.density, n_byte);
+    assert_int_equal(reconstruct_refill_lumens(&v, &option, pool, NULL, &report, NULL), STATUS_OK);
     *after = filled_share(&truth, &v);
     const bool changed = memcmp(density, v.density, n_byte) != 0;
     for (size_t i = 0; i < v.filled.n; i++) assert_true(v.density[v.filled.voxel[i]] == 1.0f);
