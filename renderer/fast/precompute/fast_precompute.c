@@ -1,4 +1,5 @@
 #include "renderer/fast/precompute/fast_precompute.h"
+#include "base/files/durable.h"
 #include "renderer/fast/precompute/precompute_parts.h"
 #include "renderer/fast/sphere_harmonics.h"
 #include "renderer/scene/scene_place.h"
@@ -41,6 +42,19 @@ uint64_t fast_tables_checksum(const struct fast_precompute_request *q)
     h = add_bytes(h, r.param, r.n_set * r.model->n_param * sizeof *r.param);
     h = add_bytes(h, number, sizeof number);
     return add_bytes(h, real, sizeof real);
+}
+
+status fast_precompute_kept(const struct fast_precompute_request *q, const char *path, struct fast_tables *t,
+                            struct error *err)
+{
+    status s = fast_tables_read(t, path, err);
+    if (s != STATUS_OK || t->checksum == fast_tables_checksum(q)) return s;
+    s = error_set(err, STATUS_CONFLICT,
+                  "cannot use tables '%s': they were made for another cloth, other scattering parameters or other "
+                  "settings (%u segments, %u hits before deep light; wanted: %zu, %u, and the same paths and cells)",
+                  path_file_name(path), t->n_segment, t->deep.n_traced, scene_n_segment(q->scene), q->deep_traced);
+    fast_tables_release(t);
+    return s;
 }
 
 static status check(const struct fast_precompute_request *q, struct error *err)

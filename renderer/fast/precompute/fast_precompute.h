@@ -32,6 +32,12 @@ struct fast_precompute_request {
 /* A number that differs for another cloth, other parameters, or another request. */
 uint64_t fast_tables_checksum(const struct fast_precompute_request *q);
 
+/* Reads the file of the tables that an earlier call made for the same request. STATUS_CONFLICT: they were made for
+ * another cloth, other parameters or another request; besides what fast_tables_read returns. t: nothing to release on
+ * failure. */
+status fast_precompute_kept(const struct fast_precompute_request *q, const char *path, struct fast_tables *t,
+                            struct error *err);
+
 /* STATUS_INVALID, field "model": a model that distinguishes directions around the fiber; a bent scene; what
  * parameter_sets_init refuses. STATUS_CANCELLED, STATUS_NO_MEMORY; of the journal STATUS_IO, STATUS_DISK_FULL. t:
  * nothing to release on failure. */

@@ -19,7 +19,7 @@
  *                [--tables FOLDER] [--deep HITS] [--deep-edge N] [--deep-paths N] [--cells-too]
  *                [--png FOLDER] [--px N] [--path-samples N] [--fast-samples N]
  *                [--no-flat] [--no-drape] [--no-visibility] [--dual DENSITY (in place of the fast renderer)]
- *   --tables     keeps the tables there, and takes those that are there, whatever the other options say
+ *   --tables     keeps the tables there, and takes those that are there; refuses those of other cloths or options
  *   --fields     along each side of the picture, 16 by default
  *   --wide       also samples fields of 0.56, 1.1 and 2.3 mm; to standard error
  *   --png        writes pictures of the drape of px x px pixels, which serve for nothing else
@@ -114,16 +114,7 @@ static void make_tables(struct bench *b)
     struct error err = {0};
     char path[512] = "/tmp/selvedge-tables-XXXXXX";
     struct stat info;
-    if (option.tables != NULL) {
-        snprintf(path, sizeof path, "%s/%s.tables", option.tables, b->fabric->name);
-        if (stat(path, &info) == 0) {
-            check(fast_tables_read(&b->tables, path, &err), &err);
-            return;
-        }
-    } else
-        close(mkstemp(path));
     const uint32_t n_path = option.n_path == 0 && b->fast.deep && !option.cells_too ? 1 : option.n_path;
-    double start = clock_process_s();
     const struct fast_precompute_request q = {.scene = b->flat,
                                               .model = b->model.surface,
                                               .param = b->param,
@@ -134,6 +125,15 @@ static void make_tables(struct bench *b)
                                               .deep_traced = b->fast.deep ? option.deep : 0,
                                               .deep_edge = option.deep_edge,
                                               .deep_paths = option.deep_paths};
+    if (option.tables != NULL) {
+        snprintf(path, sizeof path, "%s/%s.tables", option.tables, b->fabric->name);
+        if (stat(path, &info) == 0) {
+            check(fast_precompute_kept(&q, path, &b->tables, &err), &err);
+            return;
+        }
+    } else
+        close(mkstemp(path));
+    double start = clock_process_s();
     check(fast_precompute(&q, pool, NULL, &b->tables, &err), &err);
     double seconds = clock_process_s() - start;
     const struct fast_tables *t = &b->tables;

@@ -117,12 +117,11 @@ static status get_tables(struct pipeline_context *c, const struct progress *prog
     if (s != STATUS_OK) return s;
     worker_folder_path(c->folder, JOB_FOLDER_WORK, "report/fast.tables", path);
     struct error unread;
-    t->present = fast_tables_read(&t->tables, path, &unread) == STATUS_OK;
-    if (t->present && t->tables.checksum == fast_tables_checksum(&q)) {
+    t->present = fast_precompute_kept(&q, path, &t->tables, &unread) == STATUS_OK;
+    if (t->present) {
         unlink(journal); /* of an attempt that ended after it had written the tables */
         return STATUS_OK;
     }
-    fast_tables_release(&t->tables);
     s = fast_precompute(&q, c->pool, progress, &t->tables, err);
     t->present = s == STATUS_OK;
     if (s == STATUS_OK) s = fast_tables_write(&t->tables, path, err);

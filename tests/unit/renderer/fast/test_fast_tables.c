@@ -313,6 +313,40 @@ static void threads(void **state)
     thread_pool_free(pool);
 }
 
+/* Kept tables are taken for the request that they were made for, and refused for every other one. */
+static void kept(void **state)
+{
+    const char *path = scratch_path(state, "tables");
+    struct fast_tables t;
+    struct error err = {0};
+    double param[SCATTERING_MAX_PARAM];
+    memcpy(param, colored.param, sizeof param);
+    const struct fast_precompute_request made = {.scene = colored.scene,
+                                                 .model = colored.model,
+                                                 .param = param,
+                                                 .n_path = 200,
+                                                 .cell_paths = 6,
+                                                 .no_visibility = true};
+    assert_int_equal(fast_precompute(&made, NULL, NULL, &t, &err), STATUS_OK);
+    assert_int_equal(fast_tables_write(&t, path, &err), STATUS_OK);
+    fast_tables_release(&t);
+    if (fast_precompute_kept(&made, path, &t, &err) != STATUS_OK) fail_msg("%s", err.text);
+    fast_tables_release(&t);
+    struct fast_precompute_request other[4];
+    for (size_t i = 0; i < 4; i++) other[i] = made;
+    other[0].scene = white.scene;
+    other[1].n_path = 201;
+    other[2].deep_traced = 3;
+    other[3].cell_paths = 5;
+    for (size_t i = 0; i < 4; i++) {
+        assert_int_equal(fast_precompute_kept(other + i, path, &t, &err), STATUS_CONFLICT);
+        assert_non_null(strstr(err.text, "'tables'"));
+    }
+    param[0] = nextafter(param[0], 0.0);
+    assert_int_equal(fast_precompute_kept(&made, path, &t, &err), STATUS_CONFLICT);
+    assert_int_equal(fast_precompute_kept(&made, scratch_path(state, "missing"), &t, &err), STATUS_NOT_FOUND);
+}
+
 static void refusals(void **state)
 {
     (void)state;
@@ -357,6 +391,7 @@ int main(void)
         cmocka_unit_test(gaussian_weights),
         cmocka_unit_test_setup_teardown(file_round_trip, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test(threads),
+        cmocka_unit_test_setup_teardown(kept, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test(refusals),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
