@@ -55,6 +55,11 @@ struct reconstruct_option {
 void reconstruct_option_default(struct reconstruct_option *o);
 
 /* What is reported with the result, in the units named. */
+/* Whether the fibers are hollow. LUMENS_UNKNOWN: none were seen, and the scan would not show them. */
+enum lumen_answer { LUMENS_GIVEN, LUMENS_FILLED, LUMENS_DOUBTFUL, LUMENS_NONE, LUMENS_UNKNOWN };
+/* "given", "filled", "possible", "none" or "unknown". */
+const char *lumen_answer_name(enum lumen_answer a);
+
 struct reconstruct_report {
     size_t n[3];
     double voxel_size_m[3];
@@ -72,6 +77,7 @@ struct reconstruct_report {
     double lumen_share;          /* enclosed void that is filled over material; 0 if the fibers are solid */
     bool lumens_found;           /* they were filled because the fibers look hollow */
     struct lumen_evidence lumen; /* whether the fibers look hollow */
+    enum lumen_answer lumens;    /* LUMENS_GIVEN: the job says whether they are */
     bool lumens_measured;        /* each fiber has a lumen of its own with an error (fiber_shape.h) */
     double fiber_diameter_voxel; /* given, or measured from the volume before the filter */
     /* The peak that the measured diameter was preferred to (fiber_diameter.h), and the shares of noise in both; NaN if
@@ -124,6 +130,10 @@ status reconstruct_lumens(struct volume *v, struct reconstruct_option *o, struct
 status reconstruct_refill_lumens(struct volume *v, const struct reconstruct_option *o, struct thread_pool *pool,
                                  const struct progress *progress, const struct reconstruct_report *report,
                                  struct error *err);
+
+/* Changes report->lumens from LUMENS_NONE to LUMENS_UNKNOWN where lumens would not have been seen
+ * (lumen_evidence_would_show), and where the grade is GRADE_UNRESOLVED. v: as it was traced; report: with its grade. */
+void reconstruct_tell_lumens(const struct volume *v, struct reconstruct_report *report);
 
 /* Step "orientation": computes directions d from v by the line filter (orientation/line_filter.h), which starts from
  * the structure tensor and refines J locally. STATUS_INVALID when no voxel is kept: field OPTION_FILTER_DENSITY if

@@ -5,6 +5,7 @@
  * Such fibers look like the background of touching fibers beside those that were filled. Once most others are traced
  * and subtracted (trace_leftover.c), they are seen. Lines are therefore traced here, the inner parts of their fibers
  * are filled, and the step "fibers" traces them again in the volume that results. */
+#include "geometry/grade/scan_noise.h"
 #include "geometry/orientation/diameter/fiber_diameter.h"
 #include "geometry/orientation/lumen/lumen_fill.h"
 #include "geometry/orientation/lumen/lumen_sift.h"
@@ -82,6 +83,10 @@ status reconstruct_lumens(struct volume *v, struct reconstruct_option *o, struct
     report->lumen_share = 0.0;
     status s = lumen_evidence_measure(v, report->noise.mapped_sd, pool, &report->lumen, err);
     report->lumens_found = o->hollow_fibers < 0 && lumen_evidence_judge(&report->lumen) == LUMENS_CLEAR;
+    report->lumens = o->hollow_fibers >= 0                                     ? LUMENS_GIVEN
+                     : report->lumens_found                                    ? LUMENS_FILLED
+                     : lumen_evidence_judge(&report->lumen) == LUMENS_POSSIBLE ? LUMENS_DOUBTFUL
+                                                                               : LUMENS_NONE;
     if (o->hollow_fibers < 0) o->hollow_fibers = report->lumens_found;
     if (s == STATUS_OK && o->hollow_fibers > 0) s = fill_enclosed(v, o->fiber_diameter_voxel, pool, report, err);
     return s;
@@ -102,4 +107,21 @@ status reconstruct_refill_lumens(struct volume *v, const struct reconstruct_opti
     for (int round = 0; round < N_REFILL && again && s == STATUS_OK; round++) s = refill_once(&r, report, &again, err);
     scratch_release(v->space, mark);
     return s;
+}
+
+const char *lumen_answer_name(enum lumen_answer a)
+{
+    static const char *const name[] = {"given", "filled", "possible", "none", "unknown"};
+    return name[a];
+}
+
+void reconstruct_tell_lumens(const struct volume *v, struct reconstruct_report *report)
+{
+    const struct scan_noise *n = &report->noise;
+    const double blur = scan_noise_blur(scan_noise_correlation(v, n->mapped_sd));
+    const double of_scan = sqrt(fmax(0.0, blur * blur - n->smooth_voxel * n->smooth_voxel));
+    if (report->lumens != LUMENS_NONE) return;
+    if (report->grade.verdict == GRADE_UNRESOLVED ||
+        !lumen_evidence_would_show(report->fiber_diameter_voxel, n->scan_sd, of_scan))
+        report->lumens = LUMENS_UNKNOWN;
 }

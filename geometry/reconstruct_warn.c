@@ -114,6 +114,17 @@ static void warn_diameter(const struct warning_sink *warn, const struct reconstr
                      chosen, 100.0 * r->diameter_noise_share);
 }
 
+/* Says that lumens may have been missed. */
+static void warn_unseen_lumens(const struct warning_sink *warn, const struct reconstruct_report *r)
+{
+    if (r->lumens == LUMENS_UNKNOWN && r->grade.verdict != GRADE_UNRESOLVED)
+        warning_send(warn, OPTION_HOLLOW_FIBERS,
+                     "the scan does not tell whether the fibers are hollow: lumens show from 6 voxels a diameter and a "
+                     "signal-to-noise ratio of 3 on, and here it is %.1f voxels and %.1f; where hollow fibers are not "
+                     "seen, their walls are traced: give true if they are hollow, as cotton, and false if they are not",
+                     r->fiber_diameter_voxel, 1.0 / fmax(1e-3, r->noise.scan_sd));
+}
+
 static void warn_grade(const struct warning_sink *warn, const struct scan_grade *g)
 {
     char what[200] = "take them as guesses, and use a volume model, which needs directions and density alone";
@@ -157,6 +168,7 @@ void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fi
             "on, and hardly below 4",
             r->fiber_diameter_voxel);
     warn_grade(warn, &r->grade);
+    warn_unseen_lumens(warn, r);
     if (r->n[0] > 0 && r->dice > 0.0 && r->dice < 0.5)
         warning_send(warn, OPTION_NONE,
                      "fibers: they explain little of the material (Dice %.2f, where 1 is all of it); check the slices",

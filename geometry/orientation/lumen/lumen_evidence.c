@@ -14,6 +14,12 @@ static const float MIDDLE = 0.3f;          /* response in the middle of a fiber 
 static const double LEAST_ENCLOSED = 1e-3; /* share below which there are too few places to look at */
 /* middle_share, and its share of what is enclosed, from which on lumens are possible, and clear. */
 static const double POSSIBLE[2] = {0.001, 0.015}, CLEAR[2] = {0.002, 0.015};
+/* Where lumens show (lumen_evidence_would_show): least diameter in voxels, and largest noise, also where it is
+ * correlated by more than LONG_BLUR voxels. */
+#define SHOWN_DIAMETER 6.0
+#define SHOWN_NOISE 0.36
+#define LONG_BLUR 0.6
+#define LONG_NOISE 0.13
 
 /* A box in the middle of the scan: as it is, and filled. */
 struct evidence_box {
@@ -116,6 +122,11 @@ enum lumen_verdict lumen_evidence_judge(const struct lumen_evidence *e)
     const double middle = e->middle_share, of_enclosed = middle / fmax(e->enclosed_share, 1e-12);
     if (middle >= CLEAR[0] && of_enclosed >= CLEAR[1]) return LUMENS_CLEAR;
     return middle >= POSSIBLE[0] && of_enclosed >= POSSIBLE[1] ? LUMENS_POSSIBLE : LUMENS_NOT_SEEN;
+}
+
+bool lumen_evidence_would_show(double diameter_voxel, double noise_sd, double noise_blur_voxel)
+{
+    return diameter_voxel >= SHOWN_DIAMETER && noise_sd <= (noise_blur_voxel > LONG_BLUR ? LONG_NOISE : SHOWN_NOISE);
 }
 
 status lumen_evidence_measure(const struct volume *v, double noise_sd, struct thread_pool *pool,

@@ -10,6 +10,8 @@
 #include "base/thread_pool.h"
 #include "geometry/volume/volume.h"
 
+#include <stdbool.h>
+
 struct lumen_evidence {
     double enclosed_share; /* voxels filled over those of material */
     double width_voxel;    /* of what was filled, if it were round tubes; 0: nothing was */
@@ -22,6 +24,12 @@ struct lumen_evidence {
  * (geometry/NOTES.md). */
 enum lumen_verdict { LUMENS_NOT_SEEN, LUMENS_POSSIBLE, LUMENS_CLEAR };
 enum lumen_verdict lumen_evidence_judge(const struct lumen_evidence *e);
+
+/* Whether the evidence would be clear, or at least possible, if the fibers had lumens of 0.3 of their width or more.
+ * Such lumens were seen in all phantoms of 6 voxels and more whose noise, measured as here, is at most 0.36, or 0.13
+ * where it is correlated by a Gaussian of more than 0.6 voxel (geometry/NOTES.md, "Where lumens are seen"). noise_sd:
+ * of a voxel of the scan, over the step from void to material; noise_blur_voxel: of grade/scan_noise.h. */
+bool lumen_evidence_would_show(double diameter_voxel, double noise_sd, double noise_blur_voxel);
 
 /* v: densities in [0, 1]; noise_sd: of a voxel. At most 160 voxels along each axis are looked at, with 60 MB of memory.
  * STATUS_CANCELLED, STATUS_NO_MEMORY; with a scratch space also STATUS_DISK_FULL. */

@@ -316,6 +316,36 @@ static void test_diameter_of_hollow_fibers(void **state)
     volume_release(&v);
 }
 
+/* A scan that hides lumens does not call hollow fibers solid; one that would show them calls solid fibers so. */
+static void test_lumens_that_cannot_be_seen_are_told(void **state)
+{
+    (void)state;
+    static const struct {
+        struct plain_scan scan;
+        enum lumen_answer expected;
+    } c[] = {{{4, 0.4, 0.0, 2.0, 0.0}, LUMENS_UNKNOWN},
+             {{4, 0.4, 0.2, 2.0, 1.0}, LUMENS_UNKNOWN},
+             {{4, 0.0, 0.0, 2.0, 0.0}, LUMENS_UNKNOWN},
+             {{4, 0.0, 0.2, 3.0, 0.5}, LUMENS_NONE},
+             {{4, 0.4, 0.2, 3.0, 0.5}, LUMENS_FILLED}};
+    for (size_t i = 0; i < sizeof c / sizeof *c; i++) {
+        struct reconstruct_report report;
+        struct fiber_diameter d;
+        struct volume v;
+        look_at_plain(&c[i].scan, &v, &report);
+        assert_int_equal(fiber_diameter_measure(&v, NULL, NULL, &d, NULL), STATUS_OK);
+        report.fiber_diameter_voxel = d.voxel;
+        report.grade.verdict = GRADE_RESOLVED;
+        reconstruct_tell_lumens(&v, &report);
+        print_message("%s\n", lumen_answer_name(report.lumens));
+        assert_int_equal(report.lumens, c[i].expected);
+        report.grade.verdict = GRADE_UNRESOLVED;
+        reconstruct_tell_lumens(&v, &report);
+        assert_int_equal(report.lumens, c[i].expected == LUMENS_NONE ? LUMENS_UNKNOWN : c[i].expected);
+        volume_release(&v);
+    }
+}
+
 /* Lumens in strong noise where radii differ are seen; solid fibers of the same cloth are solid. */
 static void test_lumens_in_noise_are_seen(void **state)
 {
@@ -337,6 +367,6 @@ int main(void)
         cmocka_unit_test(test_hollow_fibers_are_noticed), cmocka_unit_test(test_thin_void_is_outside),
         cmocka_unit_test(test_gaps_are_sifted_out),       cmocka_unit_test(test_lumens_of_thin_fibers),
         cmocka_unit_test(test_smoothing_along_a_fiber),   cmocka_unit_test(test_diameter_of_hollow_fibers),
-        cmocka_unit_test(test_lumens_in_noise_are_seen)};
+        cmocka_unit_test(test_lumens_in_noise_are_seen),  cmocka_unit_test(test_lumens_that_cannot_be_seen_are_told)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -207,6 +207,21 @@ static void test_grade(void **state)
     expect_fibers(&r, 8, 7e-6, NULL);
 }
 
+/* A scan that would not show lumens says so, unless it shows no fibers either. */
+static void test_unseen_lumens(void **state)
+{
+    struct reconstruct_report r = clean_report();
+    (void)state;
+    r.fiber_diameter_voxel = 4.2;
+    r.noise.scan_sd = 0.5;
+    expect_fibers(&r, 8, 7e-6, NULL);
+    r.lumens = LUMENS_UNKNOWN;
+    expect_fibers(&r, 8, 7e-6, "does not tell whether the fibers are hollow");
+    expect_fibers(&r, 8, 7e-6, "here it is 4.2 voxels and 2.0");
+    r.lumens = LUMENS_NONE;
+    expect_fibers(&r, 8, 7e-6, NULL);
+}
+
 /* Lumens that are clear were filled, unless the job says that there are none; faint ones are a question. */
 static void test_lumens(void **state)
 {
@@ -230,9 +245,9 @@ static void test_lumens(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_lumens), cmocka_unit_test(test_spacing),   cmocka_unit_test(test_alignment),
-        cmocka_unit_test(test_crop),   cmocka_unit_test(test_densities), cmocka_unit_test(test_fibers),
-        cmocka_unit_test(test_grade),
+        cmocka_unit_test(test_lumens), cmocka_unit_test(test_spacing),       cmocka_unit_test(test_alignment),
+        cmocka_unit_test(test_crop),   cmocka_unit_test(test_densities),     cmocka_unit_test(test_fibers),
+        cmocka_unit_test(test_grade),  cmocka_unit_test(test_unseen_lumens),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -118,6 +118,8 @@ static void print_scan(const struct pipeline_context *c, FILE *out)
     if (g->noise.smooth_voxel > 0.0)
         row(out, "smoothing of the scan", "standard deviation of the Gaussian, because of the noise", "%.2f voxels",
             g->noise.smooth_voxel);
+    row(out, "lumens", "of hollow fibers; unknown: the scan is too coarse or too noisy to show them", "%s",
+        lumen_answer_name(g->lumens));
     row(out, "separability", "of void and material: 0.64 noise alone, above 0.8 clear", "%.2f", g->separability);
     close_table(out);
 }

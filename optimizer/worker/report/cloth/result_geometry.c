@@ -213,6 +213,7 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "file_voxel_size_um", json_number_list(g->file_voxel_size_m, 3, um));
     set_densities(json, g);
     json_object_set_new(json, "hollow_fibers", json_boolean(g->lumen_share > 0.0));
+    json_object_set_new(json, "lumens", json_string(lumen_answer_name(g->lumens)));
     json_object_set_new(json, "lumen_share", json_number(g->lumen_share));
     json_object_set_new(json, "lumen_evidence", json_number(g->lumen.middle_share));
     json_object_set_new(json, "lumen_enclosed", json_number(g->lumen.enclosed_share));

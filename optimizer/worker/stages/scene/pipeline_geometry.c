@@ -295,6 +295,7 @@ static status grade_fibers(struct pipeline_context *c, struct error *err)
     status s = scan_grade_measure(&c->volume, &c->fiber, c->pool, NULL, &g->grade, safe, err);
     if (s == STATUS_OK && g->grade.verdict == GRADE_UNRESOLVED) s = scan_grade_sort(&c->fiber, safe, &g->grade, err);
     free(safe);
+    if (s == STATUS_OK) reconstruct_tell_lumens(&c->volume, g);
     return s;
 }
 
