@@ -220,6 +220,11 @@ static void test_unseen_lumens(void **state)
     expect_fibers(&r, 8, 7e-6, "here it is 4.2 voxels and 2.0");
     r.lumens = LUMENS_NONE;
     expect_fibers(&r, 8, 7e-6, NULL);
+    r.lumens = LUMENS_UNKNOWN;
+    r.noise.scan_sd = 0.07;
+    expect_fibers(&r, 8, 7e-6, "here it is 4.2 voxels and 14.3");
+    r.fiber_diameter_voxel = 5.2; /* not the walls of wider fibers, and clear */
+    expect_fibers(&r, 8, 7e-6, NULL);
 }
 
 /* Lumens that are clear were filled, unless the job says that there are none; faint ones are a question. */
