@@ -48,15 +48,16 @@ struct cli_args {
     const char *files, *name; /* of a batch */
     const char *cores;        /* --cores: of a plan */
     bool update, keep_jobs, delete_jobs;
-    const char *input_dir; /* --input-dir: the folder of the files that the document names */
-    const char *out_dir;   /* --out */
-    const char *resume_id; /* --resume */
-    const char *id_file;   /* --id-file */
-    const char *voxel_um;  /* --voxel-um */
-    const char *axes;      /* --axes */
-    const char *template;  /* --template */
-    const char *marker;    /* --marker */
-    const char *quiet_s;   /* --quiet */
+    const char *input_dir;               /* --input-dir: the folder of the files that the document names */
+    const char *out_dir;                 /* --out */
+    const char *resume_id;               /* --resume */
+    const char *id_file;                 /* --id-file */
+    const char *voxel_um;                /* --voxel-um */
+    const char *axes;                    /* --axes */
+    const char *hollow, *diameter_voxel; /* --hollow, --diameter-voxel: of a scan */
+    const char *template;                /* --template */
+    const char *marker;                  /* --marker */
+    const char *quiet_s;                 /* --quiet */
     /* of a picture; on: --on, and so forth */
     const char *on, *lamp, *camera, *px, *samples, *width_mm, *size_mm, *radius_mm, *mesh_unit_mm, *wrap_deg, *method,
         *deep_light, *black_sheet, *twin;
@@ -64,6 +65,7 @@ struct cli_args {
     const char *max_age, *max_bytes;                     /* of retention */
     const char *state, *verdict, *tag, *sample, *days;   /* of list */
     bool watch, json, follow, draft, align, once, yes;
+    bool trial;     /* --trial: of a scan */
     bool reference; /* --reference: of a picture */
     bool filter;    /* --filter: of a picture */
     bool speckle;   /* --speckle: likewise */

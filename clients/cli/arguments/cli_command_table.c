@@ -20,7 +20,7 @@ const struct cli_command cli_command_table[CLI_N_COMMAND] = {
          "SCAN is a file (TIFF, .mhd, .mha, .nrrd, .nhdr, .vol) or a folder of TIFF slices. The job ends with the\n"
          "geometry; a later job goes on from it (\"geometry\": {\"job\": ID} in its document). The results go to the\n"
          "folder of --out (default: selvedge-ID).\n",
-         OPT_VOXEL | OPT_AXES | OPT_ALIGN | OPT_OUT | OPT_ID_FILE, "a scan"},
+         OPT_SCAN | OPT_OUT | OPT_ID_FILE, "a scan"},
     [CLI_RENDER] =
         {"render", "ID", "show the cloth of a finished job on a surface, and download the picture",
          "A job of its own renders the job's fibers with the fitted parameters, fiber by fiber. The results go to the\n"

@@ -15,9 +15,7 @@ enum {
     OPT_HELP = 512,
     OPT_VERSION = 1024,
     OPT_ID_FILE = 2048,
-    OPT_VOXEL = 4096,
-    OPT_AXES = 8192,
-    OPT_ALIGN = 16384,
+    OPT_SCAN = 4096, /* each of several */
     OPT_TEMPLATE = 32768,
     OPT_MARKER = 65536,
     OPT_QUIET = 131072,

@@ -115,6 +115,24 @@ static status read_voxel(const char *text, json_t **voxel, struct error *err)
     return STATUS_OK;
 }
 
+/* What the fibers are and what is asked of the scan, into `volume`. */
+static status add_fibers(const struct cli_args *a, json_t *volume, struct error *err)
+{
+    const bool hollow = a->hollow != NULL && strcmp(a->hollow, "yes") == 0;
+    if (a->hollow != NULL && !hollow && strcmp(a->hollow, "no") != 0)
+        return error_set(err, STATUS_INVALID, "option '--hollow' takes yes or no: '%s'", a->hollow);
+    if (a->hollow != NULL) json_object_set_new(volume, "hollow_fibers", json_boolean(hollow));
+    if (a->trial) json_object_set_new(volume, "trial", json_true());
+    if (a->diameter_voxel == NULL) return STATUS_OK;
+    char *end = NULL;
+    const double voxel = strtod(a->diameter_voxel, &end);
+    if (end == a->diameter_voxel || *end != '\0' || !(voxel > 0.0) || !isfinite(voxel))
+        return error_set(err, STATUS_INVALID, "option '--diameter-voxel' takes a number above 0: '%s'",
+                         a->diameter_voxel);
+    json_object_set_new(volume, "fiber_diameter_voxel", json_real(voxel));
+    return STATUS_OK;
+}
+
 static status make_document(const struct cli_args *a, json_t **document, char *folder, size_t n_bytes,
                             struct error *err)
 {
@@ -124,6 +142,7 @@ static status make_document(const struct cli_args *a, json_t **document, char *f
     json_object_set_new(volume, "files", files);
     if (voxel != NULL) json_object_set_new(volume, "voxel_size_um", voxel);
     if (a->axes != NULL) json_object_set_new(volume, "axes", json_string(a->axes));
+    if (s == STATUS_OK) s = add_fibers(a, volume, err);
     if (a->align) {
         json_object_set_new(volume, "align", json_string("auto"));
         json_object_set_new(volume, "crop", json_string("auto"));

@@ -103,9 +103,20 @@ def test_files_of_a_scan(real, tmp_path, name, header, sent):
     assert sorted(f["name"] for f in job["files"]) == sorted(sent), done.stderr
 
 
+def test_what_the_command_line_says_of_fibers(real, tmp_path):
+    """The document of the job has it; the worker refuses the scan."""
+    (tmp_path / "scan.tif").write_bytes(b"II*")
+    reconstruct(real, tmp_path / "scan.tif", "--voxel-um", "2", "--hollow", "no", "--diameter-voxel", "7.5", "--trial", "--id-file", tmp_path / "id")
+    volume = real.get(f"/v1/jobs/{(tmp_path / 'id').read_text().strip()}").json()["document"]["volume"]
+    assert volume["hollow_fibers"] is False and volume["fiber_diameter_voxel"] == 7.5 and volume["trial"] is True
+
+
 @pytest.mark.parametrize("words,text", [
     (["nothing.tif"], "cannot read the scan 'nothing.tif'"), ([".", "--voxel-um", "2"], "has no TIFF files"),
     (["lost.mhd"], "does not name its data file"), *((["scan.tif", "--voxel-um", um], "--voxel-um") for um in ("2,3", "2,,3", "2,", "-2")),
+    (["scan.tif", "--hollow", "maybe"], "'--hollow' takes yes or no: 'maybe'"),
+    (["scan.tif", "--diameter-voxel", "0"], "'--diameter-voxel' takes a number above 0"),
+    (["scan.tif", "--diameter-voxel", "7px"], "'7px'"),
 ])
 def test_command_line_errors(real, tmp_path, monkeypatch, words, text):
     monkeypatch.chdir(tmp_path)
