@@ -112,11 +112,12 @@ struct reconstruct_report {
 /* Memory, or space in files, that all steps together need for a voxel of the scan. */
 enum { SCAN_BYTES_PER_VOXEL = 22 };
 
-/* Step "volume": reads the files, applies axes, matrix and crop, and maps densities to [0, 1]. path: as for
- * volume_source_open_declared. space NULL: memory without a limit. Errors name the file and the option that is
- * wrong: STATUS_FORMAT (incomplete file, pages of different size or depth), STATUS_INVALID (NaN voxels, constant, or
- * empty: nothing above the threshold), STATUS_CANCELLED, STATUS_NO_MEMORY, STATUS_DISK_FULL (scratch space; in all
- * steps), STATUS_TOO_LARGE (the scan needs more than the scratch space may hold, by SCAN_BYTES_PER_VOXEL). */
+/* Step "volume": reads the files, applies axes, matrix and crop, maps densities to [0, 1], and fills enclosed lumens.
+ * Where any were filled, reconstruct_refill_lumens follows. path: as for volume_source_open_declared. space NULL:
+ * memory without a limit. Errors name the file and the option that is wrong: STATUS_FORMAT (incomplete file, pages of
+ * different size or depth), STATUS_INVALID (NaN voxels, constant, or empty: nothing above the threshold),
+ * STATUS_CANCELLED, STATUS_NO_MEMORY, STATUS_DISK_FULL (scratch space; in all steps), STATUS_TOO_LARGE (the scan needs
+ * more than the scratch space may hold, by SCAN_BYTES_PER_VOXEL). */
 status reconstruct_read(const char *const *path, size_t n_path, struct reconstruct_option *o,
                         struct scratch_space *space, struct thread_pool *pool, const struct progress *progress,
                         struct volume *v, struct reconstruct_report *report, struct error *err);
@@ -126,10 +127,9 @@ status reconstruct_read(const char *const *path, size_t n_path, struct reconstru
 status reconstruct_lumens(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
                           struct reconstruct_report *report, struct error *err);
 /* The part after it, where anything was filled: traces fibers, and where their diameters differ fills their inner parts
- * as well. Otherwise v stays as it is. progress may be NULL; only its cancellation is heeded. Errors as before. */
+ * as well. Otherwise v stays as it is. Measures the seams of the volume anew. Errors as before. */
 status reconstruct_refill_lumens(struct volume *v, const struct reconstruct_option *o, struct thread_pool *pool,
-                                 const struct progress *progress, const struct reconstruct_report *report,
-                                 struct error *err);
+                                 const struct progress *progress, struct reconstruct_report *report, struct error *err);
 
 /* Changes report->lumens from LUMENS_NONE to LUMENS_UNKNOWN where lumens would not have been seen
  * (lumen_evidence_would_show), and where the grade is GRADE_UNRESOLVED. v: as it was traced; report: with its grade. */
@@ -148,10 +148,10 @@ status reconstruct_fibers(const struct volume *v, const struct direction_volume 
                           struct reconstruct_report *report, struct error *err);
 
 /* Optional part of the step "fibers": scans a phantom of the fibers f with the noise (its strength and its correlation)
- * and the blur of the scan v, reconstructs it, and writes into report->trial how well f is found again. At most 2^24
- * voxels from the middle of the scan are tried. report: as filled by reconstruct_fibers. The phantom's fibers have the
- * radii, sections and lumens that were measured along f (grade/trial_fibers.h); sections that are no ellipses, such as
- * beans, become ellipses. What cannot be reconstructed is no error: the trial then is not made. */
+ * and the blur of the scan v, reconstructs it, and writes into report->trial how well f is found again. At most
+ * SCAN_TRIAL_VOXELS from the middle of the scan are tried. report: as filled by reconstruct_fibers. The phantom's
+ * fibers have the radii, sections and lumens that were measured along f (grade/trial_fibers.h); sections that are no
+ * ellipses, such as beans, become ellipses. What cannot be reconstructed is no error: the trial then is not made. */
 status reconstruct_trial(const struct volume *v, const struct fiber_set *f, const struct reconstruct_option *option,
                          struct thread_pool *pool, const struct progress *progress, struct reconstruct_report *report,
                          struct error *err);

@@ -28,25 +28,31 @@ static status fill_enclosed(struct volume *v, double diameter_voxel, struct thre
     return s;
 }
 
-/* What is traced, and how. Its progress only tells of a cancellation. */
+/* Share of the time of a tracing that its directions take. */
+static const double orientation_share = 0.4;
+
+/* What is traced, and how. */
 struct refill {
     struct volume *v;
     const struct reconstruct_option *o;
     struct thread_pool *pool;
-    struct progress progress;
-    uint8_t *mark; /* of the voxels: ENCLOSED where void was enclosed */
+    struct progress_part tracing; /* progress of the present tracing */
+    uint8_t *mark;                /* of the voxels: ENCLOSED where void was enclosed */
 };
 
 /* Traces lines in the volume as it is filled. report: a copy. None where voxels would be interpolated, or where nothing
  * looks like a fiber. */
-static status trace_filled(const struct refill *r, struct reconstruct_report *report, struct polyline_set *lines,
+static status trace_filled(struct refill *r, struct reconstruct_report *report, struct polyline_set *lines,
                            struct error *err)
 {
     struct reconstruct_option option = *r->o;
     struct direction_volume d = {0};
-    struct trace_job job = {
-        .v = r->v, .d = &d, .o = &option, .pool = r->pool, .report = report, .part = {.outer = &r->progress}};
-    status s = reconstruct_orientation(r->v, &option, r->pool, &r->progress, &d, report, err);
+    const struct progress tracing = progress_of_part(&r->tracing);
+    struct progress_part part;
+    const struct progress inner = progress_begin_part(&part, &tracing, 0.0, orientation_share);
+    struct trace_job job = {.v = r->v, .d = &d, .o = &option, .pool = r->pool, .report = report, .part.outer = &inner};
+    status s = reconstruct_orientation(r->v, &option, r->pool, &inner, &d, report, err);
+    part = (struct progress_part){&tracing, orientation_share, (1.0 - orientation_share) / TRACE_SETTLED_END};
     if (s == STATUS_OK && report->trace_edge_voxel >= 1.0) {
         trace_job_start(&job);
         s = trace_scan(&job, false, lines, err);
@@ -57,8 +63,7 @@ static status trace_filled(const struct refill *r, struct reconstruct_report *re
 
 /* Fills the inner parts of traced fibers besides the void that was enclosed. *again: whether the diameters of the
  * fibers differ, so that lines were found that the next tracing may improve. */
-static status refill_once(const struct refill *r, const struct reconstruct_report *report, bool *again,
-                          struct error *err)
+static status refill_once(struct refill *r, const struct reconstruct_report *report, bool *again, struct error *err)
 {
     uint8_t *mark = r->mark;
     struct reconstruct_report look = *report;
@@ -93,8 +98,7 @@ status reconstruct_lumens(struct volume *v, struct reconstruct_option *o, struct
 }
 
 status reconstruct_refill_lumens(struct volume *v, const struct reconstruct_option *o, struct thread_pool *pool,
-                                 const struct progress *progress, const struct reconstruct_report *report,
-                                 struct error *err)
+                                 const struct progress *progress, struct reconstruct_report *report, struct error *err)
 {
     void *mark = NULL;
     bool again = true;
@@ -103,9 +107,15 @@ status reconstruct_refill_lumens(struct volume *v, const struct reconstruct_opti
     if (s != STATUS_OK) return s;
     memset(mark, 0, volume_n_voxel(v->n));
     for (size_t i = 0; i < v->filled.n; i++) ((uint8_t *)mark)[v->filled.voxel[i]] = ENCLOSED;
-    const struct refill r = {.v = v, .o = o, .pool = pool, .progress = progress_silent(progress), .mark = mark};
-    for (int round = 0; round < N_REFILL && again && s == STATUS_OK; round++) s = refill_once(&r, report, &again, err);
+    struct refill r = {.v = v, .o = o, .pool = pool, .mark = mark};
+    for (int round = 0; round < N_REFILL && again && s == STATUS_OK; round++) {
+        r.tracing = (struct progress_part){progress, (double)round / N_REFILL, 1.0 / N_REFILL};
+        s = refill_once(&r, report, &again, err);
+    }
     scratch_release(v->space, mark);
+    if (s != STATUS_OK) return s;
+    seam_density_measure(v, &report->seam_density);
+    progress_report(progress, 1.0);
     return s;
 }
 

@@ -14,6 +14,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Fraction of the step once the files are read, and once the densities are mapped; lumens are looked for after that. */
+static const double READ_SHARE = 0.6, MAPPED_SHARE = 0.7;
+
 /* What must be done to the grid of the file. "stored": after the permutation of axes, before matrix and cubic
  * resampling. */
 struct plan {
@@ -176,7 +179,7 @@ static status read_slices(struct volume_source *source, const struct plan *p, co
              i++) /* VOLUME_OUTSIDE in a file is an infinite value, which is refused later */
             if (block[i] == VOLUME_OUTSIDE) block[i] = INFINITY;
         if (s == STATUS_OK) scatter_slices(p, block, k, n, v);
-        progress_report(progress, 0.8 * (double)(k + n - from[2]) / (double)(to[2] - from[2]));
+        progress_report(progress, READ_SHARE * (double)(k + n - from[2]) / (double)(to[2] - from[2]));
     }
     free(block);
     return s;
@@ -257,8 +260,8 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
     report->density_low = o->density_low;
     report->density_high = o->density_high;
     report->separability = m.separability;
+    progress_report(progress, MAPPED_SHARE);
     s = reconstruct_lumens(v, o, pool, report, err);
-    if (s == STATUS_OK) s = reconstruct_refill_lumens(v, o, pool, progress, report, err);
     if (s != STATUS_OK) return s;
     seam_density_measure(v, &report->seam_density);
     return STATUS_OK;

@@ -13,14 +13,14 @@
 #include <math.h>
 #include <string.h>
 
-enum { MAX_VOXEL = 1 << 24, MIN_EDGE = 32 };
+enum { MIN_EDGE = 32 };
 /* Variance of a voxel along an axis, in square voxels: a part of the fitted blur that drawing adds by itself. */
 static const double VOXEL_VARIANCE = 1.0 / 12.0;
 
-/* The part of the scan that is tried: all of its height, and as much of its middle as MAX_VOXEL allows. */
+/* The part of the scan that is tried: all of its height, and as much of its middle as SCAN_TRIAL_VOXELS allows. */
 static void choose_box(const size_t n[3], size_t from[3], size_t n_box[3])
 {
-    double over = (double)volume_n_voxel(n) / MAX_VOXEL, scale = over > 1.0 ? sqrt(over) : 1.0;
+    double over = (double)volume_n_voxel(n) / SCAN_TRIAL_VOXELS, scale = over > 1.0 ? sqrt(over) : 1.0;
     for (int a = 0; a < 3; a++) {
         size_t edge = a < 2 ? (size_t)((double)n[a] / scale) : n[a], least = n[a] < MIN_EDGE ? n[a] : MIN_EDGE;
         n_box[a] = edge < least ? least : edge;

@@ -5,6 +5,9 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+/* Most voxels that are tried. */
+enum { SCAN_TRIAL_VOXELS = 1 << 24 };
+
 struct scan_trial {
     bool made;
     size_t n_voxel[3], n_true, n_found; /* the part of the scan that was tried, its fibers, and those found again */

@@ -13,6 +13,7 @@ enum {
     TRACE_MIN_PIECE = 4,  /* least number of centers in a chain before joining */
     TRACE_MAX_GROWTH = 64 /* voxels by which an end may grow */
 };
+#define TRACE_SETTLED_END 0.57  /* of the progress of the step "fibers", where lines are settled */
 #define TRACE_LUMENS_END 0.85   /* of the progress of the step "fibers", where lumens are measured; from 0.67 on */
 #define TRACE_END_DIAMETERS 1.0 /* length at an end, in diameters, that may be wrong */
 /* Spread of the radii of single fibers, over their mean: below the first, fibers are alike and all found at first (0.04

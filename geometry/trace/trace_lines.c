@@ -209,6 +209,7 @@ static bool has_lost_ends(const struct trace_job *job, const struct polyline_set
 status trace_settle(struct trace_job *job, struct polyline_set *lines, struct error *err)
 {
     size_t n_join;
+    trace_enter_part(job, 0.54, TRACE_SETTLED_END);
     return settle_once(job, lines, 1, true, &n_join, err);
 }
 
@@ -216,13 +217,13 @@ status trace_finish(struct trace_job *job, struct polyline_set *lines, struct er
 {
     size_t n_join = 0;
     const int n_settle = job->independent < 1.0 ? N_SETTLE_THIN : N_SETTLE;
-    trace_enter_part(job, 0.54, 0.57);
+    trace_enter_part(job, 0.54, TRACE_SETTLED_END);
     status s = settle_once(job, lines, 1, true, &n_join, err);
     for (int k = 0; k < n_settle && s == STATUS_OK && has_lost_ends(job, lines); k++) {
         if (k > 0 && (double)n_join <= JOINED_SHARE * (double)lines->n_line) break; /* nothing moves any more */
         s = settle_once(job, lines, N_SETTLE_FIT, false, &n_join, err);
     }
-    trace_enter_part(job, 0.57, 0.67);
+    trace_enter_part(job, TRACE_SETTLED_END, 0.67);
     if (s == STATUS_OK) s = fit_axes(job, lines, true, err);
     if (s == STATUS_OK) s = straighten(job, lines, true, job->o->min_vertex, err);
     return s == STATUS_OK ? trace_join(job, lines, false, err) : s;

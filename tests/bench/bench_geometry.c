@@ -295,6 +295,7 @@ static status bench_weave_ct(const struct selection *select, struct error *err)
     for (int a = 0; a < 3; a++) o.voxel_size_m[a] = 2e-6;
     status s = thread_pool_new(0, &pool, err);
     if (s == STATUS_OK) s = reconstruct_read(&path, 1, &o, 0, pool, NULL, &v, &r, err);
+    if (s == STATUS_OK) s = reconstruct_refill_lumens(&v, &o, pool, NULL, &r, err);
     if (s == STATUS_OK) s = reconstruct_orientation(&v, &o, pool, NULL, &d, &r, err);
     if (s == STATUS_OK) s = reconstruct_fibers(&v, &d, &o, pool, NULL, &f, &r, err);
     float *safe = s == STATUS_OK ? malloc((f.n_fiber + 1) * sizeof *safe) : NULL;

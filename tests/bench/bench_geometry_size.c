@@ -146,6 +146,7 @@ static status reconstruct(const struct sample *p, const char *path, const size_t
     status s = thread_pool_new(0, &pool, err);
     if (s == STATUS_OK) s = scratch_space_new(folder, MEMORY_BYTES, &space, err);
     if (s == STATUS_OK) s = reconstruct_read(&path, 1, &o, space, pool, NULL, &v, report, err);
+    if (s == STATUS_OK) s = reconstruct_refill_lumens(&v, &o, pool, NULL, report, err);
     t[1] = clock_monotonic_s();
     if (s == STATUS_OK) s = reconstruct_orientation(&v, &o, pool, NULL, &d, report, err);
     t[2] = clock_monotonic_s();

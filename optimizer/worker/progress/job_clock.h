@@ -60,7 +60,8 @@ struct job_clock_work {
 
 /* book: copied. */
 void job_clock_init(struct job_clock *c, size_t n_stage, const struct speed_book *book, double now_s);
-/* States the work of stage i, which has not begun. */
+/* States the work of stage i, which has not begun, or whose work has become known while it runs: its time and its
+ * fraction so far then stay. */
 void job_clock_plan(struct job_clock *c, size_t i, const struct job_clock_work *work);
 /* The same, where units are seconds by the speed that this job has shown. */
 void job_clock_plan_own(struct job_clock *c, size_t i, const char *key, double seconds);

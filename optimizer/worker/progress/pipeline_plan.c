@@ -24,8 +24,10 @@ struct voxel_stage {
     const double *curve;
 };
 static const double render_s_per_path = 6e-6;
-static const double read_curve[SPEED_CURVE_POINTS] = {0.01, 0.02, 0.02, 0.03, 0.04, 0.05, 0.06, 0.06, 0.07, 0.08,
-                                                      0.08, 0.09, 0.10, 0.11, 0.12, 0.12, 0.94, 0.94, 0.94, 0.94};
+static const double read_curve[SPEED_CURVE_POINTS] = {0.03, 0.05, 0.08, 0.10, 0.12, 0.40, 0.40, 0.94, 0.94, 0.94,
+                                                      0.94, 0.94, 0.94, 0.94, 0.94, 0.94, 0.94, 0.94, 0.94, 0.94};
+static const double hollow_curve[SPEED_CURVE_POINTS] = {0.00, 0.01, 0.01, 0.02, 0.02, 0.05, 0.05, 0.10, 0.18, 0.25,
+                                                        0.33, 0.40, 0.48, 0.55, 0.63, 0.70, 0.78, 0.85, 0.93, 1.00};
 static const double orientation_curve[SPEED_CURVE_POINTS] = {0.18, 0.29, 0.37, 0.38, 0.38, 0.40, 0.44,
                                                              0.48, 0.52, 0.55, 0.58, 0.62, 0.65, 0.68,
                                                              0.71, 0.74, 0.77, 0.82, 0.90, 0.97};
@@ -34,8 +36,10 @@ static const double fibers_curve[SPEED_CURVE_POINTS] = {0.10, 0.21, 0.27, 0.28, 
 static const double transfer_curve[SPEED_CURVE_POINTS] = {0.14, 0.18, 0.21, 0.24, 0.29, 0.33, 0.37, 0.41, 0.47, 0.52,
                                                           0.56, 0.61, 0.65, 0.69, 0.73, 0.75, 0.78, 0.81, 0.84, 0.85};
 static const struct voxel_stage read_stage = {"volume", 1e-7, 0.8, read_curve},
+                                hollow_stage = {"volume.hollow", 5e-6, 0.8, hollow_curve},
                                 orientation_stage = {"orientation.material", 9e-7, 0.8, orientation_curve},
                                 fibers_stage = {"fibers.material", 6e-6, 0.4, fibers_curve},
+                                trial_stage = {"fibers.trial", 6e-6, 0.4, NULL},
                                 transfer_stage = {"directions.material", 4e-7, 0.8, transfer_curve},
                                 report_stage = {"report.geometry", 8e-8, 0.8, NULL};
 /* The same of a path of a fit to rows whose brightest channel has the mean usual_radiance. In bright cloth paths are
@@ -89,6 +93,16 @@ static double n_material(const struct pipeline_context *c)
 {
     return c->geometry.n_material_voxel > 0 ? (double)c->geometry.n_material_voxel
                                             : usual_material * pipeline_plan_voxels(c);
+}
+
+/* Tracing of the scan, and of its phantom of limited size where there is a trial. */
+static void plan_fibers(struct pipeline_context *c, size_t i)
+{
+    const double n = n_material(c), n_trial = fmin(n, n / pipeline_plan_voxels(c) * SCAN_TRIAL_VOXELS);
+    if (c->doc->trial)
+        plan_voxels(c, i, &trial_stage, n + n_trial);
+    else
+        plan_voxels(c, i, &fibers_stage, n);
 }
 
 /* ---- a described cloth ---- */
@@ -248,6 +262,12 @@ void pipeline_plan_fit_paths(struct pipeline_context *c, double n_path)
             pipeline_plan_stage(c, info[i].name, i);
 }
 
+void pipeline_plan_hollow(struct pipeline_context *c)
+{
+    const size_t i_volume = 0; /* the first of the stage table */
+    plan_voxels(c, i_volume, &hollow_stage, pipeline_plan_voxels(c));
+}
+
 void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
 {
     const struct job_clock_work rest = {.key = name, .units = 1.0, .usual_s = least_s, .log_sd = sd_of_rest},
@@ -258,11 +278,11 @@ void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
     if (job_document_of_profile(c->doc))
         worker_status_plan(c->status, i, strcmp(name, "fit") == 0 ? &profile : &rest);
     else if (strcmp(name, "volume") == 0)
-        plan_voxels(c, i, &read_stage, pipeline_plan_voxels(c));
+        plan_voxels(c, i, c->doc->hollow_fibers > 0 ? &hollow_stage : &read_stage, pipeline_plan_voxels(c));
     else if (strcmp(name, "orientation") == 0)
         plan_voxels(c, i, &orientation_stage, n_material(c));
     else if (strcmp(name, "fibers") == 0 && c->doc->has_volume)
-        plan_voxels(c, i, &fibers_stage, n_material(c));
+        plan_fibers(c, i);
     else if (strcmp(name, "fibers") == 0 && pipeline_plan_cloth_size(c) > 0.0)
         plan_cloth(c, i);
     else if (strcmp(name, "directions") == 0)

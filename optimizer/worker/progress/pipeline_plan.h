@@ -8,6 +8,8 @@
 /* Plans stage i, of this name (stage_table.h), by what is known now: before the first stage by the job document and the
  * size of its files, later by what earlier stages have found. */
 void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i);
+/* Plans the stage "volume", which runs, anew: the scan has hollow fibers, which are traced to fill their lumens. */
+void pipeline_plan_hollow(struct pipeline_context *c);
 /* Voxels of the scan: as read, or by the size of its files before. */
 double pipeline_plan_voxels(const struct pipeline_context *c);
 /* Size of a cloth that is made from its description, 0 where the job has none: of each yarn, its fibers times the

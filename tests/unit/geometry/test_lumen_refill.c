@@ -68,6 +68,20 @@ static double filled_share(const struct fiber_set *f, const struct volume *v)
     return n > 0 ? (double)n_filled / (double)n : 0.0;
 }
 
+/* What a computation reports: the largest fraction so far, as a job shows it, and how often it rose. */
+struct reports {
+    double most;
+    int n_rise;
+};
+
+static void note_report(void *context, double fraction)
+{
+    struct reports *r = context;
+    assert_in_range((int)(100.0 * fraction), 0, 100);
+    r->n_rise += fraction > r->most;
+    r->most = fmax(r->most, fraction);
+}
+
 /* Reads a plain weave of hollow fibers. *before, *after: share of the lumens that is filled without traced fibers, and
  * with them. Returns whether that changed any voxel. */
 static bool fill_plain(double radius_spread, double *before, double *after)
@@ -108,7 +122,12 @@ static bool fill_plain(double radius_spread, double *before, double *after)
     const struct progress cancelled = {.cancel = &stop};
     assert_int_equal(reconstruct_refill_lumens(&v, &option, pool, &cancelled, &report, NULL), STATUS_CANCELLED);
     assert_memory_equal(density, v.density, n_byte);
-    assert_int_equal(reconstruct_refill_lumens(&v, &option, pool, NULL, &report, NULL), STATUS_OK);
+    struct reports reports = {0};
+    const struct progress reported = {.report = note_report, .context = &reports};
+    assert_int_equal(reconstruct_refill_lumens(&v, &option, pool, &reported, &report, NULL), STATUS_OK);
+    print_message("progress rose %d times\n", reports.n_rise);
+    assert_true(reports.n_rise > 50); /* not only at the end of each tracing */
+    assert_float_equal(reports.most, 1.0, 1e-12);
     *after = filled_share(&truth, &v);
     const bool changed = memcmp(density, v.density, n_byte) != 0;
     for (size_t i = 0; i < v.filled.n; i++) assert_true(v.density[v.filled.voxel[i]] == 1.0f);

@@ -1,10 +1,12 @@
-/* Stages "volume" to "scene": from the scan, or from a fiber file, to a cloth ready for ray tracing. */
+/* Stages "volume" to "directions": from the scan, or from a fiber file, to the fibers of the cloth. */
 #include "base/option_id.h"
 #include "geometry/cloth/cloth.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/option_key.h"
 #include "optimizer/worker/fiber_file.h"
 #include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/progress/pipeline_plan.h"
+#include "optimizer/worker/stages/scene/pipeline_volume.h"
 #include "optimizer/worker/work_file.h"
 
 #include <math.h>
@@ -12,61 +14,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double um = 1e-6;
-
-/* Replaces defaults by the options of the document. */
-static void set_options(const struct job_document *doc, struct reconstruct_option *o)
-{
-    reconstruct_option_default(o);
-    memcpy(o->raw.n, doc->raw_shape, sizeof o->raw.n);
-    memcpy(o->raw.type, doc->raw_type, sizeof o->raw.type);
-    o->raw.big_endian = doc->raw_big_endian;
-    o->raw.header_bytes = doc->raw_header_bytes;
-    for (int a = 0; a < 3; a++) o->voxel_size_m[a] = doc->voxel_size_um[a] * um; /* NaN stays NaN */
-    memcpy(o->axes, doc->axes, sizeof o->axes);
-    memcpy(o->matrix, doc->matrix, sizeof o->matrix);
-    memcpy(o->crop_voxel, doc->crop_voxel, sizeof o->crop_voxel);
-    o->align = doc->align;
-    o->crop = doc->crop;
-    if (!isnan(doc->crop_keep)) o->crop_keep = doc->crop_keep;
-    o->density_low = doc->density_low;
-    o->density_high = doc->density_high;
-    o->fiber_diameter_voxel = doc->fiber_diameter_voxel;
-    o->hollow_fibers = doc->hollow_fibers;
-    if (!isnan(doc->filter_s)) o->s = doc->filter_s;
-    if (!isnan(doc->filter_t)) o->t = doc->filter_t;
-    if (doc->filter_h > 0) o->h = doc->filter_h;
-    if (!isnan(doc->filter_eps_d)) o->eps_d = doc->filter_eps_d;
-    if (!isnan(doc->filter_eps_j)) o->eps_j = doc->filter_eps_j;
-    if (!isnan(doc->link_sigma_voxel)) o->link_sigma_voxel = doc->link_sigma_voxel;
-    if (doc->min_vertex > 0) o->min_vertex = doc->min_vertex;
-    if (!isnan(doc->radius_um))
-        for (int a = 0; a < 3; a++) o->radius_m[a] = doc->radius_um * um;
-    o->radius_rule = doc->radius_per_axis < 0   ? RADIUS_AUTO
-                     : doc->radius_per_axis > 0 ? RADIUS_PER_AXIS
-                                                : RADIUS_COMMON;
-}
-
 /* ---- volume ---- */
 
-/* The files of the scan. One allocation holds the list and the paths; the caller frees it. NULL: out of memory. */
-static const char **scan_paths(const struct pipeline_context *c)
-{
-    const size_t n = c->doc->n_volume_file;
-    const char **path = malloc(n * (sizeof *path + WORKER_PATH_BYTES));
-    for (size_t i = 0; path != NULL && i < n; i++) {
-        char *text = (char *)(path + n) + i * WORKER_PATH_BYTES;
-        worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->volume_file[i], text);
-        path[i] = text;
-    }
-    return path;
-}
+/* Share of the stage's fraction that reading the scan has. Filling the lumens of hollow fibers has the rest, of whose
+ * time it takes nearly all; other scans have no such part. */
+static const double read_share = 0.4;
 
 static status read_volume(struct pipeline_context *c, struct error *err)
 {
-    const char **path = scan_paths(c);
+    const char **path = pipeline_scan_paths(c);
     if (path == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the volume: out of memory");
-    status s = reconstruct_read(path, c->doc->n_volume_file, &c->option, c->space, c->pool, &c->progress, &c->volume,
+    struct progress_part part;
+    const struct progress inner = progress_begin_part(&part, &c->progress, 0.0, read_share);
+    status s = reconstruct_read(path, c->doc->n_volume_file, &c->option, c->space, c->pool, &inner, &c->volume,
                                 &c->geometry, err);
     if (s == STATUS_OK && scratch_file_bytes(c->space) > 0)
         log_info(c->log, "volume: beyond the memory setting of %zu MB, worked on in files",
@@ -75,25 +35,23 @@ static status read_volume(struct pipeline_context *c, struct error *err)
     return s;
 }
 
-status pipeline_scan_size(const struct pipeline_context *c, size_t n[3], struct error *err)
+/* Fills the lumens of hollow fibers. That the fibers are hollow may not have been known before the scan was read. */
+static status fill_lumens(struct pipeline_context *c, struct error *err)
 {
-    struct reconstruct_option option;
-    struct volume_source *source = NULL;
-    const char **path = scan_paths(c);
-    if (path == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the volume: out of memory");
-    set_options(c->doc, &option);
-    status s = volume_source_open_declared(path, c->doc->n_volume_file, &option.raw, &source, err);
-    if (s == STATUS_OK) memcpy(n, volume_source_describe(source)->n, 3 * sizeof *n);
-    volume_source_close(source);
-    free(path);
-    return s;
+    if (c->volume.filled.n == 0) return STATUS_OK;
+    struct progress_part part;
+    const struct progress inner = progress_begin_part(&part, &c->progress, read_share, 1.0 - read_share);
+    pipeline_plan_hollow(c);
+    log_info(c->log, "volume: the fibers are hollow and are traced to fill their lumens");
+    return reconstruct_refill_lumens(&c->volume, &c->option, c->pool, &inner, &c->geometry, err);
 }
 
 status stage_volume(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    set_options(c->doc, &c->option);
+    pipeline_volume_options(c->doc, &c->option);
     status s = read_volume(c, err);
+    if (s == STATUS_OK) s = fill_lumens(c, err);
     if (s == STATUS_OK) s = pipeline_work_path(c, "volume", "volume.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
     if (s != STATUS_OK) return s;
@@ -109,37 +67,11 @@ status stage_volume(struct pipeline_context *c, struct error *err)
     return work_file_write(path, "volume.2", section, 7, err);
 }
 
-static status load_volume(struct pipeline_context *c, struct reconstruct_option *option,
-                          struct reconstruct_report *report, struct error *err)
-{
-    char path[WORKER_PATH_BYTES];
-    struct volume v = {.space = c->space};
-    status s = pipeline_work_path(c, "volume", "volume.bin", path, err);
-    if (s != STATUS_OK) return s;
-    struct work_section section[] = {
-        {option, sizeof *option}, {report, sizeof *report}, {v.n, sizeof v.n},  {v.voxel_size_m, sizeof v.voxel_size_m},
-        {NULL, 0, c->space},      {NULL, 0, c->space},      {NULL, 0, c->space}};
-    s = work_file_read(path, "volume.2", section, 7, err);
-    if (s != STATUS_OK) return s;
-    v.density = section[4].data;
-    v.filled = (struct volume_filled){section[5].n_bytes / sizeof(size_t), section[5].data, section[6].data};
-    volume_release(&c->volume);
-    c->volume = v;
-    return STATUS_OK;
-}
-
 status stage_volume_load(struct pipeline_context *c, struct error *err)
 {
-    status s = load_volume(c, &c->option, &c->geometry, err);
+    status s = pipeline_load_volume(c, &c->option, &c->geometry, err);
     if (s == STATUS_OK) reconstruct_warn_volume(&c->option, &c->geometry, &(struct warning_sink){pipeline_warn, c});
     return s;
-}
-
-status pipeline_need_volume(struct pipeline_context *c, struct error *err)
-{
-    struct reconstruct_option option;
-    struct reconstruct_report report;
-    return c->volume.density != NULL ? STATUS_OK : load_volume(c, &option, &report, err);
 }
 
 /* ---- direction volume: the stages "orientation" and "directions" store the same things ---- */
@@ -311,7 +243,7 @@ static status trace_fibers(struct pipeline_context *c, struct error *err)
     part = (struct progress_part){&c->progress, 0.5, 0.5};
     if (s == STATUS_OK && c->doc->trial) {
         struct reconstruct_option asked;
-        set_options(c->doc, &asked);
+        pipeline_volume_options(c->doc, &asked);
         s = reconstruct_trial(&c->volume, &c->fiber, &asked, c->pool, &inner, &c->geometry, err);
     }
     volume_release(&c->volume);
