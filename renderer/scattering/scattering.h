@@ -79,6 +79,9 @@ struct scattering_model {
      * the derivatives of its logarithm by each parameter, NULL when not wanted. NULL: 1, the section is round or turned
      * at random. */
     float (*width)(const struct scattering_state *state, const float w[3], float *score);
+    /* The standard deviation in th_i of the narrowest lobe about th_i = -th_o, by which lamps are sampled. NULL: the
+     * model has none. */
+    float (*lobe_rad)(const struct scattering_state *state);
     /* The integral of S cos th_i exp(sharpness (wi . axis - 1)) over wi, in closed form: an approximation for a
      * sharpness of at least 100. NULL: the model has none. */
     void (*gaussian)(const struct scattering_state *state, const float axis[3], float sharpness, const float wo[3],

@@ -47,7 +47,8 @@ struct radiance_input {
      * derivatives, for recorded paths, volumes, or other ways than path tracing. */
     bool has_speckle;
     uint64_t speckle_seed;
-    bool plain_paths; /* trace no guided shadow paths (path_tracer.h): same means, more variance; volumes have none */
+    bool plain_paths; /* trace neither guided shadow paths nor to strips of lamps (path_tracer.h): same means, more
+                         variance; volumes have none */
 };
 
 /* Paths that are traced together: at most RADIANCE_BLOCK_PATHS camera paths. The same paths serve every member: members

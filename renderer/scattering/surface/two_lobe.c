@@ -120,6 +120,7 @@ static void gaussian(const struct scattering_state *s, const float axis[3], floa
 }
 
 const struct scattering_model scattering_two_lobe = {
-    SURFACE_MODEL_ROW(two_lobe), .prepare = prepare,  .release = two_lobe_release, .eval = eval,
-    .sample = two_lobe_sample,   .pdf = two_lobe_pdf, .eval_pdf = eval_pdf,        .gaussian = gaussian,
+    SURFACE_MODEL_ROW(two_lobe),   .prepare = prepare,  .release = two_lobe_release, .eval = eval,
+    .sample = two_lobe_sample,     .pdf = two_lobe_pdf, .eval_pdf = eval_pdf,        .gaussian = gaussian,
+    .lobe_rad = two_lobe_lobe_rad,
 };

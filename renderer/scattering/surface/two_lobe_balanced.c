@@ -101,4 +101,5 @@ const struct scattering_model scattering_two_lobe_balanced = {
     .sample = two_lobe_sample,
     .pdf = two_lobe_pdf,
     .eval_pdf = eval_pdf,
+    .lobe_rad = two_lobe_lobe_rad,
 };

@@ -63,6 +63,11 @@ void two_lobe_sample(const struct scattering_state *s, const float wo[3], const 
     wi[2] = cos_theta * (d * dout.azimuth[0] + c * dout.azimuth[1]);
 }
 
+float two_lobe_lobe_rad(const struct scattering_state *s)
+{
+    return s->beta[TWO_LOBE_R] < s->beta[TWO_LOBE_TT] ? s->beta[TWO_LOBE_R] : s->beta[TWO_LOBE_TT];
+}
+
 void two_lobe_release(struct scattering_state *s) { free(s); }
 
 /* The tables are read by straight lines, which lie above a convex function, on the average by step^2 f'' / 12: taken

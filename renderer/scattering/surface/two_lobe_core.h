@@ -221,5 +221,7 @@ void two_lobe_sample(const struct scattering_state *s, const float wo[3], const 
                      float wi[3]);
 float two_lobe_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb);
 void two_lobe_release(struct scattering_state *s);
+/* scattering_model.lobe_rad */
+float two_lobe_lobe_rad(const struct scattering_state *s);
 
 #endif

@@ -160,4 +160,5 @@ const struct scattering_model scattering_two_lobe_diffuse = {
     .sample = sample,
     .pdf = pdf,
     .eval_pdf = eval_pdf,
+    .lobe_rad = two_lobe_lobe_rad,
 };

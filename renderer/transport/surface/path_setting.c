@@ -16,6 +16,8 @@ void path_setting_init(struct path_setting *s, const struct scene *scene, const 
     s->shows_width = model->width != NULL && scene_shows_sections(scene);
     s->roulette_below = PATH_SURFACE_ROULETTE_BELOW;
     if (s->guided_paths) light_guide_energy_of(model, state, &s->energy[0]);
+    s->has_strips = s->lights.has_lamp && model->lobe_rad != NULL;
+    if (s->has_strips) s->lobe_rad[0] = model->lobe_rad(state);
     s->want_jacobian = want_jacobian;
 }
 
@@ -27,5 +29,6 @@ void path_setting_init_sets(struct path_setting *s, const struct scene *scene, c
     for (size_t i = 0; i < sets->n; i++) {
         s->state[i] = sets->state[i];
         if (s->guided_paths && i > 0) light_guide_energy_of(s->model, s->state[i], &s->energy[i]);
+        if (s->has_strips) s->lobe_rad[i] = s->model->lobe_rad(s->state[i]);
     }
 }

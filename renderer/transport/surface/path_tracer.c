@@ -1,4 +1,5 @@
 #include "renderer/transport/surface/fiber_walk.h"
+#include "renderer/transport/surface/path_connect.h"
 #include "renderer/transport/surface/path_factor.h"
 #include "renderer/transport/surface/path_scatter.h"
 
@@ -8,106 +9,6 @@
 #include <string.h>
 
 #define GUIDED_PATH_SCALE 1.5f
-
-/* Adds value to the radiance and value * (H + score) to the derivatives. score NULL: the scores of the last step are
- * part of H already. */
-static inline void add_light(struct walk *w, const float value[3], const float *score)
-{
-    for (int c = 0; c < 3; c++) w->out->radiance[c] += value[c];
-    if (!w->s->want_jacobian) return;
-    size_t n = w->s->model->n_param, i = 0;
-    for (size_t c = 0; c < 3; c++)
-        for (size_t k = 0; k < w->s->n_set; k++) {
-            const float *own = score != NULL && k == w->i_set ? score + c * n : NULL;
-            for (size_t p = 0; p < n; p++, i++) w->out->jac[i] += value[c] * (w->h[i] + (own != NULL ? own[p] : 0));
-        }
-}
-
-static void add_light_to_all(struct walk *w, const float value[3], const float *score)
-{
-    for (size_t i = 0; i < w->n_out; i++) {
-        w->out = w->first_out + i;
-        add_light(w, value, score);
-    }
-}
-
-static void leave(struct walk *w, const struct bounce *b, const float direction[3], struct scene_ray *ray)
-{
-    fiber_walk_leave(w->s->model, &b->hit, b->offset_mm, direction, w->rng, ray);
-}
-
-/* Next-event estimation from a bounce to one point on the lamp. weight: multiple-importance weight of this connection,
- * in [0, 1]. Returns the incident light as stored in path_step.light, or 0 if the light is occluded. */
-static float connect_lamp(struct walk *w, const struct lamp *lamp, float weight, const struct bounce *b, float wi[3])
-{
-    const struct path_setting *s = w->s;
-    float position[3], u[2], direction[3], pdf_lamp, s_rgb[3];
-    unwrapped(b->hit.position_mm, b->offset_mm, position);
-    u[0] = rng_float(w->rng);
-    u[1] = rng_float(w->rng);
-    if (!lamp_sample(lamp, position, u, direction, &pdf_lamp)) return 0;
-    if (scene_sheet_hides(s->scene, direction)) return 0;
-    fiber_frame_to_local(&b->frame, direction, wi);
-    float pdf = path_scatter(w, b, wi, s_rgb);
-    float heuristic = path_walk_connects_all(w) ? 1 : lights_power_heuristic(pdf_lamp, pdf), value[3],
-          light = weight * lamp_radiance(lamp, direction) * fiber_frame_cos_theta(wi) / pdf_lamp * heuristic;
-    for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * s_rgb[c] * light;
-    float most = path_value_largest(value), survival;
-    if (!(most > 0)) {
-        path_value_keep_nan(w->out->radiance, value);
-        return 0;
-    }
-    if (most < PATH_SURFACE_SHADOW_BELOW) { /* hardly any light: trace few of these shadow rays, for more each */
-        if (!path_value_survives(most, PATH_SURFACE_SHADOW_BELOW, w->rng, &survival)) return 0;
-        light /= survival;
-        for (int c = 0; c < 3; c++) value[c] /= survival;
-    }
-    struct scene_ray shadow;
-    leave(w, b, direction, &shadow);
-    if (scene_occluded(s->scene, &shadow)) return 0;
-    path_factor_apply(w, b, direction, value);
-    add_light(w, value, w->score);
-    return light;
-}
-
-/* Next-event estimation from a bounce to one direction of the image environment. */
-static void connect_image(struct walk *w, const struct bounce *b)
-{
-    const struct path_setting *s = w->s;
-    float u[2], direction[3], radiance[3], pdf_image, wi[3], s_rgb[3], value[3], survival;
-    u[0] = rng_float(w->rng);
-    u[1] = rng_float(w->rng);
-    if (!lights_sample_image(&s->lights, u, direction, radiance, &pdf_image)) return;
-    if (scene_sheet_hides(s->scene, direction)) return;
-    fiber_frame_to_local(&b->frame, direction, wi);
-    float pdf = path_scatter(w, b, wi, s_rgb);
-    float weight = fiber_frame_cos_theta(wi) / pdf_image * lights_power_heuristic(pdf_image, pdf);
-    for (int c = 0; c < 3; c++) {
-        radiance[c] *= weight;
-        value[c] = w->throughput[c] * s_rgb[c] * radiance[c];
-    }
-    float most = path_value_largest(value);
-    if (!(most > 0)) {
-        path_value_keep_nan(w->out->radiance, value);
-        return;
-    }
-    if (most < PATH_SURFACE_SHADOW_BELOW) {
-        if (!path_value_survives(most, PATH_SURFACE_SHADOW_BELOW, w->rng, &survival)) return;
-        for (int c = 0; c < 3; c++) {
-            radiance[c] /= survival;
-            value[c] /= survival;
-        }
-    }
-    struct scene_ray shadow;
-    leave(w, b, direction, &shadow);
-    if (scene_occluded(s->scene, &shadow)) return;
-    path_factor_apply(w, b, direction, value);
-    add_light_to_all(w, value, w->score);
-    if (w->step != NULL) {
-        memcpy(w->step->image_wi, wi, sizeof wi);
-        memcpy(w->step->image, radiance, sizeof radiance);
-    }
-}
 
 /* Adds the radiance that a ray meets when it has left the cloth. pdf: density of the scattering sample that made the
  * ray; 0 for a camera ray. */
@@ -119,15 +20,17 @@ static void add_beyond(struct walk *w, const struct scene_ray *ray, float pdf)
     lights_add_environment(&s->lights, ray->direction, pdf, around);
     unwrapped(ray->origin_mm, ray->offset_mm, position);
     for (size_t i = 0; i < w->n_out; i++) {
-        float beyond[3], value[3];
-        float lamp = i < w->n_lamp ? lights_lamp_beyond(&w->lamp[i], position, ray->direction, pdf) : 0;
+        float beyond[3], value[3], over = pdf;
+        if (pdf > 0 && i < w->n_lamp && w->has_strips && w->strip[i].used)
+            over /= 1 + lamp_strip_ratio_towards(&w->strip[i], &w->lamp[i], position, ray->direction);
+        float lamp = i < w->n_lamp ? lights_lamp_beyond(&w->lamp[i], position, ray->direction, over) : 0;
         for (int c = 0; c < 3; c++) {
             beyond[c] = lamp + around[c];
             value[c] = w->throughput[c] * beyond[c];
         }
         w->out = w->first_out + i;
         path_factor_apply(w, NULL, ray->direction, value);
-        if (value[0] + value[1] + value[2] > 0) add_light(w, value, NULL);
+        if (value[0] + value[1] + value[2] > 0) path_add_light(w, value, NULL);
         if (w->step != NULL) memcpy(w->step->escape, beyond, sizeof beyond);
     }
 }
@@ -174,11 +77,12 @@ static void follow_guided_path(struct walk *w, size_t i_lamp, const struct bounc
     struct scene_ray ray;
     struct scene_hit hit;
     struct bounce b;
+    struct lamp_strip strip;
     float wi[3];
-    leave(w, from, direction, &ray);
+    path_leave(w, from, direction, &ray);
     if (!scene_trace(w->s->scene, &ray, &hit)) return; /* light beyond the cloth is counted by the walk itself */
     bounce_at(w, &hit, &ray, &b);
-    float light = connect_lamp(w, &w->lamp[i_lamp], 1, &b, wi);
+    float light = path_connect_lamp(w, &w->lamp[i_lamp], 1, &b, &strip, wi);
     if (w->step == NULL || light == 0) return;
     memcpy(w->step->guided_wo, b.wo, sizeof b.wo);
     memcpy(w->step->guided_light_wi, wi, sizeof wi);
@@ -256,7 +160,7 @@ static void connect_lamps(struct walk *w, const struct bounce *b)
     if (w->s->guided_paths) w->p_guided = guided_path_probability(w);
     for (size_t k = 0; k < w->n_lamp; k++) {
         w->out = w->first_out + k;
-        float light = connect_lamp(w, &w->lamp[k], w->weight[k], b, wi);
+        float light = path_connect_lamp(w, &w->lamp[k], w->weight[k], b, &w->strip[k], wi);
         if (w->step != NULL && light != 0) {
             memcpy(w->step->light_wi, wi, sizeof wi);
             w->step->light = light;
@@ -291,7 +195,7 @@ static bool scatter(struct walk *w, const struct bounce *b, struct scene_ray *ra
     fiber_frame_to_world(&b->frame, wi, direction);
     for (size_t k = 0; k < w->n_lamp && s->guided_paths; k++)
         w->weight[k] = pdf / (pdf + w->p_guided * light_guide_pdf(w->towards[k], direction));
-    leave(w, b, direction, ray);
+    path_leave(w, b, direction, ray);
     *pdf_out = pdf;
     return true;
 }
@@ -305,7 +209,8 @@ static struct path_step *next_step(struct path_record *r)
     return &r->step[i];
 }
 
-static void walk_start(struct walk *w, const struct path_setting *s, struct rng *rng, struct path_result *out)
+static void walk_start(struct walk *w, const struct path_setting *s, bool recorded, struct rng *rng,
+                       struct path_result *out)
 {
     size_t n_flat = s->want_jacobian ? 3 * s->n_set * s->model->n_param : 0;
     w->s = s;
@@ -314,6 +219,7 @@ static void walk_start(struct walk *w, const struct path_setting *s, struct rng 
     w->n_out = w->n_lamp > 0 ? w->n_lamp : 1;
     w->step = NULL;
     w->last = false;
+    w->has_strips = s->has_strips && !recorded;
     w->state = s->state[0];
     w->i_set = 0;
     for (int c = 0; c < 3; c++) w->throughput[c] = 1;
@@ -335,7 +241,7 @@ static bool go_on_beyond_last(struct walk *w, const struct bounce *b, struct sce
     if (s->finish != NULL) s->finish(s->finish_context, &b->hit, ray, w->rng, rgb);
     bool goes_on = share > 0 && (share >= 1 || rng_float(w->rng) < share);
     for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * (goes_on ? rgb[c] * (1 - 1 / share) : rgb[c]);
-    add_light_to_all(w, value, NULL);
+    path_add_light_to_all(w, value, NULL);
     if (goes_on) {
         for (int c = 0; c < 3; c++) w->throughput[c] /= share;
         for (size_t k = 0; k < w->n_lamp && s->guided_paths; k++) guide_to_lamp(w, k, b);
@@ -370,9 +276,9 @@ static void walk_on(struct walk *w, struct scene_ray *ray, struct path_record *r
         }
         float rgb[3] = {0, 0, 0};
         if (i == 0 && s->begin != NULL) s->begin(s->finish_context, &hit, ray, w->rng, rgb);
-        if (i == 0 && s->begin != NULL) add_light_to_all(w, rgb, NULL);
+        if (i == 0 && s->begin != NULL) path_add_light_to_all(w, rgb, NULL);
         connect_lamps(w, &b);
-        if (s->lights.image != NULL) connect_image(w, &b);
+        if (s->lights.image != NULL) path_connect_image(w, &b);
         if (w->last && !go_on_beyond_last(w, &b, ray)) return;
         if (!scatter(w, &b, ray, &pdf)) return;
     }
@@ -384,7 +290,7 @@ void path_trace(const struct path_setting *s, struct scene_ray *ray, struct rng 
     struct walk w; /* large: only what is used is set */
     w.lamp = &s->lights.lamp;
     w.n_lamp = s->lights.has_lamp;
-    walk_start(&w, s, rng, out);
+    walk_start(&w, s, record != NULL, rng, out);
     walk_on(&w, ray, record);
 }
 
@@ -394,6 +300,6 @@ void path_trace_lamps(const struct path_setting *s, const struct lamp *lamp, siz
     struct walk w;
     w.lamp = lamp;
     w.n_lamp = n_lamp;
-    walk_start(&w, s, rng, out);
+    walk_start(&w, s, false, rng, out);
     walk_on(&w, ray, NULL);
 }

@@ -12,6 +12,7 @@
 #include "renderer/scattering/speckle/speckle.h"
 #include "renderer/scene/scene_ray.h"
 #include "renderer/transport/discrepancy.h"
+#include "renderer/transport/light/lamp_strip.h"
 #include "renderer/transport/light/light_guide.h"
 #include "renderer/transport/light/lights.h"
 #include "renderer/transport/surface/parameter_sets.h"
@@ -26,6 +27,10 @@ struct path_setting {
     struct lights lights;
     bool guided_paths;                                    /* trace guided shadow paths: less variance, same mean */
     struct light_guide_energy energy[SCATTERING_MAX_SET]; /* by material group: sets how many guided paths there are */
+    /* Hits with a lobe that is narrow beside a square lamp are connected to two points of the lamp (lamp_strip.h): less
+     * variance, same mean. Not for recorded paths. */
+    bool has_strips;
+    float lobe_rad[SCATTERING_MAX_SET]; /* by material group: scattering_model.lobe_rad; only with has_strips */
     bool shows_width;     /* the scene has the sections of the fibers as surfaces, and the model states their widths */
     float roulette_below; /* throughput under which paths are ended at random; 0: never */
     /* Ends paths at their n_traced-th hit (0: nowhere): what that scatters of light that nothing scattered before is

@@ -42,6 +42,8 @@ struct walk {
     uint32_t i_fiber;
     float normal[3]; /* of the cloth at the present bounce; likewise */
     float throughput[3];
+    bool has_strips;                        /* path_setting.has_strips, and the walk is not recorded */
+    struct lamp_strip strip[PATH_MAX_LAMP]; /* of the lamps, from the present bounce; only with has_strips */
     float towards[PATH_MAX_LAMP][3]; /* directions from the present bounce to the lamps, which guide its guided paths */
     float p_guided;                  /* probability of a guided path there */
     float weight[PATH_MAX_LAMP];     /* multiple-importance weight of lamp connections at the present bounce: the guided

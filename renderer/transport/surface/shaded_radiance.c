@@ -54,7 +54,7 @@ status shaded_prepare(const struct shaded_method *m, const struct radiance_input
     for (size_t i = 0; i < n_configuration && st == STATUS_OK; i++) {
         struct path_setting *path = setting_at(s, i);
         path_setting_init_sets(path, in->scene.fibers, &s->sets, &c[i], false);
-        if (in->plain_paths) path->guided_paths = false;
+        if (in->plain_paths) path->guided_paths = path->has_strips = false;
         camera_init(&s->camera[i], &c[i]);
         s->n_setting = i + 1;
         st = m->init(path, in, err);

@@ -50,7 +50,7 @@ static status prepare(const struct radiance_input *in, const struct configuratio
     s->n_jac = in->want_derivative ? 3 * s->sets.n * m->n_param : 0;
     for (size_t i = 0; i < n_configuration; i++) {
         path_setting_init_sets(&s->setting[i], s->scene, &s->sets, &c[i], in->want_derivative);
-        if (in->plain_paths) s->setting[i].guided_paths = false;
+        if (in->plain_paths) s->setting[i].guided_paths = s->setting[i].has_strips = false;
         s->setting[i].discrepancy = in->discrepancy;
         if (in->has_speckle) s->setting[i].speckle = (struct speckle){m->speckle, &s->numbers, in->speckle_seed};
         camera_init(&s->camera[i], &c[i]);
