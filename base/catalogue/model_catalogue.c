@@ -35,6 +35,15 @@ static const struct model_nesting nesting[] = {
 #include "base/catalogue/models.def"
 };
 
+static const struct {
+    const char *near, *far;
+} far_field[] = {
+#define SURFACE_MODEL(...)
+#define VOLUME_MODEL(...)
+#define MODEL_HAS_FAR_FIELD(near, far) {surface_##near##_id, surface_##far##_id},
+#include "base/catalogue/models.def"
+};
+
 static const char *const with_speckle[] = {
 #define SURFACE_MODEL(...)
 #define VOLUME_MODEL(...)
@@ -64,6 +73,18 @@ bool model_catalogue_has_speckle(const char *id)
     for (size_t i = 0; i < sizeof with_speckle / sizeof *with_speckle; i++)
         if (strcmp(with_speckle[i], id) == 0) return true;
     return false;
+}
+
+const char *model_catalogue_near_field(size_t i)
+{
+    return i < sizeof far_field / sizeof *far_field ? far_field[i].near : NULL;
+}
+
+const char *model_catalogue_far_field(const char *id)
+{
+    for (size_t i = 0; i < sizeof far_field / sizeof *far_field; i++)
+        if (strcmp(far_field[i].near, id) == 0) return far_field[i].far;
+    return NULL;
 }
 
 const struct model_nesting *model_catalogue_nesting(size_t i)

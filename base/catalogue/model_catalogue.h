@@ -46,6 +46,10 @@ const struct model_nesting *model_catalogue_nesting(size_t i);
  * it. */
 const char *model_catalogue_with_speckle(size_t i);
 bool model_catalogue_has_speckle(const char *id);
+/* The id of the i-th near field that has a far field, NULL behind the last, and the id of a model's far field: the mean
+ * over the width of the fiber with the same parameters (models.def). NULL: the model has none. */
+const char *model_catalogue_near_field(size_t i);
+const char *model_catalogue_far_field(const char *id);
 
 /* The rows as constants, for the implementations of models: a scattering_model or a phase_model begins with
  * SURFACE_MODEL_ROW(name) or VOLUME_MODEL_ROW(name). n_param of a volume model's row does not count the density

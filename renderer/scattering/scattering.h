@@ -46,10 +46,6 @@ struct scattering_model {
      * normal of the surface at the hit, and the offset from the axis, in radii, is the sine of the azimuth of wo. */
     bool near_field;
 
-    /* Of a near field: the id of the model that has its mean over the width, with the same parameters, which a pixel
-     * sees that is wider than the fiber (Yan et al. 2017, section 5.2). NULL: no model has. */
-    const char *far_field;
-
     /* What the speckle of pictures is made from (speckle/speckle.h); NULL: the model has none. */
     const struct speckle_table *speckle;
 

@@ -116,6 +116,8 @@ def test_the_saved_file_shows_the_same_alone(opened, tmp_path):
     opened.get(f"file://{saved}")
     wait_for(opened, "document.querySelector('canvas.twin-view')?.twin")
     check_drawing(opened)
+    note = opened.find_element(By.ID, "note").text
+    assert "shift and drag moves the lamp" in note and "differ from path tracing by" in note, "whoever gets the file has no other page"
     keep(opened, "twin-alone")
     assert complaints(opened) == []
 

@@ -60,7 +60,7 @@ struct cli_args {
     const char *quiet_s;                 /* --quiet */
     /* of a picture; on: --on, and so forth */
     const char *on, *lamp, *camera, *px, *samples, *width_mm, *size_mm, *radius_mm, *mesh_unit_mm, *wrap_deg, *method,
-        *deep_light, *black_sheet, *twin;
+        *deep_light, *deep_light_paths, *visibility, *black_sheet, *twin;
     const char *scope, *owner, *requests, *bytes, *jobs; /* of a token to be made */
     const char *max_age, *max_bytes;                     /* of retention */
     const char *state, *verdict, *tag, *sample, *days;   /* of list */

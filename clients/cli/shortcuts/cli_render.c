@@ -72,6 +72,9 @@ static status read_picture(const struct cli_args *a, json_t *picture, const char
     const char *method = a->method == NULL && a->reference ? "fast" : a->method;
     if (method != NULL) json_object_set_new(picture, "method", json_string(method));
     if (a->deep_light != NULL) json_object_set_new(picture, "deep_light", json_string(a->deep_light));
+    if (s == STATUS_OK)
+        s = read_number("deep-light-paths", a->deep_light_paths, "deep_light_paths", true, picture, err);
+    if (a->visibility != NULL) json_object_set_new(picture, "visibility", json_string(a->visibility));
     if (a->reference) json_object_set_new(picture, "reference", json_true());
     if (a->speckle) json_object_set_new(picture, "speckle", json_true());
     if (a->field_by_pixel) json_object_set_new(picture, "field_by_pixel", json_true());
@@ -107,7 +110,7 @@ static json_t *fixed_fit(const json_t *result, json_t *groups)
 /* Sections that a picture shares with the photographs. */
 static void copy_light(const json_t *from, json_t *to)
 {
-    static const char *const key[] = {"lamp", "black_sheet"};
+    static const char *const key[] = {"lamp", "environment", "black_sheet"};
     for (size_t i = 0; i < sizeof key / sizeof *key; i++)
         if (json_object_get(from, key[i]) != NULL) json_object_set(to, key[i], json_object_get(from, key[i]));
     const json_t *camera = json_object_get(from, "camera");
@@ -147,14 +150,26 @@ static int remove_entry(const char *path, const struct stat *st, int kind, struc
     return remove(path);
 }
 
-/* Puts the fibers of the job and the mesh into a folder, from which they are uploaded. */
-static status gather_files(struct cli *cli, const char *id, const char *mesh, const char *folder, json_t *picture,
+/* A file of the job into a folder. where: "/results/" or "/files/". */
+static status fetch_file(struct cli *cli, const char *id, const char *where, const char *name, const char *folder,
+                         struct error *err)
+{
+    char url[512], path[4096], tail[320];
+    snprintf(tail, sizeof tail, "%s%s", where, name);
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    status s = cli_job_path(id, tail, url, sizeof url, err);
+    return s == STATUS_OK ? http_download(cli->http, url, path, NULL, NULL, err) : s;
+}
+
+/* Puts the fibers of the job, the file of its environment and the mesh into a folder, from which they are uploaded. */
+static status gather_files(struct cli *cli, const char *id, const char *mesh, const char *folder, json_t *document,
                            struct error *err)
 {
-    char url[256], path[4096], target[4096];
-    status s = cli_job_path(id, "/results/fibers.hair", url, sizeof url, err);
-    snprintf(path, sizeof path, "%s/%s", folder, fiber_file);
-    if (s == STATUS_OK) s = http_download(cli->http, url, path, NULL, NULL, err);
+    char path[4096], target[4096];
+    json_t *picture = json_array_get(json_object_get(document, "pictures"), 0);
+    const char *around = json_string_value(json_object_get(json_object_get(document, "environment"), "file"));
+    status s = fetch_file(cli, id, "/results/", fiber_file, folder, err);
+    if (s == STATUS_OK && around != NULL) s = fetch_file(cli, id, "/files/", around, folder, err);
     if (s != STATUS_OK || mesh == NULL) return s;
     snprintf(target, sizeof target, "%s", mesh);
     const char *name = basename(target);
@@ -190,15 +205,22 @@ static void print_comparison(FILE *out, const json_t *picture)
             100.0 * (json_is_number(noise) ? json_number_value(noise) : NAN));
 }
 
-static status compare(struct cli *cli, const char *id, struct error *err)
+/* One line of the picture, and the comparison. */
+static status describe(struct cli *cli, const char *id, struct error *err)
 {
     char path[256];
     json_t *job = NULL;
     status s = cli_job_path(id, "", path, sizeof path, err);
     if (s == STATUS_OK) s = http_json(cli->http, "GET", path, NULL, NULL, &job, err);
     if (s == STATUS_OK) s = cli_add_result(cli, job, err);
-    if (s == STATUS_OK)
-        print_comparison(cli->out, json_array_get(json_object_get(json_object_get(job, "result"), "pictures"), 0));
+    const json_t *picture = json_array_get(json_object_get(json_object_get(job, "result"), "pictures"), 0);
+    const json_t *mean = json_object_get(picture, "mean"), *noise = json_object_get(picture, "noise");
+    if (s == STATUS_OK && picture != NULL) {
+        fprintf(cli->out, "pictures/on-1.png: mean radiance %.4g %.4g %.4g, noise of a pixel %.0f %% of their mean\n",
+                number_at(mean, 0), number_at(mean, 1), number_at(mean, 2),
+                100.0 * (json_is_number(noise) ? json_number_value(noise) : NAN));
+        if (cli->args->reference) print_comparison(cli->out, picture);
+    }
     json_decref(job);
     return s;
 }
@@ -210,7 +232,7 @@ static status render(struct cli *cli, const json_t *document, const char *folder
     status s = cli_submit_document(cli, document, folder, id, err);
     if (s == STATUS_OK) s = cli_watch_job(cli, id, exit_code, err);
     if (s == STATUS_OK && *exit_code == CLI_EXIT_OK) s = cli_results_to_out(cli, id, err);
-    if (s == STATUS_OK && *exit_code == CLI_EXIT_OK && cli->args->reference) s = compare(cli, id, err);
+    if (s == STATUS_OK && *exit_code == CLI_EXIT_OK) s = describe(cli, id, err);
     if (s != STATUS_OK && id[0] != '\0')
         fprintf(cli->note, "continue with: selvedge watch %s, then selvedge results %s\n", id, id);
     return s;
@@ -233,7 +255,7 @@ status cli_render(struct cli *cli, int *exit_code, struct error *err)
     else if (s == STATUS_OK) {
         s = make_document(job, picture, &document, err);
         if (s == STATUS_OK && twin) json_object_set_new(document, "twin", json_pack("{s:b}", "make", true));
-        if (s == STATUS_OK) s = gather_files(cli, cli->args->operand, mesh, folder, picture, err);
+        if (s == STATUS_OK) s = gather_files(cli, cli->args->operand, mesh, folder, document, err);
         if (s == STATUS_OK) s = render(cli, document, folder, exit_code, err);
         nftw(folder, remove_entry, 8, FTW_DEPTH | FTW_PHYS);
     }

@@ -2,7 +2,7 @@
 import { el, size } from "../page_parts.js";
 import { getJson, raw } from "../server_link.js";
 import { twinPage } from "./twin_download.js";
-import { TwinPanel } from "./twin_panel.js";
+import { TwinPanel, twinNote } from "./twin_panel.js";
 
 const MOST_PHOTOGRAPHS = 12;
 
@@ -42,10 +42,7 @@ export function twinCard(job, files, compared) {
     try {
       data = await load(job, files, compared);
       panel = new TwinPanel(box, data);
-      const { mean_rel_rms: rms, mean_rel_noise: noise } = data.description, own = Math.sqrt(Math.max(rms ** 2 - noise ** 2, 0));
-      note.replaceChildren(panel.works ? "Drag turns, shift and drag moves the lamp, the wheel zooms. " : "",
-        `Mean radiances of the flat cloth differ from path tracing by ${(100 * own).toFixed(1)} % up to 70° from its normal, and by more beyond. Shadows are those of the lamp only, and light between folds is left out. `,
-        el("button", { id: "twin-save", onclick: save }, "Save as one HTML file"));
+      note.replaceChildren(`${twinNote(panel.works, data.description)} `, el("button", { id: "twin-save", onclick: save }, "Save as one HTML file"));
     } catch (error) {
       note.replaceChildren(`The twin cannot be shown: ${error.message}.`);
     }

@@ -30,12 +30,14 @@ export async function twinPage(data, get) {
 <meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:">
 <title>${title}</title><style>body { font: 15px/1.5 system-ui, sans-serif; margin: 1.5rem auto; max-width: 1200px; padding: 0 1rem; }
 ${style}</style></head>
-<body><h1>${title}</h1><div id="twin" class="twin"></div>
+<body><h1>${title}</h1><div id="twin" class="twin"></div><p id="note"></p>
 <script>
 "use strict";
 ${scripts.map(asScript).join("\n")}
 const tables = Uint8Array.from(atob("${tables.slice(tables.indexOf(",") + 1)}"), (c) => c.charCodeAt(0)).buffer;
-new TwinPanel(document.getElementById("twin"), { ...${asJson(inside)}, buffer: tables });
+const inside = ${asJson(inside)};
+const panel = new TwinPanel(document.getElementById("twin"), { ...inside, buffer: tables });
+document.getElementById("note").textContent = twinNote(panel.works, inside.description);
 </script></body></html>
 `], { type: "text/html" });
 }

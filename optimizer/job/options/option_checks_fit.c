@@ -129,6 +129,35 @@ static status check_speckle(const struct job_document *doc, size_t i, struct err
     return STATUS_OK;
 }
 
+/* A job of several models is shown by the best one: one of them with a far field is enough. */
+static status check_field(const struct job_document *doc, size_t i, struct error *err)
+{
+    char field[64];
+    if (!doc->surface_picture[i].field_by_pixel) return STATUS_OK;
+    for (size_t k = 0; k < doc->n_model; k++)
+        if (model_catalogue_far_field(doc->model[k].id) != NULL) return STATUS_OK;
+    snprintf(field, sizeof field, "pictures[%zu].field_by_pixel", i);
+    return error_set_field(err, STATUS_INVALID, field,
+                           "'%s' is true, but model '%s' has no far field to take in its place: near fields have, such "
+                           "as '%s'",
+                           field, doc->model[0].id, model_catalogue_near_field(0));
+}
+
+/* Tables and walks are made in the flat cloth of the job, over its sheet. */
+static status check_sheet(const struct job_document *doc, size_t i, struct error *err)
+{
+    const struct job_surface_picture *p = &doc->surface_picture[i];
+    char field[64];
+    const bool of_flat_cloth =
+        p->method == JOB_PICTURE_FAST || p->method == JOB_PICTURE_CORRECTED || p->method == JOB_PICTURE_DIFFUSION;
+    if (!of_flat_cloth || p->black_sheet < 0 || (p->black_sheet != 0) == doc->black_sheet) return STATUS_OK;
+    snprintf(field, sizeof field, "pictures[%zu].black_sheet", i);
+    return error_set_field(err, STATUS_INVALID, field,
+                           "'%s' is %s and 'black_sheet' is %s: a picture of this method has the black sheet of the "
+                           "job, or none like it; leave it out, or take the method path or dual",
+                           field, p->black_sheet != 0 ? "true" : "false", doc->black_sheet ? "true" : "false");
+}
+
 /* Paths are refused where no table of view and light is made of them. */
 static status check_deep_paths(const struct job_surface_picture *p, const json_t *given, size_t i, struct error *err)
 {
@@ -192,7 +221,9 @@ static status check_picture(const struct job_document *doc, size_t i, struct err
         return error_set_field(err, STATUS_INVALID, field,
                                "'%s' is %g: the ball under a draped piece of %g mm may have a radius of %g to %g mm",
                                field, p->radius_mm, p->size_mm, 0.02 * p->size_mm, 10.0 * p->size_mm);
-    return check_speckle(doc, i, err);
+    status s = check_sheet(doc, i, err);
+    if (s == STATUS_OK) s = check_speckle(doc, i, err);
+    return s == STATUS_OK ? check_field(doc, i, err) : s;
 }
 
 status job_check_pictures(const struct option_value *v, struct error *err)

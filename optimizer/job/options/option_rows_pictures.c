@@ -46,6 +46,7 @@ const struct job_option option_rows_pictures[] = {
     {.path = "pictures[].radius_mm",
      .kind = OPTION_NUMBER,
      OF_PICTURE(radius_mm),
+     .id = OPTION_PICTURE_RADIUS,
      RANGE(0.1, 10000),
      .unit = "mm",
      .standard = "15",
@@ -69,7 +70,9 @@ const struct job_option option_rows_pictures[] = {
      .kind = OPTION_BOOL_OR_LEFT_OUT,
      OF_PICTURE(black_sheet),
      .left_out = "`black_sheet` of the job",
-     .meaning = "Whether a black sheet lies under all of the cloth, bent as it is: without it light comes through."},
+     .meaning =
+         "Whether a black sheet lies under all of the cloth, bent as it is: without it light comes through. With "
+         "`method` `fast`, `corrected` and `diffusion` it is that of the job."},
     ANGLE("pictures[]", struct job_surface_picture, light_theta_deg, 0, 180, .required = true,
           .allowed = "0 to 180; for a flat piece not 90, and above it only without the black sheet",
           .meaning = "Angle of the lamp from the vertical. Above 90 the lamp is below."),
@@ -108,6 +111,7 @@ const struct job_option option_rows_pictures[] = {
     {.path = "pictures[].method",
      .kind = OPTION_CHOICE,
      OF_PICTURE(method),
+     .id = OPTION_PICTURE_METHOD,
      .choice = method_names,
      .standard = "\"path\"",
      .meaning =
@@ -163,7 +167,7 @@ const struct job_option option_rows_pictures[] = {
          "Of `fur_near.v1` and `dielectric_near.v1`: whether the picture takes the far field, the mean over the "
          "width of a fiber (`fur.v1`, `dielectric.v1`), where a pixel is at least as wide as a fiber. It has less "
          "noise then, and another mean in dense cloths (docs/bent-cloth.md). `model` of the result names the model "
-         "that is shown."},
+         "that is shown. Refused where none of the job's models is one of them."},
     {.path = "pictures[].reference",
      .kind = OPTION_BOOL,
      OF_PICTURE(reference),

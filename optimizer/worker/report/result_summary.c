@@ -234,7 +234,8 @@ static void print_pictures(struct pipeline_context *c, FILE *out)
             m->appearance.id, m->appearance.title);
     print_cloth(c, out);
     print_parameters(m, out);
-    fprintf(out, "\n%zu pictures in the folder pictures\n", c->doc->n_surface_picture);
+    fprintf(out, "\n%zu picture%s in the folder pictures\n", c->doc->n_surface_picture,
+            c->doc->n_surface_picture == 1 ? "" : "s");
     print_warnings(c, out);
 }
 

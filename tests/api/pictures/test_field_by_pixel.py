@@ -31,7 +31,7 @@ def test_wide_pixels_show_the_far_field(tmp_path, near, far):
     """Wide pixels have the bits of a job of the far field, and narrow ones those without the option."""
     asked = pictures_of(tmp_path / "asked", document(near, *({**p, "field_by_pixel": True} for p in (WIDE, NARROW))))
     plain = pictures_of(tmp_path / "plain", document(near, WIDE, NARROW))
-    of_far = pictures_of(tmp_path / "far", document(far, WIDE, {**NARROW, "field_by_pixel": True}))
+    of_far = pictures_of(tmp_path / "far", document(far, WIDE, NARROW))
     assert [p["model"] for p in asked] == [far, near]
     assert [p["model"] for p in plain] == [near, near] and [p["model"] for p in of_far] == [far, far]
     assert asked[0]["mean"] == of_far[0]["mean"] and asked[1]["mean"] == plain[1]["mean"]
@@ -44,3 +44,12 @@ def test_wide_pixels_show_the_far_field(tmp_path, near, far):
 def test_the_option_belongs_to_pictures(real):
     doc = {**document("fur_near.v1", WIDE), "field_by_pixel": True}
     assert "field_by_pixel" in problem(real.post("/v1/jobs", json=doc), 422, "invalid", "field_by_pixel")["detail"]
+
+
+def test_a_model_without_a_far_field_is_refused(real):
+    """Before the fit begins. Where the best of several models is shown, one of them with a far field is enough."""
+    asked = {**WIDE, "field_by_pixel": True}
+    said = problem(real.post("/v1/jobs", json=document("fur.v1", asked)), 422, "invalid", "pictures[0].field_by_pixel")["detail"]
+    assert "fur.v1" in said and "fur_near.v1" in said
+    several = {**document("fur_near.v1", asked), "fit": {"models": ["two_lobe.v1", "fur_near.v1"]}, "measurements": {"file": "rows.csv"}}
+    assert real.post("/v1/jobs", json=several).status_code == 201

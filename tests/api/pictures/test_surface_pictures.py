@@ -10,6 +10,7 @@ import time
 import pytest
 from daemon_under_test import problem, program
 from small_cloth import TABLE, hair
+from small_exr import exr
 
 VIEW = {"light_theta_deg": 45, "light_phi_deg": 0, "camera_theta_deg": 45, "camera_phi_deg": 180, "px": 16, "samples": 16}
 SHEET = "v -5 -5 0\nv 5 -5 0\nv 5 5 0\nv -5 5 0\nvt -5 -5\nvt 5 -5\nvt 5 5\nvt -5 5\n"
@@ -146,6 +147,30 @@ def test_a_mesh_that_cannot_be_used_is_found_before_the_fit(real, obj, words):
     assert all(w in done["error"]["text"] for w in words), done["error"]
 
 
+@pytest.mark.parametrize("picture, option, words", [
+    pytest.param({"on": "drape", "radius_mm": 1}, "radius_mm", "touch each other", marks=pytest.mark.slow),
+    ({"on": "flat", "method": "diffusion"}, "method", "a pile")])
+def test_a_surface_that_this_cloth_cannot_have_names_its_option(real, picture, option, words):
+    _, done = run(real, document({"on": "flat", **VIEW}, {**VIEW, **picture}))
+    assert done["state"] == "failed" and done["stage"] == "scene" and done["error"]["field"] == f"pictures[1].{option}", done["error"]
+    assert words in done["error"]["text"]
+
+
+@pytest.mark.parametrize("method", ["fast", "corrected", "diffusion"])
+def test_tables_have_the_sheet_of_the_job(real, method):
+    doc = document({"on": "cylinder", **VIEW, "method": method, "black_sheet": False})
+    assert "of the job" in problem(real.post("/v1/jobs", json=doc), 422, "invalid", "pictures[0].black_sheet")["detail"]
+    assert real.post("/v1/jobs", json={**doc, "black_sheet": False}).status_code == 201
+
+
+def test_a_black_picture_is_a_warning(real):
+    """A camera 1 m above the orbit center does not see a cloth that lies 1.1 m above it."""
+    mesh = {"on": "mesh", "mesh_file": "sheet.obj", **VIEW, "samples": 1}
+    _, done = run(real, document(mesh, {"on": "flat", **VIEW, "width_mm": 3}), sheet_at(1100))
+    assert done["state"] == "succeeded", done["error"]
+    assert [w[:10] for w in done["warnings"] if "is black" in w] == ["picture 1 "], done["warnings"]
+
+
 def sheet_at(z):
     return SHEET.replace(" 0\n", f" {z}\n") + "f 1/1 2/2 3/3 4/4\n"
 
@@ -173,7 +198,7 @@ def test_a_cylinder_thinner_than_the_cloth_is_refused(real):
     _, done = run(real, document({"on": "cylinder", "radius_mm": 0.1, **VIEW}))  # the cloth is that thick, nearly
     assert done["state"] == "succeeded", done["error"]
     _, done = run(real, document({"on": "cylinder", "radius_mm": 0.1, **VIEW}), layers=6)
-    assert done["state"] == "failed" and "folds over itself" in done["error"]["text"] and done["error"]["field"] == "", done["error"]
+    assert done["state"] == "failed" and "folds over itself" in done["error"]["text"] and done["error"]["field"] == "pictures[0].radius_mm", done["error"]
 
 
 @pytest.mark.parametrize("picture, field, word", [
@@ -276,6 +301,26 @@ def test_the_command_renders_a_finished_job(real, tmp_path):
     for mean, rendered, rendered_se in zip(picture["mean"], row["rendered"], row["rendered_se"]):
         assert abs(mean - rendered) < 5 * math.hypot(se, rendered_se)
     assert sorted(f for f in os.listdir(tmp_path)) == ["out", "sheet.obj"]
+    assert f"mean radiance {picture['mean'][0]:.4g} " in shown.stdout and f"noise of a pixel {100 * picture['noise']:.0f} %" in shown.stdout
+
+
+def test_the_command_takes_the_light_of_the_job(real, tmp_path):
+    """Lamp and environment, also that of an image, so that the picture is the one that the job itself would make."""
+    around = {"radiance": [0.2, 0.1, 0.3], "file": "sky.exr"}
+    view = {"on": "flat", "width_mm": 3, **VIEW}
+    doc = {**document(view), "environment": around, "lamp": {"kind": "directional"}}
+    sky = exr(4, 2, lambda x, y: (0.5, 0.25, 0.0))
+    job = real.create(doc)
+    for name, data, role in (("cloth.hair", hair(layers=3), "fibers"), ("rows.csv", TABLE.encode(), "measurements"), ("sky.exr", sky, "environment")):
+        real.upload(job, name, data, role)
+    assert real.post(f"/v1/jobs/{job}/start").status_code == 202
+    own = real.wait_state(job, "succeeded", "failed", timeout_s=60)["result"]["pictures"][0]
+    shown = render(real, job, "--on", "flat", "--lamp", "45,0", "--camera", "45,180", "--px", 16, "--samples", 16, "--width-mm", 3, "--out", tmp_path / "out")
+    assert shown.returncode == 0, shown.stderr
+    made = json.loads((tmp_path / "out/result.json").read_text())["pictures"][0]
+    assert made["mean"] == pytest.approx(own["mean"], abs=5 * own["noise"] * sum(own["mean"]) / 3 / 16)
+    dark = render(real, job, "--on", "flat", "--lamp", "45,0", "--visibility", "tables", "--out", tmp_path / "none")
+    assert dark.returncode != 0 and "visibility" in dark.stderr
 
 
 def test_what_the_command_refuses(real, tmp_path):

@@ -65,12 +65,15 @@ static status make_mesh(const struct pipeline_context *c, size_t i, struct mesh 
     }
 }
 
-/* The picture's name before the error, and the option of its mesh, if it has one, as the field. */
+/* The picture's name before the error. Its field, where it has none yet, is what makes the surface: the mesh or the
+ * radius. */
 static status name_picture(size_t i, enum job_surface on, status s, struct error *err)
 {
     if (s == STATUS_OK || s == STATUS_CANCELLED || err == NULL) return s;
-    if (on == JOB_ON_MESH && (s == STATUS_INVALID || s == STATUS_FORMAT))
-        snprintf(err->field, sizeof err->field, OPTION_MESH_FILE "[%zu]", i);
+    const bool of_document = (s == STATUS_INVALID || s == STATUS_FORMAT) && err->field[0] == '\0';
+    if (of_document && on != JOB_ON_FLAT)
+        snprintf(err->field, sizeof err->field, "%s[%zu]", on == JOB_ON_MESH ? OPTION_MESH_FILE : OPTION_PICTURE_RADIUS,
+                 i);
     return error_prefix(err, s, "picture %zu", i + 1);
 }
 
@@ -111,15 +114,10 @@ static status check_surface(const struct pipeline_context *c, size_t i, const st
     const struct job_surface_picture *p = &d->surface_picture[i];
     const double mm_per_cm = 10.0;
     double at[3];
-    const bool pile = p->method == JOB_PICTURE_DIFFUSION;
-    const bool by_tables = p->method == JOB_PICTURE_FAST || p->method == JOB_PICTURE_CORRECTED || pile;
-    if (by_tables && p->black_sheet >= 0 && (p->black_sheet != 0) != d->black_sheet)
-        return error_set(
-            err, STATUS_INVALID,
-            "a picture by tables has the black sheet of the job, or none like it: leave out black_sheet of "
-            "the picture, or take the method path");
-    if (pile) {
+    if (p->method == JOB_PICTURE_DIFFUSION) {
         status s = diffusion_check_pile(c->scene, NULL, err);
+        if (s == STATUS_INVALID && err != NULL)
+            snprintf(err->field, sizeof err->field, OPTION_PICTURE_METHOD "[%zu]", i);
         if (s != STATUS_OK) return s;
     }
     point_from(p->camera_theta_deg, p->camera_phi_deg - p->cloth_rotation_deg, mm_per_cm * d->camera_distance_cm, at);

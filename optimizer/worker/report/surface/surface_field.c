@@ -1,4 +1,5 @@
 #include "optimizer/worker/report/surface/surface_field.h"
+#include "base/catalogue/model_catalogue.h"
 
 #include <math.h>
 
@@ -20,8 +21,9 @@ const struct appearance *surface_field_model(const struct pipeline_context *c, s
                                              struct appearance *far)
 {
     const struct job_surface_picture *p = &c->doc->surface_picture[i];
-    if (!p->field_by_pixel || best->surface == NULL || best->surface->far_field == NULL) return best;
+    const char *id = model_catalogue_far_field(best->id);
+    if (!p->field_by_pixel || id == NULL) return best;
     double pixel_m = 1e-3 * p->width_mm / (double)p->px;
     if (surface_field_coverage(&c->fiber, pixel_m) < 1.0) return best;
-    return appearance_find(best->surface->far_field, far) ? far : best;
+    return appearance_find(id, far) ? far : best;
 }

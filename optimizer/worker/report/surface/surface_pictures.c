@@ -285,6 +285,19 @@ static bool is_finished(const json_t *entry, const struct job_surface_picture *p
            json_object_get(entry, "reference") != NULL;
 }
 
+/* A picture without any light, which a camera that looks past the cloth and a lamp behind a black sheet make. */
+static void warn_if_black(struct pipeline_context *c, size_t i, const json_t *entry)
+{
+    const json_t *mean = json_object_get(entry, "mean");
+    double sum = 0.0;
+    for (size_t k = 0; k < json_array_size(mean); k++) sum += json_number_value(json_array_get(mean, k));
+    if (sum == 0.0)
+        worker_status_warn(c->status,
+                           "picture %zu is black: no light of the lamp comes from the cloth to the camera, or the "
+                           "cloth lies beside the picture (see its angles, width_mm and black_sheet)",
+                           i + 1);
+}
+
 static status write_one(struct pipeline_context *c, size_t i, const struct surface_tables *tables,
                         const struct progress *progress, struct error *err)
 {
@@ -296,17 +309,20 @@ static status write_one(struct pipeline_context *c, size_t i, const struct surfa
     snprintf(relative, sizeof relative, "pictures/%s.json", name);
     worker_folder_path(c->folder, JOB_FOLDER_RESULTS, relative, path);
     json_t *entry = json_load_file(path, 0, NULL);
-    if (entry != NULL && is_finished(entry, p, has_fibers))
+    if (entry != NULL && is_finished(entry, p, has_fibers)) {
+        warn_if_black(c, i, entry);
         return json_array_append_new(c->surface_pictures, entry) == 0 ? STATUS_OK : STATUS_NO_MEMORY;
+    }
     json_decref(entry);
     entry = NULL;
     const struct one_picture one = {
         .i = i, .entry_path = path, .how = surface_tables_method(tables, p), .tables = tables};
     status s = surface_passes_start(c, name, p->px, p->px, &so_far, err);
     if (s == STATUS_OK) s = render(c, &one, progress, &so_far, &entry, err);
-    if (s == STATUS_OK)
+    if (s == STATUS_OK) {
+        warn_if_black(c, i, entry);
         json_array_append_new(c->surface_pictures, entry);
-    else
+    } else
         json_decref(entry);
     surface_passes_release(&so_far);
     return s;

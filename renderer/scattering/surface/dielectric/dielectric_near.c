@@ -25,7 +25,6 @@ static status prepare(const double *param, struct scattering_state **state, stru
 
 const struct scattering_model scattering_dielectric_near = {
     SURFACE_MODEL_ROW(dielectric_near),
-    .far_field = "dielectric.v1",
     .prepare = prepare,
     NEAR_FIELD_FUNCTIONS,
 };

@@ -249,14 +249,7 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
 }
 
 const struct scattering_model scattering_fur_near = {
-    SURFACE_MODEL_ROW(fur_near),
-    .near_field = true,
-    .far_field = "fur.v1",
-    .prepare = prepare,
-    .prepare_shared = prepare_shared,
-    .release = release,
-    .eval = eval,
-    .sample = sample,
-    .pdf = pdf,
+    SURFACE_MODEL_ROW(fur_near), .near_field = true, .prepare = prepare, .prepare_shared = prepare_shared,
+    .release = release,          .eval = eval,       .sample = sample,   .pdf = pdf,
     .eval_pdf = eval_pdf,
 };
