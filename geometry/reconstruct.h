@@ -81,7 +81,8 @@ struct reconstruct_report {
     bool lumens_measured;        /* each fiber has a lumen of its own with an error (fiber_shape.h) */
     double fiber_diameter_voxel; /* given, or measured from the volume before the filter */
     /* The peak that the measured diameter was preferred to (fiber_diameter.h), and the shares of noise in both; NaN if
-     * there is none, or the diameter was given. */
+     * there is none. Where the diameter was given: what the scan shows, if that differs by a factor of
+     * FIBER_DIAMETER_FINER or more, and the shares are NaN. */
     double other_diameter_voxel, diameter_noise_share, other_diameter_noise_share;
     double trace_edge_voxel; /* edge of the voxels that fibers were found in, per voxel of the scan (trace_grid.h) */
     size_t n_material_voxel, n_kept_voxel; /* V >= eps_d; V >= eps_d and J <= eps_j */
@@ -107,6 +108,7 @@ struct reconstruct_report {
     struct scan_trial trial;       /* with reconstruct_trial; else not made */
     double direction_noise_deg[2]; /* before and after the transfer (direction_noise.h) */
     double direction_change_mean_deg; /* between filtered and transferred directions */
+    double axis_share[3];             /* of the voxels with a direction: those that run most along x, y, z */
 };
 
 /* Memory, or space in files, that all steps together need for a voxel of the scan. */

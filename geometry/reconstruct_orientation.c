@@ -28,6 +28,19 @@ static void prefer_hidden(const struct scan_noise *noise, struct fiber_diameter 
     d->hidden = true;
 }
 
+/* Measures the diameter beside one that the job gives, and states it where it is another. Fibers that noise hides are
+ * not looked for. */
+static status check_given(const struct volume *v, struct thread_pool *pool, const struct progress *progress,
+                          struct fiber_diameter *d, struct error *err)
+{
+    struct fiber_diameter measured;
+    status s = fiber_diameter_measure(v, pool, progress, &measured, err);
+    if (s == STATUS_OK && measured.noise_share < 0.5 &&
+        fabs(log(measured.voxel / d->voxel)) > log(FIBER_DIAMETER_FINER))
+        d->other_voxel = measured.voxel;
+    return s;
+}
+
 /* Takes the fiber diameter of the job, or measures it. */
 static status find_diameter(const struct volume *v, const struct reconstruct_option *option, struct thread_pool *pool,
                             const struct progress *progress, struct reconstruct_report *report, struct error *err)
@@ -38,6 +51,8 @@ static status find_diameter(const struct volume *v, const struct reconstruct_opt
     if (isnan(d.voxel)) {
         s = fiber_diameter_measure(v, pool, progress, &d, err);
         if (s == STATUS_OK) prefer_hidden(&report->noise, &d);
+    } else {
+        s = check_given(v, pool, progress, &d, err);
     }
     report->fiber_diameter_voxel = d.voxel;
     report->diameter_noise_share = d.noise_share;

@@ -94,6 +94,22 @@ static status average_unresolved(const struct fiber_set *f, struct direction_vol
     return unresolved_directions_average(d, 2.0 * sum_m / (double)f->n_fiber / d->voxel_size_m[0], pool, NULL, err);
 }
 
+/* How the material runs. */
+static void count_axes(const struct direction_volume *d, double share[3])
+{
+    const size_t n_voxel = volume_n_voxel(d->n);
+    size_t n[3] = {0, 0, 0};
+    for (size_t i = 0; i < n_voxel; i++) {
+        float u[3];
+        if (d->density[i] == 0) continue;
+        direction_volume_get(d, i, u);
+        const int across = fabsf(u[1]) > fabsf(u[0]) ? 1 : 0;
+        n[fabsf(u[2]) > fabsf(u[across]) ? 2 : across]++;
+    }
+    const double all = (double)(n[0] + n[1] + n[2]);
+    for (int a = 0; a < 3; a++) share[a] = all > 0.0 ? (double)n[a] / all : 0.0;
+}
+
 status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *d, struct thread_pool *pool,
                             const struct progress *progress, struct reconstruct_report *report, struct error *err)
 {
@@ -122,6 +138,7 @@ status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *
     if (s == STATUS_OK) reduce(&job, n_brick, report);
     if (s == STATUS_OK) s = average_unresolved(f, d, pool, report, err);
     if (s == STATUS_OK) s = direction_noise_measure(d, pool, NULL, &report->direction_noise_deg[1], err);
+    if (s == STATUS_OK) count_axes(d, report->axis_share);
     free(job.distance2);
     free(job.nearest);
     free(job.sum);

@@ -97,7 +97,13 @@ void reconstruct_warn_volume(const struct reconstruct_option *o, const struct re
 static void warn_diameter(const struct warning_sink *warn, const struct reconstruct_report *r)
 {
     double chosen = r->fiber_diameter_voxel, other = r->other_diameter_voxel;
-    if (other < chosen)
+    const bool given = isnan(r->diameter_noise_share);
+    if (given && isfinite(other))
+        warning_send(warn, OPTION_FIBER_DIAMETER,
+                     "the fiber diameter that was given, %.1f voxels, was taken over one of %.1f voxels that the scan "
+                     "shows; leave it out if this is wrong",
+                     chosen, other);
+    else if (other < chosen)
         warning_send(warn, OPTION_FIBER_DIAMETER,
                      "a fiber diameter of %.1f voxels was chosen over one of %.1f, because %.0f %% of the response "
                      "there is noise; give the diameter if this is wrong",

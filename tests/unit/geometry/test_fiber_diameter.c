@@ -181,6 +181,12 @@ static void test_given_diameter(void **state)
     assert_int_equal(reconstruct_orientation(&v, &o, NULL, NULL, &d, &r, NULL), STATUS_OK);
     assert_true(r.fiber_diameter_voxel == 5.0 && isnan(r.other_diameter_voxel));
     assert_int_equal(o.h, 15);
+    direction_volume_release(&d);
+    o.fiber_diameter_voxel = 14.0; /* another one than the scan's, which is stated */
+    o.h = 0;
+    assert_int_equal(reconstruct_orientation(&v, &o, NULL, NULL, &d, &r, NULL), STATUS_OK);
+    print_message("given 14.0, the scan shows %.2f\n", r.other_diameter_voxel);
+    assert_true(r.fiber_diameter_voxel == 14.0 && fabs(r.other_diameter_voxel / 7.0 - 1.0) < 0.15);
     volume_release(&v);
     direction_volume_release(&d);
 }
@@ -226,6 +232,9 @@ static void test_diameter_warning(void **state)
     r.other_diameter_voxel = 20.0;
     reconstruct_warn_fibers(&r, &f, &sink);
     assert_non_null(strstr(text, "7.0 voxels was chosen over one of 20.0, which responds more strongly"));
+    r.diameter_noise_share = NAN; /* given */
+    reconstruct_warn_fibers(&r, &f, &sink);
+    assert_non_null(strstr(text, "that was given, 7.0 voxels, was taken over one of 20.0 voxels that the scan shows"));
 }
 
 int main(void)

@@ -82,6 +82,8 @@ static void test_transfer(void **state)
     assert_true(n_changed > 2 * n_both && n_both < n_fiber);
     assert_true(fabs(report.dice - 2.0 * (double)n_both / (double)(n_fiber + n_kept)) < 1e-12);
     assert_true(fabs(report.direction_change_mean_deg - 90.0) < 0.02);
+    assert_true(fabs(report.axis_share[0] - (double)n_changed / (double)n_kept) < 1e-12);
+    assert_true(fabs(report.axis_share[0] + report.axis_share[1] + report.axis_share[2] - 1.0) < 1e-12);
     fiber_set_release(&f);
     direction_volume_release(&d);
 }

@@ -1,3 +1,4 @@
+#include "base/angle.h"
 #include "base/option_id.h"
 #include "geometry/volume/tile_crop.h"
 #include "optimizer/job/option_key.h"
@@ -90,6 +91,34 @@ static void print_fibers(const struct pipeline_context *c, const struct fiber_le
           out);
 }
 
+/* How sure the fibers are. */
+static void print_errors(const struct pipeline_context *c, FILE *out)
+{
+    const struct reconstruct_report *g = &c->geometry;
+    if (c->fiber.n_fiber > 0 && isnan(c->doc->radius_um)) {
+        row(out, "spread of the radii", "standard deviation between fibers over the mean, without errors", "%.1f %%",
+            100.0 * g->radius_spread);
+        row(out, "error of the radius of a fiber", "typical standard error", "%.2f um", g->single_radius_se_m * 1e6);
+    }
+    if (c->fiber.n_fiber > 0 && g->axis_position_se_m > 0.0)
+        row(out, "error of the axes", "standard errors of position and direction by the noise of the scan",
+            "%.2f um, %.2f&deg;", g->axis_position_se_m * 1e6, angle_to_deg(g->axis_direction_se_rad));
+}
+
+/* The diameter that the scales of all steps follow from. */
+static void print_diameter(const struct pipeline_context *c, FILE *out)
+{
+    const struct reconstruct_report *g = &c->geometry;
+    const bool given = !isnan(c->doc->fiber_diameter_voxel);
+    row(out, "fiber diameter",
+        given ? "given by the job; from 7 voxels on, touching fibers can be separated"
+              : "measured before tracing; from 7 voxels on, touching fibers can be separated",
+        "%.1f voxels", g->fiber_diameter_voxel);
+    if (isfinite(g->other_diameter_voxel))
+        row(out, "diameter that was not taken", given ? "what the scan itself shows" : "the next best one",
+            "%.1f voxels", g->other_diameter_voxel);
+}
+
 static void print_scan(const struct pipeline_context *c, FILE *out)
 {
     const struct reconstruct_report *g = &c->geometry;
@@ -107,8 +136,10 @@ static void print_scan(const struct pipeline_context *c, FILE *out)
     row(out, "voxels kept", "those with a clear direction", "%zu", g->n_kept_voxel);
     row(out, "gaps bridged", "missed centers within a fiber", "%zu", g->n_gap_bridged);
     row(out, "pieces joined", "of one fiber, end to end", "%zu", g->n_joined);
-    row(out, "fiber diameter", "measured before tracing; from 7 voxels on, touching fibers can be separated",
-        "%.1f voxels", g->fiber_diameter_voxel);
+    print_diameter(c, out);
+    print_errors(c, out);
+    row(out, "material along x, y, z", "by the directions of its voxels, also where single fibers are not resolved",
+        "%.1f, %.1f, %.1f %%", 100.0 * g->axis_share[0], 100.0 * g->axis_share[1], 100.0 * g->axis_share[2]);
     row(out, "direction noise, filtered", "mean angle from voxel to voxel along the fiber", "%.2f&deg;",
         g->direction_noise_deg[0]);
     row(out, "direction noise, transferred", "after taking the fibers' directions", "%.2f&deg;",
@@ -140,10 +171,15 @@ static void print_trial_fibers(const struct scan_trial *t, FILE *out)
 }
 
 /* What such a scan can give. */
-static void print_trial(const struct scan_trial *t, FILE *out)
+static void print_trial(const struct scan_trial *t, bool asked, FILE *out)
 {
-    if (!t->made) return;
+    if (!t->made && !asked) return;
     open_table(out, "What this scan can give");
+    if (!t->made) {
+        row(out, "length found again", "a phantom of these fibers cannot be reconstructed", "none");
+        close_table(out);
+        return;
+    }
     row(out, "length found again", "of a phantom of these fibers with the noise and blur of the scan",
         "%.1f %% &plusmn; %.1f", 100.0 * t->recall, 100.0 * (isfinite(t->recall_se) ? t->recall_se : 0.0));
     row(out, "axes", "root mean square distance from the true ones", "%.2f voxels", t->axis_rms_voxel);
@@ -297,7 +333,7 @@ void quality_page(struct pipeline_context *c, const struct fiber_lengths *l, FIL
     print_fibers(c, l, out);
     section_report_table(c, out);
     if (c->doc->has_volume) print_scan(c, out);
-    print_trial(&c->geometry.trial, out);
+    print_trial(&c->geometry.trial, c->doc->trial, out);
     print_seam(c, out);
     print_pictures(c, out);
     if (c->doc->has_volume) print_chosen(c, out);

@@ -172,6 +172,13 @@ static void set_densities(json_t *json, const struct reconstruct_report *g)
     json_object_set_new(json, "smoothed_noise_sd", json_number(g->noise.mapped_sd));
 }
 
+static void set_directions(json_t *json, const struct reconstruct_report *g)
+{
+    json_object_set_new(json, "direction_noise_deg", json_number_list(g->direction_noise_deg, 2, 1.0));
+    json_object_set_new(json, "direction_change_mean_deg", json_number(g->direction_change_mean_deg));
+    json_object_set_new(json, "axis_share", json_number_list(g->axis_share, 3, 1.0));
+}
+
 /* The cloth of the fitted numbers, with the tile of the final fit; before the fit, that of the document. */
 static json_t *described_json(const struct pipeline_context *c)
 {
@@ -237,8 +244,7 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "dice", json_number(g->dice));
     json_object_set_new(json, "grade", grade_json(&g->grade));
     json_object_set_new(json, "trial", trial_json(&g->trial));
-    json_object_set_new(json, "direction_noise_deg", json_number_list(g->direction_noise_deg, 2, 1.0));
-    json_object_set_new(json, "direction_change_mean_deg", json_number(g->direction_change_mean_deg));
+    set_directions(json, g);
     json_object_set_new(json, "alignment", alignment_json(o, g));
     json_object_set_new(json, "crop", crop_json(o, g));
     json_object_set_new(json, "seam_density", seam_density_json(&g->seam_density));

@@ -96,8 +96,9 @@ void section_report_table(const struct pipeline_context *c, FILE *out)
     fputs("</table>\n", out);
     if (s.measured_share > 0.0)
         fputs("<figure><img class=\"plot\" src=\"pictures/fiber-sections.svg\" alt=\"distribution of the ratio of the "
-              "axes\"><figcaption>Share of the length over the ratio of the axes of the section. Pictures of the cloth "
-              "have round fibers of the same area.</figcaption></figure>\n",
+              "axes\"><figcaption>Share of the length over the ratio of the axes of the section. Fitted "
+              "models see round fibers of the same area, but for elliptical_oriented.v1, which sees the "
+              "ellipses.</figcaption></figure>\n",
               out);
 }
 
