@@ -16,6 +16,11 @@ static const float MIN_BLURRED = 0.35f;
 static const double LEAST_MATERIAL = 0.02;
 enum { NEAR_MATERIAL = 2 };           /* voxels; peaks of the noise in void must not count */
 static const double MOST_NOISE = 0.5; /* share of a peak that noise may have */
+/* A shoulder is a peak of the energy over sigma. The response to a plane outline has an energy that grows as sigma, and
+ * that of a rod grows faster up to its own peak, so the outlines of yarns and of rods without inner structure have no
+ * such peak at finer scales, but may hide the fall beyond the peak of fibers. What follows must fall to the first share
+ * of it before the coarser peak, and less than the second may be noise, whose remains are broad; as of broad peaks. */
+static const double SHOULDER_VALLEY = 0.85, MOST_REMAINS = 0.25;
 /* No scanner resolves less than about half a voxel, so a blur by that lowers the noise more than the fibers. It is used
  * only for diameters below the chosen one divided by FIBER_DIAMETER_FINER. */
 static const double SECOND_BLUR_VOXEL = 0.5;
@@ -183,13 +188,36 @@ static bool is_peak(const struct energy e[N_SCALE], int i)
     return e[i].signal > e[i - 1].signal && e[i].signal > e[i + 1].signal && e[i].signal > 1.1 * e[i + 2].signal;
 }
 
-/* Diameter of a peak: a parabola through its energy and that of the two scales beside it, in log sigma. */
-static double diameter_at(const struct energy e[N_SCALE], int i)
+/* Whether scale i is a broad peak with little noise: it falls by a tenth anywhere before the energy rises above it. */
+static bool is_broad_peak(const struct energy e[N_SCALE], int i)
+{
+    if (e[i].signal <= e[i - 1].signal || noise_share(e[i]) > MOST_REMAINS) return false;
+    for (int k = i + 1; k < N_SCALE && e[k].signal <= e[i].signal; k++)
+        if (e[i].signal > 1.1 * e[k].signal) return true;
+    return false;
+}
+
+static double over_sigma(const struct energy e[N_SCALE], int i) { return e[i].signal / scale_sigma(i); }
+
+/* Whether scale i is a shoulder below the peak of yarns at scale coarse. */
+static bool is_shoulder(const struct energy e[N_SCALE], int i, int coarse)
+{
+    const double at = over_sigma(e, i);
+    double least = at;
+    if (at < over_sigma(e, i - 1) || at < over_sigma(e, i + 1)) return false;
+    for (int k = i + 1; k < coarse; k++) least = fmin(least, over_sigma(e, k));
+    return least < SHOULDER_VALLEY * at && noise_share(e[i]) < MOST_REMAINS;
+}
+
+/* Diameter of a peak of the energy over sigma^power at or beside scale i: a parabola through its logarithm there and at
+ * the scales beside it, in log sigma. */
+static double diameter_at(const struct energy e[N_SCALE], int i, double power)
 {
     double shift = 0.0;
     if (i > 0 && i < N_SCALE - 1 && e[i - 1].signal > 0.0 && e[i + 1].signal > 0.0) {
         double l = log(e[i - 1].signal), c = log(e[i].signal), r = log(e[i + 1].signal);
-        shift = 0.5 * (l - r) / (l - 2.0 * c + r);
+        shift = (0.5 * (l - r) + power * log(1.14)) / (l - 2.0 * c + r);
+        shift = fmax(-1.0, fmin(1.0, shift));
     }
     return fmin(24.0, fmax(2.0, DIAMETER_OVER_SIGMA * scale_sigma(0) * pow(1.14, i + shift)));
 }
@@ -211,10 +239,22 @@ static void choose_peak(const struct energy e[N_SCALE], struct fiber_diameter *d
     for (int i = 0; i < N_SCALE; i++)
         if (e[i].signal > e[most].signal) most = i;
     if (best < 0) best = most;
+    for (int i = best + 1; i + 2 < N_SCALE && noise_share(e[best]) > MOST_NOISE; i++)
+        if (is_broad_peak(e, i)) {
+            other = best;
+            best = i;
+        }
+    double power = 0.0;
+    for (int i = 1; scale_sigma(i) * FIBER_DIAMETER_FINER < scale_sigma(best); i++)
+        if (is_shoulder(e, i, best)) {
+            other = best;
+            best = i;
+            power = 0.5; /* between a peak alone and one on a slope of outlines */
+        }
     d->hidden = false;
-    d->voxel = diameter_at(e, best);
+    d->voxel = diameter_at(e, best, power);
     d->noise_share = noise_share(e[best]);
-    d->other_voxel = other >= 0 ? diameter_at(e, other) : NAN;
+    d->other_voxel = other >= 0 ? diameter_at(e, other, 0.0) : NAN;
     d->other_noise_share = other >= 0 ? noise_share(e[other]) : NAN;
 }
 
@@ -257,11 +297,12 @@ static status look_finer(struct job *job, int n_scale, struct thread_pool *pool,
     const struct progress quiet = progress_silent(progress);
     status s = measure_energy(job, SECOND_BLUR_VOXEL, n_scale, pool, &quiet, e, &measured);
     for (int i = 1; i + 2 < n_scale && s == STATUS_OK; i++) {
-        if (!is_peak(e, i) || noise_share(e[i]) > MOST_NOISE || diameter_at(e, i) * FIBER_DIAMETER_FINER > d->voxel)
+        if (!is_peak(e, i) || noise_share(e[i]) > MOST_NOISE ||
+            diameter_at(e, i, 0.0) * FIBER_DIAMETER_FINER > d->voxel)
             continue;
         d->other_voxel = d->voxel;
         d->other_noise_share = d->noise_share;
-        d->voxel = diameter_at(e, i);
+        d->voxel = diameter_at(e, i, 0.0);
         d->noise_share = noise_share(e[i]);
         d->hidden = true;
         break;

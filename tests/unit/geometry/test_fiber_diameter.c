@@ -151,6 +151,30 @@ static void test_diameter_below_that_of_yarns(void **state)
     assert_true(fabs(d.voxel / 18.0 - 1.0) < 0.2);
 }
 
+/* Where the void between fibers is filled in part, their yarns hide the fall of the response beyond the fibers' scale.
+ * The fibers are found all the same; solid rods stay rods, with noise or without. */
+static void test_shoulder_of_yarns(void **state)
+{
+    (void)state;
+    static const float filling[3] = {0.4f, 0.5f, 0.6f};
+    for (int k = 0; k < 3; k++) {
+        struct volume v, rods;
+        make_yarns(&v, false);
+        make_yarns(&rods, true);
+        for (size_t i = 0; i < volume_n_voxel(v.n); i++)
+            v.density[i] = fmaxf(v.density[i], filling[k] * rods.density[i]);
+        add_white_noise(&v, 0.1, 4);
+        const struct fiber_diameter d = measure_clamped(&v);
+        add_white_noise(&rods, k == 0 ? 0.0 : 0.1 * k, 5);
+        const struct fiber_diameter rod = measure_clamped(&rods);
+        print_message("void filled to %.1f: diameter %.2f, other %.2f; solid rods with noise of %.1f: %.2f\n",
+                      (double)filling[k], d.voxel, d.other_voxel, 0.1 * k, rod.voxel);
+        assert_true(fabs(d.voxel / 4.0 - 1.0) < 0.15);
+        assert_true(d.other_voxel > 16.0 && d.other_voxel < 22.0);
+        assert_true(fabs(rod.voxel / 18.0 - 1.0) < 0.2);
+    }
+}
+
 /* Noise that hides thin fibers is lowered as that of thick ones, and their diameter is kept. */
 static void test_hidden_fibers_are_smoothed(void **state)
 {
@@ -243,6 +267,7 @@ int main(void)
         cmocka_unit_test(test_diameter_in_strong_noise),
         cmocka_unit_test(test_diameter_in_correlated_noise),
         cmocka_unit_test(test_diameter_below_that_of_yarns),
+        cmocka_unit_test(test_shoulder_of_yarns),
         cmocka_unit_test(test_hidden_fibers_are_smoothed),
         cmocka_unit_test(test_given_diameter),
         cmocka_unit_test(test_hidden_diameter),
