@@ -117,11 +117,13 @@ static status get_tables(struct pipeline_context *c, const struct progress *prog
     if (s != STATUS_OK) return s;
     worker_folder_path(c->folder, JOB_FOLDER_WORK, "report/fast.tables", path);
     struct error unread;
-    t->present = fast_precompute_kept(&q, path, &t->tables, &unread) == STATUS_OK;
+    const status kept = fast_precompute_kept(&q, path, &t->tables, &unread);
+    t->present = kept == STATUS_OK;
     if (t->present) {
         unlink(journal); /* of an attempt that ended after it had written the tables */
         return STATUS_OK;
     }
+    if (kept != STATUS_NOT_FOUND) log_info(c->log, "tables are made anew: %s", unread.text);
     s = fast_precompute(&q, c->pool, progress, &t->tables, err);
     t->present = s == STATUS_OK;
     if (s == STATUS_OK) s = fast_tables_write(&t->tables, path, err);
