@@ -233,7 +233,7 @@ static status render(struct cli *cli, const json_t *document, const char *folder
     if (s == STATUS_OK) s = cli_watch_job(cli, id, exit_code, err);
     if (s == STATUS_OK && *exit_code == CLI_EXIT_OK) s = cli_results_to_out(cli, id, err);
     if (s == STATUS_OK && *exit_code == CLI_EXIT_OK) s = describe(cli, id, err);
-    if (s != STATUS_OK && id[0] != '\0')
+    if (s != STATUS_OK && s != STATUS_CONFLICT && id[0] != '\0') /* a conflict is a job that has failed */
         fprintf(cli->note, "continue with: selvedge watch %s, then selvedge results %s\n", id, id);
     return s;
 }

@@ -135,6 +135,10 @@ status stage_scene(struct pipeline_context *c, struct error *err)
     reconstruct_warn_fibers(
         &c->geometry, &c->fiber,
         &(struct warning_sink){pipeline_warn, c}); /* this stage runs in every attempt, so the warnings are not lost */
+    if (c->doc->has_correction && c->doc->has_volume && wants_volume_scene(c))
+        pipeline_warn(c, OPTION_CORRECTION,
+                      "volume models see the densities and directions of the scan, which corrections of fibers do not "
+                      "change: they are without effect on such models");
     status s = c->doc->has_correction ? correct_fibers(c, err) : STATUS_OK;
     if (s == STATUS_OK) s = pipeline_make_scene(c, err);
     return s == STATUS_OK ? surface_cloth_check(c, err) : s;
