@@ -102,8 +102,9 @@ def test_numbers_come_back(tmp_path, sample):
     again = make_job(tmp_path, "again", sample)
     run(again, cloth=made["description"], photographs=photographs(sample), fit={"model": "two_lobe.v1", "path_budget": 1000, "max_iterations": 1, **OUTPUT})
     alike = json.loads((again / "results" / "result.json").read_text())["geometry"]
-    # how many vertices a fiber has follows from the numbers of the document, so lengths differ by the corners
-    assert abs(alike["n_fiber"] - result["geometry"]["n_fiber"]) <= 2 and abs(alike["total_length_mm"] / result["geometry"]["total_length_mm"] - 1) < 0.05
+    # how many vertices a fiber has follows from the numbers of the document, so lengths differ by the corners, and a staple that ends within
+    # one of them from a face of the tile may be cut there or not: a fourth of the 16 yarns may have one more or less
+    assert abs(alike["n_fiber"] - result["geometry"]["n_fiber"]) <= 4 and abs(alike["total_length_mm"] / result["geometry"]["total_length_mm"] - 1) < 0.05
     summary = (job / "results" / "summary.txt").read_text()
     assert "yarns[0].flatness" in summary and "these measurements do not determine it" in summary
     assert sum(s["best"] for s in result["cloth_screening"]) == 1

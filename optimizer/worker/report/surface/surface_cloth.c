@@ -71,9 +71,10 @@ static status name_picture(size_t i, enum job_surface on, status s, struct error
 {
     if (s == STATUS_OK || s == STATUS_CANCELLED || err == NULL) return s;
     const bool of_document = (s == STATUS_INVALID || s == STATUS_FORMAT) && err->field[0] == '\0';
-    if (of_document && on != JOB_ON_FLAT)
-        snprintf(err->field, sizeof err->field, "%s[%zu]", on == JOB_ON_MESH ? OPTION_MESH_FILE : OPTION_PICTURE_RADIUS,
-                 i);
+    if (of_document && on == JOB_ON_MESH)
+        snprintf(err->field, sizeof err->field, OPTION_MESH_FILE "[%zu]", i);
+    else if (of_document && on != JOB_ON_FLAT)
+        snprintf(err->field, sizeof err->field, OPTION_PICTURE_RADIUS "[%zu]", i);
     return error_prefix(err, s, "picture %zu", i + 1);
 }
 
