@@ -144,6 +144,15 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
                                const struct progress *progress, struct direction_volume *d,
                                struct reconstruct_report *report, struct error *err);
 
+/* The part of the step "orientation" after it, in noisy scans (reconstruct_redirects): traces lines up to four times,
+ * and voxels within a diameter of one take its direction. d stays as it is in other scans, where voxels are
+ * interpolated, and where radii of lines differ so much that the scan does not resolve its fibers. Errors as those of
+ * reconstruct_fibers. */
+status reconstruct_redirect(const struct volume *v, struct direction_volume *d, const struct reconstruct_option *o,
+                            struct thread_pool *pool, const struct progress *progress,
+                            const struct reconstruct_report *report, struct error *err);
+bool reconstruct_redirects(const struct reconstruct_report *report);
+
 /* Step "fibers": subvolumes, fiber centers, linking, smoothing and radius. STATUS_INVALID when no fiber is found. */
 status reconstruct_fibers(const struct volume *v, const struct direction_volume *d, struct reconstruct_option *o,
                           struct thread_pool *pool, const struct progress *progress, struct fiber_set *f,

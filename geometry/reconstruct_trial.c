@@ -41,6 +41,7 @@ static struct trial_sections sections_of(const struct reconstruct_report *report
 static void measure(const struct volume *v, const struct reconstruct_report *report, struct scan_trial *t)
 {
     double blur = report->profile_blur_m / v->voxel_size_m[0];
+    t->scan_noise_sd = report->noise.scan_sd;
     t->snr = report->noise.mapped_sd > 0.0 ? 1.0 / report->noise.mapped_sd : 0.0;
     t->noise_sd_voxel = scan_noise_blur(scan_noise_correlation(v, report->noise.mapped_sd));
     t->blur_sd_voxel = sqrt(fmax(0.0, blur * blur - VOXEL_VARIANCE));
@@ -108,6 +109,7 @@ static status reconstruct(struct volume *v, const struct fiber_set *truth, struc
     struct section_compare sections = {0};
     struct direction_compare voxels = {0};
     const struct progress inner = progress_of_part(part);
+    const struct progress quiet = progress_silent(&inner);
     const struct compare_option compare = {.voxel_size_m = v->voxel_size_m[0]};
     fiber_set_init(&found);
     status s = density_modes_find(v, &m, err);
@@ -116,6 +118,8 @@ static status reconstruct(struct volume *v, const struct fiber_set *truth, struc
     if (s == STATUS_OK && o->hollow_fibers > 0) s = reconstruct_lumens(v, o, pool, &report, err);
     *part = (struct progress_part){part->outer, 0.1, 0.3};
     if (s == STATUS_OK) s = reconstruct_orientation(v, o, pool, &inner, &d, &report, err);
+    report.noise.scan_sd = t->scan_noise_sd;
+    if (s == STATUS_OK) s = reconstruct_redirect(v, &d, o, pool, &quiet, &report, err);
     *part = (struct progress_part){part->outer, 0.4, 0.6};
     if (s == STATUS_OK) s = reconstruct_fibers(v, &d, o, pool, &inner, &found, &report, err);
     if (s == STATUS_OK) s = reconstruct_transfer(&found, &d, pool, NULL, &report, err);

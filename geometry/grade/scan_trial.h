@@ -12,6 +12,7 @@ struct scan_trial {
     bool made;
     size_t n_voxel[3], n_true, n_found; /* the part of the scan that was tried, its fibers, and those found again */
     double snr;                         /* of the phantom; 0: no noise */
+    double scan_noise_sd;               /* of the scan before it was smoothed, over the step from void to material */
     double noise_sd_voxel;              /* of the Gaussian that correlates its noise; 0: white */
     double blur_sd_voxel;
     /* The fibers of the phantom: standard deviation of their radii over the mean; mean ratio of the axes of their

@@ -297,6 +297,7 @@ static status bench_weave_ct(const struct selection *select, struct error *err)
     if (s == STATUS_OK) s = reconstruct_read(&path, 1, &o, 0, pool, NULL, &v, &r, err);
     if (s == STATUS_OK) s = reconstruct_refill_lumens(&v, &o, pool, NULL, &r, err);
     if (s == STATUS_OK) s = reconstruct_orientation(&v, &o, pool, NULL, &d, &r, err);
+    if (s == STATUS_OK) s = reconstruct_redirect(&v, &d, &o, pool, NULL, &r, err);
     if (s == STATUS_OK) s = reconstruct_fibers(&v, &d, &o, pool, NULL, &f, &r, err);
     float *safe = s == STATUS_OK ? malloc((f.n_fiber + 1) * sizeof *safe) : NULL;
     if (s == STATUS_OK) s = scan_grade_measure(&v, &f, pool, NULL, &r.grade, safe, err);

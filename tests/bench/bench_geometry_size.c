@@ -149,6 +149,7 @@ static status reconstruct(const struct sample *p, const char *path, const size_t
     if (s == STATUS_OK) s = reconstruct_refill_lumens(&v, &o, pool, NULL, report, err);
     t[1] = clock_monotonic_s();
     if (s == STATUS_OK) s = reconstruct_orientation(&v, &o, pool, NULL, &d, report, err);
+    if (s == STATUS_OK) s = reconstruct_redirect(&v, &d, &o, pool, NULL, report, err);
     t[2] = clock_monotonic_s();
     if (s == STATUS_OK) s = reconstruct_fibers(&v, &d, &o, pool, NULL, &f, report, err);
     t[3] = clock_monotonic_s();

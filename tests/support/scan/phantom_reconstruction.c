@@ -51,6 +51,8 @@ static status reconstruct(struct phantom_reconstruction *r, struct thread_pool *
     if (s == STATUS_OK) s = reconstruct_refill_lumens(&r->v, &r->option, pool, NULL, &r->report, err);
     if (s == STATUS_OK) s = reconstruct_orientation(&r->v, &r->option, pool, NULL, &d, &r->report, err);
     if (s == STATUS_OK) s = compare(r, &d, pool, &r->filtered, err);
+    if (s == STATUS_OK) s = reconstruct_redirect(&r->v, &d, &r->option, pool, NULL, &r->report, err);
+    if (s == STATUS_OK) s = compare(r, &d, pool, &r->redirected, err);
     if (s == STATUS_OK) s = reconstruct_fibers(&r->v, &d, &r->option, pool, NULL, &r->found, &r->report, err);
     if (s == STATUS_OK) s = grade(r, pool, err);
     if (s == STATUS_OK) s = reconstruct_transfer(&r->found, &d, pool, NULL, &r->report, err);

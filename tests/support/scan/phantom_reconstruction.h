@@ -12,7 +12,7 @@ struct phantom_reconstruction {
     struct volume v; /* the scan with densities mapped to [0, 1] */
     struct fiber_set truth, found;
     struct compare_report compare;
-    struct direction_compare filtered, transferred; /* the direction volume before and after the transfer */
+    struct direction_compare filtered, redirected, transferred; /* the direction volume before and after the transfer */
     struct scan_grade grade;
     struct reconstruct_option option;
     double slice_voxel; /* spacing of the scan's slices in voxels, as thick as that: 0 (1), or a multiple of 0.5 */

@@ -116,9 +116,15 @@ static status load_direction(struct pipeline_context *c, const char *stage, stru
 
 status stage_orientation(struct pipeline_context *c, struct error *err)
 {
+    struct reconstruct_report *g = &c->geometry;
+    struct progress_part part;
+    const double filter = reconstruct_redirects(g) ? 0.2 : 1.0;
+    const struct progress inner = progress_begin_part(&part, &c->progress, 0.0, filter);
     status s = pipeline_need_volume(c, err);
-    if (s == STATUS_OK)
-        s = reconstruct_orientation(&c->volume, &c->option, c->pool, &c->progress, &c->direction, &c->geometry, err);
+    if (s == STATUS_OK) s = reconstruct_orientation(&c->volume, &c->option, c->pool, &inner, &c->direction, g, err);
+    part = (struct progress_part){&c->progress, filter, 1.0 - filter};
+    if (s == STATUS_OK && reconstruct_redirects(g))
+        s = reconstruct_redirect(&c->volume, &c->direction, &c->option, c->pool, &inner, g, err);
     return s == STATUS_OK ? store_direction(c, "orientation", err) : s;
 }
 
