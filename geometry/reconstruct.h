@@ -54,12 +54,12 @@ struct reconstruct_option {
 
 void reconstruct_option_default(struct reconstruct_option *o);
 
-/* What is reported with the result, in the units named. */
 /* Whether the fibers are hollow. LUMENS_UNKNOWN: none were seen, and the scan would not show them. */
 enum lumen_answer { LUMENS_GIVEN, LUMENS_FILLED, LUMENS_DOUBTFUL, LUMENS_NONE, LUMENS_UNKNOWN };
 /* "given", "filled", "possible", "none" or "unknown". */
 const char *lumen_answer_name(enum lumen_answer a);
 
+/* What is reported with the result, in the units named. */
 struct reconstruct_report {
     size_t n[3];
     double voxel_size_m[3];

@@ -43,7 +43,7 @@ static status find_radius(struct trace_job *job, struct polyline_set *lines, str
     double voxel_m = job->v->voxel_size_m[0];
     const bool is_given = !isnan(job->o->radius_m[0]);
     if (part == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot measure the fiber radius: out of memory");
-    trace_enter_part(job, report->lumens_measured ? TRACE_LUMENS_END : 0.67, 1.0);
+    trace_enter_part(job, report->lumens_measured ? TRACE_LUMENS_END : TRACE_FINISHED_END, 1.0);
     status s = distance_histogram_measure(job->v, lines, job->o->eps_d, fmax(4.0, 1.25 * job->diameter), job->pool,
                                           &job->inner, part, err);
     if (s == STATUS_OK) s = radius_choose(part, job->o->radius_rule, &m, err);

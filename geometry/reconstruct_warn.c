@@ -124,7 +124,8 @@ static void warn_diameter(const struct warning_sink *warn, const struct reconstr
  * scan of fibers that are wider has no walls to trace, even if it is too coarse to show lumens. */
 static void warn_unseen_lumens(const struct warning_sink *warn, const struct reconstruct_report *r)
 {
-    const bool as_walls = r->fiber_diameter_voxel<5.0, noisy = r->noise.scan_sd> 0.3;
+    const bool as_walls = r->fiber_diameter_voxel < 5.0;
+    const bool noisy = r->noise.scan_sd > 0.3;
     if (r->lumens == LUMENS_UNKNOWN && r->grade.verdict != GRADE_UNRESOLVED && (as_walls || noisy))
         warning_send(warn, OPTION_HOLLOW_FIBERS,
                      "the scan does not tell whether the fibers are hollow: lumens show from 6 voxels a diameter and a "

@@ -77,6 +77,9 @@ void cli_print_json(const json_t *value, FILE *out);
 /* Writes "/v1/jobs/ID" + tail to path. STATUS_INVALID when the id has characters that no id has. */
 /* Adds members "result" and "parameters" to a job as the server gives it: its result by "result_url", or null. */
 status cli_add_result(struct cli *cli, json_t *job, struct error *err);
+/* Whether a path from the server, which becomes a file name here, is neither absolute nor has ".." or control
+ * characters. */
+bool cli_path_is_safe(const char *path);
 status cli_job_path(const char *id, const char *tail, char *path, size_t n_path, struct error *err);
 /* The folder of a path: "." if it has none. */
 void cli_folder_of(const char *path, char *folder, size_t n_bytes);

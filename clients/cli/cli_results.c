@@ -29,8 +29,7 @@ static void got(void *context, uint64_t n, uint64_t n_total)
     fflush(t->cli->note);
 }
 
-/* Paths from the server become file names here, so absolute paths, ".." and control characters are refused. */
-static bool path_is_safe(const char *path)
+bool cli_path_is_safe(const char *path)
 {
     if (path[0] == '\0' || path[0] == '/' || strlen(path) > 1000) return false;
     for (const char *p = path; *p != '\0'; p++)
@@ -49,7 +48,7 @@ static status fetch(struct transfer *t, const char *folder, const json_t *file, 
     uint64_t n_bytes = (uint64_t)json_integer_value(json_object_get(file, "size"));
     char target[4096], parent[4096];
     struct stat info;
-    if (path == NULL || url == NULL || url[0] != '/' || !path_is_safe(path))
+    if (path == NULL || url == NULL || url[0] != '/' || !cli_path_is_safe(path))
         return error_set(err, STATUS_FORMAT, "the server lists a result with an unusable name");
     if (snprintf(target, sizeof target, "%s/%s", folder, path) >= (int)sizeof target)
         return error_set(err, STATUS_INVALID, "the path '%.80s...' is too long", target);

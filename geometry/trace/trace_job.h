@@ -14,7 +14,8 @@ enum {
     TRACE_MAX_GROWTH = 64 /* voxels by which an end may grow */
 };
 #define TRACE_SETTLED_END 0.57  /* of the progress of the step "fibers", where lines are settled */
-#define TRACE_LUMENS_END 0.85   /* of the progress of the step "fibers", where lumens are measured; from 0.67 on */
+#define TRACE_FINISHED_END 0.67 /* where lines are finished */
+#define TRACE_LUMENS_END 0.85   /* where lumens are measured */
 #define TRACE_END_DIAMETERS 1.0 /* length at an end, in diameters, that may be wrong */
 /* Spread of the radii of single fibers, over their mean: below the first, fibers are alike and all found at first (0.04
  * and less); above the second, lines are those of a scan that does not resolve its fibers: yarns have 0.1 to 0.25,

@@ -223,7 +223,7 @@ status trace_finish(struct trace_job *job, struct polyline_set *lines, struct er
         if (k > 0 && (double)n_join <= JOINED_SHARE * (double)lines->n_line) break; /* nothing moves any more */
         s = settle_once(job, lines, N_SETTLE_FIT, false, &n_join, err);
     }
-    trace_enter_part(job, TRACE_SETTLED_END, 0.67);
+    trace_enter_part(job, TRACE_SETTLED_END, TRACE_FINISHED_END);
     if (s == STATUS_OK) s = fit_axes(job, lines, true, err);
     if (s == STATUS_OK) s = straighten(job, lines, true, job->o->min_vertex, err);
     return s == STATUS_OK ? trace_join(job, lines, false, err) : s;

@@ -18,7 +18,7 @@ status trace_lumens(struct trace_job *job, struct polyline_set *lines, struct er
     profile.clamp_sd = job->report->noise.mapped_sd;
     status s = volume_copy_unfilled(job->v, &scan, err);
     if (s != STATUS_OK) return s;
-    trace_enter_part(job, 0.67, TRACE_LUMENS_END);
+    trace_enter_part(job, TRACE_FINISHED_END, TRACE_LUMENS_END);
     const struct hollow_fit fit = {&scan, job->diameter, job->pool, &job->inner};
     s = polylines_fit_hollow(lines, &fit, &profile, &measure, err);
     volume_release(&scan);

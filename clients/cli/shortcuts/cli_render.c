@@ -155,6 +155,8 @@ static status fetch_file(struct cli *cli, const char *id, const char *where, con
                          struct error *err)
 {
     char url[512], path[4096], tail[320];
+    if (!cli_path_is_safe(name))
+        return error_set(err, STATUS_INVALID, "job %s names a file that cannot be written here: '%.80s'", id, name);
     snprintf(tail, sizeof tail, "%s%s", where, name);
     snprintf(path, sizeof path, "%s/%s", folder, name);
     status s = cli_job_path(id, tail, url, sizeof url, err);

@@ -38,6 +38,7 @@ static const double transfer_curve[SPEED_CURVE_POINTS] = {0.14, 0.18, 0.21, 0.24
 static const struct voxel_stage read_stage = {"volume", 1e-7, 0.8, read_curve},
                                 hollow_stage = {"volume.hollow", 5e-6, 0.8, hollow_curve},
                                 orientation_stage = {"orientation.material", 9e-7, 0.8, orientation_curve},
+                                redirect_stage = {"orientation.noisy", 1.3e-5, 0.8, NULL},
                                 fibers_stage = {"fibers.material", 6e-6, 0.4, fibers_curve},
                                 trial_stage = {"fibers.trial", 6e-6, 0.4, NULL},
                                 transfer_stage = {"directions.material", 4e-7, 0.8, transfer_curve},
@@ -280,7 +281,7 @@ void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
     else if (strcmp(name, "volume") == 0)
         plan_voxels(c, i, c->doc->hollow_fibers > 0 ? &hollow_stage : &read_stage, pipeline_plan_voxels(c));
     else if (strcmp(name, "orientation") == 0)
-        plan_voxels(c, i, &orientation_stage, n_material(c));
+        plan_voxels(c, i, reconstruct_redirects(&c->geometry) ? &redirect_stage : &orientation_stage, n_material(c));
     else if (strcmp(name, "fibers") == 0 && c->doc->has_volume)
         plan_fibers(c, i);
     else if (strcmp(name, "fibers") == 0 && pipeline_plan_cloth_size(c) > 0.0)
