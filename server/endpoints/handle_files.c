@@ -168,9 +168,7 @@ void handle_get_file(struct http_request *r)
         reply_problem(r, NULL, &err, NULL);
         return;
     }
-    reply_file(r, fd, content_type_of(file.name));
-    /* files from users are sandboxed, so that they never act as pages of this site */
-    reply_header(r, "Content-Security-Policy", "sandbox");
+    reply_foreign_file(r, fd, file.name);
 }
 
 void handle_delete_file(struct http_request *r)

@@ -117,16 +117,11 @@ void handle_list_results(struct http_request *r)
     job_row_release(&row);
 }
 
-void reply_result(struct http_request *r, int fd, const char *type)
+void reply_foreign_file(struct http_request *r, int fd, const char *name)
 {
-    static const char header[] = "Content-Security-Policy";
+    const char *type = content_type_of(name);
     reply_file(r, fd, type);
-    if (r->reply == NULL || strncmp(type, "text/html", 9) != 0) return;
-    const char *usual = MHD_get_response_header(r->reply, header);
-    if (usual != NULL) MHD_del_response_header(r->reply, header, usual);
-    reply_header(r, header,
-                 "default-src 'none'; img-src 'self' data:; style-src 'self' 'unsafe-inline'; base-uri 'none'; "
-                 "form-action 'none'; frame-ancestors 'none'");
+    if (strncmp(type, "text/html", 9) == 0) reply_policy(r, POLICY_SANDBOX_PAGE);
 }
 
 void handle_get_result(struct http_request *r)
@@ -138,7 +133,7 @@ void handle_get_result(struct http_request *r)
     if (result_open(r->service, row.id, JOB_FOLDER_RESULTS, r->param[1], &fd, &err) != STATUS_OK)
         reply_problem(r, NULL, &err, NULL);
     else
-        reply_result(r, fd, content_type_of(r->param[1]));
+        reply_foreign_file(r, fd, r->param[1]);
     job_row_release(&row);
 }
 

@@ -45,6 +45,7 @@ static void reply_static(struct http_request *r, const char *url)
         reply_code(r, "not_found", "", "there is nothing at this address");
     else
         reply_file(r, fd, content_type_of(f->path));
+    reply_policy(r, POLICY_DASHBOARD);
 }
 
 void handle_static(struct http_request *r) { reply_static(r, r->url); }

@@ -35,5 +35,5 @@ void handle_version_file(struct http_request *r)
     if (s != STATUS_OK)
         reply_problem(r, NULL, &err, NULL);
     else
-        reply_result(r, fd, content_type_of(r->param[2]));
+        reply_foreign_file(r, fd, r->param[2]);
 }

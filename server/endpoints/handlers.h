@@ -56,8 +56,8 @@ void handle_log(struct http_request *r);
 void handle_list_results(struct http_request *r);
 void handle_get_result(struct http_request *r);
 void handle_archive(struct http_request *r);
-/* Sends an open file of the results. Pages among them run no script; they may have styles and pictures inside. */
-void reply_result(struct http_request *r, int fd, const char *type);
+/* Sends an open file of a job, which is sandboxed whatever its type. Pages may show pictures and styles beside them. */
+void reply_foreign_file(struct http_request *r, int fd, const char *name);
 /* handle_versions.c */
 void handle_list_versions(struct http_request *r);
 void handle_get_version(struct http_request *r);

@@ -10,9 +10,18 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Content Security Policy: pages may load scripts and pictures only from this server and connect only to it. */
-static const char csp[] = "default-src 'self'; img-src 'self' data: blob:; object-src 'none'; base-uri 'none'; "
-                          "form-action 'self'; frame-ancestors 'none'";
+/* Content Security Policies. */
+static const char policy_header[] = "Content-Security-Policy";
+#define POLICY_COMMON "object-src 'none'; base-uri 'none'; frame-ancestors 'none'"
+static const char *const policy_text[] = {
+    [POLICY_SANDBOX] =
+        "sandbox; default-src 'none'; img-src data:; style-src 'unsafe-inline'; form-action 'none'; " POLICY_COMMON,
+    /* Without allow-scripts a page of this origin can do nothing in its name. Pages with pictures beside them need the
+     * origin, because browsers send the session's cookie to no other. */
+    [POLICY_SANDBOX_PAGE] = "sandbox allow-same-origin; default-src 'none'; img-src 'self' data:; style-src 'self' "
+                            "'unsafe-inline'; form-action 'none'; " POLICY_COMMON,
+    [POLICY_DASHBOARD] = "default-src 'self'; img-src 'self' data: blob:; form-action 'self'; " POLICY_COMMON,
+};
 
 const char *request_header(const struct http_request *r, const char *name)
 {
@@ -39,9 +48,16 @@ void reply_response(struct http_request *r, unsigned status_code, struct MHD_Res
     if (response == NULL) return;
     reply_header(r, "X-Content-Type-Options", "nosniff");
     reply_header(r, "Referrer-Policy", "no-referrer");
-    reply_header(r, "Content-Security-Policy", csp);
+    reply_header(r, policy_header, policy_text[POLICY_SANDBOX]);
     reply_header(r, "Cross-Origin-Resource-Policy", "same-origin");
     reply_header(r, "Tus-Resumable", "1.0.0");
+}
+
+void reply_policy(struct http_request *r, enum reply_policy policy)
+{
+    if (r->reply == NULL) return;
+    MHD_del_response_header(r->reply, policy_header, MHD_get_response_header(r->reply, policy_header));
+    reply_header(r, policy_header, policy_text[policy]);
 }
 
 void reply_empty(struct http_request *r, unsigned status_code)

@@ -29,6 +29,15 @@ void reply_no_store(struct http_request *request);
 void reply_header(struct http_request *request, const char *name, const char *value);
 void reply_header_int(struct http_request *request, const char *name, long long value);
 
+/* What a browser lets a reply do that it shows as a page. Every reply is sandboxed unless reply_policy says otherwise
+ * afterwards: it may hold bytes that a worker or another user wrote, and must not act for whoever opens it. */
+enum reply_policy {
+    POLICY_SANDBOX,      /* no scripts, no origin, nothing from elsewhere */
+    POLICY_SANDBOX_PAGE, /* no scripts; pictures and styles of this origin */
+    POLICY_DASHBOARD     /* scripts, styles and pictures of this origin */
+};
+void reply_policy(struct http_request *request, enum reply_policy policy);
+
 /* Takes ownership of response. */
 void reply_response(struct http_request *request, unsigned status_code, struct MHD_Response *response);
 /* Replies with a file; takes ownership of fd. Supports Range, If-Range and If-None-Match; the strong ETag comes from
