@@ -1,7 +1,7 @@
 /* A library for LD_PRELOAD in tests. It makes one system call fail, or records calls.
  * Environment of a fault: FAULT_CALL (write, sync, fallocate), FAULT_AT (number of the matching call that fails,
  * from 1), FAULT_ERRNO (0: a short write of half the bytes), FAULT_PATH (part of the file's path), FAULT_MARK (file
- * made when the fault occurs).
+ * made when the fault occurs), FAULT_KILL (if it is set, the process is killed by signal 9 instead, before the call).
  * FAULT_SLOW_SYNC_S: seconds that every sync takes longer.
  * FAULT_HOLD_SYNC: while this file exists, every sync waits.
  * FAULT_TRACE: file to which every successful write and sync appends a line "write PATH" or "sync PATH". */
@@ -9,6 +9,7 @@
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -42,6 +43,7 @@ static int fires(const char *call, int fd)
     if (atomic_fetch_add(&n_seen, 1) + 1 != strtol(at, NULL, 10)) return 0;
     int m = open(mark, O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
     if (m >= 0) close(m);
+    if (getenv("FAULT_KILL") != NULL) raise(SIGKILL);
     return 1;
 }
 

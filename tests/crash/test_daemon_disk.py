@@ -1,7 +1,6 @@
 """A full disk, write errors and short writes: error messages are clear, offsets stay valid, nothing is lost, and work
 continues when there is space again."""
 import concurrent.futures
-import ctypes
 import errno
 import itertools
 import os
@@ -9,27 +8,9 @@ import shutil
 
 import pytest
 from daemon_under_test import FILES, TUS, Daemon, document, problem, wait_until
+from servers.small_disk import fill
 
 AT_ONCE = 6  # runs of the same test
-
-
-@pytest.fixture
-def small_disk(tmp_path):
-    """A file system of 16 MiB (needs root)."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    libc = ctypes.CDLL(None, use_errno=True)
-    if os.geteuid() != 0 or libc.mount(b"selvedge-test", str(folder).encode(), b"tmpfs", 0, b"size=16m") != 0:
-        pytest.skip("a small file system cannot be mounted here (not root)")
-    yield folder
-    libc.umount2(str(folder).encode(), 2)
-
-
-def fill(folder):
-    with open(folder / "filler", "wb", buffering=0) as f, pytest.raises(OSError):
-        while f.write(b"x" * 4096) == 4096:
-            pass
-        raise OSError
 
 
 def declare(d, job, name, size):

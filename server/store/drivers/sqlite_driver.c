@@ -1,4 +1,5 @@
 /* SQLite, embedded: the database of a single daemon, with WAL and synchronous=FULL. */
+#include "server/store/drivers/store_backup.h"
 #include "server/store/store_sql.h"
 
 #include <errno.h>
@@ -125,10 +126,11 @@ static void finish(struct store_query *query)
 
 static status fault(void *db, char *why, size_t n_why)
 {
-    snprintf(why, n_why, "%s", sqlite3_errmsg(db));
-    return sqlite3_errcode(db) == SQLITE_FULL                           ? STATUS_DISK_FULL
-           : (sqlite3_extended_errcode(db) & 0xff) == SQLITE_CONSTRAINT ? STATUS_EXISTS
-                                                                        : STATUS_IO;
+    /* a file of shared memory that cannot grow is an "I/O error" */
+    const int code = sqlite3_extended_errcode(db) & 0xff;
+    const bool full = code == SQLITE_FULL || (code == SQLITE_IOERR && sqlite3_system_errno(db) == ENOSPC);
+    snprintf(why, n_why, "%s", full ? sqlite3_errstr(SQLITE_FULL) : sqlite3_errmsg(db));
+    return full ? STATUS_DISK_FULL : code == SQLITE_CONSTRAINT ? STATUS_EXISTS : STATUS_IO;
 }
 
 static bool is_alive(void *db) { return db != NULL; }
@@ -156,8 +158,20 @@ static status read_version(struct store_link *link, int *version, struct error *
     return s;
 }
 
+/* Copies the database to <path>.v<version>. A copy of that name is from a start that was killed, or from an upgrade
+ * that was taken back; the database may have changed since, so the copy is made anew. */
+static status keep_old_version(const char *path, int version, struct error *err)
+{
+    char backup[4096 + 32];
+    snprintf(backup, sizeof backup, "%s.v%d", path, version);
+    status s = store_backup_over(path, backup, err);
+    return s == STATUS_OK ? s : error_prefix(err, s, "cannot migrate the database from version %d", version);
+}
+
+/* All migrations are one transaction, so a killed start leaves the old version or the new one. */
 static status migrate(struct store_link *link, const char *path, struct error *err)
 {
+    static const char what[] = "cannot migrate the database";
     int version = 0, n_migration;
     const char *const *migration = store_migrations(&n_migration);
     status s = read_version(link, &version, err);
@@ -166,24 +180,15 @@ static status migrate(struct store_link *link, const char *path, struct error *e
         return error_set(err, STATUS_UNSUPPORTED,
                          "cannot open database '%s': its version is %d, but this program supports versions up to %d",
                          path, version, n_migration);
-    if (version > 0) {
-        char backup[4096 + 32];
-        snprintf(backup, sizeof backup, "%s.v%d", path, version);
-        s = store_run(link, NULL, err, "VACUUM INTO ?", "s", backup);
-        if (s != STATUS_OK) return error_prefix(err, s, "cannot back up the database before its migration");
-    }
-    for (; version < n_migration; version++) {
-        char done[64];
-        snprintf(done, sizeof done, "PRAGMA user_version=%d; COMMIT", version + 1);
-        s = store_script(link, link->phrase->begin, "cannot migrate the database", err);
-        if (s == STATUS_OK) s = store_script(link, migration[version], "cannot migrate the database", err);
-        if (s == STATUS_OK) s = store_script(link, done, "cannot migrate the database", err);
-        if (s != STATUS_OK) {
-            script(link->db, "ROLLBACK");
-            return s;
-        }
-    }
-    return STATUS_OK;
+    if (version > 0) s = keep_old_version(path, version, err);
+    if (s == STATUS_OK) s = store_script(link, link->phrase->begin, what, err);
+    if (s != STATUS_OK) return s;
+    char done[64];
+    snprintf(done, sizeof done, "PRAGMA user_version=%d; COMMIT", n_migration);
+    while (s == STATUS_OK && version < n_migration) s = store_script(link, migration[version++], what, err);
+    if (s == STATUS_OK) s = store_script(link, done, what, err);
+    if (s != STATUS_OK) script(link->db, "ROLLBACK");
+    return s;
 }
 
 /* A running daemon has migrated its database when it started. */

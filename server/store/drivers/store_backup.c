@@ -136,17 +136,29 @@ static status copy(const char *path, const char *to, struct error *err)
     return s;
 }
 
-status store_backup(const char *path, const char *to, struct store_summary *summary, struct error *err)
+/* Makes the copy under a temporary name first, and removes what a killed process has left under that name. */
+static status make_copy(const char *path, const char *to, struct store_summary *summary, struct error *err)
 {
-    char part[PATH_LIMIT_BYTES];
-    struct stat st;
+    static const char *const left[] = {"", "-journal"}; /* SQLite may keep a journal beside a file that it writes */
+    char part[PATH_LIMIT_BYTES], old[PATH_LIMIT_BYTES + 16];
     if (snprintf(part, sizeof part, "%s.part", to) >= (int)sizeof part)
         return error_set(err, STATUS_INVALID, "path '%.200s' is too long", to);
-    if (lstat(to, &st) == 0) return error_set(err, STATUS_EXISTS, "'%s' exists already", to);
-    if (unlink(part) != 0 && errno != ENOENT) return error_set_errno(err, "cannot remove '%s'", part);
+    for (size_t i = 0; i < sizeof left / sizeof left[0]; i++) {
+        snprintf(old, sizeof old, "%s%s", part, left[i]);
+        if (unlink(old) != 0 && errno != ENOENT) return error_set_errno(err, "cannot remove '%s'", old);
+    }
     status s = copy(path, part, err);
     if (s == STATUS_OK) s = store_examine(part, true, summary, err);
     if (s == STATUS_OK) s = durable_rename(part, to, err);
     if (s != STATUS_OK) unlink(part);
     return s == STATUS_OK ? s : error_prefix(err, s, "cannot back up the database to '%s'", to);
 }
+
+status store_backup(const char *path, const char *to, struct store_summary *summary, struct error *err)
+{
+    struct stat st;
+    if (lstat(to, &st) == 0) return error_set(err, STATUS_EXISTS, "'%s' exists already", to);
+    return make_copy(path, to, summary, err);
+}
+
+status store_backup_over(const char *path, const char *to, struct error *err) { return make_copy(path, to, NULL, err); }

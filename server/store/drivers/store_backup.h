@@ -23,5 +23,7 @@ status store_examine(const char *path, bool thorough, struct store_summary *summ
  * file beside it, which is examined thoroughly, synced and renamed. Nothing is left after an error. STATUS_EXISTS when
  * there is a file `to`, STATUS_NOT_FOUND, STATUS_FORMAT (as store_examine), STATUS_DISK_FULL, STATUS_IO. */
 status store_backup(const char *path, const char *to, struct store_summary *summary, struct error *err);
+/* The same, in place of a file `to` that may exist; after an error that file is as it was. */
+status store_backup_over(const char *path, const char *to, struct error *err);
 
 #endif

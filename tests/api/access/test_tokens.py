@@ -11,8 +11,9 @@ import time
 
 import pytest
 import requests
-from daemon_under_test import DOCUMENT, ROOT, Daemon, problem, program, settings_arguments
+from daemon_under_test import DOCUMENT, Daemon, problem, program, settings_arguments
 from openapi_check import METHODS, load
+from servers.old_database import migrations
 
 OPERATIONS = [(path, method, item[method]) for path, item in load()["paths"].items() for method in METHODS if method in item]
 SCOPES = ["none", "read", "submit", "admin"]
@@ -220,19 +221,6 @@ def test_names_are_unique_and_the_list_has_pages(guarded):
         if cursor is None:
             break
     assert names[:5] == [f"page{i}" for i in (4, 3, 2, 1, 0)] and len(names) == len(guarded.admin.get("/v1/tokens").json()["tokens"])
-
-
-def migrations():
-    """The statements of each migration, from the source."""
-    with open(os.path.join(ROOT, "server", "store", "drivers", "store_schema.c"), encoding="utf-8") as f:
-        text = f.read().split("migration[] = {")[1].split("\n};")[0]
-    entries = [""]
-    for literal, comma in re.findall(r'"((?:[^"\\]|\\.)*)"|(,)', re.sub(r"/\*.*?\*/", "", text, flags=re.S)):
-        if comma:
-            entries.append("")
-        else:
-            entries[-1] += literal
-    return [e for e in entries if e]
 
 
 def test_an_older_database_is_migrated(daemon_maker, tmp_path):
