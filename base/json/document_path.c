@@ -1,4 +1,5 @@
 #include "base/json/document_path.h"
+#include "base/json/json_depth.h"
 
 #include <stdbool.h>
 #include <stdlib.h>
@@ -71,7 +72,10 @@ status document_replace(json_t *document, const char *path, const json_t *value,
     const bool pointer = path[0] == '/';
     const char *at = pointer ? path + 1 : path;
     json_t *parent = document;
+    int n_name = 0;
     for (bool more = path[0] != '\0'; more;) {
+        if (++n_name > JSON_DEPTH_MOST)
+            return error_set(err, STATUS_INVALID, "the path '%.80s...' has more than %d names", path, JSON_DEPTH_MOST);
         const char *next = pointer ? next_of_pointer(at, name) : next_of_names(at, name);
         if (next == NULL) break;
         more = *next != '\0' || (pointer && next > at && next[-1] == '/');

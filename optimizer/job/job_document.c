@@ -1,4 +1,5 @@
 #include "optimizer/job/job_document.h"
+#include "base/json/json_depth.h"
 #include "optimizer/job/check/job_faults.h"
 #include "optimizer/job/job_document_parts.h"
 #include "optimizer/job/options/option_reader.h"
@@ -54,6 +55,7 @@ static json_t *read_json(const char *text, size_t n_bytes, struct error *err)
                   JOB_MAX_DOCUMENT_BYTES);
         return NULL;
     }
+    if (json_depth_check(text, n_bytes, "the job document", err) != STATUS_OK) return NULL;
     json_t *json = json_loadb(text, n_bytes, JSON_REJECT_DUPLICATES, &at);
     if (json == NULL)
         error_set(err, STATUS_INVALID, "the job document is not valid JSON: line %d, column %d: %s", at.line, at.column,

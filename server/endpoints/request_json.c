@@ -1,4 +1,5 @@
 #include "server/endpoints/request_json.h"
+#include "base/json/json_depth.h"
 #include "server/http/http_reply.h"
 
 #include <stdio.h>
@@ -22,6 +23,10 @@ json_t *request_json(struct http_request *r)
     json_error_t e;
     struct error err = {0};
     char text[256];
+    if (json_depth_check(r->body, r->n_body, "the body", &err) != STATUS_OK) {
+        reply_problem(r, NULL, &err, NULL);
+        return NULL;
+    }
     json_t *j = json_loadb(r->body, r->n_body, JSON_REJECT_DUPLICATES, &e);
     if (j != NULL) return j;
     const char *what = beyond_limits(&e);

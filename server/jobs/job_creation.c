@@ -1,6 +1,7 @@
 /* Creates jobs, and replaces the documents of existing jobs. */
 #include "base/clock.h"
 #include "base/files/durable.h"
+#include "base/files/file_tree.h"
 #include "optimizer/job/job_document.h"
 #include "optimizer/job/job_folder.h"
 #include "server/cluster/job_change.h"
@@ -179,7 +180,7 @@ static status create_locked(struct job_service *v, struct job_row *row, const st
     if (s != STATUS_OK) {
         char path[PATH_BYTES];
         path_join(path, v->settings->data, "jobs", row->id, NULL);
-        path_remove_tree(path, NULL);
+        file_tree_remove(path, NULL);
         store_job_erase(v->store, row->id, NULL);
     }
     return s;

@@ -3,6 +3,7 @@
  * unavailable. */
 #include "base/clock.h"
 #include "base/files/durable.h"
+#include "base/files/file_tree.h"
 #include "optimizer/job/job_folder.h"
 #include "server/cluster/job_change.h"
 #include "server/cluster/lease_keeper.h"
@@ -66,7 +67,7 @@ static status remove_deleted(struct job_service *v, struct error *err)
         char path[PATH_BYTES];
         struct error why = {0};
         path_join(path, v->settings->data, "jobs", row[i].id, NULL);
-        status removed = path_remove_tree(path, &why);
+        status removed = file_tree_remove(path, &why);
         if (removed == STATUS_OK) removed = store_job_erase(v->store, row[i].id, &why);
         if (removed != STATUS_OK)
             log_warning(v->log, "job %s is deleted, but a part of it could not be removed: %s", row[i].id, why.text);

@@ -1,6 +1,7 @@
 #include "server/rescue/rebuild.h"
 #include "base/clock.h"
 #include "base/files/durable.h"
+#include "base/files/file_tree.h"
 #include "server/cluster/store_settings.h"
 #include "server/rescue/backup_files.h"
 #include "server/rescue/job_evidence.h"
@@ -289,12 +290,12 @@ status rebuild(const struct settings *settings, bool resume, FILE *report, struc
     path_join(made, folder, "selvedge.db", NULL);
     status s = store_settings_need_file(settings, "--rebuild", "bring the database back with pg_restore", err);
     if (s != STATUS_OK) return s;
-    s = path_remove_tree(folder, err);
+    s = file_tree_remove(folder, err);
     if (s == STATUS_OK) s = durable_make_folder(folder, err);
     if (s == STATUS_OK) s = copy_base(settings, made, &kept, report, err);
     if (s == STATUS_OK) s = fill(settings, made, kept, resume, report, err);
     if (s == STATUS_OK) s = swap(settings, made, report, err);
-    path_remove_tree(folder, NULL);
+    file_tree_remove(folder, NULL);
     return s == STATUS_OK ? s : error_prefix(err, s, "cannot rebuild the database");
 }
 

@@ -1,6 +1,7 @@
 #include "server/workers/attempt.h"
 #include "base/clock.h"
 #include "base/files/durable.h"
+#include "base/files/file_tree.h"
 #include "optimizer/job/job_folder.h"
 #include "server/cluster/job_change.h"
 #include "server/jobs/job_access.h"
@@ -41,7 +42,7 @@ static status clear_folder(struct job_service *v, struct job_row *row, struct er
     status s = version_keep(v, row, err);
     for (size_t i = 0; s == STATUS_OK && i < sizeof stale / sizeof stale[0]; i++) {
         path_join(path, v->settings->data, "jobs", job_id, stale[i], NULL);
-        s = path_remove_tree(path, err);
+        s = file_tree_remove(path, err);
     }
     return s;
 }

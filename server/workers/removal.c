@@ -1,5 +1,6 @@
 #include "server/workers/removal.h"
 #include "base/clock.h"
+#include "base/files/file_tree.h"
 #include "server/jobs/job_paths.h"
 #include "server/store/store_cluster.h"
 
@@ -20,7 +21,7 @@ void removal_run(struct job_service *v, struct waiting_list *waiting,
         char path[PATH_BYTES];
         struct error err = {0};
         path_join(path, v->settings->data, "jobs", row[i].id, NULL);
-        status s = path_remove_tree(path, &err);
+        status s = file_tree_remove(path, &err);
         if (s == STATUS_OK) s = store_job_erase(v->store, row[i].id, &err);
         if (s == STATUS_OK) continue;
         log_warning(v->log, "job %s is deleted, but a part of it could not be removed; next try in %d s: %s", row[i].id,

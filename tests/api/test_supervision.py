@@ -180,12 +180,12 @@ def test_unknown_folders_are_quarantined(daemon_maker):
             assert name.startswith(f.read())
 
 
-def test_folders_that_resist_do_not_keep_the_daemon_from_starting(daemon_maker):
-    d = daemon_maker()
+def test_folders_that_resist_do_not_keep_the_daemon_from_starting(daemon_maker, shim):
+    d = daemon_maker(environment={"LD_PRELOAD": shim, "FAULT_STUCK": "stuck"})
     deleted, broken, good = d.create(), d.create(), d.ready_job()
     jobs = os.path.join(d.data, "jobs")
-    deep = os.path.join(jobs, deleted, *["x"] * 70)  # deeper than the daemon removes
-    os.makedirs(deep)
+    with open(os.path.join(jobs, deleted, "stuck"), "w"):
+        pass
     assert d.delete(f"/v1/jobs/{deleted}").status_code == 204
     warned = f"job {deleted} is deleted, but a part of it could not be removed"
     wait_until(lambda: warned in d.log_text())

@@ -2,6 +2,7 @@
  * Environment of a fault: FAULT_CALL (write, sync, fallocate), FAULT_AT (number of the matching call that fails,
  * from 1), FAULT_ERRNO (0: a short write of half the bytes), FAULT_PATH (part of the file's path), FAULT_MARK (file
  * made when the fault occurs), FAULT_KILL (if it is set, the process is killed by signal 9 instead, before the call).
+ * FAULT_STUCK: name of a file that cannot be removed by unlinkat (EBUSY).
  * FAULT_SLOW_SYNC_S: seconds that every sync takes longer.
  * FAULT_HOLD_SYNC: while this file exists, every sync waits.
  * FAULT_TRACE: file to which every successful write and sync appends a line "write PATH" or "sync PATH". */
@@ -132,3 +133,10 @@ int fallocate(int fd, int mode, off_t from, off_t n)
 }
 
 int fallocate64(int fd, int mode, off_t from, off_t n) { return fallocate(fd, mode, from, n); }
+
+int unlinkat(int fd, const char *name, int flags)
+{
+    const char *stuck = getenv("FAULT_STUCK");
+    if (stuck != NULL && strcmp(name, stuck) == 0) return errno = EBUSY, -1;
+    return REAL(int, "unlinkat", int, const char *, int)(fd, name, flags);
+}

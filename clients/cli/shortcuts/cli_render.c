@@ -1,8 +1,8 @@
 /* selvedge render ID: a picture of a finished job's cloth on a surface, as a job of its own. Its document has the
  * fibers and the fitted parameters of the first job, which is not run again and may be deleted. */
+#include "base/files/file_tree.h"
 #include "clients/cli/cli.h"
 
-#include <ftw.h>
 #include <libgen.h>
 #include <math.h>
 #include <stdlib.h>
@@ -144,12 +144,6 @@ static status make_document(const json_t *job, json_t *picture, json_t **out, st
     return STATUS_OK;
 }
 
-static int remove_entry(const char *path, const struct stat *st, int kind, struct FTW *at)
-{
-    (void)st, (void)kind, (void)at;
-    return remove(path);
-}
-
 /* A file of the job into a folder. where: "/results/" or "/files/". */
 static status fetch_file(struct cli *cli, const char *id, const char *where, const char *name, const char *folder,
                          struct error *err)
@@ -259,7 +253,7 @@ status cli_render(struct cli *cli, int *exit_code, struct error *err)
         if (s == STATUS_OK && twin) json_object_set_new(document, "twin", json_pack("{s:b}", "make", true));
         if (s == STATUS_OK) s = gather_files(cli, cli->args->operand, mesh, folder, document, err);
         if (s == STATUS_OK) s = render(cli, document, folder, exit_code, err);
-        nftw(folder, remove_entry, 8, FTW_DEPTH | FTW_PHYS);
+        file_tree_remove(folder, NULL);
     }
     json_decref(picture);
     json_decref(document);

@@ -1,5 +1,6 @@
 #include "server/jobs/versions/result_version.h"
 #include "base/files/durable.h"
+#include "base/files/file_tree.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/job_view.h"
@@ -162,9 +163,9 @@ static status remove_version(const struct job_service *v, const char *id, int64_
     snprintf(gone, sizeof gone, "%lld.removed", (long long)number);
     job_file_path(v, id, JOB_FOLDER_VERSIONS, name, from);
     job_file_path(v, id, JOB_FOLDER_VERSIONS, gone, to);
-    status s = path_remove_tree(to, err);
+    status s = file_tree_remove(to, err);
     if (s == STATUS_OK && rename(from, to) != 0) s = error_set_errno(err, "cannot remove version %s", name);
-    return s == STATUS_OK ? path_remove_tree(to, err) : s;
+    return s == STATUS_OK ? file_tree_remove(to, err) : s;
 }
 
 /* Writes version.json into the results and moves them. */

@@ -129,6 +129,15 @@ elif behaviour == "chatter":  # writes to the console without end, and dies
             time.sleep(0.02)
     print("these are my last words", flush=True)
     sys.exit(1) if os.remove(os.path.join(job, "status.json")) is None else None
+elif behaviour == "nest":  # folders inside each other, so many levels in each of three places
+    for place in ("results", "work", "."):
+        os.chdir(os.path.join(job, place))
+        for _ in range(int(argument)):
+            os.mkdir("deeper")
+            os.chdir("deeper")
+            with open("file", "w"):
+                pass
+    finish()
 elif behaviour == "work":
     work(float(argument or 3600))
     finish()

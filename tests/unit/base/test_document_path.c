@@ -1,10 +1,12 @@
 /* Paths that name a member of a document. */
 #include "base/json/document_path.h"
+#include "base/json/json_depth.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -52,12 +54,56 @@ static void test_paths_that_lead_nowhere(void **state)
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) expect("{\"a\":1,\"l\":[3,{\"x\":4}]}", bad[i], "9", NULL);
 }
 
+static void test_long_paths_are_refused(void **state)
+{
+    (void)state;
+    char path[2][2 * 7000 + 1];
+    json_t *doc = json_object(), *value = json_true();
+    for (size_t n_name = JSON_DEPTH_MOST; n_name <= 7000; n_name += 7000 - JSON_DEPTH_MOST) {
+        for (size_t i = 0; i < n_name; i++) {
+            memcpy(path[0] + 2 * i, "a.", 2);
+            memcpy(path[1] + 2 * i, "/a", 2);
+        }
+        path[0][2 * n_name - 1] = path[1][2 * n_name] = '\0';
+        for (size_t k = 0; k < 2; k++) {
+            struct error err = {0};
+            status s = document_replace(doc, path[k], value, &err);
+            assert_int_equal(s, n_name == JSON_DEPTH_MOST ? STATUS_OK : STATUS_INVALID);
+            if (s != STATUS_OK) assert_non_null(strstr(err.text, "more than 32 names"));
+        }
+    }
+    json_decref(doc);
+}
+
+static void test_depth_of_texts(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *begin, *inner, *end;
+    } kind[] = {{"[", "1", "]"}, {"{\"a\":", "1", "}"}, {"[", "\"[[[{{\\\"[[\"", "]"}};
+    for (size_t k = 0; k < 3; k++)
+        for (int depth = JSON_DEPTH_MOST; depth <= JSON_DEPTH_MOST + 1; depth++) {
+            char text[400] = "[[],{},";
+            for (int i = 1; i < depth; i++) strcat(text, kind[k].begin);
+            strcat(text, kind[k].inner);
+            for (int i = 1; i < depth; i++) strcat(text, kind[k].end);
+            strcat(text, "]");
+            json_t *read = json_loads(text, 0, NULL);
+            assert_non_null(read);
+            json_decref(read);
+            struct error err = {0};
+            assert_int_equal(json_depth_check(text, strlen(text), "the body", &err),
+                             depth > JSON_DEPTH_MOST ? STATUS_INVALID : STATUS_OK);
+        }
+    assert_int_equal(json_depth_check("]]]]\"\\", 6, "the body", NULL), STATUS_OK); /* no JSON: the parser says so */
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_both_kinds_of_paths),
-        cmocka_unit_test(test_names_with_dots_and_slashes),
-        cmocka_unit_test(test_paths_that_lead_nowhere),
+        cmocka_unit_test(test_both_kinds_of_paths),     cmocka_unit_test(test_names_with_dots_and_slashes),
+        cmocka_unit_test(test_paths_that_lead_nowhere), cmocka_unit_test(test_long_paths_are_refused),
+        cmocka_unit_test(test_depth_of_texts),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
