@@ -37,6 +37,11 @@ SMUGGLED = "GET /v1/jobs HTTP/1.1\r\nHost: localhost\r\n\r\n"
     ("Transfer-Encoding: chunked\r\n", 411, "length_required"),
     ("Transfer-Encoding: gzip, chunked\r\n", 411, "length_required"),
     ("Content-Length: 5\r\nContent-Type: application/json\r\nContent-Type: text/plain\r\n", 400, "duplicate_header"),
+    ("Transfer-Encoding:\r\n chunked\r\n", 400, "malformed"),
+    ("Transfer-Encoding:\r\n\tchunked\r\nContent-Length: 5\r\n", 400, "malformed"),
+    ("Transfer-Encoding: identity,\r\n chunked\r\n", 400, "malformed"),
+    ("Content-Length:\r\n 5\r\n", 400, "malformed"),
+    ("Content-Length: 5\r\n 0\r\n", 400, "malformed"),
 ])
 def test_ambiguous_framing_is_refused_and_the_connection_closed(daemon, headers, status, code):
     answer, closed = raw(daemon, f"POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\n{headers}\r\n0\r\n\r\n" + SMUGGLED)

@@ -81,6 +81,19 @@ def test_edit_filter_and_keys(daemon, sample):
         job.state()
 
 
+def test_a_filter_holds_for_every_page(daemon_maker):
+    """The list comes in pages of 100 jobs; the cancelled jobs are the oldest and the newest."""
+    client = selvedge.Client(daemon_maker().url)
+    cancelled = [client.create(DOCUMENT)]
+    drafts = [client.create(DOCUMENT).id for _ in range(102)]
+    cancelled.append(client.create(DOCUMENT))
+    for job in cancelled:
+        job.cancel()
+    assert [j.id for j in client.jobs(state="draft")] == drafts[::-1]
+    assert [j.id for j in client.jobs(state="cancelled")] == [cancelled[1].id, cancelled[0].id]
+    assert [j.id for j in client.jobs()] == [cancelled[1].id, *drafts[::-1], cancelled[0].id]
+
+
 def test_a_wait_that_takes_too_long(daemon, sample):
     job = selvedge.Client(daemon.url).submit(write(sample, document("work")) / "job.json")
     with pytest.raises(TimeoutError):

@@ -242,6 +242,23 @@ def test_damaged_inputs_results_and_journals_are_told(daemon_maker):
         assert {f["name"]: f["sha256"] for f in j["files"]} == {name: sha256(data) for name, (_, data) in FILES.items()}
 
 
+@pytest.mark.parametrize("change", ["cut", "grown"])
+def test_an_input_without_a_checksum_is_known_by_its_size(daemon_maker, change):
+    """Where nobody has declared a checksum and the database is lost, the size is all that is known of the bytes."""
+    d = daemon_maker()
+    job = d.ready_job(checked=False)
+    d.stop()
+    path = os.path.join(d.data, "jobs", job, "input", "rows.csv")
+    os.chmod(path, 0o600)
+    os.truncate(path, len(FILES["rows.csv"][1]) + (1 if change == "grown" else -1))
+    remove(d.data, "", "-wal", "-shm")
+    said = selvedged(d.data, "--rebuild")
+    assert "input 'rows.csv' must be sent again: its bytes are not those that were sent" in said and "scan.tif" not in said
+    assert "1 inputs are right, 1 must be sent again" in said
+    d.start()
+    assert d.job(job)["missing_files"] == ["rows.csv"]
+
+
 def test_a_journal_that_is_a_link_or_a_pipe_harms_nothing(daemon_maker, tmp_path):
     """A worker may write in its folder, and must not lead the daemon out of it."""
     d = daemon_maker()

@@ -80,6 +80,18 @@ def test_nothing_outside_of_the_folder_is_written(hostile, tmp_path, act):
     assert "hostile: write: done" in inside.stderr
 
 
+def test_an_input_that_is_a_link_is_only_read(hostile, tmp_path):
+    """In a folder made by hand; the file that the link leads to belongs to its owner."""
+    rows = tmp_path / "rows.csv"
+    rows.write_text(TABLE)
+    for act, outcome in (("read", "done"), ("overwrite", "Permission denied")):
+        folder = job_folder(tmp_path / act)
+        (folder / "input" / "rows.csv").unlink()
+        (folder / "input" / "rows.csv").symlink_to(rows)
+        done = run(hostile, folder, f"{act} {rows}", HOSTILE_TO="")
+        assert f"hostile: {act}: {outcome}" in done.stderr, done.stderr
+
+
 def test_a_shared_checkpoint_cannot_be_changed(hostile, tmp_path):
     """Files that two jobs have are for reading only (test_geometry_only_job.py), for a worker of root, too."""
     folder = job_folder(tmp_path / "job")

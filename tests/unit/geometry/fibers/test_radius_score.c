@@ -54,6 +54,60 @@ static void test_score(void **state)
     free(h);
 }
 
+/* A cylinder of this radius and length, in bins of 1/64 voxel: points of material within the radius and none beyond. */
+static void add_cylinder(struct distance_histogram *h, int class, double radius_voxel, double length_voxel)
+{
+    for (size_t b = 0; b < RADIUS_BINS; b++) {
+        double at = ((double)b + 0.5) * h->bin_voxel;
+        /* the volume of a shell, of which each voxel has RADIUS_UPSAMPLING^3 points */
+        uint64_t n = (uint64_t)lround(2.0 * M_PI * at * h->bin_voxel * length_voxel * pow(RADIUS_UPSAMPLING, 3.0));
+        (at < radius_voxel ? h->inside : h->outside)[class][b] += n;
+        h->density_sum[class][b] += at < radius_voxel ? 255 * n : 0;
+    }
+    h->length_voxel[class] += length_voxel;
+}
+
+/* Efron's jackknife over the parts that have fibers of these classes, from what is measured without each of them. */
+static double jackknife(const struct distance_histogram *part, unsigned classes, const bool *has)
+{
+    static struct distance_histogram rest;
+    double r[RADIUS_PARTS], mean = 0.0, square = 0.0;
+    size_t n = 0;
+    for (size_t p = 0; p < RADIUS_PARTS; p++) {
+        if (!has[p]) continue;
+        distance_histogram_sum(part, p, &rest);
+        r[n++] = radius_from_mass(&rest, classes, radius_best_score(&rest, classes));
+    }
+    for (size_t i = 0; i < n; i++) mean += r[i] / (double)n;
+    for (size_t i = 0; i < n; i++) square += (r[i] - mean) * (r[i] - mean);
+    return sqrt(square * (double)(n - 1) / (double)n);
+}
+
+/* The standard error of a radius, where the parts have other radii: of all parts, and where some have no fiber. */
+static void test_error_by_leaving_out_parts(void **state)
+{
+    (void)state;
+    static struct distance_histogram part[RADIUS_PARTS];
+    for (size_t n_part = RADIUS_PARTS; n_part >= 1; n_part -= n_part > 2 ? 3 : 1) {
+        bool has[RADIUS_PARTS] = {false};
+        struct radius_measure m;
+        for (size_t p = 0; p < RADIUS_PARTS; p++) {
+            part[p] = (struct distance_histogram){.bin_voxel = 1.0 / 64.0};
+            has[p] = p < n_part;
+            if (has[p]) add_cylinder(&part[p], 0, 2.0 + 0.1 * (double)(p * p % 7), 10.0 + (double)p);
+        }
+        assert_int_equal(radius_choose(part, RADIUS_PER_AXIS, &m, NULL), STATUS_OK);
+        assert_true(m.radius_voxel[0] > 1.9 && m.radius_voxel[0] < 2.7);
+        const double want = jackknife(part, 1u, has);
+        if (n_part == 1) {
+            assert_true(isnan(m.se_voxel[0])); /* one part says nothing of its scatter */
+            break;
+        }
+        if (!(want > 0.01) || fabs(m.se_voxel[0] / want - 1.0) > 1e-6)
+            fail_msg("%zu parts: error %g, not %g", n_part, m.se_voxel[0], want);
+    }
+}
+
 /* Sums of correlated values scatter as the pieces show, and not as independent values would. */
 static void test_scatter_of_correlated_values(void **state)
 {
@@ -70,6 +124,7 @@ static void test_scatter_of_correlated_values(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_scatter_of_correlated_values),
-                                       cmocka_unit_test(test_best_score), cmocka_unit_test(test_score)};
+                                       cmocka_unit_test(test_best_score), cmocka_unit_test(test_score),
+                                       cmocka_unit_test(test_error_by_leaving_out_parts)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

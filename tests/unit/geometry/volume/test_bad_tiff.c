@@ -90,6 +90,41 @@ static void test_lying_header(void **state)
     stack_expect_open_error(path, STATUS_FORMAT, "cannot read volume 'liar.tif': page 1 states 400000 x 23 pixels");
 }
 
+/* A strip or tile that begins or ends beyond the end of the file is refused when the file is opened; one that ends
+ * exactly there is read. */
+static void test_strip_beyond_the_end(void **state)
+{
+    (void)state;
+    static uint8_t data[1 << 16];
+    const uint32_t stored = STACK_WIDTH * STACK_HEIGHT;
+    char path[128];
+    stack_path(path, "beyond.tif");
+    stack_write(path, 8, 1, COMPRESSION_NONE, TEST_STRIPS);
+    size_t n = tiff_read_bytes(path, data, sizeof data);
+    tiff_patch_tag(data, TIFFTAG_ROWSPERSTRIP, STACK_HEIGHT);
+    tiff_patch_tag(data, TIFFTAG_STRIPBYTECOUNTS, stored);
+    const struct {
+        uint32_t at;
+        bool fits;
+    } check[] = {{(uint32_t)n - stored, true},
+                 {(uint32_t)n - stored + 1, false},
+                 {(uint32_t)n, false},
+                 {(uint32_t)n + 1, false},
+                 {UINT32_MAX, false}};
+    for (size_t i = 0; i < sizeof check / sizeof check[0]; i++) {
+        struct volume_source *s = NULL;
+        const char *list[1] = {path};
+        tiff_patch_tag(data, TIFFTAG_STRIPOFFSETS, check[i].at);
+        test_write_bytes(path, data, n);
+        if (!check[i].fits) {
+            stack_expect_open_error(path, STATUS_FORMAT, "but the file is too short for them");
+            continue;
+        }
+        assert_int_equal(volume_source_open(list, 1, &s, NULL), STATUS_OK);
+        volume_source_close(s);
+    }
+}
+
 /* Sizes of several rows of such a page overflow an integer. The file can be small, because deflate compresses up to a
  * thousandfold. */
 static void test_enormous_pages(void **state)
@@ -193,10 +228,15 @@ static void test_missing(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_unlike_pages),   cmocka_unit_test(test_truncated),
-        cmocka_unit_test(test_damaged),        cmocka_unit_test(test_lying_header),
-        cmocka_unit_test(test_enormous_pages), cmocka_unit_test(test_compressed_pages_have_a_limit),
-        cmocka_unit_test(test_bad_values),     cmocka_unit_test(test_missing),
+        cmocka_unit_test(test_unlike_pages),
+        cmocka_unit_test(test_truncated),
+        cmocka_unit_test(test_damaged),
+        cmocka_unit_test(test_lying_header),
+        cmocka_unit_test(test_enormous_pages),
+        cmocka_unit_test(test_compressed_pages_have_a_limit),
+        cmocka_unit_test(test_bad_values),
+        cmocka_unit_test(test_missing),
+        cmocka_unit_test(test_strip_beyond_the_end),
     };
     return cmocka_run_group_tests(tests, stack_folder_setup, NULL);
 }

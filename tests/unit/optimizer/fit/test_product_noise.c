@@ -53,6 +53,46 @@ static void test_shared_paths(void **state)
     linear_model_release(&m);
 }
 
+/* The part of the variance that the noise of the derivatives makes, by hand. Residuals are noise alone, so it is
+ * 4 noise (var J_A + var J_B) / 4 of each row, noise being the variance of the mean residual; of two rows with the
+ * correlation c, which residuals and derivatives share, (1 + c^2) times as much. The noise of the residuals makes
+ * J^2 noise of each row, (1 + c) times as much of two. */
+static void test_noise_of_derivatives(void **state)
+{
+    (void)state;
+    const double v = 1e-4, jacobian = 3.0, j_var[2] = {0.02, 0.07};
+    struct coordinate k;
+    struct linear_model m;
+    const bool fixed = false;
+    assert_int_equal(linear_model_init(&m, 6, 1, NULL), STATUS_OK);
+    coordinate_init(&k, &fake_param[6], fake_param[6].lower, fake_param[6].upper);
+    m.x_ref[0] = log(fake_param[6].start);
+    for (int n_row = 1; n_row <= 2; n_row++)
+        for (int shared = 0; shared < n_row; shared++) {
+            const double c = shared ? 0.6 : 0.0;
+            struct uncertainty exact, noisy;
+            for (size_t i = 0; i < (size_t)n_row; i++)
+                for (int q = 0; q < 2; q++) {
+                    m.j[q][3 * i] = jacobian;
+                    m.r_var[q][3 * i] = v;
+                    m.j_var[q][3 * i] = 0.0;
+                }
+            m.pair[0] = (struct linear_pair){1, 0, c};
+            m.n_pair = (size_t)shared;
+            uncertainty_compute(&m, &k, &fixed, &exact);
+            const double decrease = uncertainty_noise_decrease(&m, &k, &fixed);
+            for (size_t i = 0; i < (size_t)n_row; i++)
+                for (int q = 0; q < 2; q++) m.j_var[q][3 * i] = j_var[q];
+            uncertainty_compute(&m, &k, &fixed, &noisy);
+            const double want = (j_var[0] + j_var[1]) * (1.0 + c * c) / (jacobian * jacobian * (1.0 + c));
+            if (fabs((noisy.cov[0] / exact.cov[0] - 1.0) / want - 1.0) > 1e-2)
+                fail_msg("%d rows, correlation %g: %g, not %g", n_row, c, noisy.cov[0] / exact.cov[0] - 1.0, want);
+            const double more = uncertainty_noise_decrease(&m, &k, &fixed) / decrease - 1.0;
+            if (fabs(more / want - 1.0) > 1e-2) fail_msg("%d rows, correlation %g: decrease %g", n_row, c, more);
+        }
+    linear_model_release(&m);
+}
+
 /* The same for the errors of scored rows: of all channels together, and of one. */
 static void test_shared_paths_scored(void **state)
 {
@@ -91,6 +131,7 @@ static void test_shared_paths_scored(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_shared_paths), cmocka_unit_test(test_shared_paths_scored)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_shared_paths), cmocka_unit_test(test_noise_of_derivatives),
+                                       cmocka_unit_test(test_shared_paths_scored)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

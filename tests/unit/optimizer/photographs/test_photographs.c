@@ -162,6 +162,26 @@ static void test_png(void **state)
     assert_non_null(strstr(err.text, "saturated"));
 }
 
+/* A photograph with one channel at its largest value is refused, whichever it is, and one just below it is not. */
+static void test_one_saturated_channel(void **state)
+{
+    const struct job_photograph p = photograph_plain(JOB_TRANSFER_LINEAR);
+    const char *path = scratch_path(state, "one.png");
+    for (size_t c = 0; c < 3; c++)
+        for (int below = 0; below < 2; below++) {
+            uint8_t rgb[16 * 16 * 3];
+            struct photograph_mean m;
+            struct error err = {0};
+            memset(rgb, 128, sizeof rgb);
+            for (size_t i = 0; i < 6; i++) rgb[3 * 40 * i + c] = (uint8_t)(255 - below); /* 6 of 256 pixels: 2.3 % */
+            assert_int_equal(image_write_png_rgb8(rgb, 16, 16, path, NULL), STATUS_OK);
+            status s = photograph_measure(path, &p, &m, &err);
+            assert_int_equal(s, below ? STATUS_OK : STATUS_INVALID);
+            assert_true(m.record.saturated_share == (below ? 0.0 : 6.0 / 256.0));
+            if (!below) assert_non_null(strstr(err.text, "saturated"));
+        }
+}
+
 static void test_truncated_png(void **state)
 {
     uint8_t rgb[32 * 32 * 3];
@@ -212,10 +232,15 @@ static void test_small_files_of_huge_pictures(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_mean),          cmocka_unit_test(test_error_of_texture),
-        cmocka_unit_test(test_refused),       cmocka_unit_test(test_one_channel),
-        cmocka_unit_test(test_not_uniform),   cmocka_unit_test(test_png),
-        cmocka_unit_test(test_truncated_png), cmocka_unit_test(test_small_files_of_huge_pictures),
+        cmocka_unit_test(test_mean),
+        cmocka_unit_test(test_error_of_texture),
+        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_one_channel),
+        cmocka_unit_test(test_not_uniform),
+        cmocka_unit_test(test_png),
+        cmocka_unit_test(test_one_saturated_channel),
+        cmocka_unit_test(test_truncated_png),
+        cmocka_unit_test(test_small_files_of_huge_pictures),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }

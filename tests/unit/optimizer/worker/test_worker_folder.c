@@ -74,6 +74,33 @@ static void test_a_worker_of_an_old_attempt_removes_nothing(void **state)
     worker_folder_close(&f);
 }
 
+/* It writes neither results nor marks, and removes no mark. The files that are there stay as they are. */
+static void test_a_worker_of_an_old_attempt_writes_nothing(void **state)
+{
+    static const char *const other[] = {"{\"attempt\": 2, \"token\": \"one\"}", "{\"attempt\": 1, \"token\": \"two\"}"};
+    for (size_t i = 0; i < sizeof other / sizeof *other; i++) {
+        struct worker_folder f;
+        struct error err = {0};
+        char path[WORKER_PATH_BYTES];
+        size_t n;
+        write_attempt(*state, "{\"attempt\": 1, \"token\": \"one\"}");
+        assert_int_equal(worker_folder_open(&f, *state, NULL), STATUS_OK);
+        worker_folder_path(&f, JOB_FOLDER_RESULTS, "kept.txt", path);
+        assert_int_equal(worker_folder_replace(&f, path, "of the first", 12, NULL), STATUS_OK);
+        assert_int_equal(worker_folder_mark_stage(&f, "trace", NULL), STATUS_OK);
+        write_attempt(*state, other[i]);
+        assert_int_equal(worker_folder_replace(&f, path, "of no one", 9, &err), STATUS_STALE);
+        assert_non_null(strstr(err.text, "attempt 1 of this job is no longer current"));
+        assert_int_equal(worker_folder_mark_stage(&f, "fit", NULL), STATUS_STALE);
+        assert_int_equal(worker_folder_unmark_stage(&f, "trace", NULL), STATUS_STALE);
+        assert_true(worker_folder_stage_done(&f, "trace") && !worker_folder_stage_done(&f, "fit"));
+        char *kept = scratch_read(path, &n);
+        assert_true(n == 12 && memcmp(kept, "of the first", 12) == 0);
+        free(kept);
+        worker_folder_close(&f);
+    }
+}
+
 /* Opens the folder while another process holds its lock for so long. */
 static status open_while_held(const char *folder, int how, unsigned held_us)
 {
@@ -192,6 +219,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_other_inputs_empty_the_folder, scratch_folder_setup,
                                         scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(test_a_worker_of_an_old_attempt_removes_nothing, scratch_folder_setup,
+                                        scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(test_a_worker_of_an_old_attempt_writes_nothing, scratch_folder_setup,
                                         scratch_folder_teardown),
         cmocka_unit_test(test_fingerprint),
         cmocka_unit_test_setup_teardown(test_one_start_has_the_attempt, scratch_folder_setup, scratch_folder_teardown),
