@@ -224,9 +224,13 @@ static bool make_room(const struct settings *s, struct log *log, status failed, 
 
 static status open_service(const struct settings *s, struct log *log, struct job_service **service, struct error *err)
 {
-    status r = rebuild_is_needed(s, err);
-    if (r == STATUS_OK) r = job_service_open(s, log, service, err);
-    return make_room(s, log, r, err) ? job_service_open(s, log, service, err) : r;
+    status r;
+    do {
+        r = rebuild_is_needed(s, err);
+        if (r == STATUS_OK) r = job_service_open(s, log, service, err);
+    } while (make_room(s, log, r, err));
+    if (r == STATUS_OK) ballast_keep(s, true); /* what this start has not needed */
+    return r;
 }
 
 static void wait_for_signal(const sigset_t *signals, struct http_server *server, struct log *log)
@@ -280,6 +284,7 @@ out:
     webhook_stop(webhook);
     backup_keeper_stop(backup);
     job_service_close(service);
+    ballast_keep(s, true);
     static_files_free(files);
     return r;
 }

@@ -1,14 +1,24 @@
-/* The ballast file: a file of reserved space under the data folder. On a full disk not even a deletion can be
- * recorded. The ballast file is then removed, so that the deletion succeeds, and made again when there is space. */
+/* The ballast file: reserved space under the data folder. On a completely full disk neither a start nor a deletion
+ * could be recorded. The file is then removed, so that they succeed, and made again when there is space. */
 #ifndef SELVEDGE_SERVER_BALLAST_H
 #define SELVEDGE_SERVER_BALLAST_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Makes the file if it does not exist and twice its size is free. n_bytes 0: no file. */
-void ballast_keep(const char *data_folder, int64_t n_bytes);
+struct job_service;
+struct settings;
+
+/* Makes the file, or enlarges it up to disk.ballast_bytes (0: no file), with at most half of the space above the
+ * floor, so that it keeps no job from running; under the floor it is a small one. all: a small one may take all space
+ * that is free, as a daemon does at its start and at its end with what it has not needed, or has freed itself. */
+void ballast_keep(const struct settings *settings, bool all);
 /* Returns false if there was no file to remove. */
 bool ballast_release(const char *data_folder);
+
+/* Makes room for a change that has found the disk full and that frees space or ends work: first in what the database
+ * has, then by the ballast file. To be repeated, with *step 0 at first, while the change finds the disk full; returns
+ * false when nothing more can be done. */
+bool ballast_make_room(struct job_service *v, int *step);
 
 #endif

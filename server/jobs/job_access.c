@@ -80,7 +80,8 @@ status job_update(struct job_service *v, struct job_row *row, struct error *err)
 status job_update_surely(struct job_service *v, struct job_row *row, struct error *err)
 {
     status s = job_update(v, row, err);
-    return s == STATUS_DISK_FULL && ballast_release(v->settings->data) ? job_update(v, row, err) : s;
+    for (int step = 0; s == STATUS_DISK_FULL && ballast_make_room(v, &step);) s = job_update(v, row, err);
+    return s;
 }
 
 static status find(struct job_service *v, const char *id, bool document, struct job_row *row, struct error *err)

@@ -40,8 +40,7 @@ status job_sync_all(struct job_service *v, struct error *err);
 void job_note_all(struct job_service *v, const struct job_row *row, size_t n);
 /* store_job_update, and the journal. */
 status job_update(struct job_service *v, struct job_row *row, struct error *err);
-/* The same for changes that free space or end work: if the disk is full, the ballast file is released for
- * them. */
+/* The same for changes that free space or end work: if the disk is full, room is made for them. */
 status job_update_surely(struct job_service *v, struct job_row *row, struct error *err);
 
 #endif

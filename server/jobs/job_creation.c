@@ -241,7 +241,7 @@ status job_replace_document(struct job_service *v, const char *id, const char *d
     row.document = text;
     job_mark_edited(&row);
     s = replace_document(v, &row, run, err);
-    if (s == STATUS_DISK_FULL && ballast_release(v->settings->data)) s = replace_document(v, &row, run, err);
+    for (int step = 0; s == STATUS_DISK_FULL && ballast_make_room(v, &step);) s = replace_document(v, &row, run, err);
     if (s == STATUS_OK) job_forget_plan(v, id);
     free(run);
 out:

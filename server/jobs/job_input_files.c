@@ -277,7 +277,8 @@ status job_delete_file(struct job_service *v, const char *id, const char *name, 
     job_mark_edited(&job);
     /* the row first: bytes without a row are removed at the next start, but a row must not refer to missing bytes */
     s = store_file_erase(v->store, file.id, &job, err);
-    if (s == STATUS_DISK_FULL && ballast_release(v->settings->data)) s = store_file_erase(v->store, file.id, &job, err);
+    for (int step = 0; s == STATUS_DISK_FULL && ballast_make_room(v, &step);)
+        s = store_file_erase(v->store, file.id, &job, err);
     if (s == STATUS_OK) job_note(v, id, &(struct journal_entry){.job = &job, .removed = name});
     if (s == STATUS_OK) job_forget_plan(v, id);
     if (s == STATUS_OK) upload_discard(v->upload, &file);

@@ -160,3 +160,11 @@ status store_probe(struct store *store, struct error *err)
     pthread_mutex_unlock(&store->write.lock);
     return s;
 }
+
+void store_make_room(struct store *store)
+{
+    if (store->driver->make_room == NULL) return;
+    pthread_mutex_lock(&store->write.lock);
+    store->driver->make_room(&store->write, store->place.address);
+    pthread_mutex_unlock(&store->write.lock);
+}

@@ -191,6 +191,10 @@ status store_file_list(struct store *store, const char *job_id, struct file_row 
 status store_import(struct store *store, struct job_row *row, const struct file_row *file, size_t n_file,
                     const char *idempotency_key, const char *body_hash, struct error *err);
 
+/* After a change that has found the disk full: lets changes take space that the database has already, so that deleting
+ * is possible on a full disk. */
+void store_make_room(struct store *store);
+
 /* Writes one row, as a readiness check. */
 status store_probe(struct store *store, struct error *err);
 

@@ -14,6 +14,6 @@ bool disk_watch(struct job_service *v, bool was_below)
         log_warning(v->log, "%lld bytes are free, %lld are kept in reserve, so running jobs pause", free_bytes,
                     (long long)floor_bytes);
     if (!below) attempt_resume_paused(v);
-    if (!below) ballast_keep(v->settings->data, v->settings->ballast_bytes);
+    ballast_keep(v->settings, false);
     return below;
 }

@@ -7,8 +7,8 @@ import os
 import shutil
 
 import pytest
-from daemon_under_test import FILES, TUS, Daemon, document, problem, wait_until
-from servers.small_disk import fill
+from daemon_under_test import FILES, TUS, Daemon, document, problem, sha256, wait_until
+from servers.small_disk import fill, kept_full
 
 AT_ONCE = 6  # runs of the same test
 
@@ -63,7 +63,6 @@ def test_a_daemon_that_starts_on_a_full_disk_can_delete(small_disk):
     d.kill()
     fill(small_disk)
     with d:
-        assert not os.path.exists(os.path.join(d.data, "ballast"))
         assert d.job(job)["state"] == "draft" and d.job(other)["state"] in ("queued", "running", "failed")
         for j in (job, other):
             assert d.delete(f"/v1/jobs/{j}").status_code == 204
@@ -83,8 +82,54 @@ def test_a_daemon_with_drafts_only_starts_on_a_full_disk(small_disk):
         wait_until(lambda: os.listdir(os.path.join(d.data, "jobs")) == [])
 
 
+def everything(d):
+    """18 things that can be deleted: jobs of several kinds, files, a batch, a token. Returns (method, path) each."""
+    jobs = [d.ready_job() for _ in range(6)] + [d.start_job("succeed") for _ in range(6)]
+    for job in jobs[6:]:
+        d.wait_state(job, "succeeded")
+    known = [{"name": name, "size": len(data), "sha256": sha256(data)} for name, (_, data) in FILES.items()]
+    batch = d.post("/v1/batches", json={"name": "a", "template": document(), "samples": [{"sample": f"s{i}", "replace": {}, "files": known} for i in range(3)]})
+    assert batch.status_code in (200, 201), batch.text
+    token = d.make_token("root")
+    d.session.headers["Authorization"] = f"Bearer {token}"
+    other = d.post("/v1/tokens", json={"name": "other", "scope": "read"})
+    assert other.status_code == 201, other.text
+    return [f"/v1/jobs/{job}/files/scan.tif" for job in jobs[:4]] + [f"/v1/jobs/{job}" for job in jobs] + [
+        f"/v1/batches/{batch.json()['id']}?jobs=delete", f"/v1/tokens/{other.json()['id']}"]
+
+
+def test_every_deletion_succeeds_while_the_disk_stays_full(small_disk):
+    """Another program takes what becomes free at once."""
+    with Daemon(small_disk / "data", options={"disk.ballast_bytes": 1 << 20}) as d:
+        paths = everything(d)
+        assert len(paths) == 18
+        with kept_full(small_disk):
+            replies = {path: d.delete(path) for path in paths}
+        assert {path: r.status_code for path, r in replies.items() if r.status_code != 204} == {}
+        wait_until(lambda: os.listdir(os.path.join(d.data, "jobs")) == [])
+
+
+def test_a_completely_full_disk_refuses_no_start(small_disk, tmp_path):
+    """With the settings as they are: started and stopped again and again on a disk that is filled each time, and asked
+    for deletions meanwhile. The disk has no room for the whole ballast file."""
+    os.mkdir(small_disk / "data", 0o700)
+    os.symlink(small_disk / "data", tmp_path / "link")  # so that the log is on another disk
+    d = Daemon(tmp_path / "link").start()
+    paths = everything(d)
+    for i in range(6):
+        d.kill() if i % 3 == 2 else d.stop()
+        fill(small_disk, name=f"filler{i}")
+        headers = dict(d.session.headers)
+        d.start()
+        d.session.headers.update(headers)
+        for path in paths[3 * i:3 * i + 3]:
+            r = d.delete(path)
+            assert r.status_code == 204, (i, path, r.text)
+    d.stop()
+
+
 def test_running_jobs_pause_under_the_floor_and_go_on(small_disk):
-    with Daemon(small_disk / "data", options={"disk.floor_bytes": 8 << 20}) as d:
+    with Daemon(small_disk / "data", options={"disk.floor_bytes": 8 << 20, "disk.ballast_bytes": 0}) as d:
         job = d.start_job("work_once")
         wait_until(lambda: d.job(job)["fraction"] == 0.5)
         with open(small_disk / "filler", "wb") as f:
@@ -98,7 +143,7 @@ def test_running_jobs_pause_under_the_floor_and_go_on(small_disk):
 
 
 def test_a_paused_job_can_be_cancelled(small_disk):
-    with Daemon(small_disk / "data", options={"disk.floor_bytes": 8 << 20}) as d:
+    with Daemon(small_disk / "data", options={"disk.floor_bytes": 8 << 20, "disk.ballast_bytes": 0}) as d:
         job = d.start_job("work_once")
         wait_until(lambda: d.job(job)["fraction"] == 0.5)
         with open(small_disk / "filler", "wb") as f:

@@ -2,6 +2,7 @@
 #include "base/clock.h"
 #include "server/cluster/job_change.h"
 #include "server/http/http_problem.h"
+#include "server/jobs/ballast.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
 #include "server/workers/supervisor.h"
@@ -141,6 +142,8 @@ status batch_delete(struct job_service *v, const char *id, bool delete_jobs, str
         row[i].deleted = delete_jobs;
     }
     if (s == STATUS_OK) s = store_batch_erase(v->store, id, row, n, err);
+    for (int step = 0; s == STATUS_DISK_FULL && ballast_make_room(v, &step);)
+        s = store_batch_erase(v->store, id, row, n, err);
     if (s == STATUS_OK) job_note_all(v, row, n);
     job_change_end(v);
     if (s == STATUS_OK) {

@@ -3,11 +3,16 @@
 #include "server/store/store_sql.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <sqlite3.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/vfs.h>
+#include <unistd.h>
+
+/* SQLite checkpoints after 1,000 pages of 4096 bytes, each with 24 bytes before it; a change may take some more. */
+enum { WAL_BYTES = 1100 * (4096 + 24), WAL_SMALL_BYTES = 1 << 20 };
 
 struct sqlite_query {
     struct store_query base;
@@ -204,9 +209,38 @@ static status check_version(struct store_link *link, const char *path, struct er
                      path, version, n_migration);
 }
 
+/* Reserves blocks for the WAL up to its usual end, at most an eighth of the free space (of little space: most of it),
+ * so that changes succeed on a disk that becomes full. The size of the file stays, so SQLite does not see it. */
+static void reserve_wal(const char *path)
+{
+    char wal[4096 + 8];
+    struct statfs fs;
+    snprintf(wal, sizeof wal, "%s-wal", path);
+    int fd = open(wal, O_WRONLY | O_CLOEXEC | O_NOFOLLOW);
+    if (fd >= 0 && fstatfs(fd, &fs) == 0) {
+        int64_t n_free = (int64_t)fs.f_bavail * (int64_t)fs.f_bsize, most = n_free - n_free / 4, n = n_free / 8;
+        if (n < WAL_SMALL_BYTES) n = most < WAL_SMALL_BYTES ? most : WAL_SMALL_BYTES;
+        if (n > WAL_BYTES) n = WAL_BYTES;
+        if (n > 0 && fallocate(fd, FALLOC_FL_KEEP_SIZE, 0, (off_t)n) != 0) {
+            /* changes may then find the disk full, and say so */
+        }
+    }
+    if (fd >= 0) close(fd);
+}
+
+/* After a checkpoint the next change overwrites the WAL from its beginning. */
+static void make_room(struct store_link *link, const char *path)
+{
+    script(link->db, "PRAGMA wal_checkpoint(RESTART)");
+    reserve_wal(path);
+}
+
 static status prepare(struct store_link *link, const char *address, bool may_migrate, struct error *err)
 {
-    return may_migrate ? migrate(link, address, err) : check_version(link, address, err);
+    if (!may_migrate) return check_version(link, address, err);
+    status s = migrate(link, address, err);
+    if (s == STATUS_OK) reserve_wal(address);
+    return s;
 }
 
 const struct store_driver store_sqlite = {
@@ -220,4 +254,5 @@ const struct store_driver store_sqlite = {
                         "WHERE t.queued > 0 ORDER BY t.owner, t.batch, j.priority DESC, j.queued, j.serial"},
     .load = load,
     .check_place = check_place,
-    .prepare = prepare};
+    .prepare = prepare,
+    .make_room = make_room};

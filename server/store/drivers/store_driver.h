@@ -90,6 +90,8 @@ struct store_driver {
     status (*check_place)(const char *address, struct error *err);
     /* Brings the schema to the present version, or only checks that it has it. */
     status (*prepare)(struct store_link *link, const char *address, bool migrate, struct error *err);
+    /* Lets the next changes need as little new space as possible; NULL: the server's disk is another one. */
+    void (*make_room)(struct store_link *link, const char *address);
 };
 
 /* The row for an address. */
