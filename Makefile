@@ -62,7 +62,7 @@ LINK_GEOMETRY := $(shell pkg-config --libs libtiff-4 libzstd 2>/dev/null) -Wl,--
 LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lseccomp -lraw_r -ljpeg -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
 LINK_WAVE := -llapacke # the solver of waves, which no installed program contains
-LINK_SERVER := -lmicrohttpd -ljansson -lsqlite3 -lsodium -linih -luuid -larchive -lcurl $(LINK_BASE)
+LINK_SERVER := -lmicrohttpd -lgnutls -ljansson -lsqlite3 -lsodium -linih -luuid -larchive -lcurl $(LINK_BASE)
 
 .PHONY: all generate medulla-tables wave-tables speckle-tables deps help check test nightly demo demo-camera night cluster-demo clean
 ##@ Build and run

@@ -70,6 +70,8 @@ static const struct setting table[] = {
     NUMBER("server", "max_document_bytes", max_document_bytes, MIB, 1024, MIB, "size of the largest JSON body"),
     NUMBER("server", "max_batch_bytes", max_batch_bytes, 16 * MIB, 1024, 256 * MIB,
            "size of the largest JSON body that submits a batch"),
+    NUMBER("server", "body_memory_bytes", body_memory_bytes, 64 * MIB, MIB, 64 * GIB,
+           "memory for all JSON bodies together; requests beyond it are answered 503 with Retry-After"),
     NUMBER("upload", "max_file_bytes", max_file_bytes, 1024 * GIB, 1, INT64_MAX / 2, "size of the largest input file"),
     NUMBER("upload", "max_patch_bytes", max_patch_bytes, 64 * MIB, MIB, GIB, "size of the largest piece of an upload"),
     NUMBER("upload", "max_files_per_job", max_files_per_job, 8192, 1, 1000000, "number of input files of one job"),

@@ -16,7 +16,7 @@ struct settings {
         unix_socket[SETTING_TEXT_BYTES], public_origin[SETTING_TEXT_BYTES], tls_certificate[SETTING_TEXT_BYTES],
         tls_key[SETTING_TEXT_BYTES], store[SETTING_TEXT_BYTES], store_password_file[SETTING_TEXT_BYTES];
     int64_t port, max_connections, idle_timeout_s, header_deadline_s, min_rate_bytes_per_s, max_document_bytes,
-        max_batch_bytes, lease_s;
+        max_batch_bytes, body_memory_bytes, lease_s;
     /* [upload] */
     int64_t max_file_bytes, max_patch_bytes, max_files_per_job, commit_bytes;
     /* [jobs] */

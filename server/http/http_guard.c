@@ -48,6 +48,25 @@ static enum MHD_Result examine_header(void *context, enum MHD_ValueKind kind, co
     return seen->fault == NULL ? MHD_YES : MHD_NO;
 }
 
+/* The library takes the parts of the first line as texts, and each would end at a NUL before its end. */
+static const char *line_fault(const struct http_request *r, const char *method, const char *version)
+{
+    const char *at = method + strlen(method) + 1;
+    while (at < r->address && *at == ' ') at++;
+    if (at != r->address || r->address_spaced || version != r->address_end + 1)
+        return "the first line has NUL, other control characters or blanks in its method or its address";
+    return NULL;
+}
+
+bool guard_line(struct http_request *r, const char *method, const char *version)
+{
+    const char *fault = line_fault(r, method, version);
+    if (fault == NULL && request_header(r, "Host") == NULL && strcmp(version, "HTTP/1.1") == 0)
+        fault = "a request of this version needs the header Host";
+    if (fault != NULL) reply_code(r, "malformed", "", fault);
+    return fault == NULL;
+}
+
 bool guard_framing(struct http_request *r)
 {
     struct headers_seen seen = {0};

@@ -4,6 +4,9 @@
 
 #include "server/http/http_server.h"
 
+/* Requires a first line without NUL and blanks in its parts, and a Host header where the version needs one. method and
+ * version are as the library gives them, in the buffer of the line. */
+bool guard_line(struct http_request *request, const char *method, const char *version);
 /* Requires an unambiguous body length: no Transfer-Encoding, and no repetition of a header that matters. Sets
  * content_length. */
 bool guard_framing(struct http_request *request);

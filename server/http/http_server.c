@@ -1,7 +1,8 @@
 #include "server/http/http_server.h"
 #include "server/access/access_guard.h"
 #include "server/endpoints/handlers.h"
-#include "server/http/connection_table.h"
+#include "server/http/connections/connection_table.h"
+#include "server/http/connections/library_refusal.h"
 #include "server/http/http_guard.h"
 #include "server/http/http_listen.h"
 #include "server/http/http_reply.h"
@@ -16,7 +17,8 @@
 enum {
     CONNECTION_POOL_BYTES = 256 * 1024,
     THREAD_STACK_BYTES = 2 << 20, /* the JSON parser goes 2,048 levels deep */
-    DRAIN_LIMIT_BYTES = 64 << 20
+    DRAIN_LIMIT_BYTES = 64 << 20,
+    RETRY_AFTER_S = 5
 };
 
 struct http_server {
@@ -27,6 +29,7 @@ struct http_server {
     struct connection_table *connection;
     struct access_desk *desk;
     struct http_tls tls;
+    atomic_int_least64_t body_memory; /* bytes that the bodies of all requests take */
     atomic_uint_least64_t n_reply[HTTP_MAX_STATUS];
 };
 
@@ -53,13 +56,37 @@ static enum MHD_Result queue_reply(struct http_request *r)
     return MHD_queue_response(r->connection, r->reply_status, r->reply);
 }
 
+/* Takes the memory for a JSON body until release_body. Returns false after a reply if the bodies of other requests
+ * leave less than it needs; where there are none, any body has room. */
+static bool take_memory(struct http_request *r)
+{
+    if (r->route->body != HTTP_BODY_JSON && r->route->body != HTTP_BODY_BATCH) return true;
+    atomic_int_least64_t *taken = &r->server->body_memory;
+    int64_t before = atomic_fetch_add(taken, r->content_length);
+    if (before > 0 && before + r->content_length > r->service->settings->body_memory_bytes) {
+        atomic_fetch_sub(taken, r->content_length);
+        reply_code(r, "busy", "", "the bodies of other requests take all memory for bodies; try again in a moment");
+        reply_header_int(r, "Retry-After", RETRY_AFTER_S);
+        return false;
+    }
+    r->body_memory = r->content_length;
+    return true;
+}
+
+static void release_body(struct http_request *r)
+{
+    free(r->body);
+    r->body = NULL;
+    atomic_fetch_sub(&r->server->body_memory, r->body_memory);
+    r->body_memory = 0;
+}
+
 /* Decides the reply to requests that can be refused before their body is read. Returns true if the reply must be
  * sent without waiting for the body. */
-static bool examine(struct http_request *r, const char *method)
+static bool examine(struct http_request *r, const char *method, const char *version)
 {
     char allow[128];
-    bool framing_bad = !guard_framing(r);
-    if (framing_bad) return true;
+    if (!guard_line(r, method, version) || !guard_framing(r)) return true;
     bool skip_body = request_header(r, "Expect") != NULL || r->content_length > DRAIN_LIMIT_BYTES;
     if (atomic_load(&r->service->stopping)) {
         reply_code(r, "stopping", "", "the service is stopping; try again in a moment");
@@ -72,27 +99,39 @@ static bool examine(struct http_request *r, const char *method)
     else if (r->route == NULL) {
         reply_code(r, "method", "", "this address accepts other methods; see Allow");
         reply_header(r, "Allow", allow);
-    } else if (guard_access(r) && guard_query(r) && guard_body(r) && r->route->begin != NULL)
+    } else if (guard_access(r) && guard_query(r) && guard_body(r) && take_memory(r) && r->route->begin != NULL)
         r->route->begin(r);
     /* without a length nobody knows where the next request begins */
     return r->reply != NULL && (skip_body || r->reply_status == MHD_HTTP_LENGTH_REQUIRED);
 }
 
-static enum MHD_Result first_call(struct http_server *s, struct MHD_Connection *c, const char *url, const char *method,
-                                  void **context)
+/* The library calls this with the address as it came, before it reads the headers. */
+static void *on_address(void *context, const char *address, struct MHD_Connection *c)
 {
+    struct http_server *s = context;
     struct http_request *r = calloc(1, sizeof *r);
-    if (r == NULL) return MHD_NO;
-    *context = r;
+    if (r == NULL) return NULL;
     r->server = s;
     r->service = s->service;
     r->desk = s->desk;
     r->connection = c;
-    r->url = url;
+    r->address = address;
+    r->address_end = address;
+    for (; *r->address_end != '\0'; r->address_end++)
+        r->address_spaced = r->address_spaced || (unsigned char)*r->address_end <= ' ' || *r->address_end == 127;
     const union MHD_ConnectionInfo *info = MHD_get_connection_info(c, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
     r->entry = info == NULL ? NULL : info->socket_context;
+    connection_bind(s->connection, r->entry, c);
+    return r;
+}
+
+static enum MHD_Result first_call(struct http_request *r, const char *url, const char *method, const char *version)
+{
+    struct http_server *s = r->server;
+    r->begun = true;
+    r->url = url;
     connection_body_begins(s->connection, r->entry);
-    bool now = examine(r, method);
+    bool now = examine(r, method, version);
     if (r->reply == NULL && r->route != NULL &&
         (r->route->body == HTTP_BODY_JSON || r->route->body == HTTP_BODY_BATCH)) {
         r->body = malloc((size_t)r->content_length + 1);
@@ -107,7 +146,6 @@ static enum MHD_Result first_call(struct http_server *s, struct MHD_Connection *
 /* Accepts a piece of the body. Returns false if the connection must be closed. */
 static bool consume(struct http_request *r, const char *data, size_t n)
 {
-    connection_received(r->entry, n);
     if (r->reply != NULL) return true; /* the reply is already decided, so the body is discarded */
     if (r->upload != NULL) {
         if (r->upload_status == STATUS_OK)
@@ -126,16 +164,21 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *c, const
                                   const char *version, const char *data, size_t *n_data, void **request)
 {
     struct http_request *r = *request;
-    (void)version;
-    if (r == NULL) return first_call(context, c, url, method, request);
+    (void)context;
+    (void)c;
+    if (r == NULL) return MHD_NO; /* out of memory */
+    if (!r->begun) return first_call(r, url, method, version);
     if (*n_data > 0) {
+        connection_received(r->entry, *n_data);
         bool go_on = consume(r, data, *n_data);
+        connection_stored(r->entry);
         *n_data = 0;
         return go_on ? MHD_YES : MHD_NO;
     }
     if (r->queued) return MHD_YES;
     connection_working(r->server->connection, r->entry);
     if (r->reply == NULL) r->route->handle(r);
+    release_body(r);
     return queue_reply(r);
 }
 
@@ -149,7 +192,7 @@ static void on_completed(void *context, struct MHD_Connection *c, void **request
     if (r->upload != NULL) handle_upload_abandoned(r);
     if (r->reply != NULL) MHD_destroy_response(r->reply);
     connection_idle(s->connection, r->entry);
-    free(r->body);
+    release_body(r);
     free(r);
     *request = NULL;
 }
@@ -197,6 +240,8 @@ static void on_library_log(void *context, const char *format, va_list args)
 {
     struct http_server *s = context;
     char text[512];
+    unsigned status_code = library_refusal_of(format, args);
+    if (status_code > 0) library_refusal_answer(s->connection, http_tls_wanted(s->service->settings), status_code);
     vsnprintf(text, sizeof text, format, args);
     log_write(s->service->log, LOG_LEVEL_DEBUG, "http: %s", text);
 }
@@ -240,7 +285,8 @@ status http_server_start(struct job_service *service, http_route_finder *find_ro
         (unsigned)settings->max_connections, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)settings->idle_timeout_s,
         MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_POOL_BYTES, MHD_OPTION_NOTIFY_COMPLETED, on_completed, s,
         MHD_OPTION_NOTIFY_CONNECTION, on_connection, s, MHD_OPTION_UNESCAPE_CALLBACK, unescape, s,
-        MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_ARRAY, tls, MHD_OPTION_END);
+        MHD_OPTION_URI_LOG_CALLBACK, on_address, s, MHD_OPTION_STRICT_FOR_CLIENT, 0, MHD_OPTION_SIGPIPE_HANDLED_BY_APP,
+        1, MHD_OPTION_ARRAY, tls, MHD_OPTION_END);
     if (s->daemon == NULL) {
         close(fd);
         result = http_tls_wanted(settings)

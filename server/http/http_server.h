@@ -24,6 +24,10 @@ struct http_request {
     struct MHD_Connection *connection;
     const struct http_route *route;
     const char *url;
+    const char *address, *address_end; /* in the first line as it came, and its NUL */
+    bool address_spaced;               /* it has blanks or control characters */
+    bool begun;                        /* its headers are there */
+    int64_t body_memory;               /* bytes of the memory for bodies that it holds */
     struct access_desk *desk;
     struct access_grant grant;                  /* what its token allows */
     char param[HTTP_N_PARAM][HTTP_PARAM_BYTES]; /* values of {id}, {name} and {path...} in the path */

@@ -1,4 +1,5 @@
 """Hostile and careless clients: ambiguous framing, slow requests, pages of other sites, many idle connections."""
+import json
 import os
 import re
 import socket
@@ -63,6 +64,28 @@ def test_nonsense_gets_an_error_and_does_no_harm(daemon, text):
     answer, _ = raw(daemon, text, wait_s=2)
     assert not answer or re.match(rb"HTTP/1\.[01] [45]\d\d ", answer), answer[:100]
     assert daemon.get("/livez").json() == {"status": "alive"}
+
+
+@pytest.mark.parametrize("text", [
+    "GET /livez\0x HTTP/1.1\r\nHost: localhost\r\n\r\n", "GET /livez\0 HTTP/1.1\r\nHost: localhost\r\n\r\n", "GET /livez?a\0b HTTP/1.1\r\nHost: localhost\r\n\r\n",
+    "GET\0x /livez HTTP/1.1\r\nHost: localhost\r\n\r\n", "GET /livez\1 HTTP/1.1\r\nHost: localhost\r\n\r\n", "GET /livez x HTTP/1.1\r\nHost: localhost\r\n\r\n",
+    "GET /livez HTTP/1.1\r\n\r\n", "GET /livez HTTP/1.1\r\nHost: localhost\r\nX y\r\n\r\n", "GET /livez\r\n\r\n", "GET\t/livez HTTP/1.1\r\nHost: localhost\r\n\r\n",
+    "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n",
+    "GET /livez HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999999999999999\r\n\r\n",
+    "GET /livez HTTP/9.9\r\nHost: localhost\r\n\r\n", "GET /" + "a" * 400000 + " HTTP/1.1\r\nHost: localhost\r\n\r\n",
+    "GET /livez HTTP/1.1\r\nHost: localhost\r\nX: " + "y" * 300000 + "\r\n\r\n",
+])
+@pytest.mark.parametrize("before", ["", "GET /livez HTTP/1.1\r\nHost: localhost\r\n\r\n"])
+def test_what_cannot_be_understood_gets_one_problem_document(daemon, text, before):
+    answer, closed = raw(daemon, before + text)
+    if before:
+        first, answer = answer.split(b'{"status":"alive"}')
+        assert first.startswith(b"HTTP/1.1 200 ")
+    head, body = answer.split(b"\r\n\r\n", 1)
+    assert closed and answer.count(b"HTTP/1.1 ") == 1 and b"Content-Type: application/problem+json" in head, answer[:300]
+    said = json.loads(body)
+    assert head.startswith(f"HTTP/1.1 {said['status']} ".encode()) and said["status"] in (400, 413, 414, 431, 505)
+    assert said["type"] == f"urn:selvedge:problem:{said['code']}" and said["title"] and said["detail"]
 
 
 def test_expect_continue_is_answered_before_the_body(daemon):

@@ -98,12 +98,27 @@ static void test_depth_of_texts(void **state)
     assert_int_equal(json_depth_check("]]]]\"\\", 6, "the body", NULL), STATUS_OK); /* no JSON: the parser says so */
 }
 
+static void test_number_of_values(void **state)
+{
+    (void)state;
+    const size_t n_bytes = 3 * (JSON_VALUES_MOST / 2) + 2; /* "[[],[],...]": two values for 3 bytes */
+    char *text = malloc(n_bytes + 1);
+    assert_non_null(text);
+    for (size_t i = 0; i < n_bytes; i++) text[i] = "[],"[i % 3];
+    text[0] = '[';
+    struct error err = {0};
+    assert_int_equal(json_depth_check(text, n_bytes, "the body", &err), STATUS_INVALID);
+    assert_string_equal(err.text, "the body has more than 1000000 values");
+    assert_int_equal(json_depth_check(text, n_bytes / 2, "the body", &err), STATUS_OK);
+    free(text);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_both_kinds_of_paths),     cmocka_unit_test(test_names_with_dots_and_slashes),
         cmocka_unit_test(test_paths_that_lead_nowhere), cmocka_unit_test(test_long_paths_are_refused),
-        cmocka_unit_test(test_depth_of_texts),
+        cmocka_unit_test(test_depth_of_texts),          cmocka_unit_test(test_number_of_values),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

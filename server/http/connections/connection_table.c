@@ -1,4 +1,4 @@
-#include "server/http/connection_table.h"
+#include "server/http/connections/connection_table.h"
 #include "base/clock.h"
 
 #include <linux/sockios.h>
@@ -28,8 +28,12 @@ struct connection_entry {
     bool served; /* a request was answered on this connection, so a 408 could be taken for the answer to the next one */
     bool ended;
     atomic_uint_least64_t n_received; /* bytes of the present body */
-    double window_s;                  /* begin of the present window of RATE_GRACE_S of an answer */
-    uint64_t window_acknowledged;     /* bytes that the client had acknowledged then */
+    atomic_bool consuming;            /* a piece of it is being stored */
+    double window_s;                  /* begin of the present window of RATE_GRACE_S of a body or an answer */
+    uint64_t window_bytes;            /* bytes that had been received, or that the client had acknowledged, then */
+    bool bound;                       /* `thread` and `handle` are set */
+    pthread_t thread;
+    void *handle;
 };
 
 struct connection_table {
@@ -118,11 +122,12 @@ static void enter(struct connection_table *t, struct connection_entry *e, enum p
     pthread_mutex_lock(&t->lock);
     e->phase = phase;
     e->since_s = clock_monotonic_s();
+    e->window_s = e->since_s;
+    e->window_bytes = 0;
     if (phase == PHASE_BODY) atomic_store(&e->n_received, 0);
     if (phase == PHASE_SEND) {
         e->served = true;
-        e->window_s = e->since_s;
-        acknowledged_bytes(e->fd, &e->window_acknowledged);
+        acknowledged_bytes(e->fd, &e->window_bytes);
     }
     pthread_mutex_unlock(&t->lock);
 }
@@ -134,21 +139,80 @@ void connection_idle(struct connection_table *t, struct connection_entry *e) { e
 
 void connection_received(struct connection_entry *e, size_t n_bytes)
 {
-    if (e != NULL) atomic_fetch_add(&e->n_received, n_bytes);
+    if (e == NULL) return;
+    atomic_fetch_add(&e->n_received, n_bytes);
+    atomic_store(&e->consuming, true);
+}
+
+void connection_stored(struct connection_entry *e)
+{
+    if (e != NULL) atomic_store(&e->consuming, false);
+}
+
+void connection_bind(struct connection_table *t, struct connection_entry *e, void *handle)
+{
+    if (e == NULL) return;
+    pthread_mutex_lock(&t->lock);
+    e->bound = true;
+    e->thread = pthread_self();
+    e->handle = handle;
+    pthread_mutex_unlock(&t->lock);
+}
+
+/* Whether a connection has no thread yet, but some bytes of its first request. */
+static bool begins(const struct connection_entry *e)
+{
+    struct tcp_info info = {0};
+    socklen_t n = sizeof info;
+    return !e->bound && (getsockopt(e->fd, IPPROTO_TCP, TCP_INFO, &info, &n) != 0 || info.tcpi_bytes_received > 0);
+}
+
+int connection_of_thread(struct connection_table *t, void **handle)
+{
+    int fd = -1, only_fd = -1;
+    size_t n_beginning = 0;
+    *handle = NULL;
+    pthread_mutex_lock(&t->lock);
+    for (struct connection_entry *e = t->first; e != NULL; e = e->next) {
+        if (e->bound && pthread_equal(e->thread, pthread_self())) {
+            fd = e->fd;
+            *handle = e->handle;
+        }
+        if (!begins(e)) continue;
+        n_beginning++;
+        only_fd = e->fd;
+    }
+    pthread_mutex_unlock(&t->lock);
+    return fd >= 0 || n_beginning != 1 ? fd : only_fd;
+}
+
+/* Ends a window of a connection of which `n` bytes have moved so far, once it is long enough. Returns true if few of
+ * them moved in it. */
+static bool moved_few(const struct connection_table *t, struct connection_entry *e, uint64_t n, double now)
+{
+    double window_s = now - e->window_s;
+    if (window_s < RATE_GRACE_S) return false;
+    bool few = (double)(n - e->window_bytes) < t->min_rate_bytes_per_s * window_s;
+    e->window_s = now;
+    e->window_bytes = n;
+    return few;
+}
+
+/* Whether the client sends its body too slowly: for a whole window few bytes have come, and none wait to be read. */
+static bool sends_slowly(const struct connection_table *t, struct connection_entry *e, double now)
+{
+    int n_waiting = 0;
+    if (!moved_few(t, e, atomic_load(&e->n_received), now) || atomic_load(&e->consuming)) return false;
+    return ioctl(e->fd, SIOCINQ, &n_waiting) != 0 || n_waiting == 0;
 }
 
 /* Whether the client reads its answer too slowly: for a whole window bytes have waited for it, and few have gone. */
 static bool reads_slowly(const struct connection_table *t, struct connection_entry *e, double now)
 {
-    double window_s = now - e->window_s;
     int n_waiting = 0;
-    if (window_s < RATE_GRACE_S) return false;
     uint64_t n;
-    if (!acknowledged_bytes(e->fd, &n)) return false;
-    bool few = (double)(n - e->window_acknowledged) < t->min_rate_bytes_per_s * window_s;
-    e->window_s = now;
-    e->window_acknowledged = n;
-    return few && ioctl(e->fd, SIOCOUTQ, &n_waiting) == 0 && n_waiting > 0;
+    if (!acknowledged_bytes(e->fd, &n) || !moved_few(t, e, n, now)) return false;
+    return ioctl(e->fd, SIOCOUTQ, &n_waiting) == 0 && n_waiting > 0;
 }
 
 static bool too_slow(const struct connection_table *t, struct connection_entry *e, double now)
@@ -156,8 +220,7 @@ static bool too_slow(const struct connection_table *t, struct connection_entry *
     double age_s = now - e->since_s;
     /* an idle connection of a client's pool may stay open three times as long */
     if (e->phase == PHASE_HEAD) return age_s > t->header_deadline_s * (e->served ? 3 : 1);
-    if (e->phase == PHASE_BODY)
-        return age_s > RATE_GRACE_S && (double)atomic_load(&e->n_received) < t->min_rate_bytes_per_s * age_s;
+    if (e->phase == PHASE_BODY) return sends_slowly(t, e, now);
     if (e->phase == PHASE_SEND) return reads_slowly(t, e, now);
     return false;
 }
