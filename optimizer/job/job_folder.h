@@ -3,7 +3,8 @@
  *
  *   JOB/job.json            the job document (job_document.h), written by the user or by the daemon: when the job is
  *                           created, and when its document is replaced
- *   JOB/journal.rec         the daemon's journal of the job (server/store/job_journal.h); absent when run by hand
+ *   JOB/journal.rec         the daemon's journal of the job (server/store/journal/job_journal.h); absent when
+ *                           run by hand
  *   JOB/input/<name>        input files under the names that job.json uses. The daemon verifies them, the worker reads
  *                           them.
  *   JOB/attempt.json        {"attempt":3,"token":"..."}: the attempt that may write. Absent when run by hand.

@@ -1,4 +1,6 @@
 #include "server/jobs/job_access.h"
+#include "base/files/durable.h"
+#include "base/files/file_tree.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_paths.h"
@@ -13,6 +15,14 @@ void job_new_id(char out[STORE_ID_BYTES])
     uuid_t u;
     uuid_generate_random(u);
     uuid_unparse_lower(u, out);
+}
+
+status job_remove_folder(const struct job_service *v, const char *id, struct error *err)
+{
+    char path[PATH_BYTES];
+    path_join(path, v->settings->data, "jobs", id, NULL);
+    status s = file_tree_remove(path, err);
+    return s == STATUS_OK ? durable_sync_folder_of(path, err) : s;
 }
 
 void job_forget_plan(const struct job_service *v, const char *id)
@@ -66,7 +76,7 @@ void job_note(struct job_service *v, const char *job_id, const struct journal_en
     /* what the daemon does by itself follows from the files of the worker, too, so no one waits for its sync */
     bool sync = entry->job == NULL || (entry->job->state != JOB_RUNNING && entry->job->state != JOB_PAUSED);
     path_join(folder, v->settings->data, "jobs", job_id, NULL);
-    status s = job_journal_append(folder, entry, sync, &err);
+    status s = job_journal_append(&v->journal_key, folder, entry, sync, &err);
     if (s != STATUS_OK && s != STATUS_NOT_FOUND) log_warning(v->log, "job %s: %s", job_id, err.text);
 }
 

@@ -4,7 +4,7 @@
 #define SELVEDGE_SERVER_JOB_ACCESS_H
 
 #include "server/jobs/job_service.h"
-#include "server/store/job_journal.h"
+#include "server/store/journal/job_journal.h"
 
 /* A random id for a job or an upload. */
 void job_new_id(char out[STORE_ID_BYTES]);
@@ -15,6 +15,9 @@ status job_check_editable(const struct job_row *row, struct error *err);
 /* Marks the row of a job whose document or files were edited: the job becomes a draft, and its next start discards
  * earlier progress. The caller writes the row together with the edit, so that a job whose edit fails is unchanged. */
 void job_mark_edited(struct job_row *row);
+/* Removes the folder of a job, and syncs that: a folder that came back after a power cut, when its job's row is erased,
+ * would be one of a job that the database has lost. */
+status job_remove_folder(const struct job_service *v, const char *id, struct error *err);
 /* Removes the job's plan, if it has one: that of another document or of other files says nothing. */
 void job_forget_plan(const struct job_service *v, const char *id);
 /* Whether the job whose geometry this one adopts, if any, exists and has the same owner. STATUS_INVALID, in the same

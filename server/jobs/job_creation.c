@@ -1,7 +1,6 @@
 /* Creates jobs, and replaces the documents of existing jobs. */
 #include "base/clock.h"
 #include "base/files/durable.h"
-#include "base/files/file_tree.h"
 #include "optimizer/job/job_document.h"
 #include "optimizer/job/job_folder.h"
 #include "server/cluster/job_change.h"
@@ -51,7 +50,7 @@ static status make_folders(struct job_service *v, const char *id, struct error *
 }
 
 /* Without syncs. */
-static status make_place(const struct job_row *row, const char *folder, struct error *err)
+static status make_place(struct job_service *v, const struct job_row *row, const char *folder, struct error *err)
 {
     static const char *const part[] = {JOB_FOLDER_INPUT, "upload"};
     const struct journal_entry all = {.job = row, .document = true};
@@ -63,7 +62,7 @@ static status make_place(const struct job_row *row, const char *folder, struct e
     }
     path_join(path, folder, JOB_FILE_DOCUMENT, NULL);
     if (s == STATUS_OK) s = durable_replace_volatile(path, row->document, strlen(row->document), err);
-    return s == STATUS_OK ? job_journal_append(folder, &all, false, err) : s;
+    return s == STATUS_OK ? job_journal_append(&v->journal_key, folder, &all, false, err) : s;
 }
 
 status job_sync_all(struct job_service *v, struct error *err)
@@ -84,7 +83,7 @@ status job_make_places(struct job_service *v, const struct job_row *row, size_t 
         path_join(folder, v->settings->data, "jobs", row[i].id, NULL);
         path_join(path, folder, JOB_FILE_JOURNAL, NULL);
         if (lstat(path, &st) == 0) continue;
-        s = make_place(&row[i], folder, err);
+        s = make_place(v, &row[i], folder, err);
         n_made++;
     }
     return s == STATUS_OK && n_made > 0 ? job_sync_all(v, err) : s;
@@ -96,7 +95,7 @@ void job_note_all(struct job_service *v, const struct job_row *row, size_t n)
     for (size_t i = 0; i < n; i++) {
         struct error err = {0};
         path_join(folder, v->settings->data, "jobs", row[i].id, NULL);
-        status s = job_journal_append(folder, &(struct journal_entry){.job = &row[i]}, false, &err);
+        status s = job_journal_append(&v->journal_key, folder, &(struct journal_entry){.job = &row[i]}, false, &err);
         if (s != STATUS_OK && s != STATUS_NOT_FOUND) log_warning(v->log, "job %s: %s", row[i].id, err.text);
     }
     struct error err = {0};
@@ -134,7 +133,7 @@ static status fill_place(struct job_service *v, const struct job_row *row, const
     const struct journal_entry all = {.job = row, .document = true, .idempotency_key = key, .body_hash = body_hash};
     status s = make_folders(v, row->id, err);
     if (s == STATUS_OK) s = write_document(v, row, err);
-    if (s == STATUS_OK) s = job_journal_append(path, &all, true, err);
+    if (s == STATUS_OK) s = job_journal_append(&v->journal_key, path, &all, true, err);
     return s;
 }
 
@@ -177,11 +176,11 @@ static status create_locked(struct job_service *v, struct job_row *row, const st
     s = store_job_insert(v->store, row, key, body_hash, err);
     if (s != STATUS_OK) return s;
     s = fill_place(v, row, key, body_hash, err);
-    if (s != STATUS_OK) {
-        char path[PATH_BYTES];
-        path_join(path, v->settings->data, "jobs", row->id, NULL);
-        file_tree_remove(path, NULL);
+    if (s != STATUS_OK && job_remove_folder(v, row->id, NULL) == STATUS_OK)
         store_job_erase(v->store, row->id, NULL);
+    else if (s != STATUS_OK) { /* the folder is removed later */
+        row->deleted = true;
+        store_job_update(v->store, row, NULL);
     }
     return s;
 }

@@ -3,7 +3,6 @@
  * unavailable. */
 #include "base/clock.h"
 #include "base/files/durable.h"
-#include "base/files/file_tree.h"
 #include "optimizer/job/job_folder.h"
 #include "server/cluster/job_change.h"
 #include "server/cluster/lease_keeper.h"
@@ -64,10 +63,8 @@ static status remove_deleted(struct job_service *v, struct error *err)
     struct job_query q = {.deleted = true, .limit = SIZE_MAX >> 1};
     status s = store_job_list(v->store, &q, &row, &n, err);
     for (size_t i = 0; s == STATUS_OK && i < n; i++) {
-        char path[PATH_BYTES];
         struct error why = {0};
-        path_join(path, v->settings->data, "jobs", row[i].id, NULL);
-        status removed = file_tree_remove(path, &why);
+        status removed = job_remove_folder(v, row[i].id, &why);
         if (removed == STATUS_OK) removed = store_job_erase(v->store, row[i].id, &why);
         if (removed != STATUS_OK)
             log_warning(v->log, "job %s is deleted, but a part of it could not be removed: %s", row[i].id, why.text);
@@ -126,7 +123,7 @@ static status begin_journal(struct job_service *v, const char *job_id, const cha
     all.file = file;
     path_join(path, folder, JOB_FILE_DOCUMENT, NULL);
     if (s == STATUS_OK) s = durable_replace_volatile(path, row.document, strlen(row.document), err);
-    if (s == STATUS_OK) s = job_journal_append(folder, &all, false, err);
+    if (s == STATUS_OK) s = job_journal_append(&v->journal_key, folder, &all, false, err);
     free(file);
     job_row_release(&row);
     return s;
@@ -204,9 +201,9 @@ static status recover(struct job_service *v, struct error *err)
     job_change_begin(v, NULL, NULL);
     status s = remove_deleted(v, err);
     if (s == STATUS_OK) s = quarantine_unknown(v, err);
+    if (s == STATUS_OK) s = restore_folders(v, err); /* first, because it begins journals */
     if (s == STATUS_OK && v->keeper == NULL) s = requeue(v, err);
     if (s == STATUS_OK) s = store_fill_verdicts(v->store, read_verdict, v, err);
-    if (s == STATUS_OK) s = restore_folders(v, err);
     if (s == STATUS_OK) s = upload_recover(v->upload, err);
     job_change_end(v);
     return s;
@@ -222,6 +219,9 @@ status job_service_open(const struct settings *settings, struct log *log, struct
     v->log = log;
     pthread_mutex_init(&v->change, NULL);
     status s = make_data_folders(settings->data, err);
+    struct error why = {0};
+    if (s == STATUS_OK && journal_key_read(settings->data, true, &v->journal_key, &why) != STATUS_OK)
+        log_warning(log, "journals of jobs are not sealed: %s", why.text);
     if (s == STATUS_OK) s = store_settings_open(settings, false, &v->store, err);
     if (s == STATUS_OK) s = shared_folder_admit(v, err);
     if (s == STATUS_OK) s = lease_keeper_start(v, &v->keeper, err);

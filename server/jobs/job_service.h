@@ -7,6 +7,7 @@
 #include "server/access/access_desk.h"
 #include "server/jobs/upload.h"
 #include "server/settings.h"
+#include "server/store/journal/journal_seal.h"
 #include "server/store/store.h"
 
 #include <jansson.h>
@@ -26,10 +27,11 @@ struct job_service {
     struct change_feed *feed;        /* of what long polls wait for */
     struct queue_forecast *forecast; /* of when queued jobs start */
     struct log *log;
-    struct supervisor *supervisor; /* notified of changes; NULL in tests */
-    struct backup_keeper *backup;  /* NULL when the settings say that there are no backups */
-    struct lease_keeper *keeper;   /* NULL unless other daemons may use the database */
-    pthread_mutex_t change;        /* held from reading a row to writing it back (server/cluster/job_change.h) */
+    struct supervisor *supervisor;  /* notified of changes; NULL in tests */
+    struct backup_keeper *backup;   /* NULL when the settings say that there are no backups */
+    struct lease_keeper *keeper;    /* NULL unless other daemons may use the database */
+    struct journal_key journal_key; /* seals the journals of jobs */
+    pthread_mutex_t change;         /* held from reading a row to writing it back (server/cluster/job_change.h) */
     atomic_bool stopping;
     atomic_int n_judging; /* checks of input files that run now (server/workers/input_judge.h) */
     atomic_uint_least64_t n_attempt_total, n_lost_total, n_finished_total[JOB_N_STATE];

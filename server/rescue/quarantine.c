@@ -3,7 +3,7 @@
 #include "server/cluster/store_settings.h"
 #include "server/jobs/job_paths.h"
 #include "server/rescue/rebuild.h"
-#include "server/store/job_journal.h"
+#include "server/store/journal/job_journal.h"
 #include "server/store/store_delivery.h"
 
 #include <dirent.h>

@@ -4,6 +4,7 @@
 #include "base/files/file_tree.h"
 #include "server/cluster/store_settings.h"
 #include "server/rescue/backup_files.h"
+#include "server/rescue/database_age.h"
 #include "server/rescue/job_evidence.h"
 #include "server/store/drivers/store_backup.h"
 #include "server/store/store_access.h"
@@ -92,6 +93,7 @@ status rebuild_is_needed(const struct settings *settings, struct error *err)
         error_set(&why, s, "database '%s' is missing or empty, but there are folders of %zu jobs", path, n);
     }
     free(folder);
+    if (s == STATUS_OK) s = database_age_check(settings, path, &why);
     if (s != STATUS_FORMAT) return STATUS_OK; /* whatever else is wrong, opening it will tell */
     return error_set(err, s, "%s; bring it back from backup and job folders with: selvedged --data '%s' --rebuild",
                      why.text, settings->data);
@@ -179,8 +181,7 @@ static status bring_back_folder(struct store *store, const char *data, const cha
         s = STATUS_OK;
     if (s == STATUS_OK) s = bring_back(store, &q, tally, report, &why);
     if (s == STATUS_NOT_FOUND || s == STATUS_FORMAT || s == STATUS_INVALID || s == STATUS_TOO_LARGE) {
-        fprintf(report, "job %s is not brought back: %s; the next start moves its folder to quarantine\n", id,
-                why.text);
+        fprintf(report, "job %s is not brought back: %s\n", id, why.text);
         tally->n_lost++;
         s = STATUS_OK;
     } else if (s != STATUS_OK && err != NULL && err->text[0] == '\0')
@@ -282,6 +283,34 @@ static status swap(const struct settings *settings, const char *made, FILE *repo
     return s;
 }
 
+/* Moves the folders of jobs that are not in the new database to quarantine; a start would say that it lacks them. */
+static status set_aside_lost(const struct settings *settings, FILE *report, struct error *err)
+{
+    struct store *store = NULL;
+    struct folder *folder = NULL;
+    size_t n = 0;
+    char path[PATH_BYTES], from[PATH_BYTES], to[PATH_BYTES], name[80];
+    database_path(settings, path);
+    status s = store_open(path, &store, err);
+    if (s == STATUS_OK) s = list_folders(settings->data, false, &folder, &n, err);
+    path_join(path, settings->data, "quarantine", NULL);
+    if (s == STATUS_OK) s = durable_make_folder(path, err);
+    for (size_t i = 0; s == STATUS_OK && i < n; i++) {
+        struct job_row row = {0};
+        if (store_job_look(store, folder[i].id, &row, NULL) != STATUS_NOT_FOUND) continue;
+        snprintf(name, sizeof name, "%s-%.0f", folder[i].id, clock_wall_s());
+        path_join(from, settings->data, "jobs", folder[i].id, NULL);
+        path_join(to, path, name, NULL);
+        if (rename(from, to) != 0)
+            s = error_set_errno(err, "cannot move '%s' to quarantine", from);
+        else
+            fprintf(report, "the folder of job %s is moved to '%s'\n", folder[i].id, to);
+    }
+    store_close(store);
+    free(folder);
+    return s;
+}
+
 status rebuild(const struct settings *settings, bool resume, FILE *report, struct error *err)
 {
     char folder[PATH_BYTES], made[PATH_BYTES];
@@ -295,6 +324,7 @@ status rebuild(const struct settings *settings, bool resume, FILE *report, struc
     if (s == STATUS_OK) s = copy_base(settings, made, &kept, report, err);
     if (s == STATUS_OK) s = fill(settings, made, kept, resume, report, err);
     if (s == STATUS_OK) s = swap(settings, made, report, err);
+    if (s == STATUS_OK) s = set_aside_lost(settings, report, err);
     file_tree_remove(folder, NULL);
     return s == STATUS_OK ? s : error_prefix(err, s, "cannot rebuild the database");
 }

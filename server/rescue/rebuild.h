@@ -9,8 +9,8 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-/* Checks the database before a start. STATUS_FORMAT, with what to do: it is damaged, or it is missing while there are
- * folders of jobs. */
+/* Checks the database before a start. STATUS_FORMAT, with what to do: it is damaged, it is missing while there are
+ * folders of jobs, or it is behind them (database_age.h). */
 status rebuild_is_needed(const struct settings *settings, struct error *err);
 
 /* Writes a new database: the present one if it is sound, else the newest good backup, else an empty one, and over it

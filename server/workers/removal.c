@@ -1,7 +1,6 @@
 #include "server/workers/removal.h"
 #include "base/clock.h"
-#include "base/files/file_tree.h"
-#include "server/jobs/job_paths.h"
+#include "server/jobs/job_access.h"
 #include "server/store/store_cluster.h"
 
 enum { REMOVE_AGAIN_S = 60 };
@@ -18,10 +17,8 @@ void removal_run(struct job_service *v, struct waiting_list *waiting,
     for (size_t i = 0; mine && i < n; i++) {
         if (store_job_elsewhere(v->store, row[i].id, &elsewhere, NULL) != STATUS_OK || elsewhere) continue;
         if (!is_free(context, row[i].id)) continue;
-        char path[PATH_BYTES];
         struct error err = {0};
-        path_join(path, v->settings->data, "jobs", row[i].id, NULL);
-        status s = file_tree_remove(path, &err);
+        status s = job_remove_folder(v, row[i].id, &err);
         if (s == STATUS_OK) s = store_job_erase(v->store, row[i].id, &err);
         if (s == STATUS_OK) continue;
         log_warning(v->log, "job %s is deleted, but a part of it could not be removed; next try in %d s: %s", row[i].id,

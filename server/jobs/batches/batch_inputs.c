@@ -67,7 +67,7 @@ static void note_files(struct job_service *v, const struct linked *l)
         for (n = 1; i + n < l->n && strcmp(l->row[i].job_id, l->row[i + n].job_id) == 0;) n++;
         path_join(folder, v->settings->data, "jobs", l->row[i].job_id, NULL);
         const struct journal_entry entry = {.file = &l->row[i], .n_file = n};
-        if (job_journal_append(folder, &entry, false, &err) != STATUS_OK)
+        if (job_journal_append(&v->journal_key, folder, &entry, false, &err) != STATUS_OK)
             log_warning(v->log, "job %s: %s", l->row[i].job_id, err.text);
     }
 }

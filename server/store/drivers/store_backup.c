@@ -114,6 +114,25 @@ status store_examine(const char *path, bool thorough, struct store_summary *summ
     return s;
 }
 
+status store_read_ages(const char *path, void (*visit)(void *context, const char *id, double updated_unix_s),
+                       void *context)
+{
+    struct reader r = {0};
+    sqlite3_stmt *q = NULL;
+    status s = open_reader(path, &r, NULL);
+    int rc = s == STATUS_OK ? sqlite3_prepare_v2(r.db, "SELECT id, updated FROM job", -1, &q, NULL) : SQLITE_OK;
+    while (s == STATUS_OK && rc != SQLITE_DONE) {
+        if (rc == SQLITE_OK || rc == SQLITE_ROW) rc = sqlite3_step(q);
+        if (rc == SQLITE_ROW)
+            visit(context, (const char *)sqlite3_column_text(q, 0), sqlite3_column_double(q, 1));
+        else if (rc != SQLITE_DONE)
+            s = step_failed(&r, path, NULL);
+    }
+    sqlite3_finalize(q);
+    sqlite3_close_v2(r.db);
+    return s;
+}
+
 static status vacuum(struct reader *r, const char *to, struct error *err)
 {
     sqlite3_stmt *q = NULL;

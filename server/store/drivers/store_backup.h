@@ -19,6 +19,10 @@ struct store_summary {
  * damaged, or no database of this service. STATUS_IO and others: it could not be found out. */
 status store_examine(const char *path, bool thorough, struct store_summary *summary, struct error *err);
 
+/* Calls visit for the row of each job, tombstones too, of a database of any version. STATUS_FORMAT, STATUS_IO. */
+status store_read_ages(const char *path, void (*visit)(void *context, const char *id, double updated_unix_s),
+                       void *context);
+
 /* Copies the database `path`, with all changes that calls have returned from, to the new file `to`: into a temporary
  * file beside it, which is examined thoroughly, synced and renamed. Nothing is left after an error. STATUS_EXISTS when
  * there is a file `to`, STATUS_NOT_FOUND, STATUS_FORMAT (as store_examine), STATUS_DISK_FULL, STATUS_IO. */

@@ -302,6 +302,9 @@ def test_quarantine_lists_and_restores(daemon_maker):
             db.execute(f"DELETE FROM {table} WHERE {column} = ?", (job,))
     db.close()
     os.makedirs(os.path.join(d.data, "jobs", "something"))
+    with pytest.raises(AssertionError, match="it lacks 1 jobs that were acknowledged.*--rebuild"):
+        d.start()
+    os.rename(os.path.join(d.data, "jobs", job), os.path.join(d.data, "quarantine", f"{job}-1"))
     d.start()
     assert d.get(f"/v1/jobs/{job}").status_code == 404
     assert "another selvedged is using it" in selvedged(d.data, "--quarantine", "restore", job, expect=1)

@@ -10,10 +10,12 @@
  *   "idempotency"      {"key","body_sha256"} of the request that has created the job
  *   "files"            [{"id","name","role","size_bytes","sha256"}]: declared files; one replaces an earlier one of its
  *                      name. sha256 is "" unless the client has declared it.
- *   "removed"          name of a file that is no longer declared */
+ *   "removed"          name of a file that is no longer declared
+ *   "seal"             checksum of the record with the daemon's key (journal_seal.h); the last key */
 #ifndef SELVEDGE_SERVER_JOB_JOURNAL_H
 #define SELVEDGE_SERVER_JOB_JOURNAL_H
 
+#include "server/store/journal/journal_seal.h"
 #include "server/store/store.h"
 
 enum { JOURNAL_KEY_BYTES = 160 };
@@ -30,7 +32,12 @@ struct journal_entry {
 
 /* Appends a record to the journal in a job's folder. With sync it survives power loss. STATUS_IO, STATUS_DISK_FULL,
  * STATUS_NO_MEMORY. */
-status job_journal_append(const char *folder, const struct journal_entry *entry, bool sync, struct error *err);
+status job_journal_append(const struct journal_key *key, const char *folder, const struct journal_entry *entry,
+                          bool sync, struct error *err);
+
+/* Returns when the job's row was changed last by what the journal says for certain: updated_unix_s of the last sealed
+ * record about the job `id` among the last records. 0: there is none. */
+double job_journal_sealed_unix_s(const struct journal_key *key, const char *folder, const char *id);
 
 /* What all records of a journal say together. */
 struct job_journal {

@@ -1,4 +1,4 @@
-#include "server/store/job_journal.h"
+#include "server/store/journal/job_journal.h"
 #include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
 
@@ -117,7 +117,8 @@ static void journal_path(const char *folder, char out[FOLDER_BYTES])
     snprintf(out, FOLDER_BYTES, "%s/%s", folder, JOB_FILE_JOURNAL);
 }
 
-status job_journal_append(const char *folder, const struct journal_entry *entry, bool sync, struct error *err)
+status job_journal_append(const struct journal_key *key, const char *folder, const struct journal_entry *entry,
+                          bool sync, struct error *err)
 {
     char path[FOLDER_BYTES];
     struct stat st;
@@ -125,7 +126,8 @@ status job_journal_append(const char *folder, const struct journal_entry *entry,
     /* a worker, whose folder it is, could put a pipe here, which would be waited for */
     if (lstat(path, &st) == 0 && !S_ISREG(st.st_mode) && unlink(path) != 0)
         return error_set_errno(err, "cannot write '%s'", path);
-    char *text = entry_text(entry);
+    char *plain = entry_text(entry), *text = plain == NULL ? NULL : journal_seal(key, plain);
+    free(plain);
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
     end_last_line(path);
     status s = record_append(path, text, sync, err);
@@ -267,4 +269,49 @@ void job_journal_release(struct job_journal *journal)
     free(journal->file);
     journal->file = NULL;
     journal->n_file = 0;
+}
+
+enum { TAIL_BYTES = 1 << 16, CHECKSUM_BYTES = 9 /* and a blank, before each record */ };
+
+/* updated_unix_s of a record about the job, or 0. */
+static double updated_of(const struct journal_key *key, const char *text, size_t n, const char *id)
+{
+    if (!journal_sealed(key, text, n)) return 0;
+    json_t *j = json_loadb(text, n, 0, NULL);
+    const json_t *job = json_object_get(j, "job");
+    const char *found = json_string_value(json_object_get(job, "id"));
+    double t = found != NULL && strcmp(found, id) == 0 ? json_number_value(json_object_get(job, "updated_unix_s")) : 0;
+    json_decref(j);
+    return t;
+}
+
+/* Reads the end of a regular file; returns its number of bytes, at most TAIL_BYTES. */
+static size_t read_tail(const char *path, char tail[TAIL_BYTES])
+{
+    struct stat st;
+    ssize_t n = 0;
+    int fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode))
+        n = pread(fd, tail, TAIL_BYTES, st.st_size > TAIL_BYTES ? st.st_size - TAIL_BYTES : 0);
+    if (fd >= 0) close(fd);
+    return n > 0 ? (size_t)n : 0;
+}
+
+double job_journal_sealed_unix_s(const struct journal_key *key, const char *folder, const char *id)
+{
+    char path[FOLDER_BYTES];
+    double t = 0;
+    char *tail = key->known ? malloc(TAIL_BYTES) : NULL;
+    if (tail == NULL) return 0;
+    journal_path(folder, path);
+    size_t end = read_tail(path, tail);
+    while (t <= 0 && end > 0) { /* line by line from the end */
+        size_t begin = end - 1;
+        while (begin > 0 && tail[begin - 1] != '\n') begin--;
+        if (tail[end - 1] == '\n' && end - begin > CHECKSUM_BYTES + 1)
+            t = updated_of(key, tail + begin + CHECKSUM_BYTES, end - begin - CHECKSUM_BYTES - 1, id);
+        end = begin;
+    }
+    free(tail);
+    return t;
 }
