@@ -7,7 +7,12 @@ PHYSICS_RENDERER := $(filter-out %reconstruct_phantom %reconstruct_real %fit_den
 TEST_SUPPORT := $(call objs,$(shell find tests/support -name '*.c' 2>/dev/null))
 # gold (of binutils) links these 200 programs in half the time; another linker of LDFLAGS comes later and is taken
 TEST_LINKER := $(if $(shell command -v ld.gold),-fuse-ld=gold)
-$(BUILD)/tests/%: $(BUILD)/obj/tests/%.c.o $(TEST_SUPPORT) $(L)server.a $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
+# an archive, so that a test contains only the support that it uses
+$(L)support.a: $(TEST_SUPPORT)
+	@mkdir -p $(@D)
+	@rm -f $@
+	@ar rcs $@ $^
+$(BUILD)/tests/%: $(BUILD)/obj/tests/%.c.o $(L)support.a $(L)server.a $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
 	@mkdir -p $(@D)
 	@echo "  LINK $@"
 	@$(CC) $(TEST_LINKER) $(LDFLAGS) -o $@ $(filter %.o,$^) $(filter %.a,$^) -lcmocka $(LINK_TEST) $(LINK_SERVER) $(LINK_OPTIMIZER)

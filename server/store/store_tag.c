@@ -71,7 +71,7 @@ static status fill(struct store *store, void (*read)(void *context, const char *
     enum store_step rc = STORE_DONE;
     status s = store_begin(&store->write, err);
     if (s != STATUS_OK) return s;
-    s = store_prepare(&store->write, &q, err, "SELECT id FROM job WHERE verdict = '?'", "");
+    s = store_prepare(&store->write, &q, err, "SELECT id FROM job WHERE verdict = ?", "s", "?");
     while (s == STATUS_OK && (rc = store_step(q)) == STORE_ROW) {
         char id[STORE_ID_BYTES], code[40] = "";
         store_text(q, 0, id, sizeof id);
