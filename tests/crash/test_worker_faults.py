@@ -10,7 +10,7 @@ import re
 import subprocess
 
 import pytest
-from disk_record import strace_wrapper
+from disks.disk_record import strace_wrapper
 from fit_outcome import outcome, read_json
 from test_worker_resume import WORKER, make_job
 

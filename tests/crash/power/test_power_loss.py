@@ -1,47 +1,23 @@
 """A power cut at any moment: every state that the disk may have is rebuilt from a record of calls, a daemon starts on
 it, and everything that was confirmed before the cut is there.
 
-disk_states.py says what a disk is taken to do. SELVEDGE_EVERY=1 (make test-crash) tries every state in place of a sample.
+disks/disk_states.py says what a disk is taken to do. SELVEDGE_EVERY=1 (make test-crash) tries every state in place of
+a sample. test_power_paths.py has the other things that are confirmed.
 Two tests leave out syncs from the record: the same checks must notice that something is missing."""
-import copy
 import os
-import pathlib
 import random
-import tempfile
-import time
 
 import pytest
 from daemon_under_test import FILES, TUS, Daemon, document, program, wait_until
-from disk_record import read_record, strace_wrapper
-from disk_states import Disk, save_all, save_least, save_some
 from fit_outcome import outcome
+from disks.disk_states import Disk, save_all, save_least, save_some
+from disks.replay import EVERY, content_of, memory_folder, record, try_states  # noqa: F401
 from small_cloth import start_small_job
 
-EVERY = os.environ.get("SELVEDGE_EVERY") == "1"
 WORKER = program("selvedge-worker")
 FIT = {"sample": "power", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"},
        "fit": {"model": "two_lobe.v1", "path_budget": 160000, "max_iterations": 12, "render_px": 8, "render_samples": 1, "seed": 7}}
 SMALL_COMMITS = {"upload.commit_bytes": 1 << 16}
-
-
-class Journal:
-    """What was confirmed, and when: changes of what is expected of a job."""
-
-    def __init__(self):
-        self.changes = []
-
-    def say(self, job, **expected):
-        self.changes.append((time.time(), job, expected))
-
-    def before(self, time_s):
-        """Returns job -> expectations from all that was confirmed (or asked for) before this time."""
-        jobs = {}
-        for when, job, expected in self.changes:
-            if when < time_s:
-                known = jobs.setdefault(job, {"files": {}})
-                known["files"].update(expected.get("files", {}))
-                known.update({k: v for k, v in expected.items() if k != "files"})
-        return copy.deepcopy(jobs)
 
 
 def upload_in_pieces(d, journal, job, rng):
@@ -133,79 +109,6 @@ def check_service(folder, expected):
         assert d.get(f"/v1/jobs/{d.ready_job()}").json()["state"] == "draft"
     finally:
         d.kill()
-
-
-def record(folder, scenario, **more):
-    """Runs a daemon under strace. Returns the calls, after a check that they lead to the files that are there."""
-    trace, data = folder / "trace", folder / "data"
-    journal = Journal()
-    d = Daemon(data, wrapper=strace_wrapper(trace), **more).start()
-    scenario(d, journal)
-    d.stop()
-    calls = wait_for_record(trace, data)
-    disk = Disk()
-    for call in calls:
-        disk.apply(call)
-    save_all(disk, folder / "again")
-    assert content_of(folder / "again") == content_of(data), "the record does not lead to the files that are there"
-    return calls, journal
-
-
-def wait_for_record(trace, data):
-    """strace writes its last lines after the program has ended."""
-    size = -1
-    while size != os.path.getsize(trace):
-        size = os.path.getsize(trace)
-        time.sleep(0.2)
-    return read_record(trace, data)
-
-
-def content_of(folder):
-    found = {}
-    for path, _, names in os.walk(folder):
-        for name in names:
-            with open(os.path.join(path, name), "rb") as f:
-                found[os.path.relpath(os.path.join(path, name), folder)] = f.read()
-    return found
-
-
-def states(calls, rng):
-    """Yields (index of the last call, function that saves the state) for all states, or a sample of them. Without a
-    sync the least state stays the same while more is confirmed, so only its last moment is of interest."""
-    disk = Disk()
-    least, others = (1.0, 1.0) if EVERY else (0.3, 0.05)
-    for i, call in enumerate(calls):
-        disk.apply(call)
-        last = i + 1 == len(calls)
-        if (last or calls[i + 1].name == "sync") and rng.random() < least:
-            yield i, lambda path: save_least(disk, path)
-        if rng.random() < others:
-            yield i, lambda path: save_some(disk, path, rng)
-        if rng.random() < others:
-            yield i, lambda path: save_all(disk, path)
-
-
-def try_states(calls, journal, folder, check, enough=5):
-    """Returns (number of states tried, [what was lost]). Ends after `enough` losses."""
-    n, lost = 0, []
-    for i, save in states(calls, random.Random(1)):
-        until_s = calls[i + 1].begin_s if i + 1 < len(calls) else float("inf")
-        save(folder / "cut")
-        n += 1
-        try:
-            check(folder / "cut", journal.before(until_s))
-        except AssertionError as e:
-            lost.append(f"after call {i} ({calls[i].name} {os.fsdecode(calls[i].path)}): {e}")
-        if len(lost) >= enough:
-            break
-    return n, lost
-
-
-@pytest.fixture
-def memory_folder():
-    """A folder in memory, where there is one: states are many, and need no disk."""
-    with tempfile.TemporaryDirectory(dir="/dev/shm" if os.path.isdir("/dev/shm") else None) as folder:
-        yield pathlib.Path(folder)
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ import pytest
 
 CHANGES = ("open,openat,creat,write,pwrite64,writev,pwritev,pwritev2,ftruncate,truncate,fallocate,rename,renameat,renameat2,"
            "link,linkat,symlink,symlinkat,unlink,unlinkat,mkdir,mkdirat,rmdir")
-OTHERS = "fsync,fdatasync,lseek,sendfile,copy_file_range,splice,clone,clone3,fork,vfork"
+OTHERS = "fsync,fdatasync,syncfs,lseek,sendfile,copy_file_range,splice,clone,clone3,fork,vfork"
 LINE = re.compile(r"^(\d+) +(\d+\.\d+) (.*)$")
 CALL = re.compile(r"^(\w+)\((.*)\) += (-?\d+|\?)(.*?)(?: <(\d+\.\d+)>)?$")
 TEXT = re.compile(r'"((?:\\x[0-9a-f]{2})*)"(\.\.\.)?')
@@ -93,11 +93,11 @@ class Positions:
 
 
 class Reader:
-    def __init__(self, path, folder):
+    def __init__(self, path, folder, size):
         self.folder = os.path.realpath(folder).encode()
         lines = list(joined_lines(path))
         self.positions = Positions(lines)
-        self.size = {}  # path -> size, for the end of files
+        self.size = dict(size)  # path -> size, for the end of files
         self.calls = [c for c in (self.read(*line) for line in lines) if c is not None]
 
     def below(self, path):
@@ -145,11 +145,13 @@ class Reader:
         path = self.named(args)
         if all(p is None for p in path):
             return None
-        if name == "truncate" or name.startswith(("symlink", "link")) or None in path or "RENAME_EXCHANGE" in args:
+        if name == "truncate" or name.startswith("symlink") or None in path or "RENAME_EXCHANGE" in args:
             raise NotImplementedError(f"{name}({args[:200]})")
         plain = "rmdir" if "AT_REMOVEDIR" in args else re.sub("at2?$", "", name)
         if plain == "rename":
             self.size[path[1]] = self.size.pop(path[0], 0)
+        elif plain == "link":
+            self.size[path[1]] = self.size.get(path[0], 0)
         elif plain == "unlink":
             self.size.pop(path[0], None)
         return Call(*times, plain, path[0], path[1] if len(path) > 1 else b"")
@@ -160,8 +162,8 @@ class Reader:
         if path is None:
             return None
         key = self.positions.inherited(process, int(m[1]))
-        if name in ("fsync", "fdatasync"):
-            return Call(*times, "sync", path)
+        if name in ("fsync", "fdatasync", "syncfs"):
+            return Call(*times, "sync", path, flags=frozenset({"all"} if name == "syncfs" else ()))
         if name == "lseek":
             if self.positions.at.get(key, 0) is not None:
                 self.positions.at[key] = value
@@ -172,6 +174,8 @@ class Reader:
             return Call(*times, "size", path, offset=size)
         if name == "fallocate":
             size = sum(int(a) for a in args.rsplit(",", 2)[1:])
+            if "FALLOC_FL_KEEP_SIZE" in args:
+                return None
             if not re.search(r", 0, \d+, \d+$", args):
                 raise NotImplementedError(f"fallocate({args[-100:]})")
             return Call(*times, "size", path, offset=size) if self.grown(path, size) else None
@@ -200,8 +204,8 @@ class Reader:
         return offset
 
 
-def read_record(path, folder):
+def read_record(path, folder, size=()):
     """Returns the calls that changed or synced something below the folder, in the order of their ends.
 
-    NotImplementedError: a call that this module cannot replay."""
-    return sorted(Reader(path, folder).calls, key=lambda c: c.end_s)
+    size: path -> size of the files that were there before. NotImplementedError: a call that this module cannot replay."""
+    return sorted(Reader(path, folder, size).calls, key=lambda c: c.end_s)

@@ -2,7 +2,8 @@
 
 A sync of a file makes its bytes and its size durable, and a sync of a folder its entries. Everything else may be there
 or not: writes in any selection of sectors, changes of entries in their order. A rename is there as a whole or not at
-all, as on every file system with a journal.
+all, as on every file system with a journal, until one of its two folders is synced: that makes the half in this folder
+durable and nothing else, because POSIX promises no more. So the folder that receives an entry must be synced first.
 """
 import os
 import shutil
@@ -59,7 +60,27 @@ class Folder:
 class Disk:
     def __init__(self):
         self.root = Folder()
+        self.files = []
         self.pending = []  # changes of entries that no sync covers: lists of (folder, name, node or None)
+
+    def new_file(self):
+        self.files.append(File())
+        return self.files[-1]
+
+    def load(self, path, folder=None):
+        """Takes over what is in a folder, as durable. Returns path -> size of all files."""
+        folder, size = folder or self.root, {}
+        for entry in os.scandir(os.fsencode(path)):
+            if entry.is_dir():
+                node = Folder()
+                size.update({entry.name + b"/" + below: n for below, n in self.load(entry.path, node).items()})
+            else:
+                node = self.new_file()
+                with open(entry.path, "rb") as f:
+                    node.durable[:] = f.read()
+                size[entry.name] = len(node.durable)
+            folder.now[entry.name] = folder.durable[entry.name] = node
+        return size
 
     def find(self, path):
         node = self.root
@@ -79,7 +100,7 @@ class Disk:
         node = self.find(call.path)
         if call.name == "open":
             if node is None:
-                self.change((call.path, File()))
+                self.change((call.path, self.new_file()))
             elif "O_TRUNC" in call.flags and isinstance(node, File):
                 node.pending.append((call.end_s, 0, None))
         elif call.name == "mkdir" and call.path:  # the root is there before
@@ -88,10 +109,14 @@ class Disk:
             self.change((call.path, None))
         elif call.name == "rename":
             self.change((call.path, None), (call.target, node))
+        elif call.name == "link":
+            self.change((call.target, node))
         elif call.name == "size":
             node.pending.append((call.end_s, call.offset, None))
         elif call.name == "write" and node is not None:
             node.pending.append((call.end_s, call.offset, call.data))
+        elif call.name == "sync" and "all" in call.flags:
+            self.sync_all(call.begin_s)
         elif call.name == "sync":
             self.sync(node, call.begin_s)
 
@@ -99,9 +124,17 @@ class Disk:
         if isinstance(node, File):
             node.apply(begin_s)
         elif node is not None:
-            for edits in [e for e in self.pending if any(folder is node for folder, _, _ in e)]:
-                self.pending.remove(edits)
-                commit(edits)
+            for edits in self.pending:
+                commit([e for e in edits if e[0] is node])
+                edits[:] = [e for e in edits if e[0] is not node]
+            self.pending = [edits for edits in self.pending if edits]
+
+    def sync_all(self, begin_s):
+        for file in self.files:
+            file.apply(begin_s)
+        for edits in self.pending:
+            commit(edits)
+        self.pending = []
 
     def save(self, path, kept_changes, keep):
         """Writes one state to a new folder: kept_changes are those of `pending` that have happened, and keep() decides
