@@ -1,7 +1,7 @@
 /* The journal of a job: everything that is written comes back, later records replace earlier ones, and damage, links
  * and values that no daemon writes do no harm. */
 #include "optimizer/job/job_folder.h"
-#include "server/store/job_journal.h"
+#include "server/store/journal/job_journal.h"
 #include "tests/support/scratch_folder.h"
 
 #include <errno.h>
@@ -17,6 +17,7 @@
 
 #include <cmocka.h>
 
+static const struct journal_key key = {.known = true, .bytes = "not so secret"};
 static const struct job_row whole = {.id = "an-id",
                                      .sample = "silk \"A\"",
                                      .document = (char *)(uintptr_t) "abc",
@@ -44,7 +45,7 @@ static const struct job_row whole = {.id = "an-id",
 
 static void append(const char *folder, const struct journal_entry *entry)
 {
-    assert_int_equal(job_journal_append(folder, entry, true, NULL), STATUS_OK);
+    assert_int_equal(job_journal_append(&key, folder, entry, true, NULL), STATUS_OK);
 }
 
 static void assert_whole(const struct job_row *a, const struct job_row *b)
@@ -223,7 +224,8 @@ static void test_links_and_pipes(void **state)
     }
     unlink(path);
     assert_int_equal(mkdir(path, 0700), 0);
-    assert_int_not_equal(job_journal_append(*state, &(struct journal_entry){.job = &whole}, true, NULL), STATUS_OK);
+    assert_int_not_equal(job_journal_append(&key, *state, &(struct journal_entry){.job = &whole}, true, NULL),
+                         STATUS_OK);
 }
 
 int main(void)
