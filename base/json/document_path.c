@@ -2,6 +2,7 @@
 #include "base/json/json_depth.h"
 
 #include <stdbool.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -48,22 +49,30 @@ static bool place_of(const json_t *list, const char *name, size_t *i)
     return *i < json_array_size(list);
 }
 
-/* The member `name` of a parent, which is made an object if it is missing. NULL: there is no such place. */
-static json_t *child_of(json_t *parent, const char *name)
+static bool set_child(json_t *parent, const char *name, json_t *value)
+{
+    size_t i;
+    if (json_is_object(parent)) return json_object_set_new(parent, name, value) == 0;
+    if (json_is_array(parent) && place_of(parent, name, &i)) return json_array_set_new(parent, i, value) == 0;
+    json_decref(value);
+    return false;
+}
+
+static json_t *get_child(const json_t *parent, const char *name)
 {
     size_t i;
     if (json_is_array(parent)) return place_of(parent, name, &i) ? json_array_get(parent, i) : NULL;
-    if (!json_is_object(parent)) return NULL;
-    if (json_object_get(parent, name) == NULL) json_object_set_new(parent, name, json_object());
     return json_object_get(parent, name);
 }
 
-static bool set_child(json_t *parent, const char *name, const json_t *value)
+/* The member `name` of a parent, which is made an object if it is missing, and copied without its members if another
+ * document has it too. NULL: there is no such place. */
+static json_t *own_child(json_t *parent, const char *name)
 {
-    size_t i;
-    if (json_is_object(parent)) return json_object_set_new(parent, name, json_deep_copy(value)) == 0;
-    return json_is_array(parent) && place_of(parent, name, &i) &&
-           json_array_set_new(parent, i, json_deep_copy(value)) == 0;
+    json_t *child = get_child(parent, name);
+    if (child == NULL && json_is_object(parent)) set_child(parent, name, json_object());
+    if (child != NULL && child->refcount > 1) set_child(parent, name, json_copy(child));
+    return get_child(parent, name);
 }
 
 status document_replace(json_t *document, const char *path, const json_t *value, struct error *err)
@@ -80,10 +89,10 @@ status document_replace(json_t *document, const char *path, const json_t *value,
         if (next == NULL) break;
         more = *next != '\0' || (pointer && next > at && next[-1] == '/');
         if (!more) {
-            if (set_child(parent, name, value)) return STATUS_OK;
+            if (set_child(parent, name, json_incref((json_t *)(uintptr_t)value))) return STATUS_OK;
             return error_set(err, STATUS_INVALID, "the template has no place '%.160s'", path);
         }
-        parent = child_of(parent, name);
+        parent = own_child(parent, name);
         at = next;
         if (parent == NULL) return error_set(err, STATUS_INVALID, "the template has no place '%.160s'", path);
     }

@@ -65,12 +65,20 @@ static json_t *read_json(const char *text, size_t n_bytes, struct error *err)
 
 status job_document_parse(const char *text, size_t n_bytes, struct job_document **doc, struct error *err)
 {
-    struct job_document *d = NULL;
     struct error fault = {0};
     json_t *json = read_json(text, n_bytes, &fault);
-    status s = json != NULL ? document_new(&d, &fault) : fault.code;
-    if (s == STATUS_OK) s = job_options_read(json, d, &fault);
+    status s = json != NULL ? job_document_read(json, doc, &fault) : fault.code;
     json_decref(json);
+    if (s != STATUS_OK && err != NULL) *err = fault;
+    return s;
+}
+
+status job_document_read(const json_t *json, struct job_document **doc, struct error *err)
+{
+    struct job_document *d = NULL;
+    struct error fault = {0};
+    status s = document_new(&d, &fault);
+    if (s == STATUS_OK) s = job_options_read(json, d, &fault);
     if (s == STATUS_OK)
         *doc = d;
     else {

@@ -13,6 +13,7 @@
 #include "base/status.h"
 #include "optimizer/job/job_fit_option.h"
 
+#include <jansson.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -256,6 +257,8 @@ struct job_document {
 /* Parses and checks n_bytes of text, which need not be NUL-terminated. On success the caller frees *doc with
  * job_document_free. */
 status job_document_parse(const char *text, size_t n_bytes, struct job_document **doc, struct error *err);
+/* The same from parsed JSON. */
+status job_document_read(const json_t *json, struct job_document **doc, struct error *err);
 void job_document_free(struct job_document *doc);
 /* Whether the job has photographs or a table of measurements, so that there is something to fit. */
 bool job_document_has_rows(const struct job_document *doc);

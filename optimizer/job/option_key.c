@@ -6,9 +6,8 @@
 
 const char *job_option_key(const char *id)
 {
-    const struct job_option *row;
-    for (size_t i = 0; (row = job_option_at(i)) != NULL; i++)
-        if (row->id != NULL && strcmp(row->id, id) == 0) return row->path;
+    JOB_OPTION_EACH(row)
+    if (row->id != NULL && strcmp(row->id, id) == 0) return row->path;
     return NULL;
 }
 

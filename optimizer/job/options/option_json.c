@@ -94,8 +94,7 @@ static json_t *option_json(const struct job_option *row)
 json_t *job_options_json(void)
 {
     json_t *list = json_array();
-    const struct job_option *row;
-    for (size_t i = 0; (row = job_option_at(i)) != NULL; i++) json_array_append_new(list, option_json(row));
+    JOB_OPTION_EACH(row) json_array_append_new(list, option_json(row));
     return json_pack("{s:o}", "options", list);
 }
 

@@ -264,16 +264,19 @@ static status read_section(const struct json_field *f, const char *pattern, void
                            struct error *err)
 {
     const char *key, *allowed[MAX_KEY + 1];
-    const struct job_option *row;
+    const struct job_option *of[MAX_KEY];
     size_t n = 0;
-    for (size_t i = 0; (row = job_option_at(i)) != NULL && n < MAX_KEY; i++)
-        if ((key = job_option_key_in(row, pattern)) != NULL) allowed[n++] = key;
+    JOB_OPTION_EACH(row)
+    {
+        if (n == MAX_KEY || (key = job_option_key_in(row, pattern)) == NULL) continue;
+        of[n] = row;
+        allowed[n++] = key;
+    }
     allowed[n] = NULL;
     status s = check_keys(f, allowed, doc, err);
-    for (size_t i = 0; s == STATUS_OK && json_is_object(f->object) && (row = job_option_at(i)) != NULL; i++) {
+    for (size_t i = 0; s == STATUS_OK && json_is_object(f->object) && i < n; i++) {
         struct error fault = {0};
-        if ((key = job_option_key_in(row, pattern)) == NULL) continue;
-        s = stop_or_keep(read_option(row, f, key, base, doc, &fault), &fault, doc, err);
+        s = stop_or_keep(read_option(of[i], f, allowed[i], base, doc, &fault), &fault, doc, err);
     }
     return s;
 }
@@ -319,13 +322,12 @@ static status put_default(const struct job_option *row, void *base, struct job_d
  * skipped: their elements get defaults when they are read. */
 static status default_section(const char *pattern, void *base, struct job_document *doc, struct error *err)
 {
-    const struct job_option *row;
     size_t n = strlen(pattern);
     status s = STATUS_OK;
-    for (size_t i = 0; s == STATUS_OK && (row = job_option_at(i)) != NULL; i++)
-        if (strncmp(row->path, pattern, n) == 0 && (n == 0 || row->path[n] == '.') &&
-            strchr(row->path + n, '[') == NULL)
-            s = put_default(row, base, doc, err);
+    JOB_OPTION_EACH(row)
+    if (s == STATUS_OK && strncmp(row->path, pattern, n) == 0 && (n == 0 || row->path[n] == '.') &&
+        strchr(row->path + n, '[') == NULL)
+        s = put_default(row, base, doc, err);
     return s;
 }
 

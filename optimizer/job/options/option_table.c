@@ -7,19 +7,17 @@ static const struct job_option *const part[] = {option_rows_cloth,   option_rows
                                                 option_rows_camera,  option_rows_profile,   option_rows_fit,
                                                 option_rows_pictures};
 
+const struct job_option *job_option_part(size_t i) { return i < sizeof part / sizeof part[0] ? part[i] : NULL; }
+
 const struct job_option *job_option_at(size_t i)
 {
-    for (size_t p = 0; p < sizeof part / sizeof part[0]; p++)
-        for (const struct job_option *row = part[p]; row->path != NULL; row++)
-            if (i-- == 0) return row;
+    JOB_OPTION_EACH(row) if (i-- == 0) return row;
     return NULL;
 }
 
 const struct job_option *job_option_find(const char *path)
 {
-    const struct job_option *row;
-    for (size_t i = 0; (row = job_option_at(i)) != NULL; i++)
-        if (strcmp(row->path, path) == 0) return row;
+    JOB_OPTION_EACH(row) if (strcmp(row->path, path) == 0) return row;
     return NULL;
 }
 

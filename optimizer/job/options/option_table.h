@@ -74,6 +74,12 @@ struct option_value {
 
 /* Row i in the order of the document; NULL after the last. */
 const struct job_option *job_option_at(size_t i);
+/* The rows of part i, up to one without a path; NULL: there is no such part. JOB_OPTION_EACH walks all rows of the
+ * table without searching each from its beginning, as job_option_at does. */
+const struct job_option *job_option_part(size_t i);
+#define JOB_OPTION_EACH(row)                                                                                           \
+    for (size_t i_part_ = 0; job_option_part(i_part_) != NULL; i_part_++)                                              \
+        for (const struct job_option *row = job_option_part(i_part_); row->path != NULL; row++)
 /* The row of a path of the table; NULL when there is none. */
 const struct job_option *job_option_find(const char *path);
 /* The key of a row inside its section: "side_cm" for the row "lamp.side_cm" in the section "lamp". The section "" is

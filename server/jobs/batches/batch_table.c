@@ -1,5 +1,6 @@
 #include "server/jobs/batches/batch_table.h"
 #include "base/json/document_path.h"
+#include "base/json/json_depth.h"
 #include "optimizer/job/job_document.h"
 #include "server/jobs/job_access.h"
 
@@ -122,86 +123,130 @@ static status read_files(struct job_service *v, const json_t *list, struct batch
     return s;
 }
 
-static status make_document(const json_t *template_, const json_t *row, struct batch_sample *sample, struct error *err)
-{
-    json_t *document = json_deep_copy(template_);
-    const json_t *replace = json_object_get(row, "replace");
-    const char *path;
-    json_t *value;
-    status s = STATUS_OK;
-    if (replace != NULL && !json_is_object(replace))
-        s = error_set_field(err, STATUS_INVALID, "replace", "'replace' must be an object");
-    json_object_set_new(document, "sample", json_string(sample->sample));
-    json_object_foreach((json_t *)(uintptr_t)replace, path, value)
-    {
-        if (s == STATUS_OK && (strcmp(path, "sample") == 0 || strcmp(path, "/sample") == 0))
-            s = error_set(err, STATUS_INVALID, "the name of the sample is the member 'sample' of its row");
-        if (s == STATUS_OK) s = document_replace(document, path, value, err);
-        if (s == STATUS_INVALID && err->field[0] == '\0')
-            snprintf(err->field, sizeof err->field, "replace.%.100s", path);
-    }
-    sample->document = json_dumps(document, JSON_COMPACT);
-    json_decref(document);
-    if (s == STATUS_OK && sample->document == NULL)
-        s = error_set(err, STATUS_NO_MEMORY, "cannot read the batch: out of memory");
-    return s;
-}
+/* What is read of a table while it is read. */
+struct reading {
+    struct job_service *v;
+    const json_t *template_, *rows;
+    struct batch_table *table;
+    json_t **document; /* of each row; it shares what the row does not replace with the template */
+    json_t *names;     /* of the samples so far */
+    size_t n_bytes;    /* of the texts of all documents so far */
+};
 
-static status read_sample(struct job_service *v, const json_t *template_, const json_t *row,
-                          struct batch_sample *sample, struct error *err)
+/* The name and the files of a row. */
+static status read_head(struct reading *r, size_t i, struct error *err)
 {
-    struct job_document *doc = NULL;
+    const json_t *row = json_array_get(r->rows, i), *replace = json_object_get(row, "replace");
+    struct batch_sample *sample = &r->table->sample[i];
     const char *name = json_string_value(json_object_get(row, "sample"));
     if (!json_is_object(row)) return error_set(err, STATUS_INVALID, "a row must be an object");
     status s = check_members(row, " sample replace files ", err);
-    if (s == STATUS_OK && (name == NULL || name[0] == '\0' || strlen(name) >= sizeof sample->sample))
-        s = error_set_field(err, STATUS_INVALID, "sample", "a row needs the name of its sample, of at most 255 bytes");
     if (s != STATUS_OK) return s;
+    if (name == NULL || name[0] == '\0' || strlen(name) >= sizeof sample->sample)
+        return error_set_field(err, STATUS_INVALID, "sample",
+                               "a row needs the name of its sample, of at most 255 bytes");
     snprintf(sample->sample, sizeof sample->sample, "%s", name);
-    s = make_document(template_, row, sample, err);
-    if (s == STATUS_OK) s = read_files(v, json_object_get(row, "files"), sample, err);
+    if (json_object_get(r->names, name) != NULL)
+        return error_set_field(err, STATUS_INVALID, "sample", "there are two rows with this name");
+    json_object_set_new(r->names, name, json_true());
+    if (replace != NULL && !json_is_object(replace))
+        return error_set_field(err, STATUS_INVALID, "replace", "'replace' must be an object");
+    return read_files(r->v, json_object_get(row, "files"), sample, err);
+}
+
+static status replace_members(json_t *document, const json_t *replace, struct error *err)
+{
+    const char *path;
+    json_t *value;
+    json_object_foreach((json_t *)(uintptr_t)replace, path, value)
+    {
+        status s = strcmp(path, "sample") == 0 || strcmp(path, "/sample") == 0
+                       ? error_set(err, STATUS_INVALID, "the name of the sample is the member 'sample' of its row")
+                       : document_replace(document, path, value, err);
+        if (s == STATUS_OK) continue;
+        if (s == STATUS_INVALID) snprintf(err->field, sizeof err->field, "replace.%.100s", path);
+        return s;
+    }
+    return STATUS_OK;
+}
+
+/* The document of a row, and its text. */
+static status make_document(struct reading *r, size_t i, struct error *err)
+{
+    struct batch_sample *sample = &r->table->sample[i];
+    json_t *document = r->document[i] = json_copy((json_t *)(uintptr_t)r->template_);
+    json_object_set_new(document, "sample", json_string(sample->sample));
+    status s = replace_members(document, json_object_get(json_array_get(r->rows, i), "replace"), err);
     if (s != STATUS_OK) return s;
-    const char *text = sample->document;
-    if ((int64_t)strlen(text) > v->settings->max_document_bytes)
-        s = error_set(err, STATUS_INVALID, "its document has more than %lld bytes",
-                      (long long)v->settings->max_document_bytes);
-    if (s == STATUS_OK) s = job_document_parse(text, strlen(text), &doc, err);
-    if (s == STATUS_OK) s = match_files(sample, doc, err);
+    sample->document = json_dumps(document, JSON_COMPACT);
+    if (sample->document == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the batch: out of memory");
+    size_t n = strlen(sample->document);
+    r->n_bytes += n;
+    if ((int64_t)n > r->v->settings->max_document_bytes)
+        return error_set(err, STATUS_INVALID, "its document has more than %lld bytes",
+                         (long long)r->v->settings->max_document_bytes);
+    if (r->n_bytes > BATCH_TEXT_MOST_BYTES)
+        return error_set(err, STATUS_INVALID, "the documents of all rows have more than %d MiB together",
+                         BATCH_TEXT_MOST_BYTES >> 20);
+    return json_depth_check(sample->document, n, "its document", err);
+}
+
+/* Whether the document is one of a job, with the files of the row. */
+static status check_document(struct reading *r, size_t i, struct error *err)
+{
+    struct job_document *doc = NULL;
+    status s = job_document_read(r->document[i], &doc, err);
+    if (s == STATUS_OK) s = match_files(&r->table->sample[i], doc, err);
     job_document_free(doc);
     return s;
 }
 
-/* Reads all rows, and notes the first fault of each that has one. */
-static status read_rows(struct job_service *v, const json_t *template_, const json_t *rows, struct batch_table *t,
-                        json_t *faults, struct error *err)
+static void note_fault(const struct reading *r, size_t i, const struct error *one, json_t *faults, struct error *said)
 {
-    json_t *seen = json_object();
-    status first = STATUS_OK;
-    size_t n_bytes = 0;
-    for (size_t i = 0; i < json_array_size(rows); i++) {
-        struct error one = {0}, said = {0};
-        struct batch_sample *sample = &t->sample[t->n++];
-        status s = read_sample(v, template_, json_array_get(rows, i), sample, &one);
-        if (s == STATUS_OK && json_object_get(seen, sample->sample) != NULL)
-            s = error_set_field(&one, STATUS_INVALID, "sample", "there are two rows with this name");
-        json_object_set_new(seen, sample->sample, json_true());
-        n_bytes += sample->document == NULL ? 0 : strlen(sample->document);
-        if (s == STATUS_OK && n_bytes > BATCH_TEXT_MOST_BYTES)
-            s = error_set(&one, STATUS_INVALID, "the documents of all rows have more than %d MiB together",
-                          BATCH_TEXT_MOST_BYTES >> 20);
-        if (s == STATUS_OK) continue;
-        char field[200];
-        snprintf(field, sizeof field, "samples[%zu]%s%.140s", i, one.field[0] != '\0' ? "." : "", one.field);
-        error_set_field(&said, STATUS_INVALID, field, "sample '%.80s': %s", sample->sample, one.text);
-        if (json_array_size(faults) < FAULT_MOST)
-            json_array_append_new(faults,
-                                  json_pack("{s:s,s:s,s:s}", "code", "invalid", "field", field, "detail", said.text));
-        if (first == STATUS_OK) *err = said;
-        first = STATUS_INVALID;
-        if (n_bytes > BATCH_TEXT_MOST_BYTES) break;
+    char field[200];
+    snprintf(field, sizeof field, "samples[%zu]%s%.140s", i, one->field[0] != '\0' ? "." : "", one->field);
+    error_set_field(said, STATUS_INVALID, field, "sample '%.80s': %s", r->table->sample[i].sample, one->text);
+    json_array_append_new(faults, json_pack("{s:s,s:s,s:s}", "code", "invalid", "field", field, "detail", said->text));
+}
+
+/* Reads all rows in passes, the cheapest first. A pass that finds faults notes the first one of each row, up to
+ * FAULT_MOST rows, and is the last. */
+static status read_rows(struct reading *r, json_t *faults, struct error *err)
+{
+    status (*const pass[])(struct reading *, size_t, struct error *) = {read_head, make_document, check_document};
+    for (size_t p = 0; p < sizeof pass / sizeof pass[0]; p++) {
+        for (size_t i = 0; i < r->table->n && json_array_size(faults) < FAULT_MOST; i++) {
+            struct error one = {0}, said = {0};
+            status s = pass[p](r, i, &one);
+            if (s == STATUS_OK) continue;
+            if (s == STATUS_NO_MEMORY) {
+                *err = one;
+                return s;
+            }
+            note_fault(r, i, &one, faults, &said);
+            if (json_array_size(faults) == 1) *err = said;
+            if (r->n_bytes > BATCH_TEXT_MOST_BYTES) break;
+        }
+        if (json_array_size(faults) > 0) return STATUS_INVALID;
     }
-    json_decref(seen);
-    return first;
+    return STATUS_OK;
+}
+
+static status read_samples(struct job_service *v, const json_t *template_, const json_t *rows, struct batch_table *t,
+                           json_t *faults, struct error *err)
+{
+    struct reading r = {.v = v, .template_ = template_, .rows = rows, .table = t};
+    t->n = json_array_size(rows);
+    t->sample = calloc(t->n, sizeof *t->sample);
+    r.document = calloc(t->n, sizeof *r.document);
+    r.names = json_object();
+    status s = t->sample == NULL || r.document == NULL || r.names == NULL
+                   ? error_set(err, STATUS_NO_MEMORY, "cannot read the batch: out of memory")
+                   : read_rows(&r, faults, err);
+    for (size_t i = 0; r.document != NULL && i < t->n; i++) json_decref(r.document[i]);
+    free(r.document);
+    json_decref(r.names);
+    return s;
 }
 
 status batch_table_read(struct job_service *v, const json_t *body, struct batch_table *t, json_t **faults,
@@ -227,9 +272,7 @@ status batch_table_read(struct job_service *v, const json_t *body, struct batch_
     snprintf(t->name, sizeof t->name, "%s", name);
     t->update = json_is_true(update);
     t->template_text = json_dumps(template_, JSON_COMPACT);
-    t->sample = calloc(json_array_size(rows), sizeof *t->sample);
-    if (t->template_text == NULL || t->sample == NULL)
-        return error_set(err, STATUS_NO_MEMORY, "cannot read the batch: out of memory");
+    if (t->template_text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the batch: out of memory");
     *faults = json_array();
-    return read_rows(v, template_, rows, t, *faults, err);
+    return read_samples(v, template_, rows, t, *faults, err);
 }
