@@ -9,6 +9,8 @@
 #include <unistd.h>
 #include <zlib.h>
 
+enum { RECORD_BUFFER_BYTES = 32 << 10 };
+
 static status too_long(const char *path, struct error *err)
 {
     return error_set(err, STATUS_INVALID, "path '%.100s...' is too long", path);
@@ -172,6 +174,9 @@ status record_append(const char *path, const char *json, bool sync, struct error
     size_t n_json = strlen(json);
     if (n_json == 0 || strchr(json, '\n') != NULL)
         return error_set(err, STATUS_INVALID, "cannot append to '%s': a record is one line of text", path);
+    if (n_json + 10 > RECORD_MOST_BYTES)
+        return error_set(err, STATUS_TOO_LARGE, "cannot append to '%s': a record of %zu bytes is too long", path,
+                         n_json);
     char *line = malloc(n_json + 16);
     if (line == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot append to '%s': out of memory", path);
     unsigned long sum = crc32(0, (const unsigned char *)json, (unsigned)n_json);
@@ -205,70 +210,136 @@ static bool record_valid(const char *line, size_t n)
     return memcmp(line, want, 8) == 0;
 }
 
+/* Lines of a record file, from an offset on. The file may be foreign: one that is no regular file counts as missing,
+ * and a line longer than a record may be counts as damaged. */
+struct record_lines {
+    int fd;
+    uint64_t offset; /* of the first byte behind those in the buffer */
+    char *buffer;
+    size_t capacity, begin, end;
+    int errno_value; /* of a read that failed */
+    bool no_memory;
+};
+
+static status lines_open(struct record_lines *l, const char *path, uint64_t *size, struct error *err)
+{
+    struct stat st;
+    *l = (struct record_lines){.fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC)};
+    if (l->fd < 0 && errno != ELOOP && errno != ENXIO) return error_set_errno(err, "cannot read '%s'", path);
+    if (l->fd >= 0 && fstat(l->fd, &st) == 0 && S_ISREG(st.st_mode)) {
+        *size = (uint64_t)st.st_size;
+        return STATUS_OK;
+    }
+    if (l->fd >= 0) close(l->fd);
+    return error_set(err, STATUS_NOT_FOUND, "cannot read '%s': not a file", path);
+}
+
+static void lines_seek(struct record_lines *l, uint64_t offset)
+{
+    l->offset = offset;
+    l->begin = l->end = 0;
+}
+
+/* Makes room in the buffer, and reads into it. Returns false at the end of the file or on failure. */
+static bool lines_fill(struct record_lines *l)
+{
+    if (l->begin > 0) memmove(l->buffer, l->buffer + l->begin, l->end - l->begin);
+    l->end -= l->begin;
+    l->begin = 0;
+    if (l->end == l->capacity) {
+        size_t more = l->capacity == 0 ? RECORD_BUFFER_BYTES : 2 * l->capacity;
+        char *grown = realloc(l->buffer, more);
+        l->no_memory = grown == NULL;
+        if (grown == NULL) return false;
+        l->buffer = grown;
+        l->capacity = more;
+    }
+    ssize_t n;
+    do n = pread(l->fd, l->buffer + l->end, l->capacity - l->end, (off_t)l->offset);
+    while (n < 0 && errno == EINTR);
+    if (n < 0) l->errno_value = errno;
+    if (n <= 0) return false;
+    l->end += (size_t)n;
+    l->offset += (uint64_t)n;
+    return true;
+}
+
+/* The next line with its newline, of *n bytes, until the next call; NULL if there is no whole line that is short enough
+ * for a record. */
+static char *lines_next(struct record_lines *l, size_t *n)
+{
+    for (size_t looked = 0;;) {
+        const char *from = l->buffer + l->begin, *newline = NULL;
+        const size_t held = l->end - l->begin;
+        if (held > looked) newline = memchr(from + looked, '\n', held - looked);
+        if (newline != NULL) {
+            *n = (size_t)(newline - from) + 1;
+            l->begin += *n;
+            return *n <= RECORD_MOST_BYTES ? l->buffer + l->begin - *n : NULL;
+        }
+        looked = held;
+        if (held >= RECORD_MOST_BYTES || !lines_fill(l)) return NULL;
+    }
+}
+
+static status lines_close(struct record_lines *l, const char *path, struct error *err)
+{
+    free(l->buffer);
+    close(l->fd);
+    if (l->no_memory) return error_set(err, STATUS_NO_MEMORY, "cannot read '%s': out of memory", path);
+    errno = l->errno_value;
+    return errno == 0 ? STATUS_OK : error_set_errno(err, "cannot read '%s'", path);
+}
+
 status record_read(const char *path, uint64_t from, record_visitor visit, void *context, uint64_t *next,
                    struct error *err)
 {
-    FILE *f = fopen(path, "re");
-    if (f == NULL) return error_set_errno(err, "cannot read '%s'", path);
-    status s = STATUS_OK;
-    char *line = NULL;
-    size_t capacity = 0;
-    uint64_t offset = from;
-    if (fseeko(f, (off_t)from, SEEK_SET) != 0) {
-        s = error_set_errno(err, "cannot seek in '%s'", path);
-        goto out;
-    }
-    for (;;) {
-        ssize_t n = getline(&line, &capacity, f);
-        if (n <= 0 || line[n - 1] != '\n' || !record_valid(line, (size_t)n - 1)) break;
+    struct record_lines l;
+    uint64_t size;
+    size_t n;
+    status s = lines_open(&l, path, &size, err);
+    if (s != STATUS_OK) return s;
+    lines_seek(&l, from);
+    for (char *line; (line = lines_next(&l, &n)) != NULL && record_valid(line, n - 1);) {
         line[n - 1] = '\0';
-        offset += (uint64_t)n;
-        if (!visit(context, line + 9, (size_t)n - 10)) break;
+        from += (uint64_t)n;
+        if (!visit(context, line + 9, n - 10)) break;
     }
-    if (ferror(f)) s = error_set_errno(err, "cannot read '%s'", path);
-    if (next != NULL) *next = offset;
-out:
-    free(line);
-    fclose(f);
-    return s;
+    if (next != NULL) *next = from;
+    return lines_close(&l, path, err);
 }
 
 enum { SEEK_SPAN_BYTES = 64 * 1024 };
 
 /* Finds the first record that begins after offset `at`: *begin is its offset. Returns true if it is valid and
  * `before` holds for it. */
-static bool record_behind(FILE *f, uint64_t at, char **line, size_t *capacity, record_visitor before, void *context,
-                          uint64_t *begin)
+static bool record_behind(struct record_lines *l, uint64_t at, record_visitor before, void *context, uint64_t *begin)
 {
-    if (fseeko(f, (off_t)at, SEEK_SET) != 0) return false;
-    ssize_t rest = getline(line, capacity, f), n = rest > 0 ? getline(line, capacity, f) : -1;
-    *begin = at + (rest > 0 ? (uint64_t)rest : 0);
-    if (n <= 0 || (*line)[n - 1] != '\n' || !record_valid(*line, (size_t)n - 1)) return false;
-    (*line)[n - 1] = '\0';
-    return before(context, *line + 9, (size_t)n - 10);
+    size_t rest, n;
+    lines_seek(l, at);
+    if (lines_next(l, &rest) == NULL) return false;
+    *begin = at + rest;
+    char *line = lines_next(l, &n);
+    if (line == NULL || !record_valid(line, n - 1)) return false;
+    line[n - 1] = '\0';
+    return before(context, line + 9, n - 10);
 }
 
 status record_seek(const char *path, record_visitor before, void *context, uint64_t *from, struct error *err)
 {
+    struct record_lines l;
+    uint64_t end;
     *from = 0;
-    FILE *f = fopen(path, "re");
-    if (f == NULL) return error_set_errno(err, "cannot read '%s'", path);
-    status s = STATUS_OK;
-    char *line = NULL;
-    size_t capacity = 0;
-    off_t size = fseeko(f, 0, SEEK_END) == 0 ? ftello(f) : -1;
-    if (size < 0) s = error_set_errno(err, "cannot seek in '%s'", path);
-    for (uint64_t end = size > 0 ? (uint64_t)size : 0; s == STATUS_OK && end - *from > SEEK_SPAN_BYTES;) {
+    status s = lines_open(&l, path, &end, err);
+    if (s != STATUS_OK) return s;
+    while (end - *from > SEEK_SPAN_BYTES && l.errno_value == 0 && !l.no_memory) {
         uint64_t middle = *from + (end - *from) / 2, begin = 0;
-        if (record_behind(f, middle, &line, &capacity, before, context, &begin) && begin < end)
+        if (record_behind(&l, middle, before, context, &begin) && begin < end)
             *from = begin;
         else
             end = middle;
-        if (ferror(f)) s = error_set_errno(err, "cannot read '%s'", path);
     }
-    free(line);
-    fclose(f);
-    return s;
+    return lines_close(&l, path, err);
 }
 
 status record_truncate(const char *path, uint64_t keep_bytes, struct error *err)

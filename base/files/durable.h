@@ -42,16 +42,20 @@ const char *path_file_name(const char *path);
  * STATUS_IO, STATUS_DISK_FULL, STATUS_NO_MEMORY. */
 status record_append(const char *path, const char *json, bool sync, struct error *err);
 
+/* Bytes of the longest line. A longer one is damaged for readers, and is not appended. */
+enum { RECORD_MOST_BYTES = 8 << 20 };
+
 /* Calls visit for each valid record from byte offset `from` on (0, or a value returned in *next). Reading ends at
  * the first incomplete or damaged record; *next (may be NULL) is then the offset after the last valid record. visit
- * returns false to stop. Its json is NUL-terminated, and visit may change it, until it returns. STATUS_NOT_FOUND,
- * STATUS_IO. */
+ * returns false to stop. Its json is NUL-terminated, and visit may change it, until it returns. STATUS_NOT_FOUND (also
+ * of a link, a pipe and the like), STATUS_IO, STATUS_NO_MEMORY. */
 typedef bool (*record_visitor)(void *context, const char *json, size_t n_json);
 status record_read(const char *path, uint64_t from, record_visitor visit, void *context, uint64_t *next,
                    struct error *err);
 /* Finds an offset from which to read a sorted file, without reading all of it. `before` must hold for the records up
  * to some point of the file and for none after it. *from becomes the offset of a record for which `before` holds, or
- * 0, such that little more than 64 KiB of further such records follow. STATUS_NOT_FOUND, STATUS_IO. */
+ * 0, such that little more than 64 KiB of further such records follow. STATUS_NOT_FOUND, STATUS_IO,
+ * STATUS_NO_MEMORY. */
 status record_seek(const char *path, record_visitor before, void *context, uint64_t *from, struct error *err);
 /* Removes an incomplete last record: truncates the file to keep_bytes if it is longer. A missing file is not an
  * error. STATUS_IO. */

@@ -1,6 +1,9 @@
 /* The folder of one job: document, inputs, journal, worker, series, results. */
 #include "base/clock.h"
 #include "base/files/durable.h"
+#include "base/files/foreign_file.h"
+#include "base/json/foreign_json.h"
+#include "optimizer/job/job_document.h"
 #include "optimizer/job/job_folder.h"
 #include "server/doctor/doctor_report.h"
 #include "server/jobs/job_paths.h"
@@ -17,7 +20,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { DOCUMENT_MOST_BYTES = 1 << 20, RESULT_MOST_BYTES = 256 << 20, REPORT_BYTES = 1 << 20 };
+enum { REPORT_BYTES = 1 << 20 };
+
+static const struct foreign_bounds status_bounds = {.file_bytes = 256 << 10, .held_bytes = 1 << 20, .depth = 16},
+                                   result_bounds = {.file_bytes = 64 << 20, .held_bytes = 256 << 20, .depth = 64};
 
 struct patient {
     char folder[PATH_BYTES];
@@ -90,13 +96,14 @@ static void examine_document(struct doctor *d, const struct patient *p)
 /* Compares the bytes of the inputs with the checksums of the journal. */
 static void examine_inputs(struct doctor *d, const struct patient *p, struct job_journal *journal)
 {
-    char path[PATH_BYTES], *document = NULL, *said = NULL;
+    char *document = NULL, *said = NULL;
     size_t n_said = 0, n_document = 0, n = 0, n_complete = 0;
     struct error err = {0};
     struct file_row *file = NULL;
     FILE *notes = open_memstream(&said, &n_said);
-    path_join(path, p->folder, JOB_FILE_DOCUMENT, NULL);
-    if (notes == NULL || file_read_all(path, DOCUMENT_MOST_BYTES, &document, &n_document, &err) != STATUS_OK) goto out;
+    if (notes == NULL || foreign_file_read(p->folder, JOB_FILE_DOCUMENT, JOB_MAX_DOCUMENT_BYTES, &document, &n_document,
+                                           &err) != STATUS_OK)
+        goto out;
     struct job_row job = journal->job;
     job.document = document;
     snprintf(job.id, sizeof job.id, "%s", p->id);
@@ -138,31 +145,24 @@ static bool lock_held(const struct patient *p)
 {
     char path[PATH_BYTES];
     path_join(path, p->folder, JOB_FILE_LOCK, NULL);
-    int fd = open(path, O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
+    int fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     bool held = fd >= 0 && flock(fd, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
     if (fd >= 0) close(fd);
     return held;
 }
 
-static json_t *read_object(const char *folder, const char *part, const char *name, size_t most, struct error *err)
+static json_t *read_object(const char *folder, const char *name, const struct foreign_bounds *bounds, struct error *err)
 {
-    char path[PATH_BYTES], *text = NULL;
-    size_t n = 0;
-    json_error_t where;
-    path_join(path, folder, part, name, NULL);
-    if (file_read_all(path, most, &text, &n, err) != STATUS_OK) return NULL;
-    json_t *j = json_loadb(text, n, 0, &where);
-    free(text);
-    if (json_is_object(j)) return j;
-    json_decref(j);
-    error_set(err, STATUS_FORMAT, "'%s' is damaged: line %d: %s", path, where.line, where.text);
-    return NULL;
+    json_t *j = NULL;
+    if (foreign_json_read(folder, name, bounds, &j, err) == STATUS_FORMAT)
+        error_prefix(err, STATUS_FORMAT, "'%s' is damaged", name);
+    return j;
 }
 
 static void examine_results(struct doctor *d, const struct patient *p)
 {
     struct error err = {0};
-    json_t *result = read_object(p->folder, JOB_FOLDER_RESULTS, "result.json", RESULT_MOST_BYTES, &err);
+    json_t *result = read_object(p->folder, JOB_FOLDER_RESULTS "/result.json", &result_bounds, &err);
     if (result != NULL)
         doctor_say(d, DOCTOR_OK, "results", "result.json is whole");
     else
@@ -174,7 +174,7 @@ static void examine_results(struct doctor *d, const struct patient *p)
 static void examine_worker(struct doctor *d, struct patient *p)
 {
     struct error err = {0};
-    json_t *said = read_object(p->folder, ".", JOB_FILE_STATUS, DOCUMENT_MOST_BYTES, &err);
+    json_t *said = read_object(p->folder, JOB_FILE_STATUS, &status_bounds, &err);
     const json_t *error = json_object_get(said, "error");
     const char *state = json_string_value(json_object_get(said, "state")),
                *stage = json_string_value(json_object_get(said, "stage"));

@@ -1,3 +1,4 @@
+#include "base/files/foreign_file.h"
 #include "optimizer/job/job_folder.h"
 #include "server/endpoints/handlers.h"
 #include "server/endpoints/request_json.h"
@@ -5,7 +6,6 @@
 #include "server/jobs/job_paths.h"
 #include "server/jobs/job_view.h"
 
-#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -150,7 +150,8 @@ void handle_get_file(struct http_request *r)
     struct job_row job;
     struct file_row file;
     struct error err = {0};
-    char path[PATH_BYTES];
+    char folder[PATH_BYTES], name[sizeof file.name + sizeof JOB_FOLDER_INPUT];
+    int fd = -1;
     status s = job_get(r->service, r->param[0], &job, &err);
     job_row_release(&job);
     /* the name only selects a row; the path is built from the row, never from the request */
@@ -161,10 +162,11 @@ void handle_get_file(struct http_request *r)
         reply_problem(r, NULL, &err, NULL);
         return;
     }
-    path_join(path, r->service->settings->data, "jobs", file.job_id, JOB_FOLDER_INPUT, file.name, NULL);
-    int fd = open(path, O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
-    if (fd < 0) {
-        error_set_errno(&err, "cannot read file '%s'", file.name);
+    path_join(folder, r->service->settings->data, "jobs", file.job_id, NULL);
+    snprintf(name, sizeof name, JOB_FOLDER_INPUT "/%s", file.name);
+    s = foreign_file_open(folder, name, &fd, NULL, &err);
+    if (s == STATUS_NOT_FOUND) error_set(&err, s, "file '%s' is no longer in the job's folder", file.name);
+    if (s != STATUS_OK) {
         reply_problem(r, NULL, &err, NULL);
         return;
     }

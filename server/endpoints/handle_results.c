@@ -1,3 +1,4 @@
+#include "base/files/foreign_file.h"
 #include "optimizer/job/job_folder.h"
 #include "server/endpoints/handlers.h"
 #include "server/http/http_reply.h"
@@ -6,12 +7,9 @@
 #include "server/jobs/job_view.h"
 #include "server/jobs/series_view.h"
 
-#include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 enum { SERIES_MOST = 5000, SERIES_USUAL = 500, LOG_MOST_BYTES = 1 << 20, LOG_USUAL_BYTES = 65536 };
@@ -49,24 +47,22 @@ void handle_series(struct http_request *r)
         reply_json_tagged(r, view);
 }
 
-/* Reads at most n_most bytes from *offset on. A negative *offset counts from the end of the file; one beyond the end
- * becomes 0. Returns the number of bytes read, 0 if there is no log yet, or -1 on failure. */
-static ssize_t read_log(const char *path, long long *offset, long long *size, char *out, size_t n_most)
+/* Reads at most n_most bytes of the log from *offset on. A negative *offset counts from the end of the file; one beyond
+ * the end becomes 0. Returns the number of bytes read, 0 if there is no log yet, or -1 on failure. */
+static ssize_t read_log(const char *folder, long long *offset, long long *size, char *out, size_t n_most)
 {
-    struct stat st;
+    uint64_t n_bytes = 0;
+    int fd = -1;
     *size = 0;
-    int fd = open(path, O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
-    if (fd < 0) {
+    status s = foreign_file_open(folder, JOB_FILE_LOG, &fd, &n_bytes, NULL);
+    if (s != STATUS_OK) {
         *offset = 0;
-        return errno == ENOENT ? 0 : -1;
+        return s == STATUS_NOT_FOUND ? 0 : -1;
     }
-    ssize_t n = -1;
-    if (fstat(fd, &st) == 0) {
-        *size = (long long)st.st_size;
-        if (*offset < 0) *offset = *size + *offset > 0 ? *size + *offset : 0;
-        if (*offset > *size) *offset = 0;
-        n = pread(fd, out, n_most, (off_t)*offset);
-    }
+    *size = (long long)n_bytes;
+    if (*offset < 0) *offset = *size + *offset > 0 ? *size + *offset : 0;
+    if (*offset > *size) *offset = 0;
+    ssize_t n = pread(fd, out, n_most, (off_t)*offset);
     close(fd);
     return n;
 }
@@ -75,15 +71,15 @@ void handle_log(struct http_request *r)
 {
     struct job_row row;
     long long offset, most, size;
-    char path[PATH_BYTES];
+    char folder[PATH_BYTES];
     if (!query_integer(r, "offset", INT64_MIN, INT64_MAX, 0, &offset) ||
         !query_integer(r, "max_bytes", 1, LOG_MOST_BYTES, LOG_USUAL_BYTES, &most))
         return;
     if (!find_job(r, &row)) return;
-    path_join(path, r->service->settings->data, "jobs", row.id, JOB_FILE_LOG, NULL);
+    path_join(folder, r->service->settings->data, "jobs", row.id, NULL);
     job_row_release(&row);
     char *text = malloc((size_t)most);
-    ssize_t n = text == NULL ? -1 : read_log(path, &offset, &size, text, (size_t)most);
+    ssize_t n = text == NULL ? -1 : read_log(folder, &offset, &size, text, (size_t)most);
     if (n < 0)
         reply_code(r, "internal", "", "the log cannot be read");
     else {
@@ -106,6 +102,7 @@ void handle_list_results(struct http_request *r)
     status s = result_list(r->service, row.id, JOB_FOLDER_RESULTS, &file, &n, &err);
     if (s != STATUS_OK) {
         reply_problem(r, NULL, &err, NULL);
+        free(file);
         job_row_release(&row);
         return;
     }

@@ -1,6 +1,7 @@
 /* Creates jobs, and replaces the documents of existing jobs. */
 #include "base/clock.h"
 #include "base/files/durable.h"
+#include "base/files/foreign_file.h"
 #include "optimizer/job/job_document.h"
 #include "optimizer/job/job_folder.h"
 #include "server/cluster/job_change.h"
@@ -32,7 +33,7 @@ static status write_document(struct job_service *v, const struct job_row *row, s
 {
     char path[PATH_BYTES];
     path_join(path, v->settings->data, "jobs", row->id, JOB_FILE_DOCUMENT, NULL);
-    return durable_replace(path, row->document, strlen(row->document), err);
+    return foreign_file_replace(path, row->document, strlen(row->document), true, err);
 }
 
 static status make_folders(struct job_service *v, const char *id, struct error *err)

@@ -3,6 +3,7 @@
  * unavailable. */
 #include "base/clock.h"
 #include "base/files/durable.h"
+#include "base/files/foreign_file.h"
 #include "optimizer/job/job_folder.h"
 #include "server/cluster/job_change.h"
 #include "server/cluster/lease_keeper.h"
@@ -122,7 +123,7 @@ static status begin_journal(struct job_service *v, const char *job_id, const cha
     if (s == STATUS_OK) s = store_file_list(v->store, job_id, &file, &all.n_file, err);
     all.file = file;
     path_join(path, folder, JOB_FILE_DOCUMENT, NULL);
-    if (s == STATUS_OK) s = durable_replace_volatile(path, row.document, strlen(row.document), err);
+    if (s == STATUS_OK) s = foreign_file_replace(path, row.document, strlen(row.document), false, err);
     if (s == STATUS_OK) s = job_journal_append(&v->journal_key, folder, &all, false, err);
     free(file);
     job_row_release(&row);

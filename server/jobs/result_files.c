@@ -1,5 +1,6 @@
 /* Lists and opens the files under results/ or a version of them, always relative to an open folder and never through a
  * link. */
+#include "base/files/foreign_file.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/job_view.h"
 
@@ -91,45 +92,40 @@ status result_list(struct job_service *v, const char *job_id, const char *folder
     struct listing l = {0};
     int fd = open_results(v, job_id, folder);
     status s = STATUS_OK;
-    if (fd < 0 && errno != ENOENT) return error_set_errno(err, "cannot list results");
+    if (fd < 0 && errno != ENOENT && errno != ENOTDIR && errno != ELOOP)
+        return error_set_errno(err, "cannot list results");
     if (fd >= 0) s = walk(fd, "", 0, &l, err);
-    if (s != STATUS_OK) {
+    if (s != STATUS_OK && s != STATUS_TOO_LARGE) {
         free(l.file);
         return s;
     }
     if (l.n > 0) qsort(l.file, l.n, sizeof *l.file, by_path);
     *file = l.file;
     *n = l.n;
-    return STATUS_OK;
+    return s;
+}
+
+/* Whether every part of a path is one that is listed. */
+static bool path_valid(const char *path)
+{
+    for (int depth = 0; depth < RESULT_MAX_DEPTH; depth++) {
+        const size_t n = strcspn(path, "/");
+        if (!component_valid(path, n)) return false;
+        if (path[n] == '\0') return true;
+        path += n + 1;
+    }
+    return false;
 }
 
 status result_open(struct job_service *v, const char *job_id, const char *root, const char *path, int *out,
                    struct error *err)
 {
-    int folder = open_results(v, job_id, root), fd = -1;
-    char name[RESULT_PATH_BYTES];
-    for (int depth = 0; folder >= 0 && depth < RESULT_MAX_DEPTH; depth++) {
-        size_t n = strcspn(path, "/");
-        if (n >= sizeof name || !component_valid(path, n)) break;
-        memcpy(name, path, n);
-        name[n] = '\0';
-        bool last = path[n] == '\0';
-        int next = openat(folder, name, O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK | (last ? 0 : O_DIRECTORY));
-        close(folder);
-        folder = next;
-        path += n + (last ? 0 : 1);
-        struct stat st;
-        if (!last || folder < 0) continue;
-        if (fstat(folder, &st) == 0 && S_ISREG(st.st_mode)) {
-            fd = folder;
-            folder = -1;
-        }
-        break;
-    }
-    if (folder >= 0) close(folder);
-    if (fd < 0) return error_set(err, STATUS_NOT_FOUND, "there is no such result");
-    *out = fd;
-    return STATUS_OK;
+    char folder[PATH_BYTES], name[PATH_BYTES];
+    path_join(folder, v->settings->data, "jobs", job_id, NULL);
+    path_join(name, root, path, NULL);
+    status s = path_valid(path) && strlen(path) < RESULT_PATH_BYTES ? foreign_file_open(folder, name, out, NULL, err)
+                                                                    : STATUS_NOT_FOUND;
+    return s == STATUS_NOT_FOUND ? error_set(err, s, "there is no such result") : s;
 }
 
 const char *content_type_of(const char *name)

@@ -3,6 +3,8 @@
  * cost of a request depends on the size of its reply and not of the file, and memory holds only the points. */
 #include "server/jobs/series_view.h"
 #include "base/files/durable.h"
+#include "base/json/foreign_json.h"
+#include "base/json/json_member.h"
 #include "optimizer/job/job_document.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
@@ -15,6 +17,31 @@
 /* Limit on the size of a reply with the renderings of all points; beyond it there are fewer points. */
 enum { ALL_RENDERED_BYTES = 8 << 20, KEY_RADIUS = -1 };
 
+/* Limits on what a file may make a request read and hold. A longer series is given in several requests. */
+enum { READ_MOST_BYTES = 256 << 20, HELD_MOST_BYTES = 128 << 20, DESCRIPTION_MOST_BYTES = 64 << 20 };
+
+#define STEP_MOST (INT64_C(1) << 53)
+#define POINT_MEMBERS                                                                                                  \
+    "step", "model", "i_model", "model_step", "phase", "wall_s", "n_path", "n_path_total", "objective",                \
+        "objective_se", "parameter", "parameter_se", "rel_rms", "damping", "noise", "step_length", "step_limit",       \
+        "gain", "nuisance", "note"
+static const char *const key_member[] = {"step", "phase", "i_model", NULL},
+                         *const description_member[] = {"phase", "i_model", "model", "parameters", NULL},
+                         *const point_member[] = {POINT_MEMBERS, NULL},
+                         *const whole_member[] = {POINT_MEMBERS, "rendered", "n_path_row", NULL};
+static const struct foreign_bounds key_bounds = {RECORD_MOST_BYTES, 4096, 16, key_member},
+                                   description_bounds = {RECORD_MOST_BYTES, 1 << 20, 16, description_member},
+                                   point_bounds = {RECORD_MOST_BYTES, 1 << 20, 16, point_member},
+                                   whole_bounds = {RECORD_MOST_BYTES, 8 << 20, 16, whole_member};
+
+/* NULL for what is no record. */
+static json_t *parse(const char *json, size_t n, const struct foreign_bounds *bounds, size_t *held)
+{
+    json_t *j = NULL;
+    foreign_json_parse(json, n, bounds, held, &j, NULL);
+    return j;
+}
+
 /* Reads "step", which the worker writes first. Returns false for a record without a whole step. */
 static bool read_step(const char *json, size_t n, json_int_t *step)
 {
@@ -22,13 +49,27 @@ static bool read_step(const char *json, size_t n, json_int_t *step)
     char *end = NULL;
     if (n > sizeof begin && memcmp(json, begin, sizeof begin - 1) == 0) {
         *step = strtoll(json + sizeof begin - 1, &end, 10);
-        if (end != json + sizeof begin - 1 && (*end == ',' || *end == '}')) return true;
+        if (end != json + sizeof begin - 1 && (*end == ',' || *end == '}')) return *step >= 0 && *step < STEP_MOST;
     }
-    json_t *j = json_loadb(json, n, 0, NULL), *value = json_object_get(j, "step");
-    bool found = json_is_integer(value);
+    json_t *j = parse(json, n, &key_bounds, NULL), *value = json_object_get(j, "step");
+    bool found = json_is_integer(value) && json_integer_value(value) >= 0 && json_integer_value(value) < STEP_MOST;
     *step = json_integer_value(value);
     json_decref(j);
     return found;
+}
+
+/* Whether a record describes the parameters of a model. */
+static bool is_description(json_t *parameters, const json_t *model)
+{
+    static const struct json_member of_parameter[] = {{"name", JSON_IS_TEXT, false, 0, 0},
+                                                      {"unit", JSON_IS_TEXT, false, 0, 0},
+                                                      {"lower", JSON_IS_NUMBER, false, -1e300, 1e300},
+                                                      {"upper", JSON_IS_NUMBER, false, -1e300, 1e300},
+                                                      {"fixed", JSON_IS_FLAG, false, 0, 0}};
+    size_t i;
+    json_t *one;
+    json_array_foreach(parameters, i, one) if (!json_members_keep(one, of_parameter, 5, false)) return false;
+    return json_is_array(parameters) && (model == NULL || json_is_string(model));
 }
 
 static json_int_t model_of(const json_t *record) { return json_integer_value(json_object_get(record, "i_model")); }
@@ -46,6 +87,7 @@ struct counting {
     long long after_step;
     json_int_t last_step;
     size_t n, n_bytes; /* of the records after after_step */
+    size_t n_read;     /* bytes of all records that were read */
 };
 
 static bool is_seen(void *context, const char *json, size_t n)
@@ -59,6 +101,8 @@ static bool count(void *context, const char *json, size_t n)
 {
     struct counting *c = context;
     json_int_t step;
+    c->n_read += n;
+    if (c->n_read > READ_MOST_BYTES) return false;
     if (!read_step(json, n, &step)) return true;
     if (step > c->last_step) c->last_step = step;
     if (step <= c->after_step) return true;
@@ -72,12 +116,13 @@ static bool count(void *context, const char *json, size_t n)
 struct description {
     json_int_t i_model;
     json_t *model; /* [{"id", "parameters"}] of the preceding models */
+    size_t n_read;
 };
 
 static bool is_of_earlier_model(void *context, const char *json, size_t n)
 {
     const struct description *d = context;
-    json_t *j = json_loadb(json, n, 0, NULL);
+    json_t *j = parse(json, n, &key_bounds, NULL);
     bool earlier = j != NULL && key_of(j) < d->i_model;
     json_decref(j);
     return earlier;
@@ -88,9 +133,10 @@ static bool is_of_earlier_model(void *context, const char *json, size_t n)
 static bool take_description(void *context, const char *json, size_t n)
 {
     struct description *d = context;
-    json_t *j = json_loadb(json, n, 0, NULL), *parameters = json_object_get(j, "parameters");
-    bool found = parameters != NULL && model_of(j) == d->i_model;
-    bool go_on = !found && (j == NULL || key_of(j) < d->i_model);
+    json_t *j = parse(json, n, &description_bounds, NULL), *parameters = json_object_get(j, "parameters");
+    bool found = is_description(parameters, json_object_get(j, "model")) && model_of(j) == d->i_model;
+    d->n_read += n;
+    bool go_on = !found && d->n_read < DESCRIPTION_MOST_BYTES && (j == NULL || key_of(j) < d->i_model);
     if (found)
         json_array_append_new(d->model,
                               json_pack("{s:O?,s:O}", "id", json_object_get(j, "model"), "parameters", parameters));
@@ -100,7 +146,7 @@ static bool take_description(void *context, const char *json, size_t n)
 
 static bool keep_last_model(void *context, const char *json, size_t n)
 {
-    json_t *j = json_loadb(json, n, 0, NULL);
+    json_t *j = parse(json, n, &key_bounds, NULL);
     if (j != NULL) *(json_int_t *)context = key_of(j) > 0 ? key_of(j) : 0;
     json_decref(j);
     return true;
@@ -119,8 +165,9 @@ static status describe_models(const char *path, json_t *model, struct error *err
     json_int_t last = 0;
     status s = record_seek(path, always, NULL, &from, err);
     if (s == STATUS_OK) s = record_read(path, from, keep_last_model, &last, NULL, err);
-    for (json_int_t i = 0; s == STATUS_OK && i <= last && json_array_size(model) == (size_t)i; i++) {
-        struct description d = {i, model};
+    for (json_int_t i = 0; s == STATUS_OK && i <= last && i < JOB_MAX_MODEL && json_array_size(model) == (size_t)i;
+         i++) {
+        struct description d = {i, model, 0};
         s = record_seek(path, is_of_earlier_model, &d, &from, err);
         if (s == STATUS_OK && i == 0) from = 0; /* the search may have described the model */
         if (s == STATUS_OK) s = record_read(path, from, take_description, &d, NULL, err);
@@ -133,7 +180,7 @@ static status describe_models(const char *path, json_t *model, struct error *err
 /* Records that are merged to one point: the last record with the extremes of all. */
 struct group {
     json_t *last;
-    size_t n, n_parameter;
+    size_t n, n_parameter, held; /* held: memory of the last record */
     double least, most, low[JOB_MAX_PARAM], high[JOB_MAX_PARAM];
 };
 
@@ -142,6 +189,7 @@ struct merging {
     size_t n, n_point, i;
     bool all_rendered;
     json_t *point;
+    size_t held; /* memory of the points */
     struct group group;
 };
 
@@ -164,7 +212,7 @@ static void restart_group(struct group *g, size_t n_parameter)
 
 /* Takes ownership of the record. A record of an earlier model or with other parameters cannot be merged, so it is
  * left out. */
-static void add_to_group(struct group *g, json_t *record)
+static void add_to_group(struct group *g, json_t *record, size_t held)
 {
     const json_t *parameter = json_object_get(record, "parameter");
     size_t n = json_array_size(parameter);
@@ -173,15 +221,17 @@ static void add_to_group(struct group *g, json_t *record)
     for (size_t p = 0; p < n && p < JOB_MAX_PARAM; p++) widen(json_array_get(parameter, p), &g->low[p], &g->high[p]);
     json_decref(g->last);
     g->last = record;
+    g->held = held;
     g->n++;
 }
+
+static bool is_whole(const struct merging *m) { return m->all_rendered || json_array_size(m->point) + 1 == m->n_point; }
 
 static json_t *number_or_null(double v) { return isfinite(v) ? json_real(v) : json_null(); }
 
 static void close_group(struct merging *m)
 {
     struct group *g = &m->group;
-    bool whole = m->all_rendered || json_array_size(m->point) + 1 == m->n_point;
     if (g->n > 1) {
         json_object_set_new(g->last, "n_merged", json_integer((json_int_t)g->n));
         json_object_set_new(g->last, "objective_min", number_or_null(g->least));
@@ -194,9 +244,8 @@ static void close_group(struct merging *m)
         json_object_set_new(g->last, "parameter_min", low);
         json_object_set_new(g->last, "parameter_max", high);
     }
-    if (!whole) json_object_del(g->last, "rendered");
-    if (!whole) json_object_del(g->last, "n_path_row");
     json_array_append(m->point, g->last);
+    m->held += g->held;
     restart_group(g, 0);
 }
 
@@ -204,14 +253,12 @@ static bool merge(void *context, const char *json, size_t n)
 {
     struct merging *m = context;
     json_int_t step;
-    if (m->i == m->n) return false;
+    size_t held = 0;
+    if (m->i == m->n || m->held > HELD_MOST_BYTES) return false;
     if (!read_step(json, n, &step) || step <= m->after_step) return true;
-    json_t *j = json_loadb(json, n, 0, NULL);
+    json_t *j = parse(json, n, is_whole(m) ? &whole_bounds : &point_bounds, &held);
     m->i++;
-    if (j != NULL) {
-        json_object_del(j, "parameters");
-        add_to_group(&m->group, j);
-    }
+    if (j != NULL) add_to_group(&m->group, j, held);
     if (m->group.n > 0 && m->i == (json_array_size(m->point) + 1) * m->n / m->n_point) close_group(m);
     return true;
 }

@@ -1,6 +1,6 @@
 #include "server/rescue/job_evidence.h"
 #include "base/clock.h"
-#include "base/files/durable.h"
+#include "base/files/foreign_file.h"
 #include "optimizer/job/job_document.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
@@ -11,8 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-
-enum { DOCUMENT_MOST_BYTES = 1 << 20 };
 
 static void folder_of(const struct evidence_request *q, char out[PATH_BYTES])
 {
@@ -26,7 +24,7 @@ static status read_document(const char *folder, char **text, char sample[256], s
     size_t n = 0;
     struct job_document *doc = NULL;
     path_join(path, folder, JOB_FILE_DOCUMENT, NULL);
-    status s = file_read_all(path, DOCUMENT_MOST_BYTES, text, &n, err);
+    status s = foreign_file_read(folder, JOB_FILE_DOCUMENT, JOB_MAX_DOCUMENT_BYTES, text, &n, err);
     if (s != STATUS_OK) return s;
     s = job_document_parse(*text, n, &doc, err);
     if (s == STATUS_OK) {

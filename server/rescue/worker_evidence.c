@@ -1,30 +1,21 @@
 #include "server/rescue/worker_evidence.h"
 #include "base/clock.h"
-#include "base/files/durable.h"
+#include "base/json/foreign_json.h"
 #include "optimizer/job/job_folder.h"
-#include "server/jobs/job_paths.h"
 
 #include <jansson.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { SMALL_BYTES = 1 << 20, RESULT_BYTES = 256 << 20 };
+static const struct foreign_bounds small_bounds = {.file_bytes = 256 << 10, .held_bytes = 1 << 20, .depth = 16},
+                                   result_bounds = {.file_bytes = 64 << 20, .held_bytes = 256 << 20, .depth = 64};
 
 /* Reads a file of a job as a JSON object; NULL if it is none. */
-static json_t *read_object(const char *folder, const char *part, const char *name, size_t most_bytes)
+static json_t *read_object(const char *folder, const char *name, const struct foreign_bounds *bounds)
 {
-    char path[PATH_BYTES], *text = NULL;
-    size_t n = 0;
-    if (part != NULL)
-        path_join(path, folder, part, name, NULL);
-    else
-        path_join(path, folder, name, NULL);
-    if (file_read_all(path, most_bytes, &text, &n, NULL) != STATUS_OK) return NULL;
-    json_t *j = json_loadb(text, n, 0, NULL);
-    free(text);
-    if (json_is_object(j)) return j;
-    json_decref(j);
-    return NULL;
+    json_t *j = NULL;
+    foreign_json_read(folder, name, bounds, &j, NULL);
+    return j;
 }
 
 static void set_error(struct job_row *row, const char *code, const char *field, const char *text)
@@ -59,8 +50,8 @@ static void apply_status(const json_t *said, bool bare, struct job_row *row)
 
 void worker_evidence_apply(const char *folder, bool bare, bool resume, struct job_row *row, FILE *notes)
 {
-    json_t *said = read_object(folder, NULL, JOB_FILE_STATUS, SMALL_BYTES);
-    json_t *attempt = read_object(folder, NULL, JOB_FILE_ATTEMPT, SMALL_BYTES);
+    json_t *said = read_object(folder, JOB_FILE_STATUS, &small_bounds);
+    json_t *attempt = read_object(folder, JOB_FILE_ATTEMPT, &small_bounds);
     apply_status(said, bare, row);
     int64_t last = json_integer_value(json_object_get(attempt, "attempt"));
     if (last > row->attempt) row->attempt = last;
@@ -75,7 +66,7 @@ void worker_evidence_apply(const char *folder, bool bare, bool resume, struct jo
     if (row->state == JOB_QUEUED && row->queued_unix_s <= 0) row->queued_unix_s = clock_wall_s();
     json_t *result = NULL;
     if (row->state == JOB_SUCCEEDED &&
-        (result = read_object(folder, JOB_FOLDER_RESULTS, "result.json", RESULT_BYTES)) == NULL) {
+        (result = read_object(folder, JOB_FOLDER_RESULTS "/result.json", &result_bounds)) == NULL) {
         row->state = JOB_FAILED;
         set_error(row, "results_lost", "", "the results were damaged or missing when the database was rebuilt; retry");
         fprintf(notes, "  it had succeeded, but its result is damaged or missing; it has failed and can be retried\n");

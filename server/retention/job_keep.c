@@ -1,5 +1,6 @@
 #include "server/retention/job_keep.h"
 #include "base/files/durable.h"
+#include "base/files/foreign_file.h"
 #include "server/cluster/job_change.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
@@ -23,7 +24,9 @@ static status set_mark(const struct job_service *v, const char *id, bool keep, s
 {
     char path[PATH_BYTES];
     mark_path(v, id, path);
-    if (keep) return durable_replace(path, "", 0, err);
+    if (keep) return foreign_file_replace(path, "", 0, true, err);
+    status s = foreign_file_clear(path, err);
+    if (s != STATUS_OK) return s;
     if (unlink(path) != 0 && errno != ENOENT) return error_set_errno(err, "cannot remove '%s'", path);
     return durable_sync_folder_of(path, err);
 }

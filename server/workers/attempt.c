@@ -2,6 +2,8 @@
 #include "base/clock.h"
 #include "base/files/durable.h"
 #include "base/files/file_tree.h"
+#include "base/files/foreign_file.h"
+#include "base/json/foreign_json.h"
 #include "optimizer/job/job_folder.h"
 #include "server/cluster/job_change.h"
 #include "server/jobs/job_access.h"
@@ -9,6 +11,7 @@
 #include "server/jobs/versions/result_version.h"
 #include "server/store/store_cluster.h"
 #include "server/workers/console.h"
+#include "server/workers/guard/worker_words.h"
 
 #include <signal.h>
 #include <sodium.h>
@@ -17,26 +20,23 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { STATUS_FILE_LIMIT_BYTES = 1 << 20 };
+/* A worker's 50 warnings of 512 bytes are the most of it. */
+static const struct foreign_bounds status_bounds = {.file_bytes = 256 << 10, .held_bytes = 1 << 20, .depth = 16};
 
 json_t *attempt_read_status(const struct job_service *v, const char *job_id)
 {
-    char path[PATH_BYTES], *text = NULL;
-    size_t n = 0;
-    path_join(path, v->settings->data, "jobs", job_id, JOB_FILE_STATUS, NULL);
-    if (file_read_all(path, STATUS_FILE_LIMIT_BYTES, &text, &n, NULL) != STATUS_OK) return NULL;
-    json_t *j = json_loadb(text, n, JSON_REJECT_DUPLICATES, NULL);
-    free(text);
-    if (json_is_object(j)) return j;
-    json_decref(j);
-    return NULL;
+    char folder[PATH_BYTES];
+    json_t *j = NULL;
+    path_join(folder, v->settings->data, "jobs", job_id, NULL);
+    if (foreign_json_read(folder, JOB_FILE_STATUS, &status_bounds, &j, NULL) == STATUS_OK) worker_words_of_status(j);
+    return j;
 }
 
 /* Removes the checkpoints that belong to the input before an edit, and keeps its result as a version. */
 static status clear_folder(struct job_service *v, struct job_row *row, struct error *err)
 {
-    static const char *const stale[] = {JOB_FILE_STATUS,    JOB_FILE_SERIES, JOB_FILE_LOG,    JOB_FOLDER_WORK,
-                                        JOB_FOLDER_RESULTS, JOB_FILE_RUN,    JOB_FILE_BACKEND};
+    static const char *const stale[] = {JOB_FILE_STATUS,    JOB_FILE_SERIES, JOB_FILE_LOG,     JOB_FOLDER_WORK,
+                                        JOB_FOLDER_RESULTS, JOB_FILE_RUN,    JOB_FILE_BACKEND, "console.txt"};
     char path[PATH_BYTES];
     const char *job_id = row->id;
     status s = version_keep(v, row, err);
@@ -48,26 +48,28 @@ static status clear_folder(struct job_service *v, struct job_row *row, struct er
 }
 
 /* Whether the file holds this text. It was synced when it was written, so it need not be written again. */
-static bool holds(const char *path, const char *text)
+static bool holds(const char *folder, const char *name, const char *text)
 {
     char *there = NULL;
     size_t n = 0, n_text = strlen(text);
-    bool same =
-        file_read_all(path, n_text, &there, &n, NULL) == STATUS_OK && n == n_text && memcmp(there, text, n) == 0;
+    bool same = foreign_file_read(folder, name, n_text, &there, &n, NULL) == STATUS_OK && n == n_text &&
+                memcmp(there, text, n) == 0;
     free(there);
     return same;
 }
 
 static status write_folder(struct job_service *v, const struct job_row *row, struct error *err)
 {
-    char path[PATH_BYTES], text[160];
-    path_join(path, v->settings->data, "jobs", row->id, JOB_FILE_DOCUMENT, NULL);
-    status s =
-        holds(path, row->document) ? STATUS_OK : durable_replace(path, row->document, strlen(row->document), err);
+    char folder[PATH_BYTES], path[PATH_BYTES], text[160];
+    path_join(folder, v->settings->data, "jobs", row->id, NULL);
+    path_join(path, folder, JOB_FILE_DOCUMENT, NULL);
+    status s = STATUS_OK;
+    if (!holds(folder, JOB_FILE_DOCUMENT, row->document))
+        s = foreign_file_replace(path, row->document, strlen(row->document), true, err);
     if (s != STATUS_OK) return s;
     int n = snprintf(text, sizeof text, "{\"attempt\":%lld,\"token\":\"%s\"}\n", (long long)row->attempt, row->token);
-    path_join(path, v->settings->data, "jobs", row->id, JOB_FILE_ATTEMPT, NULL);
-    return durable_replace(path, text, (size_t)n, err);
+    path_join(path, folder, JOB_FILE_ATTEMPT, NULL);
+    return foreign_file_replace(path, text, (size_t)n, true, err);
 }
 
 static status prepare_locked(struct job_service *v, struct job_row *row, struct error *err)
@@ -290,6 +292,19 @@ static void apply_end(struct job_service *v, struct job_row *row, const struct w
         lost(v, row, end, stop, outcome);
 }
 
+/* Whatever a worker has put in place of the folders that inputs come to makes way for them. */
+static void restore_folders(const struct job_service *v, const char *job_id)
+{
+    static const char *const part[] = {JOB_FOLDER_INPUT, "upload"};
+    char path[PATH_BYTES];
+    for (size_t i = 0; i < sizeof part / sizeof part[0]; i++) {
+        struct error err = {0};
+        path_join(path, v->settings->data, "jobs", job_id, part[i], NULL);
+        if (foreign_folder_clear(path, &err) != STATUS_OK || durable_make_folder(path, &err) != STATUS_OK)
+            log_warning(v->log, "job %s: %s", job_id, err.text);
+    }
+}
+
 status attempt_finish(struct job_service *v, const char *job_id, const char *token, const struct worker_end *end,
                       enum attempt_stop stop, struct attempt_outcome *outcome, struct error *err)
 {
@@ -302,6 +317,7 @@ status attempt_finish(struct job_service *v, const char *job_id, const char *tok
         goto out;
     }
     apply_end(v, &row, end, stop, outcome);
+    restore_folders(v, job_id);
     if (end->peak_rss_bytes > row.peak_rss_bytes) row.peak_rss_bytes = end->peak_rss_bytes;
     bool over = row.state == JOB_SUCCEEDED || row.state == JOB_FAILED || row.state == JOB_CANCELLED;
     if (over) row.finished_unix_s = clock_wall_s();

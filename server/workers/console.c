@@ -24,8 +24,8 @@ static size_t read_end(int fd, off_t size, char *out, size_t n)
 void console_trim(const char *path)
 {
     struct stat st;
-    if (stat(path, &st) != 0 || st.st_size <= CONSOLE_MOST_BYTES) return;
-    int fd = open(path, O_RDWR | O_APPEND | O_NOFOLLOW | O_CLOEXEC);
+    if (lstat(path, &st) != 0 || !S_ISREG(st.st_mode) || st.st_size <= CONSOLE_MOST_BYTES) return;
+    int fd = open(path, O_RDWR | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     char *end = fd >= 0 ? malloc(CONSOLE_KEEP_BYTES) : NULL;
     if (end != NULL && fstat(fd, &st) == 0) {
         size_t n = read_end(fd, st.st_size, end, CONSOLE_KEEP_BYTES);
@@ -42,8 +42,8 @@ void console_tail(const char *path, char *out, size_t n_out)
     struct stat st;
     size_t n = 0;
     char last[4096];
-    int fd = open(path, O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
-    if (fd >= 0 && fstat(fd, &st) == 0) n = read_end(fd, st.st_size, last, sizeof last);
+    int fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode)) n = read_end(fd, st.st_size, last, sizeof last);
     if (fd >= 0) close(fd);
     while (n > 0 && (last[n - 1] == '\n' || last[n - 1] == ' ')) n--;
     size_t keep = n < n_out - 1 ? n : n_out - 1;

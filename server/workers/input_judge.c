@@ -1,9 +1,11 @@
 #include "server/workers/input_judge.h"
 #include "base/clock.h"
-#include "base/files/durable.h"
+#include "base/files/foreign_file.h"
+#include "base/json/foreign_json.h"
 #include "optimizer/job/job_folder.h"
 #include "server/cluster/job_change.h"
 #include "server/jobs/job_paths.h"
+#include "server/workers/guard/worker_words.h"
 #include "server/workers/supervisor.h"
 #include "server/workers/worker_process.h"
 
@@ -16,6 +18,9 @@
 #include <unistd.h>
 
 enum { MAX_REPORT_BYTES = 4 << 20, TURN_LIMIT_S = 30, LOOK_US = 20000 };
+
+static const struct foreign_bounds report_bounds = {
+    .file_bytes = MAX_REPORT_BYTES, .held_bytes = 64 << 20, .depth = 16};
 
 /* Takes one of the places for checks, of which there are as many as workers. */
 static status take_turn(struct job_service *v, struct job_refusal *refusal, struct error *err)
@@ -64,7 +69,7 @@ static json_t *read_report(int fd)
     off_t n = lseek(fd, 0, SEEK_END);
     char *text = n > 0 && n <= MAX_REPORT_BYTES ? malloc((size_t)n) : NULL;
     if (text != NULL && pread(fd, text, (size_t)n, 0) == (ssize_t)n)
-        report = json_loadb(text, (size_t)n, JSON_REJECT_DUPLICATES, NULL);
+        foreign_json_parse(text, (size_t)n, &report_bounds, NULL, &report, NULL);
     free(text);
     return report;
 }
@@ -160,6 +165,7 @@ static status judge(struct job_service *v, const char *job_id, int fd, json_t **
     const struct worker_paths paths = {
         .program = supervisor_program(v->supervisor), .job_folder = folder, .document = document, .report_fd = fd};
     status s = ask(v, &paths, &found, &end, refusal, err);
+    if (s == STATUS_OK) worker_words_of_check(found);
     const bool judged = s == STATUS_OK && is_judgement(found);
     if (!judged) json_decref(found);
     if (s != STATUS_OK) return s;
@@ -226,7 +232,7 @@ static status keep_plan(const char *job, json_t *plan, struct error *err)
     path_join(path, job, JOB_FILE_PLAN, NULL);
     char *text = json_dumps(plan, JSON_INDENT(1) | JSON_REAL_PRECISION(12));
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot plan the job: out of memory");
-    status s = durable_replace(path, text, strlen(text), err);
+    status s = foreign_file_replace(path, text, strlen(text), true, err);
     free(text);
     return s;
 }
@@ -268,6 +274,7 @@ static status plan_job(struct job_service *v, const struct job_row *row, int fd,
                                        .plan = true,
                                        .report_fd = fd};
     status s = ask(v, &paths, &found, &end, refusal, err);
+    if (s == STATUS_OK) worker_words_of_plan(found);
     if (s == STATUS_OK && (!is_plan(found) || json_is_object(json_object_get(found, "error"))))
         s = unreadable(found, &end, folder, err);
     if (s == STATUS_OK) {

@@ -1,20 +1,17 @@
 #include "server/workers/kept_plan.h"
-#include "base/files/durable.h"
+#include "base/json/foreign_json.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
+#include "server/workers/guard/worker_words.h"
 
-#include <stdlib.h>
-
-enum { MAX_PLAN_BYTES = 1 << 20 };
+static const struct foreign_bounds plan_bounds = {.file_bytes = 1 << 20, .held_bytes = 4 << 20, .depth = 16};
 
 json_t *kept_plan_read(const char *data, const char *job_id)
 {
-    char path[PATH_BYTES], *text = NULL;
-    size_t n = 0;
-    path_join(path, data, "jobs", job_id, JOB_FILE_PLAN, NULL);
-    if (file_read_all(path, MAX_PLAN_BYTES, &text, &n, NULL) != STATUS_OK) return NULL;
-    json_t *plan = json_loadb(text, n, 0, NULL);
-    free(text);
+    char folder[PATH_BYTES];
+    json_t *plan = NULL;
+    path_join(folder, data, "jobs", job_id, NULL);
+    if (foreign_json_read(folder, JOB_FILE_PLAN, &plan_bounds, &plan, NULL) == STATUS_OK) worker_words_of_plan(plan);
     if (json_is_number(json_object_get(plan, "cpu_s"))) return plan;
     json_decref(plan);
     return NULL;

@@ -1,4 +1,5 @@
 #include "server/workers/worker_process.h"
+#include "base/files/foreign_file.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -8,6 +9,7 @@
 #include <string.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -132,6 +134,14 @@ void worker_arguments_set(struct worker_arguments *a, const struct worker_paths 
     add(a, p->job_folder);
 }
 
+/* Of an earlier attempt, which may have put a pipe there. Its folder is left, and the start fails. */
+static int open_console(const char *path)
+{
+    struct stat st;
+    if (lstat(path, &st) == 0 && !S_ISDIR(st.st_mode) && foreign_file_clear(path, NULL) != STATUS_OK) return -1;
+    return open(path, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0600);
+}
+
 status worker_launch(const struct worker_paths *paths, const struct settings *settings, pid_t *out, struct error *err)
 {
     char *variable[WORKER_MAX_VARIABLE + 1];
@@ -153,8 +163,7 @@ status worker_launch(const struct worker_paths *paths, const struct settings *se
     if (reports)
         new.error_fd = open("/dev/null", O_WRONLY | O_CLOEXEC);
     else
-        new.output_fd = new.error_fd =
-            open(paths->console, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0600);
+        new.output_fd = new.error_fd = open_console(paths->console);
     if (new.error_fd < 0)
         s = error_set_errno(err, "cannot write '%s'", reports ? "/dev/null" : paths->console);
     else if ((*out = start(&new)) < 0)

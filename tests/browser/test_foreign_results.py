@@ -18,12 +18,14 @@ SVG = b'<svg xmlns="http://www.w3.org/2000/svg"><script>fetch("/v1/jobs", {metho
 def foreign(tmp_path, browser):
     """A signed-in browser, a client, and a job with hostile results and a hostile input."""
     process, url = start_daemon(tmp_path / "data", "--worker", HOSTILE)
-    made = subprocess.run([os.path.join(BIN, "selvedged"), "--data", str(tmp_path / "data"), "--make-token", "root"], capture_output=True, text=True, check=True)
+    make = [os.path.join(BIN, "selvedged"), "--data", str(tmp_path / "data"), "--make-token", "root"]
+    made = subprocess.run(make, capture_output=True, text=True, check=True)
     token = made.stdout.strip()
     client = selvedge.Client(url, token=token)
     (tmp_path / "scan.svg").write_bytes(SVG)
     (tmp_path / "rows.csv").write_text("set,r,g,b\n")
-    job = client.submit({"sample": "hostile: pages", "volume": {"files": ["scan.svg"], "voxel_size_um": 2.0}, "measurements": {"file": "rows.csv"}}, str(tmp_path))
+    document = {"sample": "hostile: pages", "volume": {"files": ["scan.svg"], "voxel_size_um": 2.0}, "measurements": {"file": "rows.csv"}}
+    job = client.submit(document, str(tmp_path))
     job.wait()
     browser.get(url + "/")
     wait_for(browser, "document.querySelector('#sign-in input')")

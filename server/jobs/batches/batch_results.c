@@ -1,5 +1,5 @@
 /* The table of results of a batch. */
-#include "base/files/durable.h"
+#include "base/json/foreign_json.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/batches/batch_service.h"
 #include "server/jobs/batches/batch_view.h"
@@ -9,19 +9,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { RESULT_MOST_BYTES = 256 << 20 };
+static const char *const number[] = {"fit_rel_rms", "fit_rel_rms_se", "heldout_rel_rms", "heldout_rel_rms_se", NULL};
+static const char *const shown_member[] = {
+    "verdict", "parameters", "model", "fit_rel_rms", "fit_rel_rms_se", "heldout_rel_rms", "heldout_rel_rms_se", NULL};
+static const struct foreign_bounds result_bounds = {64 << 20, 2 << 20, 64, shown_member};
 
 static json_t *read_result(struct job_service *v, const char *job_id)
 {
-    char path[PATH_BYTES], *text = NULL;
-    size_t n = 0;
-    path_join(path, v->settings->data, "jobs", job_id, JOB_FOLDER_RESULTS, "result.json", NULL);
-    if (file_read_all(path, RESULT_MOST_BYTES, &text, &n, NULL) != STATUS_OK) return NULL;
-    json_t *j = json_loadb(text, n, 0, NULL);
-    free(text);
-    if (json_is_object(j)) return j;
-    json_decref(j);
-    return NULL;
+    char folder[PATH_BYTES];
+    json_t *j = NULL;
+    path_join(folder, v->settings->data, "jobs", job_id, NULL);
+    foreign_json_read(folder, JOB_FOLDER_RESULTS "/result.json", &result_bounds, &j, NULL);
+    return j;
 }
 
 /* Copies a member if it is a number, or sets null. */
@@ -64,27 +63,21 @@ static json_t *parameters_of(const json_t *result)
     return list;
 }
 
+/* The best of the job's models. */
 static json_t *model_of(const json_t *result)
 {
-    json_t *one;
-    size_t i;
-    json_array_foreach(json_object_get(result, "models"), i, one)
-    {
-        json_t *id = json_object_get(one, "id");
-        if (json_is_true(json_object_get(one, "best")) && json_is_string(id)) return json_incref(id);
-    }
-    return json_null();
+    json_t *id = json_object_get(result, "model");
+    return json_is_string(id) ? json_incref(id) : json_null();
 }
 
 static json_t *row_of(struct job_service *v, const struct job_row *row)
 {
-    static const char *const number[] = {"fit_rel_rms", "fit_rel_rms_se", "heldout_rel_rms", "heldout_rel_rms_se"};
     json_t *result = row->state == JOB_SUCCEEDED ? read_result(v, row->id) : NULL;
     json_t *out =
         json_pack("{s:s,s:s,s:s}", "sample", row->sample, "job", row->id, "state", job_state_name(row->state));
     json_object_set_new(out, "verdict", row->verdict[0] != '\0' ? json_string(row->verdict) : json_null());
     json_object_set_new(out, "model", model_of(result));
-    for (size_t i = 0; i < sizeof number / sizeof number[0]; i++) put_number(out, result, number[i]);
+    for (size_t i = 0; number[i] != NULL; i++) put_number(out, result, number[i]);
     json_object_set_new(out, "flags", flags_of(result));
     json_object_set_new(out, "parameters", parameters_of(result));
     json_object_set_new(out, "error",
@@ -130,6 +123,20 @@ static void write_member(FILE *out, const json_t *object, const char *key)
     if (json_is_number(x)) fprintf(out, "%.9g", json_number_value(x));
 }
 
+/* The codes of a row's reservations between blanks, in one field. */
+static void write_flags(FILE *out, const json_t *flags)
+{
+    char *text = NULL;
+    size_t n_text = 0, i;
+    json_t *one;
+    FILE *list = open_memstream(&text, &n_text);
+    if (list == NULL) return;
+    json_array_foreach(flags, i, one) fprintf(list, "%s%s", i == 0 ? "" : " ", json_string_value(one));
+    fputc(',', out);
+    if (fclose(list) == 0) write_text(out, text);
+    free(text);
+}
+
 static const json_t *parameter_named(const json_t *row, const char *name)
 {
     json_t *one;
@@ -148,9 +155,7 @@ static void write_row(FILE *out, const json_t *row, const json_t *names)
     size_t i;
     write_text(out, json_string_value(json_object_get(row, "sample")));
     for (i = 0; i < sizeof member / sizeof member[0]; i++) write_member(out, row, member[i]);
-    fputc(',', out);
-    json_array_foreach(json_object_get(row, "flags"), i, value)
-        fprintf(out, "%s%s", i == 0 ? "" : " ", json_string_value(value));
+    write_flags(out, json_object_get(row, "flags"));
     json_object_foreach((json_t *)(uintptr_t)names, name, value)
     {
         const json_t *p = parameter_named(row, name);

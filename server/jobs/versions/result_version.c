@@ -1,12 +1,18 @@
 #include "server/jobs/versions/result_version.h"
+#include "base/files/disk_use.h"
 #include "base/files/durable.h"
 #include "base/files/file_tree.h"
+#include "base/files/foreign_file.h"
+#include "base/json/foreign_json.h"
+#include "optimizer/job/job_document.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/job_view.h"
+#include "server/workers/guard/worker_words.h"
 
 #include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,7 +21,17 @@
 #include <unistd.h>
 
 #define VERSION_FILE "version.json"
-enum { VERSION_MOST_BYTES = 8 << 20, MOST_DIGITS = 9, MOST_LISTED = 4096 };
+enum { MOST_DIGITS = 9, MOST_LISTED = 4096 };
+
+static const char *const summary_member[] = {"sample", "started_unix_s", "finished_unix_s", "verdict", NULL};
+static const char *const inputs_member[] = {"inputs", NULL};
+static const char *const status_member[] = {"verdict", "started_unix_s", NULL};
+/* Of files that workers have written, or may have written since. A job may have some 20,000 inputs. */
+static const struct foreign_bounds document_bounds = {JOB_MAX_DOCUMENT_BYTES, 48 << 20, 64, NULL},
+                                   report_bounds = {64 << 20, 32 << 20, 64, inputs_member},
+                                   status_bounds = {256 << 10, 1 << 20, 16, status_member},
+                                   version_bounds = {16 << 20, 64 << 20, 64, NULL},
+                                   summary_bounds = {16 << 20, 1 << 20, 64, summary_member};
 
 /* A whole number without leading zeros, or 0. */
 static int64_t parse_number(const char *text)
@@ -38,9 +54,25 @@ static void job_file_path(const struct job_service *v, const char *id, const cha
 
 static bool has_result(const struct job_service *v, const char *id, const char *folder, struct stat *st)
 {
-    char path[PATH_BYTES];
-    job_file_path(v, id, folder, "result.json", path);
-    return lstat(path, st) == 0 && S_ISREG(st->st_mode);
+    char path[PATH_BYTES], name[VERSION_FOLDER_BYTES + 16];
+    int fd = -1;
+    job_file_path(v, id, NULL, NULL, path);
+    snprintf(name, sizeof name, "%s/result.json", folder);
+    if (foreign_file_open(path, name, &fd, NULL, NULL) != STATUS_OK) return false;
+    const bool known = fstat(fd, st) == 0;
+    close(fd);
+    return known;
+}
+
+/* A JSON object of a file in the job's folder; NULL if there is none. */
+static json_t *read_object(const struct job_service *v, const char *id, const char *name,
+                           const struct foreign_bounds *bounds)
+{
+    char folder[PATH_BYTES];
+    json_t *j = NULL;
+    job_file_path(v, id, NULL, NULL, folder);
+    foreign_json_read(folder, name, bounds, &j, NULL);
+    return j;
 }
 
 static int by_number(const void *a, const void *b)
@@ -58,8 +90,10 @@ static status kept_numbers(const struct job_service *v, const char *id, int64_t 
     *number = calloc(MOST_LISTED + 1, sizeof **number);
     if (*number == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot list versions: out of memory");
     job_file_path(v, id, JOB_FOLDER_VERSIONS, NULL, path);
-    DIR *d = opendir(path);
-    if (d == NULL && errno == ENOENT) return STATUS_OK;
+    int fd = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    if (fd < 0 && (errno == ENOENT || errno == ENOTDIR || errno == ELOOP)) return STATUS_OK;
+    DIR *d = fd < 0 ? NULL : fdopendir(fd);
+    if (d == NULL && fd >= 0) close(fd);
     if (d == NULL) return error_set_errno(err, "cannot list the versions of job '%s'", id);
     for (struct dirent *e; *n < MOST_LISTED && (e = readdir(d)) != NULL;) {
         int64_t k = parse_number(e->d_name);
@@ -74,9 +108,9 @@ static status kept_numbers(const struct job_service *v, const char *id, int64_t 
 /* The input files of the run with their SHA-256, as the worker has noted them in its report; null without a report. */
 static json_t *inputs_of_run(const struct job_service *v, const char *id)
 {
-    char path[PATH_BYTES];
-    job_file_path(v, id, JOB_FOLDER_RESULTS, "report.json", path);
-    json_t *report = json_load_file(path, JSON_REJECT_DUPLICATES, NULL), *inputs = json_object_get(report, "inputs");
+    json_t *report = read_object(v, id, JOB_FOLDER_RESULTS "/report.json", &report_bounds),
+           *inputs = json_object_get(report, "inputs");
+    worker_words_of_inputs(inputs);
     inputs = json_is_array(inputs) ? json_incref(inputs) : json_null();
     json_decref(report);
     return inputs;
@@ -86,10 +120,8 @@ static json_t *inputs_of_run(const struct job_service *v, const char *id)
 static json_t *describe(const struct job_service *v, const struct job_row *row, const char *document, bool with_inputs,
                         double finished_unix_s)
 {
-    char path[PATH_BYTES];
-    job_file_path(v, row->id, JOB_FILE_STATUS, NULL, path);
-    json_t *doc = json_loads(document, JSON_REJECT_DUPLICATES, NULL);
-    json_t *st = json_load_file(path, JSON_REJECT_DUPLICATES, NULL);
+    json_t *doc = NULL, *st = read_object(v, row->id, JOB_FILE_STATUS, &status_bounds);
+    foreign_json_parse(document, strlen(document), &document_bounds, NULL, &doc, NULL);
     const json_t *sample = json_object_get(doc, "sample");
     json_t *verdict = json_object_get(st, "verdict"), *started = json_object_get(st, "started_unix_s");
     json_t *out =
@@ -105,9 +137,10 @@ static json_t *describe(const struct job_service *v, const struct job_row *row, 
 /* The document that the result in JOB/results was made with; the caller frees it. */
 static char *document_of_run(const struct job_service *v, const struct job_row *row)
 {
-    char path[PATH_BYTES], *text = NULL;
-    job_file_path(v, row->id, JOB_FILE_RUN, NULL, path);
-    if (row->dirty && file_read_all(path, VERSION_MOST_BYTES, &text, NULL, NULL) == STATUS_OK) return text;
+    char folder[PATH_BYTES], *text = NULL;
+    job_file_path(v, row->id, NULL, NULL, folder);
+    if (row->dirty && foreign_file_read(folder, JOB_FILE_RUN, JOB_MAX_DOCUMENT_BYTES, &text, NULL, NULL) == STATUS_OK)
+        return text;
     return strdup(row->document); /* no edit, or one of files only */
 }
 
@@ -133,15 +166,17 @@ static json_t *describe_damaged(int64_t number, const struct stat *st)
 static json_t *read_description(struct job_service *v, const struct job_row *row, const char *folder, int64_t number,
                                 bool full, const struct stat *st)
 {
-    char path[PATH_BYTES];
+    char name[VERSION_FOLDER_BYTES + 16];
     if (strcmp(folder, JOB_FOLDER_RESULTS) == 0) return describe_present(v, row, full, st);
-    job_file_path(v, row->id, folder, VERSION_FILE, path);
-    json_t *j = json_load_file(path, JSON_REJECT_DUPLICATES, NULL);
-    bool whole = json_is_string(json_object_get(j, "sample")) &&
-                 json_is_number(json_object_get(j, "finished_unix_s")) &&
-                 json_object_get(j, "started_unix_s") != NULL && json_object_get(j, "verdict") != NULL &&
-                 json_is_object(json_object_get(j, "document"));
-    if (whole && json_object_get(j, "inputs") == NULL) json_object_set_new(j, "inputs", json_null());
+    snprintf(name, sizeof name, "%s/%s", folder, VERSION_FILE);
+    json_t *j = read_object(v, row->id, name, full ? &version_bounds : &summary_bounds);
+    json_t *started = json_object_get(j, "started_unix_s"), *verdict = json_object_get(j, "verdict");
+    bool whole =
+        json_is_string(json_object_get(j, "sample")) && json_is_number(json_object_get(j, "finished_unix_s")) &&
+        (json_is_number(started) || json_is_null(started)) && (json_is_object(verdict) || json_is_null(verdict)) &&
+        (!full || json_is_object(json_object_get(j, "document")));
+    if (whole && !json_is_array(json_object_get(j, "inputs"))) json_object_set_new(j, "inputs", json_null());
+    worker_words_of_inputs(json_object_get(j, "inputs"));
     if (whole) return j;
     json_decref(j);
     log_warning(v->log, "job %s: the description of version %lld is damaged", row->id, (long long)number);
@@ -152,7 +187,7 @@ status version_note_document(struct job_service *v, const struct job_row *row, c
 {
     char path[PATH_BYTES];
     job_file_path(v, row->id, JOB_FILE_RUN, NULL, path);
-    return durable_replace(path, document, strlen(document), err);
+    return foreign_file_replace(path, document, strlen(document), true, err);
 }
 
 /* The rename comes first, so a kill leaves no half of a version in the list. */
@@ -177,9 +212,10 @@ static status move(struct job_service *v, const struct job_row *row, const struc
     json_decref(about);
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot keep the earlier result: out of memory");
     job_file_path(v, row->id, JOB_FOLDER_RESULTS, VERSION_FILE, path);
-    status s = durable_replace(path, text, strlen(text), err);
+    status s = foreign_file_replace(path, text, strlen(text), true, err);
     free(text);
     job_file_path(v, row->id, JOB_FOLDER_VERSIONS, NULL, path);
+    if (s == STATUS_OK) s = foreign_folder_clear(path, err);
     if (s == STATUS_OK) s = durable_make_folder(path, err);
     if (s == STATUS_OK) s = durable_sync_folder_of(path, err);
     snprintf(name, sizeof name, "%lld", (long long)row->generation);
@@ -194,20 +230,9 @@ static status move(struct job_service *v, const struct job_row *row, const struc
 /* Notes how many bytes the versions of the job have, which count as its owner's. */
 static status note_bytes(struct job_service *v, const struct job_row *row, struct error *err)
 {
-    char folder[VERSION_FOLDER_BYTES];
-    struct result_file *file = NULL;
-    int64_t *number = NULL, n_bytes = 0;
-    size_t n = 0, n_file;
-    status s = kept_numbers(v, row->id, &number, &n, err);
-    for (size_t i = 0; s == STATUS_OK && i < n; i++) {
-        snprintf(folder, sizeof folder, JOB_FOLDER_VERSIONS "/%lld", (long long)number[i]);
-        s = result_list(v, row->id, folder, &file, &n_file, err);
-        for (size_t k = 0; s == STATUS_OK && k < n_file; k++) n_bytes += file[k].size_bytes;
-        free(file);
-        file = NULL;
-    }
-    free(number);
-    return s == STATUS_OK ? store_job_version_bytes(v->store, row->id, n_bytes, err) : s;
+    char path[PATH_BYTES];
+    job_file_path(v, row->id, JOB_FOLDER_VERSIONS, NULL, path);
+    return store_job_version_bytes(v->store, row->id, disk_content_bytes(path), err);
 }
 
 status version_keep(struct job_service *v, struct job_row *row, struct error *err)
@@ -254,6 +279,7 @@ static status read_version(struct job_service *v, const struct job_row *row, int
     json_t *j = read_description(v, row, folder, number, full, &st);
     if (j == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot describe a version: out of memory");
     status s = result_list(v, row->id, folder, &file, &n, err);
+    if (s == STATUS_TOO_LARGE) s = STATUS_OK; /* then those that are listed count */
     for (size_t i = 0; i < n; i++) n_bytes += file[i].size_bytes;
     snprintf(url, sizeof url, "/v1/jobs/%s/versions/%lld", row->id, (long long)number);
     json_object_set_new(j, "version", json_integer((json_int_t)number));

@@ -1,5 +1,7 @@
 #include "server/store/journal/job_journal.h"
 #include "base/files/durable.h"
+#include "base/files/foreign_file.h"
+#include "base/json/foreign_json.h"
 #include "optimizer/job/job_folder.h"
 
 #include <errno.h>
@@ -13,7 +15,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { FOLDER_BYTES = 4096 };
+/* What is read of a journal at the most: bytes, files (more than a document can name) and damaged lines. */
+enum { FOLDER_BYTES = 4096, MOST_BYTES = 256 << 20, MOST_FILES = 1 << 15, MOST_DAMAGED = 10000 };
+
+/* A record names all files of a job that was made with them. */
+static const struct foreign_bounds record_bounds = {
+    .file_bytes = RECORD_MOST_BYTES, .held_bytes = 64 << 20, .depth = 8};
 
 /* The columns of a job, by kind. */
 struct text_column {
@@ -121,16 +128,14 @@ status job_journal_append(const struct journal_key *key, const char *folder, con
                           bool sync, struct error *err)
 {
     char path[FOLDER_BYTES];
-    struct stat st;
     journal_path(folder, path);
-    /* a worker, whose folder it is, could put a pipe here, which would be waited for */
-    if (lstat(path, &st) == 0 && !S_ISREG(st.st_mode) && unlink(path) != 0)
-        return error_set_errno(err, "cannot write '%s'", path);
+    status s = foreign_file_clear(path, err); /* a worker, whose folder it is, could have put a pipe here */
+    if (s != STATUS_OK) return s;
     char *plain = entry_text(entry), *text = plain == NULL ? NULL : journal_seal(key, plain);
     free(plain);
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
     end_last_line(path);
-    status s = record_append(path, text, sync, err);
+    s = record_append(path, text, sync, err);
     free(text);
     return s;
 }
@@ -175,6 +180,10 @@ static size_t find(const struct job_journal *j, const char *name)
 static status read_files(const json_t *list, struct job_journal *out, struct error *err)
 {
     size_t n = json_array_size(list);
+    if (n > MOST_FILES - out->n_file) {
+        n = MOST_FILES - out->n_file;
+        out->n_damaged++;
+    }
     if (n == 0) return STATUS_OK;
     struct file_row *more = realloc(out->file, (out->n_file + n) * sizeof *more);
     if (more == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read a journal: out of memory");
@@ -203,8 +212,8 @@ struct reading {
 static bool visit(void *context, const char *text, size_t n)
 {
     struct reading *r = context;
-    json_t *j = json_loadb(text, n, 0, NULL);
-    if (!json_is_object(j)) {
+    json_t *j = NULL;
+    if (foreign_json_parse(text, n, &record_bounds, NULL, &j, NULL) != STATUS_OK || !json_is_object(j)) {
         r->journal->n_damaged++;
         json_decref(j);
         return true;
@@ -228,37 +237,42 @@ static bool visit(void *context, const char *text, size_t n)
 }
 
 /* Returns the offset behind the line that begins at `from`, or size if it does not end. */
-static uint64_t behind_line(const char *path, uint64_t from, uint64_t size)
+static uint64_t behind_line(int fd, uint64_t from, uint64_t size)
 {
-    int c = 0;
-    FILE *f = fopen(path, "re");
-    if (f == NULL || fseeko(f, (off_t)from, SEEK_SET) != 0) c = EOF;
-    uint64_t at_byte = from;
-    while (c != EOF && c != '\n') {
-        c = getc(f);
-        at_byte++;
+    char piece[4096];
+    while (from < size) {
+        ssize_t n = pread(fd, piece, sizeof piece, (off_t)from);
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) break;
+        const char *newline = memchr(piece, '\n', (size_t)n);
+        if (newline != NULL) return from + (uint64_t)(newline - piece) + 1;
+        from += (uint64_t)n;
     }
-    if (f != NULL) fclose(f);
-    return c == '\n' ? at_byte : size;
+    return size;
 }
 
 status job_journal_read(const char *folder, struct job_journal *journal, struct error *err)
 {
     char path[FOLDER_BYTES];
-    struct stat st;
     struct reading r = {journal, err, STATUS_OK, 0};
+    uint64_t size = 0;
+    int fd = -1;
     *journal = (struct job_journal){0};
     journal_path(folder, path);
-    if (lstat(path, &st) != 0) return error_set_errno(err, "cannot read '%s'", path);
-    if (!S_ISREG(st.st_mode)) return error_set(err, STATUS_FORMAT, "cannot read '%s': not a file", path);
-    status s = STATUS_OK;
-    for (uint64_t from = 0, size = (uint64_t)st.st_size; s == STATUS_OK && from < size;) {
+    status s = foreign_file_open(folder, JOB_FILE_JOURNAL, &fd, &size, err);
+    if (s != STATUS_OK) return s;
+    if (size > MOST_BYTES) {
+        size = MOST_BYTES;
+        journal->n_damaged++;
+    }
+    for (uint64_t from = 0; s == STATUS_OK && from < size && journal->n_damaged < MOST_DAMAGED;) {
         s = record_read(path, from, visit, &r, &from, err);
         if (s == STATUS_OK) s = r.s;
         if (s != STATUS_OK || from >= size) break;
         journal->n_damaged++;
-        from = behind_line(path, from, size);
+        from = behind_line(fd, from, size);
     }
+    close(fd);
     if (s == STATUS_OK && r.n_record == 0)
         s = error_set(err, STATUS_FORMAT, "cannot read '%s': it has no whole record", path);
     return s;

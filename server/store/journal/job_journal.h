@@ -2,7 +2,7 @@
  * of the job, so that a lost database can be rebuilt from the folders (server/rescue/rebuild.h). The database is the
  * owner of every fact and changes first; the journal follows before a change is acknowledged. job.json holds the
  * document, so the journal has its checksum only. A worker may write into its job's folder, so what is read here is
- * checked like any input. Callers make sure that one thread at a time writes the journal of a job.
+ * checked like any input and bounded. Callers make sure that one thread at a time writes the journal of a job.
  *
  * A record is a JSON object. Each key may be absent, and a later one replaces an earlier one:
  *   "job"              every column of the job's row (names as in struct job_row) but serial, revision, token, document

@@ -1,5 +1,6 @@
 #include "server/workers/backends/backend_note.h"
-#include "base/files/durable.h"
+#include "base/files/foreign_file.h"
+#include "base/json/foreign_json.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
 
@@ -7,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NOTE_LIMIT_BYTES = 4096 };
+static const struct foreign_bounds note_bounds = {.file_bytes = 4096, .held_bytes = 32 << 10, .depth = 4};
 
 static void take_text(const json_t *from, const char *key, char *out, size_t n_out)
 {
@@ -17,13 +18,11 @@ static void take_text(const json_t *from, const char *key, char *out, size_t n_o
 
 void backend_note_read(const char *data, const char *job_id, struct backend_note *note)
 {
-    char path[PATH_BYTES], *text = NULL;
-    size_t n = 0;
+    char folder[PATH_BYTES];
+    json_t *j = NULL;
     *note = (struct backend_note){0};
-    path_join(path, data, "jobs", job_id, JOB_FILE_BACKEND, NULL);
-    if (file_read_all(path, NOTE_LIMIT_BYTES, &text, &n, NULL) != STATUS_OK) return;
-    json_t *j = json_loadb(text, n, JSON_REJECT_DUPLICATES, NULL);
-    free(text);
+    path_join(folder, data, "jobs", job_id, NULL);
+    if (foreign_json_read(folder, JOB_FILE_BACKEND, &note_bounds, &j, NULL) != STATUS_OK) return;
     take_text(j, "backend", note->backend, sizeof note->backend);
     take_text(j, "id", note->id, sizeof note->id);
     take_text(j, "state", note->state, sizeof note->state);
@@ -49,8 +48,7 @@ status backend_note_write(const char *data, const char *job_id, const struct bac
     json_decref(j);
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot note where job %s runs: out of memory", job_id);
     path_join(path, data, "jobs", job_id, JOB_FILE_BACKEND, NULL);
-    status s = durable ? durable_replace(path, text, strlen(text), err)
-                       : durable_replace_volatile(path, text, strlen(text), err);
+    status s = foreign_file_replace(path, text, strlen(text), durable, err);
     free(text);
     return s;
 }

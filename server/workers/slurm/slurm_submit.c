@@ -1,5 +1,6 @@
 /* Submits and cancels jobs. */
 #include "base/clock.h"
+#include "base/files/foreign_file.h"
 #include "server/workers/kept_plan.h"
 #include "server/workers/slurm/slurm_desk.h"
 #include "server/workers/slurm/slurm_request.h"
@@ -48,6 +49,8 @@ static status renew_console(const char *data, const char *job_id, struct error *
 {
     char path[PATH_BYTES];
     path_join(path, data, "jobs", job_id, "console.txt", NULL);
+    status s = foreign_file_clear(path, err);
+    if (s != STATUS_OK) return s;
     int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0600);
     if (fd < 0) return error_set_errno(err, "cannot write '%s'", path);
     close(fd);

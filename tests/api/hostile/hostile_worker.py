@@ -127,6 +127,33 @@ def linked_folders():
         replace(name, lambda path: os.symlink(argument, path))
 
 
+def wrong_types():
+    """JSON of the right names, and of other types than they have."""
+    for wrong in ({"code": 1}, "text", [], 1):
+        put("status.json", json.dumps({**dict.fromkeys(json.loads(status()), wrong), "attempt": attempt, "warnings": [wrong]}))
+        time.sleep(0.3)
+    put("status.json", status(warnings=[1, {}], verdict={"code": [], "text": {}}, peak_rss_bytes=-1, started_unix_s=-1e300, fraction=1e300))
+    parameters = [1, {"name": 2}, {"name": "x", "value": "y", "unit": 3}]
+    put("results/result.json", json.dumps({"parameters": parameters, "verdict": [], "model": {}, "fit_rel_rms": "z"}))
+    put("results/report.json", json.dumps({"inputs": [1, "x", {}]}))
+    records = ['{"step":0,"parameter":1,"i_model":"x","phase":[]}', '{"step":1e9}', '{"step":-5}', '{"step":9223372036854775807}', "[]",
+               '{"step":3,"parameters":7,"i_model":0}', '{"step":4,"i_model":9223372036854775807}']
+    put("series.rec", "".join(map(record, records)))
+    put("plan.json", json.dumps({"cpu_s": 1, "wall_s": "x", "stages": {}, "n_thread": []}))
+
+
+def many_records():
+    """A series of so many models, each with a description."""
+    text = '{"step":%d,"i_model":%d,"model":"m","parameter":[1],"parameters":[' + "1," * 500 + "1]}"
+    put("series.rec", "".join(record(text % (i, i)) for i in range(int(argument))))
+
+
+def damaged_lines():
+    for name in ("series.rec", "journal.rec"):
+        with open(os.path.join(job, name), "a") as f:
+            f.write("x\n" * int(argument))
+
+
 def many_files():
     for i in range(int(argument)):
         put(f"results/many/{i}", "")
