@@ -217,14 +217,13 @@ static status move(struct job_service *v, const struct job_row *row, const struc
     job_file_path(v, row->id, JOB_FOLDER_VERSIONS, NULL, path);
     if (s == STATUS_OK) s = foreign_folder_clear(path, err);
     if (s == STATUS_OK) s = durable_make_folder(path, err);
-    if (s == STATUS_OK) s = durable_sync_folder_of(path, err);
     snprintf(name, sizeof name, "%lld", (long long)row->generation);
     job_file_path(v, row->id, JOB_FOLDER_RESULTS, NULL, from);
     job_file_path(v, row->id, JOB_FOLDER_VERSIONS, name, to);
     if (s == STATUS_OK && rename(from, to) != 0)
         s = error_set_errno(err, "cannot keep the earlier result of job '%s' as version %s", row->id, name);
-    if (s == STATUS_OK) s = durable_sync_folder_of(to, err);
-    return s == STATUS_OK ? durable_sync_folder_of(from, err) : s;
+    /* the job's folder is synced by what follows before an attempt may begin: attempt.json is replaced */
+    return s == STATUS_OK ? durable_sync_folder_of(to, err) : s;
 }
 
 /* Notes how many bytes the versions of the job have, which count as its owner's. */

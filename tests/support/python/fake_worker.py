@@ -49,7 +49,15 @@ def put(path, text):
     temporary = os.path.join(job, path + ".tmp-fake00")
     with open(temporary, "w") as f:
         f.write(text)
+        if behaviour == "synced":
+            f.flush()
+            os.fsync(f.fileno())
     os.rename(temporary, os.path.join(job, path))
+    while behaviour == "synced" and path:
+        path = os.path.dirname(path)
+        folder = os.open(os.path.join(job, path), os.O_RDONLY)
+        os.fsync(folder)
+        os.close(folder)
 
 
 def say(state, fraction, error=None, clock_s=0):
@@ -75,7 +83,7 @@ def log(text):
 
 def finish():
     put("results/result.json", json.dumps({"parameters": [{"name": "beta_R", "value": 5.0, "standard_error": 0.1}],
-                                           "objective": 0.01, "run": run}))
+                                           "objective": 0.01, "run": run, "argument": argument}))
     put("results/pictures/view.png", "not really a picture " * 100)
     put("results/empty.txt", "")
     say("succeeded", 1.0)
@@ -97,7 +105,7 @@ def work(seconds, clock_s=0):
 signal.signal(signal.SIGTERM, cancelled)
 log(f"run {run}, attempt {attempt}")
 say("running", 0.1)
-if behaviour == "succeed":
+if behaviour in ("succeed", "synced"):  # synced: as the real worker, which syncs its results
     finish()
 elif behaviour == "surroundings":
     with open("/proc/self/status") as f:

@@ -82,14 +82,17 @@ def content_of(folder):
     return found
 
 
-def states(disk, calls, rng, shares):
+def states(disk, calls, rng, shares, begin):
     """Yields (index of the last call, function that saves the state) for all states, or a sample of them. Without a
     sync the least state stays the same while more is confirmed, so only its last moment is of interest."""
     least, others = (1.0, 1.0) if EVERY else shares
     for i, call in enumerate(calls):
         disk.apply(call)
+        if i < begin:
+            continue
         last = i + 1 == len(calls)
-        if (last or calls[i + 1].name == "sync") and rng.random() < least:
+        chosen = rng.random() < least or not last and "all" in calls[i + 1].flags  # there are few syncs of everything
+        if (last or calls[i + 1].name == "sync") and chosen:
             yield i, lambda path: save_least(disk, path)
         if rng.random() < others:
             yield i, lambda path: save_some(disk, path, rng)
@@ -97,11 +100,11 @@ def states(disk, calls, rng, shares):
             yield i, lambda path: save_all(disk, path)
 
 
-def try_states(calls, journal, folder, check, enough=5, shares=(0.3, 0.05)):
+def try_states(calls, journal, folder, check, enough=5, shares=(0.3, 0.05), begin=0):
     """Returns (number of states tried, [what was lost]). Ends after `enough` losses. shares: of the least states and of
-    the others that are tried."""
+    the others that are tried, from the call `begin` on."""
     n, lost = 0, []
-    for i, save in states(journal.disk()[0], calls, random.Random(1), shares):
+    for i, save in states(journal.disk()[0], calls, random.Random(1), shares, begin):
         until_s = calls[i + 1].begin_s if i + 1 < len(calls) else float("inf")
         save(folder / "cut")
         n += 1
