@@ -1,7 +1,7 @@
 /* Ids of job options, for errors and warnings of code that does not know the job document. Such code puts an id into
- * err->field or into a warning, and the pipeline replaces it by the key of the document (optimizer/job/option_key.h).
- * An element of a list has its index after the id: "photograph_file[3]".
- */
+ * err->field or into a warning, and the pipeline replaces it by the key of the document
+ * (optimizer/job/options/option_key.h). An element of a list has its index after the id: "photograph_file[3]".
+ * */
 #ifndef SELVEDGE_BASE_OPTION_ID_H
 #define SELVEDGE_BASE_OPTION_ID_H
 

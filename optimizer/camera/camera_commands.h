@@ -5,7 +5,7 @@
 #define SELVEDGE_OPTIMIZER_CAMERA_COMMANDS_H
 
 #include "base/status.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_document.h"
 #include "renderer/image/image.h"
 
 int camera_command_photo(int argc, char **argv);

@@ -1,4 +1,5 @@
 #include "optimizer/camera/camera_commands.h"
+#include "optimizer/job/job_parse.h"
 
 #include "base/files/durable.h"
 

@@ -202,8 +202,8 @@ static int preview_job(const char *path, const char *json_path, const char *pict
     if (s == STATUS_OK) s = photograph_process_load(&process, doc, folder, &err);
     if (s == STATUS_OK) print_color(&process);
     if (s == STATUS_OK && pictures != NULL) s = begin_pictures(&process, pictures, &err);
-    for (size_t i = 0; s == STATUS_OK && i < doc->n_photograph; i++)
-        whole = preview_photograph(&process, &view, &doc->photograph[i], rows) == STATUS_OK && whole;
+    for (size_t i = 0; s == STATUS_OK && i < doc->rows.n_photograph; i++)
+        whole = preview_photograph(&process, &view, &doc->rows.photograph[i], rows) == STATUS_OK && whole;
     if (s == STATUS_OK && json_path != NULL && json_dump_file(rows, json_path, JSON_INDENT(1)) != 0)
         s = error_set(&err, STATUS_IO, "cannot write '%s'", json_path);
     if (s != STATUS_OK) fprintf(stderr, "error: %s\n", err.text);

@@ -1,7 +1,7 @@
 #include "optimizer/phantom/phantom_described.h"
 
 #include "geometry/cloth/cloth.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/job_parse.h"
 
 #include <jansson.h>
 #include <math.h>

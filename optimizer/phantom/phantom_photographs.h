@@ -4,7 +4,7 @@
 
 #include "base/catalogue/model_sets.h"
 #include "base/thread_pool.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_document.h"
 #include "renderer/scattering/scattering.h"
 
 struct phantom_photograph_option {

@@ -1,6 +1,6 @@
 #include "optimizer/worker/fiber_file.h"
 #include "base/option_id.h"
-#include "optimizer/job/option_key.h"
+#include "optimizer/job/options/option_key.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -28,7 +28,7 @@ static status check_radii(const struct fiber_set *f, const char *name, struct er
 
 status fiber_file_read(const char *path, const struct job_document *doc, struct fiber_set *f, struct error *err)
 {
-    const char *name = doc->fiber_file, *dot = strrchr(name, '.');
+    const char *name = doc->cloth.fiber_file, *dot = strrchr(name, '.');
     bool text = dot != NULL && strcmp(dot, ".txt") == 0;
     status s = text ? fiber_set_read_text(f, path, err) : fiber_set_read_hair(f, path, err);
     if (s != STATUS_OK) {
@@ -36,7 +36,7 @@ status fiber_file_read(const char *path, const struct job_document *doc, struct 
         return s;
     }
     for (int a = 0; a < 2; a++)
-        if (!isnan(doc->tile_mm[a])) f->tile_size_m[a] = doc->tile_mm[a] * mm;
+        if (!isnan(doc->cloth.tile_mm[a])) f->tile_size_m[a] = doc->cloth.tile_mm[a] * mm;
     if (!(f->tile_size_m[0] > 0.0 && f->tile_size_m[1] > 0.0))
         return error_set_field(err, STATUS_INVALID, OPTION_TILE,
                                "'%s' is missing: the file '%s' does not say with which period the cloth repeats",
@@ -70,7 +70,7 @@ void fiber_file_warn(const struct fiber_set *f, const struct job_document *doc, 
         }
         double filled = (highest - lowest) / f->tile_size_m[a];
         if (filled >= least_filled && filled <= most_filled) continue;
-        warning_send(warn, isnan(doc->tile_mm[a]) ? OPTION_FIBER_FILE : OPTION_TILE,
+        warning_send(warn, isnan(doc->cloth.tile_mm[a]) ? OPTION_FIBER_FILE : OPTION_TILE,
                      "the tile is %.4g mm along %c, the fibers extend over %.4g mm: one of both may be in a wrong unit",
                      f->tile_size_m[a] / mm, "xy"[a], (highest - lowest) / mm);
         return;

@@ -4,7 +4,7 @@
 
 #include "base/warning.h"
 #include "geometry/fibers/fiber_set.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_document.h"
 
 /* Diameters of textile fibers: microfibers have 2 um, coarse wool and horsehair 100. */
 #define FIBER_LEAST_DIAMETER_UM 1.0

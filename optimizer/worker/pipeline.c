@@ -1,7 +1,7 @@
 /* Runs the stages of a job in the order of the stage table, and loads those that an earlier attempt has finished. */
 #include "base/clock.h"
 #include "optimizer/job/job_folder.h"
-#include "optimizer/job/option_key.h"
+#include "optimizer/job/options/option_key.h"
 #include "optimizer/job/stage_table.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/progress/pipeline_plan.h"
@@ -54,7 +54,7 @@ static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, 
 {
     struct stage_code own = stage_code[i];
     const struct stage_code *code = &own;
-    if (job_document_of_profile(c->doc)) {
+    if (job_document_kind(c->doc) == JOB_OF_PROFILE) {
         own.run = own.run_profile;
         own.load = NULL;
     }
@@ -66,7 +66,7 @@ static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, 
             *loaded = true;
             return STATUS_OK;
         }
-        if (c->doc->geometry_job[0] != '\0' && !code->of_scene)
+        if (c->doc->scan.geometry_job[0] != '\0' && !code->of_scene)
             return job_option_name_field(pipeline_geometry_lost(c, why.text, err), err);
         log_warning(c->log, "stage %s runs again: %s", code->name, why.text);
     }
@@ -85,10 +85,10 @@ static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, 
 
 bool pipeline_has_stage(const struct pipeline_context *c, size_t i)
 {
-    if (job_document_of_profile(c->doc)) return stage_code[i].run_profile != NULL;
-    return (!stage_code[i].of_volume || c->doc->has_volume) &&
-           (!stage_code[i].of_scene || !job_document_geometry_only(c->doc)) &&
-           (!stage_code[i].of_fit || job_document_has_rows(c->doc));
+    if (job_document_kind(c->doc) == JOB_OF_PROFILE) return stage_code[i].run_profile != NULL;
+    return (!stage_code[i].of_volume || c->doc->scan.given) &&
+           (!stage_code[i].of_scene || job_document_kind(c->doc) != JOB_OF_GEOMETRY) &&
+           (!stage_code[i].of_fit || job_document_kind(c->doc) == JOB_OF_FIT);
 }
 
 status pipeline_run(struct pipeline_context *c, struct error *err)

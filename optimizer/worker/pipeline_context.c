@@ -1,7 +1,7 @@
 #include "optimizer/worker/pipeline_context.h"
 #include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
-#include "optimizer/job/option_key.h"
+#include "optimizer/job/options/option_key.h"
 #include "renderer/transport/light/environment.h"
 
 #include <math.h>

@@ -25,7 +25,7 @@
 #include "optimizer/fit/profile/bowl/bowl_profile.h"
 #include "optimizer/fit/profile/profile_fit.h"
 #include "optimizer/fit/verdict/verdict.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_document.h"
 #include "optimizer/job/stage_table.h"
 #include "optimizer/worker/worker_folder.h"
 #include "optimizer/worker/worker_status.h"

@@ -6,7 +6,8 @@
 #include "optimizer/fit/photographs/observation_check.h"
 #include "optimizer/fit/photographs/observation_load.h"
 #include "optimizer/job/job_folder.h"
-#include "optimizer/job/option_key.h"
+#include "optimizer/job/job_parse.h"
+#include "optimizer/job/options/option_key.h"
 #include "optimizer/worker/document_fingerprint.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/stages/fit/pipeline_budget.h"
@@ -56,7 +57,8 @@ static status load_observations(struct pipeline_context *c, struct error *err)
         worker_status_warn(c->status, "%zu more warnings about photographs are in the job's log",
                            uneven.n - NAMED_PHOTOGRAPHS);
     const struct warning_sink warn = {pipeline_warn, c};
-    if (c->doc->measurement_file[0] != '\0') s = row_slips_check_angles(&c->observation, OPTION_MEASUREMENT_FILE, err);
+    if (c->doc->rows.measurement_file[0] != '\0')
+        s = row_slips_check_angles(&c->observation, OPTION_MEASUREMENT_FILE, err);
     if (s == STATUS_OK) observation_set_check(&c->observation, &warn);
     return s == STATUS_OK ? row_slips_warn(&c->observation, &warn, err) : s;
 }
@@ -65,9 +67,9 @@ static status load_observations(struct pipeline_context *c, struct error *err)
 static status load_environment(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    if (c->doc->environment_file[0] == '\0') return STATUS_OK;
-    worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->environment_file, path);
-    status s = environment_read_exr(path, c->doc->environment_scale, &c->environment, err);
+    if (c->doc->setup.environment_file[0] == '\0') return STATUS_OK;
+    worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->setup.environment_file, path);
+    status s = environment_read_exr(path, c->doc->setup.environment_scale, &c->environment, err);
     if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, OPTION_ENVIRONMENT_FILE);
     for (size_t i = 0; i < c->observation.n && s == STATUS_OK; i++)
         c->observation.item[i].configuration.environment = c->environment;
@@ -94,18 +96,19 @@ static status set_parameters(const struct job_model *given, struct pipeline_mode
 
 static status set_model(const struct job_document *doc, size_t i, struct pipeline_model *m, struct error *err)
 {
-    if (!appearance_find(doc->model[i].id, &m->appearance))
-        return error_set_field(err, STATUS_INVALID, OPTION_MODEL, "unknown model '%s'", doc->model[i].id);
-    status s = model_sets_init(&m->sets, model_catalogue_find(doc->model[i].id), doc->group, doc->n_group, err);
+    if (!appearance_find(doc->fit.model[i].id, &m->appearance))
+        return error_set_field(err, STATUS_INVALID, OPTION_MODEL, "unknown model '%s'", doc->fit.model[i].id);
+    status s = model_sets_init(&m->sets, model_catalogue_find(doc->fit.model[i].id), doc->cloth.group,
+                               doc->cloth.n_group, err);
     if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, OPTION_GROUPS);
-    return s == STATUS_OK ? set_parameters(&doc->model[i], m, err) : s;
+    return s == STATUS_OK ? set_parameters(&doc->fit.model[i], m, err) : s;
 }
 
 static status set_models(struct pipeline_context *c, struct error *err)
 {
-    c->model = calloc(c->doc->n_model, sizeof *c->model);
+    c->model = calloc(c->doc->fit.n_model, sizeof *c->model);
     if (c->model == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job: out of memory");
-    c->n_model = c->doc->n_model;
+    c->n_model = c->doc->fit.n_model;
     status s = STATUS_OK;
     for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) s = set_model(c->doc, i, &c->model[i], err);
     return s;
@@ -116,7 +119,8 @@ static status check_density(const struct pipeline_context *c, struct error *err)
     bool from_behind = false;
     for (size_t i = 0; i < c->fitted.n; i++)
         if (c->fitted.item[i].configuration.light_theta_rad > M_PI_2) from_behind = true;
-    return c->doc->fit_density && !from_behind ? job_density_undetermined(c->doc->black_sheet, err) : STATUS_OK;
+    return c->doc->fit.fit_density && !from_behind ? job_density_undetermined(c->doc->setup.black_sheet, err)
+                                                   : STATUS_OK;
 }
 
 static void warn_few_rows(struct pipeline_context *c)
@@ -174,20 +178,20 @@ static status select_rows(struct pipeline_context *c, struct error *err)
     observation_set_weigh(&c->fitted);
     if (s == STATUS_OK && c->fitted.n == 0)
         s = error_set_field(err, STATUS_INVALID,
-                            doc->measurement_file[0] != '\0' ? OPTION_MEASUREMENT_FILE : OPTION_PHOTOGRAPHS,
+                            doc->rows.measurement_file[0] != '\0' ? OPTION_MEASUREMENT_FILE : OPTION_PHOTOGRAPHS,
                             "all rows of the set 'fit' have the weight 0: give at least one a weight above it");
     if (s == STATUS_OK) s = observation_set_select(&c->fitted, JOB_SET_FIT, &c->row, err);
-    if (s != STATUS_OK || !(doc->texture_block_mm > 0.0)) return s;
-    s = observation_set_append_contrasts(&c->observation, doc->texture_weight, &c->contrast, err);
-    return s == STATUS_OK && doc->texture_weight > 0.0
-               ? observation_set_append_contrasts(&c->fitted, doc->texture_weight, &c->row, err)
+    if (s != STATUS_OK || !(doc->fit.texture_block_mm > 0.0)) return s;
+    s = observation_set_append_contrasts(&c->observation, doc->fit.texture_weight, &c->contrast, err);
+    return s == STATUS_OK && doc->fit.texture_weight > 0.0
+               ? observation_set_append_contrasts(&c->fitted, doc->fit.texture_weight, &c->row, err)
                : s;
 }
 
 /* Adds what a plain BRDF expects between the rows of the fit. */
 static status expect_rows(struct pipeline_context *c, struct error *err)
 {
-    const double strength = c->doc->plain_prior;
+    const double strength = c->doc->fit.plain_prior;
     status s = expected_rows_append(&c->fitted, strength, &c->expected, &c->row, err);
     if (s != STATUS_OK || !(strength > 0.0)) return s;
     if (c->expected.n == 0)
@@ -211,7 +215,7 @@ static status read_document(struct pipeline_context *c, struct error *err)
     s = job_document_parse(text, n, &c->doc, err);
     c->fingerprint = document_fingerprint(text, n);
     free(text);
-    if (s == STATUS_OK && c->doc->geometry_job[0] != '\0') c->doc->has_volume = true; /* the other job has it */
+    if (s == STATUS_OK && c->doc->scan.geometry_job[0] != '\0') c->doc->scan.given = true; /* the other job has it */
     return s;
 }
 
@@ -238,7 +242,7 @@ static status read_profile(struct pipeline_context *c, struct error *err)
     char folder[WORKER_PATH_BYTES];
     worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, folder);
     status s = claim_inputs(c, err);
-    if (s != STATUS_OK || !c->doc->bowl.given)
+    if (s != STATUS_OK || !c->doc->profile.bowl.given)
         return s == STATUS_OK ? fiber_profile_load(&c->profile, c->doc, folder, err) : s;
     s = bowl_profile_load(&c->profile, c->doc, folder, &c->bowl, err);
     if (s == STATUS_OK)
@@ -249,12 +253,12 @@ static status read_profile(struct pipeline_context *c, struct error *err)
 
 static status read_rows(struct pipeline_context *c, struct error *err)
 {
-    if (job_document_geometry_only(c->doc)) return claim_inputs(c, err);
+    if (job_document_kind(c->doc) == JOB_OF_GEOMETRY) return claim_inputs(c, err);
     status s = pipeline_profile_priors(c, err);
     if (s == STATUS_OK) s = set_models(c, err);
-    if (s == STATUS_OK && job_document_of_profile(c->doc)) s = read_profile(c, err);
-    if (job_document_of_profile(c->doc)) return s;
-    if (s == STATUS_OK && job_document_pictures_only(c->doc)) return take_values(c, err);
+    if (s == STATUS_OK && job_document_kind(c->doc) == JOB_OF_PROFILE) s = read_profile(c, err);
+    if (job_document_kind(c->doc) == JOB_OF_PROFILE) return s;
+    if (s == STATUS_OK && job_document_kind(c->doc) == JOB_OF_PICTURES) return take_values(c, err);
     if (s == STATUS_OK) s = pipeline_read_texture(c, err);
     if (s == STATUS_OK) s = pipeline_cloth_inputs(c, err);
     if (s == STATUS_OK) s = claim_inputs(c, err);

@@ -1,7 +1,7 @@
 /* What a client may know before it sends or starts something: what is wrong with a document or with the files of a job,
  * and which bytes are here already. */
-#include "optimizer/job/check/job_faults.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/checks/job_faults.h"
+#include "optimizer/job/job_outline.h"
 #include "server/endpoints/handlers.h"
 #include "server/endpoints/request_json.h"
 #include "server/http/http_reply.h"
@@ -11,16 +11,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void add_file(void *context, const char *name, const char *role)
-{
-    json_array_append_new(context, json_pack("{s:s,s:s}", "name", name, "role", role));
-}
-
 /* Makes nothing; the answer to a document with faults is no error. */
 void handle_check_document(struct http_request *r)
 {
     struct error err = {0};
-    struct job_document *doc = NULL;
+    struct job_outline outline = {.n_file = 0};
     json_t *body = request_json(r), *files = json_array();
     if (body == NULL) {
         json_decref(files);
@@ -28,8 +23,10 @@ void handle_check_document(struct http_request *r)
     }
     json_decref(body);
     struct job_fault_list *list = calloc(1, sizeof *list);
-    if (list != NULL) job_document_inspect(r->body, r->n_body, &doc, list);
-    if (doc != NULL) job_document_visit_files(doc, add_file, files);
+    if (list != NULL) job_outline_inspect(r->body, r->n_body, &outline, list);
+    for (size_t i = 0; i < outline.n_file; i++)
+        json_array_append_new(files,
+                              json_pack("{s:s,s:s}", "name", outline.file[i].name, "role", outline.file[i].role));
     if (list == NULL) {
         json_decref(files);
         error_set(&err, STATUS_NO_MEMORY, "cannot check the document: out of memory");
@@ -37,7 +34,7 @@ void handle_check_document(struct http_request *r)
     } else
         reply_json(r, MHD_HTTP_OK,
                    json_pack("{s:b,s:o,s:o}", "valid", list->n == 0, "errors", job_faults_json(list), "files", files));
-    job_document_free(doc);
+    job_outline_release(&outline);
     free(list);
 }
 

@@ -1,5 +1,5 @@
-#include "optimizer/job/check/job_faults.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/checks/job_faults.h"
+#include "optimizer/job/job_outline.h"
 #include "server/endpoints/handlers.h"
 #include "server/endpoints/request_json.h"
 #include "server/events/long_poll.h"
@@ -52,12 +52,12 @@ static void reply_job(struct http_request *r, const char *id, unsigned status_co
 static json_t *document_faults(const struct http_request *r)
 {
     struct job_fault_list *list = calloc(1, sizeof *list);
-    struct job_document *doc = NULL;
+    struct job_outline outline = {.n_file = 0};
     json_t *extra = NULL;
     if (list == NULL) return NULL;
-    job_document_inspect(r->body, r->n_body, &doc, list);
+    job_outline_inspect(r->body, r->n_body, &outline, list);
     if (list->n > 0) extra = json_pack("{s:o}", "errors", job_faults_json(list));
-    job_document_free(doc);
+    job_outline_release(&outline);
     free(list);
     return extra;
 }

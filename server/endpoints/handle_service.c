@@ -1,5 +1,5 @@
 #include "base/version.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_limits.h"
 #include "optimizer/job/options/option_json.h"
 #include "optimizer/job/stage_table.h"
 #include "server/endpoints/handlers.h"

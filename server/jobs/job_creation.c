@@ -2,8 +2,8 @@
 #include "base/clock.h"
 #include "base/files/durable.h"
 #include "base/files/foreign_file.h"
-#include "optimizer/job/job_document.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/job/job_outline.h"
 #include "server/cluster/job_change.h"
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_access.h"
@@ -20,11 +20,11 @@
 
 static status check_document(const char *document, size_t n_bytes, char sample[256], struct error *err)
 {
-    struct job_document *doc = NULL;
-    status s = job_document_parse(document, n_bytes, &doc, err);
+    struct job_outline outline = {.n_file = 0};
+    status s = job_outline_read(document, n_bytes, &outline, err);
     if (s != STATUS_OK) return s;
-    snprintf(sample, 256, "%s", doc->sample);
-    job_document_free(doc);
+    snprintf(sample, 256, "%s", outline.sample);
+    job_outline_release(&outline);
     return STATUS_OK;
 }
 

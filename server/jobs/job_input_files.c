@@ -1,6 +1,7 @@
 /* The input files of a job: which files its document names are missing, declarations, and deletion. */
 #include "base/files/durable.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_file_name.h"
+#include "optimizer/job/job_outline.h"
 #include "server/cluster/job_change.h"
 #include "server/jobs/ballast.h"
 #include "server/jobs/inputs/known_input.h"
@@ -29,20 +30,20 @@ static void visit_file(void *context, const char *name, const char *role)
 
 status job_missing_files(struct job_service *v, const struct job_row *row, json_t **out, struct error *err)
 {
-    struct job_document *doc = NULL;
+    struct job_outline outline = {.n_file = 0};
     struct file_row *file = NULL;
     struct missing m = {0};
-    status s = job_document_parse(row->document, strlen(row->document), &doc, err);
+    status s = job_outline_read(row->document, strlen(row->document), &outline, err);
     if (s != STATUS_OK) return s;
     s = store_file_list(v->store, row->id, &file, &m.n_file, err);
     if (s != STATUS_OK) goto out;
     m.file = file;
     m.name = json_array();
-    job_document_visit_files(doc, visit_file, &m);
+    for (size_t i = 0; i < outline.n_file; i++) visit_file(&m, outline.file[i].name, outline.file[i].role);
     *out = m.name;
 out:
     free(file);
-    job_document_free(doc);
+    job_outline_release(&outline);
     return s;
 }
 
@@ -60,11 +61,11 @@ static status check_other_job(struct job_service *v, const struct job_row *row, 
 
 status job_check_adopted(struct job_service *v, const struct job_row *row, struct error *err)
 {
-    struct job_document *doc = NULL;
-    status s = job_document_parse(row->document, strlen(row->document), &doc, err);
-    if (s == STATUS_OK) s = check_other_job(v, row, "geometry.job", doc->geometry_job, err);
-    if (s == STATUS_OK) s = check_other_job(v, row, "fit.profile_job", doc->profile_job, err);
-    job_document_free(doc);
+    struct job_outline outline = {.n_file = 0};
+    status s = job_outline_read(row->document, strlen(row->document), &outline, err);
+    if (s == STATUS_OK) s = check_other_job(v, row, "geometry.job", outline.geometry_job, err);
+    if (s == STATUS_OK) s = check_other_job(v, row, "fit.profile_job", outline.profile_job, err);
+    job_outline_release(&outline);
     return s;
 }
 

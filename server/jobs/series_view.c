@@ -5,7 +5,8 @@
 #include "base/files/durable.h"
 #include "base/json/foreign_json.h"
 #include "base/json/json_member.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_fit_option.h"
+#include "optimizer/job/document/job_limits.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
 

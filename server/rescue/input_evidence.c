@@ -1,5 +1,6 @@
 #include "server/rescue/input_evidence.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_file_name.h"
+#include "optimizer/job/job_outline.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/upload_file.h"
 
@@ -129,14 +130,14 @@ status input_evidence_read(const struct input_request *q, struct file_row **out,
                            struct error *err)
 {
     struct declared d = {0};
-    struct job_document *doc = NULL;
+    struct job_outline outline = {.n_file = 0};
     /* the journal knows what was removed since the backup; where it knows no file, its file records may be lost */
     for (size_t i = 0; i < q->journal->n_file; i++) declare(&d, &q->journal->file[i]);
     for (size_t i = 0; !q->journal->has_job && i < q->n_base; i++) declare(&d, &q->base[i]);
     struct visit v = {q, &d};
-    status s = job_document_parse(q->job->document, strlen(q->job->document), &doc, err);
-    if (s == STATUS_OK) job_document_visit_files(doc, visit_document, &v);
-    job_document_free(doc);
+    status s = job_outline_read(q->job->document, strlen(q->job->document), &outline, err);
+    for (size_t i = 0; i < outline.n_file; i++) visit_document(&v, outline.file[i].name, outline.file[i].role);
+    job_outline_release(&outline);
     if (d.no_memory) s = error_set(err, STATUS_NO_MEMORY, "cannot read job: out of memory");
     *n_complete = 0;
     for (size_t i = 0; s == STATUS_OK && i < d.n; i++) *n_complete += examine(q, &d.file[i]);

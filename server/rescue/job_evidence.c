@@ -1,8 +1,8 @@
 #include "server/rescue/job_evidence.h"
 #include "base/clock.h"
 #include "base/files/foreign_file.h"
-#include "optimizer/job/job_document.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/job/job_outline.h"
 #include "server/jobs/job_paths.h"
 #include "server/rescue/input_evidence.h"
 #include "server/rescue/worker_evidence.h"
@@ -22,14 +22,14 @@ static status read_document(const char *folder, char **text, char sample[256], s
 {
     char path[PATH_BYTES];
     size_t n = 0;
-    struct job_document *doc = NULL;
+    struct job_outline outline = {.n_file = 0};
     path_join(path, folder, JOB_FILE_DOCUMENT, NULL);
     status s = foreign_file_read(folder, JOB_FILE_DOCUMENT, JOB_MAX_DOCUMENT_BYTES, text, &n, err);
     if (s != STATUS_OK) return s;
-    s = job_document_parse(*text, n, &doc, err);
+    s = job_outline_read(*text, n, &outline, err);
     if (s == STATUS_OK) {
-        snprintf(sample, 256, "%s", doc->sample);
-        job_document_free(doc);
+        snprintf(sample, 256, "%s", outline.sample);
+        job_outline_release(&outline);
         return STATUS_OK;
     }
     free(*text);

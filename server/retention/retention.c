@@ -2,7 +2,7 @@
 #include "base/clock.h"
 #include "base/files/disk_use.h"
 #include "base/files/durable.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/job_outline.h"
 #include "server/jobs/job_paths.h"
 #include "server/retention/job_keep.h"
 
@@ -58,11 +58,11 @@ static status add_id(struct id_set *set, const char *id, struct error *err)
 /* Adds the jobs that a document asks for, if it does. */
 static status add_source(struct id_set *set, const char *document, struct error *err)
 {
-    struct job_document *doc = NULL;
-    if (document == NULL || job_document_parse(document, strlen(document), &doc, NULL) != STATUS_OK) return STATUS_OK;
-    status s = add_id(set, doc->geometry_job, err);
-    if (s == STATUS_OK) s = add_id(set, doc->profile_job, err);
-    job_document_free(doc);
+    struct job_outline outline = {.n_file = 0};
+    if (document == NULL || job_outline_read(document, strlen(document), &outline, NULL) != STATUS_OK) return STATUS_OK;
+    status s = add_id(set, outline.geometry_job, err);
+    if (s == STATUS_OK) s = add_id(set, outline.profile_job, err);
+    job_outline_release(&outline);
     return s;
 }
 

@@ -1,4 +1,5 @@
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_file_name.h"
+#include "optimizer/job/job_parse.h"
 #include "tests/fuzz/fuzz_input.h"
 
 #include <stdlib.h>

@@ -6,8 +6,11 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    const struct job_document doc = {
-        .black_sheet = true, .lamp_side_cm = 10, .lamp_distance_cm = 61, .camera_distance_cm = 100, .crop_cm = 1};
+    const struct job_document doc = {.setup.black_sheet = true,
+                                     .setup.lamp_side_cm = 10,
+                                     .setup.lamp_distance_cm = 61,
+                                     .setup.camera_distance_cm = 100,
+                                     .setup.crop_cm = 1};
     struct observation_set o;
     struct error err = {0};
     char *text = malloc(size + 1);

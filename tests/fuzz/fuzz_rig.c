@@ -7,7 +7,8 @@
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     struct job_photograph photograph = {.file = "a.exr", .view = "v"};
-    struct job_document doc = {.n_photograph = 1, .photograph = &photograph, .black_sheet = size % 2 == 1};
+    struct job_document doc = {
+        .rows.n_photograph = 1, .rows.photograph = &photograph, .setup.black_sheet = size % 2 == 1};
     struct lens lens;
     struct marker_board board;
     struct error err = {0};

@@ -2,6 +2,8 @@
 #ifndef SELVEDGE_TESTS_JOB_DOCUMENT_TEXT_H
 #define SELVEDGE_TESTS_JOB_DOCUMENT_TEXT_H
 
+#include "optimizer/job/job_parse.h"
+
 #define PHOTO                                                                                                          \
     "{\"file\":\"p0.exr\",\"set\":\"fit\",\"light_theta_deg\":20,\"light_phi_deg\":0,\"camera_theta_deg\":30,"         \
     "\"camera_phi_deg\":180}"

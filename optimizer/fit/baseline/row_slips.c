@@ -2,7 +2,7 @@
 #include "base/angle.h"
 #include "base/option_id.h"
 #include "optimizer/fit/baseline/plain_brdf.h"
-#include "optimizer/job/check/job_slips.h"
+#include "optimizer/job/checks/job_slips.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,6 +1,7 @@
 #include "optimizer/fit/photographs/measurement_table.h"
 #include "base/option_id.h"
 #include "optimizer/fit/photographs/table/number_table.h"
+#include "optimizer/job/document/job_file_name.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -113,7 +114,7 @@ static status read_row(void *context, struct number_table *t, struct error *err)
                                   t->line, set);
     double light_theta, light_phi, camera_theta, camera_phi, rotation;
     uint32_t n_rotation;
-    status s = cell_polar(t, COLUMN_LIGHT_THETA, !rows->doc->black_sheet, &light_theta, err);
+    status s = cell_polar(t, COLUMN_LIGHT_THETA, !rows->doc->setup.black_sheet, &light_theta, err);
     if (s == STATUS_OK) s = number_table_angle(t, COLUMN_LIGHT_PHI, -360.0, 360.0, &light_phi, err);
     if (s == STATUS_OK) s = cell_polar(t, COLUMN_CAMERA_THETA, false, &camera_theta, err);
     if (s == STATUS_OK) s = number_table_angle(t, COLUMN_CAMERA_PHI, -360.0, 360.0, &camera_phi, err);

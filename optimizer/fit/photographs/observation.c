@@ -100,14 +100,14 @@ struct configuration observation_configuration(const struct job_document *doc, d
         .camera_theta_rad = camera_theta_deg * rad,
         .camera_phi_rad = camera_phi_deg * rad,
         .cloth_rotation_rad = cloth_rotation_deg * rad,
-        .light_distance_m = doc->lamp_distance_cm * cm,
-        .lamp_side_m = doc->lamp_side_cm * cm,
-        .camera_distance_m = doc->camera_distance_cm * cm,
-        .crop_m = doc->crop_cm * cm,
-        .blur_m = doc->camera_blur_mm * 1e-3,
-        .light = doc->lamp_directional ? LIGHT_DIRECTIONAL : LIGHT_SQUARE_LAMP,
-        .camera = doc->camera_far_field ? CAMERA_FAR_FIELD : CAMERA_PERSPECTIVE,
+        .light_distance_m = doc->setup.lamp_distance_cm * cm,
+        .lamp_side_m = doc->setup.lamp_side_cm * cm,
+        .camera_distance_m = doc->setup.camera_distance_cm * cm,
+        .crop_m = doc->setup.crop_cm * cm,
+        .blur_m = doc->setup.camera_blur_mm * 1e-3,
+        .light = doc->setup.lamp_directional ? LIGHT_DIRECTIONAL : LIGHT_SQUARE_LAMP,
+        .camera = doc->setup.camera_far_field ? CAMERA_FAR_FIELD : CAMERA_PERSPECTIVE,
     };
-    memcpy(c.environment_rgb, doc->environment_rgb, sizeof c.environment_rgb);
+    memcpy(c.environment_rgb, doc->setup.environment_rgb, sizeof c.environment_rgb);
     return c;
 }

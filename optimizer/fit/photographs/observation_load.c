@@ -21,21 +21,21 @@ static status load_table(const struct job_document *doc, const char *folder, con
     char path[4096];
     char *text = NULL;
     size_t n = 0;
-    const brdf_reader *reader = brdf_reader_of_name(doc->measurement_file);
-    snprintf(path, sizeof path, "%s/%s", folder, doc->measurement_file);
+    const brdf_reader *reader = brdf_reader_of_name(doc->rows.measurement_file);
+    snprintf(path, sizeof path, "%s/%s", folder, doc->rows.measurement_file);
     if (reader != NULL) return brdf_file_read(reader, path, doc, warn, o, err);
-    if (doc->n_measured_row > 0 || doc->measurement_symmetry != JOB_SYMMETRY_FILE)
+    if (doc->rows.n_measured_row > 0 || doc->rows.measurement_symmetry != JOB_SYMMETRY_FILE)
         return error_set_field(
             err, STATUS_INVALID, OPTION_MEASURED_ROWS,
             "configurations and symmetry are those of a measured BRDF, but '%s' is a table: its rows "
             "say which",
-            doc->measurement_file);
+            doc->rows.measurement_file);
     status s = file_read_all(path, MAX_TABLE_BYTES, &text, &n, err);
     if (s != STATUS_OK) {
         if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_MEASUREMENT_FILE);
         return s;
     }
-    s = measurement_table_parse(text, n, doc->measurement_file, doc, o, err);
+    s = measurement_table_parse(text, n, doc->rows.measurement_file, doc, o, err);
     free(text);
     return s;
 }
@@ -43,13 +43,13 @@ static status load_table(const struct job_document *doc, const char *folder, con
 static status measure_texture(const struct job_document *doc, const struct image *im, struct observation *item,
                               const struct warning_sink *warn, struct error *err)
 {
-    item->n_cell = job_texture_cells(doc);
+    item->n_cell = job_texture_cells(doc->setup.crop_cm, doc->fit.texture_block_mm);
     status s = photograph_contrast(im, item->name, item->n_cell, item->contrast_rgb, item->contrast_se_rgb, err);
     if (s != STATUS_OK) {
         if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_TEXTURE_BLOCK);
         return s;
     }
-    if (!observation_contrast_known(item) && doc->texture_weight > 0.0)
+    if (!observation_contrast_known(item) && doc->fit.texture_weight > 0.0)
         warning_send(
             warn, OPTION_NONE,
             "photograph '%s' is black in one of its channels, so its texture is not compared with the rendering's",
@@ -61,7 +61,7 @@ static status load_photograph(const struct job_document *doc, size_t i, const ch
                               const struct photograph_process *process, const struct warning_sink *warn,
                               struct observation_set *o, struct error *err)
 {
-    const struct job_photograph *p = &doc->photograph[i];
+    const struct job_photograph *p = &doc->rows.photograph[i];
     struct photograph_mean mean = {0};
     struct observation item = {.set = p->set, .weight = p->weight};
     struct image im;
@@ -76,7 +76,7 @@ static status load_photograph(const struct job_document *doc, size_t i, const ch
         return s;
     }
     if (mean.warning[0] != '\0') warning_send(warn, OPTION_NONE, "%s", mean.warning);
-    if (doc->texture_block_mm > 0.0) s = measure_texture(doc, &im, &item, warn, err);
+    if (doc->fit.texture_block_mm > 0.0) s = measure_texture(doc, &im, &item, warn, err);
     image_release(&im);
     if (s != STATUS_OK) return s;
     item.photograph = mean.record;
@@ -146,9 +146,9 @@ status observation_set_load(const struct job_document *doc, const char *folder,
 {
     const struct photograph_process nothing = {0};
     if (process == NULL) process = &nothing;
-    if (doc->measurement_file[0] != '\0') return load_table(doc, folder, warn, o, err);
+    if (doc->rows.measurement_file[0] != '\0') return load_table(doc, folder, warn, o, err);
     size_t first = o->n;
-    for (size_t i = 0; i < doc->n_photograph; i++) {
+    for (size_t i = 0; i < doc->rows.n_photograph; i++) {
         status s = load_photograph(doc, i, folder, process, warn, o, err);
         if (s != STATUS_OK) return s;
     }

@@ -13,7 +13,7 @@
 #define SELVEDGE_OPTIMIZER_PHOTOGRAPH_H
 
 #include "optimizer/fit/photographs/reader/photograph_reader.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_document.h"
 
 /* What became of a file on its way to radiances. */
 struct photograph_record {

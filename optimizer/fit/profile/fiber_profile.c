@@ -3,7 +3,7 @@
 #include "base/files/durable.h"
 #include "base/option_id.h"
 #include "optimizer/fit/photographs/table/number_table.h"
-#include "optimizer/job/check/job_slips.h"
+#include "optimizer/job/checks/job_slips.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -165,10 +165,10 @@ status fiber_profile_load(struct fiber_profile *profile, const struct job_docume
     char path[4096], *text = NULL;
     size_t n = 0;
     *profile = (struct fiber_profile){0};
-    snprintf(path, sizeof path, "%s/%s", folder, doc->profile_file);
+    snprintf(path, sizeof path, "%s/%s", folder, doc->profile.file);
     status s = file_read_all(path, MAX_TABLE_BYTES, &text, &n, err);
     if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, OPTION_PROFILE_FILE);
-    if (s == STATUS_OK) s = fiber_profile_parse(profile, text, n, doc->profile_file, doc->profile_theta_i_deg, err);
+    if (s == STATUS_OK) s = fiber_profile_parse(profile, text, n, doc->profile.file, doc->profile.theta_i_deg, err);
     free(text);
     return s;
 }

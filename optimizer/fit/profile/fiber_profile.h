@@ -13,7 +13,7 @@
 #define SELVEDGE_OPTIMIZER_FIBER_PROFILE_H
 
 #include "base/status.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_document.h"
 
 #include <stdbool.h>
 #include <stddef.h>

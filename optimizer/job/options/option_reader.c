@@ -1,6 +1,8 @@
 #include "optimizer/job/options/option_reader.h"
-#include "optimizer/job/check/job_faults.h"
-#include "optimizer/job/check/job_slips.h"
+#include "optimizer/job/checks/job_faults.h"
+#include "optimizer/job/checks/job_slips.h"
+#include "optimizer/job/checks/option_value.h"
+#include "optimizer/job/document/job_file_name.h"
 #include "optimizer/job/json/json_field.h"
 #include "optimizer/job/options/option_table.h"
 

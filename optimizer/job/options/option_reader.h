@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_OPTIMIZER_OPTION_READER_H
 #define SELVEDGE_OPTIMIZER_OPTION_READER_H
 
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_document.h"
 
 #include <jansson.h>
 

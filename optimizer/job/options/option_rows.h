@@ -2,9 +2,9 @@
 #ifndef SELVEDGE_OPTIMIZER_OPTION_ROWS_H
 #define SELVEDGE_OPTIMIZER_OPTION_ROWS_H
 
-#include "optimizer/job/job_document.h"
-#include "optimizer/job/options/option_checks.h"
-#include "optimizer/job/options/option_table.h"
+#include "optimizer/job/checks/option_checks.h"
+#include "optimizer/job/document/job_document.h"
+#include "optimizer/job/options/option_row.h"
 
 /* Each ends with a row without a path. */
 extern const struct job_option option_rows_cloth[], option_rows_described[], option_rows_setup[], option_rows_camera[],

@@ -1,5 +1,5 @@
 #include "optimizer/worker/check/input_check.h"
-#include "optimizer/job/option_key.h"
+#include "optimizer/job/options/option_key.h"
 
 #include <stdio.h>
 #include <sys/stat.h>

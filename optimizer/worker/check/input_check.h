@@ -3,8 +3,8 @@
 #ifndef SELVEDGE_OPTIMIZER_INPUT_CHECK_H
 #define SELVEDGE_OPTIMIZER_INPUT_CHECK_H
 
-#include "optimizer/job/check/job_faults.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/checks/job_faults.h"
+#include "optimizer/job/document/job_document.h"
 
 #include <stdbool.h>
 

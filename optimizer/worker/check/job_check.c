@@ -1,7 +1,8 @@
 #include "optimizer/worker/check/job_check.h"
 #include "base/files/durable.h"
-#include "optimizer/job/check/job_faults.h"
+#include "optimizer/job/checks/job_faults.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/job/job_parse.h"
 #include "optimizer/worker/check/input_check.h"
 
 #include <stdio.h>

@@ -27,20 +27,20 @@ static const double result_bytes = 1e6, pixel_bytes = 28.0, unfitted_bytes = 3e6
                     fiber_result_bytes = 1.5, cloth_result_bytes = 180.0;
 
 /* The geometry is that of another job, which this one cannot look at before it runs: neither can its size be known. */
-static bool is_adopted(const struct pipeline_context *c) { return c->doc->geometry_job[0] != '\0'; }
+static bool is_adopted(const struct pipeline_context *c) { return c->doc->scan.geometry_job[0] != '\0'; }
 
 /* What the needs of a job go with. */
 static void key_of(const struct pipeline_context *c, const char *what, char key[SPEED_BOOK_KEY_BYTES])
 {
-    const char *cloth = is_adopted(c)           ? "adopted"
-                        : c->doc->has_volume    ? "scan"
-                        : c->doc->cloth != NULL ? "described"
-                                                : "fibers";
-    const char *work = job_document_pictures_only(c->doc)   ? "+pictures"
-                       : job_document_geometry_only(c->doc) ? ""
-                       : c->number.n > 0                    ? "+search"
-                                                            : "+fit";
-    if (job_document_of_profile(c->doc))
+    const char *cloth = is_adopted(c)                       ? "adopted"
+                        : c->doc->scan.given                ? "scan"
+                        : c->doc->cloth.description != NULL ? "described"
+                                                            : "fibers";
+    const char *work = job_document_kind(c->doc) == JOB_OF_PICTURES   ? "+pictures"
+                       : job_document_kind(c->doc) == JOB_OF_GEOMETRY ? ""
+                       : c->number.n > 0                              ? "+search"
+                                                                      : "+fit";
+    if (job_document_kind(c->doc) == JOB_OF_PROFILE)
         snprintf(key, SPEED_BOOK_KEY_BYTES, "need.%s.profile", what);
     else
         snprintf(key, SPEED_BOOK_KEY_BYTES, "need.%s.%s%s", what, cloth, work);
@@ -69,7 +69,7 @@ static void add_input(void *context, const char *name, const char *role)
     worker_folder_path(sum->c->folder, JOB_FOLDER_INPUT, name, path);
     if (stat(path, &file) != 0) return;
     sum->all += (double)file.st_size;
-    if (strcmp(name, sum->c->doc->fiber_file) == 0) sum->fibers = (double)file.st_size;
+    if (strcmp(name, sum->c->doc->cloth.fiber_file) == 0) sum->fibers = (double)file.st_size;
 }
 
 /* Pages and renderings. */
@@ -98,7 +98,7 @@ static struct job_need model_of(const struct pipeline_context *c)
 {
     struct input_bytes input = {.c = c};
     job_document_visit_files(c->doc, add_input, &input);
-    const double n_voxel = c->doc->has_volume && !is_adopted(c) ? pipeline_plan_voxels(c) : 0.0;
+    const double n_voxel = c->doc->scan.given && !is_adopted(c) ? pipeline_plan_voxels(c) : 0.0;
     double geometry_bytes = voxel_bytes * n_voxel;
     if (c->memory_limit_bytes > 0) geometry_bytes = fmin(geometry_bytes, (double)c->memory_limit_bytes);
     const double size = pipeline_plan_cloth_size(c), n_thread = (double)thread_pool_n_thread(c->pool),
@@ -152,7 +152,7 @@ void job_need_begin(struct pipeline_context *c)
     struct worker_status *shown = c->status, *usual; /* readers of the job's own status would see half a plan */
     struct error unused = {0};
     size_t n[3];
-    if (c->doc->n_volume_file > 0 && pipeline_scan_size(c, n, NULL) == STATUS_OK) memcpy(c->geometry.n, n, sizeof n);
+    if (c->doc->scan.n_file > 0 && pipeline_scan_size(c, n, NULL) == STATUS_OK) memcpy(c->geometry.n, n, sizeof n);
     plan_probe_take(c);
     c->usual_wall_s = 0.0;
     if (worker_status_new(c->folder, NULL, &usual, &unused) != STATUS_OK) return;
@@ -196,7 +196,7 @@ static status read_and_plan(struct pipeline_context *c, const struct speed_book 
 {
     struct error fault = {0};
     status s = pipeline_read_inputs(c, &fault);
-    if (s == STATUS_OK && c->doc->n_volume_file > 0) s = pipeline_scan_size(c, c->geometry.n, &fault);
+    if (s == STATUS_OK && c->doc->scan.n_file > 0) s = pipeline_scan_size(c, c->geometry.n, &fault);
     *report = s == STATUS_OK ? needs_json(c, book)
                              : json_pack("{s:{s:s, s:s, s:s}}", "error", "code", status_name(s), "field", fault.field,
                                          "text", fault.text);

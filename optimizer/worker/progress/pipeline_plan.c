@@ -67,10 +67,10 @@ static const double sd_of_fit = 0.5, sd_of_rest = 0.5;
 double pipeline_plan_voxels(const struct pipeline_context *c)
 {
     double n = (double)c->geometry.n[0] * (double)c->geometry.n[1] * (double)c->geometry.n[2];
-    for (size_t i = 0; i < c->doc->n_volume_file && !(c->geometry.n[0] > 0); i++) {
+    for (size_t i = 0; i < c->doc->scan.n_file && !(c->geometry.n[0] > 0); i++) {
         char path[WORKER_PATH_BYTES];
         struct stat file;
-        worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->volume_file[i], path);
+        worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->scan.file[i], path);
         if (stat(path, &file) == 0) n += (double)file.st_size / 1.5;
     }
     return fmax(n, 1.0);
@@ -100,7 +100,7 @@ static double n_material(const struct pipeline_context *c)
 static void plan_fibers(struct pipeline_context *c, size_t i)
 {
     const double n = n_material(c), n_trial = fmin(n, n / pipeline_plan_voxels(c) * SCAN_TRIAL_VOXELS);
-    if (c->doc->trial)
+    if (c->doc->scan.trial)
         plan_voxels(c, i, &trial_stage, n + n_trial);
     else
         plan_voxels(c, i, &fibers_stage, n);
@@ -120,10 +120,10 @@ static double fibers_of_yarn(const struct cloth_description *d, int direction, s
 
 double pipeline_plan_cloth_size(const struct pipeline_context *c)
 {
-    const struct cloth_description *d = c->doc->cloth;
+    const struct cloth_description *d = c->doc->cloth.description;
     double n_fiber[2] = {0.0, 0.0}, width[2] = {0.0, 0.0};
     if (d == NULL) return 0.0;
-    const double times = c->number.n > 0 && c->doc->cloth_final_tiles > 1 ? (double)c->doc->cloth_final_tiles : 1.0;
+    const double times = c->number.n > 0 && c->doc->cloth.final_tiles > 1 ? (double)c->doc->cloth.final_tiles : 1.0;
     if (d->structure == CLOTH_FELT) return felt_fiber_size * (double)d->kind[0].n_fiber * times * times;
     for (int direction = CLOTH_WEFT; direction <= CLOTH_WARP; direction++)
         for (size_t i = 0; i < d->n_yarn[direction]; i++) {
@@ -148,14 +148,14 @@ static void plan_cloth(struct pipeline_context *c, size_t i)
 static const char *kind_of_fit(const struct pipeline_context *c)
 {
     if (c->number.n > 0) return pipeline_correction_applies(c) ? "+correction" : "+cloth";
-    if (c->doc->fit_radius) return "+radius";
-    return c->doc->has_volume ? "+scan" : "";
+    if (c->doc->fit.fit_radius) return "+radius";
+    return c->doc->scan.given ? "+scan" : "";
 }
 
 static double path_budget(const struct pipeline_context *c)
 {
-    const struct method_info *method = method_catalogue_find(c->doc->method);
-    if (c->doc->path_budget > 0) return (double)c->doc->path_budget;
+    const struct method_info *method = method_catalogue_find(c->doc->fit.method);
+    if (c->doc->fit.path_budget > 0) return (double)c->doc->fit.path_budget;
     return method != NULL && method->default_path_budget > 0 ? (double)method->default_path_budget : usual_budget;
 }
 
@@ -163,8 +163,8 @@ double pipeline_plan_usual_paths(const struct pipeline_context *c)
 {
     const double budget = path_budget(c);
     if (c->number.n > 0) return cloth_share * budget;
-    if (c->doc->n_photograph > 0 && c->doc->path_budget > 0) return budget; /* it is used up */
-    return fmin((c->doc->n_photograph > 0 ? noise_row_paths : misfit_row_paths) * (double)c->fitted.n, budget);
+    if (c->doc->rows.n_photograph > 0 && c->doc->fit.path_budget > 0) return budget; /* it is used up */
+    return fmin((c->doc->rows.n_photograph > 0 ? noise_row_paths : misfit_row_paths) * (double)c->fitted.n, budget);
 }
 
 /* Seconds that a path of the fit takes, by how bright its rows are and how thin the cloth is. */
@@ -183,9 +183,9 @@ static void plan_fit(struct pipeline_context *c, size_t i)
 {
     char key[SPEED_BOOK_KEY_BYTES];
     /* a table ends a fit by its misfit, photographs by their noise: both take other shares of what is expected */
-    snprintf(key, sizeof key, "fit.%.40s%s%s.paths", c->doc->method, kind_of_fit(c),
-             c->doc->n_photograph > 0 ? "+photographs" : "+table");
-    const double path_s = usual_s_per_path(c), of_fit = c->doc->has_volume ? fit_share : 1.0;
+    snprintf(key, sizeof key, "fit.%.40s%s%s.paths", c->doc->fit.method, kind_of_fit(c),
+             c->doc->rows.n_photograph > 0 ? "+photographs" : "+table");
+    const double path_s = usual_s_per_path(c), of_fit = c->doc->scan.given ? fit_share : 1.0;
     const double n_path = pipeline_plan_usual_paths(c) * (double)c->n_model;
     const struct job_clock_work work = {.key = key,
                                         .units = n_path * path_s / fit_s_per_path / n_thread(c),
@@ -210,7 +210,7 @@ static double s_per_path(const struct pipeline_context *c)
 /* Paths of a model's fit: of the best one after the fit, before it those that are expected. */
 static double fit_paths(const struct pipeline_context *c)
 {
-    const double n_model = (double)c->n_model, of_fit = c->doc->has_volume ? fit_share : 1.0;
+    const double n_model = (double)c->n_model, of_fit = c->doc->scan.given ? fit_share : 1.0;
     if (isfinite(s_per_path(c))) return (double)c->model[pipeline_best_model(c)].fit.n_path;
     return of_fit * c->fit_path / n_model;
 }
@@ -228,7 +228,7 @@ static double report_paths(const struct pipeline_context *c)
     const double n_fit = fit_paths(c), path_s = s_per_path(c),
                  certificate_path_s = isfinite(path_s) ? path_s : usual_s_per_path(c) / n_thread(c);
     return result_renderings_paths(c, n_fit) + surface_pictures_paths(c) + twin_result_paths(c) +
-           (c->doc->has_volume ? scan_page_paths : page_paths) + c->certificate_s / certificate_path_s;
+           (c->doc->scan.given ? scan_page_paths : page_paths) + c->certificate_s / certificate_path_s;
 }
 
 /* A stage of n_path paths after the fit, which is stage i_fit and counts as a number of paths before it has ended. */
@@ -236,7 +236,7 @@ static void plan_after_fit(struct pipeline_context *c, size_t i, size_t i_fit, d
 {
     static const char *const key[] = {"validation", "report"};
     const char *const own = key[i - i_fit - 1];
-    const double path_s = s_per_path(c), of_fit = c->doc->has_volume ? fit_share : 1.0;
+    const double path_s = s_per_path(c), of_fit = c->doc->scan.given ? fit_share : 1.0;
     if (isfinite(path_s))
         worker_status_plan_own(c->status, i, own, fmax(n_path * path_s, least_s));
     else
@@ -276,13 +276,13 @@ void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
                                            .units = (double)c->n_model / n_thread(c),
                                            .usual_s = usual_profile_s,
                                            .log_sd = sd_of_rest};
-    if (job_document_of_profile(c->doc))
+    if (job_document_kind(c->doc) == JOB_OF_PROFILE)
         worker_status_plan(c->status, i, strcmp(name, "fit") == 0 ? &profile : &rest);
     else if (strcmp(name, "volume") == 0)
-        plan_voxels(c, i, c->doc->hollow_fibers > 0 ? &hollow_stage : &read_stage, pipeline_plan_voxels(c));
+        plan_voxels(c, i, c->doc->scan.hollow_fibers > 0 ? &hollow_stage : &read_stage, pipeline_plan_voxels(c));
     else if (strcmp(name, "orientation") == 0)
         plan_voxels(c, i, reconstruct_redirects(&c->geometry) ? &redirect_stage : &orientation_stage, n_material(c));
-    else if (strcmp(name, "fibers") == 0 && c->doc->has_volume)
+    else if (strcmp(name, "fibers") == 0 && c->doc->scan.given)
         plan_fibers(c, i);
     else if (strcmp(name, "fibers") == 0 && pipeline_plan_cloth_size(c) > 0.0)
         plan_cloth(c, i);
@@ -292,9 +292,9 @@ void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
         plan_fit(c, i);
     else if (strcmp(name, "validation") == 0)
         plan_after_fit(c, i, i - 1, validation_paths(c));
-    else if (strcmp(name, "report") == 0 && job_document_pictures_only(c->doc))
+    else if (strcmp(name, "report") == 0 && job_document_kind(c->doc) == JOB_OF_PICTURES)
         plan_pictures(c, i);
-    else if (strcmp(name, "report") == 0 && job_document_geometry_only(c->doc))
+    else if (strcmp(name, "report") == 0 && job_document_kind(c->doc) == JOB_OF_GEOMETRY)
         plan_voxels(c, i, &report_stage, pipeline_plan_voxels(c));
     else if (strcmp(name, "report") == 0)
         plan_after_fit(c, i, i - 2, report_paths(c));

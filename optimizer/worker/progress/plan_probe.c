@@ -57,8 +57,8 @@ static double path_share_of_file(const struct pipeline_context *c)
     struct stat file;
     struct fiber_set f;
     double share = 1.0;
-    if (c->doc->fiber_file[0] == '\0') return share;
-    worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->fiber_file, path);
+    if (c->doc->cloth.fiber_file[0] == '\0') return share;
+    worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->cloth.fiber_file, path);
     if (stat(path, &file) != 0 || file.st_size > FIBER_FILE_MOST_BYTES) return share;
     fiber_set_init(&f);
     if (fiber_file_read(path, c->doc, &f, NULL) == STATUS_OK) share = plan_probe_path_share(&f);
@@ -68,8 +68,8 @@ static double path_share_of_file(const struct pipeline_context *c)
 
 void plan_probe_take(struct pipeline_context *c)
 {
-    const bool fits =
-        !job_document_geometry_only(c->doc) && !job_document_pictures_only(c->doc) && !job_document_of_profile(c->doc);
+    const bool fits = job_document_kind(c->doc) != JOB_OF_GEOMETRY && job_document_kind(c->doc) != JOB_OF_PICTURES &&
+                      job_document_kind(c->doc) != JOB_OF_PROFILE;
     c->certificate_s = 0.0;
     for (size_t i = 0; fits && i < c->n_model; i++) c->certificate_s += certificate_s(&c->model[i]);
     c->path_share = path_share_of_file(c);

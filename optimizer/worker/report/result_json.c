@@ -228,7 +228,7 @@ static json_t *row_json(const struct pipeline_context *c, const struct pipeline_
     put_row_error(row, c, m, i);
     json_object_set_new(row, "rendering_png", json_string(png));
     json_object_set_new(row, "rendering_exr", json_string(exr));
-    json_object_set_new(row, "photograph_png", c->doc->n_photograph > 0 ? json_string(photograph) : json_null());
+    json_object_set_new(row, "photograph_png", c->doc->rows.n_photograph > 0 ? json_string(photograph) : json_null());
     if (o->photograph.info.format != NULL)
         json_object_set_new(row, "photograph", photograph_record_json(&o->photograph));
     result_row_options(c, m, i, row);
@@ -251,7 +251,7 @@ static json_t *radius_json(const struct pipeline_context *c)
 {
     const struct pipeline_radius *r = &c->radius;
     const double um = 1e6;
-    if (!c->doc->fit_radius) return json_null();
+    if (!c->doc->fit.fit_radius) return json_null();
     json_t *curve = json_array();
     for (size_t i = 0; i < r->curve.n_point; i++) {
         const struct noisy_point *p = &r->curve.point[i];
@@ -304,7 +304,7 @@ static json_t *definitions_json(void)
 /* Adds what every job has, also one of geometry only; a fiber without a cloth has neither geometry nor verdict. */
 static void put_job(json_t *json, struct pipeline_context *c)
 {
-    const bool of_cloth = !job_document_of_profile(c->doc);
+    const bool of_cloth = job_document_kind(c->doc) != JOB_OF_PROFILE;
     json_object_set_new(json, "definitions", definitions_json());
     json_object_set_new(json, "verdict", verdict_json(&c->verdict));
     json_object_set_new(json, "geometry", of_cloth ? result_geometry_json(c) : json_null());
@@ -324,7 +324,7 @@ static json_t *result_json(struct pipeline_context *c, picture_name *picture)
     for (size_t i = 0; i < c->observation.n; i++) json_array_append_new(rows, row_json(c, best, i, picture[i]));
     for (size_t i = 0; i < c->n_model; i++) json_array_append_new(models, model_json(c, i));
     json_t *json = json_pack("{s:i, s:s, s:s, s:s, s:I}", "format", 1, "sample", c->doc->sample, "model",
-                             best->appearance.id, "method", c->doc->method, "seed", (json_int_t)c->doc->seed);
+                             best->appearance.id, "method", c->doc->fit.method, "seed", (json_int_t)c->doc->fit.seed);
     json_object_set_new(json, "chosen_by", json_string(pipeline_choice_id(pipeline_choice(c))));
     put_fit(json, c, best);
     json_object_set_new(json, "rows", rows);
@@ -370,7 +370,7 @@ status result_pictures_json_write(struct pipeline_context *c, struct error *err)
     const struct pipeline_model *m = c->model;
     json_t *json = json_pack("{s:i, s:s, s:s, s:n, s:o, s:[], s:[], s:I}", "format", 1, "sample", c->doc->sample,
                              "model", m->appearance.id, "method", "parameters", result_parameters_json(m), "rows",
-                             "models", "seed", (json_int_t)c->doc->seed);
+                             "models", "seed", (json_int_t)c->doc->fit.seed);
     json_object_set(json, "pictures", c->surface_pictures);
     return result_json_finish(c, json, err);
 }

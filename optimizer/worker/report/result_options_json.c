@@ -39,7 +39,8 @@ static json_t *texture_json(const struct pipeline_context *c, const struct pipel
     const struct observation *o = &c->contrast.item[i];
     double rendered[3], se[3];
     pipeline_rendered_contrast(m, i, rendered, se);
-    return json_pack("{s:f, s:I, s:o, s:o, s:o, s:o}", "block_mm", job_texture_cell_mm(c->doc), "blocks_a_side",
+    return json_pack("{s:f, s:I, s:o, s:o, s:o, s:o}", "block_mm",
+                     job_texture_cell_mm(c->doc->setup.crop_cm, c->doc->fit.texture_block_mm), "blocks_a_side",
                      (json_int_t)o->n_cell, "measured", rgb_json(o->mean_rgb), "measured_se", rgb_json(o->se_rgb),
                      "rendered", rgb_json(rendered), "rendered_se", rgb_json(se));
 }
@@ -105,7 +106,7 @@ static json_t *certificate_json(const struct pipeline_model *m)
 static json_t *candidate_json(const struct pipeline_context *c, const struct pipeline_model *m, size_t rank)
 {
     const struct pipeline_candidate *k = &m->candidate[rank];
-    const struct job_candidate *g = &c->doc->candidate[k->i_candidate];
+    const struct job_candidate *g = &c->doc->fit.candidate[k->i_candidate];
     json_t *determines = json_array();
     for (size_t p = 0; p < m->sets.info.n_param; p++)
         if (k->score.determines[p]) json_array_append_new(determines, json_string(m->sets.info.param[p].name));
@@ -121,7 +122,7 @@ static json_t *candidate_json(const struct pipeline_context *c, const struct pip
 static json_t *candidates_json(const struct pipeline_context *c, const struct pipeline_model *m)
 {
     json_t *list = json_array();
-    for (size_t i = 0; m->candidate != NULL && i < c->doc->n_candidate; i++)
+    for (size_t i = 0; m->candidate != NULL && i < c->doc->fit.n_candidate; i++)
         json_array_append_new(list, candidate_json(c, m, i));
     return list;
 }
@@ -150,8 +151,9 @@ static void print_textures(const struct pipeline_context *c, const struct pipeli
 {
     if (c->contrast.n == 0) return;
     fprintf(out, "\ntexture: scatter of the means of %.3g mm blocks, per cent of the mean%s\n%-14s %-8s %9s %9s %s\n",
-            job_texture_cell_mm(c->doc), c->doc->texture_weight > 0.0 ? "" : " (not fitted: its weight is 0)", "row",
-            "set", "measured", "rendered", "+-");
+            job_texture_cell_mm(c->doc->setup.crop_cm, c->doc->fit.texture_block_mm),
+            c->doc->fit.texture_weight > 0.0 ? "" : " (not fitted: its weight is 0)", "row", "set", "measured",
+            "rendered", "+-");
     for (size_t i = 0; i < c->contrast.n; i++) {
         const struct observation *o = &c->contrast.item[i];
         double rendered[3], se[3];
@@ -174,7 +176,7 @@ void result_summary_options(const struct pipeline_context *c, const struct pipel
         check->error[check->worst], check->noise[check->worst], check->noise_se[check->worst],
         m->sets.info.param[check->worst].name);
     if (m->candidate != NULL) {
-        const struct job_candidate *best = &c->doc->candidate[m->candidate[0].i_candidate];
+        const struct job_candidate *best = &c->doc->fit.candidate[m->candidate[0].i_candidate];
         fprintf(out,
                 "next photograph: lamp %.0f (phi %.0f), camera %.0f (phi %.0f), cloth turned by %.0f degrees would add "
                 "%.2f nats\n",

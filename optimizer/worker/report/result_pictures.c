@@ -99,7 +99,7 @@ static status write_slice(const struct pipeline_context *c, int axis, struct err
 status result_geometry_write(struct pipeline_context *c, struct error *err)
 {
     status s = write_fibers(c, err);
-    if (s != STATUS_OK || !c->doc->has_volume) return s;
+    if (s != STATUS_OK || !c->doc->scan.given) return s;
     s = write_volumes(c, err);
     if (s == STATUS_OK) s = pipeline_need_volume(c, err);
     for (int axis = 0; axis < 3 && s == STATUS_OK; axis++) s = write_slice(c, axis, err);
@@ -127,7 +127,7 @@ static status write_photograph(const struct pipeline_context *c, size_t i, const
     char path[WORKER_PATH_BYTES];
     struct image im;
     worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, path);
-    status s = photograph_develop(&c->process, path, &c->doc->photograph[i], &im, NULL, err);
+    status s = photograph_develop(&c->process, path, &c->doc->rows.photograph[i], &im, NULL, err);
     if (s != STATUS_OK) return s;
     s = result_image_write(c, &im, "photographs", name, exposure, true, err);
     image_release(&im);
@@ -140,15 +140,15 @@ static const double picture_share = 0.5, least_sample = 2.0, most_sample = 16.0,
 
 size_t result_picture_px(const struct pipeline_context *c, double n_fit_path)
 {
-    const double sample = c->doc->render_sample > 0 ? (double)c->doc->render_sample : least_sample;
-    if (c->doc->render_px > 0) return c->doc->render_px;
+    const double sample = c->doc->results.render_sample > 0 ? (double)c->doc->results.render_sample : least_sample;
+    if (c->doc->results.render_px > 0) return c->doc->results.render_px;
     double px = floor(sqrt(picture_share * n_fit_path / (sample * (double)c->observation.n)));
     return (size_t)fmin(fmax(px, least_px), (double)RESULT_PICTURE_PX);
 }
 
 size_t result_picture_samples(const struct pipeline_context *c, double n_fit_path)
 {
-    if (c->doc->render_sample > 0) return c->doc->render_sample;
+    if (c->doc->results.render_sample > 0) return c->doc->results.render_sample;
     const double px = (double)result_picture_px(c, n_fit_path), n = (double)c->observation.n;
     double paths = picture_share * n_fit_path;
     return (size_t)fmin(fmax(floor(paths / (px * px * n)), least_sample), most_sample);
@@ -178,7 +178,7 @@ static status write_rendering(struct pipeline_context *c, size_t i, const char *
                                      .width = px,
                                      .height = px,
                                      .n_sample = result_picture_samples(c, (double)m->fit.n_path),
-                                     .seed = c->doc->seed ^ 0x70696374757265u,
+                                     .seed = c->doc->fit.seed ^ 0x70696374757265u,
                                      .stream = (uint32_t)i};
     status s = render_run(&q, c->pool, progress, &im, err);
     if (s != STATUS_OK) return s;
@@ -195,11 +195,11 @@ status result_renderings_write(struct pipeline_context *c, double from, double t
     size_t n = c->observation.n;
     status s = result_picture_names(&c->observation, &name, err);
     if (s == STATUS_OK) s = make_folder(c, "renderings", err);
-    if (s == STATUS_OK && c->doc->n_photograph > 0) s = make_folder(c, "photographs", err);
+    if (s == STATUS_OK && c->doc->rows.n_photograph > 0) s = make_folder(c, "photographs", err);
     if (s == STATUS_OK && c->process.chart_picture.pixel != NULL) s = make_folder(c, "pictures", err);
     if (s == STATUS_OK && c->process.chart_picture.pixel != NULL)
         s = result_image_write(c, &c->process.chart_picture, "pictures", "color-chart", 1.0, false, err);
-    for (size_t i = 0; i < c->doc->n_photograph && s == STATUS_OK; i++)
+    for (size_t i = 0; i < c->doc->rows.n_photograph && s == STATUS_OK; i++)
         s = write_photograph(c, i, name[i], exposure, err);
     for (size_t i = 0; i < n && s == STATUS_OK; i++) {
         struct progress_part part;

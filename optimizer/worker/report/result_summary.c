@@ -156,10 +156,10 @@ static void print_cloth(const struct pipeline_context *c, FILE *out)
 {
     fprintf(out, "cloth    %zu fibers, %zu vertices, tile %.3f x %.3f mm\n", c->fiber.n_fiber, c->fiber.n_vertex,
             1e3 * c->fiber.tile_size_m[0], 1e3 * c->fiber.tile_size_m[1]);
-    if (c->doc->has_volume)
+    if (c->doc->scan.given)
         fprintf(out, "         the scan shows single fibers: %s, %.0f %% of their length is sure\n",
                 grade_verdict_name(c->geometry.grade.verdict), 100.0 * c->geometry.grade.safe_share);
-    if (c->doc->has_volume)
+    if (c->doc->scan.given)
         fprintf(out,
                 "         they explain the material to %.3f (Dice); density steps at the seams x %.2f, y %.2f of those "
                 "inside\n",
@@ -196,12 +196,12 @@ static void print_summary(struct pipeline_context *c, FILE *out)
     fprintf(out, "%s\n\n", c->doc->sample);
     print_verdict(&c->verdict, out);
     if (c->n_model > 1) print_comparison(c, out);
-    fprintf(out, "model    %s (%s)\nmethod   %s\n", m->appearance.id, m->appearance.title, c->doc->method);
+    fprintf(out, "model    %s (%s)\nmethod   %s\n", m->appearance.id, m->appearance.title, c->doc->fit.method);
     fprintf(out, "fit      %s: %s\n", m->fit.converged ? "converged" : "NOT CONVERGED", m->fit.reason);
     fprintf(out, "         %zu steps, %.3g paths, %.0f s\n", m->fit.n_step, (double)m->fit.n_path, m->fit.wall_s);
     print_cloth(c, out);
     result_numbers_print(c, m, out);
-    if (c->doc->fit_radius)
+    if (c->doc->fit.fit_radius)
         fprintf(out, "radius   %.4g +- %.2g um, it was %.4g um%s%s\n\n", 1e6 * c->radius.radius_m, 1e6 * c->radius.se_m,
                 1e6 * c->radius.start_m, c->radius.curve.determined ? "" : " not determined",
                 c->radius.curve.at_bound ? " (at the edge of its range)" : "");
@@ -234,8 +234,8 @@ static void print_pictures(struct pipeline_context *c, FILE *out)
             m->appearance.id, m->appearance.title);
     print_cloth(c, out);
     print_parameters(m, out);
-    fprintf(out, "\n%zu picture%s in the folder pictures\n", c->doc->n_surface_picture,
-            c->doc->n_surface_picture == 1 ? "" : "s");
+    fprintf(out, "\n%zu picture%s in the folder pictures\n", c->doc->results.n_surface_picture,
+            c->doc->results.n_surface_picture == 1 ? "" : "s");
     print_warnings(c, out);
 }
 
@@ -257,11 +257,11 @@ status result_summary_write(struct pipeline_context *c, struct error *err)
     size_t n = 0;
     FILE *out = open_memstream(&text, &n);
     if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the summary: out of memory");
-    if (job_document_of_profile(c->doc))
+    if (job_document_kind(c->doc) == JOB_OF_PROFILE)
         print_profile(c, out);
-    else if (job_document_geometry_only(c->doc))
+    else if (job_document_kind(c->doc) == JOB_OF_GEOMETRY)
         print_geometry(c, out);
-    else if (job_document_pictures_only(c->doc))
+    else if (job_document_kind(c->doc) == JOB_OF_PICTURES)
         print_pictures(c, out);
     else
         print_summary(c, out);

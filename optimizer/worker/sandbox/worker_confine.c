@@ -1,4 +1,5 @@
 #include "optimizer/worker/sandbox/worker_confine.h"
+#include "optimizer/job/job_parse.h"
 
 #include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
@@ -111,7 +112,7 @@ static void prepare(const struct worker_folder *folder, const struct job_documen
 {
     c->pdf.order_fd = -1;
     if (doc == NULL) return;
-    if (doc->export_pdf) report_pdf_start_helper(folder, &c->pdf);
+    if (doc->results.export_pdf) report_pdf_start_helper(folder, &c->pdf);
     pipeline_link_geometry(folder, doc);
     pipeline_copy_profile(folder, doc);
 }

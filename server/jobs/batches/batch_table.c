@@ -1,7 +1,7 @@
 #include "server/jobs/batches/batch_table.h"
 #include "base/json/document_path.h"
 #include "base/json/json_depth.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/job_outline.h"
 #include "server/jobs/job_access.h"
 
 #include <stdio.h>
@@ -86,12 +86,12 @@ static void visit_file(void *context, const char *name, const char *role)
 }
 
 /* Every file that the document names is in the row, and the other way round. */
-static status match_files(struct batch_sample *sample, const struct job_document *doc, struct error *err)
+static status match_files(struct batch_sample *sample, const struct job_outline *outline, struct error *err)
 {
     struct visit visit = {.sample = sample, .named = calloc(sample->n_file + 1, sizeof(bool))};
     status s = STATUS_OK;
     if (visit.named == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the batch: out of memory");
-    job_document_visit_files(doc, visit_file, &visit);
+    for (size_t i = 0; i < outline->n_file; i++) visit_file(&visit, outline->file[i].name, outline->file[i].role);
     if (visit.missing[0] != '\0')
         s = error_set_field(err, STATUS_INVALID, "files", "its document names file '%s', which its row does not have",
                             visit.missing);
@@ -194,10 +194,10 @@ static status make_document(struct reading *r, size_t i, struct error *err)
 /* Whether the document is one of a job, with the files of the row. */
 static status check_document(struct reading *r, size_t i, struct error *err)
 {
-    struct job_document *doc = NULL;
-    status s = job_document_read(r->document[i], &doc, err);
-    if (s == STATUS_OK) s = match_files(&r->table->sample[i], doc, err);
-    job_document_free(doc);
+    struct job_outline outline = {.n_file = 0};
+    status s = job_outline_take(r->document[i], &outline, err);
+    if (s == STATUS_OK) s = match_files(&r->table->sample[i], &outline, err);
+    job_outline_release(&outline);
     return s;
 }
 

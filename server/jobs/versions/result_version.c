@@ -4,7 +4,7 @@
 #include "base/files/file_tree.h"
 #include "base/files/foreign_file.h"
 #include "base/json/foreign_json.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_document.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/job_view.h"

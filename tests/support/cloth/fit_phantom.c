@@ -148,8 +148,10 @@ void fit_phantom_render(const struct fit_phantom *f, const double *param, size_t
 
 static void views(struct phantom_view_table *t, struct configuration *configuration)
 {
-    static const struct job_document set_up = {
-        .lamp_side_cm = 10.0, .lamp_distance_cm = 61.0, .camera_distance_cm = 100.0, .crop_cm = 1.0};
+    static const struct job_document set_up = {.setup.lamp_side_cm = 10.0,
+                                               .setup.lamp_distance_cm = 61.0,
+                                               .setup.camera_distance_cm = 100.0,
+                                               .setup.crop_cm = 1.0};
     phantom_view_table_builtin(t);
     for (size_t n = 0; n < FIT_N_VIEW; n++) {
         const struct job_photograph *v = &t->view[n];

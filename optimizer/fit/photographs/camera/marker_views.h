@@ -5,7 +5,7 @@
 
 #include "optimizer/fit/photographs/camera/lens.h"
 #include "optimizer/fit/photographs/camera/marker_board.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_document.h"
 
 /* Where the camera of a picture was, and where the orbit center is in it. */
 struct marker_view {

@@ -12,7 +12,7 @@
 
 #include "base/warning.h"
 #include "optimizer/fit/photographs/camera/noise_record.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_document.h"
 
 struct noise_frames {
     const char *const *dark, *const *flat; /* paths */

@@ -62,19 +62,19 @@ static status add_dark(struct photograph_process *k, const char *name, double ex
 static status load_dark(struct photograph_process *k, const struct job_document *doc, const char *folder,
                         struct error *err)
 {
-    if (doc->n_dark_frame == 0) return STATUS_OK;
-    k->dark = calloc(doc->n_dark_frame, sizeof *k->dark);
+    if (doc->setup.n_dark_frame == 0) return STATUS_OK;
+    k->dark = calloc(doc->setup.n_dark_frame, sizeof *k->dark);
     if (k->dark == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read dark frames: out of memory");
     const struct job_photograph plain =
-        photograph_plain(doc->n_photograph > 0 ? doc->photograph[0].transfer : JOB_TRANSFER_LINEAR);
+        photograph_plain(doc->rows.n_photograph > 0 ? doc->rows.photograph[0].transfer : JOB_TRANSFER_LINEAR);
     status s = STATUS_OK;
-    for (size_t i = 0; i < doc->n_dark_frame && s == STATUS_OK; i++) {
+    for (size_t i = 0; i < doc->setup.n_dark_frame && s == STATUS_OK; i++) {
         char path[PATH_BYTES];
         struct image im;
         struct photograph_record r;
-        snprintf(path, sizeof path, "%s/%s", folder, doc->dark_frame[i]);
+        snprintf(path, sizeof path, "%s/%s", folder, doc->setup.dark_frame[i]);
         s = photograph_read_values(path, &plain, &im, &r, err);
-        if (s == STATUS_OK) s = add_dark(k, doc->dark_frame[i], r.info.exposure_s, &im, err);
+        if (s == STATUS_OK) s = add_dark(k, doc->setup.dark_frame[i], r.info.exposure_s, &im, err);
     }
     for (size_t i = 0; i < k->n_dark && s == STATUS_OK; i++) {
         struct image *im = &k->dark[i].image;
@@ -315,18 +315,18 @@ static status load_chart(struct photograph_process *k, const struct job_document
 {
     struct image im;
     struct photograph_record r;
-    status s = photograph_develop(k, folder, &doc->chart, &im, &r, err);
+    status s = photograph_develop(k, folder, &doc->setup.chart, &im, &r, err);
     if (s != STATUS_OK) return s;
-    memcpy(k->chart.corner_px, doc->chart_corner_px, sizeof k->chart.corner_px);
-    k->chart.from_2014 = doc->chart_from_2014;
+    memcpy(k->chart.corner_px, doc->setup.chart_corner_px, sizeof k->chart.corner_px);
+    k->chart.from_2014 = doc->setup.chart_from_2014;
     s = color_chart_find(&im, k->chart.corner_px, &k->chart.found_automatically, err);
     if (s == STATUS_NOT_FOUND)
         s = error_set(err, STATUS_INVALID, "no chart was found: give the corners of its patches ('corners_px')");
     if (s == STATUS_OK)
-        s = color_chart_measure(&k->chart, &im, saturation_of(&r), doc->chart.light_theta_deg * RAD_PER_DEG, err);
+        s = color_chart_measure(&k->chart, &im, saturation_of(&r), doc->setup.chart.light_theta_deg * RAD_PER_DEG, err);
     if (s == STATUS_OK) s = color_chart_picture(&k->chart, &im, &k->chart_picture, err);
     image_release(&im);
-    if (s != STATUS_OK) return error_prefix(err, s, "cannot use color chart '%s'", doc->chart.file);
+    if (s != STATUS_OK) return error_prefix(err, s, "cannot use color chart '%s'", doc->setup.chart.file);
     memcpy(k->matrix, k->chart.matrix, sizeof k->matrix);
     memcpy(k->matrix_cov, k->chart.matrix_cov, sizeof k->matrix_cov);
     k->color_info = r.info;
@@ -339,16 +339,16 @@ static status load_white(struct photograph_process *k, const struct job_document
 {
     struct image im;
     struct photograph_mean mean = {0};
-    status s = photograph_develop(k, folder, &doc->white, &im, &mean.record, err);
+    status s = photograph_develop(k, folder, &doc->setup.white, &im, &mean.record, err);
     if (s != STATUS_OK) return s;
-    s = photograph_measure_image(&im, doc->white.file, doc->white.transfer, &mean, err);
+    s = photograph_measure_image(&im, doc->setup.white.file, doc->setup.white.transfer, &mean, err);
     image_release(&im);
-    double cos_theta = cos(doc->white.light_theta_deg * RAD_PER_DEG);
+    double cos_theta = cos(doc->setup.white.light_theta_deg * RAD_PER_DEG);
     for (size_t c = 0; c < 3 && s == STATUS_OK; c++) {
         if (!(mean.mean_rgb[c] > 0.0))
             return error_set(err, STATUS_INVALID, "cannot use white reference '%s': it is black in a channel",
-                             doc->white.file);
-        k->matrix[4 * c] = doc->white_reflectance[c] * cos_theta / mean.mean_rgb[c];
+                             doc->setup.white.file);
+        k->matrix[4 * c] = doc->setup.white_reflectance[c] * cos_theta / mean.mean_rgb[c];
         k->matrix_cov[c][4 * c] = pow(k->matrix[4 * c] * mean.se_rgb[c] / mean.mean_rgb[c], 2.0);
     }
     k->color_info = mean.record.info;
@@ -358,11 +358,11 @@ static status load_white(struct photograph_process *k, const struct job_document
 static status load_color(struct photograph_process *k, const struct job_document *doc, const char *folder,
                          struct error *err)
 {
-    if (!doc->has_color) return STATUS_OK;
-    status s = doc->has_chart ? load_chart(k, doc, folder, err) : load_white(k, doc, folder, err);
+    if (!doc->setup.has_color) return STATUS_OK;
+    status s = doc->setup.has_chart ? load_chart(k, doc, folder, err) : load_white(k, doc, folder, err);
     k->has_color = s == STATUS_OK;
     if (s != STATUS_OK && err != NULL)
-        snprintf(err->field, sizeof err->field, doc->has_chart ? OPTION_COLOR_CHART : OPTION_COLOR_WHITE);
+        snprintf(err->field, sizeof err->field, doc->setup.has_chart ? OPTION_COLOR_CHART : OPTION_COLOR_WHITE);
     return s;
 }
 
@@ -371,14 +371,14 @@ status photograph_process_load(struct photograph_process *k, struct job_document
 {
     char path[PATH_BYTES];
     status s = STATUS_OK;
-    if (doc->rig_file[0] != '\0') {
-        snprintf(path, sizeof path, "%s/%s", folder, doc->rig_file);
+    if (doc->setup.rig_file[0] != '\0') {
+        snprintf(path, sizeof path, "%s/%s", folder, doc->setup.rig_file);
         s = rig_apply(path, doc, &k->lens, &k->board, err);
         if (s == STATUS_OK) s = marker_views_apply(&k->board, &k->lens, folder, doc, err);
     }
-    k->lamp_distance_cm = doc->lamp_directional ? NAN : doc->lamp_distance_cm;
-    if (s == STATUS_OK && doc->noise_file[0] != '\0') {
-        snprintf(path, sizeof path, "%s/%s", folder, doc->noise_file);
+    k->lamp_distance_cm = doc->setup.lamp_directional ? NAN : doc->setup.lamp_distance_cm;
+    if (s == STATUS_OK && doc->setup.noise_file[0] != '\0') {
+        snprintf(path, sizeof path, "%s/%s", folder, doc->setup.noise_file);
         s = noise_record_read(path, &k->noise, err);
         k->has_noise = s == STATUS_OK;
         if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, OPTION_CAMERA_NOISE);

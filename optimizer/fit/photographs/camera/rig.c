@@ -2,7 +2,7 @@
 
 #include "base/files/durable.h"
 #include "base/option_id.h"
-#include "optimizer/job/check/job_slips.h"
+#include "optimizer/job/checks/job_slips.h"
 #include "optimizer/job/json/json_field.h"
 
 #include <math.h>
@@ -65,7 +65,7 @@ static status text_of(const struct json_field *f, const char *key, char out[64],
 static status apply_view(const struct json_field *rig, struct job_document *doc, size_t i, struct error *err)
 {
     static const char *const key[] = {"lamp", "camera", "cloth_rotation_deg", NULL};
-    struct job_photograph *p = &doc->photograph[i];
+    struct job_photograph *p = &doc->rows.photograph[i];
     struct json_field views, f, lamps, cameras;
     struct station lamp, camera = {NAN, NAN, NAN}; /* by markers: not known yet */
     char lamp_name[64], camera_name[64], field[64];
@@ -87,7 +87,7 @@ static status apply_view(const struct json_field *rig, struct job_document *doc,
     if (s == STATUS_OK) s = json_field_object(rig, "cameras", &cameras, &present, err);
     if (s == STATUS_OK && !by_markers) s = read_station(&cameras, camera_name, 89.999, &camera, err);
     if (s != STATUS_OK) return s;
-    if (lamp.theta_deg >= 90.0 && (doc->black_sheet || lamp.theta_deg == 90.0))
+    if (lamp.theta_deg >= 90.0 && (doc->setup.black_sheet || lamp.theta_deg == 90.0))
         return error_set(
             err, STATUS_INVALID,
             "'lamps.%s' is at %g degrees from the normal: allowed are 0 to below 90 (above 90, from behind, "
@@ -234,8 +234,8 @@ static status apply(const json_t *json, struct job_document *doc, struct lens *l
     if (s == STATUS_OK && present) s = read_distortion(&f, lens, err);
     if (s == STATUS_OK) s = read_board(&rig, board, err);
     if (s == STATUS_OK) s = check_radians(&rig, err);
-    for (size_t i = 0; i < doc->n_photograph && s == STATUS_OK; i++)
-        if (doc->photograph[i].view[0] != '\0') s = apply_view(&rig, doc, i, err);
+    for (size_t i = 0; i < doc->rows.n_photograph && s == STATUS_OK; i++)
+        if (doc->rows.photograph[i].view[0] != '\0') s = apply_view(&rig, doc, i, err);
     return s;
 }
 

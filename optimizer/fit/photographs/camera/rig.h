@@ -24,7 +24,7 @@
 
 #include "optimizer/fit/photographs/camera/lens.h"
 #include "optimizer/fit/photographs/camera/marker_board.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_document.h"
 
 /* Reads the rig and gives every photograph of the document that names a view the angles and distances of that view.
  * STATUS_INVALID / STATUS_FORMAT with a text that names file and key; err->field is an option id where a photograph is

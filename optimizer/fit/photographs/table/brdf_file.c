@@ -108,7 +108,7 @@ static status add_row(const brdf_reader *r, const void *handle, const char *name
     snprintf(text, sizeof text,
              "measured BRDF '%s' has no value for the lamp at (%g, %g) and the camera at (%g, %g) degrees", name,
              row->light_theta_deg, row->light_phi_deg, row->camera_theta_deg, row->camera_phi_deg);
-    if (row->set == JOB_SET_FIT && doc->n_measured_row > 0)
+    if (row->set == JOB_SET_FIT && doc->rows.n_measured_row > 0)
         return error_set_field(err, STATUS_INVALID, OPTION_MEASUREMENT_FILE, "%s", text);
     warning_send(warn, OPTION_MEASUREMENT_FILE, "%s: the %s row is left out", text,
                  row->set == JOB_SET_FIT ? "fitted" : "held-out");
@@ -156,10 +156,11 @@ static status add_rows(const brdf_reader *r, const void *handle, const char *nam
                        const struct warning_sink *warn, struct observation_set *o, struct error *err)
 {
     status s = STATUS_OK;
-    if (doc->n_measured_row == 0 && r->measured != NULL) return add_measured_rows(r, handle, name, doc, warn, o, err);
-    if (doc->n_measured_row == 0) return add_default_rows(r, handle, name, doc, warn, o, err);
-    for (size_t i = 0; i < doc->n_measured_row && s == STATUS_OK; i++)
-        s = add_row(r, handle, name, doc, &doc->measured_row[i], warn, o, err);
+    if (doc->rows.n_measured_row == 0 && r->measured != NULL)
+        return add_measured_rows(r, handle, name, doc, warn, o, err);
+    if (doc->rows.n_measured_row == 0) return add_default_rows(r, handle, name, doc, warn, o, err);
+    for (size_t i = 0; i < doc->rows.n_measured_row && s == STATUS_OK; i++)
+        s = add_row(r, handle, name, doc, &doc->rows.measured_row[i], warn, o, err);
     return s;
 }
 
@@ -168,7 +169,7 @@ status brdf_file_read(const brdf_reader *r, const char *path, const struct job_d
 {
     void *handle = NULL;
     const char *name = path_file_name(path);
-    status s = r->open(path, doc->measurement_symmetry, &handle, err);
+    status s = r->open(path, doc->rows.measurement_symmetry, &handle, err);
     if (s != STATUS_OK) {
         if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_MEASUREMENT_FILE);
         return s;

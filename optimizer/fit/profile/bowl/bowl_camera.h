@@ -8,7 +8,7 @@
 #define SELVEDGE_OPTIMIZER_BOWL_CAMERA_H
 
 #include "optimizer/fit/photographs/camera/lens.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_document.h"
 
 struct bowl_camera {
     double position_mm[3], axis[3][3]; /* rows of A: to the right and down in the picture, and away from the camera */

@@ -53,13 +53,13 @@ static status same_size(const struct bowl_pictures *p, size_t i, const char *nam
 {
     if (im->width == p->width && im->height == p->height) return STATUS_OK;
     return bowl_pictures_error(i, err, "cannot use '%s' of the bowl: it has %zu x %zu pixels, and '%s' has %zu x %zu",
-                               name, im->width, im->height, p->doc->bowl.photograph[0].picture.file, p->width,
+                               name, im->width, im->height, p->doc->profile.bowl.photograph[0].picture.file, p->width,
                                p->height);
 }
 
 static status first_photograph(struct bowl_pictures *p, struct error *err)
 {
-    const struct job_bowl *b = &p->doc->bowl;
+    const struct job_bowl *b = &p->doc->profile.bowl;
     p->width = p->photograph.width;
     p->height = p->photograph.height;
     status s = bowl_camera_fit(b, &p->process.lens, p->width, p->height, &p->camera, err);
@@ -75,7 +75,7 @@ static status first_photograph(struct bowl_pictures *p, struct error *err)
 
 static status open_background(struct bowl_pictures *p, size_t i, struct error *err)
 {
-    const struct job_bowl_photograph *shot = &p->doc->bowl.photograph[i];
+    const struct job_bowl_photograph *shot = &p->doc->profile.bowl.photograph[i];
     struct job_photograph picture = shot->picture;
     if (shot->background[0] == '\0') return STATUS_OK;
     memcpy(picture.file, shot->background, sizeof picture.file);
@@ -87,7 +87,7 @@ static status open_background(struct bowl_pictures *p, size_t i, struct error *e
 
 status bowl_pictures_open(struct bowl_pictures *p, size_t i, struct error *err)
 {
-    const struct job_photograph *picture = &p->doc->bowl.photograph[i].picture;
+    const struct job_photograph *picture = &p->doc->profile.bowl.photograph[i].picture;
     struct photograph_record record;
     image_release(&p->background);
     memset(&p->background, 0, sizeof p->background);
@@ -102,7 +102,7 @@ bool bowl_pictures_place(const struct bowl_pictures *p, size_t k, struct bowl_pl
 {
     const double px[2] = {(double)(k % p->width) + 0.5, (double)(k / p->width) + 0.5};
     if (p->mask.pixel != NULL && p->mask.pixel[3 * k + 1] < 0.5f) return false;
-    return bowl_place_at(&p->doc->bowl, &p->camera, px, place);
+    return bowl_place_at(&p->doc->profile.bowl, &p->camera, px, place);
 }
 
 bool bowl_pictures_value(const struct bowl_pictures *p, size_t k, double value[3], double background[3])

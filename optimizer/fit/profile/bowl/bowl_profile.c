@@ -114,7 +114,7 @@ static status append_rows(struct view *v, const struct bowl_cells *cells, struct
 static status add_photograph(struct bowl_pictures *pictures, size_t i, struct fiber_profile *profile,
                              struct bowl_record *record, struct error *err)
 {
-    struct view v = {.bowl = &pictures->doc->bowl, .pictures = pictures, .i = i};
+    struct view v = {.bowl = &pictures->doc->profile.bowl, .pictures = pictures, .i = i};
     struct bowl_cells cells = {0};
     status s = bowl_pictures_open(pictures, i, err);
     if (s == STATUS_OK) s = measure_means(&v, err);
@@ -143,10 +143,10 @@ status bowl_profile_load(struct fiber_profile *profile, struct job_document *doc
                          struct bowl_record *record, struct error *err)
 {
     struct bowl_pictures pictures;
-    *profile = (struct fiber_profile){.n_channel = doc->bowl.is_rgb ? 3 : 1, .has_se = true};
-    if (record != NULL) *record = (struct bowl_record){.n_shot = doc->bowl.n_photograph};
+    *profile = (struct fiber_profile){.n_channel = doc->profile.bowl.is_rgb ? 3 : 1, .has_se = true};
+    if (record != NULL) *record = (struct bowl_record){.n_shot = doc->profile.bowl.n_photograph};
     status s = bowl_pictures_init(&pictures, doc, folder, err);
-    for (size_t i = 0; i < doc->bowl.n_photograph && s == STATUS_OK; i++)
+    for (size_t i = 0; i < doc->profile.bowl.n_photograph && s == STATUS_OK; i++)
         s = add_photograph(&pictures, i, profile, record, err);
     if (record != NULL) record->camera = pictures.camera;
     bowl_pictures_release(&pictures);

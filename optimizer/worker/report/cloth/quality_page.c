@@ -1,7 +1,7 @@
 #include "base/angle.h"
 #include "base/option_id.h"
 #include "geometry/volume/tile_crop.h"
-#include "optimizer/job/option_key.h"
+#include "optimizer/job/options/option_key.h"
 #include "optimizer/worker/report/cloth/quality.h"
 #include "optimizer/worker/report/cloth/section_report.h"
 
@@ -59,7 +59,7 @@ static void print_fibers(const struct pipeline_context *c, const struct fiber_le
     fputs("<h2>Fibers</h2>\n<table>\n<tr><th>class</th><th class=\"number\">fibers</th><th class=\"number\">length, "
           "mm</th><th class=\"number\">radius, um</th>",
           out);
-    if (c->doc->has_volume)
+    if (c->doc->scan.given)
         fputs("<th class=\"number\">centers</th><th class=\"number\">chains</th><th class=\"number\">dropped as "
               "short</th>",
               out);
@@ -71,16 +71,16 @@ static void print_fibers(const struct pipeline_context *c, const struct fiber_le
         fprintf(out, "<tr><td>%s</td><td class=\"number\">%zu</td><td class=\"number\">%.3g</td><td class=\"number\">",
                 name[k], l->n[k], l->total_m[k] * 1e3);
         if (l->n[k] > 0) fprintf(out, "%.2f", radius * 1e6);
-        if (l->n[k] > 0 && c->doc->has_volume && isfinite(g->radius_se_m[k]))
+        if (l->n[k] > 0 && c->doc->scan.given && isfinite(g->radius_se_m[k]))
             fprintf(out, " &plusmn; %.2f", g->radius_se_m[k] * 1e6);
         fputs("</td>", out);
-        if (c->doc->has_volume)
+        if (c->doc->scan.given)
             fprintf(out, "<td class=\"number\">%zu</td><td class=\"number\">%zu</td><td class=\"number\">%zu</td>",
                     g->n_center[k], g->n_chain[k], g->n_short_dropped[k]);
         fputs("</tr>\n", out);
     }
     fputs("</table>\n", out);
-    if (c->doc->has_volume)
+    if (c->doc->scan.given)
         fprintf(out, "<p>Radius: %s, with standard errors where it was measured.</p>\n", radii_in_words(c));
     fprintf(out, "<p>Lengths: median %.3g mm, mean %.3g mm, 80 %% between %.3g and %.3g mm, longest %.3g mm.</p>\n",
             l->median_m * 1e3, l->mean_m * 1e3, l->p10_m * 1e3, l->p90_m * 1e3, l->longest_m * 1e3);
@@ -95,7 +95,7 @@ static void print_fibers(const struct pipeline_context *c, const struct fiber_le
 static void print_errors(const struct pipeline_context *c, FILE *out)
 {
     const struct reconstruct_report *g = &c->geometry;
-    if (c->fiber.n_fiber > 0 && isnan(c->doc->radius_um)) {
+    if (c->fiber.n_fiber > 0 && isnan(c->doc->scan.radius_um)) {
         row(out, "spread of the radii", "standard deviation between fibers over the mean, without errors", "%.1f %%",
             100.0 * g->radius_spread);
         row(out, "error of the radius of a fiber", "typical standard error", "%.2f um", g->single_radius_se_m * 1e6);
@@ -109,7 +109,7 @@ static void print_errors(const struct pipeline_context *c, FILE *out)
 static void print_diameter(const struct pipeline_context *c, FILE *out)
 {
     const struct reconstruct_report *g = &c->geometry;
-    const bool given = !isnan(c->doc->fiber_diameter_voxel);
+    const bool given = !isnan(c->doc->scan.fiber_diameter_voxel);
     row(out, "fiber diameter",
         given ? "given by the job; from 7 voxels on, touching fibers can be separated"
               : "measured before tracing; from 7 voxels on, touching fibers can be separated",
@@ -234,7 +234,7 @@ static void print_seam(const struct pipeline_context *c, FILE *out)
           out);
     fprintf(out, "<tr><td>edge of the tile, mm</td><td class=\"number\">%.4f</td><td class=\"number\">%.4f</td></tr>\n",
             c->fiber.tile_size_m[0] * 1e3, c->fiber.tile_size_m[1] * 1e3);
-    if (c->doc->has_volume) {
+    if (c->doc->scan.given) {
         fputs("<tr><td>density step at the seam over that of neighbouring slices (1: no seam)</td>", out);
         for (int a = 0; a < 2; a++) figure(out, g->seam_density.ratio[a]);
         fputs("</tr>\n", out);
@@ -299,7 +299,7 @@ static void print_pictures(const struct pipeline_context *c, FILE *out)
                  {"slice-y.png", "Middle slice across y: x to the right, z up"},
                  {"slice-z.png", "Middle slice across z: x to the right, y up"}};
     fputs("<h2>Pictures</h2>\n<div class=\"slices\">\n", out);
-    for (int i = 0; i < 3 && c->doc->has_volume; i++)
+    for (int i = 0; i < 3 && c->doc->scan.given; i++)
         fprintf(out,
                 "<figure><a href=\"pictures/%s\"><img src=\"pictures/%s\" alt=\"%s\"></a><figcaption>%s. Red crosses: "
                 "fibers that pass through.</figcaption></figure>\n",
@@ -322,9 +322,9 @@ void quality_page(struct pipeline_context *c, const struct fiber_lengths *l, FIL
     escaped(c->doc->sample, out);
     fprintf(out, "</h1>\n<p>%zu fibers from %s. The same in numbers: <a href=\"quality.json\">quality.json</a>.</p>\n",
             c->fiber.n_fiber,
-            c->doc->has_volume      ? "a scan"
-            : c->doc->cloth != NULL ? "a description of the cloth"
-                                    : "a fiber file");
+            c->doc->scan.given                  ? "a scan"
+            : c->doc->cloth.description != NULL ? "a description of the cloth"
+                                                : "a fiber file");
     for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++) {
         fputs("<p class=\"warning\">", out);
         escaped(text, out);
@@ -332,10 +332,10 @@ void quality_page(struct pipeline_context *c, const struct fiber_lengths *l, FIL
     }
     print_fibers(c, l, out);
     section_report_table(c, out);
-    if (c->doc->has_volume) print_scan(c, out);
-    print_trial(&c->geometry.trial, c->doc->trial, out);
+    if (c->doc->scan.given) print_scan(c, out);
+    print_trial(&c->geometry.trial, c->doc->scan.trial, out);
     print_seam(c, out);
     print_pictures(c, out);
-    if (c->doc->has_volume) print_chosen(c, out);
+    if (c->doc->scan.given) print_chosen(c, out);
     fputs("</body>\n</html>\n", out);
 }

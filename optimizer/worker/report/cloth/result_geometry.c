@@ -84,23 +84,23 @@ static json_t *options_json(const struct reconstruct_option *o)
 static json_t *groups_json(const struct pipeline_context *c)
 {
     size_t n_fiber[FIBER_MAX_GROUP] = {0};
-    if (c->doc->n_group < 2) return json_null();
+    if (c->doc->cloth.n_group < 2) return json_null();
     json_t *list = json_array();
     for (size_t i = 0; i < c->fiber.n_fiber; i++) n_fiber[c->fiber.group[i]]++;
-    for (size_t g = 0; g < c->doc->n_group; g++)
-        json_array_append_new(list,
-                              json_pack("{s:s, s:o}", "name", c->doc->group[g], "n_fiber", json_count(n_fiber[g])));
+    for (size_t g = 0; g < c->doc->cloth.n_group; g++)
+        json_array_append_new(
+            list, json_pack("{s:s, s:o}", "name", c->doc->cloth.group[g], "n_fiber", json_count(n_fiber[g])));
     return list;
 }
 
 /* What the photograph of the weave shows, and what of it the job has taken. */
 static json_t *texture_json(const struct pipeline_context *c)
 {
-    double px_per_mm = c->doc->cloth_texture_px_per_mm;
+    double px_per_mm = c->doc->cloth.texture_px_per_mm;
     json_t *json = weave_guess_json(&c->texture.guess, isnan(px_per_mm) ? 0.0 : px_per_mm), *taken = json_array();
     for (size_t i = 0; i < c->texture.n_taken; i++) json_array_append_new(taken, json_string(c->texture.taken[i]));
     json_object_set_new(json, "taken", taken);
-    json_object_set_new(json, "photograph", json_string(c->doc->cloth_texture));
+    json_object_set_new(json, "photograph", json_string(c->doc->cloth.texture));
     json_object_set_new(json, "contradicts_draft", json_boolean(c->texture.contradicts));
     return json;
 }
@@ -186,7 +186,8 @@ static json_t *described_json(const struct pipeline_context *c)
     struct cloth_description *d = malloc(sizeof *d);
     struct error unused;
     if (d == NULL) return json_null();
-    const status s = cloth_description_enlarge(c->doc->cloth, fitted ? c->doc->cloth_final_tiles : 1, d, &unused);
+    const status s =
+        cloth_description_enlarge(c->doc->cloth.description, fitted ? c->doc->cloth.final_tiles : 1, d, &unused);
     json_t *json = s == STATUS_OK ? result_cloth_json(d, fitted ? c->number.shown : NULL, &c->cloth) : json_null();
     free(d);
     return json;
@@ -197,9 +198,9 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     const struct reconstruct_report *g = &c->geometry;
     const double um = 1e6, mm = 1e3;
     json_t *json = json_pack("{s:s, s:o, s:o, s:o}", "input",
-                             c->doc->has_volume      ? "volume"
-                             : c->doc->cloth != NULL ? "cloth"
-                                                     : "fibers",
+                             c->doc->scan.given                  ? "volume"
+                             : c->doc->cloth.description != NULL ? "cloth"
+                                                                 : "fibers",
                              "n_fiber", json_count(c->fiber.n_fiber), "n_vertex", json_count(c->fiber.n_vertex),
                              "tile_mm", json_number_list(c->fiber.tile_size_m, 2, mm));
     json_object_set_new(json, "total_length_mm", json_number(g->total_length_m * mm));
@@ -209,12 +210,12 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "sections", section_report_json(c));
     json_object_set_new(json, "groups", groups_json(c));
     json_object_set_new(json, "seam_fibers", seam_fibers_json(g));
-    if (c->doc->cloth != NULL) json_object_set_new(json, "cloth", described_json(c));
+    if (c->doc->cloth.description != NULL) json_object_set_new(json, "cloth", described_json(c));
     if (c->texture.found) json_object_set_new(json, "texture", texture_json(c));
-    if (!c->doc->has_volume) return json;
+    if (!c->doc->scan.given) return json;
     const struct reconstruct_option *o = &c->option;
     json_object_set_new(json, "from_job",
-                        c->doc->geometry_job[0] != '\0' ? json_string(c->doc->geometry_job) : json_null());
+                        c->doc->scan.geometry_job[0] != '\0' ? json_string(c->doc->scan.geometry_job) : json_null());
     json_object_set_new(json, "n_voxel", json_count_list(g->n, 3));
     json_object_set_new(json, "voxel_size_um", json_number_list(g->voxel_size_m, 3, um));
     json_object_set_new(json, "file_voxel_size_um", json_number_list(g->file_voxel_size_m, 3, um));

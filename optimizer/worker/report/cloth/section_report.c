@@ -87,7 +87,7 @@ void section_report_table(const struct pipeline_context *c, FILE *out)
         if (isfinite(s.variation_se_median)) fprintf(out, " (error %.1f %%)", 100.0 * s.variation_se_median);
         close_row(out, "standard deviation along a fiber, mean over these fibers");
     }
-    if (c->doc->has_volume && c->geometry.lumen_share > 0.0) {
+    if (c->doc->scan.given && c->geometry.lumen_share > 0.0) {
         open_row(out, "lumens");
         fprintf(out, "%.1f %%", 100.0 * c->geometry.lumen_share);
         close_row(out, "share of the material that was filled because the fibers are hollow");

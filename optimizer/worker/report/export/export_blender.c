@@ -210,4 +210,4 @@ static status write_blender(struct export_scene *e, json_t **materials, struct e
     return s;
 }
 
-const struct export_format export_blender = {"blender", offsetof(struct job_document, export_blender), write_blender};
+const struct export_format export_blender = {"blender", offsetof(struct job_results, export_blender), write_blender};

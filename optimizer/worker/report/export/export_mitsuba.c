@@ -39,7 +39,7 @@ static double area_along(const struct export_scene *e)
 static status write_volumes(const struct export_scene *e, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    if (!e->c->doc->has_volume) return STATUS_OK;
+    if (!e->c->doc->scan.given) return STATUS_OK;
     status s = pipeline_need_volume(e->c, err);
     export_path(e, "density.vol", path);
     if (s == STATUS_OK) s = worker_folder_check(e->c->folder, err);
@@ -192,4 +192,4 @@ static status write_mitsuba(struct export_scene *e, json_t **materials, struct e
     return s;
 }
 
-const struct export_format export_mitsuba = {"mitsuba", offsetof(struct job_document, export_mitsuba), write_mitsuba};
+const struct export_format export_mitsuba = {"mitsuba", offsetof(struct job_results, export_mitsuba), write_mitsuba};

@@ -152,4 +152,4 @@ static status write_pbrt(struct export_scene *e, json_t **materials, struct erro
     return s;
 }
 
-const struct export_format export_pbrt = {"pbrt", offsetof(struct job_document, export_pbrt), write_pbrt};
+const struct export_format export_pbrt = {"pbrt", offsetof(struct job_results, export_pbrt), write_pbrt};

@@ -181,7 +181,7 @@ bool export_sheet(const struct export_scene *e, double half_mm[2], double *z_mm)
     export_repeats(e, n);
     for (int a = 0; a < 2; a++) half_mm[a] = mm * e->c->fiber.tile_size_m[a] * n[a];
     *z_mm = mm * (e->z_low_m - e->z_high_m) - 1e-3;
-    return e->c->doc->black_sheet;
+    return e->c->doc->setup.black_sheet;
 }
 
 static void print_three(FILE *text, const double v[3], const char *end)
@@ -218,7 +218,7 @@ status export_rows_write(const struct export_scene *e, struct error *err)
 json_t *export_material_json(const struct export_scene *e, size_t group, json_t *material)
 {
     json_object_set_new(material, "group",
-                        e->model->sets.n_set > 1 ? json_string(e->c->doc->group[group]) : json_null());
+                        e->model->sets.n_set > 1 ? json_string(e->c->doc->cloth.group[group]) : json_null());
     return material;
 }
 

@@ -23,7 +23,7 @@ struct export_scene {
 
 struct export_format {
     const char *name; /* "mitsuba" */
-    size_t wanted_at; /* offset of its option in struct job_document, a bool */
+    size_t wanted_at; /* offset of its option in struct job_results, a bool */
     /* *json: an array with one object for each group of fibers, a new reference. */
     status (*write)(struct export_scene *e, json_t **materials, struct error *err);
 };

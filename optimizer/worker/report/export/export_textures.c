@@ -75,7 +75,7 @@ static status render_tile(const struct textures *t, bool black_sheet, struct ima
                                      .width = t->maps.width,
                                      .height = t->maps.height,
                                      .n_sample = n_sample > MIN_SAMPLE ? n_sample : MIN_SAMPLE,
-                                     .seed = c->doc->seed ^ 0x74657874757265u,
+                                     .seed = c->doc->fit.seed ^ 0x74657874757265u,
                                      .stream = STREAM};
     s = render_run(&q, c->pool, &c->progress, im, err);
     scene_free(scene);
@@ -231,7 +231,7 @@ static json_t *material_json(const struct textures *t)
 static status write_textures(struct export_scene *e, json_t **materials, struct error *err)
 {
     struct textures t = {.e = e};
-    size_t edge = 2 * (e->c->doc->render_px > 0 ? e->c->doc->render_px : RESULT_PICTURE_PX);
+    size_t edge = 2 * (e->c->doc->results.render_px > 0 ? e->c->doc->results.render_px : RESULT_PICTURE_PX);
     edge = edge < MIN_EDGE ? MIN_EDGE : edge > MAX_EDGE ? MAX_EDGE : edge;
     status s = texture_maps_make(&e->c->fiber, edge, &t.maps, err);
     t.surface.maps = &t.maps;
@@ -249,5 +249,5 @@ static status write_textures(struct export_scene *e, json_t **materials, struct 
     return s;
 }
 
-const struct export_format export_textures = {"textures", offsetof(struct job_document, export_textures),
+const struct export_format export_textures = {"textures", offsetof(struct job_results, export_textures),
                                               write_textures};

@@ -278,4 +278,4 @@ static status write_usd(struct export_scene *e, json_t **materials, struct error
     return *materials != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot export as USD: out of memory");
 }
 
-const struct export_format export_usd = {"usd", offsetof(struct job_document, export_usd), write_usd};
+const struct export_format export_usd = {"usd", offsetof(struct job_results, export_usd), write_usd};

@@ -16,7 +16,7 @@ static const double percent = 100.0;
 
 static bool wanted(const struct pipeline_context *c, const struct export_format *f)
 {
-    return *(const bool *)((const char *)c->doc + f->wanted_at);
+    return *(const bool *)((const char *)&c->doc->results + f->wanted_at);
 }
 
 static status fit_materials(struct export_scene *e, struct error *err)
@@ -72,7 +72,7 @@ static void warn_of_rest(const struct export_scene *e)
                            n[0], n[1]);
     if (e->c->environment != NULL)
         worker_status_warn(e->c->status, "the exported scenes have no image of the surroundings: add '%s' to them",
-                           e->c->doc->environment_file);
+                           e->c->doc->setup.environment_file);
     if (pipeline_discrepancy(e->model) != NULL)
         worker_status_warn(
             e->c->status, "the exported fibers are rendered without the discrepancy, which other programs do not know; "

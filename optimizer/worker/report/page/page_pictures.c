@@ -118,10 +118,10 @@ static status put_figure(const struct pipeline_context *c, size_t i, const json_
     bool has_photograph = false;
     worker_folder_path(c->folder, JOB_FOLDER_RESULTS, page_string(row, "rendering_exr"), path);
     if (image_read_exr(&rendering, path, (size_t)1 << 26, NULL) != STATUS_OK) return STATUS_OK;
-    if (c->doc->n_photograph > i) {
+    if (c->doc->rows.n_photograph > i) {
         worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, path);
         has_photograph =
-            photograph_develop(&c->process, path, &c->doc->photograph[i], &photograph, NULL, NULL) == STATUS_OK;
+            photograph_develop(&c->process, path, &c->doc->rows.photograph[i], &photograph, NULL, NULL) == STATUS_OK;
     }
     fputs("<figure>", out);
     status s = put_row(c, has_photograph ? &photograph : NULL, &rendering, out, err);
@@ -140,8 +140,9 @@ status page_pictures(const struct pipeline_context *c, const json_t *rows, FILE 
     size_t n = json_array_size(rows), n_shown = n < MAX_ROWS ? n : MAX_ROWS;
     status s = STATUS_OK;
     fprintf(out, "<p>%s Each row has an exposure of its own. %zu of %zu rows.</p>\n<div class=\"pictures\">\n",
-            c->doc->n_photograph > 0 ? "Photograph, rendering, and their difference about grey, which is amplified."
-                                     : "Renderings; the measurements are a table and have no pictures.",
+            c->doc->rows.n_photograph > 0
+                ? "Photograph, rendering, and their difference about grey, which is amplified."
+                : "Renderings; the measurements are a table and have no pictures.",
             n_shown, n);
     for (size_t i = 0; i < n_shown && s == STATUS_OK; i++) s = put_figure(c, i, json_array_get(rows, i), out, err);
     fputs("</div>\n", out);

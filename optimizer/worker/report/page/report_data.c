@@ -96,7 +96,7 @@ status report_data(struct pipeline_context *c, json_t **data, struct error *err)
     json_t *document = json_load_file(path, 0, NULL);
     *data = json_pack("{s:i, s:s, s:f, s:f, s:o, s:o?, s:o, s:o, s:o?}", "format", 1, "program", RESULT_PROGRAM,
                       "started_unix_s", worker_status_started_unix_s(c->status), "written_unix_s", clock_wall_s(),
-                      "defaults", job_options_defaults_json(document, job_document_has_rows(c->doc)), "document",
-                      document, "inputs", input.list, "curve", curve_json(c), "result", result);
+                      "defaults", job_options_defaults_json(document, job_document_kind(c->doc) == JOB_OF_FIT),
+                      "document", document, "inputs", input.list, "curve", curve_json(c), "result", result);
     return *data != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot write the report: out of memory");
 }

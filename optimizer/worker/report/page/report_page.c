@@ -225,7 +225,7 @@ static status print_fit(struct pipeline_context *c, const json_t *data, FILE *ou
 static status print_surfaces(struct pipeline_context *c, const json_t *result, FILE *out, struct error *err)
 {
     const json_t *list = json_object_get(result, "pictures");
-    if (job_document_pictures_only(c->doc))
+    if (job_document_kind(c->doc) == JOB_OF_PICTURES)
         print_parameters("Given parameters", json_object_get(result, "parameters"), out);
     if (json_array_size(list) == 0) return STATUS_OK;
     heading("The cloth on surfaces", out);
@@ -326,8 +326,8 @@ static status print_page(struct pipeline_context *c, const json_t *data, FILE *o
     fputs("The same as data: report.json.</p>\n", out);
     print_verdict(json_object_get(result, "verdict"), out);
     print_warnings(json_object_get(result, "warnings"), out);
-    if (job_document_has_rows(c->doc)) s = print_fit(c, data, out, err);
-    if (job_document_of_profile(c->doc))
+    if (job_document_kind(c->doc) == JOB_OF_FIT) s = print_fit(c, data, out, err);
+    if (job_document_kind(c->doc) == JOB_OF_PROFILE)
         print_profile(c, result, out);
     else if (s == STATUS_OK)
         s = print_surfaces(c, result, out, err);

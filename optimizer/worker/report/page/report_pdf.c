@@ -44,7 +44,7 @@ static bool installed(char prefix[WORKER_PATH_BYTES])
 void report_pdf_warn(const struct pipeline_context *c)
 {
     char prefix[WORKER_PATH_BYTES];
-    if (!c->doc->export_pdf || installed(prefix)) return;
+    if (!c->doc->results.export_pdf || installed(prefix)) return;
     worker_status_warn(c->status, "report.pdf was not made: this machine has no program '%s' (Debian package %s)",
                        program, program);
 }
@@ -156,7 +156,7 @@ status report_pdf_write(struct pipeline_context *c, struct error *err)
 {
     char prefix[WORKER_PATH_BYTES];
     struct pdf_paths path;
-    if (!c->doc->export_pdf || !installed(prefix)) return STATUS_OK;
+    if (!c->doc->results.export_pdf || !installed(prefix)) return STATUS_OK;
     set_paths(c->folder, &path);
     if (c->pdf.pid > 0 && write(c->pdf.order_fd, "g", 1) == 1 && wait_for(c, c->pdf.pid) &&
         access(path.part, F_OK) == 0) {

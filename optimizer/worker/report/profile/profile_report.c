@@ -22,7 +22,7 @@ static json_t *model_json(const struct pipeline_context *c, size_t i)
     json_t *json = json_pack("{s:s, s:s, s:b, s:o, s:o, s:o, s:b}", "id", m->appearance.id, "title",
                              m->appearance.title, "best", (int)(i == profile_best_model(c)), "parameters",
                              result_parameters_json(m), "scale", json_number(f->scale), "scale_se",
-                             json_number(f->scale_se), "scale_fitted", (int)isnan(c->doc->profile_scale));
+                             json_number(f->scale_se), "scale_fitted", (int)isnan(c->doc->profile.scale));
     json_object_set_new(json, "nrmse", json_number(f->nrmse));
     json_object_set_new(json, "rel_rms", json_number(f->rel_rms));
     json_object_set_new(json, "misfit", json_number(f->misfit));
@@ -48,7 +48,7 @@ static json_t *table_json(const struct pipeline_context *c)
             range[k][1] = fmax(range[k][1], angle_to_deg(angle[k]));
         }
     }
-    return json_pack("{s:s, s:o, s:o, s:b, s:o, s:o, s:o}", "file", job_document_profile_name(c->doc), "n_row",
+    return json_pack("{s:s, s:o, s:o, s:b, s:o, s:o, s:o}", "file", job_profile_name(&c->doc->profile), "n_row",
                      json_count(p->n), "n_channel", json_count(p->n_channel), "has_errors", (int)p->has_se,
                      "theta_i_deg", json_number_list(range[0], 2, 1.0), "theta_o_deg",
                      json_number_list(range[1], 2, 1.0), "phi_deg", json_number_list(range[2], 2, 1.0));
@@ -57,7 +57,7 @@ static json_t *table_json(const struct pipeline_context *c)
 /* How the photographs of a bowl became the table; NULL without them. */
 static json_t *bowl_json(const struct pipeline_context *c)
 {
-    const struct job_bowl *b = &c->doc->bowl;
+    const struct job_bowl *b = &c->doc->profile.bowl;
     const struct bowl_record *r = &c->bowl;
     json_t *shots = json_array();
     for (size_t i = 0; i < r->n_shot; i++) {
@@ -79,7 +79,7 @@ static json_t *profile_json(const struct pipeline_context *c)
     for (size_t i = 0; i < c->n_model; i++) json_array_append_new(models, model_json(c, i));
     json_t *json = json_pack("{s:o, s:s, s:s, s:o}", "table", table_json(c), "chosen_by", "bic", "csv", "profile.csv",
                              "models", models);
-    if (c->doc->bowl.given) json_object_set_new(json, "bowl", bowl_json(c));
+    if (c->doc->profile.bowl.given) json_object_set_new(json, "bowl", bowl_json(c));
     return json;
 }
 
@@ -88,7 +88,7 @@ status profile_json_write(struct pipeline_context *c, struct error *err)
     const struct pipeline_model *m = &c->model[profile_best_model(c)];
     json_t *json = json_pack("{s:i, s:s, s:s, s:n, s:o, s:[], s:[], s:I, s:o}", "format", 1, "sample", c->doc->sample,
                              "model", m->appearance.id, "method", "parameters", result_parameters_json(m), "rows",
-                             "models", "seed", (json_int_t)c->doc->seed, "profile", profile_json(c));
+                             "models", "seed", (json_int_t)c->doc->fit.seed, "profile", profile_json(c));
     return result_json_finish(c, json, err);
 }
 

@@ -19,7 +19,7 @@ enum { CYLINDER_CELLS = 720 };
 /* The number of the first picture that shows the same drape. */
 static size_t first_of_drape(const struct job_document *doc, size_t i)
 {
-    const struct job_surface_picture *p = doc->surface_picture;
+    const struct job_surface_picture *p = doc->results.surface_picture;
     for (size_t k = 0; k < i; k++)
         if (p[k].on == JOB_ON_DRAPE && p[k].size_mm == p[i].size_mm && p[k].radius_mm == p[i].radius_mm) return k;
     return i;
@@ -29,7 +29,7 @@ static size_t first_of_drape(const struct job_document *doc, size_t i)
  * whoever uses the file elsewhere have the same one. */
 static status make_drape(const struct pipeline_context *c, size_t i, struct mesh *m, struct error *err)
 {
-    const struct job_surface_picture *p = &c->doc->surface_picture[i];
+    const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
     char path[WORKER_PATH_BYTES], name[64], *text = NULL;
     size_t n_bytes;
     worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "pictures", path);
@@ -49,7 +49,7 @@ static status make_drape(const struct pipeline_context *c, size_t i, struct mesh
 
 static status make_mesh(const struct pipeline_context *c, size_t i, struct mesh *m, struct error *err)
 {
-    const struct job_surface_picture *p = &c->doc->surface_picture[i];
+    const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
     char path[WORKER_PATH_BYTES];
     switch (p->on) {
     case JOB_ON_CYLINDER:
@@ -81,8 +81,8 @@ static status name_picture(size_t i, enum job_surface on, status s, struct error
 status surface_cloth_init(const struct pipeline_context *c, size_t i, const struct scene *fibers,
                           struct surface_cloth *cloth, struct error *err)
 {
-    const struct job_surface_picture *p = &c->doc->surface_picture[i];
-    const bool black_sheet = p->black_sheet < 0 ? c->doc->black_sheet : p->black_sheet != 0;
+    const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
+    const bool black_sheet = p->black_sheet < 0 ? c->doc->setup.black_sheet : p->black_sheet != 0;
     struct mesh m = {0};
     memset(cloth, 0, sizeof *cloth);
     status s = make_mesh(c, i, &m, err);
@@ -112,7 +112,7 @@ static double *point_from(double theta_deg, double phi_deg, double distance_mm, 
 static status check_surface(const struct pipeline_context *c, size_t i, const struct scene *bent, struct error *err)
 {
     const struct job_document *d = c->doc;
-    const struct job_surface_picture *p = &d->surface_picture[i];
+    const struct job_surface_picture *p = &d->results.surface_picture[i];
     const double mm_per_cm = 10.0;
     double at[3];
     if (p->method == JOB_PICTURE_DIFFUSION) {
@@ -121,18 +121,19 @@ static status check_surface(const struct pipeline_context *c, size_t i, const st
             snprintf(err->field, sizeof err->field, OPTION_PICTURE_METHOD "[%zu]", i);
         if (s != STATUS_OK) return s;
     }
-    point_from(p->camera_theta_deg, p->camera_phi_deg - p->cloth_rotation_deg, mm_per_cm * d->camera_distance_cm, at);
-    if (!d->camera_far_field && scene_encloses(bent, at))
+    point_from(p->camera_theta_deg, p->camera_phi_deg - p->cloth_rotation_deg, mm_per_cm * d->setup.camera_distance_cm,
+               at);
+    if (!d->setup.camera_far_field && scene_encloses(bent, at))
         return error_set(err, STATUS_INVALID,
                          "the camera, %g cm from the orbit center, stands inside the cloth: move the mesh, or the "
                          "camera",
-                         d->camera_distance_cm);
-    point_from(p->light_theta_deg, p->light_phi_deg - p->cloth_rotation_deg, mm_per_cm * d->lamp_distance_cm, at);
-    if (!d->lamp_directional && isnan(p->lamp_sharpness) && scene_encloses(bent, at))
+                         d->setup.camera_distance_cm);
+    point_from(p->light_theta_deg, p->light_phi_deg - p->cloth_rotation_deg, mm_per_cm * d->setup.lamp_distance_cm, at);
+    if (!d->setup.lamp_directional && isnan(p->lamp_sharpness) && scene_encloses(bent, at))
         return error_set(err, STATUS_INVALID,
                          "the lamp, %g cm from the orbit center, stands inside the cloth: move the mesh, or the "
                          "lamp",
-                         d->lamp_distance_cm);
+                         d->setup.lamp_distance_cm);
     if (p->on == JOB_ON_MESH && scene_crosses_itself(bent, at))
         worker_status_warn(
             c->status,
@@ -145,11 +146,11 @@ static status check_surface(const struct pipeline_context *c, size_t i, const st
 status surface_cloth_check(const struct pipeline_context *c, struct error *err)
 {
     status s = STATUS_OK;
-    for (size_t i = 0; i < c->doc->n_surface_picture && c->scene != NULL && s == STATUS_OK; i++) {
+    for (size_t i = 0; i < c->doc->results.n_surface_picture && c->scene != NULL && s == STATUS_OK; i++) {
         struct surface_cloth cloth;
         s = surface_cloth_init(c, i, c->scene, &cloth, err);
         if (s == STATUS_OK)
-            s = name_picture(i, c->doc->surface_picture[i].on, check_surface(c, i, cloth.fibers, err), err);
+            s = name_picture(i, c->doc->results.surface_picture[i].on, check_surface(c, i, cloth.fibers, err), err);
         surface_cloth_release(&cloth);
     }
     return s;

@@ -20,7 +20,7 @@ double surface_field_coverage(const struct fiber_set *fiber, double pixel_m)
 const struct appearance *surface_field_model(const struct pipeline_context *c, size_t i, const struct appearance *best,
                                              struct appearance *far)
 {
-    const struct job_surface_picture *p = &c->doc->surface_picture[i];
+    const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
     const char *id = model_catalogue_far_field(best->id);
     if (!p->field_by_pixel || id == NULL) return best;
     double pixel_m = 1e-3 * p->width_mm / (double)p->px;

@@ -13,7 +13,7 @@ status surface_filter_init(const struct pipeline_context *c, size_t i, const str
                            struct surface_filter *filter, struct error *err)
 {
     memset(filter, 0, sizeof *filter);
-    if (!c->doc->surface_picture[i].filter) return STATUS_OK;
+    if (!c->doc->results.surface_picture[i].filter) return STATUS_OK;
     if (q->input.scene.fibers == NULL) {
         worker_status_warn(c->status, "picture %zu is not filtered: a volume model has no fibers to look at", i + 1);
         return STATUS_OK;

@@ -11,7 +11,7 @@ enum { FILTER_SIDE = 4 };
 status surface_ground_init(const struct pipeline_context *c, size_t i, const struct render_request *q,
                            const struct progress *progress, struct surface_ground *ground, struct error *err)
 {
-    const struct job_surface_picture *p = &c->doc->surface_picture[i];
+    const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
     memset(ground, 0, sizeof *ground);
     if (isnan(p->ground_gap_mm)) return STATUS_OK;
     if (q->input.scene.fibers == NULL) {

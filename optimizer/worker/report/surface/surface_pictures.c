@@ -44,7 +44,7 @@ static double paths_of(const struct job_surface_picture *p)
 double surface_pictures_paths(const struct pipeline_context *c)
 {
     double n = 0.0;
-    for (size_t i = 0; i < c->doc->n_surface_picture; i++) n += paths_of(&c->doc->surface_picture[i]);
+    for (size_t i = 0; i < c->doc->results.n_surface_picture; i++) n += paths_of(&c->doc->results.surface_picture[i]);
     return n;
 }
 
@@ -160,7 +160,7 @@ static status write_entry(struct pipeline_context *c, const struct one_picture *
                           const struct surface_filter *filter, const struct surface_passes *so_far, json_t **out,
                           struct error *err)
 {
-    const struct job_surface_picture *p = &c->doc->surface_picture[one->i];
+    const struct job_surface_picture *p = &c->doc->results.surface_picture[one->i];
     json_t *filtered = NULL;
     struct surface_passes shown;
     status s = surface_ground_add(one->ground, so_far, &shown, err);
@@ -226,7 +226,7 @@ static status render_reference(struct pipeline_context *c, const struct one_pict
 static status render(struct pipeline_context *c, const struct one_picture *one, const struct progress *progress,
                      struct surface_passes *so_far, json_t **entry, struct error *err)
 {
-    const struct job_surface_picture *p = &c->doc->surface_picture[one->i];
+    const struct job_surface_picture *p = &c->doc->results.surface_picture[one->i];
     const struct pipeline_model *model = &c->model[pipeline_best_model(c)];
     bool traced = one->how.method == JOB_PICTURE_PATH, compared = p->reference && !traced;
     struct surface_cloth cloth;
@@ -250,12 +250,12 @@ static status render(struct pipeline_context *c, const struct one_picture *one, 
                   .n_set = model->sets.n_set,
                   .discrepancy = traced ? pipeline_discrepancy(model) : NULL,
                   .has_speckle = p->speckle,
-                  .speckle_seed = c->doc->seed},
+                  .speckle_seed = c->doc->fit.seed},
         .configuration = &view,
         .width = p->px,
         .height = p->px,
         .n_sample = p->sample,
-        .seed = c->doc->seed ^ 0x73757266616365u,
+        .seed = c->doc->fit.seed ^ 0x73757266616365u,
         .stream = (uint32_t)(STREAM + one->i)};
     surface_method_apply(&one->how, &q.input);
     struct progress_part part;
@@ -301,7 +301,7 @@ static void warn_if_black(struct pipeline_context *c, size_t i, const json_t *en
 static status write_one(struct pipeline_context *c, size_t i, const struct surface_tables *tables,
                         const struct progress *progress, struct error *err)
 {
-    const struct job_surface_picture *p = &c->doc->surface_picture[i];
+    const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
     char name[32], relative[64], path[WORKER_PATH_BYTES];
     const bool has_fibers = c->model[pipeline_best_model(c)].appearance.kind == MODEL_SURFACE;
     struct surface_passes so_far;
@@ -332,7 +332,7 @@ status surface_pictures_write(struct pipeline_context *c, double from, double to
 {
     char path[WORKER_PATH_BYTES];
     double done = 0.0, all = surface_pictures_paths(c);
-    if (c->doc->n_surface_picture == 0) return STATUS_OK;
+    if (c->doc->results.n_surface_picture == 0) return STATUS_OK;
     worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "pictures", path);
     status s = durable_make_folder(path, err);
     struct surface_tables tables = {0};
@@ -341,8 +341,8 @@ status surface_pictures_write(struct pipeline_context *c, double from, double to
     struct progress make = progress_begin_part(&making, &c->progress, from, for_tables);
     if (s == STATUS_OK) s = surface_tables_get(c, &make, &tables, err);
     from += for_tables;
-    for (size_t i = 0; i < c->doc->n_surface_picture && s == STATUS_OK; i++) {
-        const struct job_surface_picture *p = &c->doc->surface_picture[i];
+    for (size_t i = 0; i < c->doc->results.n_surface_picture && s == STATUS_OK; i++) {
+        const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
         double share = (to - from) * paths_of(p) / all;
         struct progress_part part;
         struct progress progress = progress_begin_part(&part, &c->progress, from + done, share);

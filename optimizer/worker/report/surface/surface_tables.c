@@ -25,15 +25,15 @@ static bool by_tables(enum job_picture_method m) { return m == JOB_PICTURE_FAST 
 /* Whether a picture takes from tables what the segments see. */
 static bool wants_visibility(const struct pipeline_context *c)
 {
-    for (size_t i = 0; i < c->doc->n_surface_picture; i++)
-        if (c->doc->surface_picture[i].visibility_by_tables) return true;
+    for (size_t i = 0; i < c->doc->results.n_surface_picture; i++)
+        if (c->doc->results.surface_picture[i].visibility_by_tables) return true;
     return false;
 }
 
 static bool wants_tables(const struct pipeline_context *c)
 {
-    for (size_t i = 0; i < c->doc->n_surface_picture; i++)
-        if (by_tables(c->doc->surface_picture[i].method)) return true;
+    for (size_t i = 0; i < c->doc->results.n_surface_picture; i++)
+        if (by_tables(c->doc->results.surface_picture[i].method)) return true;
     return false;
 }
 
@@ -47,8 +47,8 @@ static bool by_directions(const struct job_surface_picture *p)
 static size_t deep_paths(const struct pipeline_context *c)
 {
     size_t n = 0;
-    for (size_t i = 0; i < c->doc->n_surface_picture; i++) {
-        const struct job_surface_picture *p = &c->doc->surface_picture[i];
+    for (size_t i = 0; i < c->doc->results.n_surface_picture; i++) {
+        const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
         if (by_directions(p) && p->n_deep_path > n) n = p->n_deep_path;
     }
     return n;
@@ -57,8 +57,8 @@ static size_t deep_paths(const struct pipeline_context *c)
 /* Paths of a cell; without a picture by cells they only say how far light spreads. */
 static uint32_t cell_paths(const struct pipeline_context *c)
 {
-    for (size_t i = 0; i < c->doc->n_surface_picture; i++) {
-        const struct job_surface_picture *p = &c->doc->surface_picture[i];
+    for (size_t i = 0; i < c->doc->results.n_surface_picture; i++) {
+        const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
         if (by_tables(p->method) && !by_directions(p)) return CELL_PATHS;
     }
     return SPREAD_PATHS;
@@ -67,8 +67,8 @@ static uint32_t cell_paths(const struct pipeline_context *c)
 /* Filters take the albedo of fibers from the averages. */
 static bool wants_averages(const struct pipeline_context *c, bool of_filters)
 {
-    for (size_t i = 0; i < c->doc->n_surface_picture; i++) {
-        const struct job_surface_picture *p = &c->doc->surface_picture[i];
+    for (size_t i = 0; i < c->doc->results.n_surface_picture; i++) {
+        const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
         if (p->method == JOB_PICTURE_DUAL || (of_filters && p->filter)) return true;
     }
     return false;
@@ -76,8 +76,8 @@ static bool wants_averages(const struct pipeline_context *c, bool of_filters)
 
 static bool wants_method(const struct pipeline_context *c, enum job_picture_method m)
 {
-    for (size_t i = 0; i < c->doc->n_surface_picture; i++)
-        if (c->doc->surface_picture[i].method == m) return true;
+    for (size_t i = 0; i < c->doc->results.n_surface_picture; i++)
+        if (c->doc->results.surface_picture[i].method == m) return true;
     return false;
 }
 
@@ -87,8 +87,8 @@ double surface_tables_share(const struct pipeline_context *c)
     double tables_s =
         deep_path_s * (double)deep_paths(c) + cell_path_s * cell_paths(c) + (wants_visibility(c) ? visibility_s : 0.0);
     double pictures_s = 0.0;
-    for (size_t i = 0; i < c->doc->n_surface_picture; i++) {
-        const struct job_surface_picture *p = &c->doc->surface_picture[i];
+    for (size_t i = 0; i < c->doc->results.n_surface_picture; i++) {
+        const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
         double n_sample = (double)(p->px * p->px * p->sample);
         pictures_s += n_sample * (p->method == JOB_PICTURE_FAST ? fast_sample_s : path_sample_s);
         if (p->reference) pictures_s += n_sample * path_sample_s;

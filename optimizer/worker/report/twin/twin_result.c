@@ -17,29 +17,29 @@ enum { BASIS = 16, VIEW_EDGE = 12, LIGHT_EDGE = 16, VIEW_EDGE_OF_TWO = 8, LIGHT_
 double twin_result_paths(const struct pipeline_context *c)
 {
     const double lights = 3.0; /* a path with its sixteen lights takes as long as about so many of a picture */
-    return c->doc->twin ? lights * (double)c->doc->twin_paths : 0.0;
+    return c->doc->results.twin ? lights * (double)c->doc->results.twin_paths : 0.0;
 }
 
 static json_t *lamp_json(const struct pipeline_context *c)
 {
     const struct job_document *d = c->doc;
-    return json_pack("{s:f, s:f, s:f, s:b}", "lamp_distance_mm", 10.0 * d->lamp_distance_cm, "lamp_side_mm",
-                     10.0 * d->lamp_side_cm, "camera_distance_mm", 10.0 * d->camera_distance_cm, "far_field",
-                     d->camera_far_field);
+    return json_pack("{s:f, s:f, s:f, s:b}", "lamp_distance_mm", 10.0 * d->setup.lamp_distance_cm, "lamp_side_mm",
+                     10.0 * d->setup.lamp_side_cm, "camera_distance_mm", 10.0 * d->setup.camera_distance_cm,
+                     "far_field", d->setup.camera_far_field);
 }
 
 static status write_json(const struct pipeline_context *c, const struct appearance_table *t, json_t *parts,
                          size_t n_byte, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    json_t *json =
-        json_pack("{s:s, s:s, s:s, s:[f, f], s:f, s:b, s:I, s:I, s:o, s:o, s:o, s:o, s:I, s:o, s:o}", "format",
-                  "selvedge-twin.v1", "sample", c->doc->sample, "model", c->model[pipeline_best_model(c)].appearance.id,
-                  "tile_mm", t->tile_mm[0], t->tile_mm[1], "thickness_mm", scene_thickness_mm(c->scene), "black_sheet",
-                  c->doc->black_sheet, "paths", (json_int_t)c->doc->twin_paths, "bytes", (json_int_t)n_byte,
-                  "mean_rel_rms", json_number(t->mean_rel_rms), "mean_rel_noise", json_number(t->mean_rel_noise),
-                  "all_rel_rms", json_number(t->all_rel_rms), "all_rel_noise", json_number(t->all_rel_noise),
-                  "smoothed", (json_int_t)t->n_smooth, "setup", lamp_json(c), "parts", parts);
+    json_t *json = json_pack(
+        "{s:s, s:s, s:s, s:[f, f], s:f, s:b, s:I, s:I, s:o, s:o, s:o, s:o, s:I, s:o, s:o}", "format",
+        "selvedge-twin.v1", "sample", c->doc->sample, "model", c->model[pipeline_best_model(c)].appearance.id,
+        "tile_mm", t->tile_mm[0], t->tile_mm[1], "thickness_mm", scene_thickness_mm(c->scene), "black_sheet",
+        c->doc->setup.black_sheet, "paths", (json_int_t)c->doc->results.twin_paths, "bytes", (json_int_t)n_byte,
+        "mean_rel_rms", json_number(t->mean_rel_rms), "mean_rel_noise", json_number(t->mean_rel_noise), "all_rel_rms",
+        json_number(t->all_rel_rms), "all_rel_noise", json_number(t->all_rel_noise), "smoothed",
+        (json_int_t)t->n_smooth, "setup", lamp_json(c), "parts", parts);
     char *text = json != NULL ? json_dumps(json, JSON_INDENT(1)) : NULL;
     worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "twin/twin.json", path);
     status s = text != NULL ? worker_folder_replace(c->folder, path, text, strlen(text), err)
@@ -55,7 +55,7 @@ static bool is_finished(const struct pipeline_context *c)
     char path[WORKER_PATH_BYTES];
     worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "twin/twin.json", path);
     json_t *json = json_load_file(path, 0, NULL);
-    bool same = json_integer_value(json_object_get(json, "paths")) == (json_int_t)c->doc->twin_paths;
+    bool same = json_integer_value(json_object_get(json, "paths")) == (json_int_t)c->doc->results.twin_paths;
     json_decref(json);
     return same;
 }
@@ -79,19 +79,19 @@ static status write_files(const struct pipeline_context *c, const struct appeara
 
 status twin_result_write(struct pipeline_context *c, double from, double to, struct error *err)
 {
-    if (!c->doc->twin || is_finished(c)) return STATUS_OK;
+    if (!c->doc->results.twin || is_finished(c)) return STATUS_OK;
     const struct pipeline_model *m = &c->model[pipeline_best_model(c)];
     if (m->appearance.kind != MODEL_SURFACE) {
         worker_status_warn(c->status, "no twin for the browser: the model '%s' sees no fibers", m->appearance.id);
         return STATUS_OK;
     }
-    const bool two = !c->doc->black_sheet;
-    const struct appearance_table_option o = {.texels = c->doc->twin_texels,
+    const bool two = !c->doc->setup.black_sheet;
+    const struct appearance_table_option o = {.texels = c->doc->results.twin_texels,
                                               .view_edge = two ? VIEW_EDGE_OF_TWO : VIEW_EDGE,
                                               .light_edge = two ? LIGHT_EDGE_OF_TWO : LIGHT_EDGE,
                                               .n_basis = BASIS,
-                                              .n_path = c->doc->twin_paths,
-                                              .seed = c->doc->seed ^ 0x7477696eu};
+                                              .n_path = c->doc->results.twin_paths,
+                                              .seed = c->doc->fit.seed ^ 0x7477696eu};
     const struct radiance_input in = {.scene = pipeline_scene(c, m),
                                       .model = &m->appearance,
                                       .param = m->fit.param,

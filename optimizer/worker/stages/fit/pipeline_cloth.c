@@ -3,7 +3,7 @@
 #include "base/option_id.h"
 #include "geometry/cloth/cloth.h"
 #include "geometry/fibers/shape/fiber_correct.h"
-#include "optimizer/job/option_key.h"
+#include "optimizer/job/options/option_key.h"
 #include "optimizer/worker/stages/fit/pipeline_fit_option.h"
 #include "optimizer/worker/stages/fit/pipeline_trace.h"
 
@@ -47,20 +47,20 @@ static status check_company(const struct pipeline_context *c, struct error *err)
             return error_set_field(err, STATUS_INVALID, OPTION_MODEL,
                                    "numbers of the cloth are fitted with models of fibers only: '%s' sees a volume",
                                    c->model[i].appearance.id);
-    if (c->doc->fit_radius)
-        return error_set_field(err, STATUS_INVALID, OPTION_FIT_RADIUS,
-                               "'%s' is not for a cloth with fitted numbers: fit the %s of '%s'",
-                               job_option_key(OPTION_FIT_RADIUS), c->doc->cloth != NULL ? "fiber_radius_um" : "radius",
-                               job_option_key(c->doc->cloth != NULL ? OPTION_CLOTH : OPTION_CORRECTION));
+    if (c->doc->fit.fit_radius)
+        return error_set_field(
+            err, STATUS_INVALID, OPTION_FIT_RADIUS, "'%s' is not for a cloth with fitted numbers: fit the %s of '%s'",
+            job_option_key(OPTION_FIT_RADIUS), c->doc->cloth.description != NULL ? "fiber_radius_um" : "radius",
+            job_option_key(c->doc->cloth.description != NULL ? OPTION_CLOTH : OPTION_CORRECTION));
     return STATUS_OK;
 }
 
 /* All numbers that the cloth has: those of its description, or its corrections. */
 static const struct cloth_number *numbers_of(const struct pipeline_context *c, size_t *n)
 {
-    const struct cloth_description *d = c->doc->cloth;
-    *n = d != NULL ? d->n_number : c->doc->has_correction ? CORRECTION_N : 0;
-    return d != NULL ? d->number : c->doc->correction;
+    const struct cloth_description *d = c->doc->cloth.description;
+    *n = d != NULL ? d->n_number : c->doc->cloth.has_correction ? CORRECTION_N : 0;
+    return d != NULL ? d->number : c->doc->cloth.correction;
 }
 
 status pipeline_cloth_inputs(struct pipeline_context *c, struct error *err)
@@ -146,7 +146,8 @@ static status build_tile(struct pipeline_context *c, const double *value, struct
     const struct progress progress = {.cancel = c->progress.cancel};
     struct cloth_description *d = malloc(sizeof *d);
     if (d == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make the cloth: out of memory");
-    status s = cloth_description_enlarge(c->doc->cloth, variant.final ? c->doc->cloth_final_tiles : 1, d, err);
+    status s =
+        cloth_description_enlarge(c->doc->cloth.description, variant.final ? c->doc->cloth.final_tiles : 1, d, err);
     if (s == STATUS_OK) {
         d->seed += variant.places;
         s = cloth_build(d, value, c->pool, &progress, f, report, err);
@@ -172,8 +173,8 @@ static status make_fibers(struct pipeline_context *c, const double *number, stru
             double start = c->number.range[i].start;
             value[c->number.item[i].index] = k == 0 ? number[i] : start + share * (number[i] - start);
         }
-        s = c->doc->cloth != NULL ? build_tile(c, value, variant, f, report, err)
-                                  : fiber_correct(&c->uncorrected, value, f, err);
+        s = c->doc->cloth.description != NULL ? build_tile(c, value, variant, f, report, err)
+                                              : fiber_correct(&c->uncorrected, value, f, err);
         if (s != STATUS_INVALID) return s;
     }
     return s;
@@ -185,7 +186,7 @@ static status make_fibers(struct pipeline_context *c, const double *number, stru
 static struct variant variant_of(const struct pipeline_cloth_trace *t, const struct estimator_call *call)
 {
     struct variant v = {.final = t->final};
-    if (t->c->doc->cloth != NULL && t->c->doc->cloth_renew_places && t->cloth.number_derivatives)
+    if (t->c->doc->cloth.description != NULL && t->c->doc->cloth.renew_places && t->cloth.number_derivatives)
         v.places = 2 * (uint64_t)call->iteration + (call->replica == REPLICA_FIT_B ? 2 : 1);
     return v;
 }
@@ -288,8 +289,8 @@ static void plan_budget(const struct pipeline_context *c, const struct descent_m
                         struct fit_problem *problem, struct cloth_search *q)
 {
     double least = (double)method->least_budget(problem), n_row = (double)problem->observation->n;
-    double whole = (double)(c->doc->path_budget > 0 ? c->doc->path_budget / q->option->n_start
-                                                    : BUDGET_FACTOR * method->info->default_path_budget);
+    double whole = (double)(c->doc->fit.path_budget > 0 ? c->doc->fit.path_budget / q->option->n_start
+                                                        : BUDGET_FACTOR * method->info->default_path_budget);
     double n_extra = (double)q->option->n_extra_start, least_screen = n_extra > 0.0 ? 1.0 + n_extra : 0.0;
     double per_cloth = SCREEN_ITERATIONS * least, most = fmin(MOST_CLOTHS + n_extra, CLOTH_MAX_SCREEN);
     double n_screen = fmax(least_screen, floor(fmin(most, screen_share * whole / per_cloth)));
@@ -324,7 +325,7 @@ status pipeline_cloth_fit(struct pipeline_cloth_trace *trace, const struct pipel
     struct fit_problem joint = *problem;
     struct estimator e = estimate_journal_estimator(trace->journal);
     struct cloth_search q = {
-        .method = descent_find(c->doc->method), .problem = &joint, .option = &j->option, .cloth = &trace->cloth};
+        .method = descent_find(c->doc->fit.method), .problem = &joint, .option = &j->option, .cloth = &trace->cloth};
     joint.estimator = &e;
     plan_budget(c, q.method, &joint, &q);
     status s = cloth_search_run(&q, &m->cloth, err);

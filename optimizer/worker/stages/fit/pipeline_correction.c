@@ -12,11 +12,14 @@
 /* Paths of a row and replica when a fit is scored: a share of those of the fit, between two bounds. */
 static const double score_share = 0.1, score_least = 4096.0, score_most = 65536.0;
 
-bool pipeline_correction_applies(const struct pipeline_context *c) { return c->doc->has_correction && c->number.n > 0; }
+bool pipeline_correction_applies(const struct pipeline_context *c)
+{
+    return c->doc->cloth.has_correction && c->number.n > 0;
+}
 
 void pipeline_correction_priors(struct pipeline_context *c)
 {
-    if (!c->doc->has_correction || !c->doc->has_volume) return;
+    if (!c->doc->cloth.has_correction || !c->doc->scan.given) return;
     const double se = pipeline_scan_error_radius(c);
     for (size_t k = 0; k < c->number.n; k++) {
         struct pipeline_number *item = &c->number.item[k];
@@ -45,7 +48,7 @@ static status fit_uncorrected(struct pipeline_context *c, size_t i_model, const 
                                         .estimator = &e,
                                         .path_budget = m->cloth.final.n_path,
                                         .progress = progress};
-    status s = fit_run(descent_find(c->doc->method), &problem, &option, r, err);
+    status s = fit_run(descent_find(c->doc->fit.method), &problem, &option, r, err);
     free(configuration);
     return s;
 }

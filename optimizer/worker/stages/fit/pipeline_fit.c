@@ -54,10 +54,10 @@ static struct fit_problem problem_of(struct fit_listener *l, const struct progre
                                 .info = l->joint->info.param,
                                 .parameter = l->joint->parameter,
                                 .observation = &c->row,
-                                .path_budget = c->doc->path_budget,
-                                .precision = c->doc->precision,
-                                .max_iteration = c->doc->max_iteration,
-                                .discrepancy = c->doc->discrepancy,
+                                .path_budget = c->doc->fit.path_budget,
+                                .precision = c->doc->fit.precision,
+                                .max_iteration = c->doc->fit.max_iteration,
+                                .discrepancy = c->doc->fit.discrepancy,
                                 .report = on_step,
                                 .report_context = l,
                                 .progress = progress};
@@ -75,7 +75,7 @@ static status fit_parameters(struct fit_listener *l, const struct progress *prog
         struct estimator estimator = estimate_journal_estimator(trace.journal);
         l->journal = trace.journal;
         problem.estimator = &estimator;
-        s = fit_run(descent_find(c->doc->method), &problem, &l->joint->option, &c->model[l->i_model].fit, err);
+        s = fit_run(descent_find(c->doc->fit.method), &problem, &l->joint->option, &c->model[l->i_model].fit, err);
     }
     if (s == STATUS_OK && estimate_journal_n_replayed(trace.journal) > 0)
         log_info(c->log, "%zu estimates came from the checkpoint", estimate_journal_n_replayed(trace.journal));
@@ -224,7 +224,7 @@ static status fit_model(struct fit_listener *listener, struct error *err)
     struct pipeline_context *c = listener->pipeline;
     struct pipeline_model *m = &c->model[listener->i_model];
     struct progress_part rest, part;
-    double before = c->doc->fit_radius ? PIPELINE_RADIUS_SHARE : 0.0;
+    double before = c->doc->fit.fit_radius ? PIPELINE_RADIUS_SHARE : 0.0;
     struct progress whole = progress_begin_part(&rest, &c->progress, before, 1.0 - before);
     struct progress progress = pipeline_model_progress(&part, &whole, c, listener->i_place);
     struct pipeline_joint *joint = malloc(sizeof *joint);
@@ -233,8 +233,8 @@ static status fit_model(struct fit_listener *listener, struct error *err)
     listener->joint = joint;
     status s = pipeline_joint_init(c, listener->i_model, joint, err);
     if (s == STATUS_OK) pipeline_add_nested_starts(c, listener->i_model, &joint->option);
-    if (s == STATUS_OK && descent_find(c->doc->method) == NULL)
-        s = error_set_field(err, STATUS_INVALID, OPTION_METHOD, "unknown method '%s'", c->doc->method);
+    if (s == STATUS_OK && descent_find(c->doc->fit.method) == NULL)
+        s = error_set_field(err, STATUS_INVALID, OPTION_METHOD, "unknown method '%s'", c->doc->fit.method);
     if (s == STATUS_OK) s = run_fit(listener, &progress, err);
     if (s == STATUS_OK) {
         conclude_fit(c, m);
@@ -273,7 +273,7 @@ status stage_fit_load(struct pipeline_context *c, struct error *err)
     pipeline_correction_priors(c);
     status s = pipeline_work_path(c, "fit", "result.bin", path, err);
     if (s == STATUS_OK) s = work_file_read(path, "fit.12", section, n, err);
-    if (s == STATUS_OK && c->doc->fit_radius) s = pipeline_radius_apply(c, err);
+    if (s == STATUS_OK && c->doc->fit.fit_radius) s = pipeline_radius_apply(c, err);
     for (size_t i = 0; i < c->n_model && s == STATUS_OK; i++) conclude_fit(c, &c->model[i]);
     return s;
 }
@@ -284,7 +284,7 @@ status stage_fit(struct pipeline_context *c, struct error *err)
     pipeline_correction_priors(c);
     size_t order[JOB_MAX_MODEL];
     status s = worker_series_open(c->folder, &listener.series, err);
-    if (s == STATUS_OK && c->doc->fit_radius) s = pipeline_radius_search(c, listener.series, err);
+    if (s == STATUS_OK && c->doc->fit.fit_radius) s = pipeline_radius_search(c, listener.series, err);
     listener.step_base = c->radius.n_step;
     pipeline_fit_order(c, order);
     for (; listener.i_place < c->n_model && s == STATUS_OK; listener.i_place++) {

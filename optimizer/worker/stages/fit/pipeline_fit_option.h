@@ -3,7 +3,7 @@
 #define SELVEDGE_OPTIMIZER_PIPELINE_FIT_OPTION_H
 
 #include "optimizer/fit/objective/fit_layout.h"
-#include "optimizer/job/job_fit_option.h"
+#include "optimizer/job/document/job_fit_option.h"
 
 void pipeline_fit_option(const struct job_fit_option *from, const struct param_info *info, size_t n_param,
                          struct fit_option *to);

@@ -18,7 +18,7 @@ void pipeline_copy_profile(const struct worker_folder *own, const struct job_doc
     struct worker_folder other = {.lock_fd = -1};
     char from[WORKER_PATH_BYTES], to[WORKER_PATH_BYTES], folder[WORKER_PATH_BYTES], *text = NULL;
     size_t n = 0;
-    if (doc->profile_job[0] == '\0' || !pipeline_other_folder(own, doc->profile_job, &other)) return;
+    if (doc->fit.profile_job[0] == '\0' || !pipeline_other_folder(own, doc->fit.profile_job, &other)) return;
     worker_folder_path(own, ADOPTED_PROFILE, "result.json", to);
     worker_folder_path(&other, JOB_FOLDER_RESULTS, "result.json", from);
     if (access(own->path, F_OK) != 0 || access(to, F_OK) == 0) return;
@@ -65,7 +65,7 @@ static size_t take_parameter(struct pipeline_context *c, struct job_model *m, co
             worker_status_warn(c->status,
                                "the profile of job '%s' has '%s' at %g +- %g, outside of the bounds of this job: it "
                                "gives no prior",
-                               c->doc->profile_job, name, json_number_value(value), json_number_value(se));
+                               c->doc->fit.profile_job, name, json_number_value(value), json_number_value(se));
             continue;
         }
         m->option.prior_mean[p] = json_number_value(value);
@@ -81,12 +81,12 @@ static status take_model(struct pipeline_context *c, size_t i, const json_t *pro
 {
     const json_t *models = json_object_get(profile, "models");
     const bool is_grey = json_integer_value(json_object_get(json_object_get(profile, "table"), "n_channel")) == 1;
-    struct job_model *m = &c->doc->model[i];
+    struct job_model *m = &c->doc->fit.model[i];
     const struct job_document *doc = c->doc;
     struct model_sets sets;
     size_t k;
     const json_t *model, *parameter;
-    status s = model_sets_init(&sets, model_catalogue_find(m->id), doc->group, doc->n_group, err);
+    status s = model_sets_init(&sets, model_catalogue_find(m->id), doc->cloth.group, doc->cloth.n_group, err);
     if (s != STATUS_OK) return s;
     json_array_foreach(models, k, model)
     {
@@ -103,7 +103,7 @@ static status take_model(struct pipeline_context *c, size_t i, const json_t *pro
 static status refuse(const struct pipeline_context *c, const char *why, struct error *err)
 {
     return error_set_field(err, STATUS_INVALID, OPTION_PROFILE_JOB,
-                           "cannot take priors from the profile of job '%s': %s", c->doc->profile_job, why);
+                           "cannot take priors from the profile of job '%s': %s", c->doc->fit.profile_job, why);
 }
 
 status pipeline_profile_priors(struct pipeline_context *c, struct error *err)
@@ -111,7 +111,7 @@ status pipeline_profile_priors(struct pipeline_context *c, struct error *err)
     char path[WORKER_PATH_BYTES];
     size_t n_prior = 0;
     bool found = false;
-    if (c->doc->profile_job[0] == '\0' || c->folder->lock_fd < 0) return STATUS_OK;
+    if (c->doc->fit.profile_job[0] == '\0' || c->folder->lock_fd < 0) return STATUS_OK;
     worker_folder_path(c->folder, ADOPTED_PROFILE, "result.json", path);
     json_t *result = json_load_file(path, 0, NULL);
     const json_t *profile = json_object_get(result, "profile");
@@ -120,13 +120,15 @@ status pipeline_profile_priors(struct pipeline_context *c, struct error *err)
         s = refuse(c, "there is no such job, or it has no result yet", err);
     else if (!json_is_array(json_object_get(profile, "models")))
         s = refuse(c, "it has not fitted the profile of a fiber", err);
-    for (size_t i = 0; i < c->doc->n_model && s == STATUS_OK; i++) s = take_model(c, i, profile, &n_prior, &found, err);
+    for (size_t i = 0; i < c->doc->fit.n_model && s == STATUS_OK; i++)
+        s = take_model(c, i, profile, &n_prior, &found, err);
     json_decref(result);
     if (s == STATUS_OK && !found) s = refuse(c, "it has fitted none of this job's models", err);
-    if (s == STATUS_OK) log_info(c->log, "%zu priors come from the profile of job %s", n_prior, c->doc->profile_job);
+    if (s == STATUS_OK)
+        log_info(c->log, "%zu priors come from the profile of job %s", n_prior, c->doc->fit.profile_job);
     if (s == STATUS_OK && n_prior == 0)
         worker_status_warn(c->status,
                            "the profile of job '%s' determines no parameter that could take a prior: none was taken",
-                           c->doc->profile_job);
+                           c->doc->fit.profile_job);
     return s;
 }

@@ -2,7 +2,7 @@
 #include "base/catalogue/method_catalogue.h"
 #include "base/option_id.h"
 #include "optimizer/fit/descent/fit_run.h"
-#include "optimizer/job/option_key.h"
+#include "optimizer/job/options/option_key.h"
 #include "optimizer/worker/stages/fit/pipeline_fit_option.h"
 #include "optimizer/worker/stages/fit/pipeline_trace.h"
 
@@ -64,7 +64,7 @@ static status run_fit(struct search *q, double u, const struct estimator *e, con
     struct pipeline_context *c = q->c;
     struct pipeline_model *m = &c->model[c->radius.i_model];
     const struct descent_method *method = descent_find(method_gauss_newton.id);
-    uint64_t budget = c->doc->path_budget > 0 ? c->doc->path_budget : method->info->default_path_budget;
+    uint64_t budget = c->doc->fit.path_budget > 0 ? c->doc->fit.path_budget : method->info->default_path_budget;
     double paths = fmax(budget_share * (double)budget, least_paths_a_row * (double)c->fitted.n);
     struct fit_parameter parameter[FIT_MAX_PARAM];
     struct fit_option option;
@@ -183,8 +183,8 @@ static status check_range(struct pipeline_context *c, struct error *err)
 {
     struct pipeline_radius *r = &c->radius;
     const struct job_document *doc = c->doc;
-    r->lower_m = isnan(doc->radius_lower_um) ? 0.5 * r->start_m : doc->radius_lower_um * um;
-    r->upper_m = isnan(doc->radius_upper_um) ? 2.0 * r->start_m : doc->radius_upper_um * um;
+    r->lower_m = isnan(doc->fit.radius_lower_um) ? 0.5 * r->start_m : doc->fit.radius_lower_um * um;
+    r->upper_m = isnan(doc->fit.radius_upper_um) ? 2.0 * r->start_m : doc->fit.radius_upper_um * um;
     if (r->upper_m < 1.1 * r->lower_m) /* one bound was given and lies beyond the default of the other */
         return error_set_field(err, STATUS_INVALID, OPTION_FIT_RADIUS,
                                "'%s' leaves no range to search: %.4g to %.4g um; the cloth's fibers have %.4g um",

@@ -42,7 +42,7 @@ struct scan_trace {
 
 bool pipeline_scan_error_applies(const struct pipeline_context *c, size_t i_model)
 {
-    return c->doc->has_volume && c->number.n == 0 && c->model[i_model].appearance.kind == MODEL_SURFACE &&
+    return c->doc->scan.given && c->number.n == 0 && c->model[i_model].appearance.kind == MODEL_SURFACE &&
            c->model[i_model].sets.info.n_param + N_NUMBER <= FIT_MAX_PARAM && c->geometry.axis_direction_se_rad > 0.0;
 }
 
@@ -51,7 +51,7 @@ double pipeline_scan_error_radius(const struct pipeline_context *c)
     const struct reconstruct_report *g = &c->geometry;
     const struct fiber_set *f = c->uncorrected.n_fiber > 0 ? &c->uncorrected : &c->fiber;
     double mean_m = 0.0, se_m = 0.0;
-    if (isnan(g->radius_se_m[0]) || c->doc->fit_radius) return 0.0;
+    if (isnan(g->radius_se_m[0]) || c->doc->fit.fit_radius) return 0.0;
     for (size_t i = 0; i < f->n_fiber; i++) mean_m += (double)f->radius_m[i] / (double)f->n_fiber;
     for (int a = 0; a < 3; a++)
         if (isfinite(g->radius_se_m[a])) se_m = fmax(se_m, g->radius_se_m[a]);

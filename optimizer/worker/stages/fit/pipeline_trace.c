@@ -38,8 +38,8 @@ void pipeline_trace_request(struct trace_estimator *t, const struct pipeline_con
         .request = {.input = {.scene = pipeline_scene(c, m), .model = &m->appearance, .n_set = m->sets.n_set},
                     .configuration = configuration,
                     .n_configuration = n_configuration,
-                    .seed = c->doc->seed,
-                    .share_camera_paths = c->doc->share_camera_paths},
+                    .seed = c->doc->fit.seed,
+                    .share_camera_paths = c->doc->fit.share_camera_paths},
         .pool = c->pool};
 }
 

@@ -1,7 +1,7 @@
 /* The stages of a job with the profile of a single fiber: "fit" fits every model to it, "report" writes the results. A
  * fit takes seconds, so an interrupted job begins anew. */
 #include "base/option_id.h"
-#include "optimizer/job/option_key.h"
+#include "optimizer/job/options/option_key.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/report/page/report_page.h"
 #include "optimizer/worker/report/profile/profile_report.h"
@@ -51,11 +51,11 @@ status stage_profile_fit(struct pipeline_context *c, struct error *err)
                                                 .profile = &c->profile,
                                                 .parameter = m->parameter,
                                                 .option = &option,
-                                                .scale = c->doc->profile_scale,
-                                                .max_iteration = c->doc->max_iteration,
+                                                .scale = c->doc->profile.scale,
+                                                .max_iteration = c->doc->fit.max_iteration,
                                                 .pool = c->pool,
                                                 .progress = &progress};
-        s = profile_fit_run(&problem, job_document_profile_name(c->doc), &m->profile, err);
+        s = profile_fit_run(&problem, job_profile_name(&c->doc->profile), &m->profile, err);
         if (s != STATUS_OK) return s;
         take_fit(m);
         warn(c, m);

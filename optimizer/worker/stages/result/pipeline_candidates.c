@@ -14,8 +14,8 @@ static status candidate_set(const struct pipeline_context *pipeline, struct obse
 {
     const struct job_document *doc = pipeline->doc;
     status s = STATUS_OK;
-    for (size_t i = 0; i < doc->n_candidate && s == STATUS_OK; i++) {
-        const struct job_candidate *c = &doc->candidate[i];
+    for (size_t i = 0; i < doc->fit.n_candidate && s == STATUS_OK; i++) {
+        const struct job_candidate *c = &doc->fit.candidate[i];
         struct observation item = {.weight = 1.0};
         item.configuration = observation_configuration(doc, c->light_theta_deg, c->light_phi_deg, c->camera_theta_deg,
                                                        c->camera_phi_deg, c->cloth_rotation_deg);
@@ -109,7 +109,7 @@ static status rank(struct pipeline_context *c, size_t i_model, const struct obse
 
 status pipeline_rank_candidates(struct pipeline_context *c, struct error *err)
 {
-    size_t n = c->doc->n_candidate;
+    size_t n = c->doc->fit.n_candidate;
     if (n == 0) return STATUS_OK;
     struct observation_set o;
     struct estimate *replica[2] = {calloc(n, sizeof(struct estimate)), calloc(n, sizeof(struct estimate))};

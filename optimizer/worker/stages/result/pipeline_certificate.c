@@ -46,7 +46,7 @@ static status certify(struct pipeline_context *c, struct pipeline_model *m, cons
                                                .weight = weight,
                                                .n_configuration = c->fitted.n,
                                                .n_path = N_PATH,
-                                               .seed = c->doc->seed,
+                                               .seed = c->doc->fit.seed,
                                                .replica = REPLICA_CERTIFICATE};
     status s = derivative_check_run(&q, &c->progress, &m->certificate, err);
     if (s != STATUS_OK) return s;

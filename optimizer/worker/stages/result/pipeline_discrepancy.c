@@ -1,7 +1,7 @@
 #include "optimizer/worker/stages/result/pipeline_discrepancy.h"
 #include "base/option_id.h"
 #include "optimizer/fit/discrepancy/discrepancy_fit.h"
-#include "optimizer/job/option_key.h"
+#include "optimizer/job/options/option_key.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -13,7 +13,7 @@ const struct discrepancy *pipeline_discrepancy(const struct pipeline_model *m)
 
 bool pipeline_discrepancy_expected(const struct pipeline_context *c, const struct pipeline_model *m)
 {
-    return c->doc->discrepancy && m->appearance.kind == MODEL_SURFACE &&
+    return c->doc->fit.discrepancy && m->appearance.kind == MODEL_SURFACE &&
            m->fit.cross_validation.discrepancy_share > 0.0;
 }
 
@@ -58,7 +58,7 @@ status pipeline_find_discrepancy(struct pipeline_context *c, struct pipeline_mod
     const struct cross_validation *v = &m->fit.cross_validation;
     m->discrepancy = (struct pipeline_discrepancy){.fit_rel_rms = m->validation.fit.rel_rms,
                                                    .heldout_rel_rms = m->validation.held_out.rel_rms};
-    if (!c->doc->discrepancy) return STATUS_OK;
+    if (!c->doc->fit.discrepancy) return STATUS_OK;
     if (!pipeline_discrepancy_expected(c, m)) {
         worker_status_warn(c->status, "%s: the fit of %s goes without one, because %s",
                            job_option_key(OPTION_DISCREPANCY), m->appearance.id,

@@ -1,7 +1,7 @@
 /* Stage "report": everything under results/. The numbers are written first, so that they can be looked at while
  * pictures are rendered. */
 #include "base/option_id.h"
-#include "optimizer/job/option_key.h"
+#include "optimizer/job/options/option_key.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/report/cloth/quality.h"
 #include "optimizer/worker/report/export/exports.h"
@@ -24,7 +24,7 @@ static const double most_overlap = 0.1;
 
 static void warn_of_overlap(const struct pipeline_context *c)
 {
-    if (c->doc->cloth == NULL || !(c->cloth.overlap_mean > most_overlap)) return;
+    if (c->doc->cloth.description == NULL || !(c->cloth.overlap_mean > most_overlap)) return;
     worker_status_warn(
         c->status,
         "'%s' asks for more fiber than fits: its fibers run into each other by %.0f %% of their diameter "
@@ -65,8 +65,8 @@ static status report_pictures(struct pipeline_context *c, struct error *err)
 
 status stage_report(struct pipeline_context *c, struct error *err)
 {
-    if (job_document_geometry_only(c->doc)) return report_geometry(c, err);
-    if (job_document_pictures_only(c->doc)) return report_pictures(c, err);
+    if (job_document_kind(c->doc) == JOB_OF_GEOMETRY) return report_geometry(c, err);
+    if (job_document_kind(c->doc) == JOB_OF_PICTURES) return report_pictures(c, err);
     status s = pipeline_certify(c, err);
     if (s == STATUS_OK) s = pipeline_rank_candidates(c, err);
     if (s == STATUS_OK) s = pipeline_measure_skill(c, err);

@@ -42,14 +42,14 @@ double pipeline_pilot_paths(double n_fit_path) { return 0.05 * n_fit_path; }
 
 double pipeline_validation_paths(const struct pipeline_context *c, double n_fit_path)
 {
-    double least =
-        c->doc->path_budget > 0 ? fmin(validation_least_paths, (double)c->doc->path_budget) : validation_least_paths;
+    double least = c->doc->fit.path_budget > 0 ? fmin(validation_least_paths, (double)c->doc->fit.path_budget)
+                                               : validation_least_paths;
     return fmax(validation_share * n_fit_path, least);
 }
 
 double pipeline_factor_paths(const struct pipeline_context *c, double n_fit_path)
 {
-    return c->doc->discrepancy ? factor_share / validation_share * pipeline_validation_paths(c, n_fit_path) : 0.0;
+    return c->doc->fit.discrepancy ? factor_share / validation_share * pipeline_validation_paths(c, n_fit_path) : 0.0;
 }
 
 static bool gives_factor(const struct pipeline_context *c, size_t i)

@@ -91,7 +91,7 @@ static enum verdict_scan scan_of(const struct pipeline_context *c)
                                            [GRADE_RESOLVED] = VERDICT_SCAN_RESOLVED,
                                            [GRADE_PARTLY] = VERDICT_SCAN_PARTLY,
                                            [GRADE_UNRESOLVED] = VERDICT_SCAN_UNRESOLVED};
-    return c->doc->has_volume ? of[c->geometry.grade.verdict] : VERDICT_NO_SCAN;
+    return c->doc->scan.given ? of[c->geometry.grade.verdict] : VERDICT_NO_SCAN;
 }
 
 void pipeline_reach_verdict(struct pipeline_context *c)
@@ -102,7 +102,7 @@ void pipeline_reach_verdict(struct pipeline_context *c)
                                   .n_input_warning = c->n_input_warning,
                                   .not_determined = not_determined,
                                   .at_bound = at_bound};
-    if (job_document_has_rows(c->doc)) {
+    if (job_document_kind(c->doc) == JOB_OF_FIT) {
         const struct pipeline_model *best = &c->model[pipeline_best_model(c)];
         list_parameters(c, best, not_determined, at_bound);
         add_fit(c, best, &facts);

@@ -75,7 +75,8 @@ void pipeline_link_geometry(const struct worker_folder *own, const struct job_do
 {
     struct worker_folder other = {.lock_fd = -1};
     char folder[WORKER_PATH_BYTES], name[160];
-    if (doc->geometry_job[0] == '\0' || stages_done(own) || !pipeline_other_folder(own, doc->geometry_job, &other))
+    if (doc->scan.geometry_job[0] == '\0' || stages_done(own) ||
+        !pipeline_other_folder(own, doc->scan.geometry_job, &other))
         return;
     if (access(own->path, F_OK) != 0 || access(other.path, F_OK) != 0) return;
     for (size_t i = 0; i < N_CHECKPOINT; i++) {
@@ -90,12 +91,13 @@ void pipeline_link_geometry(const struct worker_folder *own, const struct job_do
 static status other_folder(const struct pipeline_context *c, struct worker_folder *f, struct error *err)
 {
     struct worker_folder other = {.lock_fd = -1};
-    if (!pipeline_other_folder(c->folder, c->doc->geometry_job, &other))
+    if (!pipeline_other_folder(c->folder, c->doc->scan.geometry_job, &other))
         return error_set(err, STATUS_INVALID, "the job folder's path is too long");
     snprintf(f->path, sizeof f->path, "%.2000s/%s", c->folder->path, JOB_FOLDER_ADOPTED);
     if (access(other.path, F_OK) == 0) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, OPTION_GEOMETRY_JOB,
-                           "cannot take over the geometry of job '%s': there is no such job", c->doc->geometry_job);
+                           "cannot take over the geometry of job '%s': there is no such job",
+                           c->doc->scan.geometry_job);
 }
 
 /* The first half of a fingerprint depends on the document and on the program (document_fingerprint.h). */
@@ -117,7 +119,7 @@ static status check_program(const struct pipeline_context *c, const struct worke
         err, STATUS_INVALID, OPTION_GEOMETRY_JOB,
         "cannot take over the geometry of job '%s': it was made by another version of the program, or "
         "has not begun; run it again",
-        c->doc->geometry_job);
+        c->doc->scan.geometry_job);
 }
 
 static status adopt(struct pipeline_context *c, const struct worker_folder *f, size_t i, struct error *err)
@@ -126,7 +128,7 @@ static status adopt(struct pipeline_context *c, const struct worker_folder *f, s
     if (!worker_folder_stage_done(f, checkpoint[i].stage))
         return error_set_field(err, STATUS_INVALID, OPTION_GEOMETRY_JOB,
                                "cannot take over the geometry of job '%s': its stage '%s' is not done",
-                               c->doc->geometry_job, checkpoint[i].stage);
+                               c->doc->scan.geometry_job, checkpoint[i].stage);
     snprintf(part, sizeof part, "%s/%s", checkpoint[i].stage, checkpoint[i].file);
     worker_folder_path(f, JOB_FOLDER_WORK, part, from);
     status s = pipeline_work_path(c, checkpoint[i].stage, checkpoint[i].file, to, err);
@@ -134,7 +136,7 @@ static status adopt(struct pipeline_context *c, const struct worker_folder *f, s
     if (s != STATUS_OK) return s;
     /* Checkpoints are replaced, never changed, so both jobs can share a file. */
     if ((unlink(to) != 0 && errno != ENOENT) || link(from, to) != 0)
-        return error_set_errno(err, "cannot take over '%s' of job '%s'", part, c->doc->geometry_job);
+        return error_set_errno(err, "cannot take over '%s' of job '%s'", part, c->doc->scan.geometry_job);
     s = durable_sync_folder_of(to, err);
     return s == STATUS_OK ? worker_folder_mark_stage(c->folder, checkpoint[i].stage, err) : s;
 }
@@ -142,17 +144,18 @@ static status adopt(struct pipeline_context *c, const struct worker_folder *f, s
 status pipeline_adopt_geometry(struct pipeline_context *c, struct error *err)
 {
     struct worker_folder other = {.lock_fd = -1};
-    if (c->doc->geometry_job[0] == '\0' || stages_done(c->folder)) return STATUS_OK;
+    if (c->doc->scan.geometry_job[0] == '\0' || stages_done(c->folder)) return STATUS_OK;
     status s = other_folder(c, &other, err);
     if (s == STATUS_OK) s = check_program(c, &other, err);
     for (size_t i = 0; i < N_CHECKPOINT && s == STATUS_OK; i++) s = adopt(c, &other, i, err);
     if (s == STATUS_OK) visit_files(&other, c->folder, unlink_file);
-    if (s == STATUS_OK) log_info(c->log, "the geometry is that of job %s", c->doc->geometry_job);
+    if (s == STATUS_OK) log_info(c->log, "the geometry is that of job %s", c->doc->scan.geometry_job);
     return s;
 }
 
 status pipeline_geometry_lost(const struct pipeline_context *c, const char *why, struct error *err)
 {
     return error_set_field(err, STATUS_INVALID, OPTION_GEOMETRY_JOB,
-                           "cannot use the geometry that was taken over from job '%s': %s", c->doc->geometry_job, why);
+                           "cannot use the geometry that was taken over from job '%s': %s", c->doc->scan.geometry_job,
+                           why);
 }

@@ -2,7 +2,7 @@
 #include "base/option_id.h"
 #include "geometry/cloth/cloth.h"
 #include "optimizer/job/job_folder.h"
-#include "optimizer/job/option_key.h"
+#include "optimizer/job/options/option_key.h"
 #include "optimizer/worker/fiber_file.h"
 #include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/progress/pipeline_plan.h"
@@ -26,7 +26,7 @@ static status read_volume(struct pipeline_context *c, struct error *err)
     if (path == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the volume: out of memory");
     struct progress_part part;
     const struct progress inner = progress_begin_part(&part, &c->progress, 0.0, read_share);
-    status s = reconstruct_read(path, c->doc->n_volume_file, &c->option, c->space, c->pool, &inner, &c->volume,
+    status s = reconstruct_read(path, c->doc->scan.n_file, &c->option, c->space, c->pool, &inner, &c->volume,
                                 &c->geometry, err);
     if (s == STATUS_OK && scratch_file_bytes(c->space) > 0)
         log_info(c->log, "volume: beyond the memory setting of %zu MB, worked on in files",
@@ -138,7 +138,7 @@ static bool wants_fibers(const struct pipeline_context *c)
 {
     for (size_t i = 0; i < c->n_model; i++)
         if (c->model[i].appearance.kind == MODEL_SURFACE) return true;
-    return c->doc->unresolved_fibers;
+    return c->doc->scan.unresolved_fibers;
 }
 
 /* Drops the fibers that the scan does not show, unless they are wanted. The voxels have taken their directions, which
@@ -160,7 +160,7 @@ static status join_seams(struct pipeline_context *c, struct error *err)
     if (c->fiber.n_fiber == 0) return STATUS_OK;
     status s = fiber_set_copy(&c->fiber, &c->traced, err);
     if (s == STATUS_OK) s = fiber_seam_measure(&c->fiber, &g->seam_found, err);
-    if (s == STATUS_OK && c->doc->join_seams) s = fiber_seam_join(&c->fiber, &g->seam_join, err);
+    if (s == STATUS_OK && c->doc->scan.join_seams) s = fiber_seam_join(&c->fiber, &g->seam_join, err);
     if (s == STATUS_OK) s = fiber_set_validate(&c->fiber, err);
     return s == STATUS_OK ? fiber_seam_measure(&c->fiber, &g->seam_fiber, err) : s;
 }
@@ -185,7 +185,7 @@ status stage_directions_load(struct pipeline_context *c, struct error *err)
 static status read_fiber_file(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->fiber_file, path);
+    worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->cloth.fiber_file, path);
     status s = fiber_file_read(path, c->doc, &c->fiber, err);
     if (s == STATUS_OK) fiber_file_warn(&c->fiber, c->doc, &(struct warning_sink){pipeline_warn, c});
     return s;
@@ -194,7 +194,7 @@ static status read_fiber_file(struct pipeline_context *c, struct error *err)
 /* Makes the described cloth at the values of the document. */
 static status build_cloth(struct pipeline_context *c, struct error *err)
 {
-    status s = cloth_build(c->doc->cloth, NULL, c->pool, &c->progress, &c->fiber, &c->cloth, err);
+    status s = cloth_build(c->doc->cloth.description, NULL, c->pool, &c->progress, &c->fiber, &c->cloth, err);
     if (s == STATUS_INVALID) job_cloth_name_field(err);
     return s;
 }
@@ -204,8 +204,8 @@ static status check_groups(struct pipeline_context *c, struct error *err)
 {
     size_t n_fiber[FIBER_MAX_GROUP] = {0}, n_group = fiber_set_n_group(&c->fiber);
     for (size_t i = 0; i < c->fiber.n_fiber; i++) n_fiber[c->fiber.group[i]]++;
-    if (c->doc->n_group == 0) {
-        if (n_group > 1 && c->doc->cloth == NULL)
+    if (c->doc->cloth.n_group == 0) {
+        if (n_group > 1 && c->doc->cloth.description == NULL)
             worker_status_warn(
                 c->status,
                 "the fibers belong to %zu groups, but are fitted with one set of parameters: name the groups "
@@ -213,14 +213,14 @@ static status check_groups(struct pipeline_context *c, struct error *err)
                 n_group, job_option_key(OPTION_GROUPS));
         return STATUS_OK;
     }
-    const char *id = c->doc->cloth != NULL ? OPTION_YARNS : OPTION_GROUPS, *key = job_option_key(id);
-    if (n_group > c->doc->n_group)
+    const char *id = c->doc->cloth.description != NULL ? OPTION_YARNS : OPTION_GROUPS, *key = job_option_key(id);
+    if (n_group > c->doc->cloth.n_group)
         return error_set_field(err, STATUS_INVALID, id, "'%s' names %zu groups, but the fibers belong to %zu", key,
-                               c->doc->n_group, n_group);
-    for (size_t g = 0; g < c->doc->n_group; g++)
+                               c->doc->cloth.n_group, n_group);
+    for (size_t g = 0; g < c->doc->cloth.n_group; g++)
         if (n_fiber[g] == 0)
             return error_set_field(err, STATUS_INVALID, id, "'%s' names the group %zu '%s', but no fiber belongs to it",
-                                   key, g, c->doc->group[g]);
+                                   key, g, c->doc->cloth.group[g]);
     return STATUS_OK;
 }
 
@@ -241,13 +241,13 @@ static status grade_fibers(struct pipeline_context *c, struct error *err)
 static status trace_fibers(struct pipeline_context *c, struct error *err)
 {
     struct progress_part part;
-    const struct progress inner = progress_begin_part(&part, &c->progress, 0.0, c->doc->trial ? 0.5 : 1.0);
+    const struct progress inner = progress_begin_part(&part, &c->progress, 0.0, c->doc->scan.trial ? 0.5 : 1.0);
     status s = pipeline_need_volume(c, err);
     if (s == STATUS_OK)
         s = reconstruct_fibers(&c->volume, &c->direction, &c->option, c->pool, &inner, &c->fiber, &c->geometry, err);
     if (s == STATUS_OK) s = grade_fibers(c, err);
     part = (struct progress_part){&c->progress, 0.5, 0.5};
-    if (s == STATUS_OK && c->doc->trial) {
+    if (s == STATUS_OK && c->doc->scan.trial) {
         struct reconstruct_option asked;
         pipeline_volume_options(c->doc, &asked);
         s = reconstruct_trial(&c->volume, &c->fiber, &asked, c->pool, &inner, &c->geometry, err);
@@ -271,18 +271,18 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
     status s;
-    if (c->doc->has_volume) {
+    if (c->doc->scan.given) {
         s = trace_fibers(c, err);
         if (s == STATUS_OK) warn_diameter(c);
     } else {
-        s = c->doc->cloth != NULL ? build_cloth(c, err) : read_fiber_file(c, err);
+        s = c->doc->cloth.description != NULL ? build_cloth(c, err) : read_fiber_file(c, err);
         c->geometry.n_fiber = c->fiber.n_fiber;
         c->geometry.n_vertex = c->fiber.n_vertex;
         if (s == STATUS_OK) c->geometry.total_length_m = fiber_set_length_m(&c->fiber);
     }
     if (s == STATUS_OK) s = fiber_set_validate(&c->fiber, err);
     if (s == STATUS_OK) s = check_groups(c, err);
-    if (s == STATUS_OK && !c->doc->has_volume) s = fiber_seam_measure(&c->fiber, &c->geometry.seam_fiber, err);
+    if (s == STATUS_OK && !c->doc->scan.given) s = fiber_seam_measure(&c->fiber, &c->geometry.seam_fiber, err);
     if (s == STATUS_OK) s = pipeline_work_path(c, "fibers", "fibers.bin", path, err);
     if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
     if (s != STATUS_OK) return s;

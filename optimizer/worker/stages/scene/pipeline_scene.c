@@ -25,7 +25,7 @@ static bool wants_volume_scene(const struct pipeline_context *c)
 static status voxelise(struct pipeline_context *c, struct error *err)
 {
     const struct voxelise_option option = {
-        .voxel_size_m = c->doc->voxel_um * um,
+        .voxel_size_m = c->doc->cloth.voxel_um * um,
         .limit_bytes = c->memory_limit_bytes > 0 ? c->memory_limit_bytes / VOXELISE_MEMORY_SHARE : SIZE_MAX};
     double radius_m = 0.0, voxel_m;
     status s = fibers_voxelise(&c->fiber, &option, c->pool, &c->progress, &c->direction, &voxel_m, err);
@@ -46,7 +46,7 @@ static status voxelise(struct pipeline_context *c, struct error *err)
 
 static status make_volume_scene(struct pipeline_context *c, struct error *err)
 {
-    const struct volume_scene_option option = {.black_sheet = c->doc->black_sheet};
+    const struct volume_scene_option option = {.black_sheet = c->doc->setup.black_sheet};
     status s = volume_scene_init(&c->volume_scene, &c->direction, &option, err);
     c->has_volume_scene = s == STATUS_OK;
     if (s == STATUS_OK)
@@ -72,7 +72,8 @@ static bool sees_sections(const struct appearance *a) { return a->kind == MODEL_
 static status make_fiber_scene(const struct pipeline_context *c, const struct fiber_set *f, bool sections,
                                struct scene **scene, struct error *err)
 {
-    return scene_new(f, &(struct scene_option){.black_sheet = c->doc->black_sheet, .sections = sections}, scene, err);
+    return scene_new(f, &(struct scene_option){.black_sheet = c->doc->setup.black_sheet, .sections = sections}, scene,
+                     err);
 }
 
 status pipeline_fiber_scene(const struct pipeline_context *c, size_t i_model, const struct fiber_set *f,
@@ -114,7 +115,7 @@ status pipeline_make_scene(struct pipeline_context *c, struct error *err)
         log_info(c->log, "scene of their flat sections, for models that state the width: %.0f MB",
                  (double)scene_memory_bytes(c->section_scene) / 1e6);
     if (!wants_volume_scene(c)) return STATUS_OK;
-    if (!c->doc->has_volume) {
+    if (!c->doc->scan.given) {
         direction_volume_release(&c->direction);
         s = voxelise(c, err);
     }
@@ -125,7 +126,7 @@ status pipeline_make_scene(struct pipeline_context *c, struct error *err)
 static status correct_fibers(struct pipeline_context *c, struct error *err)
 {
     double value[CORRECTION_N];
-    for (int k = 0; k < CORRECTION_N; k++) value[k] = c->doc->correction[k].value;
+    for (int k = 0; k < CORRECTION_N; k++) value[k] = c->doc->cloth.correction[k].value;
     status s = fiber_set_copy(&c->fiber, &c->uncorrected, err);
     return s == STATUS_OK ? fiber_correct(&c->uncorrected, value, &c->fiber, err) : s;
 }
@@ -135,11 +136,11 @@ status stage_scene(struct pipeline_context *c, struct error *err)
     reconstruct_warn_fibers(
         &c->geometry, &c->fiber,
         &(struct warning_sink){pipeline_warn, c}); /* this stage runs in every attempt, so the warnings are not lost */
-    if (c->doc->has_correction && c->doc->has_volume && wants_volume_scene(c))
+    if (c->doc->cloth.has_correction && c->doc->scan.given && wants_volume_scene(c))
         pipeline_warn(c, OPTION_CORRECTION,
                       "volume models see the densities and directions of the scan, which corrections of fibers do not "
                       "change: they are without effect on such models");
-    status s = c->doc->has_correction ? correct_fibers(c, err) : STATUS_OK;
+    status s = c->doc->cloth.has_correction ? correct_fibers(c, err) : STATUS_OK;
     if (s == STATUS_OK) s = pipeline_make_scene(c, err);
     return s == STATUS_OK ? surface_cloth_check(c, err) : s;
 }

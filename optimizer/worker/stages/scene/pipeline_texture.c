@@ -30,18 +30,19 @@ static void compare_drafts(struct pipeline_context *c)
 {
     struct weave_draft own;
     char shown[32], given[32], text[400];
-    const bool felt = c->doc->cloth->structure == CLOTH_FELT;
-    if (!felt && (!draft_of_job(c->doc->cloth, &own) || weave_draft_same(&own, &c->texture.guess.draft))) return;
+    const bool felt = c->doc->cloth.description->structure == CLOTH_FELT;
+    if (!felt && (!draft_of_job(c->doc->cloth.description, &own) || weave_draft_same(&own, &c->texture.guess.draft)))
+        return;
     double confidence = c->texture.guess.draft_confidence;
     c->texture.contradicts = true;
     weave_draft_name(&c->texture.guess.draft, shown, sizeof shown);
     if (felt)
-        snprintf(given, sizeof given, "%s", c->doc->cloth->weave);
+        snprintf(given, sizeof given, "%s", c->doc->cloth.description->weave);
     else
         weave_draft_name(&own, given, sizeof given);
     snprintf(text, sizeof text,
              "photograph '%.120s' shows the weave '%s'%s%s (confidence %.2f), and the job says '%s': %s",
-             c->doc->cloth_texture, shown, strcmp(shown, given) == 0 ? " in another" : "",
+             c->doc->cloth.texture, shown, strcmp(shown, given) == 0 ? " in another" : "",
              strcmp(shown, given) == 0 ? " direction or step" : "", confidence, given,
              confidence < LEAST_CERTAIN ? "the photograph is not certain" : "one of them is wrong");
     pipeline_warn(c, OPTION_CLOTH_TEXTURE, text);
@@ -51,18 +52,18 @@ static void compare_drafts(struct pipeline_context *c)
 static void compare_threads(struct pipeline_context *c)
 {
     static const char *const name[] = {"weft", "warp"};
-    const struct cloth_description *d = c->doc->cloth;
+    const struct cloth_description *d = c->doc->cloth.description;
     char text[400];
-    if (!(c->doc->cloth_texture_px_per_mm > 0.0 && c->texture.guess.yarns_confidence > TEXTURE_WORTH_TAKING)) return;
+    if (!(c->doc->cloth.texture_px_per_mm > 0.0 && c->texture.guess.yarns_confidence > TEXTURE_WORTH_TAKING)) return;
     for (int a = CLOTH_WEFT; a <= CLOTH_WARP; a++) {
-        double shown = 10.0 * c->doc->cloth_texture_px_per_mm / c->texture.guess.spacing_px[a == CLOTH_WARP ? 0 : 1];
+        double shown = 10.0 * c->doc->cloth.texture_px_per_mm / c->texture.guess.spacing_px[a == CLOTH_WARP ? 0 : 1];
         if (!(d->threads_per_cm[a] > 0.0) || fabs(log(shown / d->threads_per_cm[a])) < log(1.0 + THREADS_OFF)) continue;
         snprintf(
             text, sizeof text,
             "photograph '%.120s' shows %.3g %s yarns in a centimetre (confidence %.2f), and the job says %.3g: one "
             "of them or the scale of the photograph, %g pixels in a millimetre, is wrong",
-            c->doc->cloth_texture, shown, name[a], c->texture.guess.yarns_confidence, d->threads_per_cm[a],
-            c->doc->cloth_texture_px_per_mm);
+            c->doc->cloth.texture, shown, name[a], c->texture.guess.yarns_confidence, d->threads_per_cm[a],
+            c->doc->cloth.texture_px_per_mm);
         pipeline_warn(c, OPTION_CLOTH_TEXTURE, text);
     }
 }
@@ -75,14 +76,14 @@ static void warn_uncertain(struct pipeline_context *c)
     snprintf(text, sizeof text,
              "the draft comes from photograph '%.120s', which is not certain of it (confidence %.2f): compare it with "
              "the cloth, or state 'weave' or 'draft'",
-             c->doc->cloth_texture, confidence);
+             c->doc->cloth.texture, confidence);
     pipeline_warn(c, OPTION_CLOTH_TEXTURE, text);
 }
 
 static status take_draft(struct pipeline_context *c, struct error *err)
 {
     const struct weave_guess *g = &c->texture.guess;
-    struct cloth_description *d = c->doc->cloth;
+    struct cloth_description *d = c->doc->cloth.description;
     char text[WEAVE_CELL_MAX][WEAVE_CELL_MAX + 1] = {{0}};
     const char *row[WEAVE_CELL_MAX];
     for (size_t j = 0; j < g->draft.n_weft; j++) {
@@ -91,10 +92,10 @@ static status take_draft(struct pipeline_context *c, struct error *err)
         row[j] = text[j];
     }
     status s = cloth_description_draft(d, row, g->draft.n_weft, err);
-    for (int a = CLOTH_WEFT; a <= CLOTH_WARP; a++) d->n_yarn[a] = c->doc->cloth_tile_yarn[a];
+    for (int a = CLOTH_WEFT; a <= CLOTH_WARP; a++) d->n_yarn[a] = c->doc->cloth.tile_yarn[a];
     if (s == STATUS_OK) s = texture_take_widths(c, err);
     if (s == STATUS_OK) s = cloth_description_check(d, err);
-    if (s == STATUS_OK) s = job_cloth_check_final_tiles(c->doc, err);
+    if (s == STATUS_OK) s = job_cloth_check_final_tiles(&c->doc->cloth, err);
     if (s == STATUS_INVALID) job_cloth_name_field(err);
     return s;
 }
@@ -110,7 +111,7 @@ static status detect(struct pipeline_context *c, struct error *err)
     char path[WORKER_PATH_BYTES];
     const struct job_photograph photograph = photograph_plain(JOB_TRANSFER_SRGB);
     struct image im;
-    worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->cloth_texture, path);
+    worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->cloth.texture, path);
     status s = photograph_read(path, &photograph, &im, NULL, err);
     if (s != STATUS_OK) return s;
     const struct weave_picture picture = {im.pixel, im.width, im.height};
@@ -122,9 +123,9 @@ static status detect(struct pipeline_context *c, struct error *err)
 status pipeline_read_texture(struct pipeline_context *c, struct error *err)
 {
     char name[32];
-    if (c->doc->cloth == NULL || c->doc->cloth_texture[0] == '\0') return STATUS_OK;
+    if (c->doc->cloth.description == NULL || c->doc->cloth.texture[0] == '\0') return STATUS_OK;
     status s = detect(c, err);
-    if (s == STATUS_NOT_FOUND && c->doc->cloth_draft_from_texture) return name_file(err, err->code = STATUS_INVALID);
+    if (s == STATUS_NOT_FOUND && c->doc->cloth.draft_from_texture) return name_file(err, err->code = STATUS_INVALID);
     if (s == STATUS_NOT_FOUND) {
         pipeline_warn(c, OPTION_CLOTH_TEXTURE, err->text);
         return STATUS_OK;
@@ -136,9 +137,9 @@ status pipeline_read_texture(struct pipeline_context *c, struct error *err)
     log_info(c->log,
              "photograph '%s' shows the weave '%s' (confidence %.2f), warps every %.2f and wefts every %.2f pixels "
              "(confidence %.2f)",
-             c->doc->cloth_texture, name, g->draft_confidence, g->spacing_px[0], g->spacing_px[1], g->yarns_confidence);
+             c->doc->cloth.texture, name, g->draft_confidence, g->spacing_px[0], g->spacing_px[1], g->yarns_confidence);
     compare_threads(c);
-    if (c->doc->cloth_draft_from_texture) {
+    if (c->doc->cloth.draft_from_texture) {
         warn_uncertain(c);
         return take_draft(c, err);
     }

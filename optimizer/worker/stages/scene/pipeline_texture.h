@@ -5,10 +5,10 @@
 
 #include "optimizer/worker/pipeline_context.h"
 
-/* Fills in c->texture. Without weave and draft in the job it replaces the draft of c->doc->cloth, and the numbers that
- * texture_start.h names; else a contradiction becomes a warning, and so does a photograph without a weave. Errors with
- * the field "cloth.texture": the file cannot be read, or the draft is to come from it and it shows no weave
- * (STATUS_INVALID). Nothing happens without such a photograph. */
+/* Fills in c->texture. Without weave and draft in the job it replaces the draft of c->doc->cloth.description, and
+ * the numbers that texture_start.h names; else a contradiction becomes a warning, and so does a photograph without a
+ * weave. Errors with the field "cloth.texture": the file cannot be read, or the draft is to come from it and it
+ * shows no weave (STATUS_INVALID). Nothing happens without such a photograph. */
 status pipeline_read_texture(struct pipeline_context *c, struct error *err);
 
 #endif

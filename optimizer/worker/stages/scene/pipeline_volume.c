@@ -13,42 +13,42 @@ static const double um = 1e-6;
 void pipeline_volume_options(const struct job_document *doc, struct reconstruct_option *o)
 {
     reconstruct_option_default(o);
-    memcpy(o->raw.n, doc->raw_shape, sizeof o->raw.n);
-    memcpy(o->raw.type, doc->raw_type, sizeof o->raw.type);
-    o->raw.big_endian = doc->raw_big_endian;
-    o->raw.header_bytes = doc->raw_header_bytes;
-    for (int a = 0; a < 3; a++) o->voxel_size_m[a] = doc->voxel_size_um[a] * um; /* NaN stays NaN */
-    memcpy(o->axes, doc->axes, sizeof o->axes);
-    memcpy(o->matrix, doc->matrix, sizeof o->matrix);
-    memcpy(o->crop_voxel, doc->crop_voxel, sizeof o->crop_voxel);
-    o->align = doc->align;
-    o->crop = doc->crop;
-    if (!isnan(doc->crop_keep)) o->crop_keep = doc->crop_keep;
-    o->density_low = doc->density_low;
-    o->density_high = doc->density_high;
-    o->fiber_diameter_voxel = doc->fiber_diameter_voxel;
-    o->hollow_fibers = doc->hollow_fibers;
-    if (!isnan(doc->filter_s)) o->s = doc->filter_s;
-    if (!isnan(doc->filter_t)) o->t = doc->filter_t;
-    if (doc->filter_h > 0) o->h = doc->filter_h;
-    if (!isnan(doc->filter_eps_d)) o->eps_d = doc->filter_eps_d;
-    if (!isnan(doc->filter_eps_j)) o->eps_j = doc->filter_eps_j;
-    if (!isnan(doc->link_sigma_voxel)) o->link_sigma_voxel = doc->link_sigma_voxel;
-    if (doc->min_vertex > 0) o->min_vertex = doc->min_vertex;
-    if (!isnan(doc->radius_um))
-        for (int a = 0; a < 3; a++) o->radius_m[a] = doc->radius_um * um;
-    o->radius_rule = doc->radius_per_axis < 0   ? RADIUS_AUTO
-                     : doc->radius_per_axis > 0 ? RADIUS_PER_AXIS
-                                                : RADIUS_COMMON;
+    memcpy(o->raw.n, doc->scan.raw_shape, sizeof o->raw.n);
+    memcpy(o->raw.type, doc->scan.raw_type, sizeof o->raw.type);
+    o->raw.big_endian = doc->scan.raw_big_endian;
+    o->raw.header_bytes = doc->scan.raw_header_bytes;
+    for (int a = 0; a < 3; a++) o->voxel_size_m[a] = doc->scan.voxel_size_um[a] * um; /* NaN stays NaN */
+    memcpy(o->axes, doc->scan.axes, sizeof o->axes);
+    memcpy(o->matrix, doc->scan.matrix, sizeof o->matrix);
+    memcpy(o->crop_voxel, doc->scan.crop_voxel, sizeof o->crop_voxel);
+    o->align = doc->scan.align;
+    o->crop = doc->scan.crop;
+    if (!isnan(doc->scan.crop_keep)) o->crop_keep = doc->scan.crop_keep;
+    o->density_low = doc->scan.density_low;
+    o->density_high = doc->scan.density_high;
+    o->fiber_diameter_voxel = doc->scan.fiber_diameter_voxel;
+    o->hollow_fibers = doc->scan.hollow_fibers;
+    if (!isnan(doc->scan.filter_s)) o->s = doc->scan.filter_s;
+    if (!isnan(doc->scan.filter_t)) o->t = doc->scan.filter_t;
+    if (doc->scan.filter_h > 0) o->h = doc->scan.filter_h;
+    if (!isnan(doc->scan.filter_eps_d)) o->eps_d = doc->scan.filter_eps_d;
+    if (!isnan(doc->scan.filter_eps_j)) o->eps_j = doc->scan.filter_eps_j;
+    if (!isnan(doc->scan.link_sigma_voxel)) o->link_sigma_voxel = doc->scan.link_sigma_voxel;
+    if (doc->scan.min_vertex > 0) o->min_vertex = doc->scan.min_vertex;
+    if (!isnan(doc->scan.radius_um))
+        for (int a = 0; a < 3; a++) o->radius_m[a] = doc->scan.radius_um * um;
+    o->radius_rule = doc->scan.radius_per_axis < 0   ? RADIUS_AUTO
+                     : doc->scan.radius_per_axis > 0 ? RADIUS_PER_AXIS
+                                                     : RADIUS_COMMON;
 }
 
 const char **pipeline_scan_paths(const struct pipeline_context *c)
 {
-    const size_t n = c->doc->n_volume_file;
+    const size_t n = c->doc->scan.n_file;
     const char **path = malloc(n * (sizeof *path + WORKER_PATH_BYTES));
     for (size_t i = 0; path != NULL && i < n; i++) {
         char *text = (char *)(path + n) + i * WORKER_PATH_BYTES;
-        worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->volume_file[i], text);
+        worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->scan.file[i], text);
         path[i] = text;
     }
     return path;
@@ -61,7 +61,7 @@ status pipeline_scan_size(const struct pipeline_context *c, size_t n[3], struct 
     const char **path = pipeline_scan_paths(c);
     if (path == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the volume: out of memory");
     pipeline_volume_options(c->doc, &option);
-    status s = volume_source_open_declared(path, c->doc->n_volume_file, &option.raw, &source, err);
+    status s = volume_source_open_declared(path, c->doc->scan.n_file, &option.raw, &source, err);
     if (s == STATUS_OK) memcpy(n, volume_source_describe(source)->n, 3 * sizeof *n);
     volume_source_close(source);
     free(path);

@@ -1,7 +1,7 @@
 #include "optimizer/worker/stages/scene/texture_start.h"
 
 #include "base/option_id.h"
-#include "optimizer/job/job_document_parts.h"
+#include "optimizer/job/checks/job_document_parts.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -28,7 +28,7 @@ static struct cloth_number *left_out(struct cloth_description *d, const char *na
 
 static void take(struct pipeline_context *c, const char *name, double value)
 {
-    struct cloth_number *n = left_out(c->doc->cloth, name);
+    struct cloth_number *n = left_out(c->doc->cloth.description, name);
     if (n == NULL) return;
     n->value = fmin(fmax(value, n->lower), n->upper);
     note(c, name);
@@ -36,15 +36,15 @@ static void take(struct pipeline_context *c, const char *name, double value)
 
 static status take_threads(struct pipeline_context *c, int set, bool *taken, struct error *err)
 {
-    struct cloth_description *d = c->doc->cloth;
+    struct cloth_description *d = c->doc->cloth.description;
     const struct cloth_number *cover = left_out(d, cover_name[set]);
-    double per_cm = 10.0 * c->doc->cloth_texture_px_per_mm / c->texture.guess.spacing_px[set];
+    double per_cm = 10.0 * c->doc->cloth.texture_px_per_mm / c->texture.guess.spacing_px[set];
     if (cover == NULL || cover->fitted) return STATUS_OK; /* given, or replaced by given threads */
     if (!(per_cm >= LEAST_PER_CM && per_cm <= MOST_PER_CM))
         return error_set_field(err, STATUS_INVALID, OPTION_TEXTURE_PX_PER_MM,
                                "at %g pixels in a millimetre, photograph '%.120s' shows %.4g %s yarns in a centimetre: "
                                "cloth has %g to %g",
-                               c->doc->cloth_texture_px_per_mm, c->doc->cloth_texture, per_cm,
+                               c->doc->cloth.texture_px_per_mm, c->doc->cloth.texture, per_cm,
                                set == SET_WARP ? "warp" : "weft", LEAST_PER_CM, MOST_PER_CM);
     d->threads_per_cm[direction_of[set]] = per_cm;
     note(c, threads_name[set]);
@@ -64,7 +64,7 @@ static bool lies_in(const struct cloth_description *d, size_t kind, int set)
  * width follows from their plies, and for kinds whose distances are not known. */
 static double seen_flatness(const struct pipeline_context *c, size_t kind)
 {
-    const struct cloth_description *d = c->doc->cloth;
+    const struct cloth_description *d = c->doc->cloth.description;
     double radius_um = cloth_number_value(d, NULL, (int)kind, "fiber_radius_um");
     double packing = cloth_number_value(d, NULL, (int)kind, "packing"), sum = 0.0, n = 0.0;
     for (int set = 0; set < N_SET; set++) {
@@ -79,7 +79,7 @@ static double seen_flatness(const struct pipeline_context *c, size_t kind)
 
 static void take_flatness(struct pipeline_context *c)
 {
-    const struct cloth_description *d = c->doc->cloth;
+    const struct cloth_description *d = c->doc->cloth.description;
     for (size_t k = 0; k < d->n_kind; k++) {
         char name[sizeof d->number[0].name];
         double flatness = seen_flatness(c, k);
@@ -90,7 +90,7 @@ static void take_flatness(struct pipeline_context *c)
 
 static status take_scaled(struct pipeline_context *c, struct error *err)
 {
-    struct cloth_description *d = c->doc->cloth;
+    struct cloth_description *d = c->doc->cloth.description;
     bool taken[N_SET] = {false, false};
     status s = STATUS_OK;
     for (int set = 0; set < N_SET && s == STATUS_OK; set++) s = take_threads(c, set, &taken[set], err);
@@ -107,7 +107,7 @@ static status take_scaled(struct pipeline_context *c, struct error *err)
 status texture_take_widths(struct pipeline_context *c, struct error *err)
 {
     const struct weave_guess *g = &c->texture.guess;
-    if (c->doc->cloth_texture_px_per_mm > 0.0 && g->yarns_confidence > TEXTURE_WORTH_TAKING) return take_scaled(c, err);
+    if (c->doc->cloth.texture_px_per_mm > 0.0 && g->yarns_confidence > TEXTURE_WORTH_TAKING) return take_scaled(c, err);
     for (int set = 0; set < N_SET && g->cover_confidence > TEXTURE_WORTH_TAKING; set++)
         take(c, cover_name[set], g->cover[set]);
     return STATUS_OK;
@@ -150,7 +150,7 @@ static double seen_albedo(const struct pipeline_context *c, size_t kind, int cha
     double share = warp_share(&g->draft), mean = share * seen[SET_WARP] + (1.0 - share) * seen[SET_WEFT];
     double sum = 0.0, n = 0.0;
     for (int set = 0; set < N_SET; set++) {
-        if (!lies_in(c->doc->cloth, kind, set)) continue;
+        if (!lies_in(c->doc->cloth.description, kind, set)) continue;
         sum += seen[set];
         n += 1.0;
     }
@@ -161,7 +161,7 @@ static double seen_albedo(const struct pipeline_context *c, size_t kind, int cha
 static void start_colors(struct pipeline_context *c, size_t i_model, const double mean_rgb[3])
 {
     struct pipeline_model *m = &c->model[i_model];
-    const struct job_model *given = &c->doc->model[i_model];
+    const struct job_model *given = &c->doc->fit.model[i_model];
     for (size_t p = 0; p < m->sets.info.n_param; p++) {
         const struct param_info *info = &m->sets.info.param[p];
         if (info->channel < 0 || strcmp(param_own_symbol(info), "C_TT") != 0 || m->parameter[p].fixed) continue;
@@ -178,12 +178,13 @@ static void start_colors(struct pipeline_context *c, size_t i_model, const doubl
 void texture_take_colors(struct pipeline_context *c)
 {
     double rgb[3];
-    if (!c->texture.found || c->texture.contradicts || !c->doc->cloth_texture_colors || c->doc->n_group == 0) return;
+    if (!c->texture.found || c->texture.contradicts || !c->doc->cloth.texture_colors || c->doc->cloth.n_group == 0)
+        return;
     reflectance(c, rgb);
     if (!isfinite(rgb[0]) || !(c->texture.guess.color_confidence > TEXTURE_WORTH_TAKING)) {
         char text[300];
         snprintf(text, sizeof text, "the colors of warp and weft are not taken from photograph '%.120s': %s",
-                 c->doc->cloth_texture,
+                 c->doc->cloth.texture,
                  isfinite(rgb[0]) ? "it does not show them clearly" : "no fitted row is lit from the front");
         pipeline_warn(c, OPTION_CLOTH_TEXTURE, text);
         return;

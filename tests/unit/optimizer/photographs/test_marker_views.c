@@ -181,14 +181,14 @@ static void test_job_with_markers(void **state)
     camera_at(35, 200, camera);
     draw(&im, camera, 0);
     struct job_document *doc = load_job(state, rig, &im, &k, folder);
-    const struct job_photograph *p = &doc->photograph[0];
+    const struct job_photograph *p = &doc->rows.photograph[0];
     assert_true(fabs(p->camera_theta_deg - 35.0) < 0.5 && fabs(p->camera_phi_deg - (200.0 - 360.0 + 30.0)) < 0.7);
     assert_true(fabs(p->camera_distance_cm - 50.0) < 0.6 && p->light_theta_deg == 20.0);
     assert_true(p->crop_px[0] >= 424 && p->crop_px[0] <= 426 && p->crop_px[2] - p->crop_px[0] == 30);
     photograph_process_release(&k);
     for (size_t i = 0; i < (size_t)WIDTH * HEIGHT * 3; i++) im.pixel[i] = 0.5f;
     assert_int_equal(image_write_exr(&im, scratch_path(state, "a.exr"), NULL), STATUS_OK);
-    doc->photograph[0].crop_px[2] = 0;
+    doc->rows.photograph[0].crop_px[2] = 0;
     assert_int_equal(photograph_process_load(&k, doc, folder, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "'a.exr': it shows 0 of the 4 markers"));
     assert_string_equal(err.field, "photograph_file[0]");
@@ -291,7 +291,7 @@ static void test_job_with_a_board(void **state)
     camera_at(40, 120, camera);
     draw_board(&im, camera, &lens, 20.0);
     struct job_document *doc = load_job(state, rig, &im, &k, folder);
-    const struct job_photograph *p = &doc->photograph[0];
+    const struct job_photograph *p = &doc->rows.photograph[0];
     assert_true(fabs(p->camera_theta_deg - 40.0) < 0.3 && fabs(p->camera_phi_deg - 120.0) < 0.4);
     assert_true(fabs(p->camera_distance_cm - 50.0) < 0.3);
     assert_true(p->crop_px[0] >= 424 && p->crop_px[0] <= 426 && p->crop_px[2] - p->crop_px[0] == 30);

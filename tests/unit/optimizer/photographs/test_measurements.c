@@ -2,6 +2,7 @@
 #include "base/option_id.h"
 #include "optimizer/fit/photographs/measurement_table.h"
 #include "optimizer/fit/photographs/observation_load.h"
+#include "optimizer/job/document/job_file_name.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -14,8 +15,11 @@
 
 #define HEAD "set,index,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg,r,g,b\n"
 
-static const struct job_document set_up = {
-    .lamp_side_cm = 10, .lamp_distance_cm = 61, .camera_distance_cm = 100, .crop_cm = 1, .black_sheet = true};
+static const struct job_document set_up = {.setup.lamp_side_cm = 10,
+                                           .setup.lamp_distance_cm = 61,
+                                           .setup.camera_distance_cm = 100,
+                                           .setup.crop_cm = 1,
+                                           .setup.black_sheet = true};
 
 static void check_error(const char *text, status code, const char *part)
 {
@@ -208,8 +212,8 @@ static void test_real_tables(void **state)
         struct error err = {0};
         char folder[1000], path[1200];
         snprintf(folder, sizeof folder, "%s/measured-reflectance", data != NULL ? data : "../shared/data");
-        snprintf(doc.measurement_file, sizeof doc.measurement_file, "%s.csv", name[i]);
-        snprintf(path, sizeof path, "%s/%s", folder, doc.measurement_file);
+        snprintf(doc.rows.measurement_file, sizeof doc.rows.measurement_file, "%s.csv", name[i]);
+        snprintf(path, sizeof path, "%s/%s", folder, doc.rows.measurement_file);
         FILE *f = fopen(path, "rb");
         if (f == NULL) {
             print_message("real data absent: %s (set SELVEDGE_DATA)\n", path);

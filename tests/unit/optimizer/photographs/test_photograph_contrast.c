@@ -127,13 +127,14 @@ static void test_warning_of_a_black_channel(void **state)
     snprintf(folder, sizeof folder, "%.*s", (int)(strrchr(path, '/') - path), path);
     for (int black = 0; black < 2; black++)
         for (int used = 0; used < 2; used++) {
-            struct job_document doc = {.photograph = &photograph, .n_photograph = 1, .texture_block_mm = 1.0};
+            struct job_document doc = {
+                .rows.photograph = &photograph, .rows.n_photograph = 1, .fit.texture_block_mm = 1.0};
             struct observation_set o;
             struct image im;
             struct error err = {0};
             size_t n_warning = 0;
-            doc.crop_cm = 1.0;
-            doc.texture_weight = used;
+            doc.setup.crop_cm = 1.0;
+            doc.fit.texture_weight = used;
             assert_int_equal(image_init(&im, 40, 40, 3, NULL), STATUS_OK);
             draw(&im, &(struct rng_key){.seed = 3}, 1, 0.0, 0.05, 3);
             for (size_t i = 0; black && i < 40 * 40; i++) im.pixel[3 * i] = 0.0f;

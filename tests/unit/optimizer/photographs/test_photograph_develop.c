@@ -4,6 +4,7 @@
 #include "optimizer/fit/photographs/camera/noise_calibrate.h"
 #include "optimizer/fit/photographs/color/color_matrix.h"
 #include "optimizer/fit/photographs/observation_load.h"
+#include "optimizer/job/job_parse.h"
 #include "optimizer/phantom/simulated_camera/dng_file.h"
 #include "tests/support/camera_files.h"
 #include "tests/support/drawn_chart.h"

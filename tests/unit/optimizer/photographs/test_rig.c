@@ -74,17 +74,17 @@ static void test_views(void **state)
     struct job_document *doc = job_document_of_text(
         DOCUMENT("{\"file\":\"a.exr\",\"set\":\"fit\",\"view\":\"v1\"},{\"file\":\"b.exr\",\"view\":\"v2\"}", RIG));
     if (rig_apply(path, doc, &lens, &board, &err) != STATUS_OK) fail_msg("%s", err.text);
-    const struct job_photograph *p = doc->photograph;
+    const struct job_photograph *p = doc->rows.photograph;
     assert_true(fabs(p[0].light_theta_deg - 30.0) < 1e-4 && fabs(p[0].light_phi_deg - 90.0) < 1e-9);
     assert_true(fabs(p[0].light_distance_cm - 61.0) < 1e-4 && p[0].camera_distance_cm == 80.0);
     assert_true(p[0].camera_theta_deg == 45.0 && p[0].camera_phi_deg == -90.0 && p[0].cloth_rotation_deg == 90.0);
     assert_true(p[1].light_theta_deg == 10.0 && isnan(p[1].light_distance_cm) && p[1].cloth_rotation_deg == 0.0);
     assert_true(lens.has_vignetting && !lens.has_distortion && lens.vignetting[0] == -0.3);
-    snprintf(doc->photograph[1].view, sizeof doc->photograph[1].view, "v3");
+    snprintf(doc->rows.photograph[1].view, sizeof doc->rows.photograph[1].view, "v3");
     assert_int_equal(rig_apply(path, doc, &lens, &board, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "cannot use rig 'rig.json'"));
     assert_non_null(strstr(err.text, "'lamps' has no 'none'"));
-    snprintf(doc->photograph[1].view, sizeof doc->photograph[1].view, "v9");
+    snprintf(doc->rows.photograph[1].view, sizeof doc->rows.photograph[1].view, "v9");
     assert_int_equal(rig_apply(path, doc, &lens, &board, &err), STATUS_INVALID);
     assert_string_equal(err.field, "photograph_view[1]");
     assert_non_null(strstr(err.text, "'b.exr' names the view 'v9'"));
@@ -156,9 +156,9 @@ static void test_places_in_documents(void **state)
     (void)state;
     struct job_document *doc =
         job_document_of_text(DOCUMENT("{" FILE_A CAMERA ",\"light_position_mm\":[300,0,300]}", ""));
-    assert_true(fabs(doc->photograph[0].light_theta_deg - 45.0) < 1e-9);
-    assert_true(fabs(doc->photograph[0].light_distance_cm - 30.0 * sqrt(2.0)) < 1e-9);
-    assert_true(isnan(doc->photograph[0].camera_distance_cm));
+    assert_true(fabs(doc->rows.photograph[0].light_theta_deg - 45.0) < 1e-9);
+    assert_true(fabs(doc->rows.photograph[0].light_distance_cm - 30.0 * sqrt(2.0)) < 1e-9);
+    assert_true(isnan(doc->rows.photograph[0].camera_distance_cm));
     job_document_free(doc);
     job_document_check_error(DOCUMENT("{" FILE_A CAMERA "}", ""), "photographs[0].light_theta_deg", "is missing");
     job_document_check_error(DOCUMENT("{" FILE_A CAMERA ",\"light_theta_deg\":3}", ""), "photographs[0].light_phi_deg",

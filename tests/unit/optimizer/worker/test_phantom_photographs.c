@@ -1,6 +1,7 @@
 /* Photographs of a phantom: the table of configurations, the parameters, and the files that are written. */
 #include "base/angle.h"
 #include "geometry/fibers/fiber_set.h"
+#include "optimizer/job/document/job_file_name.h"
 #include "optimizer/phantom/phantom_photographs.h"
 #include "optimizer/phantom/phantom_view_table.h"
 #include "renderer/image/image.h"

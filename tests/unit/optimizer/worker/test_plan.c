@@ -26,7 +26,7 @@ static struct job *make_job(void)
 {
     static struct job j;
     memset(&j, 0, sizeof j);
-    snprintf(j.doc.method, sizeof j.doc.method, "gauss_newton.v1");
+    snprintf(j.doc.fit.method, sizeof j.doc.fit.method, "gauss_newton.v1");
     j.c.doc = &j.doc;
     j.c.fitted.item = j.row;
     j.c.fitted.n = N_ROW;
@@ -40,16 +40,16 @@ static void test_paths_follow_from_the_rows(void **state)
     struct job *j = make_job();
     const double of_table = pipeline_plan_usual_paths(&j->c);
     assert_true(of_table > 0.5e6 && of_table < 2e6);
-    j->doc.n_photograph = N_ALL; /* their errors end a fit much later */
+    j->doc.rows.n_photograph = N_ALL; /* their errors end a fit much later */
     const double of_photographs = pipeline_plan_usual_paths(&j->c);
     assert_true(of_photographs > 3e6 && of_photographs < 6e6);
     j->c.fitted.n = N_ROW / 2; /* fewer rows, fewer paths */
     assert_true(pipeline_plan_usual_paths(&j->c) == 0.5 * of_photographs);
-    j->doc.path_budget = 300000; /* is used up */
+    j->doc.fit.path_budget = 300000; /* is used up */
     assert_true(pipeline_plan_usual_paths(&j->c) == 300000.0);
-    j->doc.n_photograph = 0;
+    j->doc.rows.n_photograph = 0;
     assert_true(pipeline_plan_usual_paths(&j->c) == 300000.0);
-    j->doc.path_budget = 3000000; /* more than misfit leaves to do */
+    j->doc.fit.path_budget = 3000000; /* more than misfit leaves to do */
     assert_true(pipeline_plan_usual_paths(&j->c) == 0.5 * of_table);
 }
 
@@ -69,11 +69,11 @@ static void test_pictures_cost_less_than_the_fit(void **state)
         before = px;
     }
     assert_true(before == 96);
-    j->doc.render_px = 200; /* the document says so */
+    j->doc.results.render_px = 200; /* the document says so */
     assert_true(result_picture_px(&j->c, 1e4) == 200 && result_picture_samples(&j->c, 1e4) == 2);
-    j->doc.render_sample = 7;
+    j->doc.results.render_sample = 7;
     assert_true(result_picture_px(&j->c, 1e4) == 200 && result_picture_samples(&j->c, 1e4) == 7);
-    j->doc.render_px = 0;
+    j->doc.results.render_px = 0;
     assert_true(result_picture_px(&j->c, 1e4) == 48);
 }
 
@@ -115,8 +115,8 @@ static double certificate_s_of(const char *id, size_t n_fixed)
     struct pipeline_context c = {.doc = &doc, .n_model = 1};
     struct pipeline_model *m = calloc(1, sizeof *m);
     assert_non_null(m);
-    snprintf(doc.measurement_file, sizeof doc.measurement_file, "rows.csv");
-    doc.n_model = 1;
+    snprintf(doc.rows.measurement_file, sizeof doc.rows.measurement_file, "rows.csv");
+    doc.fit.n_model = 1;
     assert_true(appearance_find(id, &m->appearance));
     assert_int_equal(model_sets_init(&m->sets, model_catalogue_find(id), NULL, 0, NULL), STATUS_OK);
     for (size_t p = 0; p < m->sets.info.n_param; p++)

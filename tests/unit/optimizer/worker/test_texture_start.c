@@ -1,5 +1,6 @@
 /* Start values that a described cloth takes from a photograph: threads, flatness, crimp, covers, colors; what the job
  * states stays. */
+#include "optimizer/job/job_parse.h"
 #include "optimizer/worker/stages/scene/texture_start.h"
 
 #include <math.h>
@@ -46,9 +47,9 @@ static void job_init(struct job *j, const char *cloth, const char *yarn)
                                                        .draft_confidence = 0.9,
                                                        .cover_confidence = 0.6,
                                                        .color_confidence = 0.8}};
-    const char(*group)[MODEL_SET_NAME_BYTES] = (const char(*)[MODEL_SET_NAME_BYTES])j->doc->group;
+    const char(*group)[MODEL_SET_NAME_BYTES] = (const char(*)[MODEL_SET_NAME_BYTES])j->doc->cloth.group;
     const struct model_info *model = model_catalogue_find("two_lobe.v1");
-    assert_int_equal(model_sets_init(&j->model.sets, model, group, j->doc->n_group, &err), STATUS_OK);
+    assert_int_equal(model_sets_init(&j->model.sets, model, group, j->doc->cloth.n_group, &err), STATUS_OK);
     for (size_t p = 0; p < j->model.sets.info.n_param; p++)
         j->model.parameter[p] = (struct fit_parameter){.lower = 0.01, .upper = 0.99, .start = 0.123};
     /* lit from the front at 60 degrees, and from behind */
@@ -68,8 +69,8 @@ static void job_release(struct job *j)
 
 static double number(const struct job *j, const char *name)
 {
-    int i = cloth_number_index(j->doc->cloth, name);
-    return i >= 0 ? j->doc->cloth->number[i].value : NAN;
+    int i = cloth_number_index(j->doc->cloth.description, name);
+    return i >= 0 ? j->doc->cloth.description->number[i].value : NAN;
 }
 
 static bool was_taken(const struct job *j, const char *name)
@@ -96,7 +97,7 @@ static void threads_with_a_scale(void **state)
     struct job j;
     job_init(&j, "\"texture_px_per_mm\":40,", "");
     assert_int_equal(texture_take_widths(&j.c, NULL), STATUS_OK);
-    const struct cloth_description *d = j.doc->cloth;
+    const struct cloth_description *d = j.doc->cloth.description;
     assert_true(d->threads_per_cm[CLOTH_WARP] == 40.0 && d->threads_per_cm[CLOTH_WEFT] == 20.0);
     assert_true(isnan(number(&j, "cover_warp")) && isnan(number(&j, "cover_weft")));
     assert_true(fabs(number(&j, "crimp") - 0.8) < 1e-12); /* 20^2 / (10^2 + 20^2) */
@@ -113,7 +114,8 @@ static void given_values_stay(void **state)
     struct job j;
     job_init(&j, "\"texture_px_per_mm\":40,\"warp_per_cm\":33,\"cover_weft\":0.7,\"crimp\":0.4,", ",\"flatness\":3");
     assert_int_equal(texture_take_widths(&j.c, NULL), STATUS_OK);
-    assert_true(j.doc->cloth->threads_per_cm[CLOTH_WARP] == 33.0 && j.doc->cloth->threads_per_cm[CLOTH_WEFT] == 0.0);
+    assert_true(j.doc->cloth.description->threads_per_cm[CLOTH_WARP] == 33.0 &&
+                j.doc->cloth.description->threads_per_cm[CLOTH_WEFT] == 0.0);
     assert_true(number(&j, "cover_weft") == 0.7 && number(&j, "crimp") == 0.4 &&
                 number(&j, "yarns[0].flatness") == 3.0);
     assert_true(j.c.texture.n_taken == 0);
@@ -127,7 +129,7 @@ static void what_is_not_certain_is_not_taken(void **state)
     job_init(&j, "\"texture_px_per_mm\":40,\"texture_colors\":true,", "");
     j.c.texture.guess.yarns_confidence = j.c.texture.guess.cover_confidence = 0.2;
     assert_int_equal(texture_take_widths(&j.c, NULL), STATUS_OK);
-    assert_true(j.c.texture.n_taken == 0 && j.doc->cloth->threads_per_cm[CLOTH_WARP] == 0.0);
+    assert_true(j.c.texture.n_taken == 0 && j.doc->cloth.description->threads_per_cm[CLOTH_WARP] == 0.0);
     job_release(&j);
 }
 

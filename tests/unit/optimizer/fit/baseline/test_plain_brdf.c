@@ -3,6 +3,7 @@
 #include "base/angle.h"
 #include "optimizer/fit/baseline/plain_brdf.h"
 #include "optimizer/fit/photographs/measurement_table.h"
+#include "optimizer/job/job_parse.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -3,7 +3,8 @@
 #include "base/angle.h"
 #include "optimizer/fit/profile/bowl/bowl_profile.h"
 #include "optimizer/fit/profile/profile_fit.h"
-#include "optimizer/job/option_key.h"
+#include "optimizer/job/job_parse.h"
+#include "optimizer/job/options/option_key.h"
 #include "tests/support/fiber/bowl_rays.h"
 #include "tests/support/scratch_folder.h"
 

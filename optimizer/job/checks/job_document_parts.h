@@ -3,7 +3,7 @@
 #define SELVEDGE_OPTIMIZER_JOB_DOCUMENT_PARTS_H
 
 #include "base/catalogue/model_catalogue.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_document.h"
 #include "optimizer/job/json/json_field.h"
 
 /* Sets the defaults: no ties, bounds, priors or nuisance terms, and one start. */

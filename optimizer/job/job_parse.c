@@ -1,7 +1,7 @@
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/job_parse.h"
 #include "base/json/json_depth.h"
-#include "optimizer/job/check/job_faults.h"
-#include "optimizer/job/job_document_parts.h"
+#include "optimizer/job/checks/job_document_parts.h"
+#include "optimizer/job/checks/job_faults.h"
 #include "optimizer/job/options/option_reader.h"
 
 #include <math.h>
@@ -19,31 +19,13 @@ static status document_new(struct job_document **doc, struct error *err)
     struct job_document *d = calloc(1, sizeof *d);
     if (d == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
     *doc = d;
-    d->n_model = 1;
+    d->fit.n_model = 1;
     for (size_t i = 0; i < JOB_MAX_MODEL; i++) {
-        fill_nan(d->model[i].fixed, JOB_MAX_PARAM);
-        fill_nan(d->model[i].start, JOB_MAX_PARAM);
-        job_fit_option_init(&d->model[i].option);
+        fill_nan(d->fit.model[i].fixed, JOB_MAX_PARAM);
+        fill_nan(d->fit.model[i].start, JOB_MAX_PARAM);
+        job_fit_option_init(&d->fit.model[i].option);
     }
     return job_options_default(d, err);
-}
-
-void job_document_free(struct job_document *doc)
-{
-    if (doc == NULL) return;
-    free(doc->volume_file);
-    free(doc->cloth_yarn);
-    free(doc->cloth);
-    for (size_t i = 0; i < doc->n_photograph; i++) free(doc->photograph[i].exposure);
-    free(doc->photograph);
-    for (size_t i = 0; i < doc->bowl.n_photograph; i++) free(doc->bowl.photograph[i].picture.exposure);
-    free(doc->bowl.photograph);
-    free(doc->bowl.mark);
-    free(doc->measured_row);
-    free(doc->dark_frame);
-    free(doc->candidate);
-    free(doc->surface_picture);
-    free(doc);
 }
 
 /* The text as JSON; NULL with an error. */

@@ -1,4 +1,4 @@
-#include "optimizer/job/option_key.h"
+#include "optimizer/job/options/option_key.h"
 #include "optimizer/job/options/option_table.h"
 
 #include <stdio.h>

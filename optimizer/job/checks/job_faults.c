@@ -1,4 +1,4 @@
-#include "optimizer/job/check/job_faults.h"
+#include "optimizer/job/checks/job_faults.h"
 
 #include <stdio.h>
 #include <string.h>

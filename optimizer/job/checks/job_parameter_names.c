@@ -1,5 +1,5 @@
 /* The names of a model's parameters in a job document. */
-#include "optimizer/job/job_document_parts.h"
+#include "optimizer/job/checks/job_document_parts.h"
 
 #include <stdbool.h>
 #include <stdio.h>

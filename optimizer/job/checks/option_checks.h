@@ -4,7 +4,8 @@
 #ifndef SELVEDGE_OPTIMIZER_OPTION_CHECKS_H
 #define SELVEDGE_OPTIMIZER_OPTION_CHECKS_H
 
-#include "optimizer/job/options/option_table.h"
+#include "base/status.h"
+#include "optimizer/job/checks/option_value.h"
 
 status job_check_document(const struct option_value *v, struct error *err);
 status job_check_sample(const struct option_value *v, struct error *err);

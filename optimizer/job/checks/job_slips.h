@@ -3,7 +3,7 @@
 #ifndef SELVEDGE_OPTIMIZER_JOB_SLIPS_H
 #define SELVEDGE_OPTIMIZER_JOB_SLIPS_H
 
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_document.h"
 
 /* Largest angle from the normal and around it that a set of views in radians can have. */
 #define JOB_RADIANS_THETA 3.2

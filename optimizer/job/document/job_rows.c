@@ -1,6 +1,6 @@
 /* Places of lamps and cameras. */
 #include "base/angle.h"
-#include "optimizer/job/job_document.h"
+#include "optimizer/job/document/job_document.h"
 
 #include <math.h>
 

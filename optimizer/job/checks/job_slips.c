@@ -1,4 +1,4 @@
-#include "optimizer/job/check/job_slips.h"
+#include "optimizer/job/checks/job_slips.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -105,13 +105,13 @@ static void check_radians(const struct job_document *doc, const struct slip_sear
 {
     struct angle_span photograph = {0}, candidate = {0};
     struct error slip = {0};
-    for (size_t i = 0; i < doc->n_photograph; i++) {
-        const struct job_photograph *p = &doc->photograph[i];
+    for (size_t i = 0; i < doc->rows.n_photograph; i++) {
+        const struct job_photograph *p = &doc->rows.photograph[i];
         angle_span_add(&photograph, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg, p->camera_phi_deg,
                        p->cloth_rotation_deg);
     }
-    for (size_t i = 0; i < doc->n_candidate && doc->candidate != NULL; i++) {
-        const struct job_candidate *p = &doc->candidate[i];
+    for (size_t i = 0; i < doc->fit.n_candidate && doc->fit.candidate != NULL; i++) {
+        const struct job_candidate *p = &doc->fit.candidate[i];
         angle_span_add(&candidate, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg, p->camera_phi_deg,
                        p->cloth_rotation_deg);
     }

@@ -1,0 +1,16 @@
+/* Limits of the job document that other parts of the program share. */
+#ifndef SELVEDGE_OPTIMIZER_JOB_LIMITS_H
+#define SELVEDGE_OPTIMIZER_JOB_LIMITS_H
+
+#include <stddef.h>
+
+enum {
+    JOB_MAX_DOCUMENT_BYTES = 1 << 20,
+    JOB_MAX_NAME_BYTES = 128, /* input file names: [A-Za-z0-9._-], not starting with '.' */
+    JOB_MAX_SAMPLE_BYTES = 256,
+    JOB_MAX_ID_BYTES = 64, /* ids of jobs */
+    JOB_MAX_PHOTOGRAPH = 1024,
+    JOB_MAX_MODEL = 32 /* more than there are models, so that a job can compare all of them */
+};
+
+#endif

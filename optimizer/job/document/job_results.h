@@ -1,0 +1,57 @@
+/* The sections of a job document that say which results are wanted besides the fit: renderings, pictures of the
+ * cloth on surfaces, a twin for the browser, and files for other programs. */
+#ifndef SELVEDGE_OPTIMIZER_JOB_RESULTS_H
+#define SELVEDGE_OPTIMIZER_JOB_RESULTS_H
+
+#include "optimizer/job/document/job_limits.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+enum { JOB_MAX_SURFACE_PICTURE = 32 };
+
+/* How a picture is rendered: path by path, by the tables of renderer/fast, by tables with some whole paths, whose
+ * expectation is that of path tracing, by dual scattering (renderer/dual), or by diffusion (renderer/diffusion). */
+enum job_picture_method {
+    JOB_PICTURE_PATH,
+    JOB_PICTURE_FAST,
+    JOB_PICTURE_CORRECTED,
+    JOB_PICTURE_DUAL,
+    JOB_PICTURE_DIFFUSION
+};
+
+enum job_surface { JOB_ON_FLAT, JOB_ON_CYLINDER, JOB_ON_DRAPE, JOB_ON_MESH };
+
+/* A picture of the fitted cloth laid on a surface. */
+struct job_surface_picture {
+    enum job_surface on;
+    char mesh_file[JOB_MAX_NAME_BYTES]; /* of JOB_ON_MESH; "" otherwise */
+    double mesh_unit_mm;                /* a unit of the file in millimetres */
+    double radius_mm, size_mm; /* of the cylinder or the ball; of a flat or draped piece, or along the cylinder */
+    double wrap_deg;           /* of the cylinder */
+    int black_sheet;           /* 0, 1, or -1: as in the document */
+    double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
+    double lamp_sharpness; /* of a Gaussian lamp in place of the document's; NaN: the document's */
+    double width_mm;       /* what the picture shows */
+    size_t px, sample;
+    enum job_picture_method method;
+    bool reference;                      /* also path by path, and compared with that */
+    bool filter;                         /* also filtered for the eye (renderer/preview) */
+    bool visibility_by_tables;           /* of JOB_PICTURE_FAST */
+    bool deep_by_cells;                  /* of JOB_PICTURE_FAST; with visibility_by_tables in any case */
+    size_t n_deep_path;                  /* that make the table in place of the cells */
+    bool speckle;                        /* of single fibers (renderer/scattering/speckle) */
+    bool field_by_pixel;                 /* near fields become far fields where pixels are as wide as fibers */
+    double ground_gap_mm, ground_albedo; /* of a plane under the cloth; gap NaN: none */
+};
+
+struct job_results {
+    size_t render_px, render_sample; /* 0: chosen from the paths of the fit */
+    size_t n_surface_picture;
+    struct job_surface_picture *surface_picture;
+    bool twin; /* tables for the page in the browser */
+    size_t twin_paths, twin_texels;
+    bool export_mitsuba, export_pbrt, export_usd, export_blender, export_textures, export_pdf;
+};
+
+#endif

@@ -1,0 +1,59 @@
+/* A row of the table of job options (option_table.h). */
+#ifndef SELVEDGE_OPTIMIZER_OPTION_ROW_H
+#define SELVEDGE_OPTIMIZER_OPTION_ROW_H
+
+#include "base/option_id.h"
+#include "base/status.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+struct option_value;
+
+/* What JSON a key takes, and in which form it is stored at its target. */
+enum option_kind {
+    OPTION_SECTION,          /* an object, whose members are the rows under its path -> bool: true when given */
+    OPTION_LIST,             /* a list of objects, whose members are the rows under path[] -> pointer and count */
+    OPTION_NUMBER,           /* -> double */
+    OPTION_NUMBERS,          /* n numbers -> double[n] */
+    OPTION_NUMBER_OR_LIST,   /* one number for all, or n numbers -> double[n] */
+    OPTION_COUNT,            /* whole number -> size_t */
+    OPTION_COUNTS,           /* n whole numbers -> size_t[n] */
+    OPTION_LARGE_COUNT,      /* whole number without an upper limit -> uint64_t */
+    OPTION_BOOL,             /* -> bool */
+    OPTION_BOOL_OR_LEFT_OUT, /* -> int: 0, 1, or -1 where the key is left out */
+    OPTION_CHOICE,           /* one of several words -> enum: index of the word */
+    OPTION_SWITCH,           /* one of two words -> bool: the second one */
+    OPTION_WORD,             /* one of several words -> char[n]: the word */
+    OPTION_TEXT,             /* -> char[n] */
+    OPTION_FILE_NAME,        /* -> char[JOB_MAX_NAME_BYTES] */
+    OPTION_FILE_NAMES,       /* list -> pointer to char[JOB_MAX_NAME_BYTES] and count */
+    OPTION_OWN,              /* read by the check of its section; `schema` describes the value */
+    OPTION_N_KIND
+};
+
+struct job_option {
+    const char *path; /* "lamp.side_cm", "photographs[].scale"; "" for the document itself */
+    enum option_kind kind;
+    bool required;
+    bool or_section;                /* OPTION_BOOL, OPTION_LIST: an object of the rows under path is allowed as well */
+    bool stored;                    /* it has a target */
+    size_t at;                      /* offset of the target in struct job_document, or in an element of its list */
+    size_t count_at, element_bytes; /* of lists: offset of the count, size of an element */
+    double lower, upper;            /* numbers; of lists: upper is the largest number of elements */
+    size_t n;                       /* count of numbers; bytes of a text */
+    const char *const *choice;      /* NULL-terminated; the first is the default without `standard` and `left_out` */
+    const char *(*choice_at)(size_t i); /* the same for words of a catalogue: NULL after the last */
+    const char *unit;                   /* "" or NULL: none */
+    const char *standard;               /* the default as JSON; NULL: NaN for a number, else zero or empty */
+    const char *left_out;               /* in words, what holds without the key when there is no default */
+    const char *allowed;                /* in words, when range and choices are not the whole condition */
+    const char *items;                  /* name of the elements of a list, or of the object, in errors */
+    const char *schema;                 /* members of a JSON Schema object, added to those that follow from the kind */
+    const char *id;                     /* of base/option_id.h; NULL: no other part of the program names this option */
+    const char *meaning;                /* for people: whole sentences in Markdown */
+    /* Checks the value; of a section it runs when all members are read. NULL: no check beyond the row. */
+    status (*check)(const struct option_value *v, struct error *err);
+};
+
+#endif
