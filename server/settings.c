@@ -98,7 +98,7 @@ static const struct setting table[] = {
     NUMBER("jobs", "memory_limit_bytes", memory_limit_bytes, 0, 0, INT64_MAX / 2,
            "limit on a worker's address space, which includes the files that it maps (see volume_memory_bytes); 0: no "
            "limit"),
-    NUMBER("jobs", "resident_limit_bytes", resident_limit_bytes, 0, 0, INT64_MAX / 2,
+    NUMBER("jobs", "resident_limit_bytes", resident_limit_bytes, 8 * GIB, 0, INT64_MAX / 2,
            "memory that a worker may hold, in RAM and swap, without files that it maps; a job that holds more fails; "
            "0: no "
            "limit"),
@@ -107,8 +107,12 @@ static const struct setting table[] = {
     NUMBER(
         "jobs", "scratch_limit_bytes", scratch_limit_bytes, 64 * GIB, 0, INT64_MAX / 2,
         "disk that these files of one job may take; a scan that needs more is refused before it is read; 0: no limit"),
-    NUMBER("jobs", "file_limit_bytes", file_limit_bytes, 0, 0, INT64_MAX / 2,
+    NUMBER("jobs", "file_limit_bytes", file_limit_bytes, 64 * GIB, 0, INT64_MAX / 2,
            "size of the largest file that a worker may write; 0: no limit"),
+    NUMBER("jobs", "folder_depth", folder_depth, 16, 0, 64,
+           "levels of folders that a worker may nest in its job's folder; a job with more fails; 0: no limit"),
+    NUMBER("jobs", "thread_limit", thread_limit, 1024, 0, 60000,
+           "threads that a worker may have, those of its libraries too; a job with more fails; 0: no limit"),
     NUMBER("jobs", "open_files", open_files, 1024, 64, 1000000, "number of files that a worker may have open"),
     NUMBER("jobs", "oom_score_adj", oom_score_adj, 500, 0, 1000,
            "how readily the kernel ends a worker, rather than another process, when memory is out"),
@@ -126,7 +130,7 @@ static const struct setting table[] = {
     NUMBER("webhook", "retry_s", webhook_retry_s, 5, 1, 3600,
            "pause in seconds before the second try; each further one is twice as long, up to an hour"),
     NUMBER("webhook", "max_tries", webhook_max_tries, 16, 1, 1000, "tries after which a delivery is given up"),
-    NUMBER("jobs", "time_limit_s", time_limit_s, 0, 0, 31536000,
+    NUMBER("jobs", "time_limit_s", time_limit_s, 604800, 0, 31536000,
            "time in seconds that a worker may run; its job then fails, and a retry resumes it; 0: no limit"),
     NUMBER("jobs", "check_limit_s", check_limit_s, 300, 1, 86400,
            "time in seconds in which a worker must have judged the files of a job that is not started yet"),

@@ -23,7 +23,8 @@ struct settings {
     int64_t max_jobs, keep_versions, workers;
     char backend[SETTING_TEXT_BYTES], worker[SETTING_TEXT_BYTES], sandbox[SETTING_TEXT_BYTES],
         pass_environment[SETTING_TEXT_BYTES];
-    int64_t threads, ranks, scratch_limit_bytes, file_limit_bytes, open_files, oom_score_adj;
+    int64_t threads, ranks, scratch_limit_bytes, file_limit_bytes, folder_depth, thread_limit, open_files,
+        oom_score_adj;
     int64_t nice, memory_limit_bytes, resident_limit_bytes, volume_memory_bytes, cancel_grace_s, max_lost_attempts,
         heartbeat_timeout_s, time_limit_s, check_limit_s;
     /* [slurm] */

@@ -75,7 +75,7 @@ static void examine_memory(struct doctor *d)
     else if (wanted > all)
         doctor_say(
             d, DOCTOR_NOTE, "memory",
-            "%.1f GB in all, but %lld workers may hold %.1f GB; set jobs.volume_memory_bytes or jobs.workers lower",
+            "%.1f GB in all, but %lld workers may hold %.1f GB; set jobs.resident_limit_bytes or jobs.workers lower",
             (double)all / 1e9, (long long)s->workers, (double)wanted / 1e9);
     else
         doctor_say(d, DOCTOR_OK, "memory", "%.1f GB in all, %.1f GB free", (double)all / 1e9, (double)available / 1e9);

@@ -252,6 +252,17 @@ static void time_is_up(const struct job_service *v, struct job_row *row)
     set_error(row, "time_limit", "", text);
 }
 
+/* Of what made a worker exceed it the next attempt would exceed it, too. */
+static void limit_exceeded(struct job_row *row, const char *code, const char *what, int64_t limit, const char *setting)
+{
+    char text[240];
+    snprintf(text, sizeof text,
+             "the worker %s %lld, the limit of this service (%s); with a higher limit, retry resumes the job", what,
+             (long long)limit, setting);
+    row->state = JOB_FAILED;
+    set_error(row, code, "", text);
+}
+
 static void memory_is_out(const struct job_service *v, struct job_row *row)
 {
     char text[240];
@@ -268,7 +279,16 @@ static void apply_end(struct job_service *v, struct job_row *row, const struct w
 {
     bool asked = stop == STOP_CANCEL || stop == STOP_SHUTDOWN || stop == STOP_PAUSE;
     const bool by_itself = end->cause == WORKER_ENDED && !end->by_signal;
-    if (by_itself && end->code == WORKER_SUCCEEDED)
+    const struct settings *set = v->settings;
+    if (stop == STOP_DEPTH)
+        limit_exceeded(row, "folder_limit", "has nested folders more deeply than", set->folder_depth,
+                       "jobs.folder_depth");
+    else if (stop == STOP_THREADS && !row->cancel_requested)
+        limit_exceeded(row, "thread_limit", "had more threads than", set->thread_limit, "jobs.thread_limit");
+    else if (end->cause == WORKER_ENDED && end->by_signal && end->code == SIGXFSZ)
+        limit_exceeded(row, "file_limit", "wrote a file of more bytes than", set->file_limit_bytes,
+                       "jobs.file_limit_bytes");
+    else if (by_itself && end->code == WORKER_SUCCEEDED)
         succeeded(v, row);
     else if (by_itself && end->code == WORKER_FAILED)
         failed(v, row);

@@ -7,7 +7,17 @@
 #include "server/workers/worker_process.h"
 
 /* Reasons for which the daemon stops a worker. A reason has precedence over those after it. */
-enum attempt_stop { STOP_NONE, STOP_CANCEL, STOP_SHUTDOWN, STOP_PAUSE, STOP_SILENT, STOP_MEMORY, STOP_TIME };
+enum attempt_stop {
+    STOP_NONE,
+    STOP_CANCEL,
+    STOP_SHUTDOWN,
+    STOP_PAUSE,
+    STOP_SILENT,
+    STOP_MEMORY,
+    STOP_THREADS,
+    STOP_DEPTH,
+    STOP_TIME
+};
 
 struct attempt_outcome {
     double delay_s; /* time before the job may start again */

@@ -42,7 +42,7 @@ static status wait_for(const struct job_service *v, pid_t pid, struct worker_end
                        struct error *err)
 {
     const double give_up_s = clock_monotonic_s() + (double)v->settings->check_limit_s;
-    const int64_t most_bytes = v->settings->resident_limit_bytes;
+    const int64_t most_bytes = v->settings->resident_limit_bytes, most_threads = v->settings->thread_limit;
     status s = STATUS_OK;
     while (!worker_ended(pid, end)) {
         if (s == STATUS_OK && atomic_load(&v->stopping)) {
@@ -55,6 +55,8 @@ static status wait_for(const struct job_service *v, pid_t pid, struct worker_end
                           "without, its worker judges them too",
                           (long long)v->settings->check_limit_s);
         } else if (s == STATUS_OK && most_bytes > 0 && worker_memory_bytes(pid) > most_bytes)
+            worker_signal(pid, SIGKILL);
+        else if (s == STATUS_OK && most_threads > 0 && worker_thread_count(pid) > most_threads)
             worker_signal(pid, SIGKILL);
         if (s != STATUS_OK) worker_signal(pid, SIGKILL);
         usleep(LOOK_US);

@@ -8,6 +8,7 @@
 #include "server/workers/backends/job_backend.h"
 #include "server/workers/console.h"
 #include "server/workers/disk_watch.h"
+#include "server/workers/guard/worker_limits.h"
 #include "server/workers/queue_turn.h"
 #include "server/workers/removal.h"
 #include "server/workers/waiting_list.h"
@@ -20,7 +21,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-enum { MAX_WORKER = SETTING_MAX_WORKERS, IDLE_LOOK_MS = 1000, SHARED_RUNNING = 10000, RIVALS = 16 };
+enum { MAX_WORKER = SETTING_MAX_WORKERS, IDLE_LOOK_MS = 1000, DEPTH_LOOK_S = 5, SHARED_RUNNING = 10000, RIVALS = 16 };
 
 struct slot {
     bool used;
@@ -32,7 +33,8 @@ struct slot {
     double started_s, computed_s; /* since when it computes (monotonic; 0: it waits), and how long it had before */
     double asked_s;               /* monotonic time of the request to stop; 0: none */
     bool killed, ended;
-    double retry_s; /* monotonic time of the next try to record its end in the database */
+    double depth_seen_s; /* monotonic time of the last look at the depth of its folder */
+    double retry_s;      /* monotonic time of the next try to record its end in the database */
     struct worker_end end;
 };
 
@@ -99,16 +101,14 @@ static void trim_console(struct supervisor *u, const struct slot *slot)
     console_trim(path);
 }
 
-/* What made the worker hold so much would do it again, so it is killed at once and its job fails. */
-static void check_memory(struct supervisor *u, struct slot *slot)
+static void check_limits(struct supervisor *u, struct slot *slot, double now)
 {
-    const int64_t limit_bytes = u->v->settings->resident_limit_bytes;
-    if (limit_bytes <= 0 || slot->killed) return;
-    int64_t held_bytes = u->backend->memory_bytes(slot->run);
-    if (held_bytes <= limit_bytes) return;
-    log_warning(u->v->log, "job %s: the worker holds %.1f MB of memory, more than %.1f MB, and is killed", slot->job_id,
-                (double)held_bytes / 1e6, (double)limit_bytes / 1e6);
-    kill_now(u, slot, STOP_MEMORY);
+    enum attempt_stop why = worker_limit_exceeded(u->v, u->backend, slot->run, slot->job_id);
+    if (why == STOP_NONE && slot->started_s > 0 && now - slot->depth_seen_s > DEPTH_LOOK_S) {
+        slot->depth_seen_s = now;
+        why = worker_depth_exceeded(u->v, slot->job_id);
+    }
+    if (why != STOP_NONE) kill_now(u, slot, why);
 }
 
 /* Time limit and heartbeats do not count while the worker waits in its engine. */
@@ -126,6 +126,8 @@ static void watch(struct supervisor *u, struct slot *slot)
     if (!slot->ended) note_phase(slot, u->backend->look(u->engine, slot->run, &slot->end), now);
     const bool computes = slot->started_s > 0;
     if (computes || slot->ended) trim_console(u, slot);
+    if (slot->ended && slot->retry_s <= 0 && slot->stop == STOP_NONE)
+        slot->stop = worker_depth_exceeded(u->v, slot->job_id);
     if (slot->ended && now >= slot->retry_s) record_end(u, slot);
     if (slot->ended) return;
     struct attempt_request request;
@@ -139,7 +141,7 @@ static void watch(struct supervisor *u, struct slot *slot)
     const int64_t limit_s = u->v->settings->time_limit_s;
     if (limit_s > 0 && computes && slot->computed_s + now - slot->started_s > (double)limit_s)
         request_stop(u, slot, STOP_TIME);
-    check_memory(u, slot);
+    if (!slot->killed) check_limits(u, slot, now);
     /* by our own clock, because the wall clock may be set meanwhile; one failed read is not silence */
     if (request.heartbeat_unix_s > 0 && request.heartbeat_unix_s != slot->seen_heartbeat_unix_s) {
         slot->seen_heartbeat_unix_s = request.heartbeat_unix_s;
@@ -381,8 +383,7 @@ void supervisor_trouble(const struct supervisor *u, char *text, size_t n_text)
 
 void supervisor_wake(struct supervisor *u)
 {
-    const uint64_t one = 1;
-    if (write(u->wake_fd, &one, sizeof one) < 0) {
+    if (eventfd_write(u->wake_fd, 1) != 0) {
         /* the counter is full, so the supervisor is awake already */
     }
 }

@@ -34,11 +34,21 @@ static void set_limit(__rlimit_resource_t resource, int64_t value)
     setrlimit(resource, &limit);
 }
 
+/* The kernel counts the threads of all processes of a user (but of root's none), so this holds what workers may have
+ * together and the daemon's own. The supervisor counts the threads of each worker; until it looks, a worker must not
+ * take all that the machine has. */
+static int64_t most_processes(const struct settings *s)
+{
+    enum { OF_THE_USER = 4096 };
+    return OF_THE_USER + s->max_connections + 2 * s->workers * s->thread_limit;
+}
+
 static void set_limits(const struct start *s)
 {
     setpriority(PRIO_PROCESS, 0, (int)s->settings->nice);
     set_limit(RLIMIT_CORE, 0);
     set_limit(RLIMIT_NOFILE, s->settings->open_files);
+    if (s->settings->thread_limit > 0) set_limit(RLIMIT_NPROC, most_processes(s->settings));
     if (s->settings->file_limit_bytes > 0) set_limit(RLIMIT_FSIZE, s->settings->file_limit_bytes);
     if (s->settings->memory_limit_bytes > 0) set_limit(RLIMIT_AS, s->settings->memory_limit_bytes);
     int fd = open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
@@ -192,19 +202,31 @@ bool worker_ended(pid_t pid, struct worker_end *end)
     return true;
 }
 
-int64_t worker_memory_bytes(pid_t pid)
+/* Adds up lines of /proc/PID/status by the beginnings that end with NULL. */
+static int64_t status_sum(pid_t pid, const char *const *part)
 {
-    static const char *const part[] = {"RssAnon:", "RssShmem:", "VmSwap:"};
     char path[NUMBER_BYTES + 16], line[128];
-    long long sum_kib = 0;
+    long long sum = 0;
     snprintf(path, sizeof path, "/proc/%d/status", (int)pid);
     FILE *f = fopen(path, "re");
     if (f == NULL) return 0;
     while (fgets(line, sizeof line, f) != NULL)
-        for (size_t i = 0; i < sizeof part / sizeof *part; i++)
-            if (strncmp(line, part[i], strlen(part[i])) == 0) sum_kib += strtoll(line + strlen(part[i]), NULL, 10);
+        for (size_t i = 0; part[i] != NULL; i++)
+            if (strncmp(line, part[i], strlen(part[i])) == 0) sum += strtoll(line + strlen(part[i]), NULL, 10);
     fclose(f);
-    return sum_kib * 1024;
+    return sum;
+}
+
+int64_t worker_memory_bytes(pid_t pid)
+{
+    static const char *const part[] = {"RssAnon:", "RssShmem:", "VmSwap:", NULL};
+    return 1024 * status_sum(pid, part);
+}
+
+int64_t worker_thread_count(pid_t pid)
+{
+    static const char *const part[] = {"Threads:", NULL};
+    return status_sum(pid, part);
 }
 
 void worker_signal(pid_t pid, int signal_number)

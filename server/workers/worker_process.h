@@ -66,6 +66,8 @@ bool worker_ended(pid_t pid, struct worker_end *end);
  * out. Pages of files that it maps are left out, because the kernel takes them back when memory is short. 0: not
  * known. */
 int64_t worker_memory_bytes(pid_t pid);
+/* Threads of a running worker. 0: not known. */
+int64_t worker_thread_count(pid_t pid);
 /* Sends a signal to the worker and all processes that it started. */
 void worker_signal(pid_t pid, int signal_number);
 

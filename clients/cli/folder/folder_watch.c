@@ -186,10 +186,22 @@ out:
     return r;
 }
 
+/* Whether a link or a file has the name of the folder for the outcome. A link could lead it elsewhere. */
+static bool is_blocked(const struct folder_watch *w, const struct sample *s)
+{
+    char path[PATH_ROOM];
+    struct stat st;
+    sample_path(w, s, SAMPLE_OUTCOME_SUFFIX, path);
+    return lstat(path, &st) == 0 && !S_ISDIR(st.st_mode);
+}
+
 static status step(struct folder_watch *w, struct sample *s, struct error *err)
 {
     char path[PATH_ROOM];
     if (clock_monotonic_s() < s->again_s) return STATUS_OK;
+    if (is_blocked(w, s))
+        return error_set(err, STATUS_INVALID, "'%s" SAMPLE_OUTCOME_SUFFIX "' is in the way: it is not a folder",
+                         s->name);
     if (s->outcome.state == SAMPLE_SUBMITTED) return follow(w, s, err);
     sample_path(w, s, SAMPLE_OUTCOME_SUFFIX "/state.json", path);
     if (s->outcome.state != SAMPLE_NEW && access(path, F_OK) != 0 && errno == ENOENT) {
@@ -280,8 +292,9 @@ static bool all_ended(const struct folder_watch *w, int *exit_code)
     *exit_code = CLI_EXIT_OK;
     for (size_t i = 0; i < w->n; i++) {
         enum sample_state s = w->sample[i].outcome.state;
-        if (s == SAMPLE_FAILED) *exit_code = CLI_EXIT_ERROR;
-        ended = ended && (s == SAMPLE_FAILED || s == SAMPLE_SUCCEEDED);
+        const bool failed = s == SAMPLE_FAILED || is_blocked(w, &w->sample[i]);
+        if (failed) *exit_code = CLI_EXIT_ERROR;
+        ended = ended && (failed || s == SAMPLE_SUCCEEDED);
     }
     return ended;
 }

@@ -26,20 +26,24 @@ enum { HAS_SANDBOX = 1 };
 #endif
 
 /* What every worker reads: libraries, time zone, and what libc, OpenBLAS and the thread pools ask about the machine. */
-static const struct sandbox_path usual[] = {{SANDBOX_EXECUTE, "/usr"},
-                                            {SANDBOX_EXECUTE, "/lib"},
-                                            {SANDBOX_EXECUTE, "/lib64"},
-                                            {SANDBOX_READ, "/etc/ld.so.cache"},
-                                            {SANDBOX_READ, "/etc/ld.so.preload"},
-                                            {SANDBOX_READ, "/etc/localtime"},
-                                            {SANDBOX_READ, "/proc/self"},
-                                            {SANDBOX_READ, "/proc/cpuinfo"},
-                                            {SANDBOX_READ, "/proc/meminfo"},
-                                            {SANDBOX_READ, "/proc/stat"},
-                                            {SANDBOX_READ, "/proc/sys/vm"},
-                                            {SANDBOX_READ, "/sys/devices/system"},
-                                            {SANDBOX_READ, "/dev/urandom"},
-                                            {SANDBOX_OVERWRITE, "/dev/null"}};
+static const struct sandbox_path usual[] = {
+    {SANDBOX_EXECUTE, "/usr"},
+    {SANDBOX_EXECUTE, "/lib"},
+    {SANDBOX_EXECUTE, "/lib64"},
+    {SANDBOX_READ, "/etc/ld.so.cache"},
+    {SANDBOX_READ, "/etc/ld.so.preload"},
+    {SANDBOX_READ, "/etc/localtime"},
+    {SANDBOX_READ, "/proc/self/status"}, /* not the folder, which has the sockets of the machine */
+    {SANDBOX_READ, "/proc/self/statm"},
+    {SANDBOX_READ, "/proc/self/maps"},
+    {SANDBOX_READ, "/proc/self/stat"},
+    {SANDBOX_READ, "/proc/cpuinfo"},
+    {SANDBOX_READ, "/proc/meminfo"},
+    {SANDBOX_READ, "/proc/stat"},
+    {SANDBOX_READ, "/proc/sys/vm"},
+    {SANDBOX_READ, "/sys/devices/system"},
+    {SANDBOX_READ, "/dev/urandom"},
+    {SANDBOX_OVERWRITE, "/dev/null"}};
 enum { N_USUAL = sizeof usual / sizeof *usual };
 
 struct path_list {

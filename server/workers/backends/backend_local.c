@@ -74,6 +74,8 @@ static void stop(void *state, struct backend_run *run, bool at_once)
 
 static int64_t memory_bytes(const struct backend_run *run) { return run->ended ? 0 : worker_memory_bytes(run->pid); }
 
+static int64_t thread_count(const struct backend_run *run) { return run->ended ? 0 : worker_thread_count(run->pid); }
+
 static int end_fd(const struct backend_run *run) { return run->ended ? -1 : run->pid_fd; }
 
 static void release(void *state, struct backend_run *run)
@@ -92,5 +94,6 @@ const struct job_backend backend_local = {.name = "local",
                                           .look = look,
                                           .stop = stop,
                                           .memory_bytes = memory_bytes,
+                                          .thread_count = thread_count,
                                           .end_fd = end_fd,
                                           .release = release};

@@ -31,6 +31,8 @@ struct job_backend {
     void (*stop)(void *state, struct backend_run *run, bool at_once);
     /* Memory that the worker holds (worker_memory_bytes); 0: not known, or bounded by the engine. */
     int64_t (*memory_bytes)(const struct backend_run *run);
+    /* Threads of the worker (worker_thread_count); NULL, or 0: not known. */
+    int64_t (*thread_count)(const struct backend_run *run);
     /* A descriptor that becomes readable when the worker ends; -1: there is none. */
     int (*end_fd)(const struct backend_run *run);
     /* Writes why the engine cannot be used at present, or "". From any thread. NULL: it always can. */

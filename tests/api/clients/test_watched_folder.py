@@ -179,3 +179,19 @@ def test_kills_of_daemon_and_watcher(daemon_maker, folder):
         ended(folder, f"s{i}")
     w.stop()
     assert len(jobs(d)) == 4 and {j["state"] for j in jobs(d)} == {"succeeded"}
+
+
+def test_once_ends_where_a_link_or_a_file_is_in_the_way(daemon_maker, folder, tmp_path):
+    """A link could lead the results elsewhere, so it is not followed, and no results can be written."""
+    d = daemon_maker()
+    for name in ("good", "linked", "file", "waiting"):
+        drop(folder, name, marker=None if name == "waiting" else "READY")
+    (tmp_path / "elsewhere").mkdir()
+    for name in ("linked", "waiting"):
+        os.symlink(tmp_path / "elsewhere", os.path.join(folder, name + ".selvedge"))
+    open(os.path.join(folder, "file.selvedge"), "w").close()
+    done = once(d, folder)
+    assert done.returncode == 1 and outcome(folder, "good")["state"] == "succeeded"
+    for name in ("linked", "file", "waiting"):
+        assert f"{name}: '{name}.selvedge' is in the way: it is not a folder" in done.stderr + done.stdout
+    assert os.listdir(tmp_path / "elsewhere") == [] and len(jobs(d)) == 1

@@ -159,14 +159,18 @@ def many_files():
         put(f"results/many/{i}", "")
 
 
-def deep_folders():
-    """Folders in each other, made like a script would that goes down as far as it can."""
+def left_folders():
+    """Folders in each other, made like a program would that goes down as far as it can."""
     os.chdir(job)
     for _ in range(int(argument)):
         os.mkdir("d")
         os.chdir("d")
+
+
+def deep_folders():
+    left_folders()
     put(os.path.join(job, "status.json"), status(state="running"))
-    time.sleep(30)
+    time.sleep(60)
 
 
 def threads():
@@ -186,13 +190,10 @@ def hold():
 
 
 def big_file():
-    """One file as large as it may be. It has no bytes on the disk."""
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    """One file as large as it may be. It has no bytes on the disk, and Python does not ignore the signal."""
+    signal.signal(signal.SIGXFSZ, signal.SIG_DFL)
     with open(os.path.join(job, "big"), "wb") as f:
-        try:
-            f.truncate(int(argument))
-        except OSError as error:
-            put("refused", str(error))
+        f.truncate(int(argument))
 
 
 def forever():

@@ -114,8 +114,26 @@ def test_a_forbidden_call_ends_the_worker(hostile, tmp_path, act):
 
 def test_every_thread_is_restricted(hostile, tmp_path):
     """Also those that libraries start before main."""
-    lines = run(hostile, job_folder(tmp_path / "job"), "threads", OPENBLAS_NUM_THREADS="4").stderr.split("\n")
-    assert lines.count("hostile: Seccomp:\t2") == lines.count("hostile: NoNewPrivs:\t1") >= 2 and "hostile: Seccomp:\t0" not in lines
+    environment = {**os.environ, "LD_PRELOAD": hostile, "HOSTILE": "wait", "OPENBLAS_NUM_THREADS": "4"}
+    with subprocess.Popen([WORKER, "--quiet", job_folder(tmp_path / "job")], env=environment, stderr=subprocess.PIPE, text=True) as worker:
+        try:
+            assert worker.stderr.readline() == "hostile: waits\n"
+            lines = []
+            for thread in os.listdir(f"/proc/{worker.pid}/task"):
+                with open(f"/proc/{worker.pid}/task/{thread}/status") as f:
+                    lines += [line for line in f.read().split("\n") if line.startswith(("Seccomp:", "NoNewPrivs:"))]
+        finally:
+            worker.kill()
+    assert lines.count("Seccomp:\t2") == lines.count("NoNewPrivs:\t1") >= 2 and "Seccomp:\t0" not in lines
+
+
+@pytest.mark.parametrize("path, seen", [("/proc/self/net/tcp", False), ("/proc/thread-self/net/unix", False), ("/proc/net/tcp", False),
+                                        ("/proc/self/environ", False), ("/proc/self/mountinfo", False), ("/proc/self/status", True)])
+def test_little_is_seen_of_the_machine(hostile, tmp_path, path, seen):
+    """Not which sockets it has, which would tell of its services, and not the command lines of other processes."""
+    for options, allowed in ((("--sandbox", "off"), True), ((), seen)):
+        done = run(hostile, job_folder(tmp_path / str(allowed) / str(len(options))), f"read {path}", *options)
+        assert ("hostile: read: Permission denied" in done.stderr) != allowed, done.stderr
 
 
 def test_the_daemon_names_the_forbidden_call(hostile, daemon_maker):
@@ -156,7 +174,8 @@ def test_what_a_worker_gets_of_the_daemon(daemon_maker):
     assert seen["environment"]["LANG"] == "C.UTF-8"
     assert seen["descriptors"] == ["0", "1", "2"]
     assert seen["no_new_privs"] == "1" and seen["oom_score_adj"] == "700" and seen["nice"] == 7
-    assert seen["limits"] == {"NOFILE": [200, 200], "FSIZE": [1 << 20, 1 << 20], "AS": [1 << 30, 1 << 30], "CORE": [0, 0]}
+    assert seen["limits"] == {"NOFILE": [200, 200], "FSIZE": [1 << 20, 1 << 20], "AS": [1 << 30, 1 << 30], "CORE": [0, 0],
+                              "NPROC": [4096 + 2048 + 2 * 1024] * 2}
 
 
 def bomb(edge, n_page):

@@ -115,7 +115,7 @@ elif behaviour == "surroundings":
     put("results/result.json", json.dumps({
         "parameters": [], "environment": dict(os.environ), "no_new_privs": status["NoNewPrivs"], "oom_score_adj": oom_score_adj, "nice": os.nice(0),
         "descriptors": sorted(fd for fd in os.listdir("/proc/self/fd") if os.path.exists(f"/proc/self/fd/{fd}") and int(fd) != lock.fileno()),
-        "limits": {name: list(resource.getrlimit(getattr(resource, "RLIMIT_" + name))) for name in ("NOFILE", "FSIZE", "AS", "CORE")}}))
+        "limits": {name: list(resource.getrlimit(getattr(resource, "RLIMIT_" + name))) for name in ("NOFILE", "FSIZE", "AS", "CORE", "NPROC")}}))
     say("succeeded", 1.0)
     sys.exit(0)
 elif behaviour == "series":
