@@ -125,7 +125,8 @@ static void test_lost_attempts(void **state)
 /* The worker's own error is the job's, if it is of this attempt; the heartbeat likewise. */
 static void test_status_of_this_attempt(void **state)
 {
-    static const char format[] = "{\"attempt\":%d,\"heartbeat_unix_s\":77.5,\"verdict\":{\"code\":\"good\"},"
+    static const char format[] = "{\"attempt\":%d,\"heartbeat_unix_s\":77.5,\"verdict\":"
+                                 "{\"code\":\"good\",\"words\":\"good\",\"text\":\"Good.\"},"
                                  "\"error\":{\"code\":\"format\",\"field\":\"volume.files\",\"text\":\"page 2\"}}";
     struct service_fixture *f = *state;
     const struct worker_end failure = {.code = WORKER_FAILED};
