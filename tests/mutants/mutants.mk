@@ -14,10 +14,18 @@ test-crash: | deps-test ## kills (KILLS: 2000), faults at every system call, eve
 	@SELVEDGE_EVERY=1 SELVEDGE_KILLS=$(KILLS) SELVEDGE_BUILD=$(CURDIR)/$(BUILD) \
 		/usr/bin/python3 -m pytest -q -s -p no:cacheprovider tests/crash
 
-# PART: only files whose path begins so. QUICK=1: the tests of `make check`. The copy of the tree and all results stay in build/mutants.
+# COVERED: sources whose lines are counted (tests/mutants/line_coverage.py). The worker then runs without its sandbox, from
+# which no counters could be written
+ifneq ($(COVERED),)
+$(COVERED:%=$(BUILD)/obj/%.o) $(COVERED:%=$(BUILD)/obj/shared/%.o): CFLAGS_ALL += --coverage -fprofile-update=atomic -O0
+$(BUILD)/obj/optimizer/worker/sandbox/worker_confine.c.o: CFLAGS_ALL += -DSELVEDGE_NO_SANDBOX
+endif
+
+# PART: one of the parts of tests/mutants/parts.py, or only files whose path begins so. WHOLE=1: parts of the whole tree.
+# AGAIN=1: those of the last run that were not caught. The copy of the tree and all results stay in build/mutants.
 MUTANTS ?= 200
 SEED ?= 1
-MUTANT_SECONDS ?= 900
-mutants: | deps-test ## MUTANTS (200) small faults, one at a time, in a copy of the tree: the share that the tests catch (SEED, PART, QUICK, MUTANT_SECONDS)
+MUTANT_SECONDS ?= 60
+mutants: | deps-test ## a gate: MUTANTS (200) small faults, one at a time, in a copy of the tree, of which the tests must catch 95 % (SEED, PART, WHOLE, AGAIN, MUTANT_SECONDS)
 	@/usr/bin/python3 tests/mutants/run_mutants.py --mutants $(MUTANTS) --seed $(SEED) --limit-s $(MUTANT_SECONDS) \
-		$(if $(PART),--part $(PART)) $(if $(QUICK),--quick)
+		$(if $(PART),--part $(PART)) $(if $(WHOLE),--whole) $(if $(AGAIN),--again)

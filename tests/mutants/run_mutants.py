@@ -1,9 +1,9 @@
-"""make mutants: put small faults into a copy of the tree, one at a time, and see whether `make test` notices.
+"""make mutants: put small faults into a copy of the tree, one at a time, and see whether its tests notice.
 
 Figures go to standard output as JSON lines, progress to standard error, survivors to build/mutants/survivors.txt, every mutant to
-build/mutants/mutants.jsonl. A mutant is caught when a test fails, or runs far longer than it should, and passes again without it. Mutants that do
-not compile, or whose object code is the same at -O2, do not count. Tests that cannot be affected (programs that do not
-contain the object) are left out, and those that are near to the file run first.
+build/mutants/mutants.jsonl. A mutant is caught when a test fails, or has no end, and passes without the fault. Mutants that do not
+compile, or whose object code is the same at -O2, do not count, nor do those of explained.txt. Only tests that run the faulty line
+are tried, the quickest first. Exit status 1 when fewer than 95 % are caught.
 """
 import argparse
 import collections
@@ -12,320 +12,211 @@ import os
 import pathlib
 import random
 import re
-import shutil
 import subprocess
 import sys
 import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from faults import faults_of  # noqa: E402
+from faults import Fault, faults_of  # noqa: E402
+from line_coverage import Coverage  # noqa: E402
+from mutant_build import SANDBOX, TREE, WORK, Build, Compiler, Linker, check_script, clean_scratch, copy_tree  # noqa: E402
+from parts import GATE, LANGUAGE, WHOLE, Explained, files_of  # noqa: E402
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-WORK = ROOT / "build" / "mutants"
-TREE = WORK / "tree"
-SANDBOX = ROOT / "tests" / "mutants" / "sandbox.sh"
-# parts and how large a share of the mutants each of them gets
-PARTS = {"base": 8, "geometry": 24, "renderer": 24, "optimizer": 26, "server": 12, "clients/cli": 6, "clients/dashboard": 4, "clients/python": 2}
-LANGUAGE = {".c": "c", ".js": "js", ".py": "py"}
-COMPILE = "WERROR=-Werror=incompatible-pointer-types -Werror=int-conversion -Werror=array-bounds"
-PROGRAMS = ["selvedge", "selvedged", "selvedge-worker", "selvedge-phantom", "selvedge-camera"]
-LINK_S = 2.0  # what building one test costs beside running it
-SLOW_FACTOR, SLOW_S = 8.0, 20.0  # a test that takes SLOW_S seconds and SLOW_FACTOR times as long as usual hangs
+GOAL = 0.95
+SLOW_FACTOR, SLOW_S = 8.0, 10.0  # a test that takes SLOW_S seconds and SLOW_FACTOR times as long as usual hangs
 
 
 def note(text):
     print(text, file=sys.stderr, flush=True)
 
 
-def copy_tree():
-    """The files that git knows, as they are now; only what changed is written, so that objects stay valid."""
-    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
-    names = {n for n in listed.split("\0") if n and (ROOT / n).is_file()}
-    for old in [p for p in TREE.rglob("*") if p.is_file() and "build" not in p.relative_to(TREE).parts]:
-        if str(old.relative_to(TREE)) not in names:
-            old.unlink()
-    for name in names:
-        source, target = ROOT / name, TREE / name
-        if target.is_file() and target.read_bytes() == source.read_bytes():
-            continue
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(source, target)
-    subprocess.run(["git", "init", "-q"], cwd=TREE, check=True)  # checks of the documents ask git for the names of files
-
-
-def make(*targets, jobs=None):
-    """Builds in the copy; every program leaves a link map that names the objects in it."""
-    command = ["make", "--no-print-directory", f"-j{jobs or os.cpu_count()}", COMPILE, "LDFLAGS=-Wl,-Map=$@.map", *targets]
-    return subprocess.run(command, cwd=TREE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-
-
-class Test:
-    def __init__(self, name, command, program):
-        self.name, self.command, self.program = name, command, program  # program: what make builds for it, None for Python
-        self.seconds = None
-
-    def run(self, limit_s):
-        """(passed, seconds); a test that has no end fails."""
-        start = time.monotonic()
-        environment = dict(os.environ, SELVEDGE_BUILD="/mnt/tree/build", OPENBLAS_NUM_THREADS="1", SELVEDGE_DATA=data_folder(), PYTHONDONTWRITEBYTECODE="1")
-        process = subprocess.Popen([SANDBOX, WORK, *self.command], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                                   stderr=subprocess.DEVNULL, env=environment)
-        try:
-            code = process.wait(limit_s)
-        except subprocess.TimeoutExpired:
-            process.kill()  # and with it everything in its namespace
-            process.wait()
-            code = -1
-        return code in (0, 5), time.monotonic() - start  # 5: pytest has nothing to run
-
-
-def data_folder():
-    return os.path.realpath(os.environ.get("SELVEDGE_DATA") or ROOT / ".." / "shared" / "data")
-
-
-def all_tests(quick):
-    tests = []
-    for kind in ["unit"] if quick else ["unit", "physics"]:
-        for source in sorted((TREE / "tests" / kind).rglob("test_*.c")):
-            program = str(pathlib.Path("build", source.relative_to(TREE)).with_suffix(""))
-            tests.append(Test(str(source.relative_to(TREE / "tests").with_suffix("")), [program], program))
-    for kind in ["api"] if quick else ["api", "crash", "browser", "real"]:
-        for source in sorted((TREE / "tests" / kind).rglob("test_*.py")):
-            name = str(source.relative_to(TREE))
-            command = ["/usr/bin/python3", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", name]
-            tests.append(Test(name[len("tests/"):-3], command + (["-m", "not slow"] if quick else []), None))
-    return tests
-
-
-def time_tests(tests, quick):
-    """How long each test takes; kept from run to run. Tests that fail without any fault are dropped."""
-    path = WORK / ("seconds-quick.json" if quick else "seconds.json")
-    known = json.loads(path.read_text()) if path.exists() else {}
-    for t in tests:
-        if t.name not in known:
-            passed, seconds = t.run(1500)
-            known[t.name] = seconds if passed else None
-            note(f"{t.name}: {seconds:.1f} s" + ("" if passed else ", fails without a fault and is left out"))
-            path.write_text(json.dumps(known, indent=1))
-        t.seconds = known[t.name]
-    return [t for t in tests if t.seconds is not None]
-
-
-def objects_in(program):
-    """Names of the objects ("upload.c.o") that the linker took for a program."""
-    text = (TREE / (program + ".map")).read_text(errors="replace")
-    return set(re.findall(r"([\w.]+\.(?:c|cpp)\.o)\b", text))
-
-
-class Selection:
-    """Which tests a fault in a file can make fail, the likeliest first."""
-
-    def __init__(self, tests):
-        self.tests = tests
-        self.contents = {t.program: objects_in(t.program) for t in tests if t.program}
-        self.of_program = {p: objects_in(f"build/bin/{p}") for p in PROGRAMS}
-        self.source = {t.name: self.read_source(t) for t in tests}
-        for t in tests:
-            if t.program is None:
-                self.contents[t.name] = set().union(*(self.of_program[p] for p in self.programs_of(t)))
-
-    @staticmethod
-    def read_source(test):
-        paths = [TREE / "tests" / (test.name + ending) for ending in (".c", ".py")]
-        return next(p.read_text() for p in paths if p.exists())
-
-    def programs_of(self, test):
-        """The programs that a Python test runs, by the names in it and in the modules of tests/support that it uses; all when none is named."""
-        text = self.source[test.name]
-        for module in ("small_cloth", "real_jobs"):
-            if module in text:
-                text += next(p for p in (TREE / "tests").rglob(module + ".py")).read_text()
-        named = {p for p in PROGRAMS if f'"{p}"' in text or p in ("selvedge-worker", "selvedge-phantom") and p in text}
-        return named | ({"selvedged"} if "aemon" in text else set()) or set(PROGRAMS)
-
-    def affected(self, path):
-        name = pathlib.Path(path).name
-        if path.endswith(".js"):
-            return [t for t in self.tests if t.name.startswith("browser/")]
-        if path.endswith(".py"):
-            return [t for t in self.tests if re.search(r'clients"?(/|, )"?python|import ' + pathlib.Path(path).stem, self.source[t.name])]
-        return [t for t in self.tests if name + ".o" in self.contents[t.program or t.name]]
-
-    def likeliness(self, test, path):
-        p = pathlib.Path(path)
-        stem_words, test_words = set(p.stem.split("_")), set(pathlib.Path(test.name).name.split("_"))
-        score = 2 * len(stem_words & test_words)
-        score += 4 * (f'"{p.with_suffix(".h")}"' in self.source[test.name])
-        score += 2 * (f'"{p.parent}/' in self.source[test.name])
-        score += 2 * (p.parts[0] in test.name.split("/") or (p.parts[0] == "server" and test.name.startswith("api/")) or (
-            path.startswith("clients/cli") and "cli" in test_words))
-        return score
-
-    def ordered(self, path):
-        """Those of some likeliness by it, but quick ones before slow ones; the others by time."""
-        def cost(t):
-            return (t.seconds + LINK_S) / (1 + self.likeliness(t, path)) ** 2
-        return sorted(self.affected(path), key=cost)
-
-
-def source_files(part):
-    for path in sorted((TREE / part).rglob("*")):
-        if path.is_file() and path.suffix in LANGUAGE:
-            yield str(path.relative_to(TREE))
+def functions_of(text):
+    """(first, last) lines of the functions of a formatted C file, from the brace to the brace in the first column."""
+    lines = text.split("\n")
+    opening = None
+    for i, line in enumerate(lines, 1):
+        if line == "{":
+            opening = i
+        elif line == "}" and opening is not None:
+            yield opening, i
+            opening = None
+        elif re.match(r"[a-z].*\) \{ .* \}$", line):
+            yield i, i
 
 
 class Sampler:
-    """Draws faults: the part by its share, then the file by its number of faults, then the operator, then the place."""
+    """Draws faults of one part: a file by its number of faults, then the operator, then the place."""
 
-    def __init__(self, seed, only, selection):
-        self.random = random.Random(seed)
-        self.faults = {}  # part -> file -> operator -> faults
-        for part in PARTS:
-            files = {}
-            for path in source_files(part):
-                if only is not None and not path.startswith(only):
-                    continue
-                text = (TREE / path).read_text()
-                if path.endswith(".js") and not selection.affected(path):
-                    continue  # the browser tests are no quick ones
-                by_operator = collections.defaultdict(list)
-                for f in faults_of(path, text, LANGUAGE[pathlib.Path(path).suffix]):
-                    by_operator[f.operator].append(f)
-                if by_operator:
-                    files[path] = by_operator
-            if files:
-                self.faults[part] = files
-        self.n_possible = sum(len(v) for files in self.faults.values() for o in files.values() for v in o.values())
+    def __init__(self, seed, name, part):
+        self.random = random.Random(f"{seed} {name}")
+        self.faults = {}  # file -> operator -> faults
+        for path in files_of(TREE, part):
+            by_operator = collections.defaultdict(list)
+            for f in faults_of(path, (TREE / path).read_text(), LANGUAGE[pathlib.Path(path).suffix]):
+                by_operator[f.operator].append(f)
+            if by_operator:
+                self.faults[path] = by_operator
 
-    def part_of_next(self, done):
-        """The part that is farthest behind its share."""
-        return min(self.faults, key=lambda p: (done[p] + 0.5) / PARTS[p])
-
-    def draw(self, part):
-        files = self.faults[part]
-        weight = [sum(len(v) for v in operators.values()) for operators in files.values()]
-        path = self.random.choices(list(files), weight)[0]
-        operators = files[path]
+    def draw(self):
+        """A fault that was not drawn before, or None."""
+        if not self.faults:
+            return None
+        weight = [sum(len(v) for v in operators.values()) for operators in self.faults.values()]
+        path = self.random.choices(list(self.faults), weight)[0]
+        operators = self.faults[path]
         operator = self.random.choice(sorted(operators))
         fault = operators[operator].pop(self.random.randrange(len(operators[operator])))
         if not operators[operator]:
             del operators[operator]
         if not operators:
-            del files[path]
-        if not files:
-            del self.faults[part]
+            del self.faults[path]
         return fault
 
 
-def object_code(path):
-    """The object of a C file at -O2 without debugging information; None when it does not compile."""
-    plan = make("-n", "-W", path, f"build/obj/{path}.o").stdout
-    line = next((x for x in plan.splitlines() if f"-c {path} " in x), None)
-    if line is None:
-        raise RuntimeError(f"make says no command for {path}:\n{plan}")
-    out = str(WORK / "compared.o")
-    words = [w for w in line.split() if w not in ("-g", "-O3", "-MMD", "-MP")]
-    words = words[:words.index("-o")] + ["-O2", "-o", out]
-    if subprocess.run(words, cwd=TREE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode != 0:
-        return None
-    return pathlib.Path(out).read_bytes()
+class Judge:
+    def __init__(self, coverage, limit_s):
+        self.coverage, self.limit_s = coverage, limit_s
+        self.clean, self.faulty = Build("clean"), Build("faulty")
+        self.compiler, self.linker = Compiler(self.clean), Linker(self.clean, self.faulty)
+        self.explained = Explained()
+
+    def things_for(self, test, path):
+        """What has to be built for a test."""
+        return [test.name] if test.is_c else self.coverage.programs_with(path)
+
+    def prepare(self):
+        """Builds everything without a fault."""
+        built = self.clean.has([*self.coverage.contents, *(t.name for t in self.coverage.tests if t.is_c)], options=["-j2"])
+        if built.returncode != 0:
+            raise SystemExit(f"mutants: the copy of the tree does not build:\n{built.stdout[-3000:]}")
+        self.linker.restore(self.coverage.contents)
+
+    def tests_for(self, fault, part):
+        text = (TREE / fault.path).read_text()
+        last = text.count("\n", 0, fault.end) + 1
+        function = next((f for f in functions_of(text) if f[0] <= fault.line <= f[1]), None) if fault.path.endswith(".c") else None
+        chosen = self.coverage.tests_of(fault.path, fault.line, last, function)
+        always = [t for t in self.coverage.tests if t not in chosen and any(t.name.startswith(b) for b in part[1]) and
+                  self.coverage.contains(t, fault.path)]
+        return sorted(chosen + always, key=lambda t: t.seconds)
+
+    def link(self, test, path):
+        """What a test runs, with the faulty object; scripts need nothing."""
+        return not path.endswith(".c") or all(self.linker.link(thing, path, self.compiler.object) for thing in self.things_for(test, path))
+
+    def try_tests(self, fault, tests):
+        """("caught" or "survived" or "unfinished" or "invalid", test)"""
+        start, linked = time.monotonic(), False
+        for t in tests:
+            if time.monotonic() - start > self.limit_s:
+                return "unfinished", ""
+            if not (linked and not t.is_c) and not self.link(t, fault.path):
+                return "invalid", t.name
+            linked = linked or not t.is_c
+            limit_s = max(SLOW_S, SLOW_FACTOR * t.seconds)
+            passed, _ = t.run(self.faulty, limit_s)
+            if not passed and t.run(self.clean, limit_s)[0]:
+                return "caught", t.name
+        return "survived", ""
+
+    def examine(self, fault, part):
+        """The record of a fault."""
+        start = time.monotonic()
+        target = TREE / fault.path
+        original = target.read_text()
+        mutated = fault.apply(original)
+        before, after = change_of(fault, original)
+        record = {"file": fault.path, "line": fault.line, "operator": fault.operator, "before": before, "after": after,
+                  "start": fault.start, "end": fault.end, "new": fault.new, "test": "", "n_test": 0}
+        record["verdict"] = self.compiler.verdict(fault.path, original, mutated) if fault.path.endswith(".c") else check_script(fault.path, mutated)
+        if record["verdict"] is None and self.explained.reason_of(fault.path, before, after) is not None:
+            record["verdict"] = "explained"
+        if record["verdict"] is None:
+            tests = self.tests_for(fault, part)
+            clean_scratch()
+            if not fault.path.endswith(".c"):
+                target.write_text(mutated)
+            try:
+                record["verdict"], record["test"] = self.try_tests(fault, tests)
+            finally:
+                target.write_text(original)
+                self.linker.restore(self.coverage.programs_with(fault.path))
+            record["n_test"] = len(tests)
+        record["seconds"] = round(time.monotonic() - start, 1)
+        return record
 
 
-def differs(fault, original, mutated):
-    """Whether the fault compiles and changes the program: "invalid", "equivalent" or None."""
-    target = TREE / fault.path
-    if fault.path.endswith(".py"):
-        try:
-            compile(mutated, fault.path, "exec")
-        except SyntaxError:
-            return "invalid"
-        return None
-    if fault.path.endswith(".js"):
-        if shutil.which("node") is None:
-            return None
-        probe = WORK / "probe.mjs"
-        probe.write_text(mutated)
-        return None if subprocess.run(["node", "--check", probe], stderr=subprocess.DEVNULL).returncode == 0 else "invalid"
-    before = object_code(fault.path)
-    target.write_text(mutated)
-    after = object_code(fault.path)
-    target.write_text(original)
-    if before is None:
-        raise RuntimeError(f"'{fault.path}' does not compile without a fault")
-    return "invalid" if after is None else "equivalent" if after == before else None
-
-
-def clean_scratch():
-    shutil.rmtree(WORK / "tmp", ignore_errors=True)
-    (WORK / "tmp").mkdir()
-
-
-def build_for(test):
-    """Builds what a test runs, from the copy as it is now."""
-    return make(*([test.program] if test.program else (f"build/bin/{p}" for p in PROGRAMS))).returncode == 0
-
-
-def caught_by(test, failed_after_s, limit_s, target, original):
-    """Whether a test that failed, or had no end within its limit, has caught the fault: it passes without the fault, and in far
-    less time. On a busy machine it may fail for other reasons."""
-    mutated = target.read_text()
-    target.write_text(original)
-    try:
-        passed, seconds = test.run(SLOW_FACTOR * limit_s) if build_for(test) else (False, 0.0)
-        return passed and (failed_after_s < limit_s or failed_after_s > 0.5 * SLOW_FACTOR * seconds)
-    finally:
-        target.write_text(mutated)
-
-
-def try_tests(fault, selection, original, limit_s):
-    """("caught" or "survived" or "unfinished", the test that failed, seconds); the copy holds the fault."""
-    start = time.monotonic()
-    for t in selection.ordered(fault.path):
-        if time.monotonic() - start > limit_s:
-            return "unfinished", "", time.monotonic() - start
-        if not build_for(t):
-            return "invalid", t.name, 0.0
-        test_limit_s = max(SLOW_S, SLOW_FACTOR * t.seconds)
-        passed, seconds = t.run(test_limit_s)
-        if not passed and caught_by(t, seconds, test_limit_s, TREE / fault.path, original):
-            return "caught", t.name, time.monotonic() - start
-    return "survived", "", time.monotonic() - start
-
-
-def examine(fault, selection, limit_s):
-    target = TREE / fault.path
-    original = target.read_text()
-    mutated = fault.apply(original)
-    verdict = differs(fault, original, mutated)
-    if verdict is not None:
-        return verdict, "", 0.0
-    clean_scratch()
-    target.write_text(mutated)
-    try:
-        return try_tests(fault, selection, original, limit_s)
-    finally:
-        target.write_text(original)
-
-
-def change_of(fault):
-    """The lines that the fault changes, before and after."""
-    text = (TREE / fault.path).read_text()
+def change_of(fault, text):
+    """The lines that the fault changes, before and after, each as one line."""
     start = text.rfind("\n", 0, fault.start) + 1
     end = text.find("\n", fault.end)
-    return text[start:end].strip(), (text[start:fault.start] + fault.new + text[fault.end:end]).strip()
-
-
-def describe(fault, verdict, test, seconds):
-    before, after = change_of(fault)
-    return {"file": fault.path, "line": fault.line, "operator": fault.operator, "verdict": verdict, "test": test, "seconds": round(seconds, 1),
-            "before": before, "after": after}
+    join = lambda lines: " ".join(lines.split())
+    return join(text[start:end]), join(text[start:fault.start] + fault.new + text[fault.end:end])
 
 
 def write_survivors(records):
+    """As explained.txt has them, so that a line of reason makes one an explained fault."""
     with open(WORK / "survivors.txt", "w") as f:
         for r in records:
             if r["verdict"] in ("survived", "unfinished"):
-                f.write(f"{r['file']}:{r['line']}: {r['operator']} ({r['verdict']} after {r['seconds']:.0f} s)\n  - {r['before']}\n  + {r['after']}\n")
+                f.write(f"{r['file']}: line {r['line']}, {r['operator']}, {r['verdict']} after {r['n_test']} tests in {r['seconds']:.0f} s\n"
+                        f"  - {r['before']}\n  + {r['after']}\n")
+
+
+def keep(records):
+    with open(WORK / "mutants.jsonl", "w") as f:
+        for r in records:
+            f.write(json.dumps(r) + "\n")
+    write_survivors(records)
+
+
+def say(n, r):
+    note(f"{n} {r['part']} {r['file']}:{r['line']} {r['operator']}: {r['verdict']} {r['test']} ({r['n_test']} tests, {r['seconds']:.1f} s)")
+
+
+def draw_and_judge(name, part, sampler, judge, discarded):
+    """The record of the next fault of a part that can be judged, or None when there is none left."""
+    while (fault := sampler.draw()) is not None:
+        record = dict(judge.examine(fault, part), part=name)
+        if record["verdict"] not in ("invalid", "equivalent"):
+            return record
+        discarded[record["verdict"]] += 1
+    return None
+
+
+def sample(arguments, parts, judge):
+    """Draws and judges arguments.mutants faults, of all parts in turn. Explained ones come on top."""
+    records, discarded = [], collections.Counter()
+    samplers = {name: Sampler(arguments.seed, name, part) for name, part in parts.items()}
+    n_judged = 0
+    while samplers and n_judged < arguments.mutants:
+        for name in list(samplers):
+            record = draw_and_judge(name, parts[name], samplers[name], judge, discarded) if n_judged < arguments.mutants else None
+            if record is None:
+                del samplers[name]
+                continue
+            n_judged += record["verdict"] != "explained"
+            records.append(record)
+            keep(records)
+            say(len(records), record)
+    note(f"left out: {discarded['invalid']} that do not compile, {discarded['equivalent']} with the same object code")
+    return records
+
+
+def sample_again(parts, judge):
+    """Judges again those of the last run that were not caught. Their files must not have changed."""
+    records = [json.loads(line) for line in open(WORK / "mutants.jsonl")]
+    for i, r in enumerate(records):
+        if r["part"] not in parts or r["verdict"] in ("caught", "explained"):
+            continue
+        fault = Fault(r["file"], r["line"], r["operator"], r["start"], r["end"], r["new"])
+        if change_of(fault, (TREE / r["file"]).read_text()) != (r["before"], r["after"]):
+            note(f"{r['file']} has changed: its faults need a new sample")
+            continue
+        records[i] = dict(judge.examine(fault, parts[r["part"]]), part=r["part"])
+        keep(records)
+        say(i + 1, records[i])
+    return records
 
 
 def figure(name, value, unit, better):
@@ -333,60 +224,47 @@ def figure(name, value, unit, better):
 
 
 def report(records):
-    by_part = collections.defaultdict(list)
+    """Figures, and a table; returns the share of all that was caught. Explained faults count neither way."""
+    by_part = collections.defaultdict(collections.Counter)
     for r in records:
-        by_part[next(p for p in PARTS if r["file"].startswith(p + "/"))].append(r["verdict"] == "caught")
-    all_caught = [c for values in by_part.values() for c in values]
-    for part, caught in sorted(by_part.items()):
-        figure(f"mutants.{part.replace('/', '.')}.caught_share", round(sum(caught) / len(caught), 4), "1", "higher")
-        figure(f"mutants.{part.replace('/', '.')}.n", len(caught), "1", "higher")
-    figure("mutants.caught_share", round(sum(all_caught) / max(1, len(all_caught)), 4), "1", "higher")
-    figure("mutants.n", len(all_caught), "1", "higher")
-    figure("mutants.survived", len(all_caught) - sum(all_caught), "1", "lower")
-
-
-def prepare(quick):
-    """The copy, built, and its tests with their times."""
-    TREE.mkdir(parents=True, exist_ok=True)
-    clean_scratch()
-    if subprocess.run([SANDBOX, WORK, "true"]).returncode != 0:
-        sys.exit("mutants: programs with faults need a sandbox: root, or user namespaces (unshare)")
-    copy_tree()
-    built = make("all", "build-tests")
-    if built.returncode != 0:
-        sys.exit(f"mutants: the copy of the tree does not build:\n{built.stdout[-3000:]}")
-    return Selection(time_tests(all_tests(quick), quick))
+        for key in (r["part"], "all"):
+            by_part[key][r["verdict"]] += 1
+    note(f"{'part':20s}{'faults':>8s}{'caught':>8s}{'share':>8s}{'explained':>11s}")
+    share = {}
+    for part, n in by_part.items():
+        judged = sum(n.values()) - n["explained"]
+        share[part] = n["caught"] / max(1, judged)
+        note(f"{part:20s}{judged:8d}{n['caught']:8d}{100 * share[part]:7.1f}%{n['explained']:11d}")
+        figure(f"guard.mutants.{part.replace('/', '_')}.caught", round(share[part], 4), "1", "higher")
+    return share.get("all", 0.0)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--mutants", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--part", help="only files whose path begins so")
-    parser.add_argument("--limit-s", type=float, default=900, help="of the tests of one mutant")
-    parser.add_argument("--quick", action="store_true", help="the tests of `make check` in place of those of `make test`")
+    parser.add_argument("--part", help="one of the parts, or only files whose path begins so")
+    parser.add_argument("--limit-s", type=float, default=60, help="of the tests of one mutant")
+    parser.add_argument("--whole", action="store_true", help="the whole tree in place of the parts of the gate")
+    parser.add_argument("--again", action="store_true", help="judge the faults of the last run that were not caught once more")
     arguments = parser.parse_args()
-    selection = prepare(arguments.quick)
-    sampler = Sampler(arguments.seed, arguments.part, selection)
-    note(f"{sampler.n_possible} possible faults")
-    records, done, discarded = [], collections.Counter(), collections.Counter()
-    with open(WORK / "mutants.jsonl", "w") as log:
-        while len(records) < arguments.mutants and sampler.faults:
-            part = sampler.part_of_next(done)
-            fault = sampler.draw(part)
-            verdict, test, seconds = examine(fault, selection, arguments.limit_s)
-            if verdict in ("invalid", "equivalent"):
-                discarded[verdict] += 1
-                continue
-            done[part] += 1
-            records.append(describe(fault, verdict, test, seconds))
-            log.write(json.dumps(records[-1]) + "\n")
-            log.flush()
-            write_survivors(records)
-            note(f"{len(records)}/{arguments.mutants} {fault.path}:{fault.line} {fault.operator}: {verdict} {test} ({seconds:.0f} s)")
-    note(f"left out: {discarded['invalid']} that do not compile, {discarded['equivalent']} with the same object code")
+    os.nice(10)
+    every = WHOLE if arguments.whole else GATE
+    parts = every if arguments.part is None else {arguments.part: every.get(arguments.part, ([arguments.part], []))}
+    TREE.mkdir(parents=True, exist_ok=True)
+    clean_scratch()
+    if subprocess.run([SANDBOX, WORK, "true"], check=False).returncode != 0:
+        sys.exit("mutants: programs with faults need a sandbox: root, or user namespaces (unshare)")
+    copy_tree()
+    counted, name = (every, "whole" if arguments.whole else "gate") if set(parts) <= set(every) else (parts, arguments.part.replace("/", "-"))
+    coverage = Coverage(name, [f for part in counted.values() for f in files_of(TREE, part)], note)
+    coverage.record()
+    judge = Judge(coverage, arguments.limit_s)
+    judge.prepare()
+    records = sample_again(parts, judge) if arguments.again else sample(arguments, parts, judge)
     note((WORK / "survivors.txt").read_text())
-    report(records)
+    if report([r for r in records if r["part"] in parts]) < GOAL:
+        sys.exit(f"mutants: the tests catch fewer than {100 * GOAL:.0f} %")
 
 
 if __name__ == "__main__":

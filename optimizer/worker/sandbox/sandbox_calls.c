@@ -162,7 +162,7 @@ static void report(int signal_number, siginfo_t *info, void *context)
     sigemptyset(&set);
     sigaddset(&set, signal_number);
     pthread_sigmask(SIG_UNBLOCK, &set, NULL);
-    kill(getpid(), signal_number);
+    raise(signal_number); /* to this thread: another one might not take it before the next line */
     _exit(128 + SIGSYS);
 }
 

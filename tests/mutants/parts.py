@@ -1,0 +1,49 @@
+"""Parts of the tree whose tests are judged, and faults that are known to have no effect."""
+import pathlib
+import re
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+LANGUAGE = {".c": "c", ".js": "js", ".py": "py"}
+
+# Each part: the beginnings of the paths of its files, and tests that are run for every fault of it, because counters of
+# lines do not reach there: they test processes that end without writing their counters.
+GATE = {
+    "sandbox": (["optimizer/worker/sandbox/"], ["unit/optimizer/sandbox/", "api/service/test_sandbox"]),
+    "store": (["server/store/"], []),
+    "retention": (["server/retention/"], []),
+    "uncertainty": (["optimizer/fit/objective/uncertainty", "optimizer/fit/objective/product_noise", "optimizer/fit/linear/",
+                     "optimizer/fit/cloth/carried_error", "geometry/fibers/shape/radius_choose"], []),
+    "readers": (["geometry/volume/format/", "geometry/volume/voxel_stream", "geometry/volume/volume_source", "geometry/volume/sample_type",
+                 "optimizer/fit/photographs/reader/", "optimizer/fit/photographs/table/"], []),
+}
+WHOLE = {name: ([name + "/"], []) for name in ("base", "geometry", "renderer", "optimizer", "server", "clients/cli", "clients/dashboard",
+                                               "clients/python")}
+
+
+def files_of(tree, part):
+    """Paths of the sources of a part, relative to the tree."""
+    beginnings, _ = part
+    found = []
+    for beginning in beginnings:
+        folder = tree / beginning
+        for path in sorted((folder if beginning.endswith("/") else folder.parent).rglob("*")):
+            name = str(path.relative_to(tree))
+            if name.startswith(beginning) and path.suffix in LANGUAGE and path.is_file() and not name.endswith("_main.c"):
+                found.append(name)
+    return found
+
+
+class Explained:
+    """Faults that change nothing which anyone could see, each with its reason (explained.txt)."""
+
+    ENTRY = re.compile(r"^(?P<file>[^:\s]+): (?P<reason>.+)\n  - (?P<before>.*)\n  \+ (?P<after>.*)$", re.M)
+
+    def __init__(self, text=None):
+        text = (HERE / "explained.txt").read_text() if text is None else text
+        body = "\n".join(line for line in text.split("\n") if not line.startswith("#"))
+        self.reason = {(m["file"], m["before"].strip(), m["after"].strip()): m["reason"] for m in self.ENTRY.finditer(body)}
+        self.n_unread = len([line for line in body.split("\n") if line.strip()]) - 3 * len(self.reason)
+
+    def reason_of(self, path, before, after):
+        return self.reason.get((path, before, after))
