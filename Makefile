@@ -188,8 +188,8 @@ speckle-tables: $(BUILD)/tools/speckle-tables ## make the tables of speckle of w
 	@$(BUILD)/tools/speckle-tables $(SPECKLE)
 
 include config/install.mk
-include tests/tests.mk
 include tests/exact/exact.mk
+include tests/tests.mk
 include tests/mutants/mutants.mk
 include tests/bench/bench.mk
 include tests/checks.mk

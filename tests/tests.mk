@@ -23,7 +23,7 @@ $(BUILD)/tests/physics/wave/%: LINK_TEST := $(LINK_WAVE)
 deps-test:         ## install what the tests need as well
 	@./config/install-dependencies test
 
-build-tests: $(TEST_BINS) $(PRINT_OPTIONS)
+build-tests: $(TEST_BINS) $(EXACT_BINS) $(PRINT_OPTIONS)
 
 check: | deps-test ## quick inner loop: checks of the sources, unit tests, quick API tests (< 2 minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) all build-tests

@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-pictures bench-pile bench-weave bench-weave-rendered
+.PHONY: bench bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-pictures bench-pile bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -15,6 +15,11 @@ bench: | deps-test ## every figure, one JSON object a line (a night on 2 quiet c
 bench-transport: | deps-test ## the renderer's figures (paths a second, time to a given standard error, memory)
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %transport,$(BENCH_BINS)) >&2
 	@for b in $(filter %transport,$(BENCH_BINS)); do $$b || exit 1; done
+
+# EXACT: some of the cloths only, and options of the program, such as EXACT="velvet --paths 1048576"
+bench-exact: | deps-test ## the renderer's scene against the cloth by definition: means, derivatives, tiles of any length, segments cut (five minutes)
+	@$(MAKE) --no-print-directory -j$$(nproc) all $(EXACT_BINS) >&2
+	@/usr/bin/python3 tests/exact/bench_exact.py --build $(BUILD) $(EXACT)
 
 # MODELS: some of them only, such as MODELS="chiang.v1 elliptical.v1"
 bench-models: | deps-test ## what every scattering model costs and what light it loses; fur fitted to profiles of single fibers (four minutes)

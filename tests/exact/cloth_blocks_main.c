@@ -6,7 +6,7 @@
  *
  * The request: "fibers" (.hair), "model", "parameters" (name or symbol to value or r, g, b, in the units of files),
  * "configurations" (arrays of light theta, phi, camera theta, phi and rotation in degrees), "blocks", "paths" of a
- * block, "seed"; "far_field": the camera is far away.
+ * block, "seed"; "far_field": the camera is far away; "mesh" (.obj in millimetres): the cloth lies on it.
  *
  * Printed: {"parameters": [names], "seconds", "configurations": [blocks of [r, g, b, derivatives of r, of g, of b]]}.
  */
@@ -138,6 +138,12 @@ static void make_scene(const json_t *q, struct job *j)
     check(scene_new(&f, &(struct scene_option){.black_sheet = true}, &j->flat, &err), &err);
     fiber_set_release(&f);
     j->scene = j->flat;
+    const char *path = json_string_value(json_object_get(q, "mesh"));
+    if (path == NULL) return;
+    struct mesh mesh;
+    check(mesh_read_obj(path, 1.0, &mesh, &err), &err);
+    check(scene_bend(j->flat, &mesh, true, &j->scene, &err), &err);
+    mesh_release(&mesh);
 }
 
 int main(int argc, char **argv)
@@ -170,6 +176,7 @@ int main(int argc, char **argv)
     clock_gettime(CLOCK_MONOTONIC, &end);
     print_result(&j, (double)(end.tv_sec - start.tv_sec) + 1e-9 * (double)(end.tv_nsec - start.tv_nsec));
     parameter_sets_release(&j.sets);
+    if (j.scene != j.flat) scene_free(j.scene);
     scene_free(j.flat);
     thread_pool_free(pool);
     free(j.sum);

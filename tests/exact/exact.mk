@@ -11,3 +11,4 @@ $(BUILD)/tests/exact/cloth_blocks_exact: $(BUILD)/obj/tests/exact/cloth_blocks_m
 	@mkdir -p $(@D)
 	@echo "  LINK $@"
 	@$(CC) $(TEST_LINKER) $(LDFLAGS) -o $@ $^ -ljansson $(LINK_RENDERER)
+$(BUILD)/tests/physics/exact/test_capsule: $(patsubst %,$(BUILD)/obj/tests/exact/%.c.o,capsule capsule_cloth capsule_walk tube_links)

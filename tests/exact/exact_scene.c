@@ -2,12 +2,12 @@
  * closed tube, the union of the convex hulls of the balls at both ends of its segments, over the faces of the tile too.
  * A program that is linked with this file traces these tubes in double precision, without Embree.
  *
- * A ray leaves the tubes that it starts in, each at its end, and hits the next one that it comes into. The member
- * i_cell of a ray, which flat scenes do not use, is the number of the segment that scattered it plus 1, or 0: a start
- * that single precision has moved off the surface is put back there.
+ * A ray leaves the tubes that it starts in, each at its end, and hits the next one that it comes into. A bent cloth is
+ * the image of these tubes under the map of its shell. The member i_cell of a ray is the number of the segment that
+ * scattered it plus 1, or 0: a start that single precision has moved off the surface is put back there.
  */
 #include "renderer/scene/scene_ray.h"
-#include "tests/exact/capsule_cloth.h"
+#include "tests/exact/exact_bent.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -20,12 +20,16 @@
  * put back on the surface, and of any other. Starts farther from the surface are not put back. */
 static const double slack_on_surface = 1e-6, slack_elsewhere = 1e-4, put_back_within = 1e-3;
 
+/* i_cell of a ray that has ended on the sheet of a bent cloth. */
+#define ON_SHEET UINT32_MAX
+
 struct scene {
-    struct capsule_cloth cloth;
-    uint8_t *group; /* of each fiber */
+    struct capsule_cloth cloth; /* of a bent scene: a copy, which the flat one owns */
+    uint8_t *group;             /* of each fiber */
     size_t n_group;
     double bottom_mm, tile_mm[2];
-    bool black_sheet;
+    bool black_sheet, is_bent;
+    struct exact_bent bent;
 };
 
 status scene_new(const struct fiber_set *f, const struct scene_option *o, struct scene **scene, struct error *err)
@@ -49,18 +53,54 @@ status scene_new(const struct fiber_set *f, const struct scene_option *o, struct
     return STATUS_OK;
 }
 
+status scene_bend(const struct scene *flat, const struct mesh *mesh, bool black_sheet, struct scene **bent,
+                  struct error *err)
+{
+    struct scene *s = malloc(sizeof *s);
+    if (s != NULL) {
+        memcpy(s, flat, sizeof *s);
+        s->black_sheet = black_sheet;
+        s->is_bent = true;
+    }
+    if (s == NULL || !exact_bent_init(&s->bent, mesh, MARGIN_MM, MARGIN_MM - flat->bottom_mm)) {
+        scene_free(s);
+        return error_set(err, STATUS_NO_MEMORY, "cannot bend the exact scene: out of memory");
+    }
+    *bent = s;
+    return STATUS_OK;
+}
+
 void scene_free(struct scene *s)
 {
     if (s == NULL) return;
-    capsule_cloth_release(&s->cloth);
-    free(s->group);
+    if (s->is_bent) {
+        exact_bent_release(&s->bent);
+    } else {
+        capsule_cloth_release(&s->cloth);
+        free(s->group);
+    }
     free(s);
 }
 
 /* ---- rays ---- */
 
-/* Start and direction of a ray in double precision, the start put back on the surface that it lies on. */
-static double start_of(const struct scene *s, const struct scene_ray *r, double o[3], double d[3])
+/* Puts a start back on the surface of a segment. False: it lies too far from there. */
+static bool put_back(const struct scene *s, uint32_t i_segment, double o[3])
+{
+    const double within = put_back_within * s->cloth.capsule[i_segment].radius[0];
+    if (!s->is_bent) return capsule_cloth_project(&s->cloth, i_segment, within, o);
+    const struct exact_cell *cell = &s->bent.cell[exact_bent_cell(&s->bent, o)];
+    double flat[3], way[3];
+    exact_cell_to_cloth(cell, o, flat);
+    memcpy(way, flat, sizeof way);
+    if (!capsule_cloth_project(&s->cloth, i_segment, within, flat)) return false;
+    for (int k = 0; k < 3; k++) way[k] = flat[k] - way[k];
+    exact_cell_move(cell, way, o);
+    return true;
+}
+
+/* The start of a ray as it is known to double precision. */
+static void start_of(const struct scene *s, const struct scene_ray *r, struct capsule_walk *w, double o[3], double d[3])
 {
     double length2 = 0.0;
     for (int k = 0; k < 3; k++) {
@@ -69,45 +109,61 @@ static double start_of(const struct scene *s, const struct scene_ray *r, double 
         length2 += d[k] * d[k];
     }
     for (int k = 0; k < 3; k++) d[k] /= sqrt(length2);
-    const double radius = s->cloth.capsule[r->i_cell == 0 ? 0 : r->i_cell - 1].radius[0];
-    const bool put_back =
-        r->i_cell != 0 && capsule_cloth_project(&s->cloth, r->i_cell - 1, put_back_within * radius, o);
-    return radius * (put_back ? slack_on_surface : slack_elsewhere);
+    const bool is_back = r->i_cell != 0 && put_back(s, r->i_cell - 1, o);
+    w->slack = s->cloth.capsule[0].radius[0] * (is_back ? slack_on_surface : slack_elsewhere);
+    w->n_open = w->n_part = 0;
 }
 
-static bool next_entrance(const struct scene *s, const struct scene_ray *r, double o[3], double d[3],
-                          struct capsule_entrance *e)
+static enum exact_end next_entrance(const struct scene *s, const struct scene_ray *r, double o[3], double d[3],
+                                    struct capsule_entrance *e, uint32_t *i_cell)
 {
     struct capsule_walk w;
-    w.slack = start_of(s, r, o, d);
-    w.n_open = w.n_part = 0;
-    return capsule_walk_piece(&w, &s->cloth, o, d, 0.0, INFINITY, e);
+    start_of(s, r, &w, o, d);
+    if (s->is_bent) return exact_bent_walk(&s->bent, &s->cloth, &w, o, d, s->black_sheet, e, i_cell);
+    return capsule_walk_piece(&w, &s->cloth, o, d, 0.0, INFINITY, e) ? EXACT_MET : EXACT_LEFT;
 }
 
-static void describe(const struct scene *s, const struct capsule_entrance *e, const double x[3], struct scene_hit *hit)
+/* Fills in a hit at x, all but its position. */
+static void describe(const struct scene *s, const struct capsule_entrance *e, uint32_t i_cell, const double x[3],
+                     struct scene_hit *hit)
 {
     const struct capsule *c = &s->cloth.capsule[e->i_capsule];
-    const double there[3] = {x[0] - e->shift[0] * s->tile_mm[0], x[1] - e->shift[1] * s->tile_mm[1], x[2]};
-    double normal[3], radius;
-    capsule_distance(c, there, normal, &radius);
-    for (int k = 0; k < 3; k++) {
-        hit->normal[k] = (float)normal[k];
-        hit->tangent[k] = (float)c->axis[k];
+    const struct exact_cell *cell = s->is_bent ? &s->bent.cell[i_cell] : NULL;
+    double flat[3] = {x[0], x[1], x[2]}, normal[3], radius, length[2] = {0.0, 0.0}, n[3], t[3];
+    if (cell != NULL) exact_cell_to_cloth(cell, x, flat);
+    for (int k = 0; k < 2; k++) flat[k] -= e->shift[k] * s->tile_mm[k];
+    capsule_distance(c, flat, normal, &radius);
+    for (int a = 0; a < 3; a++) {
+        n[a] = cell == NULL ? normal[a] : 0.0;
+        t[a] = cell == NULL ? c->axis[a] : 0.0;
+        for (int k = 0; k < 3 && cell != NULL; k++) { /* normals go through the inverse transpose */
+            n[a] += cell->to_cloth[k][a] * normal[k];
+            t[a] += cell->to_world[a][k] * c->axis[k];
+        }
+        length[0] += n[a] * n[a];
+        length[1] += t[a] * t[a];
     }
-    hit->radius_mm = (float)radius;
+    for (int a = 0; a < 3; a++) {
+        hit->normal[a] = (float)(n[a] / sqrt(length[0]));
+        hit->tangent[a] = (float)(t[a] / sqrt(length[1]));
+    }
+    hit->radius_mm = (float)(cell != NULL ? radius * cell->scale : radius);
     hit->i_segment = e->i_capsule;
-    hit->i_cell = 0;
+    hit->i_cell = i_cell;
 }
 
 bool scene_trace(const struct scene *s, struct scene_ray *r, struct scene_hit *hit)
 {
     double o[3], d[3];
     struct capsule_entrance e;
-    if (!next_entrance(s, r, o, d, &e)) return false;
+    uint32_t i_cell = 0;
+    const enum exact_end end = next_entrance(s, r, o, d, &e, &i_cell);
+    if (end == EXACT_ON_SHEET) r->i_cell = ON_SHEET;
+    if (end != EXACT_MET) return false;
     for (int k = 0; k < 3; k++) o[k] += e.t * d[k];
-    describe(s, &e, o, hit);
+    describe(s, &e, i_cell, o, hit);
     for (int k = 0; k < 3; k++) {
-        if (k < 2) {
+        if (k < 2 && !s->is_bent) {
             const double whole = floor(o[k] / s->tile_mm[k]) * s->tile_mm[k];
             r->offset_mm[k] += whole;
             o[k] -= whole;
@@ -122,7 +178,8 @@ bool scene_occluded(const struct scene *s, const struct scene_ray *r)
 {
     double o[3], d[3];
     struct capsule_entrance e;
-    return next_entrance(s, r, o, d, &e);
+    uint32_t i_cell;
+    return next_entrance(s, r, o, d, &e, &i_cell) != EXACT_LEFT;
 }
 
 void scene_ray_leave(const struct scene_hit *hit, const double offset_mm[2], const float direction[3],
@@ -160,21 +217,41 @@ void scene_ray_leave_across(const struct scene_hit *hit, const double offset_mm[
     r->i_cell = hit->i_segment + 1;
 }
 
+/* To the plane above or below a flat cloth. False: the ray never meets it. */
+static bool to_slab(const struct scene *s, const double o[3], const double d[3], double *t)
+{
+    const double top = MARGIN_MM, bottom = s->bottom_mm - MARGIN_MM;
+    *t = 0.0;
+    if ((o[2] > top && d[2] >= 0.0) || (o[2] < bottom && d[2] <= 0.0)) return false;
+    if (o[2] > top) *t = (top - o[2]) / d[2];
+    if (o[2] < bottom) *t = (bottom - o[2]) / d[2];
+    return true;
+}
+
+/* To a box around a bent cloth, or nowhere when the ray misses it. */
+static double to_box(const struct exact_bent *b, const double o[3], const double d[3])
+{
+    double near = 0.0, far = INFINITY;
+    for (int k = 0; k < 3; k++) {
+        if (d[k] == 0.0) continue;
+        const double low = (b->low_mm[k] - 0.01 - o[k]) / d[k], high = (b->high_mm[k] + 0.01 - o[k]) / d[k];
+        near = fmax(near, fmin(low, high));
+        far = fmin(far, fmax(low, high));
+    }
+    return near > far ? 0.0 : near;
+}
+
 bool scene_ray_enter(const struct scene *s, const double origin_mm[3], const double direction[3], struct scene_ray *r)
 {
-    const double top = MARGIN_MM, bottom = s->bottom_mm - MARGIN_MM, z = origin_mm[2];
-    double t = 0.0;
-    if (z > top) {
-        if (direction[2] >= 0.0) return false;
-        t = (top - z) / direction[2];
-    } else if (z < bottom) {
-        if (direction[2] <= 0.0) return false;
-        t = (bottom - z) / direction[2];
-    }
+    double t;
+    if (s->is_bent)
+        t = to_box(&s->bent, origin_mm, direction);
+    else if (!to_slab(s, origin_mm, direction, &t))
+        return false;
     for (int k = 0; k < 3; k++) {
         double p = origin_mm[k] + t * direction[k];
         if (k < 2) {
-            r->offset_mm[k] = floor(p / s->tile_mm[k]) * s->tile_mm[k];
+            r->offset_mm[k] = s->is_bent ? 0.0 : floor(p / s->tile_mm[k]) * s->tile_mm[k];
             p -= r->offset_mm[k];
         }
         r->origin_mm[k] = (float)p;
@@ -187,13 +264,24 @@ bool scene_ray_enter(const struct scene *s, const double origin_mm[3], const dou
 
 /* ---- the cloth ---- */
 
-bool scene_sheet_hides(const struct scene *s, const float direction[3]) { return s->black_sheet && direction[2] <= 0; }
-bool scene_sheet_met(const struct scene *s, const struct scene_ray *r) { return s->black_sheet && r->direction[2] < 0; }
+bool scene_sheet_hides(const struct scene *s, const float direction[3])
+{
+    return s->black_sheet && !s->is_bent && direction[2] <= 0;
+}
+
+bool scene_sheet_met(const struct scene *s, const struct scene_ray *r)
+{
+    return s->black_sheet && (s->is_bent ? r->i_cell == ON_SHEET : r->direction[2] < 0);
+}
+
 bool scene_bent_normal(const struct scene *s, const struct scene_hit *hit, float normal[3])
 {
-    (void)s, (void)hit, (void)normal;
-    return false;
+    if (!s->is_bent) return false;
+    const double *n = s->bent.cell[hit->i_cell].to_cloth[2];
+    for (int k = 0; k < 3; k++) normal[k] = (float)(n[k] / sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]));
+    return true;
 }
+
 bool scene_section_normal(const struct scene *s, const struct scene_hit *hit, float normal[3])
 {
     (void)s, (void)hit, (void)normal;
