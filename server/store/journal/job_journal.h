@@ -47,8 +47,8 @@ struct job_journal {
     struct file_row *file; /* owned; without offsets and states */
     size_t n_file, n_damaged /* lines that are no records */;
 };
-/* Reads a journal past damaged lines. The caller releases it, after an error too. STATUS_NOT_FOUND, STATUS_FORMAT (not
- * a file, or no record is whole), STATUS_IO, STATUS_NO_MEMORY. */
+/* Reads a journal past damaged lines. The caller releases it, after an error too. STATUS_NOT_FOUND (or it is not a
+ * file), STATUS_FORMAT (no record is whole), STATUS_IO, STATUS_NO_MEMORY. */
 status job_journal_read(const char *folder, struct job_journal *journal, struct error *err);
 void job_journal_release(struct job_journal *journal);
 

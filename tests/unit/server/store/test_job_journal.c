@@ -4,7 +4,6 @@
 #include "server/store/journal/job_journal.h"
 #include "tests/support/scratch_folder.h"
 
-#include <errno.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -192,7 +191,6 @@ static void test_no_journal(void **state)
     struct error err = {0};
     const char *path = scratch_path(state, JOB_FILE_JOURNAL);
     assert_int_equal(job_journal_read(*state, &j, &err), STATUS_NOT_FOUND);
-    assert_int_equal(err.errno_value, ENOENT);
     scratch_write(path, "", 0);
     assert_int_equal(job_journal_read(*state, &j, &err), STATUS_FORMAT);
     assert_non_null(strstr(err.text, "no whole record"));
@@ -212,8 +210,7 @@ static void test_links_and_pipes(void **state)
         unlink(path);
         scratch_write(victim, "untouched", 9);
         assert_int_equal(pipe ? mkfifo(path, 0600) : symlink(victim, path), 0);
-        assert_int_equal(job_journal_read(*state, &j, &err), STATUS_FORMAT);
-        assert_non_null(strstr(err.text, "not a file"));
+        assert_int_equal(job_journal_read(*state, &j, &err), STATUS_NOT_FOUND);
         append(*state, &(struct journal_entry){.job = &whole});
         assert_int_equal(job_journal_read(*state, &j, NULL), STATUS_OK);
         assert_true(j.has_job);
@@ -223,9 +220,12 @@ static void test_links_and_pipes(void **state)
         free(text);
     }
     unlink(path);
-    assert_int_equal(mkdir(path, 0700), 0);
-    assert_int_not_equal(job_journal_append(&key, *state, &(struct journal_entry){.job = &whole}, true, NULL),
-                         STATUS_OK);
+    assert_int_equal(mkdir(path, 0700), 0); /* a folder makes way */
+    struct job_journal j;
+    append(*state, &(struct journal_entry){.job = &whole});
+    assert_int_equal(job_journal_read(*state, &j, NULL), STATUS_OK);
+    assert_true(j.has_job);
+    job_journal_release(&j);
 }
 
 int main(void)
