@@ -15,6 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 enum { MAX_REPORT_BYTES = 4 << 20, TURN_LIMIT_S = 30, LOOK_US = 20000 };
@@ -37,12 +38,20 @@ static status take_turn(struct job_service *v, struct job_refusal *refusal, stru
     return STATUS_OK;
 }
 
+/* Whether a worker holds or takes more than one may. Its report is memory, too, but none that it has mapped. */
+static bool takes_too_much(const struct settings *set, pid_t pid, int report_fd)
+{
+    struct stat st;
+    if (set->resident_limit_bytes > 0 && worker_memory_bytes(pid) > set->resident_limit_bytes) return true;
+    if (set->thread_limit > 0 && worker_thread_count(pid) > set->thread_limit) return true;
+    return fstat(report_fd, &st) == 0 && st.st_size > MAX_REPORT_BYTES;
+}
+
 /* Waits for the worker, and kills it when it holds or takes too much. STATUS_CONFLICT: it was killed. */
-static status wait_for(const struct job_service *v, pid_t pid, struct worker_end *end, struct job_refusal *refusal,
-                       struct error *err)
+static status wait_for(const struct job_service *v, pid_t pid, int report_fd, struct worker_end *end,
+                       struct job_refusal *refusal, struct error *err)
 {
     const double give_up_s = clock_monotonic_s() + (double)v->settings->check_limit_s;
-    const int64_t most_bytes = v->settings->resident_limit_bytes, most_threads = v->settings->thread_limit;
     status s = STATUS_OK;
     while (!worker_ended(pid, end)) {
         if (s == STATUS_OK && atomic_load(&v->stopping)) {
@@ -54,11 +63,8 @@ static status wait_for(const struct job_service *v, pid_t pid, struct worker_end
                           "the files could not be judged within %lld s (jobs.check_limit_s); the job can be started "
                           "without, its worker judges them too",
                           (long long)v->settings->check_limit_s);
-        } else if (s == STATUS_OK && most_bytes > 0 && worker_memory_bytes(pid) > most_bytes)
-            worker_signal(pid, SIGKILL);
-        else if (s == STATUS_OK && most_threads > 0 && worker_thread_count(pid) > most_threads)
-            worker_signal(pid, SIGKILL);
-        if (s != STATUS_OK) worker_signal(pid, SIGKILL);
+        }
+        if (s != STATUS_OK || takes_too_much(v->settings, pid, report_fd)) worker_signal(pid, SIGKILL);
         usleep(LOOK_US);
     }
     return s;
@@ -150,7 +156,7 @@ static status ask(struct job_service *v, const struct worker_paths *paths, json_
 {
     pid_t pid;
     status s = worker_launch(paths, v->settings, &pid, err);
-    if (s == STATUS_OK) s = wait_for(v, pid, end, refusal, err);
+    if (s == STATUS_OK) s = wait_for(v, pid, paths->report_fd, end, refusal, err);
     if (s == STATUS_OK && !end->by_signal) *report = read_report(paths->report_fd);
     return s;
 }

@@ -9,6 +9,9 @@ import threading
 import time
 import zlib
 
+if "--check" in sys.argv and os.path.exists(os.path.join(sys.argv[-1], "endless.tif")):
+    while True:  # its report is memory of the daemon's
+        os.write(1, b"[" * (1 << 20))
 if "--check" in sys.argv:
     print('{"faults": [], "warnings": [], "n_file": 0}')
     sys.exit(0)

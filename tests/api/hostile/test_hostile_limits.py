@@ -68,3 +68,11 @@ def test_memory_and_time_are_bounded(daemon_maker, act, option, code):
     failed = d.wait_state(start_hostile(d, act), "succeeded", "failed")
     assert failed["state"] == "failed" and failed["error"]["code"] == code and failed["attempt"] == 1
     assert failed["peak_rss_bytes"] < 2e9
+
+
+def test_the_report_of_a_check_is_bounded(attacked):
+    job = attacked.create({"sample": "endless", "volume": {"files": ["endless.tif"], "voxel_size_um": 2.0}, "measurements": {"file": "rows.csv"}})
+    attacked.upload(job, "endless.tif", b"II*\0 a scan")
+    start = time.monotonic()
+    said = attacked.post(f"/v1/jobs/{job}/check").json()
+    assert said["valid"] is False and "signal 9" in said["errors"][0]["detail"] and time.monotonic() - start < 10
