@@ -130,11 +130,11 @@ class Coverage:
         return {name: sorted(lines) for name, lines in ran.items() if lines}
 
     def lines_at(self, path, first, last, function):
-        """The counted lines of a place: those in it, or else the last one before it in the function (first and last line)."""
-        counted = self.known["counted"].get(path, [])
+        """The counted lines of a place: those in it, or else the last one before it in the function (first and last line), or the
+        first one behind it."""
+        counted = [n for n in self.known["counted"].get(path, []) if function is None or function[0] <= n <= function[1]]
         inside = {n for n in counted if first <= n <= last}
-        before = [n for n in counted if function is not None and function[0] <= n < first]
-        return inside or set(before[-1:])
+        return inside or set([n for n in counted if n < first][-1:]) or set(counted[:1])
 
     def tests_of(self, path, first, last, function):
         """The tests that run a place, quickest first. A place outside of all functions belongs to all tests of the file."""

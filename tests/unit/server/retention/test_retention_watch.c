@@ -53,6 +53,7 @@ static void test_each_limit(void **state)
         assert_true(goes(f, later, 20));
         assert_false(service_fixture_row(f, young).deleted);
         retention_watch_stop(w);
+        assert_false(service_fixture_logged(f, "WARNING"));
     }
 }
 
