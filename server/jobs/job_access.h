@@ -28,9 +28,8 @@ status job_check_adopted(struct job_service *v, const struct job_row *row, struc
 status job_check_declaration(struct job_service *v, struct file_row *row, struct error *err);
 /* Checks whether a job can be queued, and changes its row so; the caller writes it. The row has its document. */
 status job_make_queued(struct job_service *v, struct job_row *row, struct job_refusal *refusal, struct error *err);
-/* Makes the folders of jobs that have none yet, each with document and journal, and syncs them all at once. The rows
- * have their documents. */
-status job_make_places(struct job_service *v, const struct job_row *row, size_t n, struct error *err);
+/* Makes the folder of a job with document and journal, without syncs. The row has its document. */
+status job_fill_place(struct job_service *v, const struct job_row *row, const char *folder, struct error *err);
 /* Whether an owner, beside what it keeps, may keep further jobs and bytes; else STATUS_DISK_FULL, and the refusal says
  * so with the numbers. */
 status job_check_quota(struct job_service *v, const struct access_grant *grant, const char *owner,

@@ -50,8 +50,7 @@ static status make_folders(struct job_service *v, const char *id, struct error *
     return s == STATUS_OK ? durable_sync_folder_of(path, err) : s;
 }
 
-/* Without syncs. */
-static status make_place(struct job_service *v, const struct job_row *row, const char *folder, struct error *err)
+status job_fill_place(struct job_service *v, const struct job_row *row, const char *folder, struct error *err)
 {
     static const char *const part[] = {JOB_FOLDER_INPUT, "upload"};
     const struct journal_entry all = {.job = row, .document = true};
@@ -72,22 +71,6 @@ status job_sync_all(struct job_service *v, struct error *err)
     status s = fd < 0 || syncfs(fd) != 0 ? error_set_errno(err, "cannot sync '%s'", v->settings->data) : STATUS_OK;
     if (fd >= 0) close(fd);
     return s;
-}
-
-status job_make_places(struct job_service *v, const struct job_row *row, size_t n, struct error *err)
-{
-    char folder[PATH_BYTES], path[PATH_BYTES];
-    struct stat st;
-    size_t n_made = 0;
-    status s = STATUS_OK;
-    for (size_t i = 0; s == STATUS_OK && i < n; i++) {
-        path_join(folder, v->settings->data, "jobs", row[i].id, NULL);
-        path_join(path, folder, JOB_FILE_JOURNAL, NULL);
-        if (lstat(path, &st) == 0) continue;
-        s = make_place(v, &row[i], folder, err);
-        n_made++;
-    }
-    return s == STATUS_OK && n_made > 0 ? job_sync_all(v, err) : s;
 }
 
 void job_note_all(struct job_service *v, const struct job_row *row, size_t n)

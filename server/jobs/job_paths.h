@@ -1,7 +1,8 @@
 /* Paths under the data folder.
- * The data folder has selvedge.db, lock, daemon.json, removed.rec (retention.h), jobs/<id>/, trash/<id> and
- * quarantine/<name>-<time>. The folder of a job has, beside the files that job_folder.h names, upload/<upload id>
- * (incomplete inputs), kept (job_keep.h) and console.txt (stdout and stderr of the last attempt). */
+ * The data folder has selvedge.db, lock, daemon.json, removed.rec (retention.h), jobs/<id>/, trash/<id>,
+ * quarantine/<name>-<time> and new/<batch>/<id>, the folders of jobs that a batch is about to make. The folder of a job
+ * has, beside the files that job_folder.h names, upload/<upload id> (incomplete inputs), kept (job_keep.h) and
+ * console.txt (stdout and stderr of the last attempt). */
 #ifndef SELVEDGE_SERVER_JOB_PATHS_H
 #define SELVEDGE_SERVER_JOB_PATHS_H
 

@@ -10,6 +10,7 @@
 #include "server/cluster/shared_folder.h"
 #include "server/cluster/store_settings.h"
 #include "server/events/change_feed.h"
+#include "server/jobs/batches/batch_places.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_paths.h"
 #include "server/jobs/listing/queue_forecast.h"
@@ -200,6 +201,7 @@ static void read_verdict(void *context, const char *job_id, char code[40])
 static status recover(struct job_service *v, struct error *err)
 {
     job_change_begin(v, NULL, NULL);
+    batch_places_clear(v);
     status s = remove_deleted(v, err);
     if (s == STATUS_OK) s = quarantine_unknown(v, err);
     if (s == STATUS_OK) s = restore_folders(v, err); /* first, because it begins journals */
@@ -218,7 +220,8 @@ status job_service_open(const struct settings *settings, struct log *log, struct
     if (v == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start: out of memory");
     v->settings = settings;
     v->log = log;
-    pthread_mutex_init(&v->change, NULL);
+    pthread_mutex_init(&v->change.lock, NULL);
+    pthread_cond_init(&v->change.next_turn, NULL);
     status s = make_data_folders(settings->data, err);
     struct error why = {0};
     if (s == STATUS_OK && journal_key_read(settings->data, true, &v->journal_key, &why) != STATUS_OK)
@@ -248,6 +251,7 @@ void job_service_close(struct job_service *v)
     store_close(v->store);
     queue_forecast_free(v->forecast);
     change_feed_free(v->feed);
-    pthread_mutex_destroy(&v->change);
+    pthread_mutex_destroy(&v->change.lock);
+    pthread_cond_destroy(&v->change.next_turn);
     free(v);
 }

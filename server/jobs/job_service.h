@@ -20,6 +20,14 @@ struct backup_keeper;
 struct queue_forecast;
 struct lease_keeper;
 
+/* A lock that threads get in the order in which they ask for it, so that one which takes it again and again lets others
+ * through. */
+struct job_turns {
+    pthread_mutex_t lock;
+    pthread_cond_t next_turn;
+    uint64_t n_asked, n_served;
+};
+
 struct job_service {
     const struct settings *settings;
     struct store *store;
@@ -31,7 +39,7 @@ struct job_service {
     struct backup_keeper *backup;   /* NULL when the settings say that there are no backups */
     struct lease_keeper *keeper;    /* NULL unless other daemons may use the database */
     struct journal_key journal_key; /* seals the journals of jobs */
-    pthread_mutex_t change;         /* held from reading a row to writing it back (server/cluster/job_change.h) */
+    struct job_turns change;        /* held from reading a row to writing it back (server/cluster/job_change.h) */
     atomic_bool stopping;
     atomic_int n_judging; /* checks of input files that run now (server/workers/input_judge.h) */
     atomic_uint_least64_t n_attempt_total, n_lost_total, n_finished_total[JOB_N_STATE];

@@ -84,8 +84,8 @@ bench-dashboard: | deps-test ## what the dashboard costs in a browser: opening a
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/bin/selvedged $(BUILD)/tests/bench/service/bench_scan_slices >&2
 	@/usr/bin/python3 tests/bench/service/bench_dashboard.py --build $(BUILD) $(DASHBOARD)
 
-# SERVICE: some of the figures only: list answers uploads slow_disk declare readers watchers
-bench-service: | deps-test ## what the daemon costs: the list of jobs, other answers, those beside uploads and a slow disk, declarations, slow readers, long polls (two minutes)
+# SERVICE: some of the figures only: list answers uploads slow_disk declare readers watchers guard
+bench-service: | deps-test ## what the daemon costs: the list of jobs, other answers, those beside uploads and a slow disk, declarations, slow readers, long polls, requests beside a large batch, held back bodies (three minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/bin/selvedged >&2
 	@/usr/bin/python3 tests/bench/service/bench_service.py --build $(BUILD) $(SERVICE)
 

@@ -1,5 +1,5 @@
 /* Batches as the API sees them: what users can do with all samples of a table at once. Every change holds the lock of
- * the job service and goes to the database first, in one transaction. Error texts are meant for users. */
+ * the job service and goes to the database in one transaction. Error texts are meant for users. */
 #ifndef SELVEDGE_SERVER_BATCH_SERVICE_H
 #define SELVEDGE_SERVER_BATCH_SERVICE_H
 

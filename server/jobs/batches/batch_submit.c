@@ -1,13 +1,19 @@
 /* Submits a batch: compares its table with the jobs that are there, and makes those that are missing. */
 #include "base/clock.h"
+#include "optimizer/job/job_folder.h"
 #include "server/cluster/job_change.h"
 #include "server/jobs/batches/batch_inputs.h"
+#include "server/jobs/batches/batch_places.h"
 #include "server/jobs/job_access.h"
+#include "server/jobs/job_paths.h"
 #include "server/workers/supervisor.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+
+enum { TRY_MOST = 4 };
 
 /* A submission while it is under way. */
 struct submission {
@@ -190,17 +196,34 @@ static void report(struct submission *s, struct batch_outcome *out)
     out->replayed = s->exists && s->n_new == 0 && s->n_other == 0;
 }
 
-/* Folders that a kill or a full disk has kept from being made. */
+/* Makes the folder of a job, unless it was deleted meanwhile. */
+static status complete_place(struct job_service *v, const char *id, const char *folder, struct error *err)
+{
+    struct job_row row;
+    job_change_begin(v, id, NULL);
+    status st = job_get(v, id, &row, err);
+    if (st == STATUS_OK) st = job_fill_place(v, &row, folder, err);
+    job_change_end(v);
+    job_row_release(&row);
+    return st == STATUS_NOT_FOUND ? STATUS_OK : st;
+}
+
+/* Makes the folders that a kill or a full disk has kept from being made, and syncs what is new. */
 static status complete_places(struct submission *s, struct error *err)
 {
-    status st = job_make_places(s->v, s->job, s->n_new, err);
-    for (size_t i = 0; st == STATUS_OK && i < s->table->n; i++) {
-        if (s->taken[i] == s->n_old) continue;
-        struct job_row row = s->old[s->taken[i]];
-        row.document = s->table->sample[i].document;
-        st = job_make_places(s->v, &row, 1, err);
+    char folder[PATH_BYTES], path[PATH_BYTES];
+    struct stat info;
+    status st = STATUS_OK;
+    size_t n_made = s->n_new;
+    for (size_t i = 0, i_new = 0; st == STATUS_OK && i < s->table->n; i++) {
+        const char *id = s->taken[i] < s->n_old ? s->old[s->taken[i]].id : s->job[i_new++].id;
+        path_join(folder, s->v->settings->data, "jobs", id, NULL);
+        path_join(path, folder, JOB_FILE_JOURNAL, NULL);
+        if (lstat(path, &info) == 0) continue;
+        st = complete_place(s->v, id, folder, err);
+        n_made++;
     }
-    return st;
+    return st == STATUS_OK && n_made > 0 ? job_sync_all(s->v, err) : st;
 }
 
 /* Finds the owner's batch of this name with its jobs, or begins a new one. *text: it has another template. */
@@ -235,19 +258,82 @@ static status check_update(const struct submission *s, struct job_refusal *refus
                            s->batch.name, n_left, s->n_new);
 }
 
-static status submit_locked(struct submission *s, const struct access_grant *grant, struct batch_outcome *out,
-                            struct job_refusal *refusal, struct error *err)
+/* Finds out what there is to do. *text: the batch has another template. */
+static status prepare(struct submission *s, const struct access_grant *grant, bool *text, struct job_refusal *refusal,
+                      struct error *err)
 {
-    bool text = false;
-    status st = find_batch(s, grant->owner, &text, err);
+    status st = find_batch(s, grant->owner, text, err);
     if (st == STATUS_OK) st = compare(s, err);
     if (st == STATUS_OK) st = check_update(s, refusal, err);
     if (st == STATUS_OK && s->n_new > 0) st = check_room(s, grant, refusal, err);
-    if (st == STATUS_OK) st = make_jobs(s, err);
-    if (st == STATUS_OK && (text || s->n_new + s->n_other > 0)) st = write_batch(s, out, err);
+    return st == STATUS_OK ? make_jobs(s, err) : st;
+}
+
+/* Whether batch and jobs are as prepare has found them. */
+static bool unchanged(const struct submission *s, const struct access_grant *grant)
+{
+    struct batch_row batch = {0};
+    struct job_row *row = NULL;
+    size_t n = 0;
+    status st = store_batch_find(s->v->store, grant->owner, s->table->name, &batch, NULL);
+    bool same = s->exists ? st == STATUS_OK && strcmp(batch.id, s->batch.id) == 0 &&
+                                batch.updated_unix_s <= s->batch.updated_unix_s
+                          : st == STATUS_NOT_FOUND;
+    batch_row_release(&batch);
+    if (!same || !s->exists) return same;
+    same = batch_jobs(s->v, s->batch.id, &row, &n, NULL) == STATUS_OK && n == s->n_old;
+    for (size_t k = 0; same && k < n; k++)
+        same = strcmp(row[k].id, s->old[k].id) == 0 && row[k].revision == s->old[k].revision;
+    job_rows_free(row, n);
+    return same;
+}
+
+static status commit(struct submission *s, bool text, struct batch_outcome *out, struct error *err)
+{
+    status st = text || s->n_new + s->n_other > 0 ? write_batch(s, out, err) : STATUS_OK;
     if (st != STATUS_OK) return st;
+    batch_places_move(s->v, s->batch.id, s->job, s->n_new);
     report(s, out);
-    return complete_places(s, err);
+    return STATUS_OK;
+}
+
+/* Begins again after a change by another request. */
+static void forget(struct submission *s)
+{
+    job_rows_free(s->old, s->n_old);
+    free(s->taken);
+    free(s->row_of_new);
+    free(s->keep);
+    free(s->other);
+    json_decref(s->place);
+    free(s->job);
+    *s = (struct submission){.v = s->v, .table = s->table};
+}
+
+/* The lock is held to find out what there is to do, and to write it; the folders of many jobs take longer and are made
+ * between. What another request has changed meanwhile is found out again, and in the last try it cannot. */
+static status submit(struct submission *s, const struct access_grant *grant, struct batch_outcome *out,
+                     struct job_refusal *refusal, struct error *err)
+{
+    status st = STATUS_OK;
+    bool text = false, done = false;
+    for (int n_try = 1; st == STATUS_OK && !done; n_try++) {
+        const bool last = n_try == TRY_MOST;
+        forget(s);
+        job_change_begin(s->v, NULL, NULL);
+        st = prepare(s, grant, &text, refusal, err);
+        if (!last && st == STATUS_OK && s->n_new > 0) {
+            job_change_end(s->v);
+            st = batch_places_make(s->v, s->batch.id, s->job, s->n_new, err);
+            job_change_begin(s->v, NULL, NULL);
+        }
+        done = last || s->n_new == 0 || unchanged(s, grant);
+        if (st == STATUS_OK && done && s->n_new > 0) st = check_room(s, grant, refusal, err);
+        if (st == STATUS_OK && done) st = commit(s, text, out, err);
+        job_change_end(s->v);
+        if (s->n_new > 0) batch_places_discard(s->v, s->batch.id);
+    }
+    return st == STATUS_OK ? complete_places(s, err) : st;
 }
 
 status batch_submit(struct job_service *v, const struct access_grant *grant, const struct batch_table *table,
@@ -255,19 +341,11 @@ status batch_submit(struct job_service *v, const struct access_grant *grant, con
 {
     struct submission s = {.v = v, .table = table};
     *out = (struct batch_outcome){.samples = json_array(), .left = json_array()};
-    job_change_begin(v, NULL, NULL);
-    status st = submit_locked(&s, grant, out, refusal, err);
-    job_change_end(v);
+    status st = submit(&s, grant, out, refusal, err);
     if (st == STATUS_OK && v->supervisor != NULL && json_array_size(out->left) > 0) supervisor_wake(v->supervisor);
     if (st == STATUS_OK) st = batch_declare_files(v, grant, table, out, refusal, err);
     if (st == STATUS_OK && !out->replayed)
         log_info(v->log, "batch %s '%s': %zu samples, %zu of them new", out->id, table->name, table->n, s.n_new);
-    job_rows_free(s.old, s.n_old);
-    free(s.taken);
-    free(s.row_of_new);
-    free(s.keep);
-    free(s.other);
-    json_decref(s.place);
-    free(s.job);
+    forget(&s);
     return st;
 }

@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 /* SQLite checkpoints after 1,000 pages of 4096 bytes, each with 24 bytes before it; a change may take some more. */
-enum { WAL_BYTES = 1100 * (4096 + 24), WAL_SMALL_BYTES = 1 << 20 };
+enum { WAL_BYTES = 1100 * (4096 + 24), WAL_SMALL_BYTES = 1 << 20, STATEMENT_MOST = 64 };
 
 struct sqlite_query {
     struct store_query base;
@@ -60,7 +60,11 @@ static status open_db(const struct store_place *place, const char *application, 
     return rc == SQLITE_OK ? STATUS_OK : STATUS_IO;
 }
 
-static void close_db(void *db) { sqlite3_close_v2(db); }
+static void close_db(void *db)
+{
+    for (sqlite3_stmt *s; (s = sqlite3_next_stmt(db, NULL)) != NULL;) sqlite3_finalize(s);
+    sqlite3_close_v2(db);
+}
 
 static status script(void *db, const char *sql)
 {
@@ -76,14 +80,39 @@ static int bind(sqlite3_stmt *statement, int i, const struct store_value *v)
     return sqlite3_bind_blob(statement, i, v->bytes, (int)v->n_bytes, SQLITE_TRANSIENT);
 }
 
+/* A statement of an earlier change of the same text, or a new one. Preparing a change of a job compiles its triggers,
+ * too, and takes several times as long as running it. */
+static int take_statement(sqlite3 *db, const char *sql, sqlite3_stmt **statement)
+{
+    for (sqlite3_stmt *s = sqlite3_next_stmt(db, NULL); s != NULL; s = sqlite3_next_stmt(db, s))
+        if (!sqlite3_stmt_readonly(s) && !sqlite3_stmt_busy(s) && strcmp(sqlite3_sql(s), sql) == 0) {
+            *statement = s;
+            return SQLITE_OK;
+        }
+    return sqlite3_prepare_v2(db, sql, -1, statement, NULL);
+}
+
+/* Keeps the statement of a change, which has a fixed text, for take_statement. */
+static void give_back_statement(sqlite3 *db, sqlite3_stmt *statement)
+{
+    size_t n = 0;
+    for (sqlite3_stmt *s = sqlite3_next_stmt(db, NULL); s != NULL; s = sqlite3_next_stmt(db, s)) n++;
+    if (statement == NULL || sqlite3_stmt_readonly(statement) || n > STATEMENT_MOST) {
+        sqlite3_finalize(statement);
+        return;
+    }
+    sqlite3_reset(statement);
+    sqlite3_clear_bindings(statement);
+}
+
 static status query(void *db, const char *sql, const struct store_value *value, size_t n, struct store_query **out)
 {
     sqlite3_stmt *statement = NULL;
-    int rc = sqlite3_prepare_v2(db, sql, -1, &statement, NULL);
+    int rc = take_statement(db, sql, &statement);
     for (size_t i = 0; rc == SQLITE_OK && i < n; i++) rc = bind(statement, (int)i + 1, &value[i]);
     struct sqlite_query *q = rc == SQLITE_OK ? calloc(1, sizeof *q) : NULL;
     if (q == NULL) {
-        sqlite3_finalize(statement);
+        give_back_statement(db, statement);
         return STATUS_IO;
     }
     *q = (struct sqlite_query){{&store_sqlite_calls}, statement, db};
@@ -125,7 +154,8 @@ static int64_t n_changed(struct store_query *query)
 
 static void finish(struct store_query *query)
 {
-    sqlite3_finalize(statement_of(query));
+    struct sqlite_query *q = (struct sqlite_query *)(void *)query;
+    give_back_statement(q->db, q->statement);
     free(query);
 }
 

@@ -1,6 +1,6 @@
 """What does the daemon cost, and does it answer while it stores uploads? Prints figures service.*.
 
-    bench_service.py [--build DIR] [NAME...]    NAME: list answers uploads slow_disk declare readers watchers
+    bench_service.py [--build DIR] [NAME...]    NAME: list answers uploads slow_disk declare readers watchers guard
 
 list: CPU time of the daemon for one page of the list of jobs, at 100 and at 10,000 jobs. answers: answers a second and 99th
 percentile of their time, of a page of the list, a job, its series of 500 steps and the metrics, at 100 and 10,000 jobs, with
@@ -8,7 +8,10 @@ no upload and with 8 that go on; without uploads the CPU time of the daemon for 
 time of GET on a job while 8 clients upload. slow_disk: longest time of GET /livez while one client uploads and each sync
 takes 0.5 s. declare: time in which 4,000 slices of a scan are declared. readers: memory of the daemon while 60 clients
 read a job and its result of 12 MB at 100 bytes a second. watchers: CPU time of the daemon and 99th percentile of the time of
-GET while 200 clients wait for a change of a job or of the list, and the time until the last of them has seen one.
+GET while 200 clients wait for a change of a job or of the list, and the time until the last of them has seen one. guard:
+99th percentile and longest time of POST of a job while a batch of 10,000 rows with two known files each is submitted, and the
+99th percentile without the batch; processor time of a batch of 9,000 rows that is refused; memory of the daemon that 40 clients
+take which each hold back the end of a batch of 16 MiB.
 """
 import argparse
 import contextlib
@@ -27,13 +30,13 @@ import uuid
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
 sys.path.insert(0, os.path.join(ROOT, "tests", "support", "python"))
-N_LIST, N_SLICE, N_READER, N_WATCHER, RESULT_BYTES = 200, 4000, 60, 200, 12 << 20
+N_LIST, N_SLICE, N_READER, N_WATCHER, N_ROW, RESULT_BYTES = 200, 4000, 60, 200, 10000, 12 << 20
 PIECE_BYTES = 16 << 20
 UPLOAD_S, ANSWERS_S, N_ASKING = 5.0, 2.0, 2
 
 
-def figure(name, value, unit):
-    print(json.dumps({"name": f"service.{name}", "value": round(value, 4), "unit": unit, "better": "lower"}), flush=True)
+def figure(name, value, unit, group="service"):
+    print(json.dumps({"name": f"{group}.{name}", "value": round(value, 4), "unit": unit, "better": "lower"}), flush=True)
 
 
 def cpu_s(pid):
@@ -250,8 +253,82 @@ def bench_watchers(folder, daemon_type):
         figure("watchers_last_s", time.monotonic() - start, "s")
 
 
+def post_without_pause(port, body, stop, answers):
+    """Sends its own times of POST of a job, until `stop` is set, through the pipe `answers`."""
+    client, times = http.client.HTTPConnection("127.0.0.1", port), []
+    while not stop.is_set():
+        start = time.monotonic()
+        client.request("POST", "/v1/jobs", body, {"Content-Type": "application/json"})
+        reply = client.getresponse()
+        assert reply.read() and reply.status == 201
+        times.append(time.monotonic() - start)
+    answers.send(times)
+
+
+def times_of_post(port, body, meanwhile):
+    """Times of POST of a job in order of size, while `meanwhile` runs."""
+    stop, (end, answers) = multiprocessing.Event(), multiprocessing.Pipe(duplex=False)
+    posting = multiprocessing.Process(target=post_without_pause, args=(port, body, stop, answers))
+    posting.start()
+    meanwhile()
+    stop.set()
+    times = sorted(end.recv())
+    posting.join()
+    return times
+
+
+def bench_batch(folder, daemon_type):
+    from daemon_under_test import DOCUMENT, FILES, sha256
+    files = [{"name": name, "size": len(data), "sha256": sha256(data)} for name, (_, data) in FILES.items()]
+    body = json.dumps(DOCUMENT)
+
+    def submit(daemon, name, template, rows, status):
+        reply = daemon.session.post(daemon.url + "/v1/batches", json={"name": name, "template": template, "samples": rows}, timeout=600)
+        assert reply.status_code == status, reply.text[:200]
+    with daemon_type(os.path.join(folder, "batch"), options={"jobs.max_jobs": 100000}) as daemon:
+        daemon.ready_job()
+        alone = times_of_post(daemon.port, body, lambda: time.sleep(UPLOAD_S))
+        rows = [{"sample": f"s{i}", "replace": {"volume.voxel_size_um": 1 + i % 7}, "files": files} for i in range(N_ROW)]
+        times = times_of_post(daemon.port, body, lambda: submit(daemon, "large", DOCUMENT, rows, 201))
+        figure("post_p99_ms_beside_batch", 1e3 * times[int(0.99 * len(times))], "ms", "guard")
+        figure("post_max_ms_beside_batch", 1e3 * times[-1], "ms", "guard")
+        figure("post_p99_ms_alone", 1e3 * alone[int(0.99 * len(alone))], "ms", "guard")
+        photographs = [{"file": f"p{i}.exr", "camera_theta_deg": 10, "light_theta_deg": 30} for i in range(300)]
+        before = cpu_s(daemon.process.pid)
+        submit(daemon, "refused", {**DOCUMENT, "photographs": photographs}, [{"sample": f"{i}"} for i in range(9000)], 422)
+        figure("refused_batch_cpu_s", cpu_s(daemon.process.pid) - before, "s", "guard")
+
+
+def hold_back(port, body, held):
+    client = socket.create_connection(("127.0.0.1", port))
+    held.append(client)
+    with contextlib.suppress(OSError):
+        client.sendall(f"POST /v1/batches HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n".encode())
+        client.sendall(body[:-1])
+
+
+def bench_bodies(folder, daemon_type):
+    with daemon_type(os.path.join(folder, "bodies")) as daemon:
+        daemon.create()
+        before, most, held, body = resident_bytes(daemon.process.pid), 0, [], b"{" + b" " * ((16 << 20) - 2) + b"}"
+        threads = [threading.Thread(target=hold_back, args=(daemon.port, body, held)) for _ in range(40)]
+        for thread in threads:
+            thread.start()
+        while any(thread.is_alive() for thread in threads):
+            most = max(most, resident_bytes(daemon.process.pid))
+            time.sleep(0.05)
+        figure("body_budget_bytes", most - before, "bytes", "guard")
+        for client in held:
+            client.close()
+
+
+def bench_guard(folder, daemon_type):
+    bench_batch(folder, daemon_type)
+    bench_bodies(folder, daemon_type)
+
+
 BENCH = {"list": bench_list, "answers": bench_answers, "uploads": bench_uploads, "slow_disk": bench_slow_disk, "declare": bench_declare,
-         "readers": bench_readers, "watchers": bench_watchers}
+         "readers": bench_readers, "watchers": bench_watchers, "guard": bench_guard}
 
 
 def main():
