@@ -114,18 +114,17 @@ def test_a_completely_full_disk_refuses_no_start(small_disk, tmp_path):
     for deletions meanwhile. The disk has no room for the whole ballast file."""
     os.mkdir(small_disk / "data", 0o700)
     os.symlink(small_disk / "data", tmp_path / "link")  # so that the log is on another disk
-    d = Daemon(tmp_path / "link").start()
-    paths = everything(d)
-    for i in range(6):
-        d.kill() if i % 3 == 2 else d.stop()
-        fill(small_disk, name=f"filler{i}")
-        headers = dict(d.session.headers)
-        d.start()
-        d.session.headers.update(headers)
-        for path in paths[3 * i:3 * i + 3]:
-            r = d.delete(path)
-            assert r.status_code == 204, (i, path, r.text)
-    d.stop()
+    with Daemon(tmp_path / "link") as d:
+        paths = everything(d)
+        for i in range(6):
+            d.kill() if i % 3 == 2 else d.stop()
+            fill(small_disk, name=f"filler{i}")
+            headers = dict(d.session.headers)
+            d.start()
+            d.session.headers.update(headers)
+            for path in paths[3 * i:3 * i + 3]:
+                r = d.delete(path)
+                assert r.status_code == 204, (i, path, r.text)
 
 
 def test_running_jobs_pause_under_the_floor_and_go_on(small_disk):

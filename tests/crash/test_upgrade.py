@@ -45,10 +45,10 @@ def old(tmp_path_factory):
 
 
 def check_upgraded(d, samples):
-    """The daemon has the present version with all jobs and works, and the copy of the old one is whole."""
-    assert sorted(j["sample"] for j in d.get("/v1/jobs").json()["jobs"]) == samples
-    assert d.create() and d.get("/v1/batches").json()["batches"] == []
-    d.stop()
+    """Starts the daemon. It has the present version with all jobs and works, and the copy of the old one is whole."""
+    with d:
+        assert sorted(j["sample"] for j in d.get("/v1/jobs").json()["jobs"]) == samples
+        assert d.create() and d.get("/v1/batches").json()["batches"] == []
     assert version_of(database(d.data)) == OLD + 1
     assert copies(d.data) == [f"selvedge.db.v{OLD}"]
     assert version_of(f"{database(d.data)}.v{OLD}") == OLD and samples_of(f"{database(d.data)}.v{OLD}") == samples
@@ -71,7 +71,7 @@ def test_a_first_start_that_is_killed_is_repeated(shim, tmp_path, old, call):
         if migrated:
             d.kill()
         d.environment = {}
-        check_upgraded(d.start(), old[1])
+        check_upgraded(d, old[1])
         if migrated and not (tmp_path / f"mark{n}").exists():
             break
         killed += 1
@@ -84,7 +84,7 @@ def test_a_copy_that_was_begun_is_made_anew(tmp_path, old):
     shutil.copytree(old[0], tmp_path / "data")
     for ending in ("", ".part", ".part-journal"):
         (tmp_path / "data" / f"selvedge.db.v{OLD}{ending}").write_bytes(b"half of a copy" * 1000)
-    check_upgraded(Daemon(tmp_path / "data").start(), old[1])
+    check_upgraded(Daemon(tmp_path / "data"), old[1])
 
 
 def test_upgrade_way_back_upgrade(tmp_path, old):
@@ -96,7 +96,7 @@ def test_upgrade_way_back_upgrade(tmp_path, old):
     with contextlib.closing(sqlite3.connect(database(d.data))) as db:  # work of the old version
         db.execute("UPDATE job SET sample = 'between', updated = updated + 1 WHERE serial = 1")
         db.commit()
-    check_upgraded(d.start(), sorted([*old[1][:-1], "between"]))
+    check_upgraded(d, sorted([*old[1][:-1], "between"]))
 
 
 @pytest.mark.parametrize("ballast_bytes", [0, 1 << 20])
@@ -124,5 +124,5 @@ def test_an_upgrade_on_a_full_disk(small_disk, tmp_path, old, ballast_bytes):
         else:
             d.kill()
         os.remove(small_disk / "filler")
-        check_upgraded(d.start(), old[1])
+        check_upgraded(d, old[1])
     assert refused > 0 or ballast_bytes
