@@ -11,7 +11,7 @@ import pytest
 from daemon_under_test import FILES, TUS, Daemon, document, program, wait_until
 from fit_outcome import outcome
 from disks.disk_states import Disk, save_all, save_least, save_some
-from disks.replay import EVERY, content_of, memory_folder, record, try_states  # noqa: F401
+from disks.replay import EVERY, content_of, record, try_states
 from small_cloth import start_small_job
 
 WORKER = program("selvedge-worker")

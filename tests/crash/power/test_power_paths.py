@@ -10,7 +10,7 @@ import sqlite3
 
 import pytest
 from daemon_under_test import FILES, Daemon, document, sha256, wait_until
-from disks.replay import memory_folder, record, try_states  # noqa: F401
+from disks.replay import record, try_states
 from servers.old_database import make_older, migrations
 
 OPTIONS = {"backup.every_s": 1, "disk.ballast_bytes": 0}
