@@ -43,7 +43,7 @@ def test_what_documents_need_is_accepted(daemon):
 
 @pytest.mark.parametrize("end", ["delete", "again"])
 def test_a_worker_that_nests_3000_folders(daemon_maker, end):
-    d = daemon_maker()
+    d = daemon_maker(options={"jobs.folder_depth": 0})  # no limit, so that all of them are made
     job = d.start_job("nest 3000")
     d.wait_state(job, "succeeded")
     listed = {f["path"] for f in d.get(f"/v1/jobs/{job}/results").json()["files"]}
