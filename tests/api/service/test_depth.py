@@ -45,14 +45,14 @@ def test_what_documents_need_is_accepted(daemon):
 def test_a_worker_that_nests_3000_folders(daemon_maker, end):
     d = daemon_maker(options={"jobs.folder_depth": 0})  # no limit, so that all of them are made
     job = d.start_job("nest 3000")
-    d.wait_state(job, "succeeded")
+    d.wait_state(job, "succeeded", timeout_s=120)
     listed = {f["path"] for f in d.get(f"/v1/jobs/{job}/results").json()["files"]}
     assert "result.json" in listed and all(path.count("/") < 16 for path in listed)
     assert d.get(f"/v1/jobs/{job}/results.tar").status_code == 200
     if end == "again":  # an edit removes what the earlier attempt has left
         assert d.put(f"/v1/jobs/{job}/document", json=document("succeed")).status_code == 200
         assert d.post(f"/v1/jobs/{job}/start").status_code == 202
-        d.wait_state(job, "succeeded")
+        d.wait_state(job, "succeeded", timeout_s=120)
     assert d.delete(f"/v1/jobs/{job}").status_code == 204
-    wait_until(lambda: os.listdir(os.path.join(d.data, "jobs")) == [], what="the removal of the job's folder")
+    wait_until(lambda: os.listdir(os.path.join(d.data, "jobs")) == [], timeout_s=120, what="the removal of the job's folder")
     assert "could not be removed" not in d.log_text()
