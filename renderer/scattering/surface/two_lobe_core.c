@@ -10,6 +10,7 @@ void two_lobe_state_init(struct scattering_state *s, const double *param)
         s->not_c_r[c] = (float)(1 - param[TWO_LOBE_P_C_R + c]);
         s->c_tt[c] = (float)param[TWO_LOBE_P_C_TT + c];
     }
+    s->c_r[3] = s->not_c_r[3] = s->c_tt[3] = 1;
     for (int k = 0; k < 2; k++) {
         double beta = param[TWO_LOBE_P_BETA_R + k];
         s->beta[k] = (float)beta;

@@ -33,15 +33,18 @@ struct two_lobe_normal_entry { /* by |th|: G or the balanced scale, and its deri
     float value[2], d_beta[2];
 };
 
-struct two_lobe_sampling_entry { /* by |th_o| */
-    float energy[3]; /* from all around, before colours: integrals of M_R, M_R (1 - cos th)^5, M_TT (1 - (1 - cos th)^5)
+/* By |th_o|. Arrays of four floats are computed in one vector register each; the unused fourth energy is 0. */
+struct two_lobe_sampling_entry {
+    float energy[4]; /* from all around, before colours: integrals of M_R, M_R (1 - cos th)^5, M_TT (1 - (1 - cos th)^5)
                       */
     float near[2],
         far[2]; /* erf of the distance from the lobe's centre to the near and the far pole, in units of sqrt(2) beta */
 };
 
 struct scattering_state {
-    float c_r[3], not_c_r[3], c_tt[3]; /* not_c_r = 1 - c_r, rounded once: it is small where R takes nearly all */
+    /* not_c_r = 1 - c_r, rounded once: it is small where R takes nearly all. The fourth is that of no channel: 1, 1, 1,
+     * so that the channels are computed in vector registers. */
+    float c_r[4], not_c_r[4], c_tt[4];
     float beta[2];
     float peak[2]; /* 1 / (sqrt(2 pi) beta) */
     float inv_2var[2];
@@ -135,28 +138,37 @@ static inline void two_lobe_eval_terms(const struct scattering_state *s, bool ba
     }
     float a = t->g[TWO_LOBE_R] * scale[TWO_LOBE_R] * (float)(0.5 / M_PI);
     float b = t->g[TWO_LOBE_TT] * scale[TWO_LOBE_TT] * t->von_mises;
-    float part_r[3], part_tt[3];
-    for (int c = 0; c < 3; c++) {
+    float part_r[4], part_tt[4], sum[4];
+    for (int c = 0; c < 4; c++) {
         float fresnel = s->c_r[c] + s->not_c_r[c] * k;
         part_r[c] = fresnel * a;
         part_tt[c] = s->c_tt[c] * s->not_c_r[c] * (1 - k) * b;
-        s_rgb[c] = part_r[c] + part_tt[c];
+        sum[c] = part_r[c] + part_tt[c];
     }
+    for (int c = 0; c < 3; c++) s_rgb[c] = sum[c];
     if (score == NULL) return;
 
     float d_width[2];
     for (int j = 0; j < 2; j++) d_width[j] = t->x2 * s->inv_cube[j] - s->inv[j] + d_scale[j];
     float d_cross = balanced ? two_lobe_cross_at(s, di->theta_rad) + two_lobe_cross_at(s, dout->theta_rad) : 0;
     float d_gamma = s->azimuth.score_at_peak - s->azimuth.score_slope * t->one_minus_cos;
+    float d_c_r[4], d_c_tt[4], d_beta_r[4], d_beta_tt[4], d_gamma_tt[4];
+    for (int c = 0; c < 4; c++) {
+        float one = 1 / sum[c], inv = sum[c] > 1e-30f ? one : 0; /* nothing scattered: no weight, no score */
+        d_c_r[c] = (1 - k) * (a - s->c_tt[c] * b) * inv;
+        d_c_tt[c] = part_tt[c] / s->c_tt[c] * inv;
+        d_beta_r[c] = (part_r[c] * d_width[TWO_LOBE_R] + part_tt[c] * d_cross) * inv;
+        d_beta_tt[c] = part_tt[c] * inv * d_width[TWO_LOBE_TT];
+        d_gamma_tt[c] = part_tt[c] * inv * d_gamma;
+    }
     for (int j = 0; j < 3 * TWO_LOBE_N_PARAM; j++) score[j] = 0;
     for (int c = 0; c < 3; c++) {
         float *h = score + c * TWO_LOBE_N_PARAM;
-        float inv = s_rgb[c] > 1e-30f ? 1 / s_rgb[c] : 0; /* nothing scattered: no weight, no score */
-        h[TWO_LOBE_P_C_R + c] = (1 - k) * (a - s->c_tt[c] * b) * inv;
-        h[TWO_LOBE_P_C_TT + c] = part_tt[c] / s->c_tt[c] * inv;
-        h[TWO_LOBE_P_BETA_R] = (part_r[c] * d_width[TWO_LOBE_R] + part_tt[c] * d_cross) * inv;
-        h[TWO_LOBE_P_BETA_TT] = part_tt[c] * inv * d_width[TWO_LOBE_TT];
-        h[TWO_LOBE_P_GAMMA_TT] = part_tt[c] * inv * d_gamma;
+        h[TWO_LOBE_P_C_R + c] = d_c_r[c];
+        h[TWO_LOBE_P_C_TT + c] = d_c_tt[c];
+        h[TWO_LOBE_P_BETA_R] = d_beta_r[c];
+        h[TWO_LOBE_P_BETA_TT] = d_beta_tt[c];
+        h[TWO_LOBE_P_GAMMA_TT] = d_gamma_tt[c];
     }
 }
 
@@ -166,7 +178,7 @@ static inline struct two_lobe_sampling_entry two_lobe_sampling_at(const struct s
     float t = two_lobe_table_position(theta_rad, &i);
     const struct two_lobe_sampling_entry *a = &s->sampling[i], *b = a + 1;
     struct two_lobe_sampling_entry e;
-    for (int k = 0; k < 3; k++) e.energy[k] = two_lobe_mix(a->energy[k], b->energy[k], t);
+    for (int k = 0; k < 4; k++) e.energy[k] = two_lobe_mix(a->energy[k], b->energy[k], t);
     for (int k = 0; k < 2; k++) {
         e.near[k] = two_lobe_mix(a->near[k], b->near[k], t);
         e.far[k] = two_lobe_mix(a->far[k], b->far[k], t);
@@ -179,13 +191,17 @@ static inline struct two_lobe_sampling_entry two_lobe_sampling_at(const struct s
 static inline float two_lobe_p_r(const struct scattering_state *s, const struct two_lobe_sampling_entry *e,
                                  const float *weight_rgb)
 {
-    float r = 0, tt = 0;
+    float r = 0, tt = 0, r2[4], tt2[4], w[4] = {1, 1, 1, 1};
+    for (int c = 0; c < 3 && weight_rgb != NULL; c++) w[c] = weight_rgb[c];
+    for (int c = 0; c < 4; c++) {
+        float a = w[c] * (s->c_r[c] * e->energy[0] + s->not_c_r[c] * e->energy[1]),
+              b = w[c] * s->c_tt[c] * s->not_c_r[c] * e->energy[2];
+        r2[c] = a * a;
+        tt2[c] = b * b;
+    }
     for (int c = 0; c < 3; c++) {
-        float w = weight_rgb != NULL ? weight_rgb[c] : 1;
-        float a = w * (s->c_r[c] * e->energy[0] + s->not_c_r[c] * e->energy[1]),
-              b = w * s->c_tt[c] * s->not_c_r[c] * e->energy[2];
-        r += a * a;
-        tt += b * b;
+        r += r2[c];
+        tt += tt2[c];
     }
     r = sqrtf(r);
     float p = r / (r + sqrtf(tt));
