@@ -14,15 +14,6 @@ bool fiber_walk_enter(const struct scene *scene, bool from_below, struct rng *rn
     return scene_ray_enter(scene, start, d, ray);
 }
 
-void fiber_walk_leave(const struct scattering_model *model, const struct scene_hit *hit, const double offset_mm[2],
-                      const float direction[3], struct rng *rng, struct scene_ray *ray)
-{
-    if (model->across_width)
-        scene_ray_leave_across(hit, offset_mm, direction, rng_float(rng), ray);
-    else
-        scene_ray_leave(hit, offset_mm, direction, ray);
-}
-
 bool fiber_walk_step(const struct scene *scene, const struct parameter_sets *sets, const struct scene_hit *hit,
                      struct scene_ray *ray, struct rng *rng, float throughput[3])
 {

@@ -15,8 +15,15 @@ enum { FIBER_WALK_MOST_STEPS = 10000 };
 bool fiber_walk_enter(const struct scene *scene, bool from_below, struct rng *rng, struct scene_ray *ray);
 
 /* Starts a ray where light leaves a fiber that was hit, as the model has it (scattering_model.across_width). */
-void fiber_walk_leave(const struct scattering_model *model, const struct scene_hit *hit, const double offset_mm[2],
-                      const float direction[3], struct rng *rng, struct scene_ray *ray);
+static inline void fiber_walk_leave(const struct scattering_model *model, const struct scene_hit *hit,
+                                    const double offset_mm[2], const float direction[3], struct rng *rng,
+                                    struct scene_ray *ray)
+{
+    if (model->across_width)
+        scene_ray_leave_across(hit, offset_mm, direction, rng_float(rng), ray);
+    else
+        scene_ray_leave(hit, offset_mm, direction, ray);
+}
 
 /* Scatters a ray at its hit: ray becomes the one that goes on, and throughput takes what the fiber lets through. Walks
  * of little throughput are ended at random. False: the walk ends here. */

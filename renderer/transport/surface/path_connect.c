@@ -9,8 +9,8 @@
 /* A lamp and the strip of it that a narrow lobe sees from a bounce. */
 struct seen_lamp {
     const struct lamp *lamp;
-    struct lamp_strip strip;
-    float weight; /* multiple-importance weight of all connections to it, in [0, 1] */
+    const struct lamp_strip *strip; /* NULL: no narrow lobe meets the lamp */
+    float weight;                   /* multiple-importance weight of all connections to it, in [0, 1] */
 };
 
 /* Next-event estimation from a bounce to the point of the lamp that u draws. Returns the incident light as stored in
@@ -20,13 +20,12 @@ static float connect_point(struct walk *w, const struct seen_lamp *seen, const f
 {
     const struct path_setting *s = w->s;
     const struct lamp *lamp = seen->lamp;
-    float position[3], direction[3], pdf_lamp, s_rgb[3];
-    unwrapped(b->hit.position_mm, b->offset_mm, position);
-    if (!lamp_sample(lamp, position, u, direction, &pdf_lamp)) return 0;
-    if (seen->strip.used) pdf_lamp *= 1 + lamp_strip_ratio(&seen->strip, u); /* of both points together */
-    if (scene_sheet_hides(s->scene, direction)) return 0;
+    float direction[3], pdf_lamp, s_rgb[3];
+    if (!lamp_sample(lamp, b->position_mm, u, direction, &pdf_lamp)) return 0;
+    if (seen->strip != NULL) pdf_lamp *= 1 + lamp_strip_ratio(seen->strip, u); /* of both points together */
+    if (path_walk_hides(w, direction)) return 0;
     fiber_frame_to_local(&b->frame, direction, wi);
-    float pdf = path_scatter(w, b, wi, s_rgb);
+    float pdf = path_scatter(w, b, wi, s_rgb, NULL);
     float heuristic = path_walk_connects_all(w) ? 1 : lights_power_heuristic(pdf_lamp, pdf), value[3],
           light = seen->weight * lamp_radiance(lamp, direction) * fiber_frame_cos_theta(wi) / pdf_lamp * heuristic;
     for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * s_rgb[c] * light;
@@ -44,6 +43,7 @@ static float connect_point(struct walk *w, const struct seen_lamp *seen, const f
     path_leave(w, b, direction, &shadow);
     if (scene_occluded(s->scene, &shadow)) return 0;
     path_factor_apply(w, b, direction, value);
+    path_scatter_score(w, b, wi);
     path_add_light(w, value, w->score);
     return light;
 }
@@ -52,17 +52,16 @@ float path_connect_lamp(struct walk *w, const struct lamp *lamp, float weight, c
                         struct lamp_strip *strip, float wi[3])
 {
     struct seen_lamp seen = {.lamp = lamp, .weight = weight};
-    float position[3], u[2], of_lamp[2], unused[3];
+    float u[2], of_lamp[2], unused[3];
     if (w->has_strips) {
-        unwrapped(b->hit.position_mm, b->offset_mm, position);
-        lamp_strip_init(&seen.strip, lamp, position, b->frame.u, b->wo[0], w->s->lobe_rad[w->i_set]);
-        *strip = seen.strip;
+        lamp_strip_init(strip, lamp, b->position_mm, b->frame.u, b->wo[0], w->s->lobe_rad[w->i_set]);
+        if (strip->used) seen.strip = strip;
     }
     for (int a = 0; a < 2; a++) u[a] = rng_float(w->rng);
     float light = connect_point(w, &seen, u, b, wi);
-    if (!seen.strip.used) return light;
+    if (seen.strip == NULL) return light;
     for (int a = 0; a < 2; a++) u[a] = rng_float(w->rng);
-    lamp_strip_sample(&seen.strip, u, of_lamp);
+    lamp_strip_sample(strip, u, of_lamp);
     connect_point(w, &seen, of_lamp, b, unused);
     return light;
 }
@@ -74,9 +73,9 @@ void path_connect_image(struct walk *w, const struct bounce *b)
     u[0] = rng_float(w->rng);
     u[1] = rng_float(w->rng);
     if (!lights_sample_image(&s->lights, u, direction, radiance, &pdf_image)) return;
-    if (scene_sheet_hides(s->scene, direction)) return;
+    if (path_walk_hides(w, direction)) return;
     fiber_frame_to_local(&b->frame, direction, wi);
-    float pdf = path_scatter(w, b, wi, s_rgb);
+    float pdf = path_scatter(w, b, wi, s_rgb, NULL);
     float weight = fiber_frame_cos_theta(wi) / pdf_image * lights_power_heuristic(pdf_image, pdf);
     for (int c = 0; c < 3; c++) {
         radiance[c] *= weight;
@@ -98,6 +97,7 @@ void path_connect_image(struct walk *w, const struct bounce *b)
     path_leave(w, b, direction, &shadow);
     if (scene_occluded(s->scene, &shadow)) return;
     path_factor_apply(w, b, direction, value);
+    path_scatter_score(w, b, wi);
     path_add_light_to_all(w, value, w->score);
     if (w->step != NULL) {
         memcpy(w->step->image_wi, wi, sizeof wi);

@@ -11,12 +11,15 @@ static inline void path_add_light(struct walk *w, const float value[3], const fl
 {
     for (int c = 0; c < 3; c++) w->out->radiance[c] += value[c];
     if (!w->s->want_jacobian) return;
-    size_t n = w->s->model->n_param, i = 0;
+    const size_t n = w->s->model->n_param;
+    const float *h = w->h;
+    float *jac = w->out->jac;
     for (size_t c = 0; c < 3; c++)
-        for (size_t k = 0; k < w->s->n_set; k++) {
-            const float *own = score != NULL && k == w->i_set ? score + c * n : NULL;
-            for (size_t p = 0; p < n; p++, i++) w->out->jac[i] += value[c] * (w->h[i] + (own != NULL ? own[p] : 0));
-        }
+        for (size_t k = 0; k < w->s->n_set; k++, h += n, jac += n)
+            if (score != NULL && k == w->i_set)
+                for (size_t p = 0; p < n; p++) jac[p] += value[c] * (h[p] + score[c * n + p]);
+            else
+                for (size_t p = 0; p < n; p++) jac[p] += value[c] * h[p];
 }
 
 static inline void path_add_light_to_all(struct walk *w, const float value[3], const float *score)

@@ -9,17 +9,28 @@
 float path_scatter_widths(const struct scattering_model *m, const struct scattering_state *state, const float wi[3],
                           const float wo[3], float *score);
 
-/* S of the fiber at bounce b in rgb, with the widths of its section where the scene shows them, and the density of the
- * sample; with a Jacobian, the derivatives of ln S to walk.score. */
-static inline float path_scatter(struct walk *w, const struct bounce *b, const float wi[3], float s_rgb[3])
+/* S of the fiber at bounce b in rgb, with the widths of its section where the scene shows them. Returns the density of
+ * the sample. score: NULL, or the derivatives of ln S, [c * n_param + p]. */
+static inline float path_scatter(const struct walk *w, const struct bounce *b, const float wi[3], float s_rgb[3],
+                                 float *score)
 {
     const struct path_setting *s = w->s;
-    float *score = s->want_jacobian ? w->score : NULL;
     const float pdf = s->model->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, score);
     if (!s->shows_width) return pdf;
     const float widths = path_scatter_widths(s->model, w->state, wi, b->wo, score);
     for (int c = 0; c < 3; c++) s_rgb[c] *= widths;
     return pdf;
+}
+
+/* The derivatives of ln S at bounce b to walk.score, if they are wanted. Connections ask for them when their light is
+ * known to arrive: most are dropped before, and derivatives take a third of an evaluation. */
+static inline void path_scatter_score(struct walk *w, const struct bounce *b, const float wi[3])
+{
+    const struct path_setting *s = w->s;
+    float s_rgb[3];
+    if (!s->want_jacobian) return;
+    s->model->eval(w->state, wi, b->wo, s_rgb, w->score);
+    if (s->shows_width) path_scatter_widths(s->model, w->state, wi, b->wo, w->score);
 }
 
 #endif

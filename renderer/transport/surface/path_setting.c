@@ -13,6 +13,7 @@ void path_setting_init(struct path_setting *s, const struct scene *scene, const 
     s->n_set = 1;
     lights_init(&s->lights, c);
     s->guided_paths = s->lights.has_lamp;
+    s->hides_below = scene_sheet_hides(scene, (const float[3]){0, 0, -1});
     s->shows_width = model->width != NULL && scene_shows_sections(scene);
     s->roulette_below = PATH_SURFACE_ROULETTE_BELOW;
     if (s->guided_paths) light_guide_energy_of(model, state, &s->energy[0]);

@@ -37,19 +37,24 @@ static void add_beyond(struct walk *w, const struct scene_ray *ray, float pdf)
 
 static inline void add_scores(struct walk *w)
 {
-    size_t n = w->s->model->n_param;
-    for (size_t c = 0; c < 3; c++) {
-        float *h = w->h + (c * w->s->n_set + w->i_set) * n;
-        for (size_t p = 0; p < n; p++) h[p] += w->score[c * n + p];
+    const size_t n = w->s->model->n_param, n_set = w->s->n_set;
+    float *h = w->h;
+    if (n_set == 1) { /* h and score have the same layout */
+        for (size_t i = 0; i < 3 * n; i++) h[i] += w->score[i];
+        return;
     }
+    for (size_t c = 0; c < 3; c++)
+        for (size_t p = 0; p < n; p++) h[(c * n_set + w->i_set) * n + p] += w->score[c * n + p];
 }
 
-static void bounce_at(struct walk *w, const struct scene_hit *hit, const struct scene_ray *ray, struct bounce *b)
+/* Fills in the rest of a bounce whose hit is known. */
+static void bounce_at(struct walk *w, const struct scene_ray *ray, struct bounce *b)
 {
     const float back[3] = {-ray->direction[0], -ray->direction[1], -ray->direction[2]};
-    b->hit = *hit;
+    const struct scene_hit *hit = &b->hit;
     b->has_speckle = false;
     memcpy(b->offset_mm, ray->offset_mm, sizeof b->offset_mm);
+    unwrapped(hit->position_mm, b->offset_mm, b->position_mm);
     const bool flat = w->s->model->flat_section;
     float section[3];
     const bool bent = (flat || path_factor_wanted(w->s)) && scene_bent_normal(w->s->scene, hit, b->normal);
@@ -75,19 +80,18 @@ static void follow_guided_path(struct walk *w, size_t i_lamp, const struct bounc
                                float weight)
 {
     struct scene_ray ray;
-    struct scene_hit hit;
     struct bounce b;
     struct lamp_strip strip;
     float wi[3];
     path_leave(w, from, direction, &ray);
-    if (!scene_trace(w->s->scene, &ray, &hit)) return; /* light beyond the cloth is counted by the walk itself */
-    bounce_at(w, &hit, &ray, &b);
+    if (!scene_trace(w->s->scene, &ray, &b.hit)) return; /* light beyond the cloth is counted by the walk itself */
+    bounce_at(w, &ray, &b);
     float light = path_connect_lamp(w, &w->lamp[i_lamp], 1, &b, &strip, wi);
     if (w->step == NULL || light == 0) return;
     memcpy(w->step->guided_wo, b.wo, sizeof b.wo);
     memcpy(w->step->guided_light_wi, wi, sizeof wi);
     w->step->guided_light = light * weight;
-    w->step->i_guided_group = scene_group_of(w->s->scene, hit.i_segment);
+    w->step->i_guided_group = scene_group_of(w->s->scene, b.hit.i_segment);
 }
 
 /* A guided shadow path reaches a lamp by way of one other fiber: a ray is drawn near the direction of the lamp
@@ -103,7 +107,7 @@ static void trace_guided_path(struct walk *w, size_t i_lamp, const struct bounce
     u[1] = rng_float(w->rng);
     light_guide_sample(w->towards[i_lamp], u, direction);
     fiber_frame_to_local(&b->frame, direction, wi);
-    float pdf = path_scatter(w, b, wi, s_rgb);
+    float pdf = path_scatter(w, b, wi, s_rgb, NULL);
     float weight = fiber_frame_cos_theta(wi) / (pdf + w->p_guided * light_guide_pdf(w->towards[i_lamp], direction));
     for (int c = 0; c < 3; c++) next[c] = w->throughput[c] * s_rgb[c] * weight;
     float most = path_value_largest(next);
@@ -121,14 +125,16 @@ static void trace_guided_path(struct walk *w, size_t i_lamp, const struct bounce
     float throughput[3], h[PATH_N_DERIVATIVE];
     memcpy(throughput, w->throughput, sizeof throughput);
     memcpy(h, w->h, n_flat * sizeof *h);
+    path_scatter_score(w, b, wi);
     memcpy(w->throughput, next, sizeof next);
+    w->h = h;
     if (s->want_jacobian) add_scores(w);
     if (w->step != NULL) memcpy(w->step->guided_wi, wi, sizeof wi);
     follow_guided_path(w, i_lamp, b, direction, weight);
     w->state = state;
     w->i_set = i_set;
+    w->h = w->h_walk;
     memcpy(w->throughput, throughput, sizeof throughput);
-    memcpy(w->h, h, n_flat * sizeof *h);
 }
 
 /* Proportional to the share of light that a fiber of this kind scatters forwards. */
@@ -146,10 +152,8 @@ static float guided_path_probability(const struct walk *w)
 
 static void guide_to_lamp(struct walk *w, size_t i_lamp, const struct bounce *b)
 {
-    float position[3];
-    unwrapped(b->hit.position_mm, b->offset_mm, position);
-    light_guide_towards(&w->lamp[i_lamp], position, w->towards[i_lamp]);
-    bool sees = !scene_sheet_hides(w->s->scene, w->towards[i_lamp]);
+    light_guide_towards(&w->lamp[i_lamp], b->position_mm, w->towards[i_lamp]);
+    bool sees = !path_walk_hides(w, w->towards[i_lamp]);
     if (sees && (w->p_guided >= 1 || rng_float(w->rng) < w->p_guided)) trace_guided_path(w, i_lamp, b);
 }
 
@@ -176,7 +180,7 @@ static bool scatter(struct walk *w, const struct bounce *b, struct scene_ray *ra
     float u[3], wi[3], s_rgb[3], direction[3], survival = 1;
     for (int a = 0; a < 3; a++) u[a] = rng_float(w->rng);
     s->model->sample(w->state, b->wo, w->throughput, u, wi);
-    float pdf = path_scatter(w, b, wi, s_rgb);
+    float pdf = path_scatter(w, b, wi, s_rgb, s->want_jacobian ? w->score : NULL);
     if (pdf == 0) return false; /* rounding gave a direction along the fiber, into which nothing is scattered */
     float weight = fiber_frame_cos_theta(wi) / pdf, next[3];
     for (int c = 0; c < 3; c++) next[c] = w->throughput[c] * s_rgb[c] * weight;
@@ -224,6 +228,7 @@ static void walk_start(struct walk *w, const struct path_setting *s, bool record
     w->i_set = 0;
     for (int c = 0; c < 3; c++) w->throughput[c] = 1;
     for (size_t k = 0; k < w->n_lamp; k++) w->weight[k] = 1;
+    w->h = w->h_walk;
     memset(w->h, 0, n_flat * sizeof *w->h);
     for (size_t i = 0; i < w->n_out; i++) {
         memset(out[i].radiance, 0, sizeof out[i].radiance);
@@ -259,23 +264,22 @@ static void walk_on(struct walk *w, struct scene_ray *ray, struct path_record *r
     const struct path_setting *s = w->s;
     float pdf = 0;
     for (uint32_t i = 0; i < PATH_MAX_BOUNCE; i++) {
-        struct scene_hit hit;
         struct bounce b;
-        if (!scene_trace(s->scene, ray, &hit)) {
+        if (!scene_trace(s->scene, ray, &b.hit)) {
             add_beyond(w, ray, pdf);
             return;
         }
         w->last = i + 1 == s->n_traced;
         w->first_out->n_bounce++;
         w->step = next_step(record);
-        bounce_at(w, &hit, ray, &b);
+        bounce_at(w, ray, &b);
         if (path_factor_wanted(s)) path_factor_note(w, &b, ray);
         if (w->step != NULL) {
             memcpy(w->step->wo, b.wo, sizeof b.wo);
-            w->step->i_group = scene_group_of(s->scene, hit.i_segment);
+            w->step->i_group = scene_group_of(s->scene, b.hit.i_segment);
         }
         float rgb[3] = {0, 0, 0};
-        if (i == 0 && s->begin != NULL) s->begin(s->finish_context, &hit, ray, w->rng, rgb);
+        if (i == 0 && s->begin != NULL) s->begin(s->finish_context, &b.hit, ray, w->rng, rgb);
         if (i == 0 && s->begin != NULL) path_add_light_to_all(w, rgb, NULL);
         connect_lamps(w, &b);
         if (s->lights.image != NULL) path_connect_image(w, &b);

@@ -31,6 +31,7 @@ struct path_setting {
      * variance, same mean. Not for recorded paths. */
     bool has_strips;
     float lobe_rad[SCATTERING_MAX_SET]; /* by material group: scattering_model.lobe_rad; only with has_strips */
+    bool hides_below;                   /* scene_sheet_hides all directions downwards */
     bool shows_width;     /* the scene has the sections of the fibers as surfaces, and the model states their widths */
     float roulette_below; /* throughput under which paths are ended at random; 0: never */
     /* Ends paths at their n_traced-th hit (0: nowhere): what that scatters of light that nothing scattered before is

@@ -15,7 +15,8 @@ static inline void unwrapped(const float local_mm[3], const double offset_mm[2],
 /* Where the path meets a fiber. */
 struct bounce {
     struct scene_hit hit;
-    double offset_mm[2]; /* of the ray that hit, in whole tiles */
+    double offset_mm[2];  /* of the ray that hit, in whole tiles */
+    float position_mm[3]; /* of the hit, unwrapped */
     struct fiber_frame frame;
     float wo[3];      /* towards where the path comes from, in the fiber frame */
     float normal[3];  /* of the cloth; only with a discrepancy or speckle */
@@ -49,8 +50,15 @@ struct walk {
     float weight[PATH_MAX_LAMP];     /* multiple-importance weight of lamp connections at the present bounce: the guided
                                         paths of the bounce before have the rest */
     float score[3 * SCATTERING_MAX_PARAM]; /* of the present step, [c * n_param + p] */
-    float h[PATH_N_DERIVATIVE];            /* running sums of scores, laid out as the derivatives of path_result */
+    float *h; /* running sums of scores, laid out as the derivatives of path_result: h_walk, or a guided path's own */
+    float h_walk[PATH_N_DERIVATIVE];
 };
+
+/* scene_sheet_hides, without a call. */
+static inline bool path_walk_hides(const struct walk *w, const float direction[3])
+{
+    return w->s->hides_below && direction[2] <= 0;
+}
 
 /* Whether the lamp is found by direct connections alone: at the first hit of a path that always ends there. */
 static inline bool path_walk_connects_all(const struct walk *w)
