@@ -4,7 +4,8 @@
 /* Standard deviation, in half sides of the lamp, up to which a lobe counts as narrow. Pictures by tables of a Gabardine
  * (0.46) have 0.8 times the variance with 0.8 in place of 0.4, in the same time (transport/NOTES.md). */
 #define NARROW 0.8f
-#define REACH_SD 3.0f /* a lobe whose middle is that far off the lamp sends next to no light of it */
+#define REACH_SD 3.0f     /* a lobe whose middle is that far off the lamp sends next to no light of it */
+#define SLOPES_MOST 1.45f /* above the root of 2, by more than rounding: the most of the sum of both slopes */
 
 static float dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -15,10 +16,12 @@ void lamp_strip_init(struct lamp_strip *strip, const struct lamp *lamp, const fl
     strip->used = false;
     if (!(lobe_rad > 0) || lamp->distant) return;
     for (int a = 0; a < 3; a++) n[a] = lamp->centre_mm[a] - position_mm[a];
-    float inv = 1 / sqrtf(dot(n, n)), sd = lobe_rad * sqrtf(fmaxf(1 - sin_o * sin_o, 0));
+    float inv = 1 / sqrtf(dot(n, n)), cos2_o = 1 - sin_o * sin_o, sd = lobe_rad * sqrtf(cos2_o > 0 ? cos2_o : 0),
+          half_side = inv * lamp->half_side_mm;
     if (!(sd < NARROW * inv * lamp->half_side_mm)) return; /* slopes are at most that */
     for (int a = 0; a < 3; a++) n[a] *= inv;
     float sin_i = dot(tangent, n);
+    if (!(fabsf(sin_i + sin_o) < SLOPES_MOST * half_side + REACH_SD * sd)) return; /* most lobes miss the lamp */
     for (int k = 0; k < 2; k++) /* of the sine of th_i, by half sides along the edge */
         slope[k] = (dot(tangent, lamp->edge[k]) - sin_i * dot(n, lamp->edge[k])) * inv * lamp->half_side_mm;
     float steep = sqrtf(slope[0] * slope[0] + slope[1] * slope[1]);
