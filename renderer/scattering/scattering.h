@@ -12,6 +12,7 @@
 #include "base/catalogue/model_catalogue.h"
 #include "base/status.h"
 #include "base/thread_pool.h"
+#include "renderer/scattering/fiber_direction.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -26,6 +27,12 @@ enum {
  * threads. */
 struct scattering_state;
 struct speckle_table;
+
+/* A bounce as one model sees it: what depends on wo and the weights of the channels alone. */
+struct scattering_view {
+    struct fiber_direction out; /* wo */
+    float part[8];              /* the model's own */
+};
 
 struct scattering_model {
     const char *id, *title; /* these four: SURFACE_MODEL_ROW of the catalogue */
@@ -71,6 +78,14 @@ struct scattering_model {
      * values. */
     float (*eval_pdf)(const struct scattering_state *state, const float wi[3], const float wo[3],
                       const float *weight_rgb, float s_rgb[3], float *score);
+    /* eval_pdf and sample in two steps, for the several wi of a bounce: view_of once, the others for each wi. Exactly
+     * the same values. NULL, all three: the model has them in one step only. */
+    void (*view_of)(const struct scattering_state *state, const float wo[3], const float *weight_rgb,
+                    struct scattering_view *view);
+    float (*eval_pdf_view)(const struct scattering_state *state, const float wi[3], const struct scattering_view *view,
+                           float s_rgb[3], float *score);
+    void (*sample_view)(const struct scattering_state *state, const struct scattering_view *view, const float u[3],
+                        float wi[3]);
     /* The width that the section shows towards a direction, over the diameter of a round fiber of the same area; score:
      * the derivatives of its logarithm by each parameter, NULL when not wanted. NULL: 1, the section is round or turned
      * at random. */

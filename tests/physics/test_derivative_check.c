@@ -257,6 +257,7 @@ static struct scattering_model faulty_model(const char *id, size_t i_param, floa
         fault.factor[p] = i_param == EVERY || i_param == p ? factor : 1.0f;
     wrong.eval = wrong_eval;
     wrong.eval_pdf = wrong_eval_pdf;
+    wrong.view_of = NULL;
     return wrong;
 }
 

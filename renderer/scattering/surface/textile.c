@@ -253,7 +253,8 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
         sample_diffuse(t, &dout, rest, u + 1, wi);
         return;
     }
-    float theta = two_lobe_sample_theta(s, &e, k == LOBE_TT ? TWO_LOBE_TT : TWO_LOBE_R, dout.theta_rad, u[1]);
+    float theta =
+        two_lobe_sample_theta(s, e.near, e.far, k == LOBE_TT ? TWO_LOBE_TT : TWO_LOBE_R, dout.theta_rad, u[1]);
     if (k == SMOOTH_R)
         phi = 2 * asinf(2 * u[2] - 1); /* the integral of cos(ph / 2) / 4 from -pi is (1 + sin(ph / 2)) / 2 */
     else

@@ -74,7 +74,15 @@ static void eval(const struct scattering_state *s, const float wi[3], const floa
 static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb,
                       float s_rgb[3], float *score)
 {
-    return two_lobe_eval_pdf(s, false, wi, wo, weight_rgb, s_rgb, score);
+    struct scattering_view v;
+    two_lobe_view_of(s, wo, weight_rgb, &v);
+    return two_lobe_eval_pdf(s, false, wi, &v, s_rgb, score);
+}
+
+static float eval_pdf_view(const struct scattering_state *s, const float wi[3], const struct scattering_view *v,
+                           float s_rgb[3], float *score)
+{
+    return two_lobe_eval_pdf(s, false, wi, v, s_rgb, score);
 }
 
 /* The product of a lobe's normal density of th_i about -th_o and of the Gaussian, a normal density of variance
@@ -120,7 +128,10 @@ static void gaussian(const struct scattering_state *s, const float axis[3], floa
 }
 
 const struct scattering_model scattering_two_lobe = {
-    SURFACE_MODEL_ROW(two_lobe),   .prepare = prepare,  .release = two_lobe_release, .eval = eval,
-    .sample = two_lobe_sample,     .pdf = two_lobe_pdf, .eval_pdf = eval_pdf,        .gaussian = gaussian,
-    .lobe_rad = two_lobe_lobe_rad,
+    SURFACE_MODEL_ROW(two_lobe),    .prepare = prepare,
+    .release = two_lobe_release,    .eval = eval,
+    .sample = two_lobe_sample,      .pdf = two_lobe_pdf,
+    .eval_pdf = eval_pdf,           .gaussian = gaussian,
+    .lobe_rad = two_lobe_lobe_rad,  .view_of = two_lobe_view_of,
+    .eval_pdf_view = eval_pdf_view, .sample_view = two_lobe_sample_view,
 };

@@ -90,7 +90,15 @@ static void eval(const struct scattering_state *s, const float wi[3], const floa
 static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb,
                       float s_rgb[3], float *score)
 {
-    return two_lobe_eval_pdf(s, true, wi, wo, weight_rgb, s_rgb, score);
+    struct scattering_view v;
+    two_lobe_view_of(s, wo, weight_rgb, &v);
+    return two_lobe_eval_pdf(s, true, wi, &v, s_rgb, score);
+}
+
+static float eval_pdf_view(const struct scattering_state *s, const float wi[3], const struct scattering_view *v,
+                           float s_rgb[3], float *score)
+{
+    return two_lobe_eval_pdf(s, true, wi, v, s_rgb, score);
 }
 
 const struct scattering_model scattering_two_lobe_balanced = {
@@ -102,4 +110,7 @@ const struct scattering_model scattering_two_lobe_balanced = {
     .pdf = two_lobe_pdf,
     .eval_pdf = eval_pdf,
     .lobe_rad = two_lobe_lobe_rad,
+    .view_of = two_lobe_view_of,
+    .eval_pdf_view = eval_pdf_view,
+    .sample_view = two_lobe_sample_view,
 };

@@ -34,34 +34,57 @@ void two_lobe_fill_reach(struct scattering_state *s)
 
 float two_lobe_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)
 {
-    struct fiber_direction di = fiber_direction_of(wi), dout = fiber_direction_of(wo);
-    struct two_lobe_terms t = two_lobe_terms_of(s, &di, &dout);
-    return two_lobe_pdf_terms(s, &di, &dout, weight_rgb, &t);
+    struct fiber_direction di = fiber_direction_of(wi);
+    struct scattering_view v;
+    two_lobe_view_of(s, wo, weight_rgb, &v);
+    struct two_lobe_terms t = two_lobe_terms_of(s, &di, &v.out);
+    return two_lobe_pdf_terms(&di, &v, &t);
 }
 
-float two_lobe_sample_theta(const struct scattering_state *s, const struct two_lobe_sampling_entry *e, int lobe,
+float two_lobe_sample_theta(const struct scattering_state *s, const float near[2], const float far[2], int lobe,
                             float theta_o, float u)
 {
     bool upper_near = theta_o <= 0; /* the pole on the side of -th_o is the near one */
-    float hi = upper_near ? e->near[lobe] : e->far[lobe], lo = -(upper_near ? e->far[lobe] : e->near[lobe]);
+    float hi = upper_near ? near[lobe] : far[lobe], lo = -(upper_near ? far[lobe] : near[lobe]);
     float theta = -theta_o + (float)M_SQRT2 * s->beta[lobe] * erf_inverse(lo + u * (hi - lo));
-    return fminf(fmaxf(theta, (float)-M_PI_2), (float)M_PI_2);
+    theta = theta > (float)-M_PI_2 ? theta : (float)-M_PI_2;
+    return theta < (float)M_PI_2 ? theta : (float)M_PI_2;
 }
 
 void two_lobe_sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
                      float wi[3])
 {
-    struct fiber_direction dout = fiber_direction_of(wo);
-    struct two_lobe_sampling_entry e = two_lobe_sampling_at(s, dout.theta_rad);
-    int k = u[0] < two_lobe_p_r(s, &e, weight_rgb) ? TWO_LOBE_R : TWO_LOBE_TT;
-    float theta = two_lobe_sample_theta(s, &e, k, dout.theta_rad, u[1]);
-    float sin_theta = sinf(theta), cos_theta = fmaxf(cosf(theta), 0);
+    struct scattering_view v;
+    two_lobe_view_of(s, wo, weight_rgb, &v);
+    two_lobe_sample_view(s, &v, u, wi);
+}
+
+void two_lobe_view_of(const struct scattering_state *s, const float wo[3], const float *weight_rgb,
+                      struct scattering_view *v)
+{
+    v->out = fiber_direction_of(wo);
+    struct two_lobe_sampling_entry e = two_lobe_sampling_at(s, v->out.theta_rad);
+    v->part[TWO_LOBE_V_P_R] = two_lobe_p_r(s, &e, weight_rgb);
+    for (int k = 0; k < 2; k++) {
+        v->part[TWO_LOBE_V_NEAR + k] = e.near[k];
+        v->part[TWO_LOBE_V_FAR + k] = e.far[k];
+    }
+}
+
+void two_lobe_sample_view(const struct scattering_state *s, const struct scattering_view *v, const float u[3],
+                          float wi[3])
+{
+    const struct fiber_direction *dout = &v->out;
+    int k = u[0] < v->part[TWO_LOBE_V_P_R] ? TWO_LOBE_R : TWO_LOBE_TT;
+    float theta =
+        two_lobe_sample_theta(s, v->part + TWO_LOBE_V_NEAR, v->part + TWO_LOBE_V_FAR, k, dout->theta_rad, u[1]);
+    float sin_theta = sinf(theta), cos_t = cosf(theta), cos_theta = cos_t > 0 ? cos_t : 0;
 
     float delta = k == TWO_LOBE_R ? (float)(2 * M_PI) * u[2] : von_mises_sample(&s->azimuth, u[2]);
     float c = -cosf(delta), d = -sinf(delta); /* turned by pi: forward is behind the fiber */
     wi[0] = sin_theta;
-    wi[1] = cos_theta * (c * dout.azimuth[0] - d * dout.azimuth[1]);
-    wi[2] = cos_theta * (d * dout.azimuth[0] + c * dout.azimuth[1]);
+    wi[1] = cos_theta * (c * dout->azimuth[0] - d * dout->azimuth[1]);
+    wi[2] = cos_theta * (d * dout->azimuth[0] + c * dout->azimuth[1]);
 }
 
 float two_lobe_lobe_rad(const struct scattering_state *s)

@@ -114,7 +114,10 @@ static inline struct two_lobe_terms two_lobe_terms_of(const struct scattering_st
     float x = di->theta_rad + dout->theta_rad;
     t.x2 = x * x;
     t.one_minus_cos = fiber_one_minus_cos_opposite(di, dout);
-    for (int k = 0; k < 2; k++) t.g[k] = s->peak[k] * expf(-t.x2 * s->inv_2var[k]);
+    for (int k = 0; k < 2; k++) {
+        float off = t.x2 * s->inv_2var[k]; /* beyond 104, expf is 0, after a slow test for underflow */
+        t.g[k] = off > 104 ? 0 : s->peak[k] * expf(-off);
+    }
     t.von_mises = s->azimuth.norm * expf(-s->azimuth.kappa * t.one_minus_cos);
     return t;
 }
@@ -209,33 +212,38 @@ static inline float two_lobe_p_r(const struct scattering_state *s, const struct 
     return p > 0.05f ? p : 0.05f; /* 0/0 too */
 }
 
-static inline float two_lobe_pdf_terms(const struct scattering_state *s, const struct fiber_direction *di,
-                                       const struct fiber_direction *dout, const float *weight_rgb,
+/* scattering_view.part: the probability of the R lobe, and near and far of the sampling table, R before TT. */
+enum { TWO_LOBE_V_P_R, TWO_LOBE_V_NEAR, TWO_LOBE_V_FAR = TWO_LOBE_V_NEAR + 2 };
+
+static inline float two_lobe_pdf_terms(const struct fiber_direction *di, const struct scattering_view *v,
                                        const struct two_lobe_terms *t)
 {
-    struct two_lobe_sampling_entry e = two_lobe_sampling_at(s, dout->theta_rad);
-    float p_r = two_lobe_p_r(s, &e, weight_rgb);
-    float r = t->g[TWO_LOBE_R] * 2 / (e.near[TWO_LOBE_R] + e.far[TWO_LOBE_R]) * (float)(0.5 / M_PI);
-    float tt = t->g[TWO_LOBE_TT] * 2 / (e.near[TWO_LOBE_TT] + e.far[TWO_LOBE_TT]) * t->von_mises;
+    const float *near = v->part + TWO_LOBE_V_NEAR, *far = v->part + TWO_LOBE_V_FAR, p_r = v->part[TWO_LOBE_V_P_R];
+    float r = t->g[TWO_LOBE_R] * 2 / (near[TWO_LOBE_R] + far[TWO_LOBE_R]) * (float)(0.5 / M_PI);
+    float tt = t->g[TWO_LOBE_TT] * 2 / (near[TWO_LOBE_TT] + far[TWO_LOBE_TT]) * t->von_mises;
     return (p_r * r + (1 - p_r) * tt) / (di->cos_theta > FIBER_COS_MIN ? di->cos_theta : FIBER_COS_MIN);
 }
 
 static inline float two_lobe_eval_pdf(const struct scattering_state *s, bool balanced, const float wi[3],
-                                      const float wo[3], const float *weight_rgb, float s_rgb[3], float *score)
+                                      const struct scattering_view *v, float s_rgb[3], float *score)
 {
-    struct fiber_direction di = fiber_direction_of(wi), dout = fiber_direction_of(wo);
-    struct two_lobe_terms t = two_lobe_terms_of(s, &di, &dout);
-    two_lobe_eval_terms(s, balanced, &di, &dout, &t, s_rgb, score);
-    return two_lobe_pdf_terms(s, &di, &dout, weight_rgb, &t);
+    struct fiber_direction di = fiber_direction_of(wi);
+    struct two_lobe_terms t = two_lobe_terms_of(s, &di, &v->out);
+    two_lobe_eval_terms(s, balanced, &di, &v->out, &t, s_rgb, score);
+    return two_lobe_pdf_terms(&di, v, &t);
 }
 
 /* th_i from the normal density about -th_o cut to +-pi/2. */
-float two_lobe_sample_theta(const struct scattering_state *s, const struct two_lobe_sampling_entry *e, int lobe,
+float two_lobe_sample_theta(const struct scattering_state *s, const float near[2], const float far[2], int lobe,
                             float theta_o, float u);
 /* Shared by both models as they are. */
 void two_lobe_sample(const struct scattering_state *s, const float wo[3], const float *weight_rgb, const float u[3],
                      float wi[3]);
 float two_lobe_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb);
+void two_lobe_view_of(const struct scattering_state *s, const float wo[3], const float *weight_rgb,
+                      struct scattering_view *view);
+void two_lobe_sample_view(const struct scattering_state *s, const struct scattering_view *view, const float u[3],
+                          float wi[3]);
 void two_lobe_release(struct scattering_state *s);
 /* scattering_model.lobe_rad */
 float two_lobe_lobe_rad(const struct scattering_state *s);

@@ -142,14 +142,16 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
 static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb,
                       float s_rgb[3], float *score)
 {
-    struct fiber_direction di = fiber_direction_of(wi), dout = fiber_direction_of(wo);
-    struct two_lobe_terms t = two_lobe_terms_of(s, &di, &dout);
+    struct fiber_direction di = fiber_direction_of(wi);
+    struct scattering_view v;
+    two_lobe_view_of(s, wo, weight_rgb, &v);
+    struct two_lobe_terms t = two_lobe_terms_of(s, &di, &v.out);
     const struct diffuse_state *d = diffuse_state_of(s);
     float lobe_rgb[3], lobe_score[3 * TWO_LOBE_N_PARAM];
-    two_lobe_eval_terms(s, false, &di, &dout, &t, lobe_rgb, score != NULL ? lobe_score : NULL);
+    two_lobe_eval_terms(s, false, &di, &v.out, &t, lobe_rgb, score != NULL ? lobe_score : NULL);
     add_diffuse(d, &di, lobe_rgb, lobe_score, s_rgb, score);
     float p = diffuse_probability(d, wo, weight_rgb);
-    return p * uniform_density(wi) + (1 - p) * two_lobe_pdf_terms(s, &di, &dout, weight_rgb, &t);
+    return p * uniform_density(wi) + (1 - p) * two_lobe_pdf_terms(&di, &v, &t);
 }
 
 const struct scattering_model scattering_two_lobe_diffuse = {

@@ -88,12 +88,14 @@ static float eval_pdf(const struct phase_state *s, const float wi[3], const floa
                       float f_rgb[3], float *score)
 {
     const struct scattering_state *l = s->lobes;
-    struct fiber_direction di = fiber_direction_of(wi), dout = fiber_direction_of(wo);
-    struct two_lobe_terms t = two_lobe_terms_of(l, &di, &dout);
+    struct fiber_direction di = fiber_direction_of(wi);
+    struct scattering_view v;
+    two_lobe_view_of(l, wo, weight_rgb, &v);
+    struct two_lobe_terms t = two_lobe_terms_of(l, &di, &v.out);
     float own[3 * TWO_LOBE_N_PARAM], e[3], d[3];
-    two_lobe_eval_terms(l, false, &di, &dout, &t, f_rgb, score != NULL ? own : NULL);
+    two_lobe_eval_terms(l, false, &di, &v.out, &t, f_rgb, score != NULL ? own : NULL);
     int i;
-    float x = two_lobe_table_position(dout.theta_rad, &i);
+    float x = two_lobe_table_position(v.out.theta_rad, &i);
     const struct energy_entry *a = &s->energy[i], *b = a + 1;
     for (int k = 0; k < 3; k++) {
         e[k] = two_lobe_mix(a->value[k], b->value[k], x);
@@ -117,7 +119,7 @@ static float eval_pdf(const struct phase_state *s, const float wi[3], const floa
         h[TWO_LOBE_P_BETA_TT] -= c_tt * not_c_r * d[2] * inv;
         h[P_ALPHA + c] = 1 / s->alpha[c];
     }
-    return two_lobe_pdf_terms(l, &di, &dout, weight_rgb, &t);
+    return two_lobe_pdf_terms(&di, &v, &t);
 }
 
 const struct phase_model phase_two_lobe = {

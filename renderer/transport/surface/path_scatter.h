@@ -9,13 +9,31 @@
 float path_scatter_widths(const struct scattering_model *m, const struct scattering_state *state, const float wi[3],
                           const float wo[3], float *score);
 
+/* To be called when the throughput at a bounce has changed. */
+static inline void path_scatter_look(const struct walk *w, struct bounce *b)
+{
+    const struct scattering_model *m = w->s->model;
+    if (m->view_of != NULL) m->view_of(w->state, b->wo, w->throughput, &b->view);
+}
+
+static inline void path_scatter_sample(const struct walk *w, const struct bounce *b, const float u[3], float wi[3])
+{
+    const struct scattering_model *m = w->s->model;
+    if (m->view_of != NULL)
+        m->sample_view(w->state, &b->view, u, wi);
+    else
+        m->sample(w->state, b->wo, w->throughput, u, wi);
+}
+
 /* S of the fiber at bounce b in rgb, with the widths of its section where the scene shows them. Returns the density of
  * the sample. score: NULL, or the derivatives of ln S, [c * n_param + p]. */
 static inline float path_scatter(const struct walk *w, const struct bounce *b, const float wi[3], float s_rgb[3],
                                  float *score)
 {
     const struct path_setting *s = w->s;
-    const float pdf = s->model->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, score);
+    const struct scattering_model *m = s->model;
+    const float pdf = m->view_of != NULL ? m->eval_pdf_view(w->state, wi, &b->view, s_rgb, score)
+                                         : m->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, score);
     if (!s->shows_width) return pdf;
     const float widths = path_scatter_widths(s->model, w->state, wi, b->wo, score);
     for (int c = 0; c < 3; c++) s_rgb[c] *= widths;

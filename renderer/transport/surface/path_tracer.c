@@ -70,9 +70,11 @@ static void bounce_at(struct walk *w, const struct scene_ray *ray, struct bounce
         fiber_frame_flat(&b->frame, hit->tangent);
     if (!bent) memcpy(b->normal, (const float[3]){0, 0, 1}, sizeof b->normal);
     fiber_frame_to_local(&b->frame, back, b->wo);
-    if (w->s->n_set == 1) return;
-    w->i_set = scene_group_of(w->s->scene, hit->i_segment);
-    w->state = w->s->state[w->i_set];
+    if (w->s->n_set > 1) {
+        w->i_set = scene_group_of(w->s->scene, hit->i_segment);
+        w->state = w->s->state[w->i_set];
+    }
+    path_scatter_look(w, b);
 }
 
 /* The part of a guided path beyond the present bounce. The walk carries its throughput and scores meanwhile. */
@@ -179,7 +181,7 @@ static bool scatter(struct walk *w, const struct bounce *b, struct scene_ray *ra
     const struct path_setting *s = w->s;
     float u[3], wi[3], s_rgb[3], direction[3], survival = 1;
     for (int a = 0; a < 3; a++) u[a] = rng_float(w->rng);
-    s->model->sample(w->state, b->wo, w->throughput, u, wi);
+    path_scatter_sample(w, b, u, wi);
     float pdf = path_scatter(w, b, wi, s_rgb, s->want_jacobian ? w->score : NULL);
     if (pdf == 0) return false; /* rounding gave a direction along the fiber, into which nothing is scattered */
     float weight = fiber_frame_cos_theta(wi) / pdf, next[3];
@@ -239,7 +241,7 @@ static void walk_start(struct walk *w, const struct path_setting *s, bool record
 
 /* The last bounce of a setting with n_traced. False: the path ends here. The direct connection has taken all of the
  * lamp's light only if nothing else could find it; otherwise a ray looks for the rest. */
-static bool go_on_beyond_last(struct walk *w, const struct bounce *b, struct scene_ray *ray)
+static bool go_on_beyond_last(struct walk *w, struct bounce *b, struct scene_ray *ray)
 {
     const struct path_setting *s = w->s;
     float rgb[3] = {0, 0, 0}, value[3], share = s->share_beyond, pdf;
@@ -249,6 +251,7 @@ static bool go_on_beyond_last(struct walk *w, const struct bounce *b, struct sce
     path_add_light_to_all(w, value, NULL);
     if (goes_on) {
         for (int c = 0; c < 3; c++) w->throughput[c] /= share;
+        path_scatter_look(w, b);
         for (size_t k = 0; k < w->n_lamp && s->guided_paths; k++) guide_to_lamp(w, k, b);
         w->last = false;
         return true;

@@ -18,9 +18,10 @@ struct bounce {
     double offset_mm[2];  /* of the ray that hit, in whole tiles */
     float position_mm[3]; /* of the hit, unwrapped */
     struct fiber_frame frame;
-    float wo[3];      /* towards where the path comes from, in the fiber frame */
-    float normal[3];  /* of the cloth; only with a discrepancy or speckle */
-    bool has_speckle; /* this is the first bounce of a walk with speckle */
+    float wo[3];                 /* towards where the path comes from, in the fiber frame */
+    float normal[3];             /* of the cloth; only with a discrepancy or speckle */
+    struct scattering_view view; /* of wo and the throughput; only if the model has views */
+    bool has_speckle;            /* this is the first bounce of a walk with speckle */
 };
 
 /* The state that a path carries. */

@@ -99,6 +99,7 @@ static void test_surface(void **state)
     struct scene *scene = NULL;
     broken.id = "broken.v1";
     broken.eval_pdf = surface_eval_pdf;
+    broken.view_of = NULL;
     appearance_from_surface(&broken, &a);
     assert_string_equal(a.param[6].name, "beta_R");
     hand_weave_small(&f);
