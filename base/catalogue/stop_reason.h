@@ -13,6 +13,8 @@ enum stop_reason {
     STOP_SCHEDULE,
     STOP_STILL_MOVING,
     STOP_END_OF_BRACKET,
+    STOP_DECREASE_LEFT,
+    STOP_NOISE,
     STOP_N_REASON
 };
 

@@ -7,11 +7,13 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { LEAST_ROWS = 6 };
+enum { LEAST_ROWS = 6, PLAIN_NUMBERS = 12 };
 
-/* Share of the plain BRDF's error that another reading of the rows must leave, at most, to be the better one; and the
- * error from which on there is something to explain. */
+/* Largest share of the plain BRDF's error that another reading of the rows may leave to be better, and the error
+ * from which there is something to explain. */
 static const double better_share = 0.5, least_error = 0.1;
+/* Normal deviates by which the errors of the two readings must differ. Channels are alike, so it is more than usual. */
+static const double least_deviates = 4.0;
 /* Below this cosine of the lamp the lamp's own size matters. */
 static const double least_cos = 0.05;
 
@@ -94,6 +96,15 @@ static status plain_error(const struct observation_set *rows, double (*factor)(c
     return s;
 }
 
+/* Returns the share of the error that another reading may leave. The plain BRDF has twelve numbers, so it fits a few
+ * rows well whatever they mean. The logarithm of the ratio of two mean squares with d degrees of freedom each has the
+ * standard deviation 2 / sqrt(d - 1), nearly (F-test). */
+static double largest_share(size_t n_row)
+{
+    const double freedom = 3.0 * (double)n_row - PLAIN_NUMBERS;
+    return fmin(better_share, exp(-least_deviates / sqrt(freedom - 1.0)));
+}
+
 /* Radiance of a row whose value is a BRDF. */
 static double brdf_to_radiance(const struct observation *o) { return M_PI * incident(o); }
 
@@ -102,7 +113,7 @@ static status warn_brdf(const struct observation_set *rows, const struct warning
     double as_given, as_brdf;
     status s = plain_error(rows, NULL, &as_given, err);
     if (s == STATUS_OK) s = plain_error(rows, brdf_to_radiance, &as_brdf, err);
-    if (s != STATUS_OK || as_given < least_error || as_brdf > better_share * as_given) return s;
+    if (s != STATUS_OK || as_given < least_error || as_brdf > largest_share(rows->n) * as_given) return s;
     warning_send(warn, OPTION_NONE,
                  "the values look like those of a BRDF (1/sr), not like radiances: they do not fall as the lamp comes "
                  "in at grazing angles, and a plain surface fits them to %.2g %% if each is multiplied by pi and the "

@@ -8,11 +8,14 @@
  * Differs: the thesis does not give the six values of a; here they grow by a factor of 3, and the first step moves
  * the parameter that moves most by 0.5 % .. 120 % of its rescaled range. "Final objective" is the mean over the last
  * five iterations of a run: the value of one iteration is noisy. "Oscillates" means that successive steps point
- * against each other on average; below a mean cosine of turn_limit, over at least N_EXTRA pairs of steps, counts as
- * converged. A parameter that is fixed keeps its value. With a path budget, all renderings shrink alike. Errors come
- * from 4 more estimates at the winner.
+ * against each other on average. A run is at rest below a mean cosine of turn_limit, over at least N_EXTRA pairs of
+ * steps; steps that follow the noise of tracing are so, too. So the fit counts as converged only if 4 more estimates
+ * at the winner also show that no lower objective is near, and are precise enough to show it (rest_check.h). A
+ * parameter that is fixed keeps its value. With a path budget, all renderings shrink alike. Errors come from the same
+ * 4 estimates.
  */
 #include "optimizer/fit/descent/descent_methods.h"
+#include "optimizer/fit/descent/gauss_newton/rest_check.h"
 #include "optimizer/fit/descent/rescale.h"
 #include "renderer/transport/estimate/estimate.h"
 
@@ -162,26 +165,29 @@ static status iterate_more(struct sgd *g, const struct winner *best, struct erro
     return STATUS_OK;
 }
 
-/* Decides whether the winner's run has converged, and writes the reason. */
-static void judge(const struct winner *best, struct fit_result *result)
+/* Decides whether the winner is a minimum, and writes the reason. end: of the estimates there. */
+static void judge(const struct winner *best, const struct rest_check *end, struct fit_result *result)
 {
-    bool at_end = best->i_run == 0 || best->i_run == N_RUN - 1, enough = best->n_compared >= N_EXTRA;
-    bool at_rest = best->turn <= turn_limit;
-    result->converged = enough && at_rest && !at_end;
+    const bool at_end = best->i_run == 0 || best->i_run == N_RUN - 1, enough = best->n_compared >= N_EXTRA;
+    const bool at_rest = best->turn <= turn_limit;
     result->stop = !enough    ? STOP_TOO_FEW_STEPS
                    : at_end   ? STOP_END_OF_BRACKET
                    : !at_rest ? STOP_STILL_MOVING
-                              : STOP_SCHEDULE;
+                              : rest_check_verdict(end);
+    result->converged = result->stop == STOP_SCHEDULE;
     int n = snprintf(result->reason, sizeof result->reason, "run %d of %d had the lowest objective%s; ",
                      best->i_run + 1, N_RUN, at_end ? ", which is at the end of the bracket" : "");
-    if (enough)
-        snprintf(result->reason + n, sizeof result->reason - (size_t)n,
-                 "successive steps have a mean cosine of %.2f (below %.1f counts as converged)", best->turn,
-                 turn_limit);
-    else
-        snprintf(result->reason + n, sizeof result->reason - (size_t)n,
+    char *rest = result->reason + n;
+    const size_t room = sizeof result->reason - (size_t)n;
+    if (!enough)
+        snprintf(rest, room,
                  "%zu pairs of successive steps are too few to tell whether it has converged (%d are needed)",
                  best->n_compared, N_EXTRA);
+    else
+        snprintf(rest, room,
+                 "its steps have a mean cosine of %.2f (below %.1f is at rest); further steps promise to lower the "
+                 "objective, %.3g, by %.2g with a noise of %.2g",
+                 best->turn, turn_limit, result->objective.value, end->promised, end->noise);
 }
 
 /* Estimates objective and errors at the winner from renderings at its parameters alone. */
@@ -190,6 +196,7 @@ static status finish(struct sgd *g, const struct winner *best, struct fit_result
     const struct fit_problem *problem = g->run.problem;
     struct linear_history history;
     struct linear_model model = {0};
+    struct rest_check end = {0};
     double x[N];
     linear_history_init(&history, problem->observation, g->run.coordinate, problem->n_param);
     status s = linear_model_init(&model, 3 * problem->observation->n, problem->n_param, err);
@@ -209,7 +216,10 @@ static status finish(struct sgd *g, const struct winner *best, struct fit_result
         result->objective.value = linear_model_objective(&model, &result->objective.se);
         result->objective.rel_rms = sqrt(fmax(0.0, result->objective.value) / (double)model.n_row);
         uncertainty_compute(&model, g->run.coordinate, g->run.fixed, &result->uncertainty);
-        judge(best, result);
+        s = rest_check_compute(&g->run, &model, result->objective.value, &end, err);
+    }
+    if (s == STATUS_OK) {
+        judge(best, &end, result);
         s = cross_validation_compute(&model, problem->observation, g->run.coordinate, g->run.fixed,
                                      problem->discrepancy, &result->cross_validation, err);
     }

@@ -148,6 +148,50 @@ static void test_published_sgd_mean_cosine_has_no_start(void **state)
     observation_set_release(&x.observation);
 }
 
+/* A fit of the analytic cloth whose first n_free colours of transmission are free, or all parameters (0). */
+static struct fit_result fit_free(uint64_t seed, size_t n_free, double budget, double *rel_rms)
+{
+    struct descent_fixture x;
+    struct fit_result r;
+    descent_fixture_init(&x, seed, (uint64_t)budget);
+    for (size_t p = 0; p < FAKE_N_PARAM && n_free > 0; p++) {
+        x.parameter[p].fixed = p < 3 || p >= 3 + n_free;
+        if (x.parameter[p].fixed) x.parameter[p].start = x.truth[p];
+    }
+    descent_fixture_run(&x, descent_find(method_published_sgd.id), &r);
+    *rel_rms = fake_rel_rms(&x.cloth, 0, FAKE_N_FIT, r.param, x.truth);
+    observation_set_release(&x.observation);
+    return r;
+}
+
+/* Steps that follow noise point in all directions, like steps around a minimum. With few paths a run ends far from the
+ * truth so, and must not count as converged. */
+static void test_noise_is_no_minimum(void **state)
+{
+    (void)state;
+    size_t n_still = 0;
+    for (uint64_t seed = 1; seed <= 6; seed++) {
+        for (size_t n_free = 0; n_free <= 3; n_free += 3) {
+            double rel_rms;
+            struct fit_result r = fit_free(seed, n_free, n_free > 0 ? 1.3e6 : 2e7, &rel_rms);
+            print_message("%zu free: error %.3f, %s, %s\n", n_free, rel_rms, stop_reason_info(r.stop)->id, r.reason);
+            n_still += r.stop == STOP_NOISE || r.stop == STOP_DECREASE_LEFT;
+            if (r.converged) fail_msg("seed %d has converged at an error of %.3f", (int)seed, rel_rms);
+        }
+    }
+    assert_true(n_still >= 3); /* by their steps alone these were at rest */
+}
+
+static void test_a_minimum_is_one(void **state)
+{
+    (void)state;
+    for (uint64_t seed = 1; seed <= 3; seed++) {
+        double rel_rms;
+        struct fit_result r = fit_free(seed, 3, 1e9, &rel_rms);
+        if (!r.converged || r.stop != STOP_SCHEDULE || rel_rms > 0.005) fail_msg("error %.4f, %s", rel_rms, r.reason);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -155,6 +199,8 @@ int main(void)
         cmocka_unit_test(test_steps_after_an_oscillation),
         cmocka_unit_test(test_published_sgd_needs_steps),
         cmocka_unit_test(test_published_sgd_mean_cosine_has_no_start),
+        cmocka_unit_test(test_noise_is_no_minimum),
+        cmocka_unit_test(test_a_minimum_is_one),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
