@@ -33,6 +33,12 @@ def test_a_fault_is_possible(before, after):
     assert after in changed(before)
 
 
+@pytest.mark.parametrize("name, possible", [("store_fill", True), ("store_release", False), ("thing_free", False)])
+def test_a_body_that_releases_is_not_emptied(name, possible):
+    before = f"void {name}(struct thing *t)\n{{\n    t->n = 0;\n}}\n"
+    assert (before.replace("{\n", "{ return;\n", 1) in changed(before)) == possible
+
+
 @pytest.mark.parametrize("text, kept", [
     ("int f(void)\n{\n    if (fd < 0) return 7;\n}\n", "fd < 0"),
     ("int f(void)\n{\n    if (job->lock_fd >= 0) close(job->lock_fd);\n}\n", "lock_fd >= 0"),

@@ -98,7 +98,7 @@ class Judge:
         chosen = self.coverage.tests_of(fault.path, fault.line, last, function)
         always = [t for t in self.coverage.tests if t not in chosen and any(t.name.startswith(b) for b in part[1]) and
                   self.coverage.contains(t, fault.path)]
-        return sorted(chosen + always, key=lambda t: t.seconds)
+        return sorted(chosen + always, key=lambda t: (not t.is_c, t.seconds))
 
     def link(self, test, path):
         """What a test runs, with the faulty object; scripts need nothing."""
