@@ -108,6 +108,45 @@ static void test_error_by_leaving_out_parts(void **state)
     }
 }
 
+/* Radii of classes from those of their lines: the root of the mean square by length, of all lines where classes share a
+ * radius or one has no line. Then the lines get the radii of their classes, or are scaled together to them. */
+static void test_radii_of_lines(void **state)
+{
+    (void)state;
+    static const struct {
+        uint8_t axis;
+        int n;
+        float radius;
+    } line[] = {{0, 10, 2.0f}, {0, 30, 3.0f}, {1, 20, 5.0f}};
+    for (int way = 0; way < 4; way++) { /* shared or by class, of a class or of each line */
+        const bool per_axis = way % 2 == 1, single = way / 2 == 1;
+        struct polyline_set p;
+        struct radius_measure m = {.per_axis = per_axis};
+        polyline_set_init(&p);
+        for (size_t l = 0; l < 3; l++) {
+            assert_int_equal(polyline_begin(&p, line[l].axis, NULL), STATUS_OK);
+            for (int i = 0; i < line[l].n; i++)
+                assert_int_equal(polyline_add(&p, (const float[3]){(float)i, 0.0f, 0.0f}, NULL), STATUS_OK);
+            p.radius[l] = line[l].radius;
+        }
+        const double first = sqrt((10 * 4.0 + 30 * 9.0) / 40.0), all = sqrt((10 * 4.0 + 30 * 9.0 + 20 * 25.0) / 60.0);
+        radius_measure_lines(&p, 0.25, &m);
+        assert_true(fabs(m.radius_voxel[0] - (per_axis ? first : all)) < 1e-6);
+        assert_true(fabs(m.radius_voxel[1] - (per_axis ? 5.0 : all)) < 1e-6);
+        assert_true(fabs(m.radius_voxel[2] - all) < 1e-6);
+        for (int a = 0; a < 3; a++) {
+            assert_true(m.se_voxel[a] == 0.25);
+            m.radius_voxel[a] *= 2.0;
+        }
+        polylines_set_radii(&p, &m, single);
+        for (size_t l = 0; l < 3; l++) {
+            const double want = single ? 2.0 * (double)line[l].radius : m.radius_voxel[line[l].axis];
+            assert_true(fabs((double)p.radius[l] - want) < 1e-5);
+        }
+        polyline_set_release(&p);
+    }
+}
+
 /* Sums of correlated values scatter as the pieces show, and not as independent values would. */
 static void test_scatter_of_correlated_values(void **state)
 {
@@ -125,6 +164,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_scatter_of_correlated_values),
                                        cmocka_unit_test(test_best_score), cmocka_unit_test(test_score),
-                                       cmocka_unit_test(test_error_by_leaving_out_parts)};
+                                       cmocka_unit_test(test_error_by_leaving_out_parts),
+                                       cmocka_unit_test(test_radii_of_lines)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

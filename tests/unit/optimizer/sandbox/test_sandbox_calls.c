@@ -218,10 +218,10 @@ int main(void)
     bool done = false;
     parent = getpid();
     pid_t pid = fork();
-    if (pid == 0) _exit(sandbox_calls_of_worker(&done, NULL) == STATUS_OK && done ? 0 : 1);
+    if (pid == 0) _exit(sandbox_calls_of_worker(&done, NULL) != STATUS_OK ? 2 : done ? 0 : 1);
     int code = 0;
     waitpid(pid, &code, 0);
-    if (code != 0) {
+    if (WIFEXITED(code) && WEXITSTATUS(code) == 1) {
         print_message("the kernel has no seccomp\n");
         return 0;
     }

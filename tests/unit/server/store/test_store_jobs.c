@@ -277,6 +277,46 @@ static void test_many(void **state)
     expect(store, &QUERY(.limit = 17), 17, want);
 }
 
+/* The queue of each owner: by priority, then by time, and when the owner had a start last. */
+static void test_the_queue(void **state)
+{
+    static const struct {
+        const char *owner;
+        enum job_state state;
+        int64_t priority;
+        double queued;
+    } job[] = {{"ann", JOB_QUEUED, 1, 10}, {"ann", JOB_QUEUED, 5, 30}, {"ann", JOB_QUEUED, 5, 20},
+               {"bob", JOB_QUEUED, 0, 5},  {"bob", JOB_RUNNING, 9, 1}, {"cid", JOB_DRAFT, 9, 1}};
+    static const int want[] = {3, 2, 1, 4};
+    double started_unix_s = 0;
+    struct store *store = ((struct store_fixture *)*state)->store;
+    for (int i = 0; i < 6; i++) {
+        struct job_row row = add(store, i + 1, "x", job[i].owner, 1);
+        row.state = job[i].state;
+        row.priority = job[i].priority;
+        row.queued_unix_s = job[i].queued;
+        assert_int_equal(store_job_update(store, &row, NULL), STATUS_OK);
+        if (job[i].state == JOB_RUNNING) started_unix_s = row.updated_unix_s;
+    }
+    for (size_t n_each = 1; n_each <= 3; n_each += 2) {
+        struct queued_job *q = NULL;
+        size_t n = 0;
+        char id[STORE_ID_BYTES];
+        assert_int_equal(store_job_queue(store, n_each, &q, &n, NULL), STATUS_OK);
+        assert_int_equal(n, n_each == 1 ? 2 : 4);
+        for (size_t i = 0; i < n; i++) {
+            const int k = n_each == 1 && i == 1 ? 4 : want[i];
+            make_id(k, id);
+            assert_string_equal(q[i].id, id);
+            assert_string_equal(q[i].owner, job[k - 1].owner);
+            assert_true(q[i].batch[0] == '\0' && q[i].priority == job[k - 1].priority);
+            assert_true(q[i].queued_unix_s == job[k - 1].queued);
+            assert_true(q[i].last_start_unix_s == (k == 4 ? started_unix_s : 0));
+        }
+        free(q);
+    }
+}
+
 static void read_verdict(void *context, const char *id, char code[40])
 {
     (*(int *)context)++;
@@ -339,6 +379,7 @@ static int run(const char *database)
         cmocka_unit_test_setup_teardown(test_selections, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_orders_and_pages, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_many, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_the_queue, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_verdicts_are_filled_in, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_tags_are_counted, set_up, tear_down),
     };
