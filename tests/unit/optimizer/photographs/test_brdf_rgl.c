@@ -113,6 +113,30 @@ static void test_spectra(void **state)
     assert_non_null(strstr(err.text, "'a.bsdf': its wavelengths give no color"));
 }
 
+/* Between and beyond few wavelengths a spectrum is what the same spectrum is at each nanometre. */
+static void test_few_wavelengths(void **state)
+{
+    (void)state;
+    enum { FEW = 15, FINE = 421 };
+    double few[FEW], v[FEW], weight[FEW][3], rgb[3] = {0}, fine[FINE], fine_rgb[3] = {0};
+    static double fine_weight[FINE][3];
+    for (size_t i = 0; i < FEW; i++) {
+        few[i] = 410.0 + 20.0 * (double)i;
+        v[i] = 0.2 + 0.1 * (double)(i * i % 7);
+    }
+    for (size_t i = 0; i < FINE; i++) fine[i] = 360.0 + (double)i;
+    assert_true(brdf_spectrum_weights(few, FEW, weight) && brdf_spectrum_weights(fine, FINE, fine_weight));
+    for (size_t c = 0; c < 3; c++) {
+        for (size_t i = 0; i < FEW; i++) rgb[c] += weight[i][c] * v[i];
+        for (size_t i = 0; i < FINE; i++) {
+            const double at = fmin(fmax((fine[i] - few[0]) / 20.0, 0.0), FEW - 1.0);
+            const size_t k = (size_t)fmin(at, FEW - 2.0);
+            fine_rgb[c] += fine_weight[i][c] * (v[k] + (at - (double)k) * (v[k + 1] - v[k]));
+        }
+        if (fabs(rgb[c] - fine_rgb[c]) > 1e-9) fail_msg("channel %zu: %.9g, not %.9g", c, rgb[c], fine_rgb[c]);
+    }
+}
+
 static void test_not_measured(void **state)
 {
     struct rgl_bytes b = {.n_phi = 1, .some_not_measured = true};
@@ -151,6 +175,15 @@ static void test_refused(void **state)
     b.without_sigma = true;
     rgl_bytes_make(&b);
     refused(state, &b, JOB_SYMMETRY_FILE, "it lacks sigma");
+    static const float bad[] = {-0.001f, NAN, 2e9f, INFINITY}, half = 0.5f;
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) { /* in place of a value of sigma, and of the last value */
+        b.without_sigma = false;
+        rgl_bytes_make(&b);
+        size_t at = 0;
+        while (memcmp(b.bytes + at, &half, 4) != 0 || memcmp(b.bytes + at + 4, &half, 4) != 0) at++;
+        memcpy(b.bytes + at + 4, &bad[i], 4);
+        refused(state, &b, JOB_SYMMETRY_FILE, "its sigma, ndf or vndf have values below 0");
+    }
     struct rgl_bytes third = {.n_phi = 5, .turn_rad = 2.0 * M_PI / 3.0};
     rgl_bytes_make(&third);
     refused(state, &third, JOB_SYMMETRY_FILE, "neither a whole, a half nor a quarter");
@@ -160,8 +193,8 @@ static void test_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_isotropic),    cmocka_unit_test(test_symmetries), cmocka_unit_test(test_spectra),
-        cmocka_unit_test(test_not_measured), cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_isotropic),       cmocka_unit_test(test_symmetries),   cmocka_unit_test(test_spectra),
+        cmocka_unit_test(test_few_wavelengths), cmocka_unit_test(test_not_measured), cmocka_unit_test(test_refused),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }

@@ -1,4 +1,4 @@
-/* Files of tensors, as RGL's measured reflectances are, byte by byte: what they hold, and each fault of their headers. */
+/* Files of tensors, as RGL's measured reflectances are, byte by byte: their fields, and each fault of their headers. */
 #include "optimizer/fit/photographs/table/tensor_file.h"
 #include "tests/support/scratch_folder.h"
 
