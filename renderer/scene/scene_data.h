@@ -2,6 +2,7 @@
 #ifndef SELVEDGE_RENDERER_SCENE_DATA_H
 #define SELVEDGE_RENDERER_SCENE_DATA_H
 
+#include "renderer/scene/scene_faces.h"
 #include "renderer/scene/scene_ray.h"
 
 #include <embree3/rtcore.h>
@@ -14,6 +15,7 @@ enum { SCENE_MAX_HALF_BLOCK = 12 };
 
 struct bent_cloth;
 struct scene_ellipse;
+struct scene_ends;
 
 struct scene_vertex {
     float x, y, z, radius; /* Embree's FLOAT4 */
@@ -32,6 +34,7 @@ struct scene {
         *long_axis)[3]; /* of each vertex: that of its section, a unit vector; NULL: sections are taken to be round */
     float *ratio;       /* of each vertex: long over short axis; NULL: surfaces are round tubes */
     struct scene_ellipse *ellipse; /* of each segment, where there are ratios (scene_ellipse.h) */
+    struct scene_ends *ends;       /* scene_ends.h */
     size_t n_group;
     double tile_mm[2];
     int half_block[2];                       /* the block has 2 h + 1 tiles a side, the centre one at [0, tile) */
@@ -48,27 +51,24 @@ status scene_build(struct scene *s, struct error *err);
 /* The short axis of the section of a segment whose unit tangent is given, unit and across it. False: its long axis runs
  * along the segment. */
 bool scene_short_axis(const struct scene *s, size_t i_segment, const float tangent[3], float axis[3]);
-/* The nearest front face of the flat cloth over `span` of a ray, whose direction may have any length; *distance and
+/* The nearest hit of the flat cloth over `span` of a ray, whose direction may have any length; *distance and
  * span are in units of it. The ray is moved by whole tiles. */
 bool scene_trace_span(const struct scene *scene, struct scene_ray *ray, float span, struct scene_hit *hit,
                       float *distance);
-/* What scene_visit_ahead hands on to the filter of occlusion rays. Its first member is what Embree knows of it. */
+/* What scene_visit_ahead hands on to Embree's filter of the faces of fibers. */
 struct scene_visitor {
-    struct RTCIntersectContext embree;
-    const struct scene *flat;
-    scene_visit *visit; /* NULL: the first front face ends the ray */
+    struct scene_faces faces;
+    scene_visit *visit;
     void *context;
     float direction[3];      /* unit, of the ray where it is seen */
     const float *to_seen[3]; /* rows of the map of flat tangents to seen ones; [0] NULL: they are the same */
     bool stopped;
 };
 
-/* visitor NULL: whether any front face lies ahead. Otherwise each one is visited; true: the visitor has asked to
+/* visitor NULL: whether any hit lies ahead. Otherwise each one is visited; true: the visitor has asked to
  * stop. */
 bool scene_occluded_span(const struct scene *scene, const struct scene_ray *ray, float span,
                          struct scene_visitor *visitor);
-/* The fibers' filter of occlusion rays, whose context is a scene_visitor. */
-void scene_occlusion_filter(const struct RTCFilterFunctionNArguments *a);
 void scene_visitor_init(struct scene_visitor *v, const struct scene *flat, const float direction[3], scene_visit *visit,
                         void *context);
 

@@ -1,5 +1,7 @@
 #include "renderer/scene/scene_ellipse.h"
 
+#include "renderer/scene/scene_ends.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -55,17 +57,31 @@ static void fill_cylinder(const struct scene *s, size_t i, struct scene_ellipse 
     e->sharpest_mm = minor * minor / major;
 }
 
-/* The plane between a segment and its neighbour along u, which may be NULL. */
-static void fill_end(const struct scene_ellipse *e, const struct scene_ellipse *next, float normal[3], float *beyond)
+/* The plane between a segment and its neighbour, whose direction is next; NULL: there is none. */
+static void fill_end(const struct scene_ellipse *e, const float next[3], float normal[3], float *beyond)
 {
     float n[3] = {0, 0, 0}, across = 0;
-    for (int a = 0; a < 3 && next != NULL; a++) n[a] = e->u[a] + next->u[a];
+    for (int a = 0; a < 3 && next != NULL; a++) n[a] = e->u[a] + next[a];
     if (!(dot(n, n) > 4 * LEAST_MITER * LEAST_MITER)) memcpy(n, e->u, sizeof n);
     normalise(n);
     const float cosine = dot(n, e->u);
     for (int a = 0; a < 3; a++) across += e->reach[a] * e->reach[a];
     memcpy(normal, n, sizeof n);
     *beyond = sqrtf(across) * (sqrtf(fmaxf(1 - cosine * cosine, 0)) / cosine + OVERLAP);
+}
+
+/* The direction in which the fiber runs before or after a segment, in the sense of that segment. */
+static bool direction_beside(const struct scene *s, size_t i, bool after, float u[3])
+{
+    if ((s->segment_flag[i] & (after ? RTC_CURVE_FLAG_NEIGHBOR_RIGHT : RTC_CURVE_FLAG_NEIGHBOR_LEFT)) != 0) {
+        memcpy(u, s->ellipse[after ? i + 1 : i - 1].u, sizeof s->ellipse->u);
+        return true;
+    }
+    const struct scene_link *l = scene_ends_find(s->ends, (uint32_t)i, after);
+    if (l == NULL) return false;
+    const float sign = after == l->other_after ? -1.0f : 1.0f;
+    for (int a = 0; a < 3; a++) u[a] = sign * s->ellipse[l->i_other].u[a];
+    return true;
 }
 
 status scene_ellipse_fill(struct scene *s, struct error *err)
@@ -76,10 +92,11 @@ status scene_ellipse_fill(struct scene *s, struct error *err)
     for (size_t i = 0; i < s->n_segment; i++) fill_cylinder(s, i, &s->ellipse[i]);
     for (size_t i = 0; i < s->n_segment; i++) {
         struct scene_ellipse *e = &s->ellipse[i];
-        const bool left = i > 0 && (s->segment_flag[i] & RTC_CURVE_FLAG_NEIGHBOR_LEFT) != 0,
-                   right = i + 1 < s->n_segment && (s->segment_flag[i] & RTC_CURVE_FLAG_NEIGHBOR_RIGHT) != 0;
-        fill_end(e, left ? e - 1 : NULL, e->begin, &e->beyond[0]);
-        fill_end(e, right ? e + 1 : NULL, e->end, &e->beyond[1]);
+        float before[3], after[3];
+        e->joined[0] = direction_beside(s, i, false, before);
+        e->joined[1] = direction_beside(s, i, true, after);
+        fill_end(e, e->joined[0] ? before : NULL, e->begin, &e->beyond[0]);
+        fill_end(e, e->joined[1] ? after : NULL, e->end, &e->beyond[1]);
     }
     return STATUS_OK;
 }
@@ -102,29 +119,73 @@ static void bounds(const struct RTCBoundsFunctionArguments *a)
                                       .upper_z = high[2]};
 }
 
-/* Where a ray comes into a segment. The discriminant is that of the distance from the axis, which keeps its digits for
- * rays that start many radii away. */
-static bool enter(const struct scene_ellipse *e, const struct RTCRay *ray, float *distance, float *along,
-                  float normal[3])
+/* Cuts off what lies outside of a plane through p with an outward normal. False: nothing is left. */
+static bool cut(struct scene_ellipse_span *span, const float normal[3], float sign, float outside, bool joint,
+                const float d[3])
 {
-    const float o[3] = {ray->org_x - e->p[0], ray->org_y - e->p[1], ray->org_z - e->p[2]},
-                d[3] = {ray->dir_x, ray->dir_y, ray->dir_z};
+    const float rate = sign * dot(normal, d), t = -outside / rate;
+    if (rate == 0) return outside <= 0;
+    if (rate < 0 && t > span->begin) {
+        span->begin = t;
+        span->joint_begin = joint;
+        for (int a = 0; a < 3; a++) span->normal_begin[a] = sign * normal[a];
+    } else if (rate > 0 && t < span->end) {
+        span->end = t;
+        span->joint_end = joint;
+        for (int a = 0; a < 3; a++) span->normal_end[a] = sign * normal[a];
+    }
+    return span->begin < span->end;
+}
+
+/* The discriminant is that of the distance from the axis, which keeps its digits for rays that start many radii
+ * away. */
+bool scene_ellipse_span(const struct scene_ellipse *e, const float from[3], const float d[3],
+                        struct scene_ellipse_span *span)
+{
+    const float o[3] = {from[0] - e->p[0], from[1] - e->p[1], from[2] - e->p[2]};
     const float ov = dot(e->v, o), ow = dot(e->w, o), dv = dot(e->v, d), dw = dot(e->w, d);
     const float square = dv * dv + dw * dw, off = ov * dw - ow * dv, root2 = square - off * off;
     if (!(root2 > 0)) return false;
-    const float t = -(ov * dv + ow * dw + sqrtf(root2)) / square, slack = OVERLAP * e->sharpest_mm;
-    if (!(t > ray->tnear && t < ray->tfar)) return false;
-    float x[3], from_end[3];
+    const float root = sqrtf(root2), middle = -(ov * dv + ow * dw), slack = OVERLAP * e->sharpest_mm;
+    span->begin = (middle - root) / square;
+    span->end = (middle + root) / square;
+    span->joint_begin = span->joint_end = false;
+    float from_end[3];
     for (int a = 0; a < 3; a++) {
-        x[a] = o[a] + t * d[a];
-        from_end[a] = x[a] - e->length * e->u[a];
+        const float v = e->v[a], w = e->w[a];
+        span->normal_begin[a] = (ov + span->begin * dv) * v + (ow + span->begin * dw) * w;
+        span->normal_end[a] = (ov + span->end * dv) * v + (ow + span->end * dw) * w;
+        from_end[a] = o[a] - e->length * e->u[a];
     }
-    if (dot(e->begin, x) < -slack || dot(e->end, from_end) > slack) return false;
-    const float nv = ov + t * dv, nw = ow + t * dw;
-    for (int a = 0; a < 3; a++) normal[a] = nv * e->v[a] + nw * e->w[a];
-    *distance = t;
-    *along = fminf(fmaxf(dot(e->u, x) / e->length, 0), 1);
-    return true;
+    return cut(span, e->begin, -1, -dot(e->begin, o) - slack, e->joined[0], d) &&
+           cut(span, e->end, 1, dot(e->end, from_end) - slack, e->joined[1], d);
+}
+
+/* Tells Embree of the nearest face of a segment that a ray meets, where it comes in or where it comes out, unless the
+ * filter refuses it. Planes between segments of one fiber are no faces for rays that have a filter (scene_faces.h). */
+static bool meet(const struct scene_ellipse *e, struct RTCRay *ray, struct RTCHit *hit,
+                 struct RTCFilterFunctionNArguments *filter)
+{
+    const float o[3] = {ray->org_x, ray->org_y, ray->org_z}, d[3] = {ray->dir_x, ray->dir_y, ray->dir_z};
+    struct scene_ellipse_span span;
+    if (!scene_ellipse_span(e, o, d, &span)) return false;
+    for (int out = 0; out < 2; out++) {
+        const float t = out ? span.end : span.begin, *n = out ? span.normal_end : span.normal_begin, far = ray->tfar;
+        const bool joint = out ? span.joint_end : span.joint_begin;
+        if (!(t > ray->tnear && t < far) || (joint && filter->context->filter != NULL)) continue;
+        float along = 0;
+        for (int a = 0; a < 3; a++) along += e->u[a] * (o[a] - e->p[a] + t * d[a]);
+        hit->Ng_x = n[0];
+        hit->Ng_y = n[1];
+        hit->Ng_z = n[2];
+        hit->u = fminf(fmaxf(along / e->length, 0), 1);
+        ray->tfar = t;
+        filter->valid[0] = -1;
+        if (filter->context->filter != NULL) filter->context->filter(filter);
+        if (filter->valid[0] != 0) return true;
+        ray->tfar = far;
+    }
+    return false;
 }
 
 /* Rays come one by one: N is 1. */
@@ -132,34 +193,22 @@ static void intersect(const struct RTCIntersectFunctionNArguments *a)
 {
     const struct scene *s = a->geometryUserPtr;
     struct RTCRayHit *q = (struct RTCRayHit *)(void *)a->rayhit;
-    float t, along, normal[3];
-    if (a->valid[0] == 0 || !enter(&s->ellipse[a->primID], &q->ray, &t, &along, normal)) return;
-    q->ray.tfar = t;
-    q->hit = (struct RTCHit){.Ng_x = normal[0],
-                             .Ng_y = normal[1],
-                             .Ng_z = normal[2],
-                             .u = along,
-                             .primID = a->primID,
-                             .geomID = a->geomID,
-                             .instID = {a->context->instID[0]}};
+    struct RTCHit hit = {.primID = a->primID, .geomID = a->geomID, .instID = {a->context->instID[0]}};
+    int valid = -1;
+    struct RTCFilterFunctionNArguments filter = {
+        .valid = &valid, .context = a->context, .ray = (void *)&q->ray, .hit = (void *)&hit, .N = 1};
+    if (a->valid[0] != 0 && meet(&s->ellipse[a->primID], &q->ray, &hit, &filter)) q->hit = hit;
 }
 
 static void occlude(const struct RTCOccludedFunctionNArguments *a)
 {
     const struct scene *s = a->geometryUserPtr;
     struct RTCRay *ray = (struct RTCRay *)(void *)a->ray;
-    float t, along, normal[3];
+    struct RTCHit hit = {.primID = a->primID, .geomID = a->geomID, .instID = {a->context->instID[0]}};
     int valid = -1;
-    if (a->valid[0] == 0 || !enter(&s->ellipse[a->primID], ray, &t, &along, normal)) return;
-    struct RTCHit hit = {.Ng_x = normal[0], .Ng_y = normal[1], .Ng_z = normal[2], .u = along, .primID = a->primID};
-    const struct RTCFilterFunctionNArguments filter = {.valid = &valid,
-                                                       .geometryUserPtr = a->geometryUserPtr,
-                                                       .context = a->context,
-                                                       .ray = a->ray,
-                                                       .hit = (struct RTCHitN *)(void *)&hit,
-                                                       .N = 1};
-    scene_occlusion_filter(&filter);
-    if (valid != 0) ray->tfar = -INFINITY;
+    struct RTCFilterFunctionNArguments filter = {
+        .valid = &valid, .context = a->context, .ray = a->ray, .hit = (void *)&hit, .N = 1};
+    if (a->valid[0] != 0 && meet(&s->ellipse[a->primID], ray, &hit, &filter)) ray->tfar = -INFINITY;
 }
 
 RTCGeometry scene_ellipse_geometry(struct scene *s)

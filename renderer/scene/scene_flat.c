@@ -1,5 +1,5 @@
 /* Rays through the flat cloth: from block to block of its tiles. */
-#include "renderer/scene/scene_ellipse.h"
+#include "renderer/scene/scene_hit.h"
 
 #include <math.h>
 
@@ -53,28 +53,17 @@ static inline void fill_ray(struct RTCRay *q, const struct scene_ray *r, float t
     q->flags = 0;
 }
 
-static void fill_hit(const struct scene *s, const struct scene_ray *r, const struct RTCRayHit *q, struct scene_hit *hit)
+/* Whether the nearest face is met from inside: rounding has put the start of the ray into a fiber. */
+static bool comes_out(const struct RTCRayHit *q)
 {
-    for (int a = 0; a < 3; a++) hit->position_mm[a] = r->origin_mm[a] + q->ray.tfar * r->direction[a];
-    float n[3] = {q->hit.Ng_x, q->hit.Ng_y, q->hit.Ng_z};
-    float inv = 1 / sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    for (int a = 0; a < 3; a++) hit->normal[a] = n[a] * inv;
-    hit->i_segment = q->hit.primID;
-    const struct scene_vertex *v = &s->vertex[s->segment_vertex[hit->i_segment]];
-    float t[3] = {v[1].x - v[0].x, v[1].y - v[0].y, v[1].z - v[0].z};
-    inv = 1 / sqrtf(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
-    for (int a = 0; a < 3; a++) hit->tangent[a] = t[a] * inv;
-    hit->radius_mm = s->ellipse != NULL ? s->ellipse[hit->i_segment].sharpest_mm
-                                        : v[0].radius + q->hit.u * (v[1].radius - v[0].radius);
-    hit->i_cell = 0;
+    return q->ray.dir_x * q->hit.Ng_x + q->ray.dir_y * q->hit.Ng_y + q->ray.dir_z * q->hit.Ng_z > 0;
 }
 
-/* The nearest front face over *span of the ray; *span is what is left of it from the ray's final origin, from which q
- * has its distance. */
-static bool trace_span(const struct scene *s, struct scene_ray *r, float *span, struct RTCRayHit *q)
+/* The nearest hit over *span of the ray; *span is what is left of it from the ray's final origin, from which q has its
+ * distance. */
+static bool trace_span(const struct scene *s, struct scene_ray *r, float *span, struct scene_faces *faces,
+                       struct RTCRayHit *q)
 {
-    struct RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
     for (int i = 0; i < SCENE_MAX_WRAP; i++) {
         bool leaves;
         wrap(s, r);
@@ -83,11 +72,16 @@ static bool trace_span(const struct scene *s, struct scene_ray *r, float *span, 
             t = *span;
             leaves = true;
         }
-        if (t > r->tnear_mm) {
+        while (t > r->tnear_mm) {
             fill_ray(&q->ray, r, t);
             q->hit.geomID = q->hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-            rtcIntersect1(s->block, &context, q);
-            if (q->hit.geomID != RTC_INVALID_GEOMETRY_ID) return true;
+            faces->n_back = 0;
+            rtcIntersect1(s->block, &faces->embree, q);
+            const float nearest = q->hit.geomID != RTC_INVALID_GEOMETRY_ID ? q->ray.tfar : t;
+            r->n_inside -= scene_faces_left(faces, nearest, r->n_inside);
+            if (q->hit.geomID == RTC_INVALID_GEOMETRY_ID) break;
+            if (!comes_out(q)) return true;
+            r->tnear_mm = nearest * (1 + 1e-6f) + 1e-6f;
         }
         if (leaves || !isfinite(t)) return false;
         advance(r, t);
@@ -99,24 +93,24 @@ static bool trace_span(const struct scene *s, struct scene_ray *r, float *span, 
 bool scene_trace_span(const struct scene *s, struct scene_ray *r, float span, struct scene_hit *hit, float *distance)
 {
     struct RTCRayHit q;
+    struct scene_faces faces;
     float left = span;
-    if (!trace_span(s, r, &left, &q)) return false;
-    fill_hit(s, r, &q, hit);
+    scene_faces_init(&faces, s, r);
+    if (!trace_span(s, r, &left, &faces, &q)) return false;
+    scene_hit_fill(s, r, &q, hit);
     *distance = span - left + q.ray.tfar;
     return true;
 }
 
-void scene_occlusion_filter(const struct RTCFilterFunctionNArguments *a)
+/* Embree's filter of rays that visit fibers. */
+static void visit_face(const struct RTCFilterFunctionNArguments *a)
 {
     struct scene_visitor *v = (struct scene_visitor *)(void *)a->context;
-    const struct RTCRay *ray = (const struct RTCRay *)a->ray; /* single rays: N is 1 */
-    const struct RTCHit *hit = (const struct RTCHit *)a->hit;
-    if (ray->dir_x * hit->Ng_x + ray->dir_y * hit->Ng_y + ray->dir_z * hit->Ng_z > 0) { /* a back face */
-        a->valid[0] = 0;
-        return;
-    }
-    if (v->visit == NULL) return;
-    const struct scene_vertex *p = &v->flat->vertex[v->flat->segment_vertex[hit->primID]];
+    const struct RTCHit *hit = (const struct RTCHit *)a->hit; /* single rays: N is 1 */
+    scene_faces_filter(a);
+    if (a->valid[0] == 0) return;
+    const struct scene *s = v->faces.flat;
+    const struct scene_vertex *p = &s->vertex[s->segment_vertex[hit->primID]];
     const float flat[3] = {p[1].x - p[0].x, p[1].y - p[0].y, p[1].z - p[0].z};
     float along = 0, length2 = 0;
     for (int i = 0; i < 3; i++) {
@@ -134,8 +128,8 @@ void scene_occlusion_filter(const struct RTCFilterFunctionNArguments *a)
 void scene_visitor_init(struct scene_visitor *v, const struct scene *flat, const float direction[3], scene_visit *visit,
                         void *context)
 {
-    rtcInitIntersectContext(&v->embree);
-    v->flat = flat;
+    scene_faces_init(&v->faces, flat, NULL);
+    v->faces.embree.filter = visit_face;
     v->visit = visit;
     v->context = context;
     for (int a = 0; a < 3; a++) {
@@ -148,9 +142,8 @@ void scene_visitor_init(struct scene_visitor *v, const struct scene *flat, const
 bool scene_occluded_span(const struct scene *s, const struct scene_ray *ray, float span, struct scene_visitor *visitor)
 {
     struct scene_ray r = *ray;
-    struct scene_visitor plain, *v = visitor != NULL ? visitor : &plain;
-    plain.visit = NULL;
-    rtcInitIntersectContext(&plain.embree);
+    struct scene_faces plain, *faces = visitor != NULL ? &visitor->faces : &plain;
+    if (visitor == NULL) scene_faces_init(&plain, s, &r);
     for (int i = 0; i < SCENE_MAX_WRAP; i++) {
         bool leaves;
         wrap(s, &r);
@@ -162,7 +155,7 @@ bool scene_occluded_span(const struct scene *s, const struct scene_ray *ray, flo
         if (t > r.tnear_mm) {
             struct RTCRay q;
             fill_ray(&q, &r, t);
-            rtcOccluded1(s->block, &v->embree, &q);
+            rtcOccluded1(s->block, &faces->embree, &q);
             if (q.tfar < 0) return true;
         }
         if (leaves || !isfinite(t)) return false;

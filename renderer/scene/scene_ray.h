@@ -2,8 +2,9 @@
  *
  * Frame: the cloth frame in millimetres, x and y as the fiber set has them, z shifted so that the highest fiber surface
  * is z = 0 (the plane of the orbit centre). A ray's origin is local: wrapped into the centre tile; local + offset is
- * where it really is. Front faces only: a hit from inside a fiber does not exist, since a scattering event already is
- * the way through the fiber. Threads: any number on one scene; flush-to-zero should be set (thread_pool does).
+ * where it really is. A hit is where a ray comes into a fiber. A scattering event stands for the whole way through its
+ * fiber: rays do not meet fibers that they start in (scene_faces.h). Threads: any number on one scene; flush-to-zero
+ * should be set (thread_pool does).
  */
 #ifndef SELVEDGE_RENDERER_SCENE_RAY_H
 #define SELVEDGE_RENDERER_SCENE_RAY_H
@@ -12,27 +13,32 @@
 
 #include <stdint.h>
 
+#define SCENE_NO_SEGMENT UINT32_MAX
+
 struct scene_ray {
     double offset_mm[2]; /* whole tiles */
     float origin_mm[3];  /* local */
     float direction[3];  /* unit */
     float tnear_mm;
-    uint32_t i_cell; /* of a bent cloth: where the origin lies (bent/bent_scene.h) */
+    uint32_t n_inside; /* fibers that the ray starts in, at most; 0: the next member counts for nothing */
+    uint32_t i_from;   /* the segment that the ray leaves, or SCENE_NO_SEGMENT */
+    uint32_t i_cell;   /* of a bent cloth: where the origin lies (bent/bent_scene.h) */
 };
 
 struct scene_hit {
-    float position_mm[3]; /* local to the ray's final offset */
+    float position_mm[3]; /* local to the ray's final offset, where the segment is where its vertices are */
     float normal[3];      /* unit, out of the fiber */
     float tangent[3];     /* unit, along the fiber */
     float radius_mm;      /* of an elliptical section: its least radius of curvature */
     uint32_t i_segment;   /* scene_fiber_of gives its fiber */
+    uint32_t n_inside;    /* other fibers that hold the place, at most: fibers overlap a little where they touch */
     uint32_t i_cell;      /* of a bent cloth */
 };
 
-/* Nearest front face. The ray is moved along by whole tiles (offset and origin change together). False: the ray leaves
+/* The nearest hit. The ray is moved along by whole tiles (offset and origin change together). False: the ray leaves
  * the cloth upwards or downwards, or, after SCENE_MAX_WRAP blocks within it, is taken to have left. */
 bool scene_trace(const struct scene *scene, struct scene_ray *ray, struct scene_hit *hit);
-/* Whether any front face lies ahead; the ray itself is not changed. */
+/* Whether any hit lies ahead; the ray itself is not changed. */
 bool scene_occluded(const struct scene *scene, const struct scene_ray *ray);
 
 /* A fiber that a ray goes through: its segment, and the sine of the angle between the ray and the plane across the
@@ -42,7 +48,7 @@ typedef bool scene_visit(void *context, uint32_t i_segment, float sin_theta);
  * False: the ray ends on the black sheet of a bent cloth, or visit has asked to stop. */
 bool scene_visit_ahead(const struct scene *scene, const struct scene_ray *ray, scene_visit *visit, void *context);
 
-/* Ray leaving a hit point: starts behind the fiber's far side when it points into the fiber. */
+/* Ray leaving a hit point, through the fiber when it points into it. */
 void scene_ray_leave(const struct scene_hit *hit, const double offset_mm[2], const float direction[3],
                      struct scene_ray *ray);
 /* Ray leaving the fiber of a hit from a place of its width as seen against direction: place in [0, 1) goes from one

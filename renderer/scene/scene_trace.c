@@ -22,20 +22,24 @@ bool scene_visit_ahead(const struct scene *s, const struct scene_ray *ray, scene
     return s->bent != NULL ? !bent_occluded(s, ray, &v) : !scene_occluded_span(s, ray, INFINITY, &v);
 }
 
+/* How far rays start from the surface that they leave: more than places are rounded by. */
+static inline float skin_mm(const struct scene_hit *hit)
+{
+    const float *p = hit->position_mm;
+    return 3e-5f * hit->radius_mm + 1.2e-7f * (fabsf(p[0]) + fabsf(p[1]) + fabsf(p[2]));
+}
+
 void scene_ray_leave(const struct scene_hit *hit, const double offset_mm[2], const float direction[3],
                      struct scene_ray *r)
 {
-    const float *n = hit->normal, *d = hit->tangent, *w = direction;
-    float cos_n = n[0] * w[0] + n[1] * w[1] + n[2] * w[2], along = d[0] * w[0] + d[1] * w[1] + d[2] * w[2];
-    float tnear = 0;
-    if (cos_n < 0) { /* chord of the cylinder; capped, as fibers bend */
-        float sin2 = 1 - along * along;
-        tnear = (-2 * cos_n < 4 * sin2 ? -2 * cos_n / sin2 : 4) * hit->radius_mm;
-    }
+    const float *n = hit->normal, *w = direction, skin = skin_mm(hit);
+    const bool inwards = n[0] * w[0] + n[1] * w[1] + n[2] * w[2] < 0;
+    for (int a = 0; a < 3; a++) r->origin_mm[a] = hit->position_mm[a] + (inwards ? -skin : skin) * n[a];
     memcpy(r->offset_mm, offset_mm, sizeof r->offset_mm);
-    memcpy(r->origin_mm, hit->position_mm, sizeof r->origin_mm);
     memcpy(r->direction, direction, sizeof r->direction);
-    r->tnear_mm = tnear + 1e-3f * hit->radius_mm;
+    r->tnear_mm = 0;
+    r->n_inside = hit->n_inside + inwards;
+    r->i_from = inwards ? hit->i_segment : SCENE_NO_SEGMENT;
     r->i_cell = hit->i_cell;
 }
 
@@ -48,17 +52,20 @@ void scene_ray_leave_across(const struct scene_hit *hit, const double offset_mm[
         front[a] = direction[a] - along * t[a];
         norm2 += front[a] * front[a];
     }
+    const float skin = skin_mm(hit);
     float inv = norm2 > 0 ? 1 / sqrtf(norm2) : 0, across = 2 * place - 1, towards = sqrtf(1 - across * across);
     for (int a = 0; a < 3; a++) front[a] *= inv;
     const float side[3] = {t[1] * front[2] - t[2] * front[1], t[2] * front[0] - t[0] * front[2],
                            t[0] * front[1] - t[1] * front[0]};
     for (int a = 0; a < 3; a++) {
         float from_axis = across * side[a] + towards * front[a];
-        r->origin_mm[a] = hit->position_mm[a] + hit->radius_mm * (from_axis - hit->normal[a]);
+        r->origin_mm[a] = hit->position_mm[a] + hit->radius_mm * (from_axis - hit->normal[a]) + skin * from_axis;
     }
     memcpy(r->offset_mm, offset_mm, sizeof r->offset_mm);
     memcpy(r->direction, direction, sizeof r->direction);
-    r->tnear_mm = 1e-3f * hit->radius_mm;
+    r->tnear_mm = 0;
+    r->i_from = SCENE_NO_SEGMENT;
+    r->n_inside = hit->n_inside + 1; /* a fiber that bends or is overlapped may hold the place */
     r->i_cell = hit->i_cell;
 }
 
@@ -83,6 +90,8 @@ bool scene_ray_enter(const struct scene *s, const double origin_mm[3], const dou
         r->direction[a] = (float)direction[a];
     }
     r->tnear_mm = 0;
+    r->n_inside = 0;
+    r->i_from = SCENE_NO_SEGMENT;
     r->i_cell = 0;
     return true;
 }

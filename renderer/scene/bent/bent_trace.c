@@ -11,10 +11,11 @@ struct walk_on_shell {
     const struct bent_cloth *b;
     struct shell_walk on;
     struct scene_visitor *visitor; /* or NULL */
+    uint32_t n_inside, i_from;     /* as in scene_ray */
 };
 
 /* The ray in the flat cloth, from where it is now. */
-static void to_flat(const struct walk_on_shell *w, double tnear, struct scene_ray *r)
+static void to_flat(const struct walk_on_shell *w, struct scene_ray *r)
 {
     double p[3], d[3];
     shell_walk_flat(&w->on, p, d);
@@ -26,7 +27,9 @@ static void to_flat(const struct walk_on_shell *w, double tnear, struct scene_ra
         r->origin_mm[a] = (float)p[a];
         r->direction[a] = (float)d[a];
     }
-    r->tnear_mm = (float)tnear;
+    r->tnear_mm = 0;
+    r->n_inside = w->n_inside;
+    r->i_from = w->i_from;
 }
 
 /* A hit in the flat cloth as it is seen. Normals go through the inverse transpose, so that they stay at a right angle
@@ -54,7 +57,7 @@ static void hit_here(const struct walk_on_shell *w, double t, struct scene_hit *
     hit->i_cell = w->on.i_cell;
 }
 
-/* Whether any front face lies in this cell, or with a visitor, whether it has asked to stop there. */
+/* Whether any hit lies in this cell, or with a visitor, whether it has asked to stop there. */
 static bool occluded_here(struct walk_on_shell *w, const struct scene_ray *r, double span)
 {
     const struct shell_cell *c = &w->b->space.shell.cell[w->on.i_cell];
@@ -62,7 +65,7 @@ static bool occluded_here(struct walk_on_shell *w, const struct scene_ray *r, do
     return scene_occluded_span(&w->b->flat, r, (float)span, w->visitor);
 }
 
-/* hit NULL: any front face, which it need not describe. */
+/* hit NULL: any hit, which it need not describe. */
 static bool walk(struct walk_on_shell *w, double tnear, struct scene_hit *hit)
 {
     struct shell_walk *on = &w->on;
@@ -78,13 +81,14 @@ static bool walk(struct walk_on_shell *w, double tnear, struct scene_hit *hit)
         double t = shell_walk_exit(on, &face), span = t - on->t + SHELL_OVERLAP_MM;
         struct scene_ray r;
         float distance;
-        to_flat(w, 0.0, &r);
+        to_flat(w, &r);
         if (hit == NULL) {
             if (occluded_here(w, &r, span)) return true;
         } else if (scene_trace_span(&w->b->flat, &r, (float)span, hit, &distance)) {
             hit_here(w, on->t + (double)distance, hit);
             return true;
         }
+        w->n_inside = r.n_inside;
         shell_walk_on(on, t, face);
     }
     return false;
@@ -95,6 +99,8 @@ static void start_walk(const struct scene *s, const struct scene_ray *ray, struc
     *w = (struct walk_on_shell){
         .s = s,
         .b = s->bent,
+        .n_inside = ray->n_inside,
+        .i_from = ray->i_from,
         .on = {.space = &s->bent->space, .black_sheet = s->black_sheet, .i_cell = ray->i_cell, .from_face = -1}};
     for (int a = 0; a < 3; a++) {
         w->on.origin[a] = (double)ray->origin_mm[a] + (a < 2 ? ray->offset_mm[a] : 0.0);
@@ -116,7 +122,7 @@ bool bent_occluded(const struct scene *s, const struct scene_ray *ray, struct sc
     struct walk_on_shell w;
     start_walk(s, ray, &w);
     w.visitor = visitor;
-    if (visitor != NULL) visitor->flat = &s->bent->flat;
+    if (visitor != NULL) visitor->faces.flat = &s->bent->flat;
     return walk(&w, (double)ray->tnear_mm, NULL) || w.on.i_cell == SHELL_ON_SHEET;
 }
 
@@ -138,6 +144,8 @@ bool bent_enter(const struct scene *s, const double origin_mm[3], const double d
     }
     r->offset_mm[0] = r->offset_mm[1] = 0.0;
     r->tnear_mm = 0;
+    r->n_inside = 0;
+    r->i_from = SCENE_NO_SEGMENT;
     r->i_cell = SHELL_OUTSIDE;
     return true;
 }

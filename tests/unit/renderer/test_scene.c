@@ -41,7 +41,7 @@ static void hits_are_where_they_should_be(void **state)
     (void)state;
     struct scene *s = straight_scene(true);
     struct scene_hit h;
-    assert_int_equal(scene_n_segment(s), 2);
+    assert_int_equal(scene_n_segment(s), 6); /* each fiber is longer than 20 radii */
     assert_true(fabs(scene_thickness_mm(s) - 0.14) < 1e-6);
     assert_true(scene_memory_bytes(s) > 1000);
     /* straight down on the top of the first fiber, which is at z = 0, seven tiles away */
@@ -99,17 +99,21 @@ static void back_faces_do_not_exist(void **state)
     struct scene *s = straight_scene(false);
     struct scene_hit h;
     struct scene_ray inside = ray_to(0.2, 0.1, -0.02, 0, 0.1, 1);
+    inside.n_inside = 1;
     assert_false(scene_occluded(s, &inside));
     assert_false(scene_trace(s, &inside, &h));
+    assert_int_equal(inside.n_inside, 0); /* it has left the fiber */
     inside = ray_to(0.2, 0.1, -0.02, 0, 0.2, -0.1);
+    inside.n_inside = 1;
     assert_true(scene_occluded(s, &inside)); /* the next fiber ahead, not this one */
     assert_true(scene_trace(s, &inside, &h));
     assert_int_equal(scene_fiber_of(s, h.i_segment), 1);
-    /* a ray that continues from a hit into the fiber starts after the hit */
+    assert_int_equal(h.n_inside, 0);
+    /* a ray that continues from a hit into the fiber does not meet it */
     struct scene_ray down = ray_to(0.2, 0.1, 0.001, 0, 0, -1), through;
     assert_true(scene_trace(s, &down, &h));
     scene_ray_leave(&h, down.offset_mm, (const float[3]){0, 0, -1}, &through);
-    assert_true(fabsf(through.tnear_mm - 0.04002f) < 1e-5f);
+    assert_int_equal(through.n_inside, 1);
     assert_false(scene_occluded(s, &through));
     scene_free(s);
 }
@@ -230,7 +234,8 @@ static void thin_fibers_are_as_wide_as_thick_ones(void **state)
             if (!scene_trace(s, &ray, &h)) continue;
             n_hit++;
             scene_ray_leave(&h, ray.offset_mm, h.normal, &out);
-            assert_false(scene_occluded(s, &out));
+            /* a level ray may meet the fiber's copy in the next tile */
+            if (h.normal[2] > 0.05f) assert_false(scene_occluded(s, &out));
         }
         double se = 0.5 / sqrt(N);
         if (fabs((double)n_hit / N - 0.5) > 4 * se)
@@ -281,7 +286,7 @@ static void segments_of_enormous_length_are_refused(void **state)
                              STATUS_OK);
             f.tile_size_m[0] = f.tile_size_m[1] = 1e-3;
             assert_int_equal(scene_new(&f, &(struct scene_option){true}, &s, &err), want[k]);
-            assert_non_null(strstr(err.text, k == 0 ? "too far beyond the tile" : "1.845e+19 vertices"));
+            assert_non_null(strstr(err.text, k == 0 ? "too far beyond the tile" : "3.689e+20 vertices"));
             if (kind == 0) assert_int_equal(fiber_set_write_hair(&f, hair, &err), STATUS_OK);
         }
         fiber_set_release(&f);

@@ -47,7 +47,7 @@ static void make_cloth(struct cloth *c, const double *param)
                                               .no_visibility = true,
                                               .deep_traced = TRACED,
                                               .deep_edge = param != NULL ? 10 : 6,
-                                              .deep_paths = param != NULL ? 150000 : FURNACE_PATHS};
+                                              .deep_paths = param != NULL ? 500000 : FURNACE_PATHS};
     if (fast_precompute(&q, NULL, NULL, &c->tables, &err) != STATUS_OK) fail_msg("%s", err.text);
 }
 
