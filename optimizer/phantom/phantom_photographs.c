@@ -170,7 +170,7 @@ static struct configuration view_configuration(const struct phantom_photograph_o
         .setup.camera_far_field = o->camera_far_field,
         .setup.camera_blur_mm = o->camera_blur_mm,
         .setup.environment_rgb = {o->environment_rgb[0], o->environment_rgb[1], o->environment_rgb[2]}};
-    return observation_configuration(&set_up, v->light_theta_deg, v->light_phi_deg, v->camera_theta_deg,
+    return observation_configuration(&set_up.setup, v->light_theta_deg, v->light_phi_deg, v->camera_theta_deg,
                                      v->camera_phi_deg, v->cloth_rotation_deg);
 }
 

@@ -26,9 +26,9 @@ static status check_radii(const struct fiber_set *f, const char *name, struct er
     return STATUS_OK;
 }
 
-status fiber_file_read(const char *path, const struct job_document *doc, struct fiber_set *f, struct error *err)
+status fiber_file_read(const char *path, const struct job_cloth *cloth, struct fiber_set *f, struct error *err)
 {
-    const char *name = doc->cloth.fiber_file, *dot = strrchr(name, '.');
+    const char *name = cloth->fiber_file, *dot = strrchr(name, '.');
     bool text = dot != NULL && strcmp(dot, ".txt") == 0;
     status s = text ? fiber_set_read_text(f, path, err) : fiber_set_read_hair(f, path, err);
     if (s != STATUS_OK) {
@@ -36,7 +36,7 @@ status fiber_file_read(const char *path, const struct job_document *doc, struct 
         return s;
     }
     for (int a = 0; a < 2; a++)
-        if (!isnan(doc->cloth.tile_mm[a])) f->tile_size_m[a] = doc->cloth.tile_mm[a] * mm;
+        if (!isnan(cloth->tile_mm[a])) f->tile_size_m[a] = cloth->tile_mm[a] * mm;
     if (!(f->tile_size_m[0] > 0.0 && f->tile_size_m[1] > 0.0))
         return error_set_field(err, STATUS_INVALID, OPTION_TILE,
                                "'%s' is missing: the file '%s' does not say with which period the cloth repeats",
@@ -57,7 +57,7 @@ void fiber_file_warn_diameter(double diameter_m, const char *option, const struc
                  d_um, FIBER_LEAST_DIAMETER_UM, FIBER_MOST_DIAMETER_UM);
 }
 
-void fiber_file_warn(const struct fiber_set *f, const struct job_document *doc, const struct warning_sink *warn)
+void fiber_file_warn(const struct fiber_set *f, const struct job_cloth *cloth, const struct warning_sink *warn)
 {
     double sum = 0.0;
     for (size_t i = 0; i < f->n_fiber; i++) sum += 2.0 * (double)f->radius_m[i] / (double)f->n_fiber;
@@ -70,7 +70,7 @@ void fiber_file_warn(const struct fiber_set *f, const struct job_document *doc, 
         }
         double filled = (highest - lowest) / f->tile_size_m[a];
         if (filled >= least_filled && filled <= most_filled) continue;
-        warning_send(warn, isnan(doc->cloth.tile_mm[a]) ? OPTION_FIBER_FILE : OPTION_TILE,
+        warning_send(warn, isnan(cloth->tile_mm[a]) ? OPTION_FIBER_FILE : OPTION_TILE,
                      "the tile is %.4g mm along %c, the fibers extend over %.4g mm: one of both may be in a wrong unit",
                      f->tile_size_m[a] / mm, "xy"[a], (highest - lowest) / mm);
         return;

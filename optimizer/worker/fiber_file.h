@@ -4,7 +4,7 @@
 
 #include "base/warning.h"
 #include "geometry/fibers/fiber_set.h"
-#include "optimizer/job/document/job_document.h"
+#include "optimizer/job/document/job_cloth.h"
 
 /* Diameters of textile fibers: microfibers have 2 um, coarse wool and horsehair 100. */
 #define FIBER_LEAST_DIAMETER_UM 1.0
@@ -12,10 +12,10 @@
 
 /* Reads the file into f (initialised): text when the name ends with ".txt", otherwise the hair format. Fields
  * OPTION_FIBER_FILE, OPTION_TILE. STATUS_INVALID for a missing tile and for fibers as wide as it. */
-status fiber_file_read(const char *path, const struct job_document *doc, struct fiber_set *f, struct error *err);
+status fiber_file_read(const char *path, const struct job_cloth *cloth, struct fiber_set *f, struct error *err);
 /* Warns of fibers that are thinner or thicker than those of cloth, and of a tile that the fibers do not fill or leave
  * far behind: a length in a wrong unit makes both. */
-void fiber_file_warn(const struct fiber_set *f, const struct job_document *doc, const struct warning_sink *warn);
+void fiber_file_warn(const struct fiber_set *f, const struct job_cloth *cloth, const struct warning_sink *warn);
 /* Warns of a mean diameter in metres that no textile fiber has. option: what states the lengths. */
 void fiber_file_warn_diameter(double diameter_m, const char *option, const struct warning_sink *warn);
 

@@ -1,121 +1,384 @@
-/* Runs the stages of a job in the order of the stage table, and loads those that an earlier attempt has finished. */
+#include "optimizer/worker/pipeline.h"
 #include "base/clock.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/job/stage_table.h"
-#include "optimizer/worker/pipeline_context.h"
-#include "optimizer/worker/progress/pipeline_plan.h"
 #include "optimizer/worker/ranks/worker_team.h"
+#include "optimizer/worker/report/surface/surface_cloth.h"
+#include "optimizer/worker/stages/scene/pipeline_adopt.h"
 
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
-struct stage_code {
-    const char *name;
-    status (*run)(struct pipeline_context *c, struct error *err);
-    status (*load)(struct pipeline_context *c, struct error *err); /* NULL: the stage is cheap, or always runs */
-    bool of_volume;                                                /* skipped when the job gives fibers */
-    bool of_scene;                                                 /* skipped when the job ends with the geometry */
-    bool of_fit;                                                   /* skipped when the job has no measurements */
-    /* what the stage does for the profile of a fiber, always anew; NULL: such a job skips it */
-    status (*run_profile)(struct pipeline_context *c, struct error *err);
+enum { MAX_STAGE = 16 };
+
+/* Outputs of the stages, one bit each. */
+enum { VOLUME = 1, ORIENTATION = 2, FIBERS = 4, DIRECTIONS = 8, CLOTH = 16, FIT = 32, VALIDATION = 64 };
+
+struct outputs {
+    struct volume_output volume;
+    struct orientation_output orientation;
+    struct fibers_output fibers;
+    struct directions_output directions;
+    struct made_cloth cloth;
+    struct fit_output fit;
+    struct validation_output validation;
+    struct report_output report;
 };
+
+/* The outputs that a stage takes; the others are NULL. */
+struct taken {
+    const struct volume_output *volume;
+    const struct orientation_output *orientation;
+    const struct fibers_output *fibers;
+    const struct directions_output *directions;
+    struct made_cloth *cloth; /* which later stages make anew with other numbers */
+    const struct fit_output *fit;
+    const struct validation_output *validation;
+};
+
+struct pipeline {
+    struct stage_tools *tools;
+    const struct job_inputs *in;
+    const struct pipeline_option *option;
+    struct job_plan *plan;
+    struct job_outline files;
+    struct cloth_job job;
+    struct outputs out;
+    double stage_wall_s[MAX_STAGE]; /* of this attempt, NaN for a stage that an earlier one did */
+    size_t n_input_warning;
+};
+
+/* ---- the stages with their inputs; load: what a finished stage stored is read back ---- */
+
+static status do_volume(struct pipeline *p, const struct taken *t, bool load, struct error *err)
+{
+    const struct volume_input in = {p->tools, &p->in->doc->scan};
+    (void)t;
+    status s = (load ? stage_volume_load : stage_volume)(&in, &p->out.volume, err);
+    p->plan->geometry = p->out.volume.geometry;
+    return s;
+}
+
+static status do_orientation(struct pipeline *p, const struct taken *t, bool load, struct error *err)
+{
+    const struct orientation_input in = {p->tools, t->volume};
+    status s = (load ? stage_orientation_load : stage_orientation)(&in, &p->out.orientation, err);
+    p->plan->geometry = p->out.orientation.geometry;
+    return s;
+}
+
+static status do_fibers(struct pipeline *p, const struct taken *t, bool load, struct error *err)
+{
+    const struct fibers_input in = {p->tools, &p->in->doc->scan, &p->in->doc->cloth, t->volume, t->orientation};
+    status s = (load ? stage_fibers_load : stage_fibers)(&in, &p->out.fibers, err);
+    p->plan->geometry = p->out.fibers.geometry;
+    return s;
+}
+
+static status do_directions(struct pipeline *p, const struct taken *t, bool load, struct error *err)
+{
+    const struct directions_input in = {p->tools, &p->in->doc->scan, p->in->n_model, p->in->model};
+    struct directions_output *out = &p->out.directions;
+    if (p->out.orientation.direction.density != NULL || p->out.fibers.fiber.n_fiber > 0) {
+        out->option = t->fibers->option;
+        out->geometry = t->fibers->geometry;
+        fiber_set_release(&out->fiber);
+        direction_volume_release(&out->direction);
+        out->fiber = p->out.fibers.fiber; /* taken over with the direction */
+        out->direction = p->out.orientation.direction;
+        fiber_set_init(&p->out.fibers.fiber);
+        memset(&p->out.orientation.direction, 0, sizeof p->out.orientation.direction);
+    }
+    status s = (load ? stage_directions_load : stage_directions)(&in, out, err);
+    p->plan->geometry = out->geometry;
+    return s;
+}
+
+/* The cloth takes over the fibers and the voxels of the stages before it. */
+static void gather_cloth(struct pipeline *p)
+{
+    struct made_cloth *cloth = &p->out.cloth;
+    cloth->report = p->out.fibers.cloth;
+    cloth->number = p->in->number;
+    if (!p->in->doc->scan.given) {
+        cloth->geometry = p->out.fibers.geometry;
+        cloth->fiber = p->out.fibers.fiber;
+        fiber_set_init(&p->out.fibers.fiber);
+        return;
+    }
+    struct directions_output *from = &p->out.directions;
+    cloth->geometry = from->geometry;
+    cloth->fiber = from->fiber;
+    cloth->traced = from->traced;
+    cloth->direction = from->direction;
+    fiber_set_init(&from->fiber);
+    fiber_set_init(&from->traced);
+    memset(&from->direction, 0, sizeof from->direction);
+}
+
+static status do_scene(struct pipeline *p, const struct taken *t, bool load, struct error *err)
+{
+    const struct surface_input surface = {p->tools, &p->in->doc->results, &p->in->doc->setup, t->cloth};
+    (void)load;
+    status s = stage_scene(&p->job, &p->out.cloth, err);
+    return s == STATUS_OK ? surface_cloth_check(&surface, err) : s;
+}
+
+static status do_fit(struct pipeline *p, const struct taken *t, bool load, struct error *err)
+{
+    const struct fit_input in = {&p->job, pipeline_plan_usual_paths(p->plan), t->cloth};
+    const struct profile_fit_input profile = {p->tools,      &p->in->doc->fit, &p->in->doc->profile,
+                                              &p->in->fiber, p->in->n_model,   p->in->model};
+    if (p->in->kind == JOB_OF_PROFILE) return stage_profile_fit(&profile, &p->out.fit, err);
+    return (load ? stage_fit_load : stage_fit)(&in, &p->out.fit, err);
+}
+
+static status do_validation(struct pipeline *p, const struct taken *t, bool load, struct error *err)
+{
+    const struct validation_input in = {&p->job, t->fit->model, t->cloth};
+    return (load ? stage_validation_load : stage_validation)(&in, &p->out.validation, err);
+}
+
+static status do_report(struct pipeline *p, const struct taken *t, bool load, struct error *err)
+{
+    const struct job_document *doc = p->in->doc;
+    const struct report_input in = {.job = &p->job,
+                                    .sample = doc->sample,
+                                    .kind = p->in->kind,
+                                    .photographs = &doc->rows,
+                                    .profile = &doc->profile,
+                                    .results = &doc->results,
+                                    .files = &p->files,
+                                    .fiber = &p->in->fiber,
+                                    .texture = &p->in->texture,
+                                    .option = doc->scan.given ? &t->directions->option : &t->fibers->option,
+                                    .fit = t->fit->model,
+                                    .radius = &t->fit->radius,
+                                    .validation = t->validation->model,
+                                    .made = t->cloth,
+                                    .pdf = p->option->pdf,
+                                    .n_input_warning = p->n_input_warning,
+                                    .stage_wall_s = p->stage_wall_s};
+    (void)load;
+    return stage_report(&in, &p->out.report, err);
+}
 
 /* In the order of pipeline_stage_table (a test compares the names). */
-static const struct stage_code stage_code[] = {
-    {"volume", stage_volume, stage_volume_load, .of_volume = true},
-    {"orientation", stage_orientation, stage_orientation_load, .of_volume = true},
-    {"fibers", stage_fibers, stage_fibers_load},
-    {"directions", stage_directions, stage_directions_load, .of_volume = true},
-    {"scene", stage_scene, NULL, .of_scene = true},
-    {"fit", stage_fit, stage_fit_load, .of_scene = true, .of_fit = true, .run_profile = stage_profile_fit},
-    {"validation", stage_validation, stage_validation_load, .of_scene = true, .of_fit = true},
-    {"report", stage_report, NULL, .run_profile = stage_profile_report},
+static const struct stage {
+    const char *name;
+    unsigned takes; /* outputs of earlier stages */
+    status (*run)(struct pipeline *p, const struct taken *t, bool load, struct error *err);
+    bool stores; /* false: the stage is cheap, or always runs */
+} stage_list[] = {
+    {"volume", 0, do_volume, .stores = true},
+    {"orientation", VOLUME, do_orientation, .stores = true},
+    {"fibers", VOLUME | ORIENTATION, do_fibers, .stores = true},
+    {"directions", ORIENTATION | FIBERS, do_directions, .stores = true},
+    {"scene", CLOTH, do_scene},
+    {"fit", CLOTH, do_fit, .stores = true},
+    {"validation", CLOTH | FIT, do_validation, .stores = true},
+    {"report", FIBERS | DIRECTIONS | CLOTH | FIT | VALIDATION, do_report},
 };
+enum { N_STAGE = sizeof stage_list / sizeof *stage_list };
+
+/* ---- running them ---- */
+
+static struct taken taken_of(struct outputs *out, unsigned takes)
+{
+    return (struct taken){.volume = takes & VOLUME ? &out->volume : NULL,
+                          .orientation = takes & ORIENTATION ? &out->orientation : NULL,
+                          .fibers = takes & FIBERS ? &out->fibers : NULL,
+                          .directions = takes & DIRECTIONS ? &out->directions : NULL,
+                          .cloth = takes & CLOTH ? &out->cloth : NULL,
+                          .fit = takes & FIT ? &out->fit : NULL,
+                          .validation = takes & VALIDATION ? &out->validation : NULL};
+}
+
+/* Releases the voxels of the scan once no later stage takes them. */
+static void release_scan(struct pipeline *p, size_t i_done)
+{
+    for (size_t i = i_done + 1; i < N_STAGE; i++)
+        if (stage_list[i].takes & VOLUME) return;
+    volume_release(&p->out.volume.volume);
+    memset(&p->out.volume.volume, 0, sizeof p->out.volume.volume);
+}
 
 static void report_fraction(void *context, double fraction)
 {
-    struct pipeline_context *c = context;
-    c->stage_fraction = fraction;
-    worker_status_fraction(c->status, fraction);
+    struct pipeline *p = context;
+    p->plan->stage_fraction = fraction;
+    worker_status_fraction(p->tools->status, fraction);
+}
+
+static void plan_hollow(void *context, const size_t n[3])
+{
+    pipeline_plan_hollow(((struct pipeline *)context)->plan, n);
+}
+
+static void plan_fit_paths(void *context, double n_path)
+{
+    pipeline_plan_fit_paths(((struct pipeline *)context)->plan, n_path);
 }
 
 /* Removes the marks of stage i and of all later ones: when a stage runs, what later stages have stored is out of
  * date, also for a later attempt. */
-static status unmark_from(struct pipeline_context *c, size_t i, struct error *err)
+static status unmark_from(const struct pipeline *p, size_t i, struct error *err)
 {
     status s = STATUS_OK;
-    for (; i < sizeof stage_code / sizeof stage_code[0] && s == STATUS_OK; i++)
-        s = worker_folder_unmark_stage(c->folder, stage_code[i].name, err);
+    for (; i < N_STAGE && s == STATUS_OK; i++)
+        s = worker_folder_unmark_stage(p->tools->folder, stage_list[i].name, err);
     return s;
 }
 
 /* A finished stage is loaded; if its checkpoint cannot be read it runs again, and so do all later ones. */
-static status do_stage(struct pipeline_context *c, size_t i, bool *earlier_ran, bool *loaded, struct error *err)
+static status do_stage(struct pipeline *p, size_t i, bool *earlier_ran, bool *loaded, struct error *err)
 {
-    struct stage_code own = stage_code[i];
-    const struct stage_code *code = &own;
-    if (job_document_kind(c->doc) == JOB_OF_PROFILE) {
-        own.run = own.run_profile;
-        own.load = NULL;
-    }
+    const struct stage *stage = &stage_list[i];
+    const struct stage_tools *tools = p->tools;
+    const struct taken taken = taken_of(&p->out, stage->takes);
+    const bool stores = stage->stores && p->in->kind != JOB_OF_PROFILE;
+    const char *geometry_job = p->in->doc->scan.geometry_job;
     double start_s = clock_monotonic_s();
-    if (code->load != NULL && !*earlier_ran && worker_folder_stage_done(c->folder, code->name)) {
+    if (stores && !*earlier_ran && worker_folder_stage_done(tools->folder, stage->name)) {
         struct error why = {0};
-        if (code->load(c, &why) == STATUS_OK) {
-            log_info(c->log, "stage %s: done by an earlier attempt", code->name);
+        if (stage->run(p, &taken, true, &why) == STATUS_OK) {
+            log_info(tools->log, "stage %s: done by an earlier attempt", stage->name);
             *loaded = true;
             return STATUS_OK;
         }
-        if (c->doc->scan.geometry_job[0] != '\0' && !code->of_scene)
-            return job_option_name_field(pipeline_geometry_lost(c, why.text, err), err);
-        log_warning(c->log, "stage %s runs again: %s", code->name, why.text);
+        if (geometry_job[0] != '\0' && !(stage->takes & CLOTH))
+            return job_option_name_field(pipeline_geometry_lost(geometry_job, why.text, err), err);
+        log_warning(tools->log, "stage %s runs again: %s", stage->name, why.text);
     }
-    status s = code->load != NULL && !*earlier_ran ? unmark_from(c, i, err) : STATUS_OK;
-    if (code->load != NULL) *earlier_ran = true;
-    log_info(c->log, "stage %s", code->name);
+    status s = stores && !*earlier_ran ? unmark_from(p, i, err) : STATUS_OK;
+    if (stores) *earlier_ran = true;
+    log_info(tools->log, "stage %s", stage->name);
     struct rank_traffic before = {.n_share = 0};
-    worker_team_begin_stage(c->pool, &before);
-    if (s == STATUS_OK) s = code->run(c, err);
+    worker_team_begin_stage(tools->pool, &before);
+    if (s == STATUS_OK) s = stage->run(p, &taken, false, err);
     if (s != STATUS_OK) return job_option_name_field(s, err);
-    c->stage_wall_s[i] = clock_monotonic_s() - start_s;
-    log_info(c->log, "stage %s: %.1f s", code->name, c->stage_wall_s[i]);
-    worker_team_end_stage(c->pool, &before, code->name, c->log);
-    return worker_folder_mark_stage(c->folder, code->name, err);
+    p->stage_wall_s[i] = clock_monotonic_s() - start_s;
+    log_info(tools->log, "stage %s: %.1f s", stage->name, p->stage_wall_s[i]);
+    worker_team_end_stage(tools->pool, &before, stage->name, tools->log);
+    return worker_folder_mark_stage(tools->folder, stage->name, err);
 }
 
-bool pipeline_has_stage(const struct pipeline_context *c, size_t i)
+static bool has_stage(const struct pipeline *p, const struct pipeline_stage_info *info)
 {
-    if (job_document_kind(c->doc) == JOB_OF_PROFILE) return stage_code[i].run_profile != NULL;
-    return (!stage_code[i].of_volume || c->doc->scan.given) &&
-           (!stage_code[i].of_scene || job_document_kind(c->doc) != JOB_OF_GEOMETRY) &&
-           (!stage_code[i].of_fit || job_document_kind(c->doc) == JOB_OF_FIT);
+    return pipeline_stage_applies(info, p->in->kind, p->in->doc->scan.given);
 }
 
-status pipeline_run(struct pipeline_context *c, struct error *err)
+static status run_stages(struct pipeline *p, struct error *err)
 {
     size_t n_stage;
     const struct pipeline_stage_info *info = pipeline_stage_table(&n_stage);
-    bool earlier_ran = false;
-    char work[WORKER_PATH_BYTES];
-    worker_folder_path(c->folder, JOB_FOLDER_WORK, NULL, work);
-    if (c->memory_limit_bytes > 0 && c->space == NULL) {
-        status s = scratch_space_new(work, c->memory_limit_bytes, &c->space, err);
-        if (s != STATUS_OK) return s;
-        scratch_space_bound(c->space, c->most_scratch_bytes);
-    }
-    c->progress = (struct progress){.report = report_fraction, .context = c, .cancel = worker_status_cancel(c->status)};
+    bool earlier_ran = false, gathered = false;
     for (size_t i = 0; i < n_stage; i++) {
-        if (!pipeline_has_stage(c, i)) continue;
-        if (stage_code[i].run == stage_fit) c->n_input_warning = worker_status_n_warning(c->status);
+        if (!has_stage(p, &info[i])) continue;
+        if (info[i].of_fit && p->out.fit.model == NULL) p->n_input_warning = worker_status_n_warning(p->tools->status);
+        if (stage_list[i].takes & CLOTH && !gathered) gather_cloth(p);
+        gathered = gathered || stage_list[i].takes & CLOTH;
         bool loaded = false;
         for (size_t later = i; later < n_stage; later++)
-            if (pipeline_has_stage(c, later)) pipeline_plan_stage(c, info[later].name, later);
-        c->stage_fraction = 0.0;
-        worker_status_stage(c->status, info[i].name, info[i].title, i, n_stage);
-        status s = do_stage(c, i, &earlier_ran, &loaded, err);
-        worker_status_stage_end(c->status, loaded);
-        if (s == STATUS_OK && progress_cancelled(&c->progress)) s = error_set(err, STATUS_CANCELLED, "cancelled");
+            if (has_stage(p, &info[later])) pipeline_plan_stage(p->plan, info[later].name, later);
+        p->plan->stage_fraction = 0.0;
+        worker_status_stage(p->tools->status, info[i].name, info[i].title, i, n_stage);
+        status s = do_stage(p, i, &earlier_ran, &loaded, err);
+        worker_status_stage_end(p->tools->status, loaded);
+        release_scan(p, i);
+        if (s == STATUS_OK && progress_cancelled(&p->tools->progress))
+            s = error_set(err, STATUS_CANCELLED, "cancelled");
         if (s != STATUS_OK) return s;
     }
     return STATUS_OK;
+}
+
+static status open_space(struct pipeline *p, struct error *err)
+{
+    char work[WORKER_PATH_BYTES];
+    if (p->tools->memory_limit_bytes == 0) return STATUS_OK;
+    worker_folder_path(p->tools->folder, JOB_FOLDER_WORK, NULL, work);
+    status s = scratch_space_new(work, p->tools->memory_limit_bytes, &p->tools->space, err);
+    if (s == STATUS_OK) scratch_space_bound(p->tools->space, p->option->most_scratch_bytes);
+    return s;
+}
+
+static void add_file(void *context, const char *name, const char *role)
+{
+    struct job_outline *o = context;
+    struct job_outline_file *file = &o->file[o->n_file];
+    if (o->file != NULL) *file = (struct job_outline_file){.role = role};
+    if (o->file != NULL) memcpy(file->name, name, strlen(name) + 1);
+    o->n_file++;
+}
+
+/* Lists the input files of the document. */
+static status list_files(const struct job_document *doc, struct job_outline *files, struct error *err)
+{
+    job_document_visit_files(doc, add_file, files);
+    files->file = calloc(files->n_file + 1, sizeof *files->file);
+    if (files->file == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot run the job: out of memory");
+    files->n_file = 0;
+    job_document_visit_files(doc, add_file, files);
+    return STATUS_OK;
+}
+
+static void pipeline_init(struct pipeline *p)
+{
+    const struct job_document *doc = p->in->doc;
+    fiber_set_init(&p->out.fibers.fiber);
+    fiber_set_init(&p->out.directions.fiber);
+    fiber_set_init(&p->out.directions.traced);
+    for (size_t i = 0; i < MAX_STAGE; i++) p->stage_wall_s[i] = NAN;
+    p->job = (struct cloth_job){.tools = p->tools,
+                                .scan = &doc->scan,
+                                .cloth = &doc->cloth,
+                                .setup = &doc->setup,
+                                .fit = &doc->fit,
+                                .rows = &p->in->rows,
+                                .n_model = p->in->n_model,
+                                .model = p->in->model,
+                                .number = &p->in->number};
+    p->plan->fit = &p->out.fit;
+    p->plan->validation = &p->out.validation;
+    p->tools->fingerprint = p->in->fingerprint;
+    p->tools->plan = (struct stage_plan){p, plan_hollow, plan_fit_paths};
+    p->tools->progress =
+        (struct progress){.report = report_fraction, .context = p, .cancel = worker_status_cancel(p->tools->status)};
+}
+
+static void pipeline_release(struct pipeline *p)
+{
+    volume_release(&p->out.volume.volume);
+    direction_volume_release(&p->out.orientation.direction);
+    fiber_set_release(&p->out.fibers.fiber);
+    fiber_set_release(&p->out.directions.fiber);
+    fiber_set_release(&p->out.directions.traced);
+    direction_volume_release(&p->out.directions.direction);
+    made_cloth_release(&p->out.cloth);
+    fit_output_release(&p->out.fit, p->in->n_model);
+    validation_output_release(&p->out.validation, p->in->n_model);
+    scratch_space_free(p->tools->space);
+    job_outline_release(&p->files);
+    p->tools->space = NULL;
+    p->tools->plan = (struct stage_plan){.context = NULL};
+    p->tools->progress = (struct progress){.report = NULL};
+}
+
+status pipeline_run(struct stage_tools *tools, const struct job_inputs *inputs, const struct pipeline_option *option,
+                    struct job_plan *plan, struct error *err)
+{
+    struct pipeline *p = calloc(1, sizeof *p);
+    if (p == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot run the job: out of memory");
+    *p = (struct pipeline){.tools = tools, .in = inputs, .option = option, .plan = plan};
+    pipeline_init(p);
+    status s = open_space(p, err);
+    if (s == STATUS_OK) s = list_files(inputs->doc, &p->files, err);
+    if (s == STATUS_OK && inputs->kind == JOB_OF_PICTURES) s = fit_output_given(inputs, &p->out.fit, err);
+    if (s == STATUS_OK) s = run_stages(p, err);
+    pipeline_release(p);
+    free(p);
+    return s;
 }

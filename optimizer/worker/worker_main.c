@@ -7,7 +7,7 @@
 #include "optimizer/job/json/catalogue_json.h"
 #include "optimizer/worker/check/job_check.h"
 #include "optimizer/worker/check/other_faults.h"
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/pipeline.h"
 #include "optimizer/worker/progress/job_need.h"
 #include "optimizer/worker/ranks/worker_launcher.h"
 #include "optimizer/worker/ranks/worker_team.h"
@@ -194,43 +194,57 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
 
 /* Adds what this job took to the file, which other jobs may have changed meanwhile. What fails is no error of the job.
  * An attempt that went on from an earlier one, and rank 0 of several, took only a part of what the job needs. */
-static void remember_speeds(struct pipeline_context *c, const char *path, bool alone)
+static void remember_speeds(const struct job_plan *plan, const char *path, bool alone)
 {
     struct speed_book book;
     struct error err = {0};
     const struct process_use used = process_use();
     const struct job_need took = {.cpu_s = used.cpu_s,
                                   .memory_bytes = (double)used.peak_rss_bytes,
-                                  .disk_bytes = (double)disk_use_bytes(c->folder->path)};
+                                  .disk_bytes = (double)disk_use_bytes(plan->tools->folder->path)};
     speed_book_read(path, &book);
-    worker_status_remember(c->status, &book);
-    if (!c->resumed && alone) job_need_remember(c, &took, &book);
-    if (speed_book_write(path, &book, &err) != STATUS_OK) log_info(c->log, "%s", err.text);
+    worker_status_remember(plan->status, &book);
+    if (!plan->in->resumed && alone) job_need_remember(plan, &took, &book);
+    if (speed_book_write(path, &book, &err) != STATUS_OK) log_info(plan->tools->log, "%s", err.text);
 }
 
-static status run_stages(struct pipeline_context *c, const struct arguments *a, struct error *err)
+static status run_stages(struct stage_tools *tools, const struct arguments *a, struct job_inputs *in, struct error *err)
 {
     struct speed_book book = {.n = 0};
+    struct job_plan plan;
+    const struct pipeline_option option = {.most_scratch_bytes = a->scratch_mib << 20, .pdf = a->confinement.pdf};
     if (a->speeds != NULL) speed_book_read(a->speeds, &book);
-    status s = pipeline_read_inputs(c, err);
-    if (s == STATUS_OK) job_need_begin(c);
-    worker_status_speeds(c->status, &book);
-    if (s == STATUS_OK) s = pipeline_run(c, err);
-    other_faults_name(c, s, err);
-    if (s == STATUS_OK && a->speeds != NULL) remember_speeds(c, a->speeds, a->team.fd < 0);
+    status s = job_inputs_read(tools, in, err);
+    job_plan_init(&plan, tools, in);
+    if (s == STATUS_OK) job_need_begin(&plan);
+    worker_status_speeds(tools->status, &book);
+    if (s == STATUS_OK) s = pipeline_run(tools, in, &option, &plan, err);
+    other_faults_name(tools, s, err);
+    if (s == STATUS_OK && a->speeds != NULL) remember_speeds(&plan, a->speeds, a->team.fd < 0);
+    return s;
+}
+
+static status run_with_inputs(struct stage_tools *tools, const struct arguments *a, struct error *err)
+{
+    struct job_inputs *in = malloc(sizeof *in);
+    if (in == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot run the job: out of memory");
+    job_inputs_init(in);
+    status s = run_stages(tools, a, in, err);
+    job_inputs_release(in);
+    free(in);
     return s;
 }
 
 /* *lost: another rank is lost, so the status is no end of the job. */
-static status run_job(struct pipeline_context *c, const struct arguments *a, bool *lost, struct error *err)
+static status run_job(struct stage_tools *tools, const struct arguments *a, bool *lost, struct error *err)
 {
     struct worker_team team = {.team = NULL};
-    worker_status_stage(c->status, "volume", "Reading the job", 0, 8);
-    status s = thread_pool_new(a->n_thread, &c->pool, err);
-    if (s == STATUS_OK) s = worker_team_open(&team, &a->team, c->pool, err);
-    if (s == STATUS_OK) s = run_stages(c, a, err);
+    worker_status_stage(tools->status, "volume", "Reading the job", 0, 8);
+    status s = thread_pool_new(a->n_thread, &tools->pool, err);
+    if (s == STATUS_OK) s = worker_team_open(&team, &a->team, tools->pool, err);
+    if (s == STATUS_OK) s = run_with_inputs(tools, a, err);
     *lost = worker_team_lost(&team);
-    worker_team_close(&team, c->pool, c->log);
+    worker_team_close(&team, tools->pool, tools->log);
     return s;
 }
 
@@ -260,7 +274,7 @@ static int conclude(struct worker_status *st, struct log *log, status outcome, c
 
 /* Says in the log how far the sandbox goes, and warns the job's user when a part of it could not be had. It is an error
  * only where the whole sandbox is required. */
-static status report_sandbox(struct pipeline_context *c, const struct arguments *a, const struct error *failed,
+static status report_sandbox(const struct stage_tools *tools, const struct arguments *a, const struct error *failed,
                              struct error *err)
 {
     char text[200];
@@ -270,11 +284,11 @@ static status report_sandbox(struct pipeline_context *c, const struct arguments 
         return failed->code;
     }
     if (failed->code != STATUS_OK)
-        worker_status_warn(c->status, "the worker runs without its whole sandbox: %s", failed->text);
+        worker_status_warn(tools->status, "the worker runs without its whole sandbox: %s", failed->text);
     else if (whole)
-        log_info(c->log, "%s", text);
+        log_info(tools->log, "%s", text);
     else
-        worker_status_warn(c->status, "%s", text);
+        worker_status_warn(tools->status, "%s", text);
     return STATUS_OK;
 }
 
@@ -322,7 +336,7 @@ int main(int argc, char **argv)
 {
     struct arguments a;
     struct worker_folder folder;
-    struct pipeline_context context;
+    struct stage_tools tools;
     struct error err = {0}, failed = {0};
     char log_path[WORKER_PATH_BYTES];
     int code = parse_arguments(argc, argv, &a);
@@ -348,27 +362,23 @@ int main(int argc, char **argv)
         return s == STATUS_STALE ? WORKER_STALE : s == STATUS_NOT_FOUND ? WORKER_USAGE : WORKER_FAILED;
     }
     worker_folder_sweep(&folder);
-    pipeline_context_init(&context);
-    context.folder = &folder;
-    context.pdf = a.confinement.pdf;
-    context.memory_limit_bytes = a.memory_mib << 20;
-    context.most_scratch_bytes = a.scratch_mib << 20;
+    tools =
+        (struct stage_tools){.folder = &folder, .memory_limit_bytes = a.memory_mib << 20, .warn = {stage_warn, &tools}};
     worker_folder_path(&folder, JOB_FILE_LOG, NULL, log_path);
-    s = log_open(log_path, a.quiet ? NULL : stderr, LOG_LEVEL_INFO, &context.log, &err);
-    if (s == STATUS_OK) s = worker_status_start(&folder, context.log, &context.status, &err);
+    s = log_open(log_path, a.quiet ? NULL : stderr, LOG_LEVEL_INFO, &tools.log, &err);
+    if (s == STATUS_OK) s = worker_status_start(&folder, tools.log, &tools.status, &err);
     if (s != STATUS_OK) {
         fprintf(stderr, "selvedge-worker: %s\n", err.text);
         code = WORKER_FAILED;
     } else {
-        s = report_sandbox(&context, &a, &failed, &err);
+        s = report_sandbox(&tools, &a, &failed, &err);
         bool lost = false;
-        if (s == STATUS_OK) s = run_job(&context, &a, &lost, &err);
-        code = lost ? WORKER_LOST : conclude(context.status, context.log, s, &err);
+        if (s == STATUS_OK) s = run_job(&tools, &a, &lost, &err);
+        code = lost ? WORKER_LOST : conclude(tools.status, tools.log, s, &err);
     }
-    worker_status_free(context.status);
-    pipeline_context_release(&context);
-    thread_pool_free(context.pool);
-    log_close(context.log);
+    worker_status_free(tools.status);
+    thread_pool_free(tools.pool);
+    log_close(tools.log);
     worker_folder_close(&folder);
     return code;
 }

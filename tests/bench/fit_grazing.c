@@ -41,10 +41,10 @@ static void observe_mirror(struct fit_phantom *f, double first_deg, size_t n)
     observation_set_init(&o);
     for (size_t i = 0; i < n; i++) {
         double theta_deg = first_deg + MIRROR_STEP_DEG * (double)i;
-        const struct observation item = {.set = JOB_SET_HELD_OUT,
-                                         .weight = 1.0,
-                                         .configuration =
-                                             observation_configuration(&set_up, theta_deg, 0.0, theta_deg, 180.0, 0.0)};
+        const struct observation item = {
+            .set = JOB_SET_HELD_OUT,
+            .weight = 1.0,
+            .configuration = observation_configuration(&set_up.setup, theta_deg, 0.0, theta_deg, 180.0, 0.0)};
         fit_check(observation_set_append(&o, &item, &err), &err);
     }
     fit_phantom_observe(f, &o);

@@ -127,7 +127,7 @@ static status read_row(void *context, struct number_table *t, struct error *err)
     if (s == STATUS_OK) s = number_table_not_negative(t, COLUMN_WEIGHT, 1.0, 1e6, &item.weight, err);
     if (s != STATUS_OK) return s;
     item.configuration =
-        observation_configuration(rows->doc, light_theta, light_phi, camera_theta, camera_phi, rotation);
+        observation_configuration(&rows->doc->setup, light_theta, light_phi, camera_theta, camera_phi, rotation);
     item.configuration.n_rotation = n_rotation;
     row_name(t, o, &item);
     return observation_set_append(o, &item, err);

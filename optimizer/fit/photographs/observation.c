@@ -89,7 +89,7 @@ status observation_set_append_contrasts(const struct observation_set *from, doub
     return s;
 }
 
-struct configuration observation_configuration(const struct job_document *doc, double light_theta_deg,
+struct configuration observation_configuration(const struct job_setup *setup, double light_theta_deg,
                                                double light_phi_deg, double camera_theta_deg, double camera_phi_deg,
                                                double cloth_rotation_deg)
 {
@@ -100,14 +100,14 @@ struct configuration observation_configuration(const struct job_document *doc, d
         .camera_theta_rad = camera_theta_deg * rad,
         .camera_phi_rad = camera_phi_deg * rad,
         .cloth_rotation_rad = cloth_rotation_deg * rad,
-        .light_distance_m = doc->setup.lamp_distance_cm * cm,
-        .lamp_side_m = doc->setup.lamp_side_cm * cm,
-        .camera_distance_m = doc->setup.camera_distance_cm * cm,
-        .crop_m = doc->setup.crop_cm * cm,
-        .blur_m = doc->setup.camera_blur_mm * 1e-3,
-        .light = doc->setup.lamp_directional ? LIGHT_DIRECTIONAL : LIGHT_SQUARE_LAMP,
-        .camera = doc->setup.camera_far_field ? CAMERA_FAR_FIELD : CAMERA_PERSPECTIVE,
+        .light_distance_m = setup->lamp_distance_cm * cm,
+        .lamp_side_m = setup->lamp_side_cm * cm,
+        .camera_distance_m = setup->camera_distance_cm * cm,
+        .crop_m = setup->crop_cm * cm,
+        .blur_m = setup->camera_blur_mm * 1e-3,
+        .light = setup->lamp_directional ? LIGHT_DIRECTIONAL : LIGHT_SQUARE_LAMP,
+        .camera = setup->camera_far_field ? CAMERA_FAR_FIELD : CAMERA_PERSPECTIVE,
     };
-    memcpy(c.environment_rgb, doc->setup.environment_rgb, sizeof c.environment_rgb);
+    memcpy(c.environment_rgb, setup->environment_rgb, sizeof c.environment_rgb);
     return c;
 }

@@ -58,7 +58,7 @@ status observation_set_append_contrasts(const struct observation_set *from, doub
                                         struct error *err);
 
 /* Makes a configuration in SI units from angles and the document's set-up. */
-struct configuration observation_configuration(const struct job_document *doc, double light_theta_deg,
+struct configuration observation_configuration(const struct job_setup *setup, double light_theta_deg,
                                                double light_phi_deg, double camera_theta_deg, double camera_phi_deg,
                                                double cloth_rotation_deg);
 

@@ -82,8 +82,8 @@ static status load_photograph(const struct job_document *doc, size_t i, const ch
     item.photograph = mean.record;
     memcpy(item.mean_rgb, mean.mean_rgb, sizeof item.mean_rgb);
     memcpy(item.se_rgb, mean.se_rgb, sizeof item.se_rgb);
-    item.configuration = observation_configuration(doc, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg,
-                                                   p->camera_phi_deg, p->cloth_rotation_deg);
+    item.configuration = observation_configuration(&doc->setup, p->light_theta_deg, p->light_phi_deg,
+                                                   p->camera_theta_deg, p->camera_phi_deg, p->cloth_rotation_deg);
     if (p->light_distance_cm > 0.0) item.configuration.light_distance_m = 0.01 * p->light_distance_cm;
     if (p->camera_distance_cm > 0.0) item.configuration.camera_distance_m = 0.01 * p->camera_distance_cm;
     return observation_set_append(o, &item, err);

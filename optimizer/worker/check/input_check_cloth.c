@@ -103,8 +103,8 @@ static void check_fibers(struct input_check *c)
     if (!input_check_has(c, c->doc->cloth.fiber_file)) return;
     input_check_path(c, c->doc->cloth.fiber_file, path);
     fiber_set_init(&f);
-    status s = fiber_file_read(path, c->doc, &f, &fault);
-    if (s == STATUS_OK) fiber_file_warn(&f, c->doc, &(struct warning_sink){input_check_warn, c});
+    status s = fiber_file_read(path, &c->doc->cloth, &f, &fault);
+    if (s == STATUS_OK) fiber_file_warn(&f, &c->doc->cloth, &(struct warning_sink){input_check_warn, c});
     if (s != STATUS_OK) input_check_fault(c, &fault);
     fiber_set_release(&f);
 }

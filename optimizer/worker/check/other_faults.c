@@ -7,10 +7,10 @@
 #include <string.h>
 
 /* Takes the folder of the inputs out of a text: users know their files by their names alone. */
-static void shorten_paths(const struct pipeline_context *c, char *text)
+static void shorten_paths(const struct stage_tools *tools, char *text)
 {
     char folder[WORKER_PATH_BYTES];
-    worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, folder);
+    worker_folder_path(tools->folder, JOB_FOLDER_INPUT, NULL, folder);
     const size_t n = strlen(folder);
     for (char *at = text; (at = strstr(at, folder)) != NULL;)
         if (at[n] == '/')
@@ -20,15 +20,15 @@ static void shorten_paths(const struct pipeline_context *c, char *text)
 }
 
 /* Warns of every fault of the inputs besides the one that has ended the job, so that all can be mended at once. */
-static void name_other_faults(struct pipeline_context *c, const struct error *first)
+static void name_other_faults(const struct stage_tools *tools, const struct error *first)
 {
     char path[WORKER_PATH_BYTES], folder[WORKER_PATH_BYTES];
     json_t *report = NULL;
     const json_t *fault;
     size_t i;
     struct error err = {0};
-    worker_folder_path(c->folder, JOB_FILE_DOCUMENT, NULL, path);
-    worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, folder);
+    worker_folder_path(tools->folder, JOB_FILE_DOCUMENT, NULL, path);
+    worker_folder_path(tools->folder, JOB_FOLDER_INPUT, NULL, folder);
     if (job_check(path, folder, &report, &err) != STATUS_OK) return;
     json_array_foreach(json_object_get(report, "faults"), i, fault)
     {
@@ -38,8 +38,8 @@ static void name_other_faults(struct pipeline_context *c, const struct error *fi
         if (field == NULL || detail == NULL) continue;
         if (strcmp(field, first->field) == 0 || strcmp(detail, first->text) == 0) continue;
         snprintf(text, sizeof text, "%s", detail);
-        shorten_paths(c, text);
-        worker_status_warn(c->status, "this is wrong, too: %s: %s", field, text);
+        shorten_paths(tools, text);
+        worker_status_warn(tools->status, "this is wrong, too: %s: %s", field, text);
     }
     json_decref(report);
 }
@@ -49,8 +49,8 @@ static bool is_of_input(status s)
     return s == STATUS_INVALID || s == STATUS_NOT_FOUND || s == STATUS_FORMAT || s == STATUS_UNSUPPORTED;
 }
 
-void other_faults_name(struct pipeline_context *c, status s, struct error *err)
+void other_faults_name(const struct stage_tools *tools, status s, struct error *err)
 {
-    if (is_of_input(s)) name_other_faults(c, err);
-    if (s != STATUS_OK) shorten_paths(c, err->text);
+    if (is_of_input(s)) name_other_faults(tools, err);
+    if (s != STATUS_OK) shorten_paths(tools, err->text);
 }

@@ -2,10 +2,10 @@
 #ifndef SELVEDGE_OPTIMIZER_OTHER_FAULTS_H
 #define SELVEDGE_OPTIMIZER_OTHER_FAULTS_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/stage_tools.h"
 
 /* When the status s is one that inputs cause, warns of their other faults. Takes the folder of the inputs out of the
  * text of err, because users know their files by their names alone. Does nothing for STATUS_OK. */
-void other_faults_name(struct pipeline_context *c, status s, struct error *err);
+void other_faults_name(const struct stage_tools *tools, status s, struct error *err);
 
 #endif

@@ -4,7 +4,7 @@
 #ifndef SELVEDGE_OPTIMIZER_JOB_NEED_H
 #define SELVEDGE_OPTIMIZER_JOB_NEED_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/progress/pipeline_plan.h"
 
 /* What one job takes, or took: processor seconds of all threads, largest resident memory, bytes of its folder (inputs
  * and results) at its end. */
@@ -27,8 +27,8 @@ status job_need_report(const char *folder, const struct job_need_machine *machin
 
 /* Before the first stage of a job that runs, and before its clock is given the speeds of earlier jobs: sets
  * usual_wall_s, the time by usual speeds alone, which the load of this machine does not change. */
-void job_need_begin(struct pipeline_context *c);
+void job_need_begin(struct job_plan *plan);
 /* Adds what a job has taken to the book. Values that are not positive are left out. */
-void job_need_remember(const struct pipeline_context *c, const struct job_need *took, struct speed_book *book);
+void job_need_remember(const struct job_plan *plan, const struct job_need *took, struct speed_book *book);
 
 #endif

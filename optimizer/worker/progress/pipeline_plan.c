@@ -64,46 +64,46 @@ static const double usual_profile_s = 3.0;
 static const double sd_of_fit = 0.5, sd_of_rest = 0.5;
 
 /* By the size of the files one voxel has one or two bytes. */
-double pipeline_plan_voxels(const struct pipeline_context *c)
+double pipeline_plan_voxels(const struct job_plan *plan)
 {
-    double n = (double)c->geometry.n[0] * (double)c->geometry.n[1] * (double)c->geometry.n[2];
-    for (size_t i = 0; i < c->doc->scan.n_file && !(c->geometry.n[0] > 0); i++) {
+    double n = (double)plan->geometry.n[0] * (double)plan->geometry.n[1] * (double)plan->geometry.n[2];
+    for (size_t i = 0; i < plan->in->doc->scan.n_file && !(plan->geometry.n[0] > 0); i++) {
         char path[WORKER_PATH_BYTES];
         struct stat file;
-        worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->scan.file[i], path);
+        worker_folder_path(plan->tools->folder, JOB_FOLDER_INPUT, plan->in->doc->scan.file[i], path);
         if (stat(path, &file) == 0) n += (double)file.st_size / 1.5;
     }
     return fmax(n, 1.0);
 }
 
-static double n_thread(const struct pipeline_context *c) { return (double)thread_pool_n_thread(c->pool); }
+static double n_thread(const struct job_plan *plan) { return (double)thread_pool_n_thread(plan->tools->pool); }
 
 /* A stage that goes through n voxels. */
-static void plan_voxels(struct pipeline_context *c, size_t i, const struct voxel_stage *stage, double n)
+static void plan_voxels(struct job_plan *plan, size_t i, const struct voxel_stage *stage, double n)
 {
     const struct job_clock_work work = {.key = stage->key,
-                                        .units = n / n_thread(c),
+                                        .units = n / n_thread(plan),
                                         .usual_s = stage->s_per_voxel,
                                         .log_sd = stage->log_sd,
                                         .usual_curve = stage->curve};
-    worker_status_plan(c->status, i, &work);
+    worker_status_plan(plan->status, i, &work);
 }
 
 /* Voxels of material, of which there are fibers to trace. */
-static double n_material(const struct pipeline_context *c)
+static double n_material(const struct job_plan *plan)
 {
-    return c->geometry.n_material_voxel > 0 ? (double)c->geometry.n_material_voxel
-                                            : usual_material * pipeline_plan_voxels(c);
+    return plan->geometry.n_material_voxel > 0 ? (double)plan->geometry.n_material_voxel
+                                               : usual_material * pipeline_plan_voxels(plan);
 }
 
 /* Tracing of the scan, and of its phantom of limited size where there is a trial. */
-static void plan_fibers(struct pipeline_context *c, size_t i)
+static void plan_fibers(struct job_plan *plan, size_t i)
 {
-    const double n = n_material(c), n_trial = fmin(n, n / pipeline_plan_voxels(c) * SCAN_TRIAL_VOXELS);
-    if (c->doc->scan.trial)
-        plan_voxels(c, i, &trial_stage, n + n_trial);
+    const double n = n_material(plan), n_trial = fmin(n, n / pipeline_plan_voxels(plan) * SCAN_TRIAL_VOXELS);
+    if (plan->in->doc->scan.trial)
+        plan_voxels(plan, i, &trial_stage, n + n_trial);
     else
-        plan_voxels(c, i, &fibers_stage, n);
+        plan_voxels(plan, i, &fibers_stage, n);
 }
 
 /* ---- a described cloth ---- */
@@ -118,12 +118,13 @@ static double fibers_of_yarn(const struct cloth_description *d, int direction, s
     return (double)d->kind[k].n_fiber;
 }
 
-double pipeline_plan_cloth_size(const struct pipeline_context *c)
+double pipeline_plan_cloth_size(const struct job_plan *plan)
 {
-    const struct cloth_description *d = c->doc->cloth.description;
+    const struct cloth_description *d = plan->in->doc->cloth.description;
     double n_fiber[2] = {0.0, 0.0}, width[2] = {0.0, 0.0};
     if (d == NULL) return 0.0;
-    const double times = c->number.n > 0 && c->doc->cloth.final_tiles > 1 ? (double)c->doc->cloth.final_tiles : 1.0;
+    const double times =
+        plan->in->number.n > 0 && plan->in->doc->cloth.final_tiles > 1 ? (double)plan->in->doc->cloth.final_tiles : 1.0;
     if (d->structure == CLOTH_FELT) return felt_fiber_size * (double)d->kind[0].n_fiber * times * times;
     for (int direction = CLOTH_WEFT; direction <= CLOTH_WARP; direction++)
         for (size_t i = 0; i < d->n_yarn[direction]; i++) {
@@ -133,171 +134,208 @@ double pipeline_plan_cloth_size(const struct pipeline_context *c)
     return (n_fiber[CLOTH_WEFT] * width[CLOTH_WARP] + n_fiber[CLOTH_WARP] * width[CLOTH_WEFT]) * times * times;
 }
 
-static void plan_cloth(struct pipeline_context *c, size_t i)
+static void plan_cloth(struct job_plan *plan, size_t i)
 {
     const struct job_clock_work work = {.key = "fibers.described",
-                                        .units = pipeline_plan_cloth_size(c) / n_thread(c),
+                                        .units = pipeline_plan_cloth_size(plan) / n_thread(plan),
                                         .usual_s = make_s_per_size,
                                         .log_sd = sd_of_fit};
-    worker_status_plan(c->status, i, &work);
+    worker_status_plan(plan->status, i, &work);
 }
 
 /* ---- the fit and what follows it ---- */
 
 /* What the fit consists of besides a plain one, which makes its time per path of the budget another. */
-static const char *kind_of_fit(const struct pipeline_context *c)
+static const char *kind_of_fit(const struct job_plan *plan)
 {
-    if (c->number.n > 0) return pipeline_correction_applies(c) ? "+correction" : "+cloth";
-    if (c->doc->fit.fit_radius) return "+radius";
-    return c->doc->scan.given ? "+scan" : "";
+    if (plan->in->number.n > 0)
+        return pipeline_correction_applies(&plan->in->doc->cloth, &plan->in->number) ? "+correction" : "+cloth";
+    if (plan->in->doc->fit.fit_radius) return "+radius";
+    return plan->in->doc->scan.given ? "+scan" : "";
 }
 
-static double path_budget(const struct pipeline_context *c)
+static double path_budget(const struct job_plan *plan)
 {
-    const struct method_info *method = method_catalogue_find(c->doc->fit.method);
-    if (c->doc->fit.path_budget > 0) return (double)c->doc->fit.path_budget;
+    const struct method_info *method = method_catalogue_find(plan->in->doc->fit.method);
+    if (plan->in->doc->fit.path_budget > 0) return (double)plan->in->doc->fit.path_budget;
     return method != NULL && method->default_path_budget > 0 ? (double)method->default_path_budget : usual_budget;
 }
 
-double pipeline_plan_usual_paths(const struct pipeline_context *c)
+double pipeline_plan_usual_paths(const struct job_plan *plan)
 {
-    const double budget = path_budget(c);
-    if (c->number.n > 0) return cloth_share * budget;
-    if (c->doc->rows.n_photograph > 0 && c->doc->fit.path_budget > 0) return budget; /* it is used up */
-    return fmin((c->doc->rows.n_photograph > 0 ? noise_row_paths : misfit_row_paths) * (double)c->fitted.n, budget);
+    const double budget = path_budget(plan);
+    if (plan->in->number.n > 0) return cloth_share * budget;
+    if (plan->in->doc->rows.n_photograph > 0 && plan->in->doc->fit.path_budget > 0) return budget; /* it is used up */
+    return fmin((plan->in->doc->rows.n_photograph > 0 ? noise_row_paths : misfit_row_paths) *
+                    (double)plan->in->rows.fitted.n,
+                budget);
 }
 
 /* Seconds that a path of the fit takes, by how bright its rows are and how thin the cloth is. */
-static double usual_s_per_path(const struct pipeline_context *c)
+static double usual_s_per_path(const struct job_plan *plan)
 {
-    double sum = 0.0, n = (double)c->fitted.n;
-    for (size_t i = 0; i < c->fitted.n; i++) {
-        const double *rgb = c->fitted.item[i].mean_rgb;
+    double sum = 0.0, n = (double)plan->in->rows.fitted.n;
+    for (size_t i = 0; i < plan->in->rows.fitted.n; i++) {
+        const double *rgb = plan->in->rows.fitted.item[i].mean_rgb;
         sum += fmax(rgb[0], fmax(rgb[1], rgb[2])) / n;
     }
     double bright = fmin(fmax(sum / usual_radiance, 0.1), 5.0); /* one, where no row has been read */
-    return c->path_share * fit_s_per_path * (n > 0.0 ? pow(bright, radiance_power) : 1.0);
+    return plan->path_share * fit_s_per_path * (n > 0.0 ? pow(bright, radiance_power) : 1.0);
 }
 
-static void plan_fit(struct pipeline_context *c, size_t i)
+static void plan_fit(struct job_plan *plan, size_t i)
 {
     char key[SPEED_BOOK_KEY_BYTES];
     /* a table ends a fit by its misfit, photographs by their noise: both take other shares of what is expected */
-    snprintf(key, sizeof key, "fit.%.40s%s%s.paths", c->doc->fit.method, kind_of_fit(c),
-             c->doc->rows.n_photograph > 0 ? "+photographs" : "+table");
-    const double path_s = usual_s_per_path(c), of_fit = c->doc->scan.given ? fit_share : 1.0;
-    const double n_path = pipeline_plan_usual_paths(c) * (double)c->n_model;
+    snprintf(key, sizeof key, "fit.%.40s%s%s.paths", plan->in->doc->fit.method, kind_of_fit(plan),
+             plan->in->doc->rows.n_photograph > 0 ? "+photographs" : "+table");
+    const double path_s = usual_s_per_path(plan), of_fit = plan->in->doc->scan.given ? fit_share : 1.0;
+    const double n_path = pipeline_plan_usual_paths(plan) * (double)plan->in->n_model;
     const struct job_clock_work work = {.key = key,
-                                        .units = n_path * path_s / fit_s_per_path / n_thread(c),
+                                        .units = n_path * path_s / fit_s_per_path / n_thread(plan),
                                         .usual_s = fit_s_per_path / of_fit,
                                         .log_sd = sd_of_fit,
                                         .predicts_end = true};
-    worker_status_plan(c->status, i, &work);
-    c->fit_path = fmax(n_path / of_fit, 1.0);
+    worker_status_plan(plan->status, i, &work);
+    plan->fit_path = fmax(n_path / of_fit, 1.0);
 }
 
 /* Seconds that a path has taken in this job's fits; NaN before their end. */
-static double s_per_path(const struct pipeline_context *c)
+static double s_per_path(const struct job_plan *plan)
 {
+    const struct model_fit *fits = plan->fit->model;
     double n = 0.0, s = 0.0;
-    for (size_t i = 0; i < c->n_model; i++) {
-        n += (double)c->model[i].fit.n_path;
-        s += c->model[i].fit.wall_s;
+    for (size_t i = 0; i < plan->in->n_model && fits != NULL; i++) {
+        n += (double)fits[i].result.n_path;
+        s += fits[i].result.wall_s;
     }
     return n > 0.0 ? s / n : NAN;
 }
 
-/* Paths of a model's fit: of the best one after the fit, before it those that are expected. */
-static double fit_paths(const struct pipeline_context *c)
+/* The best model by what is known: before the validation, its errors count as 0. */
+static size_t best_model(const struct job_plan *plan)
 {
-    const double n_model = (double)c->n_model, of_fit = c->doc->scan.given ? fit_share : 1.0;
-    if (isfinite(s_per_path(c))) return (double)c->model[pipeline_best_model(c)].fit.n_path;
-    return of_fit * c->fit_path / n_model;
+    static const struct validation none;
+    struct pipeline_model view[JOB_MAX_MODEL];
+    for (size_t i = 0; i < plan->in->n_model; i++)
+        view[i] = (struct pipeline_model){.setup = &plan->in->model[i],
+                                          .fit = &plan->fit->model[i],
+                                          .validation =
+                                              plan->validation->model != NULL ? &plan->validation->model[i] : &none};
+    return pipeline_best_model(view, plan->in->n_model);
 }
 
-static double validation_paths(const struct pipeline_context *c)
+/* Paths of a model's fit: of the best one after the fit, before it those that are expected. */
+static double fit_paths(const struct job_plan *plan)
 {
-    const double n_fit = fit_paths(c);
-    return validated_path * (double)c->n_model *
-           (pipeline_validation_paths(c, n_fit) + pipeline_factor_paths(c, n_fit) + pipeline_pilot_paths(n_fit));
+    const double n_model = (double)plan->in->n_model, of_fit = plan->in->doc->scan.given ? fit_share : 1.0;
+    if (isfinite(s_per_path(plan))) return (double)plan->fit->model[best_model(plan)].result.n_path;
+    return of_fit * plan->fit_path / n_model;
+}
+
+static double validation_paths(const struct job_plan *plan)
+{
+    const double n_fit = fit_paths(plan);
+    return validated_path * (double)plan->in->n_model *
+           (pipeline_validation_paths(&plan->in->doc->fit, n_fit) + pipeline_factor_paths(&plan->in->doc->fit, n_fit) +
+            pipeline_pilot_paths(n_fit));
 }
 
 /* Paths of a report. Its certificate runs on one thread. */
-static double report_paths(const struct pipeline_context *c)
+static double report_paths(const struct job_plan *plan)
 {
-    const double n_fit = fit_paths(c), path_s = s_per_path(c),
-                 certificate_path_s = isfinite(path_s) ? path_s : usual_s_per_path(c) / n_thread(c);
-    return result_renderings_paths(c, n_fit) + surface_pictures_paths(c) + twin_result_paths(c) +
-           (c->doc->scan.given ? scan_page_paths : page_paths) + c->certificate_s / certificate_path_s;
+    const double n_fit = fit_paths(plan), path_s = s_per_path(plan),
+                 certificate_path_s = isfinite(path_s) ? path_s : usual_s_per_path(plan) / n_thread(plan);
+    return result_renderings_paths(&plan->in->doc->results, plan->in->rows.observation.n, n_fit) +
+           surface_pictures_paths(&plan->in->doc->results) + twin_result_paths(&plan->in->doc->results) +
+           (plan->in->doc->scan.given ? scan_page_paths : page_paths) + plan->certificate_s / certificate_path_s;
 }
 
 /* A stage of n_path paths after the fit, which is stage i_fit and counts as a number of paths before it has ended. */
-static void plan_after_fit(struct pipeline_context *c, size_t i, size_t i_fit, double n_path)
+static void plan_after_fit(struct job_plan *plan, size_t i, size_t i_fit, double n_path)
 {
     static const char *const key[] = {"validation", "report"};
     const char *const own = key[i - i_fit - 1];
-    const double path_s = s_per_path(c), of_fit = c->doc->scan.given ? fit_share : 1.0;
+    const double path_s = s_per_path(plan), of_fit = plan->in->doc->scan.given ? fit_share : 1.0;
     if (isfinite(path_s))
-        worker_status_plan_own(c->status, i, own, fmax(n_path * path_s, least_s));
+        worker_status_plan_own(plan->status, i, own, fmax(n_path * path_s, least_s));
     else
-        worker_status_plan_share(c->status, i, own, n_path * of_fit / ((double)c->n_model * fit_paths(c)), i_fit);
+        worker_status_plan_share(plan->status, i, own, n_path * of_fit / ((double)plan->in->n_model * fit_paths(plan)),
+                                 i_fit);
 }
 
-static void plan_pictures(struct pipeline_context *c, size_t i)
+static void plan_pictures(struct job_plan *plan, size_t i)
 {
-    const struct job_clock_work work = {.key = "report.pictures",
-                                        .units = (surface_pictures_paths(c) + twin_result_paths(c)) / n_thread(c),
-                                        .usual_s = render_s_per_path,
-                                        .log_sd = sd_of_fit};
-    worker_status_plan(c->status, i, &work);
+    const struct job_clock_work work = {
+        .key = "report.pictures",
+        .units = (surface_pictures_paths(&plan->in->doc->results) + twin_result_paths(&plan->in->doc->results)) /
+                 n_thread(plan),
+        .usual_s = render_s_per_path,
+        .log_sd = sd_of_fit};
+    worker_status_plan(plan->status, i, &work);
 }
 
-void pipeline_plan_fit_paths(struct pipeline_context *c, double n_path)
+void pipeline_plan_fit_paths(struct job_plan *plan, double n_path)
 {
     size_t n_stage;
     const struct pipeline_stage_info *info = pipeline_stage_table(&n_stage);
-    if (!(c->stage_fraction > 0.0)) return;
-    c->fit_path = n_path / c->stage_fraction;
+    if (!(plan->stage_fraction > 0.0)) return;
+    plan->fit_path = n_path / plan->stage_fraction;
     for (size_t i = 0; i < n_stage; i++)
         if (strcmp(info[i].name, "validation") == 0 || strcmp(info[i].name, "report") == 0)
-            pipeline_plan_stage(c, info[i].name, i);
+            pipeline_plan_stage(plan, info[i].name, i);
 }
 
-void pipeline_plan_hollow(struct pipeline_context *c)
+void pipeline_plan_hollow(struct job_plan *plan, const size_t n[3])
 {
+    memcpy(plan->geometry.n, n, sizeof plan->geometry.n);
     const size_t i_volume = 0; /* the first of the stage table */
-    plan_voxels(c, i_volume, &hollow_stage, pipeline_plan_voxels(c));
+    plan_voxels(plan, i_volume, &hollow_stage, pipeline_plan_voxels(plan));
 }
 
-void pipeline_plan_stage(struct pipeline_context *c, const char *name, size_t i)
+void pipeline_plan_stage(struct job_plan *plan, const char *name, size_t i)
 {
     const struct job_clock_work rest = {.key = name, .units = 1.0, .usual_s = least_s, .log_sd = sd_of_rest},
                                 profile = {.key = "fit.profile",
-                                           .units = (double)c->n_model / n_thread(c),
+                                           .units = (double)plan->in->n_model / n_thread(plan),
                                            .usual_s = usual_profile_s,
                                            .log_sd = sd_of_rest};
-    if (job_document_kind(c->doc) == JOB_OF_PROFILE)
-        worker_status_plan(c->status, i, strcmp(name, "fit") == 0 ? &profile : &rest);
+    if (plan->in->kind == JOB_OF_PROFILE)
+        worker_status_plan(plan->status, i, strcmp(name, "fit") == 0 ? &profile : &rest);
     else if (strcmp(name, "volume") == 0)
-        plan_voxels(c, i, c->doc->scan.hollow_fibers > 0 ? &hollow_stage : &read_stage, pipeline_plan_voxels(c));
+        plan_voxels(plan, i, plan->in->doc->scan.hollow_fibers > 0 ? &hollow_stage : &read_stage,
+                    pipeline_plan_voxels(plan));
     else if (strcmp(name, "orientation") == 0)
-        plan_voxels(c, i, reconstruct_redirects(&c->geometry) ? &redirect_stage : &orientation_stage, n_material(c));
-    else if (strcmp(name, "fibers") == 0 && c->doc->scan.given)
-        plan_fibers(c, i);
-    else if (strcmp(name, "fibers") == 0 && pipeline_plan_cloth_size(c) > 0.0)
-        plan_cloth(c, i);
+        plan_voxels(plan, i, reconstruct_redirects(&plan->geometry) ? &redirect_stage : &orientation_stage,
+                    n_material(plan));
+    else if (strcmp(name, "fibers") == 0 && plan->in->doc->scan.given)
+        plan_fibers(plan, i);
+    else if (strcmp(name, "fibers") == 0 && pipeline_plan_cloth_size(plan) > 0.0)
+        plan_cloth(plan, i);
     else if (strcmp(name, "directions") == 0)
-        plan_voxels(c, i, &transfer_stage, n_material(c));
+        plan_voxels(plan, i, &transfer_stage, n_material(plan));
     else if (strcmp(name, "fit") == 0)
-        plan_fit(c, i);
+        plan_fit(plan, i);
     else if (strcmp(name, "validation") == 0)
-        plan_after_fit(c, i, i - 1, validation_paths(c));
-    else if (strcmp(name, "report") == 0 && job_document_kind(c->doc) == JOB_OF_PICTURES)
-        plan_pictures(c, i);
-    else if (strcmp(name, "report") == 0 && job_document_kind(c->doc) == JOB_OF_GEOMETRY)
-        plan_voxels(c, i, &report_stage, pipeline_plan_voxels(c));
+        plan_after_fit(plan, i, i - 1, validation_paths(plan));
+    else if (strcmp(name, "report") == 0 && plan->in->kind == JOB_OF_PICTURES)
+        plan_pictures(plan, i);
+    else if (strcmp(name, "report") == 0 && plan->in->kind == JOB_OF_GEOMETRY)
+        plan_voxels(plan, i, &report_stage, pipeline_plan_voxels(plan));
     else if (strcmp(name, "report") == 0)
-        plan_after_fit(c, i, i - 2, report_paths(c));
+        plan_after_fit(plan, i, i - 2, report_paths(plan));
     else
-        worker_status_plan(c->status, i, &rest);
+        worker_status_plan(plan->status, i, &rest);
+}
+
+void job_plan_init(struct job_plan *plan, const struct stage_tools *tools, const struct job_inputs *in)
+{
+    static const struct fit_output no_fit;
+    static const struct validation_output no_validation;
+    *plan = (struct job_plan){.tools = tools,
+                              .status = tools->status,
+                              .in = in,
+                              .fit = &no_fit,
+                              .validation = &no_validation,
+                              .path_share = 1.0};
 }

@@ -15,7 +15,7 @@ static const double layers = 2.5, least_path_share = 0.1;
 enum { FIBER_FILE_MOST_BYTES = 4 << 20 };
 
 /* Processor time of preparing a model once; 0 where it cannot be prepared, which the fit reports. */
-static double preparation_s(const struct pipeline_model *m)
+static double preparation_s(const struct model_setup *m)
 {
     double param[MODEL_MAX_PARAM];
     struct scattering_state *surface = NULL;
@@ -31,7 +31,7 @@ static double preparation_s(const struct pipeline_model *m)
     return s == STATUS_OK ? took_s : 0.0;
 }
 
-static double certificate_s(const struct pipeline_model *m)
+static double certificate_s(const struct model_setup *m)
 {
     const double once_s = preparation_s(m), again_s = preparation_s(m); /* the first may wait for memory */
     size_t n_free = 0;
@@ -51,26 +51,25 @@ double plan_probe_path_share(const struct fiber_set *f)
     return fmax(1.0 - exp(-area_m2 / (layers * f->tile_size_m[0] * f->tile_size_m[1])), least_path_share);
 }
 
-static double path_share_of_file(const struct pipeline_context *c)
+static double path_share_of_file(const struct job_plan *plan)
 {
     char path[WORKER_PATH_BYTES];
     struct stat file;
     struct fiber_set f;
     double share = 1.0;
-    if (c->doc->cloth.fiber_file[0] == '\0') return share;
-    worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->cloth.fiber_file, path);
+    if (plan->in->doc->cloth.fiber_file[0] == '\0') return share;
+    worker_folder_path(plan->tools->folder, JOB_FOLDER_INPUT, plan->in->doc->cloth.fiber_file, path);
     if (stat(path, &file) != 0 || file.st_size > FIBER_FILE_MOST_BYTES) return share;
     fiber_set_init(&f);
-    if (fiber_file_read(path, c->doc, &f, NULL) == STATUS_OK) share = plan_probe_path_share(&f);
+    if (fiber_file_read(path, &plan->in->doc->cloth, &f, NULL) == STATUS_OK) share = plan_probe_path_share(&f);
     fiber_set_release(&f);
     return share;
 }
 
-void plan_probe_take(struct pipeline_context *c)
+void plan_probe_take(struct job_plan *plan)
 {
-    const bool fits = job_document_kind(c->doc) != JOB_OF_GEOMETRY && job_document_kind(c->doc) != JOB_OF_PICTURES &&
-                      job_document_kind(c->doc) != JOB_OF_PROFILE;
-    c->certificate_s = 0.0;
-    for (size_t i = 0; fits && i < c->n_model; i++) c->certificate_s += certificate_s(&c->model[i]);
-    c->path_share = path_share_of_file(c);
+    const bool fits = plan->in->kind == JOB_OF_FIT;
+    plan->certificate_s = 0.0;
+    for (size_t i = 0; fits && i < plan->in->n_model; i++) plan->certificate_s += certificate_s(&plan->in->model[i]);
+    plan->path_share = path_share_of_file(plan);
 }

@@ -42,16 +42,16 @@ static json_t *mean_and_largest(const double *v)
     return json_pack("{s:f, s:f}", "mean", mean, "largest", largest);
 }
 
-json_t *photograph_color_json(const struct photograph_process *k, const struct job_document *doc)
+json_t *photograph_color_json(const struct photograph_process *k, const struct job_setup *setup)
 {
     if (!k->has_color) return json_null();
-    json_t *json = json_pack("{s:s, s:s, s:o}", "kind", doc->setup.has_chart ? "chart" : "white", "file",
-                             doc->setup.has_chart ? doc->setup.chart.file : doc->setup.white.file, "matrix",
+    json_t *json = json_pack("{s:s, s:s, s:o}", "kind", setup->has_chart ? "chart" : "white", "file",
+                             setup->has_chart ? setup->chart.file : setup->white.file, "matrix",
                              json_number_list(k->matrix, 9, 1.0));
-    if (!doc->setup.has_chart) return json;
+    if (!setup->has_chart) return json;
     json_t *patches = json_array();
     for (size_t i = 0; i < COLOR_CHART_PATCHES; i++) json_array_append_new(patches, patch_json(&k->chart, i));
-    json_object_set_new(json, "edition", json_string(doc->setup.chart_from_2014 ? "from_2014" : "before_2014"));
+    json_object_set_new(json, "edition", json_string(setup->chart_from_2014 ? "from_2014" : "before_2014"));
     json_object_set_new(json, "found_automatically", json_boolean(k->chart.found_automatically));
     json_object_set_new(json, "corners_px", json_number_list(k->chart.corner_px, 8, 1.0));
     json_object_set_new(json, "delta_e_2000_before", mean_and_largest(k->chart.delta_e_before));

@@ -37,7 +37,7 @@
 #define SELVEDGE_OPTIMIZER_RESULT_JSON_H
 
 #include "base/version.h"
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/report.h"
 
 #define RESULT_PROGRAM "selvedge-worker " SELVEDGE_VERSION
 
@@ -52,17 +52,17 @@ double result_png_exposure(const struct observation_set *o);
 void result_rendered_mean(const struct pipeline_model *m, size_t i, double mean[3], double se[3]);
 /* Relative error of row i by model m (objective_row_error), and its standard error: the one error of a row that
  * results, summary, report and dashboard show. */
-double result_row_error(const struct pipeline_context *c, const struct pipeline_model *m, size_t i, double *se);
+double result_row_error(const struct report *report, const struct pipeline_model *m, size_t i, double *se);
 
 /* The same of a job that ends with the geometry: without parameters, rows and models. */
-status result_geometry_json_write(struct pipeline_context *c, struct error *err);
+status result_geometry_json_write(struct report *report, struct error *err);
 /* The same of a job that renders given parameters: without rows, models and a method. */
-status result_pictures_json_write(struct pipeline_context *c, struct error *err);
+status result_pictures_json_write(struct report *report, struct error *err);
 /* Adds what every job has to its own part of result.json, writes the file, and releases json. */
-status result_json_finish(struct pipeline_context *c, json_t *json, struct error *err);
+status result_json_finish(struct report *report, json_t *json, struct error *err);
 /* "parameters" of a model. */
 json_t *result_parameters_json(const struct pipeline_model *m);
-status result_json_write(struct pipeline_context *c, struct error *err);
-status result_summary_write(struct pipeline_context *c, struct error *err);
+status result_json_write(struct report *report, struct error *err);
+status result_summary_write(struct report *report, struct error *err);
 
 #endif

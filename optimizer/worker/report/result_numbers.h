@@ -2,15 +2,15 @@
 #ifndef SELVEDGE_OPTIMIZER_RESULT_NUMBERS_H
 #define SELVEDGE_OPTIMIZER_RESULT_NUMBERS_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/report.h"
 
 #include <jansson.h>
 #include <stdio.h>
 
 /* Adds "cloth_numbers" and "cloth_screening" to the results of a model's fit (docs/file-formats.md); nothing when no
  * number is fitted. */
-void result_numbers_put(json_t *json, const struct pipeline_context *c, const struct pipeline_model *m);
+void result_numbers_put(json_t *json, const struct report *report, const struct pipeline_model *m);
 /* Writes a line for each number; nothing when no number is fitted. */
-void result_numbers_print(const struct pipeline_context *c, const struct pipeline_model *m, FILE *out);
+void result_numbers_print(const struct report *report, const struct pipeline_model *m, FILE *out);
 
 #endif

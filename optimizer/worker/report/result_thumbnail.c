@@ -67,30 +67,30 @@ static double exposure_of(const struct image *im)
     return level > 0 ? bright_level / level : 1;
 }
 
-static status put(const struct pipeline_context *c, status written, const char *temporary, struct error *err)
+static status put(const struct report *report, status written, const char *temporary, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, JOB_THUMBNAIL, path);
-    status s = written == STATUS_OK ? worker_folder_check(c->folder, err) : written;
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, JOB_THUMBNAIL, path);
+    status s = written == STATUS_OK ? worker_folder_check(report->in.job->tools->folder, err) : written;
     if (s == STATUS_OK) return durable_rename(temporary, path, err);
     unlink(temporary);
     return s;
 }
 
-status result_thumbnail_of_image(const struct pipeline_context *c, const struct image *im, struct error *err)
+status result_thumbnail_of_image(const struct report *report, const struct image *im, struct error *err)
 {
     char temporary[WORKER_PATH_BYTES];
     struct image small;
     const struct source source = {im->pixel, NULL, im->width, im->height, im->n_channel};
     status s = shrink(&source, &small, err);
     if (s != STATUS_OK) return s;
-    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, ".part-" JOB_THUMBNAIL, temporary);
-    s = put(c, image_write_png(&small, exposure_of(&small), temporary, err), temporary, err);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, ".part-" JOB_THUMBNAIL, temporary);
+    s = put(report, image_write_png(&small, exposure_of(&small), temporary, err), temporary, err);
     image_release(&small);
     return s;
 }
 
-status result_thumbnail_of_bytes(const struct pipeline_context *c, const uint8_t *rgb, size_t width, size_t height,
+status result_thumbnail_of_bytes(const struct report *report, const uint8_t *rgb, size_t width, size_t height,
                                  struct error *err)
 {
     char temporary[WORKER_PATH_BYTES];
@@ -101,10 +101,10 @@ status result_thumbnail_of_bytes(const struct pipeline_context *c, const uint8_t
     size_t n = small.width * small.height * 3;
     uint8_t *bytes = malloc(n);
     for (size_t i = 0; bytes != NULL && i < n; i++) bytes[i] = (uint8_t)lrintf(small.pixel[i]);
-    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, ".part-" JOB_THUMBNAIL, temporary);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, ".part-" JOB_THUMBNAIL, temporary);
     s = bytes == NULL ? error_set(err, STATUS_NO_MEMORY, "cannot make a thumbnail: out of memory")
                       : image_write_png_rgb8(bytes, small.width, small.height, temporary, err);
-    s = put(c, s, temporary, err);
+    s = put(report, s, temporary, err);
     free(bytes);
     image_release(&small);
     return s;

@@ -117,8 +117,8 @@ static void prepare(const struct worker_folder *folder, const struct job_documen
     c->pdf.order_fd = -1;
     if (doc == NULL) return;
     if (doc->results.export_pdf) report_pdf_start_helper(folder, &c->pdf);
-    pipeline_link_geometry(folder, doc);
-    pipeline_copy_profile(folder, doc);
+    pipeline_link_geometry(folder, doc->scan.geometry_job);
+    pipeline_copy_profile(folder, doc->fit.profile_job);
 }
 
 static bool by_hand(const struct worker_folder *folder)

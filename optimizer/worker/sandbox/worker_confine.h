@@ -6,7 +6,11 @@
 #ifndef SELVEDGE_OPTIMIZER_WORKER_CONFINE_H
 #define SELVEDGE_OPTIMIZER_WORKER_CONFINE_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "base/status.h"
+#include "optimizer/worker/report/page/pdf_helper.h"
+
+#include <stdbool.h>
+#include <stddef.h>
 
 /* Whether a worker runs without a sandbox, with what the kernel offers, or not at all unless that is everything. */
 enum confine_mode { CONFINE_OFF, CONFINE_AUTO, CONFINE_REQUIRED };

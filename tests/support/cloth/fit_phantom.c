@@ -155,8 +155,8 @@ static void views(struct phantom_view_table *t, struct configuration *configurat
     phantom_view_table_builtin(t);
     for (size_t n = 0; n < FIT_N_VIEW; n++) {
         const struct job_photograph *v = &t->view[n];
-        configuration[n] = observation_configuration(&set_up, v->light_theta_deg, v->light_phi_deg, v->camera_theta_deg,
-                                                     v->camera_phi_deg, v->cloth_rotation_deg);
+        configuration[n] = observation_configuration(&set_up.setup, v->light_theta_deg, v->light_phi_deg,
+                                                     v->camera_theta_deg, v->camera_phi_deg, v->cloth_rotation_deg);
     }
 }
 

@@ -95,8 +95,8 @@ static status add_row(const brdf_reader *r, const void *handle, const char *name
                       struct error *err)
 {
     struct observation item = {.set = row->set, .weight = 1.0};
-    item.configuration = observation_configuration(doc, row->light_theta_deg, row->light_phi_deg, row->camera_theta_deg,
-                                                   row->camera_phi_deg, row->cloth_rotation_deg);
+    item.configuration = observation_configuration(&doc->setup, row->light_theta_deg, row->light_phi_deg,
+                                                   row->camera_theta_deg, row->camera_phi_deg, row->cloth_rotation_deg);
     if (radiance(r, handle, &item.configuration, item.mean_rgb)) {
         item.configuration.n_rotation = r->isotropic(handle) ? CONFIGURATION_ALL_ROTATIONS : 0;
         if (r->isotropic(handle)) item.configuration.cloth_rotation_rad = 0.0;

@@ -33,12 +33,11 @@ static const char style[] =
     ".6em; "
     "font-size: 12px; } }\n";
 
-static status write_text(const struct pipeline_context *c, const char *name, const char *text, size_t n,
-                         struct error *err)
+static status write_text(const struct report *report, const char *name, const char *text, size_t n, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, name, path);
-    return worker_folder_replace(c->folder, path, text, n, err);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, name, path);
+    return worker_folder_replace(report->in.job->tools->folder, path, text, n, err);
 }
 
 static json_t *lengths_json(const struct fiber_lengths *l)
@@ -56,13 +55,13 @@ static json_t *lengths_json(const struct fiber_lengths *l)
     return json;
 }
 
-static status write_json(struct pipeline_context *c, const struct fiber_lengths *l, struct error *err)
+static status write_json(struct report *report, const struct fiber_lengths *l, struct error *err)
 {
-    json_t *json = json_pack("{s:i, s:s, s:o, s:o, s:o, s:s}", "format", 1, "sample", c->doc->sample, "geometry",
-                             result_geometry_json(c), "lengths", lengths_json(l), "warnings", result_warnings_json(c),
-                             "page", "quality.html");
+    json_t *json = json_pack("{s:i, s:s, s:o, s:o, s:o, s:s}", "format", 1, "sample", report->in.sample, "geometry",
+                             result_geometry_json(report), "lengths", lengths_json(l), "warnings",
+                             result_warnings_json(report), "page", "quality.html");
     char *text = json_dumps(json, JSON_REAL_PRECISION(17) | JSON_INDENT(1));
-    status s = text != NULL ? write_text(c, "quality.json", text, strlen(text), err)
+    status s = text != NULL ? write_text(report, "quality.json", text, strlen(text), err)
                             : error_set(err, STATUS_NO_MEMORY, "cannot write the quality report: out of memory");
     free(text);
     json_decref(json);
@@ -70,39 +69,40 @@ static status write_json(struct pipeline_context *c, const struct fiber_lengths 
 }
 
 /* Writes the file `name` with the output of `print`. */
-static status write_printed(struct pipeline_context *c, const struct fiber_lengths *l, const char *name,
-                            void (*print)(struct pipeline_context *c, const struct fiber_lengths *l, FILE *out),
+static status write_printed(struct report *report, const struct fiber_lengths *l, const char *name,
+                            void (*print)(struct report *report, const struct fiber_lengths *l, FILE *out),
                             struct error *err)
 {
     char *text = NULL;
     size_t n = 0;
     FILE *out = open_memstream(&text, &n);
     if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the quality report: out of memory");
-    print(c, l, out);
-    status s = fclose(out) == 0 ? write_text(c, name, text, n, err)
+    print(report, l, out);
+    status s = fclose(out) == 0 ? write_text(report, name, text, n, err)
                                 : error_set(err, STATUS_NO_MEMORY, "cannot write the quality report: out of memory");
     free(text);
     return s;
 }
 
-static void print_plot(struct pipeline_context *c, const struct fiber_lengths *l, FILE *out)
+static void print_plot(struct report *report, const struct fiber_lengths *l, FILE *out)
 {
-    fiber_lengths_plot(l, fmax(c->fiber.tile_size_m[0], c->fiber.tile_size_m[1]), out);
+    fiber_lengths_plot(l, fmax(report->in.made->fiber.tile_size_m[0], report->in.made->fiber.tile_size_m[1]), out);
 }
 
-static void print_sections(struct pipeline_context *c, const struct fiber_lengths *l, FILE *out)
+static void print_sections(struct report *report, const struct fiber_lengths *l, FILE *out)
 {
     (void)l;
-    section_report_plot(c, out);
+    section_report_plot(report, out);
 }
 
 /* Writes pictures/top.png: the heights of the fibers of one tile, seen from above with y up. */
-static status write_top(struct pipeline_context *c, struct error *err)
+static status write_top(struct report *report, struct error *err)
 {
     size_t n[2];
     uint8_t *grey = NULL, *rgb = NULL;
-    double cover, pixel_m = fmax(c->fiber.tile_size_m[0], c->fiber.tile_size_m[1]) / TOP_PIXELS;
-    status s = fiber_top_view(&c->fiber, pixel_m, n, &grey, &cover, err);
+    double cover,
+        pixel_m = fmax(report->in.made->fiber.tile_size_m[0], report->in.made->fiber.tile_size_m[1]) / TOP_PIXELS;
+    status s = fiber_top_view(&report->in.made->fiber, pixel_m, n, &grey, &cover, err);
     if (s != STATUS_OK) return s;
     rgb = malloc(3 * n[0] * n[1]);
     if (rgb == NULL) {
@@ -112,21 +112,21 @@ static status write_top(struct pipeline_context *c, struct error *err)
     for (size_t y = 0; y < n[1]; y++)
         for (size_t x = 0; x < n[0]; x++)
             for (size_t q = 0; q < 3; q++) rgb[3 * ((n[1] - 1 - y) * n[0] + x) + q] = grey[y * n[0] + x];
-    s = result_picture_write(c, "top", rgb, n[0], n[1], err);
+    s = result_picture_write(report, "top", rgb, n[0], n[1], err);
     free(grey);
     free(rgb);
     return s;
 }
 
-status quality_write(struct pipeline_context *c, struct error *err)
+status quality_write(struct report *report, struct error *err)
 {
     struct fiber_lengths l;
-    status s = fiber_lengths_measure(&c->fiber, &l, err);
-    if (s == STATUS_OK) s = write_top(c, err);
-    if (s == STATUS_OK) s = write_printed(c, &l, "pictures/fiber-lengths.svg", print_plot, err);
-    if (s == STATUS_OK && section_report_applies(c))
-        s = write_printed(c, &l, "pictures/fiber-sections.svg", print_sections, err);
-    if (s == STATUS_OK) s = write_json(c, &l, err);
-    if (s == STATUS_OK) s = write_text(c, "quality.css", style, strlen(style), err);
-    return s == STATUS_OK ? write_printed(c, &l, "quality.html", quality_page, err) : s;
+    status s = fiber_lengths_measure(&report->in.made->fiber, &l, err);
+    if (s == STATUS_OK) s = write_top(report, err);
+    if (s == STATUS_OK) s = write_printed(report, &l, "pictures/fiber-lengths.svg", print_plot, err);
+    if (s == STATUS_OK && section_report_applies(report))
+        s = write_printed(report, &l, "pictures/fiber-sections.svg", print_sections, err);
+    if (s == STATUS_OK) s = write_json(report, &l, err);
+    if (s == STATUS_OK) s = write_text(report, "quality.css", style, strlen(style), err);
+    return s == STATUS_OK ? write_printed(report, &l, "quality.html", quality_page, err) : s;
 }

@@ -4,14 +4,14 @@
 #ifndef SELVEDGE_OPTIMIZER_QUALITY_H
 #define SELVEDGE_OPTIMIZER_QUALITY_H
 
-#include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/report/cloth/fiber_lengths.h"
+#include "optimizer/worker/report/report.h"
 
 #include <stdio.h>
 
 /* Writes all files of the report. Call it after result_geometry_write, which makes the slices. */
-status quality_write(struct pipeline_context *c, struct error *err);
+status quality_write(struct report *report, struct error *err);
 /* Writes quality.html to out. */
-void quality_page(struct pipeline_context *c, const struct fiber_lengths *l, FILE *out);
+void quality_page(struct report *report, const struct fiber_lengths *l, FILE *out);
 
 #endif

@@ -40,48 +40,49 @@ static void open_table(FILE *out, const char *title) { fprintf(out, "<h2>%s</h2>
 static void close_table(FILE *out) { fputs("</table>\n", out); }
 
 /* How many radii the fibers have: whether one class has fibers of different radius, in words. */
-static const char *radii_in_words(const struct pipeline_context *c)
+static const char *radii_in_words(const struct report *report)
 {
-    const struct fiber_set *f = &c->fiber;
+    const struct fiber_set *f = &report->in.made->fiber;
     float first[3] = {0.0f, 0.0f, 0.0f};
     for (size_t i = 0; i < f->n_fiber; i++) {
         float *of_class = &first[f->axis_class[i]];
         if (*of_class == 0.0f) *of_class = f->radius_m[i];
         if (f->radius_m[i] != *of_class) return "every fiber has its own; the table has the mean of a class";
     }
-    return c->geometry.radius_per_axis ? "one for each class" : "one for all fibers";
+    return report->in.made->geometry.radius_per_axis ? "one for each class" : "one for all fibers";
 }
 
-static void print_fibers(const struct pipeline_context *c, const struct fiber_lengths *l, FILE *out)
+static void print_fibers(const struct report *report, const struct fiber_lengths *l, FILE *out)
 {
     static const char *const name[] = {"along x (weft)", "along y (warp)", "along z (pile)"};
-    const struct reconstruct_report *g = &c->geometry;
+    const struct reconstruct_report *g = &report->in.made->geometry;
     fputs("<h2>Fibers</h2>\n<table>\n<tr><th>class</th><th class=\"number\">fibers</th><th class=\"number\">length, "
           "mm</th><th class=\"number\">radius, um</th>",
           out);
-    if (c->doc->scan.given)
+    if (report->in.job->scan->given)
         fputs("<th class=\"number\">centers</th><th class=\"number\">chains</th><th class=\"number\">dropped as "
               "short</th>",
               out);
     fputs("</tr>\n", out);
     for (int k = 0; k < 3; k++) {
         double radius = 0.0;
-        for (size_t i = 0; i < c->fiber.n_fiber; i++)
-            if (c->fiber.axis_class[i] == k) radius += (double)c->fiber.radius_m[i] / (double)l->n[k];
+        for (size_t i = 0; i < report->in.made->fiber.n_fiber; i++)
+            if (report->in.made->fiber.axis_class[i] == k)
+                radius += (double)report->in.made->fiber.radius_m[i] / (double)l->n[k];
         fprintf(out, "<tr><td>%s</td><td class=\"number\">%zu</td><td class=\"number\">%.3g</td><td class=\"number\">",
                 name[k], l->n[k], l->total_m[k] * 1e3);
         if (l->n[k] > 0) fprintf(out, "%.2f", radius * 1e6);
-        if (l->n[k] > 0 && c->doc->scan.given && isfinite(g->radius_se_m[k]))
+        if (l->n[k] > 0 && report->in.job->scan->given && isfinite(g->radius_se_m[k]))
             fprintf(out, " &plusmn; %.2f", g->radius_se_m[k] * 1e6);
         fputs("</td>", out);
-        if (c->doc->scan.given)
+        if (report->in.job->scan->given)
             fprintf(out, "<td class=\"number\">%zu</td><td class=\"number\">%zu</td><td class=\"number\">%zu</td>",
                     g->n_center[k], g->n_chain[k], g->n_short_dropped[k]);
         fputs("</tr>\n", out);
     }
     fputs("</table>\n", out);
-    if (c->doc->scan.given)
-        fprintf(out, "<p>Radius: %s, with standard errors where it was measured.</p>\n", radii_in_words(c));
+    if (report->in.job->scan->given)
+        fprintf(out, "<p>Radius: %s, with standard errors where it was measured.</p>\n", radii_in_words(report));
     fprintf(out, "<p>Lengths: median %.3g mm, mean %.3g mm, 80 %% between %.3g and %.3g mm, longest %.3g mm.</p>\n",
             l->median_m * 1e3, l->mean_m * 1e3, l->p10_m * 1e3, l->p90_m * 1e3, l->longest_m * 1e3);
     fputs("<figure><img class=\"plot\" src=\"pictures/fiber-lengths.svg\" alt=\"length distribution of the "
@@ -92,24 +93,24 @@ static void print_fibers(const struct pipeline_context *c, const struct fiber_le
 }
 
 /* How sure the fibers are. */
-static void print_errors(const struct pipeline_context *c, FILE *out)
+static void print_errors(const struct report *report, FILE *out)
 {
-    const struct reconstruct_report *g = &c->geometry;
-    if (c->fiber.n_fiber > 0 && isnan(c->doc->scan.radius_um)) {
+    const struct reconstruct_report *g = &report->in.made->geometry;
+    if (report->in.made->fiber.n_fiber > 0 && isnan(report->in.job->scan->radius_um)) {
         row(out, "spread of the radii", "standard deviation between fibers over the mean, without errors", "%.1f %%",
             100.0 * g->radius_spread);
         row(out, "error of the radius of a fiber", "typical standard error", "%.2f um", g->single_radius_se_m * 1e6);
     }
-    if (c->fiber.n_fiber > 0 && g->axis_position_se_m > 0.0)
+    if (report->in.made->fiber.n_fiber > 0 && g->axis_position_se_m > 0.0)
         row(out, "error of the axes", "standard errors of position and direction by the noise of the scan",
             "%.2f um, %.2f&deg;", g->axis_position_se_m * 1e6, angle_to_deg(g->axis_direction_se_rad));
 }
 
 /* The diameter that the scales of all steps follow from. */
-static void print_diameter(const struct pipeline_context *c, FILE *out)
+static void print_diameter(const struct report *report, FILE *out)
 {
-    const struct reconstruct_report *g = &c->geometry;
-    const bool given = !isnan(c->doc->scan.fiber_diameter_voxel);
+    const struct reconstruct_report *g = &report->in.made->geometry;
+    const bool given = !isnan(report->in.job->scan->fiber_diameter_voxel);
     row(out, "fiber diameter",
         given ? "given by the job; from 7 voxels on, touching fibers can be separated"
               : "measured before tracing; from 7 voxels on, touching fibers can be separated",
@@ -119,9 +120,9 @@ static void print_diameter(const struct pipeline_context *c, FILE *out)
             "%.1f voxels", g->other_diameter_voxel);
 }
 
-static void print_scan(const struct pipeline_context *c, FILE *out)
+static void print_scan(const struct report *report, FILE *out)
 {
-    const struct reconstruct_report *g = &c->geometry;
+    const struct reconstruct_report *g = &report->in.made->geometry;
     open_table(out, "Against the scan");
     row(out, "fibers in the scan", "whether it shows single fibers", "%s", grade_verdict_name(g->grade.verdict));
     row(out, "length that is sure", "share of the traced length where the density shows single fibers", "%.0f %%",
@@ -136,8 +137,8 @@ static void print_scan(const struct pipeline_context *c, FILE *out)
     row(out, "voxels kept", "those with a clear direction", "%zu", g->n_kept_voxel);
     row(out, "gaps bridged", "missed centers within a fiber", "%zu", g->n_gap_bridged);
     row(out, "pieces joined", "of one fiber, end to end", "%zu", g->n_joined);
-    print_diameter(c, out);
-    print_errors(c, out);
+    print_diameter(report, out);
+    print_errors(report, out);
     row(out, "material along x, y, z", "by the directions of its voxels, also where single fibers are not resolved",
         "%.1f, %.1f, %.1f %%", 100.0 * g->axis_share[0], 100.0 * g->axis_share[1], 100.0 * g->axis_share[2]);
     row(out, "direction noise, filtered", "mean angle from voxel to voxel along the fiber", "%.2f&deg;",
@@ -226,15 +227,15 @@ static void print_seam_fibers(const struct fiber_seam *s, const char *how, FILE 
     fputs("</tr>\n", out);
 }
 
-static void print_seam(const struct pipeline_context *c, FILE *out)
+static void print_seam(const struct report *report, FILE *out)
 {
-    const struct reconstruct_report *g = &c->geometry;
+    const struct reconstruct_report *g = &report->in.made->geometry;
     fputs("<h2>Tile and seams</h2>\n<table>\n<tr><th></th><th class=\"number\">across x</th><th "
           "class=\"number\">across y</th></tr>\n",
           out);
     fprintf(out, "<tr><td>edge of the tile, mm</td><td class=\"number\">%.4f</td><td class=\"number\">%.4f</td></tr>\n",
-            c->fiber.tile_size_m[0] * 1e3, c->fiber.tile_size_m[1] * 1e3);
-    if (c->doc->scan.given) {
+            report->in.made->fiber.tile_size_m[0] * 1e3, report->in.made->fiber.tile_size_m[1] * 1e3);
+    if (report->in.job->scan->given) {
         fputs("<tr><td>density step at the seam over that of neighbouring slices (1: no seam)</td>", out);
         for (int a = 0; a < 2; a++) figure(out, g->seam_density.ratio[a]);
         fputs("</tr>\n", out);
@@ -249,7 +250,7 @@ static void print_seam(const struct pipeline_context *c, FILE *out)
         for (int a = 0; a < 2; a++) figure(out, g->seam_join.shift_m[a] * 1e6);
         fputs("</tr>\n", out);
     }
-    if (c->option.crop) {
+    if (report->in.option->crop) {
         fprintf(out, "<tr><td>mismatch of the best box (0 is a repeat, 1 is chance; used up to %.1f)</td>",
                 TILE_MOST_MISMATCH);
         for (int a = 0; a < 2; a++) figure(out, g->tile.mismatch[a]);
@@ -260,10 +261,10 @@ static void print_seam(const struct pipeline_context *c, FILE *out)
         fprintf(out, "<p>%zu pairs of ends were brought together across the seams.</p>\n", g->seam_join.n_joined);
 }
 
-static void print_chosen(const struct pipeline_context *c, FILE *out)
+static void print_chosen(const struct report *report, FILE *out)
 {
-    const struct reconstruct_report *g = &c->geometry;
-    const struct reconstruct_option *o = &c->option;
+    const struct reconstruct_report *g = &report->in.made->geometry;
+    const struct reconstruct_option *o = report->in.option;
     open_table(out, "Parameters, given or chosen");
     row(out, job_option_key(OPTION_VOXEL_SIZE), "", "%.4g, %.4g, %.4g", o->voxel_size_m[0] * 1e6,
         o->voxel_size_m[1] * 1e6, o->voxel_size_m[2] * 1e6);
@@ -291,7 +292,7 @@ static void print_chosen(const struct pipeline_context *c, FILE *out)
     close_table(out);
 }
 
-static void print_pictures(const struct pipeline_context *c, FILE *out)
+static void print_pictures(const struct report *report, FILE *out)
 {
     static const struct {
         const char *file, *text;
@@ -299,7 +300,7 @@ static void print_pictures(const struct pipeline_context *c, FILE *out)
                  {"slice-y.png", "Middle slice across y: x to the right, z up"},
                  {"slice-z.png", "Middle slice across z: x to the right, y up"}};
     fputs("<h2>Pictures</h2>\n<div class=\"slices\">\n", out);
-    for (int i = 0; i < 3 && c->doc->scan.given; i++)
+    for (int i = 0; i < 3 && report->in.job->scan->given; i++)
         fprintf(out,
                 "<figure><a href=\"pictures/%s\"><img src=\"pictures/%s\" alt=\"%s\"></a><figcaption>%s. Red crosses: "
                 "fibers that pass through.</figcaption></figure>\n",
@@ -310,32 +311,32 @@ static void print_pictures(const struct pipeline_context *c, FILE *out)
           out);
 }
 
-void quality_page(struct pipeline_context *c, const struct fiber_lengths *l, FILE *out)
+void quality_page(struct report *report, const struct fiber_lengths *l, FILE *out)
 {
     char text[600];
     fputs("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
           "content=\"width=device-width, initial-scale=1\">\n"
           "<link rel=\"icon\" href=\"data:,\">\n<link rel=\"stylesheet\" href=\"quality.css\">\n<title>Geometry of ",
           out);
-    escaped(c->doc->sample, out);
+    escaped(report->in.sample, out);
     fputs("</title>\n</head>\n<body>\n<h1>Geometry of ", out);
-    escaped(c->doc->sample, out);
+    escaped(report->in.sample, out);
     fprintf(out, "</h1>\n<p>%zu fibers from %s. The same in numbers: <a href=\"quality.json\">quality.json</a>.</p>\n",
-            c->fiber.n_fiber,
-            c->doc->scan.given                  ? "a scan"
-            : c->doc->cloth.description != NULL ? "a description of the cloth"
-                                                : "a fiber file");
-    for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++) {
+            report->in.made->fiber.n_fiber,
+            report->in.job->scan->given                  ? "a scan"
+            : report->in.job->cloth->description != NULL ? "a description of the cloth"
+                                                         : "a fiber file");
+    for (size_t i = 0; worker_status_warning(report->in.job->tools->status, i, text, sizeof text); i++) {
         fputs("<p class=\"warning\">", out);
         escaped(text, out);
         fputs("</p>\n", out);
     }
-    print_fibers(c, l, out);
-    section_report_table(c, out);
-    if (c->doc->scan.given) print_scan(c, out);
-    print_trial(&c->geometry.trial, c->doc->scan.trial, out);
-    print_seam(c, out);
-    print_pictures(c, out);
-    if (c->doc->scan.given) print_chosen(c, out);
+    print_fibers(report, l, out);
+    section_report_table(report, out);
+    if (report->in.job->scan->given) print_scan(report, out);
+    print_trial(&report->in.made->geometry.trial, report->in.job->scan->trial, out);
+    print_seam(report, out);
+    print_pictures(report, out);
+    if (report->in.job->scan->given) print_chosen(report, out);
     fputs("</body>\n</html>\n", out);
 }

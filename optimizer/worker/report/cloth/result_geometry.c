@@ -81,27 +81,29 @@ static json_t *options_json(const struct reconstruct_option *o)
 }
 
 /* The named groups of fibers; null when the cloth has one set of parameters. */
-static json_t *groups_json(const struct pipeline_context *c)
+static json_t *groups_json(const struct report *report)
 {
     size_t n_fiber[FIBER_MAX_GROUP] = {0};
-    if (c->doc->cloth.n_group < 2) return json_null();
+    if (report->in.job->cloth->n_group < 2) return json_null();
     json_t *list = json_array();
-    for (size_t i = 0; i < c->fiber.n_fiber; i++) n_fiber[c->fiber.group[i]]++;
-    for (size_t g = 0; g < c->doc->cloth.n_group; g++)
+    for (size_t i = 0; i < report->in.made->fiber.n_fiber; i++) n_fiber[report->in.made->fiber.group[i]]++;
+    for (size_t g = 0; g < report->in.job->cloth->n_group; g++)
         json_array_append_new(
-            list, json_pack("{s:s, s:o}", "name", c->doc->cloth.group[g], "n_fiber", json_count(n_fiber[g])));
+            list, json_pack("{s:s, s:o}", "name", report->in.job->cloth->group[g], "n_fiber", json_count(n_fiber[g])));
     return list;
 }
 
 /* What the photograph of the weave shows, and what of it the job has taken. */
-static json_t *texture_json(const struct pipeline_context *c)
+static json_t *texture_json(const struct report *report)
 {
-    double px_per_mm = c->doc->cloth.texture_px_per_mm;
-    json_t *json = weave_guess_json(&c->texture.guess, isnan(px_per_mm) ? 0.0 : px_per_mm), *taken = json_array();
-    for (size_t i = 0; i < c->texture.n_taken; i++) json_array_append_new(taken, json_string(c->texture.taken[i]));
+    double px_per_mm = report->in.job->cloth->texture_px_per_mm;
+    json_t *json = weave_guess_json(&report->in.texture->guess, isnan(px_per_mm) ? 0.0 : px_per_mm),
+           *taken = json_array();
+    for (size_t i = 0; i < report->in.texture->n_taken; i++)
+        json_array_append_new(taken, json_string(report->in.texture->taken[i]));
     json_object_set_new(json, "taken", taken);
-    json_object_set_new(json, "photograph", json_string(c->doc->cloth.texture));
-    json_object_set_new(json, "contradicts_draft", json_boolean(c->texture.contradicts));
+    json_object_set_new(json, "photograph", json_string(report->in.job->cloth->texture));
+    json_object_set_new(json, "contradicts_draft", json_boolean(report->in.texture->contradicts));
     return json;
 }
 
@@ -180,42 +182,30 @@ static void set_directions(json_t *json, const struct reconstruct_report *g)
 }
 
 /* The cloth of the fitted numbers, with the tile of the final fit; before the fit, that of the document. */
-static json_t *described_json(const struct pipeline_context *c)
+static json_t *described_json(const struct report *report)
 {
-    const bool fitted = c->number.i_shown > 0;
+    const bool fitted = report->in.made->i_shown > 0;
     struct cloth_description *d = malloc(sizeof *d);
     struct error unused;
     if (d == NULL) return json_null();
-    const status s =
-        cloth_description_enlarge(c->doc->cloth.description, fitted ? c->doc->cloth.final_tiles : 1, d, &unused);
-    json_t *json = s == STATUS_OK ? result_cloth_json(d, fitted ? c->number.shown : NULL, &c->cloth) : json_null();
+    const status s = cloth_description_enlarge(report->in.job->cloth->description,
+                                               fitted ? report->in.job->cloth->final_tiles : 1, d, &unused);
+    json_t *json = s == STATUS_OK
+                       ? result_cloth_json(d, fitted ? report->in.made->shown : NULL, &report->in.made->report)
+                       : json_null();
     free(d);
     return json;
 }
 
-json_t *result_geometry_json(const struct pipeline_context *c)
+/* How the fibers came from a scan. */
+static void set_scan(json_t *json, const struct report *report)
 {
-    const struct reconstruct_report *g = &c->geometry;
-    const double um = 1e6, mm = 1e3;
-    json_t *json = json_pack("{s:s, s:o, s:o, s:o}", "input",
-                             c->doc->scan.given                  ? "volume"
-                             : c->doc->cloth.description != NULL ? "cloth"
-                                                                 : "fibers",
-                             "n_fiber", json_count(c->fiber.n_fiber), "n_vertex", json_count(c->fiber.n_vertex),
-                             "tile_mm", json_number_list(c->fiber.tile_size_m, 2, mm));
-    json_object_set_new(json, "total_length_mm", json_number(g->total_length_m * mm));
-    double radius = 0.0;
-    for (size_t i = 0; i < c->fiber.n_fiber; i++) radius += (double)c->fiber.radius_m[i] / (double)c->fiber.n_fiber;
-    json_object_set_new(json, "mean_radius_um", json_number(radius * um));
-    json_object_set_new(json, "sections", section_report_json(c));
-    json_object_set_new(json, "groups", groups_json(c));
-    json_object_set_new(json, "seam_fibers", seam_fibers_json(g));
-    if (c->doc->cloth.description != NULL) json_object_set_new(json, "cloth", described_json(c));
-    if (c->texture.found) json_object_set_new(json, "texture", texture_json(c));
-    if (!c->doc->scan.given) return json;
-    const struct reconstruct_option *o = &c->option;
+    const struct reconstruct_report *g = &report->in.made->geometry;
+    const double um = 1e6;
+    const struct reconstruct_option *o = report->in.option;
     json_object_set_new(json, "from_job",
-                        c->doc->scan.geometry_job[0] != '\0' ? json_string(c->doc->scan.geometry_job) : json_null());
+                        report->in.job->scan->geometry_job[0] != '\0' ? json_string(report->in.job->scan->geometry_job)
+                                                                      : json_null());
     json_object_set_new(json, "n_voxel", json_count_list(g->n, 3));
     json_object_set_new(json, "voxel_size_um", json_number_list(g->voxel_size_m, 3, um));
     json_object_set_new(json, "file_voxel_size_um", json_number_list(g->file_voxel_size_m, 3, um));
@@ -250,14 +240,38 @@ json_t *result_geometry_json(const struct pipeline_context *c)
     json_object_set_new(json, "crop", crop_json(o, g));
     json_object_set_new(json, "seam_density", seam_density_json(&g->seam_density));
     json_object_set_new(json, "options", options_json(o));
+}
+
+json_t *result_geometry_json(const struct report *report)
+{
+    const struct reconstruct_report *g = &report->in.made->geometry;
+    const double um = 1e6, mm = 1e3;
+    json_t *json = json_pack("{s:s, s:o, s:o, s:o}", "input",
+                             report->in.job->scan->given                  ? "volume"
+                             : report->in.job->cloth->description != NULL ? "cloth"
+                                                                          : "fibers",
+                             "n_fiber", json_count(report->in.made->fiber.n_fiber), "n_vertex",
+                             json_count(report->in.made->fiber.n_vertex), "tile_mm",
+                             json_number_list(report->in.made->fiber.tile_size_m, 2, mm));
+    json_object_set_new(json, "total_length_mm", json_number(g->total_length_m * mm));
+    double radius = 0.0;
+    for (size_t i = 0; i < report->in.made->fiber.n_fiber; i++)
+        radius += (double)report->in.made->fiber.radius_m[i] / (double)report->in.made->fiber.n_fiber;
+    json_object_set_new(json, "mean_radius_um", json_number(radius * um));
+    json_object_set_new(json, "sections", section_report_json(report));
+    json_object_set_new(json, "groups", groups_json(report));
+    json_object_set_new(json, "seam_fibers", seam_fibers_json(g));
+    if (report->in.job->cloth->description != NULL) json_object_set_new(json, "cloth", described_json(report));
+    if (report->in.texture->found) json_object_set_new(json, "texture", texture_json(report));
+    if (report->in.job->scan->given) set_scan(json, report);
     return json;
 }
 
-json_t *result_warnings_json(struct pipeline_context *c)
+json_t *result_warnings_json(struct report *report)
 {
     json_t *list = json_array();
     char text[600];
-    for (size_t i = 0; worker_status_warning(c->status, i, text, sizeof text); i++)
+    for (size_t i = 0; worker_status_warning(report->in.job->tools->status, i, text, sizeof text); i++)
         json_array_append_new(list, json_string(text));
     return list;
 }

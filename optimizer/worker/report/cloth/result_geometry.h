@@ -2,12 +2,12 @@
 #ifndef SELVEDGE_OPTIMIZER_RESULT_GEOMETRY_H
 #define SELVEDGE_OPTIMIZER_RESULT_GEOMETRY_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/report.h"
 
 #include <jansson.h>
 
-json_t *result_geometry_json(const struct pipeline_context *c);
+json_t *result_geometry_json(const struct report *report);
 /* The job's warnings so far. */
-json_t *result_warnings_json(struct pipeline_context *c);
+json_t *result_warnings_json(struct report *report);
 
 #endif

@@ -4,10 +4,10 @@
 #ifndef SELVEDGE_OPTIMIZER_SCAN_SLICES_H
 #define SELVEDGE_OPTIMIZER_SCAN_SLICES_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/report.h"
 
 /* Slices that are there already stay as they are. c: volume, directions and traced fibers of a scan are loaded.
  * STATUS_IO, STATUS_DISK_FULL, STATUS_NO_MEMORY, STATUS_CANCELLED. */
-status scan_slices_write(struct pipeline_context *c, struct error *err);
+status scan_slices_write(struct report *report, struct error *err);
 
 #endif

@@ -5,12 +5,13 @@
 
 #include <math.h>
 
-bool section_report_applies(const struct pipeline_context *c) { return c->fiber.shape != NULL; }
+bool section_report_applies(const struct report *report) { return report->in.made->fiber.shape != NULL; }
 
-json_t *section_report_json(const struct pipeline_context *c)
+json_t *section_report_json(const struct report *report)
 {
     struct section_summary s;
-    if (!section_report_applies(c) || section_summary_make(&c->fiber, &s, NULL) != STATUS_OK) return json_null();
+    if (!section_report_applies(report) || section_summary_make(&report->in.made->fiber, &s, NULL) != STATUS_OK)
+        return json_null();
     json_t *json = json_object();
     const struct {
         const char *key;
@@ -72,14 +73,14 @@ static void print_lumens(const struct section_summary *s, FILE *out)
     close_row(out, "elsewhere fibers may be hollow or solid");
 }
 
-void section_report_table(const struct pipeline_context *c, FILE *out)
+void section_report_table(const struct report *report, FILE *out)
 {
     struct section_summary s;
-    if (!section_report_applies(c) || section_summary_make(&c->fiber, &s, NULL) != STATUS_OK) return;
+    if (!section_report_applies(report) || section_summary_make(&report->in.made->fiber, &s, NULL) != STATUS_OK) return;
     fputs("<h2>Sections of the fibers</h2>\n<table>\n", out);
     if (s.measured_share > 0.0) print_ratios(&s, out);
     open_row(out, "fibers whose radius varies");
-    fprintf(out, "%zu of %zu", s.n_varying, c->fiber.n_fiber);
+    fprintf(out, "%zu of %zu", s.n_varying, report->in.made->fiber.n_fiber);
     close_row(out, "along the fiber; the others have one radius each");
     if (s.n_varying > 0) {
         open_row(out, "variation of their radius");
@@ -87,9 +88,9 @@ void section_report_table(const struct pipeline_context *c, FILE *out)
         if (isfinite(s.variation_se_median)) fprintf(out, " (error %.1f %%)", 100.0 * s.variation_se_median);
         close_row(out, "standard deviation along a fiber, mean over these fibers");
     }
-    if (c->doc->scan.given && c->geometry.lumen_share > 0.0) {
+    if (report->in.job->scan->given && report->in.made->geometry.lumen_share > 0.0) {
         open_row(out, "lumens");
-        fprintf(out, "%.1f %%", 100.0 * c->geometry.lumen_share);
+        fprintf(out, "%.1f %%", 100.0 * report->in.made->geometry.lumen_share);
         close_row(out, "share of the material that was filled because the fibers are hollow");
     }
     if (s.lumen_share > 0.0) print_lumens(&s, out);
@@ -104,7 +105,7 @@ void section_report_table(const struct pipeline_context *c, FILE *out)
 
 enum { WIDTH = 640, HEIGHT = 240, LEFT = 64, RIGHT = 16, TOP = 16, BOTTOM = 44 };
 
-void section_report_plot(const struct pipeline_context *c, FILE *out)
+void section_report_plot(const struct report *report, FILE *out)
 {
     struct section_summary s;
     double most = 0.0;
@@ -114,7 +115,7 @@ void section_report_plot(const struct pipeline_context *c, FILE *out)
             "font-family=\"sans-serif\" font-size=\"12\" fill=\"#222\">\n<rect width=\"%d\" height=\"%d\" "
             "fill=\"#fff\"/>\n",
             WIDTH, HEIGHT, WIDTH, HEIGHT, WIDTH, HEIGHT);
-    const bool made = section_summary_make(&c->fiber, &s, NULL) == STATUS_OK;
+    const bool made = section_summary_make(&report->in.made->fiber, &s, NULL) == STATUS_OK;
     for (int b = 0; b < SECTION_N_BIN && made; b++) most = fmax(most, s.bin_share[b]);
     const double step = most > 0.5 ? 0.2 : most > 0.2 ? 0.1 : 0.05;
     for (double y = 0.0; y <= most && made; y += step) {

@@ -171,7 +171,7 @@ static json_t *files_json(const struct export_scene *e)
 
 static json_t *scene_json(const struct export_scene *e)
 {
-    const struct configuration *k = &e->c->observation.item[0].configuration;
+    const struct configuration *k = &e->report->in.job->rows->observation.item[0].configuration;
     const struct export_view v = export_view_of(e, k);
     double half[2], z;
     const bool sheet = export_sheet(e, half, &z);
@@ -193,7 +193,7 @@ static status write_scene(const struct export_scene *e, struct error *err)
     json_decref(json);
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot export a scene: out of memory");
     export_path(e, "scene.json", path);
-    status s = worker_folder_replace(e->c->folder, path, text, strlen(text), err);
+    status s = worker_folder_replace(e->report->in.job->tools->folder, path, text, strlen(text), err);
     free(text);
     return s;
 }
@@ -201,7 +201,7 @@ static status write_scene(const struct export_scene *e, struct error *err)
 static status write_blender(struct export_scene *e, json_t **materials, struct error *err)
 {
     status s = STATUS_OK;
-    for (size_t g = 0; g < e->model->sets.n_set && s == STATUS_OK; g++)
+    for (size_t g = 0; g < e->model->setup->sets.n_set && s == STATUS_OK; g++)
         s = export_fibers_write(e, g, ".txt", print_fiber, err);
     if (s == STATUS_OK) s = export_rows_write(e, err);
     if (s == STATUS_OK) s = write_script(e, err);

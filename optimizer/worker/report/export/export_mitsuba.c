@@ -39,15 +39,15 @@ static double area_along(const struct export_scene *e)
 static status write_volumes(const struct export_scene *e, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    if (!e->c->doc->scan.given) return STATUS_OK;
-    status s = pipeline_need_volume(e->c, err);
+    if (!e->report->in.job->scan->given) return STATUS_OK;
+    status s = report_need_volume(e->report, err);
     export_path(e, "density.vol", path);
-    if (s == STATUS_OK) s = worker_folder_check(e->c->folder, err);
-    if (s == STATUS_OK) s = vol_write_density(path, &e->c->volume, VOL_FLOAT32, err);
+    if (s == STATUS_OK) s = worker_folder_check(e->report->in.job->tools->folder, err);
+    if (s == STATUS_OK) s = vol_write_density(path, &e->report->volume.volume, VOL_FLOAT32, err);
     export_path(e, "direction.vol", path);
-    if (s == STATUS_OK) s = vol_write_direction(path, &e->c->direction, VOL_FLOAT32, err);
+    if (s == STATUS_OK) s = vol_write_direction(path, &e->report->in.made->direction, VOL_FLOAT32, err);
     export_path(e, "sggx.vol", path);
-    return s == STATUS_OK ? vol_write_sggx(path, &e->c->direction, area_along(e), err) : s;
+    return s == STATUS_OK ? vol_write_sggx(path, &e->report->in.made->direction, area_along(e), err) : s;
 }
 
 /* ---- scene.xml ---- */
@@ -76,7 +76,7 @@ static void print_material(FILE *text, const struct hair_blend *b)
 static void print_tile(FILE *text, const struct export_scene *e)
 {
     fprintf(text, "  <shape type=\"shapegroup\" id=\"tile\">\n");
-    for (size_t g = 0; g < e->model->sets.n_set; g++) {
+    for (size_t g = 0; g < e->model->setup->sets.n_set; g++) {
         fprintf(text, "   <shape type=\"bsplinecurve\">\n    <string name=\"filename\" value=\"fibers-%zu.txt\"/>\n",
                 g);
         print_material(text, &e->hair[g].blend);
@@ -160,7 +160,7 @@ static void print_defaults(FILE *text, const struct export_view *v)
 
 static status write_scene(const struct export_scene *e, struct error *err)
 {
-    const struct configuration *k = &e->c->observation.item[0].configuration;
+    const struct configuration *k = &e->report->in.job->rows->observation.item[0].configuration;
     const struct export_view v = export_view_of(e, k);
     struct export_text t;
     status s = export_text_open(&t, err);
@@ -183,7 +183,7 @@ static status write_scene(const struct export_scene *e, struct error *err)
 static status write_mitsuba(struct export_scene *e, json_t **materials, struct error *err)
 {
     status s = STATUS_OK;
-    for (size_t g = 0; g < e->model->sets.n_set && s == STATUS_OK; g++)
+    for (size_t g = 0; g < e->model->setup->sets.n_set && s == STATUS_OK; g++)
         s = export_fibers_write(e, g, ".txt", print_fiber, err);
     if (s == STATUS_OK) s = write_volumes(e, err);
     if (s == STATUS_OK) s = export_rows_write(e, err);

@@ -45,9 +45,9 @@ static void print_material(FILE *text, size_t group, const struct hair_blend *b)
 static void print_tile(FILE *text, const struct export_scene *e)
 {
     char name[32];
-    for (size_t g = 0; g < e->model->sets.n_set; g++) print_material(text, g, &e->hair[g].blend);
+    for (size_t g = 0; g < e->model->setup->sets.n_set; g++) print_material(text, g, &e->hair[g].blend);
     fprintf(text, "ObjectBegin \"tile\"\n");
-    for (size_t g = 0; g < e->model->sets.n_set; g++) {
+    for (size_t g = 0; g < e->model->setup->sets.n_set; g++) {
         export_fibers_name(g, ".pbrt", name);
         fprintf(text, "  NamedMaterial \"fiber-%zu\"\n  Include \"%s\"\n", g, name);
     }
@@ -116,7 +116,7 @@ static void print_camera(FILE *text, const struct configuration *k, const struct
 
 static status write_view(const struct export_scene *e, size_t i, struct error *err)
 {
-    const struct configuration *k = &e->c->observation.item[i].configuration;
+    const struct configuration *k = &e->report->in.job->rows->observation.item[i].configuration;
     const struct export_view v = export_view_of(e, k);
     const double *sky = k->environment_rgb;
     struct export_text t;
@@ -143,9 +143,10 @@ static status write_view(const struct export_scene *e, size_t i, struct error *e
 static status write_pbrt(struct export_scene *e, json_t **materials, struct error *err)
 {
     status s = STATUS_OK;
-    for (size_t g = 0; g < e->model->sets.n_set && s == STATUS_OK; g++)
+    for (size_t g = 0; g < e->model->setup->sets.n_set && s == STATUS_OK; g++)
         s = export_fibers_write(e, g, ".pbrt", print_fiber, err);
-    for (size_t i = 0; i < e->c->observation.n && i < MAX_VIEW && s == STATUS_OK; i++) s = write_view(e, i, err);
+    for (size_t i = 0; i < e->report->in.job->rows->observation.n && i < MAX_VIEW && s == STATUS_OK; i++)
+        s = write_view(e, i, err);
     if (s == STATUS_OK) s = export_rows_write(e, err);
     if (s == STATUS_OK) s = write_cloth(e, err);
     if (s == STATUS_OK) *materials = export_hair_json(e);

@@ -18,7 +18,7 @@ void export_path(const struct export_scene *e, const char *name, char path[WORKE
 {
     char relative[128];
     snprintf(relative, sizeof relative, "%s/%s", e->folder, name);
-    worker_folder_path(e->c->folder, JOB_FOLDER_RESULTS, relative, path);
+    worker_folder_path(e->report->in.job->tools->folder, JOB_FOLDER_RESULTS, relative, path);
 }
 
 status export_text_open(struct export_text *t, struct error *err)
@@ -34,7 +34,7 @@ status export_text_close(const struct export_scene *e, struct export_text *t, co
     bool whole = ferror(t->file) == 0;
     whole = fclose(t->file) == 0 && whole;
     export_path(e, name, path);
-    status s = whole ? worker_folder_replace(e->c->folder, path, t->data, t->n_byte, err)
+    status s = whole ? worker_folder_replace(e->report->in.job->tools->folder, path, t->data, t->n_byte, err)
                      : error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", name);
     free(t->data);
     *t = (struct export_text){0};
@@ -45,17 +45,17 @@ status export_text_close(const struct export_scene *e, struct export_text *t, co
 
 bool export_fiber_in(const struct export_scene *e, size_t i, size_t group)
 {
-    return e->c->fiber.group[i] == group || e->model->sets.n_set == 1;
+    return e->report->in.made->fiber.group[i] == group || e->model->setup->sets.n_set == 1;
 }
 
 size_t export_n_point(const struct export_scene *e, size_t i)
 {
-    return e->c->fiber.first_vertex[i + 1] - e->c->fiber.first_vertex[i] + 2;
+    return e->report->in.made->fiber.first_vertex[i + 1] - e->report->in.made->fiber.first_vertex[i] + 2;
 }
 
 void export_point(const struct export_scene *e, size_t i, size_t k, double p_mm[3])
 {
-    const struct fiber_set *f = &e->c->fiber;
+    const struct fiber_set *f = &e->report->in.made->fiber;
     const size_t first = f->first_vertex[i], last = f->first_vertex[i + 1] - 1, n = export_n_point(e, i);
     size_t v = k == 0 ? first : k == n - 1 ? last : first + k - 1;
     size_t mirrored = k == 0 ? first + 1 : k == n - 1 ? last - 1 : v;
@@ -67,12 +67,15 @@ void export_point(const struct export_scene *e, size_t i, size_t k, double p_mm[
 
 double export_point_radius_mm(const struct export_scene *e, size_t i, size_t k)
 {
-    const struct fiber_set *f = &e->c->fiber;
+    const struct fiber_set *f = &e->report->in.made->fiber;
     const size_t first = f->first_vertex[i], last = f->first_vertex[i + 1] - 1, v = k == 0 ? first : first + k - 1;
     return mm * (double)fiber_radius_m(f, i, v < last ? v : last);
 }
 
-double export_radius_mm(const struct export_scene *e, size_t i) { return mm * (double)e->c->fiber.radius_m[i]; }
+double export_radius_mm(const struct export_scene *e, size_t i)
+{
+    return mm * (double)e->report->in.made->fiber.radius_m[i];
+}
 
 void export_fibers_name(size_t group, const char *ending, char name[32])
 {
@@ -86,7 +89,7 @@ status export_fibers_write(const struct export_scene *e, size_t group, const cha
     char name[32];
     status s = export_text_open(&t, err);
     if (s != STATUS_OK) return s;
-    for (size_t i = 0; i < e->c->fiber.n_fiber; i++)
+    for (size_t i = 0; i < e->report->in.made->fiber.n_fiber; i++)
         if (export_fiber_in(e, i, group)) print(t.file, e, i);
     export_fibers_name(group, ending, name);
     return export_text_close(e, &t, name, err);
@@ -105,8 +108,8 @@ static void polar(double theta, double phi, double distance, double out[3])
 static double half_width_mm(const struct export_scene *e)
 {
     double most = 0.0, crop = 0.0;
-    for (size_t i = 0; i < e->c->observation.n; i++) {
-        const struct configuration *k = &e->c->observation.item[i].configuration;
+    for (size_t i = 0; i < e->report->in.job->rows->observation.n; i++) {
+        const struct configuration *k = &e->report->in.job->rows->observation.item[i].configuration;
         most = fmax(most, k->camera_theta_rad);
         crop = fmax(crop, k->crop_m);
     }
@@ -162,7 +165,7 @@ bool export_repeats(const struct export_scene *e, int n[2])
 {
     bool enough = true;
     for (int a = 0; a < 2; a++) {
-        double wanted = ceil(2.0 * half_width_mm(e) / (mm * e->c->fiber.tile_size_m[a])) + 1.0;
+        double wanted = ceil(2.0 * half_width_mm(e) / (mm * e->report->in.made->fiber.tile_size_m[a])) + 1.0;
         enough = enough && wanted <= EXPORT_MAX_REPEAT;
         n[a] = (int)fmin(wanted, EXPORT_MAX_REPEAT);
     }
@@ -171,17 +174,17 @@ bool export_repeats(const struct export_scene *e, int n[2])
 
 void export_repeat_at(const struct export_scene *e, const int n[2], int i, int j, double at_mm[2])
 {
-    at_mm[0] = mm * e->c->fiber.tile_size_m[0] * (i - 0.5 * n[0]);
-    at_mm[1] = mm * e->c->fiber.tile_size_m[1] * (j - 0.5 * n[1]);
+    at_mm[0] = mm * e->report->in.made->fiber.tile_size_m[0] * (i - 0.5 * n[0]);
+    at_mm[1] = mm * e->report->in.made->fiber.tile_size_m[1] * (j - 0.5 * n[1]);
 }
 
 bool export_sheet(const struct export_scene *e, double half_mm[2], double *z_mm)
 {
     int n[2];
     export_repeats(e, n);
-    for (int a = 0; a < 2; a++) half_mm[a] = mm * e->c->fiber.tile_size_m[a] * n[a];
+    for (int a = 0; a < 2; a++) half_mm[a] = mm * e->report->in.made->fiber.tile_size_m[a] * n[a];
     *z_mm = mm * (e->z_low_m - e->z_high_m) - 1e-3;
-    return e->c->doc->setup.black_sheet;
+    return e->report->in.job->setup->black_sheet;
 }
 
 static void print_three(FILE *text, const double v[3], const char *end)
@@ -191,7 +194,7 @@ static void print_three(FILE *text, const double v[3], const char *end)
 
 status export_rows_write(const struct export_scene *e, struct error *err)
 {
-    const struct observation_set *o = &e->c->observation;
+    const struct observation_set *o = &e->report->in.job->rows->observation;
     struct export_text t;
     status s = export_text_open(&t, err);
     if (s != STATUS_OK) return s;
@@ -218,7 +221,8 @@ status export_rows_write(const struct export_scene *e, struct error *err)
 json_t *export_material_json(const struct export_scene *e, size_t group, json_t *material)
 {
     json_object_set_new(material, "group",
-                        e->model->sets.n_set > 1 ? json_string(e->c->doc->cloth.group[group]) : json_null());
+                        e->model->setup->sets.n_set > 1 ? json_string(e->report->in.job->cloth->group[group])
+                                                        : json_null());
     return material;
 }
 
@@ -242,7 +246,7 @@ static json_t *hair_json(const struct hair_fit *h)
 json_t *export_hair_json(const struct export_scene *e)
 {
     json_t *materials = json_array();
-    for (size_t g = 0; g < e->model->sets.n_set; g++)
+    for (size_t g = 0; g < e->model->setup->sets.n_set; g++)
         json_array_append_new(materials, export_material_json(e, g, hair_json(&e->hair[g])));
     return materials;
 }

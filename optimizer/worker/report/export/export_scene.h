@@ -5,8 +5,8 @@
 #ifndef SELVEDGE_OPTIMIZER_EXPORT_SCENE_H
 #define SELVEDGE_OPTIMIZER_EXPORT_SCENE_H
 
-#include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/report/export/hair_fit.h"
+#include "optimizer/worker/report/report.h"
 
 #include <jansson.h>
 #include <stdio.h>
@@ -14,7 +14,7 @@
 enum { EXPORT_MAX_REPEAT = 200 }; /* of the tile, along one axis */
 
 struct export_scene {
-    struct pipeline_context *c;
+    struct report *report;
     const struct pipeline_model *model;
     struct hair_fit hair[SCATTERING_MAX_SET];
     double z_low_m, z_high_m;

@@ -49,9 +49,9 @@ struct textures {
 
 static status render_tile(const struct textures *t, bool black_sheet, struct image *im, struct error *err)
 {
-    struct pipeline_context *c = t->e->c;
+    struct report *report = t->e->report;
     const struct pipeline_model *m = t->e->model;
-    const double *size_m = c->fiber.tile_size_m;
+    const double *size_m = report->in.made->fiber.tile_size_m;
     const struct configuration above = {.camera = CAMERA_FAR_FIELD,
                                         .camera_phi_rad = -M_PI_2,
                                         .light = LIGHT_NO_LAMP,
@@ -62,22 +62,23 @@ static status render_tile(const struct textures *t, bool black_sheet, struct ima
                                         .crop_m = size_m[0],
                                         .crop_aspect = size_m[0] / size_m[1]};
     struct scene *scene = NULL;
-    const size_t n_sample =
-        SAMPLES_OF_A_RENDERING * result_picture_samples(c, (double)c->model[pipeline_best_model(c)].fit.n_path);
-    status s = scene_new(&c->fiber, &(struct scene_option){.black_sheet = black_sheet}, &scene, err);
+    const size_t n_sample = SAMPLES_OF_A_RENDERING *
+                            result_picture_samples(report->in.results, report->in.job->rows->observation.n,
+                                                   (double)report->model[report_best_model(report)].fit->result.n_path);
+    status s = scene_new(&report->in.made->fiber, &(struct scene_option){.black_sheet = black_sheet}, &scene, err);
     if (s != STATUS_OK) return s;
     const struct render_request q = {.input = {.scene = {.fibers = scene},
-                                               .model = &m->appearance,
-                                               .param = m->fit.param,
-                                               .n_set = m->sets.n_set,
-                                               .discrepancy = pipeline_discrepancy(m)},
+                                               .model = &m->setup->appearance,
+                                               .param = m->fit->result.param,
+                                               .n_set = m->setup->sets.n_set,
+                                               .discrepancy = pipeline_discrepancy(m->validation)},
                                      .configuration = &above,
                                      .width = t->maps.width,
                                      .height = t->maps.height,
                                      .n_sample = n_sample > MIN_SAMPLE ? n_sample : MIN_SAMPLE,
-                                     .seed = c->doc->fit.seed ^ 0x74657874757265u,
+                                     .seed = report->in.job->fit->seed ^ 0x74657874757265u,
                                      .stream = STREAM};
-    s = render_run(&q, c->pool, &c->progress, im, err);
+    s = render_run(&q, report->in.job->tools->pool, &report->in.job->tools->progress, im, err);
     scene_free(scene);
     return s;
 }
@@ -135,7 +136,7 @@ static status write_picture(const struct textures *t, const struct image *im, co
         s = image_write_png_rgb8(rgb, im->width, im->height, part, err);
         free(rgb);
     }
-    if (s == STATUS_OK) s = worker_folder_check(t->e->c->folder, err);
+    if (s == STATUS_OK) s = worker_folder_check(t->e->report->in.job->tools->folder, err);
     if (s == STATUS_OK) return durable_rename(part, path, err);
     unlink(part);
     return s;
@@ -231,14 +232,14 @@ static json_t *material_json(const struct textures *t)
 static status write_textures(struct export_scene *e, json_t **materials, struct error *err)
 {
     struct textures t = {.e = e};
-    size_t edge = 2 * (e->c->doc->results.render_px > 0 ? e->c->doc->results.render_px : RESULT_PICTURE_PX);
+    size_t edge = 2 * (e->report->in.results->render_px > 0 ? e->report->in.results->render_px : RESULT_PICTURE_PX);
     edge = edge < MIN_EDGE ? MIN_EDGE : edge > MAX_EDGE ? MAX_EDGE : edge;
-    status s = texture_maps_make(&e->c->fiber, edge, &t.maps, err);
+    status s = texture_maps_make(&e->report->in.made->fiber, edge, &t.maps, err);
     t.surface.maps = &t.maps;
     if (s == STATUS_OK) s = render_both(&t, err);
-    if (s == STATUS_OK) s = texture_surface_fit(&t.surface, e->c, e->model, err);
+    if (s == STATUS_OK) s = texture_surface_fit(&t.surface, e->report, e->model, err);
     t.principled.open_pbr = &t.surface;
-    if (s == STATUS_OK) s = texture_principled_fit(&t.principled, e->c, e->model, err);
+    if (s == STATUS_OK) s = texture_principled_fit(&t.principled, e->report, e->model, err);
     if (s == STATUS_OK) s = write_maps(&t, err);
     if (s == STATUS_OK) s = texture_materialx_write(e, &t.surface, err);
     if (s == STATUS_OK) s = texture_u3m_write(e, &t.principled, err);

@@ -17,7 +17,7 @@ static void print_counts(FILE *text, const struct export_scene *e, size_t group)
 {
     const char *comma = "";
     fprintf(text, "                int[] curveVertexCounts = [");
-    for (size_t i = 0; i < e->c->fiber.n_fiber; i++)
+    for (size_t i = 0; i < e->report->in.made->fiber.n_fiber; i++)
         if (export_fiber_in(e, i, group)) {
             fprintf(text, "%s%zu", comma, export_n_point(e, i));
             comma = ", ";
@@ -27,10 +27,10 @@ static void print_counts(FILE *text, const struct export_scene *e, size_t group)
 
 static void print_widths(FILE *text, const struct export_scene *e, size_t group)
 {
-    const bool varies = e->c->fiber.shape != NULL;
+    const bool varies = e->report->in.made->fiber.shape != NULL;
     const char *comma = "";
     fprintf(text, "                float[] widths = [");
-    for (size_t i = 0; i < e->c->fiber.n_fiber; i++)
+    for (size_t i = 0; i < e->report->in.made->fiber.n_fiber; i++)
         for (size_t k = 0; export_fiber_in(e, i, group) && k < (varies ? export_n_point(e, i) : 1); k++) {
             fprintf(text, "%s%.6f", comma, 2.0 * export_point_radius_mm(e, i, k));
             comma = ", ";
@@ -45,7 +45,7 @@ static void print_points(FILE *text, const struct export_scene *e, size_t group)
     const char *comma = "";
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, p[3];
     fprintf(text, "                point3f[] points = [");
-    for (size_t i = 0; i < e->c->fiber.n_fiber; i++) {
+    for (size_t i = 0; i < e->report->in.made->fiber.n_fiber; i++) {
         if (!export_fiber_in(e, i, group)) continue;
         for (size_t k = 0; k < export_n_point(e, i); k++, comma = ", ") {
             export_point(e, i, k, p);
@@ -94,7 +94,7 @@ static void print_tiles(FILE *text, const struct export_scene *e)
         fprintf(text, "%s(%.9g, %.9g, 0)", i == 0 ? "" : ", ", at[0], at[1]);
     }
     fprintf(text, "]\n        def Xform \"Tile\"\n        {\n");
-    for (size_t g = 0; g < e->model->sets.n_set; g++) print_curves(text, e, g);
+    for (size_t g = 0; g < e->model->setup->sets.n_set; g++) print_curves(text, e, g);
     fprintf(text, "        }\n    }\n");
 }
 
@@ -163,7 +163,7 @@ static void print_materials(FILE *text, const struct export_scene *e)
 {
     char name[32];
     fprintf(text, "    def Scope \"Materials\"\n    {\n");
-    for (size_t g = 0; g < e->model->sets.n_set; g++) {
+    for (size_t g = 0; g < e->model->setup->sets.n_set; g++) {
         snprintf(name, sizeof name, "fiber_%zu", g);
         print_material(text, name, &e->hair[g].surface, &e->hair[g].blend);
     }
@@ -240,7 +240,7 @@ static void print_lights(FILE *text, const struct configuration *k, const struct
 
 static status write_stage(const struct export_scene *e, struct error *err)
 {
-    const struct configuration *k = &e->c->observation.item[0].configuration;
+    const struct configuration *k = &e->report->in.job->rows->observation.item[0].configuration;
     const struct export_view v = export_view_of(e, k);
     struct export_text t;
     status s = export_text_open(&t, err);
@@ -273,7 +273,7 @@ static status write_usd(struct export_scene *e, json_t **materials, struct error
     if (s == STATUS_OK) s = write_stage(e, err);
     if (s != STATUS_OK) return s;
     *materials = export_hair_json(e);
-    for (size_t g = 0; g < e->model->sets.n_set; g++)
+    for (size_t g = 0; g < e->model->setup->sets.n_set; g++)
         json_object_set_new(json_array_get(*materials, g), "preview_surface", preview_json(&e->hair[g]));
     return *materials != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot export as USD: out of memory");
 }

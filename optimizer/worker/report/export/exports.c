@@ -14,19 +14,19 @@ static const struct export_format *const format[] = {&export_mitsuba, &export_pb
 enum { N_FORMAT = sizeof format / sizeof format[0] };
 static const double percent = 100.0;
 
-static bool wanted(const struct pipeline_context *c, const struct export_format *f)
+static bool wanted(const struct report *report, const struct export_format *f)
 {
-    return *(const bool *)((const char *)&c->doc->results + f->wanted_at);
+    return *(const bool *)((const char *)report->in.results + f->wanted_at);
 }
 
 static status fit_materials(struct export_scene *e, struct error *err)
 {
-    const struct appearance *a = &e->model->appearance;
+    const struct appearance *a = &e->model->setup->appearance;
     status s = STATUS_OK;
-    for (size_t g = 0; g < e->model->sets.n_set && s == STATUS_OK; g++) {
-        s = hair_fit_run(a->surface, e->model->fit.param + g * e->model->sets.n_own, &e->hair[g], err);
+    for (size_t g = 0; g < e->model->setup->sets.n_set && s == STATUS_OK; g++) {
+        s = hair_fit_run(a->surface, e->model->fit->result.param + g * e->model->setup->sets.n_own, &e->hair[g], err);
         if (s != STATUS_OK) break;
-        log_info(e->c->log, "exports: hair lobes differ from the fitted scattering by %.0f %%",
+        log_info(e->report->in.job->tools->log, "exports: hair lobes differ from the fitted scattering by %.0f %%",
                  percent * e->hair[g].rel_rms);
     }
     return s;
@@ -38,7 +38,7 @@ static status write_conversion(const struct export_scene *e, const json_t *json,
     char path[WORKER_PATH_BYTES], *text = json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot export a scene: out of memory");
     export_path(e, "conversion.json", path);
-    status s = worker_folder_replace(e->c->folder, path, text, strlen(text), err);
+    status s = worker_folder_replace(e->report->in.job->tools->folder, path, text, strlen(text), err);
     free(text);
     return s;
 }
@@ -49,14 +49,14 @@ static status write_format(struct export_scene *e, const struct export_format *f
     json_t *materials = NULL;
     snprintf(folder, sizeof folder, "export/%s", f->name);
     e->folder = folder;
-    worker_folder_path(e->c->folder, JOB_FOLDER_RESULTS, folder, path);
+    worker_folder_path(e->report->in.job->tools->folder, JOB_FOLDER_RESULTS, folder, path);
     status s = durable_make_folder(path, err);
     if (s == STATUS_OK) s = f->write(e, &materials, err);
     if (s != STATUS_OK) return s;
     json_t *json = json_pack("{s:s, s:s, s:o}", "format", f->name, "folder", folder, "materials", materials);
     s = write_conversion(e, json, err);
     if (s == STATUS_OK)
-        json_array_append_new(e->c->exports, json);
+        json_array_append_new(e->report->exports, json);
     else
         json_decref(json);
     return s;
@@ -66,39 +66,42 @@ static void warn_of_rest(const struct export_scene *e)
 {
     int n[2];
     if (!export_repeats(e, n))
-        worker_status_warn(e->c->status,
+        worker_status_warn(e->report->in.job->tools->status,
                            "the exported scenes have %d x %d repeats of the tile, the most that are written: the "
                            "widest view sees beyond them",
                            n[0], n[1]);
-    if (e->c->environment != NULL)
-        worker_status_warn(e->c->status, "the exported scenes have no image of the surroundings: add '%s' to them",
-                           e->c->doc->setup.environment_file);
-    if (pipeline_discrepancy(e->model) != NULL)
+    if (e->report->in.job->rows->environment != NULL)
+        worker_status_warn(e->report->in.job->tools->status,
+                           "the exported scenes have no image of the surroundings: add '%s' to them",
+                           e->report->in.job->setup->environment_file);
+    if (pipeline_discrepancy(e->model->validation) != NULL)
         worker_status_warn(
-            e->c->status, "the exported fibers are rendered without the discrepancy, which other programs do not know; "
-                          "exported textures contain it");
+            e->report->in.job->tools->status,
+            "the exported fibers are rendered without the discrepancy, which other programs do not know; "
+            "exported textures contain it");
 }
 
-static bool any_wanted(const struct pipeline_context *c)
+static bool any_wanted(const struct report *report)
 {
     for (size_t i = 0; i < N_FORMAT; i++)
-        if (wanted(c, format[i])) return true;
+        if (wanted(report, format[i])) return true;
     return false;
 }
 
-status exports_write(struct pipeline_context *c, struct error *err)
+status exports_write(struct report *report, struct error *err)
 {
-    struct export_scene e = {.c = c, .model = &c->model[pipeline_best_model(c)]};
-    if (!any_wanted(c)) return STATUS_OK;
-    if (e.model->appearance.kind != MODEL_SURFACE) {
-        worker_status_warn(c->status, "nothing was exported: the model '%s' sees no fibers, which an export needs",
-                           e.model->appearance.id);
+    struct export_scene e = {.report = report, .model = &report->model[report_best_model(report)]};
+    if (!any_wanted(report)) return STATUS_OK;
+    if (e.model->setup->appearance.kind != MODEL_SURFACE) {
+        worker_status_warn(report->in.job->tools->status,
+                           "nothing was exported: the model '%s' sees no fibers, which an export needs",
+                           e.model->setup->appearance.id);
         return STATUS_OK;
     }
-    fiber_set_z_range_m(&c->fiber, &e.z_low_m, &e.z_high_m);
+    fiber_set_z_range_m(&report->in.made->fiber, &e.z_low_m, &e.z_high_m);
     status s = fit_materials(&e, err);
     for (size_t i = 0; i < N_FORMAT && s == STATUS_OK; i++)
-        if (wanted(c, format[i])) s = write_format(&e, format[i], err);
+        if (wanted(report, format[i])) s = write_format(&e, format[i], err);
     if (s == STATUS_OK) warn_of_rest(&e);
     return s;
 }

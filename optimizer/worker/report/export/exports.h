@@ -4,10 +4,10 @@
 #ifndef SELVEDGE_OPTIMIZER_EXPORTS_H
 #define SELVEDGE_OPTIMIZER_EXPORTS_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/report.h"
 
-/* Writes the folders for the best model and adds one object each to c->exports. A best model that sees no fibers, and
- * what a scene lacks, are warnings of the job. */
-status exports_write(struct pipeline_context *c, struct error *err);
+/* Writes the folders for the best model and adds one object each to report->exports. A best model that sees no
+ * fibers, and what a scene lacks, are warnings of the job. */
+status exports_write(struct report *report, struct error *err);
 
 #endif

@@ -55,12 +55,12 @@ static status shrink(const struct image *from, size_t width, size_t height, stru
 }
 
 /* Writes the image as <img src="data:...">. */
-static status put_image(const struct pipeline_context *c, const struct image *im, double exposure, const char *what,
+static status put_image(const struct report *report, const struct image *im, double exposure, const char *what,
                         FILE *out, struct error *err)
 {
     char path[WORKER_PATH_BYTES], *png = NULL;
     size_t n = 0;
-    status s = pipeline_work_path(c, "report", "page.png", path, err);
+    status s = stage_work_path(report->in.job->tools, "report", "page.png", path, err);
     if (s == STATUS_OK) s = image_write_png(im, exposure, path, err);
     if (s == STATUS_OK) s = file_read_all(path, PNG_LIMIT_BYTES, &png, &n, err);
     unlink(path);
@@ -91,7 +91,7 @@ static void subtract(const struct image *photograph, struct image *rendering)
 static size_t least(size_t a, size_t b) { return a < b ? a : b; }
 
 /* Photograph (NULL for a row of a table), rendering and difference of one row. */
-static status put_row(const struct pipeline_context *c, const struct image *photograph, const struct image *rendering,
+static status put_row(const struct report *report, const struct image *photograph, const struct image *rendering,
                       FILE *out, struct error *err)
 {
     struct image small[2] = {{0}, {0}};
@@ -100,10 +100,10 @@ static status put_row(const struct pipeline_context *c, const struct image *phot
     if (s == STATUS_OK && photograph != NULL) s = shrink(photograph, width, height, &small[0], err);
     if (s == STATUS_OK) {
         double exposure = exposure_of(photograph != NULL ? &small[0] : &small[1]);
-        if (photograph != NULL) s = put_image(c, &small[0], exposure, "photograph", out, err);
-        if (s == STATUS_OK) s = put_image(c, &small[1], exposure, "rendering", out, err);
+        if (photograph != NULL) s = put_image(report, &small[0], exposure, "photograph", out, err);
+        if (s == STATUS_OK) s = put_image(report, &small[1], exposure, "rendering", out, err);
         if (photograph != NULL) subtract(&small[0], &small[1]);
-        if (s == STATUS_OK && photograph != NULL) s = put_image(c, &small[1], 1.0, "difference", out, err);
+        if (s == STATUS_OK && photograph != NULL) s = put_image(report, &small[1], 1.0, "difference", out, err);
         fprintf(out, "<figcaption>exposure &times; %.3g", exposure);
     }
     image_release(&small[0]);
@@ -111,20 +111,21 @@ static status put_row(const struct pipeline_context *c, const struct image *phot
     return s;
 }
 
-static status put_figure(const struct pipeline_context *c, size_t i, const json_t *row, FILE *out, struct error *err)
+static status put_figure(const struct report *report, size_t i, const json_t *row, FILE *out, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
     struct image rendering, photograph;
     bool has_photograph = false;
-    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, page_string(row, "rendering_exr"), path);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, page_string(row, "rendering_exr"), path);
     if (image_read_exr(&rendering, path, (size_t)1 << 26, NULL) != STATUS_OK) return STATUS_OK;
-    if (c->doc->rows.n_photograph > i) {
-        worker_folder_path(c->folder, JOB_FOLDER_INPUT, NULL, path);
+    if (report->in.photographs->n_photograph > i) {
+        worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_INPUT, NULL, path);
         has_photograph =
-            photograph_develop(&c->process, path, &c->doc->rows.photograph[i], &photograph, NULL, NULL) == STATUS_OK;
+            photograph_develop(&report->in.job->rows->process, path, &report->in.photographs->photograph[i],
+                               &photograph, NULL, NULL) == STATUS_OK;
     }
     fputs("<figure>", out);
-    status s = put_row(c, has_photograph ? &photograph : NULL, &rendering, out, err);
+    status s = put_row(report, has_photograph ? &photograph : NULL, &rendering, out, err);
     fputs("<br><b>", out);
     page_escaped(page_string(row, "name"), out);
     fprintf(out, "</b> (%s), error ", page_string(row, "set"));
@@ -135,29 +136,29 @@ static status put_figure(const struct pipeline_context *c, size_t i, const json_
     return s;
 }
 
-status page_pictures(const struct pipeline_context *c, const json_t *rows, FILE *out, struct error *err)
+status page_pictures(const struct report *report, const json_t *rows, FILE *out, struct error *err)
 {
     size_t n = json_array_size(rows), n_shown = n < MAX_ROWS ? n : MAX_ROWS;
     status s = STATUS_OK;
     fprintf(out, "<p>%s Each row has an exposure of its own. %zu of %zu rows.</p>\n<div class=\"pictures\">\n",
-            c->doc->rows.n_photograph > 0
+            report->in.photographs->n_photograph > 0
                 ? "Photograph, rendering, and their difference about grey, which is amplified."
                 : "Renderings; the measurements are a table and have no pictures.",
             n_shown, n);
-    for (size_t i = 0; i < n_shown && s == STATUS_OK; i++) s = put_figure(c, i, json_array_get(rows, i), out, err);
+    for (size_t i = 0; i < n_shown && s == STATUS_OK; i++) s = put_figure(report, i, json_array_get(rows, i), out, err);
     fputs("</div>\n", out);
     return s;
 }
 
-static status put_surface(const struct pipeline_context *c, const json_t *picture, FILE *out, struct error *err)
+static status put_surface(const struct report *report, const json_t *picture, FILE *out, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
     struct image im, small = {0};
-    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, page_string(picture, "file"), path);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, page_string(picture, "file"), path);
     if (image_read_exr(&im, path, (size_t)1 << 28, NULL) != STATUS_OK) return STATUS_OK;
     status s = shrink(&im, least(im.width, MAX_SURFACE_EDGE), least(im.height, MAX_SURFACE_EDGE), &small, err);
     fputs("<figure>", out);
-    if (s == STATUS_OK) s = put_image(c, &small, page_number(picture, "png_exposure"), "the cloth", out, err);
+    if (s == STATUS_OK) s = put_image(report, &small, page_number(picture, "png_exposure"), "the cloth", out, err);
     fputs("<figcaption>", out);
     page_escaped(page_string(picture, "on"), out);
     fprintf(out, ", exposure &times; %.3g, noise of a pixel ", page_number(picture, "png_exposure"));
@@ -175,13 +176,13 @@ static status put_surface(const struct pipeline_context *c, const json_t *pictur
     return s;
 }
 
-status page_surface_pictures(const struct pipeline_context *c, const json_t *list, FILE *out, struct error *err)
+status page_surface_pictures(const struct report *report, const json_t *list, FILE *out, struct error *err)
 {
     size_t i;
     const json_t *picture;
     status s = STATUS_OK;
     fputs("<div class=\"pictures\">\n", out);
-    json_array_foreach(list, i, picture) if (s == STATUS_OK) s = put_surface(c, picture, out, err);
+    json_array_foreach(list, i, picture) if (s == STATUS_OK) s = put_surface(report, picture, out, err);
     fputs("</div>\n", out);
     return s;
 }

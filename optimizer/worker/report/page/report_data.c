@@ -17,7 +17,7 @@
 enum { CHUNK_BYTES = 1 << 20, SERIES_LIMIT_BYTES = 256 << 20, SERIES_HEAD = 9 /* checksum and blank */ };
 
 /* SHA-256 of a file as text; "" when it cannot be read or the job is cancelled. */
-static void hash_file(const struct pipeline_context *c, const char *path, char text[crypto_hash_sha256_BYTES * 2 + 1])
+static void hash_file(const struct report *report, const char *path, char text[crypto_hash_sha256_BYTES * 2 + 1])
 {
     unsigned char digest[crypto_hash_sha256_BYTES], *chunk = malloc(CHUNK_BYTES);
     crypto_hash_sha256_state hash;
@@ -25,7 +25,7 @@ static void hash_file(const struct pipeline_context *c, const char *path, char t
     int fd = open(path, O_RDONLY | O_CLOEXEC);
     text[0] = '\0';
     crypto_hash_sha256_init(&hash);
-    while (fd >= 0 && chunk != NULL && !progress_cancelled(&c->progress)) {
+    while (fd >= 0 && chunk != NULL && !progress_cancelled(&report->in.job->tools->progress)) {
         n = read(fd, chunk, CHUNK_BYTES);
         if (n < 0 && errno == EINTR) continue;
         if (n <= 0) break;
@@ -38,7 +38,7 @@ static void hash_file(const struct pipeline_context *c, const char *path, char t
 }
 
 struct input_list {
-    const struct pipeline_context *pipeline;
+    const struct report *pipeline;
     json_t *list;
 };
 
@@ -47,7 +47,7 @@ static void add_input(void *context, const char *name, const char *role)
     struct input_list *input = context;
     char path[WORKER_PATH_BYTES], hash[crypto_hash_sha256_BYTES * 2 + 1];
     struct stat file = {0};
-    worker_folder_path(input->pipeline->folder, JOB_FOLDER_INPUT, name, path);
+    worker_folder_path(input->pipeline->in.job->tools->folder, JOB_FOLDER_INPUT, name, path);
     if (stat(path, &file) != 0) return;
     hash_file(input->pipeline, path, hash);
     json_array_append_new(input->list, json_pack("{s:s, s:s, s:I, s:o}", "name", name, "role", role, "size",
@@ -67,11 +67,11 @@ static json_t *curve_point(const json_t *record)
     return point;
 }
 
-static json_t *curve_json(const struct pipeline_context *c)
+static json_t *curve_json(const struct report *report)
 {
     char path[WORKER_PATH_BYTES], *text = NULL;
     json_t *list = json_array();
-    worker_folder_path(c->folder, JOB_FILE_SERIES, NULL, path);
+    worker_folder_path(report->in.job->tools->folder, JOB_FILE_SERIES, NULL, path);
     if (file_read_all(path, SERIES_LIMIT_BYTES, &text, NULL, NULL) != STATUS_OK) return list;
     for (char *line = text, *end; *line != '\0'; line = *end != '\0' ? end + 1 : end) {
         end = line + strcspn(line, "\n");
@@ -85,18 +85,19 @@ static json_t *curve_json(const struct pipeline_context *c)
     return list;
 }
 
-status report_data(struct pipeline_context *c, json_t **data, struct error *err)
+status report_data(struct report *report, json_t **data, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    struct input_list input = {c, json_array()};
-    job_document_visit_files(c->doc, add_input, &input);
-    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "result.json", path);
+    struct input_list input = {report, json_array()};
+    for (size_t i = 0; i < report->in.files->n_file; i++)
+        add_input(&input, report->in.files->file[i].name, report->in.files->file[i].role);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, "result.json", path);
     json_t *result = json_load_file(path, 0, NULL);
-    worker_folder_path(c->folder, JOB_FILE_DOCUMENT, NULL, path);
+    worker_folder_path(report->in.job->tools->folder, JOB_FILE_DOCUMENT, NULL, path);
     json_t *document = json_load_file(path, 0, NULL);
     *data = json_pack("{s:i, s:s, s:f, s:f, s:o, s:o?, s:o, s:o, s:o?}", "format", 1, "program", RESULT_PROGRAM,
-                      "started_unix_s", worker_status_started_unix_s(c->status), "written_unix_s", clock_wall_s(),
-                      "defaults", job_options_defaults_json(document, job_document_kind(c->doc) == JOB_OF_FIT),
-                      "document", document, "inputs", input.list, "curve", curve_json(c), "result", result);
+                      "started_unix_s", worker_status_started_unix_s(report->in.job->tools->status), "written_unix_s",
+                      clock_wall_s(), "defaults", job_options_defaults_json(document, report->in.kind == JOB_OF_FIT),
+                      "document", document, "inputs", input.list, "curve", curve_json(report), "result", result);
     return *data != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot write the report: out of memory");
 }

@@ -2,13 +2,13 @@
 #ifndef SELVEDGE_OPTIMIZER_REPORT_DATA_H
 #define SELVEDGE_OPTIMIZER_REPORT_DATA_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/report.h"
 
 #include <jansson.h>
 
 /* {"format", "program", "started_unix_s", "written_unix_s", "document": the job document as given,
  *  "inputs": [{"name", "role", "size", "sha256"}], "curve": [{"model", "step", "objective", "objective_se",
  *  "n_path_total"}], "result": result.json}. The caller owns it. STATUS_NO_MEMORY; STATUS_IO. */
-status report_data(struct pipeline_context *c, json_t **data, struct error *err);
+status report_data(struct report *report, json_t **data, struct error *err);
 
 #endif

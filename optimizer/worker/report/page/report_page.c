@@ -202,7 +202,7 @@ static void print_rows(const json_t *rows, FILE *out)
     fputs("</div>\n<p class=\"hint\">Rings, and blue lines of the table: held-out rows.</p>\n", out);
 }
 
-static status print_fit(struct pipeline_context *c, const json_t *data, FILE *out, struct error *err)
+static status print_fit(struct report *report, const json_t *data, FILE *out, struct error *err)
 {
     const json_t *result = json_object_get(data, "result"), *rows = json_object_get(result, "rows");
     print_errors(result, out);
@@ -210,7 +210,7 @@ static status print_fit(struct pipeline_context *c, const json_t *data, FILE *ou
     print_parameters("Numbers of the cloth", json_object_get(result, "cloth_numbers"), out);
     print_rows(rows, out);
     heading("Pictures", out);
-    status s = page_pictures(c, rows, out, err);
+    status s = page_pictures(report, rows, out, err);
     heading("Course of the fit", out);
     page_curve(json_object_get(data, "curve"), out);
     heading("Correlation of the parameters", out);
@@ -222,18 +222,18 @@ static status print_fit(struct pipeline_context *c, const json_t *data, FILE *ou
 }
 
 /* The cloth on surfaces, and the parameters if they were given. */
-static status print_surfaces(struct pipeline_context *c, const json_t *result, FILE *out, struct error *err)
+static status print_surfaces(struct report *report, const json_t *result, FILE *out, struct error *err)
 {
     const json_t *list = json_object_get(result, "pictures");
-    if (job_document_kind(c->doc) == JOB_OF_PICTURES)
+    if (report->in.kind == JOB_OF_PICTURES)
         print_parameters("Given parameters", json_object_get(result, "parameters"), out);
     if (json_array_size(list) == 0) return STATUS_OK;
     heading("The cloth on surfaces", out);
-    return page_surface_pictures(c, list, out, err);
+    return page_surface_pictures(report, list, out, err);
 }
 
 /* Models that were fitted to the profile of a fiber, the best one first. */
-static void print_profile(const struct pipeline_context *c, const json_t *result, FILE *out)
+static void print_profile(const struct report *report, const json_t *result, FILE *out)
 {
     size_t i;
     const json_t *m, *profile = json_object_get(result, "profile");
@@ -245,7 +245,7 @@ static void print_profile(const struct pipeline_context *c, const json_t *result
             char title[160];
             snprintf(title, sizeof title, "%s%s", page_string(m, "id"), best ? ", the best model" : "");
             heading(title, out);
-            profile_page(c, i, out);
+            profile_page(report, i, out);
             print_parameters("Fitted parameters", json_object_get(m, "parameters"), out);
         }
 }
@@ -305,7 +305,7 @@ static void print_warnings(const json_t *warnings, FILE *out)
     fputs("</ul>\n", out);
 }
 
-static status print_page(struct pipeline_context *c, const json_t *data, FILE *out, struct error *err)
+static status print_page(struct report *report, const json_t *data, FILE *out, struct error *err)
 {
     const json_t *result = json_object_get(data, "result");
     status s = STATUS_OK;
@@ -313,9 +313,9 @@ static status print_page(struct pipeline_context *c, const json_t *data, FILE *o
           "content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" href=\"data:,\">\n"
           "<title>",
           out);
-    page_escaped(c->doc->sample, out);
+    page_escaped(report->in.sample, out);
     fprintf(out, " - report</title>\n<style>\n%s</style>\n</head>\n<body>\n<h1>", style);
-    page_escaped(c->doc->sample, out);
+    page_escaped(report->in.sample, out);
     fputs("</h1>\n<p class=\"hint\">", out);
     if (json_is_string(json_object_get(result, "model"))) {
         page_escaped(page_string(result, "model"), out);
@@ -326,46 +326,45 @@ static status print_page(struct pipeline_context *c, const json_t *data, FILE *o
     fputs("The same as data: report.json.</p>\n", out);
     print_verdict(json_object_get(result, "verdict"), out);
     print_warnings(json_object_get(result, "warnings"), out);
-    if (job_document_kind(c->doc) == JOB_OF_FIT) s = print_fit(c, data, out, err);
-    if (job_document_kind(c->doc) == JOB_OF_PROFILE)
-        print_profile(c, result, out);
+    if (report->in.kind == JOB_OF_FIT) s = print_fit(report, data, out, err);
+    if (report->in.kind == JOB_OF_PROFILE)
+        print_profile(report, result, out);
     else if (s == STATUS_OK)
-        s = print_surfaces(c, result, out, err);
+        s = print_surfaces(report, result, out, err);
     print_settings(data, out);
     fputs("</body>\n</html>\n", out);
     return s;
 }
 
-static status write_text(const struct pipeline_context *c, const char *name, const char *text, size_t n,
-                         struct error *err)
+static status write_text(const struct report *report, const char *name, const char *text, size_t n, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, name, path);
-    return worker_folder_replace(c->folder, path, text, n, err);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, name, path);
+    return worker_folder_replace(report->in.job->tools->folder, path, text, n, err);
 }
 
-static status write_page(struct pipeline_context *c, const json_t *data, struct error *err)
+static status write_page(struct report *report, const json_t *data, struct error *err)
 {
     char *text = NULL;
     size_t n = 0;
     FILE *out = open_memstream(&text, &n);
     if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the report: out of memory");
-    status s = print_page(c, data, out, err);
+    status s = print_page(report, data, out, err);
     if (fclose(out) != 0 && s == STATUS_OK)
         s = error_set(err, STATUS_NO_MEMORY, "cannot write the report: out of memory");
-    if (s == STATUS_OK) s = write_text(c, "report.html", text, n, err);
+    if (s == STATUS_OK) s = write_text(report, "report.html", text, n, err);
     free(text);
     return s;
 }
 
-status report_write(struct pipeline_context *c, struct error *err)
+status report_write(struct report *report, struct error *err)
 {
     json_t *data = NULL;
-    status s = report_data(c, &data, err);
+    status s = report_data(report, &data, err);
     char *text = s == STATUS_OK ? json_dumps(data, JSON_REAL_PRECISION(17) | JSON_INDENT(1)) : NULL;
     if (s == STATUS_OK && text == NULL) s = error_set(err, STATUS_NO_MEMORY, "cannot write the report: out of memory");
-    if (s == STATUS_OK) s = write_text(c, "report.json", text, strlen(text), err);
-    if (s == STATUS_OK) s = write_page(c, data, err);
+    if (s == STATUS_OK) s = write_text(report, "report.json", text, strlen(text), err);
+    if (s == STATUS_OK) s = write_page(report, data, err);
     free(text);
     json_decref(data);
     return s;

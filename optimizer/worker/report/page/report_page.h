@@ -3,9 +3,9 @@
 #ifndef SELVEDGE_OPTIMIZER_REPORT_PAGE_H
 #define SELVEDGE_OPTIMIZER_REPORT_PAGE_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/report.h"
 
 /* After result.json and the pictures are written. STATUS_NO_MEMORY, and the errors of worker_folder_replace. */
-status report_write(struct pipeline_context *c, struct error *err);
+status report_write(struct report *report, struct error *err);
 
 #endif

@@ -41,12 +41,13 @@ static bool installed(char prefix[WORKER_PATH_BYTES])
     return false;
 }
 
-void report_pdf_warn(const struct pipeline_context *c)
+void report_pdf_warn(const struct report *report)
 {
     char prefix[WORKER_PATH_BYTES];
-    if (!c->doc->results.export_pdf || installed(prefix)) return;
-    worker_status_warn(c->status, "report.pdf was not made: this machine has no program '%s' (Debian package %s)",
-                       program, program);
+    if (!report->in.results->export_pdf || installed(prefix)) return;
+    worker_status_warn(report->in.job->tools->status,
+                       "report.pdf was not made: this machine has no program '%s' (Debian package %s)", program,
+                       program);
 }
 
 /* The files of the page, in the helper and in the worker. */
@@ -141,31 +142,32 @@ void report_pdf_start_helper(const struct worker_folder *folder, struct pdf_help
 }
 
 /* Waits for the end of the program. One that takes too long, or that of a cancelled job, ends with the worker. */
-static bool wait_for(const struct pipeline_context *c, pid_t child)
+static bool wait_for(const struct report *report, pid_t child)
 {
     const struct timespec pause = {0, WAIT_MS * 1000000L};
     for (int waited_ms = 0, how = 0; waited_ms < LONGEST_S * 1000; waited_ms += WAIT_MS) {
         pid_t got = waitpid(child, &how, WNOHANG);
         if (got == child) return WIFEXITED(how) && WEXITSTATUS(how) == 0;
-        if ((got < 0 && errno != EINTR) || progress_cancelled(&c->progress)) return false;
+        if ((got < 0 && errno != EINTR) || progress_cancelled(&report->in.job->tools->progress)) return false;
         nanosleep(&pause, NULL);
     }
     return false;
 }
 
-status report_pdf_write(struct pipeline_context *c, struct error *err)
+status report_pdf_write(struct report *report, struct error *err)
 {
     char prefix[WORKER_PATH_BYTES];
     struct pdf_paths path;
-    if (!c->doc->results.export_pdf || !installed(prefix)) return STATUS_OK;
-    set_paths(c->folder, &path);
-    if (c->pdf.pid > 0 && write(c->pdf.order_fd, "g", 1) == 1 && wait_for(c, c->pdf.pid) &&
+    if (!report->in.results->export_pdf || !installed(prefix)) return STATUS_OK;
+    set_paths(report->in.job->tools->folder, &path);
+    if (report->in.pdf.pid > 0 && write(report->in.pdf.order_fd, "g", 1) == 1 && wait_for(report, report->in.pdf.pid) &&
         access(path.part, F_OK) == 0) {
-        status s = worker_folder_check(c->folder, err);
+        status s = worker_folder_check(report->in.job->tools->folder, err);
         return s == STATUS_OK ? durable_rename(path.part, path.to, err) : s;
     }
     unlink(path.part);
-    if (progress_cancelled(&c->progress)) return error_set(err, STATUS_CANCELLED, "cancelled while making report.pdf");
-    worker_status_warn(c->status, "report.pdf was not made: the program '%s' failed", program);
+    if (progress_cancelled(&report->in.job->tools->progress))
+        return error_set(err, STATUS_CANCELLED, "cancelled while making report.pdf");
+    worker_status_warn(report->in.job->tools->status, "report.pdf was not made: the program '%s' failed", program);
     return STATUS_OK;
 }

@@ -39,20 +39,20 @@ static size_t find_slices(const struct profile_row *const *row, size_t n, struct
     return n_slice;
 }
 
-static void chart(const struct pipeline_context *c, size_t i_model, const struct profile_row *const *row,
+static void chart(const struct report *report, size_t i_model, const struct profile_row *const *row,
                   const struct slice *s, FILE *out)
 {
-    const size_t n = s->end - s->first, n_channel = c->profile.n_channel;
+    const size_t n = s->end - s->first, n_channel = report->in.fiber->profile.n_channel;
     struct page_point *point = calloc(n * n_channel, sizeof *point);
     char title[80];
     if (point == NULL) return;
     for (size_t k = 0; k < n * n_channel; k++) {
         const struct profile_row *r = row[s->first + k % n];
-        const size_t channel = k / n, at = (size_t)(r - c->profile.row) * n_channel + channel;
+        const size_t channel = k / n, at = (size_t)(r - report->in.fiber->profile.row) * n_channel + channel;
         point[k] = (struct page_point){.x = angle_to_deg(r->phi_rad),
                                        .measured = r->radiance[channel],
                                        .se = r->se[channel],
-                                       .fitted = c->model[i_model].profile.value[at]};
+                                       .fitted = report->model[i_model].fit->profile.value[at]};
     }
     snprintf(title, sizeof title, "phi, degrees, at theta_i %.4g, theta_o %.4g degrees",
              angle_to_deg(row[s->first]->theta_i_rad), angle_to_deg(row[s->first]->theta_o_rad));
@@ -60,9 +60,9 @@ static void chart(const struct pipeline_context *c, size_t i_model, const struct
     free(point);
 }
 
-static void charts(const struct pipeline_context *c, size_t i_model, FILE *out)
+static void charts(const struct report *report, size_t i_model, FILE *out)
 {
-    const struct fiber_profile *p = &c->profile;
+    const struct fiber_profile *p = &report->in.fiber->profile;
     const struct profile_row **row = calloc(p->n + 1, sizeof *row);
     struct slice *slice = calloc(p->n + 1, sizeof *slice);
     if (row != NULL && slice != NULL) {
@@ -72,16 +72,16 @@ static void charts(const struct pipeline_context *c, size_t i_model, FILE *out)
         fputs("<p class=\"hint\">Dots: measured, with stated errors; lines: fitted.</p>\n<div class=\"charts\">\n",
               out);
         for (size_t k = 0; k < n_shown; k++)
-            chart(c, i_model, row, &slice[n_shown > 1 ? k * (n - 1) / (n_shown - 1) : 0], out);
+            chart(report, i_model, row, &slice[n_shown > 1 ? k * (n - 1) / (n_shown - 1) : 0], out);
         fputs("</div>\n", out);
     }
     free(row);
     free(slice);
 }
 
-void profile_page(const struct pipeline_context *c, size_t i, FILE *out)
+void profile_page(const struct report *report, size_t i, FILE *out)
 {
-    const struct profile_fit *f = &c->model[i].profile;
+    const struct profile_fit *f = &report->model[i].fit->profile;
     fputs("<table>\n", out);
     if (isfinite(f->nrmse))
         fprintf(out, "<tr><td>residual, of the range of the radiances</td><td>%.2f %%</td></tr>\n", 100.0 * f->nrmse);
@@ -92,5 +92,5 @@ void profile_page(const struct pipeline_context *c, size_t i, FILE *out)
     fprintf(out, "<tr><td>scale</td><td>%.5g%s</td></tr>\n", f->scale, f->scale_se > 0.0 ? "" : ", as stated");
     fprintf(out, "<tr><td>starts that came to this result</td><td>%zu of %zu</td></tr>\n</table>\n", f->n_agree,
             f->n_start);
-    charts(c, i, out);
+    charts(report, i, out);
 }

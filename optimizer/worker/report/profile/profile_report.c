@@ -7,22 +7,22 @@
 #include <math.h>
 #include <stdlib.h>
 
-static size_t profile_best_model(const struct pipeline_context *c)
+static size_t profile_best_model(const struct report *report)
 {
     size_t best = 0;
-    for (size_t i = 1; i < c->n_model; i++)
-        if (c->model[i].profile.bic < c->model[best].profile.bic) best = i;
+    for (size_t i = 1; i < report->n_model; i++)
+        if (report->model[i].fit->profile.bic < report->model[best].fit->profile.bic) best = i;
     return best;
 }
 
-static json_t *model_json(const struct pipeline_context *c, size_t i)
+static json_t *model_json(const struct report *report, size_t i)
 {
-    const struct pipeline_model *m = &c->model[i];
-    const struct profile_fit *f = &m->profile;
-    json_t *json = json_pack("{s:s, s:s, s:b, s:o, s:o, s:o, s:b}", "id", m->appearance.id, "title",
-                             m->appearance.title, "best", (int)(i == profile_best_model(c)), "parameters",
+    const struct pipeline_model *m = &report->model[i];
+    const struct profile_fit *f = &m->fit->profile;
+    json_t *json = json_pack("{s:s, s:s, s:b, s:o, s:o, s:o, s:b}", "id", m->setup->appearance.id, "title",
+                             m->setup->appearance.title, "best", (int)(i == profile_best_model(report)), "parameters",
                              result_parameters_json(m), "scale", json_number(f->scale), "scale_se",
-                             json_number(f->scale_se), "scale_fitted", (int)isnan(c->doc->profile.scale));
+                             json_number(f->scale_se), "scale_fitted", (int)isnan(report->in.profile->scale));
     json_object_set_new(json, "nrmse", json_number(f->nrmse));
     json_object_set_new(json, "rel_rms", json_number(f->rel_rms));
     json_object_set_new(json, "misfit", json_number(f->misfit));
@@ -37,9 +37,9 @@ static json_t *model_json(const struct pipeline_context *c, size_t i)
     return json;
 }
 
-static json_t *table_json(const struct pipeline_context *c)
+static json_t *table_json(const struct report *report)
 {
-    const struct fiber_profile *p = &c->profile;
+    const struct fiber_profile *p = &report->in.fiber->profile;
     double range[3][2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
     for (size_t i = 0; i < p->n; i++) {
         const double angle[3] = {p->row[i].theta_i_rad, p->row[i].theta_o_rad, p->row[i].phi_rad};
@@ -48,17 +48,17 @@ static json_t *table_json(const struct pipeline_context *c)
             range[k][1] = fmax(range[k][1], angle_to_deg(angle[k]));
         }
     }
-    return json_pack("{s:s, s:o, s:o, s:b, s:o, s:o, s:o}", "file", job_profile_name(&c->doc->profile), "n_row",
+    return json_pack("{s:s, s:o, s:o, s:b, s:o, s:o, s:o}", "file", job_profile_name(report->in.profile), "n_row",
                      json_count(p->n), "n_channel", json_count(p->n_channel), "has_errors", (int)p->has_se,
                      "theta_i_deg", json_number_list(range[0], 2, 1.0), "theta_o_deg",
                      json_number_list(range[1], 2, 1.0), "phi_deg", json_number_list(range[2], 2, 1.0));
 }
 
 /* How the photographs of a bowl became the table; NULL without them. */
-static json_t *bowl_json(const struct pipeline_context *c)
+static json_t *bowl_json(const struct report *report)
 {
-    const struct job_bowl *b = &c->doc->profile.bowl;
-    const struct bowl_record *r = &c->bowl;
+    const struct job_bowl *b = &report->in.profile->bowl;
+    const struct bowl_record *r = &report->in.fiber->bowl;
     json_t *shots = json_array();
     for (size_t i = 0; i < r->n_shot; i++) {
         const struct bowl_shot *s = &r->shot[i];
@@ -73,56 +73,57 @@ static json_t *bowl_json(const struct pipeline_context *c)
                      shots);
 }
 
-static json_t *profile_json(const struct pipeline_context *c)
+static json_t *profile_json(const struct report *report)
 {
     json_t *models = json_array();
-    for (size_t i = 0; i < c->n_model; i++) json_array_append_new(models, model_json(c, i));
-    json_t *json = json_pack("{s:o, s:s, s:s, s:o}", "table", table_json(c), "chosen_by", "bic", "csv", "profile.csv",
-                             "models", models);
-    if (c->doc->profile.bowl.given) json_object_set_new(json, "bowl", bowl_json(c));
+    for (size_t i = 0; i < report->n_model; i++) json_array_append_new(models, model_json(report, i));
+    json_t *json = json_pack("{s:o, s:s, s:s, s:o}", "table", table_json(report), "chosen_by", "bic", "csv",
+                             "profile.csv", "models", models);
+    if (report->in.profile->bowl.given) json_object_set_new(json, "bowl", bowl_json(report));
     return json;
 }
 
-status profile_json_write(struct pipeline_context *c, struct error *err)
+status profile_json_write(struct report *report, struct error *err)
 {
-    const struct pipeline_model *m = &c->model[profile_best_model(c)];
-    json_t *json = json_pack("{s:i, s:s, s:s, s:n, s:o, s:[], s:[], s:I, s:o}", "format", 1, "sample", c->doc->sample,
-                             "model", m->appearance.id, "method", "parameters", result_parameters_json(m), "rows",
-                             "models", "seed", (json_int_t)c->doc->fit.seed, "profile", profile_json(c));
-    return result_json_finish(c, json, err);
+    const struct pipeline_model *m = &report->model[profile_best_model(report)];
+    json_t *json =
+        json_pack("{s:i, s:s, s:s, s:n, s:o, s:[], s:[], s:I, s:o}", "format", 1, "sample", report->in.sample, "model",
+                  m->setup->appearance.id, "method", "parameters", result_parameters_json(m), "rows", "models", "seed",
+                  (json_int_t)report->in.job->fit->seed, "profile", profile_json(report));
+    return result_json_finish(report, json, err);
 }
 
-status profile_csv_write(const struct pipeline_context *c, struct error *err)
+status profile_csv_write(const struct report *report, struct error *err)
 {
-    const struct fiber_profile *p = &c->profile;
+    const struct fiber_profile *p = &report->in.fiber->profile;
     char path[WORKER_PATH_BYTES], *text = NULL;
     size_t n = 0;
     FILE *out = open_memstream(&text, &n);
     if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the profile: out of memory");
     fputs("theta_i_deg,theta_o_deg,phi_deg,channel,radiance", out);
-    for (size_t i = 0; i < c->n_model; i++) fprintf(out, ",%s", c->model[i].appearance.id);
+    for (size_t i = 0; i < report->n_model; i++) fprintf(out, ",%s", report->model[i].setup->appearance.id);
     fputs("\n", out);
     for (size_t k = 0; k < p->n * p->n_channel; k++) {
         const struct profile_row *row = &p->row[k / p->n_channel];
         fprintf(out, "%.6g,%.6g,%.6g,%s,%.9g", angle_to_deg(row->theta_i_rad), angle_to_deg(row->theta_o_rad),
                 angle_to_deg(row->phi_rad), p->n_channel == 1 ? "grey" : (const char *[]){"r", "g", "b"}[k % 3],
                 row->radiance[k % p->n_channel]);
-        for (size_t i = 0; i < c->n_model; i++) fprintf(out, ",%.9g", c->model[i].profile.value[k]);
+        for (size_t i = 0; i < report->n_model; i++) fprintf(out, ",%.9g", report->model[i].fit->profile.value[k]);
         fputs("\n", out);
     }
     fclose(out);
-    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "profile.csv", path);
-    status s = worker_folder_replace(c->folder, path, text, n, err);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, "profile.csv", path);
+    status s = worker_folder_replace(report->in.job->tools->folder, path, text, n, err);
     free(text);
     return s;
 }
 
-void profile_print(const struct pipeline_context *c, size_t i, FILE *out)
+void profile_print(const struct report *report, size_t i, FILE *out)
 {
-    const struct pipeline_model *m = &c->model[i];
-    const struct profile_fit *f = &m->profile;
-    fprintf(out, "model    %s (%s)%s, fitted to the profile of a fiber\n", m->appearance.id, m->appearance.title,
-            c->n_model > 1 && i == profile_best_model(c) ? ", the best" : "");
+    const struct pipeline_model *m = &report->model[i];
+    const struct profile_fit *f = &m->fit->profile;
+    fprintf(out, "model    %s (%s)%s, fitted to the profile of a fiber\n", m->setup->appearance.id,
+            m->setup->appearance.title, report->n_model > 1 && i == profile_best_model(report) ? ", the best" : "");
     fputs("residual ", out);
     if (isfinite(f->nrmse)) fprintf(out, "%.2f %% of the range of %zu radiances; ", 100.0 * f->nrmse, f->n_value);
     fprintf(out, "relative %.2f %%", 100.0 * f->rel_rms);

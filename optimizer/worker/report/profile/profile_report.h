@@ -10,18 +10,18 @@
 #ifndef SELVEDGE_OPTIMIZER_PROFILE_REPORT_H
 #define SELVEDGE_OPTIMIZER_PROFILE_REPORT_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/report.h"
 
 #include <stdio.h>
 
 /* result.json of such a job. */
-status profile_json_write(struct pipeline_context *c, struct error *err);
+status profile_json_write(struct report *report, struct error *err);
 /* results/profile.csv: theta_i_deg, theta_o_deg, phi_deg, radiance, and the radiance by each model; one line for each
  * row and channel. */
-status profile_csv_write(const struct pipeline_context *c, struct error *err);
+status profile_csv_write(const struct report *report, struct error *err);
 /* The residuals of model i in the summary. */
-void profile_print(const struct pipeline_context *c, size_t i, FILE *out);
+void profile_print(const struct report *report, size_t i, FILE *out);
 /* The residuals of model i and charts of the radiance over phi, measured and fitted, in the page. */
-void profile_page(const struct pipeline_context *c, size_t i, FILE *out);
+void profile_page(const struct report *report, size_t i, FILE *out);
 
 #endif

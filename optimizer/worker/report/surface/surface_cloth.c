@@ -17,9 +17,9 @@
 enum { CYLINDER_CELLS = 720 };
 
 /* The number of the first picture that shows the same drape. */
-static size_t first_of_drape(const struct job_document *doc, size_t i)
+static size_t first_of_drape(const struct job_results *results, size_t i)
 {
-    const struct job_surface_picture *p = doc->results.surface_picture;
+    const struct job_surface_picture *p = results->surface_picture;
     for (size_t k = 0; k < i; k++)
         if (p[k].on == JOB_ON_DRAPE && p[k].size_mm == p[i].size_mm && p[k].radius_mm == p[i].radius_mm) return k;
     return i;
@@ -27,29 +27,29 @@ static size_t first_of_drape(const struct job_document *doc, size_t i)
 
 /* A drape is computed once and kept as a mesh file among the results, from which it is read, so that every attempt and
  * whoever uses the file elsewhere have the same one. */
-static status make_drape(const struct pipeline_context *c, size_t i, struct mesh *m, struct error *err)
+static status make_drape(const struct surface_input *on, size_t i, struct mesh *m, struct error *err)
 {
-    const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
+    const struct job_surface_picture *p = &on->results->surface_picture[i];
     char path[WORKER_PATH_BYTES], name[64], *text = NULL;
     size_t n_bytes;
-    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "pictures", path);
+    worker_folder_path(on->tools->folder, JOB_FOLDER_RESULTS, "pictures", path);
     status s = durable_make_folder(path, err);
-    snprintf(name, sizeof name, "pictures/on-%zu.obj", first_of_drape(c->doc, i) + 1);
-    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, name, path);
+    snprintf(name, sizeof name, "pictures/on-%zu.obj", first_of_drape(on->results, i) + 1);
+    worker_folder_path(on->tools->folder, JOB_FOLDER_RESULTS, name, path);
     if (s == STATUS_OK && access(path, F_OK) != 0) {
-        struct progress silent = progress_silent(&c->progress);
+        struct progress silent = progress_silent(&on->tools->progress);
         s = mesh_drape(p->size_mm, p->radius_mm, &silent, m, err);
         if (s == STATUS_OK) s = mesh_obj_text(m, &text, &n_bytes, err);
-        if (s == STATUS_OK) s = worker_folder_replace(c->folder, path, text, n_bytes, err);
+        if (s == STATUS_OK) s = worker_folder_replace(on->tools->folder, path, text, n_bytes, err);
         free(text);
         mesh_release(m);
     }
     return s == STATUS_OK ? mesh_read_obj(path, 1.0, m, err) : s;
 }
 
-static status make_mesh(const struct pipeline_context *c, size_t i, struct mesh *m, struct error *err)
+static status make_mesh(const struct surface_input *on, size_t i, struct mesh *m, struct error *err)
 {
-    const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
+    const struct job_surface_picture *p = &on->results->surface_picture[i];
     char path[WORKER_PATH_BYTES];
     switch (p->on) {
     case JOB_ON_CYLINDER:
@@ -58,9 +58,9 @@ static status make_mesh(const struct pipeline_context *c, size_t i, struct mesh 
     case JOB_ON_FLAT:
         return mesh_flat((const double[2]){p->size_mm, p->size_mm}, (const size_t[2]){1, 1}, m, err);
     case JOB_ON_DRAPE:
-        return make_drape(c, i, m, err);
+        return make_drape(on, i, m, err);
     default:
-        worker_folder_path(c->folder, JOB_FOLDER_INPUT, p->mesh_file, path);
+        worker_folder_path(on->tools->folder, JOB_FOLDER_INPUT, p->mesh_file, path);
         return mesh_read_obj(path, p->mesh_unit_mm, m, err);
     }
 }
@@ -78,16 +78,17 @@ static status name_picture(size_t i, enum job_surface on, status s, struct error
     return error_prefix(err, s, "picture %zu", i + 1);
 }
 
-status surface_cloth_init(const struct pipeline_context *c, size_t i, const struct scene *fibers,
+status surface_cloth_init(const struct surface_input *on, size_t i, const struct scene *fibers,
                           struct surface_cloth *cloth, struct error *err)
 {
-    const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
-    const bool black_sheet = p->black_sheet < 0 ? c->doc->setup.black_sheet : p->black_sheet != 0;
+    const struct job_surface_picture *p = &on->results->surface_picture[i];
+    const bool black_sheet = p->black_sheet < 0 ? on->setup->black_sheet : p->black_sheet != 0;
     struct mesh m = {0};
     memset(cloth, 0, sizeof *cloth);
-    status s = make_mesh(c, i, &m, err);
+    status s = make_mesh(on, i, &m, err);
     if (s == STATUS_OK && fibers != NULL) s = scene_bend(fibers, &m, black_sheet, &cloth->fibers, err);
-    if (s == STATUS_OK && fibers == NULL) s = volume_scene_bend(&c->volume_scene, &m, black_sheet, &cloth->volume, err);
+    if (s == STATUS_OK && fibers == NULL)
+        s = volume_scene_bend(&on->made->volume_scene, &m, black_sheet, &cloth->volume, err);
     mesh_release(&m);
     return name_picture(i, p->on, s, err);
 }
@@ -109,48 +110,47 @@ static double *point_from(double theta_deg, double phi_deg, double distance_mm, 
 }
 
 /* What would be seen is the inside of the cloth: an error. Parts that run through each other are a warning. */
-static status check_surface(const struct pipeline_context *c, size_t i, const struct scene *bent, struct error *err)
+static status check_surface(const struct surface_input *on, size_t i, const struct scene *bent, struct error *err)
 {
-    const struct job_document *d = c->doc;
-    const struct job_surface_picture *p = &d->results.surface_picture[i];
+    const struct job_setup *d = on->setup;
+    const struct job_surface_picture *p = &on->results->surface_picture[i];
     const double mm_per_cm = 10.0;
     double at[3];
     if (p->method == JOB_PICTURE_DIFFUSION) {
-        status s = diffusion_check_pile(c->scene, NULL, err);
+        status s = diffusion_check_pile(on->made->scene, NULL, err);
         if (s == STATUS_INVALID && err != NULL)
             snprintf(err->field, sizeof err->field, OPTION_PICTURE_METHOD "[%zu]", i);
         if (s != STATUS_OK) return s;
     }
-    point_from(p->camera_theta_deg, p->camera_phi_deg - p->cloth_rotation_deg, mm_per_cm * d->setup.camera_distance_cm,
-               at);
-    if (!d->setup.camera_far_field && scene_encloses(bent, at))
+    point_from(p->camera_theta_deg, p->camera_phi_deg - p->cloth_rotation_deg, mm_per_cm * d->camera_distance_cm, at);
+    if (!d->camera_far_field && scene_encloses(bent, at))
         return error_set(err, STATUS_INVALID,
                          "the camera, %g cm from the orbit center, stands inside the cloth: move the mesh, or the "
                          "camera",
-                         d->setup.camera_distance_cm);
-    point_from(p->light_theta_deg, p->light_phi_deg - p->cloth_rotation_deg, mm_per_cm * d->setup.lamp_distance_cm, at);
-    if (!d->setup.lamp_directional && isnan(p->lamp_sharpness) && scene_encloses(bent, at))
+                         d->camera_distance_cm);
+    point_from(p->light_theta_deg, p->light_phi_deg - p->cloth_rotation_deg, mm_per_cm * d->lamp_distance_cm, at);
+    if (!d->lamp_directional && isnan(p->lamp_sharpness) && scene_encloses(bent, at))
         return error_set(err, STATUS_INVALID,
                          "the lamp, %g cm from the orbit center, stands inside the cloth: move the mesh, or the "
                          "lamp",
-                         d->setup.lamp_distance_cm);
+                         d->lamp_distance_cm);
     if (p->on == JOB_ON_MESH && scene_crosses_itself(bent, at))
         worker_status_warn(
-            c->status,
+            on->tools->status,
             "picture %zu: parts of the mesh run through each other over the thickness of the cloth, as at "
             "(%.3g, %.3g, %.3g) mm; what is shown there is no cloth",
             i + 1, at[0], at[1], at[2]);
     return STATUS_OK;
 }
 
-status surface_cloth_check(const struct pipeline_context *c, struct error *err)
+status surface_cloth_check(const struct surface_input *on, struct error *err)
 {
     status s = STATUS_OK;
-    for (size_t i = 0; i < c->doc->results.n_surface_picture && c->scene != NULL && s == STATUS_OK; i++) {
+    for (size_t i = 0; i < on->results->n_surface_picture && on->made->scene != NULL && s == STATUS_OK; i++) {
         struct surface_cloth cloth;
-        s = surface_cloth_init(c, i, c->scene, &cloth, err);
+        s = surface_cloth_init(on, i, on->made->scene, &cloth, err);
         if (s == STATUS_OK)
-            s = name_picture(i, c->doc->results.surface_picture[i].on, check_surface(c, i, cloth.fibers, err), err);
+            s = name_picture(i, on->results->surface_picture[i].on, check_surface(on, i, cloth.fibers, err), err);
         surface_cloth_release(&cloth);
     }
     return s;

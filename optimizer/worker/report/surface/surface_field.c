@@ -17,13 +17,13 @@ double surface_field_coverage(const struct fiber_set *fiber, double pixel_m)
     return shown > 0.0 ? pixel_m * weight / shown : 0.0;
 }
 
-const struct appearance *surface_field_model(const struct pipeline_context *c, size_t i, const struct appearance *best,
+const struct appearance *surface_field_model(const struct report *report, size_t i, const struct appearance *best,
                                              struct appearance *far)
 {
-    const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
+    const struct job_surface_picture *p = &report->in.results->surface_picture[i];
     const char *id = model_catalogue_far_field(best->id);
     if (!p->field_by_pixel || id == NULL) return best;
     double pixel_m = 1e-3 * p->width_mm / (double)p->px;
-    if (surface_field_coverage(&c->fiber, pixel_m) < 1.0) return best;
+    if (surface_field_coverage(&report->in.made->fiber, pixel_m) < 1.0) return best;
     return appearance_find(id, far) ? far : best;
 }

@@ -8,14 +8,15 @@
 
 enum { FEATURE_SAMPLES = 8 };
 
-status surface_filter_init(const struct pipeline_context *c, size_t i, const struct render_request *q,
+status surface_filter_init(const struct report *report, size_t i, const struct render_request *q,
                            const struct surface_tables *tables, const struct progress *progress,
                            struct surface_filter *filter, struct error *err)
 {
     memset(filter, 0, sizeof *filter);
-    if (!c->doc->results.surface_picture[i].filter) return STATUS_OK;
+    if (!report->in.results->surface_picture[i].filter) return STATUS_OK;
     if (q->input.scene.fibers == NULL) {
-        worker_status_warn(c->status, "picture %zu is not filtered: a volume model has no fibers to look at", i + 1);
+        worker_status_warn(report->in.job->tools->status,
+                           "picture %zu is not filtered: a volume model has no fibers to look at", i + 1);
         return STATUS_OK;
     }
     const struct feature_request f = {.scene = q->input.scene.fibers,
@@ -26,12 +27,12 @@ status surface_filter_init(const struct pipeline_context *c, size_t i, const str
                                       .n_sample = FEATURE_SAMPLES,
                                       .seed = q->seed};
     struct progress silent = progress_silent(progress);
-    return feature_image_render(&f, c->pool, &silent, &filter->feature, err);
+    return feature_image_render(&f, report->in.job->tools->pool, &silent, &filter->feature, err);
 }
 
 void surface_filter_release(struct surface_filter *filter) { image_release(&filter->feature); }
 
-status surface_filter_write(const struct pipeline_context *c, const struct surface_filter *filter,
+status surface_filter_write(const struct report *report, const struct surface_filter *filter,
                             const struct surface_ground *ground, const struct surface_passes *so_far, double exposure,
                             json_t **entry, struct error *err)
 {
@@ -39,12 +40,12 @@ status surface_filter_write(const struct pipeline_context *c, const struct surfa
     struct image out;
     *entry = NULL;
     if (filter->feature.pixel == NULL) return STATUS_OK;
-    struct progress silent = progress_silent(&c->progress);
-    status s = joint_filter(&so_far->image, &filter->feature, c->pool, &silent, &out, err);
+    struct progress silent = progress_silent(&report->in.job->tools->progress);
+    status s = joint_filter(&so_far->image, &filter->feature, report->in.job->tools->pool, &silent, &out, err);
     if (s != STATUS_OK) return s;
     surface_ground_add_filtered(ground, &out);
     snprintf(name, sizeof name, "%s-filtered", so_far->name);
-    s = result_image_write(c, &out, "pictures", name, exposure, false, err);
+    s = result_image_write(report, &out, "pictures", name, exposure, false, err);
     image_release(&out);
     if (s != STATUS_OK) return s;
     snprintf(file, sizeof file, "pictures/%s.png", name);

@@ -8,14 +8,15 @@
 static const double radius_widths = 3.0;
 enum { FILTER_SIDE = 4 };
 
-status surface_ground_init(const struct pipeline_context *c, size_t i, const struct render_request *q,
+status surface_ground_init(const struct report *report, size_t i, const struct render_request *q,
                            const struct progress *progress, struct surface_ground *ground, struct error *err)
 {
-    const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
+    const struct job_surface_picture *p = &report->in.results->surface_picture[i];
     memset(ground, 0, sizeof *ground);
     if (isnan(p->ground_gap_mm)) return STATUS_OK;
     if (q->input.scene.fibers == NULL) {
-        worker_status_warn(c->status, "picture %zu has no ground: the shadow of a volume model is not traced", i + 1);
+        worker_status_warn(report->in.job->tools->status,
+                           "picture %zu has no ground: the shadow of a volume model is not traced", i + 1);
         return STATUS_OK;
     }
     ground->present = true;
@@ -31,11 +32,11 @@ status surface_ground_init(const struct pipeline_context *c, size_t i, const str
                                      .seed = q->seed,
                                      .stream = q->stream};
     struct progress silent = progress_silent(progress);
-    status s = ground_render(&g, c->pool, &silent, &ground->layer, err);
+    status s = ground_render(&g, report->in.job->tools->pool, &silent, &ground->layer, err);
     ground->sheared = q->configuration->light == LIGHT_SQUARE_LAMP;
     if (s == STATUS_OK && p->filter && ground->sheared)
-        s = ground_render_filtered(&g, &(struct ground_filter){.n_side = FILTER_SIDE}, c->pool, &silent,
-                                   &ground->filtered, err);
+        s = ground_render_filtered(&g, &(struct ground_filter){.n_side = FILTER_SIDE}, report->in.job->tools->pool,
+                                   &silent, &ground->filtered, err);
     return s;
 }
 

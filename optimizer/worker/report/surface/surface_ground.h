@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_OPTIMIZER_SURFACE_GROUND_H
 #define SELVEDGE_OPTIMIZER_SURFACE_GROUND_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/report.h"
 #include "optimizer/worker/report/surface/surface_passes.h"
 
 struct surface_ground {
@@ -15,7 +15,7 @@ struct surface_ground {
 
 /* Renders the plane of picture i, whose request is q, if the document asks for one. Pictures of volumes have none,
  * which a warning says. Errors of ground_render. Release in any case. */
-status surface_ground_init(const struct pipeline_context *c, size_t i, const struct render_request *q,
+status surface_ground_init(const struct report *report, size_t i, const struct render_request *q,
                            const struct progress *progress, struct surface_ground *ground, struct error *err);
 void surface_ground_release(struct surface_ground *ground);
 /* The picture so far with the plane. shown: a copy, to be released with surface_passes_release. STATUS_NO_MEMORY. */

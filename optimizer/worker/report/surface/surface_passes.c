@@ -17,11 +17,11 @@ struct pass_header {
 };
 static const char magic[8] = "SELVPAS1";
 
-static void checkpoint_path(const struct pipeline_context *c, const char *name, char path[WORKER_PATH_BYTES])
+static void checkpoint_path(const struct report *report, const char *name, char path[WORKER_PATH_BYTES])
 {
     char relative[80];
     snprintf(relative, sizeof relative, "report/%s.pass", name);
-    worker_folder_path(c->folder, JOB_FOLDER_WORK, relative, path);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_WORK, relative, path);
 }
 
 static status make_image(struct image *im, size_t width, size_t height, struct error *err)
@@ -31,18 +31,18 @@ static status make_image(struct image *im, size_t width, size_t height, struct e
     return s;
 }
 
-status surface_passes_start(const struct pipeline_context *c, const char *name, size_t width, size_t height,
+status surface_passes_start(const struct report *report, const char *name, size_t width, size_t height,
                             struct surface_passes *p, struct error *err)
 {
     char path[WORKER_PATH_BYTES], *text = NULL;
     size_t n_byte = 0, n_pixel_byte = width * height * N_CHANNEL * sizeof(float);
     struct pass_header h;
     *p = (struct surface_passes){.name = name};
-    worker_folder_path(c->folder, JOB_FOLDER_WORK, "report", path);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_WORK, "report", path);
     status s = durable_make_folder(path, err);
     if (s == STATUS_OK) s = make_image(&p->image, width, height, err);
     if (s != STATUS_OK) return s;
-    checkpoint_path(c, name, path);
+    checkpoint_path(report, name, path);
     struct error unread;
     if (file_read_all(path, sizeof h + n_pixel_byte, &text, &n_byte, &unread) == STATUS_OK &&
         n_byte == sizeof h + n_pixel_byte) {
@@ -79,7 +79,7 @@ static void add_pass(struct surface_passes *p, const struct image *im, size_t n)
     p->n_sample += n;
 }
 
-static status write_checkpoint(const struct pipeline_context *c, const struct surface_passes *p, struct error *err)
+static status write_checkpoint(const struct report *report, const struct surface_passes *p, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
     size_t n_pixel_byte = p->image.width * p->image.height * N_CHANNEL * sizeof(float);
@@ -89,13 +89,13 @@ static status write_checkpoint(const struct pipeline_context *c, const struct su
     memcpy(h.magic, magic, sizeof magic);
     memcpy(block, &h, sizeof h);
     memcpy(block + sizeof h, p->image.pixel, n_pixel_byte);
-    checkpoint_path(c, p->name, path);
-    status s = worker_folder_replace(c->folder, path, block, sizeof h + n_pixel_byte, err);
+    checkpoint_path(report, p->name, path);
+    status s = worker_folder_replace(report->in.job->tools->folder, path, block, sizeof h + n_pixel_byte, err);
     free(block);
     return s;
 }
 
-status surface_passes_add(struct pipeline_context *c, const struct render_request *q, const struct progress *progress,
+status surface_passes_add(struct report *report, const struct render_request *q, const struct progress *progress,
                           struct surface_passes *p, struct error *err)
 {
     struct render_request pass = *q;
@@ -105,11 +105,11 @@ status surface_passes_add(struct pipeline_context *c, const struct render_reques
     pass.n_sample = next_pass(p, q->n_sample);
     struct progress inner = progress_begin_part(&part, progress, (double)p->n_sample / (double)q->n_sample,
                                                 (double)pass.n_sample / (double)q->n_sample);
-    status s = render_run(&pass, c->pool, &inner, &im, err);
+    status s = render_run(&pass, report->in.job->tools->pool, &inner, &im, err);
     if (s != STATUS_OK) return s;
     add_pass(p, &im, pass.n_sample);
     image_release(&im);
-    return write_checkpoint(c, p, err);
+    return write_checkpoint(report, p, err);
 }
 
 void surface_passes_release(struct surface_passes *p) { image_release(&p->image); }

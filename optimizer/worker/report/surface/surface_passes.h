@@ -4,7 +4,7 @@
 #ifndef SELVEDGE_OPTIMIZER_SURFACE_PASSES_H
 #define SELVEDGE_OPTIMIZER_SURFACE_PASSES_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/report.h"
 #include "renderer/transport/render.h"
 
 /* The picture so far: the mean of all samples, and the variance of that mean. */
@@ -16,12 +16,12 @@ struct surface_passes {
 
 /* Reads the checkpoint of `name`, which must outlive p; where there is none for a picture of this size, it begins with
  * no sample. STATUS_IO, STATUS_NO_MEMORY. */
-status surface_passes_start(const struct pipeline_context *c, const char *name, size_t width, size_t height,
+status surface_passes_start(const struct report *report, const char *name, size_t width, size_t height,
                             struct surface_passes *p, struct error *err);
 /* Renders one more pass of q, whose n_sample is the number in the end, adds it, and writes the checkpoint. The passes
  * grow, up to some millions of paths each. The same request ends with the same bits, however often it was interrupted.
  * Errors of render_run; STATUS_STALE, STATUS_IO, STATUS_DISK_FULL. */
-status surface_passes_add(struct pipeline_context *c, const struct render_request *q, const struct progress *progress,
+status surface_passes_add(struct report *report, const struct render_request *q, const struct progress *progress,
                           struct surface_passes *p, struct error *err);
 void surface_passes_release(struct surface_passes *p);
 

@@ -41,10 +41,10 @@ static double paths_of(const struct job_surface_picture *p)
     return (double)p->px * (double)p->px * (double)p->sample * (p->reference ? 2.0 : 1.0);
 }
 
-double surface_pictures_paths(const struct pipeline_context *c)
+double surface_pictures_paths(const struct job_results *results)
 {
     double n = 0.0;
-    for (size_t i = 0; i < c->doc->results.n_surface_picture; i++) n += paths_of(&c->doc->results.surface_picture[i]);
+    for (size_t i = 0; i < results->n_surface_picture; i++) n += paths_of(&results->surface_picture[i]);
     return n;
 }
 
@@ -110,7 +110,7 @@ static json_t *reference_json(const struct surface_passes *picture, const struct
 }
 
 /* Means over the columns of the picture, as profiles across a cylinder are compared. */
-static status write_columns(const struct pipeline_context *c, const struct job_surface_picture *p,
+static status write_columns(const struct report *report, const struct job_surface_picture *p,
                             const struct surface_passes *done, struct error *err)
 {
     const struct image *im = &done->image;
@@ -129,26 +129,26 @@ static status write_columns(const struct pipeline_context *c, const struct job_s
     }
     status s = fclose(f) == 0 ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot write a table: no memory");
     snprintf(relative, sizeof relative, "pictures/%s-columns.csv", done->name);
-    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, relative, path);
-    if (s == STATUS_OK) s = worker_folder_replace(c->folder, path, text, n_byte, err);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, relative, path);
+    if (s == STATUS_OK) s = worker_folder_replace(report->in.job->tools->folder, path, text, n_byte, err);
     free(text);
     return s;
 }
 
 /* The picture so far as PNG; in the end also as EXR, and its columns. */
-static status write_picture(struct pipeline_context *c, const struct job_surface_picture *p,
+static status write_picture(struct report *report, const struct job_surface_picture *p,
                             const struct surface_passes *so_far, double exposure, struct error *err)
 {
     bool whole = so_far->n_sample == p->sample;
-    status s = result_image_write(c, &so_far->image, "pictures", so_far->name, exposure, whole, err);
-    if (s == STATUS_OK && whole) s = result_thumbnail_of_image(c, &so_far->image, err);
-    return s == STATUS_OK && whole ? write_columns(c, p, so_far, err) : s;
+    status s = result_image_write(report, &so_far->image, "pictures", so_far->name, exposure, whole, err);
+    if (s == STATUS_OK && whole) s = result_thumbnail_of_image(report, &so_far->image, err);
+    return s == STATUS_OK && whole ? write_columns(report, p, so_far, err) : s;
 }
 
-static status write_json(struct pipeline_context *c, const char *path, const json_t *entry, struct error *err)
+static status write_json(struct report *report, const char *path, const json_t *entry, struct error *err)
 {
     char *text = entry != NULL ? json_dumps(entry, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
-    status s = text != NULL ? worker_folder_replace(c->folder, path, text, strlen(text), err)
+    status s = text != NULL ? worker_folder_replace(report->in.job->tools->folder, path, text, strlen(text), err)
                             : error_set(err, STATUS_NO_MEMORY, "cannot write '%s': out of memory", path);
     free(text);
     return s;
@@ -156,18 +156,17 @@ static status write_json(struct pipeline_context *c, const char *path, const jso
 
 /* The entry of result.json lies beside the picture and is written last: a picture is finished when its entry has all
  * samples. *out: the entry, of which the caller has a reference. */
-static status write_entry(struct pipeline_context *c, const struct one_picture *one,
-                          const struct surface_filter *filter, const struct surface_passes *so_far, json_t **out,
-                          struct error *err)
+static status write_entry(struct report *report, const struct one_picture *one, const struct surface_filter *filter,
+                          const struct surface_passes *so_far, json_t **out, struct error *err)
 {
-    const struct job_surface_picture *p = &c->doc->results.surface_picture[one->i];
+    const struct job_surface_picture *p = &report->in.results->surface_picture[one->i];
     json_t *filtered = NULL;
     struct surface_passes shown;
     status s = surface_ground_add(one->ground, so_far, &shown, err);
     if (s != STATUS_OK) return s;
     double exposure = exposure_of(&shown.image);
-    s = write_picture(c, p, &shown, exposure, err);
-    if (s == STATUS_OK) s = surface_filter_write(c, filter, one->ground, so_far, exposure, &filtered, err);
+    s = write_picture(report, p, &shown, exposure, err);
+    if (s == STATUS_OK) s = surface_filter_write(report, filter, one->ground, so_far, exposure, &filtered, err);
     if (s == STATUS_OK) {
         json_decref(*out);
         *out = picture_json(one, p, &shown, exposure);
@@ -177,27 +176,27 @@ static status write_entry(struct pipeline_context *c, const struct one_picture *
     if (p->speckle) json_object_set_new(*out, "speckle", json_true());
     if (one->ground->present) json_object_set_new(*out, "ground_z_mm", json_number(one->ground->z_mm));
     if (filtered != NULL) json_object_set_new(*out, "filtered", filtered);
-    return write_json(c, one->entry_path, *out, err);
+    return write_json(report, one->entry_path, *out, err);
 }
 
 /* Renders pass by pass until all samples are there. */
-static status render_picture(struct pipeline_context *c, const struct one_picture *one, const struct render_request *q,
+static status render_picture(struct report *report, const struct one_picture *one, const struct render_request *q,
                              const struct progress *progress, struct surface_passes *so_far, json_t **entry,
                              struct error *err)
 {
     struct surface_filter filter;
-    status s = surface_filter_init(c, one->i, q, one->tables, progress, &filter, err);
+    status s = surface_filter_init(report, one->i, q, one->tables, progress, &filter, err);
     while (s == STATUS_OK && so_far->n_sample < q->n_sample) {
-        s = surface_passes_add(c, q, progress, so_far, err);
-        if (s == STATUS_OK) s = write_entry(c, one, &filter, so_far, entry, err);
+        s = surface_passes_add(report, q, progress, so_far, err);
+        if (s == STATUS_OK) s = write_entry(report, one, &filter, so_far, entry, err);
     }
-    if (s == STATUS_OK && *entry == NULL) s = write_entry(c, one, &filter, so_far, entry, err);
+    if (s == STATUS_OK && *entry == NULL) s = write_entry(report, one, &filter, so_far, entry, err);
     surface_filter_release(&filter);
     return s;
 }
 
 /* The same view path by path, with random numbers of its own, and the comparison into the entry. */
-static status render_reference(struct pipeline_context *c, const struct one_picture *one, struct render_request q,
+static status render_reference(struct report *report, const struct one_picture *one, struct render_request q,
                                const struct progress *progress, const struct surface_passes *picture, json_t *entry,
                                struct error *err)
 {
@@ -208,68 +207,73 @@ static status render_reference(struct pipeline_context *c, const struct one_pict
     q.input.dual = NULL;
     q.input.diffusion = NULL;
     q.stream += JOB_MAX_SURFACE_PICTURE;
-    status s = surface_passes_start(c, name, q.width, q.height, &traced, err);
-    while (s == STATUS_OK && traced.n_sample < q.n_sample) s = surface_passes_add(c, &q, progress, &traced, err);
+    status s = surface_passes_start(report, name, q.width, q.height, &traced, err);
+    while (s == STATUS_OK && traced.n_sample < q.n_sample) s = surface_passes_add(report, &q, progress, &traced, err);
     struct surface_passes shown = {0}, shown_picture = {0};
     if (s == STATUS_OK) s = surface_ground_add(one->ground, &traced, &shown, err);
     if (s == STATUS_OK) s = surface_ground_add(one->ground, picture, &shown_picture, err);
     if (s == STATUS_OK)
-        s = result_image_write(c, &shown.image, "pictures", name, exposure_of(&shown_picture.image), true, err);
+        s = result_image_write(report, &shown.image, "pictures", name, exposure_of(&shown_picture.image), true, err);
     if (s == STATUS_OK) {
         json_object_set_new(entry, "reference", reference_json(picture, &traced));
-        s = write_json(c, one->entry_path, entry, err);
+        s = write_json(report, one->entry_path, entry, err);
     }
     surface_passes_release(&shown), surface_passes_release(&shown_picture), surface_passes_release(&traced);
     return s;
 }
 
-static status render(struct pipeline_context *c, const struct one_picture *one, const struct progress *progress,
+static status render(struct report *report, const struct one_picture *one, const struct progress *progress,
                      struct surface_passes *so_far, json_t **entry, struct error *err)
 {
-    const struct job_surface_picture *p = &c->doc->results.surface_picture[one->i];
-    const struct pipeline_model *model = &c->model[pipeline_best_model(c)];
+    const struct job_surface_picture *p = &report->in.results->surface_picture[one->i];
+    const struct pipeline_model *model = &report->model[report_best_model(report)];
     bool traced = one->how.method == JOB_PICTURE_PATH, compared = p->reference && !traced;
     struct surface_cloth cloth;
     struct appearance far;
-    const struct appearance *shown = surface_field_model(c, one->i, &model->appearance, &far);
-    struct configuration view = observation_configuration(
-        c->doc, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg, p->camera_phi_deg, p->cloth_rotation_deg);
+    const struct appearance *shown = surface_field_model(report, one->i, &model->setup->appearance, &far);
+    struct configuration view =
+        observation_configuration(report->in.job->setup, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg,
+                                  p->camera_phi_deg, p->cloth_rotation_deg);
     view.crop_m = mm * p->width_mm;
     view.crop_aspect = 1.0;
-    view.environment = c->environment;
+    view.environment = report->in.job->rows->environment;
     if (!isnan(p->lamp_sharpness)) {
         view.light = LIGHT_GAUSSIAN;
         view.light_sharpness = p->lamp_sharpness;
     }
-    const struct scene *fibers = model->appearance.kind == MODEL_SURFACE ? pipeline_scene(c, model).fibers : NULL;
-    status s = surface_cloth_init(c, one->i, fibers, &cloth, err);
+    const struct scene *fibers =
+        model->setup->appearance.kind == MODEL_SURFACE ? made_cloth_scene(report->in.made, model->setup).fibers : NULL;
+    status s = surface_cloth_init(
+        &(struct surface_input){report->in.job->tools, report->in.results, report->in.job->setup, report->in.made},
+        one->i, fibers, &cloth, err);
     struct render_request q = {
         .input = {.scene = {.fibers = cloth.fibers, .volume = cloth.volume.bent != NULL ? &cloth.volume : NULL},
                   .model = shown,
-                  .param = model->fit.param,
-                  .n_set = model->sets.n_set,
-                  .discrepancy = traced ? pipeline_discrepancy(model) : NULL,
+                  .param = model->fit->result.param,
+                  .n_set = model->setup->sets.n_set,
+                  .discrepancy = traced ? pipeline_discrepancy(model->validation) : NULL,
                   .has_speckle = p->speckle,
-                  .speckle_seed = c->doc->fit.seed},
+                  .speckle_seed = report->in.job->fit->seed},
         .configuration = &view,
         .width = p->px,
         .height = p->px,
         .n_sample = p->sample,
-        .seed = c->doc->fit.seed ^ 0x73757266616365u,
+        .seed = report->in.job->fit->seed ^ 0x73757266616365u,
         .stream = (uint32_t)(STREAM + one->i)};
     surface_method_apply(&one->how, &q.input);
     struct progress_part part;
     struct progress first = progress_begin_part(&part, progress, 0.0, compared ? 0.5 : 1.0);
-    if (!traced && pipeline_discrepancy(model) != NULL)
-        worker_status_warn(c->status, "picture %zu is not path traced, and goes without the discrepancy", one->i + 1);
+    if (!traced && pipeline_discrepancy(model->validation) != NULL)
+        worker_status_warn(report->in.job->tools->status,
+                           "picture %zu is not path traced, and goes without the discrepancy", one->i + 1);
     struct surface_ground ground = {0};
     struct one_picture with = *one;
     with.ground = &ground;
     with.model = shown;
-    if (s == STATUS_OK) s = surface_ground_init(c, one->i, &q, &first, &ground, err);
-    if (s == STATUS_OK) s = render_picture(c, &with, &q, &first, so_far, entry, err);
+    if (s == STATUS_OK) s = surface_ground_init(report, one->i, &q, &first, &ground, err);
+    if (s == STATUS_OK) s = render_picture(report, &with, &q, &first, so_far, entry, err);
     first = progress_begin_part(&part, progress, 0.5, 0.5);
-    if (s == STATUS_OK && compared) s = render_reference(c, &with, q, &first, so_far, *entry, err);
+    if (s == STATUS_OK && compared) s = render_reference(report, &with, q, &first, so_far, *entry, err);
     surface_ground_release(&ground);
     surface_cloth_release(&cloth);
     return s == STATUS_OK || s == STATUS_CANCELLED ? s : error_prefix(err, s, "picture %zu", one->i + 1);
@@ -286,67 +290,67 @@ static bool is_finished(const json_t *entry, const struct job_surface_picture *p
 }
 
 /* A picture without any light, which a camera that looks past the cloth and a lamp behind a black sheet make. */
-static void warn_if_black(struct pipeline_context *c, size_t i, const json_t *entry)
+static void warn_if_black(struct report *report, size_t i, const json_t *entry)
 {
     const json_t *mean = json_object_get(entry, "mean");
     double sum = 0.0;
     for (size_t k = 0; k < json_array_size(mean); k++) sum += json_number_value(json_array_get(mean, k));
     if (sum == 0.0)
-        worker_status_warn(c->status,
+        worker_status_warn(report->in.job->tools->status,
                            "picture %zu is black: no light of the lamp comes from the cloth to the camera, or the "
                            "cloth lies beside the picture (see its angles, width_mm and black_sheet)",
                            i + 1);
 }
 
-static status write_one(struct pipeline_context *c, size_t i, const struct surface_tables *tables,
+static status write_one(struct report *report, size_t i, const struct surface_tables *tables,
                         const struct progress *progress, struct error *err)
 {
-    const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
+    const struct job_surface_picture *p = &report->in.results->surface_picture[i];
     char name[32], relative[64], path[WORKER_PATH_BYTES];
-    const bool has_fibers = c->model[pipeline_best_model(c)].appearance.kind == MODEL_SURFACE;
+    const bool has_fibers = report->model[report_best_model(report)].setup->appearance.kind == MODEL_SURFACE;
     struct surface_passes so_far;
     snprintf(name, sizeof name, "on-%zu", i + 1);
     snprintf(relative, sizeof relative, "pictures/%s.json", name);
-    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, relative, path);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, relative, path);
     json_t *entry = json_load_file(path, 0, NULL);
     if (entry != NULL && is_finished(entry, p, has_fibers)) {
-        warn_if_black(c, i, entry);
-        return json_array_append_new(c->surface_pictures, entry) == 0 ? STATUS_OK : STATUS_NO_MEMORY;
+        warn_if_black(report, i, entry);
+        return json_array_append_new(report->surface_pictures, entry) == 0 ? STATUS_OK : STATUS_NO_MEMORY;
     }
     json_decref(entry);
     entry = NULL;
     const struct one_picture one = {
         .i = i, .entry_path = path, .how = surface_tables_method(tables, p), .tables = tables};
-    status s = surface_passes_start(c, name, p->px, p->px, &so_far, err);
-    if (s == STATUS_OK) s = render(c, &one, progress, &so_far, &entry, err);
+    status s = surface_passes_start(report, name, p->px, p->px, &so_far, err);
+    if (s == STATUS_OK) s = render(report, &one, progress, &so_far, &entry, err);
     if (s == STATUS_OK) {
-        warn_if_black(c, i, entry);
-        json_array_append_new(c->surface_pictures, entry);
+        warn_if_black(report, i, entry);
+        json_array_append_new(report->surface_pictures, entry);
     } else
         json_decref(entry);
     surface_passes_release(&so_far);
     return s;
 }
 
-status surface_pictures_write(struct pipeline_context *c, double from, double to, struct error *err)
+status surface_pictures_write(struct report *report, double from, double to, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    double done = 0.0, all = surface_pictures_paths(c);
-    if (c->doc->results.n_surface_picture == 0) return STATUS_OK;
-    worker_folder_path(c->folder, JOB_FOLDER_RESULTS, "pictures", path);
+    double done = 0.0, all = surface_pictures_paths(report->in.results);
+    if (report->in.results->n_surface_picture == 0) return STATUS_OK;
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, "pictures", path);
     status s = durable_make_folder(path, err);
     struct surface_tables tables = {0};
-    double for_tables = (to - from) * surface_tables_share(c);
+    double for_tables = (to - from) * surface_tables_share(report);
     struct progress_part making;
-    struct progress make = progress_begin_part(&making, &c->progress, from, for_tables);
-    if (s == STATUS_OK) s = surface_tables_get(c, &make, &tables, err);
+    struct progress make = progress_begin_part(&making, &report->in.job->tools->progress, from, for_tables);
+    if (s == STATUS_OK) s = surface_tables_get(report, &make, &tables, err);
     from += for_tables;
-    for (size_t i = 0; i < c->doc->results.n_surface_picture && s == STATUS_OK; i++) {
-        const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
+    for (size_t i = 0; i < report->in.results->n_surface_picture && s == STATUS_OK; i++) {
+        const struct job_surface_picture *p = &report->in.results->surface_picture[i];
         double share = (to - from) * paths_of(p) / all;
         struct progress_part part;
-        struct progress progress = progress_begin_part(&part, &c->progress, from + done, share);
-        s = write_one(c, i, &tables, &progress, err);
+        struct progress progress = progress_begin_part(&part, &report->in.job->tools->progress, from + done, share);
+        s = write_one(report, i, &tables, &progress, err);
         done += share;
     }
     surface_tables_release(&tables);

@@ -2,14 +2,14 @@
 #ifndef SELVEDGE_OPTIMIZER_SURFACE_PICTURES_H
 #define SELVEDGE_OPTIMIZER_SURFACE_PICTURES_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/report.h"
 
 /* Samples of all pictures together. */
-double surface_pictures_paths(const struct pipeline_context *c);
+double surface_pictures_paths(const struct job_results *results);
 
-/* Renders what the job document asks for and fills c->surface_pictures, the entries of result.json. A picture that an
- * earlier attempt has finished is not rendered again. from, to: shares of the stage before and after. Errors of
- * surface_cloth_new and of render_run. */
-status surface_pictures_write(struct pipeline_context *c, double from, double to, struct error *err);
+/* Renders what the job document asks for and fills report->surface_pictures, the entries of result.json. A picture
+ * that an earlier attempt has finished is not rendered again. from, to: shares of the stage before and after. Errors
+ * of surface_cloth_new and of render_run. */
+status surface_pictures_write(struct report *report, double from, double to, struct error *err);
 
 #endif

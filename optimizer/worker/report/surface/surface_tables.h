@@ -3,7 +3,7 @@
 #ifndef SELVEDGE_OPTIMIZER_SURFACE_TABLES_H
 #define SELVEDGE_OPTIMIZER_SURFACE_TABLES_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/report.h"
 #include "renderer/diffusion/diffusion_option.h"
 #include "renderer/dual/dual_option.h"
 #include "renderer/fast/fast_option.h"
@@ -27,12 +27,12 @@ struct surface_method {
 
 /* Share of the time of the tables and the pictures together that the tables are expected to take; 0 when no picture
  * asks for those of renderer/fast: averages take a second. */
-double surface_tables_share(const struct pipeline_context *c);
+double surface_tables_share(const struct report *report);
 /* Reads the tables of the best model from the job's folder, work/report/fast.tables, if those of this cloth with these
  * parameters are there, and makes and keeps them otherwise, going on with what an interrupted attempt has kept in
  * fast.journal beside it; makes averages. Errors of fast_precompute,
  * fast_tables_write, dual_tables_init and diffusion_tables_make. */
-status surface_tables_get(struct pipeline_context *c, const struct progress *progress, struct surface_tables *t,
+status surface_tables_get(struct report *report, const struct progress *progress, struct surface_tables *t,
                           struct error *err);
 void surface_tables_release(struct surface_tables *t);
 /* t must outlive the result. */

@@ -13,14 +13,14 @@
 #ifndef SELVEDGE_OPTIMIZER_TWIN_RESULT_H
 #define SELVEDGE_OPTIMIZER_TWIN_RESULT_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/report.h"
 #include "renderer/transport/table/appearance_table.h"
 
 /* Camera paths that the tables take, 0 without a twin. */
-double twin_result_paths(const struct pipeline_context *c);
+double twin_result_paths(const struct job_results *results);
 /* Makes the tables of the best model if the job asks for them and an earlier attempt has not finished them. from, to:
  * shares of the stage before and after. A volume model gives a warning. Errors of appearance_table_make. */
-status twin_result_write(struct pipeline_context *c, double from, double to, struct error *err);
+status twin_result_write(struct report *report, double from, double to, struct error *err);
 
 /* For twin_result_write: the block of twin.bin, and the description of its parts for twin.json. The caller frees
  * both. */

@@ -2,10 +2,10 @@
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_BUDGET_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_BUDGET_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/stages/job_inputs.h"
 
 /* Warns of each model whose fit takes more paths than the document states, and names the least that it takes. After
  * models and rows are known. Warns, too, of a goal of precision where the rows state no errors. */
-status pipeline_warn_budget(struct pipeline_context *c, struct error *err);
+status pipeline_warn_budget(const struct stage_tools *tools, const struct job_inputs *in, struct error *err);
 
 #endif

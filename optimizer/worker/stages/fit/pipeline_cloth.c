@@ -24,7 +24,7 @@ enum { MOST_CLOTHS = 4 };
 
 /* ---- the numbers ---- */
 
-static void add_number(struct pipeline_numbers *to, const struct cloth_number *from, size_t index)
+static void add_number(struct cloth_numbers *to, const struct cloth_number *from, size_t index)
 {
     size_t k = to->n++;
     to->info[k] = (struct param_info){.name = from->name,
@@ -37,54 +37,52 @@ static void add_number(struct pipeline_numbers *to, const struct cloth_number *f
                                       .coordinate = from->info->coordinate,
                                       .meaning = from->info->meaning};
     to->range[k] = (struct fit_parameter){from->lower, from->upper, from->value, false};
-    to->item[k] = (struct pipeline_number){from->info->unit, index, from->prior_mean, from->prior_sd};
+    to->item[k] = (struct cloth_number_item){from->info->unit, index, from->prior_mean, from->prior_sd};
 }
 
-static status check_company(const struct pipeline_context *c, struct error *err)
+static status check_company(const struct job_inputs *in, struct error *err)
 {
-    for (size_t i = 0; i < c->n_model; i++)
-        if (c->model[i].appearance.kind != MODEL_SURFACE)
+    for (size_t i = 0; i < in->n_model; i++)
+        if (in->model[i].appearance.kind != MODEL_SURFACE)
             return error_set_field(err, STATUS_INVALID, OPTION_MODEL,
                                    "numbers of the cloth are fitted with models of fibers only: '%s' sees a volume",
-                                   c->model[i].appearance.id);
-    if (c->doc->fit.fit_radius)
+                                   in->model[i].appearance.id);
+    if (in->doc->fit.fit_radius)
         return error_set_field(
             err, STATUS_INVALID, OPTION_FIT_RADIUS, "'%s' is not for a cloth with fitted numbers: fit the %s of '%s'",
-            job_option_key(OPTION_FIT_RADIUS), c->doc->cloth.description != NULL ? "fiber_radius_um" : "radius",
-            job_option_key(c->doc->cloth.description != NULL ? OPTION_CLOTH : OPTION_CORRECTION));
+            job_option_key(OPTION_FIT_RADIUS), in->doc->cloth.description != NULL ? "fiber_radius_um" : "radius",
+            job_option_key(in->doc->cloth.description != NULL ? OPTION_CLOTH : OPTION_CORRECTION));
     return STATUS_OK;
 }
 
 /* All numbers that the cloth has: those of its description, or its corrections. */
-static const struct cloth_number *numbers_of(const struct pipeline_context *c, size_t *n)
+static const struct cloth_number *numbers_of(const struct job_cloth *cloth, size_t *n)
 {
-    const struct cloth_description *d = c->doc->cloth.description;
-    *n = d != NULL ? d->n_number : c->doc->cloth.has_correction ? CORRECTION_N : 0;
-    return d != NULL ? d->number : c->doc->cloth.correction;
+    const struct cloth_description *d = cloth->description;
+    *n = d != NULL ? d->n_number : cloth->has_correction ? CORRECTION_N : 0;
+    return d != NULL ? d->number : cloth->correction;
 }
 
-status pipeline_cloth_inputs(struct pipeline_context *c, struct error *err)
+status cloth_numbers_read(struct job_inputs *in, struct error *err)
 {
     size_t n_number;
-    const struct cloth_number *list = numbers_of(c, &n_number);
-    memset(&c->number, 0, sizeof c->number);
+    const struct cloth_number *list = numbers_of(&in->doc->cloth, &n_number);
+    memset(&in->number, 0, sizeof in->number);
     for (size_t i = 0; i < n_number; i++) {
         if (!list[i].fitted) continue;
-        if (c->number.n == CLOTH_MAX_FITTED)
+        if (in->number.n == CLOTH_MAX_FITTED)
             return error_set_field(err, STATUS_INVALID, OPTION_CLOTH, "at most %d numbers of a cloth can be fitted",
                                    CLOTH_MAX_FITTED);
-        add_number(&c->number, &list[i], i);
+        add_number(&in->number, &list[i], i);
     }
-    return c->number.n > 0 ? check_company(c, err) : STATUS_OK;
+    return in->number.n > 0 ? check_company(in, err) : STATUS_OK;
 }
 
 /* ---- the unknowns ---- */
 
-status pipeline_joint_init(const struct pipeline_context *c, size_t i_model, struct pipeline_joint *j,
+status pipeline_joint_init(const struct model_setup *m, const struct cloth_numbers *number, struct pipeline_joint *j,
                            struct error *err)
 {
-    const struct pipeline_model *m = &c->model[i_model];
-    const struct pipeline_numbers *number = &c->number;
     size_t n = m->sets.info.n_param;
     memset(j, 0, sizeof *j);
     if (n + number->n > FIT_MAX_PARAM)
@@ -108,10 +106,10 @@ status pipeline_joint_init(const struct pipeline_context *c, size_t i_model, str
 }
 
 /* Numbers that are fitted. */
-static size_t n_free_number(const struct pipeline_context *c)
+static size_t n_free_number(const struct cloth_numbers *number)
 {
     size_t n_free = 0;
-    for (size_t k = 0; k < c->number.n; k++) n_free += !c->number.range[k].fixed;
+    for (size_t k = 0; k < number->n; k++) n_free += !number->range[k].fixed;
     return n_free;
 }
 
@@ -124,7 +122,8 @@ struct variant {
 };
 
 struct pipeline_cloth_trace {
-    struct pipeline_context *c;
+    const struct cloth_job *job;
+    struct made_cloth *made;
     size_t i_model;
     struct configuration *configuration;
     struct cloth_estimator cloth;
@@ -140,17 +139,16 @@ struct pipeline_cloth_trace {
 };
 
 /* Makes the fibers of the described cloth at the values of all of its numbers. report: NULL if not wanted. */
-static status build_tile(struct pipeline_context *c, const double *value, struct variant variant, struct fiber_set *f,
+static status build_tile(const struct cloth_job *job, const double *value, struct variant variant, struct fiber_set *f,
                          struct cloth_report *report, struct error *err)
 {
-    const struct progress progress = {.cancel = c->progress.cancel};
+    const struct progress progress = {.cancel = job->tools->progress.cancel};
     struct cloth_description *d = malloc(sizeof *d);
     if (d == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make the cloth: out of memory");
-    status s =
-        cloth_description_enlarge(c->doc->cloth.description, variant.final ? c->doc->cloth.final_tiles : 1, d, err);
+    status s = cloth_description_enlarge(job->cloth->description, variant.final ? job->cloth->final_tiles : 1, d, err);
     if (s == STATUS_OK) {
         d->seed += variant.places;
-        s = cloth_build(d, value, c->pool, &progress, f, report, err);
+        s = cloth_build(d, value, job->tools->pool, &progress, f, report, err);
     }
     free(d);
     return s;
@@ -159,22 +157,22 @@ static status build_tile(struct pipeline_context *c, const double *value, struct
 /* Makes the fibers at given values of the fitted numbers. Where these contradict each other (a crimp that yarns cannot
  * follow), the nearest of a few cloths on the line to the start values takes their place, so that a search that meets
  * such a cloth goes on. */
-static status make_fibers(struct pipeline_context *c, const double *number, struct variant variant,
-                          double value[CLOTH_MAX_NUMBER], struct fiber_set *f, struct cloth_report *report,
-                          struct error *err)
+static status make_fibers(const struct cloth_job *job, const struct made_cloth *made, const double *number,
+                          struct variant variant, double value[CLOTH_MAX_NUMBER], struct fiber_set *f,
+                          struct cloth_report *report, struct error *err)
 {
     size_t n_number;
-    const struct cloth_number *list = numbers_of(c, &n_number);
+    const struct cloth_number *list = numbers_of(job->cloth, &n_number);
     status s = STATUS_OK;
     for (int k = 0; k <= SHORTENINGS; k++) {
         double share = 1.0 - (double)k / SHORTENINGS;
         for (size_t i = 0; i < n_number; i++) value[i] = list[i].value;
-        for (size_t i = 0; i < c->number.n; i++) {
-            double start = c->number.range[i].start;
-            value[c->number.item[i].index] = k == 0 ? number[i] : start + share * (number[i] - start);
+        for (size_t i = 0; i < made->number.n; i++) {
+            double start = made->number.range[i].start;
+            value[made->number.item[i].index] = k == 0 ? number[i] : start + share * (number[i] - start);
         }
-        s = c->doc->cloth.description != NULL ? build_tile(c, value, variant, f, report, err)
-                                              : fiber_correct(&c->uncorrected, value, f, err);
+        s = job->cloth->description != NULL ? build_tile(job, value, variant, f, report, err)
+                                            : fiber_correct(&made->uncorrected, value, f, err);
         if (s != STATUS_INVALID) return s;
     }
     return s;
@@ -186,7 +184,7 @@ static status make_fibers(struct pipeline_context *c, const double *number, stru
 static struct variant variant_of(const struct pipeline_cloth_trace *t, const struct estimator_call *call)
 {
     struct variant v = {.final = t->final};
-    if (t->c->doc->cloth.description != NULL && t->c->doc->cloth.renew_places && t->cloth.number_derivatives)
+    if (t->job->cloth->description != NULL && t->job->cloth->renew_places && t->cloth.number_derivatives)
         v.places = 2 * (uint64_t)call->iteration + (call->replica == REPLICA_FIT_B ? 2 : 1);
     return v;
 }
@@ -196,7 +194,7 @@ static status scene_of(struct pipeline_cloth_trace *t, const double *number, str
                        const struct scene **scene, struct error *err)
 {
     struct fiber_set fiber;
-    const size_t n_bytes = t->c->number.n * sizeof *number;
+    const size_t n_bytes = t->made->number.n * sizeof *number;
     for (size_t i = 0; i < t->n_built; i++)
         if (t->built[i].scene != NULL && t->built[i].variant.final == variant.final &&
             t->built[i].variant.places == variant.places && memcmp(number, t->built[i].number, n_bytes) == 0) {
@@ -209,8 +207,8 @@ static status scene_of(struct pipeline_cloth_trace *t, const double *number, str
     to->scene = NULL;
     fiber_set_init(&fiber);
     double value[CLOTH_MAX_NUMBER];
-    status s = make_fibers(t->c, number, variant, value, &fiber, NULL, err);
-    if (s == STATUS_OK) s = pipeline_fiber_scene(t->c, t->i_model, &fiber, &to->scene, err);
+    status s = make_fibers(t->job, t->made, number, variant, value, &fiber, NULL, err);
+    if (s == STATUS_OK) s = made_cloth_fiber_scene(t->job, t->i_model, &fiber, &to->scene, err);
     fiber_set_release(&fiber);
     memcpy(to->number, number, n_bytes);
     to->variant = variant;
@@ -222,13 +220,12 @@ static status estimate(void *context, const double *number, const struct estimat
                        const struct progress *progress, struct estimate *out, double *wall_s, struct error *err)
 {
     struct pipeline_cloth_trace *t = context;
-    struct pipeline_context *c = t->c;
     double start_s = clock_monotonic_s();
     struct trace_estimator live;
     const struct scene *scene = NULL;
     status s = scene_of(t, number, variant_of(t, call), &scene, err);
     if (s != STATUS_OK) return s;
-    pipeline_trace_request(&live, c, t->i_model, t->configuration, t->cloth.n_configuration);
+    pipeline_trace_request(&live, t->job, t->made, t->i_model, t->configuration, t->cloth.n_configuration);
     live.request.input.scene = (struct appearance_scene){.fibers = scene};
     struct estimator e = trace_estimator(&live);
     s = e.run(e.context, call, progress, out, wall_s, err);
@@ -238,23 +235,25 @@ static status estimate(void *context, const double *number, const struct estimat
 
 static void set_final(void *context, bool final) { ((struct pipeline_cloth_trace *)context)->final = final; }
 
-status pipeline_cloth_open(struct pipeline_context *c, size_t i_model, const struct pipeline_joint *j,
-                           struct pipeline_cloth_trace **trace, struct estimate_journal **journal, struct error *err)
+status pipeline_cloth_open(const struct cloth_job *job, struct made_cloth *made, size_t i_model,
+                           const struct pipeline_joint *j, struct pipeline_cloth_trace **trace,
+                           struct estimate_journal **journal, struct error *err)
 {
     struct pipeline_cloth_trace *t = calloc(1, sizeof *t);
     *trace = t;
     if (t == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit a cloth: out of memory");
-    t->c = c;
+    t->job = job;
+    t->made = made;
     t->i_model = i_model;
-    t->configuration = trace_configurations(&c->row);
+    t->configuration = trace_configurations(&job->rows->row);
     if (t->configuration == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit a cloth: out of memory");
-    const struct cloth_source source = {t, c->number.n, estimate, set_final};
-    status s = cloth_estimator_init(&t->cloth, &source, j->n_scattering, c->row.n, j->param + j->n_scattering,
+    const struct cloth_source source = {t, made->number.n, estimate, set_final};
+    status s = cloth_estimator_init(&t->cloth, &source, j->n_scattering, job->rows->row.n, j->param + j->n_scattering,
                                     j->parameter + j->n_scattering, err);
     if (s != STATUS_OK) return s;
-    t->n_built = 1 + cloth_estimator_n_moved(t->cloth.moves, n_free_number(c));
+    t->n_built = 1 + cloth_estimator_n_moved(t->cloth.moves, n_free_number(&made->number));
     t->live = cloth_estimator(&t->cloth);
-    s = pipeline_trace_journal(c, "fit", "estimates.journal", i_model, &t->live, &t->journal, err);
+    s = pipeline_trace_journal(job, made, "fit", "estimates.journal", i_model, &t->live, &t->journal, err);
     *journal = t->journal;
     return s;
 }
@@ -271,10 +270,10 @@ void pipeline_cloth_close(struct pipeline_cloth_trace *t)
 
 /* ---- the search ---- */
 
-uint64_t pipeline_cloth_least_budget(const struct pipeline_context *c, uint64_t least, size_t n_start, size_t n_extra)
+uint64_t pipeline_cloth_least_budget(const struct cloth_numbers *number, uint64_t least, size_t n_start, size_t n_extra)
 {
     double n_screen = n_extra > 0 ? 1.0 + (double)n_extra : 0.0, n_final = n_extra > 0 ? 2.0 : 1.0;
-    size_t n_free = n_free_number(c);
+    size_t n_free = n_free_number(number);
     /* a moved cloth takes a block of paths at least, a quarter of those of the cloth itself */
     double moved = 0.25 * (double)cloth_estimator_n_moved(CLOTH_MOVES_BALANCED, n_free);
     double joint = LEAST_FITS * fmax(1.0 + moved, cloth_estimator_cost(CLOTH_MOVES_BALANCED, n_free));
@@ -285,12 +284,12 @@ uint64_t pipeline_cloth_least_budget(const struct pipeline_context *c, uint64_t 
 
 /* Divides the paths of one search between screening, joint fit and final fit. Several starts share a budget that the
  * job states. Extra starts are screened however small the budget is. */
-static void plan_budget(const struct pipeline_context *c, const struct descent_method *method,
+static void plan_budget(uint64_t path_budget, const struct cloth_numbers *number, const struct descent_method *method,
                         struct fit_problem *problem, struct cloth_search *q)
 {
     double least = (double)method->least_budget(problem), n_row = (double)problem->observation->n;
-    double whole = (double)(c->doc->fit.path_budget > 0 ? c->doc->fit.path_budget / q->option->n_start
-                                                        : BUDGET_FACTOR * method->info->default_path_budget);
+    double whole = (double)(path_budget > 0 ? path_budget / q->option->n_start
+                                            : BUDGET_FACTOR * method->info->default_path_budget);
     double n_extra = (double)q->option->n_extra_start, least_screen = n_extra > 0.0 ? 1.0 + n_extra : 0.0;
     double per_cloth = SCREEN_ITERATIONS * least, most = fmin(MOST_CLOTHS + n_extra, CLOTH_MAX_SCREEN);
     double n_screen = fmax(least_screen, floor(fmin(most, screen_share * whole / per_cloth)));
@@ -298,7 +297,7 @@ static void plan_budget(const struct pipeline_context *c, const struct descent_m
     q->screen_budget = (uint64_t)(2.0 * per_cloth);
     double final = fmin(final_share * whole, fmax(least_final_share * whole, final_paths * n_row));
     q->final_budget = (uint64_t)fmax(final, LEAST_FITS * least);
-    const double cost = cloth_estimator_cost(q->cloth->moves, n_free_number(c)), least_joint = LEAST_FITS * least;
+    const double cost = cloth_estimator_cost(q->cloth->moves, n_free_number(number)), least_joint = LEAST_FITS * least;
     double both = fmax(whole - final, least_joint * cost); /* of screening and joint fit */
     q->screen_expected = (uint64_t)fmin((double)q->n_screen * per_cloth, both - least_joint * cost);
     q->least_joint_budget = (uint64_t)least_joint;
@@ -307,57 +306,58 @@ static void plan_budget(const struct pipeline_context *c, const struct descent_m
     q->final_share = 0.35;
 }
 
-static void log_cloth(const struct pipeline_context *c, const struct pipeline_model *m)
+static void log_cloth(struct log *log, const struct cloth_numbers *number, const struct model_setup *m,
+                      const struct model_fit *fit)
 {
-    const struct fit_result *r = &m->cloth.joint;
+    const struct fit_result *r = &fit->cloth.joint;
     size_t n = m->sets.info.n_param;
-    for (size_t k = 0; k < c->number.n; k++)
-        log_info(c->log, "cloth: %s %.4g +- %.2g%s%s", c->number.info[k].name, m->cloth.number[k],
+    for (size_t k = 0; k < number->n; k++)
+        log_info(log, "cloth: %s %.4g +- %.2g%s%s", number->info[k].name, fit->cloth.number[k],
                  r->uncertainty.se_param[n + k], r->uncertainty.determined[n + k] ? "" : ", not determined",
                  r->uncertainty.at_bound[n + k] ? ", at its bound" : "");
 }
 
 status pipeline_cloth_fit(struct pipeline_cloth_trace *trace, const struct pipeline_joint *j,
-                          const struct fit_problem *problem, struct error *err)
+                          const struct fit_problem *problem, struct model_fit *fit, struct error *err)
 {
-    struct pipeline_context *c = trace->c;
-    struct pipeline_model *m = &c->model[trace->i_model];
     struct fit_problem joint = *problem;
     struct estimator e = estimate_journal_estimator(trace->journal);
-    struct cloth_search q = {
-        .method = descent_find(c->doc->fit.method), .problem = &joint, .option = &j->option, .cloth = &trace->cloth};
+    struct cloth_search q = {.method = descent_find(trace->job->fit->method),
+                             .problem = &joint,
+                             .option = &j->option,
+                             .cloth = &trace->cloth};
     joint.estimator = &e;
-    plan_budget(c, q.method, &joint, &q);
-    status s = cloth_search_run(&q, &m->cloth, err);
+    plan_budget(trace->job->fit->path_budget, &trace->made->number, q.method, &joint, &q);
+    status s = cloth_search_run(&q, &fit->cloth, err);
     if (s != STATUS_OK) return s;
-    cloth_search_marginal(&q, &m->cloth, &m->fit);
-    log_cloth(c, m);
+    cloth_search_marginal(&q, &fit->cloth, &fit->result);
+    log_cloth(trace->job->tools->log, &trace->made->number, &trace->job->model[trace->i_model], fit);
     return STATUS_OK;
 }
 
 /* Warns where the cloth of the fitted numbers cannot be and another one takes its place. */
-static void warn_of_contradiction(struct pipeline_context *c, const struct pipeline_model *m)
+static void warn_of_contradiction(struct worker_status *st, const struct made_cloth *made, const struct model_fit *fit)
 {
-    for (size_t k = 0; k < c->number.n; k++) {
-        double built = c->number.shown[c->number.item[k].index];
-        if (built == m->cloth.number[k]) continue;
-        worker_status_warn(c->status,
+    for (size_t k = 0; k < made->number.n; k++) {
+        double built = made->shown[made->number.item[k].index];
+        if (built == fit->cloth.number[k]) continue;
+        worker_status_warn(st,
                            "the fitted numbers of the cloth contradict each other: '%s' came to %.4g, and the nearest "
                            "cloth that can be made, with %.4g, was rendered; narrow the bounds",
-                           c->number.info[k].name, m->cloth.number[k], built);
+                           made->number.info[k].name, fit->cloth.number[k], built);
         return;
     }
 }
 
-status pipeline_cloth_use(struct pipeline_context *c, size_t i_model, struct error *err)
+status pipeline_cloth_use(const struct cloth_job *job, const struct model_fit *fit, size_t i_model,
+                          struct made_cloth *made, struct error *err)
 {
-    const struct pipeline_model *m = &c->model[i_model];
-    if (c->number.n == 0 || c->number.i_shown == i_model + 1) return STATUS_OK;
-    status s =
-        make_fibers(c, m->cloth.number, (struct variant){.final = true}, c->number.shown, &c->fiber, &c->cloth, err);
-    if (s == STATUS_OK) s = pipeline_make_scene(c, err);
-    if (s == STATUS_OK) c->geometry.total_length_m = fiber_set_length_m(&c->fiber);
-    if (s == STATUS_OK) warn_of_contradiction(c, m);
-    c->number.i_shown = s == STATUS_OK ? i_model + 1 : 0;
+    if (made->number.n == 0 || made->i_shown == i_model + 1) return STATUS_OK;
+    status s = make_fibers(job, made, fit->cloth.number, (struct variant){.final = true}, made->shown, &made->fiber,
+                           &made->report, err);
+    if (s == STATUS_OK) s = made_cloth_make_scene(job, made, err);
+    if (s == STATUS_OK) made->geometry.total_length_m = fiber_set_length_m(&made->fiber);
+    if (s == STATUS_OK) warn_of_contradiction(job->tools->status, made, fit);
+    made->i_shown = s == STATUS_OK ? i_model + 1 : 0;
     return s;
 }

@@ -10,11 +10,11 @@
 
 #include "optimizer/fit/cloth/cloth_search.h"
 #include "optimizer/fit/descent/estimate_journal.h"
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/stages/fit_stages.h"
 
-/* Fills in c->number from the document. STATUS_INVALID with the field at fault when the job asks for something that
+/* Fills in in->number from the document. STATUS_INVALID with the field at fault when the job asks for something that
  * numbers exclude (volume models, the search for the fiber radius), or for too many. */
-status pipeline_cloth_inputs(struct pipeline_context *c, struct error *err);
+status cloth_numbers_read(struct job_inputs *in, struct error *err);
 
 /* The unknowns of a joint fit: the parameters of the model, then the numbers. */
 struct pipeline_joint {
@@ -25,26 +25,29 @@ struct pipeline_joint {
     struct fit_option option;
 };
 /* STATUS_TOO_LARGE when there are more unknowns than FIT_MAX_PARAM. */
-status pipeline_joint_init(const struct pipeline_context *c, size_t i_model, struct pipeline_joint *j,
+status pipeline_joint_init(const struct model_setup *m, const struct cloth_numbers *number, struct pipeline_joint *j,
                            struct error *err);
 
 /* The path tracer behind a journal for one cloth after the other. Must not move in memory until it is closed, and must
  * be closed after an error too. */
 struct pipeline_cloth_trace;
-status pipeline_cloth_open(struct pipeline_context *c, size_t i_model, const struct pipeline_joint *j,
-                           struct pipeline_cloth_trace **trace, struct estimate_journal **journal, struct error *err);
+status pipeline_cloth_open(const struct cloth_job *job, struct made_cloth *made, size_t i_model,
+                           const struct pipeline_joint *j, struct pipeline_cloth_trace **trace,
+                           struct estimate_journal **journal, struct error *err);
 void pipeline_cloth_close(struct pipeline_cloth_trace *t);
 
-/* Runs the search for the given problem of j, whose estimator and budget are set here. Fills in the model's cloth and
- * fit. */
+/* Runs the search for the given problem of j, whose estimator and budget are set here. Fills in fit. */
 status pipeline_cloth_fit(struct pipeline_cloth_trace *trace, const struct pipeline_joint *j,
-                          const struct fit_problem *problem, struct error *err);
+                          const struct fit_problem *problem, struct model_fit *fit, struct error *err);
 
 /* Least number of paths that n_start searches take however small the budget is: the screening of n_extra starts, the
  * joint fits with their differences, and the final fits. least: that of one fit by the method alone. */
-uint64_t pipeline_cloth_least_budget(const struct pipeline_context *c, uint64_t least, size_t n_start, size_t n_extra);
+uint64_t pipeline_cloth_least_budget(const struct cloth_numbers *number, uint64_t least, size_t n_start,
+                                     size_t n_extra);
 
-/* Makes c->fiber and the scene those of the model's fitted numbers, if they are not. Does nothing without numbers. */
-status pipeline_cloth_use(struct pipeline_context *c, size_t i_model, struct error *err);
+/* Makes the fibers and the scene of `made` those of the model's fitted numbers, if they are not. Does nothing
+ * without numbers. */
+status pipeline_cloth_use(const struct cloth_job *job, const struct model_fit *fit, size_t i_model,
+                          struct made_cloth *made, struct error *err);
 
 #endif

@@ -3,20 +3,17 @@
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_CORRECTION_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_CORRECTION_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/stages/fit_stages.h"
 
 /* Share of the progress of a fit that this step takes. */
 #define PIPELINE_CORRECTION_SHARE 0.25
 
 /* Whether the job has corrections fitted. */
-bool pipeline_correction_applies(const struct pipeline_context *c);
-
-/* Gives a fitted radius of scanned fibers that has no prior that of the reconstruction's own error. */
-void pipeline_correction_priors(struct pipeline_context *c);
+bool pipeline_correction_applies(const struct job_cloth *cloth, const struct cloth_numbers *number);
 
 /* Fits the parameters to the uncorrected fibers, with as many paths as the final fit of the corrected ones, and fills
- * in m->scan_error.uncorrected. An interrupted comparison starts over, with the same result. */
-status pipeline_correction_compare(struct pipeline_context *c, size_t i_model, const struct progress *progress,
-                                   struct error *err);
+ * in fit->scan_error.uncorrected. An interrupted comparison starts over, with the same result. */
+status pipeline_correction_compare(const struct fit_input *in, size_t i_model, const struct progress *progress,
+                                   struct model_fit *fit, struct error *err);
 
 #endif

@@ -19,7 +19,8 @@ static const double um = 1e-6, tolerance = 0.01;
 static const double budget_share = 0.12, least_paths_a_row = 21000.0;
 
 struct search {
-    struct pipeline_context *c;
+    const struct fit_input *in;
+    struct fitted_radius *radius;
     struct worker_series *series;
     struct fiber_set original; /* the cloth before the search */
     size_t n_done;
@@ -50,7 +51,7 @@ static void set_starts(const struct search *q, double u, struct fit_parameter *p
     size_t nearest = 0;
     for (size_t k = 1; k < q->n_done; k++)
         if (fabs(q->u[k] - u) < fabs(q->u[nearest] - u)) nearest = k;
-    const struct pipeline_model *m = &q->c->model[q->c->radius.i_model];
+    const struct model_setup *m = &q->in->job->model[q->radius->i_model];
     for (size_t p = 0; p < m->sets.info.n_param; p++) {
         parameter[p] = m->parameter[p];
         if (q->n_done > 0 && !parameter[p].fixed)
@@ -61,11 +62,11 @@ static void set_starts(const struct search *q, double u, struct fit_parameter *p
 static status run_fit(struct search *q, double u, const struct estimator *e, const struct progress *progress,
                       struct fit_result *r, struct error *err)
 {
-    struct pipeline_context *c = q->c;
-    struct pipeline_model *m = &c->model[c->radius.i_model];
+    const struct cloth_job *job = q->in->job;
+    const struct model_setup *m = &job->model[q->radius->i_model];
     const struct descent_method *method = descent_find(method_gauss_newton.id);
-    uint64_t budget = c->doc->fit.path_budget > 0 ? c->doc->fit.path_budget : method->info->default_path_budget;
-    double paths = fmax(budget_share * (double)budget, least_paths_a_row * (double)c->fitted.n);
+    uint64_t budget = job->fit->path_budget > 0 ? job->fit->path_budget : method->info->default_path_budget;
+    double paths = fmax(budget_share * (double)budget, least_paths_a_row * (double)job->rows->fitted.n);
     struct fit_parameter parameter[FIT_MAX_PARAM];
     struct fit_option option;
     set_starts(q, u, parameter);
@@ -74,7 +75,7 @@ static status run_fit(struct search *q, double u, const struct estimator *e, con
     const struct fit_problem problem = {.n_param = m->sets.info.n_param,
                                         .info = m->sets.info.param,
                                         .parameter = parameter,
-                                        .observation = &c->fitted,
+                                        .observation = &job->rows->fitted,
                                         .estimator = e,
                                         .path_budget = (uint64_t)paths,
                                         .progress = progress};
@@ -84,54 +85,55 @@ static status run_fit(struct search *q, double u, const struct estimator *e, con
 /* Writes one record of the series for a radius. */
 static status report(struct search *q, const struct fit_result *r, double radius_m, bool replayed, struct error *err)
 {
-    struct pipeline_context *c = q->c;
-    const struct pipeline_model *m = &c->model[c->radius.i_model];
+    const struct stage_tools *tools = q->in->job->tools;
+    const struct model_setup *m = &q->in->job->model[q->radius->i_model];
     char note[80];
     snprintf(note, sizeof note, "radius %.4g um", radius_m / um);
     const struct fit_step step = {.step = q->n_done,
                                   .phase = "radius",
-                                  .wall_s = c->radius.wall_s,
+                                  .wall_s = q->radius->wall_s,
                                   .n_path = r->n_path,
-                                  .n_path_total = c->radius.n_path,
+                                  .n_path_total = q->radius->n_path,
                                   .objective = r->objective,
                                   .n_param = m->sets.info.n_param,
                                   .param = r->param,
                                   .param_se = r->uncertainty.se_param,
                                   .note = note};
-    const struct worker_series_model model = {&m->sets.info, m->parameter, c->radius.i_model, 0};
-    worker_status_objective(c->status, step.step, r->objective.value, r->objective.se);
+    const struct worker_series_model model = {&m->sets.info, m->parameter, q->radius->i_model, 0};
+    worker_status_objective(tools->status, step.step, r->objective.value, r->objective.se);
     if (replayed)
-        worker_status_restart_eta(c->status);
+        worker_status_restart_eta(tools->status);
     else
-        log_info(c->log, "radius %.4g um: objective %.5g +- %.2g after %zu steps", radius_m / um, r->objective.value,
-                 r->objective.se, r->n_step);
+        log_info(tools->log, "radius %.4g um: objective %.5g +- %.2g after %zu steps", radius_m / um,
+                 r->objective.value, r->objective.se, r->n_step);
     return worker_series_add(q->series, &step, &model, replayed, err);
 }
 
 static status evaluate(void *context, double u, double *f, double *se, struct error *err)
 {
     struct search *q = context;
-    struct pipeline_context *c = q->c;
+    const struct cloth_job *job = q->in->job;
+    struct made_cloth *made = q->in->made;
     struct pipeline_trace trace = {0};
     struct progress_part part;
     double share = PIPELINE_RADIUS_SHARE / MOST_POINTS;
-    struct progress progress = progress_begin_part(&part, &c->progress, share * (double)q->n_done, share);
+    struct progress progress = progress_begin_part(&part, &job->tools->progress, share * (double)q->n_done, share);
     struct estimator estimator;
     struct fit_result r;
     char name[64], message[100];
     snprintf(name, sizeof name, "radius-%02zu.journal", q->n_done);
     snprintf(message, sizeof message, "fiber radius: trying %.4g um", exp(u) / um);
-    worker_status_message(c->status, message);
-    scale_radii(&c->fiber, &q->original, exp(u) / c->radius.start_m);
-    status s = pipeline_make_surface_scene(c, err);
+    worker_status_message(job->tools->status, message);
+    scale_radii(&made->fiber, &q->original, exp(u) / q->radius->start_m);
+    status s = made_cloth_make_surface_scene(job, made, err);
     if (s != STATUS_OK) return s;
-    s = pipeline_trace_open(&trace, c, "fit", name, c->radius.i_model, &c->fitted, err);
+    s = pipeline_trace_open(&trace, job, made, "fit", name, q->radius->i_model, &job->rows->fitted, err);
     if (s != STATUS_OK) goto out;
     estimator = estimate_journal_estimator(trace.journal);
     s = run_fit(q, u, &estimator, &progress, &r, err);
     if (s != STATUS_OK) goto out;
-    c->radius.n_path += r.n_path;
-    c->radius.wall_s += r.wall_s;
+    q->radius->n_path += r.n_path;
+    q->radius->wall_s += r.wall_s;
     s = report(q, &r, exp(u), estimate_journal_replaying(trace.journal), err);
     *f = r.objective.value + r.prior_penalty;
     *se = fmax(r.objective.se, 1e-12);
@@ -143,12 +145,12 @@ out:
 }
 
 /* Computes the radius and its error from the minimum of the curve. */
-static void conclude(struct pipeline_context *c)
+static void conclude(const struct cloth_job *job, struct fitted_radius *r)
 {
-    struct pipeline_radius *r = &c->radius;
-    const struct pipeline_model *m = &c->model[r->i_model];
-    double n_free = 1.0 + (double)pipeline_n_free(m), n_row = 3.0 * (double)c->fitted.n;
-    double s2 = fmax(fmax(r->curve.f, 0.0) / fmax(1.0, n_row - n_free), objective_mean_photograph_variance(&c->fitted));
+    const struct model_setup *m = &job->model[r->i_model];
+    double n_free = 1.0 + (double)model_setup_n_free(m), n_row = 3.0 * (double)job->rows->fitted.n;
+    double s2 =
+        fmax(fmax(r->curve.f, 0.0) / fmax(1.0, n_row - n_free), objective_mean_photograph_variance(&job->rows->fitted));
     double var = r->curve.u_se * r->curve.u_se + (r->curve.curvature > 0.0 ? 2.0 * s2 / r->curve.curvature : INFINITY);
     double range = log(r->upper_m / r->lower_m);
     r->curve.determined = r->curve.determined && sqrt(var) < 0.5 * range / sqrt(12.0);
@@ -156,40 +158,40 @@ static void conclude(struct pipeline_context *c)
     r->se_m = fmin(exp(r->curve.u) * sqrt(var), (r->upper_m - r->lower_m) / sqrt(12.0));
 }
 
-static void report_radius(struct pipeline_context *c)
+static void report_radius(const struct stage_tools *tools, const struct fitted_radius *r)
 {
-    const struct pipeline_radius *r = &c->radius;
-    log_info(c->log, "fiber radius %.4g +- %.2g um (%s), it was %.4g um", r->radius_m / um, r->se_m / um,
+    log_info(tools->log, "fiber radius %.4g +- %.2g um (%s), it was %.4g um", r->radius_m / um, r->se_m / um,
              r->curve.determined ? "determined" : "not determined", r->start_m / um);
     if (r->curve.determined) return;
     if (r->curve.at_bound)
-        worker_status_warn(c->status, "the fiber radius ends at the edge of its range, %.4g um (%s: %.4g to %.4g um)",
+        worker_status_warn(tools->status,
+                           "the fiber radius ends at the edge of its range, %.4g um (%s: %.4g to %.4g um)",
                            r->radius_m / um, job_option_key(OPTION_FIT_RADIUS), r->lower_m / um, r->upper_m / um);
     else
-        worker_status_warn(c->status,
+        worker_status_warn(tools->status,
                            "the fiber radius is not determined by these photographs: %.4g um is kept as it was",
                            r->start_m / um);
 }
 
-bool pipeline_radius_used(const struct pipeline_radius *r) { return r->curve.determined || r->curve.at_bound; }
+bool pipeline_radius_used(const struct fitted_radius *r) { return r->curve.determined || r->curve.at_bound; }
 
-static status use_radius(struct pipeline_context *c, const struct fiber_set *from, struct error *err)
+static status use_radius(const struct fit_input *in, const struct fitted_radius *r, const struct fiber_set *from,
+                         struct error *err)
 {
-    scale_radii(&c->fiber, from, c->radius.radius_m / c->radius.start_m);
-    return pipeline_make_scene(c, err);
+    scale_radii(&in->made->fiber, from, r->radius_m / r->start_m);
+    return made_cloth_make_scene(in->job, in->made, err);
 }
 
-static status check_range(struct pipeline_context *c, struct error *err)
+static status check_range(const struct job_fit *fit, const double tile_size_m[2], struct fitted_radius *r,
+                          struct error *err)
 {
-    struct pipeline_radius *r = &c->radius;
-    const struct job_document *doc = c->doc;
-    r->lower_m = isnan(doc->fit.radius_lower_um) ? 0.5 * r->start_m : doc->fit.radius_lower_um * um;
-    r->upper_m = isnan(doc->fit.radius_upper_um) ? 2.0 * r->start_m : doc->fit.radius_upper_um * um;
+    r->lower_m = isnan(fit->radius_lower_um) ? 0.5 * r->start_m : fit->radius_lower_um * um;
+    r->upper_m = isnan(fit->radius_upper_um) ? 2.0 * r->start_m : fit->radius_upper_um * um;
     if (r->upper_m < 1.1 * r->lower_m) /* one bound was given and lies beyond the default of the other */
         return error_set_field(err, STATUS_INVALID, OPTION_FIT_RADIUS,
                                "'%s' leaves no range to search: %.4g to %.4g um; the cloth's fibers have %.4g um",
                                job_option_key(OPTION_FIT_RADIUS), r->lower_m / um, r->upper_m / um, r->start_m / um);
-    double tile_m = fmin(c->fiber.tile_size_m[0], c->fiber.tile_size_m[1]);
+    double tile_m = fmin(tile_size_m[0], tile_size_m[1]);
     if (r->upper_m > 0.25 * tile_m)
         return error_set_field(err, STATUS_INVALID, OPTION_FIT_RADIUS_UPPER,
                                "'%s' is %.4g: fibers of that radius are wider than half of the tile (%.4g um)",
@@ -199,49 +201,49 @@ static status check_range(struct pipeline_context *c, struct error *err)
 
 /* Warns before the search, which takes long, that the range the user asked for does not contain the cloth's own
  * radius. */
-static void warn_of_range(struct pipeline_context *c)
+static void warn_of_range(const struct stage_tools *tools, const struct fitted_radius *r)
 {
-    const struct pipeline_radius *r = &c->radius;
     if (r->start_m >= r->lower_m && r->start_m <= r->upper_m) return;
     worker_status_warn(
-        c->status,
+        tools->status,
         "'%s' searches %.4g to %.4g um, but the cloth's own fibers have a mean radius of %.4g um, which is not in this "
         "range",
         job_option_key(OPTION_FIT_RADIUS), r->lower_m / um, r->upper_m / um, r->start_m / um);
 }
 
-status pipeline_radius_search(struct pipeline_context *c, struct worker_series *series, struct error *err)
+status pipeline_radius_search(const struct fit_input *in, struct worker_series *series, struct fitted_radius *radius,
+                              struct error *err)
 {
-    struct search q = {.c = c, .series = series};
-    memset(&c->radius, 0, sizeof c->radius);
-    c->radius.start_m = mean_radius_m(&c->fiber);
-    while (c->model[c->radius.i_model].appearance.kind != MODEL_SURFACE) c->radius.i_model++;
-    status s = check_range(c, err);
+    struct search q = {.in = in, .radius = radius, .series = series};
+    memset(radius, 0, sizeof *radius);
+    radius->start_m = mean_radius_m(&in->made->fiber);
+    while (in->job->model[radius->i_model].appearance.kind != MODEL_SURFACE) radius->i_model++;
+    status s = check_range(in->job->fit, in->made->fiber.tile_size_m, radius, err);
     if (s != STATUS_OK) return s;
-    warn_of_range(c);
+    warn_of_range(in->job->tools, radius);
     fiber_set_init(&q.original);
-    s = fiber_set_copy(&c->fiber, &q.original, err);
+    s = fiber_set_copy(&in->made->fiber, &q.original, err);
     if (s != STATUS_OK) goto out;
-    const struct noisy_minimum_option option = {.lower = log(c->radius.lower_m),
-                                                .upper = log(c->radius.upper_m),
+    const struct noisy_minimum_option option = {.lower = log(radius->lower_m),
+                                                .upper = log(radius->upper_m),
                                                 .n_first = FIRST_POINTS,
                                                 .n_most = MOST_POINTS,
                                                 .tolerance = tolerance};
-    s = noisy_minimum_search(&option, evaluate, &q, &c->radius.curve, err);
-    c->radius.n_step = q.n_done;
+    s = noisy_minimum_search(&option, evaluate, &q, &radius->curve, err);
+    radius->n_step = q.n_done;
     if (s == STATUS_OK) {
-        conclude(c);
-        report_radius(c);
-        s = use_radius(c, &q.original, err);
+        conclude(in->job, radius);
+        report_radius(in->job->tools, radius);
+        s = use_radius(in, radius, &q.original, err);
     }
 out:
     fiber_set_release(&q.original);
     return s;
 }
 
-status pipeline_radius_apply(struct pipeline_context *c, struct error *err)
+status pipeline_radius_apply(const struct fit_input *in, const struct fitted_radius *radius, struct error *err)
 {
-    warn_of_range(c);
-    report_radius(c);
-    return use_radius(c, &c->fiber, err);
+    warn_of_range(in->job->tools, radius);
+    report_radius(in->job->tools, radius);
+    return use_radius(in, radius, &in->made->fiber, err);
 }

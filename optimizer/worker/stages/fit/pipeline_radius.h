@@ -11,17 +11,18 @@
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_RADIUS_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_RADIUS_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/stages/fit_stages.h"
 #include "optimizer/worker/worker_series.h"
 
 /* Share of the search in the progress of the stage. */
 #define PIPELINE_RADIUS_SHARE 0.4
 
-/* Fills in c->radius, sets the fibers' radii and makes the scene anew. Steps go to the series. */
-status pipeline_radius_search(struct pipeline_context *c, struct worker_series *series, struct error *err);
-/* Applies the radius that an earlier attempt found; c->radius is filled in. */
-status pipeline_radius_apply(struct pipeline_context *c, struct error *err);
+/* Fills in radius, sets the fibers' radii and makes the scene anew. Steps go to the series. */
+status pipeline_radius_search(const struct fit_input *in, struct worker_series *series, struct fitted_radius *radius,
+                              struct error *err);
+/* Applies the radius that an earlier attempt found. */
+status pipeline_radius_apply(const struct fit_input *in, const struct fitted_radius *radius, struct error *err);
 /* Whether the fitted radius is used; false when the cloth's own is kept. */
-bool pipeline_radius_used(const struct pipeline_radius *r);
+bool pipeline_radius_used(const struct fitted_radius *r);
 
 #endif

@@ -33,29 +33,18 @@ static const double noise_sd = 0.57735;
 static const double path_share = 0.1, difference_share = 0.25;
 
 struct scan_trace {
-    struct pipeline_context *c;
+    const struct fit_input *in;
     size_t i_model;
     struct configuration *configuration;
     struct cloth_estimator cloth;
     struct fiber_roughness noise;
 };
 
-bool pipeline_scan_error_applies(const struct pipeline_context *c, size_t i_model)
+bool pipeline_scan_error_applies(const struct cloth_job *job, const struct made_cloth *made, size_t i_model)
 {
-    return c->doc->scan.given && c->number.n == 0 && c->model[i_model].appearance.kind == MODEL_SURFACE &&
-           c->model[i_model].sets.info.n_param + N_NUMBER <= FIT_MAX_PARAM && c->geometry.axis_direction_se_rad > 0.0;
-}
-
-double pipeline_scan_error_radius(const struct pipeline_context *c)
-{
-    const struct reconstruct_report *g = &c->geometry;
-    const struct fiber_set *f = c->uncorrected.n_fiber > 0 ? &c->uncorrected : &c->fiber;
-    double mean_m = 0.0, se_m = 0.0;
-    if (isnan(g->radius_se_m[0]) || c->doc->fit.fit_radius) return 0.0;
-    for (size_t i = 0; i < f->n_fiber; i++) mean_m += (double)f->radius_m[i] / (double)f->n_fiber;
-    for (int a = 0; a < 3; a++)
-        if (isfinite(g->radius_se_m[a])) se_m = fmax(se_m, g->radius_se_m[a]);
-    return hypot(se_m, mean_m - g->profile_radius_m) / mean_m;
+    return job->scan->given && made->number.n == 0 && job->model[i_model].appearance.kind == MODEL_SURFACE &&
+           job->model[i_model].sets.info.n_param + N_NUMBER <= FIT_MAX_PARAM &&
+           made->geometry.axis_direction_se_rad > 0.0;
 }
 
 /* The fibers with the radius and the noise of the numbers. */
@@ -64,12 +53,12 @@ static status make_scene(const struct scan_trace *t, const double *number, struc
     struct fiber_set fiber;
     struct fiber_roughness noise = t->noise;
     fiber_set_init(&fiber);
-    status s = fiber_set_copy(&t->c->fiber, &fiber, err);
+    status s = fiber_set_copy(&t->in->made->fiber, &fiber, err);
     if (s != STATUS_OK) return s;
     for (size_t i = 0; i < fiber.n_fiber; i++) fiber_set_scale_radius(&fiber, i, number[RADIUS]);
     noise.direction_sd_rad *= sqrt(number[NOISE]);
     fiber_roughen(&fiber, &noise);
-    s = pipeline_fiber_scene(t->c, t->i_model, &fiber, scene, err);
+    s = made_cloth_fiber_scene(t->in->job, t->i_model, &fiber, scene, err);
     fiber_set_release(&fiber);
     return s;
 }
@@ -83,7 +72,7 @@ static status estimate(void *context, const double *number, const struct estimat
     double start_s = clock_monotonic_s();
     status s = make_scene(t, number, &scene, err);
     if (s != STATUS_OK) return s;
-    pipeline_trace_request(&live, t->c, t->i_model, t->configuration, t->cloth.n_configuration);
+    pipeline_trace_request(&live, t->in->job, t->in->made, t->i_model, t->configuration, t->cloth.n_configuration);
     live.request.input.scene = (struct appearance_scene){.fibers = scene};
     struct estimator e = trace_estimator(&live);
     s = e.run(e.context, call, progress, out, wall_s, err);
@@ -93,11 +82,11 @@ static status estimate(void *context, const double *number, const struct estimat
 }
 
 /* Appends the numbers to the unknowns of the model's fit, which starts at its result. */
-static void add_numbers(const struct pipeline_model *m, const double sd[N_NUMBER], struct pipeline_joint *j)
+static void add_numbers(const struct fit_result *result, const double sd[N_NUMBER], struct pipeline_joint *j)
 {
     const size_t n = j->n_scattering;
     for (size_t p = 0; p < n; p++)
-        if (!j->parameter[p].fixed) j->parameter[p].start = m->fit.param[p];
+        if (!j->parameter[p].fixed) j->parameter[p].start = result->param[p];
     for (size_t k = 0; k < N_NUMBER; k++) {
         const struct param_info *info = &number_info[k];
         j->param[n + k] = *info;
@@ -111,13 +100,13 @@ static void add_numbers(const struct pipeline_model *m, const double sd[N_NUMBER
     j->option.n_start = 1;
 }
 
-static status run_joint(struct scan_trace *t, struct pipeline_joint *j, const struct progress *progress,
-                        struct fit_result *joint, struct error *err)
+static status run_joint(struct scan_trace *t, uint64_t n_fit_path, struct pipeline_joint *j,
+                        const struct progress *progress, struct fit_result *joint, struct error *err)
 {
-    const struct pipeline_context *c = t->c;
-    const size_t n = j->n_scattering, n_path = (size_t)(path_share * (double)c->model[t->i_model].fit.n_path);
+    const struct observation_set *row = &t->in->job->rows->row;
+    const size_t n = j->n_scattering, n_path = (size_t)(path_share * (double)n_fit_path);
     const struct cloth_source source = {t, N_NUMBER, estimate, NULL};
-    status s = cloth_estimator_init(&t->cloth, &source, n, c->row.n, j->param + n, j->parameter + n, err);
+    status s = cloth_estimator_init(&t->cloth, &source, n, row->n, j->param + n, j->parameter + n, err);
     if (s != STATUS_OK) return s;
     t->cloth.moves = CLOTH_MOVES_SINGLE; /* a single iteration */
     t->cloth.difference = difference_share;
@@ -125,57 +114,57 @@ static status run_joint(struct scan_trace *t, struct pipeline_joint *j, const st
     const struct fit_problem problem = {.n_param = j->info.n_param,
                                         .info = j->param,
                                         .parameter = j->parameter,
-                                        .observation = &c->row,
+                                        .observation = row,
                                         .estimator = &e,
                                         .path_budget = n_path,
                                         .max_iteration = 1,
-                                        .first_path = n_path / (2 * c->row.n),
+                                        .first_path = n_path / (2 * row->n),
                                         .progress = progress};
     return fit_run(descent_find(method_gauss_newton.id), &problem, &j->option, joint, err);
 }
 
 /* Adds the errors and notes how much they are. */
 static void carry(const struct pipeline_joint *j, const double sd[N_NUMBER], const struct fit_result *joint,
-                  struct pipeline_model *m)
+                  struct model_fit *fit)
 {
     const size_t n = j->n_scattering;
     size_t n_leader = 0;
     double variance[N_NUMBER];
     for (size_t p = 0; p < n; p++) n_leader += j->option.leader[p] == p;
     for (size_t k = 0; k < N_NUMBER; k++) variance[k] = sd[k] * sd[k]; /* both have slope 1 in their coordinate */
-    struct uncertainty before = m->fit.uncertainty;
-    carried_error_add(&joint->uncertainty, n, N_NUMBER, variance, &m->fit.uncertainty);
-    carried_error_add(&joint->unknown_uncertainty, n_leader, N_NUMBER, variance, &m->fit.unknown_uncertainty);
+    struct uncertainty before = fit->result.uncertainty;
+    carried_error_add(&joint->uncertainty, n, N_NUMBER, variance, &fit->result.uncertainty);
+    carried_error_add(&joint->unknown_uncertainty, n_leader, N_NUMBER, variance, &fit->result.unknown_uncertainty);
     for (size_t p = 0; p < n; p++) {
-        const double a = m->fit.uncertainty.se_param[p], b = before.se_param[p];
-        m->scan_error.se_param[p] = sqrt(fmax(a * a - b * b, 0.0));
+        const double a = fit->result.uncertainty.se_param[p], b = before.se_param[p];
+        fit->scan_error.se_param[p] = sqrt(fmax(a * a - b * b, 0.0));
     }
-    carried_error_limit(j->param, j->parameter, &m->fit.uncertainty);
-    m->scan_error.radius_rel_se = sd[RADIUS];
+    carried_error_limit(j->param, j->parameter, &fit->result.uncertainty);
+    fit->scan_error.radius_rel_se = sd[RADIUS];
 }
 
-status pipeline_scan_error_carry(struct pipeline_context *c, size_t i_model, const struct progress *progress,
-                                 struct error *err)
+status pipeline_scan_error_carry(const struct fit_input *in, size_t i_model, const struct progress *progress,
+                                 struct model_fit *fit, struct error *err)
 {
-    struct pipeline_model *m = &c->model[i_model];
-    const struct reconstruct_report *g = &c->geometry;
-    memset(&m->scan_error, 0, sizeof m->scan_error);
-    if (!pipeline_scan_error_applies(c, i_model)) return STATUS_OK;
-    const double direction = g->axis_direction_se_rad, sd[N_NUMBER] = {pipeline_scan_error_radius(c), noise_sd};
-    struct scan_trace t = {.c = c, .i_model = i_model, .noise = {g->axis_position_se_m / direction, direction}};
+    const struct reconstruct_report *g = &in->made->geometry;
+    memset(&fit->scan_error, 0, sizeof fit->scan_error);
+    if (!pipeline_scan_error_applies(in->job, in->made, i_model)) return STATUS_OK;
+    const double direction = g->axis_direction_se_rad,
+                 sd[N_NUMBER] = {made_cloth_radius_error(in->job, in->made), noise_sd};
+    struct scan_trace t = {.in = in, .i_model = i_model, .noise = {g->axis_position_se_m / direction, direction}};
     struct pipeline_joint *j = malloc(sizeof *j);
     struct fit_result *joint = malloc(sizeof *joint);
-    t.configuration = trace_configurations(&c->row);
+    t.configuration = trace_configurations(&in->job->rows->row);
     status s = j != NULL && joint != NULL && t.configuration != NULL
-                   ? pipeline_joint_init(c, i_model, j, err)
+                   ? pipeline_joint_init(&in->job->model[i_model], &in->made->number, j, err)
                    : error_set(err, STATUS_NO_MEMORY, "cannot carry the errors of the fibers: out of memory");
     if (s == STATUS_OK) {
-        add_numbers(m, sd, j);
-        s = run_joint(&t, j, progress, joint, err);
+        add_numbers(&fit->result, sd, j);
+        s = run_joint(&t, fit->result.n_path, j, progress, joint, err);
     }
     if (s == STATUS_OK) {
-        carry(j, sd, joint, m);
-        m->scan_error.direction_se_rad = direction;
+        carry(j, sd, joint, fit);
+        fit->scan_error.direction_se_rad = direction;
     }
     cloth_estimator_release(&t.cloth);
     free(t.configuration);

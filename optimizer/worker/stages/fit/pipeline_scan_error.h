@@ -8,21 +8,17 @@
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_SCAN_ERROR_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_SCAN_ERROR_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/stages/fit_stages.h"
 
 /* Share of the progress of a fit that this step takes. */
 #define PIPELINE_SCAN_ERROR_SHARE 0.2
 
 /* Whether the fibers of the job come from a scan, the model sees fibers, and no corrections of them are fitted,
  * whose own errors would then count. */
-bool pipeline_scan_error_applies(const struct pipeline_context *c, size_t i_model);
+bool pipeline_scan_error_applies(const struct cloth_job *job, const struct made_cloth *made, size_t i_model);
 
-/* Relative error of the radius: the statistical one, and the difference of both measurements. 0 where the radius was
- * given, or fitted to the photographs. */
-double pipeline_scan_error_radius(const struct pipeline_context *c);
-
-/* Adds the errors to m->fit, and fills in m->scan_error, which is all zero where they do not apply. */
-status pipeline_scan_error_carry(struct pipeline_context *c, size_t i_model, const struct progress *progress,
-                                 struct error *err);
+/* Adds the errors to fit->result, and fills in fit->scan_error, which is all zero where they do not apply. */
+status pipeline_scan_error_carry(const struct fit_input *in, size_t i_model, const struct progress *progress,
+                                 struct model_fit *fit, struct error *err);
 
 #endif

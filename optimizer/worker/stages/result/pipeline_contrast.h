@@ -3,14 +3,14 @@
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_CONTRAST_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_CONTRAST_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/stages/fit_stages.h"
 
-/* Fills validation.contrast of the model, which it allocates, with two replicas of n_path paths per row, through a
- * journal of its own. Without c->contrast it does nothing. */
-status pipeline_validate_contrast(struct pipeline_context *c, size_t i_model, const size_t *n_path,
-                                  const struct progress *progress, struct error *err);
+/* Fills v->contrast with two replicas of n_path paths per row, through a
+ * journal of its own. Without rows of contrasts it does nothing. */
+status pipeline_validate_contrast(const struct validation_input *in, size_t i_model, const size_t *n_path,
+                                  const struct progress *progress, struct validation *v, struct error *err);
 
 /* Writes the contrast of the renderings of observation i and its standard error, from both replicas. */
-void pipeline_rendered_contrast(const struct pipeline_model *m, size_t i, double contrast_rgb[3], double se_rgb[3]);
+void pipeline_rendered_contrast(const struct validation *v, size_t i, double contrast_rgb[3], double se_rgb[3]);
 
 #endif

@@ -3,10 +3,10 @@
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_PAIRING_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_PAIRING_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/report.h"
 
 /* Warns when the measurements of every lamp and camera, in reverse order of their rotations or moved on by one or one
  * back, differ from each other much more as the best model's renderings do. After validation. STATUS_NO_MEMORY. */
-status pipeline_warn_pairing(struct pipeline_context *c, struct error *err);
+status pipeline_warn_pairing(struct report *report, struct error *err);
 
 #endif

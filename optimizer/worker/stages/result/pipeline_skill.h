@@ -3,11 +3,11 @@
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_SKILL_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_SKILL_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/report.h"
 
-/* Fills in c->skill, and adds a warning when the plain BRDF predicts the held-out rows better than the best model by
- * more than the noise of its rendered rows. Not measured where a row has an environment. After validation; takes
- * milliseconds. STATUS_NO_MEMORY. */
-status pipeline_measure_skill(struct pipeline_context *c, struct error *err);
+/* Fills in report->skill, and adds a warning when the plain BRDF predicts the held-out rows better than the best
+ * model by more than the noise of its rendered rows. Not measured where a row has an environment. After validation;
+ * takes milliseconds. STATUS_NO_MEMORY. */
+status pipeline_measure_skill(struct report *report, struct error *err);
 
 #endif

@@ -2,10 +2,10 @@
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_VERDICT_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_VERDICT_H
 
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/report/report.h"
 
-/* Fills in c->verdict, of the best model or, without a fit, of the geometry, and puts it into the status, from which
- * the daemon's list of jobs has it. In the stage "report", after the certificate and the skill. */
-void pipeline_reach_verdict(struct pipeline_context *c);
+/* Fills in report->verdict, of the best model or, without a fit, of the geometry, and puts it into the status, from
+ * which the daemon's list of jobs has it. In the stage "report", after the certificate and the skill. */
+void pipeline_reach_verdict(struct report *report);
 
 #endif

@@ -1,6 +1,7 @@
 #include "optimizer/worker/stages/scene/pipeline_adopt.h"
 #include "base/files/durable.h"
 #include "base/option_id.h"
+#include "optimizer/job/document/job_limits.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/document_fingerprint.h"
 
@@ -71,13 +72,11 @@ static void unlink_file(const struct worker_folder *other, const struct worker_f
     unlink(path);
 }
 
-void pipeline_link_geometry(const struct worker_folder *own, const struct job_document *doc)
+void pipeline_link_geometry(const struct worker_folder *own, const char *geometry_job)
 {
     struct worker_folder other = {.lock_fd = -1};
     char folder[WORKER_PATH_BYTES], name[160];
-    if (doc->scan.geometry_job[0] == '\0' || stages_done(own) ||
-        !pipeline_other_folder(own, doc->scan.geometry_job, &other))
-        return;
+    if (geometry_job[0] == '\0' || stages_done(own) || !pipeline_other_folder(own, geometry_job, &other)) return;
     if (access(own->path, F_OK) != 0 || access(other.path, F_OK) != 0) return;
     for (size_t i = 0; i < N_CHECKPOINT; i++) {
         snprintf(name, sizeof name, JOB_FOLDER_WORK "/%s", checkpoint[i].stage);
@@ -88,20 +87,20 @@ void pipeline_link_geometry(const struct worker_folder *own, const struct job_do
 }
 
 /* The links to the other job's files, laid out as a job folder. */
-static status other_folder(const struct pipeline_context *c, struct worker_folder *f, struct error *err)
+static status other_folder(const struct worker_folder *own, const char *geometry_job, struct worker_folder *f,
+                           struct error *err)
 {
     struct worker_folder other = {.lock_fd = -1};
-    if (!pipeline_other_folder(c->folder, c->doc->scan.geometry_job, &other))
+    if (!pipeline_other_folder(own, geometry_job, &other))
         return error_set(err, STATUS_INVALID, "the job folder's path is too long");
-    snprintf(f->path, sizeof f->path, "%.2000s/%s", c->folder->path, JOB_FOLDER_ADOPTED);
+    snprintf(f->path, sizeof f->path, "%.2000s/%s", own->path, JOB_FOLDER_ADOPTED);
     if (access(other.path, F_OK) == 0) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, OPTION_GEOMETRY_JOB,
-                           "cannot take over the geometry of job '%s': there is no such job",
-                           c->doc->scan.geometry_job);
+                           "cannot take over the geometry of job '%s': there is no such job", geometry_job);
 }
 
 /* The first half of a fingerprint depends on the document and on the program (document_fingerprint.h). */
-static status check_program(const struct pipeline_context *c, const struct worker_folder *f, struct error *err)
+static status check_program(const char *geometry_job, const struct worker_folder *f, struct error *err)
 {
     char path[WORKER_PATH_BYTES], *document = NULL, *claimed = NULL;
     size_t n_document = 0, n_claimed = 0;
@@ -119,43 +118,43 @@ static status check_program(const struct pipeline_context *c, const struct worke
         err, STATUS_INVALID, OPTION_GEOMETRY_JOB,
         "cannot take over the geometry of job '%s': it was made by another version of the program, or "
         "has not begun; run it again",
-        c->doc->scan.geometry_job);
+        geometry_job);
 }
 
-static status adopt(struct pipeline_context *c, const struct worker_folder *f, size_t i, struct error *err)
+static status adopt(const struct stage_tools *tools, const char *geometry_job, const struct worker_folder *f, size_t i,
+                    struct error *err)
 {
     char from[WORKER_PATH_BYTES], to[WORKER_PATH_BYTES], part[160];
     if (!worker_folder_stage_done(f, checkpoint[i].stage))
         return error_set_field(err, STATUS_INVALID, OPTION_GEOMETRY_JOB,
-                               "cannot take over the geometry of job '%s': its stage '%s' is not done",
-                               c->doc->scan.geometry_job, checkpoint[i].stage);
+                               "cannot take over the geometry of job '%s': its stage '%s' is not done", geometry_job,
+                               checkpoint[i].stage);
     snprintf(part, sizeof part, "%s/%s", checkpoint[i].stage, checkpoint[i].file);
     worker_folder_path(f, JOB_FOLDER_WORK, part, from);
-    status s = pipeline_work_path(c, checkpoint[i].stage, checkpoint[i].file, to, err);
-    if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
+    status s = stage_work_path(tools, checkpoint[i].stage, checkpoint[i].file, to, err);
+    if (s == STATUS_OK) s = worker_folder_check(tools->folder, err);
     if (s != STATUS_OK) return s;
     /* Checkpoints are replaced, never changed, so both jobs can share a file. */
     if ((unlink(to) != 0 && errno != ENOENT) || link(from, to) != 0)
-        return error_set_errno(err, "cannot take over '%s' of job '%s'", part, c->doc->scan.geometry_job);
+        return error_set_errno(err, "cannot take over '%s' of job '%s'", part, geometry_job);
     s = durable_sync_folder_of(to, err);
-    return s == STATUS_OK ? worker_folder_mark_stage(c->folder, checkpoint[i].stage, err) : s;
+    return s == STATUS_OK ? worker_folder_mark_stage(tools->folder, checkpoint[i].stage, err) : s;
 }
 
-status pipeline_adopt_geometry(struct pipeline_context *c, struct error *err)
+status pipeline_adopt_geometry(const struct stage_tools *tools, const char *geometry_job, struct error *err)
 {
     struct worker_folder other = {.lock_fd = -1};
-    if (c->doc->scan.geometry_job[0] == '\0' || stages_done(c->folder)) return STATUS_OK;
-    status s = other_folder(c, &other, err);
-    if (s == STATUS_OK) s = check_program(c, &other, err);
-    for (size_t i = 0; i < N_CHECKPOINT && s == STATUS_OK; i++) s = adopt(c, &other, i, err);
-    if (s == STATUS_OK) visit_files(&other, c->folder, unlink_file);
-    if (s == STATUS_OK) log_info(c->log, "the geometry is that of job %s", c->doc->scan.geometry_job);
+    if (geometry_job[0] == '\0' || stages_done(tools->folder)) return STATUS_OK;
+    status s = other_folder(tools->folder, geometry_job, &other, err);
+    if (s == STATUS_OK) s = check_program(geometry_job, &other, err);
+    for (size_t i = 0; i < N_CHECKPOINT && s == STATUS_OK; i++) s = adopt(tools, geometry_job, &other, i, err);
+    if (s == STATUS_OK) visit_files(&other, tools->folder, unlink_file);
+    if (s == STATUS_OK) log_info(tools->log, "the geometry is that of job %s", geometry_job);
     return s;
 }
 
-status pipeline_geometry_lost(const struct pipeline_context *c, const char *why, struct error *err)
+status pipeline_geometry_lost(const char *geometry_job, const char *why, struct error *err)
 {
     return error_set_field(err, STATUS_INVALID, OPTION_GEOMETRY_JOB,
-                           "cannot use the geometry that was taken over from job '%s': %s", c->doc->scan.geometry_job,
-                           why);
+                           "cannot use the geometry that was taken over from job '%s': %s", geometry_job, why);
 }

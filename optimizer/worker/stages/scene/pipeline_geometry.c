@@ -4,8 +4,8 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/worker/fiber_file.h"
-#include "optimizer/worker/pipeline_context.h"
-#include "optimizer/worker/progress/pipeline_plan.h"
+#include "optimizer/worker/stages/geometry_stages.h"
+#include "optimizer/worker/stages/job_inputs.h"
 #include "optimizer/worker/stages/scene/pipeline_volume.h"
 #include "optimizer/worker/work_file.h"
 
@@ -20,276 +20,296 @@
  * time it takes nearly all; other scans have no such part. */
 static const double read_share = 0.4;
 
-static status read_volume(struct pipeline_context *c, struct error *err)
+static status read_volume(const struct volume_input *in, struct volume_output *out, struct error *err)
 {
-    const char **path = pipeline_scan_paths(c);
+    const char **path = scan_paths(in->tools->folder, in->scan);
     if (path == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the volume: out of memory");
     struct progress_part part;
-    const struct progress inner = progress_begin_part(&part, &c->progress, 0.0, read_share);
-    status s = reconstruct_read(path, c->doc->scan.n_file, &c->option, c->space, c->pool, &inner, &c->volume,
-                                &c->geometry, err);
-    if (s == STATUS_OK && scratch_file_bytes(c->space) > 0)
-        log_info(c->log, "volume: beyond the memory setting of %zu MB, worked on in files",
-                 c->memory_limit_bytes / 1000000);
+    const struct progress inner = progress_begin_part(&part, &in->tools->progress, 0.0, read_share);
+    status s = reconstruct_read(path, in->scan->n_file, &out->option, in->tools->space, in->tools->pool, &inner,
+                                &out->volume, &out->geometry, err);
+    if (s == STATUS_OK && scratch_file_bytes(in->tools->space) > 0)
+        log_info(in->tools->log, "volume: beyond the memory setting of %zu MB, worked on in files",
+                 in->tools->memory_limit_bytes / 1000000);
     free(path);
     return s;
 }
 
 /* Fills the lumens of hollow fibers. That the fibers are hollow may not have been known before the scan was read. */
-static status fill_lumens(struct pipeline_context *c, struct error *err)
+static status fill_lumens(const struct volume_input *in, struct volume_output *out, struct error *err)
 {
-    if (c->volume.filled.n == 0) return STATUS_OK;
+    if (out->volume.filled.n == 0) return STATUS_OK;
     struct progress_part part;
-    const struct progress inner = progress_begin_part(&part, &c->progress, read_share, 1.0 - read_share);
-    pipeline_plan_hollow(c);
-    log_info(c->log, "volume: the fibers are hollow and are traced to fill their lumens");
-    return reconstruct_refill_lumens(&c->volume, &c->option, c->pool, &inner, &c->geometry, err);
+    const struct progress inner = progress_begin_part(&part, &in->tools->progress, read_share, 1.0 - read_share);
+    if (in->tools->plan.hollow != NULL) in->tools->plan.hollow(in->tools->plan.context, out->geometry.n);
+    log_info(in->tools->log, "volume: the fibers are hollow and are traced to fill their lumens");
+    return reconstruct_refill_lumens(&out->volume, &out->option, in->tools->pool, &inner, &out->geometry, err);
 }
 
-status stage_volume(struct pipeline_context *c, struct error *err)
+status stage_volume(const struct volume_input *in, struct volume_output *out, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    pipeline_volume_options(c->doc, &c->option);
-    status s = read_volume(c, err);
-    if (s == STATUS_OK) s = fill_lumens(c, err);
-    if (s == STATUS_OK) s = pipeline_work_path(c, "volume", "volume.bin", path, err);
-    if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
+    volume_options(in->scan, &out->option);
+    status s = read_volume(in, out, err);
+    if (s == STATUS_OK) s = fill_lumens(in, out, err);
+    if (s == STATUS_OK) s = stage_work_path(in->tools, "volume", "volume.bin", path, err);
+    if (s == STATUS_OK) s = worker_folder_check(in->tools->folder, err);
     if (s != STATUS_OK) return s;
-    reconstruct_warn_volume(&c->option, &c->geometry, &(struct warning_sink){pipeline_warn, c});
-    const struct volume_filled *filled = &c->volume.filled;
-    struct work_section section[] = {{&c->option, sizeof c->option},
-                                     {&c->geometry, sizeof c->geometry},
-                                     {c->volume.n, sizeof c->volume.n},
-                                     {c->volume.voxel_size_m, sizeof c->volume.voxel_size_m},
-                                     {c->volume.density, volume_n_voxel(c->volume.n) * sizeof(float), c->space},
-                                     {filled->voxel, filled->n * sizeof *filled->voxel, c->space},
-                                     {filled->density, filled->n * sizeof *filled->density, c->space}};
+    reconstruct_warn_volume(&out->option, &out->geometry, &in->tools->warn);
+    const struct volume_filled *filled = &out->volume.filled;
+    struct work_section section[] = {
+        {&out->option, sizeof out->option},
+        {&out->geometry, sizeof out->geometry},
+        {out->volume.n, sizeof out->volume.n},
+        {out->volume.voxel_size_m, sizeof out->volume.voxel_size_m},
+        {out->volume.density, volume_n_voxel(out->volume.n) * sizeof(float), in->tools->space},
+        {filled->voxel, filled->n * sizeof *filled->voxel, in->tools->space},
+        {filled->density, filled->n * sizeof *filled->density, in->tools->space}};
     return work_file_write(path, "volume.2", section, 7, err);
 }
 
-status stage_volume_load(struct pipeline_context *c, struct error *err)
+status stage_volume_load(const struct volume_input *in, struct volume_output *out, struct error *err)
 {
-    status s = pipeline_load_volume(c, &c->option, &c->geometry, err);
-    if (s == STATUS_OK) reconstruct_warn_volume(&c->option, &c->geometry, &(struct warning_sink){pipeline_warn, c});
+    status s = volume_checkpoint_read(in->tools, out, err);
+    if (s == STATUS_OK) reconstruct_warn_volume(&out->option, &out->geometry, &in->tools->warn);
     return s;
 }
 
 /* ---- direction volume: the stages "orientation" and "directions" store the same things ---- */
 
-static status store_direction(struct pipeline_context *c, const char *stage, struct error *err)
+/* The parts of such a checkpoint. */
+struct direction_file {
+    struct reconstruct_option *option;
+    struct reconstruct_report *geometry;
+    struct direction_volume *direction;
+};
+
+static status store_direction(const struct stage_tools *tools, const char *stage, const struct direction_file *f,
+                              struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    status s = pipeline_work_path(c, stage, "direction.bin", path, err);
-    if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
+    status s = stage_work_path(tools, stage, "direction.bin", path, err);
+    if (s == STATUS_OK) s = worker_folder_check(tools->folder, err);
     if (s != STATUS_OK) return s;
-    struct direction_volume *d = &c->direction;
+    struct direction_volume *d = f->direction;
     size_t n = volume_n_voxel(d->n);
-    struct work_section section[] = {{&c->option, sizeof c->option},
-                                     {&c->geometry, sizeof c->geometry},
+    struct work_section section[] = {{f->option, sizeof *f->option},
+                                     {f->geometry, sizeof *f->geometry},
                                      {d->n, sizeof d->n},
                                      {d->voxel_size_m, sizeof d->voxel_size_m},
-                                     {d->density, n, c->space},
-                                     {d->octahedral, 4 * n, c->space}};
+                                     {d->density, n, tools->space},
+                                     {d->octahedral, 4 * n, tools->space}};
     return work_file_write(path, "direction.1", section, 6, err);
 }
 
-static status load_direction(struct pipeline_context *c, const char *stage, struct error *err)
+static status load_direction(const struct stage_tools *tools, const char *stage, const struct direction_file *f,
+                             struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    struct direction_volume d = {.space = c->space};
-    status s = pipeline_work_path(c, stage, "direction.bin", path, err);
+    struct direction_volume d = {.space = tools->space};
+    status s = stage_work_path(tools, stage, "direction.bin", path, err);
     if (s != STATUS_OK) return s;
-    struct work_section section[] = {{&c->option, sizeof c->option},
-                                     {&c->geometry, sizeof c->geometry},
+    struct work_section section[] = {{f->option, sizeof *f->option},
+                                     {f->geometry, sizeof *f->geometry},
                                      {d.n, sizeof d.n},
                                      {d.voxel_size_m, sizeof d.voxel_size_m},
-                                     {NULL, 0, c->space},
-                                     {NULL, 0, c->space}};
+                                     {NULL, 0, tools->space},
+                                     {NULL, 0, tools->space}};
     s = work_file_read(path, "direction.1", section, 6, err);
     if (s != STATUS_OK) return s;
     d.density = section[4].data;
     d.octahedral = section[5].data;
-    direction_volume_release(&c->direction);
-    c->direction = d;
+    direction_volume_release(f->direction);
+    *f->direction = d;
     return STATUS_OK;
 }
 
-status stage_orientation(struct pipeline_context *c, struct error *err)
+status stage_orientation(const struct orientation_input *in, struct orientation_output *out, struct error *err)
 {
-    struct reconstruct_report *g = &c->geometry;
+    struct reconstruct_report *g = &out->geometry;
+    const struct volume *volume = &in->volume->volume;
+    out->option = in->volume->option;
+    *g = in->volume->geometry;
     struct progress_part part;
     const double filter = reconstruct_redirects(g) ? 0.2 : 1.0;
-    const struct progress inner = progress_begin_part(&part, &c->progress, 0.0, filter);
-    status s = pipeline_need_volume(c, err);
-    if (s == STATUS_OK) s = reconstruct_orientation(&c->volume, &c->option, c->pool, &inner, &c->direction, g, err);
-    part = (struct progress_part){&c->progress, filter, 1.0 - filter};
+    const struct progress inner = progress_begin_part(&part, &in->tools->progress, 0.0, filter);
+    status s = reconstruct_orientation(volume, &out->option, in->tools->pool, &inner, &out->direction, g, err);
+    part = (struct progress_part){&in->tools->progress, filter, 1.0 - filter};
     if (s == STATUS_OK && reconstruct_redirects(g))
-        s = reconstruct_redirect(&c->volume, &c->direction, &c->option, c->pool, &inner, g, err);
-    return s == STATUS_OK ? store_direction(c, "orientation", err) : s;
+        s = reconstruct_redirect(volume, &out->direction, &out->option, in->tools->pool, &inner, g, err);
+    return s == STATUS_OK
+               ? store_direction(in->tools, "orientation",
+                                 &(struct direction_file){&out->option, &out->geometry, &out->direction}, err)
+               : s;
 }
 
-status stage_orientation_load(struct pipeline_context *c, struct error *err)
+status stage_orientation_load(const struct orientation_input *in, struct orientation_output *out, struct error *err)
 {
-    return load_direction(c, "orientation", err);
+    return load_direction(in->tools, "orientation",
+                          &(struct direction_file){&out->option, &out->geometry, &out->direction}, err);
 }
 
 /* Whether a model of the job needs fibers, and not only density and directions. */
-static bool wants_fibers(const struct pipeline_context *c)
+static bool wants_fibers(const struct directions_input *in)
 {
-    for (size_t i = 0; i < c->n_model; i++)
-        if (c->model[i].appearance.kind == MODEL_SURFACE) return true;
-    return c->doc->scan.unresolved_fibers;
+    for (size_t i = 0; i < in->n_model; i++)
+        if (in->model[i].appearance.kind == MODEL_SURFACE) return true;
+    return in->scan->unresolved_fibers;
 }
 
 /* Drops the fibers that the scan does not show, unless they are wanted. The voxels have taken their directions, which
  * are smoother than those of the filter. */
-static void drop_unseen(struct pipeline_context *c)
+static void drop_unseen(const struct directions_input *in, struct directions_output *out)
 {
-    if (wants_fibers(c)) c->geometry.grade.n_dropped = 0;
-    scan_grade_drop(&c->fiber, &c->geometry.grade);
-    c->geometry.n_fiber = c->fiber.n_fiber;
-    c->geometry.n_vertex = c->fiber.n_vertex;
-    c->geometry.total_length_m = fiber_set_length_m(&c->fiber);
+    if (wants_fibers(in)) out->geometry.grade.n_dropped = 0;
+    scan_grade_drop(&out->fiber, &out->geometry.grade);
+    out->geometry.n_fiber = out->fiber.n_fiber;
+    out->geometry.n_vertex = out->fiber.n_vertex;
+    out->geometry.total_length_m = fiber_set_length_m(&out->fiber);
 }
 
 /* Joins the ends of the fibers across the seams of the tile, once the voxels of the scan have taken their
  * directions: the joined fibers no longer lie where the scan shows them near the faces. */
-static status join_seams(struct pipeline_context *c, struct error *err)
+static status join_seams(const struct directions_input *in, struct directions_output *out, struct error *err)
 {
-    struct reconstruct_report *g = &c->geometry;
-    if (c->fiber.n_fiber == 0) return STATUS_OK;
-    status s = fiber_set_copy(&c->fiber, &c->traced, err);
-    if (s == STATUS_OK) s = fiber_seam_measure(&c->fiber, &g->seam_found, err);
-    if (s == STATUS_OK && c->doc->scan.join_seams) s = fiber_seam_join(&c->fiber, &g->seam_join, err);
-    if (s == STATUS_OK) s = fiber_set_validate(&c->fiber, err);
-    return s == STATUS_OK ? fiber_seam_measure(&c->fiber, &g->seam_fiber, err) : s;
+    struct reconstruct_report *g = &out->geometry;
+    if (out->fiber.n_fiber == 0) return STATUS_OK;
+    status s = fiber_set_copy(&out->fiber, &out->traced, err);
+    if (s == STATUS_OK) s = fiber_seam_measure(&out->fiber, &g->seam_found, err);
+    if (s == STATUS_OK && in->scan->join_seams) s = fiber_seam_join(&out->fiber, &g->seam_join, err);
+    if (s == STATUS_OK) s = fiber_set_validate(&out->fiber, err);
+    return s == STATUS_OK ? fiber_seam_measure(&out->fiber, &g->seam_fiber, err) : s;
 }
 
-status stage_directions(struct pipeline_context *c, struct error *err)
+status stage_directions(const struct directions_input *in, struct directions_output *out, struct error *err)
 {
-    status s = reconstruct_transfer(&c->fiber, &c->direction, c->pool, &c->progress, &c->geometry, err);
-    if (s == STATUS_OK) drop_unseen(c);
-    if (s == STATUS_OK) s = join_seams(c, err);
-    return s == STATUS_OK ? store_direction(c, "directions", err) : s;
+    status s =
+        reconstruct_transfer(&out->fiber, &out->direction, in->tools->pool, &in->tools->progress, &out->geometry, err);
+    if (s == STATUS_OK) drop_unseen(in, out);
+    if (s == STATUS_OK) s = join_seams(in, out, err);
+    return s == STATUS_OK
+               ? store_direction(in->tools, "directions",
+                                 &(struct direction_file){&out->option, &out->geometry, &out->direction}, err)
+               : s;
 }
 
-status stage_directions_load(struct pipeline_context *c, struct error *err)
+status stage_directions_load(const struct directions_input *in, struct directions_output *out, struct error *err)
 {
-    status s = load_direction(c, "directions", err);
-    if (s == STATUS_OK) drop_unseen(c);
-    return s == STATUS_OK ? join_seams(c, err) : s;
+    status s = load_direction(in->tools, "directions",
+                              &(struct direction_file){&out->option, &out->geometry, &out->direction}, err);
+    if (s == STATUS_OK) drop_unseen(in, out);
+    return s == STATUS_OK ? join_seams(in, out, err) : s;
 }
 
 /* ---- fibers ---- */
 
-static status read_fiber_file(struct pipeline_context *c, struct error *err)
+static status read_fiber_file(const struct fibers_input *in, struct fibers_output *out, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    worker_folder_path(c->folder, JOB_FOLDER_INPUT, c->doc->cloth.fiber_file, path);
-    status s = fiber_file_read(path, c->doc, &c->fiber, err);
-    if (s == STATUS_OK) fiber_file_warn(&c->fiber, c->doc, &(struct warning_sink){pipeline_warn, c});
+    worker_folder_path(in->tools->folder, JOB_FOLDER_INPUT, in->cloth->fiber_file, path);
+    status s = fiber_file_read(path, in->cloth, &out->fiber, err);
+    if (s == STATUS_OK) fiber_file_warn(&out->fiber, in->cloth, &in->tools->warn);
     return s;
 }
 
 /* Makes the described cloth at the values of the document. */
-static status build_cloth(struct pipeline_context *c, struct error *err)
+static status build_cloth(const struct fibers_input *in, struct fibers_output *out, struct error *err)
 {
-    status s = cloth_build(c->doc->cloth.description, NULL, c->pool, &c->progress, &c->fiber, &c->cloth, err);
+    status s =
+        cloth_build(in->cloth->description, NULL, in->tools->pool, &in->tools->progress, &out->fiber, &out->cloth, err);
     if (s == STATUS_INVALID) job_cloth_name_field(err);
     return s;
 }
 
 /* Compares the groups of the fibers with those that the job names. */
-static status check_groups(struct pipeline_context *c, struct error *err)
+static status check_groups(const struct fibers_input *in, struct fibers_output *out, struct error *err)
 {
-    size_t n_fiber[FIBER_MAX_GROUP] = {0}, n_group = fiber_set_n_group(&c->fiber);
-    for (size_t i = 0; i < c->fiber.n_fiber; i++) n_fiber[c->fiber.group[i]]++;
-    if (c->doc->cloth.n_group == 0) {
-        if (n_group > 1 && c->doc->cloth.description == NULL)
+    size_t n_fiber[FIBER_MAX_GROUP] = {0}, n_group = fiber_set_n_group(&out->fiber);
+    for (size_t i = 0; i < out->fiber.n_fiber; i++) n_fiber[out->fiber.group[i]]++;
+    if (in->cloth->n_group == 0) {
+        if (n_group > 1 && in->cloth->description == NULL)
             worker_status_warn(
-                c->status,
+                in->tools->status,
                 "the fibers belong to %zu groups, but are fitted with one set of parameters: name the groups "
                 "in '%s' to give each its own",
                 n_group, job_option_key(OPTION_GROUPS));
         return STATUS_OK;
     }
-    const char *id = c->doc->cloth.description != NULL ? OPTION_YARNS : OPTION_GROUPS, *key = job_option_key(id);
-    if (n_group > c->doc->cloth.n_group)
+    const char *id = in->cloth->description != NULL ? OPTION_YARNS : OPTION_GROUPS, *key = job_option_key(id);
+    if (n_group > in->cloth->n_group)
         return error_set_field(err, STATUS_INVALID, id, "'%s' names %zu groups, but the fibers belong to %zu", key,
-                               c->doc->cloth.n_group, n_group);
-    for (size_t g = 0; g < c->doc->cloth.n_group; g++)
+                               in->cloth->n_group, n_group);
+    for (size_t g = 0; g < in->cloth->n_group; g++)
         if (n_fiber[g] == 0)
             return error_set_field(err, STATUS_INVALID, id, "'%s' names the group %zu '%s', but no fiber belongs to it",
-                                   key, g, c->doc->cloth.group[g]);
+                                   key, g, in->cloth->group[g]);
     return STATUS_OK;
 }
 
 /* Grades the scan. Where it does not resolve the fibers, those that it does not show are put last. */
-static status grade_fibers(struct pipeline_context *c, struct error *err)
+static status grade_fibers(const struct fibers_input *in, struct fibers_output *out, struct error *err)
 {
-    struct reconstruct_report *g = &c->geometry;
-    float *safe = malloc((c->fiber.n_fiber + 1) * sizeof *safe);
+    struct reconstruct_report *g = &out->geometry;
+    float *safe = malloc((out->fiber.n_fiber + 1) * sizeof *safe);
     if (safe == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot grade the scan: out of memory");
-    status s = scan_grade_measure(&c->volume, &c->fiber, c->pool, NULL, &g->grade, safe, err);
-    if (s == STATUS_OK && g->grade.verdict == GRADE_UNRESOLVED) s = scan_grade_sort(&c->fiber, safe, &g->grade, err);
+    status s = scan_grade_measure(&in->volume->volume, &out->fiber, in->tools->pool, NULL, &g->grade, safe, err);
+    if (s == STATUS_OK && g->grade.verdict == GRADE_UNRESOLVED) s = scan_grade_sort(&out->fiber, safe, &g->grade, err);
     free(safe);
-    if (s == STATUS_OK) reconstruct_tell_lumens(&c->volume, g);
+    if (s == STATUS_OK) reconstruct_tell_lumens(&in->volume->volume, g);
     return s;
 }
 
 /* Traces the fibers of the scan, grades them, and makes the trial if the job asks for it. */
-static status trace_fibers(struct pipeline_context *c, struct error *err)
+static status trace_fibers(const struct fibers_input *in, struct fibers_output *out, struct error *err)
 {
     struct progress_part part;
-    const struct progress inner = progress_begin_part(&part, &c->progress, 0.0, c->doc->scan.trial ? 0.5 : 1.0);
-    status s = pipeline_need_volume(c, err);
-    if (s == STATUS_OK)
-        s = reconstruct_fibers(&c->volume, &c->direction, &c->option, c->pool, &inner, &c->fiber, &c->geometry, err);
-    if (s == STATUS_OK) s = grade_fibers(c, err);
-    part = (struct progress_part){&c->progress, 0.5, 0.5};
-    if (s == STATUS_OK && c->doc->scan.trial) {
+    const struct progress inner = progress_begin_part(&part, &in->tools->progress, 0.0, in->scan->trial ? 0.5 : 1.0);
+    out->option = in->orientation->option;
+    out->geometry = in->orientation->geometry;
+    status s = reconstruct_fibers(&in->volume->volume, &in->orientation->direction, &out->option, in->tools->pool,
+                                  &inner, &out->fiber, &out->geometry, err);
+    if (s == STATUS_OK) s = grade_fibers(in, out, err);
+    part = (struct progress_part){&in->tools->progress, 0.5, 0.5};
+    if (s == STATUS_OK && in->scan->trial) {
         struct reconstruct_option asked;
-        pipeline_volume_options(c->doc, &asked);
-        s = reconstruct_trial(&c->volume, &c->fiber, &asked, c->pool, &inner, &c->geometry, err);
+        volume_options(in->scan, &asked);
+        s = reconstruct_trial(&in->volume->volume, &out->fiber, &asked, in->tools->pool, &inner, &out->geometry, err);
     }
-    volume_release(&c->volume);
-    memset(&c->volume, 0, sizeof c->volume);
     return s;
 }
 
 /* A wrong voxel size makes fibers that no cloth has. */
-static void warn_diameter(struct pipeline_context *c)
+static void warn_diameter(const struct fibers_input *in, const struct fibers_output *out)
 {
     double sum = 0.0;
-    for (size_t i = 0; i < c->fiber.n_fiber; i++) sum += 2.0 * (double)c->fiber.radius_m[i];
-    if (c->fiber.n_fiber > 0)
-        fiber_file_warn_diameter(sum / (double)c->fiber.n_fiber, OPTION_VOXEL_SIZE,
-                                 &(struct warning_sink){pipeline_warn, c});
+    for (size_t i = 0; i < out->fiber.n_fiber; i++) sum += 2.0 * (double)out->fiber.radius_m[i];
+    if (out->fiber.n_fiber > 0)
+        fiber_file_warn_diameter(sum / (double)out->fiber.n_fiber, OPTION_VOXEL_SIZE, &in->tools->warn);
 }
 
-status stage_fibers(struct pipeline_context *c, struct error *err)
+status stage_fibers(const struct fibers_input *in, struct fibers_output *out, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
     status s;
-    if (c->doc->scan.given) {
-        s = trace_fibers(c, err);
-        if (s == STATUS_OK) warn_diameter(c);
+    if (in->scan->given) {
+        s = trace_fibers(in, out, err);
+        if (s == STATUS_OK) warn_diameter(in, out);
     } else {
-        s = c->doc->cloth.description != NULL ? build_cloth(c, err) : read_fiber_file(c, err);
-        c->geometry.n_fiber = c->fiber.n_fiber;
-        c->geometry.n_vertex = c->fiber.n_vertex;
-        if (s == STATUS_OK) c->geometry.total_length_m = fiber_set_length_m(&c->fiber);
+        s = in->cloth->description != NULL ? build_cloth(in, out, err) : read_fiber_file(in, out, err);
+        out->geometry.n_fiber = out->fiber.n_fiber;
+        out->geometry.n_vertex = out->fiber.n_vertex;
+        if (s == STATUS_OK) out->geometry.total_length_m = fiber_set_length_m(&out->fiber);
     }
-    if (s == STATUS_OK) s = fiber_set_validate(&c->fiber, err);
-    if (s == STATUS_OK) s = check_groups(c, err);
-    if (s == STATUS_OK && !c->doc->scan.given) s = fiber_seam_measure(&c->fiber, &c->geometry.seam_fiber, err);
-    if (s == STATUS_OK) s = pipeline_work_path(c, "fibers", "fibers.bin", path, err);
-    if (s == STATUS_OK) s = worker_folder_check(c->folder, err);
+    if (s == STATUS_OK) s = fiber_set_validate(&out->fiber, err);
+    if (s == STATUS_OK) s = check_groups(in, out, err);
+    if (s == STATUS_OK && !in->scan->given) s = fiber_seam_measure(&out->fiber, &out->geometry.seam_fiber, err);
+    if (s == STATUS_OK) s = stage_work_path(in->tools, "fibers", "fibers.bin", path, err);
+    if (s == STATUS_OK) s = worker_folder_check(in->tools->folder, err);
     if (s != STATUS_OK) return s;
-    struct fiber_set *f = &c->fiber;
-    struct work_section section[] = {{&c->option, sizeof c->option},
-                                     {&c->geometry, sizeof c->geometry},
-                                     {&c->cloth, sizeof c->cloth},
+    struct fiber_set *f = &out->fiber;
+    struct work_section section[] = {{&out->option, sizeof out->option},
+                                     {&out->geometry, sizeof out->geometry},
+                                     {&out->cloth, sizeof out->cloth},
                                      {&f->n_fiber, sizeof f->n_fiber},
                                      {&f->n_vertex, sizeof f->n_vertex},
                                      {f->tile_size_m, sizeof f->tile_size_m},
@@ -302,16 +322,16 @@ status stage_fibers(struct pipeline_context *c, struct error *err)
     return work_file_write(path, "fibers.5", section, 12, err);
 }
 
-status stage_fibers_load(struct pipeline_context *c, struct error *err)
+status stage_fibers_load(const struct fibers_input *in, struct fibers_output *out, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
     struct fiber_set f;
     fiber_set_init(&f);
-    status s = pipeline_work_path(c, "fibers", "fibers.bin", path, err);
+    status s = stage_work_path(in->tools, "fibers", "fibers.bin", path, err);
     if (s != STATUS_OK) return s;
-    struct work_section section[] = {{&c->option, sizeof c->option},
-                                     {&c->geometry, sizeof c->geometry},
-                                     {&c->cloth, sizeof c->cloth},
+    struct work_section section[] = {{&out->option, sizeof out->option},
+                                     {&out->geometry, sizeof out->geometry},
+                                     {&out->cloth, sizeof out->cloth},
                                      {&f.n_fiber, sizeof f.n_fiber},
                                      {&f.n_vertex, sizeof f.n_vertex},
                                      {f.tile_size_m, sizeof f.tile_size_m},
@@ -330,7 +350,7 @@ status stage_fibers_load(struct pipeline_context *c, struct error *err)
     f.group = section[10].data;
     f.shape = section[11].n_bytes > 0 ? section[11].data : NULL;
     if (f.shape == NULL) free(section[11].data);
-    fiber_set_release(&c->fiber);
-    c->fiber = f;
+    fiber_set_release(&out->fiber);
+    out->fiber = f;
     return STATUS_OK;
 }

@@ -9,13 +9,31 @@
 
 enum { N_FOLD = 8 };
 
+/* Models with their fits and validations. */
+struct models {
+    size_t n;
+    struct model_setup setup[3];
+    struct model_fit fit[3];
+    struct validation validation[3];
+    struct pipeline_model view[3];
+};
+
+static struct models *make_models(size_t n)
+{
+    struct models *m = calloc(1, sizeof *m);
+    m->n = n;
+    for (size_t i = 0; i < n; i++)
+        m->view[i] = (struct pipeline_model){&m->setup[i], &m->fit[i], &m->validation[i], NULL};
+    return m;
+}
+
 /* A model with n_free fitted unknowns of nine, and errors of the folds around `mean`, up and down by `scatter`. */
-static void make_model(struct pipeline_model *m, size_t n_free, double mean, double scatter)
+static void make_model(struct models *m, size_t i, size_t n_free, double mean, double scatter)
 {
     static const struct job_fit_option option;
-    struct cross_validation *v = &m->fit.cross_validation;
-    struct uncertainty *u = &m->fit.unknown_uncertainty;
-    m->option = &option;
+    struct cross_validation *v = &m->fit[i].result.cross_validation;
+    struct uncertainty *u = &m->fit[i].result.unknown_uncertainty;
+    m->setup[i].option = &option;
     u->n_param = 9;
     for (size_t p = 0; p < n_free; p++) u->cov[p * u->n_param + p] = 0.01;
     v->n_fold = N_FOLD;
@@ -40,14 +58,11 @@ static void test_of_equal_errors_the_simpler_model(void **state)
                {0.008, 0.0, 1},   /* better */
                {0.008, 0.006, 1}};
     for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
-        struct pipeline_context *c = calloc(1, sizeof *c);
-        c->n_model = 2;
-        c->model = calloc(2, sizeof *c->model);
-        make_model(&c->model[0], 9, 0.01, 0.0);
-        make_model(&c->model[1], 4, row[i].mean, row[i].scatter);
-        assert_int_equal(pipeline_choice(c), CHOICE_CROSS_VALIDATION);
-        assert_int_equal(pipeline_best_model(c), row[i].best);
-        free(c->model);
+        struct models *c = make_models(2);
+        make_model(c, 0, 9, 0.01, 0.0);
+        make_model(c, 1, 4, row[i].mean, row[i].scatter);
+        assert_int_equal(pipeline_choice(c->view, c->n), CHOICE_CROSS_VALIDATION);
+        assert_int_equal(pipeline_best_model(c->view, c->n), row[i].best);
         free(c);
     }
 }
@@ -57,17 +72,14 @@ static void test_of_equal_errors_the_simpler_model(void **state)
 static void test_of_equal_errors_the_one_that_fits(void **state)
 {
     (void)state;
-    struct pipeline_context *c = calloc(1, sizeof *c);
-    c->n_model = 2;
-    c->model = calloc(2, sizeof *c->model);
-    make_model(&c->model[0], 9, 0.197, 0.15);
-    make_model(&c->model[1], 7, 0.151, 0.0);
-    c->model[0].validation.fit.rel_square = 0.0046;
-    c->model[1].validation.fit.rel_square = 0.137;
-    assert_int_equal(pipeline_best_model(c), 0);
-    c->model[0].validation.fit.rel_square = 0.13; /* two unknowns more explain that */
-    assert_int_equal(pipeline_best_model(c), 1);
-    free(c->model);
+    struct models *c = make_models(2);
+    make_model(c, 0, 9, 0.197, 0.15);
+    make_model(c, 1, 7, 0.151, 0.0);
+    c->validation[0].fit.rel_square = 0.0046;
+    c->validation[1].fit.rel_square = 0.137;
+    assert_int_equal(pipeline_best_model(c->view, c->n), 0);
+    c->validation[0].fit.rel_square = 0.13; /* two unknowns more explain that */
+    assert_int_equal(pipeline_best_model(c->view, c->n), 1);
     free(c);
 }
 
@@ -75,17 +87,14 @@ static void test_of_equal_errors_the_one_that_fits(void **state)
 static void test_a_clear_difference_decides(void **state)
 {
     (void)state;
-    struct pipeline_context *c = calloc(1, sizeof *c);
-    c->n_model = 3;
-    c->model = calloc(3, sizeof *c->model);
-    make_model(&c->model[0], 4, 0.010, 0.0);
-    make_model(&c->model[1], 9, 0.005, 0.002);
-    make_model(&c->model[2], 9, 0.0051, 0.002);
-    assert_int_equal(pipeline_best_model(c), 1);
-    c->n_model = 1;
-    assert_int_equal(pipeline_choice(c), CHOICE_ONLY_MODEL);
-    assert_int_equal(pipeline_best_model(c), 0);
-    free(c->model);
+    struct models *c = make_models(3);
+    make_model(c, 0, 4, 0.010, 0.0);
+    make_model(c, 1, 9, 0.005, 0.002);
+    make_model(c, 2, 9, 0.0051, 0.002);
+    assert_int_equal(pipeline_best_model(c->view, c->n), 1);
+    c->n = 1;
+    assert_int_equal(pipeline_choice(c->view, c->n), CHOICE_ONLY_MODEL);
+    assert_int_equal(pipeline_best_model(c->view, c->n), 0);
     free(c);
 }
 
@@ -93,18 +102,15 @@ static void test_a_clear_difference_decides(void **state)
 static void test_fitted_rows_decide_without_folds(void **state)
 {
     (void)state;
-    struct pipeline_context *c = calloc(1, sizeof *c);
-    c->n_model = 2;
-    c->model = calloc(2, sizeof *c->model);
-    make_model(&c->model[0], 9, 0.010, 0.0);
-    make_model(&c->model[1], 4, 0.010, 0.0);
-    c->model[1].fit.cross_validation.n_fold = 0;
-    c->model[0].validation.fit.rel_square = 0.010;
-    c->model[1].validation.fit.rel_square = 0.011;
-    c->model[1].validation.fit.rel_square_se = 0.01;
-    assert_int_equal(pipeline_choice(c), CHOICE_FITTED_ROWS);
-    assert_int_equal(pipeline_best_model(c), 0);
-    free(c->model);
+    struct models *c = make_models(2);
+    make_model(c, 0, 9, 0.010, 0.0);
+    make_model(c, 1, 4, 0.010, 0.0);
+    c->fit[1].result.cross_validation.n_fold = 0;
+    c->validation[0].fit.rel_square = 0.010;
+    c->validation[1].fit.rel_square = 0.011;
+    c->validation[1].fit.rel_square_se = 0.01;
+    assert_int_equal(pipeline_choice(c->view, c->n), CHOICE_FITTED_ROWS);
+    assert_int_equal(pipeline_best_model(c->view, c->n), 0);
     free(c);
 }
 

@@ -3,8 +3,8 @@
 #include "base/angle.h"
 #include "base/files/durable.h"
 #include "base/option_id.h"
-#include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/stages/fit/pipeline_trace.h"
+#include "optimizer/worker/stages/geometry_stages.h"
 #include "renderer/transport/estimate/estimate.h"
 #include "renderer/transport/light/environment.h"
 #include "tests/support/scratch_folder.h"
@@ -71,7 +71,10 @@ static void write_sky(const char *path)
 static void compare(void **state, const char *set_up, const char *fit, const struct configuration *by_hand, bool share)
 {
     struct worker_folder f;
-    struct pipeline_context c;
+    struct job_inputs in;
+    struct fibers_output fibers_out;
+    struct made_cloth made;
+    struct stage_tools tools = {.folder = &f, .warn = {stage_warn, &tools}};
     struct pipeline_trace trace;
     struct error err = {0};
     struct estimate of_job[N_ROW], want[N_ROW];
@@ -79,21 +82,29 @@ static void compare(void **state, const char *set_up, const char *fit, const str
     const size_t n_path[N_ROW] = {N_PATH, N_PATH, N_PATH};
     write_job(state, set_up, fit);
     assert_int_equal(worker_folder_open(&f, scratch_path(state, "job"), NULL), STATUS_OK);
-    pipeline_context_init(&c);
-    c.folder = &f;
-    if (pipeline_read_inputs(&c, &err) != STATUS_OK) fail_msg("%s: %s", err.field, err.text);
-    assert_int_equal(stage_fibers(&c, &err), STATUS_OK);
-    assert_int_equal(pipeline_make_scene(&c, &err), STATUS_OK);
-    assert_int_equal(c.fitted.n, N_ROW);
+    job_inputs_init(&in);
+    memset(&fibers_out, 0, sizeof fibers_out);
+    memset(&made, 0, sizeof made);
+    fiber_set_init(&fibers_out.fiber);
+    if (job_inputs_read(&tools, &in, &err) != STATUS_OK) fail_msg("%s: %s", err.field, err.text);
+    const struct job_document *doc = in.doc;
+    const struct fibers_input stage = {.tools = &tools, .scan = &doc->scan, .cloth = &doc->cloth};
+    const struct cloth_job job = {&tools,   &doc->scan, &doc->cloth, &doc->setup, &doc->fit,
+                                  &in.rows, in.n_model, in.model,    &in.number};
+    assert_int_equal(stage_fibers(&stage, &fibers_out, &err), STATUS_OK);
+    made.fiber = fibers_out.fiber;
+    assert_int_equal(made_cloth_make_scene(&job, &made, &err), STATUS_OK);
+    assert_int_equal(in.rows.fitted.n, N_ROW);
     double param[FIT_MAX_PARAM];
-    const struct appearance *model = &c.model[0].appearance;
+    const struct appearance *model = &in.model[0].appearance;
     for (size_t p = 0; p < model->n_param; p++) param[p] = model->param[p].start;
-    assert_int_equal(pipeline_trace_open(&trace, &c, "fit", "estimates.journal", 0, &c.fitted, &err), STATUS_OK);
+    assert_int_equal(pipeline_trace_open(&trace, &job, &made, "fit", "estimates.journal", 0, &in.rows.fitted, &err),
+                     STATUS_OK);
     const struct estimator e = estimate_journal_estimator(trace.journal);
     const struct estimator_call call = {.param = param, .n_path = n_path, .want_jacobian = true};
     assert_int_equal(e.run(e.context, &call, NULL, of_job, &wall_s, &err), STATUS_OK);
     const struct estimate_request q = {
-        .input = {.scene = {.fibers = c.scene}, .model = model, .param = param, .want_derivative = true},
+        .input = {.scene = {.fibers = made.scene}, .model = model, .param = param, .want_derivative = true},
         .configuration = by_hand,
         .n_configuration = N_ROW,
         .n_path = n_path,
@@ -108,7 +119,8 @@ static void compare(void **state, const char *set_up, const char *fit, const str
         assert_memory_equal(of_job[i].partner, want[i].partner, sizeof want[i].partner);
     }
     pipeline_trace_close(&trace);
-    pipeline_context_release(&c);
+    made_cloth_release(&made);
+    job_inputs_release(&in);
     worker_folder_close(&f);
 }
 

@@ -2,7 +2,7 @@
 #include "base/files/durable.h"
 #include "base/option_id.h"
 #include "optimizer/job/job_folder.h"
-#include "optimizer/worker/pipeline_context.h"
+#include "optimizer/worker/stages/geometry_stages.h"
 #include "optimizer/worker/work_file.h"
 #include "optimizer/worker/worker_series.h"
 #include "tests/support/scratch_folder.h"
@@ -244,21 +244,26 @@ static void test_fibers_wider_than_the_tile(void **state)
     scratch_write(scratch_path(state, "wide/input/a.csv"), rows, sizeof rows - 1);
     for (int i = 0; i < 2; i++) {
         struct worker_folder f;
-        struct pipeline_context c;
+        struct job_inputs in;
+        struct fibers_output out;
+        struct stage_tools tools = {.folder = &f, .warn = {stage_warn, &tools}};
         struct error err = {0};
         scratch_write(scratch_path(state, "wide/input/a.txt"), fibers[i], strlen(fibers[i]));
         assert_int_equal(worker_folder_open(&f, scratch_path(state, "wide"), NULL), STATUS_OK);
-        pipeline_context_init(&c);
-        c.folder = &f;
-        if (pipeline_read_inputs(&c, &err) != STATUS_OK) fail_msg("%s", err.text);
-        assert_int_equal(stage_fibers(&c, &err), i == 0 ? STATUS_OK : STATUS_INVALID);
+        job_inputs_init(&in);
+        memset(&out, 0, sizeof out);
+        fiber_set_init(&out.fiber);
+        if (job_inputs_read(&tools, &in, &err) != STATUS_OK) fail_msg("%s", err.text);
+        const struct fibers_input stage = {.tools = &tools, .scan = &in.doc->scan, .cloth = &in.doc->cloth};
+        assert_int_equal(stage_fibers(&stage, &out, &err), i == 0 ? STATUS_OK : STATUS_INVALID);
         if (i == 1) {
             assert_string_equal(err.field, OPTION_FIBER_FILE);
             assert_non_null(
                 strstr(err.text,
                        "'a.txt': fiber 1 has a radius of 0.0501 mm, the tile is 0.1 x 0.2 mm: the unit may be wrong"));
         }
-        pipeline_context_release(&c);
+        fiber_set_release(&out.fiber);
+        job_inputs_release(&in);
         worker_folder_close(&f);
     }
 }

@@ -16,7 +16,8 @@
 enum { N_ROW = 16, N_ALL = 40 };
 
 struct job {
-    struct pipeline_context c;
+    struct job_plan plan;
+    struct job_inputs in;
     struct job_document doc;
     struct observation row[N_ROW];
 };
@@ -27,10 +28,11 @@ static struct job *make_job(void)
     static struct job j;
     memset(&j, 0, sizeof j);
     snprintf(j.doc.fit.method, sizeof j.doc.fit.method, "gauss_newton.v1");
-    j.c.doc = &j.doc;
-    j.c.fitted.item = j.row;
-    j.c.fitted.n = N_ROW;
-    j.c.observation.n = N_ALL;
+    j.in.doc = &j.doc;
+    j.in.rows.fitted.item = j.row;
+    j.in.rows.fitted.n = N_ROW;
+    j.in.rows.observation.n = N_ALL;
+    j.plan = (struct job_plan){.in = &j.in};
     return &j;
 }
 
@@ -38,19 +40,19 @@ static void test_paths_follow_from_the_rows(void **state)
 {
     (void)state;
     struct job *j = make_job();
-    const double of_table = pipeline_plan_usual_paths(&j->c);
+    const double of_table = pipeline_plan_usual_paths(&j->plan);
     assert_true(of_table > 0.5e6 && of_table < 2e6);
     j->doc.rows.n_photograph = N_ALL; /* their errors end a fit much later */
-    const double of_photographs = pipeline_plan_usual_paths(&j->c);
+    const double of_photographs = pipeline_plan_usual_paths(&j->plan);
     assert_true(of_photographs > 3e6 && of_photographs < 6e6);
-    j->c.fitted.n = N_ROW / 2; /* fewer rows, fewer paths */
-    assert_true(pipeline_plan_usual_paths(&j->c) == 0.5 * of_photographs);
+    j->in.rows.fitted.n = N_ROW / 2; /* fewer rows, fewer paths */
+    assert_true(pipeline_plan_usual_paths(&j->plan) == 0.5 * of_photographs);
     j->doc.fit.path_budget = 300000; /* is used up */
-    assert_true(pipeline_plan_usual_paths(&j->c) == 300000.0);
+    assert_true(pipeline_plan_usual_paths(&j->plan) == 300000.0);
     j->doc.rows.n_photograph = 0;
-    assert_true(pipeline_plan_usual_paths(&j->c) == 300000.0);
+    assert_true(pipeline_plan_usual_paths(&j->plan) == 300000.0);
     j->doc.fit.path_budget = 3000000; /* more than misfit leaves to do */
-    assert_true(pipeline_plan_usual_paths(&j->c) == 0.5 * of_table);
+    assert_true(pipeline_plan_usual_paths(&j->plan) == 0.5 * of_table);
 }
 
 /* Renderings take at most half of the paths of the fit where that allows 48 pixels with two samples. */
@@ -60,8 +62,9 @@ static void test_pictures_cost_less_than_the_fit(void **state)
     struct job *j = make_job();
     size_t before = 0;
     for (double n_path = 1e4; n_path < 1e8; n_path *= 1.7) {
-        const size_t px = result_picture_px(&j->c, n_path), sample = result_picture_samples(&j->c, n_path);
-        const double all = result_renderings_paths(&j->c, n_path);
+        const size_t px = result_picture_px(&j->doc.results, N_ALL, n_path),
+                     sample = result_picture_samples(&j->doc.results, N_ALL, n_path);
+        const double all = result_renderings_paths(&j->doc.results, N_ALL, n_path);
         assert_true(px >= 48 && px <= 96 && px >= before && sample >= 2 && sample <= 16);
         assert_true(all == (double)(px * px * sample * N_ALL));
         assert_true(all <= 0.5 * n_path || (px == 48 && sample == 2));
@@ -70,11 +73,13 @@ static void test_pictures_cost_less_than_the_fit(void **state)
     }
     assert_true(before == 96);
     j->doc.results.render_px = 200; /* the document says so */
-    assert_true(result_picture_px(&j->c, 1e4) == 200 && result_picture_samples(&j->c, 1e4) == 2);
+    assert_true(result_picture_px(&j->doc.results, N_ALL, 1e4) == 200 &&
+                result_picture_samples(&j->doc.results, N_ALL, 1e4) == 2);
     j->doc.results.render_sample = 7;
-    assert_true(result_picture_px(&j->c, 1e4) == 200 && result_picture_samples(&j->c, 1e4) == 7);
+    assert_true(result_picture_px(&j->doc.results, N_ALL, 1e4) == 200 &&
+                result_picture_samples(&j->doc.results, N_ALL, 1e4) == 7);
     j->doc.results.render_px = 0;
-    assert_true(result_picture_px(&j->c, 1e4) == 48);
+    assert_true(result_picture_px(&j->doc.results, N_ALL, 1e4) == 48);
 }
 
 /* n straight fibers of 10 um radius and 1 mm length, each of two pieces, in a tile of 1 mm x 1 mm. */
@@ -112,8 +117,9 @@ static void test_paths_in_a_thin_cloth_are_shorter(void **state)
 static double certificate_s_of(const char *id, size_t n_fixed)
 {
     static struct job_document doc;
-    struct pipeline_context c = {.doc = &doc, .n_model = 1};
-    struct pipeline_model *m = calloc(1, sizeof *m);
+    struct model_setup *m = calloc(1, sizeof *m);
+    struct job_inputs in = {.doc = &doc, .kind = JOB_OF_FIT, .n_model = 1, .model = m};
+    struct job_plan plan = {.in = &in};
     assert_non_null(m);
     snprintf(doc.rows.measurement_file, sizeof doc.rows.measurement_file, "rows.csv");
     doc.fit.n_model = 1;
@@ -121,11 +127,10 @@ static double certificate_s_of(const char *id, size_t n_fixed)
     assert_int_equal(model_sets_init(&m->sets, model_catalogue_find(id), NULL, 0, NULL), STATUS_OK);
     for (size_t p = 0; p < m->sets.info.n_param; p++)
         m->parameter[p] = (struct fit_parameter){.start = m->sets.info.param[p].start, .fixed = p < n_fixed};
-    c.model = m;
-    plan_probe_take(&c);
-    assert_true(c.path_share == 1.0);
+    plan_probe_take(&plan);
+    assert_true(plan.path_share == 1.0);
     free(m);
-    return c.certificate_s;
+    return plan.certificate_s;
 }
 
 /* The tables of an elliptical fiber take some hundred times as long as those of an isotropic one. */

@@ -14,8 +14,8 @@
 
 struct job {
     struct job_document *doc;
-    struct pipeline_context c;
-    struct pipeline_model model;
+    struct job_inputs in;
+    struct model_setup model;
     struct observation row[2];
 };
 
@@ -33,20 +33,20 @@ static void job_init(struct job *j, const char *cloth, const char *yarn)
         "{\"name\":\"b\",\"plies\":2}]},\"measurements\":{\"file\":\"a.csv\"},\"fit\":{\"model\":\"two_lobe.v1\"%s}}",
         cloth, yarn, fit_text);
     if (job_document_parse(text, strlen(text), &j->doc, &err) != STATUS_OK) fail_msg("%s: %s", err.field, err.text);
-    pipeline_context_init(&j->c);
-    j->c.doc = j->doc;
-    j->c.model = &j->model;
-    j->c.n_model = 1;
-    j->c.texture = (struct pipeline_texture){.found = true,
-                                             .guess = {.draft = {.n_warp = 2, .n_weft = 2, .warp_on_top = {1, 0, 0, 1}},
-                                                       .spacing_px = {10.0, 20.0},
-                                                       .cover = {0.9, 0.8},
-                                                       .warp.rgb = {0.3, 0.2, 0.1},
-                                                       .weft.rgb = {0.1, 0.2, 0.3},
-                                                       .yarns_confidence = 0.9,
-                                                       .draft_confidence = 0.9,
-                                                       .cover_confidence = 0.6,
-                                                       .color_confidence = 0.8}};
+    job_inputs_init(&j->in);
+    j->in.doc = j->doc;
+    j->in.model = &j->model;
+    j->in.n_model = 1;
+    j->in.texture = (struct texture_guess){.found = true,
+                                           .guess = {.draft = {.n_warp = 2, .n_weft = 2, .warp_on_top = {1, 0, 0, 1}},
+                                                     .spacing_px = {10.0, 20.0},
+                                                     .cover = {0.9, 0.8},
+                                                     .warp.rgb = {0.3, 0.2, 0.1},
+                                                     .weft.rgb = {0.1, 0.2, 0.3},
+                                                     .yarns_confidence = 0.9,
+                                                     .draft_confidence = 0.9,
+                                                     .cover_confidence = 0.6,
+                                                     .color_confidence = 0.8}};
     const char(*group)[MODEL_SET_NAME_BYTES] = (const char(*)[MODEL_SET_NAME_BYTES])j->doc->cloth.group;
     const struct model_info *model = model_catalogue_find("two_lobe.v1");
     assert_int_equal(model_sets_init(&j->model.sets, model, group, j->doc->cloth.n_group, &err), STATUS_OK);
@@ -56,16 +56,10 @@ static void job_init(struct job *j, const char *cloth, const char *yarn)
     for (int i = 0; i < 2; i++)
         j->row[i] = (struct observation){
             .configuration.light_theta_rad = i == 0 ? M_PI / 3.0 : M_PI, .mean_rgb = {0.2, 0.2, 0.2}, .weight = 1.0};
-    j->c.observation = (struct observation_set){.n = 2, .item = j->row};
+    j->in.rows.observation = (struct observation_set){.n = 2, .item = j->row};
 }
 
-/* The context's other members are the test's own or hold nothing. */
-static void job_release(struct job *j)
-{
-    json_decref(j->c.exports);
-    json_decref(j->c.surface_pictures);
-    job_document_free(j->doc);
-}
+static void job_release(struct job *j) { job_document_free(j->doc); }
 
 static double number(const struct job *j, const char *name)
 {
@@ -75,8 +69,8 @@ static double number(const struct job *j, const char *name)
 
 static bool was_taken(const struct job *j, const char *name)
 {
-    for (size_t i = 0; i < j->c.texture.n_taken; i++)
-        if (strcmp(j->c.texture.taken[i], name) == 0) return true;
+    for (size_t i = 0; i < j->in.texture.n_taken; i++)
+        if (strcmp(j->in.texture.taken[i], name) == 0) return true;
     return false;
 }
 
@@ -85,9 +79,9 @@ static void covers_without_a_scale(void **state)
     (void)state;
     struct job j;
     job_init(&j, "\"cover_weft\":0.7,", "");
-    assert_int_equal(texture_take_widths(&j.c, NULL), STATUS_OK);
+    assert_int_equal(texture_take_widths(&j.doc->cloth, &j.in.texture, NULL), STATUS_OK);
     assert_true(number(&j, "cover_warp") == 0.9 && number(&j, "cover_weft") == 0.7 && number(&j, "crimp") == 0.5);
-    assert_true(was_taken(&j, "cover_warp") && !was_taken(&j, "cover_weft") && j.c.texture.n_taken == 1);
+    assert_true(was_taken(&j, "cover_warp") && !was_taken(&j, "cover_weft") && j.in.texture.n_taken == 1);
     job_release(&j);
 }
 
@@ -96,7 +90,7 @@ static void threads_with_a_scale(void **state)
     (void)state;
     struct job j;
     job_init(&j, "\"texture_px_per_mm\":40,", "");
-    assert_int_equal(texture_take_widths(&j.c, NULL), STATUS_OK);
+    assert_int_equal(texture_take_widths(&j.doc->cloth, &j.in.texture, NULL), STATUS_OK);
     const struct cloth_description *d = j.doc->cloth.description;
     assert_true(d->threads_per_cm[CLOTH_WARP] == 40.0 && d->threads_per_cm[CLOTH_WEFT] == 20.0);
     assert_true(isnan(number(&j, "cover_warp")) && isnan(number(&j, "cover_weft")));
@@ -113,12 +107,12 @@ static void given_values_stay(void **state)
     (void)state;
     struct job j;
     job_init(&j, "\"texture_px_per_mm\":40,\"warp_per_cm\":33,\"cover_weft\":0.7,\"crimp\":0.4,", ",\"flatness\":3");
-    assert_int_equal(texture_take_widths(&j.c, NULL), STATUS_OK);
+    assert_int_equal(texture_take_widths(&j.doc->cloth, &j.in.texture, NULL), STATUS_OK);
     assert_true(j.doc->cloth.description->threads_per_cm[CLOTH_WARP] == 33.0 &&
                 j.doc->cloth.description->threads_per_cm[CLOTH_WEFT] == 0.0);
     assert_true(number(&j, "cover_weft") == 0.7 && number(&j, "crimp") == 0.4 &&
                 number(&j, "yarns[0].flatness") == 3.0);
-    assert_true(j.c.texture.n_taken == 0);
+    assert_true(j.in.texture.n_taken == 0);
     job_release(&j);
 }
 
@@ -127,9 +121,9 @@ static void what_is_not_certain_is_not_taken(void **state)
     (void)state;
     struct job j;
     job_init(&j, "\"texture_px_per_mm\":40,\"texture_colors\":true,", "");
-    j.c.texture.guess.yarns_confidence = j.c.texture.guess.cover_confidence = 0.2;
-    assert_int_equal(texture_take_widths(&j.c, NULL), STATUS_OK);
-    assert_true(j.c.texture.n_taken == 0 && j.doc->cloth.description->threads_per_cm[CLOTH_WARP] == 0.0);
+    j.in.texture.guess.yarns_confidence = j.in.texture.guess.cover_confidence = 0.2;
+    assert_int_equal(texture_take_widths(&j.doc->cloth, &j.in.texture, NULL), STATUS_OK);
+    assert_true(j.in.texture.n_taken == 0 && j.doc->cloth.description->threads_per_cm[CLOTH_WARP] == 0.0);
     job_release(&j);
 }
 
@@ -139,7 +133,7 @@ static void a_wrong_scale_is_named(void **state)
     struct job j;
     struct error err = {0};
     job_init(&j, "\"texture_px_per_mm\":5000,", "");
-    assert_int_equal(texture_take_widths(&j.c, &err), STATUS_INVALID);
+    assert_int_equal(texture_take_widths(&j.doc->cloth, &j.in.texture, &err), STATUS_INVALID);
     assert_string_equal(err.field, "texture_px_per_mm");
     assert_non_null(strstr(err.text, "5000 warp yarns"));
     job_release(&j);
@@ -155,7 +149,7 @@ static void colors_start_the_kinds(void **state)
              ",\"start\":{\"a.C_TT.r\":0.77},\"priors\":{\"b.C_TT.b\":{\"mean\":0.5,\"se\":1}}");
     job_init(&j, "\"texture_colors\":true,", "");
     fit_text[0] = '\0';
-    texture_take_colors(&j.c);
+    texture_take_colors(&(struct stage_tools){.log = NULL}, &j.in);
     for (size_t p = 0; p < j.model.sets.info.n_param; p++) {
         const struct param_info *info = &j.model.sets.info.param[p];
         bool color = strcmp(param_own_symbol(info), "C_TT") == 0;
@@ -164,11 +158,11 @@ static void colors_start_the_kinds(void **state)
         if (color && !stated) want = texture_albedo(0.4 * factor[p / j.model.sets.n_own][info->channel]);
         assert_true(fabs(j.model.parameter[p].start - want) < 1e-12);
     }
-    assert_true(j.c.texture.n_taken == 4 && was_taken(&j, "a.C_TT.g") && !was_taken(&j, "a.C_TT.r"));
+    assert_true(j.in.texture.n_taken == 4 && was_taken(&j, "a.C_TT.g") && !was_taken(&j, "a.C_TT.r"));
     job_release(&j);
     job_init(&j, "", ""); /* the job does not ask for it */
-    texture_take_colors(&j.c);
-    assert_true(j.c.texture.n_taken == 0);
+    texture_take_colors(&(struct stage_tools){.log = NULL}, &j.in);
+    assert_true(j.in.texture.n_taken == 0);
     job_release(&j);
 }
 

@@ -191,8 +191,8 @@ static json_t *front_json(const struct texture_principled *p)
 /* UUID version 4 from the job's inputs, so that the same job gives the same id. */
 static void make_uuid(const struct export_scene *e, char text[37])
 {
-    uint64_t a = e->c->fingerprint * 0x9e3779b97f4a7c15u,
-             b = (e->c->fingerprint ^ e->c->doc->fit.seed) * 0xbf58476d1ce4e5b9u;
+    uint64_t a = e->report->in.job->tools->fingerprint * 0x9e3779b97f4a7c15u,
+             b = (e->report->in.job->tools->fingerprint ^ e->report->in.job->fit->seed) * 0xbf58476d1ce4e5b9u;
     snprintf(text, 37, "%08x-%04x-4%03x-%04x-%012llx", (unsigned)(a >> 32), (unsigned)(a >> 16 & 0xffff),
              (unsigned)(a & 0xfff), (unsigned)(0x8000 | (b >> 48 & 0x3fff)), (unsigned long long)(b & 0xffffffffffffu));
 }
@@ -206,7 +206,7 @@ static json_t *u3m_json(const struct export_scene *e, const struct texture_princ
     make_uuid(e, uuid);
     return json_pack(
         "{s:s, s:{s:s, s:s, s:s, s:s, s:s, s:o, s:n, s:n, s:{s:f, s:n, s:n, s:{s:s}, s:n, s:n}, s:n}, s:n}", "schema",
-        "1.1", "material", "id", uuid, "name", e->c->doc->sample[0] != '\0' ? e->c->doc->sample : "cloth",
+        "1.1", "material", "id", uuid, "name", e->report->in.sample[0] != '\0' ? e->report->in.sample : "cloth",
         "description", "Made by Selvedge.", "created", now, "modified", now, "front", front_json(p), "back", "side",
         "physics", "thickness", 1e3 * (e->z_high_m - e->z_low_m), "weight", "composition", "devices", "fab", "null",
         "material_type", "construction", "metadata", "custom");
@@ -220,7 +220,7 @@ status texture_u3m_write(const struct export_scene *e, const struct texture_prin
     json_decref(json);
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write a U3M material: out of memory");
     export_path(e, "cloth.u3m", path);
-    status s = worker_folder_replace(e->c->folder, path, text, strlen(text), err);
+    status s = worker_folder_replace(e->report->in.job->tools->folder, path, text, strlen(text), err);
     free(text);
     return s;
 }

@@ -145,13 +145,14 @@ static status search_from(struct search *f, const double *start, double *x, doub
 }
 
 status texture_fit_run(const struct texture_model *model, void *surface, const struct texture_maps *maps,
-                       const struct texture_means *means, const struct pipeline_context *c,
+                       const struct texture_means *means, const struct report *report,
                        const struct pipeline_model *rendered, double rel_rms[2], struct error *err)
 {
     double best[TEXTURE_MAX_UNKNOWN], lowest = INFINITY;
     struct search *f = calloc(1, sizeof *f);
     if (f == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit textures: out of memory");
-    *f = (struct search){model, surface, means, &c->observation, rendered, {{{0.0}, {0.0}, {0.0}, 0.0, 0.0}}};
+    *f = (struct search){
+        model, surface, means, &report->in.job->rows->observation, rendered, {{{0.0}, {0.0}, {0.0}, 0.0, 0.0}}};
     make_samples(maps, f->sample);
     memcpy(best, model->start[0], sizeof best);
     status s = STATUS_OK;

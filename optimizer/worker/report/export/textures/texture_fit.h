@@ -4,8 +4,8 @@
 #ifndef SELVEDGE_OPTIMIZER_TEXTURE_FIT_H
 #define SELVEDGE_OPTIMIZER_TEXTURE_FIT_H
 
-#include "optimizer/worker/pipeline_context.h"
 #include "optimizer/worker/report/export/textures/texture_maps.h"
+#include "optimizer/worker/report/report.h"
 
 enum { TEXTURE_MAX_UNKNOWN = 6 };
 
@@ -37,7 +37,7 @@ struct texture_means {
 /* Leaves the best numbers in the surface. The errors are those over the fitted and over the held-out rows, relative
  * RMS in the measure of fits; NaN without such rows. STATUS_NO_MEMORY. */
 status texture_fit_run(const struct texture_model *model, void *surface, const struct texture_maps *maps,
-                       const struct texture_means *means, const struct pipeline_context *c,
+                       const struct texture_means *means, const struct report *report,
                        const struct pipeline_model *rendered, double rel_rms[2], struct error *err);
 
 #endif

@@ -67,17 +67,17 @@ static void reflect(const void *surface, const struct texture_sample *s, const d
     }
 }
 
-status texture_principled_fit(struct texture_principled *p, const struct pipeline_context *c,
-                              const struct pipeline_model *m, struct error *err)
+status texture_principled_fit(struct texture_principled *p, const struct report *report, const struct pipeline_model *m,
+                              struct error *err)
 {
     double most[N_UNKNOWN];
     struct texture_model model = {N_UNKNOWN, N_START, lower, most, start, take, look, reflect};
     const struct texture_surface *t = p->open_pbr;
     struct texture_principled round = *p;
     memcpy(most, upper, sizeof most);
-    status s = texture_fit_run(&model, p, t->maps, &t->means, c, m, p->rel_rms, err);
+    status s = texture_fit_run(&model, p, t->maps, &t->means, report, m, p->rel_rms, err);
     most[ANISOTROPY] = 0.0;
-    if (s == STATUS_OK) s = texture_fit_run(&model, &round, t->maps, &t->means, c, m, round.rel_rms, err);
+    if (s == STATUS_OK) s = texture_fit_run(&model, &round, t->maps, &t->means, report, m, round.rel_rms, err);
     if (s == STATUS_OK && !(p->rel_rms[0] < least_gain * round.rel_rms[0])) *p = round;
     return s;
 }

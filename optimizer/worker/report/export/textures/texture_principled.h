@@ -18,7 +18,7 @@ struct texture_principled {
 };
 
 /* Fits the numbers. STATUS_NO_MEMORY. */
-status texture_principled_fit(struct texture_principled *p, const struct pipeline_context *c,
-                              const struct pipeline_model *m, struct error *err);
+status texture_principled_fit(struct texture_principled *p, const struct report *report, const struct pipeline_model *m,
+                              struct error *err);
 
 #endif

@@ -104,9 +104,9 @@ static void reflect(const void *surface, const struct texture_sample *s, const d
     for (size_t c = 0; c < 3; c++) rgb[c] = cos_i * (t->kept * texture_surface_base(t, c) + shine);
 }
 
-status texture_surface_fit(struct texture_surface *t, const struct pipeline_context *c, const struct pipeline_model *m,
+status texture_surface_fit(struct texture_surface *t, const struct report *report, const struct pipeline_model *m,
                            struct error *err)
 {
     const struct texture_model model = {N_UNKNOWN, N_START, lower, upper, start, take, look, reflect};
-    return texture_fit_run(&model, t, t->maps, &t->means, c, m, t->rel_rms, err);
+    return texture_fit_run(&model, t, t->maps, &t->means, report, m, t->rel_rms, err);
 }

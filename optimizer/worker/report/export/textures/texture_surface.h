@@ -17,7 +17,7 @@ struct texture_surface {
 };
 
 /* Fits weight, roughness and anisotropy; maps and means are given. STATUS_NO_MEMORY. */
-status texture_surface_fit(struct texture_surface *t, const struct pipeline_context *c, const struct pipeline_model *m,
+status texture_surface_fit(struct texture_surface *t, const struct report *report, const struct pipeline_model *m,
                            struct error *err);
 
 /* Of pixel i of the maps. */

@@ -1,0 +1,20 @@
+/* Runs the stages of a job in the order of the stage table (optimizer/job/stage_table.h), and loads those that an
+ * earlier attempt has finished. */
+#ifndef SELVEDGE_OPTIMIZER_PIPELINE_H
+#define SELVEDGE_OPTIMIZER_PIPELINE_H
+
+#include "optimizer/worker/progress/pipeline_plan.h"
+#include "optimizer/worker/report/report.h"
+#include "optimizer/worker/stages/job_inputs.h"
+
+struct pipeline_option {
+    size_t most_scratch_bytes; /* bound on the files of large arrays; 0: the free disk is */
+    struct pdf_helper pdf;
+};
+
+/* tools: folder, status, log, pool and memory limit; the others are set here. plan: of these tools and inputs. Errors
+ * of the stages; err->field is a key of the job document. */
+status pipeline_run(struct stage_tools *tools, const struct job_inputs *inputs, const struct pipeline_option *option,
+                    struct job_plan *plan, struct error *err);
+
+#endif
