@@ -155,9 +155,52 @@ static void test_octahedral(void **state)
     direction_volume_release(&d);
 }
 
+/* Reads the header of the golden file with another byte at a place, and n_bytes bytes in all. */
+static status read_header(size_t at, uint8_t byte, size_t n_channel, size_t n_bytes, struct error *err)
+{
+    uint8_t bytes[128] = {0};
+    struct vol_header h;
+    memcpy(bytes, golden_density, sizeof golden_density);
+    bytes[20] = (uint8_t)n_channel;
+    bytes[at] = byte;
+    FILE *f = fopen(path, "w+b");
+    assert_int_equal(fwrite(bytes, 1, n_bytes, f), n_bytes);
+    fflush(f);
+    status s = vol_read_header(f, "a.vol", &h, err);
+    fclose(f);
+    return s;
+}
+
+/* Each encoding has its numbers of channels. Fewer bytes than voxels are an error, and so is a whole row more. */
+static void test_headers(void **state)
+{
+    (void)state;
+    struct error err = {0};
+    static const size_t bytes_per_voxel[6][4] = {
+        [VOL_FLOAT32] = {0, 4, 0, 12}, [VOL_UINT8] = {0, 1, 0, 0}, [4] = {0, 0, 0, 2}};
+    for (uint8_t encoding = 0; encoding < 6; encoding++)
+        for (size_t n = 0; n < 4; n++) {
+            const size_t each = bytes_per_voxel[encoding][n], whole = 48 + 2 * each;
+            assert_int_equal(read_header(4, encoding, n, whole, &err), each > 0 ? STATUS_OK : STATUS_UNSUPPORTED);
+            if (each == 0) continue;
+            assert_int_equal(read_header(4, encoding, n, whole - 1, &err), STATUS_FORMAT);
+            assert_int_equal(read_header(4, encoding, n, whole + 2 * each - 1, &err), STATUS_OK);
+            assert_int_equal(read_header(4, encoding, n, whole + 2 * each, &err), STATUS_FORMAT);
+            assert_non_null(strstr(err.text, "2 x 1 x 1 voxels need"));
+        }
+    assert_int_equal(read_header(3, 4, 1, 56, &err), STATUS_FORMAT);
+    assert_non_null(strstr(err.text, "not a .vol file of version 3"));
+    assert_int_equal(read_header(12, 0, 1, 56, &err), STATUS_FORMAT);
+    assert_non_null(strstr(err.text, "an impossible size"));
+    assert_int_equal(read_header(11, 0xff, 1, 56, &err), STATUS_FORMAT);
+    assert_non_null(strstr(err.text, "an impossible size"));
+    assert_int_equal(read_header(4, 1, 1, 47, &err), STATUS_FORMAT);
+    assert_non_null(strstr(err.text, "the header is incomplete"));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_golden), cmocka_unit_test(test_round_trips),
-                                       cmocka_unit_test(test_octahedral)};
+                                       cmocka_unit_test(test_octahedral), cmocka_unit_test(test_headers)};
     return cmocka_run_group_tests(tests, make_folder, NULL);
 }

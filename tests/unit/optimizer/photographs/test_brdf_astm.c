@@ -164,6 +164,15 @@ static void test_default_rows(void **state)
     observation_set_release(&o);
 }
 
+static void test_no_file(void **state)
+{
+    void *handle = NULL;
+    struct error err = {0};
+    assert_int_equal(astm_brdf_reader.open(scratch_path(state, "gone.astm"), JOB_SYMMETRY_FILE, &handle, &err),
+                     STATUS_NOT_FOUND);
+    assert_true(handle == NULL && strstr(err.text, "gone.astm") != NULL);
+}
+
 static status open_text(void **state, const char *text, struct error *err)
 {
     void *handle = NULL;
@@ -211,7 +220,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_values_between), cmocka_unit_test(test_one_plane), cmocka_unit_test(test_default_rows),
-        cmocka_unit_test(test_columns),        cmocka_unit_test(test_damaged),
+        cmocka_unit_test(test_columns),        cmocka_unit_test(test_no_file),   cmocka_unit_test(test_damaged),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }
