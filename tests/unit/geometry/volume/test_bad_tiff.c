@@ -125,6 +125,24 @@ static void test_strip_beyond_the_end(void **state)
     }
 }
 
+/* Samples of a kind that is not stated (4) count as whole numbers without a sign, as libtiff takes them. */
+static void test_samples_of_no_stated_kind(void **state)
+{
+    (void)state;
+    static uint8_t data[1 << 16];
+    struct volume_source *s = NULL;
+    char path[128];
+    const char *list[1] = {path};
+    stack_path(path, "void.tif");
+    stack_write(path, 16, 1, COMPRESSION_NONE, TEST_STRIPS);
+    size_t n = tiff_read_bytes(path, data, sizeof data);
+    tiff_patch_tag(data, TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_VOID);
+    test_write_bytes(path, data, n);
+    assert_int_equal(volume_source_open(list, 1, &s, NULL), STATUS_OK);
+    assert_string_equal(volume_source_describe(s)->sample, "uint16");
+    volume_source_close(s);
+}
+
 /* Sizes of several rows of such a page overflow an integer. The file can be small, because deflate compresses up to a
  * thousandfold. */
 static void test_enormous_pages(void **state)
@@ -237,6 +255,7 @@ int main(void)
         cmocka_unit_test(test_bad_values),
         cmocka_unit_test(test_missing),
         cmocka_unit_test(test_strip_beyond_the_end),
+        cmocka_unit_test(test_samples_of_no_stated_kind),
     };
     return cmocka_run_group_tests(tests, stack_folder_setup, NULL);
 }

@@ -70,6 +70,42 @@ static void test_joint_and_given_variance(void **state)
     expect(&u, 0.0);
 }
 
+/* The same with two numbers whose errors in the joint fit are correlated: each shifts both parameters. */
+static void test_two_numbers(void **state)
+{
+    (void)state;
+    static const double s[2][2] = {{2.0, -0.7}, {-1.0, 0.4}}, c[2][2] = {{0.3, 0.12}, {0.12, 0.2}},
+                        given[2] = {0.07, 0.02};
+    static const size_t at[2] = {0, 3};
+    struct uncertainty joint = {.n_param = 4}, u;
+    for (size_t k = 0; k < 2; k++)
+        for (size_t l = 0; l < 2; l++) joint.cov[4 * (1 + k) + 1 + l] = c[k][l];
+    for (size_t a = 0; a < 2; a++)
+        for (size_t b = 0; b < 2; b++) {
+            joint.cov[4 * at[a] + 1 + b] = joint.cov[4 * (1 + b) + at[a]] = s[a][0] * c[0][b] + s[a][1] * c[1][b];
+            joint.cov[4 * at[a] + at[b]] = at_fixed_x[a][b];
+            for (size_t k = 0; k < 2; k++)
+                for (size_t l = 0; l < 2; l++) joint.cov[4 * at[a] + at[b]] += s[a][k] * c[k][l] * s[b][l];
+        }
+    for (int is_given = 0; is_given < 2; is_given++) {
+        make_fixed(&u);
+        carried_error_add(&joint, 1, 2, is_given ? given : NULL, &u);
+        for (size_t a = 0; a < 2; a++)
+            for (size_t b = 0; b < 2; b++) {
+                double want = at_fixed_x[a][b];
+                for (size_t k = 0; k < 2; k++)
+                    for (size_t l = 0; l < 2; l++)
+                        want += s[a][k] * (is_given ? (k == l ? given[k] : 0.0) : c[k][l]) * s[b][l];
+                assert_true(fabs(u.cov[2 * a + b] - want) < 1e-12);
+            }
+    }
+    for (size_t k = 0; k < 4; k++) joint.cov[4 * 2 + k] = joint.cov[4 * k + 2] = 0.0; /* the second one was fixed */
+    make_fixed(&u);
+    carried_error_add(&joint, 1, 2, given, &u);
+    const double first = joint.cov[1] / joint.cov[4 * 1 + 1]; /* shift of p by the first one */
+    assert_true(fabs(u.cov[0] - (at_fixed_x[0][0] + first * first * given[0])) < 1e-12);
+}
+
 /* A number without variance was fixed in the joint fit too, and a fixed parameter keeps its zero. */
 static void test_fixed_ones_are_left_out(void **state)
 {
@@ -111,6 +147,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_joint_and_given_variance),
+        cmocka_unit_test(test_two_numbers),
         cmocka_unit_test(test_fixed_ones_are_left_out),
         cmocka_unit_test(test_limit),
     };
