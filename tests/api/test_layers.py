@@ -18,7 +18,7 @@ import check_layers  # noqa: E402
     ("renderer/a.c", "geometry/phantom/phantom.h"),
     ("optimizer/job/a.c", "renderer/scattering/appearance.h"),
     ("optimizer/job/a.h", "optimizer/fit/objective/objective.h"),
-    ("server/a.c", "optimizer/worker/pipeline_context.h"),
+    ("server/a.c", "optimizer/worker/pipeline.h"),
     ("server/a.c", "renderer/scattering/appearance.h"),
     ("clients/cli/a.c", "server/settings.h"),
     ("base/a.c", "status.h"),
