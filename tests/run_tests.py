@@ -191,7 +191,7 @@ def main():
 
     # A lane that has nothing left takes the last of the others'.
     with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(max_workers=1) as cleaner:
-        of_c, of_python = list(c_tests()), list(python_tests(["api"] if arguments.quick else ["api", "browser", "crash"]))
+        of_c, of_python = list(c_tests()), list(python_tests(["api"] if arguments.quick else ["api", "browser", "crash", "physics"]))
         real = list(python_tests([] if arguments.quick else ["real"]))
         computing = [lambda name=name: run_check(name) for name in checks()]
         computing += [lambda name=name: (run_c if name in of_c else run_python)(folder, name) for name in longest_first(of_c + real)]

@@ -93,18 +93,31 @@ static status count_vertices(const struct fiber_set *f, size_t *n, struct error 
     return STATUS_OK;
 }
 
-/* The point at t from p to q, in millimetres and with z from the top, unless it repeats the fiber's last one. */
-static void add_vertex(struct scene *s, size_t first, const float *p, const float *q, double t, double z_max_m,
-                       float radius)
+/* Embree is wrong by up to a tenth of a radius on segments of a few thousandths of it (single precision). Vertices that
+ * are nearer than this part of a radius are one. */
+static const float shortest_segment_radii = 0.05f;
+
+/* The point at t from p to q, in millimetres and with z from the top. */
+static struct scene_vertex vertex_at(const float *p, const float *q, double t, double z_max_m, float radius)
 {
     double at[3];
     for (int a = 0; a < 3; a++) at[a] = (1 - t) * (double)p[a] + t * (double)q[a];
-    struct scene_vertex x = {(float)(at[0] * MM_PER_M), (float)(at[1] * MM_PER_M),
-                             (float)((at[2] - z_max_m) * MM_PER_M), radius};
+    return (struct scene_vertex){(float)(at[0] * MM_PER_M), (float)(at[1] * MM_PER_M),
+                                 (float)((at[2] - z_max_m) * MM_PER_M), radius};
+}
+
+/* Adds a vertex unless it is as good as the fiber's last one. The end of a fiber takes the place of that, because its
+ * continuation begins there. */
+static void add_vertex(struct scene *s, size_t first, struct scene_vertex x, bool is_end)
+{
     if (s->n_vertex > first) {
         const struct scene_vertex *last = &s->vertex[s->n_vertex - 1];
         float dx = x.x - last->x, dy = x.y - last->y, dz = x.z - last->z;
-        if (dx * dx + dy * dy + dz * dz < 1e-6f * radius * radius) return;
+        const float near = shortest_segment_radii * x.radius;
+        if (dx * dx + dy * dy + dz * dz < near * near) {
+            if (!is_end || s->n_vertex == first + 1) return;
+            s->n_vertex--;
+        }
     }
     s->vertex[s->n_vertex++] = x;
 }
@@ -186,14 +199,16 @@ static status copy_fibers(struct scene *s, const struct fiber_set *f, const stru
     }
     for (size_t i = 0; i < f->n_fiber; i++) {
         size_t first = s->n_vertex, v = f->first_vertex[i];
-        add_vertex(s, first, f->position_m + 3 * v, f->position_m + 3 * v, 0, z_max_m, radius_mm(f, i, v, 0));
+        const float *start = f->position_m + 3 * v;
+        add_vertex(s, first, vertex_at(start, start, 0, z_max_m, radius_mm(f, i, v, 0)), false);
         add_section(s, f, v);
         for (; v + 1 < f->first_vertex[i + 1]; v++) {
             const float *p = f->position_m + 3 * v, *q = p + 3;
             size_t pieces = (size_t)n_piece(p, q, thinner_m(f, i, v));
             for (size_t k = 1; k <= pieces; k++) {
                 const double t = (double)k / (double)pieces;
-                add_vertex(s, first, p, q, t, z_max_m, radius_mm(f, i, v, t));
+                const bool is_end = k == pieces && v + 2 == f->first_vertex[i + 1];
+                add_vertex(s, first, vertex_at(p, q, t, z_max_m, radius_mm(f, i, v, t)), is_end);
                 add_section(s, f, t < 0.5 ? v : v + 1);
             }
         }

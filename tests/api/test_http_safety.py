@@ -69,8 +69,10 @@ def test_nonsense_gets_an_error_and_does_no_harm(daemon, text):
 @pytest.mark.parametrize("text", [
     "GET /livez\0x HTTP/1.1\r\nHost: localhost\r\n\r\n", "GET /livez\0 HTTP/1.1\r\nHost: localhost\r\n\r\n",
     "GET /livez?a\0b HTTP/1.1\r\nHost: localhost\r\n\r\n",
-    "GET\0x /livez HTTP/1.1\r\nHost: localhost\r\n\r\n", "GET /livez\1 HTTP/1.1\r\nHost: localhost\r\n\r\n", "GET /livez x HTTP/1.1\r\nHost: localhost\r\n\r\n",
-    "GET /livez HTTP/1.1\r\n\r\n", "GET /livez HTTP/1.1\r\nHost: localhost\r\nX y\r\n\r\n", "GET /livez\r\n\r\n", "GET\t/livez HTTP/1.1\r\nHost: localhost\r\n\r\n",
+    "GET\0x /livez HTTP/1.1\r\nHost: localhost\r\n\r\n", "GET /livez\1 HTTP/1.1\r\nHost: localhost\r\n\r\n",
+    "GET /livez x HTTP/1.1\r\nHost: localhost\r\n\r\n",
+    "GET /livez HTTP/1.1\r\n\r\n", "GET /livez HTTP/1.1\r\nHost: localhost\r\nX y\r\n\r\n", "GET /livez\r\n\r\n",
+    "GET\t/livez HTTP/1.1\r\nHost: localhost\r\n\r\n",
     "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n",
     "GET /livez HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999999999999999\r\n\r\n",
     "GET /livez HTTP/9.9\r\nHost: localhost\r\n\r\n", "GET /" + "a" * 400000 + " HTTP/1.1\r\nHost: localhost\r\n\r\n",

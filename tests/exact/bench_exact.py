@@ -4,9 +4,9 @@ random numbers. Prints one JSON object a line; standard errors go to standard er
     bench_exact.py [--build DIR] [--paths N] [CLOTH ...]
 
 mean_error: root mean square of the relative differences of mean radiances, over configurations and channels. derivative_error: of the
-derivatives by all parameters, each relative to its root mean square over the configurations. Both contain their noise.
+common relative differences of the derivatives by each parameter (CommonDifference). Both contain their noise.
 tile_length_spread: (largest - smallest) / mean of the radiances of straight fibers in tiles of 2 to 0.02 mm. subdivision_spread: the same of
-twill7 with segments whole and cut into 2 and 4.
+twill7 with segments whole and cut into 2 and 4, from eight times the paths: the largest over channels, and over the configurations of twill7.
 """
 import argparse
 import json
@@ -33,11 +33,10 @@ def main():
     import paired_scenes as scenes
 
     def spread(variants, folder, configurations):
-        """The largest over configurations and channels."""
         means = []
         for fibers in variants:
             blocks = scenes.trace(scenes.PRODUCT, fibers.write(os.path.join(folder, "variant.hair")), configurations=configurations, blocks=128,
-                                  paths=arguments.paths // 128)
+                                  paths=8 * arguments.paths // 128)
             means.append([scenes.mean_and_se(b[f"mean.{c}"])[0] for b in blocks for c in "rgb"])
         return max((max(m) - min(m)) / (sum(m) / len(m)) for m in zip(*means))
 
@@ -45,7 +44,7 @@ def main():
         for cloth in arguments.cloth or scenes.CLOTHS:
             fibers = scenes.make_cloth(cloth, folder)
             one, other = (scenes.trace(p, fibers, blocks=128, paths=arguments.paths // 128) for p in (scenes.PRODUCT, scenes.EXACT))
-            for name, differences in (("mean", scenes.mean_differences(one, other)), ("derivative", scenes.derivative_differences(one, other))):
+            for name, differences in (("mean", scenes.mean_differences(one, other)), ("derivative", scenes.parameter_differences(one, other))):
                 value, noise = scenes.root_mean_square(differences)
                 figure(f"exact.{cloth}.{name}_error", value)
                 print(f"  {name}: standard errors {noise:.2g}; largest {max(differences.items(), key=lambda d: abs(d[1].relative))[0]}", file=sys.stderr)

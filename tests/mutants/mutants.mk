@@ -3,9 +3,10 @@
 
 # tests that know a long variant (tests/support/agreement.h)
 TEST_LONG := physics/test_naive physics/volume/test_volume_naive physics/test_derivative_check unit/renderer/test_scattering
-test-long: | deps-test ## the renderer against the naive tracers with enough paths to see a difference of 0.5 %, derivatives of models whose tables take long (half an hour on 2 quiet cores for the first, the rest not timed)
-	@$(MAKE) --no-print-directory -j$$(nproc) $(addprefix $(BUILD)/tests/,$(TEST_LONG))
+test-long: | deps-test ## the renderer against the naive tracers with enough paths to see a difference of 0.5 %, its scene against the exact one, derivatives of models whose tables take long (half an hour on 2 quiet cores for the first, the rest not timed)
+	@$(MAKE) --no-print-directory -j$$(nproc) all $(EXACT_BINS) $(addprefix $(BUILD)/tests/,$(TEST_LONG))
 	@for t in $(TEST_LONG); do echo "$$t"; SELVEDGE_TEST_LONG=1 $(BUILD)/tests/$$t || exit 1; done
+	@SELVEDGE_TEST_LONG=1 SELVEDGE_BUILD=$(CURDIR)/$(BUILD) /usr/bin/python3 -m pytest -q -p no:cacheprovider tests/physics/exact
 
 # every system call, every state of a disk and 2,000 kills, where make test takes a sample
 KILLS ?= 2000

@@ -99,6 +99,30 @@ def derivative_differences(one, other):
     return out
 
 
+class CommonDifference:
+    """The factor, less 1, that takes the derivatives of the other scene by one parameter to those of the first: over all configurations and
+    channels, weighted by the standard errors of the differences."""
+
+    def __init__(self, pairs):
+        top = bottom = 0.0
+        for a, b in pairs:
+            d = Difference(a, b, 1.0)
+            if d.se > 0:
+                top += d.other[0] * d.relative / d.se ** 2
+                bottom += d.other[0] ** 2 / d.se ** 2
+        self.relative, self.se = top / bottom, 1 / math.sqrt(bottom)
+
+    def __str__(self):
+        return f"{100 * self.relative:+.3f} +- {100 * self.se:.3f} %"
+
+
+def parameter_differences(one, other):
+    """{parameter, without its channel: CommonDifference of the derivatives by it}."""
+    names = [name for name in one[0] if not name.startswith("mean.")]
+    return {symbol: CommonDifference([(a[name], b[name]) for name in names if name.split(".")[0] == symbol for a, b in zip(one, other)])
+            for symbol in dict.fromkeys(name.split(".")[0] for name in names)}
+
+
 def root_mean_square(differences):
     """The root mean square of relative differences and its part that the standard errors explain."""
     n = len(differences)
