@@ -107,7 +107,8 @@ static void test_sources_of_open_jobs(void **state)
             assert_int_equal(p.n, open ? 0 : 2);
             retention_plan_release(&p);
             status got = retention_remove(f->service, source[0], RETENTION_AGE, &removed, &err);
-            if (got != (open ? STATUS_CONFLICT : STATUS_OK)) fail_msg("asked for by a %s job", job_state_name(s));
+            if (got != (open ? STATUS_CONFLICT : STATUS_OK))
+                fail_msg("asked for by a %s job", job_state_name((enum job_state)s));
             if (open) assert_non_null(strstr(err.text, "asks for the geometry"));
             assert_int_equal(job_delete(f->service, asks, NULL), STATUS_OK);
             if (open)
