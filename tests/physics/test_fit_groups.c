@@ -119,7 +119,8 @@ static int tear_down(void **state)
     return 0;
 }
 
-/* Ends the test when a parameter of either set is undetermined or off by more than 2.5 standard errors. */
+/* Ends the test when a parameter of either set is undetermined or off by more than 3.2 standard errors, which one of 18
+ * normal deviates is in 2.5 % of draws (2.5 errors: in 20 %). */
 static void check_recovered(const struct fixture *x, const struct fit_result *r)
 {
     for (size_t p = 0; p < N_FLAT; p++) {
@@ -128,7 +129,7 @@ static void check_recovered(const struct fixture *x, const struct fit_result *r)
         print_message("%-16s true %8.4f  fitted %8.4f +- %.4f  %+.1f\n", info->name, param_to_file_unit(info, truth[p]),
                       param_to_file_unit(info, r->param[p]), param_to_file_unit(info, se), off);
         assert_true(r->uncertainty.determined[p]);
-        assert_true(fabs(off) < 2.5);
+        assert_true(fabs(off) < 3.2);
     }
 }
 

@@ -149,7 +149,8 @@ class Reader:
             raise NotImplementedError(f"{name}({args[:200]})")
         plain = "rmdir" if "AT_REMOVEDIR" in args else re.sub("at2?$", "", name)
         if plain == "rename":
-            self.size[path[1]] = self.size.pop(path[0], 0)
+            for old in [old for old in self.size if old == path[0] or old.startswith(path[0] + b"/")]:
+                self.size[path[1] + old[len(path[0]):]] = self.size.pop(old)
         elif plain == "link":
             self.size[path[1]] = self.size.get(path[0], 0)
         elif plain == "unlink":
