@@ -85,3 +85,38 @@ def test_programs_exist():
                for name in re.findall(r"build/(bin/[\w-]+|tests/bench/bench_\w+)", text)
                if f"$(BUILD)/{name}" not in makefile and not exists(name)]
     assert not missing
+
+
+def test_tests_exist():
+    known = {os.path.splitext(os.path.basename(path))[0] for path in tracked() if path.startswith("tests/")}
+    missing = [f"{path}: {name}" for path, text in texts() if path.startswith("docs/")
+               for name in re.findall(r"`(test_\w+)`", text) if name not in known]
+    assert not missing
+
+
+# sections, equations, figures and tables of chapters 4 to 6 of the fabric thesis: the largest number of each series
+SOURCE_SECTIONS = {"4": 9, "4.3": 2, "4.4": 4, "4.6": 4, "4.7": 3, "4.8": 2, "4.9": 1, "5": 8, "5.2": 3, "5.4": 3, "5.5": 5,
+                   "5.6": 7, "5.7": 4, "6": 7, "6.4": 4, "6.5": 3}
+SOURCE_NUMBERS = {"equation": {4: 6, 5: 14, 6: 2}, "figure": {4: 17, 5: 26, 6: 11}, "table": {4: 3, 5: 3, 6: 2}}
+
+
+def places_of(cell):
+    """("", "5.5.1") for sections and ("figure", "5.3") and the like, of the first cell of a row. Ranges are written out."""
+    kind = ""
+    for word, first, last in re.findall(r"(equation|figure|table)s? |(\d+(?:\.\d+)+)(?: to (\d+(?:\.\d+)+))?", cell):
+        if word:
+            kind = word
+            continue
+        series, start = first.rsplit(".", 1)
+        for number in range(int(start), int(last.rsplit(".", 1)[1] if last else start) + 1):
+            yield kind, f"{series}.{number}"
+
+
+def test_source_table_has_every_place():
+    with open(os.path.join(ROOT, "docs", "source-table.md")) as page:
+        found = {place for row in re.findall(r"^\| ([^|]+) \|", page.read(), re.MULTILINE) for place in places_of(row)}
+    wanted = {("", f"{series}.{number}") for series, most in SOURCE_SECTIONS.items() for number in range(1, most + 1)}
+    for kind, chapters in SOURCE_NUMBERS.items():
+        wanted |= {(kind, f"{chapter}.{number}") for chapter, most in chapters.items() for number in range(1, most + 1)}
+    assert not wanted - found, sorted(wanted - found)
+    assert not found - wanted, sorted(found - wanted)
