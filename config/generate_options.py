@@ -1,6 +1,5 @@
 #!/usr/bin/python3
-"""Writes what follows from the table of job options: the schema JobDocument of config/openapi.json and the table of section 4 of
-docs/sample-preparation.md.
+"""Writes the schema JobDocument of config/openapi.json and the page docs/options.md from the table of job options.
 
     config/generate_options.py [--check] PRINT-OPTIONS
 
@@ -14,8 +13,16 @@ import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 OPENAPI = os.path.join(ROOT, "config", "openapi.json")
-GUIDE = os.path.join(ROOT, "docs", "sample-preparation.md")
-BEGIN, END = "<!-- options: written by `make generate` -->\n", "<!-- options: end -->\n"
+PAGE = os.path.join(ROOT, "docs", "options.md")
+HEAD = """# Options of a job document
+
+This page lists every key of a job document with its unit, default and range. `make generate` writes it from the table of options
+(`optimizer/job/options`); `GET /v1/options` answers the same as JSON. How to prepare a sample is in
+[sample-preparation.md](sample-preparation.md), words of the field are in the [glossary](glossary.md).
+
+Keys stand below their section: `raw.type` in the section `volume` is `{"volume": {"raw": {"type": ...}}}`, and `[]` stands for each entry
+of a list. Unknown keys are errors. "or an object" means that a number may be searched: `{value, lower, upper, prior: [mean, sd], fit}`.
+"""
 FILE_NAME = "^[A-Za-z0-9_-][A-Za-z0-9._-]{0,126}$"
 WIDTH = 160
 
@@ -100,7 +107,7 @@ def with_schema(text, options):
     return text[:begin] + schema + text[begin + length:]
 
 
-# ---- docs/sample-preparation.md ----
+# ---- docs/options.md ----
 
 def plain(number):
     """1000, 0.05, 1e9"""
@@ -122,29 +129,49 @@ def allowed_text(row):
     return f"{row['n']} numbers, {span}" if "n" in row else span
 
 
-def table_row(row, key):
+def cells_of(row):
+    """Unit, default, allowed values and meaning of an option, as the page prints them."""
     default = f"`{json.dumps(row['default'])}`" if "default" in row else "required" if row["required"] else row.get("left_out", "")
-    cells = [key, row.get("unit", ""), default, allowed_text(row), row["meaning"]]
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+    return tuple(cell.replace("|", "\\|") for cell in (row.get("unit", ""), default, allowed_text(row), row["meaning"]))
 
 
-def option_table(options):
-    lines = ["| key | unit | default | allowed | meaning |", "|---|---|---|---|---|"]
+def option_table(options, top, first):
+    """The table of a section. Options that are alike in every cell to one of an earlier list, the angles of each list for example,
+    share a line that names that list; `first` holds the earlier options by last key and cells."""
+    lines, alike = ["| key | unit | default | allowed | meaning |", "|---|---|---|---|---|"], {}
     for row in options:
-        top, _, rest = row["path"].partition(".")
-        if row["path"] == "":
+        if row["path"] != top and not row["path"].startswith(top + "."):
             continue
-        if rest:
-            lines.append(table_row(row, f"`{rest}`"))
-        else:
-            head = f"`{top}[]`" if row["kind"] == "list" else f"`{top}`"
-            lines.append(table_row(row, f"**{head}**" if row["kind"] in ("section", "list") else head))
+        parent, _, key = row["path"].rpartition(".")
+        rest, cells = row["path"][len(top) + 1:], cells_of(row)
+        if not rest:
+            continue
+        earlier = first.setdefault((key, cells), parent)
+        if earlier == parent:
+            lines.append("| " + " | ".join((f"`{rest}`",) + cells) + " |")
+            continue
+        if (parent, earlier) not in alike:
+            alike[parent, earlier] = len(lines)
+            lines.append(f"|  | | | as in `{earlier}` | ")
+        at = alike[parent, earlier]
+        name, end = lines[at][2:].split(" | ", 1)
+        lines[at] = "| " + (f"{name}, `{key}`" if name.strip() else f"`{rest}`") + " | " + end
     return "\n".join(lines) + "\n"
 
 
-def with_table(text, options):
-    begin, end = text.index(BEGIN) + len(BEGIN), text.index(END)
-    return text[:begin] + option_table(options) + text[end:]
+def page(_, options):
+    text, first = HEAD, {}
+    plain_keys = [row for row in options if row["path"] and "." not in row["path"] and row["kind"] not in ("section", "list")]
+    for row in plain_keys:
+        _, default, allowed, meaning = cells_of(row)
+        text += f"\n`{row['path']}` (default: {default}; allowed: {allowed}): {meaning}\n".replace("default: required", "required")
+    for row in options:
+        if row["path"] and "." not in row["path"] and row not in plain_keys:
+            _, default, allowed, meaning = cells_of(row)
+            notes = "; ".join(note for note in (default and f"without it: {default}", allowed) if note)
+            text += f"\n## `{row['path']}{'[]' if row['kind'] == 'list' else ''}`\n{meaning}" + (f" ({notes})" if notes else "") + "\n\n"
+            text += option_table(options, row["path"] + ("[]" if row["kind"] == "list" else ""), first)
+    return text
 
 
 def main():
@@ -154,9 +181,11 @@ def main():
         sys.exit(__doc__)
     options = json.loads(subprocess.run(program, check=True, capture_output=True, text=True).stdout)["options"]
     stale = []
-    for path, renew in ((OPENAPI, with_schema), (GUIDE, with_table)):
-        with open(path, encoding="utf-8") as file:
-            old = file.read()
+    for path, renew in ((OPENAPI, with_schema), (PAGE, page)):
+        old = ""
+        if os.path.exists(path):
+            with open(path, encoding="utf-8") as file:
+                old = file.read()
         new = renew(old, options)
         if new != old:
             stale.append(os.path.relpath(path, ROOT))

@@ -40,6 +40,6 @@ def test_stop_reasons_are_documented(reason):
 
 @pytest.mark.parametrize("kind", ["models", "methods"])
 def test_ids_are_documented(kind):
-    """The ids that a job document may name stand in the guide to jobs."""
-    guide = read("docs", "sample-preparation.md")
+    """The ids that a job document may name stand in the page of options."""
+    guide = read("docs", "options.md")
     assert not [entry["id"] for entry in CATALOGUE[kind] if entry["id"] not in guide]

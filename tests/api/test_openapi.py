@@ -92,7 +92,7 @@ def test_iterations_of_several_starts(daemon):
                     "fit": {"starts": starts, "max_iterations": iterations}}
         assert validator.is_valid(document) == good
         assert daemon.post("/v1/jobs", json=document).status_code == (201 if good else 422)
-    with open(os.path.join(ROOT, "docs", "sample-preparation.md")) as f:
+    with open(os.path.join(ROOT, "docs", "options.md")) as f:
         rows = [line for line in f if line.startswith("| `max_iterations` ")]
     assert len(rows) == 1 and "several `starts` 1..500" in rows[0]
 

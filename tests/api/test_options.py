@@ -23,6 +23,17 @@ def test_the_generated_files_are_up_to_date():
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+def test_every_option_is_on_the_page(options):
+    """Below the heading of its section, or in a line that names an earlier list with the same options."""
+    with open(os.path.join(ROOT, "docs", "options.md"), encoding="utf-8") as file:
+        parts = {name: part for name, part in re.findall(r"^## `([\w\[\]]+)`\n(.*?)(?=^## |\Z)", file.read(), re.M | re.S)}
+    for row in options:
+        top, _, rest = row["path"].partition(".")
+        if rest:
+            keys = set(re.findall(r"`([\w.\[\]]+)`", "\n".join(line.split(" | ")[0] for line in parts[top].split("\n"))))
+            assert rest in keys or rest.rpartition(".")[2] in keys, row["path"]
+
+
 def test_the_daemon_serves_the_table(daemon, options):
     assert daemon.get("/v1/options").json()["options"] == options
 

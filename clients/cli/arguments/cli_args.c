@@ -40,7 +40,7 @@ static const struct cli_option {
     {OPT_PICTURE, 0, "on", "SURFACE",
      "flat, cylinder, drape, or a mesh NAME.obj with texture coordinates (default: cylinder)",
      offsetof(struct cli_args, on)},
-    {OPT_PICTURE, 0, "lamp", "THETA,PHI", "angles of the lamp in degrees (default: 45,0; docs/sample-preparation.md)",
+    {OPT_PICTURE, 0, "lamp", "THETA,PHI", "angles of the lamp in degrees (default: 45,0; docs/options.md)",
      offsetof(struct cli_args, lamp)},
     {OPT_PICTURE, 0, "lamp-sharpness", "N", "a Gaussian lamp: 10 is soft, 1000 sharp (default: the lamp of the job)",
      offsetof(struct cli_args, lamp_sharpness)},
@@ -326,6 +326,6 @@ void cli_help(const struct cli_args *args, char *text, size_t n_bytes)
     put(text, n_bytes, &at, "%s\noptions of every command:\n", cli_tool_help());
     put_options(OPT_EVERYWHERE | OPT_VERSION, text, n_bytes, &at);
     put(text, n_bytes, &at,
-        "\n`selvedge help COMMAND` describes a command. docs/sample-preparation.md describes the job document.\n"
+        "\n`selvedge help COMMAND` describes a command. docs/options.md describes the job document.\n"
         "Exit status: 0 done, 1 error or failed job, 2 wrong command line, 3 cancelled job, 130 interrupted.\n");
 }

@@ -34,7 +34,7 @@ const struct job_option option_rows_cloth[] = {
          "volume", "geometry", "fibers",
          "cloth") ", {\"anyOf\": [" ONE_OF("measurements", "photographs") ", " GEOMETRY_ONLY ", " PICTURES_ONLY
                                                                           "]}]}]}",
-     .meaning = "Units, defaults and meaning: docs/sample-preparation.md, section 4. The daemon checks every field and "
+     .meaning = "Units, defaults and meaning: docs/options.md. The daemon checks every field and "
                 "names the one at fault."},
     {.path = "sample",
      .kind = OPTION_TEXT,

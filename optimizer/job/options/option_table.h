@@ -1,6 +1,6 @@
 /* The table of job options: one row for each key of the job document. The rows drive the parser (option_reader.h), the
  * keys that are allowed, and GET /v1/options (option_json.h). From the latter follow the form of the dashboard, the
- * schema JobDocument of config/openapi.json and the table of docs/sample-preparation.md (`make generate`).
+ * schema JobDocument of config/openapi.json and the page docs/options.md (`make generate`).
  *
  * A new option is a row here, a member of struct job_document, and the place that uses it. Constant data.
  */
