@@ -137,7 +137,7 @@ $(BUILD)/bin/selvedge-phantom: $(BUILD)/obj/optimizer/phantom/phantom_main.c.o $
 $(BUILD)/bin/selvedge-camera: $(BUILD)/obj/optimizer/camera/camera_main.c.o $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_OPTIMIZER)
-$(BUILD)/bin/selvedged: $(BUILD)/obj/server/daemon_main.c.o $(L)server.a $(L)job.a $(L)base.a
+$(BUILD)/bin/selvedged: $(BUILD)/obj/server/main/daemon_main.c.o $(L)server.a $(L)job.a $(L)base.a
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_SERVER)
 # nothing but the daemon, when its settings ask for it, loads libpq

@@ -11,7 +11,7 @@
  *   JOB/lock                The worker holds a flock() on it while it lives.
  *   JOB/claim-<token>       the start of a worker that has the attempt of this token (option --start), when an engine
  *                           could start one twice
- *   JOB/backend.json        where an engine other than the daemon runs the job (server/workers/backends/backend_note.h)
+ *   JOB/backend.json        where an engine other than the daemon runs the job (server/reports/backend_note.h)
  *   JOB/status.json         The worker replaces it at least every second while it lives.
  *   JOB/series.rec          record file (durable.h), append-only: one JSON object for each step of the fit
  *   JOB/log.txt             the worker's log, append-only

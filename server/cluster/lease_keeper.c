@@ -1,7 +1,7 @@
 #include "server/cluster/lease_keeper.h"
 #include "base/clock.h"
-#include "server/cluster/job_change.h"
 #include "server/jobs/job_access.h"
+#include "server/jobs/job_change.h"
 #include "server/store/store_cluster.h"
 
 #include <errno.h>

@@ -1,9 +1,9 @@
 #include "server/cluster/shared_folder.h"
 #include "base/clock.h"
 #include "base/files/durable.h"
-#include "server/cluster/store_settings.h"
-#include "server/jobs/job_paths.h"
+#include "server/settings/job_paths.h"
 #include "server/store/store_cluster.h"
+#include "server/store/store_settings.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -3,7 +3,7 @@
 #ifndef SELVEDGE_SERVER_DOCTOR_H
 #define SELVEDGE_SERVER_DOCTOR_H
 
-#include "server/settings.h"
+#include "server/settings/settings.h"
 
 #include <stdio.h>
 

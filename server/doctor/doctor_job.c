@@ -6,8 +6,8 @@
 #include "optimizer/job/document/job_document.h"
 #include "optimizer/job/job_folder.h"
 #include "server/doctor/doctor_report.h"
-#include "server/jobs/job_paths.h"
 #include "server/rescue/input_evidence.h"
+#include "server/settings/job_paths.h"
 #include "server/store/journal/job_journal.h"
 
 #include <dirent.h>

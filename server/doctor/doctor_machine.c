@@ -1,7 +1,7 @@
 /* The machine: processor, memory, descriptors, kernel, clock. */
 #include "base/clock.h"
 #include "server/doctor/doctor_report.h"
-#include "server/jobs/job_paths.h"
+#include "server/settings/job_paths.h"
 
 #include <linux/landlock.h>
 #include <stdlib.h>

@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_SERVER_DOCTOR_REPORT_H
 #define SELVEDGE_SERVER_DOCTOR_REPORT_H
 
-#include "server/settings.h"
+#include "server/settings/settings.h"
 
 #include <stdio.h>
 

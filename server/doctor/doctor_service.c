@@ -1,17 +1,17 @@
 /* The data folder and what else the service needs with these settings. */
 #include "base/clock.h"
 #include "base/version.h"
-#include "server/cluster/store_settings.h"
 #include "server/doctor/doctor_report.h"
 #include "server/http/http_listen.h"
 #include "server/http/http_tls.h"
 #include "server/http/static_files.h"
-#include "server/jobs/job_paths.h"
 #include "server/rescue/backup_files.h"
 #include "server/rescue/rebuild.h"
-#include "server/secret_file.h"
+#include "server/settings/job_paths.h"
+#include "server/settings/secret_file.h"
 #include "server/store/drivers/store_backup.h"
 #include "server/store/store.h"
+#include "server/store/store_settings.h"
 
 #include <dirent.h>
 #include <errno.h>

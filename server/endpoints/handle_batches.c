@@ -1,11 +1,11 @@
 /* Batches: many samples with one template. */
+#include "server/batches/batch_plan.h"
+#include "server/batches/batch_service.h"
+#include "server/batches/batch_view.h"
 #include "server/endpoints/handlers.h"
 #include "server/endpoints/request_json.h"
-#include "server/events/long_poll.h"
 #include "server/http/http_reply.h"
-#include "server/jobs/batches/batch_plan.h"
-#include "server/jobs/batches/batch_service.h"
-#include "server/jobs/batches/batch_view.h"
+#include "server/http/long_poll.h"
 
 #include <stdio.h>
 #include <stdlib.h>

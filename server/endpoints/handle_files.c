@@ -3,8 +3,8 @@
 #include "server/endpoints/handlers.h"
 #include "server/endpoints/request_json.h"
 #include "server/http/http_reply.h"
-#include "server/jobs/job_paths.h"
-#include "server/jobs/job_view.h"
+#include "server/settings/job_paths.h"
+#include "server/views/job_view.h"
 
 #include <stdio.h>
 #include <stdlib.h>

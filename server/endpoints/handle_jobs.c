@@ -2,9 +2,9 @@
 #include "optimizer/job/job_outline.h"
 #include "server/endpoints/handlers.h"
 #include "server/endpoints/request_json.h"
-#include "server/events/long_poll.h"
 #include "server/http/http_reply.h"
-#include "server/jobs/job_view.h"
+#include "server/http/long_poll.h"
+#include "server/views/job_view.h"
 
 #include <errno.h>
 #include <stdio.h>

@@ -1,9 +1,9 @@
 /* The list of jobs: filters, orders, pages, and rows of which a client says what it has. */
 #include "server/endpoints/handlers.h"
-#include "server/events/long_poll.h"
 #include "server/http/http_reply.h"
-#include "server/jobs/job_view.h"
-#include "server/jobs/listing/job_row_view.h"
+#include "server/http/long_poll.h"
+#include "server/views/job_row_view.h"
+#include "server/views/job_view.h"
 
 #include <errno.h>
 #include <math.h>

@@ -3,9 +3,9 @@
 #include "server/endpoints/handlers.h"
 #include "server/http/http_reply.h"
 #include "server/http/tar_stream.h"
-#include "server/jobs/job_paths.h"
-#include "server/jobs/job_view.h"
-#include "server/jobs/series_view.h"
+#include "server/settings/job_paths.h"
+#include "server/views/job_view.h"
+#include "server/views/series_view.h"
 
 #include <stdio.h>
 #include <stdlib.h>

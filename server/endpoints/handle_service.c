@@ -5,9 +5,9 @@
 #include "server/endpoints/handlers.h"
 #include "server/http/http_reply.h"
 #include "server/http/static_files.h"
-#include "server/jobs/job_paths.h"
-#include "server/jobs/job_view.h"
 #include "server/rescue/backup_keeper.h"
+#include "server/settings/job_paths.h"
+#include "server/views/job_view.h"
 
 #include <fcntl.h>
 #include <stdio.h>

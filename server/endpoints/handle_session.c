@@ -1,10 +1,10 @@
 /* Who asks, and the session of a browser: a cookie that no script can read, in place of a token that a page would
  * keep. */
 #include "base/clock.h"
-#include "server/access/access_guard.h"
 #include "server/access/access_secret.h"
 #include "server/endpoints/handlers.h"
 #include "server/endpoints/request_json.h"
+#include "server/http/access_guard.h"
 #include "server/http/http_reply.h"
 #include "server/http/http_tls.h"
 

@@ -1,11 +1,11 @@
 /* Tags of jobs, and actions on many jobs at once. */
 #include "server/endpoints/handlers.h"
 #include "server/endpoints/request_json.h"
-#include "server/http/http_problem.h"
 #include "server/http/http_reply.h"
-#include "server/jobs/job_paths.h"
-#include "server/jobs/job_view.h"
-#include "server/jobs/listing/job_tags.h"
+#include "server/jobs/job_tags.h"
+#include "server/jobs/problem_code.h"
+#include "server/settings/job_paths.h"
+#include "server/views/job_view.h"
 
 #include <stdlib.h>
 #include <string.h>

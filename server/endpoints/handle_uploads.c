@@ -1,7 +1,7 @@
 /* The tus 1.0.0 resumable upload protocol: core and termination. */
 #include "server/endpoints/handlers.h"
 #include "server/http/http_reply.h"
-#include "server/jobs/job_paths.h"
+#include "server/settings/job_paths.h"
 
 #include <stdio.h>
 #include <stdlib.h>

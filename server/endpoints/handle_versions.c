@@ -1,8 +1,8 @@
 /* Earlier results of a job that was edited and run again. */
 #include "server/endpoints/handlers.h"
 #include "server/http/http_reply.h"
-#include "server/jobs/job_view.h"
-#include "server/jobs/versions/result_version.h"
+#include "server/views/job_view.h"
+#include "server/views/result_version.h"
 
 static void reply_view(struct http_request *r, const char *number)
 {

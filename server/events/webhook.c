@@ -3,7 +3,7 @@
 #include "base/version.h"
 #include "server/cluster/lease_keeper.h"
 #include "server/events/change_feed.h"
-#include "server/secret_file.h"
+#include "server/settings/secret_file.h"
 #include "server/store/store_cluster.h"
 #include "server/store/store_delivery.h"
 

@@ -4,7 +4,7 @@
 #ifndef SELVEDGE_SERVER_HTTP_LISTEN_H
 #define SELVEDGE_SERVER_HTTP_LISTEN_H
 
-#include "server/settings.h"
+#include "server/settings/settings.h"
 
 #include <stdbool.h>
 

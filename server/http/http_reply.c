@@ -1,5 +1,5 @@
 #include "server/http/http_reply.h"
-#include "server/http/http_problem.h"
+#include "server/jobs/problem_code.h"
 
 #include <errno.h>
 #include <sodium.h>

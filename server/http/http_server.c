@@ -1,6 +1,6 @@
 #include "server/http/http_server.h"
-#include "server/access/access_guard.h"
 #include "server/endpoints/handlers.h"
+#include "server/http/access_guard.h"
 #include "server/http/connections/connection_table.h"
 #include "server/http/connections/library_refusal.h"
 #include "server/http/http_guard.h"

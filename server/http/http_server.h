@@ -6,7 +6,7 @@
 #ifndef SELVEDGE_SERVER_HTTP_SERVER_H
 #define SELVEDGE_SERVER_HTTP_SERVER_H
 
-#include "server/access/access_desk.h"
+#include "server/access/access_registry.h"
 #include "server/http/http_listen.h"
 #include "server/jobs/job_service.h"
 

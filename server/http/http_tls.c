@@ -1,6 +1,6 @@
 #include "server/http/http_tls.h"
 #include "base/files/durable.h"
-#include "server/secret_file.h"
+#include "server/settings/secret_file.h"
 
 #include <sodium.h>
 #include <stdlib.h>

@@ -3,7 +3,7 @@
 #ifndef SELVEDGE_SERVER_HTTP_TLS_H
 #define SELVEDGE_SERVER_HTTP_TLS_H
 
-#include "server/settings.h"
+#include "server/settings/settings.h"
 
 #include <stdbool.h>
 

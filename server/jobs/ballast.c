@@ -1,6 +1,6 @@
 #include "server/jobs/ballast.h"
-#include "server/jobs/job_paths.h"
 #include "server/jobs/job_service.h"
+#include "server/settings/job_paths.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>

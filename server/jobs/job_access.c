@@ -3,7 +3,7 @@
 #include "base/files/file_tree.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/ballast.h"
-#include "server/jobs/job_paths.h"
+#include "server/settings/job_paths.h"
 
 #include <stdio.h>
 #include <string.h>

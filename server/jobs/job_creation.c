@@ -4,11 +4,11 @@
 #include "base/files/foreign_file.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/job_outline.h"
-#include "server/cluster/job_change.h"
 #include "server/jobs/ballast.h"
 #include "server/jobs/job_access.h"
-#include "server/jobs/job_paths.h"
-#include "server/jobs/versions/result_version.h"
+#include "server/jobs/job_change.h"
+#include "server/settings/job_paths.h"
+#include "server/views/result_version.h"
 
 #include <fcntl.h>
 #include <sodium.h>

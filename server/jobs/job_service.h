@@ -4,11 +4,11 @@
 #define SELVEDGE_SERVER_JOB_SERVICE_H
 
 #include "base/log.h"
-#include "server/access/access_desk.h"
-#include "server/jobs/upload.h"
-#include "server/settings.h"
+#include "server/access/access_registry.h"
+#include "server/settings/settings.h"
 #include "server/store/journal/journal_seal.h"
 #include "server/store/store.h"
+#include "server/uploads/upload.h"
 
 #include <jansson.h>
 #include <pthread.h>
@@ -39,7 +39,7 @@ struct job_service {
     struct backup_keeper *backup;   /* NULL when the settings say that there are no backups */
     struct lease_keeper *keeper;    /* NULL unless other daemons may use the database */
     struct journal_key journal_key; /* seals the journals of jobs */
-    struct job_turns change;        /* held from reading a row to writing it back (server/cluster/job_change.h) */
+    struct job_turns change;        /* held from reading a row to writing it back (server/jobs/job_change.h) */
     atomic_bool stopping;
     atomic_int n_judging; /* checks of input files that run now (server/workers/input_judge.h) */
     atomic_uint_least64_t n_attempt_total, n_lost_total, n_finished_total[JOB_N_STATE];

@@ -3,8 +3,8 @@
 #ifndef SELVEDGE_SERVER_BACKUP_FILES_H
 #define SELVEDGE_SERVER_BACKUP_FILES_H
 
-#include "server/jobs/job_paths.h"
-#include "server/settings.h"
+#include "server/settings/job_paths.h"
+#include "server/settings/settings.h"
 
 #include <stdint.h>
 

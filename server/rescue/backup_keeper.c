@@ -1,9 +1,9 @@
 #include "server/rescue/backup_keeper.h"
 #include "base/clock.h"
 #include "base/files/durable.h"
-#include "server/cluster/store_settings.h"
 #include "server/rescue/backup_files.h"
 #include "server/store/drivers/store_backup.h"
+#include "server/store/store_settings.h"
 
 #include <errno.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 #include "server/rescue/database_age.h"
-#include "server/jobs/job_paths.h"
+#include "server/settings/job_paths.h"
 #include "server/store/drivers/store_backup.h"
 #include "server/store/journal/job_journal.h"
 

@@ -4,7 +4,7 @@
 #ifndef SELVEDGE_SERVER_DATABASE_AGE_H
 #define SELVEDGE_SERVER_DATABASE_AGE_H
 
-#include "server/settings.h"
+#include "server/settings/settings.h"
 
 /* Compares the database, of any version, with the journals of all folders in DATA/jobs; a daemon may be using both.
  * STATUS_FORMAT, with the numbers and one job: it lacks jobs that were acknowledged, or has an older row of them than a

@@ -2,7 +2,7 @@
 #include "optimizer/job/document/job_file_name.h"
 #include "optimizer/job/job_outline.h"
 #include "server/jobs/job_access.h"
-#include "server/jobs/upload_file.h"
+#include "server/uploads/upload_file.h"
 
 #include <errno.h>
 #include <fcntl.h>

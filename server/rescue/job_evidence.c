@@ -3,9 +3,9 @@
 #include "base/files/foreign_file.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/job_outline.h"
-#include "server/jobs/job_paths.h"
 #include "server/rescue/input_evidence.h"
 #include "server/rescue/worker_evidence.h"
+#include "server/settings/job_paths.h"
 
 #include <sodium.h>
 #include <stdlib.h>

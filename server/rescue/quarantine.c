@@ -1,10 +1,10 @@
 #include "server/rescue/quarantine.h"
 #include "base/files/durable.h"
-#include "server/cluster/store_settings.h"
-#include "server/jobs/job_paths.h"
 #include "server/rescue/rebuild.h"
+#include "server/settings/job_paths.h"
 #include "server/store/journal/job_journal.h"
 #include "server/store/store_delivery.h"
+#include "server/store/store_settings.h"
 
 #include <dirent.h>
 #include <errno.h>

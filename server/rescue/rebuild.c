@@ -2,13 +2,13 @@
 #include "base/clock.h"
 #include "base/files/durable.h"
 #include "base/files/file_tree.h"
-#include "server/cluster/store_settings.h"
 #include "server/rescue/backup_files.h"
 #include "server/rescue/database_age.h"
 #include "server/rescue/job_evidence.h"
 #include "server/store/drivers/store_backup.h"
 #include "server/store/store_access.h"
 #include "server/store/store_delivery.h"
+#include "server/store/store_settings.h"
 
 #include <dirent.h>
 #include <errno.h>

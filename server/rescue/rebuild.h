@@ -3,7 +3,7 @@
 #ifndef SELVEDGE_SERVER_REBUILD_H
 #define SELVEDGE_SERVER_REBUILD_H
 
-#include "server/settings.h"
+#include "server/settings/settings.h"
 #include "server/store/store.h"
 
 #include <stdbool.h>

@@ -1,9 +1,9 @@
 #include "server/retention/job_keep.h"
 #include "base/files/durable.h"
 #include "base/files/foreign_file.h"
-#include "server/cluster/job_change.h"
 #include "server/jobs/job_access.h"
-#include "server/jobs/job_paths.h"
+#include "server/jobs/job_change.h"
+#include "server/settings/job_paths.h"
 
 #include <errno.h>
 #include <unistd.h>

@@ -3,8 +3,8 @@
 #include "base/files/disk_use.h"
 #include "base/files/durable.h"
 #include "optimizer/job/job_outline.h"
-#include "server/jobs/job_paths.h"
 #include "server/retention/job_keep.h"
+#include "server/settings/job_paths.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -8,7 +8,7 @@
 #define SELVEDGE_SERVER_STORE_H
 
 #include "base/status.h"
-#include "server/store/drivers/store_driver.h"
+#include "server/store/sql/store_driver.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -139,7 +139,7 @@ struct job_query {
 status store_job_list(struct store *store, const struct job_query *q, struct job_row **row, size_t *n,
                       struct error *err);
 void job_rows_free(struct job_row *row, size_t n);
-/* A queued job, as far as its turn depends on it (server/workers/queue_turn.h). */
+/* A queued job, as far as its turn depends on it (server/jobs/queue_turn.h). */
 struct queued_job {
     char id[STORE_ID_BYTES], owner[STORE_OWNER_BYTES], batch[STORE_ID_BYTES];
     int64_t priority;

@@ -5,13 +5,13 @@
 #include "base/files/foreign_file.h"
 #include "base/json/foreign_json.h"
 #include "optimizer/job/job_folder.h"
-#include "server/cluster/job_change.h"
 #include "server/jobs/job_access.h"
-#include "server/jobs/job_paths.h"
-#include "server/jobs/versions/result_version.h"
+#include "server/jobs/job_change.h"
+#include "server/reports/worker_words.h"
+#include "server/settings/job_paths.h"
 #include "server/store/store_cluster.h"
+#include "server/views/result_version.h"
 #include "server/workers/console.h"
-#include "server/workers/guard/worker_words.h"
 
 #include <signal.h>
 #include <sodium.h>

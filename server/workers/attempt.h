@@ -4,7 +4,7 @@
 #define SELVEDGE_SERVER_ATTEMPT_H
 
 #include "server/jobs/job_service.h"
-#include "server/workers/worker_process.h"
+#include "server/workers/backends/worker_process.h"
 
 /* Reasons for which the daemon stops a worker. A reason has precedence over those after it. */
 enum attempt_stop {

@@ -1,6 +1,6 @@
 #include "server/workers/disk_watch.h"
 #include "server/jobs/ballast.h"
-#include "server/jobs/job_paths.h"
+#include "server/settings/job_paths.h"
 #include "server/workers/attempt.h"
 
 bool disk_watch(struct job_service *v, bool was_below)

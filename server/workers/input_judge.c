@@ -3,11 +3,11 @@
 #include "base/files/foreign_file.h"
 #include "base/json/foreign_json.h"
 #include "optimizer/job/job_folder.h"
-#include "server/cluster/job_change.h"
-#include "server/jobs/job_paths.h"
-#include "server/workers/guard/worker_words.h"
+#include "server/jobs/job_change.h"
+#include "server/reports/worker_words.h"
+#include "server/settings/job_paths.h"
+#include "server/workers/backends/worker_process.h"
 #include "server/workers/supervisor.h"
-#include "server/workers/worker_process.h"
 
 #include <errno.h>
 #include <signal.h>

@@ -2,16 +2,16 @@
 #include "base/clock.h"
 #include "server/cluster/lease_keeper.h"
 #include "server/events/change_feed.h"
-#include "server/jobs/job_paths.h"
+#include "server/jobs/queue_turn.h"
+#include "server/settings/job_paths.h"
 #include "server/store/store_cluster.h"
 #include "server/workers/attempt.h"
 #include "server/workers/backends/job_backend.h"
 #include "server/workers/console.h"
 #include "server/workers/disk_watch.h"
-#include "server/workers/guard/worker_limits.h"
-#include "server/workers/queue_turn.h"
 #include "server/workers/removal.h"
 #include "server/workers/waiting_list.h"
+#include "server/workers/worker_limits.h"
 
 #include <errno.h>
 #include <poll.h>

@@ -20,7 +20,7 @@ import check_layers  # noqa: E402
     ("optimizer/job/a.h", "optimizer/fit/objective/objective.h"),
     ("server/a.c", "optimizer/worker/pipeline.h"),
     ("server/a.c", "renderer/scattering/appearance.h"),
-    ("clients/cli/a.c", "server/settings.h"),
+    ("clients/cli/a.c", "server/settings/settings.h"),
     ("base/a.c", "status.h"),
 ])
 def test_includes_against_the_layers(path, include):

@@ -53,7 +53,7 @@ def test_the_daemon_serves_it(daemon):
 
 
 def test_the_route_table_and_the_document_agree():
-    with open(os.path.join(ROOT, "server", "http", "http_route.c")) as f:
+    with open(os.path.join(ROOT, "server", "endpoints", "endpoint_table.c")) as f:
         routes = {(m.lower(), p.replace("...", "")) for m, p in re.findall(r'\{"([A-Z]+)", "([^"]+)", HTTP_BODY', f.read())}
     assert routes - {("get", "/"), ("get", "/{path}")} == {(m, p) for p, m, _ in OPERATIONS}
 
@@ -66,7 +66,7 @@ def test_api_md_names_every_path():
 
 
 def test_problem_codes_are_documented():
-    with open(os.path.join(ROOT, "server", "http", "http_problem.c")) as f:
+    with open(os.path.join(ROOT, "server", "jobs", "problem_code.c")) as f:
         source = f.read()
     with open(os.path.join(ROOT, "docs", "api.md")) as f:
         table = f.read().split("## Errors")[1]

@@ -1,5 +1,5 @@
 #include "server/http/connections/library_refusal.h"
-#include "server/http/http_problem.h"
+#include "server/jobs/problem_code.h"
 
 #include <gnutls/gnutls.h>
 #include <microhttpd.h>

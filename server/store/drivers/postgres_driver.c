@@ -1,7 +1,7 @@
 /* PostgreSQL as the database of several daemons. libpq is reached through a plug-in, so that no other service needs
  * it. */
 #include "base/machine/program_folder.h"
-#include "server/store/store_sql.h"
+#include "server/store/sql/store_sql.h"
 
 #include <dlfcn.h>
 #include <stdio.h>

@@ -1,6 +1,6 @@
 /* SQLite, embedded: the database of a single daemon, with WAL and synchronous=FULL. */
 #include "server/store/drivers/store_backup.h"
-#include "server/store/store_sql.h"
+#include "server/store/sql/store_sql.h"
 
 #include <errno.h>
 #include <fcntl.h>

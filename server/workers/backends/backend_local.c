@@ -1,5 +1,5 @@
 /* Workers as child processes of the daemon, on its machine. */
-#include "server/jobs/job_paths.h"
+#include "server/settings/job_paths.h"
 #include "server/workers/backends/job_backend.h"
 
 #include <signal.h>

@@ -5,7 +5,7 @@
 #define SELVEDGE_SERVER_JOB_BACKEND_H
 
 #include "server/jobs/job_service.h"
-#include "server/workers/worker_process.h"
+#include "server/workers/backends/worker_process.h"
 
 /* BACKEND_WAITS: the engine has the job, but its worker does not compute: it waits for a node, or is suspended. */
 enum backend_phase { BACKEND_WAITS, BACKEND_RUNS, BACKEND_ENDED };

@@ -1,7 +1,7 @@
 #include "server/workers/slurm/slurm_command.h"
 #include "base/clock.h"
-#include "server/jobs/job_paths.h"
-#include "server/workers/worker_process.h"
+#include "server/settings/job_paths.h"
+#include "server/workers/backends/worker_process.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -4,7 +4,7 @@
 #define SELVEDGE_SERVER_SLURM_COMMAND_H
 
 #include "base/status.h"
-#include "server/settings.h"
+#include "server/settings/settings.h"
 
 #include <stdatomic.h>
 #include <stddef.h>

@@ -3,8 +3,8 @@
 #ifndef SELVEDGE_SERVER_SLURM_DESK_H
 #define SELVEDGE_SERVER_SLURM_DESK_H
 
-#include "server/jobs/job_paths.h"
-#include "server/workers/backends/backend_note.h"
+#include "server/reports/backend_note.h"
+#include "server/settings/job_paths.h"
 #include "server/workers/slurm/slurm_text.h"
 
 #include <pthread.h>

@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_SERVER_SLURM_REQUEST_H
 #define SELVEDGE_SERVER_SLURM_REQUEST_H
 
-#include "server/jobs/job_paths.h"
+#include "server/settings/job_paths.h"
 #include "server/workers/slurm/slurm_text.h"
 
 /* What one start of a job needs. */

@@ -1,7 +1,7 @@
 /* Submits and cancels jobs. */
 #include "base/clock.h"
 #include "base/files/foreign_file.h"
-#include "server/workers/kept_plan.h"
+#include "server/reports/plan_file.h"
 #include "server/workers/slurm/slurm_desk.h"
 #include "server/workers/slurm/slurm_request.h"
 

@@ -1,5 +1,5 @@
 #include "tests/support/store/service_fixture.h"
-#include "server/jobs/job_paths.h"
+#include "server/settings/job_paths.h"
 #include "tests/support/scratch_folder.h"
 
 #include <setjmp.h>

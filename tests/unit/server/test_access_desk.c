@@ -1,5 +1,5 @@
 /* Tokens in the store, what they grant, how their requests are counted, and what owners keep. */
-#include "server/access/access_desk.h"
+#include "server/access/access_registry.h"
 #include "server/access/access_secret.h"
 #include "tests/support/store/store_fixture.h"
 

@@ -2,7 +2,7 @@
  * such a database. A connection that was lost is opened again before the next statement outside of a transaction.
  * Nothing that may have changed the database is ever sent twice. */
 #include "base/utf8.h"
-#include "server/store/drivers/store_driver.h"
+#include "server/store/sql/store_driver.h"
 
 #include <libpq-fe.h>
 #include <poll.h>

@@ -1,5 +1,5 @@
 /* Whose turn it is: the rule of the queue, without a database. */
-#include "server/workers/queue_turn.h"
+#include "server/jobs/queue_turn.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,8 +1,8 @@
 /* Which jobs retention removes: by age, by size, in which order, and which never. */
 #include "base/clock.h"
-#include "server/jobs/job_paths.h"
 #include "server/retention/job_keep.h"
 #include "server/retention/retention.h"
+#include "server/settings/job_paths.h"
 #include "tests/support/store/service_fixture.h"
 
 #include <jansson.h>

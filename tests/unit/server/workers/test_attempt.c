@@ -1,6 +1,6 @@
 /* One attempt at a job: what its beginning writes, and what its end makes of the job. */
 #include "optimizer/job/job_folder.h"
-#include "server/jobs/job_paths.h"
+#include "server/settings/job_paths.h"
 #include "server/workers/attempt.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/store/service_fixture.h"
