@@ -1,8 +1,8 @@
 /* Who asks: finds the token of a secret, counts its requests against its quota, and remembers when it was last used.
  * Whether tokens are required, and which are valid, is read from the database each time, so a token that was made or
  * revoked, by this process or another one, counts from the next request on. All functions are thread-safe. */
-#ifndef SELVEDGE_SERVER_ACCESS_DESK_H
-#define SELVEDGE_SERVER_ACCESS_DESK_H
+#ifndef SELVEDGE_SERVER_ACCESS_REGISTRY_H
+#define SELVEDGE_SERVER_ACCESS_REGISTRY_H
 
 #include "server/settings/settings.h"
 #include "server/store/store_access.h"

@@ -36,7 +36,7 @@ static bool awaits_files(struct job_service *v, const char *job_id)
 static bool all_known(struct job_service *v, const char *owner, const char *job_id, const struct batch_sample *sample)
 {
     bool known = sample->n_file > 0 && awaits_files(v, job_id);
-    for (size_t k = 0; known && k < sample->n_file; k++) known = known_input_exists(v, owner, &sample->file[k]);
+    for (size_t k = 0; known && k < sample->n_file; k++) known = known_input_exists(v->store, owner, &sample->file[k]);
     return known;
 }
 
@@ -59,7 +59,7 @@ static void link_job(struct job_service *v, const char *owner, const char *job_i
         *row = sample->file[k];
         snprintf(row->job_id, sizeof row->job_id, "%s", job_id);
         job_new_id(row->id);
-        if (!known_input_link(v, owner, row)) {
+        if (!known_input_link(v->store, v->settings->data, owner, row)) {
             unlink_from(v, l, n_before);
             return;
         }

@@ -5,7 +5,6 @@
 #include "server/jobs/job_change.h"
 #include "server/jobs/problem_code.h"
 #include "server/settings/job_paths.h"
-#include "server/workers/supervisor.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -122,7 +121,7 @@ status batch_act(struct job_service *v, const char *id, enum batch_action action
     if (s == STATUS_OK) s = act_locked(&deed, row, n, n_changed, *refused, err);
     job_change_end(v);
     if (s == STATUS_OK && *n_changed > 0) log_info(v->log, "batch %s: %zu jobs %s", id, *n_changed, verb[action]);
-    if (s == STATUS_OK && *n_changed > 0 && v->supervisor != NULL) supervisor_wake(v->supervisor);
+    if (s == STATUS_OK && *n_changed > 0) job_wake_runner(v);
     free(row); /* without documents; rows moved to the front must not be released twice */
     batch_row_release(&batch);
     return s;
@@ -149,7 +148,7 @@ status batch_delete(struct job_service *v, const char *id, bool delete_jobs, str
     if (s == STATUS_OK) {
         for (size_t i = 0; delete_jobs && i < n; i++) upload_discard_job(v->upload, row[i].id);
         log_info(v->log, "batch %s '%s' deleted, its %zu jobs %s", id, batch.name, n, delete_jobs ? "too" : "stay");
-        if (v->supervisor != NULL) supervisor_wake(v->supervisor);
+        job_wake_runner(v);
     }
     job_rows_free(row, n);
     batch_row_release(&batch);

@@ -6,7 +6,6 @@
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_change.h"
 #include "server/settings/job_paths.h"
-#include "server/workers/supervisor.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -342,7 +341,7 @@ status batch_submit(struct job_service *v, const struct access_grant *grant, con
     struct submission s = {.v = v, .table = table};
     *out = (struct batch_outcome){.samples = json_array(), .left = json_array()};
     status st = submit(&s, grant, out, refusal, err);
-    if (st == STATUS_OK && v->supervisor != NULL && json_array_size(out->left) > 0) supervisor_wake(v->supervisor);
+    if (st == STATUS_OK && json_array_size(out->left) > 0) job_wake_runner(v);
     if (st == STATUS_OK) st = batch_declare_files(v, grant, table, out, refusal, err);
     if (st == STATUS_OK && !out->replayed)
         log_info(v->log, "batch %s '%s': %zu samples, %zu of them new", out->id, table->name, table->n, s.n_new);

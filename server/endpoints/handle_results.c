@@ -5,6 +5,7 @@
 #include "server/http/tar_stream.h"
 #include "server/settings/job_paths.h"
 #include "server/views/job_view.h"
+#include "server/views/result_files.h"
 #include "server/views/series_view.h"
 
 #include <stdio.h>

@@ -4,10 +4,12 @@
 #include "optimizer/job/stage_table.h"
 #include "server/endpoints/handlers.h"
 #include "server/http/http_reply.h"
+#include "server/http/http_server.h"
 #include "server/http/static_files.h"
 #include "server/rescue/backup_keeper.h"
 #include "server/settings/job_paths.h"
 #include "server/views/job_view.h"
+#include "server/views/result_files.h"
 
 #include <fcntl.h>
 #include <stdio.h>

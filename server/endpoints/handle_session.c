@@ -5,6 +5,7 @@
 #include "server/endpoints/handlers.h"
 #include "server/endpoints/request_json.h"
 #include "server/http/access_guard.h"
+#include "server/http/http_listen.h"
 #include "server/http/http_reply.h"
 #include "server/http/http_tls.h"
 

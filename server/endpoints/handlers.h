@@ -1,8 +1,8 @@
-/* The handlers of the endpoints in http_route.c. Each decides exactly one reply. */
+/* The handlers of the endpoints in endpoint_table.c. Each decides exactly one reply. */
 #ifndef SELVEDGE_SERVER_HANDLERS_H
 #define SELVEDGE_SERVER_HANDLERS_H
 
-#include "server/http/http_server.h"
+#include "server/http/http_request.h"
 
 /* handle_jobs.c */
 void handle_create_job(struct http_request *r);

@@ -1,6 +1,6 @@
 /* The JSON body of a request. */
-#ifndef SELVEDGE_SERVER_ENDPOINTS_REQUEST_JSON_H
-#define SELVEDGE_SERVER_ENDPOINTS_REQUEST_JSON_H
+#ifndef SELVEDGE_SERVER_REQUEST_JSON_H
+#define SELVEDGE_SERVER_REQUEST_JSON_H
 
 #include "server/endpoints/handlers.h"
 

@@ -1,16 +1,17 @@
 #include "server/events/webhook.h"
 #include "base/clock.h"
 #include "base/version.h"
-#include "server/cluster/lease_keeper.h"
-#include "server/events/change_feed.h"
 #include "server/settings/secret_file.h"
 #include "server/store/store_cluster.h"
 #include "server/store/store_delivery.h"
 
 #include <curl/curl.h>
 #include <errno.h>
+#include <jansson.h>
 #include <math.h>
+#include <pthread.h>
 #include <sodium.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,7 +27,7 @@ enum {
 };
 
 struct webhook {
-    struct job_service *v;
+    struct webhook_setup use;
     struct change_watch *watch;
     pthread_t thread;
     bool running; /* the thread was started */
@@ -59,7 +60,7 @@ double webhook_pause_s(double first_s, int64_t n_try)
 
 static status read_secret(struct webhook *w, struct error *err)
 {
-    const char *path = w->v->settings->webhook_secret_file;
+    const char *path = w->use.settings->webhook_secret_file;
     char *text = NULL;
     size_t n = 0;
     if (path[0] == '\0')
@@ -131,7 +132,7 @@ static struct curl_slist *headers_of(const struct webhook *w, const struct deliv
 /* Returns whether the receiver has answered 2xx; sets http_status and error of the row. */
 static bool post(struct webhook *w, struct delivery_row *d)
 {
-    const struct settings *s = w->v->settings;
+    const struct settings *s = w->use.settings;
     size_t n_answer = 0;
     long code = 0;
     char *body = body_of(d);
@@ -177,20 +178,20 @@ static void try_once(struct webhook *w, struct delivery_row *d)
     if (!delivered && atomic_load(&w->stop)) return; /* broken off by the stop, which is not the receiver's fault */
     double now = clock_wall_s();
     d->n_try++;
-    d->next_unix_s = now + webhook_pause_s((double)w->v->settings->webhook_retry_s, d->n_try);
+    d->next_unix_s = now + webhook_pause_s((double)w->use.settings->webhook_retry_s, d->n_try);
     if (delivered) {
         d->state = DELIVERY_DELIVERED;
         d->delivered_unix_s = now;
-    } else if (d->n_try >= w->v->settings->webhook_max_tries) {
+    } else if (d->n_try >= w->use.settings->webhook_max_tries) {
         d->state = DELIVERY_FAILED;
-        log_warning(w->v->log, "webhook: delivery %s is given up after %lld tries: %s", d->id, (long long)d->n_try,
+        log_warning(w->use.log, "webhook: delivery %s is given up after %lld tries: %s", d->id, (long long)d->n_try,
                     d->error);
     }
-    status s = store_delivery_update(w->v->store, d, &err);
-    if (s == STATUS_OK) s = store_delivery_prune(w->v->store, KEPT, &err);
+    status s = store_delivery_update(w->use.store, d, &err);
+    if (s == STATUS_OK) s = store_delivery_prune(w->use.store, KEPT, &err);
     if (s != STATUS_OK) {
         /* the database cannot be written: the same delivery would be sent again at once */
-        log_warning(w->v->log, "webhook: %s", err.text);
+        log_warning(w->use.log, "webhook: %s", err.text);
         change_watch_wait(w->watch, -1, clock_monotonic_s() + 5);
     }
 }
@@ -201,10 +202,10 @@ static void *run(void *context)
     while (!atomic_load(&w->stop)) {
         struct delivery_row d;
         /* with a shared database, jobs end at other daemons too, and one daemon sends all deliveries */
-        double wait_s = store_is_shared(w->v->store) ? SHARED_IDLE_S : IDLE_S;
-        if (store_duty_is_mine(w->v->store, "webhook") && store_delivery_next(w->v->store, &d, NULL) == STATUS_OK) {
+        double wait_s = store_is_shared(w->use.store) ? SHARED_IDLE_S : IDLE_S;
+        if (store_duty_is_mine(w->use.store, "webhook") && store_delivery_next(w->use.store, &d, NULL) == STATUS_OK) {
             /* a clock that was set back must not delay a delivery by more than the longest pause */
-            wait_s = fmin(d.next_unix_s - clock_wall_s(), store_is_shared(w->v->store) ? SHARED_IDLE_S : PAUSE_MOST_S);
+            wait_s = fmin(d.next_unix_s - clock_wall_s(), store_is_shared(w->use.store) ? SHARED_IDLE_S : PAUSE_MOST_S);
             if (wait_s <= 0) try_once(w, &d);
         }
         if (wait_s > 0) change_watch_wait(w->watch, -1, clock_monotonic_s() + wait_s);
@@ -217,22 +218,22 @@ static bool address_valid(const char *url)
     return strncmp(url, "http://", 7) == 0 || strncmp(url, "https://", 8) == 0;
 }
 
-status webhook_start(struct job_service *v, struct webhook **out, struct error *err)
+status webhook_start(const struct webhook_setup *setup, struct webhook **out, struct error *err)
 {
-    const char *url = v->settings->webhook_url;
+    const char *url = setup->settings->webhook_url;
     *out = NULL;
     status s = STATUS_OK;
     /* a daemon that joins others without an address does not switch off what they send */
-    if (url[0] != '\0' || lease_keeper_is_eldest(v)) s = store_webhook_enable(v->store, url[0] != '\0', err);
+    if (url[0] != '\0' || setup->first_daemon) s = store_webhook_enable(setup->store, url[0] != '\0', err);
     if (s != STATUS_OK || url[0] == '\0') return s;
     if (!address_valid(url))
         return error_set_field(err, STATUS_INVALID, "webhook.url", "'%.200s' is not an http:// or https:// address",
                                url);
     struct webhook *w = calloc(1, sizeof *w);
     if (w == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start the webhook: out of memory");
-    w->v = v;
+    w->use = *setup;
     s = read_secret(w, err);
-    if (s == STATUS_OK) s = change_watch_begin(v->feed, NULL, &w->watch, err);
+    if (s == STATUS_OK) s = change_watch_begin(setup->feed, NULL, &w->watch, err);
     if (s == STATUS_OK && (curl_global_init(CURL_GLOBAL_DEFAULT) != CURLE_OK || (w->curl = curl_easy_init()) == NULL))
         s = error_set(err, STATUS_NO_MEMORY, "cannot start libcurl");
     if (s == STATUS_OK) {
@@ -253,7 +254,7 @@ void webhook_stop(struct webhook *w)
     if (w == NULL) return;
     atomic_store(&w->stop, true);
     if (w->running) {
-        change_feed_publish(w->v->feed, "");
+        change_feed_publish(w->use.feed, "");
         pthread_join(w->thread, NULL);
     }
     change_watch_end(w->watch);

@@ -2,19 +2,31 @@
  * receiver answers 2xx or the tries are over. A receiver that fails, hangs or sends too much delays other deliveries
  * only. The address comes from the settings alone; redirects are not followed, and proxies of the environment not used.
  *
- * The header Selvedge-Signature is "t=TIME,v1=HEX": the HMAC-SHA256 of "TIME.BODY" with the secret. TIME is that of the
- * try, so that a receiver can refuse what is old. */
+ * The header Selvedge-Signature is "t=TIME,v1=HEX": the HMAC-SHA256 of "TIME.BODY" with the secret. TIME is the time
+ * of the try, so that a receiver can refuse old requests. */
 #ifndef SELVEDGE_SERVER_WEBHOOK_H
 #define SELVEDGE_SERVER_WEBHOOK_H
 
-#include "server/jobs/job_service.h"
+#include "base/log.h"
+#include "server/events/change_feed.h"
+#include "server/settings/settings.h"
+#include "server/store/store.h"
 
 enum { WEBHOOK_SIGNATURE_BYTES = 96 };
+
+/* The parts of the daemon that a webhook uses; they outlive it. */
+struct webhook_setup {
+    const struct settings *settings;
+    struct store *store;
+    struct change_feed *feed;
+    struct log *log;
+    bool first_daemon; /* no other daemon uses the database, or this one began before all others */
+};
 
 struct webhook;
 /* Starts the thread; without an address in the settings *webhook is NULL and nothing is sent. STATUS_INVALID names the
  * setting at fault; STATUS_IO, STATUS_NO_MEMORY. */
-status webhook_start(struct job_service *service, struct webhook **webhook, struct error *err);
+status webhook_start(const struct webhook_setup *setup, struct webhook **webhook, struct error *err);
 /* Ends the present try and joins the thread. NULL is accepted. */
 void webhook_stop(struct webhook *webhook);
 

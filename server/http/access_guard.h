@@ -4,7 +4,7 @@
 #ifndef SELVEDGE_SERVER_ACCESS_GUARD_H
 #define SELVEDGE_SERVER_ACCESS_GUARD_H
 
-#include "server/http/http_server.h"
+#include "server/http/http_request.h"
 
 #define ACCESS_COOKIE "selvedge_session"
 

@@ -1,4 +1,5 @@
 #include "server/http/http_guard.h"
+#include "server/http/http_listen.h"
 #include "server/http/http_reply.h"
 
 #include <errno.h>

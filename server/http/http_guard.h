@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_SERVER_HTTP_GUARD_H
 #define SELVEDGE_SERVER_HTTP_GUARD_H
 
-#include "server/http/http_server.h"
+#include "server/http/http_request.h"
 
 /* Requires a first line without NUL and blanks in its parts, and a Host header where the version needs one. method and
  * version are as the library gives them, in the buffer of the line. */

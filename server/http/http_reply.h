@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_SERVER_HTTP_REPLY_H
 #define SELVEDGE_SERVER_HTTP_REPLY_H
 
-#include "server/http/http_server.h"
+#include "server/http/http_request.h"
 
 /* Returns the value of a request header, or NULL if there is none. */
 const char *request_header(const struct http_request *request, const char *name);

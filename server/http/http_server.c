@@ -1,5 +1,4 @@
 #include "server/http/http_server.h"
-#include "server/endpoints/handlers.h"
 #include "server/http/access_guard.h"
 #include "server/http/connections/connection_table.h"
 #include "server/http/connections/library_refusal.h"
@@ -189,7 +188,7 @@ static void on_completed(void *context, struct MHD_Connection *c, void **request
     (void)c;
     (void)why;
     if (r == NULL) return;
-    if (r->upload != NULL) handle_upload_abandoned(r);
+    if (r->upload != NULL) r->route->abandon(r);
     if (r->reply != NULL) MHD_destroy_response(r->reply);
     connection_idle(s->connection, r->entry);
     release_body(r);

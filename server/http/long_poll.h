@@ -4,7 +4,7 @@
 #ifndef SELVEDGE_SERVER_LONG_POLL_H
 #define SELVEDGE_SERVER_LONG_POLL_H
 
-#include "server/http/http_server.h"
+#include "server/http/http_request.h"
 
 enum { LONG_POLL_MOST_S = 60 };
 

@@ -1,6 +1,6 @@
 #include "server/http/tar_stream.h"
 #include "optimizer/job/job_folder.h"
-#include "server/views/job_view.h"
+#include "server/views/result_files.h"
 
 #include <archive.h>
 #include <archive_entry.h>

@@ -114,6 +114,11 @@ status job_look(struct job_service *v, const char *id, struct job_row *row, stru
     return find(v, id, false, row, err);
 }
 
+void job_wake_runner(const struct job_service *v)
+{
+    if (v->runner.wake != NULL) v->runner.wake(v->runner.context);
+}
+
 bool job_active(const struct job_row *row)
 {
     return row->state == JOB_QUEUED || row->state == JOB_RUNNING || row->state == JOB_PAUSED;

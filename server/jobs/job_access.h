@@ -36,6 +36,8 @@ status job_check_quota(struct job_service *v, const struct access_grant *grant, 
                        const struct owner_use *more, struct job_refusal *refusal, struct error *err);
 /* Repeats in the job's journal what the database holds already. A failure is logged: the database is the owner. */
 void job_note(struct job_service *v, const char *job_id, const struct journal_entry *entry);
+/* Tells the runner, if there is one, that a job has changed. */
+void job_wake_runner(const struct job_service *v);
 /* Syncs everything that was written to the data folder. STATUS_IO. */
 status job_sync_all(struct job_service *v, struct error *err);
 /* job_note of the rows of many jobs, with one sync. */

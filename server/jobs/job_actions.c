@@ -3,14 +3,8 @@
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_change.h"
 #include "server/jobs/job_service.h"
-#include "server/workers/supervisor.h"
 
 #include <string.h>
-
-static void wake(struct job_service *v)
-{
-    if (v->supervisor != NULL) supervisor_wake(v->supervisor);
-}
 
 status job_make_queued(struct job_service *v, struct job_row *row, struct job_refusal *refusal, struct error *err)
 {
@@ -70,7 +64,7 @@ static status begin(struct job_service *v, const char *id, bool retry, const int
 out:
     job_change_end(v);
     job_row_release(&row);
-    if (*changed) wake(v);
+    if (*changed) job_wake_runner(v);
     return s;
 }
 
@@ -107,7 +101,7 @@ status job_cancel(struct job_service *v, const char *id, bool *changed, struct e
 out:
     job_change_end(v);
     job_row_release(&row);
-    if (*changed) wake(v);
+    if (*changed) job_wake_runner(v);
     return s;
 }
 
@@ -132,7 +126,7 @@ status job_remove(struct job_service *v, const char *id,
     if (s == STATUS_OK) {
         upload_discard_job(v->upload, row.id);
         log_info(v->log, "job %s deleted", row.id);
-        wake(v);
+        job_wake_runner(v);
     }
     job_row_release(&row);
     return s;

@@ -8,7 +8,6 @@
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_change.h"
 #include "server/settings/job_paths.h"
-#include "server/views/result_version.h"
 
 #include <fcntl.h>
 #include <sodium.h>
@@ -192,11 +191,20 @@ status job_create(struct job_service *v, const struct job_request *request, char
     return s;
 }
 
+/* Writes JOB/run.json, the document that the present result was made with. */
+static status note_document_of_run(struct job_service *v, const struct job_row *row, const char *document,
+                                   struct error *err)
+{
+    char path[PATH_BYTES];
+    path_join(path, v->settings->data, "jobs", row->id, JOB_FILE_RUN, NULL);
+    return foreign_file_replace(path, document, strlen(document), true, err);
+}
+
 /* The folder first: what is acknowledged is in both, and a rebuild makes a job a draft whose document differs from the
  * journal's checksum. run: the document that the job was run with, if this is the first edit since; else NULL. */
 static status replace_document(struct job_service *v, struct job_row *row, const char *run, struct error *err)
 {
-    status s = run != NULL ? version_note_document(v, row, run, err) : STATUS_OK;
+    status s = run != NULL ? note_document_of_run(v, row, run, err) : STATUS_OK;
     if (s == STATUS_OK) s = write_document(v, row, err);
     if (s == STATUS_OK) s = store_job_replace(v->store, row, err);
     if (s == STATUS_OK) job_note(v, row->id, &(struct journal_entry){.job = row, .document = true});

@@ -140,7 +140,7 @@ static status make_places(struct job_service *v, const char *owner, struct file_
     struct file_row *part = calloc(n, sizeof *part);
     if (part == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot declare files: out of memory");
     for (size_t i = 0; i < n; i++)
-        if (known_input_link(v, owner, &row[i]))
+        if (known_input_link(v->store, v->settings->data, owner, &row[i]))
             n_linked++;
         else
             part[n_part++] = row[i];
@@ -216,7 +216,7 @@ static status declare_locked(struct job_service *v, const struct access_grant *g
         s = find_declared(v, &file[i], err);
         if (s != STATUS_OK) *i_fault = i;
         if (file[i].existed) continue;
-        file[i].known = s == STATUS_OK && known_input_exists(v, job.owner, &file[i].row);
+        file[i].known = s == STATUS_OK && known_input_exists(v->store, job.owner, &file[i].row);
         room.n_file++;
         if (!file[i].known) room.n_upload_bytes += file[i].row.size_bytes;
         room.n_bytes += file[i].row.size_bytes; /* at most max_file_bytes each, of at most a megabyte of declarations */

@@ -14,7 +14,6 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-struct supervisor;
 struct change_feed;
 struct backup_keeper;
 struct queue_forecast;
@@ -28,6 +27,17 @@ struct job_turns {
     uint64_t n_asked, n_served;
 };
 
+/* The part of the daemon that runs jobs (server/workers/supervisor.h). All members are NULL while there is none, as in
+ * tests. */
+struct job_runner {
+    const char *program; /* path of the worker program */
+    /* Makes the runner look for changes at once. */
+    void (*wake)(void *context);
+    /* Writes why no job can be started at present, such as a cluster that cannot be reached; "" otherwise. */
+    void (*trouble)(void *context, char *text, size_t n_text);
+    void *context;
+};
+
 struct job_service {
     const struct settings *settings;
     struct store *store;
@@ -35,7 +45,7 @@ struct job_service {
     struct change_feed *feed;        /* of what long polls wait for */
     struct queue_forecast *forecast; /* of when queued jobs start */
     struct log *log;
-    struct supervisor *supervisor;  /* notified of changes; NULL in tests */
+    struct job_runner runner;
     struct backup_keeper *backup;   /* NULL when the settings say that there are no backups */
     struct lease_keeper *keeper;    /* NULL unless other daemons may use the database */
     struct journal_key journal_key; /* seals the journals of jobs */
@@ -45,17 +55,11 @@ struct job_service {
     atomic_uint_least64_t n_attempt_total, n_lost_total, n_finished_total[JOB_N_STATE];
 };
 
-/* The code of http_problem.c for a refused request, if the status does not determine it; else NULL. */
+/* Why a request is refused, beyond the status and the text of the error. */
 struct job_refusal {
-    const char *code;
-    json_t *extra; /* further members of the problem: {"missing_files"} or numbers; NULL or owned by the caller */
+    const char *code; /* a code of problem_code.c, if the status does not determine it; else NULL */
+    json_t *extra;    /* further members of the problem: {"missing_files"} or numbers; NULL or owned by the caller */
 };
-
-/* Opens the database in the data folder, moves unknown job folders to the quarantine, removes tombstones, queues
- * jobs that were running, and recovers uploads. Fails as store_open does. */
-status job_service_open(const struct settings *settings, struct log *log, struct job_service **service,
-                        struct error *err);
-void job_service_close(struct job_service *service);
 
 /* A job to be created: the text of its document, and the client's key for this request, or NULL. */
 struct job_request {

@@ -1,6 +1,6 @@
 /* The only place that chooses HTTP status codes, for status codes of the program and for errors that only HTTP has. */
-#ifndef SELVEDGE_SERVER_HTTP_PROBLEM_H
-#define SELVEDGE_SERVER_HTTP_PROBLEM_H
+#ifndef SELVEDGE_SERVER_PROBLEM_CODE_H
+#define SELVEDGE_SERVER_PROBLEM_CODE_H
 
 #include "base/status.h"
 

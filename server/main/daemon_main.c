@@ -3,6 +3,8 @@
 #include "base/files/durable.h"
 #include "base/machine/program_folder.h"
 #include "base/version.h"
+#include "server/cluster/lease_keeper.h"
+#include "server/endpoints/endpoint_table.h"
 #include "server/events/webhook.h"
 #include "server/http/http_server.h"
 #include "server/http/static_files.h"
@@ -13,6 +15,7 @@
 #include "server/rescue/rebuild.h"
 #include "server/retention/retention_watch.h"
 #include "server/settings/job_paths.h"
+#include "server/start/service_open.h"
 #include "server/store/store_cluster.h"
 #include "server/store/store_settings.h"
 #include "server/workers/supervisor.h"
@@ -227,10 +230,20 @@ static status open_service(const struct settings *s, struct log *log, struct job
     status r;
     do {
         r = rebuild_is_needed(s, err);
-        if (r == STATUS_OK) r = job_service_open(s, log, service, err);
+        if (r == STATUS_OK) r = service_open(s, log, service, err);
     } while (make_room(s, log, r, err));
     if (r == STATUS_OK) ballast_keep(s, true); /* what this start has not needed */
     return r;
+}
+
+static status start_webhook(struct job_service *v, struct webhook **webhook, struct error *err)
+{
+    const struct webhook_setup setup = {.settings = v->settings,
+                                        .store = v->store,
+                                        .feed = v->feed,
+                                        .log = v->log,
+                                        .first_daemon = lease_keeper_is_eldest(v)};
+    return webhook_start(&setup, webhook, err);
 }
 
 static void wait_for_signal(const sigset_t *signals, struct http_server *server, struct log *log)
@@ -265,12 +278,12 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     status r = static_files_new(s->web, s->openapi, log, &files, err);
     if (r == STATUS_OK) r = open_service(s, log, &service, err);
     if (r != STATUS_OK) goto out;
-    r = webhook_start(service, &webhook, err);
-    if (make_room(s, log, r, err)) r = webhook_start(service, &webhook, err);
+    r = start_webhook(service, &webhook, err);
+    if (make_room(s, log, r, err)) r = start_webhook(service, &webhook, err);
     if (r == STATUS_OK) r = backup_keeper_start(service, &backup, err);
     if (r == STATUS_OK) r = supervisor_start(service, worker, &supervisor, err);
     if (r == STATUS_OK) r = retention_watch_start(service, &retention, err);
-    if (r == STATUS_OK) r = http_server_start(service, http_route_find, files, &server, url, err);
+    if (r == STATUS_OK) r = http_server_start(service, endpoint_find, files, &server, url, err);
     if (r == STATUS_OK) {
         announce(s, url, log);
         if (store_daemon_announce(service->store, url, err) != STATUS_OK) log_warning(log, "%s", err->text);
@@ -283,7 +296,7 @@ out:
     supervisor_stop(supervisor);
     webhook_stop(webhook);
     backup_keeper_stop(backup);
-    job_service_close(service);
+    service_close(service);
     ballast_keep(s, true);
     static_files_free(files);
     return r;

@@ -6,7 +6,7 @@
 
 static const struct foreign_bounds plan_bounds = {.file_bytes = 1 << 20, .held_bytes = 4 << 20, .depth = 16};
 
-json_t *kept_plan_read(const char *data, const char *job_id)
+json_t *plan_file_read(const char *data, const char *job_id)
 {
     char folder[PATH_BYTES];
     json_t *plan = NULL;

@@ -1,20 +1,13 @@
-/* Opens and closes the service. Opening brings what a stopped or killed daemon left behind into a consistent state.
- * An entry that cannot be processed is logged and skipped, because one bad folder must not make all other jobs
- * unavailable. */
+#include "server/start/job_recovery.h"
 #include "base/clock.h"
 #include "base/files/durable.h"
 #include "base/files/foreign_file.h"
 #include "optimizer/job/job_folder.h"
 #include "server/batches/batch_places.h"
-#include "server/cluster/lease_keeper.h"
-#include "server/cluster/shared_folder.h"
-#include "server/events/change_feed.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_change.h"
-#include "server/jobs/queue_forecast.h"
+#include "server/reports/status_file.h"
 #include "server/settings/job_paths.h"
-#include "server/store/store_settings.h"
-#include "server/workers/attempt.h"
 #include "server/workers/backends/job_backend.h"
 
 #include <dirent.h>
@@ -175,30 +168,17 @@ static status restore_folders(struct job_service *v, struct error *err)
     return s;
 }
 
-static status make_data_folders(const char *data, struct error *err)
-{
-    static const char *const part[] = {"jobs", "quarantine"};
-    status s = STATUS_OK;
-    for (size_t i = 0; s == STATUS_OK && i < 2; i++) {
-        char path[PATH_BYTES];
-        path_join(path, data, part[i], NULL);
-        s = durable_make_folder(path, err);
-        if (s == STATUS_OK) s = durable_sync_folder_of(path, err);
-    }
-    return s;
-}
-
 /* The code of the verdict that a job's result has. */
 static void read_verdict(void *context, const char *job_id, char code[40])
 {
-    json_t *st = attempt_read_status(context, job_id);
+    const struct job_service *v = context;
+    json_t *st = status_file_read(v->settings->data, job_id);
     const char *text = json_string_value(json_object_get(json_object_get(st, "verdict"), "code"));
     snprintf(code, 40, "%s", text == NULL ? "" : text);
     json_decref(st);
 }
 
-/* With a shared database, the daemon that began before all others does this, and keeps them from changes meanwhile. */
-static status recover(struct job_service *v, struct error *err)
+status job_recover(struct job_service *v, struct error *err)
 {
     job_change_begin(v, NULL, NULL);
     batch_places_clear(v);
@@ -210,48 +190,4 @@ static status recover(struct job_service *v, struct error *err)
     if (s == STATUS_OK) s = upload_recover(v->upload, err);
     job_change_end(v);
     return s;
-}
-
-static void publish(void *context, const char *job_id) { change_feed_publish(context, job_id); }
-
-status job_service_open(const struct settings *settings, struct log *log, struct job_service **out, struct error *err)
-{
-    struct job_service *v = calloc(1, sizeof *v);
-    if (v == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start: out of memory");
-    v->settings = settings;
-    v->log = log;
-    pthread_mutex_init(&v->change.lock, NULL);
-    pthread_cond_init(&v->change.next_turn, NULL);
-    status s = make_data_folders(settings->data, err);
-    struct error why = {0};
-    if (s == STATUS_OK && journal_key_read(settings->data, true, &v->journal_key, &why) != STATUS_OK)
-        log_warning(log, "journals of jobs are not sealed: %s", why.text);
-    if (s == STATUS_OK) s = store_settings_open(settings, false, &v->store, err);
-    if (s == STATUS_OK) s = shared_folder_admit(v, err);
-    if (s == STATUS_OK) s = lease_keeper_start(v, &v->keeper, err);
-    if (s == STATUS_OK) s = change_feed_new(&v->feed, err);
-    v->forecast = queue_forecast_new();
-    if (s == STATUS_OK && v->forecast == NULL) s = error_set(err, STATUS_NO_MEMORY, "cannot start: out of memory");
-    if (s == STATUS_OK) store_on_change(v->store, publish, v->feed);
-    if (s == STATUS_OK) s = upload_set_new(v->store, settings->data, settings->commit_bytes, log, &v->upload, err);
-    if (s == STATUS_OK && lease_keeper_is_eldest(v)) s = recover(v, err);
-    if (s != STATUS_OK) {
-        job_service_close(v);
-        return error_prefix(err, s, "cannot open data folder '%s'", settings->data);
-    }
-    *out = v;
-    return STATUS_OK;
-}
-
-void job_service_close(struct job_service *v)
-{
-    if (v == NULL) return;
-    lease_keeper_stop(v->keeper);
-    upload_set_free(v->upload);
-    store_close(v->store);
-    queue_forecast_free(v->forecast);
-    change_feed_free(v->feed);
-    pthread_mutex_destroy(&v->change.lock);
-    pthread_cond_destroy(&v->change.next_turn);
-    free(v);
 }

@@ -1,6 +1,6 @@
 #include "server/store/store_batch.h"
 #include "base/clock.h"
-#include "server/store/sql/store_sql.h"
+#include "server/store/store_rows.h"
 
 #include <stdlib.h>
 #include <string.h>

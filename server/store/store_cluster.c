@@ -1,5 +1,5 @@
 #include "server/store/store_cluster.h"
-#include "server/store/sql/store_sql.h"
+#include "server/store/store_rows.h"
 
 #include <stdio.h>
 #include <stdlib.h>

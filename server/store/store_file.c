@@ -1,4 +1,4 @@
-#include "server/store/sql/store_sql.h"
+#include "server/store/store_rows.h"
 
 #include <stdlib.h>
 #include <string.h>

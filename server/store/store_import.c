@@ -1,6 +1,6 @@
 /* Writes jobs that were read from their folders. */
 #include "base/clock.h"
-#include "server/store/sql/store_sql.h"
+#include "server/store/store_rows.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 #include "base/clock.h"
-#include "server/store/sql/store_sql.h"
+#include "server/store/store_rows.h"
 
 #include <stdlib.h>
 #include <string.h>

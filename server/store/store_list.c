@@ -1,5 +1,5 @@
 /* Lists of jobs. */
-#include "server/store/sql/store_sql.h"
+#include "server/store/store_rows.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,6 +1,7 @@
 #include "base/clock.h"
-#include "server/store/sql/store_sql.h"
+#include "server/store/drivers/driver_table.h"
 #include "server/store/store.h"
+#include "server/store/store_rows.h"
 
 #include <sodium.h>
 #include <stdio.h>
@@ -20,15 +21,6 @@ bool job_state_parse(const char *name, enum job_state *state)
             return true;
         }
     return false;
-}
-
-static const struct store_driver *const drivers[] = {&store_postgres, &store_sqlite};
-
-const struct store_driver *store_driver_of(const char *address)
-{
-    size_t i = 0; /* the last one takes any path */
-    while (strncmp(address, drivers[i]->scheme, strlen(drivers[i]->scheme)) != 0) i++;
-    return drivers[i];
 }
 
 status store_check_place(const char *address, struct error *err)

@@ -1,5 +1,5 @@
 /* Tags and verdicts of jobs. */
-#include "server/store/sql/store_sql.h"
+#include "server/store/store_rows.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -5,12 +5,12 @@
 #ifndef SELVEDGE_SERVER_KNOWN_INPUT_H
 #define SELVEDGE_SERVER_KNOWN_INPUT_H
 
-#include "server/jobs/job_service.h"
+#include "server/store/store.h"
 
 /* Whether a complete input with the size and SHA-256 of `row` is in a job of the owner. */
-bool known_input_exists(struct job_service *v, const char *owner, const struct file_row *row);
+bool known_input_exists(struct store *store, const char *owner, const struct file_row *row);
 /* Makes JOB/input/<name> of `row` a link to such an input and the row complete; the caller syncs the folder. Returns
  * false, with the row as it was, when there is none or it cannot be linked: then the bytes are uploaded. */
-bool known_input_link(struct job_service *v, const char *owner, struct file_row *row);
+bool known_input_link(struct store *store, const char *data, const char *owner, struct file_row *row);
 
 #endif

@@ -6,10 +6,9 @@
 #include "server/jobs/job_tags.h"
 #include "server/jobs/queue_forecast.h"
 #include "server/reports/backend_note.h"
+#include "server/reports/status_file.h"
 #include "server/retention/job_keep.h"
 #include "server/settings/job_paths.h"
-#include "server/workers/attempt.h"
-#include "server/workers/supervisor.h"
 
 #include <sodium.h>
 #include <stdio.h>
@@ -72,7 +71,8 @@ static void put_backend(struct job_service *v, json_t *out, const struct job_row
 {
     char message[512];
     json_object_set_new(out, "backend", backend_note_view(v->settings->data, row, message, sizeof message));
-    if (row->state == JOB_QUEUED && v->supervisor != NULL) supervisor_trouble(v->supervisor, message, sizeof message);
+    if (row->state == JOB_QUEUED && v->runner.trouble != NULL)
+        v->runner.trouble(v->runner.context, message, sizeof message);
     bool computes = row->state == JOB_RUNNING && json_integer_value(json_object_get(st, "attempt")) == row->attempt;
     if (message[0] != '\0' && !computes) json_object_set_new(out, "message", json_string(message));
 }
@@ -89,7 +89,7 @@ static void put_place(struct job_service *v, json_t *out, const struct job_row *
 json_t *job_view_heartbeat_age(struct job_service *v, const struct job_row *row)
 {
     if (row->state != JOB_RUNNING) return json_null();
-    json_t *st = attempt_read_status(v, row->id), *age = json_null();
+    json_t *st = status_file_read(v->settings->data, row->id), *age = json_null();
     json_t *at = json_object_get(st, "heartbeat_unix_s");
     if (json_is_number(at) && json_integer_value(json_object_get(st, "attempt")) == row->attempt) {
         double s = clock_wall_s() - json_number_value(at);
@@ -167,7 +167,7 @@ static status put_details(struct job_service *v, const struct job_row *row, json
 
 status job_view(struct job_service *v, const struct job_row *row, bool full, json_t **view, struct error *err)
 {
-    json_t *st = has_run(row) ? attempt_read_status(v, row->id) : NULL;
+    json_t *st = has_run(row) ? status_file_read(v->settings->data, row->id) : NULL;
     json_t *out = json_pack("{s:s,s:s,s:s,s:b,s:f,s:f,s:o,s:o,s:I,s:I,s:I}", "id", row->id, "sample", row->sample,
                             "state", job_state_name(row->state), "cancel_requested", row->cancel_requested,
                             "created_unix_s", row->created_unix_s, "updated_unix_s", row->updated_unix_s,

@@ -1,8 +1,8 @@
 /* Lists and opens the files under results/ or a version of them, always relative to an open folder and never through a
  * link. */
+#include "server/views/result_files.h"
 #include "base/files/foreign_file.h"
 #include "server/settings/job_paths.h"
-#include "server/views/job_view.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -8,7 +8,7 @@
 #include "optimizer/job/job_folder.h"
 #include "server/reports/worker_words.h"
 #include "server/settings/job_paths.h"
-#include "server/views/job_view.h"
+#include "server/views/result_files.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -181,13 +181,6 @@ static json_t *read_description(struct job_service *v, const struct job_row *row
     json_decref(j);
     log_warning(v->log, "job %s: the description of version %lld is damaged", row->id, (long long)number);
     return describe_damaged(number, st);
-}
-
-status version_note_document(struct job_service *v, const struct job_row *row, const char *document, struct error *err)
-{
-    char path[PATH_BYTES];
-    job_file_path(v, row->id, JOB_FILE_RUN, NULL, path);
-    return foreign_file_replace(path, document, strlen(document), true, err);
 }
 
 /* The rename comes first, so a kill leaves no half of a version in the list. */

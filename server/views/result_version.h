@@ -8,8 +8,6 @@
 
 enum { VERSION_FOLDER_BYTES = 48 };
 
-/* Notes the document that the job was run with, before an edit replaces it. STATUS_IO, STATUS_DISK_FULL. */
-status version_note_document(struct job_service *v, const struct job_row *row, const char *document, struct error *err);
 /* Keeps the result of an edited job, if it has one, and removes the oldest versions beyond jobs.keep_versions. It may
  * be repeated after a failure or a kill. row->generation rises if versions of that number and above exist already,
  * as after the database was restored from a backup. STATUS_IO, STATUS_DISK_FULL. */

@@ -3,11 +3,10 @@
 #include "base/files/durable.h"
 #include "base/files/file_tree.h"
 #include "base/files/foreign_file.h"
-#include "base/json/foreign_json.h"
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_change.h"
-#include "server/reports/worker_words.h"
+#include "server/reports/status_file.h"
 #include "server/settings/job_paths.h"
 #include "server/store/store_cluster.h"
 #include "server/views/result_version.h"
@@ -19,18 +18,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-/* A worker's 50 warnings of 512 bytes are the most of it. */
-static const struct foreign_bounds status_bounds = {.file_bytes = 256 << 10, .held_bytes = 1 << 20, .depth = 16};
-
-json_t *attempt_read_status(const struct job_service *v, const char *job_id)
-{
-    char folder[PATH_BYTES];
-    json_t *j = NULL;
-    path_join(folder, v->settings->data, "jobs", job_id, NULL);
-    if (foreign_json_read(folder, JOB_FILE_STATUS, &status_bounds, &j, NULL) == STATUS_OK) worker_words_of_status(j);
-    return j;
-}
 
 /* Removes the checkpoints that belong to the input before an edit, and keeps its result as a version. */
 static status clear_folder(struct job_service *v, struct job_row *row, struct error *err)
@@ -115,7 +102,7 @@ bool attempt_read_request(struct job_service *v, const char *job_id, bool comput
     if (store_job_look(v->store, job_id, &row, NULL) != STATUS_OK) return false;
     request->cancel = row.cancel_requested;
     request->deleted = row.deleted;
-    json_t *j = computes ? attempt_read_status(v, job_id) : NULL;
+    json_t *j = computes ? status_file_read(v->settings->data, job_id) : NULL;
     if (j != NULL && json_integer_value(json_object_get(j, "attempt")) == row.attempt)
         request->heartbeat_unix_s = json_number_value(json_object_get(j, "heartbeat_unix_s"));
     json_decref(j);
@@ -140,7 +127,7 @@ static void last_words(struct job_service *v, const char *job_id, char *out, siz
 
 static void succeeded(struct job_service *v, struct job_row *row)
 {
-    json_t *j = attempt_read_status(v, row->id);
+    json_t *j = status_file_read(v->settings->data, row->id);
     const char *code = json_string_value(json_object_get(json_object_get(j, "verdict"), "code"));
     row->state = JOB_SUCCEEDED;
     snprintf(row->verdict, sizeof row->verdict, "%s", code == NULL ? "" : code);
@@ -149,7 +136,7 @@ static void succeeded(struct job_service *v, struct job_row *row)
 
 static void failed(struct job_service *v, struct job_row *row)
 {
-    json_t *j = attempt_read_status(v, row->id);
+    json_t *j = status_file_read(v->settings->data, row->id);
     json_t *e = json_object_get(j, "error");
     const char *code = json_string_value(json_object_get(e, "code")),
                *field = json_string_value(json_object_get(e, "field"));

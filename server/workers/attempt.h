@@ -45,7 +45,4 @@ status attempt_fail(struct job_service *v, const char *job_id, const char *why, 
 /* Queues all paused jobs. */
 void attempt_resume_paused(struct job_service *v);
 
-/* Returns status.json of a job, owned by the caller, or NULL if there is none or it is damaged. */
-json_t *attempt_read_status(const struct job_service *v, const char *job_id);
-
 #endif

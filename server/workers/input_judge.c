@@ -7,7 +7,6 @@
 #include "server/reports/worker_words.h"
 #include "server/settings/job_paths.h"
 #include "server/workers/backends/worker_process.h"
-#include "server/workers/supervisor.h"
 
 #include <errno.h>
 #include <signal.h>
@@ -171,7 +170,7 @@ static status judge(struct job_service *v, const char *job_id, int fd, json_t **
     path_join(folder, job, JOB_FOLDER_INPUT, NULL);
     path_join(document, job, JOB_FILE_DOCUMENT, NULL);
     const struct worker_paths paths = {
-        .program = supervisor_program(v->supervisor), .job_folder = folder, .document = document, .report_fd = fd};
+        .program = v->runner.program, .job_folder = folder, .document = document, .report_fd = fd};
     status s = ask(v, &paths, &found, &end, refusal, err);
     if (s == STATUS_OK) worker_words_of_check(found);
     const bool judged = s == STATUS_OK && is_judgement(found);
@@ -187,7 +186,7 @@ static status enter(struct job_service *v, const char *job_id, int *fd, struct j
 {
     *fd = -1;
     status s = job_look(v, job_id, row, err);
-    if (s == STATUS_OK && v->supervisor == NULL)
+    if (s == STATUS_OK && v->runner.program == NULL)
         s = error_set(err, STATUS_INTERNAL, "cannot read the files: there are no workers");
     if (s == STATUS_OK) s = take_turn(v, refusal, err);
     if (s != STATUS_OK) return s;
@@ -276,11 +275,8 @@ static status plan_job(struct job_service *v, const struct job_row *row, int fd,
     path_join(job, v->settings->data, "jobs", row->id, NULL);
     path_join(folder, job, JOB_FOLDER_INPUT, NULL);
     path_join(speeds, v->settings->data, "speeds.json", NULL);
-    const struct worker_paths paths = {.program = supervisor_program(v->supervisor),
-                                       .job_folder = job,
-                                       .speeds = speeds,
-                                       .plan = true,
-                                       .report_fd = fd};
+    const struct worker_paths paths = {
+        .program = v->runner.program, .job_folder = job, .speeds = speeds, .plan = true, .report_fd = fd};
     status s = ask(v, &paths, &found, &end, refusal, err);
     if (s == STATUS_OK) worker_words_of_plan(found);
     if (s == STATUS_OK && (!is_plan(found) || json_is_object(json_object_get(found, "error"))))

@@ -317,7 +317,7 @@ static void stop_all(struct supervisor *u)
     }
 }
 
-/* Waits until a worker ends, supervisor_wake is called, or it is time to look at everything. */
+/* Waits until a worker ends, `wake` is called, or it is time to look at everything. */
 static void wait_for_news(struct supervisor *u)
 {
     struct pollfd news[MAX_WORKER + 1] = {{.fd = u->wake_fd, .events = POLLIN}};
@@ -345,6 +345,21 @@ static void *run(void *context)
     return NULL;
 }
 
+static void write_trouble(void *context, char *text, size_t n_text)
+{
+    const struct supervisor *u = context;
+    text[0] = '\0';
+    if (u->backend->trouble != NULL) u->backend->trouble(u->engine, text, n_text);
+}
+
+static void wake(void *context)
+{
+    const struct supervisor *u = context;
+    if (eventfd_write(u->wake_fd, 1) != 0) {
+        /* the counter is full, so the supervisor is awake already */
+    }
+}
+
 status supervisor_start(struct job_service *v, const char *worker_program, struct supervisor **out, struct error *err)
 {
     struct supervisor *u = calloc(1, sizeof *u);
@@ -359,10 +374,10 @@ status supervisor_start(struct job_service *v, const char *worker_program, struc
         return s;
     }
     u->wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-    v->supervisor = u;
+    v->runner = (struct job_runner){.program = u->worker, .wake = wake, .trouble = write_trouble, .context = u};
     int e = u->wake_fd < 0 ? errno : pthread_create(&u->thread, NULL, run, u);
     if (e != 0) {
-        v->supervisor = NULL;
+        v->runner = (struct job_runner){0};
         if (u->wake_fd >= 0) close(u->wake_fd);
         u->backend->close(u->engine);
         free(u);
@@ -373,28 +388,13 @@ status supervisor_start(struct job_service *v, const char *worker_program, struc
     return STATUS_OK;
 }
 
-const char *supervisor_program(const struct supervisor *u) { return u->worker; }
-
-void supervisor_trouble(const struct supervisor *u, char *text, size_t n_text)
-{
-    text[0] = '\0';
-    if (u->backend->trouble != NULL) u->backend->trouble(u->engine, text, n_text);
-}
-
-void supervisor_wake(struct supervisor *u)
-{
-    if (eventfd_write(u->wake_fd, 1) != 0) {
-        /* the counter is full, so the supervisor is awake already */
-    }
-}
-
 void supervisor_stop(struct supervisor *u)
 {
     if (u == NULL) return;
     atomic_store(&u->stop, true);
-    supervisor_wake(u);
+    wake(u);
     pthread_join(u->thread, NULL);
-    u->v->supervisor = NULL;
+    u->v->runner = (struct job_runner){0};
     close(u->wake_fd);
     free(u);
 }

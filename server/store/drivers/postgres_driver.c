@@ -1,6 +1,8 @@
 /* PostgreSQL as the database of several daemons. libpq is reached through a plug-in, so that no other service needs
  * it. */
 #include "base/machine/program_folder.h"
+#include "server/store/drivers/driver_table.h"
+#include "server/store/drivers/store_schema.h"
 #include "server/store/sql/store_sql.h"
 
 #include <dlfcn.h>

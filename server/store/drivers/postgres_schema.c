@@ -2,7 +2,9 @@
  * compared byte by byte (COLLATE "C"), as SQLite does. Counts are views rather than counters, so that changes of
  * different jobs wait for no common row; the last start of each owner and batch is a row, which starts of their jobs
  * alone write. Daemons, the jobs that they hold and their duties are explained in store_cluster.h. */
-#include "server/store/sql/store_sql.h"
+#include "server/store/drivers/store_schema.h"
+
+#include <stddef.h>
 
 #define TEXT_COLUMN " TEXT COLLATE \"C\" NOT NULL"
 #define NUMBER " BIGINT NOT NULL"

@@ -1,5 +1,7 @@
 /* SQLite, embedded: the database of a single daemon, with WAL and synchronous=FULL. */
+#include "server/store/drivers/driver_table.h"
 #include "server/store/drivers/store_backup.h"
+#include "server/store/drivers/store_schema.h"
 #include "server/store/sql/store_sql.h"
 
 #include <errno.h>

@@ -1,5 +1,6 @@
 #include "server/store/drivers/store_backup.h"
 #include "base/files/durable.h"
+#include "server/store/drivers/store_schema.h"
 #include "server/store/sql/store_sql.h"
 
 #include <errno.h>

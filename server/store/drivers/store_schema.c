@@ -1,5 +1,5 @@
 /* The schema of the database, and how an older one becomes the present one. */
-#include "server/store/sql/store_sql.h"
+#include "server/store/drivers/store_schema.h"
 
 /* Entry i changes the schema from version i to version i + 1. */
 static const char *const migration[] = {

@@ -94,8 +94,4 @@ struct store_driver {
     void (*make_room)(struct store_link *link, const char *address);
 };
 
-/* The row for an address. */
-const struct store_driver *store_driver_of(const char *address);
-extern const struct store_driver store_sqlite, store_postgres;
-
 #endif

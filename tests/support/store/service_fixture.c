@@ -1,5 +1,6 @@
 #include "tests/support/store/service_fixture.h"
 #include "server/settings/job_paths.h"
+#include "server/start/service_open.h"
 #include "tests/support/scratch_folder.h"
 
 #include <setjmp.h>
@@ -19,7 +20,7 @@ static int open_service(struct service_fixture *f)
     struct log *log = NULL;
     f->log_stream = open_memstream(&f->log, &f->n_log);
     if (f->log_stream == NULL || log_open(NULL, f->log_stream, LOG_LEVEL_INFO, &log, &err) != STATUS_OK) return -1;
-    if (job_service_open(&f->settings, log, &f->service, &err) == STATUS_OK) return 0;
+    if (service_open(&f->settings, log, &f->service, &err) == STATUS_OK) return 0;
     printf("%s\n", err.text);
     return -1;
 }
@@ -27,7 +28,7 @@ static int open_service(struct service_fixture *f)
 static void close_service(struct service_fixture *f)
 {
     struct log *log = f->service->log;
-    job_service_close(f->service);
+    service_close(f->service);
     log_close(log);
     fclose(f->log_stream);
     free(f->log);

@@ -1,6 +1,6 @@
 /* Two daemons on one database: who has a job, a duty or the gate, and what becomes of it when a daemon ends. */
-#include "server/store/sql/store_sql.h"
 #include "server/store/store_cluster.h"
+#include "server/store/store_rows.h"
 #include "tests/support/store/store_fixture.h"
 
 #include <pthread.h>
