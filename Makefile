@@ -162,7 +162,7 @@ generate: $(PRINT_OPTIONS) $(BUILD)/bin/selvedge-worker ## write what follows fr
 	@/usr/bin/python3 config/generate_model_tables.py $(BUILD)/bin/selvedge-worker
 
 # tables of light that is scattered in the medulla of a hair, checked in as source; made again after a change of their grid
-MEDULLA := renderer/scattering/surface/fur/medulla
+MEDULLA := renderer/scattering/models/fur/medulla
 $(BUILD)/tools/medulla-tables: $(BUILD)/obj/$(MEDULLA)/medulla_tables_main.c.o $(L)renderer.a $(L)base.a
 	@mkdir -p $(@D)
 	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_BASE)
@@ -170,18 +170,18 @@ medulla-tables: $(BUILD)/tools/medulla-tables ## make the tables of the medulla 
 	@$(BUILD)/tools/medulla-tables $(MEDULLA)
 
 # tables of waves that fibers scatter, checked in as source; made again after a change of a section or of the mean over sizes
-WAVE := renderer/scattering/surface/wave
+WAVE := renderer/scattering/models/wave
 $(BUILD)/tools/wave-tables: $(BUILD)/obj/$(WAVE)/wave_tables_main.c.o $(BUILD)/obj/$(WAVE)/wave_sections.c.o \
-		$(patsubst %,$(BUILD)/obj/%.o,$(wildcard renderer/scattering/wave/*.c)) $(L)base.a
+		$(patsubst %,$(BUILD)/obj/%.o,$(wildcard renderer/scattering/models/wave/solver/*.c)) $(L)base.a
 	@mkdir -p $(@D)
 	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_WAVE) $(LINK_BASE)
 wave-tables: $(BUILD)/tools/wave-tables ## make the tables of wave_silk.v1 and its like again (two minutes of a core; a third of it with libopenblas0-serial)
 	@$(BUILD)/tools/wave-tables $(WAVE)
 
 # tables of speckle, checked in as source; made again after a change of a section, of the roughness or of the bands
-SPECKLE := renderer/scattering/speckle
-$(BUILD)/tools/speckle-tables: $(addprefix $(BUILD)/obj/$(SPECKLE)/,speckle_tables_main.c.o speckle_instances.c.o speckle.c.o) \
-		$(BUILD)/obj/$(WAVE)/wave_sections.c.o $(patsubst %,$(BUILD)/obj/%.o,$(wildcard renderer/scattering/wave/*.c)) $(L)base.a
+SPECKLE := renderer/scattering/models/wave/speckle
+$(BUILD)/tools/speckle-tables: $(addprefix $(BUILD)/obj/$(SPECKLE)/,speckle_tables_main.c.o speckle_instances.c.o) $(BUILD)/obj/renderer/scattering/speckle.c.o \
+		$(BUILD)/obj/$(WAVE)/wave_sections.c.o $(patsubst %,$(BUILD)/obj/%.o,$(wildcard renderer/scattering/models/wave/solver/*.c)) $(L)base.a
 	@mkdir -p $(@D)
 	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_WAVE) $(LINK_BASE)
 speckle-tables: $(BUILD)/tools/speckle-tables ## make the tables of speckle of wave_silk.v1 and its like again (three minutes of a core)

@@ -42,7 +42,7 @@ struct model_nesting {
 
 /* The i-th, NULL behind the last. */
 const struct model_nesting *model_catalogue_nesting(size_t i);
-/* The id of the i-th model with speckle (renderer/scattering/speckle), NULL behind the last, and whether a model has
+/* The id of the i-th model with speckle (renderer/scattering/speckle.h), NULL behind the last, and whether a model has
  * it. */
 const char *model_catalogue_with_speckle(size_t i);
 bool model_catalogue_has_speckle(const char *id);

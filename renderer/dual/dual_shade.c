@@ -1,5 +1,5 @@
 #include "renderer/dual/dual_shade.h"
-#include "renderer/scattering/fiber_direction.h"
+#include "renderer/scattering/lobes/fiber_direction.h"
 #include "renderer/transport/surface/fiber_frame.h"
 #include "renderer/transport/surface/path_beyond.h"
 

@@ -43,8 +43,8 @@ struct radiance_input {
                                        derivatives */
     const struct dual_option *dual;           /* NULL, or fibers by dual scattering, without derivatives */
     const struct diffusion_option *diffusion; /* NULL, or cloths with a pile by diffusion, without derivatives */
-    /* The speckle of fibers (renderer/scattering/speckle) on light that is scattered once: for pictures alone. Not with
-     * derivatives, for recorded paths, volumes, or other ways than path tracing. */
+    /* The speckle of fibers (renderer/scattering/speckle.h) on light that is scattered once: for pictures alone. Not
+     * with derivatives, for recorded paths, volumes, or other ways than path tracing. */
     bool has_speckle;
     uint64_t speckle_seed;
     bool plain_paths; /* trace neither guided shadow paths nor to strips of lamps (path_tracer.h): same means, more

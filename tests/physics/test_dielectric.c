@@ -3,9 +3,9 @@
  */
 #include "base/angle.h"
 #include "base/rng.h"
+#include "renderer/scattering/lobes/cone_lobe.h"
+#include "renderer/scattering/models/dielectric/dielectric_ray.h"
 #include "renderer/scattering/scattering.h"
-#include "renderer/scattering/surface/cone_lobe.h"
-#include "renderer/scattering/surface/dielectric/dielectric_ray.h"
 #include "tests/support/model/fiber_angles.h"
 
 #include <math.h>

@@ -40,7 +40,7 @@ struct job_surface_picture {
     bool visibility_by_tables;           /* of JOB_PICTURE_FAST */
     bool deep_by_cells;                  /* of JOB_PICTURE_FAST; with visibility_by_tables in any case */
     size_t n_deep_path;                  /* that make the table in place of the cells */
-    bool speckle;                        /* of single fibers (renderer/scattering/speckle) */
+    bool speckle;                        /* of single fibers (renderer/scattering/speckle.h) */
     bool field_by_pixel;                 /* near fields become far fields where pixels are as wide as fibers */
     double ground_gap_mm, ground_albedo; /* of a plane under the cloth; gap NaN: none */
 };

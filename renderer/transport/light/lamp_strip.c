@@ -1,5 +1,5 @@
 #include "renderer/transport/light/lamp_strip.h"
-#include "renderer/scattering/von_mises.h"
+#include "renderer/scattering/lobes/von_mises.h"
 
 /* Standard deviation, in half sides of the lamp, up to which a lobe counts as narrow. Pictures by tables of a Gabardine
  * (0.46) have 0.8 times the variance with 0.8 in place of 0.4, in the same time (transport/NOTES.md). */

@@ -1,5 +1,5 @@
 /* Factors on the light of one path: the discrepancy of the cloth (renderer/transport/discrepancy.h), and the speckle of
- * fibers (renderer/scattering/speckle). Inside of path_tracer.c.
+ * fibers (renderer/scattering/speckle.h). Inside of path_tracer.c.
  */
 #ifndef SELVEDGE_RENDERER_PATH_FACTOR_H
 #define SELVEDGE_RENDERER_PATH_FACTOR_H

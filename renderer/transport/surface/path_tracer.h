@@ -9,7 +9,7 @@
 
 #include "base/rng.h"
 #include "renderer/scattering/scattering.h"
-#include "renderer/scattering/speckle/speckle.h"
+#include "renderer/scattering/speckle.h"
 #include "renderer/scene/scene_ray.h"
 #include "renderer/transport/discrepancy.h"
 #include "renderer/transport/light/lamp_strip.h"

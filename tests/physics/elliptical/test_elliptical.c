@@ -3,9 +3,9 @@
  */
 #include "base/angle.h"
 #include "base/rng.h"
+#include "renderer/scattering/models/dielectric/dielectric_ray.h"
+#include "renderer/scattering/models/elliptical/ellipse_ray.h"
 #include "renderer/scattering/scattering.h"
-#include "renderer/scattering/surface/dielectric/dielectric_ray.h"
-#include "renderer/scattering/surface/elliptical/ellipse_ray.h"
 #include "tests/support/model/model_furnace.h"
 #include "tests/support/model/space_ray.h"
 

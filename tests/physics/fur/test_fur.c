@@ -4,7 +4,7 @@
  */
 #include "base/angle.h"
 #include "base/rng.h"
-#include "renderer/scattering/surface/fur/fur_far.h"
+#include "renderer/scattering/models/fur/fur_far.h"
 #include "tests/support/model/fiber_angles.h"
 
 #include <math.h>

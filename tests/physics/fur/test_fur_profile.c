@@ -3,7 +3,7 @@
  */
 #include "base/angle.h"
 #include "optimizer/fit/profile/profile_fit.h"
-#include "renderer/scattering/surface/dielectric/dielectric_ray.h"
+#include "renderer/scattering/models/dielectric/dielectric_ray.h"
 #include "tests/support/fiber/fiber_rays.h"
 #include "tests/support/statistics_test.h"
 

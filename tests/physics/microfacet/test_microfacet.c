@@ -1,7 +1,7 @@
 /* microfacet_ellipse.v1 against random walks through a fiber of facets, and its light from both sides. */
 #include "base/angle.h"
 #include "base/rng.h"
-#include "renderer/scattering/surface/microfacet/microfacet.h"
+#include "renderer/scattering/models/microfacet/microfacet.h"
 #include "tests/support/model/model_furnace.h"
 
 #include <math.h>

@@ -2,7 +2,7 @@
  * the exact cylinder of Lorenz and Mie. test_mie_cylinder.c compares the lobe of one wavelength with it.
  */
 #include "base/angle.h"
-#include "renderer/scattering/surface/dielectric/strip_lobe.h"
+#include "renderer/scattering/models/dielectric/strip_lobe.h"
 #include "tests/support/model/fiber_angles.h"
 #include "tests/support/model/model_furnace.h"
 #include "tests/support/wave/mie_cylinder.h"

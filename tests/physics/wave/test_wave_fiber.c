@@ -2,10 +2,10 @@
  * section, the tables against the solver, and the furnace from both sides.
  */
 #include "base/angle.h"
+#include "renderer/scattering/models/elliptical/ellipse_ray.h"
+#include "renderer/scattering/models/wave/solver/wave_mean.h"
+#include "renderer/scattering/models/wave/wave_table.h"
 #include "renderer/scattering/scattering.h"
-#include "renderer/scattering/surface/elliptical/ellipse_ray.h"
-#include "renderer/scattering/surface/wave/wave_table.h"
-#include "renderer/scattering/wave/wave_mean.h"
 #include "tests/support/model/model_furnace.h"
 
 #include <math.h>

@@ -1,8 +1,8 @@
 /* The boundary-element solver of waves: against the exact circular cylinder, by the energy, by reciprocity, and by its
  * own convergence; outlines from points.
  */
-#include "renderer/scattering/wave/cylinder_functions.h"
-#include "renderer/scattering/wave/wave_solver.h"
+#include "renderer/scattering/models/wave/solver/cylinder_functions.h"
+#include "renderer/scattering/models/wave/solver/wave_solver.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/wave/mie_cylinder.h"
 

@@ -2,8 +2,8 @@
  * developed speckle, and what stays when light, camera and wavelength change. Limits follow from standard errors.
  */
 #include "base/rng.h"
+#include "renderer/scattering/models/wave/speckle/speckle_tables.h"
 #include "renderer/scattering/scattering.h"
-#include "renderer/scattering/speckle/speckle_tables.h"
 #include "tests/support/statistics_test.h"
 
 #include <math.h>

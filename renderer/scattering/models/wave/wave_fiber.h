@@ -1,0 +1,57 @@
+/* wave_silk.v1, wave_trilobal.v1, wave_cotton.v1: fibers of a few micrometers whose sections scatter light as waves,
+ * seen from afar and turned at random about their axes. Reciprocal; lossless from both sides where C_T = 1.
+ *
+ *     S = a(th_i) a(th_o) g(th_i + th_o; beta) N(ph; C_T^(1 / cos th_t), gamma),   sin th_t = sin th_d / index
+ *
+ * after Xia et al. 2020, "A Wave Optics Based Fiber Scattering Model". N is the table of the section (wave_table.h),
+ * made by a solver of Maxwell's equations across the fiber and blurred by a wrapped Gaussian D of the width gamma,
+ * which multiplies the Fourier coefficient k by exp(-k^2 gamma^2 / 2). g is a Gaussian, and a(th) balances it
+ * (lobe_balance.h).
+ *
+ * Approximations: across the fiber the waves are exact; for oblique light the section scatters as for normal
+ * incidence, but for the longer way through the dye. One lobe along the fiber serves all light.
+ *
+ * What differs from the publication: the orientation of the section, the size and the wavelengths of a channel are
+ * averaged over; the forward lobe of diffraction is taken away (wave_mean.h), so that fibers are met within their own
+ * width and none has to be widened; a table holds 1746 numbers in place of 6.5e8; a(th) takes the place of 1 / cos
+ * th.
+ *
+ * N is tabulated for N_ROW + 1 values of cos th_d and read between N_PHI + 1 azimuths by straight lines. Derivatives
+ * are exact for what is tabulated.
+ */
+#ifndef SELVEDGE_RENDERER_WAVE_FIBER_H
+#define SELVEDGE_RENDERER_WAVE_FIBER_H
+
+#include "base/status.h"
+#include "renderer/scattering/lobes/lobe_balance.h"
+#include "renderer/scattering/lobes/tilted_lobe.h"
+#include "renderer/scattering/models/wave/wave_table.h"
+#include "renderer/scattering/scattering_registry.h"
+
+enum { WAVE_P_C_T = 0, WAVE_P_BETA = 3, WAVE_P_GAMMA, WAVE_N_PARAM };
+enum { WAVE_N_ROW = 32, WAVE_N_PHI = 180 };
+enum { WAVE_D_C_T, WAVE_D_GAMMA, WAVE_N_SLOPE };
+
+/* N at one place of the table, and its derivatives; that by C_T is by the one of the channel. */
+struct wave_cell {
+    float n[3], d[WAVE_N_SLOPE][3];
+};
+
+/* By cos th_d. Samples choose a channel and an azimuth of it. */
+struct wave_row {
+    float energy[3][3]; /* light of each channel that leaves, on the diagonal */
+    float density[3][WAVE_N_PHI + 1], below[3][WAVE_N_PHI + 1];
+};
+
+struct scattering_state {
+    struct tilted_lobe along;                                /* without a shift */
+    float scale[LOBE_BALANCE_N], d_ln_scale[LOBE_BALANCE_N]; /* a by |th|, and by beta */
+    struct wave_row row[WAVE_N_ROW + 1];
+    struct wave_cell cell[WAVE_N_ROW + 1][WAVE_N_PHI + 1];
+};
+
+/* Fills in rows and cells. STATUS_NO_MEMORY. */
+status wave_fiber_tables(struct scattering_state *s, const struct wave_table *table, const double *param,
+                         struct error *err);
+
+#endif

@@ -1,0 +1,44 @@
+#include "renderer/scattering/scattering_registry.h"
+
+#include <math.h>
+#include <string.h>
+
+static const struct scattering_model *const registry[] = {
+#define SURFACE_MODEL(name, ...) &scattering_##name,
+#define VOLUME_MODEL(name, ...)
+#include "base/catalogue/models.def"
+    NULL,
+};
+
+const struct scattering_model *const *scattering_registry(void) { return registry; }
+
+const struct scattering_model *scattering_find(const char *id)
+{
+    for (size_t i = 0; registry[i] != NULL; i++)
+        if (strcmp(registry[i]->id, id) == 0) return registry[i];
+    return NULL;
+}
+
+int scattering_param_index(const struct scattering_model *m, const char *name)
+{
+    return param_index(m->param, m->n_param, name);
+}
+
+status scattering_prepare(const struct scattering_model *m, const double *param, struct thread_pool *pool,
+                          struct scattering_state **state, struct error *err)
+{
+    return pool != NULL && m->prepare_shared != NULL ? m->prepare_shared(param, pool, state, err)
+                                                     : m->prepare(param, state, err);
+}
+
+const char *scattering_frame_reason(const struct scattering_model *m)
+{
+    if (m->flat_section) return "its fibers are flat";
+    return m->near_field ? "its light depends on where across the fiber it is seen" : NULL;
+}
+
+double scattering_view_azimuth_rad(const struct scattering_model *m, int k, int n)
+{
+    if (m->near_field) return asin((2 * k + 1.0) / n - 1);
+    return m->flat_section ? 2 * M_PI * (k + 0.5) / n : 0;
+}
