@@ -1,8 +1,8 @@
 /* selvedge, the command line client. It communicates with the daemon only through HTTP. */
 #include "base/version.h"
-#include "clients/cli/cli.h"
-#include "clients/cli/cli_text.h"
-#include "clients/cli/tools/cli_tool.h"
+#include "clients/cli/arguments/cli_tool.h"
+#include "clients/cli/commands/cli.h"
+#include "clients/cli/text/cli_text.h"
 
 #include <curl/curl.h>
 #include <locale.h>

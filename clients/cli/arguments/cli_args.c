@@ -1,8 +1,8 @@
 #include "clients/cli/arguments/cli_args.h"
 #include "clients/cli/arguments/cli_command_table.h"
 #include "clients/cli/arguments/cli_option_bits.h"
-#include "clients/cli/cli_text.h"
-#include "clients/cli/tools/cli_tool.h"
+#include "clients/cli/arguments/cli_tool.h"
+#include "clients/cli/text/cli_text.h"
 
 #include <getopt.h>
 #include <stddef.h>

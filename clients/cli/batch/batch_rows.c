@@ -1,7 +1,7 @@
 #include "clients/cli/batch/batch_rows.h"
 #include "base/json/document_path.h"
-#include "clients/cli/batch/csv_table.h"
 #include "clients/cli/folder/sample_files.h"
+#include "clients/cli/text/csv_table.h"
 
 #include <dirent.h>
 #include <stdio.h>

@@ -3,7 +3,7 @@
 #define SELVEDGE_CLIENTS_BATCH_ROWS_H
 
 #include "base/status.h"
-#include "clients/cli/cli_job_files.h"
+#include "clients/cli/commands/cli_job_files.h"
 
 #include <jansson.h>
 

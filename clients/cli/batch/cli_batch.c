@@ -1,6 +1,6 @@
 /* Commands about batches: many samples with one template. */
 #include "clients/cli/batch/cli_batch.h"
-#include "clients/cli/cli_text.h"
+#include "clients/cli/text/cli_text.h"
 
 #include <stdlib.h>
 #include <string.h>

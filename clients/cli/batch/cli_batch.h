@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_CLIENTS_CLI_BATCH_H
 #define SELVEDGE_CLIENTS_CLI_BATCH_H
 
-#include "clients/cli/cli.h"
+#include "clients/cli/commands/cli.h"
 
 /* Writes "/v1/batches/ID" and `tail` to path, for the batch with this name, id or beginning of an id. STATUS_NOT_FOUND,
  * STATUS_INVALID when there are several. */

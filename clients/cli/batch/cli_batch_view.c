@@ -1,6 +1,6 @@
 /* Texts about batches. */
 #include "clients/cli/batch/cli_batch.h"
-#include "clients/cli/cli_text.h"
+#include "clients/cli/text/cli_text.h"
 
 #include <string.h>
 #include <time.h>

@@ -1,6 +1,6 @@
 /* selvedge plan BATCH: what the samples of a batch will take, and how far off that was. */
 #include "clients/cli/batch/cli_batch.h"
-#include "clients/cli/cli_text.h"
+#include "clients/cli/text/cli_text.h"
 
 #include <stdlib.h>
 #include <string.h>

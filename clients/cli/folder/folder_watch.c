@@ -2,8 +2,8 @@
  * harmlessly: its job is found by a key of its content, and state.json is written before the next step. So the watcher,
  * the daemon and the machine may be killed at any time. The folder is polled, because network shares send no events. */
 #include "base/clock.h"
-#include "clients/cli/cli_text.h"
 #include "clients/cli/folder/sample_outcome.h"
+#include "clients/cli/text/cli_text.h"
 
 #include <dirent.h>
 #include <errno.h>

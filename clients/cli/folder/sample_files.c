@@ -1,5 +1,5 @@
 #include "clients/cli/folder/sample_files.h"
-#include "clients/cli/cli_job_files.h"
+#include "clients/cli/commands/cli_job_files.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -4,7 +4,7 @@
 #ifndef SELVEDGE_CLIENTS_SAMPLE_OUTCOME_H
 #define SELVEDGE_CLIENTS_SAMPLE_OUTCOME_H
 
-#include "clients/cli/cli.h"
+#include "clients/cli/commands/cli.h"
 #include "clients/cli/folder/sample_files.h"
 
 #define SAMPLE_OUTCOME_SUFFIX ".selvedge"

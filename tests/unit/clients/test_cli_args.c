@@ -2,9 +2,9 @@
  * parts of the client are in no library. */
 #include "clients/cli/arguments/cli_args.c"          /* NOLINT */
 #include "clients/cli/arguments/cli_command_table.c" /* NOLINT */
-#include "clients/cli/cli_text.c"                    /* NOLINT */
-#include "clients/cli/tools/cli_sibling.c"           /* NOLINT */
-#include "clients/cli/tools/cli_tool.c"              /* NOLINT */
+#include "clients/cli/arguments/cli_sibling.c"       /* NOLINT */
+#include "clients/cli/arguments/cli_tool.c"          /* NOLINT */
+#include "clients/cli/text/cli_text.c"               /* NOLINT */
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,8 +1,8 @@
 /* What the command line client prints of a result. The source files are included here, because the parts of the client
  * are in no library. */
-#include "clients/cli/cli_text.c" /* NOLINT */
+#include "clients/cli/text/cli_text.c" /* NOLINT */
 
-#include "clients/cli/cli_report.c" /* NOLINT */
+#include "clients/cli/text/cli_report.c" /* NOLINT */
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,6 +1,6 @@
 /* Texts that the command line client shows. The source file is included here, because the parts of the client are in no
  * library. */
-#include "clients/cli/cli_text.c" /* NOLINT */
+#include "clients/cli/text/cli_text.c" /* NOLINT */
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -4,7 +4,7 @@
 
 static double now_s;
 #define clock_monotonic_s() now_s
-#include "clients/cli/cli_watch.c" /* NOLINT */
+#include "clients/cli/commands/cli_watch.c" /* NOLINT */
 
 #include <setjmp.h>
 #include <stdint.h>

@@ -1,4 +1,4 @@
-#include "clients/cli/cli_text.h"
+#include "clients/cli/text/cli_text.h"
 #include "base/utf8.h"
 
 #include <math.h>

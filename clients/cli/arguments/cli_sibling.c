@@ -1,4 +1,4 @@
-#include "clients/cli/tools/cli_sibling.h"
+#include "clients/cli/arguments/cli_sibling.h"
 #include "base/machine/program_folder.h"
 
 #include <stdio.h>

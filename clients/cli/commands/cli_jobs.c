@@ -1,7 +1,7 @@
 /* The short commands, which make one or two calls and print the reply. */
-#include "clients/cli/cli.h"
-#include "clients/cli/cli_report.h"
-#include "clients/cli/cli_text.h"
+#include "clients/cli/commands/cli.h"
+#include "clients/cli/text/cli_report.h"
+#include "clients/cli/text/cli_text.h"
 
 #include <stdlib.h>
 #include <string.h>

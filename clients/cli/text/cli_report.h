@@ -3,7 +3,7 @@
 #ifndef SELVEDGE_CLIENTS_CLI_REPORT_H
 #define SELVEDGE_CLIENTS_CLI_REPORT_H
 
-#include "clients/cli/cli_text.h"
+#include "clients/cli/text/cli_text.h"
 
 #include <jansson.h>
 #include <stdio.h>

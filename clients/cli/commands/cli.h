@@ -5,7 +5,7 @@
 #define SELVEDGE_CLIENTS_CLI_H
 
 #include "clients/cli/arguments/cli_args.h"
-#include "clients/cli/cli_http.h"
+#include "clients/cli/commands/cli_http.h"
 
 #include <stdio.h>
 

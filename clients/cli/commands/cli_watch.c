@@ -1,7 +1,7 @@
 /* Follows a job: polls with the ETag, prints what has changed, and reports the outcome. */
-#include "clients/cli/cli.h"
-#include "clients/cli/cli_report.h"
-#include "clients/cli/cli_text.h"
+#include "clients/cli/commands/cli.h"
+#include "clients/cli/text/cli_report.h"
+#include "clients/cli/text/cli_text.h"
 
 #include "base/clock.h"
 

@@ -1,7 +1,7 @@
 /* selvedge render ID: a picture of a finished job's cloth on a surface, as a job of its own. Its document has the
  * fibers and the fitted parameters of the first job, which is not run again and may be deleted. */
 #include "base/files/file_tree.h"
-#include "clients/cli/cli.h"
+#include "clients/cli/commands/cli.h"
 
 #include <libgen.h>
 #include <math.h>

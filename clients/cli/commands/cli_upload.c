@@ -1,6 +1,6 @@
 /* The client's side of tus 1.0: asks for the offset, sends pieces, and continues after a broken connection. */
-#include "clients/cli/cli.h"
-#include "clients/cli/cli_job_files.h"
+#include "clients/cli/commands/cli.h"
+#include "clients/cli/commands/cli_job_files.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -1,8 +1,8 @@
 /* Access tokens: the file that a token is read from, and `selvedge token`, by which an administrator makes, lists and
  * revokes them. */
 #include "base/files/durable.h"
-#include "clients/cli/cli.h"
-#include "clients/cli/cli_text.h"
+#include "clients/cli/commands/cli.h"
+#include "clients/cli/text/cli_text.h"
 
 #include <errno.h>
 #include <fcntl.h>

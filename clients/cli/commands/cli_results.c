@@ -1,5 +1,5 @@
-#include "clients/cli/cli.h"
-#include "clients/cli/cli_text.h"
+#include "clients/cli/commands/cli.h"
+#include "clients/cli/text/cli_text.h"
 
 #include "base/files/durable.h"
 

@@ -1,7 +1,7 @@
 /* The list of jobs, and ids that are not written out. */
 #include "base/clock.h"
-#include "clients/cli/cli.h"
-#include "clients/cli/cli_report.h"
+#include "clients/cli/commands/cli.h"
+#include "clients/cli/text/cli_report.h"
 
 #include <math.h>
 #include <stdlib.h>

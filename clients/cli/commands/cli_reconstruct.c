@@ -1,5 +1,5 @@
 /* selvedge reconstruct SCAN: a job of geometry only, for one who has a scan and wants its fibers. */
-#include "clients/cli/cli.h"
+#include "clients/cli/commands/cli.h"
 
 #include <dirent.h>
 #include <errno.h>

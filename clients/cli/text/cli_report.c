@@ -1,4 +1,4 @@
-#include "clients/cli/cli_report.h"
+#include "clients/cli/text/cli_report.h"
 
 #include <math.h>
 #include <stdbool.h>

@@ -1,7 +1,7 @@
-#include "clients/cli/cli.h"
-#include "clients/cli/cli_job_files.h"
-#include "clients/cli/cli_report.h"
-#include "clients/cli/cli_text.h"
+#include "clients/cli/commands/cli.h"
+#include "clients/cli/commands/cli_job_files.h"
+#include "clients/cli/text/cli_report.h"
+#include "clients/cli/text/cli_text.h"
 
 #include "base/clock.h"
 #include "base/files/durable.h"

@@ -1,4 +1,4 @@
-#include "clients/cli/batch/csv_table.h"
+#include "clients/cli/text/csv_table.h"
 #include "base/files/durable.h"
 
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-#include "clients/cli/cli_http.h"
+#include "clients/cli/commands/cli_http.h"
 
 #include "base/clock.h"
 

@@ -1,6 +1,6 @@
 /* The command versions: the results of a job's runs. */
-#include "clients/cli/cli.h"
-#include "clients/cli/cli_text.h"
+#include "clients/cli/commands/cli.h"
+#include "clients/cli/text/cli_text.h"
 
 #include <stdlib.h>
 #include <string.h>

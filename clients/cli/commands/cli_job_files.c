@@ -1,4 +1,4 @@
-#include "clients/cli/cli_job_files.h"
+#include "clients/cli/commands/cli_job_files.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -1,6 +1,6 @@
-#include "clients/cli/tools/cli_tool.h"
+#include "clients/cli/arguments/cli_tool.h"
 
-#include "clients/cli/tools/cli_sibling.h"
+#include "clients/cli/arguments/cli_sibling.h"
 
 #include <stdint.h>
 #include <string.h>
