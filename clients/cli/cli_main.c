@@ -1,5 +1,6 @@
 /* selvedge, the command line client. It communicates with the daemon only through HTTP. */
 #include "base/version.h"
+#include "clients/cli/arguments/cli_parse.h"
 #include "clients/cli/arguments/cli_tool.h"
 #include "clients/cli/commands/cli.h"
 #include "clients/cli/text/cli_text.h"
@@ -22,13 +23,9 @@ static void on_signal(int number)
 }
 
 static status (*const run[CLI_N_COMMAND])(struct cli *, int *, struct error *) = {
-    [CLI_SUBMIT] = cli_submit,       [CLI_CHECK] = cli_check,       [CLI_RECONSTRUCT] = cli_reconstruct,
-    [CLI_RENDER] = cli_render,       [CLI_STATUS] = cli_status,     [CLI_WATCH] = cli_watch,
-    [CLI_LIST] = cli_list,           [CLI_CANCEL] = cli_cancel,     [CLI_RETRY] = cli_retry,
-    [CLI_RESULTS] = cli_results,     [CLI_VERSIONS] = cli_versions, [CLI_LOG] = cli_log,
-    [CLI_SERIES] = cli_series,       [CLI_DELETE] = cli_delete,     [CLI_WATCH_FOLDER] = cli_watch_folder,
-    [CLI_TOKEN] = cli_token,         [CLI_KEEP] = cli_keep,         [CLI_UNKEEP] = cli_unkeep,
-    [CLI_RETENTION] = cli_retention, [CLI_BATCH] = cli_batch,       [CLI_PLAN] = cli_plan,
+#define CLI_COMMAND(id, run, ...) [CLI_##id] = run,
+#include "clients/cli/arguments/cli_commands.def"
+#undef CLI_COMMAND
 };
 
 static void print_error(const struct error *err)

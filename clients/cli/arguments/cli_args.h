@@ -1,39 +1,12 @@
-/* The command line of `selvedge`. Parsing and help texts come from a table of commands and a table of options. The
- * functions print nothing, and read only the environment that they are given. */
+/* The command line of `selvedge`, parsed. */
 #ifndef SELVEDGE_CLIENTS_CLI_ARGS_H
 #define SELVEDGE_CLIENTS_CLI_ARGS_H
 
-#include "base/status.h"
+#include "clients/cli/arguments/cli_command_table.h"
 
 #include <stdbool.h>
-#include <stddef.h>
 
 #define CLI_DEFAULT_SERVER "http://127.0.0.1:7878"
-
-enum cli_command_id {
-    CLI_SUBMIT,
-    CLI_CHECK,
-    CLI_RECONSTRUCT,
-    CLI_RENDER,
-    CLI_STATUS,
-    CLI_WATCH,
-    CLI_LIST,
-    CLI_CANCEL,
-    CLI_RETRY,
-    CLI_RESULTS,
-    CLI_VERSIONS,
-    CLI_LOG,
-    CLI_SERIES,
-    CLI_DELETE,
-    CLI_WATCH_FOLDER,
-    CLI_TOKEN,
-    CLI_KEEP,
-    CLI_UNKEEP,
-    CLI_RETENTION,
-    CLI_BATCH,
-    CLI_PLAN,
-    CLI_N_COMMAND
-};
 
 /* All that the command line says. The strings point into argv or the environment; NULL if not given. */
 struct cli_args {
@@ -76,21 +49,5 @@ struct cli_args {
     bool version;
     bool has_command;
 };
-
-/* The values of SELVEDGE_SERVER, SELVEDGE_TOKEN and SELVEDGE_TOKEN_FILE, NULL if unset. */
-struct cli_environment {
-    const char *server, *token, *token_file;
-};
-
-/* Options override the environment. A token is never an option: other users see the list of processes. STATUS_INVALID
- * for an unknown command or option (the text names the nearest known one) and for a missing or extra operand. */
-status cli_args_parse(int argc, char *const *argv, const struct cli_environment *env, struct cli_args *args,
-                      struct error *err);
-
-/* Whether the operand of the command is the id of a job. */
-bool cli_operand_is_id(enum cli_command_id id);
-const char *cli_command_name(enum cli_command_id id);
-/* Writes the help text of one command, or of the program if has_command is false: at most n_bytes, NUL-terminated. */
-void cli_help(const struct cli_args *args, char *text, size_t n_bytes);
 
 #endif

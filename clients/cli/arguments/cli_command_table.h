@@ -1,16 +1,30 @@
-/* The commands of the command line, a row each. */
+/* The commands of the command line, a row each (cli_commands.def). */
 #ifndef SELVEDGE_CLIENTS_CLI_COMMAND_TABLE_H
 #define SELVEDGE_CLIENTS_CLI_COMMAND_TABLE_H
 
-#include "clients/cli/arguments/cli_args.h"
+#include <stdbool.h>
+
+enum cli_command_id {
+#define CLI_COMMAND(id, run, ...) CLI_##id,
+#include "clients/cli/arguments/cli_commands.def"
+#undef CLI_COMMAND
+    CLI_N_COMMAND
+};
 
 struct cli_command {
-    const char *name, *operand, *what, *more;
-    int option;
-    const char *needs;  /* what the operand is, for the message when it is missing; NULL: a job id */
-    const char *second; /* a second operand that may follow; NULL: none */
-    const char *third;  /* the same after the second one */
+    const char *name;
+    const char *operand; /* name of the operand in the help; NULL: none */
+    const char *needs;   /* describes the operand in the message when it is missing; NULL: it is a job id */
+    const char *second;  /* a second operand that may follow; NULL: none */
+    const char *third;   /* a third one */
+    const char
+        *options; /* names of options and of groups of options (cli_option_table.h), between blanks; may be NULL */
+    const char *summary; /* a line of the program's help */
+    const char *text;    /* further lines of the command's help; may be NULL */
 };
 extern const struct cli_command cli_command_table[CLI_N_COMMAND];
+
+/* Whether the operand of the command is the id of a job. */
+bool cli_operand_is_id(enum cli_command_id id);
 
 #endif

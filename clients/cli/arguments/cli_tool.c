@@ -6,31 +6,23 @@
 #include <string.h>
 #include <unistd.h>
 
-/* option: what takes the place of the command's word; NULL: the word stays */
-static const struct {
-    const char *word, *program, *option;
-} command[] = {{"photo", "selvedge-camera", NULL},
-               {"calibrate-camera", "selvedge-camera", NULL},
-               {"bowl", "selvedge-camera", NULL},
-               {"doctor", "selvedged", "--doctor"}};
-enum { N_COMMAND = sizeof command / sizeof *command, MOST_ARGUMENTS = 60 };
+const struct cli_tool cli_tool_table[CLI_N_TOOL] = {
+    {"doctor", "[JOB]", "examine this machine and the service's data, or a job", "selvedged", "--doctor"},
+    {"photo", "FILE...", "show what becomes of a photograph", "selvedge-camera", NULL},
+    {"calibrate-camera", NULL, "make the record of a camera's noise from dark and flat frames", "selvedge-camera",
+     NULL},
+    {"bowl", "JOB.json", "make the profile of a fiber from photographs of a bowl", "selvedge-camera", NULL},
+};
+enum { MOST_ARGUMENTS = 60 };
 
 /* Where an installed service has them (config/selvedge.service). */
 static const char installed_settings[] = "/etc/selvedge/selvedge.conf", installed_data[] = "/var/lib/selvedge";
 
 bool cli_tool_knows(const char *word)
 {
-    for (size_t i = 0; i < N_COMMAND; i++)
-        if (strcmp(command[i].word, word) == 0) return true;
+    for (size_t i = 0; i < CLI_N_TOOL; i++)
+        if (strcmp(cli_tool_table[i].name, word) == 0) return true;
     return false;
-}
-
-const char *cli_tool_help(void)
-{
-    return "  doctor [JOB]       examine this machine and the service's data, or a job (needs no daemon)\n"
-           "  photo FILE...      show what becomes of a photograph (needs no daemon)\n"
-           "  calibrate-camera   make the record of a camera's noise from dark and flat frames (needs no daemon)\n"
-           "  bowl JOB.json      make the profile of a fiber from photographs of a bowl (needs no daemon)\n";
 }
 
 static bool names_a_service(char *const *argv)
@@ -44,10 +36,10 @@ status cli_tool_run(char **argv, struct error *err)
 {
     char path[CLI_SIBLING_BYTES];
     const char *run[MOST_ARGUMENTS + 6];
-    size_t n = 0, i_command = 0;
-    while (strcmp(command[i_command].word, argv[1]) != 0) i_command++;
-    const char *option = command[i_command].option;
-    cli_sibling(command[i_command].program, path);
+    size_t n = 0, i_tool = 0;
+    while (strcmp(cli_tool_table[i_tool].name, argv[1]) != 0) i_tool++;
+    const char *option = cli_tool_table[i_tool].option;
+    cli_sibling(cli_tool_table[i_tool].program, path);
     run[n++] = option == NULL ? argv[0] : path;
     run[n++] = option == NULL ? argv[1] : option;
     if (option != NULL && !names_a_service(argv) && access(installed_settings, R_OK) == 0) {
@@ -62,5 +54,5 @@ status cli_tool_run(char **argv, struct error *err)
     execvp(path, (char *const *)(uintptr_t)run);
     return error_set(err, STATUS_NOT_FOUND,
                      "cannot run `selvedge %s`: the program '%s' is neither beside this one nor in PATH", argv[1],
-                     command[i_command].program);
+                     cli_tool_table[i_tool].program);
 }

@@ -8,12 +8,17 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+struct cli_tool {
+    const char *name, *operand, *summary; /* operand: NULL: none */
+    const char *program;
+    const char *option; /* the option of the program that stands for the command; NULL: the command's name itself */
+};
+enum { CLI_N_TOOL = 4 };
+extern const struct cli_tool cli_tool_table[CLI_N_TOOL];
+
 /* Whether word is such a command ("photo"). */
 bool cli_tool_knows(const char *word);
 /* Replaces this process by the program that runs the command argv[1]: the one beside this program, or else in PATH.
  * Returns only on failure: STATUS_NOT_FOUND. */
 status cli_tool_run(char **argv, struct error *err);
-/* One line for each command, for the help text. */
-const char *cli_tool_help(void);
-
 #endif

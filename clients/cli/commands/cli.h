@@ -24,29 +24,11 @@ struct cli {
     bool note_is_terminal;
 };
 
-status cli_submit(struct cli *cli, int *exit_code, struct error *err);
-status cli_check(struct cli *cli, int *exit_code, struct error *err);
-status cli_status(struct cli *cli, int *exit_code, struct error *err);
-status cli_watch(struct cli *cli, int *exit_code, struct error *err);
-status cli_list(struct cli *cli, int *exit_code, struct error *err);
-status cli_cancel(struct cli *cli, int *exit_code, struct error *err);
-status cli_retry(struct cli *cli, int *exit_code, struct error *err);
-status cli_results(struct cli *cli, int *exit_code, struct error *err);
-status cli_versions(struct cli *cli, int *exit_code, struct error *err);
-status cli_log(struct cli *cli, int *exit_code, struct error *err);
-status cli_series(struct cli *cli, int *exit_code, struct error *err);
-status cli_delete(struct cli *cli, int *exit_code, struct error *err);
+/* The functions of the commands. */
+#define CLI_COMMAND(id, run, ...) status run(struct cli *cli, int *exit_code, struct error *err);
+#include "clients/cli/arguments/cli_commands.def"
+#undef CLI_COMMAND
 
-status cli_keep(struct cli *cli, int *exit_code, struct error *err);
-status cli_unkeep(struct cli *cli, int *exit_code, struct error *err);
-status cli_retention(struct cli *cli, int *exit_code, struct error *err);
-status cli_batch(struct cli *cli, int *exit_code, struct error *err);
-status cli_plan(struct cli *cli, int *exit_code, struct error *err);
-
-status cli_reconstruct(struct cli *cli, int *exit_code, struct error *err);
-status cli_render(struct cli *cli, int *exit_code, struct error *err);
-status cli_watch_folder(struct cli *cli, int *exit_code, struct error *err);
-status cli_token(struct cli *cli, int *exit_code, struct error *err);
 /* Reads the first line of a file that other users cannot read: *token, which the caller frees. STATUS_INVALID,
  * STATUS_NOT_FOUND, STATUS_IO. */
 status cli_token_read(const char *path, char **token, struct error *err);

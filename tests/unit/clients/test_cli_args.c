@@ -1,7 +1,8 @@
 /* The command line of `selvedge`: the tables of commands and options. The source file is included here, because the
  * parts of the client are in no library. */
-#include "clients/cli/arguments/cli_args.c"          /* NOLINT */
 #include "clients/cli/arguments/cli_command_table.c" /* NOLINT */
+#include "clients/cli/arguments/cli_option_table.c"  /* NOLINT */
+#include "clients/cli/arguments/cli_parse.c"         /* NOLINT */
 #include "clients/cli/arguments/cli_sibling.c"       /* NOLINT */
 #include "clients/cli/arguments/cli_tool.c"          /* NOLINT */
 #include "clients/cli/text/cli_text.c"               /* NOLINT */
@@ -111,14 +112,14 @@ static void test_help(void **state)
     assert_int_equal(PARSE("--help"), STATUS_OK);
     assert_true(args.help && !args.has_command);
     cli_help(&args, text, sizeof text);
-    for (int i = 0; i < CLI_N_COMMAND; i++) assert_non_null(strstr(text, cli_command_name((enum cli_command_id)i)));
+    for (int i = 0; i < CLI_N_COMMAND; i++) assert_non_null(strstr(text, cli_command_table[i].name));
     for (int i = 0; i < CLI_N_COMMAND; i++) { /* every command has its help, also when its operand is missing */
-        char *const argv[] = {"selvedge", (char *)(uintptr_t)cli_command_name((enum cli_command_id)i), "--help", NULL};
+        char *const argv[] = {"selvedge", (char *)(uintptr_t)cli_command_table[i].name, "--help", NULL};
         assert_int_equal(parse(argv), STATUS_OK);
         assert_true(args.help && args.has_command);
         cli_help(&args, text, sizeof text);
         assert_non_null(strstr(text, "--server URL"));
-        assert_non_null(strstr(text, cli_command_name((enum cli_command_id)i)));
+        assert_non_null(strstr(text, cli_command_table[i].name));
         cli_help(&args, small, sizeof small); /* truncated, not overrun */
         assert_true(strlen(small) < sizeof small);
     }
