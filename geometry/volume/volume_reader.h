@@ -1,4 +1,4 @@
-/* The table of volume readers. A new format is one file and one row of VOLUME_READERS. */
+/* The table of volume readers, a row of base/catalogue/volume_formats.def each. */
 #ifndef SELVEDGE_GEOMETRY_VOLUME_READER_H
 #define SELVEDGE_GEOMETRY_VOLUME_READER_H
 
@@ -22,10 +22,9 @@ typedef struct volume_reader {
 } volume_reader;
 
 /* All formats that can be recognised by the start or the name of a file, in the order in which they are tried. */
-#define VOLUME_READERS(READER) READER(tiff_reader) READER(metaimage_reader) READER(nrrd_reader) READER(vol_reader)
-
-#define VOLUME_READER_DECLARATION(name) extern const volume_reader name;
-VOLUME_READERS(VOLUME_READER_DECLARATION)
+#define VOLUME_FORMAT(reader, ...) extern const volume_reader reader;
+#include "base/catalogue/volume_formats.def"
+#undef VOLUME_FORMAT
 
 size_t volume_reader_count(void);
 const volume_reader *volume_reader_at(size_t i);

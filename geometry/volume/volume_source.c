@@ -9,8 +9,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define READER_ADDRESS(name) &name,
-static const volume_reader *const reader[] = {VOLUME_READERS(READER_ADDRESS)};
+static const volume_reader *const reader[] = {
+#define VOLUME_FORMAT(name, ...) &name,
+#include "base/catalogue/volume_formats.def"
+#undef VOLUME_FORMAT
+};
 /* Not in the table, because raw files cannot be recognised. Opened by raw_source_open with a declaration. */
 static const volume_reader raw_reader = {.id = "raw.v1", .read = raw_source_read, .close = raw_source_close};
 

@@ -1,12 +1,23 @@
 #include "clients/cli/arguments/cli_command_table.h"
 
-#include <stddef.h>
+#include "base/catalogue/volume_format.h"
+
+#include <stdio.h>
+#include <string.h>
 
 const struct cli_command cli_command_table[CLI_N_COMMAND] = {
 #define CLI_COMMAND(id, run, ...) [CLI_##id] = {__VA_ARGS__},
 #include "clients/cli/arguments/cli_commands.def"
 #undef CLI_COMMAND
 };
+
+void cli_command_text(const struct cli_command *command, char *out, size_t n_bytes)
+{
+    const char *text = command->text == NULL ? "" : command->text, *at = strstr(text, CLI_SCAN_FORMATS);
+    const int before = at == NULL ? (int)strlen(text) : (int)(at - text);
+    snprintf(out, n_bytes, "%.*s%s%s", before, text, at == NULL ? "" : volume_format_list,
+             at == NULL ? "" : at + strlen(CLI_SCAN_FORMATS));
+}
 
 bool cli_operand_is_id(enum cli_command_id id)
 {

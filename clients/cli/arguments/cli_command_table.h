@@ -3,6 +3,7 @@
 #define SELVEDGE_CLIENTS_CLI_COMMAND_TABLE_H
 
 #include <stdbool.h>
+#include <stddef.h>
 
 enum cli_command_id {
 #define CLI_COMMAND(id, run, ...) CLI_##id,
@@ -10,6 +11,9 @@ enum cli_command_id {
 #undef CLI_COMMAND
     CLI_N_COMMAND
 };
+
+/* Stands in the text of a command for the list of formats of scans (base/catalogue/volume_format.h). */
+#define CLI_SCAN_FORMATS "{scan formats}"
 
 struct cli_command {
     const char *name;
@@ -24,6 +28,8 @@ struct cli_command {
 };
 extern const struct cli_command cli_command_table[CLI_N_COMMAND];
 
+/* Writes the text of the command's help, at most n_bytes; "" when it has none. */
+void cli_command_text(const struct cli_command *command, char *out, size_t n_bytes);
 /* Whether the operand of the command is the id of a job. */
 bool cli_operand_is_id(enum cli_command_id id);
 

@@ -184,10 +184,12 @@ void cli_help(const struct cli_args *args, char *text, size_t n_bytes)
 {
     size_t at = 0;
     if (args->has_command) {
+        char text_of[2048];
         const struct cli_command *c = &cli_command_table[args->command];
+        cli_command_text(c, text_of, sizeof text_of);
         put(text, n_bytes, &at, "usage: selvedge %s%s%s [options]\n\n%s.\n%s%s\noptions:\n", c->name,
             c->operand == NULL ? "" : " ", c->operand == NULL ? "" : c->operand, c->summary,
-            c->text == NULL ? "" : "\n", c->text == NULL ? "" : c->text);
+            text_of[0] == '\0' ? "" : "\n", text_of);
         put_options(c, text, n_bytes, &at);
         return;
     }

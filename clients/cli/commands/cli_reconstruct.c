@@ -1,4 +1,5 @@
 /* selvedge reconstruct SCAN: a job of geometry only, for one who has a scan and wants its fibers. */
+#include "base/catalogue/volume_format.h"
 #include "clients/cli/commands/cli.h"
 
 #include <dirent.h>
@@ -9,12 +10,6 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-static bool ends_with(const char *text, const char *end)
-{
-    size_t n = strlen(text), m = strlen(end);
-    return n >= m && strcasecmp(text + n - m, end) == 0;
-}
-
 static const char *name_of(const char *path)
 {
     const char *slash = strrchr(path, '/');
@@ -23,7 +18,7 @@ static const char *name_of(const char *path)
 
 static int by_name(const void *a, const void *b) { return strcmp(*(const char *const *)a, *(const char *const *)b); }
 
-/* The TIFF files of a folder in the order of their names, which is that of the slices. */
+/* Lists the slices in a folder, in the order of their names. */
 static status list_slices(const char *folder, json_t *files, struct error *err)
 {
     DIR *d = opendir(folder);
@@ -32,7 +27,8 @@ static status list_slices(const char *folder, json_t *files, struct error *err)
     size_t n = 0;
     bool ok = true;
     for (struct dirent *e; ok && (e = readdir(d)) != NULL;) {
-        if (e->d_name[0] == '.' || (!ends_with(e->d_name, ".tif") && !ends_with(e->d_name, ".tiff"))) continue;
+        const struct volume_format *format = volume_format_of(e->d_name);
+        if (e->d_name[0] == '.' || format == NULL || !format->may_be_slices) continue;
         char **more = realloc(name, (n + 1) * sizeof *name);
         ok = more != NULL;
         if (ok) name = more;
@@ -50,26 +46,25 @@ static status list_slices(const char *folder, json_t *files, struct error *err)
     return n > 0 ? STATUS_OK : error_set(err, STATUS_NOT_FOUND, "the folder '%s' has no TIFF files", folder);
 }
 
-/* Whether the line up to the separator is the key of a data file, in either spelling and case. */
-static bool names_data_file(const char *line, size_t n)
+/* Whether the first n characters of the line are a key of the format, whatever the case. */
+static bool names_data_file(const struct volume_format *format, const char *line, size_t n)
 {
-    static const char *const key[] = {"ElementDataFile", "data file", "datafile"};
     while (n > 0 && (line[n - 1] == ' ' || line[n - 1] == '\t')) n--;
-    for (size_t i = 0; i < sizeof key / sizeof *key; i++)
-        if (strlen(key[i]) == n && strncasecmp(line, key[i], n) == 0) return true;
+    for (size_t i = 0; i < VOLUME_MAX_KEY && format->data_key[i] != NULL; i++)
+        if (strlen(format->data_key[i]) == n && strncasecmp(line, format->data_key[i], n) == 0) return true;
     return false;
 }
 
-/* Adds the data file that a header names behind `separator`. LOCAL: the data is in the header's own file. */
-static status add_data_file(const char *path, char separator, json_t *files, struct error *err)
+/* Adds the data file that a header names. LOCAL: the data is in the header's own file. */
+static status add_data_file(const char *path, const struct volume_format *format, json_t *files, struct error *err)
 {
     char line[1024];
     FILE *f = fopen(path, "re");
     bool found = false;
     if (f == NULL) return error_set_errno(err, "cannot read the scan '%s'", path);
     while (!found && fgets(line, sizeof line, f) != NULL) {
-        char *value = strchr(line, separator);
-        if (value == NULL || !names_data_file(line, (size_t)(value - line))) continue;
+        char *value = strchr(line, format->separator);
+        if (value == NULL || !names_data_file(format, line, (size_t)(value - line))) continue;
         value += 1 + strspn(value + 1, " \t");
         value[strcspn(value, "\r\n")] = '\0';
         found = value[0] != '\0';
@@ -79,7 +74,7 @@ static status add_data_file(const char *path, char separator, json_t *files, str
     return found ? STATUS_OK : error_set(err, STATUS_FORMAT, "the scan '%s' does not name its data file", path);
 }
 
-/* Names of the scan's files, and the folder that they lie in. */
+/* Lists the names of the scan's files, and the folder that they lie in. */
 static status list_scan(const char *scan, json_t *files, char *folder, size_t n_bytes, struct error *err)
 {
     struct stat st;
@@ -90,8 +85,9 @@ static status list_scan(const char *scan, json_t *files, char *folder, size_t n_
     }
     cli_folder_of(scan, folder, n_bytes);
     json_array_append_new(files, json_string(name_of(scan)));
-    if (ends_with(scan, ".mhd")) return add_data_file(scan, '=', files, err);
-    return ends_with(scan, ".nhdr") ? add_data_file(scan, ':', files, err) : STATUS_OK;
+    const struct volume_format *format = volume_format_of(scan);
+    return format != NULL && volume_format_is_header(format, scan) ? add_data_file(scan, format, files, err)
+                                                                   : STATUS_OK;
 }
 
 /* "2" or "2,2,3": one edge for all axes, or three. */

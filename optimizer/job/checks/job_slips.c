@@ -1,4 +1,5 @@
 #include "optimizer/job/checks/job_slips.h"
+#include "base/catalogue/volume_format.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -39,23 +40,24 @@ static enum file_kind kind_of(const char *name)
     static const struct {
         const char *ending;
         enum file_kind kind;
-    } known[] = {{".exr", KIND_PICTURE}, {".png", KIND_PICTURE},  {".jpg", KIND_PICTURE}, {".jpeg", KIND_PICTURE},
-                 {".dng", KIND_PICTURE}, {".cr2", KIND_PICTURE},  {".cr3", KIND_PICTURE}, {".nef", KIND_PICTURE},
-                 {".arw", KIND_PICTURE}, {".raf", KIND_PICTURE},  {".orf", KIND_PICTURE}, {".rw2", KIND_PICTURE},
-                 {".tif", KIND_TIFF},    {".tiff", KIND_TIFF},    {".mhd", KIND_VOLUME},  {".mha", KIND_VOLUME},
-                 {".nrrd", KIND_VOLUME}, {".nhdr", KIND_VOLUME},  {".vol", KIND_VOLUME},  {".hair", KIND_FIBERS},
-                 {".csv", KIND_TABLE},   {".binary", KIND_TABLE}, {".bsdf", KIND_TABLE},  {".astm", KIND_TABLE},
-                 {".pdf", KIND_OTHER},   {".doc", KIND_OTHER},    {".docx", KIND_OTHER},  {".xls", KIND_OTHER},
-                 {".xlsx", KIND_OTHER},  {".ods", KIND_OTHER},    {".zip", KIND_OTHER},   {".gz", KIND_OTHER},
-                 {".7z", KIND_OTHER},    {".json", KIND_JSON},    {".html", KIND_OTHER},  {".heic", KIND_OTHER},
-                 {".gif", KIND_OTHER},   {".bmp", KIND_OTHER},    {".webp", KIND_OTHER},  {".mp4", KIND_OTHER},
-                 {".dcm", KIND_OTHER},   {".hdf5", KIND_OTHER},   {".h5", KIND_OTHER},    {".npy", KIND_OTHER},
-                 {".mat", KIND_OTHER},   {".psd", KIND_OTHER},    {".obj", KIND_MESH},    {".ply", KIND_OTHER},
-                 {".stl", KIND_OTHER},   {".fbx", KIND_OTHER}};
+    } known[] = {{".exr", KIND_PICTURE},  {".png", KIND_PICTURE}, {".jpg", KIND_PICTURE}, {".jpeg", KIND_PICTURE},
+                 {".dng", KIND_PICTURE},  {".cr2", KIND_PICTURE}, {".cr3", KIND_PICTURE}, {".nef", KIND_PICTURE},
+                 {".arw", KIND_PICTURE},  {".raf", KIND_PICTURE}, {".orf", KIND_PICTURE}, {".rw2", KIND_PICTURE},
+                 {".tif", KIND_TIFF},     {".tiff", KIND_TIFF},   {".hair", KIND_FIBERS}, {".csv", KIND_TABLE},
+                 {".binary", KIND_TABLE}, {".bsdf", KIND_TABLE},  {".astm", KIND_TABLE},  {".pdf", KIND_OTHER},
+                 {".doc", KIND_OTHER},    {".docx", KIND_OTHER},  {".xls", KIND_OTHER},   {".xlsx", KIND_OTHER},
+                 {".ods", KIND_OTHER},    {".zip", KIND_OTHER},   {".gz", KIND_OTHER},    {".7z", KIND_OTHER},
+                 {".json", KIND_JSON},    {".html", KIND_OTHER},  {".heic", KIND_OTHER},  {".gif", KIND_OTHER},
+                 {".bmp", KIND_OTHER},    {".webp", KIND_OTHER},  {".mp4", KIND_OTHER},   {".dcm", KIND_OTHER},
+                 {".hdf5", KIND_OTHER},   {".h5", KIND_OTHER},    {".npy", KIND_OTHER},   {".mat", KIND_OTHER},
+                 {".psd", KIND_OTHER},    {".obj", KIND_MESH},    {".ply", KIND_OTHER},   {".stl", KIND_OTHER},
+                 {".fbx", KIND_OTHER}};
     const char *dot = strrchr(name, '.');
+    enum file_kind kind = KIND_UNKNOWN;
     for (size_t i = 0; dot != NULL && i < sizeof known / sizeof known[0]; i++)
-        if (strcasecmp(dot, known[i].ending) == 0) return known[i].kind;
-    return KIND_UNKNOWN;
+        if (strcasecmp(dot, known[i].ending) == 0) kind = known[i].kind;
+    const bool unknown = kind == KIND_UNKNOWN || kind == KIND_OTHER;
+    return unknown && volume_format_of(name) != NULL ? KIND_VOLUME : kind;
 }
 
 struct role_rule {
@@ -66,7 +68,11 @@ struct role_rule {
 #define ANY_PHOTOGRAPH [KIND_UNKNOWN] = true, [KIND_PICTURE] = true, [KIND_TIFF] = true
 static const struct role_rule role_rule[] = {
     {"volume",
-     "a scan: TIFF, .mhd, .mha, .nrrd, .nhdr, .vol or raw samples",
+     "a scan: "
+#define VOLUME_FORMAT(reader, shown, ...) shown ", "
+#include "base/catalogue/volume_formats.def"
+#undef VOLUME_FORMAT
+     "or raw samples",
      {[KIND_UNKNOWN] = true, [KIND_TIFF] = true, [KIND_VOLUME] = true}},
     {"fibers", "fibers: .hair or .txt", {[KIND_UNKNOWN] = true, [KIND_FIBERS] = true}},
     {"measurements", "a table: .csv, or a file of a goniophotometer", {[KIND_UNKNOWN] = true, [KIND_TABLE] = true}},

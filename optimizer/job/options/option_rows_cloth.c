@@ -59,8 +59,9 @@ const struct job_option option_rows_cloth[] = {
      .upper = JOB_MAX_VOLUME_FILE,
      .required = true,
      .items = "file names",
-     .meaning = "One multi-page TIFF; TIFF slices in order; `.mhd` or `.nhdr` first, then its data file; `.mha`; "
-                "`.nrrd`; `.vol`; or one file of samples without a header, with `raw`."},
+     .meaning =
+         "One scan: a file in a format of file-formats.md, its slices in order, a header and then its data file, or "
+         "one file of samples without a header, with `raw`."},
     {.path = "volume.raw",
      .kind = OPTION_SECTION,
      .id = OPTION_RAW,
