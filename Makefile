@@ -157,9 +157,10 @@ PRINT_OPTIONS := $(BUILD)/tools/print-options
 $(PRINT_OPTIONS): $(BUILD)/obj/optimizer/job/options/print_options_main.c.o $(L)job.a $(L)base.a
 	@mkdir -p $(@D)
 	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_SERVER)
-generate: $(PRINT_OPTIONS) $(BUILD)/bin/selvedge-worker ## write what follows from the tables of options and models: config/openapi.json, tables in docs/
+generate: $(PRINT_OPTIONS) $(BUILD)/bin/selvedge-worker ## write what follows from the tables of options, models and endpoints: config/openapi.json, tables in docs/ and of the daemon
 	@/usr/bin/python3 config/generate_options.py $(PRINT_OPTIONS)
 	@/usr/bin/python3 config/generate_model_tables.py $(BUILD)/bin/selvedge-worker
+	@/usr/bin/python3 config/generate_endpoints.py
 
 # tables of light that is scattered in the medulla of a hair, checked in as source; made again after a change of their grid
 MEDULLA := renderer/scattering/models/fur/medulla

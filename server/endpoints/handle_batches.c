@@ -148,7 +148,7 @@ void handle_start_batch(struct http_request *r) { act(r, BATCH_START); }
 void handle_retry_batch(struct http_request *r) { act(r, BATCH_RETRY); }
 void handle_cancel_batch(struct http_request *r) { act(r, BATCH_CANCEL); }
 
-void handle_batch_plan(struct http_request *r)
+void handle_get_batch_plan(struct http_request *r)
 {
     struct error err = {0};
     struct batch_row row;
@@ -178,13 +178,13 @@ static json_t *results_of(struct http_request *r)
     return NULL;
 }
 
-void handle_batch_results(struct http_request *r)
+void handle_get_batch_results(struct http_request *r)
 {
     json_t *table = results_of(r);
     if (table != NULL) reply_json_tagged(r, table);
 }
 
-void handle_batch_csv(struct http_request *r)
+void handle_get_batch_table(struct http_request *r)
 {
     json_t *table = results_of(r);
     if (table == NULL) return;

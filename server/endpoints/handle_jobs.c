@@ -128,7 +128,7 @@ static status check_tag(void *context, const struct job_row *row, struct error *
                      : STATUS_OK;
 }
 
-void handle_put_document(struct http_request *r)
+void handle_replace_document(struct http_request *r)
 {
     struct error err = {0};
     struct precondition p = {.request = r, .wanted = request_header(r, "If-Match")};

@@ -24,7 +24,7 @@ static bool find_job(struct http_request *r, struct job_row *row)
     return false;
 }
 
-void handle_series(struct http_request *r)
+void handle_get_series(struct http_request *r)
 {
     struct job_row row;
     struct error err = {0};
@@ -68,7 +68,7 @@ static ssize_t read_log(const char *folder, long long *offset, long long *size, 
     return n;
 }
 
-void handle_log(struct http_request *r)
+void handle_get_log(struct http_request *r)
 {
     struct job_row row;
     long long offset, most, size;
@@ -135,7 +135,7 @@ void handle_get_result(struct http_request *r)
     job_row_release(&row);
 }
 
-void handle_archive(struct http_request *r)
+void handle_get_archive(struct http_request *r)
 {
     struct job_row row;
     struct error err = {0};

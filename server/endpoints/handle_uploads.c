@@ -54,7 +54,7 @@ void handle_upload_offset(struct http_request *r)
     reply_header(r, "Cache-Control", "no-store");
 }
 
-void handle_upload_begin(struct http_request *r)
+void handle_upload_bytes_begin(struct http_request *r)
 {
     struct upload *upload;
     struct file_row row;
@@ -89,7 +89,7 @@ static void release_upload(struct http_request *r)
     r->upload = NULL;
 }
 
-void handle_upload_end(struct http_request *r)
+void handle_upload_bytes(struct http_request *r)
 {
     struct file_row row = {0};
     struct error err = {0};
@@ -107,7 +107,7 @@ void handle_upload_end(struct http_request *r)
     reply_header_int(r, "Upload-Offset", row.offset_bytes);
 }
 
-void handle_upload_abandoned(struct http_request *r)
+void handle_upload_bytes_abandoned(struct http_request *r)
 {
     struct error err = {0};
     status s = upload_commit(r->upload, r->ticket, NULL, &err);
@@ -116,7 +116,7 @@ void handle_upload_abandoned(struct http_request *r)
     release_upload(r);
 }
 
-void handle_upload_delete(struct http_request *r)
+void handle_terminate_upload(struct http_request *r)
 {
     struct error err = {0};
     if (!check_version(r)) return;

@@ -24,7 +24,7 @@ static void reply_view(struct http_request *r, const char *number)
 void handle_list_versions(struct http_request *r) { reply_view(r, NULL); }
 void handle_get_version(struct http_request *r) { reply_view(r, r->param[1]); }
 
-void handle_version_file(struct http_request *r)
+void handle_get_version_file(struct http_request *r)
 {
     struct job_row row;
     struct error err = {0};

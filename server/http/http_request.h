@@ -45,14 +45,14 @@ enum http_body { HTTP_BODY_NONE, HTTP_BODY_JSON, HTTP_BODY_BATCH, HTTP_BODY_UPLO
 
 struct http_route {
     const char *method, *path; /* path segments in braces are parameters; {path...} matches the rest of the path */
+    enum access_scope need;    /* of a token, once there are tokens (access_guard.h) */
+    const char *query;         /* names of the query parameters that it takes, between spaces; NULL: any */
     enum http_body body;
-    enum access_scope need; /* of a token, once there are tokens (access_guard.h) */
     void (*handle)(struct http_request *request);
     /* called before the body (HTTP_BODY_UPLOAD): decides a reply or sets request->upload */
     void (*begin)(struct http_request *request);
     /* called in place of `handle` when the connection ends while request->upload is set */
     void (*abandon)(struct http_request *request);
-    const char *query; /* names of the query parameters that it takes, between spaces; NULL: any */
 };
 
 /* Finds the route of a request and the values of its path's parameters. NULL and *allow "": there is no such path;

@@ -3,6 +3,8 @@ it."""
 import json
 import os
 import re
+import shutil
+import subprocess
 
 import hypothesis
 import jsonschema
@@ -52,17 +54,40 @@ def test_the_daemon_serves_it(daemon):
     assert daemon.get("/v1/openapi.json").json() == API
 
 
-def test_the_route_table_and_the_document_agree():
-    with open(os.path.join(ROOT, "server", "endpoints", "endpoint_table.c")) as f:
-        routes = {(m.lower(), p.replace("...", "")) for m, p in re.findall(r'\{"([A-Z]+)", "([^"]+)", HTTP_BODY', f.read())}
-    assert routes - {("get", "/"), ("get", "/{path}")} == {(m, p) for p, m, _ in OPERATIONS}
+def generate_endpoints(root, *arguments):
+    program = os.path.join(ROOT, "config", "generate_endpoints.py")
+    return subprocess.run([program, "--root", root, *arguments], capture_output=True, text=True)
 
 
-def test_api_md_names_every_path():
+def test_table_and_page_follow_from_the_description():
+    done = generate_endpoints(ROOT, "--check")
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_a_new_operation_makes_table_and_page_stale(tmp_path):
+    for name in ("config/openapi.json", "docs/api.md", "server/endpoints/endpoints.def"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(os.path.join(ROOT, name), tmp_path / name)
+    assert generate_endpoints(tmp_path, "--check").returncode == 0
+    api = load()
+    api["paths"]["/v1/jobs/{id}/state"] = {"get": {"operationId": "getState", "x-scope": "read", "tags": ["Jobs"],
+                                                   "summary": "Get the state of a job", "responses": {}}}
+    (tmp_path / "config" / "openapi.json").write_text(json.dumps(api))
+    stale = generate_endpoints(tmp_path, "--check")
+    assert stale.returncode == 1 and "endpoints.def" in stale.stdout and "api.md" in stale.stdout
+    assert generate_endpoints(tmp_path).returncode == 0
+    row = 'ENDPOINT("GET", "/v1/jobs/{id}/state", get_state, NONE, ACCESS_READ, "")'
+    assert row in (tmp_path / "server" / "endpoints" / "endpoints.def").read_text()
+    assert "| `GET /v1/jobs/{id}/state` | Get the state of a job. |" in (tmp_path / "docs" / "api.md").read_text()
+    assert generate_endpoints(tmp_path, "--check").returncode == 0
+
+
+def test_every_operation_stands_in_a_section_of_the_page():
     with open(os.path.join(ROOT, "docs", "api.md")) as f:
         text = f.read()
-    for path, _, _ in OPERATIONS:
-        assert path in text, path
+    for path, method, operation in OPERATIONS:
+        assert re.search(rf"^\| `{method.upper()} {re.escape(path)}[?`]", text, flags=re.M), (method, path)
+        assert operation["tags"][0] in [tag["name"] for tag in API["tags"]]
 
 
 def test_problem_codes_are_documented():
