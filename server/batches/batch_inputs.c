@@ -36,7 +36,8 @@ static bool awaits_files(struct job_service *v, const char *job_id)
 static bool all_known(struct job_service *v, const char *owner, const char *job_id, const struct batch_sample *sample)
 {
     bool known = sample->n_file > 0 && awaits_files(v, job_id);
-    for (size_t k = 0; known && k < sample->n_file; k++) known = known_input_exists(v->store, owner, &sample->file[k]);
+    for (size_t k = 0; known && k < sample->n_file; k++)
+        known = known_input_exists(v->store, v->settings->data, owner, &sample->file[k]);
     return known;
 }
 

@@ -6,6 +6,7 @@
 #include "server/endpoints/request_json.h"
 #include "server/http/http_reply.h"
 #include "server/jobs/job_service.h"
+#include "server/uploads/known_input.h"
 #include "server/workers/input_judge.h"
 
 #include <stdlib.h>
@@ -96,7 +97,7 @@ void handle_find_input(struct http_request *r)
         reply_problem(r, NULL, &err, NULL);
         return;
     }
-    status s = store_file_known(r->service->store, r->grant.owner, sum, -1, &file, &err);
+    status s = known_input_find(r->service->store, r->service->settings->data, r->grant.owner, sum, &file, &err);
     if (s != STATUS_OK && s != STATUS_NOT_FOUND)
         reply_problem(r, NULL, &err, NULL);
     else if (s == STATUS_NOT_FOUND)

@@ -216,7 +216,7 @@ static status declare_locked(struct job_service *v, const struct access_grant *g
         s = find_declared(v, &file[i], err);
         if (s != STATUS_OK) *i_fault = i;
         if (file[i].existed) continue;
-        file[i].known = s == STATUS_OK && known_input_exists(v->store, job.owner, &file[i].row);
+        file[i].known = s == STATUS_OK && known_input_exists(v->store, v->settings->data, job.owner, &file[i].row);
         room.n_file++;
         if (!file[i].known) room.n_upload_bytes += file[i].row.size_bytes;
         room.n_bytes += file[i].row.size_bytes; /* at most max_file_bytes each, of at most a megabyte of declarations */

@@ -7,7 +7,11 @@
 #include <fcntl.h>
 #include <sodium.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <sys/xattr.h>
 #include <unistd.h>
+
+static const char seal_name[] = "user.selvedge.sha256";
 
 _Static_assert(sizeof(crypto_hash_sha256_state) <= STORE_HASH_STATE_BYTES, "the hash state fits its column");
 
@@ -71,11 +75,30 @@ status upload_reserve(const char *data, struct file_row *row, size_t n, struct e
     return s;
 }
 
+/* Failures are no errors: files without a seal are only not shared. */
+static void seal(const char *path, const struct file_row *row)
+{
+    int fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (fd < 0) return;
+    if (fchmod(fd, S_IRUSR) == 0) fsetxattr(fd, seal_name, row->sha256, strlen(row->sha256), 0);
+    close(fd);
+}
+
+bool upload_is_sealed(const char *path, const struct file_row *row)
+{
+    char text[STORE_HASH_TEXT_BYTES];
+    struct stat st;
+    ssize_t n = lgetxattr(path, seal_name, text, sizeof text);
+    return n > 0 && (size_t)n == strlen(row->sha256) && memcmp(text, row->sha256, (size_t)n) == 0 &&
+           lstat(path, &st) == 0 && S_ISREG(st.st_mode) && (st.st_mode & ALLPERMS) == S_IRUSR;
+}
+
 status upload_move_to_place(struct store *store, const char *data, struct file_row *row, struct error *err)
 {
     char from[PATH_BYTES], to[PATH_BYTES];
     upload_part_path(data, row, from);
     upload_input_path(data, row, to);
+    seal(from, row);
     if (rename(from, to) != 0 && !(errno == ENOENT && access(to, R_OK) == 0))
         return error_set_errno(err, "cannot move '%s' to its place", row->name);
     status s = durable_sync_folder_of(to, err);

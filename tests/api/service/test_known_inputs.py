@@ -79,6 +79,29 @@ def test_bytes_that_were_lost_are_uploaded(daemon):
     assert daemon.declare(daemon.create(), "scan.tif", data)["state"] == "uploading"
 
 
+def test_an_input_that_a_worker_replaced_is_not_shared(daemon):
+    """Of the same size, with mode 0400 or 0600; and one that is written over under its name."""
+    for i, mode in enumerate((0o400, 0o600)):
+        data = SCAN + b"6%d" % i
+        job = daemon.create(DOCUMENT)
+        for name, (role, other) in FILES.items():
+            daemon.upload(job, name, data if name == "scan.tif" else other, role)
+        path = input_path(daemon, job, "scan.tif")
+        assert os.stat(path).st_mode & 0o777 == 0o400, "complete inputs are never written"
+        assert daemon.post(f"/v1/jobs/{job}/start").status_code == 202
+        daemon.wait_state(job, "succeeded")
+        assert daemon.get("/v1/inputs", params={"sha256": sha256(data)}).json()["known"] is True
+        with open(path + ".new", "wb") as f:
+            f.write(data[::-1])
+        os.chmod(path + ".new", mode)
+        os.rename(path + ".new", path)
+        assert daemon.get("/v1/inputs", params={"sha256": sha256(data)}).json()["known"] is False
+        other = daemon.create()
+        assert daemon.declare(other, "scan.tif", data)["state"] == "uploading"
+        daemon.upload(other, "scan.tif", data)
+        assert daemon.get(f"/v1/jobs/{other}/files/scan.tif").content == data
+
+
 def test_what_a_killed_daemon_left_of_a_link_does_not_matter(daemon):
     data = SCAN + b"5"
     first_job(daemon, data)

@@ -156,6 +156,29 @@ def test_the_daemon_names_the_forbidden_call(hostile, daemon_maker):
     assert "forbids the system call 'socket'" in failed["error"]["text"]
 
 
+@pytest.mark.parametrize("act", ["overwrite", "replace"])
+def test_inputs_that_jobs_share_cannot_be_changed(hostile, daemon_maker, act):
+    """Neither while a worker runs nor afterwards, when its job's file would be linked to another job."""
+    scan = b"II*\0 a scan that two jobs have"
+    d = daemon_maker(worker=WORKER, environment={"LD_PRELOAD": hostile, "HOSTILE": act},
+                     options={"jobs.pass_environment": "PATH, LD_PRELOAD HOSTILE", "jobs.sandbox": "required"})
+    jobs = [d.create(SCAN) for _ in range(3)]
+    for job in jobs[:2]:
+        d.upload(job, "scan.tif", scan)
+        d.upload(job, "rows.csv", TABLE.encode(), "measurements")
+    for job in jobs[:2]:  # the inputs of the first are linked to the second
+        d.post(f"/v1/jobs/{job}/start")
+        d.wait_state(job, "failed")
+        outcome = "done" if act == "replace" else "Permission denied"
+        with open(os.path.join(d.data, "jobs", job, "console.txt")) as console:
+            assert f"hostile: {act}: {outcome}" in console.read()
+        if job == jobs[0]:
+            assert d.get(f"/v1/jobs/{jobs[1]}/files/scan.tif").content == scan
+    if d.declare(jobs[2], "scan.tif", scan)["state"] != "complete":
+        d.upload(jobs[2], "scan.tif", scan)
+    assert d.get(f"/v1/jobs/{jobs[2]}/files/scan.tif").content == scan
+
+
 @pytest.mark.skipif(shutil.which("strace") is None, reason="no strace")
 @pytest.mark.parametrize("mode", ["auto", "required"])
 def test_a_kernel_that_refuses_the_sandbox(hostile, tmp_path, mode):
