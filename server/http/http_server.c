@@ -56,7 +56,8 @@ static enum MHD_Result queue_reply(struct http_request *r)
 }
 
 /* Takes the memory for a JSON body until release_body. Returns false after a reply if the bodies of other requests
- * leave less than it needs; where there are none, any body has room. */
+ * leave less than it needs; late ones are ended then, so that the client's next try has room. Where there are no other
+ * bodies, any body has room. */
 static bool take_memory(struct http_request *r)
 {
     if (r->route->body != HTTP_BODY_JSON && r->route->body != HTTP_BODY_BATCH) return true;
@@ -64,11 +65,13 @@ static bool take_memory(struct http_request *r)
     int64_t before = atomic_fetch_add(taken, r->content_length);
     if (before > 0 && before + r->content_length > r->service->settings->body_memory_bytes) {
         atomic_fetch_sub(taken, r->content_length);
+        connection_table_end_late(r->server->connection);
         reply_code(r, "busy", "", "the bodies of other requests take all memory for bodies; try again in a moment");
         reply_header_int(r, "Retry-After", RETRY_AFTER_S);
         return false;
     }
     r->body_memory = r->content_length;
+    connection_in_memory(r->server->connection, r->entry, r->content_length);
     return true;
 }
 

@@ -19,7 +19,8 @@ static int64_t size_wanted(const struct settings *s, int64_t present_bytes, int6
         if (wanted > SMALL_BYTES) wanted = SMALL_BYTES;
         if (wanted < least) wanted = 0;
     }
-    if (wanted > s->ballast_bytes) wanted = s->ballast_bytes;
+    const int64_t most = s->ballast_bytes > SMALL_BYTES ? s->ballast_bytes : SMALL_BYTES;
+    if (wanted > most) wanted = most;
     wanted -= wanted % BLOCK_BYTES;
     return wanted > present_bytes ? wanted : present_bytes;
 }

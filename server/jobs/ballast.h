@@ -9,9 +9,10 @@
 struct job_service;
 struct settings;
 
-/* Makes the file, or enlarges it up to disk.ballast_bytes (0: no file), with at most half of the space above the
- * floor, so that it keeps no job from running; under the floor it is a small one. all: a small one may take all space
- * that is free, as a daemon does at its start and at its end with what it has not needed, or has freed itself. */
+/* Makes the file, or enlarges it up to disk.ballast_bytes, or 1 MiB if that is more, with at most half of the space
+ * above the floor, so that it keeps no job from running; under the floor it is a small one. all: a small one may take
+ * all space that is free, as a daemon does at its start and at its end with what it has not needed, or has freed
+ * itself. */
 void ballast_keep(const struct settings *settings, bool all);
 /* Returns false if there was no file to remove. */
 bool ballast_release(const char *data_folder);

@@ -71,7 +71,8 @@ static const struct setting table[] = {
     NUMBER("server", "max_batch_bytes", max_batch_bytes, 16 * MIB, 1024, 256 * MIB,
            "size of the largest JSON body that submits a batch"),
     NUMBER("server", "body_memory_bytes", body_memory_bytes, 64 * MIB, MIB, 64 * GIB,
-           "memory for all JSON bodies together; requests beyond it are answered 503 with Retry-After"),
+           "memory for all JSON bodies together; requests beyond it are answered 503 with Retry-After, and slow "
+           "ones are ended (docs/api.md)"),
     NUMBER("upload", "max_file_bytes", max_file_bytes, 1024 * GIB, 1, INT64_MAX / 2, "size of the largest input file"),
     NUMBER("upload", "max_patch_bytes", max_patch_bytes, 64 * MIB, MIB, GIB, "size of the largest piece of an upload"),
     NUMBER("upload", "max_files_per_job", max_files_per_job, 8192, 1, 1000000, "number of input files of one job"),
@@ -183,7 +184,8 @@ static const struct setting table[] = {
     NUMBER("disk", "floor_bytes", floor_bytes, GIB, 0, INT64_MAX / 2,
            "free space below which new work is refused and running jobs pause"),
     NUMBER("disk", "ballast_bytes", ballast_bytes, 8 * MIB, 0, GIB,
-           "size of the ballast file, which is released when the disk is full so that deleting jobs still works"),
+           "size of the ballast file, which is released when the disk is full so that deleting jobs still works; "
+           "it has at least 1 MiB while there is room"),
 };
 enum { N_SETTING = sizeof table / sizeof table[0] };
 

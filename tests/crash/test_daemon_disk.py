@@ -127,6 +127,19 @@ def test_a_completely_full_disk_refuses_no_start(small_disk, tmp_path):
                 assert r.status_code == 204, (i, path, r.text)
 
 
+def test_a_full_disk_refuses_no_start_without_a_ballast_setting(small_disk, tmp_path):
+    """The least ballast is kept with `disk.ballast_bytes = 0`, too."""
+    os.mkdir(small_disk / "data", 0o700)
+    os.symlink(small_disk / "data", tmp_path / "link")
+    with Daemon(tmp_path / "link", options={"disk.ballast_bytes": 0}) as d:
+        jobs = [d.ready_job() for _ in range(3)]
+        for i, job in enumerate(jobs):
+            d.kill() if i == 1 else d.stop()
+            fill(small_disk, name=f"filler{i}")
+            d.start()
+            assert d.delete(f"/v1/jobs/{job}").status_code == 204
+
+
 def test_running_jobs_pause_under_the_floor_and_go_on(small_disk):
     with Daemon(small_disk / "data", options={"disk.floor_bytes": 8 << 20, "disk.ballast_bytes": 0}) as d:
         job = d.start_job("work_once")

@@ -40,6 +40,7 @@ def old(tmp_path_factory):
     with Daemon(folder, options={"disk.ballast_bytes": 0}) as d:
         jobs = [d.ready_job("succeed") for _ in range(4)] + [d.start_job("fail")]
         d.wait_state(jobs[-1], "failed")
+    os.remove(folder / "ballast")
     make_older(database(folder), OLD)
     return folder, samples_of(database(folder))
 

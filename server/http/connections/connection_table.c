@@ -13,7 +13,7 @@
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 
-enum { RATE_GRACE_S = 10, GONE_GRACE_S = 2 };
+enum { RATE_GRACE_S = 10, GONE_GRACE_S = 2, MEAN_RATE_BYTES_PER_S = 65536 };
 static const char too_slow_body[] =
     "{\"type\":\"urn:selvedge:problem:too_slow\",\"title\":\"The request came too slowly\",\"status\":408,"
     "\"code\":\"too_slow\",\"detail\":\"the head or the body of the request came too slowly\"}";
@@ -28,6 +28,7 @@ struct connection_entry {
     bool served; /* a request was answered on this connection, so a 408 could be taken for the answer to the next one */
     bool ended;
     atomic_uint_least64_t n_received; /* bytes of the present body */
+    int64_t memory_bytes;             /* size of the present body, if it is kept in memory */
     atomic_bool consuming;            /* a piece of it is being stored */
     double window_s;                  /* begin of the present window of RATE_GRACE_S of a body or an answer */
     uint64_t window_bytes;            /* bytes that had been received, or that the client had acknowledged, then */
@@ -124,6 +125,7 @@ static void enter(struct connection_table *t, struct connection_entry *e, enum p
     e->since_s = clock_monotonic_s();
     e->window_s = e->since_s;
     e->window_bytes = 0;
+    e->memory_bytes = 0;
     if (phase == PHASE_BODY) atomic_store(&e->n_received, 0);
     if (phase == PHASE_SEND) {
         e->served = true;
@@ -136,6 +138,14 @@ void connection_body_begins(struct connection_table *t, struct connection_entry 
 void connection_working(struct connection_table *t, struct connection_entry *e) { enter(t, e, PHASE_WORK); }
 void connection_sending(struct connection_table *t, struct connection_entry *e) { enter(t, e, PHASE_SEND); }
 void connection_idle(struct connection_table *t, struct connection_entry *e) { enter(t, e, PHASE_HEAD); }
+
+void connection_in_memory(struct connection_table *t, struct connection_entry *e, int64_t n_bytes)
+{
+    if (e == NULL) return;
+    pthread_mutex_lock(&t->lock);
+    e->memory_bytes = n_bytes;
+    pthread_mutex_unlock(&t->lock);
+}
 
 void connection_received(struct connection_entry *e, size_t n_bytes)
 {
@@ -234,26 +244,41 @@ static bool client_gone(const struct connection_entry *e, double now)
            (p.revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0;
 }
 
-void connection_table_reap(struct connection_table *t)
+/* Ends a connection, with the answer 408 if the client can understand it. t->lock is held. */
+static void end(const struct connection_table *t, struct connection_entry *e, bool answers)
 {
     char answer[512];
     int n_answer = snprintf(answer, sizeof answer,
                             "HTTP/1.1 408 Request Timeout\r\nContent-Type: application/problem+json\r\nConnection: "
                             "close\r\nContent-Length: %zu\r\n\r\n%s",
                             sizeof too_slow_body - 1, too_slow_body);
+    e->ended = true;
+    if (answers && t->answers && (e->phase == PHASE_BODY || (e->phase == PHASE_HEAD && !e->served))) {
+        ssize_t n = send(e->fd, answer, (size_t)n_answer, MSG_DONTWAIT | MSG_NOSIGNAL);
+        (void)n; /* the connection ends whether or not the answer arrives */
+    }
+    shutdown(e->fd, SHUT_RDWR);
+}
+
+void connection_table_reap(struct connection_table *t)
+{
     double now = clock_monotonic_s();
     pthread_mutex_lock(&t->lock);
     for (struct connection_entry *e = t->first; e != NULL; e = e->next) {
-        bool gone = !e->ended && client_gone(e, now);
-        if (e->ended || !(gone || too_slow(t, e, now))) continue;
-        e->ended = true;
-        if (gone || !t->answers) {
-            /* no answer is sent */
-        } else if (e->phase == PHASE_BODY || (e->phase == PHASE_HEAD && !e->served)) {
-            ssize_t n = send(e->fd, answer, (size_t)n_answer, MSG_DONTWAIT | MSG_NOSIGNAL);
-            (void)n; /* the connection ends whether or not the answer arrives */
-        }
-        shutdown(e->fd, SHUT_RDWR);
+        if (e->ended) continue;
+        bool gone = client_gone(e, now);
+        if (gone || too_slow(t, e, now)) end(t, e, !gone);
+    }
+    pthread_mutex_unlock(&t->lock);
+}
+
+void connection_table_end_late(struct connection_table *t)
+{
+    double now = clock_monotonic_s();
+    pthread_mutex_lock(&t->lock);
+    for (struct connection_entry *e = t->first; e != NULL; e = e->next) {
+        double allowed_s = RATE_GRACE_S + (double)e->memory_bytes / MEAN_RATE_BYTES_PER_S;
+        if (!e->ended && e->memory_bytes > 0 && now - e->since_s > allowed_s) end(t, e, true);
     }
     pthread_mutex_unlock(&t->lock);
 }

@@ -22,12 +22,19 @@ size_t connection_table_count(struct connection_table *table);
 /* Closes the connections that are too slow, after answering 408 where that is unambiguous. */
 void connection_table_reap(struct connection_table *table);
 
+/* Ends the connections whose bodies are kept in memory and are late: they have taken longer than 10 s and a second for
+ * each 64 KiB of their size. Called when memory for bodies is short, so that clients which send barely faster than the
+ * minimum rate cannot keep it. */
+void connection_table_end_late(struct connection_table *table);
+
 /* A connection calls these in order: opened; then for each request body_begins, received and stored for each piece of
  * the body, working, sending once the answer is decided, and idle until the next request; at last closed.
  * connection_opened returns NULL when memory is out. */
 struct connection_entry *connection_opened(struct connection_table *table, int fd);
 void connection_closed(struct connection_table *table, struct connection_entry *entry);
 void connection_body_begins(struct connection_table *table, struct connection_entry *entry);
+/* Notes that the body is kept in memory, and its size. */
+void connection_in_memory(struct connection_table *table, struct connection_entry *entry, int64_t n_bytes);
 void connection_received(struct connection_entry *entry, size_t n_bytes);
 void connection_stored(struct connection_entry *entry);
 void connection_working(struct connection_table *table, struct connection_entry *entry);

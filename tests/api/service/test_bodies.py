@@ -97,6 +97,40 @@ def test_40_clients_that_hold_back_the_end_of_a_batch(daemon_maker):
 
 
 @pytest.mark.slow
+def test_slow_clients_do_not_keep_the_memory(daemon_maker):
+    """They send 4 kB/s, more than the minimum. A body of 700 kB may take 21 s once others need the memory."""
+    d = daemon_maker(options={"server.body_memory_bytes": MIB})
+    start, answers = time.monotonic(), []
+
+    def trickle():
+        s = begin(d, "/v1/jobs", padded(700_000), 699_000)
+        s.settimeout(1)
+        while not answers:
+            try:
+                s.sendall(b" " * 4096)
+                answers.append(s.recv(100))
+            except TimeoutError:
+                pass
+            except ConnectionError:
+                answers.append(b"")
+        s.close()
+
+    thread = threading.Thread(target=trickle)
+    thread.start()
+    try:
+        wait_until(lambda: post(d, padded(500_000)).status_code == 503)
+        accepted_s = None
+        while accepted_s is None and time.monotonic() - start < 60:
+            accepted_s = time.monotonic() - start if post(d, padded(500_000)).status_code == 201 else None
+            time.sleep(0.3)
+        assert accepted_s is not None and accepted_s > 20
+    finally:
+        answers.append(b"the test has ended")
+        thread.join()
+    assert answers[0] == b"" or answers[0].startswith(b"HTTP/1.1 408 ")
+
+
+@pytest.mark.slow
 def test_a_body_that_is_stored_slowly_is_not_ended(daemon_maker, shim, tmp_path):
     hold = tmp_path / "hold"
     d = daemon_maker(options={"upload.commit_bytes": 65536}, environment={"LD_PRELOAD": shim, "FAULT_HOLD_SYNC": str(hold)})
