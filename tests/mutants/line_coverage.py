@@ -13,7 +13,7 @@ import time
 from mutant_build import PLUGIN, PROGRAMS, SANDBOX, TREE, WORK, Build, data_folder
 
 PYTEST = ["/usr/bin/python3", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-m", "not slow"]
-RECORD_LIMIT_S = 240
+RECORD_LIMIT_S = 90
 
 
 class Test:
@@ -28,13 +28,13 @@ class Test:
     def command(self, build):
         return [build.target(self.name)] if self.is_c else [*PYTEST, str(self.source.relative_to(TREE))]
 
-    def run(self, build, limit_s, sandboxed=True):
-        """(passed, seconds); a test that has no end fails."""
+    def run(self, build, limit_s, scratch=None):
+        """(passed, seconds); a test that has no end fails. scratch: its /tmp in a sandbox."""
         start = time.monotonic()
-        root = "/mnt/tree" if sandboxed else str(TREE)
+        root = "/mnt/tree" if scratch else str(TREE)
         environment = dict(os.environ, SELVEDGE_BUILD=f"{root}/build/{build.name}", OPENBLAS_NUM_THREADS="1", SELVEDGE_DATA=data_folder(),
                            PYTHONDONTWRITEBYTECODE="1")
-        command = [str(SANDBOX), str(WORK), *self.command(build)] if sandboxed else self.command(build)
+        command = [*([SANDBOX, WORK, scratch] if scratch else []), *self.command(build)]
         process = subprocess.Popen(command, cwd=TREE, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                                    env=environment)
         try:
@@ -61,10 +61,10 @@ def hash_of(*paths):
 
 class Coverage:
     """tests: those that may reach one of the files, with their seconds and the lines that they ran. name: of this choice of
-    files, which has a build and a record of its own."""
+    files, which has a build and a record of its own. asked: beginnings of the names of the tests that are recorded."""
 
-    def __init__(self, name, files, note):
-        self.files, self.note = set(files), note
+    def __init__(self, name, files, asked, note):
+        self.files, self.asked, self.note = set(files), tuple(asked), note
         compiled = [f for f in files if f.endswith(".c")]
         self.build = Build("covered-" + name, "LDFLAGS=--coverage -Wl,-Map=$@.map", "COVERED=" + " ".join(compiled))
         self.path = WORK / f"coverage-{name}.json"
@@ -84,7 +84,7 @@ class Coverage:
 
     def record(self):
         """Builds, runs what is not known yet, and keeps the record."""
-        tests = list(all_tests())
+        tests = [t for t in all_tests() if t.name.startswith(self.asked)]
         built = self.build.has([*PROGRAMS, PLUGIN, *(t.name for t in tests if t.is_c)], options=["-j2"])
         if built.returncode != 0:
             raise SystemExit(f"mutants: the copy of the tree does not build:\n{built.stdout[-3000:]}")
@@ -100,7 +100,7 @@ class Coverage:
         key = hash_of(test.source)
         if self.known["tests"].get(test.name, {}).get("key") != key:
             self.drop_counters()
-            passed, seconds = test.run(self.build, RECORD_LIMIT_S, sandboxed=False)
+            passed, seconds = test.run(self.build, RECORD_LIMIT_S)
             ran = self.read_counters()
             self.known["tests"][test.name] = {"key": key, "passed": passed, "seconds": seconds, "ran": ran}
             self.note(f"{test.name}: {seconds:.1f} s, {sum(map(len, ran.values()))} lines" + ("" if passed else ", fails without a fault: left out"))

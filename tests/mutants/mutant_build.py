@@ -9,7 +9,7 @@ import subprocess
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 WORK = ROOT / "build" / "mutants"
 TREE = WORK / "tree"
-SANDBOX = ROOT / "tests" / "mutants" / "sandbox.sh"
+SANDBOX = TREE / "tests" / "mutants" / "sandbox.sh"  # the copy, so that the tree may change while faults are tried
 PROGRAMS = ["selvedge", "selvedged", "selvedge-worker", "selvedge-phantom", "selvedge-camera"]
 PLUGIN = "selvedge-postgresql.so"
 FAULTY = ["-Werror=incompatible-pointer-types", "-Werror=int-conversion", "-Werror=array-bounds"]  # a fault may leave a variable unused
@@ -32,9 +32,10 @@ def copy_tree():
     subprocess.run(["git", "init", "-q"], cwd=TREE, check=True)  # checks of the documents ask git for the names of files
 
 
-def clean_scratch():
-    shutil.rmtree(WORK / "tmp", ignore_errors=True)
-    (WORK / "tmp").mkdir(parents=True, exist_ok=True)
+def clean_scratch(build):
+    """Empties the folder that tests of this build have on /tmp."""
+    shutil.rmtree(build.scratch, ignore_errors=True)
+    build.scratch.mkdir(parents=True, exist_ok=True)
 
 
 class Build:
@@ -43,6 +44,7 @@ class Build:
     def __init__(self, name, *variables):
         self.name, self.variables = name, variables
         self.path = TREE / "build" / name
+        self.scratch = WORK / ("tmp-" + name)
 
     def make(self, *targets, options=()):
         command = ["make", "--no-print-directory", f"BUILD=build/{self.name}", *self.variables, *options, *targets]
@@ -65,35 +67,33 @@ class Build:
 class Compiler:
     """Compiles faulty sources, and tells faults that do not compile or leave the object as it is."""
 
-    def __init__(self, clean):
+    def __init__(self, clean, name):
         self.clean = clean
-        self.object = str(WORK / "faulty.o")
+        self.object = str(WORK / f"{name}.o")
         self.known = {}  # path -> (words of the command, object without a fault)
 
     def command(self, path):
         """As make compiles it, but at -O2 and without debugging information, which lines alone would change."""
         target = f"build/{self.clean.name}/obj/{'shared/' if path.endswith('_plugin.c') else ''}{path}.o"
         line = line_of(self.clean.make(target, options=["-n", "-W", path]).stdout, f"-c {path} ")
-        words = [w for w in line.split() if w not in ("-g", "-O3", "-MMD", "-MP", "-Werror")]
-        return words[:words.index("-o")] + FAULTY + ["-O2", "-o", self.object]
+        words = [w for w in line.split() if w not in ("-g", "-O3", "-MMD", "-MP", "-Werror", "-c", path)]
+        return words[:words.index("-o")] + FAULTY + ["-O2", "-o", self.object, "-c", "-x", "c", "-"]
 
-    def run(self, words):
-        if subprocess.run(words, cwd=TREE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False).returncode != 0:
-            return None
-        return pathlib.Path(self.object).read_bytes()
+    def run(self, path, words, text):
+        """The object of a text in place of the file; None when it does not compile."""
+        done = subprocess.run(words, cwd=TREE, input=f'# 1 "{path}"\n{text}', text=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                              check=False)
+        return pathlib.Path(self.object).read_bytes() if done.returncode == 0 else None
 
     def verdict(self, path, original, mutated):
-        """"invalid", "equivalent" or None; then `object` has the fault. The file is as before afterwards."""
-        target = TREE / path
+        """"invalid", "equivalent" or None; then `object` has the fault."""
         if path not in self.known:
             words = self.command(path)
-            self.known[path] = (words, self.run(words))
+            self.known[path] = (words, self.run(path, words, original))
         words, before = self.known[path]
         if before is None:
             raise RuntimeError(f"'{path}' does not compile without a fault")
-        target.write_text(mutated)
-        after = self.run(words)
-        target.write_text(original)
+        after = self.run(path, words, mutated)
         return "invalid" if after is None else "equivalent" if after == before else None
 
 

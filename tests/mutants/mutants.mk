@@ -27,6 +27,7 @@ endif
 MUTANTS ?= 200
 SEED ?= 1
 MUTANT_SECONDS ?= 60
-mutants: | deps-test ## a gate: MUTANTS (200) small faults, one at a time, in a copy of the tree, of which the tests must catch 95 % (SEED, PART, WHOLE, AGAIN, MUTANT_SECONDS)
-	@/usr/bin/python3 tests/mutants/run_mutants.py --mutants $(MUTANTS) --seed $(SEED) --limit-s $(MUTANT_SECONDS) \
+MUTANT_JUDGES ?= 2
+mutants: | deps-test ## a gate: MUTANTS (200) small faults, one at a time, in a copy of the tree, of which the tests must catch 95 % (SEED, PART, WHOLE, AGAIN, MUTANT_SECONDS, MUTANT_JUDGES)
+	@/usr/bin/python3 tests/mutants/run_mutants.py --mutants $(MUTANTS) --seed $(SEED) --limit-s $(MUTANT_SECONDS) --judges $(MUTANT_JUDGES) \
 		$(if $(PART),--part $(PART)) $(if $(WHOLE),--whole) $(if $(AGAIN),--again)

@@ -6,26 +6,30 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 LANGUAGE = {".c": "c", ".js": "js", ".py": "py"}
 
-# Each part: the beginnings of the paths of its files, and tests that are run for every fault of it, because counters of
-# lines do not reach there: they test processes that end without writing their counters.
+# Each part: the beginnings of the paths of its files; the beginnings of the names of the tests that are asked about it, which
+# leave out tests that take minutes or reach these files by chance; and tests that are run for every fault of it, because
+# counters of lines do not reach there: they test processes that end without writing their counters.
 GATE = {
-    "sandbox": (["optimizer/worker/sandbox/"], ["unit/optimizer/sandbox/", "api/service/test_sandbox"]),
-    "store": (["server/store/"], []),
-    "retention": (["server/retention/"], []),
+    "sandbox": (["optimizer/worker/sandbox/"], ["unit/optimizer/sandbox/", "api/service/test_sandbox"],
+                ["unit/optimizer/sandbox/", "api/service/test_sandbox"]),
+    "store": (["server/store/"], ["unit/server/", "api/access/", "api/batches/", "api/service/", "api/test_durable_replies", "api/test_jobs_api",
+                                  "api/test_results_api", "api/test_uploads_api"], []),
+    "retention": (["server/retention/"], ["unit/server/", "api/service/", "api/test_jobs_api"], []),
     "uncertainty": (["optimizer/fit/objective/uncertainty", "optimizer/fit/objective/product_noise", "optimizer/fit/linear/",
-                     "optimizer/fit/cloth/carried_error", "geometry/fibers/shape/radius_choose"], []),
+                     "optimizer/fit/cloth/carried_error", "geometry/fibers/shape/radius_choose"],
+                    ["unit/optimizer/fit/", "unit/geometry/fibers/"], []),
     "readers": (["geometry/volume/format/", "geometry/volume/voxel_stream", "geometry/volume/volume_source", "geometry/volume/sample_type",
-                 "optimizer/fit/photographs/reader/", "optimizer/fit/photographs/table/"], []),
+                 "optimizer/fit/photographs/reader/", "optimizer/fit/photographs/table/"],
+                ["unit/geometry/volume/", "unit/optimizer/photographs/", "api/photographs/test_measured_brdf"], []),
 }
-WHOLE = {name: ([name + "/"], []) for name in ("base", "geometry", "renderer", "optimizer", "server", "clients/cli", "clients/dashboard",
-                                               "clients/python")}
+WHOLE = {name: ([name + "/"], ["unit/", "api/"], [])
+         for name in ("base", "geometry", "renderer", "optimizer", "server", "clients/cli", "clients/dashboard", "clients/python")}
 
 
 def files_of(tree, part):
     """Paths of the sources of a part, relative to the tree."""
-    beginnings, _ = part
     found = []
-    for beginning in beginnings:
+    for beginning in part[0]:
         folder = tree / beginning
         for path in sorted((folder if beginning.endswith("/") else folder.parent).rglob("*")):
             name = str(path.relative_to(tree))

@@ -1,12 +1,13 @@
 """make mutants: put small faults into a copy of the tree, one at a time, and see whether its tests notice.
 
-Figures go to standard output as JSON lines, progress to standard error, survivors to build/mutants/survivors.txt, every mutant to
-build/mutants/mutants.jsonl. A mutant is caught when a test fails, or has no end, and passes without the fault. Mutants that do not
+Figures go to standard output as JSON lines, progress to standard error, survivors to build/mutants/survivors-SEED.txt, every mutant
+to build/mutants/mutants-SEED.jsonl. A mutant is caught when a test fails, or has no end, and passes without the fault. Mutants that do not
 compile, or whose object code is the same at -O2, do not count, nor do those of explained.txt. Only tests that run the faulty line
 are tried, the quickest first. Exit status 1 when fewer than 95 % are caught.
 """
 import argparse
 import collections
+import concurrent.futures
 import json
 import os
 import pathlib
@@ -14,6 +15,7 @@ import random
 import re
 import subprocess
 import sys
+import threading
 import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -74,10 +76,12 @@ class Sampler:
 
 
 class Judge:
-    def __init__(self, coverage, limit_s):
+    """Tries faults one after the other, in a build of its own; judges work side by side."""
+
+    def __init__(self, coverage, limit_s, name):
         self.coverage, self.limit_s = coverage, limit_s
-        self.clean, self.faulty = Build("clean"), Build("faulty")
-        self.compiler, self.linker = Compiler(self.clean), Linker(self.clean, self.faulty)
+        self.clean, self.faulty = Build("clean"), Build(name)
+        self.compiler, self.linker = Compiler(self.clean, name), Linker(self.clean, self.faulty)
         self.explained = Explained()
 
     def things_for(self, test, path):
@@ -96,7 +100,8 @@ class Judge:
         last = text.count("\n", 0, fault.end) + 1
         function = next((f for f in functions_of(text) if f[0] <= fault.line <= f[1]), None) if fault.path.endswith(".c") else None
         chosen = self.coverage.tests_of(fault.path, fault.line, last, function)
-        always = [t for t in self.coverage.tests if t not in chosen and any(t.name.startswith(b) for b in part[1]) and
+        chosen = [t for t in chosen if t.name.startswith(tuple(part[1]))]
+        always = [t for t in self.coverage.tests if t not in chosen and any(t.name.startswith(b) for b in part[2]) and
                   self.coverage.contains(t, fault.path)]
         return sorted(chosen + always, key=lambda t: (not t.is_c, t.seconds))
 
@@ -114,8 +119,8 @@ class Judge:
                 return "invalid", t.name
             linked = linked or not t.is_c
             limit_s = max(SLOW_S, SLOW_FACTOR * t.seconds)
-            passed, _ = t.run(self.faulty, limit_s)
-            if not passed and t.run(self.clean, limit_s)[0]:
+            scratch = self.faulty.scratch
+            if not t.run(self.faulty, limit_s, scratch)[0] and t.run(self.clean, limit_s, scratch)[0]:
                 return "caught", t.name
         return "survived", ""
 
@@ -133,7 +138,7 @@ class Judge:
             record["verdict"] = "explained"
         if record["verdict"] is None:
             tests = self.tests_for(fault, part)
-            clean_scratch()
+            clean_scratch(self.faulty)
             if not fault.path.endswith(".c"):
                 target.write_text(mutated)
             try:
@@ -154,69 +159,96 @@ def change_of(fault, text):
     return join(text[start:end]), join(text[start:fault.start] + fault.new + text[fault.end:end])
 
 
-def write_survivors(records):
-    """As explained.txt has them, so that a line of reason makes one an explained fault."""
-    with open(WORK / "survivors.txt", "w") as f:
-        for r in records:
-            if r["verdict"] in ("survived", "unfinished"):
-                f.write(f"{r['file']}: line {r['line']}, {r['operator']}, {r['verdict']} after {r['n_test']} tests in {r['seconds']:.0f} s\n"
-                        f"  - {r['before']}\n  + {r['after']}\n")
+class Records:
+    """What was found about faults, kept in build/mutants for each seed."""
+
+    def __init__(self, seed):
+        self.path, self.survivors = WORK / f"mutants-{seed}.jsonl", WORK / f"survivors-{seed}.txt"
+        self.list, self.lock = [], threading.Lock()
+
+    def read(self):
+        self.list = [json.loads(line) for line in open(self.path)]
+
+    def put(self, record, i=None):
+        """Adds a record, or replaces the i-th."""
+        if i is None:
+            self.list.append(record)
+        else:
+            self.list[i] = record
+        with open(self.path, "w") as f:
+            f.writelines(json.dumps(r) + "\n" for r in self.list)
+        self.write_survivors()
+        r = record
+        note(f"{len(self.list) if i is None else i + 1} {r['part']} {r['file']}:{r['line']} {r['operator']}: {r['verdict']} {r['test']} "
+             f"({r['n_test']} tests, {r['seconds']:.1f} s)")
+
+    def write_survivors(self):
+        """As explained.txt has them, so that a line of reason makes one an explained fault."""
+        with open(self.survivors, "w") as f:
+            for r in self.list:
+                if r["verdict"] in ("survived", "unfinished"):
+                    f.write(f"{r['file']}: line {r['line']}, {r['operator']}, {r['verdict']} after {r['n_test']} tests in {r['seconds']:.0f} s\n"
+                            f"  - {r['before']}\n  + {r['after']}\n")
 
 
-def keep(records):
-    with open(WORK / "mutants.jsonl", "w") as f:
-        for r in records:
-            f.write(json.dumps(r) + "\n")
-    write_survivors(records)
-
-
-def say(n, r):
-    note(f"{n} {r['part']} {r['file']}:{r['line']} {r['operator']}: {r['verdict']} {r['test']} ({r['n_test']} tests, {r['seconds']:.1f} s)")
-
-
-def draw_and_judge(name, part, sampler, judge, discarded):
+def draw_and_judge(name, part, sampler, judge):
     """The record of the next fault of a part that can be judged, or None when there is none left."""
     while (fault := sampler.draw()) is not None:
         record = dict(judge.examine(fault, part), part=name)
         if record["verdict"] not in ("invalid", "equivalent"):
             return record
-        discarded[record["verdict"]] += 1
     return None
 
 
-def sample(arguments, parts, judge):
-    """Draws and judges arguments.mutants faults, of all parts in turn. Explained ones come on top."""
-    records, discarded = [], collections.Counter()
-    samplers = {name: Sampler(arguments.seed, name, part) for name, part in parts.items()}
-    n_judged = 0
-    while samplers and n_judged < arguments.mutants:
-        for name in list(samplers):
-            record = draw_and_judge(name, parts[name], samplers[name], judge, discarded) if n_judged < arguments.mutants else None
-            if record is None:
-                del samplers[name]
-                continue
-            n_judged += record["verdict"] != "explained"
-            records.append(record)
-            keep(records)
-            say(len(records), record)
-    note(f"left out: {discarded['invalid']} that do not compile, {discarded['equivalent']} with the same object code")
-    return records
+def side_by_side(judges, work):
+    with concurrent.futures.ThreadPoolExecutor(len(judges)) as pool:
+        list(pool.map(work, judges))
 
 
-def sample_again(parts, judge):
+def sample(n_fault, seed, parts, judges, records):
+    """Draws and judges n_fault faults, as many of each part; explained ones come on top. No part is with two judges at a time, so the
+    choice of faults does not depend on their number."""
+    samplers = {name: Sampler(seed, name, part) for name, part in parts.items()}
+    missing = {name: n_fault // len(parts) + (i < n_fault % len(parts)) for i, name in enumerate(parts)}
+    waiting = collections.deque(name for name in parts if missing[name] > 0)
+
+    def work(judge):
+        while True:
+            with records.lock:
+                if not waiting:
+                    return
+                name = waiting.popleft()
+            record = draw_and_judge(name, parts[name], samplers[name], judge)
+            with records.lock:
+                if record is None:
+                    continue
+                records.put(record)
+                missing[name] -= record["verdict"] != "explained"
+                if missing[name] > 0:
+                    waiting.append(name)
+    side_by_side(judges, work)
+
+
+def sample_again(parts, judges, records):
     """Judges again those of the last run that were not caught. Their files must not have changed."""
-    records = [json.loads(line) for line in open(WORK / "mutants.jsonl")]
-    for i, r in enumerate(records):
-        if r["part"] not in parts or r["verdict"] in ("caught", "explained"):
-            continue
-        fault = Fault(r["file"], r["line"], r["operator"], r["start"], r["end"], r["new"])
-        if change_of(fault, (TREE / r["file"]).read_text()) != (r["before"], r["after"]):
-            note(f"{r['file']} has changed: its faults need a new sample")
-            continue
-        records[i] = dict(judge.examine(fault, parts[r["part"]]), part=r["part"])
-        keep(records)
-        say(i + 1, records[i])
-    return records
+    records.read()
+    waiting = collections.deque(i for i, r in enumerate(records.list) if r["part"] in parts and r["verdict"] not in ("caught", "explained"))
+
+    def work(judge):
+        while True:
+            with records.lock:
+                if not waiting:
+                    return
+                i = waiting.popleft()
+            r = records.list[i]
+            fault = Fault(r["file"], r["line"], r["operator"], r["start"], r["end"], r["new"])
+            if change_of(fault, (TREE / r["file"]).read_text()) != (r["before"], r["after"]):
+                note(f"{r['file']} has changed: its faults need a new sample")
+                continue
+            record = dict(judge.examine(fault, parts[r["part"]]), part=r["part"])
+            with records.lock:
+                records.put(record, i)
+    side_by_side(judges, work)
 
 
 def figure(name, value, unit, better):
@@ -246,24 +278,30 @@ def main():
     parser.add_argument("--part", help="one of the parts, or only files whose path begins so")
     parser.add_argument("--limit-s", type=float, default=60, help="of the tests of one mutant")
     parser.add_argument("--whole", action="store_true", help="the whole tree in place of the parts of the gate")
+    parser.add_argument("--judges", type=int, default=2, help="faults tried side by side")
     parser.add_argument("--again", action="store_true", help="judge the faults of the last run that were not caught once more")
     arguments = parser.parse_args()
     os.nice(10)
     every = WHOLE if arguments.whole else GATE
-    parts = every if arguments.part is None else {arguments.part: every.get(arguments.part, ([arguments.part], []))}
+    parts = every if arguments.part is None else {arguments.part: every.get(arguments.part, ([arguments.part], ["unit/", "api/"], []))}
     TREE.mkdir(parents=True, exist_ok=True)
-    clean_scratch()
-    if subprocess.run([SANDBOX, WORK, "true"], check=False).returncode != 0:
-        sys.exit("mutants: programs with faults need a sandbox: root, or user namespaces (unshare)")
     copy_tree()
+    if subprocess.run([SANDBOX, WORK, Build("clean").scratch, "true"], check=False).returncode != 0:
+        sys.exit("mutants: programs with faults need a sandbox: root, or user namespaces (unshare)")
     counted, name = (every, "whole" if arguments.whole else "gate") if set(parts) <= set(every) else (parts, arguments.part.replace("/", "-"))
-    coverage = Coverage(name, [f for part in counted.values() for f in files_of(TREE, part)], note)
+    coverage = Coverage(name, [f for part in counted.values() for f in files_of(TREE, part)],
+                        sorted({b for part in counted.values() for b in part[1]}), note)
     coverage.record()
-    judge = Judge(coverage, arguments.limit_s)
-    judge.prepare()
-    records = sample_again(parts, judge) if arguments.again else sample(arguments, parts, judge)
-    note((WORK / "survivors.txt").read_text())
-    if report([r for r in records if r["part"] in parts]) < GOAL:
+    judges = [Judge(coverage, arguments.limit_s, f"faulty-{i}") for i in range(1 if arguments.whole else arguments.judges)]
+    for judge in judges:
+        judge.prepare()
+    records = Records(arguments.seed)
+    if arguments.again:
+        sample_again(parts, judges, records)
+    else:
+        sample(arguments.mutants, arguments.seed, parts, judges, records)
+    note(records.survivors.read_text())
+    if report([r for r in records.list if r["part"] in parts]) < GOAL:
         sys.exit(f"mutants: the tests catch fewer than {100 * GOAL:.0f} %")
 
 
