@@ -80,7 +80,7 @@ float fast_tables_distance(const struct fast_tables *t, uint32_t row, const floa
  * about z by i_segment golden sections of a turn, rounded down to whole columns of the picture. */
 void fast_tables_axis(uint32_t i_segment, size_t q, float axis[3]);
 
-/* Writes one file, replacing it (docs/file-formats.md). STATUS_IO, STATUS_DISK_FULL, STATUS_NO_MEMORY. */
+/* Writes one file, replacing it (NOTES.md of this folder). STATUS_IO, STATUS_DISK_FULL, STATUS_NO_MEMORY. */
 status fast_tables_write(const struct fast_tables *t, const char *path, struct error *err);
 /* STATUS_FORMAT: not such a file, another version, or counts that make no sense; STATUS_CHECKSUM: damaged;
  * STATUS_NOT_FOUND, STATUS_IO, STATUS_NO_MEMORY. t: nothing to release on failure. */

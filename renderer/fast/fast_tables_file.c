@@ -25,7 +25,7 @@ struct header {
     uint32_t unused;
 };
 
-_Static_assert(sizeof(struct header) == 144, "docs/file-formats.md states the layout");
+_Static_assert(sizeof(struct header) == 144, "renderer/fast/NOTES.md states the layout");
 
 /* An array of the file. */
 struct part {
