@@ -9,14 +9,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Time in seconds between two writes of last uses, each of which costs a sync. */
+/* Seconds between two writes of last uses. Each write costs a sync. */
 static const double flush_s = 30;
 
 struct meter {
     int64_t serial;
     char id[STORE_ID_BYTES];
     double left; /* requests that may be made now */
-    double at_s; /* monotonic time of that */
+    double at_s; /* monotonic time of last_used */
     double used_unix_s;
     bool dirty; /* used_unix_s is not in the database */
 };
@@ -25,7 +25,7 @@ struct access_desk {
     struct store *store;
     const struct settings *settings;
     atomic_bool required; /* once true, it stays so: tokens are revoked but never removed */
-    pthread_mutex_t lock; /* of what follows */
+    pthread_mutex_t lock; /* guards the members below */
     struct meter *meter;  /* of each token that was used since the start */
     size_t n, capacity;
     double flushed_s;

@@ -7,7 +7,7 @@
 #include "server/settings/settings.h"
 #include "server/store/store_access.h"
 
-/* What a request may do. */
+/* The rights of a request. */
 struct access_grant {
     enum access_scope scope;
     bool all;                      /* sees the jobs of all owners */

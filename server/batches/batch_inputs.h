@@ -4,9 +4,9 @@
 
 #include "server/batches/batch_service.h"
 
-/* Declares the files of all samples of a batch that was submitted. What was declared before stays as it is. Files that
- * the server knows are linked and written in slices, between which other requests are served, with one sync for all;
- * the rest as job_declare_files does. May be repeated after an error. */
+/* Declares the files of all samples of a submitted batch. Earlier declarations stay as they are. Files that the server
+ * knows are linked and written in slices with one sync for all; other requests are served between two slices. The
+ * remaining files are declared as by job_declare_files. May be repeated after an error. */
 status batch_declare_files(struct job_service *v, const struct access_grant *grant, const struct batch_table *table,
                            const struct batch_outcome *outcome, struct job_refusal *refusal, struct error *err);
 

@@ -11,7 +11,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* What one sample takes, expected or taken. */
+/* Resources of one sample, expected or used. */
 struct need {
     double wall_s, wall_low_s, wall_high_s, cpu_s, memory_bytes, disk_bytes;
     size_t n_thread;
@@ -41,7 +41,8 @@ static struct need planned(const json_t *plan)
                          .n_thread = (size_t)fmin(fmax(n_thread, 1.0), THREADS_MOST)};
 }
 
-/* Whether the job has succeeded in the first attempt after its plan, and what that took. */
+/* Returns whether the job has succeeded in the first attempt after its plan, and sets the resources that it has
+ * used. */
 static bool taken(struct job_service *v, const struct job_row *row, const json_t *plan, struct need *took)
 {
     char folder[PATH_BYTES];
@@ -94,7 +95,7 @@ static size_t places(const struct need_list *l, size_t n_core)
     return n > 0 ? n : 1;
 }
 
-/* Sorts the list by memory. n_core: 0 for what jobs have taken, whose time together is not stated. */
+/* Sorts the list by memory. n_core: 0 for resources that jobs have used, whose time together is not stated. */
 static json_t *sum_up(struct need_list *l, size_t n_core)
 {
     struct need sum = {0};
@@ -120,7 +121,7 @@ static json_t *sum_up(struct need_list *l, size_t n_core)
     return out;
 }
 
-/* What was taken over what was expected. */
+/* Ratio of used resources to expected ones. */
 static json_t *ratios(const json_t *took, const json_t *expected)
 {
     static const char *const key[] = {"cpu_s", "job_s", "memory_bytes", "disk_bytes"};
@@ -135,7 +136,7 @@ static json_t *ratios(const json_t *took, const json_t *expected)
 /* ---- the plan ---- */
 
 struct sums {
-    struct need_list expected, ended, took; /* of all, of those that ended, what these took */
+    struct need_list expected, ended, took; /* all samples; expected by those that ended; used by those that ended */
     json_t *samples;
 };
 

@@ -22,7 +22,7 @@ status batch_jobs(struct job_service *v, const char *id, struct job_row **row, s
     return store_job_list(v->store, &q, row, n, err);
 }
 
-/* What an action does to one job. *changed: its row is other than before. */
+/* An action on one job. *changed: the row differs from before. */
 struct deed {
     struct job_service *v;
     enum batch_action action;

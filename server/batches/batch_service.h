@@ -1,4 +1,4 @@
-/* Batches as the API sees them: what users can do with all samples of a table at once. Every change holds the lock of
+/* Batches as the API sees them: the actions of users on all samples of a table at once. Every change holds the lock of
  * the job service and goes to the database in one transaction. Error texts are meant for users. */
 #ifndef SELVEDGE_SERVER_BATCH_SERVICE_H
 #define SELVEDGE_SERVER_BATCH_SERVICE_H
@@ -6,7 +6,7 @@
 #include "server/batches/batch_table.h"
 #include "server/store/store_batch.h"
 
-/* What a submission did. */
+/* The outcome of a submission. */
 struct batch_outcome {
     char id[STORE_ID_BYTES];
     bool created;
@@ -16,9 +16,9 @@ struct batch_outcome {
 };
 
 /* Makes a batch of drafts and declares their files; files that the server knows are complete at once. Where the owner
- * has a batch of this name, jobs whose document and files are those of their row are taken over as they are; the others
- * leave the batch, are cancelled if they have not ended, and keep their results. STATUS_EXISTS when that would change
- * the batch and table->update is false. After an error it can be repeated, and completes what is missing. */
+ * has a batch of this name, jobs whose document and files equal their row are taken over as they are; the others leave
+ * the batch, are cancelled if they have not ended, and keep their results. STATUS_EXISTS when that would change the
+ * batch and table->update is false. After an error it can be repeated, and completes the missing parts. */
 status batch_submit(struct job_service *v, const struct access_grant *grant, const struct batch_table *table,
                     struct batch_outcome *outcome, struct job_refusal *refusal, struct error *err);
 

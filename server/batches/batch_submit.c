@@ -159,7 +159,7 @@ static status make_jobs(struct submission *s, struct error *err)
     return STATUS_OK;
 }
 
-/* Writes what has changed, in one transaction. */
+/* Writes the changes in one transaction. */
 static status write_batch(struct submission *s, struct batch_outcome *out, struct error *err)
 {
     struct job_row *changed = calloc(s->n_other + 1, sizeof *changed);
@@ -207,7 +207,7 @@ static status complete_place(struct job_service *v, const char *id, const char *
     return st == STATUS_NOT_FOUND ? STATUS_OK : st;
 }
 
-/* Makes the folders that a kill or a full disk has kept from being made, and syncs what is new. */
+/* Makes the folders that are missing after a kill or a full disk, and syncs them. */
 static status complete_places(struct submission *s, struct error *err)
 {
     char folder[PATH_BYTES], path[PATH_BYTES];
@@ -257,7 +257,7 @@ static status check_update(const struct submission *s, struct job_refusal *refus
                            s->batch.name, n_left, s->n_new);
 }
 
-/* Finds out what there is to do. *text: the batch has another template. */
+/* Finds the changes to make. *text: the batch has another template. */
 static status prepare(struct submission *s, const struct access_grant *grant, bool *text, struct job_refusal *refusal,
                       struct error *err)
 {
@@ -309,8 +309,9 @@ static void forget(struct submission *s)
     *s = (struct submission){.v = s->v, .table = s->table};
 }
 
-/* The lock is held to find out what there is to do, and to write it; the folders of many jobs take longer and are made
- * between. What another request has changed meanwhile is found out again, and in the last try it cannot. */
+/* Holds the lock to find the changes and to write them. The folders of many jobs take longer, so they are made between
+ * the two, without the lock. Changes of other requests meanwhile are found by another try; in the last try the lock is
+ * held throughout. */
 static status submit(struct submission *s, const struct access_grant *grant, struct batch_outcome *out,
                      struct job_refusal *refusal, struct error *err)
 {

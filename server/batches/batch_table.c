@@ -63,7 +63,7 @@ static status read_file(struct job_service *v, const json_t *j, struct file_row 
     return job_check_declaration(v, file, err);
 }
 
-/* What a document says of the files of its sample. */
+/* The files that a document names for its sample. */
 struct visit {
     struct batch_sample *sample;
     bool *named;
@@ -123,12 +123,12 @@ static status read_files(struct job_service *v, const json_t *list, struct batch
     return s;
 }
 
-/* What is read of a table while it is read. */
+/* The state of a table while it is read. */
 struct reading {
     struct job_service *v;
     const json_t *template_, *rows;
     struct batch_table *table;
-    json_t **document; /* of each row; it shares what the row does not replace with the template */
+    json_t **document; /* one for each row; members that the row does not replace are shared with the template */
     json_t *names;     /* of the samples so far */
     size_t n_bytes;    /* of the texts of all documents so far */
 };

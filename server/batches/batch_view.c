@@ -33,7 +33,7 @@ status batch_summary(struct job_service *v, const struct batch_row *row, json_t 
 
 /* Progress of the jobs of a batch together. */
 struct progress {
-    double n_done;     /* jobs, with the fractions of those that run */
+    double n_done;     /* jobs, with the fractions of running ones */
     double end_unix_s; /* of the last one that is queued or runs; 0: none */
     bool end_unknown;  /* of one of them */
     int64_t count[JOB_N_STATE];

@@ -92,7 +92,7 @@ static void renew(struct lease_keeper *k)
         k->good_since_s = 0;
         return;
     }
-    /* what has held this renewal up may have held up those of others, whose leases count again from here */
+    /* A delay of this renewal may have delayed the renewals of other daemons, so their leases count again from here. */
     const double end_s = clock_monotonic_s();
     const bool late = !held || end_s - begin_s > lease_s / 4 || begin_s - k->renewed_s > lease_s / 2;
     k->renewed_s = begin_s;

@@ -1,9 +1,9 @@
 /* The thread that keeps the lease of this daemon, where several daemons share the database, and takes over from daemons
  * that have ended: it removes their rows and ends their connections. Their jobs are queued again by the supervisor
- * (lease_keeper_adopt). A daemon that finds its own row gone has been taken over: it gets a new lease under a new id,
- * and its workers, whose jobs others have by then, are to be killed. They could not write any more: the token of their
- * attempt is not that of the folder. While the server does not answer no lease ends: a daemon ends those of others only
- * when it has renewed its own for a whole lease without an error or a delay. */
+ * (lease_keeper_adopt). A daemon that finds its own row gone has been taken over: it gets a new lease under a new id
+ * and kills its workers, whose jobs other daemons have by then. Such a worker could not write any more, because the
+ * token of its attempt differs from the token in the folder. While the server does not answer no lease ends: a daemon
+ * ends other leases only when it has renewed its own for a whole lease without an error or a delay. */
 #ifndef SELVEDGE_SERVER_LEASE_KEEPER_H
 #define SELVEDGE_SERVER_LEASE_KEEPER_H
 
@@ -17,7 +17,8 @@ status lease_keeper_start(struct job_service *v, struct lease_keeper **keeper, s
 void lease_keeper_stop(struct lease_keeper *keeper);
 /* How often the lease was lost; 0 for NULL. */
 unsigned lease_keeper_losses(const struct lease_keeper *keeper);
-/* Whether this daemon began before all others that live, so that what a data folder needs once is its to do. */
+/* Returns whether this daemon began before all others that live. It then does the work that a data folder needs
+ * once. */
 bool lease_keeper_is_eldest(struct job_service *v);
 /* Queues the running jobs that no daemon holds; those whose end was asked for are cancelled. */
 void lease_keeper_adopt(struct job_service *v);

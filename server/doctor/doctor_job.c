@@ -170,7 +170,7 @@ static void examine_results(struct doctor *d, const struct patient *p)
     json_decref(result);
 }
 
-/* What the worker has last said, and whether it still runs. */
+/* Reports the last status of the worker, and whether it still runs. */
 static void examine_worker(struct doctor *d, struct patient *p)
 {
     struct error err = {0};

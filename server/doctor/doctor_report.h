@@ -16,7 +16,7 @@ struct doctor {
     int n[DOCTOR_N_GRADE];
 };
 
-/* Prints "ok     subject     text"; a text is a sentence without its period, and a fault says what to do. */
+/* Prints "ok     subject     text". The text is a sentence without its period; a fault states the remedy. */
 void doctor_say(struct doctor *d, enum doctor_grade grade, const char *subject, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 

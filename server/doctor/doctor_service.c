@@ -1,4 +1,4 @@
-/* The data folder and what else the service needs with these settings. */
+/* Examines the data folder and the other things that the service needs with these settings. */
 #include "base/clock.h"
 #include "base/version.h"
 #include "server/doctor/doctor_report.h"

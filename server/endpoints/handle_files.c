@@ -108,7 +108,7 @@ static void reply_declared(struct http_request *r, bool in_list, const struct jo
     if (!in_list) reply_header(r, "Location", upload);
 }
 
-/* One declaration, or a list of them of which all or none are made. */
+/* Declares one file, or a list of files: all or none. */
 static void declare(struct http_request *r, const json_t *list, bool in_list)
 {
     struct error err = {0};

@@ -1,5 +1,5 @@
-/* What a client may know before it sends or starts something: what is wrong with a document or with the files of a job,
- * and which bytes are here already. */
+/* Checks before a client sends or starts something: faults of a document or of a job's files, and inputs that the
+ * server has already. */
 #include "optimizer/job/checks/job_faults.h"
 #include "optimizer/job/job_outline.h"
 #include "server/endpoints/handlers.h"

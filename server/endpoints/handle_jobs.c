@@ -32,7 +32,7 @@ static void reply_job(struct http_request *r, const char *id, unsigned status_co
     char tag[JOB_TAG_BYTES], location[80];
     status s = job_get(r->service, id, &row, &err);
     if (s == STATUS_OK)
-        s = job_view_tag(r->service, &row, tag, &err); /* first: what changes now changes the next tag */
+        s = job_view_tag(r->service, &row, tag, &err); /* first, because a change from now on changes the next tag */
     if (s == STATUS_OK) s = job_view(r->service, &row, true, &view, &err);
     if (s != STATUS_OK) {
         reply_problem(r, NULL, &err, NULL);

@@ -1,4 +1,4 @@
-/* The list of jobs: filters, orders, pages, and rows of which a client says what it has. */
+/* The list of jobs: filters, orders, pages, and rows that a client may have already. */
 #include "server/endpoints/handlers.h"
 #include "server/http/http_reply.h"
 #include "server/http/long_poll.h"
@@ -14,7 +14,7 @@
 
 enum { LIST_MOST = 500, LIST_USUAL = 50, CURSOR_BYTES = 24 + 2 * STORE_KEY_BYTES };
 
-/* What a request asks for. */
+/* The parameters of a request for the list. */
 struct list_request {
     struct job_query query;
     bool rows;        /* short rows instead of summaries */
@@ -195,7 +195,7 @@ static status add_summaries(struct http_request *r, const struct job_row *row, s
     return STATUS_OK;
 }
 
-/* The tag of rows does not depend on what the client has. */
+/* The tag of rows does not depend on the rows that the client has. */
 static void reply_rows(struct http_request *r, crypto_generichash_state *hash, const char *cursor, json_t *body)
 {
     unsigned char sum[16];

@@ -4,7 +4,7 @@
 
 #include <stdio.h>
 
-/* What is too large or unusual in JSON that is well formed; NULL: it is not JSON. */
+/* Returns the first value that is too large or unusual in JSON that is well formed, or NULL: it is not JSON. */
 static const char *beyond_limits(const json_error_t *e)
 {
     switch (json_error_code(e)) {

@@ -80,7 +80,7 @@ static status read_secret(struct webhook *w, struct error *err)
 
 /* ---- one try ---- */
 
-/* What the receiver says is not kept; one that sends without end is cut off. */
+/* The answer of the receiver is not stored; an answer without end is cut off. */
 static size_t on_answer(char *data, size_t size, size_t n, void *context)
 {
     size_t *n_seen = context;
@@ -223,7 +223,7 @@ status webhook_start(const struct webhook_setup *setup, struct webhook **out, st
     const char *url = setup->settings->webhook_url;
     *out = NULL;
     status s = STATUS_OK;
-    /* a daemon that joins others without an address does not switch off what they send */
+    /* a daemon that joins others without an address does not switch off their webhook */
     if (url[0] != '\0' || setup->first_daemon) s = store_webhook_enable(setup->store, url[0] != '\0', err);
     if (s != STATUS_OK || url[0] == '\0') return s;
     if (!address_valid(url))

@@ -1,6 +1,6 @@
 /* The check of each request's token. A route states the scope that it needs, and by the parameters of its path whether
- * it is about a job ({id}) or about an upload ({upload}); those of other owners are answered as if they did not exist.
- * So a new route is guarded by its row in the table. */
+ * it is about a job ({id}) or about an upload ({upload}); jobs and uploads of other owners are answered as if they did
+ * not exist. So a new route is guarded by its row in the table. */
 #ifndef SELVEDGE_SERVER_ACCESS_GUARD_H
 #define SELVEDGE_SERVER_ACCESS_GUARD_H
 

@@ -14,7 +14,7 @@ enum { N_SINGLE = sizeof single / sizeof single[0] };
 
 struct headers_seen {
     unsigned n[N_SINGLE];
-    const char *fault; /* what is wrong with a header, or NULL */
+    const char *fault; /* Returns the fault of a header, or NULL. */
 };
 
 static bool name_valid(const char *name, size_t n)
@@ -162,7 +162,7 @@ struct query_seen {
     size_t n;
 };
 
-/* Whether a name is one of those between spaces. */
+/* Returns whether a list with spaces has the name. */
 static bool listed(const char *names, const char *name)
 {
     size_t n = strlen(name);
@@ -182,7 +182,7 @@ static enum MHD_Result examine_parameter(void *context, enum MHD_ValueKind kind,
     }
     snprintf(q->name, sizeof q->name, "%s", name[0] == '\0' ? "?" : name);
     for (char *c = q->name; *c != '\0'; c++)
-        if (*c < ' ' || *c > '~') *c = '?'; /* also what is no UTF-8 */
+        if (*c < ' ' || *c > '~') *c = '?'; /* also if it is no UTF-8 */
     return MHD_NO;
 }
 

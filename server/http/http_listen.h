@@ -21,7 +21,7 @@ void http_listen_end(const struct settings *settings);
 /* Whether a Host header names this service. On an address that is not loopback, any name may: there every request needs
  * a token, which a page of another site that rebinds its name does not have. */
 bool http_host_known(const struct settings *settings, const char *host);
-/* Whether a Host header (or NULL) is that of server.public_origin, and this one is https. */
+/* Returns whether the Host header (or NULL) names server.public_origin, and this is an https address. */
 bool http_host_public(const struct settings *settings, const char *host);
 /* Whether a page with this Origin, which reached us with this Host, is one of this service. */
 bool http_origin_known(const struct settings *settings, const char *origin, const char *host);

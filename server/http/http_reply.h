@@ -29,8 +29,8 @@ void reply_no_store(struct http_request *request);
 void reply_header(struct http_request *request, const char *name, const char *value);
 void reply_header_int(struct http_request *request, const char *name, long long value);
 
-/* What a browser lets a reply do that it shows as a page. Every reply is sandboxed unless reply_policy says otherwise
- * afterwards: it may hold bytes that a worker or another user wrote, and must not act for whoever opens it. */
+/* The rights of a reply that a browser shows as a page. Every reply is sandboxed unless reply_policy says otherwise
+ * afterwards: it may hold bytes that a worker or another user wrote, and must not act for its reader. */
 enum reply_policy {
     POLICY_SANDBOX,      /* no scripts, no origin, nothing from elsewhere */
     POLICY_SANDBOX_PAGE, /* no scripts; pictures and styles of this origin */

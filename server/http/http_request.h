@@ -24,7 +24,7 @@ struct http_request {
     bool begun;                        /* its headers are there */
     int64_t body_memory;               /* bytes of the memory for bodies that it holds */
     struct access_desk *desk;
-    struct access_grant grant;                  /* what its token allows */
+    struct access_grant grant;                  /* rights of its token */
     char param[HTTP_N_PARAM][HTTP_PARAM_BYTES]; /* values of {id}, {name} and {path...} in the path */
     int64_t content_length;                     /* 0: no body */
     char *body;                                 /* JSON body, NUL-terminated */
@@ -40,7 +40,7 @@ struct http_request {
     struct connection_entry *entry;
 };
 
-/* What a route does with the request's body. HTTP_BODY_BATCH: JSON that may be larger. */
+/* How a route takes the request's body. HTTP_BODY_BATCH: JSON that may be larger. */
 enum http_body { HTTP_BODY_NONE, HTTP_BODY_JSON, HTTP_BODY_BATCH, HTTP_BODY_UPLOAD };
 
 struct http_route {

@@ -4,8 +4,8 @@
 #include "server/http/access_guard.h"
 #include "server/http/http_reply.h"
 
-/* Least time between two looks of one request at what it watches: a running job changes with every heartbeat, and the
- * list with each of any job. */
+/* Least time between two looks of one request at its job or list: a running job changes with every heartbeat, and the
+ * list with the heartbeats of all jobs. */
 static const double job_pause_s = 0.1, list_pause_s = 0.5;
 
 static int socket_of(struct http_request *r)

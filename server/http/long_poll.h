@@ -1,6 +1,6 @@
 /* Long polls: a GET with `wait` and If-None-Match is answered when the tag is no longer the present one, or 304 after
- * `wait` seconds. Each connection has a thread, so what waits is the thread of a connection that would be idle
- * otherwise; no other request waits for it. */
+ * `wait` seconds. Each connection has a thread, so only a thread waits that would be idle otherwise, and no other
+ * request. */
 #ifndef SELVEDGE_SERVER_LONG_POLL_H
 #define SELVEDGE_SERVER_LONG_POLL_H
 
@@ -16,7 +16,7 @@ struct long_poll {
 /* job_id NULL: the list of jobs. Reads `wait`; returns false after deciding another reply. Use:
  * if (!long_poll_begin(r, id, &p)) return;
  * do decide the reply; while (long_poll_again(r, &p));
- * The last call of long_poll_again releases what begin has made. */
+ * The last call of long_poll_again releases the watch. */
 bool long_poll_begin(struct http_request *request, const char *job_id, struct long_poll *poll);
 bool long_poll_again(struct http_request *request, struct long_poll *poll);
 

@@ -18,7 +18,7 @@ struct tar_stream {
     struct result_file *file;
     size_t n_file, i_file;
     int fd;               /* of the file that is being sent, or -1 */
-    long long left_bytes; /* bytes of that file that are still to be sent, by the size in its header */
+    long long left_bytes; /* bytes of this file still to be sent, by the size in its header */
     struct archive *archive;
     bool closed, failed;
     char *out; /* bytes made and not yet sent: out[sent..n_out) */

@@ -10,16 +10,15 @@ struct job_service;
 struct settings;
 
 /* Makes the file, or enlarges it up to disk.ballast_bytes, or 1 MiB if that is more, with at most half of the space
- * above the floor, so that it keeps no job from running; under the floor it is a small one. all: a small one may take
- * all space that is free, as a daemon does at its start and at its end with what it has not needed, or has freed
- * itself. */
+ * above the floor, so that it keeps no job from running; under the floor the file is small. all: a small file may take
+ * all free space, as at the start and at the end of a daemon. */
 void ballast_keep(const struct settings *settings, bool all);
 /* Returns false if there was no file to remove. */
 bool ballast_release(const char *data_folder);
 
-/* Makes room for a change that has found the disk full and that frees space or ends work: first in what the database
- * has, then by the ballast file. To be repeated, with *step 0 at first, while the change finds the disk full; returns
- * false when nothing more can be done. */
+/* Makes room for a change that has found the disk full and that frees space or ends work: first within the database
+ * file, then by removing the reserve file. To be repeated, with *step 0 at first, while the change finds the disk full;
+ * returns false when nothing more can be done. */
 bool ballast_make_room(struct job_service *v, int *step);
 
 #endif

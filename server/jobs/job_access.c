@@ -73,7 +73,7 @@ void job_note(struct job_service *v, const char *job_id, const struct journal_en
 {
     char folder[PATH_BYTES];
     struct error err = {0};
-    /* what the daemon does by itself follows from the files of the worker, too, so no one waits for its sync */
+    /* Changes by the daemon itself follow from the files of the worker, too, so no one waits for their sync. */
     bool sync = entry->job == NULL || (entry->job->state != JOB_RUNNING && entry->job->state != JOB_PAUSED);
     path_join(folder, v->settings->data, "jobs", job_id, NULL);
     status s = job_journal_append(&v->journal_key, folder, entry, sync, &err);

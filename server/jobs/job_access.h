@@ -18,7 +18,7 @@ void job_mark_edited(struct job_row *row);
 /* Removes the folder of a job, and syncs that: a folder that came back after a power cut, when its job's row is erased,
  * would be one of a job that the database has lost. */
 status job_remove_folder(const struct job_service *v, const char *id, struct error *err);
-/* Removes the job's plan, if it has one: that of another document or of other files says nothing. */
+/* Deletes the job's plan, if there is one. A plan is valid only for the document and the files it was computed from. */
 void job_forget_plan(const struct job_service *v, const char *id);
 /* Whether the job whose geometry this one adopts, if any, exists and has the same owner. STATUS_INVALID, in the same
  * words for a job of another owner as for one that does not exist. */
@@ -30,11 +30,12 @@ status job_check_declaration(struct job_service *v, struct file_row *row, struct
 status job_make_queued(struct job_service *v, struct job_row *row, struct job_refusal *refusal, struct error *err);
 /* Makes the folder of a job with document and journal, without syncs. The row has its document. */
 status job_fill_place(struct job_service *v, const struct job_row *row, const char *folder, struct error *err);
-/* Whether an owner, beside what it keeps, may keep further jobs and bytes; else STATUS_DISK_FULL, and the refusal says
- * so with the numbers. */
+/* Returns whether an owner may keep these further jobs and bytes; else STATUS_DISK_FULL, and the refusal has the
+ * numbers. */
 status job_check_quota(struct job_service *v, const struct access_grant *grant, const char *owner,
                        const struct owner_use *more, struct job_refusal *refusal, struct error *err);
-/* Repeats in the job's journal what the database holds already. A failure is logged: the database is the owner. */
+/* Repeats a change of the database in the job's journal. A failure is logged only, because the database is the
+ * owner. */
 void job_note(struct job_service *v, const char *job_id, const struct journal_entry *entry);
 /* Tells the runner, if there is one, that a job has changed. */
 void job_wake_runner(const struct job_service *v);

@@ -1,4 +1,4 @@
-/* What users can do with a job: start, retry, cancel, delete. */
+/* The actions of users on a job: start, retry, cancel, delete. */
 #include "base/clock.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_change.h"

@@ -5,8 +5,8 @@
 
 #include "server/jobs/job_service.h"
 
-/* For the changes of a job, of what an owner keeps, or of both; NULL and NULL: of all jobs. Where the locks of the
- * server cannot be had, changes that this thread tries are refused with the reason until job_change_end. */
+/* For changes of a job, of the data of an owner, or of both; NULL and NULL: of all jobs. Where the locks of the server
+ * cannot be had, changes that this thread tries are refused with the reason until job_change_end. */
 void job_change_begin(struct job_service *v, const char *job_id, const char *owner);
 void job_change_end(struct job_service *v);
 

@@ -200,8 +200,9 @@ static status note_document_of_run(struct job_service *v, const struct job_row *
     return foreign_file_replace(path, document, strlen(document), true, err);
 }
 
-/* The folder first: what is acknowledged is in both, and a rebuild makes a job a draft whose document differs from the
- * journal's checksum. run: the document that the job was run with, if this is the first edit since; else NULL. */
+/* The folder first: then an acknowledged change is in both folder and database, and a rebuild makes a job a draft whose
+ * document differs from the journal's checksum. run: the document of the last run, if this is the first edit since;
+ * else NULL. */
 static status replace_document(struct job_service *v, struct job_row *row, const char *run, struct error *err)
 {
     status s = run != NULL ? note_document_of_run(v, row, run, err) : STATUS_OK;

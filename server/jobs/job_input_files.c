@@ -181,10 +181,10 @@ static status insert_new(struct job_service *v, struct job_row *job, struct job_
     return s;
 }
 
-/* What new files take. */
+/* Space for new files. */
 struct room {
     size_t n_file;
-    int64_t n_bytes, n_upload_bytes; /* of all; of those that must be uploaded */
+    int64_t n_bytes, n_upload_bytes; /* all files; files that must be uploaded */
 };
 
 static status check_room(struct job_service *v, const struct access_grant *grant, const struct job_row *job,

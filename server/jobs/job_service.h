@@ -42,7 +42,7 @@ struct job_service {
     const struct settings *settings;
     struct store *store;
     struct upload_set *upload;
-    struct change_feed *feed;        /* of what long polls wait for */
+    struct change_feed *feed;        /* wakes long polls */
     struct queue_forecast *forecast; /* of when queued jobs start */
     struct log *log;
     struct job_runner runner;
@@ -66,7 +66,7 @@ struct job_request {
     const char *document;
     size_t n_bytes;
     const char *idempotency_key;
-    const struct access_grant *grant; /* whose job it is to be, and what they may keep */
+    const struct access_grant *grant; /* owner of the job, and the quota of that owner */
 };
 
 /* Creates a draft and gives its id. *replayed: an earlier request with the same key and document has created it; its

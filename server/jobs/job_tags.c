@@ -56,7 +56,7 @@ static bool holds(const json_t *list, const char *tag)
     return false;
 }
 
-/* Appends the tags of list, each once, but those of `not`. */
+/* Appends the tags of list, each once, except the tags in `not`. */
 static void append(json_t *to, const json_t *list, const json_t * not )
 {
     size_t i;

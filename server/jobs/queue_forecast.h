@@ -1,6 +1,6 @@
-/* When queued jobs will probably start. It repeats the supervisor's choice (next_turn in supervisor.c) in advance.
- * Running jobs end after their eta_s; a job of which nothing is known takes the median time of those that succeeded
- * last. It is computed once a second at most, so it costs little however many ask. Thread-safe. */
+/* When queued jobs will probably start. It repeats the supervisor's choice (queue_turn.h) in advance. Running jobs end
+ * after their eta_s; a job without an estimate takes the median time of the jobs that succeeded last. It is computed
+ * once a second at most, so it costs little however many requests ask for it. Thread-safe. */
 #ifndef SELVEDGE_SERVER_QUEUE_FORECAST_H
 #define SELVEDGE_SERVER_QUEUE_FORECAST_H
 

@@ -232,7 +232,7 @@ static status open_service(const struct settings *s, struct log *log, struct job
         r = rebuild_is_needed(s, err);
         if (r == STATUS_OK) r = service_open(s, log, service, err);
     } while (make_room(s, log, r, err));
-    if (r == STATUS_OK) ballast_keep(s, true); /* what this start has not needed */
+    if (r == STATUS_OK) ballast_keep(s, true); /* the space that this start has not needed */
     return r;
 }
 

@@ -1,4 +1,4 @@
-/* What an operator does with a data folder beside running the daemon: back up, rebuild, quarantine, doctor. */
+/* The commands of an operator on a data folder: back up, rebuild, quarantine, doctor. */
 #ifndef SELVEDGE_SERVER_RESCUE_COMMANDS_H
 #define SELVEDGE_SERVER_RESCUE_COMMANDS_H
 
@@ -21,7 +21,7 @@ struct rescue_request {
 status rescue_check(const struct rescue_request *request, struct error *err);
 /* Whether no daemon must be using the data folder. */
 bool rescue_needs_lock(const struct rescue_request *request);
-/* Runs the command; what it has to say goes to `out`. */
+/* Runs the command and prints its report to `out`. */
 status rescue_run(const struct settings *settings, const struct rescue_request *request, FILE *out, struct error *err);
 
 #endif

@@ -1,5 +1,5 @@
-/* JOB/backend.json: what a backend knows of a job that an engine other than the daemon runs. It lets the next daemon
- * find the job again, and any daemon on the same store show where it is. */
+/* JOB/backend.json: the state of a job at an engine other than the daemon. By this file the next daemon finds the job
+ * again, and any daemon on the same store can show where it is. */
 #ifndef SELVEDGE_SERVER_BACKEND_NOTE_H
 #define SELVEDGE_SERVER_BACKEND_NOTE_H
 
@@ -16,7 +16,7 @@ struct backend_note {
     bool waits;                 /* the worker does not compute at present */
     int64_t memory_bytes;       /* asked for in this attempt */
     int64_t least_memory_bytes; /* an attempt with less has run out of it */
-    char progress[48];          /* what had been done when an attempt was interrupted last */
+    char progress[48];          /* progress at the last interruption of an attempt */
 };
 
 /* All zero when there is no such file. */

@@ -1,4 +1,5 @@
-/* JOB/plan.json: what a job was expected to take before it ran (input_plan of server/workers/input_judge.h). */
+/* JOB/plan.json: the resources that a job was expected to need before it ran (input_plan of
+ * server/workers/input_judge.h). */
 #ifndef SELVEDGE_SERVER_PLAN_FILE_H
 #define SELVEDGE_SERVER_PLAN_FILE_H
 

@@ -1,4 +1,4 @@
-/* JOB/status.json: what a worker reports about its progress and its end (docs/api.md). */
+/* JOB/status.json: the progress and the end of a job as its worker reports them (docs/api.md). */
 #ifndef SELVEDGE_SERVER_STATUS_FILE_H
 #define SELVEDGE_SERVER_STATUS_FILE_H
 

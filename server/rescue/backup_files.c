@@ -93,7 +93,7 @@ void backup_choose(const struct backup_file *file, size_t n, int64_t keep, int64
     }
 }
 
-/* Removes what a killed daemon has left of backups that it was making. */
+/* Removes unfinished backups of a killed daemon. */
 static void remove_parts(const char *folder)
 {
     static const char ending[] = ".part";

@@ -22,7 +22,7 @@ status backup_list(const char *folder, struct backup_file **file, size_t *n, str
 /* Which backups of a list (newest first) to keep: the newest `keep`, and of the older ones the newest of each day (UTC)
  * until `days` days have one. kept[n] is set. */
 void backup_choose(const struct backup_file *file, size_t n, int64_t keep, int64_t days, bool *kept);
-/* Removes the backups that are not to be kept, and what is left of unfinished ones. No backup must be under way. */
+/* Removes the backups beyond the limits of the settings, and unfinished ones. No backup must be under way. */
 status backup_prune(const char *folder, int64_t keep, int64_t days, struct error *err);
 
 #endif

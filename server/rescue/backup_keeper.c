@@ -17,7 +17,7 @@ struct backup_keeper {
     struct job_service *v;
     char folder[PATH_BYTES], database[PATH_BYTES];
     pthread_t thread;
-    pthread_mutex_t lock; /* of what follows */
+    pthread_mutex_t lock; /* guards the members below */
     pthread_cond_t stopped;
     bool stop;
     struct backup_state state;

@@ -8,7 +8,7 @@
 
 /* Compares the database, of any version, with the journals of all folders in DATA/jobs; a daemon may be using both.
  * STATUS_FORMAT, with the numbers and one job: it lacks jobs that were acknowledged, or has an older row of them than a
- * sealed record (journal_seal.h) of their journals. What cannot be read is passed over. STATUS_NO_MEMORY. */
+ * sealed record (journal_seal.h) of their journals. Journals that cannot be read are passed over. STATUS_NO_MEMORY. */
 status database_age_check(const struct settings *settings, const char *database, struct error *err);
 
 #endif

@@ -131,7 +131,8 @@ status input_evidence_read(const struct input_request *q, struct file_row **out,
 {
     struct declared d = {0};
     struct job_outline outline = {.n_file = 0};
-    /* the journal knows what was removed since the backup; where it knows no file, its file records may be lost */
+    /* the journal lists the files removed since the backup; where it lists no file at all, its file records may be
+     * lost */
     for (size_t i = 0; i < q->journal->n_file; i++) declare(&d, &q->journal->file[i]);
     for (size_t i = 0; !q->journal->has_job && i < q->n_base; i++) declare(&d, &q->base[i]);
     struct visit v = {q, &d};

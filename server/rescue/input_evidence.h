@@ -14,7 +14,7 @@ struct input_request {
     const char *data;
     const struct job_row *job; /* with document */
     const struct job_journal *journal;
-    const struct file_row *base; /* what a backup says of them */
+    const struct file_row *base; /* files by the backup */
     size_t n_base;
     FILE *notes;
 };

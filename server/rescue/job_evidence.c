@@ -62,7 +62,7 @@ static bool choose_row(const struct evidence_request *q, const struct job_journa
     return true;
 }
 
-/* A row for a job of which only its folder is known. */
+/* Makes a row for a job that is known by its folder only. */
 static void bare_row(const struct evidence_request *q, const char *folder, struct job_row *row)
 {
     char path[PATH_BYTES];

@@ -1,5 +1,5 @@
-/* What a job's folder says of the job: its journal, its document, its inputs, and what its worker has written. From
- * this the rows of the job can be written again. The input files are read whole, and their checksums compared. */
+/* The evidence about a job in its folder: its journal, its document, its inputs, and the files of its worker. From this
+ * the rows of the job can be written again. The input files are read whole, and their checksums compared. */
 #ifndef SELVEDGE_SERVER_JOB_EVIDENCE_H
 #define SELVEDGE_SERVER_JOB_EVIDENCE_H
 
@@ -9,7 +9,7 @@
 
 struct evidence_request {
     const char *data, *id; /* the folder is DATA/jobs/ID */
-    /* what a backup says of the job; base NULL: nothing */
+    /* row of the job by the backup; base NULL: there is none */
     const struct job_row *base;
     const struct file_row *base_file;
     size_t n_base_file;

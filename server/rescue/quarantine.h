@@ -7,11 +7,11 @@
 
 #include <stdio.h>
 
-/* Prints a line for each folder: its name, and what its journal says. STATUS_IO. */
+/* Prints a line for each folder: its name, and the job by its journal. STATUS_IO. */
 status quarantine_list(const struct settings *settings, FILE *report, struct error *err);
 /* Moves a folder, named by its whole name or by the id of its job, back to jobs/ and adds its job to the database.
  * After an error the folder is in quarantine. The caller holds the lock of the data folder. STATUS_NOT_FOUND,
- * STATUS_CONFLICT (the id is that of two folders, or of a job that exists), and the errors of rebuild_one. */
+ * STATUS_CONFLICT (two folders have the id, or a job exists with it), and the errors of rebuild_one. */
 status quarantine_restore(const struct settings *settings, const char *name, FILE *report, struct error *err);
 
 #endif

@@ -9,14 +9,14 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-/* Checks the database before a start. STATUS_FORMAT, with what to do: it is damaged, it is missing while there are
+/* Checks the database before a start. STATUS_FORMAT, with the remedy: it is damaged, it is missing while there are
  * folders of jobs, or it is behind them (database_age.h). */
 status rebuild_is_needed(const struct settings *settings, struct error *err);
 
 /* Writes a new database: the present one if it is sound, else the newest good backup, else an empty one, and over it
- * what the folders say of each job (job_evidence.h). The present files are moved to DATA/replaced, nothing is
- * deleted. Prints what was brought back and what was not. resume: see job_evidence.h. After an error the present
- * files are unchanged, but for one in the very last steps, after which the call is to be repeated. STATUS_IO,
+ * the evidence in the folder of each job (job_evidence.h). The present files are moved to DATA/replaced, nothing is
+ * deleted. Prints the jobs that were restored and those that were not. resume: see job_evidence.h. After an error the
+ * present files are unchanged, but for one in the very last steps, after which the call is to be repeated. STATUS_IO,
  * STATUS_DISK_FULL, ... */
 status rebuild(const struct settings *settings, bool resume, FILE *report, struct error *err);
 

@@ -1,4 +1,4 @@
-/* What the files of a worker say of the state of a job. */
+/* The state of a job by the files of its worker. */
 #ifndef SELVEDGE_SERVER_WORKER_EVIDENCE_H
 #define SELVEDGE_SERVER_WORKER_EVIDENCE_H
 
@@ -6,9 +6,9 @@
 
 #include <stdio.h>
 
-/* Corrects state, attempt, times and error of a row by what is in its folder: an attempt that was running may have
- * ended, and a job that has succeeded must have its result. bare: nothing but the folder is known of the job. resume:
- * a job that was running or paused is queued; otherwise it is cancelled, and keeps its checkpoints for a retry. */
+/* Corrects state, attempt, times and error of a row by the files in its folder: an attempt that was running may have
+ * ended, and a job that has succeeded must have its result. bare: the job is known by its folder only. resume: a job
+ * that was running or paused is queued; otherwise it is cancelled, and keeps its checkpoints for a retry. */
 void worker_evidence_apply(const char *folder, bool bare, bool resume, struct job_row *row, FILE *notes);
 
 #endif

@@ -36,8 +36,8 @@ status retention_plan_make(struct job_service *service, const struct retention_l
                            struct retention_plan *plan, struct error *err);
 void retention_plan_release(struct retention_plan *plan);
 
-/* Removes a job, if it may go; *removed then says what it was. STATUS_CONFLICT, with the reason, if it may not;
- * STATUS_NOT_FOUND. */
+/* Removes a job, if retention may remove it, and describes it in *removed. STATUS_CONFLICT, with the reason, if it may
+ * not; STATUS_NOT_FOUND. */
 status retention_remove(struct job_service *service, const char *id, enum retention_reason reason,
                         struct retention_job *removed, struct error *err);
 

@@ -1,7 +1,7 @@
-/* The database of jobs: SQLite in a file, or PostgreSQL (drivers/store_driver.h). The changes of a call that returned
+/* The database of jobs: SQLite in a file, or PostgreSQL (sql/store_driver.h). The changes of a call that returned
  * STATUS_OK survive power loss; where the reply to a commit is lost, the call fails. One connection writes, a second
- * one reads, each guarded by a mutex: reading waits for no sync. A call reads what every call that has returned
- * before has written. A database of an older version is migrated (the file of SQLite is copied to <path>.v<old>
+ * one reads, each guarded by a mutex: reading waits for no sync. A call sees the writes of every call that has
+ * returned before. A database of an older version is migrated (the file of SQLite is copied to <path>.v<old>
  * first), a newer one is refused. All functions may be called from any thread; all may fail with STATUS_IO,
  * STATUS_DISK_FULL or STATUS_NO_MEMORY. */
 #ifndef SELVEDGE_SERVER_STORE_H
@@ -89,8 +89,8 @@ void store_place_release(struct store_place *place);
  * newer schema, or where a package is missing that the database needs. */
 status store_open(const char *path, struct store **store, struct error *err);
 status store_open_place(const struct store_place *place, struct store **store, struct error *err);
-/* Opens the database of a daemon that runs. It is not migrated: STATUS_CONFLICT when its version is not that of this
- * program. *store is set then too, and may be asked about its server (store_server_look, store_clock) and closed. */
+/* Opens the database of a daemon that runs. It is not migrated: STATUS_CONFLICT when the program expects another
+ * version. *store is set then too, and may be asked about its server (store_server_look, store_clock) and closed. */
 status store_open_place_beside(const struct store_place *place, struct store **store, struct error *err);
 void store_close(struct store *store);
 /* From now on `changed` is called with the id of a job after each change of it or of its files, by the thread that made
@@ -118,7 +118,7 @@ status store_job_erase(struct store *store, const char *id, struct error *err);
 /* JOB_BY_PLACE is for the jobs of one batch, without after_serial. */
 enum job_order { JOB_BY_CREATION, JOB_BY_END, JOB_BY_SAMPLE, JOB_BY_PLACE };
 
-/* Which jobs, and from which place of the list on. What is 0 or NULL selects nothing. */
+/* Selects jobs, and a place in the list to begin at. Members that are 0 or NULL select nothing. */
 struct job_query {
     unsigned states; /* bits 1 << enum job_state */
     bool deleted;    /* tombstones instead of jobs */
@@ -185,9 +185,9 @@ status store_file_count(struct store *store, const char *job_id, int64_t *n, str
 /* Lists files in the order of declaration; the caller frees *row. job_id NULL: the incomplete files of all jobs. */
 status store_file_list(struct store *store, const char *job_id, struct file_row **row, size_t *n, struct error *err);
 
-/* Writes all that is known of a job in one transaction, over what the database has of it: the row as it is,
- * updated_unix_s too, document, files and idempotency key (NULL: none is added). row->serial is that of the job, or 0
- * if it is new, and is set. A job that ends by this makes a delivery (store_webhook_enable) like any other. */
+/* Writes all facts about a job in one transaction, over the job's present rows: the row as it is, updated_unix_s too,
+ * document, files and idempotency key (NULL: none is added). row->serial is 0 for a new job, else the job's serial, and
+ * is set. A job that ends by this makes a delivery (store_webhook_enable) like any other. */
 status store_import(struct store *store, struct job_row *row, const struct file_row *file, size_t n_file,
                     const char *idempotency_key, const char *body_hash, struct error *err);
 

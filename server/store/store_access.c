@@ -212,7 +212,7 @@ status store_access_rebuilt(struct store *store, bool require, double now_unix_s
 {
     pthread_mutex_lock(&store->write.lock);
     status s = store_run(&store->write, NULL, err, "DELETE FROM session", "");
-    /* a token that is revoked, and whose hash is that of no text, says that tokens were once made */
+    /* a revoked token with the hash of no text says that tokens were once made */
     if (s == STATUS_OK && require) {
         char id[STORE_ID_BYTES];
         uuid_t u;

@@ -1,5 +1,5 @@
-/* Access tokens, sessions of browsers and what the owners of jobs keep, in the database of jobs. Of a token only a hash
- * is stored, and tokens are looked up by it: what an attacker can choose has no relation to the order of the index, so
+/* Access tokens, sessions of browsers and the use of job owners, in the database of jobs. Only a hash of a token is
+ * stored, and tokens are looked up by it: a text chosen by an attacker has no relation to the order of the index, so
  * the time of the look-up tells nothing. Rows of tokens are never removed: a revoked one stays, with its time. */
 #ifndef SELVEDGE_SERVER_STORE_ACCESS_H
 #define SELVEDGE_SERVER_STORE_ACCESS_H
@@ -8,13 +8,13 @@
 
 enum { STORE_SECRET_HASH_BYTES = 32, QUOTA_DEFAULT = -1 };
 
-/* What a request needs, or a token grants: each includes those before it. */
+/* The scopes of requests and tokens: each includes the scopes before it. */
 enum access_scope { ACCESS_OPEN, ACCESS_READ, ACCESS_SUBMIT, ACCESS_ADMIN, ACCESS_N_SCOPE };
 const char *access_scope_name(enum access_scope scope);
 /* Returns false when no token can have such a scope. */
 bool access_scope_parse(const char *name, enum access_scope *scope);
 
-/* Quotas; 0: no limit, QUOTA_DEFAULT: that of the settings. */
+/* Quotas; 0: no limit, QUOTA_DEFAULT: the quota of the settings. */
 struct access_quota {
     int64_t requests_per_minute, stored_bytes, jobs;
 };

@@ -16,7 +16,7 @@ void batch_row_release(struct batch_row *row);
 void batch_rows_free(struct batch_row *row, size_t n);
 
 /* Inserts a batch, or replaces template and time of the one with this id; inserts n_new drafts, and updates n_old jobs
- * as store_job_update does. All in one transaction. Sets the serials of what is new. */
+ * as store_job_update does. All in one transaction. Sets the serials of new rows. */
 status store_batch_write(struct store *store, struct batch_row *batch, struct job_row *new_job, size_t n_new,
                          struct job_row *old_job, size_t n_old, struct error *err);
 /* Removes a batch, and updates n jobs, which leave it or are tombstones, in one transaction. */

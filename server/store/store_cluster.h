@@ -1,10 +1,9 @@
 /* Several daemons on one database, where the driver allows it (store_is_shared). Each daemon has a row with a lease,
- * which it renews; times are those of the server's clock. A daemon without its row has lost its lease: another one has
- * taken over what it held. A daemon claims a queued job before it starts it, by a lock of the row that others skip.
- * What is to be done once for all daemons is a duty, which one daemon has as long as it lives. Changes of a job,
- * which are made from a row that was read before, are made behind a gate, by locks of the server that end with the
- * connection. With a database of one daemon, claims and duties are granted, and the rest does nothing. As all of
- * store.h. */
+ * which it renews; times are read from the server's clock. A daemon without its row has lost its lease: another one has
+ * taken over its jobs. A daemon claims a queued job before it starts it, by a lock of the row that others skip. Work
+ * that is done once for all daemons is a duty, which one daemon has as long as it lives. Changes of a job that start
+ * from an earlier row are made behind a gate, by locks of the server that end with the connection. With a database of
+ * one daemon, claims and duties are granted, and the rest does nothing. As all of store.h. */
 #ifndef SELVEDGE_SERVER_STORE_CLUSTER_H
 #define SELVEDGE_SERVER_STORE_CLUSTER_H
 
@@ -24,7 +23,7 @@ struct daemon_row {
 bool store_is_shared(const struct store *store);
 /* An id that the database got when it was made. */
 status store_identity(struct store *store, char id[STORE_ID_BYTES], struct error *err);
-/* What kind of server it is. */
+/* The kind of server. */
 struct store_server {
     char version[64];
     bool syncs;     /* it writes so that changes survive power loss */
@@ -65,15 +64,15 @@ status store_job_elsewhere(struct store *store, const char *id, bool *elsewhere,
 /* Running jobs that no daemon holds. The caller frees *id. */
 status store_job_orphans(struct store *store, char (**id)[STORE_ID_BYTES], size_t *n, struct error *err);
 
-/* Calls what store_on_change has named for the jobs that any daemon has changed since the last call, or with NULL where
- * that is not known. */
+/* Calls the function of store_on_change for each job that any daemon has changed since the last call, or with NULL
+ * where that is not known. */
 void store_read_changes(struct store *store);
 
 /* Whether a duty is this daemon's: it is, or no daemon that lives has it. An error counts as no. */
 bool store_duty_is_mine(struct store *store, const char *duty);
 
-/* Enters the gate for the changes of a job, of what an owner keeps, or of both; without either for changes of all.
- * Waits for others at most 30 s. After an error, and when the connection with the locks is lost, every change that this
+/* Enters the gate for changes of a job, of the use of an owner, or of both; without either for changes of all. Waits
+ * for others at most 30 s. After an error, and when the connection with the locks is lost, every change that this
  * thread tries before it leaves is refused with that error. One thread of a daemon at a time. */
 void store_gate_enter(struct store *store, const char *job_id, const char *owner);
 void store_gate_leave(struct store *store);

@@ -1,5 +1,5 @@
 /* Deliveries of webhooks, in the database of jobs. A trigger adds one in the transaction that ends a job, so none is
- * lost and none is invented; what it says of the job never changes. */
+ * lost and none is invented; its account of the job never changes. */
 #ifndef SELVEDGE_SERVER_STORE_DELIVERY_H
 #define SELVEDGE_SERVER_STORE_DELIVERY_H
 
@@ -17,7 +17,7 @@ struct delivery_row {
     int64_t attempt;
     char error_code[32], error_field[160], error_text[1024]; /* error_code "": none */
     double created_unix_s;
-    /* what has come of it */
+    /* state of the delivery */
     enum delivery_state state;
     int64_t n_try;
     double next_unix_s;      /* time of the next try, while it waits */
@@ -26,12 +26,12 @@ struct delivery_row {
     double delivered_unix_s; /* 0: not yet */
 };
 
-/* Says whether jobs that end from now on make a delivery. When not, deliveries that wait end as failed: an address that
- * is named later must not get what was meant for another. */
+/* Sets whether jobs that end from now on make a delivery. When not, waiting deliveries end as failed: an address that
+ * is named later must not get the deliveries for another. */
 status store_webhook_enable(struct store *store, bool enabled, struct error *err);
 /* The waiting delivery whose next try is the earliest. STATUS_NOT_FOUND: none waits. */
 status store_delivery_next(struct store *store, struct delivery_row *row, struct error *err);
-/* Writes what a try has changed. */
+/* Writes the outcome of a try. */
 status store_delivery_update(struct store *store, const struct delivery_row *row, struct error *err);
 /* The newest deliveries before a serial (0: from the newest). job_id NULL: of all jobs; owner NULL: of all owners. The
  * caller frees *row. */

@@ -30,8 +30,8 @@ static status replace(struct store *store, const struct job_row *row, const char
     return s;
 }
 
-/* A batch that the database does not have is made from what its jobs say of it, without its template. A journal can say
- * anything: a batch of another owner is none of this job. */
+/* A batch that is missing in the database is made from the journals of its jobs, without its template. A journal may
+ * have been forged, so a batch of another owner is not joined. */
 static status import_batch(struct store *store, struct job_row *row, struct error *err)
 {
     static const char *const name[] = {"?3", "?3 || ' ' || substr(?1, 1, 8)"};

@@ -17,7 +17,7 @@ struct store {
     void *changed_context;
 };
 
-/* What is read of a job. document: JOB_DOCUMENT, or "NULL" where it is not needed, because it may have a megabyte. */
+/* The columns of a job. document: JOB_DOCUMENT, or "NULL" where it is not needed, because it may have a megabyte. */
 #define JOB_DOCUMENT "(SELECT text FROM document WHERE job_id = job.id)"
 #define JOB_COLUMNS(document)                                                                                          \
     "serial, id, sample, " document                                                                                    \

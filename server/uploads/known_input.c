@@ -56,7 +56,7 @@ bool known_input_link(struct store *store, const char *data, const char *owner, 
     bool run;
     if (!find(store, data, owner, row, from, &run)) return false;
     upload_input_path(data, row, to);
-    unlink(to); /* no row has this name: what a daemon that was killed may have left of it */
+    unlink(to); /* no row has this name: a file that a killed daemon may have left */
     if (link(from, to) != 0) return false;
     /* looked at again under its own name, because a worker that runs may have replaced the other one meanwhile */
     if (run ? !upload_is_sealed(to, row) : chmod(to, S_IRUSR) != 0) {

@@ -1,8 +1,8 @@
-/* Inputs whose bytes the server already has, in another job of the same owner, by size and SHA-256. Such an input is a
- * hard link to the bytes of that job, so it takes no space and no upload. Complete inputs are never written: they have
- * mode 0400, and a worker in its sandbox can neither change a mode nor write against one, as with shared checkpoints
- * (pipeline_adopt.c). It can put another file in the place of an input of its own job; such a file lacks the seal of
- * upload_file.h and is not linked. Removing one job removes its own name only. */
+/* Inputs that the server already has in another job of the same owner, found by size and SHA-256. Such an input is a
+ * hard link to the file of the other job, so it takes no space and no upload. Complete inputs are never written: they
+ * have mode 0400, and a worker in its sandbox can neither change a mode nor write against one, as with shared
+ * checkpoints (pipeline_adopt.c). It can put another file in the place of an input of its own job; such a file lacks
+ * the seal of upload_file.h and is not linked. Removing one job removes its own name only. */
 #ifndef SELVEDGE_SERVER_KNOWN_INPUT_H
 #define SELVEDGE_SERVER_KNOWN_INPUT_H
 

@@ -18,7 +18,7 @@ struct upload {
     struct upload *next;
     size_t n_holder;                                 /* guarded by set->lock */
     char id[STORE_ID_BYTES], job_id[STORE_ID_BYTES]; /* never change */
-    pthread_mutex_t lock; /* of what follows but for the atomic members; held during writes and syncs */
+    pthread_mutex_t lock; /* guards the members below except the atomic ones; held during writes and syncs */
     struct file_row row;  /* as in the database */
     int64_t offset_bytes;
     crypto_hash_sha256_state hash;

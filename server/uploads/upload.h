@@ -28,13 +28,13 @@ void upload_discard_job(struct upload_set *set, const char *job_id);
 status upload_hold(struct upload_set *set, const char *id, struct upload **upload, struct error *err);
 void upload_release(struct upload_set *set, struct upload *upload);
 
-/* Makes the caller the only writer. First commits what earlier writers have sent, and completes an upload that has
- * all its bytes. *row is the present state. */
+/* Makes the caller the only writer. First commits the bytes of earlier writers, and completes an upload that has all
+ * its bytes. *row is the present state. */
 status upload_take(struct upload *upload, uint64_t *ticket, struct file_row *row, struct error *err);
 /* Writes bytes and advances the offset. STATUS_STALE when another writer has taken over, STATUS_INVALID (more bytes
  * than declared), STATUS_DISK_FULL, STATUS_IO. */
 status upload_write(struct upload *upload, uint64_t ticket, const void *data, size_t n_bytes, struct error *err);
-/* Writes what was received to disk durably. A file that has all its bytes is verified and moved to its place. *row
+/* Writes the received bytes to disk durably. A file that has all its bytes is verified and moved to its place. *row
  * (may be NULL) is the state afterwards. STATUS_CHECKSUM: the checksum differs, and the upload is back at offset 0. */
 status upload_commit(struct upload *upload, uint64_t ticket, struct file_row *row, struct error *err);
 

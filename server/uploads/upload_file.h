@@ -11,7 +11,7 @@
 /* JOB/upload/<id>, where the bytes arrive, and JOB/input/<name>, where the verified file ends. */
 void upload_part_path(const char *data, const struct file_row *row, char out[PATH_BYTES]);
 void upload_input_path(const char *data, const struct file_row *row, char out[PATH_BYTES]);
-/* Sets the hash state to that of no bytes. */
+/* Sets the hash state to the state before any byte. */
 void upload_hash_restart(struct file_row *row);
 /* Reserves the space of n >= 1 declared files of one job, whose rows are not yet in the database, and writes the first
  * hash state to the rows. After an error nothing is left behind. STATUS_DISK_FULL, STATUS_IO. */

@@ -11,9 +11,9 @@ struct result_file {
     long long size_bytes;
     double modified_unix_s;
 };
-/* Lists the regular files under a folder of the job (JOB_FOLDER_RESULTS, or that of a version), sorted by path, without
- * links and files whose names have other characters. The caller frees *file. STATUS_TOO_LARGE: there are more than
- * RESULT_MAX_FILE, of which so many are listed. */
+/* Lists the regular files under a folder of the job (JOB_FOLDER_RESULTS, or the folder of a version), sorted by path,
+ * without links and files whose names have other characters. The caller frees *file. STATUS_TOO_LARGE: there are more
+ * than RESULT_MAX_FILE, and only these are listed. */
 status result_list(struct job_service *v, const char *job_id, const char *folder, struct result_file **file, size_t *n,
                    struct error *err);
 /* Opens a listed file without following links. STATUS_NOT_FOUND for anything else. */

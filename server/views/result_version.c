@@ -116,7 +116,7 @@ static json_t *inputs_of_run(const struct job_service *v, const char *id)
     return inputs;
 }
 
-/* What version.json says, made from the job's folder. document: of the run. */
+/* Returns the content of version.json, made from the job's folder. document: the document of the run. */
 static json_t *describe(const struct job_service *v, const struct job_row *row, const char *document, bool with_inputs,
                         double finished_unix_s)
 {
@@ -155,7 +155,7 @@ static json_t *describe_present(const struct job_service *v, const struct job_ro
     return out;
 }
 
-/* What is known of a version whose version.json is damaged: its files are still there. */
+/* Describes a version whose version.json is damaged: its files are still there. */
 static json_t *describe_damaged(int64_t number, const struct stat *st)
 {
     return json_pack("{s:I,s:s,s:n,s:f,s:n,s:{},s:n,s:b}", "version", (json_int_t)number, "sample", "",
@@ -215,7 +215,7 @@ static status move(struct job_service *v, const struct job_row *row, const struc
     job_file_path(v, row->id, JOB_FOLDER_VERSIONS, name, to);
     if (s == STATUS_OK && rename(from, to) != 0)
         s = error_set_errno(err, "cannot keep the earlier result of job '%s' as version %s", row->id, name);
-    /* the job's folder is synced by what follows before an attempt may begin: attempt.json is replaced */
+    /* the job's folder is synced later, before an attempt may begin: attempt.json is replaced */
     return s == STATUS_OK ? durable_sync_folder_of(to, err) : s;
 }
 

@@ -1,6 +1,6 @@
-/* Records of a series are sorted by steps; those of a search for the radius come first, then those of the models in
- * order. The records requested are found by bisection (record_seek), counted, and merged while they are read. So the
- * cost of a request depends on the size of its reply and not of the file, and memory holds only the points. */
+/* Records of a series are sorted by steps: first the records of a search for the radius, then each model's in order.
+ * The requested records are found by bisection (record_seek), counted, and merged while they are read. So the cost of a
+ * request depends on the size of its reply and not of the file, and memory holds only the points. */
 #include "server/views/series_view.h"
 #include "base/files/durable.h"
 #include "base/json/foreign_json.h"
@@ -18,7 +18,7 @@
 /* Limit on the size of a reply with the renderings of all points; beyond it there are fewer points. */
 enum { ALL_RENDERED_BYTES = 8 << 20, KEY_RADIUS = -1 };
 
-/* Limits on what a file may make a request read and hold. A longer series is given in several requests. */
+/* Limits of reading a file for one request. A longer series is given in several requests. */
 enum { READ_MOST_BYTES = 256 << 20, HELD_MOST_BYTES = 128 << 20, DESCRIPTION_MOST_BYTES = 64 << 20 };
 
 #define STEP_MOST (INT64_C(1) << 53)
@@ -35,7 +35,7 @@ static const struct foreign_bounds key_bounds = {RECORD_MOST_BYTES, 4096, 16, ke
                                    point_bounds = {RECORD_MOST_BYTES, 1 << 20, 16, point_member},
                                    whole_bounds = {RECORD_MOST_BYTES, 8 << 20, 16, whole_member};
 
-/* NULL for what is no record. */
+/* Returns NULL for a line that is no record. */
 static json_t *parse(const char *json, size_t n, const struct foreign_bounds *bounds, size_t *held)
 {
     json_t *j = NULL;

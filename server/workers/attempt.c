@@ -214,7 +214,7 @@ static void lost(struct job_service *v, struct job_row *row, const struct worker
     row->lost_attempts++;
     atomic_fetch_add(&v->n_lost_total, 1);
     log_warning(v->log, "job %s: attempt %lld was lost: %s", row->id, (long long)row->attempt, how);
-    /* what input made it do, it would do again */
+    /* the same input would do it again */
     if (end->by_signal && end->code == SIGSYS) {
         row->state = JOB_FAILED;
         set_error(row, "forbidden_call", "", how);
@@ -239,7 +239,7 @@ static void time_is_up(const struct job_service *v, struct job_row *row)
     set_error(row, "time_limit", "", text);
 }
 
-/* Of what made a worker exceed it the next attempt would exceed it, too. */
+/* The next attempt would exceed the limit again for the same reason. */
 static void limit_exceeded(struct job_row *row, const char *code, const char *what, int64_t limit, const char *setting)
 {
     char text[240];

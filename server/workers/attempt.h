@@ -1,5 +1,5 @@
-/* One attempt at a job: writes what its worker needs before it starts, and updates the job when the worker has
- * ended. */
+/* One attempt at a job: writes the files that its worker needs before it starts, and updates the job when the worker
+ * has ended. */
 #ifndef SELVEDGE_SERVER_ATTEMPT_H
 #define SELVEDGE_SERVER_ATTEMPT_H
 
@@ -30,14 +30,14 @@ struct attempt_request {
 };
 
 /* Changes a job from queued to running: claims it, sets a new attempt number and token, writes job.json and
- * attempt.json, and clears the folder after an edit. token: that of the attempt. STATUS_CONFLICT when the job is no
- * longer queued, or another daemon has claimed it. */
+ * attempt.json, and clears the folder after an edit. token: receives the token of the attempt. STATUS_CONFLICT when the
+ * job is no longer queued, or another daemon has claimed it. */
 status attempt_prepare(struct job_service *v, const char *job_id, char token[STORE_ID_BYTES], struct error *err);
-/* Reads what users have requested for a running job and, while its worker computes, its last heartbeat. Returns false,
+/* Reads the requests of users about a running job and, while its worker computes, its last heartbeat. Returns false,
  * with no request, when the database cannot be read. */
 bool attempt_read_request(struct job_service *v, const char *job_id, bool computes, struct attempt_request *request);
-/* Changes a job whose worker has ended from running to succeeded, failed, cancelled, paused or queued. Nothing is
- * changed when the job's token is no longer that of this attempt: another daemon has taken the job over. */
+/* Changes a job whose worker has ended from running to succeeded, failed, cancelled, paused or queued. Changes nothing
+ * when the job has the token of another attempt: another daemon has taken the job over. */
 status attempt_finish(struct job_service *v, const char *job_id, const char *token, const struct worker_end *end,
                       enum attempt_stop stop, struct attempt_outcome *outcome, struct error *err);
 /* Changes a job from queued to failed. */

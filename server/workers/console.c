@@ -7,7 +7,7 @@
 #include <sys/types.h>
 #include <unistd.h>
 
-/* Reads at most n bytes up to the end of a file of that size; returns their number. */
+/* Reads at most n bytes up to the end of a file of this size; returns their number. */
 static size_t read_end(int fd, off_t size, char *out, size_t n)
 {
     off_t from = size > (off_t)n ? size - (off_t)n : 0;
@@ -30,7 +30,7 @@ void console_trim(const char *path)
     if (end != NULL && fstat(fd, &st) == 0) {
         size_t n = read_end(fd, st.st_size, end, CONSOLE_KEEP_BYTES);
         if (ftruncate(fd, 0) == 0 && write(fd, end, n) < 0) {
-            /* the disk is full, and what is lost was only the console */
+            /* the disk is full, and only the console was lost */
         }
     }
     free(end);

@@ -4,8 +4,8 @@
 
 #include "server/jobs/job_service.h"
 
-/* Returns whether so little is free that jobs must pause; was_below: what the call before returned. While there is
- * enough, paused jobs are queued and the ballast file is kept. */
+/* Returns whether so little is free that jobs must pause; was_below: the return value of the call before. While there
+ * is enough, paused jobs are queued and the reserve file is kept. */
 bool disk_watch(struct job_service *v, bool was_below);
 
 #endif

@@ -22,7 +22,7 @@ enum { MAX_REPORT_BYTES = 4 << 20, TURN_LIMIT_S = 30, LOOK_US = 20000 };
 static const struct foreign_bounds report_bounds = {
     .file_bytes = MAX_REPORT_BYTES, .held_bytes = 64 << 20, .depth = 16};
 
-/* Takes one of the places for checks, of which there are as many as workers. */
+/* Takes one of the places for checks. There are as many places as workers. */
 static status take_turn(struct job_service *v, struct job_refusal *refusal, struct error *err)
 {
     const double give_up_s = clock_monotonic_s() + TURN_LIMIT_S;
@@ -69,7 +69,7 @@ static status wait_for(const struct job_service *v, pid_t pid, int report_fd, st
     return s;
 }
 
-/* What the worker has written; NULL when that is no JSON. */
+/* Returns the worker's report, or NULL when it is no JSON. */
 static json_t *read_report(int fd)
 {
     json_t *report = NULL;
@@ -127,7 +127,7 @@ static json_t *report_of_death(const struct worker_end *end)
                      0);
 }
 
-/* What the API says of a judgement, which is released. */
+/* Returns the API's form of a judgement, which is released. */
 static json_t *finish(json_t *report, const char *folder)
 {
     json_t *errors = json_object_get(report, "faults"), *warnings = json_object_get(report, "warnings");
@@ -244,7 +244,7 @@ static status keep_plan(const char *job, json_t *plan, struct error *err)
     return s;
 }
 
-/* Whether the job still is what was planned. */
+/* Returns whether the job still is as it was planned. */
 static bool is_same(const struct job_row *planned, const struct job_row *now)
 {
     return now->state != JOB_RUNNING && now->state != JOB_SUCCEEDED && now->attempt == planned->attempt &&

@@ -1,5 +1,5 @@
-/* What a worker says of a job before it is started: all faults and warnings of its input files at once, and what it
- * will take. The worker opens the files in its sandbox, because the daemon opens none of a user's. */
+/* Reports of a worker about a job before it is started: all faults and warnings of its input files at once, and the
+ * resources that it will need. The worker opens the files in its sandbox, because the daemon opens none of a user's. */
 #ifndef SELVEDGE_SERVER_INPUT_JUDGE_H
 #define SELVEDGE_SERVER_INPUT_JUDGE_H
 
@@ -12,8 +12,8 @@
 status input_judge(struct job_service *v, const char *job_id, json_t **report, struct job_refusal *refusal,
                    struct error *err);
 
-/* Plans a job before it runs: *plan, owned by the caller, is what `selvedge-worker --plan` says (job_need.h), with
- * "planned_unix_s" and "attempt", the number of the job's attempts so far; it is kept in the job's folder until its
+/* Plans a job before it runs: *plan, owned by the caller, is the output of `selvedge-worker --plan` (job_need.h), with
+ * "planned_unix_s" and "attempt", the number of the job's attempts so far; it stays in the job's folder until its
  * document is replaced. Besides the refusals of input_judge STATUS_CONFLICT when the job runs or has succeeded, and
  * STATUS_INVALID, with a field, when its inputs cannot be read. */
 status input_plan(struct job_service *v, const char *job_id, json_t **plan, struct job_refusal *refusal,

@@ -182,7 +182,7 @@ static struct slot *take_slot(struct supervisor *u, const char *job_id, const ch
     return slot;
 }
 
-/* The row already says running, so the slot stays, as that of an ended worker, until the database is corrected. */
+/* The row already says running, so the slot stays, as if its worker had ended, until the database is corrected. */
 static void start_failed(struct supervisor *u, struct slot *slot, const struct error *err)
 {
     char job_id[STORE_ID_BYTES];

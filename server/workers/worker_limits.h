@@ -5,8 +5,8 @@
 #include "server/workers/attempt.h"
 #include "server/workers/backends/job_backend.h"
 
-/* Returns which limit a running worker exceeds, with a line in the log, or STOP_NONE. What made it do so would do so
- * again, so such a worker is killed at once and its job fails. */
+/* Returns the limit that a running worker exceeds, with a line in the log, or STOP_NONE. Another attempt would exceed
+ * it again, so such a worker is killed at once and its job fails. */
 enum attempt_stop worker_limit_exceeded(const struct job_service *v, const struct job_backend *backend,
                                         const struct backend_run *run, const char *job_id);
 /* The same of the folders below its job's, which takes a walk through them. */

@@ -196,8 +196,8 @@ int connection_of_thread(struct connection_table *t, void **handle)
     return fd >= 0 || n_beginning != 1 ? fd : only_fd;
 }
 
-/* Ends a window of a connection of which `n` bytes have moved so far, once it is long enough. Returns true if few of
- * them moved in it. */
+/* Ends the window of a connection that has moved `n` bytes so far, once the window is long enough. Returns true if too
+ * few of them moved in it. */
 static bool moved_few(const struct connection_table *t, struct connection_entry *e, uint64_t n, double now)
 {
     double window_s = now - e->window_s;

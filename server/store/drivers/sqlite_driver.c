@@ -195,7 +195,7 @@ static status read_version(struct store_link *link, int *version, struct error *
     return s;
 }
 
-/* Copies the database to <path>.v<version>. A copy of that name is from a start that was killed, or from an upgrade
+/* Copies the database to <path>.v<version>. An older copy of this name is left from a killed start or from an upgrade
  * that was taken back; the database may have changed since, so the copy is made anew. */
 static status keep_old_version(const char *path, int version, struct error *err)
 {

@@ -105,7 +105,7 @@ status store_examine(const char *path, bool thorough, struct store_summary *summ
     if (s == STATUS_OK) s = ask(&reader, path, "PRAGMA user_version", &version, NULL, err);
     if (s == STATUS_OK && version == 0) s = error_set(err, STATUS_NOT_FOUND, "database '%s' has no tables", path);
     if (s == STATUS_OK) s = check_pages(&reader, path, thorough, err);
-    /* what older versions lack is made by the migration */
+    /* the migration adds the parts that older versions lack */
     int n_version = 0;
     store_migrations(&n_version);
     if (s == STATUS_OK && version == n_version) s = check_content(&reader, path, &found, err);
@@ -156,7 +156,7 @@ static status copy(const char *path, const char *to, struct error *err)
     return s;
 }
 
-/* Makes the copy under a temporary name first, and removes what a killed process has left under that name. */
+/* Makes the copy under a temporary name first, and removes an unfinished copy of a killed process under that name. */
 static status make_copy(const char *path, const char *to, struct store_summary *summary, struct error *err)
 {
     static const char *const left[] = {"", "-journal"}; /* SQLite may keep a journal beside a file that it writes */

@@ -59,9 +59,9 @@ static const char *const migration[] = {
     "state,"
     " tries, next, status, error, delivered) VALUES (NEW.id || '.' || NEW.revision, NEW.id, NEW.state, NEW.sample,"
     " NEW.attempt, NEW.error_code, NEW.error_field, NEW.error_text, NEW.updated, 0, 0, NEW.updated, 0, '', 0); END;",
-    /* access tokens and sessions; the owner of each job, with an index for each order in which an owner's jobs are
-     * listed and one for the order in which they start; what each owner keeps, by triggers. Keys of idempotency are per
-     * owner */
+    /* access tokens and sessions; the owner of each job, with an index for each order in which the jobs of an owner are
+     * listed and one for the order in which they start; the use of each owner, kept by triggers. Keys of idempotency
+     * are per owner */
     "CREATE TABLE access_token (serial INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, name TEXT NOT NULL,"
     " owner TEXT NOT NULL, scope INTEGER NOT NULL, hash BLOB NOT NULL UNIQUE, created REAL NOT NULL, used REAL NOT "
     "NULL,"

@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_SERVER_STORE_SCHEMA_H
 #define SELVEDGE_SERVER_STORE_SCHEMA_H
 
-/* Statements of which entry i changes the schema of SQLite from version i to version i + 1. */
+/* Returns the n statements: entry i changes the schema of SQLite from version i to version i + 1. */
 const char *const *store_migrations(int *n);
 /* The same of PostgreSQL: lists of scripts, which NULL ends. */
 const char *const *const *store_postgres_migrations(int *n);

@@ -15,7 +15,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* What is read of a journal at the most: bytes, files (more than a document can name) and damaged lines. */
+/* Limits of reading a journal: bytes, files (more than a document can name) and damaged lines. */
 enum { FOLDER_BYTES = 4096, MOST_BYTES = 256 << 20, MOST_FILES = 1 << 15, MOST_DAMAGED = 10000 };
 
 /* A record names all files of a job that was made with them. */

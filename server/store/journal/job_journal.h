@@ -20,7 +20,7 @@
 
 enum { JOURNAL_KEY_BYTES = 160 };
 
-/* What one record says. All members may be NULL or 0. */
+/* The facts of one record. All members may be NULL or 0. */
 struct journal_entry {
     const struct job_row *job;
     bool document; /* job->document is now in job.json */
@@ -35,11 +35,11 @@ struct journal_entry {
 status job_journal_append(const struct journal_key *key, const char *folder, const struct journal_entry *entry,
                           bool sync, struct error *err);
 
-/* Returns when the job's row was changed last by what the journal says for certain: updated_unix_s of the last sealed
- * record about the job `id` among the last records. 0: there is none. */
+/* Returns the time of the last change of the job's row that is certain: updated_unix_s of the last sealed record about
+ * the job `id` among the last records. 0: there is none. */
 double job_journal_sealed_unix_s(const struct journal_key *key, const char *folder, const char *id);
 
-/* What all records of a journal say together. */
+/* The facts of all records of a journal together. */
 struct job_journal {
     struct job_row job; /* without document */
     bool has_job;

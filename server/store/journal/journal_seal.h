@@ -1,5 +1,5 @@
-/* Seals of the records of journals. A worker may write into its job's folder, so a record in a journal says for certain
- * what the daemon has acknowledged only if it is sealed: it ends in a checksum (HMAC) with a key that no worker can
+/* Seals of the records of journals. A worker may write into its job's folder, so only a sealed record in a journal is
+ * certain to be a change that the daemon has acknowledged: it ends in a checksum (HMAC) with a key that no worker can
  * read, the file journal.key of the data folder. */
 #ifndef SELVEDGE_SERVER_JOURNAL_SEAL_H
 #define SELVEDGE_SERVER_JOURNAL_SEAL_H

@@ -1,6 +1,6 @@
 /* The databases that a store can use, one row of a table each. The SQL of the store is the subset that all of them
- * understand; what differs stands in the row. The calls of a row may come from a plug-in, a shared object that is
- * loaded when the settings ask for it (drivers/plugin): this header is all that it shares with the daemon. */
+ * understand; the row has the differences. The calls of a row may come from a plug-in, a shared object that is loaded
+ * when the settings ask for it (drivers/plugin): this header is all that it shares with the daemon. */
 #ifndef SELVEDGE_SERVER_STORE_DRIVER_H
 #define SELVEDGE_SERVER_STORE_DRIVER_H
 
@@ -10,7 +10,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* STORE_CALLS_VERSION rises with each change of struct store_calls and of what it refers to. */
+/* STORE_CALLS_VERSION rises with each change of struct store_calls and of the structs in it. */
 enum { STORE_CALLS_VERSION = 1, STORE_WHY_BYTES = 400, STORE_ADDRESS_BYTES = 1024, STORE_APPLICATION_BYTES = 64 };
 #define STORE_CALLS_SYMBOL "selvedge_store_calls"
 
@@ -37,7 +37,7 @@ struct store_query {
     const struct store_calls *calls;
 };
 
-/* What a database can do. db is a connection; a connection is used by one thread at a time. */
+/* The operations of a database. db is a connection; a connection is used by one thread at a time. */
 struct store_calls {
     int version; /* STORE_CALLS_VERSION */
     /* application names the connection to the server, and may change while the connection is closed; it outlives db.
@@ -84,7 +84,8 @@ struct store_driver {
     const char *scheme; /* how addresses begin: "postgres"; "": any path */
     bool shared;        /* several daemons may use the database at once (store_cluster.h) */
     struct store_phrases phrase;
-    /* Gives the calls, and loads them first where they are a plug-in. STATUS_UNSUPPORTED names what is missing. */
+    /* Gives the calls, and loads them first where they are a plug-in. STATUS_UNSUPPORTED names the missing file or
+     * library. */
     status (*load)(const struct store_calls **calls, struct error *err);
     /* Whether a database may lie here; NULL: anywhere. */
     status (*check_place)(const char *address, struct error *err);

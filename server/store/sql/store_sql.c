@@ -1,4 +1,4 @@
-/* Statements: what all drivers share. */
+/* Statements, in the part that all drivers share. */
 #include "server/store/sql/store_sql.h"
 
 #include <stdarg.h>
@@ -7,12 +7,13 @@
 
 enum { VALUES_MOST = 32 };
 
-status store_error(struct store_link *link, const char *what, struct error *err)
+status store_error(struct store_link *link, const char *action, struct error *err)
 {
     char why[STORE_WHY_BYTES] = "";
     status s = link->calls->fault(link->db, why, sizeof why);
-    if (s == STATUS_CONFLICT) return error_set(err, s, "%s", why); /* it is about what is changed, not the database */
-    return error_set(err, s, "%s: database says '%s'", what, why);
+    if (s == STATUS_CONFLICT)
+        return error_set(err, s, "%s", why); /* it is about the row to be changed, not about the database */
+    return error_set(err, s, "%s: database says '%s'", action, why);
 }
 
 status store_gate_check(struct store_gate *gate, struct error *err)

@@ -18,7 +18,8 @@ struct store_link {
     pthread_mutex_t lock;
 };
 
-/* Keeps other daemons from what is being changed (store_cluster.h). link.lock is held by the thread behind it. */
+/* Keeps other daemons from a row while this one changes it (store_cluster.h). link.lock is held by the thread behind
+ * it. */
 struct store_gate {
     struct store_link link; /* a connection of its own, because its locks last longer than a transaction */
     atomic_bool entered;
@@ -27,8 +28,8 @@ struct store_gate {
     struct error why;
 };
 
-/* Sets err from the database's last failure; what is for example "cannot write job". */
-status store_error(struct store_link *link, const char *what, struct error *err);
+/* Sets err from the database's last failure. action: for example "cannot write job". */
+status store_error(struct store_link *link, const char *action, struct error *err);
 /* Starts a statement with values by format: s text, i int64_t, d double, b blob (pointer and int size). *query is NULL
  * after an error. The caller calls store_finish. */
 status store_prepare(struct store_link *link, struct store_query **query, struct error *err, const char *sql,

@@ -1,6 +1,6 @@
 /* Where workers run: a table of functions for each engine. The supervisor decides which job starts, when it must stop
- * and what its end means; a backend carries that out. All calls come from the supervisor's thread, and none of them
- * waits for an engine. */
+ * and how its end changes the job; a backend carries that out. All calls come from the supervisor's thread, and none of
+ * them waits for an engine. */
 #ifndef SELVEDGE_SERVER_JOB_BACKEND_H
 #define SELVEDGE_SERVER_JOB_BACKEND_H
 

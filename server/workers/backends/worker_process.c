@@ -15,7 +15,7 @@
 
 enum { EXIT_CANNOT_EXECUTE = 127, NUMBER_BYTES = 24 };
 
-/* What the new process needs between vfork and exec. */
+/* The values that the new process needs between vfork and exec. */
 struct start {
     const char *program;
     char *const *argv, *const *environment;
@@ -34,9 +34,9 @@ static void set_limit(__rlimit_resource_t resource, int64_t value)
     setrlimit(resource, &limit);
 }
 
-/* The kernel counts the threads of all processes of a user (but of root's none), so this holds what workers may have
- * together and the daemon's own. The supervisor counts the threads of each worker; until it looks, a worker must not
- * take all that the machine has. */
+/* The kernel counts the threads of all processes of a user (but of root's none), so this limit covers all workers
+ * together and the daemon. The supervisor counts the threads of each worker; until it looks, a worker must not take all
+ * threads of the machine. */
 static int64_t most_processes(const struct settings *s)
 {
     enum { OF_THE_USER = 4096 };

@@ -17,13 +17,13 @@ struct worker_paths {
     const char *console;  /* gets stdout and stderr, and is made new */
     const char *speeds;   /* of earlier jobs */
     const char *document; /* a job document whose files in job_folder are judged; NULL: the job is run or planned */
-    bool plan;            /* the job is not run: what it is expected to take is told */
-    int report_fd;        /* gets what a check or a plan says, in place of the console */
+    bool plan;            /* the job is not run: its expected resources are reported */
+    int report_fd;        /* gets the report of a check or a plan, in place of the console */
     int64_t threads;      /* computing threads; 0: as the settings say */
     int64_t ranks; /* processes that share the paths of the job, started by the worker; 0 and 1: none but itself */
 };
 
-/* What has ended a worker, as far as its engine knows more than the exit code. */
+/* The cause of a worker's end, as far as its engine knows more than the exit code. */
 enum worker_cause {
     WORKER_ENDED,             /* itself, or a signal: see the exit code */
     WORKER_NOT_STARTED,       /* the engine could not be reached; nothing has run */

@@ -88,7 +88,7 @@ static status spawn(const struct settings *settings, const char *const *argument
     return error_set_errno(err, "cannot run '%s'", argument[0]);
 }
 
-/* Reads what is there. Closes the descriptor at its end, when memory is out, or when there is too much. */
+/* Reads the available bytes. Closes the descriptor at its end, when memory is out, or when there is too much. */
 static void take(int *fd, struct text *t)
 {
     char *more = t->n < MOST_BYTES ? realloc(t->bytes, t->n + STEP_BYTES + 1) : NULL;
@@ -160,7 +160,7 @@ static void one_line(const struct text *t, char *out, size_t n_out)
     out[k] = '\0';
 }
 
-/* Adds words to those of the command. They replace its last ones where there is no room. */
+/* Appends words to the words of the command. They replace its last ones where there is no room. */
 static void add_words(char *text, size_t n_text, const char *words)
 {
     const size_t n_words = strlen(words) + 3, n = strlen(text), most = n_text - n_words;

@@ -1,4 +1,4 @@
-/* Runs a command of Slurm and collects what it prints. The command gets a few variables of the environment
+/* Runs a command of Slurm and collects its output. The command gets a few variables of the environment
  * (jobs.pass_environment, SLURM_CONF) and no descriptor of the daemon's. */
 #ifndef SELVEDGE_SERVER_SLURM_COMMAND_H
 #define SELVEDGE_SERVER_SLURM_COMMAND_H

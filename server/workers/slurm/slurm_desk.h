@@ -1,5 +1,5 @@
 /* The thread of the backend `slurm` that talks to Slurm: it submits, looks at the list of jobs, and cancels. The
- * supervisor's thread only changes what the runs are meant to do, under the desk's lock. */
+ * supervisor's thread only changes the requests to the runs, under the lock. */
 #ifndef SELVEDGE_SERVER_SLURM_DESK_H
 #define SELVEDGE_SERVER_SLURM_DESK_H
 
@@ -24,7 +24,7 @@ struct backend_run {
     int64_t attempt;
     enum slurm_step step;
     bool released;      /* the supervisor has forgotten it */
-    bool stop, at_once; /* what the supervisor asks */
+    bool stop, at_once; /* requests of the supervisor */
     enum backend_phase phase;
     struct worker_end end; /* with BACKEND_ENDED */
     /* of the desk's thread */
@@ -49,7 +49,7 @@ struct slurm_desk {
     double looked_s;                 /* when the list was read last */
 };
 
-/* What the desk's thread does. All of them are called without the lock, for runs that only this thread removes. */
+/* The work of the thread. All functions are called without the lock, for runs that only this thread removes. */
 /* Submits the job, or finds out why that is not possible. */
 void slurm_submit(struct slurm_desk *d, struct backend_run *run);
 /* Reads Slurm's list of jobs and updates all runs. */

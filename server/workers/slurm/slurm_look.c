@@ -1,4 +1,4 @@
-/* Reads Slurm's list of jobs, and decides what it means for each run. */
+/* Reads Slurm's list of jobs, and decides the phase of each run. */
 #include "base/clock.h"
 #include "optimizer/job/job_folder.h"
 #include "server/events/change_feed.h"
@@ -15,7 +15,7 @@
 
 enum { AFTER_START_S = 30 };
 
-/* What the worker itself has written last: its exit code, or -1 as long as this attempt has no final state. */
+/* Returns the exit code in the worker's last status, or -1 as long as this attempt has no final state. */
 static int final_code(struct slurm_desk *d, const struct backend_run *run, int64_t *peak_rss_bytes)
 {
     static const struct {
@@ -33,7 +33,7 @@ static int final_code(struct slurm_desk *d, const struct backend_run *run, int64
     return code;
 }
 
-/* What is done of the job: the number of finished stages and the size of the series. */
+/* Writes the progress of the job: the number of finished stages and the size of the series. */
 static void measure_progress(struct slurm_desk *d, const struct backend_run *run, char *out, size_t n_out)
 {
     char path[PATH_BYTES];
@@ -121,7 +121,7 @@ static bool ask_accounting(struct slurm_desk *d, const struct backend_run *run, 
     return found;
 }
 
-/* Takes over what Slurm says of a job. Returns whether it differs from before. */
+/* Takes over Slurm's state of a job. Returns whether it differs from before. */
 static bool note_job(struct backend_run *run, const struct slurm_job *job, bool waits)
 {
     struct backend_note *n = &run->note;

@@ -133,7 +133,7 @@ void slurm_comment(const char *job_id, int64_t attempt, char comment[SLURM_COMME
     snprintf(comment, SLURM_COMMENT_BYTES, "selvedge:%s:%lld", job_id, (long long)attempt);
 }
 
-/* Text that grows in an array of fixed size; what does not fit is noted. */
+/* Text that grows in an array of fixed size; an overflow is noted. */
 struct writer {
     char *text;
     size_t n, most;
@@ -183,7 +183,7 @@ __attribute__((format(printf, 3, 4))) static void add(struct slurm_request *q, s
     q->argument[n] = at;
 }
 
-/* "selvedge-" and the sample, of which other characters than letters, digits, '.', '_' and '-' become '_'. */
+/* Writes "selvedge-" and the sample. Characters other than letters, digits, '.', '_' and '-' become '_'. */
 static void name_of(const char *sample, char name[80])
 {
     snprintf(name, 80, "selvedge-%.60s", sample);

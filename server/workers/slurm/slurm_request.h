@@ -1,19 +1,19 @@
-/* What a job asks of Slurm: the command line of sbatch and the script that it submits. */
+/* The request of a job to Slurm: the command line of sbatch and the script that it submits. */
 #ifndef SELVEDGE_SERVER_SLURM_REQUEST_H
 #define SELVEDGE_SERVER_SLURM_REQUEST_H
 
 #include "server/settings/job_paths.h"
 #include "server/workers/slurm/slurm_text.h"
 
-/* What one start of a job needs. */
+/* The needs of one start of a job. */
 struct slurm_need {
     int64_t cores, memory_bytes;
 };
 
-/* What is known of a job's memory besides its files; 0: nothing. */
+/* A job's memory besides its files; 0: not known. */
 struct slurm_memory {
     int64_t planned_bytes; /* by the job's plan (server/workers/input_judge.h) */
-    int64_t least_bytes;   /* what an earlier attempt has shown to be too little, doubled */
+    int64_t least_bytes;   /* twice the memory that was too little for an earlier attempt */
 };
 
 /* The need of a job by its input files (docs/cluster.md states the rule). */

@@ -66,7 +66,7 @@ static int64_t planned_bytes(const struct slurm_desk *d, const char *job_id)
     return bytes > 0 && bytes < 1e15 ? (int64_t)bytes : 0;
 }
 
-/* Prepares what sbatch needs. */
+/* Prepares the command line and the script of sbatch. */
 static status prepare(struct slurm_desk *d, struct backend_run *run, struct slurm_request *request, struct error *err)
 {
     const struct settings *settings = d->v->settings;

@@ -11,7 +11,7 @@
 enum { N_COLUMN = 6, N_ACCOUNT_COLUMN = 4, FIRST_SIGNAL_CODE = 128 };
 
 /* The states of a Slurm job (squeue(1), "JOB STATE CODES"). Unknown ones count as running, so that a newer Slurm ends
- * no job by mistake; what has ended is listed no longer after a while. */
+ * no job by mistake; ended jobs leave the list after a while. */
 static const struct {
     const char *state;
     enum backend_phase phase;
@@ -52,7 +52,7 @@ bool slurm_parse_id(const char *text, char id[SLURM_ID_BYTES])
     return true;
 }
 
-/* Copies a column, of n bytes. What Slurm prints in place of nothing is "". */
+/* Copies a column, of n bytes. Slurm's words for an empty column become "". */
 static void copy(char *out, size_t n_out, const char *from, size_t n)
 {
     while (n > 0 && *from == ' ') from++, n--;

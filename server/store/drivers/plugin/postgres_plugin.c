@@ -100,7 +100,7 @@ static status set_up(struct pg_db *d)
 
 static void ignore_notice(void *context, const char *text) { (void)context, (void)text; }
 
-/* Whether a part of an address can be what libpq takes it for, and not a piece of a password. */
+/* Returns whether libpq can mean this part of an address as it reads it: it is not a piece of a password. */
 static bool is_sound(const PQconninfoOption *part)
 {
     if (part->val == NULL) return true;
@@ -124,7 +124,7 @@ static status check_address(struct pg_db *d)
 
 static status connect_db(struct pg_db *d)
 {
-    /* what stands later overrides what stands before */
+    /* later parts override earlier ones */
     const char *const key[] = {"connect_timeout",
                                "tcp_user_timeout",
                                "keepalives_idle",
@@ -294,7 +294,7 @@ static status run(struct pg_db *d, const char *sql, const struct parameters *p, 
     status s = ensure(d);
     if (s != STATUS_OK) return s;
     PGresult *r = execute(d, sql, p, n);
-    /* what only reads can be asked for again */
+    /* a statement that only reads can be repeated */
     if (!succeeded(r) && is_lost(d) && d->only_reads && connect_db(d) == STATUS_OK) {
         PQclear(r);
         r = execute(d, sql, p, n);
