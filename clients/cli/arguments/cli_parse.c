@@ -58,7 +58,8 @@ static void list_options(char letters[2 * CLI_N_OPTION + 3], struct option named
     named[CLI_N_OPTION] = (struct option){0};
 }
 
-/* What getopt_long reported as code, ':' and '?' included. word is the last one that it has read. */
+/* Takes an option as getopt_long reports it: code may be ':' (a missing value) or '?'. word is the last one that it has
+ * read. */
 static status take_option(struct cli_args *a, int code, const char *word, struct error *err)
 {
     bool wrong = code == ':' || code == '?';

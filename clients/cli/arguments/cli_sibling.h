@@ -4,8 +4,8 @@
 
 enum { CLI_SIBLING_BYTES = 4096 };
 
-/* What execvp should run for the program `name`: the file beside this program, or `name` alone, which execvp then looks
- * for in PATH. */
+/* Writes the file that execvp should run for the program `name`: the file beside this program, or `name` alone, which
+ * execvp then looks for in PATH. */
 void cli_sibling(const char *name, char path[CLI_SIBLING_BYTES]);
 
 #endif

@@ -28,7 +28,7 @@ static bool is_folder(const char *path)
     return stat(path, &st) == 0 && S_ISDIR(st.st_mode);
 }
 
-/* What a document has in place of the template: whole members of its top level. */
+/* Members of the top level that a document has in place of the template's. */
 static json_t *replacements(const json_t *template_, const json_t *document)
 {
     json_t *out = json_object(), *value;
@@ -136,7 +136,7 @@ status batch_rows_of_table(const char *path, const char *files, const json_t *te
 static int visible(const struct dirent *e)
 {
     size_t n = strlen(e->d_name), n_tail = strlen(".selvedge");
-    /* what watch-folder keeps beside a sample is none */
+    /* a folder that watch-folder keeps beside a sample is none */
     return e->d_name[0] != '.' && !(n > n_tail && strcmp(e->d_name + n - n_tail, ".selvedge") == 0);
 }
 

@@ -10,7 +10,7 @@
 /* A sample on this machine. */
 struct batch_row {
     char *sample;              /* its name */
-    json_t *replace;           /* {"/member": value}: what its document has in place of the template */
+    json_t *replace;           /* {"/member": value}: members of its document that replace the template's */
     struct cli_file_list list; /* its files; sizes and checksums are not known yet */
 };
 

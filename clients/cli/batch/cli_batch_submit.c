@@ -1,4 +1,4 @@
-/* Submits a batch: reads the table, sends it, and uploads what the server does not have. */
+/* Submits a batch: reads the table, sends it, and uploads the files that the server does not have. */
 #include "clients/cli/batch/batch_rows.h"
 #include "clients/cli/batch/cli_batch.h"
 
@@ -11,7 +11,7 @@ struct submission {
     json_t *template_, *batch;
     struct batch_rows rows;
     json_t *sums; /* SHA-256 and size of each path that was read */
-    json_t *sent; /* SHA-256 of what was uploaded just now */
+    json_t *sent; /* SHA-256 of the files uploaded just now */
     size_t n_sent, n_known;
 };
 
@@ -104,7 +104,7 @@ static status send_file(struct submission *u, const char *files_path, const stru
     return s;
 }
 
-/* Uploads what a job does not have. */
+/* Uploads the missing files of a job. */
 static status send_files(struct submission *u, const struct batch_row *row, const char *job, struct error *err)
 {
     char path[200];

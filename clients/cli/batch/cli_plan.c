@@ -1,4 +1,5 @@
-/* selvedge plan BATCH: what the samples of a batch will take, and how far off that was. */
+/* selvedge plan BATCH: the resources that the samples of a batch will need, and the resources that ended samples have
+ * used. */
 #include "clients/cli/batch/cli_batch.h"
 #include "clients/cli/text/cli_text.h"
 

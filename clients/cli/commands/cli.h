@@ -1,6 +1,6 @@
-/* The commands of the command line client, and what each receives. A command prints results to `out` and progress to
- * `note`, and returns errors to main. *exit_code is 0 at the start; a command that follows a job sets it by the
- * outcome of the job. */
+/* The commands of the command line client, and the arguments of each. A command prints results to `out` and progress to
+ * `note`, and returns errors to main. *exit_code is 0 at the start; a command that follows a job sets it by the outcome
+ * of the job. */
 #ifndef SELVEDGE_CLIENTS_CLI_H
 #define SELVEDGE_CLIENTS_CLI_H
 
@@ -51,8 +51,8 @@ status cli_results_of(struct cli *cli, const char *id, const char *folder, struc
 status cli_results_to_out(struct cli *cli, const char *id, struct error *err);
 /* Follows job `id` until it ends, and prints the fitted parameters. */
 status cli_watch_job(struct cli *cli, const char *id, int *exit_code, struct error *err);
-/* The id of the one job whose id begins with text, which has four characters or more; what cannot be the beginning of
- * an id is copied. STATUS_NOT_FOUND, STATUS_INVALID (several jobs). */
+/* Writes the id of the one job whose id begins with text, which has four characters or more; a text that cannot be the
+ * beginning of an id is copied. STATUS_NOT_FOUND, STATUS_INVALID (several jobs). */
 status cli_whole_id(struct cli *cli, const char *text, char id[CLI_ID_BYTES], struct error *err);
 /* Prints for programs: the server's numbers to the last digit. */
 void cli_print_json(const json_t *value, FILE *out);

@@ -1,5 +1,5 @@
 /* selvedge check JOB.json: all faults of a job document and of its files before anything is uploaded. The check itself
- * is a mode of `selvedge-worker`, which reads every file format; the client runs it and prints what it says. */
+ * is a mode of `selvedge-worker`, which reads every file format; the client runs it and prints its report. */
 #include "clients/cli/arguments/cli_sibling.h"
 #include "clients/cli/commands/cli.h"
 #include "clients/cli/text/cli_report.h"
@@ -14,7 +14,7 @@
 
 enum { PATH_ROOM = 4096, EXIT_NO_PROGRAM = 127 };
 
-/* Runs the worker's check and reads what it prints. */
+/* Runs the worker's check and reads its report. */
 static status run_worker(const char *document, const char *folder, json_t **report, struct error *err)
 {
     char worker[CLI_SIBLING_BYTES];

@@ -15,7 +15,7 @@ enum { MAX_REPLY_BYTES = 64 << 20, CONNECT_TIMEOUT_S = 10, STALL_S = 60, MAX_TRY
 struct http {
     CURL *curl;
     char *server;        /* as given */
-    char *base;          /* what the paths of requests are appended to */
+    char *base;          /* begins the address of every request */
     char *authorization; /* "Authorization: Bearer ..." or NULL */
     const volatile sig_atomic_t *stop;
     char why[CURL_ERROR_SIZE];

@@ -37,7 +37,7 @@ void http_reply_release(struct http_reply *reply);
 
 /* Sends one request. body may be NULL; header is a NULL-terminated list of "Name: value" lines, or NULL. STATUS_OK
  * means that a reply came, whatever its HTTP status. STATUS_IO: the server was not reachable or the connection broke
- * (reply->cut_off); the text says what to do. */
+ * (reply->cut_off); the text states the remedy. */
 status http_call(struct http *http, const char *method, const char *path, const char *const *header, const void *body,
                  size_t n_body, struct http_reply *reply, struct error *err);
 /* Sends a PATCH whose body is the next n_bytes of a file descriptor. `sent` is called with the bytes of each piece

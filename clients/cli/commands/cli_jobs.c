@@ -56,7 +56,7 @@ status cli_status(struct cli *cli, int *exit_code, struct error *err)
     return s;
 }
 
-/* What a cancel or retry will have done, by the state before it; NULL: nothing. */
+/* Returns the effect of a cancel or retry on a job in the state before it; NULL: none. */
 static const char *effect_of(bool cancel, const char *before)
 {
     bool running = strcmp(before, "running") == 0;

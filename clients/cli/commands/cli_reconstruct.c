@@ -111,7 +111,7 @@ static status read_voxel(const char *text, json_t **voxel, struct error *err)
     return STATUS_OK;
 }
 
-/* What the fibers are and what is asked of the scan, into `volume`. */
+/* Writes the kind of fibers and the questions to the scan into `volume`. */
 static status add_fibers(const struct cli_args *a, json_t *volume, struct error *err)
 {
     const bool hollow = a->hollow != NULL && strcmp(a->hollow, "yes") == 0;

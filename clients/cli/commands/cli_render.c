@@ -182,7 +182,7 @@ static double number_at(const json_t *list, size_t i)
     return json_is_number(x) ? json_number_value(x) : NAN;
 }
 
-/* What the job says of its picture and of the same picture path by path. */
+/* Prints the comparison of the picture with the same picture by path tracing. */
 static void print_comparison(FILE *out, const json_t *picture)
 {
     const json_t *r = json_object_get(picture, "reference"), *mean = json_object_get(r, "mean_difference"),

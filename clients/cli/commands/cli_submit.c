@@ -219,8 +219,8 @@ static status declare(struct submit *u, const struct cli_file *file, json_t **an
     return s == STATUS_OK ? s : error_prefix(err, s, "cannot declare '%s'", file->name);
 }
 
-/* Declares all files in few requests, because one after the other takes minutes for the slices of a scan. What a
- * refusal is about is found when the files are declared one by one next; the server knows the others then. */
+/* Declares all files in few requests, because one after the other takes minutes for the slices of a scan. After a
+ * refusal the files are declared one by one, which finds the file at fault; the server knows the others then. */
 static void declare_all(struct submit *u)
 {
     char path[256];

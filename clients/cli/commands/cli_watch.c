@@ -1,4 +1,4 @@
-/* Follows a job: polls with the ETag, prints what has changed, and reports the outcome. */
+/* Follows a job: polls with the ETag, prints changes, and reports the outcome. */
 #include "clients/cli/commands/cli.h"
 #include "clients/cli/text/cli_report.h"
 #include "clients/cli/text/cli_text.h"

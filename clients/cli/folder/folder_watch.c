@@ -73,7 +73,7 @@ static status give_up(struct folder_watch *w, struct sample *s, const char *why,
     return keep(w, s, SAMPLE_FAILED, text, err);
 }
 
-/* Whether a failure is that of the sample, so that trying again without a change is of no use. */
+/* Returns whether the sample is the cause of a failure, so that trying again without a change is of no use. */
 static bool is_final(status s)
 {
     return s == STATUS_INVALID || s == STATUS_FORMAT || s == STATUS_TOO_LARGE || s == STATUS_NOT_FOUND ||

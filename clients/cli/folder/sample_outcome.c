@@ -38,7 +38,7 @@ void sample_outcome_read(const char *folder, struct sample_outcome *o)
     free(text);
 }
 
-/* Other users of the share read what is written here, as far as the umask allows. */
+/* Other users of the share may read these files, as far as the umask allows. */
 static status write_text(const char *folder, const char *name, const char *text, struct error *err)
 {
     char path[PATH_ROOM];
@@ -87,7 +87,7 @@ status sample_results_retire(const char *folder, struct error *err)
     snprintf(name, sizeof name, "results-%.3f", clock_wall_s());
     join(to, folder, name);
     if (rename(from, to) != 0 && errno != ENOENT) return error_set_errno(err, "cannot move '%s' out of the way", from);
-    /* what an interrupted download of the earlier job has left must not mix with files of the next */
+    /* files left by an interrupted download of the earlier job must not mix with files of the next */
     join(from, folder, "results.part");
     snprintf(name, sizeof name, "results-%.3f.part", clock_wall_s());
     join(to, folder, name);

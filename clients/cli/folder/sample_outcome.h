@@ -1,6 +1,5 @@
-/* What lies beside a sample folder NAME, in NAME.selvedge: state.json (what has been done so far, written durably
- * before the next step), reason.txt (why there are no results), log.txt, and results/, which appears when it is
- * complete. */
+/* The folder NAME.selvedge beside a sample folder NAME: state.json (the finished steps, written durably before the next
+ * step), reason.txt (why there are no results), log.txt, and results/, which appears when it is complete. */
 #ifndef SELVEDGE_CLIENTS_SAMPLE_OUTCOME_H
 #define SELVEDGE_CLIENTS_SAMPLE_OUTCOME_H
 

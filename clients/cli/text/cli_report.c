@@ -120,7 +120,7 @@ static void print_flags(const json_t *parameter, FILE *out)
     if (json_is_false(json_object_get(parameter, "determined"))) fputs("not determined", out);
 }
 
-/* The name of a parameter without that of its set: "C_R.r" for "warp.C_R.r". */
+/* Returns the name of a parameter without its set: "C_R.r" for "warp.C_R.r". */
 static const char *own_name(const json_t *parameter)
 {
     const char *name = member_text(parameter, "name"), *set = member_text(parameter, "set");
@@ -206,7 +206,7 @@ static void print_radius(const json_t *radius, FILE *out)
             json_is_true(json_object_get(radius, "at_bound")) ? "  at the edge of its range" : "");
 }
 
-/* What the phantom of a trial was made of. */
+/* Prints the description of a trial's phantom. */
 static void print_trial_fibers(const json_t *trial, FILE *out)
 {
     const double ratio = member_number(trial, "axis_ratio"), lumen = member_number(trial, "lumen");

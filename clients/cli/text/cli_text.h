@@ -20,7 +20,7 @@ void text_with_error(double value, double standard_error, char out[CLI_SHORT_TEX
  * '?'. */
 void text_clean(const char *in, char *out, size_t n_out);
 
-/* The state of a watched job; NaN, "" or -1 for what it does not state. */
+/* The state of a watched job; NaN, "" or -1 for a member that it does not have. */
 struct job_view {
     char state[24], stage[40], message[200];
     double fraction, eta_s, eta_low_s, eta_high_s; /* low, high: NaN where the remaining time is known well */
