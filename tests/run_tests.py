@@ -36,7 +36,7 @@ PYTEST_TIMEOUT_S = 1500
 # Those that take longest start first, so that no lane waits for one of them at the end.
 LONGEST = ["physics/test_derivative_check", "unit/renderer/test_scattering", "physics/test_reconstruct_phantom", "physics/test_chi_square",
            "real/test_real_input", "api/driven/test_openapi_driven", "browser/test_accessibility", "browser/test_dashboard",
-           "api/worker/test_groups", "api/worker/test_cloth_search_job", "browser/test_mending", "browser/test_dashboard_submit",
+           "api/worker/test_groups", "api/worker/test_cloth_search_job", "browser/test_repair", "browser/test_dashboard_submit",
            "api/worker/test_described_cloth", "crash/test_daemon_disk", "crash/test_daemon_kill", "crash/test_worker_resume",
            "api/test_supervision", "api/test_cli", "api/batches/test_batch_plan", "api/batches/test_batches", "api/service/test_rescue"]
 

@@ -5,7 +5,7 @@ import { SharedFibers } from "./fibers/hair_file.js";
 import { fitDetails } from "./fit_details.js";
 import { JobCharts } from "./job_charts.js";
 import { LogTail, WholeLog } from "./log_tail.js";
-import { MendPanel, failedByInput } from "./mend/mend_panel.js";
+import { RepairPanel, failedByInput } from "./repair/repair_panel.js";
 import { duration, el, isNumber, percent, percentWithError, refill, size, stateTag, timeLeft, verdictTag, when, withError } from "./page_parts.js";
 import { pairsCard } from "./pairs/pairs_card.js";
 import { qualityCard } from "./quality_card.js";
@@ -128,7 +128,7 @@ function profileCards(profile) {
 export function jobPage(page, id) {
   const head = el("div", { class: "head" }), stages = el("div", { class: "stages" }), facts = el("div", { class: "facts" }), verdict = el("div"), notes = el("div");
   const fitCard = el("div"), curveCard = el("div"), surfaces = el("div"), results = el("div", { id: "results" }), record = el("div"), versionsNode = el("div"), logNode = el("pre", { class: "log", tabIndex: 0, role: "region", "aria-label": "the last lines of the log" });
-  const charts = new JobCharts(fitCard, curveCard), log = new LogTail(logNode), mend = new MendPanel(id, () => poller.wake()), pictures = new SurfacePictures(surfaces, id), versions = new VersionsCard(versionsNode, id);
+  const charts = new JobCharts(fitCard, curveCard), log = new LogTail(logNode), repair = new RepairPanel(id, () => poller.wake()), pictures = new SurfacePictures(surfaces, id), versions = new VersionsCard(versionsNode, id);
   const wholeLog = el("details", { id: "whole-log", ontoggle: () => {
     if (!wholeLog.open || wholeLog.childElementCount > 1) return;
     const whole = new WholeLog(id);
@@ -136,7 +136,7 @@ export function jobPage(page, id) {
     whole.show(0);
   } }, el("summary", {}, "Whole log"));
   const curves = el("div", { class: "columns" }, card("Fit", fitCard), card("Parameters over the steps", curveCard));
-  page.append(el("section", { class: "card", id: "state" }, head, stages, verdict, facts, notes, mend.node),
+  page.append(el("section", { class: "card", id: "state" }, head, stages, verdict, facts, notes, repair.node),
     curves, surfaces, results, versionsNode, record,
     el("section", { class: "card" }, el("h2", {}, "Log ", el("small", {}, "its last lines")), logNode, wholeLog));
   let about = null, generation = null, closeFibers = null, closeTwin = null, closePairs = null, gone = false;
@@ -220,7 +220,7 @@ export function jobPage(page, id) {
     refill(record, [job.state, job.generation, job.attempt, job.finished_unix_s, job.missing_files, job.document, job.result_url, job.files], () => [jobRecord(job, about)]);
     curves.hidden = !job.document?.photographs && !job.document?.measurements; // nothing is fitted
     await charts.update(job);
-    await mend.update(job);
+    await repair.update(job);
     await log.update(id);
     await pictures.update(job);
     await versions.update(job);

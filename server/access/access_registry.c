@@ -21,7 +21,7 @@ struct meter {
     bool dirty; /* used_unix_s is not in the database */
 };
 
-struct access_desk {
+struct access_registry {
     struct store *store;
     const struct settings *settings;
     atomic_bool required; /* once true, it stays so: tokens are revoked but never removed */
@@ -31,10 +31,10 @@ struct access_desk {
     double flushed_s;
 };
 
-status access_desk_new(struct store *store, const struct settings *settings, struct access_desk **out,
-                       struct error *err)
+status access_registry_new(struct store *store, const struct settings *settings, struct access_registry **out,
+                           struct error *err)
 {
-    struct access_desk *d = calloc(1, sizeof *d);
+    struct access_registry *d = calloc(1, sizeof *d);
     if (d == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start: out of memory");
     d->store = store;
     d->settings = settings;
@@ -44,16 +44,16 @@ status access_desk_new(struct store *store, const struct settings *settings, str
     return STATUS_OK;
 }
 
-void access_desk_free(struct access_desk *d)
+void access_registry_free(struct access_registry *d)
 {
     if (d == NULL) return;
-    access_desk_flush(d, true);
+    access_registry_flush(d, true);
     pthread_mutex_destroy(&d->lock);
     free(d->meter);
     free(d);
 }
 
-status access_required(struct access_desk *d, bool *required, struct error *err)
+status access_required(struct access_registry *d, bool *required, struct error *err)
 {
     *required = atomic_load(&d->required) || strcmp(d->settings->access_required, "always") == 0;
     if (*required) return STATUS_OK;
@@ -64,7 +64,7 @@ status access_required(struct access_desk *d, bool *required, struct error *err)
 
 struct access_grant access_grant_of_everyone(void) { return (struct access_grant){.scope = ACCESS_ADMIN, .all = true}; }
 
-status access_find(struct access_desk *d, const char *secret, bool is_session, struct access_grant *grant,
+status access_find(struct access_registry *d, const char *secret, bool is_session, struct access_grant *grant,
                    struct error *err)
 {
     unsigned char hash[STORE_SECRET_HASH_BYTES];
@@ -86,7 +86,7 @@ status access_find(struct access_desk *d, const char *secret, bool is_session, s
 }
 
 /* The meter of a token, made full if there is none; NULL without memory. d->lock is held. */
-static struct meter *meter_of(struct access_desk *d, const struct access_grant *grant, double now_s)
+static struct meter *meter_of(struct access_registry *d, const struct access_grant *grant, double now_s)
 {
     for (size_t i = 0; i < d->n; i++)
         if (d->meter[i].serial == grant->token_serial) return &d->meter[i];
@@ -103,7 +103,7 @@ static struct meter *meter_of(struct access_desk *d, const struct access_grant *
     return m;
 }
 
-long long access_count(struct access_desk *d, const struct access_grant *grant, double now_s)
+long long access_count(struct access_registry *d, const struct access_grant *grant, double now_s)
 {
     long long wait_s = 0;
     const double most = (double)grant->quota.requests_per_minute;
@@ -131,7 +131,7 @@ static int by_id(const void *a, const void *b)
     return strcmp(x->id, y->id);
 }
 
-void access_desk_flush(struct access_desk *d, bool now)
+void access_registry_flush(struct access_registry *d, bool now)
 {
     struct token_row *row = NULL;
     size_t n = 0;

@@ -17,25 +17,25 @@ struct access_grant {
     struct access_quota quota; /* in effect; 0: no limit */
 };
 
-struct access_desk;
+struct access_registry;
 
 /* STATUS_NO_MEMORY. */
-status access_desk_new(struct store *store, const struct settings *settings, struct access_desk **desk,
-                       struct error *err);
+status access_registry_new(struct store *store, const struct settings *settings, struct access_registry **registry,
+                           struct error *err);
 /* Writes the last uses that are not stored yet. NULL is accepted. */
-void access_desk_free(struct access_desk *desk);
+void access_registry_free(struct access_registry *registry);
 
 /* Whether a token is needed: from the first one on that was ever made, or always by access.required. */
-status access_required(struct access_desk *desk, bool *required, struct error *err);
+status access_required(struct access_registry *registry, bool *required, struct error *err);
 /* The grant when no token is needed. */
 struct access_grant access_grant_of_everyone(void);
 /* The grant of a token, or of a session. STATUS_NOT_FOUND when it is unknown, revoked or has ended. */
-status access_find(struct access_desk *desk, const char *secret, bool is_session, struct access_grant *grant,
+status access_find(struct access_registry *registry, const char *secret, bool is_session, struct access_grant *grant,
                    struct error *err);
 /* Counts a request at the monotonic time now_s. Returns 0, or after how many seconds (at least 1) it may be tried
  * again, when the quota of requests is used up. A token may use up the requests of a minute at once. */
-long long access_count(struct access_desk *desk, const struct access_grant *grant, double now_s);
+long long access_count(struct access_registry *registry, const struct access_grant *grant, double now_s);
 /* Writes the times of last use, if they are due. To be called about once a second. */
-void access_desk_flush(struct access_desk *desk, bool now);
+void access_registry_flush(struct access_registry *registry, bool now);
 
 #endif

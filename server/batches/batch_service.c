@@ -1,6 +1,6 @@
 #include "server/batches/batch_service.h"
 #include "base/clock.h"
-#include "server/jobs/ballast.h"
+#include "server/jobs/disk_reserve.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_change.h"
 #include "server/jobs/problem_code.h"
@@ -141,7 +141,7 @@ status batch_delete(struct job_service *v, const char *id, bool delete_jobs, str
         row[i].deleted = delete_jobs;
     }
     if (s == STATUS_OK) s = store_batch_erase(v->store, id, row, n, err);
-    for (int step = 0; s == STATUS_DISK_FULL && ballast_make_room(v, &step);)
+    for (int step = 0; s == STATUS_DISK_FULL && disk_reserve_make_room(v, &step);)
         s = store_batch_erase(v->store, id, row, n, err);
     if (s == STATUS_OK) job_note_all(v, row, n);
     job_change_end(v);

@@ -59,7 +59,7 @@ void handle_sign_in(struct http_request *r)
     const int64_t age_s = r->service->settings->session_s;
     status s = token == NULL || json_object_size(j) != 1
                    ? error_set_field(&err, STATUS_INVALID, "token", "the body must be {\"token\": TOKEN}")
-                   : access_find(r->desk, token, false, &grant, &err);
+                   : access_find(r->registry, token, false, &grant, &err);
     json_decref(j);
     if (s == STATUS_OK) {
         access_secret_new(secret, hash);

@@ -4,7 +4,7 @@
 #include "server/endpoints/handlers.h"
 #include "server/endpoints/request_json.h"
 #include "server/http/http_reply.h"
-#include "server/jobs/ballast.h"
+#include "server/jobs/disk_reserve.h"
 
 #include <sodium.h>
 #include <stdio.h>
@@ -149,7 +149,7 @@ void handle_revoke_token(struct http_request *r)
     struct error err = {0};
     status s = store_token_get(r->service->store, r->param[0], &token, &err);
     if (s == STATUS_OK) s = store_token_revoke(r->service->store, token.id, clock_wall_s(), &err);
-    for (int step = 0; s == STATUS_DISK_FULL && ballast_make_room(r->service, &step);)
+    for (int step = 0; s == STATUS_DISK_FULL && disk_reserve_make_room(r->service, &step);)
         s = store_token_revoke(r->service->store, token.id, clock_wall_s(), &err);
     if (s == STATUS_NOT_FOUND) error_set(&err, s, "token '%.80s' does not exist", r->param[0]);
     if (s != STATUS_OK) {

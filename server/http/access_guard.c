@@ -36,7 +36,7 @@ static bool find_grant(struct http_request *r, struct access_grant *grant)
                "dashboard");
         return false;
     }
-    status s = access_find(r->desk, secret, is_session, grant, &err);
+    status s = access_find(r->registry, secret, is_session, grant, &err);
     if (s == STATUS_NOT_FOUND)
         refuse(r, "Bearer realm=\"selvedge\", error=\"invalid_token\"",
                is_session ? "the session has ended; sign in again" : "the access token is unknown or was revoked");
@@ -47,7 +47,7 @@ static bool find_grant(struct http_request *r, struct access_grant *grant)
 
 static bool within_rate(struct http_request *r)
 {
-    long long wait_s = access_count(r->desk, &r->grant, clock_monotonic_s());
+    long long wait_s = access_count(r->registry, &r->grant, clock_monotonic_s());
     if (wait_s == 0) return true;
     struct error err = {0};
     json_int_t most = (json_int_t)r->grant.quota.requests_per_minute;
@@ -99,7 +99,7 @@ bool guard_access(struct http_request *r)
         r->grant = (struct access_grant){.scope = ACCESS_OPEN};
         return true;
     }
-    if (access_required(r->desk, &required, &err) != STATUS_OK) {
+    if (access_required(r->registry, &required, &err) != STATUS_OK) {
         reply_problem(r, NULL, &err, NULL);
         return false;
     }

@@ -23,7 +23,7 @@ struct http_request {
     bool address_spaced;               /* it has blanks or control characters */
     bool begun;                        /* its headers are there */
     int64_t body_memory;               /* bytes of the memory for bodies that it holds */
-    struct access_desk *desk;
+    struct access_registry *registry;
     struct access_grant grant;                  /* rights of its token */
     char param[HTTP_N_PARAM][HTTP_PARAM_BYTES]; /* values of {id}, {name} and {path...} in the path */
     int64_t content_length;                     /* 0: no body */

@@ -26,7 +26,7 @@ struct http_server {
     const struct static_files *files;
     struct MHD_Daemon *daemon;
     struct connection_table *connection;
-    struct access_desk *desk;
+    struct access_registry *registry;
     struct http_tls tls;
     atomic_int_least64_t body_memory; /* bytes that the bodies of all requests take */
     atomic_uint_least64_t n_reply[HTTP_MAX_STATUS];
@@ -42,7 +42,7 @@ uint64_t http_server_n_reply(const struct http_server *s, unsigned status_code)
 void http_server_reap(struct http_server *s)
 {
     connection_table_reap(s->connection);
-    access_desk_flush(s->desk, false);
+    access_registry_flush(s->registry, false);
 }
 
 static enum MHD_Result queue_reply(struct http_request *r)
@@ -115,7 +115,7 @@ static void *on_address(void *context, const char *address, struct MHD_Connectio
     if (r == NULL) return NULL;
     r->server = s;
     r->service = s->service;
-    r->desk = s->desk;
+    r->registry = s->registry;
     r->connection = c;
     r->address = address;
     r->address_end = address;
@@ -268,9 +268,9 @@ status http_server_start(struct job_service *service, http_route_finder *find_ro
     status result = connection_table_new((double)settings->header_deadline_s, settings->min_rate_bytes_per_s,
                                          !http_tls_wanted(settings), &s->connection, err);
     if (result == STATUS_OK) result = http_tls_read(settings, &s->tls, err);
-    if (result == STATUS_OK) result = access_desk_new(service->store, settings, &s->desk, err);
+    if (result == STATUS_OK) result = access_registry_new(service->store, settings, &s->registry, err);
     bool guarded = false;
-    if (result == STATUS_OK) result = access_required(s->desk, &guarded, err);
+    if (result == STATUS_OK) result = access_required(s->registry, &guarded, err);
     if (result == STATUS_OK) result = http_listen(settings, guarded, &fd, url, err);
     if (result != STATUS_OK) goto out;
     struct MHD_OptionItem tls[] = {{MHD_OPTION_HTTPS_MEM_CERT, 0, s->tls.certificate},
@@ -314,7 +314,7 @@ void http_server_stop(struct http_server *s)
         MHD_stop_daemon(s->daemon);
     }
     connection_table_free(s->connection);
-    access_desk_free(s->desk);
+    access_registry_free(s->registry);
     http_tls_release(&s->tls);
     free(s);
 }

@@ -2,7 +2,7 @@
 #include "base/files/durable.h"
 #include "base/files/file_tree.h"
 #include "optimizer/job/job_folder.h"
-#include "server/jobs/ballast.h"
+#include "server/jobs/disk_reserve.h"
 #include "server/settings/job_paths.h"
 
 #include <stdio.h>
@@ -90,7 +90,7 @@ status job_update(struct job_service *v, struct job_row *row, struct error *err)
 status job_update_surely(struct job_service *v, struct job_row *row, struct error *err)
 {
     status s = job_update(v, row, err);
-    for (int step = 0; s == STATUS_DISK_FULL && ballast_make_room(v, &step);) s = job_update(v, row, err);
+    for (int step = 0; s == STATUS_DISK_FULL && disk_reserve_make_room(v, &step);) s = job_update(v, row, err);
     return s;
 }
 

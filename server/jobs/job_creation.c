@@ -4,7 +4,7 @@
 #include "base/files/foreign_file.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/job_outline.h"
-#include "server/jobs/ballast.h"
+#include "server/jobs/disk_reserve.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_change.h"
 #include "server/settings/job_paths.h"
@@ -233,7 +233,8 @@ status job_replace_document(struct job_service *v, const char *id, const char *d
     row.document = text;
     job_mark_edited(&row);
     s = replace_document(v, &row, run, err);
-    for (int step = 0; s == STATUS_DISK_FULL && ballast_make_room(v, &step);) s = replace_document(v, &row, run, err);
+    for (int step = 0; s == STATUS_DISK_FULL && disk_reserve_make_room(v, &step);)
+        s = replace_document(v, &row, run, err);
     if (s == STATUS_OK) job_forget_plan(v, id);
     free(run);
 out:

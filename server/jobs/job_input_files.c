@@ -2,7 +2,7 @@
 #include "base/files/durable.h"
 #include "optimizer/job/document/job_file_name.h"
 #include "optimizer/job/job_outline.h"
-#include "server/jobs/ballast.h"
+#include "server/jobs/disk_reserve.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_change.h"
 #include "server/settings/job_paths.h"
@@ -278,7 +278,7 @@ status job_delete_file(struct job_service *v, const char *id, const char *name, 
     job_mark_edited(&job);
     /* the row first: bytes without a row are removed at the next start, but a row must not refer to missing bytes */
     s = store_file_erase(v->store, file.id, &job, err);
-    for (int step = 0; s == STATUS_DISK_FULL && ballast_make_room(v, &step);)
+    for (int step = 0; s == STATUS_DISK_FULL && disk_reserve_make_room(v, &step);)
         s = store_file_erase(v->store, file.id, &job, err);
     if (s == STATUS_OK) job_note(v, id, &(struct journal_entry){.job = &job, .removed = name});
     if (s == STATUS_OK) job_forget_plan(v, id);

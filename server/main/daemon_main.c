@@ -8,7 +8,7 @@
 #include "server/events/webhook.h"
 #include "server/http/http_server.h"
 #include "server/http/static_files.h"
-#include "server/jobs/ballast.h"
+#include "server/jobs/disk_reserve.h"
 #include "server/main/first_token.h"
 #include "server/main/rescue_commands.h"
 #include "server/rescue/backup_keeper.h"
@@ -216,12 +216,12 @@ static void announce(const struct settings *s, const char *url, struct log *log)
     fflush(stdout);
 }
 
-/* Whether a step of the start that has failed is to be tried once more: on a full disk the ballast file is released, so
+/* Whether a step of the start that has failed is to be tried once more: on a full disk the reserved space is released, so
  * that users can delete jobs. */
 static bool make_room(const struct settings *s, struct log *log, status failed, const struct error *err)
 {
-    if ((failed != STATUS_DISK_FULL && failed != STATUS_IO) || !ballast_release(s->data)) return false;
-    log_warning(log, "%s; the ballast file has been released to try once more", err->text);
+    if ((failed != STATUS_DISK_FULL && failed != STATUS_IO) || !disk_reserve_release(s->data)) return false;
+    log_warning(log, "%s; the reserved disk space (disk.ballast_bytes) has been released to try once more", err->text);
     return true;
 }
 
@@ -232,7 +232,7 @@ static status open_service(const struct settings *s, struct log *log, struct job
         r = rebuild_is_needed(s, err);
         if (r == STATUS_OK) r = service_open(s, log, service, err);
     } while (make_room(s, log, r, err));
-    if (r == STATUS_OK) ballast_keep(s, true); /* the space that this start has not needed */
+    if (r == STATUS_OK) disk_reserve_keep(s, true); /* the space that this start has not needed */
     return r;
 }
 
@@ -297,7 +297,7 @@ out:
     webhook_stop(webhook);
     backup_keeper_stop(backup);
     service_close(service);
-    ballast_keep(s, true);
+    disk_reserve_keep(s, true);
     static_files_free(files);
     return r;
 }

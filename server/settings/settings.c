@@ -184,8 +184,8 @@ static const struct setting table[] = {
     NUMBER("disk", "floor_bytes", floor_bytes, GIB, 0, INT64_MAX / 2,
            "free space below which new work is refused and running jobs pause"),
     NUMBER("disk", "ballast_bytes", ballast_bytes, 8 * MIB, 0, GIB,
-           "size of the ballast file, which is released when the disk is full so that deleting jobs still works; "
-           "it has at least 1 MiB while there is room"),
+           "reserved disk space, which is released when the disk is full so that deleting jobs still works; "
+           "at least 1 MiB while there is room"),
 };
 enum { N_SETTING = sizeof table / sizeof table[0] };
 

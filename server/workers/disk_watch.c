@@ -1,5 +1,5 @@
 #include "server/workers/disk_watch.h"
-#include "server/jobs/ballast.h"
+#include "server/jobs/disk_reserve.h"
 #include "server/settings/job_paths.h"
 #include "server/workers/attempt.h"
 
@@ -14,6 +14,6 @@ bool disk_watch(struct job_service *v, bool was_below)
         log_warning(v->log, "%lld bytes are free, %lld are kept in reserve, so running jobs pause", free_bytes,
                     (long long)floor_bytes);
     if (!below) attempt_resume_paused(v);
-    ballast_keep(v->settings, false);
+    disk_reserve_keep(v->settings, false);
     return below;
 }

@@ -66,8 +66,8 @@ static status give_up(struct folder_watch *w, struct sample *s, const char *why,
 {
     char text[2048];
     snprintf(text, sizeof text,
-             "Sample '%s' has no results.\n\n%s\n\n%s%s%sMend the sample, and it is tried again by itself.\n", s->name,
-             why, s->outcome.job_id[0] ? "Its job on the server: " : "", s->outcome.job_id,
+             "Sample '%s' has no results.\n\n%s\n\n%s%s%sRepair the sample, and it is tried again by itself.\n",
+             s->name, why, s->outcome.job_id[0] ? "Its job on the server: " : "", s->outcome.job_id,
              s->outcome.job_id[0] ? "\n" : "");
     report(w, s, why);
     return keep(w, s, SAMPLE_FAILED, text, err);
@@ -115,7 +115,7 @@ static status submit(struct folder_watch *w, struct sample *s, const struct samp
     return is_final(r) ? give_up(w, s, err->text, err) : r;
 }
 
-/* A sample that is new, or failed and may have been mended. */
+/* A sample that is new, or failed and may have been repaired. */
 static status look(struct folder_watch *w, struct sample *s, struct error *err)
 {
     char folder[PATH_ROOM];

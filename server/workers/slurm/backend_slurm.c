@@ -1,8 +1,8 @@
 /* Workers on the nodes of a cluster, which Slurm chooses and starts. */
 #include "base/clock.h"
 #include "server/workers/backends/job_backend.h"
-#include "server/workers/slurm/slurm_desk.h"
 #include "server/workers/slurm/slurm_request.h"
+#include "server/workers/slurm/slurm_service.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -19,7 +19,7 @@ static bool wants_cancel(const struct backend_run *run, double now_s)
 }
 
 /* Frees the runs that the supervisor has forgotten. Called with the lock. */
-static void reap(struct slurm_desk *d)
+static void reap(struct slurm_service *d)
 {
     for (struct backend_run **at = &d->first; *at != NULL;) {
         struct backend_run *run = *at;
@@ -32,7 +32,7 @@ static void reap(struct slurm_desk *d)
 }
 
 /* Returns the earliest run with work for this step, or NULL. New runs are put in front. Called with the lock. */
-static struct backend_run *next_work(struct slurm_desk *d, bool submit, double now_s)
+static struct backend_run *next_work(struct slurm_service *d, bool submit, double now_s)
 {
     struct backend_run *found = NULL;
     for (struct backend_run *run = d->first; run != NULL; run = run->next) {
@@ -43,7 +43,7 @@ static struct backend_run *next_work(struct slurm_desk *d, bool submit, double n
 }
 
 /* Submits one job, so that cancelling and looking need not wait for many. */
-static void work(struct slurm_desk *d)
+static void work(struct slurm_service *d)
 {
     struct backend_run *run;
     if (!d->stop && (run = next_work(d, true, 0)) != NULL) {
@@ -65,9 +65,9 @@ static void work(struct slurm_desk *d)
     pthread_mutex_lock(&d->lock);
 }
 
-static void *run_desk(void *context)
+static void *run_service(void *context)
 {
-    struct slurm_desk *d = context;
+    struct slurm_service *d = context;
     pthread_mutex_lock(&d->lock);
     while (!d->stop) {
         struct timespec until;
@@ -81,7 +81,7 @@ static void *run_desk(void *context)
     return NULL;
 }
 
-static status find_commands(struct slurm_desk *d, struct error *err)
+static status find_commands(struct slurm_service *d, struct error *err)
 {
     const struct settings *settings = d->v->settings;
     char srun[PATH_BYTES]; /* the nodes look for it anew, in the same way */
@@ -98,7 +98,7 @@ static status find_commands(struct slurm_desk *d, struct error *err)
 static status open_slurm(struct job_service *v, const char *program, void **state, struct error *err)
 {
     pthread_condattr_t monotonic;
-    struct slurm_desk *d = calloc(1, sizeof *d);
+    struct slurm_service *d = calloc(1, sizeof *d);
     if (d == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot use Slurm: out of memory");
     d->v = v;
     d->program = program;
@@ -110,7 +110,7 @@ static status open_slurm(struct job_service *v, const char *program, void **stat
         pthread_mutex_init(&d->lock, NULL);
         pthread_cond_init(&d->changed, &monotonic);
         pthread_condattr_destroy(&monotonic);
-        errno = pthread_create(&d->thread, NULL, run_desk, d);
+        errno = pthread_create(&d->thread, NULL, run_service, d);
         if (errno != 0) s = error_set_errno(err, "cannot use Slurm");
     }
     if (s != STATUS_OK) {
@@ -123,7 +123,7 @@ static status open_slurm(struct job_service *v, const char *program, void **stat
 
 static void close_slurm(void *state)
 {
-    struct slurm_desk *d = state;
+    struct slurm_service *d = state;
     pthread_mutex_lock(&d->lock);
     d->stop = true;
     pthread_cond_signal(&d->changed);
@@ -141,7 +141,7 @@ static void close_slurm(void *state)
 
 static bool ready(void *state)
 {
-    struct slurm_desk *d = state;
+    struct slurm_service *d = state;
     pthread_mutex_lock(&d->lock);
     bool is = (d->trouble[0] == '\0' || d->full) && clock_monotonic_s() >= d->not_before_s &&
               (!d->one_by_one || next_work(d, true, 0) == NULL);
@@ -151,14 +151,14 @@ static bool ready(void *state)
 
 static void trouble(void *state, char *text, size_t n_text)
 {
-    struct slurm_desk *d = state;
+    struct slurm_service *d = state;
     pthread_mutex_lock(&d->lock);
     snprintf(text, n_text, "%s", d->trouble);
     pthread_mutex_unlock(&d->lock);
 }
 
 /* Begins a run: a new one is submitted, one that is adopted is known by its note or must be found. */
-static void begin_run(const struct slurm_desk *d, struct backend_run *run, const struct job_row *row, bool adopt)
+static void begin_run(const struct slurm_service *d, struct backend_run *run, const struct job_row *row, bool adopt)
 {
     struct backend_note *note = &run->note;
     snprintf(run->job_id, sizeof run->job_id, "%s", row->id);
@@ -174,7 +174,7 @@ static void begin_run(const struct slurm_desk *d, struct backend_run *run, const
     note->id[0] = '\0';
 }
 
-static void enlist(struct slurm_desk *d, struct backend_run *run)
+static void enlist(struct slurm_service *d, struct backend_run *run)
 {
     pthread_mutex_lock(&d->lock);
     run->next = d->first;
@@ -184,7 +184,8 @@ static void enlist(struct slurm_desk *d, struct backend_run *run)
     pthread_mutex_unlock(&d->lock);
 }
 
-static status add_run(struct slurm_desk *d, const char *job_id, bool adopt, struct backend_run **out, struct error *err)
+static status add_run(struct slurm_service *d, const char *job_id, bool adopt, struct backend_run **out,
+                      struct error *err)
 {
     struct job_row row;
     status s = store_job_look(d->v->store, job_id, &row, err);
@@ -211,7 +212,7 @@ static status adopt(void *state, const char *job_id, struct backend_run **run, s
 
 static enum backend_phase look(void *state, struct backend_run *run, struct worker_end *end)
 {
-    struct slurm_desk *d = state;
+    struct slurm_service *d = state;
     pthread_mutex_lock(&d->lock);
     enum backend_phase phase = run->phase;
     *end = run->end;
@@ -221,7 +222,7 @@ static enum backend_phase look(void *state, struct backend_run *run, struct work
 
 static void stop(void *state, struct backend_run *run, bool at_once)
 {
-    struct slurm_desk *d = state;
+    struct slurm_service *d = state;
     pthread_mutex_lock(&d->lock);
     if (at_once && !run->at_once) run->stop_sent_s = 0;
     run->stop = true;
@@ -245,7 +246,7 @@ static int end_fd(const struct backend_run *run)
 
 static void release(void *state, struct backend_run *run)
 {
-    struct slurm_desk *d = state;
+    struct slurm_service *d = state;
     pthread_mutex_lock(&d->lock);
     run->released = true;
     pthread_mutex_unlock(&d->lock);

@@ -3,7 +3,7 @@
 #include "optimizer/job/job_folder.h"
 #include "server/events/change_feed.h"
 #include "server/reports/status_file.h"
-#include "server/workers/slurm/slurm_desk.h"
+#include "server/workers/slurm/slurm_service.h"
 
 #include <dirent.h>
 #include <signal.h>
@@ -16,7 +16,7 @@
 enum { AFTER_START_S = 30 };
 
 /* Returns the exit code in the worker's last status, or -1 as long as this attempt has no final state. */
-static int final_code(struct slurm_desk *d, const struct backend_run *run, int64_t *peak_rss_bytes)
+static int final_code(struct slurm_service *d, const struct backend_run *run, int64_t *peak_rss_bytes)
 {
     static const struct {
         const char *state;
@@ -34,7 +34,7 @@ static int final_code(struct slurm_desk *d, const struct backend_run *run, int64
 }
 
 /* Writes the progress of the job: the number of finished stages and the size of the series. */
-static void measure_progress(struct slurm_desk *d, const struct backend_run *run, char *out, size_t n_out)
+static void measure_progress(struct slurm_service *d, const struct backend_run *run, char *out, size_t n_out)
 {
     char path[PATH_BYTES];
     struct stat st = {0};
@@ -51,7 +51,7 @@ static void measure_progress(struct slurm_desk *d, const struct backend_run *run
 
 /* A start that ended at its time limit, or by the loss of a rank, is no loss when it got further than the one
  * before. */
-static void judge_progress(struct slurm_desk *d, struct backend_run *run, struct worker_end *end)
+static void judge_progress(struct slurm_service *d, struct backend_run *run, struct worker_end *end)
 {
     char now[sizeof run->note.progress], text[sizeof end->why];
     measure_progress(d, run, now, sizeof now);
@@ -66,7 +66,7 @@ static void judge_progress(struct slurm_desk *d, struct backend_run *run, struct
     snprintf(end->why, sizeof end->why, "%s", text);
 }
 
-static bool has_waited(const struct slurm_desk *d, struct backend_run *run, double least_s)
+static bool has_waited(const struct slurm_service *d, struct backend_run *run, double least_s)
 {
     double now_s = clock_monotonic_s(), wait_s = (double)d->v->settings->slurm_file_delay_s;
     if (run->gone_s <= 0) run->gone_s = now_s;
@@ -74,7 +74,7 @@ static bool has_waited(const struct slurm_desk *d, struct backend_run *run, doub
 }
 
 /* Slurm says that the job has ended. */
-static void ended(struct slurm_desk *d, struct backend_run *run, struct worker_end *end)
+static void ended(struct slurm_service *d, struct backend_run *run, struct worker_end *end)
 {
     int code = final_code(d, run, &end->peak_rss_bytes);
     bool tells = end->cause == WORKER_ENDED && !end->by_signal && end->code <= WORKER_FAILED;
@@ -89,7 +89,7 @@ static void ended(struct slurm_desk *d, struct backend_run *run, struct worker_e
 }
 
 /* Slurm does not list the job: it has forgotten its end, or never had it. */
-static void missing(struct slurm_desk *d, struct backend_run *run)
+static void missing(struct slurm_service *d, struct backend_run *run)
 {
     struct worker_end end = {0};
     int code = final_code(d, run, &end.peak_rss_bytes);
@@ -106,7 +106,7 @@ static void missing(struct slurm_desk *d, struct backend_run *run)
 }
 
 /* Asks the accounting, where there is one, for a job that squeue has forgotten. */
-static bool ask_accounting(struct slurm_desk *d, const struct backend_run *run, struct slurm_job *job)
+static bool ask_accounting(struct slurm_service *d, const struct backend_run *run, struct slurm_job *job)
 {
     struct slurm_output out = {0};
     char of[SLURM_ID_BYTES + 8];
@@ -135,7 +135,7 @@ static bool note_job(struct backend_run *run, const struct slurm_job *job, bool 
     return !same;
 }
 
-static void update(struct slurm_desk *d, struct backend_run *run, const struct slurm_job *job, size_t n)
+static void update(struct slurm_service *d, struct backend_run *run, const struct slurm_job *job, size_t n)
 {
     struct worker_end end = {0};
     struct slurm_job account;
@@ -164,7 +164,7 @@ static void update(struct slurm_desk *d, struct backend_run *run, const struct s
 }
 
 /* Returns the run after this one (NULL: the first) that is to be looked for. Runs are added meanwhile at the front. */
-static struct backend_run *next_to_look(struct slurm_desk *d, struct backend_run *run)
+static struct backend_run *next_to_look(struct slurm_service *d, struct backend_run *run)
 {
     pthread_mutex_lock(&d->lock);
     run = run == NULL ? d->first : run->next;
@@ -173,7 +173,7 @@ static struct backend_run *next_to_look(struct slurm_desk *d, struct backend_run
     return run;
 }
 
-void slurm_look(struct slurm_desk *d)
+void slurm_look(struct slurm_service *d)
 {
     struct slurm_output out = {0};
     struct slurm_job *job = NULL;

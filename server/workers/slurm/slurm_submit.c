@@ -2,8 +2,8 @@
 #include "base/clock.h"
 #include "base/files/foreign_file.h"
 #include "server/reports/plan_file.h"
-#include "server/workers/slurm/slurm_desk.h"
 #include "server/workers/slurm/slurm_request.h"
+#include "server/workers/slurm/slurm_service.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -14,7 +14,7 @@
 
 static const double first_pause_s = 1, longest_pause_s = 60;
 
-void slurm_note_trouble(struct slurm_desk *d, const char *command, const char *words, bool full)
+void slurm_note_trouble(struct slurm_service *d, const char *command, const char *words, bool full)
 {
     pthread_mutex_lock(&d->lock);
     if (full != d->full) d->pause_s = 0;
@@ -31,7 +31,7 @@ void slurm_note_trouble(struct slurm_desk *d, const char *command, const char *w
     if (begins && !full) log_warning(d->v->log, "Slurm cannot be used (%s): %s", command, words);
 }
 
-void slurm_conclude(struct slurm_desk *d, struct backend_run *run, const struct worker_end *end)
+void slurm_conclude(struct slurm_service *d, struct backend_run *run, const struct worker_end *end)
 {
     struct error err = {0};
     run->note.waits = false;
@@ -58,7 +58,7 @@ static status renew_console(const char *data, const char *job_id, struct error *
 }
 
 /* Memory that the job's plan says; 0 without a plan. */
-static int64_t planned_bytes(const struct slurm_desk *d, const char *job_id)
+static int64_t planned_bytes(const struct slurm_service *d, const char *job_id)
 {
     json_t *plan = plan_file_read(d->v->settings->data, job_id);
     const double bytes = json_number_value(json_object_get(plan, "memory_bytes"));
@@ -67,7 +67,8 @@ static int64_t planned_bytes(const struct slurm_desk *d, const char *job_id)
 }
 
 /* Prepares the command line and the script of sbatch. */
-static status prepare(struct slurm_desk *d, struct backend_run *run, struct slurm_request *request, struct error *err)
+static status prepare(struct slurm_service *d, struct backend_run *run, struct slurm_request *request,
+                      struct error *err)
 {
     const struct settings *settings = d->v->settings;
     struct job_row row;
@@ -94,7 +95,7 @@ static status prepare(struct slurm_desk *d, struct backend_run *run, struct slur
     return s;
 }
 
-static void set_step(struct slurm_desk *d, struct backend_run *run, enum slurm_step step)
+static void set_step(struct slurm_service *d, struct backend_run *run, enum slurm_step step)
 {
     pthread_mutex_lock(&d->lock);
     run->step = step;
@@ -102,7 +103,7 @@ static void set_step(struct slurm_desk *d, struct backend_run *run, enum slurm_s
 }
 
 /* Slurm has the job: its number is noted before anything else happens. */
-static void submitted(struct slurm_desk *d, struct backend_run *run, const char *id)
+static void submitted(struct slurm_service *d, struct backend_run *run, const char *id)
 {
     struct error err = {0};
     snprintf(run->note.id, sizeof run->note.id, "%s", id);
@@ -121,7 +122,7 @@ static void submitted(struct slurm_desk *d, struct backend_run *run, const char 
     pthread_mutex_unlock(&d->lock);
 }
 
-static void not_submitted(struct slurm_desk *d, struct backend_run *run, const struct slurm_output *out)
+static void not_submitted(struct slurm_service *d, struct backend_run *run, const struct slurm_output *out)
 {
     struct worker_end end = {.cause = WORKER_NOT_STARTED};
     const char *words = out->error[0] != '\0' ? out->error : "sbatch gave no number of a job";
@@ -140,7 +141,7 @@ static void not_submitted(struct slurm_desk *d, struct backend_run *run, const s
 }
 
 /* Whether the supervisor has given the run up, or Slurm takes no jobs now: then nothing is submitted. */
-static bool is_off(struct slurm_desk *d, const struct backend_run *run)
+static bool is_off(struct slurm_service *d, const struct backend_run *run)
 {
     pthread_mutex_lock(&d->lock);
     bool off = run->stop || (d->full ? clock_monotonic_s() < d->not_before_s : d->trouble[0] != '\0');
@@ -148,7 +149,7 @@ static bool is_off(struct slurm_desk *d, const struct backend_run *run)
     return off;
 }
 
-void slurm_submit(struct slurm_desk *d, struct backend_run *run)
+void slurm_submit(struct slurm_service *d, struct backend_run *run)
 {
     struct error err = {0};
     struct slurm_output out = {0};
@@ -176,7 +177,7 @@ void slurm_submit(struct slurm_desk *d, struct backend_run *run)
 
 /* Ends a worker at once by SIGKILL, and removes the job from Slurm's list in either case: a job that waits, or whose
  * node is gone, gets no signal. Slurm itself sends SIGTERM first and, after its KillWait, SIGKILL. */
-void slurm_cancel(struct slurm_desk *d, struct backend_run *run)
+void slurm_cancel(struct slurm_service *d, struct backend_run *run)
 {
     const char *const kill[] = {d->scancel, "--signal=KILL", "--full", run->note.id, NULL};
     const char *const end[] = {d->scancel, run->note.id, NULL};

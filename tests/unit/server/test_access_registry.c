@@ -18,7 +18,7 @@ struct fixture {
     struct store_fixture db;
     struct settings settings;
     struct store *store;
-    struct access_desk *desk;
+    struct access_registry *registry;
 };
 
 static int set_up(void **state)
@@ -28,13 +28,13 @@ static int set_up(void **state)
     f->store = f->db.store;
     settings_init(&f->settings);
     *state = f;
-    return access_desk_new(f->store, &f->settings, &f->desk, NULL) != STATUS_OK;
+    return access_registry_new(f->store, &f->settings, &f->registry, NULL) != STATUS_OK;
 }
 
 static int tear_down(void **state)
 {
     struct fixture *f = *state;
-    access_desk_free(f->desk);
+    access_registry_free(f->registry);
     store_fixture_end(&f->db);
     free(f);
     return 0;
@@ -54,28 +54,28 @@ static void test_tokens_are_needed_from_the_first_one_on(void **state)
     struct token_row row;
     char text[ACCESS_SECRET_TEXT_BYTES], other[ACCESS_SECRET_TEXT_BYTES];
     bool required = true;
-    assert_int_equal(access_required(f->desk, &required, NULL), STATUS_OK);
+    assert_int_equal(access_required(f->registry, &required, NULL), STATUS_OK);
     assert_false(required);
-    assert_int_equal(access_find(f->desk, "x", false, &grant, NULL), STATUS_NOT_FOUND);
+    assert_int_equal(access_find(f->registry, "x", false, &grant, NULL), STATUS_NOT_FOUND);
     make(f, "ann", QUOTA_DEFAULT, text);
     make(f, "bob", QUOTA_DEFAULT, other);
     assert_string_not_equal(text, other);
-    assert_int_equal(access_required(f->desk, &required, NULL), STATUS_OK);
+    assert_int_equal(access_required(f->registry, &required, NULL), STATUS_OK);
     assert_true(required);
     f->settings.stored_bytes = 77;
-    assert_int_equal(access_find(f->desk, text, false, &grant, NULL), STATUS_OK);
+    assert_int_equal(access_find(f->registry, text, false, &grant, NULL), STATUS_OK);
     assert_string_equal(grant.owner, "ann");
     assert_int_equal(grant.scope, ACCESS_SUBMIT);
     assert_false(grant.all);
-    assert_int_equal(grant.quota.stored_bytes, 77);                                     /* of the settings */
-    assert_int_equal(grant.quota.jobs, 0);                                              /* its own: no limit */
-    assert_int_equal(access_find(f->desk, text, true, &grant, NULL), STATUS_NOT_FOUND); /* a token is no session */
+    assert_int_equal(grant.quota.stored_bytes, 77);                                         /* of the settings */
+    assert_int_equal(grant.quota.jobs, 0);                                                  /* its own: no limit */
+    assert_int_equal(access_find(f->registry, text, true, &grant, NULL), STATUS_NOT_FOUND); /* a token is no session */
     assert_int_equal(store_token_get(f->store, "ann", &row, NULL), STATUS_OK);
     assert_int_equal(store_token_revoke(f->store, row.id, 1, NULL), STATUS_OK);
-    assert_int_equal(access_find(f->desk, text, false, &grant, NULL), STATUS_NOT_FOUND);
+    assert_int_equal(access_find(f->registry, text, false, &grant, NULL), STATUS_NOT_FOUND);
     assert_int_equal(store_token_get(f->store, "bob", &row, NULL), STATUS_OK);
     assert_int_equal(store_token_revoke(f->store, row.id, 1, NULL), STATUS_OK);
-    assert_int_equal(access_required(f->desk, &required, NULL), STATUS_OK);
+    assert_int_equal(access_required(f->registry, &required, NULL), STATUS_OK);
     assert_true(required);
 }
 
@@ -85,7 +85,7 @@ static void test_the_configuration_can_ask_for_tokens_always(void **state)
     bool required = false;
     assert_int_equal(settings_set(&f->settings, "access.required", "never", NULL), STATUS_INVALID);
     assert_int_equal(settings_set(&f->settings, "access.required", "always", NULL), STATUS_OK);
-    assert_int_equal(access_required(f->desk, &required, NULL), STATUS_OK);
+    assert_int_equal(access_required(f->registry, &required, NULL), STATUS_OK);
     assert_true(required);
 }
 
@@ -95,19 +95,20 @@ static void test_requests_of_a_minute(void **state)
     struct access_grant ann, bob;
     char text[ACCESS_SECRET_TEXT_BYTES];
     make(f, "ann", 6, text);
-    assert_int_equal(access_find(f->desk, text, false, &ann, NULL), STATUS_OK);
+    assert_int_equal(access_find(f->registry, text, false, &ann, NULL), STATUS_OK);
     make(f, "bob", 0, text);
-    assert_int_equal(access_find(f->desk, text, false, &bob, NULL), STATUS_OK);
-    for (int i = 0; i < 6; i++) assert_int_equal(access_count(f->desk, &ann, 1000), 0);
-    assert_int_equal(access_count(f->desk, &ann, 1000), 10); /* one each 10 s */
-    assert_int_equal(access_count(f->desk, &ann, 1004), 6);  /* a refused one costs nothing */
-    assert_int_equal(access_count(f->desk, &ann, 1010.5), 0);
-    assert_int_equal(access_count(f->desk, &ann, 1010.6), 10);
-    for (int i = 0; i < 6; i++) assert_int_equal(access_count(f->desk, &ann, 5000), 0); /* never more than a minute's */
-    assert_true(access_count(f->desk, &ann, 5000) > 0);
-    for (int i = 0; i < 1000; i++) assert_int_equal(access_count(f->desk, &bob, 1000), 0);
+    assert_int_equal(access_find(f->registry, text, false, &bob, NULL), STATUS_OK);
+    for (int i = 0; i < 6; i++) assert_int_equal(access_count(f->registry, &ann, 1000), 0);
+    assert_int_equal(access_count(f->registry, &ann, 1000), 10); /* one each 10 s */
+    assert_int_equal(access_count(f->registry, &ann, 1004), 6);  /* a refused one costs nothing */
+    assert_int_equal(access_count(f->registry, &ann, 1010.5), 0);
+    assert_int_equal(access_count(f->registry, &ann, 1010.6), 10);
+    for (int i = 0; i < 6; i++)
+        assert_int_equal(access_count(f->registry, &ann, 5000), 0); /* never more than a minute's */
+    assert_true(access_count(f->registry, &ann, 5000) > 0);
+    for (int i = 0; i < 1000; i++) assert_int_equal(access_count(f->registry, &bob, 1000), 0);
     struct access_grant everyone = access_grant_of_everyone();
-    assert_int_equal(access_count(f->desk, &everyone, 1000), 0);
+    assert_int_equal(access_count(f->registry, &everyone, 1000), 0);
 }
 
 static void test_last_uses_reach_the_database(void **state)
@@ -117,12 +118,12 @@ static void test_last_uses_reach_the_database(void **state)
     struct token_row row;
     char text[ACCESS_SECRET_TEXT_BYTES];
     make(f, "ann", 0, text);
-    assert_int_equal(access_find(f->desk, text, false, &ann, NULL), STATUS_OK);
-    access_count(f->desk, &ann, 1000);
-    access_desk_flush(f->desk, false); /* not due yet */
+    assert_int_equal(access_find(f->registry, text, false, &ann, NULL), STATUS_OK);
+    access_count(f->registry, &ann, 1000);
+    access_registry_flush(f->registry, false); /* not due yet */
     assert_int_equal(store_token_get(f->store, "ann", &row, NULL), STATUS_OK);
     assert_true(row.used_unix_s == 0);
-    access_desk_flush(f->desk, true);
+    access_registry_flush(f->registry, true);
     assert_int_equal(store_token_get(f->store, "ann", &row, NULL), STATUS_OK);
     assert_true(row.used_unix_s > 0);
 }
@@ -139,13 +140,13 @@ static void *race(void *context)
     struct racer *r = context;
     struct access_grant grant;
     for (int i = 0; i < N_ROUND; i++) {
-        if (access_find(r->f->desk, r->text, false, &grant, NULL) != STATUS_OK)
+        if (access_find(r->f->registry, r->text, false, &grant, NULL) != STATUS_OK)
             r->n_unknown++;
-        else if (access_count(r->f->desk, &grant, 1000) == 0)
+        else if (access_count(r->f->registry, &grant, 1000) == 0)
             r->n_allowed++;
         else
             r->n_refused++;
-        if (i % 100 == 0) access_desk_flush(r->f->desk, true);
+        if (i % 100 == 0) access_registry_flush(r->f->registry, true);
     }
     return NULL;
 }

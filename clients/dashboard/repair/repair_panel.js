@@ -1,4 +1,4 @@
-// Mending a job in place: after an error of its input, the field at fault with its value to edit and the file to
+// Repairing a job in place: after an error of its input, the field at fault with its value to edit and the file to
 // replace; of a draft, the files that are missing. Then the job runs again.
 import { memberText } from "../copied_job.js";
 import { el, size } from "../page_parts.js";
@@ -10,7 +10,7 @@ const INPUT_ERRORS = new Set(["invalid", "format", "numeric", "unsupported", "no
 
 // True when the job failed by its input, so that running it again without a change fails again.
 export const failedByInput = (job) => Boolean(job.error) && INPUT_ERRORS.has(job.error.code);
-export const canBeMended = (job) => (job.state === "failed" && failedByInput(job)) || (job.state === "draft" && (failedByInput(job) || job.missing_files?.length > 0));
+export const canBeRepaired = (job) => (job.state === "failed" && failedByInput(job)) || (job.state === "draft" && (failedByInput(job) || job.missing_files?.length > 0));
 
 // The files at fault: those that the message names, else those of the field; and those that are missing.
 export function filesAtFault(job, value) {
@@ -37,10 +37,10 @@ function placesOf(source, faults) {
   return found.filter((p) => !around(p)).sort((p, q) => p.from - q.from);
 }
 
-export class MendPanel {
+export class RepairPanel {
   // again() is called when the job has been changed
   constructor(id, again) {
-    this.node = el("div", { id: "mend" });
+    this.node = el("div", { id: "repair" });
     this.id = id;
     this.again = again;
     this.key = null;
@@ -54,7 +54,7 @@ export class MendPanel {
   }
 
   async update(job) {
-    const shown = canBeMended(job), key = shown ? JSON.stringify([job.state, job.error, job.generation, job.attempt, job.document, job.missing_files]) : "";
+    const shown = canBeRepaired(job), key = shown ? JSON.stringify([job.state, job.error, job.generation, job.attempt, job.document, job.missing_files]) : "";
     if (this.busy || key === this.key || (shown && this.key !== null && this.dirty())) return;
     this.key = key;
     if (!shown) { this.fault = this.written = ""; this.refused = null; this.node.replaceChildren(); return; }
@@ -90,31 +90,31 @@ export class MendPanel {
 
   build(job, stored, checked) {
     const source = this.refused?.text ?? stored, faults = this.faults(job, checked), places = placesOf(source, faults);
-    this.say = el("p", { class: this.fault ? "note bad" : "hint", role: "status", id: "mend-said" }, this.fault);
+    this.say = el("p", { class: this.fault ? "note bad" : "hint", role: "status", id: "repair-said" }, this.fault);
     this.fault = "";
     this.chosen = new Map();
-    const title = faults.length === 0 ? "Files that this job still needs" : faults.length === 1 ? "Mend the input and run again" : `Mend the input and run again: ${faults.length} faults`;
+    const title = faults.length === 0 ? "Files that this job still needs" : faults.length === 1 ? "Repair the input and run again" : `Repair the input and run again: ${faults.length} faults`;
     const parts = [el("h3", {}, title)], inputs = places.map((place, i) => this.valueLine(source, place, i, parts));
     this.inputs = inputs.map((input, i) => ({ input, before: source.slice(places[i].from, places[i].to) }));
     const value = (place) => { try { return JSON.parse(source.slice(place.from, place.to)); } catch { return null; } };
     const files = [...new Set(places.length ? places.flatMap((place) => filesAtFault(job, value(place))) : filesAtFault(job, null))];
-    parts.push(el("ul", { class: "mend-files" }, files.slice(0, SHOWN_FILES).map((f) => this.fileLine(job, f))));
+    parts.push(el("ul", { class: "repair-files" }, files.slice(0, SHOWN_FILES).map((f) => this.fileLine(job, f))));
     if (files.length > SHOWN_FILES) parts.push(el("p", { class: "hint" }, `and ${files.length - SHOWN_FILES} more, when these have arrived`));
     if (this.written) parts.push(el("details", { open: true }, el("summary", {}, "What you had written"), el("pre", { class: "mono" }, this.written)));
     this.written = "";
-    const go = el("button", { type: "button", class: "main", id: "mend-go", onclick: () => this.run(job, { stored, source, places, inputs }, go) }, "Save and run again");
-    parts.push(el("div", { class: "mend-end" }, go, this.say));
+    const go = el("button", { type: "button", class: "main", id: "repair-go", onclick: () => this.run(job, { stored, source, places, inputs }, go) }, "Save and run again");
+    parts.push(el("div", { class: "repair-end" }, go, this.say));
     this.node.replaceChildren(...parts);
   }
 
   // Appends one value with its faults; returns its input.
   valueLine(source, place, i, parts) {
     const before = source.slice(place.from, place.to), lines = before.split("\n").length, long = before.length > 80 || lines > 1;
-    const input = el(long ? "textarea" : "input", { id: i === 0 ? "mend-value" : `mend-value-${i}`, class: "mono", value: before, spellcheck: false, rows: long ? Math.min(16, Math.max(lines, Math.ceil(before.length / 100))) : null });
+    const input = el(long ? "textarea" : "input", { id: i === 0 ? "repair-value" : `repair-value-${i}`, class: "mono", value: before, spellcheck: false, rows: long ? Math.min(16, Math.max(lines, Math.ceil(before.length / 100))) : null });
     const fields = [...new Set(place.faults.map((f) => f.field))], absent = fields.filter((field) => field && field !== place.path);
-    parts.push(el("p", {}, fields.length > 1 ? "Fields at fault: " : "Field at fault: ", el("b", { class: "mono", id: i === 0 ? "mend-field" : null }, fields.filter(Boolean).join(", ") || "not known")),
+    parts.push(el("p", {}, fields.length > 1 ? "Fields at fault: " : "Field at fault: ", el("b", { class: "mono", id: i === 0 ? "repair-field" : null }, fields.filter(Boolean).join(", ") || "not known")),
       ...place.faults.filter((f) => f.detail).map((f) => el("p", { class: "note bad" }, f.detail)),
-      el("label", { class: "mend-line" }, el("span", { class: "mono" }, place.path || "the whole document"), input));
+      el("label", { class: "repair-line" }, el("span", { class: "mono" }, place.path || "the whole document"), input));
     if (absent.length) parts.push(el("p", { class: "hint" }, `The document does not set ${absent.join(", ")}; this is what contains it.`));
     return input;
   }

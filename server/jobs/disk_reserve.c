@@ -1,4 +1,4 @@
-#include "server/jobs/ballast.h"
+#include "server/jobs/disk_reserve.h"
 #include "server/jobs/job_service.h"
 #include "server/settings/job_paths.h"
 
@@ -25,7 +25,7 @@ static int64_t size_wanted(const struct settings *s, int64_t present_bytes, int6
     return wanted > present_bytes ? wanted : present_bytes;
 }
 
-void ballast_keep(const struct settings *s, bool all)
+void disk_reserve_keep(const struct settings *s, bool all)
 {
     char path[PATH_BYTES];
     struct stat st = {0};
@@ -43,16 +43,16 @@ void ballast_keep(const struct settings *s, bool all)
     if (!made) unlink(path);
 }
 
-bool ballast_release(const char *data_folder)
+bool disk_reserve_release(const char *data_folder)
 {
     char path[PATH_BYTES];
     path_join(path, data_folder, "ballast", NULL);
     return unlink(path) == 0;
 }
 
-bool ballast_make_room(struct job_service *v, int *step)
+bool disk_reserve_make_room(struct job_service *v, int *step)
 {
-    if (*step > 1 || ((*step)++ == 1 && !ballast_release(v->settings->data))) return false;
+    if (*step > 1 || ((*step)++ == 1 && !disk_reserve_release(v->settings->data))) return false;
     store_make_room(v->store);
     return true;
 }

@@ -1,7 +1,7 @@
 /* The thread of the backend `slurm` that talks to Slurm: it submits, looks at the list of jobs, and cancels. The
  * supervisor's thread only changes the requests to the runs, under the lock. */
-#ifndef SELVEDGE_SERVER_SLURM_DESK_H
-#define SELVEDGE_SERVER_SLURM_DESK_H
+#ifndef SELVEDGE_SERVER_SLURM_SERVICE_H
+#define SELVEDGE_SERVER_SLURM_SERVICE_H
 
 #include "server/reports/backend_note.h"
 #include "server/settings/job_paths.h"
@@ -17,7 +17,7 @@ enum slurm_step {
     SLURM_OVER
 };
 
-/* All members are guarded by the desk's lock, except those that only the desk's thread uses. */
+/* All members are guarded by the lock, except those that only the thread of this service uses. */
 struct backend_run {
     struct backend_run *next;
     char job_id[STORE_ID_BYTES], comment[SLURM_COMMENT_BYTES];
@@ -27,13 +27,13 @@ struct backend_run {
     bool stop, at_once; /* requests of the supervisor */
     enum backend_phase phase;
     struct worker_end end; /* with BACKEND_ENDED */
-    /* of the desk's thread */
+    /* of the thread of this service */
     struct backend_note note;
     double stop_sent_s; /* when it was cancelled last; 0: not yet */
     double gone_s;      /* since when it is listed no longer, or its last files are awaited; 0: neither */
 };
 
-struct slurm_desk {
+struct slurm_service {
     struct job_service *v;
     const char *program;
     char sbatch[PATH_BYTES], squeue[PATH_BYTES], scancel[PATH_BYTES], sacct[PATH_BYTES]; /* sacct "": no accounts */
@@ -51,15 +51,15 @@ struct slurm_desk {
 
 /* The work of the thread. All functions are called without the lock, for runs that only this thread removes. */
 /* Submits the job, or finds out why that is not possible. */
-void slurm_submit(struct slurm_desk *d, struct backend_run *run);
+void slurm_submit(struct slurm_service *d, struct backend_run *run);
 /* Reads Slurm's list of jobs and updates all runs. */
-void slurm_look(struct slurm_desk *d);
-void slurm_cancel(struct slurm_desk *d, struct backend_run *run);
+void slurm_look(struct slurm_service *d);
+void slurm_cancel(struct slurm_service *d, struct backend_run *run);
 
 /* Notes that Slurm cannot be used, in its own words, and for how long nothing is to be submitted. full: because of a
  * limit of Slurm's. */
-void slurm_note_trouble(struct slurm_desk *d, const char *command, const char *words, bool full);
+void slurm_note_trouble(struct slurm_service *d, const char *command, const char *words, bool full);
 /* Ends a run and writes its note. */
-void slurm_conclude(struct slurm_desk *d, struct backend_run *run, const struct worker_end *end);
+void slurm_conclude(struct slurm_service *d, struct backend_run *run, const struct worker_end *end);
 
 #endif

@@ -1,4 +1,4 @@
-"""A job that failed by its input is mended on its page: the field at fault is edited or its file replaced, and the job runs
+"""A job that failed by its input is repaired on its page: the field at fault is edited or its file replaced, and the job runs
 again, with the real worker."""
 import json
 
@@ -26,7 +26,7 @@ def failed_job(client, folder, table=small_cloth.TABLE, **changes):
     """A job with a small cloth and a table, which must fail."""
     (folder / "cloth.hair").write_bytes(small_cloth.hair(groups=True))
     (folder / "rows.csv").write_text(table)
-    document = {"sample": "to be mended", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"}, "fit": FIT}
+    document = {"sample": "to be repaired", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"}, "fit": FIT}
     for key, value in changes.items():
         document[key].update(value)
     job = client.submit(document, str(folder))
@@ -37,31 +37,31 @@ def failed_job(client, folder, table=small_cloth.TABLE, **changes):
 
 def open_page(browser, client, job):
     browser.get(f"{client.url}/#{job.id}")
-    wait_for(browser, "document.querySelector('#mend-go')")
+    wait_for(browser, "document.querySelector('#repair-go')")
 
 
 def write(browser, value):
-    browser.execute_script("document.querySelector('#mend-value').value = arguments[0]", value)
+    browser.execute_script("document.querySelector('#repair-value').value = arguments[0]", value)
 
 
 def test_replace_the_file(client, browser, tmp_path):
     lines = small_cloth.TABLE.splitlines(keepends=True)
     job = failed_job(client, tmp_path, "".join(lines[:3] + ["fit,45,0,a lot,180,0,0.14,0.10,0.06\n"] + lines[4:]))
     open_page(browser, client, job)
-    assert text_of(browser, "#mend-field") == "measurements.file" and "line 4" in text_of(browser, ".note.bad")
-    assert browser.execute_script("return document.querySelector('#mend-value').value") == '"rows.csv"'
-    assert [t.split()[0] for t in texts(browser, ".mend-files li")] == ["rows.csv"]
+    assert text_of(browser, "#repair-field") == "measurements.file" and "line 4" in text_of(browser, ".note.bad")
+    assert browser.execute_script("return document.querySelector('#repair-value').value") == '"rows.csv"'
+    assert [t.split()[0] for t in texts(browser, ".repair-files li")] == ["rows.csv"]
     # without a change nothing runs
-    click_on(browser, "#mend-go")
-    assert "Nothing has changed" in text_of(browser, "#mend-said") and job.state().state == "failed"
-    keep(browser, "mend-file")
+    click_on(browser, "#repair-go")
+    assert "Nothing has changed" in text_of(browser, "#repair-said") and job.state().state == "failed"
+    keep(browser, "repair-file")
     better = tmp_path / "better.csv"
     better.write_text(small_cloth.TABLE)
-    browser.find_element(By.CSS_SELECTOR, ".mend-files input").send_keys(str(better))
-    assert "it will have the name rows.csv" in text_of(browser, ".mend-files li")
-    click_on(browser, "#mend-go")
+    browser.find_element(By.CSS_SELECTOR, ".repair-files input").send_keys(str(better))
+    assert "it will have the name rows.csv" in text_of(browser, ".repair-files li")
+    click_on(browser, "#repair-go")
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)
-    assert browser.find_elements(By.CSS_SELECTOR, "#mend > *") == []
+    assert browser.find_elements(By.CSS_SELECTOR, "#repair > *") == []
     state = job.state().raw
     assert {f["name"]: f["size"] for f in state["files"]}["rows.csv"] == len(small_cloth.TABLE) and state["document"]["fit"]["seed"] == LARGE
     assert job.result().raw["rows"][1]["measured"] == [0.14, 0.1, 0.06]
@@ -72,40 +72,40 @@ def test_edit_the_document(client, browser, tmp_path):
     job = failed_job(client, tmp_path, fibers={"groups": ["weft", "warp", "pile"]})
     before = job.state().raw["document"]
     open_page(browser, client, job)
-    assert text_of(browser, "#mend-field") == "fibers.groups"
-    assert json.loads(browser.execute_script("return document.querySelector('#mend-value').value")) == ["weft", "warp", "pile"]
-    keep(browser, "mend-document")
+    assert text_of(browser, "#repair-field") == "fibers.groups"
+    assert json.loads(browser.execute_script("return document.querySelector('#repair-value').value")) == ["weft", "warp", "pile"]
+    keep(browser, "repair-document")
     with sized(browser, 375, 800):
         assert scrolls_sideways(browser) == []
-        keep(browser, "mend-375", 375, 800)
+        keep(browser, "repair-375", 375, 800)
     write(browser, '["weft", "warp"')
-    click_on(browser, "#mend-go")
-    assert "no JSON" in text_of(browser, "#mend-said")
+    click_on(browser, "#repair-go")
+    assert "no JSON" in text_of(browser, "#repair-said")
     # what the server refuses is said, and the job stays as it was
     write(browser, '["weft", 7]')
-    click_on(browser, "#mend-go")
-    wait_for(browser, "document.querySelector('#mend-value').value === '7'")  # what is wrong in the refused text
-    assert "fibers.groups[1]" in text_of(browser, "#mend-said")
+    click_on(browser, "#repair-go")
+    wait_for(browser, "document.querySelector('#repair-value').value === '7'")  # what is wrong in the refused text
+    assert "fibers.groups[1]" in text_of(browser, "#repair-said")
     assert job.state().raw["document"] == before and job.state().state == "failed"
     write(browser, '"warp"')
-    click_on(browser, "#mend-go")
+    click_on(browser, "#repair-go")
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)
     assert job.state().raw["document"] == {**before, "fibers": {"file": "cloth.hair", "groups": ["weft", "warp"]}}
     assert [c for c in complaints(browser) if "422" not in c] == []  # the refused document
 
 
 def test_all_faults_are_shown(client, browser, tmp_path):
-    """Of a refused document every fault has its words and its value; several are mended at once."""
+    """Of a refused document every fault has its words and its value; several are repaired at once."""
     job = failed_job(client, tmp_path, fibers={"groups": ["weft", "warp", "pile"]})
     open_page(browser, client, job)
     write(browser, '["weft", 7, "weft"]')
-    click_on(browser, "#mend-go")
-    wait_for(browser, "document.querySelector('#mend .note.bad')")
+    click_on(browser, "#repair-go")
+    wait_for(browser, "document.querySelector('#repair .note.bad')")
     wrong = {**job.state().raw["document"], "fibers": {"file": "cloth.hair", "groups": ["weft", 7, "weft"]}}
     fields = [e["field"] for e in client.request("POST", "/v1/check", json_body=wrong).json()["errors"]]
-    assert all(field in text_of(browser, "#mend") for field in fields)
-    write(browser, browser.execute_script("return document.querySelector('#mend-value').value").replace("7", '"warp"').replace(', "weft"]', "]"))
-    keep(browser, "mend-faults")
+    assert all(field in text_of(browser, "#repair") for field in fields)
+    write(browser, browser.execute_script("return document.querySelector('#repair-value').value").replace("7", '"warp"').replace(', "weft"]', "]"))
+    keep(browser, "repair-faults")
     assert job.state().state == "failed"
     assert [c for c in complaints(browser) if "422" not in c] == []
 
@@ -117,13 +117,13 @@ def test_two_editors(client, browser, tmp_path):
     write(browser, '["mine", "warp"]')
     theirs = {**job.state().raw["document"], "fibers": {"file": "cloth.hair", "groups": ["a", "b", "c"]}}
     job.edit(theirs)
-    click_on(browser, "#mend-go")
-    wait_for(browser, "document.querySelector('#mend-said.bad')?.textContent.includes('changed this job meanwhile')")
-    assert '"mine"' in text_of(browser, "#mend pre") and job.state().raw["document"] == theirs and job.state().state == "draft"
-    assert json.loads(browser.execute_script("return document.querySelector('#mend-value').value")) == ["a", "b", "c"]
-    keep(browser, "mend-two-editors")
+    click_on(browser, "#repair-go")
+    wait_for(browser, "document.querySelector('#repair-said.bad')?.textContent.includes('changed this job meanwhile')")
+    assert '"mine"' in text_of(browser, "#repair pre") and job.state().raw["document"] == theirs and job.state().state == "draft"
+    assert json.loads(browser.execute_script("return document.querySelector('#repair-value').value")) == ["a", "b", "c"]
+    keep(browser, "repair-two-editors")
     write(browser, '["a", "b"]')
-    click_on(browser, "#mend-go")
+    click_on(browser, "#repair-go")
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)
     assert [c for c in complaints(browser) if "412" not in c] == []
 
@@ -133,21 +133,21 @@ def test_another_file_name_and_its_upload(client, browser, tmp_path):
     job = failed_job(client, tmp_path, small_cloth.TABLE.replace("0.14", "bright"))
     open_page(browser, client, job)
     write(browser, '"new.csv"')
-    click_on(browser, "#mend-go")
-    wait_for(browser, "[...document.querySelectorAll('.mend-files li')].some((e) => e.textContent.startsWith('new.csv'))")
-    assert job.state().state == "draft" and "new.csv is missing" in text_of(browser, "#mend-said")
+    click_on(browser, "#repair-go")
+    wait_for(browser, "[...document.querySelectorAll('.repair-files li')].some((e) => e.textContent.startsWith('new.csv'))")
+    assert job.state().state == "draft" and "new.csv is missing" in text_of(browser, "#repair-said")
     (tmp_path / "new.csv").write_text(small_cloth.TABLE)
-    upload = texts(browser, ".mend-files li")
+    upload = texts(browser, ".repair-files li")
     index = next(i for i, t in enumerate(upload) if t.startswith("new.csv"))
     assert "missing" in upload[index]
-    browser.find_elements(By.CSS_SELECTOR, ".mend-files input")[index].send_keys(str(tmp_path / "new.csv"))
-    click_on(browser, "#mend-go")
+    browser.find_elements(By.CSS_SELECTOR, ".repair-files input")[index].send_keys(str(tmp_path / "new.csv"))
+    click_on(browser, "#repair-go")
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)
     assert complaints(browser) == []
 
 
 PLACE = """const done = arguments[2];
-import("/mend/json_place.js").then(({ placeOf, replaced }) => {
+import("/repair/json_place.js").then(({ placeOf, replaced }) => {
   const place = placeOf(arguments[0], arguments[1]);
   done([place.path, arguments[0].slice(place.from, place.to), replaced(arguments[0], place, "?")]);
 }).catch((error) => done(String(error)));"""
