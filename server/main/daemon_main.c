@@ -216,8 +216,8 @@ static void announce(const struct settings *s, const char *url, struct log *log)
     fflush(stdout);
 }
 
-/* Whether a step of the start that has failed is to be tried once more: on a full disk the reserved space is released, so
- * that users can delete jobs. */
+/* Returns whether to try a failed step of the start once more: on a full disk the reserved space is released, so that
+ * users can delete jobs. */
 static bool make_room(const struct settings *s, struct log *log, status failed, const struct error *err)
 {
     if ((failed != STATUS_DISK_FULL && failed != STATUS_IO) || !disk_reserve_release(s->data)) return false;
