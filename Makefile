@@ -46,7 +46,7 @@ folder_base := base
 folder_geometry := geometry
 folder_renderer := renderer
 folder_job := optimizer/job
-folder_optimizer := optimizer/fit optimizer/worker optimizer/phantom optimizer/camera
+folder_optimizer := $(addprefix optimizer/,photographs fit stages report worker tools)
 folder_server := server
 LIBS := $(foreach p,$(PARTS),$(BUILD)/lib/lib$(p).a)
 
@@ -127,14 +127,14 @@ $(BUILD)/bin/selvedge-worker: $(BUILD)/obj/optimizer/worker/worker_main.c.o $(L)
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_OPTIMIZER)
 # (MPI's headers include casts that our warnings refuse)
-$(BUILD)/obj/optimizer/worker/ranks/selvedge_mpi_main.c.o: CFLAGS_ALL += $(patsubst -I%,-isystem %,$(shell pkg-config --cflags-only-I ompi-c 2>/dev/null))
-$(BUILD)/bin/selvedge-mpi: $(BUILD)/obj/optimizer/worker/ranks/selvedge_mpi_main.c.o
+$(BUILD)/obj/optimizer/worker/selvedge_mpi_main.c.o: CFLAGS_ALL += $(patsubst -I%,-isystem %,$(shell pkg-config --cflags-only-I ompi-c 2>/dev/null))
+$(BUILD)/bin/selvedge-mpi: $(BUILD)/obj/optimizer/worker/selvedge_mpi_main.c.o
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(shell pkg-config --libs ompi-c)
-$(BUILD)/bin/selvedge-phantom: $(BUILD)/obj/optimizer/phantom/phantom_main.c.o $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
+$(BUILD)/bin/selvedge-phantom: $(BUILD)/obj/optimizer/tools/phantom/phantom_main.c.o $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_OPTIMIZER)
-$(BUILD)/bin/selvedge-camera: $(BUILD)/obj/optimizer/camera/camera_main.c.o $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
+$(BUILD)/bin/selvedge-camera: $(BUILD)/obj/optimizer/tools/camera/camera_main.c.o $(L)optimizer.a $(L)job.a $(L)renderer.a $(L)geometry.a $(L)base.a
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_OPTIMIZER)
 $(BUILD)/bin/selvedged: $(BUILD)/obj/server/main/daemon_main.c.o $(L)server.a $(L)job.a $(L)base.a

@@ -23,7 +23,7 @@ columns:           ## no line of a C source is longer than 120 columns, comments
 # compiles, are part of it
 SOURCES = $(shell find $(foreach p,$(PARTS),$(folder_$p)) clients/cli tests -name '*.c' -o -name '*.cpp')
 # shared objects, which have rules of their own, and what needs a library that may be missing
-APART = tests/crash/fault_shim.c tests/bench/clock/cpu_clock.c %_plugin.c $(if $(OPENMPI),,optimizer/worker/ranks/selvedge_mpi_main.c)
+APART = tests/crash/fault_shim.c tests/bench/clock/cpu_clock.c %_plugin.c $(if $(OPENMPI),,optimizer/worker/selvedge_mpi_main.c)
 every-object: $(call objs,$(filter-out $(APART),$(SOURCES))) $(PLUGINS)
 
 clang:             ## clang compiles every source, benchmarks and fuzzers too, without a warning (gcc does in every build)

@@ -1,5 +1,5 @@
 /* Messages between the ranks of one job. A rank is a worker process with a descriptor of its own: a stream socket,
- * whose other end carries messages to the other ranks (optimizer/worker/ranks/selvedge_mpi_main.c does so by MPI). A
+ * whose other end carries messages to the other ranks (optimizer/worker/selvedge_mpi_main.c does so by MPI). A
  * message is a frame and its bytes; the other end keeps the order of the messages from one rank to another. Host byte
  * order: all ranks run the same program.
  */

@@ -3,9 +3,9 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/job/stage_table.h"
-#include "optimizer/worker/ranks/worker_team.h"
-#include "optimizer/worker/report/surface/surface_cloth.h"
-#include "optimizer/worker/stages/scene/pipeline_adopt.h"
+#include "optimizer/report/surface/surface_cloth.h"
+#include "optimizer/stages/scene/pipeline_adopt.h"
+#include "optimizer/worker/worker_team.h"
 
 #include <math.h>
 #include <stdlib.h>

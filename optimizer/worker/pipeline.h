@@ -3,9 +3,9 @@
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_H
 
-#include "optimizer/worker/progress/pipeline_plan.h"
-#include "optimizer/worker/report/report.h"
-#include "optimizer/worker/stages/job_inputs.h"
+#include "optimizer/report/findings/report.h"
+#include "optimizer/stages/job_inputs.h"
+#include "optimizer/worker/pipeline_plan.h"
 
 struct pipeline_option {
     size_t most_scratch_bytes; /* bound on the files of large arrays; 0: the free disk is */

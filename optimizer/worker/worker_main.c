@@ -3,17 +3,17 @@
 #include "base/log.h"
 #include "base/machine/process_use.h"
 #include "base/thread_pool.h"
+#include "optimizer/job/document/catalogue_json.h"
 #include "optimizer/job/job_folder.h"
-#include "optimizer/job/json/catalogue_json.h"
+#include "optimizer/report/result/result_json.h"
 #include "optimizer/worker/check/job_check.h"
 #include "optimizer/worker/check/other_faults.h"
+#include "optimizer/worker/job_need.h"
 #include "optimizer/worker/pipeline.h"
-#include "optimizer/worker/progress/job_need.h"
-#include "optimizer/worker/ranks/worker_launcher.h"
-#include "optimizer/worker/ranks/worker_team.h"
-#include "optimizer/worker/report/result_json.h"
 #include "optimizer/worker/sandbox/worker_confine.h"
+#include "optimizer/worker/worker_launcher.h"
 #include "optimizer/worker/worker_signals.h"
+#include "optimizer/worker/worker_team.h"
 
 #include <errno.h>
 #include <getopt.h>

@@ -1,6 +1,6 @@
 /* What the fibers leave of a measured fabric: a smooth factor on the radiance of the cloth, close to 1, that depends on
  * the directions of light and camera to the cloth's normal alone. A fit finds it from the ratios of measured to
- * rendered radiances (optimizer/fit/discrepancy); renderings of the same cloth are multiplied by it.
+ * rendered radiances (optimizer/fit/baseline); renderings of the same cloth are multiplied by it.
  *
  *   ln factor_c = sum_k weight_kc exp(-1/2 sum_a ((x_a - place_ka) / scale_a)^2),  at most DISCREPANCY_MOST in size,
  *

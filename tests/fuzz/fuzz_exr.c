@@ -1,4 +1,4 @@
-#include "optimizer/fit/photographs/photograph.h"
+#include "optimizer/photographs/reader/photograph.h"
 #include "tests/fuzz/fuzz_input.h"
 
 #include <math.h>

@@ -1,4 +1,4 @@
-#include "optimizer/fit/photographs/measurement_table.h"
+#include "optimizer/photographs/rows/measurement_table.h"
 #include "tests/fuzz/fuzz_input.h"
 
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* TIFF photographs. */
-#include "optimizer/fit/photographs/photograph.h"
+#include "optimizer/photographs/reader/photograph.h"
 #include "tests/fuzz/fuzz_input.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -1,5 +1,5 @@
 /* Corrects the checksums of chunks first, so that mutated input is not refused for them. */
-#include "optimizer/fit/photographs/photograph.h"
+#include "optimizer/photographs/reader/photograph.h"
 #include "tests/fuzz/fuzz_input.h"
 
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* Rig files. */
-#include "optimizer/fit/photographs/camera/rig.h"
+#include "optimizer/photographs/camera/rig.h"
 #include "tests/fuzz/fuzz_input.h"
 
 #include <stdio.h>

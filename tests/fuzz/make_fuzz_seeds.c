@@ -3,7 +3,7 @@
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/phantom/phantom.h"
 #include "geometry/volume/format/vol_file.h"
-#include "optimizer/phantom/simulated_camera/dng_file.h"
+#include "optimizer/tools/simulated_camera/dng_file.h"
 #include "renderer/image/image.h"
 #include "tests/support/camera_files.h"
 #include "tests/support/rgl_bytes.h"

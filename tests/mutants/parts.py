@@ -10,16 +10,18 @@ LANGUAGE = {".c": "c", ".js": "js", ".py": "py"}
 # leave out tests that take minutes or reach these files by chance; and tests that are run for every fault of it, because
 # counters of lines do not reach there: they test processes that end without writing their counters.
 GATE = {
-    "sandbox": (["optimizer/worker/sandbox/"], ["unit/optimizer/sandbox/", "api/service/test_sandbox"],
+    "sandbox": (["optimizer/worker/sandbox/sandbox_", "optimizer/worker/sandbox/worker_confine"],
+                ["unit/optimizer/sandbox/", "api/service/test_sandbox"],
                 ["unit/optimizer/sandbox/", "api/service/test_sandbox"]),
     "store": (["server/store/"], ["unit/server/", "api/access/", "api/batches/", "api/service/", "api/test_durable_replies", "api/test_jobs_api",
                                   "api/test_results_api", "api/test_uploads_api"], []),
     "retention": (["server/retention/"], ["unit/server/", "api/service/", "api/test_jobs_api"], []),
-    "uncertainty": (["optimizer/fit/objective/uncertainty", "optimizer/fit/objective/product_noise", "optimizer/fit/linear/",
+    "uncertainty": (["optimizer/fit/linear/uncertainty", "optimizer/fit/linear/linear_", "optimizer/fit/objective/product_noise",
                      "optimizer/fit/cloth/carried_error", "geometry/fibers/shape/radius_choose"],
                     ["unit/optimizer/fit/", "unit/geometry/fibers/"], []),
     "readers": (["geometry/volume/format/", "geometry/volume/voxel_stream", "geometry/volume/volume_source", "geometry/volume/sample_type",
-                 "optimizer/fit/photographs/reader/", "optimizer/fit/photographs/table/"],
+                 *(f"optimizer/photographs/reader/{name}" for name in ("exif", "integer_samples", "photograph_reader", "read_")),
+                 *(f"optimizer/photographs/rows/{name}" for name in ("brdf_", "number_table", "table_text", "tensor_file"))],
                 ["unit/geometry/volume/", "unit/optimizer/photographs/", "api/photographs/test_measured_brdf"], []),
 }
 WHOLE = {name: ([name + "/"], ["unit/", "api/"], [])

@@ -1,5 +1,5 @@
 /* Picture files as cameras and programs write them: TIFF of any kind, JPEG with Exif data. Raw mosaics are written
- * by optimizer/phantom/simulated_camera/dng_file.h. */
+ * by optimizer/tools/simulated_camera/dng_file.h. */
 #ifndef SELVEDGE_TESTS_CAMERA_FILES_H
 #define SELVEDGE_TESTS_CAMERA_FILES_H
 

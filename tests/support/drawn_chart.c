@@ -1,8 +1,8 @@
 #include "tests/support/drawn_chart.h"
 
 #include "base/rng.h"
-#include "optimizer/fit/photographs/color/color_chart.h"
-#include "optimizer/fit/photographs/color/color_matrix.h"
+#include "optimizer/photographs/camera/color_chart.h"
+#include "optimizer/photographs/camera/color_matrix.h"
 
 #include <math.h>
 #include <string.h>

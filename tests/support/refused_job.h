@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_TESTS_REFUSED_JOB_H
 #define SELVEDGE_TESTS_REFUSED_JOB_H
 
-#include "optimizer/worker/stages/job_inputs.h"
+#include "optimizer/stages/job_inputs.h"
 
 /* The inputs of the job in the folder `path` are refused with an error of this field. */
 static inline void refused_job_check(const char *path, const char *field)

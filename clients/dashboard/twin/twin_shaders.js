@@ -1,5 +1,5 @@
 // Shaders of the twin. The cloth's radiance is |cos th_i| / (|cos th_i| + |cos th_o|) sum_k W_k(x) T_k(wo, wi): W in an array of textures of the tile,
-// T in a second array, whose layers, rows and columns twin.json describes (optimizer/worker/report/twin/twin_result.h).
+// T in a second array, whose layers, rows and columns twin.json describes (optimizer/report/export/twin_result.h).
 
 export const vertexText = `#version 300 es
 in vec3 position;

@@ -19,7 +19,7 @@
 #define SELVEDGE_OPTIMIZER_EXPECTED_ROWS_H
 
 #include "optimizer/fit/objective/folds.h"
-#include "optimizer/fit/photographs/observation.h"
+#include "optimizer/photographs/rows/observation.h"
 
 enum { EXPECTED_ROWS = 24 };
 

@@ -17,7 +17,7 @@
 #ifndef SELVEDGE_OPTIMIZER_PLAIN_BRDF_H
 #define SELVEDGE_OPTIMIZER_PLAIN_BRDF_H
 
-#include "optimizer/fit/photographs/observation.h"
+#include "optimizer/photographs/rows/observation.h"
 
 #include <stdbool.h>
 

@@ -5,7 +5,7 @@
 #define SELVEDGE_OPTIMIZER_ROW_SLIPS_H
 
 #include "base/warning.h"
-#include "optimizer/fit/photographs/observation.h"
+#include "optimizer/photographs/rows/observation.h"
 
 /* Median brightness per incident light of rows lit from the front, of a white diffuser 1, beyond which all rows are
  * dark or brighter than white: the darkest fabrics reflect 2 %, no fabric in the mean more than it receives. */

@@ -11,11 +11,11 @@
 #include "base/catalogue/stop_reason.h"
 #include "optimizer/fit/descent/cross_validation.h"
 #include "optimizer/fit/descent/estimator.h"
+#include "optimizer/fit/linear/fit_layout.h"
 #include "optimizer/fit/linear/linear_model.h"
+#include "optimizer/fit/linear/uncertainty.h"
 #include "optimizer/fit/objective/coordinate.h"
-#include "optimizer/fit/objective/fit_layout.h"
 #include "optimizer/fit/objective/objective.h"
-#include "optimizer/fit/objective/uncertainty.h"
 
 enum { FIT_MAX_START = 16 };
 

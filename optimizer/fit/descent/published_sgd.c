@@ -15,8 +15,8 @@
  * 4 estimates.
  */
 #include "optimizer/fit/descent/descent_methods.h"
-#include "optimizer/fit/descent/gauss_newton/rest_check.h"
 #include "optimizer/fit/descent/rescale.h"
+#include "optimizer/fit/descent/rest_check.h"
 #include "renderer/transport/estimate/estimate.h"
 
 #include <math.h>

@@ -4,7 +4,7 @@
 
 #include "base/thread_pool.h"
 #include "optimizer/fit/descent/estimator.h"
-#include "optimizer/fit/photographs/observation.h"
+#include "optimizer/photographs/rows/observation.h"
 #include "renderer/transport/estimate/estimate.h"
 
 /* Everything pointed to outlives the estimator. */

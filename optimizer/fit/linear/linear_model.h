@@ -17,7 +17,7 @@
 #define SELVEDGE_OPTIMIZER_LINEAR_MODEL_H
 
 #include "optimizer/fit/objective/coordinate.h"
-#include "optimizer/fit/photographs/observation.h"
+#include "optimizer/photographs/rows/observation.h"
 #include "renderer/transport/estimate/estimate.h"
 
 _Static_assert((int)FIT_MAX_PARAM <= (int)SCATTERING_MAX_FLAT, "an estimate has room for the derivatives of a fit");

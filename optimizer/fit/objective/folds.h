@@ -8,7 +8,7 @@
 #ifndef SELVEDGE_OPTIMIZER_FOLDS_H
 #define SELVEDGE_OPTIMIZER_FOLDS_H
 
-#include "optimizer/fit/photographs/observation.h"
+#include "optimizer/photographs/rows/observation.h"
 
 enum { FOLDS_MAX = 16, FOLDS_LEAST = 4 };
 

@@ -16,7 +16,7 @@
 #ifndef SELVEDGE_OPTIMIZER_MISFIT_FIELD_H
 #define SELVEDGE_OPTIMIZER_MISFIT_FIELD_H
 
-#include "optimizer/fit/photographs/observation.h"
+#include "optimizer/photographs/rows/observation.h"
 #include "renderer/transport/estimate/estimate.h"
 
 enum { MISFIT_FIELD_MAX_ROW = 128, MISFIT_FIELD_PLACE = 6 };

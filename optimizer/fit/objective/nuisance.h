@@ -9,7 +9,7 @@
 #ifndef SELVEDGE_OPTIMIZER_NUISANCE_H
 #define SELVEDGE_OPTIMIZER_NUISANCE_H
 
-#include "optimizer/fit/photographs/observation.h"
+#include "optimizer/photographs/rows/observation.h"
 #include "renderer/transport/estimate/estimate.h"
 
 enum { FIT_MAX_NUISANCE = 2 };

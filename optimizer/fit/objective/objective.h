@@ -19,7 +19,7 @@
 #ifndef SELVEDGE_OPTIMIZER_OBJECTIVE_H
 #define SELVEDGE_OPTIMIZER_OBJECTIVE_H
 
-#include "optimizer/fit/photographs/observation.h"
+#include "optimizer/photographs/rows/observation.h"
 #include "renderer/transport/estimate/estimate.h"
 
 #define OBJECTIVE_TAU 0.02

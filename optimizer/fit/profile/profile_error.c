@@ -1,6 +1,6 @@
 #include "optimizer/fit/profile/profile_error.h"
 #include "base/small_matrix.h"
-#include "optimizer/fit/objective/uncertainty.h"
+#include "optimizer/fit/linear/uncertainty.h"
 
 #include <math.h>
 #include <stdlib.h>

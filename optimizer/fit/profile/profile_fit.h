@@ -16,7 +16,7 @@
 #define SELVEDGE_OPTIMIZER_PROFILE_FIT_H
 
 #include "base/progress.h"
-#include "optimizer/fit/objective/fit_layout.h"
+#include "optimizer/fit/linear/fit_layout.h"
 #include "optimizer/fit/profile/profile_model.h"
 
 /* A profile is fitted from at least so many starts: the model's own and others spread over the bounds. */

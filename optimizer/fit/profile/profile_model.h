@@ -7,7 +7,7 @@
 #define SELVEDGE_OPTIMIZER_PROFILE_MODEL_H
 
 #include "base/thread_pool.h"
-#include "optimizer/fit/profile/fiber_profile.h"
+#include "optimizer/photographs/profile/fiber_profile.h"
 #include "renderer/scattering/scattering.h"
 
 /* How the rows are computed. */

@@ -4,7 +4,7 @@
 
 #include "base/catalogue/model_catalogue.h"
 #include "optimizer/job/document/job_document.h"
-#include "optimizer/job/json/json_field.h"
+#include "optimizer/job/document/json_field.h"
 
 /* Sets the defaults: no ties, bounds, priors or nuisance terms, and one start. */
 void job_fit_option_init(struct job_fit_option *o);

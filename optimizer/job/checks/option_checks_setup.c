@@ -1,7 +1,7 @@
 /* Checks of the set-up, of the measurements, and of the document as a whole. */
 #include "optimizer/job/checks/option_checks.h"
 #include "optimizer/job/document/job_document.h"
-#include "optimizer/job/json/json_field.h"
+#include "optimizer/job/document/json_field.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -3,7 +3,7 @@
 #include "optimizer/job/checks/job_slips.h"
 #include "optimizer/job/checks/option_value.h"
 #include "optimizer/job/document/job_file_name.h"
-#include "optimizer/job/json/json_field.h"
+#include "optimizer/job/document/json_field.h"
 #include "optimizer/job/options/option_table.h"
 
 #include <math.h>

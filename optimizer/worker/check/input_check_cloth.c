@@ -3,10 +3,10 @@
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/volume/volume_source.h"
 #include "geometry/weave/weave_detect.h"
-#include "optimizer/fit/photographs/photograph.h"
 #include "optimizer/job/options/option_key.h"
+#include "optimizer/photographs/reader/photograph.h"
+#include "optimizer/stages/scene/fiber_file.h"
 #include "optimizer/worker/check/input_check.h"
-#include "optimizer/worker/fiber_file.h"
 #include "renderer/transport/light/environment.h"
 
 #include <math.h>

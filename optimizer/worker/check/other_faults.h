@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_OPTIMIZER_OTHER_FAULTS_H
 #define SELVEDGE_OPTIMIZER_OTHER_FAULTS_H
 
-#include "optimizer/worker/stage_tools.h"
+#include "optimizer/stages/run/stage_tools.h"
 
 /* When the status s is one that inputs cause, warns of their other faults. Takes the folder of the inputs out of the
  * text of err, because users know their files by their names alone. Does nothing for STATUS_OK. */

@@ -3,11 +3,11 @@
 
 #include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
-#include "optimizer/worker/report/page/report_pdf.h"
+#include "optimizer/report/report_pdf.h"
+#include "optimizer/stages/reading/pipeline_profile_prior.h"
+#include "optimizer/stages/scene/pipeline_adopt.h"
 #include "optimizer/worker/sandbox/sandbox_calls.h"
 #include "optimizer/worker/sandbox/sandbox_files.h"
-#include "optimizer/worker/stages/fit/pipeline_profile_prior.h"
-#include "optimizer/worker/stages/scene/pipeline_adopt.h"
 
 #include <errno.h>
 #include <fcntl.h>

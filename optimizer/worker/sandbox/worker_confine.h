@@ -7,7 +7,7 @@
 #define SELVEDGE_OPTIMIZER_WORKER_CONFINE_H
 
 #include "base/status.h"
-#include "optimizer/worker/report/page/pdf_helper.h"
+#include "optimizer/report/findings/pdf_helper.h"
 
 #include <stdbool.h>
 #include <stddef.h>

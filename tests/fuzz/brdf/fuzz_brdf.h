@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_TESTS_FUZZ_BRDF_H
 #define SELVEDGE_TESTS_FUZZ_BRDF_H
 
-#include "optimizer/fit/photographs/table/brdf_file.h"
+#include "optimizer/photographs/rows/brdf_file.h"
 #include "tests/fuzz/fuzz_input.h"
 
 #include <math.h>

@@ -4,7 +4,7 @@
 #include "base/rng.h"
 #include "geometry/fibers/voxelise.h"
 #include "optimizer/fit/objective/objective.h"
-#include "optimizer/phantom/phantom_view_table.h"
+#include "optimizer/tools/phantom/phantom_view_table.h"
 #include "tests/support/cloth/kept_estimate.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
 /* Photographs of a bowl into which a single fiber scatters, by rays: what the camera of the device of the
- * fiber-scattering thesis (4.6) would take. It shares no formula with optimizer/fit/profile/bowl: the camera looks at a
+ * fiber-scattering thesis (4.6) would take. It shares no formula with optimizer/photographs/profile: the camera looks at a
  * point, pixels have an area, the lit part of the fiber has a length, and light that the bowl throws onto itself
  * follows paths of matte reflections until they leave or end by chance.
  *

@@ -12,7 +12,7 @@
 #ifndef SELVEDGE_TESTS_FIBER_RAYS_H
 #define SELVEDGE_TESTS_FIBER_RAYS_H
 
-#include "optimizer/fit/profile/fiber_profile.h"
+#include "optimizer/photographs/profile/fiber_profile.h"
 
 #include <stdint.h>
 #include <stdio.h>

@@ -8,7 +8,7 @@
 #define SELVEDGE_TESTS_FAKE_ESTIMATOR_H
 
 #include "optimizer/fit/descent/descent.h"
-#include "optimizer/fit/photographs/observation.h"
+#include "optimizer/photographs/rows/observation.h"
 
 enum { FAKE_N_PARAM = 9, FAKE_N_FIT = 16, FAKE_N_HELD_OUT = 24 };
 

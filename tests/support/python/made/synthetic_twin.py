@@ -1,4 +1,4 @@
-"""Tables of a twin (optimizer/worker/report/twin/twin_result.h) whose drawing is known in closed form: two stripes along
+"""Tables of a twin (optimizer/report/export/twin_result.h) whose drawing is known in closed form: two stripes along
 x, every 10 mm, one three times as bright as the other, without change by direction but for the factor of a layer. "both" in the
 sample's name: tables of both sides, where light from the other side is half as bright."""
 import json

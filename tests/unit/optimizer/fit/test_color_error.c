@@ -2,7 +2,7 @@
  * compared with the scatter of fits of photographs whose matrix differs from draw to draw. */
 #include "base/rng.h"
 #include "optimizer/fit/objective/objective.h"
-#include "optimizer/fit/photographs/color/color_matrix.h"
+#include "optimizer/photographs/camera/color_matrix.h"
 #include "tests/support/fit_fixture.h"
 
 #include <math.h>

@@ -2,7 +2,7 @@
  * that only one candidate determines. */
 #include "base/angle.h"
 #include "base/small_matrix.h"
-#include "optimizer/fit/objective/next_photograph.h"
+#include "optimizer/fit/linear/next_photograph.h"
 #include "tests/support/tracer/fake_estimator.h"
 
 #include <math.h>

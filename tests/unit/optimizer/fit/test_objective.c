@@ -1,8 +1,8 @@
 /* The objective, fit coordinates, the linear model of an objective, and uncertainty. */
 #include "base/rng.h"
 #include "optimizer/fit/linear/linear_model.h"
+#include "optimizer/fit/linear/uncertainty.h"
 #include "optimizer/fit/objective/objective.h"
-#include "optimizer/fit/objective/uncertainty.h"
 #include "tests/support/tracer/fake_estimator.h"
 
 #include <math.h>

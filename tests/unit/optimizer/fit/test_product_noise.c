@@ -1,6 +1,6 @@
 /* Rows that share their camera paths: what their correlation does to the errors of the objective and of a parameter. */
+#include "optimizer/fit/linear/uncertainty.h"
 #include "optimizer/fit/objective/objective.h"
-#include "optimizer/fit/objective/uncertainty.h"
 #include "tests/support/tracer/fake_estimator.h"
 
 #include <math.h>

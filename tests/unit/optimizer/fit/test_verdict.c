@@ -1,5 +1,5 @@
 /* Verdicts: which facts lead to which code and reservations, and what measurements allow. */
-#include "optimizer/fit/verdict/verdict.h"
+#include "optimizer/report/findings/verdict.h"
 
 #include <math.h>
 #include <setjmp.h>

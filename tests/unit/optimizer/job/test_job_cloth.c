@@ -1,6 +1,6 @@
 /* The section "cloth" of the job document: descriptions are read with their defaults, and mistakes are named. */
+#include "optimizer/job/document/cloth_json.h"
 #include "optimizer/job/document/job_document.h"
-#include "optimizer/job/json/cloth_json.h"
 
 #include <math.h>
 #include <setjmp.h>

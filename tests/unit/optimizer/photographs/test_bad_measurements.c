@@ -4,7 +4,7 @@
 #include "base/catalogue/method_catalogue.h"
 #include "base/option_id.h"
 #include "optimizer/fit/descent/fit_run.h"
-#include "optimizer/fit/photographs/observation_check.h"
+#include "optimizer/photographs/rows/observation_check.h"
 #include "tests/support/tracer/fake_estimator.h"
 
 #include <math.h>

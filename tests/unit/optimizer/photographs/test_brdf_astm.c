@@ -1,8 +1,8 @@
 /* Files of goniometers: a BRDF that is known in closed form comes back between its samples; columns, units,
  * symmetry, the choice of rows, damaged files. */
 #include "base/option_id.h"
-#include "optimizer/fit/photographs/observation_load.h"
-#include "optimizer/fit/photographs/table/brdf_file.h"
+#include "optimizer/photographs/rows/brdf_file.h"
+#include "optimizer/photographs/rows/observation_load.h"
 #include "tests/support/scratch_folder.h"
 
 #include <math.h>

@@ -1,7 +1,7 @@
 /* Files of the MERL database: radiances of BRDFs that are known in closed form, missing samples, damaged files. */
 #include "base/option_id.h"
-#include "optimizer/fit/photographs/observation_load.h"
-#include "optimizer/fit/photographs/table/brdf_file.h"
+#include "optimizer/photographs/rows/brdf_file.h"
+#include "optimizer/photographs/rows/observation_load.h"
 #include "tests/support/scratch_folder.h"
 
 #include <math.h>

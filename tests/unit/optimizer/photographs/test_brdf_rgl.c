@@ -1,7 +1,7 @@
 /* Files of RGL's database: values that are known in closed form, symmetries, spectra, samples that were not measured,
  * damaged files. tests/api/photographs/test_measured_brdf.py compares with another writer, and with Mitsuba. */
-#include "optimizer/fit/photographs/table/brdf_file.h"
-#include "optimizer/fit/photographs/table/brdf_spectrum.h"
+#include "optimizer/photographs/rows/brdf_file.h"
+#include "optimizer/photographs/rows/brdf_spectrum.h"
 #include "tests/support/rgl_bytes.h"
 #include "tests/support/scratch_folder.h"
 

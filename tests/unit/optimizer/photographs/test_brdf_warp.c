@@ -1,7 +1,7 @@
 /* Tables over the unit square against sums over a fine grid: their values, integrals and warps, and the weights of the
  * directions of the light. */
 #include "base/rng.h"
-#include "optimizer/fit/photographs/table/brdf_warp.h"
+#include "optimizer/photographs/rows/brdf_warp.h"
 
 #include <math.h>
 #include <setjmp.h>

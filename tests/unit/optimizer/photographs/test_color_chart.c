@@ -1,9 +1,9 @@
 /* The color matrix on patches without noise, published color differences, and ColorCheckers: drawn and warped here, and
  * a real one (data/color-target). */
 #include "base/rng.h"
-#include "optimizer/fit/photographs/color/color_chart.h"
-#include "optimizer/fit/photographs/color/color_matrix.h"
-#include "optimizer/fit/photographs/photograph.h"
+#include "optimizer/photographs/camera/color_chart.h"
+#include "optimizer/photographs/camera/color_matrix.h"
+#include "optimizer/photographs/reader/photograph.h"
 #include "tests/support/drawn_chart.h"
 
 #include <math.h>

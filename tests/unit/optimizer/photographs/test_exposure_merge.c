@@ -1,6 +1,6 @@
 /* Merging exposures: the published figures, dark pixels without bias, saturated samples, pictures. */
 #include "base/rng.h"
-#include "optimizer/fit/photographs/camera/exposure_merge.h"
+#include "optimizer/photographs/camera/exposure_merge.h"
 
 #include <math.h>
 #include <setjmp.h>

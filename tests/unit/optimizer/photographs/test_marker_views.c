@@ -1,8 +1,8 @@
 /* Markers around a sample, drawn as a pinhole camera sees them: the crop and the camera's place follow. */
 #include "geometry/vision/vision_markers.h"
-#include "optimizer/fit/photographs/camera/marker_views.h"
-#include "optimizer/fit/photographs/camera/photograph_develop.h"
-#include "optimizer/fit/photographs/camera/plane_pose.h"
+#include "optimizer/photographs/camera/marker_views.h"
+#include "optimizer/photographs/camera/photograph_develop.h"
+#include "optimizer/photographs/camera/plane_pose.h"
 #include "tests/support/scratch_folder.h"
 
 #include <math.h>

@@ -1,8 +1,8 @@
 /* Tables of measured radiances: values are read correctly, and errors name file, line and column. */
 #include "base/option_id.h"
-#include "optimizer/fit/photographs/measurement_table.h"
-#include "optimizer/fit/photographs/observation_load.h"
 #include "optimizer/job/document/job_file_name.h"
+#include "optimizer/photographs/rows/measurement_table.h"
+#include "optimizer/photographs/rows/observation_load.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -1,8 +1,8 @@
 /* Contrasts of photographs: of a chess board with noise, their stated errors, and blocks whose edges divide pixels. */
-#include "optimizer/fit/photographs/observation.h"
-#include "optimizer/fit/photographs/observation_load.h"
-#include "optimizer/fit/photographs/photograph.h"
-#include "optimizer/fit/photographs/photograph_contrast.h"
+#include "optimizer/photographs/reader/photograph.h"
+#include "optimizer/photographs/reader/photograph_contrast.h"
+#include "optimizer/photographs/rows/observation.h"
+#include "optimizer/photographs/rows/observation_load.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/tracer/chess_board.h"
 

@@ -1,11 +1,11 @@
 /* From raw files of a simulated camera to radiances: noise, three exposures, a wrong white balance, dark frames, a
  * color chart or a white reference; the record of the camera's noise from dark and flat frames. */
 #include "base/rng.h"
-#include "optimizer/fit/photographs/camera/noise_calibrate.h"
-#include "optimizer/fit/photographs/color/color_matrix.h"
-#include "optimizer/fit/photographs/observation_load.h"
 #include "optimizer/job/job_parse.h"
-#include "optimizer/phantom/simulated_camera/dng_file.h"
+#include "optimizer/photographs/camera/color_matrix.h"
+#include "optimizer/photographs/camera/noise_calibrate.h"
+#include "optimizer/photographs/rows/observation_load.h"
+#include "optimizer/tools/simulated_camera/dng_file.h"
 #include "tests/support/camera_files.h"
 #include "tests/support/drawn_chart.h"
 #include "tests/support/scratch_folder.h"

@@ -1,7 +1,7 @@
 /* The picture readers: exact values of files written here, what they state of the exposure, and files that must be
  * refused with a sentence that names file and reason. */
-#include "optimizer/fit/photographs/photograph.h"
-#include "optimizer/phantom/simulated_camera/dng_file.h"
+#include "optimizer/photographs/reader/photograph.h"
+#include "optimizer/tools/simulated_camera/dng_file.h"
 #include "tests/support/camera_files.h"
 #include "tests/support/scratch_folder.h"
 

@@ -1,8 +1,8 @@
 /* Mean radiances of photographs: exact means, standard errors that include texture, and pictures that must be
  * refused. */
 #include "base/rng.h"
-#include "optimizer/fit/photographs/observation.h"
-#include "optimizer/fit/photographs/photograph.h"
+#include "optimizer/photographs/reader/photograph.h"
+#include "optimizer/photographs/rows/observation.h"
 #include "tests/support/scratch_folder.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* The rig file, positions in millimetres, and the errors of a lens. */
-#include "optimizer/fit/photographs/camera/rig.h"
-#include "optimizer/fit/photographs/observation_load.h"
+#include "optimizer/photographs/camera/rig.h"
+#include "optimizer/photographs/rows/observation_load.h"
 #include "tests/support/scratch_folder.h"
 
 #include <math.h>

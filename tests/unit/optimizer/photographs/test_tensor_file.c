@@ -1,5 +1,5 @@
 /* Files of tensors, as RGL's measured reflectances are, byte by byte: their fields, and each fault of their headers. */
-#include "optimizer/fit/photographs/table/tensor_file.h"
+#include "optimizer/photographs/rows/tensor_file.h"
 #include "tests/support/scratch_folder.h"
 
 #include <setjmp.h>

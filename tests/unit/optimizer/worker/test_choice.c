@@ -1,5 +1,5 @@
 /* The choice between the models of a job. */
-#include "optimizer/worker/stages/result/pipeline_choice.h"
+#include "optimizer/stages/validation/pipeline_choice.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,5 @@
 /* Hair lobes for other programs: their energy, and how near they come to a fiber. */
-#include "optimizer/worker/report/export/hair_fit.h"
+#include "optimizer/report/export/hair_fit.h"
 
 #include <math.h>
 #include <setjmp.h>

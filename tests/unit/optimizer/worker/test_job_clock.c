@@ -1,7 +1,7 @@
 /* The predicted end of a job: what speeds of earlier jobs, finished stages and the running stage say, and a fraction
  * that neither falls nor leaps. */
 #include "base/files/durable.h"
-#include "optimizer/worker/progress/job_clock.h"
+#include "optimizer/stages/run/job_clock.h"
 #include "tests/support/scratch_folder.h"
 
 #include <math.h>

@@ -2,8 +2,8 @@
 #include "base/angle.h"
 #include "geometry/fibers/fiber_set.h"
 #include "optimizer/job/document/job_file_name.h"
-#include "optimizer/phantom/phantom_photographs.h"
-#include "optimizer/phantom/phantom_view_table.h"
+#include "optimizer/tools/phantom/phantom_photographs.h"
+#include "optimizer/tools/phantom/phantom_view_table.h"
 #include "renderer/image/image.h"
 #include "tests/support/scratch_folder.h"
 

@@ -2,9 +2,9 @@
 #include "base/files/durable.h"
 #include "base/option_id.h"
 #include "optimizer/job/job_folder.h"
-#include "optimizer/worker/stages/geometry_stages.h"
-#include "optimizer/worker/work_file.h"
-#include "optimizer/worker/worker_series.h"
+#include "optimizer/stages/geometry_stages.h"
+#include "optimizer/stages/run/work_file.h"
+#include "optimizer/stages/run/worker_series.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/tracer/fake_estimator.h"
 

@@ -1,7 +1,7 @@
 /* What a job expects of its fit and its pictures: paths of the fit by its rows, size and samples of the renderings. */
-#include "optimizer/worker/progress/pipeline_plan.h"
-#include "optimizer/worker/progress/plan_probe.h"
-#include "optimizer/worker/report/result_pictures.h"
+#include "optimizer/report/result/result_pictures.h"
+#include "optimizer/worker/pipeline_plan.h"
+#include "optimizer/worker/plan_probe.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

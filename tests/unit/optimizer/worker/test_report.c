@@ -1,5 +1,5 @@
 /* Names and exposure of the pictures in the results. */
-#include "optimizer/worker/report/result_json.h"
+#include "optimizer/report/result/result_json.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -1,5 +1,5 @@
 /* How far two pictures are apart: closed forms, with noise and without. */
-#include "optimizer/worker/report/surface/surface_difference.h"
+#include "optimizer/report/surface/surface_difference.h"
 
 #include <math.h>
 #include <setjmp.h>

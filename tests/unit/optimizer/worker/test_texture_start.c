@@ -1,7 +1,7 @@
 /* Start values that a described cloth takes from a photograph: threads, flatness, crimp, covers, colors; what the job
  * states stays. */
 #include "optimizer/job/job_parse.h"
-#include "optimizer/worker/stages/scene/texture_start.h"
+#include "optimizer/stages/reading/texture_start.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -1,7 +1,7 @@
 /* The worker's status: many warnings, and texts that are not valid in JSON. */
 #include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
-#include "optimizer/worker/worker_status.h"
+#include "optimizer/stages/run/worker_status.h"
 #include "tests/support/scratch_folder.h"
 
 #include <jansson.h>

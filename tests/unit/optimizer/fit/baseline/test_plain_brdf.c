@@ -2,8 +2,8 @@
  * independent least-squares fit of the same terms gave. */
 #include "base/angle.h"
 #include "optimizer/fit/baseline/plain_brdf.h"
-#include "optimizer/fit/photographs/measurement_table.h"
 #include "optimizer/job/job_parse.h"
+#include "optimizer/photographs/rows/measurement_table.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -1,7 +1,7 @@
 /* The discrepancy of a cloth: a smooth reciprocal factor, its fit to rows, and its share by cross-validation. */
 #include "base/angle.h"
 #include "base/catalogue/method_catalogue.h"
-#include "optimizer/fit/discrepancy/discrepancy_fit.h"
+#include "optimizer/fit/baseline/discrepancy_fit.h"
 #include "tests/support/descent_fixture.h"
 
 #include <math.h>

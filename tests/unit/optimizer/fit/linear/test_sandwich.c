@@ -3,7 +3,7 @@
  * share paths, a color matrix with an error, priors, a fixed parameter. */
 #include "base/rng.h"
 #include "base/small_matrix.h"
-#include "optimizer/fit/objective/uncertainty.h"
+#include "optimizer/fit/linear/uncertainty.h"
 
 #include <math.h>
 #include <setjmp.h>

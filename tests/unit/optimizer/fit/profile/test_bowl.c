@@ -1,10 +1,10 @@
 /* Photographs of a bowl, made by rays (bowl_rays.h) of a fiber whose profile is known: the cells that come back, their
  * errors, the fit to them, and inputs that are refused. */
 #include "base/angle.h"
-#include "optimizer/fit/profile/bowl/bowl_profile.h"
 #include "optimizer/fit/profile/profile_fit.h"
 #include "optimizer/job/job_parse.h"
 #include "optimizer/job/options/option_key.h"
+#include "optimizer/photographs/profile/bowl_profile.h"
 #include "tests/support/fiber/bowl_rays.h"
 #include "tests/support/scratch_folder.h"
 

@@ -1,7 +1,7 @@
 /* Tables of the profile of a fiber: what is read of them, and errors that name line and column. */
 #include "base/angle.h"
 #include "base/option_id.h"
-#include "optimizer/fit/profile/fiber_profile.h"
+#include "optimizer/photographs/profile/fiber_profile.h"
 
 #include <math.h>
 #include <setjmp.h>

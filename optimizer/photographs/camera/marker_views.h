@@ -1,0 +1,34 @@
+/* Crop and camera of a photograph from square markers around the sample (rig.h, "markers"). The markers lie in the
+ * plane of the cloth and turn with it. */
+#ifndef SELVEDGE_OPTIMIZER_MARKER_VIEWS_H
+#define SELVEDGE_OPTIMIZER_MARKER_VIEWS_H
+
+#include "optimizer/job/document/job_document.h"
+#include "optimizer/photographs/camera/lens.h"
+#include "optimizer/photographs/camera/marker_board.h"
+
+/* Where the camera of a picture was, and where the orbit center is in it. */
+struct marker_view {
+    size_t n_marker, n_corner; /* of those of a chessboard */
+    double rms_px;             /* what is left between markers and map */
+    double center_px[2];       /* of the orbit, in the picture without distortion */
+    double px_per_mm;          /* at the orbit center, perpendicular to the view */
+    bool has_camera;           /* the lens' focal lengths are known */
+    double camera_mm[3];       /* in the frame of the cloth */
+};
+
+/* Finds the board in a picture. The corners of a chessboard are looked for where the found markers promise them,
+ * and count only between two markers that were found, so that cloth on the board does no harm; eight of them
+ * replace the corners of the markers. STATUS_INVALID: fewer than two of its markers, or places that contradict the
+ * picture by more than a tenth of a marker. */
+status marker_view_find(const struct marker_board *board, const struct lens *lens, const struct image *im,
+                        struct marker_view *view, struct error *err);
+/* Fills in what photograph p leaves out: the crop of crop_cm about the orbit center, and the place of the camera. */
+status marker_view_apply(const struct marker_view *view, double crop_cm, size_t width, size_t height,
+                         struct job_photograph *p, struct error *err);
+/* Does both for every photograph of the document that leaves out its crop or its camera; files are in `folder`. Without
+ * a board (n 0) a photograph whose camera is not given is an error. err->field is an option id. */
+status marker_views_apply(const struct marker_board *board, const struct lens *lens, const char *folder,
+                          struct job_document *doc, struct error *err);
+
+#endif

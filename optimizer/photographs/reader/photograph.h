@@ -1,0 +1,65 @@
+/* One photograph to its mean rgb radiance.
+ *
+ * Reads any format of photograph_reader.h, takes the crop, divides by the exposure where it is known, multiplies by the
+ * photograph's scale. The exposure is t (ISO / 100) / N^2, time t in seconds and f-number N; a factor that neither the
+ * document nor the file states is 1 (photographs_check_exposure requires that all photographs state the same ones). The
+ * standard error of the mean comes from the means of square sub-blocks (8 x 8 of them where the crop allows): cloth has
+ * texture that is correlated from pixel to pixel, so single pixels would state an error that is far too small.
+ * STATUS_FORMAT / STATUS_INVALID naming the file: unreadable, NaN or infinite pixels, negative mean, all black,
+ * saturated (more than 2 % of the crop of an integer picture at its largest value), crop outside the picture, linear
+ * samples that are declared as srgb.
+ */
+#ifndef SELVEDGE_OPTIMIZER_PHOTOGRAPH_H
+#define SELVEDGE_OPTIMIZER_PHOTOGRAPH_H
+
+#include "optimizer/job/document/job_document.h"
+#include "optimizer/photographs/reader/photograph_reader.h"
+
+/* What became of a file on its way to radiances. */
+struct photograph_record {
+    struct photograph_info info; /* with the exposure that the document overrides */
+    size_t width, height;        /* of the file, in pixels of the image that was read */
+    double saturated_share;      /* of the crop's pixels that have a channel at full scale, 0 for float samples */
+    double exposure;             /* pixel values were divided by it; 1 when nothing is known */
+    bool merged;                 /* by the estimator of exposure_merge.h, of n_exposure pictures */
+    size_t n_exposure;
+    double noise_se_rgb[3]; /* of the mean, by the camera's noise; with merged alone, NaN without a noise record */
+    /* Errors of the mean of channel c by those of the color matrix, from three independent causes of one standard
+     * deviation each; the causes of a channel are the same for all photographs that the matrix was applied to. */
+    double color_error[3][3];
+    bool resampled; /* pixels depend on their neighbours as after an enlargement or a strong filter */
+};
+
+struct photograph_mean {
+    struct photograph_record record;
+    double mean_rgb[3];
+    double se_rgb[3];      /* by the scatter of sub-blocks, and by the errors of the color matrix */
+    double block_contrast; /* standard deviation of sub-block means over the mean, largest channel */
+    char warning[400];     /* "" or why the mean describes the crop badly */
+};
+
+/* Standard error of the mean of channel c by all causes of color_error. */
+double photograph_color_se(const struct photograph_record *r, size_t c);
+
+/* Reads one file (photograph_read) and measures it. */
+status photograph_measure(const char *path, const struct job_photograph *p, struct photograph_mean *mean,
+                          struct error *err);
+/* Measures a crop that has been read; name: of its file. mean->record is set before. transfer: as declared. */
+status photograph_measure_image(const struct image *im, const char *name, enum job_transfer transfer,
+                                struct photograph_mean *mean, struct error *err);
+
+/* A photograph of which nothing but the transfer is declared: scale 1, no crop, exposure and black level as the file
+ * states. */
+struct job_photograph photograph_plain(enum job_transfer transfer);
+
+/* The crop as the file's values: neither divided by the exposure, which record states, nor scaled. */
+status photograph_read_values(const char *path, const struct job_photograph *p, struct image *im,
+                              struct photograph_record *record, struct error *err);
+/* Multiplies all pixels. */
+void image_scale(struct image *im, double factor);
+/* The crop as an image, divided by the exposure and scaled. record may be NULL. The transfer of p is that of integer
+ * samples alone: linear files are read as they are. */
+status photograph_read(const char *path, const struct job_photograph *p, struct image *im,
+                       struct photograph_record *record, struct error *err);
+
+#endif

@@ -1,0 +1,130 @@
+/* 8/16-bit PNG through libpng. Its longjmp stays in this file. */
+#include "base/files/durable.h"
+#include "optimizer/photographs/reader/integer_samples.h"
+
+#include <png.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+struct png_failure {
+    char text[160];
+};
+
+static void on_error(png_structp png, png_const_charp text)
+{
+    struct png_failure *f = png_get_error_ptr(png);
+    snprintf(f->text, sizeof f->text, "%s", text);
+    png_longjmp(png, 1);
+}
+
+static void on_warning(png_structp png, png_const_charp text)
+{
+    (void)png;
+    (void)text;
+}
+
+static bool recognise(const uint8_t first[PHOTOGRAPH_FIRST_BYTES])
+{
+    return memcmp(first, "\x89PNG\r\n\x1a\n", 8) == 0;
+}
+
+/* Channel c of pixel x of a row that holds grey or rgb, with or without alpha. */
+static unsigned sample(const png_byte *row, unsigned depth, size_t x, size_t c, size_t n_channel)
+{
+    const png_byte *p = row + (n_channel * x + c) * (depth / 8);
+    return depth == 16 ? (unsigned)p[0] << 8 | p[1] : p[0];
+}
+
+static status convert(png_structp png, png_infop info, const float *light, struct image *im, const char *path,
+                      struct error *err)
+{
+    png_bytepp row = png_get_rows(png, info);
+    unsigned depth = png_get_bit_depth(png, info), largest = depth == 16 ? 65535 : 255;
+    size_t n = png_get_channels(png, info), n_color = n <= 2 ? 1 : 3;
+    for (size_t y = 0; y < im->height; y++) {
+        for (size_t x = 0; x < im->width; x++) {
+            for (size_t c = 0; c < 3; c++)
+                im->pixel[(y * im->width + x) * 3 + c] = light[sample(row[y], depth, x, n_color == 3 ? c : 0, n)];
+            if (n > n_color && sample(row[y], depth, x, n_color, n) != largest)
+                return integer_samples_transparent(path, err);
+        }
+    }
+    return STATUS_OK;
+}
+
+/* Checks the size, which is at bytes 16..23, before libpng allocates memory for it. */
+static status check_size(FILE *f, const char *name, size_t limit_pixel, struct error *err)
+{
+    unsigned char h[24];
+    static const unsigned char signature[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+    if (fread(h, 1, sizeof h, f) != sizeof h || memcmp(h, signature, sizeof signature) != 0)
+        return error_set(err, STATUS_FORMAT, "cannot read photograph '%s': it is not a PNG file", name);
+    size_t width = (size_t)h[16] << 24 | (size_t)h[17] << 16 | (size_t)h[18] << 8 | h[19];
+    size_t height = (size_t)h[20] << 24 | (size_t)h[21] << 16 | (size_t)h[22] << 8 | h[23];
+    if (width > 0 && height > limit_pixel / width)
+        return error_set(err, STATUS_TOO_LARGE,
+                         "cannot read photograph '%s': %zu x %zu pixels, the limit is %zu in all", name, width, height,
+                         limit_pixel);
+    struct stat st; /* a row has at least a bit a pixel; deflate cannot do better than 1 : 1032 */
+    if (fstat(fileno(f), &st) != 0) return error_set_errno(err, "cannot read photograph '%s'", name);
+    if ((width / 8 + 1) * height / 1100 > (size_t)st.st_size)
+        return error_set(err, STATUS_FORMAT,
+                         "cannot read photograph '%s': its header promises %zu x %zu pixels, the file has %lld bytes",
+                         name, width, height, (long long)st.st_size);
+    rewind(f);
+    return STATUS_OK;
+}
+
+/* Converts the rows that libpng has read. */
+static status take_rows(png_structp png, png_infop png_info, const char *path, const struct photograph_request *q,
+                        struct image *im, struct photograph_info *info, struct error *err)
+{
+    if (png_get_color_type(png, png_info) == PNG_COLOR_TYPE_PALETTE) return integer_samples_palette(path, err);
+    if (png_get_bit_depth(png, png_info) < 8)
+        return error_set(err, STATUS_UNSUPPORTED,
+                         "cannot use photograph '%s': it has %d bits in a sample, allowed are 8 and 16",
+                         path_file_name(path), png_get_bit_depth(png, png_info));
+    info->has_alpha = (png_get_color_type(png, png_info) & PNG_COLOR_MASK_ALPHA) != 0;
+    status s = integer_samples_declare(path, q, png_get_bit_depth(png, png_info) == 16 ? 16 : 8, info, err);
+    if (s != STATUS_OK) return s;
+    float *light = integer_samples_curve(q, info);
+    if (light == NULL)
+        return error_set(err, STATUS_NO_MEMORY, "cannot read photograph '%s': out of memory", path_file_name(path));
+    s = image_init(im, png_get_image_width(png, png_info), png_get_image_height(png, png_info), 3, err);
+    if (s == STATUS_OK) s = convert(png, png_info, light, im, path, err);
+    if (s != STATUS_OK) image_release(im);
+    free(light);
+    return s;
+}
+
+static status read_png(const char *path, const struct photograph_request *q, struct image *im,
+                       struct photograph_info *info, struct error *err)
+{
+    const char *name = path_file_name(path);
+    struct png_failure failure = {{0}};
+    FILE *f = fopen(path, "rbe");
+    if (f == NULL) return error_set_errno(err, "cannot read photograph '%s'", name);
+    status s = check_size(f, name, q->limit_pixel, err);
+    if (s != STATUS_OK) {
+        fclose(f);
+        return s;
+    }
+    png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &failure, on_error, on_warning);
+    png_infop png_info = png != NULL ? png_create_info_struct(png) : NULL;
+    if (png_info == NULL) {
+        s = error_set(err, STATUS_NO_MEMORY, "cannot read photograph '%s': out of memory", name);
+    } else if (setjmp(png_jmpbuf(png))) {
+        s = error_set(err, STATUS_FORMAT, "cannot read photograph '%s': %s", name, failure.text);
+    } else {
+        png_init_io(png, f);
+        png_read_png(png, png_info, PNG_TRANSFORM_PACKING, NULL);
+        s = take_rows(png, png_info, path, q, im, info, err);
+    }
+    if (png != NULL) png_destroy_read_struct(&png, png_info != NULL ? &png_info : NULL, NULL);
+    fclose(f);
+    return s;
+}
+
+const photograph_reader png_photograph_reader = {"png.v1", "PNG", " png ", recognise, read_png};

@@ -1,0 +1,107 @@
+#include "optimizer/report/export/exports.h"
+
+#include "base/files/durable.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/report/export/export_formats.h"
+#include "optimizer/stages/validation/pipeline_choice.h"
+#include "optimizer/stages/validation/pipeline_discrepancy.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static const struct export_format *const format[] = {&export_mitsuba, &export_pbrt, &export_usd, &export_blender,
+                                                     &export_textures};
+enum { N_FORMAT = sizeof format / sizeof format[0] };
+static const double percent = 100.0;
+
+static bool wanted(const struct report *report, const struct export_format *f)
+{
+    return *(const bool *)((const char *)report->in.results + f->wanted_at);
+}
+
+static status fit_materials(struct export_scene *e, struct error *err)
+{
+    const struct appearance *a = &e->model->setup->appearance;
+    status s = STATUS_OK;
+    for (size_t g = 0; g < e->model->setup->sets.n_set && s == STATUS_OK; g++) {
+        s = hair_fit_run(a->surface, e->model->fit->result.param + g * e->model->setup->sets.n_own, &e->hair[g], err);
+        if (s != STATUS_OK) break;
+        log_info(e->report->in.job->tools->log, "exports: hair lobes differ from the fitted scattering by %.0f %%",
+                 percent * e->hair[g].rel_rms);
+    }
+    return s;
+}
+
+/* conversion.json */
+static status write_conversion(const struct export_scene *e, const json_t *json, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], *text = json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
+    if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot export a scene: out of memory");
+    export_path(e, "conversion.json", path);
+    status s = worker_folder_replace(e->report->in.job->tools->folder, path, text, strlen(text), err);
+    free(text);
+    return s;
+}
+
+static status write_format(struct export_scene *e, const struct export_format *f, struct error *err)
+{
+    char folder[64], path[WORKER_PATH_BYTES];
+    json_t *materials = NULL;
+    snprintf(folder, sizeof folder, "export/%s", f->name);
+    e->folder = folder;
+    worker_folder_path(e->report->in.job->tools->folder, JOB_FOLDER_RESULTS, folder, path);
+    status s = durable_make_folder(path, err);
+    if (s == STATUS_OK) s = f->write(e, &materials, err);
+    if (s != STATUS_OK) return s;
+    json_t *json = json_pack("{s:s, s:s, s:o}", "format", f->name, "folder", folder, "materials", materials);
+    s = write_conversion(e, json, err);
+    if (s == STATUS_OK)
+        json_array_append_new(e->report->exports, json);
+    else
+        json_decref(json);
+    return s;
+}
+
+static void warn_of_rest(const struct export_scene *e)
+{
+    int n[2];
+    if (!export_repeats(e, n))
+        worker_status_warn(e->report->in.job->tools->status,
+                           "the exported scenes have %d x %d repeats of the tile, the most that are written: the "
+                           "widest view sees beyond them",
+                           n[0], n[1]);
+    if (e->report->in.job->rows->environment != NULL)
+        worker_status_warn(e->report->in.job->tools->status,
+                           "the exported scenes have no image of the surroundings: add '%s' to them",
+                           e->report->in.job->setup->environment_file);
+    if (pipeline_discrepancy(e->model->validation) != NULL)
+        worker_status_warn(
+            e->report->in.job->tools->status,
+            "the exported fibers are rendered without the discrepancy, which other programs do not know; "
+            "exported textures contain it");
+}
+
+static bool any_wanted(const struct report *report)
+{
+    for (size_t i = 0; i < N_FORMAT; i++)
+        if (wanted(report, format[i])) return true;
+    return false;
+}
+
+status exports_write(struct report *report, struct error *err)
+{
+    struct export_scene e = {.report = report, .model = &report->model[report_best_model(report)]};
+    if (!any_wanted(report)) return STATUS_OK;
+    if (e.model->setup->appearance.kind != MODEL_SURFACE) {
+        worker_status_warn(report->in.job->tools->status,
+                           "nothing was exported: the model '%s' sees no fibers, which an export needs",
+                           e.model->setup->appearance.id);
+        return STATUS_OK;
+    }
+    fiber_set_z_range_m(&report->in.made->fiber, &e.z_low_m, &e.z_high_m);
+    status s = fit_materials(&e, err);
+    for (size_t i = 0; i < N_FORMAT && s == STATUS_OK; i++)
+        if (wanted(report, format[i])) s = write_format(&e, format[i], err);
+    if (s == STATUS_OK) warn_of_rest(&e);
+    return s;
+}

@@ -1,0 +1,80 @@
+/* The stage "report": everything under JOB/results. `struct report` is shared by the files of this folder: the input of
+ * the stage, and what the stage has found so far. */
+#ifndef SELVEDGE_OPTIMIZER_REPORT_H
+#define SELVEDGE_OPTIMIZER_REPORT_H
+
+#include "optimizer/fit/baseline/plain_brdf.h"
+#include "optimizer/fit/linear/next_photograph.h"
+#include "optimizer/job/document/job_results.h"
+#include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/job_outline.h"
+#include "optimizer/report/findings/pdf_helper.h"
+#include "optimizer/report/findings/verdict.h"
+#include "optimizer/stages/fit_stages.h"
+#include "optimizer/stages/geometry_stages.h"
+#include "renderer/transport/derivative_check.h"
+
+/* Nothing is owned. */
+struct report_input {
+    const struct cloth_job *job; /* sections, rows and models */
+    const char *sample;
+    enum job_kind kind;
+    const struct job_rows *photographs;
+    const struct job_profile *profile;
+    const struct job_results *results;
+    const struct job_outline *files;  /* the input files */
+    const struct profile_rows *fiber; /* of a job with the profile of a fiber */
+    const struct texture_guess *texture;
+    const struct reconstruct_option *option;
+    const struct model_fit *fit;
+    const struct fitted_radius *radius;
+    const struct validation *validation;
+    struct made_cloth *made; /* made anew at the numbers of each model */
+    struct pdf_helper pdf;
+    size_t n_input_warning;     /* warnings of reading the job and of its geometry */
+    const double *stage_wall_s; /* by index of the stage table; of this attempt, NaN for a stage of an earlier one */
+};
+
+struct report_output {
+    struct verdict verdict; /* of the best model or, without a fit, of the geometry */
+};
+status stage_report(const struct report_input *in, struct report_output *out, struct error *err);
+
+/* A candidate for the next photograph. */
+struct pipeline_candidate {
+    size_t i_candidate; /* of the document */
+    struct candidate_score score;
+};
+
+/* Two additions to the result of a model (pipeline_advice.h). */
+struct model_advice {
+    struct derivative_check certificate;  /* of the free parameters at the result */
+    struct pipeline_candidate *candidate; /* as many as the document has, best first; NULL when none were asked for */
+};
+
+/* How well a plain BRDF describes the same rows (pipeline_skill.h). */
+struct pipeline_skill {
+    bool measured; /* false where a row is lit by an environment too */
+    struct plain_brdf brdf;
+    double fit_rel_rms, heldout_rel_rms; /* NaN without rows of that set */
+    double left_out_rel_rms;             /* fitted rows by cross-validation; NaN with too few of them */
+};
+
+struct report {
+    struct report_input in;
+    size_t n_model;
+    struct pipeline_model model[JOB_MAX_MODEL]; /* in the order of the document */
+    struct model_advice *advice;                /* of each model */
+    struct pipeline_skill skill;
+    struct verdict verdict;
+    json_t *exports;             /* the files for other programs, as result.json lists them */
+    json_t *surface_pictures;    /* the pictures of the cloth on surfaces, as result.json lists them */
+    struct volume_output volume; /* the scan; empty until report_need_volume */
+};
+
+/* Index of the best model (pipeline_choice.h). */
+size_t report_best_model(const struct report *report);
+/* Reads the scan from its checkpoint, if it is not in memory. */
+status report_need_volume(struct report *report, struct error *err);
+
+#endif

@@ -1,0 +1,81 @@
+/* The verdict on a result: whether it can be used, in words and as a code. It is about the fit, and has nothing to do
+ * with the state of the job: a job that has succeeded may have fitted a cloth that does not describe the photographs.
+ *
+ * What the measurements allow: the root mean square, over the judged rows and channels, of their relative standard
+ * errors (in the unit of the relative RMS error, objective.h) and of VERDICT_LEAST_ERROR together. The error of the fit
+ * is counted in multiples of that:
+ *
+ *   does not describe this cloth   above VERDICT_FAR multiples; or above the error of one color for all rows; or above
+ *                                  twice that of a plain BRDF, unless below VERDICT_NEAR multiples
+ *   usable, with reservations      above VERDICT_NEAR multiples, or any reservation below
+ *   good                           otherwise
+ *
+ * From the error two of its standard errors are subtracted first, so noise of the rendering condemns nothing. Without a
+ * fit (a job that ends with the geometry) the grade of the scan decides alone: unresolved, partly, resolved. */
+#ifndef SELVEDGE_OPTIMIZER_VERDICT_H
+#define SELVEDGE_OPTIMIZER_VERDICT_H
+
+#include "optimizer/photographs/rows/observation.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+/* Relative error below which no photograph and no table is taken to be right as a whole, whatever errors it states:
+ * certificates of reflectance standards alone state 1 to 2 %. */
+#define VERDICT_LEAST_ERROR 0.02
+/* Three standard errors are the usual limit of what noise explains. At ten, no choice of the assumed errors matters. */
+#define VERDICT_NEAR 3.0
+#define VERDICT_FAR 10.0
+#define VERDICT_PLAIN_BRDF_FACTOR 2.0
+
+enum verdict_code { VERDICT_NONE, VERDICT_GOOD, VERDICT_USABLE, VERDICT_DOES_NOT_DESCRIBE };
+enum verdict_rows { VERDICT_HELD_OUT, VERDICT_LEFT_OUT, VERDICT_FITTED }; /* rows that the error is about */
+enum verdict_scan { VERDICT_NO_SCAN, VERDICT_SCAN_RESOLVED, VERDICT_SCAN_PARTLY, VERDICT_SCAN_UNRESOLVED };
+
+enum { VERDICT_MAX_RESERVATION = 12, VERDICT_TEXT_BYTES = 320 };
+
+/* What the verdict is computed from. Texts are lists of names, "a, b, c", or "". */
+struct verdict_facts {
+    bool has_fit; /* false: all but scan and n_input_warning is left out */
+    enum verdict_rows rows;
+    double error, error_se;  /* relative RMS error over these rows */
+    double allowed;          /* verdict_allowed_error */
+    double one_color_error;  /* of one color for all rows; NaN: not known */
+    double plain_brdf_error; /* over the same rows, left out in the same way; NaN: not known */
+    bool converged, derivatives_right, several_solutions;
+    const char *not_determined, *at_bound;
+    enum verdict_scan scan;
+    double scan_safe_share;
+    size_t n_input_warning; /* warnings about the input and its geometry */
+};
+
+struct verdict_reservation {
+    const char *code; /* a constant, "not_converged" */
+    char text[VERDICT_TEXT_BYTES];
+};
+
+struct verdict {
+    enum verdict_code code;
+    char text[VERDICT_TEXT_BYTES]; /* one sentence */
+    enum verdict_rows rows;
+    double error, error_se, allowed, one_color_error, plain_brdf_error; /* as in the facts; NaN without a fit */
+    size_t n_reservation;
+    struct verdict_reservation reservation[VERDICT_MAX_RESERVATION];
+};
+
+void verdict_reach(const struct verdict_facts *facts, struct verdict *v);
+
+/* "none", "good", "usable", "does_not_describe_this_cloth". */
+const char *verdict_code_id(enum verdict_code code);
+/* "good", "usable with reservations", "does not describe this cloth"; "none". */
+const char *verdict_code_words(enum verdict_code code);
+/* "held_out", "cross_validation", "fitted". */
+const char *verdict_rows_id(enum verdict_rows rows);
+
+/* What the measurements of the rows of one set allow, as above. NaN without rows. */
+double verdict_allowed_error(const struct observation_set *o, enum job_set set);
+/* Relative RMS error over the rows of `judged` of the one color that describes the rows of the set "fit" best. NaN
+ * without rows. */
+double verdict_one_color_error(const struct observation_set *o, enum job_set judged);
+
+#endif

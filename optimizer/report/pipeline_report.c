@@ -1,0 +1,158 @@
+/* Stage "report": everything under results/. The numbers are written first, so that they can be looked at while
+ * pictures are rendered. */
+#include "base/option_id.h"
+#include "optimizer/job/options/option_key.h"
+#include "optimizer/report/export/exports.h"
+#include "optimizer/report/export/twin_result.h"
+#include "optimizer/report/findings/pipeline_advice.h"
+#include "optimizer/report/findings/pipeline_pairing.h"
+#include "optimizer/report/findings/pipeline_skill.h"
+#include "optimizer/report/findings/pipeline_verdict.h"
+#include "optimizer/report/findings/report.h"
+#include "optimizer/report/quality.h"
+#include "optimizer/report/report_page.h"
+#include "optimizer/report/report_pdf.h"
+#include "optimizer/report/result/profile_report.h"
+#include "optimizer/report/result/result_json.h"
+#include "optimizer/report/result/result_pictures.h"
+#include "optimizer/report/surface/surface_pictures.h"
+#include "optimizer/stages/fit/pipeline_cloth.h"
+#include "optimizer/stages/validation/pipeline_choice.h"
+
+#include <stdlib.h>
+
+/* Depth by which fibers run into each other, over their diameter and as a mean over all points, above which a described
+ * cloth has more fiber than fits. Default numbers make 0 to 0.07; a packing of 0.85 makes 0.14. */
+static const double most_overlap = 0.1;
+
+static void warn_of_overlap(const struct report *report)
+{
+    if (report->in.job->cloth->description == NULL || !(report->in.made->report.overlap_mean > most_overlap)) return;
+    worker_status_warn(
+        report->in.job->tools->status,
+        "'%s' asks for more fiber than fits: its fibers run into each other by %.0f %% of their diameter "
+        "on average; lower packing or cover, or raise compression",
+        job_option_key(OPTION_CLOTH), 100.0 * report->in.made->report.overlap_mean);
+}
+
+/* Of a job that ends with the geometry. */
+static status report_geometry(struct report *report, struct error *err)
+{
+    reconstruct_warn_fibers(&report->in.made->geometry, &report->in.made->fiber, &report->in.job->tools->warn);
+    report_pdf_warn(report);
+    pipeline_reach_verdict(report);
+    status s = result_geometry_json_write(report, err);
+    if (s == STATUS_OK) s = result_summary_write(report, err);
+    if (s == STATUS_OK) s = result_geometry_write(report, err);
+    if (s == STATUS_OK) s = quality_write(report, err);
+    if (s == STATUS_OK) s = report_write(report, err);
+    return s == STATUS_OK ? report_pdf_write(report, err) : s;
+}
+
+/* Of a job that renders given parameters. */
+static status report_pictures(struct report *report, struct error *err)
+{
+    warn_of_overlap(report);
+    report_pdf_warn(report);
+    status s = result_geometry_write(report, err);
+    if (s == STATUS_OK) s = quality_write(report, err);
+    double on_surfaces = surface_pictures_paths(report->in.results),
+           until = on_surfaces / (on_surfaces + twin_result_paths(report->in.results));
+    if (s == STATUS_OK) s = surface_pictures_write(report, 0.0, until, err);
+    if (s == STATUS_OK) s = twin_result_write(report, until, 1.0, err);
+    if (s == STATUS_OK) pipeline_reach_verdict(report);
+    if (s == STATUS_OK) s = result_pictures_json_write(report, err);
+    if (s == STATUS_OK) s = result_summary_write(report, err);
+    if (s == STATUS_OK) s = report_write(report, err);
+    return s == STATUS_OK ? report_pdf_write(report, err) : s;
+}
+
+/* Of a job with the profile of a single fiber. */
+static status report_profile(struct report *report, struct error *err)
+{
+    status s = profile_json_write(report, err);
+    if (s == STATUS_OK) s = result_summary_write(report, err);
+    if (s == STATUS_OK) s = profile_csv_write(report, err);
+    return s == STATUS_OK ? report_write(report, err) : s;
+}
+
+static status use_best(struct report *report, struct error *err)
+{
+    const size_t best = report_best_model(report);
+    return pipeline_cloth_use(report->in.job, &report->in.fit[best], best, report->in.made, err);
+}
+
+/* Of a job that fits models to rows. */
+static status report_fit(struct report *report, struct error *err)
+{
+    status s = pipeline_certify(report, err);
+    if (s == STATUS_OK) s = pipeline_rank_candidates(report, err);
+    if (s == STATUS_OK) s = pipeline_measure_skill(report, err);
+    if (s == STATUS_OK) s = use_best(report, err);
+    if (s == STATUS_OK) s = pipeline_warn_pairing(report, err);
+    if (s == STATUS_OK) warn_of_overlap(report);
+    if (s == STATUS_OK) report_pdf_warn(report);
+    if (s == STATUS_OK) pipeline_reach_verdict(report);
+    if (s == STATUS_OK) s = result_json_write(report, err);
+    if (s == STATUS_OK) s = result_summary_write(report, err);
+    if (s == STATUS_OK) s = result_geometry_write(report, err);
+    if (s == STATUS_OK) s = quality_write(report, err);
+    double n_fit_path = (double)report->model[report_best_model(report)].fit->result.n_path;
+    double done = result_renderings_paths(report->in.results, report->in.job->rows->observation.n, n_fit_path),
+           on_surfaces = done + surface_pictures_paths(report->in.results),
+           all = on_surfaces + twin_result_paths(report->in.results), first = 0.1,
+           rest = all > 0.0 ? (1.0 - first) / all : 0.0;
+    if (s == STATUS_OK) s = result_renderings_write(report, first, first + rest * done, err);
+    if (s == STATUS_OK) s = surface_pictures_write(report, first + rest * done, first + rest * on_surfaces, err);
+    if (s == STATUS_OK) s = twin_result_write(report, first + rest * on_surfaces, 1.0, err);
+    if (s == STATUS_OK) s = exports_write(report, err);
+    if (s == STATUS_OK) s = result_json_write(report, err);
+    if (s == STATUS_OK) s = report_write(report, err);
+    return s == STATUS_OK ? report_pdf_write(report, err) : s;
+}
+
+static status run(struct report *report, struct error *err)
+{
+    switch (report->in.kind) {
+    case JOB_OF_GEOMETRY:
+        return report_geometry(report, err);
+    case JOB_OF_PICTURES:
+        return report_pictures(report, err);
+    case JOB_OF_PROFILE:
+        return report_profile(report, err);
+    default:
+        return report_fit(report, err);
+    }
+}
+
+static void report_release(struct report *report)
+{
+    for (size_t i = 0; i < report->n_model && report->advice != NULL; i++) free(report->advice[i].candidate);
+    free(report->advice);
+    json_decref(report->exports);
+    json_decref(report->surface_pictures);
+    volume_release(&report->volume.volume);
+    free(report);
+}
+
+status stage_report(const struct report_input *in, struct report_output *out, struct error *err)
+{
+    const size_t n_model = in->job->n_model;
+    struct report *report = calloc(1, sizeof *report);
+    if (report == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the results: out of memory");
+    report->in = *in;
+    report->n_model = n_model;
+    report->exports = json_array();
+    report->surface_pictures = json_array();
+    report->advice = calloc(n_model + 1, sizeof *report->advice);
+    for (size_t i = 0; i < n_model; i++)
+        report->model[i] = (struct pipeline_model){.setup = &in->job->model[i],
+                                                   .fit = in->fit != NULL ? &in->fit[i] : NULL,
+                                                   .validation = in->validation != NULL ? &in->validation[i] : NULL,
+                                                   .advice = &report->advice[i]};
+    status s = report->advice != NULL ? run(report, err)
+                                      : error_set(err, STATUS_NO_MEMORY, "cannot write the results: out of memory");
+    out->verdict = report->verdict;
+    report_release(report);
+    return s;
+}

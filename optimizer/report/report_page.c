@@ -1,0 +1,371 @@
+#include "optimizer/report/report_page.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/report/page_charts.h"
+#include "optimizer/report/page_pictures.h"
+#include "optimizer/report/page_text.h"
+#include "optimizer/report/report_data.h"
+#include "optimizer/report/result/profile_report.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+static const char style[] =
+    "body { font: 14px/1.45 system-ui, sans-serif; max-width: 1060px; margin: 2em auto; padding: 0 1em; color: "
+    "#1c1f24; "
+    "background: #fff; }\n"
+    "h1 { font-size: 1.6em; margin-bottom: .2em; } h2 { font-size: 1.15em; margin: 1.8em 0 .5em; border-bottom: 1px "
+    "solid #ddd; padding-bottom: .2em; }\n"
+    "table { border-collapse: collapse; } th, td { text-align: left; padding: .14em 1.2em .14em 0; vertical-align: "
+    "top; "
+    "} th { font-weight: 600; } td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; }\n"
+    "tr.held td { color: #2457a6; } .flag { color: #8a5a00; } .hint { color: #667; }\n"
+    ".verdict { padding: .6em 1em; border-left: 6px solid; margin: 1em 0; } .good { border-color: #1d7a46; background: "
+    "#dcf2e5; } .usable { border-color: #e0a100; background: #fdf0d2; } .does_not_describe_this_cloth { border-color: "
+    "#b3261e; background: #fbe3e1; }\n"
+    ".charts { display: flex; flex-wrap: wrap; gap: 12px; } .pictures { display: flex; flex-wrap: wrap; gap: 14px; } "
+    "figure { margin: 0; min-width: 10em; break-inside: avoid; } figure img { width: 104px; height: 104px; "
+    "image-rendering: pixelated; "
+    "margin-right: 3px; } figcaption { font-size: .85em; color: #555; width: 0; min-width: 100%; }\n"
+    "@media screen and (max-width: 700px) { body { margin: 1em; } h1, li, td, th, code, pre { overflow-wrap: anywhere; "
+    "} "
+    "pre { white-space: pre-wrap; } th, td { padding-right: .6em; font-size: 12px; } svg, img { max-width: 100%; } "
+    "svg { height: auto; } }\n"
+    "@page { size: A4; margin: 15mm; }\n"
+    "@media print { body { margin: 0; padding: 0; max-width: none; font-size: 10px; } h2, h2 + p { break-after: avoid; "
+    "} tr, "
+    "svg "
+    "{ break-inside: avoid; } th, td { padding-right: .8em; } td.n { white-space: nowrap; } td { overflow-wrap: "
+    "anywhere; "
+    "} .charts, .pictures { display: block; } .charts svg { width: 48%; height: auto; } figure { display: "
+    "inline-block; "
+    "margin: 0 14px 10px 0; vertical-align: top; } }\n";
+
+static void heading(const char *text, FILE *out) { fprintf(out, "<h2>%s</h2>\n", text); }
+
+static void print_time(const char *label, double unix_s, FILE *out)
+{
+    time_t t = (time_t)unix_s;
+    struct tm utc;
+    char text[40];
+    if (gmtime_r(&t, &utc) != NULL && strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &utc) > 0)
+        fprintf(out, "<tr><td>%s</td><td>%s</td></tr>\n", label, text);
+}
+
+static void print_verdict(const json_t *verdict, FILE *out)
+{
+    size_t i;
+    const json_t *reservation, *list = json_object_get(verdict, "reservations");
+    if (!json_is_object(verdict)) return;
+    fprintf(out, "<div class=\"verdict %s\"><b>Verdict: ", page_string(verdict, "code"));
+    page_escaped(page_string(verdict, "words"), out);
+    fputs(".</b> ", out);
+    page_escaped(page_string(verdict, "text"), out);
+    fputs("\n<ul>", out);
+    json_array_foreach(list, i, reservation)
+    {
+        fputs("<li>", out);
+        page_escaped(page_string(reservation, "text"), out);
+        fputs("</li>\n", out);
+    }
+    fputs("</ul></div>\n", out);
+}
+
+static void error_row(const json_t *result, const char *label, const char *key, FILE *out)
+{
+    char key_se[64];
+    snprintf(key_se, sizeof key_se, "%s_se", key);
+    fprintf(out, "<tr><td>%s</td><td>", label);
+    page_with_error(json_object_get(result, key), json_object_get(result, key_se), 100.0, " %", out);
+    fputs("</td></tr>\n", out);
+}
+
+static void print_errors(const json_t *result, FILE *out)
+{
+    const json_t *plain = json_object_get(json_object_get(result, "skill"), "plain_brdf");
+    heading("Errors", out);
+    fputs(
+        "<p class=\"hint\">Relative RMS errors of mean radiances, by fresh paths; after &plusmn; the standard error by "
+        "tracing. The error of a row is its part of them.</p>\n<table>\n",
+        out);
+    error_row(result, "fitted rows", "fit_rel_rms", out);
+    error_row(result, "held-out rows", "heldout_rel_rms", out);
+    error_row(json_object_get(result, "cross_validation"), "fitted rows left out in turn", "rel_rms", out);
+    error_row(plain, "a plain BRDF, held-out rows", "heldout_rel_rms", out);
+    error_row(plain, "a plain BRDF, fitted rows left out in turn", "left_out_rel_rms", out);
+    error_row(json_object_get(result, "verdict"), "what the measurements allow", "allowed_rel_rms", out);
+    fputs("<tr><td>objective, fitted rows</td><td>", out);
+    page_with_error(json_object_get(result, "objective"), json_object_get(result, "objective_se"), 1.0, "", out);
+    fputs("</td></tr>\n<tr><td>end of the fit</td><td>", out);
+    page_escaped(page_string(result, "reason"), out);
+    fputs("</td></tr>\n</table>\n", out);
+}
+
+static void print_flags(const json_t *p, FILE *out)
+{
+    const char *between = "";
+    if (json_is_true(json_object_get(p, "fixed"))) {
+        fputs("fixed", out);
+        between = ", ";
+    }
+    if (json_is_string(json_object_get(p, "at_bound"))) {
+        fprintf(out, "%sat its %s bound", between, page_string(p, "at_bound"));
+        between = ", ";
+    }
+    if (json_is_false(json_object_get(p, "determined"))) {
+        fprintf(out, "%snot determined", between);
+        between = ", ";
+    }
+    if (!json_is_string(json_object_get(p, "tied_to"))) return;
+    fprintf(out, "%stied to ", between);
+    page_escaped(page_string(p, "tied_to"), out);
+}
+
+static void print_parameters(const char *title, const json_t *list, FILE *out)
+{
+    size_t i;
+    const json_t *p;
+    if (json_array_size(list) == 0) return;
+    heading(title, out);
+    fputs("<table>\n<tr><th>name</th><th class=\"n\">value &plusmn; standard error</th><th>unit</th><th "
+          "class=\"n\">allowed</th><th></th></tr>\n",
+          out);
+    json_array_foreach(list, i, p)
+    {
+        fputs("<tr><td>", out);
+        page_escaped(page_string(p, "name"), out);
+        fputs("</td><td class=\"n\">", out);
+        page_with_error(json_object_get(p, "value"), json_object_get(p, "standard_error"), 1.0, "", out);
+        fputs("</td><td>", out);
+        page_escaped(page_string(p, "unit"), out);
+        fprintf(out, "</td><td class=\"n\">%.4g &hellip; %.4g</td><td class=\"flag\">", page_number(p, "lower"),
+                page_number(p, "upper"));
+        print_flags(p, out);
+        fputs("</td></tr>\n", out);
+    }
+    fputs("</table>\n", out);
+}
+
+static void rgb_cell(const json_t *rgb, FILE *out)
+{
+    fputs("<td class=\"n\">", out);
+    for (size_t c = 0; c < 3; c++) fprintf(out, "%s%.4f", c > 0 ? " " : "", json_number_value(json_array_get(rgb, c)));
+    fputs("</td>", out);
+}
+
+/* False for means over all rotations, and where all rows have the same one. */
+static bool any_turned(const json_t *rows)
+{
+    const double first = page_number(json_array_get(rows, 0), "cloth_rotation_deg");
+    size_t i;
+    const json_t *row;
+    json_array_foreach(rows, i, row)
+    {
+        if (!json_is_true(json_object_get(row, "all_rotations")) && page_number(row, "cloth_rotation_deg") != first)
+            return true;
+    }
+    return false;
+}
+
+static void print_rows(const json_t *rows, FILE *out)
+{
+    static const char *const angle[] = {"light_theta_deg", "light_phi_deg", "camera_theta_deg", "camera_phi_deg",
+                                        "cloth_rotation_deg"};
+    size_t i;
+    const json_t *row;
+    heading("Measured and rendered", out);
+    fputs("<table>\n<tr><th>row</th><th>set</th><th class=\"n\">lamp</th><th class=\"n\">phi</th><th "
+          "class=\"n\">camera</th><th class=\"n\">phi</th><th class=\"n\">turned</th><th class=\"n\">measured r g "
+          "b</th><th class=\"n\">rendered r g b</th><th class=\"n\">error</th></tr>\n",
+          out);
+    json_array_foreach(rows, i, row)
+    {
+        fprintf(out, "<tr%s><td>", strcmp(page_string(row, "set"), "fit") == 0 ? "" : " class=\"held\"");
+        page_escaped(page_string(row, "name"), out);
+        fprintf(out, "</td><td>%s</td>", page_string(row, "set"));
+        bool all = json_is_true(json_object_get(row, "all_rotations"));
+        for (size_t k = 0; k < (all ? 4 : 5); k++)
+            fprintf(out, "<td class=\"n\">%.1f</td>", page_number(row, angle[k]));
+        if (all) fputs("<td class=\"n\">all</td>", out);
+        rgb_cell(json_object_get(row, "measured"), out);
+        rgb_cell(json_object_get(row, "rendered"), out);
+        fputs("<td class=\"n\">", out);
+        page_with_error(json_object_get(row, "rel_error"), json_object_get(row, "rel_error_se"), 100.0, " %", out);
+        fputs("</td></tr>\n", out);
+    }
+    fputs("</table>\n<div class=\"charts\">\n", out);
+    page_scatter(rows, out);
+    page_errors_over(rows, "light_theta_deg", "angle of the lamp, degrees", out);
+    page_errors_over(rows, "camera_theta_deg", "angle of the camera, degrees", out);
+    if (any_turned(rows)) page_errors_over(rows, "cloth_rotation_deg", "rotation of the cloth, degrees", out);
+    fputs("</div>\n<p class=\"hint\">Rings, and blue lines of the table: held-out rows.</p>\n", out);
+}
+
+static status print_fit(struct report *report, const json_t *data, FILE *out, struct error *err)
+{
+    const json_t *result = json_object_get(data, "result"), *rows = json_object_get(result, "rows");
+    print_errors(result, out);
+    print_parameters("Fitted parameters", json_object_get(result, "parameters"), out);
+    print_parameters("Numbers of the cloth", json_object_get(result, "cloth_numbers"), out);
+    print_rows(rows, out);
+    heading("Pictures", out);
+    status s = page_pictures(report, rows, out, err);
+    heading("Course of the fit", out);
+    page_curve(json_object_get(data, "curve"), out);
+    heading("Correlation of the parameters", out);
+    fputs("<p class=\"hint\">In fit coordinates; blue: positive, red: negative.</p>\n", out);
+    page_correlation(json_object_get(result, "parameters"), json_object_get(result, "correlation"), out);
+    heading("Gradient certificate", out);
+    page_object(json_object_get(result, "certificate"), out);
+    return s;
+}
+
+/* The cloth on surfaces, and the parameters if they were given. */
+static status print_surfaces(struct report *report, const json_t *result, FILE *out, struct error *err)
+{
+    const json_t *list = json_object_get(result, "pictures");
+    if (report->in.kind == JOB_OF_PICTURES)
+        print_parameters("Given parameters", json_object_get(result, "parameters"), out);
+    if (json_array_size(list) == 0) return STATUS_OK;
+    heading("The cloth on surfaces", out);
+    return page_surface_pictures(report, list, out, err);
+}
+
+/* Models that were fitted to the profile of a fiber, the best one first. */
+static void print_profile(const struct report *report, const json_t *result, FILE *out)
+{
+    size_t i;
+    const json_t *m, *profile = json_object_get(result, "profile");
+    heading("Profile of the fiber", out);
+    page_object(json_object_get(profile, "table"), out);
+    for (int best = 1; best >= 0; best--) json_array_foreach(json_object_get(profile, "models"), i, m)
+        {
+            if (json_is_true(json_object_get(m, "best")) != (best == 1)) continue;
+            char title[160];
+            snprintf(title, sizeof title, "%s%s", page_string(m, "id"), best ? ", the best model" : "");
+            heading(title, out);
+            profile_page(report, i, out);
+            print_parameters("Fitted parameters", json_object_get(m, "parameters"), out);
+        }
+}
+
+static void print_inputs(const json_t *inputs, FILE *out)
+{
+    size_t i;
+    const json_t *input;
+    heading("Inputs", out);
+    fputs("<table>\n<tr><th>file</th><th>role</th><th class=\"n\">bytes</th><th>SHA-256</th></tr>\n", out);
+    json_array_foreach(inputs, i, input)
+    {
+        fputs("<tr><td>", out);
+        page_escaped(page_string(input, "name"), out);
+        fprintf(out, "</td><td>%s</td><td class=\"n\">%.0f</td><td><code>%s</code></td></tr>\n",
+                page_string(input, "role"), page_number(input, "size"), page_string(input, "sha256"));
+    }
+    fputs("</table>\n", out);
+}
+
+static void print_settings(const json_t *data, FILE *out)
+{
+    const json_t *result = json_object_get(data, "result");
+    if (json_is_object(json_object_get(result, "geometry"))) {
+        heading("Geometry", out);
+        page_object(json_object_get(result, "geometry"), out);
+    }
+    heading("Settings: the job document", out);
+    page_object(json_object_get(data, "document"), out);
+    heading("Settings that have their defaults", out);
+    page_object(json_object_get(data, "defaults"), out);
+    print_inputs(json_object_get(data, "inputs"), out);
+    heading("Program and dates", out);
+    fputs("<table>\n<tr><td>program</td><td>", out);
+    page_escaped(page_string(data, "program"), out);
+    fputs("</td></tr>\n", out);
+    if (json_is_number(json_object_get(result, "seed")))
+        fprintf(out, "<tr><td>seed</td><td>%.0f</td></tr>\n", page_number(result, "seed"));
+    print_time("this attempt began", page_number(data, "started_unix_s"), out);
+    print_time("written", page_number(data, "written_unix_s"), out);
+    fputs("</table>\n", out);
+}
+
+static void print_warnings(const json_t *warnings, FILE *out)
+{
+    size_t i;
+    const json_t *warning;
+    if (json_array_size(warnings) == 0) return;
+    heading("Warnings", out);
+    fputs("<ul>\n", out);
+    json_array_foreach(warnings, i, warning)
+    {
+        fputs("<li>", out);
+        page_escaped(json_string_value(warning), out);
+        fputs("</li>\n", out);
+    }
+    fputs("</ul>\n", out);
+}
+
+static status print_page(struct report *report, const json_t *data, FILE *out, struct error *err)
+{
+    const json_t *result = json_object_get(data, "result");
+    status s = STATUS_OK;
+    fputs("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
+          "content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" href=\"data:,\">\n"
+          "<title>",
+          out);
+    page_escaped(report->in.sample, out);
+    fprintf(out, " - report</title>\n<style>\n%s</style>\n</head>\n<body>\n<h1>", style);
+    page_escaped(report->in.sample, out);
+    fputs("</h1>\n<p class=\"hint\">", out);
+    if (json_is_string(json_object_get(result, "model"))) {
+        page_escaped(page_string(result, "model"), out);
+        if (page_string(result, "method")[0] != '\0') fputs(", ", out);
+        page_escaped(page_string(result, "method"), out);
+        fputs(". ", out);
+    }
+    fputs("The same as data: report.json.</p>\n", out);
+    print_verdict(json_object_get(result, "verdict"), out);
+    print_warnings(json_object_get(result, "warnings"), out);
+    if (report->in.kind == JOB_OF_FIT) s = print_fit(report, data, out, err);
+    if (report->in.kind == JOB_OF_PROFILE)
+        print_profile(report, result, out);
+    else if (s == STATUS_OK)
+        s = print_surfaces(report, result, out, err);
+    print_settings(data, out);
+    fputs("</body>\n</html>\n", out);
+    return s;
+}
+
+static status write_text(const struct report *report, const char *name, const char *text, size_t n, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, name, path);
+    return worker_folder_replace(report->in.job->tools->folder, path, text, n, err);
+}
+
+static status write_page(struct report *report, const json_t *data, struct error *err)
+{
+    char *text = NULL;
+    size_t n = 0;
+    FILE *out = open_memstream(&text, &n);
+    if (out == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the report: out of memory");
+    status s = print_page(report, data, out, err);
+    if (fclose(out) != 0 && s == STATUS_OK)
+        s = error_set(err, STATUS_NO_MEMORY, "cannot write the report: out of memory");
+    if (s == STATUS_OK) s = write_text(report, "report.html", text, n, err);
+    free(text);
+    return s;
+}
+
+status report_write(struct report *report, struct error *err)
+{
+    json_t *data = NULL;
+    status s = report_data(report, &data, err);
+    char *text = s == STATUS_OK ? json_dumps(data, JSON_REAL_PRECISION(17) | JSON_INDENT(1)) : NULL;
+    if (s == STATUS_OK && text == NULL) s = error_set(err, STATUS_NO_MEMORY, "cannot write the report: out of memory");
+    if (s == STATUS_OK) s = write_text(report, "report.json", text, strlen(text), err);
+    if (s == STATUS_OK) s = write_page(report, data, err);
+    free(text);
+    json_decref(data);
+    return s;
+}

@@ -1,0 +1,27 @@
+/* What a job reports of the profile of a fiber and of the models that were fitted to it.
+ *
+ * "profile" of result.json:
+ *   "table"      file, n_row, n_channel, has_errors, and the ranges of theta_i_deg, theta_o_deg and phi_deg
+ *   "chosen_by"  "bic": the best model has the least profile_fit.bic
+ *   "csv"        name of the table of measured and fitted radiances, of all models
+ *   "models"     of each: id, title, best, parameters, scale and its error, nrmse, rel_rms, misfit, chi_square, bic,
+ *                n_unknown, n_start, n_agree, n_evaluation, converged, fit_wall_s (profile_fit.h)
+ */
+#ifndef SELVEDGE_OPTIMIZER_PROFILE_REPORT_H
+#define SELVEDGE_OPTIMIZER_PROFILE_REPORT_H
+
+#include "optimizer/report/findings/report.h"
+
+#include <stdio.h>
+
+/* result.json of such a job. */
+status profile_json_write(struct report *report, struct error *err);
+/* results/profile.csv: theta_i_deg, theta_o_deg, phi_deg, radiance, and the radiance by each model; one line for each
+ * row and channel. */
+status profile_csv_write(const struct report *report, struct error *err);
+/* The residuals of model i in the summary. */
+void profile_print(const struct report *report, size_t i, FILE *out);
+/* The residuals of model i and charts of the radiance over phi, measured and fitted, in the page. */
+void profile_page(const struct report *report, size_t i, FILE *out);
+
+#endif

@@ -1,0 +1,224 @@
+#include "optimizer/report/result/result_pictures.h"
+#include "base/files/durable.h"
+#include "geometry/volume/format/vol_file.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/photographs/reader/photograph.h"
+#include "optimizer/report/geometry/scan_slices.h"
+#include "optimizer/report/result/result_json.h"
+#include "optimizer/report/result/result_thumbnail.h"
+#include "optimizer/stages/validation/pipeline_choice.h"
+#include "optimizer/stages/validation/pipeline_discrepancy.h"
+#include "renderer/transport/render.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+/* The path RESULTS/<folder>/<name><ending>, and a temporary one in the same folder. The temporary name has the same
+ * ending, because writers choose the format by it. */
+static void picture_paths(const struct report *report, const char *folder, const char *name, const char *ending,
+                          char path[WORKER_PATH_BYTES], char temporary[WORKER_PATH_BYTES])
+{
+    char relative[300];
+    snprintf(relative, sizeof relative, "%s%s%s%s", folder, folder[0] != '\0' ? "/" : "", name, ending);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, relative, path);
+    snprintf(relative, sizeof relative, "%s%s.part-%s%s", folder, folder[0] != '\0' ? "/" : "", name, ending);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, relative, temporary);
+}
+
+/* Renames `temporary` to `path` when writing it succeeded, and removes it otherwise. */
+static status put_in_place(const struct report *report, status written, const char *temporary, const char *path,
+                           struct error *err)
+{
+    status s = written == STATUS_OK ? worker_folder_check(report->in.job->tools->folder, err) : written;
+    if (s == STATUS_OK) return durable_rename(temporary, path, err);
+    unlink(temporary);
+    return s;
+}
+
+static bool exists(const char *path) { return access(path, F_OK) == 0; }
+
+static status make_folder(const struct report *report, const char *name, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, name, path);
+    return durable_make_folder(path, err);
+}
+
+/* ---- geometry ---- */
+
+static status write_fibers(const struct report *report, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
+    picture_paths(report, "", "fibers", ".hair", path, temporary);
+    status s =
+        put_in_place(report, fiber_set_write_hair(&report->in.made->fiber, temporary, err), temporary, path, err);
+    if (s != STATUS_OK) return s;
+    picture_paths(report, "", "fibers", ".txt", path, temporary);
+    return put_in_place(report, fiber_set_write_text(&report->in.made->fiber, temporary, err), temporary, path, err);
+}
+
+static status write_volumes(const struct report *report, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
+    picture_paths(report, "", "direction", ".vol", path, temporary);
+    status s =
+        exists(path)
+            ? STATUS_OK
+            : put_in_place(report, vol_write_direction(temporary, &report->in.made->direction, VOL_QUANTISED, err),
+                           temporary, path, err);
+    picture_paths(report, "", "density", ".vol", path, temporary);
+    if (s != STATUS_OK || exists(path)) return s;
+    return put_in_place(report, vol_write_kept_density(temporary, &report->in.made->direction, err), temporary, path,
+                        err);
+}
+
+status result_picture_write(const struct report *report, const char *name, const uint8_t *rgb, size_t width,
+                            size_t height, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
+    status s = make_folder(report, "pictures", err);
+    if (s != STATUS_OK) return s;
+    picture_paths(report, "pictures", name, ".png", path, temporary);
+    return put_in_place(report, image_write_png_rgb8(rgb, width, height, temporary, err), temporary, path, err);
+}
+
+static status write_slice(const struct report *report, int axis, struct error *err)
+{
+    static const char *const name[] = {"slice-x", "slice-y", "slice-z"};
+    uint8_t *rgb = NULL;
+    size_t width, height;
+    status s = reconstruct_slice_picture(&report->volume.volume, &report->in.made->traced, axis,
+                                         report->volume.volume.n[axis] / 2, &rgb, &width, &height, err);
+    if (s != STATUS_OK) return s;
+    s = result_picture_write(report, name[axis], rgb, width, height, err);
+    if (s == STATUS_OK && axis == 2) s = result_thumbnail_of_bytes(report, rgb, width, height, err);
+    free(rgb);
+    return s;
+}
+
+status result_geometry_write(struct report *report, struct error *err)
+{
+    status s = write_fibers(report, err);
+    if (s != STATUS_OK || !report->in.job->scan->given) return s;
+    s = write_volumes(report, err);
+    if (s == STATUS_OK) s = report_need_volume(report, err);
+    for (int axis = 0; axis < 3 && s == STATUS_OK; axis++) s = write_slice(report, axis, err);
+    return s == STATUS_OK ? scan_slices_write(report, err) : s;
+}
+
+/* ---- renderings ---- */
+
+status result_image_write(const struct report *report, const struct image *im, const char *folder, const char *name,
+                          double exposure, bool exr, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
+    status s = STATUS_OK;
+    if (exr) {
+        picture_paths(report, folder, name, ".exr", path, temporary);
+        s = put_in_place(report, image_write_exr(im, temporary, err), temporary, path, err);
+    }
+    picture_paths(report, folder, name, ".png", path, temporary);
+    return s == STATUS_OK ? put_in_place(report, image_write_png(im, exposure, temporary, err), temporary, path, err)
+                          : s;
+}
+
+static status write_photograph(const struct report *report, size_t i, const char *name, double exposure,
+                               struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    struct image im;
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_INPUT, NULL, path);
+    status s = photograph_develop(&report->in.job->rows->process, path, &report->in.photographs->photograph[i], &im,
+                                  NULL, err);
+    if (s != STATUS_OK) return s;
+    s = result_image_write(report, &im, "photographs", name, exposure, true, err);
+    image_release(&im);
+    return s;
+}
+
+/* Without numbers in the job document, all renderings together take this share of the paths of the best model's fit,
+ * within these bounds: pictures do not cost more than the fit. */
+static const double picture_share = 0.5, least_sample = 2.0, most_sample = 16.0, least_px = 48.0;
+
+size_t result_picture_px(const struct job_results *results, size_t n_row, double n_fit_path)
+{
+    const double sample = results->render_sample > 0 ? (double)results->render_sample : least_sample;
+    if (results->render_px > 0) return results->render_px;
+    double px = floor(sqrt(picture_share * n_fit_path / (sample * (double)n_row)));
+    return (size_t)fmin(fmax(px, least_px), (double)RESULT_PICTURE_PX);
+}
+
+size_t result_picture_samples(const struct job_results *results, size_t n_row, double n_fit_path)
+{
+    if (results->render_sample > 0) return results->render_sample;
+    const double px = (double)result_picture_px(results, n_row, n_fit_path), n = (double)n_row;
+    double paths = picture_share * n_fit_path;
+    return (size_t)fmin(fmax(floor(paths / (px * px * n)), least_sample), most_sample);
+}
+
+double result_renderings_paths(const struct job_results *results, size_t n_row, double n_fit_path)
+{
+    const double px = (double)result_picture_px(results, n_row, n_fit_path);
+    return px * px * (double)n_row * (double)result_picture_samples(results, n_row, n_fit_path);
+}
+
+static status write_rendering(struct report *report, size_t i, const char *name, double exposure,
+                              const struct progress *progress, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
+    struct image im;
+    picture_paths(report, "renderings", name, ".png", path, temporary); /* written last of the two */
+    if (exists(path)) return STATUS_OK;
+    const struct pipeline_model *m = &report->model[report_best_model(report)];
+    const size_t px =
+        result_picture_px(report->in.results, report->in.job->rows->observation.n, (double)m->fit->result.n_path);
+    const struct render_request q = {.input = {.scene = made_cloth_scene(report->in.made, m->setup),
+                                               .model = &m->setup->appearance,
+                                               .param = m->fit->result.param,
+                                               .n_set = m->setup->sets.n_set,
+                                               .discrepancy = pipeline_discrepancy(m->validation)},
+                                     .configuration = &report->in.job->rows->observation.item[i].configuration,
+                                     .width = px,
+                                     .height = px,
+                                     .n_sample =
+                                         result_picture_samples(report->in.results, report->in.job->rows->observation.n,
+                                                                (double)m->fit->result.n_path),
+                                     .seed = report->in.job->fit->seed ^ 0x70696374757265u,
+                                     .stream = (uint32_t)i};
+    status s = render_run(&q, report->in.job->tools->pool, progress, &im, err);
+    if (s != STATUS_OK) return s;
+    s = result_image_write(report, &im, "renderings", name, exposure, true, err);
+    if (s == STATUS_OK && i == 0) s = result_thumbnail_of_image(report, &im, err);
+    image_release(&im);
+    return s;
+}
+
+status result_renderings_write(struct report *report, double from, double to, struct error *err)
+{
+    picture_name *name = NULL;
+    double exposure = result_png_exposure(&report->in.job->rows->observation);
+    size_t n = report->in.job->rows->observation.n;
+    status s = result_picture_names(&report->in.job->rows->observation, &name, err);
+    if (s == STATUS_OK) s = make_folder(report, "renderings", err);
+    if (s == STATUS_OK && report->in.photographs->n_photograph > 0) s = make_folder(report, "photographs", err);
+    if (s == STATUS_OK && report->in.job->rows->process.chart_picture.pixel != NULL)
+        s = make_folder(report, "pictures", err);
+    if (s == STATUS_OK && report->in.job->rows->process.chart_picture.pixel != NULL)
+        s = result_image_write(report, &report->in.job->rows->process.chart_picture, "pictures", "color-chart", 1.0,
+                               false, err);
+    for (size_t i = 0; i < report->in.photographs->n_photograph && s == STATUS_OK; i++)
+        s = write_photograph(report, i, name[i], exposure, err);
+    for (size_t i = 0; i < n && s == STATUS_OK; i++) {
+        struct progress_part part;
+        struct progress progress =
+            progress_begin_part(&part, &report->in.job->tools->progress, from + (to - from) * (double)i / (double)n,
+                                (to - from) / (double)n);
+        s = write_rendering(report, i, name[i], exposure, &progress, err);
+    }
+    free(name);
+    return s;
+}

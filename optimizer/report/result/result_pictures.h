@@ -1,0 +1,31 @@
+/* Pictures and geometry files under results/. Each file is written under a temporary name and then renamed, so that
+ * it is never incomplete. A file that an earlier attempt has written is kept. */
+#ifndef SELVEDGE_OPTIMIZER_RESULT_PICTURES_H
+#define SELVEDGE_OPTIMIZER_RESULT_PICTURES_H
+
+#include "optimizer/report/findings/report.h"
+
+/* fibers.hair, fibers.txt; with a volume also density.vol (uint8), direction.vol (2-byte directions) and
+ * pictures/slice-{x,y,z}.png. */
+status result_geometry_write(struct report *report, struct error *err);
+/* pictures/<name>.png: 3 bytes a pixel, row 0 at the top. */
+status result_picture_write(const struct report *report, const char *name, const uint8_t *rgb, size_t width,
+                            size_t height, struct error *err);
+/* <folder>/<name>.png, brighter by exposure, and with `exr` before it <name>.exr. The folder must be there. */
+status result_image_write(const struct report *report, const struct image *im, const char *folder, const char *name,
+                          double exposure, bool exr, struct error *err);
+/* Largest edge of the renderings where the job document states none. */
+enum { RESULT_PICTURE_PX = 96 };
+/* Edge of the renderings in pixels: that of the job document, or fewer than RESULT_PICTURE_PX where the best model's
+ * fit has taken only n_fit_path. */
+size_t result_picture_px(const struct job_results *results, size_t n_row, double n_fit_path);
+/* Samples a pixel of the renderings: those of the job document, or as many as the cost of the best model's fit allows,
+ * which has taken n_fit_path. */
+size_t result_picture_samples(const struct job_results *results, size_t n_row, double n_fit_path);
+/* Samples of all renderings together, after such a fit. */
+double result_renderings_paths(const struct job_results *results, size_t n_row, double n_fit_path);
+/* renderings/<name>.exr and .png, and photographs/<name>.png, for every observation. from, to: shares of the stage
+ * before and after, between which progress is reported. */
+status result_renderings_write(struct report *report, double from, double to, struct error *err);
+
+#endif

@@ -1,0 +1,13 @@
+/* results/thumbnail.png: a small picture by which lists show a job. A later one replaces an earlier one. */
+#ifndef SELVEDGE_OPTIMIZER_RESULT_THUMBNAIL_H
+#define SELVEDGE_OPTIMIZER_RESULT_THUMBNAIL_H
+
+#include "optimizer/report/findings/report.h"
+
+/* Of a linear picture, as bright as its 98th percentile asks. */
+status result_thumbnail_of_image(const struct report *report, const struct image *im, struct error *err);
+/* Of 3 bytes a pixel in sRGB, row 0 at the top. */
+status result_thumbnail_of_bytes(const struct report *report, const uint8_t *rgb, size_t width, size_t height,
+                                 struct error *err);
+
+#endif

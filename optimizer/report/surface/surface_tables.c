@@ -1,0 +1,204 @@
+#include "optimizer/report/surface/surface_tables.h"
+#include "base/files/durable.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/stages/validation/pipeline_choice.h"
+#include "renderer/fast/precompute/fast_precompute.h"
+
+#include <unistd.h>
+
+/* Three traced hits leave a third of the error of one (renderer/fast/NOTES.md); the transfer to a cell has an error of
+ * 1 to 2 % by so many paths. */
+enum { N_TRACED = 3, CELL_PATHS = 8000, SPREAD_PATHS = 1024 };
+/* Two hits before diffusion leave its means without a part that stays (renderer/diffusion/NOTES.md). */
+enum { N_TRACED_IN_PILE = 2 };
+#define JOURNAL_EVERY_S 2.0
+/* Of dual scattering: cloth is dense (fabric thesis, section 6.6). */
+#define DENSITY 1.0f
+static const double corrected_share = 0.25;
+/* Rough processor seconds on a twill of 26,000 segments: of a path of the table of directions, of a path of all cells,
+ * of the tables of what segments see, and of a sample of a picture by tables and path by path. */
+static const double deep_path_s = 12e-6, cell_path_s = 3e-3, visibility_s = 60.0, fast_sample_s = 5e-6,
+                    path_sample_s = 20e-6;
+
+static bool by_tables(enum job_picture_method m) { return m == JOB_PICTURE_FAST || m == JOB_PICTURE_CORRECTED; }
+
+/* Whether a picture takes from tables what the segments see. */
+static bool wants_visibility(const struct report *report)
+{
+    for (size_t i = 0; i < report->in.results->n_surface_picture; i++)
+        if (report->in.results->surface_picture[i].visibility_by_tables) return true;
+    return false;
+}
+
+static bool wants_tables(const struct report *report)
+{
+    for (size_t i = 0; i < report->in.results->n_surface_picture; i++)
+        if (by_tables(report->in.results->surface_picture[i].method)) return true;
+    return false;
+}
+
+/* Whether a picture takes light that is scattered often from the table of directions. Otherwise from cells. */
+static bool by_directions(const struct job_surface_picture *p)
+{
+    return p->method == JOB_PICTURE_FAST && !p->visibility_by_tables && !p->deep_by_cells;
+}
+
+/* Paths for that table; 0: no picture asks for it. */
+static size_t deep_paths(const struct report *report)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < report->in.results->n_surface_picture; i++) {
+        const struct job_surface_picture *p = &report->in.results->surface_picture[i];
+        if (by_directions(p) && p->n_deep_path > n) n = p->n_deep_path;
+    }
+    return n;
+}
+
+/* Paths of a cell; without a picture by cells they only say how far light spreads. */
+static uint32_t cell_paths(const struct report *report)
+{
+    for (size_t i = 0; i < report->in.results->n_surface_picture; i++) {
+        const struct job_surface_picture *p = &report->in.results->surface_picture[i];
+        if (by_tables(p->method) && !by_directions(p)) return CELL_PATHS;
+    }
+    return SPREAD_PATHS;
+}
+
+/* Filters take the albedo of fibers from the averages. */
+static bool wants_averages(const struct report *report, bool of_filters)
+{
+    for (size_t i = 0; i < report->in.results->n_surface_picture; i++) {
+        const struct job_surface_picture *p = &report->in.results->surface_picture[i];
+        if (p->method == JOB_PICTURE_DUAL || (of_filters && p->filter)) return true;
+    }
+    return false;
+}
+
+static bool wants_method(const struct report *report, enum job_picture_method m)
+{
+    for (size_t i = 0; i < report->in.results->n_surface_picture; i++)
+        if (report->in.results->surface_picture[i].method == m) return true;
+    return false;
+}
+
+double surface_tables_share(const struct report *report)
+{
+    if (!wants_tables(report)) return 0.0;
+    double tables_s = deep_path_s * (double)deep_paths(report) + cell_path_s * cell_paths(report) +
+                      (wants_visibility(report) ? visibility_s : 0.0);
+    double pictures_s = 0.0;
+    for (size_t i = 0; i < report->in.results->n_surface_picture; i++) {
+        const struct job_surface_picture *p = &report->in.results->surface_picture[i];
+        double n_sample = (double)(p->px * p->px * p->sample);
+        pictures_s += n_sample * (p->method == JOB_PICTURE_FAST ? fast_sample_s : path_sample_s);
+        if (p->reference) pictures_s += n_sample * path_sample_s;
+    }
+    return tables_s / (tables_s + pictures_s);
+}
+
+static status get_tables(struct report *report, const struct progress *progress, struct surface_tables *t,
+                         struct error *err)
+{
+    const struct pipeline_model *model = &report->model[report_best_model(report)];
+    char path[WORKER_PATH_BYTES], journal[WORKER_PATH_BYTES];
+    const struct fast_precompute_request q = {.scene = report->in.made->scene,
+                                              .model = model->setup->appearance.surface,
+                                              .param = model->fit->result.param,
+                                              .n_set = model->setup->sets.n_set,
+                                              .n_path = cell_paths(report),
+                                              .no_visibility = !wants_visibility(report),
+                                              .deep_traced = deep_paths(report) > 0 ? N_TRACED : 0,
+                                              .deep_paths = (double)deep_paths(report),
+                                              .journal_path = journal,
+                                              .journal_every_s = JOURNAL_EVERY_S};
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_WORK, "report/fast.journal", journal);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_WORK, "report", path);
+    status s = durable_make_folder(path, err);
+    if (s != STATUS_OK) return s;
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_WORK, "report/fast.tables", path);
+    struct error unread;
+    const status kept = fast_precompute_kept(&q, path, &t->tables, &unread);
+    t->present = kept == STATUS_OK;
+    if (t->present) {
+        unlink(journal); /* of an attempt that ended after it had written the tables */
+        return STATUS_OK;
+    }
+    if (kept != STATUS_NOT_FOUND) log_info(report->in.job->tools->log, "tables are made anew: %s", unread.text);
+    s = fast_precompute(&q, report->in.job->tools->pool, progress, &t->tables, err);
+    t->present = s == STATUS_OK;
+    if (s == STATUS_OK) s = fast_tables_write(&t->tables, path, err);
+    if (s == STATUS_OK && unlink(journal) != 0) s = error_set_errno(err, "cannot remove '%s'", path_file_name(journal));
+    return s;
+}
+
+static status get_pile(struct report *report, const struct progress *progress, struct surface_tables *t,
+                       struct error *err)
+{
+    const struct pipeline_model *model = &report->model[report_best_model(report)];
+    const struct diffusion_request q = {.scene = report->in.made->scene,
+                                        .model = model->setup->appearance.surface,
+                                        .param = model->fit->result.param,
+                                        .n_set = model->setup->sets.n_set,
+                                        .n_traced = N_TRACED_IN_PILE};
+    struct progress silent = progress_silent(progress);
+    status s = diffusion_tables_make(&q, report->in.job->tools->pool, &silent, &t->pile, err);
+    t->piled = s == STATUS_OK;
+    return s;
+}
+
+status surface_tables_get(struct report *report, const struct progress *progress, struct surface_tables *t,
+                          struct error *err)
+{
+    const struct pipeline_model *model = &report->model[report_best_model(report)];
+    const bool tables = wants_tables(report), averages = wants_averages(report, true),
+               pile = wants_method(report, JOB_PICTURE_DIFFUSION);
+    *t = (struct surface_tables){0};
+    if (!tables && !averages && !pile) return STATUS_OK;
+    if (model->setup->appearance.kind != MODEL_SURFACE ||
+        scattering_frame_reason(model->setup->appearance.surface) != NULL) {
+        if (tables || pile || wants_averages(report, false))
+            worker_status_warn(report->in.job->tools->status,
+                               "all pictures are rendered path by path: there are no tables for the model '%s'",
+                               model->setup->appearance.id);
+        return STATUS_OK;
+    }
+    status s = STATUS_OK;
+    if (averages) {
+        struct progress silent = progress_silent(progress);
+        s = dual_tables_init(&t->averages, report->in.made->scene, model->setup->appearance.surface,
+                             model->fit->result.param, model->setup->sets.n_set, report->in.job->tools->pool, &silent,
+                             err);
+        t->averaged = s == STATUS_OK;
+    }
+    if (s == STATUS_OK && pile) s = get_pile(report, progress, t, err);
+    return s == STATUS_OK && tables ? get_tables(report, progress, t, err) : s;
+}
+
+void surface_tables_release(struct surface_tables *t)
+{
+    fast_tables_release(&t->tables);
+    dual_tables_release(&t->averages);
+}
+
+struct surface_method surface_tables_method(const struct surface_tables *t, const struct job_surface_picture *p)
+{
+    const bool has = p->method == JOB_PICTURE_DUAL        ? t->averaged
+                     : p->method == JOB_PICTURE_DIFFUSION ? t->piled
+                                                          : t->present;
+    return (struct surface_method){
+        .method = has ? p->method : JOB_PICTURE_PATH,
+        .fast = {.tables = &t->tables,
+                 .visibility = p->visibility_by_tables ? FAST_TABLES : FAST_TRACED,
+                 .n_traced = N_TRACED,
+                 .deep = by_directions(p),
+                 .corrected_share = p->method == JOB_PICTURE_CORRECTED ? corrected_share : 0.0},
+        .dual = {&t->averages, DENSITY, DENSITY},
+        .diffusion = {&t->pile}};
+}
+
+void surface_method_apply(const struct surface_method *m, struct radiance_input *input)
+{
+    input->fast = by_tables(m->method) ? &m->fast : NULL;
+    input->dual = m->method == JOB_PICTURE_DUAL ? &m->dual : NULL;
+    input->diffusion = m->method == JOB_PICTURE_DIFFUSION ? &m->diffusion : NULL;
+}

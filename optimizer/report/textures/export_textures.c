@@ -1,0 +1,254 @@
+/* results/export/textures/: one tile of the fitted cloth as a texture set, for programs that want a material only.
+ * base_color.png and transmission.png (sRGB; light reflected and let through under even light from above, rendered
+ * from the fibers), normal.png, roughness.png, anisotropy.png, anisotropy_rotation.png (plain numbers; the
+ * rotation in turns, of the direction across the fibers), maps.exr (all of them as floats, with the height),
+ * cloth.mtlx and cloth.u3m (texture_documents.h). Of the parameters, texture_surface.h. */
+#include "base/files/durable.h"
+#include "optimizer/job/document/json_number.h"
+#include "optimizer/report/export/export_formats.h"
+#include "optimizer/report/result/result_pictures.h"
+#include "optimizer/report/textures/texture_documents.h"
+#include "optimizer/stages/validation/pipeline_choice.h"
+#include "optimizer/stages/validation/pipeline_discrepancy.h"
+#include "renderer/transport/render.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { MIN_EDGE = 16, MAX_EDGE = 512, MIN_SAMPLE = 64, SAMPLES_OF_A_RENDERING = 4, N_CHANNEL = 16, STREAM = 4090 };
+static const char *const channel[N_CHANNEL] = {"R",
+                                               "G",
+                                               "B",
+                                               "transmission.R",
+                                               "transmission.G",
+                                               "transmission.B",
+                                               "N.X",
+                                               "N.Y",
+                                               "N.Z",
+                                               "roughness",
+                                               "anisotropy",
+                                               "direction_rad",
+                                               "height_mm",
+                                               "principled.R",
+                                               "principled.G",
+                                               "principled.B"};
+
+struct textures {
+    struct export_scene *e;
+    struct texture_maps maps;
+    struct texture_surface surface;
+    struct texture_principled principled;
+    struct image reflected, transmitted; /* 3 channels */
+    double noise;                        /* relative standard error of a pixel of `reflected`, root mean square */
+};
+
+/* ---- renderings of one tile under even light of radiance 1 ---- */
+
+static status render_tile(const struct textures *t, bool black_sheet, struct image *im, struct error *err)
+{
+    struct report *report = t->e->report;
+    const struct pipeline_model *m = t->e->model;
+    const double *size_m = report->in.made->fiber.tile_size_m;
+    const struct configuration above = {.camera = CAMERA_FAR_FIELD,
+                                        .camera_phi_rad = -M_PI_2,
+                                        .light = LIGHT_NO_LAMP,
+                                        .environment_rgb = {1.0, 1.0, 1.0},
+                                        .light_distance_m = 1.0,
+                                        .lamp_side_m = 0.1,
+                                        .camera_distance_m = 1.0,
+                                        .crop_m = size_m[0],
+                                        .crop_aspect = size_m[0] / size_m[1]};
+    struct scene *scene = NULL;
+    const size_t n_sample = SAMPLES_OF_A_RENDERING *
+                            result_picture_samples(report->in.results, report->in.job->rows->observation.n,
+                                                   (double)report->model[report_best_model(report)].fit->result.n_path);
+    status s = scene_new(&report->in.made->fiber, &(struct scene_option){.black_sheet = black_sheet}, &scene, err);
+    if (s != STATUS_OK) return s;
+    const struct render_request q = {.input = {.scene = {.fibers = scene},
+                                               .model = &m->setup->appearance,
+                                               .param = m->fit->result.param,
+                                               .n_set = m->setup->sets.n_set,
+                                               .discrepancy = pipeline_discrepancy(m->validation)},
+                                     .configuration = &above,
+                                     .width = t->maps.width,
+                                     .height = t->maps.height,
+                                     .n_sample = n_sample > MIN_SAMPLE ? n_sample : MIN_SAMPLE,
+                                     .seed = report->in.job->fit->seed ^ 0x74657874757265u,
+                                     .stream = STREAM};
+    s = render_run(&q, report->in.job->tools->pool, &report->in.job->tools->progress, im, err);
+    scene_free(scene);
+    return s;
+}
+
+static void take_pixels(struct textures *t, const struct image *dark, const struct image *open)
+{
+    const size_t n = t->maps.width * t->maps.height;
+    double variance = 0.0, square = 0.0;
+    for (size_t i = 0; i < n; i++)
+        for (size_t c = 0; c < 3; c++) {
+            double a = (double)dark->pixel[i * dark->n_channel + c], b = (double)open->pixel[i * open->n_channel + c];
+            t->reflected.pixel[3 * i + c] = (float)a;
+            t->transmitted.pixel[3 * i + c] = (float)fmax(b - a, 0.0);
+            t->surface.means.albedo[c] += a / (double)n;
+            t->surface.means.transmission[c] += (b - a) / (double)n;
+            variance += (double)dark->pixel[i * dark->n_channel + 3 + c];
+            square += a * a;
+        }
+    for (size_t c = 0; c < 3; c++) t->surface.means.transmission[c] = fmax(t->surface.means.transmission[c], 0.0);
+    t->noise = square > 0.0 ? sqrt(variance / square) : 0.0;
+}
+
+static status render_both(struct textures *t, struct error *err)
+{
+    struct image dark = {0}, open = {0};
+    status s = image_init(&t->reflected, t->maps.width, t->maps.height, 3, err);
+    if (s == STATUS_OK) s = image_init(&t->transmitted, t->maps.width, t->maps.height, 3, err);
+    if (s == STATUS_OK) s = render_tile(t, true, &dark, err);
+    if (s == STATUS_OK) s = render_tile(t, false, &open, err);
+    if (s == STATUS_OK) take_pixels(t, &dark, &open);
+    image_release(&dark);
+    image_release(&open);
+    return s;
+}
+
+/* ---- files ---- */
+
+enum picture_kind { PICTURE_SRGB, PICTURE_NUMBERS, PICTURE_EXR };
+
+static status write_picture(const struct textures *t, const struct image *im, const char *name, enum picture_kind kind,
+                            struct error *err)
+{
+    char path[WORKER_PATH_BYTES], part[WORKER_PATH_BYTES], partial[64];
+    snprintf(partial, sizeof partial, "part-%s", name);
+    export_path(t->e, name, path);
+    export_path(t->e, partial, part);
+    status s = STATUS_OK;
+    if (kind == PICTURE_SRGB) s = image_write_png(im, 1.0, part, err);
+    if (kind == PICTURE_EXR) s = image_write_exr(im, part, err);
+    if (kind == PICTURE_NUMBERS) {
+        uint8_t *rgb = malloc(3 * im->width * im->height);
+        if (rgb == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write textures: out of memory");
+        for (size_t i = 0; i < 3 * im->width * im->height; i++)
+            rgb[i] = (uint8_t)lround(255.0 * fmin(fmax((double)im->pixel[i], 0.0), 1.0));
+        s = image_write_png_rgb8(rgb, im->width, im->height, part, err);
+        free(rgb);
+    }
+    if (s == STATUS_OK) s = worker_folder_check(t->e->report->in.job->tools->folder, err);
+    if (s == STATUS_OK) return durable_rename(part, path, err);
+    unlink(part);
+    return s;
+}
+
+/* All maps of pixel i, in the order of `channel`. */
+static void pixel_of(const struct textures *t, size_t i, float out[N_CHANNEL])
+{
+    for (size_t c = 0; c < 3; c++) {
+        /* in proportion, so that the mean is right in spite of the noise of dark pixels */
+        const double share = (double)t->reflected.pixel[3 * i + c] / fmax(t->surface.means.albedo[c], 1e-9);
+        out[c] = (float)(share * texture_surface_base(&t->surface, c));
+        out[3 + c] = t->transmitted.pixel[3 * i + c];
+        out[6 + c] = t->maps.normal[3 * i + c];
+        out[13 + c] = (float)(share * t->principled.base[c]);
+    }
+    out[9] = (float)texture_surface_roughness(&t->surface, i);
+    out[10] = (float)texture_surface_anisotropy(&t->surface, i);
+    out[11] = t->maps.direction_rad[i];
+    out[12] = t->maps.height_mm[i];
+}
+
+/* Turns from +x to the direction across the fibers, which has no sign: in [0.125, 0.625), so that those of weft and
+ * warp are not next to the step. */
+static float rotation_turns(float direction_rad)
+{
+    double turns = ((double)direction_rad + M_PI_2) / (2.0 * M_PI);
+    return (float)(turns >= 0.625 ? turns - 0.5 : turns);
+}
+
+/* One PNG of channels [first, first + n) as numbers of [0, 1]; one channel becomes grey. */
+static status write_map(const struct textures *t, const struct image *all, size_t first, size_t n, const char *name,
+                        struct error *err)
+{
+    struct image im;
+    status s = image_init(&im, all->width, all->height, 3, err);
+    if (s != STATUS_OK) return s;
+    for (size_t i = 0; i < im.width * im.height; i++)
+        for (size_t c = 0; c < 3; c++) {
+            float value = all->pixel[i * N_CHANNEL + first + (n == 3 ? c : 0)];
+            if (first == 6) value = 0.5f * (value + 1.0f);
+            if (first == 11) value = rotation_turns(value);
+            im.pixel[3 * i + c] = value;
+        }
+    s = write_picture(t, &im, name, first < 6 || first == 13 ? PICTURE_SRGB : PICTURE_NUMBERS, err);
+    image_release(&im);
+    return s;
+}
+
+static status write_maps(const struct textures *t, struct error *err)
+{
+    static const struct {
+        size_t first, n;
+        const char *name;
+    } map[] = {{0, 3, "base_color.png"},
+               {3, 3, "transmission.png"},
+               {6, 3, "normal.png"},
+               {9, 1, "roughness.png"},
+               {10, 1, "anisotropy.png"},
+               {11, 1, "anisotropy_rotation.png"},
+               {13, 3, "principled_base_color.png"}};
+    struct image all;
+    status s = image_init(&all, t->maps.width, t->maps.height, N_CHANNEL, err);
+    if (s != STATUS_OK) return s;
+    all.channel_name = channel;
+    for (size_t i = 0; i < all.width * all.height; i++) pixel_of(t, i, all.pixel + i * N_CHANNEL);
+    s = write_picture(t, &all, "maps.exr", PICTURE_EXR, err);
+    for (size_t i = 0; i < sizeof map / sizeof map[0] && s == STATUS_OK; i++)
+        s = write_map(t, &all, map[i].first, map[i].n, map[i].name, err);
+    image_release(&all);
+    return s;
+}
+
+static json_t *principled_json(const struct texture_principled *p)
+{
+    return json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "specular", json_number(p->specular), "roughness_factor",
+                     json_number(p->roughness), "anisotropy_factor", json_number(p->anisotropy), "base_color",
+                     json_number_list(p->base, 3, 1.0), "sheen", json_number(p->sheen), "rel_rms",
+                     json_number(p->rel_rms[0]), "heldout_rel_rms", json_number(p->rel_rms[1]));
+}
+
+static json_t *material_json(const struct textures *t)
+{
+    const struct texture_surface *u = &t->surface;
+    return json_pack("[{s:n, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}]", "group", "specular_weight",
+                     json_number(u->weight), "specular_roughness", json_number(u->roughness), "specular_anisotropy",
+                     json_number(u->anisotropy), "albedo", json_number_list(u->means.albedo, 3, 1.0), "transmission",
+                     json_number_list(u->means.transmission, 3, 1.0), "pixel_rel_se", json_number(t->noise), "rel_rms",
+                     json_number(u->rel_rms[0]), "heldout_rel_rms", json_number(u->rel_rms[1]), "principled",
+                     principled_json(&t->principled));
+}
+
+static status write_textures(struct export_scene *e, json_t **materials, struct error *err)
+{
+    struct textures t = {.e = e};
+    size_t edge = 2 * (e->report->in.results->render_px > 0 ? e->report->in.results->render_px : RESULT_PICTURE_PX);
+    edge = edge < MIN_EDGE ? MIN_EDGE : edge > MAX_EDGE ? MAX_EDGE : edge;
+    status s = texture_maps_make(&e->report->in.made->fiber, edge, &t.maps, err);
+    t.surface.maps = &t.maps;
+    if (s == STATUS_OK) s = render_both(&t, err);
+    if (s == STATUS_OK) s = texture_surface_fit(&t.surface, e->report, e->model, err);
+    t.principled.open_pbr = &t.surface;
+    if (s == STATUS_OK) s = texture_principled_fit(&t.principled, e->report, e->model, err);
+    if (s == STATUS_OK) s = write_maps(&t, err);
+    if (s == STATUS_OK) s = texture_materialx_write(e, &t.surface, err);
+    if (s == STATUS_OK) s = texture_u3m_write(e, &t.principled, err);
+    if (s == STATUS_OK) *materials = material_json(&t);
+    image_release(&t.reflected);
+    image_release(&t.transmitted);
+    texture_maps_release(&t.maps);
+    return s;
+}
+
+const struct export_format export_textures = {"textures", offsetof(struct job_results, export_textures),
+                                              write_textures};

@@ -1,0 +1,341 @@
+#include "optimizer/worker/pipeline_plan.h"
+#include "optimizer/job/job_folder.h"
+#include "optimizer/job/stage_table.h"
+#include "optimizer/report/export/twin_result.h"
+#include "optimizer/report/result/result_pictures.h"
+#include "optimizer/report/surface/surface_pictures.h"
+#include "optimizer/stages/fit/pipeline_correction.h"
+#include "optimizer/stages/fit/pipeline_scan_error.h"
+#include "optimizer/stages/validation/pipeline_choice.h"
+#include "optimizer/stages/validation/pipeline_validation.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+
+/* Stages that go through voxels: seconds that one takes on one thread of a common processor of 2023, for a machine that
+ * has run no job yet, the standard deviation of its logarithm between jobs, and how the time runs over the fraction:
+ * means of the demo's scan, of two real ones and of a felt of 156 million voxels, which need up to 1.5 times more or
+ * less. Filters vary more, because their cost goes with the size of the fibers in voxels. */
+struct voxel_stage {
+    const char *key;
+    double s_per_voxel, log_sd;
+    const double *curve;
+};
+static const double render_s_per_path = 6e-6;
+static const double read_curve[SPEED_CURVE_POINTS] = {0.03, 0.05, 0.08, 0.10, 0.12, 0.40, 0.40, 0.94, 0.94, 0.94,
+                                                      0.94, 0.94, 0.94, 0.94, 0.94, 0.94, 0.94, 0.94, 0.94, 0.94};
+static const double hollow_curve[SPEED_CURVE_POINTS] = {0.00, 0.01, 0.01, 0.02, 0.02, 0.05, 0.05, 0.10, 0.18, 0.25,
+                                                        0.33, 0.40, 0.48, 0.55, 0.63, 0.70, 0.78, 0.85, 0.93, 1.00};
+static const double orientation_curve[SPEED_CURVE_POINTS] = {0.18, 0.29, 0.37, 0.38, 0.38, 0.40, 0.44,
+                                                             0.48, 0.52, 0.55, 0.58, 0.62, 0.65, 0.68,
+                                                             0.71, 0.74, 0.77, 0.82, 0.90, 0.97};
+static const double fibers_curve[SPEED_CURVE_POINTS] = {0.10, 0.21, 0.27, 0.28, 0.37, 0.37, 0.47, 0.47, 0.52, 0.52,
+                                                        0.66, 0.66, 0.66, 0.77, 0.80, 0.84, 0.88, 0.92, 0.95, 0.97};
+static const double transfer_curve[SPEED_CURVE_POINTS] = {0.14, 0.18, 0.21, 0.24, 0.29, 0.33, 0.37, 0.41, 0.47, 0.52,
+                                                          0.56, 0.61, 0.65, 0.69, 0.73, 0.75, 0.78, 0.81, 0.84, 0.85};
+static const struct voxel_stage read_stage = {"volume", 1e-7, 0.8, read_curve},
+                                hollow_stage = {"volume.hollow", 5e-6, 0.8, hollow_curve},
+                                orientation_stage = {"orientation.material", 9e-7, 0.8, orientation_curve},
+                                redirect_stage = {"orientation.noisy", 1.3e-5, 0.8, NULL},
+                                fibers_stage = {"fibers.material", 6e-6, 0.4, fibers_curve},
+                                trial_stage = {"fibers.trial", 6e-6, 0.4, NULL},
+                                transfer_stage = {"directions.material", 4e-7, 0.8, transfer_curve},
+                                report_stage = {"report.geometry", 8e-8, 0.8, NULL};
+/* The same of a path of a fit to rows whose brightest channel has the mean usual_radiance. In bright cloth paths are
+ * longer: the time goes with this power of the radiance. */
+static const double fit_s_per_path = 9e-6, usual_radiance = 0.13, radiance_power = 0.4;
+/* Share of the voxels that is material, before the volume is known. */
+static const double usual_material = 0.4;
+/* Paths of a fitted row that a fit takes: to a table, of which its misfit ends it (tables of five fabrics took 0.7 to
+ * 1.3 million for 16 rows), and to photographs, where it ends by their errors, which asks for 120 thousand effective
+ * paths of two replicas. Of a fit that searches the numbers of a cloth, the share of the budget. */
+static const double misfit_row_paths = 62500.0, noise_row_paths = 264000.0, cloth_share = 0.7;
+/* Of the time of the fit, the share of the fit where a scan's errors are carried on. */
+static const double usual_budget = 6e6, fit_share = 1.0 - PIPELINE_SCAN_ERROR_SHARE;
+/* Time of a validated path over that of a fitted one; paths in whose time the rest of a report is made, without what
+ * its gradient certificate takes to prepare the models: pages, and the geometry of a scan. */
+static const double validated_path = 0.88, page_paths = 2e4, scan_page_paths = 7e4;
+static const double least_s = 0.05;
+/* Time of one thread in which a model is fitted to the profile of a fiber. */
+static const double usual_profile_s = 3.0;
+/* Standard deviations of the logarithm of a time where no job has been run. */
+static const double sd_of_fit = 0.5, sd_of_rest = 0.5;
+
+/* By the size of the files one voxel has one or two bytes. */
+double pipeline_plan_voxels(const struct job_plan *plan)
+{
+    double n = (double)plan->geometry.n[0] * (double)plan->geometry.n[1] * (double)plan->geometry.n[2];
+    for (size_t i = 0; i < plan->in->doc->scan.n_file && !(plan->geometry.n[0] > 0); i++) {
+        char path[WORKER_PATH_BYTES];
+        struct stat file;
+        worker_folder_path(plan->tools->folder, JOB_FOLDER_INPUT, plan->in->doc->scan.file[i], path);
+        if (stat(path, &file) == 0) n += (double)file.st_size / 1.5;
+    }
+    return fmax(n, 1.0);
+}
+
+static double n_thread(const struct job_plan *plan) { return (double)thread_pool_n_thread(plan->tools->pool); }
+
+/* A stage that goes through n voxels. */
+static void plan_voxels(struct job_plan *plan, size_t i, const struct voxel_stage *stage, double n)
+{
+    const struct job_clock_work work = {.key = stage->key,
+                                        .units = n / n_thread(plan),
+                                        .usual_s = stage->s_per_voxel,
+                                        .log_sd = stage->log_sd,
+                                        .usual_curve = stage->curve};
+    worker_status_plan(plan->status, i, &work);
+}
+
+/* Voxels of material, of which there are fibers to trace. */
+static double n_material(const struct job_plan *plan)
+{
+    return plan->geometry.n_material_voxel > 0 ? (double)plan->geometry.n_material_voxel
+                                               : usual_material * pipeline_plan_voxels(plan);
+}
+
+/* Tracing of the scan, and of its phantom of limited size where there is a trial. */
+static void plan_fibers(struct job_plan *plan, size_t i)
+{
+    const double n = n_material(plan), n_trial = fmin(n, n / pipeline_plan_voxels(plan) * SCAN_TRIAL_VOXELS);
+    if (plan->in->doc->scan.trial)
+        plan_voxels(plan, i, &trial_stage, n + n_trial);
+    else
+        plan_voxels(plan, i, &fibers_stage, n);
+}
+
+/* ---- a described cloth ---- */
+
+/* Of a felt's fiber, in units of the other structures; seconds of one thread for a unit: weaves of sizes from 3,000 to
+ * 143,000 needed 1.5e-5 to 1.6e-5, felts of 600 and 2,500 fibers 1.2e-5 to 1.3e-5. */
+static const double felt_fiber_size = 38.0, make_s_per_size = 1.5e-5;
+
+static double fibers_of_yarn(const struct cloth_description *d, int direction, size_t i)
+{
+    const size_t k = d->n_order[direction] > 0 ? d->order[direction][i % d->n_order[direction]] : 0;
+    return (double)d->kind[k].n_fiber;
+}
+
+double pipeline_plan_cloth_size(const struct job_plan *plan)
+{
+    const struct cloth_description *d = plan->in->doc->cloth.description;
+    double n_fiber[2] = {0.0, 0.0}, width[2] = {0.0, 0.0};
+    if (d == NULL) return 0.0;
+    const double times =
+        plan->in->number.n > 0 && plan->in->doc->cloth.final_tiles > 1 ? (double)plan->in->doc->cloth.final_tiles : 1.0;
+    if (d->structure == CLOTH_FELT) return felt_fiber_size * (double)d->kind[0].n_fiber * times * times;
+    for (int direction = CLOTH_WEFT; direction <= CLOTH_WARP; direction++)
+        for (size_t i = 0; i < d->n_yarn[direction]; i++) {
+            n_fiber[direction] += fibers_of_yarn(d, direction, i);
+            width[direction] += sqrt(fibers_of_yarn(d, direction, i));
+        }
+    return (n_fiber[CLOTH_WEFT] * width[CLOTH_WARP] + n_fiber[CLOTH_WARP] * width[CLOTH_WEFT]) * times * times;
+}
+
+static void plan_cloth(struct job_plan *plan, size_t i)
+{
+    const struct job_clock_work work = {.key = "fibers.described",
+                                        .units = pipeline_plan_cloth_size(plan) / n_thread(plan),
+                                        .usual_s = make_s_per_size,
+                                        .log_sd = sd_of_fit};
+    worker_status_plan(plan->status, i, &work);
+}
+
+/* ---- the fit and what follows it ---- */
+
+/* What the fit consists of besides a plain one, which makes its time per path of the budget another. */
+static const char *kind_of_fit(const struct job_plan *plan)
+{
+    if (plan->in->number.n > 0)
+        return pipeline_correction_applies(&plan->in->doc->cloth, &plan->in->number) ? "+correction" : "+cloth";
+    if (plan->in->doc->fit.fit_radius) return "+radius";
+    return plan->in->doc->scan.given ? "+scan" : "";
+}
+
+static double path_budget(const struct job_plan *plan)
+{
+    const struct method_info *method = method_catalogue_find(plan->in->doc->fit.method);
+    if (plan->in->doc->fit.path_budget > 0) return (double)plan->in->doc->fit.path_budget;
+    return method != NULL && method->default_path_budget > 0 ? (double)method->default_path_budget : usual_budget;
+}
+
+double pipeline_plan_usual_paths(const struct job_plan *plan)
+{
+    const double budget = path_budget(plan);
+    if (plan->in->number.n > 0) return cloth_share * budget;
+    if (plan->in->doc->rows.n_photograph > 0 && plan->in->doc->fit.path_budget > 0) return budget; /* it is used up */
+    return fmin((plan->in->doc->rows.n_photograph > 0 ? noise_row_paths : misfit_row_paths) *
+                    (double)plan->in->rows.fitted.n,
+                budget);
+}
+
+/* Seconds that a path of the fit takes, by how bright its rows are and how thin the cloth is. */
+static double usual_s_per_path(const struct job_plan *plan)
+{
+    double sum = 0.0, n = (double)plan->in->rows.fitted.n;
+    for (size_t i = 0; i < plan->in->rows.fitted.n; i++) {
+        const double *rgb = plan->in->rows.fitted.item[i].mean_rgb;
+        sum += fmax(rgb[0], fmax(rgb[1], rgb[2])) / n;
+    }
+    double bright = fmin(fmax(sum / usual_radiance, 0.1), 5.0); /* one, where no row has been read */
+    return plan->path_share * fit_s_per_path * (n > 0.0 ? pow(bright, radiance_power) : 1.0);
+}
+
+static void plan_fit(struct job_plan *plan, size_t i)
+{
+    char key[SPEED_BOOK_KEY_BYTES];
+    /* a table ends a fit by its misfit, photographs by their noise: both take other shares of what is expected */
+    snprintf(key, sizeof key, "fit.%.40s%s%s.paths", plan->in->doc->fit.method, kind_of_fit(plan),
+             plan->in->doc->rows.n_photograph > 0 ? "+photographs" : "+table");
+    const double path_s = usual_s_per_path(plan), of_fit = plan->in->doc->scan.given ? fit_share : 1.0;
+    const double n_path = pipeline_plan_usual_paths(plan) * (double)plan->in->n_model;
+    const struct job_clock_work work = {.key = key,
+                                        .units = n_path * path_s / fit_s_per_path / n_thread(plan),
+                                        .usual_s = fit_s_per_path / of_fit,
+                                        .log_sd = sd_of_fit,
+                                        .predicts_end = true};
+    worker_status_plan(plan->status, i, &work);
+    plan->fit_path = fmax(n_path / of_fit, 1.0);
+}
+
+/* Seconds that a path has taken in this job's fits; NaN before their end. */
+static double s_per_path(const struct job_plan *plan)
+{
+    const struct model_fit *fits = plan->fit->model;
+    double n = 0.0, s = 0.0;
+    for (size_t i = 0; i < plan->in->n_model && fits != NULL; i++) {
+        n += (double)fits[i].result.n_path;
+        s += fits[i].result.wall_s;
+    }
+    return n > 0.0 ? s / n : NAN;
+}
+
+/* The best model by what is known: before the validation, its errors count as 0. */
+static size_t best_model(const struct job_plan *plan)
+{
+    static const struct validation none;
+    struct pipeline_model view[JOB_MAX_MODEL];
+    for (size_t i = 0; i < plan->in->n_model; i++)
+        view[i] = (struct pipeline_model){.setup = &plan->in->model[i],
+                                          .fit = &plan->fit->model[i],
+                                          .validation =
+                                              plan->validation->model != NULL ? &plan->validation->model[i] : &none};
+    return pipeline_best_model(view, plan->in->n_model);
+}
+
+/* Paths of a model's fit: of the best one after the fit, before it those that are expected. */
+static double fit_paths(const struct job_plan *plan)
+{
+    const double n_model = (double)plan->in->n_model, of_fit = plan->in->doc->scan.given ? fit_share : 1.0;
+    if (isfinite(s_per_path(plan))) return (double)plan->fit->model[best_model(plan)].result.n_path;
+    return of_fit * plan->fit_path / n_model;
+}
+
+static double validation_paths(const struct job_plan *plan)
+{
+    const double n_fit = fit_paths(plan);
+    return validated_path * (double)plan->in->n_model *
+           (pipeline_validation_paths(&plan->in->doc->fit, n_fit) + pipeline_factor_paths(&plan->in->doc->fit, n_fit) +
+            pipeline_pilot_paths(n_fit));
+}
+
+/* Paths of a report. Its certificate runs on one thread. */
+static double report_paths(const struct job_plan *plan)
+{
+    const double n_fit = fit_paths(plan), path_s = s_per_path(plan),
+                 certificate_path_s = isfinite(path_s) ? path_s : usual_s_per_path(plan) / n_thread(plan);
+    return result_renderings_paths(&plan->in->doc->results, plan->in->rows.observation.n, n_fit) +
+           surface_pictures_paths(&plan->in->doc->results) + twin_result_paths(&plan->in->doc->results) +
+           (plan->in->doc->scan.given ? scan_page_paths : page_paths) + plan->certificate_s / certificate_path_s;
+}
+
+/* A stage of n_path paths after the fit, which is stage i_fit and counts as a number of paths before it has ended. */
+static void plan_after_fit(struct job_plan *plan, size_t i, size_t i_fit, double n_path)
+{
+    static const char *const key[] = {"validation", "report"};
+    const char *const own = key[i - i_fit - 1];
+    const double path_s = s_per_path(plan), of_fit = plan->in->doc->scan.given ? fit_share : 1.0;
+    if (isfinite(path_s))
+        worker_status_plan_own(plan->status, i, own, fmax(n_path * path_s, least_s));
+    else
+        worker_status_plan_share(plan->status, i, own, n_path * of_fit / ((double)plan->in->n_model * fit_paths(plan)),
+                                 i_fit);
+}
+
+static void plan_pictures(struct job_plan *plan, size_t i)
+{
+    const struct job_clock_work work = {
+        .key = "report.pictures",
+        .units = (surface_pictures_paths(&plan->in->doc->results) + twin_result_paths(&plan->in->doc->results)) /
+                 n_thread(plan),
+        .usual_s = render_s_per_path,
+        .log_sd = sd_of_fit};
+    worker_status_plan(plan->status, i, &work);
+}
+
+void pipeline_plan_fit_paths(struct job_plan *plan, double n_path)
+{
+    size_t n_stage;
+    const struct pipeline_stage_info *info = pipeline_stage_table(&n_stage);
+    if (!(plan->stage_fraction > 0.0)) return;
+    plan->fit_path = n_path / plan->stage_fraction;
+    for (size_t i = 0; i < n_stage; i++)
+        if (strcmp(info[i].name, "validation") == 0 || strcmp(info[i].name, "report") == 0)
+            pipeline_plan_stage(plan, info[i].name, i);
+}
+
+void pipeline_plan_hollow(struct job_plan *plan, const size_t n[3])
+{
+    memcpy(plan->geometry.n, n, sizeof plan->geometry.n);
+    const size_t i_volume = 0; /* the first of the stage table */
+    plan_voxels(plan, i_volume, &hollow_stage, pipeline_plan_voxels(plan));
+}
+
+void pipeline_plan_stage(struct job_plan *plan, const char *name, size_t i)
+{
+    const struct job_clock_work rest = {.key = name, .units = 1.0, .usual_s = least_s, .log_sd = sd_of_rest},
+                                profile = {.key = "fit.profile",
+                                           .units = (double)plan->in->n_model / n_thread(plan),
+                                           .usual_s = usual_profile_s,
+                                           .log_sd = sd_of_rest};
+    if (plan->in->kind == JOB_OF_PROFILE)
+        worker_status_plan(plan->status, i, strcmp(name, "fit") == 0 ? &profile : &rest);
+    else if (strcmp(name, "volume") == 0)
+        plan_voxels(plan, i, plan->in->doc->scan.hollow_fibers > 0 ? &hollow_stage : &read_stage,
+                    pipeline_plan_voxels(plan));
+    else if (strcmp(name, "orientation") == 0)
+        plan_voxels(plan, i, reconstruct_redirects(&plan->geometry) ? &redirect_stage : &orientation_stage,
+                    n_material(plan));
+    else if (strcmp(name, "fibers") == 0 && plan->in->doc->scan.given)
+        plan_fibers(plan, i);
+    else if (strcmp(name, "fibers") == 0 && pipeline_plan_cloth_size(plan) > 0.0)
+        plan_cloth(plan, i);
+    else if (strcmp(name, "directions") == 0)
+        plan_voxels(plan, i, &transfer_stage, n_material(plan));
+    else if (strcmp(name, "fit") == 0)
+        plan_fit(plan, i);
+    else if (strcmp(name, "validation") == 0)
+        plan_after_fit(plan, i, i - 1, validation_paths(plan));
+    else if (strcmp(name, "report") == 0 && plan->in->kind == JOB_OF_PICTURES)
+        plan_pictures(plan, i);
+    else if (strcmp(name, "report") == 0 && plan->in->kind == JOB_OF_GEOMETRY)
+        plan_voxels(plan, i, &report_stage, pipeline_plan_voxels(plan));
+    else if (strcmp(name, "report") == 0)
+        plan_after_fit(plan, i, i - 2, report_paths(plan));
+    else
+        worker_status_plan(plan->status, i, &rest);
+}
+
+void job_plan_init(struct job_plan *plan, const struct stage_tools *tools, const struct job_inputs *in)
+{
+    static const struct fit_output no_fit;
+    static const struct validation_output no_validation;
+    *plan = (struct job_plan){.tools = tools,
+                              .status = tools->status,
+                              .in = in,
+                              .fit = &no_fit,
+                              .validation = &no_validation,
+                              .path_share = 1.0};
+}
