@@ -1,3 +1,4 @@
+#include "optimizer/fit/baseline/plain_brdf.h"
 #include "optimizer/fit/baseline/plain_brdf_terms.h"
 
 #include "optimizer/fit/objective/objective.h"

@@ -1,4 +1,5 @@
 /* The fit of the plain BRDF: colours solved exactly, shapes searched. */
+#include "optimizer/fit/baseline/plain_brdf.h"
 #include "optimizer/fit/baseline/plain_brdf_terms.h"
 
 #include "base/small_matrix.h"

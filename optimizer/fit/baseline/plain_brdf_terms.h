@@ -2,7 +2,9 @@
 #ifndef SELVEDGE_OPTIMIZER_PLAIN_BRDF_TERMS_H
 #define SELVEDGE_OPTIMIZER_PLAIN_BRDF_TERMS_H
 
-#include "optimizer/fit/baseline/plain_brdf.h"
+#include "renderer/scene/configuration.h"
+
+#include <stdbool.h>
 
 enum { PLAIN_DIFFUSE, PLAIN_F0, PLAIN_SHEEN, PLAIN_N_COLOUR };
 

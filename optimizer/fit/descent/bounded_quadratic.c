@@ -1,4 +1,4 @@
-#include "optimizer/fit/descent/descent_methods.h"
+#include "optimizer/fit/descent/bounded_quadratic.h"
 
 #include <math.h>
 #include <nlopt.h>

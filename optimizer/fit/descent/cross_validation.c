@@ -1,6 +1,6 @@
 #include "optimizer/fit/descent/cross_validation.h"
 #include "optimizer/fit/baseline/discrepancy_fit.h"
-#include "optimizer/fit/descent/descent_methods.h"
+#include "optimizer/fit/descent/bounded_quadratic.h"
 #include "optimizer/fit/objective/folds.h"
 #include "optimizer/fit/objective/objective.h"
 

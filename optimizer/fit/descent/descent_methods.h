@@ -35,9 +35,4 @@ status descent_report(struct descent_run *run, struct fit_step *step, struct err
 /* STATUS_INVALID: fewer than one observation, a start outside its bounds, more parameters than FIT_MAX_PARAM. */
 status descent_check(const struct fit_problem *problem, struct error *err);
 
-/* Minimises g.y + y'Hy/2 over lower <= y <= upper, with lower <= 0 <= upper and a positive semi-definite H (n x n),
- * by nlopt's SLSQP. STATUS_NO_MEMORY; STATUS_NUMERIC when H or g is not finite. */
-status bounded_quadratic(const double *hessian, const double *g, const double *lower, const double *upper, size_t n,
-                         double *y, struct error *err);
-
 #endif

@@ -9,6 +9,7 @@
  *   pull       acts while paths are few, towards the start and wide lobes, like a prior of pull_sd step limits.
  */
 #include "base/small_matrix.h"
+#include "optimizer/fit/descent/bounded_quadratic.h"
 #include "optimizer/fit/descent/gauss_newton.h"
 
 #include <math.h>

@@ -1,4 +1,5 @@
 #include "optimizer/fit/profile/profile_search.h"
+#include "optimizer/fit/descent/bounded_quadratic.h"
 #include "optimizer/fit/descent/descent_methods.h"
 
 #include <math.h>

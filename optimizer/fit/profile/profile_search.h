@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_OPTIMIZER_PROFILE_SEARCH_H
 #define SELVEDGE_OPTIMIZER_PROFILE_SEARCH_H
 
-#include "optimizer/fit/profile/profile_fit.h"
+#include "optimizer/fit/profile/profile_problem.h"
 
 enum { PROFILE_MAX_UNKNOWN = FIT_MAX_PARAM + 1 };
 

@@ -1,6 +1,5 @@
-/* Places of lamps and cameras. */
+#include "optimizer/job/document/job_rows.h"
 #include "base/angle.h"
-#include "optimizer/job/document/job_document.h"
 
 #include <math.h>
 

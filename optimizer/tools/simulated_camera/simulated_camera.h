@@ -7,24 +7,7 @@
 #define SELVEDGE_OPTIMIZER_SIMULATED_CAMERA_H
 
 #include "base/thread_pool.h"
-#include "optimizer/photographs/camera/lens.h"
-#include "optimizer/tools/simulated_camera/sensor.h"
-
-enum { SIMULATED_EXPOSURES = 3, SIMULATED_DARK = 8, SIMULATED_FLAT = 6 };
-
-struct simulated_camera_option {
-    const char *source;                     /* folder with photographs.json, truth.json and the renderings */
-    const char *folder;                     /* created when it does not exist */
-    size_t size_px[2];                      /* of the picture in cells of 2 x 2 photosites */
-    double px_per_mm;                       /* such cells, at the orbit center */
-    double crop_cm;                         /* of the job; the renderings show more */
-    double exposure_s[SIMULATED_EXPOSURES]; /* from the shortest on */
-    double chart_exposure_s, chart_light_theta_deg, chart_camera_theta_deg, chart_camera_phi_deg;
-    double aim_mm;             /* largest distance by which the camera looks past the orbit center */
-    bool cameras_from_markers; /* the rig does not say where the camera was */
-    uint64_t seed;
-    struct sensor sensor;
-};
+#include "optimizer/tools/simulated_camera/simulated_option.h"
 
 void simulated_camera_option_default(struct simulated_camera_option *o);
 

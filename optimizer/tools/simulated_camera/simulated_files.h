@@ -4,7 +4,7 @@
 
 #include "optimizer/photographs/camera/lens.h"
 #include "optimizer/photographs/camera/marker_board.h"
-#include "optimizer/tools/simulated_camera/simulated_camera.h"
+#include "optimizer/tools/simulated_camera/simulated_option.h"
 
 #include <jansson.h>
 

@@ -3,9 +3,9 @@
 
 #include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
-#include "optimizer/report/report_pdf.h"
 #include "optimizer/stages/reading/pipeline_profile_prior.h"
 #include "optimizer/stages/scene/pipeline_adopt.h"
+#include "optimizer/worker/sandbox/pdf_process.h"
 #include "optimizer/worker/sandbox/sandbox_calls.h"
 #include "optimizer/worker/sandbox/sandbox_files.h"
 
@@ -116,7 +116,7 @@ static void prepare(const struct worker_folder *folder, const struct job_documen
 {
     c->pdf.order_fd = -1;
     if (doc == NULL) return;
-    if (doc->results.export_pdf) report_pdf_start_helper(folder, &c->pdf);
+    if (doc->results.export_pdf) pdf_process_start(folder, &c->pdf);
     pipeline_link_geometry(folder, doc->scan.geometry_job);
     pipeline_copy_profile(folder, doc->fit.profile_job);
 }

@@ -2,6 +2,7 @@
  * when it is repeated. */
 #include "base/catalogue/method_catalogue.h"
 #include "base/option_id.h"
+#include "optimizer/fit/descent/bounded_quadratic.h"
 #include "optimizer/fit/descent/descent_methods.h"
 #include "tests/support/descent_fixture.h"
 
