@@ -1,6 +1,6 @@
 /* Photographs of a bowl into which a single fiber scatters, by rays: what the camera of the device of the
- * fiber-scattering thesis (4.6) would take. It shares no formula with optimizer/photographs/profile: the camera looks at a
- * point, pixels have an area, the lit part of the fiber has a length, and light that the bowl throws onto itself
+ * fiber-scattering thesis (4.6) would take. It shares no formula with optimizer/photographs/profile: the camera looks
+ * at a point, pixels have an area, the lit part of the fiber has a length, and light that the bowl throws onto itself
  * follows paths of matte reflections until they leave or end by chance.
  *
  * Lengths in mm, the center of the sphere is the origin, the fiber runs along x, z is up. */
