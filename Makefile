@@ -148,9 +148,15 @@ $(BUILD)/obj/shared/%.c.o: %.c
 	@mkdir -p $(@D)
 	@echo "  CC   $<"
 	@$(CC) $(CFLAGS_ALL) -fPIC $(shell pkg-config --cflags libpq 2>/dev/null | sed 's/-I/-isystem /g') -MMD -MP -c $< -o $@
-$(BUILD)/bin/selvedge: $(call objs,$(shell find clients/cli -name '*.c' 2>/dev/null)) $(L)base.a
+$(BUILD)/bin/selvedge: $(call objs,$(shell find clients/cli -name '*.c' ! -name print_commands_main.c 2>/dev/null)) $(L)base.a
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ -lcurl -ljansson -lsodium $(LINK_BASE)
+
+# the commands of selvedge as JSON: of this the manual page and the completion of shells are made
+PRINT_COMMANDS := $(BUILD)/tools/print-commands
+$(PRINT_COMMANDS): $(call objs,$(wildcard clients/cli/arguments/*.c clients/cli/text/cli_text.c)) $(L)base.a
+	@mkdir -p $(@D)
+	@$(CC) $(LDFLAGS) -o $@ $^ -ljansson $(LINK_BASE)
 
 # the option table as JSON: of this the description of the API, the guide's table and the form of the dashboard are made
 PRINT_OPTIONS := $(BUILD)/tools/print-options

@@ -1,5 +1,5 @@
 # Installation below PREFIX, and the Debian package that is made of it. docs/operating.md says what goes where.
-.PHONY: install uninstall deb deps-package test-deb
+.PHONY: install manual uninstall deb deps-package test-deb
 PREFIX ?= /usr/local
 DESTDIR ?=
 # where systemd and administrators look, whatever the prefix of a system-wide installation
@@ -11,25 +11,17 @@ DOCDIR := $(PREFIX)/share/doc/selvedge
 MANDIR := $(PREFIX)/share/man
 INSTALL ?= install
 
-# what `selvedge-NAME --help` says as a manual page: page, and the line that whatis shows
-MAN_PAGES := $(BUILD)/man/selvedge.1 $(BUILD)/man/selvedged.8 $(BUILD)/man/selvedge-worker.1 \
-	$(BUILD)/man/selvedge-phantom.1 $(BUILD)/man/selvedge-camera.1
-purpose_selvedge := client of the service that makes digital twins of cloth
-purpose_selvedged := service that makes digital twins of cloth
-purpose_selvedge-worker := run one job of Selvedge in its folder
-purpose_selvedge-phantom := make artificial cloth with known fibers and scattering
-purpose_selvedge-camera := show how Selvedge reads photographs, and calibrate cameras
-purpose_selvedge-mpi := carry the messages of the ranks of one job of Selvedge
-ifneq ($(OPENMPI),)
-MAN_PAGES += $(BUILD)/man/selvedge-mpi.1
-endif
-HELP2MAN := $(shell command -v help2man)
+# manual pages and completion of shells, of the tables and texts behind --help
+MANUAL := $(BUILD)/manual
+BASHDIR := $(PREFIX)/share/bash-completion/completions
+ZSHDIR := $(PREFIX)/share/zsh/$(if $(filter /usr,$(PREFIX)),vendor-completions,site-functions)
+MAN_NAMES := selvedge.1 selvedged.8 selvedge-worker.1 selvedge-phantom.1 selvedge-camera.1 selvedge-mpi.1 selvedge.conf.5
 
 DASHBOARD_FOLDERS := $(notdir $(patsubst %/,%,$(wildcard clients/dashboard/*/)))
 
 ##@ Installation
 # configuration: kept where there is one; the default is beside the dashboard
-install: all       ## install below PREFIX (/usr/local) of DESTDIR: programs, dashboard, documents, unit, configuration
+install: all manual ## install below PREFIX (/usr/local) of DESTDIR: programs, dashboard, documents, unit, configuration
 	$(INSTALL) -d $(addprefix "$(DESTDIR)",$(PREFIX)/bin $(addprefix $(SHAREDIR)/dashboard/,$(DASHBOARD_FOLDERS)) $(DOCDIR)/docs/images $(DOCDIR)/examples)
 	$(INSTALL) $(PROGRAMS) "$(DESTDIR)$(PREFIX)/bin"
 	$(if $(PLUGINS),$(INSTALL) -d "$(DESTDIR)$(PREFIX)/lib/selvedge" && $(INSTALL) -m 644 $(PLUGINS) "$(DESTDIR)$(PREFIX)/lib/selvedge")
@@ -48,29 +40,24 @@ install: all       ## install below PREFIX (/usr/local) of DESTDIR: programs, da
 	$(INSTALL) -m 644 config/selvedge.sysusers "$(DESTDIR)$(SYSUSERSDIR)/selvedge.conf"
 	[ -e "$(DESTDIR)$(SYSCONFDIR)/selvedge/selvedge.conf" ] || \
 		$(INSTALL) -m 644 config/selvedge.conf "$(DESTDIR)$(SYSCONFDIR)/selvedge/selvedge.conf"
-ifneq ($(HELP2MAN),)
-	@$(MAKE) --no-print-directory $(MAN_PAGES)
-	$(INSTALL) -d "$(DESTDIR)$(MANDIR)/man1" "$(DESTDIR)$(MANDIR)/man8"
-	$(INSTALL) -m 644 $(filter %.1,$(MAN_PAGES)) "$(DESTDIR)$(MANDIR)/man1"
-	$(INSTALL) -m 644 $(filter %.8,$(MAN_PAGES)) "$(DESTDIR)$(MANDIR)/man8"
-else
-	@echo "no manual pages: help2man is not installed"
-endif
+	$(INSTALL) -d $(addprefix "$(DESTDIR)$(MANDIR)/man",1 5 8) "$(DESTDIR)$(BASHDIR)" "$(DESTDIR)$(ZSHDIR)"
+	for page in $(MANUAL)/man/*; do $(INSTALL) -m 644 "$$page" "$(DESTDIR)$(MANDIR)/man$${page##*.}" || exit 1; done
+	$(INSTALL) -m 644 $(MANUAL)/bash/* "$(DESTDIR)$(BASHDIR)"
+	$(INSTALL) -m 644 $(MANUAL)/zsh/_selvedge "$(DESTDIR)$(ZSHDIR)"
 
 # data and configuration are the administrator's
 uninstall:         ## remove what install has put there, but neither configuration nor data
 	rm -f $(patsubst %,"$(DESTDIR)$(PREFIX)/bin/%",$(notdir $(PROGRAMS)))
 	rm -rf "$(DESTDIR)$(SHAREDIR)" "$(DESTDIR)$(DOCDIR)" "$(DESTDIR)$(PREFIX)/lib/selvedge"
 	rm -f "$(DESTDIR)$(UNITDIR)/selvedge.service" "$(DESTDIR)$(SYSUSERSDIR)/selvedge.conf"
-	rm -f $(foreach p,$(notdir $(MAN_PAGES)),"$(DESTDIR)$(MANDIR)/man$(patsubst .%,%,$(suffix $(p)))/$(p)")
+	rm -f $(foreach p,$(MAN_NAMES),"$(DESTDIR)$(MANDIR)/man$(patsubst .%,%,$(suffix $(p)))/$(p)") "$(DESTDIR)$(ZSHDIR)/_selvedge"
+	rm -f $(patsubst %,"$(DESTDIR)$(BASHDIR)/%",$(notdir $(PROGRAMS)))
 	@echo "kept: $(DESTDIR)$(SYSCONFDIR)/selvedge, the data and the user 'selvedge'"
 
-$(BUILD)/man/%.1: $(BUILD)/bin/%
-	@mkdir -p $(@D)
-	@help2man --no-info --section=1 --name="$(purpose_$*)" --output=$@ $<
-$(BUILD)/man/%.8: $(BUILD)/bin/%
-	@mkdir -p $(@D)
-	@help2man --no-info --section=8 --name="$(purpose_$*)" --output=$@ $<
+# made anew each time: the texts of all programs are part of it
+manual: $(PRINT_COMMANDS) $(PROGRAMS) ## manual pages and completion of shells in build/manual
+	@rm -rf $(MANUAL)
+	@/usr/bin/python3 config/generate_manual.py $(PRINT_COMMANDS) $(BUILD)/bin $(MANUAL)
 
 # ---- the Debian package, built from the files of the tree in a copy of it
 VERSION := $(shell sed -n 's/^\#define SELVEDGE_VERSION "\(.*\)"/\1/p' base/version.h)

@@ -29,7 +29,8 @@ def test_install_and_uninstall_into_a_staging_folder(tmp_path):
     assert {f"usr/bin/{p}" for p in PROGRAMS} <= there
     assert {"etc/selvedge/selvedge.conf", f"usr/{UNIT}", "usr/share/selvedge/openapi.json", "usr/share/selvedge/result.schema.json",
             "usr/share/selvedge/dashboard/index.html", "usr/share/doc/selvedge/docs/operating.md"} <= there
-    assert shutil.which("help2man") is None or "usr/share/man/man8/selvedged.8" in there
+    assert {"usr/share/man/man8/selvedged.8", "usr/share/man/man1/selvedge.1", "usr/share/man/man5/selvedge.conf.5",
+            "usr/share/bash-completion/completions/selvedge", "usr/share/zsh/vendor-completions/_selvedge"} <= there
     assert os.stat(tmp_path / "etc/selvedge/secrets").st_mode & 0o777 == 0o700
     changed = tmp_path / "etc/selvedge/selvedge.conf"
     changed.write_text("[server]\nport = 7000\n")
@@ -44,6 +45,66 @@ def prefix(tmp_path_factory):
     folder = tmp_path_factory.mktemp("prefix")
     make("install", PREFIX=folder)
     return folder
+
+
+def helps(prefix, program):
+    """The help of a program and of each of its commands."""
+    def ask(*arguments):
+        done = subprocess.run([prefix / "bin" / program, *arguments, "--help"], capture_output=True, text=True, timeout=60)
+        assert done.returncode == 0, (program, arguments, done.stderr)
+        return done.stdout
+    yield "", ask()
+    names = {"selvedge": r"^  ([a-z-]+) .*", "selvedge-phantom": r"^  selvedge-phantom ([a-z]+)"}.get(program)
+    for line in re.finditer(names or "$(^)", ask().split("options of every command")[0], flags=re.M):
+        if "needs no daemon" not in line[0]:
+            yield line[1], ask(line[1])
+
+
+@pytest.mark.parametrize("program", sorted(PROGRAMS))
+def test_every_option_is_in_manual_and_completion(prefix, program):
+    with open(prefix / "share/man" / ("man8" if program == "selvedged" else "man1") / (program + (".8" if program == "selvedged" else ".1"))) as f:
+        page = f.read().replace("\\-", "-")
+    completions = [(prefix / "share/bash-completion/completions" / program).read_text(),
+                   (prefix / "share/zsh/site-functions/_selvedge").read_text()]
+    n = 0
+    for command, text in helps(prefix, program):
+        assert command in page and all(command in script for script in completions), command
+        # the texts of selvedge name options of selvedged, too
+        own = r"^ +(?:-\w, )?(--[a-z][a-z0-9-]*)" if program == "selvedge" else r"(?<![\w-])(--[a-z][a-z0-9-]*)"
+        for option in set(re.findall(own, text, flags=re.M)):
+            n += 1
+            for where in (page, *completions):
+                assert re.search(re.escape(option) + r"(?![a-z0-9-])", where), (program, command, option)
+    assert n >= 8
+
+
+def test_bash_completes_commands_and_their_options(prefix):
+    script = prefix / "share/bash-completion/completions/selvedge"
+
+    def complete(*words):
+        line = f'source "{script}"; COMP_WORDS=({" ".join(map(repr, words))}); COMP_CWORD={len(words) - 1}; _selvedge; echo "${{COMPREPLY[@]}}"'
+        return subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=True, timeout=20).stdout.split()
+
+    assert complete("selvedge", "rec") == ["reconstruct"]
+    assert complete("selvedge", "reconstruct", "scan.tif", "--vo") == ["--voxel-um"]
+    assert complete("selvedge", "list", "--voxel") == []
+    assert complete("selvedge", "help", "watch-") == ["watch-folder"]
+
+
+def test_every_setting_is_in_its_manual_page(prefix):
+    page = (prefix / "share/man/man5/selvedge.conf.5").read_text().replace("\\-", "-")
+    with open(os.path.join(ROOT, "config", "selvedge.conf")) as f:
+        keys = re.findall(r"^(\w+) =", f.read(), flags=re.M)
+    assert len(keys) > 60 and all(f"\\fB{key}\\fR" in page for key in keys)
+
+
+@pytest.mark.skipif(shutil.which("man") is None, reason="man is not installed")
+@pytest.mark.parametrize("page", ["man1/selvedge.1", "man8/selvedged.8", "man1/selvedge-worker.1", "man1/selvedge-phantom.1",
+                                  "man1/selvedge-camera.1", "man5/selvedge.conf.5"])
+def test_manual_pages_are_sound(prefix, page):
+    done = subprocess.run(["man", "--warnings", "-E", "UTF-8", "-l", "-Tutf8", "-Z", prefix / "share/man" / page], capture_output=True,
+                          text=True, timeout=60, env={**os.environ, "LC_ALL": "C.UTF-8"})
+    assert done.returncode == 0 and done.stderr == ""
 
 
 def test_the_installed_daemon_finds_its_files(prefix, tmp_path):
