@@ -51,9 +51,9 @@ static const double *extra_start(const struct cloth_search *q, size_t i)
     return i > 0 && i <= q->option->n_extra_start ? q->option->extra_start[i - 1] : NULL;
 }
 
-/* The place of cloth i in the sequence that is spread over the bounds; 0: the start values. Later searches go on where
+/* Index of cloth i in the sequence that is spread over the bounds; 0: the start values. Later searches go on where
  * the screening of the first one ends. */
-static size_t place_of(const struct search *s, size_t i)
+static size_t spread_index(const struct search *s, size_t i)
 {
     const size_t n_extra = s->search->option->n_extra_start, n_screen = s->search->n_screen;
     if (s->i_start > 0) return s->i_start + (n_screen > 1 + n_extra ? n_screen - 1 - n_extra : 0);
@@ -63,7 +63,7 @@ static size_t place_of(const struct search *s, size_t i)
 static void choose_cloth(struct search *s, size_t i, double *number)
 {
     const double *extra = s->i_start == 0 ? extra_start(s->search, i) : NULL;
-    const size_t place = place_of(s, i);
+    const size_t place = spread_index(s, i);
     for (size_t k = 0; k < s->layout.n_unknown; k++) {
         const struct fit_parameter *p = &s->layout.parameter[k];
         number[k] = p->start;

@@ -82,9 +82,9 @@ static status report_here(struct gauss_newton *g, const char *note, struct error
 static status judge_step(struct gauss_newton *g, bool *failed, struct error *err)
 {
     double se, f = linear_model_objective(&g->model, &se), doubt = se + g->best_se;
-    /* both points take priors and pull in the unit (row_var) of the present model */
-    double penalty = linear_model_penalty(&g->model, g->x) + gauss_newton_pull_penalty(g, g->x);
-    double best = g->best_f + linear_model_penalty(&g->model, g->best_x) + gauss_newton_pull_penalty(g, g->best_x);
+    /* both points take priors and regularization in the unit (row_var) of the present model */
+    double penalty = linear_model_penalty(&g->model, g->x) + gauss_newton_regularization(g, g->x);
+    double best = g->best_f + linear_model_penalty(&g->model, g->best_x) + gauss_newton_regularization(g, g->best_x);
     bool first = g->history.n_step == 1;
     *failed = !first && f + penalty - best > 3.0 * doubt && f + penalty > 1.1 * best && g->limit_scale > least_limit;
     *failed = *failed || gauss_newton_in_noise_trap(g);
@@ -103,7 +103,7 @@ static status judge_step(struct gauss_newton *g, bool *failed, struct error *err
     memcpy(g->best_x, g->x, sizeof g->x);
     g->best_f = f;
     g->best_se = se;
-    if (!g->pulls) gauss_newton_judge_progress(g, f + penalty, se);
+    if (!g->regularized) gauss_newton_judge_progress(g, f + penalty, se);
     return STATUS_OK;
 }
 
@@ -120,13 +120,13 @@ static bool plan_paths(struct gauss_newton *g, bool decrease_is_clear, size_t n_
     return most >= MIN_PATH && left >= 0.02 * (double)g->run.path_budget;
 }
 
-/* Ends the pull when there are enough paths, when half of the paths or iterations are used up, or when no row has a
- * weight above 0. */
-static void release_pull(struct gauss_newton *g, size_t max_iteration)
+/* Ends the regularization when there are enough paths, when half of the paths or iterations are used up, or when no row
+ * has a weight above 0. */
+static void end_regularization(struct gauss_newton *g, size_t max_iteration)
 {
     bool half = 2 * g->run.n_path_total >= g->run.path_budget || 2 * (g->run.n_step + 1) > max_iteration, silent = true;
     for (size_t row = 0; row < g->model.n_row; row++) silent = silent && !(g->model.weight[row] > 0.0);
-    if (g->model.n_effective >= GAUSS_NEWTON_PULL_UNTIL || half || silent) g->pulls = false;
+    if (g->model.n_effective >= GAUSS_NEWTON_REGULARIZED_UNTIL || half || silent) g->regularized = false;
 }
 
 /* Ends the fit at the point with the lowest objective, because the last step has not been tried. */
@@ -155,7 +155,7 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
         s = linear_model_pool(&g->model, &g->history, g->x, err);
         if (s != STATUS_OK) return s;
         linear_model_weigh(&g->model, g->n_free);
-        release_pull(g, max_iteration);
+        end_regularization(g, max_iteration);
         double se, f = linear_model_objective(&g->model, &se);
         s = report_here(g, NULL, err);
         if (s != STATUS_OK) return s;
@@ -170,14 +170,14 @@ static status iterate(struct gauss_newton *g, struct fit_result *result, struct 
         result->converged = arrived && !failed && g->history.n_step > 2;
         bool precise = gauss_newton_precise(g, f, se);
         bool fine = precise || gauss_newton_as_good_as_photographs(g) || gauss_newton_as_precise_as_asked(g);
-        if (result->converged && fine && !g->pulls) {
+        if (result->converged && fine && !g->regularized) {
             gauss_newton_explain_end(g, precise, f, se, result);
             return STATUS_OK;
         }
         if (gauss_newton_ends_at_misfit(g)) return end_at_misfit(g, result, err);
-        g->at_misfit = g->at_misfit || (!failed && gauss_newton_pulled_to_misfit(g));
+        g->at_misfit = g->at_misfit || (!failed && gauss_newton_regularized_at_misfit(g));
         if ((result->converged && precise) || g->at_misfit)
-            g->pulls = false; /* the fit has arrived with the pull, and goes on without it */
+            g->regularized = false; /* the fit has arrived with regularization, and goes on without it */
         bool paths_left = plan_paths(g, clear, problem->observation->n);
         if (g->run.n_step < max_iteration && paths_left) {
             g->run.n_path_expected = gauss_newton_expected_paths(g, f, se, max_iteration - g->run.n_step);
@@ -223,7 +223,7 @@ static uint64_t least_budget(const struct fit_problem *problem)
 
 static status run_gauss_newton(const struct fit_problem *problem, struct fit_result *result, struct error *err)
 {
-    struct gauss_newton g = {.limit_scale = 1.0, .pulls = true};
+    struct gauss_newton g = {.limit_scale = 1.0, .regularized = true};
     memset(result, 0, sizeof *result);
     status s = descent_run_init(&g.run, problem, &descent_gauss_newton, err);
     if (s != STATUS_OK) goto out;

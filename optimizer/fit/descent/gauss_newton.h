@@ -7,8 +7,8 @@
 #include "optimizer/fit/descent/descent_methods.h"
 
 enum { N = FIT_MAX_PARAM };
-/* Effective paths from which on there is no pull. */
-#define GAUSS_NEWTON_PULL_UNTIL 40000.0
+/* Effective paths from which on there is no regularization. */
+#define GAUSS_NEWTON_REGULARIZED_UNTIL 40000.0
 
 struct gauss_newton {
     struct descent_run run;
@@ -27,11 +27,11 @@ struct gauss_newton {
     double damping;        /* added to the diagonal, per squared step limit */
     double largest_step;   /* largest move of a parameter, in step limits */
     double noise_decrease; /* expected decrease of the weighted f by a step that follows noise alone */
-    bool pulls;            /* whether there is a pull */
-    bool at_misfit;        /* the pull ended because the fit had arrived at misfit */
-    /* Of gauss_newton_judge_progress: the accepted point with the lowest objective since the pull ended, f with priors
-     * there (which noise may make negative), and the iterations since f last fell by more than its noise and a small
-     * share. */
+    bool regularized;      /* as long as the fit is regularized */
+    bool at_misfit;        /* the regularization ended because the fit had arrived at misfit */
+    /* Of gauss_newton_judge_progress: the accepted point with the lowest objective since the regularization ended, f
+     * with priors there (which noise may make negative), and the iterations since f last fell by more than its noise
+     * and a small share. */
     bool judged; /* whether there has been such a point */
     double lowest_x[N], lowest_f;
     size_t n_stalled;
@@ -42,8 +42,8 @@ struct gauss_newton {
  * that has arrived from one that moves along a valley in steps too short to show. STATUS_INTERNAL of
  * bounded_quadratic. */
 status gauss_newton_step(struct gauss_newton *g, double *dx, struct error *err);
-/* What the pull adds to f at x; 0 without a pull. */
-double gauss_newton_pull_penalty(const struct gauss_newton *g, const double *x);
+/* Returns the term that the regularization adds to f at x; 0 without it. */
+double gauss_newton_regularization(const struct gauss_newton *g, const double *x);
 
 /* Decrease of f that pure noise would predict. For f = r.r it is the noise variance of a residual for each free
  * direction, one to three times that because the three channels of a configuration share their paths. */
@@ -58,8 +58,8 @@ bool gauss_newton_as_good_as_photographs(const struct gauss_newton *g);
 /* Whether the noise is small enough for the job's goal of precision; false when it states none. */
 bool gauss_newton_as_precise_as_asked(const struct gauss_newton *g);
 
-/* Whether the fit has arrived with the pull, and misfit, not noise, makes the residuals there. */
-bool gauss_newton_pulled_to_misfit(const struct gauss_newton *g);
+/* Whether the fit has arrived with regularization, and misfit, not noise, makes the residuals there. */
+bool gauss_newton_regularized_at_misfit(const struct gauss_newton *g);
 /* Whether a step from such a place has led to where the noise is far larger: narrow lobes, whose few rare bright paths
  * make renderings too dark and the objective too low. */
 bool gauss_newton_in_noise_trap(const struct gauss_newton *g);

@@ -2,14 +2,14 @@
  *
  * A fit that ends by its noise needs the paths that bring the noise of the pooled means to the target. A fit that ends
  * at misfit needs few paths but several iterations: of those that lower the objective, each brings the decrease that is
- * left to about a fifth, then the pull ends, which makes room for another decrease, and the last ones see no progress.
- * The numbers are those of the example jobs (config/examples). */
+ * left to about a fifth, then the regularization ends, which makes room for another decrease, and the last ones see no
+ * progress. The numbers are those of the example jobs (config/examples). */
 #include "optimizer/fit/descent/gauss_newton.h"
 
 #include <math.h>
 
 static const double decrease_of_step = 5.0, arrived_share = 0.02;
-static const double steps_with_pull = 3.0, steps_without = 2.0;
+static const double steps_regularized = 3.0, steps_without = 2.0;
 /* The first steps go far, and what they say of the noise at the end and of misfit is of other parameters. The
  * prediction passes from what such fits usually take to the fit's own over this many steps. */
 static const double own_steps = 12.0;
@@ -21,7 +21,7 @@ static double steps_to_misfit(const struct gauss_newton *g)
                  left = fmax(weighted - g->far_decrease, 0.1 * weighted);
     const double share = fmax(g->far_decrease, 0.0) / fmax(left, 1e-12);
     const double arrival = log(fmax(share / arrived_share, 1.0)) / log(decrease_of_step);
-    return arrival + steps_without + (g->pulls ? steps_with_pull : 0.0);
+    return arrival + steps_without + (g->regularized ? steps_regularized : 0.0);
 }
 
 /* Paths of all configurations and replicas for each path of one of them. */
@@ -39,7 +39,7 @@ double gauss_newton_expected_paths(const struct gauss_newton *g, double f, doubl
     const double next = g->n_path_mean * n_row_path;
     const double f_end = f - fmax(g->far_decrease, 0.0); /* while f is large, a large noise seems good enough */
     double effective = g->model.n_effective * fmax(gauss_newton_paths_to_grow(g, f_end, se), 1.0);
-    if (g->pulls) effective = fmax(effective, GAUSS_NEWTON_PULL_UNTIL);
+    if (g->regularized) effective = fmax(effective, GAUSS_NEWTON_REGULARIZED_UNTIL);
     double more = (effective - g->model.n_effective) * n_row_path;
     const double growth = gauss_newton_paths_to_misfit(g);
     if (isfinite(growth))

@@ -1,12 +1,13 @@
-/* The step of gauss_newton.v1: the minimum of the pooled quadratic model in the fit coordinates, inside the bounds
- * and the step limits.
+/* The step of gauss_newton.v1: the minimum of the pooled quadratic model in the fit coordinates, inside the bounds and
+ * the step limits.
  *   rows       have weights by noise and misfit (linear_model_weigh);
  *   gradient   is the mirrored product of the replicas, which has no bias;
  *   curvature  is 2 J'J of the averaged replicas. It is too large by the noise of J, a damping that fades as paths
  *              add up;
  *   damping    adds 2 c noise / limit^2: a move by the whole step limit must lower the objective by more than c times
  *              one residual's Monte-Carlo variance. c falls from early_caution to 1 as paths add up;
- *   pull       acts while paths are few, towards the start and wide lobes, like a prior of pull_sd step limits.
+ *   regularization  acts while paths are few, towards the start and wide lobes, like a prior of regularization_sd
+ *              step limits.
  */
 #include "base/small_matrix.h"
 #include "optimizer/fit/descent/bounded_quadratic.h"
@@ -17,10 +18,10 @@
 
 /* Early noise would drive weakly determined parameters along a valley, to places from which fits did not come back
  * (narrow lobes, whose noise is four times as large). A strong damping prevents that, but makes the way along a
- * valley long. A pull like that of a prior does not, and it ends while most paths are still to come. The numbers were
+ * valley long. A regularization as a prior does not, and it ends while most paths are still to come. The numbers were
  * chosen by trial on analytic cloth. */
 static const double early_caution = 4.0, cautious_until = 10000.0; /* effective paths */
-static const double pull_sd = 1.0;                                 /* step limits */
+static const double regularization_sd = 1.0;                       /* step limits */
 static const double wide_share = 0.8; /* of the way from the narrowest lobe to the widest, in the logarithm */
 static const double far_reach = 6.0;  /* step limits within which far_decrease is computed */
 
@@ -40,11 +41,11 @@ struct scaled_model {
     double h[N * N], g[N], trace;
 };
 
-/* Writes the coordinate that parameter p is pulled to: its start. A lobe width whose start is that of the model is
- * pulled towards wide lobes, for which radiance is smooth and few paths determine it; narrow lobes are noisy. Returns
- * false for parameters without a pull: fixed ones, and other positive quantities (density, the flakes' gamma), which
- * may be off by powers of ten. */
-static bool pull_target(const struct gauss_newton *g, size_t p, double *x)
+/* Writes the coordinate to which the regularization draws parameter p: its start. A lobe width whose start is that of
+ * the model is drawn towards wide lobes, for which radiance is smooth and few paths determine it; narrow lobes are
+ * noisy. Returns false for parameters without it: fixed ones, and other positive quantities (density, the flakes'
+ * gamma), which may be off by powers of ten. */
+static bool regularization_target(const struct gauss_newton *g, size_t p, double *x)
 {
     const struct coordinate *k = &g->run.coordinate[p];
     const struct param_info *info = &g->run.problem->info[p];
@@ -55,24 +56,24 @@ static bool pull_target(const struct gauss_newton *g, size_t p, double *x)
     return !g->run.fixed[p] && (width || k->kind != PARAM_LOG);
 }
 
-/* Adds the pull, which is as strong as a prior of pull_sd step limits. */
-static void add_pull(const struct gauss_newton *g, struct scaled_model *m)
+/* Adds the regularization, which is as strong as a prior of regularization_sd step limits. */
+static void add_regularization(const struct gauss_newton *g, struct scaled_model *m)
 {
-    double curvature = 2.0 * g->model.row_var / (pull_sd * pull_sd), x;
+    double curvature = 2.0 * g->model.row_var / (regularization_sd * regularization_sd), x;
     for (size_t a = 0; a < m->n; a++) {
         size_t p = m->index[a];
-        if (!pull_target(g, p, &x)) continue;
+        if (!regularization_target(g, p, &x)) continue;
         m->h[a * m->n + a] += curvature;
         m->g[a] += curvature * (g->model.x_ref[p] - x) / g->run.coordinate[p].step_limit;
     }
 }
 
-double gauss_newton_pull_penalty(const struct gauss_newton *g, const double *x)
+double gauss_newton_regularization(const struct gauss_newton *g, const double *x)
 {
     double sum = 0.0, target;
-    for (size_t p = 0; p < g->model.n_param && g->pulls; p++) {
-        if (!pull_target(g, p, &target)) continue;
-        double off = (x[p] - target) / (pull_sd * g->run.coordinate[p].step_limit);
+    for (size_t p = 0; p < g->model.n_param && g->regularized; p++) {
+        if (!regularization_target(g, p, &target)) continue;
+        double off = (x[p] - target) / (regularization_sd * g->run.coordinate[p].step_limit);
         sum += off * off;
     }
     return g->model.row_var * sum;
@@ -97,7 +98,7 @@ static void scale_model(const struct gauss_newton *g, bool cross, struct scaled_
         m->trace += m->h[a * m->n + a];
     }
     if (cross) small_clip_eigenvalues(m->h, m->n, 2.0 * linear_model_noise(&g->model));
-    if (g->pulls) add_pull(g, m);
+    if (g->regularized) add_regularization(g, m);
 }
 
 /* Finds the minimum y of the model inside the bounds and `reach` times the step limits, with `damping` added to the

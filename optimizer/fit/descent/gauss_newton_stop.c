@@ -1,16 +1,16 @@
 /* When gauss_newton.v1 ends.
  *
  * It has arrived when the decrease of the objective that several undamped steps could bring (far_decrease, by the
- * curvature without the noise of J) is within the noise, or below arrived_share of the weighted objective, under
- * which the curvature of the model does not determine it, or good enough: below target_share of that objective or
+ * curvature without the noise of J) is within the noise, or below arrived_share of the weighted objective, under which
+ * the curvature of the model does not determine it, or good enough: below target_share of that objective or
  * target_rel_rms. One step would not do for that test: where a model does not fit, steps are short and each brings
  * little, so such fits would end on their way.
  *
- * The fit ends when it has arrived, there is no pull any more, and the noise is good enough too: below target_share
- * of the plain objective or target_rel_rms, or, where neither a budget nor a goal of precision was asked for,
- * below photograph_share of the variance of a residual by the photographs' own errors, or where the job states a goal
- * of precision, when that is reached. A fit whose paths or iterations are used up before that has converged if it had
- * arrived. */
+ * The fit ends when it has arrived, there is no regularization any more, and the noise is good enough too: below
+ * target_share of the plain objective or target_rel_rms, or, where neither a budget nor a goal of precision was asked
+ * for, below photograph_share of the variance of a residual by the photographs' own errors, or where the job states a
+ * goal of precision, when that is reached. A fit whose paths or iterations are used up before that has converged if it
+ * had arrived. */
 #include "optimizer/fit/descent/gauss_newton.h"
 
 #include <math.h>
@@ -28,10 +28,10 @@ static const double photograph_share = 0.6, least_effective = 120000.0;
 static const double arrived_share = 0.02;
 
 /* Where misfit makes the residuals: the share of the weighted objective that the noise of the parameters may add to it
- * when the pull ends and at the end (5 % of it are 2.5 % of the relative RMS error), the share that shows a place where
- * paths are too noisy, the share by which f must fall for an iteration to count as progress, and the iterations without
- * progress that end the fit. The steps of Gauss-Newton promise too much where residuals are large, because the
- * curvature of the renderings is not in J'J. */
+ * when the regularization ends and at the end (5 % of it are 2.5 % of the relative RMS error), the share that shows a
+ * place where paths are too noisy, the share by which f must fall for an iteration to count as progress, and the
+ * iterations without progress that end the fit. The steps of Gauss-Newton promise too much where residuals are large,
+ * because the curvature of the renderings is not in J'J. */
 static const double end_noise_share = 0.05, trap_noise_share = 0.15, progress_share = 0.02;
 enum { MOST_STALLED = 3 };
 
@@ -88,7 +88,7 @@ double gauss_newton_paths_to_grow(const struct gauss_newton *g, double f, double
 double gauss_newton_paths_to_misfit(const struct gauss_newton *g)
 {
     const struct linear_model *m = &g->model;
-    const bool stalled = !g->pulls && g->n_stalled > 0;
+    const bool stalled = !g->regularized && g->n_stalled > 0;
     double photograph = 0.0, left = linear_model_weighted_objective(m) - (stalled ? 0.0 : g->far_decrease);
     for (size_t row = 0; row < m->n_row; row++) photograph += m->weight[row] * m->photograph_var[row];
     return left > photograph ? g->noise_decrease / (end_noise_share * left) : INFINITY;
@@ -127,9 +127,9 @@ static bool arrived_at_misfit(const struct gauss_newton *g)
     return g->far_decrease <= g->noise_decrease + arrived_share * linear_model_weighted_objective(&g->model);
 }
 
-bool gauss_newton_pulled_to_misfit(const struct gauss_newton *g)
+bool gauss_newton_regularized_at_misfit(const struct gauss_newton *g)
 {
-    return g->pulls && arrived_at_misfit(g) && misfit_rules(g);
+    return g->regularized && arrived_at_misfit(g) && misfit_rules(g);
 }
 
 bool gauss_newton_in_noise_trap(const struct gauss_newton *g)
@@ -151,7 +151,7 @@ void gauss_newton_judge_progress(struct gauss_newton *g, double f, double se)
 
 bool gauss_newton_ends_at_misfit(const struct gauss_newton *g)
 {
-    return !g->pulls && misfit_rules(g) && (arrived_at_misfit(g) || g->n_stalled >= MOST_STALLED);
+    return !g->regularized && misfit_rules(g) && (arrived_at_misfit(g) || g->n_stalled >= MOST_STALLED);
 }
 
 /* Share of the weighted objective, in percent, that further steps are predicted to remove, rounded to two digits. The

@@ -17,7 +17,8 @@ static void unit_vector(double theta, double phi, double v[3])
     v[2] = cos(theta);
 }
 
-static void place_of(const struct misfit_field *f, const struct configuration *c, double place[MISFIT_FIELD_PLACE])
+static void set_coordinates(const struct misfit_field *f, const struct configuration *c,
+                            double place[MISFIT_FIELD_PLACE])
 {
     double light = c->light_phi_rad - c->cloth_rotation_rad, camera = c->camera_phi_rad - c->cloth_rotation_rad;
     if (f->all_rotations) {
@@ -100,7 +101,7 @@ void misfit_field_init(struct misfit_field *f, const struct observation_set *o, 
     for (size_t i = 0; i < o->n; i++) f->all_rotations = f->all_rotations || o->item[i].configuration.n_rotation > 1;
     for (size_t k = 0; k < f->n; k++) {
         const size_t i = k * o->n / f->n;
-        place_of(f, &o->item[i].configuration, f->place[k]);
+        set_coordinates(f, &o->item[i].configuration, f->place[k]);
         residual[k] = residual_of(&o->item[i], &a[i], &b[i], &noise[k]);
     }
     if (f->n < LEAST_ROW || !(misfit_var > 0.0))
@@ -114,7 +115,7 @@ void misfit_field_predict(const struct misfit_field *f, const struct configurati
 {
     double place[MISFIT_FIELD_PLACE], k[MAX_ROW], x[MAX_ROW], known = 0.0;
     out->rest_var = f->misfit_var * (1.0 - f->smooth_share);
-    place_of(f, c, place);
+    set_coordinates(f, c, place);
     for (size_t i = 0; i < f->n; i++) k[i] = x[i] = smooth_covariance(f, place, f->place[i]);
     if (f->n > 0) small_solve(f->factor, f->n, x, 1);
     for (size_t i = 0; i < f->n; i++) known += k[i] * x[i];

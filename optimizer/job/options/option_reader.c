@@ -1,6 +1,6 @@
 #include "optimizer/job/options/option_reader.h"
+#include "optimizer/job/checks/job_consistency.h"
 #include "optimizer/job/checks/job_faults.h"
-#include "optimizer/job/checks/job_slips.h"
 #include "optimizer/job/checks/option_value.h"
 #include "optimizer/job/document/job_file_name.h"
 #include "optimizer/job/document/json_field.h"
@@ -335,22 +335,22 @@ static status default_section(const char *pattern, void *base, struct job_docume
 
 status job_options_default(struct job_document *doc, struct error *err) { return default_section("", doc, doc, err); }
 
-struct first_slip {
+struct first_fault {
     struct job_document *doc;
     struct error *err;
     status outcome;
 };
 
-static void take_slip(void *context, const struct error *slip)
+static void take_fault(void *context, const struct error *fault)
 {
-    struct first_slip *first = context;
-    if (first->outcome == STATUS_OK) first->outcome = stop_or_keep(slip->code, slip, first->doc, first->err);
+    struct first_fault *first = context;
+    if (first->outcome == STATUS_OK) first->outcome = stop_or_keep(fault->code, fault, first->doc, first->err);
 }
 
-static status find_slips(struct job_document *doc, struct error *err)
+static status check_consistency(struct job_document *doc, struct error *err)
 {
-    struct first_slip first = {doc, err, STATUS_OK};
-    job_find_slips(doc, take_slip, &first);
+    struct first_fault first = {doc, err, STATUS_OK};
+    job_consistency_check(doc, take_fault, &first);
     return first.outcome;
 }
 
@@ -362,5 +362,5 @@ status job_options_read(const json_t *document, struct job_document *doc, struct
     struct error fault = {0};
     status s = read_section(&root, row->path, doc, doc, err);
     if (s == STATUS_OK && n_fault(doc) == 0) s = stop_or_keep(row->check(&whole, &fault), &fault, doc, err);
-    return s == STATUS_OK ? find_slips(doc, err) : s;
+    return s == STATUS_OK ? check_consistency(doc, err) : s;
 }

@@ -2,7 +2,7 @@
 
 #include "base/files/durable.h"
 #include "base/option_id.h"
-#include "optimizer/job/checks/job_slips.h"
+#include "optimizer/job/checks/job_consistency.h"
 #include "optimizer/job/document/json_field.h"
 
 #include <math.h>

@@ -2,7 +2,7 @@
 #include "base/angle.h"
 #include "base/files/durable.h"
 #include "base/option_id.h"
-#include "optimizer/job/checks/job_slips.h"
+#include "optimizer/job/checks/job_consistency.h"
 #include "optimizer/photographs/rows/number_table.h"
 
 #include <math.h>

@@ -20,8 +20,8 @@ static bool same_view(const struct configuration *a, const struct configuration 
 
 static bool counts(const struct observation *o) { return o->weight > 0.0 && !observation_is_contrast(o); }
 
-/* Place of row i among the rows of its lamp and camera in the order of rotation, and their number. */
-static size_t place_of(const struct observation_set *o, size_t i, size_t *n)
+/* Index of row i among the rows of its lamp and camera in the order of rotation, and their number. */
+static size_t rotation_index(const struct observation_set *o, size_t i, size_t *n)
 {
     size_t place = 0;
     *n = 0;
@@ -49,7 +49,7 @@ static void look_at_row(const struct report *report, size_t i, struct brightness
     struct estimate x, y;
     nuisance_show(&m->fit->result.nuisance, &m->validation->replica[0][i], &x);
     nuisance_show(&m->fit->result.nuisance, &m->validation->replica[1][i], &y);
-    b->place = place_of(&report->in.job->rows->observation, i, &b->n);
+    b->place = rotation_index(&report->in.job->rows->observation, i, &b->n);
     b->measured = mean_of(report->in.job->rows->observation.item[i].mean_rgb);
     b->rendered = 0.5 * (mean_of(x.mean) + mean_of(y.mean));
 }

@@ -2,7 +2,7 @@
  * observations. */
 #include "base/files/durable.h"
 #include "base/option_id.h"
-#include "optimizer/fit/baseline/row_slips.h"
+#include "optimizer/fit/baseline/row_consistency.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/job_parse.h"
 #include "optimizer/job/options/option_key.h"
@@ -57,9 +57,9 @@ static status load_observations(const struct stage_tools *tools, struct job_inpu
         worker_status_warn(tools->status, "%zu more warnings about photographs are in the job's log",
                            uneven.n - NAMED_PHOTOGRAPHS);
     if (in->doc->rows.measurement_file[0] != '\0')
-        s = row_slips_check_angles(&in->rows.observation, OPTION_MEASUREMENT_FILE, err);
+        s = row_consistency_check_angles(&in->rows.observation, OPTION_MEASUREMENT_FILE, err);
     if (s == STATUS_OK) observation_set_check(&in->rows.observation, &tools->warn);
-    return s == STATUS_OK ? row_slips_warn(&in->rows.observation, &tools->warn, err) : s;
+    return s == STATUS_OK ? row_consistency_warn(&in->rows.observation, &tools->warn, err) : s;
 }
 
 /* The image of the surroundings, which every observation is taken under. */

@@ -1,7 +1,7 @@
 #include "base/files/durable.h"
 #include "base/option_id.h"
 #include "base/warning.h"
-#include "optimizer/fit/baseline/row_slips.h"
+#include "optimizer/fit/baseline/row_consistency.h"
 #include "optimizer/photographs/camera/photograph_develop.h"
 #include "optimizer/photographs/profile/bowl_profile.h"
 #include "optimizer/photographs/reader/photograph.h"
@@ -141,10 +141,10 @@ static void judge_rows(struct input_check *c, const struct photograph_process *p
     observation_set_init(&rows);
     status s = observation_set_load(c->doc, c->folder, process, &warn, &rows, &fault);
     if (s == STATUS_OK && c->doc->rows.measurement_file[0] != '\0')
-        s = row_slips_check_angles(&rows, OPTION_MEASUREMENT_FILE, &fault);
+        s = row_consistency_check_angles(&rows, OPTION_MEASUREMENT_FILE, &fault);
     if (s == STATUS_OK) {
         observation_set_check(&rows, &warn);
-        s = row_slips_warn(&rows, &warn, &fault);
+        s = row_consistency_warn(&rows, &warn, &fault);
     }
     if (s != STATUS_OK) input_check_fault(c, &fault);
     observation_set_release(&rows);

@@ -19,7 +19,7 @@ static void shorten_paths(const struct stage_tools *tools, char *text)
             at += n;
 }
 
-/* Warns of every fault of the inputs besides the one that has ended the job, so that all can be mended at once. */
+/* Warns of every fault of the inputs besides the one that has ended the job, so that all can be repaired at once. */
 static void name_other_faults(const struct stage_tools *tools, const struct error *first)
 {
     char path[WORKER_PATH_BYTES], folder[WORKER_PATH_BYTES];

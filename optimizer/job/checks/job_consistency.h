@@ -1,7 +1,7 @@
-/* Slips of a job document that are allowed values and still wrong: angles in radians, files of another kind than the
- * option asks for. */
-#ifndef SELVEDGE_OPTIMIZER_JOB_SLIPS_H
-#define SELVEDGE_OPTIMIZER_JOB_SLIPS_H
+/* Consistency checks of a job document: each value is allowed, and still they are wrong together. Angles are in
+ * radians, or a file is of another kind than its option asks for. */
+#ifndef SELVEDGE_OPTIMIZER_JOB_CONSISTENCY_H
+#define SELVEDGE_OPTIMIZER_JOB_CONSISTENCY_H
 
 #include "optimizer/job/document/job_document.h"
 
@@ -19,8 +19,8 @@ void angle_span_add(struct angle_span *span, double light_theta, double light_ph
                     double camera_phi, double rotation);
 bool angle_span_in_radians(const struct angle_span *span);
 
-/* Calls `found` with the status STATUS_INVALID and a filled error for every slip of the document, in its order. */
-void job_find_slips(const struct job_document *doc, void (*found)(void *context, const struct error *slip),
-                    void *context);
+/* Calls `found` for every inconsistency of the document, in its order, with STATUS_INVALID and a filled error. */
+void job_consistency_check(const struct job_document *doc, void (*found)(void *context, const struct error *fault),
+                           void *context);
 
 #endif

@@ -1,4 +1,4 @@
-#include "optimizer/job/checks/job_slips.h"
+#include "optimizer/job/checks/job_consistency.h"
 #include "base/catalogue/volume_format.h"
 
 #include <math.h>
@@ -86,31 +86,31 @@ static const struct role_rule role_rule[] = {
     {"rig", "a rig file: .json", {[KIND_UNKNOWN] = true, [KIND_JSON] = true}},
 };
 
-struct slip_search {
+struct consistency_check {
     const struct job_document *doc;
-    void (*found)(void *context, const struct error *slip);
+    void (*found)(void *context, const struct error *fault);
     void *context;
 };
 
 static void check_ending(void *context, const char *name, const char *role)
 {
-    const struct slip_search *search = context;
-    struct error slip = {0};
-    char field[sizeof slip.field];
+    const struct consistency_check *search = context;
+    struct error fault = {0};
+    char field[sizeof fault.field];
     for (size_t i = 0; i < sizeof role_rule / sizeof role_rule[0]; i++) {
         const struct role_rule *r = &role_rule[i];
         if (strcmp(role, r->role) != 0 || r->kind[kind_of(name)]) continue;
         job_document_file_key(search->doc, name, field, sizeof field);
-        error_set_field(&slip, STATUS_INVALID, field, "'%s' is '%s', which by its ending is not %s", field, name,
+        error_set_field(&fault, STATUS_INVALID, field, "'%s' is '%s', which by its ending is not %s", field, name,
                         r->wanted);
-        search->found(search->context, &slip);
+        search->found(search->context, &fault);
     }
 }
 
-static void check_radians(const struct job_document *doc, const struct slip_search *search)
+static void check_radians(const struct job_document *doc, const struct consistency_check *search)
 {
     struct angle_span photograph = {0}, candidate = {0};
-    struct error slip = {0};
+    struct error fault = {0};
     for (size_t i = 0; i < doc->rows.n_photograph; i++) {
         const struct job_photograph *p = &doc->rows.photograph[i];
         angle_span_add(&photograph, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg, p->camera_phi_deg,
@@ -124,17 +124,17 @@ static void check_radians(const struct job_document *doc, const struct slip_sear
     for (int k = 0; k < 2; k++) {
         const struct angle_span *span = k == 0 ? &photograph : &candidate;
         if (!angle_span_in_radians(span)) continue;
-        error_set_field(&slip, STATUS_INVALID, k == 0 ? "photographs" : "fit.candidates",
+        error_set_field(&fault, STATUS_INVALID, k == 0 ? "photographs" : "fit.candidates",
                         "the angles of '%s' look like radians: the largest one from the normal is %.3g; write degrees",
                         k == 0 ? "photographs" : "fit.candidates", span->theta);
-        search->found(search->context, &slip);
+        search->found(search->context, &fault);
     }
 }
 
-void job_find_slips(const struct job_document *doc, void (*found)(void *context, const struct error *slip),
-                    void *context)
+void job_consistency_check(const struct job_document *doc, void (*found)(void *context, const struct error *fault),
+                           void *context)
 {
-    struct slip_search search = {doc, found, context};
+    struct consistency_check search = {doc, found, context};
     job_document_visit_files(doc, check_ending, &search);
     check_radians(doc, &search);
 }

@@ -1,8 +1,8 @@
-#include "optimizer/fit/baseline/row_slips.h"
+#include "optimizer/fit/baseline/row_consistency.h"
 #include "base/angle.h"
 #include "base/option_id.h"
 #include "optimizer/fit/baseline/plain_brdf.h"
-#include "optimizer/job/checks/job_slips.h"
+#include "optimizer/job/checks/job_consistency.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -17,7 +17,7 @@ static const double least_deviates = 4.0;
 /* Below this cosine of the lamp the lamp's own size matters. */
 static const double least_cos = 0.05;
 
-status row_slips_check_angles(const struct observation_set *o, const char *field, struct error *err)
+status row_consistency_check_angles(const struct observation_set *o, const char *field, struct error *err)
 {
     struct angle_span span = {0};
     for (size_t i = 0; i < o->n; i++) {
@@ -64,12 +64,12 @@ static status median_reflected(const struct observation_set *rows, double *media
 
 static void warn_scale(double median, const struct warning_sink *warn)
 {
-    if (median < ROW_SLIP_DARK)
+    if (median < ROW_CONSISTENCY_DARK)
         warning_send(warn, OPTION_NONE,
                      "all rows are dark: half of them are below %.2g of what a white cloth shows under the same lamp; "
                      "is the scale right? A white diffuser that faces the lamp has the radiance 1",
                      median);
-    if (median > ROW_SLIP_WHITE)
+    if (median > ROW_CONSISTENCY_WHITE)
         warning_send(warn, OPTION_NONE,
                      "all rows are above white: half of them are above %.3g times what a white cloth shows under the "
                      "same lamp; is the scale right? A white diffuser that faces the lamp has the radiance 1",
@@ -131,7 +131,7 @@ static status select_judged(const struct observation_set *o, struct observation_
     return s;
 }
 
-status row_slips_warn(const struct observation_set *o, const struct warning_sink *warn, struct error *err)
+status row_consistency_warn(const struct observation_set *o, const struct warning_sink *warn, struct error *err)
 {
     struct observation_set rows;
     double median = NAN;
