@@ -10,10 +10,10 @@
 /* Relative RMS errors of a fit to the fibers without the job's corrections (pipeline_correction.h). */
 struct uncorrected_errors {
     bool measured;
-    double fit_rel_rms, heldout_rel_rms, heldout_rel_rms_se; /* NaN without rows of that set */
+    double fit_rel_rms, heldout_rel_rms, heldout_rel_rms_se; /* NaN where that set has no rows */
 };
 
-/* What the errors of scanned fibers add to the errors of the parameters (pipeline_scan_error.h). */
+/* The part of the parameters' errors that comes from the errors of scanned fibers (pipeline_scan_error.h). */
 struct scan_error {
     double radius_rel_se, direction_se_rad; /* of the fibers; direction 0: no errors were carried */
     double se_param[FIT_MAX_PARAM];         /* their part of the standard errors, internal units */
@@ -65,7 +65,7 @@ status stage_profile_fit(const struct profile_fit_input *in, struct fit_output *
  * it. */
 struct model_discrepancy {
     struct discrepancy factor;
-    double fit_rel_rms, heldout_rel_rms; /* NaN without rows of that set */
+    double fit_rel_rms, heldout_rel_rms; /* NaN where that set has no rows */
 };
 
 /* Fresh estimates at the fitted parameters: two replicas of every observation, in the order of `observation`. */

@@ -1,6 +1,6 @@
 /* The stages "volume" to "directions": from a scan, a fiber file or a described cloth to fibers and voxels. Each has a
- * function that does the work and stores it under JOB/work/<stage>/, and one that reads back what a finished stage
- * stored. Outputs are owned by the caller. */
+ * function that does the work and stores it under JOB/work/<stage>/, and one that reads the output of a finished stage
+ * back from there. Outputs are owned by the caller. */
 #ifndef SELVEDGE_OPTIMIZER_GEOMETRY_STAGES_H
 #define SELVEDGE_OPTIMIZER_GEOMETRY_STAGES_H
 

@@ -1,5 +1,5 @@
-/* What is read of a job before its first stage: the document, the rows of the fit, the models with their parameters.
- * Owned by the struct unless a comment says otherwise. */
+/* The inputs of a job, read before its first stage: the document, the rows of the fit, the models with their
+ * parameters. Owned by the struct unless a comment says otherwise. */
 #ifndef SELVEDGE_OPTIMIZER_JOB_INPUTS_H
 #define SELVEDGE_OPTIMIZER_JOB_INPUTS_H
 
@@ -20,11 +20,11 @@
 /* The rows of a job. */
 struct measured_rows {
     struct environment *environment;    /* image of the surroundings; NULL: none */
-    struct photograph_process process;  /* what is known of the camera */
+    struct photograph_process process;  /* the camera and its noise */
     struct observation_set observation; /* all */
-    struct observation_set fitted;      /* those of the set "fit" */
-    /* The rows that the fit sees: the fitted ones, their contrasts if these have a weight, and what is expected between
-     * them. */
+    struct observation_set fitted;      /* the rows of the set "fit" */
+    /* The rows that the fit sees: the fitted ones, their contrasts if these have a weight, and the radiances that a
+     * plain BRDF expects between them. */
     struct observation_set row;
     struct expected_rows expected;
     struct observation_set contrast; /* of all observations, in their order; empty when not asked for */
@@ -57,7 +57,7 @@ struct cloth_numbers {
     } item[CLOTH_MAX_FITTED];
 };
 
-/* What the photograph of the cloth's texture shows (pipeline_texture.h). */
+/* The weave, as read from a photograph of the cloth's texture (pipeline_texture.h). */
 enum { TEXTURE_MAX_TAKEN = 48 };
 struct texture_guess {
     bool found, contradicts; /* contradicts: the job's draft is another one */
@@ -83,8 +83,8 @@ void job_inputs_init(struct job_inputs *in);
 void job_inputs_release(struct job_inputs *in);
 
 /* Reads job.json and the observations: everything that can be wrong with them is found before the first stage.
- * err->field is a key of the job document. A folder whose lock is not held (lock_fd is -1) is only looked at: what an
- * earlier run left in it stays. */
+ * err->field is a key of the job document. A folder whose lock is not held (lock_fd is -1) is only read: files that an
+ * earlier run left in it stay. */
 status job_inputs_read(const struct stage_tools *tools, struct job_inputs *in, struct error *err);
 
 /* Number of unknowns of a model's fit: parameters that are neither fixed nor tied to another one. */

@@ -23,7 +23,7 @@ struct made_cloth {
     bool has_volume_scene;
     struct cloth_numbers number;    /* of the job, with the priors that the scan's own errors give */
     size_t i_shown;                 /* model whose cloth this is, plus 1; 0: the cloth of the start values */
-    double shown[CLOTH_MAX_NUMBER]; /* all numbers of that cloth; unset while i_shown is 0 */
+    double shown[CLOTH_MAX_NUMBER]; /* all numbers of the cloth shown; unset while i_shown is 0 */
 };
 
 /* The sections of the document, the rows and the models that a cloth is made and traced for. */

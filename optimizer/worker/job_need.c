@@ -28,10 +28,11 @@ static const double program_bytes = 31e6, voxel_bytes = 19.0, fiber_file_bytes =
 static const double result_bytes = 1e6, pixel_bytes = 28.0, unfitted_bytes = 3e6, voxel_result_bytes = 22.0,
                     fiber_result_bytes = 1.5, cloth_result_bytes = 180.0;
 
-/* The geometry is that of another job, which this one cannot look at before it runs: neither can its size be known. */
+/* Returns whether the job takes its geometry from another job. The worker cannot read that job before this one runs, so
+ * the size of the geometry is unknown. */
 static bool is_adopted(const struct job_plan *plan) { return plan->in->doc->scan.geometry_job[0] != '\0'; }
 
-/* What the needs of a job go with. */
+/* Writes the key under which jobs of this kind remember a need. */
 static void key_of(const struct job_plan *plan, const char *what, char key[SPEED_BOOK_KEY_BYTES])
 {
     const char *cloth = is_adopted(plan)                           ? "adopted"
@@ -98,7 +99,7 @@ static double profile_bytes(const struct job_plan *plan)
     return most + (double)(plan->in->fiber.profile.n * sizeof *plan->in->fiber.profile.row);
 }
 
-/* What the models say without corrections. */
+/* Returns the needs by the cost models, without corrections. */
 static struct job_need model_of(const struct job_plan *plan)
 {
     struct input_bytes input = {.plan = plan};
@@ -116,7 +117,8 @@ static struct job_need model_of(const struct job_plan *plan)
                                            fiber_result_bytes * input.fibers + cloth_result_bytes * size};
 }
 
-/* The mean ratio of what jobs of this kind took to what the model said; 1 where none has run. */
+/* Returns the mean ratio of the needs of earlier jobs of this kind to their model's prediction; 1 where none has
+ * run. */
 static double correction(const struct job_plan *plan, const struct speed_book *book, const char *what)
 {
     char key[SPEED_BOOK_KEY_BYTES];

@@ -1,18 +1,18 @@
-/* What a job will take as a whole, told before it runs: time by the speeds by which its progress is predicted
- * (job_clock.h), processor time, memory and disk by measured cost models. Each of the last three is corrected by the
- * mean ratio of what earlier jobs of the same kind took to what the model said, in the book of speeds. */
+/* Predicts the needs of a whole job before it runs: time by the speeds by which its progress is predicted
+ * (job_clock.h), processor time, memory and disk by measured cost models. Each of the last three is corrected by a mean
+ * ratio in the book of speeds: needs of earlier jobs of the same kind over the model's prediction. */
 #ifndef SELVEDGE_OPTIMIZER_JOB_NEED_H
 #define SELVEDGE_OPTIMIZER_JOB_NEED_H
 
 #include "optimizer/worker/pipeline_plan.h"
 
-/* What one job takes, or took: processor seconds of all threads, largest resident memory, bytes of its folder (inputs
- * and results) at its end. */
+/* The needs of one job: processor seconds of all threads, largest resident memory, bytes of its folder (inputs and
+ * results) at its end. */
 struct job_need {
     double cpu_s, memory_bytes, disk_bytes;
 };
 
-/* What the worker of the job is given. */
+/* The machine that the job's worker may use. */
 struct job_need_machine {
     size_t n_thread;           /* 0: one a processor */
     size_t memory_limit_bytes; /* of the geometry stages */
@@ -28,7 +28,7 @@ status job_need_report(const char *folder, const struct job_need_machine *machin
 /* Before the first stage of a job that runs, and before its clock is given the speeds of earlier jobs: sets
  * usual_wall_s, the time by usual speeds alone, which the load of this machine does not change. */
 void job_need_begin(struct job_plan *plan);
-/* Adds what a job has taken to the book. Values that are not positive are left out. */
+/* Adds the needs of a job that has run to the book. Values that are not positive are left out. */
 void job_need_remember(const struct job_plan *plan, const struct job_need *took, struct speed_book *book);
 
 #endif

@@ -50,7 +50,7 @@ struct pipeline {
     size_t n_input_warning;
 };
 
-/* ---- the stages with their inputs; load: what a finished stage stored is read back ---- */
+/* ---- the stages with their inputs; load: the output of a finished stage is read back ---- */
 
 static status do_volume(struct pipeline *p, const struct taken *t, bool load, struct error *err)
 {
@@ -222,7 +222,7 @@ static void plan_fit_paths(void *context, double n_path)
     pipeline_plan_fit_paths(((struct pipeline *)context)->plan, n_path);
 }
 
-/* Removes the marks of stage i and of all later ones: when a stage runs, what later stages have stored is out of
+/* Removes the marks of stage i and of all later ones: when a stage runs, the stored outputs of later stages are out of
  * date, also for a later attempt. */
 static status unmark_from(const struct pipeline *p, size_t i, struct error *err)
 {

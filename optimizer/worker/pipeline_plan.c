@@ -48,14 +48,14 @@ static const struct voxel_stage read_stage = {"volume", 1e-7, 0.8, read_curve},
 static const double fit_s_per_path = 9e-6, usual_radiance = 0.13, radiance_power = 0.4;
 /* Share of the voxels that is material, before the volume is known. */
 static const double usual_material = 0.4;
-/* Paths of a fitted row that a fit takes: to a table, of which its misfit ends it (tables of five fabrics took 0.7 to
- * 1.3 million for 16 rows), and to photographs, where it ends by their errors, which asks for 120 thousand effective
- * paths of two replicas. Of a fit that searches the numbers of a cloth, the share of the budget. */
+/* Paths of a fitted row that a fit takes. A fit to a table ends by its misfit (tables of five fabrics took 0.7 to 1.3
+ * million for 16 rows). A fit to photographs ends by their errors, which asks for 120 thousand effective paths of two
+ * replicas. cloth_share: the share of the budget that a search of the numbers of a cloth takes. */
 static const double misfit_row_paths = 62500.0, noise_row_paths = 264000.0, cloth_share = 0.7;
 /* Of the time of the fit, the share of the fit where a scan's errors are carried on. */
 static const double usual_budget = 6e6, fit_share = 1.0 - PIPELINE_SCAN_ERROR_SHARE;
-/* Time of a validated path over that of a fitted one; paths in whose time the rest of a report is made, without what
- * its gradient certificate takes to prepare the models: pages, and the geometry of a scan. */
+/* Time of a validated path over the time of a fitted one. The rest of a report in units of a path's time, without the
+ * preparation of models for its gradient certificate: pages, and the geometry of a scan. */
 static const double validated_path = 0.88, page_paths = 2e4, scan_page_paths = 7e4;
 static const double least_s = 0.05;
 /* Time of one thread in which a model is fitted to the profile of a fiber. */
@@ -89,7 +89,7 @@ static void plan_voxels(struct job_plan *plan, size_t i, const struct voxel_stag
     worker_status_plan(plan->status, i, &work);
 }
 
-/* Voxels of material, of which there are fibers to trace. */
+/* Returns the voxels of material, where there are fibers to trace. */
 static double n_material(const struct job_plan *plan)
 {
     return plan->geometry.n_material_voxel > 0 ? (double)plan->geometry.n_material_voxel
@@ -143,9 +143,10 @@ static void plan_cloth(struct job_plan *plan, size_t i)
     worker_status_plan(plan->status, i, &work);
 }
 
-/* ---- the fit and what follows it ---- */
+/* ---- the fit and the stages after it ---- */
 
-/* What the fit consists of besides a plain one, which makes its time per path of the budget another. */
+/* Returns the suffix of the key for fits with further parts, whose time per path of the budget differs from a plain
+ * fit's. */
 static const char *kind_of_fit(const struct job_plan *plan)
 {
     if (plan->in->number.n > 0)
@@ -186,7 +187,7 @@ static double usual_s_per_path(const struct job_plan *plan)
 static void plan_fit(struct job_plan *plan, size_t i)
 {
     char key[SPEED_BOOK_KEY_BYTES];
-    /* a table ends a fit by its misfit, photographs by their noise: both take other shares of what is expected */
+    /* a table ends a fit by its misfit, photographs by their noise: their shares of the expected paths differ */
     snprintf(key, sizeof key, "fit.%.40s%s%s.paths", plan->in->doc->fit.method, kind_of_fit(plan),
              plan->in->doc->rows.n_photograph > 0 ? "+photographs" : "+table");
     const double path_s = usual_s_per_path(plan), of_fit = plan->in->doc->scan.given ? fit_share : 1.0;
@@ -212,7 +213,7 @@ static double s_per_path(const struct job_plan *plan)
     return n > 0.0 ? s / n : NAN;
 }
 
-/* The best model by what is known: before the validation, its errors count as 0. */
+/* Returns the best model so far: before the validation, its errors count as 0. */
 static size_t best_model(const struct job_plan *plan)
 {
     static const struct validation none;

@@ -1,5 +1,4 @@
-/* What each stage of a job has to do, in units of work whose speed can be remembered: voxels, paths, seconds of the
- * fit. */
+/* Plans the work of each stage of a job, in units whose speed can be remembered: voxels, paths, seconds of the fit. */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_PLAN_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_PLAN_H
 
@@ -14,7 +13,7 @@ struct job_plan {
     const struct fit_output *fit;               /* its models are NULL before the fit */
     const struct validation_output *validation; /* its models are NULL before the validation */
     double stage_fraction;                      /* of the running stage, as last reported */
-    double fit_path;      /* that the fits are expected to take, with what follows them in their stage */
+    double fit_path;      /* that the fits are expected to take, with the other work of their stage */
     double usual_wall_s;  /* of the whole job, by the speeds of a common machine (job_need.h) */
     double certificate_s; /* processor time of the gradient certificates, on one thread (plan_probe.h) */
     double path_share;    /* time of a path in this cloth over that in a closed one */
@@ -23,8 +22,8 @@ struct job_plan {
 /* A plan of a job whose inputs have been read. */
 void job_plan_init(struct job_plan *plan, const struct stage_tools *tools, const struct job_inputs *in);
 
-/* Plans stage i, of this name (stage_table.h), by what is known now: before the first stage by the job document and the
- * size of its files, later by what earlier stages have found. */
+/* Plans stage i, of this name (stage_table.h): before the first stage by the job document and the size of its files,
+ * later by the outputs of earlier stages. */
 void pipeline_plan_stage(struct job_plan *plan, const char *name, size_t i);
 /* Plans the stage "volume", which runs, anew: the scan of n voxels has hollow fibers, which are traced to fill their
  * lumens. */

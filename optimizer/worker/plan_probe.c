@@ -8,8 +8,9 @@
 
 /* The certificate prepares a model at four points for each free parameter (derivative_check.h). */
 static const double points_of_parameter = 4.0;
-/* Layers of fibers after which a path's time is 63 % of that in a closed cloth: weaves of straight fibers with areas of
- * 0.8, 2.3, 4.6, 9.2 and 18.4 tiles, whose rows textile.v3 was fitted to, took 0.30, 0.56, 0.84, 0.97 and 1 of it. */
+/* Layers of fibers after which a path's time is 63 % of its time in a closed cloth: weaves of straight fibers with
+ * areas of 0.8, 2.3, 4.6, 9.2 and 18.4 tiles, whose rows textile.v3 was fitted to, took 0.30, 0.56, 0.84, 0.97 and 1 of
+ * it. */
 static const double layers = 2.5, least_path_share = 0.1;
 /* Larger files have the fibers of a closed cloth, and reading them would take longer than the rest of a plan. */
 enum { FIBER_FILE_MOST_BYTES = 4 << 20 };

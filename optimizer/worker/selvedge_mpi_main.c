@@ -3,9 +3,9 @@
  * no rights for transports, and machines without MPI need no library of it. The worker gets "--team FD,RANK,RANKS", or
  * "--team none" when it is alone.
  *
- * The loop sleeps while nothing happens, and wakes at once when the worker sends. Exit status: that of the worker;
- * EXIT_LOST when another rank is lost, whereupon MPI ends all of them; EXIT_FORBIDDEN when a rank was lost because its
- * sandbox has ended it. */
+ * The loop sleeps while nothing happens, and wakes at once when the worker sends. Exit status: the worker's; EXIT_LOST
+ * when another rank is lost, whereupon MPI ends all of them; EXIT_FORBIDDEN when a rank was lost because its sandbox
+ * has ended it. */
 #include "base/ranks/rank_link.h"
 #include "base/version.h"
 
@@ -127,8 +127,8 @@ static _Noreturn void become_worker(int fd, pid_t parent, char **argv)
     _exit(EXIT_CANNOT_EXECUTE);
 }
 
-/* The child is made before MPI starts threads and opens devices, of which it must not have a copy. It blocks SIGTERM
- * and SIGINT, so that one that comes before the worker can take it is kept for it. */
+/* The child is made before MPI starts threads and opens devices, because it must not have a copy of them. It blocks
+ * SIGTERM and SIGINT, so that one that comes before the worker can take it is kept for it. */
 static bool start_worker(struct agent *a, char **argv)
 {
     int end[2];
@@ -158,7 +158,7 @@ static void send_to_rank(struct agent *a, struct message *m)
     append(&a->to_rank, m);
 }
 
-/* Reads what the worker has sent. */
+/* Reads the worker's messages. */
 static bool read_worker(struct agent *a)
 {
     bool any = false;

@@ -77,7 +77,7 @@ static status make_command(struct command *c, char **argv, size_t n_rank, size_t
 }
 
 /* In a process group of its own: a signal to the group of the launcher would make mpirun end the ranks at once, and
- * rank 0 could not keep what it has. */
+ * rank 0 could not store its state. */
 static _Noreturn void become_mpirun(const struct command *c, pid_t parent, const sigset_t *mask)
 {
     int nothing = open("/dev/null", O_RDONLY | O_CLOEXEC);
@@ -96,8 +96,8 @@ static _Noreturn void become_mpirun(const struct command *c, pid_t parent, const
     _exit(EXIT_NO_PROGRAM);
 }
 
-/* Runs mpirun once. mask: the signals that mpirun is to block. *stopped: the job was asked to end. SIGUSR1 is what
- * mpirun passes on to the ranks; one that it gets before it has started them is lost, so it gets more of them. */
+/* Runs mpirun once. mask: the signals that mpirun is to block. *stopped: the job was asked to end. mpirun passes
+ * SIGUSR1 on to the ranks; one that it gets before it has started them is lost, so it gets more of them. */
 static int run_once(const struct command *c, const sigset_t *awaited, const sigset_t *mask, bool *stopped)
 {
     const struct timespec again = {.tv_nsec = STOP_AGAIN_MS * 1000000L};
@@ -116,7 +116,7 @@ static int run_once(const struct command *c, const sigset_t *awaited, const sigs
 
 static bool is_of_worker(int code) { return code >= WORKER_SUCCEEDED && code <= WORKER_STALE; }
 
-/* Runs mpirun until the job has ended, or is lost several times at the same place. What the job has stored grows as it
+/* Runs mpirun until the job has ended, or is lost several times at the same place. The folder of the job grows as it
  * goes on. */
 static int run_until_end(const struct command *c, const char *job_folder)
 {

@@ -192,8 +192,9 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
     return -1;
 }
 
-/* Adds what this job took to the file, which other jobs may have changed meanwhile. What fails is no error of the job.
- * An attempt that went on from an earlier one, and rank 0 of several, took only a part of what the job needs. */
+/* Adds the speeds and needs of this job to the file, which other jobs may have changed meanwhile. A failure here is no
+ * error of the job. An attempt that went on from an earlier one, and rank 0 of several, have taken only a part of the
+ * job's needs. */
 static void remember_speeds(const struct job_plan *plan, const char *path, bool alone)
 {
     struct speed_book book;
@@ -309,7 +310,7 @@ static void report_sandbox_of_helper(const struct arguments *a, const struct err
 /* The job is not run. */
 static bool files_only(const struct arguments *a) { return a->check != NULL || a->plan; }
 
-/* Enters the sandbox. Returns only in it, or without one; report_sandbox says what then failed. */
+/* Enters the sandbox. Returns only in it, or without one; report_sandbox then reports the failure. */
 static void enter_sandbox(struct arguments *a, char **argv, struct error *err)
 {
     struct confinement *c = &a->confinement;
@@ -317,7 +318,7 @@ static void enter_sandbox(struct arguments *a, char **argv, struct error *err)
     char document[WORKER_PATH_BYTES], input[WORKER_PATH_BYTES];
     struct confine_files files = {
         .folder = a->folder, .document = a->check, .speeds = a->speeds, .no_links = a->no_links, .none = is_helper(a)};
-    if (a->plan) { /* which reads what a check reads */
+    if (a->plan) { /* which reads the same files as a check */
         snprintf(job.path, sizeof job.path, "%s", a->folder);
         worker_folder_path(&job, JOB_FILE_DOCUMENT, NULL, document);
         worker_folder_path(&job, JOB_FOLDER_INPUT, NULL, input);

@@ -75,7 +75,7 @@ status worker_team_join(char **argv, struct error *err)
     return error_set_errno(err, "cannot execute '%s'", program);
 }
 
-/* What must be the same in all ranks for their paths to be the same, bit by bit. */
+/* Values that must be equal in all ranks for equal paths, bit by bit. */
 static void describe_self(char text[TEXT_BYTES])
 {
     const char *processor = "other";

@@ -36,13 +36,13 @@ status worker_team_open(struct worker_team *t, const struct worker_team_place *p
 /* Ends the other ranks, takes the pool from them, and says in the log when one is lost. pool: NULL where there is
  * none. */
 void worker_team_close(struct worker_team *t, struct thread_pool *pool, struct log *log);
-/* At both ends of a stage: says in the log what the ranks have exchanged in it. */
+/* At both ends of a stage: logs the traffic between the ranks. */
 void worker_team_begin_stage(struct thread_pool *pool, struct rank_traffic *before);
 void worker_team_end_stage(struct thread_pool *pool, const struct rank_traffic *before, const char *stage,
                            struct log *log);
 /* Another rank is lost, so the job cannot go on in this process. */
 bool worker_team_lost(const struct worker_team *t);
-/* The other ranks: traces what rank 0 asks for until it ends. Returns the exit status. */
+/* The other ranks: traces at the request of rank 0 until it ends. Returns the exit status. */
 int worker_team_help(const struct worker_team_place *place, size_t n_thread);
 
 #endif

@@ -11,8 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* BUDGET_FACTOR: where the job states no path budget, that of the method is multiplied by it. LEAST_FITS: joint and
- * final fit have at least so many times the least paths of the method. */
+/* BUDGET_FACTOR: multiplies the method's path budget where the job states none. LEAST_FITS: joint and final fit have at
+ * least so many times the least paths of the method. */
 enum { BUDGET_FACTOR = 3, SHORTENINGS = 8, SCREEN_ITERATIONS = 6, LEAST_FITS = 2 };
 /* Shares of the paths, at most: of the screening, and of the final fit. */
 static const double screen_share = 0.25, final_share = 0.4;
@@ -55,7 +55,7 @@ static status check_company(const struct job_inputs *in, struct error *err)
     return STATUS_OK;
 }
 
-/* All numbers that the cloth has: those of its description, or its corrections. */
+/* Returns all numbers of the cloth: the numbers of its description, or its corrections. */
 static const struct cloth_number *numbers_of(const struct job_cloth *cloth, size_t *n)
 {
     const struct cloth_description *d = cloth->description;
@@ -129,7 +129,7 @@ struct pipeline_cloth_trace {
     struct cloth_estimator cloth;
     struct estimator live;
     struct estimate_journal *journal;
-    bool final;             /* the next cloths are those of a final fit */
+    bool final;             /* the next cloths belong to a final fit */
     size_t n_built, i_next; /* the cloths of one iteration; the next of them to be replaced */
     struct built {
         double number[CLOTH_MAX_FITTED];
@@ -274,7 +274,7 @@ uint64_t pipeline_cloth_least_budget(const struct cloth_numbers *number, uint64_
 {
     double n_screen = n_extra > 0 ? 1.0 + (double)n_extra : 0.0, n_final = n_extra > 0 ? 2.0 : 1.0;
     size_t n_free = n_free_number(number);
-    /* a moved cloth takes a block of paths at least, a quarter of those of the cloth itself */
+    /* a moved cloth takes a block of paths at least, a quarter of the paths of the cloth itself */
     double moved = 0.25 * (double)cloth_estimator_n_moved(CLOTH_MOVES_BALANCED, n_free);
     double joint = LEAST_FITS * fmax(1.0 + moved, cloth_estimator_cost(CLOTH_MOVES_BALANCED, n_free));
     double later = n_extra > 0 ? 1.0 : 0.0; /* cloths that a search after the first one screens */

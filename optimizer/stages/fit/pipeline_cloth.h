@@ -40,12 +40,13 @@ void pipeline_cloth_close(struct pipeline_cloth_trace *t);
 status pipeline_cloth_fit(struct pipeline_cloth_trace *trace, const struct pipeline_joint *j,
                           const struct fit_problem *problem, struct model_fit *fit, struct error *err);
 
-/* Least number of paths that n_start searches take however small the budget is: the screening of n_extra starts, the
- * joint fits with their differences, and the final fits. least: that of one fit by the method alone. */
+/* Returns the least number of paths that n_start searches take, however small the budget is: for the screening of
+ * n_extra starts, the joint fits with their differences, and the final fits. least: the least paths of one fit by the
+ * method alone. */
 uint64_t pipeline_cloth_least_budget(const struct cloth_numbers *number, uint64_t least, size_t n_start,
                                      size_t n_extra);
 
-/* Makes the fibers and the scene of `made` those of the model's fitted numbers, if they are not. Does nothing
+/* Builds the fibers and the scene of `made` at the model's fitted numbers, unless `made` has them already. Does nothing
  * without numbers. */
 status pipeline_cloth_use(const struct cloth_job *job, const struct model_fit *fit, size_t i_model,
                           struct made_cloth *made, struct error *err);

@@ -9,7 +9,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-/* Paths of a row and replica when a fit is scored: a share of those of the fit, between two bounds. */
+/* Paths of a row and replica when a fit is scored: a share of the paths of the fit, between two bounds. */
 static const double score_share = 0.1, score_least = 4096.0, score_most = 65536.0;
 
 bool pipeline_correction_applies(const struct job_cloth *cloth, const struct cloth_numbers *number)

@@ -1,5 +1,5 @@
-/* What the corrections of scanned or given fibers gain: the same model is fitted to the fibers without them, and both
- * fits are scored on the held-out rows. */
+/* Measures the gain by the corrections of scanned or given fibers: fits the same model to the fibers without
+ * corrections, and scores both fits on the held-out rows. */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_CORRECTION_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_CORRECTION_H
 

@@ -210,7 +210,7 @@ static void announce_model(const struct fit_listener *l)
     log_info(job->tools->log, "%s", message);
 }
 
-/* Fits the model, and carries the errors of scanned fibers into those of its parameters. */
+/* Fits the model, and carries the errors of scanned fibers into the errors of its parameters. */
 static status run_fit(struct fit_listener *l, const struct progress *progress, struct error *err)
 {
     const struct cloth_job *job = l->in->job;

@@ -1,4 +1,4 @@
-/* Converts the fit options of the job document (file units) to those of the optimizer (internal units). */
+/* Converts the fit options of the job document (file units) to options of the optimizer (internal units). */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_FIT_OPTION_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_FIT_OPTION_H
 

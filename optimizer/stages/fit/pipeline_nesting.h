@@ -1,11 +1,12 @@
-/* The fit of a model that contains another model of the job (MODEL_CONTAINS in base/catalogue/models.def) comes after
- * that of the other and starts from its result too, so that it does not end worse. */
+/* The order of the fits where a model contains another model of the job (MODEL_CONTAINS in base/catalogue/models.def).
+ * The contained model is fitted first, and its result is a further start of the containing model, which therefore does
+ * not end worse. */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_NESTING_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_NESTING_H
 
 #include "optimizer/stages/fit_stages.h"
 
-/* The order of the fits: that of the job, except that a contained model comes first. */
+/* Writes the order of the fits: the job's order, except that a contained model comes first. */
 void pipeline_fit_order(const struct model_setup *model, size_t n_model, size_t order[JOB_MAX_MODEL]);
 /* Number of starts that contained models add to the fit of model i_model. */
 size_t pipeline_n_nested_start(const struct model_setup *model, size_t n_model, size_t i_model);

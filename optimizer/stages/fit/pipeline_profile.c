@@ -7,7 +7,7 @@
 
 #include <stdlib.h>
 
-/* Copies what the results show of any fit. */
+/* Copies the members that the results show of any fit. */
 static void take_fit(const struct model_setup *m, struct model_fit *fit)
 {
     const struct profile_fit *f = &fit->profile;

@@ -2,12 +2,11 @@
  * axes stay), the first surface model of the job is fitted to each, and the minimum of the objective over the radius is
  * found with the noise taken into account (noisy_minimum.h). Derivatives by the radius are not needed.
  *
- * Standard error of ln radius: the place's own (Monte-Carlo), and what residuals leave open: a change of the objective
- * by s2 = f / (rows - free parameters - 1) is one standard error (s2 is not below what the photographs' own errors
- * make it), so var = 2 s2 / curvature, as for any least squares.
- * A radius that the photographs do not determine is left as it was; one at the edge of its range is taken there. Each
- * fit has a journal of its own, so the search resumes bit by bit.
- */
+ * Standard error of ln radius: the Monte-Carlo error of the minimum, and an error by the residuals: a change of the
+ * objective by s2 = f / (rows - free parameters - 1) is one standard error (s2 is at least the value that the
+ * photographs' stated errors give), so var = 2 s2 / curvature, as for any least squares. A radius that the photographs
+ * do not determine is left as it was; one at the edge of its range is taken there. Each fit has a journal of its own,
+ * so the search resumes bit by bit. */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_RADIUS_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_RADIUS_H
 

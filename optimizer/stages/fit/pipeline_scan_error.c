@@ -29,7 +29,7 @@ static const struct param_info number_info[N_NUMBER] = {
 /* Between the axes as they should be and as they are: noise may have been left in them (-1), or as much of their own
  * waves been smoothed away (1). Uniform between the two. */
 static const double noise_sd = 0.57735;
-/* Paths of one of the cloths, as a share of those of the fit; move of a number as a share of its range. */
+/* Paths of one of the cloths, as a share of the paths of the fit; move of a number as a share of its range. */
 static const double path_share = 0.1, difference_share = 0.25;
 
 struct scan_trace {

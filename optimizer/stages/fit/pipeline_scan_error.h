@@ -1,4 +1,4 @@
-/* Carries the errors of scanned fibers into those of the scattering parameters.
+/* Carries the errors of scanned fibers into the errors of the scattering parameters.
  *
  * The reconstruction measures them (geometry/reconstruct.h): the radius by two methods, and the direction noise of the
  * axes. They become two numbers of the cloth: a factor of all radii, and the variance of the direction noise in units

@@ -1,4 +1,4 @@
-/* What the stages "fit" and "validation" share: the path tracer of one model behind a journal, and the progress of one
+/* Shared by the stages "fit" and "validation": the path tracer of one model behind a journal, and the progress of one
  * model out of several. */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_TRACE_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_TRACE_H

@@ -188,7 +188,7 @@ static status select_rows(struct job_inputs *in, struct error *err)
                : s;
 }
 
-/* Adds what a plain BRDF expects between the rows of the fit. */
+/* Adds the radiances that a plain BRDF expects between the rows of the fit. */
 static status expect_rows(const struct stage_tools *tools, struct job_inputs *in, struct error *err)
 {
     const double strength = in->doc->fit.plain_prior;

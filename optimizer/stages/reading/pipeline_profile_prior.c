@@ -77,7 +77,7 @@ static size_t take_parameter(const struct stage_tools *tools, const char *profil
     return n;
 }
 
-/* What priors are taken for. */
+/* The cloth and the fit whose parameters get the priors. */
 struct prior_taking {
     const struct stage_tools *tools;
     const struct job_cloth *cloth;

@@ -1,4 +1,4 @@
-/* A job that takes what another one found of the profile of a single fiber as the priors of its parameters. */
+/* Priors from another job: the parameters that it fitted to the profile of a single fiber become priors of this job. */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_PROFILE_PRIOR_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_PROFILE_PRIOR_H
 
@@ -8,7 +8,7 @@
 struct job_cloth;
 
 /* Copies result.json of the job that the document names to JOB/adopted/profile/, unless it is there: before the worker
- * enters its sandbox, in which it sees its own folder alone. What is missing is reported by the next function. */
+ * enters its sandbox, in which it sees its own folder alone. The next function reports files that are missing. */
 void pipeline_copy_profile(const struct worker_folder *own, const char *profile_job);
 /* Adds priors to the models of the document. A parameter takes the value and the standard error of the parameter of the
  * same name, in each set of a cloth of several groups, unless it is fixed or tied or has a prior here, or was fixed,

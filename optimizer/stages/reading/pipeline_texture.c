@@ -11,7 +11,7 @@
 
 /* Below this confidence a contradiction is not certain. */
 static const double LEAST_CERTAIN = 0.7;
-/* Counted threads that differ by more than this share from those of the photograph contradict it. */
+/* Counted threads that differ by more than this share from the threads of the photograph contradict it. */
 static const double THREADS_OFF = 0.1;
 
 /* The job's draft in the order of a detected one: row 0 is the upper weft. The draft of a cloth without one repeat of

@@ -1,4 +1,4 @@
-/* Start values of a described cloth from the photograph that shows its weave: what the job leaves out, and the
+/* Start values of a described cloth from the photograph that shows its weave: values that the job leaves out and the
  * photograph shows with some confidence. Each value that is taken is listed in texture_guess.taken. */
 #ifndef SELVEDGE_OPTIMIZER_TEXTURE_START_H
 #define SELVEDGE_OPTIMIZER_TEXTURE_START_H
@@ -15,8 +15,8 @@
  * stay. STATUS_INVALID, field "cloth.texture_px_per_mm": a scale that gives impossible threads. */
 status texture_take_widths(struct job_cloth *cloth, struct texture_guess *texture, struct error *err);
 
-/* Starts the parameters C_TT of named kinds of yarn at the colors of the photograph, with cloth.texture_colors.
- * Brightness is that of the fitted rows that are lit from the front. A value, a start, a prior or a tie of the job
+/* Starts the parameters C_TT of named kinds of yarn at the colors of the photograph, with cloth.texture_colors. The
+ * brightness is taken from the fitted rows that are lit from the front. A value, a start, a prior or a tie of the job
  * stays. */
 void texture_take_colors(const struct stage_tools *tools, struct job_inputs *in);
 

@@ -6,8 +6,8 @@
 
 enum { PROGRAM_MAX_BYTES = 256 << 20 };
 
-/* Checksum of the running program, because another build may trace other numbers, which must not be mixed with those
- * of an earlier run. 0 where the system does not show the program. */
+/* Checksum of the running program, because another build may trace other numbers, which must not be mixed with the
+ * numbers of an earlier run. 0 where the system does not show the program. */
 static uint32_t program_sum(void)
 {
     char *text = NULL;

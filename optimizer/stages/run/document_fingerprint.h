@@ -1,4 +1,5 @@
-/* What a checkpoint depends on besides the input files: the text of the job document, and the program. */
+/* Checksum of the two things that a checkpoint depends on besides the input files: the text of the job document, and
+ * the program. */
 #ifndef SELVEDGE_OPTIMIZER_DOCUMENT_FINGERPRINT_H
 #define SELVEDGE_OPTIMIZER_DOCUMENT_FINGERPRINT_H
 

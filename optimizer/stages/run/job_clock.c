@@ -4,18 +4,18 @@
 #include <stdio.h>
 
 /* Standard deviations of the logarithm of a time: at least; of the factor by which this job is slower than earlier
- * ones; and of a stage by this job's own speed. The scatter between jobs of all kinds counts like that of this many
- * remembered jobs. */
+ * ones; and of a stage by this job's own speed. The scatter between jobs of all kinds counts as much as the scatter of
+ * this many remembered jobs. */
 static const double sd_least = 0.08, sd_factor = 0.4, sd_own = 0.3, usual_jobs = 0.5;
 /* The same of elapsed time over the passed share x, times (1 - x) / sqrt(x): by a remembered curve; by a straight line
- * or what the stage predicts itself; and by a usual curve, which is that of other scans: of four, at half of the
- * fraction of tracing fibers 35 to 73 % of the time had passed, and at two thirds 58 to 95 %. */
+ * or the stage's own prediction; and by a usual curve, taken from four other scans: at half of the fraction of tracing
+ * fibers 35 to 73 % of the time had passed, and at two thirds 58 to 95 %. */
 static const double sd_by_curve = 0.2, sd_by_line = 0.35, sd_by_usual = 1.0;
 static const double usual_curve_jobs = 1.0;
 /* Share of a stage's time in one of SPEED_CURVE_POINTS parts of its fraction from which on the fraction has waited. */
 static const double long_wait = 0.1;
-/* A stage whose time varies by more than this between jobs says nothing about the speed of the machine. The filters of
- * a scan took 0.5 to 4.2 times what is usual where its tracing took 1.0 to 1.3 times that on the same machine. */
+/* A stage whose time varies by more than this between jobs says nothing about the speed of the machine. On one machine
+ * the filters of scans took 0.5 to 4.2 times their usual time, while tracing took 1.0 to 1.3 times its usual time. */
 static const double most_sd_of_speed = 0.6;
 /* A stage below this many seconds is not remembered and says nothing about the others. */
 static const double least_s = 0.3;
@@ -69,7 +69,7 @@ void job_clock_plan_own(struct job_clock *c, size_t i, const char *key, double s
     c->stage[i].log_sd = fmin(c->stage[i].log_sd, sd_own);
 }
 
-/* Factor by which the stages of this job take longer than expected, shrunk towards 1 by what they do not tell. */
+/* Factor by which the stages of this job take longer than expected, shrunk towards 1 where few stages have ended. */
 static double slower_by(const struct job_clock *c)
 {
     double sum = 0.0, weight = 1.0 / (sd_factor * sd_factor);
@@ -96,8 +96,8 @@ static double expected_s(const struct job_clock *c, const struct job_clock_stage
     return s->planned ? s->expected_s * (s->own_speed ? 1.0 : slower_by(c)) : 0.0;
 }
 
-/* Share of the stage's time that has passed at a fraction, of which `likely` is what its elapsed time says. Where the
- * fraction of earlier jobs has waited, as between the parts of a stage, the share may lie anywhere in the waiting. */
+/* Share of the stage's time that has passed at a fraction. likely: the share by its elapsed time. Where the fraction of
+ * earlier jobs has waited, as between the parts of a stage, the share may lie anywhere in the waiting. */
 static double share_at(const struct job_clock_stage *s, double fraction, double likely)
 {
     double x = fmin(fmax(fraction, 0.0), 1.0) * SPEED_CURVE_POINTS;
@@ -206,7 +206,7 @@ double job_clock_expected_s(const struct job_clock *c, size_t i)
     return expected_s(c, s) * (s->i_of_plus_one > 0 ? expected_s(c, &c->stage[s->i_of_plus_one - 1]) : 1.0);
 }
 
-/* Time that the job has taken, with the expected time of what earlier attempts did. */
+/* Time that the job has taken, with the expected time of the stages that earlier attempts did. */
 static double taken_s(const struct job_clock *c, double now_s)
 {
     double taken = now_s - c->began_s;

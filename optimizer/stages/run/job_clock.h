@@ -1,14 +1,14 @@
-/* Predicts when a job ends: its stages with the work that they have, the speeds of earlier jobs (speed_book.h), and
- * what this job has shown so far.
+/* Predicts when a job ends: its stages with the work that they have, the speeds of earlier jobs (speed_book.h), and the
+ * speed of this job so far.
  *
  * Before it runs, a stage is expected to take units x seconds per unit, times a factor by which those finished stages
- * of this job were slower than expected whose time hardly varies between jobs. While it runs, that is combined with
- * its elapsed time over the share of its time that has passed at its fraction, each weighted by its uncertainty
- * (logarithms of times are taken to be normal). A stage that predicts its own end (a fit) has a fraction that runs
- * evenly with time, but for what such predictions were off in earlier jobs; its time says nothing about the speed of
- * other stages. The stated fraction of the job is elapsed time over elapsed and remaining time; it never falls, and
- * it rises by at most JOB_CLOCK_STEP between two looks and in a second; in a second also by twice what is even, where
- * a job is short. Times are of the monotonic clock, in seconds. Not thread-safe. */
+ * of this job were slower than expected whose time hardly varies between jobs. While it runs, that is combined with its
+ * elapsed time over the share of its time that has passed at its fraction, each weighted by its uncertainty (logarithms
+ * of times are taken to be normal). A stage that predicts its own end (a fit) has a fraction that runs evenly with
+ * time, except for the errors of such predictions in earlier jobs; its time says nothing about the speed of other
+ * stages. The stated fraction of the job is elapsed time over elapsed and remaining time; it never falls, and it rises
+ * by at most JOB_CLOCK_STEP between two looks and in a second; where a job is short, in a second also by twice the even
+ * rate. Times are of the monotonic clock, in seconds. Not thread-safe. */
 #ifndef SELVEDGE_OPTIMIZER_JOB_CLOCK_H
 #define SELVEDGE_OPTIMIZER_JOB_CLOCK_H
 
@@ -22,7 +22,7 @@ enum { JOB_CLOCK_MAX_STAGE = 16 };
 struct job_clock_stage {
     char key[SPEED_BOOK_KEY_BYTES];
     bool planned, began, ended, loaded; /* loaded: an earlier attempt has done it */
-    size_t i_of_plus_one;               /* its units are a share of that stage's time; 0: they are not */
+    size_t i_of_plus_one;               /* its units are a share of the time of that stage; 0: they are not */
     bool own_speed;                     /* its units are seconds by this job's own speed: the factor is not applied */
     bool predicts_end;                  /* job_clock_work.predicts_end */
     double units, expected_s, log_sd;
@@ -48,12 +48,12 @@ struct job_clock_look {
     double eta_low_s, eta_high_s; /* two standard deviations either way; NaN where that is less than a quarter */
 };
 
-/* What a stage has to do: units > 0, of which one takes about usual_s seconds where no speed is remembered under the
- * key. log_sd: standard deviation of the logarithm of a stage's time between jobs of all kinds. */
+/* The work of a stage: units > 0, each of about usual_s seconds where no speed is remembered under the key. log_sd:
+ * standard deviation of the logarithm of a stage's time between jobs of all kinds. */
 struct job_clock_work {
     const char *key;
     double units, usual_s, log_sd;
-    bool predicts_end; /* its fraction is that of the work that the stage itself expects */
+    bool predicts_end; /* its fraction is a share of the work that the stage itself expects */
     /* as speed_entry.curve, of jobs on other machines; NULL: a straight line. Where nothing is remembered. */
     const double *usual_curve;
 };
@@ -68,8 +68,8 @@ void job_clock_plan_own(struct job_clock *c, size_t i, const char *key, double s
 /* The same, where the stage takes about a share of the time of the earlier stage i_of. */
 void job_clock_plan_share(struct job_clock *c, size_t i, const char *key, double share, size_t i_of);
 
-/* Seconds that a stage is expected to take by what is known without its own progress, also one that takes a share of
- * another's time; 0 where it is not planned. */
+/* Seconds that a stage is expected to take, its own progress left out; also of a stage that takes a share of another's
+ * time; 0 where it is not planned. */
 double job_clock_expected_s(const struct job_clock *c, size_t i);
 void job_clock_begin(struct job_clock *c, size_t i, double now_s);
 void job_clock_fraction(struct job_clock *c, double stage_fraction, double now_s);

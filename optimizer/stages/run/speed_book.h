@@ -29,7 +29,7 @@ void speed_book_read(const char *path, struct speed_book *book);
 status speed_book_write(const char *path, const struct speed_book *book, struct error *err);
 /* NULL when there is none. */
 const struct speed_entry *speed_book_find(const struct speed_book *book, const char *key);
-/* Adds what one job has measured: seconds > 0 and units > 0. A full book forgets its first entry. */
+/* Adds the measurement of one job: seconds > 0 and units > 0. A full book forgets its first entry. */
 void speed_book_add(struct speed_book *book, const char *key, double seconds, double units,
                     const double curve[SPEED_CURVE_POINTS]);
 

@@ -11,7 +11,7 @@
 #include "optimizer/stages/run/worker_folder.h"
 #include "optimizer/stages/run/worker_status.h"
 
-/* How a stage tells what it has found out about the work that is left. Either may be called at any time. */
+/* Functions by which a stage reports news about the work that is left. Either may be called at any time. */
 struct stage_plan {
     void *context;
     /* The scan of n voxels has hollow fibers, which are traced to fill their lumens. */

@@ -39,9 +39,9 @@ status worker_folder_replace(const struct worker_folder *f, const char *path, co
  * before anything is written; one that cannot be removed does no harm. */
 void worker_folder_sweep(const struct worker_folder *f);
 
-/* Compares the fingerprint of the inputs with that of the run before. When it is another one (a document or a file was
- * edited by hand) or there is none, everything that was computed before is removed: work/, results/, series.rec.
- * *changed: there was another one. */
+/* Compares the fingerprint of the inputs with the fingerprint of the run before. When it is another one (a document or
+ * a file was edited by hand) or there is none, everything that was computed before is removed: work/, results/,
+ * series.rec. *changed: there was another one. */
 status worker_folder_claim_inputs(const struct worker_folder *f, uint64_t fingerprint, bool *changed,
                                   struct error *err);
 

@@ -43,7 +43,7 @@ double worker_status_expected_s(struct worker_status *st, size_t i_stage);
 void worker_status_stage(struct worker_status *st, const char *name, const char *title, size_t i_stage, size_t n_stage);
 void worker_status_stage_end(struct worker_status *st, bool loaded);
 void worker_status_fraction(struct worker_status *st, double stage_fraction);
-/* Measures the running stage from here on, because what is done so far was done by an earlier attempt. */
+/* Measures the running stage from here on, because an earlier attempt did the part before. */
 void worker_status_restart_eta(struct worker_status *st);
 /* Adds the speeds of this attempt's stages to the book. */
 void worker_status_remember(struct worker_status *st, struct speed_book *book);

@@ -1,4 +1,4 @@
-/* The fiber file of a job: read with the tile of the document, and compared with what fibers of cloth are. */
+/* The fiber file of a job: read with the tile of the document, and compared with usual fibers of cloth. */
 #ifndef SELVEDGE_OPTIMIZER_FIBER_FILE_H
 #define SELVEDGE_OPTIMIZER_FIBER_FILE_H
 
@@ -13,10 +13,10 @@
 /* Reads the file into f (initialised): text when the name ends with ".txt", otherwise the hair format. Fields
  * OPTION_FIBER_FILE, OPTION_TILE. STATUS_INVALID for a missing tile and for fibers as wide as it. */
 status fiber_file_read(const char *path, const struct job_cloth *cloth, struct fiber_set *f, struct error *err);
-/* Warns of fibers that are thinner or thicker than those of cloth, and of a tile that the fibers do not fill or leave
+/* Warns of fibers that are thinner or thicker than fibers of cloth, and of a tile that the fibers do not fill or leave
  * far behind: a length in a wrong unit makes both. */
 void fiber_file_warn(const struct fiber_set *f, const struct job_cloth *cloth, const struct warning_sink *warn);
-/* Warns of a mean diameter in metres that no textile fiber has. option: what states the lengths. */
+/* Warns of a mean diameter in metres that no textile fiber has. option: the option that states the lengths. */
 void fiber_file_warn_diameter(double diameter_m, const char *option, const struct warning_sink *warn);
 
 #endif

@@ -48,7 +48,8 @@ static void link_file(const struct worker_folder *other, const struct worker_fol
     if (link(from, to) != 0 || chmod(to, S_IRUSR) != 0) return; /* pipeline_adopt_geometry finds that it is missing */
 }
 
-/* What of another job is linked: its document, its fingerprint, and for each stage the mark and the checkpoint. */
+/* Visits the files of another job that are linked: its document, its fingerprint, and for each stage the mark and the
+ * checkpoint. */
 static void visit_files(const struct worker_folder *other, const struct worker_folder *own,
                         void (*visit)(const struct worker_folder *other, const struct worker_folder *own,
                                       const char *name))

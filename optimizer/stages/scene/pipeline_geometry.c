@@ -157,8 +157,8 @@ static bool wants_fibers(const struct directions_input *in)
     return in->scan->unresolved_fibers;
 }
 
-/* Drops the fibers that the scan does not show, unless they are wanted. The voxels have taken their directions, which
- * are smoother than those of the filter. */
+/* Drops the fibers that the scan does not show, unless they are wanted. The voxels have taken the fibers' directions,
+ * which are smoother than the filter's. */
 static void drop_unseen(const struct directions_input *in, struct directions_output *out)
 {
     if (wants_fibers(in)) out->geometry.grade.n_dropped = 0;

@@ -31,7 +31,7 @@ static double judged_square(const struct pipeline_model *m, enum pipeline_choice
     return choice == CHOICE_CROSS_VALIDATION ? m->fit->result.cross_validation.rel_square : fitted_error(m)->rel_square;
 }
 
-/* Error of b minus that of a as relative squares, and its standard error. */
+/* Returns the error of b less the error of a, as relative squares; se: its standard error. */
 static double difference(const struct pipeline_model *a, const struct pipeline_model *b, enum pipeline_choice choice,
                          double *se)
 {

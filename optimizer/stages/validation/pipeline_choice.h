@@ -1,5 +1,5 @@
-/* Which of a job's models is the best, and by what it was chosen. Held-out rows have no part in the choice, so their
- * error is that of rows that neither the fit nor the choice has seen. */
+/* Chooses the best of a job's models. Held-out rows have no part in the choice, so neither the fit nor the choice has
+ * seen the rows of the held-out error. */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_CHOICE_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_CHOICE_H
 
@@ -22,8 +22,8 @@ const char *pipeline_choice_id(enum pipeline_choice choice);
  * unknown. Where all have as many unknowns as values, the lowest error by cross-validation decides. */
 size_t pipeline_best_model(const struct pipeline_model *model, size_t n_model);
 
-/* Warns of models whose error equals that of the best one within the noise, so that the choice between them is chance,
- * and of a choice by the fitted rows. */
+/* Warns of models whose error equals the error of the best one within the noise, so that the choice between them is
+ * chance, and of a choice by the fitted rows. */
 void pipeline_warn_choice(struct worker_status *st, const struct pipeline_model *model, size_t n_model);
 
 #endif

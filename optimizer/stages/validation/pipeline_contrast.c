@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-/* Other random numbers than those of the means (pipeline_validation.c). */
+/* Random numbers that the means (pipeline_validation.c) do not use. */
 enum { ITERATION = 2 };
 _Static_assert((int)JOB_MAX_TEXTURE_CELLS <= (int)CONFIGURATION_MAX_CELLS, "the renderer takes every texture of a job");
 

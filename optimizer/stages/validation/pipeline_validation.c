@@ -93,7 +93,7 @@ static void plan_validation(const struct cloth_job *job, const struct pipeline_m
     }
 }
 
-/* Converts one replica of row i to what its photograph would show. */
+/* Converts one replica of row i to the values that its photograph would show. */
 static void show_row(const struct observation *o, const struct pipeline_model *m, size_t i, int replica, bool own_gain,
                      struct estimate *out)
 {

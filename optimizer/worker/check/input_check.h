@@ -1,5 +1,5 @@
-/* What the checks of a job's input files share, and the checks. A check does nothing where its files are missing, which
- * is a fault already, and goes on after a fault. */
+/* The checks of a job's input files, and the record that they share. A check does nothing where its files are missing,
+ * which is a fault already, and goes on after a fault. */
 #ifndef SELVEDGE_OPTIMIZER_INPUT_CHECK_H
 #define SELVEDGE_OPTIMIZER_INPUT_CHECK_H
 

@@ -1,4 +1,4 @@
-/* What a worker says of the inputs when a job has ended with an error. */
+/* Warnings about the inputs of a job that has ended with an error. */
 #ifndef SELVEDGE_OPTIMIZER_OTHER_FAULTS_H
 #define SELVEDGE_OPTIMIZER_OTHER_FAULTS_H
 

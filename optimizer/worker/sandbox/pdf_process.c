@@ -78,7 +78,7 @@ void pdf_process_start(const struct worker_folder *folder, struct pdf_helper *he
     char prefix[WORKER_PATH_BYTES];
     int end[2];
     *helper = (struct pdf_helper){.order_fd = -1};
-    /* what does not exist yet cannot be permitted to the helper */
+    /* folders that do not exist yet cannot be permitted to the helper */
     for (size_t i = 0; i < 2; i++) {
         char own[WORKER_PATH_BYTES];
         worker_folder_path(folder, i == 0 ? JOB_FOLDER_RESULTS : JOB_FOLDER_WORK, NULL, own);

@@ -10,7 +10,7 @@
 #include <sys/prctl.h>
 #include <unistd.h>
 
-/* What libc, the thread pools and the libraries of a worker use. Landlock decides which files may be opened. */
+/* Calls of libc, the thread pools and the libraries of a worker. Landlock decides which files may be opened. */
 static const char *const needed[] = {
     /* files */
     "read", "write", "readv", "writev", "pread64", "pwrite64", "preadv", "pwritev", "open", "openat", "creat", "close",
@@ -28,12 +28,12 @@ static const char *const needed[] = {
     "sched_get_priority_max", "sched_get_priority_min", "getcpu", "rt_sigaction", "rt_sigprocmask", "rt_sigreturn",
     "rt_sigtimedwait", "rt_sigpending", "rt_sigsuspend", "sigaltstack", "restart_syscall", "exit", "exit_group",
     "wait4", "waitid",
-    /* time, and what a process asks about itself */
+    /* time, and questions of a process about itself */
     "clock_gettime", "clock_getres", "clock_nanosleep", "nanosleep", "gettimeofday", "time", "times", "getrusage",
     "getpid", "getppid", "getpgrp", "getpgid", "getsid", "getuid", "geteuid", "getgid", "getegid", "getresuid",
     "getresgid", "getgroups", "getpriority", "getrlimit", "sysinfo", "uname", "getrandom"};
 
-/* What nothing in a worker does, but code that has taken it over would. */
+/* Calls that nothing in a worker makes, but code that has taken it over would. */
 static const char *const hostile[] = {"execve",
                                       "execveat",
                                       "fork",

@@ -11,7 +11,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-/* What Debian 12's header of Linux 6.1 lacks; values of the kernel's interface, which never change. */
+/* Definitions that Debian 12's header of Linux 6.1 lacks; values of the kernel's interface, which never change. */
 enum { ACCESS_TRUNCATE = 1 << 14, ACCESS_IOCTL_DEV = 1 << 15, ACCESS_NET_TCP = 3, SCOPE_SOCKET_AND_SIGNAL = 3 };
 struct ruleset {
     uint64_t handled_access_fs, handled_access_net, scoped;

@@ -25,7 +25,8 @@ enum { HAS_SANDBOX = 0 };
 enum { HAS_SANDBOX = 1 };
 #endif
 
-/* What every worker reads: libraries, time zone, and what libc, OpenBLAS and the thread pools ask about the machine. */
+/* Files that every worker reads: libraries, the time zone, and descriptions of the machine for libc, OpenBLAS and the
+ * thread pools. */
 static const struct sandbox_path usual[] = {
     {SANDBOX_EXECUTE, "/usr"},
     {SANDBOX_EXECUTE, "/lib"},

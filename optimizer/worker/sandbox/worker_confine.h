@@ -12,7 +12,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Whether a worker runs without a sandbox, with what the kernel offers, or not at all unless that is everything. */
+/* A worker runs without a sandbox, with the parts of it that the kernel offers, or only where the kernel offers all
+ * parts. */
 enum confine_mode { CONFINE_OFF, CONFINE_AUTO, CONFINE_REQUIRED };
 
 /* Files of a worker. A check reads the folder and the document; a job has the whole folder. */
@@ -24,7 +25,7 @@ struct confine_files {
     bool no_links;        /* links of inputs out of the folder stay out of reach: a worker may have made them */
 };
 
-/* What was reached; files_version is Landlock's, 0: files are not restricted. */
+/* The parts of the sandbox that are in force; files_version is Landlock's, 0: files are not restricted. */
 struct confinement {
     bool executed; /* this is the program that worker_confine has executed */
     int files_version;
@@ -34,8 +35,8 @@ struct confinement {
 
 /* Reads "off", "auto" or "required". */
 bool confine_mode_parse(const char *text, enum confine_mode *mode);
-/* Prepares what the worker cannot do later (the helper for report.pdf, links to an adopted geometry), restricts the
- * files and executes the program with the same arguments and "--confined STATE". Returns only on failure. */
+/* Does the work that the sandbox forbids later (starts the helper for report.pdf, links an adopted geometry), restricts
+ * the files and executes the program with the same arguments and "--confined STATE". Returns only on failure. */
 status worker_confine(const struct confine_files *files, char **argv, struct error *err);
 /* Only the preparations, for a worker without a sandbox. */
 void worker_prepare(const char *folder, struct confinement *confinement);
