@@ -5,13 +5,13 @@
 #include <jansson.h>
 #include <stdio.h>
 
-/* rows: those of result.json. Rendered over measured mean radiance, logarithmic, channels in their colors, held-out
+/* rows: the rows of result.json. Rendered over measured mean radiance, logarithmic, channels in their colors, held-out
  * rows as rings. */
 void page_scatter(const json_t *rows, FILE *out);
 /* Relative error of the rows, in per cent, over one of their angles. */
 void page_errors_over(const json_t *rows, const char *angle_key, const char *title, FILE *out);
 /* Points of one channel after the other, n of each, in the order of x: dots with bars of one standard error where it is
- * stated, and a line through what was fitted. */
+ * stated, and a line through the fitted values. */
 struct page_point {
     double x, measured, se, fitted;
 };

@@ -33,7 +33,7 @@ static double exposure_of(const struct image *im)
     return exposure;
 }
 
-/* The image in width x height pixels, each the mean of those that it covers. */
+/* The image in width x height pixels, each the mean of the pixels that it covers. */
 static status shrink(const struct image *from, size_t width, size_t height, struct image *to, struct error *err)
 {
     status s = image_init(to, width, height, 3, err);

@@ -7,7 +7,7 @@
 #include <jansson.h>
 #include <stdio.h>
 
-/* rows: those of result.json. Each row has an exposure of its own for photograph and rendering, which brings the
+/* rows: the rows of result.json. Each row has an exposure of its own for photograph and rendering, which brings the
  * brightest twentieth of the photograph's pixels (of a table: of the rendering's) to white, and one for the difference
  * (rendering minus photograph about grey). Pictures that cannot be read are left out. STATUS_NO_MEMORY, STATUS_IO. */
 status page_pictures(const struct report *report, const json_t *rows, FILE *out, struct error *err);

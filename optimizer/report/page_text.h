@@ -7,9 +7,9 @@
 
 /* Text with <, >, & and quotes escaped. NULL: nothing. */
 void page_escaped(const char *text, FILE *out);
-/* A value of JSON as people read it: text, number, yes or no, list "a, b"; "-" for null and what is missing. */
+/* A value of JSON as people read it: text, number, yes or no, list "a, b"; "-" for null and for missing values. */
 void page_value(const json_t *value, FILE *out);
-/* "2.41 &plusmn; 0.05", in units of 1 / factor (100 for per cent); "-" for what is no number. */
+/* "2.41 &plusmn; 0.05", in units of 1 / factor (100 for per cent); "-" for values that are no numbers. */
 void page_with_error(const json_t *value, const json_t *se, double factor, const char *unit, FILE *out);
 /* A table of the members of an object, members of objects inside as "a.b"; long lists are left out. */
 void page_object(const json_t *object, FILE *out);

@@ -156,7 +156,7 @@ static void print_scan(const struct report *report, FILE *out)
     close_table(out);
 }
 
-/* What the phantom was made of. */
+/* The cloth and the scanner of the phantom. */
 static void print_trial_fibers(const struct scan_trial *t, FILE *out)
 {
     row(out, "radii of the phantom", "standard deviation over the mean, as traced", "%.1f %%",
@@ -171,7 +171,7 @@ static void print_trial_fibers(const struct scan_trial *t, FILE *out)
         row(out, "sections of the phantom", "those of the scan are neither flat nor hollow", "solid discs");
 }
 
-/* What such a scan can give. */
+/* The quality that such a scan can give. */
 static void print_trial(const struct scan_trial *t, bool asked, FILE *out)
 {
     if (!t->made && !asked) return;
@@ -209,7 +209,7 @@ static void figure(FILE *out, double v)
         fputs("<td class=\"number\">&ndash;</td>", out);
 }
 
-/* how: what is said of the fibers behind each label. */
+/* how: the text about the fibers behind each label. */
 static void print_seam_fibers(const struct fiber_seam *s, const char *how, FILE *out)
 {
     fprintf(out, "<tr><td>fiber ends that continue in the next tile%s</td>", how);

@@ -55,7 +55,7 @@ static void add_input(void *context, const char *name, const char *role)
                                                  hash[0] != '\0' ? json_string(hash) : json_null()));
 }
 
-/* What the page shows of a record of series.rec. */
+/* The part of a record of series.rec that the page shows. */
 static json_t *curve_point(const json_t *record)
 {
     static const char *const key[] = {"model", "step", "model_step", "objective", "objective_se", "n_path_total"};

@@ -25,7 +25,7 @@ bool report_pdf_installed(char prefix[WORKER_PATH_BYTES])
         if (n > 0 && length < (int)sizeof path && access(path, X_OK) == 0) {
             char up[WORKER_PATH_BYTES], whole[PATH_MAX];
             snprintf(up, sizeof up, "%.*s/..", n, from);
-            /* from a /bin of its own it needs no more than what every program does */
+            /* from a /bin of its own it needs only the folders that every program needs */
             bool all = realpath(up, whole) == NULL || strcmp(whole, "/") == 0;
             snprintf(prefix, WORKER_PATH_BYTES, "%s", all ? "/usr" : up);
             return true;
@@ -51,7 +51,8 @@ void report_pdf_paths(const struct worker_folder *folder, struct pdf_paths *p)
     worker_folder_path(folder, JOB_FOLDER_RESULTS, "report.pdf", p->to);
 }
 
-/* Waits for the end of the program. One that takes too long, or that of a cancelled job, ends with the worker. */
+/* Waits for the end of the program. A program that takes too long, or belongs to a cancelled job, ends with the
+ * worker. */
 static bool wait_for(const struct report *report, pid_t child)
 {
     const struct timespec pause = {0, WAIT_MS * 1000000L};

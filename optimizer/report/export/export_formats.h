@@ -1,4 +1,4 @@
-/* The formats of exports.c. Each file export_<name>.c says at its head what is in its folder. */
+/* The formats of exports.c. Each file export_<name>.c lists at its head the files of its folder. */
 #ifndef SELVEDGE_OPTIMIZER_EXPORT_FORMATS_H
 #define SELVEDGE_OPTIMIZER_EXPORT_FORMATS_H
 

@@ -23,8 +23,7 @@ static void print_fiber(FILE *text, const struct export_scene *e, size_t i)
 }
 
 /* Projected area along the fiber over that across it, of flakes that are tilted so much that they widen a reflected ray
- * as the first group's hair materials do: by twice their tilt, of which the variance is v (hair_lobes.h, equation of
- * v). */
+ * as the first group's hair materials do: by twice their tilt, whose variance is v (hair_lobes.h, equation for v). */
 static double area_along(const struct export_scene *e)
 {
     const struct hair_blend *b = &e->hair[0].blend;

@@ -216,7 +216,7 @@ status export_rows_write(const struct export_scene *e, struct error *err)
     return export_text_close(e, &t, "rows.csv", err);
 }
 
-/* ---- what the result says ---- */
+/* ---- entries of result.json ---- */
 
 json_t *export_material_json(const struct export_scene *e, size_t group, json_t *material)
 {

@@ -1,4 +1,4 @@
-/* What the scenes of all exports share: the tile of fibers and its repeats, lamp, camera and materials of the best
+/* Shared by the scenes of all exports: the tile of fibers and its repeats, lamp, camera and materials of the best
  * model. Millimetres; z = 0 is the highest point of the cloth; radiances have the unit of configuration.h.
  *
  * A format is a row of the table in exports.c and a file export_<name>.c. */
@@ -52,7 +52,7 @@ double export_radius_mm(const struct export_scene *e, size_t i);
 double export_point_radius_mm(const struct export_scene *e, size_t i, size_t k);
 /* "fibers-<group><ending>" */
 void export_fibers_name(size_t group, const char *ending, char name[32]);
-/* Writes the file of that name, with each fiber of the group as `print` does. */
+/* Writes the file with the name above, with each fiber of the group as `print` does. */
 status export_fibers_write(const struct export_scene *e, size_t group, const char *ending,
                            void (*print)(FILE *text, const struct export_scene *e, size_t i), struct error *err);
 
@@ -72,7 +72,8 @@ void export_lamp_corners(const struct export_view *v, double side_mm, double cor
 void export_cross(const double a[3], const double b[3], double out[3]);
 void export_make_unit(double v[3]);
 
-/* Repeats of the tile along x and y, and where repeat (i, j) stands. False: they do not cover what all rows see. */
+/* Repeats of the tile along x and y, and where repeat (i, j) stands. False: they do not cover the area that all rows
+ * see. */
 bool export_repeats(const struct export_scene *e, int n[2]);
 void export_repeat_at(const struct export_scene *e, const int n[2], int i, int j, double at_mm[2]);
 /* Half widths and height of the black sheet; false: the job has none. */
@@ -81,7 +82,7 @@ bool export_sheet(const struct export_scene *e, double half_mm[2], double *z_mm)
 /* rows.csv: lamp and camera of every row with its measured and rendered radiance. */
 status export_rows_write(const struct export_scene *e, struct error *err);
 
-/* Adds the name of the group to what result.json says of its material. */
+/* Adds the name of the group to the entry of its material in result.json. */
 json_t *export_material_json(const struct export_scene *e, size_t group, json_t *material);
 /* Parameters of the hair materials and the error of the conversion, of all groups. */
 json_t *export_hair_json(const struct export_scene *e);

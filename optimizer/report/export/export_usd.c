@@ -98,8 +98,9 @@ static void print_tiles(FILE *text, const struct export_scene *e)
     fprintf(text, "        }\n    }\n");
 }
 
-/* One hair material. MaterialX takes a cuticle angle of 0.5 for scales that are not tilted, and the variances of light
- * that goes through and of light that is reflected inside as 0.5^2 and 2^2 of that of the surface, as pbrt does. */
+/* One hair material. MaterialX takes a cuticle angle of 0.5 for scales that are not tilted, and takes the variances of
+ * light that goes through and of light that is reflected inside as 0.5^2 and 2^2 times the variance of the surface
+ * reflection, as pbrt does. */
 static void print_hair(FILE *text, const char *name, size_t i, const struct hair_lobes *h)
 {
     const double *a = h->absorption;

@@ -20,8 +20,8 @@ enum {
     N_WIDTH = 12
 };
 #define N_VALUE ((size_t)N_THETA_O * N_THETA_I * N_PHI * 3)
-/* Cloth scatters light many times, and what returns from it has turned round in some fiber. So the share of light
- * that is kept, against what is absorbed, counts more than the shapes of the lobes, and what turns back as much. */
+/* Cloth scatters light many times, and returning light has turned round in some fiber. So the scattered share of light,
+ * against the absorbed share, counts more than the shapes of the lobes, and the share that turns back as much. */
 static const double albedo_weight = 4.0, turned_weight = 1.0, least_absorbed = 0.1, least_turned = 0.005;
 enum side { TURNS_BACK, GOES_ON, N_SIDE };
 /* roughness, roughness, index, ln absorption of each material; share of the second one */

@@ -7,8 +7,8 @@
 
 enum { HAIR_FIT_N_BLEND = 2 };
 
-/* Two hair materials, of which each point of a fiber has the second with the probability second_share: one material
- * has one roughness for the light that is reflected and for the light that goes through. */
+/* Two hair materials. A point of a fiber has the second one with the probability second_share, because one material has
+ * one roughness for the light that is reflected and for the light that goes through. */
 struct hair_blend {
     struct hair_lobes lobes[HAIR_FIT_N_BLEND];
     double second_share;
@@ -19,13 +19,13 @@ struct hair_fit {
     /* Root mean square, over all pairs of directions, of the difference of both densities of scattered light, over the
      * root mean square of the fiber's own. */
     double rel_rms;
-    /* Shares of the light, means over directions, by channel: what is scattered, and what of it turns back to the side
-     * that it came from; of the fiber, and of the blend. */
+    /* Shares of the light, means over directions, by channel: all scattered light, and the part that turns back to the
+     * side of the light; for the fiber, and for the blend. */
     double albedo[3], turned[3], blend_albedo[3], blend_turned[3];
-    /* For programs with surfaces only: an opaque fiber, diffuse under a rough dielectric. Index and roughness
-     * (whose square is GGX's alpha) bring its scattering nearest to that of the fiber; the colour makes a thick
-     * cloth as bright. By the theory of Kubelka and Munk 1931 that is so if as much is absorbed for the light that
-     * turns back: (1 - albedo) / turned is the same. */
+    /* For programs with surfaces only: an opaque fiber, diffuse under a rough dielectric. Index and roughness (whose
+     * square is GGX's alpha) bring its scattering nearest to the fiber's; the colour makes a thick cloth as bright. By
+     * the theory of Kubelka and Munk 1931 that is so if as much is absorbed for the light that turns back: (1 - albedo)
+     * / turned is the same. */
     struct surface_fit {
         double diffuse[3], index, roughness;
         double rel_rms, albedo[3], turned[3]; /* of this fiber; rel_rms measured as above */

@@ -15,7 +15,7 @@ static double power_of(double x, int n)
     return y;
 }
 
-/* Longitudinal variances of the lobes, Chiang et al. 2016, equation 7 and below; the rest shares that of TRT. */
+/* Longitudinal variances of the lobes, Chiang et al. 2016, equation 7 and below; the rest has the variance of TRT. */
 static void variances(double beta_m, double v[N_LOBE + 1])
 {
     double s = 0.726 * beta_m + 0.812 * beta_m * beta_m + 3.7 * power_of(beta_m, 20);

@@ -2,10 +2,9 @@
  * scales: Chiang, Bitterli, Tappan, Burley 2016, "A Practical and Controllable Hair and Fur Model for Production Path
  * Tracing", sections 3 and 4, as in the source of pbrt. Here it is a mean over the offset h across the fiber.
  *
- * Angles as in renderer/scattering/scattering.h: th from the normal plane, ph about the fiber. What is returned is the
+ * Angles as in renderer/scattering/scattering.h: th from the normal plane, ph about the fiber. Functions return the
  * density of the light that leaves into wi, for light from wo: with S of scattering.h it is S cos(th_i). Dimensionless
- * over steradians; its integral over all wi is the share of the light that is not absorbed.
- */
+ * over steradians; its integral over all wi is the share of the light that is not absorbed. */
 #ifndef SELVEDGE_OPTIMIZER_HAIR_LOBES_H
 #define SELVEDGE_OPTIMIZER_HAIR_LOBES_H
 

@@ -24,7 +24,7 @@ static void *grow(struct twin_block *b, size_t n)
     return data + b->n_byte - n;
 }
 
-/* The nearest half float; what is too large becomes the largest one. */
+/* Returns the nearest half float; a number that is too large becomes the largest one. */
 static uint16_t half_of(float x)
 {
     const float most = 65504.0f, least_normal = 0x1p-14f;

@@ -1,4 +1,4 @@
-/* results/twin/: what the page in the browser shows the cloth from while it is turned, bent and lit
+/* results/twin/: the tables from which a page in the browser shows the cloth while it is turned, bent and lit
  * (clients/dashboard/twin). twin.json describes the tables and their error, twin.bin holds them:
  *
  *     textures   half floats [n_basis / 4][height][width][4]: W_4g .. W_4g+3 of appearance_table.h
@@ -8,8 +8,7 @@
  *     drape      unsigned 16-bit [n][n][3]: positions between `low` and `high` of a square piece over a ball, rows
  *                along the warp
  *
- * one after the other, little-endian, at the offsets that twin.json states.
- */
+ * one after the other, little-endian, at the offsets that twin.json states. */
 #ifndef SELVEDGE_OPTIMIZER_TWIN_RESULT_H
 #define SELVEDGE_OPTIMIZER_TWIN_RESULT_H
 

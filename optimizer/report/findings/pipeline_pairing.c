@@ -35,7 +35,7 @@ static size_t rotation_index(const struct observation_set *o, size_t i, size_t *
     return place;
 }
 
-/* What is compared: the brightness of a row, as measured and as rendered. */
+/* The compared quantity: the brightness of a row, as measured and as rendered. */
 struct brightness {
     size_t place, n; /* in the group of the row's lamp and camera */
     double measured, rendered;
@@ -83,9 +83,10 @@ static size_t row_at(const struct report *report, const struct brightness *b, si
     return i;
 }
 
-/* How far brightness over the mean of its group is from that of the rendering, as a root mean square over groups of at
- * least two rows, with each rendering beside the measurement at place n - 1 - k (reverse) or k + shift of its group.
- * Levels of groups are left out, because the fit may have adapted to them. NaN without such groups. */
+/* Returns the difference between measured and rendered brightness, each over the mean of its group, as a root mean
+ * square over groups of at least two rows, with each rendering beside the measurement at place n - 1 - k (reverse) or k
+ * + shift of its group. Levels of groups are left out, because the fit may have adapted to them. NaN without such
+ * groups. */
 static double contrast_error(const struct report *report, const struct brightness *b, bool reverse, size_t shift)
 {
     double sum = 0.0, count = 0.0, measured, rendered;

@@ -1,5 +1,5 @@
 /* Photographs in another order of the cloth's rotation than the job states: the finished fit describes them better when
- * those of one lamp and camera change places. */
+ * photographs of one lamp and camera change places. */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_PAIRING_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_PAIRING_H
 

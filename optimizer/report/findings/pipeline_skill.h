@@ -1,4 +1,4 @@
-/* The skill of a fit: its error over held-out rows beside that of a plain BRDF fitted to the same rows
+/* The skill of a fit: its error over held-out rows beside the error of a plain BRDF fitted to the same rows
  * (plain_brdf.h). */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_SKILL_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_SKILL_H

@@ -9,14 +9,15 @@
 
 enum { NAMES_BYTES = 200 };
 
-/* Appends a name to a list "a, b"; what does not fit is cut. */
+/* Appends a name to a list "a, b"; a text that does not fit is cut. */
 static void append_name(char list[NAMES_BYTES], const char *name)
 {
     size_t used = strlen(list);
     snprintf(list + used, NAMES_BYTES - used, "%s%s", used > 0 ? ", " : "", name);
 }
 
-/* Names of the parameters and numbers of the cloth that the rows do not determine, and of those at a bound. */
+/* Names of the parameters and numbers of the cloth that the rows do not determine, and names of parameters at a
+ * bound. */
 static void list_parameters(const struct report *report, const struct pipeline_model *m,
                             char not_determined[NAMES_BYTES], char at_bound[NAMES_BYTES])
 {

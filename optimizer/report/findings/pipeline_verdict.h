@@ -1,4 +1,4 @@
-/* The verdict on the job's result (optimizer/report/findings/verdict.h) from what the stages have found. */
+/* The verdict on the job's result (optimizer/report/findings/verdict.h) from the outputs of the stages. */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_VERDICT_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_VERDICT_H
 

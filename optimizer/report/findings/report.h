@@ -1,5 +1,5 @@
 /* The stage "report": everything under JOB/results. `struct report` is shared by the files of this folder: the input of
- * the stage, and what the stage has found so far. */
+ * the stage, and its findings so far. */
 #ifndef SELVEDGE_OPTIMIZER_REPORT_H
 #define SELVEDGE_OPTIMIZER_REPORT_H
 
@@ -56,7 +56,7 @@ struct model_advice {
 struct pipeline_skill {
     bool measured; /* false where a row is lit by an environment too */
     struct plain_brdf brdf;
-    double fit_rel_rms, heldout_rel_rms; /* NaN without rows of that set */
+    double fit_rel_rms, heldout_rel_rms; /* NaN where that set has no rows */
     double left_out_rel_rms;             /* fitted rows by cross-validation; NaN with too few of them */
 };
 

@@ -33,7 +33,7 @@ const char *verdict_rows_id(enum verdict_rows rows)
     return id[rows];
 }
 
-/* ---- what the measurements allow ---- */
+/* ---- the error that the measurements allow ---- */
 
 static bool counts(const struct observation *o, enum job_set set)
 {

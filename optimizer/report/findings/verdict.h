@@ -1,12 +1,12 @@
 /* The verdict on a result: whether it can be used, in words and as a code. It is about the fit, and has nothing to do
  * with the state of the job: a job that has succeeded may have fitted a cloth that does not describe the photographs.
  *
- * What the measurements allow: the root mean square, over the judged rows and channels, of their relative standard
- * errors (in the unit of the relative RMS error, objective.h) and of VERDICT_LEAST_ERROR together. The error of the fit
- * is counted in multiples of that:
+ * The error that the measurements allow: the root mean square, over the judged rows and channels, of their relative
+ * standard errors (in the unit of the relative RMS error, objective.h) and of VERDICT_LEAST_ERROR together. The error
+ * of the fit is counted in multiples of the allowed error:
  *
  *   does not describe this cloth   above VERDICT_FAR multiples; or above the error of one color for all rows; or above
- *                                  twice that of a plain BRDF, unless below VERDICT_NEAR multiples
+ *                                  twice the error of a plain BRDF, unless below VERDICT_NEAR multiples
  *   usable, with reservations      above VERDICT_NEAR multiples, or any reservation below
  *   good                           otherwise
  *
@@ -23,7 +23,8 @@
 /* Relative error below which no photograph and no table is taken to be right as a whole, whatever errors it states:
  * certificates of reflectance standards alone state 1 to 2 %. */
 #define VERDICT_LEAST_ERROR 0.02
-/* Three standard errors are the usual limit of what noise explains. At ten, no choice of the assumed errors matters. */
+/* Three standard errors are the usual limit of an explanation by noise. At ten, no choice of the assumed errors
+ * matters. */
 #define VERDICT_NEAR 3.0
 #define VERDICT_FAR 10.0
 #define VERDICT_PLAIN_BRDF_FACTOR 2.0
@@ -34,7 +35,7 @@ enum verdict_scan { VERDICT_NO_SCAN, VERDICT_SCAN_RESOLVED, VERDICT_SCAN_PARTLY,
 
 enum { VERDICT_MAX_RESERVATION = 12, VERDICT_TEXT_BYTES = 320 };
 
-/* What the verdict is computed from. Texts are lists of names, "a, b, c", or "". */
+/* The facts behind a verdict. Texts are lists of names, "a, b, c", or "". */
 struct verdict_facts {
     bool has_fit; /* false: all but scan and n_input_warning is left out */
     enum verdict_rows rows;
@@ -72,7 +73,7 @@ const char *verdict_code_words(enum verdict_code code);
 /* "held_out", "cross_validation", "fitted". */
 const char *verdict_rows_id(enum verdict_rows rows);
 
-/* What the measurements of the rows of one set allow, as above. NaN without rows. */
+/* Returns the error that the measurements of the rows of one set allow, as above. NaN without rows. */
 double verdict_allowed_error(const struct observation_set *o, enum job_set set);
 /* Relative RMS error over the rows of `judged` of the one color that describes the rows of the set "fit" best. NaN
  * without rows. */

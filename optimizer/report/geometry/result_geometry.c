@@ -93,7 +93,7 @@ static json_t *groups_json(const struct report *report)
     return list;
 }
 
-/* What the photograph of the weave shows, and what of it the job has taken. */
+/* The weave that the photograph shows, and the numbers that the job has taken from it. */
 static json_t *texture_json(const struct report *report)
 {
     double px_per_mm = report->in.job->cloth->texture_px_per_mm;
@@ -116,7 +116,7 @@ static json_t *grade_json(const struct scan_grade *g)
                      json_count(g->n_dropped));
 }
 
-/* What such a scan can give; null unless a trial was asked for and could be made. */
+/* The quality that such a scan can give; null unless a trial was asked for and could be made. */
 static json_t *trial_json(const struct scan_trial *t)
 {
     if (!t->made) return json_null();
@@ -181,7 +181,7 @@ static void set_directions(json_t *json, const struct reconstruct_report *g)
     json_object_set_new(json, "axis_share", json_number_list(g->axis_share, 3, 1.0));
 }
 
-/* The cloth of the fitted numbers, with the tile of the final fit; before the fit, that of the document. */
+/* The cloth of the fitted numbers, with the tile of the final fit; before the fit, the tile of the document. */
 static json_t *described_json(const struct report *report)
 {
     const bool fitted = report->in.made->i_shown > 0;

@@ -1,5 +1,5 @@
-/* What a photograph tells about its weave, as JSON: for people and scripts (selvedge-phantom detect) and for
- * result.json. docs/weave-detection.md lists the members. */
+/* The weave read from a photograph, as JSON: for people and scripts (selvedge-phantom detect) and for result.json.
+ * docs/weave-detection.md lists the members. */
 #ifndef SELVEDGE_OPTIMIZER_WEAVE_JSON_H
 #define SELVEDGE_OPTIMIZER_WEAVE_JSON_H
 

@@ -6,7 +6,7 @@
 
 #include <jansson.h>
 
-/* {"format", "bits", "less_trustworthy", "exposure_s", ...}; what is not known is null. NULL for a row of a table. */
+/* {"format", "bits", "less_trustworthy", "exposure_s", ...}; unknown values are null. NULL for a row of a table. */
 json_t *photograph_record_json(const struct photograph_record *r);
 /* How colors became radiances: the matrix and, of a chart, its corners and color differences; null without either. */
 json_t *photograph_color_json(const struct photograph_process *k, const struct job_setup *setup);

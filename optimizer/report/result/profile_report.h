@@ -1,12 +1,11 @@
-/* What a job reports of the profile of a fiber and of the models that were fitted to it.
+/* The results of a job with the profile of a fiber: the profile, and the models fitted to it.
  *
  * "profile" of result.json:
  *   "table"      file, n_row, n_channel, has_errors, and the ranges of theta_i_deg, theta_o_deg and phi_deg
  *   "chosen_by"  "bic": the best model has the least profile_fit.bic
  *   "csv"        name of the table of measured and fitted radiances, of all models
  *   "models"     of each: id, title, best, parameters, scale and its error, nrmse, rel_rms, misfit, chi_square, bic,
- *                n_unknown, n_start, n_agree, n_evaluation, converged, fit_wall_s (profile_fit.h)
- */
+ *                n_unknown, n_start, n_agree, n_evaluation, converged, fit_wall_s (profile_fit.h) */
 #ifndef SELVEDGE_OPTIMIZER_PROFILE_REPORT_H
 #define SELVEDGE_OPTIMIZER_PROFILE_REPORT_H
 

@@ -131,7 +131,7 @@ static void put_row_error(json_t *row, const struct report *report, const struct
 }
 
 /* The error of fitted rows that were left out in turn; null when there are too few rows. Where numbers of the cloth are
- * fitted, they are the same in all folds; the same error with new numbers in each fold is that of the joint fit. */
+ * fitted, they are the same in all folds; the joint fit gives the same error with new numbers in each fold. */
 static json_t *cross_validation_json(const struct report *report, const struct pipeline_model *m)
 {
     const struct cross_validation *v = &m->fit->result.cross_validation, *joint = &m->fit->cloth.joint.cross_validation;
@@ -287,7 +287,7 @@ static json_t *skill_json(const struct report *report)
                      json_number(twin / report->skill.heldout_rel_rms));
 }
 
-/* What the figures of the file mean, so that it can be read alone. */
+/* The meaning of the figures of the file, so that it can be read alone. */
 static json_t *definitions_json(void)
 {
     return json_pack(
@@ -306,7 +306,8 @@ static json_t *definitions_json(void)
         "null", "a number that does not exist");
 }
 
-/* Adds what every job has, also one of geometry only; a fiber without a cloth has neither geometry nor verdict. */
+/* Adds the entries of every job, also of a job of geometry only; a fiber without a cloth has neither geometry nor
+ * verdict. */
 static void put_job(json_t *json, struct report *report)
 {
     const bool of_cloth = report->in.kind != JOB_OF_PROFILE;

@@ -2,10 +2,10 @@
  *
  * docs/file-formats.md describes every key of result.json with its unit. The outline:
  *
- *   "format", "sample", "method", "seed"            version of this format, and what the job document says
+ *   "format", "sample", "method", "seed"            version of this format, and values of the job document
  *   "model", "chosen_by"                            id of the best model, to which all keys but "models" refer, and
  *                                                   the measure by which it was chosen
- *   "definitions"                                   what errors and units are, in sentences
+ *   "definitions"                                   errors and units, explained in sentences
  *   "exports"                                       files for other programs (docs/exports.md)
  *   "verdict"                                       whether the result can be used (verdict.h)
  *   "converged", "reason", "reason_code"            why the fit ended (stop_reason.h)
@@ -31,8 +31,7 @@
  *   "warnings", "program"                           the job's warnings; the program and its version
  *
  * The best model has the lowest error by cross-validation inside the fitted rows (pipeline_choice.h). Numbers have 17
- * digits, so that equal fits give equal bytes.
- */
+ * digits, so that equal fits give equal bytes. */
 #ifndef SELVEDGE_OPTIMIZER_RESULT_JSON_H
 #define SELVEDGE_OPTIMIZER_RESULT_JSON_H
 
@@ -47,7 +46,7 @@ status result_picture_names(const struct observation_set *o, picture_name **name
 /* Exposure of all PNG pictures. It brings the 90th percentile of the brightest measured channels to 0.8. */
 double result_png_exposure(const struct observation_set *o);
 
-/* What model m makes of row i: the mean of both replicas with the fitted nuisance terms (nuisance.h), and its standard
+/* Row i as rendered by model m: the mean of both replicas with the fitted nuisance terms (nuisance.h), and its standard
  * error: the figures to compare with the measurement. */
 void result_rendered_mean(const struct pipeline_model *m, size_t i, double mean[3], double se[3]);
 /* Relative error of row i by model m (objective_row_error), and its standard error: the one error of a row that
@@ -58,7 +57,7 @@ double result_row_error(const struct report *report, const struct pipeline_model
 status result_geometry_json_write(struct report *report, struct error *err);
 /* The same of a job that renders given parameters: without rows, models and a method. */
 status result_pictures_json_write(struct report *report, struct error *err);
-/* Adds what every job has to its own part of result.json, writes the file, and releases json. */
+/* Adds the entries of every job to json, the job's own part of result.json, writes the file, and releases json. */
 status result_json_finish(struct report *report, json_t *json, struct error *err);
 /* "parameters" of a model. */
 json_t *result_parameters_json(const struct pipeline_model *m);

@@ -93,7 +93,7 @@ void result_numbers_put(json_t *json, const struct report *report, const struct 
     json_object_set_new(json, "cloth_screening", screening_json(report, &m->fit->cloth));
 }
 
-/* What the photographs say about the corrections, and what these gain. */
+/* The corrections by the photographs, and the gain by them. */
 static void print_uncorrected(const struct report *report, const struct pipeline_model *m, FILE *out)
 {
     const struct uncorrected_errors *u = &m->fit->scan_error.uncorrected;

@@ -1,4 +1,4 @@
-/* The fitted numbers of a cloth in the results: values, errors, and what the photographs do not tell. */
+/* The fitted numbers of a cloth in the results: values, errors, and numbers that the photographs do not determine. */
 #ifndef SELVEDGE_OPTIMIZER_RESULT_NUMBERS_H
 #define SELVEDGE_OPTIMIZER_RESULT_NUMBERS_H
 

@@ -16,10 +16,10 @@ status result_image_write(const struct report *report, const struct image *im, c
                           double exposure, bool exr, struct error *err);
 /* Largest edge of the renderings where the job document states none. */
 enum { RESULT_PICTURE_PX = 96 };
-/* Edge of the renderings in pixels: that of the job document, or fewer than RESULT_PICTURE_PX where the best model's
- * fit has taken only n_fit_path. */
+/* Edge of the renderings in pixels: the job document's edge, or fewer than RESULT_PICTURE_PX where the best model's fit
+ * has taken only n_fit_path. */
 size_t result_picture_px(const struct job_results *results, size_t n_row, double n_fit_path);
-/* Samples a pixel of the renderings: those of the job document, or as many as the cost of the best model's fit allows,
+/* Samples a pixel of the renderings: the job document's number, or as many as the cost of the best model's fit allows,
  * which has taken n_fit_path. */
 size_t result_picture_samples(const struct job_results *results, size_t n_row, double n_fit_path);
 /* Samples of all renderings together, after such a fit. */

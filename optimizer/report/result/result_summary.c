@@ -134,7 +134,7 @@ static void print_skill(const struct report *report, FILE *out)
     fprintf(out, "\n");
 }
 
-/* What the fibers alone come to, where the renderings have a factor besides. */
+/* The error of the fibers alone, where the renderings have a factor besides. */
 static void print_discrepancy(const struct report *report, FILE *out)
 {
     const struct pipeline_model *m = &report->model[report_best_model(report)];
@@ -146,7 +146,7 @@ static void print_discrepancy(const struct report *report, FILE *out)
     fprintf(out, "\n");
 }
 
-/* What the phantom of the trial was made of. */
+/* The cloth and the scanner of the trial's phantom. */
 static void print_trial_fibers(const struct scan_trial *t, FILE *out)
 {
     fprintf(out, "         a phantom of these fibers (radii spread by %.1f %%", 100.0 * t->radius_spread);

@@ -65,7 +65,7 @@ static status make_mesh(const struct surface_input *on, size_t i, struct mesh *m
     }
 }
 
-/* The picture's name before the error. Its field, where it has none yet, is what makes the surface: the mesh or the
+/* The picture's name before the error. Makes the field of the surface, where it has none yet: the mesh or the
  * radius. */
 static status name_picture(size_t i, enum job_surface on, status s, struct error *err)
 {
@@ -109,7 +109,7 @@ static double *point_from(double theta_deg, double phi_deg, double distance_mm, 
     return p;
 }
 
-/* What would be seen is the inside of the cloth: an error. Parts that run through each other are a warning. */
+/* The picture would show the inside of the cloth: an error. Parts that run through each other are a warning. */
 static status check_surface(const struct surface_input *on, size_t i, const struct scene *bent, struct error *err)
 {
     const struct job_setup *d = on->setup;

@@ -5,7 +5,7 @@
 
 enum { FIELD = 4, N_RGB = 3 };
 
-/* Means over some pixels of both pictures, of their difference, and the variance of that. */
+/* Means over some pixels of both pictures, of their difference, and the variance of the difference. */
 struct means {
     double reference[N_RGB], difference[N_RGB], variance[N_RGB];
     bool lit;

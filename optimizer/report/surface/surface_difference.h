@@ -8,7 +8,7 @@
  * brightness of the lit fields. Fields are squares of 4 x 4 pixels; pixels that hang over at the edges belong to none.
  * NaN where the reference is black. */
 struct surface_difference {
-    double mean[3], mean_se[3]; /* of the whole picture in red, green and blue, and the standard error of that */
+    double mean[3], mean_se[3]; /* of the whole picture in red, green and blue, and its standard error */
     double field_rms;           /* root mean square over lit fields and channels, with the noise of both taken off */
     double field_noise;         /* the noise that was taken off */
 };

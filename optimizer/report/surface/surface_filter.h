@@ -8,7 +8,7 @@
 #include "optimizer/report/surface/surface_tables.h"
 
 struct surface_filter {
-    struct image feature; /* of what the pixels see; without pixels: the picture is not filtered */
+    struct image feature; /* seen by the pixels; without pixels: the picture is not filtered */
 };
 
 /* Renders the features of picture i, whose request is q, if the document asks for a filtered view. Pictures of volumes

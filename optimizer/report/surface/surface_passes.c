@@ -9,7 +9,7 @@
 enum { FIRST_SAMPLES = 2, PASS_PATHS = 1 << 21, N_CHANNEL = 6 };
 static const char *const channel_name[N_CHANNEL] = {"R", "G", "B", "var.R", "var.G", "var.B"};
 
-/* What a checkpoint begins with; the pixels follow, as they are in memory. Another machine's would not be read: a job
+/* The beginning of a checkpoint; the pixels follow, as they are in memory. Another machine's would not be read: a job
  * stays where its folder is. */
 struct pass_header {
     char magic[8];

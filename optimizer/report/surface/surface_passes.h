@@ -1,13 +1,12 @@
-/* A picture that is rendered in passes, each with more samples of every pixel: what is there so far can be looked at,
- * and an attempt goes on where the one before was interrupted.
- */
+/* A picture that is rendered in passes, each with more samples of every pixel: the picture so far can be looked at, and
+ * an attempt goes on where the one before was interrupted. */
 #ifndef SELVEDGE_OPTIMIZER_SURFACE_PASSES_H
 #define SELVEDGE_OPTIMIZER_SURFACE_PASSES_H
 
 #include "optimizer/report/findings/report.h"
 #include "renderer/transport/render.h"
 
-/* The picture so far: the mean of all samples, and the variance of that mean. */
+/* The picture so far: the mean of all samples, and its variance. */
 struct surface_passes {
     struct image image;
     size_t n_sample;  /* so far; 0: image is empty */

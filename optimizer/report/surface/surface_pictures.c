@@ -48,7 +48,7 @@ double surface_pictures_paths(const struct job_results *results)
     return n;
 }
 
-/* Brings the mean of what is lit to a medium brightness. */
+/* Returns the exposure that brings the mean of the lit pixels to a medium brightness. */
 static double exposure_of(const struct image *im)
 {
     const double medium = 0.25;
@@ -155,7 +155,7 @@ static status write_json(struct report *report, const char *path, const json_t *
 }
 
 /* The entry of result.json lies beside the picture and is written last: a picture is finished when its entry has all
- * samples. *out: the entry, of which the caller has a reference. */
+ * samples. *out: the entry; the caller owns a reference to it. */
 static status write_entry(struct report *report, const struct one_picture *one, const struct surface_filter *filter,
                           const struct surface_passes *so_far, json_t **out, struct error *err)
 {

@@ -7,9 +7,9 @@
 /* Samples of all pictures together. */
 double surface_pictures_paths(const struct job_results *results);
 
-/* Renders what the job document asks for and fills report->surface_pictures, the entries of result.json. A picture
- * that an earlier attempt has finished is not rendered again. from, to: shares of the stage before and after. Errors
- * of surface_cloth_new and of render_run. */
+/* Renders the pictures that the job document asks for, and fills report->surface_pictures, the entries of result.json.
+ * A picture that an earlier attempt has finished is not rendered again. from, to: shares of the stage before and after.
+ * Errors of surface_cloth_new and of render_run. */
 status surface_pictures_write(struct report *report, double from, double to, struct error *err);
 
 #endif

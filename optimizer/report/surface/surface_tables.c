@@ -16,13 +16,13 @@ enum { N_TRACED_IN_PILE = 2 };
 #define DENSITY 1.0f
 static const double corrected_share = 0.25;
 /* Rough processor seconds on a twill of 26,000 segments: of a path of the table of directions, of a path of all cells,
- * of the tables of what segments see, and of a sample of a picture by tables and path by path. */
+ * of the tables of visible directions, and of a sample of a picture by tables and path by path. */
 static const double deep_path_s = 12e-6, cell_path_s = 3e-3, visibility_s = 60.0, fast_sample_s = 5e-6,
                     path_sample_s = 20e-6;
 
 static bool by_tables(enum job_picture_method m) { return m == JOB_PICTURE_FAST || m == JOB_PICTURE_CORRECTED; }
 
-/* Whether a picture takes from tables what the segments see. */
+/* Returns whether a picture takes the visibility of its segments from tables. */
 static bool wants_visibility(const struct report *report)
 {
     for (size_t i = 0; i < report->in.results->n_surface_picture; i++)

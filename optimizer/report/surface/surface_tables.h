@@ -1,5 +1,5 @@
-/* Tables of light transport for the pictures of a job that are not rendered path by path: those of renderer/fast, and
- * the averages of dual scattering (renderer/dual) and of diffusion (renderer/diffusion). */
+/* Tables of light transport for the pictures of a job that are not rendered path by path: the tables of renderer/fast,
+ * and the averages of dual scattering (renderer/dual) and of diffusion (renderer/diffusion). */
 #ifndef SELVEDGE_OPTIMIZER_SURFACE_TABLES_H
 #define SELVEDGE_OPTIMIZER_SURFACE_TABLES_H
 
@@ -17,7 +17,7 @@ struct surface_tables {
     bool piled;    /* the same of the pile */
 };
 
-/* What one picture renders with. */
+/* The method of one picture. */
 struct surface_method {
     enum job_picture_method method; /* the document's, or JOB_PICTURE_PATH where there are no tables */
     struct fast_option fast;
@@ -26,18 +26,18 @@ struct surface_method {
 };
 
 /* Share of the time of the tables and the pictures together that the tables are expected to take; 0 when no picture
- * asks for those of renderer/fast: averages take a second. */
+ * asks for tables of renderer/fast: averages take a second. */
 double surface_tables_share(const struct report *report);
-/* Reads the tables of the best model from the job's folder, work/report/fast.tables, if those of this cloth with these
- * parameters are there, and makes and keeps them otherwise, going on with what an interrupted attempt has kept in
- * fast.journal beside it; makes averages. Errors of fast_precompute,
- * fast_tables_write, dual_tables_init and diffusion_tables_make. */
+/* Reads the tables of the best model from the job's folder, work/report/fast.tables, if the file has the tables of this
+ * cloth with these parameters. Otherwise makes and stores them, and goes on from the file fast.journal beside it that
+ * an interrupted attempt has left. Makes averages. Errors of fast_precompute, fast_tables_write, dual_tables_init and
+ * diffusion_tables_make. */
 status surface_tables_get(struct report *report, const struct progress *progress, struct surface_tables *t,
                           struct error *err);
 void surface_tables_release(struct surface_tables *t);
 /* t must outlive the result. */
 struct surface_method surface_tables_method(const struct surface_tables *t, const struct job_surface_picture *p);
-/* What the source of its radiance renders with. */
+/* Sets the method in the source of the picture's radiance. */
 void surface_method_apply(const struct surface_method *m, struct radiance_input *input);
 
 #endif

@@ -159,8 +159,8 @@ static void pixel_of(const struct textures *t, size_t i, float out[N_CHANNEL])
     out[12] = t->maps.height_mm[i];
 }
 
-/* Turns from +x to the direction across the fibers, which has no sign: in [0.125, 0.625), so that those of weft and
- * warp are not next to the step. */
+/* Turns from +x to the direction across the fibers, which has no sign: in [0.125, 0.625), so that the angles of weft
+ * and warp are not next to the step. */
 static float rotation_turns(float direction_rad)
 {
     double turns = ((double)direction_rad + M_PI_2) / (2.0 * M_PI);

@@ -140,7 +140,7 @@ static json_t *normal_json(const struct texture_maps *m, const char *file)
     return j;
 }
 
-/* The keys that no map has are those of a plain dielectric without coat and metal. */
+/* Sets the keys without a map to the values of a plain dielectric without coat and metal. */
 static void add_rest(json_t *v)
 {
     static const char *const zero[] = {"clearcoat_value", "clearcoat_roughness", "metalness",       "displacement",

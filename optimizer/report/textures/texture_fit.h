@@ -1,6 +1,6 @@
-/* Fits the numbers of a surface model to the renderings of the fitted rows: those with which the mean over the maps of
- * a texture set comes nearest. Programs interpolate between the pixels of maps, and so does this: normals between
- * pixels are flatter than those of the pixels. */
+/* Fits the numbers of a surface model to the renderings of the fitted rows, so that the mean over the maps of a texture
+ * set comes nearest to them. Programs interpolate between the pixels of maps, and so does this fit: normals between
+ * pixels are flatter than normals at pixels. */
 #ifndef SELVEDGE_OPTIMIZER_TEXTURE_FIT_H
 #define SELVEDGE_OPTIMIZER_TEXTURE_FIT_H
 
@@ -29,7 +29,7 @@ struct texture_model {
                     double rgb[3]);
 };
 
-/* Means over the maps, for even light, of what the cloth reflects and lets through. */
+/* Reflected and transmitted shares of even light, means over the maps. */
 struct texture_means {
     double albedo[3], transmission[3];
 };

@@ -1,4 +1,4 @@
-/* What one tile of cloth looks like from above, from its fibers alone: heights, normals and directions, for textures.
+/* One tile of cloth seen from above, from its fibers alone: heights, normals and directions, for textures.
  *
  * Pixels in rows from the top (+y) and from the left (-x); the middle of the picture is the corner (0, 0) of the tile,
  * as in a rendering of one tile, and the picture repeats. */
@@ -11,7 +11,7 @@ struct texture_maps {
     size_t width, height;
     double pixel_mm[2];
     float *height_mm;    /* of the highest fiber; 0 is the top of the cloth */
-    float *fiber_normal; /* x 3, of that fiber; (0, 0, 1) where there is none */
+    float *fiber_normal; /* x 3, of the highest fiber; (0, 0, 1) where there is none */
     float *normal;       /* x 3, of the smoothed heights */
     float *spread; /* root mean square of the fibers' slopes that the smooth surface does not have, over its mean */
     float *direction_rad; /* along the fibers, from +x, in [0, pi) */

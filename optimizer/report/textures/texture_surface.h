@@ -11,7 +11,7 @@ struct texture_surface {
     const struct texture_maps *maps;
     struct texture_means means;
     double weight, roughness, anisotropy; /* specular_weight; the mean of the one and the largest of the other map */
-    double specular_albedo;               /* what the dielectric reflects of light that comes straight down */
+    double specular_albedo;               /* the dielectric's reflected share of light that comes straight down */
     double kept;                          /* share of the light from the camera's side that reaches the base */
     double rel_rms[2];                    /* over the fitted and the held-out rows; NaN without such rows */
 };
@@ -24,7 +24,7 @@ status texture_surface_fit(struct texture_surface *t, const struct report *repor
 double texture_surface_roughness(const struct texture_surface *t, size_t i);
 double texture_surface_anisotropy(const struct texture_surface *t, size_t i);
 
-/* Mean base color: what must be reflected below the microfacets, so that both reflect the albedo. */
+/* Mean base color: the share that must be reflected below the microfacets, so that both together reflect the albedo. */
 double texture_surface_base(const struct texture_surface *t, size_t channel);
 
 /* GGX's density of the half vector h, for the widths ax and ay along tangent and bitangent, and Smith's Lambda of a
