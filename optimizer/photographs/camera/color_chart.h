@@ -35,7 +35,7 @@ void color_chart_reference(bool from_2014, size_t i, double rgb[3]);
 status color_chart_find(const struct image *im, double corner_px[8], bool *found, struct error *err);
 /* Measures the patches inside the corners and fits the matrix. full_scale_is: values from which on a sample is
  * saturated (INFINITY: none). STATUS_INVALID: a corner outside the picture, a saturated white patch, patches that are
- * not those of a chart (the matrix leaves a mean difference above 12). */
+ * no chart's (the matrix leaves a mean difference above 12). */
 status color_chart_measure(struct color_chart *k, const struct image *im, double saturation, double light_theta_rad,
                            struct error *err);
 /* Point (u, v) in [0, 1]^2 of the chart, from dark skin along the rows, in pixels of the photograph. */

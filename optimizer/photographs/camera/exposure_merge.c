@@ -113,9 +113,9 @@ static double rate_around(const struct exposure_set *e, const double *sum, size_
     return of[1] > 1e-9 * e->t_s[0] ? of[0] / of[1] : NAN;
 }
 
-/* Marks as saturated (1 or more) the samples of exposure i, channel c that may be cut by saturation. Whether one is
- * left out must depend neither on its own noise nor on that of the samples that stay in its place: leaving out those
- * alone that reach the full scale leaves the darker half of the noise, and makes an area whose mean is near the full
+/* Marks as saturated (1 or more) the samples of exposure i, channel c that may be cut by saturation. The choice must
+ * depend neither on a sample's own noise nor on the noise of the samples that stay in its place: leaving out only
+ * samples that reach the full scale leaves the darker half of the noise, and makes an area whose mean is near the full
  * scale darker by 0.2 %. So the shorter exposures of the pixels around it decide. */
 static void leave_out_near_saturation(const struct exposure_set *e, size_t i, size_t c, double *sum)
 {
@@ -149,7 +149,8 @@ static void leave_out_all_near_saturation(const struct exposure_set *e, double *
     }
 }
 
-/* Light of exposure i over what the others predict for the same samples; NaN where there is too little of it. */
+/* Returns the light of exposure i over the other exposures' prediction for the same samples; NaN where there is too
+ * little of it. */
 static double light_ratio(const struct exposure_set *e, size_t i)
 {
     static const double least_share = 0.005, most_share = 0.9; /* of the full scale */

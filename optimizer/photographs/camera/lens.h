@@ -32,7 +32,7 @@ double lens_vignetting(const struct lens *l, const double real_px[2]);
 status lens_correct(const struct lens *l, const double crop[4], struct image *im, struct error *err);
 /* The same for the variances of the pixels of a picture before its correction. Interpolation spreads the noise of a
  * pixel over its neighbours: each value is the density of variance there, so that the sum over an area is the variance
- * of the sum of the corrected picture over the area, though single pixels of that are quieter. */
+ * of the sum of the corrected picture over the area, though single pixels of the corrected picture are quieter. */
 status lens_correct_variance(const struct lens *l, const double crop[4], struct image *variance, struct error *err);
 
 #endif

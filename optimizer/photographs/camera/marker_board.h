@@ -1,6 +1,6 @@
-/* Markers around a sample: which ones, how large, and where they lie on the plane of the cloth. A ChArUco board is
- * a chessboard with the markers 0, 1, 2, ... in its white squares, row by row from the upper left; the corners
- * between its squares are found more exactly than those of markers. */
+/* Markers around a sample: which ones, how large, and where they lie on the plane of the cloth. A ChArUco board is a
+ * chessboard with the markers 0, 1, 2, ... in its white squares, row by row from the upper left; the corners between
+ * its squares are found more exactly than the corners of markers. */
 #ifndef SELVEDGE_OPTIMIZER_MARKER_BOARD_H
 #define SELVEDGE_OPTIMIZER_MARKER_BOARD_H
 

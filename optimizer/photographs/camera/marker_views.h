@@ -9,8 +9,8 @@
 
 /* Where the camera of a picture was, and where the orbit center is in it. */
 struct marker_view {
-    size_t n_marker, n_corner; /* of those of a chessboard */
-    double rms_px;             /* what is left between markers and map */
+    size_t n_marker, n_corner; /* of the board's markers, of the chessboard's corners */
+    double rms_px;             /* residual between markers and map */
     double center_px[2];       /* of the orbit, in the picture without distortion */
     double px_per_mm;          /* at the orbit center, perpendicular to the view */
     bool has_camera;           /* the lens' focal lengths are known */
@@ -23,7 +23,8 @@ struct marker_view {
  * picture by more than a tenth of a marker. */
 status marker_view_find(const struct marker_board *board, const struct lens *lens, const struct image *im,
                         struct marker_view *view, struct error *err);
-/* Fills in what photograph p leaves out: the crop of crop_cm about the orbit center, and the place of the camera. */
+/* Fills in two values that photograph p leaves out: the crop of crop_cm about the orbit center, and the place of the
+ * camera. */
 status marker_view_apply(const struct marker_view *view, double crop_cm, size_t width, size_t height,
                          struct job_photograph *p, struct error *err);
 /* Does both for every photograph of the document that leaves out its crop or its camera; files are in `folder`. Without

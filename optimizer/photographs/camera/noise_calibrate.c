@@ -18,7 +18,7 @@ struct frame {
     char camera[96];
 };
 
-/* What two frames of one exposure time, or a single one, say about a channel. */
+/* Mean and variance of a channel by two frames of one exposure time, or by a single frame. */
 struct dark_point {
     double t_s, mean[3], var[3]; /* var NaN: of a single frame */
 };
@@ -129,7 +129,7 @@ static void fit_dark(const struct dark_point *p, size_t n, size_t c, struct nois
     k->read_var = fmax(k->read_var, 0.0);
 }
 
-/* The two sums of a block of which s_s^2 is the quotient. A block with a saturated pixel adds nothing. */
+/* Adds the two sums of a block whose quotient is s_s^2. A block with a saturated pixel adds nothing. */
 static void add_block(const struct frame *a, const struct frame *b, size_t x0, size_t y0, struct noise_record *r,
                       double var[3], double light[3])
 {
@@ -165,7 +165,7 @@ struct frame_walk {
     struct dark_point *dark;
     size_t n_dark_point, n_pair;
     double var[3], light[3];
-    struct frame first; /* of all frames, without its pixels: what the others are compared with */
+    struct frame first; /* of all frames, without its pixels: the others are compared with it */
 };
 
 static status walk_dark(struct frame_walk *w, struct error *err)

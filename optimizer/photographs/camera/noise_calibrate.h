@@ -4,9 +4,8 @@
  * Dark frames: their mean is mu_r + mu_d t. Half of the variance of the difference of two frames of one exposure time
  * is s_r^2 + s_d^2 t, free of the fixed pattern of the sensor. Both lines are fitted by least squares over the exposure
  * times; with a single time the dark current is 0 and counts as read noise. Flat frames: in blocks of 16 x 16 pixels
- * half of the variance of the difference of two frames, minus that of a dark frame, over the mean, is s_s^2. A slow
- * change of the lamp between the frames cancels, because each block's mean difference is removed.
- */
+ * half of the variance of the difference of two frames, minus the variance of a dark frame, over the mean, is s_s^2. A
+ * slow change of the lamp between the frames cancels, because each block's mean difference is removed. */
 #ifndef SELVEDGE_OPTIMIZER_NOISE_CALIBRATE_H
 #define SELVEDGE_OPTIMIZER_NOISE_CALIBRATE_H
 

@@ -29,7 +29,7 @@ struct noise_record {
     size_t n_dark, n_flat; /* frames that it was made from */
 };
 
-/* STATUS_FORMAT / STATUS_INVALID with a text that names file and key; otherwise those of file_read_all. */
+/* STATUS_FORMAT / STATUS_INVALID with a text that names file and key; otherwise the errors of file_read_all. */
 status noise_record_read(const char *path, struct noise_record *r, struct error *err);
 /* Writes the file durably. STATUS_IO, STATUS_DISK_FULL, STATUS_NO_MEMORY. */
 status noise_record_write(const struct noise_record *r, const char *path, struct error *err);

@@ -176,7 +176,7 @@ static status check_noise(const struct photograph_process *k, const struct expos
     return STATUS_OK;
 }
 
-/* Merges into image[0], whose unit stays that of the first exposure. */
+/* Merges into image[0], which keeps the unit of the first exposure. */
 static status merge(const struct photograph_process *k, struct exposures *e, struct error *err)
 {
     struct noise_record noise = k->noise;
@@ -213,8 +213,8 @@ static void mean_error(const struct image *variance, double se_rgb[3])
     for (size_t c = 0; c < 3; c++) se_rgb[c] = n > 0 ? sqrt(sum[c]) / (double)n : NAN;
 }
 
-/* Applies the matrix to the picture, to the error of its mean by the camera's noise, and adds what the errors of the
- * matrix make of the mean. */
+/* Applies the matrix to the picture, to the error of its mean by the camera's noise, and adds the error of the mean by
+ * the errors of the matrix. */
 static void apply_color(const struct photograph_process *k, struct image *im, struct photograph_record *r)
 {
     const size_t n = im->width * im->height;

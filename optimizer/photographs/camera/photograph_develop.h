@@ -1,12 +1,10 @@
-/* From the files of one view to an image in radiance units, by what a job knows of its camera: dark frames, the record
- * of its noise, several exposures, a color chart or a white reference.
+/* From the files of one view to an image in radiance units, by the job's knowledge of its camera: dark frames, the
+ * record of its noise, several exposures, a color chart or a white reference.
  *
  * Steps: each exposure is read and cropped; the mean of the dark frames of its exposure time is subtracted; exposures
  * are merged (exposure_merge.h); the errors of the lens are removed (lens.h); the values are divided by the exposure
- * (photograph.h), multiplied by the color matrix, by the scale, and by the square of the lamp's distance over that of
- * the document.
- * Ownership: init/release.
- */
+ * (photograph.h), multiplied by the color matrix, by the scale, and by the square of the lamp's distance over the
+ * document's distance. Ownership: init/release. */
 #ifndef SELVEDGE_OPTIMIZER_PHOTOGRAPH_DEVELOP_H
 #define SELVEDGE_OPTIMIZER_PHOTOGRAPH_DEVELOP_H
 

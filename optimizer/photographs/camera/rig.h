@@ -1,4 +1,4 @@
-/* The rig file: what a measuring apparatus has, described once. JSON, strictly read:
+/* The rig file: the lamps, cameras, views and lens of a measuring apparatus, described once. JSON, strictly read:
  *
  *   {"selvedge_rig": 1,
  *    "lamps":   {"lamp-20": {"theta_deg": 20, "phi_deg": 0}, "side": {"position_mm": [430, 0, 430]}},
@@ -17,8 +17,7 @@
  *    "markers": {"dictionary": "4x4_50", "side_mm": 8, "charuco": {"squares": [9, 7], "square_mm": 11,
  *                "upper_left_mm": [-49.5, 38.5], "first_square": "black"}}
  *
- * (marker_board.h). With markers a view may leave out its camera, whose place then follows from them.
- */
+ * (marker_board.h). With markers a view may leave out its camera, whose place then follows from them. */
 #ifndef SELVEDGE_OPTIMIZER_RIG_H
 #define SELVEDGE_OPTIMIZER_RIG_H
 
@@ -26,7 +25,7 @@
 #include "optimizer/photographs/camera/lens.h"
 #include "optimizer/photographs/camera/marker_board.h"
 
-/* Reads the rig and gives every photograph of the document that names a view the angles and distances of that view.
+/* Reads the rig and gives every photograph of the document that names a view the angles and distances of the view.
  * STATUS_INVALID / STATUS_FORMAT with a text that names file and key; err->field is an option id where a photograph is
  * at fault (an unknown view, a lamp behind the cloth with a black sheet). */
 status rig_apply(const char *path, struct job_document *doc, struct lens *lens, struct marker_board *board,

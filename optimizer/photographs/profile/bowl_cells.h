@@ -1,10 +1,9 @@
 /* Point samples over (theta_o, azimuth) resampled to cells, each with a value at its middle and a standard error.
  *
  * A polynomial of degree two goes through the samples of a cell by least squares; its value in the middle counts. The
- * error follows from the scatter of the samples about it, as independent ones: it holds the noise of the pixels and the
- * roughness of the paint, and what a polynomial cannot follow. Differs from the fiber-scattering thesis (4.6.3), which
- * smooths by a Gaussian of 2 degrees: that has no error and flattens peaks.
- */
+ * error follows from the scatter of the samples about it, as independent ones: it holds the noise of the pixels, the
+ * roughness of the paint, and structure that a polynomial cannot follow. Differs from the fiber-scattering thesis
+ * (4.6.3), which smooths by a Gaussian of 2 degrees: that has no error and flattens peaks. */
 #ifndef SELVEDGE_OPTIMIZER_BOWL_CELLS_H
 #define SELVEDGE_OPTIMIZER_BOWL_CELLS_H
 

@@ -1,4 +1,5 @@
-/* The files of a bowl: its photographs one by one with their backgrounds, the mask, and what is known of the camera. */
+/* The files of a bowl: its photographs one by one with their backgrounds, the mask, and the properties of the
+ * camera. */
 #ifndef SELVEDGE_OPTIMIZER_BOWL_PICTURES_H
 #define SELVEDGE_OPTIMIZER_BOWL_PICTURES_H
 
@@ -18,14 +19,15 @@ struct bowl_pictures {
     double saturated;                    /* value from which on a sample of the photograph is */
 };
 
-/* Reads what is known of the camera: noise, dark frames, and the lens of the rig. Release after an error, too. */
+/* Reads the properties of the camera: noise, dark frames, and the lens of the rig. Release after an error, too. */
 status bowl_pictures_init(struct bowl_pictures *p, struct job_document *doc, const char *folder, struct error *err);
 void bowl_pictures_release(struct bowl_pictures *p);
 /* Develops photograph i and its background; with the first one also the mask and the camera's place. */
 status bowl_pictures_open(struct bowl_pictures *p, size_t i, struct error *err);
-/* What pixel k sees; false where it does not see the bowl or the mask hides it. */
+/* Writes the place that pixel k sees; false where it does not see the bowl or the mask hides it. */
 bool bowl_pictures_place(const struct bowl_pictures *p, size_t k, struct bowl_place *place);
-/* The value of pixel k, and that of the background (0 without one). False where one of them is saturated. */
+/* Writes the value of pixel k in the photograph and in the background (0 without one). False where one of them is
+ * saturated. */
 bool bowl_pictures_value(const struct bowl_pictures *p, size_t k, double value[3], double background[3]);
 
 /* Sets and returns STATUS_INVALID with the field of photograph i. */

@@ -1,6 +1,5 @@
-/* What a pixel of a photograph of the bowl sees: the place on the bowl, the direction in which the fiber lit it, and
- * what the radiance there is over that of the fiber (fiber-scattering thesis, 4.6.1: a point sample of the scattered
- * light).
+/* The place on the bowl that a pixel of a photograph sees, the direction in which the fiber lit it, and its radiance
+ * over the fiber's radiance (fiber-scattering thesis, 4.6.1: a point sample of the scattered light).
  *
  * The lit part of the fiber, short against the radius R, has the radiance L(theta_o, phi) and shows the width D and the
  * length l cos theta_o. A place at the distance r, at which light arrives at the angle alpha from the normal, gets the
@@ -10,8 +9,8 @@
  *     r^2 / (R^2 cos alpha cos theta_o)                        up to a constant
  *
  * The thesis compares pixels with direct measurements that it divides by cos theta_o, and leaves out cos theta_o of the
- * bowl (equation 4.6), which is at least 0.9 in the part that it compares. A beam of fixed width lights a length of
- * l / cos theta_i, which is removed as well.
+ * bowl (equation 4.6), which is at least 0.9 in the part that it compares. A beam of fixed width lights a length of l /
+ * cos theta_i, which is removed as well.
  *
  * Azimuths are measured about the fiber from +y, the rim, through the bowl: 90 degrees is its lowest point. */
 #ifndef SELVEDGE_OPTIMIZER_BOWL_PLACE_H

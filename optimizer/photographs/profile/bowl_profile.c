@@ -13,7 +13,7 @@ static const double most_saturated = 0.02, least_se = 1e-6; /* of the bowl's pix
 
 static double wrap_deg(double phi) { return phi - 360.0 * floor((phi + 180.0) / 360.0); }
 
-/* What one photograph shows of the bowl. */
+/* The bowl in one photograph. */
 struct view {
     const struct job_bowl *bowl;
     const struct bowl_pictures *pictures;

@@ -2,13 +2,12 @@
  *
  * The table (number_table.h) has the columns
  *   theta_o_deg   angle of the view from the normal plane of the fiber, -90..90
- *   phi_deg       azimuth of the view about the fiber, from that of the light: 0 back to the light, 180 straight on
+ *   phi_deg       azimuth of the view about the fiber, from the light's: 0 back to the light, 180 straight on
  *   radiance      any unit; or radiance_r, radiance_g, radiance_b for three channels
  *   theta_i_deg   angle of the light from the normal plane; not where the job states one angle for the whole table
  *   radiance_se   standard error (also radiance_r_se ...); optional
  * as the goniometer of Yan et al. 2015 gives them: theta_i -40 degrees, theta_o 10 to 50 degrees in steps of 2, phi -20
- * to 200 in steps of 5. A view at theta_o = -theta_i sees the mirrored light. Angles here are radians.
- */
+ * to 200 in steps of 5. A view at theta_o = -theta_i sees the mirrored light. Angles here are radians. */
 #ifndef SELVEDGE_OPTIMIZER_FIBER_PROFILE_H
 #define SELVEDGE_OPTIMIZER_FIBER_PROFILE_H
 
@@ -33,8 +32,8 @@ struct fiber_profile {
     struct profile_row *row;
 };
 
-/* text: the table, NUL-terminated, n_bytes without the NUL; name: what errors call it. theta_i_deg: of the whole table,
- * or NaN. Errors are those of number_table.h with the option OPTION_PROFILE_FILE: a column that is missing, or given
+/* text: the table, NUL-terminated, n_bytes without the NUL; name: the table's name in errors. theta_i_deg: of the whole
+ * table, or NaN. Errors: from number_table.h with the option OPTION_PROFILE_FILE: a column that is missing, or given
  * twice over (theta_i_deg in the table and in the job; radiance and radiance_r), angles out of range or in radians, a
  * radiance that is negative by more than five times its standard error, a standard error that is not above 0, no row,
  * or radiances that are all below 1e-12. STATUS_TOO_LARGE above PROFILE_MAX_ROW rows. */

@@ -5,7 +5,7 @@
 
 #include "optimizer/photographs/reader/photograph_reader.h"
 
-/* data: what follows "Exif\0\0" in the marker APP1. Sets the members that it states; leaves the others. */
+/* data: the bytes after "Exif\0\0" in the marker APP1. Sets the members that it states; leaves the others. */
 void exif_read(const uint8_t *data, size_t n_bytes, struct photograph_info *info);
 
 #endif

@@ -1,12 +1,13 @@
-/* What the readers of integer pictures (PNG, JPEG, TIFF) have in common: the declared transfer curve, and the check of
- * an alpha channel. */
+/* Shared by the readers of integer pictures (PNG, JPEG, TIFF): the declared transfer curve, and the check of an alpha
+ * channel. */
 #ifndef SELVEDGE_OPTIMIZER_INTEGER_SAMPLES_H
 #define SELVEDGE_OPTIMIZER_INTEGER_SAMPLES_H
 
 #include "optimizer/photographs/reader/photograph_reader.h"
 
-/* Whether the document declares how integer samples stand for light. STATUS_INVALID with what to write; also for a
- * black level of samples that are not linear, or above the largest sample. Fills the members of info that follow. */
+/* Checks that the document declares how integer samples stand for light. STATUS_INVALID with the words to write; also
+ * for a black level of samples that are not linear, or above the largest sample. Fills the members of info that
+ * follow. */
 status integer_samples_declare(const char *path, const struct photograph_request *q, unsigned bits,
                                struct photograph_info *info, struct error *err);
 /* Light of each of the 2^bits sample values, 1 for the largest; bits is 8 or 16. The caller frees it; NULL without

@@ -39,9 +39,9 @@ static double saturated_part(const struct image *im)
     return (double)n_saturated / (double)n;
 }
 
-/* Power of the second differences of neighbours over that of every other pixel, the larger one of rows and columns. 1
- * for independent noise, 0.4 and more for photographs as a camera made them, 0.15 and less after an enlargement by 2 or
- * a blur by a pixel. 1 for pictures without structure. */
+/* Returns the power of the second differences of neighbours over the power for every other pixel, the larger ratio of
+ * rows and columns. 1 for independent noise, 0.4 and more for photographs as a camera made them, 0.15 and less after an
+ * enlargement by 2 or a blur by a pixel. 1 for pictures without structure. */
 static double neighbour_power(const struct image *im)
 {
     double largest = 0.0;

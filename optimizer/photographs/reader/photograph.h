@@ -15,7 +15,7 @@
 #include "optimizer/job/document/job_document.h"
 #include "optimizer/photographs/reader/photograph_reader.h"
 
-/* What became of a file on its way to radiances. */
+/* The record of a file on its way to radiances. */
 struct photograph_record {
     struct photograph_info info; /* with the exposure that the document overrides */
     size_t width, height;        /* of the file, in pixels of the image that was read */
@@ -24,7 +24,7 @@ struct photograph_record {
     bool merged;                 /* by the estimator of exposure_merge.h, of n_exposure pictures */
     size_t n_exposure;
     double noise_se_rgb[3]; /* of the mean, by the camera's noise; with merged alone, NaN without a noise record */
-    /* Errors of the mean of channel c by those of the color matrix, from three independent causes of one standard
+    /* Errors of the mean of channel c by the errors of the color matrix, from three independent causes of one standard
      * deviation each; the causes of a channel are the same for all photographs that the matrix was applied to. */
     double color_error[3][3];
     bool resampled; /* pixels depend on their neighbours as after an enlargement or a strong filter */
@@ -48,7 +48,7 @@ status photograph_measure(const char *path, const struct job_photograph *p, stru
 status photograph_measure_image(const struct image *im, const char *name, enum job_transfer transfer,
                                 struct photograph_mean *mean, struct error *err);
 
-/* A photograph of which nothing but the transfer is declared: scale 1, no crop, exposure and black level as the file
+/* Returns a photograph that declares nothing but its transfer: scale 1, no crop, exposure and black level as the file
  * states. */
 struct job_photograph photograph_plain(enum job_transfer transfer);
 
@@ -57,7 +57,7 @@ status photograph_read_values(const char *path, const struct job_photograph *p, 
                               struct photograph_record *record, struct error *err);
 /* Multiplies all pixels. */
 void image_scale(struct image *im, double factor);
-/* The crop as an image, divided by the exposure and scaled. record may be NULL. The transfer of p is that of integer
+/* The crop as an image, divided by the exposure and scaled. record may be NULL. The transfer of p applies to integer
  * samples alone: linear files are read as they are. */
 status photograph_read(const char *path, const struct job_photograph *p, struct image *im,
                        struct photograph_record *record, struct error *err);

@@ -1,4 +1,4 @@
-/* The contrast of a photograph's texture at a stated scale: what contrast_blocks.h is for a rendering.
+/* The contrast of a photograph's texture at a stated scale: the counterpart of contrast_blocks.h for renderings.
  *
  *   C = 1/(K - 1) sum_k (m_k - m)^2 / m^2,    m_k: mean of part k of K = n_cell^2 equal parts of the crop
  *
@@ -9,8 +9,7 @@
  * distances).
  *
  * Standard error: how much C changes from one piece of the cloth to another, by the scatter of the parts'
- * contributions, taken as independent. For a pattern that repeats within the crop it is too large.
- */
+ * contributions, taken as independent. For a pattern that repeats within the crop it is too large. */
 #ifndef SELVEDGE_OPTIMIZER_PHOTOGRAPH_CONTRAST_H
 #define SELVEDGE_OPTIMIZER_PHOTOGRAPH_CONTRAST_H
 

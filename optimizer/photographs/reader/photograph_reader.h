@@ -22,7 +22,7 @@ struct photograph_request {
     size_t limit_pixel;
 };
 
-/* What a file states besides its pixels. */
+/* The statements of a file besides its pixels. */
 struct photograph_info {
     const char *format;               /* "OpenEXR", "TIFF", "camera raw", "PNG", "JPEG" */
     unsigned bits;                    /* of one sample as stored; 32 for float */
@@ -30,7 +30,7 @@ struct photograph_info {
     bool less_trustworthy;            /* 8 bits, or made by a camera's own processing */
     bool has_alpha;                   /* an alpha channel that is opaque everywhere, and was left out */
     double exposure_s, iso, aperture; /* NaN: not stated. aperture is the f-number */
-    double black_level;               /* what was subtracted, in the file's values */
+    double black_level;               /* the subtracted level, in the file's values */
     double full_scale;                /* file values from black to saturation, which are 1 in the image; 1 for float */
     char camera[96];                  /* maker and model; "": not stated */
 };

@@ -65,7 +65,7 @@ static void take_exif(const struct jpeg_decompress_struct *jpeg, struct photogra
             exif_read(m->data + 6, m->data_length - 6, info);
 }
 
-/* What outlives the longjmp. */
+/* The state that outlives the longjmp. */
 struct jpeg_work {
     struct jpeg_decompress_struct jpeg;
     struct jpeg_failure failure;

@@ -14,7 +14,7 @@
 struct tiff_photograph {
     TIFF *tiff;
     const char *path, *name;
-    struct tiff_page page; /* width: of all channels, so that its sizes are those of the file */
+    struct tiff_page page; /* width: of all channels, so that its sizes agree with the file's */
     uint32_t width, height;
     uint16_t n_channel, planar, photometric;
     char message[256];

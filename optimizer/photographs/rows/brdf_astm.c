@@ -28,7 +28,7 @@ struct astm {
     size_t n_chosen, chosen[N_CHOSEN];
 };
 
-/* What the columns after the angles are: rgb is the sum of weight_rgb times value. */
+/* The meaning of the columns after the angles: rgb is the sum of weight_rgb times value. */
 struct astm_columns {
     size_t n;
     double (*weight_rgb)[3];

@@ -1,13 +1,13 @@
 /* The table of measured BRDFs in the formats of public databases, and how rows of measurements are made of them. A new
  * format is one file and one row of BRDF_READERS.
  *
- * Rows are what a photograph would give: the mean over the lamp of pi f cos theta_l, over the mean of the lamp's own
- * cosine, so that a perfect white diffuser that faces the lamp is 1. The lamp is that of the document, sampled at 8 x 8
- * points. Which rows: those of the document (measurements.configurations), or BRDF_FIT_ROWS and BRDF_HELD_OUT_ROWS of
- * the default, which spread over lamp, camera and azimuth; of formats that list what was measured they are a choice of
- * that. An isotropic BRDF gives means over all rotations of the cloth. Of an anisotropic one x runs along the weft, and
- * default rows alternate between rotations 0 and 90 degrees, or are at rotation 0 where the file lists its azimuths.
- */
+ * Rows have the values that a photograph would give: the mean over the lamp of pi f cos theta_l, over the mean of the
+ * lamp's own cosine, so that a perfect white diffuser that faces the lamp is 1. The document's lamp is sampled at 8 x 8
+ * points. The document may list the rows (measurements.configurations). The default has BRDF_FIT_ROWS and
+ * BRDF_HELD_OUT_ROWS, which spread over lamp, camera and azimuth; for formats that list their measurements it chooses
+ * among these. An isotropic BRDF gives means over all rotations of the cloth. Of an anisotropic one x runs along the
+ * weft, and default rows alternate between rotations 0 and 90 degrees, or are at rotation 0 where the file lists its
+ * azimuths. */
 #ifndef SELVEDGE_OPTIMIZER_BRDF_FILE_H
 #define SELVEDGE_OPTIMIZER_BRDF_FILE_H
 
@@ -21,8 +21,8 @@ enum { BRDF_FIT_ROWS = 16, BRDF_HELD_OUT_ROWS = 24 };
 typedef struct brdf_reader {
     const char *id, *title;
     const char *suffix; /* of its files, by which it is recognised: ".binary" */
-    /* symmetry: what the job says of the file. STATUS_FORMAT, STATUS_INVALID (it is not of that symmetry), STATUS_IO,
-     * STATUS_NO_MEMORY, STATUS_NOT_FOUND with a text that names the file. */
+    /* symmetry: the symmetry by the job document. STATUS_FORMAT, STATUS_INVALID (the file has another symmetry),
+     * STATUS_IO, STATUS_NO_MEMORY, STATUS_NOT_FOUND with a text that names the file. */
     status (*open)(const char *path, enum job_symmetry symmetry, void **handle, struct error *err);
     bool (*isotropic)(const void *handle);
     /* f per steradian of unit vectors towards lamp and camera, z along the normal. False where nothing was measured. */

@@ -41,7 +41,7 @@ static void close_rgl(void *handle)
     free(r);
 }
 
-/* What is wrong with a file, or NULL; "" when memory is short. */
+/* The fault of a file, or NULL; "" when memory is short. */
 typedef const char *fault_text;
 static const char no_memory[] = "";
 

@@ -56,7 +56,7 @@ double brdf_samples_distance(bool isotropic, const struct brdf_sample *p, const 
 
 static double height_of(const struct brdf_sample *s) { return s->light[2] + s->camera[2]; }
 
-/* By height, then by all numbers, so that the order does not depend on that of the file. */
+/* By height, then by all numbers, so that the order does not depend on the order in the file. */
 static int compare(const void *left, const void *right)
 {
     const struct brdf_sample *p = left, *q = right;

@@ -2,10 +2,10 @@
  *
  * A pair (l, c) towards lamp and camera is the vectors a = l + c and b = 0.15 (l - c): along a, which is the half
  * vector, a BRDF changes fast, along b slowly. The squared distance of two pairs is the sum of both squared
- * differences. Exchange of l and c changes the sign of b alone, and by reciprocity nothing else. An isotropic BRDF
- * is the same for pairs that are turned about the normal, or mirrored; the nearest of them counts. A value is that
- * of a plane through the nearest 16 samples, fitted by weighted least squares (weights fall to 0 at the next
- * sample), and stays between the least and the largest of them; at a sample it is that sample. */
+ * differences. Exchange of l and c changes the sign of b alone, and by reciprocity nothing else. An isotropic BRDF is
+ * the same for pairs that are turned about the normal, or mirrored; the nearest of them counts. A value lies on a plane
+ * through the nearest 16 samples, fitted by weighted least squares (weights fall to 0 at the next sample), and stays
+ * between the least and the largest of them; at a sample it is that sample. */
 #ifndef SELVEDGE_OPTIMIZER_BRDF_SAMPLES_H
 #define SELVEDGE_OPTIMIZER_BRDF_SAMPLES_H
 

@@ -63,7 +63,7 @@ bool brdf_spectrum_weights(const double *nm, size_t n, double (*weight)[3])
     if (!gives_color(nm, n)) return false;
     memset(weight, 0, n * sizeof *weight);
     for (size_t i = 0; i + 1 < n; i++) add_interval(nm[i], nm[i + 1], weight[i], weight[i + 1]);
-    for (size_t c = 0; c < 3; c++) { /* what lies beyond the ends counts as at the ends */
+    for (size_t c = 0; c < 3; c++) { /* values beyond the ends equal the values at the ends */
         double below = 0.0, above = 0.0;
         for (int at = FIRST_NM - STEP_NM; at < FIRST_NM + N * STEP_NM; at++) {
             double middle = (double)at + 0.5;

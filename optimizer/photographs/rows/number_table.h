@@ -14,7 +14,7 @@
 enum { NUMBER_TABLE_MAX_CELL = 64, NUMBER_TABLE_MAX_COLUMN = 24 };
 
 struct number_table {
-    const char *file;               /* what errors call it */
+    const char *file;               /* its name in errors */
     const char *option;             /* of base/option_id.h: the table's */
     const char *const *column_name; /* NULL-terminated, at most NUMBER_TABLE_MAX_COLUMN; the required ones first */
     size_t n_required;

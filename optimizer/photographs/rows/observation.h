@@ -1,7 +1,6 @@
-/* What was measured: one mean rgb radiance with its standard error per configuration, from a table or from photographs.
- * Radiance unit: configuration.h (a perfect white diffuser facing the lamp has radiance 1).
- * Ownership: init/release; the array is malloc'ed and owned.
- */
+/* Measurements: one mean rgb radiance with its standard error per configuration, from a table or from photographs.
+ * Radiance unit: configuration.h (a perfect white diffuser facing the lamp has radiance 1). Ownership: init/release;
+ * the array is malloc'ed and owned. */
 #ifndef SELVEDGE_OPTIMIZER_OBSERVATION_H
 #define SELVEDGE_OPTIMIZER_OBSERVATION_H
 
@@ -18,9 +17,9 @@ struct observation {
     double mean_rgb[3];
     double se_rgb[3]; /* 0 when the source states none */
     double weight;    /* factor of the objective's weight of this observation; 1 */
-    size_t n_cell;    /* parts along an edge of the crop of which the contrast is taken; 0: not measured */
+    size_t n_cell;    /* parts along an edge of the crop, whose means make the contrast; 0: not measured */
     double contrast_rgb[3], contrast_se_rgb[3]; /* photograph_contrast.h */
-    /* True: not measured, but what a simpler model expects there (expected_rows.h). Such rows weigh in a fit, and are
+    /* True: not a measurement, but a simpler model's expectation (expected_rows.h). Such rows weigh in a fit, and are
      * neither scored nor reported. left_out_rgb: their mean_rgb without the rows of each fold, 3 * FOLDS_MAX values, of
      * the maker; NULL for other rows. */
     bool expected;
@@ -44,8 +43,8 @@ status observation_set_select(const struct observation_set *o, enum job_set set,
  * ratios count. */
 void observation_set_weigh(struct observation_set *o);
 
-/* An observation of the contrast of a photograph, not of its mean radiance: mean_rgb and se_rgb are those of the
- * contrast, and estimates of its configuration are estimates of the contrast (contrast_blocks.h). */
+/* An observation of the contrast of a photograph, not of its mean radiance: mean_rgb and se_rgb hold the contrast and
+ * its standard error, and estimates of its configuration are estimates of the contrast (contrast_blocks.h). */
 bool observation_is_contrast(const struct observation *o);
 /* Whether the row is a measured mean radiance: neither a contrast nor an expected row. */
 bool observation_is_measured_mean(const struct observation *o);

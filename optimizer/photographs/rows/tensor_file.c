@@ -25,7 +25,7 @@ static bool take(struct cursor *c, size_t n, uint64_t *value)
 
 static size_t type_bytes(unsigned type) { return type == TENSOR_UINT8 ? 1 : type == TENSOR_FLOAT32 ? 4 : 0; }
 
-/* Reads the header of a field. Returns what is wrong, or NULL. */
+/* Reads the header of a field. Returns the fault as text, or NULL. */
 static const char *take_field(struct cursor *c, const char *bytes, size_t n_bytes, struct tensor_field *f)
 {
     static const char *const ends = "it ends in its list of fields";

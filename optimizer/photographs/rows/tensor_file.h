@@ -25,7 +25,7 @@ struct tensor_file {
 };
 
 /* Reads a file of at most a gibibyte; the data of every field of the two types above lies inside it. STATUS_FORMAT with
- * what is wrong, and the errors of file_read_all. On failure there is nothing to release. */
+ * the fault in words, and the errors of file_read_all. On failure there is nothing to release. */
 status tensor_file_read(const char *path, struct tensor_file *t, struct error *err);
 void tensor_file_release(struct tensor_file *t);
 /* A field by name; NULL when there is none of this type and number of dimensions. */
