@@ -125,7 +125,7 @@ static void print_color(const struct photograph_process *k)
            k->chart.found_automatically ? "found" : "at the corners given", before, after);
 }
 
-/* A row of the JSON file: what a job would take from a photograph. */
+/* A row of the JSON file: the values that a job would take from a photograph. */
 static json_t *row_json(const struct job_photograph *p, const struct photograph_mean *m)
 {
     json_t *color = json_array();

@@ -16,7 +16,7 @@ int phantom_command_detect(int argc, char **argv);
 int phantom_command_look(int argc, char **argv);
 int phantom_command_mesh(int argc, char **argv);
 
-/* What the option --NAME takes. Each command has one table of its options. */
+/* The values of the option --NAME. Each command has one table of its options. */
 enum option_kind {
     OPTION_TEXT,
     OPTION_NUMBER,

@@ -80,7 +80,7 @@ static status detect_one(const struct detect_option *o, size_t i, struct photogr
     return STATUS_OK;
 }
 
-/* What a job document may take over. The scale is that of the first photograph. */
+/* The entries that a job document may take over. The first photograph gives the scale. */
 static json_t *cloth_json(const struct weave_guess *g, double px_per_mm)
 {
     json_t *j = json_pack("{s:o}", "draft", weave_draft_json(&g->draft));

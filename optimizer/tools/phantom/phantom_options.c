@@ -77,7 +77,7 @@ static status set_option(const struct command_option *o, const char *value, stru
     return error_set_field(err, STATUS_INVALID, o->name, "option --%s does not take '%s'", o->name, value);
 }
 
-/* The error of the option at which getopt_long stopped. code is what it returned, ':' or '?'; word is the last argument
+/* The error of the option at which getopt_long stopped. code: its return value, ':' or '?'; word is the last argument
  * that it read. */
 static status option_fault(int code, const char *word, const struct command_option *option, struct error *err)
 {

@@ -34,7 +34,7 @@ status phantom_photograph_model(struct phantom_photograph_option *o, const char 
 
 /* Reads the value of --param, "NAME=v" or "NAME=r,g,b" in file units. NAME is a parameter, or a colour with three
  * channels; with the name of a group before it ("warp.C_R"), or without for all groups. Returns STATUS_INVALID with a
- * text that says what is allowed. */
+ * text that names the allowed values. */
 status phantom_param_parse(const struct model_info *model, const char *text, double *param, struct error *err);
 
 /* Writes FOLDER/fit-00.exr .. held-out-23.exr, FOLDER/photographs.json (the array "photographs" of a job document)

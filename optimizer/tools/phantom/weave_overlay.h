@@ -6,7 +6,7 @@
 
 /* Writes a PNG of two pieces of the middle of the photograph side by side, enlarged and with more contrast: the left
  * one bare, the right one with a ring around each crossing where the rarer set of yarns is on top (orange: the warp,
- * blue: the weft), the lines through the middles of the wefts, and those of the warps where they are more than 12
+ * blue: the weft), the lines through the middles of the wefts, and the lines of the warps where these are more than 12
  * enlarged pixels apart. */
 status weave_overlay_write(const struct weave_picture *picture, const struct weave_guess *guess, const char *path,
                            struct error *err);

@@ -1,5 +1,5 @@
 /* Writes a raw mosaic as an uncompressed DNG file (Adobe, Digital Negative 1.3), as a camera with a Bayer sensor does:
- * what simulated cameras and the tests of the readers of real ones need, no more. */
+ * with only the tags that simulated cameras and the tests of the readers of real ones need. */
 #ifndef SELVEDGE_OPTIMIZER_DNG_FILE_H
 #define SELVEDGE_OPTIMIZER_DNG_FILE_H
 
@@ -12,7 +12,7 @@ struct dng_picture {
     size_t width, height; /* of the mosaic; even */
     unsigned black, white;
     double exposure_s, iso, aperture; /* exposure_s 0: the file states none of the three */
-    double neutral[3];                /* camera rgb of what the camera takes for white, 0: 0.5, 1, 0.7 */
+    double neutral[3];                /* camera rgb that the camera takes for white, 0: 0.5, 1, 0.7 */
 };
 
 /* sample: width x height, of 16 bits, in cells RG over GB. STATUS_IO. */

@@ -20,8 +20,8 @@ struct sensor {
     unsigned black, white;
 };
 
-/* A camera whose colors are far from those of radiances, at ISO 200 and f/8, with a white balance that is wrong for
- * every lamp. */
+/* A camera whose colors are far from the colors of radiances, at ISO 200 and f/8, with a white balance that is wrong
+ * for every lamp. */
 struct sensor sensor_default(void);
 /* Channel 0, 1, 2 of the filter over a photosite. */
 static inline size_t sensor_channel(size_t x, size_t y) { return y % 2 == 0 ? x % 2 : 1 + x % 2; }

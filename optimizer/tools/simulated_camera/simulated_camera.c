@@ -31,7 +31,7 @@ void simulated_camera_option_default(struct simulated_camera_option *o)
                                           .sensor = sensor_default()};
 }
 
-/* What all pictures have in common. */
+/* Shared by all pictures. */
 struct simulation {
     const struct simulated_camera_option *o;
     struct studio studio;
@@ -96,8 +96,8 @@ static void trace_photosites(const struct simulation *m, const struct studio_sce
     }
 }
 
-/* Smooths a picture by a Gaussian of one photosite along lines of n values with this stride, in place; what lies beyond
- * an end is as the end. line: scratch of n values. */
+/* Smooths a picture by a Gaussian of one photosite along lines of n values with this stride, in place; places beyond an
+ * end have the value at the end. line: scratch of n values. */
 static void blur_lines(float *value, size_t n_line, size_t line_step, size_t n, size_t step, float *line)
 {
     static const double weight[4] = {0.39905, 0.24204, 0.05401, 0.00443};
@@ -113,7 +113,7 @@ static void blur_lines(float *value, size_t n_line, size_t line_step, size_t n, 
     }
 }
 
-/* Rate of every photosite for what the scene shows, behind a lens that blurs by a photosite. */
+/* Rate of every photosite, behind a lens that blurs the scene by a photosite. */
 static status collect_light(const struct simulation *m, const struct studio_scene *scene, const struct studio_camera *c,
                             float *rate, struct error *err)
 {

@@ -8,7 +8,7 @@
 #include <string.h>
 
 static const double paper = 0.75, ink = 0.03, chart_board = 0.02, chart_table = 0.35;
-/* Of the chart, in units of which a patch has 2.5 and a gap 0.25. */
+/* Sizes of the chart, in units: a patch has 2.5 and a gap 0.25. */
 static const double patch = 2.5, pitch = 2.75, chart_width = 16.25, chart_height = 10.75, chart_margin = 0.75;
 
 status studio_init(struct studio *s, struct error *err)

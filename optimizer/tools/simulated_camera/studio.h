@@ -1,8 +1,8 @@
-/* What stands before a simulated camera, as a function of the ray: a piece of cloth that has been rendered, in the
- * middle of a white sheet with square markers, or a ColorChecker on its dark board.
+/* The scene before a simulated camera, as a function of the ray: a piece of cloth that has been rendered, in the middle
+ * of a white sheet with square markers, or a ColorChecker on its dark board.
  *
- * Frame: that of the cloth at rest, millimetres from the orbit center: x along the weft, y along the warp, z up. The
- * rendering shows the square of its crop about the orbit center, perpendicular to the view
+ * Frame: the frame of the cloth at rest, millimetres from the orbit center: x along the weft, y along the warp, z up.
+ * The rendering shows the square of its crop about the orbit center, perpendicular to the view
  * (renderer/transport/camera.h); around it the cloth continues as its mirror image. Sheet and chart are Lambert
  * reflectors under the lamp. Markers and chart do not cast shadows. */
 #ifndef SELVEDGE_OPTIMIZER_STUDIO_H
@@ -34,7 +34,7 @@ struct studio_camera {
 struct studio_scene {
     const struct studio *studio;
     const struct image *cloth;
-    double cloth_crop_mm; /* edge of what the rendering shows */
+    double cloth_crop_mm; /* edge of the rendered area */
     double cos_light;     /* of the lamp's angle from the normal */
 };
 
