@@ -11,8 +11,8 @@ LANGUAGE = {".c": "c", ".js": "js", ".py": "py"}
 # counters of lines do not reach there: they test processes that end without writing their counters.
 GATE = {
     "sandbox": (["optimizer/worker/sandbox/sandbox_", "optimizer/worker/sandbox/worker_confine"],
-                ["unit/optimizer/sandbox/", "api/service/test_sandbox"],
-                ["unit/optimizer/sandbox/", "api/service/test_sandbox"]),
+                ["unit/optimizer/worker/sandbox/", "api/service/test_sandbox"],
+                ["unit/optimizer/worker/sandbox/", "api/service/test_sandbox"]),
     "store": (["server/store/"], ["unit/server/", "api/access/", "api/batches/", "api/service/", "api/test_durable_replies", "api/test_jobs_api",
                                   "api/test_results_api", "api/test_uploads_api"], []),
     "retention": (["server/retention/"], ["unit/server/", "api/service/", "api/test_jobs_api"], []),
