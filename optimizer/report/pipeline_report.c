@@ -35,7 +35,7 @@ static void warn_of_overlap(const struct report *report)
         job_option_key(OPTION_CLOTH), 100.0 * report->in.made->report.overlap_mean);
 }
 
-/* Of a job that ends with the geometry. */
+/* Writes the results of a job that ends with the geometry. */
 static status report_geometry(struct report *report, struct error *err)
 {
     reconstruct_warn_fibers(&report->in.made->geometry, &report->in.made->fiber, &report->in.job->tools->warn);
@@ -49,7 +49,7 @@ static status report_geometry(struct report *report, struct error *err)
     return s == STATUS_OK ? report_pdf_write(report, err) : s;
 }
 
-/* Of a job that renders given parameters. */
+/* Writes the results of a job that renders given parameters. */
 static status report_pictures(struct report *report, struct error *err)
 {
     warn_of_overlap(report);
@@ -67,7 +67,7 @@ static status report_pictures(struct report *report, struct error *err)
     return s == STATUS_OK ? report_pdf_write(report, err) : s;
 }
 
-/* Of a job with the profile of a single fiber. */
+/* Writes the results of a job with the profile of a single fiber. */
 static status report_profile(struct report *report, struct error *err)
 {
     status s = profile_json_write(report, err);
@@ -82,7 +82,7 @@ static status use_best(struct report *report, struct error *err)
     return pipeline_cloth_use(report->in.job, &report->in.fit[best], best, report->in.made, err);
 }
 
-/* Of a job that fits models to rows. */
+/* Writes the results of a job that fits models to rows. */
 static status report_fit(struct report *report, struct error *err)
 {
     status s = pipeline_certify(report, err);

@@ -39,7 +39,7 @@ __attribute__((format(printf, 4, 5))) static void row(FILE *out, const char *nam
 static void open_table(FILE *out, const char *title) { fprintf(out, "<h2>%s</h2>\n<table>\n", title); }
 static void close_table(FILE *out) { fputs("</table>\n", out); }
 
-/* How many radii the fibers have: whether one class has fibers of different radius, in words. */
+/* Returns in words whether one class of the fibers has different radii. */
 static const char *radii_in_words(const struct report *report)
 {
     const struct fiber_set *f = &report->in.made->fiber;
@@ -92,7 +92,7 @@ static void print_fibers(const struct report *report, const struct fiber_lengths
           out);
 }
 
-/* How sure the fibers are. */
+/* Prints the confidence in the fibers. */
 static void print_errors(const struct report *report, FILE *out)
 {
     const struct reconstruct_report *g = &report->in.made->geometry;

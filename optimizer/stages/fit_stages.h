@@ -58,7 +58,7 @@ struct profile_fit_input {
     size_t n_model;
     const struct model_setup *model;
 };
-/* Of a job with the profile of a fiber; always done anew. */
+/* The stage "fit" of a job with the profile of a fiber; it stores nothing and always runs. */
 status stage_profile_fit(const struct profile_fit_input *in, struct fit_output *out, struct error *err);
 
 /* The smooth factor on the renderings of a model's cloth (pipeline_discrepancy.h), and relative RMS errors without

@@ -52,7 +52,7 @@ static const double usual_material = 0.4;
  * million for 16 rows). A fit to photographs ends by their errors, which asks for 120 thousand effective paths of two
  * replicas. cloth_share: the share of the budget that a search of the numbers of a cloth takes. */
 static const double misfit_row_paths = 62500.0, noise_row_paths = 264000.0, cloth_share = 0.7;
-/* Of the time of the fit, the share of the fit where a scan's errors are carried on. */
+/* The fit's share of its stage's time where a scan's errors are carried on. */
 static const double usual_budget = 6e6, fit_share = 1.0 - PIPELINE_SCAN_ERROR_SHARE;
 /* Time of a validated path over the time of a fitted one. The rest of a report in units of a path's time, without the
  * preparation of models for its gradient certificate: pages, and the geometry of a scan. */
@@ -108,8 +108,8 @@ static void plan_fibers(struct job_plan *plan, size_t i)
 
 /* ---- a described cloth ---- */
 
-/* Of a felt's fiber, in units of the other structures; seconds of one thread for a unit: weaves of sizes from 3,000 to
- * 143,000 needed 1.5e-5 to 1.6e-5, felts of 600 and 2,500 fibers 1.2e-5 to 1.3e-5. */
+/* Size of a felt's fiber, in units of the other structures; seconds of one thread for a unit: weaves of sizes from
+ * 3,000 to 143,000 needed 1.5e-5 to 1.6e-5, felts of 600 and 2,500 fibers 1.2e-5 to 1.3e-5. */
 static const double felt_fiber_size = 38.0, make_s_per_size = 1.5e-5;
 
 static double fibers_of_yarn(const struct cloth_description *d, int direction, size_t i)

@@ -299,7 +299,7 @@ static void carry_messages(struct agent *a)
     }
 }
 
-/* Whether the launcher has started several processes that MPI takes for single ones. */
+/* Returns whether the launcher has started several processes that MPI takes for single ones. */
 static bool is_lonely(const struct agent *a)
 {
     const char *n = getenv("SLURM_STEP_NUM_TASKS");

@@ -21,7 +21,7 @@ struct worker_team {
 };
 
 bool worker_team_parse(const char *text, struct worker_team_place *place);
-/* Whether mpirun or srun has started this process as one of several. */
+/* Returns whether mpirun or srun has started this process as one of several. */
 bool worker_team_is_started(void);
 /* Executes selvedge-mpi, which starts this program again with its place among the ranks. Returns only on failure:
  * STATUS_NOT_FOUND when it is not installed beside this program. */

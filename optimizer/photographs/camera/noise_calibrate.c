@@ -45,7 +45,7 @@ static status read_frame(const char *path, const struct noise_frames *f, struct 
     return s;
 }
 
-/* Whether two frames may be compared: the same camera, ISO and size. */
+/* Checks that two frames may be compared: the same camera, ISO and size. */
 static status check_alike(const struct frame *a, const struct frame *b, struct error *err)
 {
     const char *what = a->image.width != b->image.width || a->image.height != b->image.height ? "sizes"

@@ -27,7 +27,7 @@ void photograph_process_release(struct photograph_process *k)
 
 /* ---- dark frames ---- */
 
-/* Whether two exposure times are equal, or both unknown. */
+/* Returns whether two exposure times are equal, or both unknown. */
 static bool same_time(double a, double b)
 {
     return (isnan(a) && isnan(b)) || fabs(a - b) <= same_time_rel * fmax(fabs(a), fabs(b));

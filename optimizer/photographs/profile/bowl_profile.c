@@ -159,7 +159,7 @@ status bowl_profile_load(struct fiber_profile *profile, struct job_document *doc
 
 /* ---- the picture ---- */
 
-/* Whether a line of the grid goes through between two angles in degrees. */
+/* Returns whether a line of the grid goes through between two angles in degrees. */
 static bool crosses(double a_deg, double b_deg) { return floor(a_deg / 15.0) != floor(b_deg / 15.0); }
 
 static void draw(const struct bowl_pictures *p, float bright, struct image *out)

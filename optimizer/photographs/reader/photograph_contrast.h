@@ -16,10 +16,10 @@
 #include "optimizer/job/document/job_document.h"
 #include "renderer/image/image.h"
 
-/* Of a crop; name: of its file. STATUS_INVALID: fewer than 2 x 2 pixels in a part. STATUS_NO_MEMORY. */
+/* Measures a crop; name: the name of its file. STATUS_INVALID: fewer than 2 x 2 pixels in a part. STATUS_NO_MEMORY. */
 status photograph_contrast(const struct image *im, const char *name, size_t n_cell, double contrast_rgb[3],
                            double se_rgb[3], struct error *err);
-/* Of one channel of a picture with at least 2 x 2 pixels in a part; contrast 0 where the mean is not positive. */
+/* Measures one channel of a picture with at least 2 x 2 pixels in a part; contrast 0 where the mean is not positive. */
 status image_contrast(const struct image *im, size_t channel, size_t n_cell, double *contrast, double *se,
                       struct error *err);
 

@@ -15,7 +15,7 @@
 
 enum { PHOTOGRAPH_FIRST_BYTES = 16 };
 
-/* How a file is to be read. */
+/* The request of a reader: transfer curve, black level and limits. */
 struct photograph_request {
     enum job_transfer transfer; /* of integer samples; undeclared is an error for them */
     double black_level;         /* value of the file that stands for no light; NaN: the file's own, or 0 */

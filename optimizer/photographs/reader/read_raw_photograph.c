@@ -59,7 +59,7 @@ static int channel_of(const libraw_data_t *lr, int color)
     return at != NULL && *at != '\0' ? (int)(at - "RGB") : -1;
 }
 
-/* Whether each cell of 2 x 2 samples has a red, two greens and a blue. */
+/* Returns whether each cell of 2 x 2 samples has a red, two greens and a blue. */
 static bool is_bayer(libraw_data_t *lr)
 {
     int n[3] = {0};

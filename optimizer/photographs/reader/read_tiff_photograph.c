@@ -57,7 +57,7 @@ static status open_tiff(struct tiff_photograph *t, struct error *err)
                      t->message[0] != '\0' ? t->message : "damaged data");
 }
 
-/* Whether the kind of picture is one that a photograph has. */
+/* Checks that the picture is of a kind that photographs have. */
 static status check_kind(const struct tiff_photograph *t, uint16_t format, struct error *err)
 {
     if (t->photometric == PHOTOMETRIC_PALETTE) return integer_samples_palette(t->path, err);

@@ -73,7 +73,7 @@ status number_table_not_negative(const struct number_table *t, size_t column, do
     return STATUS_OK;
 }
 
-/* Whether a line has separators alone. */
+/* Returns whether a line has separators alone. */
 static bool is_empty(const struct number_table *t)
 {
     for (size_t i = 0; i < t->n_cell; i++)

@@ -46,9 +46,10 @@ void observation_set_weigh(struct observation_set *o);
 /* An observation of the contrast of a photograph, not of its mean radiance: mean_rgb and se_rgb hold the contrast and
  * its standard error, and estimates of its configuration are estimates of the contrast (contrast_blocks.h). */
 bool observation_is_contrast(const struct observation *o);
-/* Whether the row is a measured mean radiance: neither a contrast nor an expected row. */
+/* Returns whether the row is a measured mean radiance: neither a contrast nor an expected row. */
 bool observation_is_measured_mean(const struct observation *o);
-/* Whether the contrast of all channels is known: its standard errors are below 1, which a black channel has not. */
+/* Returns whether the contrast of all channels is known: its standard errors are below 1, which a black channel has
+ * not. */
 bool observation_contrast_known(const struct observation *o);
 /* Makes that observation from one with n_cell > 0. weight: of contrasts beside means. */
 struct observation observation_of_contrast(const struct observation *o, double weight);

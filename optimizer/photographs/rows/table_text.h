@@ -10,9 +10,9 @@
 /* Prepares NUL-terminated text in place: drops the byte order mark, and turns all line ends into '\n'. Returns the
  * first character. */
 char *table_text_begin(char *text);
-/* Whether text of n_bytes is UTF-16, as Excel's "Unicode text" is. */
+/* Returns whether text of n_bytes is UTF-16, as Excel's "Unicode text" is. */
 bool table_text_is_utf16(const char *text, size_t n_bytes);
-/* Whether a line is "sep=X"; sets the separator then. */
+/* Returns whether a line is "sep=X"; sets the separator then. */
 bool table_text_is_separator_line(const char *line, char *separator);
 /* The separator of a header line: ';' or a tab where it has one, else ','. */
 char table_text_separator(const char *header);

@@ -40,7 +40,7 @@ status export_text_open(struct export_text *t, struct error *err);
 status export_text_close(const struct export_scene *e, struct export_text *t, const char *name, struct error *err);
 void export_path(const struct export_scene *e, const char *name, char path[WORKER_PATH_BYTES]);
 
-/* Whether fiber i belongs to group. */
+/* Returns whether fiber i belongs to group. */
 bool export_fiber_in(const struct export_scene *e, size_t i, size_t group);
 /* Control points of the cubic B-spline of fiber i: the vertices, and before the first and after the last one its
  * neighbour mirrored there, so that the curve begins and ends at them. Between, it passes a vertex by a sixth of the

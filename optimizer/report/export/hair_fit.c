@@ -139,7 +139,7 @@ static double share_square(const struct target *t)
     return sum / weight;
 }
 
-/* Of one material where n = N_OF_LOBES. */
+/* Gives one material where n = N_OF_LOBES. */
 static double objective(unsigned n, const double *x, double *gradient, void *data)
 {
     (void)gradient;

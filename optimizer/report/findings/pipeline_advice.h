@@ -7,7 +7,7 @@
 
 /* Fills in the certificate of every model and warns if one fails. Takes some seconds at most. */
 status pipeline_certify(struct report *report, struct error *err);
-/* Whether the derivatives are as good as they must be; noise alone is no reason to fail. */
+/* Returns whether the derivatives are as good as they must be; noise alone is no reason to fail. */
 bool pipeline_certificate_passed(const struct pipeline_model *m);
 
 /* Ranks the candidate photographs of the document for every model. Without candidates it does nothing. */

@@ -52,7 +52,7 @@ struct model_advice {
     struct pipeline_candidate *candidate; /* as many as the document has, best first; NULL when none were asked for */
 };
 
-/* How well a plain BRDF describes the same rows (pipeline_skill.h). */
+/* A plain BRDF fitted to the same rows, and its errors (pipeline_skill.h). */
 struct pipeline_skill {
     bool measured; /* false where a row is lit by an environment too */
     struct plain_brdf brdf;

@@ -50,7 +50,7 @@ static json_t *seam_json(const struct fiber_seam *s)
     return json;
 }
 
-/* Of the fibers in use, and as they were found. */
+/* Lengths of the fibers in use, and of the fibers as they were found. */
 static json_t *seam_fibers_json(const struct reconstruct_report *g)
 {
     const bool scanned = g->n[0] > 0;
@@ -107,7 +107,7 @@ static json_t *texture_json(const struct report *report)
     return json;
 }
 
-/* How clearly the scan shows the fibers. */
+/* The grade of the scan: how clearly it shows the fibers. */
 static json_t *grade_json(const struct scan_grade *g)
 {
     return json_pack("{s:s, s:o, s:o, s:o, s:o, s:o}", "verdict", grade_verdict_name(g->verdict), "contrast",
@@ -197,7 +197,7 @@ static json_t *described_json(const struct report *report)
     return json;
 }
 
-/* How the fibers came from a scan. */
+/* The way from the scan to the fibers. */
 static void set_scan(json_t *json, const struct report *report)
 {
     const struct reconstruct_report *g = &report->in.made->geometry;

@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-/* Whether the fibers in use have sections or radii that vary. */
+/* Returns whether the fibers in use have sections or radii that vary. */
 bool section_report_applies(const struct report *report);
 /* The key "sections" of "geometry"; null where it does not apply, or when memory is out. */
 json_t *section_report_json(const struct report *report);

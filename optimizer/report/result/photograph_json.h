@@ -1,4 +1,4 @@
-/* How a photograph became radiances, as JSON: for the rows of result.json and for previews. */
+/* The steps from a photograph to radiances as JSON, for the rows of result.json and for previews. */
 #ifndef SELVEDGE_OPTIMIZER_PHOTOGRAPH_JSON_H
 #define SELVEDGE_OPTIMIZER_PHOTOGRAPH_JSON_H
 
@@ -8,7 +8,8 @@
 
 /* {"format", "bits", "less_trustworthy", "exposure_s", ...}; unknown values are null. NULL for a row of a table. */
 json_t *photograph_record_json(const struct photograph_record *r);
-/* How colors became radiances: the matrix and, of a chart, its corners and color differences; null without either. */
+/* Returns the step from colors to radiances: the matrix and, of a chart, its corners and color differences; null
+ * without either. */
 json_t *photograph_color_json(const struct photograph_process *k, const struct job_setup *setup);
 
 #endif

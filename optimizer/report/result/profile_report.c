@@ -54,7 +54,7 @@ static json_t *table_json(const struct report *report)
                      json_number_list(range[1], 2, 1.0), "phi_deg", json_number_list(range[2], 2, 1.0));
 }
 
-/* How the photographs of a bowl became the table; NULL without them. */
+/* Returns the steps from the photographs of a bowl to the table; NULL without photographs. */
 static json_t *bowl_json(const struct report *report)
 {
     const struct job_bowl *b = &report->in.profile->bowl;

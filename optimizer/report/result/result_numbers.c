@@ -51,8 +51,8 @@ static json_t *screening_json(const struct report *report, const struct cloth_se
     return list;
 }
 
-/* Whether the photographs ask for correction k: it is determined, and two standard errors or more from the value that
- * leaves the fibers as they are. */
+/* Returns whether the photographs ask for correction k: it is determined, and two standard errors or more from the
+ * value that leaves the fibers as they are. */
 static bool asked_for(const struct report *report, const struct pipeline_model *m, size_t k)
 {
     const struct uncertainty *u = &m->fit->cloth.joint.uncertainty;

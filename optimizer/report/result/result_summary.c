@@ -226,7 +226,7 @@ static void print_summary(struct report *report, FILE *out)
     print_warnings(report, out);
 }
 
-/* Of a job that ends with the geometry. */
+/* Prints the summary of a job that ends with the geometry. */
 static void print_geometry(struct report *report, FILE *out)
 {
     fprintf(out, "%s\n\n", report->in.sample);
@@ -236,7 +236,7 @@ static void print_geometry(struct report *report, FILE *out)
     print_warnings(report, out);
 }
 
-/* Of a job that renders given parameters. */
+/* Prints the summary of a job that renders given parameters. */
 static void print_pictures(struct report *report, FILE *out)
 {
     const struct pipeline_model *m = report->model;
@@ -249,7 +249,7 @@ static void print_pictures(struct report *report, FILE *out)
     print_warnings(report, out);
 }
 
-/* Of a job with the profile of a fiber. */
+/* Prints the summary of a job with the profile of a fiber. */
 static void print_profile(struct report *report, FILE *out)
 {
     fprintf(out, "%s\n\n", report->in.sample);

@@ -4,9 +4,9 @@
 
 #include "optimizer/report/findings/report.h"
 
-/* Of a linear picture, as bright as its 98th percentile asks. */
+/* Writes the thumbnail of a linear picture, with an exposure by its 98th percentile. */
 status result_thumbnail_of_image(const struct report *report, const struct image *im, struct error *err);
-/* Of 3 bytes a pixel in sRGB, row 0 at the top. */
+/* Writes the thumbnail of a picture with 3 bytes a pixel in sRGB, row 0 at the top. */
 status result_thumbnail_of_bytes(const struct report *report, const uint8_t *rgb, size_t width, size_t height,
                                  struct error *err);
 

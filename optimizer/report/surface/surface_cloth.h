@@ -25,7 +25,7 @@ struct surface_cloth {
 status surface_cloth_init(const struct surface_input *on, size_t i, const struct scene *fibers,
                           struct surface_cloth *cloth, struct error *err);
 void surface_cloth_release(struct surface_cloth *cloth);
-/* Whether the cloth can be laid on the surfaces of all pictures, so that a fault is found before the fit. Errors as
+/* Checks that the cloth can be laid on the surfaces of all pictures, so that a fault is found before the fit. Errors as
  * above. */
 status surface_cloth_check(const struct surface_input *on, struct error *err);
 

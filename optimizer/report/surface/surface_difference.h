@@ -1,4 +1,4 @@
-/* How far a picture by tables is from a path-traced one of the same view. */
+/* The difference of a picture by tables from a path-traced one of the same view. */
 #ifndef SELVEDGE_OPTIMIZER_SURFACE_DIFFERENCE_H
 #define SELVEDGE_OPTIMIZER_SURFACE_DIFFERENCE_H
 

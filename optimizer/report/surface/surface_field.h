@@ -4,8 +4,8 @@
 
 #include "optimizer/report/findings/report.h"
 
-/* How many mean fiber diameters a pixel of `pixel_m` covers. Fibers weigh as much as they show, by their length and
- * diameter. 0 without fibers. */
+/* Returns the number of mean fiber diameters that a pixel of `pixel_m` covers. Fibers weigh as much as they show, by
+ * their length and diameter. 0 without fibers. */
 double surface_field_coverage(const struct fiber_set *fiber, double pixel_m);
 
 /* The model by which picture i renders the best model of the job. That is the model itself. But if the picture asks for

@@ -279,7 +279,7 @@ static status render(struct report *report, const struct one_picture *one, const
     return s == STATUS_OK || s == STATUS_CANCELLED ? s : error_prefix(err, s, "picture %zu", one->i + 1);
 }
 
-/* Whether an entry of an earlier attempt has all that the document asks for. */
+/* Returns whether an entry of an earlier attempt has all that the document asks for. */
 static bool is_finished(const json_t *entry, const struct job_surface_picture *p, bool has_fibers)
 {
     const char *method = json_string_value(json_object_get(entry, "method"));

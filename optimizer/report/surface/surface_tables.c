@@ -12,7 +12,7 @@ enum { N_TRACED = 3, CELL_PATHS = 8000, SPREAD_PATHS = 1024 };
 /* Two hits before diffusion leave its means without a part that stays (renderer/diffusion/NOTES.md). */
 enum { N_TRACED_IN_PILE = 2 };
 #define JOURNAL_EVERY_S 2.0
-/* Of dual scattering: cloth is dense (fabric thesis, section 6.6). */
+/* Density for dual scattering: cloth is dense (fabric thesis, section 6.6). */
 #define DENSITY 1.0f
 static const double corrected_share = 0.25;
 /* Rough processor seconds on a twill of 26,000 segments: of a path of the table of directions, of a path of all cells,
@@ -37,7 +37,7 @@ static bool wants_tables(const struct report *report)
     return false;
 }
 
-/* Whether a picture takes light that is scattered often from the table of directions. Otherwise from cells. */
+/* Returns whether a picture takes light that is scattered often from the table of directions. Otherwise from cells. */
 static bool by_directions(const struct job_surface_picture *p)
 {
     return p->method == JOB_PICTURE_FAST && !p->visibility_by_tables && !p->deep_by_cells;

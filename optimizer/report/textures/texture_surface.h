@@ -20,7 +20,7 @@ struct texture_surface {
 status texture_surface_fit(struct texture_surface *t, const struct report *report, const struct pipeline_model *m,
                            struct error *err);
 
-/* Of pixel i of the maps. */
+/* Roughness and anisotropy of pixel i of the maps. */
 double texture_surface_roughness(const struct texture_surface *t, size_t i);
 double texture_surface_anisotropy(const struct texture_surface *t, size_t i);
 

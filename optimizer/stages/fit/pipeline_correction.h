@@ -8,7 +8,7 @@
 /* Share of the progress of a fit that this step takes. */
 #define PIPELINE_CORRECTION_SHARE 0.25
 
-/* Whether the job has corrections fitted. */
+/* Returns whether the job has corrections fitted. */
 bool pipeline_correction_applies(const struct job_cloth *cloth, const struct cloth_numbers *number);
 
 /* Fits the parameters to the uncorrected fibers, with as many paths as the final fit of the corrected ones, and fills

@@ -12,7 +12,7 @@ static const struct model_setup *inner_model(const struct model_setup *model, si
     return NULL;
 }
 
-/* Whether all models of the job that model i_model contains are done. */
+/* Returns whether all models of the job that model i_model contains are done. */
 static bool inner_models_done(const struct model_setup *model, size_t n_model, size_t i_model, const bool *done)
 {
     const struct model_nesting *n;

@@ -21,7 +21,7 @@ status pipeline_radius_search(const struct fit_input *in, struct worker_series *
                               struct error *err);
 /* Applies the radius that an earlier attempt found. */
 status pipeline_radius_apply(const struct fit_input *in, const struct fitted_radius *radius, struct error *err);
-/* Whether the fitted radius is used; false when the cloth's own is kept. */
+/* Returns whether the fitted radius is used; false when the cloth's own is kept. */
 bool pipeline_radius_used(const struct fitted_radius *r);
 
 #endif

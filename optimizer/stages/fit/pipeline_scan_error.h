@@ -13,7 +13,7 @@
 /* Share of the progress of a fit that this step takes. */
 #define PIPELINE_SCAN_ERROR_SHARE 0.2
 
-/* Whether the fibers of the job come from a scan, the model sees fibers, and no corrections of them are fitted,
+/* Returns whether the fibers of the job come from a scan, the model sees fibers, and no corrections of them are fitted,
  * whose own errors would then count. */
 bool pipeline_scan_error_applies(const struct cloth_job *job, const struct made_cloth *made, size_t i_model);
 

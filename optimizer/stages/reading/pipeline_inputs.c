@@ -220,7 +220,7 @@ static status read_document(const struct stage_tools *tools, struct job_inputs *
     return s;
 }
 
-/* Of a job that fits nothing. */
+/* Reads the values of a job that fits nothing. */
 static status take_values(const struct stage_tools *tools, struct job_inputs *in, struct error *err)
 {
     status s = cloth_numbers_read(in, err);
@@ -231,7 +231,7 @@ static status take_values(const struct stage_tools *tools, struct job_inputs *in
     return s == STATUS_OK ? load_environment(tools, in, err) : s;
 }
 
-/* Of a job without a cloth. */
+/* Reads the profile of a job without a cloth. */
 static status read_profile(const struct stage_tools *tools, struct job_inputs *in, struct error *err)
 {
     char folder[WORKER_PATH_BYTES];

@@ -40,7 +40,8 @@ static bool is_tied(const struct job_fit_option *o, size_t n_param, size_t p)
     return false;
 }
 
-/* Whether a value within three standard errors lies in the bounds that the job states, as for priors of its own. */
+/* Returns whether a value within three standard errors lies in the bounds that the job states, as for priors of its
+ * own. */
 static bool agrees(const struct job_fit_option *o, size_t p, double value, double se)
 {
     return !(value + 3.0 * se < o->lower[p]) && !(value - 3.0 * se > o->upper[p]);

@@ -29,8 +29,9 @@ void job_clock_init(struct job_clock *c, size_t n_stage, const struct speed_book
 
 /* ---- expectations ---- */
 
-/* How the time of earlier jobs ran over their fraction. Where the fraction is the stage's own prediction, that says how
- * such predictions were off, and counts beside the usual curve with its weight in jobs. */
+/* Sets the curve of a stage: the share of time over the fraction, from earlier jobs. Where the fraction is the stage's
+ * own prediction, that says how such predictions were off, and counts beside the usual curve with its weight in
+ * jobs. */
 static void set_curve(struct job_clock_stage *s, const struct speed_entry *e, const struct job_clock_work *work)
 {
     const double n_usual = e == NULL || work->predicts_end ? usual_curve_jobs : 0.0, n_job = e != NULL ? e->n_job : 0.0;

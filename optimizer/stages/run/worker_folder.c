@@ -173,7 +173,8 @@ static status empty_folder(const struct worker_folder *f, const char *name, stru
     return STATUS_OK;
 }
 
-/* Whether a file is one that a writer renames when it is whole: "x.part", or durable_replace's "x.tmp-AbCdEf". */
+/* Returns whether a file is one that a writer renames when it is whole: "x.part", or durable_replace's
+ * "x.tmp-AbCdEf". */
 static bool is_temporary(const char *name)
 {
     static const char part[] = ".part", tmp[] = ".tmp-";

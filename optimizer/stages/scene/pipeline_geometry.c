@@ -149,7 +149,7 @@ status stage_orientation_load(const struct orientation_input *in, struct orienta
                           &(struct direction_file){&out->option, &out->geometry, &out->direction}, err);
 }
 
-/* Whether a model of the job needs fibers, and not only density and directions. */
+/* Returns whether a model of the job needs fibers, and not only density and directions. */
 static bool wants_fibers(const struct directions_input *in)
 {
     for (size_t i = 0; i < in->n_model; i++)

@@ -67,8 +67,8 @@ static void release_scenes(struct made_cloth *made)
     made->has_volume_scene = false;
 }
 
-/* Whether a model sees the sections of the fibers: one that states the width that a section shows. The others are made
- * for round tubes. */
+/* Returns whether a model sees the sections of the fibers: one that states the width that a section shows. The others
+ * are made for round tubes. */
 static bool sees_sections(const struct appearance *a) { return a->kind == MODEL_SURFACE && a->surface->width != NULL; }
 
 static status make_fiber_scene(const struct job_setup *setup, const struct fiber_set *f, bool sections,

@@ -7,7 +7,7 @@
 
 /* For radiance_input: NULL where there is none, or v is NULL. */
 const struct discrepancy *pipeline_discrepancy(const struct validation *v);
-/* Whether a fitted model will have one (pipeline_find_discrepancy). */
+/* Returns whether a fitted model will have one (pipeline_find_discrepancy). */
 bool pipeline_discrepancy_expected(const struct job_fit *fit, const struct pipeline_model *m);
 /* Finds the factor of a model whose rows have been estimated and scored, and multiplies these estimates by it. There
  * is none where the job does not ask for one, where it does not lower the error of rows that are left out, and for

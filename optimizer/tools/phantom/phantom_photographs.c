@@ -50,7 +50,7 @@ status phantom_photograph_model(struct phantom_photograph_option *o, const char 
     return st;
 }
 
-/* Whether the n bytes of key name the parameter, and whether they name the whole colour that it belongs to. */
+/* Returns whether the n bytes of key name the parameter, and whether they name the whole colour that it belongs to. */
 static bool is_named(const struct param_info *p, const char *key, size_t n, bool *colour)
 {
     char name[MODEL_SET_TEXT_BYTES];

@@ -17,7 +17,7 @@
 
 enum { MAX_TABLE_BYTES = 16 << 20, MAX_LINE_FAULT = 20 };
 
-/* Whether all files of a photograph are there. */
+/* Returns whether all files of a photograph are there. */
 static bool has_files(const struct input_check *c, const struct job_photograph *p)
 {
     bool all = input_check_has(c, p->file);
