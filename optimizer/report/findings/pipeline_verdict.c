@@ -1,6 +1,5 @@
 #include "optimizer/report/findings/pipeline_verdict.h"
 #include "optimizer/report/findings/pipeline_advice.h"
-#include "optimizer/report/findings/verdict_json.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 
 #include <math.h>

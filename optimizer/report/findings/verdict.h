@@ -17,6 +17,7 @@
 
 #include "optimizer/photographs/rows/observation.h"
 
+#include <jansson.h>
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -78,5 +79,11 @@ double verdict_allowed_error(const struct observation_set *o, enum job_set set);
 /* Relative RMS error over the rows of `judged` of the one color that describes the rows of the set "fit" best. NaN
  * without rows. */
 double verdict_one_color_error(const struct observation_set *o, enum job_set judged);
+
+/* Returns the verdict as JSON, for the key "verdict" of result.json, status.json and the API's jobs:
+ * {"code", "words", "text", "judged_by", "rel_rms", "rel_rms_se", "allowed_rel_rms", "one_color_rel_rms",
+ * "plain_brdf_rel_rms", "reservations": [{"code", "text"}]}. The numbers are null without a fit; null as a whole when
+ * there is nothing to judge. The caller owns it. */
+json_t *verdict_json(const struct verdict *v);
 
 #endif

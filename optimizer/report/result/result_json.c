@@ -3,7 +3,6 @@
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/stage_table.h"
-#include "optimizer/report/findings/verdict_json.h"
 #include "optimizer/report/geometry/result_geometry.h"
 #include "optimizer/report/result/photograph_json.h"
 #include "optimizer/report/result/result_numbers.h"

@@ -48,7 +48,7 @@ void worker_status_restart_eta(struct worker_status *st);
 /* Adds the speeds of this attempt's stages to the book. */
 void worker_status_remember(struct worker_status *st, struct speed_book *book);
 void worker_status_message(struct worker_status *st, const char *text);
-/* Takes over the verdict on the result (verdict_json.h); null until it is reached. */
+/* Takes over the verdict on the result (verdict_json); null until it is reached. */
 void worker_status_verdict(struct worker_status *st, json_t *verdict);
 void worker_status_objective(struct worker_status *st, size_t step, double objective, double se);
 /* Formats a warning as printf does, keeps it in the list and writes it to the log; a warning that the list has
