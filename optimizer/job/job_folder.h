@@ -48,7 +48,7 @@
 #define JOB_FILE_BACKEND "backend.json"
 #define JOB_CLAIM_PREFIX "claim-"
 #define JOB_FILE_STATUS "status.json"
-#define JOB_FILE_PLAN "plan.json" /* what the job was expected to take (server/workers/input_judge.h) */
+#define JOB_FILE_PLAN "plan.json" /* the needs that were predicted for the job (server/workers/input_judge.h) */
 #define JOB_FILE_SERIES "series.rec"
 #define JOB_FILE_LOG "log.txt"
 #define JOB_FOLDER_INPUT "input"

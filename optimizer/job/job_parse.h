@@ -14,8 +14,8 @@ status job_document_parse(const char *text, size_t n_bytes, struct job_document 
 /* The same from parsed JSON. */
 status job_document_read(const json_t *json, struct job_document **doc, struct error *err);
 /* Reads a document as job_document_parse does, and adds everything that is wrong with it to the list. A check that
- * compares several values is left out where one of these is wrong itself. *doc: what could be read, with defaults in
- * place of wrong values, to be released by the caller; NULL when the text is not JSON or memory is out. */
+ * compares several values is left out where one of these is wrong itself. *doc: the values that could be read, with
+ * defaults in place of wrong values, to be released by the caller; NULL when the text is not JSON or memory is out. */
 void job_document_inspect(const char *text, size_t n_bytes, struct job_document **doc, struct job_fault_list *list);
 
 #endif

@@ -1,15 +1,15 @@
-/* Finds the discrepancy of a cloth (renderer/transport/discrepancy.h) from the rows of a fit: what the fibers at the
- * result leave of the measured radiances, as far as it is smooth over the directions.
+/* Finds the discrepancy of a cloth (renderer/transport/discrepancy.h) from the rows of a fit: the part of the measured
+ * radiances that the fibers at the result do not explain and that is smooth over the directions.
  *
  * ln(measured / rendered) of a row and channel is a Gaussian field plus a part of its own for each row, whose standard
  * deviation is DISCREPANCY_ROUGH of the field's (more in a channel that is darker than the row, in proportion). The
  * expected field between the rows is taken times `share` in [0, 1]. Scales and DISCREPANCY_ROUGH were chosen by
- * cross-validation over measured tables, all alike (NOTES.md of optimizer/fit); the share is that of one fit, by the
+ * cross-validation over measured tables, all alike (NOTES.md of optimizer/fit); the share belongs to one fit, by the
  * cross-validation inside its rows (cross_validation.h). A share of 0 is the fit without discrepancy.
  *
  * Source: Kennedy and O'Hagan 2001, "Bayesian calibration of computer models", section 4; the share as in Breiman 1996,
- * "Stacked regressions". Differs: the field is fitted to the residuals of a finished fit instead of together with it.
- */
+ * "Stacked regressions". Differs: the field is fitted to the residuals of a finished fit instead of together with
+ * it. */
 #ifndef SELVEDGE_OPTIMIZER_DISCREPANCY_FIT_H
 #define SELVEDGE_OPTIMIZER_DISCREPANCY_FIT_H
 

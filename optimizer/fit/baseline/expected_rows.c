@@ -6,11 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Weights are those of residuals of this relative size, divided among all rows. */
+/* All rows together weigh as much as one residual of this relative size. */
 static const double unit_error = 0.2;
 enum { BRDF_NUMBERS = 12 };
 
-/* The BRDF of all rows, and without those of each fold. */
+/* The BRDF of all rows, and of the rows outside each fold. */
 struct brdfs {
     size_t n_fold;
     struct plain_brdf all, without[FOLDS_MAX];
@@ -61,8 +61,8 @@ static double widest_rad(const struct observation_set *rows, bool camera)
 static double theta_at(double share, double widest) { return acos(1.0 - share * (1.0 - cos(widest))); }
 
 /* Row k of a sequence that fills the three angles evenly: additive recurrence by powers of the root of g^4 = g + 1
- * (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"). Lamp, distances and rotation are those of
- * the measured rows in turn. */
+ * (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"). Lamp, distances and rotation come from the
+ * measured rows in turn. */
 static struct observation place(const struct observation_set *rows, size_t k)
 {
     static const double step[3] = {0.8191725133961645, 0.6710436067037893, 0.5497004779019703};

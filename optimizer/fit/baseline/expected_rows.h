@@ -13,8 +13,8 @@
  * chosen by cross-validation over measured tables (NOTES.md of optimizer/fit).
  *
  * Source of the idea: a prior on a model's predictions instead of on its parameters, as power priors are (Ibrahim and
- * Chen 2000, "Power prior distributions for regression models"). Differs: the expected data are those of a simpler
- * model of the same rows, so each fold of a cross-validation has its own (left_out_rgb), made without that fold. */
+ * Chen 2000, "Power prior distributions for regression models"). Differs: the expected data come from a simpler model
+ * of the same rows, so each fold of a cross-validation has its own (left_out_rgb), made without that fold. */
 #ifndef SELVEDGE_OPTIMIZER_EXPECTED_ROWS_H
 #define SELVEDGE_OPTIMIZER_EXPECTED_ROWS_H
 

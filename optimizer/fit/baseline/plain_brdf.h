@@ -1,5 +1,6 @@
-/* A plain surface reflectance that knows nothing of the cloth: what a user would take in place of a twin. Every fit is
- * compared with it, because a twin that predicts new views worse than twelve numbers is not worth its price.
+/* A plain surface reflectance that knows nothing of the cloth: the description that a user would take in place of a
+ * twin. Every fit is compared with it, because a twin that predicts new views worse than twelve numbers is not worth
+ * its price.
  *
  *   L = pi cos(theta_l) (diffuse f_d + f_s(F0) + sheen f_h)                    lamp in front of the cloth
  *   L = |cos(theta_l)| transmission                                            lamp behind it
@@ -12,8 +13,7 @@
  * The colours enter linearly, so they are solved exactly within their ranges (diffuse, F0 and transmission in [0, 1],
  * sheen in [0, 2]) for every trial of the three shapes, and only these are searched: a grid first, then nlopt's Sbplx
  * from the best of its points. Both maskings are fitted and the one with the lower objective of the fitted rows is
- * kept.
- */
+ * kept. */
 #ifndef SELVEDGE_OPTIMIZER_PLAIN_BRDF_H
 #define SELVEDGE_OPTIMIZER_PLAIN_BRDF_H
 

@@ -130,7 +130,7 @@ static size_t free_numbers(const struct cloth_estimator *e)
     return n;
 }
 
-/* The numbers of one moved cloth, and what its means are multiplied with in each column. */
+/* The numbers of one moved cloth, and the factor of its means in each column. */
 struct move {
     double number[CLOTH_MAX_FITTED], factor[CLOTH_MAX_FITTED];
 };
@@ -168,7 +168,8 @@ static void add_move(const struct cloth_estimator *e, const struct move *move, s
     }
 }
 
-/* Paths of a moved cloth: its share of those of the cloth itself, in whole blocks. */
+/* Divides the path budget of each configuration evenly among the moved cloths, rounded down to whole blocks (at least
+ * one). */
 static void share_paths(const struct cloth_estimator *e, size_t n_moved, const struct estimator_call *call)
 {
     for (size_t i = 0; i < e->n_configuration; i++) {

@@ -1,27 +1,27 @@
-/* An estimator whose parameters are those of the scattering model followed by the numbers of the cloth (flatness of its
+/* An estimator whose parameters are the scattering model's, followed by the numbers of the cloth (flatness of its
  * yarns, their packing, ...). A method of descent then fits both together.
  *
- * Paths have no derivative by a number of the cloth, because moving a fiber changes what a path hits. These columns are
- * therefore differences between cloths whose numbers are moved by `difference` of their ranges in the fit coordinate:
+ * Paths have no derivative by a number of the cloth, because moving a fiber changes the hits of a path. These columns
+ * are therefore differences between cloths whose numbers are moved by `difference` of their ranges in the fit
+ * coordinate:
  *
  * CLOTH_MOVES_BALANCED, the default. All numbers move at once, up in half of the cloths and down in the other half, by
  * the columns of a Hadamard matrix (Plackett and Burman 1946; quadratic residues, Paley 1933). Every moved cloth thus
  * says something about every number. All moved cloths together take as many paths as the cloth itself. Compared with m
- * numbers moved one after the other, the same paths give columns of an (m + 1)th of the variance and means of two
- * (m + 1)ths. Odd iterations take the opposite moves, which removes what pairs of numbers do together.
+ * numbers moved one after the other, the same paths give columns of an (m + 1)th of the variance and means of two (m +
+ * 1)ths. Odd iterations take the opposite moves, which removes joint effects of pairs of numbers.
  *
- * CLOTH_MOVES_SINGLE. One cloth for each number, with as many paths as the cloth itself: its mean minus that of the
- * cloth. Even iterations move up and odd ones down. For estimates of a single iteration.
+ * CLOTH_MOVES_SINGLE. One cloth for each number, with as many paths as the cloth itself: its mean minus the mean of the
+ * cloth itself. Even iterations move up and odd ones down. For estimates of a single iteration.
  *
  * Where a move would leave the bounds, a balanced one ends there, and a single one goes to the other side. Both
  * replicas of an iteration see the same cloths, so each cloth is built once. All cloths are traced with the same random
  * numbers, and variances are stated as if the means were independent, which is an upper limit where they are positively
  * correlated.
  *
- * The scattering parameters are not searched again at every cloth: minimising the linearised residuals over both
- * blocks at once gives the same step as variable projection (Golub and Pereyra 1973, section 2; Kaufman 1975 for the
- * form of the Jacobian used here), which removes the scattering parameters first.
- */
+ * The scattering parameters are not searched again at every cloth: minimising the linearised residuals over both blocks
+ * at once gives the same step as variable projection (Golub and Pereyra 1973, section 2; Kaufman 1975 for the form of
+ * the Jacobian used here), which removes the scattering parameters first. */
 #ifndef SELVEDGE_OPTIMIZER_CLOTH_ESTIMATOR_H
 #define SELVEDGE_OPTIMIZER_CLOTH_ESTIMATOR_H
 
@@ -64,8 +64,8 @@ status cloth_estimator_init(struct cloth_estimator *e, const struct cloth_source
 void cloth_estimator_release(struct cloth_estimator *e);
 /* Cloths that an estimate with derivatives by n_free numbers traces besides the cloth itself. */
 size_t cloth_estimator_n_moved(enum cloth_moves moves, size_t n_free);
-/* Paths of such an estimate over those of the cloth itself, where they are many; a moved cloth takes a block of paths
- * of each configuration at least. */
+/* Returns the paths of such an estimate over the paths of the cloth itself, where they are many; a moved cloth takes a
+ * block of paths of each configuration at least. */
 double cloth_estimator_cost(enum cloth_moves moves, size_t n_free);
 /* It has n_scattering + n_number parameters and uses e, which must not move in memory. */
 struct estimator cloth_estimator(struct cloth_estimator *e);

@@ -19,7 +19,7 @@ struct search {
     struct fit_layout layout;                      /* of the numbers alone, for the spread of the cloths */
     struct fit_parameter parameter[FIT_MAX_PARAM]; /* of all unknowns, with the start of the next fit */
     struct cloth_search_result *result;
-    const struct cloth_search_result *before; /* what the searches before this one took */
+    const struct cloth_search_result *before; /* totals of the searches before this one */
     char kind[KIND_BYTES];                    /* of the present fit: "cloth 3 of 8" */
 };
 
@@ -88,7 +88,7 @@ static status report_step(void *context, const struct fit_step *step, struct err
     return problem->report(problem->report_context, &outer, err);
 }
 
-/* Runs one of the fits and adds what it took. */
+/* Runs one of the fits and adds its steps, paths and time. */
 static status run_fit(struct search *s, struct fit_problem *problem, const struct fit_option *option,
                       struct fit_result *fit, struct error *err)
 {
@@ -136,7 +136,8 @@ static bool is_better(const struct search *s, size_t i)
     return new->objective < best->objective - doubt;
 }
 
-/* Fits the scattering parameters to cloth i, and keeps them as the start of what follows when it is the best so far. */
+/* Fits the scattering parameters to cloth i, and stores them as the start of the later fits when cloth i is the best so
+ * far. */
 static status screen_cloth(struct search *s, size_t i, double *best_param, struct fit_result *fit, struct error *err)
 {
     const struct cloth_search *q = s->search;
@@ -233,7 +234,7 @@ static status run_final(struct search *s, const double *number, const double *st
     return st;
 }
 
-/* Fits the cloth of the joint fit, and that of the screening where the joint fit ended worse. */
+/* Fits the cloth of the joint fit, and the best cloth of the screening where the joint fit ended worse. */
 static status choose_final(struct search *s, struct fit_result *other, struct error *err)
 {
     const size_t n = n_scattering(s->search);

@@ -22,8 +22,7 @@ static double evaluate(unsigned n, const double *y, double *gradient, void *cont
     return value;
 }
 
-/* Minimises exactly along one coordinate after the other, which removes what is left after nlopt stops at its
- * tolerance. */
+/* Minimises exactly along one coordinate after the other, which removes the rest after nlopt stops at its tolerance. */
 static void polish(const struct quadratic *q, const double *lower, const double *upper, double *y)
 {
     for (int sweep = 0; sweep < 200; sweep++) {

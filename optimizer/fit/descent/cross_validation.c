@@ -18,7 +18,7 @@ enum { SHARES = 20 };
 /* A number of the rows, predicted by a fit without it. */
 struct left_out {
     double r[2];       /* residuals of both replicas, without the extra weight */
-    double log_factor; /* of the discrepancy of that fit, with the share 1 */
+    double log_factor; /* of the discrepancy of the fit without the number, with the share 1 */
     double measured;   /* in units of the objective */
 };
 
@@ -143,7 +143,8 @@ static void choose_share(const struct linear_model *m, const struct fold_fit *f,
     sum_folds(m, f, fold, out->discrepancy_share, out);
 }
 
-/* Fills in weights and residuals of a fold. What is expected between the rows is expected without those of the fold. */
+/* Fills in weights and residuals of a fold. Radiances that are expected between the rows are predicted from the rows
+ * outside the fold only. */
 static void own_rows(const struct linear_model *m, const struct observation_set *o, const size_t *fold, size_t i_fold,
                      struct fold_fit *f)
 {

@@ -2,7 +2,7 @@
  * compared by it, so the held-out rows have no part in the choice.
  *
  * Folds: optimizer/fit/objective/folds.h. The fit without a fold is not repeated with new paths. The pooled linear
- * model at the result is minimised anew without the fold's rows: weights, priors and bounds are those of the fit, the
+ * model at the result is minimised anew without the fold's rows: weights, priors and bounds come from the fit, the
  * allowed range of each parameter is a weak prior about the result (as in uncertainty.h), and no parameter moves by
  * more than a few step limits. The fold's residuals then follow from the same linear model. The two replicas have
  * independent noise, so the product of their predicted residuals is an unbiased square, as in objective.h.
@@ -13,11 +13,10 @@
  *
  * With a discrepancy (discrepancy_fit.h) each fold has one of its own, by the predicted residuals of the rows left in.
  * It counts by a share in [0, 1], the same for all folds, which is the one with the lowest error; so the error is too
- * low by what one number can gain.
+ * low by the gain of one fitted number.
  *
  * Source: Stone 1974, Cross-validatory choice and assessment of statistical predictions; the update of a linear model
- * without some of its rows is as in Hastie, Tibshirani, Friedman 2009, section 7.10.
- */
+ * without some of its rows is as in Hastie, Tibshirani, Friedman 2009, section 7.10. */
 #ifndef SELVEDGE_OPTIMIZER_CROSS_VALIDATION_H
 #define SELVEDGE_OPTIMIZER_CROSS_VALIDATION_H
 
@@ -31,7 +30,7 @@ struct cross_validation {
     size_t n_row;                  /* rows that were left out and predicted, each once */
     double rel_square;             /* mean square of the relative errors; may be below 0 by noise */
     double rel_rms;                /* sqrt(max(0, rel_square)) */
-    double rel_rms_se;             /* by the scatter between folds, which contains that of the model's misfit */
+    double rel_rms_se;             /* by the scatter between folds, which contains the scatter of the model's misfit */
     double discrepancy_share;      /* 0 where no discrepancy was asked for */
     double plain_rel_rms;          /* the error with a share of 0 */
     double fold_square[FOLDS_MAX]; /* sum of the squares of a fold */

@@ -1,9 +1,8 @@
 /* Methods of descent: one file each, one row in the catalogue (base/catalogue/methods.def), found by id.
  *
  * A method is a deterministic function of the problem and of the estimates it asks for; it keeps nothing between runs
- * and never looks at a clock. That is what makes a fit bit-identical for any number of threads and after a resume
- * (estimate_journal.h).
- */
+ * and never looks at a clock. Therefore a fit is bit-identical for any number of threads and after a resume
+ * (estimate_journal.h). */
 #ifndef SELVEDGE_OPTIMIZER_DESCENT_H
 #define SELVEDGE_OPTIMIZER_DESCENT_H
 
@@ -26,11 +25,11 @@ struct fit_start {
     double cross_validation; /* relative RMS error, where it chooses among the starts (cloth_search.h); NaN otherwise */
     bool converged;
     bool kept;
-    bool elsewhere; /* its objective equals that of the kept one within the noise, but its parameters differ */
+    bool elsewhere; /* its objective equals the kept start's within the noise, but its parameters differ */
     uint64_t n_path;
 };
 
-/* What a method reports after every iteration. Pointers are valid during the call. */
+/* The report of a method after every iteration. Pointers are valid during the call. */
 struct fit_step {
     size_t step;
     const char *phase;
@@ -53,12 +52,13 @@ struct fit_problem {
     size_t n_param;
     const struct param_info *info;         /* of the model */
     const struct fit_parameter *parameter; /* bounds, start and fixed flag of each */
-    /* the fitted ones, each of which is one configuration of the estimator; contrasts come after all radiances */
+    /* the fitted ones; each is one configuration of the estimator; contrasts come after all radiances */
     const struct observation_set *observation;
     const struct estimator *estimator;
     uint64_t path_budget; /* 0: the method's default */
-    /* Ends the fit when the noise of tracing in the fitted means is at most this share of what the photographs' stated
-     * errors make of them; the budget is then the most that it takes. 0: no such goal. Methods without it ignore it. */
+    /* Ends the fit when the noise of tracing in the fitted means is at most this share of the errors of these means by
+     * the photographs' stated errors; the budget is then the most that it takes. 0: no such goal. Methods without it
+     * ignore it. */
     double precision;
     size_t max_iteration; /* 0: the method's default */
     size_t first_path;    /* of a configuration and replica in the first estimate; 0: the method's default */
@@ -84,7 +84,7 @@ struct fit_result {
     struct objective_value objective; /* predicted at `param` by all estimates of the fit together */
     struct uncertainty uncertainty;
     struct cross_validation cross_validation;
-    double prior_penalty; /* what the priors add to the objective at `param` */
+    double prior_penalty; /* the priors' part of the objective at `param` */
     /* The fields below are filled in by fit_run (fit_run.h). */
     struct fit_nuisance nuisance;
     /* values of the unknowns of fit_layout.h: leaders of ties and nuisance terms */

@@ -3,12 +3,11 @@
  * Methods are deterministic functions of the estimates they ask for. So a resumed fit starts from the beginning, and
  * the journal answers every call that was answered before, bit by bit; the first new call goes to the path tracer
  * again. No method has state of its own to save, and a resumed fit ends exactly as an uninterrupted one. A record holds
- * the call as well: one that does not match what is asked (another program version, another seed) ends the replay, and
- * the rest of the file is cut.
+ * the call as well: one that does not match the call (another program version, another seed) ends the replay, and the
+ * rest of the file is cut.
  *
  * File: 8 bytes "SELVJNL1", u64 fingerprint; then records { u32 bytes, u32 crc32, payload }. Host byte order: the file
- * is scratch of one machine. Cutting the file behind record k makes the fit resume from there.
- */
+ * is scratch of one machine. Cutting the file behind record k makes the fit resume from there. */
 #ifndef SELVEDGE_OPTIMIZER_ESTIMATE_JOURNAL_H
 #define SELVEDGE_OPTIMIZER_ESTIMATE_JOURNAL_H
 

@@ -1,6 +1,6 @@
-/* What a descent method asks for: mean radiances of every fitted configuration at given parameters. Production calls
- * the path tracer (estimate.h) through a journal (estimate_journal.h); tests put an analytic function here.
- */
+/* The source of a descent method's estimates: mean radiances of every fitted configuration at given parameters.
+ * Production calls the path tracer (estimate.h) through a journal (estimate_journal.h); tests put an analytic function
+ * here. */
 #ifndef SELVEDGE_OPTIMIZER_ESTIMATOR_H
 #define SELVEDGE_OPTIMIZER_ESTIMATOR_H
 

@@ -13,7 +13,7 @@ struct fit {
     const struct fit_problem *problem; /* in the model's parameters */
     const struct fit_option *option;
     struct fit_layout layout;
-    struct estimate *buffer; /* what the renderer gave */
+    struct estimate *buffer; /* estimates of the renderer */
     struct estimator_pair pair;
     size_t i_start, n_start; /* n_start: with the extra ones */
     size_t n_step;           /* steps of the starts before this one; the next two likewise */
@@ -225,14 +225,14 @@ static status run_start(struct fit *f, const struct descent_method *method, size
     return STATUS_OK;
 }
 
-/* Objective of b minus that of a, both with their prior penalties, and its standard error. */
+/* Returns the objective of b minus the objective of a, both with their prior penalties; se: its standard error. */
 static double difference(const struct fit_start *a, const struct fit_start *b, double *se)
 {
     *se = hypot(a->objective_se, b->objective_se);
     return b->objective + b->prior_penalty - a->objective - a->prior_penalty;
 }
 
-/* Marks converged starts whose objective equals that of the kept one within the noise although a determined parameter
+/* Marks converged starts whose objective equals the kept start's within the noise although a determined parameter
  * differs by more than four standard errors. */
 static void mark_elsewhere(struct fit_result *r, size_t kept)
 {

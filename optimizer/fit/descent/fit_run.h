@@ -2,23 +2,21 @@
  * several. The method sees a smaller problem (fit_layout.h); everything that comes out is in the model's parameters.
  *
  * Several starts: the first is the problem's own; the others are spread evenly (additive recurrence by the generalised
- * golden ratio) over the inner 80 % of the bounds in fit coordinates, or over two standard deviations of a prior.
- * Extra starts of the option come after the problem's own and before the others.
- * Each takes its share of the path budget when one is given, and the method's default otherwise. A later start is kept
- * instead of an earlier one when its objective (with what the priors add) is lower by more than two standard errors of
- * the difference. An extra start, which is the result of another fit, is kept when its objective is lower at all, so
- * that the fit does not end worse than the other.
+ * golden ratio) over the inner 80 % of the bounds in fit coordinates, or over two standard deviations of a prior. Extra
+ * starts of the option come after the problem's own and before the others. Each takes its share of the path budget when
+ * one is given, and the method's default otherwise. A later start is kept instead of an earlier one when its objective
+ * (with its prior penalty) is lower by more than two standard errors of the difference. An extra start, which is the
+ * result of another fit, is kept when its objective is lower at all, so that the fit does not end worse than the other.
  *
  * Deterministic like the methods themselves, and it asks for the same estimates in the same order: with a journal below
- * (estimate_journal.h) every option resumes bit by bit.
- */
+ * (estimate_journal.h) every option resumes bit by bit. */
 #ifndef SELVEDGE_OPTIMIZER_FIT_RUN_H
 #define SELVEDGE_OPTIMIZER_FIT_RUN_H
 
 #include "optimizer/fit/descent/descent.h"
 
-/* problem: in the model's parameters; its prior and gain_sd are ignored. option: NULL for none. Errors are those of
- * fit_layout_init and of the method. */
+/* problem: in the model's parameters; its prior and gain_sd are ignored. option: NULL for none. Errors: from
+ * fit_layout_init and from the method. */
 status fit_run(const struct descent_method *method, const struct fit_problem *problem, const struct fit_option *option,
                struct fit_result *result, struct error *err);
 

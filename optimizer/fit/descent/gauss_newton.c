@@ -76,7 +76,7 @@ static status report_here(struct gauss_newton *g, const char *note, struct error
     return descent_report(&g->run, &step, err);
 }
 
-/* Compares what the last step did with the predicted decrease. If the objective is higher beyond doubt, *failed is
+/* Compares the decrease by the last step with the predicted one. If the objective is higher beyond doubt, *failed is
  * set and the fit goes back to the best point. If the decrease is clearly smaller than predicted, because a fit with
  * large residuals overshoots from side to side, the step limits are halved; otherwise they grow again. */
 static status judge_step(struct gauss_newton *g, bool *failed, struct error *err)
@@ -236,7 +236,7 @@ static status run_gauss_newton(const struct fit_problem *problem, struct fit_res
     for (size_t p = 0; p < problem->n_param; p++)
         g.x[p] = coordinate_from_param(&g.run.coordinate[p], problem->parameter[p].start);
     if (problem->path_budget ==
-        0) /* with many rows the default budget grows to that of LEAST_ITERATION iterations with the fewest paths */
+        0) /* with many rows the default budget grows to LEAST_ITERATION iterations of the fewest paths */
         g.run.path_budget = (uint64_t)fmax((double)g.run.path_budget, LEAST_ITERATION * (double)least_budget(problem));
     /* small budgets begin with fewer paths, so that they allow several iterations */
     double first = (double)g.run.path_budget / (40.0 * 2.0 * (double)problem->observation->n);

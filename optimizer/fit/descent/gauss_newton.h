@@ -65,7 +65,8 @@ bool gauss_newton_regularized_at_misfit(const struct gauss_newton *g);
 bool gauss_newton_in_noise_trap(const struct gauss_newton *g);
 /* Counts an accepted point with the objective f +- se, priors included, in lowest_x, lowest_f and n_stalled. */
 void gauss_newton_judge_progress(struct gauss_newton *g, double f, double se);
-/* Whether what is left is misfit: it rules, and further steps promise too little or have brought nothing. */
+/* Returns whether the remaining residuals are misfit: it rules, and further steps promise too little or have brought
+ * nothing. */
 bool gauss_newton_ends_at_misfit(const struct gauss_newton *g);
 /* Fills in stop and reason of such a fit. */
 void gauss_newton_explain_misfit(const struct gauss_newton *g, double f, double se, struct fit_result *result);
@@ -76,8 +77,8 @@ double gauss_newton_paths_to_grow(const struct gauss_newton *g, double f, double
 /* Factor by which they must grow until it is plain that misfit makes the residuals. INFINITY where, by the decrease
  * that is predicted, it will not. */
 double gauss_newton_paths_to_misfit(const struct gauss_newton *g);
-/* Paths that the whole fit is expected to take, between those of the next iteration and the budget: a prediction for
- * its progress alone. f is the objective with noise se. n_left: iterations that are allowed. */
+/* Returns the paths that the whole fit is expected to take, at least the next iteration's and at most the budget: a
+ * prediction for its progress alone. f is the objective with noise se. n_left: iterations that are allowed. */
 double gauss_newton_expected_paths(const struct gauss_newton *g, double f, double se, size_t n_left);
 
 /* Fills in stop and reason of a fit that ended because it had arrived. precise: gauss_newton_precise; otherwise it is

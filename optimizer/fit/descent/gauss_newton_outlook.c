@@ -1,17 +1,17 @@
 /* When a fit by gauss_newton.v1 is expected to end, for its progress.
  *
  * A fit that ends by its noise needs the paths that bring the noise of the pooled means to the target. A fit that ends
- * at misfit needs few paths but several iterations: of those that lower the objective, each brings the decrease that is
- * left to about a fifth, then the regularization ends, which makes room for another decrease, and the last ones see no
- * progress. The numbers are those of the example jobs (config/examples). */
+ * at misfit needs few paths but several iterations: each iteration that lowers the objective leaves about a fifth of
+ * the possible decrease, then the regularization ends, which makes room for another decrease, and the last ones see no
+ * progress. The numbers come from the example jobs (config/examples). */
 #include "optimizer/fit/descent/gauss_newton.h"
 
 #include <math.h>
 
 static const double decrease_of_step = 5.0, arrived_share = 0.02;
 static const double steps_regularized = 3.0, steps_without = 2.0;
-/* The first steps go far, and what they say of the noise at the end and of misfit is of other parameters. The
- * prediction passes from what such fits usually take to the fit's own over this many steps. */
+/* The first steps go far, so their noise and misfit belong to other parameters than the result. The prediction passes
+ * from the usual paths of such fits to the fit's own prediction over this many steps. */
 static const double own_steps = 12.0;
 
 /* Iterations until a fit that heads for misfit has arrived. */

@@ -41,10 +41,10 @@ struct scaled_model {
     double h[N * N], g[N], trace;
 };
 
-/* Writes the coordinate to which the regularization draws parameter p: its start. A lobe width whose start is that of
- * the model is drawn towards wide lobes, for which radiance is smooth and few paths determine it; narrow lobes are
- * noisy. Returns false for parameters without it: fixed ones, and other positive quantities (density, the flakes'
- * gamma), which may be off by powers of ten. */
+/* Writes the coordinate to which the regularization draws parameter p: its start. A lobe width that starts at the
+ * model's start value is drawn towards wide lobes, for which radiance is smooth and few paths determine it; narrow
+ * lobes are noisy. Returns false for parameters without it: fixed ones, and other positive quantities (density, the
+ * flakes' gamma), which may be off by powers of ten. */
 static bool regularization_target(const struct gauss_newton *g, size_t p, double *x)
 {
     const struct coordinate *k = &g->run.coordinate[p];

@@ -2,7 +2,7 @@
  *
  * It has arrived when the decrease of the objective that several undamped steps could bring (far_decrease, by the
  * curvature without the noise of J) is within the noise, or below arrived_share of the weighted objective, under which
- * the curvature of the model does not determine it, or good enough: below target_share of that objective or
+ * the curvature of the model does not determine it, or good enough: below target_share of the weighted objective or
  * target_rel_rms. One step would not do for that test: where a model does not fit, steps are short and each brings
  * little, so such fits would end on their way.
  *
@@ -20,9 +20,9 @@
 /* Excess of the relative RMS error through noise in the parameters that is good enough whatever the misfit is, and
  * the share of the objective that is. */
 static const double target_rel_rms = 0.0007, target_share = 0.002;
-/* Variance of a residual by tracing, in units of that by the photographs' stated errors, that ends a fit with the
- * default budget: its errors are then sqrt(1 + photograph_share) times those of exact renderings. The pooled means
- * must have least_effective paths each, because their derivatives are several times noisier than they are. */
+/* Variance of a residual by tracing, in units of the variance by the photographs' stated errors, that ends a fit with
+ * the default budget: its errors are then sqrt(1 + photograph_share) times the errors with exact renderings. The pooled
+ * means must have least_effective paths each, because their derivatives are several times noisier than they are. */
 static const double photograph_share = 0.6, least_effective = 120000.0;
 /* Share of the objective below which the curvature of the model does not determine a predicted decrease. */
 static const double arrived_share = 0.02;
@@ -59,8 +59,8 @@ static double noise_ratio(const struct gauss_newton *g)
 }
 
 /* Error of the fitted means through the noise of tracing over that through the photographs' stated errors; infinite
- * where they state none. Both are sums of squares over the rows: what noise adds to the weighted objective by way of
- * the parameters, and for the photographs their mean variance for each free parameter. */
+ * where they state none. Both are sums of squares over the rows: for tracing the part of the weighted objective by
+ * noise in the parameters, and for the photographs their mean variance for each free parameter. */
 static double error_ratio(const struct gauss_newton *g)
 {
     double photograph = 0.0;

@@ -36,8 +36,8 @@ double rescale_slope(const struct rescale_curve *curve, double p);
 /* Number of curves that rescale_measure renders, each with up to RESCALE_POINTS points. */
 size_t rescale_n_curve(const struct fit_problem *problem, const struct coordinate *k);
 /* Measures curve[n_param]; channels of one colour with the same bounds share the values. n_path: paths per
- * configuration of each rendering. Adds to *n_path_used and *wall_s. problem->path_budget is that of the whole fit,
- * whose progress is reported. STATUS_NO_MEMORY, and the estimator's errors. */
+ * configuration of each rendering. Adds to *n_path_used and *wall_s. problem->path_budget is the budget of the whole
+ * fit, whose progress is reported. STATUS_NO_MEMORY, and the estimator's errors. */
 status rescale_measure(const struct fit_problem *problem, const struct coordinate *k, const size_t *n_path,
                        struct rescale_curve *curve, uint64_t *n_path_used, double *wall_s, struct error *err);
 

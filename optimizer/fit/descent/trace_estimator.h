@@ -9,7 +9,7 @@
 
 /* Everything pointed to outlives the estimator. */
 struct trace_estimator {
-    struct estimate_request request; /* parameter values, counts, iteration and replica are those of each call */
+    struct estimate_request request; /* parameter values, counts, iteration and replica come from each call */
     struct thread_pool *pool;
 };
 

@@ -28,7 +28,7 @@ static void add_prior(struct gaussian_prior *to, double mean, double sd)
     to->precision = sum;
 }
 
-/* Adds a prior to unknown k; mean and se are values of that unknown. */
+/* Adds a prior to unknown k; mean and se are values of the unknown. */
 static void add_parameter_prior(struct fit_layout *l, size_t k, double mean, double se)
 {
     struct coordinate c;

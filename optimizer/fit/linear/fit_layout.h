@@ -1,17 +1,16 @@
-/* The unknowns of a fit: the free parameters of the model after ties, and nuisance terms; and the way between them
- * and the model's full list of parameters.
+/* The unknowns of a fit: the free parameters of the model after ties, and nuisance terms; and the way between them and
+ * the model's full list of parameters.
  *
  *   value of parameter p = ratio_p * value of its leader
- *   what a photograph shows = gain * (rendered radiance) + stray light
+ *   radiance in a photograph = gain * (rendered radiance) + stray light
  *
  * Nuisance terms: a global gain (Gaussian on ln gain about 0) and a stray light (radiance >= 0, half a Gaussian about
  * 0) are unknowns like parameters; one gain for each photograph is not an unknown but taken out of the residuals
  * (linear_model.h).
  *
  * Priors are Gaussian in the fit coordinate x (coordinate.h): mean x(mean), standard deviation se |dx/dp| at the mean
- * (delta rule). With residuals r in units of the objective and s2 their variance, -2 ln(posterior) is (r.r + s2 sum
- * ((x - mean) / sd)^2) / s2, so a fit minimises f + s2 sum ((x - mean) / sd)^2.
- */
+ * (delta rule). With residuals r in units of the objective and s2 their variance, -2 ln(posterior) is (r.r + s2 sum ((x
+ * - mean) / sd)^2) / s2, so a fit minimises f + s2 sum ((x - mean) / sd)^2. */
 #ifndef SELVEDGE_OPTIMIZER_FIT_LAYOUT_H
 #define SELVEDGE_OPTIMIZER_FIT_LAYOUT_H
 
@@ -63,9 +62,9 @@ status fit_layout_init(struct fit_layout *l, const struct param_info *info, cons
 void fit_layout_full(const struct fit_layout *l, const double *unknown, double *full);
 /* Derivative of the fit coordinate of parameter p by the fit coordinate of its owner. */
 double fit_layout_stretch(const struct fit_layout *l, const struct param_info *info, const double *unknown, size_t p);
-/* Converts an estimate of the renderer to what the photograph would show (mean, variance), with derivatives by the
- * unknowns if they are wanted. The derivatives of tied parameters come from the same paths, so their errors are taken
- * as fully correlated. e and out may be the same. */
+/* Converts an estimate of the renderer to the values in a photograph (mean, variance), with derivatives by the unknowns
+ * if they are wanted. The derivatives of tied parameters come from the same paths, so their errors are taken as fully
+ * correlated. e and out may be the same. */
 void fit_layout_estimate(const struct fit_layout *l, const double *unknown, bool want_jacobian,
                          const struct estimate *e, struct estimate *out);
 

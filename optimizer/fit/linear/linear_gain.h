@@ -4,9 +4,9 @@
 
 #include "optimizer/fit/linear/linear_model.h"
 
-/* Removes gains of standard deviation m->gain_sd from residuals, derivatives and their variances. To be called once
- * for each pooling. The errors that photographs state
- * keep their variances; those of the color matrix lose what a gain takes out. */
+/* Removes gains of standard deviation m->gain_sd from residuals, derivatives and their variances. To be called once for
+ * each pooling. The errors that photographs state keep their variances; the errors of the color matrix lose the part
+ * that a gain takes out. */
 void linear_gain_absorb(struct linear_model *m, const struct observation_set *o);
 
 #endif

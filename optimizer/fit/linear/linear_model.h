@@ -41,8 +41,8 @@ struct linear_history {
     struct history_step *step;
 };
 
-/* Configurations i and j < i that share their camera paths: the noise of row 3 i + c has this correlation with that of
- * row 3 j + d. Channels count as fully correlated, as within a configuration. */
+/* Configurations i and j < i that share their camera paths: the noise of row 3 i + c has this correlation with the
+ * noise of row 3 j + d. Channels count as fully correlated, as within a configuration. */
 struct linear_pair {
     size_t i, j;
     double correlation;
@@ -108,14 +108,14 @@ double linear_model_misfit(const struct linear_model *m, size_t n_free);
  * rows that are known best (Paule and Mandel 1982). For the rows of means ([0]) and of contrasts ([1], 0 without any)
  * apart, because a model that is right in brightness to 1 % may be off by half in texture. */
 void linear_model_misfits(const struct linear_model *m, size_t n_free, double misfit[2]);
-/* Row weights v0 / (v_misfit + v_photograph + v_row): misfit, stated error and Monte-Carlo variance, all without
- * extra weights, which act as they are. While noise rules, rows that are known well count more (bright channels have
- * the longest paths and the most noise); where the model does not fit, or photographs state no errors and paths add
- * up, all weights go to 1 and the minimum is that of f. Weights are kept until the next call and by
+/* Row weights v0 / (v_misfit + v_photograph + v_row): misfit, stated error and Monte-Carlo variance, all without extra
+ * weights, which act as they are. While noise rules, rows that are known well count more (bright channels have the
+ * longest paths and the most noise); where the model does not fit, or photographs state no errors and paths add up, all
+ * weights go to 1 and the minimum is the minimum of f. Weights are kept until the next call and by
  * linear_model_pool. */
 void linear_model_weigh(struct linear_model *m, size_t n_free);
 
-/* s2 sum ((x - mean) / sd)^2 with s2 = row_var: what the priors add to f at x. */
+/* s2 sum ((x - mean) / sd)^2 with s2 = row_var: the priors' part of f at x. */
 double linear_model_penalty(const struct linear_model *m, const double *x);
 /* f = r_A . r_B at x_ref, with its standard error (channels taken as fully correlated). */
 double linear_model_objective(const struct linear_model *m, double *se);

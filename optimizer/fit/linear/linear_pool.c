@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The number by which noise falls: the variance of a mean is v / n, that of a contrast of few paths is nearer to v /
- * n^2. */
+/* The number by which noise falls: the variance of a mean is v / n, the variance of a contrast of few paths is nearer
+ * to v / n^2. */
 static double strength(const struct linear_history *h, size_t i, double n_path)
 {
     return observation_is_contrast(&h->observation->item[i]) ? n_path * n_path : n_path;
@@ -52,8 +52,8 @@ static void mean_derivatives(const struct linear_history *h, double *mean)
 }
 
 /* How much the residuals of configuration i change over dx, in the channel that changes most. net: square of the
- * predicted change. Along a valley the changes by several parameters cancel, but their bends do not: r is the sum
- * over p of (dr/dx_p dx_p^3)^2, and j that of (dr/dx_p dx_p)^2. */
+ * predicted change. Along a valley the changes by several parameters cancel, but their bends do not: r is the sum over
+ * p of (dr/dx_p dx_p^3)^2, and j the sum of (dr/dx_p dx_p)^2. */
 struct bend {
     double net, r, j;
 };
@@ -161,8 +161,8 @@ struct carried {
     struct bend bend;
 };
 
-/* Carries a step by derivatives half way, of which those near the middle count most. The derivatives of the step
- * itself are noisier, and their noise comes from the same rare paths as that of its mean. */
+/* Carries a step by derivatives half way; derivatives near the middle count most. The derivatives of the step itself
+ * are noisier, and their noise comes from the same rare paths as the noise of its mean. */
 static void carry(const struct linear_history *h, const double *mean, size_t i, const struct derivative_scale *scale,
                   const double *x_ref, const double *x, struct carried *out)
 {
@@ -226,8 +226,8 @@ static void pool_weights(const struct linear_history *h, size_t i, const struct 
     *n_effective += sum_square > 0.0 ? 1.0 / sum_square : 0.0;
 }
 
-/* Adds the noise of the derivatives that carried the steps. All steps use the same derivatives, so these errors add
- * up like those of a single step that is carried over the mean of their distances. */
+/* Adds the noise of the derivatives that carried the steps. All steps use the same derivatives, so these errors add up
+ * like the errors of a single step that is carried over the mean of their distances. */
 static void add_carried_noise(struct linear_model *m, const struct linear_history *h, size_t i,
                               const struct derivative_scale *scale, const struct carried *carried,
                               const struct pool_weight *weight)
@@ -258,8 +258,8 @@ static void pool_configuration(struct linear_model *m, const struct linear_histo
     add_carried_noise(m, h, i, &scale, carried, weight);
 }
 
-/* What the photographs state of their errors, in the unit of the residuals. No error of colors changes a contrast much,
- * which is relative to the mean. */
+/* Sets the photographs' stated errors, in the unit of the residuals. No error of colors changes a contrast much, which
+ * is relative to the mean. */
 static void set_photograph(struct linear_model *m, const struct observation *o, size_t row)
 {
     const size_t c = row % 3;

@@ -18,7 +18,7 @@ struct design {
 
 static bool is_nuisance(const struct fit_layout *l, size_t k) { return k == l->i_gain || k == l->i_stray; }
 
-/* Copies the covariance, and narrows that of undetermined parameters to their range. */
+/* Copies the covariance, and narrows the part of undetermined parameters to their range. */
 static void take_covariance(struct design *d, const struct next_photograph_fit *f)
 {
     const struct fit_layout *l = f->layout;
@@ -146,7 +146,8 @@ static void residual_given_parameters(const struct design *d, double v[9])
     small_clip_eigenvalues(v, 3, least_var);
 }
 
-/* Writes what the photograph would determine of unknown d->index[k] to every parameter of the model that follows it. */
+/* Writes the information of the photograph about unknown d->index[k] to every parameter of the model that follows
+ * it. */
 static void set_unknown(const struct design *d, size_t k, double decrease, const struct next_photograph_fit *f,
                         struct candidate_score *score)
 {

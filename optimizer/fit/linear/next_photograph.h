@@ -1,16 +1,16 @@
 /* Which photograph to take next: how much one more photograph of a candidate configuration would reduce the covariance
- * of the parameters, by the Monte-Carlo Jacobian of that configuration at the result (optimal experimental design;
- * Kiefer 1959 for the criterion).
+ * of the parameters, by the candidate's Monte-Carlo Jacobian at the result (optimal experimental design; Kiefer 1959
+ * for the criterion).
  *
  * C is the covariance of the unknowns of the fit (fit_layout.h) in fit coordinates. It contains the weak prior of the
- * allowed range, so undetermined parameters count with their range. J are the candidate's 3 x n derivatives in units
- * of the objective, V is the covariance of its three residuals, and C_n the covariance of the nuisance terms (global
- * gain, stray light) when the parameters are known:
+ * allowed range, so undetermined parameters count with their range. J are the candidate's 3 x n derivatives in units of
+ * the objective, V is the covariance of its three residuals, and C_n the covariance of the nuisance terms (global gain,
+ * stray light) when the parameters are known:
  *     information = 1/2 ln det(V + J C J') - 1/2 ln det(V + J_n C_n J_n')
  *     C_after     = C - C J' (J C J' + V)^-1 J C
  * The information is the decrease of 1/2 ln det of the parameters' covariance (D-optimality), in nats. Without nuisance
- * terms the second determinant is that of V. J C J' is the symmetrised product of two independent replicas, so the
- * noise of J does not count as information.
+ * terms the second determinant is det V. J C J' is the symmetrised product of two independent replicas, so the noise of
+ * J does not count as information.
  *
  * With a prediction of the misfit its smooth part (variance k, common to the channels, as far as the fitted rows do not
  * tell it) is an unknown like the parameters. V then contains k 1 1', which hides parameters, and the information about
@@ -19,10 +19,9 @@
  *
  * V is the sum of the variance that the fit left on a residual of weight 1; of sum_p C_pp times the variance of the
  * estimated J_p, with the channels, which share their paths, fully correlated; and, where every photograph has a gain
- * of its own, of photograph_gain_sd^2 m m' with the candidate's relative radiances m. The second term treats what is
- * known of J only through noise as noise, so rough estimates make a candidate look worse, never better. Fixed
- * parameters do not count.
- */
+ * of its own, of photograph_gain_sd^2 m m' with the candidate's relative radiances m. The second term counts the noise
+ * of J as noise of the photograph, so rough estimates make a candidate look worse, never better. Fixed parameters do
+ * not count. */
 #ifndef SELVEDGE_OPTIMIZER_NEXT_PHOTOGRAPH_H
 #define SELVEDGE_OPTIMIZER_NEXT_PHOTOGRAPH_H
 

@@ -12,8 +12,8 @@ _Static_assert((int)SMALL_MATRIX_MAX >= (int)N, "small_matrix.h takes matrices o
 static const double log_determined = 0.69;
 
 /* Least share of the information in J'J that is believed, however large the noise of J is. Near-singular directions
- * would otherwise get errors between those of their noise and those of the whole range by chance: errors of ten equal
- * fits on analytic cloth differed up to 57-fold, and do so up to 7-fold. */
+ * would otherwise get errors anywhere between the error by their noise and the whole range, by chance: errors of ten
+ * equal fits on analytic cloth differed up to 57-fold, and do so up to 7-fold. */
 static const double least_information = 0.25;
 
 /* Share of a photograph's stated variance, without that by the color matrix, that its three channels have in common:
@@ -40,7 +40,8 @@ static double common_variance(const struct linear_model *m, size_t row)
 
 typedef double row_variance(const struct linear_model *m, size_t row);
 
-/* What noise of one standard deviation, the same in all channels of a configuration, adds to J'r of each replica. */
+/* The change of J'r of each replica by noise of one standard deviation that is the same in all channels of a
+ * configuration. */
 struct common_noise {
     double of[2][N];
 };
@@ -57,7 +58,7 @@ static struct common_noise common_noise(const struct linear_model *m, size_t i, 
     return v;
 }
 
-/* Adds the mirrored product of what both replicas make of the same noise to b. */
+/* Adds the mirrored product of the two replicas' changes by the same noise to b. */
 static void add_outer(const struct common_noise *v, size_t n, double *b)
 {
     for (size_t p = 0; p < n; p++)
@@ -97,7 +98,7 @@ static double shared_derivative_noise(const struct linear_model *m, const struct
     return sum;
 }
 
-/* Adds to b what configurations that share their camera paths have in common of the noise of tracing. */
+/* Adds the covariance of the noise of tracing between configurations that share their camera paths to b. */
 static void add_shared_noise(const struct linear_model *m, const size_t *index, size_t n, double *b)
 {
     for (size_t k = 0; k < m->n_pair; k++) {
@@ -113,7 +114,7 @@ static void add_shared_noise(const struct linear_model *m, const size_t *index, 
     }
 }
 
-/* Adds what the causes of the color matrix's error, which all rows have in common, make of the gradient. */
+/* Adds the covariance of the gradient by the causes of the color matrix's error, which all rows have in common. */
 static void add_color_error(const struct linear_model *m, const size_t *index, size_t n, double *b)
 {
     for (size_t cause = 0; cause < LINEAR_COLOR_CAUSES; cause++) {

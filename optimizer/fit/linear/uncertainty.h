@@ -5,8 +5,8 @@
  * J' V J is a mirrored product of two independent replicas, so the noise of J does not make it larger. From J'J of the
  * mean of both, the noise that their difference shows is subtracted, which is the same in the mean, but in no direction
  * more than three quarters: where noise and information are alike, their difference is chance, and the errors with it.
- *   V    covariance of the residuals: that of the photographs, in which the error of the color matrix is the same for
- *        all of them (linear_model.h); that of the misfit (the part of f per degree of freedom that no noise explains);
+ *   V    covariance of the residuals: the photographs' part, in which the error of the color matrix is the same for
+ *        all of them (linear_model.h); the misfit's part (the part of f per degree of freedom that no noise explains);
  *        and the Monte-Carlo variance of the pooled mean, which is fully correlated between channels, because they
  *        share their paths, and correlated between configurations that share camera paths (linear_pair);
  *   D    Monte-Carlo noise of J times the residuals, with the correlations of V between configurations;
@@ -16,9 +16,8 @@
  *
  * A parameter at a bound counts like the others: noise may have driven it there, so it is not known as if it were
  * fixed. Where the truth is at the bound, the errors of the others are a little too large. Errors in file units follow
- * by the delta method, se(p) = |dp/dx| se(x), and are not larger than that of a uniform distribution over the allowed
- * range, nor than the prior's.
- */
+ * by the delta method, se(p) = |dp/dx| se(x), and are at most the error of a uniform distribution over the allowed
+ * range, and at most the prior's. */
 #ifndef SELVEDGE_OPTIMIZER_UNCERTAINTY_H
 #define SELVEDGE_OPTIMIZER_UNCERTAINTY_H
 
@@ -42,9 +41,9 @@ struct uncertainty {
     double photograph_var; /* mean variance per residual by the photographs' stated errors */
 };
 
-/* The standard error is below half of that of a uniform distribution over the allowed range (that of k), in the
- * parameter (se_param) and in its fit coordinate (sd), and for parameters that move in the logarithm below a factor of
- * 2. */
+/* Returns whether the standard error is below half of the error of a uniform distribution over the allowed range of k,
+ * in the parameter (se_param) and in its fit coordinate (sd), and for parameters that move in the logarithm below a
+ * factor of 2. */
 bool uncertainty_determined(const struct coordinate *k, double sd, double se_param);
 
 /* Expected decrease of the weighted objective by a step that follows nothing but the noise of tracing,

@@ -6,8 +6,8 @@
 
 #include "base/catalogue/param_info.h"
 
-/* Largest number of parameters of a fit. It may be larger than that of a scattering model, because the cloth may have
- * numbers of its own and several sets of parameters. */
+/* Largest number of parameters of a fit. It may exceed the number of a scattering model's parameters, because the cloth
+ * may have numbers of its own and several sets of parameters. */
 enum { FIT_MAX_PARAM = 64 };
 
 struct coordinate {
@@ -17,7 +17,7 @@ struct coordinate {
     double step_limit; /* largest step of one iteration: 1 in logit, 0.25 in log, 1/8 of the range otherwise */
 };
 
-/* lower and upper: bounds of this fit, inside those of the model. */
+/* lower and upper: bounds of this fit, inside the model's bounds. */
 void coordinate_init(struct coordinate *k, const struct param_info *info, double lower, double upper);
 /* The coordinate of a value inside the model's range, without regard to the bounds of the fit. */
 double coordinate_of(const struct coordinate *k, double param);

@@ -1,18 +1,17 @@
-/* What a fit leaves at neighbouring directions is alike: a highlight that is too wide is too bright beside its middle
- * everywhere. The misfit is therefore taken as a Gaussian field over the directions of light and camera,
+/* The residuals of a fit at neighbouring directions are alike: a highlight that is too wide is too bright beside its
+ * middle everywhere. The misfit is therefore taken as a Gaussian field over the directions of light and camera,
  *
  *   covariance of rows i and j = misfit_var [ s exp(-d_ij^2 / (2 l^2)) + (1 - s) (i = j) ],
  *   d_ij^2 = |light_i - light_j|^2 + |camera_i - camera_j|^2   (unit vectors in the frame of the cloth),
  *
- * common to the three channels, in units of the objective (relative to a row's brightness). misfit_var is that of the
- * fit; the smooth share s and the length l are those of the largest likelihood of the fitted rows' residuals, whose own
- * noise is added on the diagonal. Where a row is a mean over all rotations of the cloth, directions are compared up to
- * a turn about the normal and a mirroring.
+ * common to the three channels, in units of the objective (relative to a row's brightness). misfit_var comes from the
+ * fit; the smooth share s and the length l have the largest likelihood of the fitted rows' residuals, whose own noise
+ * is added on the diagonal. Where a row is a mean over all rotations of the cloth, directions are compared up to a turn
+ * about the normal and a mirroring.
  *
- * The field then tells what is still unknown of the misfit at another configuration: much far from all fitted rows,
- * little beside one. Source: Kennedy and O'Hagan 2001, Bayesian calibration of computer models, section 4.
- * Ownership: plain memory, about 140 kB; not for the stack. Not thread-safe while it is set up.
- */
+ * The field then gives the variance of the misfit that is still unknown at another configuration: large far from all
+ * fitted rows, small beside one. Source: Kennedy and O'Hagan 2001, Bayesian calibration of computer models, section 4.
+ * Ownership: plain memory, about 140 kB; not for the stack. Not thread-safe while it is set up. */
 #ifndef SELVEDGE_OPTIMIZER_MISFIT_FIELD_H
 #define SELVEDGE_OPTIMIZER_MISFIT_FIELD_H
 

@@ -4,10 +4,9 @@
  * polynomial fitted to all (of degree 4, or 3 or 2 where there are too few points or its minimum is not sure: a
  * lopsided minimum would be shifted by less), and so far to its sides that the rise stands out of the noise. Weighted
  * least squares; a point may be off the polynomial by its own error and by 20 % of its rise over the lowest one, so
- * that far points count little and near ones for what they are worth. The vertex gets the error that follows from the
+ * that far points count little and near ones by their own error. The vertex gets the error that follows from the
  * points' errors, larger by the square root of chi^2 per degree of freedom where the points scatter more than that. A
- * function of the values it is given: the same values, the same search.
- */
+ * function of the values it is given: the same values, the same search. */
 #ifndef SELVEDGE_OPTIMIZER_NOISY_MINIMUM_H
 #define SELVEDGE_OPTIMIZER_NOISY_MINIMUM_H
 
@@ -36,7 +35,7 @@ struct noisy_minimum {
     double curvature, curvature_se;            /* second derivative */
     bool at_bound;                             /* the minimum is at lower or upper */
     /* The minimum is inside the bounds, its curvature is positive by two standard errors, and its error is below half
-     * of that of a uniform distribution over the range. */
+     * of the error of a uniform distribution over the range. */
     bool determined;
 };
 

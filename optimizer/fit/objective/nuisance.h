@@ -1,11 +1,11 @@
-/* Nuisance terms: what stands between the radiance that the renderer predicts and what a photograph shows, and belongs
- * to neither the cloth nor the model: a gain (exposure, lamp power) and a constant stray light (glare, room light).
+/* Nuisance terms: differences between the radiance that the renderer predicts and the radiance in a photograph which
+ * belong to neither the cloth nor the model: a gain (exposure, lamp power) and a constant stray light (glare, room
+ * light).
  *
  *   shown = gain * radiance + stray light
  *
  * A global gain and the stray light are fitted with the parameters (fit_layout.h). One gain for each photograph is
- * marginalised in the fit (linear_model.h); its most likely value follows from fresh estimates at the result.
- */
+ * marginalised in the fit (linear_model.h); its most likely value follows from fresh estimates at the result. */
 #ifndef SELVEDGE_OPTIMIZER_NUISANCE_H
 #define SELVEDGE_OPTIMIZER_NUISANCE_H
 
@@ -25,7 +25,7 @@ struct fit_nuisance {
     bool at_bound[FIT_MAX_NUISANCE];
 };
 
-/* Converts mean and variance of an estimate to those of what a photograph would show. Derivatives are not changed. */
+/* Converts mean and variance of an estimate to the values in a photograph. Derivatives are not changed. */
 void nuisance_show(const struct fit_nuisance *n, const struct estimate *e, struct estimate *out);
 
 /* Most likely gain of one photograph, with its standard error: Gaussian of sd `sd` about 1, residuals of variance

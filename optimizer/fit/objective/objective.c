@@ -85,7 +85,8 @@ static double factor_of_channel(const struct observation *o, int channel)
     return scored(o) ? 1.0 / (unit * unit) : 0.0;
 }
 
-/* What rows that share their camera paths add to the variance of a sum over rows: of all channels, or of one. */
+/* Returns the covariance of rows that share their camera paths in the variance of a sum over rows: of all channels, or
+ * of one. */
 static double shared_variance(const struct observation_set *o, const struct estimate *a, const struct estimate *b,
                               row_factor *factor, int first, int end)
 {

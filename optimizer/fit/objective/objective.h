@@ -7,15 +7,14 @@
  * B: f = sum_i w_i sum_c (A_ic - M_ic)(B_ic - M_ic),       E f = f of the true means; single values may be negative,
  * and the gradient by the mirrored average  sum_i w_i sum_c [(A - M) dB + (B - M) dA].
  *
- * Standard error: Var[(A-M)(B-M)] = ra^2 vb + rb^2 va - va vb (unbiased, since E ra^2 = r^2 + va). The channels of
- * one configuration share their paths; their correlation is not in an estimate, so it is taken as full: the stated
- * error is an upper estimate, too large by at most a factor sqrt(3). Configurations that share camera paths
- * (estimate.partner) have covariances (product_noise.h).
+ * Standard error: Var[(A-M)(B-M)] = ra^2 vb + rb^2 va - va vb (unbiased, since E ra^2 = r^2 + va). The channels of one
+ * configuration share their paths; their correlation is not in an estimate, so it is taken as full: the stated error is
+ * an upper estimate, too large by at most a factor sqrt(3). Configurations that share camera paths (estimate.partner)
+ * have covariances (product_noise.h).
  *
- * Relative RMS error of n rows: sqrt(max(0, sum_i sum_c (A-M)(B-M) / max(a_i, tau)^2) / (3 n)), extra weights left
- * out. Contrasts and rows of weight 0 are left out of that figure. The Monte-Carlo variance cancels in the product,
- * so nothing is subtracted and the figure does not fall when fewer paths are used.
- */
+ * Relative RMS error of n rows: sqrt(max(0, sum_i sum_c (A-M)(B-M) / max(a_i, tau)^2) / (3 n)), extra weights left out.
+ * Contrasts and rows of weight 0 do not count in it. The Monte-Carlo variance cancels in the product, so nothing is
+ * subtracted and the figure does not fall when fewer paths are used. */
 #ifndef SELVEDGE_OPTIMIZER_OBJECTIVE_H
 #define SELVEDGE_OPTIMIZER_OBJECTIVE_H
 
@@ -23,9 +22,9 @@
 #include "renderer/transport/estimate/estimate.h"
 
 #define OBJECTIVE_TAU 0.02
-/* Contrasts (observation_is_contrast): C is a squared coefficient of variation, so half its relative error is that of
- * the scatter itself; w_i = weight_i / (2 max(a_i, tau_C))^2 with a_i the mean over channels of C, and cloth that
- * scatters by less than 2 % counts as if it did. */
+/* Contrasts (observation_is_contrast): C is a squared coefficient of variation, so half its relative error is the
+ * relative error of the scatter itself; w_i = weight_i / (2 max(a_i, tau_C))^2 with a_i the mean over channels of C,
+ * and cloth that scatters by less than 2 % counts as if it did. */
 #define OBJECTIVE_CONTRAST_TAU 4e-4
 
 struct objective_value {

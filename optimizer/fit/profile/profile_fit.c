@@ -148,7 +148,7 @@ static status run_starts(struct starts *all, struct profile_fit *fit, size_t *be
 
 /* ---- the misfit ---- */
 
-/* The sum of squares at a relative misfit t, over the number of values less that of unknowns. */
+/* The sum of squares at a relative misfit t, over the number of values less the number of unknowns. */
 static double reduced_sum(const struct profile_search *s, size_t n_free, double misfit)
 {
     const struct profile_target *t = s->target;

@@ -3,15 +3,15 @@
  *
  *   minimised: sum over values m of ((s L - m) / e)^2 + priors,   e^2 = se^2 + (t (m + 0.02 mean of m))^2
  *
- * s is the scale, L the model's radiance (profile_model.h), se the stated error and t the relative misfit: what the
- * model leaves beyond those errors, chosen so that the sum is the number of values less that of unknowns, and 0 where
- * the stated errors explain the residuals. Without stated errors all of e is misfit, and the fit is one of relative
- * residuals, like the published one of logarithms (Yan et al. 2017, section 5.1), which a value of 0 does not break.
+ * s is the scale, L the model's radiance (profile_model.h), se the stated error and t the relative misfit: the
+ * residuals beyond the stated errors, chosen so that the sum is the number of values less the number of unknowns, and 0
+ * where the stated errors explain the residuals. Without stated errors all of e is misfit, and the fit is one of
+ * relative residuals, like the published one of logarithms (Yan et al. 2017, section 5.1), which a value of 0 does not
+ * break.
  *
- * Standard errors: the larger one, for each unknown, of two covariances: that of independent residuals of variance e^2,
+ * Standard errors: the larger one, for each unknown, of two covariances: one for independent residuals of variance e^2,
  * and the sandwich with the residuals of groups of rows of neighbouring phi, in which the misfit of neighbours goes
- * together. It is the sandwich that counts where the model does not describe the fiber exactly.
- */
+ * together. It is the sandwich that counts where the model does not describe the fiber exactly. */
 #ifndef SELVEDGE_OPTIMIZER_PROFILE_FIT_H
 #define SELVEDGE_OPTIMIZER_PROFILE_FIT_H
 

@@ -6,7 +6,7 @@
 
 enum { PROFILE_MAX_UNKNOWN = FIT_MAX_PARAM + 1 };
 
-/* What all searches of a fit share. Unknowns are those of the layout and then ln of the scale. */
+/* Shared by all searches of a fit. The unknowns of the layout come first, then ln of the scale. */
 struct profile_target {
     const struct profile_problem *problem;
     struct fit_layout layout;

@@ -1,6 +1,5 @@
 /* Checks of the option table that the range of one number cannot express, and checks that relate several options. Each
- * returns STATUS_INVALID with the key at fault and a text that says what is allowed.
- */
+ * returns STATUS_INVALID with the key at fault and a text that names the allowed values. */
 #ifndef SELVEDGE_OPTIMIZER_OPTION_CHECKS_H
 #define SELVEDGE_OPTIMIZER_OPTION_CHECKS_H
 

@@ -3,12 +3,11 @@
  * {"models":[{"id","title","kind":"surface"|"volume",
  *             "parameters":[{"name","symbol","kind","unit","channel":null|0..2,"lower","upper","start","coordinate",
  *                            "meaning"}]}],
- *  "methods":[{"id","title","takes":["priors","nuisance","texture","precision"],"default_path_budget":n|null,
+ * "methods":[{"id","title","takes":["priors","nuisance","texture","precision"],"default_path_budget":n|null,
  *              "default_max_iterations","max_iterations_with_starts"}],
- *  "stop_reasons":[{"id","meaning"}]}
+ * "stop_reasons":[{"id","meaning"}]}
  *
- * Numbers are in the units of files; the words are those of base/catalogue/param_info.h.
- */
+ * Numbers are in the units of files; the words come from base/catalogue/param_info.h. */
 #ifndef SELVEDGE_OPTIMIZER_CATALOGUE_JSON_H
 #define SELVEDGE_OPTIMIZER_CATALOGUE_JSON_H
 

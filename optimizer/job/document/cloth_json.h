@@ -6,7 +6,7 @@
 
 #include <jansson.h>
 
-/* number: the values, NULL for those of d. Numbers are given, not searched. NULL when memory is short. */
+/* number: the values; NULL: the values of d. Numbers are given, not searched. NULL when memory is short. */
 json_t *cloth_section_json(const struct cloth_description *d, const double *number);
 /* The draft as texts, the upper row first. */
 json_t *cloth_draft_json(const struct cloth_description *d);

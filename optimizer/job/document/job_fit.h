@@ -22,7 +22,7 @@ struct job_model {
     int first_free; /* the first parameter that neither "fixed" nor "tied" holds; -1: all are held */
 };
 
-/* A configuration of which a photograph might be taken. */
+/* A configuration that might be photographed. */
 struct job_candidate {
     double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
 };

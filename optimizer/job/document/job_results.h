@@ -11,7 +11,7 @@
 enum { JOB_MAX_SURFACE_PICTURE = 32 };
 
 /* How a picture is rendered: path by path, by the tables of renderer/fast, by tables with some whole paths, whose
- * expectation is that of path tracing, by dual scattering (renderer/dual), or by diffusion (renderer/diffusion). */
+ * expectation equals path tracing's, by dual scattering (renderer/dual), or by diffusion (renderer/diffusion). */
 enum job_picture_method {
     JOB_PICTURE_PATH,
     JOB_PICTURE_FAST,
@@ -32,7 +32,7 @@ struct job_surface_picture {
     int black_sheet;           /* 0, 1, or -1: as in the document */
     double light_theta_deg, light_phi_deg, camera_theta_deg, camera_phi_deg, cloth_rotation_deg;
     double lamp_sharpness; /* of a Gaussian lamp in place of the document's; NaN: the document's */
-    double width_mm;       /* what the picture shows */
+    double width_mm;       /* width of the area in the picture */
     size_t px, sample;
     enum job_picture_method method;
     bool reference;                      /* also path by path, and compared with that */

@@ -1,7 +1,6 @@
 /* Strict reading of JSON objects. On an error every function returns STATUS_INVALID, puts the path of the field at
- * fault ("photographs[3].scale") into err->field and says in err->text what is allowed. A key that is absent leaves
- * *out unchanged and is no error, unless the function's name or argument says `required`.
- */
+ * fault ("photographs[3].scale") into err->field and names the allowed values in err->text. A key that is absent leaves
+ * *out unchanged and is no error, unless the function's name or argument says `required`. */
 #ifndef SELVEDGE_OPTIMIZER_JSON_FIELD_H
 #define SELVEDGE_OPTIMIZER_JSON_FIELD_H
 

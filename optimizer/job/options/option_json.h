@@ -1,4 +1,4 @@
-/* The option table as JSON, for GET /v1/options and what is generated from it. */
+/* The option table as JSON, for GET /v1/options and for generated documents. */
 #ifndef SELVEDGE_OPTIMIZER_OPTION_JSON_H
 #define SELVEDGE_OPTIMIZER_OPTION_JSON_H
 
@@ -22,8 +22,8 @@
  * Members that do not apply are left out. The caller owns the value; NULL when out of memory. */
 json_t *job_options_json(void);
 /* Settings that a document leaves at their defaults, {"fit.seed": 1}, as far as they have an effect: their section is
- * given, or every job with rows has it. Not those of `cloth`, of which the result states all that are in use. The
- * caller owns the value. */
+ * given, or every job with rows has it. Settings of `cloth` are left out, because the result states all of them that
+ * are in use. The caller owns the value. */
 json_t *job_options_defaults_json(const json_t *document, bool has_rows);
 
 #endif

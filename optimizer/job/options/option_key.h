@@ -17,8 +17,8 @@ const char *job_option_key(const char *id);
 void job_option_resolve(const char *field, char *key, size_t n_bytes);
 
 /* Replaces the option id in err->field by its key. A field that is neither an option id nor a key is emptied, because
- * it names an argument inside the program; the text says what is wrong. err may be NULL. Returns code, so that a
- * caller can write `return job_option_name_field(s, err)`. */
+ * it names an argument inside the program; the text names the fault. err may be NULL. Returns code, so that a caller
+ * can write `return job_option_name_field(s, err)`. */
 status job_option_name_field(status code, struct error *err);
 
 #endif
