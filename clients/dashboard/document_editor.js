@@ -14,9 +14,9 @@ export function holdsLargeNumber(value) {
 export function documentEditor(changed) {
   const text = el("pre", { class: "log", id: "document", tabIndex: 0, role: "region", "aria-label": "the job document" }), body = el("div"), note = el("p", { class: "hint" });
   let source = "", options = null, form = null, wrong = [];
-  const marked = new Map(); // row -> what the server said of it
+  const marked = new Map(); // row -> the server's fault
   const markFaults = () => {
-    for (const [row, text] of marked) { // but not what the form itself says of a value that it cannot read
+    for (const [row, text] of marked) { // except the form's own fault for a value that it cannot read
       const problem = row.querySelector(":scope > .problem");
       if (problem?.textContent !== text) continue;
       row.classList.remove("bad");
@@ -69,7 +69,7 @@ export function documentEditor(changed) {
       return source;
     },
     show(now) { source = now; render(); }, // a document from a file
-    // What is wrong with the document: the rows of these fields are marked, and no others.
+    // Faults of the document: the rows of these fields are marked, and no others.
     faults(list) { wrong = list; markFaults(); },
     async mark(field, message) {
       node.open = true;

@@ -1,4 +1,4 @@
-// The files of a drop, those of dropped folders too, whatever their depth.
+// The files of a drop, and all files of dropped folders, whatever their depth.
 
 const entriesOf = (reader) => new Promise((done, failed) => reader.readEntries(done, failed));
 const fileOf = (entry) => new Promise((done, failed) => entry.file(done, failed));

@@ -60,7 +60,7 @@ function certificate(result) {
     el("p", { class: "hint" }, `Derivatives of ${c.n_path} paths through this cloth, compared with finite differences over the same paths: the worst relative error is ${c.worst_rel_error.toExponential(1)} (${c.worst_parameter}), of which noise explains ${c.worst_noise.toExponential(1)} ± ${c.worst_noise_se.toExponential(0)}.`));
 }
 
-// The plain BRDF fitted to the same rows: what a user would take in place of this twin.
+// The plain BRDF fitted to the same rows: a user's alternative to this twin.
 function skill(result) {
   const plain = result.skill?.plain_brdf;
   if (!plain || !isNumber(plain.heldout_rel_rms)) return null;
@@ -92,7 +92,7 @@ function clothNumbers(result) {
       number(`${n.lower} to ${n.upper}`), el("td", {}, n.determined ? "" : tag("these measurements do not determine it"), n.at_bound ? tag(`at its ${n.at_bound} bound`) : "")))));
 }
 
-// What the photographs ask to change about the fibers of a scan or a file, and what that gains.
+// Changes to the fibers of a scan or a file that the photographs ask for, and the gain of each.
 function corrections(result) {
   const without = result.without_corrections;
   if (!without) return null;

@@ -45,7 +45,7 @@ function factsOf(job) {
   if (LIVE.has(job.state)) facts.push(fact("done", percent(job.fraction, 0)), fact("time left", timeLeft(job)));
   if (job.state === "running" && /^(fitting|fiber radius)/.test(job.message)) facts.push(fact("now", job.message));
   if (isNumber(job.step)) facts.push(fact("step", String(job.step)));
-  const { result } = job; // after the end there is one objective: that of the best model, computed with fresh paths
+  const { result } = job; // after the end there is one objective, of the best model, computed with fresh paths
   if (isNumber(result?.objective)) facts.push(fact("objective, fresh paths", withError(result.objective, result.objective_se)));
   else if (isNumber(job.objective)) facts.push(fact("objective of this step", withError(job.objective, job.objective_se)));
   const { fit, fitSe, leftOut, leftOutSe, held, heldSe } = residuals(job);
@@ -113,7 +113,7 @@ function downloads(job, list) {
   return [el("p", {}, report(list, "report.html", "Report"), report(list, "report.pdf", "Report as PDF"), el("a", { class: "button", href: list.archive, download: `selvedge-${job.id}.tar` }, "Everything (tar)")), el("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": "files" }, el("table", { id: "files" }, el("tbody", {}, rows)))];
 }
 
-// What was fitted to the profile of a single fiber.
+// The fit to the profile of a single fiber.
 function profileCards(profile) {
   if (!profile) return [];
   const rows = profile.models.map((m) => el("tr", { class: m.best ? "best" : "" }, el("td", { title: m.title }, el("span", { class: "mono" }, m.id)), el("td", { class: "number" }, percentWithError(m.nrmse)),

@@ -58,7 +58,7 @@ export function withError(value, se) {
 export const percent = (x, digits = 1) => (isNumber(x) ? `${(100 * x).toFixed(digits)} %` : "–");
 export const percentWithError = (x, se, digits = 2) => (isNumber(x) && isNumber(se) ? `${(100 * x).toFixed(digits)} ± ${(100 * se).toFixed(digits)} %` : percent(x, digits));
 export const when = (unix) => (isNumber(unix) && unix > 0 ? new Date(1000 * unix).toLocaleString() : "–");
-// A time in the reader's zone, with that of UTC as its title.
+// A time in the reader's zone, with the UTC time as its title.
 export function timeOf(unix) {
   if (!isNumber(unix) || unix <= 0) return el("span", {}, "–");
   const iso = new Date(1000 * unix).toISOString();

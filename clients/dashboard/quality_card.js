@@ -6,7 +6,7 @@ const pair = (v, show) => (v ? v.map((x) => (isNumber(x) ? show(x) : "–")).joi
 
 const radius = (g) => (g.radius_per_axis ? g.radius_um.map((r, i) => withError(r, g.radius_se_um?.[i])).join(" / ") : withError(g.mean_radius_um, g.radius_se_um?.[0])) + " µm";
 
-// What the phantom of a trial was made of.
+// The description of a trial's phantom.
 const phantomFibers = (t) => [`radii spread by ${percent(t.radius_spread, 1)}`,
   t.axis_ratio > 1 && `ratios of axes ${number(t.axis_ratio)} ± ${number(t.axis_ratio_spread, 2)}`,
   t.lumen > 0 && `lumens ${number(t.lumen, 2)} ± ${number(t.lumen_spread, 2)} of the width`,

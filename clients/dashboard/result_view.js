@@ -4,7 +4,7 @@ import { isNumber } from "./page_parts.js";
 
 const CHANNEL = { r: 0, g: 1, b: 2 };
 
-// The name of a parameter without that of its set: "C_R.r" for "warp.C_R.r".
+// The name of a parameter without its set: "C_R.r" for "warp.C_R.r".
 const ownName = (p) => (p.set ? p.name.slice(p.set.length + 1) : p.name);
 
 // Returns [{set, symbol, unit, flat: [{i, name, channel}]}] from parameters with names such as "C_R.r", "beta_TT". set:
@@ -43,7 +43,7 @@ export function models(job) {
 }
 
 // Returns the fitted parameters of a job or of one of its models: [{set, name, unit, value, se, flags: [text], lower,
-// upper}], the name without that of the set
+// upper}], the name without the set
 export function fitted(of) {
   return (of.parameters ?? []).map((p) => {
     const flags = [];
@@ -86,7 +86,7 @@ export const sliceFiles = (files) => files.filter((f) => /(^|\/)slice[^/]*\.png$
 export const fiberFile = (files) => files.find((f) => f.path === "fibers.hair") ?? null;
 // The fibers as they were traced in a scan, before the seams of the tile were closed.
 export const tracedFile = (files) => files.find((f) => f.path === "scan/fibers.hair") ?? null;
-// How clearly the scan shows each point of that file; null without a scan.
+// How clearly the scan shows each point of the file; null without a scan.
 export const contrastFile = (files) => files.find((f) => f.path === "scan/contrast.u8") ?? null;
 export const residuals = (job) => ({
   fit: job.result?.fit_rel_rms, fitSe: job.result?.fit_rel_rms_se, held: job.result?.heldout_rel_rms, heldSe: job.result?.heldout_rel_rms_se,
@@ -106,7 +106,7 @@ export function correlations(job) {
   if (!full || full.length !== all.length || free.length < 2) return null;
   return { names: free.map((i) => all[i].name), matrix: free.map((i) => free.map((j) => full[i][j])) };
 }
-// By what the best of several models was chosen, as a sentence.
+// The reason for choosing the best of several models, as a sentence.
 export const choiceOf = (job) => (job.result?.chosen_by === "cross_validation"
   ? "The best model has the lowest error over fitted rows that were left out in turn (cross-validation); held-out rows have no part in the choice."
   : "The fitted rows are too few for cross-validation, so the best model has the lowest error over the fitted rows.");

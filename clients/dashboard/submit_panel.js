@@ -69,7 +69,7 @@ function removeFile(job, name) {
   return raw("DELETE", `/v1/jobs/${job}/files/${name}`).catch((error) => { if (error.status !== 404) throw error; });
 }
 
-// file: what was dropped, or {size, sha256} of an input of the copied job.
+// file: a dropped file, or {size, sha256} of an input of the copied job.
 async function declare(job, f, file) {
   const url = `/v1/jobs/${job}/files`, sum = file instanceof File ? await sha256(file) : file.sha256;
   const ask = { name: f.name, role: f.role, size: file.size, sha256: sum };
@@ -91,7 +91,7 @@ export function submitPanel(handed = [], copy = null) {
   const fileOf = (name) => dropped.get(name) ?? (before?.files.get(name)?.sha256 ? before.files.get(name) : undefined);
   const faultOf = (name) => (dropped.has(name) ? check.fault(dropped.get(name)) : null);
   const allow = () => { go.disabled = busy || doc === null || wanted().some((f) => !fileOf(f.name) || faultOf(f.name)); };
-  // What is known of a file from the copied job.
+  // The entry of a file in the copied job.
   const otherSize = (name) => {
     const known = before?.files.get(name)?.size, now = dropped.get(name)?.size;
     if (known === undefined || now === known) return null;
@@ -179,7 +179,7 @@ export function submitPanel(handed = [], copy = null) {
         const file = fileOf(f.name), mark = `${job.id} ${file.size} ${file.lastModified}`;
         const label = (n) => say(`${i + 1} of ${files.length}: ${f.name}, ${size(n)} of ${size(file.size)}`);
         label(0);
-        // a different file of the same name: its bytes must not continue those of the first
+        // a different file of the same name: its bytes must not continue the first file
         if (known.has(f.name) && known.get(f.name) !== mark) await removeFile(job.id, f.name);
         known.set(f.name, mark);
         const state = await declare(job.id, f, file);

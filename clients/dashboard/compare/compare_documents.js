@@ -1,4 +1,4 @@
-// What differs between the job documents of several jobs, between the bytes of their inputs, and between programs.
+// Differences between the job documents of several jobs, between the bytes of their inputs, and between programs.
 import { el } from "../page_parts.js";
 import { sideBySide } from "./compare_tables.js";
 

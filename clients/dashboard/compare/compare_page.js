@@ -11,7 +11,7 @@ const LIVE = new Set(["queued", "running", "paused"]);
 
 export const compareAddress = (ids) => `#compare/${ids.join(",")}`;
 
-// Gets the result of an earlier run, ID@RUN, in the place of the job's present one; returns the addresses of its files. What its inputs were is not kept.
+// Gets the result of an earlier run, ID@RUN, in the place of the job's present one; returns the addresses of its files. Its list of inputs is not kept.
 async function fetchVersion(job, run) {
   const version = await getJson(`/v1/jobs/${job.id}/versions/${run}`), urls = new Map(version.files.map((f) => [f.path, f.url]));
   const result = await getJson(`${version.url}/result.json`);
@@ -63,7 +63,7 @@ function headCard(columns, ids, reference, choose) {
 
 const card = (id, title, ...content) => el("section", { class: "card", id }, el("h2", {}, title), ...content);
 
-// columns: [{id, letter, job, urls, list}], the first of which is not always the reference
+// columns: [{id, letter, job, urls, list}]; the first one is not always the reference
 function cards(columns, reference) {
   const ended = columns.filter((c) => c.job.result), base = ended.find((c) => c.id === reference) ?? ended[0], parts = [];
   if (ended.length) {

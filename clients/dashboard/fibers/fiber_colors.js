@@ -1,4 +1,4 @@
-// Colours of the fibers in 3D, and the legend that says what they mean. hair: what readHair of fiber_view.js returns.
+// Colours of the fibers in 3D, and their legend. hair: as readHair of fiber_view.js returns it.
 import { el } from "../page_parts.js";
 import { FOUND_FROM } from "./hair_file.js";
 
@@ -68,7 +68,7 @@ export const TRACED = ["found or filled in, as traced", byContrast];
 // The ways that this file has data for: [name, function of hair].
 export const waysToColour = (hair) => [["direction", byDirection], ["class", byKind], ["radius", byRadius], hair.group ? ["material", byGroup] : null].filter(Boolean);
 
-// Three numbers for each end of each segment; what lies deep is darker.
+// Three numbers for each end of each segment; deeper fibers are darker.
 export function coloursOf(hair, way) {
   const { position, n } = hair, { of, legend } = way(hair), out = new Float32Array(position.length);
   let low = Infinity, high = -Infinity;

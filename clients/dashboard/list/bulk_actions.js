@@ -1,4 +1,4 @@
-// What can be done with the selected jobs of the list.
+// Actions on the selected jobs of the list.
 import { compareAddress, MOST } from "../compare/compare_page.js";
 import { el } from "../page_parts.js";
 import { sendJson } from "../server_link.js";
@@ -6,7 +6,7 @@ import { sendJson } from "../server_link.js";
 const LIVE = new Set(["queued", "running", "paused"]), ENDED = new Set(["failed", "cancelled"]);
 const WORDS = { cancel: "cancelled", retry: "queued again", delete: "deleted", tag: "tagged" };
 
-// In words, what came of an action: "3 deleted, 1 unchanged; 1 refused: ...".
+// The outcome of an action in words: "3 deleted, 1 unchanged; 1 refused: ...".
 function outcomeOf(action, results) {
   const n = (outcome) => results.filter((r) => r.outcome === outcome).length, refused = results.filter((r) => r.outcome === "refused");
   const parts = [n("done") ? `${n("done")} ${WORDS[action]}` : null, n("unchanged") ? `${n("unchanged")} unchanged` : null].filter(Boolean);

@@ -9,7 +9,7 @@ function stateCell(job) {
   return [job.cancel_requested ? el("span", { class: "state cancelled" }, "stopping") : stateTag(job.state), place];
 }
 
-// What the job does, or why it has failed.
+// The stage of the job, or why it has failed.
 function whyCell(job) {
   if (job.state === "running") return job.stage ?? "";
   if (job.state === "failed" || job.error) return job.error?.text ?? "";
@@ -38,7 +38,7 @@ function cells(job, owners, byTag) {
   ];
 }
 
-// Replaces the cells behind the box. The focus stays on what has the same address or text.
+// Replaces the cells behind the box. The focus stays on the element with the same address or text.
 function redraw(line, job, owners, byTag) {
   const held = line.node.contains(document.activeElement) ? document.activeElement : null;
   while (line.node.childElementCount > 1) line.node.lastElementChild.remove();

@@ -1,5 +1,5 @@
 // Reads OpenEXR files as the daemon's results have them: scan lines, 32-bit floats, not compressed. Everything else is
-// refused with an error that says what it is.
+// refused with an error that names it.
 
 const MAGIC = 20000630, TILED = 0x200, PARTS = 0x1800, FLOAT = 2, MOST_PIXELS = 1 << 26;
 

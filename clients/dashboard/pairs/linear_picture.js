@@ -7,7 +7,7 @@ const TABLE = Uint8ClampedArray.from({ length: STEPS + 1 }, (_, i) => {
   const v = i / STEPS;
   return Math.round(255 * (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055));
 });
-const encode = (x) => (x > 0 ? TABLE[Math.min(STEPS, Math.round(x * STEPS))] : 0); // also 0 for what is no number
+const encode = (x) => (x > 0 ? TABLE[Math.min(STEPS, Math.round(x * STEPS))] : 0); // also 0 for a value that is no number
 
 // One value everywhere: a row that was measured without a photograph.
 export const uniform = (rgb) => ({ width: 1, height: 1, rgb: Float32Array.from(rgb) });

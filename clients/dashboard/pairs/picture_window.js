@@ -90,7 +90,7 @@ export class PictureWindow {
       if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
       canvas.classList.toggle("whole", this.zoom === 1); // a finger then scrolls the page
       const context = canvas.getContext("2d"), w = source.width / this.zoom, h = source.height / this.zoom;
-      context.imageSmoothingEnabled = w > width; // pixels stay squares when they are larger than those of the screen
+      context.imageSmoothingEnabled = w > width; // pixels stay squares when they are larger than the screen's
       context.drawImage(source, this.x * source.width - w / 2, this.y * source.height - h / 2, w, h, 0, 0, width, height);
     });
   }

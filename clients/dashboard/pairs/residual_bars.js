@@ -1,4 +1,4 @@
-// The relative error of each row as a bar; a click leads to the pair of that row.
+// The relative error of each row as a bar; a click leads to the row's pair.
 import { el, isNumber, percentWithError } from "../page_parts.js";
 
 const sum = (rgb) => rgb[0] + rgb[1] + rgb[2];

@@ -1,4 +1,4 @@
-// What a job was made of: settings of its document, input files with sizes and SHA-256, versions and dates.
+// The record of a job: settings of its document, input files with sizes and SHA-256, versions and dates.
 import { flatten } from "../compare/compare_documents.js";
 import { el, size, timeOf } from "../page_parts.js";
 

@@ -12,7 +12,7 @@ const INPUT_ERRORS = new Set(["invalid", "format", "numeric", "unsupported", "no
 export const failedByInput = (job) => Boolean(job.error) && INPUT_ERRORS.has(job.error.code);
 export const canBeRepaired = (job) => (job.state === "failed" && failedByInput(job)) || (job.state === "draft" && (failedByInput(job) || job.missing_files?.length > 0));
 
-// The files at fault: those that the message names, else those of the field; and those that are missing.
+// The files at fault: the files that the message names, else the files of the field; and missing ones.
 export function filesAtFault(job, value) {
   const all = filesOf(job.document ?? {}), said = job.error ? job.error.text : "";
   const names = new Set(typeof value === "string" ? [value] : Array.isArray(value) ? value : [value?.file, ...(value?.files ?? [])]);
@@ -50,7 +50,7 @@ export class RepairPanel {
     this.inputs = []; // {input, before: its text}
     this.chosen = new Map(); // the files that were chosen
     this.tag = null; // of the job that is shown
-    this.written = ""; // what was written when another editor came first
+    this.written = ""; // the text written when another editor came first
   }
 
   async update(job) {
@@ -66,7 +66,7 @@ export class RepairPanel {
     if (key === this.key) this.build(job, source, checked);
   }
 
-  // What else is wrong with the stored document; nothing for a reader who may not ask.
+  // Further faults of the stored document; none for a reader who may not ask.
   async check(source) {
     try {
       const answer = await raw("POST", "/v1/check", { body: source, header: { "Content-Type": "application/json" } });
@@ -130,7 +130,7 @@ export class RepairPanel {
       el("label", {}, now ? "Replace by " : "Upload ", choose), picked);
   }
 
-  // The stored text with all edits; null without one. Throws what is no JSON.
+  // The stored text with all edits; null without one. Throws when it is no JSON.
   edited({ stored, source, places, inputs }) {
     let text = source;
     for (let i = places.length - 1; i >= 0; i--) {

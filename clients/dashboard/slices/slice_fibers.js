@@ -5,7 +5,7 @@ export const FOUND_COLOUR = "#ff5b4d", FILLED_COLOUR = "#4dd2ff";
 const BUCKET = 4; // slices
 
 export class SliceFibers {
-  // fibers: what SharedFibers.load returns; axis: across which the slices lie; n of them, thick_mm apart
+  // fibers: as SharedFibers.load returns them; axis: across which the slices lie; n of them, thick_mm apart
   constructor({ parsed, contrast }, axis, n, thickMm) {
     this.parsed = parsed;
     this.contrast = contrast;
@@ -43,7 +43,7 @@ export class SliceFibers {
 
   isFound(k) { return !this.contrast || this.contrast[k] + this.contrast[k + 1] >= 2 * FOUND_FROM; }
 
-  // Draws what lies at a slice. place(u, v) gives the pixel of a place in mm, scale the pixels of a millimetre.
+  // Draws the fibers at a slice. place(u, v) gives the pixel of a place in mm, scale the pixels of a millimetre.
   draw(context, slice, place, scale, { centers, fibers }) {
     const plane = (slice + 0.5) * this.thick, b = Math.floor(slice / BUCKET), { xyz } = this.parsed, { axis, u, v } = this;
     const paths = [FOUND_COLOUR, FILLED_COLOUR].map((colour) => ({ colour, line: new Path2D(), disc: new Path2D() }));

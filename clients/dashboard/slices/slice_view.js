@@ -99,7 +99,7 @@ class SliceView {
     return { axis: this.axis, slice: this.at[this.axis], level, from: low, to: Math.min(high, file.levels[level].rows - 1) };
   }
 
-  // Loads and draws what is asked for at last; what was asked for meanwhile and is not any more is left out.
+  // Loads and draws the last request; requests that were replaced meanwhile are left out.
   async show() {
     if (!this.file || this.at[this.axis] === null) return;
     this.canvas.draw();

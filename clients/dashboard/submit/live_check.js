@@ -1,4 +1,4 @@
-// What is wrong with a document and its files, and what of them is on the server already: found while they are put
+// Faults of a document and its files, and the files that the server has already: found while they are put
 // together, before anything is sent.
 import { el, size } from "../page_parts.js";
 import { getJson, raw } from "../server_link.js";

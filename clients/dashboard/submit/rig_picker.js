@@ -1,4 +1,4 @@
-// Views of a rig in the form for a new job: which view each photograph shows, chosen from those of the rig file
+// Views of a rig in the form for a new job: which view each photograph shows, chosen from the views of the rig file
 // (docs/photographs.md).
 import { el } from "../page_parts.js";
 
@@ -16,7 +16,7 @@ export function rigOf(text) {
 const whereOf = (view) => [view?.lamp ? `lamp ${view.lamp}` : null, view?.camera ? `camera ${view.camera}` : "camera by markers",
   typeof view?.cloth_rotation_deg === "number" ? `cloth turned ${view.cloth_rotation_deg}°` : null].filter(Boolean).join(", ");
 
-// changed(doc) is called with a document of which a view was chosen.
+// changed(doc) is called with the document after a view was chosen.
 export class RigPicker {
   constructor(changed) {
     this.node = el("div", { id: "rig-picker", hidden: true });

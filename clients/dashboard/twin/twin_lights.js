@@ -10,7 +10,7 @@ export function direction(theta, phi) {
 }
 
 // A camera at `distance` from the point `center`, seen from theta and phi; up is the projection of the vertical. width: of
-// what is seen at the center. Column-major; {eye, matrix, near, far, widthAtOne}.
+// the point seen at the center. Column-major; {eye, matrix, near, far, widthAtOne}.
 export function cameraFrom({ theta, phi, distance, width, aspect = 1, center = [0, 0, 0], depth = 80 }) {
   const t = theta * Math.PI / 180, p = phi * Math.PI / 180, back = direction(theta, phi);
   const up = [-Math.cos(t) * Math.cos(p), -Math.cos(t) * Math.sin(p), Math.sin(t)], right = cross(up, back);

@@ -18,7 +18,7 @@ function node(name, attributes = {}, ...children) {
 
 const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
 
-// What a reader should know of the drawing: how it is moved, and how far it can be trusted.
+// Notes for the reader of the drawing: how it is moved, and how far it can be trusted.
 export function twinNote(works, { mean_rel_rms: rms, mean_rel_noise: noise }) {
   const own = Math.sqrt(Math.max(rms ** 2 - noise ** 2, 0));
   return !works ? "" : "Drag turns, shift and drag moves the lamp, the wheel zooms. " +

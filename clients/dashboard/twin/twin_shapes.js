@@ -1,5 +1,5 @@
 // The surfaces that the twin is laid on, in millimetres around the orbit center, z up: a flat piece, the upper side of a
-// cylinder, a piece that has fallen over a ball. They are those of the job's pictures (docs/bent-cloth.md).
+// cylinder, a piece that has fallen over a ball. They are the surfaces of the job's pictures (docs/bent-cloth.md).
 
 const CYLINDER_RADIUS = 15, SIZE = 40;
 

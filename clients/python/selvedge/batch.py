@@ -81,7 +81,7 @@ class BatchState:
 
 
 class Batch:
-    """One batch of a server. Methods ask the server every time; only the id is kept, and what the submission said."""
+    """One batch of a server. Methods ask the server every time; only the id and the answer to the submission are kept."""
 
     def __init__(self, client: Client, batch_id: str, submitted: Optional[Mapping[str, Any]] = None) -> None:
         self.client, self.id, self.submitted = client, batch_id, submitted
@@ -111,8 +111,8 @@ class Batch:
         self.client.request("DELETE", f"{self.path}?jobs={'delete' if jobs else 'keep'}", n_try=1).read()
 
     def plan(self, cores: Optional[int] = None) -> dict[str, Any]:
-        """Return what the samples will take together: processor time, time on so many cores (default: those of the service's
-        workers), memory and disk, and for those that ran since they were planned what they took. Samples that have not
+        """Return the resources that the samples will need together: processor time, time on so many cores (default: those of the service's
+        workers), memory and disk, and the used resources of samples that ran since they were planned. Samples that have not
         run are planned anew; `unplanned` has the reasons of those that cannot be, by sample."""
         path = f"{self.path}/plan" + ("" if cores is None else f"?cores={cores}")
         unplanned = {}
@@ -192,7 +192,7 @@ def resolve(template: Document, sample: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def send_files(job: Job, files: Mapping[str, str], known: Mapping[str, Mapping[str, Any]], sent: set[str]) -> None:
-    """Upload what a job does not have. A file that was sent to another job just now is declared again, and complete then."""
+    """Upload the files that a job does not have. A file that was sent to another job just now is declared again, and complete then."""
     for state in job.client.request("GET", job.path + "/files").json()["files"]:
         if state["state"] == "complete" or state["name"] not in files:
             continue

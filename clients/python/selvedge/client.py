@@ -1,4 +1,4 @@
-"""A server, and what can be asked of it without a job."""
+"""A server, and its requests that need no job."""
 from __future__ import annotations
 
 import os
@@ -16,7 +16,7 @@ PIECE = 16 << 20
 
 
 def read_token(path: Optional[str] = None) -> Optional[str]:
-    """The token in a file, by default that of SELVEDGE_TOKEN_FILE; else SELVEDGE_TOKEN. A file that others may read is refused."""
+    """The token in a file, by default SELVEDGE_TOKEN_FILE; else SELVEDGE_TOKEN. A file that others may read is refused."""
     path = path or os.environ.get("SELVEDGE_TOKEN_FILE")
     if not path:
         return os.environ.get("SELVEDGE_TOKEN")
@@ -91,7 +91,7 @@ class Client:
 
     def submit_batch(self, name: str, template: DocumentOrPath, samples: Samples, folder: Optional[str] = None, *, update: bool = False,
                      start: bool = True) -> Batch:
-        """Create a job of each sample, upload what the server does not have, and start them. template: a job document. samples: the
+        """Create a job of each sample, upload the files that the server does not have, and start them. template: a job document. samples: the
         path of a CSV file, or dicts of "sample", "replace" ({path: value}) and perhaps "folder". folder: where the files are, by
         default beside the table; a sample that has a folder of its own name in it has them there. update: a batch of this name becomes
         like this one, and only samples whose document or files differ run; otherwise that is Problem "exists". The same call may be

@@ -43,7 +43,7 @@ def read_document(document: DocumentOrPath) -> tuple[Document, str]:
 
 
 def declaration(path: str, role: str, name: Optional[str] = None, read: Callable[[int], None] = lambda n: None) -> dict[str, Any]:
-    """Return what declares a file to the server: its name, size and SHA-256. read(n) is called for each n bytes."""
+    """Return the declaration of a file for the server: its name, size and SHA-256. read(n) is called for each n bytes."""
     digest = hashlib.sha256()
     with open(path, "rb") as f:
         while chunk := f.read(1 << 20):

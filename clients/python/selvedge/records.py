@@ -1,5 +1,5 @@
-"""What the server says, as dataclasses. Each keeps the JSON object that it was made of in `raw`, which has every member of
-docs/api.md and docs/file-formats.md; the attributes are those that most programs need."""
+"""The server's answers, as dataclasses. Each keeps its JSON object in `raw`, which has every member of
+docs/api.md and docs/file-formats.md; the attributes are the members that most programs need."""
 from __future__ import annotations
 
 from dataclasses import dataclass, field

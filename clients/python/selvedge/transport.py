@@ -18,11 +18,11 @@ BROKEN = (OSError, http.client.HTTPException)
 
 
 class SelvedgeError(Exception):
-    """What all errors of this package are."""
+    """The base of all errors of this package."""
 
 
 class Problem(SelvedgeError):
-    """The server has refused a request (RFC 9457). `code` is stable; `field` names what is at fault, or is ""."""
+    """The server has refused a request (RFC 9457). `code` is stable; `field` names the member at fault, or is ""."""
 
     def __init__(self, status: int, body: Mapping[str, Any]) -> None:
         self.status, self.body = status, body
@@ -68,7 +68,7 @@ class Answer:
 
     def __exit__(self, kind: Optional[type[BaseException]], value: Optional[BaseException], trace: Optional[TracebackType]) -> None:
         if not self.response.isclosed():
-            self.drop()  # what is left of the body would be taken for the next answer
+            self.drop()  # the rest of the body would be taken for the next answer
 
     def read(self) -> bytes:
         return self.response.read()
@@ -151,7 +151,7 @@ class Transport:
                 pause_s = min(60.0, float(wait)) if wait.isdigit() else 0.0
                 answer.read()
             if i + 1 < n_try:
-                time.sleep(max(pause_s, 0.05 * 3 ** i))  # the first failure may be that of a connection that was idle for too long
+                time.sleep(max(pause_s, 0.05 * 3 ** i))  # the first failure may come from a connection that was idle for too long
         raise Unreachable(f"the server at {self.url} cannot be reached: {why}")
 
     def _checked(self, answer: Answer) -> Answer:
