@@ -1,8 +1,7 @@
 #include "server/batches/batch_plan.h"
 #include "base/files/disk_use.h"
 #include "server/batches/batch_service.h"
-#include "server/reports/plan_file.h"
-#include "server/reports/status_file.h"
+#include "server/reports/worker_files.h"
 #include "server/settings/job_paths.h"
 #include "server/workers/input_judge.h"
 
@@ -48,7 +47,7 @@ static bool taken(struct job_service *v, const struct job_row *row, const json_t
     char folder[PATH_BYTES];
     if (row->state != JOB_SUCCEEDED || row->attempt != json_integer_value(json_object_get(plan, "attempt")) + 1)
         return false;
-    json_t *said = status_file_read(v->settings->data, row->id);
+    json_t *said = worker_status_read(v->settings->data, row->id);
     const double cpu_s = number_of(said, "cpu_s");
     json_decref(said);
     if (!(cpu_s > 0.0)) return false;
@@ -150,7 +149,7 @@ static json_t *need_json(const struct need *n, bool expected)
 
 static void add_job(struct job_service *v, const struct job_row *row, struct sums *s)
 {
-    json_t *plan = plan_file_read(v->settings->data, row->id), *expected = json_null(), *took_json = json_null();
+    json_t *plan = worker_plan_read(v->settings->data, row->id), *expected = json_null(), *took_json = json_null();
     struct need took;
     if (plan != NULL) {
         const struct need n = planned(plan);

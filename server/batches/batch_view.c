@@ -2,7 +2,7 @@
 #include "base/clock.h"
 #include "server/batches/batch_service.h"
 #include "server/jobs/queue_forecast.h"
-#include "server/reports/status_file.h"
+#include "server/reports/worker_files.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -42,7 +42,7 @@ struct progress {
 
 static void add_running(struct job_service *v, const struct job_row *row, struct progress *p)
 {
-    json_t *st = status_file_read(v->settings->data, row->id);
+    json_t *st = worker_status_read(v->settings->data, row->id);
     const json_t *eta = json_object_get(st, "eta_s"), *fraction = json_object_get(st, "fraction");
     bool present = json_integer_value(json_object_get(st, "attempt")) == row->attempt;
     if (present && json_is_number(fraction)) p->n_done += fmin(fmax(json_number_value(fraction), 0), 1);

@@ -1,7 +1,7 @@
 #include "server/jobs/queue_forecast.h"
 #include "base/clock.h"
 #include "server/jobs/queue_turn.h"
-#include "server/reports/status_file.h"
+#include "server/reports/worker_files.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -75,7 +75,7 @@ static double typical_s(struct job_service *v)
 /* The time at which a running job will end. */
 static double end_of(struct job_service *v, const struct job_row *row, double typical, double now)
 {
-    json_t *st = status_file_read(v->settings->data, row->id);
+    json_t *st = worker_status_read(v->settings->data, row->id);
     const json_t *eta = json_object_get(st, "eta_s");
     double left_s = json_is_number(eta) ? json_number_value(eta) : typical - (now - row->started_unix_s);
     json_decref(st);

@@ -6,7 +6,7 @@
 #include "server/batches/batch_places.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_change.h"
-#include "server/reports/status_file.h"
+#include "server/reports/worker_files.h"
 #include "server/settings/job_paths.h"
 #include "server/workers/backends/job_backend.h"
 
@@ -172,7 +172,7 @@ static status restore_folders(struct job_service *v, struct error *err)
 static void read_verdict(void *context, const char *job_id, char code[40])
 {
     const struct job_service *v = context;
-    json_t *st = status_file_read(v->settings->data, job_id);
+    json_t *st = worker_status_read(v->settings->data, job_id);
     const char *text = json_string_value(json_object_get(json_object_get(st, "verdict"), "code"));
     snprintf(code, 40, "%s", text == NULL ? "" : text);
     json_decref(st);

@@ -2,7 +2,7 @@
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_tags.h"
 #include "server/jobs/queue_forecast.h"
-#include "server/reports/status_file.h"
+#include "server/reports/worker_files.h"
 #include "server/settings/job_paths.h"
 
 #include <math.h>
@@ -77,7 +77,7 @@ static void put_queue(struct job_service *v, json_t *out, const struct job_row *
 static json_t *describe(struct job_service *v, const struct job_row *row)
 {
     bool has_run = row->attempt > 0 && row->state != JOB_DRAFT && !row->dirty;
-    json_t *st = has_run ? status_file_read(v->settings->data, row->id) : NULL;
+    json_t *st = has_run ? worker_status_read(v->settings->data, row->id) : NULL;
     json_t *out = json_pack("{s:s,s:s,s:s,s:I}", "id", row->id, "sample", row->sample, "state",
                             job_state_name(row->state), "created_unix_s", (json_int_t)row->created_unix_s);
     put_time(out, "started_unix_s", row->started_unix_s);

@@ -6,7 +6,7 @@
 #include "server/jobs/job_tags.h"
 #include "server/jobs/queue_forecast.h"
 #include "server/reports/backend_note.h"
-#include "server/reports/status_file.h"
+#include "server/reports/worker_files.h"
 #include "server/retention/job_keep.h"
 #include "server/settings/job_paths.h"
 
@@ -89,7 +89,7 @@ static void put_place(struct job_service *v, json_t *out, const struct job_row *
 json_t *job_view_heartbeat_age(struct job_service *v, const struct job_row *row)
 {
     if (row->state != JOB_RUNNING) return json_null();
-    json_t *st = status_file_read(v->settings->data, row->id), *age = json_null();
+    json_t *st = worker_status_read(v->settings->data, row->id), *age = json_null();
     json_t *at = json_object_get(st, "heartbeat_unix_s");
     if (json_is_number(at) && json_integer_value(json_object_get(st, "attempt")) == row->attempt) {
         double s = clock_wall_s() - json_number_value(at);
@@ -167,7 +167,7 @@ static status put_details(struct job_service *v, const struct job_row *row, json
 
 status job_view(struct job_service *v, const struct job_row *row, bool full, json_t **view, struct error *err)
 {
-    json_t *st = has_run(row) ? status_file_read(v->settings->data, row->id) : NULL;
+    json_t *st = has_run(row) ? worker_status_read(v->settings->data, row->id) : NULL;
     json_t *out = json_pack("{s:s,s:s,s:s,s:b,s:f,s:f,s:o,s:o,s:I,s:I,s:I}", "id", row->id, "sample", row->sample,
                             "state", job_state_name(row->state), "cancel_requested", row->cancel_requested,
                             "created_unix_s", row->created_unix_s, "updated_unix_s", row->updated_unix_s,

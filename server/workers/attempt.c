@@ -6,7 +6,7 @@
 #include "optimizer/job/job_folder.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_change.h"
-#include "server/reports/status_file.h"
+#include "server/reports/worker_files.h"
 #include "server/settings/job_paths.h"
 #include "server/store/store_cluster.h"
 #include "server/views/result_version.h"
@@ -102,7 +102,7 @@ bool attempt_read_request(struct job_service *v, const char *job_id, bool comput
     if (store_job_look(v->store, job_id, &row, NULL) != STATUS_OK) return false;
     request->cancel = row.cancel_requested;
     request->deleted = row.deleted;
-    json_t *j = computes ? status_file_read(v->settings->data, job_id) : NULL;
+    json_t *j = computes ? worker_status_read(v->settings->data, job_id) : NULL;
     if (j != NULL && json_integer_value(json_object_get(j, "attempt")) == row.attempt)
         request->heartbeat_unix_s = json_number_value(json_object_get(j, "heartbeat_unix_s"));
     json_decref(j);
@@ -127,7 +127,7 @@ static void last_words(struct job_service *v, const char *job_id, char *out, siz
 
 static void succeeded(struct job_service *v, struct job_row *row)
 {
-    json_t *j = status_file_read(v->settings->data, row->id);
+    json_t *j = worker_status_read(v->settings->data, row->id);
     const char *code = json_string_value(json_object_get(json_object_get(j, "verdict"), "code"));
     row->state = JOB_SUCCEEDED;
     snprintf(row->verdict, sizeof row->verdict, "%s", code == NULL ? "" : code);
@@ -136,7 +136,7 @@ static void succeeded(struct job_service *v, struct job_row *row)
 
 static void failed(struct job_service *v, struct job_row *row)
 {
-    json_t *j = status_file_read(v->settings->data, row->id);
+    json_t *j = worker_status_read(v->settings->data, row->id);
     json_t *e = json_object_get(j, "error");
     const char *code = json_string_value(json_object_get(e, "code")),
                *field = json_string_value(json_object_get(e, "field"));

@@ -1,6 +1,11 @@
 #include "server/workers/worker_limits.h"
 #include "server/settings/job_paths.h"
-#include "server/workers/folder_depth.h"
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 enum attempt_stop worker_limit_exceeded(const struct job_service *v, const struct job_backend *backend,
                                         const struct backend_run *run, const char *job_id)
@@ -17,6 +22,36 @@ enum attempt_stop worker_limit_exceeded(const struct job_service *v, const struc
     log_warning(v->log, "job %s: the worker has %lld threads, more than %lld, and is killed", job_id,
                 (long long)n_thread, (long long)most_threads);
     return STOP_THREADS;
+}
+
+static bool is_folder(int folder_fd, const struct dirent *e)
+{
+    struct stat st;
+    if (strcmp(e->d_name, ".") == 0 || strcmp(e->d_name, "..") == 0) return false;
+    if (e->d_type != DT_UNKNOWN) return e->d_type == DT_DIR;
+    return fstatat(folder_fd, e->d_name, &st, AT_SYMLINK_NOFOLLOW) == 0 && S_ISDIR(st.st_mode);
+}
+
+/* Takes ownership of folder_fd. Calls itself `left` times at the most. */
+static bool is_deeper(int folder_fd, int64_t left)
+{
+    bool deeper = false;
+    DIR *d = folder_fd < 0 ? NULL : fdopendir(folder_fd);
+    if (d == NULL && folder_fd >= 0) close(folder_fd);
+    if (d == NULL) return false; /* it was removed meanwhile */
+    for (struct dirent *e; !deeper && (e = readdir(d)) != NULL;) {
+        if (!is_folder(dirfd(d), e)) continue;
+        deeper = left == 0 ||
+                 is_deeper(openat(dirfd(d), e->d_name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC), left - 1);
+    }
+    closedir(d);
+    return deeper;
+}
+
+/* Returns whether a folder is more than `most` levels below `path`. Links are not followed. */
+static bool folder_is_deeper(const char *path, int64_t most)
+{
+    return is_deeper(open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC), most);
 }
 
 enum attempt_stop worker_depth_exceeded(const struct job_service *v, const char *job_id)

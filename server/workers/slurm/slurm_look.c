@@ -2,7 +2,7 @@
 #include "base/clock.h"
 #include "optimizer/job/job_folder.h"
 #include "server/events/change_feed.h"
-#include "server/reports/status_file.h"
+#include "server/reports/worker_files.h"
 #include "server/workers/slurm/slurm_service.h"
 
 #include <dirent.h>
@@ -22,7 +22,7 @@ static int final_code(struct slurm_service *d, const struct backend_run *run, in
         const char *state;
         int code;
     } final[] = {{"succeeded", WORKER_SUCCEEDED}, {"failed", WORKER_FAILED}, {"cancelled", WORKER_CANCELLED}};
-    json_t *j = status_file_read(d->v->settings->data, run->job_id);
+    json_t *j = worker_status_read(d->v->settings->data, run->job_id);
     const char *state = json_string_value(json_object_get(j, "state"));
     int code = -1;
     bool own = json_integer_value(json_object_get(j, "attempt")) == run->attempt;

@@ -1,7 +1,7 @@
 /* Submits and cancels jobs. */
 #include "base/clock.h"
 #include "base/files/foreign_file.h"
-#include "server/reports/plan_file.h"
+#include "server/reports/worker_files.h"
 #include "server/workers/slurm/slurm_request.h"
 #include "server/workers/slurm/slurm_service.h"
 
@@ -60,7 +60,7 @@ static status renew_console(const char *data, const char *job_id, struct error *
 /* Memory that the job's plan says; 0 without a plan. */
 static int64_t planned_bytes(const struct slurm_service *d, const char *job_id)
 {
-    json_t *plan = plan_file_read(d->v->settings->data, job_id);
+    json_t *plan = worker_plan_read(d->v->settings->data, job_id);
     const double bytes = json_number_value(json_object_get(plan, "memory_bytes"));
     json_decref(plan);
     return bytes > 0 && bytes < 1e15 ? (int64_t)bytes : 0;

@@ -1,12 +1,24 @@
-#include "server/reports/plan_file.h"
+#include "server/reports/worker_files.h"
 #include "base/json/foreign_json.h"
 #include "optimizer/job/job_folder.h"
 #include "server/reports/worker_words.h"
 #include "server/settings/job_paths.h"
 
+/* The largest part is the list of at most 50 warnings of 512 bytes each. */
+static const struct foreign_bounds status_bounds = {.file_bytes = 256 << 10, .held_bytes = 1 << 20, .depth = 16};
+
+json_t *worker_status_read(const char *data, const char *job_id)
+{
+    char folder[PATH_BYTES];
+    json_t *j = NULL;
+    path_join(folder, data, "jobs", job_id, NULL);
+    if (foreign_json_read(folder, JOB_FILE_STATUS, &status_bounds, &j, NULL) == STATUS_OK) worker_words_of_status(j);
+    return j;
+}
+
 static const struct foreign_bounds plan_bounds = {.file_bytes = 1 << 20, .held_bytes = 4 << 20, .depth = 16};
 
-json_t *plan_file_read(const char *data, const char *job_id)
+json_t *worker_plan_read(const char *data, const char *job_id)
 {
     char folder[PATH_BYTES];
     json_t *plan = NULL;
