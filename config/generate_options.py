@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""Writes the schema JobDocument of config/openapi.json and the page docs/options.md from the table of job options.
+"""Writes the schema JobDocument of config/openapi.json, the page docs/options.md and the picture options of `selvedge render` from the
+table of job options.
 
     config/generate_options.py [--check] PRINT-OPTIONS
 
@@ -10,10 +11,19 @@ import os
 import re
 import subprocess
 import sys
+import textwrap
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 OPENAPI = os.path.join(ROOT, "config", "openapi.json")
 PAGE = os.path.join(ROOT, "docs", "options.md")
+RENDER = os.path.join(ROOT, "clients", "cli", "arguments", "picture_options.def")
+# keys of a picture that `selvedge render` sets by --on, --lamp and --camera, or not at all
+RENDER_OTHERS = {"on", "mesh_file", "light_theta_deg", "light_phi_deg", "camera_theta_deg", "camera_phi_deg", "cloth_rotation_deg"}
+RENDER_HEAD = """/* The options of `selvedge render` that are options of a picture in a job document. Written by `make generate`; do not
+ * edit.
+ *
+ * PICTURE_OPTION(key, name, value, kind, help): key of the picture; kind is number, whole, text, yes or flag. */
+"""
 HEAD = """# Options of a job document
 
 This page lists every key of a job document with its unit, default and range. `make generate` writes it from the table of options
@@ -174,6 +184,44 @@ def page(_, options):
     return text
 
 
+# ---- the options of `selvedge render` ----
+
+def render_kind(row):
+    """Kind of the option of `selvedge render` (cli_render.c), and the name of its value in the help."""
+    if row["kind"] == "boolean":
+        return ("flag", None) if row.get("default") is False else ("yes", "yes|no")
+    if row["kind"] == "choice":
+        return "text", "HOW"
+    return ("whole" if row["kind"] == "integer" else "number"), {"mm": "MM", "degrees": "ANGLE"}.get(row.get("unit"), "N")
+
+
+def render_help(row):
+    """The choices with their condition, or the first sentence of the meaning; and the default."""
+    if row["kind"] == "choice":
+        condition = re.match(r"Of (.*?): ", row["meaning"])
+        text = (f"of {condition[1]}: " if condition else "") + ", ".join(row["choices"][:-1]) + " or " + row["choices"][-1]
+    else:
+        text = re.split(r"\. |\.$" if row["meaning"].startswith("Of ") else r"\. |\.$|: ", row["meaning"])[0]
+        text = re.sub(r"^Whether ", "", text)
+        text = text[0].lower() + text[1:]
+    default = row.get("left_out") or (row.get("default") if row.get("default") is not False else None)
+    text += f" (default: {plain(default) if isinstance(default, (int, float)) else default})" if default is not None else ""
+    return textwrap.wrap(text.replace("`", "").replace('"', ""), 92, break_on_hyphens=False)
+
+
+def render_options(_, options):
+    text = RENDER_HEAD
+    for row in options:
+        key = row["path"][len("pictures[]."):]
+        if not row["path"].startswith("pictures[].") or key in RENDER_OTHERS:
+            continue
+        kind, value = render_kind(row)
+        value = f'"{value}"' if value else "NULL"
+        lines = [f'"{line}"' for line in render_help(row)]
+        text += f'PICTURE_OPTION({key}, "{key.replace("_", "-")}", {value}, {kind},\n               ' + ' CLI_NEXT_LINE\n               '.join(lines) + ")\n"
+    return text
+
+
 def main():
     check = "--check" in sys.argv[1:]
     program = [a for a in sys.argv[1:] if a != "--check"]
@@ -181,7 +229,7 @@ def main():
         sys.exit(__doc__)
     options = json.loads(subprocess.run(program, check=True, capture_output=True, text=True).stdout)["options"]
     stale = []
-    for path, renew in ((OPENAPI, with_schema), (PAGE, page)):
+    for path, renew in ((OPENAPI, with_schema), (PAGE, page), (RENDER, render_options)):
         old = ""
         if os.path.exists(path):
             with open(path, encoding="utf-8") as file:

@@ -8,6 +8,10 @@
 
 #define CLI_DEFAULT_SERVER "http://127.0.0.1:7878"
 
+/* Types of the options of a picture. */
+typedef const char *CLI_PICTURE_number, *CLI_PICTURE_whole, *CLI_PICTURE_text, *CLI_PICTURE_yes;
+typedef bool CLI_PICTURE_flag;
+
 /* All that the command line says. The strings point into argv or the environment; NULL if not given. */
 struct cli_args {
     enum cli_command_id command;
@@ -21,31 +25,28 @@ struct cli_args {
     const char *files, *name; /* of a batch */
     const char *cores;        /* --cores: of a plan */
     bool update, keep_jobs, delete_jobs;
-    const char *input_dir;               /* --input-dir: the folder of the files that the document names */
-    const char *out_dir;                 /* --out */
-    const char *resume_id;               /* --resume */
-    const char *id_file;                 /* --id-file */
-    const char *voxel_um;                /* --voxel-um */
-    const char *axes;                    /* --axes */
-    const char *hollow, *diameter_voxel; /* --hollow, --diameter-voxel: of a scan */
-    const char *template;                /* --template */
-    const char *marker;                  /* --marker */
-    const char *quiet_s;                 /* --quiet */
-    /* of a picture; on: --on, and so forth */
-    const char *on, *lamp, *camera, *px, *samples, *width_mm, *size_mm, *radius_mm, *mesh_unit_mm, *wrap_deg, *method,
-        *deep_light, *deep_light_paths, *visibility, *black_sheet, *twin;
+    const char *input_dir;                 /* --input-dir: the folder of the files that the document names */
+    const char *out_dir;                   /* --out */
+    const char *resume_id;                 /* --resume */
+    const char *id_file;                   /* --id-file */
+    const char *voxel_um;                  /* --voxel-um */
+    const char *axes;                      /* --axes */
+    const char *hollow, *diameter_voxel;   /* --hollow, --diameter-voxel: of a scan */
+    const char *template;                  /* --template */
+    const char *marker;                    /* --marker */
+    const char *quiet_s;                   /* --quiet */
+    const char *on, *lamp, *camera, *twin; /* of a picture; on: --on, and so forth */
+    struct {
+#define PICTURE_OPTION(key, name, value, kind, help) CLI_PICTURE_##kind key;
+#include "clients/cli/arguments/picture_options.def"
+#undef PICTURE_OPTION
+    } picture;                                           /* members of the picture in the job document */
     const char *scope, *owner, *requests, *bytes, *jobs; /* of a token to be made */
     const char *max_age, *max_bytes;                     /* of retention */
     const char *state, *verdict, *tag, *sample, *days;   /* of list */
     bool watch, json, follow, draft, align, once, yes;
-    bool trial;     /* --trial: of a scan */
-    bool reference; /* --reference: of a picture */
-    bool filter;    /* --filter: of a picture */
-    bool speckle;   /* --speckle: likewise */
-    bool field_by_pixel;
-    const char *ground_gap_mm;
-    const char *lamp_sharpness;
-    bool help; /* --help was given: for one command if has_command is set */
+    bool trial; /* --trial: of a scan */
+    bool help;  /* --help was given: for one command if has_command is set */
     bool version;
     bool has_command;
 };

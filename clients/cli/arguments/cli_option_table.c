@@ -2,13 +2,16 @@
 
 #include <string.h>
 
+/* begins another line of a help text */
+#define CLI_NEXT_LINE "\n                      "
+
 const struct cli_option cli_option_table[CLI_N_OPTION] = {
     {NULL, 0, "input-dir", "DIR", "folder of the input files (default: the document's folder)",
      offsetof(struct cli_args, input_dir)},
     {NULL, 'w', "watch", NULL, "follow the job until it ends", offsetof(struct cli_args, watch)},
     {NULL, 0, "resume", "ID",
-     "continue an interrupted submit of job ID (JOB.json is then not needed\n"
-     "                      if the files are in the current folder or --input-dir)",
+     "continue an interrupted submit of job ID (JOB.json is then not needed" CLI_NEXT_LINE
+     "if the files are in the current folder or --input-dir)",
      offsetof(struct cli_args, resume_id)},
     {NULL, 0, "draft", NULL, "upload everything but do not start the job", offsetof(struct cli_args, draft)},
     {NULL, 0, "id-file", "FILE", "write the job's id to FILE as soon as there is one (for scripts)",
@@ -30,39 +33,12 @@ const struct cli_option cli_option_table[CLI_N_OPTION] = {
      offsetof(struct cli_args, on)},
     {"picture", 0, "lamp", "THETA,PHI", "angles of the lamp in degrees (default: 45,0; docs/options.md)",
      offsetof(struct cli_args, lamp)},
-    {"picture", 0, "lamp-sharpness", "N", "a Gaussian lamp: 10 is soft, 1000 sharp (default: the lamp of the job)",
-     offsetof(struct cli_args, lamp_sharpness)},
     {"picture", 0, "camera", "THETA,PHI", "angles of the camera (default: 30,180)", offsetof(struct cli_args, camera)},
-    {"picture", 0, "px", "N", "width and height of the picture (default: 512)", offsetof(struct cli_args, px)},
-    {"picture", 0, "samples", "N", "paths of a pixel (default: 16)", offsetof(struct cli_args, samples)},
-    {"picture", 0, "method", "HOW", "path, fast, corrected, dual or diffusion (default: path)",
-     offsetof(struct cli_args, method)},
-    {"picture", 0, "deep-light", "HOW", "of --method fast: directions or cells (default: directions)",
-     offsetof(struct cli_args, deep_light)},
-    {"picture", 0, "deep-light-paths", "N", "paths of the table of --method fast (default: 8000000, some minutes)",
-     offsetof(struct cli_args, deep_light_paths)},
-    {"picture", 0, "visibility", "HOW", "of --method fast: traced or tables (default: traced)",
-     offsetof(struct cli_args, visibility)},
-    {"picture", 0, "reference", NULL, "compare it with path tracing (default: --method fast)",
-     offsetof(struct cli_args, reference)},
-    {"picture", 0, "filter", NULL, "also make a filtered view with less noise, for the eye",
-     offsetof(struct cli_args, filter)},
-    {"picture", 0, "speckle", NULL, "the speckle of single fibers, of models of waves",
-     offsetof(struct cli_args, speckle)},
-    {"picture", 0, "field-by-pixel", NULL, "near fields of fibers become far fields in wide pixels: less noise",
-     offsetof(struct cli_args, field_by_pixel)},
-    {"picture", 0, "ground-gap-mm", "MM", "a plane with the shadow, so far under the cloth (default: none)",
-     offsetof(struct cli_args, ground_gap_mm)},
-    {"picture", 0, "width-mm", "MM", "width of what it shows (default: 40)", offsetof(struct cli_args, width_mm)},
-    {"picture", 0, "size-mm", "MM", "edge of the flat or draped piece, length of the cylinder (default: 40)",
-     offsetof(struct cli_args, size_mm)},
-    {"picture", 0, "radius-mm", "MM", "of the cylinder or ball (default: 15)", offsetof(struct cli_args, radius_mm)},
-    {"picture", 0, "wrap-deg", "ANGLE", "how far around the cylinder (default: 180)",
-     offsetof(struct cli_args, wrap_deg)},
-    {"picture", 0, "black-sheet", "yes|no", "a black sheet under the cloth (default: as in the job)",
-     offsetof(struct cli_args, black_sheet)},
     {"picture", 0, "twin", "yes|no", "the cloth under the mouse, too (default: no)", offsetof(struct cli_args, twin)},
-    {"picture", 0, "mesh-unit-mm", "MM", "unit of the mesh (default: 1)", offsetof(struct cli_args, mesh_unit_mm)},
+#define PICTURE_OPTION(key, name, value, kind, help)                                                                   \
+    {"picture", 0, name, value, help, offsetof(struct cli_args, picture.key)},
+#include "clients/cli/arguments/picture_options.def"
+#undef PICTURE_OPTION
     {NULL, 0, "template", "JOB.json",
      "job document of samples that have no job.json; '*' in names of files is filled in",
      offsetof(struct cli_args, template)},

@@ -17,7 +17,14 @@ struct cli_option {
     const char *help;
     size_t at; /* the member of struct cli_args that it sets: a text if it has a value, else a bool */
 };
-enum { CLI_N_OPTION = 63 };
+enum {
+    CLI_N_PICTURE_OPTION = 0
+#define PICTURE_OPTION(...) +1
+#include "clients/cli/arguments/picture_options.def"
+#undef PICTURE_OPTION
+    ,
+    CLI_N_OPTION = 45 + CLI_N_PICTURE_OPTION
+};
 extern const struct cli_option cli_option_table[CLI_N_OPTION];
 
 /* Whether the command takes the option. */

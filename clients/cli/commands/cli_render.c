@@ -35,8 +35,8 @@ static status read_angles(const char *option, const char *text, double fallback_
     return STATUS_OK;
 }
 
-static status read_number(const char *option, const char *text, const char *key, bool whole, json_t *picture,
-                          struct error *err)
+static status read_value(const char *option, const char *text, bool whole, json_t *picture, const char *key,
+                         struct error *err)
 {
     char *end;
     if (text == NULL) return STATUS_OK;
@@ -45,6 +45,39 @@ static status read_number(const char *option, const char *text, const char *key,
         return error_set(err, STATUS_INVALID, "option '--%s' takes a %snumber: '%s'", option, whole ? "whole " : "",
                          text);
     json_object_set_new(picture, key, whole ? json_integer((json_int_t)value) : json_real(value));
+    return STATUS_OK;
+}
+
+/* The kinds of picture_options.def: each sets the key of the picture if the option is given. */
+static status set_number(const char *option, const char *text, json_t *picture, const char *key, struct error *err)
+{
+    return read_value(option, text, false, picture, key, err);
+}
+
+static status set_whole(const char *option, const char *text, json_t *picture, const char *key, struct error *err)
+{
+    return read_value(option, text, true, picture, key, err);
+}
+
+static status set_text(const char *option, const char *text, json_t *picture, const char *key, struct error *err)
+{
+    (void)option, (void)err;
+    if (text != NULL) json_object_set_new(picture, key, json_string(text));
+    return STATUS_OK;
+}
+
+static status set_yes(const char *option, const char *text, json_t *picture, const char *key, struct error *err)
+{
+    bool yes;
+    status s = read_yes(option, text, &yes, err);
+    if (s == STATUS_OK && text != NULL) json_object_set_new(picture, key, json_boolean(yes));
+    return s;
+}
+
+static status set_flag(const char *option, bool given, json_t *picture, const char *key, struct error *err)
+{
+    (void)option, (void)err;
+    if (given) json_object_set_new(picture, key, json_true());
     return STATUS_OK;
 }
 
@@ -59,29 +92,12 @@ static status read_picture(const struct cli_args *a, json_t *picture, const char
         return error_set(err, STATUS_INVALID, "option '--on' takes flat, cylinder, drape or a mesh NAME.obj: '%s'", on);
     json_object_set_new(picture, "on", json_string(shape ? on : "mesh"));
     status s = read_angles("lamp", a->lamp, 45.0, 0.0, picture, "light", err);
-    if (s == STATUS_OK) s = read_number("lamp-sharpness", a->lamp_sharpness, "lamp_sharpness", false, picture, err);
     if (s == STATUS_OK) s = read_angles("camera", a->camera, 30.0, 180.0, picture, "camera", err);
-    if (s == STATUS_OK) s = read_number("px", a->px, "px", true, picture, err);
-    if (s == STATUS_OK) s = read_number("samples", a->samples, "samples", true, picture, err);
-    if (s == STATUS_OK) s = read_number("width-mm", a->width_mm, "width_mm", false, picture, err);
-    if (s == STATUS_OK) s = read_number("size-mm", a->size_mm, "size_mm", false, picture, err);
-    if (s == STATUS_OK) s = read_number("radius-mm", a->radius_mm, "radius_mm", false, picture, err);
-    if (s == STATUS_OK) s = read_number("wrap-deg", a->wrap_deg, "wrap_deg", false, picture, err);
-    if (s == STATUS_OK) s = read_number("mesh-unit-mm", a->mesh_unit_mm, "mesh_unit_mm", false, picture, err);
-    if (s == STATUS_OK) s = read_number("ground-gap-mm", a->ground_gap_mm, "ground_gap_mm", false, picture, err);
-    const char *method = a->method == NULL && a->reference ? "fast" : a->method;
-    if (method != NULL) json_object_set_new(picture, "method", json_string(method));
-    if (a->deep_light != NULL) json_object_set_new(picture, "deep_light", json_string(a->deep_light));
-    if (s == STATUS_OK)
-        s = read_number("deep-light-paths", a->deep_light_paths, "deep_light_paths", true, picture, err);
-    if (a->visibility != NULL) json_object_set_new(picture, "visibility", json_string(a->visibility));
-    if (a->reference) json_object_set_new(picture, "reference", json_true());
-    if (a->speckle) json_object_set_new(picture, "speckle", json_true());
-    if (a->field_by_pixel) json_object_set_new(picture, "field_by_pixel", json_true());
-    if (a->filter) json_object_set_new(picture, "filter", json_true());
-    bool yes;
-    if (s == STATUS_OK) s = read_yes("black-sheet", a->black_sheet, &yes, err);
-    if (s == STATUS_OK && a->black_sheet != NULL) json_object_set_new(picture, "black_sheet", json_boolean(yes));
+#define PICTURE_OPTION(key, name, value, kind, help)                                                                   \
+    if (s == STATUS_OK) s = set_##kind(name, a->picture.key, picture, #key, err);
+#include "clients/cli/arguments/picture_options.def"
+#undef PICTURE_OPTION
+    if (a->picture.reference && a->picture.method == NULL) json_object_set_new(picture, "method", json_string("fast"));
     return s;
 }
 
@@ -215,7 +231,7 @@ static status describe(struct cli *cli, const char *id, struct error *err)
         fprintf(cli->out, "pictures/on-1.png: mean radiance %.4g %.4g %.4g, noise of a pixel %.0f %% of their mean\n",
                 number_at(mean, 0), number_at(mean, 1), number_at(mean, 2),
                 100.0 * (json_is_number(noise) ? json_number_value(noise) : NAN));
-        if (cli->args->reference) print_comparison(cli->out, picture);
+        if (cli->args->picture.reference) print_comparison(cli->out, picture);
     }
     json_decref(job);
     return s;
