@@ -87,9 +87,9 @@ FIELD = re.compile(r"error_set(?:_errno)?(?:_field|_at)\(\s*err,\s*(?:STATUS_\w+
 
 
 def test_computing_parts_name_options_by_ids():
-    """Fields of geometry, fit and worker are ids or variables. (The renderer knows no options: its fields name arguments.)"""
+    """Fields of geometry and of optimizer but its job are ids or variables. (The renderer knows no options: its fields name arguments.)"""
     seen = 0
-    for path, text in c_files("geometry", "optimizer/fit", "optimizer/worker"):
+    for path, text in c_files("geometry", "optimizer/photographs", "optimizer/fit", "optimizer/stages", "optimizer/report", "optimizer/worker"):
         if path.startswith("geometry/phantom/"):
             continue  # options of selvedge-phantom
         fields = FIELD.findall(text) + re.findall(r"snprintf\(err->field, sizeof err->field, (\"[^\"]*\"|\w+)", text)
