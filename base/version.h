@@ -3,6 +3,6 @@
 #ifndef SELVEDGE_BASE_VERSION_H
 #define SELVEDGE_BASE_VERSION_H
 
-#define SELVEDGE_VERSION "0.1.0"
+#define SELVEDGE_VERSION "0.2.0"
 
 #endif

@@ -1,2 +1,2 @@
 """The version of the client, that of base/version.h."""
-__version__ = "0.1.0"
+__version__ = "0.2.0"
