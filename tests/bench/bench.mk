@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-pictures bench-pile bench-weave bench-weave-rendered
+.PHONY: bench docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-pictures bench-pile bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -11,6 +11,9 @@ $(BUILD)/tests/unit/renderer/test_field_comparison: $(BUILD)/obj/tests/bench/pic
 bench: | deps-test ## every figure, one JSON object a line (a night on 2 quiet cores)
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(BENCH_BINS) >&2
 	@/usr/bin/python3 tests/bench/run_bench.py --build $(BUILD)
+
+docs-benchmarks:   ## write docs/benchmarks.md from tests/bench/figures.jsonl and readings.txt (a second)
+	@/usr/bin/python3 tests/bench/write_page.py
 
 bench-transport: | deps-test ## the renderer's figures (paths a second, time to a given standard error, memory)
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %transport,$(BENCH_BINS)) >&2
