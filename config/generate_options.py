@@ -31,7 +31,8 @@ This page lists every key of a job document with its unit, default and range. `m
 [sample-preparation.md](sample-preparation.md), words of the field are in the [glossary](glossary.md).
 
 Keys stand below their section: `raw.type` in the section `volume` is `{"volume": {"raw": {"type": ...}}}`, and `[]` stands for each entry
-of a list. Unknown keys are errors. "or an object" means that a number may be searched: `{value, lower, upper, prior: [mean, sd], fit}`.
+of a list. Unknown keys are errors. A range with a star takes an object, too, for a number that is searched: `{value, lower, upper,
+prior: [mean, sd], fit}`.
 """
 FILE_NAME = "^[A-Za-z0-9_-][A-Za-z0-9._-]{0,126}$"
 WIDTH = 160
@@ -130,7 +131,7 @@ def allowed_text(row):
     if row["kind"] == "choice":
         return ", ".join(f"`{word}`" for word in row["choices"])
     if row["kind"] == "boolean":
-        return "`true`, `false`"
+        return "boolean"
     if "max_items" in row:
         return f"1..{row['max_items']}" + (" names" if row["kind"] == "file_names" else "")
     if "upper" not in row:
@@ -142,7 +143,8 @@ def allowed_text(row):
 def cells_of(row):
     """Unit, default, allowed values and meaning of an option, as the page prints them."""
     default = f"`{json.dumps(row['default'])}`" if "default" in row else "required" if row["required"] else row.get("left_out", "")
-    return tuple(cell.replace("|", "\\|") for cell in (row.get("unit", ""), default, allowed_text(row), row["meaning"]))
+    allowed = re.sub(r", or an object$", " \\*", allowed_text(row))
+    return tuple(cell.replace("|", "\\|") for cell in (row.get("unit", ""), default, allowed, row["meaning"]))
 
 
 def option_table(options, top, first):

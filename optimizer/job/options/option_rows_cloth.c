@@ -140,10 +140,8 @@ const struct job_option option_rows_cloth[] = {
      .id = OPTION_ALIGN,
      INTO(scan.align),
      .choice = none_auto,
-     .meaning =
-         "`auto` turns weft to x, warp to y and their normal to z, after `axes`. A tilt out of the plane is seen "
-         "only where the scan holds a repeat. Without effect where `matrix` is given. The result has the "
-         "matrix, the angles and their standard errors."},
+     .meaning = "`auto` turns weft to x, warp to y and their normal to z, after `axes`; a tilt is seen only where the "
+                "scan holds a repeat. Without effect with `matrix`. The result has matrix, angles and errors."},
     {.path = "volume.crop",
      .kind = OPTION_SWITCH,
      .id = OPTION_CROP,
@@ -175,21 +173,16 @@ const struct job_option option_rows_cloth[] = {
      .kind = OPTION_BOOL_OR_LEFT_OUT,
      INTO(scan.hollow_fibers),
      .left_out = "decided from the scan",
-     .meaning =
-         "`true` for hollow fibers, as of cotton: void that is enclosed in fibers is filled before tracing, and "
-         "radii are those of the fibers' outlines. `false` for solid fibers, some of whose enclosed gaps would "
-         "be filled. Left "
-         "out: `true` where the scan shows lumens clearly, which a warning states; where it shows them faintly, a "
-         "warning asks for the answer."},
+     .meaning = "`true`: lumens are filled before tracing, and radii are those of the outlines. `false`: solid fibers. "
+                "Left out: `true` where the scan shows lumens clearly (with a warning); a warning asks where it shows "
+                "them faintly."},
     {.path = "volume.trial",
      .kind = OPTION_BOOL,
      INTO(scan.trial),
      .standard = "false",
      .meaning =
-         "`true`: the traced fibers, with their sections and lumens, are drawn as a scan with the noise and the blur "
-         "of this one, which is reconstructed and compared with them; the result states what such a scan can give. "
-         "Takes as long as tracing again, at most a minute or two (16.8 million voxels from the middle of the scan "
-         "are tried)."},
+         "`true`: the traced fibers are drawn as a scan with the noise and blur of this one, reconstructed and "
+         "compared; the result states the errors. Takes as long as tracing again, for at most 16.8 million voxels."},
     {.path = "volume.density_low",
      .kind = OPTION_NUMBER,
      .id = OPTION_DENSITY_LOW,

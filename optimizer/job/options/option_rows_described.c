@@ -58,11 +58,9 @@ const struct job_option option_rows_described[] = {
      .id = OPTION_CLOTH_TEXTURE,
      INTO(cloth.texture),
      .left_out = "none",
-     .meaning =
-         "Photograph of the flat cloth from straight above, PNG (sRGB) or OpenEXR, that shows its weave. Without "
-         "`weave` and `draft` the draft comes from it, and so do `cover_warp` and `cover_weft` where it shows "
-         "them and they have their standard values; otherwise a weave that contradicts it is warned about. "
-         "docs/weave-detection.md says how it is read."},
+     .meaning = "Photograph of the flat cloth from straight above, PNG (sRGB) or OpenEXR, that shows its weave. Draft "
+                "and covers come from it where the job leaves them open; a contradiction is warned about "
+                "(docs/weave-detection.md)."},
     {.path = "cloth.texture_px_per_mm",
      .kind = OPTION_NUMBER,
      .id = OPTION_TEXTURE_PX_PER_MM,
@@ -70,10 +68,8 @@ const struct job_option option_rows_described[] = {
      RANGE(0.1, 10000),
      .unit = "px/mm",
      .left_out = "not known",
-     .meaning =
-         "Pixels of `texture` in a millimetre of the cloth. Where the draft comes from the photograph, the threads "
-         "per centimetre then do too, with the `flatness` that makes single yarns as wide as seen, and the "
-         "`crimp` that bends warp and weft equally sharply. What the job states stays."},
+     .meaning = "Pixels of `texture` in a millimetre. Threads per centimetre, `flatness` and `crimp` then come from "
+                "the photograph, too, where the job leaves them open."},
     {.path = "cloth.texture_colors",
      .kind = OPTION_BOOL,
      INTO(cloth.texture_colors),
@@ -111,18 +107,14 @@ const struct job_option option_rows_described[] = {
      RANGE(1, 8),
      .standard = "1",
      .meaning =
-         "Where numbers of the cloth are fitted: how many times as long along both edges the tile is in the last "
-         "fit, on the chosen cloth, and in the result. Radiances of a small tile show the random places of its "
-         "fibers; the search, which makes many cloths, is fast with small ones, and the result is better with a "
-         "large one."},
+         "With fitted numbers of the cloth: how many times as long along both edges the tile of the last fit and of "
+         "the result is. Small tiles show the random places of their fibers; the search is fast with them."},
     {.path = "cloth.renew_places",
      .kind = OPTION_BOOL,
      INTO(cloth.renew_places),
      .standard = "false",
-     .meaning =
-         "Where numbers of the cloth are fitted: whether every estimate of the search has fibers at other random "
-         "places, so that what single tiles scatter averages out. It makes twice as many cloths, and needs tiles "
-         "that scatter by less than about 1 %, such as 16 x 16 yarns."},
+     .meaning = "With fitted numbers of the cloth: whether every estimate of the search has fibers at other random "
+                "places. It makes twice as many cloths, and needs large tiles, such as 16 x 16 yarns."},
     {.path = "cloth.warp_per_cm",
      .kind = OPTION_NUMBER,
      INTO(cloth.threads_per_cm[1]),

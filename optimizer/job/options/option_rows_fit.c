@@ -80,11 +80,9 @@ const struct job_option option_rows_fit[] = {
      .unit = "paths",
      .left_out = "the method's",
      .allowed = "from 1000",
-     .meaning = "Light paths of the fit of each model. Usually left out: the fit then stops by itself when more paths "
-                "would not pay, after 6 million at the latest (more with over some 240 fitted rows). Give a larger "
-                "number for smaller errors, a smaller one for a quick trial; it is used up unless the fit is precise "
-                "before. A budget below the least that a fit takes gives a warning that names it (docs/model.md, "
-                "section 5)."},
+     .meaning =
+         "Light paths of the fit of each model. Left out, the fit ends by itself, after 6 million at the latest (more "
+         "with over some 240 fitted rows). A budget below the least that a fit takes gives a warning that names it."},
     {.path = "fit.precision",
      .kind = OPTION_NUMBER,
      .id = OPTION_PRECISION,
@@ -93,13 +91,9 @@ const struct job_option option_rows_fit[] = {
      .upper = 10,
      .left_out = "no goal",
      .allowed = "0.05..10",
-     .meaning =
-         "Goal of precision of `gauss_newton.v1`: the fit ends when the noise of tracing makes an error of the fitted "
-         "means that is so many times the one that the photographs' stated errors make; 0.5 leaves the errors 12 % "
-         "larger than exact renderings would. `path_budget` is then the most that it takes: without one, 6 million "
-         "paths "
-         "(more with over some 240 fitted rows), so give a large one. Measurements without stated errors have no such "
-         "goal."},
+     .meaning = "Goal of `gauss_newton.v1`: the fit ends when the noise of tracing makes so many times the error of "
+                "the fitted means that the photographs' stated errors make. `path_budget` is then the most that it "
+                "takes. Needs measurements with errors."},
     {.path = "fit.profile_job",
      .kind = OPTION_TEXT,
      .id = OPTION_PROFILE_JOB,
@@ -107,39 +101,32 @@ const struct job_option option_rows_fit[] = {
      .check = job_check_job_id,
      .left_out = "none",
      .allowed = "the id of a job with `profile`",
-     .meaning =
-         "A job that has fitted models to the profile of a fiber of this cloth. What it found of a model that is "
-         "fitted here becomes the `priors` of its parameters, with their standard errors; parameters that are "
-         "`fixed` or tied here, have priors of their own, or were not determined there, take none, nor do colors "
-         "where the profile is grey. The other job may be deleted once this job runs."},
+     .meaning = "A job that fitted models to the profile of a fiber of this cloth. Its determined parameters become "
+                "`priors` here, with their standard errors, unless they are fixed, tied or have priors; colors only "
+                "where the profile has three channels."},
     {.path = "fit.share_camera_paths",
      .kind = OPTION_BOOL,
      INTO(fit.share_camera_paths),
      .standard = "false",
      .meaning =
-         "Whether rows that differ in the place of their lamp only are traced with the same light paths, which "
-         "takes 0.54 to 0.63 of the time for two of them. The noise of such rows then goes together; the errors of "
-         "parameters and scores contain that. A path counts once for each row. Not together with `texture`; volumes "
-         "trace separate paths all the same."},
+         "Whether rows that differ in their lamp only are traced with the same paths, in 0.54 to 0.63 of the time for "
+         "two of them. Errors contain that their noise goes together. Not with `texture`; without effect on volumes."},
     {.path = "fit.plain_prior",
      .kind = OPTION_NUMBER,
      .id = OPTION_PLAIN_PRIOR,
      INTO(fit.plain_prior),
      RANGE(0, 100),
      .standard = "0",
-     .meaning =
-         "How much the fit listens to a plain BRDF that is fitted to the same rows: 0, not at all; 1, as much as "
-         "was best for a dozen measured rows of a described cloth (docs/model.md, section 5). With few rows many "
-         "cloths fit them, and differ in between; this chooses among these. Not together with `nuisance`."},
+     .meaning = "How much the fit listens to a plain BRDF of the same rows: 0, not at all; 1, as was best for a dozen "
+                "measured rows of a described cloth (docs/model.md, section 5). Not with `nuisance`."},
     {.path = "fit.discrepancy",
      .kind = OPTION_BOOL,
      .id = OPTION_DISCREPANCY,
      INTO(fit.discrepancy),
      .standard = "false",
-     .meaning =
-         "Whether what the fibers leave of the measured radiances is kept as a smooth factor on all renderings of the "
-         "cloth, as far as it predicts rows that were left out (docs/model.md, section 5). For measured fabrics, whose "
-         "fibers no model describes exactly. Not together with `nuisance`; models of volumes go without it."},
+     .meaning = "Whether the rest that the fibers leave of the measured radiances is kept as a smooth factor on all "
+                "renderings, as far as it predicts left-out rows (docs/model.md, section 5). Not with `nuisance`, nor "
+                "for volumes."},
     {.path = "fit.fixed",
      .kind = OPTION_OWN,
      .unit = "degrees for angles",
@@ -180,9 +167,8 @@ const struct job_option option_rows_fit[] = {
      .standard = "false",
      .items = "lower_um and upper_um",
      .allowed = "`true`, `false`, or the range to search: `{\"lower_um\": v, \"upper_um\": v}`",
-     .meaning = "Look for the mean radius of the fibers too. It makes up to 11 short fits of the first fiber model by "
-                "`gauss_newton.v1` before the real one, each with 12 % of `path_budget` and at least 21,000 paths a "
-                "fitted row, so the job takes clearly longer."},
+     .meaning = "Look for the mean radius of the fibers, too, by up to 11 short fits of the first fiber model before "
+                "the real one, each with 12 % of `path_budget` and at least 21,000 paths a fitted row."},
     {.path = "fit.fit_radius.lower_um",
      .kind = OPTION_NUMBER,
      INTO(fit.radius_lower_um),
@@ -233,9 +219,8 @@ const struct job_option option_rows_fit[] = {
      RANGE(1, JOB_MAX_START),
      .standard = "1",
      .meaning =
-         "The fit is made from so many starts, spread over the bounds. The best is kept, all are listed. They "
-         "share a `path_budget`; `max_iterations` may be 500 at most. With fitted numbers of the cloth each start is "
-         "a search from a cloth of its own, and the best is the one that predicts left-out rows best."},
+         "The fit is made from so many starts, spread over the bounds; the best is kept, all are listed. They share a "
+         "`path_budget`. With fitted numbers of the cloth each is a search of its own, judged by left-out rows."},
     {.path = "fit.nuisance",
      .kind = OPTION_SECTION,
      .id = OPTION_NUISANCE,

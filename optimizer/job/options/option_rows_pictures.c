@@ -82,11 +82,9 @@ const struct job_option option_rows_pictures[] = {
      OF_PICTURE(lamp_sharpness),
      RANGE(1, 100000),
      .left_out = "`lamp` of the job",
-     .meaning =
-         "Lights the cloth with a spherical Gaussian in place of the lamp of the job: light from infinitely far "
-         "whose radiance falls off around the lamp's direction as exp(sharpness (cos - 1)). Its half width is "
-         "67 degrees over the root of the sharpness: 10 is soft, 200 about as wide as a lamp of 10 cm at 61 cm. A "
-         "surface that faces it has the light that it has from the lamp of the job."},
+     .meaning = "A spherical Gaussian in place of the job's lamp: light from infinitely far that falls off as "
+                "exp(sharpness (cos - 1)). Its half width is 67 degrees over the root of the sharpness: 10 is soft, "
+                "200 like a lamp of 10 cm at 61 cm."},
     {.path = "pictures[].width_mm",
      .kind = OPTION_NUMBER,
      OF_PICTURE(width_mm),
@@ -155,19 +153,15 @@ const struct job_option option_rows_pictures[] = {
      .kind = OPTION_BOOL,
      OF_PICTURE(speckle),
      .standard = "false",
-     .meaning =
-         "Whether each fiber has a random pattern of bright and dark directions of its own, as light has from rough "
-         "fibers. It has the mean 1 and the seed `fit.seed`, and is for pictures alone: fits have none. Needs "
-         "method `path` and models with it: those of waves, `wave_silk.v1` and its like (docs/bent-cloth.md)."},
+     .meaning = "Whether each fiber has a random pattern of bright and dark directions, with the mean 1 and the seed "
+                "`fit.seed`. Needs method `path` and a model of waves (docs/bent-cloth.md)."},
     {.path = "pictures[].field_by_pixel",
      .kind = OPTION_BOOL,
      OF_PICTURE(field_by_pixel),
      .standard = "false",
-     .meaning =
-         "Of `fur_near.v1` and `dielectric_near.v1`: whether the picture takes the far field, the mean over the "
-         "width of a fiber (`fur.v1`, `dielectric.v1`), where a pixel is at least as wide as a fiber. It has less "
-         "noise then, and another mean in dense cloths (docs/bent-cloth.md). `model` of the result names the model "
-         "that is shown. Refused where none of the job's models is one of them."},
+     .meaning = "Of `fur_near.v1` and `dielectric_near.v1`: whether the far field is taken where a pixel is at least "
+                "as wide as a fiber, with less noise and another mean in dense cloths (docs/bent-cloth.md). Refused "
+                "without such a model."},
     {.path = "pictures[].reference",
      .kind = OPTION_BOOL,
      OF_PICTURE(reference),
@@ -181,9 +175,8 @@ const struct job_option option_rows_pictures[] = {
      RANGE(0, 1000),
      .unit = "mm",
      .left_out = "no ground",
-     .meaning = "Puts a matte, level plane under the cloth, so far below its lowest point, with the shadow that the "
-                "cloth casts on it. It is lit by the lamp alone, which stands above it as the camera does: the job has "
-                "no `environment`, and the plane gives no light to the cloth."},
+     .meaning = "Puts a matte, level plane so far below the lowest point of the cloth, with its shadow. The lamp alone "
+                "lights it, from above; it gives no light to the cloth, and the job has no `environment`."},
     {.path = "pictures[].ground_albedo",
      .kind = OPTION_NUMBER,
      OF_PICTURE(ground_albedo),
@@ -194,11 +187,8 @@ const struct job_option option_rows_pictures[] = {
      .kind = OPTION_BOOL,
      OF_PICTURE(filter),
      .standard = "false",
-     .meaning =
-         "Whether a filtered view is made beside the picture, in which less noise is seen: "
-         "`pictures/on-1-filtered.png`. Of a ground it filters the soft shadow (sheared filtering). It is a preview "
-         "for the eye. The picture itself, its numbers and its "
-         "OpenEXR file stay as they were rendered."},
+     .meaning = "Whether a filtered view with less noise is made beside the picture, for the eye; the picture, its "
+                "numbers and its OpenEXR file stay as rendered."},
     {.path = "twin",
      .kind = OPTION_SECTION,
      .left_out = "none",

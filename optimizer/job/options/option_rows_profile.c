@@ -45,9 +45,9 @@ const struct job_option option_rows_profile[] = {
      BOWL(given),
      .check = job_check_bowl,
      .left_out = "this or `profile.file`",
-     .meaning = "The profile from photographs of a bowl: a matte part of a sphere below the fiber, which runs along a "
-                "diameter, is lit in the middle of it, and is photographed from above (docs/fiber-bowl.md). Places are "
-                "in millimetres from the center of the sphere: x along the fiber, z up to the camera."},
+     .meaning =
+         "The profile from photographs of a bowl: a matte part of a sphere below the fiber, lit in the middle and "
+         "photographed from above (docs/fiber-bowl.md). Places are in millimetres from the center of the sphere."},
     {.path = "profile.bowl.radius_mm",
      .kind = OPTION_NUMBER,
      BOWL(radius_mm),
