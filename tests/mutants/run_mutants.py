@@ -109,6 +109,10 @@ class Judge:
         """What a test runs, with the faulty object; scripts need nothing."""
         return not path.endswith(".c") or all(self.linker.link(thing, path, self.compiler.object) for thing in self.things_for(test, path))
 
+    def passes(self, test, build, limit_s):
+        clean_scratch(self.faulty)  # a test that crashed leaves files, and its number as a process, which may name them, comes again
+        return test.run(build, limit_s, self.faulty.scratch)[0]
+
     def try_tests(self, fault, tests):
         """("caught" or "survived" or "unfinished" or "invalid", test)"""
         start, linked = time.monotonic(), False
@@ -119,8 +123,7 @@ class Judge:
                 return "invalid", t.name
             linked = linked or not t.is_c
             limit_s = max(SLOW_S, SLOW_FACTOR * t.seconds)
-            scratch = self.faulty.scratch
-            if not t.run(self.faulty, limit_s, scratch)[0] and t.run(self.clean, limit_s, scratch)[0]:
+            if not self.passes(t, self.faulty, limit_s) and self.passes(t, self.clean, limit_s):
                 return "caught", t.name
         return "survived", ""
 
@@ -138,7 +141,6 @@ class Judge:
             record["verdict"] = "explained"
         if record["verdict"] is None:
             tests = self.tests_for(fault, part)
-            clean_scratch(self.faulty)
             if not fault.path.endswith(".c"):
                 target.write_text(mutated)
             try:
@@ -229,6 +231,14 @@ def sample(n_fault, seed, parts, judges, records):
     side_by_side(judges, work)
 
 
+def moved(path):
+    """Where a file of an earlier run is now: names are unique in the tree."""
+    if (TREE / path).exists():
+        return path
+    found = [p for p in TREE.rglob(pathlib.Path(path).name) if "build" not in p.relative_to(TREE).parts]
+    return str(found[0].relative_to(TREE)) if found else None
+
+
 def sample_again(parts, judges, records):
     """Judges again those of the last run that were not caught. Their files must not have changed."""
     records.read()
@@ -241,8 +251,8 @@ def sample_again(parts, judges, records):
                     return
                 i = waiting.popleft()
             r = records.list[i]
-            fault = Fault(r["file"], r["line"], r["operator"], r["start"], r["end"], r["new"])
-            if change_of(fault, (TREE / r["file"]).read_text()) != (r["before"], r["after"]):
+            fault = Fault(moved(r["file"]), r["line"], r["operator"], r["start"], r["end"], r["new"])
+            if fault.path is None or change_of(fault, (TREE / fault.path).read_text()) != (r["before"], r["after"]):
                 note(f"{r['file']} has changed: its faults need a new sample")
                 continue
             record = dict(judge.examine(fault, parts[r["part"]]), part=r["part"])

@@ -13,6 +13,7 @@ enum { RGL_BYTES_MAX = 16384 };
 
 struct rgl_bytes {
     size_t n_phi, n_wavelength; /* 0 wavelengths: rgb */
+    size_t n_rgb;               /* channels of rgb; 0: 3 */
     double turn_rad;            /* azimuths of the light go from -pi over this angle */
     double first_nm, step_nm;
     bool without_sigma, some_not_measured;
@@ -66,7 +67,7 @@ static inline void rgl_bytes_make(struct rgl_bytes *b)
     static const char jacobian[1] = {1};
     float phi[16], vndf[16 * 8], level[16 * 2 * 32 * 4], nm[32];
     char valid[16 * 8];
-    size_t n_level = b->n_wavelength > 0 ? b->n_wavelength : 3, n = 0;
+    size_t n_level = b->n_wavelength > 0 ? b->n_wavelength : b->n_rgb > 0 ? b->n_rgb : 3, n = 0;
     for (size_t p = 0; p < b->n_phi; p++) {
         double share = b->n_phi > 1 ? (double)p / (double)(b->n_phi - 1) : 0.0;
         phi[p] = (float)(b->n_phi > 2 ? -M_PI + share * b->turn_rad : 0.0);

@@ -127,6 +127,35 @@ static void test_fixed_ones_are_left_out(void **state)
     assert_true(fabs(u.cov[3] - (at_fixed_x[1][1] + given)) < 1e-12);
 }
 
+/* The numbers of a joint fit are left out of its errors: the others keep theirs, in their order. */
+static void test_numbers_are_left_out(void **state)
+{
+    (void)state;
+    enum { N = 5, FIRST = 1, N_OUT = 2, M = N - N_OUT };
+    static const size_t from[M] = {0, 3, 4};
+    struct uncertainty u = {.n_param = N}, out;
+    for (size_t p = 0; p < N; p++) {
+        u.se_param[p] = (double)p + 0.5;
+        u.at_bound[p] = p == 3;
+        u.determined[p] = p == 4;
+        for (size_t q = 0; q < N; q++) {
+            u.cov[p * N + q] = (double)(10 * p + q);
+            u.correlation[p * N + q] = (double)(10 * p + q) / 100.0;
+        }
+    }
+    memset(&out, 0, sizeof out);
+    carried_error_leave_out(&u, FIRST, N_OUT, &out);
+    assert_int_equal(out.n_param, M);
+    for (size_t p = 0; p < M; p++) {
+        assert_true(out.se_param[p] == (double)from[p] + 0.5);
+        assert_true(out.at_bound[p] == (from[p] == 3) && out.determined[p] == (from[p] == 4));
+        for (size_t q = 0; q < M; q++) {
+            assert_true(out.cov[p * M + q] == (double)(10 * from[p] + from[q]));
+            assert_true(out.correlation[p * M + q] == (double)(10 * from[p] + from[q]) / 100.0);
+        }
+    }
+}
+
 /* No error is larger than that of a parameter of which only the range is known, which is not determined then. */
 static void test_limit(void **state)
 {
@@ -149,6 +178,7 @@ int main(void)
         cmocka_unit_test(test_joint_and_given_variance),
         cmocka_unit_test(test_two_numbers),
         cmocka_unit_test(test_fixed_ones_are_left_out),
+        cmocka_unit_test(test_numbers_are_left_out),
         cmocka_unit_test(test_limit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

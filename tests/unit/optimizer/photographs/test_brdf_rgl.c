@@ -113,6 +113,24 @@ static void test_spectra(void **state)
     assert_non_null(strstr(err.text, "'a.bsdf': its wavelengths give no color"));
 }
 
+static void test_rgb_has_three_channels(void **state)
+{
+    for (size_t n_rgb = 1; n_rgb <= 4; n_rgb++) {
+        struct rgl_bytes b = {.n_phi = 1, .n_rgb = n_rgb};
+        struct error err = {0};
+        void *handle = NULL;
+        rgl_bytes_make(&b);
+        status s = open_bytes(state, &b, JOB_SYMMETRY_FILE, &handle, &err);
+        if (n_rgb == 3) {
+            assert_int_equal(s, STATUS_OK);
+            rgl_brdf_reader.close(handle);
+        } else {
+            assert_int_equal(s, STATUS_FORMAT);
+            assert_non_null(strstr(err.text, "'a.bsdf': its rgb has another shape than RGL's"));
+        }
+    }
+}
+
 /* Between and beyond few wavelengths a spectrum is what the same spectrum is at each nanometre. */
 static void test_few_wavelengths(void **state)
 {
@@ -193,8 +211,13 @@ static void test_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_isotropic),       cmocka_unit_test(test_symmetries),   cmocka_unit_test(test_spectra),
-        cmocka_unit_test(test_few_wavelengths), cmocka_unit_test(test_not_measured), cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_isotropic),
+        cmocka_unit_test(test_symmetries),
+        cmocka_unit_test(test_spectra),
+        cmocka_unit_test(test_few_wavelengths),
+        cmocka_unit_test(test_rgb_has_three_channels),
+        cmocka_unit_test(test_not_measured),
+        cmocka_unit_test(test_refused),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }

@@ -71,10 +71,26 @@ static void test_the_first_look_has_its_time(void **state)
     assert_false(service_fixture_row(f, id).deleted);
 }
 
+/* A daemon that is stopped while it removes jobs does not go on to the last one. */
+static void test_a_stop_ends_the_removals(void **state)
+{
+    enum { MANY = 60 };
+    struct service_fixture *f = *state;
+    static char id[MANY][STORE_ID_BYTES];
+    size_t n_gone = 0;
+    for (int i = 0; i < MANY; i++) service_fixture_job(f, NULL, JOB_SUCCEEDED, 1000 + i, id[i]);
+    struct retention_watch *w = start(f, 1, 0, 1);
+    assert_true(goes(f, id[0], 20));
+    retention_watch_stop(w);
+    for (int i = 0; i < MANY; i++) n_gone += service_fixture_row(f, id[i]).deleted;
+    assert_true(n_gone < MANY);
+}
+
 int main(void)
 {
 #define WITH_SERVICE(test) cmocka_unit_test_setup_teardown(test, service_fixture_setup, service_fixture_teardown)
     const struct CMUnitTest tests[] = {WITH_SERVICE(test_without_limits), WITH_SERVICE(test_each_limit),
-                                       WITH_SERVICE(test_the_first_look_has_its_time)};
+                                       WITH_SERVICE(test_the_first_look_has_its_time),
+                                       WITH_SERVICE(test_a_stop_ends_the_removals)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

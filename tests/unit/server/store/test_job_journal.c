@@ -185,6 +185,22 @@ static void test_damage(void **state)
     job_journal_release(&j);
 }
 
+/* No more than 256 MiB of a journal are read, which counts as a damaged place. */
+static void test_a_journal_that_is_too_large(void **state)
+{
+    struct job_journal j;
+    struct job_row row = whole;
+    append(*state, &(struct journal_entry){.job = &row});
+    assert_int_equal(truncate(scratch_path(state, JOB_FILE_JOURNAL), 256 << 20), 0);
+    assert_int_equal(job_journal_read(*state, &j, NULL), STATUS_OK);
+    assert_true(j.has_job && j.n_damaged == 1);
+    job_journal_release(&j);
+    assert_int_equal(truncate(scratch_path(state, JOB_FILE_JOURNAL), (256 << 20) + 1), 0);
+    assert_int_equal(job_journal_read(*state, &j, NULL), STATUS_OK);
+    assert_true(j.has_job && j.n_damaged == 2);
+    job_journal_release(&j);
+}
+
 static void test_no_journal(void **state)
 {
     struct job_journal j;
@@ -232,8 +248,9 @@ int main(void)
 {
 #define WITH_FOLDER(test) cmocka_unit_test_setup_teardown(test, scratch_folder_setup, scratch_folder_teardown)
     const struct CMUnitTest tests[] = {
-        WITH_FOLDER(test_every_column), WITH_FOLDER(test_parts),      WITH_FOLDER(test_strange_records),
-        WITH_FOLDER(test_damage),       WITH_FOLDER(test_no_journal), WITH_FOLDER(test_links_and_pipes),
+        WITH_FOLDER(test_every_column),    WITH_FOLDER(test_parts),      WITH_FOLDER(test_strange_records),
+        WITH_FOLDER(test_damage),          WITH_FOLDER(test_no_journal), WITH_FOLDER(test_a_journal_that_is_too_large),
+        WITH_FOLDER(test_links_and_pipes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
