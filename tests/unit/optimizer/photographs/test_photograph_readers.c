@@ -197,6 +197,24 @@ static void test_dng(void **state)
     free(whole);
 }
 
+/* A black level is taken from every value of an EXR picture. */
+static void test_black_of_exr(void **state)
+{
+    const char *path = scratch_path(state, "a.exr");
+    struct image im;
+    struct photograph_record r;
+    struct job_photograph p = no_transfer;
+    p.black_level = 0.25;
+    assert_int_equal(image_init(&im, EDGE, EDGE, 3, NULL), STATUS_OK);
+    for (size_t i = 0; i < EDGE * EDGE * 3; i++) im.pixel[i] = 0.5f + (float)(i % 256) / 256.0f;
+    assert_int_equal(image_write_exr(&im, path, NULL), STATUS_OK);
+    image_release(&im);
+    read_ok(path, &p, &im, &r);
+    for (size_t i = 0; i < EDGE * EDGE * 3; i++)
+        assert_true(fabs((double)im.pixel[i] - 0.25 - (double)(i % 256) / 256.0) < 1e-3);
+    image_release(&im);
+}
+
 /* The Kodak DC50 of data/camera-raw (LibRaw's sample, by way of rawpy's test data). */
 static void test_real_raw(void **state)
 {
@@ -264,6 +282,7 @@ int main(void)
         cmocka_unit_test(test_exif_of_tiff),
         cmocka_unit_test(test_jpeg),
         cmocka_unit_test(test_dng),
+        cmocka_unit_test(test_black_of_exr),
         cmocka_unit_test(test_real_raw),
         cmocka_unit_test(test_enlarged),
     };

@@ -3,10 +3,12 @@
 #include "server/retention/job_keep.h"
 #include "server/retention/retention.h"
 #include "server/settings/job_paths.h"
+#include "tests/support/scratch_folder.h"
 #include "tests/support/store/service_fixture.h"
 
 #include <jansson.h>
 #include <setjmp.h>
+#include <sqlite3.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -202,6 +204,22 @@ static void test_removals_are_recorded(void **state)
     assert_int_equal(retention_remove(f->service, id[0], RETENTION_AGE, &removed, &err), STATUS_NOT_FOUND);
 }
 
+/* Whose geometry is needed cannot be known without the jobs, so nothing is planned or removed then. */
+static void test_a_database_that_fails(void **state)
+{
+    struct service_fixture *f = *state;
+    char id[STORE_ID_BYTES];
+    struct retention_plan p = {0};
+    struct retention_job removed = {0};
+    sqlite3 *db = NULL;
+    service_fixture_job(f, NULL, JOB_SUCCEEDED, 1000, id);
+    assert_int_equal(sqlite3_open(scratch_path(&f->folder, "selvedge.db"), &db), SQLITE_OK);
+    assert_int_equal(sqlite3_exec(db, "ALTER TABLE job RENAME COLUMN sample TO other", NULL, NULL, NULL), SQLITE_OK);
+    sqlite3_close(db);
+    assert_true(retention_plan_make(f->service, &(struct retention_limits){.max_age_days = 1}, &p, NULL) != STATUS_OK);
+    assert_true(retention_remove(f->service, id, RETENTION_AGE, &removed, NULL) != STATUS_OK);
+}
+
 int main(void)
 {
 #define WITH_SERVICE(test) cmocka_unit_test_setup_teardown(test, service_fixture_setup, service_fixture_teardown)
@@ -213,6 +231,7 @@ int main(void)
         WITH_SERVICE(test_jobs_that_are_kept),
         WITH_SERVICE(test_a_mark_that_is_a_folder),
         WITH_SERVICE(test_removals_are_recorded),
+        WITH_SERVICE(test_a_database_that_fails),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -185,12 +185,29 @@ static int call_as_32_bit(const void *context)
     return 0;
 }
 
+static void *call_from_a_thread(void *context)
+{
+    call_as_32_bit(context);
+    return context;
+}
+
+/* The other threads end, too. */
+static int call_beside_this_thread(const void *context)
+{
+    pthread_t t;
+    (void)context;
+    if (pthread_create(&t, NULL, call_from_a_thread, NULL) != 0) return 201;
+    for (int i = 0; i < 100; i++) nanosleep(&(struct timespec){0, 10000000}, NULL);
+    return 0;
+}
+
 static void test_calls_of_another_architecture(void **state)
 {
     char text[400];
     (void)state;
     assert_int_equal(restricted(sandbox_calls_of_worker, call_as_32_bit, NULL, text), -SIGSYS);
     assert_string_equal(text, "");
+    assert_int_equal(restricted(sandbox_calls_of_worker, call_beside_this_thread, NULL, text), -SIGSYS);
 }
 #endif
 

@@ -1,6 +1,7 @@
 /* The modes of a worker's sandbox, the state that is handed to the program that is executed again, and the sentences
  * about it. */
 #include "optimizer/worker/sandbox/worker_confine.h"
+#include "tests/support/scratch_folder.h"
 
 #include <fcntl.h>
 #include <setjmp.h>
@@ -8,10 +9,14 @@
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cmocka.h>
+
+#define OTHER "01234567-89ab-4def-8123-456789abcdef"
+#define GEOMETRY_JOB "{\"sample\":\"a\",\"geometry\":{\"job\":\"" OTHER "\"},\"measurements\":{\"file\":\"rows.csv\"}}"
 
 static void test_modes(void **state)
 {
@@ -104,6 +109,30 @@ static void test_completion(void **state)
     assert_int_equal(complete(CONFINE_REQUIRED, 0), 100 + STATUS_UNSUPPORTED);
 }
 
+/* Files of the job whose geometry is taken over are linked before the worker is confined, because it cannot do so
+ * afterwards: for reading only. */
+static void test_a_geometry_is_linked(void **state)
+{
+    static const char *const file[] = {"job.json", "work/fibers/fibers.bin", "work/fibers.done"};
+    struct confinement c;
+    struct stat st;
+    char path[400];
+    static const char *const folder[] = {OTHER, OTHER "/work", OTHER "/work/fibers", "job", "job/adopted"};
+    for (size_t i = 0; i < sizeof folder / sizeof *folder; i++)
+        assert_int_equal(mkdir(scratch_path(state, folder[i]), 0700), 0);
+    scratch_write(scratch_path(state, "job/job.json"), GEOMETRY_JOB, sizeof GEOMETRY_JOB - 1);
+    for (size_t i = 0; i < 3; i++) {
+        snprintf(path, sizeof path, OTHER "/%s", file[i]);
+        scratch_write(scratch_path(state, path), "kept", 4);
+    }
+    worker_prepare(scratch_path(state, "job"), &c);
+    for (size_t i = 0; i < 3; i++) {
+        snprintf(path, sizeof path, "job/adopted/%s", file[i]);
+        assert_int_equal(stat(scratch_path(state, path), &st), 0);
+        assert_true(st.st_nlink == 2 && (st.st_mode & 0777) == 0400);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -111,6 +140,7 @@ int main(void)
         cmocka_unit_test(test_the_state_of_the_program),
         cmocka_unit_test(test_sentences),
         cmocka_unit_test(test_completion),
+        cmocka_unit_test_setup_teardown(test_a_geometry_is_linked, scratch_folder_setup, scratch_folder_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
