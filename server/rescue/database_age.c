@@ -18,7 +18,10 @@ struct compared {
 struct comparison {
     struct compared *folder;
     size_t n;
+    double allowed_s; /* by which a row may be older: clocks of daemons that share a database differ */
 };
+
+enum { SHARED_ALLOWED_S = 300 };
 
 static int by_id(const void *a, const void *b)
 {
@@ -67,7 +70,7 @@ static void visit_row(void *context, const char *id, double updated_unix_s)
     struct compared *found = c->n == 0 ? NULL : bsearch(&wanted, c->folder, c->n, sizeof *c->folder, by_id);
     if (found == NULL) return;
     found->known = true;
-    found->older = updated_unix_s < found->sealed_unix_s;
+    found->older = updated_unix_s < found->sealed_unix_s - c->allowed_s;
 }
 
 /* Whether a folder that the database does not know is the folder of a job that was acknowledged and not deleted. A
@@ -82,15 +85,17 @@ static bool is_missing(const char *folder, const char *id)
     return missing;
 }
 
-status database_age_check(const struct settings *s, const char *database, struct error *err)
+status database_age_check(const struct settings *s, const char *database, struct store *store, struct error *err)
 {
-    struct comparison c = {0};
+    struct comparison c = {.allowed_s = store == NULL ? 0 : SHARED_ALLOWED_S};
     size_t n_missing = 0, n_older = 0;
     const char *first = "";
     char path[PATH_BYTES];
     /* the journals before the database, because a daemon may write meanwhile */
     status r = list(s, &c, err);
-    if (r == STATUS_OK && store_read_ages(database, visit_row, &c) != STATUS_OK) c.n = 0;
+    if (r == STATUS_OK && (store == NULL ? store_read_ages(database, visit_row, &c)
+                                         : store_job_ages(store, visit_row, &c, NULL)) != STATUS_OK)
+        c.n = 0;
     for (size_t i = 0; r == STATUS_OK && i < c.n; i++) {
         folder_of(s, c.folder[i].id, path);
         bool missing = !c.folder[i].known && is_missing(path, c.folder[i].id);

@@ -5,10 +5,13 @@
 #define SELVEDGE_SERVER_DATABASE_AGE_H
 
 #include "server/settings/settings.h"
+#include "server/store/store.h"
 
-/* Compares the database, of any version, with the journals of all folders in DATA/jobs; a daemon may be using both.
+/* Compares the database, of any version, with the journals of all folders in DATA/jobs; daemons may be using both.
+ * database: its path, or its address where store is open; store NULL: it is the file of this path.
  * STATUS_FORMAT, with the numbers and one job: it lacks jobs that were acknowledged, or has an older row of them than a
  * sealed record (journal_seal.h) of their journals. Journals that cannot be read are passed over. STATUS_NO_MEMORY. */
-status database_age_check(const struct settings *settings, const char *database, struct error *err);
+status database_age_check(const struct settings *settings, const char *database, struct store *store,
+                          struct error *err);
 
 #endif

@@ -79,13 +79,28 @@ static status list_folders(const char *data, bool ages, struct folder **out, siz
     return STATUS_OK;
 }
 
+/* A server's database may be behind the folders, too: when an old dump was put back, or another database is named.
+ * One of an older version is not compared. */
+static status shared_is_behind(const struct settings *settings, struct error *err)
+{
+    struct store *store = NULL;
+    struct error why = {0};
+    status s = store_settings_open(settings, true, &store, NULL);
+    if (s == STATUS_OK) s = database_age_check(settings, "PostgreSQL", store, &why);
+    store_close(store);
+    if (s != STATUS_FORMAT) return STATUS_OK; /* whatever else is wrong, opening it will tell */
+    return error_set(err, s,
+                     "%s; put a newer dump of it back, or give up these jobs by moving their folders out of '%s/jobs'",
+                     why.text, settings->data);
+}
+
 status rebuild_is_needed(const struct settings *settings, struct error *err)
 {
     char path[PATH_BYTES];
     struct folder *folder = NULL;
     size_t n = 0;
     struct error why = {0};
-    if (store_settings_shared(settings)) return STATUS_OK;
+    if (store_settings_shared(settings)) return shared_is_behind(settings, err);
     database_path(settings, path);
     status s = store_examine(path, false, NULL, &why);
     if (s == STATUS_NOT_FOUND && list_folders(settings->data, false, &folder, &n, NULL) == STATUS_OK && n > 0) {
@@ -93,7 +108,7 @@ status rebuild_is_needed(const struct settings *settings, struct error *err)
         error_set(&why, s, "database '%s' is missing or empty, but there are folders of %zu jobs", path, n);
     }
     free(folder);
-    if (s == STATUS_OK) s = database_age_check(settings, path, &why);
+    if (s == STATUS_OK) s = database_age_check(settings, path, NULL, &why);
     if (s != STATUS_FORMAT) return STATUS_OK; /* whatever else is wrong, opening it will tell */
     return error_set(err, s, "%s; bring it back from backup and job folders with: selvedged --data '%s' --rebuild",
                      why.text, settings->data);

@@ -139,6 +139,9 @@ struct job_query {
 status store_job_list(struct store *store, const struct job_query *q, struct job_row **row, size_t *n,
                       struct error *err);
 void job_rows_free(struct job_row *row, size_t n);
+/* Calls visit for the row of each job, tombstones too. */
+status store_job_ages(struct store *store, void (*visit)(void *context, const char *id, double updated_unix_s),
+                      void *context, struct error *err);
 /* A queued job, as far as its turn depends on it (server/jobs/queue_turn.h). */
 struct queued_job {
     char id[STORE_ID_BYTES], owner[STORE_OWNER_BYTES], batch[STORE_ID_BYTES];

@@ -129,6 +129,24 @@ status store_job_count(struct store *store, int64_t n[JOB_N_STATE], struct error
     return s;
 }
 
+status store_job_ages(struct store *store, void (*visit)(void *context, const char *id, double updated_unix_s),
+                      void *context, struct error *err)
+{
+    char id[STORE_ID_BYTES];
+    struct store_query *q = NULL;
+    enum store_step rc = STORE_DONE;
+    pthread_mutex_lock(&store->read.lock);
+    status s = store_prepare(&store->read, &q, err, "SELECT id, updated FROM job", "");
+    while (s == STATUS_OK && (rc = store_step(q)) == STORE_ROW) {
+        store_text(q, 0, id, sizeof id);
+        visit(context, id, store_real(q, 1));
+    }
+    if (s == STATUS_OK && rc != STORE_DONE) s = store_error(&store->read, "cannot list jobs", err);
+    store_finish(q);
+    pthread_mutex_unlock(&store->read.lock);
+    return s;
+}
+
 status store_job_queue(struct store *store, size_t n_each, struct queued_job **out, size_t *n_out, struct error *err)
 {
     struct queued_job *job = NULL;
