@@ -41,14 +41,17 @@ static void test_truncated(void **state)
     const char *list[1] = {path};
     stack_path(path, "cut.tif");
     stack_write(path, 16, STACK_PAGES, COMPRESSION_NONE, TEST_STRIPS);
-    size_t n = tiff_read_bytes(path, data, sizeof data);
+    size_t n = tiff_read_bytes(path, data, sizeof data), n_directory = 0, n_count = 0;
     for (size_t keep = 0; keep < n; keep += 61) {
         struct error err = {0};
         struct volume_source *s = NULL;
         test_write_bytes(path, data, keep);
         assert_int_not_equal(volume_source_open(list, 1, &s, &err), STATUS_OK);
         assert_true(strlen(err.text) > 20);
+        n_directory += strcmp(err.text, "cannot read volume 'cut.tif': Can not read TIFF directory") == 0;
+        n_count += strcmp(err.text, "cannot read volume 'cut.tif': Can not read TIFF directory count") == 0;
     }
+    assert_true(n_directory > 0 && n_count > 0); /* whole sentences of libtiff, without the folder */
 }
 
 /* Changed bytes may give an error or other values, but neither a crash nor an unlimited allocation. */
