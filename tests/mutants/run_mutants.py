@@ -19,7 +19,7 @@ import threading
 import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from faults import Fault, faults_of  # noqa: E402
+from faults import faults_of  # noqa: E402
 from line_coverage import Coverage  # noqa: E402
 from mutant_build import SANDBOX, TREE, WORK, Build, Compiler, Linker, check_script, clean_scratch, copy_tree  # noqa: E402
 from parts import GATE, LANGUAGE, WHOLE, Explained, files_of  # noqa: E402
@@ -231,16 +231,19 @@ def sample(n_fault, seed, parts, judges, records):
     side_by_side(judges, work)
 
 
-def moved(path):
-    """Where a file of an earlier run is now: names are unique in the tree."""
-    if (TREE / path).exists():
-        return path
-    found = [p for p in TREE.rglob(pathlib.Path(path).name) if "build" not in p.relative_to(TREE).parts]
-    return str(found[0].relative_to(TREE)) if found else None
+def find_again(r):
+    """The fault of a record, or None: its file may have moved, and have changed elsewhere. Names of files are unique in the tree."""
+    path = next((p for p in TREE.rglob(pathlib.Path(r["file"]).name) if "build" not in p.relative_to(TREE).parts), None)
+    if path is None:
+        return None
+    text, path = path.read_text(), str(path.relative_to(TREE))
+    same = [f for f in faults_of(path, text, LANGUAGE[pathlib.Path(path).suffix])
+            if f.operator == r["operator"] and change_of(f, text) == (r["before"], r["after"])]
+    return min(same, key=lambda f: abs(f.line - r["line"]), default=None)
 
 
 def sample_again(parts, judges, records):
-    """Judges again those of the last run that were not caught. Their files must not have changed."""
+    """Judges again those of the last run that were not caught, as far as their lines are still there."""
     records.read()
     waiting = collections.deque(i for i, r in enumerate(records.list) if r["part"] in parts and r["verdict"] not in ("caught", "explained"))
 
@@ -251,8 +254,8 @@ def sample_again(parts, judges, records):
                     return
                 i = waiting.popleft()
             r = records.list[i]
-            fault = Fault(moved(r["file"]), r["line"], r["operator"], r["start"], r["end"], r["new"])
-            if fault.path is None or change_of(fault, (TREE / fault.path).read_text()) != (r["before"], r["after"]):
+            fault = find_again(r)
+            if fault is None:
                 note(f"{r['file']} has changed: its faults need a new sample")
                 continue
             record = dict(judge.examine(fault, parts[r["part"]]), part=r["part"])
