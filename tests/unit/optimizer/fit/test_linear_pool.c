@@ -153,9 +153,31 @@ static void test_noise_of_carrying(void **state)
     one_row_release(&r);
 }
 
+/* However noisy the steps are, their weights add up to 1: equal estimates are pooled to the same residual. */
+static void test_noisy_steps(void **state)
+{
+    (void)state;
+    static const double noise[] = {1e-6, 1.0, 1e6};
+    for (size_t k = 0; k < 3; k++) {
+        struct one_row r;
+        struct estimate e = {.n_path = 64};
+        double x = 0.2;
+        one_row_init(&r);
+        for (size_t c = 0; c < 3; c++) {
+            e.mean[c] = 1.5;
+            e.var[c] = noise[k];
+        }
+        for (int n = 0; n < 2; n++) assert_int_equal(linear_history_append(&r.h, &x, &e, &e, NULL), STATUS_OK);
+        assert_int_equal(linear_model_pool(&r.m, &r.h, &x, NULL), STATUS_OK);
+        for (size_t c = 0; c < 3; c++)
+            for (int q = 0; q < 2; q++) assert_true(fabs(r.m.r[q][c] / (0.5 * sqrt(r.weight)) - 1.0) < 1e-9);
+        one_row_release(&r);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_pool), cmocka_unit_test(test_carried_to_second_order),
-                                       cmocka_unit_test(test_noise_of_carrying)};
+                                       cmocka_unit_test(test_noise_of_carrying), cmocka_unit_test(test_noisy_steps)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -149,6 +149,15 @@ static void test_a_file_is_in_the_way(void **state)
     assert_int_equal(store_examine(copy, true, NULL, NULL), STATUS_OK);
 }
 
+/* Only a migration keeps a copy of the database. */
+static void test_an_open_of_the_present_version_copies_nothing(void **state)
+{
+    struct store *store = NULL;
+    assert_int_equal(store_open(path, &store, NULL), STATUS_OK);
+    store_close(store);
+    assert_int_equal(scratch_count_entries(*state), 1);
+}
+
 struct ages {
     int n;
     double youngest_unix_s;
@@ -179,6 +188,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         WITH_DATABASE(test_a_sound_database),         WITH_DATABASE(test_no_database),
         WITH_DATABASE(test_content_that_cannot_be),   WITH_DATABASE(test_ages),
-        WITH_DATABASE(test_an_index_that_lacks_rows), WITH_DATABASE(test_a_file_is_in_the_way)};
+        WITH_DATABASE(test_an_index_that_lacks_rows), WITH_DATABASE(test_a_file_is_in_the_way),
+        WITH_DATABASE(test_an_open_of_the_present_version_copies_nothing)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
