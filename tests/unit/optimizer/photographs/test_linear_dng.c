@@ -1,5 +1,5 @@
 /* Raw pictures that are no mosaic: linear DNG, as converters of raw files write it, and a sensor without colors. */
-#include "optimizer/fit/photographs/photograph.h"
+#include "optimizer/photographs/reader/photograph.h"
 #include "tests/support/scratch_folder.h"
 
 #include <math.h>
