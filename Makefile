@@ -23,7 +23,7 @@ WARN += -Wno-format-truncation
 endif
 WARN_C := $(WARN) -Wconversion -Wstrict-prototypes
 WERROR ?= -Werror
-COMMON := -g $(OPTIMIZE) $(MACHINE) -fno-math-errno -fno-trapping-math -I. $(PKG_CFLAGS) $(WERROR)
+COMMON := -g $(OPTIMIZE) $(MACHINE) -fno-math-errno -fno-trapping-math -I. -I$(BUILD) $(PKG_CFLAGS) $(WERROR)
 ifneq ($(SANITIZE),)
 # the sanitizers need more than the sandbox of a worker permits
 COMMON += -fsanitize=$(SANITIZE) -fno-omit-frame-pointer -DSELVEDGE_NO_SANDBOX
@@ -95,6 +95,18 @@ help:              ## list the targets
 	@awk -F ':[^#]*## ' '/^##@ /{printf "\n%s\n", substr($$0, 5)} /^[a-z-]+:.*## /{printf "  %-18s %s\n", $$1, $$2}' \
 		$(MAKEFILE_LIST)
 
+# tables whose rows stand beside the code that they are about: the file, the macro of a row, the sources. A row ends at a blank
+# line
+define gathered
+$$(BUILD)/generated/$(1): $(sort $(3))
+	@mkdir -p $$(@D)
+	@awk '/^$(2)\(/ {row = 1} /^$$$$/ {row = 0} row {print}' $$^ > $$@.new
+	@cmp -s $$@.new $$@ && rm $$@.new || mv $$@.new $$@
+GENERATED += $$(BUILD)/generated/$(1)
+endef
+$(eval $(call gathered,volume_formats.def,VOLUME_FORMAT,$(wildcard geometry/volume/format/*.c)))
+$(eval $(call gathered,cli_commands.def,CLI_COMMAND,$(shell find clients/cli -name '*.c')))
+
 define part_rule
 $(BUILD)/lib/lib$(1).a: $$(call objs,$$(call srcs,$$(folder_$(1))))
 	@mkdir -p $$(@D)
@@ -103,7 +115,7 @@ $(BUILD)/lib/lib$(1).a: $$(call objs,$$(call srcs,$$(folder_$(1))))
 endef
 $(foreach p,$(PARTS),$(eval $(call part_rule,$(p))))
 
-$(BUILD)/obj/%.c.o: %.c
+$(BUILD)/obj/%.c.o: %.c | $(GENERATED)
 	@mkdir -p $(@D)
 	@echo "  CC   $<"
 	@$(CC) $(CFLAGS_ALL) -MMD -MP -c $< -o $@

@@ -6,14 +6,14 @@
 
 static const struct volume_format table[] = {
 #define VOLUME_FORMAT(reader, shown, ...) {__VA_ARGS__},
-#include "base/catalogue/volume_formats.def"
+#include "generated/volume_formats.def"
 #undef VOLUME_FORMAT
 };
 
 /* begins with a separator, which the list leaves out */
 static const char list_after_separator[] =
 #define VOLUME_FORMAT(reader, shown, ...) ", " shown
-#include "base/catalogue/volume_formats.def"
+#include "generated/volume_formats.def"
 #undef VOLUME_FORMAT
     ;
 const char *const volume_format_list = list_after_separator + 2;

@@ -1,4 +1,4 @@
-/* The formats of scans by the endings of file names (volume_formats.def). */
+/* The formats of scans by the endings of file names (rows VOLUME_FORMAT of geometry/volume/format). */
 #ifndef SELVEDGE_BASE_VOLUME_FORMAT_H
 #define SELVEDGE_BASE_VOLUME_FORMAT_H
 

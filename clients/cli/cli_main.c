@@ -23,8 +23,9 @@ static void on_signal(int number)
 }
 
 static status (*const run[CLI_N_COMMAND])(struct cli *, int *, struct error *) = {
+#undef CLI_COMMAND
 #define CLI_COMMAND(id, run, ...) [CLI_##id] = run,
-#include "clients/cli/arguments/cli_commands.def"
+#include "generated/cli_commands.def"
 #undef CLI_COMMAND
 };
 

@@ -1,4 +1,6 @@
-/* The table of volume readers, a row of base/catalogue/volume_formats.def each. */
+/* The table of volume readers. Each has a row VOLUME_FORMAT(reader, shown, members of struct volume_format
+ * (base/catalogue/volume_format.h)) in its own file, beside the reader; `shown` names the format in lists. The Makefile
+ * gathers the rows, from which readers, checks of jobs and clients come. */
 #ifndef SELVEDGE_GEOMETRY_VOLUME_READER_H
 #define SELVEDGE_GEOMETRY_VOLUME_READER_H
 
@@ -23,8 +25,9 @@ typedef struct volume_reader {
 
 /* All formats that can be recognised by the start or the name of a file, in the order in which they are tried. */
 #define VOLUME_FORMAT(reader, ...) extern const volume_reader reader;
-#include "base/catalogue/volume_formats.def"
+#include "generated/volume_formats.def"
 #undef VOLUME_FORMAT
+#define VOLUME_FORMAT(reader, ...) /* a row stands for nothing in the file of its reader */
 
 size_t volume_reader_count(void);
 const volume_reader *volume_reader_at(size_t i);

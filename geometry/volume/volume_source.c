@@ -10,8 +10,9 @@
 #include <string.h>
 
 static const volume_reader *const reader[] = {
+#undef VOLUME_FORMAT
 #define VOLUME_FORMAT(name, ...) &name,
-#include "base/catalogue/volume_formats.def"
+#include "generated/volume_formats.def"
 #undef VOLUME_FORMAT
 };
 /* Not in the table, because raw files cannot be recognised. Opened by raw_source_open with a declaration. */

@@ -2,14 +2,30 @@
 
 #include "base/catalogue/volume_format.h"
 
+#include <limits.h>
 #include <stdio.h>
 #include <string.h>
 
 const struct cli_command cli_command_table[CLI_N_COMMAND] = {
 #define CLI_COMMAND(id, run, ...) [CLI_##id] = {__VA_ARGS__},
-#include "clients/cli/arguments/cli_commands.def"
+#include "generated/cli_commands.def"
 #undef CLI_COMMAND
 };
+
+static int list_place(enum cli_command_id id)
+{
+    const int place = cli_command_table[id].place;
+    return place != 0 ? place : INT_MAX;
+}
+
+void cli_command_order(enum cli_command_id order[CLI_N_COMMAND])
+{
+    for (int i = 0; i < CLI_N_COMMAND; i++) {
+        int k = i;
+        for (; k > 0 && list_place(order[k - 1]) > list_place((enum cli_command_id)i); k--) order[k] = order[k - 1];
+        order[k] = (enum cli_command_id)i;
+    }
+}
 
 void cli_command_text(const struct cli_command *command, char *out, size_t n_bytes)
 {

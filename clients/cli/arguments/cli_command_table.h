@@ -1,4 +1,6 @@
-/* The commands of the command line, a row each (cli_commands.def). */
+/* The commands of the command line: a row CLI_COMMAND(ID, function, members of struct cli_command) each, which stands
+ * beside its function in a file of clients/cli. The Makefile gathers the rows. The parser, the help, the manual page, the
+ * completion of shells and the call of the command come from them. */
 #ifndef SELVEDGE_CLIENTS_CLI_COMMAND_TABLE_H
 #define SELVEDGE_CLIENTS_CLI_COMMAND_TABLE_H
 
@@ -7,7 +9,7 @@
 
 enum cli_command_id {
 #define CLI_COMMAND(id, run, ...) CLI_##id,
-#include "clients/cli/arguments/cli_commands.def"
+#include "generated/cli_commands.def"
 #undef CLI_COMMAND
     CLI_N_COMMAND
 };
@@ -16,6 +18,7 @@ enum cli_command_id {
 #define CLI_SCAN_FORMATS "{scan formats}"
 
 struct cli_command {
+    int place; /* in lists of commands, which rise in it; 0: at the end */
     const char *name;
     const char *operand; /* name of the operand in the help; NULL: none */
     const char *needs;   /* describes the operand in the message when it is missing; NULL: it is a job id */
@@ -27,6 +30,9 @@ struct cli_command {
     const char *text;    /* further lines of the command's help; may be NULL */
 };
 extern const struct cli_command cli_command_table[CLI_N_COMMAND];
+
+/* All commands in the order of lists. */
+void cli_command_order(enum cli_command_id order[CLI_N_COMMAND]);
 
 /* Writes the text of the command's help, at most n_bytes; "" when it has none. */
 void cli_command_text(const struct cli_command *command, char *out, size_t n_bytes);

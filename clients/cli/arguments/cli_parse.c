@@ -197,9 +197,11 @@ void cli_help(const struct cli_args *args, char *text, size_t n_bytes)
     put(text, n_bytes, &at,
         "selvedge: fit the scattering of a cloth's fibers, through a selvedged server\n\n"
         "usage: selvedge COMMAND [options]\n\ncommands:\n");
+    enum cli_command_id order[CLI_N_COMMAND];
+    cli_command_order(order);
     for (int i = 0; i < CLI_N_COMMAND; i++) {
         char left[32];
-        const struct cli_command *c = &cli_command_table[i];
+        const struct cli_command *c = &cli_command_table[order[i]];
         snprintf(left, sizeof left, "%s %s", c->name, c->operand == NULL ? "" : c->operand);
         put(text, n_bytes, &at, "  %-18s %s\n", left, c->summary);
     }

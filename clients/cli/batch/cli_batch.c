@@ -174,6 +174,19 @@ static status delete_batch(struct cli *cli, int *exit_code, struct error *err)
     return s == STATUS_OK ? http_json(cli->http, "DELETE", path, NULL, NULL, NULL, err) : s;
 }
 
+CLI_COMMAND(
+    BATCH, cli_batch, .place = 200, .name = "batch", .operand = "ACTION",
+    .needs = "an action: submit, list, show, start, retry, cancel, results or delete", .second = "NAME",
+    .third = "TABLE", .options = "batch draft json out",
+    .summary = "run many samples with one template, or say how they are",
+    .text =
+        "selvedge batch submit TEMPLATE.json TABLE.csv    a job of each row; or a folder with a folder of each sample\n"
+        "selvedge batch list\n"
+        "selvedge batch show|start|retry|cancel NAME      or its id; retry queues all that have failed\n"
+        "selvedge batch results NAME                      table of results as CSV (--json; --out FILE)\n"
+        "selvedge batch delete NAME --keep-jobs|--delete-jobs\n"
+        "docs/automation.md describes the table. Submitting a changed table with --update runs only what differs.\n")
+
 status cli_batch(struct cli *cli, int *exit_code, struct error *err)
 {
     static const struct {

@@ -127,6 +127,13 @@ static void print_plan(struct cli *cli, const json_t *plan)
     print_ratio(out, ratio);
 }
 
+CLI_COMMAND(
+    PLAN, cli_plan, .place = 210, .name = "plan", .operand = "BATCH", .needs = "the name or the id of a batch",
+    .options = "cores json", .summary = "tell what a batch will take, before it runs, and how far off that was",
+    .text =
+        "Samples that have not run are planned anew: processor time, time on --cores cores, memory and disk. Of those\n"
+        "that ran since they were planned, what they took stands beside it.\n")
+
 status cli_plan(struct cli *cli, int *exit_code, struct error *err)
 {
     char path[200], tail[60] = "/plan";

@@ -26,8 +26,10 @@ struct cli {
 
 /* The functions of the commands. */
 #define CLI_COMMAND(id, run, ...) status run(struct cli *cli, int *exit_code, struct error *err);
-#include "clients/cli/arguments/cli_commands.def"
+#include "generated/cli_commands.def"
 #undef CLI_COMMAND
+/* The row of a command, beside its function; the Makefile gathers all rows. It stands for nothing there. */
+#define CLI_COMMAND(id, run, ...)
 
 /* Reads the first line of a file that other users cannot read: *token, which the caller frees. STATUS_INVALID,
  * STATUS_NOT_FOUND, STATUS_IO. */

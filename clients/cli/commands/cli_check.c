@@ -45,6 +45,13 @@ static status run_worker(const char *document, const char *folder, json_t **repo
     return STATUS_OK;
 }
 
+CLI_COMMAND(
+    CHECK, cli_check, .place = 20, .name = "check", .operand = "JOB.json", .needs = "a job document",
+    .options = "input-dir json", .summary = "check a job document and its files, without a server",
+    .text =
+        "Every file is opened and judged, and all faults are printed at once; nothing is uploaded. Files are taken\n"
+        "from the document's folder (or --input-dir). Exit status 1 when there are faults.\n")
+
 status cli_check(struct cli *cli, int *exit_code, struct error *err)
 {
     char folder[PATH_ROOM];

@@ -44,6 +44,9 @@ status cli_add_result(struct cli *cli, json_t *job, struct error *err)
     return STATUS_OK;
 }
 
+CLI_COMMAND(STATUS, cli_status, .place = 50, .name = "status", .operand = "ID", .options = "json",
+            .summary = "show one job", .text = "Exit status 0 whatever the job's state is.\n")
+
 status cli_status(struct cli *cli, int *exit_code, struct error *err)
 {
     (void)exit_code;
@@ -86,17 +89,26 @@ static status act(struct cli *cli, bool cancel, struct error *err)
     return s;
 }
 
+CLI_COMMAND(CANCEL, cli_cancel, .place = 80, .name = "cancel", .operand = "ID",
+            .summary = "stop a job; its results so far are kept")
+
 status cli_cancel(struct cli *cli, int *exit_code, struct error *err)
 {
     (void)exit_code;
     return act(cli, true, err);
 }
 
+CLI_COMMAND(RETRY, cli_retry, .place = 90, .name = "retry", .operand = "ID",
+            .summary = "start a failed or cancelled job again from its last checkpoint")
+
 status cli_retry(struct cli *cli, int *exit_code, struct error *err)
 {
     (void)exit_code;
     return act(cli, false, err);
 }
+
+CLI_COMMAND(DELETE, cli_delete, .place = 140, .name = "delete", .operand = "ID",
+            .summary = "remove a job and its files", .text = "A running job is stopped first; its results are lost.\n")
 
 status cli_delete(struct cli *cli, int *exit_code, struct error *err)
 {
@@ -142,6 +154,9 @@ static status job_is_active(struct cli *cli, bool *active, struct error *err)
     return s;
 }
 
+CLI_COMMAND(LOG, cli_log, .place = 120, .name = "log", .operand = "ID", .options = "follow",
+            .summary = "print the job's log")
+
 status cli_log(struct cli *cli, int *exit_code, struct error *err)
 {
     (void)exit_code;
@@ -179,6 +194,9 @@ static void print_point(const json_t *point, FILE *out)
     json_array_foreach(json_object_get(point, "parameter"), i, value) fprintf(out, "\t%.7g", json_number_value(value));
     fputc('\n', out);
 }
+
+CLI_COMMAND(SERIES, cli_series, .place = 130, .name = "series", .operand = "ID", .options = "json",
+            .summary = "print the fit step by step: objective, residual, parameters (tab-separated)")
 
 status cli_series(struct cli *cli, int *exit_code, struct error *err)
 {

@@ -43,6 +43,9 @@ static status list_path(const struct cli *cli, char *path, size_t n_path, struct
     return s == STATUS_OK ? add(path, n_path, "created_after", a->days == NULL ? NULL : since, err) : s;
 }
 
+CLI_COMMAND(LIST, cli_list, .place = 70, .name = "list", .options = "json selection",
+            .summary = "list the jobs, newest first")
+
 status cli_list(struct cli *cli, int *exit_code, struct error *err)
 {
     (void)exit_code;

@@ -149,6 +149,15 @@ static status make_document(const struct cli_args *a, json_t **document, char *f
     return s;
 }
 
+CLI_COMMAND(
+    RECONSTRUCT, cli_reconstruct, .place = 30, .name = "reconstruct", .operand = "SCAN", .needs = "a scan",
+    .options = "scan out id-file",
+    .summary = "trace the fibers of a scan, without photographs, and download the results",
+    .text =
+        "SCAN is a file (" CLI_SCAN_FORMATS ") or a folder of slices. The job ends with the\n"
+        "geometry; a later job goes on from it (\"geometry\": {\"job\": ID} in its document). The results go to the\n"
+        "folder of --out (default: selvedge-ID).\n")
+
 status cli_reconstruct(struct cli *cli, int *exit_code, struct error *err)
 {
     json_t *document = NULL;

@@ -250,6 +250,14 @@ static status render(struct cli *cli, const json_t *document, const char *folder
     return s;
 }
 
+CLI_COMMAND(
+    RENDER, cli_render, .place = 40, .name = "render", .operand = "ID", .options = "picture out id-file",
+    .summary = "show the cloth of a finished job on a surface, and download the picture",
+    .text =
+        "A job of its own renders the job's fibers with the fitted parameters, fiber by fiber. The results go to the\n"
+        "folder of --out (default: selvedge-ID): pictures/on-1.png, and on-1.exr with the radiance.\n"
+        "--reference alone means --method fast.\n")
+
 status cli_render(struct cli *cli, int *exit_code, struct error *err)
 {
     const char *mesh = NULL, *temporary = getenv("TMPDIR");

@@ -74,6 +74,13 @@ static status fetch(struct transfer *t, const char *folder, const json_t *file, 
     return STATUS_OK;
 }
 
+CLI_COMMAND(
+    RESULTS, cli_results, .place = 100, .name = "results", .operand = "ID", .options = "out",
+    .summary = "download the results",
+    .text =
+        "Files go to the folder of --out (default: selvedge-ID). A download that breaks continues where it stopped;\n"
+        "complete files are not downloaded again.\n")
+
 status cli_results(struct cli *cli, int *exit_code, struct error *err)
 {
     (void)exit_code;

@@ -17,11 +17,16 @@ static status set_kept(struct cli *cli, const char *method, const char *done, st
     return s;
 }
 
+CLI_COMMAND(KEEP, cli_keep, .place = 170, .name = "keep", .operand = "ID",
+            .summary = "keep a job, whatever the limits of retention say")
+
 status cli_keep(struct cli *cli, int *exit_code, struct error *err)
 {
     (void)exit_code;
     return set_kept(cli, "PUT", "kept", err);
 }
+
+CLI_COMMAND(UNKEEP, cli_unkeep, .place = 180, .name = "unkeep", .operand = "ID", .summary = "take that back")
 
 status cli_unkeep(struct cli *cli, int *exit_code, struct error *err)
 {
@@ -115,6 +120,14 @@ static void print_outcome(const struct cli *cli, const json_t *outcome)
         fprintf(cli->note, "not removed: %s\n", why);
     }
 }
+
+CLI_COMMAND(
+    RETENTION, cli_retention, .place = 190, .name = "retention", .options = "max-age-days max-bytes yes json",
+    .summary = "list the finished jobs that limits of age and size would remove; --yes removes them",
+    .text =
+        "Without options the limits are those of the service's settings. Only jobs that have ended are removed, but\n"
+        "not those that are kept (`selvedge keep ID`), nor those whose geometry an unfinished job asks for. With\n"
+        "--yes exactly the listed jobs are removed, and each is named.\n")
 
 status cli_retention(struct cli *cli, int *exit_code, struct error *err)
 {

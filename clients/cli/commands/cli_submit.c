@@ -347,6 +347,15 @@ status cli_submit_once(struct cli *cli, const json_t *document, const char *fold
     return s;
 }
 
+CLI_COMMAND(
+    SUBMIT, cli_submit, .place = 10, .name = "submit", .operand = "JOB.json", .needs = "a job document",
+    .options = "input-dir watch resume draft id-file",
+    .summary = "send a job document and its files, and start the job",
+    .text =
+        "Every file that the document names is taken from the document's folder (or --input-dir), declared with\n"
+        "its SHA-256 and uploaded. An upload that breaks continues where it stopped; `selvedge submit --resume ID`\n"
+        "continues a submit that was interrupted. Prints the job's id on standard output.\n")
+
 status cli_submit(struct cli *cli, int *exit_code, struct error *err)
 {
     struct submit u = {.cli = cli};

@@ -144,6 +144,16 @@ static status revoke_token(struct cli *cli, const char *name, struct error *err)
     return http_json(cli->http, "DELETE", path, NULL, NULL, NULL, err);
 }
 
+CLI_COMMAND(
+    TOKEN, cli_token, .place = 160, .name = "token", .operand = "ACTION", .needs = "make, list or revoke",
+    .second = "NAME", .options = "scope owner requests bytes jobs json out",
+    .summary = "make, list or revoke access tokens",
+    .text =
+        "selvedge token make NAME --scope SCOPE    prints the token, which is shown only once (--out: into a file)\n"
+        "selvedge token list                       all tokens, newest first\n"
+        "selvedge token revoke NAME                or its id; the next request with it is refused\n"
+        "These need a token with scope admin; the first one is made by `selvedged --make-token NAME`.\n")
+
 status cli_token(struct cli *cli, int *exit_code, struct error *err)
 {
     const char *action = cli->args->operand, *name = cli->args->second;

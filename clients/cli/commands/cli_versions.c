@@ -59,6 +59,12 @@ static status download(struct cli *cli, const char *id, const char *number, stru
     return s;
 }
 
+CLI_COMMAND(
+    VERSIONS, cli_versions, .place = 110, .name = "versions", .operand = "ID", .second = "NUMBER",
+    .options = "out json", .summary = "list the results of a job's earlier runs, or download one",
+    .text = "A job that is edited and run again keeps its earlier results, each under the number of its run. With a\n"
+            "NUMBER its files go to the folder of --out (default: selvedge-ID-NUMBER).\n")
+
 status cli_versions(struct cli *cli, int *exit_code, struct error *err)
 {
     (void)exit_code;

@@ -186,6 +186,11 @@ status cli_watch_job(struct cli *cli, const char *id, int *exit_code, struct err
     return s;
 }
 
+CLI_COMMAND(
+    WATCH, cli_watch, .place = 60, .name = "watch", .operand = "ID", .summary = "follow a job until it ends",
+    .text = "A live progress line in a terminal, one line per change otherwise. Exit status 0 when the job succeeded,\n"
+            "1 when it failed, 3 when it was cancelled.\n")
+
 status cli_watch(struct cli *cli, int *exit_code, struct error *err)
 {
     return cli_watch_job(cli, cli->args->operand, exit_code, err);

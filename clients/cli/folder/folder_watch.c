@@ -327,6 +327,15 @@ static status read_options(struct folder_watch *w, struct error *err)
                      where.line, where.text);
 }
 
+CLI_COMMAND(WATCH_FOLDER, cli_watch_folder, .place = 150, .name = "watch-folder", .operand = "DIR", .needs = "a folder",
+            .options = "template marker quiet once",
+            .summary = "make a job of every sample folder that is put into DIR",
+            .text = "A sample folder NAME is complete when it has the marker file, or has not changed for the quiet "
+                    "time. It becomes\n"
+                    "a job by its job.json or by the template; results, or the reason why there are none, are then in "
+                    "NAME.selvedge\n"
+                    "beside it. Runs until it is stopped; what is known is on disk, so it may be killed at any time.\n")
+
 status cli_watch_folder(struct cli *cli, int *exit_code, struct error *err)
 {
     struct folder_watch w = {.cli = cli, .lock_fd = -1};

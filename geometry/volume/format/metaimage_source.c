@@ -205,5 +205,8 @@ static bool metaimage_recognise(const uint8_t b[16], const char *path)
     return memcmp(b, "ObjectType", 10) == 0 || memcmp(b, "NDims", 5) == 0;
 }
 
+VOLUME_FORMAT(metaimage_reader, ".mhd, .mha", .ending = {".mhd", ".mha"}, .header_ending = ".mhd", .separator = '=',
+              .data_key = {"ElementDataFile"})
+
 const volume_reader metaimage_reader = {"metaimage.v1", "MetaImage",    metaimage_recognise,
                                         metaimage_open, metaimage_read, metaimage_close};

@@ -327,4 +327,7 @@ static bool nrrd_recognise(const uint8_t b[16], const char *path)
     return memcmp(b, "NRRD000", 7) == 0;
 }
 
+VOLUME_FORMAT(nrrd_reader, ".nrrd, .nhdr", .ending = {".nrrd", ".nhdr"}, .header_ending = ".nhdr", .separator = ':',
+              .data_key = {"data file", "datafile"})
+
 const volume_reader nrrd_reader = {"nrrd.v1", "NRRD", nrrd_recognise, nrrd_open, nrrd_read, nrrd_close};

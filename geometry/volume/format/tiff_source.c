@@ -278,4 +278,6 @@ static bool tiff_recognise(const uint8_t b[16], const char *path)
            memcmp(b, "MM\0+", 4) == 0;
 }
 
+VOLUME_FORMAT(tiff_reader, "TIFF", .ending = {".tif", ".tiff"}, .may_be_slices = true)
+
 const volume_reader tiff_reader = {"tiff.v1", "TIFF", tiff_recognise, tiff_open, tiff_read, tiff_close};

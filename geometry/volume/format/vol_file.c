@@ -341,6 +341,8 @@ static bool vol_recognise(const uint8_t b[16], const char *path)
     return memcmp(b, "VOL\3", 4) == 0;
 }
 
+VOLUME_FORMAT(vol_reader, ".vol", .ending = {".vol"})
+
 const volume_reader vol_reader = {"vol.v1", ".vol", vol_recognise, vol_source_open, vol_source_read, vol_source_close};
 
 status vol_read_density(const char *path, struct volume *v, struct error *err)

@@ -70,7 +70,7 @@ static const struct role_rule role_rule[] = {
     {"volume",
      "a scan: "
 #define VOLUME_FORMAT(reader, shown, ...) shown ", "
-#include "base/catalogue/volume_formats.def"
+#include "generated/volume_formats.def"
 #undef VOLUME_FORMAT
      "or raw samples",
      {[KIND_UNKNOWN] = true, [KIND_TIFF] = true, [KIND_VOLUME] = true}},
