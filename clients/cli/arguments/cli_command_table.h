@@ -1,6 +1,6 @@
 /* The commands of the command line: a row CLI_COMMAND(ID, function, members of struct cli_command) each, which stands
- * beside its function in a file of clients/cli. The Makefile gathers the rows. The parser, the help, the manual page, the
- * completion of shells and the call of the command come from them. */
+ * beside its function in a file of clients/cli. The Makefile gathers the rows. The parser, the help, the manual page,
+ * the completion of shells and the call of the command come from them. */
 #ifndef SELVEDGE_CLIENTS_CLI_COMMAND_TABLE_H
 #define SELVEDGE_CLIENTS_CLI_COMMAND_TABLE_H
 
