@@ -66,7 +66,7 @@ def test_paths_exist():
 def test_source_files_exist():
     known = {os.path.basename(path) for path in tracked()} | FOREIGN_NAMES
     missing = [f"{path}: {name}" for path, text in texts()
-               for name in re.findall(r"(?<![\w.-])[a-z][\w.-]*\.(?:c|h|cpp|py|sh|js|css)\b", text)
+               for name in re.findall(r"(?<![\w.<-])[a-z][\w.-]*\.(?:c|h|cpp|py|sh|js|css)\b", text)
                if "my_" not in name and name not in known]
     assert not missing
 
