@@ -11,42 +11,49 @@
         .meaning = "Extinction of full density across the fibers."                                                     \
     }
 
-#define TEXTS(row, id, title) const char row##_id[] = id, row##_title[] = title;
-#define SURFACE_MODEL(name, id, title, ...)                                                                            \
-    TEXTS(surface_##name, id, title)                                                                                   \
-    const struct param_info surface_##name##_param[] = {__VA_ARGS__};
-#define VOLUME_MODEL(name, id, title, ...)                                                                             \
-    TEXTS(volume_##name, id, title)                                                                                    \
-    const struct param_info volume_##name##_param[] = {__VA_ARGS__, DENSITY};
+#define ROW_DATA(row, id, title, ...)                                                                                  \
+    const char row##_id[] = id, row##_title[] = title;                                                                 \
+    const struct param_info row##_param[] = {__VA_ARGS__};
+#define SURFACE_MODEL(name, id, title, ...) ROW_DATA(surface_##name, id, title, __VA_ARGS__)
+#define VOLUME_MODEL(name, id, title, ...) ROW_DATA(volume_##name, id, title, __VA_ARGS__, DENSITY)
 #include "base/catalogue/models.def"
+#undef SURFACE_MODEL
+#undef VOLUME_MODEL
 
+#define INFO(row, kind) {row##_id, row##_title, kind, sizeof row##_param / sizeof *row##_param, row##_param},
 static const struct model_info catalogue[] = {
-#define SURFACE_MODEL(name, ...)                                                                                       \
-    {surface_##name##_id, surface_##name##_title, MODEL_SURFACE, surface_##name##_n_param, surface_##name##_param},
-#define VOLUME_MODEL(name, ...)                                                                                        \
-    {volume_##name##_id, volume_##name##_title, MODEL_VOLUME, volume_##name##_n_param + 1, volume_##name##_param},
+#define SURFACE_MODEL(name, ...) INFO(surface_##name, MODEL_SURFACE)
+#define VOLUME_MODEL(...)
 #include "base/catalogue/models.def"
+#undef SURFACE_MODEL
+#undef VOLUME_MODEL
+#define SURFACE_MODEL(...)
+#define VOLUME_MODEL(name, ...) INFO(volume_##name, MODEL_VOLUME)
+#include "base/catalogue/models.def"
+#undef VOLUME_MODEL
 };
 
-static const struct model_nesting nesting[] = {
-#define SURFACE_MODEL(...)
 #define VOLUME_MODEL(...)
+#undef MODEL_CONTAINS
 #define MODEL_CONTAINS(outer, inner, symbol, ...) {surface_##outer##_id, surface_##inner##_id, symbol, {__VA_ARGS__}},
+static const struct model_nesting nesting[] = {
 #include "base/catalogue/models.def"
 };
+#undef MODEL_CONTAINS
+#define MODEL_CONTAINS(...)
 
 static const struct {
     const char *near, *far;
 } far_field[] = {
-#define SURFACE_MODEL(...)
-#define VOLUME_MODEL(...)
+#undef MODEL_HAS_FAR_FIELD
 #define MODEL_HAS_FAR_FIELD(near, far) {surface_##near##_id, surface_##far##_id},
 #include "base/catalogue/models.def"
 };
+#undef MODEL_HAS_FAR_FIELD
+#define MODEL_HAS_FAR_FIELD(...)
 
 static const char *const with_speckle[] = {
-#define SURFACE_MODEL(...)
-#define VOLUME_MODEL(...)
+#undef MODEL_HAS_SPECKLE
 #define MODEL_HAS_SPECKLE(name) surface_##name##_id,
 #include "base/catalogue/models.def"
 };

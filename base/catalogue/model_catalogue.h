@@ -1,11 +1,10 @@
-/* The catalogue of models: their ids and parameters. It is pure data from models.def, so that a program can check
- * a job document without linking the renderer. A new model is a row there and a file below renderer/scattering; the
- * registries of the renderer follow from the same rows.
+/* The catalogue of models: their ids and parameters. It is pure data (models.def), so that a program can check a job
+ * document without linking the renderer. A new model is a folder of renderer/scattering/models and a line of
+ * models.def; the registries of the renderer follow from the same rows.
  */
 #ifndef SELVEDGE_BASE_MODEL_CATALOGUE_H
 #define SELVEDGE_BASE_MODEL_CATALOGUE_H
 
-#include "base/angle.h"
 #include "base/catalogue/param_info.h"
 
 #include <stdbool.h>
@@ -47,23 +46,8 @@ const struct model_nesting *model_catalogue_nesting(size_t i);
 const char *model_catalogue_with_speckle(size_t i);
 bool model_catalogue_has_speckle(const char *id);
 /* The id of the i-th near field that has a far field, NULL behind the last, and the id of a model's far field: the mean
- * over the width of the fiber with the same parameters (models.def). NULL: the model has none. */
+ * over the width of the fiber with the same parameters (model_row.h). NULL: the model has none. */
 const char *model_catalogue_near_field(size_t i);
 const char *model_catalogue_far_field(const char *id);
-
-/* The rows as constants, for the implementations of models: a scattering_model or a phase_model begins with
- * SURFACE_MODEL_ROW(name) or VOLUME_MODEL_ROW(name). n_param of a volume model's row does not count the density
- * multiplier, which belongs to the volume and not to the phase function. */
-#define SURFACE_MODEL_ROW(name) MODEL_ROW_FIELDS(surface_##name)
-#define VOLUME_MODEL_ROW(name) MODEL_ROW_FIELDS(volume_##name)
-#define MODEL_ROW_FIELDS(row) .id = row##_id, .title = row##_title, .n_param = row##_n_param, .param = row##_param
-
-#define MODEL_ROW_CONSTANTS(row, ...)                                                                                  \
-    extern const char row##_id[], row##_title[];                                                                       \
-    extern const struct param_info row##_param[];                                                                      \
-    enum { row##_n_param = sizeof((const struct param_info[]){__VA_ARGS__}) / sizeof(struct param_info) };
-#define SURFACE_MODEL(name, id, title, ...) MODEL_ROW_CONSTANTS(surface_##name, __VA_ARGS__)
-#define VOLUME_MODEL(name, id, title, ...) MODEL_ROW_CONSTANTS(volume_##name, __VA_ARGS__)
-#include "base/catalogue/models.def"
 
 #endif

@@ -1,9 +1,13 @@
-#include "renderer/scattering/phase_registry.h"
+#include "renderer/scattering/phase_model.h"
 
 #include <string.h>
 
+#define SURFACE_MODEL(...)
+#define VOLUME_MODEL(name, ...) extern const struct phase_model phase_##name;
+#include "base/catalogue/models.def"
+#undef VOLUME_MODEL
+
 static const struct phase_model *const registry[] = {
-#define SURFACE_MODEL(name, ...)
 #define VOLUME_MODEL(name, ...) &phase_##name,
 #include "base/catalogue/models.def"
     NULL,

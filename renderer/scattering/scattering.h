@@ -1,4 +1,5 @@
-/* Scattering models of fibers: one file per model, one row in the catalogue (base/catalogue/models.def), found by id.
+/* Scattering models of fibers: a folder of models/ each, with their rows of the catalogue
+ * (base/catalogue/models.def), found by id.
  *
  * Frame: fiber frame u, v, w with u along the fiber; w = (sin th, cos th cos ph, cos th sin ph), th in [-pi/2, pi/2]
  * from the normal plane (fabric thesis, section 5.4). Directions point away from the fiber. S(wi, wo) is the BCSDF; the

@@ -1,11 +1,15 @@
-#include "renderer/scattering/scattering_registry.h"
+#include "renderer/scattering/scattering.h"
 
 #include <math.h>
 #include <string.h>
 
+#define VOLUME_MODEL(...)
+#define SURFACE_MODEL(name, ...) extern const struct scattering_model scattering_##name;
+#include "base/catalogue/models.def"
+#undef SURFACE_MODEL
+
 static const struct scattering_model *const registry[] = {
 #define SURFACE_MODEL(name, ...) &scattering_##name,
-#define VOLUME_MODEL(name, ...)
 #include "base/catalogue/models.def"
     NULL,
 };

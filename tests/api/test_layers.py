@@ -22,6 +22,8 @@ import check_layers  # noqa: E402
     ("server/a.c", "renderer/scattering/appearance.h"),
     ("clients/cli/a.c", "server/settings/settings.h"),
     ("base/a.c", "status.h"),
+    ("base/catalogue/models.def", "renderer/scattering/scattering.h"),
+    ("base/catalogue/methods.def", "renderer/scattering/models/fur/fur.def"),
 ])
 def test_includes_against_the_layers(path, include):
     assert list(check_layers.check_includes(path, f'/* A file. */\n#include "{include}"\n'))
@@ -31,6 +33,7 @@ def test_includes_against_the_layers(path, include):
     ("optimizer/job/a.c", "base/catalogue/model_catalogue.h"),
     ("server/jobs/a.c", "optimizer/job/document/job_document.h"),
     ("optimizer/fit/a.c", "renderer/transport/estimate/estimate.h"),
+    ("base/catalogue/models.def", "renderer/scattering/models/fur/fur.def"),
 ])
 def test_includes_along_the_layers(path, include):
     assert not list(check_layers.check_includes(path, f'#include "{include}"\n'))

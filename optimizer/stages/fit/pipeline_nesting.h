@@ -1,4 +1,4 @@
-/* The order of the fits where a model contains another model of the job (MODEL_CONTAINS in base/catalogue/models.def).
+/* The order of the fits where a model contains another model of the job (MODEL_CONTAINS in base/catalogue/model_row.h).
  * The contained model is fitted first, and its result is a further start of the containing model, which therefore does
  * not end worse. */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_NESTING_H

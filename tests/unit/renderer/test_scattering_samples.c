@@ -1,6 +1,6 @@
 /* How often a model draws from each of its terms: samples that ask for the wrong term cost variance, which no mean
  * shows. */
-#include "renderer/scattering/scattering_registry.h"
+#include "renderer/scattering/scattering.h"
 
 #include <math.h>
 #include <setjmp.h>

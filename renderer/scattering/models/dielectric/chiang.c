@@ -13,7 +13,6 @@
  * azimuth are taken at the difference angle (near_field.h), and the surface has no tilted scales.
  */
 #include "renderer/scattering/models/dielectric/near_field.h"
-#include "renderer/scattering/scattering_registry.h"
 
 #include <stdlib.h>
 

@@ -23,7 +23,6 @@
 
 #include "renderer/scattering/models/dielectric/dielectric_along.h"
 #include "renderer/scattering/models/dielectric/dielectric_ray.h"
-#include "renderer/scattering/scattering_registry.h"
 
 enum {
     DIELECTRIC_N_PARAM = surface_dielectric_n_param,

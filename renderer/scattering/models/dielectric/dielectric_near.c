@@ -1,6 +1,5 @@
 /* dielectric_near.v1: the near field of dielectric.v1, with the same parameters (near_field.h). */
 #include "renderer/scattering/models/dielectric/near_field.h"
-#include "renderer/scattering/scattering_registry.h"
 
 #include <stdlib.h>
 

@@ -24,7 +24,6 @@
 #define SELVEDGE_RENDERER_ELLIPTICAL_H
 
 #include "renderer/scattering/models/elliptical/elliptical_lobes.h"
-#include "renderer/scattering/scattering_registry.h"
 
 enum {
     ELLIPTICAL_N_PHI = 180,

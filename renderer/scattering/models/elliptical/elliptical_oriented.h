@@ -28,7 +28,6 @@
 #define SELVEDGE_RENDERER_ELLIPTICAL_ORIENTED_H
 
 #include "renderer/scattering/models/elliptical/elliptical_lobes.h"
-#include "renderer/scattering/scattering_registry.h"
 
 enum {
     ORIENTED_N = 48,                    /* steps of psi and of Delta */

@@ -3,7 +3,6 @@
  * direction; an azimuth from N of the mode at th_d = th_o, averaged over the channels, and 2 % uniform.
  */
 #include "renderer/scattering/models/fur/fur_far.h"
-#include "renderer/scattering/scattering_registry.h"
 #include "renderer/scattering/scattering_state.h"
 
 #include <stdlib.h>

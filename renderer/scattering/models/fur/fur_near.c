@@ -4,7 +4,6 @@
 #include "renderer/scattering/models/dielectric/near_azimuth.h"
 #include "renderer/scattering/models/dielectric/near_view.h"
 #include "renderer/scattering/models/fur/fur.h"
-#include "renderer/scattering/scattering_registry.h"
 #include "renderer/scattering/scattering_state.h"
 
 #include <stdlib.h>

@@ -33,9 +33,10 @@
 
 #include "renderer/scattering/lobes/azimuth_table.h"
 #include "renderer/scattering/lobes/lobe_balance.h"
+#include "renderer/scattering/models/microfacet/microfacet.def"
 #include "renderer/scattering/models/microfacet/microfacet_surface.h"
 #include "renderer/scattering/models/microfacet/microfacet_walk.h"
-#include "renderer/scattering/scattering_registry.h"
+#include "renderer/scattering/scattering.h"
 
 enum {
     MICROFACET_P_C_T = 0,

@@ -8,7 +8,7 @@
  * albedos beside the nine parameters of two_lobe.v1; sampling is that model's, whose density is exact here too.
  */
 #include "renderer/scattering/models/two_lobe/two_lobe_core.h"
-#include "renderer/scattering/phase_registry.h"
+#include "renderer/scattering/phase_model.h"
 
 #include <string.h>
 

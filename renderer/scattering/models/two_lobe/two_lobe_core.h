@@ -15,7 +15,8 @@
 
 #include "renderer/scattering/lobes/fiber_direction.h"
 #include "renderer/scattering/lobes/von_mises.h"
-#include "renderer/scattering/scattering_registry.h"
+#include "renderer/scattering/models/two_lobe/two_lobe.def"
+#include "renderer/scattering/scattering.h"
 
 #include <stdbool.h>
 #include <stdlib.h>
