@@ -1,11 +1,13 @@
 #!/usr/bin/python3
-"""Writes the tables of parameters in docs/model.md, which follow from the catalogue of models (base/catalogue/models.def).
+"""Writes the tables of parameters in docs/model.md and in the pages of the models, which follow from the catalogue of
+models (base/catalogue/models.def).
 
     config/generate_model_tables.py [--check] SELVEDGE-WORKER
 
 Between a line "<!-- parameters: ID ID ... -->" and the next "<!-- end -->" stands one table of these models. With --check
 nothing is written and the exit status is 1 when a table is out of date."""
 import argparse
+import glob
 import json
 import os
 import re
@@ -13,7 +15,8 @@ import subprocess
 import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-DOCUMENT = os.path.join(ROOT, "docs", "model.md")
+DOCUMENTS = [os.path.join(ROOT, "docs", "model.md")] + sorted(
+    glob.glob(os.path.join(ROOT, "renderer", "scattering", "models", "*", "README.md")))
 MARKS = re.compile(r"(<!-- parameters: ([^\n]*?) -->\n).*?(<!-- end -->)", flags=re.S)
 HEAD = ["model", "parameter", "meaning", "unit in files", "range", "start", "fitted in"]
 COORDINATE = {"linear": "p", "log": "ln p", "logit": "ln(p / (1 - p))"}
@@ -64,13 +67,16 @@ def main():
     parser.add_argument("--check", action="store_true")
     parser.add_argument("worker", metavar="SELVEDGE-WORKER")
     arguments = parser.parse_args()
-    with open(DOCUMENT, encoding="utf-8") as file:
-        before = file.read()
-    after = with_tables(before, read_catalogue(arguments.worker))
-    if not arguments.check and before != after:
-        with open(DOCUMENT, "w", encoding="utf-8") as file:
-            file.write(after)
-    return 1 if arguments.check and before != after else 0
+    catalogue, stale = read_catalogue(arguments.worker), False
+    for document in DOCUMENTS:
+        with open(document, encoding="utf-8") as file:
+            before = file.read()
+        after = with_tables(before, catalogue)
+        stale = stale or before != after
+        if not arguments.check and before != after:
+            with open(document, "w", encoding="utf-8") as file:
+                file.write(after)
+    return 1 if arguments.check and stale else 0
 
 
 if __name__ == "__main__":

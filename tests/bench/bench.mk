@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-pictures bench-pile bench-weave bench-weave-rendered
+.PHONY: bench docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-pictures bench-pile bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -147,6 +147,11 @@ docs-pictures: | deps-test ## make docs/images/{twill,derivatives,cloth-weaves,c
 	@mkdir -p docs/images
 	@$(BUILD)/tests/bench/pictures/documentation_pictures twill docs/images/twill.png
 	@$(BUILD)/tests/bench/pictures/documentation_pictures derivatives docs/images/derivatives.png
+
+docs-lobes:        ## draw NAME-lobes.svg in every folder of renderer/scattering/models anew, from what the models evaluate (seconds)
+	@$(MAKE) --no-print-directory $(BUILD)/tests/bench/models/draw_lobes >&2
+	@for rows in renderer/scattering/models/*/*.def; do \
+		$(BUILD)/tests/bench/models/draw_lobes $$(sed -nE 's/^(SURFACE|VOLUME)_MODEL\(\w+, "([^"]+)".*/\2/p' $$rows) > $${rows%.def}-lobes.svg || exit 1; done
 
 docs-speckle: | deps-test ## make docs/images/speckle.png anew: silk without and with speckle (half a minute of a core)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/pictures/speckle_pictures
