@@ -1,4 +1,5 @@
 #include "optimizer/report/export/hair_fit.h"
+#include "renderer/scattering/lobes/fresnel.h"
 
 #include <math.h>
 #include <nlopt.h>
@@ -212,14 +213,6 @@ static void mean_share(const struct target *t, double share[N_THETA_O][N_SIDE][3
 
 /* ---- an opaque fiber ---- */
 
-static double dielectric(double cosine, double index)
-{
-    double cos_t = sqrt(1.0 - (1.0 - cosine * cosine) / (index * index));
-    double p = (index * cosine - cos_t) / (index * cosine + cos_t),
-           s = (cosine - index * cos_t) / (cosine + index * cos_t);
-    return 0.5 * (p * p + s * s);
-}
-
 static double smith(double cosine, double alpha)
 {
     return 2.0 * cosine / (cosine + sqrt(alpha * alpha + (1.0 - alpha * alpha) * cosine * cosine));
@@ -230,8 +223,8 @@ static double highlight(double cos_i, double cos_o, double half2, double index, 
 {
     double alpha = roughness * roughness, half = sqrt(half2), z = (cos_i + cos_o) / (2.0 * half);
     double t = z * z * (alpha * alpha - 1.0) + 1.0;
-    return alpha * alpha / (t * t) * smith(cos_i, alpha) * smith(cos_o, alpha) * dielectric(half, index) /
-           (4.0 * cos_i * cos_o);
+    return alpha * alpha / (t * t) * smith(cos_i, alpha) * smith(cos_o, alpha) *
+           fresnel_unpolarised(half, index, NULL) / (4.0 * cos_i * cos_o);
 }
 
 /* Means over the width of the fiber of cos cos f, f = 1 / pi for [0] and the highlight for [1], towards wi from wo. */

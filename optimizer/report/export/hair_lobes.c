@@ -1,4 +1,5 @@
 #include "optimizer/report/export/hair_lobes.h"
+#include "renderer/scattering/lobes/fresnel.h"
 
 #include <math.h>
 #include <string.h>
@@ -62,22 +63,13 @@ static double trimmed_logistic(double x, double s)
     return e / (s * (1.0 + e) * (1.0 + e)) / (logistic_cdf(M_PI, s) - logistic_cdf(-M_PI, s));
 }
 
-static double fresnel(double cos_i, double eta)
-{
-    double sin2_t = (1.0 - cos_i * cos_i) / (eta * eta);
-    if (sin2_t >= 1.0) return 1.0;
-    double cos_t = sqrt(1.0 - sin2_t), p = (eta * cos_i - cos_t) / (eta * cos_i + cos_t),
-           s = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-    return 0.5 * (p * p + s * s);
-}
-
 /* Shares of the light in the lobes and in the rest, for an offset h; and gamma_o, gamma_t. */
 static void attenuations(const struct hair_lobes *l, double h, double theta_o, double share[N_LOBE + 1][3],
                          double gamma[2])
 {
     double cos_o = cos(theta_o), sin_t = sin(theta_o) / l->index, cos_t = sqrt(1.0 - sin_t * sin_t);
     double eta = sqrt(l->index * l->index - sin(theta_o) * sin(theta_o)) / cos_o, sin_gamma = h / eta;
-    double f = fresnel(cos_o * sqrt(1.0 - h * h), l->index);
+    double f = fresnel_unpolarised(cos_o * sqrt(1.0 - h * h), l->index, NULL);
     gamma[0] = asin(h);
     gamma[1] = asin(sin_gamma);
     for (int c = 0; c < 3; c++) {

@@ -1,4 +1,5 @@
 #include "optimizer/report/textures/texture_surface.h"
+#include "renderer/scattering/lobes/fresnel.h"
 
 #include <math.h>
 
@@ -29,9 +30,7 @@ double texture_surface_anisotropy(const struct texture_surface *t, size_t i)
 double texture_fresnel(double cosine, double share)
 {
     double root = sqrt(fmin(share, 0.98)), eta = (1.0 + root) / (1.0 - root);
-    double cos_t = sqrt(fmax(1.0 - (1.0 - cosine * cosine) / (eta * eta), 0.0));
-    double p = (eta * cosine - cos_t) / (eta * cosine + cos_t), s = (cosine - eta * cos_t) / (cosine + eta * cos_t);
-    return 0.5 * (p * p + s * s);
+    return fresnel_unpolarised(cosine, eta, NULL);
 }
 
 double texture_smith(const struct texture_sample *s, const double w[3], double ax, double ay)

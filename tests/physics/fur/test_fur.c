@@ -65,7 +65,7 @@ static void cuticle(void **unused)
     double largest = 0;
     for (int k = 0; k <= 40; k++) {
         double x = k * M_PI_2 / 41, eta = 1.5, single[2], stack = 0;
-        dielectric_polarised(cos(x), eta, single, NULL);
+        fresnel_polarised(cos(x), eta, single, NULL);
         for (int p = 0; p < 2; p++) { /* one layer has two boundaries, with all reflections between them */
             double r = single[p], t = 1 - r;
             stack += 0.5 * (r + t * t * r / (1 - r * r));

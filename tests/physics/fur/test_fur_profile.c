@@ -68,7 +68,7 @@ static void mirrored_light(void **unused)
         for (int k = 0; k < 50; k++) {
             const double phi = deg * RAD_PER_DEG + bin * ((k + 0.5) / 50 - 0.5);
             double single[2], layer = 0;
-            dielectric_polarised(cos(theta_i) * cos(phi / 2), f.eta, single, NULL);
+            fresnel_polarised(cos(theta_i) * cos(phi / 2), f.eta, single, NULL);
             for (int q = 0; q < 2; q++) layer += 0.5 * single[q] / (1 + single[q]);
             expected += layer * cos(phi / 2) / 4 * bin / 50;
         }

@@ -16,8 +16,7 @@
 #ifndef SELVEDGE_RENDERER_DIELECTRIC_RAY_H
 #define SELVEDGE_RENDERER_DIELECTRIC_RAY_H
 
-#include <math.h>
-#include <stddef.h>
+#include "renderer/scattering/lobes/fresnel.h"
 
 enum dielectric_mode { DIELECTRIC_R, DIELECTRIC_TT, DIELECTRIC_TRT, DIELECTRIC_REST, DIELECTRIC_N_MODE };
 
@@ -42,37 +41,13 @@ struct dielectric_ray {
     double d_fresnel, d_length, d_gamma_t; /* by eta */
 };
 
-/* Reflectances from outside of light that is polarised across (s) and in (p) the plane of incidence, for the cosine of
- * the angle of incidence, and their derivatives by eta when d_eta is not NULL. */
-static inline void dielectric_polarised(double cos_i, double eta, double sp[2], double d_eta[2])
-{
-    double sin2 = 1 - cos_i * cos_i, cos_t = sqrt(1 - sin2 / (eta * eta)), q = eta * cos_t, a = eta * cos_i;
-    double s = (cos_i - q) / (cos_i + q), p = (a - cos_t) / (a + cos_t);
-    sp[0] = s * s;
-    sp[1] = p * p;
-    if (d_eta != NULL) {
-        double d_cos_t = sin2 / (eta * eta * eta * cos_t), d_q = cos_t + eta * d_cos_t;
-        d_eta[0] = -4 * s * cos_i / ((cos_i + q) * (cos_i + q)) * d_q;
-        d_eta[1] = 4 * p * (cos_t * cos_i - a * d_cos_t) / ((a + cos_t) * (a + cos_t));
-    }
-}
-
-/* F of unpolarised light from outside for the cosine of the angle of incidence, and d F / d eta when wanted. */
-static inline double dielectric_fresnel(double cos_i, double eta, double *d_eta)
-{
-    double sp[2], d[2];
-    dielectric_polarised(cos_i, eta, sp, d_eta != NULL ? d : NULL);
-    if (d_eta != NULL) *d_eta = 0.5 * (d[0] + d[1]);
-    return 0.5 * (sp[0] + sp[1]);
-}
-
 /* cos_theta > 0; x in [-pi/2, pi/2]; eta > 1. */
 static inline struct dielectric_ray dielectric_ray_at(double cos_theta, double x, double eta)
 {
     struct dielectric_ray r;
     double h = sin(x), cos2 = cos_theta * cos_theta, sin2 = 1 - cos2, bravais2 = (eta * eta - sin2) / cos2;
     double sin_t = h / sqrt(bravais2), cos_t = sqrt(1 - sin_t * sin_t), cos_theta_t = sqrt(1 - sin2 / (eta * eta));
-    r.fresnel = dielectric_fresnel(cos_theta * cos(x), eta, &r.d_fresnel);
+    r.fresnel = fresnel_unpolarised(cos_theta * cos(x), eta, &r.d_fresnel);
     r.gamma_t = asin(sin_t);
     r.length = cos_t / cos_theta_t;
     r.d_gamma_t = -sin_t / cos_t * eta / (bravais2 * cos2); /* d ln eta' / d eta = eta / (eta'^2 cos^2 th) */

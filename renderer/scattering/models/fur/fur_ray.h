@@ -59,7 +59,7 @@ static inline struct fur_ray fur_ray_at(const struct fur_fiber *f, double cos_th
     double eta = f->eta, cos2 = cos_theta * cos_theta, sin2 = 1 - cos2, bravais2 = (eta * eta - sin2) / cos2;
     double b = sin(x) / sqrt(bravais2), cosine = sqrt(1 - b * b), d_b = -b * eta / (bravais2 * cos2);
     double f_sp[2], d_sp[2], one = 0, d_one = 0;
-    dielectric_polarised(cos_theta * cos(x), eta, f_sp, d_sp);
+    fresnel_polarised(cos_theta * cos(x), eta, f_sp, d_sp);
     for (int k = 0; k < 2; k++) {
         one += f_sp[k] / (1 + f_sp[k]);
         d_one += d_sp[k] / ((1 + f_sp[k]) * (1 + f_sp[k]));

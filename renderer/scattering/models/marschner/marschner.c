@@ -16,6 +16,7 @@
 #include "renderer/scattering/models/marschner/marschner.def"
 #include "renderer/scattering/lobes/cone_lobe.h"
 #include "renderer/scattering/lobes/fiber_direction.h"
+#include "renderer/scattering/lobes/fresnel.h"
 #include "renderer/scattering/lobes/von_mises.h"
 #include "renderer/scattering/scattering.h"
 
@@ -37,14 +38,6 @@ struct scattering_state {
     float fresnel[N_TABLE + 1][2]; /* by cos of the angle of incidence: F, d F / d eta */
 };
 
-/* Unpolarised Fresnel reflectance from outside. */
-static double fresnel_dielectric(double cos_i, double eta)
-{
-    double cos_t = sqrt(1 - (1 - cos_i * cos_i) / (eta * eta));
-    double s = (cos_i - eta * cos_t) / (cos_i + eta * cos_t), p = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
-    return 0.5 * (s * s + p * p);
-}
-
 /* Means over h: value and d / d C_T of TT and TRT for one transmittance; the mean Fresnel factor. */
 static double mean_attenuation(double cos_d, double eta, double c_t, double value[2], double d_c_t[2])
 {
@@ -53,7 +46,7 @@ static double mean_attenuation(double cos_d, double eta, double c_t, double valu
     for (int k = 0; k < 2; k++) value[k] = d_c_t[k] = 0;
     for (int i = 0; i < N_OFFSET; i++) { /* h = sin x: nodes crowd where Fresnel rises */
         double x = (i + 0.5) * M_PI_2 / N_OFFSET, h = sin(x), weight = cos(x) * M_PI_2 / N_OFFSET;
-        double f = fresnel_dielectric(cos_d * cos(x), eta), length = sqrt(fmax(0, 1 - h * h / bravais2)) / cos_t;
+        double f = fresnel_unpolarised(cos_d * cos(x), eta, NULL), length = sqrt(fmax(0, 1 - h * h / bravais2)) / cos_t;
         double t = exp(ln_c_t * length), tt = (1 - f) * (1 - f) * t * weight, trt = tt * f * t;
         value[0] += tt;
         value[1] += trt;
@@ -70,9 +63,10 @@ static void fill_tables(struct scattering_state *s, const double *param)
     for (int i = 0; i <= N_TABLE; i++) {
         double cos_d = (double)i / N_TABLE;
         struct attenuation_entry *e = &s->attenuation[i];
-        s->fresnel[i][0] = (float)fresnel_dielectric(cos_d, eta);
+        s->fresnel[i][0] = (float)fresnel_unpolarised(cos_d, eta, NULL);
         s->fresnel[i][1] =
-            (float)((fresnel_dielectric(cos_d, eta + step) - fresnel_dielectric(cos_d, eta - step)) / (2 * step));
+            (float)((fresnel_unpolarised(cos_d, eta + step, NULL) - fresnel_unpolarised(cos_d, eta - step, NULL)) /
+                    (2 * step));
         for (int c = 0; c < 3; c++) {
             double value[2], d_c_t[2], more[2], less[2], unused[2], c_t = param[P_C_T + c];
             e->reflected = (float)mean_attenuation(cos_d, eta, c_t, value, d_c_t);

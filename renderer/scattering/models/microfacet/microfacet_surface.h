@@ -15,7 +15,7 @@
 #ifndef SELVEDGE_RENDERER_MICROFACET_SURFACE_H
 #define SELVEDGE_RENDERER_MICROFACET_SURFACE_H
 
-#include "renderer/scattering/models/dielectric/dielectric_ray.h"
+#include "renderer/scattering/lobes/fresnel.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -45,7 +45,7 @@ static inline float microfacet_reflected(const struct microfacet_surface *s, flo
         }
     double d_fresnel;
     const float fresnel =
-        (float)dielectric_fresnel(fmin((double)cos_half, 1), (double)s->eta, d != NULL ? &d_fresnel : NULL);
+        (float)fresnel_unpolarised(fmin((double)cos_half, 1), (double)s->eta, d != NULL ? &d_fresnel : NULL);
     const float scale = sec2 * sec2 * 0.035261849f * inv; /* 1 / (16 sqrt(pi)) */
     if (d != NULL) {
         d[MICROFACET_R_BY_ETA] = scale * sum * (float)d_fresnel;

@@ -219,7 +219,7 @@ static void store_samples(struct scattering_state *s, const struct work *w, int 
         const double phi = j * M_PI / MICROFACET_N_PHI, c = cos(0.5 * phi);
         const double seen = fmax(2 * microfacet_seen(cosine, c, r) - 1, 0);
         microfacet_reflected_lobe(&s->surface, cosine, phi, &to->shift_r[j], &to->width_r[j]);
-        light[j] = seen * 0.25 * c * dielectric_fresnel(cosine * c, (double)s->surface.eta, NULL);
+        light[j] = seen * 0.25 * c * fresnel_unpolarised(cosine * c, (double)s->surface.eta, NULL);
         sum += light[j] * 2 * M_PI / MICROFACET_N_PHI;
     }
     store_density(to, MICROFACET_R, light);

@@ -1,5 +1,5 @@
 #include "renderer/scattering/models/microfacet/microfacet_walk.h"
-#include "renderer/scattering/models/dielectric/dielectric_ray.h"
+#include "renderer/scattering/lobes/fresnel.h"
 #include "renderer/scattering/models/elliptical/ellipse_ray.h"
 
 #include <string.h>
@@ -55,7 +55,7 @@ static double leave(const struct microfacet_fiber *f, const struct facet *m, con
     const double cosine = ellipse_cosine_outside(1 - f->eta * f->eta * (1 - m->cosine * m->cosine), NULL);
     if (!(cosine > 0)) return 0;
     for (int i = 0; i < 3; i++) out[i] = f->eta * w[i] + (cosine - f->eta * m->cosine) * m->normal[i];
-    return 1 - dielectric_fresnel(cosine, f->eta, NULL);
+    return 1 - fresnel_unpolarised(cosine, f->eta, NULL);
 }
 
 void microfacet_walk(const struct microfacet_fiber *f, double theta, const struct microfacet_draw *draw,
@@ -72,7 +72,7 @@ void microfacet_walk(const struct microfacet_fiber *f, double theta, const struc
     struct facet m = facet_at(f, at, light, draw->slope[0]);
     if (m.weight == 0) return;
     const double cos_t = sqrt(1 - (1 - m.cosine * m.cosine) / (f->eta * f->eta));
-    double left = m.weight * (1 - dielectric_fresnel(m.cosine, f->eta, NULL));
+    double left = m.weight * (1 - fresnel_unpolarised(m.cosine, f->eta, NULL));
     for (int i = 0; i < 3; i++) w[i] = -light[i] / f->eta + (m.cosine / f->eta - cos_t) * m.normal[i];
     for (int p = 0; p < MICROFACET_N_INNER; p++) {
         double out[3];
