@@ -127,7 +127,6 @@ void diffusion_setting_init(struct diffusion_setting *s, const struct diffusion_
 {
     s->option = option;
     s->path.n_traced = option->tables->n_traced;
-    s->path.share_beyond = 0;
     s->path.finish = finish;
     s->path.finish_context = s;
     if (s->path.n_traced == 1) s->path.guided_paths = false;

@@ -18,10 +18,6 @@ struct fast_option {
     /* Take light that is scattered more than n_traced times from tables->deep, at the first hit of a path, instead of
      * from the cells at the last. With FAST_TRACED and n_traced as in the table. */
     bool deep;
-    /* 0: the fast value alone. Otherwise this share of the paths, chosen at random, goes on beyond the table, and adds
-     * what it finds less the table's value, over the share: then the expectation is that of path tracing. In (0, 1],
-     * with FAST_TRACED and without deep. */
-    double corrected_share;
 };
 
 #endif

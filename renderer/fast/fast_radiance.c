@@ -7,12 +7,8 @@ static status check(const struct radiance_input *in, struct error *err)
 {
     const struct fast_option *o = in->fast;
     double tile_mm[2];
-    if (!(o->corrected_share >= 0.0 && o->corrected_share <= 1.0) ||
-        (o->corrected_share > 0.0 && o->visibility != FAST_TRACED))
-        return error_set(err, STATUS_INVALID, "cannot correct a share of %g of the samples", o->corrected_share);
-    if (o->deep && (o->visibility != FAST_TRACED || o->corrected_share > 0.0))
-        return error_set(err, STATUS_INVALID,
-                         "cannot take deep light from its table with visibility by tables or with corrected samples");
+    if (o->deep && o->visibility != FAST_TRACED)
+        return error_set(err, STATUS_INVALID, "cannot take deep light from its table with visibility by tables");
     if (o->deep && (o->n_traced == 0 || o->tables->deep.n_traced != o->n_traced))
         return error_set(err, STATUS_INVALID, "cannot trace %u hits: the table of deep light is for %u", o->n_traced,
                          o->tables->deep.n_traced);

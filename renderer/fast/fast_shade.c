@@ -338,11 +338,10 @@ status fast_setting_init(struct fast_setting *s, const struct fast_option *optio
     s->option = option;
     s->arriving = NULL;
     s->path.n_traced = option->n_traced > 0 ? option->n_traced : 1;
-    s->path.share_beyond = (float)option->corrected_share;
     s->path.finish = option->deep ? NULL : finish;
     s->path.begin = option->deep ? deep_shade_begin : NULL;
     s->path.finish_context = s;
-    if (s->path.n_traced == 1 && !(s->path.share_beyond > 0)) s->path.guided_paths = false;
+    if (s->path.n_traced == 1) s->path.guided_paths = false;
     light_mixture_init(&s->mixture, &s->path.lights);
     return option->deep || scene_is_bent(s->path.scene) ? STATUS_OK : fill_arriving(s, err);
 }

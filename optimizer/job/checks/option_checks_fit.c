@@ -1,5 +1,6 @@
 /* Checks of the parts of the section "fit" that do not depend on a model's parameters. */
 #include "base/catalogue/method_catalogue.h"
+#include "base/catalogue/picture_method.h"
 #include "optimizer/job/checks/option_checks.h"
 #include "optimizer/job/document/job_document.h"
 
@@ -146,9 +147,9 @@ static status check_sheet(const struct job_document *doc, size_t i, struct error
 {
     const struct job_surface_picture *p = &doc->results.surface_picture[i];
     char field[64];
-    const bool of_flat_cloth =
-        p->method == JOB_PICTURE_FAST || p->method == JOB_PICTURE_CORRECTED || p->method == JOB_PICTURE_DIFFUSION;
-    if (!of_flat_cloth || p->black_sheet < 0 || (p->black_sheet != 0) == doc->setup.black_sheet) return STATUS_OK;
+    if (!picture_method_of_flat_cloth(p->method) || p->black_sheet < 0 ||
+        (p->black_sheet != 0) == doc->setup.black_sheet)
+        return STATUS_OK;
     snprintf(field, sizeof field, "pictures[%zu].black_sheet", i);
     return error_set_field(err, STATUS_INVALID, field,
                            "'%s' is %s and 'black_sheet' is %s: a picture of this method has the black sheet of the "

@@ -10,14 +10,10 @@
 
 enum { JOB_MAX_SURFACE_PICTURE = 32 };
 
-/* How a picture is rendered: path by path, by the tables of renderer/fast, by tables with some whole paths, whose
- * expectation equals path tracing's, by dual scattering (renderer/dual), or by diffusion (renderer/diffusion). */
+/* How a picture is rendered: JOB_PICTURE_PATH and so forth, a value for each row of picture_methods.def. */
 enum job_picture_method {
-    JOB_PICTURE_PATH,
-    JOB_PICTURE_FAST,
-    JOB_PICTURE_CORRECTED,
-    JOB_PICTURE_DUAL,
-    JOB_PICTURE_DIFFUSION
+#define PICTURE_METHOD(id, ...) JOB_PICTURE_##id,
+#include "base/catalogue/picture_methods.def"
 };
 
 enum job_surface { JOB_ON_FLAT, JOB_ON_CYLINDER, JOB_ON_DRAPE, JOB_ON_MESH };

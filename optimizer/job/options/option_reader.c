@@ -48,6 +48,12 @@ static status read_choice(const struct job_option *row, const struct json_field 
     size_t n = 0;
     while (n < MAX_CHOICE && (name[n] = job_option_choice(row, n)) != NULL) n++;
     name[n] = NULL;
+    const char *given = json_string_value(json_object_get(f->object, key));
+    if (row->removed_word != NULL && given != NULL && strcmp(given, row->removed_word) == 0) {
+        char path[JSON_PATH_BYTES];
+        json_field_path(f, key, path);
+        return error_set_field(err, STATUS_INVALID, path, "'%s' is '%s', which %s", path, given, row->removed_why);
+    }
     return json_field_choice(f, key, name, index, err);
 }
 

@@ -43,15 +43,16 @@ struct job_option {
     double lower, upper;            /* numbers; of lists: upper is the largest number of elements */
     size_t n;                       /* count of numbers; bytes of a text */
     const char *const *choice;      /* NULL-terminated; the first is the default without `standard` and `left_out` */
-    const char *(*choice_at)(size_t i); /* the same for words of a catalogue: NULL after the last */
-    const char *unit;                   /* "" or NULL: none */
-    const char *standard;               /* the default as JSON; NULL: NaN for a number, else zero or empty */
-    const char *left_out;               /* in words, what holds without the key when there is no default */
-    const char *allowed;                /* in words, when range and choices are not the whole condition */
-    const char *items;                  /* name of the elements of a list, or of the object, in errors */
-    const char *schema;                 /* members of a JSON Schema object, added to those that follow from the kind */
-    const char *id;                     /* of base/option_id.h; NULL: no other part of the program names this option */
-    const char *meaning;                /* for people: whole sentences in Markdown */
+    const char *(*choice_at)(size_t i);     /* the same for words of a catalogue: NULL after the last */
+    const char *removed_word, *removed_why; /* a word that an older version took, and what the error says of it */
+    const char *unit;                       /* "" or NULL: none */
+    const char *standard;                   /* the default as JSON; NULL: NaN for a number, else zero or empty */
+    const char *left_out;                   /* in words, what holds without the key when there is no default */
+    const char *allowed;                    /* in words, when range and choices are not the whole condition */
+    const char *items;                      /* name of the elements of a list, or of the object, in errors */
+    const char *schema;  /* members of a JSON Schema object, added to those that follow from the kind */
+    const char *id;      /* of base/option_id.h; NULL: no other part of the program names this option */
+    const char *meaning; /* for people: whole sentences in Markdown */
     /* Checks the value; of a section it runs when all members are read. NULL: no check beyond the row. */
     status (*check)(const struct option_value *v, struct error *err);
 };

@@ -1,4 +1,5 @@
 /* Rows of the option table: pictures of the fitted cloth on a surface. */
+#include "base/catalogue/picture_method.h"
 #include "optimizer/job/options/option_rows.h"
 
 #define OF_PICTURE(member) INTO_OF(struct job_surface_picture, member)
@@ -6,7 +7,11 @@
 static const char *const surface_names[] = {"flat", "cylinder", "drape", "mesh", NULL};
 static const char *const deep_light_names[] = {"directions", "cells", NULL};
 static const char *const visibility_names[] = {"traced", "tables", NULL};
-static const char *const method_names[] = {"path", "fast", "corrected", "dual", "diffusion", NULL};
+/* "`path`: every path is traced. `fast`: ..." */
+static const char method_meaning[] =
+#define PICTURE_METHOD(id, name, of_flat_cloth, meaning) "`" name "`: " meaning " "
+#include "base/catalogue/picture_methods.def"
+    ;
 
 const struct job_option option_rows_pictures[] = {
     {.path = "pictures",
@@ -72,7 +77,7 @@ const struct job_option option_rows_pictures[] = {
      .left_out = "`black_sheet` of the job",
      .meaning =
          "Whether a black sheet lies under all of the cloth, bent as it is: without it light comes through. With "
-         "`method` `fast`, `corrected` and `diffusion` it is that of the job."},
+         "`method` `fast` and `diffusion` it is that of the job."},
     ANGLE("pictures[]", struct job_surface_picture, light_theta_deg, 0, 180, .required = true,
           .allowed = "0 to 180; for a flat piece not 90, and above it only without the black sheet",
           .meaning = "Angle of the lamp from the vertical. Above 90 the lamp is below."),
@@ -110,15 +115,11 @@ const struct job_option option_rows_pictures[] = {
      .kind = OPTION_CHOICE,
      OF_PICTURE(method),
      .id = OPTION_PICTURE_METHOD,
-     .choice = method_names,
+     .choice = picture_method_name,
+     .removed_word = "corrected",
+     .removed_why = "was removed, because it gained nothing over path tracing: take \"path\" or \"fast\"",
      .standard = "\"path\"",
-     .meaning =
-         "`path`: every path is traced. `fast`: light that is scattered often comes from tables, with less noise "
-         "and a small error (docs/bent-cloth.md). `corrected`: the same, with whole paths that take the error off. "
-         "`dual`: light that is scattered often is estimated from the number of fibers before the lamp (dual "
-         "scattering), quickly and roughly, as a preview. `diffusion`: for cloths with a pile, two hits of each path "
-         "are "
-         "traced, and light that is scattered more often diffuses through the pile, as a preview."},
+     .meaning = method_meaning},
     {.path = "pictures[].visibility",
      .kind = OPTION_SWITCH,
      OF_PICTURE(visibility_by_tables),
@@ -139,7 +140,7 @@ const struct job_option option_rows_pictures[] = {
          "means "
          "over the repeat, so that places of like threads do not differ in this light. `cells`: from a table of the "
          "place where the third hit lies, in spherical harmonics of order 4, which is made faster. With `visibility` "
-         "`tables`, and with method `corrected`, it always comes from cells."},
+         "`tables` it always comes from cells."},
     {.path = "pictures[].deep_light_paths",
      .kind = OPTION_COUNT,
      OF_PICTURE(n_deep_path),

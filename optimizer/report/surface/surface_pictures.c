@@ -1,4 +1,5 @@
 #include "optimizer/report/surface/surface_pictures.h"
+#include "base/catalogue/picture_method.h"
 #include "base/files/durable.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/job/job_folder.h"
@@ -23,7 +24,6 @@
 enum { STREAM = 4000 };
 static const double mm = 1e-3;
 
-static const char *const method_name[] = {"path", "fast", "corrected", "dual", "diffusion"};
 static const char *const surface_name[] = {"flat", "cylinder", "drape", "mesh"};
 
 /* One picture of the document. */
@@ -91,8 +91,8 @@ static json_t *picture_json(const struct one_picture *one, const struct job_surf
     json_t *mean, *noise = noise_json(so_far, &mean);
     snprintf(file, sizeof file, "pictures/%s.exr", so_far->name);
     return json_pack("{s:s, s:s, s:s, s:s, s:I, s:o, s:o, s:o}", "file", file, "on", surface_name[p->on], "method",
-                     method_name[one->how.method], "model", one->model->id, "samples", (json_int_t)so_far->n_sample,
-                     "mean", mean, "noise", noise, "png_exposure", json_number(exposure));
+                     picture_method_name[one->how.method], "model", one->model->id, "samples",
+                     (json_int_t)so_far->n_sample, "mean", mean, "noise", noise, "png_exposure", json_number(exposure));
 }
 
 /* The path-traced picture beside one by tables, and how far they are apart. */
@@ -285,7 +285,7 @@ static bool is_finished(const json_t *entry, const struct job_surface_picture *p
     const char *method = json_string_value(json_object_get(entry, "method"));
     if (json_integer_value(json_object_get(entry, "samples")) != (json_int_t)p->sample) return false;
     if (p->filter && has_fibers && json_object_get(entry, "filtered") == NULL) return false;
-    return !p->reference || method == NULL || strcmp(method, method_name[JOB_PICTURE_PATH]) == 0 ||
+    return !p->reference || method == NULL || strcmp(method, picture_method_name[JOB_PICTURE_PATH]) == 0 ||
            json_object_get(entry, "reference") != NULL;
 }
 

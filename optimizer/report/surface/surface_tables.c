@@ -14,13 +14,10 @@ enum { N_TRACED_IN_PILE = 2 };
 #define JOURNAL_EVERY_S 2.0
 /* Density for dual scattering: cloth is dense (fabric thesis, section 6.6). */
 #define DENSITY 1.0f
-static const double corrected_share = 0.25;
 /* Rough processor seconds on a twill of 26,000 segments: of a path of the table of directions, of a path of all cells,
  * of the tables of visible directions, and of a sample of a picture by tables and path by path. */
 static const double deep_path_s = 12e-6, cell_path_s = 3e-3, visibility_s = 60.0, fast_sample_s = 5e-6,
                     path_sample_s = 20e-6;
-
-static bool by_tables(enum job_picture_method m) { return m == JOB_PICTURE_FAST || m == JOB_PICTURE_CORRECTED; }
 
 /* Returns whether a picture takes the visibility of its segments from tables. */
 static bool wants_visibility(const struct report *report)
@@ -33,7 +30,7 @@ static bool wants_visibility(const struct report *report)
 static bool wants_tables(const struct report *report)
 {
     for (size_t i = 0; i < report->in.results->n_surface_picture; i++)
-        if (by_tables(report->in.results->surface_picture[i].method)) return true;
+        if (report->in.results->surface_picture[i].method == JOB_PICTURE_FAST) return true;
     return false;
 }
 
@@ -59,7 +56,7 @@ static uint32_t cell_paths(const struct report *report)
 {
     for (size_t i = 0; i < report->in.results->n_surface_picture; i++) {
         const struct job_surface_picture *p = &report->in.results->surface_picture[i];
-        if (by_tables(p->method) && !by_directions(p)) return CELL_PATHS;
+        if (p->method == JOB_PICTURE_FAST && !by_directions(p)) return CELL_PATHS;
     }
     return SPREAD_PATHS;
 }
@@ -185,20 +182,18 @@ struct surface_method surface_tables_method(const struct surface_tables *t, cons
     const bool has = p->method == JOB_PICTURE_DUAL        ? t->averaged
                      : p->method == JOB_PICTURE_DIFFUSION ? t->piled
                                                           : t->present;
-    return (struct surface_method){
-        .method = has ? p->method : JOB_PICTURE_PATH,
-        .fast = {.tables = &t->tables,
-                 .visibility = p->visibility_by_tables ? FAST_TABLES : FAST_TRACED,
-                 .n_traced = N_TRACED,
-                 .deep = by_directions(p),
-                 .corrected_share = p->method == JOB_PICTURE_CORRECTED ? corrected_share : 0.0},
-        .dual = {&t->averages, DENSITY, DENSITY},
-        .diffusion = {&t->pile}};
+    return (struct surface_method){.method = has ? p->method : JOB_PICTURE_PATH,
+                                   .fast = {.tables = &t->tables,
+                                            .visibility = p->visibility_by_tables ? FAST_TABLES : FAST_TRACED,
+                                            .n_traced = N_TRACED,
+                                            .deep = by_directions(p)},
+                                   .dual = {&t->averages, DENSITY, DENSITY},
+                                   .diffusion = {&t->pile}};
 }
 
 void surface_method_apply(const struct surface_method *m, struct radiance_input *input)
 {
-    input->fast = by_tables(m->method) ? &m->fast : NULL;
+    input->fast = m->method == JOB_PICTURE_FAST ? &m->fast : NULL;
     input->dual = m->method == JOB_PICTURE_DUAL ? &m->dual : NULL;
     input->diffusion = m->method == JOB_PICTURE_DIFFUSION ? &m->diffusion : NULL;
 }

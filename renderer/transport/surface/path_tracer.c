@@ -239,26 +239,17 @@ static void walk_start(struct walk *w, const struct path_setting *s, bool record
     }
 }
 
-/* The last bounce of a setting with n_traced. False: the path ends here. The direct connection has taken all of the
- * lamp's light only if nothing else could find it; otherwise a ray looks for the rest. */
-static bool go_on_beyond_last(struct walk *w, struct bounce *b, struct scene_ray *ray)
+/* The last bounce of a setting with n_traced. The direct connection has taken all of the lamp's light only if nothing
+ * else could find it; otherwise a ray looks for the rest. */
+static void end_beyond_last(struct walk *w, struct bounce *b, struct scene_ray *ray)
 {
     const struct path_setting *s = w->s;
-    float rgb[3] = {0, 0, 0}, value[3], share = s->share_beyond, pdf;
+    float rgb[3] = {0, 0, 0}, value[3], pdf;
     if (s->finish != NULL) s->finish(s->finish_context, &b->hit, ray, w->rng, rgb);
-    bool goes_on = share > 0 && (share >= 1 || rng_float(w->rng) < share);
-    for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * (goes_on ? rgb[c] * (1 - 1 / share) : rgb[c]);
+    for (int c = 0; c < 3; c++) value[c] = w->throughput[c] * rgb[c];
     path_add_light_to_all(w, value, NULL);
-    if (goes_on) {
-        for (int c = 0; c < 3; c++) w->throughput[c] /= share;
-        path_scatter_look(w, b);
-        for (size_t k = 0; k < w->n_lamp && s->guided_paths; k++) guide_to_lamp(w, k, b);
-        w->last = false;
-        return true;
-    }
-    if (share != 0 || path_walk_connects_all(w)) return false;
+    if (path_walk_connects_all(w)) return;
     if (scatter(w, b, ray, &pdf) && !scene_trace(s->scene, ray, &(struct scene_hit){0})) add_beyond(w, ray, pdf);
-    return false;
 }
 
 /* Traces the walk from bounce to bounce until it leaves the cloth or ends. */
@@ -286,7 +277,10 @@ static void walk_on(struct walk *w, struct scene_ray *ray, struct path_record *r
         if (i == 0 && s->begin != NULL) path_add_light_to_all(w, rgb, NULL);
         connect_lamps(w, &b);
         if (s->lights.image != NULL) path_connect_image(w, &b);
-        if (w->last && !go_on_beyond_last(w, &b, ray)) return;
+        if (w->last) {
+            end_beyond_last(w, &b, ray);
+            return;
+        }
         if (!scatter(w, &b, ray, &pdf)) return;
     }
 }

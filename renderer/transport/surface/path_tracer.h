@@ -35,11 +35,9 @@ struct path_setting {
     bool shows_width;     /* the scene has the sections of the fibers as surfaces, and the model states their widths */
     float roulette_below; /* throughput under which paths are ended at random; 0: never */
     /* Ends paths at their n_traced-th hit (0: nowhere): what that scatters of light that nothing scattered before is
-     * added as ever, and of the other light what finish knows: rgb, radiance along the ray reversed. A share of the
-     * paths goes on all the same, chosen at random, and adds over the share what it finds instead; with a share above
-     * 0 the expectation is that of whole paths, whatever finish knows. Values only: no derivatives, one lamp. */
+     * added as ever, and of the other light what finish knows: rgb, radiance along the ray reversed. Values only: no
+     * derivatives, one lamp. */
     uint32_t n_traced;
-    float share_beyond;
     void (*finish)(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,
                    float rgb[3]);
     /* Radiance along the ray reversed that is added at the first hit, as finish; NULL: none. With n_traced, finish may

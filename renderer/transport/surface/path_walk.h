@@ -65,7 +65,7 @@ static inline bool path_walk_hides(const struct walk *w, const float direction[3
 static inline bool path_walk_connects_all(const struct walk *w)
 {
     const struct path_setting *s = w->s;
-    return w->last && s->n_traced == 1 && s->share_beyond == 0 && !s->lights.has_constant && s->lights.image == NULL;
+    return w->last && s->n_traced == 1 && !s->lights.has_constant && s->lights.image == NULL;
 }
 
 #endif

@@ -156,7 +156,7 @@ def test_a_surface_that_this_cloth_cannot_have_names_its_option(real, picture, o
     assert words in done["error"]["text"]
 
 
-@pytest.mark.parametrize("method", ["fast", "corrected", "diffusion"])
+@pytest.mark.parametrize("method", ["fast", "diffusion"])
 def test_tables_have_the_sheet_of_the_job(real, method):
     doc = document({"on": "cylinder", **VIEW, "method": method, "black_sheet": False})
     assert "of the job" in problem(real.post("/v1/jobs", json=doc), 422, "invalid", "pictures[0].black_sheet")["detail"]

@@ -78,11 +78,16 @@ def test_deep_light_belongs_to_the_fast_method(real):
 
 
 def test_paths_of_deep_light_need_its_table(real):
-    for other in ({}, {"method": "corrected"}, {"method": "fast", "deep_light": "cells"}, {"method": "fast", "visibility": "tables"}):
+    for other in ({}, {"method": "dual"}, {"method": "fast", "deep_light": "cells"}, {"method": "fast", "visibility": "tables"}):
         view = {"on": "flat", **VIEW, "deep_light_paths": 100000}
         doc = {"sample": "s", "fibers": {"file": "a.hair"}, "pictures": [{**view, "method": "fast"}, {**view, **other}], "fit": {"model": "two_lobe.v1"}}
         said = problem(real.post("/v1/jobs", json=doc), 422, "invalid", "pictures[1].deep_light_paths")["detail"]
         assert (list(other)[-1] if other else "method") in said
+
+
+def test_a_method_that_was_removed_says_so(real):
+    doc = {"sample": "s", "fibers": {"file": "a.hair"}, "pictures": [{"on": "flat", **VIEW, "method": "corrected"}], "fit": {"model": "two_lobe.v1"}}
+    assert "was removed" in problem(real.post("/v1/jobs", json=doc), 422, "invalid", "pictures[0].method")["detail"]
 
 
 def test_visibility_belongs_to_the_fast_method(real):

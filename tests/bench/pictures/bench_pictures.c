@@ -15,7 +15,7 @@
  *       part is above 3 %, and where its standard error leaves open whether it is. Standard error says which.
  *
  * bench_pictures [FABRIC...] [--fields N] [--most-seconds N] [--wide] [--flat-paths N] [--paths N] [--order N]
- *                [--cell-paths N] [--traced HITS] [--corrected SHARE] [--by-tables] [--yarns N]
+ *                [--cell-paths N] [--traced HITS] [--by-tables] [--yarns N]
  *                [--tables FOLDER] [--deep HITS] [--deep-edge N] [--deep-paths N] [--cells-too]
  *                [--png FOLDER] [--px N] [--path-samples N] [--fast-samples N]
  *                [--no-flat] [--no-drape] [--no-visibility] [--dual DENSITY (in place of the fast renderer)]
@@ -23,8 +23,8 @@
  *   --fields     along each side of the picture, 16 by default
  *   --wide       also samples fields of 0.56, 1.1 and 2.3 mm; to standard error
  *   --png        writes pictures of the drape of px x px pixels, which serve for nothing else
- *   --deep       hits before the table of deep light, 3 by default; 0: light from cells in its place, as with --traced,
- *                --corrected and --by-tables
+ *   --deep       hits before the table of deep light, 3 by default; 0: light from cells in its place, as with --traced
+ *                and --by-tables
  *   --cells-too  also compares the drape with cells in place of that table; to standard error
  *   FABRIC   gabardine, fleece, silk (tests/support/cloth/fit_fabrics.h); default: all three
  */
@@ -52,7 +52,7 @@ enum { N_FLAT = 492 };
 static struct {
     size_t px, n_path_sample, n_fast_sample, n_flat_path, n_yarn, n_field;
     uint32_t n_path, order, n_traced, deep, deep_edge; /* 0: the defaults of the precomputation and of the renderer */
-    double cell_paths, corrected, dual, deep_paths, most_s;
+    double cell_paths, dual, deep_paths, most_s;
     const char *png, *tables;
     bool no_flat, no_drape, no_visibility, by_tables, cells_too, wide;
 } option = {
@@ -296,7 +296,7 @@ static void bench_drape(struct bench *b)
 static void bench_fabric(const char *name)
 {
     struct bench b = {.fabric = fit_fabric_find(name)};
-    const bool deep = option.deep > 0 && option.n_traced == 0 && !(option.corrected > 0) && !option.by_tables;
+    const bool deep = option.deep > 0 && option.n_traced == 0 && !option.by_tables;
     if (b.fabric == NULL || !appearance_find(b.fabric->model_id, &b.model) || b.model.kind != MODEL_SURFACE) {
         fprintf(stderr, "no such fabric: %s\n", name);
         exit(2);
@@ -306,8 +306,7 @@ static void bench_fabric(const char *name)
     b.fast = (struct fast_option){.tables = &b.tables,
                                   .visibility = option.by_tables ? FAST_TABLES : FAST_TRACED,
                                   .n_traced = deep ? option.deep : option.n_traced,
-                                  .deep = deep,
-                                  .corrected_share = option.corrected};
+                                  .deep = deep};
     make_cloth(&b);
     if (option.dual > 0)
         make_averages(&b);
@@ -343,7 +342,6 @@ static bool take_number(const char *name, double number)
                  {"--deep-paths", NULL, NULL, &option.deep_paths},
                  {"--traced", NULL, &option.n_traced, NULL},
                  {"--cell-paths", NULL, NULL, &option.cell_paths},
-                 {"--corrected", NULL, NULL, &option.corrected},
                  {"--dual", NULL, NULL, &option.dual}};
     for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
         if (strcmp(name, known[i].name) != 0) continue;

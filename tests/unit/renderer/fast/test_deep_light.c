@@ -216,8 +216,8 @@ static void refusals(void **state)
 {
     (void)state;
     refuse(&(struct fast_option){.tables = &narrow.tables, .n_traced = 1, .deep = true}, "1 hits");
-    refuse(&(struct fast_option){.tables = &narrow.tables, .n_traced = 2, .deep = true, .corrected_share = 0.5},
-           "corrected");
+    refuse(&(struct fast_option){.tables = &narrow.tables, .n_traced = 2, .deep = true, .visibility = FAST_TABLES},
+           "visibility by tables");
     struct fast_tables t;
     struct error err = {0};
     const struct fast_precompute_request q = {
