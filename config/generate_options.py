@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Writes the schema JobDocument of config/openapi.json, the page docs/options.md and the picture options of `selvedge render` from the
-table of job options.
+"""Writes the schema JobDocument of config/openapi.json, the page docs/options.md, the picture options of `selvedge render` and the
+words of results that are words of job options (config/result.schema.json), from the table of job options.
 
     config/generate_options.py [--check] PRINT-OPTIONS
 
@@ -24,6 +24,7 @@ RENDER_HEAD = """/* The options of `selvedge render` that are options of a pictu
  *
  * PICTURE_OPTION(key, name, value, kind, help): key of the picture; kind is number, whole, text, yes or flag. */
 """
+RESULT = os.path.join(ROOT, "config", "result.schema.json")
 HEAD = """# Options of a job document
 
 This page lists every key of a job document with its unit, default and range. `make generate` writes it from the table of options
@@ -116,6 +117,18 @@ def with_schema(text, options):
     begin = re.search(r'^      "JobDocument": ', text, re.M).end()
     _, length = json.JSONDecoder().raw_decode(text[begin:])
     return text[:begin] + schema + text[begin + length:]
+
+
+# ---- config/result.schema.json ----
+
+def with_words(text, options):
+    """The words of exports[].format, pictures[].on and pictures[].method are those of the job's options."""
+    schema, row_of = json.loads(text), {row["path"]: row for row in options}
+    formats = [path.split(".")[1] for path in row_of if path.startswith("export.") and path != "export.pdf"]
+    schema["properties"]["exports"]["items"]["properties"]["format"]["enum"] = formats
+    for key in ("on", "method"):
+        schema["properties"]["pictures"]["items"]["properties"][key]["enum"] = row_of["pictures[]." + key]["choices"]
+    return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
 
 
 # ---- docs/options.md ----
@@ -231,7 +244,7 @@ def main():
         sys.exit(__doc__)
     options = json.loads(subprocess.run(program, check=True, capture_output=True, text=True).stdout)["options"]
     stale = []
-    for path, renew in ((OPENAPI, with_schema), (PAGE, page), (RENDER, render_options)):
+    for path, renew in ((OPENAPI, with_schema), (PAGE, page), (RENDER, render_options), (RESULT, with_words)):
         old = ""
         if os.path.exists(path):
             with open(path, encoding="utf-8") as file:

@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { JOB_MAX_SURFACE_PICTURE = 32 };
+enum { JOB_MAX_SURFACE_PICTURE = 32, JOB_MAX_EXPORT = 16 };
 
 /* How a picture is rendered: JOB_PICTURE_PATH and so forth, a value for each row of picture_methods.def. */
 enum job_picture_method {
@@ -47,7 +47,8 @@ struct job_results {
     struct job_surface_picture *surface_picture;
     bool twin; /* tables for the page in the browser */
     size_t twin_paths, twin_texels;
-    bool export_mitsuba, export_pbrt, export_usd, export_blender, export_textures, export_pdf;
+    bool exported[JOB_MAX_EXPORT]; /* in the order of optimizer/job/options/exports.def */
+    bool export_pdf;
 };
 
 #endif

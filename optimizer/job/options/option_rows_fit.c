@@ -26,6 +26,14 @@ static const char *const gain[] = {
     "{\"if\": {\"properties\": {\"starts\": {\"minimum\": 2}}, \"required\": [\"starts\"]}, "                          \
     "\"then\": {\"properties\": {\"max_iterations\": {\"maximum\": 500}}}}"
 
+/* Where results.exported has the wish for each export: its place in the table. */
+enum {
+#define EXPORT(name, ...) EXPORT_##name,
+#include "optimizer/job/options/exports.def"
+    N_EXPORT
+};
+_Static_assert((int)N_EXPORT <= (int)JOB_MAX_EXPORT, "more exports than JOB_MAX_EXPORT");
+
 const struct job_option option_rows_fit[] = {
     {.path = "fit",
      .kind = OPTION_SECTION,
@@ -313,38 +321,14 @@ const struct job_option option_rows_fit[] = {
      .left_out = "none",
      .meaning = "Files for other programs, in the folder `export` of the results (docs/exports.md). They show the best "
                 "model, which must be a surface model; the result states how near its materials come."},
-    {.path = "export.mitsuba",
-     .kind = OPTION_BOOL,
-     INTO(results.export_mitsuba),
-     .check = job_check_export,
-     .standard = "false",
-     .meaning = "A scene for Mitsuba 3: fibers, lamp, camera, and hair lobes near to the fitted scattering."},
-    {.path = "export.pbrt",
-     .kind = OPTION_BOOL,
-     INTO(results.export_pbrt),
-     .check = job_check_export,
-     .standard = "false",
-     .meaning = "The same scene for pbrt-v4, with one file for each row."},
-    {.path = "export.usd",
-     .kind = OPTION_BOOL,
-     INTO(results.export_usd),
-     .check = job_check_export,
-     .standard = "false",
-     .meaning =
-         "The same scene as Universal Scene Description: curves with a preview surface of which cloth is as bright."},
-    {.path = "export.blender",
-     .kind = OPTION_BOOL,
-     INTO(results.export_blender),
-     .check = job_check_export,
-     .standard = "false",
-     .meaning = "The same scene as a script that builds it in Blender, with hair curves and Blender's hair material."},
-    {.path = "export.textures",
-     .kind = OPTION_BOOL,
-     INTO(results.export_textures),
-     .check = job_check_export,
-     .standard = "false",
-     .meaning = "Textures of one tile with a MaterialX document (OpenPBR) and a U3M 1.1 material. Their pixels follow "
-                "from `fit.render_px`."},
+#define EXPORT(name, text)                                                                                             \
+    {.path = "export." #name,                                                                                          \
+     .kind = OPTION_BOOL,                                                                                              \
+     INTO(results.exported[EXPORT_##name]),                                                                            \
+     .check = job_check_export,                                                                                        \
+     .standard = "false",                                                                                              \
+     .meaning = (text)},
+#include "optimizer/job/options/exports.def"
     {.path = "export.pdf",
      .kind = OPTION_BOOL,
      INTO(results.export_pdf),

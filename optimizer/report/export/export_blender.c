@@ -7,7 +7,7 @@
  * hair curves with two Principled Hair BSDFs mixed (hair_fit.h; Cycles), instances, black sheet, camera and lamp.
  * Millimetres. */
 #include "optimizer/job/document/json_number.h"
-#include "optimizer/report/export/export_formats.h"
+#include "optimizer/report/export/export_scene.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -210,4 +210,4 @@ static status write_blender(struct export_scene *e, json_t **materials, struct e
     return s;
 }
 
-const struct export_format export_blender = {"blender", offsetof(struct job_results, export_blender), write_blender};
+const struct export_format export_blender = {write_blender};

@@ -3,7 +3,7 @@
  * fibers-<group>.txt the fibers of one group. Of a scanned cloth also density.vol, direction.vol and sggx.vol with
  * float32 samples, as Mitsuba's gridvolume reads them. */
 #include "geometry/volume/format/vol_file.h"
-#include "optimizer/report/export/export_formats.h"
+#include "optimizer/report/export/export_scene.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -191,4 +191,4 @@ static status write_mitsuba(struct export_scene *e, json_t **materials, struct e
     return s;
 }
 
-const struct export_format export_mitsuba = {"mitsuba", offsetof(struct job_results, export_mitsuba), write_mitsuba};
+const struct export_format export_mitsuba = {write_mitsuba};

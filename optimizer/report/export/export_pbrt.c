@@ -4,7 +4,7 @@
  *
  * pbrt scales a light given as RGB so that its value is the value of the picture with the film's standard sensor. A
  * lamp with alpha 0 lights the cloth but is not seen. Pictures of pbrt are left-handed, therefore the Scale. */
-#include "optimizer/report/export/export_formats.h"
+#include "optimizer/report/export/export_scene.h"
 
 #include <stddef.h>
 
@@ -153,4 +153,4 @@ static status write_pbrt(struct export_scene *e, json_t **materials, struct erro
     return s;
 }
 
-const struct export_format export_pbrt = {"pbrt", offsetof(struct job_results, export_pbrt), write_pbrt};
+const struct export_format export_pbrt = {write_pbrt};

@@ -1,7 +1,7 @@
 /* Shared by the scenes of all exports: the tile of fibers and its repeats, lamp, camera and materials of the best
  * model. Millimetres; z = 0 is the highest point of the cloth; radiances have the unit of configuration.h.
  *
- * A format is a row of the table in exports.c and a file export_<name>.c. */
+ * A format is a row of optimizer/job/options/exports.def and a source that defines export_<name>. */
 #ifndef SELVEDGE_OPTIMIZER_EXPORT_SCENE_H
 #define SELVEDGE_OPTIMIZER_EXPORT_SCENE_H
 
@@ -22,8 +22,6 @@ struct export_scene {
 };
 
 struct export_format {
-    const char *name; /* "mitsuba" */
-    size_t wanted_at; /* offset of its option in struct job_results, a bool */
     /* *json: an array with one object for each group of fibers, a new reference. */
     status (*write)(struct export_scene *e, json_t **materials, struct error *err);
 };

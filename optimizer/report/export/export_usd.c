@@ -6,7 +6,7 @@
  * hair materials of hair_fit.h, and for all others a UsdPreviewSurface. That one lets no light through a fiber; it is
  * the opaque fiber of hair_fit.h. */
 #include "optimizer/job/document/json_number.h"
-#include "optimizer/report/export/export_formats.h"
+#include "optimizer/report/export/export_scene.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -279,4 +279,4 @@ static status write_usd(struct export_scene *e, json_t **materials, struct error
     return *materials != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot export as USD: out of memory");
 }
 
-const struct export_format export_usd = {"usd", offsetof(struct job_results, export_usd), write_usd};
+const struct export_format export_usd = {write_usd};

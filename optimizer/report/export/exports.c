@@ -2,22 +2,26 @@
 
 #include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
-#include "optimizer/report/export/export_formats.h"
+#include "optimizer/report/export/export_scene.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 #include "optimizer/stages/validation/pipeline_discrepancy.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-static const struct export_format *const format[] = {&export_mitsuba, &export_pbrt, &export_usd, &export_blender,
-                                                     &export_textures};
-enum { N_FORMAT = sizeof format / sizeof format[0] };
-static const double percent = 100.0;
+#define EXPORT(name, ...) extern const struct export_format export_##name;
+#include "optimizer/job/options/exports.def"
 
-static bool wanted(const struct report *report, const struct export_format *f)
-{
-    return *(const bool *)((const char *)report->in.results + f->wanted_at);
-}
+/* In the order of job_results.exported. */
+static const struct {
+    const char *name;
+    const struct export_format *format;
+} exports[] = {
+#define EXPORT(name, ...) {#name, &export_##name},
+#include "optimizer/job/options/exports.def"
+};
+enum { N_FORMAT = sizeof exports / sizeof *exports };
+static const double percent = 100.0;
 
 static status fit_materials(struct export_scene *e, struct error *err)
 {
@@ -43,17 +47,17 @@ static status write_conversion(const struct export_scene *e, const json_t *json,
     return s;
 }
 
-static status write_format(struct export_scene *e, const struct export_format *f, struct error *err)
+static status write_format(struct export_scene *e, size_t i, struct error *err)
 {
     char folder[64], path[WORKER_PATH_BYTES];
     json_t *materials = NULL;
-    snprintf(folder, sizeof folder, "export/%s", f->name);
+    snprintf(folder, sizeof folder, "export/%s", exports[i].name);
     e->folder = folder;
     worker_folder_path(e->report->in.job->tools->folder, JOB_FOLDER_RESULTS, folder, path);
     status s = durable_make_folder(path, err);
-    if (s == STATUS_OK) s = f->write(e, &materials, err);
+    if (s == STATUS_OK) s = exports[i].format->write(e, &materials, err);
     if (s != STATUS_OK) return s;
-    json_t *json = json_pack("{s:s, s:s, s:o}", "format", f->name, "folder", folder, "materials", materials);
+    json_t *json = json_pack("{s:s, s:s, s:o}", "format", exports[i].name, "folder", folder, "materials", materials);
     s = write_conversion(e, json, err);
     if (s == STATUS_OK)
         json_array_append_new(e->report->exports, json);
@@ -84,7 +88,7 @@ static void warn_of_rest(const struct export_scene *e)
 static bool any_wanted(const struct report *report)
 {
     for (size_t i = 0; i < N_FORMAT; i++)
-        if (wanted(report, format[i])) return true;
+        if (report->in.results->exported[i]) return true;
     return false;
 }
 
@@ -101,7 +105,7 @@ status exports_write(struct report *report, struct error *err)
     fiber_set_z_range_m(&report->in.made->fiber, &e.z_low_m, &e.z_high_m);
     status s = fit_materials(&e, err);
     for (size_t i = 0; i < N_FORMAT && s == STATUS_OK; i++)
-        if (wanted(report, format[i])) s = write_format(&e, format[i], err);
+        if (report->in.results->exported[i]) s = write_format(&e, i, err);
     if (s == STATUS_OK) warn_of_rest(&e);
     return s;
 }

@@ -5,7 +5,7 @@
  * cloth.mtlx and cloth.u3m (texture_documents.h). Of the parameters, texture_surface.h. */
 #include "base/files/durable.h"
 #include "optimizer/job/document/json_number.h"
-#include "optimizer/report/export/export_formats.h"
+#include "optimizer/report/export/export_scene.h"
 #include "optimizer/report/result/result_pictures.h"
 #include "optimizer/report/textures/texture_documents.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
@@ -250,5 +250,4 @@ static status write_textures(struct export_scene *e, json_t **materials, struct 
     return s;
 }
 
-const struct export_format export_textures = {"textures", offsetof(struct job_results, export_textures),
-                                              write_textures};
+const struct export_format export_textures = {write_textures};
