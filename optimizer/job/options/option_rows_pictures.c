@@ -7,9 +7,9 @@
 static const char *const surface_names[] = {"flat", "cylinder", "drape", "mesh", NULL};
 static const char *const deep_light_names[] = {"directions", "cells", NULL};
 static const char *const visibility_names[] = {"traced", "tables", NULL};
-/* "`path`: every path is traced. `fast`: ..." */
+/* " `path`: every path is traced. `fast`: ...", with a blank in front. */
 static const char method_meaning[] =
-#define PICTURE_METHOD(id, name, of_flat_cloth, meaning) "`" name "`: " meaning " "
+#define PICTURE_METHOD(id, name, of_flat_cloth, meaning) " `" name "`: " meaning
 #include "base/catalogue/picture_methods.def"
     ;
 
@@ -119,7 +119,7 @@ const struct job_option option_rows_pictures[] = {
      .removed_word = "corrected",
      .removed_why = "was removed, because it gained nothing over path tracing: take \"path\" or \"fast\"",
      .standard = "\"path\"",
-     .meaning = method_meaning},
+     .meaning = method_meaning + 1},
     {.path = "pictures[].visibility",
      .kind = OPTION_SWITCH,
      OF_PICTURE(visibility_by_tables),
