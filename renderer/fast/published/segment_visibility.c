@@ -3,7 +3,7 @@
  * picture's resolution, and the components are those of at most 2,048 segments. */
 #include "renderer/fast/precompute/distance_components.h"
 #include "renderer/fast/precompute/precompute_parts.h"
-#include "renderer/fast/precompute/segment_picture.h"
+#include "renderer/fast/published/segment_picture.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-#include "renderer/fast/precompute/sphere_distance.h"
+#include "renderer/fast/published/sphere_distance.h"
 
 #include <math.h>
 #include <string.h>

@@ -3,7 +3,7 @@
 #ifndef SELVEDGE_RENDERER_SEGMENT_PICTURE_H
 #define SELVEDGE_RENDERER_SEGMENT_PICTURE_H
 
-#include "renderer/fast/precompute/sphere_distance.h"
+#include "renderer/fast/published/sphere_distance.h"
 #include "renderer/scene/scene_ray.h"
 
 /* Whether any of 16 x 16 directions (of those above, with a black sheet) sees the open. */

@@ -1,4 +1,4 @@
-#include "renderer/fast/precompute/segment_picture.h"
+#include "renderer/fast/published/segment_picture.h"
 #include "renderer/scene/scene_place.h"
 
 #include <string.h>
