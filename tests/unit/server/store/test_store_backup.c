@@ -185,10 +185,12 @@ static void test_ages(void **state)
 int main(void)
 {
 #define WITH_DATABASE(test) cmocka_unit_test_setup_teardown(test, set_up, tear_down)
-    const struct CMUnitTest tests[] = {
-        WITH_DATABASE(test_a_sound_database),         WITH_DATABASE(test_no_database),
-        WITH_DATABASE(test_content_that_cannot_be),   WITH_DATABASE(test_ages),
-        WITH_DATABASE(test_an_index_that_lacks_rows), WITH_DATABASE(test_a_file_is_in_the_way),
-        WITH_DATABASE(test_an_open_of_the_present_version_copies_nothing)};
+    const struct CMUnitTest tests[] = {WITH_DATABASE(test_a_sound_database),
+                                       WITH_DATABASE(test_no_database),
+                                       WITH_DATABASE(test_content_that_cannot_be),
+                                       WITH_DATABASE(test_ages),
+                                       WITH_DATABASE(test_an_index_that_lacks_rows),
+                                       WITH_DATABASE(test_a_file_is_in_the_way),
+                                       WITH_DATABASE(test_an_open_of_the_present_version_copies_nothing)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
