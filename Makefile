@@ -204,7 +204,7 @@ $(BUILD)/tools/speckle-tables: $(addprefix $(BUILD)/obj/$(SPECKLE)/,speckle_tabl
 	@mkdir -p $(@D)
 	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_WAVE) $(LINK_BASE)
 speckle-tables: $(BUILD)/tools/speckle-tables ## make the tables of speckle of wave_silk.v1 and its like again (three minutes of a core)
-	@$(BUILD)/tools/speckle-tables $(SPECKLE)
+	@$(BUILD)/tools/speckle-tables $(WAVE)
 
 include config/install.mk
 include tests/exact/exact.mk

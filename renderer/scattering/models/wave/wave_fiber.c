@@ -6,7 +6,7 @@
  */
 #include "renderer/scattering/models/wave/wave_fiber.h"
 #include "renderer/scattering/lobes/azimuth_table.h"
-#include "renderer/scattering/models/wave/speckle/speckle_tables.h"
+#include "renderer/scattering/models/wave/speckle_tables.h"
 #include "renderer/scattering/scattering_state.h"
 
 #include <stdlib.h>

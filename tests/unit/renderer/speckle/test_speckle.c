@@ -2,7 +2,7 @@
  * developed speckle, and what stays when light, camera and wavelength change. Limits follow from standard errors.
  */
 #include "base/rng.h"
-#include "renderer/scattering/models/wave/speckle/speckle_tables.h"
+#include "renderer/scattering/models/wave/speckle_tables.h"
 #include "renderer/scattering/scattering.h"
 #include "tests/support/statistics_test.h"
 

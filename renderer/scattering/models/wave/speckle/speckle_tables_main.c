@@ -99,7 +99,7 @@ static void write_table(const struct wave_section *s, const float weight[SPECKLE
     if (f == NULL) stop("cannot write to the folder");
     fprintf(f,
             "/* Made by speckle-tables (`make speckle-tables`), not by hand; speckle.h says what it is. */\n"
-            "#include \"renderer/scattering/models/wave/speckle/speckle_tables.h\"\n\n/* clang-format off */\n"
+            "#include \"renderer/scattering/models/wave/speckle_tables.h\"\n\n/* clang-format off */\n"
             "const struct speckle_table wave_%s_speckle = {\n{",
             s->name);
     for (int c = 0; c < 3; c++) fprintf(f, "%.6gF,", cells(s, c, power));

@@ -1,5 +1,5 @@
 /* Made by speckle-tables (`make speckle-tables`), not by hand; speckle.h says what it is. */
-#include "renderer/scattering/models/wave/speckle/speckle_tables.h"
+#include "renderer/scattering/models/wave/speckle_tables.h"
 
 /* clang-format off */
 const struct speckle_table wave_cotton_speckle = {
