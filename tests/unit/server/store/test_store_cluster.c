@@ -132,6 +132,28 @@ static void test_what_a_daemon_held_can_be_had_when_it_has_ended(void **state)
     assert_false(store_duty_is_mine(f->one, "removal"));
 }
 
+static void test_many_jobs_without_a_daemon(void **state)
+{
+    enum { MANY = 200 };
+    struct fixture *f = *state;
+    char id[STORE_ID_BYTES], (*found)[STORE_ID_BYTES] = NULL;
+    bool seen[MANY] = {false};
+    size_t n = 0;
+    for (int i = 0; i < MANY; i++) {
+        snprintf(id, sizeof id, "a job of a long name, number %d", i);
+        add_job(f->one, id, JOB_RUNNING);
+    }
+    assert_int_equal(store_job_orphans(f->two, &found, &n, NULL), STATUS_OK);
+    assert_int_equal(n, MANY);
+    for (size_t i = 0; i < n; i++) {
+        int k = -1;
+        assert_int_equal(sscanf(found[i], "a job of a long name, number %d", &k), 1);
+        assert_true(k >= 0 && k < MANY && !seen[k]);
+        seen[k] = true;
+    }
+    free(found);
+}
+
 static void test_a_claim_ends_with_the_state_that_it_was_for(void **state)
 {
     struct fixture *f = *state;
@@ -362,6 +384,7 @@ static int run(const char *database)
     const struct CMUnitTest tests[] = {
         TEST(test_a_job_is_claimed_by_one),
         TEST(test_what_a_daemon_held_can_be_had_when_it_has_ended),
+        TEST(test_many_jobs_without_a_daemon),
         TEST(test_a_claim_ends_with_the_state_that_it_was_for),
         TEST(test_a_lease_that_has_ended_is_removed_with_its_connections),
         TEST(test_the_gate_admits_one_for_a_job),
