@@ -175,9 +175,30 @@ static void test_noisy_steps(void **state)
     }
 }
 
+/* No row beyond the last one counts. */
+static void test_weighted_objective(void **state)
+{
+    enum { N_ROW = 6 };
+    struct linear_model m;
+    double want = 0.0;
+    (void)state;
+    assert_int_equal(linear_model_init(&m, N_ROW, 1, NULL), STATUS_OK);
+    for (size_t row = 0; row < N_ROW; row++) {
+        m.weight[row] = (double)(row + 1);
+        m.r[0][row] = 2.0;
+        m.r[1][row] = 0.5 * (double)(row + 3);
+    }
+    for (m.n_row = 0; m.n_row < N_ROW; m.n_row++) {
+        assert_true(fabs(linear_model_weighted_objective(&m) - want) < 1e-12);
+        want += (double)(m.n_row + 1) * (double)(m.n_row + 3);
+    }
+    linear_model_release(&m);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_pool), cmocka_unit_test(test_carried_to_second_order),
-                                       cmocka_unit_test(test_noise_of_carrying), cmocka_unit_test(test_noisy_steps)};
+                                       cmocka_unit_test(test_noise_of_carrying), cmocka_unit_test(test_noisy_steps),
+                                       cmocka_unit_test(test_weighted_objective)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

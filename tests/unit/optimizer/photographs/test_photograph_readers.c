@@ -197,6 +197,16 @@ static void test_dng(void **state)
     free(whole);
 }
 
+static void test_files_that_are_missing(void **state)
+{
+    static const char *const name[] = {"none.png", "none.jpg", "none.tif", "none.exr", "none.dng"};
+    for (size_t i = 0; i < sizeof name / sizeof *name; i++) {
+        struct job_photograph p = no_transfer;
+        p.transfer = i < 2 ? JOB_TRANSFER_SRGB : i == 2 ? JOB_TRANSFER_LINEAR : no_transfer.transfer;
+        check_refused(scratch_path(state, name[i]), &p, "cannot read photograph");
+    }
+}
+
 /* A black level is taken from every value of an EXR picture. */
 static void test_black_of_exr(void **state)
 {
@@ -283,6 +293,7 @@ int main(void)
         cmocka_unit_test(test_jpeg),
         cmocka_unit_test(test_dng),
         cmocka_unit_test(test_black_of_exr),
+        cmocka_unit_test(test_files_that_are_missing),
         cmocka_unit_test(test_real_raw),
         cmocka_unit_test(test_enlarged),
     };

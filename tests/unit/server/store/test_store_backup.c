@@ -8,6 +8,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -158,6 +159,34 @@ static void test_an_open_of_the_present_version_copies_nothing(void **state)
     assert_int_equal(scratch_count_entries(*state), 1);
 }
 
+static void no_verdict(void *context, const char *id, char code[40]) { (void)context, (void)id, (void)code; }
+
+/* Queries that were not finished would keep the connection, and with it the WAL, after the store is closed. */
+static void test_a_store_that_is_closed_leaves_one_file(void **state)
+{
+    struct store *store = NULL;
+    struct job_row *job = NULL;
+    struct file_row *file = NULL;
+    struct queued_job *queued = NULL;
+    struct tag_count *tag = NULL;
+    int64_t count[JOB_N_STATE], n_file = 0;
+    size_t n = 0;
+    assert_int_equal(store_open(path, &store, NULL), STATUS_OK);
+    assert_int_equal(store_fill_verdicts(store, no_verdict, NULL, NULL), STATUS_OK);
+    assert_int_equal(store_job_list(store, &(struct job_query){.limit = 9}, &job, &n, NULL), STATUS_OK);
+    job_rows_free(job, n);
+    assert_int_equal(store_file_list(store, "job-0", &file, &n, NULL), STATUS_OK);
+    assert_int_equal(store_job_queue(store, 9, &queued, &n, NULL), STATUS_OK);
+    assert_int_equal(store_tag_count(store, NULL, &tag, &n, NULL), STATUS_OK);
+    assert_int_equal(store_job_count(store, count, NULL), STATUS_OK);
+    assert_int_equal(store_file_count(store, "job-0", &n_file, NULL), STATUS_OK);
+    free(file);
+    free(queued);
+    free(tag);
+    store_close(store);
+    assert_int_equal(scratch_count_entries(*state), 1);
+}
+
 struct ages {
     int n;
     double youngest_unix_s;
@@ -191,6 +220,7 @@ int main(void)
                                        WITH_DATABASE(test_ages),
                                        WITH_DATABASE(test_an_index_that_lacks_rows),
                                        WITH_DATABASE(test_a_file_is_in_the_way),
-                                       WITH_DATABASE(test_an_open_of_the_present_version_copies_nothing)};
+                                       WITH_DATABASE(test_an_open_of_the_present_version_copies_nothing),
+                                       WITH_DATABASE(test_a_store_that_is_closed_leaves_one_file)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
