@@ -118,6 +118,26 @@ static void test_sources_of_open_jobs(void **state)
         }
 }
 
+/* Jobs that nobody asks for go beside some that are asked for. */
+static void test_other_jobs_than_sources(void **state)
+{
+    struct service_fixture *f = *state;
+    char source[2][STORE_ID_BYTES], other[1][STORE_ID_BYTES], asks[STORE_ID_BYTES], text[400];
+    struct retention_job removed;
+    service_fixture_job(f, NULL, JOB_SUCCEEDED, 1000, other[0]);
+    for (int i = 0; i < 2; i++) {
+        service_fixture_job(f, NULL, JOB_SUCCEEDED, 2000 + i, source[i]);
+        snprintf(text, sizeof text,
+                 "{\"sample\":\"x\",\"geometry\":{\"job\":\"%s\"},\"measurements\":{\"file\":\"rows.csv\"}}",
+                 source[i]);
+        service_fixture_job(f, text, JOB_DRAFT, 0, asks);
+    }
+    expect_plan(f, &(struct retention_limits){.max_age_days = 1}, 1, other, RETENTION_AGE);
+    for (int i = 0; i < 2; i++)
+        assert_int_equal(retention_remove(f->service, source[i], RETENTION_AGE, &removed, NULL), STATUS_CONFLICT);
+    assert_int_equal(retention_remove(f->service, other[0], RETENTION_AGE, &removed, NULL), STATUS_OK);
+}
+
 static void test_jobs_that_are_kept(void **state)
 {
     struct service_fixture *f = *state;
@@ -228,6 +248,7 @@ int main(void)
         WITH_SERVICE(test_by_size),
         WITH_SERVICE(test_equal_ends),
         WITH_SERVICE(test_sources_of_open_jobs),
+        WITH_SERVICE(test_other_jobs_than_sources),
         WITH_SERVICE(test_jobs_that_are_kept),
         WITH_SERVICE(test_a_mark_that_is_a_folder),
         WITH_SERVICE(test_removals_are_recorded),

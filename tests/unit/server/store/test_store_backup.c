@@ -159,6 +159,18 @@ static void test_an_open_of_the_present_version_copies_nothing(void **state)
     assert_int_equal(scratch_count_entries(*state), 1);
 }
 
+/* Blocks of a disk that becomes full later: changes go to the WAL, whose blocks are reserved before its size grows. */
+static void test_an_open_store_has_space_for_changes(void **state)
+{
+    struct store *store = NULL;
+    struct stat st;
+    assert_int_equal(store_open(path, &store, NULL), STATUS_OK);
+    assert_int_equal(store_probe(store, NULL), STATUS_OK);
+    assert_int_equal(stat(scratch_path(state, "test.db-wal"), &st), 0);
+    assert_true(st.st_blocks * 512 > st.st_size + (1 << 16));
+    store_close(store);
+}
+
 static void no_verdict(void *context, const char *id, char code[40]) { (void)context, (void)id, (void)code; }
 
 /* Queries that were not finished would keep the connection, and with it the WAL, after the store is closed. */
@@ -221,6 +233,7 @@ int main(void)
                                        WITH_DATABASE(test_an_index_that_lacks_rows),
                                        WITH_DATABASE(test_a_file_is_in_the_way),
                                        WITH_DATABASE(test_an_open_of_the_present_version_copies_nothing),
+                                       WITH_DATABASE(test_an_open_store_has_space_for_changes),
                                        WITH_DATABASE(test_a_store_that_is_closed_leaves_one_file)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
