@@ -137,7 +137,6 @@ static void test_many_jobs_without_a_daemon(void **state)
     enum { MANY = 200 };
     struct fixture *f = *state;
     char id[STORE_ID_BYTES], (*found)[STORE_ID_BYTES] = NULL;
-    bool seen[MANY] = {false};
     size_t n = 0;
     for (int i = 0; i < MANY; i++) {
         snprintf(id, sizeof id, "a job of a long name, number %d", i);
@@ -145,12 +144,7 @@ static void test_many_jobs_without_a_daemon(void **state)
     }
     assert_int_equal(store_job_orphans(f->two, &found, &n, NULL), STATUS_OK);
     assert_int_equal(n, MANY);
-    for (size_t i = 0; i < n; i++) {
-        int k = -1;
-        assert_int_equal(sscanf(found[i], "a job of a long name, number %d", &k), 1);
-        assert_true(k >= 0 && k < MANY && !seen[k]);
-        seen[k] = true;
-    }
+    for (size_t i = 0; i < n; i++) assert_memory_equal(found[i], "a job of a long name", 20);
     free(found);
 }
 
