@@ -58,7 +58,7 @@ def apply(tree, verb, words, example):
             assert old in text, f"{words}: no {old}"
             text = text.replace(old, new)
         full = os.path.join(tree, path)
-        os.makedirs(os.path.dirname(full), exist_ok=True)
+    os.makedirs(os.path.dirname(full), exist_ok=True)
     with open(full, "w", encoding="utf-8") as out:
         out.write(text)
     return path
@@ -115,6 +115,6 @@ def test_the_copy_is_built_and_has_what_was_added(tree):
     with open(os.path.join(copy, "docs", "options.md"), encoding="utf-8") as page:
         options = page.read()
     assert "smooth_alpha" in options
-    assert "my_descent.v1" in options and "my_grey.v1" in options
+    assert "my_descent.v1" in options and "my_grey.v1" in options and "my_points" in options
     with open(os.path.join(copy, "docs", "api.md"), encoding="utf-8") as page:
         assert "/v1/jobs/{id}/state" in page.read()
