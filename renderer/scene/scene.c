@@ -1,29 +1,15 @@
 #include "base/ranks/unique_number.h"
 #include "renderer/scene/bent/bent_scene.h"
-#include "renderer/scene/scene_ellipse.h"
+#include "renderer/scene/grid/scene_grid.h"
 #include "renderer/scene/scene_ends.h"
+#include "renderer/scene/sections/scene_ellipse.h"
+#include "renderer/scene/sections/scene_embree.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define MM_PER_M 1e3
-
-static void on_device_error(void *user, enum RTCError code, const char *text)
-{
-    struct error *e = user;
-    if (e->code != STATUS_OK) return; /* the first is the cause */
-    error_set_at(e, code == RTC_ERROR_OUT_OF_MEMORY ? STATUS_NO_MEMORY : STATUS_INTERNAL, "embree", "",
-                 "cannot build scene: Embree: %s", text == NULL ? "unknown error" : text);
-}
-
-static bool count_device_memory(void *user, ssize_t bytes, bool post)
-{
-    (void)post;
-    struct scene *s = user;
-    atomic_fetch_add_explicit(&s->device_bytes, bytes, memory_order_relaxed);
-    return true;
-}
 
 /* Embree's round curves are computed in single precision relative to a segment's length: one of 100 radii is wrong by
  * 1e-3 of its radius, and 15 % of the rays that leave it outwards seem to hit it again. Longer segments are cut into
@@ -262,64 +248,13 @@ static status choose_block(struct scene *s, const struct fiber_set *f, struct er
     return STATUS_OK;
 }
 
-static RTCGeometry round_geometry(struct scene *s)
-{
-    RTCGeometry g = rtcNewGeometry(s->device, RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE);
-    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, s->vertex, 0, sizeof *s->vertex,
-                               s->n_vertex);
-    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, s->segment_vertex, 0,
-                               sizeof *s->segment_vertex, s->n_segment);
-    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_FLAGS, 0, RTC_FORMAT_UCHAR, s->segment_flag, 0, 1, s->n_segment);
-    return g;
-}
-
-static void build_tile(struct scene *s)
-{
-    RTCGeometry g = s->ellipse != NULL ? scene_ellipse_geometry(s) : round_geometry(s);
-    rtcCommitGeometry(g);
-    s->tile = rtcNewScene(s->device);
-    rtcSetSceneFlags(s->tile, RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
-    rtcAttachGeometry(s->tile, g);
-    rtcReleaseGeometry(g);
-    rtcCommitScene(s->tile);
-}
-
-static void build_block(struct scene *s)
-{
-    s->block = rtcNewScene(s->device);
-    rtcSetSceneFlags(s->block, RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
-    for (int j = -s->half_block[1]; j <= s->half_block[1]; j++)
-        for (int i = -s->half_block[0]; i <= s->half_block[0]; i++) {
-            RTCGeometry g = rtcNewGeometry(s->device, RTC_GEOMETRY_TYPE_INSTANCE);
-            float m[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, (float)(i * s->tile_mm[0]), (float)(j * s->tile_mm[1]), 0};
-            rtcSetGeometryInstancedScene(g, s->tile);
-            rtcSetGeometryTransform(g, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, m);
-            rtcCommitGeometry(g);
-            rtcAttachGeometry(s->block, g);
-            rtcReleaseGeometry(g);
-        }
-    rtcCommitScene(s->block);
-}
-
 status scene_build(struct scene *s, struct error *err)
 {
-    struct error device_error = {0};
     status st = scene_ends_new(s, &s->ends, err);
-    if (st == STATUS_OK && s->ratio != NULL) st = scene_ellipse_fill(s, err);
-    if (st != STATUS_OK) return st;
     s->number = unique_number();
-    /* one build thread: the order of the tree's leaves, which decides ties, must not depend on timing */
-    s->device = rtcNewDevice(s->no_avx512 ? "threads=1,set_affinity=0,isa=avx2" : "threads=1,set_affinity=0");
-    if (s->device == NULL)
-        return error_set(err, STATUS_UNSUPPORTED, "cannot build scene: Embree does not start (error %d)",
-                         (int)rtcGetDeviceError(NULL));
-    rtcSetDeviceErrorFunction(s->device, on_device_error, &device_error);
-    rtcSetDeviceMemoryMonitorFunction(s->device, count_device_memory, s);
-    build_tile(s);
-    build_block(s);
-    rtcSetDeviceErrorFunction(s->device, NULL, NULL); /* device_error is on this stack */
-    if (device_error.code != STATUS_OK && err != NULL) *err = device_error;
-    return device_error.code;
+    if (s->ratio == NULL) return st == STATUS_OK ? scene_grid_new(s, &s->grid, err) : st;
+    if (st == STATUS_OK) st = scene_ellipse_fill(s, err);
+    return st == STATUS_OK ? scene_embree_build(s, err) : st;
 }
 
 status scene_new(const struct fiber_set *f, const struct scene_option *o, struct scene **scene, struct error *err)
@@ -348,9 +283,7 @@ void scene_free(struct scene *s)
         bent_free(s); /* all else belongs to the flat scene */
         return;
     }
-    if (s->block != NULL) rtcReleaseScene(s->block);
-    if (s->tile != NULL) rtcReleaseScene(s->tile);
-    if (s->device != NULL) rtcReleaseDevice(s->device);
+    scene_embree_free(s);
     free(s->vertex);
     free(s->segment_vertex);
     free(s->segment_fiber);
@@ -360,6 +293,7 @@ void scene_free(struct scene *s)
     free(s->ratio);
     free(s->ellipse);
     scene_ends_free(s->ends);
+    scene_grid_free(s->grid);
     free(s);
 }
 
@@ -371,6 +305,7 @@ size_t scene_memory_bytes(const struct scene *s)
            s->n_vertex * (sizeof *s->vertex + (s->long_axis != NULL ? sizeof *s->long_axis : 0) +
                           (s->ratio != NULL ? sizeof *s->ratio : 0)) +
            (s->ellipse != NULL ? s->n_segment * sizeof *s->ellipse : 0) + s->ends->n * sizeof *s->ends->link +
+           (s->grid != NULL ? scene_grid_bytes(s) : 0) +
            s->n_segment * (sizeof *s->segment_vertex + sizeof *s->segment_fiber + 1 + (s->segment_group != NULL));
 }
 

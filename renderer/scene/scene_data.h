@@ -16,13 +16,14 @@ enum { SCENE_MAX_HALF_BLOCK = 12 };
 struct bent_cloth;
 struct scene_ellipse;
 struct scene_ends;
+struct scene_grid;
 
 struct scene_vertex {
-    float x, y, z, radius; /* Embree's FLOAT4 */
+    float x, y, z, radius;
 };
 
 struct scene {
-    RTCDevice device;
+    RTCDevice device; /* of elliptical sections (scene_embree.h) */
     RTCScene tile, block;
     size_t n_vertex, n_segment;
     struct scene_vertex *vertex;
@@ -35,9 +36,10 @@ struct scene {
     float *ratio;       /* of each vertex: long over short axis; NULL: surfaces are round tubes */
     struct scene_ellipse *ellipse; /* of each segment, where there are ratios (scene_ellipse.h) */
     struct scene_ends *ends;       /* scene_ends.h */
+    struct scene_grid *grid;       /* of round fibers (scene_grid.h) */
     size_t n_group;
     double tile_mm[2];
-    int half_block[2];                       /* the block has 2 h + 1 tiles a side, the centre one at [0, tile) */
+    int half_block[2];                       /* a block has 2 h + 1 tiles a side, the centre one at [0, tile) */
     float inset_low_mm[2], inset_high_mm[2]; /* where every fiber of the endless cloth is present */
     float bottom_mm;                         /* < 0; the top is 0 */
     bool black_sheet, no_avx512;
@@ -46,18 +48,26 @@ struct scene {
     atomic_llong device_bytes;
 };
 
-/* Builds Embree's trees of a scene whose other members are filled in. STATUS_UNSUPPORTED, STATUS_NO_MEMORY. */
+/* Builds the grid or the trees of a scene whose other members are filled in. STATUS_UNSUPPORTED, STATUS_NO_MEMORY. */
 status scene_build(struct scene *s, struct error *err);
 /* The short axis of the section of a segment whose unit tangent is given, unit and across it. False: its long axis runs
  * along the segment. */
 bool scene_short_axis(const struct scene *s, size_t i_segment, const float tangent[3], float axis[3]);
+/* A front face on a ray: the ray comes into a segment of the copy of the tile. */
+struct scene_face {
+    float t;
+    uint32_t i_segment;
+    int copy[2];
+    float normal[3]; /* of elliptical sections only, of any length */
+};
+
 /* The nearest hit of the flat cloth over `span` of a ray, whose direction may have any length; *distance and
  * span are in units of it. The ray is moved by whole tiles. */
 bool scene_trace_span(const struct scene *scene, struct scene_ray *ray, float span, struct scene_hit *hit,
                       float *distance);
-/* What scene_visit_ahead hands on to Embree's filter of the faces of fibers. */
+/* What scene_visit_ahead hands on. */
 struct scene_visitor {
-    struct scene_faces faces;
+    const struct scene *flat;
     scene_visit *visit;
     void *context;
     float direction[3];      /* unit, of the ray where it is seen */
@@ -71,5 +81,7 @@ bool scene_occluded_span(const struct scene *scene, const struct scene_ray *ray,
                          struct scene_visitor *visitor);
 void scene_visitor_init(struct scene_visitor *v, const struct scene *flat, const float direction[3], scene_visit *visit,
                         void *context);
+/* Visits a segment. False: no further ones are wanted. */
+bool scene_visitor_see(struct scene_visitor *v, uint32_t i_segment);
 
 #endif

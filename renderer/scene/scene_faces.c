@@ -1,9 +1,6 @@
 #include "renderer/scene/scene_faces.h"
 
-#include "renderer/scene/scene_ellipse.h"
 #include "renderer/scene/scene_ends.h"
-
-#include <math.h>
 
 /* A ray that starts in a fiber meets none of its faces within this part of its radius: the surfaces of neighbouring
  * segments lie less deep there than places are rounded by. */
@@ -74,9 +71,7 @@ static bool move_along(const struct scene *s, struct piece *p, bool *after)
     return true;
 }
 
-/* Whether a point of a segment's surface lies inside of the tube that the segment is a part of, or the segment is on
- * the same piece of the tube as i_from. */
-static bool inside_tube(const struct scene *s, uint32_t i_segment, uint32_t i_from, const float at[3])
+bool scene_faces_inside(const struct scene *s, uint32_t i_segment, uint32_t i_from, const float at[3])
 {
     if (i_segment == i_from) return true;
     for (int sense = 0; sense < 2; sense++) {
@@ -88,44 +83,7 @@ static bool inside_tube(const struct scene *s, uint32_t i_segment, uint32_t i_fr
     return false;
 }
 
-/* Remembers a back face, once, although Embree may find it twice. */
-static void note_back(struct scene_faces *f, float t, const struct RTCHit *hit)
+float scene_faces_near(const struct scene *s, uint32_t i_from)
 {
-    for (uint32_t k = 0; k < f->n_back; k++)
-        if (f->back[k].i_segment == hit->primID && f->back[k].i_copy == hit->instID[0]) return;
-    if (f->n_back == SCENE_MAX_BACK) return;
-    f->back[f->n_back].t = t;
-    f->back[f->n_back].i_segment = hit->primID;
-    f->back[f->n_back++].i_copy = hit->instID[0];
-}
-
-void scene_faces_filter(const struct RTCFilterFunctionNArguments *a)
-{
-    struct scene_faces *f = (struct scene_faces *)(void *)a->context;
-    const struct RTCRay *ray = (const struct RTCRay *)a->ray; /* single rays: N is 1; in the frame of the copy */
-    const struct RTCHit *hit = (const struct RTCHit *)a->hit;
-    const bool back = ray->dir_x * hit->Ng_x + ray->dir_y * hit->Ng_y + ray->dir_z * hit->Ng_z > 0;
-    const float at[3] = {ray->org_x + ray->tfar * ray->dir_x, ray->org_y + ray->tfar * ray->dir_y,
-                         ray->org_z + ray->tfar * ray->dir_z};
-    const uint32_t i_from = !back && ray->tfar < f->near_t ? f->i_from : SCENE_NO_SEGMENT;
-    const bool inside = f->flat->ellipse == NULL && inside_tube(f->flat, hit->primID, i_from, at);
-    if (back || inside) a->valid[0] = 0;
-    if (back && !inside) note_back(f, ray->tfar, hit);
-}
-
-void scene_faces_init(struct scene_faces *f, const struct scene *flat, const struct scene_ray *ray)
-{
-    rtcInitIntersectContext(&f->embree);
-    if (ray == NULL || ray->n_inside > 0) f->embree.filter = scene_faces_filter;
-    f->flat = flat;
-    f->n_back = 0;
-    f->i_from = ray != NULL ? ray->i_from : SCENE_NO_SEGMENT;
-    f->near_t = f->i_from != SCENE_NO_SEGMENT ? START_RADII * flat->vertex[flat->segment_vertex[f->i_from]].radius : 0;
-}
-
-uint32_t scene_faces_left(const struct scene_faces *f, float t, uint32_t n_inside)
-{
-    uint32_t n = 0;
-    for (uint32_t k = 0; k < f->n_back; k++) n += f->back[k].t < t;
-    return n < n_inside ? n : n_inside;
+    return i_from != SCENE_NO_SEGMENT ? START_RADII * s->vertex[s->segment_vertex[i_from]].radius : 0;
 }

@@ -4,7 +4,7 @@
 
 #include "renderer/scene/scene_data.h"
 
-/* Describes what Embree has found for a ray. The ray's frame moves to the copy of the tile that was hit. */
-void scene_hit_fill(const struct scene *s, struct scene_ray *r, const struct RTCRayHit *q, struct scene_hit *hit);
+/* Describes a face that a ray meets. The ray's frame moves to the copy of the tile that was hit. */
+void scene_hit_fill(const struct scene *s, struct scene_ray *r, const struct scene_face *face, struct scene_hit *hit);
 
 #endif

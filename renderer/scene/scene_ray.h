@@ -20,9 +20,9 @@ struct scene_ray {
     float origin_mm[3];  /* local */
     float direction[3];  /* unit */
     float tnear_mm;
-    uint32_t n_inside; /* fibers that the ray starts in, at most; 0: the next member counts for nothing */
-    uint32_t i_from;   /* the segment that the ray leaves, or SCENE_NO_SEGMENT */
-    uint32_t i_cell;   /* of a bent cloth: where the origin lies (bent/bent_scene.h) */
+    bool inside;     /* the ray may start in fibers; false: the next member counts for nothing */
+    uint32_t i_from; /* the segment that the ray leaves inwards, or SCENE_NO_SEGMENT */
+    uint32_t i_cell; /* of a bent cloth: where the origin lies (bent/bent_scene.h) */
 };
 
 struct scene_hit {
@@ -31,7 +31,6 @@ struct scene_hit {
     float tangent[3];     /* unit, along the fiber */
     float radius_mm;      /* of an elliptical section: its least radius of curvature */
     uint32_t i_segment;   /* scene_fiber_of gives its fiber */
-    uint32_t n_inside;    /* other fibers that hold the place, at most: fibers overlap a little where they touch */
     uint32_t i_cell;      /* of a bent cloth */
 };
 

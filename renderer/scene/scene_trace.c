@@ -38,7 +38,7 @@ void scene_ray_leave(const struct scene_hit *hit, const double offset_mm[2], con
     memcpy(r->offset_mm, offset_mm, sizeof r->offset_mm);
     memcpy(r->direction, direction, sizeof r->direction);
     r->tnear_mm = 0;
-    r->n_inside = hit->n_inside + inwards;
+    r->inside = true; /* fibers overlap where they touch */
     r->i_from = inwards ? hit->i_segment : SCENE_NO_SEGMENT;
     r->i_cell = hit->i_cell;
 }
@@ -65,7 +65,7 @@ void scene_ray_leave_across(const struct scene_hit *hit, const double offset_mm[
     memcpy(r->direction, direction, sizeof r->direction);
     r->tnear_mm = 0;
     r->i_from = SCENE_NO_SEGMENT;
-    r->n_inside = hit->n_inside + 1; /* a fiber that bends or is overlapped may hold the place */
+    r->inside = true; /* a fiber that bends or is overlapped may hold the place */
     r->i_cell = hit->i_cell;
 }
 
@@ -90,7 +90,7 @@ bool scene_ray_enter(const struct scene *s, const double origin_mm[3], const dou
         r->direction[a] = (float)direction[a];
     }
     r->tnear_mm = 0;
-    r->n_inside = 0;
+    r->inside = false;
     r->i_from = SCENE_NO_SEGMENT;
     r->i_cell = 0;
     return true;

@@ -12,3 +12,4 @@ $(BUILD)/tests/exact/cloth_blocks_exact: $(BUILD)/obj/tests/exact/cloth_blocks_m
 	@echo "  LINK $@"
 	@$(CC) $(TEST_LINKER) $(LDFLAGS) -o $@ $^ -ljansson $(LINK_RENDERER)
 $(BUILD)/tests/physics/exact/test_capsule: $(patsubst %,$(BUILD)/obj/tests/exact/%.c.o,capsule capsule_cloth capsule_walk tube_links)
+$(BUILD)/tests/physics/exact/test_scene_rays: $(patsubst %,$(BUILD)/obj/tests/exact/%.c.o,capsule capsule_cloth capsule_walk tube_links)

@@ -16,7 +16,7 @@ static bool sees(const struct look *l, int pixel)
 {
     const float *d = l->s->direction[pixel];
     if (scene_sheet_hides(l->scene, d)) return false;
-    struct scene_ray ray = {.n_inside = 1, .i_from = SCENE_NO_SEGMENT};
+    struct scene_ray ray = {.inside = true, .i_from = SCENE_NO_SEGMENT};
     memcpy(ray.origin_mm, l->segment.middle_mm, sizeof ray.origin_mm);
     memcpy(ray.direction, d, sizeof ray.direction);
     return !scene_occluded(l->scene, &ray);

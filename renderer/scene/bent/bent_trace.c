@@ -11,7 +11,8 @@ struct walk_on_shell {
     const struct bent_cloth *b;
     struct shell_walk on;
     struct scene_visitor *visitor; /* or NULL */
-    uint32_t n_inside, i_from;     /* as in scene_ray */
+    bool inside;                   /* as in scene_ray, as is the next one */
+    uint32_t i_from;
 };
 
 /* The ray in the flat cloth, from where it is now. */
@@ -28,7 +29,7 @@ static void to_flat(const struct walk_on_shell *w, struct scene_ray *r)
         r->direction[a] = (float)d[a];
     }
     r->tnear_mm = 0;
-    r->n_inside = w->n_inside;
+    r->inside = w->inside;
     r->i_from = w->i_from;
 }
 
@@ -88,7 +89,6 @@ static bool walk(struct walk_on_shell *w, double tnear, struct scene_hit *hit)
             hit_here(w, on->t + (double)distance, hit);
             return true;
         }
-        w->n_inside = r.n_inside;
         shell_walk_on(on, t, face);
     }
     return false;
@@ -99,7 +99,7 @@ static void start_walk(const struct scene *s, const struct scene_ray *ray, struc
     *w = (struct walk_on_shell){
         .s = s,
         .b = s->bent,
-        .n_inside = ray->n_inside,
+        .inside = ray->inside,
         .i_from = ray->i_from,
         .on = {.space = &s->bent->space, .black_sheet = s->black_sheet, .i_cell = ray->i_cell, .from_face = -1}};
     for (int a = 0; a < 3; a++) {
@@ -122,7 +122,7 @@ bool bent_occluded(const struct scene *s, const struct scene_ray *ray, struct sc
     struct walk_on_shell w;
     start_walk(s, ray, &w);
     w.visitor = visitor;
-    if (visitor != NULL) visitor->faces.flat = &s->bent->flat;
+    if (visitor != NULL) visitor->flat = &s->bent->flat;
     return walk(&w, (double)ray->tnear_mm, NULL) || w.on.i_cell == SHELL_ON_SHEET;
 }
 
@@ -144,7 +144,7 @@ bool bent_enter(const struct scene *s, const double origin_mm[3], const double d
     }
     r->offset_mm[0] = r->offset_mm[1] = 0.0;
     r->tnear_mm = 0;
-    r->n_inside = 0;
+    r->inside = false;
     r->i_from = SCENE_NO_SEGMENT;
     r->i_cell = SHELL_OUTSIDE;
     return true;
