@@ -5,10 +5,8 @@
 #include <stdlib.h>
 
 /* Edge of a cell in mean diameters of the fibers, and how many cells there may be for each segment. */
-#ifndef CELL_DIAMETERS
 #define CELL_DIAMETERS 1.2
-#endif
-#define MOST_CELLS_PER_SEGMENT 6.0
+#define MOST_CELLS_PER_SEGMENT 2.0
 /* Segments reach into cells that are nearer than this part of a radius, and than this part of the tile: rounding. */
 static const float slack_radii = 1e-2f, slack_of_tile = 1e-6f;
 
