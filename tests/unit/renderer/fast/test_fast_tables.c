@@ -186,7 +186,7 @@ static void visibility(void **state)
     rng_start(&rng, &(struct rng_key){.seed = 5}, 0, 0);
     for (uint32_t i = 0; i < t->n_segment; i += 3) {
         struct scene_segment segment;
-        struct scene_ray ray = {.n_inside = 1}; /* it starts on the axis */
+        struct scene_ray ray = {.inside = true}; /* it starts on the axis */
         scene_segment_at(colored.scene, i, &segment);
         memcpy(ray.origin_mm, segment.middle_mm, sizeof ray.origin_mm);
         for (int k = 0; k < 8; k++, n++) {
@@ -215,7 +215,7 @@ static void gaussian_weights(void **state)
     double open = 0, weights = 0, n = 0;
     for (uint32_t i = 0; i < t->n_segment; i++) {
         struct scene_segment segment;
-        struct scene_ray ray = {.n_inside = 1}; /* it starts on the axis */
+        struct scene_ray ray = {.inside = true}; /* it starts on the axis */
         struct rng rng;
         uint32_t row = t->segment_row[i];
         if (row == FAST_NO_ROW) continue;
