@@ -105,6 +105,7 @@ $$(BUILD)/generated/$(1): $(sort $(3))
 GENERATED += $$(BUILD)/generated/$(1)
 endef
 $(eval $(call gathered,volume_formats.def,VOLUME_FORMAT,$(wildcard geometry/volume/format/*.c)))
+$(eval $(call gathered,exports.def,EXPORT,$(wildcard optimizer/report/*/export_*.c)))
 $(eval $(call gathered,cli_commands.def,CLI_COMMAND,$(shell find clients/cli -name '*.c')))
 
 define part_rule

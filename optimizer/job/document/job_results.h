@@ -47,7 +47,7 @@ struct job_results {
     struct job_surface_picture *surface_picture;
     bool twin; /* tables for the page in the browser */
     size_t twin_paths, twin_texels;
-    bool exported[JOB_MAX_EXPORT]; /* in the order of optimizer/job/options/exports.def */
+    bool exported[JOB_MAX_EXPORT]; /* in the order of the rows EXPORT */
     bool export_pdf;
 };
 

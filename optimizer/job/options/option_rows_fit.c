@@ -29,7 +29,8 @@ static const char *const gain[] = {
 /* Where results.exported has the wish for each export: its place in the table. */
 enum {
 #define EXPORT(name, ...) EXPORT_##name,
-#include "optimizer/job/options/exports.def"
+#include "generated/exports.def"
+#undef EXPORT
     N_EXPORT
 };
 _Static_assert((int)N_EXPORT <= (int)JOB_MAX_EXPORT, "more exports than JOB_MAX_EXPORT");
@@ -328,7 +329,8 @@ const struct job_option option_rows_fit[] = {
      .check = job_check_export,                                                                                        \
      .standard = "false",                                                                                              \
      .meaning = (text)},
-#include "optimizer/job/options/exports.def"
+#include "generated/exports.def"
+#undef EXPORT
     {.path = "export.pdf",
      .kind = OPTION_BOOL,
      INTO(results.export_pdf),

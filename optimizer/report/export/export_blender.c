@@ -210,4 +210,6 @@ static status write_blender(struct export_scene *e, json_t **materials, struct e
     return s;
 }
 
+EXPORT(blender, "A script that builds the scene in Blender, with hair curves and Blender's hair material.")
+
 const struct export_format export_blender = {write_blender};

@@ -191,4 +191,6 @@ static status write_mitsuba(struct export_scene *e, json_t **materials, struct e
     return s;
 }
 
+EXPORT(mitsuba, "A scene for Mitsuba 3: fibers, lamp, camera, and hair lobes near to the fitted scattering.")
+
 const struct export_format export_mitsuba = {write_mitsuba};

@@ -153,4 +153,6 @@ static status write_pbrt(struct export_scene *e, json_t **materials, struct erro
     return s;
 }
 
+EXPORT(pbrt, "The scene for pbrt-v4, with one file for each row.")
+
 const struct export_format export_pbrt = {write_pbrt};

@@ -1,7 +1,8 @@
 /* Shared by the scenes of all exports: the tile of fibers and its repeats, lamp, camera and materials of the best
  * model. Millimetres; z = 0 is the highest point of the cloth; radiances have the unit of configuration.h.
  *
- * A format is a row of optimizer/job/options/exports.def and a source that defines export_<name>. */
+ * A format is a source that defines export_<name> and has a row EXPORT(name, meaning), where `meaning` describes the
+ * option `export.<name>` to people. The Makefile gathers the rows. */
 #ifndef SELVEDGE_OPTIMIZER_EXPORT_SCENE_H
 #define SELVEDGE_OPTIMIZER_EXPORT_SCENE_H
 
@@ -25,6 +26,8 @@ struct export_format {
     /* *json: an array with one object for each group of fibers, a new reference. */
     status (*write)(struct export_scene *e, json_t **materials, struct error *err);
 };
+
+#define EXPORT(name, meaning) /* a row stands for nothing in the source of its export */
 
 /* A text of the folder while it is made. */
 struct export_text {

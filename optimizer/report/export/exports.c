@@ -9,8 +9,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#undef EXPORT
 #define EXPORT(name, ...) extern const struct export_format export_##name;
-#include "optimizer/job/options/exports.def"
+#include "generated/exports.def"
+#undef EXPORT
 
 /* In the order of job_results.exported. */
 static const struct {
@@ -18,7 +20,8 @@ static const struct {
     const struct export_format *format;
 } exports[] = {
 #define EXPORT(name, ...) {#name, &export_##name},
-#include "optimizer/job/options/exports.def"
+#include "generated/exports.def"
+#undef EXPORT
 };
 enum { N_FORMAT = sizeof exports / sizeof *exports };
 static const double percent = 100.0;

@@ -250,4 +250,7 @@ static status write_textures(struct export_scene *e, json_t **materials, struct 
     return s;
 }
 
+EXPORT(textures, "Textures of one tile with a MaterialX document (OpenPBR) and a U3M 1.1 material. They have as "
+                 "many pixels as the renderings of the job.")
+
 const struct export_format export_textures = {write_textures};
