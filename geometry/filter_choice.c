@@ -6,8 +6,8 @@
 
 double filter_solid_j(double s, double t, size_t h) { return (-2.0 * M_PI / s + M_PI / t) * (double)h; }
 
-/* J as a share of that of solid material is 0.9 on axes of fibers, 0.5 on those of thin and blurred ones, and below
- * 0.2 for noise in void. */
+/* J over J of solid material is 0.9 on axes of fibers, 0.5 on axes of thin and blurred fibers, and below 0.2 for noise
+ * in void. */
 static const double EPS_J_SHARE = 0.35;
 
 /* s times the squared radius in voxels: over the six fabrics of thesis Table 5.2 it is between 0.7 and 11, with a

@@ -12,8 +12,8 @@ void filter_choose_thin(struct reconstruct_option *o, double diameter_voxel);
 /* Fills in the options s, t, h, eps_d and eps_j that are not given (NaN; h: 0), from the fiber diameter and the
  * volume. */
 void filter_choose(struct reconstruct_option *o, const struct volume *v, double diameter_voxel);
-/* STATUS_INVALID unless t > s / 2: only then is J of solid material below that of void, 0. A job may give one of the
- * two, and the other is then chosen. */
+/* STATUS_INVALID unless t > s / 2: only then is J of solid material below J of void, which is 0. A job may give one of
+ * the two, and the other is then chosen. */
 status filter_check(const struct reconstruct_option *o, struct error *err);
 
 #endif

@@ -336,7 +336,7 @@ static void release(struct orientation_job *o)
     free(o->scratch);
 }
 
-/* Runs all passes over the volume. Their progress continues that of the blur. */
+/* Runs all passes over the volume. Their progress continues where the progress of the blur ends. */
 static status search(struct orientation_job *o, struct thread_pool *pool, const struct progress *inner,
                      struct progress_part *part, struct error *err)
 {

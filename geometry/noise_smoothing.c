@@ -11,7 +11,7 @@ static const double WEAK = 0.2;
  * Fibers of FINEST_VOXEL need all of the scan's resolution. */
 static const double LEAST_SD_VOXEL = 0.3, MOST_SD_VOXEL = 0.7, FINEST_VOXEL = 4.0, BEYOND_FINEST = 0.25;
 
-/* What the threads share. Slice k, blurred along x and y, is at k % n_held of `held`. */
+/* Data that the threads share. Slice k, blurred along x and y, is at k % n_held of `held`. */
 struct smoothing {
     struct volume *v;
     float kernel[2 * MAX_REACH + 1];

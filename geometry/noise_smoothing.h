@@ -6,8 +6,8 @@
 #include "geometry/volume/volume.h"
 
 /* Standard deviation of the Gaussian in voxels, 0 for none, for noise of standard deviation scan_sd over the step from
- * void to material: that which leaves a fifth of the step if the noise is white, but at most 0.7 voxels and a quarter
- * of what the fibers' diameter exceeds 4 voxels by. */
+ * void to material: the one that leaves a fifth of the step if the noise is white, but at most 0.7 voxels and a quarter
+ * of the diameter's excess over 4 voxels. */
 double noise_smoothing_sd(double scan_sd, double diameter_voxel);
 
 /* Blurs v by a Gaussian of sd_voxel > 0; the values at the faces count on beyond them. The slices are processed in

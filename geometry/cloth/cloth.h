@@ -26,7 +26,7 @@ struct cloth_report {
     double yarn_height_m[CLOTH_MAX_KIND];
     double surface_angle_rad[CLOTH_MAX_KIND]; /* between the yarn and its outermost fibers, from the twist */
     double thickness_m;                       /* from the lowest to the highest fiber surface, hairs included */
-    double body_thickness_m;                  /* the same without hairs: what a thickness gauge finds, not pressed */
+    double body_thickness_m;                  /* the same without hairs: the reading of a gauge that does not press */
     double cover;                             /* share of the tile's area under at least one fiber, along z */
     double volume_fraction; /* volume of the fibers, hairs included, over tile area x thickness without hairs */
     double overlap_mean;    /* depth of interpenetration over the diameter, mean over all points */

@@ -1,5 +1,5 @@
 /* Felt: fibers in all directions of the plane, at all depths. The edge of the tile follows from the number of fibers,
- * the density and the thickness, so that the number of fibers stays what it is when the density changes. */
+ * the density and the thickness, so that a change of the density leaves the number of fibers unchanged. */
 #include "base/angle.h"
 #include "base/rng.h"
 #include "geometry/cloth/cloth_work.h"

@@ -14,8 +14,8 @@ static const double START_STEP = 0.7548776662466927;
 /* Nodes of a fiber are this many radii apart at the description's own values. */
 static const double NODE_STEP_RADII = 1.5;
 /* Length, in radii, of the part of a yarn in which its staples begin and end. The places turn with the twist, and one
- * tile seldom holds whole turns, so those of fibers that begin and of fibers that end do not fit each other. Both are
- * in the section only here. With ends all along the yarn, radiances depended on the length of the tile by 1 to 2 %
+ * tile seldom holds whole turns, so the places where fibers begin do not fit the places where fibers end. Both are in
+ * the section only here. With ends all along the yarn, radiances depended on the length of the tile by 1 to 2 %
  * (optimizer/fit/NOTES.md, "The size of the tile"). */
 static const double SEAM_RADII = 24.0;
 /* Lengths, in radii, of the longest waves of a fiber about its place, of a section's size, and of a migration. */

@@ -38,7 +38,7 @@ struct strand_set {
     double (*axis)[3];  /* a vector along the long axis of the section at each node; NULL unless flat */
 };
 
-/* Random streams of the parts of a cloth; STREAM_NOISE, STREAM_RING and STREAM_WHITE are those of a simulated scan. */
+/* Random streams of the parts of a cloth; a simulated scan uses STREAM_NOISE, STREAM_RING and STREAM_WHITE. */
 enum cloth_stream {
     STREAM_YARN = 1,
     STREAM_FLYAWAY,
@@ -74,7 +74,7 @@ struct strand_section {
 /* Gives the fibers the sections of their vertices, with long axes across the fibers. STATUS_NO_MEMORY. */
 status strand_set_sections(const struct strand_section *section, struct fiber_set *f, struct error *err);
 
-/* What is left of interpenetration and sharp bends. */
+/* Interpenetration and sharp bends that remain. */
 struct strand_fit {
     /* Depth of interpenetration over the diameter: mean over all points of fibers, and the largest. */
     double overlap_mean, overlap_max;

@@ -161,7 +161,7 @@ static void emit_strand(struct emitter *e, const struct strand_set *s, const str
             double step = (double)n_interval * t->start_share * (double)n_sub - (double)(i * n_sub + k - 1);
             bool here = changes && step >= 0.0 && step < 1.0, cut = !here && advance(e, a, b);
             if (here) advance_past_change(e, a, b, step);
-            if (cut && started && faces && i == n_interval) { /* closed: what advance began is the first piece again */
+            if (cut && started && faces && i == n_interval) { /* closed: advance began the first piece once more */
                 e->n_vertex -= e->n_here;
                 e->n_here = 0;
                 return;

@@ -59,7 +59,7 @@ static float get_f32(const uint8_t *from)
  * bits. */
 static size_t n_strand_of(size_t n) { return (n - 2) / FIBER_HAIR_MAX_SEGMENT + 1; }
 
-/* Counts what the file will hold. The vertex between two strands of a fiber is in both. */
+/* Counts the strands and points that the file will hold. The vertex between two strands of a fiber is in both. */
 static status count_strands(const struct fiber_set *f, const char *name, size_t *n_strand, size_t *n_point,
                             struct error *err)
 {

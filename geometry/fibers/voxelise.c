@@ -10,10 +10,10 @@ enum { SLAB = 2, BYTES_PER_VOXEL = 5 };
 /* Buffers of one thread for the voxels of one slab. */
 struct slab {
     uint32_t *owner;  /* number + 1 of the fiber that last touched a voxel */
-    float *share;     /* share of that fiber */
+    float *share;     /* share of the owner in the voxel */
     float *density;   /* sum of shares */
     float *distance;  /* distance to the nearest axis, in widths */
-    float *direction; /* direction of that axis, three numbers */
+    float *direction; /* direction of the nearest axis, three numbers */
 };
 
 struct job {
@@ -103,7 +103,7 @@ static double share_beyond(const struct job *job, const struct capsule *c, const
     return share;
 }
 
-/* all: share of the fiber in the voxel, with what lies beyond the grid. */
+/* all: share of the fiber in the voxel, with the part beyond the grid. */
 static void add_share(struct slab *s, size_t at, const struct capsule *c, double distance, double all)
 {
     float share = (float)all, away = (float)distance;
@@ -236,7 +236,7 @@ static status choose_grid(const struct fiber_set *f, const struct voxelise_optio
     for (int a = 0; a < 3; a++) n[a] = (size_t)count[a];
     for (int a = 0; a < 2; a++) size_m[a] = f->tile_size_m[a] / count[a];
     size_m[2] = *edge_m;
-    *z_low_m = z_high_m - count[2] * *edge_m; /* the top of the grid is that of the cloth, as for fibers */
+    *z_low_m = z_high_m - count[2] * *edge_m; /* grid and cloth have the same top, as for fibers */
     return STATUS_OK;
 }
 

@@ -3,13 +3,12 @@
  * The density of a voxel is the share of it inside fibers. For a voxel of width w whose centre has distance d from
  * the axis of a fiber of radius r there (sections are discs) it is clamp(1/2 + (r' - d) / w), where r'^2 = r^2 -
  * w^2 / 12 preserves the area of the section, pi (r'^2 + w^2 / 12), if the ramp ends before the axis (r' >= w / 2).
- * Thinner fibers are drawn as cones
- * of that width and of the fiber's area, 3 r^2 / w^2 (1 - d / w), because narrower profiles would miss the centres
- * of voxels. What extends above or below the cloth is added to its first or last slice. Shares of different fibers
- * add, up to 1. Ends are flat. The direction is the tangent of the fiber whose axis is nearest, as in the direction
- * transfer of the fabric thesis (5.6.7).
+ * Thinner fibers are drawn as cones of the width w and of the fiber's area, 3 r^2 / w^2 (1 - d / w), because narrower
+ * profiles would miss the centres of voxels. Parts above or below the cloth are added to its first or last slice.
+ * Shares of different fibers add, up to 1. Ends are flat. The direction is the tangent of the fiber whose axis is
+ * nearest, as in the direction transfer of the fabric thesis (5.6.7).
  *
- * A tile has a whole number of voxels, so the grid is periodic in x and y. Its top is that of the highest fiber. The
+ * A tile has a whole number of voxels, so the grid is periodic in x and y. It ends at the top of the highest fiber. The
  * result depends only on the fibers and the options, not on the number of threads. */
 #ifndef SELVEDGE_GEOMETRY_VOXELISE_H
 #define SELVEDGE_GEOMETRY_VOXELISE_H

@@ -1,6 +1,6 @@
 /* Compares a direction volume with the true fibers of a phantom.
  *
- * A voxel belongs to the true fiber whose axis is nearest to its centre, periodic in x and y. It lies inside of that
+ * A voxel belongs to the true fiber whose axis is nearest to its centre, periodic in x and y. It lies inside of the
  * fiber if the distance is at most the fiber's radius, and in its rim up to twice that, as far as the transfer of
  * directions reaches (fabric thesis, 5.6.7). The rim holds the blurred surface of fibers, and noise. The error of a
  * voxel is the angle between its direction and the fiber's, without sign; emptied voxels have none. */

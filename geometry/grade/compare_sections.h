@@ -5,18 +5,20 @@
 
 #include "geometry/fibers/fiber_set.h"
 
-/* Over vertices of found fibers that lie within the radius of a true fiber. A pull is the median of |error| over the
- * standard error, divided by that of a normal variable, 0.6745: 1 where the stated errors are right. Root mean squares
- * contain places where a line follows no fiber. NaN where there are no values. */
+/* Over vertices of found fibers that lie within the radius of a true fiber. A pull is a normalised error: the median of
+ * |error| over the standard error, divided by 0.6745, the median of a normal variable's absolute value: 1 where the
+ * stated errors are right. Root mean squares contain places where a line follows no fiber. NaN where there are no
+ * values. */
 struct section_compare {
     size_t n;
     double radius_rms;                 /* of found / true - 1, with the radius at the vertex */
     double mean_radius_rms;            /* the same with the mean radius of the found fiber */
-    double radius_bias, radius_pull;   /* mean of found / true - 1; the pull is that of the rest */
+    double radius_bias, radius_pull;   /* mean of found / true - 1; the pull is without this mean */
     double ratio_bias, ratio_rms;      /* of found / true - 1 */
     double ratio_median, ratio_pull;   /* median of |found / true - 1| */
     double turn_median_deg, turn_pull; /* where the true ratio is above 1.3 */
-    /* Of found - true width of the lumen over that of the fiber; share of the vertices where the scan tells it. */
+    /* Of the found minus the true ratio of lumen width to fiber width; share of the vertices where the scan tells
+     * it. */
     double lumen_rms, lumen_bias, lumen_pull, lumen_share;
 };
 

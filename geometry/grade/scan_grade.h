@@ -4,8 +4,8 @@
  * places would have: high within them, low between them. `contrast` is the slope of the measured on these expected
  * densities, over windows of GRADE_WINDOW_DIAMETERS along a fiber, because single voxels are noisy: near 1 where the
  * scan shows the fibers, and near 0 where it shows material but no single fibers, so that lines there are invented.
- * `valley_depth` is easier to see in a picture: from the axis of a fiber to that of its nearest neighbour the density
- * falls by this share. It is small also where fibers are pressed together. */
+ * `valley_depth` is easier to see in a picture: from the axis of a fiber to the axis of its nearest neighbour the
+ * density falls by this share. It is small also where fibers are pressed together. */
 #ifndef SELVEDGE_GEOMETRY_SCAN_GRADE_H
 #define SELVEDGE_GEOMETRY_SCAN_GRADE_H
 
@@ -36,13 +36,13 @@ const char *grade_verdict_name(enum grade_verdict v);
  * the number of threads. STATUS_NO_MEMORY, STATUS_CANCELLED. */
 status scan_grade_measure(const struct volume *v, const struct fiber_set *f, struct thread_pool *pool,
                           const struct progress *progress, struct scan_grade *grade, float *safe, struct error *err);
-/* Contrast at every vertex: that of the window around it, so how clearly the scan shows the fiber there. Below
- * GRADE_SAFE_CONTRAST the scan does not show it, and the line is filled in. contrast: n_vertex; NaN for a fiber too
- * short to have a window. Else as scan_grade_measure. */
+/* Writes the contrast at every vertex, measured in the window around it: how clearly the scan shows the fiber there.
+ * Below GRADE_SAFE_CONTRAST the scan does not show it, and the line is filled in. contrast: n_vertex; NaN for a fiber
+ * too short to have a window. Else as scan_grade_measure. */
 status scan_grade_contrast(const struct volume *v, const struct fiber_set *f, struct thread_pool *pool,
                            const struct progress *progress, float *contrast, struct error *err);
-/* Puts the fibers of which less than half of the length is safe behind the others, and counts them in the grade as to
- * be dropped; none if that is true of all. safe: as measured. STATUS_NO_MEMORY. */
+/* Puts the fibers that are safe over less than half of their length behind the others, and counts them in the grade as
+ * to be dropped; counts none if all fibers are such. safe: as measured. STATUS_NO_MEMORY. */
 status scan_grade_sort(struct fiber_set *f, const float *safe, struct scan_grade *grade, struct error *err);
 /* Drops those fibers. */
 void scan_grade_drop(struct fiber_set *f, const struct scan_grade *grade);

@@ -4,8 +4,8 @@
 #include <stdbool.h>
 
 enum { REACH = 4, EDGE = 2 * REACH + 1, MAX_PLACE = 200000, MIN_PLACE = 500 };
-/* Void is where the mean over EDGE^3 voxels is not far above that of clamped noise, 0.4 sd: a closer bound would leave
- * out what correlated noise has raised. */
+/* Void is where the mean over EDGE^3 voxels is not far above the mean of clamped noise, 0.4 sd: a closer bound would
+ * leave out void that correlated noise has raised. */
 static const double VOID_MEAN_SD = 0.6, VOID_MEAN = 0.005;
 static const double LEAST_CORRELATION = 0.02, MOST_BLUR = 5.0;
 
@@ -33,7 +33,7 @@ static void add_place(const struct volume *v, const size_t x[3], struct sums *s)
     s->n++;
 }
 
-/* Correlation of Gaussian noise from that of its positive part. */
+/* Returns the correlation c of Gaussian noise whose positive part has this ratio (formula in scan_noise.h). */
 static double invert(double ratio)
 {
     double low = -1.0, high = 1.0;

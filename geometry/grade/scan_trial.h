@@ -1,4 +1,5 @@
-/* What a scan can give: figures of a phantom of the fibers that were traced in it, with its noise and blur. */
+/* The accuracy that a scan allows: figures of a phantom of the fibers that were traced in it, with its noise and
+ * blur. */
 #ifndef SELVEDGE_GEOMETRY_SCAN_TRIAL_H
 #define SELVEDGE_GEOMETRY_SCAN_TRIAL_H
 
@@ -16,8 +17,8 @@ struct scan_trial {
     double noise_sd_voxel;              /* of the Gaussian that correlates its noise; 0: white */
     double blur_sd_voxel;
     /* The fibers of the phantom: standard deviation of their radii over the mean; mean ratio of the axes of their
-     * sections (1: round) and mean width of their lumens over that of the fibers (0: solid), with standard deviations.
-     * All are taken over the length, where the scan was measured, so deviations contain the errors of that. */
+     * sections (1: round) and mean ratio of the lumens' width to the fibers' (0: solid), with standard deviations. All
+     * are taken over the length, where the scan was measured, so deviations contain the errors of the measurement. */
     double radius_spread, axis_ratio, axis_ratio_spread, lumen, lumen_spread;
     /* Figures of geometry/phantom/compare.h; NaN if nothing was found. */
     double recall, recall_se, precision, fragments, fragments_se, merges, axis_rms_voxel, direction_mean_deg,

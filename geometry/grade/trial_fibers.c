@@ -107,7 +107,7 @@ static double told_lumen(const struct fiber_set *f)
     return n > 0.0 ? sum / n : NAN;
 }
 
-/* Removes what of the sections is not kept. */
+/* Removes the parts of the measured sections that `sections` does not keep. */
 static void take_sections(struct fiber_set *f, const struct trial_sections *sections)
 {
     double other = told_lumen(f);

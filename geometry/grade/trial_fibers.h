@@ -5,12 +5,13 @@
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/grade/scan_trial.h"
 
-/* What of the measured sections is kept. Round solid fibers have ratios of the axes of up to 1.1, which are noise. */
+/* The parts of the measured sections that a phantom keeps. Round solid fibers have ratios of the axes of up to 1.1,
+ * which are noise. */
 struct trial_sections {
     bool flat;   /* ratios of axes and turns; else sections are round */
     bool hollow; /* lumens; else fibers are solid */
-    /* Width over that of the fiber, for hollow fibers if the scan tells the lumens of none. Where it tells some, the
-     * others have their mean. */
+    /* Width of the lumen over the fiber's, for hollow fibers if the scan tells the lumens of none. Where it tells some,
+     * the others have their mean. */
     double lumen;
 };
 

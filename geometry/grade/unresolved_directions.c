@@ -23,7 +23,7 @@ struct average_job {
 /* A brick with the voxels around it on which it depends. */
 struct surroundings {
     size_t from[3], n[3]; /* of the brick */
-    size_t low[3], m[3];  /* with what is around it */
+    size_t low[3], m[3];  /* with its surroundings */
 };
 
 static struct surroundings find_surroundings(const struct average_job *job, size_t i_brick)

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The simulation's unit of length is the edge of the cloth, its unit of time the square root of that over gravity, and
- * every point has the mass 1. */
+/* The simulation's unit of length is the edge of the cloth, its unit of time the square root of the edge over gravity,
+ * and every point has the mass 1. */
 enum { CELLS = 64, SIDE = CELLS + 1, POINTS = SIDE * SIDE, STEPS = 12000 };
 /* The mesh has so many cells for each of the simulation's, along each edge. */
 enum { FINER = 4, FINE_SIDE = FINER * CELLS + 1 };

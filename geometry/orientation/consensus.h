@@ -1,6 +1,6 @@
 /* Mean fiber directions of neighbourhoods: direction tensors averaged on a coarse grid and blurred over about a
- * fiber diameter. The fibers of a yarn run side by side, so where J does not distinguish two directions, that of the
- * neighbourhood is the right one. */
+ * fiber diameter. The fibers of a yarn run side by side, so where J does not distinguish two directions, the direction
+ * of the neighbourhood is the right one. */
 #ifndef SELVEDGE_GEOMETRY_CONSENSUS_H
 #define SELVEDGE_GEOMETRY_CONSENSUS_H
 

@@ -5,9 +5,9 @@
 #include "base/thread_pool.h"
 #include "geometry/volume/volume.h"
 
-/* Mean angle in degrees between the direction of a kept voxel and that of the next voxel along its axis class, if
- * that one is kept too. Along a fiber directions hardly change from voxel to voxel, so a large angle is noise. NaN
- * if there are no such pairs. STATUS_CANCELLED, STATUS_NO_MEMORY. */
+/* Measures the mean angle in degrees between the directions of a kept voxel and of the next voxel along its axis class,
+ * if the next one is kept too. Along a fiber directions hardly change from voxel to voxel, so a large angle is noise.
+ * NaN if there are no such pairs. STATUS_CANCELLED, STATUS_NO_MEMORY. */
 status direction_noise_measure(const struct direction_volume *d, struct thread_pool *pool,
                                const struct progress *progress, double *mean_deg, struct error *err);
 

@@ -1,5 +1,5 @@
-/* Directions spread evenly over the half sphere, where d and -d are the same, with what a descent over them needs:
- * the nearest neighbours of each, and the least-squares fit of a paraboloid to values at them. */
+/* Directions spread evenly over the half sphere, where d and -d are the same, with the data of a descent over them: the
+ * nearest neighbours of each, and the least-squares fit of a paraboloid to values at them. */
 #ifndef SELVEDGE_GEOMETRY_DIRECTION_SET_H
 #define SELVEDGE_GEOMETRY_DIRECTION_SET_H
 

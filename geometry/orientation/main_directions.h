@@ -1,4 +1,4 @@
-/* The main directions of the fibers of a cloth: those of weft and warp, or of its only system of fibers.
+/* The main directions of the fibers of a cloth: the directions of weft and warp, or of its only system of fibers.
  *
  * Directions come from structure tensors (Bigun and Granlund 1987) at places spread over the volume where there is
  * material. The histogram of their angle within the plane of x and y, smoothed by 8 degrees, has its highest peak at

@@ -1,5 +1,6 @@
-/* The search compares floats, LANES nodes at a time, with a reach that is wider by what rounding can do. What it finds
- * is looked at again in double precision, in the order of the grid, so that results do not depend on the lanes. */
+/* The search compares floats, LANES nodes at a time, with a reach widened by the largest rounding error. Each pair
+ * found is tested again in double precision, in the order of the grid, so that results do not depend on the number of
+ * SIMD lanes. */
 #include "geometry/cloth/relax/strand_contact.h"
 #include "base/lanes.h"
 
@@ -24,7 +25,7 @@ struct batch {
     uint32_t node[BATCH];                /* that is pushed */
     double d_m[3][BATCH], want_m[BATCH]; /* from the other node; sum of radii */
     double aside[BATCH];                 /* where it goes in z when both are in one place */
-    /* results: what is added, 0 for pairs that do not touch */
+    /* results: the terms to add, 0 for pairs that do not touch */
     double move_m[3][BATCH], n_contact[BATCH], depth[BATCH];
 };
 
@@ -109,14 +110,14 @@ static inline void add_pair(struct look *l, const struct grid_node *i, const str
     b->aside[k] = i->node < j->node ? -1.0 : 1.0; /* the lower number goes down */
 }
 
-/* Up to LANES sorted nodes beside each other, what is added to their x and y, and a bit for each. */
+/* Up to LANES sorted nodes beside each other, the shift of their x and y, and a bit for each. */
 struct piece {
     uint32_t from, valid;
     float shift_m[2];
 };
 enum { MOST_PIECES = 64, PIECES_PER_WORD = 64 / LANES };
 
-/* Finds what is near sorted node k in some pieces. */
+/* Finds the nodes of some pieces that are near sorted node k. */
 static void look_from(struct look *l, size_t k, const struct piece *piece, size_t n_piece)
 {
     const struct strand_grid *g = l->c->grid;
@@ -132,7 +133,7 @@ static void look_from(struct look *l, size_t k, const struct piece *piece, size_
     for (size_t i = 0; i < n_piece; i += PIECES_PER_WORD) {
         const struct piece *in = piece + i;
         size_t n = n_piece - i < PIECES_PER_WORD ? n_piece - i : PIECES_PER_WORD;
-        uint64_t near = 0; /* LANES bits of each piece, so that there is one loop over what is found in all of them */
+        uint64_t near = 0; /* LANES bits of each piece, so that one loop runs over the nodes found in all */
         for (size_t q = 0; q < n; q++) {
             const size_t from = in[q].from;
             const lanes d_x = *(const lanes *)(g->at[0] + from) - (x - in[q].shift_m[0]),

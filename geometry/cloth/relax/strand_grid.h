@@ -1,7 +1,7 @@
 /* The nodes of strands sorted by the cells of a periodic grid, so that the neighbours of a node are found at once.
  * Cells are at least a diameter wide: nodes that touch lie in the same cell or in neighbouring ones. Nodes of a cell
- * lie side by side in memory with what a pair of them needs, because pairs are looked at more often than anything
- * else. */
+ * lie side by side in memory with the numbers that the test of a pair needs, because pairs are looked at more often
+ * than anything else. */
 #ifndef SELVEDGE_GEOMETRY_STRAND_GRID_H
 #define SELVEDGE_GEOMETRY_STRAND_GRID_H
 
@@ -33,8 +33,8 @@ void strand_grid_release(struct strand_grid *g);
 /* Sorts the nodes by their present places. strand_of: node -> strand. */
 void strand_grid_sort(struct strand_grid *g, const struct strand_set *s, const uint32_t *strand_of);
 
-/* A row of cells along x, each row by its number among n_cell[1] * n_cell[2] of them, and what is added to y of its
- * nodes to have them beside those of another row. */
+/* A row of cells along x, each row by its number among n_cell[1] * n_cell[2] of them, and the shift of y that puts its
+ * nodes beside the nodes of another row. */
 struct grid_row {
     size_t first_cell;
     float shift_m;
@@ -44,7 +44,7 @@ enum { GRID_MAX_ROW = 9, GRID_MAX_RUN = 27 };
 /* Rows around a row, itself included, each row once. Returns their number. */
 size_t strand_grid_rows(const struct strand_grid *g, size_t i_row, struct grid_row row[GRID_MAX_ROW]);
 
-/* A run of neighbouring cells: sorted[from] to sorted[to - 1], and what is added to their x and y. */
+/* A run of neighbouring cells: sorted[from] to sorted[to - 1], and the shift of their x and y. */
 struct grid_run {
     uint32_t from, to;
     float shift_m[2];

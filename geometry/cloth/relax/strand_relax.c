@@ -105,7 +105,7 @@ static double strain_p95(struct relax *r)
     return n > 0 ? r->contacts.depth[(size_t)(0.95 * (double)(n - 1))] : 0.0;
 }
 
-/* Measures what is left, from a look at the present places. */
+/* Measures the interpenetration and the sharp bends that are left at the present places. */
 static void measure(struct relax *r, struct strand_fit *fit)
 {
     const size_t n_node = r->s->n_node;

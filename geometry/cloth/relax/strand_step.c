@@ -45,8 +45,8 @@ static void pad(const struct strand *t, const double *shift, struct rows *r)
     }
 }
 
-/* Computes in `move` the means of what contacts want, without the part along the fiber, which would only shuffle
- * nodes. q: the nodes. */
+/* Computes in `move` the mean of the moves that the contacts of each node ask for, without the part along the fiber,
+ * which would only shuffle nodes. q: the nodes. */
 static void settle(const struct strand *t, const struct strand_moves *m, const struct rows *q, struct rows *move)
 {
     const double *x = q->row[0], *y = q->row[1], *z = q->row[2];
@@ -86,10 +86,10 @@ static void smooth(const struct strand_set *s, const struct strand *t, int a, co
     }
 }
 
-/* Computes what the bend at each node wants: where a strand bends more sharply than fibers can, the node and its two
- * neighbours move towards a straight line until the bend is allowed. `want` is the move of a neighbour, with its sign
- * turned; the node moves by twice as much. Returns whether any bend is too sharp. from, to: nodes with
- * a bend. */
+/* Computes the moves that the bend at each node asks for: where a strand bends more sharply than fibers can, the node
+ * and its two neighbours move towards a straight line until the bend is allowed. `want` is the move of a neighbour,
+ * with its sign turned; the node moves by twice as much. Returns whether any bend is too sharp. from, to: nodes with a
+ * bend. */
 static bool find_bends(const struct rows *q, long from, long to, double most_per_chord2, struct rows *want)
 {
     const double *x = q->row[0], *y = q->row[1], *z = q->row[2];

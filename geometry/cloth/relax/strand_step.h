@@ -1,12 +1,12 @@
-/* One round of a strand by itself, after its contacts with other strands are known: it moves by the mean of what they
- * want, its displacement is smoothed, and bends that would break a fiber are straightened. A strand takes all of this
- * in one go, while its nodes are in the cache. */
+/* One round of a strand by itself, after its contacts with other strands are known: it moves by the mean of the moves
+ * that they ask for, its displacement is smoothed, and bends that would break a fiber are straightened. A strand takes
+ * all of this in one go, while its nodes are in the cache. */
 #ifndef SELVEDGE_GEOMETRY_STRAND_STEP_H
 #define SELVEDGE_GEOMETRY_STRAND_STEP_H
 
 #include "geometry/cloth/strand.h"
 
-/* What the contacts of a node want. */
+/* The moves that the contacts of a node ask for. */
 struct strand_push {
     double sum_m[3];  /* of the moves */
     double n_contact; /* as the rule counts them */
@@ -25,8 +25,8 @@ size_t strand_step_work(size_t n);
 void strand_step(struct strand_set *s, const struct strand *t, const struct strand_moves *m, double smoothing,
                  double *work);
 
-/* The bend at the middle one of three nodes: the second difference of the positions. Returns its square and that of
- * half of the chord. */
+/* The bend at the middle one of three nodes: the second difference of the positions. Returns its square, and in *chord2
+ * the square of half of the chord. */
 static inline double strand_bend(const double before[3], const double at[3], const double after[3], double bend[3],
                                  double *chord2)
 {

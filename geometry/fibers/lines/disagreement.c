@@ -29,7 +29,7 @@ static float sine2(const struct polyline_set *p, size_t line, size_t i, const st
     return fmaxf(0.0f, 1.0f - cosine * cosine / norm);
 }
 
-/* What the cuts of one set of lines have in common. */
+/* Data that all cuts of one set of lines share. */
 struct disagreement {
     const struct polyline_set *lines;
     const struct direction_volume *d;

@@ -26,7 +26,7 @@ static float near_distance(const struct polyline_set *p, size_t a, size_t b, flo
     return fmaxf(fmaxf(1.0f, touching * (ra + rb)), 0.9f * fmaxf(ra, rb) + 0.1f * fminf(ra, rb));
 }
 
-/* What the search for duplicates has in common for all vertices. */
+/* Data of the search for duplicates that all vertices share. */
 struct duplicate_search {
     const struct polyline_set *p;
     struct vertex_grid grid;

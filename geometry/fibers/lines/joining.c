@@ -15,7 +15,7 @@ static const float FACE_STEPS = 1.5f;                              /* voxels alo
 static const double MAX_RMS = 0.13, MAX_BEND = 1.2, MAX_GAP = 1.5; /* diameters, per diameter, diameters */
 /* Logarithm of the ratio of two radii that makes a join as unlikely as a curve of the largest bend. */
 static const double UNLIKE = 0.3;
-/* Where the scan judges joins: what one costs for which the scan is halfway between one fiber and two, and the most
+/* Where the scan judges joins: the cost of a join for which the scan is halfway between one fiber and two, and the most
  * that a join may cost. In plain weaves and velvets 1 of 50 joins within that was wrong, and 41 of 63 beyond
  * (geometry/NOTES.md). */
 static const double NO_EVIDENCE = 0.8, MOST_JUDGED = 0.75;
@@ -130,7 +130,7 @@ static bool may_face(const struct join_job *job, uint32_t a, uint32_t b)
     return cosine > -0.2f && ahead > -(float)MAX_TRIM && side2 < (wide + 0.4f * free_way) * (wide + 0.4f * free_way);
 }
 
-/* What a join costs because the scan does not show one fiber. */
+/* Returns the cost of a join for lack of evidence that the scan shows one fiber. */
 static double lack_of_evidence(const struct join_job *job, const struct join_curve *j, uint32_t a, uint32_t b)
 {
     if (!(job->blur > 0.0)) return 0.0;

@@ -9,7 +9,7 @@
  * rest of the way. */
 void polylines_reach_faces(struct polyline_set *lines, const struct volume *v, double eps_d, double max_voxel);
 
-/* Copies the lines without vertices at their ends that lie outside of the volume; those of fewer than min_vertex
+/* Copies the lines without vertices at their ends that lie outside of the volume; lines of fewer than min_vertex
  * vertices are left out and counted by the class of the line. STATUS_NO_MEMORY. */
 status polylines_keep_inside(const struct polyline_set *in, const size_t n_voxel[3], size_t min_vertex,
                              struct polyline_set *out, size_t n_dropped[3], struct error *err);

@@ -15,7 +15,7 @@ struct polyline_set {
     float (*vertex)[3];
     uint8_t *axis; /* per line: index of the subvolume (slice frame) it was found in; later its axis class */
     float *radius; /* per line: radius of the fiber, voxels; 0 while it is not known */
-    struct fiber_shape *shape; /* per vertex: measured sections, whose mean radius is that of the line; NULL: none */
+    struct fiber_shape *shape; /* per vertex: measured sections, whose mean radius is the line's; NULL: none */
 };
 
 void polyline_set_init(struct polyline_set *p);
@@ -28,7 +28,7 @@ status polyline_add(struct polyline_set *p, const float x[3], struct error *err)
 /* Gives every vertex a disc of the radius of its line. Vertices that are added later begin as discs of no radius.
  * STATUS_NO_MEMORY. */
 status polyline_shapes_init(struct polyline_set *p, struct error *err);
-/* Makes the mean radius of the sections of each line that of the line, where both were changed apart. */
+/* Makes the mean radius of each line's sections equal to the line's radius, where both were changed apart. */
 void polyline_shapes_follow(struct polyline_set *p, bool scale);
 /* Copies vertices i .. end - 1 (indices in from->vertex) of a line of `from` as a new line, with their sections. */
 status polyline_add_part(struct polyline_set *p, const struct polyline_set *from, size_t line, size_t i, size_t end,

@@ -55,10 +55,10 @@ static inline size_t segment_n_brick(const struct segment_bricks *s)
 /* The voxels of a brick (cut at the faces), and the lattice with `factor` points per voxel along each axis in it. */
 void segment_brick_box(const struct segment_bricks *s, size_t i_brick, size_t from[3], size_t n[3]);
 struct point_lattice segment_brick_lattice(const struct segment_bricks *s, size_t i_brick, size_t factor);
-/* distance2[point]: squared distance to the nearest segment, or reach^2 if none is nearer. nearest[point]: index of
- * that segment, or UINT32_MAX. Points are in the order (z, y, x); both arrays have room for SEGMENT_SLACK more. Lines
- * are assumed to bend by less than about 10 degrees at a vertex: the first and last segment of a line are compared
- * with all points, the others only with the slab between their ends and one voxel beyond. */
+/* distance2[point]: squared distance to the nearest segment, or reach^2 if none is nearer. nearest[point]: index of the
+ * segment, or UINT32_MAX. Points are in the order (z, y, x); both arrays have room for SEGMENT_SLACK more. Lines are
+ * assumed to bend by less than about 10 degrees at a vertex: the first and last segment of a line are compared with all
+ * points, the others only with the slab between their ends and one voxel beyond. */
 enum { SEGMENT_SLACK = 8 };
 void segment_distances(const struct segment_bricks *s, size_t i_brick, const struct point_lattice *lattice,
                        float *distance2, uint32_t *nearest);

@@ -1,5 +1,5 @@
-/* The assignment of least cost between two sets, of which only some pairs are allowed: successive shortest paths over
- * sparse rows (Jonker and Volgenant 1987). */
+/* The assignment of least cost between two sets if only some pairs are allowed: successive shortest paths over sparse
+ * rows (Jonker and Volgenant 1987). */
 #ifndef SELVEDGE_GEOMETRY_ASSIGNMENT_H
 #define SELVEDGE_GEOMETRY_ASSIGNMENT_H
 

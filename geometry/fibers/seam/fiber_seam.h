@@ -1,6 +1,6 @@
 /* Measures how well the fibers of a tile continue in the neighbouring tiles, and joins ends across its seams, so that
  * the repeated tile shows none. The fabric thesis (5.7.1) makes Wang tiles of the volume instead, whose cuts go where
- * scans agree best; here fibers that were cut at one face go on in those of the other.
+ * scans agree best; here fibers that were cut at one face go on in the fibers cut at the other.
  *
  * seam_ends.h defines which ends lie on a seam. */
 #ifndef SELVEDGE_GEOMETRY_FIBER_SEAM_H
@@ -15,8 +15,8 @@ struct fiber_seam {
     double offset_m[2];    /* mean distance of these partners in the plane of the face; NaN if there are none */
     double angle_rad[2];   /* mean angle between them */
     /* Step of the section that fibers fill, in fields of two mean diameters, from a plane a quarter of a diameter
-     * before the seam to one behind it: sum of the absolute differences over the sum of both, 0 .. 1. The mean of
-     * the same at eight planes within the tile is what the seam of an endless cloth would have. NaN if no fiber
+     * before the seam to one behind it: sum of the absolute differences over the sum of both, 0 .. 1. step_inside: the
+     * mean of the same at eight planes within the tile, as the seam of an endless cloth would have it. NaN if no fiber
      * crosses the planes. */
     double step[2], step_inside[2];
 };

@@ -113,7 +113,8 @@ static double widest_radius(const struct seam_ends *s)
     return widest;
 }
 
-/* Calls visit for all ends at the high face whose height differs from that of each low end by at most `window`. */
+/* Calls visit for each pair of an end at the low and an end at the high face whose heights differ by at most
+ * `window`. */
 static status each_pair(const struct seam_ends *s, double window,
                         status (*visit)(void *, size_t, size_t, struct error *), void *context, struct error *err)
 {

@@ -35,8 +35,8 @@ struct seam_ends {
 status seam_ends_collect(struct seam_ends *s, const struct fiber_set *f, int axis, struct error *err);
 void seam_ends_release(struct seam_ends *s);
 
-/* What a pair costs: the square of its distance in radii, and with SEAM_BY_SHAPE also those of the angle between
- * the ends over 0.2 rad and of the difference of their radii over a fifth of them. */
+/* Cost of a pair: the square of its distance in radii. SEAM_BY_SHAPE adds the squares of the angle between the ends
+ * over 0.2 rad and of the difference of their radii over a fifth of them. */
 enum seam_cost { SEAM_BY_DISTANCE, SEAM_BY_SHAPE };
 
 /* Finds partners within `reach` radii, after the offsets of `field` (NULL: none) have been taken off, by the assignment

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Weight of what the field was, in samples at the same place. */
+/* Weight of the field's previous value, in samples at the same place. */
 static const double KEPT_WEIGHT = 0.5;
 enum { MOST_CELLS = 512 };
 

@@ -22,7 +22,7 @@ struct seam_sample {
 };
 
 /* Makes the field the mean of the samples weighted by a Gaussian of standard deviation width_m. Where there are few
- * samples it keeps to what it was. STATUS_NO_MEMORY. */
+ * samples it stays near its previous value. STATUS_NO_MEMORY. */
 status seam_field_fit(struct seam_field *f, const struct seam_sample *sample, size_t n, double width_m,
                       struct error *err);
 

@@ -52,7 +52,7 @@ size_t blob_scratch(size_t width, int reach)
 
 static inline uint8_t least(uint8_t a, uint8_t b) { return a < b ? a : b; }
 
-/* Lowers the distances of a row to those of the row beside it and one more. */
+/* One pass of a distance transform: sets distance[b] to min(distance[b], beside[b] + 1). */
 static void lower(uint8_t *restrict distance, const uint8_t *restrict beside, size_t n)
 {
     for (size_t b = 0; b < n; b++) distance[b] = least(distance[b], (uint8_t)(beside[b] + 1));

@@ -10,7 +10,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Pixels in a block of a row: those of a byte of bits. */
+/* BLOB_BLOCK: pixels in a block of a row, one for each bit of a byte. */
 enum { BLOB_BLOCK = 8, BLOB_MAX_REACH = 64 };
 
 static inline size_t blob_n_block(size_t width) { return (width + BLOB_BLOCK - 1) / BLOB_BLOCK; }

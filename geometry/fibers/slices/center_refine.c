@@ -14,7 +14,7 @@ struct box {
     ptrdiff_t u0, u1, v0, v1; /* u1, v1 are excluded */
 };
 
-/* A center with what its pixels share. */
+/* A center and the values that all its pixels share. */
 struct window {
     float u, v, slope_u, slope_v, stretch2; /* stretch2: squared length of the axis per slice */
     float radius2, edge2;
@@ -48,7 +48,7 @@ static void clear_row(float *distance, ptrdiff_t n)
 
 static const lanes STEP = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
 
-/* Gives LANES pixels of a row, of which n count, to a center if it is the nearest so far. du, dv: their places from the
+/* Gives the first n of LANES pixels of a row to a center if it is the nearest so far. du, dv: their places from the
  * center. The distance is perpendicular to the axis. */
 static inline void claim_lanes(const struct window *w, float index, lanes du, float dv, ptrdiff_t n, float *distance,
                                float *owner)
@@ -87,7 +87,7 @@ struct centroid {
     lanes sum, du, dv;
 };
 
-/* Adds LANES pixels of a row from number `at` on, of which n count. place: of the first from the center. Pixels beyond
+/* Adds the first n of LANES pixels of a row from number `at` on. place: of the first from the center. Pixels beyond
  * limit along the row have no mirror image in the picture. */
 static inline void add_pixels(const struct refine_slice *s, ptrdiff_t at, float index, const float place[2],
                               ptrdiff_t n, float limit, struct centroid *c)

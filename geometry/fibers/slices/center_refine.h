@@ -1,10 +1,10 @@
 /* Moves centers to the centroids of their own fiber's cross section, without the shift by neighbours that the maxima
  * of the blob filter have.
  *
- * Each pixel within WINDOW_RADII of a radius belongs to the nearest center. Distances are measured perpendicular to
- * the fiber of that center, because the section of a leaning fiber is an ellipse; the squared radius of a fiber is
- * taken off its squared distances, so that the border between touching fibers of different thickness is where they
- * touch. The center moves to the density-weighted mean of its pixels; this is repeated a few times. */
+ * Each pixel within WINDOW_RADII of a radius belongs to the nearest center. Distances are measured perpendicular to the
+ * center's own fiber, because the section of a leaning fiber is an ellipse; the squared radius of a fiber is taken off
+ * its squared distances, so that the border between touching fibers of different thickness is where they touch. The
+ * center moves to the density-weighted mean of its pixels; this is repeated a few times. */
 #ifndef SELVEDGE_GEOMETRY_CENTER_REFINE_H
 #define SELVEDGE_GEOMETRY_CENTER_REFINE_H
 

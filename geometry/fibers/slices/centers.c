@@ -90,7 +90,7 @@ static bool push(struct slice_result *r, const struct center *c)
     return true;
 }
 
-/* Radius of the fiber from the responses of the scales beside that of a peak: a parabola in log sigma. */
+/* Returns the radius of the fiber, by a parabola in log sigma through the responses at and beside a peak's scale. */
 static float radius_at(const struct detect_job *job, const float *peak, size_t n_pixel, int s)
 {
     double shift = 0.0, half = 0.5 * job->diameter;

@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 struct peak_search {
-    const float *response; /* width x height; only that of candidates and of their neighbours is read */
+    const float *response; /* width x height; read only at candidates and their neighbours */
     size_t width, height;
     const uint8_t *candidate; /* pixel_bits.h, (width + 7) / 8 bytes a row */
     float least;              /* least response of a peak */

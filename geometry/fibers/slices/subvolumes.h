@@ -1,4 +1,4 @@
-/* Masks that state which voxels belong to the slices of which frame. */
+/* Masks of the voxels that belong to the slices of each frame. */
 #ifndef SELVEDGE_GEOMETRY_SUBVOLUMES_H
 #define SELVEDGE_GEOMETRY_SUBVOLUMES_H
 

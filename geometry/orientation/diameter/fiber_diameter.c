@@ -17,9 +17,10 @@ static const double LEAST_MATERIAL = 0.02;
 enum { NEAR_MATERIAL = 2 };           /* voxels; peaks of the noise in void must not count */
 static const double MOST_NOISE = 0.5; /* share of a peak that noise may have */
 /* A shoulder is a peak of the energy over sigma. The response to a plane outline has an energy that grows as sigma, and
- * that of a rod grows faster up to its own peak, so the outlines of yarns and of rods without inner structure have no
- * such peak at finer scales, but may hide the fall beyond the peak of fibers. What follows must fall to the first share
- * of it before the coarser peak, and less than the second may be noise, whose remains are broad; as of broad peaks. */
+ * the energy of a rod grows faster up to its own peak, so the outlines of yarns and of rods without inner structure
+ * have no such peak at finer scales, but may hide the fall beyond the peak of fibers. SHOULDER_VALLEY: before the
+ * coarser peak the energy over sigma must fall to this share of the shoulder. MOST_REMAINS: the share of noise, whose
+ * remains are broad, in a shoulder or a broad peak stays below this. */
 static const double SHOULDER_VALLEY = 0.85, MOST_REMAINS = 0.25;
 /* No scanner resolves less than about half a voxel, so a blur by that lowers the noise more than the fibers. It is used
  * only for diameters below the chosen one divided by FIBER_DIAMETER_FINER. */
@@ -277,8 +278,8 @@ static status measure_energy(struct job *job, double blur_voxel, int n_scale, st
     return s;
 }
 
-/* Number of scales that say whether there is a peak well below the diameter: those of smaller diameters, and the two
- * beyond them that a peak is compared with. 0 if noise hides no peak there. */
+/* Number of scales that say whether there is a peak well below the diameter: the scales of smaller diameters, and the
+ * two beyond them that a peak is compared with. Returns 0 if noise hides no peak there. */
 static int hidden_scales(const struct energy e[N_SCALE], double diameter)
 {
     int n = 0;

@@ -15,7 +15,7 @@ static const double MIN_VOID_VOXEL = 500.0;
  * void is clamped, the variance at fibers is 1.4 times as large (found on phantoms of 4 and 7 voxels). */
 static const double CLAMPED_GAIN = 0.8;
 
-/* Lowers the distance of voxel (i, j, k) to that of its neighbours on one side, plus one. */
+/* Lowers the distance of voxel (i, j, k) to the least distance of its neighbours on one side plus one. */
 static void pass_on(uint8_t *far, const size_t n[3], size_t i, size_t j, size_t k, int side)
 {
     size_t at = (k * n[1] + j) * n[0] + i;

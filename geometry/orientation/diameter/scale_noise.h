@@ -1,6 +1,6 @@
 /* How strongly the noise of a scan responds at each scale (scale_space.h), measured in the void of this very scan. A
  * scanner's filter correlates the noise of neighbouring voxels, which makes its response at coarse scales stronger than
- * that of white noise by any factor; so nothing is assumed about it. */
+ * the response of white noise by any factor; so nothing is assumed about it. */
 #ifndef SELVEDGE_GEOMETRY_SCALE_NOISE_H
 #define SELVEDGE_GEOMETRY_SCALE_NOISE_H
 
@@ -12,7 +12,7 @@
 /* Sums over the void of one or several bricks. */
 struct scale_noise {
     double square[N_SCALE], n[N_SCALE];
-    double n_void, n_clamped; /* voxels of void, and those of them with density 0 */
+    double n_void, n_clamped; /* voxels of void, and their number with density 0 */
 };
 
 /* Fills far with the distance of each voxel from material (density blurred by 1.4 voxels above 0.4) and from places

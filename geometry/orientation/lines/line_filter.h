@@ -41,7 +41,7 @@ void line_filter_free(struct line_filter *filter);
 /* Number of floats that a thread needs for the neighbourhood of one voxel. They must be zero at first. */
 size_t line_filter_scratch(const struct line_filter *filter);
 
-/* What is needed to evaluate J at one voxel for many directions. */
+/* Data for evaluating J at one voxel for many directions. */
 struct line_filter_site {
     const float *centre;
     bool copied;

@@ -12,7 +12,7 @@ enum { MOST_EDGE = 160, BRICK = SCALE_EDGE, MARGIN = 8, STEP = BRICK - 2 * MARGI
 static const double SCALE_PER_WIDTH[3] = {0.85, 1.05, 1.3};
 static const float MIDDLE = 0.3f;          /* response in the middle of a fiber */
 static const double LEAST_ENCLOSED = 1e-3; /* share below which there are too few places to look at */
-/* middle_share, and its share of what is enclosed, from which on lumens are possible, and clear. */
+/* Thresholds of middle_share, and of middle_share / enclosed_share, above which lumens are possible, and clear. */
 static const double POSSIBLE[2] = {0.001, 0.015}, CLEAR[2] = {0.002, 0.015};
 /* Where lumens show (lumen_evidence_would_show): least diameter in voxels, and largest noise, also where it is
  * correlated by more than LONG_BLUR voxels. */
@@ -89,7 +89,7 @@ static void respond(const struct evidence_box *b, const size_t from[3], const si
     }
 }
 
-/* Adds the enclosed voxels inside of a brick, and those of them in the middle of a fiber. */
+/* Adds the number of enclosed voxels inside of a brick, and of enclosed voxels in the middle of a fiber. */
 static void count_brick(const struct evidence_box *b, const size_t from[3], const size_t n[3], size_t *enclosed,
                         size_t *middle)
 {

@@ -2,8 +2,8 @@
  *
  * Lumens are filled in a copy of the middle of the scan (lumen_fill.h). Enclosed gaps between solid fibers are filled
  * too, but only a filled lumen is then the middle of a fiber, where the scale-normalised Laplacian of the scan is large
- * at the scale of a fiber (Lindeberg 1998). The scale follows from the width of what was filled, not from a measured
- * diameter, which may be that of walls or of a bundle. */
+ * at the scale of a fiber (Lindeberg 1998). The scale follows from the width of the filled space, not from a measured
+ * diameter, which may belong to walls or to a bundle. */
 #ifndef SELVEDGE_GEOMETRY_LUMEN_EVIDENCE_H
 #define SELVEDGE_GEOMETRY_LUMEN_EVIDENCE_H
 
@@ -13,15 +13,15 @@
 #include <stdbool.h>
 
 struct lumen_evidence {
-    double enclosed_share; /* voxels filled over those of material */
-    double width_voxel;    /* of what was filled, if it were round tubes; 0: nothing was */
-    double middle_share;   /* voxels filled that are in the middle of a fiber over those of material */
+    double enclosed_share; /* filled voxels over material voxels */
+    double width_voxel;    /* of the filled space, if it were round tubes; 0: nothing was filled */
+    double middle_share;   /* filled voxels in the middle of a fiber over material voxels */
 };
 
-/* What the evidence says. Of phantoms of solid fibers of 4 to 12 voxels none has a middle_share of 0.001 that is 0.015
- * of enclosed_share. Lumens of 0.3 and 0.4 of the width have at least 0.0032 and 0.022 at 7 voxels and signal-to-noise
- * 3, also where radii differ; at 2, and at 4 voxels, most of them cannot be told from gaps between solid fibers
- * (geometry/NOTES.md). */
+/* The verdict on the evidence. Of phantoms of solid fibers of 4 to 12 voxels none has a middle_share of 0.001 that is
+ * 0.015 of enclosed_share. Lumens of 0.3 and 0.4 of the width have at least 0.0032 and 0.022 at 7 voxels and
+ * signal-to-noise 3, also where radii differ; at 2, and at 4 voxels, most of them cannot be told from gaps between
+ * solid fibers (geometry/NOTES.md). */
 enum lumen_verdict { LUMENS_NOT_SEEN, LUMENS_POSSIBLE, LUMENS_CLEAR };
 enum lumen_verdict lumen_evidence_judge(const struct lumen_evidence *e);
 

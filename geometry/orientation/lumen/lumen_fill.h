@@ -12,9 +12,9 @@
 #include "base/thread_pool.h"
 #include "geometry/volume/volume.h"
 
-/* Sets the density in lumens to 1, and keeps what they had in v->filled. v: densities in [0, 1]. noise_sd: of a voxel.
- * *filled_share: voxels filled over those of material. STATUS_CANCELLED, STATUS_NO_MEMORY; with a scratch
- * space also STATUS_DISK_FULL. */
+/* Sets the density in lumens to 1, and saves their former densities in v->filled. v: densities in [0, 1]. noise_sd: of
+ * a voxel. *filled_share: filled voxels over material voxels. STATUS_CANCELLED, STATUS_NO_MEMORY; with a scratch space
+ * also STATUS_DISK_FULL. */
 status lumens_fill(struct volume *v, double noise_sd, struct thread_pool *pool, double *filled_share,
                    struct error *err);
 

@@ -12,8 +12,9 @@
 #include "base/thread_pool.h"
 #include "geometry/volume/volume.h"
 
-/* v: with v->filled of lumens_fill. diameter_voxel: of the fibers, as measured in v. *filled_share: that of lumens_fill
- * is lowered to what is left of it. STATUS_CANCELLED, STATUS_NO_MEMORY; with a scratch space also STATUS_DISK_FULL. */
+/* v: with v->filled of lumens_fill. diameter_voxel: of the fibers, as measured in v. *filled_share: the share of
+ * lumens_fill, lowered to the voxels that stay filled. STATUS_CANCELLED, STATUS_NO_MEMORY; with a scratch space also
+ * STATUS_DISK_FULL. */
 status lumens_sift(struct volume *v, double diameter_voxel, struct thread_pool *pool, double *filled_share,
                    struct error *err);
 

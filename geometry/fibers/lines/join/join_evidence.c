@@ -17,7 +17,7 @@ struct path {
     int n;
 };
 
-/* The ends and what they may continue as. */
+/* The two ends and their possible continuations. */
 struct gap_view {
     struct path side[2], on[2], way; /* last vertices of both lines, straight on from there, and the curve between */
     float radius[2], most2;          /* most2: squared distance within which voxels are compared */
@@ -108,7 +108,7 @@ static void take_way(const struct join_curve *j, struct path *way)
     }
 }
 
-/* Box around what is compared. */
+/* Computes the box around the compared paths. */
 static void bound(const struct gap_view *g, float lo[3], float hi[3])
 {
     const struct path *path[3] = {&g->way, &g->on[0], &g->on[1]};
@@ -130,8 +130,8 @@ static int ascending(const void *p, const void *q)
     return (*a > *b) - (*a < *b);
 }
 
-/* Finds the vertices of other lines than those of ends a and b whose fibers reach into a box. Beyond MAX_NEAR vertices
- * or MAX_NEAR_LINE lines the rest is left out. */
+/* Finds the vertices whose fibers reach into a box, without the lines of ends a and b. Beyond MAX_NEAR vertices or
+ * MAX_NEAR_LINE lines the rest is left out. */
 static void take_others(const struct join_scene *s, const float lo[3], const float hi[3], uint32_t a, uint32_t b,
                         struct near_lines *near)
 {

@@ -16,9 +16,9 @@ struct join_scene {
     float largest_radius;
 };
 
-/* Returns the squared residuals of the second picture minus those of the first, over the sum of the squared differences
- * of the pictures: 1 if the scan is exactly as with one fiber, -1 if it is exactly as with two. 0 where both pictures
- * are the same. */
+/* Returns (R2 - R1) / D, R1 and R2 being the sums of the squared residuals of the first and the second picture, and D
+ * the sum of the squared differences of the pictures: 1 if the scan is exactly as with one fiber, -1 if it is exactly
+ * as with two. 0 where both pictures are the same. */
 double join_evidence(const struct join_scene *s, const struct join_curve *j, uint32_t a, uint32_t b);
 
 #endif
