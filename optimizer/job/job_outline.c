@@ -1,5 +1,7 @@
 #include "optimizer/job/job_outline.h"
 #include "optimizer/job/checks/job_faults.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/job_parse.h"
 
 #include <stdio.h>
@@ -24,8 +26,8 @@ static status take_document(const struct job_document *doc, struct job_outline *
     size_t n = 0;
     *o = (struct job_outline){.n_file = 0};
     snprintf(o->sample, sizeof o->sample, "%s", doc->sample);
-    snprintf(o->geometry_job, sizeof o->geometry_job, "%s", doc->scan.geometry_job);
-    snprintf(o->profile_job, sizeof o->profile_job, "%s", doc->fit.profile_job);
+    snprintf(o->geometry_job, sizeof o->geometry_job, "%s", doc->scan->geometry_job);
+    snprintf(o->profile_job, sizeof o->profile_job, "%s", doc->fit->profile_job);
     job_document_visit_files(doc, count_file, &n);
     o->file = calloc(n + 1, sizeof *o->file);
     if (o->file == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");

@@ -2,6 +2,8 @@
 #include "base/json/json_depth.h"
 #include "optimizer/job/checks/job_document_parts.h"
 #include "optimizer/job/checks/job_faults.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_fit_option.h"
 #include "optimizer/job/options/option_reader.h"
 
 #include <math.h>
@@ -16,14 +18,14 @@ static void fill_nan(double *v, size_t n)
 /* A document with the defaults of all options. */
 static status document_new(struct job_document **doc, struct error *err)
 {
-    struct job_document *d = calloc(1, sizeof *d);
+    struct job_document *d = job_document_new();
     if (d == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
     *doc = d;
-    d->fit.n_model = 1;
+    d->fit->n_model = 1;
     for (size_t i = 0; i < JOB_MAX_MODEL; i++) {
-        fill_nan(d->fit.model[i].fixed, JOB_MAX_PARAM);
-        fill_nan(d->fit.model[i].start, JOB_MAX_PARAM);
-        job_fit_option_init(&d->fit.model[i].option);
+        fill_nan(d->fit->model[i].fixed, JOB_MAX_PARAM);
+        fill_nan(d->fit->model[i].start, JOB_MAX_PARAM);
+        job_fit_option_init(&d->fit->model[i].option);
     }
     return job_options_default(d, err);
 }

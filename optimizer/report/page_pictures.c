@@ -1,5 +1,7 @@
 #include "optimizer/report/page_pictures.h"
 #include "base/files/durable.h"
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_rows.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/page_text.h"
 #include "renderer/image/image.h"

@@ -1,6 +1,7 @@
 /* Stage "report": everything under results/. The numbers are written first, so that they can be looked at while
  * pictures are rendered. */
 #include "base/option_id.h"
+#include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/report/export/exports.h"
 #include "optimizer/report/export/twin_result.h"

@@ -1,6 +1,8 @@
 #include "base/angle.h"
 #include "base/option_id.h"
 #include "geometry/volume/tile_crop.h"
+#include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/report/geometry/section_report.h"
 #include "optimizer/report/quality.h"

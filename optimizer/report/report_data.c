@@ -2,6 +2,7 @@
 #include "base/clock.h"
 #include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/job/job_outline.h"
 #include "optimizer/job/options/option_json.h"
 #include "optimizer/report/result/result_json.h"
 

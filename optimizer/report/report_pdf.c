@@ -1,6 +1,7 @@
 #include "optimizer/report/report_pdf.h"
 
 #include "base/files/durable.h"
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/job/job_folder.h"
 
 #include <errno.h>

@@ -8,8 +8,9 @@
 #include "optimizer/fit/baseline/expected_rows.h"
 #include "optimizer/fit/cloth/cloth_search.h"
 #include "optimizer/fit/descent/descent.h"
-#include "optimizer/job/document/job_document.h"
+
 #include "optimizer/job/document/job_kind.h"
+#include "optimizer/job/document/job_sections.h"
 #include "optimizer/photographs/camera/photograph_develop.h"
 #include "optimizer/photographs/profile/bowl_profile.h"
 #include "optimizer/photographs/profile/fiber_profile.h"
@@ -68,6 +69,7 @@ struct texture_guess {
 
 struct job_inputs {
     struct job_document *doc;
+    struct job_sections section; /* of doc */
     enum job_kind kind;
     bool resumed;         /* an earlier attempt has left work of the same inputs */
     uint64_t fingerprint; /* of the job document's text and this build of the program */

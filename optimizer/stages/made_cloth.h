@@ -37,6 +37,7 @@ struct cloth_job {
     size_t n_model;
     const struct model_setup *model;
     const struct cloth_numbers *number;
+    uint64_t seed; /* of all random numbers of the job */
 };
 
 void made_cloth_release(struct made_cloth *made);

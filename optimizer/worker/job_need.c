@@ -1,4 +1,7 @@
 #include "optimizer/worker/job_need.h"
+#include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_document.h"
+#include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/stage_table.h"
@@ -30,15 +33,15 @@ static const double result_bytes = 1e6, pixel_bytes = 28.0, unfitted_bytes = 3e6
 
 /* Returns whether the job takes its geometry from another job. The worker cannot read that job before this one runs, so
  * the size of the geometry is unknown. */
-static bool is_adopted(const struct job_plan *plan) { return plan->in->doc->scan.geometry_job[0] != '\0'; }
+static bool is_adopted(const struct job_plan *plan) { return plan->in->section.scan->geometry_job[0] != '\0'; }
 
 /* Writes the key under which jobs of this kind remember a need. */
 static void key_of(const struct job_plan *plan, const char *what, char key[SPEED_BOOK_KEY_BYTES])
 {
-    const char *cloth = is_adopted(plan)                           ? "adopted"
-                        : plan->in->doc->scan.given                ? "scan"
-                        : plan->in->doc->cloth.description != NULL ? "described"
-                                                                   : "fibers";
+    const char *cloth = is_adopted(plan)                               ? "adopted"
+                        : plan->in->section.scan->given                ? "scan"
+                        : plan->in->section.cloth->description != NULL ? "described"
+                                                                       : "fibers";
     const char *work = plan->in->kind == JOB_OF_PICTURES   ? "+pictures"
                        : plan->in->kind == JOB_OF_GEOMETRY ? ""
                        : plan->in->number.n > 0            ? "+search"
@@ -54,7 +57,7 @@ static void plan_stages(struct job_plan *plan)
     size_t n_stage;
     const struct pipeline_stage_info *info = pipeline_stage_table(&n_stage);
     for (size_t i = 0; i < n_stage; i++)
-        if (pipeline_stage_applies(&info[i], plan->in->kind, plan->in->doc->scan.given))
+        if (pipeline_stage_applies(&info[i], plan->in->kind, plan->in->section.scan->given))
             pipeline_plan_stage(plan, info[i].name, i);
 }
 
@@ -73,14 +76,14 @@ static void add_input(void *context, const char *name, const char *role)
     worker_folder_path(sum->plan->tools->folder, JOB_FOLDER_INPUT, name, path);
     if (stat(path, &file) != 0) return;
     sum->all += (double)file.st_size;
-    if (strcmp(name, sum->plan->in->doc->cloth.fiber_file) == 0) sum->fibers = (double)file.st_size;
+    if (strcmp(name, sum->plan->in->section.cloth->fiber_file) == 0) sum->fibers = (double)file.st_size;
 }
 
 /* Pages and renderings. */
 static double page_bytes(const struct job_plan *plan)
 {
     if (plan->in->rows.fitted.n == 0) return unfitted_bytes;
-    const double px = (double)result_picture_px(&plan->in->doc->results, plan->in->rows.observation.n,
+    const double px = (double)result_picture_px(plan->in->section.results, plan->in->rows.observation.n,
                                                 pipeline_plan_usual_paths(plan));
     return result_bytes + pixel_bytes * px * px * (double)plan->in->rows.observation.n;
 }
@@ -104,7 +107,7 @@ static struct job_need model_of(const struct job_plan *plan)
 {
     struct input_bytes input = {.plan = plan};
     job_document_visit_files(plan->in->doc, add_input, &input);
-    const double n_voxel = plan->in->doc->scan.given && !is_adopted(plan) ? pipeline_plan_voxels(plan) : 0.0;
+    const double n_voxel = plan->in->section.scan->given && !is_adopted(plan) ? pipeline_plan_voxels(plan) : 0.0;
     double geometry_bytes = voxel_bytes * n_voxel;
     if (plan->tools->memory_limit_bytes > 0)
         geometry_bytes = fmin(geometry_bytes, (double)plan->tools->memory_limit_bytes);
@@ -159,7 +162,8 @@ void job_need_begin(struct job_plan *plan)
     struct worker_status *shown = plan->status, *usual; /* readers of the job's own status would see half a plan */
     struct error unused = {0};
     size_t n[3];
-    if (plan->in->doc->scan.n_file > 0 && scan_size(plan->tools->folder, &plan->in->doc->scan, n, NULL) == STATUS_OK)
+    if (plan->in->section.scan->n_file > 0 &&
+        scan_size(plan->tools->folder, plan->in->section.scan, n, NULL) == STATUS_OK)
         memcpy(plan->geometry.n, n, sizeof n);
     plan_probe_take(plan);
     plan->usual_wall_s = 0.0;
@@ -177,7 +181,7 @@ static json_t *stages_json(struct job_plan *plan)
     const struct pipeline_stage_info *info = pipeline_stage_table(&n_stage);
     json_t *list = json_array();
     for (size_t i = 0; i < n_stage; i++)
-        if (pipeline_stage_applies(&info[i], plan->in->kind, plan->in->doc->scan.given))
+        if (pipeline_stage_applies(&info[i], plan->in->kind, plan->in->section.scan->given))
             json_array_append_new(list, json_pack("{s:s, s:o}", "name", info[i].name, "wall_s",
                                                   json_number(worker_status_expected_s(plan->status, i))));
     return list;
@@ -207,7 +211,7 @@ static status read_and_plan(struct stage_tools *tools, struct job_inputs *in, co
     size_t n[3] = {0, 0, 0};
     status s = job_inputs_read(tools, in, &fault);
     job_plan_init(&plan, tools, in);
-    if (s == STATUS_OK && in->doc->scan.n_file > 0) s = scan_size(tools->folder, &in->doc->scan, n, &fault);
+    if (s == STATUS_OK && in->section.scan->n_file > 0) s = scan_size(tools->folder, in->section.scan, n, &fault);
     memcpy(plan.geometry.n, n, sizeof n);
     *report = s == STATUS_OK ? needs_json(&plan, book)
                              : json_pack("{s:{s:s, s:s, s:s}}", "error", "code", status_name(s), "field", fault.field,

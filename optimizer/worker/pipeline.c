@@ -1,6 +1,10 @@
 #include "optimizer/worker/pipeline.h"
 #include "base/clock.h"
+#include "optimizer/job/document/job_document.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/job/job_outline.h"
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/job/stage_table.h"
 #include "optimizer/report/surface/surface_cloth.h"
@@ -54,7 +58,7 @@ struct pipeline {
 
 static status do_volume(struct pipeline *p, const struct taken *t, bool load, struct error *err)
 {
-    const struct volume_input in = {p->tools, &p->in->doc->scan};
+    const struct volume_input in = {p->tools, p->in->section.scan};
     (void)t;
     status s = (load ? stage_volume_load : stage_volume)(&in, &p->out.volume, err);
     p->plan->geometry = p->out.volume.geometry;
@@ -71,7 +75,7 @@ static status do_orientation(struct pipeline *p, const struct taken *t, bool loa
 
 static status do_fibers(struct pipeline *p, const struct taken *t, bool load, struct error *err)
 {
-    const struct fibers_input in = {p->tools, &p->in->doc->scan, &p->in->doc->cloth, t->volume, t->orientation};
+    const struct fibers_input in = {p->tools, p->in->section.scan, p->in->section.cloth, t->volume, t->orientation};
     status s = (load ? stage_fibers_load : stage_fibers)(&in, &p->out.fibers, err);
     p->plan->geometry = p->out.fibers.geometry;
     return s;
@@ -79,7 +83,7 @@ static status do_fibers(struct pipeline *p, const struct taken *t, bool load, st
 
 static status do_directions(struct pipeline *p, const struct taken *t, bool load, struct error *err)
 {
-    const struct directions_input in = {p->tools, &p->in->doc->scan, p->in->n_model, p->in->model};
+    const struct directions_input in = {p->tools, p->in->section.scan, p->in->n_model, p->in->model};
     struct directions_output *out = &p->out.directions;
     if (p->out.orientation.direction.density != NULL || p->out.fibers.fiber.n_fiber > 0) {
         out->option = t->fibers->option;
@@ -102,7 +106,7 @@ static void gather_cloth(struct pipeline *p)
     struct made_cloth *cloth = &p->out.cloth;
     cloth->report = p->out.fibers.cloth;
     cloth->number = p->in->number;
-    if (!p->in->doc->scan.given) {
+    if (!p->in->section.scan->given) {
         cloth->geometry = p->out.fibers.geometry;
         cloth->fiber = p->out.fibers.fiber;
         fiber_set_init(&p->out.fibers.fiber);
@@ -120,7 +124,7 @@ static void gather_cloth(struct pipeline *p)
 
 static status do_scene(struct pipeline *p, const struct taken *t, bool load, struct error *err)
 {
-    const struct surface_input surface = {p->tools, &p->in->doc->results, &p->in->doc->setup, t->cloth};
+    const struct surface_input surface = {p->tools, p->in->section.results, p->in->section.setup, t->cloth};
     (void)load;
     status s = stage_scene(&p->job, &p->out.cloth, err);
     return s == STATUS_OK ? surface_cloth_check(&surface, err) : s;
@@ -129,8 +133,8 @@ static status do_scene(struct pipeline *p, const struct taken *t, bool load, str
 static status do_fit(struct pipeline *p, const struct taken *t, bool load, struct error *err)
 {
     const struct fit_input in = {&p->job, pipeline_plan_usual_paths(p->plan), t->cloth};
-    const struct profile_fit_input profile = {p->tools,      &p->in->doc->fit, &p->in->doc->profile,
-                                              &p->in->fiber, p->in->n_model,   p->in->model};
+    const struct profile_fit_input profile = {p->tools,      p->in->section.fit, p->in->section.profile,
+                                              &p->in->fiber, p->in->n_model,     p->in->model};
     if (p->in->kind == JOB_OF_PROFILE) return stage_profile_fit(&profile, &p->out.fit, err);
     return (load ? stage_fit_load : stage_fit)(&in, &p->out.fit, err);
 }
@@ -143,17 +147,17 @@ static status do_validation(struct pipeline *p, const struct taken *t, bool load
 
 static status do_report(struct pipeline *p, const struct taken *t, bool load, struct error *err)
 {
-    const struct job_document *doc = p->in->doc;
+    const struct job_sections *section = &p->in->section;
     const struct report_input in = {.job = &p->job,
-                                    .sample = doc->sample,
+                                    .sample = section->sample,
                                     .kind = p->in->kind,
-                                    .photographs = &doc->rows,
-                                    .profile = &doc->profile,
-                                    .results = &doc->results,
+                                    .photographs = section->rows,
+                                    .profile = section->profile,
+                                    .results = section->results,
                                     .files = &p->files,
                                     .fiber = &p->in->fiber,
                                     .texture = &p->in->texture,
-                                    .option = doc->scan.given ? &t->directions->option : &t->fibers->option,
+                                    .option = section->scan->given ? &t->directions->option : &t->fibers->option,
                                     .fit = t->fit->model,
                                     .radius = &t->fit->radius,
                                     .validation = t->validation->model,
@@ -239,7 +243,7 @@ static status do_stage(struct pipeline *p, size_t i, bool *earlier_ran, bool *lo
     const struct stage_tools *tools = p->tools;
     const struct taken taken = taken_of(&p->out, stage->takes);
     const bool stores = stage->stores && p->in->kind != JOB_OF_PROFILE;
-    const char *geometry_job = p->in->doc->scan.geometry_job;
+    const char *geometry_job = p->in->section.scan->geometry_job;
     double start_s = clock_monotonic_s();
     if (stores && !*earlier_ran && worker_folder_stage_done(tools->folder, stage->name)) {
         struct error why = {0};
@@ -267,7 +271,7 @@ static status do_stage(struct pipeline *p, size_t i, bool *earlier_ran, bool *lo
 
 static bool has_stage(const struct pipeline *p, const struct pipeline_stage_info *info)
 {
-    return pipeline_stage_applies(info, p->in->kind, p->in->doc->scan.given);
+    return pipeline_stage_applies(info, p->in->kind, p->in->section.scan->given);
 }
 
 static status run_stages(struct pipeline *p, struct error *err)
@@ -315,32 +319,33 @@ static void add_file(void *context, const char *name, const char *role)
 }
 
 /* Lists the input files of the document. */
-static status list_files(const struct job_document *doc, struct job_outline *files, struct error *err)
+static status list_files(const struct job_inputs *in, struct job_outline *files, struct error *err)
 {
-    job_document_visit_files(doc, add_file, files);
+    job_document_visit_files(in->doc, add_file, files);
     files->file = calloc(files->n_file + 1, sizeof *files->file);
     if (files->file == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot run the job: out of memory");
     files->n_file = 0;
-    job_document_visit_files(doc, add_file, files);
+    job_document_visit_files(in->doc, add_file, files);
     return STATUS_OK;
 }
 
 static void pipeline_init(struct pipeline *p)
 {
-    const struct job_document *doc = p->in->doc;
+    const struct job_sections *section = &p->in->section;
     fiber_set_init(&p->out.fibers.fiber);
     fiber_set_init(&p->out.directions.fiber);
     fiber_set_init(&p->out.directions.traced);
     for (size_t i = 0; i < MAX_STAGE; i++) p->stage_wall_s[i] = NAN;
     p->job = (struct cloth_job){.tools = p->tools,
-                                .scan = &doc->scan,
-                                .cloth = &doc->cloth,
-                                .setup = &doc->setup,
-                                .fit = &doc->fit,
+                                .scan = section->scan,
+                                .cloth = section->cloth,
+                                .setup = section->setup,
+                                .fit = section->fit,
                                 .rows = &p->in->rows,
                                 .n_model = p->in->n_model,
                                 .model = p->in->model,
-                                .number = &p->in->number};
+                                .number = &p->in->number,
+                                .seed = p->in->section.fit->seed};
     p->plan->fit = &p->out.fit;
     p->plan->validation = &p->out.validation;
     p->tools->fingerprint = p->in->fingerprint;
@@ -375,7 +380,7 @@ status pipeline_run(struct stage_tools *tools, const struct job_inputs *inputs, 
     *p = (struct pipeline){.tools = tools, .in = inputs, .option = option, .plan = plan};
     pipeline_init(p);
     status s = open_space(p, err);
-    if (s == STATUS_OK) s = list_files(inputs->doc, &p->files, err);
+    if (s == STATUS_OK) s = list_files(inputs, &p->files, err);
     if (s == STATUS_OK && inputs->kind == JOB_OF_PICTURES) s = fit_output_given(inputs, &p->out.fit, err);
     if (s == STATUS_OK) s = run_stages(p, err);
     pipeline_release(p);

@@ -1,4 +1,8 @@
 #include "optimizer/worker/pipeline_plan.h"
+#include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/stage_table.h"
 #include "optimizer/report/export/twin_result.h"
@@ -67,10 +71,10 @@ static const double sd_of_fit = 0.5, sd_of_rest = 0.5;
 double pipeline_plan_voxels(const struct job_plan *plan)
 {
     double n = (double)plan->geometry.n[0] * (double)plan->geometry.n[1] * (double)plan->geometry.n[2];
-    for (size_t i = 0; i < plan->in->doc->scan.n_file && !(plan->geometry.n[0] > 0); i++) {
+    for (size_t i = 0; i < plan->in->section.scan->n_file && !(plan->geometry.n[0] > 0); i++) {
         char path[WORKER_PATH_BYTES];
         struct stat file;
-        worker_folder_path(plan->tools->folder, JOB_FOLDER_INPUT, plan->in->doc->scan.file[i], path);
+        worker_folder_path(plan->tools->folder, JOB_FOLDER_INPUT, plan->in->section.scan->file[i], path);
         if (stat(path, &file) == 0) n += (double)file.st_size / 1.5;
     }
     return fmax(n, 1.0);
@@ -100,7 +104,7 @@ static double n_material(const struct job_plan *plan)
 static void plan_fibers(struct job_plan *plan, size_t i)
 {
     const double n = n_material(plan), n_trial = fmin(n, n / pipeline_plan_voxels(plan) * SCAN_TRIAL_VOXELS);
-    if (plan->in->doc->scan.trial)
+    if (plan->in->section.scan->trial)
         plan_voxels(plan, i, &trial_stage, n + n_trial);
     else
         plan_voxels(plan, i, &fibers_stage, n);
@@ -120,11 +124,12 @@ static double fibers_of_yarn(const struct cloth_description *d, int direction, s
 
 double pipeline_plan_cloth_size(const struct job_plan *plan)
 {
-    const struct cloth_description *d = plan->in->doc->cloth.description;
+    const struct cloth_description *d = plan->in->section.cloth->description;
     double n_fiber[2] = {0.0, 0.0}, width[2] = {0.0, 0.0};
     if (d == NULL) return 0.0;
-    const double times =
-        plan->in->number.n > 0 && plan->in->doc->cloth.final_tiles > 1 ? (double)plan->in->doc->cloth.final_tiles : 1.0;
+    const double times = plan->in->number.n > 0 && plan->in->section.cloth->final_tiles > 1
+                             ? (double)plan->in->section.cloth->final_tiles
+                             : 1.0;
     if (d->structure == CLOTH_FELT) return felt_fiber_size * (double)d->kind[0].n_fiber * times * times;
     for (int direction = CLOTH_WEFT; direction <= CLOTH_WARP; direction++)
         for (size_t i = 0; i < d->n_yarn[direction]; i++) {
@@ -150,15 +155,15 @@ static void plan_cloth(struct job_plan *plan, size_t i)
 static const char *kind_of_fit(const struct job_plan *plan)
 {
     if (plan->in->number.n > 0)
-        return pipeline_correction_applies(&plan->in->doc->cloth, &plan->in->number) ? "+correction" : "+cloth";
-    if (plan->in->doc->fit.fit_radius) return "+radius";
-    return plan->in->doc->scan.given ? "+scan" : "";
+        return pipeline_correction_applies(plan->in->section.cloth, &plan->in->number) ? "+correction" : "+cloth";
+    if (plan->in->section.fit->fit_radius) return "+radius";
+    return plan->in->section.scan->given ? "+scan" : "";
 }
 
 static double path_budget(const struct job_plan *plan)
 {
-    const struct method_info *method = method_catalogue_find(plan->in->doc->fit.method);
-    if (plan->in->doc->fit.path_budget > 0) return (double)plan->in->doc->fit.path_budget;
+    const struct method_info *method = method_catalogue_find(plan->in->section.fit->method);
+    if (plan->in->section.fit->path_budget > 0) return (double)plan->in->section.fit->path_budget;
     return method != NULL && method->default_path_budget > 0 ? (double)method->default_path_budget : usual_budget;
 }
 
@@ -166,8 +171,9 @@ double pipeline_plan_usual_paths(const struct job_plan *plan)
 {
     const double budget = path_budget(plan);
     if (plan->in->number.n > 0) return cloth_share * budget;
-    if (plan->in->doc->rows.n_photograph > 0 && plan->in->doc->fit.path_budget > 0) return budget; /* it is used up */
-    return fmin((plan->in->doc->rows.n_photograph > 0 ? noise_row_paths : misfit_row_paths) *
+    if (plan->in->section.rows->n_photograph > 0 && plan->in->section.fit->path_budget > 0)
+        return budget; /* it is used up */
+    return fmin((plan->in->section.rows->n_photograph > 0 ? noise_row_paths : misfit_row_paths) *
                     (double)plan->in->rows.fitted.n,
                 budget);
 }
@@ -188,9 +194,9 @@ static void plan_fit(struct job_plan *plan, size_t i)
 {
     char key[SPEED_BOOK_KEY_BYTES];
     /* a table ends a fit by its misfit, photographs by their noise: their shares of the expected paths differ */
-    snprintf(key, sizeof key, "fit.%.40s%s%s.paths", plan->in->doc->fit.method, kind_of_fit(plan),
-             plan->in->doc->rows.n_photograph > 0 ? "+photographs" : "+table");
-    const double path_s = usual_s_per_path(plan), of_fit = plan->in->doc->scan.given ? fit_share : 1.0;
+    snprintf(key, sizeof key, "fit.%.40s%s%s.paths", plan->in->section.fit->method, kind_of_fit(plan),
+             plan->in->section.rows->n_photograph > 0 ? "+photographs" : "+table");
+    const double path_s = usual_s_per_path(plan), of_fit = plan->in->section.scan->given ? fit_share : 1.0;
     const double n_path = pipeline_plan_usual_paths(plan) * (double)plan->in->n_model;
     const struct job_clock_work work = {.key = key,
                                         .units = n_path * path_s / fit_s_per_path / n_thread(plan),
@@ -229,7 +235,7 @@ static size_t best_model(const struct job_plan *plan)
 /* Paths of a model's fit: of the best one after the fit, before it those that are expected. */
 static double fit_paths(const struct job_plan *plan)
 {
-    const double n_model = (double)plan->in->n_model, of_fit = plan->in->doc->scan.given ? fit_share : 1.0;
+    const double n_model = (double)plan->in->n_model, of_fit = plan->in->section.scan->given ? fit_share : 1.0;
     if (isfinite(s_per_path(plan))) return (double)plan->fit->model[best_model(plan)].result.n_path;
     return of_fit * plan->fit_path / n_model;
 }
@@ -238,8 +244,8 @@ static double validation_paths(const struct job_plan *plan)
 {
     const double n_fit = fit_paths(plan);
     return validated_path * (double)plan->in->n_model *
-           (pipeline_validation_paths(&plan->in->doc->fit, n_fit) + pipeline_factor_paths(&plan->in->doc->fit, n_fit) +
-            pipeline_pilot_paths(n_fit));
+           (pipeline_validation_paths(plan->in->section.fit, n_fit) +
+            pipeline_factor_paths(plan->in->section.fit, n_fit) + pipeline_pilot_paths(n_fit));
 }
 
 /* Paths of a report. Its certificate runs on one thread. */
@@ -247,9 +253,9 @@ static double report_paths(const struct job_plan *plan)
 {
     const double n_fit = fit_paths(plan), path_s = s_per_path(plan),
                  certificate_path_s = isfinite(path_s) ? path_s : usual_s_per_path(plan) / n_thread(plan);
-    return result_renderings_paths(&plan->in->doc->results, plan->in->rows.observation.n, n_fit) +
-           surface_pictures_paths(&plan->in->doc->results) + twin_result_paths(&plan->in->doc->results) +
-           (plan->in->doc->scan.given ? scan_page_paths : page_paths) + plan->certificate_s / certificate_path_s;
+    return result_renderings_paths(plan->in->section.results, plan->in->rows.observation.n, n_fit) +
+           surface_pictures_paths(plan->in->section.results) + twin_result_paths(plan->in->section.results) +
+           (plan->in->section.scan->given ? scan_page_paths : page_paths) + plan->certificate_s / certificate_path_s;
 }
 
 /* A stage of n_path paths after the fit, which is stage i_fit and counts as a number of paths before it has ended. */
@@ -257,7 +263,7 @@ static void plan_after_fit(struct job_plan *plan, size_t i, size_t i_fit, double
 {
     static const char *const key[] = {"validation", "report"};
     const char *const own = key[i - i_fit - 1];
-    const double path_s = s_per_path(plan), of_fit = plan->in->doc->scan.given ? fit_share : 1.0;
+    const double path_s = s_per_path(plan), of_fit = plan->in->section.scan->given ? fit_share : 1.0;
     if (isfinite(path_s))
         worker_status_plan_own(plan->status, i, own, fmax(n_path * path_s, least_s));
     else
@@ -269,7 +275,7 @@ static void plan_pictures(struct job_plan *plan, size_t i)
 {
     const struct job_clock_work work = {
         .key = "report.pictures",
-        .units = (surface_pictures_paths(&plan->in->doc->results) + twin_result_paths(&plan->in->doc->results)) /
+        .units = (surface_pictures_paths(plan->in->section.results) + twin_result_paths(plan->in->section.results)) /
                  n_thread(plan),
         .usual_s = render_s_per_path,
         .log_sd = sd_of_fit};
@@ -304,12 +310,12 @@ void pipeline_plan_stage(struct job_plan *plan, const char *name, size_t i)
     if (plan->in->kind == JOB_OF_PROFILE)
         worker_status_plan(plan->status, i, strcmp(name, "fit") == 0 ? &profile : &rest);
     else if (strcmp(name, "volume") == 0)
-        plan_voxels(plan, i, plan->in->doc->scan.hollow_fibers > 0 ? &hollow_stage : &read_stage,
+        plan_voxels(plan, i, plan->in->section.scan->hollow_fibers > 0 ? &hollow_stage : &read_stage,
                     pipeline_plan_voxels(plan));
     else if (strcmp(name, "orientation") == 0)
         plan_voxels(plan, i, reconstruct_redirects(&plan->geometry) ? &redirect_stage : &orientation_stage,
                     n_material(plan));
-    else if (strcmp(name, "fibers") == 0 && plan->in->doc->scan.given)
+    else if (strcmp(name, "fibers") == 0 && plan->in->section.scan->given)
         plan_fibers(plan, i);
     else if (strcmp(name, "fibers") == 0 && pipeline_plan_cloth_size(plan) > 0.0)
         plan_cloth(plan, i);

@@ -58,11 +58,11 @@ static double path_share_of_file(const struct job_plan *plan)
     struct stat file;
     struct fiber_set f;
     double share = 1.0;
-    if (plan->in->doc->cloth.fiber_file[0] == '\0') return share;
-    worker_folder_path(plan->tools->folder, JOB_FOLDER_INPUT, plan->in->doc->cloth.fiber_file, path);
+    if (plan->in->section.cloth->fiber_file[0] == '\0') return share;
+    worker_folder_path(plan->tools->folder, JOB_FOLDER_INPUT, plan->in->section.cloth->fiber_file, path);
     if (stat(path, &file) != 0 || file.st_size > FIBER_FILE_MOST_BYTES) return share;
     fiber_set_init(&f);
-    if (fiber_file_read(path, &plan->in->doc->cloth, &f, NULL) == STATUS_OK) share = plan_probe_path_share(&f);
+    if (fiber_file_read(path, plan->in->section.cloth, &f, NULL) == STATUS_OK) share = plan_probe_path_share(&f);
     fiber_set_release(&f);
     return share;
 }

@@ -2,10 +2,10 @@
  * The requested records are found by bisection (record_seek), counted, and merged while they are read. So the cost of a
  * request depends on the size of its reply and not of the file, and memory holds only the points. */
 #include "server/views/series_view.h"
+#include "base/catalogue/model_catalogue.h"
 #include "base/files/durable.h"
 #include "base/json/foreign_json.h"
 #include "base/json/json_member.h"
-#include "optimizer/job/document/job_fit_option.h"
 #include "optimizer/job/document/job_limits.h"
 #include "optimizer/job/job_folder.h"
 #include "server/settings/job_paths.h"
@@ -182,7 +182,7 @@ static status describe_models(const char *path, json_t *model, struct error *err
 struct group {
     json_t *last;
     size_t n, n_parameter, held; /* held: memory of the last record */
-    double least, most, low[JOB_MAX_PARAM], high[JOB_MAX_PARAM];
+    double least, most, low[MODEL_MAX_FLAT], high[MODEL_MAX_FLAT];
 };
 
 struct merging {
@@ -205,7 +205,7 @@ static void restart_group(struct group *g, size_t n_parameter)
 {
     json_decref(g->last);
     *g = (struct group){.n_parameter = n_parameter, .least = INFINITY, .most = -INFINITY};
-    for (size_t p = 0; p < JOB_MAX_PARAM; p++) {
+    for (size_t p = 0; p < MODEL_MAX_FLAT; p++) {
         g->low[p] = INFINITY;
         g->high[p] = -INFINITY;
     }
@@ -219,7 +219,7 @@ static void add_to_group(struct group *g, json_t *record, size_t held)
     size_t n = json_array_size(parameter);
     if (g->n == 0 || n != g->n_parameter || model_of(g->last) != model_of(record)) restart_group(g, n);
     widen(json_object_get(record, "objective"), &g->least, &g->most);
-    for (size_t p = 0; p < n && p < JOB_MAX_PARAM; p++) widen(json_array_get(parameter, p), &g->low[p], &g->high[p]);
+    for (size_t p = 0; p < n && p < MODEL_MAX_FLAT; p++) widen(json_array_get(parameter, p), &g->low[p], &g->high[p]);
     json_decref(g->last);
     g->last = record;
     g->held = held;
@@ -238,7 +238,7 @@ static void close_group(struct merging *m)
         json_object_set_new(g->last, "objective_min", number_or_null(g->least));
         json_object_set_new(g->last, "objective_max", number_or_null(g->most));
         json_t *low = json_array(), *high = json_array();
-        for (size_t p = 0; p < g->n_parameter && p < JOB_MAX_PARAM; p++) {
+        for (size_t p = 0; p < g->n_parameter && p < MODEL_MAX_FLAT; p++) {
             json_array_append_new(low, number_or_null(g->low[p]));
             json_array_append_new(high, number_or_null(g->high[p]));
         }

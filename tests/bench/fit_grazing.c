@@ -32,19 +32,17 @@ static void print_mirror_photographs(const struct observation_set *o)
 /* Replaces the observations of f by n mirrored directions from first_deg on. */
 static void observe_mirror(struct fit_phantom *f, double first_deg, size_t n)
 {
-    const struct job_document set_up = {.setup.lamp_side_cm = 10.0,
-                                        .setup.lamp_distance_cm = 61.0,
-                                        .setup.camera_distance_cm = 100.0,
-                                        .setup.crop_cm = 1.0};
+    const struct job_setup set_up = {
+        .lamp_side_cm = 10.0, .lamp_distance_cm = 61.0, .camera_distance_cm = 100.0, .crop_cm = 1.0};
     struct observation_set o;
     struct error err = {0};
     observation_set_init(&o);
     for (size_t i = 0; i < n; i++) {
         double theta_deg = first_deg + MIRROR_STEP_DEG * (double)i;
-        const struct observation item = {
-            .set = JOB_SET_HELD_OUT,
-            .weight = 1.0,
-            .configuration = observation_configuration(&set_up.setup, theta_deg, 0.0, theta_deg, 180.0, 0.0)};
+        const struct observation item = {.set = JOB_SET_HELD_OUT,
+                                         .weight = 1.0,
+                                         .configuration =
+                                             observation_configuration(&set_up, theta_deg, 0.0, theta_deg, 180.0, 0.0)};
         fit_check(observation_set_append(&o, &item, &err), &err);
     }
     fit_phantom_observe(f, &o);

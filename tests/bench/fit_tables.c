@@ -67,11 +67,11 @@ static void read_table(const struct real *real, const char *path, struct real_ro
     struct error err = {0};
     char *text = NULL;
     size_t n = 0;
-    const struct job_document set_up = {.setup.lamp_side_cm = 10.0,
-                                        .setup.lamp_distance_cm = 61.0,
-                                        .setup.camera_distance_cm = 100.0,
-                                        .setup.crop_cm = 1.0,
-                                        .setup.black_sheet = true};
+    const struct job_setup set_up = {.lamp_side_cm = 10.0,
+                                     .lamp_distance_cm = 61.0,
+                                     .camera_distance_cm = 100.0,
+                                     .crop_cm = 1.0,
+                                     .black_sheet = true};
     observation_set_init(&row->observation);
     fit_check(file_read_all(path, 1 << 20, &text, &n, &err), &err);
     fit_check(measurement_table_parse(text, n, row->sample, &set_up, &row->observation, &err), &err);

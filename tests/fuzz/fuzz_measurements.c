@@ -6,11 +6,8 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    const struct job_document doc = {.setup.black_sheet = true,
-                                     .setup.lamp_side_cm = 10,
-                                     .setup.lamp_distance_cm = 61,
-                                     .setup.camera_distance_cm = 100,
-                                     .setup.crop_cm = 1};
+    const struct job_setup setup = {
+        .black_sheet = true, .lamp_side_cm = 10, .lamp_distance_cm = 61, .camera_distance_cm = 100, .crop_cm = 1};
     struct observation_set o;
     struct error err = {0};
     char *text = malloc(size + 1);
@@ -18,7 +15,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     memcpy(text, data, size);
     text[size] = '\0';
     observation_set_init(&o);
-    fuzz_check_error(measurement_table_parse(text, size, "table.csv", &doc, &o, &err), &err);
+    fuzz_check_error(measurement_table_parse(text, size, "table.csv", &setup, &o, &err), &err);
     observation_set_release(&o);
     free(text);
     return 0;

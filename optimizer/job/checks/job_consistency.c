@@ -1,5 +1,9 @@
 #include "optimizer/job/checks/job_consistency.h"
 #include "base/catalogue/volume_format.h"
+#include "optimizer/job/document/job_document.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_rows.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -111,13 +115,13 @@ static void check_radians(const struct job_document *doc, const struct consisten
 {
     struct angle_span photograph = {0}, candidate = {0};
     struct error fault = {0};
-    for (size_t i = 0; i < doc->rows.n_photograph; i++) {
-        const struct job_photograph *p = &doc->rows.photograph[i];
+    for (size_t i = 0; i < doc->rows->n_photograph; i++) {
+        const struct job_photograph *p = &doc->rows->photograph[i];
         angle_span_add(&photograph, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg, p->camera_phi_deg,
                        p->cloth_rotation_deg);
     }
-    for (size_t i = 0; i < doc->fit.n_candidate && doc->fit.candidate != NULL; i++) {
-        const struct job_candidate *p = &doc->fit.candidate[i];
+    for (size_t i = 0; i < doc->fit->n_candidate && doc->fit->candidate != NULL; i++) {
+        const struct job_candidate *p = &doc->fit->candidate[i];
         angle_span_add(&candidate, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg, p->camera_phi_deg,
                        p->cloth_rotation_deg);
     }

@@ -3,7 +3,12 @@
 #ifndef SELVEDGE_OPTIMIZER_JOB_CONSISTENCY_H
 #define SELVEDGE_OPTIMIZER_JOB_CONSISTENCY_H
 
-#include "optimizer/job/document/job_document.h"
+#include "base/status.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+struct job_document;
 
 /* Largest angle from the normal and around it that a set of views in radians can have. */
 #define JOB_RADIANS_THETA 3.2

@@ -1,7 +1,9 @@
 /* The section "cloth": from its keys to a checked description of the cloth. */
 #include "base/catalogue/cloth_description.h"
+#include "base/catalogue/correction_numbers.h"
 #include "optimizer/job/checks/job_document_parts.h"
 #include "optimizer/job/checks/option_checks.h"
+#include "optimizer/job/document/job_cloth.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -166,12 +168,12 @@ static status read_numbers(const json_t *section, struct cloth_description *d, s
 static void take_kinds(const struct job_document *doc, const json_t *section, struct cloth_description *d)
 {
     const json_t *yarns = json_object_get(section, "yarns");
-    if (doc->cloth.n_yarn == 0) return;
+    if (doc->cloth->n_yarn == 0) return;
     struct cloth_kind ground = d->kind[0], pile = d->kind[1];
-    d->n_kind = doc->cloth.n_yarn;
+    d->n_kind = doc->cloth->n_yarn;
     if (d->pile_kind >= 0) d->pile_kind = (int)d->n_kind - 1;
     for (size_t k = 0; k < d->n_kind; k++) {
-        const struct job_cloth_yarn *y = &doc->cloth.yarn[k];
+        const struct job_cloth_yarn *y = &doc->cloth->yarn[k];
         d->kind[k] = (int)k == d->pile_kind ? pile : ground;
         if (y->n_fiber > 0) d->kind[k].n_fiber = y->n_fiber;
         d->kind[k].n_ply = y->n_ply;
@@ -183,13 +185,13 @@ static void take_kinds(const struct job_document *doc, const json_t *section, st
 static status read_weave(const struct option_value *v, struct cloth_description *d, struct error *err)
 {
     const json_t *draft = json_object_get(v->value, "draft");
-    bool named = json_object_get(v->value, "weave") != NULL, shown = v->doc->cloth.texture[0] != '\0';
+    bool named = json_object_get(v->value, "weave") != NULL, shown = v->doc->cloth->texture[0] != '\0';
     if (named == (draft != NULL) && (named || !shown))
         return error_set_field(err, STATUS_INVALID, "cloth.weave",
                                "a described cloth takes either 'cloth.weave' or 'cloth.draft', or neither with a "
                                "photograph in 'cloth.texture'");
-    v->doc->cloth.draft_from_texture = !named && draft == NULL; /* until it is read, the weave stands as plain */
-    status st = cloth_description_init(d, named ? v->doc->cloth.weave : "plain", err);
+    v->doc->cloth->draft_from_texture = !named && draft == NULL; /* until it is read, the weave stands as plain */
+    status st = cloth_description_init(d, named ? v->doc->cloth->weave : "plain", err);
     return st == STATUS_OK && draft != NULL ? read_draft(draft, d, err) : st;
 }
 
@@ -203,12 +205,12 @@ static status read_cloth(const struct option_value *v, struct cloth_description 
     if (d->pile_kind == 0)
         return error_set_field(err, STATUS_INVALID, "cloth.yarns",
                                "a velvet has at least two kinds of yarn: the ground, and last the pile");
-    d->seed = doc->cloth.seed;
+    d->seed = doc->cloth->seed;
     for (int k = 0; k < 2 && st == STATUS_OK; k++) {
         enum cloth_direction a = k == 0 ? CLOTH_WEFT : CLOTH_WARP;
         /* the tile of a draft that is not known yet is checked when it is */
-        d->n_yarn[a] = doc->cloth.draft_from_texture ? 0 : doc->cloth.tile_yarn[a];
-        if (!isnan(doc->cloth.threads_per_cm[a])) d->threads_per_cm[a] = doc->cloth.threads_per_cm[a];
+        d->n_yarn[a] = doc->cloth->draft_from_texture ? 0 : doc->cloth->tile_yarn[a];
+        if (!isnan(doc->cloth->threads_per_cm[a])) d->threads_per_cm[a] = doc->cloth->threads_per_cm[a];
         st = read_order(v->value, a, d, err);
     }
     cloth_description_number(d);
@@ -221,15 +223,16 @@ static status read_names(struct job_document *doc, struct error *err)
 {
     size_t n_named = 0;
     status s = STATUS_OK;
-    for (size_t k = 0; k < doc->cloth.n_yarn; k++) n_named += doc->cloth.yarn[k].name[0] != '\0';
-    for (size_t k = 0; k < doc->cloth.n_yarn && n_named > 0 && s == STATUS_OK; k++) {
-        memcpy(doc->cloth.description->kind[k].name, doc->cloth.yarn[k].name,
-               sizeof doc->cloth.description->kind[k].name);
+    for (size_t k = 0; k < doc->cloth->n_yarn; k++) n_named += doc->cloth->yarn[k].name[0] != '\0';
+    for (size_t k = 0; k < doc->cloth->n_yarn && n_named > 0 && s == STATUS_OK; k++) {
+        memcpy(doc->cloth->description->kind[k].name, doc->cloth->yarn[k].name,
+               sizeof doc->cloth->description->kind[k].name);
         char path[JSON_PATH_BYTES];
         snprintf(path, sizeof path, "cloth.yarns[%zu].name", k);
-        s = n_named == doc->cloth.n_yarn ? job_add_group(doc, doc->cloth.yarn[k].name, path, err)
-                                         : error_set_field(err, STATUS_INVALID, path,
-                                                           "'%s': either all kinds of yarn have a name, or none", path);
+        s = n_named == doc->cloth->n_yarn
+                ? job_add_group(doc, doc->cloth->yarn[k].name, path, err)
+                : error_set_field(err, STATUS_INVALID, path, "'%s': either all kinds of yarn have a name, or none",
+                                  path);
     }
     return s;
 }
@@ -258,12 +261,12 @@ status job_cloth_check_final_tiles(const struct job_cloth *cloth, struct error *
 
 status job_check_cloth(const struct option_value *v, struct error *err)
 {
-    v->doc->cloth.description = calloc(1, sizeof *v->doc->cloth.description);
-    if (v->doc->cloth.description == NULL)
+    v->doc->cloth->description = calloc(1, sizeof *v->doc->cloth->description);
+    if (v->doc->cloth->description == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
-    status st = read_cloth(v, v->doc->cloth.description, err);
+    status st = read_cloth(v, v->doc->cloth->description, err);
     if (st == STATUS_OK) st = read_names(v->doc, err);
-    if (st == STATUS_OK) st = job_cloth_check_final_tiles(&v->doc->cloth, err);
+    if (st == STATUS_OK) st = job_cloth_check_final_tiles(v->doc->cloth, err);
     if (st == STATUS_INVALID) job_cloth_name_field(err);
     return st;
 }
@@ -273,13 +276,13 @@ status job_check_correction(const struct option_value *v, struct error *err)
     struct job_document *doc = v->doc;
     const struct json_field f = {.object = v->value, .path = "correction"};
     status s = STATUS_OK;
-    if (doc->cloth.description != NULL)
+    if (doc->cloth->description != NULL)
         return error_set_field(
             err, STATUS_INVALID, "correction",
             "'correction' is for fibers of a scan or a file: a described cloth has numbers of its own");
-    correction_numbers_init(doc->cloth.correction);
-    for (int k = 0; k < CORRECTION_N && s == STATUS_OK; k++) s = read_number(&f, &doc->cloth.correction[k], err);
-    if (s == STATUS_OK) s = correction_numbers_check(doc->cloth.correction, err);
+    correction_numbers_init(doc->cloth->correction);
+    for (int k = 0; k < CORRECTION_N && s == STATUS_OK; k++) s = read_number(&f, &doc->cloth->correction[k], err);
+    if (s == STATUS_OK) s = correction_numbers_check(doc->cloth->correction, err);
     if (s == STATUS_INVALID) name_section("correction", err);
     return s;
 }

@@ -2,6 +2,9 @@
 #include "base/catalogue/method_catalogue.h"
 #include "optimizer/job/checks/job_document_parts.h"
 #include "optimizer/job/checks/option_checks.h"
+#include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_fit_option.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -37,7 +40,7 @@ static status parse_model_list(const struct json_field *f, const char *const *na
     if (!json_is_array(list) || json_array_size(list) == 0 || json_array_size(list) > JOB_MAX_MODEL)
         return error_set_field(err, STATUS_INVALID, "fit.models", "'fit.models' must be a list of 1 to %d model ids",
                                JOB_MAX_MODEL);
-    doc->fit.n_model = 0;
+    doc->fit->n_model = 0;
     for (size_t i = 0; i < json_array_size(list); i++) {
         const char *id = json_string_value(json_array_get(list, i));
         char path[JSON_PATH_BYTES], known[400];
@@ -49,9 +52,9 @@ static status parse_model_list(const struct json_field *f, const char *const *na
             return error_set_field(err, STATUS_INVALID, path, "'%s' is no model: allowed are %s", path, known);
         }
         for (size_t j = 0; j < i; j++)
-            if (strcmp(doc->fit.model[j].id, id) == 0)
+            if (strcmp(doc->fit->model[j].id, id) == 0)
                 return error_set_field(err, STATUS_INVALID, path, "'%s' names the model '%s' a second time", path, id);
-        snprintf(doc->fit.model[doc->fit.n_model++].id, sizeof doc->fit.model[0].id, "%s", id);
+        snprintf(doc->fit->model[doc->fit->n_model++].id, sizeof doc->fit->model[0].id, "%s", id);
     }
     return STATUS_OK;
 }
@@ -119,13 +122,13 @@ static status parse_values(const struct json_field *fit, bool fixed, const struc
     for (; iter != NULL; iter = json_object_iter_next((json_t *)(uintptr_t)f.object, iter)) {
         const char *key = json_object_iter_key(iter);
         bool known = false;
-        for (size_t i = 0; i < doc->fit.n_model && s == STATUS_OK; i++)
+        for (size_t i = 0; i < doc->fit->n_model && s == STATUS_OK; i++)
             s = parse_value(&f, key, json_object_iter_value(iter), model[i],
-                            fixed ? doc->fit.model[i].fixed : doc->fit.model[i].start, &known, err);
+                            fixed ? doc->fit->model[i].fixed : doc->fit->model[i].start, &known, err);
         if (s != STATUS_OK) return s;
         char path[JSON_PATH_BYTES];
         json_field_path(&f, key, path);
-        if (!known) return job_unknown_parameter(model, doc->fit.n_model, path, key, err);
+        if (!known) return job_unknown_parameter(model, doc->fit->n_model, path, key, err);
     }
     return STATUS_OK;
 }
@@ -135,14 +138,14 @@ static status set_density(const struct json_field *f, const struct model_info *c
                           struct error *err)
 {
     bool any_volume = false;
-    for (size_t i = 0; i < doc->fit.n_model; i++) {
+    for (size_t i = 0; i < doc->fit->n_model; i++) {
         if (model[i]->kind != MODEL_VOLUME) continue;
         const struct param_info *d = &model[i]->param[model[i]->n_param - 1];
-        bool given = !isnan(doc->fit.density_multiplier_per_cm);
-        double value = given ? doc->fit.density_multiplier_per_cm : param_to_file_unit(d, d->start);
-        if (!doc->fit.fit_density) doc->fit.model[i].fixed[model[i]->n_param - 1] = value;
-        if (doc->fit.fit_density && given)
-            doc->fit.model[i].start[model[i]->n_param - 1] =
+        bool given = !isnan(doc->fit->density_multiplier_per_cm);
+        double value = given ? doc->fit->density_multiplier_per_cm : param_to_file_unit(d, d->start);
+        if (!doc->fit->fit_density) doc->fit->model[i].fixed[model[i]->n_param - 1] = value;
+        if (doc->fit->fit_density && given)
+            doc->fit->model[i].start[model[i]->n_param - 1] =
                 value; /* without a value, a prior's mean may be the start */
         any_volume = true;
     }
@@ -152,16 +155,17 @@ static status set_density(const struct json_field *f, const struct model_info *c
             char path[JSON_PATH_BYTES];
             json_field_path(f, key[i], path);
             return error_set_field(err, STATUS_INVALID, path, "'%s' belongs to volume models, but the job fits '%s'%s",
-                                   path, doc->fit.model[0].id, doc->fit.n_model > 1 ? " and other surface models" : "");
+                                   path, doc->fit->model[0].id,
+                                   doc->fit->n_model > 1 ? " and other surface models" : "");
         }
     return STATUS_OK;
 }
 
 static status check_radius(const struct model_info *const *model, const struct job_document *doc, struct error *err)
 {
-    for (size_t i = 0; i < doc->fit.n_model && doc->fit.fit_radius; i++)
+    for (size_t i = 0; i < doc->fit->n_model && doc->fit->fit_radius; i++)
         if (model[i]->kind == MODEL_SURFACE) return STATUS_OK;
-    return doc->fit.fit_radius
+    return doc->fit->fit_radius
                ? error_set_field(err, STATUS_INVALID, "fit.fit_radius",
                                  "'fit.fit_radius' needs a surface model, and '%s' is a volume model", model[0]->id)
                : STATUS_OK;
@@ -177,15 +181,15 @@ static status check_starts(const struct model_info *m, const struct job_model *g
 }
 
 /* Finds the models of the document, each with one set of parameters for each group of fibers. */
-static status find_models(const struct job_document *doc, struct model_sets *sets, const struct model_info **model,
-                          struct error *err)
+static status find_models(const struct job_fit *fit, const struct job_cloth *cloth, struct model_sets *sets,
+                          const struct model_info **model, struct error *err)
 {
-    for (size_t i = 0; i < doc->fit.n_model; i++) {
-        const struct model_info *m = model_catalogue_find(doc->fit.model[i].id);
+    for (size_t i = 0; i < fit->n_model; i++) {
+        const struct model_info *m = model_catalogue_find(fit->model[i].id);
         if (m == NULL)
             return error_set_field(err, STATUS_INVALID, "fit.model", "the model '%s' is not in this program",
-                                   doc->fit.model[i].id);
-        status s = model_sets_init(&sets[i], m, doc->cloth.group, doc->cloth.n_group, err);
+                                   fit->model[i].id);
+        status s = model_sets_init(&sets[i], m, cloth->group, cloth->n_group, err);
         if (s != STATUS_OK) {
             snprintf(err->field, sizeof err->field, "fit.model");
             return s;
@@ -203,7 +207,8 @@ static status parse_parameters(const struct json_field *f, const struct model_in
     if (s == STATUS_OK) s = parse_values(f, false, model, doc, err);
     if (s == STATUS_OK) s = set_density(f, model, doc, err);
     if (s == STATUS_OK) s = check_radius(model, doc, err);
-    for (size_t i = 0; i < doc->fit.n_model && s == STATUS_OK; i++) s = check_starts(model[i], &doc->fit.model[i], err);
+    for (size_t i = 0; i < doc->fit->n_model && s == STATUS_OK; i++)
+        s = check_starts(model[i], &doc->fit->model[i], err);
     return s == STATUS_OK ? job_parse_fit_options(f, model, doc, err) : s;
 }
 
@@ -215,7 +220,7 @@ status job_check_fit(const struct option_value *v, struct error *err)
     struct model_sets *sets = malloc(JOB_MAX_MODEL * sizeof *sets);
     if (sets == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
     status s = parse_models(&f, v->doc, err);
-    if (s == STATUS_OK) s = find_models(v->doc, sets, model, err);
+    if (s == STATUS_OK) s = find_models(v->doc->fit, v->doc->cloth, sets, model, err);
     if (s == STATUS_OK) s = parse_parameters(&f, model, v->doc, err);
     free(sets);
     return s;

@@ -1,6 +1,8 @@
 /* Ties, bounds and priors of the section "fit" (job_fit_option.h). */
 #include "base/catalogue/method_catalogue.h"
 #include "optimizer/job/checks/job_document_parts.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_fit_option.h"
 
 #include <math.h>
 #include <stdint.h>
@@ -25,9 +27,9 @@ struct reader {
 static status check_known(const struct reader *r, const char *path, const char *key, struct error *err)
 {
     size_t slot[JOB_MAX_PARAM];
-    for (size_t i = 0; i < r->doc->fit.n_model; i++)
+    for (size_t i = 0; i < r->doc->fit->n_model; i++)
         if (job_parameter_slots(r->model[i], r->model[i]->n_param, key, slot) > 0) return STATUS_OK;
-    return job_unknown_parameter(r->model, r->doc->fit.n_model, path, key, err);
+    return job_unknown_parameter(r->model, r->doc->fit->n_model, path, key, err);
 }
 
 /* ---- ties ---- */
@@ -111,9 +113,9 @@ static status parse_tied(const struct reader *r, const struct json_field *fit, s
         snprintf(f.path, sizeof f.path, "fit.tied[%zu]", g);
         status s = read_tie(&f, &t, err);
         for (size_t i = 0; i < t.n_name && s == STATUS_OK; i++) s = check_known(r, f.path, t.name[i], err);
-        for (size_t i = 0; i < r->doc->fit.n_model && s == STATUS_OK; i++) {
+        for (size_t i = 0; i < r->doc->fit->n_model && s == STATUS_OK; i++) {
             size_t n_slot;
-            s = apply_tie(&t, r->model[i], &r->doc->fit.model[i].option, &n_slot, err);
+            s = apply_tie(&t, r->model[i], &r->doc->fit->model[i].option, &n_slot, err);
             if (n_slot > largest) largest = n_slot;
         }
         if (s != STATUS_OK) return s;
@@ -197,44 +199,43 @@ static status parse_each(const struct reader *r, const struct json_field *fit, c
         const char *key = json_object_iter_key(iter);
         json_field_path(&f, key, path);
         s = check_known(r, path, key, err);
-        for (size_t i = 0; i < r->doc->fit.n_model && s == STATUS_OK; i++)
-            s = one(&f, key, r->model[i], &r->doc->fit.model[i].option, err);
+        for (size_t i = 0; i < r->doc->fit->n_model && s == STATUS_OK; i++)
+            s = one(&f, key, r->model[i], &r->doc->fit->model[i].option, err);
     }
     return s;
 }
 
 /* Refuses priors, nuisance terms and a goal of precision that the method does not take. */
-static status check_method(const struct job_document *doc, struct error *err)
+static status check_method(const struct job_fit *fit, struct error *err)
 {
-    bool has_prior = doc->fit.profile_job[0] != '\0';
-    for (size_t i = 0; i < doc->fit.n_model; i++)
-        for (size_t p = 0; p < JOB_MAX_PARAM; p++)
-            has_prior = has_prior || !isnan(doc->fit.model[i].option.prior_mean[p]);
-    const struct job_fit_option *o = &doc->fit.model[0].option;
+    bool has_prior = fit->profile_job[0] != '\0';
+    for (size_t i = 0; i < fit->n_model; i++)
+        for (size_t p = 0; p < JOB_MAX_PARAM; p++) has_prior = has_prior || !isnan(fit->model[i].option.prior_mean[p]);
+    const struct job_fit_option *o = &fit->model[0].option;
     unsigned wanted = (has_prior ? METHOD_TAKES_PRIORS : 0u) |
                       (o->gain != JOB_GAIN_NONE || o->stray_light ? METHOD_TAKES_NUISANCE : 0u) |
-                      (doc->fit.precision > 0.0 ? METHOD_TAKES_PRECISION : 0u);
-    unsigned missing = wanted & ~method_catalogue_find(doc->fit.method)->takes;
+                      (fit->precision > 0.0 ? METHOD_TAKES_PRECISION : 0u);
+    unsigned missing = wanted & ~method_catalogue_find(fit->method)->takes;
     if (missing == 0) return STATUS_OK;
     const char *path = (missing & METHOD_TAKES_PRIORS) != 0
-                           ? doc->fit.profile_job[0] != '\0' ? "fit.profile_job" : "fit.priors"
+                           ? fit->profile_job[0] != '\0' ? "fit.profile_job" : "fit.priors"
                        : (missing & METHOD_TAKES_NUISANCE) != 0 ? "fit.nuisance"
                                                                 : "fit.precision";
     return error_set_field(err, STATUS_INVALID, path, "'%s' needs the method '%s': '%s' does not know it", path,
-                           method_catalogue_taking(wanted)->id, doc->fit.method);
+                           method_catalogue_taking(wanted)->id, fit->method);
 }
 
 /* Copies the options that are the same for all models. They have been read into the first model. */
-static status share_common(struct job_document *doc, struct error *err)
+static status share_common(struct job_fit *fit, struct error *err)
 {
-    const struct job_fit_option *common = &doc->fit.model[0].option;
-    size_t most = method_catalogue_find(doc->fit.method)->max_iteration_of_starts;
-    if (common->n_start > 1 && doc->fit.max_iteration > most)
+    const struct job_fit_option *common = &fit->model[0].option;
+    size_t most = method_catalogue_find(fit->method)->max_iteration_of_starts;
+    if (common->n_start > 1 && fit->max_iteration > most)
         return error_set_field(err, STATUS_INVALID, "fit.max_iterations",
                                "'fit.max_iterations' is %zu: with several starts at most %zu are allowed",
-                               doc->fit.max_iteration, most);
-    for (size_t i = 1; i < doc->fit.n_model; i++) {
-        struct job_fit_option *o = &doc->fit.model[i].option;
+                               fit->max_iteration, most);
+    for (size_t i = 1; i < fit->n_model; i++) {
+        struct job_fit_option *o = &fit->model[i].option;
         o->n_start = common->n_start;
         o->gain = common->gain;
         o->gain_prior_rel = common->gain_prior_rel;
@@ -252,13 +253,13 @@ status job_parse_fit_options(const struct json_field *f, const struct model_info
     status s = parse_tied(&r, f, err);
     if (s == STATUS_OK) s = parse_each(&r, f, "bounds", parse_bound, err);
     if (s == STATUS_OK) s = parse_each(&r, f, "priors", parse_prior, err);
-    if (s == STATUS_OK) s = share_common(doc, err);
-    if (s == STATUS_OK) s = check_method(doc, err);
-    for (size_t i = 0; i < doc->fit.n_model && s == STATUS_OK; i++) {
-        s = job_fit_resolve(model[i]->param, model[i]->n_param, &doc->fit.model[i], resolved, err);
-        doc->fit.model[i].first_free = -1;
+    if (s == STATUS_OK) s = share_common(doc->fit, err);
+    if (s == STATUS_OK) s = check_method(doc->fit, err);
+    for (size_t i = 0; i < doc->fit->n_model && s == STATUS_OK; i++) {
+        s = job_fit_resolve(model[i]->param, model[i]->n_param, &doc->fit->model[i], resolved, err);
+        doc->fit->model[i].first_free = -1;
         for (size_t p = model[i]->n_param; p-- > 0 && s == STATUS_OK;)
-            if (!resolved[p].fixed) doc->fit.model[i].first_free = (int)p;
+            if (!resolved[p].fixed) doc->fit->model[i].first_free = (int)p;
     }
     return s;
 }

@@ -6,6 +6,8 @@
 #include "optimizer/job/document/job_document.h"
 #include "optimizer/job/document/json_field.h"
 
+struct job_fit_option;
+
 /* Sets the defaults: no ties, bounds, priors or nuisance terms, and one start. */
 void job_fit_option_init(struct job_fit_option *o);
 /* Reads the keys of job_fit_option.h from the section "fit" for every model, and then resolves all parameters
@@ -22,8 +24,9 @@ size_t job_n_named_parameter(const struct model_info *m);
  * the name is not valid or was given before. */
 status job_add_group(struct job_document *doc, const char *name, const char *path, struct error *err);
 /* Writes the indices of the parameters among the first n_param that a key names: a colour ("C_TT") or one parameter
- * ("C_TT.r"), of one set ("warp.C_TT") or of all. Returns their number. */
-size_t job_parameter_slots(const struct model_info *m, size_t n_param, const char *key, size_t slot[JOB_MAX_PARAM]);
+ * ("C_TT.r"), of one set ("warp.C_TT") or of all. Returns their number. slot has n_param
+ * elements. */
+size_t job_parameter_slots(const struct model_info *m, size_t n_param, const char *key, size_t *slot);
 /* Returns STATUS_INVALID for the key `path`, which names a parameter `key` that no model has. The text lists the
  * parameters that the models have. */
 status job_unknown_parameter(const struct model_info *const *model, size_t n_model, const char *path, const char *key,

@@ -1,6 +1,8 @@
 /* Bounds, start and fixed flag of each parameter from ties, bounds, priors, fixed values and starts
  * (job_fit_resolve). */
 #include "optimizer/job/checks/job_document_parts.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_fit_option.h"
 
 #include <math.h>
 #include <stdint.h>

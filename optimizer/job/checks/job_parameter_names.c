@@ -7,7 +7,7 @@
 
 size_t job_n_named_parameter(const struct model_info *m) { return m->n_param - (m->kind == MODEL_VOLUME ? 1 : 0); }
 
-size_t job_parameter_slots(const struct model_info *m, size_t n_param, const char *key, size_t slot[JOB_MAX_PARAM])
+size_t job_parameter_slots(const struct model_info *m, size_t n_param, const char *key, size_t *slot)
 {
     size_t n = 0;
     for (size_t p = 0; p < n_param; p++)

@@ -1,6 +1,8 @@
 /* Checks of the sections "volume" and its parts. */
 #include "optimizer/job/checks/job_document_parts.h"
 #include "optimizer/job/checks/option_checks.h"
+#include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_scan.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -11,22 +13,22 @@
 status job_check_volume(const struct option_value *v, struct error *err)
 {
     struct job_document *doc = v->doc;
-    if (json_object_get(v->value, "matrix") != NULL) doc->scan.align = false;
-    if (json_object_get(v->value, "crop_voxel") != NULL) doc->scan.crop = false;
-    if (doc->scan.density_low >= doc->scan.density_high) /* false where one is NaN */
+    if (json_object_get(v->value, "matrix") != NULL) doc->scan->align = false;
+    if (json_object_get(v->value, "crop_voxel") != NULL) doc->scan->crop = false;
+    if (doc->scan->density_low >= doc->scan->density_high) /* false where one is NaN */
         return error_set_field(err, STATUS_INVALID, "volume.density_high",
-                               "'volume.density_high' (%g) must be above density_low (%g)", doc->scan.density_high,
-                               doc->scan.density_low);
-    if (json_object_get(v->value, "raw") != NULL && doc->scan.n_file != 1)
+                               "'volume.density_high' (%g) must be above density_low (%g)", doc->scan->density_high,
+                               doc->scan->density_low);
+    if (json_object_get(v->value, "raw") != NULL && doc->scan->n_file != 1)
         return error_set_field(err, STATUS_INVALID, "volume.raw",
-                               "'volume.raw' describes one file, 'volume.files' names %zu", doc->scan.n_file);
+                               "'volume.raw' describes one file, 'volume.files' names %zu", doc->scan->n_file);
     return STATUS_OK;
 }
 
 /* Samples of several bytes have a byte order. */
 status job_check_raw(const struct option_value *v, struct error *err)
 {
-    const char *type = v->doc->scan.raw_type;
+    const char *type = v->doc->scan->raw_type;
     bool one_byte = type[0] != '\0' && type[strlen(type) - 1] == '8';
     if (one_byte || json_object_get(v->value, "endian") != NULL) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, v->path, "'%s' lacks 'endian': 'little' or 'big'", v->path);
@@ -47,16 +49,16 @@ static bool axes_valid(const char *text)
 
 status job_check_axes(const struct option_value *v, struct error *err)
 {
-    if (axes_valid(v->doc->scan.axes)) return STATUS_OK;
+    if (axes_valid(v->doc->scan->axes)) return STATUS_OK;
     return error_set_field(
         err, STATUS_INVALID, v->path,
         "'%s' is '%s': allowed is each of x, y, z once, with an optional minus sign, such as 'xyz' or '-zxy'", v->path,
-        v->doc->scan.axes);
+        v->doc->scan->axes);
 }
 
 status job_check_matrix(const struct option_value *v, struct error *err)
 {
-    const double *m = v->doc->scan.matrix;
+    const double *m = v->doc->scan->matrix;
     double det =
         m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
     if (fabs(det) >= 1e-6) return STATUS_OK;
@@ -66,7 +68,7 @@ status job_check_matrix(const struct option_value *v, struct error *err)
 
 status job_check_crop_voxel(const struct option_value *v, struct error *err)
 {
-    const size_t *c = v->doc->scan.crop_voxel;
+    const size_t *c = v->doc->scan->crop_voxel;
     for (size_t a = 0; a < 3; a++)
         if (c[a + 3] <= c[a])
             return error_set_field(err, STATUS_INVALID, v->path,
@@ -78,11 +80,11 @@ status job_check_crop_voxel(const struct option_value *v, struct error *err)
 status job_check_filter(const struct option_value *v, struct error *err)
 {
     const struct job_document *doc = v->doc;
-    if (doc->scan.filter_t <= 0.5 * doc->scan.filter_s) /* false where one is NaN, which means chosen from the data */
+    if (doc->scan->filter_t <= 0.5 * doc->scan->filter_s) /* false where one is NaN, which means chosen from the data */
         return error_set_field(
             err, STATUS_INVALID, "volume.filter.t",
             "'volume.filter.t' is %g: it must be above half of s (%g), or the filter does not respond to fibers",
-            doc->scan.filter_t, doc->scan.filter_s);
+            doc->scan->filter_t, doc->scan->filter_s);
     return STATUS_OK;
 }
 
@@ -101,10 +103,10 @@ status job_add_group(struct job_document *doc, const char *name, const char *pat
             "'%s' is not the name of a group of fibers: allowed are 1 to 20 characters of A-Z a-z 0-9 _ "
             "-",
             path);
-    for (size_t k = 0; k < doc->cloth.n_group; k++)
-        if (strcmp(doc->cloth.group[k], name) == 0)
+    for (size_t k = 0; k < doc->cloth->n_group; k++)
+        if (strcmp(doc->cloth->group[k], name) == 0)
             return error_set_field(err, STATUS_INVALID, path, "'%s' gives the name '%s' a second time", path, name);
-    snprintf(doc->cloth.group[doc->cloth.n_group++], sizeof doc->cloth.group[0], "%s", name);
+    snprintf(doc->cloth->group[doc->cloth->n_group++], sizeof doc->cloth->group[0], "%s", name);
     return STATUS_OK;
 }
 

@@ -1,25 +1,32 @@
 /* Checks of the parts of the section "fit" that do not depend on a model's parameters. */
 #include "base/catalogue/method_catalogue.h"
+#include "base/catalogue/model_catalogue.h"
 #include "base/catalogue/picture_method.h"
 #include "optimizer/job/checks/option_checks.h"
 #include "optimizer/job/document/job_document.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_fit_option.h"
+#include "optimizer/job/document/job_results.h"
+#include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/document/job_setup.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 
 status job_check_fit_radius(const struct option_value *v, struct error *err)
 {
     const struct job_document *doc = v->doc;
-    if (doc->fit.radius_upper_um < 1.1 * doc->fit.radius_lower_um) /* false where one is NaN */
+    if (doc->fit->radius_upper_um < 1.1 * doc->fit->radius_lower_um) /* false where one is NaN */
         return error_set_field(err, STATUS_INVALID, "fit.fit_radius.upper_um",
                                "'fit.fit_radius.upper_um' is %g: it must be at least 1.1 times lower_um (%g)",
-                               doc->fit.radius_upper_um, doc->fit.radius_lower_um);
+                               doc->fit->radius_upper_um, doc->fit->radius_lower_um);
     return STATUS_OK;
 }
 
 status job_check_nuisance(const struct option_value *v, struct error *err)
 {
-    const struct job_fit_option *o = &v->doc->fit.model[0].option;
+    const struct job_fit_option *o = &v->doc->fit->model[0].option;
     if (json_object_get(v->value, "gain_prior_rel") != NULL && o->gain == JOB_GAIN_NONE)
         return error_set_field(err, STATUS_INVALID, "fit.nuisance.gain_prior_rel",
                                "'fit.nuisance.gain_prior_rel' needs 'fit.nuisance.gain': no gain is fitted");
@@ -27,11 +34,11 @@ status job_check_nuisance(const struct option_value *v, struct error *err)
         return error_set_field(err, STATUS_INVALID, "fit.nuisance.stray_light_prior",
                                "'fit.nuisance.stray_light_prior' needs 'fit.nuisance.stray_light': no stray light is "
                                "fitted");
-    if (v->doc->fit.plain_prior > 0.0 && (o->gain != JOB_GAIN_NONE || o->stray_light))
+    if (v->doc->fit->plain_prior > 0.0 && (o->gain != JOB_GAIN_NONE || o->stray_light))
         return error_set_field(err, STATUS_INVALID, v->path,
                                "'%s' cannot be used with 'fit.plain_prior': the plain BRDF does not know these faults",
                                v->path);
-    if (v->doc->fit.discrepancy && (o->gain != JOB_GAIN_NONE || o->stray_light))
+    if (v->doc->fit->discrepancy && (o->gain != JOB_GAIN_NONE || o->stray_light))
         return error_set_field(err, STATUS_INVALID, v->path,
                                "'%s' cannot be used with 'fit.discrepancy': it would take these faults for the cloth's",
                                v->path);
@@ -52,25 +59,25 @@ double job_texture_cell_mm(double crop_cm, double block_mm)
 status job_check_texture(const struct option_value *v, struct error *err)
 {
     const struct job_document *doc = v->doc;
-    double crop_mm = 10.0 * doc->setup.crop_cm, block_mm = doc->fit.texture_block_mm;
+    double crop_mm = 10.0 * doc->setup->crop_cm, block_mm = doc->fit->texture_block_mm;
     if (block_mm > crop_mm / 2.0 || lround(crop_mm / block_mm) > JOB_MAX_TEXTURE_CELLS)
         return error_set_field(err, STATUS_INVALID, "fit.texture.block_mm",
                                "'fit.texture.block_mm' is %g: it must divide the crop of %g mm into 2 to %d blocks a "
                                "side, which is %g to %g mm",
                                block_mm, crop_mm, JOB_MAX_TEXTURE_CELLS, crop_mm / JOB_MAX_TEXTURE_CELLS,
                                crop_mm / 2.0);
-    if (doc->rows.measurement_file[0] != '\0')
+    if (doc->rows->measurement_file[0] != '\0')
         return error_set_field(err, STATUS_INVALID, v->path, "'%s' needs photographs: a table of means has no texture",
                                v->path);
-    if (doc->fit.texture_weight > 0.0 && (method_catalogue_find(doc->fit.method)->takes & METHOD_TAKES_TEXTURE) == 0)
+    if (doc->fit->texture_weight > 0.0 && (method_catalogue_find(doc->fit->method)->takes & METHOD_TAKES_TEXTURE) == 0)
         return error_set_field(err, STATUS_INVALID, v->path,
                                "'%s' with a weight needs the method '%s': '%s' has no such terms", v->path,
-                               method_catalogue_taking(METHOD_TAKES_TEXTURE)->id, doc->fit.method);
-    if (doc->fit.share_camera_paths)
+                               method_catalogue_taking(METHOD_TAKES_TEXTURE)->id, doc->fit->method);
+    if (doc->fit->share_camera_paths)
         return error_set_field(err, STATUS_INVALID, v->path,
                                "'%s' cannot be used with 'fit.share_camera_paths': a contrast needs paths of its own",
                                v->path);
-    if (doc->fit.model[0].option.stray_light)
+    if (doc->fit->model[0].option.stray_light)
         return error_set_field(err, STATUS_INVALID, v->path,
                                "'%s' cannot be used with 'fit.nuisance.stray_light': a contrast that is lowered by "
                                "stray light is not modelled",
@@ -85,20 +92,19 @@ static const double light_theta[] = {20, 45, 65, 80}, camera_theta[] = {0, 30, 6
 
 /* The built-in candidates: the lamp at phi 0, the camera opposite to it or beside it, the cloth turned by 0 and 90
  * degrees. Without the black sheet there are also lamps behind the cloth. */
-static status make_grid(struct job_document *doc, struct error *err)
+static status make_grid(struct job_setup *setup, struct job_fit *fit, struct error *err)
 {
     enum { FRONT = 4 * 4 * 2 * 2, BACK = 4 };
-    doc->fit.candidate = calloc(FRONT + BACK, sizeof *doc->fit.candidate);
-    if (doc->fit.candidate == NULL)
-        return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
+    fit->candidate = calloc(FRONT + BACK, sizeof *fit->candidate);
+    if (fit->candidate == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
     for (size_t i = 0; i < FRONT; i++) {
         struct job_candidate c = {light_theta[i / 16], 0.0, camera_theta[i / 4 % 4], camera_phi[i / 2 % 2],
                                   rotation[i % 2]};
         if (c.camera_theta_deg == 0.0 && c.camera_phi_deg != 180.0) continue; /* from above, phi makes no difference */
-        doc->fit.candidate[doc->fit.n_candidate++] = c;
+        fit->candidate[fit->n_candidate++] = c;
     }
-    for (size_t i = 0; i < BACK && !doc->setup.black_sheet; i++)
-        doc->fit.candidate[doc->fit.n_candidate++] =
+    for (size_t i = 0; i < BACK && !setup->black_sheet; i++)
+        fit->candidate[fit->n_candidate++] =
             (struct job_candidate){150.0, 0.0, i / 2 ? 45.0 : 0.0, 180.0, rotation[i % 2]};
     return STATUS_OK;
 }
@@ -112,49 +118,48 @@ status job_check_export(const struct option_value *v, struct error *err)
 }
 
 /* Speckle is of path-traced pictures of models that have it, whichever of the job's models will be the best. */
-static status check_speckle(const struct job_document *doc, size_t i, struct error *err)
+static status check_speckle(const struct job_fit *fit, const struct job_results *results, size_t i, struct error *err)
 {
-    const struct job_surface_picture *p = &doc->results.surface_picture[i];
+    const struct job_surface_picture *p = &results->surface_picture[i];
     char field[64];
     if (!p->speckle) return STATUS_OK;
     snprintf(field, sizeof field, "pictures[%zu].speckle", i);
     if (p->method != JOB_PICTURE_PATH)
         return error_set_field(err, STATUS_INVALID, field, "'%s' is true, but 'method' is not \"path\"", field);
-    for (size_t k = 0; k < doc->fit.n_model; k++)
-        if (!model_catalogue_has_speckle(doc->fit.model[k].id))
+    for (size_t k = 0; k < fit->n_model; k++)
+        if (!model_catalogue_has_speckle(fit->model[k].id))
             return error_set_field(err, STATUS_INVALID, field,
                                    "'%s' is true, but model '%s' has no speckle: models of waves have, such as '%s'",
-                                   field, doc->fit.model[k].id, model_catalogue_with_speckle(0));
+                                   field, fit->model[k].id, model_catalogue_with_speckle(0));
     return STATUS_OK;
 }
 
 /* A job of several models is shown by the best one: one of them with a far field is enough. */
-static status check_field(const struct job_document *doc, size_t i, struct error *err)
+static status check_field(const struct job_fit *fit, const struct job_results *results, size_t i, struct error *err)
 {
     char field[64];
-    if (!doc->results.surface_picture[i].field_by_pixel) return STATUS_OK;
-    for (size_t k = 0; k < doc->fit.n_model; k++)
-        if (model_catalogue_far_field(doc->fit.model[k].id) != NULL) return STATUS_OK;
+    if (!results->surface_picture[i].field_by_pixel) return STATUS_OK;
+    for (size_t k = 0; k < fit->n_model; k++)
+        if (model_catalogue_far_field(fit->model[k].id) != NULL) return STATUS_OK;
     snprintf(field, sizeof field, "pictures[%zu].field_by_pixel", i);
     return error_set_field(err, STATUS_INVALID, field,
                            "'%s' is true, but model '%s' has no far field to take in its place: near fields have, such "
                            "as '%s'",
-                           field, doc->fit.model[0].id, model_catalogue_near_field(0));
+                           field, fit->model[0].id, model_catalogue_near_field(0));
 }
 
 /* Tables and walks are made in the flat cloth of the job, over its sheet. */
-static status check_sheet(const struct job_document *doc, size_t i, struct error *err)
+static status check_sheet(const struct job_setup *setup, const struct job_results *results, size_t i, struct error *err)
 {
-    const struct job_surface_picture *p = &doc->results.surface_picture[i];
+    const struct job_surface_picture *p = &results->surface_picture[i];
     char field[64];
-    if (!picture_method_of_flat_cloth(p->method) || p->black_sheet < 0 ||
-        (p->black_sheet != 0) == doc->setup.black_sheet)
+    if (!picture_method_of_flat_cloth(p->method) || p->black_sheet < 0 || (p->black_sheet != 0) == setup->black_sheet)
         return STATUS_OK;
     snprintf(field, sizeof field, "pictures[%zu].black_sheet", i);
     return error_set_field(err, STATUS_INVALID, field,
                            "'%s' is %s and 'black_sheet' is %s: a picture of this method has the black sheet of the "
                            "job, or none like it; leave it out, or take the method path or dual",
-                           field, p->black_sheet != 0 ? "true" : "false", doc->setup.black_sheet ? "true" : "false");
+                           field, p->black_sheet != 0 ? "true" : "false", setup->black_sheet ? "true" : "false");
 }
 
 /* Paths are refused where no table of view and light is made of them. */
@@ -171,10 +176,11 @@ static status check_deep_paths(const struct job_surface_picture *p, const json_t
                            "'%s' is given, but the picture has no table of view and light: %s", field, why);
 }
 
-static status check_picture(const struct job_document *doc, size_t i, struct error *err)
+static status check_picture(const struct job_setup *setup, const struct job_fit *fit, const struct job_results *results,
+                            size_t i, struct error *err)
 {
-    const struct job_surface_picture *p = &doc->results.surface_picture[i];
-    bool sheet = p->black_sheet < 0 ? doc->setup.black_sheet : p->black_sheet != 0;
+    const struct job_surface_picture *p = &results->surface_picture[i];
+    bool sheet = p->black_sheet < 0 ? setup->black_sheet : p->black_sheet != 0;
     char field[64];
     snprintf(field, sizeof field, "pictures[%zu].mesh_file", i);
     if (p->on == JOB_ON_MESH && p->mesh_file[0] == '\0')
@@ -182,9 +188,9 @@ static status check_picture(const struct job_document *doc, size_t i, struct err
     if (p->on != JOB_ON_MESH && p->mesh_file[0] != '\0')
         return error_set_field(err, STATUS_INVALID, field, "'%s' is given, but 'on' is not \"mesh\"", field);
     snprintf(field, sizeof field, "pictures[%zu].width_mm", i);
-    if (!doc->setup.camera_far_field && p->width_mm > 10.0 * doc->setup.camera_distance_cm)
+    if (!setup->camera_far_field && p->width_mm > 10.0 * setup->camera_distance_cm)
         return error_set_field(err, STATUS_INVALID, field, "'%s' is %g: allowed is at most camera.distance_cm (%g cm)",
-                               field, p->width_mm, doc->setup.camera_distance_cm);
+                               field, p->width_mm, setup->camera_distance_cm);
     snprintf(field, sizeof field, "pictures[%zu].light_theta_deg", i);
     if (p->on == JOB_ON_FLAT && (p->light_theta_deg == 90.0 || (sheet && p->light_theta_deg > 90.0)))
         return error_set_field(
@@ -193,14 +199,14 @@ static status check_picture(const struct job_document *doc, size_t i, struct err
             "with 'black_sheet' false",
             field, p->light_theta_deg);
     snprintf(field, sizeof field, "pictures[%zu].ground_gap_mm", i);
-    const double *around = doc->setup.environment_rgb;
+    const double *around = setup->environment_rgb;
     if (!isnan(p->ground_gap_mm) && (p->light_theta_deg >= 90.0 || p->camera_theta_deg >= 90.0))
         return error_set_field(err, STATUS_INVALID, field,
                                "'%s' is given, but the ground under the cloth wants lamp and camera above it, below 90 "
                                "degrees from the vertical",
                                field);
     if (!isnan(p->ground_gap_mm) &&
-        (doc->setup.environment_file[0] != '\0' || around[0] > 0.0 || around[1] > 0.0 || around[2] > 0.0))
+        (setup->environment_file[0] != '\0' || around[0] > 0.0 || around[1] > 0.0 || around[2] > 0.0))
         return error_set_field(err, STATUS_INVALID, field,
                                "'%s' is given, but the ground under the cloth is lit by the lamp alone: leave out "
                                "'environment'",
@@ -220,18 +226,18 @@ static status check_picture(const struct job_document *doc, size_t i, struct err
         return error_set_field(err, STATUS_INVALID, field,
                                "'%s' is %g: the ball under a draped piece of %g mm may have a radius of %g to %g mm",
                                field, p->radius_mm, p->size_mm, 0.02 * p->size_mm, 10.0 * p->size_mm);
-    status s = check_sheet(doc, i, err);
-    if (s == STATUS_OK) s = check_speckle(doc, i, err);
-    return s == STATUS_OK ? check_field(doc, i, err) : s;
+    status s = check_sheet(setup, results, i, err);
+    if (s == STATUS_OK) s = check_speckle(fit, results, i, err);
+    return s == STATUS_OK ? check_field(fit, results, i, err) : s;
 }
 
 status job_check_pictures(const struct option_value *v, struct error *err)
 {
     status s = STATUS_OK;
-    for (size_t i = 0; i < v->doc->results.n_surface_picture && s == STATUS_OK; i++) {
-        s = check_picture(v->doc, i, err);
+    for (size_t i = 0; i < v->doc->results->n_surface_picture && s == STATUS_OK; i++) {
+        s = check_picture(v->doc->setup, v->doc->fit, v->doc->results, i, err);
         if (s == STATUS_OK)
-            s = check_deep_paths(&v->doc->results.surface_picture[i], json_array_get(v->value, i), i, err);
+            s = check_deep_paths(&v->doc->results->surface_picture[i], json_array_get(v->value, i), i, err);
     }
     return s;
 }
@@ -247,5 +253,5 @@ status job_check_twin(const struct option_value *v, struct error *err)
 
 status job_check_candidates(const struct option_value *v, struct error *err)
 {
-    return v->doc->fit.candidate_grid ? make_grid(v->doc, err) : STATUS_OK;
+    return v->doc->fit->candidate_grid ? make_grid(v->doc->setup, v->doc->fit, err) : STATUS_OK;
 }

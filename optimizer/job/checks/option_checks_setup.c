@@ -1,7 +1,15 @@
 /* Checks of the set-up, of the measurements, and of the document as a whole. */
+#include "base/catalogue/model_catalogue.h"
 #include "optimizer/job/checks/option_checks.h"
+#include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/document/job_document.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_profile.h"
+#include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/job/document/json_field.h"
+#include "optimizer/job/document/picture_words.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -28,26 +36,27 @@ status job_check_job_id(const struct option_value *v, struct error *err)
 
 status job_check_lamp(const struct option_value *v, struct error *err)
 {
-    if (v->doc->setup.lamp_directional || v->doc->setup.lamp_side_cm <= 2.0 * v->doc->setup.lamp_distance_cm)
+    if (v->doc->setup->lamp_directional || v->doc->setup->lamp_side_cm <= 2.0 * v->doc->setup->lamp_distance_cm)
         return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, "lamp.side_cm",
                            "'lamp.side_cm' is %g: allowed is at most twice lamp.distance_cm (%g)",
-                           v->doc->setup.lamp_side_cm, v->doc->setup.lamp_distance_cm);
+                           v->doc->setup->lamp_side_cm, v->doc->setup->lamp_distance_cm);
 }
 
 status job_check_camera(const struct option_value *v, struct error *err)
 {
-    if (v->doc->setup.camera_far_field || v->doc->setup.crop_cm <= v->doc->setup.camera_distance_cm) return STATUS_OK;
+    if (v->doc->setup->camera_far_field || v->doc->setup->crop_cm <= v->doc->setup->camera_distance_cm)
+        return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, "camera.crop_cm",
-                           "'camera.crop_cm' is %g: allowed is at most camera.distance_cm (%g)", v->doc->setup.crop_cm,
-                           v->doc->setup.camera_distance_cm);
+                           "'camera.crop_cm' is %g: allowed is at most camera.distance_cm (%g)", v->doc->setup->crop_cm,
+                           v->doc->setup->camera_distance_cm);
 }
 
 /* A lamp behind the cloth lights it through; that needs a cloth without its black sheet. */
 status job_check_light_theta(const struct option_value *v, struct error *err)
 {
     double theta_deg = *(const double *)v->target;
-    if (theta_deg < 90.0 || (theta_deg > 90.0 && !v->doc->setup.black_sheet)) return STATUS_OK;
+    if (theta_deg < 90.0 || (theta_deg > 90.0 && !v->doc->setup->black_sheet)) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, v->path,
                            "'%s' is %g: allowed are 0 to below 90 degrees from the normal (above 90, from behind, "
                            "without black_sheet)",
@@ -65,18 +74,18 @@ status job_check_crop_px(const struct option_value *v, struct error *err)
 status job_check_color(const struct option_value *v, struct error *err)
 {
     struct job_document *doc = v->doc;
-    doc->setup.chart.scale = doc->setup.white.scale = 1.0;
-    if (doc->setup.has_chart != doc->setup.has_white) return STATUS_OK;
+    doc->setup->chart.scale = doc->setup->white.scale = 1.0;
+    if (doc->setup->has_chart != doc->setup->has_white) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, v->path,
-                           doc->setup.has_chart ? "'%s' has both 'chart' and 'white': give one of them"
-                                                : "'%s' needs 'chart' or 'white'",
+                           doc->setup->has_chart ? "'%s' has both 'chart' and 'white': give one of them"
+                                                 : "'%s' needs 'chart' or 'white'",
                            v->path);
 }
 
 status job_check_measured_rows(const struct option_value *v, struct error *err)
 {
-    for (size_t i = 0; i < v->doc->rows.n_measured_row; i++)
-        if (v->doc->rows.measured_row[i].set == JOB_SET_FIT) return STATUS_OK;
+    for (size_t i = 0; i < v->doc->rows->n_measured_row; i++)
+        if (v->doc->rows->measured_row[i].set == JOB_SET_FIT) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, v->path,
                            "'%s' has no configuration with \"set\": \"fit\": give at least one", v->path);
 }
@@ -101,14 +110,14 @@ static status check_place(const struct option_value *v, size_t i, const char *wh
                           const double position_mm[3], double *distance_cm, struct error *err)
 {
     char path[JSON_PATH_BYTES];
-    bool angles, position = !isnan(position_mm[0]), view = v->doc->rows.photograph[i].view[0] != '\0';
+    bool angles, position = !isnan(position_mm[0]), view = v->doc->rows->photograph[i].view[0] != '\0';
     status s = check_angles(v->path, i, what, (double[2]){*theta_deg, *phi_deg}, &angles, err);
     if (s != STATUS_OK) return s;
     snprintf(path, sizeof path, "%s[%zu].%s_%s", v->path, i, what, position ? "position_mm" : "theta_deg");
     if (angles + position + view > 1)
         return error_set_field(err, STATUS_INVALID, path, "'%s' is given as well as %s: give one of them", path,
                                view ? "'view'" : "angles");
-    if (angles + position + view == 0 && what[0] == 'c' && v->doc->setup.rig_file[0] != '\0')
+    if (angles + position + view == 0 && what[0] == 'c' && v->doc->setup->rig_file[0] != '\0')
         return STATUS_OK; /* the camera follows from the markers of the rig */
     if (angles + position + view == 0)
         return error_set_field(err, STATUS_INVALID, path,
@@ -117,7 +126,7 @@ static status check_place(const struct option_value *v, size_t i, const char *wh
     *distance_cm = NAN;
     if (!position) return STATUS_OK;
     job_angles_of_position(position_mm, theta_deg, phi_deg, distance_cm);
-    bool camera = what[0] == 'c', behind = !camera && *theta_deg > 90.0 && !v->doc->setup.black_sheet;
+    bool camera = what[0] == 'c', behind = !camera && *theta_deg > 90.0 && !v->doc->setup->black_sheet;
     if (*distance_cm >= 1.0 && (*theta_deg < (camera ? 89.999 : 90.0) || behind)) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, path, "'%s' is %s", path,
                            *distance_cm < 1.0 ? "nearer than 10 mm to the orbit center"
@@ -127,8 +136,8 @@ static status check_place(const struct option_value *v, size_t i, const char *wh
 status job_check_photographs(const struct option_value *v, struct error *err)
 {
     bool fitted = false;
-    for (size_t i = 0; i < v->doc->rows.n_photograph; i++) {
-        struct job_photograph *p = &v->doc->rows.photograph[i];
+    for (size_t i = 0; i < v->doc->rows->n_photograph; i++) {
+        struct job_photograph *p = &v->doc->rows->photograph[i];
         char path[JSON_PATH_BYTES];
         fitted = fitted || p->set == JOB_SET_FIT;
         status s = check_place(v, i, "light", &p->light_theta_deg, &p->light_phi_deg, p->light_position_mm,
@@ -137,7 +146,7 @@ status job_check_photographs(const struct option_value *v, struct error *err)
             s = check_place(v, i, "camera", &p->camera_theta_deg, &p->camera_phi_deg, p->camera_position_mm,
                             &p->camera_distance_cm, err);
         if (s != STATUS_OK) return s;
-        if (p->view[0] == '\0' || v->doc->setup.rig_file[0] != '\0') continue;
+        if (p->view[0] == '\0' || v->doc->setup->rig_file[0] != '\0') continue;
         snprintf(path, sizeof path, "%s[%zu].view", v->path, i);
         return error_set_field(err, STATUS_INVALID, path, "'%s' needs 'rig': the file that describes the views", path);
     }
@@ -199,22 +208,23 @@ static status check_one_measurement(const struct option_value *v, struct error *
 static status check_values_shown(const struct option_value *v, struct error *err)
 {
     const struct job_document *doc = v->doc;
-    const struct job_model *m = &doc->fit.model[0];
+    const struct job_model *m = &doc->fit->model[0];
     struct model_sets sets;
     if (!given(v, "fit"))
         return error_set_field(err, STATUS_INVALID, "pictures",
                                "'pictures' needs 'photographs' or 'measurements', to which a model is fitted, or its "
                                "parameters: give 'fit.model' and 'fit.fixed'");
-    if (doc->fit.n_model > 1)
+    if (doc->fit->n_model > 1)
         return error_set_field(err, STATUS_INVALID, "fit.models",
                                "'fit.models' has %zu models, but pictures without photographs show one: give "
                                "'fit.model'",
-                               doc->fit.n_model);
-    if (doc->fit.fit_radius || doc->fit.fit_density)
-        return error_set_field(err, STATUS_INVALID, doc->fit.fit_radius ? "fit.fit_radius" : "fit.fit_density",
-                               "'%s' needs photographs", doc->fit.fit_radius ? "fit.fit_radius" : "fit.fit_density");
+                               doc->fit->n_model);
+    if (doc->fit->fit_radius || doc->fit->fit_density)
+        return error_set_field(err, STATUS_INVALID, doc->fit->fit_radius ? "fit.fit_radius" : "fit.fit_density",
+                               "'%s' needs photographs", doc->fit->fit_radius ? "fit.fit_radius" : "fit.fit_density");
+    const struct job_cloth *cloth = doc->cloth;
     const struct model_info *info = model_catalogue_find(m->id);
-    status s = model_sets_init(&sets, info, doc->cloth.group, doc->cloth.n_group, err);
+    status s = model_sets_init(&sets, info, cloth->group, cloth->n_group, err);
     if (s != STATUS_OK) return s;
     if (m->first_free >= 0)
         return error_set_field(err, STATUS_INVALID, "fit.fixed",
@@ -229,12 +239,12 @@ static status check_free(const struct option_value *v, struct error *err)
 {
     const struct job_document *doc = v->doc;
     if (job_document_kind(doc) == JOB_OF_PICTURES) return check_values_shown(v, err);
-    for (size_t i = 0; i < doc->fit.n_model; i++)
-        if (doc->fit.model[i].first_free < 0)
+    for (size_t i = 0; i < doc->fit->n_model; i++)
+        if (doc->fit->model[i].first_free < 0)
             return error_set_field(err, STATUS_INVALID, "fit.fixed",
                                    "'fit.fixed' and 'fit.tied' together hold every parameter of model '%s': leave at "
                                    "least one free",
-                                   doc->fit.model[i].id);
+                                   doc->fit->model[i].id);
     return STATUS_OK;
 }
 
@@ -252,13 +262,13 @@ status job_density_undetermined(bool black_sheet, struct error *err)
 static status check_density(const struct job_document *doc, struct error *err)
 {
     bool from_behind = false;
-    for (size_t i = 0; i < doc->rows.n_photograph; i++)
-        if (doc->rows.photograph[i].set == JOB_SET_FIT &&
-            (doc->rows.photograph[i].light_theta_deg > 90.0 || doc->rows.photograph[i].view[0] != '\0'))
+    for (size_t i = 0; i < doc->rows->n_photograph; i++)
+        if (doc->rows->photograph[i].set == JOB_SET_FIT &&
+            (doc->rows->photograph[i].light_theta_deg > 90.0 || doc->rows->photograph[i].view[0] != '\0'))
             from_behind = true; /* the rig is read later */
-    if (!doc->fit.fit_density || from_behind || (doc->rows.n_photograph == 0 && !doc->setup.black_sheet))
+    if (!doc->fit->fit_density || from_behind || (doc->rows->n_photograph == 0 && !doc->setup->black_sheet))
         return STATUS_OK;
-    return job_density_undetermined(doc->setup.black_sheet, err);
+    return job_density_undetermined(doc->setup->black_sheet, err);
 }
 
 struct name_list {
@@ -312,7 +322,7 @@ static status check_files(const struct job_document *doc, struct error *err)
 
 status job_check_document(const struct option_value *v, struct error *err)
 {
-    const bool of_profile = job_profile_given(&v->doc->profile);
+    const bool of_profile = job_profile_given(v->doc->profile);
     status s = of_profile ? job_check_profile_document(v, err) : check_one_cloth(v, err);
     if (s == STATUS_OK && !of_profile) s = check_one_measurement(v, err);
     if (s == STATUS_OK) s = check_free(v, err);

@@ -9,31 +9,30 @@
 #define SELVEDGE_OPTIMIZER_JOB_DOCUMENT_H
 
 #include "base/status.h"
-#include "optimizer/job/document/job_cloth.h"
-#include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_kind.h"
-#include "optimizer/job/document/job_profile.h"
-#include "optimizer/job/document/job_results.h"
-#include "optimizer/job/document/job_rows.h"
-#include "optimizer/job/document/job_scan.h"
-#include "optimizer/job/document/job_setup.h"
+#include "optimizer/job/document/job_limits.h"
+#include "optimizer/job/document/job_sections.h"
 
 struct job_fault_list;
 
-/* The seven sections. Only the parser, its checks and the pipeline see all of them; other code takes the sections that
- * it reads. */
+/* Owns the seven sections. Only the parser, its checks and the pipeline see all of them; other code takes the sections
+ * that it reads, and includes their headers. */
 struct job_document {
     struct job_fault_list *fault; /* all faults go there while the document is read; NULL: reading ends at the first */
     char sample[JOB_MAX_SAMPLE_BYTES];
-    struct job_scan scan;
-    struct job_cloth cloth;
-    struct job_setup setup;
-    struct job_rows rows;
-    struct job_profile profile;
-    struct job_fit fit;
-    struct job_results results;
+    struct job_scan *scan;
+    struct job_cloth *cloth;
+    struct job_setup *setup;
+    struct job_rows *rows;
+    struct job_profile *profile;
+    struct job_fit *fit;
+    struct job_results *results;
 };
 
+/* Returns a document whose members are all zero, NULL when memory is out. */
+struct job_document *job_document_new(void);
+
+struct job_sections job_document_sections(const struct job_document *doc);
 void job_document_free(struct job_document *doc);
 enum job_kind job_document_kind(const struct job_document *doc);
 

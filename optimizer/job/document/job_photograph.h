@@ -3,15 +3,12 @@
 #define SELVEDGE_OPTIMIZER_JOB_PHOTOGRAPH_H
 
 #include "optimizer/job/document/job_limits.h"
+#include "optimizer/job/document/picture_words.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 
 enum { JOB_MAX_MORE_EXPOSURES = 15 };
-
-enum job_set { JOB_SET_FIT, JOB_SET_HELD_OUT };
-/* How integer samples of a picture stand for light. */
-enum job_transfer { JOB_TRANSFER_UNDECLARED, JOB_TRANSFER_LINEAR, JOB_TRANSFER_SRGB };
 
 /* One more exposure of the view of a photograph. */
 struct job_exposure {
@@ -34,6 +31,13 @@ struct job_photograph {
     double exposure_s, iso, aperture, black_level; /* NaN: as the file states */
     size_t n_exposure;                             /* besides the first one, which is `file` */
     struct job_exposure *exposure;
+};
+
+/* A photograph of the bowl of a single fiber. */
+struct job_bowl_photograph {
+    struct job_photograph picture;       /* members that belong to a view of the cloth are unused */
+    char background[JOB_MAX_NAME_BYTES]; /* "": none */
+    double theta_i_deg, phi_i_deg;
 };
 
 #endif

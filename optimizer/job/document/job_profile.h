@@ -3,19 +3,16 @@
 #ifndef SELVEDGE_OPTIMIZER_JOB_PROFILE_H
 #define SELVEDGE_OPTIMIZER_JOB_PROFILE_H
 
-#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_limits.h"
 
-enum { JOB_MAX_BOWL_MARK = 100, JOB_MAX_BOWL_PHOTOGRAPH = 64 };
+#include <stdbool.h>
+#include <stddef.h>
+
+struct job_bowl_photograph;
 
 /* A place on the bowl of a single fiber, and where the photographs show it. */
 struct job_bowl_mark {
     double at_mm[3], px[2];
-};
-
-struct job_bowl_photograph {
-    struct job_photograph picture;       /* members that belong to a view of the cloth are unused */
-    char background[JOB_MAX_NAME_BYTES]; /* "": none */
-    double theta_i_deg, phi_i_deg;
 };
 
 /* A bowl into which a single fiber scatters (option_rows_profile.c). */

@@ -3,12 +3,14 @@
 #define SELVEDGE_OPTIMIZER_JOB_ROWS_H
 
 #include "base/status.h"
-#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_limits.h"
+#include "optimizer/job/document/picture_words.h"
+
+#include <stddef.h>
+
+struct job_photograph;
 
 enum { JOB_MAX_MEASURED_ROW = 455 }; /* as many means over rotations as a table may have */
-
-/* Symmetry of a measured BRDF: as its file says, or as the job says. */
-enum job_symmetry { JOB_SYMMETRY_FILE, JOB_SYMMETRY_ISOTROPIC, JOB_SYMMETRY_ANISOTROPIC };
 
 /* A configuration that is taken from a file of a measured BRDF. */
 struct job_measured_row {

@@ -17,6 +17,14 @@ enum { MAX_KEY = 40, MAX_CHOICE = 40 };
 static status read_section(const struct json_field *f, const char *pattern, void *base, struct job_document *doc,
                            struct error *err);
 
+/* The struct that the row's offsets are of: its section, or `base`, an element of a list. */
+static void *base_of(const struct job_option *row, void *base, const struct job_document *doc)
+{
+    if (row->section == 0) return base;
+    memcpy(&base, (const char *)doc + row->section, sizeof base);
+    return base;
+}
+
 /* Number of faults found so far where all are collected. */
 static size_t n_fault(const struct job_document *doc)
 {
@@ -231,6 +239,7 @@ static bool lacks_message(enum option_kind kind)
 static status read_option(const struct job_option *row, const struct json_field *f, const char *key, void *base,
                           struct job_document *doc, struct error *err)
 {
+    base = base_of(row, base, doc);
     struct option_value v = {
         .row = row, .value = json_object_get(f->object, key), .target = (char *)base + row->at, .doc = doc};
     char path[JSON_PATH_BYTES];
@@ -303,6 +312,7 @@ static status read_default(const struct job_option *row, void *base, struct job_
 
 static status put_default(const struct job_option *row, void *base, struct job_document *doc, struct error *err)
 {
+    base = base_of(row, base, doc);
     void *target = (char *)base + row->at;
     if (!row->stored) return STATUS_OK;
     if (row->standard != NULL) return read_default(row, base, doc, err);

@@ -38,7 +38,8 @@ struct job_option {
     bool required;
     bool or_section;                /* OPTION_BOOL, OPTION_LIST: an object of the rows under path is allowed as well */
     bool stored;                    /* it has a target */
-    size_t at;                      /* offset of the target in struct job_document, or in an element of its list */
+    size_t section;                 /* offset of the pointer to the section in struct job_document; 0: none */
+    size_t at;                      /* offset of the target in the section, or in an element of a list */
     size_t count_at, element_bytes; /* of lists: offset of the count, size of an element */
     double lower, upper;            /* numbers; of lists: upper is the largest number of elements */
     size_t n;                       /* count of numbers; bytes of a text */

@@ -17,13 +17,14 @@ extern const char *const job_transfer_names[];
 #define TEXT_INTO_OF(type, member) INTO_OF(type, member), .n = sizeof((type *)NULL)->member
 #define NUMBERS_INTO_OF(type, member)                                                                                  \
     INTO_OF(type, member), .n = sizeof((type *)NULL)->member / sizeof((type *)NULL)->member[0]
-/* Targets in struct job_document. */
-#define INTO(member) INTO_OF(struct job_document, member)
-#define TEXT_INTO(member) TEXT_INTO_OF(struct job_document, member)
-#define NUMBERS_INTO(member) NUMBERS_INTO_OF(struct job_document, member)
-#define LIST_INTO(pointer, n_member)                                                                                   \
-    INTO(pointer), .count_at = offsetof(struct job_document, n_member),                                                \
-                   .element_bytes = sizeof *((struct job_document *)NULL)->pointer
+/* Targets in a section of the job document, as INTO(scan, crop_keep). */
+#define OF_SECTION(name) .section = offsetof(struct job_document, name)
+#define INTO(name, member) OF_SECTION(name), INTO_OF(struct job_##name, member)
+#define TEXT_INTO(name, member) OF_SECTION(name), TEXT_INTO_OF(struct job_##name, member)
+#define NUMBERS_INTO(name, member) OF_SECTION(name), NUMBERS_INTO_OF(struct job_##name, member)
+#define LIST_INTO(name, pointer, n_member)                                                                             \
+    INTO(name, pointer), .count_at = offsetof(struct job_##name, n_member),                                            \
+                         .element_bytes = sizeof *((struct job_##name *)NULL)->pointer
 
 #define RANGE(from, to) .lower = (from), .upper = (to)
 

@@ -2,6 +2,7 @@
  * base/catalogue/cloth_numbers.def and correction_numbers.def. */
 #include "base/catalogue/cloth_description.h"
 #include "base/option_id.h"
+#include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/options/option_rows.h"
 
 #define OF_YARN(member) INTO_OF(struct job_cloth_yarn, member)
@@ -41,7 +42,7 @@ const struct job_option option_rows_described[] = {
          "(`fit` is true unless it is given). docs/described-cloth.md shows what each number does."},
     {.path = "cloth.weave",
      .kind = OPTION_WORD,
-     TEXT_INTO(cloth.weave),
+     TEXT_INTO(cloth, weave),
      .choice_at = weave_name,
      .left_out = "this, `draft` or `texture`",
      .meaning = "Name of the weave."},
@@ -56,7 +57,7 @@ const struct job_option option_rows_described[] = {
     {.path = "cloth.texture",
      .kind = OPTION_FILE_NAME,
      .id = OPTION_CLOTH_TEXTURE,
-     INTO(cloth.texture),
+     INTO(cloth, texture),
      .left_out = "none",
      .meaning = "Photograph of the flat cloth from straight above, PNG (sRGB) or OpenEXR, that shows its weave. Draft "
                 "and covers come from it where the job leaves them open; a contradiction is warned about "
@@ -64,7 +65,7 @@ const struct job_option option_rows_described[] = {
     {.path = "cloth.texture_px_per_mm",
      .kind = OPTION_NUMBER,
      .id = OPTION_TEXTURE_PX_PER_MM,
-     INTO(cloth.texture_px_per_mm),
+     INTO(cloth, texture_px_per_mm),
      RANGE(0.1, 10000),
      .unit = "px/mm",
      .left_out = "not known",
@@ -72,7 +73,7 @@ const struct job_option option_rows_described[] = {
                 "the photograph, too, where the job leaves them open."},
     {.path = "cloth.texture_colors",
      .kind = OPTION_BOOL,
-     INTO(cloth.texture_colors),
+     INTO(cloth, texture_colors),
      .standard = "false",
      .meaning =
          "Whether `C_TT` of named kinds of yarn starts at the colors that `texture` shows of warp and weft, if it "
@@ -91,19 +92,19 @@ const struct job_option option_rows_described[] = {
      .meaning = "Kinds of the weft yarns from below; of a knit, its courses."},
     {.path = "cloth.tile_warps",
      .kind = OPTION_COUNT,
-     INTO(cloth.tile_yarn[1]),
+     INTO(cloth, tile_yarn[1]),
      RANGE(1, 128),
      .left_out = "whole repeats, at least 8; wales: 4",
      .meaning = "Warp yarns, or wales, in the tile that is repeated."},
     {.path = "cloth.tile_wefts",
      .kind = OPTION_COUNT,
-     INTO(cloth.tile_yarn[0]),
+     INTO(cloth, tile_yarn[0]),
      RANGE(1, 128),
      .left_out = "whole repeats, at least 8; courses: 4",
      .meaning = "Weft yarns, or courses, in the tile."},
     {.path = "cloth.final_tiles",
      .kind = OPTION_COUNT,
-     INTO(cloth.final_tiles),
+     INTO(cloth, final_tiles),
      RANGE(1, 8),
      .standard = "1",
      .meaning =
@@ -111,27 +112,27 @@ const struct job_option option_rows_described[] = {
          "the result is. Small tiles show the random places of their fibers; the search is fast with them."},
     {.path = "cloth.renew_places",
      .kind = OPTION_BOOL,
-     INTO(cloth.renew_places),
+     INTO(cloth, renew_places),
      .standard = "false",
      .meaning = "With fitted numbers of the cloth: whether every estimate of the search has fibers at other random "
                 "places. It makes twice as many cloths, and needs large tiles, such as 16 x 16 yarns."},
     {.path = "cloth.warp_per_cm",
      .kind = OPTION_NUMBER,
-     INTO(cloth.threads_per_cm[1]),
+     INTO(cloth, threads_per_cm[1]),
      RANGE(1, 400),
      .unit = "1/cm",
      .left_out = "from `cover_warp`",
      .meaning = "Warp yarns in a centimetre, where they were counted. Replaces `cover_warp`."},
     {.path = "cloth.weft_per_cm",
      .kind = OPTION_NUMBER,
-     INTO(cloth.threads_per_cm[0]),
+     INTO(cloth, threads_per_cm[0]),
      RANGE(1, 400),
      .unit = "1/cm",
      .left_out = "from `cover_weft`",
      .meaning = "Weft yarns in a centimetre. Replaces `cover_weft`."},
     {.path = "cloth.seed",
      .kind = OPTION_LARGE_COUNT,
-     INTO(cloth.seed),
+     INTO(cloth, seed),
      .standard = "1",
      .meaning = "Selects the random places of the fibers. All values of the numbers use the same."},
 #include "base/catalogue/cloth_numbers.def"
@@ -140,7 +141,7 @@ const struct job_option option_rows_described[] = {
     {.path = "cloth.yarns",
      .kind = OPTION_LIST,
      .id = OPTION_YARNS,
-     LIST_INTO(cloth.yarn, cloth.n_yarn),
+     LIST_INTO(cloth, yarn, n_yarn),
      RANGE(1, CLOTH_MAX_KIND),
      .items = "kinds of yarn",
      .left_out = "one kind; velvet: ground and pile",
@@ -180,7 +181,7 @@ const struct job_option option_rows_described[] = {
 #include "base/catalogue/cloth_numbers.def"
     {.path = "correction",
      .kind = OPTION_SECTION,
-     INTO(cloth.has_correction),
+     INTO(cloth, has_correction),
      .id = OPTION_CORRECTION,
      .check = job_check_correction,
      .left_out = "the fibers are used as they are",

@@ -1,4 +1,7 @@
 /* Rows of the option table: the fit. Sections whose keys are names of model parameters are read by job_check_fit. */
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_fit_option.h"
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/job/options/option_rows.h"
 
 static const char *const gain[] = {
@@ -44,7 +47,7 @@ const struct job_option option_rows_fit[] = {
     {.path = "fit.model",
      .kind = OPTION_WORD,
      .id = OPTION_MODEL,
-     TEXT_INTO(fit.model[0].id),
+     TEXT_INTO(fit, model[0].id),
      .choice_at = job_model_id,
      .standard = "\"textile.v3\"",
      .meaning = "The scattering model; docs/model.md describes each. `two_lobe.v1` is the published one, with nine "
@@ -60,7 +63,7 @@ const struct job_option option_rows_fit[] = {
     {.path = "fit.method",
      .kind = OPTION_WORD,
      .id = OPTION_METHOD,
-     TEXT_INTO(fit.method),
+     TEXT_INTO(fit, method),
      .choice_at = job_method_id,
      .meaning = "`published_sgd.v1` is the published method, for comparison. When no budget is stated it has the "
                 "published one: six runs of 60 iterations, two replicas, 64 x 64 pixels of 64 samples, which is 550 "
@@ -69,13 +72,13 @@ const struct job_option option_rows_fit[] = {
                 "weight above 0."},
     {.path = "fit.seed",
      .kind = OPTION_LARGE_COUNT,
-     INTO(fit.seed),
+     INTO(fit, seed),
      .standard = "1",
      .allowed = "whole number from 0",
      .meaning = "The same seed and document give a bit-identical result."},
     {.path = "fit.max_iterations",
      .kind = OPTION_COUNT,
-     INTO(fit.max_iteration),
+     INTO(fit, max_iteration),
      RANGE(1, 10000),
      .left_out = "the method's",
      .allowed = "1..10000; with several `starts` 1..500",
@@ -84,7 +87,7 @@ const struct job_option option_rows_fit[] = {
     {.path = "fit.path_budget",
      .kind = OPTION_LARGE_COUNT,
      .id = OPTION_PATH_BUDGET,
-     INTO(fit.path_budget),
+     INTO(fit, path_budget),
      .lower = 1000,
      .unit = "paths",
      .left_out = "the method's",
@@ -95,7 +98,7 @@ const struct job_option option_rows_fit[] = {
     {.path = "fit.precision",
      .kind = OPTION_NUMBER,
      .id = OPTION_PRECISION,
-     INTO(fit.precision),
+     INTO(fit, precision),
      .lower = 0.05,
      .upper = 10,
      .left_out = "no goal",
@@ -106,7 +109,7 @@ const struct job_option option_rows_fit[] = {
     {.path = "fit.profile_job",
      .kind = OPTION_TEXT,
      .id = OPTION_PROFILE_JOB,
-     TEXT_INTO(fit.profile_job),
+     TEXT_INTO(fit, profile_job),
      .check = job_check_job_id,
      .left_out = "none",
      .allowed = "the id of a job with `profile`",
@@ -115,7 +118,7 @@ const struct job_option option_rows_fit[] = {
                 "where the profile has three channels."},
     {.path = "fit.share_camera_paths",
      .kind = OPTION_BOOL,
-     INTO(fit.share_camera_paths),
+     INTO(fit, share_camera_paths),
      .standard = "false",
      .meaning =
          "Whether rows that differ in their lamp only are traced with the same paths, in 0.54 to 0.63 of the time for "
@@ -123,7 +126,7 @@ const struct job_option option_rows_fit[] = {
     {.path = "fit.plain_prior",
      .kind = OPTION_NUMBER,
      .id = OPTION_PLAIN_PRIOR,
-     INTO(fit.plain_prior),
+     INTO(fit, plain_prior),
      RANGE(0, 100),
      .standard = "0",
      .meaning = "How much the fit listens to a plain BRDF of the same rows: 0, not at all; 1, as was best for a dozen "
@@ -131,7 +134,7 @@ const struct job_option option_rows_fit[] = {
     {.path = "fit.discrepancy",
      .kind = OPTION_BOOL,
      .id = OPTION_DISCREPANCY,
-     INTO(fit.discrepancy),
+     INTO(fit, discrepancy),
      .standard = "false",
      .meaning = "Whether the rest that the fibers leave of the measured radiances is kept as a smooth factor on all "
                 "renderings, as far as it predicts left-out rows (docs/model.md, section 5). Not with `nuisance`, nor "
@@ -156,7 +159,7 @@ const struct job_option option_rows_fit[] = {
      .meaning = "Values at which the fit starts, written like `fixed`."},
     {.path = "fit.density_multiplier_per_cm",
      .kind = OPTION_NUMBER,
-     INTO(fit.density_multiplier_per_cm),
+     INTO(fit, density_multiplier_per_cm),
      RANGE(10, 100000),
      .unit = "1/cm",
      .left_out = "4000",
@@ -164,14 +167,14 @@ const struct job_option option_rows_fit[] = {
                 "the fit; left out, that is a prior's mean, or 4000."},
     {.path = "fit.fit_density",
      .kind = OPTION_BOOL,
-     INTO(fit.fit_density),
+     INTO(fit, fit_density),
      .standard = "false",
      .meaning = "Volume models: fit the density too. Needs photographs with the lamp behind the cloth."},
     {.path = "fit.fit_radius",
      .kind = OPTION_BOOL,
      .id = OPTION_FIT_RADIUS,
      .or_section = true,
-     INTO(fit.fit_radius),
+     INTO(fit, fit_radius),
      .check = job_check_fit_radius,
      .standard = "false",
      .items = "lower_um and upper_um",
@@ -180,7 +183,7 @@ const struct job_option option_rows_fit[] = {
                 "the real one, each with 12 % of `path_budget` and at least 21,000 paths a fitted row."},
     {.path = "fit.fit_radius.lower_um",
      .kind = OPTION_NUMBER,
-     INTO(fit.radius_lower_um),
+     INTO(fit, radius_lower_um),
      RANGE(0.05, 1000),
      .unit = "um",
      .left_out = "half the cloth's own",
@@ -188,7 +191,7 @@ const struct job_option option_rows_fit[] = {
     {.path = "fit.fit_radius.upper_um",
      .kind = OPTION_NUMBER,
      .id = OPTION_FIT_RADIUS_UPPER,
-     INTO(fit.radius_upper_um),
+     INTO(fit, radius_upper_um),
      RANGE(0.05, 1000),
      .unit = "um",
      .left_out = "twice the cloth's own",
@@ -224,7 +227,7 @@ const struct job_option option_rows_fit[] = {
     {.path = "fit.starts",
      .kind = OPTION_COUNT,
      .id = OPTION_STARTS,
-     INTO(fit.model[0].option.n_start),
+     INTO(fit, model[0].option.n_start),
      RANGE(1, JOB_MAX_START),
      .standard = "1",
      .meaning =
@@ -238,25 +241,25 @@ const struct job_option option_rows_fit[] = {
      .meaning = "Faults of the photographs that are fitted with the parameters."},
     {.path = "fit.nuisance.gain",
      .kind = OPTION_CHOICE,
-     INTO(fit.model[0].option.gain),
+     INTO(fit, model[0].option.gain),
      .choice = gain,
      .meaning = "Exposure or lamp power is not known exactly: all photographs may be too bright or too dark by one "
                 "factor, or each by one of its own. The result lists the factors."},
     {.path = "fit.nuisance.gain_prior_rel",
      .kind = OPTION_NUMBER,
-     INTO(fit.model[0].option.gain_prior_rel),
+     INTO(fit, model[0].option.gain_prior_rel),
      RANGE(1e-4, 1),
      .standard = "0.05",
      .meaning = "How well the gain is known: standard deviation of its logarithm. Only with a `gain`."},
     {.path = "fit.nuisance.stray_light",
      .kind = OPTION_BOOL,
-     INTO(fit.model[0].option.stray_light),
+     INTO(fit, model[0].option.stray_light),
      .standard = "false",
      .meaning = "The same small radiance is added to every photograph (glare, room light). It is fitted and not "
                 "negative. Not together with `texture`."},
     {.path = "fit.nuisance.stray_light_prior",
      .kind = OPTION_NUMBER,
-     INTO(fit.model[0].option.stray_light_prior),
+     INTO(fit, model[0].option.stray_light_prior),
      RANGE(1e-6, 1),
      .unit = "radiance",
      .standard = "0.01",
@@ -270,7 +273,7 @@ const struct job_option option_rows_fit[] = {
     {.path = "fit.texture.block_mm",
      .kind = OPTION_NUMBER,
      .id = OPTION_TEXTURE_BLOCK,
-     INTO(fit.texture_block_mm),
+     INTO(fit, texture_block_mm),
      RANGE(1e-3, 1e3),
      .required = true,
      .unit = "mm",
@@ -280,7 +283,7 @@ const struct job_option option_rows_fit[] = {
          "and is what the result states."},
     {.path = "fit.texture.weight",
      .kind = OPTION_NUMBER,
-     INTO(fit.texture_weight),
+     INTO(fit, texture_weight),
      RANGE(0, 1e3),
      .standard = "1",
      .meaning =
@@ -289,7 +292,7 @@ const struct job_option option_rows_fit[] = {
     {.path = "fit.candidates",
      .kind = OPTION_LIST,
      .or_section = true,
-     LIST_INTO(fit.candidate, fit.n_candidate),
+     LIST_INTO(fit, candidate, n_candidate),
      .upper = JOB_MAX_CANDIDATE,
      .check = job_check_candidates,
      .left_out = "none",
@@ -298,13 +301,13 @@ const struct job_option option_rows_fit[] = {
      .meaning = "Photographs that could be taken. The result ranks them by how much they would narrow the parameters."},
     {.path = "fit.candidates.grid",
      .kind = OPTION_BOOL,
-     INTO(fit.candidate_grid),
+     INTO(fit, candidate_grid),
      .standard = "false",
      .meaning = "Instead of a list: 56 configurations of lamp, camera and cloth, 60 without the black sheet."},
     ANGLES("fit.candidates[]", struct job_candidate, .required = true),
     {.path = "fit.render_px",
      .kind = OPTION_COUNT,
-     INTO(results.render_px),
+     INTO(results, render_px),
      RANGE(8, 2048),
      .unit = "pixels",
      .left_out = "96; fewer, at least 48, where two samples of each pixel would take more than half of the paths of "
@@ -312,7 +315,7 @@ const struct job_option option_rows_fit[] = {
      .meaning = "Edge of the renderings in the result."},
     {.path = "fit.render_samples",
      .kind = OPTION_COUNT,
-     INTO(results.render_sample),
+     INTO(results, render_sample),
      RANGE(1, 65536),
      .unit = "per pixel",
      .left_out = "so many that all renderings together take half of the paths of the fit, 2 to 16",
@@ -325,7 +328,7 @@ const struct job_option option_rows_fit[] = {
 #define EXPORT(name, text)                                                                                             \
     {.path = "export." #name,                                                                                          \
      .kind = OPTION_BOOL,                                                                                              \
-     INTO(results.exported[EXPORT_##name]),                                                                            \
+     INTO(results, exported[EXPORT_##name]),                                                                           \
      .check = job_check_export,                                                                                        \
      .standard = "false",                                                                                              \
      .meaning = (text)},
@@ -333,7 +336,7 @@ const struct job_option option_rows_fit[] = {
 #undef EXPORT
     {.path = "export.pdf",
      .kind = OPTION_BOOL,
-     INTO(results.export_pdf),
+     INTO(results, export_pdf),
      .standard = "false",
      .meaning = "The report as PDF, too: `report.pdf`. Needs the program WeasyPrint on the machine of the service."},
     {.path = NULL},

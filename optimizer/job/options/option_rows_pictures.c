@@ -1,5 +1,6 @@
 /* Rows of the option table: pictures of the fitted cloth on a surface. */
 #include "base/catalogue/picture_method.h"
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/job/options/option_rows.h"
 
 #define OF_PICTURE(member) INTO_OF(struct job_surface_picture, member)
@@ -16,7 +17,7 @@ static const char method_meaning[] =
 const struct job_option option_rows_pictures[] = {
     {.path = "pictures",
      .kind = OPTION_LIST,
-     LIST_INTO(results.surface_picture, results.n_surface_picture),
+     LIST_INTO(results, surface_picture, n_surface_picture),
      .upper = JOB_MAX_SURFACE_PICTURE,
      .check = job_check_pictures,
      .left_out = "none",
@@ -198,13 +199,13 @@ const struct job_option option_rows_pictures[] = {
          "it is turned, bent and lit with the mouse (docs/bent-cloth.md)."},
     {.path = "twin.make",
      .kind = OPTION_BOOL,
-     INTO(results.twin),
+     INTO(results, twin),
      .check = job_check_twin,
      .standard = "false",
      .meaning = "Whether to make them. Needs `photographs`, `measurements` or `pictures`."},
     {.path = "twin.paths",
      .kind = OPTION_COUNT,
-     INTO(results.twin_paths),
+     INTO(results, twin_paths),
      RANGE(1000, 1e9),
      .standard = "1200000",
      .meaning =
@@ -212,7 +213,7 @@ const struct job_option option_rows_pictures[] = {
          "one processor, and four times as many halve the noise."},
     {.path = "twin.texels",
      .kind = OPTION_COUNT,
-     INTO(results.twin_texels),
+     INTO(results, twin_texels),
      RANGE(16, 65536),
      .standard = "4096",
      .meaning = "About so many places of the tile are told apart."},

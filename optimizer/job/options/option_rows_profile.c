@@ -1,9 +1,11 @@
 /* Rows of the option table: the profile of a single fiber, from a table or from photographs of a bowl. */
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_profile.h"
 #include "optimizer/job/options/option_rows.h"
 
 #define INTO_PICTURE(member) INTO_OF(struct job_bowl_photograph, picture.member)
-#define BOWL(member) INTO(profile.bowl.member)
-#define BOWL_NUMBERS(member) NUMBERS_INTO(profile.bowl.member)
+#define BOWL(member) INTO(profile, bowl.member)
+#define BOWL_NUMBERS(member) NUMBERS_INTO(profile, bowl.member)
 
 static const char *const job_bowl_channels[] = {"grey", "rgb", NULL};
 
@@ -20,21 +22,21 @@ const struct job_option option_rows_profile[] = {
     {.path = "profile.file",
      .kind = OPTION_FILE_NAME,
      .id = OPTION_PROFILE_FILE,
-     INTO(profile.file),
+     INTO(profile, file),
      .left_out = "this or `profile.bowl`",
      .allowed = "CSV, section 3",
      .meaning = "The table of a goniometer, with the columns `theta_o_deg`, `phi_deg` and `radiance`. Upload it with "
                 "the role `profile`."},
     {.path = "profile.theta_i_deg",
      .kind = OPTION_NUMBER,
-     INTO(profile.theta_i_deg),
+     INTO(profile, theta_i_deg),
      RANGE(-89.9, 89.9),
      .unit = "degrees",
      .left_out = "the column `theta_i_deg`, or that of each photograph",
      .meaning = "Angle of the light from the normal plane of the fiber, where all rows have the same."},
     {.path = "profile.scale",
      .kind = OPTION_NUMBER,
-     INTO(profile.scale),
+     INTO(profile, scale),
      RANGE(1e-12, 1e12),
      .left_out = "fitted",
      .meaning = "The value of the file that stands for a radiance of 1 where the irradiance across the light's "
@@ -83,7 +85,7 @@ const struct job_option option_rows_profile[] = {
      .kind = OPTION_LIST,
      .id = OPTION_BOWL_MARKS,
      .required = true,
-     LIST_INTO(profile.bowl.mark, profile.bowl.n_mark),
+     LIST_INTO(profile, bowl.mark, bowl.n_mark),
      .upper = JOB_MAX_BOWL_MARK,
      .items = "marks",
      .meaning = "Places on the bowl that are seen in the photographs, at least 4, such as marks on its rim and its "
@@ -158,7 +160,7 @@ const struct job_option option_rows_profile[] = {
     {.path = "profile.bowl.photographs",
      .kind = OPTION_LIST,
      .required = true,
-     LIST_INTO(profile.bowl.photograph, profile.bowl.n_photograph),
+     LIST_INTO(profile, bowl.photograph, bowl.n_photograph),
      .upper = JOB_MAX_BOWL_PHOTOGRAPH,
      .items = "photographs",
      .meaning = "Photographs of the bowl by one camera in one place, such as one for each side that the lamp shines "

@@ -2,6 +2,9 @@
 
 #include "base/option_id.h"
 #include "geometry/vision/vision_markers.h"
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/photographs/camera/plane_pose.h"
 #include "optimizer/photographs/reader/photograph.h"
 
@@ -206,14 +209,14 @@ static status apply_to(const struct marker_board *board, const struct lens *lens
 }
 
 status marker_views_apply(const struct marker_board *board, const struct lens *lens, const char *folder,
-                          struct job_document *doc, struct error *err)
+                          struct job_setup *setup, struct job_rows *rows, struct error *err)
 {
-    for (size_t i = 0; i < doc->rows.n_photograph; i++) {
-        struct job_photograph *p = &doc->rows.photograph[i];
+    for (size_t i = 0; i < rows->n_photograph; i++) {
+        struct job_photograph *p = &rows->photograph[i];
         bool no_camera = isnan(p->camera_theta_deg);
         status s = STATUS_OK;
         if (board->n > 0 && (no_camera || p->crop_px[2] == 0))
-            s = apply_to(board, lens, folder, doc->setup.crop_cm, p, err);
+            s = apply_to(board, lens, folder, setup->crop_cm, p, err);
         else if (no_camera)
             s = error_set(
                 err, STATUS_INVALID,

@@ -3,9 +3,12 @@
 #ifndef SELVEDGE_OPTIMIZER_MARKER_VIEWS_H
 #define SELVEDGE_OPTIMIZER_MARKER_VIEWS_H
 
-#include "optimizer/job/document/job_document.h"
 #include "optimizer/photographs/camera/lens.h"
 #include "optimizer/photographs/camera/marker_board.h"
+
+struct job_photograph;
+struct job_rows;
+struct job_setup;
 
 /* Where the camera of a picture was, and where the orbit center is in it. */
 struct marker_view {
@@ -30,6 +33,6 @@ status marker_view_apply(const struct marker_view *view, double crop_cm, size_t 
 /* Does both for every photograph of the document that leaves out its crop or its camera; files are in `folder`. Without
  * a board (n 0) a photograph whose camera is not given is an error. err->field is an option id. */
 status marker_views_apply(const struct marker_board *board, const struct lens *lens, const char *folder,
-                          struct job_document *doc, struct error *err);
+                          struct job_setup *setup, struct job_rows *rows, struct error *err);
 
 #endif

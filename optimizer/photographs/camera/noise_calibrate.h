@@ -10,7 +10,7 @@
 #define SELVEDGE_OPTIMIZER_NOISE_CALIBRATE_H
 
 #include "base/warning.h"
-#include "optimizer/job/document/job_document.h"
+#include "optimizer/job/document/picture_words.h"
 #include "optimizer/photographs/camera/noise_record.h"
 
 struct noise_frames {

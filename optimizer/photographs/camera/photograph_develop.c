@@ -2,6 +2,9 @@
 
 #include "base/angle.h"
 #include "base/option_id.h"
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/photographs/camera/color_matrix.h"
 #include "optimizer/photographs/camera/exposure_merge.h"
 #include "optimizer/photographs/camera/marker_views.h"
@@ -59,22 +62,22 @@ static status add_dark(struct photograph_process *k, const char *name, double ex
     return s;
 }
 
-static status load_dark(struct photograph_process *k, const struct job_document *doc, const char *folder,
-                        struct error *err)
+static status load_dark(struct photograph_process *k, const struct job_setup *setup, const struct job_rows *rows,
+                        const char *folder, struct error *err)
 {
-    if (doc->setup.n_dark_frame == 0) return STATUS_OK;
-    k->dark = calloc(doc->setup.n_dark_frame, sizeof *k->dark);
+    if (setup->n_dark_frame == 0) return STATUS_OK;
+    k->dark = calloc(setup->n_dark_frame, sizeof *k->dark);
     if (k->dark == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read dark frames: out of memory");
     const struct job_photograph plain =
-        photograph_plain(doc->rows.n_photograph > 0 ? doc->rows.photograph[0].transfer : JOB_TRANSFER_LINEAR);
+        photograph_plain(rows->n_photograph > 0 ? rows->photograph[0].transfer : JOB_TRANSFER_LINEAR);
     status s = STATUS_OK;
-    for (size_t i = 0; i < doc->setup.n_dark_frame && s == STATUS_OK; i++) {
+    for (size_t i = 0; i < setup->n_dark_frame && s == STATUS_OK; i++) {
         char path[PATH_BYTES];
         struct image im;
         struct photograph_record r;
-        snprintf(path, sizeof path, "%s/%s", folder, doc->setup.dark_frame[i]);
+        snprintf(path, sizeof path, "%s/%s", folder, setup->dark_frame[i]);
         s = photograph_read_values(path, &plain, &im, &r, err);
-        if (s == STATUS_OK) s = add_dark(k, doc->setup.dark_frame[i], r.info.exposure_s, &im, err);
+        if (s == STATUS_OK) s = add_dark(k, setup->dark_frame[i], r.info.exposure_s, &im, err);
     }
     for (size_t i = 0; i < k->n_dark && s == STATUS_OK; i++) {
         struct image *im = &k->dark[i].image;
@@ -310,23 +313,23 @@ static double saturation_of(const struct photograph_record *r)
     return r->info.full_scale != 1.0 ? 0.999999 / r->exposure : INFINITY;
 }
 
-static status load_chart(struct photograph_process *k, const struct job_document *doc, const char *folder,
+static status load_chart(struct photograph_process *k, const struct job_setup *setup, const char *folder,
                          struct error *err)
 {
     struct image im;
     struct photograph_record r;
-    status s = photograph_develop(k, folder, &doc->setup.chart, &im, &r, err);
+    status s = photograph_develop(k, folder, &setup->chart, &im, &r, err);
     if (s != STATUS_OK) return s;
-    memcpy(k->chart.corner_px, doc->setup.chart_corner_px, sizeof k->chart.corner_px);
-    k->chart.from_2014 = doc->setup.chart_from_2014;
+    memcpy(k->chart.corner_px, setup->chart_corner_px, sizeof k->chart.corner_px);
+    k->chart.from_2014 = setup->chart_from_2014;
     s = color_chart_find(&im, k->chart.corner_px, &k->chart.found_automatically, err);
     if (s == STATUS_NOT_FOUND)
         s = error_set(err, STATUS_INVALID, "no chart was found: give the corners of its patches ('corners_px')");
     if (s == STATUS_OK)
-        s = color_chart_measure(&k->chart, &im, saturation_of(&r), doc->setup.chart.light_theta_deg * RAD_PER_DEG, err);
+        s = color_chart_measure(&k->chart, &im, saturation_of(&r), setup->chart.light_theta_deg * RAD_PER_DEG, err);
     if (s == STATUS_OK) s = color_chart_picture(&k->chart, &im, &k->chart_picture, err);
     image_release(&im);
-    if (s != STATUS_OK) return error_prefix(err, s, "cannot use color chart '%s'", doc->setup.chart.file);
+    if (s != STATUS_OK) return error_prefix(err, s, "cannot use color chart '%s'", setup->chart.file);
     memcpy(k->matrix, k->chart.matrix, sizeof k->matrix);
     memcpy(k->matrix_cov, k->chart.matrix_cov, sizeof k->matrix_cov);
     k->color_info = r.info;
@@ -334,55 +337,55 @@ static status load_chart(struct photograph_process *k, const struct job_document
 }
 
 /* A factor for each channel. */
-static status load_white(struct photograph_process *k, const struct job_document *doc, const char *folder,
+static status load_white(struct photograph_process *k, const struct job_setup *setup, const char *folder,
                          struct error *err)
 {
     struct image im;
     struct photograph_mean mean = {0};
-    status s = photograph_develop(k, folder, &doc->setup.white, &im, &mean.record, err);
+    status s = photograph_develop(k, folder, &setup->white, &im, &mean.record, err);
     if (s != STATUS_OK) return s;
-    s = photograph_measure_image(&im, doc->setup.white.file, doc->setup.white.transfer, &mean, err);
+    s = photograph_measure_image(&im, setup->white.file, setup->white.transfer, &mean, err);
     image_release(&im);
-    double cos_theta = cos(doc->setup.white.light_theta_deg * RAD_PER_DEG);
+    double cos_theta = cos(setup->white.light_theta_deg * RAD_PER_DEG);
     for (size_t c = 0; c < 3 && s == STATUS_OK; c++) {
         if (!(mean.mean_rgb[c] > 0.0))
             return error_set(err, STATUS_INVALID, "cannot use white reference '%s': it is black in a channel",
-                             doc->setup.white.file);
-        k->matrix[4 * c] = doc->setup.white_reflectance[c] * cos_theta / mean.mean_rgb[c];
+                             setup->white.file);
+        k->matrix[4 * c] = setup->white_reflectance[c] * cos_theta / mean.mean_rgb[c];
         k->matrix_cov[c][4 * c] = pow(k->matrix[4 * c] * mean.se_rgb[c] / mean.mean_rgb[c], 2.0);
     }
     k->color_info = mean.record.info;
     return s;
 }
 
-static status load_color(struct photograph_process *k, const struct job_document *doc, const char *folder,
+static status load_color(struct photograph_process *k, const struct job_setup *setup, const char *folder,
                          struct error *err)
 {
-    if (!doc->setup.has_color) return STATUS_OK;
-    status s = doc->setup.has_chart ? load_chart(k, doc, folder, err) : load_white(k, doc, folder, err);
+    if (!setup->has_color) return STATUS_OK;
+    status s = setup->has_chart ? load_chart(k, setup, folder, err) : load_white(k, setup, folder, err);
     k->has_color = s == STATUS_OK;
     if (s != STATUS_OK && err != NULL)
-        snprintf(err->field, sizeof err->field, doc->setup.has_chart ? OPTION_COLOR_CHART : OPTION_COLOR_WHITE);
+        snprintf(err->field, sizeof err->field, setup->has_chart ? OPTION_COLOR_CHART : OPTION_COLOR_WHITE);
     return s;
 }
 
-status photograph_process_load(struct photograph_process *k, struct job_document *doc, const char *folder,
-                               struct error *err)
+status photograph_process_load(struct photograph_process *k, struct job_setup *setup, struct job_rows *rows,
+                               const char *folder, struct error *err)
 {
     char path[PATH_BYTES];
     status s = STATUS_OK;
-    if (doc->setup.rig_file[0] != '\0') {
-        snprintf(path, sizeof path, "%s/%s", folder, doc->setup.rig_file);
-        s = rig_apply(path, doc, &k->lens, &k->board, err);
-        if (s == STATUS_OK) s = marker_views_apply(&k->board, &k->lens, folder, doc, err);
+    if (setup->rig_file[0] != '\0') {
+        snprintf(path, sizeof path, "%s/%s", folder, setup->rig_file);
+        s = rig_apply(path, setup, rows, &k->lens, &k->board, err);
+        if (s == STATUS_OK) s = marker_views_apply(&k->board, &k->lens, folder, setup, rows, err);
     }
-    k->lamp_distance_cm = doc->setup.lamp_directional ? NAN : doc->setup.lamp_distance_cm;
-    if (s == STATUS_OK && doc->setup.noise_file[0] != '\0') {
-        snprintf(path, sizeof path, "%s/%s", folder, doc->setup.noise_file);
+    k->lamp_distance_cm = setup->lamp_directional ? NAN : setup->lamp_distance_cm;
+    if (s == STATUS_OK && setup->noise_file[0] != '\0') {
+        snprintf(path, sizeof path, "%s/%s", folder, setup->noise_file);
         s = noise_record_read(path, &k->noise, err);
         k->has_noise = s == STATUS_OK;
         if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, OPTION_CAMERA_NOISE);
     }
-    if (s == STATUS_OK) s = load_dark(k, doc, folder, err);
-    return s == STATUS_OK ? load_color(k, doc, folder, err) : s;
+    if (s == STATUS_OK) s = load_dark(k, setup, rows, folder, err);
+    return s == STATUS_OK ? load_color(k, setup, folder, err) : s;
 }

@@ -15,6 +15,10 @@
 #include "optimizer/photographs/camera/noise_record.h"
 #include "optimizer/photographs/reader/photograph.h"
 
+struct job_photograph;
+struct job_rows;
+struct job_setup;
+
 /* The mean of the dark frames of one exposure time (NaN: not stated). */
 struct dark_mean {
     double exposure_s;
@@ -43,8 +47,8 @@ void photograph_process_release(struct photograph_process *k);
 /* Reads the files of camera and rig that the document names; they are in `folder`. Gives photographs the angles of the
  * views that they name (rig.h), and crops and cameras by markers (marker_views.h). Errors have the option in
  * err->field. */
-status photograph_process_load(struct photograph_process *k, struct job_document *doc, const char *folder,
-                               struct error *err);
+status photograph_process_load(struct photograph_process *k, struct job_setup *setup, struct job_rows *rows,
+                               const char *folder, struct error *err);
 /* Develops a photograph of the job. record may be NULL. Errors as in photograph_read; STATUS_INVALID besides: exposures
  * of different sizes, ISO values or f-numbers, or of unknown time; no dark frame of the exposure time; a noise record
  * of another ISO value. */

@@ -3,6 +3,9 @@
 #include "base/files/durable.h"
 #include "base/option_id.h"
 #include "optimizer/job/checks/job_consistency.h"
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/job/document/json_field.h"
 
 #include <math.h>
@@ -62,10 +65,11 @@ static status text_of(const struct json_field *f, const char *key, char out[64],
 }
 
 /* Gives photograph i the view that it names. */
-static status apply_view(const struct json_field *rig, struct job_document *doc, size_t i, struct error *err)
+static status apply_view(const struct json_field *rig, struct job_setup *setup, struct job_rows *rows, size_t i,
+                         struct error *err)
 {
     static const char *const key[] = {"lamp", "camera", "cloth_rotation_deg", NULL};
-    struct job_photograph *p = &doc->rows.photograph[i];
+    struct job_photograph *p = &rows->photograph[i];
     struct json_field views, f, lamps, cameras;
     struct station lamp, camera = {NAN, NAN, NAN}; /* by markers: not known yet */
     char lamp_name[64], camera_name[64], field[64];
@@ -87,7 +91,7 @@ static status apply_view(const struct json_field *rig, struct job_document *doc,
     if (s == STATUS_OK) s = json_field_object(rig, "cameras", &cameras, &present, err);
     if (s == STATUS_OK && !by_markers) s = read_station(&cameras, camera_name, 89.999, &camera, err);
     if (s != STATUS_OK) return s;
-    if (lamp.theta_deg >= 90.0 && (doc->setup.black_sheet || lamp.theta_deg == 90.0))
+    if (lamp.theta_deg >= 90.0 && (setup->black_sheet || lamp.theta_deg == 90.0))
         return error_set(
             err, STATUS_INVALID,
             "'lamps.%s' is at %g degrees from the normal: allowed are 0 to below 90 (above 90, from behind, "
@@ -216,8 +220,8 @@ static status check_radians(const struct json_field *rig, struct error *err)
                      span.theta);
 }
 
-static status apply(const json_t *json, struct job_document *doc, struct lens *lens, struct marker_board *board,
-                    struct error *err)
+static status apply(const json_t *json, struct job_setup *setup, struct job_rows *rows, struct lens *lens,
+                    struct marker_board *board, struct error *err)
 {
     static const char *const key[] = {"selvedge_rig", "lamps", "cameras", "views", "lens", "markers", NULL};
     static const char *const lens_key[] = {"vignetting", "distortion", NULL};
@@ -234,13 +238,13 @@ static status apply(const json_t *json, struct job_document *doc, struct lens *l
     if (s == STATUS_OK && present) s = read_distortion(&f, lens, err);
     if (s == STATUS_OK) s = read_board(&rig, board, err);
     if (s == STATUS_OK) s = check_radians(&rig, err);
-    for (size_t i = 0; i < doc->rows.n_photograph && s == STATUS_OK; i++)
-        if (doc->rows.photograph[i].view[0] != '\0') s = apply_view(&rig, doc, i, err);
+    for (size_t i = 0; i < rows->n_photograph && s == STATUS_OK; i++)
+        if (rows->photograph[i].view[0] != '\0') s = apply_view(&rig, setup, rows, i, err);
     return s;
 }
 
-status rig_apply(const char *path, struct job_document *doc, struct lens *lens, struct marker_board *board,
-                 struct error *err)
+status rig_apply(const char *path, struct job_setup *setup, struct job_rows *rows, struct lens *lens,
+                 struct marker_board *board, struct error *err)
 {
     char *text = NULL;
     size_t n = 0;
@@ -255,7 +259,7 @@ status rig_apply(const char *path, struct job_document *doc, struct lens *lens, 
     if (json == NULL)
         return error_set_field(err, STATUS_FORMAT, OPTION_RIG, "cannot use rig '%s': it is not JSON: line %d: %s", name,
                                at.line, at.text);
-    s = apply(json, doc, lens, board, err);
+    s = apply(json, setup, rows, lens, board, err);
     json_decref(json);
     if (s == STATUS_OK) return STATUS_OK;
     if (err != NULL && strncmp(err->field, OPTION_PHOTOGRAPH_VIEW, strlen(OPTION_PHOTOGRAPH_VIEW)) != 0)

@@ -21,14 +21,16 @@
 #ifndef SELVEDGE_OPTIMIZER_RIG_H
 #define SELVEDGE_OPTIMIZER_RIG_H
 
-#include "optimizer/job/document/job_document.h"
 #include "optimizer/photographs/camera/lens.h"
 #include "optimizer/photographs/camera/marker_board.h"
+
+struct job_rows;
+struct job_setup;
 
 /* Reads the rig and gives every photograph of the document that names a view the angles and distances of the view.
  * STATUS_INVALID / STATUS_FORMAT with a text that names file and key; err->field is an option id where a photograph is
  * at fault (an unknown view, a lamp behind the cloth with a black sheet). */
-status rig_apply(const char *path, struct job_document *doc, struct lens *lens, struct marker_board *board,
-                 struct error *err);
+status rig_apply(const char *path, struct job_setup *setup, struct job_rows *rows, struct lens *lens,
+                 struct marker_board *board, struct error *err);
 
 #endif

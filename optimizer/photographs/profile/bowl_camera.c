@@ -1,6 +1,8 @@
 #include "optimizer/photographs/profile/bowl_camera.h"
 #include "base/option_id.h"
 #include "base/small_matrix.h"
+#include "optimizer/job/document/job_limits.h"
+#include "optimizer/job/document/job_profile.h"
 
 #include <math.h>
 #include <stdio.h>

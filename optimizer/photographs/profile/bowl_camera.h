@@ -7,8 +7,9 @@
 #ifndef SELVEDGE_OPTIMIZER_BOWL_CAMERA_H
 #define SELVEDGE_OPTIMIZER_BOWL_CAMERA_H
 
-#include "optimizer/job/document/job_document.h"
 #include "optimizer/photographs/camera/lens.h"
+
+struct job_bowl;
 
 struct bowl_camera {
     double position_mm[3], axis[3][3]; /* rows of A: to the right and down in the picture, and away from the camera */

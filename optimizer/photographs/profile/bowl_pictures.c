@@ -1,4 +1,6 @@
 #include "optimizer/photographs/profile/bowl_pictures.h"
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_profile.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -10,11 +12,12 @@ status bowl_pictures_name_field(size_t i, status s, struct error *err)
     return s;
 }
 
-status bowl_pictures_init(struct bowl_pictures *p, struct job_document *doc, const char *folder, struct error *err)
+status bowl_pictures_init(struct bowl_pictures *p, const struct job_bowl *bowl, struct job_setup *setup,
+                          struct job_rows *rows, const char *folder, struct error *err)
 {
-    *p = (struct bowl_pictures){.doc = doc, .folder = folder};
+    *p = (struct bowl_pictures){.bowl = bowl, .folder = folder};
     photograph_process_init(&p->process);
-    return photograph_process_load(&p->process, doc, folder, err);
+    return photograph_process_load(&p->process, setup, rows, folder, err);
 }
 
 void bowl_pictures_release(struct bowl_pictures *p)
@@ -53,13 +56,12 @@ static status same_size(const struct bowl_pictures *p, size_t i, const char *nam
 {
     if (im->width == p->width && im->height == p->height) return STATUS_OK;
     return bowl_pictures_error(i, err, "cannot use '%s' of the bowl: it has %zu x %zu pixels, and '%s' has %zu x %zu",
-                               name, im->width, im->height, p->doc->profile.bowl.photograph[0].picture.file, p->width,
-                               p->height);
+                               name, im->width, im->height, p->bowl->photograph[0].picture.file, p->width, p->height);
 }
 
 static status first_photograph(struct bowl_pictures *p, struct error *err)
 {
-    const struct job_bowl *b = &p->doc->profile.bowl;
+    const struct job_bowl *b = p->bowl;
     p->width = p->photograph.width;
     p->height = p->photograph.height;
     status s = bowl_camera_fit(b, &p->process.lens, p->width, p->height, &p->camera, err);
@@ -75,7 +77,7 @@ static status first_photograph(struct bowl_pictures *p, struct error *err)
 
 static status open_background(struct bowl_pictures *p, size_t i, struct error *err)
 {
-    const struct job_bowl_photograph *shot = &p->doc->profile.bowl.photograph[i];
+    const struct job_bowl_photograph *shot = &p->bowl->photograph[i];
     struct job_photograph picture = shot->picture;
     if (shot->background[0] == '\0') return STATUS_OK;
     memcpy(picture.file, shot->background, sizeof picture.file);
@@ -87,7 +89,7 @@ static status open_background(struct bowl_pictures *p, size_t i, struct error *e
 
 status bowl_pictures_open(struct bowl_pictures *p, size_t i, struct error *err)
 {
-    const struct job_photograph *picture = &p->doc->profile.bowl.photograph[i].picture;
+    const struct job_photograph *picture = &p->bowl->photograph[i].picture;
     struct photograph_record record;
     image_release(&p->background);
     memset(&p->background, 0, sizeof p->background);
@@ -102,7 +104,7 @@ bool bowl_pictures_place(const struct bowl_pictures *p, size_t k, struct bowl_pl
 {
     const double px[2] = {(double)(k % p->width) + 0.5, (double)(k / p->width) + 0.5};
     if (p->mask.pixel != NULL && p->mask.pixel[3 * k + 1] < 0.5f) return false;
-    return bowl_place_at(&p->doc->profile.bowl, &p->camera, px, place);
+    return bowl_place_at(p->bowl, &p->camera, px, place);
 }
 
 bool bowl_pictures_value(const struct bowl_pictures *p, size_t k, double value[3], double background[3])

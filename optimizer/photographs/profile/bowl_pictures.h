@@ -8,8 +8,12 @@
 #include "optimizer/photographs/profile/bowl_camera.h"
 #include "optimizer/photographs/profile/bowl_place.h"
 
+struct job_bowl;
+struct job_rows;
+struct job_setup;
+
 struct bowl_pictures {
-    const struct job_document *doc;
+    const struct job_bowl *bowl;
     const char *folder;
     struct photograph_process process;
     struct bowl_camera camera;
@@ -20,7 +24,8 @@ struct bowl_pictures {
 };
 
 /* Reads the properties of the camera: noise, dark frames, and the lens of the rig. Release after an error, too. */
-status bowl_pictures_init(struct bowl_pictures *p, struct job_document *doc, const char *folder, struct error *err);
+status bowl_pictures_init(struct bowl_pictures *p, const struct job_bowl *bowl, struct job_setup *setup,
+                          struct job_rows *rows, const char *folder, struct error *err);
 void bowl_pictures_release(struct bowl_pictures *p);
 /* Develops photograph i and its background; with the first one also the mask and the camera's place. */
 status bowl_pictures_open(struct bowl_pictures *p, size_t i, struct error *err);

@@ -1,5 +1,6 @@
 #include "optimizer/photographs/profile/bowl_place.h"
 #include "base/angle.h"
+#include "optimizer/job/document/job_profile.h"
 
 #include <math.h>
 

@@ -1,5 +1,7 @@
 #include "optimizer/photographs/profile/bowl_profile.h"
 #include "base/angle.h"
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_profile.h"
 #include "optimizer/photographs/profile/bowl_cells.h"
 #include "optimizer/photographs/profile/bowl_pictures.h"
 #include "optimizer/photographs/profile/bowl_place.h"
@@ -114,7 +116,7 @@ static status append_rows(struct view *v, const struct bowl_cells *cells, struct
 static status add_photograph(struct bowl_pictures *pictures, size_t i, struct fiber_profile *profile,
                              struct bowl_record *record, struct error *err)
 {
-    struct view v = {.bowl = &pictures->doc->profile.bowl, .pictures = pictures, .i = i};
+    struct view v = {.bowl = pictures->bowl, .pictures = pictures, .i = i};
     struct bowl_cells cells = {0};
     status s = bowl_pictures_open(pictures, i, err);
     if (s == STATUS_OK) s = measure_means(&v, err);
@@ -139,14 +141,14 @@ static void bound_errors(struct fiber_profile *profile)
             profile->row[i].se[c] = fmax(profile->row[i].se[c], least_se * most);
 }
 
-status bowl_profile_load(struct fiber_profile *profile, struct job_document *doc, const char *folder,
-                         struct bowl_record *record, struct error *err)
+status bowl_profile_load(struct fiber_profile *profile, const struct job_bowl *bowl, struct job_setup *setup,
+                         struct job_rows *rows, const char *folder, struct bowl_record *record, struct error *err)
 {
     struct bowl_pictures pictures;
-    *profile = (struct fiber_profile){.n_channel = doc->profile.bowl.is_rgb ? 3 : 1, .has_se = true};
-    if (record != NULL) *record = (struct bowl_record){.n_shot = doc->profile.bowl.n_photograph};
-    status s = bowl_pictures_init(&pictures, doc, folder, err);
-    for (size_t i = 0; i < doc->profile.bowl.n_photograph && s == STATUS_OK; i++)
+    *profile = (struct fiber_profile){.n_channel = bowl->is_rgb ? 3 : 1, .has_se = true};
+    if (record != NULL) *record = (struct bowl_record){.n_shot = bowl->n_photograph};
+    status s = bowl_pictures_init(&pictures, bowl, setup, rows, folder, err);
+    for (size_t i = 0; i < bowl->n_photograph && s == STATUS_OK; i++)
         s = add_photograph(&pictures, i, profile, record, err);
     if (record != NULL) record->camera = pictures.camera;
     bowl_pictures_release(&pictures);
@@ -187,11 +189,12 @@ static void draw(const struct bowl_pictures *p, float bright, struct image *out)
     }
 }
 
-status bowl_profile_picture(struct job_document *doc, const char *folder, struct image *picture, struct error *err)
+status bowl_profile_picture(const struct job_bowl *bowl, struct job_setup *setup, struct job_rows *rows,
+                            const char *folder, struct image *picture, struct error *err)
 {
     struct bowl_pictures p;
     *picture = (struct image){0};
-    status s = bowl_pictures_init(&p, doc, folder, err);
+    status s = bowl_pictures_init(&p, bowl, setup, rows, folder, err);
     if (s == STATUS_OK) s = bowl_pictures_open(&p, 0, err);
     if (s == STATUS_OK) s = image_init(picture, p.width, p.height, 3, err);
     if (s == STATUS_OK) {

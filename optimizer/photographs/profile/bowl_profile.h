@@ -12,8 +12,13 @@
 #ifndef SELVEDGE_OPTIMIZER_BOWL_PROFILE_H
 #define SELVEDGE_OPTIMIZER_BOWL_PROFILE_H
 
+#include "optimizer/job/document/job_limits.h"
 #include "optimizer/photographs/profile/bowl_camera.h"
 #include "optimizer/photographs/profile/fiber_profile.h"
+
+struct job_bowl;
+struct job_rows;
+struct job_setup;
 
 /* The record of one photograph. */
 struct bowl_shot {
@@ -32,10 +37,11 @@ struct bowl_record {
  * photograph_develop and bowl_camera_fit; STATUS_INVALID with the field of the photograph at fault for sizes that
  * differ, more than 2 % of the bowl saturated, a background as bright as the photograph, a picture that shows no bowl,
  * and cells without enough pixels; STATUS_TOO_LARGE for more than PROFILE_MAX_ROW cells. */
-status bowl_profile_load(struct fiber_profile *profile, struct job_document *doc, const char *folder,
-                         struct bowl_record *record, struct error *err);
+status bowl_profile_load(struct fiber_profile *profile, const struct job_bowl *bowl, struct job_setup *setup,
+                         struct job_rows *rows, const char *folder, struct bowl_record *record, struct error *err);
 /* A picture (width x height of the photograph) of photograph 0 with lines of theta_o and azimuth every 15 degrees, and
  * with pixels that do not count in red. The caller releases it. */
-status bowl_profile_picture(struct job_document *doc, const char *folder, struct image *picture, struct error *err);
+status bowl_profile_picture(const struct job_bowl *bowl, struct job_setup *setup, struct job_rows *rows,
+                            const char *folder, struct image *picture, struct error *err);
 
 #endif

@@ -3,6 +3,7 @@
 #include "base/files/durable.h"
 #include "base/option_id.h"
 #include "optimizer/job/checks/job_consistency.h"
+#include "optimizer/job/document/job_profile.h"
 #include "optimizer/photographs/rows/number_table.h"
 
 #include <math.h>
@@ -159,16 +160,16 @@ status fiber_profile_parse(struct fiber_profile *profile, const char *text, size
     return s;
 }
 
-status fiber_profile_load(struct fiber_profile *profile, const struct job_document *doc, const char *folder,
+status fiber_profile_load(struct fiber_profile *profile, const struct job_profile *asked, const char *folder,
                           struct error *err)
 {
     char path[4096], *text = NULL;
     size_t n = 0;
     *profile = (struct fiber_profile){0};
-    snprintf(path, sizeof path, "%s/%s", folder, doc->profile.file);
+    snprintf(path, sizeof path, "%s/%s", folder, asked->file);
     status s = file_read_all(path, MAX_TABLE_BYTES, &text, &n, err);
     if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, OPTION_PROFILE_FILE);
-    if (s == STATUS_OK) s = fiber_profile_parse(profile, text, n, doc->profile.file, doc->profile.theta_i_deg, err);
+    if (s == STATUS_OK) s = fiber_profile_parse(profile, text, n, asked->file, asked->theta_i_deg, err);
     free(text);
     return s;
 }

@@ -12,11 +12,12 @@
 #define SELVEDGE_OPTIMIZER_FIBER_PROFILE_H
 
 #include "base/status.h"
-#include "optimizer/job/document/job_document.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdio.h>
+
+struct job_profile;
 
 enum { PROFILE_MAX_ROW = 20000 };
 
@@ -40,7 +41,7 @@ struct fiber_profile {
 status fiber_profile_parse(struct fiber_profile *profile, const char *text, size_t n_bytes, const char *name,
                            double theta_i_deg, struct error *err);
 /* Reads the profile that a job document names from the folder of its files. Errors also of reading the file. */
-status fiber_profile_load(struct fiber_profile *profile, const struct job_document *doc, const char *folder,
+status fiber_profile_load(struct fiber_profile *profile, const struct job_profile *asked, const char *folder,
                           struct error *err);
 /* Writes the table, with the column theta_i_deg. */
 void fiber_profile_print(const struct fiber_profile *profile, FILE *out);

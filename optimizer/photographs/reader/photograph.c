@@ -1,6 +1,7 @@
 #include "optimizer/photographs/reader/photograph.h"
 
 #include "base/files/durable.h"
+#include "optimizer/job/document/job_photograph.h"
 
 #include <math.h>
 #include <stdio.h>

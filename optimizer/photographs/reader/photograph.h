@@ -12,8 +12,11 @@
 #ifndef SELVEDGE_OPTIMIZER_PHOTOGRAPH_H
 #define SELVEDGE_OPTIMIZER_PHOTOGRAPH_H
 
-#include "optimizer/job/document/job_document.h"
+#include "optimizer/job/document/job_limits.h"
+#include "optimizer/job/document/picture_words.h"
 #include "optimizer/photographs/reader/photograph_reader.h"
+
+struct job_photograph;
 
 /* The record of a file on its way to radiances. */
 struct photograph_record {

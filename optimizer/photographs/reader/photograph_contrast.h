@@ -13,7 +13,6 @@
 #ifndef SELVEDGE_OPTIMIZER_PHOTOGRAPH_CONTRAST_H
 #define SELVEDGE_OPTIMIZER_PHOTOGRAPH_CONTRAST_H
 
-#include "optimizer/job/document/job_document.h"
 #include "renderer/image/image.h"
 
 /* Measures a crop; name: the name of its file. STATUS_INVALID: fewer than 2 x 2 pixels in a part. STATUS_NO_MEMORY. */

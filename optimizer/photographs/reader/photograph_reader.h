@@ -7,7 +7,7 @@
 #ifndef SELVEDGE_OPTIMIZER_PHOTOGRAPH_READER_H
 #define SELVEDGE_OPTIMIZER_PHOTOGRAPH_READER_H
 
-#include "optimizer/job/document/job_document.h"
+#include "optimizer/job/document/picture_words.h"
 #include "renderer/image/image.h"
 
 #include <stdbool.h>

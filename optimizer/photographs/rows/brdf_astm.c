@@ -9,6 +9,7 @@
  * A file whose source has one azimuth counts as isotropic, another one as anisotropic, unless the job says which. */
 #include "base/angle.h"
 #include "base/files/durable.h"
+#include "optimizer/job/document/job_rows.h"
 #include "optimizer/photographs/rows/brdf_file.h"
 #include "optimizer/photographs/rows/brdf_samples.h"
 #include "optimizer/photographs/rows/brdf_spectrum.h"

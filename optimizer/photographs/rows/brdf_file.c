@@ -3,6 +3,7 @@
 #include "base/angle.h"
 #include "base/files/durable.h"
 #include "base/option_id.h"
+#include "optimizer/job/document/job_rows.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -90,34 +91,41 @@ static bool radiance(const brdf_reader *r, const void *handle, const struct conf
     return true;
 }
 
-static status add_row(const brdf_reader *r, const void *handle, const char *name, const struct job_document *doc,
-                      const struct job_measured_row *row, const struct warning_sink *warn, struct observation_set *o,
-                      struct error *err)
+/* An open file of a measured BRDF, and the receiver of its rows. */
+struct brdf_source {
+    const brdf_reader *reader;
+    const void *handle;
+    const char *name;
+    const struct job_setup *setup;
+    bool asked; /* the job names the configurations */
+    const struct warning_sink *warn;
+    struct observation_set *rows;
+};
+
+static status add_row(const struct brdf_source *s, const struct job_measured_row *row, struct error *err)
 {
     struct observation item = {.set = row->set, .weight = 1.0};
-    item.configuration = observation_configuration(&doc->setup, row->light_theta_deg, row->light_phi_deg,
+    item.configuration = observation_configuration(s->setup, row->light_theta_deg, row->light_phi_deg,
                                                    row->camera_theta_deg, row->camera_phi_deg, row->cloth_rotation_deg);
-    if (radiance(r, handle, &item.configuration, item.mean_rgb)) {
-        item.configuration.n_rotation = r->isotropic(handle) ? CONFIGURATION_ALL_ROTATIONS : 0;
-        if (r->isotropic(handle)) item.configuration.cloth_rotation_rad = 0.0;
+    if (radiance(s->reader, s->handle, &item.configuration, item.mean_rgb)) {
+        item.configuration.n_rotation = s->reader->isotropic(s->handle) ? CONFIGURATION_ALL_ROTATIONS : 0;
+        if (s->reader->isotropic(s->handle)) item.configuration.cloth_rotation_rad = 0.0;
         snprintf(item.name, sizeof item.name, "%s-%02zu", row->set == JOB_SET_FIT ? "fit" : "held-out",
-                 observation_set_count(o, row->set));
-        return observation_set_append(o, &item, err);
+                 observation_set_count(s->rows, row->set));
+        return observation_set_append(s->rows, &item, err);
     }
     char text[300];
     snprintf(text, sizeof text,
-             "measured BRDF '%s' has no value for the lamp at (%g, %g) and the camera at (%g, %g) degrees", name,
+             "measured BRDF '%s' has no value for the lamp at (%g, %g) and the camera at (%g, %g) degrees", s->name,
              row->light_theta_deg, row->light_phi_deg, row->camera_theta_deg, row->camera_phi_deg);
-    if (row->set == JOB_SET_FIT && doc->rows.n_measured_row > 0)
+    if (row->set == JOB_SET_FIT && s->asked)
         return error_set_field(err, STATUS_INVALID, OPTION_MEASUREMENT_FILE, "%s", text);
-    warning_send(warn, OPTION_MEASUREMENT_FILE, "%s: the %s row is left out", text,
+    warning_send(s->warn, OPTION_MEASUREMENT_FILE, "%s: the %s row is left out", text,
                  row->set == JOB_SET_FIT ? "fitted" : "held-out");
     return STATUS_OK;
 }
 
-static status add_default_rows(const brdf_reader *r, const void *handle, const char *name,
-                               const struct job_document *doc, const struct warning_sink *warn,
-                               struct observation_set *o, struct error *err)
+static status add_default_rows(const struct brdf_source *source, struct error *err)
 {
     status s = STATUS_OK;
     for (size_t i = 0; i < BRDF_FIT_ROWS && s == STATUS_OK; i++) {
@@ -126,7 +134,7 @@ static status add_default_rows(const brdf_reader *r, const void *handle, const c
                                              .camera_theta_deg = fit_deg[i][1],
                                              .camera_phi_deg = fit_deg[i][2],
                                              .cloth_rotation_deg = i % 2 == 0 ? 0.0 : 90.0};
-        s = add_row(r, handle, name, doc, &row, warn, o, err);
+        s = add_row(source, &row, err);
     }
     for (size_t i = 0; i < BRDF_HELD_OUT_ROWS && s == STATUS_OK; i++) {
         const struct job_measured_row row = {.set = JOB_SET_HELD_OUT,
@@ -134,47 +142,45 @@ static status add_default_rows(const brdf_reader *r, const void *handle, const c
                                              .camera_theta_deg = held_camera_deg[i / 2 % 3],
                                              .camera_phi_deg = held_phi_deg[i % 2],
                                              .cloth_rotation_deg = i % 4 < 2 ? 0.0 : 90.0};
-        s = add_row(r, handle, name, doc, &row, warn, o, err);
+        s = add_row(source, &row, err);
     }
     return s;
 }
 
-static status add_measured_rows(const brdf_reader *r, const void *handle, const char *name,
-                                const struct job_document *doc, const struct warning_sink *warn,
-                                struct observation_set *o, struct error *err)
+static status add_measured_rows(const struct brdf_source *source, struct error *err)
 {
     status s = STATUS_OK;
     struct job_measured_row row = {.set = JOB_SET_FIT};
-    for (size_t i = 0; s == STATUS_OK && r->measured(handle, i, &row); i++) {
+    for (size_t i = 0; s == STATUS_OK && source->reader->measured(source->handle, i, &row); i++) {
         row.set = i % 5 == 0 || i % 5 == 2 ? JOB_SET_FIT : JOB_SET_HELD_OUT;
-        s = add_row(r, handle, name, doc, &row, warn, o, err);
+        s = add_row(source, &row, err);
     }
     return s;
 }
 
-static status add_rows(const brdf_reader *r, const void *handle, const char *name, const struct job_document *doc,
-                       const struct warning_sink *warn, struct observation_set *o, struct error *err)
+static status add_rows(const struct brdf_source *source, const struct job_rows *asked, struct error *err)
 {
     status s = STATUS_OK;
-    if (doc->rows.n_measured_row == 0 && r->measured != NULL)
-        return add_measured_rows(r, handle, name, doc, warn, o, err);
-    if (doc->rows.n_measured_row == 0) return add_default_rows(r, handle, name, doc, warn, o, err);
-    for (size_t i = 0; i < doc->rows.n_measured_row && s == STATUS_OK; i++)
-        s = add_row(r, handle, name, doc, &doc->rows.measured_row[i], warn, o, err);
+    if (asked->n_measured_row == 0 && source->reader->measured != NULL) return add_measured_rows(source, err);
+    if (asked->n_measured_row == 0) return add_default_rows(source, err);
+    for (size_t i = 0; i < asked->n_measured_row && s == STATUS_OK; i++)
+        s = add_row(source, &asked->measured_row[i], err);
     return s;
 }
 
-status brdf_file_read(const brdf_reader *r, const char *path, const struct job_document *doc,
-                      const struct warning_sink *warn, struct observation_set *o, struct error *err)
+status brdf_file_read(const brdf_reader *r, const char *path, const struct job_setup *setup,
+                      const struct job_rows *rows, const struct warning_sink *warn, struct observation_set *o,
+                      struct error *err)
 {
     void *handle = NULL;
     const char *name = path_file_name(path);
-    status s = r->open(path, doc->rows.measurement_symmetry, &handle, err);
+    status s = r->open(path, rows->measurement_symmetry, &handle, err);
     if (s != STATUS_OK) {
         if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_MEASUREMENT_FILE);
         return s;
     }
-    s = add_rows(r, handle, name, doc, warn, o, err);
+    const struct brdf_source source = {r, handle, name, setup, rows->n_measured_row > 0, warn, o};
+    s = add_rows(&source, rows, err);
     r->close(handle);
     if (s == STATUS_OK && observation_set_count(o, JOB_SET_FIT) == 0)
         return error_set_field(err, STATUS_INVALID, OPTION_MEASUREMENT_FILE,

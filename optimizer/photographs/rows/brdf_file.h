@@ -12,9 +12,13 @@
 #define SELVEDGE_OPTIMIZER_BRDF_FILE_H
 
 #include "base/warning.h"
+#include "optimizer/job/document/picture_words.h"
 #include "optimizer/photographs/rows/observation.h"
 
 #include <stdbool.h>
+
+struct job_measured_row;
+struct job_rows;
 
 enum { BRDF_FIT_ROWS = 16, BRDF_HELD_OUT_ROWS = 24 };
 
@@ -42,7 +46,8 @@ const brdf_reader *brdf_reader_of_name(const char *name);
 /* Appends the rows. A held-out row where nothing was measured is left out with a warning, and so is a fitted one of the
  * default; a fitted one of the document is STATUS_INVALID, as is a file without any fitted row. err->field is
  * OPTION_MEASUREMENT_FILE. */
-status brdf_file_read(const brdf_reader *reader, const char *path, const struct job_document *doc,
-                      const struct warning_sink *warn, struct observation_set *o, struct error *err);
+status brdf_file_read(const brdf_reader *reader, const char *path, const struct job_setup *setup,
+                      const struct job_rows *rows, const struct warning_sink *warn, struct observation_set *o,
+                      struct error *err);
 
 #endif

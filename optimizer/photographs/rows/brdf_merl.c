@@ -4,6 +4,7 @@
  * 1.15 and 1.66 over 1500. Negative values mean that nothing was measured. Values between samples are interpolated
  * linearly in sqrt(theta_h), theta_d and phi_d; where a neighbour is missing, the nearest sample counts. Isotropic. */
 #include "base/files/durable.h"
+#include "optimizer/job/document/job_rows.h"
 #include "optimizer/photographs/rows/brdf_file.h"
 
 #include <math.h>

@@ -9,6 +9,7 @@
  * One or two phi_i: isotropic. Azimuths of the light over half or a quarter of a turn, from -pi: the BRDF is symmetric
  * to a turn by pi, or also to both axes. */
 #include "base/files/durable.h"
+#include "optimizer/job/document/job_rows.h"
 #include "optimizer/photographs/rows/brdf_file.h"
 #include "optimizer/photographs/rows/brdf_spectrum.h"
 #include "optimizer/photographs/rows/brdf_warp.h"

@@ -1,6 +1,7 @@
 #include "optimizer/photographs/rows/measurement_table.h"
 #include "base/option_id.h"
 #include "optimizer/job/document/job_file_name.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/photographs/rows/number_table.h"
 
 #include <math.h>
@@ -48,7 +49,7 @@ static const char *const column_name[COLUMN_COUNT + 1] = {"set",
                                                           NULL};
 
 struct table {
-    const struct job_document *doc;
+    const struct job_setup *setup;
     struct observation_set *rows;
     /* of the rows so far, fitted and held-out ones, which are traced together in the validation */
     size_t n_configuration;
@@ -114,7 +115,7 @@ static status read_row(void *context, struct number_table *t, struct error *err)
                                   t->line, set);
     double light_theta, light_phi, camera_theta, camera_phi, rotation;
     uint32_t n_rotation;
-    status s = cell_polar(t, COLUMN_LIGHT_THETA, !rows->doc->setup.black_sheet, &light_theta, err);
+    status s = cell_polar(t, COLUMN_LIGHT_THETA, !rows->setup->black_sheet, &light_theta, err);
     if (s == STATUS_OK) s = number_table_angle(t, COLUMN_LIGHT_PHI, -360.0, 360.0, &light_phi, err);
     if (s == STATUS_OK) s = cell_polar(t, COLUMN_CAMERA_THETA, false, &camera_theta, err);
     if (s == STATUS_OK) s = number_table_angle(t, COLUMN_CAMERA_PHI, -360.0, 360.0, &camera_phi, err);
@@ -127,18 +128,18 @@ static status read_row(void *context, struct number_table *t, struct error *err)
     if (s == STATUS_OK) s = number_table_not_negative(t, COLUMN_WEIGHT, 1.0, 1e6, &item.weight, err);
     if (s != STATUS_OK) return s;
     item.configuration =
-        observation_configuration(&rows->doc->setup, light_theta, light_phi, camera_theta, camera_phi, rotation);
+        observation_configuration(rows->setup, light_theta, light_phi, camera_theta, camera_phi, rotation);
     item.configuration.n_rotation = n_rotation;
     row_name(t, o, &item);
     return observation_set_append(o, &item, err);
 }
 
-status measurement_table_parse(const char *text, size_t n_bytes, const char *name, const struct job_document *doc,
+status measurement_table_parse(const char *text, size_t n_bytes, const char *name, const struct job_setup *setup,
                                struct observation_set *o, struct error *err)
 {
     struct number_table t = {
         .file = name, .option = OPTION_MEASUREMENT_FILE, .column_name = column_name, .n_required = COLUMN_N_REQUIRED};
-    struct table rows = {.doc = doc, .rows = o};
+    struct table rows = {.setup = setup, .rows = o};
     status s = number_table_read(&t, text, n_bytes, NULL, read_row, &rows, err);
     if (s == STATUS_OK && observation_set_count(o, JOB_SET_FIT) == 0)
         s = error_set_field(err, STATUS_INVALID, OPTION_MEASUREMENT_FILE,

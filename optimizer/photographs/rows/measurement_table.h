@@ -18,7 +18,7 @@
 #include "optimizer/photographs/rows/observation.h"
 
 /* text: the file's content (NUL-terminated, n_bytes without the NUL); name: the file's name in errors. */
-status measurement_table_parse(const char *text, size_t n_bytes, const char *name, const struct job_document *doc,
+status measurement_table_parse(const char *text, size_t n_bytes, const char *name, const struct job_setup *setup,
                                struct observation_set *o, struct error *err);
 
 #endif

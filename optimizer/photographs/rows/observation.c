@@ -1,5 +1,6 @@
 #include "optimizer/photographs/rows/observation.h"
 #include "base/angle.h"
+#include "optimizer/job/document/job_setup.h"
 
 #include <math.h>
 #include <stdlib.h>

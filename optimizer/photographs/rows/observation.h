@@ -10,6 +10,8 @@
 
 #include <stdbool.h>
 
+struct job_setup;
+
 struct observation {
     char name[JOB_MAX_NAME_BYTES]; /* file name of the photograph, or "fit-03" for a row of a table */
     enum job_set set;

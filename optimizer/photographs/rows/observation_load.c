@@ -1,6 +1,10 @@
 #include "optimizer/photographs/rows/observation_load.h"
 #include "base/files/durable.h"
 #include "base/option_id.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "optimizer/photographs/reader/photograph_contrast.h"
 #include "optimizer/photographs/rows/brdf_file.h"
@@ -15,41 +19,41 @@
 
 enum { MAX_TABLE_BYTES = 16 << 20 };
 
-static status load_table(const struct job_document *doc, const char *folder, const struct warning_sink *warn,
-                         struct observation_set *o, struct error *err)
+static status load_table(const struct job_setup *setup, const struct job_rows *rows, const char *folder,
+                         const struct warning_sink *warn, struct observation_set *o, struct error *err)
 {
     char path[4096];
     char *text = NULL;
     size_t n = 0;
-    const brdf_reader *reader = brdf_reader_of_name(doc->rows.measurement_file);
-    snprintf(path, sizeof path, "%s/%s", folder, doc->rows.measurement_file);
-    if (reader != NULL) return brdf_file_read(reader, path, doc, warn, o, err);
-    if (doc->rows.n_measured_row > 0 || doc->rows.measurement_symmetry != JOB_SYMMETRY_FILE)
+    const brdf_reader *reader = brdf_reader_of_name(rows->measurement_file);
+    snprintf(path, sizeof path, "%s/%s", folder, rows->measurement_file);
+    if (reader != NULL) return brdf_file_read(reader, path, setup, rows, warn, o, err);
+    if (rows->n_measured_row > 0 || rows->measurement_symmetry != JOB_SYMMETRY_FILE)
         return error_set_field(
             err, STATUS_INVALID, OPTION_MEASURED_ROWS,
             "configurations and symmetry are those of a measured BRDF, but '%s' is a table: its rows "
             "say which",
-            doc->rows.measurement_file);
+            rows->measurement_file);
     status s = file_read_all(path, MAX_TABLE_BYTES, &text, &n, err);
     if (s != STATUS_OK) {
         if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_MEASUREMENT_FILE);
         return s;
     }
-    s = measurement_table_parse(text, n, doc->rows.measurement_file, doc, o, err);
+    s = measurement_table_parse(text, n, rows->measurement_file, setup, o, err);
     free(text);
     return s;
 }
 
-static status measure_texture(const struct job_document *doc, const struct image *im, struct observation *item,
-                              const struct warning_sink *warn, struct error *err)
+static status measure_texture(const struct job_setup *setup, const struct job_fit *fit, const struct image *im,
+                              struct observation *item, const struct warning_sink *warn, struct error *err)
 {
-    item->n_cell = job_texture_cells(doc->setup.crop_cm, doc->fit.texture_block_mm);
+    item->n_cell = job_texture_cells(setup->crop_cm, fit->texture_block_mm);
     status s = photograph_contrast(im, item->name, item->n_cell, item->contrast_rgb, item->contrast_se_rgb, err);
     if (s != STATUS_OK) {
         if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_TEXTURE_BLOCK);
         return s;
     }
-    if (!observation_contrast_known(item) && doc->fit.texture_weight > 0.0)
+    if (!observation_contrast_known(item) && fit->texture_weight > 0.0)
         warning_send(
             warn, OPTION_NONE,
             "photograph '%s' is black in one of its channels, so its texture is not compared with the rendering's",
@@ -57,16 +61,23 @@ static status measure_texture(const struct job_document *doc, const struct image
     return STATUS_OK;
 }
 
-static status load_photograph(const struct job_document *doc, size_t i, const char *folder,
-                              const struct photograph_process *process, const struct warning_sink *warn,
+/* Shared by all photographs of a job. */
+struct series {
+    const struct job_setup *setup;
+    const struct job_fit *fit;
+    const char *folder;
+    const struct photograph_process *process;
+    const struct warning_sink *warn;
+};
+
+static status load_photograph(const struct series *all, const struct job_photograph *p, size_t i,
                               struct observation_set *o, struct error *err)
 {
-    const struct job_photograph *p = &doc->rows.photograph[i];
     struct photograph_mean mean = {0};
     struct observation item = {.set = p->set, .weight = p->weight};
     struct image im;
     snprintf(item.name, sizeof item.name, "%s", p->file);
-    status s = photograph_develop(process, folder, p, &im, &mean.record, err);
+    status s = photograph_develop(all->process, all->folder, p, &im, &mean.record, err);
     if (s == STATUS_OK) {
         s = photograph_measure_image(&im, p->file, p->transfer, &mean, err);
         if (s != STATUS_OK) image_release(&im);
@@ -75,14 +86,14 @@ static status load_photograph(const struct job_document *doc, size_t i, const ch
         if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_PHOTOGRAPH_FILE "[%zu]", i);
         return s;
     }
-    if (mean.warning[0] != '\0') warning_send(warn, OPTION_NONE, "%s", mean.warning);
-    if (doc->fit.texture_block_mm > 0.0) s = measure_texture(doc, &im, &item, warn, err);
+    if (mean.warning[0] != '\0') warning_send(all->warn, OPTION_NONE, "%s", mean.warning);
+    if (all->fit->texture_block_mm > 0.0) s = measure_texture(all->setup, all->fit, &im, &item, all->warn, err);
     image_release(&im);
     if (s != STATUS_OK) return s;
     item.photograph = mean.record;
     memcpy(item.mean_rgb, mean.mean_rgb, sizeof item.mean_rgb);
     memcpy(item.se_rgb, mean.se_rgb, sizeof item.se_rgb);
-    item.configuration = observation_configuration(&doc->setup, p->light_theta_deg, p->light_phi_deg,
+    item.configuration = observation_configuration(all->setup, p->light_theta_deg, p->light_phi_deg,
                                                    p->camera_theta_deg, p->camera_phi_deg, p->cloth_rotation_deg);
     if (p->light_distance_cm > 0.0) item.configuration.light_distance_m = 0.01 * p->light_distance_cm;
     if (p->camera_distance_cm > 0.0) item.configuration.camera_distance_m = 0.01 * p->camera_distance_cm;
@@ -140,16 +151,17 @@ static void warn_less_trustworthy(const struct observation_set *o, size_t first,
                      n, o->n - first, o->item[which].name, n > 1 ? " and others" : "");
 }
 
-status observation_set_load(const struct job_document *doc, const char *folder,
-                            const struct photograph_process *process, const struct warning_sink *warn,
-                            struct observation_set *o, struct error *err)
+status observation_set_load(const struct job_setup *setup, const struct job_rows *rows, const struct job_fit *fit,
+                            const char *folder, const struct photograph_process *process,
+                            const struct warning_sink *warn, struct observation_set *o, struct error *err)
 {
     const struct photograph_process nothing = {0};
     if (process == NULL) process = &nothing;
-    if (doc->rows.measurement_file[0] != '\0') return load_table(doc, folder, warn, o, err);
+    if (rows->measurement_file[0] != '\0') return load_table(setup, rows, folder, warn, o, err);
+    const struct series all = {setup, fit, folder, process, warn};
     size_t first = o->n;
-    for (size_t i = 0; i < doc->rows.n_photograph; i++) {
-        status s = load_photograph(doc, i, folder, process, warn, o, err);
+    for (size_t i = 0; i < rows->n_photograph; i++) {
+        status s = load_photograph(&all, &rows->photograph[i], i, o, err);
         if (s != STATUS_OK) return s;
     }
     warn_less_trustworthy(o, first, warn);

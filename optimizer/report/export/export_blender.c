@@ -6,6 +6,7 @@
  * fibers-<group>.txt has the vertices of each fiber with its radius, scene.json the data for the script, which makes
  * hair curves with two Principled Hair BSDFs mixed (hair_fit.h; Cycles), instances, black sheet, camera and lamp.
  * Millimetres. */
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/report/export/export_scene.h"
 

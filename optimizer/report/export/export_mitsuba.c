@@ -3,6 +3,8 @@
  * fibers-<group>.txt the fibers of one group. Of a scanned cloth also density.vol, direction.vol and sggx.vol with
  * float32 samples, as Mitsuba's gridvolume reads them. */
 #include "geometry/volume/format/vol_file.h"
+#include "optimizer/job/document/job_results.h"
+#include "optimizer/job/document/job_scan.h"
 #include "optimizer/report/export/export_scene.h"
 
 #include <math.h>

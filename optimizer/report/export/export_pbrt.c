@@ -4,6 +4,7 @@
  *
  * pbrt scales a light given as RGB so that its value is the value of the picture with the film's standard sensor. A
  * lamp with alpha 0 lights the cloth but is not seen. Pictures of pbrt are left-handed, therefore the Scale. */
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/report/export/export_scene.h"
 
 #include <stddef.h>

@@ -1,5 +1,7 @@
 #include "optimizer/report/export/export_scene.h"
 
+#include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/result/result_json.h"

@@ -1,6 +1,8 @@
 #include "optimizer/report/export/exports.h"
 
 #include "base/files/durable.h"
+#include "optimizer/job/document/job_results.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/export/export_scene.h"
 #include "optimizer/stages/validation/pipeline_choice.h"

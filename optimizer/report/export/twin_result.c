@@ -1,6 +1,8 @@
 #include "optimizer/report/export/twin_result.h"
 
 #include "base/files/durable.h"
+#include "optimizer/job/document/job_results.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
@@ -93,7 +95,7 @@ status twin_result_write(struct report *report, double from, double to, struct e
                                               .light_edge = two ? LIGHT_EDGE_OF_TWO : LIGHT_EDGE,
                                               .n_basis = BASIS,
                                               .n_path = report->in.results->twin_paths,
-                                              .seed = report->in.job->fit->seed ^ 0x7477696eu};
+                                              .seed = report->in.job->seed ^ 0x7477696eu};
     const struct radiance_input in = {.scene = made_cloth_scene(report->in.made, m->setup),
                                       .model = &m->setup->appearance,
                                       .param = m->fit->result.param,

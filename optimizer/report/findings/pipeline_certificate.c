@@ -48,7 +48,7 @@ static status certify(struct report *report, size_t i_model, const struct config
                                                .weight = weight,
                                                .n_configuration = report->in.job->rows->fitted.n,
                                                .n_path = N_PATH,
-                                               .seed = report->in.job->fit->seed,
+                                               .seed = report->in.job->seed,
                                                .replica = REPLICA_CERTIFICATE};
     status s = derivative_check_run(&q, &progress, &report->advice[i_model].certificate, err);
     if (s != STATUS_OK) return s;

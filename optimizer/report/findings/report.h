@@ -5,14 +5,17 @@
 
 #include "optimizer/fit/baseline/plain_brdf.h"
 #include "optimizer/fit/linear/next_photograph.h"
-#include "optimizer/job/document/job_results.h"
-#include "optimizer/job/document/job_rows.h"
-#include "optimizer/job/job_outline.h"
+#include "optimizer/job/document/job_kind.h"
 #include "optimizer/report/findings/pdf_helper.h"
 #include "optimizer/report/findings/verdict.h"
 #include "optimizer/stages/fit_stages.h"
 #include "optimizer/stages/geometry_stages.h"
 #include "renderer/transport/derivative_check.h"
+
+struct job_outline;
+struct job_profile;
+struct job_results;
+struct job_rows;
 
 /* Nothing is owned. */
 struct report_input {

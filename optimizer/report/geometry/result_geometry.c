@@ -1,5 +1,7 @@
 #include "optimizer/report/geometry/result_geometry.h"
 #include "base/angle.h"
+#include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/report/geometry/result_cloth.h"
 #include "optimizer/report/geometry/section_report.h"

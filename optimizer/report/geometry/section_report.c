@@ -1,6 +1,7 @@
 #include "optimizer/report/geometry/section_report.h"
 #include "base/angle.h"
 #include "geometry/fibers/shape/section_summary.h"
+#include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/document/json_number.h"
 
 #include <math.h>

@@ -1,4 +1,5 @@
 #include "optimizer/report/result/photograph_json.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/photographs/camera/color_matrix.h"
 

@@ -1,5 +1,7 @@
 #include "optimizer/report/result/profile_report.h"
 #include "base/angle.h"
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_profile.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/result/result_json.h"
@@ -89,7 +91,7 @@ status profile_json_write(struct report *report, struct error *err)
     json_t *json =
         json_pack("{s:i, s:s, s:s, s:n, s:o, s:[], s:[], s:I, s:o}", "format", 1, "sample", report->in.sample, "model",
                   m->setup->appearance.id, "method", "parameters", result_parameters_json(m), "rows", "models", "seed",
-                  (json_int_t)report->in.job->fit->seed, "profile", profile_json(report));
+                  (json_int_t)report->in.job->seed, "profile", profile_json(report));
     return result_json_finish(report, json, err);
 }
 

@@ -1,5 +1,7 @@
 #include "optimizer/report/result/result_json.h"
 #include "base/angle.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_rows.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/stage_table.h"
@@ -333,7 +335,7 @@ static json_t *result_json(struct report *report, picture_name *picture)
     for (size_t i = 0; i < report->n_model; i++) json_array_append_new(models, model_json(report, i));
     json_t *json = json_pack("{s:i, s:s, s:s, s:s, s:I}", "format", 1, "sample", report->in.sample, "model",
                              best->setup->appearance.id, "method", report->in.job->fit->method, "seed",
-                             (json_int_t)report->in.job->fit->seed);
+                             (json_int_t)report->in.job->seed);
     json_object_set_new(json, "chosen_by",
                         json_string(pipeline_choice_id(pipeline_choice(report->model, report->n_model))));
     put_fit(json, report, best);
@@ -380,7 +382,7 @@ status result_pictures_json_write(struct report *report, struct error *err)
     const struct pipeline_model *m = report->model;
     json_t *json = json_pack("{s:i, s:s, s:s, s:n, s:o, s:[], s:[], s:I}", "format", 1, "sample", report->in.sample,
                              "model", m->setup->appearance.id, "method", "parameters", result_parameters_json(m),
-                             "rows", "models", "seed", (json_int_t)report->in.job->fit->seed);
+                             "rows", "models", "seed", (json_int_t)report->in.job->seed);
     json_object_set(json, "pictures", report->surface_pictures);
     return result_json_finish(report, json, err);
 }

@@ -1,4 +1,7 @@
 #include "optimizer/report/result/result_options_json.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_fit_option.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/job/document/json_number.h"
 
 #include "optimizer/report/findings/pipeline_advice.h"

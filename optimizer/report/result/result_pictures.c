@@ -1,6 +1,10 @@
 #include "optimizer/report/result/result_pictures.h"
 #include "base/files/durable.h"
 #include "geometry/volume/format/vol_file.h"
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_results.h"
+#include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "optimizer/report/geometry/scan_slices.h"
@@ -187,7 +191,7 @@ static status write_rendering(struct report *report, size_t i, const char *name,
                                      .n_sample =
                                          result_picture_samples(report->in.results, report->in.job->rows->observation.n,
                                                                 (double)m->fit->result.n_path),
-                                     .seed = report->in.job->fit->seed ^ 0x70696374757265u,
+                                     .seed = report->in.job->seed ^ 0x70696374757265u,
                                      .stream = (uint32_t)i};
     status s = render_run(&q, report->in.job->tools->pool, progress, &im, err);
     if (s != STATUS_OK) return s;

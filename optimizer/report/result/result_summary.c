@@ -1,5 +1,9 @@
 /* results/summary.txt: the result on one page, for people. */
 #include "base/angle.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_fit_option.h"
+#include "optimizer/job/document/job_results.h"
+#include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/result/profile_report.h"
 #include "optimizer/report/result/result_json.h"

@@ -3,6 +3,8 @@
 #include "base/option_id.h"
 #include "geometry/mesh/mesh_drape.h"
 #include "geometry/mesh/mesh_shapes.h"
+#include "optimizer/job/document/job_results.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/job/job_folder.h"
 #include "renderer/diffusion/diffusion_tables.h"
 #include "renderer/transport/volume/volume_bent.h"

@@ -2,8 +2,10 @@
 #ifndef SELVEDGE_OPTIMIZER_SURFACE_CLOTH_H
 #define SELVEDGE_OPTIMIZER_SURFACE_CLOTH_H
 
-#include "optimizer/job/document/job_results.h"
 #include "optimizer/stages/made_cloth.h"
+
+struct job_results;
+struct job_setup;
 
 /* The pictures of the document and the cloth that they show. */
 struct surface_input {

@@ -1,5 +1,6 @@
 #include "optimizer/report/surface/surface_field.h"
 #include "base/catalogue/model_catalogue.h"
+#include "optimizer/job/document/job_results.h"
 
 #include <math.h>
 

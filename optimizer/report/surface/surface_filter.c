@@ -1,4 +1,5 @@
 #include "optimizer/report/surface/surface_filter.h"
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/report/result/result_pictures.h"
 #include "renderer/preview/feature_image.h"
 #include "renderer/preview/joint_filter.h"

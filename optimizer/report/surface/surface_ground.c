@@ -1,4 +1,5 @@
 #include "optimizer/report/surface/surface_ground.h"
+#include "optimizer/job/document/job_results.h"
 #include "renderer/preview/ground_shadow.h"
 
 #include <math.h>

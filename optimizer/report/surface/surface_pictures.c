@@ -1,6 +1,7 @@
 #include "optimizer/report/surface/surface_pictures.h"
 #include "base/catalogue/picture_method.h"
 #include "base/files/durable.h"
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/result/result_json.h"
@@ -253,12 +254,12 @@ static status render(struct report *report, const struct one_picture *one, const
                   .n_set = model->setup->sets.n_set,
                   .discrepancy = traced ? pipeline_discrepancy(model->validation) : NULL,
                   .has_speckle = p->speckle,
-                  .speckle_seed = report->in.job->fit->seed},
+                  .speckle_seed = report->in.job->seed},
         .configuration = &view,
         .width = p->px,
         .height = p->px,
         .n_sample = p->sample,
-        .seed = report->in.job->fit->seed ^ 0x73757266616365u,
+        .seed = report->in.job->seed ^ 0x73757266616365u,
         .stream = (uint32_t)(STREAM + one->i)};
     surface_method_apply(&one->how, &q.input);
     struct progress_part part;

@@ -1,5 +1,6 @@
 #include "optimizer/report/surface/surface_tables.h"
 #include "base/files/durable.h"
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 #include "renderer/fast/precompute/fast_precompute.h"

@@ -3,6 +3,7 @@
 #ifndef SELVEDGE_OPTIMIZER_SURFACE_TABLES_H
 #define SELVEDGE_OPTIMIZER_SURFACE_TABLES_H
 
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/report/findings/report.h"
 #include "renderer/diffusion/diffusion_option.h"
 #include "renderer/dual/dual_option.h"

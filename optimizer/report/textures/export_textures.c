@@ -4,6 +4,7 @@
  * rotation in turns, of the direction across the fibers), maps.exr (all of them as floats, with the height),
  * cloth.mtlx and cloth.u3m (texture_documents.h). Of the parameters, texture_surface.h. */
 #include "base/files/durable.h"
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/report/export/export_scene.h"
 #include "optimizer/report/result/result_pictures.h"
@@ -76,7 +77,7 @@ static status render_tile(const struct textures *t, bool black_sheet, struct ima
                                      .width = t->maps.width,
                                      .height = t->maps.height,
                                      .n_sample = n_sample > MIN_SAMPLE ? n_sample : MIN_SAMPLE,
-                                     .seed = report->in.job->fit->seed ^ 0x74657874757265u,
+                                     .seed = report->in.job->seed ^ 0x74657874757265u,
                                      .stream = STREAM};
     s = render_run(&q, report->in.job->tools->pool, &report->in.job->tools->progress, im, err);
     scene_free(scene);

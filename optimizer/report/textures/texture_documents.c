@@ -192,7 +192,7 @@ static json_t *front_json(const struct texture_principled *p)
 static void make_uuid(const struct export_scene *e, char text[37])
 {
     uint64_t a = e->report->in.job->tools->fingerprint * 0x9e3779b97f4a7c15u,
-             b = (e->report->in.job->tools->fingerprint ^ e->report->in.job->fit->seed) * 0xbf58476d1ce4e5b9u;
+             b = (e->report->in.job->tools->fingerprint ^ e->report->in.job->seed) * 0xbf58476d1ce4e5b9u;
     snprintf(text, 37, "%08x-%04x-4%03x-%04x-%012llx", (unsigned)(a >> 32), (unsigned)(a >> 16 & 0xffff),
              (unsigned)(a & 0xfff), (unsigned)(0x8000 | (b >> 48 & 0x3fff)), (unsigned long long)(b & 0xffffffffffffu));
 }

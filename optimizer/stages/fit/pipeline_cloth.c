@@ -3,6 +3,8 @@
 #include "base/option_id.h"
 #include "geometry/cloth/cloth.h"
 #include "geometry/fibers/shape/fiber_correct.h"
+#include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/stages/fit/pipeline_fit_option.h"
 #include "optimizer/stages/fit/pipeline_trace.h"
@@ -47,11 +49,11 @@ static status check_company(const struct job_inputs *in, struct error *err)
             return error_set_field(err, STATUS_INVALID, OPTION_MODEL,
                                    "numbers of the cloth are fitted with models of fibers only: '%s' sees a volume",
                                    in->model[i].appearance.id);
-    if (in->doc->fit.fit_radius)
+    if (in->section.fit->fit_radius)
         return error_set_field(
             err, STATUS_INVALID, OPTION_FIT_RADIUS, "'%s' is not for a cloth with fitted numbers: fit the %s of '%s'",
-            job_option_key(OPTION_FIT_RADIUS), in->doc->cloth.description != NULL ? "fiber_radius_um" : "radius",
-            job_option_key(in->doc->cloth.description != NULL ? OPTION_CLOTH : OPTION_CORRECTION));
+            job_option_key(OPTION_FIT_RADIUS), in->section.cloth->description != NULL ? "fiber_radius_um" : "radius",
+            job_option_key(in->section.cloth->description != NULL ? OPTION_CLOTH : OPTION_CORRECTION));
     return STATUS_OK;
 }
 
@@ -66,7 +68,7 @@ static const struct cloth_number *numbers_of(const struct job_cloth *cloth, size
 status cloth_numbers_read(struct job_inputs *in, struct error *err)
 {
     size_t n_number;
-    const struct cloth_number *list = numbers_of(&in->doc->cloth, &n_number);
+    const struct cloth_number *list = numbers_of(in->section.cloth, &n_number);
     memset(&in->number, 0, sizeof in->number);
     for (size_t i = 0; i < n_number; i++) {
         if (!list[i].fitted) continue;

@@ -1,6 +1,8 @@
 #include "optimizer/stages/fit/pipeline_correction.h"
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/fit/descent/trace_estimator.h"
+#include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_fit.h"
 #include "optimizer/stages/fit/pipeline_fit_option.h"
 #include "optimizer/stages/fit/pipeline_scan_error.h"
 #include "optimizer/stages/fit/pipeline_trace.h"

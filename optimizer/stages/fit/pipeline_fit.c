@@ -1,6 +1,7 @@
 /* Stage "fit": for each model of the job, the path tracer behind a journal and a method of descent. */
 #include "base/option_id.h"
 #include "optimizer/fit/descent/fit_run.h"
+#include "optimizer/job/document/job_fit.h"
 #include "optimizer/stages/fit/pipeline_cloth.h"
 #include "optimizer/stages/fit/pipeline_correction.h"
 #include "optimizer/stages/fit/pipeline_fit_option.h"

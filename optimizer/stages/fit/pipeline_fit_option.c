@@ -1,5 +1,6 @@
 #include "optimizer/stages/fit/pipeline_fit_option.h"
 #include "optimizer/fit/descent/descent.h"
+#include "optimizer/job/document/job_fit_option.h"
 
 #include <math.h>
 

@@ -3,7 +3,8 @@
 #define SELVEDGE_OPTIMIZER_PIPELINE_FIT_OPTION_H
 
 #include "optimizer/fit/linear/fit_layout.h"
-#include "optimizer/job/document/job_fit_option.h"
+
+struct job_fit_option;
 
 void pipeline_fit_option(const struct job_fit_option *from, const struct param_info *info, size_t n_param,
                          struct fit_option *to);

@@ -1,4 +1,5 @@
 #include "optimizer/stages/fit/pipeline_nesting.h"
+#include "optimizer/job/document/job_fit_option.h"
 
 #include <string.h>
 

@@ -1,6 +1,8 @@
 /* The stage "fit" of a job with the profile of a single fiber: fits every model to it. A
  * fit takes seconds, so an interrupted job begins anew. */
 #include "base/option_id.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_profile.h"
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/stages/fit/pipeline_fit_option.h"
 #include "optimizer/stages/fit_stages.h"

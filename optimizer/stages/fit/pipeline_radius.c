@@ -2,6 +2,7 @@
 #include "base/catalogue/method_catalogue.h"
 #include "base/option_id.h"
 #include "optimizer/fit/descent/fit_run.h"
+#include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/stages/fit/pipeline_fit_option.h"
 #include "optimizer/stages/fit/pipeline_trace.h"

@@ -5,6 +5,7 @@
 #include "optimizer/fit/cloth/carried_error.h"
 #include "optimizer/fit/cloth/cloth_estimator.h"
 #include "optimizer/fit/descent/fit_run.h"
+#include "optimizer/job/document/job_scan.h"
 #include "optimizer/stages/fit/pipeline_cloth.h"
 #include "optimizer/stages/fit/pipeline_trace.h"
 

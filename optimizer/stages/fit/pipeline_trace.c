@@ -1,4 +1,5 @@
 #include "optimizer/stages/fit/pipeline_trace.h"
+#include "optimizer/job/document/job_fit.h"
 
 #include <stdint.h>
 #include <stdlib.h>
@@ -40,7 +41,7 @@ void pipeline_trace_request(struct trace_estimator *t, const struct cloth_job *j
         .request = {.input = {.scene = made_cloth_scene(made, m), .model = &m->appearance, .n_set = m->sets.n_set},
                     .configuration = configuration,
                     .n_configuration = n_configuration,
-                    .seed = job->fit->seed,
+                    .seed = job->seed,
                     .share_camera_paths = job->fit->share_camera_paths},
         .pool = job->tools->pool};
 }

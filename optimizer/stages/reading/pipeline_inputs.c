@@ -3,6 +3,13 @@
 #include "base/files/durable.h"
 #include "base/option_id.h"
 #include "optimizer/fit/baseline/row_consistency.h"
+#include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_fit_option.h"
+#include "optimizer/job/document/job_profile.h"
+#include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/document/job_scan.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/job_parse.h"
 #include "optimizer/job/options/option_key.h"
@@ -48,15 +55,15 @@ static status load_observations(const struct stage_tools *tools, struct job_inpu
     char path[WORKER_PATH_BYTES];
     struct uneven_photographs uneven = {.tools = tools};
     worker_folder_path(tools->folder, JOB_FOLDER_INPUT, NULL, path);
-    status s = photograph_process_load(&in->rows.process, in->doc, path, err);
+    status s = photograph_process_load(&in->rows.process, in->doc->setup, in->doc->rows, path, err);
     if (s == STATUS_OK)
-        s = observation_set_load(in->doc, path, &in->rows.process, &(struct warning_sink){warn_photograph, &uneven},
-                                 &in->rows.observation, err);
+        s = observation_set_load(in->section.setup, in->section.rows, in->section.fit, path, &in->rows.process,
+                                 &(struct warning_sink){warn_photograph, &uneven}, &in->rows.observation, err);
     if (s != STATUS_OK) return s;
     if (uneven.n > NAMED_PHOTOGRAPHS)
         worker_status_warn(tools->status, "%zu more warnings about photographs are in the job's log",
                            uneven.n - NAMED_PHOTOGRAPHS);
-    if (in->doc->rows.measurement_file[0] != '\0')
+    if (in->section.rows->measurement_file[0] != '\0')
         s = row_consistency_check_angles(&in->rows.observation, OPTION_MEASUREMENT_FILE, err);
     if (s == STATUS_OK) observation_set_check(&in->rows.observation, &tools->warn);
     return s == STATUS_OK ? row_consistency_warn(&in->rows.observation, &tools->warn, err) : s;
@@ -66,9 +73,9 @@ static status load_observations(const struct stage_tools *tools, struct job_inpu
 static status load_environment(const struct stage_tools *tools, struct job_inputs *in, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    if (in->doc->setup.environment_file[0] == '\0') return STATUS_OK;
-    worker_folder_path(tools->folder, JOB_FOLDER_INPUT, in->doc->setup.environment_file, path);
-    status s = environment_read_exr(path, in->doc->setup.environment_scale, &in->rows.environment, err);
+    if (in->section.setup->environment_file[0] == '\0') return STATUS_OK;
+    worker_folder_path(tools->folder, JOB_FOLDER_INPUT, in->section.setup->environment_file, path);
+    status s = environment_read_exr(path, in->section.setup->environment_scale, &in->rows.environment, err);
     if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, OPTION_ENVIRONMENT_FILE);
     for (size_t i = 0; i < in->rows.observation.n && s == STATUS_OK; i++)
         in->rows.observation.item[i].configuration.environment = in->rows.environment;
@@ -105,12 +112,12 @@ static status set_model(const struct job_fit *fit, const struct job_cloth *cloth
 
 static status set_models(struct job_inputs *in, struct error *err)
 {
-    in->model = calloc(in->doc->fit.n_model, sizeof *in->model);
+    in->model = calloc(in->section.fit->n_model, sizeof *in->model);
     if (in->model == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job: out of memory");
-    in->n_model = in->doc->fit.n_model;
+    in->n_model = in->section.fit->n_model;
     status s = STATUS_OK;
     for (size_t i = 0; i < in->n_model && s == STATUS_OK; i++)
-        s = set_model(&in->doc->fit, &in->doc->cloth, i, &in->model[i], err);
+        s = set_model(in->section.fit, in->section.cloth, i, &in->model[i], err);
     return s;
 }
 
@@ -119,8 +126,8 @@ static status check_density(const struct job_inputs *in, struct error *err)
     bool from_behind = false;
     for (size_t i = 0; i < in->rows.fitted.n; i++)
         if (in->rows.fitted.item[i].configuration.light_theta_rad > M_PI_2) from_behind = true;
-    return in->doc->fit.fit_density && !from_behind ? job_density_undetermined(in->doc->setup.black_sheet, err)
-                                                    : STATUS_OK;
+    return in->section.fit->fit_density && !from_behind ? job_density_undetermined(in->section.setup->black_sheet, err)
+                                                        : STATUS_OK;
 }
 
 static void warn_few_rows(const struct stage_tools *tools, struct job_inputs *in)
@@ -173,25 +180,26 @@ static status claim_inputs(const struct stage_tools *tools, struct job_inputs *i
 /* Selects the rows of the fit and makes the rows of contrasts. */
 static status select_rows(struct job_inputs *in, struct error *err)
 {
-    const struct job_document *doc = in->doc;
+    const struct job_fit *fit = in->section.fit;
     status s = observation_set_select(&in->rows.observation, JOB_SET_FIT, &in->rows.fitted, err);
     observation_set_weigh(&in->rows.fitted);
     if (s == STATUS_OK && in->rows.fitted.n == 0)
         s = error_set_field(err, STATUS_INVALID,
-                            doc->rows.measurement_file[0] != '\0' ? OPTION_MEASUREMENT_FILE : OPTION_PHOTOGRAPHS,
+                            in->section.rows->measurement_file[0] != '\0' ? OPTION_MEASUREMENT_FILE
+                                                                          : OPTION_PHOTOGRAPHS,
                             "all rows of the set 'fit' have the weight 0: give at least one a weight above it");
     if (s == STATUS_OK) s = observation_set_select(&in->rows.fitted, JOB_SET_FIT, &in->rows.row, err);
-    if (s != STATUS_OK || !(doc->fit.texture_block_mm > 0.0)) return s;
-    s = observation_set_append_contrasts(&in->rows.observation, doc->fit.texture_weight, &in->rows.contrast, err);
-    return s == STATUS_OK && doc->fit.texture_weight > 0.0
-               ? observation_set_append_contrasts(&in->rows.fitted, doc->fit.texture_weight, &in->rows.row, err)
+    if (s != STATUS_OK || !(fit->texture_block_mm > 0.0)) return s;
+    s = observation_set_append_contrasts(&in->rows.observation, fit->texture_weight, &in->rows.contrast, err);
+    return s == STATUS_OK && fit->texture_weight > 0.0
+               ? observation_set_append_contrasts(&in->rows.fitted, fit->texture_weight, &in->rows.row, err)
                : s;
 }
 
 /* Adds the radiances that a plain BRDF expects between the rows of the fit. */
 static status expect_rows(const struct stage_tools *tools, struct job_inputs *in, struct error *err)
 {
-    const double strength = in->doc->fit.plain_prior;
+    const double strength = in->section.fit->plain_prior;
     status s = expected_rows_append(&in->rows.fitted, strength, &in->rows.expected, &in->rows.row, err);
     if (s != STATUS_OK || !(strength > 0.0)) return s;
     if (in->rows.expected.n == 0)
@@ -213,10 +221,14 @@ static status read_document(const struct stage_tools *tools, struct job_inputs *
     status s = file_read_all(path, JOB_MAX_DOCUMENT_BYTES, &text, &n, err);
     if (s != STATUS_OK) return s;
     s = job_document_parse(text, n, &in->doc, err);
-    if (s == STATUS_OK) in->kind = job_document_kind(in->doc);
+    if (s == STATUS_OK) {
+        in->section = job_document_sections(in->doc);
+        in->kind = job_document_kind(in->doc);
+    }
     in->fingerprint = document_fingerprint(text, n);
     free(text);
-    if (s == STATUS_OK && in->doc->scan.geometry_job[0] != '\0') in->doc->scan.given = true; /* the other job has it */
+    if (s == STATUS_OK && in->section.scan->geometry_job[0] != '\0')
+        in->doc->scan->given = true; /* the other job has it */
     return s;
 }
 
@@ -237,9 +249,10 @@ static status read_profile(const struct stage_tools *tools, struct job_inputs *i
     char folder[WORKER_PATH_BYTES];
     worker_folder_path(tools->folder, JOB_FOLDER_INPUT, NULL, folder);
     status s = claim_inputs(tools, in, err);
-    if (s != STATUS_OK || !in->doc->profile.bowl.given)
-        return s == STATUS_OK ? fiber_profile_load(&in->fiber.profile, in->doc, folder, err) : s;
-    s = bowl_profile_load(&in->fiber.profile, in->doc, folder, &in->fiber.bowl, err);
+    if (s != STATUS_OK || !in->section.profile->bowl.given)
+        return s == STATUS_OK ? fiber_profile_load(&in->fiber.profile, in->section.profile, folder, err) : s;
+    s = bowl_profile_load(&in->fiber.profile, &in->doc->profile->bowl, in->doc->setup, in->doc->rows, folder,
+                          &in->fiber.bowl, err);
     if (s == STATUS_OK)
         log_info(tools->log, "%zu photographs of a bowl give %zu cells; the marks are off by %.2g pixels",
                  in->fiber.bowl.n_shot, in->fiber.profile.n, in->fiber.bowl.camera.rms_px);
@@ -249,12 +262,12 @@ static status read_profile(const struct stage_tools *tools, struct job_inputs *i
 static status read_rows(const struct stage_tools *tools, struct job_inputs *in, struct error *err)
 {
     if (in->kind == JOB_OF_GEOMETRY) return claim_inputs(tools, in, err);
-    status s = pipeline_profile_priors(tools, &in->doc->cloth, &in->doc->fit, err);
+    status s = pipeline_profile_priors(tools, in->doc->cloth, in->doc->fit, err);
     if (s == STATUS_OK) s = set_models(in, err);
     if (s == STATUS_OK && in->kind == JOB_OF_PROFILE) s = read_profile(tools, in, err);
     if (in->kind == JOB_OF_PROFILE) return s;
     if (s == STATUS_OK && in->kind == JOB_OF_PICTURES) return take_values(tools, in, err);
-    if (s == STATUS_OK) s = pipeline_read_texture(&(struct texture_input){tools, &in->doc->cloth}, &in->texture, err);
+    if (s == STATUS_OK) s = pipeline_read_texture(&(struct texture_input){tools, in->doc->cloth}, &in->texture, err);
     if (s == STATUS_OK) s = cloth_numbers_read(in, err);
     if (s == STATUS_OK) s = claim_inputs(tools, in, err);
     if (s == STATUS_OK) s = load_observations(tools, in, err);
@@ -272,7 +285,7 @@ status job_inputs_read(const struct stage_tools *tools, struct job_inputs *in, s
     status s = read_document(tools, in, err);
     if (s == STATUS_OK) s = read_rows(tools, in, err);
     if (s == STATUS_OK && tools->folder->lock_fd >= 0)
-        s = pipeline_adopt_geometry(tools, in->doc->scan.geometry_job, err);
+        s = pipeline_adopt_geometry(tools, in->section.scan->geometry_job, err);
     return job_option_name_field(s, err);
 }
 

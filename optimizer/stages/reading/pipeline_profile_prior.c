@@ -3,6 +3,8 @@
 #include "base/files/durable.h"
 #include "base/option_id.h"
 #include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_fit_option.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/stages/scene/pipeline_adopt.h"
 

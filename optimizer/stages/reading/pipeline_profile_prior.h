@@ -2,10 +2,10 @@
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_PROFILE_PRIOR_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_PROFILE_PRIOR_H
 
-#include "optimizer/job/document/job_fit.h"
 #include "optimizer/stages/run/stage_tools.h"
 
 struct job_cloth;
+struct job_fit;
 
 /* Copies result.json of the job that the document names to JOB/adopted/profile/, unless it is there: before the worker
  * enters its sandbox, in which it sees its own folder alone. The next function reports files that are missing. */

@@ -1,6 +1,8 @@
 #include "optimizer/stages/reading/pipeline_texture.h"
 
 #include "base/option_id.h"
+#include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "optimizer/stages/reading/texture_start.h"

@@ -1,7 +1,10 @@
 #include "optimizer/stages/reading/texture_start.h"
 
+#include "base/catalogue/correction_numbers.h"
 #include "base/option_id.h"
 #include "optimizer/job/checks/job_document_parts.h"
+#include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_fit.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -162,15 +165,15 @@ static double seen_albedo(const struct cloth_description *d, const struct weave_
 static void start_colors(struct job_inputs *in, size_t i_model, const double mean_rgb[3])
 {
     struct model_setup *m = &in->model[i_model];
-    const struct job_model *given = &in->doc->fit.model[i_model];
+    const struct job_model *given = &in->section.fit->model[i_model];
     for (size_t p = 0; p < m->sets.info.n_param; p++) {
         const struct param_info *info = &m->sets.info.param[p];
         if (info->channel < 0 || strcmp(param_own_symbol(info), "C_TT") != 0 || m->parameter[p].fixed) continue;
         if (!isnan(given->start[p]) || !isnan(given->option.prior_mean[p]) ||
             job_parameter_is_tied(&given->option, m->sets.info.n_param, p))
             continue;
-        double albedo = seen_albedo(in->doc->cloth.description, &in->texture.guess, p / m->sets.n_own, info->channel,
-                                    mean_rgb[info->channel]);
+        double albedo = seen_albedo(in->section.cloth->description, &in->texture.guess, p / m->sets.n_own,
+                                    info->channel, mean_rgb[info->channel]);
         if (!isfinite(albedo)) continue;
         m->parameter[p].start = fmin(fmax(albedo, m->parameter[p].lower), m->parameter[p].upper);
         if (i_model == 0) note(&in->texture, info->name);
@@ -180,13 +183,14 @@ static void start_colors(struct job_inputs *in, size_t i_model, const double mea
 void texture_take_colors(const struct stage_tools *tools, struct job_inputs *in)
 {
     double rgb[3];
-    if (!in->texture.found || in->texture.contradicts || !in->doc->cloth.texture_colors || in->doc->cloth.n_group == 0)
+    if (!in->texture.found || in->texture.contradicts || !in->section.cloth->texture_colors ||
+        in->section.cloth->n_group == 0)
         return;
     reflectance(&in->rows.observation, rgb);
     if (!isfinite(rgb[0]) || !(in->texture.guess.color_confidence > TEXTURE_WORTH_TAKING)) {
         char text[300];
         snprintf(text, sizeof text, "the colors of warp and weft are not taken from photograph '%.120s': %s",
-                 in->doc->cloth.texture,
+                 in->section.cloth->texture,
                  isfinite(rgb[0]) ? "it does not show them clearly" : "no fitted row is lit from the front");
         warning_send(&tools->warn, OPTION_CLOTH_TEXTURE, "%s", text);
         return;

@@ -1,6 +1,7 @@
 /* Stages "volume" to "directions": from the scan, or from a fiber file, to the fibers of the cloth. */
 #include "base/option_id.h"
 #include "geometry/cloth/cloth.h"
+#include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/stages/geometry_stages.h"

@@ -3,6 +3,10 @@
 #include "geometry/fibers/shape/fiber_correct.h"
 #include "geometry/fibers/voxelise.h"
 #include "geometry/reconstruct.h"
+#include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_scan.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/stages/made_cloth.h"
 #include "renderer/scene/scene_ray.h"
 

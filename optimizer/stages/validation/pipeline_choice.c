@@ -1,4 +1,5 @@
 #include "optimizer/stages/validation/pipeline_choice.h"
+#include "optimizer/job/document/job_fit_option.h"
 
 #include <math.h>
 #include <stdio.h>

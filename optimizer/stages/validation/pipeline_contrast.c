@@ -1,4 +1,5 @@
 #include "optimizer/stages/validation/pipeline_contrast.h"
+#include "optimizer/job/document/job_fit.h"
 #include "optimizer/stages/fit/pipeline_trace.h"
 
 #include <math.h>

@@ -2,6 +2,7 @@
 #include "base/option_id.h"
 #include "optimizer/fit/baseline/discrepancy_fit.h"
 #include "optimizer/fit/baseline/plain_brdf.h"
+#include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/options/option_key.h"
 
 #include <math.h>

@@ -2,6 +2,8 @@
  * rows apart. */
 #include "optimizer/stages/validation/pipeline_validation.h"
 #include "optimizer/fit/baseline/discrepancy_fit.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_fit_option.h"
 #include "optimizer/stages/fit/pipeline_cloth.h"
 #include "optimizer/stages/fit/pipeline_trace.h"
 #include "optimizer/stages/run/work_file.h"

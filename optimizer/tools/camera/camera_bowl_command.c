@@ -1,5 +1,8 @@
 /* `selvedge bowl`: the table of a fiber's profile from the photographs of a bowl that a job document describes. */
 #include "base/files/durable.h"
+#include "optimizer/job/document/job_document.h"
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_profile.h"
 #include "optimizer/photographs/profile/bowl_profile.h"
 #include "optimizer/tools/camera/camera_commands.h"
 
@@ -41,14 +44,16 @@ static status make(const char *job, const char *table, const char *picture, stru
     struct bowl_record record;
     struct image im = {0};
     status s = camera_read_document(job, folder, sizeof folder, &doc, err);
-    if (s == STATUS_OK && !doc->profile.bowl.given)
+    if (s == STATUS_OK && !doc->profile->bowl.given)
         s = error_set(err, STATUS_INVALID, "'%s' describes no photographs of a bowl", job);
-    if (s == STATUS_OK && picture != NULL) s = bowl_profile_picture(doc, folder, &im, err);
+    if (s == STATUS_OK && picture != NULL)
+        s = bowl_profile_picture(&doc->profile->bowl, doc->setup, doc->rows, folder, &im, err);
     if (s == STATUS_OK && picture != NULL) s = image_write_png(&im, 1.0, picture, err);
     image_release(&im);
-    if (s == STATUS_OK) s = bowl_profile_load(&profile, doc, folder, &record, err);
+    if (s == STATUS_OK)
+        s = bowl_profile_load(&profile, &doc->profile->bowl, doc->setup, doc->rows, folder, &record, err);
     if (s == STATUS_OK) s = write_table(&profile, table, err);
-    if (s == STATUS_OK) print_record(&doc->profile.bowl, &record);
+    if (s == STATUS_OK) print_record(&doc->profile->bowl, &record);
     fiber_profile_release(&profile);
     job_document_free(doc);
     return s;

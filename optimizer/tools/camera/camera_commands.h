@@ -5,8 +5,9 @@
 #define SELVEDGE_OPTIMIZER_CAMERA_COMMANDS_H
 
 #include "base/status.h"
-#include "optimizer/job/document/job_document.h"
 #include "renderer/image/image.h"
+
+struct job_document;
 
 int camera_command_photo(int argc, char **argv);
 int camera_command_calibrate(int argc, char **argv);

@@ -1,3 +1,4 @@
+#include "optimizer/job/document/picture_words.h"
 #include "optimizer/job/job_parse.h"
 #include "optimizer/tools/camera/camera_commands.h"
 

@@ -1,4 +1,7 @@
 #include "base/files/durable.h"
+#include "optimizer/job/document/job_document.h"
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_rows.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/photographs/camera/photograph_develop.h"
 #include "optimizer/report/result/photograph_json.h"
@@ -199,11 +202,11 @@ static int preview_job(const char *path, const char *json_path, const char *pict
     bool whole = true;
     photograph_process_init(&process);
     status s = camera_read_document(path, folder, sizeof folder, &doc, &err);
-    if (s == STATUS_OK) s = photograph_process_load(&process, doc, folder, &err);
+    if (s == STATUS_OK) s = photograph_process_load(&process, doc->setup, doc->rows, folder, &err);
     if (s == STATUS_OK) print_color(&process);
     if (s == STATUS_OK && pictures != NULL) s = begin_pictures(&process, pictures, &err);
-    for (size_t i = 0; s == STATUS_OK && i < doc->rows.n_photograph; i++)
-        whole = preview_photograph(&process, &view, &doc->rows.photograph[i], rows) == STATUS_OK && whole;
+    for (size_t i = 0; s == STATUS_OK && i < doc->rows->n_photograph; i++)
+        whole = preview_photograph(&process, &view, &doc->rows->photograph[i], rows) == STATUS_OK && whole;
     if (s == STATUS_OK && json_path != NULL && json_dump_file(rows, json_path, JSON_INDENT(1)) != 0)
         s = error_set(&err, STATUS_IO, "cannot write '%s'", json_path);
     if (s != STATUS_OK) fprintf(stderr, "error: %s\n", err.text);

@@ -2,12 +2,12 @@
 #include "geometry/fibers/fiber_view.h"
 #include "geometry/phantom/phantom.h"
 #include "optimizer/job/document/cloth_json.h"
+#include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/document/job_document.h"
 #include "optimizer/tools/phantom/phantom_commands.h"
 #include "optimizer/tools/phantom/phantom_described.h"
 #include "renderer/image/image.h"
 
-#include <jansson.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -302,7 +302,7 @@ static json_t *describe(const struct cloth *c)
     }
     if (c->described != NULL) {
         json_decref(cloth);
-        cloth = cloth_section_json(c->described->cloth.description, NULL);
+        cloth = cloth_section_json(c->described->cloth->description, NULL);
         json_object_set_new(cloth, "voxel_size_um", json_real(um * o->voxel_size_m));
     }
     return json_pack("{s:I,s:o,s:o,s:o}", "seed", (json_int_t)o->seed, "cloth", cloth, "scan", scan, "result", size);
@@ -313,7 +313,7 @@ static status write_description(const struct cloth *c, struct error *err)
 {
     char path[4096];
     struct cloth_description nearest;
-    const struct cloth_description *d = c->described != NULL ? c->described->cloth.description : &nearest;
+    const struct cloth_description *d = c->described != NULL ? c->described->cloth->description : &nearest;
     if (c->described == NULL && c->yarn != NULL) return STATUS_OK;
     status st = path_in(c->out, "cloth.json", path, err);
     if (st == STATUS_OK && c->described == NULL)
@@ -361,7 +361,7 @@ static status write_files(struct cloth *c, struct error *err)
 static status make_fibers(struct cloth *c, struct thread_pool *pool, struct error *err)
 {
     if (c->described == NULL) return phantom_generate(&c->phantom, pool, NULL, &c->fibers, &c->report, err);
-    return phantom_described_make(c->described->cloth.description, c->phantom.voxel_size_m, c->phantom.margin_m, pool,
+    return phantom_described_make(c->described->cloth->description, c->phantom.voxel_size_m, c->phantom.margin_m, pool,
                                   &c->fibers, &c->report, err);
 }
 

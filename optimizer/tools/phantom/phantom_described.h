@@ -7,7 +7,7 @@
 
 struct job_document;
 
-/* Reads the section "cloth" from a file of JSON; doc->cloth.description of the document is the description. The
+/* Reads the section "cloth" from a file of JSON; doc->cloth->description of the document is the description. The
  * caller frees *doc with job_document_free. STATUS_INVALID names the field. */
 status phantom_described_read(const char *path, struct job_document **doc, struct error *err);
 

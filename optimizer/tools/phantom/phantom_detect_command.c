@@ -1,4 +1,5 @@
 /* The command "detect". */
+#include "optimizer/job/document/job_photograph.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "optimizer/report/geometry/weave_json.h"
 #include "optimizer/tools/phantom/phantom_commands.h"

@@ -2,6 +2,7 @@
 #include "geometry/vision/vision.h"
 #include "geometry/vision/vision_texture.h"
 #include "geometry/weave/weave_contrast.h"
+#include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "optimizer/tools/phantom/phantom_commands.h"

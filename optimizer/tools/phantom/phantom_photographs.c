@@ -3,6 +3,7 @@
 #include "base/files/durable.h"
 #include "base/rng.h"
 #include "geometry/fibers/fiber_set.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/photographs/rows/observation.h"
 #include "optimizer/tools/phantom/phantom_view_table.h"
 #include "optimizer/tools/simulated_camera/phantom_files.h"
@@ -161,16 +162,16 @@ static status finish_picture(const struct phantom_photograph_option *o, const st
 static struct configuration view_configuration(const struct phantom_photograph_option *o,
                                                const struct job_photograph *v)
 {
-    const struct job_document set_up = {
-        .setup.lamp_side_cm = o->lamp_side_cm,
-        .setup.lamp_distance_cm = o->lamp_distance_cm,
-        .setup.lamp_directional = o->lamp_directional,
-        .setup.camera_distance_cm = o->camera_distance_cm,
-        .setup.crop_cm = o->crop_cm,
-        .setup.camera_far_field = o->camera_far_field,
-        .setup.camera_blur_mm = o->camera_blur_mm,
-        .setup.environment_rgb = {o->environment_rgb[0], o->environment_rgb[1], o->environment_rgb[2]}};
-    return observation_configuration(&set_up.setup, v->light_theta_deg, v->light_phi_deg, v->camera_theta_deg,
+    const struct job_setup set_up = {
+        .lamp_side_cm = o->lamp_side_cm,
+        .lamp_distance_cm = o->lamp_distance_cm,
+        .lamp_directional = o->lamp_directional,
+        .camera_distance_cm = o->camera_distance_cm,
+        .crop_cm = o->crop_cm,
+        .camera_far_field = o->camera_far_field,
+        .camera_blur_mm = o->camera_blur_mm,
+        .environment_rgb = {o->environment_rgb[0], o->environment_rgb[1], o->environment_rgb[2]}};
+    return observation_configuration(&set_up, v->light_theta_deg, v->light_phi_deg, v->camera_theta_deg,
                                      v->camera_phi_deg, v->cloth_rotation_deg);
 }
 

@@ -4,8 +4,10 @@
 
 #include "base/catalogue/model_sets.h"
 #include "base/thread_pool.h"
-#include "optimizer/job/document/job_document.h"
 #include "renderer/scattering/scattering.h"
+
+#include <stdbool.h>
+#include <stdint.h>
 
 struct phantom_photograph_option {
     const char *fiber_file; /* .hair, or text "x y z radius" with tile_mm */

@@ -2,7 +2,8 @@
 #ifndef SELVEDGE_OPTIMIZER_PHANTOM_VIEW_TABLE_H
 #define SELVEDGE_OPTIMIZER_PHANTOM_VIEW_TABLE_H
 
-#include "optimizer/job/document/job_document.h"
+#include "base/status.h"
+#include "optimizer/job/document/job_photograph.h"
 
 struct phantom_view_table {
     size_t n;

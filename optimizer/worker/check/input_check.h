@@ -4,9 +4,10 @@
 #define SELVEDGE_OPTIMIZER_INPUT_CHECK_H
 
 #include "optimizer/job/checks/job_faults.h"
-#include "optimizer/job/document/job_document.h"
 
 #include <stdbool.h>
+
+struct job_document;
 
 enum { INPUT_PATH_BYTES = 4096 };
 

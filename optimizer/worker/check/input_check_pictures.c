@@ -1,13 +1,15 @@
 #include "base/option_id.h"
 #include "geometry/mesh/mesh.h"
+#include "optimizer/job/document/job_document.h"
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/worker/check/input_check.h"
 
 #include <stdio.h>
 
 void input_check_pictures(struct input_check *c)
 {
-    for (size_t i = 0; i < c->doc->results.n_surface_picture; i++) {
-        const struct job_surface_picture *p = &c->doc->results.surface_picture[i];
+    for (size_t i = 0; i < c->doc->results->n_surface_picture; i++) {
+        const struct job_surface_picture *p = &c->doc->results->surface_picture[i];
         char path[INPUT_PATH_BYTES];
         struct mesh m = {0};
         struct error fault = {0};

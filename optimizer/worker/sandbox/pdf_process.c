@@ -1,5 +1,6 @@
 #include "optimizer/worker/sandbox/pdf_process.h"
 #include "base/files/durable.h"
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/report_pdf.h"
 #include "optimizer/worker/sandbox/sandbox_calls.h"

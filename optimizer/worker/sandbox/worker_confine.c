@@ -1,4 +1,7 @@
 #include "optimizer/worker/sandbox/worker_confine.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_results.h"
+#include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/job_parse.h"
 
 #include "base/files/durable.h"
@@ -117,9 +120,9 @@ static void prepare(const struct worker_folder *folder, const struct job_documen
 {
     c->pdf.order_fd = -1;
     if (doc == NULL) return;
-    if (doc->results.export_pdf) pdf_process_start(folder, &c->pdf);
-    pipeline_link_geometry(folder, doc->scan.geometry_job);
-    pipeline_copy_profile(folder, doc->fit.profile_job);
+    if (doc->results->export_pdf) pdf_process_start(folder, &c->pdf);
+    pipeline_link_geometry(folder, doc->scan->geometry_job);
+    pipeline_copy_profile(folder, doc->fit->profile_job);
 }
 
 static bool by_hand(const struct worker_folder *folder)

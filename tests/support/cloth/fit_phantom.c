@@ -4,6 +4,7 @@
 #include "base/rng.h"
 #include "geometry/fibers/voxelise.h"
 #include "optimizer/fit/objective/objective.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/tools/phantom/phantom_view_table.h"
 #include "tests/support/cloth/kept_estimate.h"
 
@@ -148,15 +149,13 @@ void fit_phantom_render(const struct fit_phantom *f, const double *param, size_t
 
 static void views(struct phantom_view_table *t, struct configuration *configuration)
 {
-    static const struct job_document set_up = {.setup.lamp_side_cm = 10.0,
-                                               .setup.lamp_distance_cm = 61.0,
-                                               .setup.camera_distance_cm = 100.0,
-                                               .setup.crop_cm = 1.0};
+    static const struct job_setup set_up = {
+        .lamp_side_cm = 10.0, .lamp_distance_cm = 61.0, .camera_distance_cm = 100.0, .crop_cm = 1.0};
     phantom_view_table_builtin(t);
     for (size_t n = 0; n < FIT_N_VIEW; n++) {
         const struct job_photograph *v = &t->view[n];
-        configuration[n] = observation_configuration(&set_up.setup, v->light_theta_deg, v->light_phi_deg,
-                                                     v->camera_theta_deg, v->camera_phi_deg, v->cloth_rotation_deg);
+        configuration[n] = observation_configuration(&set_up, v->light_theta_deg, v->light_phi_deg, v->camera_theta_deg,
+                                                     v->camera_phi_deg, v->cloth_rotation_deg);
     }
 }
 

@@ -170,7 +170,7 @@ static bool load_table(const char *name, struct observation_set *o)
     text[n] = '\0';
     assert_int_equal(job_document_parse(document, strlen(document), &doc, &err), STATUS_OK);
     observation_set_init(o);
-    assert_int_equal(measurement_table_parse(text, n, name, doc, o, &err), STATUS_OK);
+    assert_int_equal(measurement_table_parse(text, n, name, doc->setup, o, &err), STATUS_OK);
     job_document_free(doc);
     return true;
 }

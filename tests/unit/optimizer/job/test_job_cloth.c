@@ -1,5 +1,6 @@
 /* The section "cloth" of the job document: descriptions are read with their defaults, and mistakes are named. */
 #include "optimizer/job/document/cloth_json.h"
+#include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/document/job_document.h"
 
 #include <math.h>
@@ -17,9 +18,9 @@
 
 static const struct cloth_number *number(const struct job_document *doc, const char *name)
 {
-    int i = cloth_number_index(doc->cloth.description, name);
+    int i = cloth_number_index(doc->cloth->description, name);
     if (i < 0) fail_msg("the cloth has no number '%s'", name);
-    return &doc->cloth.description->number[i];
+    return &doc->cloth->description->number[i];
 }
 
 static void test_a_name_is_enough(void **state)
@@ -29,14 +30,14 @@ static void test_a_name_is_enough(void **state)
         char text[200];
         snprintf(text, sizeof text, CLOTH("\"weave\":\"%s\""), *weave);
         struct job_document *doc = job_document_of_text(text);
-        assert_string_equal(doc->cloth.description->weave, *weave);
-        assert_int_equal(doc->cloth.description->seed, 1);
-        for (size_t i = 0; i < doc->cloth.description->n_number; i++) {
-            assert_false(doc->cloth.description->number[i].fitted);
-            assert_true(doc->cloth.description->number[i].value == doc->cloth.description->number[i].info->standard);
+        assert_string_equal(doc->cloth->description->weave, *weave);
+        assert_int_equal(doc->cloth->description->seed, 1);
+        for (size_t i = 0; i < doc->cloth->description->n_number; i++) {
+            assert_false(doc->cloth->description->number[i].fitted);
+            assert_true(doc->cloth->description->number[i].value == doc->cloth->description->number[i].info->standard);
         }
-        assert_true(cloth_number_index(doc->cloth.description, "yarns[0].fiber_radius_um") >= 0);
-        assert_int_equal(cloth_number_index(doc->cloth.description, "density") >= 0, strcmp(*weave, "felt") == 0);
+        assert_true(cloth_number_index(doc->cloth->description, "yarns[0].fiber_radius_um") >= 0);
+        assert_int_equal(cloth_number_index(doc->cloth->description, "density") >= 0, strcmp(*weave, "felt") == 0);
         job_document_free(doc);
     }
 }
@@ -50,7 +51,7 @@ static void test_everything_given(void **state)
         "24,\"crimp\":{\"lower\":0.4,\"upper\":0.6,\"prior\":[0.5,0.1]},\"disorder\":0.02,\"yarns\":[{\"fibers\":30,"
         "\"packing\":0.55},{\"fibers\":20,\"plies\":2,\"ply_twist_per_m\":-700,\"melange_with\":0,\"melange\":0.3,"
         "\"flatness\":{\"value\":2,\"fit\":false}}]"));
-    const struct cloth_description *d = doc->cloth.description;
+    const struct cloth_description *d = doc->cloth->description;
     assert_true(d->n_weft == 3 && d->n_warp == 4 && d->n_kind == 2 && d->seed == 7);
     assert_true(d->warp_over[2][0] && !d->warp_over[2][1] && d->warp_over[0][1]); /* the upper row first */
     assert_true(d->n_yarn[CLOTH_WARP] == 24 && d->n_yarn[CLOTH_WEFT] == 9);
@@ -72,12 +73,12 @@ static void test_named_kinds(void **state)
     (void)state;
     struct job_document *doc = job_document_of_text(
         CLOTH("\"weave\":\"plain\",\"weft\":[1],\"yarns\":[{\"name\":\"red\"},{\"name\":\"blue\"}]"));
-    assert_int_equal(doc->cloth.n_group, 2);
-    assert_string_equal(doc->cloth.group[0], "red");
-    assert_string_equal(doc->cloth.group[1], "blue");
+    assert_int_equal(doc->cloth->n_group, 2);
+    assert_string_equal(doc->cloth->group[0], "red");
+    assert_string_equal(doc->cloth->group[1], "blue");
     job_document_free(doc);
     doc = job_document_of_text(CLOTH("\"weave\":\"plain\",\"weft\":[1],\"yarns\":[{},{}]"));
-    assert_int_equal(doc->cloth.n_group, 0);
+    assert_int_equal(doc->cloth->n_group, 0);
     job_document_free(doc);
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"weft\":[1],\"yarns\":[{\"name\":\"red\"},{}]"),
                              "cloth.yarns[0].name", "or none");
@@ -92,20 +93,20 @@ static void describes_itself(const char *text)
 {
     struct job_document *doc = job_document_of_text(text);
     json_t *document = json_pack("{s:s, s:o, s:{s:s}}", "sample", "s", "cloth",
-                                 cloth_section_json(doc->cloth.description, NULL), "measurements", "file", "a.csv");
+                                 cloth_section_json(doc->cloth->description, NULL), "measurements", "file", "a.csv");
     char *again_text = json_dumps(document, JSON_REAL_PRECISION(17));
     assert_non_null(again_text);
     struct job_document *again = job_document_of_text(again_text);
-    assert_int_equal(again->cloth.n_group, doc->cloth.n_group);
-    assert_memory_equal(again->cloth.group, doc->cloth.group, sizeof doc->cloth.group);
-    for (size_t i = 0; i < doc->cloth.description->n_number; i++) { /* numbers that were searched are given now */
-        struct cloth_number *n = &doc->cloth.description->number[i];
+    assert_int_equal(again->cloth->n_group, doc->cloth->n_group);
+    assert_memory_equal(again->cloth->group, doc->cloth->group, sizeof doc->cloth->group);
+    for (size_t i = 0; i < doc->cloth->description->n_number; i++) { /* numbers that were searched are given now */
+        struct cloth_number *n = &doc->cloth->description->number[i];
         n->fitted = false;
         n->lower = n->info->lower;
         n->upper = n->info->upper;
-        n->prior_mean = n->prior_sd = again->cloth.description->number[i].prior_mean;
+        n->prior_mean = n->prior_sd = again->cloth->description->number[i].prior_mean;
     }
-    assert_memory_equal(again->cloth.description, doc->cloth.description, sizeof *doc->cloth.description);
+    assert_memory_equal(again->cloth->description, doc->cloth->description, sizeof *doc->cloth->description);
     free(again_text);
     json_decref(document);
     job_document_free(again);

@@ -2,6 +2,11 @@
  * section fit is in test_job_document_fit.c. */
 #include "base/catalogue/method_catalogue.h"
 #include "optimizer/job/document/job_file_name.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/document/job_scan.h"
+#include "optimizer/job/document/job_setup.h"
+#include "optimizer/job/document/picture_words.h"
 #include "optimizer/job/job_parse.h"
 #include "optimizer/job/stage_table.h"
 #include "renderer/scattering/scattering.h"
@@ -22,21 +27,21 @@ static void test_defaults(void **state)
     (void)state;
     struct job_document *d =
         job_document_of_text("{\"sample\":\"blue \xc3\xa9toffe\"," VOLUME ",\"measurements\":{\"file\":\"a.csv\"}}");
-    assert_true(d->scan.given);
-    assert_string_equal(d->scan.file[0], "scan.tif");
-    assert_true(d->scan.voxel_size_um[2] == 2.0);
-    assert_string_equal(d->scan.axes, "xyz");
-    assert_true(isnan(d->scan.density_low) && isnan(d->scan.filter_s) && isnan(d->scan.radius_um) &&
-                isnan(d->fit.model[0].fixed[0]) && isnan(d->fit.model[0].start[8]));
-    assert_true(d->setup.lamp_side_cm == 10.0 && d->setup.lamp_distance_cm == 61.0 &&
-                d->setup.camera_distance_cm == 100.0 && d->setup.crop_cm == 1.0);
-    assert_true(d->setup.black_sheet);
-    assert_int_equal(d->fit.n_model, 1);
-    assert_string_equal(d->fit.model[0].id, "textile.v3");
-    assert_string_equal(d->fit.method, method_gauss_newton.id);
-    assert_int_equal(d->rows.n_photograph, 0);
-    assert_int_equal(d->scan.radius_per_axis, -1);
-    assert_string_equal(d->rows.measurement_file, "a.csv");
+    assert_true(d->scan->given);
+    assert_string_equal(d->scan->file[0], "scan.tif");
+    assert_true(d->scan->voxel_size_um[2] == 2.0);
+    assert_string_equal(d->scan->axes, "xyz");
+    assert_true(isnan(d->scan->density_low) && isnan(d->scan->filter_s) && isnan(d->scan->radius_um) &&
+                isnan(d->fit->model[0].fixed[0]) && isnan(d->fit->model[0].start[8]));
+    assert_true(d->setup->lamp_side_cm == 10.0 && d->setup->lamp_distance_cm == 61.0 &&
+                d->setup->camera_distance_cm == 100.0 && d->setup->crop_cm == 1.0);
+    assert_true(d->setup->black_sheet);
+    assert_int_equal(d->fit->n_model, 1);
+    assert_string_equal(d->fit->model[0].id, "textile.v3");
+    assert_string_equal(d->fit->method, method_gauss_newton.id);
+    assert_int_equal(d->rows->n_photograph, 0);
+    assert_int_equal(d->scan->radius_per_axis, -1);
+    assert_string_equal(d->rows->measurement_file, "a.csv");
     job_document_free(d);
 }
 
@@ -58,18 +63,18 @@ static void test_everything_given(void **state)
         "\"path_budget\":100000,"
         "\"fixed\":{\"beta_R\":5,\"C_R.g\":0.5},\"start\":{\"C_TT\":[0.1,0.2,0.3],\"C_R.r\":0.9},\"render_px\":32,"
         "\"render_samples\":2}}");
-    assert_int_equal(d->scan.n_file, 2);
-    assert_string_equal(d->scan.axes, "-z-x-y");
-    assert_int_equal(d->scan.crop_voxel[5], 12);
-    assert_false(d->setup.black_sheet);
-    assert_int_equal(d->rows.photograph[1].set, JOB_SET_HELD_OUT);
-    assert_true(d->rows.photograph[1].transfer == JOB_TRANSFER_SRGB && d->rows.photograph[1].scale == 2.0 &&
-                d->rows.photograph[1].light_theta_deg == 150.0);
-    const struct scattering_model *m = scattering_find(d->fit.model[0].id);
-    assert_true(d->fit.model[0].start[scattering_param_index(m, "C_TT.b")] == 0.3);
-    assert_true(isnan(d->fit.model[0].start[scattering_param_index(m, "C_R.b")]));
-    assert_true(d->fit.model[0].fixed[scattering_param_index(m, "C_R.g")] == 0.5);
-    assert_true(d->fit.model[0].fixed[scattering_param_index(m, "beta_R")] == 5.0);
+    assert_int_equal(d->scan->n_file, 2);
+    assert_string_equal(d->scan->axes, "-z-x-y");
+    assert_int_equal(d->scan->crop_voxel[5], 12);
+    assert_false(d->setup->black_sheet);
+    assert_int_equal(d->rows->photograph[1].set, JOB_SET_HELD_OUT);
+    assert_true(d->rows->photograph[1].transfer == JOB_TRANSFER_SRGB && d->rows->photograph[1].scale == 2.0 &&
+                d->rows->photograph[1].light_theta_deg == 150.0);
+    const struct scattering_model *m = scattering_find(d->fit->model[0].id);
+    assert_true(d->fit->model[0].start[scattering_param_index(m, "C_TT.b")] == 0.3);
+    assert_true(isnan(d->fit->model[0].start[scattering_param_index(m, "C_R.b")]));
+    assert_true(d->fit->model[0].fixed[scattering_param_index(m, "C_R.g")] == 0.5);
+    assert_true(d->fit->model[0].fixed[scattering_param_index(m, "beta_R")] == 5.0);
     job_document_free(d);
 }
 
@@ -80,11 +85,11 @@ static void test_geometry_only(void **state)
     const char *alone = "{\"sample\":\"s\"," VOLUME "}",
                *on = "{\"sample\":\"s\",\"geometry\":{\"job\":\"5e0c-1\"},\"measurements\":{\"file\":\"a.csv\"}}";
     assert_int_equal(job_document_parse(alone, strlen(alone), &doc, NULL), STATUS_OK);
-    assert_true(job_document_kind(doc) == JOB_OF_GEOMETRY && doc->scan.given && doc->scan.geometry_job[0] == '\0');
+    assert_true(job_document_kind(doc) == JOB_OF_GEOMETRY && doc->scan->given && doc->scan->geometry_job[0] == '\0');
     job_document_free(doc);
     assert_int_equal(job_document_parse(on, strlen(on), &doc, NULL), STATUS_OK);
-    assert_true(job_document_kind(doc) != JOB_OF_GEOMETRY && !doc->scan.given);
-    assert_string_equal(doc->scan.geometry_job, "5e0c-1");
+    assert_true(job_document_kind(doc) != JOB_OF_GEOMETRY && !doc->scan->given);
+    assert_string_equal(doc->scan->geometry_job, "5e0c-1");
     job_document_free(doc);
 }
 
@@ -151,11 +156,11 @@ static void test_alignment(void **state)
     (void)state;
     struct job_document *d =
         job_document_of_text(VOLUME_OF("\"align\":\"auto\",\"crop\":\"auto\",\"crop_keep\":0.3,\"join_seams\":false"));
-    assert_true(d->scan.align && d->scan.crop && d->scan.crop_keep == 0.3 && !d->scan.join_seams);
+    assert_true(d->scan->align && d->scan->crop && d->scan->crop_keep == 0.3 && !d->scan->join_seams);
     job_document_free(d);
     d = job_document_of_text(
         VOLUME_OF("\"align\":\"auto\",\"crop\":\"auto\",\"matrix\":[1,0,0,0,1,0,0,0,1],\"crop_voxel\":[0,0,0,9,9,9]"));
-    assert_true(!d->scan.align && !d->scan.crop && d->scan.join_seams && isnan(d->scan.crop_keep));
+    assert_true(!d->scan->align && !d->scan->crop && d->scan->join_seams && isnan(d->scan->crop_keep));
     job_document_free(d);
     job_document_check_error(VOLUME_OF("\"align\":\"yes\""), "volume.align", "auto");
     job_document_check_error(VOLUME_OF("\"crop\":true"), "volume.crop", "none, auto");
@@ -250,9 +255,9 @@ static void test_raw_volume(void **state)
     (void)state;
     struct job_document *d = job_document_of_text(
         VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint16\",\"endian\":\"big\",\"header_bytes\":8}"));
-    assert_true(d->scan.raw_shape[0] == 3 && d->scan.raw_shape[2] == 5 && d->scan.raw_big_endian &&
-                d->scan.raw_header_bytes == 8);
-    assert_string_equal(d->scan.raw_type, "uint16");
+    assert_true(d->scan->raw_shape[0] == 3 && d->scan->raw_shape[2] == 5 && d->scan->raw_big_endian &&
+                d->scan->raw_header_bytes == 8);
+    assert_string_equal(d->scan->raw_type, "uint16");
     job_document_free(d);
     job_document_free(job_document_of_text(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint8\"}")));
     job_document_check_error(VOLUME_OF("\"raw\":{\"shape\":[3,4,5],\"type\":\"uint16\"}"), "volume.raw",

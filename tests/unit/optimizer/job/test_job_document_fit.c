@@ -1,7 +1,11 @@
 /* The section fit of the job document: models, methods, parameters, ties, bounds, priors, textures. */
 #include "base/catalogue/method_catalogue.h"
 #include "base/catalogue/model_sets.h"
+#include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/document/job_document.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_fit_option.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/job/options/option_table.h"
 #include "renderer/scattering/appearance.h"
 
@@ -44,11 +48,12 @@ static void resolve(const char *fit, struct job_fit_parameter k[JOB_MAX_PARAM])
 {
     const struct job_document *d = job_document_of_text(fit);
     static struct model_sets m;
+    const struct job_cloth *cloth = d->cloth;
     struct error err = {0};
-    assert_int_equal(
-        model_sets_init(&m, model_catalogue_find(d->fit.model[0].id), d->cloth.group, d->cloth.n_group, &err),
-        STATUS_OK);
-    if (job_fit_resolve(m.info.param, m.info.n_param, &d->fit.model[0], k, &err) != STATUS_OK) fail_msg("%s", err.text);
+    assert_int_equal(model_sets_init(&m, model_catalogue_find(d->fit->model[0].id), cloth->group, cloth->n_group, &err),
+                     STATUS_OK);
+    if (job_fit_resolve(m.info.param, m.info.n_param, &d->fit->model[0], k, &err) != STATUS_OK)
+        fail_msg("%s", err.text);
     job_document_free((struct job_document *)(uintptr_t)d);
 }
 
@@ -56,8 +61,8 @@ static void test_names_of_groups(void **state)
 {
     (void)state;
     struct job_document *d = job_document_of_text(FIBERS_OF("\"groups\":[\"warp\",\"we-ft_2\"]"));
-    assert_int_equal(d->cloth.n_group, 2);
-    assert_string_equal(d->cloth.group[1], "we-ft_2");
+    assert_int_equal(d->cloth->n_group, 2);
+    assert_string_equal(d->cloth->group[1], "we-ft_2");
     job_document_free(d);
     job_document_check_error(FIBERS_OF("\"groups\":[\"warp\"]"), "fibers.groups", "2 to 8");
     job_document_check_error(FIBERS_OF("\"groups\":\"warp\""), "fibers.groups", "2 to 8");
@@ -96,7 +101,7 @@ static void test_parameters_of_groups(void **state)
     assert_true(k[7].start == 17.0 && k[16].start == 17.0 && k[9].start == 0.5 * k[0].start);
     const struct job_document *d =
         job_document_of_text(GROUPS_OF("{\"model\":\"two_lobe.v1\",\"tied\":[[\"beta_TT\"]]}"));
-    assert_true(d->fit.model[0].option.leader[16] == 7 && d->fit.model[0].option.leader[17] == 17);
+    assert_true(d->fit->model[0].option.leader[16] == 7 && d->fit->model[0].option.leader[17] == 17);
     job_document_free((struct job_document *)(uintptr_t)d);
     job_document_check_error(GROUPS_OF("{\"fixed\":{\"pile.C_R\":0.1}}"), "fit.fixed.pile.C_R", "or weft.C_R ...");
     job_document_check_error(GROUPS_OF("{\"start\":{\"C_R\":[0.1,0.2,0.3,0.1,0.2,0.3]}}"), "fit.start.C_R",
@@ -113,7 +118,7 @@ static void test_groups_and_volume_models(void **state)
     (void)state;
     struct job_document *d = job_document_of_text(
         GROUPS_OF("{\"models\":[\"microflake.v1\",\"two_lobe.v1\"],\"start\":{\"weft.C_R\":0.2}}"));
-    assert_true(d->fit.model[1].start[9] == 0.2 && isnan(d->fit.model[0].start[9]));
+    assert_true(d->fit->model[1].start[9] == 0.2 && isnan(d->fit->model[0].start[9]));
     job_document_free(d);
 }
 
@@ -135,18 +140,18 @@ static void test_fit_options(void **state)
         job_document_of_text(FIT_OF("{\"starts\":4,\"nuisance\":{\"gain\":\"per_photograph\",\"gain_prior_rel\":0.1,"
                                     "\"stray_light\":true},\"models\":[\"two_lobe.v1\",\"two_lobe_balanced.v1\"]}"));
     for (size_t i = 0; i < 2; i++) {
-        const struct job_fit_option *o = &d->fit.model[i].option;
+        const struct job_fit_option *o = &d->fit->model[i].option;
         assert_true(o->n_start == 4 && o->gain == JOB_GAIN_PER_PHOTOGRAPH && o->gain_prior_rel == 0.1);
         assert_true(o->stray_light && o->stray_light_prior == 0.01);
     }
     job_document_free(d);
     d = job_document_of_text(FIT_OF("{\"candidates\":{\"grid\":true}}"));
-    assert_int_equal(d->fit.n_candidate, 56);
+    assert_int_equal(d->fit->n_candidate, 56);
     job_document_free(d);
     d = job_document_of_text(FIT_OF(
         "{\"candidates\":[{\"light_theta_deg\":10,\"light_phi_deg\":1,\"camera_theta_deg\":2,\"camera_phi_deg\":3}]}"));
-    assert_true(d->fit.n_candidate == 1 && d->fit.candidate[0].camera_phi_deg == 3.0 &&
-                d->fit.candidate[0].cloth_rotation_deg == 0.0);
+    assert_true(d->fit->n_candidate == 1 && d->fit->candidate[0].camera_phi_deg == 3.0 &&
+                d->fit->candidate[0].cloth_rotation_deg == 0.0);
     job_document_free(d);
 }
 
@@ -184,20 +189,21 @@ static void test_texture(void **state)
 {
     (void)state;
     struct job_document *d = job_document_of_text(FIT_OF("{\"texture\":{\"block_mm\":0.5}}"));
-    assert_true(d->fit.texture_block_mm == 0.5 && d->fit.texture_weight == 1.0 &&
-                job_texture_cells(d->setup.crop_cm, d->fit.texture_block_mm) == 20);
+    assert_true(d->fit->texture_block_mm == 0.5 && d->fit->texture_weight == 1.0 &&
+                job_texture_cells(d->setup->crop_cm, d->fit->texture_block_mm) == 20);
     job_document_free(d);
     d = job_document_of_text(FIT_OF(
         "{\"texture\":{\"block_mm\":0.85}}")); /* the crop has 11.8 of these blocks, so 12 smaller ones are used */
-    assert_true(d->fit.texture_block_mm == 0.85 && job_texture_cells(d->setup.crop_cm, d->fit.texture_block_mm) == 12 &&
-                job_texture_cell_mm(d->setup.crop_cm, d->fit.texture_block_mm) == 10.0 / 12);
+    assert_true(d->fit->texture_block_mm == 0.85 &&
+                job_texture_cells(d->setup->crop_cm, d->fit->texture_block_mm) == 12 &&
+                job_texture_cell_mm(d->setup->crop_cm, d->fit->texture_block_mm) == 10.0 / 12);
     job_document_free(d);
     d = job_document_of_text(FIT_OF("{\"texture\":{\"block_mm\":5,\"weight\":0},\"method\":\"published_sgd.v1\"}"));
-    assert_true(d->fit.texture_block_mm == 5.0 && d->fit.texture_weight == 0.0 &&
-                job_texture_cells(d->setup.crop_cm, d->fit.texture_block_mm) == 2);
+    assert_true(d->fit->texture_block_mm == 5.0 && d->fit->texture_weight == 0.0 &&
+                job_texture_cells(d->setup->crop_cm, d->fit->texture_block_mm) == 2);
     job_document_free(d);
     d = job_document_of_text(FIT_OF("{}"));
-    assert_true(d->fit.texture_block_mm == 0.0);
+    assert_true(d->fit->texture_block_mm == 0.0);
     job_document_free(d);
     job_document_check_error("{\"sample\":\"s\"," VOLUME
                              ",\"measurements\":{\"file\":\"a.csv\"},\"fit\":{\"texture\":{\"block_mm\":1}}}",
@@ -315,9 +321,9 @@ static void test_bounds_are_values(void **state)
     (void)state;
     struct job_document *d = job_document_of_text(
         FIT_OF("{\"model\":\"two_lobe.v1\",\"start\":{\"beta_TT\":45,\"gamma_TT\":1},\"fixed\":{\"C_TT\":0.999}}"));
-    const struct scattering_model *m = scattering_find(d->fit.model[0].id);
-    assert_true(fabs(d->fit.model[0].start[scattering_param_index(m, "beta_TT")] - 45.0) < 1e-9);
-    assert_true(d->fit.model[0].fixed[scattering_param_index(m, "C_TT.g")] == 0.999);
+    const struct scattering_model *m = scattering_find(d->fit->model[0].id);
+    assert_true(fabs(d->fit->model[0].start[scattering_param_index(m, "beta_TT")] - 45.0) < 1e-9);
+    assert_true(d->fit->model[0].fixed[scattering_param_index(m, "C_TT.g")] == 0.999);
     job_document_free(d);
 }
 

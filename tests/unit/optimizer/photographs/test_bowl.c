@@ -2,6 +2,7 @@
  * errors, the fit to them, and inputs that are refused. */
 #include "base/angle.h"
 #include "optimizer/fit/profile/profile_fit.h"
+#include "optimizer/job/document/job_profile.h"
 #include "optimizer/job/job_parse.h"
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/photographs/profile/bowl_profile.h"
@@ -119,7 +120,8 @@ static void load(void **state, const struct scene *s, const char *photographs, s
     struct job_document *doc = NULL;
     struct error err = {0};
     snprintf(bowl, sizeof bowl, SAID ",%s", s->marks, photographs);
-    if (parse(bowl, &doc, &err) != STATUS_OK || bowl_profile_load(profile, doc, *state, record, &err) != STATUS_OK)
+    if (parse(bowl, &doc, &err) != STATUS_OK ||
+        bowl_profile_load(profile, &doc->profile->bowl, doc->setup, doc->rows, *state, record, &err) != STATUS_OK)
         fail_msg("%s: %s", err.field, err.text);
     job_document_free(doc);
 }
@@ -266,7 +268,7 @@ static void refused_files(void **state, const char *marks, const char *photograp
     snprintf(bowl, sizeof bowl, "\"radius_mm\":75,\"height_mm\":73,\"reflectance\":0.2,\"marks\":[%s],%s", marks,
              photographs);
     assert_int_equal(parse(bowl, &doc, &err), STATUS_OK);
-    assert_true(bowl_profile_load(&p, doc, *state, NULL, &err) != STATUS_OK);
+    assert_true(bowl_profile_load(&p, &doc->profile->bowl, doc->setup, doc->rows, *state, NULL, &err) != STATUS_OK);
     job_option_name_field(STATUS_INVALID, &err);
     if ((field[0] != '\0' && strcmp(err.field, field) != 0) || strstr(err.text, says[0]) == NULL ||
         strstr(err.text, says[1]) == NULL)

@@ -130,7 +130,7 @@ static status load(void **state, const char *measurements, struct observation_se
              measurements);
     struct job_document *doc = job_document_of_text(text);
     observation_set_init(o);
-    status s = observation_set_load(doc, folder, NULL, NULL, o, err);
+    status s = observation_set_load(doc->setup, doc->rows, doc->fit, folder, NULL, NULL, o, err);
     job_document_free(doc);
     return s;
 }

@@ -1,5 +1,6 @@
 /* Files of RGL's database: values that are known in closed form, symmetries, spectra, samples that were not measured,
  * damaged files. tests/api/photographs/test_measured_brdf.py compares with another writer, and with Mitsuba. */
+#include "optimizer/job/document/job_rows.h"
 #include "optimizer/photographs/rows/brdf_file.h"
 #include "optimizer/photographs/rows/brdf_spectrum.h"
 #include "tests/support/rgl_bytes.h"

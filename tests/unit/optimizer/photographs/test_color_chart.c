@@ -1,6 +1,7 @@
 /* The color matrix on patches without noise, published color differences, and ColorCheckers: drawn and warped here, and
  * a real one (data/color-target). */
 #include "base/rng.h"
+#include "optimizer/job/document/job_photograph.h"
 #include "optimizer/photographs/camera/color_chart.h"
 #include "optimizer/photographs/camera/color_matrix.h"
 #include "optimizer/photographs/reader/photograph.h"

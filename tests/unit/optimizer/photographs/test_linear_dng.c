@@ -1,4 +1,5 @@
 /* Raw pictures that are no mosaic: linear DNG, as converters of raw files write it, and a sensor without colors. */
+#include "optimizer/job/document/job_photograph.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "tests/support/scratch_folder.h"
 

@@ -1,5 +1,7 @@
 /* Markers around a sample, drawn as a pinhole camera sees them: the crop and the camera's place follow. */
 #include "geometry/vision/vision_markers.h"
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_rows.h"
 #include "optimizer/photographs/camera/marker_views.h"
 #include "optimizer/photographs/camera/photograph_develop.h"
 #include "optimizer/photographs/camera/plane_pose.h"
@@ -161,7 +163,7 @@ static struct job_document *load_job(void **state, const char *rig, const struct
         "{\"sample\":\"s\",\"fibers\":{\"file\":\"c.hair\"},\"rig\":{\"file\":\"rig.json\"},\"photographs\":[{\"file\":"
         "\"a.exr\",\"set\":\"fit\",\"view\":\"v\"}]}");
     photograph_process_init(k);
-    if (photograph_process_load(k, doc, folder, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (photograph_process_load(k, doc->setup, doc->rows, folder, &err) != STATUS_OK) fail_msg("%s", err.text);
     return doc;
 }
 
@@ -181,15 +183,15 @@ static void test_job_with_markers(void **state)
     camera_at(35, 200, camera);
     draw(&im, camera, 0);
     struct job_document *doc = load_job(state, rig, &im, &k, folder);
-    const struct job_photograph *p = &doc->rows.photograph[0];
+    const struct job_photograph *p = &doc->rows->photograph[0];
     assert_true(fabs(p->camera_theta_deg - 35.0) < 0.5 && fabs(p->camera_phi_deg - (200.0 - 360.0 + 30.0)) < 0.7);
     assert_true(fabs(p->camera_distance_cm - 50.0) < 0.6 && p->light_theta_deg == 20.0);
     assert_true(p->crop_px[0] >= 424 && p->crop_px[0] <= 426 && p->crop_px[2] - p->crop_px[0] == 30);
     photograph_process_release(&k);
     for (size_t i = 0; i < (size_t)WIDTH * HEIGHT * 3; i++) im.pixel[i] = 0.5f;
     assert_int_equal(image_write_exr(&im, scratch_path(state, "a.exr"), NULL), STATUS_OK);
-    doc->rows.photograph[0].crop_px[2] = 0;
-    assert_int_equal(photograph_process_load(&k, doc, folder, &err), STATUS_INVALID);
+    doc->rows->photograph[0].crop_px[2] = 0;
+    assert_int_equal(photograph_process_load(&k, doc->setup, doc->rows, folder, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "'a.exr': it shows 0 of the 4 markers"));
     assert_string_equal(err.field, "photograph_file[0]");
     photograph_process_release(&k);
@@ -291,7 +293,7 @@ static void test_job_with_a_board(void **state)
     camera_at(40, 120, camera);
     draw_board(&im, camera, &lens, 20.0);
     struct job_document *doc = load_job(state, rig, &im, &k, folder);
-    const struct job_photograph *p = &doc->rows.photograph[0];
+    const struct job_photograph *p = &doc->rows->photograph[0];
     assert_true(fabs(p->camera_theta_deg - 40.0) < 0.3 && fabs(p->camera_phi_deg - 120.0) < 0.4);
     assert_true(fabs(p->camera_distance_cm - 50.0) < 0.3);
     assert_true(p->crop_px[0] >= 424 && p->crop_px[0] <= 426 && p->crop_px[2] - p->crop_px[0] == 30);

@@ -1,6 +1,9 @@
 /* Tables of measured radiances: values are read correctly, and errors name file, line and column. */
 #include "base/option_id.h"
 #include "optimizer/job/document/job_file_name.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/photographs/rows/measurement_table.h"
 #include "optimizer/photographs/rows/observation_load.h"
 
@@ -15,11 +18,8 @@
 
 #define HEAD "set,index,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg,r,g,b\n"
 
-static const struct job_document set_up = {.setup.lamp_side_cm = 10,
-                                           .setup.lamp_distance_cm = 61,
-                                           .setup.camera_distance_cm = 100,
-                                           .setup.crop_cm = 1,
-                                           .setup.black_sheet = true};
+static const struct job_setup set_up = {
+    .lamp_side_cm = 10, .lamp_distance_cm = 61, .camera_distance_cm = 100, .crop_cm = 1, .black_sheet = true};
 
 static void check_error(const char *text, status code, const char *part)
 {
@@ -207,13 +207,14 @@ static void test_real_tables(void **state)
     (void)state;
     const char *data = getenv("SELVEDGE_DATA"), *name[] = {"merl-blue-fabric", "nielsen-greencloth", "merl-pink-felt"};
     for (size_t i = 0; i < 3; i++) {
-        struct job_document doc = set_up;
+        struct job_rows asked = {.measurement_file = ""};
+        const struct job_fit fit = {0};
         struct observation_set o;
         struct error err = {0};
         char folder[1000], path[1200];
         snprintf(folder, sizeof folder, "%s/measured-reflectance", data != NULL ? data : "../shared/data");
-        snprintf(doc.rows.measurement_file, sizeof doc.rows.measurement_file, "%s.csv", name[i]);
-        snprintf(path, sizeof path, "%s/%s", folder, doc.rows.measurement_file);
+        snprintf(asked.measurement_file, sizeof asked.measurement_file, "%s.csv", name[i]);
+        snprintf(path, sizeof path, "%s/%s", folder, asked.measurement_file);
         FILE *f = fopen(path, "rb");
         if (f == NULL) {
             print_message("real data absent: %s (set SELVEDGE_DATA)\n", path);
@@ -221,7 +222,8 @@ static void test_real_tables(void **state)
         }
         fclose(f);
         observation_set_init(&o);
-        if (observation_set_load(&doc, folder, NULL, NULL, &o, &err) != STATUS_OK) fail_msg("%s", err.text);
+        if (observation_set_load(&set_up, &asked, &fit, folder, NULL, NULL, &o, &err) != STATUS_OK)
+            fail_msg("%s", err.text);
         assert_int_equal(observation_set_count(&o, JOB_SET_FIT), 16);
         assert_int_equal(observation_set_count(&o, JOB_SET_HELD_OUT), 24);
         observation_set_release(&o);

@@ -1,4 +1,8 @@
 /* Contrasts of photographs: of a chess board with noise, their stated errors, and blocks whose edges divide pixels. */
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "optimizer/photographs/reader/photograph_contrast.h"
 #include "optimizer/photographs/rows/observation.h"
@@ -127,22 +131,21 @@ static void test_warning_of_a_black_channel(void **state)
     snprintf(folder, sizeof folder, "%.*s", (int)(strrchr(path, '/') - path), path);
     for (int black = 0; black < 2; black++)
         for (int used = 0; used < 2; used++) {
-            struct job_document doc = {
-                .rows.photograph = &photograph, .rows.n_photograph = 1, .fit.texture_block_mm = 1.0};
+            const struct job_setup setup = {.crop_cm = 1.0};
+            const struct job_rows rows = {.photograph = &photograph, .n_photograph = 1};
+            const struct job_fit fit = {.texture_block_mm = 1.0, .texture_weight = used};
             struct observation_set o;
             struct image im;
             struct error err = {0};
             size_t n_warning = 0;
-            doc.setup.crop_cm = 1.0;
-            doc.fit.texture_weight = used;
             assert_int_equal(image_init(&im, 40, 40, 3, NULL), STATUS_OK);
             draw(&im, &(struct rng_key){.seed = 3}, 1, 0.0, 0.05, 3);
             for (size_t i = 0; black && i < 40 * 40; i++) im.pixel[3 * i] = 0.0f;
             assert_int_equal(image_write_exr(&im, path, NULL), STATUS_OK);
             image_release(&im);
             observation_set_init(&o);
-            if (observation_set_load(&doc, folder, NULL, &(struct warning_sink){count_warning, &n_warning}, &o, &err) !=
-                STATUS_OK)
+            if (observation_set_load(&setup, &rows, &fit, folder, NULL,
+                                     &(struct warning_sink){count_warning, &n_warning}, &o, &err) != STATUS_OK)
                 fail_msg("%s", err.text);
             assert_int_equal(n_warning, black && used);
             observation_set_release(&o);

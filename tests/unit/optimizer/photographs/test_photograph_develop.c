@@ -143,8 +143,8 @@ static status load(void **state, struct job_document *doc, struct observation_se
     snprintf(folder, sizeof folder, "%.*s", (int)(strrchr(path, '/') - path), path);
     observation_set_init(o);
     photograph_process_init(&k);
-    status s = photograph_process_load(&k, doc, folder, err);
-    if (s == STATUS_OK) s = observation_set_load(doc, folder, &k, NULL, o, err);
+    status s = photograph_process_load(&k, doc->setup, doc->rows, folder, err);
+    if (s == STATUS_OK) s = observation_set_load(doc->setup, doc->rows, doc->fit, folder, &k, NULL, o, err);
     photograph_process_release(&k);
     return s;
 }

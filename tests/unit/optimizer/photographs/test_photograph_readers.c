@@ -1,5 +1,6 @@
 /* The picture readers: exact values of files written here, what they state of the exposure, and files that must be
  * refused with a sentence that names file and reason. */
+#include "optimizer/job/document/job_photograph.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "optimizer/tools/simulated_camera/dng_file.h"
 #include "tests/support/camera_files.h"

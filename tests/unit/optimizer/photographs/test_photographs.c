@@ -1,6 +1,7 @@
 /* Mean radiances of photographs: exact means, standard errors that include texture, and pictures that must be
  * refused. */
 #include "base/rng.h"
+#include "optimizer/job/document/job_photograph.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "optimizer/photographs/rows/observation.h"
 #include "tests/support/scratch_folder.h"

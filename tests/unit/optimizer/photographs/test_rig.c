@@ -1,4 +1,6 @@
 /* The rig file, positions in millimetres, and the errors of a lens. */
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_rows.h"
 #include "optimizer/photographs/camera/rig.h"
 #include "optimizer/photographs/rows/observation_load.h"
 #include "tests/support/scratch_folder.h"
@@ -57,7 +59,7 @@ static void test_radians(void **state)
         char text[400];
         snprintf(text, sizeof text, "{\"selvedge_rig\":1,\"lamps\":{%s},\"views\":{}}", given[i].stations);
         scratch_write(path, text, strlen(text));
-        status s = rig_apply(path, doc, &lens, &board, &err);
+        status s = rig_apply(path, doc->setup, doc->rows, &lens, &board, &err);
         if (s != (given[i].refused ? STATUS_INVALID : STATUS_OK)) fail_msg("%zu: %s", i, err.text);
         if (given[i].refused) assert_non_null(strstr(err.text, "look like radians"));
     }
@@ -73,19 +75,19 @@ static void test_views(void **state)
     scratch_write(path, good_rig, strlen(good_rig));
     struct job_document *doc = job_document_of_text(
         DOCUMENT("{\"file\":\"a.exr\",\"set\":\"fit\",\"view\":\"v1\"},{\"file\":\"b.exr\",\"view\":\"v2\"}", RIG));
-    if (rig_apply(path, doc, &lens, &board, &err) != STATUS_OK) fail_msg("%s", err.text);
-    const struct job_photograph *p = doc->rows.photograph;
+    if (rig_apply(path, doc->setup, doc->rows, &lens, &board, &err) != STATUS_OK) fail_msg("%s", err.text);
+    const struct job_photograph *p = doc->rows->photograph;
     assert_true(fabs(p[0].light_theta_deg - 30.0) < 1e-4 && fabs(p[0].light_phi_deg - 90.0) < 1e-9);
     assert_true(fabs(p[0].light_distance_cm - 61.0) < 1e-4 && p[0].camera_distance_cm == 80.0);
     assert_true(p[0].camera_theta_deg == 45.0 && p[0].camera_phi_deg == -90.0 && p[0].cloth_rotation_deg == 90.0);
     assert_true(p[1].light_theta_deg == 10.0 && isnan(p[1].light_distance_cm) && p[1].cloth_rotation_deg == 0.0);
     assert_true(lens.has_vignetting && !lens.has_distortion && lens.vignetting[0] == -0.3);
-    snprintf(doc->rows.photograph[1].view, sizeof doc->rows.photograph[1].view, "v3");
-    assert_int_equal(rig_apply(path, doc, &lens, &board, &err), STATUS_INVALID);
+    snprintf(doc->rows->photograph[1].view, sizeof doc->rows->photograph[1].view, "v3");
+    assert_int_equal(rig_apply(path, doc->setup, doc->rows, &lens, &board, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "cannot use rig 'rig.json'"));
     assert_non_null(strstr(err.text, "'lamps' has no 'none'"));
-    snprintf(doc->rows.photograph[1].view, sizeof doc->rows.photograph[1].view, "v9");
-    assert_int_equal(rig_apply(path, doc, &lens, &board, &err), STATUS_INVALID);
+    snprintf(doc->rows->photograph[1].view, sizeof doc->rows->photograph[1].view, "v9");
+    assert_int_equal(rig_apply(path, doc->setup, doc->rows, &lens, &board, &err), STATUS_INVALID);
     assert_string_equal(err.field, "photograph_view[1]");
     assert_non_null(strstr(err.text, "'b.exr' names the view 'v9'"));
     job_document_free(doc);
@@ -141,7 +143,7 @@ static void test_bad_rigs(void **state)
         struct marker_board board;
         struct error err = {0};
         scratch_write(path, bad[i].rig, strlen(bad[i].rig));
-        assert_int_not_equal(rig_apply(path, doc, &lens, &board, &err), STATUS_OK);
+        assert_int_not_equal(rig_apply(path, doc->setup, doc->rows, &lens, &board, &err), STATUS_OK);
         if (strstr(err.text, bad[i].part) == NULL || strstr(err.text, "rig.json") == NULL)
             fail_msg("'%s' is not in '%s'", bad[i].part, err.text);
         assert_string_equal(err.field, "rig_file");
@@ -156,9 +158,9 @@ static void test_places_in_documents(void **state)
     (void)state;
     struct job_document *doc =
         job_document_of_text(DOCUMENT("{" FILE_A CAMERA ",\"light_position_mm\":[300,0,300]}", ""));
-    assert_true(fabs(doc->rows.photograph[0].light_theta_deg - 45.0) < 1e-9);
-    assert_true(fabs(doc->rows.photograph[0].light_distance_cm - 30.0 * sqrt(2.0)) < 1e-9);
-    assert_true(isnan(doc->rows.photograph[0].camera_distance_cm));
+    assert_true(fabs(doc->rows->photograph[0].light_theta_deg - 45.0) < 1e-9);
+    assert_true(fabs(doc->rows->photograph[0].light_distance_cm - 30.0 * sqrt(2.0)) < 1e-9);
+    assert_true(isnan(doc->rows->photograph[0].camera_distance_cm));
     job_document_free(doc);
     job_document_check_error(DOCUMENT("{" FILE_A CAMERA "}", ""), "photographs[0].light_theta_deg", "is missing");
     job_document_check_error(DOCUMENT("{" FILE_A CAMERA ",\"light_theta_deg\":3}", ""), "photographs[0].light_phi_deg",
@@ -242,8 +244,10 @@ static void test_light_of_a_view(void **state)
                                       RIG));
     observation_set_init(&o);
     photograph_process_init(&k);
-    if (photograph_process_load(&k, doc, folder_of(state), &err) != STATUS_OK) fail_msg("%s", err.text);
-    if (observation_set_load(doc, folder_of(state), &k, NULL, &o, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (photograph_process_load(&k, doc->setup, doc->rows, folder_of(state), &err) != STATUS_OK)
+        fail_msg("%s", err.text);
+    if (observation_set_load(doc->setup, doc->rows, doc->fit, folder_of(state), &k, NULL, &o, &err) != STATUS_OK)
+        fail_msg("%s", err.text);
     assert_true(fabs(o.item[0].mean_rgb[1] - 0.4) < 1e-5 && o.item[0].se_rgb[1] < 1e-5);
     assert_true(fabs(o.item[1].mean_rgb[1] - 0.1) < 1e-5); /* four times the light */
     assert_true(o.item[0].configuration.light_distance_m == 0.61 && o.item[1].configuration.light_distance_m == 0.305);

@@ -1,4 +1,5 @@
 /* The choice between the models of a job. */
+#include "optimizer/job/document/job_fit_option.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 
 #include <setjmp.h>

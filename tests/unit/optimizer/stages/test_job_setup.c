@@ -3,6 +3,7 @@
 #include "base/angle.h"
 #include "base/files/durable.h"
 #include "base/option_id.h"
+#include "optimizer/job/document/job_fit.h"
 #include "optimizer/stages/fit/pipeline_trace.h"
 #include "optimizer/stages/geometry_stages.h"
 #include "renderer/transport/estimate/estimate.h"
@@ -87,10 +88,10 @@ static void compare(void **state, const char *set_up, const char *fit, const str
     memset(&made, 0, sizeof made);
     fiber_set_init(&fibers_out.fiber);
     if (job_inputs_read(&tools, &in, &err) != STATUS_OK) fail_msg("%s: %s", err.field, err.text);
-    const struct job_document *doc = in.doc;
-    const struct fibers_input stage = {.tools = &tools, .scan = &doc->scan, .cloth = &doc->cloth};
-    const struct cloth_job job = {&tools,   &doc->scan, &doc->cloth, &doc->setup, &doc->fit,
-                                  &in.rows, in.n_model, in.model,    &in.number};
+    const struct job_sections *section = &in.section;
+    const struct fibers_input stage = {.tools = &tools, .scan = section->scan, .cloth = section->cloth};
+    const struct cloth_job job = {&tools,   section->scan, section->cloth, section->setup, section->fit,
+                                  &in.rows, in.n_model,    in.model,       &in.number,     section->fit->seed};
     assert_int_equal(stage_fibers(&stage, &fibers_out, &err), STATUS_OK);
     made.fiber = fibers_out.fiber;
     assert_int_equal(made_cloth_make_scene(&job, &made, &err), STATUS_OK);

@@ -1,5 +1,7 @@
 /* Start values that a described cloth takes from a photograph: threads, flatness, crimp, covers, colors; what the job
  * states stays. */
+#include "base/catalogue/correction_numbers.h"
+#include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/job_parse.h"
 #include "optimizer/stages/reading/texture_start.h"
 
@@ -34,7 +36,7 @@ static void job_init(struct job *j, const char *cloth, const char *yarn)
         cloth, yarn, fit_text);
     if (job_document_parse(text, strlen(text), &j->doc, &err) != STATUS_OK) fail_msg("%s: %s", err.field, err.text);
     job_inputs_init(&j->in);
-    j->in.doc = j->doc;
+    j->in.section = job_document_sections(j->doc);
     j->in.model = &j->model;
     j->in.n_model = 1;
     j->in.texture = (struct texture_guess){.found = true,
@@ -47,9 +49,9 @@ static void job_init(struct job *j, const char *cloth, const char *yarn)
                                                      .draft_confidence = 0.9,
                                                      .cover_confidence = 0.6,
                                                      .color_confidence = 0.8}};
-    const char(*group)[MODEL_SET_NAME_BYTES] = (const char(*)[MODEL_SET_NAME_BYTES])j->doc->cloth.group;
+    const char(*group)[MODEL_SET_NAME_BYTES] = (const char(*)[MODEL_SET_NAME_BYTES])j->doc->cloth->group;
     const struct model_info *model = model_catalogue_find("two_lobe.v1");
-    assert_int_equal(model_sets_init(&j->model.sets, model, group, j->doc->cloth.n_group, &err), STATUS_OK);
+    assert_int_equal(model_sets_init(&j->model.sets, model, group, j->doc->cloth->n_group, &err), STATUS_OK);
     for (size_t p = 0; p < j->model.sets.info.n_param; p++)
         j->model.parameter[p] = (struct fit_parameter){.lower = 0.01, .upper = 0.99, .start = 0.123};
     /* lit from the front at 60 degrees, and from behind */
@@ -63,8 +65,8 @@ static void job_release(struct job *j) { job_document_free(j->doc); }
 
 static double number(const struct job *j, const char *name)
 {
-    int i = cloth_number_index(j->doc->cloth.description, name);
-    return i >= 0 ? j->doc->cloth.description->number[i].value : NAN;
+    int i = cloth_number_index(j->doc->cloth->description, name);
+    return i >= 0 ? j->doc->cloth->description->number[i].value : NAN;
 }
 
 static bool was_taken(const struct job *j, const char *name)
@@ -79,7 +81,7 @@ static void covers_without_a_scale(void **state)
     (void)state;
     struct job j;
     job_init(&j, "\"cover_weft\":0.7,", "");
-    assert_int_equal(texture_take_widths(&j.doc->cloth, &j.in.texture, NULL), STATUS_OK);
+    assert_int_equal(texture_take_widths(j.doc->cloth, &j.in.texture, NULL), STATUS_OK);
     assert_true(number(&j, "cover_warp") == 0.9 && number(&j, "cover_weft") == 0.7 && number(&j, "crimp") == 0.5);
     assert_true(was_taken(&j, "cover_warp") && !was_taken(&j, "cover_weft") && j.in.texture.n_taken == 1);
     job_release(&j);
@@ -90,8 +92,8 @@ static void threads_with_a_scale(void **state)
     (void)state;
     struct job j;
     job_init(&j, "\"texture_px_per_mm\":40,", "");
-    assert_int_equal(texture_take_widths(&j.doc->cloth, &j.in.texture, NULL), STATUS_OK);
-    const struct cloth_description *d = j.doc->cloth.description;
+    assert_int_equal(texture_take_widths(j.doc->cloth, &j.in.texture, NULL), STATUS_OK);
+    const struct cloth_description *d = j.doc->cloth->description;
     assert_true(d->threads_per_cm[CLOTH_WARP] == 40.0 && d->threads_per_cm[CLOTH_WEFT] == 20.0);
     assert_true(isnan(number(&j, "cover_warp")) && isnan(number(&j, "cover_weft")));
     assert_true(fabs(number(&j, "crimp") - 0.8) < 1e-12); /* 20^2 / (10^2 + 20^2) */
@@ -107,9 +109,9 @@ static void given_values_stay(void **state)
     (void)state;
     struct job j;
     job_init(&j, "\"texture_px_per_mm\":40,\"warp_per_cm\":33,\"cover_weft\":0.7,\"crimp\":0.4,", ",\"flatness\":3");
-    assert_int_equal(texture_take_widths(&j.doc->cloth, &j.in.texture, NULL), STATUS_OK);
-    assert_true(j.doc->cloth.description->threads_per_cm[CLOTH_WARP] == 33.0 &&
-                j.doc->cloth.description->threads_per_cm[CLOTH_WEFT] == 0.0);
+    assert_int_equal(texture_take_widths(j.doc->cloth, &j.in.texture, NULL), STATUS_OK);
+    assert_true(j.doc->cloth->description->threads_per_cm[CLOTH_WARP] == 33.0 &&
+                j.doc->cloth->description->threads_per_cm[CLOTH_WEFT] == 0.0);
     assert_true(number(&j, "cover_weft") == 0.7 && number(&j, "crimp") == 0.4 &&
                 number(&j, "yarns[0].flatness") == 3.0);
     assert_true(j.in.texture.n_taken == 0);
@@ -122,8 +124,8 @@ static void what_is_not_certain_is_not_taken(void **state)
     struct job j;
     job_init(&j, "\"texture_px_per_mm\":40,\"texture_colors\":true,", "");
     j.in.texture.guess.yarns_confidence = j.in.texture.guess.cover_confidence = 0.2;
-    assert_int_equal(texture_take_widths(&j.doc->cloth, &j.in.texture, NULL), STATUS_OK);
-    assert_true(j.in.texture.n_taken == 0 && j.doc->cloth.description->threads_per_cm[CLOTH_WARP] == 0.0);
+    assert_int_equal(texture_take_widths(j.doc->cloth, &j.in.texture, NULL), STATUS_OK);
+    assert_true(j.in.texture.n_taken == 0 && j.doc->cloth->description->threads_per_cm[CLOTH_WARP] == 0.0);
     job_release(&j);
 }
 
@@ -133,7 +135,7 @@ static void a_wrong_scale_is_named(void **state)
     struct job j;
     struct error err = {0};
     job_init(&j, "\"texture_px_per_mm\":5000,", "");
-    assert_int_equal(texture_take_widths(&j.doc->cloth, &j.in.texture, &err), STATUS_INVALID);
+    assert_int_equal(texture_take_widths(j.doc->cloth, &j.in.texture, &err), STATUS_INVALID);
     assert_string_equal(err.field, "texture_px_per_mm");
     assert_non_null(strstr(err.text, "5000 warp yarns"));
     job_release(&j);

@@ -254,7 +254,7 @@ static void test_fibers_wider_than_the_tile(void **state)
         memset(&out, 0, sizeof out);
         fiber_set_init(&out.fiber);
         if (job_inputs_read(&tools, &in, &err) != STATUS_OK) fail_msg("%s", err.text);
-        const struct fibers_input stage = {.tools = &tools, .scan = &in.doc->scan, .cloth = &in.doc->cloth};
+        const struct fibers_input stage = {.tools = &tools, .scan = in.section.scan, .cloth = in.section.cloth};
         assert_int_equal(stage_fibers(&stage, &out, &err), i == 0 ? STATUS_OK : STATUS_INVALID);
         if (i == 1) {
             assert_string_equal(err.field, OPTION_FIBER_FILE);

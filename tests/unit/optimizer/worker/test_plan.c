@@ -1,4 +1,8 @@
 /* What a job expects of its fit and its pictures: paths of the fit by its rows, size and samples of the renderings. */
+#include "optimizer/job/document/job_document.h"
+#include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_results.h"
+#include "optimizer/job/document/job_rows.h"
 #include "optimizer/report/result/result_pictures.h"
 #include "optimizer/worker/pipeline_plan.h"
 #include "optimizer/worker/plan_probe.h"
@@ -18,7 +22,7 @@ enum { N_ROW = 16, N_ALL = 40 };
 struct job {
     struct job_plan plan;
     struct job_inputs in;
-    struct job_document doc;
+    struct job_document *doc;
     struct observation row[N_ROW];
 };
 
@@ -26,9 +30,12 @@ struct job {
 static struct job *make_job(void)
 {
     static struct job j;
+    job_document_free(j.doc);
     memset(&j, 0, sizeof j);
-    snprintf(j.doc.fit.method, sizeof j.doc.fit.method, "gauss_newton.v1");
-    j.in.doc = &j.doc;
+    j.doc = job_document_new();
+    assert_non_null(j.doc);
+    snprintf(j.doc->fit->method, sizeof j.doc->fit->method, "gauss_newton.v1");
+    j.in.section = job_document_sections(j.doc);
     j.in.rows.fitted.item = j.row;
     j.in.rows.fitted.n = N_ROW;
     j.in.rows.observation.n = N_ALL;
@@ -42,16 +49,16 @@ static void test_paths_follow_from_the_rows(void **state)
     struct job *j = make_job();
     const double of_table = pipeline_plan_usual_paths(&j->plan);
     assert_true(of_table > 0.5e6 && of_table < 2e6);
-    j->doc.rows.n_photograph = N_ALL; /* their errors end a fit much later */
+    j->doc->rows->n_photograph = N_ALL; /* their errors end a fit much later */
     const double of_photographs = pipeline_plan_usual_paths(&j->plan);
     assert_true(of_photographs > 3e6 && of_photographs < 6e6);
     j->in.rows.fitted.n = N_ROW / 2; /* fewer rows, fewer paths */
     assert_true(pipeline_plan_usual_paths(&j->plan) == 0.5 * of_photographs);
-    j->doc.fit.path_budget = 300000; /* is used up */
+    j->doc->fit->path_budget = 300000; /* is used up */
     assert_true(pipeline_plan_usual_paths(&j->plan) == 300000.0);
-    j->doc.rows.n_photograph = 0;
+    j->doc->rows->n_photograph = 0;
     assert_true(pipeline_plan_usual_paths(&j->plan) == 300000.0);
-    j->doc.fit.path_budget = 3000000; /* more than misfit leaves to do */
+    j->doc->fit->path_budget = 3000000; /* more than misfit leaves to do */
     assert_true(pipeline_plan_usual_paths(&j->plan) == 0.5 * of_table);
 }
 
@@ -62,9 +69,9 @@ static void test_pictures_cost_less_than_the_fit(void **state)
     struct job *j = make_job();
     size_t before = 0;
     for (double n_path = 1e4; n_path < 1e8; n_path *= 1.7) {
-        const size_t px = result_picture_px(&j->doc.results, N_ALL, n_path),
-                     sample = result_picture_samples(&j->doc.results, N_ALL, n_path);
-        const double all = result_renderings_paths(&j->doc.results, N_ALL, n_path);
+        const size_t px = result_picture_px(j->doc->results, N_ALL, n_path),
+                     sample = result_picture_samples(j->doc->results, N_ALL, n_path);
+        const double all = result_renderings_paths(j->doc->results, N_ALL, n_path);
         assert_true(px >= 48 && px <= 96 && px >= before && sample >= 2 && sample <= 16);
         assert_true(all == (double)(px * px * sample * N_ALL));
         assert_true(all <= 0.5 * n_path || (px == 48 && sample == 2));
@@ -72,14 +79,14 @@ static void test_pictures_cost_less_than_the_fit(void **state)
         before = px;
     }
     assert_true(before == 96);
-    j->doc.results.render_px = 200; /* the document says so */
-    assert_true(result_picture_px(&j->doc.results, N_ALL, 1e4) == 200 &&
-                result_picture_samples(&j->doc.results, N_ALL, 1e4) == 2);
-    j->doc.results.render_sample = 7;
-    assert_true(result_picture_px(&j->doc.results, N_ALL, 1e4) == 200 &&
-                result_picture_samples(&j->doc.results, N_ALL, 1e4) == 7);
-    j->doc.results.render_px = 0;
-    assert_true(result_picture_px(&j->doc.results, N_ALL, 1e4) == 48);
+    j->doc->results->render_px = 200; /* the document says so */
+    assert_true(result_picture_px(j->doc->results, N_ALL, 1e4) == 200 &&
+                result_picture_samples(j->doc->results, N_ALL, 1e4) == 2);
+    j->doc->results->render_sample = 7;
+    assert_true(result_picture_px(j->doc->results, N_ALL, 1e4) == 200 &&
+                result_picture_samples(j->doc->results, N_ALL, 1e4) == 7);
+    j->doc->results->render_px = 0;
+    assert_true(result_picture_px(j->doc->results, N_ALL, 1e4) == 48);
 }
 
 /* n straight fibers of 10 um radius and 1 mm length, each of two pieces, in a tile of 1 mm x 1 mm. */
@@ -116,13 +123,14 @@ static void test_paths_in_a_thin_cloth_are_shorter(void **state)
 
 static double certificate_s_of(const char *id, size_t n_fixed)
 {
-    static struct job_document doc;
+    struct job_document *doc = job_document_new();
     struct model_setup *m = calloc(1, sizeof *m);
-    struct job_inputs in = {.doc = &doc, .kind = JOB_OF_FIT, .n_model = 1, .model = m};
+    struct job_inputs in = {.section = job_document_sections(doc), .kind = JOB_OF_FIT, .n_model = 1, .model = m};
     struct job_plan plan = {.in = &in};
     assert_non_null(m);
-    snprintf(doc.rows.measurement_file, sizeof doc.rows.measurement_file, "rows.csv");
-    doc.fit.n_model = 1;
+    assert_non_null(doc);
+    snprintf(doc->rows->measurement_file, sizeof doc->rows->measurement_file, "rows.csv");
+    doc->fit->n_model = 1;
     assert_true(appearance_find(id, &m->appearance));
     assert_int_equal(model_sets_init(&m->sets, model_catalogue_find(id), NULL, 0, NULL), STATUS_OK);
     for (size_t p = 0; p < m->sets.info.n_param; p++)
@@ -130,6 +138,7 @@ static double certificate_s_of(const char *id, size_t n_fixed)
     plan_probe_take(&plan);
     assert_true(plan.path_share == 1.0);
     free(m);
+    job_document_free(doc);
     return plan.certificate_s;
 }
 
