@@ -43,7 +43,7 @@ static void hits_are_where_they_should_be(void **state)
     struct scene_hit h;
     assert_int_equal(scene_n_segment(s), 6); /* each fiber is longer than 20 radii */
     assert_true(fabs(scene_thickness_mm(s) - 0.14) < 1e-6);
-    assert_true(scene_memory_bytes(s) > 1000);
+    assert_true(scene_memory_bytes(s) > 500);
     /* straight down on the top of the first fiber, which is at z = 0, seven tiles away */
     struct scene_ray r = ray_to(0.2 + 7 * 0.5, 0.1 - 3 * 0.5, 0.001, 0, 0, -1);
     assert_true(scene_trace(s, &r, &h));
