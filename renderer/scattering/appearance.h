@@ -1,10 +1,11 @@
-/* What a fit can choose between: a cloth of fibers with a scattering model of their surfaces, or a cloth as a volume
- * with a phase function. Both are seen as one thing with an id and a flat list of parameters, so that nothing beyond
- * the renderer has to know which kind it deals with.
+/* The appearance that a fit chooses: a cloth of fibers with a scattering model of their surfaces, or a cloth as a
+ * volume with a phase function. Both are seen as one thing with an id and a flat list of parameters, so that nothing
+ * beyond the renderer has to know which kind it deals with.
  *
- * A surface model has the parameters of its scattering model. A volume model has those of its phase model, and then the
- * density multiplier d ("density_multiplier", 1/m inside, 1/cm in files), the extinction of full density across the
- * fibers: the published volume fits hold it at 4000 1/cm. Ids are those of the two registries; no id is in both.
+ * A surface model has the parameters of its scattering model. A volume model has the parameters of its phase model, and
+ * then the density multiplier d ("density_multiplier", 1/m inside, 1/cm in files), the extinction of full density
+ * across the fibers: the published volume fits hold it at 4000 1/cm. Ids come from the two registries; no id is in
+ * both.
  */
 #ifndef SELVEDGE_RENDERER_APPEARANCE_H
 #define SELVEDGE_RENDERER_APPEARANCE_H
@@ -21,7 +22,7 @@ struct appearance {
     const struct phase_model *volume;       /* MODEL_VOLUME, otherwise NULL */
 };
 
-/* All models, those of surfaces first: the i-th, false behind the last. */
+/* Sets *a to the i-th model, surface models first. Returns false when i is beyond the last. */
 bool appearance_at(size_t i, struct appearance *a);
 /* False when no model has that id. */
 bool appearance_find(const char *id, struct appearance *a);

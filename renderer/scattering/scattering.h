@@ -29,7 +29,7 @@ enum {
 struct scattering_state;
 struct speckle_table;
 
-/* A bounce as one model sees it: what depends on wo and the weights of the channels alone. */
+/* State of a model at a bounce that depends on wo and the weights of the channels alone. */
 struct scattering_view {
     struct fiber_direction out; /* wo */
     float part[8];              /* the model's own */
@@ -54,7 +54,7 @@ struct scattering_model {
      * normal of the surface at the hit, and the offset from the axis, in radii, is the sine of the azimuth of wo. */
     bool near_field;
 
-    /* What the speckle of pictures is made from (speckle/speckle.h); NULL: the model has none. */
+    /* Table from which the speckle of pictures is made (renderer/scattering/speckle.h); NULL: the model has none. */
     const struct speckle_table *speckle;
 
     /* STATUS_INVALID, field = parameter name, for a value that is NaN or outside [lower, upper]. */
@@ -110,7 +110,7 @@ status scattering_prepare(const struct scattering_model *m, const double *param,
 const char *scattering_frame_reason(const struct scattering_model *m);
 
 /* The azimuth of the k-th of n views that have the same weight in a mean over all views of the fiber: equal steps of
- * the turn for a section, of the width for a near field. 0 for all other models, of which one view is enough. */
+ * the turn for a section, of the width for a near field. 0 for all other models, for which one view is enough. */
 double scattering_view_azimuth_rad(const struct scattering_model *m, int k, int n);
 
 /* All models, NULL-terminated, in the order of the catalogue; and by id (NULL when unknown). */

@@ -14,10 +14,9 @@
  * light and camera move so that it stays (memory effect). A longer wave makes the pattern larger about 0, where
  * light goes straight on, by a power of its length.
  *
- * What differs from the publication (README.md has the measurements): fields are added up and not intensities (its
- * equation 17), whose sum varies less than the light of the simulated fibers does; it has the angles of the half
- * vector alone, which jump where light goes straight on; a fiber has a pattern of its own in place of an offset in
- * one pattern.
+ * Differs from the publication (README.md has the measurements): fields are added up and not intensities (its equation
+ * 17), whose sum varies less than the light of the simulated fibers does; it has the angles of the half vector alone,
+ * which jump where light goes straight on; a fiber has a pattern of its own in place of an offset in one pattern.
  *
  * A is a lattice of random complex numbers, read by a quadratic B-spline in each axis and divided by the root of
  * the sum of the squares of the spline's weights: its variance is the same everywhere.

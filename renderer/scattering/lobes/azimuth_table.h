@@ -20,7 +20,7 @@ static inline float table_position(float x, int n, int *i)
 /* Stretches u to [0, 1) within an interval that starts at 0. */
 static inline float table_stretch(float u, float width) { return fminf(u / width, 0x1.fffffep-1f); }
 
-/* What two directions are to each other in a table by cos th_d (n_row + 1 nodes) and by |ph| (n_phi + 1 nodes). */
+/* Place of two directions in a table by cos th_d (n_row + 1 nodes) and by |ph| (n_phi + 1 nodes). */
 struct azimuth_place {
     struct fiber_direction in, out;
     int row, column, out_row;

@@ -2,8 +2,8 @@
  * 3.1): light on the cone th_o = -th_i, blurred on the sphere by a von Mises-Fisher density of concentration k.
  *     M(th_i, th_o) = k / (2 sinh k) exp(-k sin th_i sin th_o) I0(k cos th_i cos th_o),   k = 1 / beta^2
  * Symmetric; the integral of M cos th d th over either angle is exactly 1. Models divide it by max(cos th_i, cos th_o):
- * what leaves is then never more than what came, from either side, reciprocity stays, and sampling weights are bounded.
- * (Division by cos th_o alone, as published, is lossless but unbounded for views along the fiber.)
+ * the light that leaves is then never more than the light that came, from either side, reciprocity stays, and sampling
+ * weights are bounded. (Division by cos th_o alone, as published, is lossless but unbounded for views along the fiber.)
  *
  * No angles are computed: 1 - cos(th_i + th_o) comes from sines and cosines without cancellation. I0 and I1 are scaled
  * by exp(-x); polynomials of Abramowitz and Stegun 9.8.1-9.8.4, relative error 2e-7.

@@ -45,7 +45,7 @@ static inline struct fiber_direction fiber_direction_of(const float w[3])
     return d;
 }
 
-/* A direction from its longitudinal angle and the cosine and sine of its azimuth beyond that of w. */
+/* A direction from its longitudinal angle and the cosine and sine of its azimuth less the azimuth of w. */
 static inline void fiber_direction_beyond(const struct fiber_direction *w, float sin_theta, float cos_theta, float c,
                                           float d, float beyond[3])
 {

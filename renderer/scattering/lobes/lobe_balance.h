@@ -50,8 +50,8 @@ void lobe_balance_source_of_kernel(struct lobe_balance *b, const double *x);
 
 /* Solves for a, the scale of R: want = 1, no share. d_ln_a: by beta. */
 void lobe_balance_r(struct lobe_balance *b, double beta, double *a, double *d_ln_a);
-/* rho = a (g share) a: what the share sends into R of the light at each node. d_rho: by beta. Leaves the kernel g
- * share.
+/* rho = a (g share) a: fraction of the light at each node that the share sends into R. d_rho: by beta. Leaves the
+ * kernel g share.
  */
 void lobe_balance_share(struct lobe_balance *b, double beta, const double *a, const double *d_ln_a, double *rho,
                         double *d_rho);

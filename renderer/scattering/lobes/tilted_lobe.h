@@ -29,7 +29,7 @@ static inline float tilted_lobe_eval(const struct tilted_lobe *m, float x, float
     return a + b;
 }
 
-/* Density of samples of th_i, of which `direct` = M belongs to th_i itself and the rest to angles beyond a pole. */
+/* Density of samples of th_i: the sum of `direct` = M, for th_i itself, and of M for the angles beyond a pole. */
 static inline float tilted_lobe_density(const struct tilted_lobe *m, float theta_i, float theta_o, float direct)
 {
     const float reach = 6 * m->width + m->shift;

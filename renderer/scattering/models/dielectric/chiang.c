@@ -9,7 +9,7 @@
  * sigma an absorption per radius. chiang_albedo.v1 takes the color of a mass of such fibers, from which their section
  * 4.2 finds the absorption: sigma = (ln C / g(beta_N))^2, with g the polynomial of fifth degree below.
  *
- * What differs from the publication: the factor 1 / cos th_i is replaced by the scale a(th_i) a(th_o), attenuation and
+ * Differs from the publication: the factor 1 / cos th_i is replaced by the scale a(th_i) a(th_o), attenuation and
  * azimuth are taken at the difference angle (near_field.h), and the surface has no tilted scales.
  */
 #include "renderer/scattering/models/dielectric/near_field.h"

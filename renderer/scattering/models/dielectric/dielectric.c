@@ -79,7 +79,7 @@ static float density(const struct scattering_state *s, const struct azimuth_plac
     return sum;
 }
 
-/* S without the scale is the sum of m N; what the scores need of it. */
+/* Terms that the scores need of the sum of m N, which is S without the scale. */
 struct terms {
     const float *m, *d_beta; /* of the longitudinal lobes */
     struct dielectric_cell n;

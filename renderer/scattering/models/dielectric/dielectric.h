@@ -7,16 +7,17 @@
  *
  * d'Eon et al. 2011, "An Energy-Conserving Hair Reflectance Model": longitudinal lobes M of their equation 7
  * (cone_lobe.h), of widths beta (R), beta / 2 (TT) and 2 beta (TRT and the rest) as for Marschner et al. 2003; the
- * azimuthal integral over the offset h with a wrapped Gaussian D, their section 3.2. Attenuations A, azimuths Phi and
- * the rest are those of dielectric_ray.h, with absorption along the way of every single ray. th_d = (th_i - th_o) / 2.
+ * azimuthal integral over the offset h with a wrapped Gaussian D, their section 3.2. dielectric_ray.h defines
+ * attenuations A, azimuths Phi and the rest, with absorption along the way of every single ray.
+ * th_d = (th_i - th_o) / 2.
  *
  * As published, M is divided by cos th_i, which gains energy without bound for light along the fiber, and A is taken at
- * the difference angle, by which wide lobes gain up to a half at grazing angles. a(th) mends both: it solves
+ * the difference angle, by which wide lobes gain up to a half at grazing angles. a(th) repairs both: it solves
  *     a(th_i) integral of a(th_o) [sum of M_p mean A_p at C_T = 1] cos^2 th_o dth_o = 1
  * (lobe_balance.h), so nothing is lost from either side, and S stays reciprocal.
  *
  * N is made as a Fourier series in ph, in which a wrapped Gaussian is a factor exp(-k^2 w^2 / 2), for N_ROW + 1 values
- * of cos th_d, and read between N_PHI + 1 azimuths by straight lines. Derivatives are exact for what is tabulated.
+ * of cos th_d, and read between N_PHI + 1 azimuths by straight lines. Derivatives are exact for the tabulated function.
  */
 #ifndef SELVEDGE_RENDERER_DIELECTRIC_H
 #define SELVEDGE_RENDERER_DIELECTRIC_H

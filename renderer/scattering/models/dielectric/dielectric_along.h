@@ -1,6 +1,6 @@
-/* What the models of smooth round dielectric fibers have in common along the fiber: the longitudinal lobes of d'Eon et
- * al. 2011 and the scale a(th) that balances them (dielectric.h states the equation). R has the width beta, TT beta /
- * 2, TRT and all longer paths 2 beta.
+/* Common part of the models of smooth round dielectric fibers along the fiber: the longitudinal lobes of d'Eon et al.
+ * 2011 and the scale a(th) that balances them (dielectric.h states the equation). R has the width beta, TT beta / 2,
+ * TRT and all longer paths 2 beta.
  */
 #ifndef SELVEDGE_RENDERER_DIELECTRIC_ALONG_H
 #define SELVEDGE_RENDERER_DIELECTRIC_ALONG_H
@@ -16,7 +16,7 @@
 enum { DIELECTRIC_N_LOBE = 3 };
 
 struct dielectric_along {
-    struct cone_lobe longitudinal[DIELECTRIC_N_LOBE]; /* R, TT, TRT; the rest has that of TRT */
+    struct cone_lobe longitudinal[DIELECTRIC_N_LOBE]; /* R, TT, TRT; the rest uses the lobe of TRT */
     float scale[LOBE_BALANCE_N];                      /* a by |th| */
     float d_ln_scale[2][LOBE_BALANCE_N];              /* d ln a by eta and by beta (rad) */
 };

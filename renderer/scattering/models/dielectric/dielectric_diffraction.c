@@ -7,15 +7,15 @@
  * A fiber much wider than the wavelength takes twice the light that falls on its section out of a beam: half of it
  * by reflection and refraction, half by diffraction (van de Hulst 1957, "Light Scattering by Small Particles",
  * section 8.2). There are two ways to count this without gain or loss. This model intersects fibers at twice their
- * diameter, so that half of what they meet passes through the true section and the other half is diffracted. Fibers
- * of their true diameter with dielectric.v1 leave out diffraction, because it turns light by little; a fit in a
+ * diameter, so that half of the light that they meet passes through the true section and the other half is diffracted.
+ * Fibers of their true diameter with dielectric.v1 leave out diffraction, because it turns light by little; a fit in a
  * dense cloth should take that.
  *
  * F is the diffraction by a strip (strip_lobe.h), after the idea of Benamira and Pattanaik 2021, "A Combined
- * Scattering and Diffraction Model for Elliptical Hair Rendering", whose equations are not those here. d is the true
- * diameter in wavelengths of 0.55 um; a fiber drawn with the radius r has d = r / 0.55 um. g is a Gaussian of width
- * beta_D, which a straight fiber has from the size of the light, and b(th) balances it (lobe_balance.h). Wavelengths
- * are the dominant ones of the primaries of sRGB.
+ * Scattering and Diffraction Model for Elliptical Hair Rendering", whose equations differ. d is the true diameter in
+ * wavelengths of 0.55 um; a fiber drawn with the radius r has d = r / 0.55 um. g is a Gaussian of width beta_D, which a
+ * straight fiber has from the size of the light, and b(th) balances it (lobe_balance.h). Wavelengths are the dominant
+ * ones of the primaries of sRGB.
  *
  * Sampling: half of the samples by dielectric.v1. For the others th_i from g and the azimuth from a Lorentz curve of
  * the width of F in the green channel at th_d = th_o.
@@ -32,7 +32,7 @@
 
 enum {
     N_PARAM = surface_dielectric_diffraction_n_param,
-    N_RAY = surface_dielectric_n_param, /* the first ones are those of dielectric.v1 */
+    N_RAY = surface_dielectric_n_param, /* the first are the parameters of dielectric.v1 */
     P_SIZE = N_RAY,
     P_BETA_D
 };
@@ -93,7 +93,7 @@ static status prepare(const double *param, struct scattering_state **state, stru
     return STATUS_OK;
 }
 
-/* Two directions: what the strip needs of them. */
+/* Two directions, and the quantities that the strip needs. */
 struct pair {
     struct fiber_direction in, out;
     double cos_d, sine, tangent; /* of th_d; of the azimuth from straight on: its sine, and the tangent of its half */
@@ -120,7 +120,7 @@ static float scale_at(const struct scattering_state *s, float theta_rad, float *
     return table_mix(s->scale[i], s->scale[i + 1], t);
 }
 
-/* Makes S and its scores of what dielectric.v1 says: ray_score[3][N_RAY]. */
+/* Turns S and its scores of dielectric.v1, ray_score[3][N_RAY], into S and the scores of this model. */
 static void add_strip(const struct scattering_state *s, const struct pair *g, float s_rgb[3], const float *ray_score,
                       float *score)
 {

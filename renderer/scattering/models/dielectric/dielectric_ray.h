@@ -1,5 +1,5 @@
-/* Geometric optics of a smooth circular dielectric cylinder: what a ray does that meets it at the offset h = sin x from
- * its axis, and its derivatives by the index of refraction. Marschner et al. 2003, "Light Scattering from Human Hair
+/* Geometric optics of a smooth circular dielectric cylinder: exits of a ray that meets it at the offset h = sin x from
+ * its axis, and their derivatives by the index of refraction. Marschner et al. 2003, "Light Scattering from Human Hair
  * Fibers", section 3, with unpolarised Fresnel reflection at the true angle of incidence; the share of paths with more
  * inner reflections in closed form after Chiang et al. 2016, "A Practical and Controllable Hair and Fur Model for
  * Production Path Tracing", section 4.

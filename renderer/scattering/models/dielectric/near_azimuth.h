@@ -20,7 +20,7 @@ struct near_azimuth {
     double width_rad;   /* w or s */
     double norm;        /* factor of the exponential */
     double d_ln_norm;   /* by the width */
-    double below, span; /* logistic: its integral below -pi before trimming, and that over the turn */
+    double below, span; /* logistic: its integral below -pi before trimming, and its integral over the turn */
 };
 
 static inline void near_azimuth_init(struct near_azimuth *a, enum near_azimuth_kind kind, double width_rad)
@@ -66,7 +66,7 @@ static inline double near_azimuth_eval(const struct near_azimuth *a, double x, d
     return a->norm * sum;
 }
 
-/* x of that density for u in [0, 1); the Gaussian's is not wrapped. */
+/* Draws x from the density, with u in [0, 1); the Gaussian's x is not wrapped. */
 static inline double near_azimuth_sample(const struct near_azimuth *a, float u)
 {
     if (a->kind == NEAR_GAUSSIAN) return a->width_rad * M_SQRT2 * (double)erf_inverse(2 * u - 1);

@@ -166,7 +166,7 @@ void near_field_sample(const struct scattering_state *s, const float wo[3], cons
     int k = 0;
     mode_probabilities(s, &out, x, weight_rgb, p);
     while (k < DIELECTRIC_N_MODE - 1 && rest >= p[k]) rest -= p[k++];
-    float left = fminf((float)(rest / p[k]), 0x1.fffffep-1f); /* what the choice left over of u[0] is uniform again */
+    float left = fminf((float)(rest / p[k]), 0x1.fffffep-1f); /* the unused part of u[0] is uniform again */
     const struct cone_lobe *lobe = &s->along.longitudinal[k < DIELECTRIC_N_LOBE ? k : DIELECTRIC_TRT];
     float sin_i = cone_lobe_sample(lobe, wo[0], out.cos_theta, u[1], left);
     float cos_i = sqrtf((1 - sin_i) * (1 + sin_i));

@@ -1,5 +1,5 @@
-/* A smooth round dielectric fiber seen from close: what leaves depends on the offset h across the fiber of the place
- * that is seen. Shared by dielectric_near.v1, chiang.v1 and chiang_albedo.v1.
+/* A smooth round dielectric fiber seen from close: the light that leaves depends on the offset h of the seen place
+ * across the fiber. Shared by dielectric_near.v1, chiang.v1 and chiang_albedo.v1.
  *
  *     S(wi, wo) = a(th_i) a(th_o) [ sum over R, TT, TRT of M_p(th_i, th_o) A_p(th_d, h) D(ph - Phi_p(th_d, h))
  *                                   + M_TRT A_rest(th_d, h) / (2 pi) ]
@@ -7,14 +7,14 @@
  *
  * v of the fiber frame is the normal of the surface at the hit (scattering_model.near_field), so the azimuth of wo is
  * the angle between the view and the normal, and h follows from it. A ray that is followed backwards from the camera
- * meets the fiber at h and leaves with share A_p at the azimuth Phi_p (dielectric_ray.h); by reciprocity that is the
- * light that comes from there. The mean of S over h is the far field; with the wrapped Gaussian for D it is that of
- * dielectric.v1. Lobes and scales along the fiber are the same. Since a(th) balances the mean over h, the mean is
- * lossless and reciprocal; a single h gains or loses light where its mixture of modes differs from the mean's, which
- * tests/physics/test_near_field.c bounds.
+ * meets the fiber at h and leaves with share A_p at the azimuth Phi_p (dielectric_ray.h); by reciprocity, light from
+ * there reaches the camera with the same share. The mean of S over h is the far field; with the wrapped Gaussian for D
+ * it is S of dielectric.v1. Lobes and scales along the fiber are the same. Since a(th) balances the mean over h, the
+ * mean is lossless and reciprocal; a single h gains or loses light where its mixture of modes differs from the mean's,
+ * which tests/physics/test_near_field.c bounds.
  *
- * Everything is computed for each pair of directions; the only table is that of a(th). Double precision, since a narrow
- * lobe multiplies the rounding error of an angle.
+ * Everything is computed for each pair of directions; the only table holds a(th). Double precision, since a narrow lobe
+ * multiplies the rounding error of an angle.
  */
 #ifndef SELVEDGE_RENDERER_NEAR_FIELD_H
 #define SELVEDGE_RENDERER_NEAR_FIELD_H

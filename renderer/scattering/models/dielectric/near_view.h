@@ -5,7 +5,7 @@
 
 #include "renderer/scattering/lobes/fiber_direction.h"
 
-#define NEAR_LEAST_COSINE_D 1e-6 /* of th_d: rays are those of this angle beyond it */
+#define NEAR_LEAST_COSINE_D 1e-6 /* of th_d: steeper rays are taken at this cosine */
 
 struct near_view {
     struct fiber_direction in, out;
@@ -38,7 +38,7 @@ static inline struct near_view near_view_of(const float wi[3], const float wo[3]
     return g;
 }
 
-/* wi from th_i and the azimuth beyond that of the view. */
+/* Sets wi from th_i and phi, its azimuth less the azimuth of the view. */
 static inline void near_direction(const struct fiber_direction *out, float sin_i, float cos_i, double phi, float wi[3])
 {
     fiber_direction_beyond(out, sin_i, cos_i, (float)cos(phi), (float)sin(phi), wi);

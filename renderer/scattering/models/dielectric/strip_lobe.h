@@ -1,6 +1,6 @@
-/* Light that a fiber diffracts past itself: far from the fiber, its shadow is that of an opaque strip as wide as the
- * fiber, and diffracts like a slit of this width (Babinet's principle; Born and Wolf 1999, "Principles of Optics",
- * sections 8.5.1 and 8.3.2).
+/* Light that a fiber diffracts past itself: far from the fiber, its shadow equals the shadow of an opaque strip as wide
+ * as the fiber, and diffracts like a slit of this width (Babinet's principle; Born and Wolf 1999, "Principles of
+ * Optics", sections 8.5.1 and 8.3.2).
  *
  *     F(d; A) = A h(pi A sin d) / c(A)   for |d| < pi / 2, and 0 behind,   d from straight on,   A = D cos th / lambda
  *     h(y) = (1 - cos(2 y) exp(-2 s^2 y^2)) / (2 y^2)

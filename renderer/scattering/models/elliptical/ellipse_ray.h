@@ -1,4 +1,4 @@
-/* Geometric optics of a smooth dielectric fiber with an elliptical section: what a ray does that meets it at a place of
+/* Geometric optics of a smooth dielectric fiber with an elliptical section: exits of a ray that meets it at a place of
  * its width, by exact hops in the section (Khungurn and Marschner 2017, "Azimuthal Scattering from Elliptical Hair
  * Fibers"; fabric thesis, section 4.4). Each quantity carries its derivatives by the index of refraction and by the
  * ratio of axes.
@@ -6,7 +6,7 @@
  * Section: semi-axes A = sqrt(a), B = 1 / sqrt(a) along v and w, so its area is pi and lengths are in units of the root
  * of the product of both semi-axes. A ray comes from the azimuth phi at the offset H sin x, H half of the width that
  * the section shows there. The walls turn it in the section as Snell's law does with Bravais' index eta' = sqrt(eta^2 -
- * sin^2 th) / cos th; reflectances are those of the true angles in space.
+ * sin^2 th) / cos th; reflectances are taken at the true angles in space.
  *
  *     hop     from the point (A cos g, B sin g) along the direction t: delta = atan2(sin t / B, cos t / A), next point
  *             g' = 2 delta - g + pi
@@ -29,7 +29,7 @@ struct ellipse {
     struct dual eta, major, minor; /* A and B */
 };
 
-/* What is the same for all longitudinal angles: where a ray meets the section. */
+/* The point where a ray meets the section, the same for all longitudinal angles. */
 struct ellipse_entry {
     double phi;             /* azimuth that it comes from */
     struct dual gamma, nu;  /* parameter of the point, azimuth of the normal there */
@@ -46,7 +46,7 @@ struct ellipse_wall {
 struct ellipse_path {
     int n;
     struct dual share[ELLIPSE_N_EXIT + 1], length[ELLIPSE_N_EXIT + 1]; /* true length of the way inside */
-    struct dual azimuth[ELLIPSE_N_MODE];                               /* of exit less that of the ray; any turn */
+    struct dual azimuth[ELLIPSE_N_MODE];                               /* of exit less azimuth of the ray; any turn */
 };
 
 struct ellipse ellipse_of(double eta, double ratio);
@@ -59,7 +59,7 @@ void ellipse_follow(const struct ellipse *e, const struct ellipse_wall *w, const
 /* Cosine of the angle outside from its square, which is negative where the reflection is total, and its slope when
  * wanted. The root has an infinite slope at 0, so the derivatives of a sum over rays would be noisy. Between -G and G,
  * the square of the cosine of 77 degrees, root(G) (2 t^3 - t^5) takes its place, t = (square / G + 1) / 2. It has value
- * and slope 0 at -G, those of the root at G, and the integral of the root. */
+ * and slope 0 at -G, value and slope of the root at G, and the integral of the root. */
 double ellipse_cosine_outside(double square, double *slope);
 
 #endif

@@ -90,7 +90,7 @@ static float density(const struct scattering_state *s, const struct azimuth_plac
     return sum / fmaxf(g->in.cos_theta, FIBER_COS_MIN);
 }
 
-/* S without the scale is the sum of m N; what the scores need of it. */
+/* Terms that the scores need of the sum of m N, which is S without the scale. */
 struct terms {
     float m[ELLIPTICAL_N_LOBE], d[ELLIPTICAL_N_LOBE][2]; /* along the fiber, and by shift and width */
     struct elliptical_cell n;

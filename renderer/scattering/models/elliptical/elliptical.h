@@ -8,17 +8,17 @@
  *     alpha_p / alpha = 1, -1/2, -3/2, -5/2,   beta_p / beta = 1, 1/2, 2, 2
  *
  * Fabric thesis, section 4.4 and appendix A; Khungurn and Marschner 2017, "Azimuthal Scattering from Elliptical Hair
- * Fibers". Shares A, azimuths Phi and ways inside are those of ellipse_ray.h; the rest are the exits beyond TRRT. g
- * is a Gaussian. Absorption takes C_T^l, l in units of 2 sqrt(A B), the diameter of a round fiber of the same section.
+ * Fibers". ellipse_ray.h defines shares A, azimuths Phi and ways inside; the rest are the exits beyond TRRT. g is a
+ * Gaussian. Absorption takes C_T^l, l in units of 2 sqrt(A B), the diameter of a round fiber of the same section.
  *
- * What differs from the publication: the section's orientation is averaged over, because cloth is made of twisted yarns
- * and scans hardly resolve it; light beyond TRRT is kept; the shift by scales is taken in both directions alike,
- * since a fiber in a cloth has no known root; and a(th), which balances the lobes as in dielectric.v1, takes the
- * place of the normaliser G, so that S is reciprocal and nothing is lost at grazing angles.
+ * Differs from the publication: the section's orientation is averaged over, because cloth is made of twisted yarns and
+ * scans hardly resolve it; light beyond TRRT is kept; the shift by scales is taken in both directions alike, since a
+ * fiber in a cloth has no known root; and a(th), which balances the lobes as in dielectric.v1, takes the place of the
+ * normaliser G, so that S is reciprocal and nothing is lost at grazing angles.
  *
  * The means are taken over a lattice of N_RAY rays, at N_ROW + 1 values of cos th_d, as Fourier series in ph
  * (a wrapped Gaussian is a factor exp(-k^2 w^2 / 2)), and read between N_PHI + 1 azimuths by straight lines.
- * Derivatives are exact for what is tabulated.
+ * Derivatives are exact for the tabulated function.
  */
 #ifndef SELVEDGE_RENDERER_ELLIPTICAL_H
 #define SELVEDGE_RENDERER_ELLIPTICAL_H

@@ -1,5 +1,5 @@
-/* What elliptical.v1 and elliptical_oriented.v1 share: their parameters, their lobes along the fiber, and the balance
- * of these. elliptical.h states the lobes. */
+/* Common part of elliptical.v1 and elliptical_oriented.v1: their parameters, their lobes along the fiber, and the
+ * balance of these. elliptical.h states the lobes. */
 #ifndef SELVEDGE_RENDERER_ELLIPTICAL_LOBES_H
 #define SELVEDGE_RENDERER_ELLIPTICAL_LOBES_H
 
@@ -28,7 +28,7 @@ enum {
     ELLIPTICAL_N_INNER = ELLIPTICAL_N_LOBE - 1 /* lobes with a color */
 };
 
-/* Derivatives that the tables hold, and those of the scale a(th). */
+/* Derivatives that the tables hold, and derivatives of the scale a(th). */
 enum { ELLIPTICAL_D_C_T, ELLIPTICAL_D_ETA, ELLIPTICAL_D_RATIO, ELLIPTICAL_D_GAMMA, ELLIPTICAL_N_SLOPE };
 enum { ELLIPTICAL_S_ETA, ELLIPTICAL_S_RATIO, ELLIPTICAL_S_ALPHA, ELLIPTICAL_S_BETA, ELLIPTICAL_N_SCALE };
 

@@ -90,7 +90,7 @@ static struct place place_of(const float wi[3], const float wo[3])
         }                                                                                                              \
     } while (0)
 
-/* Along the fiber, the table, and what scales them. */
+/* M of each lobe along the fiber, F from the table, and the factors that scale them. */
 struct terms {
     float m[ELLIPTICAL_N_LOBE], d[ELLIPTICAL_N_LOBE][2];
     struct elliptical_cell f;

@@ -13,7 +13,7 @@
  * balances the mean over all azimuths as in elliptical.v1. The scale m makes a m the positive solution x of
  * x (M F x) = H for C_T = 1, over both angles at once: all light of every direction leaves, although K blurs the widths
  * too (the thesis divides by the blurred width), and lobes of different widths end at the pole. docs/model.md states
- * what is left between the nodes of m.
+ * the error that remains between the nodes of m.
  *
  * Symmetry: F is even and of period pi in psi = (ph_i + ph_o) / 2 from the long axis, and even and of period 2 pi in
  * Delta = ph_o - ph_i. Tables hold a quarter: psi in [0, pi / 2], Delta in [0, pi], 3.75 degrees apart in Delta.
@@ -21,9 +21,9 @@
  * Fabric thesis, section 4.4 and appendix A. Its tables of 128 x 256 x 256 x 3 values a mode have 403 MB and no
  * derivatives; these have 22 MB with all of them.
  *
- * In a scene of round tubes the two projected widths are those of the tube and drop out of what leaves along wo
- * (thesis, equation 2.11): the light that leaves a fiber towards each side is right, and its shadows are those of the
- * tube. In a scene of elliptical sections (scene_option.sections) their ratio is a factor (path_scatter.h). */
+ * In a scene of round tubes the tube has both projected widths, so they drop out of the light that leaves along wo
+ * (thesis, equation 2.11): the light that leaves a fiber towards each side is right, and its shadows are the tube's. In
+ * a scene of elliptical sections (scene_option.sections) their ratio is a factor (path_scatter.h). */
 #ifndef SELVEDGE_RENDERER_ELLIPTICAL_ORIENTED_H
 #define SELVEDGE_RENDERER_ELLIPTICAL_ORIENTED_H
 
@@ -31,7 +31,7 @@
 
 enum {
     ORIENTED_N = 48,                    /* steps of psi and of Delta */
-    ORIENTED_N_TURN = 24,               /* steps of an azimuth over a quarter turn; as far apart as those of Delta */
+    ORIENTED_N_TURN = 24,               /* steps of an azimuth over a quarter turn; as wide as the steps of Delta */
     ORIENTED_N_AROUND = 2 * ORIENTED_N, /* steps of Delta over a turn */
     ORIENTED_N_THETA = 64,              /* steps of |th| in m */
     ORIENTED_N_RAY = 2584,              /* of the lattice over a quarter turn, numbers of Fibonacci */
@@ -40,7 +40,7 @@ enum {
 /* Derivatives of m. */
 enum { ORIENTED_M_ETA, ORIENTED_M_RATIO, ORIENTED_M_ALPHA, ORIENTED_M_BETA, ORIENTED_M_GAMMA, ORIENTED_N_M };
 
-/* What samples are drawn with: by cos th_d and by the azimuth of wo from the long axis. */
+/* Distributions from which samples are drawn: by cos th_d and by the azimuth of wo from the long axis. */
 struct oriented_view {
     float energy[ELLIPTICAL_N_LOBE][3];
     float density[ELLIPTICAL_N_LOBE][ORIENTED_N_AROUND + 1]; /* by (Delta + pi) / 2, integral 1 over [0, pi] */

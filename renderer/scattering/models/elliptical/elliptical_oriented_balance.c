@@ -15,7 +15,7 @@ enum {
 };
 #define LEAST_LOBE 1e-9 /* of M, below which a pair of angles adds nothing */
 
-/* A derivative of the kernel: which part of F, and of which parameter along the fiber, if any. */
+/* A derivative of the kernel: the part of F, and the parameter along the fiber of the derivative, if any. */
 enum along_part { ALONG_VALUE, ALONG_ALPHA, ALONG_BETA };
 struct kernel_part {
     int f;
@@ -48,7 +48,8 @@ void oriented_fold_plane(oriented_plane plane, oriented_folded out)
         }
 }
 
-/* Adds what two angles along the fiber exchange whose th_i + th_o is so many nodes and th_d half of `half` nodes. */
+/* Adds the light that two angles along the fiber exchange: their th_i + th_o is `distance` nodes, their th_d half of
+ * `half` nodes. */
 static void add_exchange(const struct scattering_state *s, struct oriented_row *row, struct kernel_part part,
                          int distance, int half, oriented_folded out)
 {
@@ -82,7 +83,7 @@ static void add_block(oriented_folded block, const double *x, double *y)
         for (int i = 0; i < N_TURN; i++) y[i] += block[j][i] * x[j];
 }
 
-/* Adds what the angles t and u send to each other. wx: x with the weights of the nodes. */
+/* Adds the light that the angles t and u send to each other. wx: x with the weights of the nodes. */
 static void add_both(oriented_folded block, int t, int u, const double *wx, double *y)
 {
     add_block(block, wx + u * N_TURN, y + t * N_TURN);

@@ -1,6 +1,6 @@
 /* Tables of elliptical_oriented.v1: rays are spread over a quarter of the plane of psi and Delta by quadratic
- * B-splines, and the sums are blurred as cosine series in both. The factors of the series take off what the B-splines
- * blur, and in the tables that are read by straight lines also what these do. */
+ * B-splines, and the sums are blurred as cosine series in both. The factors of the series remove the blur of the
+ * B-splines, and, in the tables that are read by straight lines, also the blur of the straight lines. */
 #include "renderer/scattering/lobes/azimuth_table.h"
 #include "renderer/scattering/lobes/quadratic_spline.h"
 #include "renderer/scattering/models/elliptical/elliptical_oriented.h"
@@ -68,7 +68,7 @@ static void enter_rays(struct work *w, const struct ellipse *e)
     }
 }
 
-/* Adds an exit with the planes `a`, whose azimuth is turned against that of the ray. */
+/* Adds an exit with the planes `a`; `turn`: its azimuth less the azimuth `phi` of the ray. */
 static void add_exit(oriented_plane *plane, const double a[N_PLANE], double phi, struct dual turn)
 {
     const double per_psi = N / M_PI_2, per_delta = N / M_PI;
@@ -186,7 +186,7 @@ static double at_half(const double *f, int twice)
     return twice % 2 == 0 ? a : 0.5 * (a + f[oriented_fold(i + 1, N_TURN)]);
 }
 
-/* Light beyond TRRT: rho(ph_i) rho(ph_o) / (2 pi mean rho), added to a plane, and to those of its derivatives. */
+/* Light beyond TRRT: rho(ph_i) rho(ph_o) / (2 pi mean rho), added to a plane, and its derivatives to their planes. */
 static void spread_rest(const double *value, double (*d)[N_TURN + 1], int n_d, oriented_plane out,
                         oriented_plane *d_out)
 {
@@ -248,7 +248,7 @@ static void store(struct work *w, struct elliptical_cell (*cell)[N + 1], struct 
         for (int k = 0; k < ORIENTED_N_PART; k++) oriented_fold_plane(w->clear[p][k], row->f[p][k]);
 }
 
-/* What leaves to the azimuth i by Delta: for the choice of a mode and of an azimuth. */
+/* Stores the light that leaves to the azimuth i by Delta, from which a mode and an azimuth are drawn. */
 static void store_view(struct elliptical_cell (*cell)[N + 1], int i, struct oriented_view *view)
 {
     memset(view->energy, 0, sizeof view->energy);
@@ -267,7 +267,7 @@ static void store_view(struct elliptical_cell (*cell)[N + 1], int i, struct orie
     }
 }
 
-/* What the tasks of the rows share. */
+/* Data that the tasks of all rows share. */
 struct rows {
     struct scattering_state *s;
     const struct ellipse *e;

@@ -126,7 +126,7 @@ static void lobe_shares(const struct scattering_state *s, float cos_o, const flo
     for (int k = 0; k < N_LOBE; k++) p[k] = sum > 0 ? 0.1f + 0.7f * p[k] / sum : 1.0f / N_LOBE;
 }
 
-/* What the two directions are to each other. */
+/* Angles between two directions, and the quantities that follow from them. */
 struct geometry {
     float cos_i, cos_o, cos_d, cos_half; /* cos th_i, cos th_o, cos th_d, cos of the angle of incidence */
     float azimuth[N_LOBE];               /* N of each lobe */
@@ -204,7 +204,7 @@ static void sample(const struct scattering_state *s, const float wo[3], const fl
     lobe_shares(s, dout.cos_theta, weight_rgb, share);
     int k = 0;
     while (k < N_LOBE - 1 && left >= share[k]) left -= share[k++];
-    left = fminf(left / share[k], 1); /* what the choice left over of u[0] is uniform again */
+    left = fminf(left / share[k], 1); /* the unused part of u[0] is uniform again */
     float sin_i = cone_lobe_sample(&s->longitudinal[k], wo[0], dout.cos_theta, u[1], left);
     if (k == LOBE_R) /* up to the last 1e-6, where its density vanishes */
         delta = 2 * asinf((2 * u[2] - 1) * (1 - 1e-6f));

@@ -50,7 +50,7 @@ static struct textile_entry entry_at(const struct textile_state *t, float theta_
     return e;
 }
 
-/* What a flat section makes of one direction. */
+/* Quantities of the flat section for one direction. */
 struct side {
     float v, d_ln_v, t, d_ln_t[TEXTILE_N_SLOPE]; /* d_ln_v: by f */
 };
@@ -67,7 +67,7 @@ static struct side side_of(const struct textile_state *t, const struct fiber_dir
     return y;
 }
 
-/* The three terms without colours, and what their derivatives need. */
+/* The three terms without colours, and the quantities that their derivatives need. */
 struct terms {
     float r, azimuth, rise;           /* R = r azimuth (C_R + (1 - C_R) rise) */
     float tt_whole, tt, d;            /* TT = tt = tt_whole (1 - K) */

@@ -3,7 +3,7 @@
  * Reciprocal; lossless from both sides where C_TT = 1.
  *
  *     d     = (th_i - th_o) / 2,  ph = ph_o - ph_i       difference angle and relative azimuth
- *     N(ph) = (1 - s) / (2 pi) + s cos(ph / 2) / 4       azimuth of R: uniform, or that of a smooth cylinder
+ *     N(ph) = (1 - s) / (2 pi) + s cos(ph / 2) / 4       azimuth of R: uniform, or as of a smooth cylinder
  *     k     = (1 - cos d cos(ph / 2))^5                  Schlick's rise at the half angle of both directions
  *     K(d)  = integral of N k dph                        a polynomial in cos d
  *     R  = a(th_i) a(th_o) g(th_o; -th_i, beta_R) N(ph) (C_R + (1 - C_R) k)
@@ -18,14 +18,14 @@
  * scattered inside, and the rest goes on in TT. t solves t(ph) (f * t)(ph) = 1 - w v(ph) (textile_section.c), so both
  * take all light that R leaves. A round section has f = 1, v = 1 and t = sqrt(1 - w). v has the period pi, so that the
  * mean of v cos ph is 0, and h takes light from one side of the fiber to the other without loss: h = 1/2 scatters alike
- * to all sides, and less than that more towards where the light came from.
+ * to all sides, and h < 1/2 scatters more towards where the light came from.
  *
  * Light enters the fiber at a random place of its width (scattering_model.across_width).
  *
  * a, b and rho solve the equations of two_lobe_balanced.c with K in place of its k; Z = 2 pi times the integral of
- * q cos^2 th. R takes C_R + (1 - C_R) rho of the light at any angle, TT and D each return what is left. cos d cos(ph/2)
- * is the cosine of the half angle between wi and wo where th_o = -th_i: N for a smooth cylinder and the half angle are
- * those of Marschner et al. 2003, "Light Scattering from Human Hair Fibers", section 5.
+ * q cos^2 th. R takes C_R + (1 - C_R) rho of the light at any angle, TT and D each return the light that is left. cos d
+ * cos(ph/2) is the cosine of the half angle between wi and wo where th_o = -th_i: N for a smooth cylinder and the half
+ * angle follow Marschner et al. 2003, "Light Scattering from Human Hair Fibers", section 5.
  */
 #ifndef SELVEDGE_RENDERER_TEXTILE_H
 #define SELVEDGE_RENDERER_TEXTILE_H

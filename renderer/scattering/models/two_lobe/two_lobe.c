@@ -3,7 +3,7 @@
 #include "renderer/scattering/models/two_lobe/gauss_polynomial.h"
 #include "renderer/scattering/models/two_lobe/two_lobe_core.h"
 
-/* What a uniform environment brings to th_o through each lobe, before colours. */
+/* Light that a uniform environment sends to th_o through each lobe, before colours. */
 static void lobe_energy(const struct scattering_state *s, float theta_o, float energy[3])
 {
     enum { N = 24 };
@@ -99,7 +99,7 @@ static float product_integral(const struct scattering_state *s, int lobe, float 
            inside;
 }
 
-/* Fabric thesis, equation 6.2 and appendix C.2: the rest of the integrand is taken at the middle of that product. I0 is
+/* Fabric thesis, equation 6.2 and appendix C.2: the rest of the integrand is taken at the middle of the product. I0 is
  * scaled by exp(-x) throughout. */
 static void gaussian(const struct scattering_state *s, const float axis[3], float sharpness, const float wo[3],
                      float rgb[3])

@@ -2,7 +2,7 @@
  * sides. The published normaliser conserves energy for the incident side only. Here, with the Fresnel share k of the
  * difference angle, k(x, y) = (1 - cos((x - y) / 2))^5, which is symmetric,
  *     M_R(th_i, th_o)  = a(th_i) a(th_o) g(th_o; -th_i, beta_R),                a(t) sum_R[a] = 1
- *     rho(t)           = what of the light at t the growing share k sends into R = a(t) sum_R[a k]
+ *     rho(t)           = share of the light at t that the growing k sends into R = a(t) sum_R[a k]
  *     M_TT(th_i, th_o) = b(th_i) b(th_o) g(th_o; -th_i, beta_TT),               b(t) sum_TT[b (1 - k)] = 1 - rho(t)
  * with sum_x[f] the integral of f(u) g(u; -t, beta_x) cos^2 u du. R takes C_R + (1 - C_R) rho and TT is given the rest,
  * (1 - C_R)(1 - rho), in every channel: one pair of functions serves all colours. Both equations are solved by

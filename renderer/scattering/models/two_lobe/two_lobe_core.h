@@ -1,14 +1,14 @@
-/* What two_lobe.v1, two_lobe_balanced.v1, two_lobe_diffuse.v1 and textile.v3 share: state, evaluation with scores,
+/* Common part of two_lobe.v1, two_lobe_balanced.v1, two_lobe_diffuse.v1 and textile.v3: state, evaluation with scores,
  * sampling. Included by those files only.
  *
  *     S = F(th_f) M_R / (2 pi) + C_TT (1 - F(th_f)) M_TT f(ph_o; ph_i + pi, gamma_TT)
  *     F(t) = C_R + (1 - C_R)(1 - cos t)^5,   M = g(th_o; -th_i, beta) * (longitudinal scale)
  *     published: th_f = th_i, scale = 1 / G(-th_i, beta);  balanced: th_f = (th_i - th_o) / 2, scale = a(th_i) a(th_o)
- *                (R) and b(th_i) b(th_o) (TT), of which b depends on both widths (two_lobe_balanced.c)
+ *                (R) and b(th_i) b(th_o) (TT); b depends on both widths (two_lobe_balanced.c)
  *
  * Sampling of wi: a lobe by its energy at th_o and the weights of the channels, th_i from the normal density about
- * -th_o cut to +-pi/2, azimuth uniform or von Mises. pdf() is the exact density of that. All functions are inlined with
- * `balanced` constant.
+ * -th_o cut to +-pi/2, azimuth uniform or von Mises. pdf() is the exact density of these samples. All functions are
+ * inlined with `balanced` constant.
  */
 #ifndef SELVEDGE_RENDERER_TWO_LOBE_CORE_H
 #define SELVEDGE_RENDERER_TWO_LOBE_CORE_H
@@ -43,8 +43,8 @@ struct two_lobe_sampling_entry {
 };
 
 struct scattering_state {
-    /* not_c_r = 1 - c_r, rounded once: it is small where R takes nearly all. The fourth is that of no channel: 1, 1, 1,
-     * so that the channels are computed in vector registers. */
+    /* not_c_r = 1 - c_r, rounded once: it is small where R takes nearly all. The fourth entry belongs to no channel: 1,
+     * 1, 1, so that the channels are computed in vector registers. */
     float c_r[4], not_c_r[4], c_tt[4];
     float beta[2];
     float peak[2]; /* 1 / (sqrt(2 pi) beta) */

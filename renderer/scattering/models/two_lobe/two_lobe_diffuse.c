@@ -3,9 +3,9 @@
  *     S = R + C_TT (1 - F(th_i)) [(1 - w) M_TT f(ph_o; ph_i + pi, gamma_TT) + w / pi^2]
  *
  * w is the share of the transmitted light that leaves the fiber in all directions alike; 1 / pi^2 keeps its energy,
- * since the integral of cos th over the sphere is pi^2. The limit w = 0 is two_lobe.v1. The energy bound is that of
- * two_lobe.v1: what R leaves is split between two terms, each of which returns at most its share from the incident
- * side.
+ * since the integral of cos th over the sphere is pi^2. The limit w = 0 is two_lobe.v1. The energy bound is the same as
+ * for two_lobe.v1: the light that R leaves is split between two terms, and each returns at most its share from the
+ * incident side.
  *
  * Sampling of wi: the diffuse term with the probability that its energy asks for, with density cos th_i / pi^2,
  * otherwise as two_lobe.v1.
@@ -20,7 +20,7 @@ enum { N_PARAM = surface_two_lobe_diffuse_n_param, P_W = TWO_LOBE_N_PARAM };
 struct diffuse_state {
     struct scattering_state lobes; /* of two_lobe.v1, with C_TT (1 - w) in place of C_TT */
     float w, c_tt[3];
-    float energy; /* what the diffuse term takes of uniform light, before colours: integral of (1 - (1 - cos th)^5) */
+    float energy; /* energy of the diffuse term in uniform light, before colours: integral of (1 - (1 - cos th)^5) */
 };
 
 static const struct diffuse_state *diffuse_state_of(const struct scattering_state *s)
@@ -60,7 +60,7 @@ static status prepare(const double *param, struct scattering_state **state, stru
 /* The state begins with its lobes, so it is released as they are. */
 static_assert(offsetof(struct diffuse_state, lobes) == 0, "two_lobe_release frees the state by its first member");
 
-/* Adds the diffuse term to S and, if score != NULL, turns the scores of the lobes into those of this model. */
+/* Adds the diffuse term to S and, if score != NULL, turns the scores of the lobes into the scores of this model. */
 static void add_diffuse(const struct diffuse_state *d, const struct fiber_direction *di, const float lobe_rgb[3],
                         const float *lobe_score, float s_rgb[3], float *score)
 {
