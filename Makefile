@@ -125,9 +125,9 @@ $(BUILD)/obj/%.cpp.o: %.cpp
 	@echo "  C++  $<"
 	@$(CXX) $(CXXFLAGS_ALL) -MMD -MP -c $< -o $@
 
-# inner loops that round a product and a sum once, in one instruction; clang does so without being told
-FUSED := fibers/lines/segment_bricks fibers/shape/axes/axis_brick fibers/shape/axes/axis_claim \
-         fibers/shape/axes/axis_compare fibers/slices/blob_response orientation/lines/line_filter
+# inner loops of the geometry that round a product and a sum once, in one instruction; clang does so without being told
+FUSED := fibers/lines/segment_bricks fibers/axes/axis_brick fibers/axes/model/nearest_segment \
+         fibers/axes/axis_compare fibers/slices/blob_response filter/line_filter
 $(FUSED:%=$(BUILD)/obj/geometry/%.c.o): CFLAGS_ALL += -ffp-contract=fast
 $(BUILD)/obj/renderer/scene/grid/scene_grid_walk.c.o: CFLAGS_ALL += -ffp-contract=fast
 

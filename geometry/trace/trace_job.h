@@ -5,9 +5,9 @@
 #define SELVEDGE_GEOMETRY_TRACE_JOB_H
 
 #include "base/angle.h"
+#include "geometry/fibers/axes/model/axis_profile.h"
 #include "geometry/fibers/lines/joining.h"
-#include "geometry/fibers/shape/axes/axis_profile.h"
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 
 enum {
     TRACE_MIN_PIECE = 4,  /* least number of centers in a chain before joining */

@@ -7,9 +7,9 @@
  * their sides. The lines found there join the others before ends grow and touching lines are compared. */
 #include "geometry/trace/trace_job.h"
 
-#include "geometry/fibers/shape/axes/fiber_section.h"
-#include "geometry/filter_directions.h"
-#include "geometry/ranks/volume_slabs.h"
+#include "geometry/fibers/axes/model/fiber_section.h"
+#include "geometry/filter/filter_directions.h"
+#include "geometry/volume/volume_slabs.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,11 +1,11 @@
 /* Lines on one grid, from chains of centers to the last fit. */
 #include "geometry/trace/trace_job.h"
 
+#include "geometry/fibers/axes/axis_fit.h"
+#include "geometry/fibers/axes/flat_fit.h"
 #include "geometry/fibers/lines/disagreement.h"
 #include "geometry/fibers/lines/kinks.h"
 #include "geometry/fibers/lines/line_ends.h"
-#include "geometry/fibers/shape/axes/axis_fit.h"
-#include "geometry/fibers/shape/axes/flat_fit.h"
 #include "geometry/fibers/shape/smoothing.h"
 
 #include <math.h>

@@ -1,7 +1,7 @@
 /* The lumens of traced fibers, in the scan whose lumens were not filled. */
 #include "geometry/trace/trace_job.h"
 
-#include "geometry/fibers/shape/axes/lumen/hollow_fit.h"
+#include "geometry/fibers/axes/hollow_fit.h"
 
 /* Error of the model of a hollow fiber, as a density: images of lumens are right to 0.006 to 0.012 (geometry/NOTES.md,
  * "Lumens of single fibers"). */

@@ -1,9 +1,9 @@
 /* Lines of a scan, traced in its own voxels or in others (trace_grid.h). */
 #include "geometry/trace/trace_job.h"
 
-#include "geometry/ranks/volume_slabs.h"
 #include "geometry/trace/trace_grid.h"
 #include "geometry/volume/volume_rescale.h"
+#include "geometry/volume/volume_slabs.h"
 
 #include <math.h>
 

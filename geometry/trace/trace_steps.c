@@ -1,10 +1,10 @@
 /* The steps that lines are traced by, on one grid. */
 #include "geometry/trace/trace_job.h"
 
+#include "geometry/fibers/axes/axis_fit.h"
 #include "geometry/fibers/lines/disagreement.h"
 #include "geometry/fibers/lines/growing.h"
 #include "geometry/fibers/lines/linking.h"
-#include "geometry/fibers/shape/axes/axis_fit.h"
 #include "geometry/fibers/slices/centers.h"
 
 #include <math.h>

@@ -27,7 +27,7 @@ struct volume {
     float *density;              /* n[0]*n[1]*n[2]; in [0, 1] after density_map_apply, raw scanner values before */
     struct volume_filled filled; /* from the same space */
     struct scratch_space *space; /* not owned */
-    /* Which parts of it other ranks have (geometry/ranks/volume_slabs.h); NULL: none. Not owned. */
+    /* Which parts of it other ranks have (geometry/volume/volume_slabs.h); NULL: none. Not owned. */
     const struct volume_slabs *slabs;
 };
 

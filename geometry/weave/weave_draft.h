@@ -7,9 +7,9 @@
 #ifndef SELVEDGE_GEOMETRY_WEAVE_DRAFT_H
 #define SELVEDGE_GEOMETRY_WEAVE_DRAFT_H
 
-#include "geometry/weave/spectrum/weave_streaks.h"
 #include "geometry/weave/weave_drawing.h"
 #include "geometry/weave/weave_repeat.h"
+#include "geometry/weave/weave_streaks.h"
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -6,7 +6,7 @@
 #ifndef SELVEDGE_GEOMETRY_WEAVE_REPEAT_H
 #define SELVEDGE_GEOMETRY_WEAVE_REPEAT_H
 
-#include "geometry/weave/spectrum/weave_lattice.h"
+#include "geometry/weave/weave_lattice.h"
 
 #include <complex.h>
 

@@ -3,9 +3,9 @@
 #ifndef SELVEDGE_GEOMETRY_WEAVE_TRIAL_H
 #define SELVEDGE_GEOMETRY_WEAVE_TRIAL_H
 
-#include "geometry/weave/spectrum/weave_streaks.h"
 #include "geometry/weave/weave_drawing.h"
 #include "geometry/weave/weave_repeat.h"
+#include "geometry/weave/weave_streaks.h"
 
 /* WEAVE_PLACES: steps of the origin within one crossing, along each set of yarns. WEAVE_BLURS: blurs of the drawing. */
 enum { WEAVE_PLACES = 8, WEAVE_BLURS = 5 };

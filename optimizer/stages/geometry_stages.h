@@ -5,7 +5,7 @@
 #define SELVEDGE_OPTIMIZER_GEOMETRY_STAGES_H
 
 #include "geometry/cloth/cloth.h"
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "optimizer/stages/run/stage_tools.h"
 
 struct job_scan;

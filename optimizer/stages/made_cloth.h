@@ -5,7 +5,7 @@
 
 #include "geometry/cloth/cloth.h"
 #include "geometry/fibers/fiber_set.h"
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "optimizer/stages/job_inputs.h"
 #include "renderer/scene/scene.h"
 

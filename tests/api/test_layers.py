@@ -12,7 +12,7 @@ import check_layers  # noqa: E402
 
 
 @pytest.mark.parametrize("path, include", [
-    ("base/a.c", "geometry/reconstruct.h"),
+    ("base/a.c", "geometry/reconstruct/reconstruct.h"),
     ("geometry/a.c", "renderer/scene/scene.h"),
     ("renderer/a.c", "optimizer/job/job_folder.h"),
     ("renderer/a.c", "geometry/phantom/phantom.h"),

@@ -19,7 +19,7 @@
  */
 #include "base/clock.h"
 #include "geometry/phantom/phantom.h"
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "geometry/volume/tile_crop.h"
 
 #include <math.h>

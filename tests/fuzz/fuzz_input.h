@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_TESTS_FUZZ_INPUT_H
 #define SELVEDGE_TESTS_FUZZ_INPUT_H
 
-#include "geometry/volume/volume_reader.h"
+#include "geometry/volume/format/volume_reader.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 

@@ -1,6 +1,6 @@
 /* The first six bytes are the declaration, and the rest is the file. */
 #include "geometry/volume/format/raw_source.h"
-#include "geometry/volume/sample_type.h"
+#include "geometry/volume/format/sample_type.h"
 #include "tests/fuzz/fuzz_input.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

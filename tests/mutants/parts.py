@@ -19,7 +19,7 @@ GATE = {
     "uncertainty": (["optimizer/fit/linear/uncertainty", "optimizer/fit/linear/linear_", "optimizer/fit/objective/product_noise",
                      "optimizer/fit/cloth/carried_error", "geometry/fibers/shape/radius_choose"],
                     ["unit/optimizer/fit/", "unit/geometry/fibers/"], []),
-    "readers": (["geometry/volume/format/", "geometry/volume/voxel_stream", "geometry/volume/volume_source", "geometry/volume/sample_type",
+    "readers": (["geometry/volume/format/", "geometry/volume/format/voxel_stream", "geometry/volume/format/volume_source", "geometry/volume/format/sample_type",
                  *(f"optimizer/photographs/reader/{name}" for name in ("exif", "integer_samples", "photograph_reader", "read_")),
                  *(f"optimizer/photographs/rows/{name}" for name in ("brdf_", "number_table", "table_text", "tensor_file"))],
                 ["unit/geometry/volume/", "unit/optimizer/photographs/", "api/photographs/test_measured_brdf"], []),

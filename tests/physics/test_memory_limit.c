@@ -1,6 +1,6 @@
 /* The resident memory of a reconstruction stays under its limit when the arrays of the volume need several times as
  * much. */
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "tests/support/scan/scan_files.h"
 
 #include <math.h>

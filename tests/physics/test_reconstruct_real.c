@@ -3,7 +3,7 @@
  * resolved there, so only the directions are judged. Pictures of slices go to the folder named by SELVEDGE_PICTURES,
  * if set. */
 #include "base/clock.h"
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "geometry/volume/tile_crop.h"
 #include "tests/support/cloth/weave_labels.h"
 

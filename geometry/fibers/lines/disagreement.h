@@ -4,7 +4,7 @@
 #define SELVEDGE_GEOMETRY_DISAGREEMENT_H
 
 #include "base/thread_pool.h"
-#include "geometry/fibers/lines/polyline.h"
+#include "geometry/fibers/polyline.h"
 #include "geometry/volume/volume.h"
 
 /* pool NULL: one thread. */

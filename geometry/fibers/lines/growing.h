@@ -7,7 +7,7 @@
 #ifndef SELVEDGE_GEOMETRY_GROWING_H
 #define SELVEDGE_GEOMETRY_GROWING_H
 
-#include "geometry/fibers/lines/polyline.h"
+#include "geometry/fibers/polyline.h"
 #include "geometry/volume/volume.h"
 
 struct grow_option {

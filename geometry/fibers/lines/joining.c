@@ -1,7 +1,7 @@
 #include "geometry/fibers/lines/joining.h"
 
-#include "geometry/fibers/lines/join/join_emit.h"
-#include "geometry/fibers/lines/join/join_evidence.h"
+#include "geometry/fibers/lines/join_emit.h"
+#include "geometry/fibers/lines/join_evidence.h"
 
 #include <math.h>
 #include <stdbool.h>

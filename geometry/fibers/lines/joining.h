@@ -11,7 +11,7 @@
 #define SELVEDGE_GEOMETRY_JOINING_H
 
 #include "base/thread_pool.h"
-#include "geometry/fibers/lines/polyline.h"
+#include "geometry/fibers/polyline.h"
 #include "geometry/volume/volume.h"
 
 #include <stdbool.h>

@@ -4,7 +4,7 @@
 #ifndef SELVEDGE_GEOMETRY_KINKS_H
 #define SELVEDGE_GEOMETRY_KINKS_H
 
-#include "geometry/fibers/lines/polyline.h"
+#include "geometry/fibers/polyline.h"
 
 #include <stdbool.h>
 

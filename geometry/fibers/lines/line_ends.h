@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_GEOMETRY_LINE_ENDS_H
 #define SELVEDGE_GEOMETRY_LINE_ENDS_H
 
-#include "geometry/fibers/lines/polyline.h"
+#include "geometry/fibers/polyline.h"
 #include "geometry/volume/volume.h"
 
 /* Extends ends that lie shortly before a face, at most max_voxel, to that face, if there is material (eps_d) on the

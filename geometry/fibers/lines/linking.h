@@ -9,7 +9,7 @@
 #ifndef SELVEDGE_GEOMETRY_LINKING_H
 #define SELVEDGE_GEOMETRY_LINKING_H
 
-#include "geometry/fibers/lines/polyline.h"
+#include "geometry/fibers/polyline.h"
 #include "geometry/fibers/slices/centers.h"
 
 #define LINK_REACH 0.2

@@ -4,7 +4,7 @@
 #define SELVEDGE_GEOMETRY_SEGMENT_BRICKS_H
 
 #include "geometry/fibers/fiber_set.h"
-#include "geometry/fibers/lines/polyline.h"
+#include "geometry/fibers/polyline.h"
 
 #include <stdbool.h>
 

@@ -4,7 +4,7 @@
 #include "base/files/durable.h"
 #include "base/option_id.h"
 #include "geometry/volume/format/volume_header.h"
-#include "geometry/volume/volume_reader.h"
+#include "geometry/volume/format/volume_reader.h"
 
 #include <endian.h>
 #include <errno.h>

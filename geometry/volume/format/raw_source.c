@@ -2,7 +2,7 @@
 #include "base/option_id.h"
 
 #include "base/files/durable.h"
-#include "geometry/volume/voxel_stream.h"
+#include "geometry/volume/format/voxel_stream.h"
 
 #include <endian.h>
 #include <limits.h>

@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_GEOMETRY_RAW_SOURCE_H
 #define SELVEDGE_GEOMETRY_RAW_SOURCE_H
 
-#include "geometry/volume/volume_reader.h"
+#include "geometry/volume/format/volume_reader.h"
 
 /* Opens one file that holds only the declared voxels after declaration->header_bytes. STATUS_INVALID for more than
  * one file (field OPTION_RAW), an unknown type (OPTION_RAW_TYPE), edges that are not 1 .. VOXEL_STREAM_MAX_EDGE

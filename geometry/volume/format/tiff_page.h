@@ -3,7 +3,7 @@
 #define SELVEDGE_GEOMETRY_TIFF_PAGE_H
 
 #include "base/status.h"
-#include "geometry/volume/sample_type.h"
+#include "geometry/volume/format/sample_type.h"
 
 #include <stdint.h>
 #include <tiffio.h>

@@ -4,7 +4,7 @@
 #include "base/files/durable.h"
 #include "base/option_id.h"
 #include "geometry/volume/format/tiff_page.h"
-#include "geometry/volume/volume_reader.h"
+#include "geometry/volume/format/volume_reader.h"
 
 #include <errno.h>
 #include <math.h>

@@ -2,7 +2,7 @@
 #include "base/option_id.h"
 
 #include "base/files/durable.h"
-#include "geometry/volume/volume_reader.h"
+#include "geometry/volume/format/volume_reader.h"
 
 #include <endian.h>
 #include <errno.h>

@@ -3,7 +3,7 @@
 #ifndef SELVEDGE_GEOMETRY_VOLUME_HEADER_H
 #define SELVEDGE_GEOMETRY_VOLUME_HEADER_H
 
-#include "geometry/volume/voxel_stream.h"
+#include "geometry/volume/format/voxel_stream.h"
 
 enum { VOLUME_HEADER_MAX_BYTES = 65536 };
 

@@ -2,7 +2,7 @@
 #include "base/clock.h"
 #include "base/files/durable.h"
 #include "geometry/grade/scan_grade.h"
-#include "geometry/volume/tiles/slice_tiles.h"
+#include "geometry/volume/slice_tiles.h"
 #include "optimizer/job/job_folder.h"
 
 #include <math.h>

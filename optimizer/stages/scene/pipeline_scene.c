@@ -2,7 +2,7 @@
 #include "base/option_id.h"
 #include "geometry/fibers/shape/fiber_correct.h"
 #include "geometry/fibers/voxelise.h"
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_scan.h"

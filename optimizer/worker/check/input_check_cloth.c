@@ -1,7 +1,7 @@
 #include "base/option_id.h"
 #include "base/warning.h"
 #include "geometry/fibers/fiber_set.h"
-#include "geometry/volume/volume_source.h"
+#include "geometry/volume/format/volume_source.h"
 #include "geometry/weave/weave_detect.h"
 #include "optimizer/job/document/job_document.h"
 #include "optimizer/job/document/job_photograph.h"

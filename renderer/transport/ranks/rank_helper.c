@@ -1,6 +1,6 @@
 #include "renderer/transport/ranks/rank_helper.h"
 
-#include "geometry/ranks/slab_helper.h"
+#include "geometry/reconstruct/slab_helper.h"
 #include "renderer/transport/ranks/rank_orders.h"
 #include "renderer/transport/ranks/rank_request.h"
 

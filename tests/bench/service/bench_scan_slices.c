@@ -13,8 +13,8 @@
 #include "base/clock.h"
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/phantom/phantom.h"
-#include "geometry/reconstruct.h"
-#include "geometry/volume/tiles/slice_tiles.h"
+#include "geometry/reconstruct/reconstruct.h"
+#include "geometry/volume/slice_tiles.h"
 
 #include <math.h>
 #include <stdio.h>

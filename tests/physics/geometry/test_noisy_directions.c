@@ -1,7 +1,7 @@
 /* Directions of the voxels of a noisy plain weave: those of the filter, and those of lines that are traced in it. */
 #include "geometry/grade/compare_directions.h"
 #include "geometry/phantom/phantom.h"
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "geometry/volume/density_map.h"
 #include "tests/support/scan/phantom_reconstruction.h"
 

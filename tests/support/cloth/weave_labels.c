@@ -1,6 +1,6 @@
 #include "tests/support/cloth/weave_labels.h"
 
-#include "geometry/volume/volume_source.h"
+#include "geometry/volume/format/volume_source.h"
 
 #include <math.h>
 #include <stdlib.h>

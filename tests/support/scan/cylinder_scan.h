@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_TESTS_CYLINDER_SCAN_H
 #define SELVEDGE_TESTS_CYLINDER_SCAN_H
 
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "tests/support/scan/scan_files.h"
 
 enum { CYLINDER_NX = 72, CYLINDER_NY = 64, CYLINDER_NZ = 48, CYLINDER_N = 5 };

@@ -6,7 +6,7 @@
 #include "geometry/grade/scan_grade.h"
 #include "geometry/phantom/compare.h"
 #include "geometry/phantom/phantom.h"
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 
 struct phantom_reconstruction {
     struct volume v; /* the scan with densities mapped to [0, 1] */

@@ -1,6 +1,6 @@
 #include "tests/support/scan/scan_expectation.h"
 
-#include "geometry/volume/volume_source.h"
+#include "geometry/volume/format/volume_source.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_TESTS_SCAN_EXPECTATION_H
 #define SELVEDGE_TESTS_SCAN_EXPECTATION_H
 
-#include "geometry/volume/volume_reader.h"
+#include "geometry/volume/format/volume_reader.h"
 
 #include <stddef.h>
 #include <stdint.h>

@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_TESTS_TIFF_STACK_H
 #define SELVEDGE_TESTS_TIFF_STACK_H
 
-#include "geometry/volume/volume_source.h"
+#include "geometry/volume/format/volume_source.h"
 #include "tests/support/scan/scan_files.h"
 
 enum { STACK_WIDTH = 37, STACK_HEIGHT = 23, STACK_PAGES = 4 };

@@ -3,7 +3,7 @@
 #include "base/files/scratch_space.h"
 #include "geometry/orientation/alignment.h"
 #include "geometry/orientation/repeat_direction.h"
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "geometry/volume/density_map.h"
 #include "geometry/volume/tile_crop.h"
 #include "geometry/volume/volume_align.h"

@@ -2,7 +2,7 @@
  * the direction transfer (fabric thesis 5.6.7): voxels up to two radii away take the direction of the true fiber. */
 #include "base/angle.h"
 #include "geometry/grade/compare_directions.h"
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 
 #include <math.h>
 #include <setjmp.h>

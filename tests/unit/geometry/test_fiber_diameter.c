@@ -1,8 +1,8 @@
 /* The fiber diameter that is measured in a scan: with noise of any kind, below that of yarns, given, and reported. */
 #include "base/option_id.h"
-#include "geometry/orientation/diameter/fiber_diameter.h"
-#include "geometry/orientation/diameter/scale_space.h"
-#include "geometry/reconstruct.h"
+#include "geometry/diameter/fiber_diameter.h"
+#include "geometry/diameter/scale_space.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "tests/support/scan/scan_files.h"
 
 #include <math.h>

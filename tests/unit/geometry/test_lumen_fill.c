@@ -1,10 +1,10 @@
 /* Lumens of hollow fibers are filled, and nothing outside of the fibers. */
 #include "base/rng.h"
-#include "geometry/orientation/diameter/fiber_diameter.h"
-#include "geometry/orientation/lumen/along_smooth.h"
-#include "geometry/orientation/lumen/lumen_evidence.h"
-#include "geometry/orientation/lumen/lumen_fill.h"
-#include "geometry/orientation/lumen/lumen_sift.h"
+#include "geometry/diameter/along_smooth.h"
+#include "geometry/diameter/fiber_diameter.h"
+#include "geometry/diameter/lumen_evidence.h"
+#include "geometry/diameter/lumen_fill.h"
+#include "geometry/diameter/lumen_filter.h"
 #include "geometry/volume/density_map.h"
 #include "tests/support/scan/phantom_reconstruction.h"
 

@@ -1,9 +1,9 @@
 /* Smoothing of a scan's noise before its densities are clamped: how far it goes, and what it leaves as it is. */
-#include "geometry/scan_densities.h"
+#include "geometry/diameter/scan_densities.h"
 
 #include "base/rng.h"
-#include "geometry/noise_smoothing.h"
 #include "geometry/volume/density_map.h"
+#include "geometry/volume/noise_smoothing.h"
 #include "geometry/volume/volume_align.h"
 
 #include <math.h>

@@ -1,9 +1,9 @@
 /* The line filter and the search for its minimum. */
 #include "base/angle.h"
 #include "base/option_id.h"
-#include "geometry/orientation/lines/line_filter.h"
+#include "geometry/filter/line_filter.h"
 #include "geometry/orientation/structure_tensor.h"
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "tests/support/scan/scan_files.h"
 
 #include <math.h>

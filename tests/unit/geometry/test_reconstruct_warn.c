@@ -1,7 +1,7 @@
 /* Every warning about a scan and its fibers: a clean scan has none, and each figure warns on its own side of its limit
  * only, with its numbers and the option that it is about. */
 #include "base/option_id.h"
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 
 #include <math.h>
 #include <setjmp.h>

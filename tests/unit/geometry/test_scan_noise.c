@@ -1,7 +1,7 @@
 /* The correlation of a scan's noise, measured in void that is clamped at 0, on phantoms whose noise is known. */
+#include "geometry/diameter/scan_densities.h"
 #include "geometry/grade/scan_noise.h"
 #include "geometry/phantom/phantom.h"
-#include "geometry/scan_densities.h"
 #include "geometry/volume/density_map.h"
 
 #include <math.h>

@@ -1,7 +1,7 @@
 /* Directions of the voxels of a velvet whose fibers are 4 voxels thick and touch each other. */
 #include "geometry/grade/compare_directions.h"
 #include "geometry/phantom/phantom.h"
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "geometry/volume/density_map.h"
 #include "tests/support/scan/phantom_reconstruction.h"
 

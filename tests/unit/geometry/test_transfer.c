@@ -1,7 +1,7 @@
 /* Direction transfer (fabric thesis 5.6.7) against distances computed here: a kept voxel within 2 r of the axis of a
  * fiber takes that fiber's direction, all others keep theirs; the share of fibers that is material counts voxels
  * within r. In a scan that does not resolve fibers, directions are means over those around. */
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -1,5 +1,5 @@
 /* Which voxels each line claims, and for which of its segments, against a search of all segments. */
-#include "geometry/fibers/shape/axes/axis_claim.h"
+#include "geometry/fibers/axes/model/nearest_segment.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -1,6 +1,6 @@
 /* The stiffness of axes in their last fit follows the curvature of the fibers from place to place, and their bends are
- * correlated along the fiber (geometry/fibers/shape/axes/axis_solve.h). */
-#include "geometry/fibers/shape/axes/axis_solve.h"
+ * correlated along the fiber (geometry/fibers/axes/axis_solve.h). */
+#include "geometry/fibers/axes/axis_solve.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -1,6 +1,6 @@
 /* Sections of two axes in the fit of fiber axes: derivatives, and which line beside a flat fiber is a part of it. */
 #include "base/rng.h"
-#include "geometry/fibers/shape/axes/flat_fit.h"
+#include "geometry/fibers/axes/flat_fit.h"
 #include "geometry/phantom/phantom_section.h"
 
 #include <math.h>

@@ -1,8 +1,8 @@
 /* Lines that change to the neighbouring fiber are cut at that place, and lines that bend like fibers are not cut.
  * Ends that do not follow the measured directions are trimmed. */
+#include "geometry/fibers/axes/axis_fit.h"
 #include "geometry/fibers/lines/disagreement.h"
 #include "geometry/fibers/lines/kinks.h"
-#include "geometry/fibers/shape/axes/axis_fit.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -2,7 +2,7 @@
  *     score(r) = |C(r) and V| - |C(r) xor V|, and a ring belongs to the best C(r) while more than a third of its points
  *     are in V, because a point of V inside of C(r) counts twice (it joins the intersection and leaves the
  *     difference). */
-#include "geometry/fibers/shape/axes/axis_profile.h"
+#include "geometry/fibers/axes/model/axis_profile.h"
 #include "geometry/fibers/shape/radius.h"
 
 #include <math.h>

@@ -1,12 +1,12 @@
-/* Sections along fibers with their errors (geometry/fibers/shape/axes/shape_measure.h), on fibers of known sections:
+/* Sections along fibers with their errors (geometry/fibers/axes/shape_measure.h), on fibers of known sections:
  * radius, ratio of axes and turn of the long axis differ from the truth by as much as their errors say, for white and
  * for correlated noise, and a radius counts as varying only where it does. The same of the lumens of hollow fibers
  * (geometry/fibers/shape/axes/lumen). */
 #include "base/rng.h"
-#include "geometry/fibers/shape/axes/flat_fit.h"
-#include "geometry/fibers/shape/axes/lumen/hollow_fit.h"
-#include "geometry/noise_smoothing.h"
+#include "geometry/fibers/axes/flat_fit.h"
+#include "geometry/fibers/axes/hollow_fit.h"
 #include "geometry/phantom/phantom_section.h"
+#include "geometry/volume/noise_smoothing.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -1,7 +1,7 @@
 /* Faulty scans through the whole reconstruction: each gives a clear error or a clear warning. */
 #include "base/option_id.h"
 #include "base/rng.h"
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "tests/support/scan/scan_files.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
 /* Scans with slices thicker than their voxels become cubes of the right size at the right place: known answers. */
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "geometry/volume/volume_align.h"
 
 #include <math.h>

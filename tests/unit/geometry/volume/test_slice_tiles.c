@@ -1,7 +1,7 @@
 /* Slices for a viewer: codes of directions and densities, files read back tile by tile, shrinking, and threads. */
 #include "base/files/durable.h"
 #include "base/rng.h"
-#include "geometry/volume/tiles/slice_tiles.h"
+#include "geometry/volume/slice_tiles.h"
 #include "tests/support/scan/scan_files.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
 /* Volumes in voxels of another size, and fibers too thin or too thick for the scan's own voxels: known answers. */
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "geometry/trace/trace_grid.h"
 #include "geometry/volume/volume_rescale.h"
 #include "tests/support/scan/scan_files.h"

@@ -1,7 +1,7 @@
 /* Void above and below the cloth of a large scan is left out when it is read. */
 #include "base/rng.h"
-#include "geometry/reconstruct.h"
-#include "geometry/volume/void_trim.h"
+#include "geometry/reconstruct/reconstruct.h"
+#include "geometry/reconstruct/void_trim.h"
 #include "tests/support/scan/scan_files.h"
 
 #include <setjmp.h>

@@ -1,9 +1,9 @@
 /* Readers of scans: golden bytes of raw, MetaImage and .vol, the registry of readers, and wrong headers. */
 #include "base/option_id.h"
-#include "geometry/reconstruct.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "geometry/volume/format/vol_file.h"
-#include "geometry/volume/volume_reader.h"
-#include "geometry/volume/volume_source.h"
+#include "geometry/volume/format/volume_reader.h"
+#include "geometry/volume/format/volume_source.h"
 #include "tests/support/scan/scan_expectation.h"
 #include "tests/support/scratch_folder.h"
 

@@ -1,10 +1,10 @@
 /* The geometry of a scan by slabs over two ranks: the same bits as by one rank alone. Orders that make no sense are
  * refused. */
 #include "base/ranks/byte_pack.h"
-#include "geometry/filter_rows.h"
-#include "geometry/ranks/axis_share.h"
-#include "geometry/ranks/direction_share.h"
-#include "geometry/reconstruct.h"
+#include "geometry/fibers/axes/axis_share.h"
+#include "geometry/filter/direction_share.h"
+#include "geometry/filter/filter_rows.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "geometry/trace/trace_job.h"
 #include "tests/support/ranks/two_ranks.h"
 #include "tests/support/scan/scan_files.h"

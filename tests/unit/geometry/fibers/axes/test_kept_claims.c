@@ -1,8 +1,8 @@
 /* Fits of lines at rest, which keep the claims of voxels for some rounds: the result does not depend on how many of
  * them there is room for, and is that of fits that find them anew. */
-#include "geometry/fibers/shape/axes/axis_fit.h"
-#include "geometry/fibers/shape/axes/kept/claim_rounds.h"
-#include "geometry/fibers/shape/axes/kept/claim_store.h"
+#include "geometry/fibers/axes/axis_fit.h"
+#include "geometry/fibers/axes/model/nearest_cache.h"
+#include "geometry/fibers/axes/model/nearest_rounds.h"
 #include "tests/support/scratch_folder.h"
 
 #include <math.h>

@@ -1,0 +1,14 @@
+/* Directions of the fibers on one grid (head of filter_rows.c). */
+#ifndef SELVEDGE_GEOMETRY_FILTER_DIRECTIONS_H
+#define SELVEDGE_GEOMETRY_FILTER_DIRECTIONS_H
+
+#include "geometry/reconstruct/reconstruct.h"
+
+/* Computes d from v, whose fibers are diameter_voxel thick. Options that are left to the data are chosen from v and
+ * written back. Counts the voxels of material and those kept. STATUS_INVALID when no voxel is kept (reconstruct.h);
+ * STATUS_CANCELLED, STATUS_NO_MEMORY, STATUS_DISK_FULL. */
+status filter_directions(const struct volume *v, double diameter_voxel, struct reconstruct_option *option,
+                         struct thread_pool *pool, const struct progress *progress, struct direction_volume *d,
+                         struct reconstruct_report *report, struct error *err);
+
+#endif

@@ -1,0 +1,116 @@
+/* Step "orientation": the fiber diameter, and the direction of the fiber through every voxel of material. */
+#include "geometry/reconstruct/reconstruct.h"
+
+#include "geometry/diameter/fiber_diameter.h"
+#include "geometry/filter/filter_choice.h"
+#include "geometry/filter/filter_directions.h"
+#include "geometry/trace/trace_grid.h"
+#include "geometry/volume/volume_rescale.h"
+
+#include <math.h>
+
+/* Ratio of diameters that are the same peak. */
+static const double SAME_PEAK = 1.3;
+/* Noise over the step from void to material from which on thin fibers get the usual filter: a narrow one sees more of
+ * it. It lies between a half, at which some cloths gain by the narrow one and others lose, and a fifth, at which all
+ * that touch gain (geometry/NOTES.md, "Thin fibers: the filter was too wide"). */
+static const double MOST_NOISE = 1.0 / 3.0;
+
+/* Takes the diameter of the fibers that noise hid in the scan, if only their yarns are left since it was smoothed. */
+static void prefer_hidden(const struct scan_noise *noise, struct fiber_diameter *d)
+{
+    const double hidden = noise->hidden_diameter_voxel;
+    if (!(hidden > 0.0) || hidden * FIBER_DIAMETER_FINER > d->voxel) return;
+    d->other_voxel = d->voxel;
+    d->other_noise_share = d->noise_share;
+    d->voxel = hidden;
+    d->noise_share = noise->hidden_noise_share;
+    d->hidden = true;
+}
+
+/* Measures the diameter beside one that the job gives, and states it where it is another. Fibers that noise hides are
+ * not looked for. */
+static status check_given(const struct volume *v, struct thread_pool *pool, const struct progress *progress,
+                          struct fiber_diameter *d, struct error *err)
+{
+    struct fiber_diameter measured;
+    status s = fiber_diameter_measure(v, pool, progress, &measured, err);
+    if (s == STATUS_OK && measured.noise_share < 0.5 &&
+        fabs(log(measured.voxel / d->voxel)) > log(FIBER_DIAMETER_FINER))
+        d->other_voxel = measured.voxel;
+    return s;
+}
+
+/* Takes the fiber diameter of the job, or measures it. */
+static status find_diameter(const struct volume *v, const struct reconstruct_option *option, struct thread_pool *pool,
+                            const struct progress *progress, struct reconstruct_report *report, struct error *err)
+{
+    struct fiber_diameter d = {.voxel = option->fiber_diameter_voxel, .noise_share = NAN, .other_voxel = NAN};
+    status s = STATUS_OK;
+    d.other_noise_share = NAN;
+    if (isnan(d.voxel)) {
+        s = fiber_diameter_measure(v, pool, progress, &d, err);
+        if (s == STATUS_OK) prefer_hidden(&report->noise, &d);
+    } else {
+        s = check_given(v, pool, progress, &d, err);
+    }
+    report->fiber_diameter_voxel = d.voxel;
+    report->diameter_noise_share = d.noise_share;
+    report->other_diameter_voxel = d.other_voxel;
+    report->other_diameter_noise_share = d.other_noise_share;
+    return s;
+}
+
+/* Measures the diameter once more in the rescaled volume, where the scales of the filter are neither about as fine as
+ * the voxels nor coarse. A peak far from the first one is another one. */
+static status measure_again(const struct volume *grid, double edge, struct thread_pool *pool,
+                            const struct progress *progress, struct reconstruct_report *report, struct error *err)
+{
+    struct fiber_diameter d;
+    status s = fiber_diameter_measure(grid, pool, progress, &d, err);
+    if (s == STATUS_OK && fabs(log(d.voxel * edge / report->fiber_diameter_voxel)) < log(SAME_PEAK))
+        report->fiber_diameter_voxel = d.voxel * edge;
+    return s;
+}
+
+/* Filters a rescaled volume, and gives its directions to the voxels of the scan. */
+static status filter_rescaled(const struct volume *v, double edge, struct reconstruct_option *option,
+                              struct thread_pool *pool, const struct progress *progress, struct direction_volume *d,
+                              struct reconstruct_report *report, struct error *err)
+{
+    struct volume grid = {0};
+    struct direction_volume on_grid = {0};
+    const struct progress quiet = progress_silent(progress);
+    status s = volume_rescale(v, edge, pool, &quiet, &grid, err);
+    if (s == STATUS_OK && isnan(option->fiber_diameter_voxel))
+        s = measure_again(&grid, edge, pool, &quiet, report, err);
+    trace_grid_rescale_option(option, edge);
+    if (edge < 1.0 && report->noise.scan_sd < MOST_NOISE)
+        filter_choose_thin(option, report->fiber_diameter_voxel / edge);
+    if (s == STATUS_OK)
+        s = filter_directions(&grid, report->fiber_diameter_voxel / edge, option, pool, progress, &on_grid, report,
+                              err);
+    trace_grid_rescale_option(option, 1.0 / edge);
+    volume_release(&grid);
+    if (s == STATUS_OK)
+        s = direction_volume_rescale(&on_grid, v, option->eps_d, pool, d, &report->n_material_voxel,
+                                     &report->n_kept_voxel, err);
+    direction_volume_release(&on_grid);
+    return s;
+}
+
+status reconstruct_orientation(const struct volume *v, struct reconstruct_option *option, struct thread_pool *pool,
+                               const struct progress *progress, struct direction_volume *d,
+                               struct reconstruct_report *report, struct error *err)
+{
+    struct progress_part part = {progress, 0.0, 0.1};
+    const struct progress inner = progress_of_part(&part);
+    *d = (struct direction_volume){0};
+    status s = find_diameter(v, option, pool, &inner, report, err);
+    if (s != STATUS_OK) return s;
+    const double edge = trace_grid_edge(report->fiber_diameter_voxel, v->n);
+    report->trace_edge_voxel = edge;
+    part = (struct progress_part){progress, 0.1, 0.9};
+    if (edge == 1.0) return filter_directions(v, report->fiber_diameter_voxel, option, pool, &inner, d, report, err);
+    return filter_rescaled(v, edge, option, pool, &inner, d, report, err);
+}
