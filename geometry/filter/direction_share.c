@@ -210,15 +210,15 @@ static void heed_root(void *team, double fraction)
     rank_team_heed(team);
 }
 
-status direction_share_help(struct slab_helper *h, const struct rank_order *order, struct thread_pool *pool,
+status direction_share_help(const struct helper_slab *slab, const struct rank_order *order, struct thread_pool *pool,
                             struct error *err)
 {
     struct byte_view v = {.data = order->data, .n = order->n_bytes};
     struct directions_order o;
     struct reconstruct_option option;
     struct direction_volume part = {0};
-    struct rank_team *team = h->slabs.team;
-    const struct slab_rows *r = &h->rows;
+    struct rank_team *team = slab->slabs.team;
+    const struct slab_rows *r = &slab->rows;
     const size_t own[2] = {r->begin - r->with_halo, r->end - r->with_halo};
     BYTE_VIEW(&v, o);
     status s = byte_view_check(&v, err);
@@ -229,13 +229,13 @@ status direction_share_help(struct slab_helper *h, const struct rank_order *orde
     option.eps_d = o.eps_d;
     option.eps_j = o.eps_j;
     const bool right = s == STATUS_OK && order_makes_sense(&o) && filter_check(&option, NULL) == STATUS_OK &&
-                       h->slabs.halo == filter_rows_halo(&option, o.diameter_voxel) &&
-                       h->slabs.align == filter_rows_alignment(o.diameter_voxel);
+                       slab->slabs.halo == filter_rows_halo(&option, o.diameter_voxel) &&
+                       slab->slabs.align == filter_rows_alignment(o.diameter_voxel);
     if (!right) return error_set(err, STATUS_FORMAT, "another rank asks for directions of fibers that cannot be");
     const struct progress progress = {.report = heed_root, .context = team, .cancel = rank_team_cancel(team)};
-    if (h->volume.density != NULL)
-        s = filter_rows(&h->volume, own, o.diameter_voxel, &option, pool, &progress, &part, err);
-    struct gather g = {.slabs = &h->slabs, .part = &part, .part_row = r->with_halo};
+    if (slab->volume.density != NULL)
+        s = filter_rows(&slab->volume, own, o.diameter_voxel, &option, pool, &progress, &part, err);
+    struct gather g = {.slabs = &slab->slabs, .part = &part, .part_row = r->with_halo};
     if (s == STATUS_OK) s = gather_rows(&g, pool, &(struct progress){.cancel = progress.cancel}, err);
     direction_volume_release(&part);
     return s;

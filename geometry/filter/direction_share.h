@@ -4,8 +4,8 @@
 #ifndef SELVEDGE_GEOMETRY_DIRECTION_SHARE_H
 #define SELVEDGE_GEOMETRY_DIRECTION_SHARE_H
 
-#include "geometry/reconstruct/reconstruct.h"
-#include "geometry/reconstruct/slab_helper.h"
+#include "geometry/record/reconstruct_option.h"
+#include "geometry/volume/volume_slabs.h"
 
 /* Data of an order RANK_ORDER_DIRECTIONS. */
 struct directions_order {
@@ -23,7 +23,7 @@ status direction_share_filter(const struct volume_slabs *slabs, const struct vol
                               const struct reconstruct_option *option, struct thread_pool *pool,
                               const struct progress *progress, struct direction_volume *d, struct error *err);
 /* Helper: filters its slab. STATUS_FORMAT, STATUS_NO_MEMORY, STATUS_CANCELLED, STATUS_IO. */
-status direction_share_help(struct slab_helper *h, const struct rank_order *order, struct thread_pool *pool,
+status direction_share_help(const struct helper_slab *slab, const struct rank_order *order, struct thread_pool *pool,
                             struct error *err);
 
 #endif

@@ -2,7 +2,10 @@
 #ifndef SELVEDGE_GEOMETRY_FILTER_CHOICE_H
 #define SELVEDGE_GEOMETRY_FILTER_CHOICE_H
 
-#include "geometry/reconstruct/reconstruct.h"
+#include "base/progress.h"
+#include "base/thread_pool.h"
+#include "geometry/record/reconstruct_option.h"
+#include "geometry/volume/volume.h"
 
 /* J of solid material, a block of density 1. */
 double filter_solid_j(double s, double t, size_t h);

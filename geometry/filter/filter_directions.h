@@ -2,7 +2,11 @@
 #ifndef SELVEDGE_GEOMETRY_FILTER_DIRECTIONS_H
 #define SELVEDGE_GEOMETRY_FILTER_DIRECTIONS_H
 
-#include "geometry/reconstruct/reconstruct.h"
+#include "base/progress.h"
+#include "base/thread_pool.h"
+#include "geometry/record/reconstruct_option.h"
+#include "geometry/record/reconstruct_report.h"
+#include "geometry/volume/volume.h"
 
 /* Computes d from v, whose fibers are diameter_voxel thick. Options that are left to the data are chosen from v and
  * written back. Counts the voxels of material and those kept. STATUS_INVALID when no voxel is kept (reconstruct.h);

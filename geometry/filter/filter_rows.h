@@ -2,7 +2,10 @@
 #ifndef SELVEDGE_GEOMETRY_FILTER_ROWS_H
 #define SELVEDGE_GEOMETRY_FILTER_ROWS_H
 
-#include "geometry/reconstruct/reconstruct.h"
+#include "base/progress.h"
+#include "base/thread_pool.h"
+#include "geometry/record/reconstruct_option.h"
+#include "geometry/volume/volume.h"
 
 /* Computes directions d for rows row[0] .. row[1] - 1 of v, whose fibers are diameter_voxel thick, with options that
  * are chosen (filter_choice.h). v holds their surroundings: filter_rows_halo rows to both sides, unless the whole

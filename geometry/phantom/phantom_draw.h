@@ -3,6 +3,7 @@
 #define SELVEDGE_GEOMETRY_PHANTOM_DRAW_H
 
 #include "geometry/phantom/phantom_strand.h"
+#include "geometry/volume/volume.h"
 
 /* A slab of slices, first .. first + n_slice. The caller owns the arrays, each of n_slice slices. */
 struct phantom_slab {

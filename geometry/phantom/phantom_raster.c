@@ -17,6 +17,7 @@
  * FRINGE_SD_VOXEL more: that is the Laplacian of free propagation at a finite resolution, bright inside an outline and
  * dark outside. Correlated noise is white noise after a Gaussian blur, scaled back to its standard deviation. */
 #include "base/rng.h"
+#include "geometry/phantom/phantom.h"
 #include "geometry/phantom/phantom_draw.h"
 #include "geometry/phantom/slice_blur.h"
 

@@ -1,7 +1,6 @@
 #include "geometry/reconstruct/slab_helper.h"
 
 #include "base/ranks/byte_pack.h"
-#include "geometry/fibers/axes/axis_share.h"
 #include "geometry/filter/direction_share.h"
 
 #include <math.h>
@@ -15,11 +14,11 @@ static void forget(struct slab_helper *h)
 {
     axis_round_free(h->round);
     h->round = NULL;
-    if (h->volume.density != NULL) volume_release(&h->volume);
-    h->volume = (struct volume){.n = {0}};
-    free(h->slabs.first);
-    h->slabs = (struct volume_slabs){0};
-    h->n_slice = 0;
+    if (h->slab.volume.density != NULL) volume_release(&h->slab.volume);
+    h->slab.volume = (struct volume){.n = {0}};
+    free(h->slab.slabs.first);
+    h->slab.slabs = (struct volume_slabs){0};
+    h->slab.n_slice = 0;
 }
 
 void slab_helper_release(struct slab_helper *h) { forget(h); }
@@ -63,36 +62,37 @@ static status take_slab(struct slab_helper *h, struct rank_team *team, const str
     if (v.failed || !order_makes_sense(&o, n_rank))
         return error_set(err, STATUS_FORMAT, "the slab of another rank is none");
     uint64_t *first = byte_view_array(&v, n_rank + 1, sizeof *first);
-    h->slabs = (struct volume_slabs){.team = team, .halo = o.halo, .align = o.align, .n_rank = n_rank};
-    for (int a = 0; a < 3; a++) h->slabs.n[a] = o.n[a];
+    h->slab.slabs = (struct volume_slabs){.team = team, .halo = o.halo, .align = o.align, .n_rank = n_rank};
+    for (int a = 0; a < 3; a++) h->slab.slabs.n[a] = o.n[a];
     status s = byte_view_check(&v, err);
-    if (s == STATUS_OK && !take_columns(&h->slabs, first))
+    if (s == STATUS_OK && !take_columns(&h->slab.slabs, first))
         s = error_set(err, STATUS_FORMAT, "another rank deals out columns that do not exist");
     free(first);
     if (s != STATUS_OK) return s;
-    h->rows = o.halo > 0 ? volume_slabs_own(&h->slabs, rank) : volume_slabs_touched(&h->slabs, rank);
-    const size_t n[3] = {o.n[0], h->rows.halo_end - h->rows.with_halo, o.n[2]};
-    return n[1] > 0 ? volume_init(&h->volume, n, o.voxel_size_m, err) : STATUS_OK;
+    h->slab.rows = o.halo > 0 ? volume_slabs_own(&h->slab.slabs, rank) : volume_slabs_touched(&h->slab.slabs, rank);
+    const size_t n[3] = {o.n[0], h->slab.rows.halo_end - h->slab.rows.with_halo, o.n[2]};
+    return n[1] > 0 ? volume_init(&h->slab.volume, n, o.voxel_size_m, err) : STATUS_OK;
 }
 
 static status take_rows(struct slab_helper *h, const struct rank_order *order, struct error *err)
 {
     struct byte_view v = {.data = order->data, .n = order->n_bytes};
-    const size_t *n = h->volume.n, n_slice = n[0] * n[1];
+    const size_t *n = h->slab.volume.n, n_slice = n[0] * n[1];
     struct rows_order o;
     BYTE_VIEW(&v, o);
-    if (v.failed || h->volume.density == NULL || o.first_slice != h->n_slice || o.n_slice > n[2] - h->n_slice ||
-        v.n != o.n_slice * n_slice * sizeof(float))
+    if (v.failed || h->slab.volume.density == NULL || o.first_slice != h->slab.n_slice ||
+        o.n_slice > n[2] - h->slab.n_slice || v.n != o.n_slice * n_slice * sizeof(float))
         return error_set(err, STATUS_FORMAT, "another rank sent densities of a slab that are none");
-    byte_view_get(&v, h->volume.density + h->n_slice * n_slice, v.n);
-    h->n_slice += o.n_slice;
+    byte_view_get(&v, h->slab.volume.density + h->slab.n_slice * n_slice, v.n);
+    h->slab.n_slice += o.n_slice;
     return STATUS_OK;
 }
 
 /* The slab is there as a whole. A rank may have none. */
 static status check_slab(const struct slab_helper *h, struct error *err)
 {
-    const bool whole = h->slabs.first != NULL && (h->volume.density == NULL || h->n_slice == h->volume.n[2]);
+    const bool whole =
+        h->slab.slabs.first != NULL && (h->slab.volume.density == NULL || h->slab.n_slice == h->slab.volume.n[2]);
     return whole ? STATUS_OK
                  : error_set(err, STATUS_FORMAT, "another rank asks for work on a slab that it has not sent");
 }
@@ -107,7 +107,7 @@ status slab_helper_follow(struct slab_helper *h, struct rank_team *team, const s
     }
     if (h->lacks.code == STATUS_OK && order->kind == RANK_ORDER_ROWS) take_rows(h, order, &h->lacks);
     if (h->lacks.code == STATUS_OK && order->kind == RANK_ORDER_AXES && check_slab(h, &h->lacks) == STATUS_OK)
-        axis_share_take(h, order, pool, &h->lacks);
+        axis_share_take(&h->slab, &h->round, order, pool, &h->lacks);
     if (!has_tasks) return STATUS_OK;
     if (h->lacks.code != STATUS_OK) {
         *err = h->lacks;
@@ -115,6 +115,6 @@ status slab_helper_follow(struct slab_helper *h, struct rank_team *team, const s
     }
     status s = check_slab(h, err);
     if (s != STATUS_OK) return s;
-    return order->kind == RANK_ORDER_BRICKS ? axis_share_help(h, order, pool, err)
-                                            : direction_share_help(h, order, pool, err);
+    return order->kind == RANK_ORDER_BRICKS ? axis_share_help(&h->slab, h->round, order, pool, err)
+                                            : direction_share_help(&h->slab, order, pool, err);
 }

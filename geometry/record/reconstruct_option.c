@@ -1,5 +1,5 @@
 /* The options of a reconstruction that nobody chose. */
-#include "geometry/reconstruct/reconstruct.h"
+#include "geometry/record/reconstruct_option.h"
 
 #include <math.h>
 

@@ -7,7 +7,7 @@
 #define SELVEDGE_GEOMETRY_TRACE_GRID_H
 
 #include "geometry/fibers/polyline.h"
-#include "geometry/reconstruct/reconstruct.h"
+#include "geometry/record/reconstruct_option.h"
 
 /* Edge of the grid's voxels in voxels of the scan, for fibers of this diameter in a scan of n_voxel: 1 if the scan's
  * own grid serves, or a finer one would be too large. */

@@ -5,9 +5,13 @@
 #define SELVEDGE_GEOMETRY_TRACE_JOB_H
 
 #include "base/angle.h"
+#include "base/progress.h"
+#include "base/thread_pool.h"
 #include "geometry/fibers/axes/model/axis_profile.h"
 #include "geometry/fibers/lines/joining.h"
-#include "geometry/reconstruct/reconstruct.h"
+#include "geometry/record/reconstruct_option.h"
+#include "geometry/record/reconstruct_report.h"
+#include "geometry/volume/volume.h"
 
 enum {
     TRACE_MIN_PIECE = 4,  /* least number of centers in a chain before joining */

@@ -24,6 +24,14 @@ struct slab_rows {
     size_t with_halo, halo_end; /* rows that it has */
 };
 
+/* The slab that a helper has. All zero: it has none. */
+struct helper_slab {
+    struct volume_slabs slabs; /* as the root has dealt the volume out */
+    struct volume volume;      /* the rows `rows` of it; density NULL: there are none */
+    struct slab_rows rows;
+    size_t n_slice; /* slices that have come */
+};
+
 /* First data of an order RANK_ORDER_SLAB; then come the first columns of all ranks and the number of columns. No
  * voxels: helpers forget their slabs. */
 struct slab_order {

@@ -3,7 +3,7 @@
 #define SELVEDGE_GEOMETRY_WEAVE_MEASURE_H
 
 #include "geometry/weave/weave_contrast.h"
-#include "geometry/weave/weave_detect.h"
+#include "geometry/weave/weave_guess.h"
 
 /* Fills cover, warp, weft and their confidences. draft and repeat are in pixels of this picture.
  *

@@ -3,7 +3,8 @@
 #ifndef SELVEDGE_GEOMETRY_AXIS_COMPARE_H
 #define SELVEDGE_GEOMETRY_AXIS_COMPARE_H
 
-#include "geometry/fibers/axes/axis_brick.h"
+#include "geometry/fibers/axes/axis_model.h"
+#include "geometry/fibers/axes/axis_solve.h"
 
 /* Compares the model with the n voxels of the scan from `from` on, and adds to the normal equations of what fibers
  * share: a change of all radii, blur, low, high, and of all lumens. Shares above 1 become 1 where fibers are solid;

@@ -320,11 +320,11 @@ static status follow_round(struct axis_round *r, struct axis_round *before, stru
     return axis_round_follow(&r->batch.model, &r->lines, &r->bricks, &r->claiming, err);
 }
 
-static status take_round(struct slab_helper *h, const struct rank_order *order, struct axis_round *before,
-                         struct thread_pool *pool, struct error *err)
+static status take_round(const struct helper_slab *slab, struct axis_round **round, const struct rank_order *order,
+                         struct axis_round *before, struct thread_pool *pool, struct error *err)
 {
     struct axes_order o;
-    struct axis_round *r = h->round = calloc(1, sizeof *r);
+    struct axis_round *r = *round = calloc(1, sizeof *r);
     if (r == NULL) return error_set(err, STATUS_NO_MEMORY, "no memory for lines");
     status s = read_lines(r, order, &o, err);
     if (s != STATUS_OK) return s;
@@ -334,45 +334,44 @@ static status take_round(struct slab_helper *h, const struct rank_order *order, 
     if (o.has_section) r->view = malloc((o.n_vertex + 1) * sizeof *r->view);
     if (r->reach == NULL || (o.has_section && r->view == NULL))
         return error_set(err, STATUS_NO_MEMORY, "no memory for lines");
-    m->v = &h->volume;
-    m->first_row = h->rows.with_halo;
+    m->v = &slab->volume;
+    m->first_row = slab->rows.with_halo;
     m->profile = (struct axis_profile){.blur = o.blur, .low = o.low, .high = o.high, .section = r->section};
     s = axis_batch_init(&r->batch, r->n_thread, err);
     if (s == STATUS_OK && o.follows) return follow_round(r, before, err);
-    return s == STATUS_OK ? axis_round_prepare(m, &r->lines, h->slabs.n, r->view, r->reach, &r->bricks, err) : s;
+    return s == STATUS_OK ? axis_round_prepare(m, &r->lines, slab->slabs.n, r->view, r->reach, &r->bricks, err) : s;
 }
 
-status axis_share_take(struct slab_helper *h, const struct rank_order *order, struct thread_pool *pool,
-                       struct error *err)
+status axis_share_take(const struct helper_slab *slab, struct axis_round **round, const struct rank_order *order,
+                       struct thread_pool *pool, struct error *err)
 {
-    struct axis_round *before = h->round;
-    h->round = NULL;
-    status s = take_round(h, order, before, pool, err);
+    struct axis_round *before = *round;
+    *round = NULL;
+    status s = take_round(slab, round, order, before, pool, err);
     axis_round_free(before);
     return s;
 }
 
-status axis_share_help(struct slab_helper *h, const struct rank_order *order, struct thread_pool *pool,
-                       struct error *err)
+status axis_share_help(const struct helper_slab *slab, struct axis_round *round, const struct rank_order *order,
+                       struct thread_pool *pool, struct error *err)
 {
     struct byte_view v = {.data = order->data, .n = order->n_bytes};
     struct bricks_order o;
     BYTE_VIEW(&v, o);
     status s = byte_view_check(&v, err);
     if (s != STATUS_OK) return s;
-    if (h->round == NULL)
-        return error_set(err, STATUS_FORMAT, "another rank asks for a fit of lines that are not there");
-    struct axis_batch *b = &h->round->batch;
-    const size_t n_brick = segment_n_brick(&h->round->bricks), n_column = volume_slabs_n_column(h->slabs.n);
-    if (h->slabs.halo > 0 || o.n_brick == 0 || o.first_brick > n_brick || o.n_brick > n_brick - o.first_brick ||
+    if (round == NULL) return error_set(err, STATUS_FORMAT, "another rank asks for a fit of lines that are not there");
+    struct axis_batch *b = &round->batch;
+    const size_t n_brick = segment_n_brick(&round->bricks), n_column = volume_slabs_n_column(slab->slabs.n);
+    if (slab->slabs.halo > 0 || o.n_brick == 0 || o.first_brick > n_brick || o.n_brick > n_brick - o.first_brick ||
         o.first_brick % n_column != 0 || o.n_brick % n_column != 0)
         return error_set(err, STATUS_FORMAT, "another rank asks for a fit of bricks that do not exist");
     b->first_brick = o.first_brick;
     b->n_brick = o.n_brick;
-    const struct progress progress = {.cancel = rank_team_cancel(h->slabs.team)};
+    const struct progress progress = {.cancel = rank_team_cancel(slab->slabs.team)};
     s = axis_batch_start(b, err);
-    if (s == STATUS_OK) s = share_bricks(b, &h->slabs, pool, &progress, err);
-    for (size_t t = 0; t < h->round->n_thread && s == STATUS_OK; t++)
+    if (s == STATUS_OK) s = share_bricks(b, &slab->slabs, pool, &progress, err);
+    for (size_t t = 0; t < round->n_thread && s == STATUS_OK; t++)
         if (b->failed[t]) s = error_set(err, STATUS_NO_MEMORY, "no memory for the fit of fibers");
     axis_batch_end(b);
     return s;

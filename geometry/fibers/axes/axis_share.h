@@ -1,11 +1,11 @@
-/* The bricks of the fit of axes (geometry/fibers/shape/axes) over the ranks that have slabs of the volume. The root
+/* The bricks of the fit of axes (axis_fit.h) over the ranks that have slabs of the volume. The root
  * sends the lines at the beginning of a round, and an order for each batch of bricks; every rank fits the bricks of its
  * columns; the root gets the sums of each brick, and adds those of all bricks in order, as without other ranks. */
 #ifndef SELVEDGE_GEOMETRY_AXIS_SHARE_H
 #define SELVEDGE_GEOMETRY_AXIS_SHARE_H
 
 #include "geometry/fibers/axes/axis_round.h"
-#include "geometry/reconstruct/slab_helper.h"
+#include "geometry/volume/volume_slabs.h"
 
 /* First data of an order RANK_ORDER_AXES. Then come the first vertices of all lines and the number of vertices (64
  * bits), the vertices, the radii of the lines, and with has_shape and has_section the shapes and sections of the
@@ -30,12 +30,15 @@ bool axis_share_can(const struct axis_batch *b);
 status axis_share_bricks(struct axis_batch *b, struct thread_pool *pool, const struct progress *progress,
                          struct error *err);
 
-/* Helper: takes the lines of a round. STATUS_FORMAT, STATUS_NO_MEMORY. */
-status axis_share_take(struct slab_helper *h, const struct rank_order *order, struct thread_pool *pool,
-                       struct error *err);
-/* Helper: fits its bricks of a batch. The same, STATUS_CANCELLED, STATUS_IO. */
-status axis_share_help(struct slab_helper *h, const struct rank_order *order, struct thread_pool *pool,
-                       struct error *err);
+struct axis_round; /* the lines of a round, in a helper */
+
+/* Helper: replaces *round, which may be NULL, by the lines of the order. The slab must outlive it. STATUS_FORMAT,
+ * STATUS_NO_MEMORY. */
+status axis_share_take(const struct helper_slab *slab, struct axis_round **round, const struct rank_order *order,
+                       struct thread_pool *pool, struct error *err);
+/* Helper: fits its bricks of a batch; round NULL: STATUS_FORMAT. Errors as before, STATUS_CANCELLED, STATUS_IO. */
+status axis_share_help(const struct helper_slab *slab, struct axis_round *round, const struct rank_order *order,
+                       struct thread_pool *pool, struct error *err);
 /* Accepts NULL. */
 void axis_round_free(struct axis_round *r);
 

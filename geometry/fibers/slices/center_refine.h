@@ -8,7 +8,7 @@
 #ifndef SELVEDGE_GEOMETRY_CENTER_REFINE_H
 #define SELVEDGE_GEOMETRY_CENTER_REFINE_H
 
-#include "geometry/fibers/slices/centers.h"
+#include "geometry/fibers/slices/center.h"
 
 #include <stdbool.h>
 

@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_GEOMETRY_CENTER_SLOPE_H
 #define SELVEDGE_GEOMETRY_CENTER_SLOPE_H
 
-#include "geometry/fibers/slices/centers.h"
+#include "geometry/fibers/slices/center.h"
 
 /* Whether a center lies in the volume and has a voxel of the class within one pixel. */
 bool center_has_voxel(const struct center_search *s, size_t i_slice, const struct center *c);

@@ -9,17 +9,9 @@
 #ifndef SELVEDGE_GEOMETRY_CENTERS_H
 #define SELVEDGE_GEOMETRY_CENTERS_H
 
+#include "base/progress.h"
 #include "base/thread_pool.h"
-#include "geometry/fibers/slices/slice_frame.h"
-#include "geometry/fibers/slices/subvolumes.h"
-#include "geometry/volume/volume.h"
-
-struct center {
-    float u, v;             /* in pixels of the frame; the centre of pixel i is at i + 1/2 */
-    float slope_u, slope_v; /* du, dv per slice, from the direction volume */
-    float radius;           /* of the fiber, from the scale of the strongest response, voxels */
-    float strength;         /* scale-normalised response; 0.74 for an isolated disk of density 1 */
-};
+#include "geometry/fibers/slices/center.h"
 
 struct center_list {
     size_t n_slice;
@@ -28,15 +20,6 @@ struct center_list {
 };
 
 void center_list_release(struct center_list *l);
-
-/* Where centers are looked for. */
-struct center_search {
-    const struct volume *v;
-    const struct direction_volume *d; /* of v */
-    const struct subvolumes *sub;     /* of d */
-    const struct slice_frame *frame;
-    double diameter_voxel; /* of the fibers; it determines the scales of the filters */
-};
 
 /* Finds the centers in all slices of the frame. STATUS_CANCELLED, STATUS_NO_MEMORY. */
 status centers_detect(const struct center_search *search, struct thread_pool *pool, const struct progress *progress,

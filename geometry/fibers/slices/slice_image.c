@@ -1,6 +1,6 @@
 #include "geometry/fibers/slices/slice_image.h"
 
-#include "geometry/fibers/slices/centers.h"
+#include "geometry/fibers/slices/subvolumes.h"
 
 #include <math.h>
 #include <stdbool.h>

@@ -4,7 +4,8 @@
 #ifndef SELVEDGE_GEOMETRY_VOLUME_READER_H
 #define SELVEDGE_GEOMETRY_VOLUME_READER_H
 
-#include "geometry/volume/format/volume_source.h"
+#include "base/status.h"
+#include "geometry/volume/format/volume_info.h"
 
 #include <stdbool.h>
 #include <stdint.h>

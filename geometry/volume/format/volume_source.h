@@ -7,25 +7,12 @@
 #define SELVEDGE_GEOMETRY_VOLUME_SOURCE_H
 
 #include "base/status.h"
+#include "geometry/volume/format/volume_info.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 
 struct volume_source;
-
-/* The content of a file without a header. n[0] == 0: nothing is declared, and the file has a header. */
-struct volume_raw_declaration {
-    size_t n[3];  /* columns, rows, slices; x runs fastest */
-    char type[8]; /* "uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64" */
-    bool big_endian;
-    size_t header_bytes; /* bytes to skip at the start of the file */
-};
-
-struct volume_source_info {
-    size_t n[3];            /* columns, rows, slices */
-    double voxel_size_m[3]; /* NaN where the file does not state it */
-    const char *sample;     /* "uint8", "uint16", "int16", "float32" */
-};
 
 /* Opens a scan. path: one multi-page TIFF, one .mhd or .mha, one .nrrd or .nhdr (data file beside it), one .vol, or
  * TIFF slices in order. The field of errors is OPTION_SCAN_FILES. STATUS_IO, STATUS_NOT_FOUND; STATUS_FORMAT for
