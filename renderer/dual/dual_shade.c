@@ -1,6 +1,6 @@
 #include "renderer/dual/dual_shade.h"
 #include "renderer/scattering/lobes/fiber_direction.h"
-#include "renderer/transport/surface/fiber_frame.h"
+#include "renderer/scene/fiber_frame.h"
 #include "renderer/transport/surface/path_beyond.h"
 
 #include <string.h>

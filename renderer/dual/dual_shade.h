@@ -3,7 +3,7 @@
 #define SELVEDGE_RENDERER_DUAL_SHADE_H
 
 #include "renderer/dual/dual_option.h"
-#include "renderer/transport/surface/fiber_frame.h"
+#include "renderer/scene/fiber_frame.h"
 #include "renderer/transport/surface/path_tracer.h"
 
 struct dual_setting {

@@ -1,5 +1,5 @@
 #include "renderer/fast/gaussian_light.h"
-#include "renderer/transport/surface/fiber_frame.h"
+#include "renderer/scene/fiber_frame.h"
 
 #include <math.h>
 #include <string.h>

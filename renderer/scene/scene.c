@@ -1,5 +1,5 @@
 #include "base/ranks/unique_number.h"
-#include "renderer/scene/bent/bent_scene.h"
+#include "renderer/scene/bent_scene.h"
 #include "renderer/scene/grid/scene_grid.h"
 #include "renderer/scene/scene_ends.h"
 #include "renderer/scene/sections/scene_ellipse.h"

@@ -1,5 +1,5 @@
 #include "renderer/scene/scene_place.h"
-#include "renderer/scene/bent/bent_scene.h"
+#include "renderer/scene/bent_scene.h"
 
 #include <math.h>
 #include <string.h>

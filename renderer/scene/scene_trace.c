@@ -1,4 +1,4 @@
-#include "renderer/scene/bent/bent_scene.h"
+#include "renderer/scene/bent_scene.h"
 #include "renderer/scene/scene_data.h"
 
 #include <math.h>

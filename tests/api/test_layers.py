@@ -32,7 +32,7 @@ def test_includes_against_the_layers(path, include):
 @pytest.mark.parametrize("path, include", [
     ("optimizer/job/a.c", "base/catalogue/model_catalogue.h"),
     ("server/jobs/a.c", "optimizer/job/document/job_document.h"),
-    ("optimizer/fit/a.c", "renderer/transport/estimate/estimate.h"),
+    ("optimizer/fit/a.c", "renderer/estimate/estimate.h"),
     ("base/catalogue/models.def", "renderer/scattering/models/fur/fur.def"),
 ])
 def test_includes_along_the_layers(path, include):

@@ -9,7 +9,7 @@
  * Arguments: paths for each configuration (4096), voxels along an edge (500).
  */
 #include "base/clock.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "tests/support/scan/hand_volume.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/trace_input.h"

@@ -2,7 +2,7 @@
  * second scattering is negligible, and so far apart that they neither shadow nor light each other.
  */
 #include "base/angle.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/reference_two_lobe.h"
 #include "tests/support/tracer/trace_input.h"

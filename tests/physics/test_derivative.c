@@ -5,7 +5,7 @@
  */
 #include "base/angle.h"
 #include "renderer/transport/camera.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "renderer/transport/surface/path_tracer.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"

@@ -1,5 +1,5 @@
 /* The gradient certificate: every model passes it at its defaults and at its bounds, and wrong derivatives fail it. */
-#include "renderer/transport/derivative_check.h"
+#include "renderer/estimate/derivative_check.h"
 #include "tests/support/agreement.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/model/compared_range.h"

@@ -4,7 +4,7 @@
 #include "base/catalogue/model_sets.h"
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/fit/descent/trace_estimator.h"
-#include "renderer/transport/derivative_check.h"
+#include "renderer/estimate/derivative_check.h"
 #include "tests/support/cloth/hand_weave.h"
 
 #include <math.h>

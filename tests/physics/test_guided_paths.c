@@ -4,7 +4,7 @@
  */
 #include "base/angle.h"
 #include "base/rng.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "renderer/transport/light/light_guide.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"

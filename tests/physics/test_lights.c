@@ -1,7 +1,7 @@
 /* Lights and cameras other than the square lamp and the perspective camera, against closed forms, quadrature, or each
  * other. Tolerances are 4 standard errors (for several dozen comparisons) plus the stated remainders.
  */
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "renderer/transport/light/environment.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"

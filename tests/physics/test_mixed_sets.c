@@ -2,8 +2,8 @@
  * derivatives are by the parameters of their set. */
 #include "base/angle.h"
 #include "renderer/transport/camera.h"
-#include "renderer/transport/estimate/estimate.h"
-#include "renderer/transport/render.h"
+#include "renderer/estimate/estimate.h"
+#include "renderer/estimate/render.h"
 #include "renderer/transport/surface/path_tracer.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/orbit_configurations.h"

@@ -3,7 +3,7 @@
  * both sides.
  */
 #include "base/angle.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/model/fiber_angles.h"
 #include "tests/support/model/model_furnace.h"

@@ -3,7 +3,7 @@
 #include "base/angle.h"
 #include "geometry/fibers/seam/fiber_seam.h"
 #include "geometry/phantom/phantom.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "tests/support/cloth/cut_tile.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/trace_input.h"

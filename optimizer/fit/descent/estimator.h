@@ -5,7 +5,7 @@
 #define SELVEDGE_OPTIMIZER_ESTIMATOR_H
 
 #include "base/progress.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 
 /* Replica numbers (rng.h) of the different uses of an estimator. Each use has its own random streams. */
 enum estimator_replica {

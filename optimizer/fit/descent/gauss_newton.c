@@ -11,7 +11,7 @@
  */
 #include "optimizer/fit/descent/gauss_newton.h"
 #include "optimizer/fit/descent/descent_methods.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 
 #include <math.h>
 #include <string.h>

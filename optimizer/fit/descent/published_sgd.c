@@ -17,7 +17,7 @@
 #include "optimizer/fit/descent/descent_methods.h"
 #include "optimizer/fit/descent/rescale.h"
 #include "optimizer/fit/descent/rest_check.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 
 #include <math.h>
 #include <stdio.h>

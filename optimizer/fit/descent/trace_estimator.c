@@ -2,7 +2,7 @@
 
 #include "base/clock.h"
 
-#include "renderer/transport/estimate/rotation_mean.h"
+#include "renderer/estimate/rotation_mean.h"
 
 #include <stdlib.h>
 #include <string.h>

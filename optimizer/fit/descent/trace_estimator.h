@@ -5,7 +5,7 @@
 #include "base/thread_pool.h"
 #include "optimizer/fit/descent/estimator.h"
 #include "optimizer/photographs/rows/observation.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 
 /* Everything pointed to outlives the estimator. */
 struct trace_estimator {

@@ -17,7 +17,7 @@
 #include "optimizer/fit/linear/linear_model.h"
 #include "optimizer/fit/objective/coordinate.h"
 #include "optimizer/fit/objective/nuisance.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 
 enum { FIT_MAX_EXTRA_START = 4 };
 /* One parameter of a fit, internal units. Bounds lie inside the model's. A fixed one keeps `start`. */

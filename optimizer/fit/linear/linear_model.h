@@ -18,7 +18,7 @@
 
 #include "optimizer/fit/objective/coordinate.h"
 #include "optimizer/photographs/rows/observation.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 
 _Static_assert((int)FIT_MAX_PARAM <= (int)SCATTERING_MAX_FLAT, "an estimate has room for the derivatives of a fit");
 

@@ -16,7 +16,7 @@
 #define SELVEDGE_OPTIMIZER_MISFIT_FIELD_H
 
 #include "optimizer/photographs/rows/observation.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 
 enum { MISFIT_FIELD_MAX_ROW = 128, MISFIT_FIELD_PLACE = 6 };
 

@@ -10,7 +10,7 @@
 #define SELVEDGE_OPTIMIZER_NUISANCE_H
 
 #include "optimizer/photographs/rows/observation.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 
 enum { FIT_MAX_NUISANCE = 2 };
 

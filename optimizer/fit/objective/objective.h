@@ -19,7 +19,7 @@
 #define SELVEDGE_OPTIMIZER_OBJECTIVE_H
 
 #include "optimizer/photographs/rows/observation.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 
 #define OBJECTIVE_TAU 0.02
 /* Contrasts (observation_is_contrast): C is a squared coefficient of variation, so half its relative error is the

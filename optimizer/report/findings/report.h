@@ -10,7 +10,7 @@
 #include "optimizer/report/findings/verdict.h"
 #include "optimizer/stages/fit_stages.h"
 #include "optimizer/stages/geometry_stages.h"
-#include "renderer/transport/derivative_check.h"
+#include "renderer/estimate/derivative_check.h"
 
 struct job_outline;
 struct job_profile;

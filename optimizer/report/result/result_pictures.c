@@ -12,7 +12,7 @@
 #include "optimizer/report/result/result_thumbnail.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 #include "optimizer/stages/validation/pipeline_discrepancy.h"
-#include "renderer/transport/render.h"
+#include "renderer/estimate/render.h"
 
 #include <errno.h>
 #include <math.h>

@@ -4,7 +4,7 @@
 #define SELVEDGE_OPTIMIZER_SURFACE_PASSES_H
 
 #include "optimizer/report/findings/report.h"
-#include "renderer/transport/render.h"
+#include "renderer/estimate/render.h"
 
 /* The picture so far: the mean of all samples, and its variance. */
 struct surface_passes {

@@ -11,7 +11,7 @@
 #include "optimizer/report/textures/texture_documents.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 #include "optimizer/stages/validation/pipeline_discrepancy.h"
-#include "renderer/transport/render.h"
+#include "renderer/estimate/render.h"
 
 #include <math.h>
 #include <stddef.h>

@@ -7,7 +7,7 @@
 #include "optimizer/photographs/rows/observation.h"
 #include "optimizer/tools/phantom/phantom_view_table.h"
 #include "optimizer/tools/simulated_camera/phantom_files.h"
-#include "renderer/transport/render.h"
+#include "renderer/estimate/render.h"
 
 #include <jansson.h>
 #include <math.h>

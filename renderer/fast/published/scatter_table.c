@@ -3,7 +3,7 @@
  * w_o differ by a turn about z alone. */
 #include "renderer/fast/precompute/precompute_parts.h"
 #include "renderer/fast/sphere_harmonics.h"
-#include "renderer/transport/surface/fiber_frame.h"
+#include "renderer/scene/fiber_frame.h"
 
 enum { N_SAMPLE = 4096 };
 

@@ -12,7 +12,7 @@
 
 #include "renderer/scattering/scattering.h"
 #include "renderer/transport/light/lamp.h"
-#include "renderer/transport/surface/fiber_frame.h"
+#include "renderer/scene/fiber_frame.h"
 
 #define LIGHT_GUIDE_KAPPA 20.0f
 

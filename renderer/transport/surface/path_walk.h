@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_RENDERER_PATH_WALK_H
 #define SELVEDGE_RENDERER_PATH_WALK_H
 
-#include "renderer/transport/surface/fiber_frame.h"
+#include "renderer/scene/fiber_frame.h"
 #include "renderer/transport/surface/path_tracer.h"
 
 static inline void unwrapped(const float local_mm[3], const double offset_mm[2], float out[3])

@@ -4,7 +4,7 @@
 
 #include "base/rng.h"
 #include "renderer/scattering/phase_model.h"
-#include "renderer/transport/surface/fiber_frame.h"
+#include "renderer/scene/fiber_frame.h"
 #include "renderer/transport/volume/volume_scene.h"
 
 /* -ln(1 - u) for u from rng_float, with an error below 2e-7 times the larger of 1 and the result. Exponent and mantissa

@@ -20,7 +20,7 @@
  */
 #include "base/angle.h"
 #include "base/clock.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/model/model_furnace.h"
 #include "tests/support/tracer/orbit_configurations.h"

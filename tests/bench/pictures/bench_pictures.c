@@ -34,8 +34,8 @@
 #include "renderer/dual/dual_option.h"
 #include "renderer/fast/fast_option.h"
 #include "renderer/fast/precompute/fast_precompute.h"
-#include "renderer/transport/estimate/estimate.h"
-#include "renderer/transport/render.h"
+#include "renderer/estimate/estimate.h"
+#include "renderer/estimate/render.h"
 #include "tests/bench/pictures/field_pair.h"
 #include "tests/support/cloth/fit_fabrics.h"
 

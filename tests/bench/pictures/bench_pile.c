@@ -17,7 +17,7 @@
 #include "geometry/phantom/phantom.h"
 #include "renderer/diffusion/diffusion_option.h"
 #include "renderer/dual/dual_option.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "tests/support/tracer/trace_input.h"
 
 #include <math.h>

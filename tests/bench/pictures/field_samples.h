@@ -4,7 +4,7 @@
 #define SELVEDGE_BENCH_FIELD_SAMPLES_H
 
 #include "base/thread_pool.h"
-#include "renderer/transport/radiance_source.h"
+#include "renderer/estimate/radiance_source.h"
 #include "tests/bench/pictures/field_comparison.h"
 
 struct field_request {

@@ -5,7 +5,7 @@
  */
 #include "base/angle.h"
 #include "geometry/phantom/phantom.h"
-#include "renderer/transport/render.h"
+#include "renderer/estimate/render.h"
 #include "tests/support/tracer/trace_input.h"
 
 #include <stdio.h>

@@ -9,7 +9,7 @@ import struct
 
 
 def tasks_of(path):
-    """Tasks of each estimate in a checkpoint, as renderer/transport/estimate/estimate_blocks.c cuts them."""
+    """Tasks of each estimate in a checkpoint, as renderer/estimate/estimate_blocks.c cuts them."""
     with open(path, "rb") as f:
         data = f.read()
     at, found = 16, []

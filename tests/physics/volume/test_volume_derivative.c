@@ -1,7 +1,7 @@
 /* Derivatives of volume estimates by every parameter and by d, against differences of independent runs. Also tests that
  * estimates have the same bits for any number of threads, and the storage of voxels in the tracer. */
 #include "base/angle.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "renderer/transport/volume/volume_tracer.h"
 #include "tests/support/scan/hand_volume.h"
 #include "tests/support/tracer/trace_input.h"

@@ -2,7 +2,7 @@
  * tiles does not depend on where the tile begins. A difference of 2 % fails the tests. */
 #include "base/angle.h"
 #include "base/thread_pool.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "tests/support/agreement.h"
 #include "tests/support/scan/hand_volume.h"
 #include "tests/support/tracer/trace_input.h"

@@ -3,7 +3,7 @@
  * cameras are compared with their limits, and constant pictures with constant environments; lights must be additive.
  * Tolerances are standard errors plus the stated remainders of closed forms. */
 #include "base/angle.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "renderer/transport/light/environment.h"
 #include "tests/support/scan/hand_volume.h"
 #include "tests/support/tracer/environment/painted_environment.h"

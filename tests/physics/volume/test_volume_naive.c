@@ -3,7 +3,7 @@
  * A difference of 4 % in all configurations fails the test; of 0.5 % with the paths of `make test-long`. */
 #include "base/angle.h"
 #include "base/thread_pool.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "tests/support/agreement.h"
 #include "tests/support/scan/hand_volume.h"
 #include "tests/support/statistics_test.h"

@@ -1,6 +1,6 @@
 #include "tests/support/ranks/two_ranks.h"
 
-#include "renderer/transport/ranks/rank_helper.h"
+#include "renderer/estimate/rank_helper.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,6 +1,6 @@
 #include "tests/support/tracer/chess_board.h"
 
-#include "renderer/transport/estimate/estimate_blocks.h"
+#include "renderer/estimate/estimate_blocks.h"
 
 #include <math.h>
 #include <setjmp.h>

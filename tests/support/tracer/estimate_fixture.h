@@ -3,8 +3,8 @@
 #ifndef SELVEDGE_TESTS_ESTIMATE_FIXTURE_H
 #define SELVEDGE_TESTS_ESTIMATE_FIXTURE_H
 
-#include "renderer/transport/estimate/estimate.h"
-#include "renderer/transport/render.h"
+#include "renderer/estimate/estimate.h"
+#include "renderer/estimate/render.h"
 
 #include <stdint.h>
 

@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_TESTS_TRACE_INPUT_H
 #define SELVEDGE_TESTS_TRACE_INPUT_H
 
-#include "renderer/transport/radiance_source.h"
+#include "renderer/estimate/radiance_source.h"
 
 /* Fills in model. model, scene and param must outlive the returned input. */
 struct radiance_input trace_input_surface(const struct scene *scene, const struct scattering_model *m,

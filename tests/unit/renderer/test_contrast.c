@@ -1,7 +1,7 @@
 /* The contrast of a crop from sums of paths: values and derivatives of a known crop come back, and the stated variances
  * are the scatter of repeated estimates. The paths are drawn from normal distributions, so that no scene is traced. */
 #include "base/rng.h"
-#include "renderer/transport/estimate/contrast_blocks.h"
+#include "renderer/estimate/contrast_blocks.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -1,5 +1,5 @@
 /* Fiber frames: orthonormal, right-handed, and with the normal of a flat section nearest to the cloth's normal. */
-#include "renderer/transport/surface/fiber_frame.h"
+#include "renderer/scene/fiber_frame.h"
 
 #include "base/rng.h"
 

@@ -1,6 +1,6 @@
 /* render_run: agreement with estimate_run, the same bits for any number of threads, layers and names, back light. */
-#include "renderer/transport/estimate/estimate.h"
-#include "renderer/transport/render.h"
+#include "renderer/estimate/estimate.h"
+#include "renderer/estimate/render.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/estimate_fixture.h"
 #include "tests/support/tracer/orbit_configurations.h"

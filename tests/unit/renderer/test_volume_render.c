@@ -1,7 +1,7 @@
 /* render_run for volumes: agreement with estimate_run, the same bits for any number of threads, layers and names,
  * files, progress and cancellation. */
-#include "renderer/transport/estimate/estimate.h"
-#include "renderer/transport/render.h"
+#include "renderer/estimate/estimate.h"
+#include "renderer/estimate/render.h"
 #include "tests/support/scan/hand_volume.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/tracer/estimate_fixture.h"

@@ -2,7 +2,7 @@
  * and they agree with the contrast of a rendered picture. */
 #include "base/rng.h"
 #include "renderer/transport/camera.h"
-#include "renderer/transport/render.h"
+#include "renderer/estimate/render.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/chess_board.h"
 #include "tests/support/tracer/orbit_configurations.h"

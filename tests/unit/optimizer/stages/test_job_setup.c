@@ -6,7 +6,7 @@
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/stages/fit/pipeline_trace.h"
 #include "optimizer/stages/geometry_stages.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "renderer/transport/light/environment.h"
 #include "tests/support/scratch_folder.h"
 

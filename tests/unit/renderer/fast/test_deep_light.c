@@ -5,7 +5,7 @@
 #include "renderer/fast/deep_shade.h"
 #include "renderer/fast/precompute/fast_precompute.h"
 #include "renderer/scene/scene_place.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/trace_input.h"

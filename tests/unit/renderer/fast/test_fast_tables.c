@@ -7,7 +7,7 @@
 #include "renderer/fast/precompute/seen_places.h"
 #include "renderer/fast/sphere_harmonics.h"
 #include "renderer/scene/scene_place.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/tracer/orbit_configurations.h"

@@ -5,7 +5,7 @@
 #include "base/rng.h"
 #include "renderer/fast/fast_option.h"
 #include "renderer/fast/precompute/fast_precompute.h"
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 #include "renderer/transport/light/lamp.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/trace_input.h"

@@ -3,7 +3,7 @@
 #include "base/rng.h"
 #include "renderer/preview/feature_image.h"
 #include "renderer/preview/joint_filter.h"
-#include "renderer/transport/render.h"
+#include "renderer/estimate/render.h"
 #include "tests/support/cloth/dual_cloth.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/trace_input.h"

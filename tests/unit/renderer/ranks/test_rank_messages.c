@@ -5,7 +5,7 @@
 #include "base/ranks/rank_team_data.h"
 #include "base/rng.h"
 #include "renderer/scene/scene_pack.h"
-#include "renderer/transport/ranks/rank_orders.h"
+#include "renderer/ranks/rank_orders.h"
 #include "renderer/transport/volume/volume_scene.h"
 #include "tests/support/tracer/environment/painted_environment.h"
 #include "tests/support/tracer/estimate_fixture.h"

@@ -1,7 +1,7 @@
 /* Pictures with speckle: their mean over patterns is that of the picture without, a seed makes the same bits for any
  * number of threads, and what has no speckle says so. */
-#include "renderer/transport/estimate/estimate.h"
-#include "renderer/transport/render.h"
+#include "renderer/estimate/estimate.h"
+#include "renderer/estimate/render.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
 #include "tests/support/tracer/estimate_fixture.h"

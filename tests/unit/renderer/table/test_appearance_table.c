@@ -3,8 +3,8 @@
 
 #include "base/angle.h"
 #include "base/rng.h"
-#include "renderer/transport/estimate/estimate.h"
-#include "renderer/transport/render.h"
+#include "renderer/estimate/estimate.h"
+#include "renderer/estimate/render.h"
 #include "renderer/transport/table/direction_grid.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/trace_input.h"

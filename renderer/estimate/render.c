@@ -1,7 +1,7 @@
-#include "renderer/transport/render.h"
+#include "renderer/estimate/render.h"
 
 #include "base/ranks/rank_team.h"
-#include "renderer/transport/ranks/rank_orders.h"
+#include "renderer/ranks/rank_orders.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,8 +1,8 @@
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 
-#include "renderer/transport/estimate/estimate_blocks.h"
-#include "renderer/transport/estimate/rotation_mean.h"
-#include "renderer/transport/ranks/rank_orders.h"
+#include "renderer/estimate/estimate_blocks.h"
+#include "renderer/estimate/rotation_mean.h"
+#include "renderer/ranks/rank_orders.h"
 
 #include <stdint.h>
 

@@ -1,8 +1,8 @@
-#include "renderer/transport/ranks/shared_cloth.h"
+#include "renderer/ranks/shared_cloth.h"
 
 #include "renderer/scene/scene_pack.h"
 #include "renderer/transport/light/environment.h"
-#include "renderer/transport/ranks/rank_orders.h"
+#include "renderer/ranks/rank_orders.h"
 
 #include <string.h>
 

@@ -3,8 +3,8 @@
 #ifndef SELVEDGE_RENDERER_ESTIMATE_BLOCKS_H
 #define SELVEDGE_RENDERER_ESTIMATE_BLOCKS_H
 
-#include "renderer/transport/estimate/estimate.h"
-#include "renderer/transport/estimate/path_groups.h"
+#include "renderer/estimate/estimate.h"
+#include "renderer/estimate/path_groups.h"
 
 struct estimate_blocks {
     const struct radiance_source *source;

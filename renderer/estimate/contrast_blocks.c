@@ -1,4 +1,4 @@
-#include "renderer/transport/estimate/contrast_blocks.h"
+#include "renderer/estimate/contrast_blocks.h"
 
 #include <math.h>
 #include <stdlib.h>

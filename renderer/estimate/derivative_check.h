@@ -23,7 +23,7 @@
 #ifndef SELVEDGE_RENDERER_DERIVATIVE_CHECK_H
 #define SELVEDGE_RENDERER_DERIVATIVE_CHECK_H
 
-#include "renderer/transport/radiance_source.h"
+#include "renderer/estimate/radiance_source.h"
 
 struct derivative_check_request {
     struct radiance_input input; /* parameters inside the model's bounds; want_derivative is taken as true */

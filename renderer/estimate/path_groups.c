@@ -1,4 +1,4 @@
-#include "renderer/transport/estimate/path_groups.h"
+#include "renderer/estimate/path_groups.h"
 
 #include <stdbool.h>
 #include <stdlib.h>

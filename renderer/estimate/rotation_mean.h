@@ -5,7 +5,7 @@
 #ifndef SELVEDGE_RENDERER_ROTATION_MEAN_H
 #define SELVEDGE_RENDERER_ROTATION_MEAN_H
 
-#include "renderer/transport/estimate/estimate.h"
+#include "renderer/estimate/estimate.h"
 
 struct rotation_mean {
     size_t n, n_turned;           /* configurations asked for, and rotations of all of them */

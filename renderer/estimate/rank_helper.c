@@ -1,8 +1,8 @@
-#include "renderer/transport/ranks/rank_helper.h"
+#include "renderer/estimate/rank_helper.h"
 
 #include "geometry/reconstruct/slab_helper.h"
-#include "renderer/transport/ranks/rank_orders.h"
-#include "renderer/transport/ranks/rank_request.h"
+#include "renderer/ranks/rank_orders.h"
+#include "renderer/ranks/rank_request.h"
 
 #include <stdlib.h>
 #include <string.h>

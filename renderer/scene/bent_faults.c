@@ -1,5 +1,5 @@
 /* What makes a bent cloth impossible to look at, found before a picture is traced. */
-#include "renderer/scene/bent/bent_scene.h"
+#include "renderer/scene/bent_scene.h"
 
 #include <math.h>
 #include <string.h>

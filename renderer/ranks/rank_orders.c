@@ -1,7 +1,7 @@
-#include "renderer/transport/ranks/rank_orders.h"
+#include "renderer/ranks/rank_orders.h"
 
 #include "renderer/scene/scene_place.h"
-#include "renderer/transport/ranks/rank_request.h"
+#include "renderer/ranks/rank_request.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 /* Rays through the fibers of a bent cloth, in each cell of the shell straight through those of the flat one. */
-#include "renderer/scene/bent/bent_scene.h"
+#include "renderer/scene/bent_scene.h"
 
 #include <math.h>
 #include <string.h>

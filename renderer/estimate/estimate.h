@@ -6,7 +6,7 @@
 #define SELVEDGE_RENDERER_ESTIMATE_H
 
 #include "base/thread_pool.h"
-#include "renderer/transport/radiance_source.h"
+#include "renderer/estimate/radiance_source.h"
 
 struct estimate_request {
     struct radiance_input input;

@@ -1,6 +1,6 @@
-#include "renderer/transport/derivative_check.h"
+#include "renderer/estimate/derivative_check.h"
 
-#include "renderer/transport/estimate/estimate_blocks.h"
+#include "renderer/estimate/estimate_blocks.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -4,7 +4,7 @@
 #ifndef SELVEDGE_RENDERER_RANK_REQUEST_H
 #define SELVEDGE_RENDERER_RANK_REQUEST_H
 
-#include "renderer/transport/ranks/shared_cloth.h"
+#include "renderer/ranks/shared_cloth.h"
 
 enum { RANK_MODEL_BYTES = 64 };
 

@@ -4,7 +4,7 @@
 #define SELVEDGE_RENDERER_SHARED_CLOTH_H
 
 #include "base/ranks/rank_team.h"
-#include "renderer/transport/radiance_source.h"
+#include "renderer/estimate/radiance_source.h"
 
 enum { SHARED_CLOTH_KEPT = 4 };
 

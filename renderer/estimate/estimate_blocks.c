@@ -1,5 +1,5 @@
 #include "base/ranks/rank_team.h"
-#include "renderer/transport/estimate/contrast_blocks.h"
+#include "renderer/estimate/contrast_blocks.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-#include "renderer/transport/estimate/rotation_mean.h"
+#include "renderer/estimate/rotation_mean.h"
 
 #include <math.h>
 #include <stdlib.h>

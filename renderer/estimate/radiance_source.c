@@ -1,4 +1,4 @@
-#include "renderer/transport/radiance_source.h"
+#include "renderer/estimate/radiance_source.h"
 
 #include "renderer/diffusion/diffusion_radiance.h"
 #include "renderer/dual/dual_radiance.h"

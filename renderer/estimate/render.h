@@ -11,7 +11,7 @@
 
 #include "base/thread_pool.h"
 #include "renderer/image/image.h"
-#include "renderer/transport/radiance_source.h"
+#include "renderer/estimate/radiance_source.h"
 
 struct render_request {
     struct radiance_input input;
