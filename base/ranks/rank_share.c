@@ -1,5 +1,6 @@
 /* Tasks that all ranks share (rank_team_share). */
 #include "base/clock.h"
+#include "base/ranks/rank_team.h"
 #include "base/ranks/rank_team_data.h"
 
 #include <pthread.h>

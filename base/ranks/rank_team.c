@@ -1,3 +1,4 @@
+#include "base/ranks/rank_team.h"
 #include "base/clock.h"
 #include "base/ranks/rank_team_data.h"
 

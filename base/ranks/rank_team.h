@@ -11,6 +11,7 @@
 
 #include "base/progress.h"
 #include "base/ranks/rank_order_kind.h"
+#include "base/ranks/rank_traffic.h"
 #include "base/thread_pool.h"
 
 #include <stdint.h>
@@ -18,17 +19,6 @@
 struct rank_team;
 
 enum { RANK_TEAM_MOST = 65536 };
-
-/* What the ranks of a job have exchanged, and how the root has spent its time. */
-struct rank_traffic {
-    size_t n_order, n_share, n_task, n_message; /* messages: those that the root has received */
-    uint64_t order_bytes, result_bytes;         /* of orders once, however many ranks get them */
-    double share_s, wait_s; /* in rank_team_share, and in it after the root's own last task, waiting for helpers */
-    size_t n_own;           /* tasks that the root has run itself */
-    double own_cpu_s;       /* processor time of these */
-    double share_cpu_s;     /* processor time of the process in rank_team_share */
-    double cpu_s;           /* of the process, until now */
-};
 
 struct rank_order {
     uint32_t kind;

@@ -3,7 +3,11 @@
 #define SELVEDGE_BASE_RANK_TEAM_DATA_H
 
 #include "base/ranks/rank_link.h"
-#include "base/ranks/rank_team.h"
+#include "base/ranks/rank_traffic.h"
+#include "base/status.h"
+
+#include <stdatomic.h>
+#include <stdbool.h>
 
 enum rank_message {
     RANK_ORDER = 1, /* struct order_head; its bytes follow in messages RANK_PIECE */

@@ -3,9 +3,9 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/result/result_json.h"
 #include "optimizer/stages/run/document_fingerprint.h"
-#include "renderer/scene/scene_pack.h"
 #include "renderer/estimate/rank_helper.h"
 #include "renderer/ranks/rank_orders.h"
+#include "renderer/scene/scene_pack.h"
 
 #include <fcntl.h>
 #include <gnu/libc-version.h>

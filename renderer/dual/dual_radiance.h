@@ -4,7 +4,7 @@
 #ifndef SELVEDGE_RENDERER_DUAL_RADIANCE_H
 #define SELVEDGE_RENDERER_DUAL_RADIANCE_H
 
-#include "renderer/estimate/radiance_source.h"
+#include "renderer/transport/radiance_tracer.h"
 
 extern const struct radiance_tracer dual_radiance;
 

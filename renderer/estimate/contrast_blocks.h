@@ -16,7 +16,8 @@
 #ifndef SELVEDGE_RENDERER_CONTRAST_BLOCKS_H
 #define SELVEDGE_RENDERER_CONTRAST_BLOCKS_H
 
-#include "renderer/estimate/estimate_blocks.h"
+#include "renderer/estimate/block_trace.h"
+#include "renderer/estimate/radiance_estimate.h"
 
 struct contrast_plan {
     size_t n_side, n_cell, n_half; /* cells a side, cells, paths of each of a cell's two sets */

@@ -1,6 +1,7 @@
 #include "renderer/estimate/estimate.h"
 
 #include "renderer/estimate/estimate_blocks.h"
+#include "renderer/estimate/radiance_source.h"
 #include "renderer/estimate/rotation_mean.h"
 #include "renderer/ranks/rank_orders.h"
 

@@ -1,3 +1,4 @@
+#include "renderer/estimate/estimate_blocks.h"
 #include "base/ranks/rank_team.h"
 #include "renderer/estimate/contrast_blocks.h"
 
@@ -33,29 +34,10 @@ struct run {
     size_t n_value, n_pair; /* the most of any group */
 };
 
-size_t estimate_n_value(const struct estimate_blocks *b, size_t i_group)
-{
-    return b->groups->group[i_group].n * (3 + 3 * b->source->n_flat);
-}
-
 static size_t n_pair_of(const struct estimate_blocks *b, size_t i_group)
 {
     size_t n = b->groups->group[i_group].n;
     return n * (n - 1) / 2;
-}
-
-uint64_t estimate_trace(const struct estimate_blocks *b, size_t i_group, size_t n, double (*xy)[2], struct rng *rng,
-                        float *value)
-{
-    const struct path_group *g = &b->groups->group[i_group];
-    const struct radiance_block block = {.member = b->groups->member + g->first,
-                                         .n_member = g->n,
-                                         .n_path = n,
-                                         .xy = xy,
-                                         .rng = rng,
-                                         .progress = b->progress};
-    memset(value, 0, n * estimate_n_value(b, i_group) * sizeof *value);
-    return b->source->tracer->trace(b->source->state, &block, value);
 }
 
 /* Adds the products of the members' radiances on one path. value: n_value of each of the n_member members. */

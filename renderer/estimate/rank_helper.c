@@ -1,6 +1,8 @@
 #include "renderer/estimate/rank_helper.h"
 
 #include "geometry/reconstruct/slab_helper.h"
+#include "renderer/estimate/estimate.h"
+#include "renderer/estimate/render.h"
 #include "renderer/ranks/rank_orders.h"
 #include "renderer/ranks/rank_request.h"
 
@@ -123,7 +125,7 @@ static status agree(struct rank_team *team, const struct rank_order *order, cons
 status rank_helper_serve(struct rank_team *team, struct thread_pool *pool, const char *mine, struct error *err)
 {
     struct shared_cloth cloth = {.n_use = 0};
-    struct slab_helper slab = {.n_slice = 0};
+    struct slab_helper slab = {.round = NULL};
     struct error lacks = {0}; /* why a cloth could not be taken: the next request is refused with it */
     status s = STATUS_OK;
     for (bool end = false; !end && s == STATUS_OK;) {

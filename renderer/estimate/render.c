@@ -1,4 +1,5 @@
 #include "renderer/estimate/render.h"
+#include "renderer/estimate/radiance_source.h"
 
 #include "base/ranks/rank_team.h"
 #include "renderer/ranks/rank_orders.h"

@@ -11,16 +11,7 @@
 
 #include "base/thread_pool.h"
 #include "renderer/image/image.h"
-#include "renderer/estimate/radiance_source.h"
-
-struct render_request {
-    struct radiance_input input;
-    const struct configuration *configuration;
-    size_t width, height, n_sample; /* samples a pixel */
-    size_t first_sample;            /* their first number: pictures of other numbers have other random numbers */
-    uint64_t seed;
-    uint32_t stream; /* takes the place of the configuration number in the random key; at most 4095 */
-};
+#include "renderer/transport/radiance_request.h"
 
 /* im: initialised here, released on failure. STATUS_INVALID (no pixels or samples, too many, a stream above 4095, and
  * as for an estimate), STATUS_NO_MEMORY, STATUS_CANCELLED (looked for every 64 samples or more often), STATUS_NUMERIC

@@ -5,7 +5,9 @@
 #ifndef SELVEDGE_RENDERER_ROTATION_MEAN_H
 #define SELVEDGE_RENDERER_ROTATION_MEAN_H
 
-#include "renderer/estimate/estimate.h"
+#include "base/status.h"
+#include "renderer/estimate/radiance_estimate.h"
+#include "renderer/scene/configuration.h"
 
 struct rotation_mean {
     size_t n, n_turned;           /* configurations asked for, and rotations of all of them */

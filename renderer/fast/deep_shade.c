@@ -1,4 +1,6 @@
 #include "renderer/fast/deep_shade.h"
+
+#include "renderer/fast/fast_setting.h"
 #include "renderer/scene/scene_place.h"
 
 #include <string.h>

@@ -3,7 +3,8 @@
 #ifndef SELVEDGE_RENDERER_DEEP_SHADE_H
 #define SELVEDGE_RENDERER_DEEP_SHADE_H
 
-#include "renderer/fast/fast_shade.h"
+#include "base/rng.h"
+#include "renderer/scene/scene_ray.h"
 
 /* context: the fast_setting. Adds the radiance along the ray reversed at its first hit. */
 void deep_shade_begin(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,

@@ -2,8 +2,8 @@
 #include "renderer/fast/deep_shade.h"
 #include "renderer/fast/gaussian_light.h"
 #include "renderer/fast/sphere_harmonics.h"
-#include "renderer/scene/scene_place.h"
 #include "renderer/scene/fiber_frame.h"
+#include "renderer/scene/scene_place.h"
 #include "renderer/transport/surface/path_beyond.h"
 
 #include <stdlib.h>

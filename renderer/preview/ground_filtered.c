@@ -1,6 +1,7 @@
 /* The ground with a filtered shadow: a grid of its places along the lamp's edges is sampled and filtered, and the
  * picture looks its places up there. */
 #include "renderer/preview/ground_plane.h"
+#include "renderer/preview/ground_shadow.h"
 #include "renderer/preview/sheared_filter.h"
 #include "renderer/scene/scene_ray.h"
 

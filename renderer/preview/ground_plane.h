@@ -3,7 +3,7 @@
 #define SELVEDGE_RENDERER_GROUND_PLANE_H
 
 #include "base/rng.h"
-#include "renderer/preview/ground_shadow.h"
+#include "renderer/preview/ground_request.h"
 #include "renderer/transport/camera.h"
 #include "renderer/transport/light/lamp.h"
 

@@ -10,19 +10,7 @@
 
 #include "base/thread_pool.h"
 #include "renderer/image/image.h"
-#include "renderer/scene/configuration.h"
-#include "renderer/scene/scene.h"
-
-struct ground_request {
-    const struct scene *scene; /* bent */
-    const struct configuration *configuration;
-    double z_mm;      /* of the plane, below the cloth; the orbit center is at 0 */
-    double radius_mm; /* the plane is a disc around the z axis */
-    double albedo;
-    size_t width, height, n_sample; /* rays a pixel, at least 2 */
-    uint64_t seed;
-    uint32_t stream;
-};
+#include "renderer/preview/ground_request.h"
 
 /* z_mm of a plane that lies gap_mm under the lowest point of a bent cloth, the thickness included. */
 double ground_below(const struct scene *bent, double gap_mm);

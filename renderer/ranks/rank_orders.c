@@ -1,7 +1,8 @@
 #include "renderer/ranks/rank_orders.h"
 
-#include "renderer/scene/scene_place.h"
 #include "renderer/ranks/rank_request.h"
+#include "renderer/ranks/shared_cloth.h"
+#include "renderer/scene/scene_place.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -3,9 +3,7 @@
 #define SELVEDGE_RENDERER_RANK_ORDERS_H
 
 #include "base/ranks/rank_team.h"
-#include "renderer/estimate/estimate.h"
-#include "renderer/ranks/shared_cloth.h"
-#include "renderer/estimate/render.h"
+#include "renderer/transport/radiance_request.h"
 
 /* Whether helpers can trace it: a flat cloth by path tracing, one environment at most. */
 bool rank_orders_can_share(const struct configuration *c, size_t n_configuration, const struct radiance_input *in);

@@ -2,7 +2,6 @@
 
 #include "renderer/scene/scene_pack.h"
 #include "renderer/transport/light/environment.h"
-#include "renderer/ranks/rank_orders.h"
 
 #include <string.h>
 

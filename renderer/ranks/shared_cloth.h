@@ -4,7 +4,8 @@
 #define SELVEDGE_RENDERER_SHARED_CLOTH_H
 
 #include "base/ranks/rank_team.h"
-#include "renderer/estimate/radiance_source.h"
+#include "renderer/transport/radiance_tracer.h"
+#include "renderer/transport/volume/volume_scene.h"
 
 enum { SHARED_CLOTH_KEPT = 4 };
 

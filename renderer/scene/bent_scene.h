@@ -8,6 +8,7 @@
 
 #include "renderer/scene/bent/shell_walk.h"
 #include "renderer/scene/scene_data.h"
+#include "renderer/scene/scene_visitor.h"
 
 struct bent_cloth {
     struct scene flat; /* a copy: the flat scene itself belongs to the caller */

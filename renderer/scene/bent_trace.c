@@ -1,5 +1,6 @@
 /* Rays through the fibers of a bent cloth, in each cell of the shell straight through those of the flat one. */
 #include "renderer/scene/bent_scene.h"
+#include "renderer/scene/scene_visitor.h"
 
 #include <math.h>
 #include <string.h>

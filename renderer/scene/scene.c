@@ -1,3 +1,4 @@
+#include "renderer/scene/scene.h"
 #include "base/ranks/unique_number.h"
 #include "renderer/scene/bent_scene.h"
 #include "renderer/scene/grid/scene_grid.h"

@@ -1,6 +1,7 @@
 /* Rays through the flat cloth: from block to block of its tiles. */
 #include "renderer/scene/grid/scene_grid.h"
 #include "renderer/scene/scene_hit.h"
+#include "renderer/scene/scene_visitor.h"
 #include "renderer/scene/sections/scene_embree.h"
 
 #include <math.h>

@@ -9,9 +9,10 @@
 #ifndef SELVEDGE_RENDERER_SCENE_RAY_H
 #define SELVEDGE_RENDERER_SCENE_RAY_H
 
-#include "renderer/scene/scene.h"
-
+#include <stdbool.h>
 #include <stdint.h>
+
+struct scene;
 
 #define SCENE_NO_SEGMENT UINT32_MAX
 
@@ -22,7 +23,7 @@ struct scene_ray {
     float tnear_mm;
     bool inside;     /* the ray may start in fibers; false: the next member counts for nothing */
     uint32_t i_from; /* the segment that the ray leaves inwards, or SCENE_NO_SEGMENT */
-    uint32_t i_cell; /* of a bent cloth: where the origin lies (bent/bent_scene.h) */
+    uint32_t i_cell; /* of a bent cloth: where the origin lies (bent_scene.h) */
 };
 
 struct scene_hit {

@@ -1,5 +1,6 @@
 #include "renderer/scene/bent_scene.h"
 #include "renderer/scene/scene_data.h"
+#include "renderer/scene/scene_visitor.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,4 +1,6 @@
 /* Rays that visit all fibers ahead. */
+#include "renderer/scene/scene_visitor.h"
+
 #include "renderer/scene/scene_data.h"
 
 #include <math.h>

@@ -4,8 +4,8 @@
  * error of paired batches is the tolerance.
  */
 #include "base/angle.h"
-#include "renderer/transport/camera.h"
 #include "renderer/estimate/estimate.h"
+#include "renderer/transport/camera.h"
 #include "renderer/transport/surface/path_tracer.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"

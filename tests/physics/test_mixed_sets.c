@@ -1,9 +1,9 @@
 /* Cloths of several fiber groups, each with a parameter set of its own. Equal sets give the result of one set, and
  * derivatives are by the parameters of their set. */
 #include "base/angle.h"
-#include "renderer/transport/camera.h"
 #include "renderer/estimate/estimate.h"
 #include "renderer/estimate/render.h"
+#include "renderer/transport/camera.h"
 #include "renderer/transport/surface/path_tracer.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/orbit_configurations.h"

@@ -2,8 +2,10 @@
 #ifndef SELVEDGE_RENDERER_PRECOMPUTE_PARTS_H
 #define SELVEDGE_RENDERER_PRECOMPUTE_PARTS_H
 
-#include "renderer/fast/precompute/fast_precompute.h"
+#include "base/thread_pool.h"
+#include "renderer/fast/fast_tables.h"
 #include "renderer/fast/precompute/precompute_journal.h"
+#include "renderer/fast/precompute/precompute_request.h"
 #include "renderer/transport/surface/parameter_sets.h"
 
 /* Numbers of the parts in the journal. */

@@ -11,8 +11,8 @@
 #define SELVEDGE_RENDERER_LIGHT_GUIDE_H
 
 #include "renderer/scattering/scattering.h"
-#include "renderer/transport/light/lamp.h"
 #include "renderer/scene/fiber_frame.h"
+#include "renderer/transport/light/lamp.h"
 
 #define LIGHT_GUIDE_KAPPA 20.0f
 

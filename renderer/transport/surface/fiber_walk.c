@@ -1,6 +1,6 @@
 #include "renderer/transport/surface/fiber_walk.h"
-#include "renderer/transport/path_value.h"
 #include "renderer/scene/fiber_frame.h"
+#include "renderer/transport/path_value.h"
 
 bool fiber_walk_enter(const struct scene *scene, bool from_below, struct rng *rng, struct scene_ray *ray)
 {

@@ -1,4 +1,5 @@
 #include "renderer/transport/surface/path_scatter.h"
+#include "renderer/transport/surface/path_tracer.h"
 
 struct replay {
     const struct parameter_sets *sets;

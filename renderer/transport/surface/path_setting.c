@@ -1,5 +1,5 @@
+#include "renderer/transport/surface/path_setting.h"
 #include "renderer/transport/path_value.h"
-#include "renderer/transport/surface/path_tracer.h"
 
 #include <string.h>
 

@@ -3,7 +3,7 @@
 #define SELVEDGE_RENDERER_PATH_WALK_H
 
 #include "renderer/scene/fiber_frame.h"
-#include "renderer/transport/surface/path_tracer.h"
+#include "renderer/transport/surface/path_setting.h"
 
 static inline void unwrapped(const float local_mm[3], const double offset_mm[2], float out[3])
 {

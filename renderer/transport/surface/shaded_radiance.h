@@ -4,7 +4,7 @@
 #ifndef SELVEDGE_RENDERER_SHADED_RADIANCE_H
 #define SELVEDGE_RENDERER_SHADED_RADIANCE_H
 
-#include "renderer/estimate/radiance_source.h"
+#include "renderer/transport/radiance_tracer.h"
 #include "renderer/transport/surface/path_tracer.h"
 
 /* One way to shade. A setting is what it needs of one configuration: a struct that begins with a path_setting. */

@@ -2,6 +2,7 @@
  * leading left singular vectors of a matrix whose columns are noisy pictures of the tile, by subspace iteration. Each
  * texel has one path a picture: its noise is independent of all others, so that it hardly enters what the pictures
  * have in common. */
+#include "renderer/transport/table/appearance_table.h"
 #include "renderer/transport/table/direction_grid.h"
 #include "renderer/transport/table/table_walks.h"
 

@@ -17,7 +17,7 @@
 #define SELVEDGE_RENDERER_APPEARANCE_TABLE_H
 
 #include "base/thread_pool.h"
-#include "renderer/estimate/radiance_source.h"
+#include "renderer/transport/radiance_tracer.h"
 
 enum { APPEARANCE_MAX_BASIS = 32 };
 #define APPEARANCE_UPRIGHT 0.342 /* cosine of 70 degrees */

@@ -1,4 +1,5 @@
 /* Less noise in a table by means over neighbouring cells, as long as they bring it nearer to the truth. */
+#include "renderer/transport/table/appearance_table.h"
 #include "renderer/transport/table/table_walks.h"
 
 /* One axis of the table: n cells, `stride` floats apart. */

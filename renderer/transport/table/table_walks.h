@@ -3,8 +3,10 @@
 #ifndef SELVEDGE_RENDERER_TABLE_WALKS_H
 #define SELVEDGE_RENDERER_TABLE_WALKS_H
 
+#include "renderer/transport/radiance_tracer.h"
 #include "renderer/transport/surface/path_tracer.h"
-#include "renderer/transport/table/appearance_table.h"
+
+struct appearance_table;
 
 enum { TABLE_LIGHTS = PATH_MAX_LAMP };
 

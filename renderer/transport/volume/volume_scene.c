@@ -1,10 +1,12 @@
+#include "renderer/transport/volume/volume_scene.h"
 #include "base/ranks/unique_number.h"
-#include "renderer/transport/volume/volume_bent.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+
+#define MARGIN_MM 1e-3
 
 /* Voxels are read in random order, so large pages save misses of the address cache where the system has them. Only
  * whole pages inside the array are advised; failure does no harm. */
@@ -169,10 +171,31 @@ status volume_scene_init(struct volume_scene *s, const struct direction_volume *
     return st;
 }
 
+status volume_scene_bend(const struct volume_scene *flat, const struct mesh *mesh, bool black_sheet,
+                         struct volume_scene *bent, struct error *err)
+{
+    const double thickness_mm = (double)((flat->high - flat->low) * flat->voxel_mm[2]);
+    *bent = *flat;
+    bent->black_sheet = black_sheet;
+    bent->bent = calloc(1, sizeof *bent->bent);
+    if (bent->bent == NULL) {
+        memset(bent, 0, sizeof *bent);
+        return error_set(err, STATUS_NO_MEMORY, "cannot bend the cloth: out of memory");
+    }
+    return shell_space_init(&bent->bent->space, mesh, thickness_mm, MARGIN_MM, err);
+}
+
+static void release_bent(struct volume_scene *bent)
+{
+    shell_space_release(&bent->bent->space);
+    free(bent->bent);
+    memset(bent, 0, sizeof *bent);
+}
+
 void volume_scene_release(struct volume_scene *s)
 {
     if (s->bent != NULL) {
-        volume_bent_release(s);
+        release_bent(s);
         return;
     }
     free(s->brick);

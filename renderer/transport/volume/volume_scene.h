@@ -13,7 +13,9 @@
 #define SELVEDGE_RENDERER_VOLUME_SCENE_H
 
 #include "base/ranks/byte_pack.h"
+#include "geometry/mesh/mesh.h"
 #include "geometry/volume/volume.h"
+#include "renderer/scene/bent/shell_walk.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -25,7 +27,10 @@ enum {
     VOLUME_EMPTY_MAX = 32
 };
 
-struct volume_bent;
+/* The shell of a cloth that is laid on a mesh (volume_bent.h). */
+struct volume_bent {
+    struct shell_space space;
+};
 
 struct volume_scene {
     size_t n[3];
@@ -52,6 +57,10 @@ struct volume_scene_option {
  * than 2^24 voxels along an edge or 2^31 bricks. */
 status volume_scene_init(struct volume_scene *scene, const struct direction_volume *v,
                          const struct volume_scene_option *o, struct error *err);
+/* bent: like flat, which must outlive it, on the mesh; its origin is the orbit centre. black_sheet: one lies under all
+ * of it. Errors as scene_bend (renderer/scene/scene.h). volume_scene_release in any case. */
+status volume_scene_bend(const struct volume_scene *flat, const struct mesh *mesh, bool black_sheet,
+                         struct volume_scene *bent, struct error *err);
 void volume_scene_release(struct volume_scene *scene);
 /* A flat scene as bytes, and the same scene made of them by another process. STATUS_FORMAT, STATUS_NO_MEMORY; the scene
  * is released on failure. */

@@ -3,8 +3,8 @@
  * standard errors, with what a limit leaves out stated beside it.
  */
 #include "base/angle.h"
-#include "renderer/transport/camera.h"
 #include "renderer/estimate/estimate.h"
+#include "renderer/transport/camera.h"
 #include "renderer/transport/volume/volume_tracer.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/scan/hand_volume.h"

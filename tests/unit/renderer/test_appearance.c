@@ -1,7 +1,7 @@
 /* The list of models for fits, and their estimates, which must agree with direct use of the tracers. */
+#include "renderer/estimate/estimate.h"
 #include "renderer/scattering/appearance.h"
 #include "renderer/transport/camera.h"
-#include "renderer/estimate/estimate.h"
 #include "renderer/transport/surface/path_tracer.h"
 #include "renderer/transport/volume/volume_tracer.h"
 #include "tests/support/cloth/hand_weave.h"

@@ -1,8 +1,8 @@
 /* The contrast of a texture: estimates are unbiased for any number of paths, their errors and derivatives are right,
  * and they agree with the contrast of a rendered picture. */
 #include "base/rng.h"
-#include "renderer/transport/camera.h"
 #include "renderer/estimate/render.h"
+#include "renderer/transport/camera.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/chess_board.h"
 #include "tests/support/tracer/orbit_configurations.h"

@@ -2,10 +2,10 @@
  * cloth with narrow lobes against path tracing, which the cells' harmonics miss, any number of threads, and directions
  * in a sheared cloth, and where deep light enters a bent one. */
 #include "geometry/mesh/mesh_shapes.h"
+#include "renderer/estimate/estimate.h"
 #include "renderer/fast/deep_shade.h"
 #include "renderer/fast/precompute/fast_precompute.h"
 #include "renderer/scene/scene_place.h"
-#include "renderer/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/trace_input.h"

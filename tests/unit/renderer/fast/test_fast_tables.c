@@ -2,12 +2,12 @@
  * lossless cloth against the directions that are blocked, and pictures by tables against path tracing. */
 #include "base/files/durable.h"
 #include "base/rng.h"
+#include "renderer/estimate/estimate.h"
 #include "renderer/fast/fast_option.h"
 #include "renderer/fast/precompute/fast_precompute.h"
 #include "renderer/fast/precompute/seen_places.h"
 #include "renderer/fast/sphere_harmonics.h"
 #include "renderer/scene/scene_place.h"
-#include "renderer/estimate/estimate.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/tracer/orbit_configurations.h"

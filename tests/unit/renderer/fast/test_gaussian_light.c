@@ -3,9 +3,9 @@
  * parallel light. */
 #include "base/angle.h"
 #include "base/rng.h"
+#include "renderer/estimate/estimate.h"
 #include "renderer/fast/fast_option.h"
 #include "renderer/fast/precompute/fast_precompute.h"
-#include "renderer/estimate/estimate.h"
 #include "renderer/transport/light/lamp.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/trace_input.h"

@@ -1,9 +1,9 @@
 /* The joint filter for previews: what it does to noise, to edges of features and of colors, and to a picture without
  * noise; and on a rendering against one of many samples. */
 #include "base/rng.h"
+#include "renderer/estimate/render.h"
 #include "renderer/preview/feature_image.h"
 #include "renderer/preview/joint_filter.h"
-#include "renderer/estimate/render.h"
 #include "tests/support/cloth/dual_cloth.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/trace_input.h"
