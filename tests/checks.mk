@@ -11,8 +11,9 @@ format:            ## format the C sources with clang-format 14
 format-check:      ## fails when a C source is not formatted as `make format` would
 	@clang-format-14 --dry-run -Werror $(FORMATTED) && echo "format ok"
 
-layers:            ## includes and calls go one way, the daemon holds no symbol of the computing parts, headers say their purpose, functions and files are short
+layers:            ## includes and calls go one way, in each part from folder to folder, the daemon holds no symbol of the computing parts, headers say their purpose, functions and files are short
 	@/usr/bin/python3 tests/check_layers.py --build $(BUILD)
+	@/usr/bin/python3 tests/check_folders.py
 	@/usr/bin/python3 tests/check_calls.py --build $(BUILD)
 	@/usr/bin/python3 tests/check_code.py
 

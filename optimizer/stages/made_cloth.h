@@ -8,6 +8,7 @@
 #include "geometry/reconstruct/reconstruct.h"
 #include "optimizer/stages/job_inputs.h"
 #include "renderer/scene/scene.h"
+#include "renderer/transport/volume/volume_scene.h"
 
 /* Owns its members. */
 struct made_cloth {

@@ -1,5 +1,6 @@
 /* The densities of a scan: the options that it is reconstructed with, its files, and its checkpoint. */
 #include "optimizer/stages/scene/pipeline_volume.h"
+#include "geometry/volume/format/volume_source.h"
 #include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/stages/run/work_file.h"

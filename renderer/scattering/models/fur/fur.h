@@ -28,7 +28,7 @@
 #include "renderer/scattering/lobes/lobe_balance.h"
 #include "renderer/scattering/lobes/tilted_lobe.h"
 #include "renderer/scattering/models/fur/fur.def"
-#include "renderer/scattering/models/fur/fur_means.h"
+#include "renderer/scattering/models/fur/fur_mean.h"
 #include "renderer/scattering/models/fur/fur_ray.h"
 #include "renderer/scattering/models/fur/medulla/medulla.h"
 #include "renderer/scattering/scattering.h"

@@ -1,4 +1,5 @@
 #include "renderer/scattering/models/fur/fur.h"
+#include "renderer/scattering/models/fur/fur_means.h"
 
 #include <stdlib.h>
 #include <string.h>
