@@ -10,6 +10,7 @@
  */
 #include "base/clock.h"
 #include "renderer/estimate/estimate.h"
+#include "renderer/transport/volume/volume_scene.h"
 #include "tests/support/scan/hand_volume.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/trace_input.h"

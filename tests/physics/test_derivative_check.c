@@ -1,5 +1,6 @@
 /* The gradient certificate: every model passes it at its defaults and at its bounds, and wrong derivatives fail it. */
 #include "renderer/estimate/derivative_check.h"
+#include "renderer/transport/volume/volume_scene.h"
 #include "tests/support/agreement.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/model/compared_range.h"

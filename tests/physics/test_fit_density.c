@@ -5,6 +5,7 @@
 #include "base/rng.h"
 #include "optimizer/fit/descent/descent.h"
 #include "optimizer/fit/descent/trace_estimator.h"
+#include "renderer/transport/volume/volume_scene.h"
 #include "tests/support/scan/hand_volume.h"
 
 #include <math.h>

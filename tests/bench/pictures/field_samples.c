@@ -1,4 +1,5 @@
 #include "tests/bench/pictures/field_samples.h"
+#include "renderer/estimate/radiance_source.h"
 
 #include <string.h>
 

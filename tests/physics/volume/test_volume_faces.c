@@ -3,6 +3,7 @@
 #include "base/angle.h"
 #include "base/thread_pool.h"
 #include "renderer/estimate/estimate.h"
+#include "renderer/transport/volume/volume_scene.h"
 #include "tests/support/agreement.h"
 #include "tests/support/scan/hand_volume.h"
 #include "tests/support/tracer/trace_input.h"

@@ -5,6 +5,7 @@
 #include "base/angle.h"
 #include "renderer/estimate/estimate.h"
 #include "renderer/transport/light/environment.h"
+#include "renderer/transport/volume/volume_scene.h"
 #include "tests/support/scan/hand_volume.h"
 #include "tests/support/tracer/environment/painted_environment.h"
 #include "tests/support/tracer/orbit_configurations.h"

@@ -1,4 +1,5 @@
 #include "tests/support/scan/tiff_stack.h"
+#include "geometry/volume/format/volume_source.h"
 
 #include "base/option_id.h"
 

@@ -2,6 +2,7 @@
  * files, progress and cancellation. */
 #include "renderer/estimate/estimate.h"
 #include "renderer/estimate/render.h"
+#include "renderer/transport/volume/volume_scene.h"
 #include "tests/support/scan/hand_volume.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/tracer/estimate_fixture.h"

@@ -1,6 +1,7 @@
 /* TIFF volumes that are damaged, or have values that no scan has. The errors name the file. */
 #include "base/option_id.h"
 #include "geometry/reconstruct/reconstruct.h"
+#include "geometry/volume/format/volume_source.h"
 #include "tests/support/scan/tiff_stack.h"
 
 #include <math.h>

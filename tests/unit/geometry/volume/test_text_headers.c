@@ -1,5 +1,6 @@
 /* Fields of the text headers of NRRD and MetaImage one by one: every name of a type and a unit, and what is refused. */
 #include "base/option_id.h"
+#include "geometry/volume/format/volume_source.h"
 #include "tests/support/scan/scan_expectation.h"
 #include "tests/support/scratch_folder.h"
 

@@ -1,6 +1,7 @@
 /* TIFF volumes: which kinds of samples, layouts and stacks are read. */
 #include "base/option_id.h"
 #include "geometry/reconstruct/reconstruct.h"
+#include "geometry/volume/format/volume_source.h"
 #include "tests/support/scan/tiff_stack.h"
 
 #include <math.h>

@@ -2,6 +2,7 @@
 #include "base/rng.h"
 #include "geometry/reconstruct/reconstruct.h"
 #include "geometry/reconstruct/void_trim.h"
+#include "geometry/volume/format/volume_source.h"
 #include "tests/support/scan/scan_files.h"
 
 #include <setjmp.h>

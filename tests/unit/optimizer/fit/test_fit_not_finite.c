@@ -2,6 +2,7 @@
  * NaN occurs, the fit ends with an error that names model, parameter and configuration. */
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/fit/descent/trace_estimator.h"
+#include "renderer/transport/volume/volume_scene.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/scan/hand_volume.h"
 

@@ -5,6 +5,7 @@
 #include "geometry/mesh/mesh_shapes.h"
 #include "renderer/diffusion/diffusion_option.h"
 #include "renderer/estimate/estimate.h"
+#include "renderer/estimate/radiance_source.h"
 #include "tests/support/cloth/dual_cloth.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/cloth/make_phantom.h"

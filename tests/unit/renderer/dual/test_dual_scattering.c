@@ -4,6 +4,7 @@
 #include "geometry/mesh/mesh_shapes.h"
 #include "renderer/dual/dual_shade.h"
 #include "renderer/estimate/estimate.h"
+#include "renderer/estimate/radiance_source.h"
 #include "tests/support/cloth/dual_cloth.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/orbit_configurations.h"
