@@ -3,6 +3,7 @@
 #include "base/rng.h"
 #include "geometry/mesh/mesh_shapes.h"
 #include "renderer/preview/ground_plane.h"
+#include "renderer/preview/ground_shadow.h"
 #include "renderer/preview/sheared_filter.h"
 #include "tests/support/cloth/dual_cloth.h"
 
