@@ -7,6 +7,8 @@
 
 #include "renderer/scene/scene_data.h"
 
+struct scene_visitor;
+
 struct scene_grid {
     int n[3];
     float low_mm[3], cell_mm[3], per_mm[3]; /* per_mm: 1 / cell_mm */

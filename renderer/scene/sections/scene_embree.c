@@ -1,4 +1,5 @@
 #include "renderer/scene/sections/scene_embree.h"
+#include "renderer/scene/scene_visitor.h"
 
 #include "renderer/scene/sections/scene_ellipse.h"
 

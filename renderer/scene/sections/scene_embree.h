@@ -5,6 +5,8 @@
 
 #include "renderer/scene/scene_data.h"
 
+struct scene_visitor;
+
 /* STATUS_UNSUPPORTED, STATUS_NO_MEMORY. */
 status scene_embree_build(struct scene *s, struct error *err);
 void scene_embree_free(struct scene *s);
