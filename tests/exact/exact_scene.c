@@ -6,6 +6,7 @@
  * the image of these tubes under the map of its shell. The member i_cell of a ray is the number of the segment that
  * scattered it plus 1, or 0: a start that single precision has moved off the surface is put back there.
  */
+#include "renderer/scene/scene.h"
 #include "renderer/scene/scene_ray.h"
 #include "tests/exact/exact_bent.h"
 

@@ -1,4 +1,5 @@
 /* Rays of renderer/scene against the intervals of the cloth by definition (tests/exact), ray by ray. */
+#include "renderer/scene/scene.h"
 #include "renderer/scene/scene_place.h"
 #include "renderer/scene/scene_ray.h"
 #include "tests/exact/capsule_cloth.h"

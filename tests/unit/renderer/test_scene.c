@@ -1,4 +1,5 @@
 /* The periodic cloth: positions of hits, periodicity, back faces, camera and lamp. */
+#include "renderer/scene/scene.h"
 #include "renderer/scene/scene_ray.h"
 #include "renderer/transport/camera.h"
 #include "renderer/transport/light/lamp.h"
