@@ -129,7 +129,7 @@ $(BUILD)/obj/%.cpp.o: %.cpp
 FUSED := fibers/lines/segment_bricks fibers/axes/axis_brick fibers/axes/model/nearest_segment \
          fibers/axes/axis_compare fibers/slices/blob_response filter/line_filter
 $(FUSED:%=$(BUILD)/obj/geometry/%.c.o): CFLAGS_ALL += -ffp-contract=fast
-$(BUILD)/obj/renderer/scene/grid/scene_grid_walk.c.o: CFLAGS_ALL += -ffp-contract=fast
+$(BUILD)/obj/renderer/scene/scene_grid_walk.c.o: CFLAGS_ALL += -ffp-contract=fast
 
 # a program says what its processor lacks; the compiler may use that everywhere but here
 ifeq ($(ARCH),x86_64)

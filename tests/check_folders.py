@@ -27,7 +27,7 @@ def read_sources(root, paths):
     """Returns {path: [paths that it includes]} of the sources of all parts."""
     found = {}
     for path in paths:
-        if path.split("/")[0] in PARTS and path.endswith((".c", ".h", ".cpp", ".def")):
+        if path.split("/")[0] in PARTS and path.endswith((".c", ".h", ".cpp")):
             with open(os.path.join(root, path), encoding="utf-8") as source:
                 found[path] = re.findall(r'^\s*#\s*include\s+"([^"]+)"', source.read(), flags=re.M)
     return found

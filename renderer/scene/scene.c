@@ -1,10 +1,10 @@
 #include "renderer/scene/scene.h"
 #include "base/ranks/unique_number.h"
 #include "renderer/scene/bent_scene.h"
-#include "renderer/scene/grid/scene_grid.h"
+#include "renderer/scene/scene_ellipse.h"
+#include "renderer/scene/scene_embree.h"
 #include "renderer/scene/scene_ends.h"
-#include "renderer/scene/sections/scene_ellipse.h"
-#include "renderer/scene/sections/scene_embree.h"
+#include "renderer/scene/scene_grid.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,8 +1,8 @@
 /* Rays through the flat cloth: from block to block of its tiles. */
-#include "renderer/scene/grid/scene_grid.h"
+#include "renderer/scene/scene_embree.h"
+#include "renderer/scene/scene_grid.h"
 #include "renderer/scene/scene_hit.h"
 #include "renderer/scene/scene_visitor.h"
-#include "renderer/scene/sections/scene_embree.h"
 
 #include <math.h>
 

@@ -1,6 +1,6 @@
 #include "renderer/scene/scene_hit.h"
 
-#include "renderer/scene/sections/scene_ellipse.h"
+#include "renderer/scene/scene_ellipse.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,4 +1,5 @@
-/* The fibers ahead of a ray of the flat cloth: whether there are any, or a visit of each. For the files of this folder. */
+/* The fibers ahead of a ray of the flat cloth: whether there are any, or a visit of each. For the files of this
+ * folder. */
 #ifndef SELVEDGE_RENDERER_SCENE_VISITOR_H
 #define SELVEDGE_RENDERER_SCENE_VISITOR_H
 

@@ -1,5 +1,5 @@
-/* What a tracer is given, and the table of functions that it fills in (radiance_source.h in renderer/estimate has the list
- * of tracers). */
+/* What a tracer is given, and the table of functions that it fills in (radiance_source.h in renderer/estimate has
+ * the list of tracers). */
 #ifndef SELVEDGE_RENDERER_RADIANCE_TRACER_H
 #define SELVEDGE_RENDERER_RADIANCE_TRACER_H
 

@@ -23,7 +23,7 @@ import check_layers  # noqa: E402
     ("clients/cli/a.c", "server/settings/settings.h"),
     ("base/a.c", "status.h"),
     ("base/catalogue/models.def", "renderer/scattering/scattering.h"),
-    ("base/catalogue/methods.def", "renderer/scattering/models/fur/fur.def"),
+    ("base/catalogue/methods.def", "renderer/scattering/models/fur/fur_rows.def"),
 ])
 def test_includes_against_the_layers(path, include):
     assert list(check_layers.check_includes(path, f'/* A file. */\n#include "{include}"\n'))
@@ -33,7 +33,7 @@ def test_includes_against_the_layers(path, include):
     ("optimizer/job/a.c", "base/catalogue/model_catalogue.h"),
     ("server/jobs/a.c", "optimizer/job/document/job_document.h"),
     ("optimizer/fit/a.c", "renderer/estimate/estimate.h"),
-    ("base/catalogue/models.def", "renderer/scattering/models/fur/fur.def"),
+    ("base/catalogue/models.def", "renderer/scattering/models/fur/fur_rows.def"),
 ])
 def test_includes_along_the_layers(path, include):
     assert not list(check_layers.check_includes(path, f'#include "{include}"\n'))

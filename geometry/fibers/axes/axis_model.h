@@ -1,5 +1,5 @@
-/* The model of a scan by fibers near given lines (axis_fit.h), and the arrays of one thread for a brick of it. Lengths are
- * in voxels. */
+/* The model of a scan by fibers near given lines (axis_fit.h), and the arrays of one thread for a brick of it.
+ * Lengths are in voxels. */
 #ifndef SELVEDGE_GEOMETRY_AXIS_MODEL_H
 #define SELVEDGE_GEOMETRY_AXIS_MODEL_H
 

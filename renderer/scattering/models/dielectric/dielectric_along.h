@@ -10,7 +10,7 @@
 #include "renderer/scattering/lobes/cone_lobe.h"
 #include "renderer/scattering/lobes/fiber_direction.h"
 #include "renderer/scattering/lobes/lobe_balance.h"
-#include "renderer/scattering/models/dielectric/dielectric.def"
+#include "renderer/scattering/models/dielectric/dielectric_rows.def"
 #include "renderer/scattering/scattering.h"
 
 enum { DIELECTRIC_N_LOBE = 3 };

@@ -23,7 +23,7 @@
 #include "renderer/scattering/lobes/azimuth_table.h"
 #include "renderer/scattering/lobes/lobe_balance.h"
 #include "renderer/scattering/lobes/tilted_lobe.h"
-#include "renderer/scattering/models/dielectric/dielectric.def"
+#include "renderer/scattering/models/dielectric/dielectric_rows.def"
 #include "renderer/scattering/models/dielectric/strip_lobe.h"
 #include "renderer/scattering/scattering.h"
 

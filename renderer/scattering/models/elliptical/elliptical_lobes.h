@@ -6,7 +6,7 @@
 #include "renderer/scattering/lobes/lobe_balance.h"
 #include "renderer/scattering/lobes/tilted_lobe.h"
 #include "renderer/scattering/models/elliptical/ellipse_ray.h"
-#include "renderer/scattering/models/elliptical/elliptical.def"
+#include "renderer/scattering/models/elliptical/elliptical_rows.def"
 #include "renderer/scattering/scattering.h"
 
 #include "base/status.h"

@@ -27,9 +27,9 @@
 #include "renderer/scattering/lobes/azimuth_table.h"
 #include "renderer/scattering/lobes/lobe_balance.h"
 #include "renderer/scattering/lobes/tilted_lobe.h"
-#include "renderer/scattering/models/fur/fur.def"
 #include "renderer/scattering/models/fur/fur_mean.h"
 #include "renderer/scattering/models/fur/fur_ray.h"
+#include "renderer/scattering/models/fur/fur_rows.def"
 #include "renderer/scattering/models/fur/medulla/medulla.h"
 #include "renderer/scattering/scattering.h"
 

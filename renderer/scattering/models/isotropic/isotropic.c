@@ -2,8 +2,8 @@
  * lossless from both sides (the integral of cos th over the sphere is pi^2): the yardstick of furnace tests and the
  * plainest model to fit.
  */
-#include "renderer/scattering/models/isotropic/isotropic.def"
 #include "renderer/scattering/lobes/fiber_direction.h"
+#include "renderer/scattering/models/isotropic/isotropic_rows.def"
 #include "renderer/scattering/scattering.h"
 
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 /* phase_isotropic.v1: f = alpha / (4 pi), extinction the same in all directions. The yardstick of closed forms and
  * furnace tests, and the plainest model to fit. */
-#include "renderer/scattering/models/isotropic/isotropic.def"
+#include "renderer/scattering/models/isotropic/isotropic_rows.def"
 #include "renderer/scattering/phase_model.h"
 
 #include <math.h>

@@ -33,7 +33,7 @@
 
 #include "renderer/scattering/lobes/azimuth_table.h"
 #include "renderer/scattering/lobes/lobe_balance.h"
-#include "renderer/scattering/models/microfacet/microfacet.def"
+#include "renderer/scattering/models/microfacet/microfacet_rows.def"
 #include "renderer/scattering/models/microfacet/microfacet_surface.h"
 #include "renderer/scattering/models/microfacet/microfacet_walk.h"
 #include "renderer/scattering/scattering.h"

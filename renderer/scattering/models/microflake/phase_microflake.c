@@ -10,7 +10,7 @@
  * side; density of wi = D(h) / (2 |wo . h|), weight alpha |wo . h| / s(wo).
  */
 #include "renderer/scattering/lobes/von_mises.h"
-#include "renderer/scattering/models/microflake/microflake.def"
+#include "renderer/scattering/models/microflake/microflake_rows.def"
 #include "renderer/scattering/phase_model.h"
 
 #include <math.h>

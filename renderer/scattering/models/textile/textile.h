@@ -30,7 +30,7 @@
 #ifndef SELVEDGE_RENDERER_TEXTILE_H
 #define SELVEDGE_RENDERER_TEXTILE_H
 
-#include "renderer/scattering/models/textile/textile.def"
+#include "renderer/scattering/models/textile/textile_rows.def"
 #include "renderer/scattering/models/two_lobe/two_lobe_core.h"
 
 enum {

@@ -15,7 +15,7 @@
 
 #include "renderer/scattering/lobes/fiber_direction.h"
 #include "renderer/scattering/lobes/von_mises.h"
-#include "renderer/scattering/models/two_lobe/two_lobe.def"
+#include "renderer/scattering/models/two_lobe/two_lobe_rows.def"
 #include "renderer/scattering/scattering.h"
 
 #include <stdbool.h>

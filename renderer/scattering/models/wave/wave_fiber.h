@@ -25,7 +25,7 @@
 #include "base/status.h"
 #include "renderer/scattering/lobes/lobe_balance.h"
 #include "renderer/scattering/lobes/tilted_lobe.h"
-#include "renderer/scattering/models/wave/wave.def"
+#include "renderer/scattering/models/wave/wave_rows.def"
 #include "renderer/scattering/models/wave/wave_table.h"
 #include "renderer/scattering/scattering.h"
 

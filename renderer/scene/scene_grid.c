@@ -1,4 +1,4 @@
-#include "renderer/scene/grid/scene_grid.h"
+#include "renderer/scene/scene_grid.h"
 
 #include <inttypes.h>
 #include <math.h>

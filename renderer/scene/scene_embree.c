@@ -1,7 +1,7 @@
-#include "renderer/scene/sections/scene_embree.h"
+#include "renderer/scene/scene_embree.h"
 #include "renderer/scene/scene_visitor.h"
 
-#include "renderer/scene/sections/scene_ellipse.h"
+#include "renderer/scene/scene_ellipse.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "renderer/scene/sections/scene_ellipse.h"
+#include "renderer/scene/scene_ellipse.h"
 
 #include "renderer/scene/scene_ends.h"
 

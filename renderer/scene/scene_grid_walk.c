@@ -1,7 +1,7 @@
 /* Rays from cell to cell of the grid. */
-#include "renderer/scene/grid/scene_grid.h"
-#include "renderer/scene/grid/scene_segment.h"
 #include "renderer/scene/scene_faces.h"
+#include "renderer/scene/scene_grid.h"
+#include "renderer/scene/scene_segment.h"
 #include "renderer/scene/scene_visitor.h"
 
 #include <string.h>
