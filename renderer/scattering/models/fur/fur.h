@@ -12,14 +12,14 @@
  *
  * fur_near.v1 takes h from the place of the fiber that is seen; fur.v1 is the mean over h.
  *
- * What differs from the publication, besides fur_ray.h: scales tilt light to both sides alike (tilted_lobe.h); a(th)
- * takes the place of 1 / cos^2 th_i. In the mean over h and without absorption the medulla scatters the share B(th) of
- * light from th, and b(th) balances M_s to that: taken at th_d alone, as published, grazing light that a wide lobe
+ * Differs from the publication, besides fur_ray.h: scales tilt light to both sides alike (tilted_lobe.h); a(th) takes
+ * the place of 1 / cos^2 th_i. In the mean over h and without absorption the medulla scatters the share B(th) of light
+ * from th, and b(th) balances M_s to this share: taken at th_d alone, as published, grazing light that a wide lobe
  * sends to the middle would be scattered as if it came from there, and fibers would give back more than they get. a(th)
  * balances R, TT, TRT and the rest to 1 - B(th), as in dielectric.v1. So nothing is lost or gained, and the mean is
  * reciprocal. For narrow lobes a a M_p is the published Gaussian over cos th_i cos th_o, and b b / B is 1. The optical
- * radius of the medulla around the fiber is kappa sigma_ms / cos th_t, that along it kappa sigma_ms, as the unit circle
- * demands (their text leaves kappa out).
+ * radius of the medulla around the fiber is kappa sigma_ms / cos th_t, the radius along it kappa sigma_ms, as the unit
+ * circle demands (their text leaves kappa out).
  */
 #ifndef SELVEDGE_RENDERER_FUR_H
 #define SELVEDGE_RENDERER_FUR_H
@@ -48,10 +48,10 @@ enum {
 };
 enum { FUR_N_LOBE = 3, FUR_N_SEGMENT = 2 };
 /* Parameters that the scale a(th) depends on. */
-enum fur_scale_by { FUR_S_ALPHA = FUR_N_MEAN_BY, FUR_S_BETA, FUR_N_SCALE }; /* after those of fur_mean_by */
+enum fur_scale_by { FUR_S_ALPHA = FUR_N_MEAN_BY, FUR_S_BETA, FUR_N_SCALE }; /* numbered on from fur_mean_by */
 enum { FUR_N_WIDE = 129 };
 
-/* What both models have along the fiber. */
+/* State of both models along the fiber. */
 struct fur_along {
     struct fur_fiber fiber;
     struct tilted_lobe lobe[FUR_N_LOBE];

@@ -39,7 +39,7 @@ static void mode_probabilities(const struct scattering_state *s, int row, float 
                                LEAST_PROBABILITY, p);
 }
 
-/* A pair of directions: M of each lobe, and what multiplies the tables. */
+/* A pair of directions: M of each lobe, and the factors of the tables. */
 struct terms {
     struct azimuth_place g;
     float m[FUR_N_LOBE], d[FUR_N_LOBE][2];             /* M, and by shift and width */

@@ -1,10 +1,11 @@
-/* Tables of fur.v1, the far field (fur.h states the model): the mean over the offset h of what fur_near.v1 has around
- * the fiber, at FUR_FAR_ROW + 1 values of cos th_d and FUR_N_PHI + 1 azimuths over half a turn, read by straight lines.
+/* Tables of fur.v1, the far field (fur.h states the model): the mean over the offset h of the azimuthal functions of
+ * fur_near.v1, at FUR_FAR_ROW + 1 values of cos th_d and FUR_N_PHI + 1 azimuths over half a turn, read by straight
+ * lines.
  *
  * The means are sums over offsets as Fourier series in ph: a wrapped Gaussian is a factor exp(-k^2 w^2 / 2), and the
  * density of the medulla a factor of each of its functions of the azimuth. The publication integrates pieces between
  * few offsets in closed form, with shares and angles linear within each piece, which makes R too bright at the rim.
- * Derivatives are exact for what is tabulated.
+ * Derivatives are exact for the tabulated function.
  */
 #ifndef SELVEDGE_RENDERER_FUR_FAR_H
 #define SELVEDGE_RENDERER_FUR_FAR_H

@@ -5,12 +5,12 @@
 
 /* Waves for widths from a degree, the least gamma. */
 enum { N_WAVE = 320, N_MEDULLA_WAVE = 48, LEAST_OFFSET = 160 };
-/* Values of a table, and derivatives in the order of fur_far_by; that by gamma follows from the values. */
+/* Values of a table, and derivatives in the order of fur_far_by; the derivative by gamma follows from the values. */
 enum { VALUE, BY = 1, N_SUM = BY + FUR_F_GAMMA, BY_GAMMA = N_SUM, N_QUANTITY };
 #define LEAST_FACTOR 5.5 /* waves with k w above this have a factor below exp(-5.5^2 / 2) = 3e-7 */
 #define FADED 3e-6
 
-/* What all rows need. */
+/* Data that all rows need. */
 struct common {
     double cosine[N_WAVE][FUR_N_PHI + 1];
     struct fur_fiber fiber;
@@ -261,7 +261,7 @@ static void store(const struct work *w, struct fur_cell *cell, struct fur_slope 
     azimuth_density(mean, FUR_N_PHI, row->density[p], row->below[p]);
 }
 
-/* cos(k ph) at the azimuths of the table, each of which is one of the 2 FUR_N_PHI of a turn. */
+/* cos(k ph) at the azimuths of the table, which are among the 2 FUR_N_PHI azimuths of a turn. */
 static void fill_cosines(struct common *all)
 {
     double of_turn[2 * FUR_N_PHI];

@@ -1,5 +1,5 @@
 /* Shares of light in the mean over the offset of a fiber with a medulla, without absorption, by cos th_d, and their
- * derivatives: what the balance along the fiber knows of light around it (fur.h). */
+ * derivatives. The balance along the fiber takes the light around it from them (fur.h). */
 #ifndef SELVEDGE_RENDERER_FUR_MEANS_H
 #define SELVEDGE_RENDERER_FUR_MEANS_H
 

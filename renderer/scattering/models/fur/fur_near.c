@@ -44,7 +44,7 @@ static status prepare(const double *param, struct scattering_state **state, stru
 
 static void release(struct scattering_state *s) { free(s); }
 
-/* What multiplies the share of each mode, and its derivatives by what is not in the shares alone. */
+/* Factor of the share of each mode, and its derivatives by the parameters that it depends on. */
 enum by { BY_ETA, BY_KAPPA, BY_MS, BY_G, BY_ALPHA, BY_BETA, BY_GAMMA, N_BY };
 static const int param_of[N_BY] = {FUR_P_ETA, FUR_P_KAPPA, FUR_P_MS, FUR_P_G, FUR_P_ALPHA, FUR_P_BETA, FUR_P_GAMMA};
 

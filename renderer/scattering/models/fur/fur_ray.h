@@ -1,12 +1,11 @@
-/* What a ray does that meets a fiber with a medulla at the offset h = sin x from its axis, with derivatives (Yan,
- * Jensen and Ramamoorthi 2017, "An Efficient and Practical Near and Far Field Fur Reflectance Model", section 4; Yan
- * 2018, "Physically-based Modeling and Rendering of Complex Visual Appearance", sections 4.3 and 4.8). The section is
- * two concentric circles, of radius 1 and kappa, and of the same index of refraction. Lengths are in radii of the
- * fiber.
+/* Exits of a ray that meets a fiber with a medulla at the offset h = sin x from its axis, with derivatives (Yan, Jensen
+ * and Ramamoorthi 2017, "An Efficient and Practical Near and Far Field Fur Reflectance Model", section 4; Yan 2018,
+ * "Physically-based Modeling and Rendering of Complex Visual Appearance", sections 4.3 and 4.8). The section is two
+ * concentric circles, of radius 1 and kappa, and of the same index of refraction. Lengths are in radii of the fiber.
  *
  *     F      reflectance of l layers of cuticle: F_1 = F_s / (1 + F_s) + F_p / (1 + F_p), F = l F_1 / (1 + (l - 1) F_1)
- *     s_m    half of the way in the medulla, sqrt(kappa^2 - sin^2 gamma_t); s_c = cos gamma_t - s_m that in the cortex
- *     E      what one crossing leaves unscattered: exp(-2 (s_c sigma_c + s_m (sigma_ma + sigma_ms)) / cos th_t)
+ *     s_m    half of the way in the medulla, sqrt(kappa^2 - sin^2 gamma_t); s_c = cos gamma_t - s_m, in the cortex
+ *     E      share that one crossing leaves unscattered: exp(-2 (s_c sigma_c + s_m (sigma_ma + sigma_ms)) / cos th_t)
  *     s      share that one crossing scatters: 1 - exp(-2 s_m sigma_ms / cos th_t)
  *     u      exp(-s_c sigma_c / cos th_t), the way to the medulla
  *     v      exp(-(kappa sigma_ma + (1 - kappa) sigma_c) / cos th_t), the way of scattered light out of the fiber
@@ -17,11 +16,11 @@
  *
  * Without absorption the shares sum to 1 at every offset.
  *
- * What differs from the publication: TT^s begins with 1 - F where their table 3 prints F, as their equation (20) and
- * the sum of energies demand; the rest, all longer paths, is kept; ways are divided by cos th_t, sin th_t = sin th_d /
- * eta, and not by cos th_d, which the refracted ray never has; F is taken at the true angle of incidence and not at
- * gamma_i with the index eta'; and s_m is rounded off within 5 % of the medulla's edge, where its slope has no bound:
- * s_m^2 = (q + sqrt(q^2 + e^2)) / 2, q = kappa^2 - sin^2 gamma_t.
+ * Differs from the publication: TT^s begins with 1 - F where their table 3 prints F, as their equation (20) and the sum
+ * of energies demand; the rest, all longer paths, is kept; ways are divided by cos th_t, sin th_t = sin th_d / eta, and
+ * not by cos th_d, which the refracted ray never has; F is taken at the true angle of incidence and not at gamma_i with
+ * the index eta'; and s_m is rounded off within 5 % of the medulla's edge, where its slope has no bound: s_m^2 = (q +
+ * sqrt(q^2 + e^2)) / 2, q = kappa^2 - sin^2 gamma_t.
  */
 #ifndef SELVEDGE_RENDERER_FUR_RAY_H
 #define SELVEDGE_RENDERER_FUR_RAY_H
@@ -31,7 +30,7 @@
 #include <math.h>
 
 enum fur_mode { FUR_R, FUR_TT, FUR_TRT, FUR_TT_S, FUR_TRT_S, FUR_REST, FUR_N_MODE };
-/* What shares depend on. FUR_BY_C: ln C_T of one channel, C_T = exp(-2 sigma_c). */
+/* Quantities that the shares depend on. FUR_BY_C: ln C_T of one channel, C_T = exp(-2 sigma_c). */
 enum fur_by { FUR_BY_C, FUR_BY_ETA, FUR_BY_KAPPA, FUR_BY_LAYERS, FUR_BY_MS, FUR_BY_MA, FUR_N_BY };
 #define FUR_EDGE 1e-2         /* e */
 #define FUR_LEAST_COSINE 1e-3 /* of th_d: at 0 all light is reflected */
@@ -124,7 +123,7 @@ static inline void fur_parts(const struct fur_fiber *f, const struct fur_ray *r,
         for (int k = 0; k < FUR_N_BY; k++) part[p][k] = all[p][k];
 }
 
-/* Derivatives of one share from those of the parts. */
+/* Derivatives of one share from the derivatives of the parts. */
 static inline void fur_share_slopes(const struct fur_shares *a, int mode, double part[FUR_N_PART][FUR_N_BY],
                                     double d[FUR_N_BY])
 {
@@ -134,7 +133,8 @@ static inline void fur_share_slopes(const struct fur_shares *a, int mode, double
     }
 }
 
-/* Azimuth, from that of the ray, that points back along segment p = 1, 2 of the ray inside; by eta in *d_eta. */
+/* Returns the azimuth, less the azimuth of the ray, that points back along segment p = 1, 2 inside; by eta in
+ * *d_eta. */
 static inline double fur_segment_azimuth(const struct fur_ray *r, int p, double x, double *d_eta)
 {
     *d_eta = (2 * p - 1) * r->d_gamma_t;

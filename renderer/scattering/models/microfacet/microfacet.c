@@ -2,7 +2,7 @@
  *
  * Sampling of wi: a lobe by its energy at th_o and the weights of the channels; an azimuth from the lobe at th_d =
  * th_o, averaged over the channels, and 2 % uniform; th_i normally distributed about one of both shifted cones, with
- * shift and width of that azimuth, beyond a pole taken as the direction on its other side. The density does not know
+ * shift and width of this azimuth, beyond a pole taken as the direction on its other side. The density does not know
  * a(th) and takes th_d = th_o, so weights are bounded but not constant.
  */
 #include "renderer/scattering/models/microfacet/microfacet.h"
@@ -82,10 +82,10 @@ static struct microfacet_slope slope_at(const struct scattering_state *s, const 
     return y;
 }
 
-/* S without the scale is the sum of all of these; what the scores need of it. */
+/* Terms that the scores need of S. S without the scale is their sum. */
 struct terms {
     struct microfacet_cell cell;
-    float r, d_r[MICROFACET_R_N_BY], seen, d_seen; /* R without what is hidden; what is seen, and by r */
+    float r, d_r[MICROFACET_R_N_BY], seen, d_seen; /* R if no facet were hidden; visible share, and by r */
     float m[MICROFACET_N_INNER + 1], d[MICROFACET_N_INNER + 1][2]; /* M; by shift and width; the last is the rest's */
     float rest[3], d_scale[MICROFACET_N_SCALE];                    /* d ln of the scales of both directions */
 };

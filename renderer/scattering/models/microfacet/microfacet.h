@@ -8,25 +8,26 @@
  *     x = th_i + th_o,   M = (g(x - mu; sigma) + g(x + mu; sigma)) / 2,   mu = tan(tau) kappa
  *
  * R is the sum over the facets that mirror wi to wo, in closed form (microfacet_surface.h). N_p is the density of the
- * azimuth of what leaves, weighted by absorption; sigma^2 and kappa are the mean of x^2 there and the mean of d x / d k
- * for a mean slope k of the wall. All are means over N_DRAW paths (microfacet_walk.h) of a lattice that depends on no
- * parameter, over the section's orientation, the place across its width and the facets that are met, at N_ROW + 1
- * values of cos th_d; densities are blurred by a Gaussian of r / 4 (TT) and r / 2 (TRT) and read between N_PHI + 1
- * azimuths by straight lines. What TRT leaves inside goes across the section once more and leaves at any azimuth.
- * Absorption takes C_T^l, l in units of 2 sqrt(A B), the diameter of a round fiber of the same section.
+ * azimuth of the light that leaves, weighted by absorption; sigma^2 and kappa are the mean of x^2 there and the mean of
+ * d x / d k for a mean slope k of the wall. All are means over N_DRAW paths (microfacet_walk.h) of a lattice that
+ * depends on no parameter, over the section's orientation, the place across its width and the facets that are met, at
+ * N_ROW + 1 values of cos th_d; densities are blurred by a Gaussian of r / 4 (TT) and r / 2 (TRT) and read between
+ * N_PHI + 1 azimuths by straight lines. Light that TRT leaves inside goes across the section once more and leaves at
+ * any azimuth. Absorption takes C_T^l, l in units of 2 sqrt(A B), the diameter of a round fiber of the same section.
  *
- * What differs from the publication: a lattice takes the place of random facets inside, so that value, density and
- * derivatives are functions of the parameters; R has 1 / (cos th_i cos th_o), of which the published form lacks one
- * cosine; a(th) balances the lobes as in dielectric.v1 and takes the place of that factor, so that S is reciprocal and
- * what facets hide of each other is not lost; the section's orientation and the direction of the scales are averaged
+ * Differs from the publication: a lattice takes the place of random facets inside, so that value, density and
+ * derivatives are functions of the parameters; R has 1 / (cos th_i cos th_o), and the published form lacks one cosine;
+ * a(th) balances the lobes as in dielectric.v1 and takes the place of this factor, so that S is reciprocal and light
+ * that facets hide from each other is not lost; the section's orientation and the direction of the scales are averaged
  * over; facets have the slopes of Beckmann's distribution, and scales add a mean slope to them.
  *
  * kappa takes the derivative of a mean by a mean of slopes: d <x> / d k = <x sum of p> / <p^2>.
  *
  * The sums over paths are rough functions of eta, a and r where rays begin to be reflected totally, and their slopes
  * would be noise. So N, mu and sigma are made at nodes of a grid of ln eta, ln a and ln r, some 3, 8 and 15 % apart,
- * and are linear in between, over the four corners of a simplex. R and what its facets hide depend on the parameters
- * themselves. Derivatives are exact for what is tabulated, and those by eta, a and r step between simplices.
+ * and are linear in between, over the four corners of a simplex. R and the shadowing of its facets depend on the
+ * parameters themselves. Derivatives are exact for the tabulated function, and the derivatives by eta, a and r step
+ * between simplices.
  */
 #ifndef SELVEDGE_RENDERER_MICROFACET_H
 #define SELVEDGE_RENDERER_MICROFACET_H
@@ -56,7 +57,7 @@ enum {
 
 /* Lobes in samples: R, TT, TRT, the rest. */
 enum { MICROFACET_R, MICROFACET_INNER, MICROFACET_REST = MICROFACET_INNER + MICROFACET_N_INNER, MICROFACET_N_LOBE };
-/* Derivatives that tables hold besides that by C_T, and those of the scale a(th). */
+/* Derivatives that tables hold besides the one by C_T, and derivatives of the scale a(th). */
 enum { MICROFACET_BY_ETA, MICROFACET_BY_RATIO, MICROFACET_BY_ROUGHNESS, MICROFACET_N_BY };
 enum { MICROFACET_BY_TAU = MICROFACET_N_BY, MICROFACET_N_SCALE };
 

@@ -106,7 +106,7 @@ static void add_reflected(const struct scattering_state *s, const struct balance
 
 /* ---- the scale ---- */
 
-/* Adds what goes between th_i at node i and th_o at node -j, or j where `same`. */
+/* Adds the light that goes between th_i at node i and th_o at node -j (j may be negative). */
 static void add_pair(const struct scattering_state *s, const struct balance *b, int i, int j, struct light *to)
 {
     const int distance = abs(i - j), half = i + j;

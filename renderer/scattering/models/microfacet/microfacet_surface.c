@@ -1,6 +1,6 @@
 #include "renderer/scattering/models/microfacet/microfacet_surface.h"
 
-/* Nodes and weights of Gauss's rule over [-1, 1], those of at least 0. */
+/* Nodes of Gauss's rule over [-1, 1] that are at least 0, and their weights. */
 enum { N_GAUSS = 8 };
 static const double gauss_node[N_GAUSS] = {0.0950125098376374, 0.2816035507792589, 0.4580167776572274,
                                            0.6178762444026438, 0.7554044083550030, 0.8656312023878318,

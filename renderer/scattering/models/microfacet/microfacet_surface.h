@@ -1,7 +1,8 @@
 /* Reflection by the facets of a fiber's wall, the lobe R, in closed form.
  *
  * Over all orientations of the section its normals have all azimuths alike, whatever convex shape it has. So the facets
- * that mirror wi to wo are those of a circle, summed over the azimuth of the wall, psi off that of the half vector h:
+ * that mirror wi to wo are the same as on a circle, summed over the azimuth of the wall, psi measured from the
+ * half vector h:
  *
  *     S_R cos th_i cos th_o = F / 8 * integral of D(m) over psi,   D = exp(-((p - k)^2 + q^2) / r^2) / (pi r^2 (m .
  * n)^4)
@@ -9,7 +10,7 @@
  *
  * With t = tan psi the integrand is exp(-((tan th_h sqrt(1 + t^2) - k)^2 + t^2) / r^2) (1 + t^2) / (pi r^2 cos^4 th_h).
  * It is integrated in closed form with sqrt(1 + t^2) = 1 + t^2 / 2 in the one product with k, and exactly for k = 0.
- * The mean of k and -k is taken, since a fiber in a cloth has no known root. What the wall hides of these facets is a
+ * The mean of k and -k is taken, since a fiber in a cloth has no known root. The visible share of these facets is a
  * factor of its own, V(alpha_i) + V(alpha_o) - 1 for the azimuths alpha of both directions off h (microfacet_seen).
  */
 #ifndef SELVEDGE_RENDERER_MICROFACET_SURFACE_H
@@ -26,7 +27,7 @@ struct microfacet_surface {
 
 enum { MICROFACET_R_BY_ETA, MICROFACET_R_BY_ROUGHNESS, MICROFACET_R_BY_TAU, MICROFACET_R_N_BY };
 
-/* S_R cos th_i cos th_o without what the wall hides, for t = tan th_h and the cosine of half of the angle between both
+/* S_R cos th_i cos th_o if the wall hid no facets, for t = tan th_h and the cosine of half of the angle between both
  * directions, and its derivatives when wanted. */
 static inline float microfacet_reflected(const struct microfacet_surface *s, float t, float cos_half,
                                          float d[MICROFACET_R_N_BY])
@@ -55,8 +56,8 @@ static inline float microfacet_reflected(const struct microfacet_surface *s, flo
     return scale * sum * fresnel;
 }
 
-/* What R takes of two directions: tan th_h, the cosine of half of the angle between them, and the cosines of their
- * azimuths off that of h. */
+/* Arguments of R for two directions: tan th_h, the cosine of half of the angle between them, and the cosines of their
+ * azimuths less the azimuth of h. */
 struct microfacet_half {
     float t, cos_half, cos_alpha[2];
 };

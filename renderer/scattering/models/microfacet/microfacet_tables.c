@@ -7,14 +7,14 @@
 #include <string.h>
 
 enum { N_CIRCLE = 2 * MICROFACET_N_PHI, N_NODE = MICROFACET_N_PHI + 1, N_CORNER = 1 + MICROFACET_N_BY };
-/* What is summed over the paths that leave at a place: light of each channel, its derivative by C_T, light without
- * absorption, and that times x^2 and times x and the slopes. The last two become width and shift of the lobe. */
+/* Sums over the paths that leave at a place: light of each channel, its derivative by C_T, light without absorption,
+ * and this light times x^2 and times x and the slopes. The last two become width and shift of the lobe. */
 enum { LIGHT = 0, BY_C_T = 3, CLEAR = 6, SQUARE, LEANING, N_SUM, WIDTH = SQUARE, SHIFT = LEANING };
 
 static const double blur_over_roughness[MICROFACET_N_INNER] = {0.25, 0.5};
 #define LEAST_COSINE 1e-3  /* of th_d: at 0 all light is reflected */
 #define MEAN_OF_PLACE 3e-3 /* of the mean density of a lobe: light of its mean width that every place has in addition */
-#define REST_WIDTH (4 / 3.0) /* square of the rest's width over that of TRT: it meets one facet more */
+#define REST_WIDTH (4 / 3.0) /* squared width of the rest over squared width of TRT: it meets one facet more */
 #define REACH 4.5            /* of the blur, in standard deviations */
 
 /* The fiber of a corner of the simplex about the parameters. */
@@ -204,7 +204,7 @@ static void store_density(struct microfacet_row *to, int lobe, const double ligh
     azimuth_density(light, MICROFACET_N_PHI, to->density[lobe], to->below[lobe]);
 }
 
-/* What is seen of the facets, and the rows that samples need. */
+/* The visible share of the facets, and the rows that samples need. */
 static void store_samples(struct scattering_state *s, const struct work *w, int row, double cosine)
 {
     struct microfacet_row *to = &s->row[row];

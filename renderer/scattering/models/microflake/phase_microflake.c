@@ -5,9 +5,9 @@
  * Normalised with s(wo): dwi = 4 |wo . h| dh over the half sphere around wo makes the integral of f over wi exactly
  * alpha. (Written with s(wi) it would integrate to 1 over wo; s(wo) f is symmetric, so both say the same.) The integral
  * over the azimuth of m is closed: with a = t cos, b = sqrt(1 - t^2) sin of the angle between w and dir, integral of |a
- * + b cos ph| dph = 2 pi |a| when |a| >= b, else 4 (sqrt(b^2 - a^2) + a asin(a / b)). What is left, over t, goes into a
- * table over the sine of that angle, together with its derivative by gamma. Sampling: a flake from D, mirrored to wo's
- * side; density of wi = D(h) / (2 |wo . h|), weight alpha |wo . h| / s(wo).
+ * + b cos ph| dph = 2 pi |a| when |a| >= b, else 4 (sqrt(b^2 - a^2) + a asin(a / b)). The remaining integral, over t,
+ * goes into a table over the sine of this angle, together with its derivative by gamma. Sampling: a flake from D,
+ * mirrored to wo's side; density of wi = D(h) / (2 |wo . h|), weight alpha |wo . h| / s(wo).
  */
 #include "renderer/scattering/lobes/von_mises.h"
 #include "renderer/scattering/models/microflake/microflake_rows.def"

@@ -1,4 +1,4 @@
-/* Made by wave-tables (`make wave-tables`), not by hand; wave_table.h says what it is. */
+/* Made by wave-tables (`make wave-tables`), not by hand; wave_table.h defines it. */
 #include "renderer/scattering/models/wave/wave_table.h"
 
 /* clang-format off */

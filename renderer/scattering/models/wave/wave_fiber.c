@@ -1,8 +1,8 @@
 /* wave_silk.v1, wave_trilobal.v1, wave_cotton.v1: evaluation with scores, and sampling (wave_fiber.h states the model).
  *
  * Sampling of wi: th_i normally distributed about the cone of the mirror, beyond a pole taken as the direction on its
- * other side; a channel by what leaves of it and its weight; an azimuth from N of that channel at th_d = th_o, and 2 %
- * uniform. The density does not know a(th) and takes th_d = th_o, so weights are bounded but not constant.
+ * other side; a channel by its light that leaves and its weight; an azimuth from N of this channel at th_d = th_o, and
+ * 2 % uniform. The density does not know a(th) and takes th_d = th_o, so weights are bounded but not constant.
  */
 #include "renderer/scattering/models/wave/wave_fiber.h"
 #include "renderer/scattering/lobes/azimuth_table.h"

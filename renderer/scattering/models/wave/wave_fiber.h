@@ -11,13 +11,12 @@
  * Approximations: across the fiber the waves are exact; for oblique light the section scatters as for normal
  * incidence, but for the longer way through the dye. One lobe along the fiber serves all light.
  *
- * What differs from the publication: the orientation of the section, the size and the wavelengths of a channel are
- * averaged over; the forward lobe of diffraction is taken away (wave_mean.h), so that fibers are met within their own
- * width and none has to be widened; a table holds 1746 numbers in place of 6.5e8; a(th) takes the place of 1 / cos
- * th.
+ * Differs from the publication: the orientation of the section, the size and the wavelengths of a channel are averaged
+ * over; the forward lobe of diffraction is taken away (wave_mean.h), so that fibers are met within their own width and
+ * none has to be widened; a table holds 1746 numbers in place of 6.5e8; a(th) takes the place of 1 / cos th.
  *
  * N is tabulated for N_ROW + 1 values of cos th_d and read between N_PHI + 1 azimuths by straight lines. Derivatives
- * are exact for what is tabulated.
+ * are exact for the tabulated function.
  */
 #ifndef SELVEDGE_RENDERER_WAVE_FIBER_H
 #define SELVEDGE_RENDERER_WAVE_FIBER_H

@@ -1,11 +1,10 @@
 /* Tables of azimuthal scattering by waves for the sections that wave_silk.v1, wave_trilobal.v1 and wave_cotton.v1
  * have, made by wave-tables, a program of the tree (`make wave-tables`), and checked in as source: 7 kB each.
  *
- * N(ph; C) is the density of the azimuth between incident and exitant light, 0 where it goes back, for a fiber of
- * which a diameter of a circle of the section's area lets through C: the mean over both polarisations, over the
- * orientations of the section (wave_mean.h), and over sizes and wavelengths, which have a normal distribution in the
- * logarithm of size over wavelength of the deviation WAVE_TABLE_SPREAD about that of the channel. It stands as
- * Fourier coefficients
+ * N(ph; C) is the density of the azimuth between incident and exitant light, 0 where it goes back, for a fiber whose
+ * material lets C through over the diameter of a circle of the section's area: the mean over both polarisations, over
+ * the orientations of the section (wave_mean.h), and over sizes and wavelengths, whose ratio has a normally distributed
+ * logarithm of the deviation WAVE_TABLE_SPREAD about the channel's. It stands as Fourier coefficients
  *
  *     wave[c][i][k] = integral of N cos(k ph) dph,   N = (wave[0] + 2 sum over k of wave[k] cos(k ph)) / (2 pi)
  *
@@ -32,7 +31,7 @@ struct wave_table {
 
 extern const struct wave_table wave_silk_table, wave_trilobal_table, wave_cotton_table;
 
-/* What a table is made for. */
+/* A section for which a table is made. */
 struct wave_section {
     const char *name;
     double radius_m; /* of a circle of the same area */

@@ -10,8 +10,8 @@
  *   RADIUS_UM  of a circle of the section's area
  *   INDEX      of refraction
  * Prints for each section the time, the size and three errors, each the root mean square over azimuths of a difference,
- * over that of N, for a blur of 5 degrees: what another half of the sizes makes of it (speckle), what lies between the
- * values of C, and how far the light that a fiber meets is from its width, which the tables do not know.
+ * over the root mean square of N, for a blur of 5 degrees: from N of one half of the sizes (speckle), from the exact N
+ * between the values of C, and of the light that a fiber meets from its width, a difference that the tables neglect.
  */
 #include "base/clock.h"
 #include "base/thread_pool.h"
@@ -27,7 +27,7 @@ enum { CHECK_STEP = 4 }; /* so many sizes apart, values of C are checked */
 enum { OUTLINE_WAVES = 32 };
 enum { N_TASK = N_SIZE * N_COLUMN * WAVE_N_FIELD, MOST_COLUMN = 118 };
 
-#define CHECK_CLEAR 0.5 /* a value of C between those of the table */
+#define CHECK_CLEAR 0.5 /* between the values of C of the table */
 #define REACH 2.2       /* sizes: standard deviations beyond the outer channels */
 #define PER_WAVE 3      /* nodes: errors below 1e-3 of the forward amplitude */
 #define BLUR (5 * M_PI / 180)
@@ -67,7 +67,7 @@ static void solve(void *context, size_t i_task, size_t i_thread)
     (void)i_thread;
     if (i % N_COLUMN == CHECK && i / N_COLUMN % CHECK_STEP != 0) return;
     const double x = exp(log_size(job->section, i / N_COLUMN)), index = job->section->index;
-    /* exp(-4 x Im(index)) is what a diameter lets through */
+    /* a diameter lets through the share exp(-4 x Im(index)) */
     const struct wave_problem p = {&job->outline, x, index - I * log(clear_of(i % N_COLUMN)) / (4 * x),
                                    (enum wave_field)(i_task % WAVE_N_FIELD),
                                    wave_solver_nodes(&job->outline, x, index, PER_WAVE)};
@@ -171,7 +171,7 @@ static void write_table(const struct job *job, const char *folder)
     FILE *f = fopen(path, "w");
     if (f == NULL) stop("cannot write to the folder");
     fprintf(f,
-            "/* Made by wave-tables (`make wave-tables`), not by hand; wave_table.h says what it is. */\n"
+            "/* Made by wave-tables (`make wave-tables`), not by hand; wave_table.h defines it. */\n"
             "#include \"renderer/scattering/models/wave/wave_table.h\"\n\n/* clang-format off */\n"
             "const struct wave_table wave_%s_table = {%g, {\n",
             job->section->name, job->section->index);

@@ -1,4 +1,4 @@
-/* Made by speckle-tables (`make speckle-tables`), not by hand; speckle.h says what it is. */
+/* Made by speckle-tables (`make speckle-tables`), not by hand; speckle.h defines it. */
 #include "renderer/scattering/models/wave/speckle_tables.h"
 
 /* clang-format off */

@@ -4,14 +4,14 @@
  *     around   density of the azimuth of exit psi, from the one that points back along the ray in the medulla, by the
  *              optical radius of the medulla, the anisotropy g, and asin of the offset h' of the ray in radii of the
  *              medulla, which passes the axis on the side of psi < 0 where h' > 0. Integral 1 over a turn.
- *     along    M of the half that leaves on the side of entry (back) and of that which goes through, by the optical
- *              radius, g, and both longitudinal angles. Symmetric; integral of M cos^2 th_o dth_o = 1: a symmetric
- *              scale removes what the compression leaves.
+ *     along    M of the half that leaves on the side of entry (back) and of the half that goes through, by the
+ *              optical radius, g, and both longitudinal angles. Symmetric; integral of M cos^2 th_o dth_o = 1: a
+ *              symmetric scale removes the error of the compression.
  *
  * The tables are sums of MEDULLA_*_RANK products of functions of one variable, made by medulla-tables, a program of the
  * tree that traces random walks (medulla_walk.h, medulla_fit.h): 34 kB, checked in as C source because making them
  * takes a minute on two cores (`make medulla-tables`). Functions go through their nodes as cubics with continuous
- * slopes (Catmull and Rom), so derivatives are exact for what is tabulated.
+ * slopes (Catmull and Rom), so derivatives are exact for the tabulated function.
  */
 #ifndef SELVEDGE_RENDERER_MEDULLA_H
 #define SELVEDGE_RENDERER_MEDULLA_H
@@ -49,14 +49,14 @@ struct medulla_ray {
 };
 
 void medulla_around_init(struct medulla_around *m, double g);
-/* depth in [0, MEDULLA_MOST_DEPTH], beyond which it is that; offset = asin |h'| in [0, pi/2]. */
+/* depth in [0, MEDULLA_MOST_DEPTH], a larger depth counts as the limit; offset = asin |h'| in [0, pi/2]. */
 void medulla_ray_init(const struct medulla_around *m, double depth, double offset, struct medulla_ray *ray);
-/* The density at psi for h' >= 0 (for h' < 0 it is that at -psi), in [0, pi) or any other turn. When d is not NULL, its
- * derivatives as of medulla_ray_by, and that by psi as the last. */
+/* The density at psi for h' >= 0 (for h' < 0: the density at -psi), in [0, pi) or any other turn. When d is not NULL,
+ * its derivatives as of medulla_ray_by, and the derivative by psi as the last. */
 double medulla_ray_density(const struct medulla_ray *ray, double psi, double *d);
 /* Coefficients of cos(k psi) and sin(k psi) of each function of psi, whose integral is 1: integrals of the products. */
 void medulla_waves(int n_wave, float (*cosine)[MEDULLA_ROUND_RANK], float (*sine)[MEDULLA_ROUND_RANK]);
-/* Adds the waves of a ray, of[r * n + k] being those of function r of psi. */
+/* Adds the n waves of a ray; of[r * n + k]: wave k of function r of psi. */
 static inline void medulla_add_waves(const float weight[MEDULLA_ROUND_RANK], const float *of, int n,
                                      float *restrict sum)
 {

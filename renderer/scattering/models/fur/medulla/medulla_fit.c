@@ -39,7 +39,7 @@ static void contract(struct fit *s, int axis)
             }
 }
 
-/* Products of the columns of all factors but that of `axis` (-1: of all). */
+/* Products of the columns of all factors but the factor of `axis` (-1: of all). */
 static void grams(const struct fit *s, int axis, double (*g)[MOST_RANK])
 {
     for (int q = 0; q < s->rank; q++)
@@ -80,7 +80,7 @@ static void improve(struct fit *s, int axis)
     if (axis < 3) normalise(s, axis);
 }
 
-/* |x - model|^2 = |x|^2 - 2 x . model + |model|^2; s->sum is that of the last axis. */
+/* |x - model|^2 = |x|^2 - 2 x . model + |model|^2; s->sum belongs to the last axis. */
 static double relative_error(const struct fit *s)
 {
     double g[MOST_RANK][MOST_RANK], all = 0, cross = 0, model = 0;

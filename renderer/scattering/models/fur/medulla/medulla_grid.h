@@ -1,5 +1,5 @@
 /* The places at which light that is scattered in the medulla of a fiber is tabulated: coordinates of the nodes and the
- * shape of the compressed tables (medulla.h states what they mean).
+ * shape of the compressed tables (medulla.h states their meaning).
  *
  *     round   density of the azimuth of exit, by optical radius, anisotropy, offset of entry and azimuth
  *     slab    longitudinal function of either half, by optical radius, anisotropy, |th_i + th_o| and |th_i - th_o|
@@ -23,7 +23,7 @@ enum {
 };
 #define MEDULLA_MOST_DEPTH 8.0
 #define MEDULLA_MOST_G 0.8
-#define MEDULLA_LEAST_DEPTH 1e-4 /* what the first node stands for: light is scattered once */
+#define MEDULLA_LEAST_DEPTH 1e-4 /* value of the first node: light is scattered once */
 #define MEDULLA_MOST_OFFSET 0.9998
 
 static inline double medulla_depth_of_node(int i)
@@ -39,8 +39,8 @@ static inline double medulla_offset_of_node(int i)
     return fmin(sin(M_PI_2 * i / (MEDULLA_N_OFFSET - 1)), MEDULLA_MOST_OFFSET);
 }
 
-/* What the longitudinal function is multiplied by before it is compressed: walks know little of light that grazes,
- * which carries little energy, cos th_i cos th_o = (cos sum + cos difference) / 2. */
+/* Returns the factor of the longitudinal function before it is compressed. It is small for grazing light, which the
+ * walks estimate poorly and which carries little energy, cos th_i cos th_o = (cos sum + cos difference) / 2. */
 static inline double medulla_slab_weight(double sum, double difference)
 {
     return sqrt(fmax(0.5 * (cos(sum) + cos(difference)), 0) + 0.05);

@@ -1,4 +1,4 @@
-/* Made by medulla-tables (`make medulla-tables`), not by hand; medulla.h says what it is. */
+/* Made by medulla-tables (`make medulla-tables`), not by hand; medulla.h defines it. */
 #include "renderer/scattering/models/fur/medulla/medulla.h"
 
 /* clang-format off */

@@ -4,7 +4,7 @@
  * medulla-tables FOLDER [SEED]
  *   FOLDER  where medulla_round_table.c and medulla_slab_table.c are written
  *   SEED    of the walks (1)
- * Prints the size, the time and, for each table, what the compression leaves, which is noise of the walks for the most
+ * Prints the size, the time and, for each table, the error of the compression, which is noise of the walks for the most
  * part (tests/physics/fur/test_medulla.c separates the two).
  */
 #include "base/clock.h"
@@ -113,7 +113,7 @@ static size_t write_tables(const char *folder, const char *file, const struct ta
     snprintf(path, sizeof path, "%s/%s", folder, file);
     FILE *f = fopen(path, "w");
     if (f == NULL) stop("cannot write to the folder");
-    fprintf(f, "/* Made by medulla-tables (`make medulla-tables`), not by hand; medulla.h says what it is. */\n"
+    fprintf(f, "/* Made by medulla-tables (`make medulla-tables`), not by hand; medulla.h defines it. */\n"
                "#include \"renderer/scattering/models/fur/medulla/medulla.h\"\n\n/* clang-format off */\n");
     for (int k = 0; k < n; k++)
         for (int a = 0; a < MEDULLA_N_AXIS; a++) bytes += write_factor(f, &t[k], a, axis);

@@ -16,7 +16,7 @@ void medulla_trace_round(const struct medulla_medium *m, double offset, int n_wa
 }
 
 struct slab {
-    double walk[2][N][N]; /* what leaves, over its cosine and for all the light that comes, by incidence and exit */
+    double walk[2][N][N]; /* light that leaves, over its cosine, per light that comes, by incidence and exit */
     double weight[N][N];  /* reciprocal variance of walk over the value that it estimates */
     double f[N][N], scale[N];
 };

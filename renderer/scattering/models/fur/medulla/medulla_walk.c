@@ -5,7 +5,7 @@
 /* Distance to a collision that is certain to lie within `way`; u in [0, 1). */
 static double forced_flight(double depth, double way, double u) { return -log1p(u * expm1(-depth * way)) / depth; }
 
-/* Turns d by a random angle: the tangent of its half is that of a uniform angle's half times (1 - g) / (1 + g). */
+/* Turns d by a random angle: tan of its half is (1 - g) / (1 + g) times tan of half of a uniform angle. */
 static void scatter(const struct medulla_medium *m, struct rng *r, double d[2])
 {
     double t = (1 - m->g) / (1 + m->g) * tan(M_PI * ((double)rng_float(r) + 0x1p-25 - 0.5));

@@ -1,19 +1,19 @@
 /* How a fiber of one size scatters light of one wavelength in the mean over all orientations of its section, with the
- * shadow taken away: what a model of a fiber of the section's own width needs.
+ * shadow taken away, as a model of a fiber of the section's own width needs it.
  *
  * A large body extinguishes twice the light that falls on it: half is diffracted into a narrow forward lobe, which is
  * the light that is missing in the shadow (Babinet). Where fibers are met by rays within their width, that half is
- * light that goes on. The lobe's amplitude is that of a dark strip of the width that the section shows,
+ * light that goes on. The lobe has the amplitude of a dark strip of the width that the section shows,
  *
  *     T_s(d) = k / 2 w(d) integral over the width of exp(-i k y sin d) dy,   w = exp(-(d x^(1/3) / 1.8)^2)
  *
- * d from straight on, x = k times half of the width. What is left is |T - T_s|^2. Amplitudes are subtracted and not
- * powers, because the lobe interferes with light that is refracted straight on. The factor w ends the lobe where the
- * penumbra of a round edge does, whose angle goes with x^(-1/3) (Fock); a knife's edge would diffract further. 1.8
+ * d from straight on, x = k times half of the width. The remaining light is |T - T_s|^2. Amplitudes are subtracted and
+ * not powers, because the lobe interferes with light that is refracted straight on. The factor w ends the lobe where
+ * the penumbra of a round edge does, whose angle goes with x^(-1/3) (Fock); a knife's edge would diffract further. 1.8
  * leaves the least power of circles that absorb all that they do not reflect, of x = 27, 55 and 109.
  *
- * What is left and what is absorbed is the light that the fiber meets: 1.03 to 1.08 of its width at these sizes, as
- * waves reach beyond an edge. Shares are of that light, so energy is exact.
+ * The remaining and the absorbed light together are the light that the fiber meets: 1.03 to 1.08 of its width at these
+ * sizes, as waves reach beyond an edge. Shares refer to this light, so energy is exact.
  */
 #ifndef SELVEDGE_RENDERER_WAVE_MEAN_H
 #define SELVEDGE_RENDERER_WAVE_MEAN_H

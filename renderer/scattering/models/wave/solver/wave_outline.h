@@ -1,5 +1,5 @@
 /* Outlines of a fiber's section as closed smooth curves, run through counter-clockwise: x(t) + i y(t) is a Fourier
- * series in t, a turn of which is the outline.
+ * series in t, and one turn of t runs through the outline.
  *
  * Lengths are in any unit; waves are stated by their number per unit. Sections are centered: the series has no
  * constant.

@@ -7,7 +7,7 @@
 
 enum {
     N = 1024,
-    N_ROUGH = 48 /* waves of the height: the products with those of a smooth outline stay in the series */
+    N_ROUGH = 48 /* waves of the height: the products with waves of a smooth outline stay in the series */
 };
 
 /* Amplitudes of the waves of the height, by the length along an outline of so much. */

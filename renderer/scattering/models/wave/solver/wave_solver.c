@@ -57,9 +57,9 @@ static void place_nodes(struct wave_solver *s, const struct wave_outline *o)
     }
 }
 
-/* Integrals of ln(4 sin^2(t / 2)) times the trigonometric polynomials through the nodes, less what the quadrature of
- * equal weights makes of it: a kernel K with the logarithmic part L ln(4 sin^2) has the weight K step + L log_weight.
- * At distance 0: the integral alone. */
+/* Integrals of ln(4 sin^2(t / 2)) times the trigonometric polynomials through the nodes, less their quadrature with
+ * equal weights: a kernel K with the logarithmic part L ln(4 sin^2) has the weight K step + L log_weight. At distance
+ * 0: the integral alone. */
 static void weigh_logarithm(struct wave_solver *s)
 {
     const size_t half = s->n / 2;
@@ -92,7 +92,7 @@ static struct kernels kernels_between(const struct wave_solver *s, double comple
                             dot(to->normal, from->normal) * z1 / r + a * b * (k * k * z0 - 2 * z1 / r)};
 }
 
-/* The limits at a node. Those of D and D' are of Laplace's equation and the same in both media; of T all but the
+/* The limits at a node. D and D' have the limits of Laplace's equation, the same in both media; T is without its
  * strongest singularity, which cancels between the media. */
 static struct kernels kernels_at(const struct wave_solver *s, double complex k, size_t i)
 {
@@ -109,7 +109,7 @@ static void set(struct wave_solver *s, size_t i, size_t j, double complex value)
     s->matrix[j * 2 * s->n + i] = value;
 }
 
-/* What source j adds to the two equations at node i. */
+/* Sets the contribution of source j to the two equations at node i. */
 static void set_pair(struct wave_solver *s, size_t i, size_t j, const struct kernels kernel[N_MEDIUM])
 {
     const struct kernels *e = &kernel[OUTSIDE], *in = &kernel[INSIDE];
@@ -264,7 +264,7 @@ static double complex at(const struct wave_solver *s, size_t row, size_t i_wave)
     return complex_of(s->re[i], s->im[i]);
 }
 
-/* What node i contributes to T towards d: factors of u and of v / k. */
+/* Contribution of node i to T towards d: factors of u and of v / k. */
 static void far_factors(const struct wave_solver *s, double complex d, size_t i, double complex factor[2])
 {
     const struct node *p = &s->node[i];

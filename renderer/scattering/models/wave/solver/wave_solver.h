@@ -30,7 +30,7 @@ enum wave_field { WAVE_ALONG, WAVE_ACROSS, WAVE_N_FIELD }; /* TM, TE */
 struct wave_problem {
     const struct wave_outline *outline;
     double k;             /* radians per unit of length outside */
-    double complex index; /* of the fiber over that of the medium; the imaginary part absorbs and is at least 0 */
+    double complex index; /* of the fiber over index of the medium; the imaginary part absorbs and is at least 0 */
     enum wave_field field;
     size_t n_node; /* even */
 };

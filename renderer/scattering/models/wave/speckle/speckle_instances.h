@@ -1,13 +1,13 @@
-/* Fibers with rough surfaces of their own, whose light the boundary-element solver computes: what speckle tables
- * are fitted to.
+/* Fibers with rough surfaces of their own, whose light the boundary-element solver computes. Speckle tables are fitted
+ * to them.
  *
  * An instance has the outline of a section of wave_table.h, its size with a deviation of 10 %, a rough surface,
- * and one orientation. Its light is that of a channel: the mean over both polarisations and over wavelengths of
- * +-4 %. Divided by the mean over all instances, it is f. Its correlation at two pairs of directions across the
- * fiber is looked at by their distance, the change of wi + wo times radius over wavelength, in the mean over
- * directions, each of which has the weight of the light that goes there. There are pairs between which the camera
- * moves, and beyond 45 degrees from straight on pairs between which the fiber turns. Nearer to straight on, a turn
- * changes wi + wo by little, and the light by more than that.
+ * and one orientation. Its light is the light in a channel: the mean over both polarisations and over wavelengths of
+ * +-4 %. Divided by the mean over all instances, it is f. Its correlation at two pairs of directions across the fiber
+ * is looked at by their distance, the change of wi + wo times radius over wavelength, in the mean over directions,
+ * weighted by the light that goes there. There are pairs between which the camera moves, and beyond 45 degrees from
+ * straight on pairs between which the fiber turns. Nearer to straight on, a turn changes wi + wo by little, and the
+ * light by more.
  */
 #ifndef SELVEDGE_RENDERER_SPECKLE_INSTANCES_H
 #define SELVEDGE_RENDERER_SPECKLE_INSTANCES_H

@@ -6,11 +6,11 @@
  *   SECTION  one of the names of wave_sections.c; all without it
  * Prints for each section the weights, contrast and correlation of the simulated light, and the time.
  *
- * The correlation of the intensity of fully developed speckle is the square of that of its field (Goodman 2007).
- * So v_b >= 0 minimise the squares of sqrt(C) - sum of v_b C_b (non-negative least squares), C_b the correlation
- * of the field of a band, and weight_b = sqrt(v_b / sum of v). The pattern grows about wi + wo = 0 with a power of
- * the wavelength that makes the correlations between channels those of the simulated light; it would be 1 for
- * waves of a thin rough layer.
+ * The correlation of the intensity of fully developed speckle is the square of the correlation of its field (Goodman
+ * 2007). So v_b >= 0 minimise the squares of sqrt(C) - sum of v_b C_b (non-negative least squares), C_b the correlation
+ * of the field of a band, and weight_b = sqrt(v_b / sum of v). The pattern grows about wi + wo = 0 with a power of the
+ * wavelength with which the correlations between channels equal the correlations of the simulated light; it would be 1
+ * for waves of a thin rough layer.
  */
 #include "base/clock.h"
 #include "renderer/scattering/models/wave/speckle/speckle_instances.h"
@@ -98,7 +98,7 @@ static void write_table(const struct wave_section *s, const float weight[SPECKLE
     FILE *f = fopen(path, "w");
     if (f == NULL) stop("cannot write to the folder");
     fprintf(f,
-            "/* Made by speckle-tables (`make speckle-tables`), not by hand; speckle.h says what it is. */\n"
+            "/* Made by speckle-tables (`make speckle-tables`), not by hand; speckle.h defines it. */\n"
             "#include \"renderer/scattering/models/wave/speckle_tables.h\"\n\n/* clang-format off */\n"
             "const struct speckle_table wave_%s_speckle = {\n{",
             s->name);
