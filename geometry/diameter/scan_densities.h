@@ -1,6 +1,6 @@
 /* From the values of a scanner to densities in [0, 1].
  *
- * Clamping a noisy voxel loses a part of what it says about its neighbourhood, and steps of the tracing that look at
+ * Clamping a noisy voxel loses a part of its information on its neighbourhood, and steps of the tracing that look at
  * few voxels (thresholds, centroids of disks, ways between ends) then fail. So a scan whose noise is strong is smoothed
  * before it is clamped. The fit of axes (axis_fit.h) finds the blur of the scan as it then is. */
 #ifndef SELVEDGE_GEOMETRY_SCAN_DENSITIES_H

@@ -11,10 +11,10 @@ struct fiber_shape {
     float ratio, ratio_se;   /* long over short axis of the section, at least 1 */
     float long_axis[3];      /* unit vector across the fiber; zero where the section was not measured */
     float angle_se_rad;      /* of the turn of the long axis about the fiber */
-    float lumen, lumen_se;   /* width of the lumen over that of the outline; with an error of 0: not measured */
+    float lumen, lumen_se;   /* width of the lumen over the outline's; with an error of 0: not measured */
 };
 
-/* Largest ratio of axes that files may state; that of the fit is 4. */
+/* Largest ratio of axes that files may state; the fit goes up to 4. */
 #define FIBER_RATIO_MOST 20.0f
 /* Mean ratio of axes of a cloth from which on its fibers are flat. Round ones come out as up to some 1.1. */
 #define FIBER_RATIO_FLAT 1.15
@@ -27,7 +27,7 @@ static inline struct fiber_shape fiber_shape_disc(float radius)
 /* Numbers of a section in files, beside the radius: radius_se in millimetres, ratio, ratio_se, angle_se_rad, long_axis,
  * and where lumens were measured, lumen and lumen_se. */
 enum { FIBER_SHAPE_NUMBERS = 7, FIBER_SHAPE_WITH_LUMEN = 9 };
-/* Widest lumen that files may state; that of the fit is 0.9. */
+/* Widest lumen that files may state; the fit goes up to 0.9. */
 #define FIBER_LUMEN_MOST 0.99f
 void fiber_shape_numbers(const struct fiber_shape *s, float value[FIBER_SHAPE_WITH_LUMEN]);
 /* Sets everything but the radius from n of these numbers. long_axis is made a unit vector. Returns false for numbers

@@ -21,7 +21,7 @@ struct gather {
     size_t *first; /* task of each rank */
 };
 
-/* Voxels of a task, of which one follows the other: place in the volume, and their number. */
+/* Consecutive voxels of a task: place of the first in the volume, and their number. */
 struct gather_span {
     size_t slice, row, n_voxel;
 };

@@ -1,9 +1,9 @@
 /* Directions of voxels where a scan does not resolve single fibers.
  *
  * There the line that is nearest to a voxel is one that the scan does not show, and may cross the yarn. The scan does
- * show how the yarn runs, so each voxel takes the mean direction of those around it: the main axis of the mean of d d^T
- * (d: unit direction), because a direction and its opposite are the same. The mean is weighted by a box that is applied
- * twice along each axis, whose standard deviation is UNRESOLVED_SD_DIAMETERS. */
+ * show how the yarn runs, so each voxel takes the mean direction of the voxels around it: the main axis of the mean
+ * tensor d d^T (d: unit direction), because a direction and its opposite are the same. The mean is weighted by a box
+ * that is applied twice along each axis, whose standard deviation is UNRESOLVED_SD_DIAMETERS. */
 #ifndef SELVEDGE_GEOMETRY_UNRESOLVED_DIRECTIONS_H
 #define SELVEDGE_GEOMETRY_UNRESOLVED_DIRECTIONS_H
 

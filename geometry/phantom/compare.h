@@ -39,9 +39,9 @@ struct compare_report {
     double longest_run;
     double missed;              /* share of true fibers without a fragment */
     double fragments_per_fiber; /* fragments / true fibers that have one */
-    double fragments_se;        /* standard error of that, from the scatter between these; NaN for a single one */
+    double fragments_se;        /* its standard error, from the scatter between these; NaN for a single one */
     double gaps_per_fiber;      /* runs of unmatched samples between matched ones / true fibers */
-    double merges_per_fiber; /* sum over found fibers of (true fibers of which it has a fragment - 1) / true fibers */
+    double merges_per_fiber;    /* sum over found fibers of (true fibers in it - 1) / true fibers */
     double direction_mean_deg, direction_p95_deg; /* of matched found samples from the direction of the true polyline */
     /* Frobenius norm of the difference of the mean orientation tensors (mean of d d^T over all samples). */
     double orientation_frobenius;

@@ -14,7 +14,7 @@ struct phantom_slab {
     size_t first, n_slice;
     float *drawn;    /* sums of the shares of all fibers, at most 1 */
     uint32_t *owner; /* number + 1 of the fiber that last touched a voxel */
-    float *share;    /* share of that fiber */
+    float *share;    /* share of the owner in the voxel */
     float *apart;    /* distance of its axis, in voxels; NULL if all sections are full discs */
 };
 

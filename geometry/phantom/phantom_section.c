@@ -53,7 +53,7 @@ void phantom_section_frame(const double t[3], uint8_t axis_class, double across[
     for (int a = 0; a < 3; a++) o[a] = t[(a + 1) % 3] * e[(a + 2) % 3] - t[(a + 2) % 3] * e[(a + 1) % 3];
 }
 
-/* Phase of the taper: that of the radius, which pieces of a fiber at the faces share. */
+/* Phase of the taper: taken from the radius, which pieces of a fiber at the faces share. */
 static double taper_phase(const struct phantom_section_law *law, float radius_m)
 {
     const struct rng_key key = {.seed = law->seed, .iteration = STREAM_SECTION};

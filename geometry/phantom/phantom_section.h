@@ -16,7 +16,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* What the sections of all fibers have in common. All zero: full discs. */
+/* Numbers that the sections of all fibers share. All zero: full discs. */
 struct phantom_section_law {
     uint64_t seed;
     double lumen;  /* width of the lumen over the width of the fiber, 0 .. 0.8 */
@@ -54,8 +54,8 @@ struct phantom_section phantom_section_of(const struct phantom_section_law *law,
 double phantom_section_spacing(const struct phantom_section_law *law);
 
 /* Share of a voxel of width 1 that is inside the section of a fiber of radius r. The voxel is at (u, v), along the long
- * and the short axis; all lengths are in voxels. Distances from the outline are of the first order, the ramp is that of
- * phantom_raster.c. */
+ * and the short axis; all lengths are in voxels. Distances from the outline are of the first order, the ramp is the
+ * same as in phantom_raster.c. */
 double phantom_section_share(const struct phantom_section *c, double r, double u, double v);
 /* Distance from the axis beyond which the share is 0, in voxels. */
 double phantom_section_reach(const struct phantom_section *c, double r);

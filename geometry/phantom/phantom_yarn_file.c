@@ -1,5 +1,5 @@
-/* Reads parameter files of real yarns: "key: value" lines, lengths in centimetres. The layout is that of the
- * generator published with Zhao et al. 2016. Keys that only control that generator (its box and step sizes) are
+/* Reads parameter files of real yarns: "key: value" lines, lengths in centimetres. The layout is the one read by the
+ * generator published with Zhao et al. 2016. Keys that only control the generator (its box and step sizes) are
  * skipped. */
 #include "geometry/phantom/phantom.h"
 

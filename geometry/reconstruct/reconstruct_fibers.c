@@ -47,7 +47,7 @@ static status find_radius(struct trace_job *job, struct polyline_set *lines, str
     status s = distance_histogram_measure(job->v, lines, job->o->eps_d, fmax(4.0, 1.25 * job->diameter), job->pool,
                                           &job->inner, part, err);
     if (s == STATUS_OK) s = radius_choose(part, job->o->radius_rule, &m, err);
-    /* the mass is that of filled lumens, whose walls are thin and not as dense as 1 */
+    /* the mass belongs to filled lumens, whose walls are thin and not as dense as 1 */
     const bool of_lines = report->lumens_measured && job->o->radius_rule == RADIUS_AUTO;
     if (s == STATUS_OK && of_lines) radius_measure_lines(lines, job->shared_radius_se, &m);
     if (s == STATUS_OK) {
@@ -64,8 +64,8 @@ static status find_radius(struct trace_job *job, struct polyline_set *lines, str
     }
     for (int a = 0; a < 3; a++) m.radius_voxel[a] = job->o->radius_m[a] / voxel_m;
     if (s == STATUS_OK) polylines_set_radii(lines, &m, !is_given && job->o->radius_rule == RADIUS_AUTO);
-    /* edges and mass disagree by the errors of both models, which every fiber shares; of hollow fibers there are only
-     * the radii by the edges, with what noise makes of all of them */
+    /* edges and mass disagree by the errors of both models, which every fiber shares; hollow fibers have only the radii
+     * by the edges, with the shared error from noise */
     const double shared_m = of_lines && !is_given ? job->shared_radius_se * voxel_m
                                                   : mean_radius(lines) * voxel_m - report->profile_radius_m;
     report->single_radius_se_m = hypot(report->single_radius_se_m, shared_m);

@@ -31,7 +31,7 @@ static status fill_enclosed(struct volume *v, double diameter_voxel, struct thre
 /* Share of the time of a tracing that its directions take. */
 static const double orientation_share = 0.4;
 
-/* What is traced, and how. */
+/* The volume that is traced, and the options. */
 struct refill {
     struct volume *v;
     const struct reconstruct_option *o;

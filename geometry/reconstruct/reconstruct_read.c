@@ -17,7 +17,7 @@
 /* Fraction of the step once the files are read, and once the densities are mapped; lumens are looked for after that. */
 static const double READ_SHARE = 0.6, MAPPED_SHARE = 0.7;
 
-/* What must be done to the grid of the file. "stored": after the permutation of axes, before matrix and cubic
+/* Changes to make to the grid of the file. "stored": after the permutation of axes, before matrix and cubic
  * resampling. */
 struct plan {
     struct axis_map map;
@@ -27,7 +27,7 @@ struct plan {
     bool resample;
     size_t box[6];        /* in the result */
     size_t box_stored[6]; /* part of the stored grid that is kept in memory */
-    bool trimmed;         /* the box was cropped in z to what holds material */
+    bool trimmed;         /* the box was cropped in z to slices with material */
 };
 
 static bool is_identity(const double m[9])
@@ -96,7 +96,7 @@ static status plan_read(const struct volume_source_info *info, struct reconstruc
     return plan_crop(o, p, err);
 }
 
-/* Crops a large scan in z to what holds material. */
+/* Crops a large scan in z to the slices that hold material. */
 static status trim_void(struct volume_source *source, const struct reconstruct_option *o, struct plan *p,
                         const struct progress *progress, struct error *err)
 {

@@ -9,7 +9,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* What the directions of the fibers have changed. */
+/* States in the report the changes that the directions of the fibers have made. */
 static void state_change(const struct line_directions *all, struct reconstruct_report *report)
 {
     report->dice =

@@ -28,8 +28,8 @@ static void choose_box(const size_t n[3], size_t from[3], size_t n_box[3])
     }
 }
 
-/* What of the measured sections the phantom has. A share x of filled voxels over those of material makes lumens of the
- * area x / (1 + x). */
+/* Returns the parts of the measured sections that the phantom has. A ratio x of filled voxels to material voxels makes
+ * lumens of the area x / (1 + x). */
 static struct trial_sections sections_of(const struct reconstruct_report *report)
 {
     const double filled = report->lumen_share;
@@ -134,7 +134,7 @@ static status reconstruct(struct volume *v, const struct fiber_set *truth, struc
 
 /* Draws the phantom of a trial. Thin walls of hollow fibers are not as dense in a blurred scan as their material, and
  * the mapping of densities makes up for that in scan and phantom alike. So where the phantom has lumens, it is drawn
- * again with the noise that becomes that of the scan when it is mapped. */
+ * again with the noise that becomes the scan's noise when it is mapped. */
 static status draw(const struct volume *v, const struct fiber_set *truth, struct thread_pool *pool,
                    const struct progress *progress, struct scan_trial *t, struct volume *phantom, struct error *err)
 {

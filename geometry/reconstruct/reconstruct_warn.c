@@ -39,7 +39,7 @@ static void warn_alignment(const struct warning_sink *warn, const struct reconst
     if (r->aligned && r->align.se_deg > 1.0)
         warning_send(warn, OPTION_ALIGN, "the standard error of the directions of warp and weft is %.1f degrees",
                      r->align.se_deg);
-    const size_t *valid = r->tile.valid, *box = o->crop_voxel; /* valid is of what the box has left */
+    const size_t *valid = r->tile.valid, *box = o->crop_voxel; /* valid counts in the cropped box */
     double share = (double)(valid[2] - valid[0]) * (double)(valid[3] - valid[1]) / ((double)r->n[0] * (double)r->n[1]);
     if (!o->crop && valid[2] > 0 && share < 0.98)
         warning_send(
@@ -120,7 +120,7 @@ static void warn_diameter(const struct warning_sink *warn, const struct reconstr
                      chosen, 100.0 * r->diameter_noise_share);
 }
 
-/* Says that lumens may have been missed, and walls traced. Those of unseen lumens were 3.6 to 4.7 voxels wide; a clear
+/* Says that lumens may have been missed, and walls traced. Walls of unseen lumens were 3.6 to 4.7 voxels wide; a clear
  * scan of fibers that are wider has no walls to trace, even if it is too coarse to show lumens. */
 static void warn_unseen_lumens(const struct warning_sink *warn, const struct reconstruct_report *r)
 {

@@ -6,7 +6,8 @@
 #include <stdlib.h>
 
 enum { MOST_SAMPLES = 1 << 22 };
-/* Standard deviations by which the count of a layer exceeds that of the emptiest ones, and counts that are noise. */
+/* Standard deviations by which the count of a layer exceeds the count of the emptiest ones, and counts that are
+ * noise. */
 static const double BEYOND_NOISE = 6.0, LEAST_COUNT = 3.0;
 
 struct sampling {

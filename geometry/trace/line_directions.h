@@ -7,7 +7,7 @@
 #include "geometry/fibers/lines/segment_bricks.h"
 #include "geometry/volume/volume.h"
 
-/* What was changed, and how lines and kept voxels overlap. */
+/* The changes, and the overlap of lines and kept voxels. */
 struct line_directions {
     double angle_deg; /* sum over the changed voxels: between the direction before and after */
     size_t n_changed; /* voxels that have taken a direction */
@@ -15,7 +15,7 @@ struct line_directions {
     size_t n_both, n_kept;
 };
 
-/* Edge of the bricks, and the distance that they must reach: that of voxels that take the direction of a line. */
+/* Edge of the bricks, and the distance that they must reach, up to which voxels take the direction of a line. */
 enum { LINE_DIRECTIONS_BRICK = 32 };
 static inline float line_directions_reach(float radius_voxel) { return 2.0f * radius_voxel; }
 /* Gives kept voxels (density > 0) within a diameter of a segment the direction of the nearest one. sum may be NULL. The

@@ -3,8 +3,8 @@
 
 #include <math.h>
 
-/* Radius of the part that is marked over that of the fiber: lumens have 0.3 to 0.6. More fills gaps beside lines that
- * are off, and 0.75 loses recall (geometry/NOTES.md, "Fibers that were traced are filled"). */
+/* Radius of the marked part over the fiber's: lumens have 0.3 to 0.6. More fills gaps beside lines that are off, and
+ * 0.75 loses recall (geometry/NOTES.md, "Fibers that were traced are filled"). */
 static const float CORE = 0.6f;
 static const double LEAST_DIAMETERS = 1.5; /* length of a line that is a fiber */
 

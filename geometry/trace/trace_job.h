@@ -22,7 +22,7 @@ enum {
 #define TRACE_LUMENS_END 0.85   /* where lumens are measured */
 #define TRACE_END_DIAMETERS 1.0 /* length at an end, in diameters, that may be wrong */
 /* Spread of the radii of single fibers, over their mean: below the first, fibers are alike and all found at first (0.04
- * and less); above the second, lines are those of a scan that does not resolve its fibers: yarns have 0.1 to 0.25,
+ * and less); above the second, lines come from a scan that does not resolve its fibers: yarns have 0.1 to 0.25,
  * weave-ct 0.39. */
 #define TRACE_LEAST_SPREAD 0.1
 #define TRACE_MOST_SPREAD 0.3
@@ -45,14 +45,14 @@ struct trace_job {
     double shared_radius_se;     /* voxels, with lumens that were measured: of all radii together (shape_measure.h) */
 };
 
-/* Sets what follows from the other members at the start: whether fibers are hollow, the diameter of
- * the report, and a profile. */
+/* Sets the members that follow from others at the start: whether fibers are hollow, the diameter of the report, and a
+ * profile. */
 void trace_job_start(struct trace_job *job);
 /* States which part of the progress of the step "fibers" comes next. */
 void trace_enter_part(struct trace_job *job, double from, double to);
 /* A profile to start a fit from. */
 struct axis_profile trace_start_profile(const struct trace_job *job);
-/* Writes what a fit found for all fibers into the report. */
+/* Writes the results of a fit for all fibers into the report. */
 void trace_state_profile(const struct trace_job *job, const struct axis_profile *profile);
 /* Sets the class of each line: the axis along which it extends most. */
 void trace_classify(struct polyline_set *lines);
@@ -67,10 +67,11 @@ status trace_repair(struct trace_job *job, struct polyline_set *in, bool grow, d
 status trace_join(struct trace_job *job, struct polyline_set *lines, bool grow, struct error *err);
 /* Moves lines that are still in pieces towards their axes, and finds their radii, by n_fit fits. */
 status trace_center(struct trace_job *job, struct polyline_set *lines, int n_fit, struct error *err);
-/* Adds lines to fibers that have none, in what `lines` leave of the scan (trace_leftover.c), where radii differ. The
- * report has their spread. */
+/* Adds lines to fibers that have none, in the scan without `lines` (trace_leftover.c), where radii differ. The report
+ * has their spread. */
 status trace_leftover(struct trace_job *job, struct polyline_set *lines, struct error *err);
-/* Finds lines and repairs them, until only the last fit is left, which trace_finish makes: it drops what deviates. */
+/* Finds lines and repairs them, until only the last fit is left, which trace_finish makes: it drops parts that
+ * deviate. */
 status trace_lines(struct trace_job *job, struct polyline_set *lines, struct error *err);
 status trace_finish(struct trace_job *job, struct polyline_set *lines, struct error *err);
 /* In place of trace_finish where lines need not be exact: one round of its repairs. */

@@ -1,10 +1,10 @@
 /* A second look at the material that no line explains.
  *
- * Thin fibers between thicker ones are missed at first: filters have the scale of the typical fiber, so the directions
- * inside of thin fibers are those of their neighbours. Once whole lines are fitted, their fibers are subtracted from
- * the scan (matching pursuit, Mallat and Zhang 1993), and what is left is filtered and traced like a scan of thinner
- * fibers. Flat fibers are subtracted with their sections, because what a disc leaves of them looks like thin fibers at
- * their sides. The lines found there join the others before ends grow and touching lines are compared. */
+ * Thin fibers between thicker ones are missed at first: filters have the scale of the typical fiber, so thin fibers get
+ * the directions of their neighbours. Once whole lines are fitted, their fibers are subtracted from the scan (matching
+ * pursuit, Mallat and Zhang 1993), and the rest is filtered and traced like a scan of thinner fibers. Flat fibers are
+ * subtracted with their sections, because the part outside of a disc looks like thin fibers at their sides. The lines
+ * found there join the others before ends grow and touching lines are compared. */
 #include "geometry/trace/trace_job.h"
 
 #include "geometry/fibers/axes/model/fiber_section.h"
@@ -46,7 +46,7 @@ static float depth_in(const struct piece *p, const float d[3])
     return fiber_section_place(p->section, p->radius, across).depth;
 }
 
-/* Lowers the density around a vertex to what a piece of a fiber leaves. width: of its blurred edge. */
+/* Lowers the density around a vertex by a piece of a fiber. width: of its blurred edge. */
 static void subtract_piece(const struct volume *v, const struct piece *p, float width, struct volume *left)
 {
     size_t from[3], to[3];
@@ -95,7 +95,7 @@ static size_t count_material(const struct volume *v, double eps_d)
     return n;
 }
 
-/* Makes the volume of what the lines leave. *share: material in it over that of the scan. */
+/* Makes the volume of the scan without the lines. *share: its material over the material of the scan. */
 static status subtract_lines(const struct trace_job *job, const struct polyline_set *lines, struct volume *left,
                              double *share, struct error *err)
 {
@@ -149,7 +149,7 @@ static status add_lines(const struct trace_job *job, const struct volume *left, 
     status s = filter_directions(left, look.diameter, &option, job->pool, &look.inner, &d, &report, err);
     const bool nothing = s == STATUS_INVALID; /* no voxel looks like a part of a fiber */
     if (nothing) s = STATUS_OK;
-    if (s == STATUS_OK && job->v->slabs != NULL) /* other ranks have one slab at a time: that of `left` until here */
+    if (s == STATUS_OK && job->v->slabs != NULL) /* other ranks have one slab at a time: a slab of `left` until here */
         s = volume_slabs_send(job->v->slabs, job->v, err);
     if (s == STATUS_OK && !nothing) s = trace_chains(&look, &part[0], err);
     if (s == STATUS_OK && !nothing) s = trace_repair(&look, &part[0], false, 0.0, &part[1], &counts, err);

@@ -68,7 +68,7 @@ static status fit_axes(struct trace_job *job, struct polyline_set *lines, bool l
     struct polyline_set even, inside;
     polyline_set_init(&even);
     polyline_set_init(&inside);
-    /* what is missing up to a face follows the density, and not only the tangent of the end */
+    /* the piece that is missing up to a face follows the density, and not only the tangent of the end */
     if (last) polylines_reach_faces(lines, job->v, job->o->eps_d, TRACE_END_DIAMETERS * job->diameter);
     status s = polylines_resample(lines, &even, err);
     struct shape_measure measure;
@@ -92,7 +92,7 @@ static status fit_axes(struct trace_job *job, struct polyline_set *lines, bool l
 }
 
 /* Cuts lines at kinks, where they change to another fiber; in the last pass also removes ends that lie in other
- * fibers. Those of fibers so thin that voxels are interpolated must lie deeper in them: the directions that they are
+ * fibers. Ends of fibers so thin that voxels are interpolated must lie deeper in others: the directions that they are
  * compared with are off by 19 degrees in the mean there, and the lines by 7. */
 static status straighten(struct trace_job *job, struct polyline_set *lines, bool last, size_t min_vertex,
                          struct error *err)
@@ -161,8 +161,9 @@ status trace_lines(struct trace_job *job, struct polyline_set *lines, struct err
 }
 
 /* Where fibers are so thin that voxels are interpolated, and where they are hollow and traced in the scan's own voxels,
- * looks once more at what no line explains: cuts have freed fibers that others had grown into, and lines on them keep
- * the others from growing back. Flat fibers are left alone, because their sections are not known any more. */
+ * looks once more at the material that no line explains: cuts have freed fibers that others had grown into, and lines
+ * on them keep the others from growing back. Flat fibers are left alone, because their sections are not known any
+ * more. */
 static status look_again(struct trace_job *job, struct polyline_set *lines, struct error *err)
 {
     const size_t n_before = lines->n_line;
@@ -196,8 +197,8 @@ static status settle_once(struct trace_job *job, struct polyline_set *lines, int
     return s;
 }
 
-/* Whether another round may join what is in pieces. Lines of a scan that does not resolve its fibers are left alone,
- * and so are flat fibers: fitted as discs, they would get second lines at their sides. */
+/* Returns whether another round may join fibers that are in pieces. Lines of a scan that does not resolve its fibers
+ * are left alone, and so are flat fibers: fitted as discs, they would get second lines at their sides. */
 static bool has_lost_ends(const struct trace_job *job, const struct polyline_set *lines)
 {
     const double n_lost = (double)polylines_count_lost_ends(lines, job->v, job->o->eps_d, 0.5 * job->diameter);

@@ -21,8 +21,8 @@ static status end_lines(struct trace_job *job, bool finish, struct polyline_set 
     return finish ? trace_finish(job, lines, err) : trace_settle(job, lines, err);
 }
 
-/* Finds lines in voxels of `edge` times those of the scan. The last fit is to the finer of both grids. The lines are in
- * voxels of the scan. */
+/* Finds lines in voxels whose edge is `edge` voxels of the scan. The last fit is to the finer of both grids. The lines
+ * are in voxels of the scan. */
 static status trace_rescaled(const struct trace_job *job, double edge, bool finish, struct polyline_set *lines,
                              struct error *err)
 {

@@ -13,8 +13,7 @@
 
 enum { N_CENTER = 2 }; /* rounds of fitting pieces of lines to the scan */
 
-/* The shares of the parts are means of those of the time that they take on a phantom, on a scan of cotton and on one of
- * a weave. */
+/* The share of a part is its mean share of the time on a phantom, on a scan of cotton and on one of a weave. */
 void trace_enter_part(struct trace_job *job, double from, double to)
 {
     job->part.from = from;

@@ -1,4 +1,4 @@
-/* What the functions of OpenCV (C++) behind the headers of this folder need before their first use. */
+/* Set-up that the functions of OpenCV (C++) behind the headers of this folder need before their first use. */
 #ifndef SELVEDGE_GEOMETRY_VISION_H
 #define SELVEDGE_GEOMETRY_VISION_H
 

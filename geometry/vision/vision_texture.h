@@ -1,6 +1,6 @@
-/* The C interface to what OpenCV computes of a picture's texture: even illumination and the power spectrum. Pictures
- * are single-channel floats, row-major, without padding. All exceptions are caught inside. OpenCV's own threads are
- * off after vision_init (vision.h); afterwards the functions may be called from several threads at once. */
+/* The C interface to OpenCV for a picture's texture: even illumination and the power spectrum. Pictures are
+ * single-channel floats, row-major, without padding. All exceptions are caught inside. OpenCV's own threads are off
+ * after vision_init (vision.h); afterwards the functions may be called from several threads at once. */
 #ifndef SELVEDGE_GEOMETRY_VISION_TEXTURE_H
 #define SELVEDGE_GEOMETRY_VISION_TEXTURE_H
 

@@ -9,7 +9,7 @@ uint8_t slice_direction_code(const float d[3])
                             steps * d[2] * d[2] / length2};
     long part[3], sum = 0;
     for (int a = 0; a < 3; a++) sum += part[a] = lrintf(exact[a]);
-    while (sum != SLICE_DIRECTION_STEPS) { /* the part that was rounded the farthest takes what is left over */
+    while (sum != SLICE_DIRECTION_STEPS) { /* the part that was rounded the farthest takes the remainder */
         long by = sum < SLICE_DIRECTION_STEPS ? 1 : -1;
         int worst = 0;
         for (int a = 1; a < 3; a++)

@@ -68,8 +68,8 @@ static bool taps_at(double x, size_t n, struct taps *t)
     return true;
 }
 
-/* What stands for a sum that is not finite: a voxel that is not a number or infinite in the file, which is refused
- * later, else the outside of the scan. */
+/* Returns the value that stands for a sum that is not finite: a voxel that is not a number or infinite in the file,
+ * which is refused later, else the outside of the scan. */
 static float not_finite(const struct volume *v, const struct taps t[3])
 {
     for (size_t c = 0; c < t[2].n; c++)

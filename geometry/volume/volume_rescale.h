@@ -5,17 +5,17 @@
 #include "base/thread_pool.h"
 #include "geometry/volume/volume.h"
 
-/* Makes `out` of voxels with `edge` times the edge of those of v; both have the same corner. edge > 1: each density is
- * the mean over the voxel, exactly, and the last voxel along an axis may be a part of one. edge < 1: interpolated by
- * six points along each axis (volume_align.h). Uses the scratch space of v. STATUS_CANCELLED, and as
+/* Makes `out` of voxels whose edge is `edge` times the edge of v's voxels; both have the same corner. edge > 1: each
+ * density is the mean over the voxel, exactly, and the last voxel along an axis may be a part of one. edge < 1:
+ * interpolated by six points along each axis (volume_align.h). Uses the scratch space of v. STATUS_CANCELLED, and as
  * volume_init_in. */
 status volume_rescale(const struct volume *v, double edge, struct thread_pool *pool, const struct progress *progress,
                       struct volume *out, struct error *err);
 
 /* Makes `out` with the grid of v, whose voxels take the direction of the voxel of `from` that holds their centre (if
- * that is empty, of one whose centre they hold), and their density from v. A voxel is empty below eps_d, and where
- * those of `from` are. *n_material: voxels of eps_d and
- * more; *n_kept: those that are not empty. STATUS_CANCELLED, and as volume_init_in. */
+ * that is empty, of one whose centre they hold), and their density from v. A voxel is empty below eps_d, and where the
+ * voxels of `from` are. *n_material: voxels of eps_d and more; *n_kept: voxels that are not empty. STATUS_CANCELLED,
+ * and as volume_init_in. */
 status direction_volume_rescale(const struct direction_volume *from, const struct volume *v, double eps_d,
                                 struct thread_pool *pool, struct direction_volume *out, size_t *n_material,
                                 size_t *n_kept, struct error *err);

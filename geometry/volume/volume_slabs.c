@@ -27,7 +27,7 @@ struct slab_rows volume_slabs_touched(const struct volume_slabs *s, size_t rank)
     return with_halo(s, begin / in_row * SLAB_EDGE, at_most((end + in_row - 1) / in_row * SLAB_EDGE, s->n[1]));
 }
 
-/* The row at which a column of those that are dealt out begins, as a part of its band of rows. */
+/* Returns the row at which a column begins, as a part of its band of rows. */
 static size_t row_of(const struct volume_slabs *s, size_t column)
 {
     return at_most(column * SLAB_EDGE / columns_in_row(s), s->n[1]);
@@ -38,7 +38,7 @@ struct slab_rows volume_slabs_own(const struct volume_slabs *s, size_t rank)
     return with_halo(s, row_of(s, s->first[rank]), row_of(s, s->first[rank + 1]));
 }
 
-/* Adds what a row of voxels weighs to its columns. */
+/* Adds the weights of a row of voxels to its columns. */
 static void weigh_row(const float *density, size_t n, double *weight)
 {
     for (size_t i = 0; i < n; i += SLAB_EDGE) {

@@ -16,7 +16,7 @@ struct volume_slabs {
     struct rank_team *team;
     size_t n[3], halo, align; /* voxels of the volume; rows; the first row of a slab is a multiple of align */
     size_t n_rank;
-    size_t *first; /* owned: n_rank + 1 columns, of which rank r has first[r] .. first[r + 1] - 1 */
+    size_t *first; /* owned: n_rank + 1 columns; rank r has first[r] .. first[r + 1] - 1 */
 };
 
 struct slab_rows {
@@ -50,12 +50,12 @@ static inline size_t volume_slabs_n_column(const size_t n[3])
 }
 /* The rows that the bricks of a rank touch. Rows of two ranks may overlap. */
 struct slab_rows volume_slabs_touched(const struct volume_slabs *s, size_t rank);
-/* Rows that a rank alone answers for: those of all ranks make up the volume. */
+/* Returns the rows that `rank` owns. The owned rows of all ranks partition the volume. */
 struct slab_rows volume_slabs_own(const struct volume_slabs *s, size_t rank);
 
 /* Deals the columns out, without sending anything; the caller has set team, halo and align. STATUS_NO_MEMORY. */
 status volume_slabs_deal(struct volume_slabs *s, const struct volume *v, struct error *err);
-/* Root: sends every helper its slab. The rows are those of volume_slabs_touched, or of volume_slabs_own where there is
+/* Root: sends every helper its slab. The rows are given by volume_slabs_touched, or by volume_slabs_own where there is
  * a halo. STATUS_IO, STATUS_NO_MEMORY. */
 status volume_slabs_send(const struct volume_slabs *s, const struct volume *v, struct error *err);
 /* Root: both, for a volume without a halo that is made known as v->slabs. team NULL: does nothing. */

@@ -20,9 +20,9 @@ enum { WEAVE_SCALES = 3 }; /* half of the period, the period, twice the period *
 status weave_contrast(const float *grey, size_t width, size_t height, double period_px, double contrast[WEAVE_SCALES],
                       struct error *err);
 
-/* What white noise of the pixels adds to the square of each contrast. relative_var: mean over the pixels of the noise's
- * variance over the square of the local mean, before the picture was smoothed by a Gaussian of blur_px pixels (0: it
- * was not). Errors as weave_contrast, for a picture of 8 periods. */
+/* Computes the term that white noise of the pixels adds to the square of each contrast. relative_var: mean over the
+ * pixels of the noise's variance over the square of the local mean, before the picture was smoothed by a Gaussian of
+ * blur_px pixels (0: it was not). Errors as weave_contrast, for a picture of 8 periods. */
 status weave_contrast_noise(double relative_var, double blur_px, double period_px, double square[WEAVE_SCALES],
                             struct error *err);
 

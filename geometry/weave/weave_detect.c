@@ -8,9 +8,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* EDGE_PX: of what is analysed. FIRST_FLATTEN_PX: reach of the first flattening; that of the second follows from the
- * repeat. LATTICE_GAIN: logarithm of the odds for a nat of a lattice's information, about the number of its peaks.
- * WORTH: share of the best lattice's information from which others are tried, too. */
+/* EDGE_PX: largest edge of the picture that is analysed. FIRST_FLATTEN_PX: reach of the first flattening; the second
+ * reach follows from the repeat. LATTICE_GAIN: logarithm of the odds for a nat of a lattice's information, about the
+ * number of its peaks. WORTH: share of the best lattice's information from which others are tried, too. */
 enum { EDGE_PX = 1024, MULTIPLE_PX = 16 };
 static const double FIRST_FLATTEN_PX = 12.0, LATTICE_GAIN = 10.0, WORTH = 0.8;
 
@@ -58,7 +58,7 @@ static status piece_init(struct piece *p, const struct weave_picture *from, size
     return STATUS_OK;
 }
 
-/* What the search finds in a piece. */
+/* Results of the search in a piece. */
 struct finding {
     struct weave_lattice lattice[WEAVE_LATTICE_MAX];
     size_t n_lattice, i_best; /* i_best: the lattice of the best draft */

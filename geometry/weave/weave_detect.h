@@ -1,6 +1,6 @@
-/* What a photograph of a woven cloth tells about the cloth: the distances and directions of its yarns, the draft, the
- * width of the yarns, the colors of warp and weft, and the contrast of the texture. Each comes with a confidence. These
- * are guesses to start a fit from, not measurements.
+/* Estimates from a photograph of a woven cloth: the distances and directions of its yarns, the draft, the width of the
+ * yarns, the colors of warp and weft, and the contrast of the texture. Each comes with a confidence. These are guesses
+ * to start a fit from, not measurements.
  *
  * The photograph looks straight down on flat cloth. Light that changes over the picture, and objects in it, do no harm
  * if most of the picture is cloth. Steps: illumination is made even (vision_flatten); peaks of the spectrum

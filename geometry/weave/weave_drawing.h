@@ -1,5 +1,5 @@
-/* Drawings of woven cloth in the frequency domain: what the repeat of a draft looks like. A crossing is a unit square
- * in yarn coordinates (warps along x, wefts along y), with either the warp or the weft on top. The drawing is a sum of
+/* Drawings of woven cloth in the frequency domain: the appearance of a draft's repeat. A crossing is a unit square in
+ * yarn coordinates (warps along x, wefts along y), with either the warp or the weft on top. The drawing is a sum of
  * seven shapes with free brightness:
  *
  *   0     the difference between warp and weft
@@ -7,7 +7,7 @@
  *   3, 4  the bow of a float of warp and of weft along, sin(pi t), t from 0 at one end of the float to 1 at the other
  *   5, 6  their slant, sin(2 pi x) cos(pi t): fibers are twisted, and highlights lie aslant
  *
- * The bow spans the whole float, which is what makes a float of three crossings differ from three single ones. */
+ * The bow spans the whole float; this alone makes a float of three crossings differ from three single ones. */
 #ifndef SELVEDGE_GEOMETRY_WEAVE_DRAWING_H
 #define SELVEDGE_GEOMETRY_WEAVE_DRAWING_H
 
@@ -32,8 +32,8 @@ bool weave_cells_init(struct weave_cells *c, const int index_warp[2], const int 
 /* Whether bit `number` of pattern (1: warp on top) leaves no yarn on one side all along. */
 bool weave_pattern_holds(const struct weave_cells *c, unsigned pattern);
 
-/* What the shapes of all patterns are made of, at one frequency (a, b) in cycles per yarn. [0]: along x, [1]: along y.
- * Floats are numbered by length, and within a length by the place of the crossing in it. */
+/* Parts that make up the shapes of all patterns, at one frequency (a, b) in cycles per yarn. [0]: along x, [1]: along
+ * y. Floats are numbered by length, and within a length by the place of the crossing in it. */
 enum { WEAVE_FLOATS = WEAVE_CELL_MAX * (WEAVE_CELL_MAX + 1) / 2 };
 struct weave_strokes {
     double complex phase[WEAVE_CELL_MAX]; /* of each cell */

@@ -4,8 +4,8 @@
 #include <stdbool.h>
 #include <string.h>
 
-/* BASIS_PEAKS: of which the candidate bases are made. FURTHEST: largest frequency of a mirrored peak, cycles per pixel.
- * LARGEST_CHANCE: share of the plane that the places of a lattice may cover with their tolerances. */
+/* BASIS_PEAKS: number of peaks from which the candidate bases are made. FURTHEST: largest frequency of a mirrored peak,
+ * cycles per pixel. LARGEST_CHANCE: share of the plane that the places of a lattice may cover with their tolerances. */
 enum { BASIS_PEAKS = 14 };
 static const double FURTHEST = 0.75, LARGEST_CHANCE = 0.2, TOLERANCE_BIN = 2.0;
 
@@ -100,8 +100,8 @@ static double chance(struct weave_lattice *l, double resolution)
     return M_PI * radius * radius / fabs(determinant(l->f));
 }
 
-/* Fills in what follows from the basis. A peak falls on a lattice by chance with the probability that chance() states;
- * a mirrored one is worth half, because it could have come from more places. */
+/* Fills in the members that follow from the basis. A peak falls on a lattice by chance with the probability that
+ * chance() states; a mirrored one is worth half, because it could have come from more places. */
 static void explain(const struct weave_peak *peak, size_t n_peak, double resolution, struct weave_lattice *l)
 {
     double sum = 0.0, on = 0.0, all = 0.0, hits = 0.0;
@@ -134,7 +134,7 @@ static bool make_candidate(const struct weave_peak *peak, size_t n_peak, const s
     return chance(l, resolution) <= LARGEST_CHANCE;
 }
 
-/* Keeps the candidates of the most information, the best first, of which none is the same lattice as another. */
+/* Keeps the candidates of the most information, the best first, each lattice once. */
 static void keep_best(struct weave_lattice kept[WEAVE_LATTICE_MAX], size_t *n_kept, struct weave_lattice *l)
 {
     size_t at = 0;

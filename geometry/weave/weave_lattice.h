@@ -1,6 +1,6 @@
-/* The lattice of a texture that repeats: the two shortest frequencies of which all peaks of the spectrum are
- * whole-number combinations. Its dual are the two shifts that map the texture to itself. Frequencies are in cycles per
- * pixel, x to the right and y down the picture; shifts in pixels. */
+/* The lattice of a texture that repeats: the two shortest frequencies whose whole-number combinations include all peaks
+ * of the spectrum. Its dual are the two shifts that map the texture to itself. Frequencies are in cycles per pixel, x
+ * to the right and y down the picture; shifts in pixels. */
 #ifndef SELVEDGE_GEOMETRY_WEAVE_LATTICE_H
 #define SELVEDGE_GEOMETRY_WEAVE_LATTICE_H
 

@@ -20,7 +20,7 @@ static size_t step_of(const struct weave_draft *d)
     return 0;
 }
 
-/* Whether the draft is a plain one of which every yarn is repeated: 2 in basket 2/2. */
+/* Returns whether the draft is a plain one with every yarn repeated n times: 2 in basket 2/2. */
 static bool is_basket(const struct weave_draft *d, size_t n)
 {
     if (d->n_warp != 2 * n || d->n_weft != 2 * n) return false;

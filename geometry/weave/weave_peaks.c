@@ -6,7 +6,7 @@
 
 enum { REACH = 2, LEAST_PERIODS = 5 };
 static const double LEAST_EXCESS = 12.0;
-/* A weaker maximum this near to a strong peak, as a share of the distance to zero, is the foot of that peak. */
+/* A weaker maximum this near to a strong peak, as a share of the distance to zero, is the peak's foot. */
 static const double FOOT_SHARE = 0.15, FOOT_POWER = 0.05;
 
 struct spectrum {

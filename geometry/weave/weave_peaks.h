@@ -1,4 +1,4 @@
-/* Peaks in the power spectrum of a photograph: the frequencies of what repeats in it. Frequencies are in cycles per
+/* Peaks in the power spectrum of a photograph: the frequencies at which it repeats. Frequencies are in cycles per
  * pixel, x to the right and y down the picture. */
 #ifndef SELVEDGE_GEOMETRY_WEAVE_PEAKS_H
 #define SELVEDGE_GEOMETRY_WEAVE_PEAKS_H

@@ -32,7 +32,7 @@ static void list_frequencies(const struct weave_lattice *l, struct weave_repeat 
     memcpy(r->coefficient, all, r->n_coefficient * sizeof *all);
 }
 
-/* The windows of a picture: squares of edge pixels, half of which overlap. */
+/* The windows of a picture: squares of `edge` pixels that overlap by half. */
 struct windows {
     const float *flat;
     size_t width, height, edge, n[2];
@@ -267,7 +267,7 @@ void weave_repeat_middle(const struct weave_repeat *repeat, const struct weave_l
     at_px[1] = (double)(y * (repeat->edge_px / 2));
     for (int i = 0; i < 2; i++)
         for (int a = 0; a < 2; a++) at_px[a] -= phase[i] / (2.0 * M_PI) * lattice->shift_px[i][a];
-    /* the phases are those of the window's middle best: the yarns of its corner may have wandered from there */
+    /* the phases fit best in the window's middle: the yarns of its corner may have wandered from there */
     const double half = 0.5 * (double)repeat->edge_px;
     move_towards(lattice, (double[2]){(double)x * half + half, (double)y * half + half}, at_px);
 }

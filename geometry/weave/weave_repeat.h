@@ -2,7 +2,7 @@
  *
  * A photographed cloth repeats over a few periods only: yarns wander, and perspective and folds change the period. So
  * the coefficients are taken in small windows; each window is shifted to the phases of two strong reference peaks, and
- * then the windows are averaged. What differs from repeat to repeat averages out. */
+ * then the windows are averaged. Differences from repeat to repeat average out. */
 #ifndef SELVEDGE_GEOMETRY_WEAVE_REPEAT_H
 #define SELVEDGE_GEOMETRY_WEAVE_REPEAT_H
 

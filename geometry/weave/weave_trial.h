@@ -24,8 +24,8 @@ struct weave_trial {
     double power, n_effective; /* weighted power of all coefficients, and how many of them matter */
 };
 
-/* warp, weft: yarn frequencies as whole-number combinations of the lattice's basis. False if they cannot be those of
- * warp (the more vertical yarns) and weft. */
+/* warp, weft: yarn frequencies as whole-number combinations of the lattice's basis. Returns false if they cannot belong
+ * to warp (the more vertical yarns) and weft. */
 bool weave_trial_init(struct weave_trial *t, const struct weave_lattice *lattice, const struct weave_repeat *repeat,
                       const struct weave_streaks *streaks, const int warp[2], const int weft[2]);
 

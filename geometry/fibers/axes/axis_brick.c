@@ -18,7 +18,7 @@ void axis_scratch_init(struct axis_scratch *s)
 
 void axis_scratch_release(struct axis_scratch *s) { axis_claims_release(&s->claims); }
 
-/* A segment, with what the voxels near it share. */
+/* A segment, with the values that all voxels near it share. */
 struct axis_view {
     float a[3], u[3], inverse_length2, radius; /* a: begin from the centre of the brick's first voxel; u: to its end */
     const struct section_view *section;        /* NULL: a disc */

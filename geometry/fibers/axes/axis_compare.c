@@ -24,7 +24,7 @@ static void clamp_mean(float sd, lanes *value, lanes *slope)
     }
 }
 
-/* Finds residual and weight of LANES voxels, of which n are in the brick, and adds those with fibers to the sums. */
+/* Finds residual and weight of the first n of LANES voxels, and adds voxels with fibers to the sums. */
 static void compare_lanes(const struct axis_model *m, struct axis_scratch *s, size_t at, const float *density, size_t n,
                           struct plane_sum *sum)
 {
@@ -37,7 +37,7 @@ static void compare_lanes(const struct axis_model *m, struct axis_scratch *s, si
         value = *(const lanes *)density;
     else
         memcpy(&value, density, n * sizeof *density);
-    /* with lumens a share above 1 is that of a negative area, whose derivatives would not know of a bound */
+    /* with lumens a share above 1 comes from a negative area, whose derivatives would not know of a bound */
     lanes share = of[0];
     if (m->lumen == NULL) share = lanes_choose(of[0] < one, of[0], one);
     lanes e = value - low - amplitude * share, by_value = one;

@@ -41,7 +41,7 @@ static void state_error(double information, double variance, const double *stiff
     p->direction_se_rad = sqrt(square * direction);
 }
 
-/* What a fit keeps from round to round. */
+/* Data that a fit keeps from round to round. */
 struct fit_work {
     uint32_t *first_vertex_of;     /* per segment */
     struct axis_pull *total;       /* per vertex */
@@ -290,8 +290,8 @@ static status fit_batch(struct axis_batch *job, struct fit_work *w, struct threa
     return s;
 }
 
-/* Prepares the model. kind.follows: the claims of an earlier round are used; kind.is_followed: the next round uses
- * those of this one. */
+/* Prepares the model. kind.follows: this round uses the nearest segments of an earlier one; kind.is_followed: the next
+ * round uses the nearest segments of this one. */
 static status start_round(struct axis_model *m, const struct polyline_set *lines, struct fit_work *w,
                           struct round_kind kind, struct error *err)
 {

@@ -6,15 +6,16 @@
  * be towards the centroid of the material around it. Each round is one Gauss-Newton step of
  *     sum over voxels of w (V - M)^2 + sum over lines of stiffness |p_{i-1} - 2 p_i + p_{i+1}|^2
  * for all vertices, one for b, low, high and all radii together, and one for each radius. The weight w (Geman and
- * McClure 1985) ignores fibers that no line represents. The stiffness is the variance of the residuals over that of the
- * fibers' curvature, so noisy scans give smoother fibers.
+ * McClure 1985) ignores fibers that no line represents. The stiffness is the variance of the residuals over the
+ * variance of the fibers' curvature, so noisy scans give smoother fibers.
  *
  * In the last fit, where the curvature is measured, second differences of neighbouring vertices are correlated
  * (axis_solve.h), as bends of fibers are: if its curvature could change at every voxel, a fiber would take noise for
  * bends.
  *
  * The errors of the axes follow from the same sum. With data of information n a vertex, residuals of variance s and
- * stiffness L, the posterior spectrum of the position is s / (n + L k^4). Its integral, and that of k^2 times it, are
+ * stiffness L, the posterior spectrum of the position is s / (n + L k^4). The integrals of the spectrum, and of k^2
+ * times the spectrum, are
  *     position^2 = s / (2 sqrt 2 n l),   direction^2 = position^2 / l^2,   l = (L / n)^(1/4) voxels,
  * l being the length over which the axes are smoothed. The noise of voxels counts as independent, so that the errors
  * are lower limits where a scanner's filter has blurred its noise. They do not count on the correlation of bends: with

@@ -31,9 +31,9 @@ void axis_brick_sum_release(struct axis_brick_sum *sum);
 status axis_round_prepare(struct axis_model *m, const struct polyline_set *lines, const size_t n[3],
                           struct section_view *view, float *reach, struct segment_bricks *bricks, struct error *err);
 
-/* Prepares a model of discs for the same lines in a later round. The claims stay those of the last axis_round_prepare:
- * lines at rest have moved by a tenth of a voxel since, which hardly changes what is nearest to which segment. *bricks
- * are those of that round; *claiming becomes their segments, as in segment_bricks_move. STATUS_NO_MEMORY. */
+/* Prepares a model of discs for the same lines in a later round. The voxels keep their nearest segments from the last
+ * axis_round_prepare: lines at rest have moved by a tenth of a voxel since, which hardly changes the nearest segments.
+ * *bricks comes from the same round; *claiming becomes their segments, as in segment_bricks_move. STATUS_NO_MEMORY. */
 status axis_round_follow(struct axis_model *m, const struct polyline_set *lines, struct segment_bricks *bricks,
                          struct segment **claiming, struct error *err);
 

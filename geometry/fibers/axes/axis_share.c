@@ -9,7 +9,7 @@
 
 _Static_assert((int)SLAB_EDGE == (int)AXIS_BRICK, "a column of a slab is one of bricks");
 
-/* Bytes of a brick's sums that fit into one message with those of others. */
+/* Bytes of a brick's sums that fit into one message with the sums of others. */
 enum { BRICK_MOST_BYTES = RANK_MESSAGE_MOST / 4 };
 
 /* The lines of a round, in a helper. */
@@ -117,7 +117,7 @@ static size_t pack_brick(void *context, size_t i_task, void *to)
     return (size_t)(at - (char *)to);
 }
 
-/* Makes room for the sums of a brick. Zeros are what a segment without terms has. */
+/* Makes room for the sums of a brick. A segment without terms has zeros. */
 static bool make_sum(const struct share_view *v, size_t i_brick, struct axis_brick_sum *sum)
 {
     const struct segment_bricks *b = v->batch->model.bricks;

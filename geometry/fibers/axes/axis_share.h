@@ -1,6 +1,6 @@
 /* The bricks of the fit of axes (axis_fit.h) over the ranks that have slabs of the volume. The root
  * sends the lines at the beginning of a round, and an order for each batch of bricks; every rank fits the bricks of its
- * columns; the root gets the sums of each brick, and adds those of all bricks in order, as without other ranks. */
+ * columns; the root gets the sums of each brick, and adds the sums of all bricks in order, as without other ranks. */
 #ifndef SELVEDGE_GEOMETRY_AXIS_SHARE_H
 #define SELVEDGE_GEOMETRY_AXIS_SHARE_H
 
@@ -14,7 +14,7 @@ struct axes_order {
     uint64_t n_line, n_vertex;
     double blur, low, high; /* of the profile */
     uint8_t has_shape, has_section;
-    uint8_t follows; /* whether the claims are those of the last order that does not follow (axis_round_follow) */
+    uint8_t follows; /* whether nearest segments come from the last order that does not follow (axis_round_follow) */
 };
 
 /* Data of an order RANK_ORDER_BRICKS. */
@@ -24,7 +24,7 @@ struct bricks_order {
 
 /* Root: sends the lines of a round, before they are prepared. STATUS_IO, STATUS_NO_MEMORY. */
 status axis_share_round(const struct axis_model *m, const struct polyline_set *lines, bool follows, struct error *err);
-/* Root: whether the other ranks can fit bricks of the batch: solid fibers in a volume of which they have slabs. */
+/* Root: returns whether the other ranks can fit bricks of the batch: solid fibers in a volume whose slabs they have. */
 bool axis_share_can(const struct axis_batch *b);
 /* Root: fits the bricks of the batch with all ranks. STATUS_CANCELLED, STATUS_IO, STATUS_NO_MEMORY. */
 status axis_share_bricks(struct axis_batch *b, struct thread_pool *pool, const struct progress *progress,

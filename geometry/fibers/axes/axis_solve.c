@@ -8,8 +8,8 @@
 /* Lower bound of the measured standard deviation of a fiber's curvature, per diameter. */
 static const double CURVATURE_LEAST = 0.05;
 
-/* Length to either side over which the curvature at a vertex is measured, and the length of line as which that of all
- * lines counts beside it. */
+/* Length to either side over which the curvature at a vertex is measured, and the length of line whose weight the
+ * curvature of all lines has beside it. */
 static const double WINDOW_DIAMETERS = 2.0, PRIOR_DIAMETERS = 2.0;
 
 /* Length over which a fiber's curvature is correlated. */

@@ -11,19 +11,19 @@ static const double SMOOTH = 0.75;
 /* Lengths in diameters: pieces whose differences show the noise of the radius and of the section, pieces of the test,
  * and smoothing of a radius that varies. */
 static const double RADIUS_PIECE = 1.0, SECTION_PIECE = 0.5, TEST_PIECE = 2.0, RADIUS_LENGTH = 1.0;
-/* A line's own noise is known as well as that of so many pieces of all lines together. */
+/* Number of pieces of a line from which on its own noise weighs more than the noise of all lines together. */
 static const double PRIOR_PIECES = 10.0;
-/* The radius varies where chi^2 has a probability below that of so many standard deviations of a normal variable, and
- * the variation, without noise, is at least this share of the radius. */
+/* The radius varies where chi^2 is less probable than so many standard deviations of a normal variable, and the
+ * variation, without noise, is at least this share of the radius. */
 static const double LEAST_DEVIATION = 4.0, LEAST_VARIATION = 0.03;
 /* The same of the area of a lumen, and the standard deviation of widths between 0 and 0.8. */
 static const double LEAST_AREA_VARIATION = 0.03, AREA_CHANGE_MOST = 0.3, ANY_LUMEN_SE = 0.23;
-/* Largest area of a lumen over that of its outline, as in the fit (axis_profile.c). */
+/* Largest area of a lumen over its outline's, as in the fit (axis_profile.c). */
 static const double AREA_MOST = 0.81;
 /* Standard deviation of an angle that may be any between 0 and pi: pi / sqrt 12. */
 static const double ANY_ANGLE_SE = 0.9069;
 
-/* Squares of differences of neighbouring pieces, and what they are for a noise of 1. */
+/* Squares of differences of neighbouring pieces, and their expected values for a noise of 1. */
 struct scatter {
     double square, expected, n;
 };
@@ -61,7 +61,7 @@ struct line_work {
     double (*variance)[3]; /* of c and s: cc, cs, ss, per noise */
 };
 
-/* Terms of a segment of a line for the radius, without what the lumen explains. */
+/* Terms of a segment of a line for the radius, without the part that the lumen explains. */
 static struct piece_sum radius_terms(const struct line_work *w, const struct shape_sums *sums, size_t i)
 {
     const struct axis_pull *p = &sums->pull[w->first + i];
@@ -76,7 +76,7 @@ static struct piece_sum radius_terms(const struct line_work *w, const struct sha
     return t;
 }
 
-/* Terms for the area of the lumen, without what the radius explains. */
+/* Terms for the area of the lumen, without the part that the radius explains. */
 static struct piece_sum area_terms(const struct line_work *w, const struct shape_sums *sums, size_t i)
 {
     const struct axis_pull *p = &sums->pull[w->first + i];
@@ -143,14 +143,14 @@ static void section_scatter(struct line_work *w, const struct shape_sums *sums, 
     }
 }
 
-/* Noise of a line: its own, weighed against that of all lines, and not less than that. */
+/* Returns the noise of a line: its own, weighed against the noise of all lines, and not less than the latter. */
 static double line_noise(const struct scatter *own, const struct scatter *all)
 {
     const double common = noise_of(all), weight = own->n / (own->n + PRIOR_PIECES);
     return fmax(common, own->n > 0.0 ? weight * noise_of(own) + (1.0 - weight) * common : common);
 }
 
-/* Takes the gradient of the radius, or of the lumen, of the whole line from those of its vertices. Returns the
+/* Takes the gradient of the radius, or of the lumen, of the whole line from the gradients of its vertices. Returns the
  * line's information. */
 static double centre_gradient(struct line_work *w)
 {

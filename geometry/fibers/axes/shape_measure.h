@@ -1,11 +1,11 @@
 /* Sections along lines with their errors, from the normal equations that the last round of a fit leaves
  * (axis_fit.h).
  *
- * Noise. What the residuals of neighbouring voxels have in common, by correlated noise or by what the model leaves
- * out, is in the gradients of single vertices, so their scatter is measured instead of counting voxels: sums of
- * gradients over pieces of a line have a variance of v times their information. Differences of order two (section:
- * pieces of half a diameter) and four (radius: pieces of a diameter) of neighbouring pieces give v without what
- * varies slowly. v is that of all lines, or that of a line itself where it is larger.
+ * Noise. The residuals of neighbouring voxels have a common part, from correlated noise or from details that the model
+ * leaves out. It is in the gradients of single vertices, so their scatter is measured instead of counting voxels: sums
+ * of gradients over pieces of a line have a variance of v times their information. Differences of order two (section:
+ * pieces of half a diameter) and four (radius: pieces of a diameter) of neighbouring pieces give v without slow
+ * variations. v is measured over all lines, or over a line itself where it is larger.
  *
  * Curvature. The weights of the fit fall with the residuals, so the gradient of a converged fit changes by less than
  * the N of the normal equations for a step of 1: by `slope` N, which stands for N below.
@@ -17,12 +17,11 @@
  * Radius. chi^2 of the radii of pieces of two diameters about the radius of the line says whether it varies. Where
  * it does, the radius follows the data by the same kind of equation.
  *
- * Lumen. The area of the lumen is measured like the radius, each with what is left of its gradient without the part
- * that the other explains. The width follows as the root of the area, so its error is that of a root: sqrt(a + e) -
- * sqrt(a) for an area a with the error e. Where that exceeds the standard deviation of widths that may be anything
- * from 0 to 0.8, the scan tells nothing, and width and error are 0. The variance has a part that all fibers share:
- * density and blur of the walls are not known beforehand, and walls that are thinner than the blur look like less
- * dense ones.
+ * Lumen. The area of the lumen is measured like the radius, each from its gradient without the part that the other
+ * explains. The width follows as the root of the area, so its error is a difference of roots: sqrt(a + e) - sqrt(a) for
+ * an area a with the error e. Where that exceeds the standard deviation of widths that may be anything from 0 to 0.8,
+ * the scan tells nothing, and width and error are 0. The variance has a part that all fibers share: density and blur of
+ * the walls are not known beforehand, and walls that are thinner than the blur look like less dense ones.
  *
  * Errors of the model do not fall with the number of voxels, as noise does. With residuals e of weights w, and shared
  * variances C for a noise of 1, they shift a shared number by at most sqrt(C sum w e^2) (Cauchy and Schwarz). That is
@@ -36,7 +35,7 @@
 #include "geometry/fibers/axes/model/fiber_section.h"
 #include "geometry/fibers/polyline.h"
 
-/* What the last round leaves. */
+/* The sums that the last round leaves. */
 struct shape_sums {
     const struct axis_pull *pull; /* of each vertex; radius_normal and radius_gradient are of the segment after it */
     const struct section_pull *section;   /* of each vertex */

@@ -1,7 +1,7 @@
-/* Corrections of fibers that came from a scan or a file: what photographs can contradict, as numbers of the whole
- * cloth (base/catalogue/correction_numbers.h). At the standard values the fibers keep their bits. The result
- * follows every number smoothly: random numbers are a function of the hair's index, and hairs appear by growing
- * from length 0. */
+/* Corrections of fibers that came from a scan or a file: properties that photographs can contradict, as numbers of the
+ * whole cloth (base/catalogue/correction_numbers.h). At the standard values the fibers keep their bits. The result
+ * follows every number smoothly: random numbers are a function of the hair's index, and hairs appear by growing from
+ * length 0. */
 #ifndef SELVEDGE_GEOMETRY_FIBER_CORRECT_H
 #define SELVEDGE_GEOMETRY_FIBER_CORRECT_H
 

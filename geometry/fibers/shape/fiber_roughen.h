@@ -1,10 +1,11 @@
 /* Fibers whose axes carry more of the noise that a reconstruction leaves in them (axis_fit.h).
  *
- * Waves of a few fixed lengths and random phases are added to each axis. Their spectrum is that of the reconstruction's
- * error: k^2 / (1 + (k l)^4) for directions, l being the length over which the axes were smoothed, cut off at k l = 3.
- * The variance of the direction is exact in the mean over a long fiber. The error that fibers were smoothed too little
- * or too much changes a rendering in proportion to that variance, so this is the measure for both (Cook and Stefanski
- * 1994, "Simulation-extrapolation estimation in parametric measurement error models", section 2). */
+ * Waves of a few fixed lengths and random phases are added to each axis. Their spectrum equals the spectrum of the
+ * reconstruction's error: k^2 / (1 + (k l)^4) for directions, l being the length over which the axes were smoothed, cut
+ * off at k l = 3. The variance of the direction is exact in the mean over a long fiber. The error that fibers were
+ * smoothed too little or too much changes a rendering in proportion to that variance, so this is the measure for both
+ * (Cook and Stefanski 1994, "Simulation-extrapolation estimation in parametric measurement error models", section
+ * 2). */
 #ifndef SELVEDGE_GEOMETRY_FIBER_ROUGHEN_H
 #define SELVEDGE_GEOMETRY_FIBER_ROUGHEN_H
 

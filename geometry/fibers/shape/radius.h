@@ -26,10 +26,10 @@ struct distance_histogram {
     double length_voxel[3];                          /* length of the polylines of each class */
 };
 
-/* part: RADIUS_PARTS histograms of disjoint sets of bricks scattered over the volume. Their sum is that of the
+/* part: RADIUS_PARTS histograms of disjoint sets of bricks scattered over the volume. Their sum is the histogram of the
  * volume, and their differences give the standard error of a radius. eps_d: density that counts as material (the
- * density is interpolated, so V has smooth surfaces). farthest_voxel: end of the last bin. If more than 500 bricks
- * have fibers near them, about 500 are measured. Integers are summed, so the result does not depend on the threads.
+ * density is interpolated, so V has smooth surfaces). farthest_voxel: end of the last bin. If more than 500 bricks have
+ * fibers near them, about 500 are measured. Integers are summed, so the result does not depend on the threads.
  * STATUS_CANCELLED, STATUS_NO_MEMORY. */
 status distance_histogram_measure(const struct volume *v, const struct polyline_set *lines, double eps_d,
                                   double farthest_voxel, struct thread_pool *pool, const struct progress *progress,

@@ -15,7 +15,7 @@ struct section_summary {
     double bin_edge[SECTION_N_BIN + 1];          /* ratios from 1 to 3; the last bin has all above, too */
     double bin_share[SECTION_N_BIN];
     size_t n_varying; /* fibers whose radius varies along them */
-    /* Widths of lumens over those of the fibers, where the scan tells them; share of the length where it does. */
+    /* Widths of lumens over widths of the fibers, where the scan tells them; share of the length where it does. */
     double lumen_p10, lumen_median, lumen_p90, lumen_se_median, lumen_share;
     /* Of the fibers whose radius varies: mean standard deviation of the radius along a fiber over its mean, and
      * median error over that. */

@@ -22,8 +22,8 @@ status tiff_page_compare(const struct tiff_page *p, const struct tiff_page *firs
                          struct error *err);
 /* Bytes of the decoded samples of the page. */
 uint64_t tiff_page_bytes(const struct tiff_page *p);
-/* Returns whether the stored bytes of the current page lie in its file of file_bytes bytes and can suffice for what
- * its tags state. To be called before memory is allocated for the page. */
+/* Returns whether the stored bytes of the current page lie in its file of file_bytes bytes and can suffice for the size
+ * that its tags state. To be called before memory is allocated for the page. */
 bool tiff_page_fits(TIFF *tiff, const struct tiff_page *p, uint64_t file_bytes);
 
 #endif

@@ -26,9 +26,9 @@ status vol_write_direction(const char *path, const struct direction_volume *d, e
                            struct error *err);
 /* Six channels, float32: S = I - (1 - along^2) t t' as xx, yy, zz, xy, xz, yz, of the fiber direction t. A flake
  * distribution with this matrix has the projected area sqrt(w' S w) (Heitz, Dupuy, Crassin, Dachsbacher 2015, "The SGGX
- * microflake distribution", section 3): that of a cylinder for along = 0, and `along` times that across it in the
- * direction of the fiber. S = I where there is no fiber, so that samples between voxels have a matrix, too. 0 < along
- * <= 1. */
+ * microflake distribution", section 3): the area of a cylinder for along = 0; in the direction of the fiber it is
+ * `along` times the area across. S = I where there is no fiber, so that samples between voxels have a matrix, too. 0 <
+ * along <= 1. */
 status vol_write_sggx(const char *path, const struct direction_volume *d, double along, struct error *err);
 /* Writes the densities of a direction volume, 0 where emptied, as VOL_UINT8. */
 status vol_write_kept_density(const char *path, const struct direction_volume *d, struct error *err);

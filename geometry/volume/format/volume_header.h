@@ -1,5 +1,5 @@
-/* What the formats with a text header share: the header's name, the layout of the voxels, and the file that holds them.
- * Errors have the field OPTION_SCAN_FILES and name the header. */
+/* Common parts of the formats with a text header: the header's name, the layout of the voxels, and the file that holds
+ * them. Errors have the field OPTION_SCAN_FILES and name the header. */
 #ifndef SELVEDGE_GEOMETRY_VOLUME_HEADER_H
 #define SELVEDGE_GEOMETRY_VOLUME_HEADER_H
 
@@ -18,7 +18,7 @@ struct volume_header {
 status volume_header_init(struct volume_header *h, const char *path, struct error *err);
 void volume_header_release(struct volume_header *h);
 
-/* STATUS_FORMAT: "cannot read volume 'scan.nrrd': WHAT 'VALUE'". */
+/* STATUS_FORMAT: "cannot read volume 'scan.nrrd': PROBLEM 'VALUE'". */
 status volume_header_refuse(const struct volume_header *h, const char *what, const char *value, struct error *err);
 /* Reads layout.n, three numbers from 1 to VOXEL_STREAM_MAX_EDGE, and returns in *end where they end. `complaint` begins
  * the error's text. STATUS_FORMAT. */

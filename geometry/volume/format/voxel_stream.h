@@ -20,7 +20,7 @@ enum { VOXEL_STREAM_MAX_EDGE = 1 << 20 };
 
 struct voxel_stream;
 
-/* name: of the header, for errors. Compares the stated size with that of the file: STATUS_FORMAT if the file is too
+/* name: of the header, for errors. Compares the stated size with the size of the file: STATUS_FORMAT if the file is too
  * short, or longer by a row or more. Both mean a wrong shape or type, and the text names the types that would fit.
  * STATUS_NOT_FOUND, STATUS_IO, STATUS_TOO_LARGE (a slice over 4 GiB). */
 status voxel_stream_open(const char *name, const char *data_path, const struct voxel_layout *layout,

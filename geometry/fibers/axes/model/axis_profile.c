@@ -7,8 +7,8 @@
 static const double RADIUS_LEAST = 0.2, RADIUS_MOST = 1.0, RADIUS_STEP = 0.3;
 /* Largest density of the walls of hollow fibers: void and brightest voxels are at 0 and 1. */
 static const double HIGH_OF_WALLS = 3.0;
-/* Bounds of the area of a lumen over that of its outline, and of a step; share of the information about it that must
- * be left beside the radius. */
+/* Bounds of the area of a lumen over its outline's, and of a step; share of the information about it that must be left
+ * beside the radius. */
 static const double AREA_MOST = 0.81, AREA_STEP = 0.1, AREA_KNOWN = 1e-6;
 /* Lower bound of the spread of the radii, relative. */
 static const double SPREAD_LEAST = 0.01;
@@ -62,7 +62,7 @@ static void measure_spread(struct axis_profile *p, const struct radius_sum *line
     p->radius_spread = sqrt(fmax(0.0, var - white / total)) / p->radius;
 }
 
-/* Solves for the shared step, of which the first n count; zero if the data do not determine it. damping: added to the
+/* Solves for the first n numbers of the shared step; zero if the data do not determine it. damping: added to the
  * diagonal, as a share of it (Marquardt 1963). */
 static void solve_shared(const struct shared_sum *shared, size_t n, double damping, double x[AXIS_N_SHARED])
 {
@@ -81,7 +81,7 @@ static void solve_shared(const struct shared_sum *shared, size_t n, double dampi
 
 static double within(double least, double value, double most) { return fmin(most, fmax(least, value)); }
 
-/* Shortens a step of several numbers, of which each has a limit, without turning it: numbers that depend on each other
+/* Shortens a step of several numbers, each with a limit, without turning it: numbers that depend on each other
  * strongly, as wall density, radius and lumen do, leave their valley when only some of them are held back. Returns its
  * factor. */
 static double shorten(double *x, const double *most, size_t n)
@@ -93,7 +93,7 @@ static double shorten(double *x, const double *most, size_t n)
 }
 
 /* Steps the area of the lumen of a line together with its radius. normal, step: of the radius. x: the shared step.
- * part: of a whole step that the shared one was. Returns what is left of the step of the radius. */
+ * part: of a whole step that the shared one was. Returns the remaining step of the radius, times `normal`. */
 static double step_lumen(const struct axis_profile *p, const struct radius_sum *line, const double x[AXIS_N_SHARED],
                          double part, double normal, double step, float *area)
 {

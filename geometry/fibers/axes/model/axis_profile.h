@@ -1,4 +1,5 @@
-/* The profile of the fibers in the fit of axes (axis_fit.h): what all fibers share, and the radius of each. */
+/* The profile of the fibers in the fit of axes (axis_fit.h): the numbers that all fibers share, and the radius of
+ * each. */
 #ifndef SELVEDGE_GEOMETRY_AXIS_PROFILE_H
 #define SELVEDGE_GEOMETRY_AXIS_PROFILE_H
 
@@ -12,17 +13,17 @@ struct shape_measure;
 struct axis_profile {
     double blur;      /* voxels */
     double low, high; /* densities of void and fiber */
-    /* The variance of the curvature is measured on the lines at every round. Otherwise it is that of fibers that are
+    /* The variance of the curvature is measured on the lines at every round. Otherwise it is the variance for fibers
      * about to break, which holds back no line that still has to find its fiber. */
     bool measured_curvature;
     /* Lines move little from round to round, so that the nearest segments of voxels serve several, unless a step
      * shows otherwise (kept/claim_rounds.h). */
     bool at_rest;
     struct fiber_section *section; /* of each vertex of the lines, refined too; NULL: discs */
-    float *lumen; /* with sections: area of the lumen of each line over that of its outline, refined too; NULL: solid */
+    float *lumen;       /* with sections: area of each line's lumen over its outline's, refined too; NULL: solid */
     double damping;     /* of the steps of shared numbers and lumens; 0 for solid fibers */
     double clamp_sd;    /* with lumens: noise of the voxels before they were clamped to [0, 1]; 0: they were not */
-    double model_error; /* with lumens: that of the fitted densities beside noise, for the stated errors; 0: none */
+    double model_error; /* with lumens: error of the fitted densities beside noise, for the stated errors; 0: none */
     struct shape_measure *measure; /* with sections: the last round leaves them with their errors in lines->shape */
     double independent; /* share of the voxels that have values of their own; below 1 where they are interpolated */
     /* Written by the fit: mean radius (voxels, by length), standard deviation of the fibers' radii without the part of
@@ -48,7 +49,8 @@ void axis_table_init(struct axis_table *t);
 
 enum { AXIS_N_SHARED = 5 };
 
-/* Normal equations of what all fibers share: a change of all radii, blur, low, high, and of the areas of all lumens. */
+/* Normal equations of the numbers that all fibers share: a change of all radii, blur, low, high, and of the areas of
+ * all lumens. */
 struct shared_sum {
     double normal[AXIS_N_SHARED][AXIS_N_SHARED], gradient[AXIS_N_SHARED];
     double square, weight; /* of the residuals */
@@ -68,8 +70,8 @@ struct radius_sum {
  * the fiber, and by neighbours that are not modelled. stride: of the values, in floats. Infinite below two pieces. */
 double axis_scatter(const float *value, size_t stride, size_t n, size_t piece);
 
-/* Makes one Gauss-Newton step for what all fibers share, and then one for the radius of each line with what is left of
- * the residuals, limited to plausible values. (All at once overshoots: lines that touch share voxels, which the
+/* Makes one Gauss-Newton step for the numbers that all fibers share, and then one for the radius of each line with the
+ * remaining residuals, limited to plausible values. (All at once overshoots: lines that touch share voxels, which the
  * equations of single lines do not know.) Radii are held towards their mean by their own spread (empirical Bayes), so
  * fibers of one size keep one size. length: of the lines. diameter: typical, voxels. */
 void axis_profile_step(struct axis_profile *p, const struct shared_sum *shared, const struct radius_sum *line,

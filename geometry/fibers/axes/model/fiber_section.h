@@ -1,9 +1,9 @@
 /* Sections of two axes: the flatness of a fiber, and how its section is turned, at every vertex of a line.
  *
- * The section of a fiber of radius r (that of the disc of equal area) is the ellipse o^T exp(-2 L) o = r^2, where o is
- * the offset from the axis and L = [c s; s -c] in the frame (u, t x u), t the fiber's direction. Its half axes are
- * r exp(f) and r exp(-f), f = |(c, s)|; a disc has c = s = 0. The frames of neighbouring vertices differ by the bend of
- * the line only, so c and s change as the section turns about its axis. */
+ * The section of a fiber of radius r (of the disc of equal area) is the ellipse o^T exp(-2 L) o = r^2, where o is the
+ * offset from the axis and L = [c s; s -c] in the frame (u, t x u), t the fiber's direction. Its half axes are r exp(f)
+ * and r exp(-f), f = |(c, s)|; a disc has c = s = 0. The frames of neighbouring vertices differ by the bend of the line
+ * only, so c and s change as the section turns about its axis. */
 #ifndef SELVEDGE_GEOMETRY_FIBER_SECTION_H
 #define SELVEDGE_GEOMETRY_FIBER_SECTION_H
 
@@ -22,10 +22,10 @@ struct section_view {
     float stretch;    /* long half axis over radius */
 };
 
-/* A point seen from the section it is near to. Derivatives are those of depth_voxel. */
+/* A point seen from the section it is near to. Derivatives are taken of depth_voxel. */
 struct section_place {
     float depth;     /* distance beyond the outline, voxels; of the first order in it */
-    float share;     /* distance from the axis over that of the outline on the same ray */
+    float share;     /* distance from the axis over the outline's distance on the same ray */
     float normal[3]; /* of the outline */
     float along;     /* place of the foot on the segment, 0 .. 1; set by the caller */
     float by_radius, by_c, by_s;

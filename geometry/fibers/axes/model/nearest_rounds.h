@@ -13,7 +13,8 @@ struct claim_rounds {
     double moved;       /* voxels, root of the mean square of the last step of all vertices */
 };
 
-/* Whether a round uses the claims of an earlier one, and whether the next one may use those of this one. */
+/* Reuse of the nearest segments of voxels between rounds. follows: this round uses the nearest segments of an earlier
+ * one; is_followed: the next round may use the nearest segments of this one. */
 struct round_kind {
     bool follows, is_followed;
 };

@@ -36,7 +36,7 @@ struct line_view {
     int axis[3];
 };
 
-/* A segment in the coordinates of its line's view, with what its rows share. */
+/* A segment in the coordinates of its line's view, with the values that all its rows share. */
 struct stamp {
     int32_t id;
     float a[3], u[3], length2, inverse_length2; /* a: begin from the corner of the brick; u: from begin to end */
@@ -258,8 +258,9 @@ static void place_claims(struct axis_claims *c, const int axis[3], uint32_t *pla
     c->n_row = 0;
 }
 
-/* Sorts the claims of a line by segment: those of segments first .. end - 1 of the brick's list follow those of the
- * lines before. Voxels without a claim go behind them, where the next line writes. */
+/* Sorts the voxels of a line by their nearest segment: the voxels of segments first .. end - 1 of the brick's list
+ * follow the voxels of the lines before. Voxels without a nearest segment go behind them, where the next line
+ * writes. */
 static bool keep_claims(struct axis_claims *c, const int axis[3], size_t first, size_t end)
 {
     uint32_t *place = c->first + 1; /* of segment e in place[e]: number of its claims, then begin, then end */

@@ -11,15 +11,17 @@
 
 enum { AXIS_BRICK = 32, AXIS_N_CELL = AXIS_BRICK * AXIS_BRICK * AXIS_BRICK };
 
-/* Every line claims the voxels up to `tail` beyond the outlines of its segments, each for the nearest of them. Voxels
- * whose nearest point is an end of the line are not claimed. A voxel may have claims of several lines. */
+/* Nearest segments (claims): every line assigns each voxel up to `tail` beyond the outlines of its segments to the
+ * nearest of them. Voxels whose nearest point is an end of the line have none. A voxel may have a nearest segment of
+ * each of several lines. */
 struct axis_claims {
-    /* (k AXIS_BRICK + j) AXIS_BRICK + i of each claim; those of a segment follow each other. LANES zeros at the end. */
+    /* (k AXIS_BRICK + j) AXIS_BRICK + i of each voxel with a nearest segment; the voxels of a segment follow each
+     * other. LANES zeros at the end. */
     uint16_t *cell;
-    uint32_t *first; /* claim of each segment in the order of the brick's list, and the number of all */
+    uint32_t *first; /* index in `cell` of the first voxel of each segment of the brick's list, and the number of all */
     size_t capacity, first_capacity;
     /* Work for one line, with axes in an order of its own: squared distance of the nearest segment, infinite between
-     * lines, and the number of that segment in the brick's list, -1 between lines and beyond an end of the line. */
+     * lines, and the segment's number in the brick's list, -1 between lines and beyond an end of the line. */
     float own2[AXIS_N_CELL + LANES];
     int32_t own[AXIS_N_CELL + LANES];
     /* The rows that the line has reached, and the range of voxels in each row of the brick. Between lines every end is
