@@ -51,8 +51,8 @@ static inline struct progress progress_of_part(struct progress_part *part)
         .report = progress_report_part, .context = part, .cancel = part->outer != NULL ? part->outer->cancel : NULL};
 }
 
-/* Fills part and returns what its computation takes: fractions 0 .. 1 become from .. from + share of outer, which is
- * not NULL. */
+/* Fills part and returns the progress to pass to its computation: fractions 0 .. 1 become from .. from + share of
+ * outer, which is not NULL. */
 static inline struct progress progress_begin_part(struct progress_part *part, const struct progress *outer, double from,
                                                   double share)
 {

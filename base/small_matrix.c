@@ -28,8 +28,8 @@ void small_solve(const double *factor, size_t n, double *x, size_t stride)
     }
 }
 
-/* Row i of a band matrix and of its factor, with n_before columns before the diagonal. inverse: in [d] that of the
- * factor's diagonal d rows before. Inlined with numbers that are known, so that its loops are unrolled. */
+/* Row i of a band matrix and of its factor, with n_before columns before the diagonal. inverse[d]: the reciprocal of
+ * the factor's diagonal d rows before. Inlined with constant sizes, so that its loops are unrolled. */
 static inline bool factor_row(double *row, size_t n_band, size_t n_before, double *inverse)
 {
     for (size_t d = n_before; d > 0; d--) {
@@ -90,7 +90,7 @@ bool small_solve_banded(double *m, size_t n, size_t n_band, double *x)
 bool small_invert_banded(double *m, size_t n, size_t n_band)
 {
     if (!factor_banded(m, n, n_band)) return false;
-    for (size_t j = n; j-- > 0;) { /* the elements of columns above j are those of the inverse already */
+    for (size_t j = n; j-- > 0;) { /* columns above j hold the inverse already */
         double l[SMALL_BAND_MAX];  /* column j of the factor from the diagonal on */
         const size_t below = n - 1 - j < n_band - 1 ? n - 1 - j : n_band - 1;
         for (size_t k = 0; k <= below; k++) l[k] = m[(j + k) * n_band + k];

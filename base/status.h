@@ -2,9 +2,8 @@
  *
  * A function that can fail returns `status` and takes `struct error *err` as its last parameter. On failure it fills
  * err (if not NULL) and leaves its outputs untouched or releasable. No function below main() prints or exits. Texts
- * say what is wrong first, put the subject in quotes and end with the cause: "cannot read volume 'silk.tif': page
- * 211 is 8-bit, page 1 is 16-bit". Texts and fields are always UTF-8: bytes of quoted text that are not become '?'
- * (utf8.h). */
+ * name the fault first, put the subject in quotes and end with the cause: "cannot read volume 'silk.tif': page 211 is
+ * 8-bit, page 1 is 16-bit". Texts and fields are always UTF-8: other bytes of quoted text become '?' (utf8.h). */
 #ifndef SELVEDGE_BASE_STATUS_H
 #define SELVEDGE_BASE_STATUS_H
 
@@ -49,7 +48,7 @@ status error_set_at(struct error *err, status code, const char *where, const cha
  * STATUS_NO_MEMORY, STATUS_NOT_FOUND, or else STATUS_IO. */
 status error_set_errno_at(struct error *err, const char *where, const char *field, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
-/* Puts "prefix: " before the text of an error (err may be NULL) and returns code, the code of that error. */
+/* Puts "prefix: " before the text of an error (err may be NULL) and returns its code, which the caller passes. */
 status error_prefix(struct error *err, status code, const char *format, ...) __attribute__((format(printf, 3, 4)));
 
 #define error_set(err, code, ...) error_set_at((err), (code), __func__, "", __VA_ARGS__)

@@ -1,4 +1,4 @@
-/* Where a computation sends its warnings: what a user should know although it stops nothing. */
+/* Receives the warnings of a computation: facts that a user should know although they stop nothing. */
 #ifndef SELVEDGE_BASE_WARNING_H
 #define SELVEDGE_BASE_WARNING_H
 

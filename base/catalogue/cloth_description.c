@@ -96,7 +96,7 @@ status cloth_description_draft(struct cloth_description *d, const char *const *r
     return STATUS_OK;
 }
 
-/* What the cloth (kind -1) or one of its kinds of yarn has, of enum cloth_has. */
+/* Returns the bits of enum cloth_has for the cloth (kind -1) or for one of its kinds of yarn. */
 static unsigned has(const struct cloth_description *d, int kind)
 {
     static const unsigned of_structure[CLOTH_N_STRUCTURE] = {CLOTH_HAS_WEAVE, CLOTH_HAS_LOOPS,

@@ -55,7 +55,7 @@ struct cloth_number_info {
     const char *meaning;
 };
 
-/* One number of one cloth. Its index in cloth_description.number is that of its value in the flat vector. */
+/* One number of one cloth. It has the same index in cloth_description.number as its value in the flat vector. */
 struct cloth_number {
     const struct cloth_number_info *info;
     int kind;                    /* kind of yarn; -1: of the cloth */
@@ -69,7 +69,7 @@ struct cloth_number {
 /* STATUS_INVALID, with err->field naming the number: a value, bounds or a prior that cannot be. */
 status cloth_number_check_one(const struct cloth_number *n, struct error *err);
 
-/* What is counted or named of one kind of yarn. */
+/* Counts and names of one kind of yarn. */
 struct cloth_kind {
     size_t n_fiber;                  /* fibers in a section; of a tuft of the pile; of a felt: in the tile */
     size_t n_ply;                    /* 1: single yarn */

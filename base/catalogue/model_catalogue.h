@@ -15,7 +15,7 @@ enum { MODEL_MAX_PARAM = 16, MODEL_MAX_SET = 8, MODEL_MAX_FLAT = 64 };
 
 #define MODEL_DENSITY_MULTIPLIER "density_multiplier"
 
-/* What a model sees: the surfaces of fibers, or the cloth as a volume. */
+/* The geometry that a model scatters at: the surfaces of fibers, or the cloth as a volume. */
 enum model_kind { MODEL_SURFACE, MODEL_VOLUME };
 
 struct model_info {
@@ -23,7 +23,7 @@ struct model_info {
     const char *title; /* one line for people, with the source */
     enum model_kind kind;
     size_t n_param;                 /* at most MODEL_MAX_PARAM */
-    const struct param_info *param; /* of a volume model: those of the phase function, then the density multiplier */
+    const struct param_info *param; /* of a volume model: the phase function's, then the density multiplier */
 };
 
 /* The models of surfaces first: the i-th, NULL behind the last. */

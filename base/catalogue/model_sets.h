@@ -1,8 +1,8 @@
 /* The parameters of a model in a cloth of several groups of fibers: one set for each group, one set after the other.
  *
- * The name of a parameter begins with that of its set: "warp.C_R.r", symbol "warp.C_R". A cloth of one group has one
- * set, whose names are those of the model. A volume model sees no fibers, so it has one set in any cloth.
- */
+ * The name of a parameter begins with the name of its set: "warp.C_R.r", symbol "warp.C_R". A cloth of one group has
+ * one set, and its parameters have the names of the model. A volume model sees no fibers, so it has one set in any
+ * cloth. */
 #ifndef SELVEDGE_BASE_MODEL_SETS_H
 #define SELVEDGE_BASE_MODEL_SETS_H
 

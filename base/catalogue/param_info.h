@@ -1,10 +1,9 @@
-/* What is known about one parameter of a model: its name, unit, range, start, the scale on which a fit moves it, what
- * kind of quantity it is and what it means. Pure data: everyone who handles parameters (renderer, fit, job document,
- * reports) reads it from here and infers nothing from names, units or ranges.
+/* The description of one parameter of a model: its name, unit, range, start, the scale on which a fit moves it, its
+ * kind of quantity and its meaning. Pure data: everyone who handles parameters (renderer, fit, job document, reports)
+ * reads it from here and infers nothing from names, units or ranges.
  *
  * Parameters are numbered flat: a colour takes three consecutive slots r, g, b. Values are in internal units (radians,
- * 1/m); files and users see the unit that `unit` names.
- */
+ * 1/m); files and users see the unit that `unit` names. */
 #ifndef SELVEDGE_BASE_PARAM_INFO_H
 #define SELVEDGE_BASE_PARAM_INFO_H
 
@@ -50,7 +49,7 @@ const char *param_kind_name(enum param_kind kind);
 double param_from_file_unit(const struct param_info *p, double value);
 double param_to_file_unit(const struct param_info *p, double value);
 
-/* The name without that of the set: "C_R.r" for "warp.C_R.r". */
+/* Returns the name without the prefix of the set: "C_R.r" for "warp.C_R.r". */
 const char *param_own_name(const struct param_info *p);
 const char *param_own_symbol(const struct param_info *p);
 /* True when key names the parameter: its name ("warp.C_R.r"), its symbol ("warp.C_R"), or one of them without the set

@@ -10,8 +10,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Opens folder/name for reading. name: parts separated by '/', of which none is a link. *size (may be NULL): bytes of
- * the file. STATUS_NOT_FOUND, STATUS_IO. */
+/* Opens folder/name for reading. name: parts separated by '/'; none may be a link. *size (may be NULL): bytes of the
+ * file. STATUS_NOT_FOUND, STATUS_IO. */
 status foreign_file_open(const char *folder, const char *name, int *fd, uint64_t *size, struct error *err);
 /* Reads such a file into memory, as file_read_all does. STATUS_TOO_LARGE beyond limit_bytes, STATUS_NOT_FOUND,
  * STATUS_IO, STATUS_NO_MEMORY. */

@@ -82,7 +82,7 @@ status scratch_check(struct scratch_space *s, double n_bytes, const char *what, 
     struct statvfs disk;
     if (s == NULL || n_bytes <= 0.5 * (double)s->limit_bytes) return STATUS_OK;
     if (n_bytes > (double)s->most_file_bytes) return too_large(s, n_bytes, what, err);
-    if (statvfs(s->folder, &disk) != 0) return STATUS_OK; /* making the arrays will show what there is */
+    if (statvfs(s->folder, &disk) != 0) return STATUS_OK; /* scratch_new will fail if space is missing */
     double free_bytes = (double)disk.f_bavail * (double)disk.f_frsize;
     if (n_bytes <= free_bytes) return STATUS_OK;
     return error_set(err, STATUS_TOO_LARGE, "cannot work on %s: %.3g GB are needed, but the disk has %.3g GB left",

@@ -24,8 +24,8 @@ status scratch_check(struct scratch_space *space, double n_bytes, const char *wh
 /* Also releases the arrays that are still allocated. Accepts NULL. */
 void scratch_space_free(struct scratch_space *space);
 
-/* Makes an array of n_bytes zeros. space == NULL: ordinary memory without a limit. `what` names the array in error
- * texts. STATUS_NO_MEMORY, STATUS_DISK_FULL, STATUS_TOO_LARGE (scratch_space_bound), STATUS_IO. */
+/* Makes an array of n_bytes zeros. space == NULL: ordinary memory without a limit. Error texts name the array by the
+ * third argument. STATUS_NO_MEMORY, STATUS_DISK_FULL, STATUS_TOO_LARGE (scratch_space_bound), STATUS_IO. */
 status scratch_new(struct scratch_space *space, size_t n_bytes, const char *what, void **array, struct error *err);
 /* Releases an array that scratch_new returned for the same space. Accepts NULL. */
 void scratch_release(struct scratch_space *space, void *array);

@@ -8,11 +8,11 @@
 #include <string.h>
 #include <unistd.h>
 
-/* What jansson 2.14 takes on a 64-bit machine, with the overhead of malloc. */
+/* Memory that jansson 2.14 takes on a 64-bit machine, with the overhead of malloc. */
 enum { OBJECT_BYTES = 256, LIST_BYTES = 144, STRING_BYTES = 64, KEY_BYTES = 80, VALUE_BYTES = 48 };
 enum { CHUNK_BYTES = 1 << 16, NAME_BYTES = 64 };
 
-/* Reads a text byte by byte and keeps of it what is to be parsed. */
+/* Reads a text byte by byte and copies the part to be parsed. */
 struct sieve {
     const struct foreign_bounds *bounds;
     char *kept;
@@ -103,7 +103,7 @@ static size_t weight(char c)
 
 static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 
-/* A byte outside of strings. Returns whether it belongs to what is kept. */
+/* Takes a byte outside of strings. Returns whether it belongs to the part to be parsed. */
 static bool pass_token(struct sieve *v, char c)
 {
     const bool filtered = v->bounds->member != NULL;

@@ -12,8 +12,8 @@
  * table of 10,000 samples with 10 files each has 500,000. */
 enum { JSON_DEPTH_MOST = 32, JSON_VALUES_MOST = 1000000 };
 
-/* Checks a text before it is parsed; the text need not be JSON. what: names it in the sentence, such as "the body".
- * STATUS_INVALID: it has more than JSON_DEPTH_MOST levels or JSON_VALUES_MOST values. */
+/* Checks a text before it is parsed; the text need not be JSON. The error names the text by the third argument, such as
+ * "the body". STATUS_INVALID: it has more than JSON_DEPTH_MOST levels or JSON_VALUES_MOST values. */
 status json_depth_check(const char *text, size_t n_bytes, const char *what, struct error *err);
 
 #endif

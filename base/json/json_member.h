@@ -17,7 +17,7 @@ struct json_member {
 };
 
 /* Removes the members of an object that do not fit, and with `only` those that are not in the table. Returns whether
- * the object has all members of the table now; false for what is no object. */
+ * the object has all members of the table now; false for a value that is no object. */
 bool json_members_keep(json_t *object, const struct json_member *member, size_t n, bool only);
 /* Removes the items of a list that are no objects with all members of the table, and their other members. */
 void json_items_keep(json_t *list, const struct json_member *member, size_t n);

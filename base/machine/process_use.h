@@ -1,4 +1,4 @@
-/* What this process has used so far. */
+/* Processor time and memory that this process has used so far. */
 #ifndef SELVEDGE_BASE_PROCESS_USE_H
 #define SELVEDGE_BASE_PROCESS_USE_H
 

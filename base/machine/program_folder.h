@@ -1,4 +1,4 @@
-/* Where the program that runs is installed, for what is looked for beside it. */
+/* The folder in which the running program is installed, for finding files beside it. */
 #ifndef SELVEDGE_BASE_PROGRAM_FOLDER_H
 #define SELVEDGE_BASE_PROGRAM_FOLDER_H
 

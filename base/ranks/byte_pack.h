@@ -11,7 +11,7 @@
 struct byte_pack {
     char *data; /* owned */
     size_t n, capacity;
-    bool failed; /* out of memory: what was written since then is missing */
+    bool failed; /* out of memory: all later bytes are missing */
 };
 
 /* A part of a message that is read; `failed` once more was asked for than there is. */

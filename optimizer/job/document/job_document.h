@@ -1,10 +1,10 @@
-/* The job document: what a job is to do, as JSON text and as a struct. The daemon and the worker read and check it with
- * the same code.
+/* The job document: the description of a job, as JSON text and as a struct. The daemon and the worker read and check it
+ * with the same code.
  *
  * The keys, with type, unit, range, default and meaning, are the rows of optimizer/job/options (for people:
  * docs/sample-preparation.md, section 4). Unknown keys are errors, so that a misspelt option is not ignored. Errors:
- * STATUS_INVALID with err->field a key such as "photographs[3].light_theta_deg" and a text that says what is allowed.
- */
+ * STATUS_INVALID with err->field a key such as "photographs[3].light_theta_deg" and a text that names the allowed
+ * values. */
 #ifndef SELVEDGE_OPTIMIZER_JOB_DOCUMENT_H
 #define SELVEDGE_OPTIMIZER_JOB_DOCUMENT_H
 

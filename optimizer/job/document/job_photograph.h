@@ -24,7 +24,7 @@ struct job_photograph {
     /* As given: a view of the rig (""), or places in mm from the orbit center (NaN). The angles follow from either. */
     char view[64];
     double light_position_mm[3], camera_position_mm[3];
-    double light_distance_cm, camera_distance_cm; /* NaN: those of the document */
+    double light_distance_cm, camera_distance_cm; /* NaN: the document's */
     size_t crop_px[4];                            /* all 0: whole picture */
     double crop_exact_px[4];                      /* the same before rounding, where markers gave it; or all 0 */
     enum job_transfer transfer;

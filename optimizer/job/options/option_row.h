@@ -10,7 +10,7 @@
 
 struct option_value;
 
-/* What JSON a key takes, and in which form it is stored at its target. */
+/* The JSON values that a key takes, and the type of its target. */
 enum option_kind {
     OPTION_SECTION,          /* an object, whose members are the rows under its path -> bool: true when given */
     OPTION_LIST,             /* a list of objects, whose members are the rows under path[] -> pointer and count */
@@ -45,10 +45,10 @@ struct job_option {
     size_t n;                       /* count of numbers; bytes of a text */
     const char *const *choice;      /* NULL-terminated; the first is the default without `standard` and `left_out` */
     const char *(*choice_at)(size_t i);     /* the same for words of a catalogue: NULL after the last */
-    const char *removed_word, *removed_why; /* a word that an older version took, and what the error says of it */
+    const char *removed_word, *removed_why; /* a word that an older version took, and the reason in the error text */
     const char *unit;                       /* "" or NULL: none */
     const char *standard;                   /* the default as JSON; NULL: NaN for a number, else zero or empty */
-    const char *left_out;                   /* in words, what holds without the key when there is no default */
+    const char *left_out;                   /* the behaviour without the key, in words, when there is no default */
     const char *allowed;                    /* in words, when range and choices are not the whole condition */
     const char *items;                      /* name of the elements of a list, or of the object, in errors */
     const char *schema;  /* members of a JSON Schema object, added to those that follow from the kind */

@@ -1,4 +1,4 @@
-/* Inside the option table: its parts, and macros for what rows have in common. */
+/* Inside the option table: its parts, and macros that rows share. */
 #ifndef SELVEDGE_OPTIMIZER_OPTION_ROWS_H
 #define SELVEDGE_OPTIMIZER_OPTION_ROWS_H
 
@@ -28,7 +28,8 @@ extern const char *const job_transfer_names[];
 
 #define RANGE(from, to) .lower = (from), .upper = (to)
 
-/* Rows of what a picture file may not state itself: members of the struct job_photograph that offset_of gives. */
+/* Rows for values that a picture file may not state itself: members of the struct job_photograph that offset_of
+ * gives. */
 #define PICTURE(list, offset_of, transfers)                                                                            \
     {.path = list ".transfer",                                                                                         \
      .kind = OPTION_CHOICE,                                                                                            \

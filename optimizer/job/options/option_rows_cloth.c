@@ -8,7 +8,7 @@ static const char *const sample_type[] = {"uint8", "int8",    "uint16",  "int16"
 static const char *const byte_order[] = {"little", "big", NULL};
 static const char *const none_auto[] = {"none", "auto", NULL};
 
-/* Schemas of two or four keys of which exactly one must be given, and of four of which none may be. */
+/* Schemas of two or four keys with exactly one given, and of four keys with none given. */
 #define REQUIRED(a) "{\"required\": [\"" a "\"]}"
 #define ONE_OF_FOUR(a, b, c, d) "{\"oneOf\": [" REQUIRED(a) ", " REQUIRED(b) ", " REQUIRED(c) ", " REQUIRED(d) "]}"
 #define ONE_OF(a, b) "{\"oneOf\": [" REQUIRED(a) ", " REQUIRED(b) "]}"

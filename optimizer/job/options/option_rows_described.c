@@ -1,4 +1,4 @@
-/* Rows of the option table: the described cloth, and corrections of other ones. Their numbers are those of
+/* Rows of the option table: the described cloth, and corrections of other ones. Their numbers come from
  * base/catalogue/cloth_numbers.def and correction_numbers.def. */
 #include "base/catalogue/cloth_description.h"
 #include "base/option_id.h"
