@@ -1,10 +1,10 @@
 /* Carries the errors of scanned fibers into the errors of the scattering parameters.
  *
- * The reconstruction measures them (geometry/reconstruct/reconstruct.h): the radius by two methods, and the direction noise of the
- * axes. They become two numbers of the cloth: a factor of all radii, and the variance of the direction noise in units
- * of the stated one (fiber_roughen.h), where 0 stands for the fibers as they are. After the fit one more estimate
- * traces the cloth as it is and with each of the numbers moved, and the shift of the parameters by each number, times
- * its prior error, is added to their covariance (carried_error.h). The parameters stay as they are. */
+ * The reconstruction measures them (geometry/reconstruct/reconstruct.h): the radius by two methods, and the direction
+ * noise of the axes. They become two numbers of the cloth: a factor of all radii, and the variance of the direction
+ * noise in units of the stated one (fiber_roughen.h), where 0 stands for the fibers as they are. After the fit one
+ * more estimate traces the cloth as it is and with each of the numbers moved, and the shift of the parameters by each
+ * number, times its prior error, is added to their covariance (carried_error.h). The parameters stay as they are. */
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_SCAN_ERROR_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_SCAN_ERROR_H
 
