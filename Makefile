@@ -23,7 +23,7 @@ WARN += -Wno-format-truncation
 endif
 WARN_C := $(WARN) -Wconversion -Wstrict-prototypes
 WERROR ?= -Werror
-COMMON := -g $(OPTIMIZE) $(MACHINE) -fno-math-errno -fno-trapping-math -I. -I$(BUILD) $(PKG_CFLAGS) $(WERROR)
+COMMON := -g1 $(OPTIMIZE) $(MACHINE) -fno-math-errno -fno-trapping-math -I. -I$(BUILD) $(PKG_CFLAGS) $(WERROR)
 ifneq ($(SANITIZE),)
 # the sanitizers need more than the sandbox of a worker permits
 COMMON += -fsanitize=$(SANITIZE) -fno-omit-frame-pointer -DSELVEDGE_NO_SANDBOX
@@ -35,6 +35,13 @@ endif
 endif
 CFLAGS_ALL := -std=c17 -D_GNU_SOURCE -pthread $(COMMON) $(WARN_C) $(CFLAGS)
 CXXFLAGS_ALL := -std=c++17 -pthread $(COMMON) $(WARN) $(CXXFLAGS)
+
+# code that waits for files, clients and other programs is compiled in less time
+ifeq ($(OPTIMIZE),-O3)
+WAITING := server clients optimizer/job optimizer/report optimizer/stages optimizer/tools optimizer/worker tests/unit/server \
+           tests/unit/clients tests/unit/optimizer
+$(foreach d,$(WAITING),$(eval $(BUILD)/obj/$(d)/%.c.o: CFLAGS_ALL += -O1))
+endif
 
 # every *_main.c is a program; everything else in its part goes into the part's library
 MAINS := $(shell find base geometry renderer optimizer server clients -name '*_main.c' 2>/dev/null)
