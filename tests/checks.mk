@@ -34,9 +34,9 @@ clang:             ## clang compiles every source, benchmarks and fuzzers too, w
 lint: lint-c lint-javascript lint-python lint-shell ## all of the next four
 
 # without tests: cppcheck does not know that cmocka's assertions end a test
-lint-c:            ## cppcheck, of files that have changed; which checks: config/cppcheck.txt
+lint-c: $(GENERATED) ## cppcheck, of files that have changed; which checks: config/cppcheck.txt
 	@mkdir -p $(BUILD)/cppcheck
-	@cppcheck --quiet -j$$(nproc) --cppcheck-build-dir=$(BUILD)/cppcheck $$(grep -v '^#' config/cppcheck.txt) \
+	@cppcheck --quiet -j$$(nproc) --cppcheck-build-dir=$(BUILD)/cppcheck -I$(BUILD) $$(grep -v '^#' config/cppcheck.txt) \
 		base geometry renderer optimizer server clients/cli && echo "cppcheck ok"
 
 lint-javascript:   ## the TypeScript compiler as a checker of the dashboard: config/javascript.json
