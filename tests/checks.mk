@@ -1,5 +1,5 @@
 # Checks of the sources. `make test` and `make check` count each of them as a test.
-.PHONY: every-object layers format format-check columns clang lint lint-c lint-javascript lint-python lint-shell
+.PHONY: every-object layers format format-check columns clang lint lint-c lint-javascript lint-python lint-shell lint-words
 # clang-format 14, that of Debian 12: other versions break lines elsewhere
 FORMATTED = $(shell find base geometry renderer optimizer server clients tests -name '*.[ch]' -o -name '*.cpp')
 SHELL_SCRIPTS = $(shell git ls-files '*.sh') config/install-dependencies .ci/run
@@ -31,7 +31,7 @@ clang:             ## clang compiles every source, benchmarks and fuzzers too, w
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/clang CC=clang CXX=clang++ OPTIMIZE=-O0 CFLAGS=-g0 CXXFLAGS=-g0 every-object
 	@echo "clang ok"
 
-lint: lint-c lint-javascript lint-python lint-shell ## all of the next four
+lint: lint-c lint-javascript lint-python lint-shell lint-words ## all of the next five
 
 # without tests: cppcheck does not know that cmocka's assertions end a test
 lint-c: $(GENERATED) ## cppcheck, of files that have changed; which checks: config/cppcheck.txt
@@ -47,3 +47,6 @@ lint-python:       ## flake8: .flake8
 
 lint-shell:        ## shellcheck
 	@shellcheck $(SHELL_SCRIPTS) && echo "shell ok"
+
+lint-words:        ## pronouns in place of nouns in the comments of C sources stay below a bar (tests/check_words.py)
+	@/usr/bin/python3 tests/check_words.py

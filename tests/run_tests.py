@@ -21,7 +21,7 @@ import time
 import xml.etree.ElementTree as ElementTree
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-CHECKS = ["layers", "format-check", "columns", "lint-c", "lint-javascript", "lint-python", "lint-shell"]
+CHECKS = ["layers", "format-check", "columns", "lint-c", "lint-javascript", "lint-python", "lint-shell", "lint-words"]
 SLOW_CHECKS = ["clang", "tsan-requests"]
 # unit tests that take more than 4 s of a core, which the inner loop leaves to `make test`
 LONG_UNIT_TESTS = ["unit/renderer/test_scattering", "unit/renderer/fast/test_precompute_journal", "unit/renderer/preview/test_joint_filter",

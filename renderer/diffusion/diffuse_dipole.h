@@ -1,7 +1,7 @@
 /* The dipole: light that diffuses under the flat surface of a deep medium (Jensen, Marschner, Levoy and Hanrahan 2001,
  * "A Practical Model for Subsurface Light Transport"; dissertation of Yan, equation 2.4), for a medium whose surface
- * neither reflects nor refracts, as that of a pile: A = 1, so the virtual source is 7/3 as high as the real one is
- * deep.
+ * neither reflects nor refracts, like the surface of a pile: A = 1, so the virtual source is 7/3 as high as the real
+ * one is deep.
  *
  * Closed forms, with s = sigma_tr z_r = sqrt(3 (1 - albedo)):
  *     integral of R_d over the plane:  albedo / 2 (exp(-s) + exp(-7/3 s))

@@ -81,7 +81,7 @@ struct between {
     float t;
 };
 
-/* Those of z, on one side. */
+/* The values of z, on one side. */
 static struct between z_between(float d_z)
 {
     const float half = 0.5f * DIFFUSION_N_Z, least = d_z > 0 ? half : 0, most = least + half - 1;

@@ -13,7 +13,7 @@ struct estimate_blocks {
     size_t n_configuration;
     const struct path_groups *groups; /* a group's paths are rounded up to whole blocks */
     struct rng_key key;               /* key.configuration is replaced by the number of the group */
-    bool next_replica_too;            /* n_configuration more estimates in out: those of key.replica + 1 */
+    bool next_replica_too;            /* n_configuration more estimates in out: the estimates with key.replica + 1 */
     const struct progress *progress;  /* may be NULL */
     /* Tells the helpers of the pool's team what is estimated, right before the tasks are shared; NULL: they are not. */
     status (*announce)(struct rank_team *team, const void *context, struct error *err);

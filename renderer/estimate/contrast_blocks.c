@@ -103,7 +103,7 @@ static double mean_covariance(double x, double y, double xy, double n) { return 
 
 /* Terms of one cell for channel `channel` and for one derivative of it (value `k`; k = channel: no derivative). */
 struct cell {
-    double value[2], slope[2]; /* means minus those of the crop */
+    double value[2], slope[2]; /* means minus the means of the crop */
     double var[2], slope_var[2], covariance[2];
 };
 

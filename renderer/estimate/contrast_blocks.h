@@ -6,7 +6,7 @@
  * paths with means a_k and b_k, and the numerator is 1/(K - 1) sum_k (a_k - a)(b_k - b), whose expectation is the
  * numerator of the true means for any number of paths. The denominator is a b. The remaining bias of the
  * quotient falls with the paths of the whole crop, not of a cell: about 4 times the relative variance of their mean.
- * The derivative is that of the same expression, one set's value with the other's derivative and the mirror image.
+ * The derivative belongs to the same expression, one set's value with the other's derivative and the mirror image.
  *
  * Variance: delta rule with the sample variances inside cells (and their covariances with the derivatives); the term
  * that both sets have in common, s_a s_b, is counted once.

@@ -4,8 +4,8 @@
  * volume with a phase function (volume/volume_radiance.c). Two more serve previews: dual scattering of fibers
  * (renderer/dual/dual_radiance.c), and diffusion in a pile (renderer/diffusion/diffusion_radiance.c).
  *
- * Derivatives are numbered flat: the parameters of set 0, then of set 1, ...; those of channel c start at c * n_flat.
- * A source is immutable after radiance_source_init: threads share it. It copies nothing of its input.
+ * Derivatives are numbered flat: the parameters of set 0, then of set 1, ...; derivatives of channel c start at c *
+ * n_flat. A source is immutable after radiance_source_init: threads share it. It copies nothing of its input.
  */
 #ifndef SELVEDGE_RENDERER_RADIANCE_SOURCE_H
 #define SELVEDGE_RENDERER_RADIANCE_SOURCE_H

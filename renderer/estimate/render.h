@@ -2,8 +2,8 @@
  * estimate.h.
  *
  * Channels: R G B, var.R var.G var.B (of the mean; infinite for one sample), and with derivatives d_<name>.R .G .B for
- * every flat parameter (radiance_derivative_name). The bits do not depend on the number of threads. Random numbers are
- * apart from those of estimates. A crop that is not square wants crop_aspect = width / height for square pixels. Of a
+ * every flat parameter (radiance_derivative_name). The bits do not depend on the number of threads. Estimates use
+ * other random numbers. A crop that is not square wants crop_aspect = width / height for square pixels. Of a
  * configuration with n_rotation it shows the first rotation.
  */
 #ifndef SELVEDGE_RENDERER_RENDER_H

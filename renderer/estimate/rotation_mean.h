@@ -1,6 +1,6 @@
 /* Estimates of configurations whose radiance is the mean over cloth rotations (configuration.h, n_rotation): each such
  * configuration is estimated at its rotations, with an equal share of its paths each, and the estimates are averaged.
- * A stratified mean: unbiased for the rotations stated, and its variance is that of the paths alone.
+ * A stratified mean: unbiased for the rotations stated, and its variance comes from the paths alone.
  */
 #ifndef SELVEDGE_RENDERER_ROTATION_MEAN_H
 #define SELVEDGE_RENDERER_ROTATION_MEAN_H

@@ -48,8 +48,8 @@ static inline size_t deep_light_n_shift(const struct deep_light *d)
 void deep_light_nodes(const struct deep_light *d, const double direction[3], size_t node[4], double weight[4]);
 /* Class of a fiber by its tangent in the flat cloth: 1 when it lies along x, the weft, rather than along y. */
 size_t deep_light_class(const float tangent[3]);
-/* The two kinds around that of a fiber, class * DEEP_LIGHT_N_TILT + node of tilt, and their weights, which sum to 1. A
- * tangent and its opposite are the same. */
+/* The two kinds around the kind of a fiber, class * DEEP_LIGHT_N_TILT + node of tilt, and their weights, which sum to
+ * 1. A tangent and its opposite are the same. */
 void deep_light_kinds(const float tangent[3], size_t kind[2], double weight[2]);
 /* Adds the radiance times scale. wo, wi: unit vectors; tangent: of the fiber in the flat cloth. A view from below where
  * there is a black sheet counts as one along the cloth; light from there as none. */

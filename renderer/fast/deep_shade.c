@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-/* What is seen, in the flat cloth. */
+/* The place that is seen, in the flat cloth. */
 struct deep_hit {
     const struct scene_hit *hit;
     double offset_mm[2];
@@ -38,7 +38,7 @@ static void enter_beside(const struct fast_setting *s, const struct deep_hit *h,
     scene_hit_beside(s->path.scene, h->hit, shift, at);
 }
 
-/* Adds light of one direction, of which a surface that faces it has the irradiance pi times scale. It enters beside
+/* Adds light of one direction; a surface that faces it has the irradiance pi times scale. The light enters beside
  * the hit, where a bent cloth has another normal and other shadows. */
 static void add_from(const struct fast_setting *s, const struct deep_hit *h, const float direction[3],
                      const float scale[3], struct rng *rng, float radiance[3])

@@ -152,7 +152,7 @@ static void add_direction(const struct fast_tables *t, const float d[3], const f
         for (k = 0; k < n; k++) coefficient[c * n + k] += rgb[c] * y[k];
 }
 
-/* The same for the lamp, of which n directions count. u: chooses one of n = 1 of a Gaussian lamp. */
+/* The same for n directions of the lamp. u: chooses one of n = 1 of a Gaussian lamp. */
 static void add_lamp_directions(const struct fast_setting *s, const struct scene_place *place,
                                 const float position_mm[3], const float u[2], size_t n, float *coefficient)
 {
@@ -229,7 +229,7 @@ static bool shell_is_open(const struct fast_setting *s, const struct seen_hit *h
     return !scene_shell_shades(s->path.scene, &h->hit, &h->place, shift, direction);
 }
 
-/* The same for all light from outside, of which one direction is chosen. */
+/* The same for all light from outside, by one direction that is chosen. */
 static bool shell_lets_through(const struct fast_setting *s, const struct seen_hit *h, const float u[2],
                                struct rng *rng)
 {
@@ -317,7 +317,7 @@ uint32_t fast_shade(const struct fast_setting *s, struct scene_ray *ray, struct 
     return path.n_bounce;
 }
 
-/* ---- what is the same for all rays ---- */
+/* ---- values that all rays share ---- */
 
 static status fill_arriving(struct fast_setting *s, struct error *err)
 {

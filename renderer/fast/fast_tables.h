@@ -1,5 +1,6 @@
-/* What the fast renderer knows of a cloth with one set of scattering parameters (fabric thesis, section 6.4): how light
- * is scattered from cell to cell, what each segment sees, and how a fiber scatters, in spherical harmonics.
+/* The tables of the fast renderer for a cloth with one set of scattering parameters (fabric thesis, section 6.4): the
+ * transfer of light from cell to cell, the visibility of each segment, and the scattering of a fiber, in spherical
+ * harmonics.
  *
  * Frame and millimetres of scene_ray.h. Harmonics: sphere_harmonics.h. Immutable once made: shared by threads.
  *
@@ -49,7 +50,7 @@ struct fast_tables {
     float *transfer;        /* n_transfer x 3 x n_harmonic x n_harmonic */
     float *scatter;         /* n_set x FAST_N_THETA x 3 x n_harmonic: of S cos th_i over directions in the frame whose
                                z is the fiber and whose x-z plane holds w_o */
-    uint32_t *segment_row;  /* n_segment: row of what it sees, or FAST_NO_ROW */
+    uint32_t *segment_row;  /* n_segment: row of its visibility, or FAST_NO_ROW */
     float *basis;           /* FAST_N_GRID^2 x (1 + FAST_N_COMPONENT): mean distance, then the components */
     float *component_scale; /* FAST_N_COMPONENT: value of one step */
     int8_t *component;      /* n_row x FAST_N_COMPONENT */
@@ -63,7 +64,7 @@ static inline size_t fast_n_cell(const struct fast_tables *t)
     return (size_t)t->n_cell[0] * t->n_cell[1] * t->n_cell[2];
 }
 
-/* Allocates what the counts ask for, all zero. STATUS_NO_MEMORY. Each part separately, as counts become known: */
+/* Allocates arrays of the stated counts, all zero. STATUS_NO_MEMORY. Each part separately, as counts become known: */
 status fast_tables_reserve_cells(struct fast_tables *t, struct error *err);    /* n_cell */
 status fast_tables_reserve_transfer(struct fast_tables *t, struct error *err); /* n_transfer, order */
 status fast_tables_reserve_scatter(struct fast_tables *t, struct error *err);  /* n_set, order */

@@ -8,7 +8,7 @@
 #define SHARP_ABOVE 200.0f /* signed distances alone */
 #define LEAST_LIGHT 1e-6f  /* of a Gaussian of the sum beside its largest possible value */
 
-/* A sum over the Gaussians of what the segment sees, times the lamp. */
+/* A sum over the Gaussians of the segment's visibility, times the lamp. */
 static void add_soft(const struct fast_tables *t, const struct gaussian_fiber *f, const struct fiber_frame *frame,
                      const float axis[3], float sharpness, float rgb[3])
 {

@@ -1,8 +1,8 @@
-/* Light of a Gaussian lamp that a fiber scatters once, with what its segment sees from the tables (fabric thesis,
+/* Light of a Gaussian lamp that a fiber scatters once, with the segment's visibility from the tables (fabric thesis,
  * section 6.5.2 and appendix C.2): no random numbers, no shadow ray.
  *
- * Below a sharpness of 100 visibility is a sum of spherical Gaussians, each of which with the lamp is one sharp
- * Gaussian; above 200 it is an error function of the signed distance to the edge of what the segment sees; between
+ * Below a sharpness of 100 visibility is a sum of spherical Gaussians: the product of each with the lamp is one
+ * sharp Gaussian; above 200 it is an error function of the signed distance to the edge of the visible part; between
  * them, a mixture of both. */
 #ifndef SELVEDGE_RENDERER_GAUSSIAN_LIGHT_H
 #define SELVEDGE_RENDERER_GAUSSIAN_LIGHT_H

@@ -5,13 +5,13 @@
 #include <math.h>
 #include <string.h>
 
-enum { ITERATION = 65534, REPLICA = 15 }; /* random numbers apart from those of render.c */
+enum { ITERATION = 65534, REPLICA = 15 }; /* other random numbers than render.c has */
 
 struct run {
     const struct feature_request *q;
     const struct progress *progress;
     struct camera camera;
-    double plane[4]; /* towards the camera, over the width of the crop: that of the crop */
+    double plane[4]; /* towards the camera, over the width of the crop: the plane of the crop */
     struct image *im;
 };
 

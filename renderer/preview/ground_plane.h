@@ -22,7 +22,7 @@ bool ground_plane_seen(const struct ground_plane *g, const double xy[2], double 
 /* Radiance of a place that sees the point u of the lamp, over the density of lamp_sample, and the direction to it. 0:
  * behind the lamp. */
 float ground_plane_lit(const struct ground_plane *g, const double p_mm[3], const float u[2], float direction[3]);
-/* Random numbers of a pixel apart from those of everything else. */
+/* Random numbers of a pixel that nothing else uses. */
 void ground_plane_random(const struct ground_plane *g, size_t i_pixel, bool of_grid, struct rng *rng);
 
 #endif

@@ -1,5 +1,5 @@
 /* Sheared filtering of soft shadows, for previews (Yan, "Physically-based modeling and rendering of complex visual
- * appearance", 2018, sections 2.6 and 5.4; the filter is that of Egan, Hecht, Durand and Ramamoorthi 2011).
+ * appearance", 2018, sections 2.6 and 5.4; the filter is by Egan, Hecht, Durand and Ramamoorthi 2011).
  *
  * What a receiver sees of the lamp is estimated from its own rays and those of its neighbours. An occluder that hides
  * a place y of the lamp from one receiver hides a shifted place from the next one, and the filter follows that shift:

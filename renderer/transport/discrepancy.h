@@ -1,6 +1,6 @@
-/* What the fibers leave of a measured fabric: a smooth factor on the radiance of the cloth, close to 1, that depends on
- * the directions of light and camera to the cloth's normal alone. A fit finds it from the ratios of measured to
- * rendered radiances (optimizer/fit/baseline); renderings of the same cloth are multiplied by it.
+/* The part of a measured fabric that fibers do not explain: a smooth factor on the radiance of the cloth, close to 1,
+ * that depends on the directions of light and camera to the cloth's normal alone. A fit finds it from the ratios of
+ * measured to rendered radiances (optimizer/fit/baseline); renderings of the same cloth are multiplied by it.
  *
  *   ln factor_c = sum_k weight_kc exp(-1/2 sum_a ((x_a - place_ka) / scale_a)^2),  at most DISCREPANCY_MOST in size,
  *
@@ -10,7 +10,7 @@
  * to the back of the cloth has the factor 1.
  *
  * Source: the model discrepancy of Kennedy and O'Hagan 2001, "Bayesian calibration of computer models", in these
- * coordinates (the first two are those of Rusinkiewicz 1998, "A new change of variables for efficient BRDF
+ * coordinates (the first two as in Rusinkiewicz 1998, "A new change of variables for efficient BRDF
  * representation"). Angles are in radians. Plain memory; immutable while it is used.
  */
 #ifndef SELVEDGE_RENDERER_DISCREPANCY_H

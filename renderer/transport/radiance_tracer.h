@@ -1,4 +1,4 @@
-/* What a tracer is given, and the table of functions that it fills in (radiance_source.h in renderer/estimate has
+/* The input of a tracer, and the table of functions that it fills in (radiance_source.h in renderer/estimate has
  * the list of tracers). */
 #ifndef SELVEDGE_RENDERER_RADIANCE_TRACER_H
 #define SELVEDGE_RENDERER_RADIANCE_TRACER_H

@@ -101,7 +101,7 @@ static void choose(const struct products *p, struct deep_rank_fit *fit)
     }
 }
 
-/* Adds factor times what is kept of a matrix to out. */
+/* Adds factor times the retained part of a matrix to out. */
 static status add_kept(const struct rank_job *x, const struct deep_rank_fit *fit, float *matrix, double factor,
                        double *out, struct error *err)
 {
@@ -116,7 +116,7 @@ static status add_kept(const struct rank_job *x, const struct deep_rank_fit *fit
     return s;
 }
 
-/* With the means of both halves in value, and what they are apart by in off: adds what is kept of the rest. */
+/* With the means of both halves in value, and their differences in off: adds the retained part of the rest. */
 static status keep(const struct rank_job *x, double *value, double *off, struct deep_rank_fit *fit, struct error *err)
 {
     struct products p = {0};

@@ -1,7 +1,7 @@
-/* Takes the noise of paths off a table of deep light, by what two independent halves of the paths agree on.
+/* Removes the noise of paths from a table of deep light: retains the part on which two independent halves agree.
  *
  * Means over lights and over views have little noise, and are kept exactly: of each view, channel and light, so that no
- * energy is lost. What is left of them is a matrix of views x (lights and channels). Its largest singular values are
+ * energy is lost. The remainder is a matrix of views x (lights and channels). Its largest singular values are
  * kept whole, and the rest of it with one factor, as far as both halves agree on it. Number and factor are those with
  * which the matrix of one half is nearest to the other half (cross-validation; both ways, in the mean of squares over
  * views and lights). */
@@ -13,7 +13,7 @@
 enum { DEEP_RANK_MOST = 48 };
 
 /* half: the table by each half of the paths, n_view x n_light x 3. view_area, light_area: weight of each view and light
- * in integrals; what has none becomes 0. */
+ * in integrals; entries without weight become 0. */
 struct deep_halves {
     const double *half[2], *view_area, *light_area;
     size_t n_view, n_light;

@@ -44,7 +44,7 @@ struct deep_job {
     double *seen_area;             /* n_view: sums of its rows */
 };
 
-/* View `near` of those around one: its tilt, row and column are at most 1 apart. False: there is none. */
+/* View `near` around a view: its tilt, row and column are at most 1 apart. False: there is none. */
 static bool near_to(const struct deep_job *x, size_t i_view, size_t near, size_t *other)
 {
     const size_t edge = x->d->edge, node = i_view % x->n_node, kind = i_view / x->n_node;
@@ -101,7 +101,7 @@ static bool meet(const struct deep_job *x, size_t i_class, const double wo[3], s
     return false;
 }
 
-/* Where a path begins: the views around it, and what it counts for. */
+/* Where a path begins: the views around it, and its weight. */
 struct start {
     const double *wo;
     size_t view[8], node[4];
@@ -288,7 +288,7 @@ static void fill_unseen(const struct deep_job *x, double *value)
     }
 }
 
-/* Sums the rows: what was seen, and each half of b over the areas. */
+/* Sums the rows: the visible areas, and each half of b over the areas. */
 static void sum_rows(const struct deep_job *x, double *const half[2])
 {
     for (size_t i = 0; i < x->n_seen; i++) {

@@ -12,7 +12,7 @@
 uint64_t fast_tables_checksum(const struct fast_precompute_request *q);
 
 /* Reads the file of the tables that an earlier call made for the same request. STATUS_CONFLICT: they were made for
- * another cloth, other parameters or another request; besides what fast_tables_read returns. t: nothing to release on
+ * another cloth, other parameters or another request; also the errors of fast_tables_read. t: nothing to release on
  * failure. */
 status fast_precompute_kept(const struct fast_precompute_request *q, const char *path, struct fast_tables *t,
                             struct error *err);

@@ -1,6 +1,6 @@
-/* What a precomputation has finished so far, in a file to which it is appended, so that an interrupted one goes on
- * there and ends with the same bits. The file begins with the number of the request; records that are incomplete or
- * damaged end it.
+/* A journal of the finished parts of a precomputation, in a file to which they are appended, so that an interrupted
+ * one goes on there and ends with the same bits. The file begins with the number of the request; records that are
+ * incomplete or damaged end it.
  *
  * A part of the work fills arrays row by row, and rows are finished in order, some at a time.
  */
@@ -33,7 +33,7 @@ struct journal_part {
     } array[JOURNAL_MAX_ARRAY];
 };
 
-/* Reads what an earlier attempt at the same request has kept at `path`; a file of another request is begun anew.
+/* Reads the journal of an earlier attempt at the same request at `path`; a file of another request is begun anew.
  * checksum: the number of the request. STATUS_IO, STATUS_DISK_FULL, STATUS_NO_MEMORY. Release in any case. */
 status precompute_journal_open(struct precompute_journal *j, const char *path, double every_s, uint64_t checksum,
                                struct error *err);

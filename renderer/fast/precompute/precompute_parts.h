@@ -1,4 +1,4 @@
-/* The parts of fast_precompute, each of which fills in a part of the tables. */
+/* The parts of fast_precompute: each fills in a part of the tables. */
 #ifndef SELVEDGE_RENDERER_PRECOMPUTE_PARTS_H
 #define SELVEDGE_RENDERER_PRECOMPUTE_PARTS_H
 
@@ -26,7 +26,7 @@ status precompute_scatter(struct precompute_job *j, struct error *err);
 status precompute_transfer(struct precompute_job *j, struct error *err);
 /* deep_walks.c: t->deep, whose sizes are set. */
 status precompute_deep(struct precompute_job *j, struct error *err);
-/* segment_visibility.c: what the segments see. */
+/* segment_visibility.c: the visibility of segments. */
 status precompute_visibility(struct precompute_job *j, struct error *err);
 
 #endif

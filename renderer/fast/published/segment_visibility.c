@@ -1,6 +1,6 @@
-/* What every segment sees, as signed distances in principal components and as weights of spherical Gaussians (fabric
- * thesis, section 6.4.1). Unlike there, segments that see nothing have no row, distances are kept on a grid of half the
- * picture's resolution, and the components are those of at most 2,048 segments. */
+/* The visibility of every segment, as signed distances in principal components and as weights of spherical Gaussians
+ * (fabric thesis, section 6.4.1). Unlike there, segments that see nothing have no row, distances are kept on a grid
+ * of half the picture's resolution, and the components follow from at most 2,048 segments. */
 #include "renderer/fast/precompute/distance_components.h"
 #include "renderer/fast/precompute/precompute_parts.h"
 #include "renderer/fast/published/segment_picture.h"

@@ -37,7 +37,7 @@ static inline void offer(struct field *f, int p, int q)
     f->cosine[p] = c;
 }
 
-/* What a neighbour q can tell pixel p: itself, if it is of the other kind, or what is nearest to it. */
+/* The candidate that a neighbour q has for pixel p: itself, if it is of the other kind, or its own nearest pixel. */
 static inline void ask(struct field *f, int p, int q)
 {
     offer(f, p, f->picture[p] != f->picture[q] ? q : f->nearest[q]);

@@ -1,8 +1,8 @@
 /* Transfer of light from outside to the cells of the tile (fabric thesis, section 6.4.2).
  *
- * What differs from the publication: paths end where they leave the cloth, and that direction is the light's, so that
+ * Differs from the publication: paths end where they leave the cloth, and that direction is the light's, so that
  * each path counts for the one direction that it found instead of one drawn beforehand; and places are not midpoints of
- * segments but hits of rays from outside, so that a cell is the mean over what is seen of it. Each cell is a task of
+ * segments but hits of rays from outside, so that a cell is the mean over its visible surfaces. Each cell is a task of
  * its own, whose paths follow from its number: results do not depend on the number of threads. */
 #include "renderer/fast/precompute/precompute_parts.h"
 #include "renderer/fast/precompute/seen_places.h"
@@ -72,7 +72,7 @@ static void walk(const struct precompute_job *j, const struct seen_place *place,
     }
 }
 
-/* What the paths of one cell add up to. */
+/* The sums over the paths of one cell. */
 struct cell_sum {
     double n, mean, mean2, lateral2_mm2, throughput;
 };

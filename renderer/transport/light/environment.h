@@ -18,7 +18,7 @@ struct environment;
 /* Radiance = first three channels of the image * scale. STATUS_INVALID for a value that is negative or not finite, for
  * a scale that is not positive, for more than 2^26 pixels; STATUS_NO_MEMORY. im may be released afterwards. */
 status environment_new(const struct image *im, double scale, struct environment **environment, struct error *err);
-/* From an OpenEXR file; also STATUS_FORMAT and what image_read_exr gives. */
+/* From an OpenEXR file; also STATUS_FORMAT and the errors of image_read_exr. */
 status environment_read_exr(const char *path, double scale, struct environment **environment, struct error *err);
 void environment_free(struct environment *environment);
 /* A number that no other environment of this process has had. */

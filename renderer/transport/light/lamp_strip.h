@@ -5,7 +5,7 @@
  * random points of the lamp mostly miss; and scattering samples, which lie all around the fiber, mostly miss the lamp.
  * A point of the strip is drawn by its distance s along the lamp's plane, across those lines, with a normal density cut
  * to the lamp, and evenly along the line. The lines are taken as those at the lamp's centre: the density is exact for
- * what is drawn, and where the lines bend it only fits the lobe less well.
+ * the points drawn, and where the lines bend it only fits the lobe less well.
  */
 #ifndef SELVEDGE_RENDERER_LAMP_STRIP_H
 #define SELVEDGE_RENDERER_LAMP_STRIP_H
@@ -28,7 +28,8 @@ void lamp_strip_init(struct lamp_strip *strip, const struct lamp *lamp, const fl
                      const float tangent[3], float sin_o, float lobe_rad);
 /* Numbers in [0, 1)^2 by which lamp_sample draws a point of the strip. */
 void lamp_strip_sample(const struct lamp_strip *strip, const float u[2], float lamp_u[2]);
-/* Density of the strip's points over that of all the lamp's, at the point that lamp_sample draws by lamp_u. */
+/* Density of the strip's points over the density of all points of the lamp, at the point that lamp_sample draws by
+ * lamp_u. */
 float lamp_strip_ratio(const struct lamp_strip *strip, const float lamp_u[2]);
 /* The same at the point that a direction meets, which must be one of the lamp's. */
 float lamp_strip_ratio_towards(const struct lamp_strip *strip, const struct lamp *lamp, const float position_mm[3],

@@ -52,7 +52,7 @@ static inline float lights_lamp_beyond(const struct lamp *lamp, const float posi
     return pdf_lamp > 0 ? lamp_radiance(lamp, direction) * (pdf > 0 ? lights_power_heuristic(pdf, pdf_lamp) : 1) : 0;
 }
 
-/* Adds the radiance of both environments, that of the image times its share beside light samples. */
+/* Adds the radiance of both environments; the image counts by its share beside light samples. */
 static inline void lights_add_environment(const struct lights *l, const float direction[3], float pdf, float beyond[3])
 {
     for (int c = 0; c < 3 && l->has_constant; c++) beyond[c] += l->constant[c];

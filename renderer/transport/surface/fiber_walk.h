@@ -1,4 +1,4 @@
-/* Walks of light through a cloth that no lamp guides, for tables of what a cloth does to light: rays from outside, and
+/* Walks of light through a cloth that no lamp guides, for tables of the scattering of a cloth: rays from outside, and
  * steps from fiber to fiber. Models of round fibers only (scattering_frame_reason).
  */
 #ifndef SELVEDGE_RENDERER_FIBER_WALK_H
@@ -25,8 +25,8 @@ static inline void fiber_walk_leave(const struct scattering_model *model, const 
         scene_ray_leave(hit, offset_mm, direction, ray);
 }
 
-/* Scatters a ray at its hit: ray becomes the one that goes on, and throughput takes what the fiber lets through. Walks
- * of little throughput are ended at random. False: the walk ends here. */
+/* Scatters a ray at its hit: ray becomes the one that goes on, and throughput is multiplied by the fiber's weight.
+ * Walks of little throughput are ended at random. False: the walk ends here. */
 bool fiber_walk_step(const struct scene *scene, const struct parameter_sets *sets, const struct scene_hit *hit,
                      struct scene_ray *ray, struct rng *rng, float throughput[3]);
 

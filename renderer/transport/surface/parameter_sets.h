@@ -13,8 +13,8 @@ struct parameter_sets {
 };
 
 /* param: max(n_set, 1) * model->n_param. One set serves all groups of the scene; otherwise every group needs one.
- * STATUS_INVALID for too few sets for the scene's groups or more parameters than SCATTERING_MAX_FLAT, and what the
- * model's prepare gives. Release in any case. */
+ * STATUS_INVALID for too few sets for the scene's groups or more parameters than SCATTERING_MAX_FLAT, and the errors
+ * of the model's prepare. Release in any case. */
 status parameter_sets_init(struct parameter_sets *sets, const struct scene *scene, const struct scattering_model *model,
                            const double *param, size_t n_set, struct error *err);
 void parameter_sets_release(struct parameter_sets *sets);

@@ -1,4 +1,4 @@
-/* What an eye's ray meets when it has left the cloth without a hit. */
+/* The light that a camera ray meets after it has left the cloth without a hit. */
 #ifndef SELVEDGE_RENDERER_PATH_BEYOND_H
 #define SELVEDGE_RENDERER_PATH_BEYOND_H
 

@@ -11,7 +11,7 @@ static inline bool path_factor_wanted(const struct path_setting *s)
     return s->discrepancy != NULL || s->speckle.table != NULL;
 }
 
-/* Remembers what the factors need of the present bounce of the walk. */
+/* Stores the values of the present bounce of the walk that the factors need. */
 static inline void path_factor_note(struct walk *w, struct bounce *b, const struct scene_ray *ray)
 {
     memcpy(w->normal, b->normal, sizeof w->normal);
@@ -26,7 +26,7 @@ static inline void path_factor_note(struct walk *w, struct bounce *b, const stru
 }
 
 /* Multiplies light that reaches the bounce b from a direction by the factors; b NULL: light beyond the present bounce
- * of the walk. What the camera sees beside the cloth has none. Speckle is on light that one fiber alone scatters. */
+ * of the walk. Light beside the cloth has no factor. Speckle is on light that one fiber alone scatters. */
 static inline void path_factor_apply(const struct walk *w, const struct bounce *b, const float direction[3],
                                      float value[3])
 {

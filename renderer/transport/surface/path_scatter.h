@@ -1,4 +1,4 @@
-/* What a fiber scatters at a bounce of a path. Inside of path_tracer.c. */
+/* Scattering by a fiber at a bounce of a path. Inside of path_tracer.c. */
 #ifndef SELVEDGE_RENDERER_PATH_SCATTER_H
 #define SELVEDGE_RENDERER_PATH_SCATTER_H
 

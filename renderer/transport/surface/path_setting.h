@@ -65,7 +65,7 @@ struct path_result {
     uint32_t n_bounce;
 };
 
-/* What the radiance of a path depends on besides S. Its radiance is the sum over steps of
+/* The values that the radiance of a path depends on besides S. Its radiance is the sum over steps of
  *     T (S(light_wi, wo) light + S(image_wi, wo) image + S(guided_wi, wo) S'(guided_light_wi, guided_wo) guided_light)
  *     + T' escape,
  * where T' = T S(wi, wo) weight is the throughput after the step. It can be evaluated for other parameters without

@@ -97,7 +97,7 @@ static void follow_guided_path(struct walk *w, size_t i_lamp, const struct bounc
 }
 
 /* A guided shadow path reaches a lamp by way of one other fiber: a ray is drawn near the direction of the lamp
- * (light_guide.h), connects what it hits with the lamp, and ends. The walk can find the same light by a scattering
+ * (light_guide.h), connects its hit with the lamp, and ends. The walk can find the same light by a scattering
  * sample followed by a connection; the balance heuristic combines the two, and walk.weight is the weight of the walk's
  * own. The walk itself does not turn towards the lamp, because its later contributions would then carry a smaller
  * weight. */
@@ -288,7 +288,7 @@ static void walk_on(struct walk *w, struct scene_ray *ray, struct path_record *r
 void path_trace(const struct path_setting *s, struct scene_ray *ray, struct rng *rng, struct path_result *out,
                 struct path_record *record)
 {
-    struct walk w; /* large: only what is used is set */
+    struct walk w; /* large: only the members in use are set */
     w.lamp = &s->lights.lamp;
     w.n_lamp = s->lights.has_lamp;
     walk_start(&w, s, record != NULL, rng, out);

@@ -13,14 +13,14 @@
 void path_trace(const struct path_setting *s, struct scene_ray *ray, struct rng *rng, struct path_result *out,
                 struct path_record *record);
 
-/* The same path under each of n_lamp lamps, which replace the lamp of the setting. Result k is what path_trace gives
+/* The same path under each of n_lamp lamps, which replace the lamp of the setting. Result k equals path_trace
  * with lamp k alone; environments count in all. Further lamps cost their connections only, and the errors of the
  * results are correlated. */
 void path_trace_lamps(const struct path_setting *s, const struct lamp *lamp, size_t n_lamp, struct scene_ray *ray,
                       struct rng *rng, struct path_result *out);
 
 /* Sum over channels of the radiance that a recorded path has with other parameters, by the formula at path_step.
- * shows_width: that of the path's setting; S has the widths as a factor then. */
+ * shows_width: the value of the path's setting; S has the widths as a factor then. */
 double path_replay(const struct parameter_sets *sets, const struct path_record *record, bool shows_width);
 
 #endif

@@ -1,4 +1,4 @@
-/* What a path carries from bounce to bounce: inside of path_tracer.c. */
+/* The state of a path from bounce to bounce: inside of path_tracer.c. */
 #ifndef SELVEDGE_RENDERER_PATH_WALK_H
 #define SELVEDGE_RENDERER_PATH_WALK_H
 

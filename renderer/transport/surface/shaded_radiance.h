@@ -7,7 +7,7 @@
 #include "renderer/transport/radiance_tracer.h"
 #include "renderer/transport/surface/path_tracer.h"
 
-/* One way to shade. A setting is what it needs of one configuration: a struct that begins with a path_setting. */
+/* One way to shade. A setting holds its values for one configuration: a struct that begins with a path_setting. */
 struct shaded_method {
     const char *name; /* as in "cannot render by <name>" */
     size_t setting_bytes;

@@ -157,7 +157,7 @@ static void check_task(void *context, size_t i_view, size_t i_thread)
     }
 }
 
-/* Which of them: those of even or odd views, without those that graze the cloth. */
+/* Which of them: even or odd views, without views that graze the cloth. */
 struct check_range {
     size_t parity;
     double least_cos;

@@ -6,8 +6,8 @@
  * on a surface that faces it, as the path tracer has it: all scattering, shadows and the parallax of the fibers below x
  * are in it. This is a bidirectional texture function (Dana et al. 1999), factored as by Koudelka et al. 2003 into
  * textures W_k and their weights T_k. W_0 is 1, so T_0 is the mean of the tile; the other W_k have mean 0 and mean
- * square 1, and are at a right angle with each other. The first factor is that of a deep layer of single scatterers
- * (Seeliger 1888): what is left changes slowly even where light and view graze the cloth. Textures that are averaged
+ * square 1, and are at a right angle with each other. The first factor describes a deep layer of single scatterers
+ * (Seeliger 1888): the remainder changes slowly even where light and view graze the cloth. Textures that are averaged
  * over an area (mipmaps) give the mean radiance of it.
  *
  * Directions are those of a square grid over each hemisphere (direction_grid.h): view (side, row, column), light

@@ -148,7 +148,7 @@ static void connect_lights(struct bent_path *p, const double position[3])
     if (lights_sample_image(l, u, direction, radiance, &pdf)) connect(p, position, direction, radiance, pdf);
 }
 
-/* What the path meets when it has left the cloth. pdf: as lights_lamp_beyond. */
+/* Adds the light that a path meets after it has left the cloth. pdf: as lights_lamp_beyond. */
 static void add_beyond(struct bent_path *p, float pdf)
 {
     if (p->walk.i_cell == SHELL_ON_SHEET) return;

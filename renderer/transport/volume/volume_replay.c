@@ -2,7 +2,7 @@
 
 struct replay {
     const struct volume_parameters *now, *then;
-    double ratio_d; /* density multiplier over that of tracing */
+    double ratio_d; /* density multiplier over the multiplier of tracing */
     double majorant_density;
 };
 

@@ -204,7 +204,7 @@ void volume_scene_release(struct volume_scene *s)
     s->voxel = NULL;
 }
 
-/* What a scene holds besides its bricks, and what does not follow from its size. */
+/* The members of a scene besides its bricks that do not follow from its size. */
 struct volume_head {
     size_t n[3], n_stored;
     double voxel_size_m[3];

@@ -46,7 +46,7 @@ struct volume_scene {
     size_t n_stored; /* bricks */
     bool black_sheet;
     uint64_t number;          /* that no other volume scene of this process has had */
-    struct volume_bent *bent; /* owned; NULL: the cloth is flat. Otherwise brick and voxel are those of the flat one */
+    struct volume_bent *bent; /* owned; NULL: the cloth is flat. Otherwise brick and voxel belong to the flat one */
 };
 
 struct volume_scene_option {

@@ -61,9 +61,9 @@ struct volume_result {
     uint32_t n_bounce, n_lookup;
 };
 
-/* What the radiance of a path depends on besides the phase function and the extinction, in order. r is the ratio of
- * extinction to the majorant of tracing, for the parameters in question; r_then is the same for the parameters of
- * tracing. The radiance follows from T = 1 by:
+/* The values that the radiance of a path depends on besides the phase function and the extinction, in order. r is the
+ * ratio of extinction to the majorant of tracing, for the parameters in question; r_then is the same for the
+ * parameters of tracing. The radiance follows from T = 1 by:
  *   null       T *= (1 - r) / (1 - r_then)       real     T *= r / r_then
  *   scatter    T *= f(wi, wo) weight[0]
  *   connect    L = T f(wi, wo) weight            passed   L *= 1 - r
