@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-pictures bench-pile bench-weave bench-weave-rendered
+.PHONY: bench bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-pictures bench-pile bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -18,6 +18,11 @@ docs-benchmarks:   ## write docs/benchmarks.md from tests/bench/figures.jsonl an
 bench-transport: | deps-test ## the renderer's figures (paths a second, time to a given standard error, memory)
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %transport,$(BENCH_BINS)) >&2
 	@for b in $(filter %transport,$(BENCH_BINS)); do $$b || exit 1; done
+
+# HOUSE=--times: also seconds of a clean build, of `make check` and of `make test`
+bench-house:       ## figures of the source tree: circles, objects that a new option compiles anew, words
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/bench_house.py --build $(BUILD) $(HOUSE)
 
 # EXACT: some of the cloths only, and options of the program, such as EXACT="velvet --paths 1048576"
 bench-exact: | deps-test ## the renderer's scene against the cloth by definition: means, derivatives, tiles of any length, segments cut (five minutes)
