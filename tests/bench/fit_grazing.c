@@ -1,6 +1,7 @@
 /* Lamp and camera in mirrored directions, from the normal to grazing: figures fit.grazing.* of bench_fit. */
 #include "base/angle.h"
 #include "base/catalogue/method_catalogue.h"
+#include "optimizer/job/document/job_setup.h"
 #include "tests/bench/fit_bench.h"
 #include "tests/support/cloth/fit_fabrics.h"
 

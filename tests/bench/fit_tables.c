@@ -2,6 +2,7 @@
 #include "base/angle.h"
 #include "base/catalogue/method_catalogue.h"
 #include "base/files/durable.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/photographs/rows/measurement_table.h"
 #include "tests/bench/fit_bench.h"
 

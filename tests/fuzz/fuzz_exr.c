@@ -1,3 +1,4 @@
+#include "optimizer/job/document/job_photograph.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "tests/fuzz/fuzz_input.h"
 

@@ -1,3 +1,4 @@
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/photographs/rows/measurement_table.h"
 #include "tests/fuzz/fuzz_input.h"
 

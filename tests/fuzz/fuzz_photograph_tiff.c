@@ -1,4 +1,5 @@
 /* TIFF photographs. */
+#include "optimizer/job/document/job_photograph.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "tests/fuzz/fuzz_input.h"
 

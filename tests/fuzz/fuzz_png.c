@@ -1,4 +1,5 @@
 /* Corrects the checksums of chunks first, so that mutated input is not refused for them. */
+#include "optimizer/job/document/job_photograph.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "tests/fuzz/fuzz_input.h"
 

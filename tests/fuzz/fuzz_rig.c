@@ -1,4 +1,7 @@
 /* Rig files. */
+#include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/photographs/camera/rig.h"
 #include "tests/fuzz/fuzz_input.h"
 

@@ -2,6 +2,7 @@
 #ifndef SELVEDGE_TESTS_FUZZ_BRDF_H
 #define SELVEDGE_TESTS_FUZZ_BRDF_H
 
+#include "optimizer/job/document/job_rows.h"
 #include "optimizer/photographs/rows/brdf_file.h"
 #include "tests/fuzz/fuzz_input.h"
 
