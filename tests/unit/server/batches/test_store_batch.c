@@ -1,6 +1,7 @@
 /* Batches in the database. */
 #include "server/store/store_access.h"
 #include "server/store/store_batch.h"
+#include "server/store/store_rows.h"
 #include "tests/support/store/store_fixture.h"
 
 #include <setjmp.h>
@@ -177,6 +178,24 @@ static void test_jobs_bring_their_batch_with_them(void **state)
     assert_string_equal(row.batch, "");
 }
 
+/* A state that this version does not know is not counted, and nothing is written beyond the counts. */
+static void test_an_unknown_state_is_not_counted(void **state)
+{
+    struct fixture *f = *state;
+    struct batch_row b = batch_named(batch_id, "ann", "weave");
+    struct job_row job[3] = {job_of(batch_id, "a", 0), job_of(batch_id, "b", 1), job_of(batch_id, "c", 2)};
+    int64_t count[JOB_N_STATE + 1] = {0};
+    char sql[80];
+    count[JOB_N_STATE] = -7;
+    assert_int_equal(store_batch_write(f->store, &b, job, 3, NULL, 0, NULL), STATUS_OK);
+    snprintf(sql, sizeof sql, "UPDATE job SET state = %d WHERE id = 'b'", JOB_N_STATE);
+    assert_int_equal(store_run(&f->store->write, NULL, NULL, sql, ""), STATUS_OK);
+    assert_int_equal(store_batch_count(f->store, batch_id, count, NULL), STATUS_OK);
+    assert_int_equal(count[JOB_DRAFT], 2);
+    for (int i = 0; i < JOB_N_STATE; i++) assert_true(i == JOB_DRAFT || count[i] == 0);
+    assert_int_equal(count[JOB_N_STATE], -7);
+}
+
 static int run(const char *database)
 {
     const struct CMUnitTest tests[] = {
@@ -184,6 +203,7 @@ static int run(const char *database)
         cmocka_unit_test_setup_teardown(test_erasing_a_batch_leaves_what_it_should, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_the_queue_is_known_by_batch, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_jobs_bring_their_batch_with_them, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_an_unknown_state_is_not_counted, set_up, tear_down),
     };
     return cmocka_run_group_tests_name(database, tests, NULL, NULL);
 }

@@ -3,8 +3,10 @@
 #include "server/store/store_access.h"
 #include "server/store/store_batch.h"
 #include "server/store/store_delivery.h"
+#include "server/store/store_rows.h"
 #include "tests/support/scratch_folder.h"
 
+#include <errno.h>
 #include <setjmp.h>
 #include <sqlite3.h>
 #include <stdarg.h>
@@ -194,11 +196,75 @@ static void test_a_job_without_its_table(void **state)
     store_close(store);
 }
 
+/* A change whose transaction does not begin, here because another one is open, is an error. */
+static void test_a_change_that_cannot_begin(void **state)
+{
+    struct store *store = NULL;
+    struct job_row row = {.id = "a", .document = (char *)(uintptr_t) "{}"};
+    assert_int_equal(store_open(scratch_path(state, "begin.db"), &store, NULL), STATUS_OK);
+    assert_int_equal(store_job_insert(store, &row, NULL, NULL, NULL), STATUS_OK);
+    assert_int_equal(store_begin(&store->write, NULL), STATUS_OK);
+    assert_true(store_job_replace(store, &row, NULL) != STATUS_OK);
+    assert_true(store_import(store, &row, NULL, 0, NULL, NULL, NULL) != STATUS_OK);
+    assert_int_equal(store_end(&store->write, STATUS_OK, NULL), STATUS_OK);
+    store_close(store);
+}
+
+/* A job is not imported without the batch that it names. */
+static void test_a_batch_that_cannot_be_imported(void **state)
+{
+    struct store *store = NULL;
+    struct job_row row = {.id = "a", .owner = "ann", .document = (char *)(uintptr_t) "{}"}, found;
+    assert_int_equal(store_open(scratch_path(state, "batch.db"), &store, NULL), STATUS_OK);
+    assert_int_equal(sqlite3_exec(store->write.db,
+                                  "CREATE TRIGGER no_batch BEFORE INSERT ON batch BEGIN SELECT RAISE(ABORT, 'no'); END",
+                                  NULL, NULL, NULL),
+                     SQLITE_OK);
+    snprintf(row.batch, sizeof row.batch, "%s", id);
+    assert_true(store_import(store, &row, NULL, 0, NULL, NULL, NULL) != STATUS_OK);
+    assert_int_equal(store_job_look(store, "a", &found, NULL), STATUS_NOT_FOUND);
+    store_close(store);
+}
+
+static void fail_with(sqlite3_context *context, int n, sqlite3_value **value)
+{
+    (void)n;
+    sqlite3_result_error_code(context, SQLITE_IOERR);
+    errno = sqlite3_value_int(value[0]);
+}
+
+/* An I/O error means a full disk only where the system says so. */
+static void test_an_io_error_is_told_from_a_full_disk(void **state)
+{
+    struct store *store = NULL;
+    char why[200] = "", command[60];
+    const int number[] = {EIO, ENOSPC};
+    assert_int_equal(store_open(scratch_path(state, "io.db"), &store, NULL), STATUS_OK);
+    sqlite3 *db = store->write.db;
+    assert_int_equal(
+        sqlite3_create_function(db, "fail_with", 1, SQLITE_UTF8 | SQLITE_DIRECTONLY, NULL, fail_with, NULL, NULL),
+        SQLITE_OK);
+    for (size_t i = 0; i < 2; i++) {
+        snprintf(command, sizeof command, "SELECT fail_with(%d)", number[i]);
+        assert_int_equal(sqlite3_exec(db, command, NULL, NULL, NULL), SQLITE_IOERR);
+        assert_int_equal(sqlite3_system_errno(db), number[i]);
+        assert_int_equal(store->write.calls->fault(db, why, sizeof why), i == 0 ? STATUS_IO : STATUS_DISK_FULL);
+        assert_string_equal(why, sqlite3_errstr(i == 0 ? SQLITE_IOERR : SQLITE_FULL));
+    }
+    store_close(store);
+}
+
 int main(void)
 {
 #define BROKEN(test) cmocka_unit_test_setup_teardown(test, set_up, tear_down)
-    const struct CMUnitTest tests[] = {BROKEN(test_jobs),       BROKEN(test_files),
-                                       BROKEN(test_batches),    BROKEN(test_access),
-                                       BROKEN(test_deliveries), BROKEN(test_a_job_without_its_table)};
+    const struct CMUnitTest tests[] = {BROKEN(test_jobs),
+                                       BROKEN(test_files),
+                                       BROKEN(test_batches),
+                                       BROKEN(test_access),
+                                       BROKEN(test_deliveries),
+                                       BROKEN(test_a_job_without_its_table),
+                                       BROKEN(test_a_change_that_cannot_begin),
+                                       BROKEN(test_a_batch_that_cannot_be_imported),
+                                       BROKEN(test_an_io_error_is_told_from_a_full_disk)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

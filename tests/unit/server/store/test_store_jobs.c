@@ -167,6 +167,10 @@ static void test_keys(void **state)
     row.deleted = true;
     assert_int_equal(store_job_update(store, &row, NULL), STATUS_OK);
     assert_int_equal(store_idempotency_find(store, "ann", "key", id, hash, NULL), STATUS_NOT_FOUND);
+    row.deleted = false;
+    assert_int_equal(store_job_erase(store, row.id, NULL), STATUS_OK);
+    assert_int_equal(store_job_insert(store, &row, NULL, NULL, NULL), STATUS_OK);
+    assert_int_equal(store_idempotency_find(store, "ann", "key", id, hash, NULL), STATUS_NOT_FOUND);
 }
 
 /* Fails unless the list has the jobs with these numbers, in this order. */
