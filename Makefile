@@ -105,15 +105,17 @@ help:              ## list the targets
 # tables whose rows stand beside the code that they are about: the file, the macro of a row, the sources. A row ends at a blank
 # line
 define gathered
-$$(BUILD)/generated/$(1): $(sort $(3))
+$$(BUILD)/generated/$(1): $(3)
 	@mkdir -p $$(@D)
 	@awk '/^$(2)\(/ {row = 1} /^$$$$/ {row = 0} row {print}' $$^ > $$@.new
 	@cmp -s $$@.new $$@ && rm $$@.new || mv $$@.new $$@
 GENERATED += $$(BUILD)/generated/$(1)
 endef
-$(eval $(call gathered,volume_formats.def,VOLUME_FORMAT,$(wildcard geometry/volume/format/*.c)))
-$(eval $(call gathered,exports.def,EXPORT,$(wildcard optimizer/report/*/export_*.c)))
-$(eval $(call gathered,cli_commands.def,CLI_COMMAND,$(shell find clients/cli -name '*.c')))
+# (the commonest format is named first in messages)
+FORMATS := $(sort $(wildcard geometry/volume/format/*.c))
+$(eval $(call gathered,volume_formats.def,VOLUME_FORMAT,geometry/volume/format/tiff_source.c $(filter-out %/tiff_source.c,$(FORMATS))))
+$(eval $(call gathered,exports.def,EXPORT,$(sort $(wildcard optimizer/report/*/export_*.c))))
+$(eval $(call gathered,cli_commands.def,CLI_COMMAND,$(sort $(shell find clients/cli -name '*.c'))))
 
 define part_rule
 $(BUILD)/lib/lib$(1).a: $$(call objs,$$(call srcs,$$(folder_$(1))))
