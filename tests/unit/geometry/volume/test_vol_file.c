@@ -211,9 +211,21 @@ static void test_headers(void **state)
     assert_non_null(strstr(err.text, "the header is incomplete"));
 }
 
+static void test_directions_that_are_missing(void **state)
+{
+    (void)state;
+    struct error err = {0};
+    struct vol_header h;
+    float *x = (float[1]){0};
+    assert_int_equal(vol_read_direction("/nonexistent/none.vol", &h, &x, &err), STATUS_NOT_FOUND);
+    assert_non_null(strstr(err.text, "cannot read volume 'none.vol'"));
+    assert_null(x);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_golden), cmocka_unit_test(test_round_trips),
-                                       cmocka_unit_test(test_octahedral), cmocka_unit_test(test_headers)};
+                                       cmocka_unit_test(test_octahedral), cmocka_unit_test(test_headers),
+                                       cmocka_unit_test(test_directions_that_are_missing)};
     return cmocka_run_group_tests(tests, make_folder, NULL);
 }

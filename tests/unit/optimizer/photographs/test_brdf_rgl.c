@@ -132,6 +132,25 @@ static void test_rgb_has_three_channels(void **state)
     }
 }
 
+/* The numbers of azimuths, inclinations, rows and columns are those of the other fields, and two or more. */
+static void test_rgb_has_the_shape_of_the_axes(void **state)
+{
+    const uint64_t shape[5] = {1, 2, 3, 2, 2};
+    const uint64_t other[4][5] = {{2, 1, 3, 2, 2}, {1, 1, 3, 2, 2}, {1, 2, 3, 1, 2}, {1, 2, 3, 2, 1}};
+    for (size_t i = 0; i < 4; i++) {
+        struct rgl_bytes b = {.n_phi = 1};
+        struct error err = {0};
+        void *handle = NULL;
+        size_t at = 0;
+        rgl_bytes_make(&b);
+        while (memcmp(b.bytes + at, shape, sizeof shape) != 0) at++;
+        memcpy(b.bytes + at, other[i], sizeof shape);
+        assert_int_equal(open_bytes(state, &b, JOB_SYMMETRY_FILE, &handle, &err), STATUS_FORMAT);
+        if (strstr(err.text, "'a.bsdf': its rgb or spectra have another shape than RGL's") == NULL)
+            fail_msg("%zu: %s", i, err.text);
+    }
+}
+
 /* Between and beyond few wavelengths a spectrum is what the same spectrum is at each nanometre. */
 static void test_few_wavelengths(void **state)
 {
@@ -217,6 +236,7 @@ int main(void)
         cmocka_unit_test(test_spectra),
         cmocka_unit_test(test_few_wavelengths),
         cmocka_unit_test(test_rgb_has_three_channels),
+        cmocka_unit_test(test_rgb_has_the_shape_of_the_axes),
         cmocka_unit_test(test_not_measured),
         cmocka_unit_test(test_refused),
     };

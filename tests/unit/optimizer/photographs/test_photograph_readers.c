@@ -191,6 +191,8 @@ static void test_dng(void **state)
     read_ok(path, &other, &im, &r);
     assert_true(fabs((double)im.pixel[0]) < 1e-6);
     image_release(&im);
+    other.black_level = 16383.0;
+    check_refused(path, &other, "its black level 16383 is not below its white level 16383");
     size_t n;
     char *whole = scratch_read(path, &n);
     scratch_write(path, whole, n / 3);
