@@ -16,8 +16,6 @@
  * 1e-3 of its radius, and 15 % of the rays that leave it outwards seem to hit it again. Longer segments are cut into
  * pieces of this many radii (5e-6). */
 static const double longest_segment_radii = 10;
-/* Positions have 24 bits, so that a fiber of this share of the tile still is round to some percent. */
-static const double smallest_radius_of_tile = 2e-6;
 
 static double distance(const float *p, const float *q)
 {
@@ -65,11 +63,11 @@ static status count_vertices(const struct fiber_set *f, size_t *n, struct error 
 {
     double tile_m = fmax(f->tile_size_m[0], f->tile_size_m[1]), sum = (double)f->n_vertex;
     for (size_t i = 0; i < f->n_fiber; i++) {
-        if ((double)f->radius_m[i] < smallest_radius_of_tile * tile_m)
+        if ((double)f->radius_m[i] < SCENE_SMALLEST_RADIUS_OF_TILE * tile_m)
             return error_set_field(err, STATUS_INVALID, "radius_m",
                                    "cannot build scene: fiber %zu has a radius of %g m on a tile of %g m, rays need at "
                                    "least 1/%.0f of it",
-                                   i, (double)f->radius_m[i], tile_m, 1 / smallest_radius_of_tile);
+                                   i, (double)f->radius_m[i], tile_m, 1 / SCENE_SMALLEST_RADIUS_OF_TILE);
         for (size_t v = f->first_vertex[i]; v + 1 < f->first_vertex[i + 1]; v++)
             sum += n_piece(f->position_m + 3 * v, f->position_m + 3 * (v + 1), thinner_m(f, i, v)) - 1;
     }

@@ -11,6 +11,9 @@
 
 enum { SCENE_MAX_HALF_BLOCK = 12 };
 
+/* Positions have 24 bits, so that a fiber of this share of the tile still is round to some percent. */
+#define SCENE_SMALLEST_RADIUS_OF_TILE 2e-6
+
 /* The top and the bottom plane of the cloth lie so far outside of its fibers. */
 #define SCENE_MARGIN_MM 1e-3f
 

@@ -180,7 +180,7 @@ static inline struct eight meet_eight(const struct grid_walk *w, const uint32_t 
 
 /* The entries of the ray's cell, eight at a time. */
 struct cell_entries {
-    const uint32_t *entry, *end;
+    const uint32_t *entry, *next, *end; /* the present eight, and those after them */
     unsigned left;
     float t[8];
 };
@@ -198,7 +198,7 @@ static inline struct cell_entries entries_of(const struct grid_walk *w)
 {
     const size_t cell = scene_grid_cell(w->g, w->at[0], w->at[1], w->at[2]);
     struct cell_entries e;
-    e.entry = w->g->entry + w->g->first[cell] - 8;
+    e.next = w->g->entry + w->g->first[cell];
     e.end = w->g->entry + w->g->first[cell + 1];
     e.left = 0;
     return e;
@@ -216,8 +216,9 @@ static float meet_along(const struct grid_walk *w, uint32_t entry)
 /* Looks at the next eight. False: there are none. */
 static inline bool next_eight(const struct grid_walk *w, struct cell_entries *e, float t_far)
 {
-    e->entry += 8;
+    e->entry = e->next;
     if (e->entry >= e->end) return false;
+    e->next += 8; /* the array goes on for eight entries behind the last one */
     const unsigned there = e->end - e->entry < 8 ? (1u << (e->end - e->entry)) - 1 : 255;
     struct eight m = meet_eight(w, e->entry);
     for (unsigned along = lanes(m.along) & there; along != 0; along &= along - 1) {

@@ -51,25 +51,28 @@ void scene_pack(const struct scene *s, struct byte_pack *p)
     if (h.has_ratio) byte_pack_put(p, s->ratio, s->n_vertex * sizeof *s->ratio);
 }
 
-/* Whether a vertex with its section lies within the tiles of the block and the thickness of the cloth. */
+/* Whether a vertex lies in the cloth, and its section in the tiles of the block. */
 static bool vertex_in_range(const struct scene *s, size_t i)
 {
     const struct scene_vertex *v = &s->vertex[i];
-    const double r = (double)v->radius * (s->ratio != NULL ? sqrt((double)s->ratio[i]) : 1), slack = 1.01;
-    const double at[2] = {(double)v->x, (double)v->y};
-    bool good = r > 0 && r <= slack * fabs((double)s->bottom_mm) && r <= s->tile_mm[0] + s->tile_mm[1] &&
-                s->tile_mm[0] < 1e6 && s->tile_mm[1] < 1e6 && fabs((double)s->bottom_mm) < 1e6 &&
-                fabs((double)v->z) <= slack * fabs((double)s->bottom_mm);
-    for (int a = 0; a < 2; a++) good = good && fabs(at[a]) + r <= slack * (s->half_block[a] + 1) * s->tile_mm[a];
+    const double root = s->ratio != NULL ? sqrt((double)s->ratio[i]) : 1, slack = 1.01, radius = (double)v->radius,
+                 thickness = slack * fabs((double)s->bottom_mm), at[2] = {(double)v->x, (double)v->y};
+    bool good = radius > 0 && radius / root <= thickness && fabs((double)v->z) <= thickness;
+    for (int a = 0; a < 2; a++)
+        good = good && fabs(at[a]) + radius * root <= slack * (s->half_block[a] + 1) * s->tile_mm[a];
     return good;
 }
 
+/* With sizes that scene_new does not permit, the cells of the grid could be filled for hours. */
 static bool in_range(const struct scene *s)
 {
+    double largest_mm = 0;
     bool good = s->n_segment > 0 && s->n_group >= 1 && s->n_group <= FIBER_MAX_GROUP &&
-                (s->ratio == NULL || s->long_axis != NULL);
+                (s->ratio == NULL || s->long_axis != NULL) && isfinite(s->bottom_mm);
+    for (size_t i = 0; i < s->n_vertex; i++) largest_mm = fmax(largest_mm, (double)s->vertex[i].radius);
     for (int a = 0; a < 2; a++)
-        good = good && s->half_block[a] >= 1 && s->half_block[a] <= SCENE_MAX_HALF_BLOCK && s->tile_mm[a] > 0;
+        good = good && s->half_block[a] >= 1 && s->half_block[a] <= SCENE_MAX_HALF_BLOCK && s->tile_mm[a] > 0 &&
+               SCENE_SMALLEST_RADIUS_OF_TILE * s->tile_mm[a] <= 2 * largest_mm;
     for (size_t i = 0; good && i < s->n_vertex; i++) good = vertex_in_range(s, i);
     for (size_t i = 0; good && i < s->n_segment; i++)
         good = s->segment_vertex[i] + (size_t)1 < s->n_vertex &&

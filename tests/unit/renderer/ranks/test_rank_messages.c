@@ -227,7 +227,7 @@ typedef status unpack_function(const struct byte_pack *p, size_t n_bytes);
 /* Whole it is taken, cut at any of 200 places it is not; altered in one byte it is taken or not. */
 static void cut_and_alter(struct byte_pack *p, unpack_function *unpack)
 {
-    enum { N_CUT = 200, N_ALTER = 80, HEAD_BYTES = 120 };
+    enum { N_CUT = 200, N_ALTER = 200, HEAD_BYTES = 120 };
     struct rng r;
     rng_start(&r, &(struct rng_key){.seed = 24}, 0, 0);
     assert_int_equal(unpack(p, p->n), STATUS_OK);
