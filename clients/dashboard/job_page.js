@@ -12,7 +12,7 @@ import { qualityCard } from "./quality_card.js";
 import { correlationTable } from "./record/correlation_table.js";
 import { jobRecord } from "./record/job_record.js";
 import { VersionsCard } from "./record/versions_card.js";
-import { channelErrors, choiceOf, configurations, contrastFile, fiberFile, fitted, models, radiusSearch, residuals, sliceFiles, tracedFile } from "./result_view.js";
+import { channelErrors, choiceOf, configurations, contrastFile, fiberFile, fitted, models, radiusSearch, residuals, sliceFiles, tracedFile, statements } from "./result_view.js";
 import { getJson, poll, sendJson } from "./server_link.js";
 import { sliceView } from "./slices/slice_view.js";
 import { SurfacePictures } from "./surface_card.js";
@@ -175,7 +175,7 @@ export function jobPage(page, id) {
     closeTwin = twin?.close ?? null;
     const pairs = compared.length ? pairsCard(compared, job.result?.png_exposure) : null;
     closePairs = pairs?.close ?? null;
-    const compete = models(job), radius = radiusSearch(job);
+    const compete = models(job), radius = radiusSearch(job), stated = statements(job);
     results.append(
       twin ? card("The twin under the mouse", twin.box) : "",
       compete.length > 1 ? card("Models compared", modelTable(compete, choiceOf(job))) : "",
@@ -189,6 +189,7 @@ export function jobPage(page, id) {
       quality ? card("Quality of the geometry", quality) : "",
       scan ? card("Slices of the scan", scan.box) : slices.length ? card("Slices of the scan, detected fibers in red", el("div", { class: "slices" }, slices.map((f) => el("figure", {}, el("img", { src: f.url, alt: f.path, loading: "lazy" }), el("figcaption", {}, f.path))))) : "",
       fibers ? card("Fibers", fibers.box) : "",
+      stated.length ? el("section", { class: "card", id: "statements" }, el("details", { open: !stated.every((s) => s.applied) }, el("summary", {}, "Statements of the files"), el("ul", {}, stated.map((s) => el("li", {}, s.text))))) : "",
       card("Downloads", downloads(job, list)));
   };
 

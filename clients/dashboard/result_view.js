@@ -42,6 +42,19 @@ export function models(job) {
   }));
 }
 
+// Returns the statements of the input files as sentences [{text, applied}], equal statements of several files as one;
+// those that are not used come first.
+export function statements(job) {
+  const groups = new Map();
+  for (const { file, statements: list } of job.result?.files ?? []) for (const s of list) {
+    const key = JSON.stringify([s.name, s.use, s.reason]), group = groups.get(key);
+    if (group) { group.others++; group.differ ||= group.value !== s.value; } else groups.set(key, { ...s, file, others: 0, differ: false });
+  }
+  return [...groups.values()].map((g) => ({ applied: g.use === "applied",
+    text: `${g.file}${g.others ? ` and ${g.others} other file${g.others > 1 ? "s" : ""} state` : " states"} ${g.name} ${g.value}${g.differ ? " (others state other values)" : ""}: ${g.use === "applied" ? "applied" : `not used, ${g.reason}`}` }))
+    .sort((a, b) => a.applied - b.applied);
+}
+
 // Returns the fitted parameters of a job or of one of its models: [{set, name, unit, value, se, flags: [text], lower,
 // upper}], the name without the set
 export function fitted(of) {

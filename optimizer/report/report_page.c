@@ -1,4 +1,5 @@
 #include "optimizer/report/report_page.h"
+#include "base/json/file_ledger_json.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/page_charts.h"
 #include "optimizer/report/page_pictures.h"
@@ -289,17 +290,17 @@ static void print_settings(const json_t *data, FILE *out)
     fputs("</table>\n", out);
 }
 
-static void print_warnings(const json_t *warnings, FILE *out)
+static void print_list(const char *title, const json_t *texts, FILE *out)
 {
     size_t i;
-    const json_t *warning;
-    if (json_array_size(warnings) == 0) return;
-    heading("Warnings", out);
+    const json_t *text;
+    if (json_array_size(texts) == 0) return;
+    heading(title, out);
     fputs("<ul>\n", out);
-    json_array_foreach(warnings, i, warning)
+    json_array_foreach(texts, i, text)
     {
         fputs("<li>", out);
-        page_escaped(json_string_value(warning), out);
+        page_escaped(json_string_value(text), out);
         fputs("</li>\n", out);
     }
     fputs("</ul>\n", out);
@@ -325,12 +326,15 @@ static status print_page(struct report *report, const json_t *data, FILE *out, s
     }
     fputs("The same as data: report.json.</p>\n", out);
     print_verdict(json_object_get(result, "verdict"), out);
-    print_warnings(json_object_get(result, "warnings"), out);
+    print_list("Warnings", json_object_get(result, "warnings"), out);
     if (report->in.kind == JOB_OF_FIT) s = print_fit(report, data, out, err);
     if (report->in.kind == JOB_OF_PROFILE)
         print_profile(report, result, out);
     else if (s == STATUS_OK)
         s = print_surfaces(report, result, out, err);
+    json_t *statements = file_ledger_sentences(json_object_get(result, "files"));
+    print_list("Statements of the files", statements, out);
+    json_decref(statements);
     print_settings(data, out);
     fputs("</body>\n</html>\n", out);
     return s;

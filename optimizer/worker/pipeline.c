@@ -155,6 +155,7 @@ static status do_report(struct pipeline *p, const struct taken *t, bool load, st
                                     .profile = section->profile,
                                     .results = section->results,
                                     .files = &p->files,
+                                    .statements = p->in->files,
                                     .fiber = &p->in->fiber,
                                     .texture = &p->in->texture,
                                     .option = section->scan->given ? &t->directions->option : &t->fibers->option,

@@ -1,4 +1,5 @@
 #include "server/reports/worker_words.h"
+#include "base/json/file_ledger_json.h"
 #include "base/json/json_member.h"
 
 #include <string.h>
@@ -68,6 +69,7 @@ static const struct json_member of_status[] = {TEXT("state"),
                                 of_stage[] = {TEXT("name"), NUMBER("wall_s", 0, MOST_S)},
                                 of_check[] = {{"faults", JSON_IS_LIST, false, 0, 0},
                                               {"warnings", JSON_IS_LIST, false, 0, 0},
+                                              {"files", JSON_IS_LIST, false, 0, 0},
                                               COUNT("n_file")},
                                 of_fault[] = {TEXT("code"), {"field", JSON_IS_TEXT, true, 0, 0}, TEXT("detail")},
                                 of_warning[] = {TEXT("field"), TEXT("detail")},
@@ -104,6 +106,7 @@ void worker_words_of_check(json_t *report)
     json_members_keep(report, of_check, N(of_check), true);
     json_items_keep(json_object_get(report, "faults"), of_fault, N(of_fault));
     json_items_keep(json_object_get(report, "warnings"), of_warning, N(of_warning));
+    file_ledgers_keep(json_object_get(report, "files"));
 }
 
 void worker_words_of_inputs(json_t *inputs) { json_items_keep(inputs, of_input, N(of_input)); }

@@ -122,26 +122,29 @@ static json_t *report_of_death(const struct worker_end *end)
     else
         snprintf(text, sizeof text, "the program that reads the files could not judge them (exit status %d)",
                  end->code);
-    return json_pack("{s:b, s:[{s:s, s:s, s:s}], s:[], s:i}", "valid", 0, "errors", "code",
-                     forbidden ? "forbidden_call" : "worker_lost", "field", "", "detail", text, "warnings", "n_file",
-                     0);
+    return json_pack("{s:b, s:[{s:s, s:s, s:s}], s:[], s:[], s:i}", "valid", 0, "errors", "code",
+                     forbidden ? "forbidden_call" : "worker_lost", "field", "", "detail", text, "warnings", "files",
+                     "n_file", 0);
 }
 
 /* Returns the API's form of a judgement, which is released. */
 static json_t *finish(json_t *report, const char *folder)
 {
-    json_t *errors = json_object_get(report, "faults"), *warnings = json_object_get(report, "warnings");
+    json_t *errors = json_object_get(report, "faults"), *warnings = json_object_get(report, "warnings"),
+           *files = json_object_get(report, "files");
     shorten(errors, folder);
     shorten(warnings, folder);
-    json_t *out = json_pack("{s:b, s:O, s:O, s:I}", "valid", json_array_size(errors) == 0, "errors", errors, "warnings",
-                            warnings, "n_file", json_integer_value(json_object_get(report, "n_file")));
+    json_t *out =
+        json_pack("{s:b, s:O, s:O, s:O, s:I}", "valid", json_array_size(errors) == 0, "errors", errors, "warnings",
+                  warnings, "files", files, "n_file", json_integer_value(json_object_get(report, "n_file")));
     json_decref(report);
     return out;
 }
 
 static bool is_judgement(const json_t *report)
 {
-    return json_is_array(json_object_get(report, "faults")) && json_is_array(json_object_get(report, "warnings"));
+    return json_is_array(json_object_get(report, "faults")) && json_is_array(json_object_get(report, "warnings")) &&
+           json_is_array(json_object_get(report, "files"));
 }
 
 static bool is_plan(const json_t *report)

@@ -71,6 +71,7 @@ status cli_check(struct cli *cli, int *exit_code, struct error *err)
     if (s == STATUS_OK && !a->json) {
         cli_print_faults(json_object_get(report, "faults"), "fault", cli->out);
         size_t n_warning = cli_print_faults(json_object_get(report, "warnings"), "warning", cli->out);
+        cli_print_statements(json_object_get(report, "files"), cli->out);
         fprintf(cli->out, "%lld files, %zu faults, %zu warnings%s\n",
                 json_integer_value(json_object_get(report, "n_file")), n_fault, n_warning,
                 n_fault == 0 ? ": the job can be submitted" : "");

@@ -1,4 +1,5 @@
 #include "clients/cli/text/cli_report.h"
+#include "base/json/file_ledger_json.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -339,4 +340,17 @@ size_t cli_print_faults(const json_t *list, const char *label, FILE *out)
         fprintf(out, "%s: %s%s%s\n", label, named ? "" : field, named ? "" : ": ", detail);
     }
     return json_array_size(list);
+}
+
+void cli_print_statements(const json_t *files, FILE *out)
+{
+    size_t i;
+    json_t *sentence, *list = file_ledger_sentences(files);
+    json_array_foreach(list, i, sentence)
+    {
+        char text[700];
+        text_clean(json_string_value(sentence), text, sizeof text);
+        fprintf(out, "%s\n", text);
+    }
+    json_decref(list);
 }

@@ -2,6 +2,8 @@
 #ifndef SELVEDGE_GEOMETRY_VOLUME_INFO_H
 #define SELVEDGE_GEOMETRY_VOLUME_INFO_H
 
+#include "base/files/file_ledger.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -14,9 +16,10 @@ struct volume_raw_declaration {
 };
 
 struct volume_source_info {
-    size_t n[3];            /* columns, rows, slices */
-    double voxel_size_m[3]; /* NaN where the file does not state it */
-    const char *sample;     /* "uint8", "uint16", "int16", "float32" */
+    size_t n[3];               /* columns, rows, slices */
+    double voxel_size_m[3];    /* NaN where the file does not state it */
+    const char *sample;        /* "uint8", "uint16", "int16", "float32" */
+    struct file_ledger ledger; /* every statement of the file beside its samples */
 };
 
 #endif

@@ -1,6 +1,7 @@
 #include "optimizer/photographs/camera/photograph_develop.h"
 
 #include "base/angle.h"
+#include "base/json/file_ledger_json.h"
 #include "base/option_id.h"
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_rows.h"
@@ -77,6 +78,7 @@ static status load_dark(struct photograph_process *k, const struct job_setup *se
         struct photograph_record r;
         snprintf(path, sizeof path, "%s/%s", folder, setup->dark_frame[i]);
         s = photograph_read_values(path, &plain, &im, &r, err);
+        if (s == STATUS_OK) file_ledger_append(k->files, setup->dark_frame[i], &r.info.ledger);
         if (s == STATUS_OK) s = add_dark(k, setup->dark_frame[i], r.info.exposure_s, &im, err);
     }
     for (size_t i = 0; i < k->n_dark && s == STATUS_OK; i++) {
@@ -136,6 +138,7 @@ static status read_exposure(const struct photograph_process *k, const char *fold
     status s = photograph_read_values(path, &own, &e->image[i], &e->record[i], err);
     if (s != STATUS_OK) return s;
     e->n++;
+    file_ledger_append(k->files, e->name[i], &e->record[i].info.ledger);
     return subtract_dark(k, &own, e->name[i], &e->record[i], &e->image[i], err);
 }
 

@@ -15,6 +15,8 @@
 #include "optimizer/photographs/camera/noise_record.h"
 #include "optimizer/photographs/reader/photograph.h"
 
+#include <jansson.h>
+
 struct job_photograph;
 struct job_rows;
 struct job_setup;
@@ -40,6 +42,9 @@ struct photograph_process {
     struct photograph_info color_info; /* of the photograph of the chart or of the white reference */
     struct color_chart chart;          /* with has_color and the document's has_chart */
     struct image chart_picture;        /* color_chart_picture; no pixels without a chart */
+    /* The list that the ledger of every file that is read is appended to (base/json/file_ledger_json.h), of the caller;
+     * NULL: not wanted. */
+    json_t *files;
 };
 
 void photograph_process_init(struct photograph_process *k);

@@ -65,14 +65,20 @@ static double neighbour_power(const struct image *im)
     return largest;
 }
 
-/* The document's value, or else the file's. */
-static double chosen(double given, double of_file) { return given > 0.0 ? given : of_file; }
+/* Returns the document's value, or else the file's, and enters the file's into its ledger. */
+static double chosen(struct file_ledger *ledger, const char *name, const char *unit, double given, double of_file)
+{
+    char reason[FILE_STATEMENT_BYTES];
+    snprintf(reason, sizeof reason, "the document says %.6g%s", given, unit);
+    if (!isnan(of_file)) file_ledger_add(ledger, name, given > 0.0 ? reason : NULL, "%.6g%s", of_file, unit);
+    return given > 0.0 ? given : of_file;
+}
 
 static double exposure_of(const struct job_photograph *p, struct photograph_info *info)
 {
-    info->exposure_s = chosen(p->exposure_s, info->exposure_s);
-    info->iso = chosen(p->iso, info->iso);
-    info->aperture = chosen(p->aperture, info->aperture);
+    info->exposure_s = chosen(&info->ledger, "exposure time", " s", p->exposure_s, info->exposure_s);
+    info->iso = chosen(&info->ledger, "ISO", "", p->iso, info->iso);
+    info->aperture = chosen(&info->ledger, "f-number", "", p->aperture, info->aperture);
     double exposure = 1.0;
     if (!isnan(info->exposure_s)) exposure *= info->exposure_s;
     if (!isnan(info->iso)) exposure *= info->iso / 100.0;

@@ -7,6 +7,7 @@
 #ifndef SELVEDGE_OPTIMIZER_PHOTOGRAPH_READER_H
 #define SELVEDGE_OPTIMIZER_PHOTOGRAPH_READER_H
 
+#include "base/files/file_ledger.h"
 #include "optimizer/job/document/picture_words.h"
 #include "renderer/image/image.h"
 
@@ -33,6 +34,7 @@ struct photograph_info {
     double black_level;               /* the subtracted level, in the file's values */
     double full_scale;                /* file values from black to saturation, which are 1 in the image; 1 for float */
     char camera[96];                  /* maker and model; "": not stated */
+    struct file_ledger ledger;        /* every statement of the file, also those above */
 };
 
 typedef struct photograph_reader {

@@ -323,6 +323,7 @@ static void put_job(json_t *json, struct report *report)
                                  : json_null());
     json_object_set_new(json, "stages", stages_json(report));
     json_object_set_new(json, "warnings", result_warnings_json(report));
+    json_object_set(json, "files", report->in.statements);
     json_object_set_new(json, "program", json_string(RESULT_PROGRAM));
 }
 

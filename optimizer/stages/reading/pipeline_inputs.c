@@ -55,6 +55,7 @@ static status load_observations(const struct stage_tools *tools, struct job_inpu
     char path[WORKER_PATH_BYTES];
     struct uneven_photographs uneven = {.tools = tools};
     worker_folder_path(tools->folder, JOB_FOLDER_INPUT, NULL, path);
+    in->rows.process.files = in->files;
     status s = photograph_process_load(&in->rows.process, in->doc->setup, in->doc->rows, path, err);
     if (s == STATUS_OK)
         s = observation_set_load(in->section.setup, in->section.rows, in->section.fit, path, &in->rows.process,
@@ -282,6 +283,8 @@ static status read_rows(const struct stage_tools *tools, struct job_inputs *in, 
 
 status job_inputs_read(const struct stage_tools *tools, struct job_inputs *in, struct error *err)
 {
+    in->files = json_array();
+    if (in->files == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job: out of memory");
     status s = read_document(tools, in, err);
     if (s == STATUS_OK) s = read_rows(tools, in, err);
     if (s == STATUS_OK && tools->folder->lock_fd >= 0)
@@ -310,6 +313,7 @@ void job_inputs_release(struct job_inputs *in)
     environment_free(in->rows.environment);
     fiber_profile_release(&in->fiber.profile);
     free(in->model);
+    json_decref(in->files);
 }
 
 size_t model_setup_n_free(const struct model_setup *m)

@@ -50,6 +50,11 @@ static void print_mean(const char *name, const struct photograph_mean *m)
     printf("  %-14s means of parts scatter by %.1f %%\n", "uniformity", 100.0 * m->block_contrast);
     if (r->info.less_trustworthy) printf("  %-14s 8 bits, or a camera's own processing: less trustworthy\n", "warning");
     if (m->warning[0] != '\0') printf("  %-14s %s\n", "warning", m->warning);
+    for (size_t i = 0; i < r->info.ledger.n; i++) {
+        const struct file_statement *f = &r->info.ledger.item[i];
+        printf("  %-14s %s %s: %s%s\n", i == 0 ? "the file states" : "", f->name, f->value,
+               f->use == FILE_STATEMENT_APPLIED ? "applied" : "not used, ", f->reason);
+    }
 }
 
 /* Draws the crop of p in the whole picture of the file at `path`. */

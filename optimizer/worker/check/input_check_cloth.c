@@ -1,3 +1,4 @@
+#include "base/json/file_ledger_json.h"
 #include "base/option_id.h"
 #include "base/warning.h"
 #include "geometry/fibers/fiber_set.h"
@@ -90,6 +91,7 @@ static void check_volume(struct input_check *c)
     snprintf(raw.type, sizeof raw.type, "%s", doc->scan->raw_type);
     status s = volume_source_open_declared(path, doc->scan->n_file, &raw, &source, &fault);
     if (s == STATUS_OK) check_voxel_size(c, volume_source_describe(source));
+    if (s == STATUS_OK) file_ledger_append(c->files, doc->scan->file[0], &volume_source_describe(source)->ledger);
     if (s == STATUS_OK) s = look_at_slices(source, range, &fault);
     if (s != STATUS_OK) input_check_fault(c, &fault);
     volume_source_close(source);

@@ -195,6 +195,7 @@ void input_check_rows(struct input_check *c)
     if (job_document_kind(c->doc) == JOB_OF_PROFILE) check_profile(c);
     if (job_document_kind(c->doc) != JOB_OF_FIT) return;
     photograph_process_init(&process);
+    process.files = c->files;
     if (c->doc->rows->measurement_file[0] != '\0')
         usable = check_table(c);
     else {
@@ -203,6 +204,7 @@ void input_check_rows(struct input_check *c)
             input_check_fault(c, &fault);
             photograph_process_release(&process);
             photograph_process_init(&process);
+            process.files = c->files;
         }
         usable = check_photographs(c, &process) && loaded;
     }

@@ -31,8 +31,8 @@ static void look_for(void *context, const char *name, const char *role)
 
 static json_t *report_of(struct input_check *c)
 {
-    return json_pack("{s:o, s:o, s:I}", "faults", job_faults_json(c->fault), "warnings", c->warnings, "n_file",
-                     (json_int_t)c->n_file);
+    return json_pack("{s:o, s:o, s:o, s:I}", "faults", job_faults_json(c->fault), "warnings", c->warnings, "files",
+                     c->files, "n_file", (json_int_t)c->n_file);
 }
 
 status job_check(const char *path, const char *folder, json_t **report, struct error *err)
@@ -44,9 +44,11 @@ status job_check(const char *path, const char *folder, json_t **report, struct e
     if (s != STATUS_OK) return s;
     c.fault = calloc(1, sizeof *c.fault);
     c.warnings = json_array();
-    if (c.fault == NULL || c.warnings == NULL) {
+    c.files = json_array();
+    if (c.fault == NULL || c.warnings == NULL || c.files == NULL) {
         s = error_set(err, STATUS_NO_MEMORY, "cannot check '%s': out of memory", path);
         json_decref(c.warnings);
+        json_decref(c.files);
         goto out;
     }
     job_document_inspect(text, n, &c.doc, c.fault);
