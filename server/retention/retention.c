@@ -70,21 +70,22 @@ static status add_source(struct id_set *set, const char *document, struct error 
 static status find_sources(struct job_service *v, struct id_set *set, struct error *err)
 {
     static const enum job_state open[] = {JOB_DRAFT, JOB_QUEUED, JOB_RUNNING, JOB_PAUSED};
-    status s = STATUS_OK;
+    status found = STATUS_OK;
     *set = (struct id_set){0};
-    for (size_t k = 0; s == STATUS_OK && k < sizeof open / sizeof *open; k++) {
+    for (size_t k = 0; found == STATUS_OK && k < sizeof open / sizeof *open; k++) {
         struct job_row *row = NULL;
         size_t n = 0;
         const struct job_query q = {.states = 1U << open[k], .limit = SIZE_MAX >> 1};
-        s = store_job_list(v->store, &q, &row, &n, err);
-        for (size_t i = 0; s == STATUS_OK && i < n; i++) {
+        found = store_job_list(v->store, &q, &row, &n, err);
+        for (size_t i = 0; found == STATUS_OK && i < n; i++) {
             struct job_row full = {0};
-            if (store_job_get(v->store, row[i].id, &full, NULL) == STATUS_OK) s = add_source(set, full.document, err);
+            if (store_job_get(v->store, row[i].id, &full, NULL) == STATUS_OK)
+                found = add_source(set, full.document, err);
             job_row_release(&full);
         }
         job_rows_free(row, n);
     }
-    return s;
+    return found;
 }
 
 /* ---- the plan ---- */

@@ -50,13 +50,20 @@ status store_identity(struct store *store, char id[STORE_ID_BYTES], struct error
     return ask(store, id, STORE_ID_BYTES, err, "SELECT id FROM identity WHERE one = 1", NULL, NULL);
 }
 
+void store_server_read(const char *letters, struct store_server *server)
+{
+    const size_t n = strlen(letters);
+    server->syncs = n > 0 && letters[0] == 't';
+    server->encrypted = n > 1 && letters[1] == 't';
+    server->local = n > 2 && letters[2] == 't';
+}
+
 status store_server_look(struct store *store, struct store_server *server, struct error *err)
 {
     char how[8];
     *server = (struct store_server){0};
     status s = ask(store, server->version, sizeof server->version, err, "SELECT current_setting('server_version')",
                    NULL, NULL);
-    /* three letters, t or f each */
     if (s == STATUS_OK)
         s = ask(store, how, sizeof how, err,
                 "SELECT concat(current_setting('fsync') = 'on' AND current_setting('full_page_writes') = 'on', "
@@ -65,9 +72,7 @@ status store_server_look(struct store *store, struct store_server *server, struc
                 NULL, NULL);
     if (s != STATUS_OK) return s;
     server->version[strcspn(server->version, " ")] = '\0';
-    server->syncs = how[0] == 't';
-    server->encrypted = how[0] != '\0' && how[1] == 't';
-    server->local = how[0] != '\0' && how[1] != '\0' && how[2] == 't';
+    store_server_read(how, server);
     return STATUS_OK;
 }
 

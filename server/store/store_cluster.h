@@ -30,6 +30,9 @@ struct store_server {
     bool encrypted; /* the connection is */
     bool local;     /* the connection does not leave this machine */
 };
+/* Reads the server's answer: three letters, t or f, for the three members in their order. A missing letter is an
+ * f. */
+void store_server_read(const char *letters, struct store_server *server);
 status store_server_look(struct store *store, struct store_server *server, struct error *err);
 /* The server's clock. */
 status store_clock(struct store *store, double *now_unix_s, struct error *err);

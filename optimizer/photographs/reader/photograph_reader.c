@@ -42,8 +42,8 @@ static const photograph_reader *reader_of_name(const char *path)
 
 static const photograph_reader *reader_of_content(const uint8_t first[PHOTOGRAPH_FIRST_BYTES])
 {
-    for (size_t i = 0; i < photograph_reader_count(); i++)
-        if (reader[i]->recognise != NULL && reader[i]->recognise(first)) return reader[i];
+    for (size_t k = 0; k < photograph_reader_count(); k++)
+        if (reader[k]->recognise != NULL && reader[k]->recognise(first)) return reader[k];
     return NULL;
 }
 

@@ -4,9 +4,14 @@
 
 #include "server/store/sql/store_driver.h"
 
+#include <stdint.h>
+
 extern const struct store_driver store_sqlite, store_postgres;
 
 /* Returns the first row that takes the address; the last row takes any path. */
 const struct store_driver *store_driver_of(const char *address);
+/* Bytes that SQLite reserves for its log (WAL) on a disk with n_free bytes: its usual size, at most an eighth of the
+ * free space, and of little space a mebibyte, at most three quarters. */
+int64_t store_sqlite_log_bytes(int64_t n_free);
 
 #endif

@@ -241,8 +241,15 @@ static status check_version(struct store_link *link, const char *path, struct er
                      path, version, n_migration);
 }
 
-/* Reserves blocks for the WAL up to its usual end, at most an eighth of the free space (of little space: most of it),
- * so that changes succeed on a disk that becomes full. The size of the file stays, so SQLite does not see it. */
+int64_t store_sqlite_log_bytes(int64_t n_free)
+{
+    int64_t most = n_free - n_free / 4, n = n_free / 8;
+    if (n < WAL_SMALL_BYTES) n = most < WAL_SMALL_BYTES ? most : WAL_SMALL_BYTES;
+    return n > WAL_BYTES ? WAL_BYTES : n;
+}
+
+/* Reserves blocks for the WAL up to its usual end, so that changes succeed on a disk that becomes full. The
+ * size of the file stays, so SQLite does not see it. */
 static void reserve_wal(const char *path)
 {
     char wal[4096 + 8];
@@ -250,9 +257,7 @@ static void reserve_wal(const char *path)
     snprintf(wal, sizeof wal, "%s-wal", path);
     int fd = open(wal, O_WRONLY | O_CLOEXEC | O_NOFOLLOW);
     if (fd >= 0 && fstatfs(fd, &fs) == 0) {
-        int64_t n_free = (int64_t)fs.f_bavail * (int64_t)fs.f_bsize, most = n_free - n_free / 4, n = n_free / 8;
-        if (n < WAL_SMALL_BYTES) n = most < WAL_SMALL_BYTES ? most : WAL_SMALL_BYTES;
-        if (n > WAL_BYTES) n = WAL_BYTES;
+        int64_t n = store_sqlite_log_bytes((int64_t)fs.f_bavail * (int64_t)fs.f_bsize);
         if (n > 0 && fallocate(fd, FALLOC_FL_KEEP_SIZE, 0, (off_t)n) != 0) {
             /* changes may then find the disk full, and say so */
         }

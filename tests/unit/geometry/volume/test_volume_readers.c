@@ -113,6 +113,21 @@ static void test_wrong_byte_order(void **state)
     }
 }
 
+/* Values that are no numbers in the stated byte order, and a picture in the other. */
+static void test_wrong_byte_order_of_floats(void **state)
+{
+    enum { N = 32 };
+    static float picture[N * N];
+    for (uint32_t i = 0; i < N * N; i++) { /* the low bytes are the exponent of the other order: all ones */
+        uint32_t bits = (0x3f800000u + (i % N << 16)) | 0xff7fu;
+        memcpy(&picture[i], &bits, sizeof bits);
+    }
+    struct volume_raw_declaration raw = {.n = {N, N, 1}, .type = "float32", .big_endian = true};
+    const char *path = scratch_path(state, "f.raw");
+    scratch_write(path, (const uint8_t *)picture, sizeof picture);
+    scan_expect_refused(path, &raw, STATUS_FORMAT, OPTION_SCAN_FILES, "stated byte order is wrong");
+}
+
 static void test_metaimage(void **state)
 {
     static const uint8_t data[8] = {1, 0, 0, 1, 255, 255, 2, 1};
@@ -251,6 +266,7 @@ int main(void)
         cmocka_unit_test(test_raw),
         cmocka_unit_test(test_registry),
         cmocka_unit_test(test_wrong_byte_order),
+        cmocka_unit_test(test_wrong_byte_order_of_floats),
         cmocka_unit_test(test_metaimage),
         cmocka_unit_test(test_metaimage_units),
         cmocka_unit_test(test_vol),
