@@ -164,7 +164,7 @@ $(BUILD)/bin/selvedged: $(BUILD)/obj/server/main/daemon_main.c.o $(L)server.a $(
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_SERVER)
 # nothing but the daemon, when its settings ask for it, loads libpq
-$(BUILD)/lib/selvedge-postgresql.so: $(addprefix $(BUILD)/obj/shared/,server/store/drivers/plugin/postgres_plugin.c.o base/utf8.c.o)
+$(BUILD)/lib/selvedge-postgresql.so: $(addprefix $(BUILD)/obj/shared/,server/store/drivers/postgres_plugin.c.o base/utf8.c.o)
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -shared -Wl,--exclude-libs,ALL -o $@ $^ -lpq
 $(BUILD)/obj/shared/%.c.o: %.c

@@ -3,7 +3,7 @@
  *
  *   JOB/job.json            the job document (job_document.h), written by the user or by the daemon: when the job is
  *                           created, and when its document is replaced
- *   JOB/journal.rec         the daemon's journal of the job (server/store/journal/job_journal.h); absent when
+ *   JOB/journal.rec         the daemon's journal of the job (server/store/job_journal.h); absent when
  *                           run by hand
  *   JOB/input/<name>        input files under the names that job.json uses. The daemon verifies them, the worker reads
  *                           them.
@@ -11,7 +11,7 @@
  *   JOB/lock                The worker holds a flock() on it while it lives.
  *   JOB/claim-<token>       the start of a worker that has the attempt of this token (option --start), when an engine
  *                           could start one twice
- *   JOB/backend.json        where an engine other than the daemon runs the job (server/reports/backend_note.h)
+ *   JOB/backend.json        where an engine other than the daemon runs the job (server/files/backend_note.h)
  *   JOB/status.json         The worker replaces it at least every second while it lives.
  *   JOB/series.rec          record file (durable.h), append-only: one JSON object for each step of the fit
  *   JOB/log.txt             the worker's log, append-only

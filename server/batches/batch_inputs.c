@@ -1,9 +1,9 @@
 #include "server/batches/batch_inputs.h"
+#include "server/files/known_input.h"
+#include "server/files/upload_file.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_change.h"
 #include "server/settings/job_paths.h"
-#include "server/uploads/known_input.h"
-#include "server/uploads/upload_file.h"
 
 #include <stdio.h>
 #include <stdlib.h>

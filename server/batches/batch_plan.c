@@ -1,7 +1,7 @@
 #include "server/batches/batch_plan.h"
 #include "base/files/disk_use.h"
 #include "server/batches/batch_service.h"
-#include "server/reports/worker_files.h"
+#include "server/files/worker_files.h"
 #include "server/settings/job_paths.h"
 #include "server/workers/input_judge.h"
 

@@ -1,8 +1,8 @@
 #include "server/batches/batch_view.h"
 #include "base/clock.h"
 #include "server/batches/batch_service.h"
+#include "server/files/worker_files.h"
 #include "server/jobs/queue_forecast.h"
-#include "server/reports/worker_files.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 /* Whether the cluster of the settings takes jobs. Nothing is submitted: Slurm is asked whether it would take one. */
 #include "server/doctor/doctor_report.h"
-#include "server/workers/slurm/slurm_request.h"
+#include "server/workers/backends/slurm_request.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -8,7 +8,7 @@
 #include "server/doctor/doctor_report.h"
 #include "server/rescue/input_evidence.h"
 #include "server/settings/job_paths.h"
-#include "server/store/journal/job_journal.h"
+#include "server/store/job_journal.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -1,9 +1,9 @@
 /* The database that daemons share, and the data folder that they share with it. */
 #include "base/clock.h"
-#include "server/cluster/shared_folder.h"
 #include "server/doctor/doctor_report.h"
 #include "server/store/store_cluster.h"
 #include "server/store/store_settings.h"
+#include "server/workers/shared_folder.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -4,9 +4,9 @@
 #include "optimizer/job/job_outline.h"
 #include "server/endpoints/handlers.h"
 #include "server/endpoints/request_json.h"
+#include "server/files/known_input.h"
 #include "server/http/http_reply.h"
 #include "server/jobs/job_service.h"
-#include "server/uploads/known_input.h"
 #include "server/workers/input_judge.h"
 
 #include <stdlib.h>

@@ -1,11 +1,11 @@
 #include "server/http/http_server.h"
 #include "server/http/access_guard.h"
-#include "server/http/connections/connection_table.h"
-#include "server/http/connections/library_refusal.h"
+#include "server/http/connection_table.h"
 #include "server/http/http_guard.h"
 #include "server/http/http_listen.h"
 #include "server/http/http_reply.h"
 #include "server/http/http_tls.h"
+#include "server/http/library_refusal.h"
 
 #include <errno.h>
 #include <stdio.h>

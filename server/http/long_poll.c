@@ -1,8 +1,8 @@
 #include "server/http/long_poll.h"
 #include "base/clock.h"
-#include "server/events/change_feed.h"
 #include "server/http/access_guard.h"
 #include "server/http/http_reply.h"
+#include "server/jobs/change_feed.h"
 
 /* Least time between two looks of one request at its job or list: a running job changes with every heartbeat, and the
  * list with the heartbeats of all jobs. */

@@ -4,7 +4,7 @@
 #define SELVEDGE_SERVER_JOB_ACCESS_H
 
 #include "server/jobs/job_service.h"
-#include "server/store/journal/job_journal.h"
+#include "server/store/job_journal.h"
 
 /* A random id for a job or an upload. */
 void job_new_id(char out[STORE_ID_BYTES]);

@@ -2,12 +2,12 @@
 #include "base/files/durable.h"
 #include "optimizer/job/document/job_file_name.h"
 #include "optimizer/job/job_outline.h"
+#include "server/files/known_input.h"
+#include "server/files/upload_file.h"
 #include "server/jobs/disk_reserve.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_change.h"
 #include "server/settings/job_paths.h"
-#include "server/uploads/known_input.h"
-#include "server/uploads/upload_file.h"
 
 #include <stdio.h>
 #include <stdlib.h>

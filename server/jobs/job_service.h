@@ -5,10 +5,10 @@
 
 #include "base/log.h"
 #include "server/access/access_registry.h"
+#include "server/files/upload.h"
 #include "server/settings/settings.h"
-#include "server/store/journal/journal_seal.h"
+#include "server/store/journal_seal.h"
 #include "server/store/store.h"
-#include "server/uploads/upload.h"
 
 #include <jansson.h>
 #include <pthread.h>

@@ -1,7 +1,7 @@
 #include "server/jobs/queue_forecast.h"
 #include "base/clock.h"
+#include "server/files/worker_files.h"
 #include "server/jobs/queue_turn.h"
-#include "server/reports/worker_files.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 #include "server/rescue/database_age.h"
 #include "server/settings/job_paths.h"
 #include "server/store/drivers/store_backup.h"
-#include "server/store/journal/job_journal.h"
+#include "server/store/job_journal.h"
 
 #include <dirent.h>
 #include <stdlib.h>

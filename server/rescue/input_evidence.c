@@ -1,8 +1,8 @@
 #include "server/rescue/input_evidence.h"
 #include "optimizer/job/document/job_file_name.h"
 #include "optimizer/job/job_outline.h"
+#include "server/files/upload_file.h"
 #include "server/jobs/job_access.h"
-#include "server/uploads/upload_file.h"
 
 #include <errno.h>
 #include <fcntl.h>

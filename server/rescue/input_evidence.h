@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_SERVER_INPUT_EVIDENCE_H
 #define SELVEDGE_SERVER_INPUT_EVIDENCE_H
 
-#include "server/store/journal/job_journal.h"
+#include "server/store/job_journal.h"
 
 #include <stdio.h>
 

@@ -2,7 +2,7 @@
 #include "base/files/durable.h"
 #include "server/rescue/rebuild.h"
 #include "server/settings/job_paths.h"
-#include "server/store/journal/job_journal.h"
+#include "server/store/job_journal.h"
 #include "server/store/store_delivery.h"
 #include "server/store/store_settings.h"
 

@@ -8,7 +8,7 @@
 #define SELVEDGE_SERVER_STORE_H
 
 #include "base/status.h"
-#include "server/store/sql/store_driver.h"
+#include "server/store/drivers/store_driver.h"
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_SERVER_STORE_ROWS_H
 #define SELVEDGE_SERVER_STORE_ROWS_H
 
-#include "server/store/sql/store_sql.h"
+#include "server/store/drivers/store_sql.h"
 #include "server/store/store.h"
 
 struct store {

@@ -1,8 +1,8 @@
 #include "server/views/job_row_view.h"
 #include "optimizer/job/job_folder.h"
+#include "server/files/worker_files.h"
 #include "server/jobs/job_tags.h"
 #include "server/jobs/queue_forecast.h"
-#include "server/reports/worker_files.h"
 #include "server/settings/job_paths.h"
 
 #include <math.h>

@@ -3,10 +3,10 @@
 #include "base/version.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/stage_table.h"
+#include "server/files/backend_note.h"
+#include "server/files/worker_files.h"
 #include "server/jobs/job_tags.h"
 #include "server/jobs/queue_forecast.h"
-#include "server/reports/backend_note.h"
-#include "server/reports/worker_files.h"
 #include "server/retention/job_keep.h"
 #include "server/settings/job_paths.h"
 

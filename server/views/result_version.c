@@ -6,7 +6,7 @@
 #include "base/json/foreign_json.h"
 #include "optimizer/job/document/job_document.h"
 #include "optimizer/job/job_folder.h"
-#include "server/reports/worker_words.h"
+#include "server/files/worker_words.h"
 #include "server/settings/job_paths.h"
 #include "server/views/result_files.h"
 

@@ -3,8 +3,8 @@
 #include "base/files/foreign_file.h"
 #include "base/json/foreign_json.h"
 #include "optimizer/job/job_folder.h"
+#include "server/files/worker_words.h"
 #include "server/jobs/job_change.h"
-#include "server/reports/worker_words.h"
 #include "server/settings/job_paths.h"
 #include "server/workers/backends/worker_process.h"
 

@@ -201,7 +201,7 @@ def test_dashboard_and_vendor_files(daemon):
         assert r.status_code == 200 and r.headers["Content-Type"].startswith(kind) and len(r.content) > 500
     for r in (daemon.get("/vendor/three.min.js"), page, daemon.get("/nothing")):
         assert "default-src 'self'" in r.headers["Content-Security-Policy"] and r.headers["X-Content-Type-Options"] == "nosniff"
-    for name in ("README.md", "dashboard_test.py", "../cli/cli_main.c"):
+    for name in ("README.md", "dashboard_test.py", "../cli/commands/cli_main.c"):
         problem(daemon.get("/" + name), 404, "not_found")
 
 

@@ -1,6 +1,6 @@
 #include "clients/cli/batch/batch_rows.h"
 #include "base/json/document_path.h"
-#include "clients/cli/folder/sample_files.h"
+#include "clients/cli/batch/sample_files.h"
 #include "clients/cli/text/csv_table.h"
 
 #include <dirent.h>

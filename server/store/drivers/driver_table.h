@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_SERVER_DRIVER_TABLE_H
 #define SELVEDGE_SERVER_DRIVER_TABLE_H
 
-#include "server/store/sql/store_driver.h"
+#include "server/store/drivers/store_driver.h"
 
 #include <stdint.h>
 

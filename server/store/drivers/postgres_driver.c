@@ -3,7 +3,7 @@
 #include "base/machine/program_folder.h"
 #include "server/store/drivers/driver_table.h"
 #include "server/store/drivers/store_schema.h"
-#include "server/store/sql/store_sql.h"
+#include "server/store/drivers/store_sql.h"
 
 #include <dlfcn.h>
 #include <stdio.h>

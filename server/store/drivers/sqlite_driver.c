@@ -2,7 +2,7 @@
 #include "server/store/drivers/driver_table.h"
 #include "server/store/drivers/store_backup.h"
 #include "server/store/drivers/store_schema.h"
-#include "server/store/sql/store_sql.h"
+#include "server/store/drivers/store_sql.h"
 
 #include <errno.h>
 #include <fcntl.h>

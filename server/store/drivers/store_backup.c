@@ -1,7 +1,7 @@
 #include "server/store/drivers/store_backup.h"
 #include "base/files/durable.h"
 #include "server/store/drivers/store_schema.h"
-#include "server/store/sql/store_sql.h"
+#include "server/store/drivers/store_sql.h"
 
 #include <errno.h>
 #include <sqlite3.h>

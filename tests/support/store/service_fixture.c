@@ -1,6 +1,6 @@
 #include "tests/support/store/service_fixture.h"
+#include "server/main/service_open.h"
 #include "server/settings/job_paths.h"
-#include "server/start/service_open.h"
 #include "tests/support/scratch_folder.h"
 
 #include <setjmp.h>

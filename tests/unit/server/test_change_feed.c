@@ -1,6 +1,6 @@
 /* Which watches a change wakes, and what else ends a wait. */
 #include "base/clock.h"
-#include "server/events/change_feed.h"
+#include "server/jobs/change_feed.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,8 +1,8 @@
 /* Leases of two daemons on one database: how they are renewed, and when one daemon takes over from another. */
 #include "base/clock.h"
-#include "server/cluster/lease_keeper.h"
 #include "server/store/store_cluster.h"
 #include "server/store/store_rows.h"
+#include "server/workers/lease_keeper.h"
 #include "tests/support/store/store_fixture.h"
 
 #include <setjmp.h>

@@ -1,5 +1,5 @@
 /* What a job asks of Slurm: its memory and cores, the options of sbatch, the script. */
-#include "server/workers/slurm/slurm_request.h"
+#include "server/workers/backends/slurm_request.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

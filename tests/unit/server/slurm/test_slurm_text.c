@@ -1,6 +1,6 @@
 /* What Slurm's commands print, recorded from Slurm 22.05.8 of Debian 12 with two virtual nodes, and what it means. */
 #include "optimizer/job/job_folder.h"
-#include "server/workers/slurm/slurm_text.h"
+#include "server/workers/backends/slurm_text.h"
 
 #include <setjmp.h>
 #include <signal.h>

@@ -1,7 +1,7 @@
 /* The journal of a job: everything that is written comes back, later records replace earlier ones, and damage, links
  * and values that no daemon writes do no harm. */
 #include "optimizer/job/job_folder.h"
-#include "server/store/journal/job_journal.h"
+#include "server/store/job_journal.h"
 #include "tests/support/scratch_folder.h"
 
 #include <setjmp.h>

@@ -1,7 +1,7 @@
 /* Seals of journals: who lacks the key makes none, and only sealed records say when a job was changed last. */
 #include "optimizer/job/job_folder.h"
-#include "server/store/journal/job_journal.h"
-#include "server/store/journal/journal_seal.h"
+#include "server/store/job_journal.h"
+#include "server/store/journal_seal.h"
 #include "tests/support/scratch_folder.h"
 
 #include <setjmp.h>
