@@ -142,7 +142,7 @@ $(BUILD)/obj/renderer/scene/scene_grid_walk.c.o: CFLAGS_ALL += -ffp-contract=fas
 
 # a program says what its processor lacks; the compiler may use that everywhere but here
 ifeq ($(ARCH),x86_64)
-$(BUILD)/obj/base/machine/processor.c.o: CFLAGS_ALL += -march=x86-64
+$(BUILD)/obj/base/processor.c.o: CFLAGS_ALL += -march=x86-64
 endif
 
 L = $(BUILD)/lib/lib
@@ -192,7 +192,7 @@ generate: $(PRINT_OPTIONS) $(BUILD)/bin/selvedge-worker ## write what follows fr
 	@/usr/bin/python3 config/generate_endpoints.py
 
 # tables of light that is scattered in the medulla of a hair, checked in as source; made again after a change of their grid
-MEDULLA := renderer/scattering/models/fur/medulla
+MEDULLA := renderer/scattering/models/fur
 $(BUILD)/tools/medulla-tables: $(BUILD)/obj/$(MEDULLA)/medulla_tables_main.c.o $(L)renderer.a $(L)base.a
 	@mkdir -p $(@D)
 	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_BASE)
@@ -209,8 +209,7 @@ wave-tables: $(BUILD)/tools/wave-tables ## make the tables of wave_silk.v1 and i
 	@$(BUILD)/tools/wave-tables $(WAVE)
 
 # tables of speckle, checked in as source; made again after a change of a section, of the roughness or of the bands
-SPECKLE := renderer/scattering/models/wave/speckle
-$(BUILD)/tools/speckle-tables: $(addprefix $(BUILD)/obj/$(SPECKLE)/,speckle_tables_main.c.o speckle_instances.c.o) $(BUILD)/obj/renderer/scattering/speckle.c.o \
+$(BUILD)/tools/speckle-tables: $(addprefix $(BUILD)/obj/$(WAVE)/,speckle_tables_main.c.o speckle_instances.c.o) $(BUILD)/obj/renderer/scattering/speckle.c.o \
 		$(BUILD)/obj/$(WAVE)/wave_sections.c.o $(patsubst %,$(BUILD)/obj/%.o,$(wildcard renderer/scattering/models/wave/solver/*.c)) $(L)base.a
 	@mkdir -p $(@D)
 	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_WAVE) $(LINK_BASE)

@@ -27,7 +27,7 @@ SLOW_CHECKS = ["clang", "tsan-requests"]
 LONG_UNIT_TESTS = ["unit/renderer/test_scattering", "unit/renderer/fast/test_precompute_journal", "unit/renderer/preview/test_joint_filter",
                    "unit/renderer/dual/test_dual_scattering", "unit/geometry/test_lumen_fill", "unit/geometry/test_lumen_refill",
                    "unit/renderer/fast/test_deep_light",
-                   "unit/geometry/mesh/test_drape", "unit/renderer/fast/test_fast_tables", "unit/geometry/fibers/test_shape_measure",
+                   "unit/renderer/mesh/test_drape", "unit/renderer/fast/test_fast_tables", "unit/geometry/fibers/test_shape_measure",
                    "unit/geometry/weave/test_weave_detect", "unit/renderer/preview/test_sheared_filter", "unit/optimizer/report/test_hair_fit",
                    "unit/geometry/volume/test_slice_tiles", "unit/renderer/fast/test_gaussian_light", "unit/geometry/test_alignment",
                    "unit/geometry/volume/test_bad_input", "unit/geometry/test_reconstruct", "unit/renderer/table/test_appearance_table"]

@@ -3,7 +3,7 @@
 #define SELVEDGE_GEOMETRY_CLOTH_WORK_H
 
 #include "geometry/cloth/cloth.h"
-#include "geometry/strands/yarn_path.h"
+#include "geometry/cloth/yarn_path.h"
 
 enum { POINTS_PER_CROSSING = 24, N_WAVE = 4, MAX_CLOTH_NODES = 20000000 };
 

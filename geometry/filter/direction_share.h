@@ -4,7 +4,7 @@
 #ifndef SELVEDGE_GEOMETRY_DIRECTION_SHARE_H
 #define SELVEDGE_GEOMETRY_DIRECTION_SHARE_H
 
-#include "geometry/record/reconstruct_option.h"
+#include "geometry/grade/reconstruct_option.h"
 #include "geometry/volume/volume_slabs.h"
 
 /* Data of an order RANK_ORDER_DIRECTIONS. */

@@ -4,7 +4,7 @@
 
 #include "base/progress.h"
 #include "base/thread_pool.h"
-#include "geometry/record/reconstruct_option.h"
+#include "geometry/grade/reconstruct_option.h"
 #include "geometry/volume/volume.h"
 
 /* J of solid material, a block of density 1. */

@@ -4,8 +4,8 @@
 
 #include "base/progress.h"
 #include "base/thread_pool.h"
-#include "geometry/record/reconstruct_option.h"
-#include "geometry/record/reconstruct_report.h"
+#include "geometry/grade/reconstruct_option.h"
+#include "geometry/grade/reconstruct_report.h"
 #include "geometry/volume/volume.h"
 
 /* Computes d from v, whose fibers are diameter_voxel thick. Options that are left to the data are chosen from v and

@@ -4,7 +4,7 @@
 
 #include "base/progress.h"
 #include "base/thread_pool.h"
-#include "geometry/record/reconstruct_option.h"
+#include "geometry/grade/reconstruct_option.h"
 #include "geometry/volume/volume.h"
 
 /* Computes directions d for rows row[0] .. row[1] - 1 of v, whose fibers are diameter_voxel thick, with options that

@@ -1,7 +1,7 @@
 #include "geometry/phantom/phantom_section.h"
 
 #include "base/rng.h"
-#include "geometry/strands/strand.h"
+#include "geometry/cloth/strand.h"
 
 #include <math.h>
 #include <string.h>

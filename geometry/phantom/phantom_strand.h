@@ -2,8 +2,8 @@
 #ifndef SELVEDGE_GEOMETRY_PHANTOM_STRAND_H
 #define SELVEDGE_GEOMETRY_PHANTOM_STRAND_H
 
+#include "geometry/cloth/yarn_path.h"
 #include "geometry/phantom/phantom_option.h"
-#include "geometry/strands/yarn_path.h"
 
 /* The strands of a phantom, and the properties of a real yarn as made. */
 struct phantom_strands {

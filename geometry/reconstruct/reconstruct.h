@@ -7,8 +7,8 @@
 #define SELVEDGE_GEOMETRY_RECONSTRUCT_H
 
 #include "geometry/fibers/fiber_set.h"
-#include "geometry/record/reconstruct_option.h"
-#include "geometry/record/reconstruct_report.h"
+#include "geometry/grade/reconstruct_option.h"
+#include "geometry/grade/reconstruct_report.h"
 #include "geometry/volume/volume.h"
 
 #include "base/progress.h"

@@ -4,7 +4,7 @@
 
 #include "geometry/fibers/lines/line_ends.h"
 #include "geometry/fibers/shape/radius.h"
-#include "geometry/trace/trace_job.h"
+#include "geometry/reconstruct/trace_job.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -10,7 +10,7 @@
 #include "geometry/diameter/lumen_filter.h"
 #include "geometry/grade/scan_noise.h"
 #include "geometry/reconstruct/reconstruct.h"
-#include "geometry/trace/trace_job.h"
+#include "geometry/reconstruct/trace_job.h"
 
 #include <math.h>
 #include <string.h>

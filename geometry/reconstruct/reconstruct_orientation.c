@@ -4,7 +4,7 @@
 #include "geometry/diameter/fiber_diameter.h"
 #include "geometry/filter/filter_choice.h"
 #include "geometry/filter/filter_directions.h"
-#include "geometry/trace/trace_grid.h"
+#include "geometry/reconstruct/trace_grid.h"
 #include "geometry/volume/volume_rescale.h"
 
 #include <math.h>

@@ -4,7 +4,7 @@
 
 #include "geometry/grade/unresolved_directions.h"
 #include "geometry/orientation/direction_noise.h"
-#include "geometry/trace/line_directions.h"
+#include "geometry/reconstruct/line_directions.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 #include "optimizer/job/job_parse.h"
-#include "base/json/json_depth.h"
+#include "base/files/json_depth.h"
 #include "optimizer/job/checks/job_document_parts.h"
 #include "optimizer/job/checks/job_faults.h"
 #include "optimizer/job/document/job_fit.h"

@@ -1,5 +1,5 @@
 #include "optimizer/report/report_page.h"
-#include "base/json/file_ledger_json.h"
+#include "base/files/file_ledger_json.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/page_charts.h"
 #include "optimizer/report/page_pictures.h"

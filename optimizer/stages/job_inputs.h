@@ -79,7 +79,7 @@ struct job_inputs {
     struct model_setup *model; /* in the order of the document */
     struct cloth_numbers number;
     struct texture_guess texture;
-    json_t *files; /* ledgers of the files that were read (base/json/file_ledger_json.h) */
+    json_t *files; /* ledgers of the files that were read (base/files/file_ledger_json.h) */
 };
 
 void job_inputs_init(struct job_inputs *in);

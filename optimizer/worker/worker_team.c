@@ -4,7 +4,7 @@
 #include "optimizer/report/result/result_json.h"
 #include "optimizer/stages/run/document_fingerprint.h"
 #include "renderer/estimate/rank_helper.h"
-#include "renderer/ranks/rank_orders.h"
+#include "renderer/estimate/rank_orders.h"
 #include "renderer/scene/scene_pack.h"
 
 #include <fcntl.h>

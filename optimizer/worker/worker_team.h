@@ -6,7 +6,7 @@
 
 #include "base/log.h"
 #include "base/ranks/rank_team.h"
-#include "renderer/ranks/shared_cloth.h"
+#include "renderer/estimate/shared_cloth.h"
 
 /* The place of this process among the ranks, as selvedge-mpi gives it: "FD,RANK,RANKS", or "none". */
 struct worker_team_place {

@@ -2,8 +2,8 @@
 
 #include "renderer/estimate/estimate_blocks.h"
 #include "renderer/estimate/radiance_source.h"
+#include "renderer/estimate/rank_orders.h"
 #include "renderer/estimate/rotation_mean.h"
-#include "renderer/ranks/rank_orders.h"
 
 #include <stdint.h>
 

@@ -1,8 +1,8 @@
 #include "renderer/estimate/radiance_source.h"
 
-#include "renderer/diffusion/diffusion_radiance.h"
-#include "renderer/dual/dual_radiance.h"
 #include "renderer/fast/fast_radiance.h"
+#include "renderer/quick/diffusion_radiance.h"
+#include "renderer/quick/dual_radiance.h"
 #include "renderer/transport/surface/surface_radiance.h"
 #include "renderer/transport/volume/volume_radiance.h"
 

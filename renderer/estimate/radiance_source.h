@@ -2,7 +2,7 @@
  * the derivative check are made from. Three implementations stand behind one table of functions: fibers with a
  * scattering model (surface/surface_radiance.c), the same by tables (renderer/fast/fast_radiance.c), and a density
  * volume with a phase function (volume/volume_radiance.c). Two more serve previews: dual scattering of fibers
- * (renderer/dual/dual_radiance.c), and diffusion in a pile (renderer/diffusion/diffusion_radiance.c).
+ * (renderer/quick/dual_radiance.c), and diffusion in a pile (renderer/quick/diffusion_radiance.c).
  *
  * Derivatives are numbered flat: the parameters of set 0, then of set 1, ...; derivatives of channel c start at c *
  * n_flat. A source is immutable after radiance_source_init: threads share it. It copies nothing of its input.

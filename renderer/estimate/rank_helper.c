@@ -2,9 +2,9 @@
 
 #include "geometry/reconstruct/slab_helper.h"
 #include "renderer/estimate/estimate.h"
+#include "renderer/estimate/rank_orders.h"
+#include "renderer/estimate/rank_request.h"
 #include "renderer/estimate/render.h"
-#include "renderer/ranks/rank_orders.h"
-#include "renderer/ranks/rank_request.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -2,7 +2,7 @@
 #include "renderer/estimate/radiance_source.h"
 
 #include "base/ranks/rank_team.h"
-#include "renderer/ranks/rank_orders.h"
+#include "renderer/estimate/rank_orders.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -4,7 +4,7 @@
 #define SELVEDGE_RENDERER_LIGHT_MIXTURE_H
 
 #include "renderer/fast/sphere_harmonics.h"
-#include "renderer/transport/light/lights.h"
+#include "renderer/transport/lights.h"
 
 enum { MIXTURE_MAX = 96 };
 

@@ -1,5 +1,5 @@
 #include "renderer/preview/feature_image.h"
-#include "renderer/scattering/lobes/fiber_direction.h"
+#include "renderer/scattering/fiber_direction.h"
 #include "renderer/transport/camera.h"
 
 #include <math.h>

@@ -3,8 +3,8 @@
 #define SELVEDGE_RENDERER_FEATURE_IMAGE_H
 
 #include "base/thread_pool.h"
-#include "renderer/dual/dual_tables.h"
 #include "renderer/image/image.h"
+#include "renderer/quick/dual_tables.h"
 #include "renderer/scene/configuration.h"
 #include "renderer/scene/scene.h"
 

@@ -5,7 +5,7 @@
 #include "base/rng.h"
 #include "renderer/preview/ground_request.h"
 #include "renderer/transport/camera.h"
-#include "renderer/transport/light/lamp.h"
+#include "renderer/transport/lamp.h"
 
 struct ground_plane {
     const struct ground_request *q;

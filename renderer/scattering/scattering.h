@@ -13,7 +13,7 @@
 #include "base/catalogue/model_catalogue.h"
 #include "base/status.h"
 #include "base/thread_pool.h"
-#include "renderer/scattering/lobes/fiber_direction.h"
+#include "renderer/scattering/fiber_direction.h"
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -1,5 +1,5 @@
 #include "renderer/scattering/speckle.h"
-#include "renderer/scattering/lobes/quadratic_spline.h"
+#include "renderer/scattering/quadratic_spline.h"
 
 #include <math.h>
 

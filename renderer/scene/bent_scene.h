@@ -6,7 +6,7 @@
 #ifndef SELVEDGE_RENDERER_BENT_SCENE_H
 #define SELVEDGE_RENDERER_BENT_SCENE_H
 
-#include "renderer/scene/bent/shell_walk.h"
+#include "renderer/mesh/shell_walk.h"
 #include "renderer/scene/scene_data.h"
 #include "renderer/scene/scene_visitor.h"
 

@@ -16,7 +16,7 @@
 
 #include <stdint.h>
 
-struct environment; /* renderer/transport/light/environment.h */
+struct environment; /* renderer/transport/environment.h */
 
 enum configuration_light {
     LIGHT_SQUARE_LAMP = 0,

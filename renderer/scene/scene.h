@@ -7,7 +7,7 @@
 
 #include "base/status.h"
 #include "geometry/fibers/fiber_set.h"
-#include "geometry/mesh/mesh.h"
+#include "renderer/mesh/mesh.h"
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -1,5 +1,5 @@
 /* The table of results of a batch. */
-#include "base/json/foreign_json.h"
+#include "base/files/foreign_json.h"
 #include "optimizer/job/job_folder.h"
 #include "server/batches/batch_service.h"
 #include "server/batches/batch_view.h"

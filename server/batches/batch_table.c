@@ -1,6 +1,6 @@
 #include "server/batches/batch_table.h"
-#include "base/json/document_path.h"
-#include "base/json/json_depth.h"
+#include "base/files/document_path.h"
+#include "base/files/json_depth.h"
 #include "optimizer/job/job_outline.h"
 #include "server/jobs/job_access.h"
 

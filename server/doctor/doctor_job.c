@@ -2,7 +2,7 @@
 #include "base/clock.h"
 #include "base/files/durable.h"
 #include "base/files/foreign_file.h"
-#include "base/json/foreign_json.h"
+#include "base/files/foreign_json.h"
 #include "optimizer/job/document/job_document.h"
 #include "optimizer/job/job_folder.h"
 #include "server/doctor/doctor_report.h"

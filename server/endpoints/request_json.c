@@ -1,5 +1,5 @@
 #include "server/endpoints/request_json.h"
-#include "base/json/json_depth.h"
+#include "base/files/json_depth.h"
 #include "server/http/http_reply.h"
 
 #include <stdio.h>

@@ -1,6 +1,6 @@
 #include "server/files/backend_note.h"
 #include "base/files/foreign_file.h"
-#include "base/json/foreign_json.h"
+#include "base/files/foreign_json.h"
 #include "optimizer/job/job_folder.h"
 #include "server/settings/job_paths.h"
 

@@ -1,5 +1,5 @@
 #include "server/files/worker_files.h"
-#include "base/json/foreign_json.h"
+#include "base/files/foreign_json.h"
 #include "optimizer/job/job_folder.h"
 #include "server/files/worker_words.h"
 #include "server/settings/job_paths.h"

@@ -1,6 +1,6 @@
 #include "server/files/worker_words.h"
-#include "base/json/file_ledger_json.h"
-#include "base/json/json_member.h"
+#include "base/files/file_ledger_json.h"
+#include "base/files/json_member.h"
 
 #include <string.h>
 

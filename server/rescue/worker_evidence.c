@@ -1,6 +1,6 @@
 #include "server/rescue/worker_evidence.h"
 #include "base/clock.h"
-#include "base/json/foreign_json.h"
+#include "base/files/foreign_json.h"
 #include "optimizer/job/job_folder.h"
 
 #include <jansson.h>

@@ -1,7 +1,7 @@
 #include "server/store/job_journal.h"
 #include "base/files/durable.h"
 #include "base/files/foreign_file.h"
-#include "base/json/foreign_json.h"
+#include "base/files/foreign_json.h"
 #include "optimizer/job/job_folder.h"
 
 #include <errno.h>

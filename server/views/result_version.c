@@ -3,7 +3,7 @@
 #include "base/files/durable.h"
 #include "base/files/file_tree.h"
 #include "base/files/foreign_file.h"
-#include "base/json/foreign_json.h"
+#include "base/files/foreign_json.h"
 #include "optimizer/job/document/job_document.h"
 #include "optimizer/job/job_folder.h"
 #include "server/files/worker_words.h"

@@ -1,7 +1,7 @@
 #include "server/workers/input_judge.h"
 #include "base/clock.h"
 #include "base/files/foreign_file.h"
-#include "base/json/foreign_json.h"
+#include "base/files/foreign_json.h"
 #include "optimizer/job/job_folder.h"
 #include "server/files/worker_words.h"
 #include "server/jobs/job_change.h"

@@ -1,11 +1,11 @@
-/* The shell of a bent cloth by definition (renderer/scene/bent/shell.h says which map it is): prisms between the mesh
+/* The shell of a bent cloth by definition (renderer/mesh/shell.h says which map it is): prisms between the mesh
  * moved up and down along its normals, each cut into three tetrahedra, in which the map to the flat cloth is affine.
  * Every ray is clipped at every tetrahedron. Millimetres.
  */
 #ifndef SELVEDGE_TESTS_EXACT_BENT_H
 #define SELVEDGE_TESTS_EXACT_BENT_H
 
-#include "geometry/mesh/mesh.h"
+#include "renderer/mesh/mesh.h"
 #include "tests/exact/capsule_cloth.h"
 
 struct exact_cell {

@@ -3,7 +3,7 @@
  */
 #include "base/angle.h"
 #include "base/rng.h"
-#include "renderer/scattering/lobes/cone_lobe.h"
+#include "renderer/scattering/cone_lobe.h"
 #include "renderer/scattering/models/dielectric/dielectric_ray.h"
 #include "renderer/scattering/scattering.h"
 #include "tests/support/model/fiber_angles.h"

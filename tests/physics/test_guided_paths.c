@@ -5,7 +5,7 @@
 #include "base/angle.h"
 #include "base/rng.h"
 #include "renderer/estimate/estimate.h"
-#include "renderer/transport/light/light_guide.h"
+#include "renderer/transport/light_guide.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
 #include "tests/support/tracer/trace_input.h"

@@ -2,7 +2,7 @@
  * other. Tolerances are 4 standard errors (for several dozen comparisons) plus the stated remainders.
  */
 #include "renderer/estimate/estimate.h"
-#include "renderer/transport/light/environment.h"
+#include "renderer/transport/environment.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"
 #include "tests/support/tracer/environment/painted_environment.h"

@@ -1,5 +1,5 @@
 #include "clients/cli/arguments/cli_sibling.h"
-#include "base/machine/program_folder.h"
+#include "base/program_folder.h"
 
 #include <stdio.h>
 #include <unistd.h>

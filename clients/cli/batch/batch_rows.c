@@ -1,5 +1,5 @@
 #include "clients/cli/batch/batch_rows.h"
-#include "base/json/document_path.h"
+#include "base/files/document_path.h"
 #include "clients/cli/batch/sample_files.h"
 #include "clients/cli/text/csv_table.h"
 

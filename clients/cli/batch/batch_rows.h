@@ -20,7 +20,7 @@ struct batch_rows {
 };
 
 /* Reads a CSV file whose first line names the columns: "sample", and paths of members of the template
- * (base/json/document_path.h). An empty cell leaves the template's value; a cell that is JSON is that value, and any
+ * (base/files/document_path.h). An empty cell leaves the template's value; a cell that is JSON is that value, and any
  * other is a text. files: the folder of the input files; a sample that has a folder of its own in it has its files
  * there, and then a '*' of the template stands for them. STATUS_INVALID and STATUS_NOT_FOUND name line and column, or
  * the sample. */

@@ -1,5 +1,5 @@
 #include "clients/cli/text/cli_report.h"
-#include "base/json/file_ledger_json.h"
+#include "base/files/file_ledger_json.h"
 
 #include <math.h>
 #include <stdbool.h>

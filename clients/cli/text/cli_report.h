@@ -20,7 +20,7 @@ void report_summary(const json_t *job, FILE *out);
 
 /* Prints a list of {"field", "detail"}, a line each behind the label. Returns how many there are. */
 size_t cli_print_faults(const json_t *list, const char *label, FILE *out);
-/* Prints the statements of files, a sentence each (base/json/file_ledger_json.h). */
+/* Prints the statements of files, a sentence each (base/files/file_ledger_json.h). */
 void cli_print_statements(const json_t *files, FILE *out);
 
 #endif

@@ -1,7 +1,7 @@
 #include "optimizer/photographs/camera/photograph_develop.h"
 
 #include "base/angle.h"
-#include "base/json/file_ledger_json.h"
+#include "base/files/file_ledger_json.h"
 #include "base/option_id.h"
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_rows.h"

@@ -42,8 +42,8 @@ struct photograph_process {
     struct photograph_info color_info; /* of the photograph of the chart or of the white reference */
     struct color_chart chart;          /* with has_color and the document's has_chart */
     struct image chart_picture;        /* color_chart_picture; no pixels without a chart */
-    /* The list that the ledger of every file that is read is appended to (base/json/file_ledger_json.h), of the caller;
-     * NULL: not wanted. */
+    /* The list that the ledger of every file that is read is appended to (base/files/file_ledger_json.h), of the
+     * caller; NULL: not wanted. */
     json_t *files;
 };
 

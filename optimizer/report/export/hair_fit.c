@@ -1,5 +1,5 @@
 #include "optimizer/report/export/hair_fit.h"
-#include "renderer/scattering/lobes/fresnel.h"
+#include "renderer/scattering/fresnel.h"
 
 #include <math.h>
 #include <nlopt.h>

@@ -1,5 +1,5 @@
-#include "geometry/mesh/mesh_drape.h"
 #include "optimizer/report/export/twin_result.h"
+#include "renderer/mesh/mesh_drape.h"
 
 #include <math.h>
 #include <stdlib.h>

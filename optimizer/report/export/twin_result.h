@@ -13,7 +13,7 @@
 #define SELVEDGE_OPTIMIZER_TWIN_RESULT_H
 
 #include "optimizer/report/findings/report.h"
-#include "renderer/transport/table/appearance_table.h"
+#include "renderer/preview/appearance_table.h"
 
 /* Camera paths that the tables take, 0 without a twin. */
 double twin_result_paths(const struct job_results *results);

@@ -26,7 +26,7 @@ struct report_input {
     const struct job_profile *profile;
     const struct job_results *results;
     const struct job_outline *files;  /* the input files */
-    json_t *statements;               /* of these files (base/json/file_ledger_json.h) */
+    json_t *statements;               /* of these files (base/files/file_ledger_json.h) */
     const struct profile_rows *fiber; /* of a job with the profile of a fiber */
     const struct texture_guess *texture;
     const struct reconstruct_option *option;

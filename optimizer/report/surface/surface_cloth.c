@@ -1,12 +1,12 @@
 #include "optimizer/report/surface/surface_cloth.h"
 #include "base/files/durable.h"
 #include "base/option_id.h"
-#include "geometry/mesh/mesh_drape.h"
-#include "geometry/mesh/mesh_shapes.h"
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/job_setup.h"
 #include "optimizer/job/job_folder.h"
-#include "renderer/diffusion/diffusion_tables.h"
+#include "renderer/mesh/mesh_drape.h"
+#include "renderer/mesh/mesh_shapes.h"
+#include "renderer/quick/diffusion_tables.h"
 #include "renderer/transport/volume/volume_bent.h"
 
 #include <math.h>

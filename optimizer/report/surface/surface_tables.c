@@ -10,7 +10,7 @@
 /* Three traced hits leave a third of the error of one (renderer/fast/NOTES.md); the transfer to a cell has an error of
  * 1 to 2 % by so many paths. */
 enum { N_TRACED = 3, CELL_PATHS = 8000, SPREAD_PATHS = 1024 };
-/* Two hits before diffusion leave its means without a part that stays (renderer/diffusion/NOTES.md). */
+/* Two hits before diffusion leave its means without a part that stays (renderer/quick/diffusion-notes.md). */
 enum { N_TRACED_IN_PILE = 2 };
 #define JOURNAL_EVERY_S 2.0
 /* Density for dual scattering: cloth is dense (fabric thesis, section 6.6). */

@@ -1,13 +1,13 @@
 /* Tables of light transport for the pictures of a job that are not rendered path by path: the tables of renderer/fast,
- * and the averages of dual scattering (renderer/dual) and of diffusion (renderer/diffusion). */
+ * and the averages of dual scattering and of diffusion (renderer/quick). */
 #ifndef SELVEDGE_OPTIMIZER_SURFACE_TABLES_H
 #define SELVEDGE_OPTIMIZER_SURFACE_TABLES_H
 
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/report/findings/report.h"
-#include "renderer/diffusion/diffusion_option.h"
-#include "renderer/dual/dual_option.h"
 #include "renderer/fast/fast_option.h"
+#include "renderer/quick/diffusion_option.h"
+#include "renderer/quick/dual_option.h"
 
 struct surface_tables {
     struct fast_tables tables;

@@ -1,5 +1,5 @@
 #include "optimizer/report/textures/texture_surface.h"
-#include "renderer/scattering/lobes/fresnel.h"
+#include "renderer/scattering/fresnel.h"
 
 #include <math.h>
 

@@ -23,7 +23,7 @@
 #include "optimizer/stages/reading/texture_start.h"
 #include "optimizer/stages/run/document_fingerprint.h"
 #include "optimizer/stages/scene/pipeline_adopt.h"
-#include "renderer/transport/light/environment.h"
+#include "renderer/transport/environment.h"
 
 #include <math.h>
 #include <stdio.h>

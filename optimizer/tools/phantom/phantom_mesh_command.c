@@ -1,9 +1,9 @@
 /* The command "mesh". */
 #include "base/angle.h"
 #include "base/files/durable.h"
-#include "geometry/mesh/mesh_drape.h"
-#include "geometry/mesh/mesh_shapes.h"
 #include "optimizer/tools/phantom/phantom_commands.h"
+#include "renderer/mesh/mesh_drape.h"
+#include "renderer/mesh/mesh_shapes.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -16,7 +16,7 @@ struct input_check {
     struct job_document *doc; /* wrong values in it are replaced by defaults */
     struct job_fault_list *fault;
     json_t *warnings; /* [{"field", "detail"}] */
-    json_t *files;    /* ledgers (base/json/file_ledger_json.h) */
+    json_t *files;    /* ledgers (base/files/file_ledger_json.h) */
     size_t n_file;
 };
 

@@ -1,4 +1,4 @@
-#include "base/json/file_ledger_json.h"
+#include "base/files/file_ledger_json.h"
 #include "base/option_id.h"
 #include "base/warning.h"
 #include "geometry/fibers/fiber_set.h"
@@ -12,7 +12,7 @@
 #include "optimizer/photographs/reader/photograph.h"
 #include "optimizer/stages/scene/fiber_file.h"
 #include "optimizer/worker/check/input_check.h"
-#include "renderer/transport/light/environment.h"
+#include "renderer/transport/environment.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,8 +1,8 @@
 #include "base/option_id.h"
-#include "geometry/mesh/mesh.h"
 #include "optimizer/job/document/job_document.h"
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/worker/check/input_check.h"
+#include "renderer/mesh/mesh.h"
 
 #include <stdio.h>
 

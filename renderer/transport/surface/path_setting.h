@@ -7,9 +7,9 @@
 #include "renderer/scattering/speckle.h"
 #include "renderer/scene/scene_ray.h"
 #include "renderer/transport/discrepancy.h"
-#include "renderer/transport/light/lamp_strip.h"
-#include "renderer/transport/light/light_guide.h"
-#include "renderer/transport/light/lights.h"
+#include "renderer/transport/lamp_strip.h"
+#include "renderer/transport/light_guide.h"
+#include "renderer/transport/lights.h"
 #include "renderer/transport/surface/parameter_sets.h"
 
 enum { PATH_MAX_BOUNCE = 10000, PATH_N_DERIVATIVE = 3 * SCATTERING_MAX_FLAT, PATH_MAX_LAMP = 16 };

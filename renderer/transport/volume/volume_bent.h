@@ -1,4 +1,4 @@
-/* A volume of fibers laid on a mesh: the same shell map as for fibers (renderer/scene/bent/shell.h). Nothing of the
+/* A volume of fibers laid on a mesh: the same shell map as for fibers (renderer/mesh/shell.h). Nothing of the
  * volume is copied. Optical depth is measured in the flat cloth, so that a stretched cloth is as dense as the flat one.
  */
 #ifndef SELVEDGE_RENDERER_VOLUME_BENT_H

@@ -13,9 +13,9 @@
 #define SELVEDGE_RENDERER_VOLUME_SCENE_H
 
 #include "base/ranks/byte_pack.h"
-#include "geometry/mesh/mesh.h"
 #include "geometry/volume/volume.h"
-#include "renderer/scene/bent/shell_walk.h"
+#include "renderer/mesh/mesh.h"
+#include "renderer/mesh/shell_walk.h"
 
 #include <math.h>
 #include <stdbool.h>

@@ -22,7 +22,7 @@
 #include "base/rng.h"
 #include "renderer/scattering/phase_model.h"
 #include "renderer/scene/configuration.h"
-#include "renderer/transport/light/lights.h"
+#include "renderer/transport/lights.h"
 #include "renderer/transport/volume/volume_scene.h"
 
 enum { VOLUME_MAX_BOUNCE = 10000, VOLUME_N_DERIVATIVE = 3 * SCATTERING_MAX_PARAM };

@@ -30,12 +30,12 @@
  */
 #include "base/angle.h"
 #include "base/clock.h"
-#include "geometry/mesh/mesh_drape.h"
-#include "renderer/dual/dual_option.h"
 #include "renderer/estimate/estimate.h"
 #include "renderer/estimate/render.h"
 #include "renderer/fast/fast_option.h"
 #include "renderer/fast/precompute/fast_precompute.h"
+#include "renderer/mesh/mesh_drape.h"
+#include "renderer/quick/dual_option.h"
 #include "tests/bench/pictures/field_pair.h"
 #include "tests/support/cloth/fit_fabrics.h"
 

@@ -15,9 +15,9 @@
 #include "base/angle.h"
 #include "base/clock.h"
 #include "geometry/phantom/phantom.h"
-#include "renderer/diffusion/diffusion_option.h"
-#include "renderer/dual/dual_option.h"
 #include "renderer/estimate/estimate.h"
+#include "renderer/quick/diffusion_option.h"
+#include "renderer/quick/dual_option.h"
 #include "tests/support/tracer/trace_input.h"
 
 #include <math.h>

@@ -1,4 +1,4 @@
-#include "geometry/mesh/mesh.h"
+#include "renderer/mesh/mesh.h"
 #include "tests/fuzz/fuzz_input.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -2,7 +2,7 @@
  * energy from the side of the camera, reciprocity of a single layer, and the derivative of the factor of the widths.
  */
 #include "base/angle.h"
-#include "geometry/mesh/mesh_shapes.h"
+#include "renderer/mesh/mesh_shapes.h"
 #include "renderer/transport/surface/path_scatter.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"

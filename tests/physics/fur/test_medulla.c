@@ -1,9 +1,9 @@
 /* Tables of the medulla: against walks of other random numbers at places between their nodes, and where light is
  * scattered once, in closed form. Their compression: on a sum of products that is known.
  */
-#include "renderer/scattering/models/fur/medulla/medulla.h"
-#include "renderer/scattering/models/fur/medulla/medulla_fit.h"
-#include "renderer/scattering/models/fur/medulla/medulla_trace.h"
+#include "renderer/scattering/models/fur/medulla.h"
+#include "renderer/scattering/models/fur/medulla_fit.h"
+#include "renderer/scattering/models/fur/medulla_trace.h"
 
 #include <math.h>
 #include <setjmp.h>

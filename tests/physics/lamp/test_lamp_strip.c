@@ -3,7 +3,7 @@
  */
 #include "base/angle.h"
 #include "renderer/transport/camera.h"
-#include "renderer/transport/light/lamp_strip.h"
+#include "renderer/transport/lamp_strip.h"
 #include "renderer/transport/surface/path_tracer.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/statistics_test.h"

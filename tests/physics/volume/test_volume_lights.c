@@ -4,7 +4,7 @@
  * Tolerances are standard errors plus the stated remainders of closed forms. */
 #include "base/angle.h"
 #include "renderer/estimate/estimate.h"
-#include "renderer/transport/light/environment.h"
+#include "renderer/transport/environment.h"
 #include "renderer/transport/volume/volume_scene.h"
 #include "tests/support/scan/hand_volume.h"
 #include "tests/support/tracer/environment/painted_environment.h"

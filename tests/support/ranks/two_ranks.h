@@ -4,7 +4,7 @@
 #define SELVEDGE_TESTS_TWO_RANKS_H
 
 #include "base/ranks/rank_team.h"
-#include "renderer/ranks/shared_cloth.h"
+#include "renderer/estimate/shared_cloth.h"
 
 #include <sys/types.h>
 

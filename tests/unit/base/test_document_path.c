@@ -1,6 +1,6 @@
 /* Paths that name a member of a document. */
-#include "base/json/document_path.h"
-#include "base/json/json_depth.h"
+#include "base/files/document_path.h"
+#include "base/files/json_depth.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

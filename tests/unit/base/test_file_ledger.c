@@ -1,5 +1,5 @@
 /* Ledgers of files: entries, overflow, foreign text, and the sentences for people. */
-#include "base/json/file_ledger_json.h"
+#include "base/files/file_ledger_json.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

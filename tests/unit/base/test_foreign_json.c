@@ -1,8 +1,8 @@
 /* JSON and files of somebody else: what is held of them, what is refused, and what counts as no file. */
 #include "base/files/durable.h"
 #include "base/files/foreign_file.h"
-#include "base/json/foreign_json.h"
-#include "base/json/json_member.h"
+#include "base/files/foreign_json.h"
+#include "base/files/json_member.h"
 #include "tests/support/scratch_folder.h"
 
 #include <fcntl.h>

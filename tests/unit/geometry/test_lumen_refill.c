@@ -1,5 +1,5 @@
 /* Hollow fibers of different diameters: more of their lumens are filled once they were traced. */
-#include "geometry/trace/trace_job.h"
+#include "geometry/reconstruct/trace_job.h"
 #include "geometry/volume/density_map.h"
 #include "tests/support/scan/phantom_reconstruction.h"
 

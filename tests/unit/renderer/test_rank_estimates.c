@@ -1,7 +1,7 @@
 /* Estimates and pictures that two ranks share: the same bits as those of one rank. */
 #include "base/ranks/byte_pack.h"
 #include "base/ranks/rank_team.h"
-#include "renderer/ranks/rank_orders.h"
+#include "renderer/estimate/rank_orders.h"
 #include "tests/support/ranks/two_ranks.h"
 #include "tests/support/tracer/estimate_fixture.h"
 

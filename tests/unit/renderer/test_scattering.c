@@ -1,8 +1,8 @@
 /* Scattering models: golden values, the registry, agreement with a double-precision reference, scores against central
  * differences. */
-#include "renderer/scattering/lobes/von_mises.h"
 #include "renderer/scattering/models/two_lobe/gauss_polynomial.h"
 #include "renderer/scattering/scattering.h"
+#include "renderer/scattering/von_mises.h"
 #include "tests/support/agreement.h"
 #include "tests/support/model/compared_range.h"
 #include "tests/support/model/model_stream.h"

@@ -2,7 +2,7 @@
 #include "renderer/scene/scene.h"
 #include "renderer/scene/scene_ray.h"
 #include "renderer/transport/camera.h"
-#include "renderer/transport/light/lamp.h"
+#include "renderer/transport/lamp.h"
 #include "tests/support/cloth/hand_weave.h"
 
 #include "base/angle.h"

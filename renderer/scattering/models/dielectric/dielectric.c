@@ -5,7 +5,7 @@
  * th_d = th_o, so weights are bounded but not constant.
  */
 #include "renderer/scattering/models/dielectric/dielectric.h"
-#include "renderer/scattering/lobes/azimuth_table.h"
+#include "renderer/scattering/azimuth_table.h"
 #include "renderer/scattering/scattering_state.h"
 
 #include <stdlib.h>

@@ -6,10 +6,10 @@
 #define SELVEDGE_RENDERER_DIELECTRIC_ALONG_H
 
 #include "base/status.h"
-#include "renderer/scattering/lobes/azimuth_table.h"
-#include "renderer/scattering/lobes/cone_lobe.h"
-#include "renderer/scattering/lobes/fiber_direction.h"
-#include "renderer/scattering/lobes/lobe_balance.h"
+#include "renderer/scattering/azimuth_table.h"
+#include "renderer/scattering/cone_lobe.h"
+#include "renderer/scattering/fiber_direction.h"
+#include "renderer/scattering/lobe_balance.h"
 #include "renderer/scattering/models/dielectric/dielectric_rows.def"
 #include "renderer/scattering/scattering.h"
 

@@ -20,12 +20,12 @@
  * Sampling: half of the samples by dielectric.v1. For the others th_i from g and the azimuth from a Lorentz curve of
  * the width of F in the green channel at th_d = th_o.
  */
-#include "renderer/scattering/lobes/azimuth_table.h"
-#include "renderer/scattering/lobes/lobe_balance.h"
-#include "renderer/scattering/lobes/tilted_lobe.h"
+#include "renderer/scattering/azimuth_table.h"
+#include "renderer/scattering/lobe_balance.h"
 #include "renderer/scattering/models/dielectric/dielectric_rows.def"
 #include "renderer/scattering/models/dielectric/strip_lobe.h"
 #include "renderer/scattering/scattering.h"
+#include "renderer/scattering/tilted_lobe.h"
 
 #include <stdlib.h>
 #include <string.h>

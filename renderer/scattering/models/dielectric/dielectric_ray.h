@@ -16,7 +16,7 @@
 #ifndef SELVEDGE_RENDERER_DIELECTRIC_RAY_H
 #define SELVEDGE_RENDERER_DIELECTRIC_RAY_H
 
-#include "renderer/scattering/lobes/fresnel.h"
+#include "renderer/scattering/fresnel.h"
 
 enum dielectric_mode { DIELECTRIC_R, DIELECTRIC_TT, DIELECTRIC_TRT, DIELECTRIC_REST, DIELECTRIC_N_MODE };
 

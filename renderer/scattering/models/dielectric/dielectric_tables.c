@@ -1,4 +1,4 @@
-#include "renderer/scattering/lobes/azimuth_table.h"
+#include "renderer/scattering/azimuth_table.h"
 #include "renderer/scattering/models/dielectric/dielectric.h"
 
 #include <stdlib.h>

@@ -7,7 +7,7 @@
 #ifndef SELVEDGE_RENDERER_NEAR_AZIMUTH_H
 #define SELVEDGE_RENDERER_NEAR_AZIMUTH_H
 
-#include "renderer/scattering/lobes/von_mises.h"
+#include "renderer/scattering/von_mises.h"
 
 #include <math.h>
 #include <stddef.h>

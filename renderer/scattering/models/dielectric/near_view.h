@@ -3,7 +3,7 @@
 #ifndef SELVEDGE_RENDERER_NEAR_VIEW_H
 #define SELVEDGE_RENDERER_NEAR_VIEW_H
 
-#include "renderer/scattering/lobes/fiber_direction.h"
+#include "renderer/scattering/fiber_direction.h"
 
 #define NEAR_LEAST_COSINE_D 1e-6 /* of th_d: steeper rays are taken at this cosine */
 

@@ -6,7 +6,7 @@
  * are bounded but not constant.
  */
 #include "renderer/scattering/models/elliptical/elliptical.h"
-#include "renderer/scattering/lobes/azimuth_table.h"
+#include "renderer/scattering/azimuth_table.h"
 #include "renderer/scattering/scattering_state.h"
 
 #include <stdlib.h>

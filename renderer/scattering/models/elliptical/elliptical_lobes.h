@@ -3,11 +3,11 @@
 #ifndef SELVEDGE_RENDERER_ELLIPTICAL_LOBES_H
 #define SELVEDGE_RENDERER_ELLIPTICAL_LOBES_H
 
-#include "renderer/scattering/lobes/lobe_balance.h"
-#include "renderer/scattering/lobes/tilted_lobe.h"
+#include "renderer/scattering/lobe_balance.h"
 #include "renderer/scattering/models/elliptical/ellipse_ray.h"
 #include "renderer/scattering/models/elliptical/elliptical_rows.def"
 #include "renderer/scattering/scattering.h"
+#include "renderer/scattering/tilted_lobe.h"
 
 #include "base/status.h"
 

@@ -4,7 +4,7 @@
  * of both shifted cones, beyond a pole taken as the direction on its other side; an azimuth from F of the mode at th_d
  * = th_o and the azimuths of wo on both sides of its own in the table, averaged over the channels, and 2 % uniform. */
 #include "renderer/scattering/models/elliptical/elliptical_oriented.h"
-#include "renderer/scattering/lobes/azimuth_table.h"
+#include "renderer/scattering/azimuth_table.h"
 #include "renderer/scattering/scattering_state.h"
 
 #include <stdlib.h>

@@ -1,9 +1,9 @@
 /* Tables of elliptical_oriented.v1: rays are spread over a quarter of the plane of psi and Delta by quadratic
  * B-splines, and the sums are blurred as cosine series in both. The factors of the series remove the blur of the
  * B-splines, and, in the tables that are read by straight lines, also the blur of the straight lines. */
-#include "renderer/scattering/lobes/azimuth_table.h"
-#include "renderer/scattering/lobes/quadratic_spline.h"
+#include "renderer/scattering/azimuth_table.h"
 #include "renderer/scattering/models/elliptical/elliptical_oriented.h"
+#include "renderer/scattering/quadratic_spline.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -24,14 +24,14 @@
 #ifndef SELVEDGE_RENDERER_FUR_H
 #define SELVEDGE_RENDERER_FUR_H
 
-#include "renderer/scattering/lobes/azimuth_table.h"
-#include "renderer/scattering/lobes/lobe_balance.h"
-#include "renderer/scattering/lobes/tilted_lobe.h"
+#include "renderer/scattering/azimuth_table.h"
+#include "renderer/scattering/lobe_balance.h"
 #include "renderer/scattering/models/fur/fur_mean.h"
 #include "renderer/scattering/models/fur/fur_ray.h"
 #include "renderer/scattering/models/fur/fur_rows.def"
-#include "renderer/scattering/models/fur/medulla/medulla.h"
+#include "renderer/scattering/models/fur/medulla.h"
 #include "renderer/scattering/scattering.h"
+#include "renderer/scattering/tilted_lobe.h"
 
 enum {
     FUR_P_C_T = 0,

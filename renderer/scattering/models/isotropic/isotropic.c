@@ -2,7 +2,7 @@
  * lossless from both sides (the integral of cos th over the sphere is pi^2): the yardstick of furnace tests and the
  * plainest model to fit.
  */
-#include "renderer/scattering/lobes/fiber_direction.h"
+#include "renderer/scattering/fiber_direction.h"
 #include "renderer/scattering/models/isotropic/isotropic_rows.def"
 #include "renderer/scattering/scattering.h"
 

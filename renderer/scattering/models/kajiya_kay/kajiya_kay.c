@@ -7,8 +7,8 @@
  * as cos^p. Specular takes its share first, the rest is diffuse: energy <= C_S + C_D (1 - C_S) < 1 for all bounds.
  * Reciprocal.
  */
-#include "renderer/scattering/lobes/cone_lobe.h"
-#include "renderer/scattering/lobes/fiber_direction.h"
+#include "renderer/scattering/cone_lobe.h"
+#include "renderer/scattering/fiber_direction.h"
 #include "renderer/scattering/models/kajiya_kay/kajiya_kay_rows.def"
 #include "renderer/scattering/scattering.h"
 

@@ -13,12 +13,12 @@
  * of one th_d to others, so up to 1.49 of the light leaves at grazing directions (tests/physics/test_energy_bound.c).
  * A(th_d) and its derivatives by C_T and eta are tabulated over cos th_d (eta by central differences in double).
  */
-#include "renderer/scattering/lobes/cone_lobe.h"
-#include "renderer/scattering/lobes/fiber_direction.h"
-#include "renderer/scattering/lobes/fresnel.h"
-#include "renderer/scattering/lobes/von_mises.h"
+#include "renderer/scattering/cone_lobe.h"
+#include "renderer/scattering/fiber_direction.h"
+#include "renderer/scattering/fresnel.h"
 #include "renderer/scattering/models/marschner/marschner_rows.def"
 #include "renderer/scattering/scattering.h"
+#include "renderer/scattering/von_mises.h"
 
 #include <stdlib.h>
 

@@ -6,9 +6,9 @@
  * a(th) and takes th_d = th_o, so weights are bounded but not constant.
  */
 #include "renderer/scattering/models/microfacet/microfacet.h"
-#include "renderer/scattering/lobes/azimuth_table.h"
-#include "renderer/scattering/lobes/tilted_lobe.h"
+#include "renderer/scattering/azimuth_table.h"
 #include "renderer/scattering/scattering_state.h"
+#include "renderer/scattering/tilted_lobe.h"
 
 #include <stdlib.h>
 

@@ -32,8 +32,8 @@
 #ifndef SELVEDGE_RENDERER_MICROFACET_H
 #define SELVEDGE_RENDERER_MICROFACET_H
 
-#include "renderer/scattering/lobes/azimuth_table.h"
-#include "renderer/scattering/lobes/lobe_balance.h"
+#include "renderer/scattering/azimuth_table.h"
+#include "renderer/scattering/lobe_balance.h"
 #include "renderer/scattering/models/microfacet/microfacet_rows.def"
 #include "renderer/scattering/models/microfacet/microfacet_surface.h"
 #include "renderer/scattering/models/microfacet/microfacet_walk.h"

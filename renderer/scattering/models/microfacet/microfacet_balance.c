@@ -1,5 +1,5 @@
-#include "renderer/scattering/lobes/tilted_lobe.h"
 #include "renderer/scattering/models/microfacet/microfacet.h"
+#include "renderer/scattering/tilted_lobe.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -16,7 +16,7 @@
 #ifndef SELVEDGE_RENDERER_MICROFACET_SURFACE_H
 #define SELVEDGE_RENDERER_MICROFACET_SURFACE_H
 
-#include "renderer/scattering/lobes/fresnel.h"
+#include "renderer/scattering/fresnel.h"
 
 #include <math.h>
 #include <stddef.h>

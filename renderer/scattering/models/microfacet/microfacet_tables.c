@@ -1,7 +1,7 @@
-#include "renderer/scattering/lobes/azimuth_table.h"
-#include "renderer/scattering/lobes/quadratic_spline.h"
-#include "renderer/scattering/lobes/von_mises.h"
+#include "renderer/scattering/azimuth_table.h"
 #include "renderer/scattering/models/microfacet/microfacet.h"
+#include "renderer/scattering/quadratic_spline.h"
+#include "renderer/scattering/von_mises.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 #include "renderer/scattering/models/microfacet/microfacet_walk.h"
-#include "renderer/scattering/lobes/fresnel.h"
+#include "renderer/scattering/fresnel.h"
 #include "renderer/scattering/models/elliptical/ellipse_ray.h"
 
 #include <string.h>

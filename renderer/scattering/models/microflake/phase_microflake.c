@@ -9,9 +9,9 @@
  * goes into a table over the sine of this angle, together with its derivative by gamma. Sampling: a flake from D,
  * mirrored to wo's side; density of wi = D(h) / (2 |wo . h|), weight alpha |wo . h| / s(wo).
  */
-#include "renderer/scattering/lobes/von_mises.h"
 #include "renderer/scattering/models/microflake/microflake_rows.def"
 #include "renderer/scattering/phase_model.h"
+#include "renderer/scattering/von_mises.h"
 
 #include <math.h>
 #include <stdlib.h>

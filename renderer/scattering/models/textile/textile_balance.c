@@ -1,4 +1,4 @@
-#include "renderer/scattering/lobes/lobe_balance.h"
+#include "renderer/scattering/lobe_balance.h"
 #include "renderer/scattering/models/textile/textile.h"
 
 enum { N = LOBE_BALANCE_N };

@@ -1,5 +1,5 @@
 /* two_lobe.v1: the textile fiber model of the fabric thesis, section 5.4, as published. */
-#include "renderer/scattering/lobes/cone_lobe.h"
+#include "renderer/scattering/cone_lobe.h"
 #include "renderer/scattering/models/two_lobe/gauss_polynomial.h"
 #include "renderer/scattering/models/two_lobe/two_lobe_core.h"
 

@@ -9,7 +9,7 @@
  * Sinkhorn's balancing, y <- sqrt(y want / (K y)), and their derivatives by implicit differentiation; b depends on both
  * widths, through want also on beta_R.
  */
-#include "renderer/scattering/lobes/lobe_balance.h"
+#include "renderer/scattering/lobe_balance.h"
 #include "renderer/scattering/models/two_lobe/two_lobe_core.h"
 
 enum { N = LOBE_BALANCE_N };

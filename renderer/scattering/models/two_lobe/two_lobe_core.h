@@ -13,10 +13,10 @@
 #ifndef SELVEDGE_RENDERER_TWO_LOBE_CORE_H
 #define SELVEDGE_RENDERER_TWO_LOBE_CORE_H
 
-#include "renderer/scattering/lobes/fiber_direction.h"
-#include "renderer/scattering/lobes/von_mises.h"
+#include "renderer/scattering/fiber_direction.h"
 #include "renderer/scattering/models/two_lobe/two_lobe_rows.def"
 #include "renderer/scattering/scattering.h"
+#include "renderer/scattering/von_mises.h"
 
 #include <stdbool.h>
 #include <stdlib.h>

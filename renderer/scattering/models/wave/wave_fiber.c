@@ -5,7 +5,7 @@
  * 2 % uniform. The density does not know a(th) and takes th_d = th_o, so weights are bounded but not constant.
  */
 #include "renderer/scattering/models/wave/wave_fiber.h"
-#include "renderer/scattering/lobes/azimuth_table.h"
+#include "renderer/scattering/azimuth_table.h"
 #include "renderer/scattering/models/wave/speckle_tables.h"
 #include "renderer/scattering/scattering_state.h"
 

@@ -22,11 +22,11 @@
 #define SELVEDGE_RENDERER_WAVE_FIBER_H
 
 #include "base/status.h"
-#include "renderer/scattering/lobes/lobe_balance.h"
-#include "renderer/scattering/lobes/tilted_lobe.h"
+#include "renderer/scattering/lobe_balance.h"
 #include "renderer/scattering/models/wave/wave_rows.def"
 #include "renderer/scattering/models/wave/wave_table.h"
 #include "renderer/scattering/scattering.h"
+#include "renderer/scattering/tilted_lobe.h"
 
 enum { WAVE_P_C_T = 0, WAVE_P_BETA = 3, WAVE_P_GAMMA, WAVE_N_PARAM };
 enum { WAVE_N_ROW = 32, WAVE_N_PHI = 180 };

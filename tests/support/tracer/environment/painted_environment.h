@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_TESTS_PAINTED_ENVIRONMENT_H
 #define SELVEDGE_TESTS_PAINTED_ENVIRONMENT_H
 
-#include "renderer/transport/light/environment.h"
+#include "renderer/transport/environment.h"
 
 /* Makes an environment from the values of paint at the centres of the pixels: theta from the normal and phi from x, in
  * radians. Aborts the test when that fails. The caller frees it with environment_free. */

@@ -1,6 +1,6 @@
 /* The grid behind strand_relax finds all fibers that a fiber touches: overlaps against those of all pairs of nodes. */
 #include "base/rng.h"
-#include "geometry/strands/strand.h"
+#include "geometry/cloth/strand.h"
 
 #include <math.h>
 #include <setjmp.h>

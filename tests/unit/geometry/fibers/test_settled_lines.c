@@ -1,6 +1,6 @@
 /* Ends in the middle of material, and the rounds of fitting, cutting and joining before the last fit. */
 #include "geometry/fibers/lines/line_ends.h"
-#include "geometry/trace/trace_job.h"
+#include "geometry/reconstruct/trace_job.h"
 
 #include <math.h>
 #include <setjmp.h>

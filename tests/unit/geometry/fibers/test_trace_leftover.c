@@ -2,7 +2,7 @@
  * it where radii differ. It is left out where fibers are alike, and where radii spread like those of no yarn. Flat
  * fibers leave nothing at their sides. */
 #include "geometry/phantom/phantom_section.h"
-#include "geometry/trace/trace_job.h"
+#include "geometry/reconstruct/trace_job.h"
 
 #include <math.h>
 #include <setjmp.h>

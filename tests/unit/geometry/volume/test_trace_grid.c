@@ -1,6 +1,6 @@
 /* Volumes in voxels of another size, and fibers too thin or too thick for the scan's own voxels: known answers. */
 #include "geometry/reconstruct/reconstruct.h"
-#include "geometry/trace/trace_grid.h"
+#include "geometry/reconstruct/trace_grid.h"
 #include "geometry/volume/volume_rescale.h"
 #include "tests/support/scan/scan_files.h"
 

@@ -7,7 +7,7 @@
 #include "optimizer/stages/fit/pipeline_trace.h"
 #include "optimizer/stages/geometry_stages.h"
 #include "renderer/estimate/estimate.h"
-#include "renderer/transport/light/environment.h"
+#include "renderer/transport/environment.h"
 #include "tests/support/scratch_folder.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
 /* Shell maps: a flat mesh changes nothing, fibers lie where a bent cloth has them, no light is lost between cells. */
-#include "geometry/mesh/mesh_shapes.h"
+#include "renderer/mesh/mesh_shapes.h"
 #include "renderer/scene/scene_place.h"
 #include "renderer/scene/scene_ray.h"
 #include "tests/support/cloth/hand_weave.h"

@@ -1,7 +1,7 @@
 /* Volumes on meshes: a flat mesh changes nothing but the noise, no light is lost on a cylinder. */
 #include "base/angle.h"
-#include "geometry/mesh/mesh_shapes.h"
 #include "renderer/estimate/render.h"
+#include "renderer/mesh/mesh_shapes.h"
 #include "renderer/transport/volume/volume_bent.h"
 #include "tests/support/scan/hand_volume.h"
 #include "tests/support/tracer/trace_input.h"

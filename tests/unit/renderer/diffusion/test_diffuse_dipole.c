@@ -1,7 +1,7 @@
 /* The dipole: closed forms against quadrature, samples against their distribution, and the medium that is found again.
  */
 #include "base/rng.h"
-#include "renderer/diffusion/diffuse_dipole.h"
+#include "renderer/quick/diffuse_dipole.h"
 #include "tests/support/statistics_test.h"
 
 #include <math.h>

@@ -2,10 +2,10 @@
  * against path tracing and dual scattering, a mesh against the flat cloth, and what is refused. */
 #include "base/angle.h"
 #include "base/rng.h"
-#include "geometry/mesh/mesh_shapes.h"
-#include "renderer/diffusion/diffusion_option.h"
 #include "renderer/estimate/estimate.h"
 #include "renderer/estimate/radiance_source.h"
+#include "renderer/mesh/mesh_shapes.h"
+#include "renderer/quick/diffusion_option.h"
 #include "tests/support/cloth/dual_cloth.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/cloth/make_phantom.h"

@@ -1,10 +1,10 @@
 /* Dual scattering: the count of fibers in front against rays from fiber to fiber, its limits, and what of the light in
  * a furnace it loses. */
 #include "base/rng.h"
-#include "geometry/mesh/mesh_shapes.h"
-#include "renderer/dual/dual_shade.h"
 #include "renderer/estimate/estimate.h"
 #include "renderer/estimate/radiance_source.h"
+#include "renderer/mesh/mesh_shapes.h"
+#include "renderer/quick/dual_shade.h"
 #include "tests/support/cloth/dual_cloth.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/orbit_configurations.h"

@@ -1,14 +1,14 @@
 /* The table of light that is scattered more often than the paths of a fast picture are traced: a furnace, means of a
  * cloth with narrow lobes against path tracing, which the cells' harmonics miss, any number of threads, and directions
  * in a sheared cloth, and where deep light enters a bent one. */
-#include "geometry/mesh/mesh_shapes.h"
 #include "renderer/estimate/estimate.h"
 #include "renderer/fast/deep_shade.h"
 #include "renderer/fast/fast_option.h"
 #include "renderer/fast/fast_setting.h"
 #include "renderer/fast/precompute/fast_precompute.h"
+#include "renderer/mesh/mesh_shapes.h"
 #include "renderer/scene/scene_place.h"
-#include "renderer/transport/light/lights.h"
+#include "renderer/transport/lights.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/orbit_configurations.h"
 #include "tests/support/tracer/trace_input.h"

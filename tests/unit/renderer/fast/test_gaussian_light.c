@@ -6,7 +6,7 @@
 #include "renderer/estimate/estimate.h"
 #include "renderer/fast/fast_option.h"
 #include "renderer/fast/precompute/fast_precompute.h"
-#include "renderer/transport/light/lamp.h"
+#include "renderer/transport/lamp.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/trace_input.h"
 

@@ -1,7 +1,7 @@
 /* Sheared filtering of soft shadows: both versions against the closed form of a half plane's shadow and against a fine
  * quadrature of two occluders, against each other, and on a cloth over a plane against many rays. */
 #include "base/rng.h"
-#include "geometry/mesh/mesh_shapes.h"
+#include "renderer/mesh/mesh_shapes.h"
 #include "renderer/preview/ground_plane.h"
 #include "renderer/preview/ground_shadow.h"
 #include "renderer/preview/sheared_filter.h"

@@ -5,7 +5,7 @@
 #include "geometry/filter/direction_share.h"
 #include "geometry/filter/filter_rows.h"
 #include "geometry/reconstruct/reconstruct.h"
-#include "geometry/trace/trace_job.h"
+#include "geometry/reconstruct/trace_job.h"
 #include "tests/support/ranks/two_ranks.h"
 #include "tests/support/scan/scan_files.h"
 

@@ -4,7 +4,7 @@
 #include "base/ranks/rank_link.h"
 #include "base/ranks/rank_team_data.h"
 #include "base/rng.h"
-#include "renderer/ranks/rank_orders.h"
+#include "renderer/estimate/rank_orders.h"
 #include "renderer/scene/scene_pack.h"
 #include "renderer/transport/volume/volume_scene.h"
 #include "tests/support/tracer/environment/painted_environment.h"

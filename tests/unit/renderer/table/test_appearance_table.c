@@ -1,11 +1,11 @@
 /* Tables of appearance: the grid of directions, the textures, agreement of the mean with the path tracer's pictures. */
-#include "renderer/transport/table/appearance_table.h"
+#include "renderer/preview/appearance_table.h"
 
 #include "base/angle.h"
 #include "base/rng.h"
 #include "renderer/estimate/estimate.h"
 #include "renderer/estimate/render.h"
-#include "renderer/transport/table/direction_grid.h"
+#include "renderer/preview/direction_grid.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/tracer/trace_input.h"
 

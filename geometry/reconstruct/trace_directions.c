@@ -1,0 +1,60 @@
+/* Directions of a noisy scan by the lines that are found in it.
+ *
+ * The line filter sees a few diameters of a fiber, and strong noise turns its directions: by 20 degrees in the mean in
+ * a plain weave at signal-to-noise 2, where chains then end and change from fiber to fiber. Lines that follow a fiber
+ * farther know its direction better. Voxels near them take theirs, and lines that are traced once more in these
+ * directions are longer. */
+#include "geometry/reconstruct/line_directions.h"
+#include "geometry/reconstruct/trace_job.h"
+
+#include <math.h>
+
+enum { N_ROUND = 4 };
+/* Rounds end where the number of lines, which are pieces of fibers, has not fallen to this share of the last one. */
+static const double LEAST_FALL = 0.97;
+/* Noise over the step from void to material from which on lines are traced for their directions (geometry/NOTES.md). */
+static const double LEAST_NOISE = 0.3;
+
+/* Gives voxels within a diameter of a line its direction. */
+static status take_directions(const struct polyline_set *lines, struct direction_volume *d, struct thread_pool *pool,
+                              struct error *err)
+{
+    struct segment_bricks bricks = {0};
+    float most = 0.0f;
+    for (size_t i = 0; i < lines->n_line; i++) most = fmaxf(most, lines->radius[i]);
+    status s = segment_bricks_init(&bricks, lines, d->n, LINE_DIRECTIONS_BRICK, line_directions_reach(most), err);
+    if (s != STATUS_OK) return s;
+    s = line_directions_give(&bricks, d, pool, NULL, NULL, err);
+    segment_bricks_release(&bricks);
+    return s;
+}
+
+bool reconstruct_redirects(const struct reconstruct_report *report) { return report->noise.scan_sd >= LEAST_NOISE; }
+
+status reconstruct_redirect(const struct volume *v, struct direction_volume *d, const struct reconstruct_option *o,
+                            struct thread_pool *pool, const struct progress *progress,
+                            const struct reconstruct_report *report, struct error *err)
+{
+    status s = STATUS_OK;
+    bool again = reconstruct_redirects(report) && report->trace_edge_voxel >= 1.0;
+    size_t n_before = SIZE_MAX;
+    for (int round = 0; round < N_ROUND && again && s == STATUS_OK; round++) {
+        struct reconstruct_report look = *report;
+        struct reconstruct_option option = *o;
+        struct progress_part part = {progress, (double)round / N_ROUND, 1.0 / N_ROUND / TRACE_FINISHED_END};
+        const struct progress inner = progress_of_part(&part);
+        struct trace_job job = {.v = v, .d = d, .o = &option, .pool = pool, .report = &look, .part.outer = &inner};
+        struct polyline_set lines;
+        polyline_set_init(&lines);
+        look.radius_spread = 0.0;
+        trace_job_start(&job);
+        s = trace_scan(&job, true, &lines, err);
+        const bool fibers = lines.n_line > 0 && look.radius_spread <= TRACE_MOST_SPREAD;
+        if (s == STATUS_OK && fibers) s = take_directions(&lines, d, pool, err);
+        again = fibers && (double)lines.n_line < LEAST_FALL * (double)n_before;
+        n_before = lines.n_line;
+        polyline_set_release(&lines);
+    }
+    if (s == STATUS_OK) progress_report(progress, 1.0);
+    return s;
+}
