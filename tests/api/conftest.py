@@ -8,7 +8,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(
 from servers.daemon_fixtures import daemon, daemon_maker, shim  # noqa: E402, F401
 from daemon_under_test import Daemon, program  # noqa: E402
 
-OF_SQLITE = ("sqlite3", "selvedge.db", "--rebuild", "database(", "older_database", "shim", "EXPLAIN", "file_rows_locked")
+OF_SQLITE = ("sqlite3", "selvedge.db", "--rebuild", "database(", "older_database", "shim", "EXPLAIN", "file_rows_locked", "set_age", "(traced)")
 
 
 def pytest_collection_modifyitems(items):

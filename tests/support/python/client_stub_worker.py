@@ -20,7 +20,7 @@ if "--check" in sys.argv:
         faulty = json.load(checked)["sample"].startswith("faulty")
     faults = [{"code": "format", "field": "volume.files", "detail": "cannot read volume 'scan.tif': it is no scan"},
               {"code": "format", "field": "measurements.file", "detail": "line 1 of 'cloth.csv' has no numbers"}] if faulty else []
-    print(json.dumps({"faults": faults, "warnings": [], "n_file": 2}))
+    print(json.dumps({"faults": faults, "warnings": [], "files": [], "n_file": 2}))
     sys.exit(int(faulty))
 
 FOLDER = sys.argv[-1]

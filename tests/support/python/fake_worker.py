@@ -12,7 +12,7 @@ import time
 import zlib
 
 if "--check" in sys.argv:
-    print('{"faults": [], "warnings": [], "n_file": 0}')
+    print('{"faults": [], "warnings": [], "files": [], "n_file": 0}')
     sys.exit(0)
 if "--plan" in sys.argv:
     with open(os.path.join(sys.argv[-1], "job.json")) as f:
