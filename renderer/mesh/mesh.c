@@ -118,6 +118,35 @@ status mesh_check(const struct mesh *m, struct error *err)
     return s == STATUS_OK ? check_edges(m, err) : s;
 }
 
+/* ---- stretch ---- */
+
+/* Adds one triangle: surface and texture areas, and over its surface the squared derivatives of position by u and v. */
+static void add_stretch(const struct mesh *m, const struct mesh_triangle *t, double area[2], double square[2])
+{
+    double edge[2][3], normal[3], uv[2][2];
+    for (int e = 0; e < 2; e++) {
+        subtract(m->position_mm[t->position[e + 1]], m->position_mm[t->position[0]], edge[e]);
+        for (int a = 0; a < 2; a++) uv[e][a] = m->texture_mm[t->texture[e + 1]][a] - m->texture_mm[t->texture[0]][a];
+    }
+    cross(edge[0], edge[1], normal);
+    const double det = uv[0][0] * uv[1][1] - uv[0][1] * uv[1][0], surface = 0.5 * sqrt(dot(normal, normal));
+    area[0] += surface;
+    area[1] += 0.5 * fabs(det);
+    for (int a = 0; a < 2; a++) {
+        double along[3];
+        const double sign = a == 0 ? 1.0 : -1.0;
+        for (int k = 0; k < 3; k++) along[k] = sign * (edge[0][k] * uv[1][1 - a] - edge[1][k] * uv[0][1 - a]) / det;
+        square[a] += surface * dot(along, along);
+    }
+}
+
+struct mesh_stretch mesh_stretch(const struct mesh *m)
+{
+    double area[2] = {0, 0}, square[2] = {0, 0};
+    for (size_t i = 0; i < m->n_triangle; i++) add_stretch(m, &m->triangle[i], area, square);
+    return (struct mesh_stretch){area[0] / area[1], {sqrt(square[0] / area[0]), sqrt(square[1] / area[0])}};
+}
+
 /* ---- normals ---- */
 
 static void add_corner(const struct mesh *m, const struct mesh_triangle *t, int k, double (*normal)[3])

@@ -7,6 +7,7 @@
 #ifndef SELVEDGE_RENDERER_MESH_H
 #define SELVEDGE_RENDERER_MESH_H
 
+#include "base/files/file_ledger.h"
 #include "base/status.h"
 
 #include <stddef.h>
@@ -39,10 +40,21 @@ status mesh_check(const struct mesh *m, struct error *err);
  * 1998). normal: n_position. */
 status mesh_normals(const struct mesh *m, double (*normal)[3], struct error *err);
 
-/* Reads a Wavefront OBJ file: v, vt and f; polygons become fans of triangles; all else is passed over.
- * Equal positions become one. Positions and
- * texture coordinates are multiplied by scale_mm. The mesh is checked. STATUS_FORMAT (naming file and line), also for a
- * face without texture coordinates; STATUS_TOO_LARGE; STATUS_INVALID as mesh_check; STATUS_IO, STATUS_NOT_FOUND. */
+/* Area of the surface over the area of its texture, and root mean squares over the surface of the lengths that a
+ * millimetre of cloth along u and along v has on it. All are 1 where cloth lies without stretching. m: checked. */
+struct mesh_stretch {
+    double area, along[2];
+};
+struct mesh_stretch mesh_stretch(const struct mesh *m);
+
+/* Reads a Wavefront OBJ file: v, vt and f, with comments, continued lines and a byte order mark; polygons become fans
+ * of triangles. ledger: receives the other statements (base/files/file_ledger.h), or NULL. Equal positions become one.
+ * Positions and texture coordinates are multiplied by scale_mm. The mesh is checked. STATUS_FORMAT (naming file and
+ * line), also for a face without texture coordinates and for curved surfaces; STATUS_TOO_LARGE; STATUS_INVALID as
+ * mesh_check; STATUS_IO, STATUS_NOT_FOUND. */
+status mesh_read_obj_ledger(const char *path, double scale_mm, struct mesh *m, struct file_ledger *ledger,
+                            struct error *err);
+/* The same without a ledger. */
 status mesh_read_obj(const char *path, double scale_mm, struct mesh *m, struct error *err);
 
 /* Writes such a file, in millimetres with six significant digits, pairs of triangles with a common first corner as one

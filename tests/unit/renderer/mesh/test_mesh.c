@@ -41,6 +41,73 @@ static void polygons_become_triangles(void **state)
     }
 }
 
+/* The same square with what other programs write: byte order mark, comments after a statement, continued lines, ends of
+ * lines of all systems, faces before their points. */
+static void other_spellings_are_read(void **state)
+{
+    static const char *const file[] = {
+        "\xef\xbb\xbf" SQUARE "f 1/1 2/2 3/3 4/4\n",
+        SQUARE "f 1/1 2/2 3/3 # upper\nf 1/1 3/3 4/4#lower\n",
+        SQUARE "f 1/1 2/2 \\\n3/3 4/4\n",
+        SQUARE "f 1/1 2/2 3/3\\\r\n 4/4\r\n",
+        SQUARE "f \\  \n1/1 \\\n\\\n2/2 3/3 4/4",
+        SQUARE "# C:\\meshes\\\nf 1/1 2/2 3/3 4/4\n",
+        SQUARE "usemtl a#b\\\n c\nf 1/1 2/2 3/3 4/4\n",
+        "f 1/1/1 2/2/1 3/3/1 4/4/1\n" SQUARE,
+        "v 0 0 0\rv 1 0 0\rv 1 1 0\rv 0 1 0\rvt 0 0\rvt 2 0\rvt 2 2\rvt 0 2\rf -4/-4 2/2 3/3 -1/-1\r",
+    };
+    for (size_t i = 0; i < sizeof file / sizeof file[0]; i++) {
+        struct mesh m;
+        struct error err = {0};
+        if (read_text(state, file[i], &m, &err) != STATUS_OK) fail_msg("%zu: %s", i, err.text);
+        assert_int_equal(m.n_triangle, 2);
+        assert_int_equal(m.n_position, 4);
+        assert_true(m.position_mm[2][0] == 10.0 && m.texture_mm[2][1] == 20.0);
+        assert_int_equal(m.triangle[1].position[2], 3);
+        mesh_release(&m);
+    }
+}
+
+static void other_statements_are_in_the_ledger(void **state)
+{
+    const char *path = scratch_path(state, "a.obj");
+    static const char text[] = "mtllib a.mtl\nusemtl red\nusemtl blue\n" SQUARE "f 1/1 2/2 3/3 4/4\nl 1 2\n";
+    struct file_ledger ledger = {0};
+    struct mesh m;
+    scratch_write(path, text, sizeof text - 1);
+    assert_int_equal(mesh_read_obj_ledger(path, 1.0, &m, &ledger, NULL), STATUS_OK);
+    mesh_release(&m);
+    assert_int_equal(ledger.n, 4);
+    assert_string_equal(file_ledger_find(&ledger, "material")->value, "red");
+    assert_int_equal(file_ledger_find(&ledger, "normals")->use, FILE_STATEMENT_NOT_USED);
+    assert_non_null(file_ledger_find(&ledger, "material library"));
+    assert_non_null(file_ledger_find(&ledger, "lines"));
+}
+
+/* Texture coordinates of 20 mm on 10 mm, and such that equal areas hide. */
+static void stretch_is_measured(void **state)
+{
+    static const struct {
+        const char *texture;
+        double area, u, v;
+    } of[] = {
+        {"vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n", 1.0, 1.0, 1.0},
+        {"vt 0 0\nvt 2 0\nvt 2 2\nvt 0 2\n", 0.25, 0.5, 0.5},
+        {"vt 0 0\nvt 4 0\nvt 4 .25\nvt 0 .25\n", 1.0, 0.25, 4.0},
+        {"vt 0 0\nvt 0 .1\nvt -.1 .1\nvt -.1 0\n", 100.0, 10.0, 10.0}, /* turned */
+    };
+    for (size_t i = 0; i < sizeof of / sizeof of[0]; i++) {
+        char text[512];
+        struct mesh m;
+        snprintf(text, sizeof text, "v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\n%sf 1/1 2/2 3/3 4/4\n", of[i].texture);
+        assert_int_equal(read_text(state, text, &m, NULL), STATUS_OK);
+        const struct mesh_stretch s = mesh_stretch(&m);
+        assert_true(fabs(s.area / of[i].area - 1.0) < 1e-12);
+        assert_true(fabs(s.along[0] / of[i].u - 1.0) < 1e-12 && fabs(s.along[1] / of[i].v - 1.0) < 1e-12);
+        mesh_release(&m);
+    }
+}
+
 static void equal_positions_become_one(void **state)
 {
     struct mesh m;
@@ -64,6 +131,12 @@ static void faults_are_named(void **state)
         {SQUARE "f 1/1 2/2 9/3\n", "position (v) that is not there", STATUS_FORMAT},
         {SQUARE "f 1/1 2/2 3/-9\n", "texture coordinate (vt) that is not there", STATUS_FORMAT},
         {SQUARE "f 1/1 2/2\n", "three corners", STATUS_FORMAT},
+        {SQUARE "f 1/1 \\\n2/2 9/9\n", "line 11: the face names a position", STATUS_FORMAT},
+        {SQUARE "vt 0 \\\n0\nf 1/1 2/2 9/9\n", "line 13: the face names a position", STATUS_FORMAT},
+        {SQUARE "f 1/1 2/2 3/3x\n", "line 11: a corner of the face is not v/vt/vn", STATUS_FORMAT},
+        {SQUARE "f -9/-1 2/2 3/3\n", "position (v) that is not there", STATUS_FORMAT},
+        {SQUARE "cstype bspline\n", "line 11: it is of a curved surface", STATUS_FORMAT},
+        {"v 1,5 2 3\n", "line 1: a number is missing", STATUS_FORMAT},
         {"v 1 2\n", "line 1: a number is missing", STATUS_FORMAT},
         {"", "no triangles", STATUS_INVALID},
         {SQUARE "f 1/1 2/2 2/3\n", "triangle 1 of the mesh has no area", STATUS_INVALID},
@@ -82,6 +155,10 @@ static void faults_are_named(void **state)
     }
     struct error err = {0};
     struct mesh m;
+    const char *utf16 = scratch_path(state, "utf16.obj");
+    scratch_write(utf16, "\xff\xfev\0 \0", 6);
+    assert_int_equal(mesh_read_obj(utf16, 1.0, &m, &err), STATUS_FORMAT);
+    assert_non_null(strstr(err.text, "UTF-16"));
     assert_int_equal(mesh_read_obj("/nowhere/a.obj", 1.0, &m, &err), STATUS_NOT_FOUND);
 }
 
@@ -134,6 +211,10 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(polygons_become_triangles, scratch_folder_setup, scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(other_spellings_are_read, scratch_folder_setup, scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(other_statements_are_in_the_ledger, scratch_folder_setup,
+                                        scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(stretch_is_measured, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(equal_positions_become_one, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(a_written_mesh_is_read_again, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test_setup_teardown(faults_are_named, scratch_folder_setup, scratch_folder_teardown),
