@@ -1,6 +1,8 @@
 #include "optimizer/job/job_outline.h"
 #include "optimizer/job/checks/job_faults.h"
+#include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/document/job_fit.h"
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/job_parse.h"
 
@@ -21,17 +23,18 @@ static void add_file(void *context, const char *name, const char *role)
     file->role = role;
 }
 
-static status take_document(const struct job_document *doc, struct job_outline *o, struct error *err)
+static status take_sections(struct job_sections section, struct job_outline *o, struct error *err)
 {
     size_t n = 0;
     *o = (struct job_outline){.n_file = 0};
-    snprintf(o->sample, sizeof o->sample, "%s", doc->sample);
-    snprintf(o->geometry_job, sizeof o->geometry_job, "%s", doc->scan->geometry_job);
-    snprintf(o->profile_job, sizeof o->profile_job, "%s", doc->fit->profile_job);
-    job_document_visit_files(doc, count_file, &n);
+    snprintf(o->sample, sizeof o->sample, "%s", section.cloth->sample);
+    snprintf(o->geometry_job, sizeof o->geometry_job, "%s", section.scan->geometry_job);
+    snprintf(o->profile_job, sizeof o->profile_job, "%s", section.fit->profile_job);
+    o->export_pdf = section.results->export_pdf;
+    job_sections_visit_files(&section, count_file, &n);
     o->file = calloc(n + 1, sizeof *o->file);
     if (o->file == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
-    job_document_visit_files(doc, add_file, o);
+    job_sections_visit_files(&section, add_file, o);
     return STATUS_OK;
 }
 
@@ -39,7 +42,7 @@ status job_outline_read(const char *text, size_t n_bytes, struct job_outline *ou
 {
     struct job_document *doc = NULL;
     status s = job_document_parse(text, n_bytes, &doc, err);
-    if (s == STATUS_OK) s = take_document(doc, outline, err);
+    if (s == STATUS_OK) s = take_sections(job_document_sections(doc), outline, err);
     job_document_free(doc);
     return s;
 }
@@ -48,7 +51,7 @@ status job_outline_take(const json_t *json, struct job_outline *outline, struct 
 {
     struct job_document *doc = NULL;
     status s = job_document_read(json, &doc, err);
-    if (s == STATUS_OK) s = take_document(doc, outline, err);
+    if (s == STATUS_OK) s = take_sections(job_document_sections(doc), outline, err);
     job_document_free(doc);
     return s;
 }
@@ -59,7 +62,8 @@ void job_outline_inspect(const char *text, size_t n_bytes, struct job_outline *o
     struct error fault = {0};
     *outline = (struct job_outline){.n_file = 0};
     job_document_inspect(text, n_bytes, &doc, list);
-    if (doc != NULL && take_document(doc, outline, &fault) != STATUS_OK) job_faults_add(list, &fault);
+    if (doc != NULL && take_sections(job_document_sections(doc), outline, &fault) != STATUS_OK)
+        job_faults_add(list, &fault);
     job_document_free(doc);
 }
 

@@ -1,5 +1,5 @@
-/* The outline of a job document: its sample, the other jobs that it names, and its input files. The daemon needs no
- * more of a document. */
+/* The outline of a job document: its sample, the other jobs that it names, and its input files. The daemon, and a
+ * worker that enters its sandbox, need no more of a document. */
 #ifndef SELVEDGE_OPTIMIZER_JOB_OUTLINE_H
 #define SELVEDGE_OPTIMIZER_JOB_OUTLINE_H
 
@@ -7,18 +7,20 @@
 #include "optimizer/job/document/job_limits.h"
 
 #include <jansson.h>
+#include <stdbool.h>
 #include <stddef.h>
 
 struct job_fault_list;
 
 struct job_outline_file {
     char name[JOB_MAX_NAME_BYTES];
-    const char *role; /* "volume", "fibers", ... (job_document.h); constant */
+    const char *role; /* "volume", "fibers", ... (job_sections.h); constant */
 };
 
 struct job_outline {
     char sample[JOB_MAX_SAMPLE_BYTES];
     char geometry_job[JOB_MAX_ID_BYTES], profile_job[JOB_MAX_ID_BYTES]; /* "" when none is named */
+    bool export_pdf;                                                    /* report.pdf is wanted */
     size_t n_file;
     struct job_outline_file *file;
 };

@@ -1,7 +1,9 @@
 #include "optimizer/job/job_parse.h"
+#include "base/catalogue/cloth_description.h"
 #include "base/files/json_depth.h"
 #include "optimizer/job/checks/job_document_parts.h"
 #include "optimizer/job/checks/job_faults.h"
+#include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_fit_option.h"
 #include "optimizer/job/options/option_reader.h"
@@ -62,7 +64,7 @@ status job_document_read(const json_t *json, struct job_document **doc, struct e
     struct job_document *d = NULL;
     struct error fault = {0};
     status s = document_new(&d, &fault);
-    if (s == STATUS_OK) s = job_options_read(json, d, &fault);
+    if (s == STATUS_OK) s = job_options_read(json, d, NULL, &fault);
     if (s == STATUS_OK)
         *doc = d;
     else {
@@ -78,11 +80,20 @@ void job_document_inspect(const char *text, size_t n_bytes, struct job_document 
     json_t *json = read_json(text, n_bytes, &fault);
     *doc = NULL;
     status s = json != NULL ? document_new(doc, &fault) : fault.code;
-    if (s == STATUS_OK) {
-        (*doc)->fault = list;
-        s = job_options_read(json, *doc, &fault);
-        (*doc)->fault = NULL;
-    }
+    if (s == STATUS_OK) s = job_options_read(json, *doc, list, &fault);
     json_decref(json);
     if (s != STATUS_OK) job_faults_add(list, &fault);
+}
+
+status job_parse_cloth(const json_t *section, struct cloth_description *cloth, struct error *err)
+{
+    struct job_document *doc = NULL;
+    json_t *json =
+        json_pack("{s:s, s:O, s:{s:s}}", "sample", "described", "cloth", section, "measurements", "file", "none.csv");
+    if (json == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the section 'cloth': out of memory");
+    status s = job_document_read(json, &doc, err);
+    if (s == STATUS_OK) *cloth = *doc->cloth->description;
+    job_document_free(doc);
+    json_decref(json);
+    return s;
 }

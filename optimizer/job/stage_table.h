@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_OPTIMIZER_STAGE_TABLE_H
 #define SELVEDGE_OPTIMIZER_STAGE_TABLE_H
 
-#include "optimizer/job/document/job_kind.h"
+#include "optimizer/job/document/job_sections.h"
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -9,7 +9,6 @@
 #include "optimizer/fit/cloth/cloth_search.h"
 #include "optimizer/fit/descent/descent.h"
 
-#include "optimizer/job/document/job_kind.h"
 #include "optimizer/job/document/job_sections.h"
 #include "optimizer/photographs/camera/photograph_develop.h"
 #include "optimizer/photographs/profile/bowl_profile.h"

@@ -1,6 +1,5 @@
 #include "optimizer/worker/job_need.h"
 #include "optimizer/job/document/job_cloth.h"
-#include "optimizer/job/document/job_document.h"
 #include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/job/job_folder.h"
@@ -106,7 +105,7 @@ static double profile_bytes(const struct job_plan *plan)
 static struct job_need model_of(const struct job_plan *plan)
 {
     struct input_bytes input = {.plan = plan};
-    job_document_visit_files(plan->in->doc, add_input, &input);
+    job_sections_visit_files(&plan->in->section, add_input, &input);
     const double n_voxel = plan->in->section.scan->given && !is_adopted(plan) ? pipeline_plan_voxels(plan) : 0.0;
     double geometry_bytes = voxel_bytes * n_voxel;
     if (plan->tools->memory_limit_bytes > 0)

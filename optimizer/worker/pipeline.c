@@ -1,6 +1,6 @@
 #include "optimizer/worker/pipeline.h"
 #include "base/clock.h"
-#include "optimizer/job/document/job_document.h"
+#include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/job_folder.h"
@@ -149,7 +149,7 @@ static status do_report(struct pipeline *p, const struct taken *t, bool load, st
 {
     const struct job_sections *section = &p->in->section;
     const struct report_input in = {.job = &p->job,
-                                    .sample = section->sample,
+                                    .sample = section->cloth->sample,
                                     .kind = p->in->kind,
                                     .photographs = section->rows,
                                     .profile = section->profile,
@@ -322,11 +322,11 @@ static void add_file(void *context, const char *name, const char *role)
 /* Lists the input files of the document. */
 static status list_files(const struct job_inputs *in, struct job_outline *files, struct error *err)
 {
-    job_document_visit_files(in->doc, add_file, files);
+    job_sections_visit_files(&in->section, add_file, files);
     files->file = calloc(files->n_file + 1, sizeof *files->file);
     if (files->file == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot run the job: out of memory");
     files->n_file = 0;
-    job_document_visit_files(in->doc, add_file, files);
+    job_sections_visit_files(&in->section, add_file, files);
     return STATUS_OK;
 }
 

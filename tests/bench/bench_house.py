@@ -5,6 +5,7 @@
 house.folder_circles, .file_circles   folders, and files (a header with the source of its name), that include each other
 house.upward_includes                 includes that a table of folders (README.md of a part) does not permit
 house.option_objects                  most objects of the programs that a change of one header of optimizer/job/document compiles anew
+house.document_files                  C files of the parts that name struct job_document, the whole of a job
 house.model_objects                   objects that a new scattering model compiles: its own source, and the readers of the list of rows
 house.that_of, .what                  pronouns in place of nouns in 1,000 words of comments (tests/check_words.py)
 house.docs_words                      words of docs/
@@ -71,12 +72,13 @@ def main():
     figure("upward_includes", sum("table of" in breach and "include of" in breach for breach in check_folders.check_tree(ROOT, paths)))
     found = users(arguments.build)
     figure("option_objects", max(len(o) for h, o in found.items() if re.fullmatch(r"optimizer/job/document/job_\w+\.h", h)
-                                 and h.split("/")[-1] not in ("job_limits.h", "job_kind.h", "job_sections.h", "job_file_name.h")))
+                                 and h.split("/")[-1] not in ("job_limits.h", "job_sections.h", "job_file_name.h")))
     figure("model_objects", 1 + len(found["base/catalogue/models.def"]))
     texts = {}
     for path in sources:
         with open(os.path.join(ROOT, path), encoding="utf-8") as source:
             texts[path] = source.read()
+    figure("document_files", sum(bool(re.search(r"struct job_document\b", text)) for text in texts.values()))
     n_word, counters = check_words.count(texts)
     for name, counter in zip(("that_of", "what"), counters):
         figure(name, 1000 * counter.total() / n_word)

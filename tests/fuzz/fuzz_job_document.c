@@ -19,7 +19,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     status s = job_document_parse((const char *)data, size, &doc, &err);
     fuzz_check_error(s, &err);
     if (s != STATUS_OK) return 0;
-    job_document_visit_files(doc, name_is_safe, NULL);
+    const struct job_sections section = job_document_sections(doc);
+    job_sections_visit_files(&section, name_is_safe, NULL);
     job_document_free(doc);
     return 0;
 }

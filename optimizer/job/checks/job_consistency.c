@@ -1,9 +1,9 @@
 #include "optimizer/job/checks/job_consistency.h"
 #include "base/catalogue/volume_format.h"
-#include "optimizer/job/document/job_document.h"
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/document/job_sections.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -91,7 +91,7 @@ static const struct role_rule role_rule[] = {
 };
 
 struct consistency_check {
-    const struct job_document *doc;
+    const struct job_sections *section;
     void (*found)(void *context, const struct error *fault);
     void *context;
 };
@@ -104,24 +104,24 @@ static void check_ending(void *context, const char *name, const char *role)
     for (size_t i = 0; i < sizeof role_rule / sizeof role_rule[0]; i++) {
         const struct role_rule *r = &role_rule[i];
         if (strcmp(role, r->role) != 0 || r->kind[kind_of(name)]) continue;
-        job_document_file_key(search->doc, name, field, sizeof field);
+        job_sections_file_key(search->section, name, field, sizeof field);
         error_set_field(&fault, STATUS_INVALID, field, "'%s' is '%s', which by its ending is not %s", field, name,
                         r->wanted);
         search->found(search->context, &fault);
     }
 }
 
-static void check_radians(const struct job_document *doc, const struct consistency_check *search)
+static void check_radians(const struct job_sections *section, const struct consistency_check *search)
 {
     struct angle_span photograph = {0}, candidate = {0};
     struct error fault = {0};
-    for (size_t i = 0; i < doc->rows->n_photograph; i++) {
-        const struct job_photograph *p = &doc->rows->photograph[i];
+    for (size_t i = 0; i < section->rows->n_photograph; i++) {
+        const struct job_photograph *p = &section->rows->photograph[i];
         angle_span_add(&photograph, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg, p->camera_phi_deg,
                        p->cloth_rotation_deg);
     }
-    for (size_t i = 0; i < doc->fit->n_candidate && doc->fit->candidate != NULL; i++) {
-        const struct job_candidate *p = &doc->fit->candidate[i];
+    for (size_t i = 0; i < section->fit->n_candidate && section->fit->candidate != NULL; i++) {
+        const struct job_candidate *p = &section->fit->candidate[i];
         angle_span_add(&candidate, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg, p->camera_phi_deg,
                        p->cloth_rotation_deg);
     }
@@ -135,10 +135,10 @@ static void check_radians(const struct job_document *doc, const struct consisten
     }
 }
 
-void job_consistency_check(const struct job_document *doc, void (*found)(void *context, const struct error *fault),
+void job_consistency_check(const struct job_sections *section, void (*found)(void *context, const struct error *fault),
                            void *context)
 {
-    struct consistency_check search = {doc, found, context};
-    job_document_visit_files(doc, check_ending, &search);
-    check_radians(doc, &search);
+    struct consistency_check search = {section, found, context};
+    job_sections_visit_files(section, check_ending, &search);
+    check_radians(section, &search);
 }

@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-struct job_document;
+struct job_sections;
 
 /* Largest angle from the normal and around it that a set of views in radians can have. */
 #define JOB_RADIANS_THETA 3.2
@@ -25,7 +25,7 @@ void angle_span_add(struct angle_span *span, double light_theta, double light_ph
 bool angle_span_in_radians(const struct angle_span *span);
 
 /* Calls `found` for every inconsistency of the document, in its order, with STATUS_INVALID and a filled error. */
-void job_consistency_check(const struct job_document *doc, void (*found)(void *context, const struct error *fault),
+void job_consistency_check(const struct job_sections *section, void (*found)(void *context, const struct error *fault),
                            void *context);
 
 #endif

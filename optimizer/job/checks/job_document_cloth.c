@@ -165,15 +165,15 @@ static status read_numbers(const json_t *section, struct cloth_description *d, s
     return st;
 }
 
-static void take_kinds(const struct job_document *doc, const json_t *section, struct cloth_description *d)
+static void take_kinds(const struct job_cloth *cloth, const json_t *section, struct cloth_description *d)
 {
     const json_t *yarns = json_object_get(section, "yarns");
-    if (doc->cloth->n_yarn == 0) return;
+    if (cloth->n_yarn == 0) return;
     struct cloth_kind ground = d->kind[0], pile = d->kind[1];
-    d->n_kind = doc->cloth->n_yarn;
+    d->n_kind = cloth->n_yarn;
     if (d->pile_kind >= 0) d->pile_kind = (int)d->n_kind - 1;
     for (size_t k = 0; k < d->n_kind; k++) {
-        const struct job_cloth_yarn *y = &doc->cloth->yarn[k];
+        const struct job_cloth_yarn *y = &cloth->yarn[k];
         d->kind[k] = (int)k == d->pile_kind ? pile : ground;
         if (y->n_fiber > 0) d->kind[k].n_fiber = y->n_fiber;
         d->kind[k].n_ply = y->n_ply;
@@ -182,57 +182,54 @@ static void take_kinds(const struct job_document *doc, const json_t *section, st
     }
 }
 
-static status read_weave(const struct option_value *v, struct cloth_description *d, struct error *err)
+static status read_weave(const json_t *section, struct job_cloth *cloth, struct cloth_description *d, struct error *err)
 {
-    const json_t *draft = json_object_get(v->value, "draft");
-    bool named = json_object_get(v->value, "weave") != NULL, shown = v->doc->cloth->texture[0] != '\0';
+    const json_t *draft = json_object_get(section, "draft");
+    bool named = json_object_get(section, "weave") != NULL, shown = cloth->texture[0] != '\0';
     if (named == (draft != NULL) && (named || !shown))
         return error_set_field(err, STATUS_INVALID, "cloth.weave",
                                "a described cloth takes either 'cloth.weave' or 'cloth.draft', or neither with a "
                                "photograph in 'cloth.texture'");
-    v->doc->cloth->draft_from_texture = !named && draft == NULL; /* until it is read, the weave stands as plain */
-    status st = cloth_description_init(d, named ? v->doc->cloth->weave : "plain", err);
+    cloth->draft_from_texture = !named && draft == NULL; /* until it is read, the weave stands as plain */
+    status st = cloth_description_init(d, named ? cloth->weave : "plain", err);
     return st == STATUS_OK && draft != NULL ? read_draft(draft, d, err) : st;
 }
 
-static status read_cloth(const struct option_value *v, struct cloth_description *d, struct error *err)
+static status read_cloth(const json_t *section, struct job_cloth *cloth, struct cloth_description *d, struct error *err)
 {
-    const struct job_document *doc = v->doc;
-    status st = read_weave(v, d, err);
-    if (st == STATUS_OK) st = check_yarn_keys(v->value, d, err);
+    status st = read_weave(section, cloth, d, err);
+    if (st == STATUS_OK) st = check_yarn_keys(section, d, err);
     if (st != STATUS_OK) return st;
-    take_kinds(doc, v->value, d);
+    take_kinds(cloth, section, d);
     if (d->pile_kind == 0)
         return error_set_field(err, STATUS_INVALID, "cloth.yarns",
                                "a velvet has at least two kinds of yarn: the ground, and last the pile");
-    d->seed = doc->cloth->seed;
+    d->seed = cloth->seed;
     for (int k = 0; k < 2 && st == STATUS_OK; k++) {
         enum cloth_direction a = k == 0 ? CLOTH_WEFT : CLOTH_WARP;
         /* the tile of a draft that is not known yet is checked when it is */
-        d->n_yarn[a] = doc->cloth->draft_from_texture ? 0 : doc->cloth->tile_yarn[a];
-        if (!isnan(doc->cloth->threads_per_cm[a])) d->threads_per_cm[a] = doc->cloth->threads_per_cm[a];
-        st = read_order(v->value, a, d, err);
+        d->n_yarn[a] = cloth->draft_from_texture ? 0 : cloth->tile_yarn[a];
+        if (!isnan(cloth->threads_per_cm[a])) d->threads_per_cm[a] = cloth->threads_per_cm[a];
+        st = read_order(section, a, d, err);
     }
     cloth_description_number(d);
-    if (st == STATUS_OK) st = read_numbers(v->value, d, err);
+    if (st == STATUS_OK) st = read_numbers(section, d, err);
     return st == STATUS_OK ? cloth_description_check(d, err) : st;
 }
 
 /* Reads the names of the kinds of yarn, which are the groups of fibers: all have one, or none. */
-static status read_names(struct job_document *doc, struct error *err)
+static status read_names(struct job_cloth *cloth, struct error *err)
 {
     size_t n_named = 0;
     status s = STATUS_OK;
-    for (size_t k = 0; k < doc->cloth->n_yarn; k++) n_named += doc->cloth->yarn[k].name[0] != '\0';
-    for (size_t k = 0; k < doc->cloth->n_yarn && n_named > 0 && s == STATUS_OK; k++) {
-        memcpy(doc->cloth->description->kind[k].name, doc->cloth->yarn[k].name,
-               sizeof doc->cloth->description->kind[k].name);
+    for (size_t k = 0; k < cloth->n_yarn; k++) n_named += cloth->yarn[k].name[0] != '\0';
+    for (size_t k = 0; k < cloth->n_yarn && n_named > 0 && s == STATUS_OK; k++) {
+        memcpy(cloth->description->kind[k].name, cloth->yarn[k].name, sizeof cloth->description->kind[k].name);
         char path[JSON_PATH_BYTES];
         snprintf(path, sizeof path, "cloth.yarns[%zu].name", k);
-        s = n_named == doc->cloth->n_yarn
-                ? job_add_group(doc, doc->cloth->yarn[k].name, path, err)
-                : error_set_field(err, STATUS_INVALID, path, "'%s': either all kinds of yarn have a name, or none",
-                                  path);
+        s = n_named == cloth->n_yarn ? job_add_group(cloth, cloth->yarn[k].name, path, err)
+                                     : error_set_field(err, STATUS_INVALID, path,
+                                                       "'%s': either all kinds of yarn have a name, or none", path);
     }
     return s;
 }
@@ -261,28 +258,29 @@ status job_cloth_check_final_tiles(const struct job_cloth *cloth, struct error *
 
 status job_check_cloth(const struct option_value *v, struct error *err)
 {
-    v->doc->cloth->description = calloc(1, sizeof *v->doc->cloth->description);
-    if (v->doc->cloth->description == NULL)
+    struct job_cloth *cloth = v->own;
+    cloth->description = calloc(1, sizeof *cloth->description);
+    if (cloth->description == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
-    status st = read_cloth(v, v->doc->cloth->description, err);
-    if (st == STATUS_OK) st = read_names(v->doc, err);
-    if (st == STATUS_OK) st = job_cloth_check_final_tiles(v->doc->cloth, err);
+    status st = read_cloth(v->value, cloth, cloth->description, err);
+    if (st == STATUS_OK) st = read_names(cloth, err);
+    if (st == STATUS_OK) st = job_cloth_check_final_tiles(cloth, err);
     if (st == STATUS_INVALID) job_cloth_name_field(err);
     return st;
 }
 
 status job_check_correction(const struct option_value *v, struct error *err)
 {
-    struct job_document *doc = v->doc;
+    struct job_cloth *cloth = v->own;
     const struct json_field f = {.object = v->value, .path = "correction"};
     status s = STATUS_OK;
-    if (doc->cloth->description != NULL)
+    if (cloth->description != NULL)
         return error_set_field(
             err, STATUS_INVALID, "correction",
             "'correction' is for fibers of a scan or a file: a described cloth has numbers of its own");
-    correction_numbers_init(doc->cloth->correction);
-    for (int k = 0; k < CORRECTION_N && s == STATUS_OK; k++) s = read_number(&f, &doc->cloth->correction[k], err);
-    if (s == STATUS_OK) s = correction_numbers_check(doc->cloth->correction, err);
+    correction_numbers_init(cloth->correction);
+    for (int k = 0; k < CORRECTION_N && s == STATUS_OK; k++) s = read_number(&f, &cloth->correction[k], err);
+    if (s == STATUS_OK) s = correction_numbers_check(cloth->correction, err);
     if (s == STATUS_INVALID) name_section("correction", err);
     return s;
 }

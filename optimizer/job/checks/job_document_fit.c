@@ -33,14 +33,14 @@ static void list_models(const char *name[MAX_LISTED + 1])
     name[n] = NULL;
 }
 
-static status parse_model_list(const struct json_field *f, const char *const *name, struct job_document *doc,
+static status parse_model_list(const struct json_field *f, const char *const *name, struct job_fit *fit,
                                struct error *err)
 {
     const json_t *list = json_object_get(f->object, "models");
     if (!json_is_array(list) || json_array_size(list) == 0 || json_array_size(list) > JOB_MAX_MODEL)
         return error_set_field(err, STATUS_INVALID, "fit.models", "'fit.models' must be a list of 1 to %d model ids",
                                JOB_MAX_MODEL);
-    doc->fit->n_model = 0;
+    fit->n_model = 0;
     for (size_t i = 0; i < json_array_size(list); i++) {
         const char *id = json_string_value(json_array_get(list, i));
         char path[JSON_PATH_BYTES], known[400];
@@ -52,14 +52,14 @@ static status parse_model_list(const struct json_field *f, const char *const *na
             return error_set_field(err, STATUS_INVALID, path, "'%s' is no model: allowed are %s", path, known);
         }
         for (size_t j = 0; j < i; j++)
-            if (strcmp(doc->fit->model[j].id, id) == 0)
+            if (strcmp(fit->model[j].id, id) == 0)
                 return error_set_field(err, STATUS_INVALID, path, "'%s' names the model '%s' a second time", path, id);
-        snprintf(doc->fit->model[doc->fit->n_model++].id, sizeof doc->fit->model[0].id, "%s", id);
+        snprintf(fit->model[fit->n_model++].id, sizeof fit->model[0].id, "%s", id);
     }
     return STATUS_OK;
 }
 
-static status parse_models(const struct json_field *f, struct job_document *doc, struct error *err)
+static status parse_models(const struct json_field *f, struct job_fit *fit, struct error *err)
 {
     const char *name[MAX_LISTED + 1];
     if (json_object_get(f->object, "models") == NULL) return STATUS_OK;
@@ -67,7 +67,7 @@ static status parse_models(const struct json_field *f, struct job_document *doc,
         return error_set_field(err, STATUS_INVALID, "fit.models",
                                "'fit.model' and 'fit.models' are both given: a job takes one of them");
     list_models(name);
-    return parse_model_list(f, name, doc, err);
+    return parse_model_list(f, name, fit, err);
 }
 
 /* Number of the first slots that are of the same set of parameters. */
@@ -111,42 +111,41 @@ static status parse_value(const struct json_field *f, const char *key, const jso
 }
 
 /* Reads the section "fixed" or "start". Each key applies to every model that has such a parameter. */
-static status parse_values(const struct json_field *fit, bool fixed, const struct model_info *const *model,
-                           struct job_document *doc, struct error *err)
+static status parse_values(const struct json_field *section, bool fixed, const struct model_info *const *model,
+                           struct job_fit *fit, struct error *err)
 {
     struct json_field f;
     bool present;
-    status s = json_field_object(fit, fixed ? "fixed" : "start", &f, &present, err);
+    status s = json_field_object(section, fixed ? "fixed" : "start", &f, &present, err);
     if (s != STATUS_OK || !present) return s;
     void *iter = json_object_iter((json_t *)(uintptr_t)f.object);
     for (; iter != NULL; iter = json_object_iter_next((json_t *)(uintptr_t)f.object, iter)) {
         const char *key = json_object_iter_key(iter);
         bool known = false;
-        for (size_t i = 0; i < doc->fit->n_model && s == STATUS_OK; i++)
+        for (size_t i = 0; i < fit->n_model && s == STATUS_OK; i++)
             s = parse_value(&f, key, json_object_iter_value(iter), model[i],
-                            fixed ? doc->fit->model[i].fixed : doc->fit->model[i].start, &known, err);
+                            fixed ? fit->model[i].fixed : fit->model[i].start, &known, err);
         if (s != STATUS_OK) return s;
         char path[JSON_PATH_BYTES];
         json_field_path(&f, key, path);
-        if (!known) return job_unknown_parameter(model, doc->fit->n_model, path, key, err);
+        if (!known) return job_unknown_parameter(model, fit->n_model, path, key, err);
     }
     return STATUS_OK;
 }
 
 /* Fixes the density multiplier of volume models at the given value, or starts its fit there. */
-static status set_density(const struct json_field *f, const struct model_info *const *model, struct job_document *doc,
+static status set_density(const struct json_field *f, const struct model_info *const *model, struct job_fit *fit,
                           struct error *err)
 {
     bool any_volume = false;
-    for (size_t i = 0; i < doc->fit->n_model; i++) {
+    for (size_t i = 0; i < fit->n_model; i++) {
         if (model[i]->kind != MODEL_VOLUME) continue;
         const struct param_info *d = &model[i]->param[model[i]->n_param - 1];
-        bool given = !isnan(doc->fit->density_multiplier_per_cm);
-        double value = given ? doc->fit->density_multiplier_per_cm : param_to_file_unit(d, d->start);
-        if (!doc->fit->fit_density) doc->fit->model[i].fixed[model[i]->n_param - 1] = value;
-        if (doc->fit->fit_density && given)
-            doc->fit->model[i].start[model[i]->n_param - 1] =
-                value; /* without a value, a prior's mean may be the start */
+        bool given = !isnan(fit->density_multiplier_per_cm);
+        double value = given ? fit->density_multiplier_per_cm : param_to_file_unit(d, d->start);
+        if (!fit->fit_density) fit->model[i].fixed[model[i]->n_param - 1] = value;
+        if (fit->fit_density && given)
+            fit->model[i].start[model[i]->n_param - 1] = value; /* without a value, a prior's mean may be the start */
         any_volume = true;
     }
     static const char *const key[] = {"density_multiplier_per_cm", "fit_density"};
@@ -155,17 +154,16 @@ static status set_density(const struct json_field *f, const struct model_info *c
             char path[JSON_PATH_BYTES];
             json_field_path(f, key[i], path);
             return error_set_field(err, STATUS_INVALID, path, "'%s' belongs to volume models, but the job fits '%s'%s",
-                                   path, doc->fit->model[0].id,
-                                   doc->fit->n_model > 1 ? " and other surface models" : "");
+                                   path, fit->model[0].id, fit->n_model > 1 ? " and other surface models" : "");
         }
     return STATUS_OK;
 }
 
-static status check_radius(const struct model_info *const *model, const struct job_document *doc, struct error *err)
+static status check_radius(const struct model_info *const *model, const struct job_fit *fit, struct error *err)
 {
-    for (size_t i = 0; i < doc->fit->n_model && doc->fit->fit_radius; i++)
+    for (size_t i = 0; i < fit->n_model && fit->fit_radius; i++)
         if (model[i]->kind == MODEL_SURFACE) return STATUS_OK;
-    return doc->fit->fit_radius
+    return fit->fit_radius
                ? error_set_field(err, STATUS_INVALID, "fit.fit_radius",
                                  "'fit.fit_radius' needs a surface model, and '%s' is a volume model", model[0]->id)
                : STATUS_OK;
@@ -200,28 +198,28 @@ static status find_models(const struct job_fit *fit, const struct job_cloth *clo
 }
 
 /* Reads the parameters of all models of the document. */
-static status parse_parameters(const struct json_field *f, const struct model_info *const *model,
-                               struct job_document *doc, struct error *err)
+static status parse_parameters(const struct json_field *f, const struct model_info *const *model, struct job_fit *fit,
+                               struct error *err)
 {
-    status s = parse_values(f, true, model, doc, err);
-    if (s == STATUS_OK) s = parse_values(f, false, model, doc, err);
-    if (s == STATUS_OK) s = set_density(f, model, doc, err);
-    if (s == STATUS_OK) s = check_radius(model, doc, err);
-    for (size_t i = 0; i < doc->fit->n_model && s == STATUS_OK; i++)
-        s = check_starts(model[i], &doc->fit->model[i], err);
-    return s == STATUS_OK ? job_parse_fit_options(f, model, doc, err) : s;
+    status s = parse_values(f, true, model, fit, err);
+    if (s == STATUS_OK) s = parse_values(f, false, model, fit, err);
+    if (s == STATUS_OK) s = set_density(f, model, fit, err);
+    if (s == STATUS_OK) s = check_radius(model, fit, err);
+    for (size_t i = 0; i < fit->n_model && s == STATUS_OK; i++) s = check_starts(model[i], &fit->model[i], err);
+    return s == STATUS_OK ? job_parse_fit_options(f, model, fit, err) : s;
 }
 
 status job_check_fit(const struct option_value *v, struct error *err)
 {
+    struct job_fit *fit = v->own;
     struct json_field f = {.object = v->value};
     snprintf(f.path, sizeof f.path, "%s", v->path);
     const struct model_info *model[JOB_MAX_MODEL];
     struct model_sets *sets = malloc(JOB_MAX_MODEL * sizeof *sets);
     if (sets == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job document: out of memory");
-    status s = parse_models(&f, v->doc, err);
-    if (s == STATUS_OK) s = find_models(v->doc->fit, v->doc->cloth, sets, model, err);
-    if (s == STATUS_OK) s = parse_parameters(&f, model, v->doc, err);
+    status s = parse_models(&f, fit, err);
+    if (s == STATUS_OK) s = find_models(fit, v->section->cloth, sets, model, err);
+    if (s == STATUS_OK) s = parse_parameters(&f, model, fit, err);
     free(sets);
     return s;
 }

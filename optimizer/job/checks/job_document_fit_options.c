@@ -21,15 +21,15 @@ void job_fit_option_init(struct job_fit_option *o)
 
 struct reader {
     const struct model_info *const *model;
-    struct job_document *doc;
+    struct job_fit *fit;
 };
 
 static status check_known(const struct reader *r, const char *path, const char *key, struct error *err)
 {
     size_t slot[JOB_MAX_PARAM];
-    for (size_t i = 0; i < r->doc->fit->n_model; i++)
+    for (size_t i = 0; i < r->fit->n_model; i++)
         if (job_parameter_slots(r->model[i], r->model[i]->n_param, key, slot) > 0) return STATUS_OK;
-    return job_unknown_parameter(r->model, r->doc->fit->n_model, path, key, err);
+    return job_unknown_parameter(r->model, r->fit->n_model, path, key, err);
 }
 
 /* ---- ties ---- */
@@ -113,9 +113,9 @@ static status parse_tied(const struct reader *r, const struct json_field *fit, s
         snprintf(f.path, sizeof f.path, "fit.tied[%zu]", g);
         status s = read_tie(&f, &t, err);
         for (size_t i = 0; i < t.n_name && s == STATUS_OK; i++) s = check_known(r, f.path, t.name[i], err);
-        for (size_t i = 0; i < r->doc->fit->n_model && s == STATUS_OK; i++) {
+        for (size_t i = 0; i < r->fit->n_model && s == STATUS_OK; i++) {
             size_t n_slot;
-            s = apply_tie(&t, r->model[i], &r->doc->fit->model[i].option, &n_slot, err);
+            s = apply_tie(&t, r->model[i], &r->fit->model[i].option, &n_slot, err);
             if (n_slot > largest) largest = n_slot;
         }
         if (s != STATUS_OK) return s;
@@ -199,8 +199,8 @@ static status parse_each(const struct reader *r, const struct json_field *fit, c
         const char *key = json_object_iter_key(iter);
         json_field_path(&f, key, path);
         s = check_known(r, path, key, err);
-        for (size_t i = 0; i < r->doc->fit->n_model && s == STATUS_OK; i++)
-            s = one(&f, key, r->model[i], &r->doc->fit->model[i].option, err);
+        for (size_t i = 0; i < r->fit->n_model && s == STATUS_OK; i++)
+            s = one(&f, key, r->model[i], &r->fit->model[i].option, err);
     }
     return s;
 }
@@ -245,21 +245,21 @@ static status share_common(struct job_fit *fit, struct error *err)
     return STATUS_OK;
 }
 
-status job_parse_fit_options(const struct json_field *f, const struct model_info *const *model,
-                             struct job_document *doc, struct error *err)
+status job_parse_fit_options(const struct json_field *f, const struct model_info *const *model, struct job_fit *fit,
+                             struct error *err)
 {
-    struct reader r = {model, doc};
+    struct reader r = {model, fit};
     struct job_fit_parameter resolved[JOB_MAX_PARAM];
     status s = parse_tied(&r, f, err);
     if (s == STATUS_OK) s = parse_each(&r, f, "bounds", parse_bound, err);
     if (s == STATUS_OK) s = parse_each(&r, f, "priors", parse_prior, err);
-    if (s == STATUS_OK) s = share_common(doc->fit, err);
-    if (s == STATUS_OK) s = check_method(doc->fit, err);
-    for (size_t i = 0; i < doc->fit->n_model && s == STATUS_OK; i++) {
-        s = job_fit_resolve(model[i]->param, model[i]->n_param, &doc->fit->model[i], resolved, err);
-        doc->fit->model[i].first_free = -1;
+    if (s == STATUS_OK) s = share_common(fit, err);
+    if (s == STATUS_OK) s = check_method(fit, err);
+    for (size_t i = 0; i < fit->n_model && s == STATUS_OK; i++) {
+        s = job_fit_resolve(model[i]->param, model[i]->n_param, &fit->model[i], resolved, err);
+        fit->model[i].first_free = -1;
         for (size_t p = model[i]->n_param; p-- > 0 && s == STATUS_OK;)
-            if (!resolved[p].fixed) doc->fit->model[i].first_free = (int)p;
+            if (!resolved[p].fixed) fit->model[i].first_free = (int)p;
     }
     return s;
 }

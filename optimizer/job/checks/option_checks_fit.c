@@ -3,30 +3,31 @@
 #include "base/catalogue/model_catalogue.h"
 #include "base/catalogue/picture_method.h"
 #include "optimizer/job/checks/option_checks.h"
-#include "optimizer/job/document/job_document.h"
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_fit_option.h"
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/document/job_sections.h"
 #include "optimizer/job/document/job_setup.h"
 
 #include <math.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 status job_check_fit_radius(const struct option_value *v, struct error *err)
 {
-    const struct job_document *doc = v->doc;
-    if (doc->fit->radius_upper_um < 1.1 * doc->fit->radius_lower_um) /* false where one is NaN */
+    const struct job_fit *fit = v->section->fit;
+    if (fit->radius_upper_um < 1.1 * fit->radius_lower_um) /* false where one is NaN */
         return error_set_field(err, STATUS_INVALID, "fit.fit_radius.upper_um",
                                "'fit.fit_radius.upper_um' is %g: it must be at least 1.1 times lower_um (%g)",
-                               doc->fit->radius_upper_um, doc->fit->radius_lower_um);
+                               fit->radius_upper_um, fit->radius_lower_um);
     return STATUS_OK;
 }
 
 status job_check_nuisance(const struct option_value *v, struct error *err)
 {
-    const struct job_fit_option *o = &v->doc->fit->model[0].option;
+    const struct job_fit_option *o = &v->section->fit->model[0].option;
     if (json_object_get(v->value, "gain_prior_rel") != NULL && o->gain == JOB_GAIN_NONE)
         return error_set_field(err, STATUS_INVALID, "fit.nuisance.gain_prior_rel",
                                "'fit.nuisance.gain_prior_rel' needs 'fit.nuisance.gain': no gain is fitted");
@@ -34,11 +35,11 @@ status job_check_nuisance(const struct option_value *v, struct error *err)
         return error_set_field(err, STATUS_INVALID, "fit.nuisance.stray_light_prior",
                                "'fit.nuisance.stray_light_prior' needs 'fit.nuisance.stray_light': no stray light is "
                                "fitted");
-    if (v->doc->fit->plain_prior > 0.0 && (o->gain != JOB_GAIN_NONE || o->stray_light))
+    if (v->section->fit->plain_prior > 0.0 && (o->gain != JOB_GAIN_NONE || o->stray_light))
         return error_set_field(err, STATUS_INVALID, v->path,
                                "'%s' cannot be used with 'fit.plain_prior': the plain BRDF does not know these faults",
                                v->path);
-    if (v->doc->fit->discrepancy && (o->gain != JOB_GAIN_NONE || o->stray_light))
+    if (v->section->fit->discrepancy && (o->gain != JOB_GAIN_NONE || o->stray_light))
         return error_set_field(err, STATUS_INVALID, v->path,
                                "'%s' cannot be used with 'fit.discrepancy': it would take these faults for the cloth's",
                                v->path);
@@ -58,26 +59,26 @@ double job_texture_cell_mm(double crop_cm, double block_mm)
  * contrasts as terms of the objective. */
 status job_check_texture(const struct option_value *v, struct error *err)
 {
-    const struct job_document *doc = v->doc;
-    double crop_mm = 10.0 * doc->setup->crop_cm, block_mm = doc->fit->texture_block_mm;
+    const struct job_fit *fit = v->section->fit;
+    double crop_mm = 10.0 * v->section->setup->crop_cm, block_mm = fit->texture_block_mm;
     if (block_mm > crop_mm / 2.0 || lround(crop_mm / block_mm) > JOB_MAX_TEXTURE_CELLS)
         return error_set_field(err, STATUS_INVALID, "fit.texture.block_mm",
                                "'fit.texture.block_mm' is %g: it must divide the crop of %g mm into 2 to %d blocks a "
                                "side, which is %g to %g mm",
                                block_mm, crop_mm, JOB_MAX_TEXTURE_CELLS, crop_mm / JOB_MAX_TEXTURE_CELLS,
                                crop_mm / 2.0);
-    if (doc->rows->measurement_file[0] != '\0')
+    if (v->section->rows->measurement_file[0] != '\0')
         return error_set_field(err, STATUS_INVALID, v->path, "'%s' needs photographs: a table of means has no texture",
                                v->path);
-    if (doc->fit->texture_weight > 0.0 && (method_catalogue_find(doc->fit->method)->takes & METHOD_TAKES_TEXTURE) == 0)
+    if (fit->texture_weight > 0.0 && (method_catalogue_find(fit->method)->takes & METHOD_TAKES_TEXTURE) == 0)
         return error_set_field(err, STATUS_INVALID, v->path,
                                "'%s' with a weight needs the method '%s': '%s' has no such terms", v->path,
-                               method_catalogue_taking(METHOD_TAKES_TEXTURE)->id, doc->fit->method);
-    if (doc->fit->share_camera_paths)
+                               method_catalogue_taking(METHOD_TAKES_TEXTURE)->id, fit->method);
+    if (fit->share_camera_paths)
         return error_set_field(err, STATUS_INVALID, v->path,
                                "'%s' cannot be used with 'fit.share_camera_paths': a contrast needs paths of its own",
                                v->path);
-    if (doc->fit->model[0].option.stray_light)
+    if (fit->model[0].option.stray_light)
         return error_set_field(err, STATUS_INVALID, v->path,
                                "'%s' cannot be used with 'fit.nuisance.stray_light': a contrast that is lowered by "
                                "stray light is not modelled",
@@ -92,7 +93,7 @@ static const double light_theta[] = {20, 45, 65, 80}, camera_theta[] = {0, 30, 6
 
 /* The built-in candidates: the lamp at phi 0, the camera opposite to it or beside it, the cloth turned by 0 and 90
  * degrees. Without the black sheet there are also lamps behind the cloth. */
-static status make_grid(struct job_setup *setup, struct job_fit *fit, struct error *err)
+static status make_grid(const struct job_setup *setup, struct job_fit *fit, struct error *err)
 {
     enum { FRONT = 4 * 4 * 2 * 2, BACK = 4 };
     fit->candidate = calloc(FRONT + BACK, sizeof *fit->candidate);
@@ -112,7 +113,7 @@ static status make_grid(struct job_setup *setup, struct job_fit *fit, struct err
 status job_check_export(const struct option_value *v, struct error *err)
 {
     const bool *wanted = v->target;
-    if (!*wanted || job_document_kind(v->doc) == JOB_OF_FIT) return STATUS_OK;
+    if (!*wanted || job_sections_kind(v->section) == JOB_OF_FIT) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, v->path,
                            "'%s' needs a fitted model: give 'photographs' or 'measurements'", v->path);
 }
@@ -234,10 +235,10 @@ static status check_picture(const struct job_setup *setup, const struct job_fit 
 status job_check_pictures(const struct option_value *v, struct error *err)
 {
     status s = STATUS_OK;
-    for (size_t i = 0; i < v->doc->results->n_surface_picture && s == STATUS_OK; i++) {
-        s = check_picture(v->doc->setup, v->doc->fit, v->doc->results, i, err);
+    for (size_t i = 0; i < v->section->results->n_surface_picture && s == STATUS_OK; i++) {
+        s = check_picture(v->section->setup, v->section->fit, v->section->results, i, err);
         if (s == STATUS_OK)
-            s = check_deep_paths(&v->doc->results->surface_picture[i], json_array_get(v->value, i), i, err);
+            s = check_deep_paths(&v->section->results->surface_picture[i], json_array_get(v->value, i), i, err);
     }
     return s;
 }
@@ -245,7 +246,7 @@ status job_check_pictures(const struct option_value *v, struct error *err)
 status job_check_twin(const struct option_value *v, struct error *err)
 {
     const bool *wanted = v->target;
-    if (!*wanted || job_document_kind(v->doc) != JOB_OF_GEOMETRY) return STATUS_OK;
+    if (!*wanted || job_sections_kind(v->section) != JOB_OF_GEOMETRY) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, v->path,
                            "'%s' needs a model with its parameters: give 'photographs', 'measurements' or 'pictures'",
                            v->path);
@@ -253,5 +254,6 @@ status job_check_twin(const struct option_value *v, struct error *err)
 
 status job_check_candidates(const struct option_value *v, struct error *err)
 {
-    return v->doc->fit->candidate_grid ? make_grid(v->doc->setup, v->doc->fit, err) : STATUS_OK;
+    struct job_fit *fit = v->own;
+    return fit->candidate_grid ? make_grid(v->section->setup, fit, err) : STATUS_OK;
 }

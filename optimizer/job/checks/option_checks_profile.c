@@ -1,7 +1,6 @@
 /* Checks of a job that fits the profile of a single fiber. */
 #include "base/catalogue/model_catalogue.h"
 #include "optimizer/job/checks/option_checks.h"
-#include "optimizer/job/document/job_document.h"
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_profile.h"
@@ -41,27 +40,27 @@ status job_check_profile_document(const struct option_value *v, struct error *er
                              *const of_camera[] = {"noise_file", "dark_frames", NULL},
                              *const of_fit[] = {"model",  "models", "seed",   "fixed",          "start", "tied",
                                                 "bounds", "priors", "starts", "max_iterations", NULL};
-    status s = check_keys(v->value, "", v->doc->profile->bowl.given ? of_bowl : of_document, err);
+    status s = check_keys(v->value, "", v->section->profile->bowl.given ? of_bowl : of_document, err);
     const json_t *fit = json_object_get(v->value, "fit"), *camera = json_object_get(v->value, "camera");
     if (s == STATUS_OK && camera != NULL) s = check_keys(camera, "camera.", of_camera, err);
     if (s == STATUS_OK && fit != NULL) s = check_keys(fit, "fit.", of_fit, err);
-    for (size_t i = 0; i < v->doc->fit->n_model && s == STATUS_OK; i++)
-        if (model_catalogue_find(v->doc->fit->model[i].id)->kind != MODEL_SURFACE)
+    for (size_t i = 0; i < v->section->fit->n_model && s == STATUS_OK; i++)
+        if (model_catalogue_find(v->section->fit->model[i].id)->kind != MODEL_SURFACE)
             s = error_set_field(err, STATUS_INVALID, "fit.models",
                                 "'%s' is a model of a cloth as a volume: a profile needs a model of fibers",
-                                v->doc->fit->model[i].id);
+                                v->section->fit->model[i].id);
     return s;
 }
 
 status job_check_profile(const struct option_value *v, struct error *err)
 {
-    const struct job_document *doc = v->doc;
-    const bool file = doc->profile->file[0] != '\0';
-    if (file == doc->profile->bowl.given)
+    const struct job_profile *profile = v->section->profile;
+    const bool file = profile->file[0] != '\0';
+    if (file == profile->bowl.given)
         return error_set_field(err, STATUS_INVALID, file ? "profile" : "profile.file",
                                file ? "'profile.file' and 'profile.bowl' are both given: one of them counts"
                                     : "'profile' needs 'file', a table, or 'bowl', photographs");
-    if (doc->profile->bowl.given && !isnan(doc->profile->theta_i_deg))
+    if (profile->bowl.given && !isnan(profile->theta_i_deg))
         return error_set_field(err, STATUS_INVALID, "profile.theta_i_deg",
                                "'profile.theta_i_deg' is given, but each photograph of the bowl has its own");
     return STATUS_OK;
@@ -93,7 +92,8 @@ static status check_lamp(const struct job_bowl *b, size_t i, struct error *err)
 
 status job_check_bowl(const struct option_value *v, struct error *err)
 {
-    struct job_bowl *b = &v->doc->profile->bowl;
+    struct job_profile *profile = v->own;
+    struct job_bowl *b = &profile->bowl;
     char text[160];
     double off_mm = 0.0;
     if (isnan(b->height_mm)) b->height_mm = b->radius_mm;

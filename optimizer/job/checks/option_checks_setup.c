@@ -2,7 +2,6 @@
 #include "base/catalogue/model_catalogue.h"
 #include "optimizer/job/checks/option_checks.h"
 #include "optimizer/job/document/job_cloth.h"
-#include "optimizer/job/document/job_document.h"
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_profile.h"
@@ -19,7 +18,7 @@
 status job_check_sample(const struct option_value *v, struct error *err)
 {
     size_t n = 0;
-    for (const char *p = v->doc->sample; *p != '\0'; p++)
+    for (const char *p = v->section->cloth->sample; *p != '\0'; p++)
         if (((unsigned char)*p & 0xC0) != 0x80) n++;
     if (n > 200)
         return error_set_field(err, STATUS_INVALID, v->path, "'sample' has %zu characters: allowed are 1 to 200", n);
@@ -36,27 +35,28 @@ status job_check_job_id(const struct option_value *v, struct error *err)
 
 status job_check_lamp(const struct option_value *v, struct error *err)
 {
-    if (v->doc->setup->lamp_directional || v->doc->setup->lamp_side_cm <= 2.0 * v->doc->setup->lamp_distance_cm)
+    if (v->section->setup->lamp_directional ||
+        v->section->setup->lamp_side_cm <= 2.0 * v->section->setup->lamp_distance_cm)
         return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, "lamp.side_cm",
                            "'lamp.side_cm' is %g: allowed is at most twice lamp.distance_cm (%g)",
-                           v->doc->setup->lamp_side_cm, v->doc->setup->lamp_distance_cm);
+                           v->section->setup->lamp_side_cm, v->section->setup->lamp_distance_cm);
 }
 
 status job_check_camera(const struct option_value *v, struct error *err)
 {
-    if (v->doc->setup->camera_far_field || v->doc->setup->crop_cm <= v->doc->setup->camera_distance_cm)
+    if (v->section->setup->camera_far_field || v->section->setup->crop_cm <= v->section->setup->camera_distance_cm)
         return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, "camera.crop_cm",
-                           "'camera.crop_cm' is %g: allowed is at most camera.distance_cm (%g)", v->doc->setup->crop_cm,
-                           v->doc->setup->camera_distance_cm);
+                           "'camera.crop_cm' is %g: allowed is at most camera.distance_cm (%g)",
+                           v->section->setup->crop_cm, v->section->setup->camera_distance_cm);
 }
 
 /* A lamp behind the cloth lights it through; that needs a cloth without its black sheet. */
 status job_check_light_theta(const struct option_value *v, struct error *err)
 {
     double theta_deg = *(const double *)v->target;
-    if (theta_deg < 90.0 || (theta_deg > 90.0 && !v->doc->setup->black_sheet)) return STATUS_OK;
+    if (theta_deg < 90.0 || (theta_deg > 90.0 && !v->section->setup->black_sheet)) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, v->path,
                            "'%s' is %g: allowed are 0 to below 90 degrees from the normal (above 90, from behind, "
                            "without black_sheet)",
@@ -73,19 +73,19 @@ status job_check_crop_px(const struct option_value *v, struct error *err)
 
 status job_check_color(const struct option_value *v, struct error *err)
 {
-    struct job_document *doc = v->doc;
-    doc->setup->chart.scale = doc->setup->white.scale = 1.0;
-    if (doc->setup->has_chart != doc->setup->has_white) return STATUS_OK;
+    struct job_setup *setup = v->own;
+    setup->chart.scale = setup->white.scale = 1.0;
+    if (setup->has_chart != setup->has_white) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, v->path,
-                           doc->setup->has_chart ? "'%s' has both 'chart' and 'white': give one of them"
-                                                 : "'%s' needs 'chart' or 'white'",
+                           setup->has_chart ? "'%s' has both 'chart' and 'white': give one of them"
+                                            : "'%s' needs 'chart' or 'white'",
                            v->path);
 }
 
 status job_check_measured_rows(const struct option_value *v, struct error *err)
 {
-    for (size_t i = 0; i < v->doc->rows->n_measured_row; i++)
-        if (v->doc->rows->measured_row[i].set == JOB_SET_FIT) return STATUS_OK;
+    for (size_t i = 0; i < v->section->rows->n_measured_row; i++)
+        if (v->section->rows->measured_row[i].set == JOB_SET_FIT) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, v->path,
                            "'%s' has no configuration with \"set\": \"fit\": give at least one", v->path);
 }
@@ -110,14 +110,14 @@ static status check_place(const struct option_value *v, size_t i, const char *wh
                           const double position_mm[3], double *distance_cm, struct error *err)
 {
     char path[JSON_PATH_BYTES];
-    bool angles, position = !isnan(position_mm[0]), view = v->doc->rows->photograph[i].view[0] != '\0';
+    bool angles, position = !isnan(position_mm[0]), view = v->section->rows->photograph[i].view[0] != '\0';
     status s = check_angles(v->path, i, what, (double[2]){*theta_deg, *phi_deg}, &angles, err);
     if (s != STATUS_OK) return s;
     snprintf(path, sizeof path, "%s[%zu].%s_%s", v->path, i, what, position ? "position_mm" : "theta_deg");
     if (angles + position + view > 1)
         return error_set_field(err, STATUS_INVALID, path, "'%s' is given as well as %s: give one of them", path,
                                view ? "'view'" : "angles");
-    if (angles + position + view == 0 && what[0] == 'c' && v->doc->setup->rig_file[0] != '\0')
+    if (angles + position + view == 0 && what[0] == 'c' && v->section->setup->rig_file[0] != '\0')
         return STATUS_OK; /* the camera follows from the markers of the rig */
     if (angles + position + view == 0)
         return error_set_field(err, STATUS_INVALID, path,
@@ -126,7 +126,7 @@ static status check_place(const struct option_value *v, size_t i, const char *wh
     *distance_cm = NAN;
     if (!position) return STATUS_OK;
     job_angles_of_position(position_mm, theta_deg, phi_deg, distance_cm);
-    bool camera = what[0] == 'c', behind = !camera && *theta_deg > 90.0 && !v->doc->setup->black_sheet;
+    bool camera = what[0] == 'c', behind = !camera && *theta_deg > 90.0 && !v->section->setup->black_sheet;
     if (*distance_cm >= 1.0 && (*theta_deg < (camera ? 89.999 : 90.0) || behind)) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, path, "'%s' is %s", path,
                            *distance_cm < 1.0 ? "nearer than 10 mm to the orbit center"
@@ -135,9 +135,10 @@ static status check_place(const struct option_value *v, size_t i, const char *wh
 
 status job_check_photographs(const struct option_value *v, struct error *err)
 {
+    struct job_rows *rows = v->own;
     bool fitted = false;
-    for (size_t i = 0; i < v->doc->rows->n_photograph; i++) {
-        struct job_photograph *p = &v->doc->rows->photograph[i];
+    for (size_t i = 0; i < rows->n_photograph; i++) {
+        struct job_photograph *p = &rows->photograph[i];
         char path[JSON_PATH_BYTES];
         fitted = fitted || p->set == JOB_SET_FIT;
         status s = check_place(v, i, "light", &p->light_theta_deg, &p->light_phi_deg, p->light_position_mm,
@@ -146,7 +147,7 @@ status job_check_photographs(const struct option_value *v, struct error *err)
             s = check_place(v, i, "camera", &p->camera_theta_deg, &p->camera_phi_deg, p->camera_position_mm,
                             &p->camera_distance_cm, err);
         if (s != STATUS_OK) return s;
-        if (p->view[0] == '\0' || v->doc->setup->rig_file[0] != '\0') continue;
+        if (p->view[0] == '\0' || v->section->setup->rig_file[0] != '\0') continue;
         snprintf(path, sizeof path, "%s[%zu].view", v->path, i);
         return error_set_field(err, STATUS_INVALID, path, "'%s' needs 'rig': the file that describes the views", path);
     }
@@ -207,22 +208,22 @@ static status check_one_measurement(const struct option_value *v, struct error *
 /* Pictures without a fit show the parameters that the document holds fixed. */
 static status check_values_shown(const struct option_value *v, struct error *err)
 {
-    const struct job_document *doc = v->doc;
-    const struct job_model *m = &doc->fit->model[0];
+    const struct job_fit *fit = v->section->fit;
+    const struct job_model *m = &fit->model[0];
     struct model_sets sets;
     if (!given(v, "fit"))
         return error_set_field(err, STATUS_INVALID, "pictures",
                                "'pictures' needs 'photographs' or 'measurements', to which a model is fitted, or its "
                                "parameters: give 'fit.model' and 'fit.fixed'");
-    if (doc->fit->n_model > 1)
+    if (fit->n_model > 1)
         return error_set_field(err, STATUS_INVALID, "fit.models",
                                "'fit.models' has %zu models, but pictures without photographs show one: give "
                                "'fit.model'",
-                               doc->fit->n_model);
-    if (doc->fit->fit_radius || doc->fit->fit_density)
-        return error_set_field(err, STATUS_INVALID, doc->fit->fit_radius ? "fit.fit_radius" : "fit.fit_density",
-                               "'%s' needs photographs", doc->fit->fit_radius ? "fit.fit_radius" : "fit.fit_density");
-    const struct job_cloth *cloth = doc->cloth;
+                               fit->n_model);
+    if (fit->fit_radius || fit->fit_density)
+        return error_set_field(err, STATUS_INVALID, fit->fit_radius ? "fit.fit_radius" : "fit.fit_density",
+                               "'%s' needs photographs", fit->fit_radius ? "fit.fit_radius" : "fit.fit_density");
+    const struct job_cloth *cloth = v->section->cloth;
     const struct model_info *info = model_catalogue_find(m->id);
     status s = model_sets_init(&sets, info, cloth->group, cloth->n_group, err);
     if (s != STATUS_OK) return s;
@@ -237,14 +238,14 @@ static status check_values_shown(const struct option_value *v, struct error *err
 /* A fit needs something to find. */
 static status check_free(const struct option_value *v, struct error *err)
 {
-    const struct job_document *doc = v->doc;
-    if (job_document_kind(doc) == JOB_OF_PICTURES) return check_values_shown(v, err);
-    for (size_t i = 0; i < doc->fit->n_model; i++)
-        if (doc->fit->model[i].first_free < 0)
+    const struct job_fit *fit = v->section->fit;
+    if (job_sections_kind(v->section) == JOB_OF_PICTURES) return check_values_shown(v, err);
+    for (size_t i = 0; i < fit->n_model; i++)
+        if (fit->model[i].first_free < 0)
             return error_set_field(err, STATUS_INVALID, "fit.fixed",
                                    "'fit.fixed' and 'fit.tied' together hold every parameter of model '%s': leave at "
                                    "least one free",
-                                   doc->fit->model[i].id);
+                                   fit->model[i].id);
     return STATUS_OK;
 }
 
@@ -259,16 +260,16 @@ status job_density_undetermined(bool black_sheet, struct error *err)
 
 /* Cloths of different density look alike when they are lit and seen from the front. A fit of the density therefore
  * needs light that passed through the cloth. Rows of a table are checked when the table is read. */
-static status check_density(const struct job_document *doc, struct error *err)
+static status check_density(const struct job_setup *setup, const struct job_rows *rows, const struct job_fit *fit,
+                            struct error *err)
 {
     bool from_behind = false;
-    for (size_t i = 0; i < doc->rows->n_photograph; i++)
-        if (doc->rows->photograph[i].set == JOB_SET_FIT &&
-            (doc->rows->photograph[i].light_theta_deg > 90.0 || doc->rows->photograph[i].view[0] != '\0'))
+    for (size_t i = 0; i < rows->n_photograph; i++)
+        if (rows->photograph[i].set == JOB_SET_FIT &&
+            (rows->photograph[i].light_theta_deg > 90.0 || rows->photograph[i].view[0] != '\0'))
             from_behind = true; /* the rig is read later */
-    if (!doc->fit->fit_density || from_behind || (doc->rows->n_photograph == 0 && !doc->setup->black_sheet))
-        return STATUS_OK;
-    return job_density_undetermined(doc->setup->black_sheet, err);
+    if (!fit->fit_density || from_behind || (rows->n_photograph == 0 && !setup->black_sheet)) return STATUS_OK;
+    return job_density_undetermined(setup->black_sheet, err);
 }
 
 struct name_list {
@@ -296,36 +297,36 @@ static void collect_name(void *context, const char *name, const char *role)
 }
 
 /* The error of a file that the document names twice; it names the last of the two keys. */
-static status named_twice(const struct job_document *doc, const char *name, struct error *err)
+static status named_twice(const struct job_sections *section, const char *name, struct error *err)
 {
     char path[JSON_PATH_BYTES];
-    job_document_file_key(doc, name, path, sizeof path);
+    job_sections_file_key(section, name, path, sizeof path);
     return error_set_field(err, STATUS_INVALID, path,
                            "'%s' names the file '%s' a second time: each input file has one use", path, name);
 }
 
-static status check_files(const struct job_document *doc, struct error *err)
+static status check_files(const struct job_sections *section, struct error *err)
 {
     status s = STATUS_OK;
     struct name_list list = {0};
-    job_document_visit_files(doc, count_name, &list.n);
+    job_sections_visit_files(section, count_name, &list.n);
     list.name = malloc((list.n + 1) * sizeof *list.name);
     if (list.name == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot check the job document: out of memory");
     list.n = 0;
-    job_document_visit_files(doc, collect_name, &list);
+    job_sections_visit_files(section, collect_name, &list);
     qsort(list.name, list.n, sizeof *list.name, compare_names);
     for (size_t i = 1; i < list.n && s == STATUS_OK; i++)
-        if (strcmp(list.name[i - 1], list.name[i]) == 0) s = named_twice(doc, list.name[i], err);
+        if (strcmp(list.name[i - 1], list.name[i]) == 0) s = named_twice(section, list.name[i], err);
     free(list.name);
     return s;
 }
 
 status job_check_document(const struct option_value *v, struct error *err)
 {
-    const bool of_profile = job_profile_given(v->doc->profile);
+    const bool of_profile = job_profile_given(v->section->profile);
     status s = of_profile ? job_check_profile_document(v, err) : check_one_cloth(v, err);
     if (s == STATUS_OK && !of_profile) s = check_one_measurement(v, err);
     if (s == STATUS_OK) s = check_free(v, err);
-    if (s == STATUS_OK) s = check_density(v->doc, err);
-    return s == STATUS_OK ? check_files(v->doc, err) : s;
+    if (s == STATUS_OK) s = check_density(v->section->setup, v->section->rows, v->section->fit, err);
+    return s == STATUS_OK ? check_files(v->section, err) : s;
 }

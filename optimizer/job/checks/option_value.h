@@ -4,7 +4,8 @@
 
 #include <jansson.h>
 
-struct job_document;
+#include "optimizer/job/document/job_sections.h"
+
 struct job_option;
 
 /* A value for a check. It and all options of earlier rows have been read. */
@@ -13,7 +14,8 @@ struct option_value {
     const json_t *value;
     const char *path; /* "photographs[3].crop_px" */
     void *target;
-    struct job_document *doc;
+    void *own; /* the section struct that target is in, which a check may complete */
+    const struct job_sections *section;
 };
 
 #endif

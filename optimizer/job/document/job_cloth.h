@@ -1,5 +1,5 @@
-/* The sections "fibers", "cloth" and "correction" of a job document: a cloth that is given as fibers or described,
- * the groups of its fibers, and corrections of them. */
+/* The sections "sample", "fibers", "cloth" and "correction" of a job document: the name of the cloth, a cloth that is
+ * given as fibers or described, the groups of its fibers, and corrections of them. */
 #ifndef SELVEDGE_OPTIMIZER_JOB_CLOTH_H
 #define SELVEDGE_OPTIMIZER_JOB_CLOTH_H
 
@@ -18,6 +18,7 @@ struct job_cloth_yarn {
 };
 
 struct job_cloth {
+    char sample[JOB_MAX_SAMPLE_BYTES]; /* name of the cloth for people */
     char fiber_file[JOB_MAX_NAME_BYTES];
     double tile_mm[2]; /* NaN: from the file */
     double voxel_um;   /* NaN: chosen from the radius */

@@ -14,32 +14,40 @@
 
 enum { MAX_KEY = 40, MAX_CHOICE = 40 };
 
-static status read_section(const struct json_field *f, const char *pattern, void *base, struct job_document *doc,
+/* A document while it is read. */
+struct reading {
+    struct job_document *doc;
+    struct job_sections section;  /* of doc, for checks */
+    struct job_fault_list *fault; /* all faults go there; NULL: reading ends at the first */
+};
+
+static status read_section(const struct json_field *f, const char *pattern, void *base, struct reading *r,
                            struct error *err);
 
 /* The struct that the row's offsets are of: its section, or `base`, an element of a list. */
-static void *base_of(const struct job_option *row, void *base, const struct job_document *doc)
+static void *base_of(const struct job_option *row, void *base, const struct reading *r)
 {
-    if (row->section == 0) return base;
-    memcpy(&base, (const char *)doc + row->section, sizeof base);
-    return base;
+    const struct job_document *doc = r->doc;
+    void *const at[JOB_N_SECTION] = {
+        [JOB_SECTION_none] = base,        [JOB_SECTION_scan] = doc->scan,       [JOB_SECTION_cloth] = doc->cloth,
+        [JOB_SECTION_setup] = doc->setup, [JOB_SECTION_rows] = doc->rows,       [JOB_SECTION_profile] = doc->profile,
+        [JOB_SECTION_fit] = doc->fit,     [JOB_SECTION_results] = doc->results,
+    };
+    return at[row->section];
 }
 
 /* Number of faults found so far where all are collected. */
-static size_t n_fault(const struct job_document *doc)
-{
-    return doc->fault != NULL ? doc->fault->n + doc->fault->n_more : 0;
-}
+static size_t n_fault(const struct reading *r) { return r->fault != NULL ? r->fault->n + r->fault->n_more : 0; }
 
 /* Ends reading with an error, or keeps it with the other faults and goes on. */
-static status stop_or_keep(status s, const struct error *fault, struct job_document *doc, struct error *err)
+static status stop_or_keep(status s, const struct error *fault, struct reading *r, struct error *err)
 {
     if (s == STATUS_OK) return s;
-    if (doc->fault == NULL || s == STATUS_NO_MEMORY) {
+    if (r->fault == NULL || s == STATUS_NO_MEMORY) {
         if (err != NULL) *err = *fault;
         return s;
     }
-    job_faults_add(doc->fault, fault);
+    job_faults_add(r->fault, fault);
     return STATUS_OK;
 }
 
@@ -91,7 +99,7 @@ static status read_number_or_list(const struct job_option *row, const struct jso
 }
 
 static status read_bool(const struct job_option *row, const struct json_field *f, const char *key, void *base,
-                        struct job_document *doc, struct error *err)
+                        struct reading *r, struct error *err)
 {
     void *target = (char *)base + row->at;
     const json_t *value = json_object_get(f->object, key);
@@ -100,7 +108,7 @@ static status read_bool(const struct job_option *row, const struct json_field *f
     json_field_path(f, key, sub.path);
     if (row->or_section && json_is_object(value)) {
         *(bool *)target = true;
-        return read_section(&sub, row->path, base, doc, err);
+        return read_section(&sub, row->path, base, r, err);
     }
     if (row->or_section && !json_is_boolean(value))
         return error_set_field(err, STATUS_INVALID, sub.path, "'%s' must be true, false or an object of %s", sub.path,
@@ -147,20 +155,20 @@ static status read_file_names(const struct job_option *row, const struct json_fi
     return s;
 }
 
-static status default_section(const char *pattern, void *base, struct job_document *doc, struct error *err);
+static status default_section(const char *pattern, void *base, struct reading *r, struct error *err);
 
-static status read_list(const struct job_option *row, const struct json_field *list, void *base,
-                        struct job_document *doc, struct error *err)
+static status read_list(const struct job_option *row, const struct json_field *list, void *base, struct reading *r,
+                        struct error *err)
 {
     char *element, pattern[JSON_PATH_BYTES];
-    if (row->or_section && json_is_object(list->object)) return read_section(list, row->path, base, doc, err);
+    if (row->or_section && json_is_object(list->object)) return read_section(list, row->path, base, r, err);
     status s = new_list(row, list, base, &element, err);
     snprintf(pattern, sizeof pattern, "%s[]", row->path);
     for (size_t i = 0; s == STATUS_OK && i < json_array_size(list->object); i++, element += row->element_bytes) {
         struct json_field f = {.object = json_array_get(list->object, i)};
         snprintf(f.path, sizeof f.path, "%.140s[%zu]", list->path, i);
-        s = default_section(pattern, element, doc, err);
-        if (s == STATUS_OK) s = read_section(&f, pattern, element, doc, err);
+        s = default_section(pattern, element, r, err);
+        if (s == STATUS_OK) s = read_section(&f, pattern, element, r, err);
         if (s == STATUS_OK) ++*(size_t *)((char *)base + row->count_at);
     }
     return s;
@@ -176,28 +184,28 @@ static status read_file_name(const struct job_option *row, const struct json_fie
 }
 
 static status read_object(const struct job_option *row, const struct json_field *f, const char *key, void *base,
-                          struct job_document *doc, struct error *err)
+                          struct reading *r, struct error *err)
 {
     struct json_field sub;
     bool present;
     status s = json_field_object(f, key, &sub, &present, err);
     if (s != STATUS_OK) return s;
     if (row->stored) *(bool *)((char *)base + row->at) = present;
-    return read_section(&sub, row->path, base, doc, err);
+    return read_section(&sub, row->path, base, r, err);
 }
 
 /* Reads the value of a key that is given or required. */
 static status read_value(const struct job_option *row, const struct json_field *f, const char *key, void *base,
-                         struct job_document *doc, struct error *err)
+                         struct reading *r, struct error *err)
 {
     void *target = (char *)base + row->at;
     struct json_field sub = {.object = json_object_get(f->object, key)};
     json_field_path(f, key, sub.path);
     switch (row->kind) {
     case OPTION_SECTION:
-        return read_object(row, f, key, base, doc, err);
+        return read_object(row, f, key, base, r, err);
     case OPTION_LIST:
-        return read_list(row, &sub, base, doc, err);
+        return read_list(row, &sub, base, r, err);
     case OPTION_FILE_NAMES:
         return read_file_names(row, &sub, base, err);
     case OPTION_NUMBER:
@@ -214,7 +222,7 @@ static status read_value(const struct job_option *row, const struct json_field *
         return json_field_u64(f, key, (uint64_t)row->lower, target, err);
     case OPTION_BOOL:
     case OPTION_BOOL_OR_LEFT_OUT:
-        return read_bool(row, f, key, base, doc, err);
+        return read_bool(row, f, key, base, r, err);
     case OPTION_CHOICE:
     case OPTION_SWITCH:
     case OPTION_WORD:
@@ -237,30 +245,32 @@ static bool lacks_message(enum option_kind kind)
 }
 
 static status read_option(const struct job_option *row, const struct json_field *f, const char *key, void *base,
-                          struct job_document *doc, struct error *err)
+                          struct reading *r, struct error *err)
 {
-    base = base_of(row, base, doc);
-    struct option_value v = {
-        .row = row, .value = json_object_get(f->object, key), .target = (char *)base + row->at, .doc = doc};
+    base = base_of(row, base, r);
+    struct option_value v = {.row = row,
+                             .value = json_object_get(f->object, key),
+                             .target = (char *)base + row->at,
+                             .own = base,
+                             .section = &r->section};
     char path[JSON_PATH_BYTES];
     if (v.value == NULL && !row->required) return STATUS_OK;
     if (v.value == NULL && lacks_message(row->kind))
         return error_set_field(err, STATUS_INVALID, f->path, "'%s' lacks '%s'", f->path, key);
-    const size_t n_before = n_fault(doc);
-    status s = read_value(row, f, key, base, doc, err);
-    if (s != STATUS_OK || row->check == NULL || n_fault(doc) > n_before) return s;
+    const size_t n_before = n_fault(r);
+    status s = read_value(row, f, key, base, r, err);
+    if (s != STATUS_OK || row->check == NULL || n_fault(r) > n_before) return s;
     json_field_path(f, key, path);
     v.path = path;
     return row->check(&v, err);
 }
 
 /* Refuses keys that are not allowed: one by one where all faults are collected. */
-static status check_keys(const struct json_field *f, const char *const *allowed, struct job_document *doc,
-                         struct error *err)
+static status check_keys(const struct json_field *f, const char *const *allowed, struct reading *r, struct error *err)
 {
     struct error fault = {0};
     status s = json_field_check_keys(f, allowed, &fault);
-    if (s == STATUS_OK || doc->fault == NULL || !json_is_object(f->object)) return stop_or_keep(s, &fault, doc, err);
+    if (s == STATUS_OK || r->fault == NULL || !json_is_object(f->object)) return stop_or_keep(s, &fault, r, err);
     const char *key;
     json_t *value, *object = (json_t *)(uintptr_t)f->object;
     json_object_foreach(object, key, value)
@@ -270,14 +280,14 @@ static status check_keys(const struct json_field *f, const char *const *allowed,
         if (one.object == NULL) continue;
         s = json_field_check_keys(&one, allowed, &fault);
         json_decref((json_t *)(uintptr_t)one.object);
-        if (s != STATUS_OK) job_faults_add(doc->fault, &fault);
+        if (s != STATUS_OK) job_faults_add(r->fault, &fault);
     }
     return STATUS_OK;
 }
 
 /* Reads all members of an object. pattern: its path in the table; base: the struct to which the offsets of the members
  * refer. */
-static status read_section(const struct json_field *f, const char *pattern, void *base, struct job_document *doc,
+static status read_section(const struct json_field *f, const char *pattern, void *base, struct reading *r,
                            struct error *err)
 {
     const char *key, *allowed[MAX_KEY + 1];
@@ -290,32 +300,32 @@ static status read_section(const struct json_field *f, const char *pattern, void
         allowed[n++] = key;
     }
     allowed[n] = NULL;
-    status s = check_keys(f, allowed, doc, err);
+    status s = check_keys(f, allowed, r, err);
     for (size_t i = 0; s == STATUS_OK && json_is_object(f->object) && i < n; i++) {
         struct error fault = {0};
-        s = stop_or_keep(read_option(of[i], f, allowed[i], base, doc, &fault), &fault, doc, err);
+        s = stop_or_keep(read_option(of[i], f, allowed[i], base, r, &fault), &fault, r, err);
     }
     return s;
 }
 
 /* ---- defaults ---- */
 
-static status read_default(const struct job_option *row, void *base, struct job_document *doc, struct error *err)
+static status read_default(const struct job_option *row, void *base, struct reading *r, struct error *err)
 {
     json_t *object = json_pack("{s:o?}", "default", json_loads(row->standard, JSON_DECODE_ANY, NULL));
     struct json_field f = {.object = object};
     if (object == NULL) return no_memory(err);
-    status s = read_value(row, &f, "default", base, doc, err);
+    status s = read_value(row, &f, "default", base, r, err);
     json_decref(object);
     return s;
 }
 
-static status put_default(const struct job_option *row, void *base, struct job_document *doc, struct error *err)
+static status put_default(const struct job_option *row, void *base, struct reading *r, struct error *err)
 {
-    base = base_of(row, base, doc);
+    base = base_of(row, base, r);
     void *target = (char *)base + row->at;
     if (!row->stored) return STATUS_OK;
-    if (row->standard != NULL) return read_default(row, base, doc, err);
+    if (row->standard != NULL) return read_default(row, base, r, err);
     switch (row->kind) {
     case OPTION_NUMBER:
         if (!row->required) *(double *)target = NAN;
@@ -338,21 +348,25 @@ static status put_default(const struct job_option *row, void *base, struct job_d
 
 /* Sets the defaults in a section, or in an element of a list, and in the sections inside it. Lists inside it are
  * skipped: their elements get defaults when they are read. */
-static status default_section(const char *pattern, void *base, struct job_document *doc, struct error *err)
+static status default_section(const char *pattern, void *base, struct reading *r, struct error *err)
 {
     size_t n = strlen(pattern);
     status s = STATUS_OK;
     JOB_OPTION_EACH(row)
     if (s == STATUS_OK && strncmp(row->path, pattern, n) == 0 && (n == 0 || row->path[n] == '.') &&
         strchr(row->path + n, '[') == NULL)
-        s = put_default(row, base, doc, err);
+        s = put_default(row, base, r, err);
     return s;
 }
 
-status job_options_default(struct job_document *doc, struct error *err) { return default_section("", doc, doc, err); }
+status job_options_default(struct job_document *doc, struct error *err)
+{
+    struct reading r = {doc, job_document_sections(doc), NULL};
+    return default_section("", doc, &r, err);
+}
 
 struct first_fault {
-    struct job_document *doc;
+    struct reading *r;
     struct error *err;
     status outcome;
 };
@@ -360,23 +374,25 @@ struct first_fault {
 static void take_fault(void *context, const struct error *fault)
 {
     struct first_fault *first = context;
-    if (first->outcome == STATUS_OK) first->outcome = stop_or_keep(fault->code, fault, first->doc, first->err);
+    if (first->outcome == STATUS_OK) first->outcome = stop_or_keep(fault->code, fault, first->r, first->err);
 }
 
-static status check_consistency(struct job_document *doc, struct error *err)
+static status check_consistency(struct reading *r, struct error *err)
 {
-    struct first_fault first = {doc, err, STATUS_OK};
-    job_consistency_check(doc, take_fault, &first);
+    struct first_fault first = {r, err, STATUS_OK};
+    job_consistency_check(&r->section, take_fault, &first);
     return first.outcome;
 }
 
-status job_options_read(const json_t *document, struct job_document *doc, struct error *err)
+status job_options_read(const json_t *document, struct job_document *doc, struct job_fault_list *faults,
+                        struct error *err)
 {
+    struct reading r = {doc, job_document_sections(doc), faults};
     const struct json_field root = {.object = document};
     const struct job_option *row = job_option_find("");
-    const struct option_value whole = {.row = row, .value = document, .path = "", .doc = doc};
+    const struct option_value whole = {.row = row, .value = document, .path = "", .section = &r.section};
     struct error fault = {0};
-    status s = read_section(&root, row->path, doc, doc, err);
-    if (s == STATUS_OK && n_fault(doc) == 0) s = stop_or_keep(row->check(&whole, &fault), &fault, doc, err);
-    return s == STATUS_OK ? check_consistency(doc, err) : s;
+    status s = read_section(&root, row->path, doc, &r, err);
+    if (s == STATUS_OK && n_fault(&r) == 0) s = stop_or_keep(row->check(&whole, &fault), &fault, &r, err);
+    return s == STATUS_OK ? check_consistency(&r, err) : s;
 }

@@ -10,6 +10,19 @@
 
 struct option_value;
 
+/* The section struct that a row's target is in: JOB_SECTION_scan for struct job_scan (optimizer/job/document). */
+enum job_section {
+    JOB_SECTION_none, /* an element of a list, or no target */
+    JOB_SECTION_scan,
+    JOB_SECTION_cloth,
+    JOB_SECTION_setup,
+    JOB_SECTION_rows,
+    JOB_SECTION_profile,
+    JOB_SECTION_fit,
+    JOB_SECTION_results,
+    JOB_N_SECTION
+};
+
 /* The JSON values that a key takes, and the type of its target. */
 enum option_kind {
     OPTION_SECTION,          /* an object, whose members are the rows under its path -> bool: true when given */
@@ -38,7 +51,7 @@ struct job_option {
     bool required;
     bool or_section;                /* OPTION_BOOL, OPTION_LIST: an object of the rows under path is allowed as well */
     bool stored;                    /* it has a target */
-    size_t section;                 /* offset of the pointer to the section in struct job_document; 0: none */
+    enum job_section section;       /* of the target */
     size_t at;                      /* offset of the target in the section, or in an element of a list */
     size_t count_at, element_bytes; /* of lists: offset of the count, size of an element */
     double lower, upper;            /* numbers; of lists: upper is the largest number of elements */

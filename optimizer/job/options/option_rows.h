@@ -3,7 +3,7 @@
 #define SELVEDGE_OPTIMIZER_OPTION_ROWS_H
 
 #include "optimizer/job/checks/option_checks.h"
-#include "optimizer/job/document/job_document.h"
+#include "optimizer/job/document/job_limits.h"
 #include "optimizer/job/options/option_row.h"
 
 /* Each ends with a row without a path. */
@@ -18,7 +18,7 @@ extern const char *const job_transfer_names[];
 #define NUMBERS_INTO_OF(type, member)                                                                                  \
     INTO_OF(type, member), .n = sizeof((type *)NULL)->member / sizeof((type *)NULL)->member[0]
 /* Targets in a section of the job document, as INTO(scan, crop_keep). */
-#define OF_SECTION(name) .section = offsetof(struct job_document, name)
+#define OF_SECTION(name) .section = JOB_SECTION_##name
 #define INTO(name, member) OF_SECTION(name), INTO_OF(struct job_##name, member)
 #define TEXT_INTO(name, member) OF_SECTION(name), TEXT_INTO_OF(struct job_##name, member)
 #define NUMBERS_INTO(name, member) OF_SECTION(name), NUMBERS_INTO_OF(struct job_##name, member)

@@ -40,7 +40,7 @@ const struct job_option option_rows_cloth[] = {
                 "names the one at fault."},
     {.path = "sample",
      .kind = OPTION_TEXT,
-     TEXT_INTO_OF(struct job_document, sample),
+     TEXT_INTO(cloth, sample),
      .required = true,
      .check = job_check_sample,
      .allowed = "1..200 characters",
@@ -304,6 +304,7 @@ const struct job_option option_rows_cloth[] = {
 
     {.path = "fibers",
      .kind = OPTION_SECTION,
+     OF_SECTION(cloth),
      .check = job_check_fibers,
      .left_out = "this, `volume` or `cloth`",
      .meaning = "The cloth as a file of fibers."},

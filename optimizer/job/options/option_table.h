@@ -2,7 +2,7 @@
  * keys that are allowed, and GET /v1/options (option_json.h). From the latter follow the form of the dashboard, the
  * schema JobDocument of config/openapi.json and the page docs/options.md (`make generate`).
  *
- * A new option is a row here, a member of struct job_document, and the place that uses it. Constant data.
+ * A new option is a row here, a member of the struct of its section, and the place that uses it. Constant data.
  */
 #ifndef SELVEDGE_OPTIMIZER_OPTION_TABLE_H
 #define SELVEDGE_OPTIMIZER_OPTION_TABLE_H

@@ -5,7 +5,7 @@
 
 #include "optimizer/fit/baseline/plain_brdf.h"
 #include "optimizer/fit/linear/next_photograph.h"
-#include "optimizer/job/document/job_kind.h"
+#include "optimizer/job/document/job_sections.h"
 #include "optimizer/report/findings/pdf_helper.h"
 #include "optimizer/report/findings/verdict.h"
 #include "optimizer/stages/fit_stages.h"

@@ -170,7 +170,7 @@ static status claim_inputs(const struct stage_tools *tools, struct job_inputs *i
     if (tools->folder->lock_fd < 0) return STATUS_OK;
     worker_folder_path(tools->folder, JOB_FOLDER_WORK, WORKER_FILE_FINGERPRINT, before);
     in->resumed = access(before, F_OK) == 0;
-    job_document_visit_files(in->doc, add_input, &input);
+    job_sections_visit_files(&in->section, add_input, &input);
     status s = worker_folder_claim_inputs(tools->folder, in->fingerprint << 32 | input.sum, &changed, err);
     in->resumed = in->resumed && !changed;
     if (s == STATUS_OK && changed)
@@ -224,7 +224,7 @@ static status read_document(const struct stage_tools *tools, struct job_inputs *
     s = job_document_parse(text, n, &in->doc, err);
     if (s == STATUS_OK) {
         in->section = job_document_sections(in->doc);
-        in->kind = job_document_kind(in->doc);
+        in->kind = job_sections_kind(&in->section);
     }
     in->fingerprint = document_fingerprint(text, n);
     free(text);

@@ -1,6 +1,5 @@
 /* `selvedge bowl`: the table of a fiber's profile from the photographs of a bowl that a job document describes. */
 #include "base/files/durable.h"
-#include "optimizer/job/document/job_document.h"
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_profile.h"
 #include "optimizer/photographs/profile/bowl_profile.h"
@@ -36,26 +35,25 @@ static status write_table(const struct fiber_profile *profile, const char *path,
     return s;
 }
 
-static status make(const char *job, const char *table, const char *picture, struct error *err)
+static status make(const char *path, const char *table, const char *picture, struct error *err)
 {
-    char folder[4096];
-    struct job_document *doc = NULL;
+    struct camera_job job;
     struct fiber_profile profile = {0};
     struct bowl_record record;
     struct image im = {0};
-    status s = camera_read_document(job, folder, sizeof folder, &doc, err);
-    if (s == STATUS_OK && !doc->profile->bowl.given)
-        s = error_set(err, STATUS_INVALID, "'%s' describes no photographs of a bowl", job);
+    status s = camera_job_read(path, &job, err);
+    if (s == STATUS_OK && !job.profile->bowl.given)
+        s = error_set(err, STATUS_INVALID, "'%s' describes no photographs of a bowl", path);
     if (s == STATUS_OK && picture != NULL)
-        s = bowl_profile_picture(&doc->profile->bowl, doc->setup, doc->rows, folder, &im, err);
+        s = bowl_profile_picture(&job.profile->bowl, job.setup, job.rows, job.folder, &im, err);
     if (s == STATUS_OK && picture != NULL) s = image_write_png(&im, 1.0, picture, err);
     image_release(&im);
     if (s == STATUS_OK)
-        s = bowl_profile_load(&profile, &doc->profile->bowl, doc->setup, doc->rows, folder, &record, err);
+        s = bowl_profile_load(&profile, &job.profile->bowl, job.setup, job.rows, job.folder, &record, err);
     if (s == STATUS_OK) s = write_table(&profile, table, err);
-    if (s == STATUS_OK) print_record(&doc->profile->bowl, &record);
+    if (s == STATUS_OK) print_record(&job.profile->bowl, &record);
     fiber_profile_release(&profile);
-    job_document_free(doc);
+    camera_job_release(&job);
     return s;
 }
 

@@ -8,6 +8,9 @@
 #include "renderer/image/image.h"
 
 struct job_document;
+struct job_profile;
+struct job_rows;
+struct job_setup;
 
 int camera_command_photo(int argc, char **argv);
 int camera_command_calibrate(int argc, char **argv);
@@ -28,9 +31,18 @@ status camera_option_number(const struct camera_option *o, double *out, struct e
 /* undeclared, linear or srgb. */
 status camera_option_transfer(const struct camera_option *o, unsigned *transfer, struct error *err);
 
-/* Reads a job document and the name of its folder, in which its files are. */
-status camera_read_document(const char *path, char *folder, size_t n_folder, struct job_document **doc,
-                            struct error *err);
+/* A job whose photographs a command looks at. */
+struct camera_job {
+    char folder[4096];        /* of the document and its files */
+    struct job_document *doc; /* owns the sections; NULL: none was read */
+    struct job_setup *setup;  /* the rig and the photographs complete the set-up and the rows */
+    struct job_rows *rows;
+    const struct job_profile *profile;
+};
+
+/* The caller releases the job, also after an error. */
+status camera_job_read(const char *path, struct camera_job *job, struct error *err);
+void camera_job_release(struct camera_job *job);
 
 /* Draws the outline of the crop (all 0: the whole picture) into the picture, and writes it as PNG whose white is the
  * 99th percentile of the values. STATUS_IO as image_write_png. */

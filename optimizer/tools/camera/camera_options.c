@@ -1,3 +1,4 @@
+#include "optimizer/job/document/job_document.h"
 #include "optimizer/job/document/picture_words.h"
 #include "optimizer/job/job_parse.h"
 #include "optimizer/tools/camera/camera_commands.h"
@@ -63,16 +64,22 @@ status camera_option_transfer(const struct camera_option *o, unsigned *transfer,
     return STATUS_OK;
 }
 
-status camera_read_document(const char *path, char *folder, size_t n_folder, struct job_document **doc,
-                            struct error *err)
+status camera_job_read(const char *path, struct camera_job *job, struct error *err)
 {
     char *text = NULL;
     size_t n = 0;
     const char *name = path_file_name(path);
-    snprintf(folder, n_folder, "%.*s", (int)(name - path), path);
-    if (folder[0] == '\0') snprintf(folder, n_folder, ".");
+    *job = (struct camera_job){.doc = NULL};
+    snprintf(job->folder, sizeof job->folder, "%.*s", (int)(name - path), path);
+    if (job->folder[0] == '\0') snprintf(job->folder, sizeof job->folder, ".");
     status s = file_read_all(path, JOB_MAX_DOCUMENT_BYTES, &text, &n, err);
-    if (s == STATUS_OK) s = job_document_parse(text, n, doc, err);
+    if (s == STATUS_OK) s = job_document_parse(text, n, &job->doc, err);
     free(text);
-    return s;
+    if (s != STATUS_OK) return s;
+    job->setup = job->doc->setup;
+    job->rows = job->doc->rows;
+    job->profile = job->doc->profile;
+    return STATUS_OK;
 }
+
+void camera_job_release(struct camera_job *job) { job_document_free(job->doc); }

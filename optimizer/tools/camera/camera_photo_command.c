@@ -1,5 +1,4 @@
 #include "base/files/durable.h"
-#include "optimizer/job/document/job_document.h"
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_rows.h"
 #include "optimizer/job/document/json_number.h"
@@ -198,25 +197,24 @@ static status preview_photograph(const struct photograph_process *k, const struc
 
 static int preview_job(const char *path, const char *json_path, const char *pictures)
 {
-    char folder[4096];
-    const struct preview view = {folder, pictures};
-    struct job_document *doc = NULL;
+    struct camera_job job;
+    const struct preview view = {job.folder, pictures};
     struct photograph_process process;
     struct error err = {0};
     json_t *rows = json_array();
     bool whole = true;
     photograph_process_init(&process);
-    status s = camera_read_document(path, folder, sizeof folder, &doc, &err);
-    if (s == STATUS_OK) s = photograph_process_load(&process, doc->setup, doc->rows, folder, &err);
+    status s = camera_job_read(path, &job, &err);
+    if (s == STATUS_OK) s = photograph_process_load(&process, job.setup, job.rows, job.folder, &err);
     if (s == STATUS_OK) print_color(&process);
     if (s == STATUS_OK && pictures != NULL) s = begin_pictures(&process, pictures, &err);
-    for (size_t i = 0; s == STATUS_OK && i < doc->rows->n_photograph; i++)
-        whole = preview_photograph(&process, &view, &doc->rows->photograph[i], rows) == STATUS_OK && whole;
+    for (size_t i = 0; s == STATUS_OK && i < job.rows->n_photograph; i++)
+        whole = preview_photograph(&process, &view, &job.rows->photograph[i], rows) == STATUS_OK && whole;
     if (s == STATUS_OK && json_path != NULL && json_dump_file(rows, json_path, JSON_INDENT(1)) != 0)
         s = error_set(&err, STATUS_IO, "cannot write '%s'", json_path);
     if (s != STATUS_OK) fprintf(stderr, "error: %s\n", err.text);
     photograph_process_release(&process);
-    job_document_free(doc);
+    camera_job_release(&job);
     json_decref(rows);
     return s == STATUS_OK && whole ? 0 : 1;
 }

@@ -3,7 +3,6 @@
 #include "geometry/phantom/phantom.h"
 #include "optimizer/job/document/cloth_json.h"
 #include "optimizer/job/document/job_cloth.h"
-#include "optimizer/job/document/job_document.h"
 #include "optimizer/tools/phantom/phantom_commands.h"
 #include "optimizer/tools/phantom/phantom_described.h"
 #include "renderer/image/image.h"
@@ -76,9 +75,9 @@ static const char usage_scan[] =
     "  --memory-mib N          limit of resident memory; a larger volume is kept in a file in DIR         [2048]\n";
 
 struct cloth {
-    const char *out, *yarn;  /* yarn: NULL or a file of parameters */
-    const char *description; /* NULL or a file */
-    struct job_document *described;
+    const char *out, *yarn;             /* yarn: NULL or a file of parameters */
+    const char *description;            /* NULL or a file */
+    struct cloth_description described; /* with a description */
     struct phantom_option phantom;
     struct phantom_scan_option scan;
     struct phantom_file_option file;
@@ -123,7 +122,7 @@ static status take_input(struct cloth *c, const struct cloth_input *in, struct e
     c->scan.seed = c->phantom.section.seed = c->phantom.seed;
     c->phantom.section.turns_per_m = 1e3 * in->turns_per_mm;
     c->scan.section = c->phantom.section;
-    if (c->described != NULL &&
+    if (c->description != NULL &&
         (!phantom_section_is_disc(&c->scan.section) || c->phantom.radius_spread > 0.0 || c->scan.section.taper > 0.0))
         return error_set(err, STATUS_INVALID, "sections, --taper and --diameter-spread do not go with --description");
     return STATUS_OK;
@@ -300,9 +299,9 @@ static json_t *describe(const struct cloth *c)
                                       p->wanted_ply_turns[0], p->wanted_ply_turns[1], "fiber_turns", p->fiber_turns[0],
                                       p->fiber_turns[1], "hairs", (int)p->n_hair, "loops", (int)p->n_loop));
     }
-    if (c->described != NULL) {
+    if (c->description != NULL) {
         json_decref(cloth);
-        cloth = cloth_section_json(c->described->cloth->description, NULL);
+        cloth = cloth_section_json(&c->described, NULL);
         json_object_set_new(cloth, "voxel_size_um", json_real(um * o->voxel_size_m));
     }
     return json_pack("{s:I,s:o,s:o,s:o}", "seed", (json_int_t)o->seed, "cloth", cloth, "scan", scan, "result", size);
@@ -313,10 +312,10 @@ static status write_description(const struct cloth *c, struct error *err)
 {
     char path[4096];
     struct cloth_description nearest;
-    const struct cloth_description *d = c->described != NULL ? c->described->cloth->description : &nearest;
-    if (c->described == NULL && c->yarn != NULL) return STATUS_OK;
+    const struct cloth_description *d = c->description != NULL ? &c->described : &nearest;
+    if (c->description == NULL && c->yarn != NULL) return STATUS_OK;
     status st = path_in(c->out, "cloth.json", path, err);
-    if (st == STATUS_OK && c->described == NULL)
+    if (st == STATUS_OK && c->description == NULL)
         st = phantom_described_as(&c->phantom, &c->report, &c->fibers, &nearest, err);
     if (st != STATUS_OK) return st;
     json_t *json = cloth_section_json(d, NULL);
@@ -360,9 +359,9 @@ static status write_files(struct cloth *c, struct error *err)
 
 static status make_fibers(struct cloth *c, struct thread_pool *pool, struct error *err)
 {
-    if (c->described == NULL) return phantom_generate(&c->phantom, pool, NULL, &c->fibers, &c->report, err);
-    return phantom_described_make(c->described->cloth->description, c->phantom.voxel_size_m, c->phantom.margin_m, pool,
-                                  &c->fibers, &c->report, err);
+    if (c->description == NULL) return phantom_generate(&c->phantom, pool, NULL, &c->fibers, &c->report, err);
+    return phantom_described_make(&c->described, c->phantom.voxel_size_m, c->phantom.margin_m, pool, &c->fibers,
+                                  &c->report, err);
 }
 
 int phantom_command_cloth(int argc, char **argv)
@@ -392,7 +391,6 @@ int phantom_command_cloth(int argc, char **argv)
     if (st == STATUS_OK) st = write_files(&c, &err);
     if (st != STATUS_OK) fprintf(stderr, "selvedge-phantom cloth: %s\n", err.text);
     volume_release(&c.volume);
-    job_document_free(c.described);
     scratch_space_free(space);
     fiber_set_release(&c.fibers);
     thread_pool_free(pool);

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-status phantom_described_read(const char *path, struct job_document **doc, struct error *err)
+status phantom_described_read(const char *path, struct cloth_description *d, struct error *err)
 {
     json_error_t at;
     json_t *section = json_load_file(path, JSON_REJECT_DUPLICATES, &at);
@@ -17,14 +17,7 @@ status phantom_described_read(const char *path, struct job_document **doc, struc
         return error_set(err, STATUS_FORMAT, "cannot read the description '%s': line %d: %s", path, at.line, at.text);
     /* the section of a whole job document is accepted as well */
     json_t *inner = json_object_get(section, "cloth");
-    json_t *document = json_pack("{s:s, s:O, s:{s:s}}", "sample", "described", "cloth", inner != NULL ? inner : section,
-                                 "measurements", "file", "none.csv");
-    char *text = document != NULL ? json_dumps(document, 0) : NULL;
-    status st = text != NULL
-                    ? job_document_parse(text, strlen(text), doc, err)
-                    : error_set(err, STATUS_NO_MEMORY, "cannot read the description '%s': out of memory", path);
-    free(text);
-    json_decref(document);
+    status st = job_parse_cloth(inner != NULL ? inner : section, d, err);
     json_decref(section);
     return st;
 }

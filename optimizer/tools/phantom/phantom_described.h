@@ -5,11 +5,9 @@
 #include "base/catalogue/cloth_description.h"
 #include "geometry/phantom/phantom.h"
 
-struct job_document;
-
-/* Reads the section "cloth" from a file of JSON; doc->cloth->description of the document is the description. The
- * caller frees *doc with job_document_free. STATUS_INVALID names the field. */
-status phantom_described_read(const char *path, struct job_document **doc, struct error *err);
+/* Reads the section "cloth" from a file of JSON: the section alone or a whole job document. STATUS_INVALID names the
+ * field. */
+status phantom_described_read(const char *path, struct cloth_description *d, struct error *err);
 
 /* Makes its fibers for a scan with the given voxels: the tile is stretched to whole voxels, and margin_m of void lies
  * below and above. Fills the members of the report that a described cloth has. */

@@ -4,16 +4,17 @@
 #define SELVEDGE_OPTIMIZER_INPUT_CHECK_H
 
 #include "optimizer/job/checks/job_faults.h"
+#include "optimizer/job/document/job_sections.h"
 
 #include <stdbool.h>
-
-struct job_document;
 
 enum { INPUT_PATH_BYTES = 4096 };
 
 struct input_check {
     const char *folder;
-    struct job_document *doc; /* wrong values in it are replaced by defaults */
+    struct job_sections section; /* wrong values in it are replaced by defaults */
+    struct job_setup *setup;     /* two of the sections, which the rig of a camera completes */
+    struct job_rows *rows;
     struct job_fault_list *fault;
     json_t *warnings; /* [{"field", "detail"}] */
     json_t *files;    /* ledgers (base/files/file_ledger_json.h) */

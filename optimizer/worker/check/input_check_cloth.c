@@ -4,7 +4,6 @@
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/volume/format/volume_source.h"
 #include "geometry/weave/weave_detect.h"
-#include "optimizer/job/document/job_document.h"
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/document/job_setup.h"
@@ -28,7 +27,7 @@ static void check_voxel_size(struct input_check *c, const struct volume_source_i
 {
     struct error fault = {0};
     for (int a = 0; a < 3; a++) {
-        double given_um = c->doc->scan->voxel_size_um[a], stated_um = 1e6 * info->voxel_size_m[a];
+        double given_um = c->section.scan->voxel_size_um[a], stated_um = 1e6 * info->voxel_size_m[a];
         if (isnan(given_um) && isnan(stated_um)) {
             error_set_field(&fault, STATUS_INVALID, OPTION_VOXEL_SIZE,
                             "the voxel size is not given, and the file does not state it");
@@ -71,27 +70,26 @@ static status look_at_slices(struct volume_source *source, double range[2], stru
 
 static void check_volume(struct input_check *c)
 {
-    const struct job_document *doc = c->doc;
-    const char **path = calloc(doc->scan->n_file, sizeof *path);
-    char(*text)[INPUT_PATH_BYTES] = calloc(doc->scan->n_file, sizeof *text);
-    struct volume_raw_declaration raw = {
-        .n = {doc->scan->raw_shape[0], doc->scan->raw_shape[1], doc->scan->raw_shape[2]},
-        .big_endian = doc->scan->raw_big_endian,
-        .header_bytes = doc->scan->raw_header_bytes};
+    const struct job_scan *scan = c->section.scan;
+    const char **path = calloc(scan->n_file, sizeof *path);
+    char(*text)[INPUT_PATH_BYTES] = calloc(scan->n_file, sizeof *text);
+    struct volume_raw_declaration raw = {.n = {scan->raw_shape[0], scan->raw_shape[1], scan->raw_shape[2]},
+                                         .big_endian = scan->raw_big_endian,
+                                         .header_bytes = scan->raw_header_bytes};
     struct volume_source *source = NULL;
     struct error fault = {0};
     double range[2];
     bool all = path != NULL && text != NULL;
-    for (size_t i = 0; i < doc->scan->n_file && all; i++) {
-        all = input_check_has(c, doc->scan->file[i]);
-        input_check_path(c, doc->scan->file[i], text[i]);
+    for (size_t i = 0; i < scan->n_file && all; i++) {
+        all = input_check_has(c, scan->file[i]);
+        input_check_path(c, scan->file[i], text[i]);
         path[i] = text[i];
     }
     if (!all) goto out;
-    snprintf(raw.type, sizeof raw.type, "%s", doc->scan->raw_type);
-    status s = volume_source_open_declared(path, doc->scan->n_file, &raw, &source, &fault);
+    snprintf(raw.type, sizeof raw.type, "%s", scan->raw_type);
+    status s = volume_source_open_declared(path, scan->n_file, &raw, &source, &fault);
     if (s == STATUS_OK) check_voxel_size(c, volume_source_describe(source));
-    if (s == STATUS_OK) file_ledger_append(c->files, doc->scan->file[0], &volume_source_describe(source)->ledger);
+    if (s == STATUS_OK) file_ledger_append(c->files, scan->file[0], &volume_source_describe(source)->ledger);
     if (s == STATUS_OK) s = look_at_slices(source, range, &fault);
     if (s != STATUS_OK) input_check_fault(c, &fault);
     volume_source_close(source);
@@ -107,11 +105,11 @@ static void check_fibers(struct input_check *c)
     char path[INPUT_PATH_BYTES];
     struct fiber_set f;
     struct error fault = {0};
-    if (!input_check_has(c, c->doc->cloth->fiber_file)) return;
-    input_check_path(c, c->doc->cloth->fiber_file, path);
+    if (!input_check_has(c, c->section.cloth->fiber_file)) return;
+    input_check_path(c, c->section.cloth->fiber_file, path);
     fiber_set_init(&f);
-    status s = fiber_file_read(path, c->doc->cloth, &f, &fault);
-    if (s == STATUS_OK) fiber_file_warn(&f, c->doc->cloth, &(struct warning_sink){input_check_warn, c});
+    status s = fiber_file_read(path, c->section.cloth, &f, &fault);
+    if (s == STATUS_OK) fiber_file_warn(&f, c->section.cloth, &(struct warning_sink){input_check_warn, c});
     if (s != STATUS_OK) input_check_fault(c, &fault);
     fiber_set_release(&f);
 }
@@ -121,9 +119,9 @@ static void check_environment(struct input_check *c)
     char path[INPUT_PATH_BYTES];
     struct environment *environment = NULL;
     struct error fault = {0};
-    if (!input_check_has(c, c->doc->setup->environment_file)) return;
-    input_check_path(c, c->doc->setup->environment_file, path);
-    if (environment_read_exr(path, c->doc->setup->environment_scale, &environment, &fault) != STATUS_OK) {
+    if (!input_check_has(c, c->section.setup->environment_file)) return;
+    input_check_path(c, c->section.setup->environment_file, path);
+    if (environment_read_exr(path, c->section.setup->environment_scale, &environment, &fault) != STATUS_OK) {
         snprintf(fault.field, sizeof fault.field, OPTION_ENVIRONMENT_FILE);
         input_check_fault(c, &fault);
     }
@@ -138,14 +136,14 @@ static void check_texture(struct input_check *c)
     struct weave_guess guess;
     struct error fault = {0};
     const struct job_photograph photograph = photograph_plain(JOB_TRANSFER_SRGB);
-    if (!input_check_has(c, c->doc->cloth->texture)) return;
-    input_check_path(c, c->doc->cloth->texture, path);
+    if (!input_check_has(c, c->section.cloth->texture)) return;
+    input_check_path(c, c->section.cloth->texture, path);
     status s = photograph_read(path, &photograph, &im, NULL, &fault);
     if (s == STATUS_OK) {
         s = weave_detect(&(struct weave_picture){im.pixel, im.width, im.height}, &guess, &fault);
         image_release(&im);
     }
-    if (s == STATUS_NOT_FOUND && !c->doc->cloth->draft_from_texture) {
+    if (s == STATUS_NOT_FOUND && !c->section.cloth->draft_from_texture) {
         input_check_warn(c, OPTION_CLOTH_TEXTURE, fault.text);
         return;
     }
@@ -157,7 +155,7 @@ static void check_texture(struct input_check *c)
 
 void input_check_cloth(struct input_check *c)
 {
-    if (c->doc->scan->n_file > 0) check_volume(c);
+    if (c->section.scan->n_file > 0) check_volume(c);
     check_fibers(c);
     check_environment(c);
     check_texture(c);

@@ -1,6 +1,5 @@
 #include "base/files/file_ledger_json.h"
 #include "base/option_id.h"
-#include "optimizer/job/document/job_document.h"
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/worker/check/input_check.h"
 #include "renderer/mesh/mesh.h"
@@ -29,8 +28,8 @@ static void check_stretch(struct input_check *c, size_t i, const char *name, con
 
 void input_check_pictures(struct input_check *c)
 {
-    for (size_t i = 0; i < c->doc->results->n_surface_picture; i++) {
-        const struct job_surface_picture *p = &c->doc->results->surface_picture[i];
+    for (size_t i = 0; i < c->section.results->n_surface_picture; i++) {
+        const struct job_surface_picture *p = &c->section.results->surface_picture[i];
         char path[INPUT_PATH_BYTES];
         struct mesh m = {0};
         struct error fault = {0};

@@ -2,11 +2,10 @@
 #include "base/option_id.h"
 #include "base/warning.h"
 #include "optimizer/fit/baseline/row_consistency.h"
-#include "optimizer/job/document/job_document.h"
-#include "optimizer/job/document/job_kind.h"
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_profile.h"
 #include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/document/job_sections.h"
 #include "optimizer/photographs/camera/photograph_develop.h"
 #include "optimizer/photographs/profile/bowl_profile.h"
 #include "optimizer/photographs/reader/photograph.h"
@@ -47,9 +46,9 @@ static status measure(const struct input_check *c, const struct photograph_proce
 static bool check_photographs(struct input_check *c, const struct photograph_process *process)
 {
     bool all = true;
-    for (size_t i = 0; i < c->doc->rows->n_photograph; i++) {
+    for (size_t i = 0; i < c->section.rows->n_photograph; i++) {
         struct error fault = {0};
-        const struct job_photograph *p = &c->doc->rows->photograph[i];
+        const struct job_photograph *p = &c->section.rows->photograph[i];
         if (has_files(c, p) && measure(c, process, p, &fault) == STATUS_OK) continue;
         all = false;
         if (fault.code == STATUS_OK) continue; /* a file is missing, which is a fault already */
@@ -77,7 +76,7 @@ static status parse_one(struct input_check *c, const char *head, const char *row
     text[at++] = '\n';
     text[at] = '\0';
     observation_set_init(&rows);
-    status s = measurement_table_parse(text, at, c->doc->rows->measurement_file, c->doc->setup, &rows, fault);
+    status s = measurement_table_parse(text, at, c->section.rows->measurement_file, c->section.setup, &rows, fault);
     observation_set_release(&rows);
     free(text);
     return s;
@@ -122,13 +121,13 @@ static bool check_table(struct input_check *c)
     size_t n = 0;
     struct observation_set rows;
     struct error fault = {0};
-    if (!input_check_has(c, c->doc->rows->measurement_file)) return false;
-    if (brdf_reader_of_name(c->doc->rows->measurement_file) != NULL) return true; /* judge_rows reads it */
-    input_check_path(c, c->doc->rows->measurement_file, path);
+    if (!input_check_has(c, c->section.rows->measurement_file)) return false;
+    if (brdf_reader_of_name(c->section.rows->measurement_file) != NULL) return true; /* judge_rows reads it */
+    input_check_path(c, c->section.rows->measurement_file, path);
     observation_set_init(&rows);
     status s = file_read_all(path, MAX_TABLE_BYTES, &text, &n, &fault);
     if (s == STATUS_OK)
-        s = measurement_table_parse(text, n, c->doc->rows->measurement_file, c->doc->setup, &rows, &fault);
+        s = measurement_table_parse(text, n, c->section.rows->measurement_file, c->section.setup, &rows, &fault);
     if (s != STATUS_OK) {
         snprintf(fault.field, sizeof fault.field, OPTION_MEASUREMENT_FILE);
         input_check_fault(c, &fault);
@@ -145,8 +144,9 @@ static void judge_rows(struct input_check *c, const struct photograph_process *p
     struct error fault = {0};
     const struct warning_sink warn = {input_check_warn, c};
     observation_set_init(&rows);
-    status s = observation_set_load(c->doc->setup, c->doc->rows, c->doc->fit, c->folder, process, &warn, &rows, &fault);
-    if (s == STATUS_OK && c->doc->rows->measurement_file[0] != '\0')
+    status s = observation_set_load(c->section.setup, c->section.rows, c->section.fit, c->folder, process, &warn, &rows,
+                                    &fault);
+    if (s == STATUS_OK && c->section.rows->measurement_file[0] != '\0')
         s = row_consistency_check_angles(&rows, OPTION_MEASUREMENT_FILE, &fault);
     if (s == STATUS_OK) {
         observation_set_check(&rows, &warn);
@@ -174,14 +174,14 @@ static void check_profile(struct input_check *c)
     struct fiber_profile profile;
     struct error fault = {0};
     struct photographs_there there = {c, true};
-    if (c->doc->profile->bowl.given)
-        job_document_visit_files(c->doc, look_for_photograph, &there);
+    if (c->section.profile->bowl.given)
+        job_sections_visit_files(&c->section, look_for_photograph, &there);
     else
-        there.all = input_check_has(c, c->doc->profile->file);
+        there.all = input_check_has(c, c->section.profile->file);
     if (!there.all) return;
-    if ((c->doc->profile->bowl.given
-             ? bowl_profile_load(&profile, &c->doc->profile->bowl, c->doc->setup, c->doc->rows, c->folder, NULL, &fault)
-             : fiber_profile_load(&profile, c->doc->profile, c->folder, &fault)) == STATUS_OK)
+    if ((c->section.profile->bowl.given
+             ? bowl_profile_load(&profile, &c->section.profile->bowl, c->setup, c->rows, c->folder, NULL, &fault)
+             : fiber_profile_load(&profile, c->section.profile, c->folder, &fault)) == STATUS_OK)
         fiber_profile_release(&profile);
     else
         input_check_fault(c, &fault);
@@ -192,14 +192,14 @@ void input_check_rows(struct input_check *c)
     struct photograph_process process;
     struct error fault = {0};
     bool usable;
-    if (job_document_kind(c->doc) == JOB_OF_PROFILE) check_profile(c);
-    if (job_document_kind(c->doc) != JOB_OF_FIT) return;
+    if (job_sections_kind(&c->section) == JOB_OF_PROFILE) check_profile(c);
+    if (job_sections_kind(&c->section) != JOB_OF_FIT) return;
     photograph_process_init(&process);
     process.files = c->files;
-    if (c->doc->rows->measurement_file[0] != '\0')
+    if (c->section.rows->measurement_file[0] != '\0')
         usable = check_table(c);
     else {
-        bool loaded = photograph_process_load(&process, c->doc->setup, c->doc->rows, c->folder, &fault) == STATUS_OK;
+        bool loaded = photograph_process_load(&process, c->setup, c->rows, c->folder, &fault) == STATUS_OK;
         if (!loaded) { /* the photographs are opened all the same, as if nothing were known of the camera */
             input_check_fault(c, &fault);
             photograph_process_release(&process);

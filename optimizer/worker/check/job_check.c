@@ -40,6 +40,7 @@ status job_check(const char *path, const char *folder, json_t **report, struct e
     char *text = NULL;
     size_t n = 0;
     struct input_check c = {.folder = folder};
+    struct job_document *doc = NULL;
     status s = file_read_all(path, JOB_MAX_DOCUMENT_BYTES, &text, &n, err);
     if (s != STATUS_OK) return s;
     c.fault = calloc(1, sizeof *c.fault);
@@ -51,16 +52,19 @@ status job_check(const char *path, const char *folder, json_t **report, struct e
         json_decref(c.files);
         goto out;
     }
-    job_document_inspect(text, n, &c.doc, c.fault);
-    if (c.doc != NULL) {
-        job_document_visit_files(c.doc, look_for, &c);
+    job_document_inspect(text, n, &doc, c.fault);
+    if (doc != NULL) {
+        c.section = job_document_sections(doc);
+        c.setup = doc->setup;
+        c.rows = doc->rows;
+        job_sections_visit_files(&c.section, look_for, &c);
         input_check_cloth(&c);
         input_check_rows(&c);
         input_check_pictures(&c);
     }
     *report = report_of(&c);
 out:
-    job_document_free(c.doc);
+    job_document_free(doc);
     free(c.fault);
     free(text);
     return s;

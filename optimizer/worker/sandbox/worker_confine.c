@@ -1,8 +1,5 @@
 #include "optimizer/worker/sandbox/worker_confine.h"
-#include "optimizer/job/document/job_fit.h"
-#include "optimizer/job/document/job_results.h"
-#include "optimizer/job/document/job_scan.h"
-#include "optimizer/job/job_parse.h"
+#include "optimizer/job/job_outline.h"
 
 #include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
@@ -87,42 +84,35 @@ static int permit_library(struct dl_phdr_info *info, size_t n, void *context)
     return 0;
 }
 
-struct input_links {
-    struct path_list *list;
-    const char *folder; /* of the inputs */
-};
-
 /* In a folder made by hand an input may be a link to a file elsewhere. */
-static void permit_link(void *context, const char *name, const char *role)
+static void permit_links(const struct job_outline *outline, const char *folder, struct path_list *list)
 {
-    (void)role;
-    const struct input_links *in = context;
     struct stat st;
     char path[WORKER_PATH_BYTES];
-    snprintf(path, sizeof path, "%s/%s", in->folder, name);
-    if (lstat(path, &st) == 0 && S_ISLNK(st.st_mode)) permit(in->list, SANDBOX_READ, path);
+    for (size_t i = 0; i < outline->n_file; i++) {
+        snprintf(path, sizeof path, "%s/%s", folder, outline->file[i].name);
+        if (lstat(path, &st) == 0 && S_ISLNK(st.st_mode)) permit(list, SANDBOX_READ, path);
+    }
 }
 
-/* NULL when it cannot be read: the worker in its sandbox finds the fault again and reports it. */
-static struct job_document *read_document(const char *path)
+/* Returns false where the document cannot be read: the worker in its sandbox finds the fault again and reports it. The
+ * outline is then empty. */
+static bool read_outline(const char *path, struct job_outline *outline)
 {
     char *text = NULL;
     size_t n = 0;
-    struct job_document *doc = NULL;
-    if (file_read_all(path, JOB_MAX_DOCUMENT_BYTES, &text, &n, NULL) != STATUS_OK ||
-        job_document_parse(text, n, &doc, NULL) != STATUS_OK)
-        doc = NULL;
+    *outline = (struct job_outline){.n_file = 0};
+    bool read = file_read_all(path, JOB_MAX_DOCUMENT_BYTES, &text, &n, NULL) == STATUS_OK &&
+                job_outline_read(text, n, outline, NULL) == STATUS_OK;
     free(text);
-    return doc;
+    return read;
 }
 
-static void prepare(const struct worker_folder *folder, const struct job_document *doc, struct confinement *c)
+static void prepare(const struct worker_folder *folder, const struct job_outline *outline, struct confinement *c)
 {
-    c->pdf.order_fd = -1;
-    if (doc == NULL) return;
-    if (doc->results->export_pdf) pdf_process_start(folder, &c->pdf);
-    pipeline_link_geometry(folder, doc->scan->geometry_job);
-    pipeline_copy_profile(folder, doc->fit->profile_job);
+    if (outline->export_pdf) pdf_process_start(folder, &c->pdf);
+    pipeline_link_geometry(folder, outline->geometry_job);
+    pipeline_copy_profile(folder, outline->profile_job);
 }
 
 static bool by_hand(const struct worker_folder *folder)
@@ -152,17 +142,18 @@ static void list_files(const struct confine_files *files, const char *program, s
     permit(list, SANDBOX_EXECUTE, program);
     dl_iterate_phdr(permit_library, list);
     if (files->none) return;
-    struct job_document *doc = read_document(files->document != NULL ? files->document : document);
+    struct job_outline outline;
+    const bool read = read_outline(files->document != NULL ? files->document : document, &outline);
     permit(list, files->document != NULL ? SANDBOX_READ : SANDBOX_OWN, files->folder);
     if (files->document != NULL) permit(list, SANDBOX_READ, files->document);
     if (files->speeds != NULL && files->document == NULL) permit_speeds(list, files->speeds);
     if (files->speeds != NULL && files->document != NULL && access(files->speeds, F_OK) == 0)
         permit(list, SANDBOX_READ, files->speeds); /* a plan changes nothing */
-    if (doc != NULL && !files->no_links && by_hand(&folder))
-        job_document_visit_files(doc, permit_link,
-                                 &(struct input_links){list, files->document != NULL ? files->folder : input});
-    if (files->document == NULL) prepare(&folder, doc, c);
-    job_document_free(doc);
+    if (!files->no_links && by_hand(&folder))
+        permit_links(&outline, files->document != NULL ? files->folder : input, list);
+    if (files->document == NULL) c->pdf.order_fd = -1;
+    if (files->document == NULL && read) prepare(&folder, &outline, c);
+    job_outline_release(&outline);
 }
 
 /* A daemon that runs as root owns its jobs' folders, so its workers need no right to pass over modes of files. By hand
@@ -216,9 +207,10 @@ void worker_prepare(const char *folder_path, struct confinement *c)
     char document[WORKER_PATH_BYTES];
     snprintf(folder.path, sizeof folder.path, "%s", folder_path);
     worker_folder_path(&folder, JOB_FILE_DOCUMENT, NULL, document);
-    struct job_document *doc = read_document(document);
-    prepare(&folder, doc, c);
-    job_document_free(doc);
+    struct job_outline outline;
+    c->pdf.order_fd = -1;
+    if (read_outline(document, &outline)) prepare(&folder, &outline, c);
+    job_outline_release(&outline);
 }
 
 bool confine_mode_parse(const char *text, enum confine_mode *mode)

@@ -85,10 +85,13 @@ static void test_geometry_only(void **state)
     const char *alone = "{\"sample\":\"s\"," VOLUME "}",
                *on = "{\"sample\":\"s\",\"geometry\":{\"job\":\"5e0c-1\"},\"measurements\":{\"file\":\"a.csv\"}}";
     assert_int_equal(job_document_parse(alone, strlen(alone), &doc, NULL), STATUS_OK);
-    assert_true(job_document_kind(doc) == JOB_OF_GEOMETRY && doc->scan->given && doc->scan->geometry_job[0] == '\0');
+    struct job_sections section = job_document_sections(doc);
+    assert_true(job_sections_kind(&section) == JOB_OF_GEOMETRY && doc->scan->given &&
+                doc->scan->geometry_job[0] == '\0');
     job_document_free(doc);
     assert_int_equal(job_document_parse(on, strlen(on), &doc, NULL), STATUS_OK);
-    assert_true(job_document_kind(doc) != JOB_OF_GEOMETRY && !doc->scan->given);
+    section = job_document_sections(doc);
+    assert_true(job_sections_kind(&section) != JOB_OF_GEOMETRY && !doc->scan->given);
     assert_string_equal(doc->scan->geometry_job, "5e0c-1");
     job_document_free(doc);
 }
