@@ -32,6 +32,7 @@
 #define OPTION_LEAST_VERTICES "least_vertices"
 /* the fiber file */
 #define OPTION_FIBER_FILE "fiber_file"
+#define OPTION_FIBER_RADIUS "fiber_radius"
 #define OPTION_TILE "tile"
 #define OPTION_DENSITY_VOXEL "density_voxel"
 #define OPTION_GROUPS "groups"

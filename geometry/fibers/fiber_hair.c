@@ -1,6 +1,7 @@
-/* Reads and writes Cem Yuksel's .hair; docs/file-formats.md has the byte layout. All numbers are little-endian. */
+/* Reads Cem Yuksel's .hair. All numbers are little-endian. */
+#include "geometry/fibers/fiber_hair.h"
 #include "base/files/durable.h"
-#include "geometry/fibers/fiber_set.h"
+#include "geometry/fibers/fiber_import.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -8,41 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-    HAIR_HEADER_BYTES = 128,
-    HAIR_TEXT_OFFSET = 40,
-    HAIR_TEXT_BYTES = 88,
-    HAIR_SEGMENTS = 1,
-    HAIR_POINTS = 2,
-    HAIR_THICKNESS = 4,
-    HAIR_TRANSPARENCY = 8,
-    HAIR_COLOUR = 16,
-    HAIR_KNOWN = 31
-};
-
-static const char tile_key[] = "selvedge tile_mm=", group_key[] = " groups=rgb", section_key[] = " sections",
-                  lumen_key[] = " lumens";
 /* Points that are thinner, over the mean thickness of their fiber, count as this thick: rays need some thickness. */
 static const double LEAST_THICKNESS = 0.05;
-
-static void put_u16(uint8_t *to, uint32_t v)
-{
-    to[0] = (uint8_t)v;
-    to[1] = (uint8_t)(v >> 8);
-}
-
-static void put_u32(uint8_t *to, uint32_t v)
-{
-    put_u16(to, v & 0xffffu);
-    put_u16(to + 2, v >> 16);
-}
-
-static void put_f32(uint8_t *to, float v)
-{
-    uint32_t bits;
-    memcpy(&bits, &v, sizeof bits);
-    put_u32(to, bits);
-}
 
 static uint32_t get_u16(const uint8_t *from) { return (uint32_t)from[0] | (uint32_t)from[1] << 8; }
 static uint32_t get_u32(const uint8_t *from) { return get_u16(from) | get_u16(from + 2) << 16; }
@@ -55,110 +23,9 @@ static float get_f32(const uint8_t *from)
     return v;
 }
 
-/* Number of strands that a fiber of n vertices is written as, because the format counts a strand's segments in 16
- * bits. */
-static size_t n_strand_of(size_t n) { return (n - 2) / FIBER_HAIR_MAX_SEGMENT + 1; }
-
-/* Counts the strands and points that the file will hold. The vertex between two strands of a fiber is in both. */
-static status count_strands(const struct fiber_set *f, const char *name, size_t *n_strand, size_t *n_point,
-                            struct error *err)
-{
-    *n_strand = 0;
-    for (size_t i = 0; i < f->n_fiber; i++) {
-        size_t n = f->first_vertex[i + 1] - f->first_vertex[i];
-        if (n < 2)
-            return error_set(err, STATUS_INVALID,
-                             "cannot write fibers '%s': fiber %zu has %zu vertices, but needs at least 2", name, i, n);
-        *n_strand += n_strand_of(n);
-    }
-    *n_point = f->n_vertex + (*n_strand - f->n_fiber);
-    if (*n_point > UINT32_MAX) /* there are fewer strands than points */
-        return error_set(err, STATUS_TOO_LARGE,
-                         "cannot write fibers '%s': %zu vertices, but the format is limited to %u", name, *n_point,
-                         UINT32_MAX);
-    return STATUS_OK;
-}
-
-/* numbers: of a section (fiber_shape.h), here and below; 0: there are none. */
-static void put_header(uint8_t *to, const struct fiber_set *f, size_t n_strand, size_t n_point, bool groups,
-                       int numbers)
-{
-    memset(to, 0, HAIR_HEADER_BYTES);
-    memcpy(to, "HAIR", 4);
-    put_u32(to + 4, (uint32_t)n_strand);
-    put_u32(to + 8, (uint32_t)n_point);
-    put_u32(to + 12, HAIR_SEGMENTS | HAIR_POINTS | HAIR_THICKNESS | (groups ? HAIR_COLOUR : 0));
-    put_f32(to + 20, f->n_fiber > 0 ? 2000.0f * f->radius_m[0] : 0.0f);
-    for (size_t c = 0; c < 3; c++) put_f32(to + 28 + 4 * c, 1.0f);
-    char text[HAIR_TEXT_BYTES];
-    int n = snprintf(text, sizeof text, "%s%.17g,%.17g%s%s", tile_key, 1e3 * f->tile_size_m[0], 1e3 * f->tile_size_m[1],
-                     groups ? group_key : "",
-                     numbers == 0                     ? ""
-                     : numbers == FIBER_SHAPE_NUMBERS ? section_key
-                                                      : lumen_key);
-    if (n > 0 && n < HAIR_TEXT_BYTES) memcpy(to + HAIR_TEXT_OFFSET, text, (size_t)n);
-}
-
-/* The colours of groups are the corners of the rgb cube: group 0 is white, and bit c of the group clears channel c. */
-static float group_channel(uint8_t group, size_t c) { return ((uint32_t)group >> c & 1u) != 0 ? 0.0f : 1.0f; }
-
-/* The numbers of a point that the format has no array for. */
-static void put_section(uint8_t *to, const struct fiber_shape *s, int numbers)
-{
-    float value[FIBER_SHAPE_WITH_LUMEN];
-    fiber_shape_numbers(s, value);
-    for (int i = 0; i < numbers; i++) put_f32(to + 4 * i, value[i]);
-}
-
-static int section_numbers(const struct fiber_set *f)
-{
-    return f->shape == NULL ? 0 : fiber_set_has_lumens(f) ? FIBER_SHAPE_WITH_LUMEN : FIBER_SHAPE_NUMBERS;
-}
-
-/* to: the arrays of the file, after the header. */
-static void put_strands(uint8_t *to, const struct fiber_set *f, size_t n_strand, size_t n_point, bool groups,
-                        int numbers)
-{
-    uint8_t *segments = to, *points = segments + 2 * n_strand, *thickness = points + 12 * n_point;
-    uint8_t *colour = thickness + 4 * n_point, *section = colour + (groups ? 12 * n_point : 0);
-    for (size_t i = 0; i < f->n_fiber; i++)
-        for (size_t from = f->first_vertex[i], last = f->first_vertex[i + 1] - 1; from < last;) {
-            size_t n = last - from < FIBER_HAIR_MAX_SEGMENT ? last - from : FIBER_HAIR_MAX_SEGMENT;
-            put_u16(segments, (uint32_t)n);
-            for (size_t k = from; k <= from + n; k++, points += 12, thickness += 4) {
-                for (size_t a = 0; a < 3; a++) put_f32(points + 4 * a, 1000.0f * f->position_m[3 * k + a]);
-                put_f32(thickness, 2000.0f * fiber_radius_m(f, i, k));
-                if (numbers > 0) put_section(section, &f->shape[k], numbers);
-                section += 4 * numbers;
-                for (size_t c = 0; groups && c < 3; c++, colour += 4) put_f32(colour, group_channel(f->group[i], c));
-            }
-            segments += 2;
-            from += n;
-        }
-}
-
-status fiber_set_write_hair(const struct fiber_set *f, const char *path, struct error *err)
-{
-    const char *name = path_file_name(path);
-    size_t n_strand = 0, n_point = 0;
-    status s = count_strands(f, name, &n_strand, &n_point, err);
-    if (s != STATUS_OK) return s;
-    bool groups = fiber_set_n_group(f) > 1;
-    const int numbers = section_numbers(f);
-    const size_t point_bytes = (groups ? 28u : 16u) + 4u * (size_t)numbers;
-    const size_t n_bytes = HAIR_HEADER_BYTES + 2 * n_strand + point_bytes * n_point;
-    uint8_t *data = malloc(n_bytes);
-    if (data == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write fibers '%s': out of memory", name);
-    put_header(data, f, n_strand, n_point, groups, numbers);
-    put_strands(data + HAIR_HEADER_BYTES, f, n_strand, n_point, groups, numbers);
-    s = durable_replace(path, data, n_bytes, err);
-    free(data);
-    return s;
-}
-
 struct hair_header {
     uint32_t n_strand, n_point, flags, default_segments;
-    float default_thickness;
+    float default_thickness, default_transparency, default_colour[3];
     int numbers; /* of the section of each point, after the arrays */
 };
 
@@ -291,14 +158,14 @@ static void get_text(double tile_size_m[2], const uint8_t *header, bool *groups,
     memcpy(text, header + HAIR_TEXT_OFFSET, HAIR_TEXT_BYTES);
     text[HAIR_TEXT_BYTES] = '\0';
     tile_size_m[0] = tile_size_m[1] = 0.0;
-    const char *at = strstr(text, tile_key);
-    *groups = at != NULL && strstr(at, group_key) != NULL;
-    *numbers = at != NULL && strstr(at, section_key) != NULL ? FIBER_SHAPE_NUMBERS
-               : at != NULL && strstr(at, lumen_key) != NULL ? FIBER_SHAPE_WITH_LUMEN
-                                                             : 0;
+    const char *at = strstr(text, HAIR_TILE_KEY);
+    *groups = at != NULL && strstr(at, HAIR_GROUP_KEY) != NULL;
+    *numbers = at != NULL && strstr(at, HAIR_SECTION_KEY) != NULL ? FIBER_SHAPE_NUMBERS
+               : at != NULL && strstr(at, HAIR_LUMEN_KEY) != NULL ? FIBER_SHAPE_WITH_LUMEN
+                                                                  : 0;
     if (at == NULL) return;
     char *end;
-    double x = strtod(at + sizeof tile_key - 1, &end);
+    double x = strtod(at + sizeof HAIR_TILE_KEY - 1, &end);
     if (*end != ',') return;
     double y = strtod(end + 1, &end);
     if (!(x > 0.0) || !(y > 0.0) || !isfinite(x) || !isfinite(y)) return;
@@ -308,13 +175,47 @@ static void get_text(double tile_size_m[2], const uint8_t *header, bool *groups,
 
 static struct hair_header get_header(const uint8_t *data, double tile_size_m[2], bool *groups)
 {
-    struct hair_header h = {get_u32(data + 4),  get_u32(data + 8),  get_u32(data + 12),
-                            get_u32(data + 16), get_f32(data + 20), 0};
+    struct hair_header h = {
+        .n_strand = get_u32(data + 4),
+        .n_point = get_u32(data + 8),
+        .flags = get_u32(data + 12),
+        .default_segments = get_u32(data + 16),
+        .default_thickness = get_f32(data + 20),
+        .default_transparency = get_f32(data + 24),
+        .default_colour = {get_f32(data + 28), get_f32(data + 32), get_f32(data + 36)},
+    };
     get_text(tile_size_m, data, groups, &h.numbers);
     return h;
 }
 
-static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes, const char *name, struct error *err)
+/* The statements that have no use here. */
+static void note_unused(const struct hair_header *h, bool groups, struct file_ledger *ledger)
+{
+    static const char opaque[] = "the fitted model says how much light a fiber lets through",
+                      fitted[] = "the fitted model says which color a fiber has";
+    const float *c = h->default_colour;
+    if ((h->flags & HAIR_TRANSPARENCY) != 0)
+        file_ledger_add(ledger, "transparency", opaque, "of each point");
+    else if (h->default_transparency != 0.0f)
+        file_ledger_add(ledger, "transparency", opaque, "%g", (double)h->default_transparency);
+    if ((h->flags & HAIR_COLOUR) != 0)
+        file_ledger_add(ledger, "colors", groups ? NULL : fitted, groups ? "groups of fibers" : "of each point");
+    else if ((c[0] != 1.0f || c[1] != 1.0f || c[2] != 1.0f) && (c[0] != 0.0f || c[1] != 0.0f || c[2] != 0.0f))
+        file_ledger_add(ledger, "colors", fitted, "%g %g %g", (double)c[0], (double)c[1], (double)c[2]);
+}
+
+/* The radius of the job is for files that state none. */
+static status settle_radius(struct hair_header *h, double radius_m, const char *name, struct error *err)
+{
+    const bool stated = (h->flags & HAIR_THICKNESS) != 0 || h->default_thickness > 0.0f;
+    if (!isnan(radius_m) && stated) return fiber_terms_two_radii(name, err);
+    if (!stated && isnan(radius_m)) return fiber_terms_no_radius(name, err);
+    if (!stated) h->default_thickness = (float)(2e3 * radius_m);
+    return STATUS_OK;
+}
+
+static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes, const struct fiber_file_terms *terms,
+                     const char *name, struct error *err)
 {
     if (n_bytes < HAIR_HEADER_BYTES || memcmp(data, "HAIR", 4) != 0)
         return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': not a .hair file", name);
@@ -322,6 +223,8 @@ static status decode(struct fiber_set *f, const uint8_t *data, uint64_t n_bytes,
     double tile_size_m[2];
     struct hair_header h = get_header(data, tile_size_m, &groups);
     status s = check_header(&h, n_bytes, name, err);
+    if (s == STATUS_OK) s = settle_radius(&h, terms->radius_m, name, err);
+    if (s == STATUS_OK) note_unused(&h, groups, terms->ledger);
     if (s == STATUS_OK) s = fiber_set_reserve(f, h.n_strand, h.n_point, err);
     if (s != STATUS_OK) return s;
     const uint8_t *segments = NULL, *at = data + HAIR_HEADER_BYTES;
@@ -371,7 +274,7 @@ static status check_file(const char *path, struct error *err)
     return s;
 }
 
-status fiber_set_read_hair(struct fiber_set *f, const char *path, struct error *err)
+status fiber_import_hair(struct fiber_set *f, const char *path, const struct fiber_file_terms *terms, struct error *err)
 {
     char *data = NULL;
     size_t n_bytes = 0;
@@ -379,7 +282,7 @@ status fiber_set_read_hair(struct fiber_set *f, const char *path, struct error *
     fiber_set_init(&read);
     status s = check_file(path, err);
     if (s == STATUS_OK) s = file_read_all(path, SIZE_MAX / 2, &data, &n_bytes, err);
-    if (s == STATUS_OK) s = decode(&read, (const uint8_t *)data, n_bytes, path_file_name(path), err);
+    if (s == STATUS_OK) s = decode(&read, (const uint8_t *)data, n_bytes, terms, path_file_name(path), err);
     free(data);
     if (s != STATUS_OK) {
         fiber_set_release(&read);

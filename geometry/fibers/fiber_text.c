@@ -1,7 +1,7 @@
-/* Fibers as text: a line "x y z radius", "x y z radius group", or these and the numbers of a section, in
- * millimetres for each vertex, and a blank line between fibers (docs/file-formats.md). */
+/* Fibers as text: a line "x y z", "x y z radius", "x y z radius group", or these and the numbers of a section, in
+ * millimetres for each vertex, and a blank line between fibers (docs/file-formats.md). '#' begins a comment. */
 #include "base/files/durable.h"
-#include "geometry/fibers/fiber_set.h"
+#include "geometry/fibers/fiber_import.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -51,27 +51,36 @@ struct line_reader {
 
 enum { LINE_BYTES = 256 };
 
-enum line_kind { LINE_END, LINE_BLANK, LINE_POINT, LINE_TOO_LONG };
+enum line_kind { LINE_END, LINE_BLANK, LINE_COMMENT, LINE_POINT, LINE_TOO_LONG };
 
-/* Copies the next line to a buffer, so that strtod cannot read beyond the end of the line. */
+/* The lines of a file, after a byte order mark. */
+static struct line_reader first_line(const char *data, size_t n_bytes)
+{
+    const size_t mark = n_bytes >= 3 && memcmp(data, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
+    return (struct line_reader){data + mark, data + n_bytes, 0};
+}
+
+/* Copies the next line to a buffer without its comment, so that strtod cannot read beyond the end of the line. A line
+ * with a comment alone does not end a fiber. */
 static enum line_kind next_line(struct line_reader *r, char line[LINE_BYTES])
 {
     if (r->at >= r->end) return LINE_END;
     const char *stop = memchr(r->at, '\n', (size_t)(r->end - r->at));
     if (stop == NULL) stop = r->end;
-    size_t n = (size_t)(stop - r->at);
-    const char *from = r->at;
+    const char *from = r->at, *comment = memchr(from, '#', (size_t)(stop - from));
+    size_t n = (size_t)((comment != NULL ? comment : stop) - from);
     r->at = stop + 1;
     r->i_line++;
     if (n >= LINE_BYTES) return LINE_TOO_LONG;
     memcpy(line, from, n);
     line[n] = '\0';
-    return line[strspn(line, " \t\r")] == '\0' && strlen(line) == n ? LINE_BLANK : LINE_POINT;
+    const bool blank = line[strspn(line, " \t\r")] == '\0' && strlen(line) == n;
+    return !blank ? LINE_POINT : comment != NULL ? LINE_COMMENT : LINE_BLANK;
 }
 
 static size_t count_points(const char *data, size_t n_bytes, size_t *n_fiber)
 {
-    struct line_reader r = {data, data + n_bytes, 0};
+    struct line_reader r = first_line(data, n_bytes);
     char line[LINE_BYTES];
     size_t n_vertex = 0;
     bool inside = false;
@@ -81,6 +90,7 @@ static size_t count_points(const char *data, size_t n_bytes, size_t *n_fiber)
             inside = false;
             continue;
         }
+        if (kind == LINE_COMMENT) continue;
         if (!inside) ++*n_fiber;
         inside = true;
         n_vertex++;
@@ -93,6 +103,7 @@ static bool is_end(const char *line) { return line[strspn(line, " \t\r")] == '\0
 /* One line of the file. */
 struct text_point {
     double value[4]; /* position and radius */
+    bool has_radius;
     uint8_t group;
     bool has_section;
     struct fiber_shape shape; /* in metres */
@@ -113,12 +124,15 @@ static bool parse_section(const char *line, struct text_point *p)
     return p->has_section && is_end(line);
 }
 
-/* Parses four finite numbers, and after them a group, a group and a section, or nothing, which is group 0. Returns
- * false for anything else. */
-static bool parse_point(const char *line, struct text_point *p)
+/* Parses four finite numbers, and after them a group, a group and a section, or nothing, which is group 0; or three
+ * numbers alone, whose radius is radius_mm. Returns false for anything else. */
+static bool parse_point(const char *line, double radius_mm, struct text_point *p)
 {
     char *end;
-    for (int a = 0; a < 4; a++) {
+    p->value[3] = radius_mm;
+    p->has_radius = false;
+    for (int a = 0; a < 4 && !(a == 3 && is_end(line)); a++) {
+        p->has_radius = a == 3;
         p->value[a] = strtod(line, &end);
         if (end == line || !isfinite(p->value[a])) return false;
         line = end;
@@ -132,7 +146,7 @@ static bool parse_point(const char *line, struct text_point *p)
         p->group = (uint8_t)number;
         line = end;
     }
-    return (is_end(line) || parse_section(line, p)) && p->value[3] > 0.0;
+    return (is_end(line) || parse_section(line, p)) && (!p->has_radius || p->value[3] > 0.0);
 }
 
 static status wrong_line(const char *name, size_t i_line, bool other_group, struct error *err)
@@ -140,11 +154,11 @@ static status wrong_line(const char *name, size_t i_line, bool other_group, stru
     if (other_group)
         return error_set(err, STATUS_FORMAT, "cannot read fibers '%s': line %zu has another group than its fiber", name,
                          i_line);
-    return error_set(
-        err, STATUS_FORMAT,
-        "cannot read fibers '%s': line %zu is not \"x y z radius\" or \"x y z radius group\" with a group of "
-        "0 to %d, alone or with the seven or nine numbers of a section",
-        name, i_line, FIBER_MAX_GROUP - 1);
+    return error_set(err, STATUS_FORMAT,
+                     "cannot read fibers '%s': line %zu is not \"x y z\", \"x y z radius\" or \"x y z radius group\" "
+                     "with a group of "
+                     "0 to %d, alone or with the seven or nine numbers of a section",
+                     name, i_line, FIBER_MAX_GROUP - 1);
 }
 
 static status close_fiber(struct fiber_set *f, size_t i_fiber, size_t n_vertex, double radius_sum, const char *name,
@@ -159,14 +173,22 @@ static status close_fiber(struct fiber_set *f, size_t i_fiber, size_t n_vertex, 
     return STATUS_OK;
 }
 
-/* *shaped: there are sections, or the radius varies along a fiber. */
-static status parse(struct fiber_set *f, const char *data, size_t n_bytes, const char *name, bool *shaped,
-                    struct error *err)
+/* One radius is stated: by every line or by the job */
+static status check_radius(const struct text_point *p, double radius_m, const char *name, struct error *err)
 {
-    struct line_reader r = {data, data + n_bytes, 0};
+    if (p->has_radius && !isnan(radius_m)) return fiber_terms_two_radii(name, err);
+    return p->has_radius || !isnan(radius_m) ? STATUS_OK : fiber_terms_no_radius(name, err);
+}
+
+/* *shaped: there are sections, or the radius varies along a fiber. radius_m: of the job. */
+static status parse(struct fiber_set *f, const struct line_reader *first, double radius_m, const char *name,
+                    bool *shaped, struct error *err)
+{
+    struct line_reader r = *first;
     char line[LINE_BYTES];
     size_t i_fiber = 0, n_vertex = 0;
     double radius_sum = 0.0;
+    bool with_radius = false; /* the first point states one */
     struct text_point p;
     for (;;) {
         enum line_kind kind = next_line(&r, line);
@@ -177,8 +199,13 @@ static status parse(struct fiber_set *f, const char *data, size_t n_bytes, const
             radius_sum = 0.0;
         }
         if (kind == LINE_END) return STATUS_OK;
-        if (kind == LINE_BLANK) continue;
-        if (kind == LINE_TOO_LONG || !parse_point(line, &p)) return wrong_line(name, r.i_line, false, err);
+        if (kind == LINE_BLANK || kind == LINE_COMMENT) continue;
+        if (kind == LINE_TOO_LONG || !parse_point(line, 1e3 * radius_m, &p))
+            return wrong_line(name, r.i_line, false, err);
+        if (n_vertex == 0) with_radius = p.has_radius;
+        if (p.has_radius != with_radius) return wrong_line(name, r.i_line, false, err);
+        status s = check_radius(&p, radius_m, name, err);
+        if (s != STATUS_OK) return s;
         if (inside && p.group != f->group[i_fiber]) return wrong_line(name, r.i_line, true, err);
         f->group[i_fiber] = p.group;
         for (size_t a = 0; a < 3; a++) f->position_m[3 * n_vertex + a] = (float)(1e-3 * p.value[a]);
@@ -189,7 +216,7 @@ static status parse(struct fiber_set *f, const char *data, size_t n_bytes, const
     }
 }
 
-status fiber_set_read_text(struct fiber_set *f, const char *path, struct error *err)
+status fiber_import_text(struct fiber_set *f, const char *path, const struct fiber_file_terms *terms, struct error *err)
 {
     char *data = NULL;
     size_t n_bytes = 0, n_fiber = 0;
@@ -203,7 +230,8 @@ status fiber_set_read_text(struct fiber_set *f, const char *path, struct error *
         s = error_set(err, STATUS_FORMAT, "cannot read fibers '%s': it has no fiber", path_file_name(path));
     if (s == STATUS_OK) s = fiber_set_reserve(&read, n_fiber, n_vertex, err);
     if (s == STATUS_OK) s = fiber_set_add_shapes(&read, err);
-    if (s == STATUS_OK) s = parse(&read, data, n_bytes, path_file_name(path), &shaped, err);
+    const struct line_reader first = first_line(data, n_bytes);
+    if (s == STATUS_OK) s = parse(&read, &first, terms->radius_m, path_file_name(path), &shaped, err);
     if (!shaped) {
         free(read.shape);
         read.shape = NULL;

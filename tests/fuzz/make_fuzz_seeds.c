@@ -8,6 +8,7 @@
 #include "tests/support/camera_files.h"
 #include "tests/support/rgl_bytes.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -104,6 +105,10 @@ static void header_seeds(void)
 
 static void fiber_seeds(void)
 {
+    static const float mitsuba[] = {INFINITY, 0, 0, 1, 0, 1, 1};
+    uint8_t binary[15 + sizeof mitsuba] = "BINARY_HAIR\2"; /* two points */
+    memcpy(binary + 15, mitsuba, sizeof mitsuba);
+    put("hair", "mitsuba.hair", "", binary, sizeof binary);
     put("obj", "square.obj",
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 2 0\nvt 2 2\nvt 0 2\nf 1/1 2/2 3/3 4/4\nf -4/-4 -2/-2/1 "
         "-1/-1\n",

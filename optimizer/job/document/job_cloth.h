@@ -20,8 +20,9 @@ struct job_cloth_yarn {
 struct job_cloth {
     char sample[JOB_MAX_SAMPLE_BYTES]; /* name of the cloth for people */
     char fiber_file[JOB_MAX_NAME_BYTES];
-    double tile_mm[2]; /* NaN: from the file */
-    double voxel_um;   /* NaN: chosen from the radius */
+    double fiber_radius_um; /* of fiber files that state none; NaN: not given */
+    double tile_mm[2];      /* NaN: from the file */
+    double voxel_um;        /* NaN: chosen from the radius */
     /* The section "cloth" as given; `description` is the checked description, NULL without the section. */
     char weave[16];
     char texture[JOB_MAX_NAME_BYTES]; /* photograph that shows the weave; "" when none is given */

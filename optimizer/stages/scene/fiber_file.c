@@ -1,5 +1,6 @@
 #include "optimizer/stages/scene/fiber_file.h"
 #include "base/option_id.h"
+#include "geometry/fibers/fiber_import.h"
 #include "optimizer/job/options/option_key.h"
 
 #include <math.h>
@@ -26,15 +27,27 @@ static status check_radii(const struct fiber_set *f, const char *name, struct er
     return STATUS_OK;
 }
 
-status fiber_file_read(const char *path, const struct job_cloth *cloth, struct fiber_set *f, struct error *err)
+/* States in the ledger which tile is taken. */
+static void note_tile(const struct fiber_set *f, const struct job_cloth *cloth, struct file_ledger *ledger)
 {
-    const char *name = cloth->fiber_file, *dot = strrchr(name, '.');
-    bool text = dot != NULL && strcmp(dot, ".txt") == 0;
-    status s = text ? fiber_set_read_text(f, path, err) : fiber_set_read_hair(f, path, err);
+    const double *tile_m = f->tile_size_m;
+    const bool given = !isnan(cloth->tile_mm[0]);
+    if (tile_m[0] > 0.0)
+        file_ledger_add(ledger, "tile", given ? "the job states it" : NULL, "%g x %g mm", tile_m[0] / mm,
+                        tile_m[1] / mm);
+}
+
+status fiber_file_read(const char *path, const struct job_cloth *cloth, struct fiber_set *f, struct file_ledger *ledger,
+                       struct error *err)
+{
+    const char *name = cloth->fiber_file;
+    const struct fiber_file_terms terms = {.radius_m = cloth->fiber_radius_um * um, .ledger = ledger};
+    status s = fiber_import(f, path, &terms, err);
     if (s != STATUS_OK) {
-        if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_FIBER_FILE);
+        if (err != NULL && err->field[0] == '\0') snprintf(err->field, sizeof err->field, OPTION_FIBER_FILE);
         return s;
     }
+    note_tile(f, cloth, ledger);
     for (int a = 0; a < 2; a++)
         if (!isnan(cloth->tile_mm[a])) f->tile_size_m[a] = cloth->tile_mm[a] * mm;
     if (!(f->tile_size_m[0] > 0.0 && f->tile_size_m[1] > 0.0))

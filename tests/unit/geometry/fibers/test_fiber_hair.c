@@ -231,8 +231,8 @@ static void test_no_thickness_is_an_error(void **state)
     struct error err;
     fiber_set_init(&f);
     scratch_write(path, data, other_program(data, 3, 0.0f));
-    assert_int_equal(fiber_set_read_hair(&f, path, &err), STATUS_FORMAT);
-    assert_non_null(strstr(err.text, "thickness"));
+    assert_int_equal(fiber_set_read_hair(&f, path, &err), STATUS_INVALID);
+    assert_non_null(strstr(err.text, "states no radius"));
     fiber_set_release(&f);
 }
 

@@ -160,6 +160,21 @@ static void test_text_of_other_programs(void **state)
     fiber_set_release(&f);
 }
 
+/* A comment does not end a fiber; a byte order mark is no number. */
+static void test_comments_of_text(void **state)
+{
+    static const char text[] =
+        "\xef\xbb\xbf# x y z radius\n0 0 0 1\n  # between\r\n0 0 1 1 # 3\n\n#\n0 0 0 2#\n0 0 1 2\n# the end";
+    struct fiber_set f;
+    struct error err = {0};
+    fiber_set_init(&f);
+    if (read_text(state, text, sizeof text - 1, &f, &err) != STATUS_OK) fail_msg("%s", err.text);
+    assert_int_equal(f.n_fiber, 2);
+    assert_int_equal(f.n_vertex, 4);
+    assert_true(fabsf(f.radius_m[1] - 2e-3f) < 1e-9f);
+    fiber_set_release(&f);
+}
+
 static void test_text_errors_name_the_line(void **state)
 {
     static const struct {
@@ -181,7 +196,7 @@ static void test_text_errors_name_the_line(void **state)
         {"0 0 0 1\n0 0 1 inf\n", "line 2"},
         {"0 0 0 1\n0 0 1 0\n", "line 2"},
         {"0 0 0 1\n0 0 1 -1\n", "line 2"},
-        {"# comment\n0 0 0 1\n0 0 1 1\n", "line 1"},
+        {"# comment\n0 0 0 x\n0 0 1 1\n", "line 2"},
         {"0 0 0 1\n0 0 1e999 1\n", "line 2"},
     };
     struct fiber_set f = two_fibers();
@@ -210,6 +225,7 @@ int main(void)
         cmocka_unit_test(test_text_round_trip),
         cmocka_unit_test(test_text_keeps_groups),
         cmocka_unit_test(test_text_of_other_programs),
+        cmocka_unit_test(test_comments_of_text),
         cmocka_unit_test(test_text_errors_name_the_line),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
