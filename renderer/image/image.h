@@ -20,7 +20,8 @@ void image_release(struct image *im);
 
 /* OpenEXR scan-line file, 32-bit float, uncompressed, through OpenEXRCore. */
 status image_write_exr(const struct image *im, const char *path, struct error *err);
-/* Reads R, G, B (or Y, copied to all three) of half or float, scan-line or single-level tiled, into n_channel = 3.
+/* Reads R, G, B (or Y, copied to all three) of half or float, scan-line or single-level tiled, into n_channel = 3, and
+ * turns the primaries that the file states into Rec. 709 (color_primaries.h; image_exr.h reads them as they are).
  * STATUS_FORMAT naming file and reason for missing channels, deep data, truncation; at most limit_pixel pixels
  * (STATUS_TOO_LARGE). */
 status image_read_exr(struct image *im, const char *path, size_t limit_pixel, struct error *err);

@@ -1,4 +1,4 @@
-#include "renderer/image/image.h"
+#include "renderer/image/image_exr.h"
 
 #include <OpenEXR/openexr.h>
 #include <errno.h>
@@ -144,6 +144,8 @@ struct reader {
     exr_storage_t storage;
     const char *prefix; /* of the names of the channels: "" or "var." */
     bool grey;
+    uint8_t *rest; /* room for a chunk of a channel that is not wanted */
+    size_t rest_bytes;
 };
 
 static const char channel_letter[] = "RGBY";
@@ -162,12 +164,23 @@ static status refuse(const struct reader *rd, struct error *err, const char *why
     return error_set(err, STATUS_FORMAT, "cannot read image '%s': %s", rd->path, why);
 }
 
+static bool has_channel(const exr_attr_chlist_t *list, const char *name)
+{
+    for (int i = 0; i < list->num_channels; i++)
+        if (strcmp(list->entries[i].name.str, name) == 0) return true;
+    return false;
+}
+
 static status check_channels(struct reader *rd, struct error *err)
 {
     const exr_attr_chlist_t *list = NULL;
     if (exr_get_channels(rd->file, 0, &list) != EXR_ERR_SUCCESS || list == NULL)
         return refuse(rd, err, "it has no list of channels");
     bool have[4] = {false, false, false, false};
+    if (has_channel(list, "RY") || has_channel(list, "BY"))
+        return refuse(rd, err, "it holds luminance and chroma (channels Y, RY, BY): save it as RGB");
+    if (has_channel(list, "X") && has_channel(list, "Y") && has_channel(list, "Z"))
+        return refuse(rd, err, "it holds tristimulus values (channels X, Y, Z): save it as RGB");
     for (int i = 0; i < list->num_channels; i++) {
         const exr_attr_chlist_entry_t *e = &list->entries[i];
         int which = letter_index(rd, e->name.str);
@@ -212,6 +225,25 @@ static status read_header(struct reader *rd, size_t limit_pixel, struct error *e
     return check_channels(rd, err);
 }
 
+/* A channel that is not wanted is decoded all the same: the routines of OpenEXRCore 3.1.5 for three half channels write
+ * through its pointer without asking whether there is one. */
+static bool decode_unwanted(struct reader *rd, exr_coding_channel_info_t *c)
+{
+    const size_t sample = (size_t)c->bytes_per_element, bytes = (size_t)c->width * (size_t)c->height * sample;
+    if (bytes > rd->rest_bytes) {
+        uint8_t *larger = realloc(rd->rest, bytes);
+        if (larger == NULL) return false;
+        rd->rest = larger;
+        rd->rest_bytes = bytes;
+    }
+    c->user_bytes_per_element = c->bytes_per_element;
+    c->user_data_type = c->data_type;
+    c->user_pixel_stride = (int32_t)sample;
+    c->user_line_stride = (int32_t)((size_t)c->width * sample);
+    c->decode_to_ptr = rd->rest;
+    return true;
+}
+
 /* Decodes one chunk whose top left pixel is (x, y) of the image. Outputs beyond the image cannot happen: sizes are
  * checked. */
 static exr_result_t decode_chunk(struct reader *rd, exr_decode_pipeline_t *decoder, const exr_chunk_info_t *chunk,
@@ -227,7 +259,7 @@ static exr_result_t decode_chunk(struct reader *rd, exr_decode_pipeline_t *decod
         exr_coding_channel_info_t *c = &decoder->channels[k];
         int which = letter_index(rd, c->channel_name);
         bool wanted = rd->grey ? which == 3 : which >= 0 && which < 3;
-        c->decode_to_ptr = NULL;
+        if (!wanted && !decode_unwanted(rd, c)) return EXR_ERR_OUT_OF_MEMORY;
         if (!wanted) continue;
         size_t channel = rd->grey ? 0 : (size_t)which;
         c->user_bytes_per_element = sizeof(float);
@@ -271,8 +303,24 @@ static exr_result_t read_tiles(struct reader *rd, exr_decode_pipeline_t *decoder
     return r;
 }
 
+static status read_pixels(struct reader *rd, struct error *err)
+{
+    exr_decode_pipeline_t decoder = EXR_DECODE_PIPELINE_INITIALIZER;
+    bool first = true;
+    status st = image_init(rd->im, (size_t)rd->width, (size_t)rd->height, 3, err);
+    if (st != STATUS_OK) return st;
+    exr_result_t r =
+        rd->storage == EXR_STORAGE_TILED ? read_tiles(rd, &decoder, &first) : read_scanlines(rd, &decoder, &first);
+    if (!first) exr_decoding_destroy(rd->file, &decoder);
+    if (r != EXR_ERR_SUCCESS) return refuse(rd, err, reason(&rd->note, r));
+    float *p = rd->im->pixel;
+    for (size_t i = 0; rd->grey && i < rd->im->width * rd->im->height; i++) p[3 * i + 1] = p[3 * i + 2] = p[3 * i];
+    return STATUS_OK;
+}
+
+/* said: NULL, or the place for the statements of the file. */
 static status read_channels(struct image *im, const char *path, const char *prefix, size_t limit_pixel,
-                            struct error *err)
+                            struct exr_statements *said, struct error *err)
 {
     struct reader rd = {.im = im, .path = path, .prefix = prefix};
     memset(im, 0, sizeof *im);
@@ -281,28 +329,35 @@ static status read_channels(struct image *im, const char *path, const char *pref
     exr_result_t r = exr_start_read(&rd.file, path, &init);
     if (r != EXR_ERR_SUCCESS) return refuse(&rd, err, reason(&rd.note, r));
     status st = read_header(&rd, limit_pixel, err);
-    if (st == STATUS_OK) st = image_init(im, (size_t)rd.width, (size_t)rd.height, 3, err);
-    if (st == STATUS_OK) {
-        exr_decode_pipeline_t decoder = EXR_DECODE_PIPELINE_INITIALIZER;
-        bool first = true;
-        r = rd.storage == EXR_STORAGE_TILED ? read_tiles(&rd, &decoder, &first) : read_scanlines(&rd, &decoder, &first);
-        if (!first) exr_decoding_destroy(rd.file, &decoder);
-        if (r != EXR_ERR_SUCCESS) st = refuse(&rd, err, reason(&rd.note, r));
-    }
-    if (st == STATUS_OK && rd.grey)
-        for (size_t i = 0; i < im->width * im->height; i++)
-            im->pixel[3 * i + 1] = im->pixel[3 * i + 2] = im->pixel[3 * i];
+    if (st == STATUS_OK) st = read_pixels(&rd, err);
+    if (st == STATUS_OK && said != NULL) exr_statements_read(rd.file, said);
     if (st != STATUS_OK) image_release(im);
+    free(rd.rest);
     exr_finish(&rd.file);
     return st;
 }
 
+status image_read_exr_stated(struct image *im, const char *path, size_t limit_pixel, struct exr_statements *said,
+                             struct error *err)
+{
+    return read_channels(im, path, "", limit_pixel, said, err);
+}
+
 status image_read_exr(struct image *im, const char *path, size_t limit_pixel, struct error *err)
 {
-    return read_channels(im, path, "", limit_pixel, err);
+    struct exr_statements said;
+    double matrix[9];
+    status st = read_channels(im, path, "", limit_pixel, &said, err);
+    if (st != STATUS_OK || !said.has_primaries) return st;
+    if (!color_primaries_matrix(&said.primaries, matrix)) {
+        image_release(im);
+        return error_set(err, STATUS_FORMAT, "cannot read image '%s': its chromaticities are no primaries", path);
+    }
+    if (!color_matrix_is_identity(matrix)) image_apply_matrix(im, matrix);
+    return STATUS_OK;
 }
 
 status image_read_exr_variance(struct image *im, const char *path, size_t limit_pixel, struct error *err)
 {
-    return read_channels(im, path, "var.", limit_pixel, err);
+    return read_channels(im, path, "var.", limit_pixel, NULL, err);
 }

@@ -10,7 +10,7 @@
  * follow. */
 status integer_samples_declare(const char *path, const struct photograph_request *q, unsigned bits,
                                struct photograph_info *info, struct error *err);
-/* Light of each of the 2^bits sample values, 1 for the largest; bits is 8 or 16. The caller frees it; NULL without
+/* Light of each of the 2^bits sample values, 1 for the largest. The caller frees it; NULL without
  * memory. IEC 61966-2-1 for sRGB. */
 float *integer_samples_curve(const struct photograph_request *q, const struct photograph_info *info);
 /* STATUS_UNSUPPORTED for a picture that is transparent somewhere. */

@@ -1,6 +1,7 @@
 #include "optimizer/photographs/reader/photograph_reader.h"
 
 #include "base/files/durable.h"
+#include "renderer/image/color_primaries.h"
 
 #include <ctype.h>
 #include <math.h>
@@ -73,5 +74,8 @@ status photograph_file_read(const char *path, const struct photograph_request *q
             "the right suffix",
             path_file_name(path), named->title, found->title);
     info->format = found->title;
-    return found->read(path, q, im, info, err);
+    s = found->read(path, q, im, info, err);
+    if (s == STATUS_OK && info->to_rec709[0] != 0.0 && !color_matrix_is_identity(info->to_rec709))
+        image_apply_matrix(im, info->to_rec709);
+    return s;
 }

@@ -33,6 +33,9 @@ struct photograph_info {
     double exposure_s, iso, aperture; /* NaN: not stated. aperture is the f-number */
     double black_level;               /* the subtracted level, in the file's values */
     double full_scale;                /* file values from black to saturation, which are 1 in the image; 1 for float */
+    unsigned orientation;             /* of Exif and TIFF, 1 to 8; 0: not stated */
+    unsigned exif_color_space;        /* 1: sRGB, 2: Adobe RGB, 65535: uncalibrated; 0: not stated */
+    double to_rec709[9];              /* from the file's primaries, row-major; all 0 where it states none */
     char camera[96];                  /* maker and model; "": not stated */
     struct file_ledger ledger;        /* every statement of the file, also those above */
 };

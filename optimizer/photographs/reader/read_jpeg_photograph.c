@@ -62,7 +62,7 @@ static void take_exif(const struct jpeg_decompress_struct *jpeg, struct photogra
 {
     for (const struct jpeg_marker_struct *m = jpeg->marker_list; m != NULL; m = m->next)
         if (m->marker == JPEG_APP0 + 1 && m->data_length > 6 && memcmp(m->data, "Exif\0\0", 6) == 0)
-            exif_read(m->data + 6, m->data_length - 6, info);
+            exif_read_bytes(m->data, m->data_length, info);
 }
 
 /* The state that outlives the longjmp. */

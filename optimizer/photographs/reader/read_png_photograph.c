@@ -1,5 +1,6 @@
-/* 8/16-bit PNG through libpng. Its longjmp stays in this file. */
+/* PNG through libpng. Its longjmp stays in this file. */
 #include "base/files/durable.h"
+#include "optimizer/photographs/reader/exif.h"
 #include "optimizer/photographs/reader/integer_samples.h"
 
 #include <png.h>
@@ -30,9 +31,13 @@ static bool recognise(const uint8_t first[PHOTOGRAPH_FIRST_BYTES])
     return memcmp(first, "\x89PNG\r\n\x1a\n", 8) == 0;
 }
 
-/* Channel c of pixel x of a row that holds grey or rgb, with or without alpha. */
+/* Channel c of pixel x of a row that holds grey or rgb, with or without alpha. Grey may have 1, 2 or 4 bits. */
 static unsigned sample(const png_byte *row, unsigned depth, size_t x, size_t c, size_t n_channel)
 {
+    if (depth < 8) {
+        const size_t bit = x * depth;
+        return row[bit / 8] >> (8 - depth - bit % 8) & ((1u << depth) - 1);
+    }
     const png_byte *p = row + (n_channel * x + c) * (depth / 8);
     return depth == 16 ? (unsigned)p[0] << 8 | p[1] : p[0];
 }
@@ -41,7 +46,7 @@ static status convert(png_structp png, png_infop info, const float *light, struc
                       struct error *err)
 {
     png_bytepp row = png_get_rows(png, info);
-    unsigned depth = png_get_bit_depth(png, info), largest = depth == 16 ? 65535 : 255;
+    unsigned depth = png_get_bit_depth(png, info), largest = (1u << depth) - 1;
     size_t n = png_get_channels(png, info), n_color = n <= 2 ? 1 : 3;
     for (size_t y = 0; y < im->height; y++) {
         for (size_t x = 0; x < im->width; x++) {
@@ -77,17 +82,21 @@ static status check_size(FILE *f, const char *name, size_t limit_pixel, struct e
     return STATUS_OK;
 }
 
+static void take_exif(png_structp png, png_infop png_info, struct photograph_info *info)
+{
+    png_uint_32 n = 0;
+    png_bytep exif = NULL;
+    if (png_get_eXIf_1(png, png_info, &n, &exif) != 0 && exif != NULL) exif_read_bytes(exif, n, info);
+}
+
 /* Converts the rows that libpng has read. */
 static status take_rows(png_structp png, png_infop png_info, const char *path, const struct photograph_request *q,
                         struct image *im, struct photograph_info *info, struct error *err)
 {
     if (png_get_color_type(png, png_info) == PNG_COLOR_TYPE_PALETTE) return integer_samples_palette(path, err);
-    if (png_get_bit_depth(png, png_info) < 8)
-        return error_set(err, STATUS_UNSUPPORTED,
-                         "cannot use photograph '%s': it has %d bits in a sample, allowed are 8 and 16",
-                         path_file_name(path), png_get_bit_depth(png, png_info));
+    take_exif(png, png_info, info);
     info->has_alpha = (png_get_color_type(png, png_info) & PNG_COLOR_MASK_ALPHA) != 0;
-    status s = integer_samples_declare(path, q, png_get_bit_depth(png, png_info) == 16 ? 16 : 8, info, err);
+    status s = integer_samples_declare(path, q, png_get_bit_depth(png, png_info), info, err);
     if (s != STATUS_OK) return s;
     float *light = integer_samples_curve(q, info);
     if (light == NULL)
@@ -119,7 +128,7 @@ static status read_png(const char *path, const struct photograph_request *q, str
         s = error_set(err, STATUS_FORMAT, "cannot read photograph '%s': %s", name, failure.text);
     } else {
         png_init_io(png, f);
-        png_read_png(png, png_info, PNG_TRANSFORM_PACKING, NULL);
+        png_read_png(png, png_info, PNG_TRANSFORM_IDENTITY, NULL);
         s = take_rows(png, png_info, path, q, im, info, err);
     }
     if (png != NULL) png_destroy_read_struct(&png, png_info != NULL ? &png_info : NULL, NULL);

@@ -2,6 +2,7 @@
  * interleaved or in planes; the first page counts, and more pages are an error. */
 #include "base/files/durable.h"
 #include "geometry/volume/format/tiff_page.h"
+#include "optimizer/photographs/reader/exif.h"
 #include "optimizer/photographs/reader/integer_samples.h"
 
 #include <math.h>
@@ -114,16 +115,12 @@ static status read_header(struct tiff_photograph *t, const struct photograph_req
     return STATUS_OK;
 }
 
-static void take_metadata(TIFF *tiff, struct photograph_info *info)
+static void take_metadata(const struct tiff_photograph *t, struct photograph_info *info)
 {
-    uint64_t folder = 0;
-    float value = 0.0f;
-    uint16_t n_iso = 0, *iso = NULL;
-    if (!TIFFGetField(tiff, TIFFTAG_EXIFIFD, &folder) || !TIFFReadEXIFDirectory(tiff, folder)) return;
-    if (TIFFGetField(tiff, EXIFTAG_EXPOSURETIME, &value) && value > 0.0f) info->exposure_s = (double)value;
-    if (TIFFGetField(tiff, EXIFTAG_FNUMBER, &value) && value > 0.0f) info->aperture = (double)value;
-    if (TIFFGetField(tiff, EXIFTAG_ISOSPEEDRATINGS, &n_iso, &iso) && n_iso > 0 && iso != NULL && iso[0] > 0)
-        info->iso = iso[0];
+    FILE *file = fopen(t->path, "rbe");
+    if (file == NULL) return;
+    exif_read(file, info);
+    fclose(file);
 }
 
 /* Sample i of a row as light; alpha: as stored. */
@@ -199,7 +196,7 @@ static status decode(struct tiff_photograph *t, const struct photograph_request 
     if (s == STATUS_OK) s = read_rows(t, light, im, err);
     if (s == STATUS_OK && !info->encoded && info->black_level != 0.0)
         for (size_t i = 0; i < im->width * im->height * 3; i++) im->pixel[i] -= (float)info->black_level;
-    if (s == STATUS_OK) take_metadata(t->tiff, info);
+    if (s == STATUS_OK) take_metadata(t, info);
     if (s != STATUS_OK) image_release(im);
     free(light);
     return s;

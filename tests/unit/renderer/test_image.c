@@ -7,6 +7,7 @@
 #include <png.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -196,6 +197,54 @@ static void exr_half_tiled_grey(void **state)
     }
 }
 
+/* Half channels of other names beside the wanted ones: every set of up to four names of which some picture can be
+ * read. */
+static void exr_other_channels(void **state)
+{
+    (void)state;
+    static const char *const name[] = {"A", "B", "G", "R", "Y", "Z", "a", "n"};
+    const unsigned all = sizeof name / sizeof *name;
+    int n_read = 0;
+    for (unsigned set = 1; set < 1u << all; set++) {
+        const char *in[8];
+        int n = 0, at[5] = {-1, -1, -1, -1, -1};
+        for (unsigned i = 0; i < all; i++) {
+            if (!(set >> i & 1)) continue;
+            if (i >= 1 && i <= 4) at[i] = n;
+            in[n++] = name[i];
+        }
+        const bool rgb = at[1] >= 0 && at[2] >= 0 && at[3] >= 0, grey = at[4] >= 0 && at[1] + at[2] + at[3] == -3;
+        if (n > 5 || (!rgb && !grey)) continue;
+        for (int tile = 0; tile <= 8; tile += 8) {
+            struct image im;
+            struct error err = {0};
+            write_half(path_of("a.exr"), in, n, 21, 13, tile);
+            if (image_read_exr(&im, path_of("a.exr"), LIMIT, &err) != STATUS_OK) fail_msg("set %u: %s", set, err.text);
+            for (size_t i = 0; i < 21 * 13 * 3; i++)
+                assert_true(im.pixel[i] == (float)(i / 3 % 21) + 0.5f * (float)(i / 63) +
+                                               0.25f * (float)(rgb ? at[3 - i % 3] : at[4]));
+            image_release(&im);
+            n_read++;
+        }
+    }
+    assert_true(n_read > 60);
+}
+
+/* Channels whose names say that they are no rgb. */
+static void exr_of_other_colors(void **state)
+{
+    (void)state;
+    static const char *const yc[3] = {"BY", "RY", "Y"}, *const xyz[3] = {"X", "Y", "Z"};
+    struct image im;
+    struct error err = {0};
+    write_half(path_of("a.exr"), yc, 3, 21, 13, 0);
+    assert_int_equal(image_read_exr(&im, path_of("a.exr"), LIMIT, &err), STATUS_FORMAT);
+    assert_non_null(strstr(err.text, "luminance and chroma"));
+    write_half(path_of("a.exr"), xyz, 3, 21, 13, 8);
+    assert_int_equal(image_read_exr(&im, path_of("a.exr"), LIMIT, &err), STATUS_FORMAT);
+    assert_non_null(strstr(err.text, "tristimulus"));
+}
+
 static void bad_files(void **state)
 {
     (void)state;
@@ -273,8 +322,10 @@ static void png_is_srgb(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(exr_round_trip),      cmocka_unit_test(exr_variances), cmocka_unit_test(exr_noise_survives),
-        cmocka_unit_test(exr_half_tiled_grey), cmocka_unit_test(bad_files),     cmocka_unit_test(truncated_and_damaged),
+        cmocka_unit_test(exr_round_trip),     cmocka_unit_test(exr_variances),
+        cmocka_unit_test(exr_noise_survives), cmocka_unit_test(exr_half_tiled_grey),
+        cmocka_unit_test(exr_other_channels), cmocka_unit_test(exr_of_other_colors),
+        cmocka_unit_test(bad_files),          cmocka_unit_test(truncated_and_damaged),
         cmocka_unit_test(png_is_srgb),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
