@@ -4,7 +4,7 @@
  * to lower its noise without blurring thin walls (along_smooth.h), and f(x) the smallest possible maximum of g over the
  * ways from x to the outside (the reconstruction of g by erosion, Vincent 1993). f - g is the depth of the basin that x
  * lies in; at the faces of the scan, where fibers are cut, ways end. Basins deeper than the noise are filled. Enclosed
- * gaps between fibers are basins too; lumen_sift.h empties most of them again, in scans of fibers known to be hollow.
+ * gaps between fibers are basins too; lumen_filter.h empties most of them again, in scans of fibers known to be hollow.
  */
 #ifndef SELVEDGE_GEOMETRY_LUMEN_FILL_H
 #define SELVEDGE_GEOMETRY_LUMEN_FILL_H

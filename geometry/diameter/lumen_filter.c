@@ -14,7 +14,7 @@ static const double DIAMETER_OVER_SIGMA = 3.5, MARGIN_SIGMA = 3.0;
 static const float LEAST_RESPONSE[N_ROUND] = {0.05f, 0.08f};
 
 /* The basins as lists over the filled voxels: the response there, and the basin as the place of one of its voxels. */
-struct sift {
+struct basin_filter {
     struct volume *v;
     double sigma;
     size_t margin, n_brick[3];
@@ -31,7 +31,7 @@ static size_t find_basin(size_t *basin, size_t i)
 
 /* Unites the voxels that share a face. The list is in the order of the voxels, so each of the three neighbours before a
  * voxel moves along the list with it. */
-static void unite_basins(const struct sift *s)
+static void unite_basins(const struct basin_filter *s)
 {
     const struct volume_filled *f = &s->v->filled;
     const size_t *n = s->v->n, step[3] = {1, n[0], n[0] * n[1]}, n_line[3] = {n[0], n[1], n[2]};
@@ -62,7 +62,7 @@ static size_t first_from(const struct volume_filled *f, size_t voxel)
 }
 
 /* Writes the response of the filled voxels of one row inside of a brick. a: the blurred brick from `from`, of n. */
-static void respond_row(const struct sift *s, const float *a, const size_t from[3], const size_t n[3],
+static void respond_row(const struct basin_filter *s, const float *a, const size_t from[3], const size_t n[3],
                         const size_t row[4])
 {
     const struct volume_filled *f = &s->v->filled;
@@ -78,7 +78,7 @@ static void respond_row(const struct sift *s, const float *a, const size_t from[
 
 static void respond_brick(void *context, size_t i_brick, size_t i_thread)
 {
-    const struct sift *s = context;
+    const struct basin_filter *s = context;
     const struct volume *v = s->v;
     const size_t c[3] = {i_brick % s->n_brick[0], i_brick / s->n_brick[0] % s->n_brick[1],
                          i_brick / (s->n_brick[0] * s->n_brick[1])};
@@ -108,7 +108,7 @@ static void respond_brick(void *context, size_t i_brick, size_t i_thread)
 }
 
 /* Fills the basins whose mean response is large enough, and empties the others. *n_kept: voxels in them. */
-static status sift_round(struct sift *s, float least, struct thread_pool *pool, size_t *n_kept)
+static status filter_round(struct basin_filter *s, float least, struct thread_pool *pool, size_t *n_kept)
 {
     const struct volume_filled *f = &s->v->filled;
     const status st = thread_pool_run(pool, s->n_brick[0] * s->n_brick[1] * s->n_brick[2], respond_brick, s, NULL);
@@ -127,7 +127,7 @@ static status sift_round(struct sift *s, float least, struct thread_pool *pool, 
 enum { FILLED = 1, RIM = 2 };
 
 /* Marks the basins that are kept and the voxels beside them. mark: zeros for all voxels. */
-static void mark_lumens(const struct sift *s, uint8_t *mark)
+static void mark_lumens(const struct basin_filter *s, uint8_t *mark)
 {
     const struct volume_filled *f = &s->v->filled;
     const size_t *n = s->v->n, step[3] = {1, n[0], n[0] * n[1]};
@@ -149,11 +149,11 @@ static status new_array(const struct volume *v, size_t n_byte, void *array, stru
     return scratch_new(v->space, n_byte, "the lumens of fibers", array, err);
 }
 
-status lumens_sift(struct volume *v, double diameter_voxel, struct thread_pool *pool, double *filled_share,
-                   struct error *err)
+status lumens_filter(struct volume *v, double diameter_voxel, struct thread_pool *pool, double *filled_share,
+                     struct error *err)
 {
     const size_t n_before = v->filled.n;
-    struct sift s = {.v = v, .sigma = diameter_voxel / DIAMETER_OVER_SIGMA};
+    struct basin_filter s = {.v = v, .sigma = diameter_voxel / DIAMETER_OVER_SIGMA};
     void *array[4] = {NULL, NULL, NULL, NULL};
     size_t n_kept = 0;
     if (n_before == 0 || v->n[0] < 3 || v->n[1] < 3 || v->n[2] < 3) return STATUS_OK;
@@ -172,7 +172,7 @@ status lumens_sift(struct volume *v, double diameter_voxel, struct thread_pool *
         s.sum = array[2];
         unite_basins(&s);
     }
-    for (int r = 0; r < N_ROUND && st == STATUS_OK; r++) st = sift_round(&s, LEAST_RESPONSE[r], pool, &n_kept);
+    for (int r = 0; r < N_ROUND && st == STATUS_OK; r++) st = filter_round(&s, LEAST_RESPONSE[r], pool, &n_kept);
     if (st == STATUS_CANCELLED) error_set(err, st, "looking for lumens was cancelled");
     if (st == STATUS_OK) {
         memset(array[3], 0, volume_n_voxel(v->n));

@@ -6,8 +6,8 @@
  * scan. Basins with too small a mean are emptied. That is done twice, because filled gaps lower the response of the
  * lumens beside them. The walls next to the lumens that are left are filled by one voxel, because the rim of a lumen is
  * shallower than its basin has to be. */
-#ifndef SELVEDGE_GEOMETRY_LUMEN_SIFT_H
-#define SELVEDGE_GEOMETRY_LUMEN_SIFT_H
+#ifndef SELVEDGE_GEOMETRY_LUMEN_FILTER_H
+#define SELVEDGE_GEOMETRY_LUMEN_FILTER_H
 
 #include "base/thread_pool.h"
 #include "geometry/volume/volume.h"
@@ -15,7 +15,7 @@
 /* v: with v->filled of lumens_fill. diameter_voxel: of the fibers, as measured in v. *filled_share: the share of
  * lumens_fill, lowered to the voxels that stay filled. STATUS_CANCELLED, STATUS_NO_MEMORY; with a scratch space also
  * STATUS_DISK_FULL. */
-status lumens_sift(struct volume *v, double diameter_voxel, struct thread_pool *pool, double *filled_share,
-                   struct error *err);
+status lumens_filter(struct volume *v, double diameter_voxel, struct thread_pool *pool, double *filled_share,
+                     struct error *err);
 
 #endif

@@ -22,7 +22,7 @@ struct reconstruct_option {
      * or estimated, or voxels are not cubes: 2^30 by default. */
     size_t trim_above_voxel;
     double density_low, density_high; /* scanner values mapped to 0 and 1 */
-    /* Whether lumens are filled when the volume is read (lumen_sift.h): 0, 1, or -1 (default) where the evidence is
+    /* Whether lumens are filled when the volume is read (lumen_filter.h): 0, 1, or -1 (default) where the evidence is
      * clear; the decision is written back. */
     int hollow_fibers;
     double fiber_diameter_voxel; /* typical diameter, from which scales and reaches follow */

@@ -1,6 +1,6 @@
 /* Part of the step "volume": the lumens of hollow fibers are filled, so that their fibers are traced as solid ones.
  *
- * Void that is enclosed is filled first (lumen_fill.h, lumen_sift.h). Where diameters differ, that leaves most lumens
+ * Void that is enclosed is filled first (lumen_fill.h, lumen_filter.h). Where diameters differ, that leaves most lumens
  * of the thinnest fibers open: their walls are blurred to 0.6 to 0.8 of the density, and noise opens them somewhere.
  * Such fibers look like the background of touching fibers beside those that were filled. Once most others are traced
  * and subtracted (trace_leftover.c), they are seen. Lines are therefore traced here, the inner parts of their fibers
@@ -24,7 +24,7 @@ static status fill_enclosed(struct volume *v, double diameter_voxel, struct thre
     struct fiber_diameter d = {.voxel = diameter_voxel};
     status s = lumens_fill(v, report->noise.mapped_sd, pool, &report->lumen_share, err);
     if (s == STATUS_OK && isnan(diameter_voxel)) s = fiber_diameter_measure(v, pool, NULL, &d, err);
-    if (s == STATUS_OK) s = lumens_sift(v, d.voxel, pool, &report->lumen_share, err);
+    if (s == STATUS_OK) s = lumens_filter(v, d.voxel, pool, &report->lumen_share, err);
     return s;
 }
 

@@ -13,7 +13,7 @@
 
 #include <stdint.h>
 
-/* Voxels whose density was replaced by 1 because they lie in lumens (lumen_sift.h), by index, with their former
+/* Voxels whose density was replaced by 1 because they lie in lumens (lumen_filter.h), by index, with their former
  * densities. */
 struct volume_filled {
     size_t n, *voxel;

@@ -13,10 +13,10 @@ static const float ON_AXIS = 1e-3f; /* distance below which a voxel has no direc
 void axis_scratch_init(struct axis_scratch *s)
 {
     memset(s, 0, sizeof *s);
-    axis_claims_init(&s->claims);
+    nearest_segments_init(&s->nearest);
 }
 
-void axis_scratch_release(struct axis_scratch *s) { axis_claims_release(&s->claims); }
+void axis_scratch_release(struct axis_scratch *s) { nearest_segments_release(&s->nearest); }
 
 /* A segment, with the values that all voxels near it share. */
 struct axis_view {
@@ -142,7 +142,7 @@ static void subtract_lumen(const struct axis_model *m, struct axis_scratch *s, c
     for (size_t l = 0; l < p->n; l++) s->lumen[p->cell[l]] -= q.by_area[l];
 }
 
-/* Adds the claims of a segment to the model. */
+/* Adds the voxels of a segment to the model. */
 static void add_to_model(const struct axis_model *m, struct axis_scratch *s, const struct axis_view *w,
                          const uint16_t *cell, size_t n)
 {
@@ -168,7 +168,7 @@ static void add_to_model(const struct axis_model *m, struct axis_scratch *s, con
     }
 }
 
-/* Sums of axis_pull for the ends of a segment, and of section_pull. */
+/* Sums of axis_equation for the ends of a segment, and of section_equation. */
 struct segment_sum {
     lanes gradient[2][3], normal[2][6], radius_normal, radius_gradient, radius_cross[4];
     lanes section_gradient[2], section_normal[3];
@@ -275,9 +275,9 @@ static void add_places(const struct axis_model *m, const struct axis_scratch *s,
     sum->radius_cross[3] += weighted * v.share;
     for (int end = 0; end < 2; end++) {
         const lanes part = end == 0 ? (lanes)(1.0f - p->along) : p->along;
-        const lanes pull = part * d.slope * v.residual, hold = part * d.slope * d.slope * v.weight;
+        const lanes gradient = part * d.slope * v.residual, hold = part * d.slope * d.slope * v.weight;
         for (int a = 0, i = 0; a < 3; a++) {
-            sum->gradient[end][a] += pull * d.normal[a];
+            sum->gradient[end][a] += gradient * d.normal[a];
             for (int b = 0; b <= a; b++, i++) sum->normal[end][i] += hold * d.normal[a] * d.normal[b];
         }
     }
@@ -290,51 +290,51 @@ static void add_places(const struct axis_model *m, const struct axis_scratch *s,
     if (w->lumen != NULL) add_lumen(amplitude, &v, d.by_area, by, sum);
 }
 
-static void keep_lumen(const struct segment_sum *sum, struct lumen_pull *pull)
+static void keep_lumen(const struct segment_sum *sum, struct lumen_equation *equation)
 {
-    pull->normal = lanes_sum(sum->area_normal);
-    pull->gradient = lanes_sum(sum->area_gradient);
-    pull->by_radius = lanes_sum(sum->area_by_radius);
-    for (int i = 0; i < AXIS_N_SHARED; i++) pull->cross[i] = lanes_sum(sum->area_cross[i]);
-    pull->radius_shared = lanes_sum(sum->radius_shared);
+    equation->normal = lanes_sum(sum->area_normal);
+    equation->gradient = lanes_sum(sum->area_gradient);
+    equation->by_radius = lanes_sum(sum->area_by_radius);
+    for (int i = 0; i < AXIS_N_SHARED; i++) equation->cross[i] = lanes_sum(sum->area_cross[i]);
+    equation->radius_shared = lanes_sum(sum->radius_shared);
 }
 
-/* pull: of both ends. section: NULL for discs. */
-static void keep_sum(const struct segment_sum *sum, struct axis_pull *pull, struct section_pull *section)
+/* equation: of both ends. section: NULL for discs. */
+static void keep_sum(const struct segment_sum *sum, struct axis_equation *equation, struct section_equation *section)
 {
     for (int end = 0; end < 2; end++) {
-        for (int i = 0; i < 3; i++) pull[end].gradient[i] = lanes_sum(sum->gradient[end][i]);
-        for (int i = 0; i < 6; i++) pull[end].normal[i] = lanes_sum(sum->normal[end][i]);
+        for (int i = 0; i < 3; i++) equation[end].gradient[i] = lanes_sum(sum->gradient[end][i]);
+        for (int i = 0; i < 6; i++) equation[end].normal[i] = lanes_sum(sum->normal[end][i]);
     }
-    pull->radius_normal = lanes_sum(sum->radius_normal);
-    pull->radius_gradient = lanes_sum(sum->radius_gradient);
-    for (int i = 0; i < 4; i++) pull->radius_cross[i] = lanes_sum(sum->radius_cross[i]);
+    equation->radius_normal = lanes_sum(sum->radius_normal);
+    equation->radius_gradient = lanes_sum(sum->radius_gradient);
+    for (int i = 0; i < 4; i++) equation->radius_cross[i] = lanes_sum(sum->radius_cross[i]);
     if (section == NULL) return;
     for (int i = 0; i < 2; i++) section->gradient[i] = lanes_sum(sum->section_gradient[i]);
     for (int i = 0; i < 3; i++) section->normal[i] = lanes_sum(sum->section_normal[i]);
 }
 
-/* Adds the claims to the normal equations of the segments. */
-static void add_pulls(const struct axis_model *m, const struct axis_scratch *s, const struct claim_list *claims,
-                      size_t i_brick, const size_t from[3], const struct axis_brick_sum *sum)
+/* Adds the voxels of all segments to their normal equations. */
+static void add_equations(const struct axis_model *m, const struct axis_scratch *s, const struct nearest_list *nearest,
+                          size_t i_brick, const size_t from[3], const struct axis_brick_sum *sum)
 {
     const struct segment_bricks *b = m->bricks;
     for (size_t e = 0; e < b->first[i_brick + 1] - b->first[i_brick]; e++) {
-        const uint32_t i_segment = b->index[b->first[i_brick] + e], end = claims->first[e + 1];
+        const uint32_t i_segment = b->index[b->first[i_brick] + e], end = nearest->first[e + 1];
         const struct axis_view w = view_of(m, i_segment, from);
         struct segment_sum total = {0};
-        for (size_t i = claims->first[e]; i < end; i += LANES) {
+        for (size_t i = nearest->first[e]; i < end; i += LANES) {
             struct axis_places p;
-            find_places(&w, claims->cell + i, end - i, &p);
+            find_places(&w, nearest->cell + i, end - i, &p);
             add_places(m, s, &w, &p, &total);
         }
-        sum->pull[2 * e].segment = sum->pull[2 * e + 1].segment = i_segment;
-        keep_sum(&total, &sum->pull[2 * e], sum->section != NULL ? &sum->section[e] : NULL);
+        sum->equation[2 * e].segment = sum->equation[2 * e + 1].segment = i_segment;
+        keep_sum(&total, &sum->equation[2 * e], sum->section != NULL ? &sum->section[e] : NULL);
         if (sum->lumen != NULL) keep_lumen(&total, &sum->lumen[e]);
     }
 }
 
-static void forget_claims(struct axis_scratch *s, bool lumens)
+static void clear_model(struct axis_scratch *s, bool lumens)
 {
     for (size_t b = 0; b < AXIS_N_CELL / LANES; b++) {
         if (!s->touched[b]) continue;
@@ -344,16 +344,17 @@ static void forget_claims(struct axis_scratch *s, bool lumens)
     }
 }
 
-/* Finds the claims of a brick, or takes those that are kept. */
-static bool find_claims(const struct axis_model *m, size_t i_brick, struct axis_scratch *s, struct claim_list *claims)
+/* Finds the nearest segments in a brick, or takes them from the cache. */
+static bool find_nearest(const struct axis_model *m, size_t i_brick, struct axis_scratch *s,
+                         struct nearest_list *nearest)
 {
     struct segment_bricks of = *m->bricks;
-    if (m->claiming != NULL) of.segment = m->claiming;
-    if (m->claiming != NULL && m->store != NULL && claim_store_find(m->store, i_brick, claims)) return true;
-    if (!axis_claims_find(&s->claims, &of, m->section, m->claim_tail, i_brick)) return false;
-    *claims = (struct claim_list){s->claims.cell, s->claims.first};
-    if (m->claiming == NULL && m->store != NULL)
-        claim_store_add(m->store, i_brick, claims, of.first[i_brick + 1] - of.first[i_brick]);
+    if (m->nearest_of != NULL) of.segment = m->nearest_of;
+    if (m->nearest_of != NULL && m->store != NULL && nearest_cache_find(m->store, i_brick, nearest)) return true;
+    if (!nearest_segments_find(&s->nearest, &of, m->section, m->nearest_tail, i_brick)) return false;
+    *nearest = (struct nearest_list){s->nearest.cell, s->nearest.first};
+    if (m->nearest_of == NULL && m->store != NULL)
+        nearest_cache_add(m->store, i_brick, nearest, of.first[i_brick + 1] - of.first[i_brick]);
     return true;
 }
 
@@ -363,21 +364,21 @@ bool axis_brick_fit(const struct axis_model *model, size_t i_brick, struct axis_
     const size_t n_segment = b->first[i_brick + 1] - b->first[i_brick];
     size_t from[3], n[3];
     if (n_segment == 0) return true;
-    sum->pull = calloc(2 * n_segment, sizeof *sum->pull);
+    sum->equation = calloc(2 * n_segment, sizeof *sum->equation);
     if (model->section != NULL) sum->section = calloc(n_segment, sizeof *sum->section);
     if (model->lumen != NULL) sum->lumen = calloc(n_segment, sizeof *sum->lumen);
-    if (sum->pull == NULL || (model->section != NULL && sum->section == NULL) ||
+    if (sum->equation == NULL || (model->section != NULL && sum->section == NULL) ||
         (model->lumen != NULL && sum->lumen == NULL))
         return false;
-    struct claim_list claims;
-    if (!find_claims(model, i_brick, s, &claims)) return false;
+    struct nearest_list nearest;
+    if (!find_nearest(model, i_brick, s, &nearest)) return false;
     segment_brick_box(b, i_brick, from, n);
     for (size_t e = 0; e < n_segment; e++) {
         const struct axis_view w = view_of(model, b->index[b->first[i_brick] + e], from);
-        add_to_model(model, s, &w, claims.cell + claims.first[e], claims.first[e + 1] - claims.first[e]);
+        add_to_model(model, s, &w, nearest.cell + nearest.first[e], nearest.first[e + 1] - nearest.first[e]);
     }
     axis_compare(model, s, from, n, &sum->shared);
-    add_pulls(model, s, &claims, i_brick, from, sum);
-    forget_claims(s, model->lumen != NULL);
+    add_equations(model, s, &nearest, i_brick, from, sum);
+    clear_model(s, model->lumen != NULL);
     return true;
 }

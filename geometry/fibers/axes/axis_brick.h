@@ -13,9 +13,9 @@ void axis_scratch_release(struct axis_scratch *s);
 
 /* For the vertices of the brick's segments, and for the profile. */
 struct axis_brick_sum {
-    struct axis_pull *pull;       /* two for each segment of the brick, in the order of its list */
-    struct section_pull *section; /* one for each segment; NULL for discs */
-    struct lumen_pull *lumen;     /* one for each segment; NULL for solid fibers */
+    struct axis_equation *equation;   /* two for each segment of the brick, in the order of its list */
+    struct section_equation *section; /* one for each segment; NULL for discs */
+    struct lumen_equation *lumen;     /* one for each segment; NULL for solid fibers */
     struct shared_sum shared;
 };
 

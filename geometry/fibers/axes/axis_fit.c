@@ -43,21 +43,21 @@ static void state_error(double information, double variance, const double *stiff
 
 /* Data that a fit keeps from round to round. */
 struct fit_work {
-    uint32_t *first_vertex_of;     /* per segment */
-    struct axis_pull *total;       /* per vertex */
-    float *reach;                  /* per segment */
-    double *stiffness;             /* per vertex */
-    struct section_view *view;     /* per segment; NULL for discs, as the next */
-    struct section_pull *section;  /* per vertex */
-    struct lumen_view *lumen_view; /* per segment; NULL for solid fibers, as the next two */
-    struct lumen_pull *lumen;      /* per vertex: of the segment after it */
+    uint32_t *first_vertex_of;        /* per segment */
+    struct axis_equation *total;      /* per vertex */
+    float *reach;                     /* per segment */
+    double *stiffness;                /* per vertex */
+    struct section_view *view;        /* per segment; NULL for discs, as the next */
+    struct section_equation *section; /* per vertex */
+    struct lumen_view *lumen_view;    /* per segment; NULL for solid fibers, as the next two */
+    struct lumen_equation *lumen;     /* per vertex: of the segment after it */
     struct lumen_table *lumen_table;
     struct radius_sum *radius; /* per line */
     double *length;
     struct segment_bricks bricks; /* of the round */
-    struct segment *claiming;     /* segments of the round whose claims are used; NULL: this one */
-    struct claim_store store;
-    struct claim_rounds rounds;
+    struct segment *nearest_of;   /* segments of the round whose nearest segments are used; NULL: this one */
+    struct nearest_cache store;
+    struct nearest_rounds rounds;
     struct shared_sum shared;
     double hold;        /* of the sections to discs */
     double last_square; /* mean square of the residuals in the round before */
@@ -65,9 +65,9 @@ struct fit_work {
 
 static void release_round(struct fit_work *w)
 {
-    free(w->claiming);
-    w->claiming = NULL;
-    claim_store_release(&w->store);
+    free(w->nearest_of);
+    w->nearest_of = NULL;
+    nearest_cache_release(&w->store);
     segment_bricks_release(&w->bricks);
 }
 
@@ -85,7 +85,7 @@ static void release_work(struct fit_work *w)
     free(w->lumen_table);
     free(w->radius);
     free(w->length);
-    claim_rounds_release(&w->rounds);
+    nearest_rounds_release(&w->rounds);
 }
 
 static bool init_work(struct fit_work *w, const struct polyline_set *lines, bool with_sections, bool with_lumens)
@@ -121,7 +121,7 @@ static bool init_work(struct fit_work *w, const struct polyline_set *lines, bool
 }
 
 /* Adds the terms of a segment to the sections at its ends. */
-static void add_section(struct section_pull *ends, const struct section_pull *q)
+static void add_section(struct section_equation *ends, const struct section_equation *q)
 {
     for (int end = 0; end < 2; end++) {
         for (int i = 0; i < 3; i++) ends[end].normal[i] += 0.5f * q->normal[i];
@@ -130,9 +130,9 @@ static void add_section(struct section_pull *ends, const struct section_pull *q)
 }
 
 /* Adds the terms of a segment to the lumen of its line, and keeps them at its first vertex. */
-static void add_lumen(struct fit_work *w, uint32_t segment, const struct lumen_pull *q, struct radius_sum *r)
+static void add_lumen(struct fit_work *w, uint32_t segment, const struct lumen_equation *q, struct radius_sum *r)
 {
-    lumen_pull_add(&w->lumen[w->first_vertex_of[segment]], q);
+    lumen_equation_add(&w->lumen[w->first_vertex_of[segment]], q);
     r->area_normal += (double)q->normal;
     r->area_gradient += (double)q->gradient;
     r->area_by_radius += (double)q->by_radius;
@@ -173,10 +173,10 @@ static size_t first_from(const uint32_t *index, size_t n, uint32_t segment)
 static void add_segment(struct fit_work *w, const struct axis_brick_sum *sum, size_t e, uint32_t line)
 {
     struct radius_sum *r = &w->radius[line];
-    const uint32_t segment = sum->pull[2 * e].segment, vertex = w->first_vertex_of[segment];
+    const uint32_t segment = sum->equation[2 * e].segment, vertex = w->first_vertex_of[segment];
     for (uint32_t end = 0; end < 2; end++) {
-        const struct axis_pull *q = &sum->pull[2 * e + end];
-        axis_pull_add(&w->total[vertex + end], q);
+        const struct axis_equation *q = &sum->equation[2 * e + end];
+        axis_equation_add(&w->total[vertex + end], q);
         r->normal += (double)q->radius_normal;
         r->gradient += (double)q->radius_gradient;
         for (int a = 0; a < 4; a++) r->cross[a] += (double)q->radius_cross[a];
@@ -243,9 +243,9 @@ static status make_step(struct axis_batch *job, struct polyline_set *lines, stru
     w->hold = variance / (FLATNESS_SD * FLATNESS_SD);
     if (w->section != NULL)
         s = fiber_sections_solve(lines, w->section, SECTION_DIAMETERS * diameter, w->hold, profile->section, pool, err);
-    claim_rounds_before_step(&w->rounds, lines);
+    nearest_rounds_before_step(&w->rounds, lines);
     if (s == STATUS_OK) s = axis_solve_lines(lines, w->total, w->stiffness, correlation, pool, err);
-    claim_rounds_after_step(&w->rounds, lines);
+    nearest_rounds_after_step(&w->rounds, lines);
     return s;
 }
 
@@ -298,12 +298,12 @@ static status start_round(struct axis_model *m, const struct polyline_set *lines
     status s = STATUS_OK;
     if (m->v->slabs != NULL && m->profile.lumen == NULL) s = axis_share_round(m, lines, kind.follows, err);
     if (s != STATUS_OK) return s;
-    if (kind.follows) return axis_round_follow(m, lines, &w->bricks, &w->claiming, err);
+    if (kind.follows) return axis_round_follow(m, lines, &w->bricks, &w->nearest_of, err);
     release_round(w);
     s = axis_round_prepare(m, lines, m->v->n, w->view, w->reach, &w->bricks, err);
     m->store = NULL;
     if (s != STATUS_OK || !kind.is_followed) return s;
-    if (!claim_store_init(&w->store, segment_n_brick(&w->bricks), scratch_buffer_bytes(m->v->space)))
+    if (!nearest_cache_init(&w->store, segment_n_brick(&w->bricks), scratch_buffer_bytes(m->v->space)))
         return error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
     m->store = &w->store;
     return s;
@@ -362,19 +362,19 @@ status polylines_fit(struct polyline_set *lines, const struct volume *v, double 
         s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
     /* sections are left out, because their outlines change */
     if (s == STATUS_OK && profile->at_rest && profile->section == NULL &&
-        !claim_rounds_start(&work.rounds, lines->n_vertex))
+        !nearest_rounds_start(&work.rounds, lines->n_vertex))
         s = error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
     for (size_t l = 0; l < lines->n_line; l++)
         if (!(lines->radius[l] > 0.0f)) lines->radius[l] = (float)(0.5 * diameter_voxel);
     for (int round = 0; round < n_round && s == STATUS_OK; round++) {
         struct progress_part part = {progress, (double)round / n_round, 1.0 / n_round};
         const struct progress inner = progress_of_part(&part);
-        s = start_round(&job->model, lines, &work, claim_rounds_next(&work.rounds, round + 1 == n_round), err);
+        s = start_round(&job->model, lines, &work, nearest_rounds_next(&work.rounds, round + 1 == n_round), err);
         if (s == STATUS_OK) s = one_round(job, lines, &work, diameter_voxel, pool, &inner, err);
     }
     if (s == STATUS_OK) *profile = job->model.profile;
     if (s == STATUS_OK && n_round > 0 && profile->section != NULL && profile->measure != NULL) {
-        struct shape_sums sums = {.pull = work.total,
+        struct shape_sums sums = {.equation = work.total,
                                   .section = work.section,
                                   .sections = profile->section,
                                   .lumen = work.lumen,

@@ -24,22 +24,24 @@ struct axis_model {
     struct axis_profile profile;
     struct axis_table table;
     float tail, inverse_blur; /* tail: voxels beyond the radius up to which a fiber is modelled */
-    /* The claims are those of these segments, in the order of the bricks', up to claim_tail: the lines where they were
-     * some rounds before. NULL: those of the bricks. */
-    struct segment *claiming;
-    float claim_tail;
-    struct claim_store *store; /* keeps the claims of the bricks, or has those of `claiming`; may be NULL */
+    /* Segments of the lines where they were some rounds before, in the order of the bricks': voxels up to nearest_tail
+     * belong to the nearest of these. NULL: to the nearest of the bricks' own. */
+    struct segment *nearest_of;
+    float nearest_tail;
+    struct nearest_cache
+        *store; /* keeps the nearest segments of bricks, or has the lists of `nearest_of`; may be NULL */
 };
 
 /* Work of one thread. By voxels of a brick, 0 between bricks: the share of fibers, its derivatives by all radii and
  * by the blur, and the weight times the residual; the derivative by the areas of all lumens; whether any of LANES
- * voxels that follow each other has a claim. The weight is that of claimed voxels, and not 0 between bricks. */
+ * voxels that follow each other has a nearest segment. The weight is valid for such voxels only, and not 0 between
+ * bricks. */
 struct axis_scratch {
     lane_row model[AXIS_N_CELL];
     float weight[AXIS_N_CELL];
     float lumen[AXIS_N_CELL];
     bool touched[AXIS_N_CELL / LANES];
-    struct axis_claims claims;
+    struct nearest_segments nearest;
 };
 
 #endif

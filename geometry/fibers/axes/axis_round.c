@@ -30,7 +30,7 @@ status axis_batch_start(struct axis_batch *b, struct error *err)
 
 void axis_brick_sum_release(struct axis_brick_sum *sum)
 {
-    free(sum->pull);
+    free(sum->equation);
     free(sum->section);
     free(sum->lumen);
     *sum = (struct axis_brick_sum){0};
@@ -82,18 +82,18 @@ status axis_round_prepare(struct axis_model *m, const struct polyline_set *lines
     find_reach(lines, view, m->tail, reach);
     m->section = view;
     m->bricks = bricks;
-    m->claiming = NULL;
-    m->claim_tail = m->tail;
+    m->nearest_of = NULL;
+    m->nearest_tail = m->tail;
     return segment_bricks_init_each(bricks, lines, n, AXIS_BRICK, reach, err);
 }
 
 status axis_round_follow(struct axis_model *m, const struct polyline_set *lines, struct segment_bricks *bricks,
-                         struct segment **claiming, struct error *err)
+                         struct segment **nearest_of, struct error *err)
 {
     prepare_profile(m);
-    status s = segment_bricks_move(bricks, lines, claiming, err);
+    status s = segment_bricks_move(bricks, lines, nearest_of, err);
     m->section = NULL;
     m->bricks = bricks;
-    m->claiming = *claiming;
+    m->nearest_of = *nearest_of;
     return s;
 }

@@ -33,8 +33,9 @@ status axis_round_prepare(struct axis_model *m, const struct polyline_set *lines
 
 /* Prepares a model of discs for the same lines in a later round. The voxels keep their nearest segments from the last
  * axis_round_prepare: lines at rest have moved by a tenth of a voxel since, which hardly changes the nearest segments.
- * *bricks comes from the same round; *claiming becomes their segments, as in segment_bricks_move. STATUS_NO_MEMORY. */
+ * *bricks comes from the same round; *nearest_of becomes their segments, as in segment_bricks_move.
+ * STATUS_NO_MEMORY. */
 status axis_round_follow(struct axis_model *m, const struct polyline_set *lines, struct segment_bricks *bricks,
-                         struct segment **claiming, struct error *err);
+                         struct segment **nearest_of, struct error *err);
 
 #endif

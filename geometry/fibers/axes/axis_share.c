@@ -19,7 +19,7 @@ struct axis_round {
     struct section_view *view;
     float *reach;
     struct segment_bricks bricks;
-    struct segment *claiming;
+    struct segment *nearest_of;
     struct axis_batch batch;
     size_t n_thread;
 };
@@ -48,12 +48,12 @@ static size_t n_segment_of(const struct share_view *v, size_t i_brick)
 /* Terms of a segment as they are sent. */
 struct segment_terms {
     float end[2][9], radius[6];
-    struct section_pull section;
+    struct section_equation section;
 };
 
 static size_t terms_bytes(bool with_section)
 {
-    return sizeof(struct segment_terms) - (with_section ? 0 : sizeof(struct section_pull));
+    return sizeof(struct segment_terms) - (with_section ? 0 : sizeof(struct section_equation));
 }
 
 static size_t most_bytes_of(size_t n_segment, bool with_section)
@@ -65,26 +65,26 @@ static void terms_of(const struct axis_brick_sum *sum, size_t e, struct segment_
 {
     memset(t, 0, sizeof *t);
     for (int end = 0; end < 2; end++) {
-        const struct axis_pull *q = &sum->pull[2 * e + (size_t)end];
+        const struct axis_equation *q = &sum->equation[2 * e + (size_t)end];
         memcpy(t->end[end], q->normal, sizeof q->normal);
         memcpy(t->end[end] + 6, q->gradient, sizeof q->gradient);
     }
-    t->radius[0] = sum->pull[2 * e].radius_normal;
-    t->radius[1] = sum->pull[2 * e].radius_gradient;
-    memcpy(t->radius + 2, sum->pull[2 * e].radius_cross, sizeof sum->pull->radius_cross);
+    t->radius[0] = sum->equation[2 * e].radius_normal;
+    t->radius[1] = sum->equation[2 * e].radius_gradient;
+    memcpy(t->radius + 2, sum->equation[2 * e].radius_cross, sizeof sum->equation->radius_cross);
     if (sum->section != NULL) t->section = sum->section[e];
 }
 
 static void take_terms(struct axis_brick_sum *sum, size_t e, const struct segment_terms *t)
 {
     for (int end = 0; end < 2; end++) {
-        struct axis_pull *q = &sum->pull[2 * e + (size_t)end];
+        struct axis_equation *q = &sum->equation[2 * e + (size_t)end];
         memcpy(q->normal, t->end[end], sizeof q->normal);
         memcpy(q->gradient, t->end[end] + 6, sizeof q->gradient);
     }
-    sum->pull[2 * e].radius_normal = t->radius[0];
-    sum->pull[2 * e].radius_gradient = t->radius[1];
-    memcpy(sum->pull[2 * e].radius_cross, t->radius + 2, sizeof sum->pull->radius_cross);
+    sum->equation[2 * e].radius_normal = t->radius[0];
+    sum->equation[2 * e].radius_gradient = t->radius[1];
+    memcpy(sum->equation[2 * e].radius_cross, t->radius + 2, sizeof sum->equation->radius_cross);
     if (sum->section != NULL) sum->section[e] = t->section;
 }
 
@@ -100,7 +100,7 @@ static size_t pack_brick(void *context, size_t i_task, void *to)
     const struct share_view *v = context;
     const size_t i_brick = brick_of(v, i_task), n_segment = n_segment_of(v, i_brick);
     struct axis_brick_sum *sum = &v->batch->sum[i_brick];
-    if (sum->pull == NULL) return 0; /* no line comes near */
+    if (sum->equation == NULL) return 0; /* no line comes near */
     char *at = to;
     put(&at, &sum->shared, sizeof sum->shared);
     uint8_t *has = (uint8_t *)at;
@@ -122,11 +122,11 @@ static bool make_sum(const struct share_view *v, size_t i_brick, struct axis_bri
 {
     const struct segment_bricks *b = v->batch->model.bricks;
     const size_t n = n_segment_of(v, i_brick);
-    sum->pull = calloc(2 * n, sizeof *sum->pull);
+    sum->equation = calloc(2 * n, sizeof *sum->equation);
     if (v->batch->model.section != NULL) sum->section = calloc(n, sizeof *sum->section);
-    if (sum->pull == NULL || (v->batch->model.section != NULL && sum->section == NULL)) return false;
+    if (sum->equation == NULL || (v->batch->model.section != NULL && sum->section == NULL)) return false;
     for (size_t e = 0; e < 2 * n; e++)
-        sum->pull[e].segment = b->index[b->first[v->batch->first_brick + i_brick] + e / 2];
+        sum->equation[e].segment = b->index[b->first[v->batch->first_brick + i_brick] + e / 2];
     return true;
 }
 
@@ -140,7 +140,7 @@ static bool unpack_brick(void *context, size_t i_task, const void *from, size_t 
     const uint8_t *has = (const uint8_t *)from + sizeof sum->shared;
     struct shared_sum shared;
     BYTE_VIEW(&bytes, shared);
-    if (bytes.n < (n_segment + 7) / 8 || sum->pull != NULL || !make_sum(v, i_brick, sum)) return false;
+    if (bytes.n < (n_segment + 7) / 8 || sum->equation != NULL || !make_sum(v, i_brick, sum)) return false;
     bytes.data += (n_segment + 7) / 8;
     bytes.n -= (n_segment + 7) / 8;
     sum->shared = shared;
@@ -248,7 +248,7 @@ void axis_round_free(struct axis_round *r)
     free(r->view);
     free(r->reach);
     segment_bricks_release(&r->bricks);
-    free(r->claiming);
+    free(r->nearest_of);
     free(r);
 }
 
@@ -313,11 +313,11 @@ static status follow_round(struct axis_round *r, struct axis_round *before, stru
     for (size_t l = 0; same && l <= p->n_line; l++) same = p->first[l] == before->lines.first[l];
     if (!same) return error_set(err, STATUS_FORMAT, "another rank goes on with a fit of lines that are not there");
     r->bricks = before->bricks;
-    r->claiming = before->claiming;
+    r->nearest_of = before->nearest_of;
     before->bricks = (struct segment_bricks){0};
-    before->claiming = NULL;
-    r->batch.model.claim_tail = before->batch.model.claim_tail;
-    return axis_round_follow(&r->batch.model, &r->lines, &r->bricks, &r->claiming, err);
+    before->nearest_of = NULL;
+    r->batch.model.nearest_tail = before->batch.model.nearest_tail;
+    return axis_round_follow(&r->batch.model, &r->lines, &r->bricks, &r->nearest_of, err);
 }
 
 static status take_round(const struct helper_slab *slab, struct axis_round **round, const struct rank_order *order,

@@ -18,7 +18,7 @@ static const double BEND_DIAMETERS = 2.5;
 /* The diagonal and six below it: second differences of three coordinates. Nine: differences of these. */
 enum { BAND = 7, BAND_CORRELATED = 10 };
 
-void axis_pull_add(struct axis_pull *to, const struct axis_pull *from)
+void axis_equation_add(struct axis_equation *to, const struct axis_equation *from)
 {
     for (int i = 0; i < 6; i++) to->normal[i] += from->normal[i];
     for (int i = 0; i < 3; i++) to->gradient[i] += from->gradient[i];
@@ -26,7 +26,7 @@ void axis_pull_add(struct axis_pull *to, const struct axis_pull *from)
     to->radius_gradient += from->radius_gradient;
 }
 
-double axis_information(const struct axis_pull *total, size_t n_vertex)
+double axis_information(const struct axis_equation *total, size_t n_vertex)
 {
     double sum = 0.0; /* half the trace, because none lies along the fiber */
     for (size_t i = 0; i < n_vertex; i++)
@@ -36,7 +36,7 @@ double axis_information(const struct axis_pull *total, size_t n_vertex)
 
 struct solve_job {
     struct polyline_set *lines;
-    const struct axis_pull *pull;
+    const struct axis_equation *equation;
     const double *stiffness; /* of the second difference at each vertex */
     double correlation, hold;
     bool *failed; /* one per line */
@@ -85,7 +85,7 @@ static void solve_line(void *context, size_t l, size_t i_thread)
     struct solve_job *job = context;
     const size_t n = polyline_length(job->lines, l), band = job->correlation > 0.0 ? BAND_CORRELATED : BAND;
     float(*p)[3] = job->lines->vertex + job->lines->first[l];
-    const struct axis_pull *q = job->pull + job->lines->first[l];
+    const struct axis_equation *q = job->equation + job->lines->first[l];
     double *m = calloc(3 * n * band, sizeof *m), *x = calloc(3 * n, sizeof *x);
     struct line_system system = {(const float(*)[3])p, n, band, m, x};
     if (m == NULL || x == NULL) {
@@ -109,16 +109,18 @@ out:
     free(x);
 }
 
-status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull, const double *stiffness,
+status axis_solve_lines(struct polyline_set *lines, const struct axis_equation *equation, const double *stiffness,
                         double correlation, struct thread_pool *pool, struct error *err)
 {
-    struct solve_job job = {
-        .lines = lines, .pull = pull, .correlation = correlation, .failed = calloc(lines->n_line + 1, sizeof(bool))};
+    struct solve_job job = {.lines = lines,
+                            .equation = equation,
+                            .correlation = correlation,
+                            .failed = calloc(lines->n_line + 1, sizeof(bool))};
     double mean = 0.0;
     if (job.failed == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit fibers: out of memory");
     /* half the trace, because the direction along the fiber contributes nothing */
     for (size_t i = 0; i < lines->n_vertex; i++)
-        mean += 0.5 * (double)(pull[i].normal[0] + pull[i].normal[2] + pull[i].normal[5]);
+        mean += 0.5 * (double)(equation[i].normal[0] + equation[i].normal[2] + equation[i].normal[5]);
     mean = lines->n_vertex > 0 ? mean / (double)lines->n_vertex : 0.0;
     job.stiffness = stiffness;
     job.hold = 0.02 * mean + 1e-12;

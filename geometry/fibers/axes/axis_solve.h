@@ -6,7 +6,7 @@
 #include "geometry/fibers/polyline.h"
 
 /* Normal equations of the position of one vertex from the data. */
-struct axis_pull {
+struct axis_equation {
     uint32_t segment;  /* segment that the terms belong to, in a sum over a brick */
     float normal[6];   /* xx, yx yy, zx zy zz */
     float gradient[3]; /* normal times the step to the minimum */
@@ -15,9 +15,9 @@ struct axis_pull {
 };
 
 /* Adds the terms of a position, and of the radius without the shared terms. */
-void axis_pull_add(struct axis_pull *to, const struct axis_pull *from);
+void axis_equation_add(struct axis_equation *to, const struct axis_equation *from);
 /* Mean information of the data on one component of the position of a vertex. */
-double axis_information(const struct axis_pull *total, size_t n_vertex);
+double axis_information(const struct axis_equation *total, size_t n_vertex);
 
 /* Standard deviation of one component of the lines' curvature, per voxel, at most AXIS_CURVATURE_MOST per diameter, the
  * curvature of fibers about to break. It is measured over chords of a diameter, where the noise of single vertices has
@@ -40,7 +40,7 @@ double axis_bend_correlation(double diameter);
  * differences times the root of the stiffness, by at most one voxel. The bends are a stationary sequence whose
  * neighbours have this correlation: u_1^2 + sum (u_{i+1} - correlation u_i)^2 / (1 - correlation^2). With 0 the terms
  * are stiffness |second difference|^2. stiffness: of each vertex. STATUS_NO_MEMORY. */
-status axis_solve_lines(struct polyline_set *lines, const struct axis_pull *pull, const double *stiffness,
+status axis_solve_lines(struct polyline_set *lines, const struct axis_equation *equation, const double *stiffness,
                         double correlation, struct thread_pool *pool, struct error *err);
 
 #endif

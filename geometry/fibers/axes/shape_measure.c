@@ -64,10 +64,10 @@ struct line_work {
 /* Terms of a segment of a line for the radius, without the part that the lumen explains. */
 static struct piece_sum radius_terms(const struct line_work *w, const struct shape_sums *sums, size_t i)
 {
-    const struct axis_pull *p = &sums->pull[w->first + i];
+    const struct axis_equation *p = &sums->equation[w->first + i];
     struct piece_sum t = {(double)p->radius_gradient, (double)p->radius_normal};
     if (sums->lumen != NULL) {
-        const struct lumen_pull *q = &sums->lumen[w->first + i];
+        const struct lumen_equation *q = &sums->lumen[w->first + i];
         const double part = w->radius_by_area;
         t.gradient -= part * (double)q->gradient;
         t.information += part * (part * (double)q->normal - 2.0 * (double)q->by_radius);
@@ -79,8 +79,8 @@ static struct piece_sum radius_terms(const struct line_work *w, const struct sha
 /* Terms for the area of the lumen, without the part that the radius explains. */
 static struct piece_sum area_terms(const struct line_work *w, const struct shape_sums *sums, size_t i)
 {
-    const struct axis_pull *p = &sums->pull[w->first + i];
-    const struct lumen_pull *q = &sums->lumen[w->first + i];
+    const struct axis_equation *p = &sums->equation[w->first + i];
+    const struct lumen_equation *q = &sums->lumen[w->first + i];
     const double part = w->area_by_radius;
     return (struct piece_sum){
         (double)q->gradient - part * (double)p->radius_gradient,
@@ -132,12 +132,12 @@ static void segment_scatter(struct line_work *w, const struct shape_sums *sums, 
 
 static void section_scatter(struct line_work *w, const struct shape_sums *sums, struct scatter *to)
 {
-    const struct section_pull *pull = sums->section;
+    const struct section_equation *equation = sums->section;
     static const double second[3] = {1.0, -2.0, 1.0};
     for (int a = 0; a < 2; a++) {
         for (size_t i = 0; i < w->n; i++) {
-            w->gradient[i] = (double)pull[w->first + i].gradient[a];
-            w->information[i] = sums->slope * (double)pull[w->first + i].normal[2 * a];
+            w->gradient[i] = (double)equation[w->first + i].gradient[a];
+            w->information[i] = sums->slope * (double)equation[w->first + i].normal[2 * a];
         }
         add_differences(w->piece, take_pieces(w, piece_length(SECTION_PIECE, sums->diameter)), second, 3, to);
     }
@@ -325,7 +325,7 @@ static void start_line(struct line_work *w, const struct polyline_set *lines, si
     w->first = lines->first[line];
     w->n = polyline_length(lines, line);
     for (size_t i = w->first; i < w->first + w->n && sums->lumen != NULL; i++) {
-        radius += (double)sums->pull[i].radius_normal;
+        radius += (double)sums->equation[i].radius_normal;
         area += (double)sums->lumen[i].normal;
         both += (double)sums->lumen[i].by_radius;
     }

@@ -37,12 +37,13 @@
 
 /* The sums that the last round leaves. */
 struct shape_sums {
-    const struct axis_pull *pull; /* of each vertex; radius_normal and radius_gradient are of the segment after it */
-    const struct section_pull *section;   /* of each vertex */
-    const struct fiber_section *sections; /* as fitted */
-    const struct lumen_pull *lumen;       /* of each vertex: of the segment after it; NULL: solid fibers */
-    const float *area;                    /* of the lumen of each line, as fitted */
-    double shared_area, shared_radius;    /* variances of a change of all areas, or of all radii, for a noise of 1 */
+    const struct axis_equation
+        *equation; /* of each vertex; radius_normal and radius_gradient are of the segment after it */
+    const struct section_equation *section; /* of each vertex */
+    const struct fiber_section *sections;   /* as fitted */
+    const struct lumen_equation *lumen;     /* of each vertex: of the segment after it; NULL: solid fibers */
+    const float *area;                      /* of the lumen of each line, as fitted */
+    double shared_area, shared_radius;      /* variances of a change of all areas, or of all radii, for a noise of 1 */
     double model_square; /* largest variance of a shared number by errors of the model, over the same; 0: none */
     double diameter, section_length, section_hold;
     double slope; /* of weighted residuals by residuals, over the mean weight: the share of N in the true curvature */

@@ -61,7 +61,7 @@ static float radius_of(const struct join_job *job, size_t l)
 }
 
 /* Returns whether x lies inside of a third line. */
-static bool is_claimed(const struct join_job *job, const float x[3], uint32_t a, uint32_t b)
+static bool is_in_third_line(const struct join_job *job, const float x[3], uint32_t a, uint32_t b)
 {
     const struct vertex_grid *g = &job->grid;
     float near = job->largest_radius;
@@ -97,7 +97,7 @@ static bool is_way_free(const struct join_job *job, const struct join_curve *j, 
         last[1] = last[0];
         last[0] = density;
         sum += density;
-        if (i > 0 && i < n && is_claimed(job, x, a, b)) return false;
+        if (i > 0 && i < n && is_in_third_line(job, x, a, b)) return false;
     }
     return sum >= job->eps_d * (n + 1);
 }

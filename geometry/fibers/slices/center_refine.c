@@ -50,8 +50,8 @@ static const lanes STEP = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
 
 /* Gives the first n of LANES pixels of a row to a center if it is the nearest so far. du, dv: their places from the
  * center. The distance is perpendicular to the axis. */
-static inline void claim_lanes(const struct window *w, float index, lanes du, float dv, ptrdiff_t n, float *distance,
-                               float *owner)
+static inline void assign_lanes(const struct window *w, float index, lanes du, float dv, ptrdiff_t n, float *distance,
+                                float *owner)
 {
     const lanes along = du * w->slope_u + dv * w->slope_v;
     const lanes d2 = du * du + dv * dv - along * along / w->stretch2, own = d2 - w->radius2;
@@ -61,7 +61,7 @@ static inline void claim_lanes(const struct window *w, float index, lanes du, fl
     *(lanes *)owner = lanes_choose(mine, zero + index, other);
 }
 
-static void claim_pixels(const struct refine_slice *s, const struct window *window, size_t n)
+static void assign_pixels(const struct refine_slice *s, const struct window *window, size_t n)
 {
     /* clear only the pixels that centers can reach, because no others are read later */
     for (size_t i = 0; i < n; i++) {
@@ -76,7 +76,7 @@ static void claim_pixels(const struct refine_slice *s, const struct window *wind
             for (ptrdiff_t u = b->u0; u < b->u1; u += LANES) {
                 const ptrdiff_t at = v * (ptrdiff_t)s->width + u;
                 const lanes du = (float)b->u0 + 0.5f - w->u + (STEP + (float)(u - b->u0));
-                claim_lanes(w, (float)i, du, (float)v + 0.5f - w->v, b->u1 - u, s->distance + at, s->owner + at);
+                assign_lanes(w, (float)i, du, (float)v + 0.5f - w->v, b->u1 - u, s->distance + at, s->owner + at);
             }
         }
     }
@@ -134,7 +134,7 @@ bool centers_refine(const struct refine_slice *slice, struct center *center, siz
     if (window == NULL) return false;
     for (int round = 0; round < N_ROUND; round++) {
         for (size_t i = 0; i < n; i++) window[i] = window_of(&center[i], slice);
-        claim_pixels(slice, window, n);
+        assign_pixels(slice, window, n);
         for (size_t i = 0; i < n; i++) move_to_centroid(slice, &window[i], (float)i, &center[i]);
     }
     free(window);

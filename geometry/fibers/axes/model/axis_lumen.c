@@ -52,7 +52,7 @@ struct lumen_lanes lumen_lanes_at(const struct lumen_view *w, const struct lumen
                                 .by_s = -step * (y * p + x * q) * w->turn};
 }
 
-void lumen_pull_add(struct lumen_pull *to, const struct lumen_pull *from)
+void lumen_equation_add(struct lumen_equation *to, const struct lumen_equation *from)
 {
     to->normal += from->normal;
     to->gradient += from->gradient;

@@ -35,10 +35,10 @@ struct lumen_lanes lumen_lanes_at(const struct lumen_view *w, const struct lumen
 
 /* Normal equation of the area of one line, and the terms that it has in common with the radius and with the numbers
  * that all fibers share (axis_profile.h); radius_shared: of the radius with a change of all areas. */
-struct lumen_pull {
+struct lumen_equation {
     float normal, gradient, by_radius, cross[AXIS_N_SHARED], radius_shared;
 };
 
-void lumen_pull_add(struct lumen_pull *to, const struct lumen_pull *from);
+void lumen_equation_add(struct lumen_equation *to, const struct lumen_equation *from);
 
 #endif

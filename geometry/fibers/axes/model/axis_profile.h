@@ -17,7 +17,7 @@ struct axis_profile {
      * about to break, which holds back no line that still has to find its fiber. */
     bool measured_curvature;
     /* Lines move little from round to round, so that the nearest segments of voxels serve several, unless a step
-     * shows otherwise (kept/claim_rounds.h). */
+     * shows otherwise (nearest_rounds.h). */
     bool at_rest;
     struct fiber_section *section; /* of each vertex of the lines, refined too; NULL: discs */
     float *lumen;       /* with sections: area of each line's lumen over its outline's, refined too; NULL: solid */

@@ -122,17 +122,17 @@ float fiber_section_ratio(const struct fiber_section *section)
 static double within(double most, double value) { return fmin(most, fmax(-most, value)); }
 
 /* Mean information of the data on c or s at a vertex. */
-static double information(const struct section_pull *pull, size_t n_vertex)
+static double information(const struct section_equation *equation, size_t n_vertex)
 {
     double sum = 0.0;
-    for (size_t i = 0; i < n_vertex; i++) sum += 0.5 * (double)(pull[i].normal[0] + pull[i].normal[2]);
+    for (size_t i = 0; i < n_vertex; i++) sum += 0.5 * (double)(equation[i].normal[0] + equation[i].normal[2]);
     return fmax(sum / fmax(1.0, (double)n_vertex), 1e-12);
 }
 
 static const double second[3] = {1.0, -2.0, 1.0};
 
 /* Fills the banded matrix m of a line of n vertices. */
-static void fill_matrix(const struct section_pull *q, size_t n, double stiffness, double hold, double (*m)[BAND])
+static void fill_matrix(const struct section_equation *q, size_t n, double stiffness, double hold, double (*m)[BAND])
 {
     memset(m, 0, 2 * n * sizeof *m);
     for (size_t i = 0; i < n; i++) {
@@ -147,7 +147,7 @@ static void fill_matrix(const struct section_pull *q, size_t n, double stiffness
 }
 
 /* Fills the right-hand side x of a line of n vertices. */
-static void fill_line(const struct section_pull *q, const struct fiber_section *section, size_t n, double stiffness,
+static void fill_line(const struct section_equation *q, const struct fiber_section *section, size_t n, double stiffness,
                       double hold, double *x)
 {
     memset(x, 0, 2 * n * sizeof *x);
@@ -175,16 +175,16 @@ static void step_line(const double *x, size_t n, struct fiber_section *section)
     }
 }
 
-double fiber_sections_stiffness(const struct section_pull *pull, size_t n_vertex, double length)
+double fiber_sections_stiffness(const struct section_equation *equation, size_t n_vertex, double length)
 {
-    return pow(length, 4.0) * information(pull, n_vertex);
+    return pow(length, 4.0) * information(equation, n_vertex);
 }
 
-bool fiber_section_variance(const struct section_pull *pull, size_t n, double stiffness, double hold, double *m,
+bool fiber_section_variance(const struct section_equation *equation, size_t n, double stiffness, double hold, double *m,
                             double (*variance)[3])
 {
     double(*row)[BAND] = (double(*)[BAND])m;
-    fill_matrix(pull, n, stiffness, hold, row);
+    fill_matrix(equation, n, stiffness, hold, row);
     if (!small_invert_banded(m, 2 * n, BAND)) return false;
     for (size_t i = 0; i < n; i++) {
         variance[i][0] = row[2 * i][0];
@@ -196,7 +196,7 @@ bool fiber_section_variance(const struct section_pull *pull, size_t n, double st
 
 struct section_job {
     const struct polyline_set *lines;
-    const struct section_pull *pull;
+    const struct section_equation *equation;
     struct fiber_section *section;
     double stiffness, hold;
     atomic_bool failed; /* memory was out */
@@ -209,8 +209,8 @@ static void solve_line(void *context, size_t l, size_t i_thread)
     const size_t n = polyline_length(job->lines, l), first = job->lines->first[l];
     double(*m)[BAND] = malloc((2 * n + 1) * sizeof *m), *x = malloc((2 * n + 1) * sizeof *x);
     if (m != NULL && x != NULL) {
-        fill_matrix(job->pull + first, n, job->stiffness, job->hold, m);
-        fill_line(job->pull + first, job->section + first, n, job->stiffness, job->hold, x);
+        fill_matrix(job->equation + first, n, job->stiffness, job->hold, m);
+        fill_line(job->equation + first, job->section + first, n, job->stiffness, job->hold, x);
         if (small_solve_banded(m[0], 2 * n, BAND, x)) step_line(x, n, job->section + first);
     } else {
         job->failed = true;
@@ -219,13 +219,13 @@ static void solve_line(void *context, size_t l, size_t i_thread)
     free(x);
 }
 
-status fiber_sections_solve(const struct polyline_set *lines, const struct section_pull *pull, double length,
+status fiber_sections_solve(const struct polyline_set *lines, const struct section_equation *equation, double length,
                             double hold, struct fiber_section *section, struct thread_pool *pool, struct error *err)
 {
     struct section_job job = {.lines = lines,
-                              .pull = pull,
+                              .equation = equation,
                               .section = section,
-                              .stiffness = fiber_sections_stiffness(pull, lines->n_vertex, length),
+                              .stiffness = fiber_sections_stiffness(equation, lines->n_vertex, length),
                               .hold = hold};
     status s = thread_pool_run(pool, lines->n_line, solve_line, &job, NULL);
     if (s == STATUS_OK && job.failed)

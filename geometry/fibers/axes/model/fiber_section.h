@@ -48,23 +48,23 @@ void fiber_section_take_shape(const struct fiber_shape *shape, const float t[3],
 float fiber_section_ratio(const struct fiber_section *section);
 
 /* Normal equation of (c, s) at one vertex. */
-struct section_pull {
+struct section_equation {
     float normal[3], gradient[2]; /* cc, cs, ss */
 };
 
 /* Steps the sections to the minimum of their data terms, a penalty on their second differences along the line, which
  * smooths them over `length` vertices, and one on their size of weight `hold`. Bounded. STATUS_NO_MEMORY. */
-status fiber_sections_solve(const struct polyline_set *lines, const struct section_pull *pull, double length,
+status fiber_sections_solve(const struct polyline_set *lines, const struct section_equation *equation, double length,
                             double hold, struct fiber_section *section, struct thread_pool *pool, struct error *err);
 
 /* Elements of the banded matrix for each component of a section. */
 enum { SECTION_BAND = 5 };
 /* Weight of the penalty on second differences that smooths over `length` vertices. */
-double fiber_sections_stiffness(const struct section_pull *pull, size_t n_vertex, double length);
+double fiber_sections_stiffness(const struct section_equation *equation, size_t n_vertex, double length);
 /* The inverse of the matrix of the normal equations of one line of n vertices: its elements cc, cs and ss at each
  * vertex, which are the variances of c and s for a noise of 1 where the penalties describe the fiber. m: room for
  * 2 SECTION_BAND n numbers. Returns false where the matrix is not positive definite. */
-bool fiber_section_variance(const struct section_pull *pull, size_t n, double stiffness, double hold, double *m,
+bool fiber_section_variance(const struct section_equation *equation, size_t n, double stiffness, double hold, double *m,
                             double (*variance)[3]);
 
 #endif

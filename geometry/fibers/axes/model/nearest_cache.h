@@ -1,34 +1,34 @@
-/* Claims of bricks (axis_claim.h) that are kept from one round of a fit to the next. */
-#ifndef SELVEDGE_GEOMETRY_CLAIM_STORE_H
-#define SELVEDGE_GEOMETRY_CLAIM_STORE_H
+/* Nearest segments of bricks (nearest_segment.h) that are kept from one round of a fit to the next. */
+#ifndef SELVEDGE_GEOMETRY_NEAREST_CACHE_H
+#define SELVEDGE_GEOMETRY_NEAREST_CACHE_H
 
 #include "geometry/fibers/axes/model/nearest_segment.h"
 
 #include <stdatomic.h>
 
-/* The claims of a brick, as in struct axis_claims. */
-struct claim_list {
+/* The voxels of a brick by their nearest segments, as in struct nearest_segments. */
+struct nearest_list {
     const uint16_t *cell;
     const uint32_t *first;
 };
 
-/* Claims of the bricks as far as there is room. Bricks may be added at a time, each by one thread. */
-struct claim_store {
+/* Lists of the bricks as far as there is room. Bricks may be added at a time, each by one thread. */
+struct nearest_cache {
     size_t n_brick, most_bytes;
     atomic_size_t n_bytes;
-    struct stored_claims {
+    struct stored_nearest {
         uint16_t *cell;
-        uint32_t *first; /* NULL: the claims of this brick are not kept */
+        uint32_t *first; /* NULL: the list of this brick is not kept */
     } * brick;
 };
 
 /* Makes an empty store for n_brick bricks, which keeps at most most_bytes. Returns false when memory is out. */
-bool claim_store_init(struct claim_store *s, size_t n_brick, size_t most_bytes);
+bool nearest_cache_init(struct nearest_cache *s, size_t n_brick, size_t most_bytes);
 /* Accepts a store that is all zero. */
-void claim_store_release(struct claim_store *s);
-/* Keeps a copy of the claims of a brick with n_segment segments, if there is room and memory for it. */
-void claim_store_add(struct claim_store *s, size_t i_brick, const struct claim_list *claims, size_t n_segment);
-/* Finds the claims of a brick. Returns false if they are not kept. */
-bool claim_store_find(const struct claim_store *s, size_t i_brick, struct claim_list *claims);
+void nearest_cache_release(struct nearest_cache *s);
+/* Keeps a copy of the list of a brick with n_segment segments, if there is room and memory for it. */
+void nearest_cache_add(struct nearest_cache *s, size_t i_brick, const struct nearest_list *nearest, size_t n_segment);
+/* Finds the list of a brick. Returns false if it is not kept. */
+bool nearest_cache_find(const struct nearest_cache *s, size_t i_brick, struct nearest_list *nearest);
 
 #endif

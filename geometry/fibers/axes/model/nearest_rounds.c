@@ -4,35 +4,35 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { ROUNDS_OF_CLAIMS = 3 };
+enum { MOST_ROUNDS = 3 };
 static const double MOST_MOVED = 0.1; /* voxels */
 
-bool claim_rounds_start(struct claim_rounds *r, size_t n_vertex)
+bool nearest_rounds_start(struct nearest_rounds *r, size_t n_vertex)
 {
-    *r = (struct claim_rounds){.before = malloc((n_vertex + 1) * sizeof *r->before)};
+    *r = (struct nearest_rounds){.before = malloc((n_vertex + 1) * sizeof *r->before)};
     return r->before != NULL;
 }
 
-void claim_rounds_release(struct claim_rounds *r)
+void nearest_rounds_release(struct nearest_rounds *r)
 {
     free(r->before);
-    *r = (struct claim_rounds){0};
+    *r = (struct nearest_rounds){0};
 }
 
-struct round_kind claim_rounds_next(struct claim_rounds *r, bool is_last)
+struct round_kind nearest_rounds_next(struct nearest_rounds *r, bool is_last)
 {
-    const bool follows = r->n_round > 0 && r->n_round < ROUNDS_OF_CLAIMS && r->moved <= MOST_MOVED;
+    const bool follows = r->n_round > 0 && r->n_round < MOST_ROUNDS && r->moved <= MOST_MOVED;
     const struct round_kind kind = {follows, r->before != NULL && !follows && !is_last};
     r->n_round = kind.follows ? r->n_round + 1 : kind.is_followed ? 1 : 0;
     return kind;
 }
 
-void claim_rounds_before_step(struct claim_rounds *r, const struct polyline_set *lines)
+void nearest_rounds_before_step(struct nearest_rounds *r, const struct polyline_set *lines)
 {
     if (r->before != NULL) memcpy(r->before, lines->vertex, lines->n_vertex * sizeof *r->before);
 }
 
-void claim_rounds_after_step(struct claim_rounds *r, const struct polyline_set *lines)
+void nearest_rounds_after_step(struct nearest_rounds *r, const struct polyline_set *lines)
 {
     double square = 0.0;
     if (r->before == NULL) return;

@@ -9,7 +9,7 @@
 enum { BRICK = AXIS_BRICK, SHIFT = 5, BOUND = BRICK - 1, OFF_LINE = -1 };
 static const float ROUNDING = 0.05f; /* voxels by which slabs of neighbours overlap, so that no voxel is lost */
 
-void axis_claims_init(struct axis_claims *c)
+void nearest_segments_init(struct nearest_segments *c)
 {
     memset(c, 0, sizeof *c);
     for (size_t i = 0; i < AXIS_N_CELL + LANES; i++) {
@@ -18,7 +18,7 @@ void axis_claims_init(struct axis_claims *c)
     }
 }
 
-void axis_claims_release(struct axis_claims *c)
+void nearest_segments_release(struct nearest_segments *c)
 {
     free(c->cell);
     free(c->first);
@@ -154,7 +154,7 @@ static void row_ranges(const struct stamp *w, float y0, float z, lane_mask *from
 
 /* Gives LANES voxels of a row that follow each other to the segment where it is the nearest so far. p: of the first
  * from the segment's begin; n: of the voxels that are in the row. */
-static void stamp_lanes(struct axis_claims *c, const struct stamp *w, const float p[3], size_t at, int n)
+static void stamp_lanes(struct nearest_segments *c, const struct stamp *w, const float p[3], size_t at, int n)
 {
     const lanes x = STEP + p[0], zero = {0.0f}, one = zero + 1.0f;
     lanes t = (x * w->u[0] + (p[1] * w->u[1] + p[2] * w->u[2])) * w->inverse_length2;
@@ -169,7 +169,7 @@ static void stamp_lanes(struct axis_claims *c, const struct stamp *w, const floa
     *own = (*own & ~take) | (take & ((beside & w->id) | (~beside & OFF_LINE)));
 }
 
-static void note_row(struct axis_claims *c, size_t row, int from, int to)
+static void note_row(struct nearest_segments *c, size_t row, int from, int to)
 {
     if (c->row_end[row] == 0) {
         c->row[c->n_row++] = (uint16_t)row;
@@ -182,7 +182,7 @@ static void note_row(struct axis_claims *c, size_t row, int from, int to)
 }
 
 /* Gives the voxels of the brick to the segment for which it is the nearest of its line so far. */
-static void stamp(struct axis_claims *c, const struct stamp *w)
+static void stamp(struct nearest_segments *c, const struct stamp *w)
 {
     for (size_t k = w->lo[2]; k < w->hi[2]; k++) {
         const float z = (float)k + 0.5f - w->a[2];
@@ -217,10 +217,10 @@ static void choose_axes(struct line_view *v, const uint32_t *index, size_t n)
     v->axis[2] = along[a] <= along[b] ? b : a;
 }
 
-static bool make_room(struct axis_claims *c, size_t n_claim)
+static bool make_room(struct nearest_segments *c, size_t n_voxel)
 {
-    if (n_claim + LANES <= c->capacity) return true;
-    size_t n = 2 * n_claim + AXIS_N_CELL;
+    if (n_voxel + LANES <= c->capacity) return true;
+    size_t n = 2 * n_voxel + AXIS_N_CELL;
     uint16_t *bigger = realloc(c->cell, n * sizeof *bigger);
     if (bigger == NULL) return false;
     c->cell = bigger;
@@ -228,9 +228,9 @@ static bool make_room(struct axis_claims *c, size_t n_claim)
     return true;
 }
 
-/* Counts the claims of the line's segments, and returns the number of voxels in the ranges of its rows. place: by
+/* Counts the voxels of the line's segments, and returns the number of voxels in the ranges of its rows. place: by
  * number in the brick's list; OFF_LINE counts the others, so that no branch depends on a voxel. */
-static uint32_t count_claims(const struct axis_claims *c, uint32_t *place)
+static uint32_t count_voxels(const struct nearest_segments *c, uint32_t *place)
 {
     uint32_t n = 0;
     for (size_t r = 0; r < c->n_row; r++) {
@@ -241,8 +241,8 @@ static uint32_t count_claims(const struct axis_claims *c, uint32_t *place)
     return n;
 }
 
-/* Writes the claims to their places, and makes the work ready for the next line. */
-static void place_claims(struct axis_claims *c, const int axis[3], uint32_t *place)
+/* Writes the voxels to their places, and makes the work ready for the next line. */
+static void place_voxels(struct nearest_segments *c, const int axis[3], uint32_t *place)
 {
     for (size_t r = 0; r < c->n_row; r++) {
         const uint32_t row = c->row[r];
@@ -261,25 +261,25 @@ static void place_claims(struct axis_claims *c, const int axis[3], uint32_t *pla
 /* Sorts the voxels of a line by their nearest segment: the voxels of segments first .. end - 1 of the brick's list
  * follow the voxels of the lines before. Voxels without a nearest segment go behind them, where the next line
  * writes. */
-static bool keep_claims(struct axis_claims *c, const int axis[3], size_t first, size_t end)
+static bool store_voxels(struct nearest_segments *c, const int axis[3], size_t first, size_t end)
 {
-    uint32_t *place = c->first + 1; /* of segment e in place[e]: number of its claims, then begin, then end */
+    uint32_t *place = c->first + 1; /* of segment e in place[e]: number of its voxels, then begin, then end */
     memset(place + first, 0, (end - first) * sizeof *place);
     uint32_t begin = c->first[first];
-    if (!make_room(c, begin + count_claims(c, place))) return false;
+    if (!make_room(c, begin + count_voxels(c, place))) return false;
     for (size_t e = first; e < end; e++) {
         const uint32_t n = place[e];
         place[e] = begin;
         begin += n;
     }
     place[OFF_LINE] = begin;
-    place_claims(c, axis, place);
-    place[OFF_LINE] = 0; /* the begin of the first segment's claims */
+    place_voxels(c, axis, place);
+    place[OFF_LINE] = 0; /* the begin of the first segment's voxels */
     return true;
 }
 
 /* Makes room for n_segment segments. */
-static bool start(struct axis_claims *c, size_t n_segment)
+static bool start(struct nearest_segments *c, size_t n_segment)
 {
     if (n_segment + 1 > c->first_capacity) {
         free(c->first);
@@ -292,8 +292,8 @@ static bool start(struct axis_claims *c, size_t n_segment)
     return true;
 }
 
-bool axis_claims_find(struct axis_claims *c, const struct segment_bricks *bricks, const struct section_view *section,
-                      float tail, size_t i_brick)
+bool nearest_segments_find(struct nearest_segments *c, const struct segment_bricks *bricks,
+                           const struct section_view *section, float tail, size_t i_brick)
 {
     const uint32_t *index = bricks->index + bricks->first[i_brick];
     const size_t n_segment = bricks->first[i_brick + 1] - bricks->first[i_brick];
@@ -310,7 +310,7 @@ bool axis_claims_find(struct axis_claims *c, const struct segment_bricks *bricks
             struct stamp w;
             if (stamp_init(&v, index[i], (int32_t)i, &w)) stamp(c, &w);
         }
-        if (!keep_claims(c, v.axis, e, end)) return false;
+        if (!store_voxels(c, v.axis, e, end)) return false;
     }
     memset(c->cell + c->first[n_segment], 0, LANES * sizeof *c->cell);
     return true;

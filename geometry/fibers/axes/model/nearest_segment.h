@@ -1,7 +1,7 @@
 /* The voxels of a brick of the scan that lie near its lines, sorted by the segment that is nearest to them. Lengths are
  * in voxels. */
-#ifndef SELVEDGE_GEOMETRY_AXIS_CLAIM_H
-#define SELVEDGE_GEOMETRY_AXIS_CLAIM_H
+#ifndef SELVEDGE_GEOMETRY_NEAREST_SEGMENT_H
+#define SELVEDGE_GEOMETRY_NEAREST_SEGMENT_H
 
 #include "base/lanes.h"
 #include "geometry/fibers/axes/model/fiber_section.h"
@@ -11,10 +11,10 @@
 
 enum { AXIS_BRICK = 32, AXIS_N_CELL = AXIS_BRICK * AXIS_BRICK * AXIS_BRICK };
 
-/* Nearest segments (claims): every line assigns each voxel up to `tail` beyond the outlines of its segments to the
+/* Nearest segments: every line assigns each voxel up to `tail` beyond the outlines of its segments to the
  * nearest of them. Voxels whose nearest point is an end of the line have none. A voxel may have a nearest segment of
  * each of several lines. */
-struct axis_claims {
+struct nearest_segments {
     /* (k AXIS_BRICK + j) AXIS_BRICK + i of each voxel with a nearest segment; the voxels of a segment follow each
      * other. LANES zeros at the end. */
     uint16_t *cell;
@@ -31,12 +31,12 @@ struct axis_claims {
     size_t n_row;
 };
 
-void axis_claims_init(struct axis_claims *c);
-void axis_claims_release(struct axis_claims *c);
+void nearest_segments_init(struct nearest_segments *c);
+void nearest_segments_release(struct nearest_segments *c);
 
-/* Finds the claims in brick i_brick of bricks with edge AXIS_BRICK. section: of each segment; NULL: discs. Returns
- * false when memory is out. */
-bool axis_claims_find(struct axis_claims *c, const struct segment_bricks *bricks, const struct section_view *section,
-                      float tail, size_t i_brick);
+/* Finds the nearest segments in brick i_brick of bricks with edge AXIS_BRICK. section: of each segment; NULL: discs.
+ * Returns false when memory is out. */
+bool nearest_segments_find(struct nearest_segments *c, const struct segment_bricks *bricks,
+                           const struct section_view *section, float tail, size_t i_brick);
 
 #endif

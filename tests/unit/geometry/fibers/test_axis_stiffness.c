@@ -111,7 +111,7 @@ static double direction_error(const struct polyline_set *lines, const struct wav
 static double solved_error(const struct wave *w, double noise, double correlation)
 {
     struct polyline_set lines;
-    static struct axis_pull pull[N];
+    static struct axis_equation equation[N];
     double stiffness[N];
     const double bend = w->amplitude * pow(2.0 * M_PI / w->length, 2.0) / 2.0; /* mean square over both components */
     uint32_t random = 7;
@@ -122,11 +122,11 @@ static double solved_error(const struct wave *w, double noise, double correlatio
         wave_point(w, (double)i, x);
         x[1] += (float)noise * normal_number(&random);
         x[2] += (float)noise * normal_number(&random);
-        pull[i] = (struct axis_pull){.normal = {1.0f, 0.0f, 1.0f, 0.0f, 0.0f, 1.0f}};
+        equation[i] = (struct axis_equation){.normal = {1.0f, 0.0f, 1.0f, 0.0f, 0.0f, 1.0f}};
         assert_int_equal(polyline_add(&lines, x, NULL), STATUS_OK);
         stiffness[i] = noise * noise / (bend * bend);
     }
-    assert_int_equal(axis_solve_lines(&lines, pull, stiffness, correlation, NULL, NULL), STATUS_OK);
+    assert_int_equal(axis_solve_lines(&lines, equation, stiffness, correlation, NULL, NULL), STATUS_OK);
     const double error = direction_error(&lines, w, (size_t)(5.0 * DIAMETER));
     polyline_set_release(&lines);
     return error;

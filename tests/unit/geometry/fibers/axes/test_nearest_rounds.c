@@ -1,5 +1,5 @@
-/* Fits of lines at rest, which keep the claims of voxels for some rounds: the result does not depend on how many of
- * them there is room for, and is that of fits that find them anew. */
+/* Fits of lines at rest, which keep the nearest segments of voxels for some rounds: the result does not depend on how
+ * many of them there is room for, and is the result of fits that find them anew. */
 #include "geometry/fibers/axes/axis_fit.h"
 #include "geometry/fibers/axes/model/nearest_cache.h"
 #include "geometry/fibers/axes/model/nearest_rounds.h"
@@ -72,8 +72,8 @@ static double distance_of(const struct polyline_set *lines, const struct polylin
     return sqrt(square);
 }
 
-/* The claims take some 400 kB, and the least scratch space has room for an eighth of a megabyte of them. */
-static void test_room_for_claims(void **state)
+/* The nearest segments take some 400 kB, and the least scratch space has room for an eighth of a megabyte of them. */
+static void test_room_for_lists(void **state)
 {
     struct volume v;
     struct polyline_set lines, all, few;
@@ -116,35 +116,35 @@ static void test_same_axes(void **state)
     polyline_set_release(&anew);
 }
 
-/* A brick whose claims do not fit is not kept, and does not take the room of the next one. */
+/* A brick whose list does not fit is not kept, and does not take the room of the next one. */
 static void test_store(void **state)
 {
     (void)state;
     const uint16_t cell[20 + LANES] = {7, 8, 9};
     const uint32_t small_first[3] = {0, 1, 3}, large_first[3] = {0, 1, 20};
-    const struct claim_list small = {cell, small_first}, large = {cell, large_first};
-    struct claim_list found;
-    struct claim_store s;
-    assert_true(claim_store_init(&s, 3, (3 + LANES) * sizeof *cell + sizeof small_first));
-    claim_store_add(&s, 0, &large, 2);
-    claim_store_add(&s, 1, &small, 2);
-    claim_store_add(&s, 2, &small, 2);
-    assert_false(claim_store_find(&s, 0, &found));
-    assert_false(claim_store_find(&s, 2, &found));
-    assert_true(claim_store_find(&s, 1, &found));
+    const struct nearest_list small = {cell, small_first}, large = {cell, large_first};
+    struct nearest_list found;
+    struct nearest_cache s;
+    assert_true(nearest_cache_init(&s, 3, (3 + LANES) * sizeof *cell + sizeof small_first));
+    nearest_cache_add(&s, 0, &large, 2);
+    nearest_cache_add(&s, 1, &small, 2);
+    nearest_cache_add(&s, 2, &small, 2);
+    assert_false(nearest_cache_find(&s, 0, &found));
+    assert_false(nearest_cache_find(&s, 2, &found));
+    assert_true(nearest_cache_find(&s, 1, &found));
     assert_memory_equal(found.cell, cell, (3 + LANES) * sizeof *cell);
     assert_memory_equal(found.first, small_first, sizeof small_first);
-    claim_store_release(&s);
-    claim_store_release(&s); /* an empty store */
+    nearest_cache_release(&s);
+    nearest_cache_release(&s); /* an empty store */
 }
 
 /* Makes a step that moves all vertices by d voxels, and returns the kind of the round after it. */
-static struct round_kind after_step(struct claim_rounds *r, struct polyline_set *lines, float d, bool is_last)
+static struct round_kind after_step(struct nearest_rounds *r, struct polyline_set *lines, float d, bool is_last)
 {
-    claim_rounds_before_step(r, lines);
+    nearest_rounds_before_step(r, lines);
     for (size_t i = 0; i < lines->n_vertex; i++) lines->vertex[i][1] += d;
-    claim_rounds_after_step(r, lines);
-    return claim_rounds_next(r, is_last);
+    nearest_rounds_after_step(r, lines);
+    return nearest_rounds_next(r, is_last);
 }
 
 /* Claims serve three rounds and are found anew after a step of more than a tenth of a voxel. The last round keeps
@@ -153,15 +153,15 @@ static void test_rounds(void **state)
 {
     (void)state;
     static const float vertex[2][3] = {{1, 2, 3}, {2, 2, 3}};
-    struct claim_rounds r = {0};
+    struct nearest_rounds r = {0};
     struct polyline_set lines;
     polyline_set_init(&lines);
     assert_int_equal(polyline_begin(&lines, 0, NULL), STATUS_OK);
     for (int i = 0; i < 2; i++) assert_int_equal(polyline_add(&lines, vertex[i], NULL), STATUS_OK);
-    struct round_kind k = claim_rounds_next(&r, false); /* not of lines at rest */
+    struct round_kind k = nearest_rounds_next(&r, false); /* not of lines at rest */
     assert_false(k.follows || k.is_followed);
-    assert_true(claim_rounds_start(&r, lines.n_vertex));
-    k = claim_rounds_next(&r, false);
+    assert_true(nearest_rounds_start(&r, lines.n_vertex));
+    k = nearest_rounds_next(&r, false);
     assert_true(!k.follows && k.is_followed);
     for (int i = 0; i < 2; i++) assert_true(after_step(&r, &lines, 0.05f, false).follows);
     k = after_step(&r, &lines, 0.05f, false);
@@ -171,14 +171,14 @@ static void test_rounds(void **state)
     assert_true(after_step(&r, &lines, 0.05f, true).follows);
     k = after_step(&r, &lines, 0.2f, true);
     assert_false(k.follows || k.is_followed);
-    claim_rounds_release(&r);
+    nearest_rounds_release(&r);
     polyline_set_release(&lines);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(test_room_for_claims, scratch_folder_setup, scratch_folder_teardown),
+        cmocka_unit_test_setup_teardown(test_room_for_lists, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test(test_same_axes), cmocka_unit_test(test_rounds), cmocka_unit_test(test_store)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

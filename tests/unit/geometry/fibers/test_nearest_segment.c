@@ -1,4 +1,4 @@
-/* Which voxels each line claims, and for which of its segments, against a search of all segments. */
+/* Which voxels belong to each line, and to which of its segments, against a search of all segments. */
 #include "geometry/fibers/axes/model/nearest_segment.h"
 
 #include <math.h>
@@ -12,7 +12,7 @@
 enum { N_LINE = 4, NX = 45, NY = 39, NZ = 37 };
 static const size_t N[3] = {NX, NY, NZ};
 static const float TAIL = 1.7f;
-static const double EDGE = 1e-3; /* voxels this near to the reach may be claimed or not */
+static const double EDGE = 1e-3; /* voxels this near to the reach may belong to it or not */
 
 /* Lines along every axis and askew, that bend, have a kink, and leave the volume. */
 static void make_lines(struct polyline_set *lines)
@@ -65,15 +65,15 @@ static double nearest_of(const struct segment_bricks *b, uint32_t line, const do
     return least;
 }
 
-/* Compares the claims of one brick with the search, and counts them. */
-static size_t check_brick(const struct segment_bricks *b, struct axis_claims *c, size_t i_brick)
+/* Compares the nearest segments in one brick with the search, and counts them. */
+static size_t check_brick(const struct segment_bricks *b, struct nearest_segments *c, size_t i_brick)
 {
-    static bool claimed[N_LINE][AXIS_N_CELL];
+    static bool found[N_LINE][AXIS_N_CELL];
     const size_t n_segment = b->first[i_brick + 1] - b->first[i_brick];
     size_t from[3], n[3];
-    memset(claimed, 0, sizeof claimed);
+    memset(found, 0, sizeof found);
     segment_brick_box(b, i_brick, from, n);
-    assert_true(axis_claims_find(c, b, NULL, TAIL, i_brick));
+    assert_true(nearest_segments_find(c, b, NULL, TAIL, i_brick));
     for (size_t e = 0; e < n_segment; e++)
         for (size_t i = c->first[e]; i < c->first[e + 1]; i++) {
             const struct segment *g = &b->segment[b->index[b->first[i_brick] + e]];
@@ -85,8 +85,8 @@ static size_t check_brick(const struct segment_bricks *b, struct axis_claims *c,
                 assert_true(x[a] < n[a]);
                 p[a] = (double)(from[a] + x[a]) + 0.5;
             }
-            assert_false(claimed[g->line][c->cell[i]]);
-            claimed[g->line][c->cell[i]] = true;
+            assert_false(found[g->line][c->cell[i]]);
+            found[g->line][c->cell[i]] = true;
             assert_true(distance_of(g, p, &t) < nearest_of(b, g->line, p, &beside) + EDGE);
         }
     for (uint32_t l = 0; l < N_LINE; l++)
@@ -97,36 +97,36 @@ static size_t check_brick(const struct segment_bricks *b, struct axis_claims *c,
                                  (double)(from[2] + x[2]) + 0.5};
             bool beside = false;
             const double d = nearest_of(b, l, p, &beside), reach = 2.0 + 0.6 * l + (double)TAIL;
-            if (fabs(d - reach) > EDGE && beside) assert_int_equal(claimed[l][at], d < reach);
+            if (fabs(d - reach) > EDGE && beside) assert_int_equal(found[l][at], d < reach);
         }
     return c->first[n_segment];
 }
 
-static void test_claims_are_those_of_the_nearest_segments(void **state)
+static void test_voxels_belong_to_the_nearest_segments(void **state)
 {
     (void)state;
     struct polyline_set lines;
     struct segment_bricks bricks;
-    struct axis_claims *c = malloc(sizeof *c);
-    size_t n_claim = 0;
+    struct nearest_segments *c = malloc(sizeof *c);
+    size_t n_voxel = 0;
     assert_non_null(c);
     make_lines(&lines);
-    axis_claims_init(c);
+    nearest_segments_init(c);
     assert_int_equal(segment_bricks_init(&bricks, &lines, N, AXIS_BRICK, 6.0f, NULL), STATUS_OK);
-    for (size_t b = 0; b < segment_n_brick(&bricks); b++) n_claim += check_brick(&bricks, c, b);
-    assert_true(n_claim > 4000);
+    for (size_t b = 0; b < segment_n_brick(&bricks); b++) n_voxel += check_brick(&bricks, c, b);
+    assert_true(n_voxel > 4000);
     /* a second visit finds the work as clean as the first */
     size_t again = 0;
     for (size_t b = 0; b < segment_n_brick(&bricks); b++) again += check_brick(&bricks, c, b);
-    assert_int_equal(again, n_claim);
+    assert_int_equal(again, n_voxel);
     segment_bricks_release(&bricks);
-    axis_claims_release(c);
+    nearest_segments_release(c);
     free(c);
     polyline_set_release(&lines);
 }
 
 int main(void)
 {
-    const struct CMUnitTest test[] = {cmocka_unit_test(test_claims_are_those_of_the_nearest_segments)};
+    const struct CMUnitTest test[] = {cmocka_unit_test(test_voxels_belong_to_the_nearest_segments)};
     return cmocka_run_group_tests(test, NULL, NULL);
 }
