@@ -214,7 +214,7 @@ $(BUILD)/tools/speckle-tables: $(addprefix $(BUILD)/obj/$(WAVE)/,speckle_tables_
 	@mkdir -p $(@D)
 	@$(CC) $(LDFLAGS) -o $@ $^ $(LINK_WAVE) $(LINK_BASE)
 speckle-tables: $(BUILD)/tools/speckle-tables ## make the tables of speckle of wave_silk.v1 and its like again (three minutes of a core)
-	@$(BUILD)/tools/speckle-tables $(WAVE)
+	@$(BUILD)/tools/speckle-tables $(WAVE)/wave_speckle.c
 
 include config/install.mk
 include tests/exact/exact.mk

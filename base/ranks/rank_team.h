@@ -10,11 +10,27 @@
 #define SELVEDGE_BASE_RANK_TEAM_H
 
 #include "base/progress.h"
-#include "base/ranks/rank_order_kind.h"
 #include "base/ranks/rank_traffic.h"
 #include "base/thread_pool.h"
 
 #include <stdint.h>
+
+/* The kinds of orders that the root of a team sends to its helpers. The header named beside a kind describes the
+ * content of the order. */
+enum rank_order_kind {
+    RANK_ORDER_END = 0, /* ends the helper */
+    /* renderer/estimate */
+    RANK_ORDER_CLOTH,    /* shared_cloth.h */
+    RANK_ORDER_ESTIMATE, /* rank_request.h, as the next */
+    RANK_ORDER_PICTURE,
+    RANK_ORDER_AGREE, /* a text; helpers refuse when theirs is another */
+    /* geometry */
+    RANK_ORDER_SLAB,       /* volume_slabs.h, as the next: which part of a volume a rank has */
+    RANK_ORDER_ROWS,       /* densities of the rank's part */
+    RANK_ORDER_DIRECTIONS, /* direction_share.h */
+    RANK_ORDER_AXES,       /* axis_share.h, as the next: the lines of a round of the fit */
+    RANK_ORDER_BRICKS
+};
 
 struct rank_team;
 

@@ -79,7 +79,7 @@ status trace_settle(struct trace_job *job, struct polyline_set *lines, struct er
 /* Finds the lines of a scan (trace_scan.c), to the end (finish) or until they are settled. They are in voxels of the
  * scan. */
 status trace_scan(struct trace_job *job, bool finish, struct polyline_set *lines, struct error *err);
-/* Marks the voxels in the inner parts of fibers (trace_cores.c), in a volume of n. Voxels that have a mark keep it. */
+/* Marks the voxels in the inner parts of fibers (trace_lumens.c), in a volume of n. Voxels that have a mark keep it. */
 void trace_mark_cores(const struct polyline_set *lines, double diameter, const size_t n[3], uint8_t value,
                       uint8_t *mark);
 /* Where lumens were filled, fits the finished lines once more to the scan as it was, with a lumen for each

@@ -1,6 +1,6 @@
 #include "optimizer/worker/worker_launcher.h"
 
-#include "base/files/disk_use.h"
+#include "base/files/file_tree.h"
 #include "base/status.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/worker/worker_team.h"

@@ -1,7 +1,7 @@
 /* selvedge-worker JOBDIR: one job from its folder to its results. Layout of the folder: optimizer/job/job_folder.h. */
-#include "base/files/disk_use.h"
+#include "base/files/file_tree.h"
 #include "base/log.h"
-#include "base/process_use.h"
+#include "base/process.h"
 #include "base/thread_pool.h"
 #include "optimizer/job/document/catalogue_json.h"
 #include "optimizer/job/job_folder.h"

@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_RENDERER_FAST_SETTING_H
 #define SELVEDGE_RENDERER_FAST_SETTING_H
 
-#include "renderer/fast/fast_option.h"
+#include "renderer/fast/fast_tables.h"
 #include "renderer/fast/light_mixture.h"
 #include "renderer/transport/surface/path_tracer.h"
 

@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_RENDERER_DIFFUSION_SHADE_H
 #define SELVEDGE_RENDERER_DIFFUSION_SHADE_H
 
-#include "renderer/quick/diffusion_option.h"
+#include "renderer/quick/diffusion_tables.h"
 #include "renderer/transport/surface/path_tracer.h"
 
 struct diffusion_setting {

@@ -65,4 +65,9 @@ void diffusion_leaving_at(const struct diffusion_tables *t, size_t side, const f
 /* entering(wi) pair(wo, wi), linear between cells of one side. */
 void diffusion_entering_at(const struct diffusion_tables *t, const float wo[3], const float wi[3], float rgb[3]);
 
+/* How a radiance source renders by diffusion. */
+struct diffusion_option {
+    const struct diffusion_tables *tables; /* they say how many hits of a path are traced */
+};
+
 #endif

@@ -2,7 +2,7 @@
 #ifndef SELVEDGE_RENDERER_DUAL_SHADE_H
 #define SELVEDGE_RENDERER_DUAL_SHADE_H
 
-#include "renderer/quick/dual_option.h"
+#include "renderer/quick/dual_tables.h"
 #include "renderer/scene/fiber_frame.h"
 #include "renderer/transport/surface/path_tracer.h"
 

@@ -57,4 +57,12 @@ void dual_deep_lobe(const struct dual_tables *t, const struct dual_average *a, f
 /* A_1 + A_3 for fractions forward and backward: light that comes back after one and after three turns. */
 float dual_deep_fraction(float forward, float backward);
 
+/* How a radiance source renders by dual scattering. */
+struct dual_option {
+    const struct dual_tables *tables;
+    /* Shares of light that is scattered by fibers in front and that comes back from fibers behind: 0.6 to 0.8 for hair
+     * as published, 1 for cloth (fabric thesis, section 6.6), whose fibers lie closer. */
+    float density_forward, density_backward;
+};
+
 #endif

@@ -1,25 +1,47 @@
+/* The models of fibers and of volumes, in the order of their rows. */
+#include "renderer/scattering/phase_model.h"
 #include "renderer/scattering/scattering.h"
 
 #include <math.h>
 #include <string.h>
 
-#define VOLUME_MODEL(...)
 #define SURFACE_MODEL(name, ...) extern const struct scattering_model scattering_##name;
+#define VOLUME_MODEL(name, ...) extern const struct phase_model phase_##name;
 #include "base/catalogue/models.def"
 #undef SURFACE_MODEL
+#undef VOLUME_MODEL
 
-static const struct scattering_model *const registry[] = {
+static const struct scattering_model *const surface_models[] = {
 #define SURFACE_MODEL(name, ...) &scattering_##name,
+#define VOLUME_MODEL(...)
+#include "base/catalogue/models.def"
+    NULL,
+};
+#undef SURFACE_MODEL
+#undef VOLUME_MODEL
+
+static const struct phase_model *const volume_models[] = {
+#define SURFACE_MODEL(...)
+#define VOLUME_MODEL(name, ...) &phase_##name,
 #include "base/catalogue/models.def"
     NULL,
 };
 
-const struct scattering_model *const *scattering_registry(void) { return registry; }
+const struct scattering_model *const *scattering_registry(void) { return surface_models; }
 
 const struct scattering_model *scattering_find(const char *id)
 {
-    for (size_t i = 0; registry[i] != NULL; i++)
-        if (strcmp(registry[i]->id, id) == 0) return registry[i];
+    for (size_t i = 0; surface_models[i] != NULL; i++)
+        if (strcmp(surface_models[i]->id, id) == 0) return surface_models[i];
+    return NULL;
+}
+
+const struct phase_model *const *phase_registry(void) { return volume_models; }
+
+const struct phase_model *phase_find(const char *id)
+{
+    for (size_t i = 0; volume_models[i] != NULL; i++)
+        if (strcmp(volume_models[i]->id, id) == 0) return volume_models[i];
     return NULL;
 }
 

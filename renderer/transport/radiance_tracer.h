@@ -14,9 +14,9 @@
 enum { RADIANCE_BLOCK_PATHS = 256 };
 
 struct volume_scene;     /* renderer/transport/volume/volume_scene.h */
-struct fast_option;      /* renderer/fast/fast_option.h */
-struct dual_option;      /* renderer/quick/dual_option.h */
-struct diffusion_option; /* renderer/quick/diffusion_option.h */
+struct fast_option;      /* renderer/fast/fast_tables.h */
+struct dual_option;      /* renderer/quick/dual_tables.h */
+struct diffusion_option; /* renderer/quick/diffusion_tables.h */
 
 /* One cloth in the forms in which it is at hand. */
 struct appearance_scene {

@@ -1,5 +1,5 @@
 #include "server/batches/batch_plan.h"
-#include "base/files/disk_use.h"
+#include "base/files/file_tree.h"
 #include "server/batches/batch_service.h"
 #include "server/files/worker_files.h"
 #include "server/settings/job_paths.h"

@@ -1,5 +1,5 @@
 #include "server/http/static_files.h"
-#include "base/program_folder.h"
+#include "base/process.h"
 
 #include <dirent.h>
 #include <stdbool.h>

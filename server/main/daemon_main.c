@@ -1,7 +1,7 @@
 /* selvedged, the daemon: HTTP server, database of jobs and supervision of workers. It never reads volumes or
  * pictures and computes nothing; workers do. */
 #include "base/files/durable.h"
-#include "base/program_folder.h"
+#include "base/process.h"
 #include "base/version.h"
 #include "server/endpoints/endpoint_table.h"
 #include "server/http/http_server.h"

@@ -1,7 +1,7 @@
 #include "server/retention/retention.h"
 #include "base/clock.h"
-#include "base/files/disk_use.h"
 #include "base/files/durable.h"
+#include "base/files/file_tree.h"
 #include "optimizer/job/job_outline.h"
 #include "server/retention/job_keep.h"
 #include "server/settings/job_paths.h"

@@ -1,5 +1,4 @@
 #include "server/views/result_version.h"
-#include "base/files/disk_use.h"
 #include "base/files/durable.h"
 #include "base/files/file_tree.h"
 #include "base/files/foreign_file.h"

@@ -1,8 +1,9 @@
 #include "clients/cli/arguments/cli_tool.h"
 
-#include "clients/cli/arguments/cli_sibling.h"
+#include "base/process.h"
 
 #include <stdint.h>
+#include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -30,6 +31,16 @@ static bool names_a_service(char *const *argv)
     for (; *argv != NULL; argv++)
         if (strncmp(*argv, "--config", 8) == 0 || strncmp(*argv, "--data", 6) == 0) return true;
     return false;
+}
+
+void cli_sibling(const char *name, char path[CLI_SIBLING_BYTES])
+{
+    char own[CLI_SIBLING_BYTES - 256];
+    if (program_folder(own, sizeof own)) {
+        snprintf(path, CLI_SIBLING_BYTES, "%s/%.200s", own, name);
+        if (access(path, X_OK) == 0) return;
+    }
+    snprintf(path, CLI_SIBLING_BYTES, "%s", name);
 }
 
 status cli_tool_run(char **argv, struct error *err)

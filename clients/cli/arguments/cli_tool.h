@@ -21,4 +21,11 @@ bool cli_tool_knows(const char *word);
 /* Replaces this process by the program that runs the command argv[1]: the one beside this program, or else in PATH.
  * Returns only on failure: STATUS_NOT_FOUND. */
 status cli_tool_run(char **argv, struct error *err);
+
+enum { CLI_SIBLING_BYTES = 4096 };
+
+/* Writes the file that execvp should run for the program `name`: the file beside this program, or `name` alone, which
+ * execvp then looks for in PATH. */
+void cli_sibling(const char *name, char path[CLI_SIBLING_BYTES]);
+
 #endif

@@ -1,6 +1,6 @@
 /* selvedge check JOB.json: all faults of a job document and of its files before anything is uploaded. The check itself
  * is a mode of `selvedge-worker`, which reads every file format; the client runs it and prints its report. */
-#include "clients/cli/arguments/cli_sibling.h"
+#include "clients/cli/arguments/cli_tool.h"
 #include "clients/cli/commands/cli.h"
 #include "clients/cli/text/cli_report.h"
 #include "clients/cli/text/cli_text.h"

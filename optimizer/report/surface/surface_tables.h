@@ -5,9 +5,9 @@
 
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/report/findings/report.h"
-#include "renderer/fast/fast_option.h"
-#include "renderer/quick/diffusion_option.h"
-#include "renderer/quick/dual_option.h"
+#include "renderer/fast/fast_tables.h"
+#include "renderer/quick/diffusion_tables.h"
+#include "renderer/quick/dual_tables.h"
 
 struct surface_tables {
     struct fast_tables tables;

@@ -1,7 +1,7 @@
 #include "optimizer/stages/run/worker_status.h"
 #include "base/clock.h"
 #include "base/files/durable.h"
-#include "base/process_use.h"
+#include "base/process.h"
 #include "base/utf8.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/job/job_folder.h"

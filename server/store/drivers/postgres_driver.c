@@ -1,6 +1,6 @@
 /* PostgreSQL as the database of several daemons. libpq is reached through a plug-in, so that no other service needs
  * it. */
-#include "base/program_folder.h"
+#include "base/process.h"
 #include "server/store/drivers/driver_table.h"
 #include "server/store/drivers/store_schema.h"
 #include "server/store/drivers/store_sql.h"

@@ -32,10 +32,10 @@
 #include "base/clock.h"
 #include "renderer/estimate/estimate.h"
 #include "renderer/estimate/render.h"
-#include "renderer/fast/fast_option.h"
+#include "renderer/fast/fast_tables.h"
 #include "renderer/fast/precompute/fast_precompute.h"
 #include "renderer/mesh/mesh_drape.h"
-#include "renderer/quick/dual_option.h"
+#include "renderer/quick/dual_tables.h"
 #include "tests/bench/pictures/field_pair.h"
 #include "tests/support/cloth/fit_fabrics.h"
 

@@ -16,8 +16,8 @@
 #include "base/clock.h"
 #include "geometry/phantom/phantom.h"
 #include "renderer/estimate/estimate.h"
-#include "renderer/quick/diffusion_option.h"
-#include "renderer/quick/dual_option.h"
+#include "renderer/quick/diffusion_tables.h"
+#include "renderer/quick/dual_tables.h"
 #include "tests/support/tracer/trace_input.h"
 
 #include <math.h>

@@ -3,7 +3,7 @@
 #define SELVEDGE_TESTS_DUAL_CLOTH_H
 
 #include "geometry/fibers/fiber_set.h"
-#include "renderer/quick/dual_option.h"
+#include "renderer/quick/dual_tables.h"
 
 struct dual_cloth {
     struct scene *scene;

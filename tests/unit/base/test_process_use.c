@@ -1,5 +1,5 @@
 /* What a process has used: its own memory, and not that of the program that started it. */
-#include "base/process_use.h"
+#include "base/process.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -3,7 +3,6 @@
 #include "clients/cli/arguments/cli_command_table.c" /* NOLINT */
 #include "clients/cli/arguments/cli_option_table.c"  /* NOLINT */
 #include "clients/cli/arguments/cli_parse.c"         /* NOLINT */
-#include "clients/cli/arguments/cli_sibling.c"       /* NOLINT */
 #include "clients/cli/arguments/cli_tool.c"          /* NOLINT */
 #include "clients/cli/text/cli_text.c"               /* NOLINT */
 

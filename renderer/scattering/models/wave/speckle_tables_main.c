@@ -1,9 +1,8 @@
 /* Makes the tables of speckle (speckle.h): simulates rough fibers (speckle_instances.h), and finds the weights of
  * bands whose correlation comes nearest to theirs.
  *
- * speckle-tables FOLDER [SECTION]
- *   FOLDER   where wave_SECTION_speckle.c is written
- *   SECTION  one of the names of wave_sections.c; all without it
+ * speckle-tables FILE
+ *   FILE   where the tables of all sections are written
  * Prints for each section the weights, contrast and correlation of the simulated light, and the time.
  *
  * The correlation of the intensity of fully developed speckle is the square of the correlation of its field (Goodman
@@ -90,23 +89,13 @@ static double fit_power(const struct wave_section *s, const struct speckle_stati
     return best;
 }
 
-static void write_table(const struct wave_section *s, const float weight[SPECKLE_N_BAND], double power,
-                        const char *folder)
+static void write_table(FILE *f, const struct wave_section *s, const float weight[SPECKLE_N_BAND], double power)
 {
-    char path[4096];
-    snprintf(path, sizeof path, "%s/wave_%s_speckle.c", folder, s->name);
-    FILE *f = fopen(path, "w");
-    if (f == NULL) stop("cannot write to the folder");
-    fprintf(f,
-            "/* Made by speckle-tables (`make speckle-tables`), not by hand; speckle.h defines it. */\n"
-            "#include \"renderer/scattering/models/wave/speckle_tables.h\"\n\n/* clang-format off */\n"
-            "const struct speckle_table wave_%s_speckle = {\n{",
-            s->name);
+    fprintf(f, "const struct speckle_table wave_%s_speckle = {\n{", s->name);
     for (int c = 0; c < 3; c++) fprintf(f, "%.6gF,", cells(s, c, power));
     fprintf(f, "}, {");
     for (int b = 0; b < SPECKLE_N_BAND; b++) fprintf(f, "%.6fF,", (double)weight[b]);
-    fprintf(f, "}};\n/* clang-format on */\n");
-    if (fclose(f) != 0) stop("cannot write to the folder");
+    fprintf(f, "}};\n");
 }
 
 static void report(const struct wave_section *s, const struct speckle_statistics *t, const float weight[SPECKLE_N_BAND],
@@ -127,7 +116,7 @@ static void report(const struct wave_section *s, const struct speckle_statistics
                speckle_correlation(weight, i * SPECKLE_DISTANCE_STEP / CELL));
 }
 
-static void make(struct thread_pool *pool, const struct wave_section *section, const char *folder)
+static void make(struct thread_pool *pool, const struct wave_section *section, FILE *f)
 {
     struct speckle_statistics t;
     struct error err = {0};
@@ -138,22 +127,22 @@ static void make(struct thread_pool *pool, const struct wave_section *section, c
     for (int b = 0; b < SPECKLE_N_BAND; b++) sum += v[b];
     for (int b = 0; b < SPECKLE_N_BAND; b++) weight[b] = (float)sqrt(v[b] / sum);
     const double power = fit_power(section, &t, weight);
-    write_table(section, weight, power, folder);
+    write_table(f, section, weight, power);
     report(section, &t, weight, power, clock_monotonic_s() - start);
 }
 
 int main(int argc, char **argv)
 {
     struct thread_pool *pool = NULL;
-    bool found = false;
-    if (argc < 2 || argc > 3) stop("usage: speckle-tables FOLDER [SECTION]");
+    if (argc != 2) stop("usage: speckle-tables FILE");
     if (thread_pool_new(0, &pool, NULL) != STATUS_OK) stop("out of memory");
-    for (int i = 0; i < WAVE_N_SECTION; i++) {
-        if (argc > 2 && strcmp(argv[2], wave_sections[i].name) != 0) continue;
-        make(pool, &wave_sections[i], argv[1]);
-        found = true;
-    }
+    FILE *f = fopen(argv[1], "w");
+    if (f == NULL) stop("cannot write the file");
+    fprintf(f, "/* Made by speckle-tables (`make speckle-tables`), not by hand; speckle.h defines them. */\n"
+               "#include \"renderer/scattering/models/wave/speckle_tables.h\"\n\n/* clang-format off */\n");
+    for (int i = 0; i < WAVE_N_SECTION; i++) make(pool, &wave_sections[i], f);
+    fprintf(f, "/* clang-format on */\n");
+    if (fclose(f) != 0) stop("cannot write the file");
     thread_pool_free(pool);
-    if (!found) stop("there is no such section");
     return 0;
 }

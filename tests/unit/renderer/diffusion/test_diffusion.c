@@ -5,7 +5,7 @@
 #include "renderer/estimate/estimate.h"
 #include "renderer/estimate/radiance_source.h"
 #include "renderer/mesh/mesh_shapes.h"
-#include "renderer/quick/diffusion_option.h"
+#include "renderer/quick/diffusion_tables.h"
 #include "tests/support/cloth/dual_cloth.h"
 #include "tests/support/cloth/hand_weave.h"
 #include "tests/support/cloth/make_phantom.h"

@@ -3,8 +3,8 @@
  * in a sheared cloth, and where deep light enters a bent one. */
 #include "renderer/estimate/estimate.h"
 #include "renderer/fast/deep_shade.h"
-#include "renderer/fast/fast_option.h"
 #include "renderer/fast/fast_setting.h"
+#include "renderer/fast/fast_tables.h"
 #include "renderer/fast/precompute/fast_precompute.h"
 #include "renderer/mesh/mesh_shapes.h"
 #include "renderer/scene/scene_place.h"

@@ -3,7 +3,7 @@
 #include "base/files/durable.h"
 #include "base/rng.h"
 #include "renderer/estimate/estimate.h"
-#include "renderer/fast/fast_option.h"
+#include "renderer/fast/fast_tables.h"
 #include "renderer/fast/precompute/fast_precompute.h"
 #include "renderer/fast/precompute/seen_places.h"
 #include "renderer/fast/sphere_harmonics.h"

@@ -4,7 +4,7 @@
 #include "base/angle.h"
 #include "base/rng.h"
 #include "renderer/estimate/estimate.h"
-#include "renderer/fast/fast_option.h"
+#include "renderer/fast/fast_tables.h"
 #include "renderer/fast/precompute/fast_precompute.h"
 #include "renderer/transport/lamp.h"
 #include "tests/support/cloth/hand_weave.h"

@@ -1,7 +1,9 @@
-#include "base/process_use.h"
+#include "base/process.h"
 
 #include <stdio.h>
+#include <string.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 static double seconds_of(const struct timeval *t) { return (double)t->tv_sec + 1e-6 * (double)t->tv_usec; }
 
@@ -24,4 +26,13 @@ struct process_use process_use(void)
     const long long own_kib = peak_kib();
     return (struct process_use){.cpu_s = seconds_of(&usage.ru_utime) + seconds_of(&usage.ru_stime),
                                 .peak_rss_bytes = (own_kib > 0 ? own_kib : usage.ru_maxrss) * 1024};
+}
+
+bool program_folder(char *folder, size_t n_bytes)
+{
+    ssize_t n = readlink("/proc/self/exe", folder, n_bytes);
+    folder[n > 0 && (size_t)n < n_bytes ? n : 0] = '\0';
+    char *slash = strrchr(folder, '/');
+    if (slash != NULL) *slash = '\0';
+    return slash != NULL;
 }
