@@ -150,7 +150,7 @@ $(BUILD)/bin/selvedge-worker: $(BUILD)/obj/optimizer/worker/worker_main.c.o $(L)
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(LINK_OPTIMIZER)
 # (MPI's headers include casts that our warnings refuse)
-$(BUILD)/obj/optimizer/worker/selvedge_mpi_main.c.o: CFLAGS_ALL += $(patsubst -I%,-isystem %,$(shell pkg-config --cflags-only-I ompi-c 2>/dev/null))
+$(BUILD)/obj/optimizer/worker/selvedge_mpi_main.c.o $(BUILD)/syntax/optimizer/worker/selvedge_mpi_main.c.ok: CFLAGS_ALL += $(patsubst -I%,-isystem %,$(shell pkg-config --cflags-only-I ompi-c 2>/dev/null))
 $(BUILD)/bin/selvedge-mpi: $(BUILD)/obj/optimizer/worker/selvedge_mpi_main.c.o
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS) -o $@ $^ $(shell pkg-config --libs ompi-c)

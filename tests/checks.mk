@@ -1,5 +1,5 @@
 # Checks of the sources. `make test` and `make check` count each of them as a test.
-.PHONY: every-object layers format format-check columns clang lint lint-c lint-javascript lint-python lint-shell lint-words
+.PHONY: every-source layers format format-check columns clang lint lint-c lint-javascript lint-python lint-shell lint-words
 # clang-format 14, that of Debian 12: other versions break lines elsewhere
 FORMATTED = $(shell find base geometry renderer optimizer server clients tests -name '*.[ch]' -o -name '*.cpp')
 SHELL_SCRIPTS = $(shell git ls-files '*.sh') config/install-dependencies .ci/run
@@ -20,15 +20,25 @@ layers:            ## includes and calls go one way, in each part from folder to
 columns:           ## no line of a C source is longer than 120 columns, comments included
 	@/usr/bin/python3 tests/check_columns.py $(FORMATTED)
 
-# objects of all sources, none of them linked; benchmarks and fuzzers, which no other target of continuous integration
-# compiles, are part of it
+# what gcc compiles in `make test` is compiled with clang as well, but for tests/unit and tests/physics, which only a
+# night compiles (CLANG_TOO); benchmarks and fuzzers, which no other target of continuous integration compiles, are part
+# of it. Nothing but errors and warnings is made
+CLANG_TOO ?=
 SOURCES = $(shell find $(foreach p,$(PARTS),$(folder_$p)) clients/cli tests -name '*.c' -o -name '*.cpp')
 # shared objects, which have rules of their own, and what needs a library that may be missing
-APART = tests/crash/fault_shim.c tests/bench/clock/cpu_clock.c %_plugin.c $(if $(OPENMPI),,optimizer/worker/selvedge_mpi_main.c)
-every-object: $(call objs,$(filter-out $(APART),$(SOURCES))) $(PLUGINS)
+APART = tests/crash/fault_shim.c tests/bench/clock/cpu_clock.c %_plugin.c $(if $(OPENMPI),,optimizer/worker/selvedge_mpi_main.c) \
+	$(if $(CLANG_TOO),,tests/unit/% tests/physics/%)
+$(BUILD)/syntax/%.c.ok: %.c | $(GENERATED)
+	@mkdir -p $(@D)
+	@$(CC) $(CFLAGS_ALL) -fsyntax-only -MMD -MP -MF $(@:.ok=.d) -MT $@ $< && touch $@
+$(BUILD)/syntax/%.cpp.ok: %.cpp
+	@mkdir -p $(@D)
+	@$(CXX) $(CXXFLAGS_ALL) -fsyntax-only -MMD -MP -MF $(@:.ok=.d) -MT $@ $< && touch $@
+every-source: $(patsubst %,$(BUILD)/syntax/%.ok,$(filter-out $(APART),$(SOURCES))) $(PLUGINS)
+-include $(shell find $(BUILD)/syntax -name '*.d' 2>/dev/null)
 
-clang:             ## clang compiles every source, benchmarks and fuzzers too, without a warning (gcc does in every build)
-	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/clang CC=clang CXX=clang++ OPTIMIZE=-O0 CFLAGS=-g0 CXXFLAGS=-g0 every-object
+clang:             ## clang reads every source but tests (CLANG_TOO=1: these too), benchmarks and fuzzers as well, without a warning (gcc does in every build)
+	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/clang CC=clang CXX=clang++ OPTIMIZE=-O0 CLANG_TOO=$(CLANG_TOO) every-source
 	@echo "clang ok"
 
 lint: lint-c lint-javascript lint-python lint-shell lint-words ## all of the next five

@@ -65,7 +65,8 @@ tsan: | deps-test  ## tests of the daemon under the thread sanitizer (three minu
 		/usr/bin/python3 tests/run_tests.py --quick --programs --only $$t --build build/tsan || exit 1; done
 
 tsan-requests:     ## those where many requests meet: a part of `make test`
-	@$(MAKE) --no-print-directory tsan THREADED_TESTS="api/service api/test_jobs_api api/test_uploads_api"
+	@$(MAKE) --no-print-directory tsan THREADED_TESTS="api/service/test_list api/service/test_long_poll api/service/test_backup \
+		api/service/test_service_cost api/service/test_webhook api/test_jobs_api api/test_uploads_api"
 
 test-slurm: | deps-test ## jobs on a real Slurm of two virtual nodes: faults, restarts, time limits (five minutes, mostly of waiting)
 	@$(MAKE) --no-print-directory -j$$(nproc) all

@@ -214,9 +214,9 @@ def scenario(d):
 
 
 @pytest.mark.parametrize("call, code, path, step", [
-    ("write", errno.ENOSPC, "/upload/", 3), ("write", errno.EIO, "/upload/", 7), ("write", 0, "/upload/", 5), ("sync", errno.EIO, "/upload/", 3),
-    ("fallocate", errno.ENOSPC, "/upload/", 1), ("write", errno.ENOSPC, "selvedge.db", 11), ("write", errno.EIO, "selvedge.db", 13),
-    ("write", 0, "selvedge.db", 17), ("sync", errno.EIO, "selvedge.db", 7), ("write", errno.ENOSPC, "/jobs/", 9), ("sync", errno.EIO, "/jobs/", 9)])
+    ("write", errno.ENOSPC, "/upload/", 7), ("write", errno.EIO, "/upload/", 13), ("write", 0, "/upload/", 11), ("sync", errno.EIO, "/upload/", 7),
+    ("fallocate", errno.ENOSPC, "/upload/", 1), ("write", errno.ENOSPC, "selvedge.db", 23), ("write", errno.EIO, "selvedge.db", 29),
+    ("write", 0, "selvedge.db", 37), ("sync", errno.EIO, "selvedge.db", 13), ("write", errno.ENOSPC, "/jobs/", 17), ("sync", errno.EIO, "/jobs/", 17)])
 def test_one_fault_at_every_call(shim, tmp_path, call, code, path, step):
     """One call fails, at first the first one and then later ones, until a run ends without a fault. SELVEDGE_EVERY=1
     (make test-crash): every call. Runs wait for timers and disk most of the time, so that several go on at once."""

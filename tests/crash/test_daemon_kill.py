@@ -1,7 +1,7 @@
 """kill -9 of the daemon at any moment: nothing acknowledged is lost, no job is left running without a worker, and files
 match their hashes.
 
-SELVEDGE_KILLS says how often all tests together kill (200; `make test-crash`: 2,000). They print
+SELVEDGE_KILLS says how often all tests together kill (100; `make test-crash`: 2,000). They print
 the kills and the facts that were confirmed, as lines of JSON."""
 import concurrent.futures
 import json
@@ -17,7 +17,7 @@ from daemon_under_test import FILES, TUS, Daemon, document, sha256, wait_until
 
 AT_ONCE = 4
 KILLS_IN_UPLOADS = 12
-KILLS = int(os.environ.get("SELVEDGE_KILLS", "200"))
+KILLS = int(os.environ.get("SELVEDGE_KILLS", "100"))
 LOOPS = max(2, KILLS // 100)
 ROUNDS = max(15, (KILLS - 3 * KILLS_IN_UPLOADS) // LOOPS)
 

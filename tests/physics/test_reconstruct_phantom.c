@@ -1,5 +1,6 @@
 /* Reconstruction of phantoms measured against the truth: fiber diameter 7 voxels, blur 0.7 voxels, signal-to-noise
  * 5; fibers that are alike in white noise, and fibers whose radii spread by 20 % in correlated noise. */
+#include "tests/support/agreement.h"
 #include "tests/support/scan/phantom_reconstruction.h"
 
 #include <math.h>
@@ -72,6 +73,7 @@ static void test_twill(void **state)
 static void test_knit(void **state)
 {
     (void)state;
+    if (!is_long_variant()) return; /* make test-long */
     struct compare_report c;
     reconstruct_phantom(PHANTOM_KNIT, &c);
     meet_the_goals(&c);
@@ -80,6 +82,7 @@ static void test_knit(void **state)
 static void test_velvet(void **state)
 {
     (void)state;
+    if (!is_long_variant()) return; /* make test-long */
     struct compare_report c;
     reconstruct_phantom(PHANTOM_VELVET, &c);
     meet_the_goals(&c);

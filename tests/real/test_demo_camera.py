@@ -41,7 +41,7 @@ def fit(job, sample, photographs, fibers):
             os.link(file, job / "input" / file.name)
     (job / "job.json").write_text(json.dumps({
         "sample": "camera", "fibers": {"file": "truth.hair"}, **photographs,
-        "fit": {"model": "two_lobe.v1", "seed": 1, "path_budget": 600000, "render_px": 16, "render_samples": 1}}))
+        "fit": {"model": "two_lobe.v1", "seed": 1, "path_budget": 300000, "render_px": 16, "render_samples": 1}}))
     run("selvedge-worker", "--quiet", job)
     return load(job / "results" / "result.json")
 

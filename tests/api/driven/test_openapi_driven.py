@@ -7,6 +7,8 @@ import subprocess
 import pytest
 from daemon_under_test import BUILD
 
+# make test-long makes more requests
+MORE = 4 if os.environ.get("SELVEDGE_TEST_LONG") else 1
 HERE = os.path.dirname(os.path.abspath(__file__))
 CONFIG = os.path.join(HERE, "schemathesis.toml")
 pytestmark = pytest.mark.slow
@@ -35,7 +37,7 @@ def drive(schemathesis, daemon, config, *options):
 
 def test_every_reply_is_as_the_description_says(schemathesis, daemon):
     """All operations. Identifiers come from earlier replies where schemathesis finds them, else from nowhere."""
-    drive(schemathesis, daemon, CONFIG, "--max-examples", "20")
+    drive(schemathesis, daemon, CONFIG, "--max-examples", str(5 * MORE))
 
 
 def test_every_reply_about_a_finished_job_is_as_the_description_says(schemathesis, daemon, tmp_path, monkeypatch):
@@ -48,4 +50,4 @@ def test_every_reply_about_a_finished_job_is_as_the_description_says(schemathesi
     places = '"path.id" = "${SELVEDGE_JOB}"\n"path.name" = "${SELVEDGE_FILE}"\n"path.path" = "${SELVEDGE_RESULT}"\n"path.version" = "1"\n'
     config = tmp_path / "schemathesis.toml"
     config.write_text(text + places)
-    drive(schemathesis, daemon, config, "--include-method", "GET", "--include-path-regex", r"\{id\}", "--max-examples", "40")
+    drive(schemathesis, daemon, config, "--include-method", "GET", "--include-path-regex", r"\{id\}", "--max-examples", str(10 * MORE))

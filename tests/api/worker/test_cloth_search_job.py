@@ -84,7 +84,7 @@ def test_numbers_come_back(tmp_path, sample):
     fixed = {k: TRUTH[k] for k in ("beta_R", "beta_TT", "gamma_TT")}
     described = cloth(hairs_per_mm=0.02, hair_length_um={"value": 200, "lower": 100, "upper": 1000}, **FITTED)
     result = run(job, cloth={**described, "final_tiles": 2}, photographs=photographs(sample),
-                 fit={"model": "two_lobe.v1", "path_budget": 1200000, "fixed": fixed, **OUTPUT})
+                 fit={"model": "two_lobe.v1", "path_budget": 600000, "fixed": fixed, **OUTPUT})
     numbers = {n["name"]: n for n in result["cloth_numbers"]}
     flatness, hairs = numbers["yarns[0].flatness"], numbers["yarns[0].hair_length_um"]
     assert flatness["determined"] and abs(flatness["value"] - 2.6) < 0.8 and flatness["standard_error"] < 0.6, flatness
@@ -116,7 +116,7 @@ def without_times(result):
 
 def test_killed_jobs_end_with_the_same_bits(tmp_path, sample):
     document = {"cloth": cloth(**FITTED), "photographs": photographs(sample),
-                "fit": {"model": "two_lobe.v1", "path_budget": 300000, "max_iterations": 4, **OUTPUT}}
+                "fit": {"model": "two_lobe.v1", "path_budget": 150000, "max_iterations": 4, **OUTPUT}}
     document["cloth"]["renew_places"] = True
     want = without_times(run(make_job(tmp_path, "whole", sample), **document))
     one_tile = {**document, "cloth": {k: v for k, v in document["cloth"].items() if k != "renew_places"}}

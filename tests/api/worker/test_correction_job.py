@@ -50,7 +50,7 @@ def small(tmp_path):
     return run
 
 
-def corrected(job, sample, fibers, correction, path_budget=1200000):
+def corrected(job, sample, fibers, correction, path_budget=600000):
     """Result and summary of a job that corrects the fibers of a file, with all parameters known but C_TT."""
     known = {k: v for k, v in TRUTH.items() if k != "C_TT"}
     (job / "input").mkdir(parents=True)
@@ -84,7 +84,7 @@ def test_wrong_fibers_are_corrected(tmp_path, sample, fibers, name, true):
 
 @pytest.mark.slow
 def test_hairs_that_the_cloth_has_not_are_not_asked_for(tmp_path, sample):
-    result, summary = corrected(tmp_path / "job", sample, "truth.txt", {"hairs_per_mm2": {"lower": 0, "upper": 60}}, 600000)
+    result, summary = corrected(tmp_path / "job", sample, "truth.txt", {"hairs_per_mm2": {"lower": 0, "upper": 60}}, 300000)
     (hairs,) = result["cloth_numbers"]
     assert hairs["value"] < max(10, 2 * hairs["standard_error"])
     assert result["without_corrections"]["asked_for"] == [] and "the photographs ask for none" in summary

@@ -111,7 +111,7 @@ def test_both_groups_are_recovered(real, tmp_path):
     assert truth["warp.C_TT.r"] == 0.85 and truth["weft.C_TT.r"] == 0.3 and len(truth) == 18
     rows = json.loads((photographs / "photographs.json").read_text())
     job = real.create({"sample": "two colours", "fibers": {"file": "two.hair", "groups": ["weft", "warp"]}, "photographs": rows, "black_sheet": False,
-                       "fit": {"model": "two_lobe.v1", "seed": 3, "path_budget": 1000000, "fixed": {"beta_R": 5},
+                       "fit": {"model": "two_lobe.v1", "seed": 3, "path_budget": 500000, "fixed": {"beta_R": 5},
                                "tied": [["beta_TT"], ["gamma_TT"]], "render_px": 16,
                                "render_samples": 4}})
     real.upload(job, "two.hair", (tmp_path / "two.hair").read_bytes(), "fibers")

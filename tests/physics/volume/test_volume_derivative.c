@@ -104,7 +104,7 @@ static void traced_again(void **state)
             param[p] = info->channel < 0 ? info->start * 1.5 : info->start + 0.1 * (1 - info->start) * info->channel;
         }
         uint32_t iteration = 0;
-        run(&k, m, param, d, 400000, iteration++, true, at);
+        run(&k, m, param, d, 200000, iteration++, true, at);
         for (size_t p = 0; p <= m->n_param; p++) {
             /* a colour moves in all three channels with one run, each channel with its own */
             int channel = p < m->n_param ? m->param[p].channel : -1;
@@ -114,7 +114,7 @@ static void traced_again(void **state)
                 memcpy(moved, param, sizeof moved);
                 for (size_t q = p; q < m->n_param && q < p + (channel == 0 ? 3 : 1); q++) moved[q] += side ? h : -h;
                 double d_moved = p == m->n_param ? d + (side ? h : -h) : d;
-                run(&k, m, moved, d_moved, 200000, iteration++, false, side ? high : low);
+                run(&k, m, moved, d_moved, 100000, iteration++, false, side ? high : low);
             }
             for (int j = 0; j < N_CONFIGURATION; j++)
                 for (size_t q = p; q < (p == m->n_param ? p + 1 : p + (channel == 0 ? 3 : 1)); q++)

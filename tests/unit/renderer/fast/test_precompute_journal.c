@@ -43,7 +43,7 @@ static struct fast_precompute_request request(const char *journal)
     return (struct fast_precompute_request){.scene = scene,
                                             .model = scattering_find("two_lobe.v1"),
                                             .param = param,
-                                            .n_path = 2000,
+                                            .n_path = 500,
                                             .cell_paths = 3,
                                             .journal_path = journal};
 }
@@ -167,7 +167,7 @@ static void deep_light_goes_on(void **state)
     q.journal_path = journal;
     q.deep_traced = 1;
     q.deep_edge = 4;
-    q.deep_paths = 60000;
+    q.deep_paths = 15000;
     assert_false(attempt(&q, 0.85, pool, pieces)); /* the table is made from 0.73 on */
     size_t kept = length_of(journal);
     assert_true(kept > length_of(cells));
