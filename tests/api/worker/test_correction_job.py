@@ -50,7 +50,7 @@ def small(tmp_path):
     return run
 
 
-def corrected(job, sample, fibers, correction, path_budget=600000):
+def corrected(job, sample, fibers, correction, path_budget=1200000):
     """Result and summary of a job that corrects the fibers of a file, with all parameters known but C_TT."""
     known = {k: v for k, v in TRUTH.items() if k != "C_TT"}
     (job / "input").mkdir(parents=True)
