@@ -8,6 +8,7 @@
 #define OPTION_NONE ""
 /* the scan */
 #define OPTION_SCAN_FILES "scan_files"
+#define OPTION_IGNORE_NUMBERS "ignore_numbers"
 #define OPTION_GEOMETRY_JOB "geometry_job"
 #define OPTION_RAW "raw"
 #define OPTION_RAW_SHAPE "raw_shape"

@@ -1,4 +1,6 @@
 #include "clients/cli/batch/sample_files.h"
+#include "base/natural_order.h"
+#include "base/utf8.h"
 #include "clients/cli/commands/cli_job_files.h"
 
 #include <dirent.h>
@@ -14,10 +16,19 @@
 
 enum { PATH_ROOM = 4096 };
 
-static int by_name(const void *a, const void *b) { return strcmp(*(const char *const *)a, *(const char *const *)b); }
+/* A name must be UTF-8, or no document could hold it. */
+static bool is_utf8(const char *name)
+{
+    size_t n;
+    for (; *name != '\0'; name += n)
+        if ((n = utf8_sequence_bytes(name)) == 0) return false;
+    return true;
+}
 
 static status add_name(struct sample_files *f, const char *name, struct error *err)
 {
+    if (!is_utf8(name))
+        return error_set(err, STATUS_INVALID, "the name of the file '%s' is not UTF-8: rename it", name);
     char **more = realloc(f->name, (f->n + 1) * sizeof *more);
     if (more != NULL) f->name = more;
     char *copy = more == NULL ? NULL : strdup(name);
@@ -61,7 +72,7 @@ status sample_files_list(const char *folder, const char *marker, struct sample_f
             s = add_name(f, e->d_name, err);
     }
     closedir(d);
-    if (f->n > 0) qsort(f->name, f->n, sizeof *f->name, by_name);
+    if (f->n > 0) qsort(f->name, f->n, sizeof *f->name, natural_compare_names);
     if (s == STATUS_OK) s = make_fingerprint(folder, f, err);
     if (s != STATUS_OK) sample_files_release(f);
     return s;
@@ -76,7 +87,7 @@ void sample_files_release(struct sample_files *f)
 
 bool sample_files_have(const struct sample_files *f, const char *name)
 {
-    return f->n > 0 && bsearch(&name, f->name, f->n, sizeof *f->name, by_name) != NULL;
+    return f->n > 0 && bsearch(&name, f->name, f->n, sizeof *f->name, natural_compare_names) != NULL;
 }
 
 /* ---- templates ---- */

@@ -1,4 +1,6 @@
 #include "clients/cli/commands/cli_job_files.h"
+#include "base/natural_order.h"
+#include "clients/cli/text/cli_text.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -126,6 +128,23 @@ status cli_job_files_list(const json_t *document, const char *folder, struct cli
     if (s == STATUS_OK) s = add_meshes(json_object_get(document, "pictures"), folder, list, err);
     if (s != STATUS_OK) cli_job_files_release(list);
     return s;
+}
+
+void cli_job_files_note(const json_t *document, FILE *note)
+{
+    const json_t *files = json_object_get(json_object_get(document, "volume"), "files");
+    const size_t n = json_array_size(files);
+    const char **name = n > 1 ? calloc(n, sizeof *name) : NULL;
+    enum { ORDER_ROOM = 200 };
+    char text[ORDER_ROOM], clean[ORDER_ROOM];
+    for (size_t i = 0; i < n && name != NULL; i++)
+        if ((name[i] = json_string_value(json_array_get(files, i))) == NULL) name[i] = "";
+    if (name != NULL) {
+        natural_order_text(name, n, text, sizeof text);
+        text_clean(text, clean, sizeof clean);
+        fprintf(note, "scan of %s\n", clean);
+    }
+    free(name);
 }
 
 status cli_job_files_list_strict(const json_t *document, const char *folder, struct cli_file_list *list,

@@ -7,6 +7,7 @@
 #include <jansson.h>
 #include <stdbool.h>
 #include <stdint.h>
+#include <stdio.h>
 
 enum { CLI_SHA256_HEX = 65 };
 
@@ -33,6 +34,8 @@ status cli_job_files_list_strict(const json_t *document, const char *folder, str
                                  struct error *err);
 /* Opens a file for reading. Returns -1 with errno; ELOOP or ENOTDIR: it or its folder is a link that is not allowed. */
 int cli_file_open(const struct cli_file *file);
+/* Prints the order in which the files of a scan are taken, if there are several. */
+void cli_job_files_note(const json_t *document, FILE *note);
 void cli_job_files_release(struct cli_file_list *list);
 
 /* Computes size and SHA-256 of one file. changed() is called with the bytes read so far (may be NULL); if it returns

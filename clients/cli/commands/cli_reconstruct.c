@@ -1,5 +1,6 @@
 /* selvedge reconstruct SCAN: a job of geometry only, for one who has a scan and wants its fibers. */
 #include "base/catalogue/volume_format.h"
+#include "base/natural_order.h"
 #include "clients/cli/commands/cli.h"
 
 #include <dirent.h>
@@ -16,9 +17,7 @@ static const char *name_of(const char *path)
     return slash != NULL ? slash + 1 : path;
 }
 
-static int by_name(const void *a, const void *b) { return strcmp(*(const char *const *)a, *(const char *const *)b); }
-
-/* Lists the slices in a folder, in the order of their names. */
+/* Lists the slices in a folder, in the order of the numbers in their names. */
 static status list_slices(const char *folder, json_t *files, struct error *err)
 {
     DIR *d = opendir(folder);
@@ -36,12 +35,15 @@ static status list_slices(const char *folder, json_t *files, struct error *err)
         n += ok;
     }
     closedir(d);
-    if (n > 0) qsort(name, n, sizeof *name, by_name);
+    if (n > 0) qsort(name, n, sizeof *name, natural_compare_names);
+    status s = STATUS_OK;
     for (size_t i = 0; i < n; i++) {
-        json_array_append_new(files, json_string(name[i]));
+        if (json_array_append_new(files, json_string(name[i])) != 0)
+            s = error_set(err, STATUS_INVALID, "the name of the file '%s' is not UTF-8: rename it", name[i]);
         free(name[i]);
     }
     free(name);
+    if (s != STATUS_OK) return s;
     if (!ok) return error_set(err, STATUS_NO_MEMORY, "cannot list the folder '%s': out of memory", folder);
     return n > 0 ? STATUS_OK : error_set(err, STATUS_NOT_FOUND, "the folder '%s' has no TIFF files", folder);
 }

@@ -167,6 +167,7 @@ static status create_job(struct submit *u, struct error *err)
     const char *id = json_string_value(json_object_get(u->job, "id"));
     if (id == NULL) return error_set(err, STATUS_FORMAT, "the server's reply has no job id");
     snprintf(u->id, sizeof u->id, "%s", id);
+    cli_job_files_note(u->document, u->cli->note);
     fprintf(u->cli->note, "job %s created\n", u->id);
     if (u->cli->args->id_file == NULL) return STATUS_OK;
     char line[sizeof u->id + 1];
@@ -308,6 +309,7 @@ status cli_submit_document(struct cli *cli, const json_t *document, const char *
     if (s == STATUS_OK) s = hash_files(&u, err);
     if (s == STATUS_OK) s = create_job(&u, err);
     if (s == STATUS_OK) s = send_files(&u, err);
+    if (s == STATUS_OK) s = judge_files(&u, err);
     if (s == STATUS_OK) s = start_job(&u, err);
     draw_end(&u);
     snprintf(id, CLI_ID_BYTES, "%s", u.id);

@@ -14,6 +14,7 @@ struct job_scan {
     bool given; /* the job has a scan: its own, or the one of the job that geometry_job names */
     size_t n_file;
     char (*file)[JOB_MAX_NAME_BYTES];
+    bool ignore_numbers; /* in the names of files */
     size_t raw_shape[3]; /* all 0: not given */
     char raw_type[8];
     bool raw_big_endian;

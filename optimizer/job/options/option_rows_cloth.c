@@ -64,6 +64,12 @@ const struct job_option option_rows_cloth[] = {
      .meaning =
          "One scan: a file in a format of file-formats.md, its slices in order, a header and then its data file, or "
          "one file of samples without a header, with `raw`."},
+    {.path = "volume.ignore_numbers",
+     .kind = OPTION_BOOL,
+     .id = OPTION_IGNORE_NUMBERS,
+     INTO(scan, ignore_numbers),
+     .standard = "false",
+     .meaning = "Whether numbers in names of slices may have gaps, repeat or be out of order."},
     {.path = "volume.raw",
      .kind = OPTION_SECTION,
      .id = OPTION_RAW,

@@ -10,6 +10,7 @@
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "optimizer/stages/scene/fiber_file.h"
+#include "optimizer/stages/scene/scan_order.h"
 #include "optimizer/worker/check/input_check.h"
 #include "renderer/transport/environment.h"
 
@@ -79,6 +80,9 @@ static void check_volume(struct input_check *c)
     struct volume_source *source = NULL;
     struct error fault = {0};
     double range[2];
+    if (scan_order_check(scan, c->files, &(struct warning_sink){input_check_warn, c}, &fault) != STATUS_OK)
+        input_check_fault(c, &fault);
+    fault = (struct error){0};
     bool all = path != NULL && text != NULL;
     for (size_t i = 0; i < scan->n_file && all; i++) {
         all = input_check_has(c, scan->file[i]);

@@ -20,3 +20,11 @@ def tiff16(width, height, values, exposure_s, iso=100, f_number=8):
         return struct.pack("<H", len(entries)) + b"".join(entry(*e) for e in entries) + struct.pack("<I", 0)
     return (b"II*\0" + struct.pack("<I", first) + data + directory(tags) + struct.pack("<3H", 16, 16, 16) + directory(exif_tags)
             + struct.pack("<4I", round(exposure_s * 1e6), 1000000, round(f_number * 10), 10))
+
+
+def grey_tiff(width, height, value, bits=8):
+    """One page of grey samples without a sign: value(x, y)."""
+    data = b"".join(value(x, y).to_bytes(bits // 8, "little") for y in range(height) for x in range(width))
+    tags = [(256, 4, width), (257, 4, height), (258, 3, bits), (259, 3, 1), (262, 3, 1), (273, 4, 8), (277, 3, 1), (278, 4, height), (279, 4, len(data))]
+    directory = struct.pack("<H", len(tags)) + b"".join(struct.pack("<HHII", tag, kind, 1, of) for tag, kind, of in tags) + bytes(4)
+    return b"II*\0" + struct.pack("<I", 8 + len(data)) + data + directory
