@@ -48,8 +48,8 @@ struct linear_pair {
     double correlation;
 };
 
-/* Causes of the errors of a color matrix that all photographs have in common: three of each channel. */
-enum { LINEAR_COLOR_CAUSES = 9 };
+/* Causes of errors that all photographs have in common: of the color matrix, and of the rounding of exposures. */
+enum { LINEAR_COLOR_CAUSES = PHOTOGRAPH_CAUSES };
 
 struct linear_model {
     size_t n_row, n_param;
@@ -58,8 +58,8 @@ struct linear_model {
     double *j[2], *j_var[2]; /* n_row x n_param */
     /* n_row: variance of a residual by the photograph's stated error, set by linear_model_pool */
     double *photograph_var;
-    /* n_row x LINEAR_COLOR_CAUSES: errors of a residual by one standard deviation of each cause of the color matrix's
-     * error, which all rows have in common; color_var (n_row): the part of photograph_var that they make */
+    /* n_row x LINEAR_COLOR_CAUSES: errors of a residual by one standard deviation of each cause of an
+     * error that all rows have in common; color_var (n_row): the part of photograph_var that they make */
     double *color, *color_var;
     /* n_row: the observation's extra weight, which is in r, j and all variances; set by linear_model_pool */
     double *extra;

@@ -267,9 +267,9 @@ static void set_photograph(struct linear_model *m, const struct observation *o, 
     double *color = m->color + row * LINEAR_COLOR_CAUSES;
     memset(color, 0, LINEAR_COLOR_CAUSES * sizeof *color);
     m->color_var[row] = 0.0;
-    for (size_t cause = 0; cause < 3 && !contrast; cause++) {
-        color[3 * c + cause] = sqrt(objective_weight(o)) * o->photograph.color_error[c][cause];
-        m->color_var[row] += color[3 * c + cause] * color[3 * c + cause];
+    for (size_t cause = 0; cause < PHOTOGRAPH_CAUSES && !contrast; cause++) {
+        color[cause] = sqrt(objective_weight(o)) * o->photograph.color_error[c][cause];
+        m->color_var[row] += color[cause] * color[cause];
     }
     m->photograph_var[row] = objective_photograph_variance(o, c);
     m->color_var[row] = fmin(m->color_var[row], m->photograph_var[row]);

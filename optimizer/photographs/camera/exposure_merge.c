@@ -56,21 +56,13 @@ static size_t shortest(size_t n, const double *t_s)
 
 /* ---- pictures ---- */
 
-struct exposure_set {
-    const struct noise_record *noise; /* NULL: none */
-    size_t n, width, height;
-    const double *t_s, *full_scale;
-    struct image *const *image;
-};
-
-static const struct noise_channel *channel_noise(const struct exposure_set *e, size_t c)
+const struct noise_channel *exposure_noise(const struct exposure_set *e, size_t c)
 {
     static const struct noise_channel none = {0};
     return e->noise != NULL ? &e->noise->channel[c] : &none;
 }
 
-/* Sample p of exposure i in DN, NaN where it is saturated. */
-static double sample_dn(const struct exposure_set *e, size_t i, size_t p)
+double exposure_sample_dn(const struct exposure_set *e, size_t i, size_t p)
 {
     double v = (double)e->image[i]->pixel[p];
     return v >= 1.0 && e->full_scale[i] != 1.0 ? NAN : v * e->full_scale[i];
@@ -80,14 +72,14 @@ static double sample_dn(const struct exposure_set *e, size_t i, size_t p)
  * exposure i: sum[2 ((y + 1) (width + 1) + x + 1)]. */
 static void sum_shorter(const struct exposure_set *e, size_t i, size_t c, double *sum)
 {
-    const struct noise_channel *k = channel_noise(e, c);
+    const struct noise_channel *k = exposure_noise(e, c);
     const size_t stride = 2 * (e->width + 1);
     for (size_t y = 0; y < e->height; y++)
         for (size_t x = 0; x < e->width; x++) {
             double own[2] = {0.0, 0.0}, *to = sum + (y + 1) * stride + 2 * (x + 1);
             for (size_t j = 0; j < e->n; j++) {
                 if (!(e->t_s[j] < e->t_s[i])) continue;
-                double dn = sample_dn(e, j, 3 * (y * e->width + x) + c);
+                double dn = exposure_sample_dn(e, j, 3 * (y * e->width + x) + c);
                 if (isnan(dn)) continue;
                 own[0] += dn - k->read_mean - e->t_s[j] * k->dark_mean;
                 own[1] += e->t_s[j];
@@ -120,7 +112,7 @@ static double rate_around(const struct exposure_set *e, const double *sum, size_
 static void leave_out_near_saturation(const struct exposure_set *e, size_t i, size_t c, double *sum)
 {
     static const double sd_away = 4.0, unknown_noise = 0.05; /* share of the full scale */
-    const struct noise_channel *k = channel_noise(e, c);
+    const struct noise_channel *k = exposure_noise(e, c);
     const bool known = k->read_var + k->dark_var + k->shot_var > 0.0;
     if (e->full_scale[i] == 1.0) return;
     sum_shorter(e, i, c, sum);
@@ -149,79 +141,59 @@ static void leave_out_all_near_saturation(const struct exposure_set *e, double *
     }
 }
 
-/* Returns the light of exposure i over the other exposures' prediction for the same samples; NaN where there is too
- * little of it. */
-static double light_ratio(const struct exposure_set *e, size_t i)
+/* Adds the light that each exposure has in a merged sample. */
+static void add_light(const struct exposure_set *e, size_t c, const double *y_dn, const struct merged_sample *m,
+                      double light[EXPOSURE_MAX][3])
 {
-    static const double least_share = 0.005, most_share = 0.9; /* of the full scale */
-    const size_t n_sample = 3 * e->width * e->height;
-    double own = 0.0, predicted = 0.0;
-    for (size_t p = 0; p < n_sample; p++) {
-        const struct noise_channel *k = channel_noise(e, p % 3);
-        double light = 0.0, time_s = 0.0, here = NAN;
-        for (size_t j = 0; j < e->n; j++) {
-            if ((double)e->image[j]->pixel[p] >= most_share) continue;
-            const double dn = sample_dn(e, j, p) - k->read_mean - e->t_s[j] * k->dark_mean;
-            if (j == i)
-                here = dn;
-            else
-                light += dn, time_s += e->t_s[j];
-        }
-        if (isnan(here) || !(time_s > 0.0)) continue;
-        own += here;
-        predicted += light / time_s * e->t_s[i];
+    const struct noise_channel *k = exposure_noise(e, c);
+    const bool known = k->read_var + k->dark_var + k->shot_var > 0.0;
+    double weight[EXPOSURE_MAX] = {0}, sum = 0.0;
+    for (size_t i = 0; i < e->n; i++) {
+        if (isnan(y_dn[i])) continue;
+        const double v = known ? variance(k, e->t_s[i], 0.0, m->value, false) : e->t_s[i];
+        weight[i] = e->t_s[i] * e->t_s[i] / (v > 0.0 ? v : e->t_s[i]);
+        sum += weight[i];
     }
-    const double least = least_share * e->full_scale[i] * (double)n_sample, most = fmax(own, predicted);
-    return most > least ? fmax(own, 1e-3 * most) / fmax(predicted, 1e-3 * most) : NAN;
+    for (size_t i = 0; i < e->n && sum > 0.0; i++) light[i][c] += weight[i] / sum * m->value / e->full_scale[0];
 }
 
-status exposure_check_agreement(const struct noise_record *noise, size_t n, const double *t_s, const double *full_scale,
-                                struct image *const *exposure, const char *const *name, struct error *err)
+/* Merges pixel p. Returns whether a channel is saturated in all exposures. */
+static bool merge_pixel(const struct exposure_set *e, size_t p, struct image *variance, double (*light)[3])
 {
-    static const double most = 1.25;
-    const struct exposure_set e = {noise, n, exposure[0]->width, exposure[0]->height, t_s, full_scale, exposure};
-    double farthest = 0.0, ratio_there = 1.0;
-    size_t worst = 0;
-    for (size_t i = 0; n > 1 && i < n; i++) {
-        const double ratio = light_ratio(&e, i);
-        if (isnan(ratio) || fabs(log(ratio)) <= farthest) continue;
-        farthest = fabs(log(ratio));
-        ratio_there = ratio;
-        worst = i;
+    const size_t brief = shortest(e->n, e->t_s);
+    bool saturated = false;
+    for (size_t c = 0; c < 3; c++) {
+        double y[EXPOSURE_MAX];
+        for (size_t i = 0; i < e->n; i++) y[i] = exposure_sample_dn(e, i, 3 * p + c);
+        struct merged_sample m = exposure_merge(exposure_noise(e, c), e->n, e->t_s, y, 2);
+        const bool lost = m.n_used == 0;
+        if (lost) m.value = (double)e->image[brief]->pixel[3 * p + c] * e->full_scale[brief] / e->t_s[brief];
+        if (!lost && light != NULL) add_light(e, c, y, &m, light);
+        saturated = saturated || lost;
+        if (variance != NULL)
+            variance->pixel[3 * p + c] = lost ? 0.0f : (float)(m.se * m.se / (e->full_scale[0] * e->full_scale[0]));
+        e->image[0]->pixel[3 * p + c] = (float)(m.value / e->full_scale[0]);
     }
-    if (farthest <= log(most)) return STATUS_OK;
-    return error_set(err, STATUS_INVALID,
-                     "cannot merge the exposures of '%s': '%s' has %.2g times the light that the others and the "
-                     "exposure times predict: check 'exposure_s', and that all show the same view in the same light",
-                     name[0], name[worst], ratio_there);
+    return saturated;
 }
 
-status exposure_merge_images(const struct noise_record *noise, size_t n, const double *t_s, const double *full_scale,
-                             struct image *const *exposure, struct image *variance, double *saturated_share,
-                             struct error *err)
+status exposure_merge_images(const struct exposure_set *e, struct image *variance, struct exposure_light *light,
+                             double *saturated_share, struct error *err)
 {
-    const struct exposure_set e = {noise, n, exposure[0]->width, exposure[0]->height, t_s, full_scale, exposure};
-    const size_t n_pixel = e.width * e.height, brief = shortest(n, t_s);
     size_t n_saturated = 0;
-    double *sum = calloc(2 * (e.width + 1) * (e.height + 1), sizeof *sum);
+    double *sum = calloc(2 * (e->width + 1) * (e->height + 1), sizeof *sum);
     if (sum == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot merge exposures: out of memory");
-    if (n > 1) leave_out_all_near_saturation(&e, sum);
+    if (e->n > 1) leave_out_all_near_saturation(e, sum);
     free(sum);
-    for (size_t p = 0; p < n_pixel; p++) {
-        bool saturated = false;
-        for (size_t c = 0; c < 3; c++) {
-            double y[EXPOSURE_MAX];
-            for (size_t i = 0; i < n; i++) y[i] = sample_dn(&e, i, 3 * p + c);
-            struct merged_sample m = exposure_merge(channel_noise(&e, c), n, t_s, y, 2);
-            bool lost = m.n_used == 0;
-            if (lost) m.value = (double)exposure[brief]->pixel[3 * p + c] * full_scale[brief] / t_s[brief];
-            saturated = saturated || lost;
-            if (variance != NULL)
-                variance->pixel[3 * p + c] = lost ? 0.0f : (float)(m.se * m.se / (full_scale[0] * full_scale[0]));
-            exposure[0]->pixel[3 * p + c] = (float)(m.value / full_scale[0]);
+    for (size_t y = 0; y < e->height; y++)
+        for (size_t x = 0; x < e->width; x++) {
+            const size_t *r = light != NULL ? light->region : NULL;
+            const bool inside = r != NULL && x >= r[0] && y >= r[1] && x < r[2] && y < r[3];
+            n_saturated += merge_pixel(e, y * e->width + x, variance, inside ? light->light : NULL);
         }
-        n_saturated += saturated;
-    }
-    *saturated_share = (double)n_saturated / (double)n_pixel;
+    for (size_t i = 0; light != NULL && i < 3 * e->n; i++)
+        light->light[i / 3][i % 3] /=
+            (double)((light->region[2] - light->region[0]) * (light->region[3] - light->region[1]));
+    *saturated_share = (double)n_saturated / (double)(e->width * e->height);
     return STATUS_OK;
 }

@@ -29,22 +29,35 @@ struct merged_sample {
 struct merged_sample exposure_merge(const struct noise_channel *k, size_t n, const double *t_s, const double *y_dn,
                                     size_t n_reweight);
 
-/* Exposures of one view show the same light: another lamp, a moved camera or a wrong exposure time would leave an
- * average of different things. STATUS_INVALID, with the name of the exposure at fault, where the light of one is more
- * than 1.25 times the prediction of the others and the exposure times for the same samples, or less than the prediction
- * over 1.25; shutters keep their times to a few percent. Samples that come near saturation are left out, and so is a
- * dark exposure. */
-status exposure_check_agreement(const struct noise_record *noise, size_t n, const double *t_s, const double *full_scale,
-                                struct image *const *exposure, const char *const *name, struct error *err);
+/* Exposures of one view, of equal size. pixel of image[i]: 1 is saturation; full_scale[i]: in DN, 1 for float samples,
+ * which do not saturate. */
+struct exposure_set {
+    const struct noise_record *noise; /* NULL: no record */
+    size_t n, width, height;
+    const double *t_s, *full_scale;
+    struct image *const *image;
+    const char *const *name;
+    bool srgb; /* the files hold values of the sRGB curve */
+};
 
-/* Merges n pictures of equal size. pixel of exposure[i]: 1 is saturation, full_scale[i] DN. noise NULL: no record. The
- * result replaces exposure[0]: values per second in the same unit, not DN. Where all samples of a pixel are saturated
- * it takes the sample of the shortest exposure. variance: initialised with the size of the pictures, becomes the
- * variance of each value by the camera's noise; NULL: not wanted, as without a record. *saturated_share: of the pixels
- * with a channel that is saturated in every exposure. The other exposures lose the samples that are left out.
- * STATUS_NO_MEMORY. */
-status exposure_merge_images(const struct noise_record *noise, size_t n, const double *t_s, const double *full_scale,
-                             struct image *const *exposure, struct image *variance, double *saturated_share,
-                             struct error *err);
+/* The part of each exposure in a merged picture: light[i][c] is the mean over the pixels of `region` (x0, y0, x1, y1)
+ * of the merged value times the weight of exposure i, so its derivative by -ln t_s[i]. */
+struct exposure_light {
+    size_t region[4];
+    double light[EXPOSURE_MAX][3];
+};
+
+/* Sample p of exposure i in DN, NaN where it is saturated. */
+double exposure_sample_dn(const struct exposure_set *e, size_t i, size_t p);
+/* Noise of channel c; all variances are 0 without a record. */
+const struct noise_channel *exposure_noise(const struct exposure_set *e, size_t c);
+
+/* Merges the pictures. The result replaces image[0]: values per second in the same unit, not DN. Where all samples of a
+ * pixel are saturated it takes the sample of the shortest exposure. variance: initialised with the size of the
+ * pictures, becomes the variance of each value by the camera's noise; NULL: not wanted, as without a record.
+ * *saturated_share: of the pixels with a channel that is saturated in every exposure. light: NULL where not wanted. The
+ * other exposures lose the samples that are left out. STATUS_NO_MEMORY. */
+status exposure_merge_images(const struct exposure_set *e, struct image *variance, struct exposure_light *light,
+                             double *saturated_share, struct error *err);
 
 #endif

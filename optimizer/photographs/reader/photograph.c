@@ -116,6 +116,7 @@ status photograph_read_values(const char *path, const struct job_photograph *p, 
     r.resampled = r.info.encoded && neighbour_power(im) < resampled_limit;
     r.exposure = exposure_of(p, &r.info);
     r.n_exposure = 1;
+    r.scale_s = r.fitted_s[0] = r.info.exposure_s;
     *record = r;
     return STATUS_OK;
 }
@@ -195,7 +196,9 @@ static void warn(const struct image *im, const char *name, struct photograph_mea
 double photograph_color_se(const struct photograph_record *r, size_t c)
 {
     const double *e = r->color_error[c];
-    return sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
+    double square = 0.0;
+    for (size_t k = 0; k < PHOTOGRAPH_CAUSES; k++) square += e[k] * e[k];
+    return sqrt(square);
 }
 
 status photograph_measure_image(const struct image *im, const char *name, enum job_transfer transfer,
@@ -214,7 +217,7 @@ status photograph_measure_image(const struct image *im, const char *name, enum j
     for (size_t c = 0; c < 3; c++) {
         double block_sd;
         measure_channel(im, c, n_block, &mean->mean_rgb[c], &block_sd);
-        mean->se_rgb[c] = hypot(block_sd / (double)n_block, photograph_color_se(r, c));
+        mean->se_rgb[c] = hypot(hypot(block_sd / (double)n_block, r->exposure_se_rgb[c]), photograph_color_se(r, c));
         if (mean->mean_rgb[c] > 0.0) mean->block_contrast = fmax(mean->block_contrast, block_sd / mean->mean_rgb[c]);
     }
     const double *m = mean->mean_rgb;

@@ -13,10 +13,18 @@
 #define SELVEDGE_OPTIMIZER_PHOTOGRAPH_H
 
 #include "optimizer/job/document/job_limits.h"
+#include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/picture_words.h"
 #include "optimizer/photographs/reader/photograph_reader.h"
 
-struct job_photograph;
+/* Causes of errors that all photographs of a camera share: three of the color matrix for each channel of radiance, the
+ * rounding of exposure times, and of f-numbers. */
+enum {
+    PHOTOGRAPH_TIME_CAUSE = 9,
+    PHOTOGRAPH_APERTURE_CAUSE,
+    PHOTOGRAPH_CAUSES,
+    PHOTOGRAPH_EXPOSURES = JOB_MAX_MORE_EXPOSURES + 1
+};
 
 /* The record of a file on its way to radiances. */
 struct photograph_record {
@@ -26,10 +34,14 @@ struct photograph_record {
     double exposure;             /* pixel values were divided by it; 1 when nothing is known */
     bool merged;                 /* by the estimator of exposure_merge.h, of n_exposure pictures */
     size_t n_exposure;
+    double scale_s;                        /* stated time of the exposure that the scale of the values belongs to */
+    double fitted_s[PHOTOGRAPH_EXPOSURES]; /* times by the light of the exposures (exposure_ratio.h) */
+    double exposure_se_rgb[3];             /* of the mean, by the errors of fitted_s; in all channels by one cause */
+    char exposure_warning[400];            /* "", or why exposures or their stated times are doubtful */
     double noise_se_rgb[3]; /* of the mean, by the camera's noise; with merged alone, NaN without a noise record */
-    /* Errors of the mean of channel c by the errors of the color matrix, from three independent causes of one standard
-     * deviation each; the causes of a channel are the same for all photographs that the matrix was applied to. */
-    double color_error[3][3];
+    /* Errors of the mean of channel c by independent causes of one standard deviation each, which are the same for all
+     * channels and photographs: of the color matrix and of the rounding of exposures. */
+    double color_error[3][PHOTOGRAPH_CAUSES];
     bool resampled; /* pixels depend on their neighbours as after an enlargement or a strong filter */
 };
 

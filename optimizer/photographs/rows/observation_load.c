@@ -68,6 +68,7 @@ struct series {
     const char *folder;
     const struct photograph_process *process;
     const struct warning_sink *warn;
+    size_t first; /* observation of the first photograph */
 };
 
 static status load_photograph(const struct series *all, const struct job_photograph *p, size_t i,
@@ -86,10 +87,15 @@ static status load_photograph(const struct series *all, const struct job_photogr
         if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_PHOTOGRAPH_FILE "[%zu]", i);
         return s;
     }
-    if (mean.warning[0] != '\0') warning_send(all->warn, OPTION_NONE, "%s", mean.warning);
+    const char *const warning[2] = {mean.warning, mean.record.exposure_warning};
+    for (size_t k = 0; k < 2; k++)
+        if (warning[k][0] != '\0') warning_send(all->warn, OPTION_NONE, "%s", warning[k]);
     if (all->fit->texture_block_mm > 0.0) s = measure_texture(all->setup, all->fit, &im, &item, all->warn, err);
     image_release(&im);
     if (s != STATUS_OK) return s;
+    const struct exposure_reference reference =
+        photograph_process_reference(all->process, o->n > all->first ? &o->item[all->first].photograph : &mean.record);
+    exposure_rounding_state(&mean.record, &reference, mean.mean_rgb, mean.se_rgb);
     item.photograph = mean.record;
     memcpy(item.mean_rgb, mean.mean_rgb, sizeof item.mean_rgb);
     memcpy(item.se_rgb, mean.se_rgb, sizeof item.se_rgb);
@@ -158,8 +164,8 @@ status observation_set_load(const struct job_setup *setup, const struct job_rows
     const struct photograph_process nothing = {0};
     if (process == NULL) process = &nothing;
     if (rows->measurement_file[0] != '\0') return load_table(setup, rows, folder, warn, o, err);
-    const struct series all = {setup, fit, folder, process, warn};
-    size_t first = o->n;
+    const size_t first = o->n;
+    const struct series all = {setup, fit, folder, process, warn, first};
     for (size_t i = 0; i < rows->n_photograph; i++) {
         status s = load_photograph(&all, &rows->photograph[i], i, o, err);
         if (s != STATUS_OK) return s;

@@ -19,6 +19,9 @@ json_t *photograph_record_json(const struct photograph_record *r)
     double color_se[3];
     for (size_t c = 0; c < 3; c++) color_se[c] = photograph_color_se(r, c);
     json_object_set_new(json, "color_se", json_number_list(color_se, 3, 1.0));
+    json_object_set_new(json, "fitted_exposure_s",
+                        r->n_exposure > 1 ? json_number_list(r->fitted_s, r->n_exposure, 1.0) : json_null());
+    json_object_set_new(json, "exposure_se", json_number_list(r->exposure_se_rgb, 3, 1.0));
     json_object_set_new(json, "noise_se", r->merged ? json_number_list(r->noise_se_rgb, 3, 1.0) : json_null());
     return json;
 }

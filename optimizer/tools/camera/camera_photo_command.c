@@ -18,6 +18,8 @@ enum { FILES, CROP, TRANSFER, EXPOSURE, ISO, APERTURE, BLACK, OUT, JOB, JSON, N_
 /* Folders of a preview of a job: of its files, and of the pictures to write (NULL: none). */
 struct preview {
     const char *folder, *pictures;
+    bool begun;
+    struct exposure_reference reference; /* once begun */
 };
 
 static void print_stated(const char *name, double value, const char *unit)
@@ -45,10 +47,13 @@ static void print_mean(const char *name, const struct photograph_mean *m)
     if (r->merged && !isnan(r->noise_se_rgb[0]))
         printf("  %-14s %.2g %.2g %.2g\n", "camera's noise", r->noise_se_rgb[0], r->noise_se_rgb[1],
                r->noise_se_rgb[2]);
+    for (size_t i = 0; i < r->n_exposure && r->n_exposure > 1; i++)
+        printf("  %-14s %.6g s\n", i == 0 ? "fitted times" : "", r->fitted_s[i]);
     printf("  %-14s %.2f %%\n", "saturated", 100.0 * r->saturated_share);
     printf("  %-14s means of parts scatter by %.1f %%\n", "uniformity", 100.0 * m->block_contrast);
     if (r->info.less_trustworthy) printf("  %-14s 8 bits, or a camera's own processing: less trustworthy\n", "warning");
     if (m->warning[0] != '\0') printf("  %-14s %s\n", "warning", m->warning);
+    if (r->exposure_warning[0] != '\0') printf("  %-14s %s\n", "warning", r->exposure_warning);
     for (size_t i = 0; i < r->info.ledger.n; i++) {
         const struct file_statement *f = &r->info.ledger.item[i];
         printf("  %-14s %s %s: %s%s\n", i == 0 ? "the file states" : "", f->name, f->value,
@@ -136,7 +141,8 @@ static void print_color(const struct photograph_process *k)
 static json_t *row_json(const struct job_photograph *p, const struct photograph_mean *m)
 {
     json_t *color = json_array();
-    for (size_t c = 0; c < 3; c++) json_array_append_new(color, json_number_list(m->record.color_error[c], 3, 1.0));
+    for (size_t c = 0; c < 3; c++)
+        json_array_append_new(color, json_number_list(m->record.color_error[c], PHOTOGRAPH_CAUSES, 1.0));
     return json_pack("{s:s, s:o, s:o, s:o, s:[i,i,i,i], s:o, s:o, s:o}", "file", p->file, "mean_rgb",
                      json_number_list(m->mean_rgb, 3, 1.0), "standard_error", json_number_list(m->se_rgb, 3, 1.0),
                      "color_error", color, "crop_px", (int)p->crop_px[0], (int)p->crop_px[1], (int)p->crop_px[2],
@@ -174,8 +180,8 @@ static status begin_pictures(const struct photograph_process *k, const char *pic
 
 /* Prints the photographs of the document and appends them to `rows`. A photograph that cannot be used is drawn as well,
  * because the picture may show why. */
-static status preview_photograph(const struct photograph_process *k, const struct preview *v,
-                                 const struct job_photograph *p, json_t *rows)
+static status preview_photograph(const struct photograph_process *k, struct preview *v, const struct job_photograph *p,
+                                 json_t *rows)
 {
     const char *const folder = v->folder;
     struct photograph_mean mean = {0};
@@ -185,6 +191,11 @@ static status preview_photograph(const struct photograph_process *k, const struc
     if (s == STATUS_OK) {
         s = photograph_measure_image(&im, p->file, p->transfer, &mean, &err);
         image_release(&im);
+    }
+    if (s == STATUS_OK) {
+        if (!v->begun) v->reference = photograph_process_reference(k, &mean.record);
+        v->begun = true;
+        exposure_rounding_state(&mean.record, &v->reference, mean.mean_rgb, mean.se_rgb);
     }
     if (mean.record.info.format != NULL) print_mean(p->file, &mean);
     if (s == STATUS_OK) json_array_append_new(rows, row_json(p, &mean));
@@ -198,7 +209,7 @@ static status preview_photograph(const struct photograph_process *k, const struc
 static int preview_job(const char *path, const char *json_path, const char *pictures)
 {
     struct camera_job job;
-    const struct preview view = {job.folder, pictures};
+    struct preview view = {.folder = job.folder, .pictures = pictures};
     struct photograph_process process;
     struct error err = {0};
     json_t *rows = json_array();

@@ -2,6 +2,7 @@
 #include "optimizer/tools/phantom/phantom_commands.h"
 #include "optimizer/tools/simulated_camera/simulated_camera.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -19,6 +20,10 @@ static const char usage[] =
     "  --crop-cm C             crop of the job                                                        [1]\n"
     "  --exposures T,T,T       exposure times in seconds, rising                                      "
     "[0.02,0.16,1.28]\n"
+    "  --exposure-error E      true times are longer by the share E for the first and third time, shorter for the "
+    "second [0]\n"
+    "  --chart-fall F          the lamp gives the share F less light at one end of the chart                [0]\n"
+    "  --chart-fall-phi D      direction from the dark end to the bright one, in degrees                    [30]\n"
     "  --aim-mm A              the camera looks past the orbit center by up to this                   [1.5]\n"
     "  --noise-times F         read noise times F, shot noise times F squared; 0: none                [1]\n"
     "  --cameras-from-markers  the rig file does not say where the camera was\n"
@@ -38,6 +43,9 @@ static status parse(int argc, char **argv, struct simulated_camera_option *o, si
         {.name = "px-per-mm", .kind = OPTION_NUMBER, .to = &o->px_per_mm},
         {.name = "crop-cm", .kind = OPTION_NUMBER, .to = &o->crop_cm},
         {.name = "exposures", .kind = OPTION_NUMBER_LIST, .to = o->exposure_s, .n = SIMULATED_EXPOSURES},
+        {.name = "exposure-error", .kind = OPTION_NUMBER, .to = &o->exposure_error},
+        {.name = "chart-fall", .kind = OPTION_NUMBER, .to = &o->chart_fall},
+        {.name = "chart-fall-phi", .kind = OPTION_NUMBER, .to = &o->chart_fall_phi_deg},
         {.name = "aim-mm", .kind = OPTION_NUMBER, .to = &o->aim_mm},
         {.name = "noise-times", .kind = OPTION_NUMBER, .to = &noise},
         {.name = "cameras-from-markers", .kind = OPTION_FLAG, .to = &o->cameras_from_markers},
@@ -50,6 +58,8 @@ static status parse(int argc, char **argv, struct simulated_camera_option *o, si
         return error_set(err, STATUS_INVALID, "--photographs and --out are needed");
     if (!(o->px_per_mm > 0.0 && o->crop_cm > 0.0 && o->exposure_s[0] > 0.0 && o->aim_mm >= 0.0 && noise >= 0.0))
         return error_set(err, STATUS_INVALID, "lengths, times and the resolution must be positive");
+    if (!(fabs(o->exposure_error) < 0.5 && fabs(o->chart_fall) < 0.9))
+        return error_set(err, STATUS_INVALID, "--exposure-error is below 0.5, --chart-fall below 0.9");
     o->sensor.read_sd *= noise;
     o->sensor.dark_var_dn *= noise * noise;
     o->sensor.shot_var *= noise * noise;

@@ -21,15 +21,15 @@ struct sensor sensor_default(void)
                            .white = 16383};
 }
 
-status sensor_expose(const struct sensor *s, const size_t size[2], const float *rate, double exposure_s, uint64_t seed,
-                     uint32_t number, const char *path, struct error *err)
+status sensor_expose(const struct sensor *s, const size_t size[2], const float *rate, const double exposure_s[2],
+                     uint64_t seed, uint32_t number, const char *path, struct error *err)
 {
     const struct rng_key key = {.seed = seed, .iteration = 65533, .configuration = number};
     const struct dng_picture d = {.width = size[0],
                                   .height = size[1],
                                   .black = s->black,
                                   .white = s->white,
-                                  .exposure_s = exposure_s,
+                                  .exposure_s = exposure_s[1],
                                   .iso = s->iso,
                                   .aperture = s->aperture,
                                   .neutral = {s->neutral[0], s->neutral[1], s->neutral[2]}};
@@ -37,7 +37,7 @@ status sensor_expose(const struct sensor *s, const size_t size[2], const float *
     uint16_t *sample = malloc(n * sizeof *sample);
     if (sample == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot simulate a camera: out of memory");
     for (size_t i = 0; i < n; i++) {
-        double light = (double)rate[i] * exposure_s, dark = s->dark_dn_per_s * exposure_s, normal[2];
+        double light = (double)rate[i] * exposure_s[0], dark = s->dark_dn_per_s * exposure_s[0], normal[2];
         double var = s->read_sd * s->read_sd + s->dark_var_dn * dark + s->shot_var * light;
         struct rng r;
         rng_start(&r, &key, (uint32_t)i, 0);

@@ -25,9 +25,10 @@ struct sensor {
 struct sensor sensor_default(void);
 /* Channel 0, 1, 2 of the filter over a photosite. */
 static inline size_t sensor_channel(size_t x, size_t y) { return y % 2 == 0 ? x % 2 : 1 + x % 2; }
-/* Writes one exposure as a DNG file. rate: height x width photosites, DN/s. number: below 4096, of the exposure:
+/* Writes one exposure as a DNG file. rate: height x width photosites, DN/s. exposure_s: the true time, and the time
+ * that the file states. number: below 4096, of the exposure:
  * chooses its random numbers together with the seed. STATUS_IO, STATUS_NO_MEMORY. */
-status sensor_expose(const struct sensor *s, const size_t size[2], const float *rate, double exposure_s, uint64_t seed,
-                     uint32_t number, const char *path, struct error *err);
+status sensor_expose(const struct sensor *s, const size_t size[2], const float *rate, const double exposure_s[2],
+                     uint64_t seed, uint32_t number, const char *path, struct error *err);
 
 #endif

@@ -22,6 +22,7 @@ void simulated_camera_option_default(struct simulated_camera_option *o)
                                           .px_per_mm = 4.8,
                                           .crop_cm = 1.0,
                                           .exposure_s = {0.02, 0.16, 1.28},
+                                          .chart_fall_phi_deg = 30.0,
                                           .chart_exposure_s = 0.16,
                                           .chart_light_theta_deg = 20.0,
                                           .chart_camera_theta_deg = 28.0,
@@ -141,13 +142,23 @@ static status collect_light(const struct simulation *m, const struct studio_scen
     return st;
 }
 
+/* Time for which the shutter is open at this setting; a setting is as wrong for the chart as for a view. */
+static double true_time(const struct simulated_camera_option *o, double stated_s)
+{
+    for (size_t k = 0; k < SIMULATED_EXPOSURES; k++)
+        if (stated_s == o->exposure_s[k])
+            return stated_s * (1.0 + (k % 2 == 0 ? o->exposure_error : -o->exposure_error));
+    return stated_s;
+}
+
 static status expose(const struct simulation *m, const float *rate, double exposure_s, uint32_t number,
                      const char *name, struct error *err)
 {
     const size_t size[2] = {2 * m->o->size_px[0], 2 * m->o->size_px[1]};
+    const double time_s[2] = {true_time(m->o, exposure_s), exposure_s};
     char path[PHANTOM_PATH_BYTES];
     status st = phantom_path(m->o->folder, name, path, err);
-    return st == STATUS_OK ? sensor_expose(&m->o->sensor, size, rate, exposure_s, m->o->seed, number, path, err) : st;
+    return st == STATUS_OK ? sensor_expose(&m->o->sensor, size, rate, time_s, m->o->seed, number, path, err) : st;
 }
 
 static float *new_rate(const struct simulation *m, struct error *err)
@@ -320,7 +331,10 @@ static status prepare(struct simulation *m, struct error *err)
     if (m->ideal == NULL || m->share == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot simulate a camera: out of memory");
     map_photosites(m);
-    return studio_init(&m->studio, err);
+    status st = studio_init(&m->studio, err);
+    m->studio.chart_fall = m->o->chart_fall;
+    m->studio.chart_fall_phi_rad = m->o->chart_fall_phi_deg * RAD_PER_DEG;
+    return st;
 }
 
 status simulated_camera_make(const struct simulated_camera_option *o, struct thread_pool *pool, struct error *err)

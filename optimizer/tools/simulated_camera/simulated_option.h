@@ -18,6 +18,9 @@ struct simulated_camera_option {
     double px_per_mm;                       /* such cells, at the orbit center */
     double crop_cm;                         /* of the job; the renderings show more */
     double exposure_s[SIMULATED_EXPOSURES]; /* from the shortest on */
+    double exposure_error; /* true times are longer by this share for the first, third.. of exposure_s, else shorter */
+    double chart_fall;     /* light at one end of the chart's length is less by this share than at the other */
+    double chart_fall_phi_deg; /* direction from the dark end to the bright one */
     double chart_exposure_s, chart_light_theta_deg, chart_camera_theta_deg, chart_camera_phi_deg;
     double aim_mm;             /* largest distance by which the camera looks past the orbit center */
     bool cameras_from_markers; /* the rig does not say where the camera was */

@@ -99,6 +99,14 @@ static void chart_reflectance(const struct studio *s, double x_mm, double y_mm, 
         color_chart_reference(false, (size_t)(v / pitch) * COLOR_CHART_COLUMNS + (size_t)(u / pitch), rgb);
 }
 
+/* Light at a place of the chart over the light in its middle. */
+static double chart_light(const struct studio *s, double x_mm, double y_mm)
+{
+    const double half = 0.5 * chart_width * s->chart_mm_per_unit;
+    const double along = (cos(s->chart_fall_phi_rad) * x_mm + sin(s->chart_fall_phi_rad) * y_mm) / half;
+    return fmax(0.0, 1.0 + s->chart_fall / (2.0 - s->chart_fall) * along);
+}
+
 void studio_radiance(const struct studio_scene *k, const struct studio_camera *c, const double d[3], double rgb[3])
 {
     const double to_sheet = -c->eye_mm[2] / d[2], x = c->eye_mm[0] + to_sheet * d[0],
@@ -118,6 +126,7 @@ void studio_radiance(const struct studio_scene *k, const struct studio_camera *c
         for (size_t i = 0; i < 3; i++) rgb[i] = sheet_reflectance(s, x, y);
     } else {
         chart_reflectance(s, x, y, rgb);
+        for (size_t i = 0; i < 3; i++) rgb[i] *= chart_light(s, x, y);
     }
     for (size_t i = 0; i < 3; i++) rgb[i] *= k->cos_light;
 }

@@ -22,6 +22,7 @@ struct studio {
     double cloth_half_mm;                                            /* half the edge of the piece of cloth */
     uint8_t marker[MARKER_MAX][STUDIO_MARKER_PX * STUDIO_MARKER_PX]; /* drawings of the board's markers */
     double chart_mm_per_unit, chart_turn_rad;                        /* a patch has an edge of 2.5 units */
+    double chart_fall, chart_fall_phi_rad; /* simulated_option.h; the middle has the light of even lamps */
 };
 
 /* A camera that looks past the orbit center by aim_mm, measured there along its right and its lower edge. */

@@ -12,6 +12,7 @@ show the same piece, so the differences are smaller than the errors. rel_error, 
 camera.cards: even cards, 20 cameras. Here the error is noise and what the chart makes of it. z_max: the largest |difference / error|;
 z_max_expected: the median of the largest of random values with the stated covariance, in which the errors of the color matrix are common to
 the views of a camera; chi2_per_value: the squares with that covariance, over their number. 1 is right.
+camera.exposures: the even cards by cameras whose true exposure times differ by 5 % from the stated ones.
 """
 import argparse
 import contextlib
@@ -35,7 +36,7 @@ TRUTH = ["C_R=0.06,0.05,0.08", "C_TT=0.72,0.55,0.35", "beta_R=4", "beta_TT=20", 
 CARDS = [(0.9, 0.7, 0.6), (0.011, 0.009, 0.013), (0.2, 0.2, 0.2), (0.3, 0.1, 0.02), (0.03, 0.06, 0.2), (1.6, 1.2, 0.9), (0.05, 0.04, 0.03),
          (0.5, 0.6, 0.1)]
 CROP_CM, BLUR_MM = 1.25, 0.12
-CAMERAS, DRAWS = 20, 301
+CAMERAS, FAULTY_CAMERAS, DRAWS = 20, 8, 301
 
 
 def run(arguments, name, *command, stdout=subprocess.DEVNULL):
@@ -71,9 +72,9 @@ def make_cards(folder):
                    "camera": {"distance_cm": 100.0, "crop_cm": CROP_CM, "far_field": False, "blur_mm": 0.0}}, f)
 
 
-def take(arguments, source, folder, seed):
+def take(arguments, source, folder, seed, *faults):
     """Takes the samples of a folder; [(true mean rgb, row of `selvedge photo --json`, view)]."""
-    run(arguments, "selvedge-phantom", "camera", "--photographs", source, "--out", folder, "--seed", seed, "--cameras-from-markers")
+    run(arguments, "selvedge-phantom", "camera", "--photographs", source, "--out", folder, "--seed", seed, "--cameras-from-markers", *faults)
 
     def frames(kind):
         return sorted(os.path.join(folder, name) for name in os.listdir(folder) if name.startswith(kind))
@@ -113,13 +114,18 @@ def solve(matrix, b):
     return x
 
 
+def own_error(row, c):
+    """Error of a row's mean by causes of its own: the camera's noise, and its fitted exposure times."""
+    return math.hypot(row["photograph"]["noise_se"][c], row["photograph"]["exposure_se"][c])
+
+
 def chi_square(views):
     """Sum of squares of the differences over their covariance: each channel's noise, and the causes that its views have in common."""
     total = 0.0
     for c in range(3):
         d = [row["mean_rgb"][c] - true[c] for true, row, _ in views]
         cause = [row["color_error"][c] for _, row, _ in views]
-        noise = [row["photograph"]["noise_se"][c] for _, row, _ in views]
+        noise = [own_error(row, c) for _, row, _ in views]
         cov = [[sum(a * b for a, b in zip(cause[i], cause[j])) + (noise[i] ** 2 if i == j else 0.0) for j in range(len(d))] for i in range(len(d))]
         total += sum(a * b for a, b in zip(d, solve(cov, d)))
     return total
@@ -137,10 +143,10 @@ def angle_error_deg(view, row):
 def largest_drawn(views, rng):
     """The largest |difference / error| of one camera, drawn with the stated covariance."""
     largest = 0.0
+    cause = [rng.gauss(0.0, 1.0) for _ in views[0][1]["color_error"][0]]
     for c in range(3):
-        cause = [rng.gauss(0.0, 1.0) for _ in range(3)]
         for _, row, _ in views:
-            error = sum(a * b for a, b in zip(cause, row["color_error"][c])) + rng.gauss(0.0, row["photograph"]["noise_se"][c])
+            error = sum(a * b for a, b in zip(cause, row["color_error"][c])) + rng.gauss(0.0, own_error(row, c))
             largest = max(largest, abs(error) / row["standard_error"][c])
     return largest
 
@@ -171,6 +177,19 @@ def bench_cloth(arguments, folder):
     figure("roundtrip.camera_angle_deg", max(angle_error_deg(view, row) for _, row, view in views), "deg")
 
 
+def bench_fault(arguments, folder, name, *faults):
+    """The even cards by cameras that have a fault."""
+    cameras = []
+    for seed in range(1, 2 if arguments.quick else FAULTY_CAMERAS + 1):
+        cameras.append(take(arguments, os.path.join(folder, "cards"), os.path.join(folder, f"{name}-raw"), seed, *faults))
+        show(name, cameras[-1])
+    z = [value for views in cameras for value in z_values(views)]
+    figure(f"{name}.rel_error", max(max(relative_errors(views)) for views in cameras))
+    figure(f"{name}.z_max", max(map(abs, z)))
+    figure(f"{name}.z_max_expected", expected_largest(cameras))
+    figure(f"{name}.chi2_per_value", sum(map(chi_square, cameras)) / len(z))
+
+
 def bench_cards(arguments, folder):
     source = os.path.join(folder, "cards")
     make_cards(source)
@@ -197,6 +216,7 @@ def main():
         os.makedirs(folder, exist_ok=True)
         bench_cloth(arguments, folder)
         bench_cards(arguments, folder)
+        bench_fault(arguments, folder, "exposures", "--exposure-error", 0.05)
 
 
 if __name__ == "__main__":

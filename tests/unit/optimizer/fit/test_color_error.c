@@ -33,7 +33,7 @@ static void apply_draw(struct observation_set *o, struct rng *rng)
         double truth[3];
         memcpy(truth, o->item[i].mean_rgb, sizeof truth);
         for (size_t c = 0; c < 3; c++) {
-            double *error = o->item[i].photograph.color_error[c];
+            double *error = o->item[i].photograph.color_error[c] + 3 * c;
             color_matrix_error(row_cov[c], truth, error);
             for (size_t cause = 0; cause < 3; cause++) o->item[i].mean_rgb[c] += z[c][cause] * error[cause];
             o->item[i].se_rgb[c] = hypot(o->item[i].se_rgb[c], photograph_color_se(&o->item[i].photograph, c));

@@ -24,6 +24,9 @@ enum { BLACK = 512, WHITE = 16383, EDGE = 96 };
 static const double camera[9] = {0.61, 0.22, 0.05, 0.11, 0.74, 0.09, 0.02, 0.18, 0.48}; /* radiance to camera rgb */
 static const double read_sd = 4.0, dark_dn_per_s = 3.0, shot_var = 0.5, dn_per_s = 60000.0;
 
+/* Time that files state over the true one. */
+static double stated_over_true = 1.0;
+
 /* One exposure of an image of camera rgb as a mosaic with noise. */
 static void expose(const char *path, const struct image *im, double t_s, uint32_t seed)
 {
@@ -40,8 +43,9 @@ static void expose(const char *path, const struct image *im, double t_s, uint32_
         double sd = sqrt(read_sd * read_sd + shot_var * light + 0.5 * dark_dn_per_s * t_s);
         mosaic[i] = (uint16_t)fmin(fmax(rint(BLACK + light + dark_dn_per_s * t_s + sd * z[0]), 0.0), WHITE);
     }
-    assert_int_equal(dng_file_write(path, &(struct dng_picture){w, h, BLACK, WHITE, t_s, 100, 8}, mosaic, NULL),
-                     STATUS_OK);
+    assert_int_equal(
+        dng_file_write(path, &(struct dng_picture){w, h, BLACK, WHITE, t_s * stated_over_true, 100, 8}, mosaic, NULL),
+        STATUS_OK);
     free(mosaic);
 }
 
@@ -135,6 +139,8 @@ static struct job_document *parse(const char *camera_keys, const char *photograp
     "{\"file\":\"" name "0.dng\",\"more_exposures\":[{\"file\":\"" name "1.dng\"},{\"file\":\"" name                   \
     "2.dng\"}]," ANGLES "}"
 
+static json_t *files; /* the list of ledgers, of the test; NULL: not wanted */
+
 static status load(void **state, struct job_document *doc, struct observation_set *o, struct error *err)
 {
     char folder[1024];
@@ -143,6 +149,7 @@ static status load(void **state, struct job_document *doc, struct observation_se
     snprintf(folder, sizeof folder, "%.*s", (int)(strrchr(path, '/') - path), path);
     observation_set_init(o);
     photograph_process_init(&k);
+    k.files = files;
     status s = photograph_process_load(&k, doc->setup, doc->rows, folder, err);
     if (s == STATUS_OK) s = observation_set_load(doc->setup, doc->rows, doc->fit, folder, &k, NULL, o, err);
     photograph_process_release(&k);
@@ -195,6 +202,52 @@ static void test_chart_round_trip(void **state)
     check_radiance(&o.item[1], dim);
     assert_true(o.item[0].photograph.n_exposure == 3 && o.item[0].photograph.noise_se_rgb[1] > 0.0);
     assert_true(o.item[0].photograph.noise_se_rgb[1] < 0.3 * o.item[0].mean_rgb[1] / EDGE);
+    observation_set_release(&o);
+    job_document_free(doc);
+}
+
+/* Stated times that are 5 % off: the exposure that has the chart's time keeps the scale, the others are measured by
+ * their light, and the ledger says so. */
+static void test_wrong_exposure_times(void **state)
+{
+    const double corner[8] = {42, 38, 270, 56, 262, 206, 30, 186};
+    static const double off[3] = {1.0 / 1.05, 1.05, 1.0 / 1.05};
+    struct image chart;
+    struct observation_set o;
+    struct error err = {0};
+    take_views(state);
+    for (size_t i = 0; i < 3; i++) {
+        char name[16];
+        stated_over_true = off[i];
+        snprintf(name, sizeof name, "b%zu.dng", i);
+        take(state, name, EDGE, bright, exposure_s[i] / off[i], (uint32_t)(10 + i));
+        snprintf(name, sizeof name, "d%zu.dng", i);
+        take(state, name, EDGE, dim, exposure_s[i] / off[i], (uint32_t)(20 + i));
+    }
+    assert_int_equal(image_init(&chart, 320, 240, 3, NULL), STATUS_OK);
+    draw_chart(&chart, corner, camera, cos(20.0 * M_PI / 180.0), 0.0);
+    stated_over_true = off[1];
+    expose(scratch_path(state, "chart.dng"), &chart, 0.16 / off[1], 31);
+    stated_over_true = 1.0;
+    image_release(&chart);
+    struct job_document *doc = parse("\"noise_file\":\"noise.json\"", THREE("b") "," THREE("d"),
+                                     "{\"chart\":{\"file\":\"chart.dng\",\"light_theta_deg\":20}}");
+    files = json_array();
+    if (load(state, doc, &o, &err) != STATUS_OK) fail_msg("%s: %s", err.field, err.text);
+    check_radiance(&o.item[0], bright);
+    check_radiance(&o.item[1], dim);
+    const struct photograph_record *r = &o.item[1].photograph;
+    assert_true(fabs(r->scale_s - 0.16) < 1e-6 && fabs(r->fitted_s[2] / (1.28 * 1.05 * 1.05) - 1.0) < 0.01);
+    assert_non_null(strstr(o.item[0].photograph.exposure_warning, "is stated as"));
+    assert_true(r->exposure_se_rgb[0] > 0.0 && r->exposure_se_rgb[0] < 0.01 * dim[0]);
+    assert_true(r->color_error[0][PHOTOGRAPH_TIME_CAUSE] == 0.0); /* the chart has this time */
+    char *text = json_dumps(files, 0);
+    if (strstr(text, "0.02 s; the fitted ratio says 0.022") == NULL ||
+        strstr(text, "0.16 s, the other exposures are measured against it") == NULL)
+        fail_msg("%s", text);
+    free(text);
+    json_decref(files);
+    files = NULL;
     observation_set_release(&o);
     job_document_free(doc);
 }
@@ -272,6 +325,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_noise_record),
         cmocka_unit_test(test_chart_round_trip),
+        cmocka_unit_test(test_wrong_exposure_times),
         cmocka_unit_test(test_white_and_dark_frames),
         cmocka_unit_test(test_refused),
     };
