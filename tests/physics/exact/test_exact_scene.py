@@ -82,7 +82,8 @@ def test_the_same_cloth_written_otherwise(folder, program):
     views = [CONFIGURATIONS[0], CONFIGURATIONS[4]]
 
     def blocks(f):
-        return trace(program, f.write(os.path.join(folder, "other.hair")), configurations=views, blocks=64, paths=(1024 if program == PRODUCT else 128) // FEWER)
+        paths = (1024 if program == PRODUCT else 128) // FEWER
+        return trace(program, f.write(os.path.join(folder, "other.hair")), configurations=views, blocks=64, paths=paths)
 
     as_made = blocks(fibers)
     x, y = fibers.tile
