@@ -35,7 +35,7 @@ Keys stand below their section: `raw.type` in the section `volume` is `{"volume"
 of a list. Unknown keys are errors. A range with a star takes an object, too, for a number that is searched: `{value, lower, upper,
 prior: [mean, sd], fit}`.
 """
-FILE_NAME = "^[A-Za-z0-9_-][A-Za-z0-9._-]{0,126}$"
+FILE_NAME = "^[^./\\\\\\x00-\\x1f\\x7f-\\x9f][^/\\\\\\x00-\\x1f\\x7f-\\x9f]{0,126}$"
 WIDTH = 160
 
 

@@ -66,7 +66,7 @@ async function upload(file, url, piece, progress) {
 const newKey = () => [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
 
 function removeFile(job, name) {
-  return raw("DELETE", `/v1/jobs/${job}/files/${name}`).catch((error) => { if (error.status !== 404) throw error; });
+  return raw("DELETE", `/v1/jobs/${job}/files/${encodeURIComponent(name)}`).catch((error) => { if (error.status !== 404) throw error; });
 }
 
 // file: a dropped file, or {size, sha256} of an input of the copied job.
@@ -155,7 +155,7 @@ export function submitPanel(handed = [], copy = null) {
       const safe = editor.load(before.source);
       use(safe);
       if (doc.rig?.file && before.files.has(doc.rig.file)) {
-        const described = await raw("GET", `/v1/jobs/${before.id}/files/${doc.rig.file}`).then((answer) => answer.text()).then(rigOf).catch(() => null); // not complete
+        const described = await raw("GET", `/v1/jobs/${before.id}/files/${encodeURIComponent(doc.rig.file)}`).then((answer) => answer.text()).then(rigOf).catch(() => null); // not complete
         if (described) rig.use(doc.rig.file, described);
       }
       from.append("A copy of ", el("a", { href: `#${before.id}` }, before.sample || "(no name)"), ". Change the document below, then submit it: the earlier job stays as it is.");

@@ -84,7 +84,9 @@ status job_check_declaration(struct job_service *v, struct file_row *row, struct
     if (!job_file_name_valid(row->name))
         return error_set_field(
             err, STATUS_INVALID, "name",
-            "file name '%.127s' is not allowed: 1..127 of A-Z a-z 0-9 . _ -, not starting with a dot", row->name);
+            "file name '%.127s' is not allowed: 1..127 bytes of UTF-8 without '/', '\\' and control characters, not "
+            "starting with a dot",
+            row->name);
     if (!role_valid(row->role))
         return error_set_field(
             err, STATUS_INVALID, "role",

@@ -72,11 +72,12 @@ static const struct cli_file *file_named(const struct batch_row *row, const char
 static status declare_again(struct submission *u, const char *files_path, const struct cli_file *file, char **url,
                             struct error *err)
 {
-    char path[320];
+    char path[320 + CLI_ESCAPED_BYTES], name[CLI_ESCAPED_BYTES];
     json_t *answer = NULL;
     json_t *body = json_pack("{s:s,s:s,s:I,s:s}", "name", file->name, "role", file->role, "size",
                              (json_int_t)file->n_bytes, "sha256", file->sha256);
-    snprintf(path, sizeof path, "%s/%s", files_path, file->name);
+    cli_name_escape(file->name, name);
+    snprintf(path, sizeof path, "%s/%s", files_path, name);
     status s = http_json(u->cli->http, "DELETE", path, NULL, NULL, NULL, err);
     if (s == STATUS_OK) s = http_json(u->cli->http, "POST", files_path, NULL, body, &answer, err);
     const char *address = json_string_value(json_object_get(answer, "upload_url"));

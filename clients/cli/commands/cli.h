@@ -65,6 +65,9 @@ status cli_add_result(struct cli *cli, json_t *job, struct error *err);
  * characters. */
 bool cli_path_is_safe(const char *path);
 status cli_job_path(const char *id, const char *tail, char *path, size_t n_path, struct error *err);
+/* Writes the name of a file as a part of an address: %XX for bytes other than letters, digits and . _ - */
+enum { CLI_ESCAPED_BYTES = 400 };
+void cli_name_escape(const char *name, char out[CLI_ESCAPED_BYTES]);
 /* The folder of a path: "." if it has none. */
 void cli_folder_of(const char *path, char *folder, size_t n_bytes);
 /* Width of the terminal behind `note`; 80 if it is unknown. */

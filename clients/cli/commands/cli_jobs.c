@@ -18,6 +18,16 @@ status cli_job_path(const char *id, const char *tail, char *path, size_t n_path,
     return STATUS_OK;
 }
 
+void cli_name_escape(const char *name, char out[CLI_ESCAPED_BYTES])
+{
+    static const char plain[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-";
+    size_t n = 0;
+    for (; *name != '\0' && n + 4 <= CLI_ESCAPED_BYTES; name++)
+        n += (size_t)snprintf(out + n, CLI_ESCAPED_BYTES - n, strchr(plain, *name) != NULL ? "%c" : "%%%02X",
+                              (unsigned char)*name);
+    out[n] = '\0';
+}
+
 static status job_call(struct cli *cli, const char *method, const char *tail, json_t **job, struct error *err)
 {
     char path[256];

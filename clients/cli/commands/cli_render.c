@@ -164,10 +164,11 @@ static status make_document(const json_t *job, json_t *picture, json_t **out, st
 static status fetch_file(struct cli *cli, const char *id, const char *where, const char *name, const char *folder,
                          struct error *err)
 {
-    char url[512], path[4096], tail[320];
+    char url[1024], path[4096], tail[512], escaped[CLI_ESCAPED_BYTES];
     if (!cli_path_is_safe(name))
         return error_set(err, STATUS_INVALID, "job %s names a file that cannot be written here: '%.80s'", id, name);
-    snprintf(tail, sizeof tail, "%s%s", where, name);
+    cli_name_escape(name, escaped);
+    snprintf(tail, sizeof tail, "%s%s", where, escaped);
     snprintf(path, sizeof path, "%s/%s", folder, name);
     status s = cli_job_path(id, tail, url, sizeof url, err);
     return s == STATUS_OK ? http_download(cli->http, url, path, NULL, NULL, err) : s;

@@ -210,10 +210,10 @@ static status declare(struct submit *u, const struct cli_file *file, json_t **an
     if (body == NULL) return error_set(err, STATUS_INVALID, "file name '%s' is not UTF-8", file->name);
     s = http_json(u->cli->http, "POST", path, NULL, body, answer, err);
     if (s == STATUS_CONFLICT && u->cli->args->resume_id != NULL) { /* the file has changed: replace the earlier one */
-        char *escaped = path + strlen(path);
-        snprintf(escaped, sizeof path - strlen(path), "/%s", file->name);
-        s = http_json(u->cli->http, "DELETE", path, NULL, NULL, NULL, err);
-        *escaped = '\0';
+        char one[sizeof path + CLI_ESCAPED_BYTES], name[CLI_ESCAPED_BYTES];
+        cli_name_escape(file->name, name);
+        snprintf(one, sizeof one, "%s/%s", path, name);
+        s = http_json(u->cli->http, "DELETE", one, NULL, NULL, NULL, err);
         if (s == STATUS_OK) s = http_json(u->cli->http, "POST", path, NULL, body, answer, err);
     }
     json_decref(body);

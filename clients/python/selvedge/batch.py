@@ -7,6 +7,7 @@ import json
 import os
 import re
 import time
+import urllib.parse
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Iterable, Mapping, Optional, Union
 
@@ -198,6 +199,6 @@ def send_files(job: Job, files: Mapping[str, str], known: Mapping[str, Mapping[s
             continue
         path = files[state["name"]]
         if known[path]["sha256"] in sent:
-            job.client.request("DELETE", f"{job.path}/files/{state['name']}", n_try=1).read()
+            job.client.request("DELETE", f"{job.path}/files/{urllib.parse.quote(state['name'], safe='')}", n_try=1).read()
         sent.add(known[path]["sha256"])
         job.upload(path, state["role"])

@@ -7,9 +7,9 @@
 
 #include <stdbool.h>
 
-/* True for [A-Za-z0-9._-]+, 1..127 bytes, not starting with '.'. */
+/* True for UTF-8 of 1..127 bytes without '/', '\\' and control characters, not starting with '.'. */
 bool job_file_name_valid(const char *name);
-/* Makes a valid file name of any text: other characters become '_', and it is cut to 127 bytes. */
+/* Makes a plain file name of any text: bytes outside of [A-Za-z0-9._-] become '_', and it is cut to 127 bytes. */
 void job_file_name_make_valid(const char *text, char name[JOB_MAX_NAME_BYTES]);
 /* Returns STATUS_INVALID with the key `path` when job_file_name_valid is false. */
 status job_check_file_name(const char *path, const char *name, struct error *err);

@@ -6,7 +6,7 @@
 
 enum {
     JOB_MAX_DOCUMENT_BYTES = 1 << 20,
-    JOB_MAX_NAME_BYTES = 128, /* input file names: [A-Za-z0-9._-], not starting with '.' */
+    JOB_MAX_NAME_BYTES = 128, /* input file names (job_file_name.h) */
     JOB_MAX_SAMPLE_BYTES = 256,
     JOB_MAX_ID_BYTES = 64, /* ids of jobs */
     JOB_MAX_PHOTOGRAPH = 1024,

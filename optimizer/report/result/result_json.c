@@ -28,11 +28,13 @@ static bool name_taken(picture_name *list, size_t i)
 
 status result_picture_names(const struct observation_set *o, picture_name **name, struct error *err)
 {
+    char from[JOB_MAX_NAME_BYTES];
     picture_name *list = calloc(o->n > 0 ? o->n : 1, sizeof *list);
     if (list == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot name pictures: out of memory");
     for (size_t i = 0; i < o->n; i++) {
-        const char *from = o->item[i].name, *dot = strrchr(from, '.');
-        int n = dot != NULL && dot > from ? (int)(dot - from) : (int)strlen(from);
+        job_file_name_make_valid(o->item[i].name, from);
+        const char *dot = strrchr(from, '.');
+        const int n = (int)(dot != NULL && dot > from ? (size_t)(dot - from) : strlen(from));
         snprintf(list[i], sizeof list[i], "%.*s", n, from);
         /* A number is appended until the name is unique, because a row may already have such a name. */
         for (size_t number = i; name_taken(list, i); number += o->n)
@@ -44,7 +46,7 @@ status result_picture_names(const struct observation_set *o, picture_name **name
 
 static int compare_double(const void *a, const void *b)
 {
-    double x = *(const double *)a, y = *(const double *)b;
+    const double x = *(const double *)a, y = *(const double *)b;
     return x < y ? -1 : x > y;
 }
 

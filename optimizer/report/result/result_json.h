@@ -36,6 +36,7 @@
 #define SELVEDGE_OPTIMIZER_RESULT_JSON_H
 
 #include "base/version.h"
+#include "optimizer/job/document/job_file_name.h"
 #include "optimizer/report/findings/report.h"
 
 #define RESULT_PROGRAM "selvedge-worker " SELVEDGE_VERSION

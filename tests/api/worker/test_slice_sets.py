@@ -67,7 +67,8 @@ def test_reconstruct_takes_the_slices_of_a_folder_by_number(real, tmp_path):
     folder = tmp_path / "scan"
     folder.mkdir()
     slices(folder, [f"s{k}.tif" for k in range(12)])
-    command = [program("selvedge"), "--server", real.url, "reconstruct", str(folder), "--voxel-um", "2", "--out", str(tmp_path / "out"), "--id-file", str(tmp_path / "id")]
+    command = [program("selvedge"), "--server", real.url, "reconstruct", str(folder), "--voxel-um", "2", "--out", str(tmp_path / "out"),
+               "--id-file", str(tmp_path / "id")]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
     assert "scan of 12 files: s0.tif, s1.tif ... s11.tif" in done.stderr
     job = (tmp_path / "id").read_text().strip()

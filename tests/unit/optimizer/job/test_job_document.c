@@ -123,7 +123,7 @@ static void test_structure(void **state)
     job_document_check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"scan.tif\"}}",
                              "volume.files[0]", "second time");
     job_document_check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{\"file\":\"../a.csv\"}}",
-                             "measurements.file", "A-Z a-z 0-9");
+                             "measurements.file", "127 bytes of UTF-8");
     job_document_check_error("{\"sample\":\"s\"," VOLUME ",\"measurements\":{}}", "measurements.file", "missing");
     job_document_check_error("{\"sample\":\"s\"," VOLUME
                              ",\"measurements\":{\"file\":\"a.csv\"},\"lamp\":{\"side_cm\":true}}",
@@ -137,7 +137,8 @@ static void test_volume(void **state)
     (void)state;
     job_document_check_error("{\"sample\":\"s\",\"volume\":{},\"photographs\":[" PHOTO "]}", "volume.files",
                              "list of 1 to");
-    job_document_check_error("{\"sample\":\"s\",\"volume\":{\"files\":[\"a b\"]}}", "volume.files[0]", "a file name");
+    job_document_check_error("{\"sample\":\"s\",\"volume\":{\"files\":[\"a\\\\b\"]}}", "volume.files[0]",
+                             "a file name");
     job_document_check_error(VOLUME_OF("\"voxel_size_um\":0"), "volume.voxel_size_um", "0.01 to 1000");
     job_document_check_error(VOLUME_OF("\"voxel_size_um\":[1,2]"), "volume.voxel_size_um", "3 numbers");
     job_document_check_error(VOLUME_OF("\"voxel_size_um\":[1,2,-1]"), "volume.voxel_size_um[2]", "-1");
@@ -202,6 +203,22 @@ static void test_file_names(void **state)
     assert_false(job_file_name_valid(".hidden"));
     assert_false(job_file_name_valid("a/b"));
     assert_false(job_file_name_valid("a\nb"));
+    static const char *const good[] = {"Probe 3 Gr\u00f6\u00dfe_00.tif", "a&b (2).tif", "\u7d39 1.tif", "a'b.tif",
+                                       "100%.csv"};
+    static const char *const bad[] = {"a\\b",
+                                      "a\x7f",
+                                      "a\tb",
+                                      "Gr\xf6\xdf"
+                                      "e",
+                                      "\xc2\x85",
+                                      "\xc0\xaf",
+                                      "a/../b",
+                                      "\xed\xa0\x80"};
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++) assert_true(job_file_name_valid(good[i]));
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) assert_false(job_file_name_valid(bad[i]));
+    char plain[JOB_MAX_NAME_BYTES];
+    job_file_name_make_valid("Gr\u00f6\u00dfe 1.tif", plain);
+    assert_string_equal(plain, "Gr____e_1.tif");
     char name[200];
     memset(name, 'a', sizeof name);
     name[127] = '\0';
