@@ -1,4 +1,5 @@
 /* Rays from cell to cell of the grid. */
+#include "renderer/scene/fiber_frame.h"
 #include "renderer/scene/scene_faces.h"
 #include "renderer/scene/scene_grid.h"
 #include "renderer/scene/scene_segment.h"
@@ -11,8 +12,9 @@ struct grid_walk {
     const struct scene *s;
     const struct scene_grid *g;
     float o[3]; /* in the copy of the tile that the ray is in */
-    float d[3], d2, inv[3], t_near, near_t;
-    bool checked; /* it may start in fibers: faces inside of their own tube are none */
+    float d[3], d2, inv_d2, inv[3], t_near, near_t;
+    float across[2][3], along[3]; /* two unit vectors across the ray, and d / d2 */
+    bool checked;                 /* it may start in fibers: faces inside of their own tube are none */
     uint32_t i_from;
     int at[3], step[3], copy[2];
     float next[3]; /* where the ray leaves the cell */
@@ -22,6 +24,16 @@ static inline void set_next(struct grid_walk *w, int k)
 {
     const float face = w->g->low_mm[k] + (float)(w->at[k] + (w->step[k] > 0)) * w->g->cell_mm[k];
     w->next[k] = w->d[k] != 0 ? (face - w->o[k]) * w->inv[k] : INFINITY;
+}
+
+static inline void set_frame(struct grid_walk *w, const float d[3])
+{
+    struct fiber_frame f;
+    const float inv = sqrtf(w->inv_d2), unit[3] = {inv * d[0], inv * d[1], inv * d[2]};
+    fiber_frame_from(&f, unit);
+    memcpy(w->across[0], f.v, sizeof f.v);
+    memcpy(w->across[1], f.w, sizeof f.w);
+    for (int k = 0; k < 3; k++) w->along[k] = w->inv_d2 * d[k];
 }
 
 static inline void start(struct grid_walk *w, const struct scene *s, const struct scene_ray *r)
@@ -35,6 +47,8 @@ static inline void start(struct grid_walk *w, const struct scene *s, const struc
     w->near_t = scene_faces_near(s, r->i_from);
     w->copy[0] = w->copy[1] = 0;
     w->d2 = segment_dot(r->direction, r->direction);
+    w->inv_d2 = 1 / w->d2;
+    set_frame(w, r->direction);
     for (int k = 0; k < 3; k++) {
         w->o[k] = r->origin_mm[k];
         w->d[k] = r->direction[k];
@@ -65,7 +79,7 @@ typedef float f4 __attribute__((vector_size(16)));
 typedef float f8 __attribute__((vector_size(32)));
 typedef int32_t i8 __attribute__((vector_size(32)));
 
-static inline f8 dot8(const f8 a[3], const f8 b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+static inline f8 along8(const f8 a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 static inline f8 two_vertices(const struct scene_vertex *a, const struct scene_vertex *b)
 {
@@ -144,37 +158,33 @@ static inline void place_eight(const struct grid_walk *w, const uint32_t *entry,
     }
 }
 
-/* segment_meet for eight entries at once; along the axis, places count in lengths of the segment. */
+/* segment_meet for eight entries at once, in the frame of the ray: lengths across it, and along it counts of its
+ * direction. The axis of a segment is a; the ray runs past its first end at p. On the cone that touches both balls,
+ *     z^2 slope - 2 z a_z g + g^2 - cone (p^2 - r^2) = 0,   cone = slope + a_z^2,
+ * and the ball that touches there has the place (g + z a_z) / cone of the way from the first end to the second. */
 static inline struct eight meet_eight(const struct grid_walk *w, const uint32_t *entry)
 {
     struct eight m;
     i8 numbers;
-    f8 o[3], a[3], radius[2], p[3], p_off[3], d_off[3], q[3];
+    f8 o[3], a[3], radius[2];
     place_eight(w, entry, o, a, radius);
-    const float *d = w->d, inv_d2 = 1 / w->d2;
-    const f8 ad = a[0] * d[0] + a[1] * d[1] + a[2] * d[2], inv = 1 / dot8(a, a), da = ad * inv,
-             near = (0.5f * ad - (o[0] * d[0] + o[1] * d[1] + o[2] * d[2])) * inv_d2;
-    for (int k = 0; k < 3; k++) p[k] = o[k] + near * d[k];
-    const f8 pa = dot8(p, a) * inv, rate = radius[1] - radius[0], k = rate * inv, c2 = 1 - rate * k;
-    for (int i = 0; i < 3; i++) {
-        p_off[i] = p[i] - pa * a[i];
-        d_off[i] = d[i] - da * a[i];
-    }
-    const f8 r = radius[0] + rate * pa, r_rate = rate * da, s = c2 * dot8(d_off, d_off) - r_rate * r_rate,
-             h = c2 * dot8(p_off, d_off) - r * r_rate, root2 = h * h - s * (c2 * dot8(p_off, p_off) - r * r),
-             t = (-h - root8(root2)) / s, place = (pa + t * da + k * radius[0]) / c2;
-    const i8 before = place<0, after = place> 1;
-    m.along = ~(s > 1e-6f * w->d2);
+    const f8 px = along8(o, w->across[0]), py = along8(o, w->across[1]), start = along8(o, w->along),
+             ax = along8(a, w->across[0]), ay = along8(a, w->across[1]), az = along8(a, w->along);
+    const f8 rate = radius[1] - radius[0], r2 = radius[0] * radius[0], off2 = ax * ax + ay * ay,
+             slope = off2 - rate * rate, az_d2 = az * w->d2, cone = slope + az * az_d2, side = px * ay - py * ax,
+             pa = px * ax + py * ay, p2 = px * px + py * py, g = pa + radius[0] * rate,
+             root2 = off2 * r2 - side * side + rate * (2 * radius[0] * pa + rate * p2),
+             z = (az * g - root8(root2 * cone * w->inv_d2)) / slope, place = g + z * az_d2;
+    const i8 before = place<0, after = place> cone;
+    m.along = ~(slope > 1e-6f * cone);
     m.met = root2 >= 0;
-    m.t = near + t;
-    if (lanes((before | after) & m.met) == 0) return m;
-    for (int i = 0; i < 3; i++) q[i] = p[i] - (f8)((i8)a[i] & after);
-    const f8 ball = choose(after, radius[1], radius[0]), b = q[0] * d[0] + q[1] * d[1] + q[2] * d[2],
-             ball2 = b * b - w->d2 * (dot8(q, q) - ball * ball), t_ball = near + (-b - root8(ball2)) * inv_d2;
-    m.t = choose(before | after, t_ball, m.t);
+    m.t = z - start;
+    const f8 qx = px - (f8)((i8)ax & after), qy = py - (f8)((i8)ay & after),
+             ball = choose(after, radius[1] * radius[1], r2) - (qx * qx + qy * qy);
     memcpy(&numbers, entry, sizeof numbers);
-    const i8 begins = (numbers & (int32_t)w->g->begin_bit) != 0;
-    m.met &= ~(before | after) | ((ball2 >= 0) & (after | begins));
+    const i8 begins = (numbers & (int32_t)w->g->begin_bit) != 0, meets_ball = (ball >= 0) & (after | (before & begins));
+    m.met &= ~(before | after) | meets_ball;
+    m.t = choose(before | after, (f8)((i8)az & after) - root8(ball * w->inv_d2) - start, m.t);
     return m;
 }
 
