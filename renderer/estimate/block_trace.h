@@ -20,8 +20,30 @@ struct estimate_blocks {
     const void *announce_context;
 };
 
+/* Sums over the paths of one or more blocks, in path order: n_value sums, as many sums of squares, and for each pair of
+ * members the sum of the products of their radiances, over all channels. Pair (a, b), b < a, has number a (a - 1) / 2 +
+ * b. The counts are those of all sums of a task, in the first of them. */
+struct block_sum {
+    uint64_t n_path, n_bounce;
+    double *x, *x2, *pair;
+};
+
+/* n blocks of a group, the first of which is the begin-th after first_block. */
+struct block_range {
+    uint32_t i_group, first_block, begin, n, per_sum;
+};
+
+/* Values of all paths that are traced at once. */
+enum { ESTIMATE_MOST_VALUES = 1 << 17 };
+
 /* Values of one path: of all members of a group. */
 size_t estimate_n_value(const struct estimate_blocks *b, size_t i_group);
+/* How many blocks of a group may be traced at once, by the tracer and by the room for values. */
+uint32_t estimate_blocks_at_once(const struct estimate_blocks *b, size_t i_group);
+/* Traces blocks. Adds each to its sum, which has per_sum of the blocks from first_block on. value: room for
+ * ESTIMATE_MOST_VALUES. */
+void estimate_trace_blocks(const struct estimate_blocks *b, const struct block_range *range, float *value,
+                           struct block_sum *sum);
 /* Traces n paths of a group. value: room for n * estimate_n_value, is cleared first. Result: the number of bounces. */
 uint64_t estimate_trace(const struct estimate_blocks *b, size_t i_group, size_t n, double (*xy)[2], struct rng *rng,
                         float *value);

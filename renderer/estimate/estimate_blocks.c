@@ -8,27 +8,23 @@
 
 enum {
     BLOCK_PATHS = RADIANCE_BLOCK_PATHS,
-    TASKS_PER_GROUP = 1024,
+    SUMS_PER_GROUP = 1024, /* at most, or twice as many */
+    LEAST_TASKS = 64,      /* of all groups together, if they have as many blocks */
     N_VALUE = 3 + 3 * SCATTERING_MAX_FLAT,
     N_PAIR = ESTIMATE_MAX_PARTNER * (ESTIMATE_MAX_PARTNER + 1) / 2
 };
 
-/* Sums over the paths of one task, in path order: n_value sums, as many sums of squares, and for each pair of members
- * the sum of the products of their radiances, over all channels. Pair (a, b), b < a, has number a (a - 1) / 2 + b. */
-struct task_sum {
-    uint64_t n_path, n_bounce;
-    double *x, *x2, *pair;
-};
-
+/* Blocks of one group, which has a sum for each blocks_per_sum of them. */
 struct task {
-    uint32_t i_group, first_block, n_block;
+    uint32_t i_group, first_block, n_block, blocks_per_sum;
+    size_t first_sum, n_sum;
 };
 
 struct run {
     const struct estimate_blocks *b;
     struct task *task;
-    size_t n_task;
-    struct task_sum *sum;           /* per task */
+    size_t n_task, n_sum;
+    struct block_sum *sum;          /* one for each sum of the tasks */
     struct contrast_plan *contrast; /* per group; n_cell 0: its mean is wanted */
     double *sum_storage;
     size_t n_value, n_pair; /* the most of any group */
@@ -40,52 +36,24 @@ static size_t n_pair_of(const struct estimate_blocks *b, size_t i_group)
     return n * (n - 1) / 2;
 }
 
-/* Adds the products of the members' radiances on one path. value: n_value of each of the n_member members. */
-static void add_pairs(const float *value, size_t n_member, size_t n_value, double *pair)
-{
-    for (size_t a = 1; a < n_member; a++)
-        for (size_t b = 0; b < a; b++, pair++)
-            for (size_t c = 0; c < 3; c++) *pair += (double)value[a * n_value + c] * (double)value[b * n_value + c];
-}
-
-static void trace_block(const struct estimate_blocks *b, uint32_t i_group, uint32_t i_block, struct task_sum *sum,
-                        float *value)
-{
-    struct rng_key key = b->key;
-    size_t n_value = estimate_n_value(b, i_group);
-    struct rng rng[BLOCK_PATHS];
-    double xy[BLOCK_PATHS][2];
-    key.configuration = i_group;
-    for (uint32_t i = 0; i < BLOCK_PATHS; i++) {
-        rng_start(&rng[i], &key, i_block, i);
-        for (int a = 0; a < 2; a++) xy[i][a] = rng_double(&rng[i]);
-    }
-    sum->n_bounce += estimate_trace(b, i_group, BLOCK_PATHS, xy, rng, value);
-    sum->n_path += BLOCK_PATHS;
-    const size_t n_member = b->groups->group[i_group].n;
-    for (size_t i = 0; i < BLOCK_PATHS; i++) {
-        for (size_t k = 0; k < n_value; k++) {
-            double v = (double)value[i * n_value + k];
-            sum->x[k] += v;
-            sum->x2[k] += v * v;
-        }
-        add_pairs(value + i * n_value, n_member, n_value / n_member, sum->pair);
-    }
-}
-
 static void run_task(void *context, size_t i_task, size_t i_thread)
 {
     (void)i_thread;
     struct run *r = context;
     const struct task *t = &r->task[i_task];
-    float value[BLOCK_PATHS * N_VALUE];
+    float value[ESTIMATE_MOST_VALUES];
     const struct contrast_plan *contrast = &r->contrast[t->i_group];
+    struct block_sum *sum = &r->sum[t->first_sum];
     if (contrast->n_cell > 0) {
-        r->sum[i_task].n_bounce = contrast_trace_task(r->b, contrast, t->i_group, t->first_block, value);
+        sum->n_bounce = contrast_trace_task(r->b, contrast, t->i_group, t->first_block, value);
         return;
     }
-    for (uint32_t b = 0; b < t->n_block && !progress_cancelled(r->b->progress); b++)
-        trace_block(r->b, t->i_group, t->first_block + b, &r->sum[i_task], value);
+    const uint32_t most = estimate_blocks_at_once(r->b, t->i_group);
+    for (uint32_t i = 0; i < t->n_block && !progress_cancelled(r->b->progress); i += most) {
+        const uint32_t left = t->n_block - i;
+        const struct block_range range = {t->i_group, t->first_block, i, left < most ? left : most, t->blocks_per_sum};
+        estimate_trace_blocks(r->b, &range, value, sum);
+    }
 }
 
 static status check_count(const struct path_group *g, size_t limit, size_t i_configuration, struct error *err)
@@ -111,28 +79,47 @@ static status plan_contrasts(struct run *r, struct error *err)
     return STATUS_OK;
 }
 
-/* Blocks of a group, and how many of them one task has; of a contrast: tasks of whole cells. */
-static uint64_t blocks_of(const struct run *r, size_t i_group, uint64_t *per_task)
+static uint64_t blocks_for(const struct path_group *g) { return ((uint64_t)g->n_path + BLOCK_PATHS - 1) / BLOCK_PATHS; }
+
+/* Blocks of a group, and how many of them have one sum: this depends on the group alone. Of a contrast: its tasks. */
+static uint64_t blocks_of(const struct run *r, size_t i_group, uint32_t *per_sum)
 {
-    uint64_t n_block = ((uint64_t)r->b->groups->group[i_group].n_path + BLOCK_PATHS - 1) / BLOCK_PATHS;
-    *per_task = 1;
+    const uint64_t n_block = blocks_for(&r->b->groups->group[i_group]);
+    *per_sum = 1;
     if (r->contrast[i_group].n_cell > 0) return r->contrast[i_group].n_task;
-    *per_task += n_block / TASKS_PER_GROUP;
+    *per_sum += (uint32_t)(n_block / SUMS_PER_GROUP);
     return n_block;
+}
+
+/* Sums of a task: as many as are traced at once, if there are tasks enough for all threads of a machine. */
+static uint32_t sums_per_task(const struct run *r, size_t i_group, uint32_t per_sum)
+{
+    const struct path_groups *groups = r->b->groups;
+    uint64_t all = 0, n = estimate_blocks_at_once(r->b, i_group);
+    if (r->contrast[i_group].n_cell > 0) return 1;
+    for (size_t i = 0; i < groups->n; i++) all += blocks_for(&groups->group[i]);
+    n = (all / LEAST_TASKS < n ? all / LEAST_TASKS : n) / per_sum;
+    return n > 1 ? (uint32_t)n : 1;
 }
 
 static void fill_tasks(struct run *r)
 {
-    size_t n = 0, n_value = r->n_value, n_pair = r->n_pair;
+    size_t n_value = r->n_value, n_pair = r->n_pair, i_sum = 0;
     for (size_t i = 0; i < r->b->groups->n; i++) {
-        uint64_t per_task, n_block = blocks_of(r, i, &per_task);
-        for (uint64_t b = 0; b < n_block; b += per_task, n++) {
-            uint64_t here = n_block - b < per_task ? n_block - b : per_task;
-            r->task[n] = (struct task){(uint32_t)i, (uint32_t)b, (uint32_t)here};
-            r->sum[n].x = r->sum_storage + (2 * n_value + n_pair) * n;
-            r->sum[n].x2 = r->sum[n].x + n_value;
-            r->sum[n].pair = r->sum[n].x2 + n_value;
+        uint32_t per_sum;
+        const uint64_t n_block = blocks_of(r, i, &per_sum), per_task = (uint64_t)sums_per_task(r, i, per_sum) * per_sum;
+        for (uint64_t b = 0; b < n_block; b += per_task) {
+            const uint64_t here = n_block - b < per_task ? n_block - b : per_task,
+                           n_sum = (here + per_sum - 1) / per_sum;
+            r->task[r->n_task++] =
+                (struct task){(uint32_t)i, (uint32_t)b, (uint32_t)here, per_sum, i_sum, (size_t)n_sum};
+            i_sum += (size_t)n_sum;
         }
+    }
+    for (size_t k = 0; k < r->n_sum; k++) {
+        r->sum[k].x = r->sum_storage + (2 * n_value + n_pair) * k;
+        r->sum[k].x2 = r->sum[k].x + n_value;
+        r->sum[k].pair = r->sum[k].x2 + n_value;
     }
 }
 
@@ -143,20 +130,20 @@ static status make_tasks(struct run *r, struct error *err)
     size_t n = 0, n_value = 0, n_pair = 0;
     for (size_t i = 0; i < groups->n; i++) {
         const struct path_group *g = &groups->group[i];
-        uint64_t per_task, n_block;
         status s = check_count(g, (size_t)UINT32_MAX * BLOCK_PATHS, groups->member[g->first], err);
         if (s != STATUS_OK) return s;
-        n_block = blocks_of(r, i, &per_task);
-        n += (size_t)((n_block + per_task - 1) / per_task);
+        uint32_t per_sum;
+        const uint64_t n_block = blocks_of(r, i, &per_sum);
+        n += (size_t)((n_block + per_sum - 1) / per_sum);
         if (estimate_n_value(r->b, i) > n_value) n_value = estimate_n_value(r->b, i);
         if (n_pair_of(r->b, i) > n_pair) n_pair = n_pair_of(r->b, i);
     }
-    r->n_task = n;
-    r->task = malloc((n + 1) * sizeof *r->task);
+    r->n_sum = n;
+    r->task = malloc((n + 1) * sizeof *r->task); /* at most one for each sum */
     r->sum = calloc(n + 1, sizeof *r->sum);
     r->sum_storage = calloc(n + 1, (2 * n_value + n_pair + 1) * sizeof *r->sum_storage);
     if (r->task == NULL || r->sum == NULL || r->sum_storage == NULL)
-        return error_set(err, STATUS_NO_MEMORY, "cannot estimate radiance: no memory for %zu tasks", n);
+        return error_set(err, STATUS_NO_MEMORY, "cannot estimate radiance: no memory for %zu sums", n);
     r->n_value = n_value;
     r->n_pair = n_pair;
     fill_tasks(r);
@@ -171,7 +158,7 @@ static status not_finite(size_t i_configuration, size_t i_value, struct estimate
 }
 
 /* One member's means and variances from its part of the sums. */
-static bool member_estimate(const struct task_sum *sum, size_t n_jac, struct estimate *e, size_t *bad_value)
+static bool member_estimate(const struct block_sum *sum, size_t n_jac, struct estimate *e, size_t *bad_value)
 {
     double n = (double)sum->n_path;
     e->n_path = sum->n_path;
@@ -207,7 +194,7 @@ static void add_partner(const struct path_group *g, const size_t *member, size_t
                                                            .correlation = (float)fmin(fmax(correlation, -1.0), 1.0)};
 }
 
-static status group_estimates(const struct run *r, size_t i_group, const struct task_sum *total, struct estimate *out,
+static status group_estimates(const struct run *r, size_t i_group, const struct block_sum *total, struct estimate *out,
                               struct estimate_fault *fault, struct error *err)
 {
     const struct path_groups *groups = r->b->groups;
@@ -222,12 +209,23 @@ static status group_estimates(const struct run *r, size_t i_group, const struct 
     }
     for (size_t k = 0; k < g->n; k++) {
         size_t i = groups->member[g->first + k], at = k * (3 + n_jac);
-        const struct task_sum own = {total->n_path, total->n_bounce, total->x + at, total->x2 + at, NULL};
+        const struct block_sum own = {total->n_path, total->n_bounce, total->x + at, total->x2 + at, NULL};
         if (!member_estimate(&own, n_jac, &out[i], &bad_value)) return not_finite(i, bad_value, fault, err);
         for (size_t b = 0; b < k && total->n_path > 0; b++)
             add_partner(g, groups->member, k, b, total->pair[k * (k - 1) / 2 + b], out);
     }
     return STATUS_OK;
+}
+
+static void add_sum(const struct block_sum *s, size_t n_value, size_t n_pair, struct block_sum *total)
+{
+    for (size_t k = 0; k < n_value; k++) {
+        total->x[k] += s->x[k];
+        total->x2[k] += s->x2[k];
+    }
+    for (size_t k = 0; k < n_pair; k++) total->pair[k] += s->pair[k];
+    total->n_path += s->n_path;
+    total->n_bounce += s->n_bounce;
 }
 
 static status reduce(const struct run *r, struct estimate *out, struct estimate_fault *fault, struct error *err)
@@ -236,16 +234,11 @@ static status reduce(const struct run *r, struct estimate *out, struct estimate_
     status st = STATUS_OK;
     for (size_t i = 0; i < r->b->groups->n && st == STATUS_OK; i++) {
         double x[N_VALUE] = {0}, x2[N_VALUE] = {0}, pair[N_PAIR] = {0};
-        struct task_sum total = {0, 0, x, x2, pair};
+        struct block_sum total = {0, 0, x, x2, pair};
         for (; i_task < r->n_task && r->task[i_task].i_group == i; i_task++) {
-            const struct task_sum *s = &r->sum[i_task];
-            for (size_t k = 0; k < estimate_n_value(r->b, i); k++) {
-                total.x[k] += s->x[k];
-                total.x2[k] += s->x2[k];
-            }
-            for (size_t k = 0; k < n_pair_of(r->b, i); k++) total.pair[k] += s->pair[k];
-            total.n_path += s->n_path;
-            total.n_bounce += s->n_bounce;
+            const struct task *t = &r->task[i_task];
+            for (size_t k = 0; k < t->n_sum; k++)
+                add_sum(&r->sum[t->first_sum + k], estimate_n_value(r->b, i), n_pair_of(r->b, i), &total);
         }
         st = group_estimates(r, i, &total, out, fault, err);
     }
@@ -259,8 +252,8 @@ static size_t sum_bytes(const struct run *r, size_t i_task, double **sum)
     const struct task *t = &r->task[i_task];
     const struct contrast_plan *contrast = &r->contrast[t->i_group];
     if (contrast->n_cell > 0) return contrast_task_sums(contrast, t->first_block, sum) * sizeof **sum;
-    *sum = r->sum[i_task].x;
-    return (2 * r->n_value + r->n_pair) * sizeof **sum;
+    *sum = r->sum[t->first_sum].x;
+    return t->n_sum * (2 * r->n_value + r->n_pair) * sizeof **sum;
 }
 
 static size_t most_bytes(const struct run *r)
@@ -295,7 +288,8 @@ static size_t pack_task(void *context, size_t i_task, void *to)
 {
     const struct run *r = run_of(context, &i_task);
     double *sum;
-    const uint64_t count[2] = {r->sum[i_task].n_path, r->sum[i_task].n_bounce};
+    const struct block_sum *first = &r->sum[r->task[i_task].first_sum]; /* counts for the whole task */
+    const uint64_t count[2] = {first->n_path, first->n_bounce};
     size_t n = sum_bytes(r, i_task, &sum);
     memcpy(to, count, sizeof count);
     memcpy((char *)to + sizeof count, sum, n);
@@ -311,8 +305,9 @@ static bool unpack_task(void *context, size_t i_task, const void *from, size_t n
     if (n_bytes != n + sizeof count) return false;
     memcpy(count, from, sizeof count);
     memcpy(sum, (const char *)from + sizeof count, n);
-    r->sum[i_task].n_path = count[0];
-    r->sum[i_task].n_bounce = count[1];
+    struct block_sum *first = &r->sum[r->task[i_task].first_sum];
+    first->n_path = count[0];
+    first->n_bounce = count[1];
     return true;
 }
 

@@ -11,7 +11,8 @@
 #include "renderer/scene/scene.h"
 #include "renderer/transport/discrepancy.h"
 
-enum { RADIANCE_BLOCK_PATHS = 256 };
+/* Paths of a block of an estimate, and the most that any tracer takes at once. */
+enum { RADIANCE_BLOCK_PATHS = 256, RADIANCE_MOST_PATHS = 16 * RADIANCE_BLOCK_PATHS };
 
 struct volume_scene;     /* renderer/transport/volume/volume_scene.h */
 struct fast_option;      /* renderer/fast/fast_tables.h */
@@ -45,7 +46,7 @@ struct radiance_input {
                          variance; volumes have none */
 };
 
-/* Paths that are traced together: at most RADIANCE_BLOCK_PATHS camera paths. The same paths serve every member: members
+/* Paths that are traced together: at most max_path of the tracer. The same paths serve every member: members
  * differ in their lamp only. */
 struct radiance_block {
     const size_t *member; /* n_member indices of configurations */
@@ -66,6 +67,7 @@ struct radiance_record {
 
 /* The table of an implementation; state is its own. */
 struct radiance_tracer {
+    size_t max_path;    /* in one call of trace: whole blocks, at most RADIANCE_MOST_PATHS */
     size_t max_member;  /* configurations that one path can serve */
     size_t entry_bytes; /* of a record */
     /* STATUS_INVALID: a parameter (field: its name) or n_set; STATUS_NO_MEMORY. Leaves nothing to release on

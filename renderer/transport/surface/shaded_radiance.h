@@ -35,8 +35,9 @@ double shaded_replay_nothing(const void *at, const void *traced, const struct ra
 /* A radiance_tracer with this prepare. */
 #define SHADED_TRACER(prepare_method)                                                                                  \
     {                                                                                                                  \
-        .max_member = 1, .entry_bytes = 1, .prepare = prepare_method, .release = shaded_release,                       \
-        .trace = shaded_trace, .record = shaded_record_nothing, .replay = shaded_replay_nothing                        \
+        .max_path = RADIANCE_BLOCK_PATHS, .max_member = 1, .entry_bytes = 1, .prepare = prepare_method,                \
+        .release = shaded_release, .trace = shaded_trace, .record = shaded_record_nothing,                             \
+        .replay = shaded_replay_nothing                                                                                \
     }
 
 #endif

@@ -1,6 +1,7 @@
 #include "renderer/transport/surface/surface_radiance.h"
 
 #include "renderer/transport/camera.h"
+#include "renderer/transport/surface/path_order.h"
 #include "renderer/transport/surface/path_tracer.h"
 
 #include <stdlib.h>
@@ -68,8 +69,11 @@ static uint64_t trace(const void *state, const struct radiance_block *b, float *
     uint64_t n_bounce = 0;
     struct lamp lamp[PATH_MAX_LAMP];
     struct path_result path[PATH_MAX_LAMP];
+    uint32_t order[RADIANCE_MOST_PATHS];
+    path_order_fill(camera, s->scene, b->n_path, b->xy, order);
     for (size_t k = 0; k < b->n_member; k++) lamp[k] = s->setting[b->member[k]].lights.lamp;
-    for (size_t i = 0; i < b->n_path; i++) {
+    for (size_t k = 0; k < b->n_path; k++) {
+        const size_t i = order[k];
         struct scene_ray ray;
         double xy[2];
         if (progress_cancelled(b->progress)) break; /* a block of white cloth takes longer than a caller will wait */
@@ -77,10 +81,10 @@ static uint64_t trace(const void *state, const struct radiance_block *b, float *
         if (!camera_ray(camera, s->scene, xy, &ray)) continue; /* sees nothing: adds 0 */
         path_trace_lamps(setting, lamp, n_lamp, &ray, &b->rng[i], path);
         n_bounce += path[0].n_bounce;
-        for (size_t k = 0; k < b->n_member; k++) {
-            float *v = value + (i * b->n_member + k) * n_value;
-            memcpy(v, path[k].radiance, sizeof path[k].radiance);
-            memcpy(v + 3, path[k].jac, s->n_jac * sizeof *v);
+        for (size_t m = 0; m < b->n_member; m++) {
+            float *v = value + (i * b->n_member + m) * n_value;
+            memcpy(v, path[m].radiance, sizeof path[m].radiance);
+            memcpy(v + 3, path[m].jac, s->n_jac * sizeof *v);
         }
     }
     return n_bounce;
@@ -111,7 +115,8 @@ static double replay(const void *at, const void *traced, const struct radiance_r
     return path_replay(sets, &steps, by->setting[0].shows_width);
 }
 
-const struct radiance_tracer surface_radiance = {.max_member = PATH_MAX_LAMP,
+const struct radiance_tracer surface_radiance = {.max_path = RADIANCE_MOST_PATHS,
+                                                 .max_member = PATH_MAX_LAMP,
                                                  .entry_bytes = sizeof(struct path_step),
                                                  .prepare = prepare,
                                                  .release = release,

@@ -144,7 +144,8 @@ static double replay(const void *at, const void *traced, const struct radiance_r
     return volume_replay(now->scene, &now->parameters, &then->parameters, &events);
 }
 
-const struct radiance_tracer volume_radiance = {.max_member = 1,
+const struct radiance_tracer volume_radiance = {.max_path = RADIANCE_BLOCK_PATHS,
+                                                .max_member = 1,
                                                 .entry_bytes = sizeof(struct volume_event),
                                                 .prepare = prepare,
                                                 .release = release,

@@ -41,7 +41,7 @@ static uint64_t trace(const void *state, const struct radiance_block *block, flo
     return block->n_path;
 }
 
-static const struct radiance_tracer board_tracer = {.max_member = 1, .trace = trace};
+static const struct radiance_tracer board_tracer = {.max_path = RADIANCE_BLOCK_PATHS, .max_member = 1, .trace = trace};
 
 status board_estimate(void *context, const struct estimator_call *call, const struct progress *progress,
                       struct estimate *out, double *wall_s, struct error *err)

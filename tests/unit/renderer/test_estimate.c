@@ -59,6 +59,20 @@ static void same_bits_for_any_threads(void **state)
         assert_true(more[0].mean[c] == one[0].mean[c] && more[0].var[c] == one[0].var[c] && more[0].jac[c] == 0);
 }
 
+/* Tasks of a large request are of more blocks than those of a small one: neither order nor sums may show it. */
+static void same_bits_in_large_requests(void **state)
+{
+    (void)state;
+    const size_t all[4] = {8192, 8192, 8192, 8192}, only_last[4] = {0, 0, 0, 8192};
+    struct estimate_request large = estimate_fixture_request(&fixture, all, 4),
+                            small = estimate_fixture_request(&fixture, only_last, 4);
+    struct estimate a[4], b[4];
+    estimate_fixture_run(&large, 2, a);
+    estimate_fixture_run(&small, 2, b);
+    assert_int_equal(a[3].n_path, 8192);
+    assert_memory_equal(&a[3], &b[3], sizeof a[3]);
+}
+
 /* The stated variance of the mean against the variance of repeated estimates. */
 static void variances_agree_with_repetitions(void **state)
 {
@@ -242,6 +256,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(same_bits_for_any_threads),
+        cmocka_unit_test(same_bits_in_large_requests),
         cmocka_unit_test(variances_agree_with_repetitions),
         cmocka_unit_test(agrees_without_avx512),
         cmocka_unit_test(cancels_within_100_ms),
