@@ -10,6 +10,8 @@
 #define OPTION_SCAN_FILES "scan_files"
 #define OPTION_IGNORE_NUMBERS "ignore_numbers"
 #define OPTION_GEOMETRY_JOB "geometry_job"
+#define OPTION_SCAN_CHANNEL "scan_channel"
+#define OPTION_SCAN_TIME "scan_time"
 #define OPTION_RAW "raw"
 #define OPTION_RAW_SHAPE "raw_shape"
 #define OPTION_RAW_TYPE "raw_type"

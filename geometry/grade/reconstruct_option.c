@@ -7,7 +7,6 @@ void reconstruct_option_default(struct reconstruct_option *o)
 {
     *o = (struct reconstruct_option){
         .voxel_size_m = {NAN, NAN, NAN},
-        .axes = "xyz",
         .crop_keep = 0.5,
         .trim_above_voxel = (size_t)1 << 30,
         .matrix = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},

@@ -11,8 +11,9 @@
  * back. */
 struct reconstruct_option {
     struct volume_raw_declaration raw; /* n[0] == 0 (default): the file has a header */
+    struct volume_part part;           /* of a file that has several channels or times */
     double voxel_size_m[3];            /* required unless the file states it; NaN: take the file's */
-    char axes[8];         /* which volume axis becomes cloth x, y, z: "xyz" (default), "xzy", "-zxy", ... */
+    char axes[8];         /* which volume axis becomes cloth x, y, z: "xzy", "-zxy", ...; "" (default): the file's */
     double matrix[9];     /* rotation/shear applied after `axes`, row-major; identity by default */
     size_t crop_voxel[6]; /* x0 y0 z0 x1 y1 z1 after the matrix; all 0: everything */
     bool align;           /* estimate the matrix (main_directions.h); a given matrix has precedence */

@@ -9,6 +9,7 @@
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/grade/reconstruct_option.h"
 #include "geometry/grade/reconstruct_report.h"
+#include "geometry/volume/format/volume_info.h"
 #include "geometry/volume/volume.h"
 
 #include "base/progress.h"
@@ -17,8 +18,25 @@
 
 #include <stdbool.h>
 
+struct scan_look;
+
 /* Memory, or space in files, that all steps together need for a voxel of the scan. */
 enum { SCAN_BYTES_PER_VOXEL = 22 };
+
+/* Settles the statements of a scan's files against the options: each is applied (an option that was left out takes
+ * its value), or its entry in the ledger, a copy of info->ledger, says why it is not used. STATUS_INVALID, with the
+ * option in the field, names a statement that the options contradict, with both values and a way out, and asks about a
+ * voxel size that shows no fiber. */
+status reconstruct_settle(const struct volume_source_info *info, struct reconstruct_option *o,
+                          struct file_ledger *ledger, struct error *err);
+/* Enters the padding that was found, and a stated one that was not. */
+void reconstruct_state_padding(const struct volume_source_info *info, const struct scan_look *look,
+                               struct file_ledger *ledger);
+/* Opens a scan, settles its statements, and looks at some of its slices: everything that can be said before it is read.
+ * Errors as of volume_source_open_declared and reconstruct_settle; STATUS_FORMAT for voxels without numbers, or of one
+ * value. */
+status reconstruct_examine(const char *const *path, size_t n_path, struct reconstruct_option *o,
+                           struct file_ledger *ledger, struct error *err);
 
 /* Step "volume": reads the files, applies axes, matrix and crop, maps densities to [0, 1], and fills enclosed lumens.
  * Where any were filled, reconstruct_refill_lumens follows. path: as for volume_source_open_declared. space NULL:

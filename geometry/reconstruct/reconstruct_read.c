@@ -4,6 +4,7 @@
 
 #include "geometry/diameter/fiber_diameter.h"
 #include "geometry/orientation/repeat_direction.h"
+#include "geometry/reconstruct/scan_look.h"
 #include "geometry/reconstruct/void_trim.h"
 #include "geometry/volume/density_map.h"
 #include "geometry/volume/format/volume_source.h"
@@ -37,18 +38,11 @@ static bool is_identity(const double m[9])
     return true;
 }
 
-static status plan_voxel_size(const struct volume_source_info *info, struct reconstruct_option *o, struct plan *p,
-                              struct error *err)
+static status plan_voxel_size(const struct reconstruct_option *o, struct plan *p, struct error *err)
 {
-    for (int a = 0; a < 3; a++)
-        if (isnan(o->voxel_size_m[a])) o->voxel_size_m[a] = info->voxel_size_m[a];
     double least = INFINITY, most = 0.0;
     for (int a = 0; a < 3; a++) {
         double w = o->voxel_size_m[a];
-        if (isnan(w))
-            return error_set_field(
-                err, STATUS_INVALID, OPTION_VOXEL_SIZE,
-                "cannot use the volume: its voxel size is not given, and the file does not state it");
         if (!(w >= 1e-9) || !(w <= 1e-2))
             return error_set_field(err, STATUS_INVALID, OPTION_VOXEL_SIZE,
                                    "cannot use the volume: a voxel size of %g um is not possible", w * 1e6);
@@ -86,8 +80,9 @@ static status plan_read(const struct volume_source_info *info, struct reconstruc
                         struct error *err)
 {
     *p = (struct plan){0};
-    status s = axis_map_parse(o->axes, &p->map, err);
-    if (s == STATUS_OK) s = plan_voxel_size(info, o, p, err);
+    status s = reconstruct_settle(info, o, NULL, err);
+    if (s == STATUS_OK) s = axis_map_parse(o->axes, &p->map, err);
+    if (s == STATUS_OK) s = plan_voxel_size(o, p, err);
     if (s != STATUS_OK) return s;
     memcpy(p->n_file, info->n, sizeof p->n_file);
     for (int a = 0; a < 3; a++) p->n_stored[a] = info->n[p->map.source[a]];
@@ -97,14 +92,14 @@ static status plan_read(const struct volume_source_info *info, struct reconstruc
 }
 
 /* Crops a large scan in z to the slices that hold material. */
-static status trim_void(struct volume_source *source, const struct reconstruct_option *o, struct plan *p,
-                        const struct progress *progress, struct error *err)
+static status trim_void(struct volume_source *source, const struct scan_look *look, const struct reconstruct_option *o,
+                        struct plan *p, const struct progress *progress, struct error *err)
 {
     bool given = p->resample;
     for (int i = 0; i < 6; i++) given = given || o->crop_voxel[i] > 0;
     if (given || volume_n_voxel(p->n_stored) <= o->trim_above_voxel) return STATUS_OK;
     size_t range[2];
-    status s = void_trim_find(source, p->map.source[2], progress, range, err);
+    status s = void_trim_find(source, look, p->map.source[2], progress, range, err);
     if (s != STATUS_OK) return s;
     const size_t n = p->n_stored[2];
     p->box[2] = p->box_stored[2] = p->map.flip[2] ? n - range[1] : range[0];
@@ -157,8 +152,18 @@ static void scatter_slices(const struct plan *p, const float *block, size_t i_sl
     }
 }
 
-static status read_slices(struct volume_source *source, const struct plan *p, const struct progress *progress,
-                          struct volume *v, struct error *err)
+/* Marks padding as unknown. VOLUME_OUTSIDE in a file is an infinite value, which is refused later. */
+static void mark_padding(const struct scan_look *look, float *value, size_t n)
+{
+    for (size_t i = 0; i < n; i++)
+        if (look->n_padding > 0 && scan_look_is_padding(look, value[i]))
+            value[i] = VOLUME_OUTSIDE;
+        else if (value[i] == VOLUME_OUTSIDE)
+            value[i] = INFINITY;
+}
+
+static status read_slices(struct volume_source *source, const struct plan *p, const struct scan_look *look,
+                          const struct progress *progress, struct volume *v, struct error *err)
 {
     size_t n_page = p->n_file[0] * p->n_file[1], n_block = 1, from[3], to[3];
     file_range(p, from, to);
@@ -175,9 +180,7 @@ static status read_slices(struct volume_source *source, const struct plan *p, co
             else
                 s = volume_source_read(source, k + i, 1, block + i * n_page, err);
         }
-        for (size_t i = 0; i < n * n_page && s == STATUS_OK;
-             i++) /* VOLUME_OUTSIDE in a file is an infinite value, which is refused later */
-            if (block[i] == VOLUME_OUTSIDE) block[i] = INFINITY;
+        if (s == STATUS_OK) mark_padding(look, block, n * n_page);
         if (s == STATUS_OK) scatter_slices(p, block, k, n, v);
         progress_report(progress, READ_SHARE * (double)(k + n - from[2]) / (double)(to[2] - from[2]));
     }
@@ -274,14 +277,17 @@ status reconstruct_read(const char *const *path, size_t n_path, struct reconstru
     struct volume_source *source = NULL;
     struct volume stored = {0};
     struct plan p;
+    struct scan_look look;
     *v = (struct volume){0};
     for (int i = 0; i < 6; i++) o->crop = o->crop && o->crop_voxel[i] == 0;
     o->align = o->align && is_identity(o->matrix);
-    status s = volume_source_open_declared(path, n_path, &o->raw, &source, err);
+    status s = volume_source_open_declared(path, n_path, &o->raw, &o->part, &source, err);
     if (s != STATUS_OK) return s;
     memcpy(report->file_voxel_size_m, volume_source_describe(source)->voxel_size_m, sizeof report->file_voxel_size_m);
     s = plan_read(volume_source_describe(source), o, &p, err);
-    if (s == STATUS_OK) s = trim_void(source, o, &p, progress, err);
+    if (s == STATUS_OK) s = scan_look_take(source, &look, err);
+    if (s == STATUS_OK) report->has_padding = look.n_padding > 0;
+    if (s == STATUS_OK) s = trim_void(source, &look, o, &p, progress, err);
     if (s != STATUS_OK) goto out;
     size_t n[3];
     for (int a = 0; a < 3; a++) n[a] = p.box_stored[3 + a] - p.box_stored[a];
@@ -291,7 +297,7 @@ status reconstruct_read(const char *const *path, size_t n_path, struct reconstru
         goto out;
     }
     s = volume_init_in(&stored, n, p.spacing_m, space, err);
-    if (s == STATUS_OK) s = read_slices(source, &p, progress, &stored, err);
+    if (s == STATUS_OK) s = read_slices(source, &p, &look, progress, &stored, err);
     if (s == STATUS_OK && o->align) s = estimate_alignment(&stored, o, pool, NULL, report, err);
     if (s != STATUS_OK) goto out;
     if (p.resample) {

@@ -12,6 +12,7 @@ static const double BEYOND_NOISE = 6.0, LEAST_COUNT = 3.0;
 
 struct sampling {
     const size_t *n; /* columns, rows, slices */
+    const struct scan_look *look;
     size_t stride;
     int axis;
     float *value;
@@ -52,6 +53,8 @@ static status sample(struct volume_source *source, struct sampling *s, const str
             st = error_set(err, STATUS_CANCELLED, "reading the volume was cancelled");
         else
             st = volume_source_read(source, k, 1, slice, err);
+        for (size_t i = 0; i < s->n[0] * s->n[1] && s->look->n_padding > 0 && st == STATUS_OK; i++)
+            if (scan_look_is_padding(s->look, slice[i])) slice[i] = NAN;
         if (st == STATUS_OK) sample_slice(s, slice, k);
     }
     free(slice);
@@ -98,10 +101,10 @@ static status find_layers(const struct sampling *s, size_t range[2], struct erro
     return STATUS_OK;
 }
 
-status void_trim_find(struct volume_source *source, int axis, const struct progress *progress, size_t range[2],
-                      struct error *err)
+status void_trim_find(struct volume_source *source, const struct scan_look *look, int axis,
+                      const struct progress *progress, size_t range[2], struct error *err)
 {
-    struct sampling s = {.n = volume_source_describe(source)->n, .axis = axis, .stride = 1};
+    struct sampling s = {.n = volume_source_describe(source)->n, .look = look, .axis = axis, .stride = 1};
     range[0] = 0;
     range[1] = s.n[axis];
     while (s.n[0] / s.stride * (s.n[1] / s.stride) * (s.n[2] / s.stride) > MOST_SAMPLES) s.stride++;

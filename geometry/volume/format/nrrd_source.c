@@ -1,24 +1,25 @@
 /* The NRRD format: a text header "field: value" that ends with an empty line, with the data after it (.nrrd) or in a
- * file beside it (.nhdr). Supported are three dimensions of scalars and the encodings raw and gzip. Lengths come
- * from "spacings" or from the lengths of "space directions", in the stated unit or by default in millimetres.
+ * file beside it (.nhdr). Supported are scalars in three dimensions of space, besides channels and times, and the
+ * encodings raw and gzip. Lengths come from "spacings" or from the lengths of "space directions", in the stated unit or
+ * by default in millimetres.
  * Source: the definition of the NRRD file format (teem.sourceforge.net/nrrd/format.html). */
 #include "base/files/durable.h"
 #include "base/option_id.h"
-#include "geometry/volume/format/volume_header.h"
+#include "geometry/volume/format/nrrd_axes.h"
 #include "geometry/volume/format/volume_reader.h"
 
 #include <endian.h>
 #include <errno.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
 struct nrrd {
     struct volume_header header; /* data_path: NULL until open_parsed where the data follows the header */
-    double spacing[3], direction_length[3], unit_m[3];
+    struct nrrd_axes axes;
+    struct volume_source_info info; /* its statements, and the padding */
     long long line_skip, byte_skip;
-    bool has_dimension, has_size, has_type, has_endian, big_endian, has_encoding;
+    bool has_type, has_endian, big_endian, has_encoding;
 };
 
 static status bad(const struct nrrd *m, struct error *err, const char *what, const char *value)
@@ -71,95 +72,6 @@ static status parse_type(struct nrrd *m, const char *value, struct error *err)
     return bad(m, err, "unsupported type", value);
 }
 
-static status parse_dimension(struct nrrd *m, const char *value, struct error *err)
-{
-    m->has_dimension = true;
-    return strcmp(value, "3") == 0 ? STATUS_OK : bad(m, err, "dimension must be 3, not", value);
-}
-
-static status parse_sizes(struct nrrd *m, const char *value, struct error *err)
-{
-    static const char complaint[] = "sizes are not three positive numbers:";
-    const char *end;
-    status s = volume_header_sizes(&m->header, value, complaint, &end, err);
-    if (s != STATUS_OK) return s;
-    if (end[strspn(end, " \t")] != '\0') return bad(m, err, complaint, value);
-    m->has_size = true;
-    return STATUS_OK;
-}
-
-/* Leaves NaN if the file says "nan" or "none": the size is unknown, and the job must give it. */
-static status parse_spacings(struct nrrd *m, const char *value, struct error *err)
-{
-    const char *p = value;
-    for (int a = 0; a < 3; a++) {
-        char *end;
-        double w = strtod(p, &end);
-        if (end == p || (!isnan(w) && !(fabs(w) > 0.0 && isfinite(w))))
-            return bad(m, err, "spacings are not three positive numbers:", value);
-        m->spacing[a] = fabs(w);
-        p = end;
-    }
-    return STATUS_OK;
-}
-
-/* "(0.002,0,0) (0,0.002,0) (0,0,0.002)": the edges of a voxel in space. Their lengths are the spacings. */
-static status parse_directions(struct nrrd *m, const char *value, struct error *err)
-{
-    const char *p = value;
-    for (int a = 0; a < 3; a++) {
-        double square = 0.0;
-        p += strspn(p, " \t");
-        if (*p++ != '(') return bad(m, err, "space directions are not three vectors:", value);
-        for (int c = 0; c < 3; c++) {
-            char *end;
-            double x = strtod(p, &end);
-            bool given = end != p && isfinite(x);
-            p = end + strspn(end, " \t");
-            if (!given || *p != (c < 2 ? ',' : ')'))
-                return bad(m, err, "space directions are not three vectors:", value);
-            p++;
-            square += x * x;
-        }
-        if (!(square > 0.0) || !isfinite(square)) return bad(m, err, "a space direction has no length:", value);
-        m->direction_length[a] = sqrt(square);
-    }
-    return STATUS_OK;
-}
-
-/* For example "\"mm\" \"mm\" \"mm\"". */
-static status parse_units(struct nrrd *m, const char *value, struct error *err)
-{
-    static const struct {
-        const char *name;
-        double metre;
-    } unit[] = {{"mm", 1e-3},
-                {"millimeter", 1e-3},
-                {"millimeters", 1e-3},
-                {"um", 1e-6},
-                {"\xc2\xb5m", 1e-6},
-                {"\xce\xbcm", 1e-6},
-                {"micron", 1e-6},
-                {"microns", 1e-6},
-                {"micrometer", 1e-6},
-                {"micrometers", 1e-6},
-                {"nm", 1e-9},
-                {"cm", 1e-2},
-                {"m", 1.0},
-                {"", 1e-3}};
-    const char *p = value;
-    for (int a = 0; a < 3; a++) {
-        const char *open = strchr(p, '"'), *close = open != NULL ? strchr(open + 1, '"') : NULL;
-        if (close == NULL) return bad(m, err, "units are not three quoted words:", value);
-        size_t n = (size_t)(close - open - 1), i = 0, n_unit = sizeof unit / sizeof *unit;
-        while (i < n_unit && (strlen(unit[i].name) != n || strncasecmp(unit[i].name, open + 1, n) != 0)) i++;
-        if (i == n_unit) return bad(m, err, "unknown unit of length in", value);
-        m->unit_m[a] = unit[i].metre;
-        p = close + 1;
-    }
-    return STATUS_OK;
-}
-
 static status parse_encoding(struct nrrd *m, const char *value, struct error *err)
 {
     m->has_encoding = true;
@@ -191,11 +103,6 @@ static status parse_skip(struct nrrd *m, const char *value, long long least, lon
 static status parse_field(struct nrrd *m, const char *path, const char *key, const char *value, struct error *err)
 {
     if (strcasecmp(key, "type") == 0) return parse_type(m, value, err);
-    if (strcasecmp(key, "dimension") == 0) return parse_dimension(m, value, err);
-    if (strcasecmp(key, "sizes") == 0) return parse_sizes(m, value, err);
-    if (strcasecmp(key, "spacings") == 0) return parse_spacings(m, value, err);
-    if (strcasecmp(key, "space directions") == 0) return parse_directions(m, value, err);
-    if (strcasecmp(key, "space units") == 0 || strcasecmp(key, "units") == 0) return parse_units(m, value, err);
     if (strcasecmp(key, "encoding") == 0) return parse_encoding(m, value, err);
     if (strcasecmp(key, "endian") == 0) return parse_endian(m, value, err);
     if (strcasecmp(key, "data file") == 0 || strcasecmp(key, "datafile") == 0)
@@ -204,16 +111,16 @@ static status parse_field(struct nrrd *m, const char *path, const char *key, con
         return parse_skip(m, value, 0, &m->line_skip, err);
     if (strcasecmp(key, "byte skip") == 0 || strcasecmp(key, "byteskip") == 0)
         return parse_skip(m, value, -1, &m->byte_skip, err);
-    return STATUS_OK; /* other fields do not concern the voxels */
+    return nrrd_axes_parse(&m->axes, &m->header, key, value, &m->info.ledger, err);
 }
 
 static status check_complete(const struct nrrd *m, struct error *err)
 {
-    const char *missing = !m->has_dimension  ? "dimension"
-                          : !m->has_size     ? "sizes"
-                          : !m->has_type     ? "type"
-                          : !m->has_encoding ? "encoding"
-                                             : NULL;
+    const char *missing = m->axes.n == 0      ? "dimension"
+                          : !m->axes.has_size ? "sizes"
+                          : !m->has_type      ? "type"
+                          : !m->has_encoding  ? "encoding"
+                                              : NULL;
     if (missing == NULL && !m->has_endian && sample_bytes(m->header.layout.sample) > 1) missing = "endian";
     if (missing != NULL) return bad(m, err, "the header lacks", missing);
     if (m->header.layout.compressed && m->byte_skip < 0)
@@ -235,8 +142,10 @@ static status parse_header(struct nrrd *m, const char *path, FILE *file, struct 
         while (n > 0 && strchr(" \t\r\n", line[n - 1]) != NULL) line[--n] = '\0';
         ended = n == 0;
         char *colon = strchr(line, ':');
-        if (ended || line[0] == '#' || colon == NULL || colon[1] == '=') continue;
+        if (ended || line[0] == '#' || colon == NULL) continue;
         *colon = '\0';
+        if (colon[1] == '=') nrrd_state_pair(&m->info, line, colon + 2);
+        if (colon[1] == '=') continue;
         status s = parse_field(m, path, line, colon + 1 + strspn(colon + 1, " \t"), err);
         if (s != STATUS_OK) return s;
     }
@@ -286,15 +195,13 @@ static status open_parsed(struct nrrd *m, const char *const *path, size_t n_path
     return volume_header_open_data(&m->header, err);
 }
 
-static status nrrd_open(const char *const *path, size_t n_path, void **handle, struct volume_source_info *info,
-                        struct error *err)
+static status nrrd_open(const char *const *path, size_t n_path, const struct volume_part *part, void **handle,
+                        struct volume_source_info *info, struct error *err)
 {
     struct nrrd *m = calloc(1, sizeof *m);
     if (m == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
-    for (int a = 0; a < 3; a++) {
-        m->spacing[a] = m->direction_length[a] = NAN;
-        m->unit_m[a] = 1e-3;
-    }
+    nrrd_axes_init(&m->axes);
+    m->info = volume_source_info_empty();
     status s = volume_header_init(&m->header, path[0], err);
     FILE *header = s == STATUS_OK ? fopen(path[0], "rbe") : NULL;
     if (s == STATUS_OK && header == NULL)
@@ -302,15 +209,14 @@ static status nrrd_open(const char *const *path, size_t n_path, void **handle, s
     if (s == STATUS_OK) s = parse_header(m, path[0], header, err);
     if (s == STATUS_OK) s = find_data(m, header, err);
     if (header != NULL) fclose(header);
+    if (s == STATUS_OK) s = nrrd_axes_settle(&m->axes, &m->header, part, &m->info, err);
     if (s == STATUS_OK) s = open_parsed(m, path, n_path, err);
     if (s != STATUS_OK) {
         nrrd_close(m);
         return s;
     }
-    *info = (struct volume_source_info){.sample = sample_name(m->header.layout.sample)};
-    memcpy(info->n, m->header.layout.n, sizeof info->n);
-    for (int a = 0; a < 3; a++)
-        info->voxel_size_m[a] = (isnan(m->direction_length[a]) ? m->spacing[a] : m->direction_length[a]) * m->unit_m[a];
+    *info = m->info;
+    info->sample = sample_name(m->header.layout.sample);
     *handle = m;
     return STATUS_OK;
 }

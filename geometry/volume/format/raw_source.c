@@ -6,7 +6,6 @@
 
 #include <endian.h>
 #include <limits.h>
-#include <math.h>
 #include <string.h>
 
 static bool sample_type_of_name(const char *name, enum sample_type *type)
@@ -47,8 +46,9 @@ status raw_source_open(const char *const *path, size_t n_path, const struct volu
         voxel_stream_close(stream);
         return s;
     }
-    *info = (struct volume_source_info){
-        .n = {d->n[0], d->n[1], d->n[2]}, .voxel_size_m = {NAN, NAN, NAN}, .sample = sample_name(layout.sample)};
+    *info = volume_source_info_empty();
+    memcpy(info->n, d->n, sizeof info->n);
+    info->sample = sample_name(layout.sample);
     *handle = stream;
     return STATUS_OK;
 }

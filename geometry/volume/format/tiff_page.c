@@ -43,20 +43,38 @@ static uint64_t most_expansion(uint16_t compression)
 }
 
 struct tags {
-    uint16_t format, per_pixel, photometric; /* as libtiff names their values */
+    uint16_t format, photometric; /* as libtiff names their values */
 };
 
 static void read_tags(TIFF *tiff, struct tiff_page *p, struct tags *k)
 {
-    *p = (struct tiff_page){.bits = 1, .compression = COMPRESSION_NONE};
-    *k = (struct tags){.format = SAMPLEFORMAT_UINT, .per_pixel = 1, .photometric = PHOTOMETRIC_MINISBLACK};
+    uint16_t n_extra = 0, *extra = NULL, planar = PLANARCONFIG_CONTIG;
+    uint32_t kind = 0;
+    *p = (struct tiff_page){.bits = 1, .compression = COMPRESSION_NONE, .n_sample = 1, .depth = 1};
+    *k = (struct tags){.format = SAMPLEFORMAT_UINT, .photometric = PHOTOMETRIC_MINISBLACK};
     TIFFGetField(tiff, TIFFTAG_IMAGEWIDTH, &p->width);
     TIFFGetField(tiff, TIFFTAG_IMAGELENGTH, &p->height);
     TIFFGetFieldDefaulted(tiff, TIFFTAG_BITSPERSAMPLE, &p->bits);
     TIFFGetFieldDefaulted(tiff, TIFFTAG_SAMPLEFORMAT, &k->format);
-    TIFFGetFieldDefaulted(tiff, TIFFTAG_SAMPLESPERPIXEL, &k->per_pixel);
+    TIFFGetFieldDefaulted(tiff, TIFFTAG_SAMPLESPERPIXEL, &p->n_sample);
+    TIFFGetFieldDefaulted(tiff, TIFFTAG_IMAGEDEPTH, &p->depth);
+    TIFFGetFieldDefaulted(tiff, TIFFTAG_PLANARCONFIG, &planar);
+    TIFFGetField(tiff, TIFFTAG_ORIENTATION, &p->orientation);
+    TIFFGetFieldDefaulted(tiff, TIFFTAG_EXTRASAMPLES, &n_extra, &extra);
+    TIFFGetFieldDefaulted(tiff, TIFFTAG_SUBFILETYPE, &kind);
     TIFFGetField(tiff, TIFFTAG_PHOTOMETRIC, &k->photometric);
     TIFFGetFieldDefaulted(tiff, TIFFTAG_COMPRESSION, &p->compression);
+    if (p->orientation > ORIENTATION_LEFTBOT) p->orientation = 0;
+    if (p->depth == 0) p->depth = 1;
+    p->is_separate = p->n_sample > 1 && planar == PLANARCONFIG_SEPARATE;
+    p->has_alpha = p->n_sample == 2 && n_extra == 1 && extra[0] != EXTRASAMPLE_UNSPECIFIED;
+    p->is_preview = (kind & FILETYPE_REDUCEDIMAGE) != 0;
+}
+
+/* Returns whether the samples of a pixel are the parts of a color. */
+static bool is_color(uint16_t photometric)
+{
+    return photometric != PHOTOMETRIC_MINISBLACK && photometric != PHOTOMETRIC_MINISWHITE;
 }
 
 status tiff_page_read(TIFF *tiff, const char *name, size_t page, struct tiff_page *p, struct error *err)
@@ -71,9 +89,10 @@ status tiff_page_read(TIFF *tiff, const char *name, size_t page, struct tiff_pag
             err, STATUS_TOO_LARGE, OPTION_SCAN_FILES,
             "cannot read volume '%s': page %zu has %u x %u pixels, but the limit is %d along each edge", name, page,
             p->width, p->height, MAX_EDGE);
-    if (k.per_pixel != 1 || k.photometric == PHOTOMETRIC_PALETTE)
+    if (p->n_sample == 0 || (p->n_sample > 1 && is_color(k.photometric)) || k.photometric == PHOTOMETRIC_PALETTE)
         return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
-                               "cannot read volume '%s': page %zu is a color image", name, page);
+                               "cannot read volume '%s': page %zu is a color image: save the stack in grey", name,
+                               page);
     /* programs disagree whether such a page has its values or only their display inverted */
     if (k.photometric == PHOTOMETRIC_MINISWHITE)
         return error_set_field(err, STATUS_UNSUPPORTED, OPTION_SCAN_FILES,
@@ -104,14 +123,32 @@ status tiff_page_compare(const struct tiff_page *p, const struct tiff_page *firs
         return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
                                "cannot read volume '%s': page %zu is %s, page 1 is %s", name, page, sample_name(t),
                                sample_name(first->sample));
+    if (p->depth != first->depth || p->n_sample != first->n_sample || p->is_separate != first->is_separate)
+        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
+                               "cannot read volume '%s': page %zu has %u slices of %u channels, page 1 has %u of %u",
+                               name, page, p->depth, p->n_sample, first->depth, first->n_sample);
+    if (p->orientation != 0 && p->orientation != first->orientation && p->orientation + first->orientation > 1)
+        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
+                               "cannot read volume '%s': page %zu has orientation %u, page 1 has %u", name, page,
+                               p->orientation, first->orientation);
     return STATUS_OK;
 }
 
 uint64_t tiff_page_bytes(const struct tiff_page *p) { return (uint64_t)p->width * p->height * sample_bytes(p->sample); }
 
+bool tiff_page_is_contiguous(TIFF *tiff, const struct tiff_page *p)
+{
+    if (TIFFIsTiled(tiff) || p->compression != COMPRESSION_NONE || p->n_sample != 1) return false;
+    uint64_t at = TIFFGetStrileOffset(tiff, 0);
+    for (uint32_t i = 0, n = TIFFNumberOfStrips(tiff); i < n; at += TIFFGetStrileByteCount(tiff, i), i++)
+        if (TIFFGetStrileOffset(tiff, i) != at) return false;
+    return at - TIFFGetStrileOffset(tiff, 0) >= tiff_page_bytes(p) || TIFFNumberOfStrips(tiff) == 1;
+}
+
 bool tiff_page_fits(TIFF *tiff, const struct tiff_page *p, uint64_t file_bytes)
 {
-    const uint64_t page_bytes = tiff_page_bytes(p);
+    const bool is_bare = p->depth > 1 && tiff_page_is_contiguous(tiff, p); /* libtiff knows strips of one slice */
+    const uint64_t page_bytes = tiff_page_bytes(p) * p->n_sample * (is_bare ? 1 : p->depth);
     uint32_t n_block = TIFFIsTiled(tiff) ? TIFFNumberOfTiles(tiff) : TIFFNumberOfStrips(tiff);
     if (n_block == 0 || n_block > file_bytes) return false;
     uint64_t stored = 0;
@@ -121,6 +158,7 @@ bool tiff_page_fits(TIFF *tiff, const struct tiff_page *p, uint64_t file_bytes)
         stored += n;
         if (stored > file_bytes * 2) return false;
     }
+    if (is_bare && (file_bytes - TIFFGetStrileOffset(tiff, 0)) / page_bytes < p->depth) return false;
     uint64_t most = most_expansion(p->compression);
     return (page_bytes + most - 1) / most <= stored;
 }

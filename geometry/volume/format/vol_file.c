@@ -2,6 +2,8 @@
 #include "base/option_id.h"
 
 #include "base/files/durable.h"
+#include "geometry/volume/format/length_unit.h"
+#include "geometry/volume/format/volume_part.h"
 #include "geometry/volume/format/volume_reader.h"
 
 #include <endian.h>
@@ -289,9 +291,10 @@ static void vol_source_close(void *handle)
     free(h);
 }
 
-static status vol_source_open(const char *const *path, size_t n_path, void **handle, struct volume_source_info *info,
-                              struct error *err)
+static status vol_source_open(const char *const *path, size_t n_path, const struct volume_part *part, void **handle,
+                              struct volume_source_info *info, struct error *err)
 {
+    size_t index[2];
     struct vol_handle *h = calloc(1, sizeof *h);
     status s = STATUS_OK;
     if (h != NULL) h->name = strdup(path_file_name(path[0]));
@@ -305,16 +308,18 @@ static status vol_source_open(const char *const *path, size_t n_path, void **han
         s = bad_header(h->name, err, "one .vol file is a whole volume, but more files are given");
     if (s == STATUS_OK) s = vol_read_header(h->file, h->name, &h->header, err);
     if (s == STATUS_OK && h->header.n_channel != 1) s = bad_header(h->name, err, "it holds directions, not densities");
+    if (s == STATUS_OK) s = volume_part_choose(h->name, &(struct volume_parts){0}, part, index, NULL, err);
     if (s != STATUS_OK) {
         vol_source_close(h);
         return s;
     }
-    *info = (struct volume_source_info){.sample = h->header.encoding == VOL_FLOAT32 ? "float32" : "uint8"};
-    for (int a = 0; a < 3; a++) {
-        double edge_mm = (double)h->header.box_max[a] - (double)h->header.box_min[a];
-        info->n[a] = h->header.n[a];
-        info->voxel_size_m[a] = edge_mm > 0.0 && isfinite(edge_mm) ? edge_mm * 1e-3 / (double)h->header.n[a] : NAN;
-    }
+    *info = volume_source_info_empty();
+    info->sample = h->header.encoding == VOL_FLOAT32 ? "float32" : "uint8";
+    double size_m[3];
+    memcpy(info->n, h->header.n, sizeof info->n);
+    for (int a = 0; a < 3; a++)
+        size_m[a] = ((double)h->header.box_max[a] - (double)h->header.box_min[a]) * 1e-3 / (double)h->header.n[a];
+    volume_state_voxel_size(info, size_m, "bounding box");
     *handle = h;
     return STATUS_OK;
 }
@@ -350,7 +355,7 @@ status vol_read_density(const char *path, struct volume *v, struct error *err)
     struct volume_source_info info = {0};
     void *handle = NULL;
     *v = (struct volume){0};
-    status s = vol_source_open(&path, 1, &handle, &info, err);
+    status s = vol_source_open(&path, 1, NULL, &handle, &info, err);
     if (s == STATUS_OK) s = volume_init(v, info.n, info.voxel_size_m, err);
     if (s == STATUS_OK) s = vol_source_read(handle, 0, info.n[2], v->density, err);
     vol_source_close(handle);

@@ -26,17 +26,17 @@ status volume_header_refuse(const struct volume_header *h, const char *what, con
                            value);
 }
 
-status volume_header_sizes(struct volume_header *h, const char *value, const char *complaint, const char **end,
-                           struct error *err)
+status volume_header_sizes(const struct volume_header *h, const char *value, size_t n, size_t *size,
+                           const char *complaint, const char **end, struct error *err)
 {
     const char *p = value;
-    for (int a = 0; a < 3; a++) {
+    for (size_t a = 0; a < n; a++) {
         char *after;
         errno = 0;
-        unsigned long long n = strtoull(p, &after, 10);
-        if (after == p || errno != 0 || n == 0 || n > VOXEL_STREAM_MAX_EDGE || strchr(value, '-') != NULL)
+        unsigned long long edge = strtoull(p, &after, 10);
+        if (after == p || errno != 0 || edge == 0 || edge > VOXEL_STREAM_MAX_EDGE || strchr(value, '-') != NULL)
             return volume_header_refuse(h, complaint, value, err);
-        h->layout.n[a] = (size_t)n;
+        size[a] = (size_t)edge;
         p = after;
     }
     *end = p;

@@ -20,10 +20,10 @@ void volume_header_release(struct volume_header *h);
 
 /* STATUS_FORMAT: "cannot read volume 'scan.nrrd': PROBLEM 'VALUE'". */
 status volume_header_refuse(const struct volume_header *h, const char *what, const char *value, struct error *err);
-/* Reads layout.n, three numbers from 1 to VOXEL_STREAM_MAX_EDGE, and returns in *end where they end. `complaint` begins
- * the error's text. STATUS_FORMAT. */
-status volume_header_sizes(struct volume_header *h, const char *value, const char *complaint, const char **end,
-                           struct error *err);
+/* Reads n whole numbers from 1 to VOXEL_STREAM_MAX_EDGE, and returns in *end where they end. `complaint` begins the
+ * error's text. STATUS_FORMAT. */
+status volume_header_sizes(const struct volume_header *h, const char *value, size_t n, size_t *size,
+                           const char *complaint, const char **end, struct error *err);
 /* Sets data_path to `file` in the folder of the header. STATUS_UNSUPPORTED for lists of files; STATUS_FORMAT, with
  * `complaint`, for a file in another folder, because a header must not refer to files outside of its own. */
 status volume_header_data_file(struct volume_header *h, const char *header_path, const char *file,

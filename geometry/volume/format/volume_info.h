@@ -15,11 +15,30 @@ struct volume_raw_declaration {
     size_t header_bytes; /* bytes to skip at the start of the file */
 };
 
+/* The part of a scan that has several channels or times. Both count from 1; 0: the document does not say. */
+struct volume_part {
+    size_t channel, time;
+};
+
 struct volume_source_info {
-    size_t n[3];               /* columns, rows, slices */
-    double voxel_size_m[3];    /* NaN where the file does not state it */
+    size_t n[3];            /* columns, rows, slices */
+    double voxel_size_m[3]; /* NaN where the file does not state it */
+    /* The voxel size is one that programs also write without a meaning, as a resolution for prints or one pixel per
+     * unit: the document's replaces it. */
+    bool is_weak_size;
+    char axes[8];              /* directions of the file's axes, as option OPTION_AXES; "": not stated, or oblique */
+    bool is_oblique;           /* the file's axes are no turn and no mirror image of the axes of space */
+    double oblique[9];         /* the matrix that then straightens them, as option OPTION_MATRIX */
+    double padding;            /* value of voxels without a measurement; NaN: not stated */
     const char *sample;        /* "uint8", "uint16", "int16", "float32" */
     struct file_ledger ledger; /* every statement of the file beside its samples */
 };
+
+/* Returns an info that states nothing yet. */
+static inline struct volume_source_info volume_source_info_empty(void)
+{
+    const double unknown = __builtin_nan("");
+    return (struct volume_source_info){.voxel_size_m = {unknown, unknown, unknown}, .padding = unknown};
+}
 
 #endif

@@ -16,9 +16,10 @@ typedef struct volume_reader {
     /* Returns whether this reader can read the files, from the first 16 bytes of the first file (padded with zeros)
      * and its name. */
     bool (*recognise)(const uint8_t first_byte[16], const char *path);
-    /* On success the caller closes *handle with close, and info is complete. Errors as in volume_source_open. */
-    status (*open)(const char *const *path, size_t n_path, void **handle, struct volume_source_info *info,
-                   struct error *err);
+    /* part: which channel and time are read, NULL: none is chosen. On success the caller closes *handle with close, and
+     * info is complete. Errors as in volume_source_open. */
+    status (*open)(const char *const *path, size_t n_path, const struct volume_part *part, void **handle,
+                   struct volume_source_info *info, struct error *err);
     /* Reads slices i_slice .. i_slice + n_slice - 1, which exist, to value[n_slice][rows][columns]. */
     status (*read)(void *handle, size_t i_slice, size_t n_slice, float *value, struct error *err);
     void (*close)(void *handle);

@@ -61,7 +61,7 @@ static status no_reader_takes(const char *path, struct error *err)
 }
 
 status volume_source_open_declared(const char *const *path, size_t n_path, const struct volume_raw_declaration *raw,
-                                   struct volume_source **source, struct error *err)
+                                   const struct volume_part *part, struct volume_source **source, struct error *err)
 {
     *source = NULL;
     if (n_path == 0)
@@ -78,7 +78,7 @@ status volume_source_open_declared(const char *const *path, size_t n_path, const
         return error_set(err, STATUS_NO_MEMORY, "cannot read volume '%s': out of memory", path_file_name(path[0]));
     v->reader = found;
     s = found == &raw_reader ? raw_source_open(path, n_path, raw, &v->handle, &v->info, err)
-                             : found->open(path, n_path, &v->handle, &v->info, err);
+                             : found->open(path, n_path, part, &v->handle, &v->info, err);
     if (s != STATUS_OK) {
         free(v);
         return s;
@@ -89,7 +89,7 @@ status volume_source_open_declared(const char *const *path, size_t n_path, const
 
 status volume_source_open(const char *const *path, size_t n_path, struct volume_source **source, struct error *err)
 {
-    return volume_source_open_declared(path, n_path, NULL, source, err);
+    return volume_source_open_declared(path, n_path, NULL, NULL, source, err);
 }
 
 void volume_source_close(struct volume_source *source)

@@ -18,10 +18,11 @@ struct volume_source;
  * TIFF slices in order. The field of errors is OPTION_SCAN_FILES. STATUS_IO, STATUS_NOT_FOUND; STATUS_FORMAT for
  * files that do not have their stated format; STATUS_UNSUPPORTED. */
 status volume_source_open(const char *const *path, size_t n_path, struct volume_source **source, struct error *err);
-/* The same; with a declaration (n[0] > 0) the only file at path has raw samples. Fields OPTION_RAW,
- * OPTION_SCAN_FILES. */
+/* The same; with a declaration (n[0] > 0) the only file at path has raw samples. part: the channel and the time of a
+ * file that has several, which is an error where none is chosen. raw and part may be NULL. Fields also OPTION_RAW,
+ * OPTION_SCAN_CHANNEL, OPTION_SCAN_TIME. */
 status volume_source_open_declared(const char *const *path, size_t n_path, const struct volume_raw_declaration *raw,
-                                   struct volume_source **source, struct error *err);
+                                   const struct volume_part *part, struct volume_source **source, struct error *err);
 void volume_source_close(struct volume_source *source);
 const struct volume_source_info *volume_source_describe(const struct volume_source *source);
 /* Reads slices i_slice .. i_slice + n_slice - 1 to value[n_slice][rows][columns]. */

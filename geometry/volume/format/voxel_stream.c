@@ -24,6 +24,30 @@ struct voxel_stream {
     size_t next_slice; /* next slice of the inflated stream */
 };
 
+static size_t count(const struct voxel_parts *p) { return p->n > 1 ? p->n : 1; }
+
+/* Slices in the file, of all volumes. */
+static uint64_t n_stored(const struct voxel_layout *l)
+{
+    return (uint64_t)l->n[2] * count(&l->by_slice) * count(&l->by_volume);
+}
+
+/* The slice in the file that slice k of the volume is. */
+static size_t stored_slice(const struct voxel_layout *l, size_t k)
+{
+    return (l->by_volume.i * l->n[2] + k) * count(&l->by_slice) + l->by_slice.i;
+}
+
+/* Samples in a slice of the file. */
+static uint64_t n_in_slice(const struct voxel_layout *l) { return (uint64_t)l->n[0] * l->n[1] * count(&l->by_sample); }
+
+/* Bytes of all samples of n_byte bytes; UINT64_MAX: too many to count. */
+static uint64_t stored_bytes(const struct voxel_layout *l, size_t n_byte)
+{
+    uint64_t n;
+    return __builtin_mul_overflow(n_in_slice(l) * n_byte, n_stored(l), &n) ? UINT64_MAX : n;
+}
+
 static status no_memory(const char *name, struct error *err)
 {
     return error_set(err, STATUS_NO_MEMORY, "cannot read volume '%s': out of memory", name);
@@ -55,11 +79,10 @@ void voxel_stream_close(struct voxel_stream *v)
 /* Returns ", which fits uint8, int8" for the types that would give exactly the file's length, else "". */
 static const char *types_that_fit(const struct voxel_layout *l, uint64_t have, char *text, size_t n_text)
 {
-    uint64_t n_voxel = (uint64_t)l->n[0] * l->n[1] * l->n[2];
     size_t used = 0;
     text[0] = '\0';
     for (enum sample_type t = 0; t < SAMPLE_COUNT; t++) {
-        if (have != n_voxel * sample_bytes(t)) continue;
+        if (have != stored_bytes(l, sample_bytes(t))) continue;
         int n = snprintf(text + used, n_text - used, "%s%s", used == 0 ? ", which fits " : ", ", sample_name(t));
         if (n > 0 && used + (size_t)n < n_text) used += (size_t)n;
     }
@@ -70,7 +93,7 @@ static status check_size(struct voxel_stream *v, uint64_t size, struct error *er
 {
     struct voxel_layout *l = &v->layout;
     char fits[128];
-    uint64_t want = (uint64_t)l->n[0] * l->n[1] * l->n[2] * sample_bytes(l->sample), skip = (uint64_t)l->skip_bytes;
+    uint64_t want = stored_bytes(l, sample_bytes(l->sample)), skip = (uint64_t)l->skip_bytes;
     if (l->offset_bytes == -1) l->offset_bytes = want <= size ? (long long)(size - want) : 0;
     uint64_t offset = (uint64_t)l->offset_bytes, have = size > offset ? size - offset : 0;
     if (l->compressed) { /* the best ratio of deflate is 1032 */
@@ -104,7 +127,10 @@ static status open_data(struct voxel_stream *v, struct error *err)
             return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
                                    "cannot read volume '%s': an impossible size, %zu x %zu x %zu voxels", v->name,
                                    l->n[0], l->n[1], l->n[2]);
-    v->slice_bytes = l->n[0] * l->n[1] * sample_bytes(l->sample);
+    if (l->by_sample.n > 64 || l->by_slice.n > VOXEL_STREAM_MAX_EDGE || l->by_volume.n > VOXEL_STREAM_MAX_EDGE)
+        return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
+                               "cannot read volume '%s': too many channels or times", v->name);
+    v->slice_bytes = (size_t)n_in_slice(l) * sample_bytes(l->sample);
     if (v->slice_bytes > UINT32_MAX)
         return error_set_field(err, STATUS_TOO_LARGE, OPTION_SCAN_FILES,
                                "cannot read volume '%s': a slice is over 4 GiB", v->name);
@@ -211,7 +237,7 @@ static status check_end(struct voxel_stream *v, struct error *err)
 {
     const struct voxel_layout *l = &v->layout;
     size_t row_bytes = l->n[0] * sample_bytes(l->sample);
-    if (inflate_bytes(v, l->n[2], v->slice, row_bytes, NULL) != STATUS_OK) return STATUS_OK;
+    if (inflate_bytes(v, (size_t)n_stored(l), v->slice, row_bytes, NULL) != STATUS_OK) return STATUS_OK;
     return error_set_field(err, STATUS_FORMAT, OPTION_SCAN_FILES,
                            "cannot read volume '%s': '%s' continues after the %zu x %zu x %zu %s voxels of its header",
                            v->name, path_file_name(v->data_path), l->n[0], l->n[1], l->n[2], sample_name(l->sample));
@@ -225,14 +251,24 @@ static status next_plain(struct voxel_stream *v, size_t i_slice, struct error *e
     return fread(v->slice, 1, v->slice_bytes, v->file) == v->slice_bytes ? STATUS_OK : short_data(v, i_slice, err);
 }
 
+/* Moves the samples of the part that is read to the front of a slice whose samples alternate. */
+static void take_part(const struct voxel_layout *l, uint8_t *slice)
+{
+    const size_t bytes = sample_bytes(l->sample), n = l->n[0] * l->n[1], step = count(&l->by_sample);
+    for (size_t i = 0; step > 1 && i < n; i++)
+        for (size_t b = 0; b < bytes; b++) slice[i * bytes + b] = slice[(i * step + l->by_sample.i) * bytes + b];
+}
+
 status voxel_stream_read(struct voxel_stream *v, size_t i_slice, size_t n_slice, float *value, struct error *err)
 {
     size_t n_sample = v->layout.n[0] * v->layout.n[1];
     for (size_t i = i_slice; i < i_slice + n_slice; i++, value += n_sample) {
-        status s = v->layout.compressed ? next_inflated(v, i, err) : next_plain(v, i, err);
+        const size_t stored = stored_slice(&v->layout, i);
+        status s = v->layout.compressed ? next_inflated(v, stored, err) : next_plain(v, stored, err);
         if (s != STATUS_OK) return s;
+        take_part(&v->layout, v->slice);
         sample_to_float(v->layout.sample, v->layout.swap, n_sample, v->slice, value);
-        if (v->layout.compressed && i + 1 == v->layout.n[2]) s = check_end(v, err);
+        if (v->layout.compressed && stored + 1 == n_stored(&v->layout)) s = check_end(v, err);
         if (s != STATUS_OK) return s;
     }
     return STATUS_OK;

@@ -7,8 +7,15 @@
 #include "base/status.h"
 #include "geometry/volume/format/sample_type.h"
 
+/* Several volumes in one file: `n` of them, of which number i is read. 0 counts as 1. */
+struct voxel_parts {
+    size_t n, i;
+};
+
 struct voxel_layout {
     size_t n[3]; /* 1 .. VOXEL_STREAM_MAX_EDGE each */
+    /* Volumes whose samples alternate, whose slices alternate, and that lie behind one another. */
+    struct voxel_parts by_sample, by_slice, by_volume;
     enum sample_type sample;
     bool swap; /* the byte order is opposite to the machine's */
     bool compressed;

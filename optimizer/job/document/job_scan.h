@@ -19,8 +19,9 @@ struct job_scan {
     char raw_type[8];
     bool raw_big_endian;
     size_t raw_header_bytes;
+    size_t channel, time; /* of a scan that has several, from 1; 0: not given */
     double voxel_size_um[3];
-    char axes[8];
+    char axes[8]; /* "": not given */
     double matrix[9];
     size_t crop_voxel[6];
     bool align, crop; /* true for "auto"; false where matrix or crop_voxel is given */

@@ -23,6 +23,7 @@
 #include "optimizer/stages/reading/texture_start.h"
 #include "optimizer/stages/run/document_fingerprint.h"
 #include "optimizer/stages/scene/pipeline_adopt.h"
+#include "optimizer/stages/scene/pipeline_volume.h"
 #include "optimizer/stages/scene/scan_order.h"
 #include "renderer/transport/environment.h"
 
@@ -288,6 +289,8 @@ status job_inputs_read(const struct stage_tools *tools, struct job_inputs *in, s
     if (in->files == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the job: out of memory");
     status s = read_document(tools, in, err);
     if (s == STATUS_OK) s = scan_order_check(in->section.scan, in->files, &tools->warn, err);
+    if (s == STATUS_OK && in->section.scan->n_file > 0)
+        s = scan_examine(tools->folder, in->section.scan, in->files, err);
     if (s == STATUS_OK) s = read_rows(tools, in, err);
     if (s == STATUS_OK && tools->folder->lock_fd >= 0)
         s = pipeline_adopt_geometry(tools, in->section.scan->geometry_job, err);

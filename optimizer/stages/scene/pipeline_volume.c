@@ -1,5 +1,7 @@
 /* The densities of a scan: the options that it is reconstructed with, its files, and its checkpoint. */
 #include "optimizer/stages/scene/pipeline_volume.h"
+#include "base/files/file_ledger_json.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "geometry/volume/format/volume_source.h"
 #include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/job_folder.h"
@@ -18,6 +20,7 @@ void volume_options(const struct job_scan *scan, struct reconstruct_option *o)
     memcpy(o->raw.type, scan->raw_type, sizeof o->raw.type);
     o->raw.big_endian = scan->raw_big_endian;
     o->raw.header_bytes = scan->raw_header_bytes;
+    o->part = (struct volume_part){scan->channel, scan->time};
     for (int a = 0; a < 3; a++) o->voxel_size_m[a] = scan->voxel_size_um[a] * um; /* NaN stays NaN */
     memcpy(o->axes, scan->axes, sizeof o->axes);
     memcpy(o->matrix, scan->matrix, sizeof o->matrix);
@@ -62,9 +65,22 @@ status scan_size(const struct worker_folder *folder, const struct job_scan *scan
     const char **path = scan_paths(folder, scan);
     if (path == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the volume: out of memory");
     volume_options(scan, &option);
-    status s = volume_source_open_declared(path, scan->n_file, &option.raw, &source, err);
+    status s = volume_source_open_declared(path, scan->n_file, &option.raw, &option.part, &source, err);
     if (s == STATUS_OK) memcpy(n, volume_source_describe(source)->n, 3 * sizeof *n);
     volume_source_close(source);
+    free(path);
+    return s;
+}
+
+status scan_examine(const struct worker_folder *folder, const struct job_scan *scan, json_t *files, struct error *err)
+{
+    struct reconstruct_option option;
+    struct file_ledger ledger = {0};
+    const char **path = scan_paths(folder, scan);
+    if (path == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read the volume: out of memory");
+    volume_options(scan, &option);
+    status s = reconstruct_examine(path, scan->n_file, &option, &ledger, err);
+    file_ledger_append(files, scan->file[0], &ledger);
     free(path);
     return s;
 }

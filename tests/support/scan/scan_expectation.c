@@ -38,7 +38,7 @@ void scan_expect_values(const char *const *path, size_t n_path, const struct vol
 {
     struct volume_source *source;
     struct error err = {0};
-    if (volume_source_open_declared(path, n_path, raw, &source, &err) != STATUS_OK) fail_msg("%s", err.text);
+    if (volume_source_open_declared(path, n_path, raw, NULL, &source, &err) != STATUS_OK) fail_msg("%s", err.text);
     const struct volume_source_info *info = volume_source_describe(source);
     size_t n_voxel = n[0] * n[1] * n[2], n_slice = n[0] * n[1];
     float *value = calloc(n_voxel, sizeof *value);
@@ -66,7 +66,7 @@ void scan_expect_refused(const char *path, const struct volume_raw_declaration *
 {
     struct volume_source *source = NULL;
     struct error err = {0};
-    status s = volume_source_open_declared(&path, 1, raw, &source, &err);
+    status s = volume_source_open_declared(&path, 1, raw, NULL, &source, &err);
     float value[4096];
     if (s == STATUS_OK) { /* damage of compressed data is found only when it is read */
         const struct volume_source_info *info = volume_source_describe(source);

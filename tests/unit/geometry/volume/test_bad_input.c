@@ -156,25 +156,32 @@ static void test_wrong_spacing(void **state)
     write_metaimage("spacing", "MET_USHORT", 0.004, samples, N_VOXEL * 2);
     const char *path[] = {path_of("spacing.mhd"), path_of("spacing.raw")};
     chain_init(&c); /* the job says 2 um, the file 4 */
-    assert_int_equal(chain_read(&c, path, 2), STATUS_OK);
-    print_outcome(&c, STATUS_OK);
-    assert_warned(&c, "the job says 2 um along x, the file says 4 um");
+    assert_refused(&c, chain_read(&c, path, 2), STATUS_INVALID, OPTION_VOXEL_SIZE,
+                   "the job says 2 um along x, the file says 4 um");
     chain_release(&c);
-    write_metaimage("spacing", "MET_USHORT", 0.00002, samples, N_VOXEL * 2);
-    chain_init(&c); /* a spacing in a wrong unit: fibers of 0.07 um */
+    write_metaimage("spacing", "MET_USHORT", 0.000002, samples, N_VOXEL * 2);
+    chain_init(&c); /* a spacing in a wrong unit: fibers of 0.007 um */
     for (int a = 0; a < 3; a++) c.o.voxel_size_m[a] = NAN;
-    assert_int_equal(chain_run(&c, path, 2), STATUS_OK);
-    print_outcome(&c, STATUS_OK);
-    assert_warned(&c, "not that of a textile fiber");
+    assert_refused(&c, chain_read(&c, path, 2), STATUS_INVALID, OPTION_VOXEL_SIZE, "shows no textile fiber");
+    chain_release(&c);
+    write_metaimage("spacing", "MET_USHORT", 0.02, samples, N_VOXEL * 2);
+    chain_init(&c);
+    for (int a = 0; a < 3; a++) c.o.voxel_size_m[a] = NAN;
+    assert_refused(&c, chain_read(&c, path, 2), STATUS_INVALID, OPTION_VOXEL_SIZE, "a voxel of 20 um shows no");
+    c.o.fiber_diameter_voxel = 7.0; /* the answer */
+    assert_int_equal(chain_read(&c, path, 2), STATUS_OK);
     chain_release(&c);
     write_metaimage("spacing", "MET_USHORT", 50.0, samples, N_VOXEL * 2);
     chain_init(&c);
     for (int a = 0; a < 3; a++) c.o.voxel_size_m[a] = NAN;
+    c.o.fiber_diameter_voxel = 7.0;
     assert_refused(&c, chain_read(&c, path, 2), STATUS_INVALID, OPTION_VOXEL_SIZE, "is not possible");
     chain_release(&c);
     chain_init(&c);
+    c.o.raw = (struct volume_raw_declaration){.n = {48, 48, 48}, .type = "uint16"};
     c.o.voxel_size_m[2] = 100e-6;
-    assert_refused(&c, chain_read(&c, path, 2), STATUS_INVALID, OPTION_VOXEL_SIZE, "too far from cubes");
+    assert_refused(&c, chain_read(&c, path + 1, 1), STATUS_INVALID, OPTION_VOXEL_SIZE, "too far from cubes");
+    chain_release(&c);
     chain_release(&c);
     free(samples);
 }

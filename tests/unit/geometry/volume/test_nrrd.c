@@ -136,7 +136,7 @@ static void test_nrrd_refused(void **state)
 {
     refuse_header(state, HEAD "uchar" SIZES "encoding: raw\n", "no empty line");
     refuse_header(state, HEAD "block" SIZES "encoding: raw\n\n", "unsupported type 'block'");
-    refuse_header(state, HEAD "uchar\ndimension: 4\nsizes: 1 2 1 2\nencoding: raw\n\n", "dimension must be 3");
+    refuse_header(state, HEAD "uchar\ndimension: 2\nsizes: 2 2\nencoding: raw\n\n", "dimension must be 3");
     refuse_header(state, HEAD "uchar\ndimension: 3\nsizes: 2 1\nencoding: raw\n\n", "sizes");
     refuse_header(state, HEAD "uchar\ndimension: 3\nsizes: 2 -1 2\nencoding: raw\n\n", "sizes");
     refuse_header(state, HEAD "uchar\ndimension: 3\nsizes: 2 1 99999999999\nencoding: raw\n\n", "sizes");

@@ -50,7 +50,7 @@ static void find(const size_t n[3], int sheet, int axis, size_t range[2])
     struct volume_source *source;
     write_scan(n, sheet);
     assert_int_equal(volume_source_open(&file, 1, &source, NULL), STATUS_OK);
-    assert_int_equal(void_trim_find(source, axis, NULL, range, NULL), STATUS_OK);
+    assert_int_equal(void_trim_find(source, &(struct scan_look){0}, axis, NULL, range, NULL), STATUS_OK);
     volume_source_close(source);
 }
 

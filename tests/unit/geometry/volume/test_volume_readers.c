@@ -79,7 +79,7 @@ static void test_registry(void **state)
         void *handle = NULL;
         struct volume_source_info info;
         struct error err = {0};
-        assert_int_equal(r->open(&path, 1, &handle, &info, &err), STATUS_FORMAT);
+        assert_int_equal(r->open(&path, 1, NULL, &handle, &info, &err), STATUS_FORMAT);
         if (strstr(err.text, "'cut.short'") == NULL || strcmp(err.field, OPTION_SCAN_FILES) != 0)
             fail_msg("%s: %s", r->id, err.text);
         assert_null(handle);
@@ -108,7 +108,7 @@ static void test_wrong_byte_order(void **state)
     for (int i = 0; i < 5; i++) { /* the right order; noise and coarse values in both */
         raw.big_endian = i % 2 == 0;
         if (i > 0) scratch_write(path, i < 3 ? noise : coarse, sizeof noise);
-        assert_int_equal(volume_source_open_declared(&path, 1, &raw, &source, NULL), STATUS_OK);
+        assert_int_equal(volume_source_open_declared(&path, 1, &raw, NULL, &source, NULL), STATUS_OK);
         volume_source_close(source);
     }
 }
