@@ -62,7 +62,7 @@ void handle_upload_bytes_begin(struct http_request *r)
     const char *text = request_header(r, "Upload-Offset");
     if (!check_version(r)) return;
     if (text == NULL || *text == '\0' || strlen(text) > 18 || strspn(text, "0123456789") != strlen(text)) {
-        reply_code(r, "malformed", "Upload-Offset", "Upload-Offset must be a whole number");
+        reply_code(r, "malformed", "Upload-Offset", "Upload-Offset must be a whole number of at most 18 digits");
         return;
     }
     if (!take_upload(r, &upload, &row)) return;

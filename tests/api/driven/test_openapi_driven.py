@@ -7,8 +7,10 @@ import subprocess
 import pytest
 from daemon_under_test import BUILD
 
-# make test-long makes more requests
-MORE = 4 if os.environ.get("SELVEDGE_TEST_LONG") else 1
+LONG = bool(os.environ.get("SELVEDGE_TEST_LONG"))
+# The phase "coverage" tries each bound of each member of a whole job document, which takes ten times the rest: make test-long has
+# it for all operations, make test for those that read a finished job.
+PHASES = "examples,coverage,fuzzing,stateful" if LONG else "examples,fuzzing,stateful"
 HERE = os.path.dirname(os.path.abspath(__file__))
 CONFIG = os.path.join(HERE, "schemathesis.toml")
 pytestmark = pytest.mark.slow
@@ -37,7 +39,7 @@ def drive(schemathesis, daemon, config, *options):
 
 def test_every_reply_is_as_the_description_says(schemathesis, daemon):
     """All operations. Identifiers come from earlier replies where schemathesis finds them, else from nowhere."""
-    drive(schemathesis, daemon, CONFIG, "--max-examples", str(5 * MORE))
+    drive(schemathesis, daemon, CONFIG, "--phases", PHASES, "--max-examples", "20" if LONG else "10")
 
 
 def test_every_reply_about_a_finished_job_is_as_the_description_says(schemathesis, daemon, tmp_path, monkeypatch):
@@ -50,4 +52,4 @@ def test_every_reply_about_a_finished_job_is_as_the_description_says(schemathesi
     places = '"path.id" = "${SELVEDGE_JOB}"\n"path.name" = "${SELVEDGE_FILE}"\n"path.path" = "${SELVEDGE_RESULT}"\n"path.version" = "1"\n'
     config = tmp_path / "schemathesis.toml"
     config.write_text(text + places)
-    drive(schemathesis, daemon, config, "--include-method", "GET", "--include-path-regex", r"\{id\}", "--max-examples", str(10 * MORE))
+    drive(schemathesis, daemon, config, "--include-method", "GET", "--include-path-regex", r"\{id\}", "--max-examples", "40" if LONG else "10")

@@ -100,7 +100,7 @@ def states(disk, calls, rng, shares, begin):
             yield i, lambda path: save_all(disk, path)
 
 
-def try_states(calls, journal, folder, check, enough=5, shares=(0.3, 0.05), begin=0):
+def try_states(calls, journal, folder, check, enough=5, shares=(0.2, 0.03), begin=0):
     """Returns (number of states tried, [what was lost]). Ends after `enough` losses. shares: of the least states and of
     the others that are tried, from the call `begin` on."""
     n, lost = 0, []
