@@ -170,16 +170,14 @@ static bool for_the_night(const struct appearance *m)
 }
 
 /* By day the lower bounds of models with dear tables are left to test_scattering, and clear cloth to other models. */
-static enum place first_place(const struct appearance *m) { return has_dear_tables(m->id) ? DEFAULTS : LOWER_BOUNDS; }
-
 static void every_model(void **state)
 {
     const struct fixture *x = *state;
     struct appearance m;
     for (size_t i = 0; appearance_at(i, &m); i++) {
         if (for_the_night(&m)) continue;
-        const enum place end = has_dear_tables(m.id) ? CLEAR_CLOTH : N_PLACE;
-        for (enum place place = first_place(&m); place < end; place++) {
+        const bool dear = has_dear_tables(m.id);
+        for (enum place place = dear ? DEFAULTS : LOWER_BOUNDS; place < (dear ? CLEAR_CLOTH : N_PLACE); place++) {
             double param[SCATTERING_MAX_PARAM];
             bool skip[SCATTERING_MAX_PARAM];
             place_parameters(&m, place, param);
