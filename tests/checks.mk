@@ -1,5 +1,5 @@
 # Checks of the sources. `make test` and `make check` count each of them as a test.
-.PHONY: every-source layers format format-check columns clang lint lint-c lint-javascript lint-python lint-shell lint-words
+.PHONY: every-source layers format format-check columns clang clang-tests lint lint-c lint-javascript lint-python lint-shell lint-words
 # clang-format 14, that of Debian 12: other versions break lines elsewhere
 FORMATTED = $(shell find base geometry renderer optimizer server clients tests -name '*.[ch]' -o -name '*.cpp')
 SHELL_SCRIPTS = $(shell git ls-files '*.sh') config/install-dependencies .ci/run
@@ -20,8 +20,8 @@ layers:            ## includes and calls go one way, in each part from folder to
 columns:           ## no line of a C source is longer than 120 columns, comments included
 	@/usr/bin/python3 tests/check_columns.py $(FORMATTED)
 
-# what gcc compiles in `make test` is compiled with clang as well, but for tests/unit and tests/physics, which only a
-# night compiles (CLANG_TOO); benchmarks and fuzzers, which no other target of continuous integration compiles, are part
+# what gcc compiles in `make test` is compiled with clang as well, but for tests/unit and tests/physics, which only
+# `make clang-tests` compiles; benchmarks and fuzzers, which no other target of continuous integration compiles, are part
 # of it. Nothing but errors and warnings is made
 CLANG_TOO ?=
 SOURCES = $(shell find $(foreach p,$(PARTS),$(folder_$p)) clients/cli tests -name '*.c' -o -name '*.cpp')
@@ -37,9 +37,11 @@ $(BUILD)/syntax/%.cpp.ok: %.cpp
 every-source: $(patsubst %,$(BUILD)/syntax/%.ok,$(filter-out $(APART),$(SOURCES))) $(PLUGINS)
 -include $(shell find $(BUILD)/syntax -name '*.d' 2>/dev/null)
 
-clang:             ## clang reads every source but tests (CLANG_TOO=1: these too), benchmarks and fuzzers as well, without a warning (gcc does in every build)
+clang:             ## clang reads every source but C tests, benchmarks and fuzzers as well, without a warning (gcc does in every build)
 	@$(MAKE) --no-print-directory -j$$(nproc) BUILD=build/clang CC=clang CXX=clang++ OPTIMIZE=-O0 CLANG_TOO=$(CLANG_TOO) every-source
 	@echo "clang ok"
+clang-tests:       ## the same with the C tests
+	@$(MAKE) --no-print-directory clang CLANG_TOO=1
 
 lint: lint-c lint-javascript lint-python lint-shell lint-words ## all of the next five
 

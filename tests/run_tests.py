@@ -3,7 +3,7 @@
 C tests are cmocka programs build/tests/{unit,physics}/test_*, Python tests are pytest folders. A program that crashes,
 hangs or writes no results counts as one failed test. Each check of the sources (tests/checks.mk) counts as one test.
 Each line says how long a test took and how many seconds of a core that were. Tests of the API and the browser wait for
-daemons most of the time, so three of them run beside one that computes. --quick runs the checks, the unit tests that take
+daemons most of the time, so four of them run beside one that computes. --quick runs the checks, the unit tests that take
 at most 4 s of a core and the quick API tests, three that wait beside two that compute. --programs leaves out the checks
 of the sources, which neither sanitizers nor coverage change, and runs the long unit tests in spite of --quick.
 """
@@ -31,13 +31,15 @@ LONG_UNIT_TESTS = ["unit/renderer/test_scattering", "unit/renderer/fast/test_pre
                    "unit/geometry/weave/test_weave_detect", "unit/renderer/preview/test_sheared_filter", "unit/optimizer/report/test_hair_fit",
                    "unit/geometry/volume/test_slice_tiles", "unit/renderer/fast/test_gaussian_light", "unit/geometry/test_alignment",
                    "unit/geometry/volume/test_bad_input", "unit/geometry/test_reconstruct", "unit/renderer/table/test_appearance_table"]
-TIMEOUT_S = 600
-PYTEST_TIMEOUT_S = 1500
+# limits in seconds of a core, and how long a test may use next to none
+MOST_CORE_S, MOST_PYTEST_CORE_S = 600, 1500
+STILL_S, STILL_CORE_S = 900, 2
 # Those that take longest start first, so that no lane waits for one of them at the end.
-LONGEST = ["physics/test_derivative_check", "unit/renderer/test_scattering", "physics/test_reconstruct_phantom", "physics/test_chi_square",
+LONGEST = ["physics/test_reconstruct_phantom", "physics/test_derivative_check", "physics/test_scan_trial", "unit/renderer/test_scattering",
            "real/test_real_input", "api/driven/test_openapi_driven", "browser/test_accessibility", "browser/test_dashboard",
-           "api/worker/test_groups", "api/worker/test_cloth_search_job", "browser/test_repair", "browser/test_dashboard_submit",
-           "api/worker/test_described_cloth", "crash/test_daemon_disk", "crash/test_daemon_kill", "crash/test_worker_resume",
+           "api/worker/test_cloth_search_job", "crash/test_worker_resume", "crash/test_daemon_disk", "crash/test_daemon_kill",
+           "physics/exact/test_exact_scene", "api/service/test_bodies", "browser/test_dashboard_submit", "api/worker/test_groups",
+           "api/worker/test_correction_job", "api/test_recipes", "browser/test_repair", "api/worker/test_several_models",
            "api/test_supervision", "api/test_cli", "api/batches/test_batch_plan", "api/batches/test_batches", "api/service/test_rescue"]
 
 
@@ -57,21 +59,59 @@ def count_junit(path):
     return passed, failed, skipped, bad, why
 
 
-def run(command, timeout_s, environment):
+def core_seconds(pid):
+    """Seconds of a core that a process and all its descendants have used so far."""
+    children, used, tick = {}, {}, os.sysconf("SC_CLK_TCK")
+    for path in glob.glob("/proc/[0-9]*/stat"):
+        try:
+            with open(path, encoding="utf-8", errors="replace") as text:
+                fields = text.read().rsplit(")", 1)[1].split()
+        except OSError:  # it has ended
+            continue
+        one = int(path.split("/")[2])
+        children.setdefault(int(fields[1]), []).append(one)
+        used[one] = sum(map(int, fields[11:15])) / tick  # its own, and of children that have ended
+    family = [pid]
+    for one in family:
+        family += children.get(one, [])
+    return sum(used.get(one, 0) for one in family)
+
+
+def end_when_stuck(process, most_s, done, why):
+    """Kills a test that uses more seconds of a core than most_s, or next to none in STILL_S: it waits for nothing. How long it
+    takes says nothing, because it may share its cores with others."""
+    before, since = 0, time.monotonic()
+    while not done.wait(5):
+        used = core_seconds(process.pid)
+        if abs(used - before) > STILL_CORE_S:
+            before, since = used, time.monotonic()
+        if used > most_s:
+            why.append(f"no end after {most_s} s of a core")
+        elif time.monotonic() - since > STILL_S:
+            why.append(f"no progress: less than {STILL_CORE_S} s of a core in {STILL_S} s")
+        if why:
+            process.kill()
+            return
+
+
+def run(command, most_s, environment):
     """Returns the exit code, the output and how long it took: in seconds, and in seconds of a core with all children."""
     start = time.monotonic()
     # a file instead of a pipe, because a process that outlives its test would keep a pipe open
     with tempfile.TemporaryFile() as log:
         process = subprocess.Popen(command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT)
-        late = threading.Timer(timeout_s, process.kill)
-        late.start()
+        done, why = threading.Event(), []
+        watch = threading.Thread(target=end_when_stuck, args=(process, most_s, done, why))
+        watch.start()
+        # a process that is waited for keeps its number until the watch has ended, so that no other can be killed
+        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+        done.set()
+        watch.join()
         _, status, used = os.wait4(process.pid, 0)
-        late.cancel()
         seconds = time.monotonic() - start
         process.returncode = os.waitstatus_to_exitcode(status)
-        code = f"no end after {timeout_s} s" if process.returncode < 0 and seconds >= timeout_s else process.returncode
         log.seek(0)
-        return code, log.read().decode(errors="replace"), f"{seconds:.1f} s, of a core {used.ru_utime + used.ru_stime:.1f} s"
+        return why[0] if why else process.returncode, log.read().decode(errors="replace"), f"{seconds:.1f} s, of a core {used.ru_utime + used.ru_stime:.1f} s"
 
 
 def longest_first(names):
@@ -151,7 +191,7 @@ def main():
         return [name for name in names if wanted(name)]
 
     def run_check(name):
-        totals.add_one(name, *run(["make", "--silent", f"BUILD={arguments.build}", name], TIMEOUT_S, environment))
+        totals.add_one(name, *run(["make", "--silent", f"BUILD={arguments.build}", name], MOST_CORE_S, environment))
 
     left_out = LONG_UNIT_TESTS if arguments.quick and not arguments.programs and arguments.only is None else []
 
@@ -164,7 +204,7 @@ def main():
 
     def run_c(folder, name):
         junit = os.path.join(folder, name.replace("/", "."))
-        totals.add(name, junit + ".*.xml", *run([os.path.join(ROOT, arguments.build, "tests", name)], TIMEOUT_S,
+        totals.add(name, junit + ".*.xml", *run([os.path.join(ROOT, arguments.build, "tests", name)], MOST_CORE_S,
                                                 dict(environment, CMOCKA_MESSAGE_OUTPUT="xml", CMOCKA_XML_FILE=junit + ".%g.xml")))
 
     def python_tests(kinds):
@@ -183,7 +223,7 @@ def main():
                    f"--junitxml={junit}", os.path.join("tests", name + ".py")]
         if arguments.quick:
             command += ["-m", "not slow"]
-        code, output, time_taken = run(command, PYTEST_TIMEOUT_S, environment)
+        code, output, time_taken = run(command, MOST_PYTEST_CORE_S, environment)
         cleaner.submit(shutil.rmtree, files, ignore_errors=True)
         if code == 5 and arguments.quick:  # all tests of the file are slow ones
             return
@@ -196,7 +236,7 @@ def main():
         computing = [lambda name=name: run_check(name) for name in checks()]
         computing += [lambda name=name: (run_c if name in of_c else run_python)(folder, name) for name in longest_first(of_c + real)]
         waiting = [lambda name=name: run_python(folder, name) for name in longest_first(of_python)]
-        lanes = [computing, computing, waiting, waiting, waiting] if arguments.quick else [computing, waiting, waiting, waiting]
+        lanes = [computing, computing, waiting, waiting, waiting] if arguments.quick else [computing, waiting, waiting, waiting, waiting]
         with concurrent.futures.ThreadPoolExecutor(max_workers=len(lanes)) as pool:
             for done in [pool.submit(run_lane, own, waiting if own is computing else computing) for own in lanes]:
                 done.result()

@@ -42,8 +42,8 @@ screens: | deps-test ## the browser tests, which then keep screenshots of the da
 	@SELVEDGE_SCREENSHOTS="$(CURDIR)/$(BUILD)/screens" /usr/bin/python3 -m pytest -q $(addprefix tests/browser/,$(PAGES))$(if $(PAGES),,tests/browser)
 
 # What takes too long for every commit. One part that fails does not keep the next from running.
-NIGHTLY := asan tsan fuzz-smoke coverage test-crash test-cluster-kills test-postgresql test-slurm test-long mutants
-nightly:           ## asan, tsan, fuzz-smoke, coverage, test-crash, test-cluster-kills, test-postgresql, test-slurm, test-long and mutants: too long for every commit
+NIGHTLY := asan tsan clang-tests fuzz-smoke coverage test-crash test-cluster-kills test-postgresql test-slurm test-long mutants
+nightly:           ## asan, tsan, clang-tests, fuzz-smoke, coverage, test-crash, test-cluster-kills, test-postgresql, test-slurm, test-long and mutants: too long for every commit
 	@failed=""; for part in $(NIGHTLY); do \
 		echo "== $$part"; $(MAKE) --no-print-directory $$part || failed="$$failed $$part"; done; \
 	[ -z "$$failed" ] || { echo "nightly: failed:$$failed"; exit 1; }

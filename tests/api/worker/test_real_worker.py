@@ -49,7 +49,7 @@ def scan(tmp_path_factory):
 
 def document(**fit):
     return {"sample": "small plain weave", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}, "measurements": {"file": "rows.csv"},
-            "fit": {"model": "two_lobe.v1", "seed": 3, "max_iterations": 4, "path_budget": 300000, "render_px": 16, "render_samples": 4, **fit}}
+            "fit": {"model": "two_lobe.v1", "seed": 3, "max_iterations": 4, "path_budget": 80000, "render_px": 16, "render_samples": 4, **fit}}
 
 
 def submit(d, scan, table=TABLE, **fit):

@@ -100,7 +100,7 @@ def test_each_model_sees_its_own_sections(real):
 
     def fit(models, **more):
         job = real.create({"sample": "flat fibers", "cloth": cloth, "measurements": {"file": "rows.csv"},
-                           "fit": {"models": models, "max_iterations": 2, "path_budget": 20000, "render_px": 8, "render_samples": 1, **more}})
+                           "fit": {"models": models, "max_iterations": 1, "path_budget": 20000, "render_px": 8, "render_samples": 1, **more}})
         real.upload(job, "rows.csv", TABLE.encode(), "measurements")
         assert real.post(f"/v1/jobs/{job}/start").status_code == 202
         return {m["id"]: m for m in real.wait_state(job, "succeeded", timeout_s=300)["result"]["models"]}
@@ -177,7 +177,7 @@ def test_radius_beyond_the_tile(real):
 
 
 def test_radius_range_without_the_cloths_own(real):
-    job = start_small_job(real, document(fit_radius={"lower_um": 20, "upper_um": 30}, path_budget=1000))
+    job = start_small_job(real, document(fit_radius={"lower_um": 20, "upper_um": 30}, path_budget=1000, max_iterations=1))
     warnings = real.wait_state(job, "succeeded", timeout_s=120)["warnings"]
     said = [w for w in warnings if "fit.fit_radius" in w and "20 to 30 um" in w and "radius of 8 um" in w]
     assert len(said) == 1, warnings

@@ -45,7 +45,8 @@ def check_all(one, other):
 @pytest.mark.parametrize("model", ["two_lobe.v1", "textile.v3", "dielectric_near.v1"])
 def test_tubes_that_bend_and_touch(folder, model):
     fibers = make_cloth("twill7", folder)
-    one, other = (trace(p, fibers, model, CONFIGURATIONS[:4], blocks=64, paths=PATHS[model]) for p in (PRODUCT, EXACT))
+    views = CONFIGURATIONS[:2 if model == "dielectric_near.v1" and not LONG else 4]
+    one, other = (trace(p, fibers, model, views, blocks=64, paths=PATHS[model]) for p in (PRODUCT, EXACT))
     check(mean_differences(one, other), MEAN_BAR, 0.04)
 
 
@@ -82,7 +83,8 @@ def test_the_same_cloth_written_otherwise(folder, program):
     views = [CONFIGURATIONS[0], CONFIGURATIONS[4]]
 
     def blocks(f):
-        return trace(program, f.write(os.path.join(folder, "other.hair")), configurations=views, blocks=64, paths=(1024 if program == PRODUCT else 128) // FEWER)
+        paths = (1024 if program == PRODUCT else 128) // FEWER
+        return trace(program, f.write(os.path.join(folder, "other.hair")), configurations=views, blocks=64, paths=paths)
 
     as_made = blocks(fibers)
     x, y = fibers.tile
