@@ -30,12 +30,28 @@ static void write_rows(TIFF *tiff, const struct camera_tiff *t, const void *samp
     free(row);
 }
 
-static void write_tile(TIFF *tiff, const struct camera_tiff *t, const void *sample)
+/* Tiles of 16 x 16 pixels, which reach beyond the picture. */
+static void write_tiles(TIFF *tiff, const struct camera_tiff *t, const void *sample)
 {
-    TIFFSetField(tiff, TIFFTAG_TILEWIDTH, (uint32_t)t->width);
-    TIFFSetField(tiff, TIFFTAG_TILELENGTH, (uint32_t)t->height);
-    must(TIFFWriteEncodedTile(tiff, 0, (void *)(uintptr_t)sample,
-                              (tmsize_t)(t->width * t->height * t->n_channel * t->bits / 8)) > 0);
+    enum { TILE = 16 };
+    const size_t bytes = t->bits / 8, n_in = t->planes ? 1 : t->n_channel;
+    uint8_t *tile = malloc(TILE * TILE * n_in * bytes);
+    must(tile != NULL);
+    TIFFSetField(tiff, TIFFTAG_TILEWIDTH, (uint32_t)TILE);
+    TIFFSetField(tiff, TIFFTAG_TILELENGTH, (uint32_t)TILE);
+    for (size_t c = 0; c < (t->planes ? t->n_channel : 1); c++)
+        for (size_t y = 0; y < t->height; y += TILE)
+            for (size_t x = 0; x < t->width; x += TILE) {
+                memset(tile, 0x77, TILE * TILE * n_in * bytes);
+                for (size_t i = 0; i < TILE * TILE * n_in; i++) {
+                    const size_t at_x = x + i / n_in % TILE, at_y = y + i / n_in / TILE, k = t->planes ? c : i % n_in;
+                    if (at_x < t->width && at_y < t->height)
+                        memcpy(tile + i * bytes,
+                               (const uint8_t *)sample + ((at_y * t->width + at_x) * t->n_channel + k) * bytes, bytes);
+                }
+                must(TIFFWriteTile(tiff, tile, (uint32_t)x, (uint32_t)y, 0, (uint16_t)c) > 0);
+            }
+    free(tile);
 }
 
 /* Writes the Exif data into a folder of their own; the picture's folder must have been written. */
@@ -76,7 +92,7 @@ void camera_write_tiff(const char *path, const struct camera_tiff *t, const void
     if (t->n_channel % 2 == 0) TIFFSetField(tiff, TIFFTAG_EXTRASAMPLES, 1, &extra);
     if (t->palette) set_palette(tiff);
     if (t->tiled)
-        write_tile(tiff, t, sample);
+        write_tiles(tiff, t, sample);
     else
         write_rows(tiff, t, sample);
     if (t->exposure_s > 0.0) {

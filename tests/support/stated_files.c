@@ -178,6 +178,15 @@ void stated_write_png(const char *path, size_t width, size_t height, unsigned de
     free(packed);
 }
 
+void stated_write_png_bytes(const char *path, size_t width, size_t height, const uint8_t *rgb)
+{
+    uint16_t *sample = malloc(3 * width * height * sizeof *sample);
+    must(sample != NULL);
+    for (size_t i = 0; i < 3 * width * height; i++) sample[i] = rgb[i];
+    stated_write_png(path, width, height, 8, 3, sample, NULL, 0);
+    free(sample);
+}
+
 /* ---- JPEG ---- */
 
 void stated_write_jpeg(const char *path, size_t width, size_t height, const uint8_t *rgb, const struct file_part *part,

@@ -34,6 +34,8 @@ struct file_part {
 /* channels: 1 to 4 of `depth` bits; sample: values in order, of 16 bits each. Parts lie before the picture data. */
 void stated_write_png(const char *path, size_t width, size_t height, unsigned depth, unsigned channels,
                       const uint16_t *sample, const struct file_part *part, size_t n_part);
+/* An rgb PNG of 8 bits that states nothing. */
+void stated_write_png_bytes(const char *path, size_t width, size_t height, const uint8_t *rgb);
 /* An rgb JPEG of quality 100 without subsampling. */
 void stated_write_jpeg(const char *path, size_t width, size_t height, const uint8_t *rgb, const struct file_part *part,
                        size_t n_part);

@@ -32,7 +32,7 @@ static status read_frame(const char *path, const struct noise_frames *f, struct 
     if (s != STATUS_OK) return s;
     out->exposure_s = isnan(info.exposure_s) ? f->exposure_s : info.exposure_s;
     out->iso = info.iso;
-    out->limit_dn = info.encoded || info.full_scale != 1.0 ? info.full_scale : INFINITY;
+    out->limit_dn = info.full_scale * photograph_saturation(&info);
     snprintf(out->camera, sizeof out->camera, "%s", info.camera);
     for (size_t i = 0; i < out->image.width * out->image.height * 3; i++) out->image.pixel[i] *= (float)info.full_scale;
     if (isnan(out->exposure_s))

@@ -67,8 +67,9 @@ static double saturated_in_crop(const struct view_exposures *e, const size_t cro
     size_t x1 = crop[2] > 0 ? crop[2] : im->width, y1 = crop[3] > 0 ? crop[3] : im->height, n = 0;
     double shortest_s = e->record[0].fitted_s[0];
     for (size_t i = 1; i < e->n; i++) shortest_s = fmin(shortest_s, e->record[0].fitted_s[i]);
-    const float limit = e->n > 1 ? (float)(0.999999 * info->exposure_s / shortest_s) : 1.0f;
-    if (info->full_scale == 1.0 || x1 > im->width || y1 > im->height) return 0.0;
+    const double level = photograph_saturation(info);
+    const float limit = (float)(e->n > 1 ? 0.999999 * level * info->exposure_s / shortest_s : level);
+    if (!isfinite(level) || x1 > im->width || y1 > im->height) return 0.0;
     for (size_t y = crop[1]; y < y1; y++)
         for (size_t x = crop[0]; x < x1; x++) {
             const float *p = im->pixel + 3 * (y * im->width + x);
@@ -122,7 +123,7 @@ status photograph_develop(const struct photograph_process *k, const char *folder
 /* Value from which on a developed sample was saturated. */
 static double saturation_of(const struct photograph_record *r)
 {
-    return r->info.full_scale != 1.0 ? 0.999999 / r->exposure : INFINITY;
+    return 0.999999 * photograph_saturation(&r->info) / r->exposure;
 }
 
 static status load_chart(struct photograph_process *k, const struct job_setup *setup, const char *folder,

@@ -38,18 +38,22 @@ static struct dark_mean *dark_of_time(const struct photograph_process *k, double
 }
 
 /* Adds a frame to the sum of its exposure time. Takes the image. */
-static status add_dark(struct photograph_process *k, const char *name, double exposure_s, struct image *im,
-                       struct error *err)
+static status add_dark(struct photograph_process *k, const char *name, const struct photograph_info *info,
+                       struct image *im, struct error *err)
 {
-    struct dark_mean *d = dark_of_time(k, exposure_s);
+    struct dark_mean *d = dark_of_time(k, info->exposure_s);
     if (d == NULL) {
-        k->dark[k->n_dark++] = (struct dark_mean){.exposure_s = exposure_s, .n = 1, .image = *im};
+        k->dark[k->n_dark++] =
+            (struct dark_mean){.exposure_s = info->exposure_s, .n = 1, .orientation = info->orientation, .image = *im};
         return STATUS_OK;
     }
     status s = STATUS_OK;
     if (d->image.width != im->width || d->image.height != im->height)
         s = error_set(err, STATUS_INVALID, "cannot use dark frame '%s': it has %zu x %zu pixels, others have %zu x %zu",
                       name, im->width, im->height, d->image.width, d->image.height);
+    else if (d->orientation != info->orientation)
+        s = error_set(err, STATUS_INVALID, "cannot use dark frame '%s': its orientation is %u, others have %u", name,
+                      info->orientation, d->orientation);
     for (size_t i = 0; i < im->width * im->height * 3 && s == STATUS_OK; i++) d->image.pixel[i] += im->pixel[i];
     d->n++;
     image_release(im);
@@ -72,7 +76,7 @@ status photograph_process_load_dark(struct photograph_process *k, const struct j
         snprintf(path, sizeof path, "%s/%s", folder, setup->dark_frame[i]);
         s = photograph_read_values(path, &plain, &im, &r, err);
         if (s == STATUS_OK) file_ledger_append(k->files, setup->dark_frame[i], &r.info.ledger);
-        if (s == STATUS_OK) s = add_dark(k, setup->dark_frame[i], r.info.exposure_s, &im, err);
+        if (s == STATUS_OK) s = add_dark(k, setup->dark_frame[i], &r.info, &im, err);
     }
     for (size_t i = 0; i < k->n_dark && s == STATUS_OK; i++) {
         struct image *im = &k->dark[i].image;
@@ -98,11 +102,16 @@ status photograph_process_subtract_dark(const struct photograph_process *k, cons
         return error_set(err, STATUS_INVALID,
                          "cannot use photograph '%s': it has %zu x %zu pixels, its dark frame has %zu x %zu", name,
                          r->width, r->height, d->image.width, d->image.height);
+    if (d->orientation != r->info.orientation)
+        return error_set(err, STATUS_INVALID,
+                         "cannot use photograph '%s': its orientation is %u, its dark frame's is %u: their sensors are "
+                         "turned against each other",
+                         name, r->info.orientation, d->orientation);
     for (size_t y = 0; y < im->height; y++) {
         const float *dark = d->image.pixel + 3 * ((y + p->crop_px[1]) * d->image.width + p->crop_px[0]);
         float *to = im->pixel + 3 * y * im->width;
         for (size_t i = 0; i < 3 * im->width; i++)
-            if (to[i] < 1.0f || r->info.full_scale == 1.0) to[i] -= dark[i]; /* a saturated sample stays at 1 */
+            if ((double)to[i] < r->info.saturation[i % 3]) to[i] -= dark[i]; /* a saturated sample stays as it is */
     }
     return STATUS_OK;
 }

@@ -21,6 +21,7 @@ struct job_setup;
 struct dark_mean {
     double exposure_s;
     size_t n;
+    unsigned orientation;
     struct image image;
 };
 

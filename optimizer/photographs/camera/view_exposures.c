@@ -33,6 +33,7 @@ static status check_exposures(const struct view_exposures *e, struct error *err)
     for (size_t i = 0; i < e->n; i++) {
         const struct photograph_record *a = &e->record[0], *b = &e->record[i];
         const char *what = a->width != b->width || a->height != b->height ? "sizes"
+                           : a->info.orientation != b->info.orientation   ? "orientations"
                            : differ(a->info.iso, b->info.iso)             ? "ISO values"
                            : differ(a->info.aperture, b->info.aperture)   ? "f-numbers"
                                                                           : NULL;
@@ -112,12 +113,24 @@ static void rank_exposures(const struct photograph_process *k, const struct view
     }
 }
 
+/* Scales an exposure so that 1 is saturation, as the estimator has it. Returns the factor that was divided by. */
+static double scale_to_saturation(const struct photograph_info *info, struct image *im, double *full_scale)
+{
+    double level = photograph_saturation(info);
+    *full_scale = info->full_scale;
+    if (!isfinite(level) || (level == 1.0 && *full_scale != 1.0)) return 1.0;
+    if (*full_scale == 1.0) level *= 1.0 - 1e-6; /* a full scale of 1 stands for samples that do not saturate */
+    image_scale(im, 1.0 / level);
+    *full_scale *= level;
+    return level;
+}
+
 /* Merges into image[0], which keeps the unit of the first exposure. */
 static status merge(const struct photograph_process *k, const struct job_photograph *p, struct view_exposures *e,
                     struct error *err)
 {
     struct noise_record noise = k->noise;
-    double full_scale[EXPOSURE_MAX], stated_s[EXPOSURE_MAX], rank[EXPOSURE_MAX];
+    double full_scale[EXPOSURE_MAX], stated_s[EXPOSURE_MAX], rank[EXPOSURE_MAX], level = 1.0;
     struct image *image[EXPOSURE_MAX];
     struct photograph_record *r = &e->record[0];
     struct exposure_ratio ratio;
@@ -126,7 +139,8 @@ static status merge(const struct photograph_process *k, const struct job_photogr
         noise.channel[c].read_mean = noise.channel[c].dark_mean = 0.0;
     for (size_t i = 0; i < e->n; i++) {
         stated_s[i] = e->record[i].info.exposure_s;
-        full_scale[i] = e->record[i].info.full_scale;
+        const double own = scale_to_saturation(&e->record[i].info, &e->image[i], &full_scale[i]);
+        if (i == 0) level = own;
         image[i] = &e->image[i];
     }
     struct exposure_set set = {k->has_noise ? &noise : NULL,
@@ -137,7 +151,7 @@ static status merge(const struct photograph_process *k, const struct job_photogr
                                full_scale,
                                image,
                                e->name,
-                               r->info.encoded && p->transfer == JOB_TRANSFER_SRGB};
+                               r->info.curved};
     rank_exposures(k, e, rank);
     status s = k->has_noise ? image_init(&e->variance, image[0]->width, image[0]->height, 3, err) : STATUS_OK;
     if (s == STATUS_OK) s = exposure_ratio_fit(&set, rank, &ratio, err);
@@ -154,8 +168,9 @@ static status merge(const struct photograph_process *k, const struct job_photogr
     snprintf(r->exposure_warning, sizeof r->exposure_warning, "%s", ratio.warning);
     time_error(&ratio, e->n, &light, e->time_error);
     for (size_t i = 0; i < 3 * e->n; i++) e->time_error[i / 3][i % 3] *= stated_s[0];
-    image_scale(image[0], stated_s[0]); /* the first one's time is divided by later */
-    if (k->has_noise) image_scale(&e->variance, stated_s[0] * stated_s[0]);
+    for (size_t i = 0; i < 3 * e->n; i++) e->time_error[i / 3][i % 3] *= level;
+    image_scale(image[0], level * stated_s[0]); /* the first one's time is divided by later */
+    if (k->has_noise) image_scale(&e->variance, level * level * stated_s[0] * stated_s[0]);
     return STATUS_OK;
 }
 

@@ -29,17 +29,16 @@ void bowl_pictures_release(struct bowl_pictures *p)
 }
 
 /* Value from which on a sample is saturated in every exposure, after it was divided by the exposure. INFINITY where
- * that is not known: for float samples, and for exposures whose times only their files state. */
+ * that is not known: for samples without a limit, and for exposures whose times only their files state. */
 static double saturation_of(const struct photograph_record *r, const struct job_photograph *p)
 {
     double shortest_s = r->info.exposure_s;
-    if (r->info.full_scale == 1.0) return INFINITY; /* float samples */
     for (size_t i = 0; i < p->n_exposure; i++) {
         if (isnan(p->exposure[i].exposure_s)) return INFINITY;
         shortest_s = fmin(shortest_s, p->exposure[i].exposure_s);
     }
     const double ratio = p->n_exposure > 0 ? r->info.exposure_s / shortest_s : 1.0;
-    return 0.999999 * ratio / r->exposure;
+    return 0.999999 * ratio * photograph_saturation(&r->info) / r->exposure;
 }
 
 static status develop(const struct bowl_pictures *p, const struct job_photograph *photograph, struct image *im,

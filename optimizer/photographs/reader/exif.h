@@ -5,7 +5,7 @@
 #ifndef SELVEDGE_OPTIMIZER_EXIF_H
 #define SELVEDGE_OPTIMIZER_EXIF_H
 
-#include "optimizer/photographs/reader/photograph_reader.h"
+#include "optimizer/photographs/reader/photograph_info.h"
 
 #include <stdio.h>
 

@@ -30,12 +30,13 @@ static status crop_image(struct image *im, const size_t crop[4], const char *nam
     return STATUS_OK;
 }
 
-static double saturated_part(const struct image *im)
+/* Share of the pixels that have a saturated channel. */
+static double saturated_part(const struct image *im, const double saturation[3])
 {
     size_t n = im->width * im->height, n_saturated = 0;
     for (size_t i = 0; i < n; i++) {
         const float *p = im->pixel + i * im->n_channel;
-        n_saturated += p[0] >= 1.0f || p[1] >= 1.0f || p[2] >= 1.0f;
+        n_saturated += (double)p[0] >= saturation[0] || (double)p[1] >= saturation[1] || (double)p[2] >= saturation[2];
     }
     return (double)n_saturated / (double)n;
 }
@@ -112,7 +113,7 @@ status photograph_read_values(const char *path, const struct job_photograph *p, 
         image_release(im);
         return s;
     }
-    r.saturated_share = r.info.full_scale != 1.0 ? saturated_part(im) : 0.0;
+    r.saturated_share = saturated_part(im, r.info.saturation);
     r.resampled = r.info.encoded && neighbour_power(im) < resampled_limit;
     r.exposure = exposure_of(p, &r.info);
     r.n_exposure = 1;

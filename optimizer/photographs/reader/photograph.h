@@ -6,7 +6,7 @@
  * standard error of the mean comes from the means of square sub-blocks (8 x 8 of them where the crop allows): cloth has
  * texture that is correlated from pixel to pixel, so single pixels would state an error that is far too small.
  * STATUS_FORMAT / STATUS_INVALID naming the file: unreadable, NaN or infinite pixels, negative mean, all black,
- * saturated (more than 2 % of the crop of an integer picture at its largest value), crop outside the picture, linear
+ * saturated (more than 2 % of the crop at the value where the picture is clipped), crop outside the picture, linear
  * samples that are declared as srgb.
  */
 #ifndef SELVEDGE_OPTIMIZER_PHOTOGRAPH_H
@@ -30,7 +30,7 @@ enum {
 struct photograph_record {
     struct photograph_info info; /* with the exposure that the document overrides */
     size_t width, height;        /* of the file, in pixels of the image that was read */
-    double saturated_share;      /* of the crop's pixels that have a channel at full scale, 0 for float samples */
+    double saturated_share;      /* of the crop's pixels that have a saturated channel */
     double exposure;             /* pixel values were divided by it; 1 when nothing is known */
     bool merged;                 /* by the estimator of exposure_merge.h, of n_exposure pictures */
     size_t n_exposure;

@@ -1,6 +1,7 @@
 #include "optimizer/photographs/reader/photograph_reader.h"
 
 #include "base/files/durable.h"
+#include "optimizer/photographs/reader/saturation.h"
 #include "renderer/image/color_primaries.h"
 
 #include <ctype.h>
@@ -56,12 +57,89 @@ static status no_reader_takes(const char *path, struct error *err)
                      path_file_name(path));
 }
 
+static void multiply(const double m[9], const float in[3], float out[3])
+{
+    for (int c = 0; c < 3; c++)
+        out[c] = (float)(m[3 * c] * (double)in[0] + m[3 * c + 1] * (double)in[1] + m[3 * c + 2] * (double)in[2]);
+}
+
+static bool is_saturated(const float p[3], const double saturation[3])
+{
+    return (double)p[0] >= saturation[0] || (double)p[1] >= saturation[1] || (double)p[2] >= saturation[2];
+}
+
+/* Converts the colors. A pixel with a saturated sample is unknown in all channels afterwards: all become larger than
+ * the samples of other pixels. */
+static void convert_primaries(struct image *im, struct photograph_info *info)
+{
+    const size_t n = im->width * im->height;
+    float limit = 0.0f, out[3];
+    bool any = false;
+    for (size_t i = 0; i < n; i++) {
+        const float *p = im->pixel + 3 * i;
+        if (is_saturated(p, info->saturation)) {
+            any = true;
+            continue;
+        }
+        multiply(info->to_rec709, p, out);
+        limit = fmaxf(limit, fmaxf(out[0], fmaxf(out[1], out[2])));
+    }
+    limit = nextafterf(limit, INFINITY);
+    for (size_t i = 0; i < n; i++) {
+        float *p = im->pixel + 3 * i;
+        const bool lost = is_saturated(p, info->saturation);
+        multiply(info->to_rec709, p, out);
+        for (int c = 0; c < 3; c++) p[c] = lost ? fmaxf(out[c], limit) : out[c];
+    }
+    for (int c = 0; c < 3; c++) info->saturation[c] = any ? (double)limit : INFINITY;
+}
+
+/* Turns the picture as viewers show it: orientation k of Exif says where the first row and column
+ * of the file belong. */
+static status turn(struct image *im, struct photograph_info *info, struct error *err)
+{
+    static const char *const meaning[] = {"",
+                                          "upright",
+                                          "mirrored",
+                                          "half a turn",
+                                          "mirrored upside down",
+                                          "mirrored, a quarter turn",
+                                          "a quarter turn to the right",
+                                          "mirrored, a quarter turn to the right",
+                                          "a quarter turn to the left"};
+    const unsigned k = info->orientation;
+    info->orientation = 1;
+    if (k == 0 || k > 8) return STATUS_OK;
+    info->orientation = k;
+    file_ledger_add(&info->ledger, "orientation", NULL, "%u, %s", k, meaning[k]);
+    if (k == 1) return STATUS_OK;
+    const bool exchanged = k >= 5;
+    struct image out;
+    status s = image_init(&out, exchanged ? im->height : im->width, exchanged ? im->width : im->height, 3, err);
+    if (s != STATUS_OK) return s;
+    for (size_t y = 0; y < im->height; y++)
+        for (size_t x = 0; x < im->width; x++) {
+            const size_t to_left = im->width - 1 - x, to_top = im->height - 1 - y;
+            const size_t across = k == 2 || k == 3 || k == 7 || k == 8 ? to_left : x;
+            const size_t down = k == 3 || k == 4 || k == 6 || k == 7 ? to_top : y;
+            const size_t column = exchanged ? down : across, row = exchanged ? across : down;
+            memcpy(out.pixel + 3 * (row * out.width + column), im->pixel + 3 * (y * im->width + x), 3 * sizeof(float));
+        }
+    image_release(im);
+    *im = out;
+    return STATUS_OK;
+}
+
 status photograph_file_read(const char *path, const struct photograph_request *q, struct image *im,
                             struct photograph_info *info, struct error *err)
 {
     uint8_t first[PHOTOGRAPH_FIRST_BYTES];
     memset(im, 0, sizeof *im);
-    *info = (struct photograph_info){.exposure_s = NAN, .iso = NAN, .aperture = NAN, .full_scale = 1.0};
+    *info = (struct photograph_info){.exposure_s = NAN,
+                                     .iso = NAN,
+                                     .aperture = NAN,
+                                     .full_scale = 1.0,
+                                     .saturation = {INFINITY, INFINITY, INFINITY}};
     status s = read_first_bytes(path, first, err);
     if (s != STATUS_OK) return s;
     const photograph_reader *named = reader_of_name(path), *found = reader_of_content(first);
@@ -75,7 +153,10 @@ status photograph_file_read(const char *path, const struct photograph_request *q
             path_file_name(path), named->title, found->title);
     info->format = found->title;
     s = found->read(path, q, im, info, err);
-    if (s == STATUS_OK && info->to_rec709[0] != 0.0 && !color_matrix_is_identity(info->to_rec709))
-        image_apply_matrix(im, info->to_rec709);
+    if (s != STATUS_OK) return s;
+    saturation_find(im, info);
+    if (info->to_rec709[0] != 0.0 && !color_matrix_is_identity(info->to_rec709)) convert_primaries(im, info);
+    s = turn(im, info, err);
+    if (s != STATUS_OK) image_release(im);
     return s;
 }

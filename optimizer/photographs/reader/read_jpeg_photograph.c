@@ -2,6 +2,7 @@
 #include "base/files/durable.h"
 #include "optimizer/photographs/reader/exif.h"
 #include "optimizer/photographs/reader/integer_samples.h"
+#include "optimizer/photographs/reader/photograph_reader.h"
 
 #include <setjmp.h>
 #include <stdio.h>
@@ -69,9 +70,26 @@ static void take_exif(const struct jpeg_decompress_struct *jpeg, struct photogra
 struct jpeg_work {
     struct jpeg_decompress_struct jpeg;
     struct jpeg_failure failure;
+    struct declared_color color;
+    JOCTET *profile;
     float *light;
     JSAMPLE *row;
 };
+
+/* Curve and primaries that the file declares: by its ICC profile, or by the color space of Exif. */
+static status take_colors(struct jpeg_work *w, const char *path, struct photograph_info *info, struct error *err)
+{
+    unsigned n = 0;
+    status s = STATUS_OK;
+    take_exif(&w->jpeg, info);
+    if (jpeg_read_icc_profile(&w->jpeg, &w->profile, &n))
+        s = declared_color_icc(&w->color, path, w->profile, n, w->jpeg.num_components == 1, info, err);
+    if (s == STATUS_OK) s = declared_color_exif(&w->color, info, err);
+    if (w->jpeg.saw_JFIF_marker && w->jpeg.density_unit != 0 && w->jpeg.X_density > 1)
+        file_ledger_add(&info->ledger, "JFIF density", "lengths follow from the crop", "%u pixels per %s",
+                        w->jpeg.X_density, w->jpeg.density_unit == 1 ? "inch" : "cm");
+    return s;
+}
 
 static status decode(struct jpeg_work *w, FILE *file, const char *path, const struct photograph_request *q,
                      struct image *im, struct photograph_info *info, struct error *err)
@@ -79,14 +97,15 @@ static status decode(struct jpeg_work *w, FILE *file, const char *path, const st
     struct jpeg_decompress_struct *jpeg = &w->jpeg;
     jpeg_stdio_src(jpeg, file);
     jpeg_save_markers(jpeg, JPEG_APP0 + 1, 0xffff);
+    jpeg_save_markers(jpeg, JPEG_APP0 + 2, 0xffff);
     jpeg_read_header(jpeg, TRUE);
     status s = check_header(jpeg, path_file_name(path), q, file, err);
-    if (s == STATUS_OK) s = integer_samples_declare(path, q, 8, info, err);
+    if (s == STATUS_OK) s = take_colors(w, path, info, err);
+    if (s == STATUS_OK) s = integer_samples_declare(path, q, 8, &w->color, info, err);
     if (s != STATUS_OK) return s;
-    take_exif(jpeg, info);
     jpeg->out_color_space = JCS_RGB;
     jpeg->dct_method = JDCT_ISLOW;
-    w->light = integer_samples_curve(q, info);
+    w->light = integer_samples_curves(q, &w->color, 255, info);
     w->row = malloc(3 * (size_t)jpeg->image_width);
     if (w->light == NULL || w->row == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot read photograph '%s': out of memory", path_file_name(path));
@@ -96,7 +115,7 @@ static status decode(struct jpeg_work *w, FILE *file, const char *path, const st
     while (jpeg->output_scanline < jpeg->output_height) {
         float *to = im->pixel + (size_t)jpeg->output_scanline * im->width * 3;
         jpeg_read_scanlines(jpeg, &w->row, 1);
-        for (size_t i = 0; i < 3 * im->width; i++) to[i] = w->light[w->row[i]];
+        for (size_t i = 0; i < 3 * im->width; i++) to[i] = w->light[256 * (i % 3) + w->row[i]];
     }
     return STATUS_OK;
 }
@@ -126,6 +145,8 @@ static status read_jpeg(const char *path, const struct photograph_request *q, st
     }
     if (s != STATUS_OK) image_release(im);
     jpeg_destroy_decompress(&w->jpeg);
+    declared_color_release(&w->color);
+    free(w->profile);
     free(w->light);
     free(w->row);
     free(w);

@@ -3,7 +3,7 @@
  *
  * A picture of a Bayer sensor becomes one pixel for each cell of 2 x 2 samples: red, the mean of both greens, and blue,
  * as they were measured. It has half of the sensor's width and height, and noise of neighbouring pixels stays
- * independent. Monochrome sensors and linear rgb keep their size. The rotation of the camera is ignored. Values
+ * independent. Monochrome sensors and linear rgb keep their size. The orientation is stated, and applied later. Values
  * are (sample - black) / (white - black), neither clamped at 0 nor cut at 1; a pixel with a sample at or above the
  * camera's limit is at least 1. */
 #include "base/files/durable.h"
@@ -141,6 +141,10 @@ static status take_levels(libraw_data_t *lr, const char *name, const struct phot
                          k->black, c->maximum);
     info->black_level = k->black;
     info->full_scale = k->full_scale;
+    for (int i = 0; i < 3; i++) info->saturation[i] = 1.0;
+    file_ledger_add(&info->ledger, "black level", isnan(q->black_level) ? NULL : "the document gives one", "%g",
+                    (double)c->black + (double)c->cblack[0]);
+    file_ledger_add(&info->ledger, "white level", NULL, "%u", c->maximum);
     info->bits = 1;
     while (info->bits < 16 && (1u << info->bits) <= c->maximum) info->bits++;
     return STATUS_OK;
@@ -175,6 +179,8 @@ static status decode(libraw_data_t *lr, const char *path, const struct photograp
     info->exposure_s = known(lr->other.shutter);
     info->iso = known(lr->other.iso_speed);
     info->aperture = known(lr->other.aperture);
+    static const unsigned orientation_of_flip[8] = {1, 2, 4, 3, 5, 8, 6, 7};
+    info->orientation = orientation_of_flip[lr->sizes.flip & 7];
     snprintf(info->camera, sizeof info->camera, "%.40s %.40s", lr->idata.make, lr->idata.model);
     return take_picture(lr, name, &k, im, err);
 }

@@ -34,7 +34,10 @@ static void print_mean(const char *name, const struct photograph_mean *m)
 {
     const struct photograph_record *r = &m->record;
     printf("%s\n  %-14s %s, %u bit%s%s%s\n", name, "read as", r->info.format, r->info.bits,
-           r->info.encoded ? ", curve as declared" : ", linear", r->info.camera[0] != '\0' ? ", " : "", r->info.camera);
+           r->info.curve_of_file ? ", curve of the file"
+           : r->info.encoded     ? ", curve as declared"
+                                 : ", linear",
+           r->info.camera[0] != '\0' ? ", " : "", r->info.camera);
     printf("  %-14s %zu x %zu pixels\n", "size", r->width, r->height);
     print_stated("black level", r->info.black_level, " subtracted");
     print_stated("exposure", r->info.exposure_s, " s");

@@ -229,12 +229,96 @@ static void test_grey_of_few_bits(void **state)
     }
 }
 
+/* The eight orientations in JPEG, PNG and TIFF, in both byte orders: the picture that viewers show is read. */
+static void test_orientation(void **state)
+{
+    enum { WIDTH = 40, HEIGHT = 24 };
+    static const uint16_t bits[3] = {8, 8, 8};
+    static uint8_t folder[ROOM], marked[ROOM + 6] = "Exif\0", rgb[WIDTH * HEIGHT * 3], file[ROOM + sizeof rgb];
+    static uint16_t word[WIDTH * HEIGHT * 3];
+    const char *name[3] = {scratch_path(state, "o.jpg"), scratch_path(state, "o.png"), scratch_path(state, "o.tif")};
+    for (unsigned k = 1; k <= 8; k++)
+        for (int carrier = 0; carrier < 3; carrier++) {
+            struct image im;
+            struct photograph_record r;
+            for (size_t i = 0; i < WIDTH * HEIGHT; i++) { /* stored pixel of the shown one with brightness by place */
+                const size_t x = i % WIDTH, y = i / WIDTH, left = WIDTH - 1 - x, up = HEIGHT - 1 - y;
+                /* where the first row and the first column are shown, by the table of the standard */
+                const size_t shown_x[9] = {0, x, left, left, x, y, up, up, y},
+                             shown_y[9] = {0, y, y, up, up, x, x, left, left};
+                for (size_t c = 0; c < 3; c++)
+                    word[3 * i + c] = rgb[3 * i + c] = (uint8_t)(c == 0   ? 4 * shown_x[k]
+                                                                 : c == 1 ? 4 * shown_y[k]
+                                                                          : 90);
+            }
+            const struct folder_entry one = {0x112, 3, k};
+            size_t n = folder_build(k % 2 == 0, &one, 1, NULL, 0, folder, sizeof folder);
+            memcpy(marked + 6, folder, n);
+            if (carrier == 0)
+                stated_write_jpeg(name[0], WIDTH, HEIGHT, rgb, &(struct file_part){NULL, 0xe1, marked, n + 6}, 1);
+            if (carrier == 1)
+                stated_write_png(name[1], WIDTH, HEIGHT, 8, 3, word, &(struct file_part){"eXIf", 0, folder, n}, 1);
+            if (carrier == 2) {
+                const struct folder_entry entry[] = {{256, 3, WIDTH},     {257, 3, HEIGHT}, {258, 3, 0, false, 3, bits},
+                                                     {259, 3, 1},         {262, 3, 2},      {273, 4, 0},
+                                                     {274, 3, k},         {277, 3, 3},      {278, 3, HEIGHT},
+                                                     {279, 4, sizeof rgb}};
+                n = folder_build(k % 2 == 0, entry, sizeof entry / sizeof *entry, rgb, sizeof rgb, file, sizeof file);
+                scratch_write(name[2], (char *)file, n);
+            }
+            read_ok(name[carrier], JOB_TRANSFER_LINEAR, &im, &r);
+            assert_true(im.width == (k < 5 ? WIDTH : HEIGHT) && im.height == (k < 5 ? HEIGHT : WIDTH));
+            assert_true(r.info.orientation == k && file_ledger_find(&r.info.ledger, "orientation") != NULL);
+            for (size_t y = 0; y < im.height; y++)
+                for (size_t x = 0; x < im.width; x++) {
+                    const float *p = im.pixel + 3 * (y * im.width + x);
+                    const double allowed = carrier == 0 ? 0.012 : 1e-6; /* JPEG rounds */
+                    if (!(fabs((double)p[0] - 4.0 * (double)x / 255.0) < allowed &&
+                          fabs((double)p[1] - 4.0 * (double)y / 255.0) < allowed))
+                        fail_msg("orientation %u of %s: (%zu, %zu) is %g %g", k, name[carrier], x, y,
+                                 255.0 * (double)p[0] / 4, 255.0 * (double)p[1] / 4);
+                }
+            image_release(&im);
+        }
+}
+
+/* Grey whose zero is white, and a largest sample that the file states. */
+static void test_tags_of_tiff(void **state)
+{
+    static const uint16_t largest = 1023;
+    static uint16_t word[EDGE * EDGE];
+    static uint8_t file[ROOM];
+    const char *path = scratch_path(state, "tags.tif");
+    struct image im;
+    struct photograph_record r;
+    for (size_t i = 0; i < EDGE * EDGE; i++) word[i] = (uint16_t)(i % 50 == 0 ? 1023 : 300 + i % 7);
+    for (int white = 0; white < 2; white++) {
+        const struct folder_entry entry[] = {
+            {256, 3, EDGE}, {257, 3, EDGE}, {258, 3, 16},   {259, 3, 1},           {262, 3, white ? 0 : 1},
+            {273, 4, 0},    {277, 3, 1},    {278, 3, EDGE}, {279, 4, sizeof word}, {281, 3, 0, false, 1, &largest}};
+        const size_t n = folder_build(false, entry, sizeof entry / sizeof *entry - (size_t)white, word, sizeof word,
+                                      file, sizeof file);
+        scratch_write(path, (char *)file, n);
+        read_ok(path, JOB_TRANSFER_LINEAR, &im, &r);
+        for (size_t i = 0; i < EDGE * EDGE; i++)
+            assert_true(fabs((double)im.pixel[3 * i] - (white ? 65535 - word[i] : word[i]) / 65535.0) < 1e-6);
+        image_release(&im);
+        assert_true(white ? r.saturated_share == 0.0 : fabs(r.saturated_share - 12.0 / (EDGE * EDGE)) < 1e-9);
+        assert_non_null(file_ledger_find(&r.info.ledger, white ? "photometric sense" : "MaxSampleValue"));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_exposure_of_exif),        cmocka_unit_test(test_exposure_of_tiff),
-        cmocka_unit_test(test_exposures_that_are_none), cmocka_unit_test(test_statements_of_exr),
-        cmocka_unit_test(test_primaries_of_exr),        cmocka_unit_test(test_grey_of_few_bits),
+        cmocka_unit_test(test_exposure_of_exif),
+        cmocka_unit_test(test_exposure_of_tiff),
+        cmocka_unit_test(test_exposures_that_are_none),
+        cmocka_unit_test(test_statements_of_exr),
+        cmocka_unit_test(test_primaries_of_exr),
+        cmocka_unit_test(test_grey_of_few_bits),
+        cmocka_unit_test(test_orientation),
+        cmocka_unit_test(test_tags_of_tiff),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }

@@ -5,6 +5,7 @@
 #include "optimizer/photographs/reader/photograph.h"
 #include "optimizer/photographs/rows/observation.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/stated_files.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -135,7 +136,7 @@ static void test_png(void **state)
     const char *path = scratch_path(state, "grey.png");
     memset(rgb, 128, sizeof rgb);
     for (size_t i = 0; i < 4 * 3; i++) rgb[i] = 255; /* 4 of 256 pixels saturated: 1.6 % */
-    assert_int_equal(image_write_png_rgb8(rgb, 16, 16, path, NULL), STATUS_OK);
+    stated_write_png_bytes(path, 16, 16, rgb);
     struct job_photograph p = {.scale = 1.0, .transfer = JOB_TRANSFER_SRGB, .crop_px = {0, 1, 16, 16}};
     assert_int_equal(photograph_measure(path, &p, &m, NULL), STATUS_OK);
     assert_true(fabs(m.mean_rgb[1] - pow((128.0 / 255.0 + 0.055) / 1.055, 2.4)) < 1e-6);
@@ -150,7 +151,7 @@ static void test_png(void **state)
     assert_int_equal(photograph_measure(path, &p, &m, &err), STATUS_INVALID);
     assert_true(m.record.saturated_share == 0.25);
     memset(rgb + 8 * 16 * 3, 255, 8 * 16 * 3);
-    assert_int_equal(image_write_png_rgb8(rgb, 16, 16, path, NULL), STATUS_OK);
+    stated_write_png_bytes(path, 16, 16, rgb);
     memcpy(p.crop_px, (size_t[]){0, 1, 16, 8}, sizeof p.crop_px);
     p.scale = 0.25; /* and before the scale */
     assert_int_equal(photograph_measure(path, &p, &m, &err), STATUS_OK);
@@ -158,7 +159,7 @@ static void test_png(void **state)
     memcpy(p.crop_px, (size_t[]){0, 1, 16, 16}, sizeof p.crop_px);
     p.transfer = JOB_TRANSFER_SRGB;
     memset(rgb, 255, 16 * 3 * 8);
-    assert_int_equal(image_write_png_rgb8(rgb, 16, 16, path, NULL), STATUS_OK);
+    stated_write_png_bytes(path, 16, 16, rgb);
     assert_int_equal(photograph_measure(path, &p, &m, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "saturated"));
 }
@@ -175,7 +176,7 @@ static void test_one_saturated_channel(void **state)
             struct error err = {0};
             memset(rgb, 128, sizeof rgb);
             for (size_t i = 0; i < 6; i++) rgb[3 * 40 * i + c] = (uint8_t)(255 - below); /* 6 of 256 pixels: 2.3 % */
-            assert_int_equal(image_write_png_rgb8(rgb, 16, 16, path, NULL), STATUS_OK);
+            stated_write_png_bytes(path, 16, 16, rgb);
             status s = photograph_measure(path, &p, &m, &err);
             assert_int_equal(s, below ? STATUS_OK : STATUS_INVALID);
             assert_true(m.record.saturated_share == (below ? 0.0 : 6.0 / 256.0));
