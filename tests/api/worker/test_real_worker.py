@@ -166,7 +166,7 @@ def row(text):
 BAD = {
     "truncated TIFF": ("scan.tif", lambda scan: scan[:len(scan) // 2], "scan.tif"),
     "pages of different size": ("scan.tif", lambda scan: tiff([(24, 24)] * 5 + [(24, 20)] + [(24, 24)] * 6), "page"),
-    "empty volume": ("scan.tif", lambda scan: tiff(24), "every voxel"),
+    "empty volume": ("scan.tif", lambda scan: tiff(24), "all voxels of the scan"),
     "not a TIFF": ("scan.tif", lambda scan: b"nonsense" * 100, "scan.tif"),
     "missing column": ("rows.csv", lambda scan: b"\n".join(
         b",".join(line.split(b",")[:4] + line.split(b",")[5:]) for line in TABLE.split(b"\n")), "camera_theta_deg"),
