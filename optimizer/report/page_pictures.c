@@ -1,9 +1,9 @@
-#include "optimizer/report/page_pictures.h"
 #include "base/files/durable.h"
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_rows.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/page_text.h"
+#include "optimizer/report/report_page.h"
 #include "renderer/image/image.h"
 
 #include <math.h>

@@ -1,9 +1,9 @@
-#include "optimizer/report/report_data.h"
 #include "base/clock.h"
 #include "base/files/durable.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/job_outline.h"
 #include "optimizer/job/options/option_json.h"
+#include "optimizer/report/report_page.h"
 #include "optimizer/report/result/result_json.h"
 
 #include <errno.h>

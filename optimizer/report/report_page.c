@@ -2,9 +2,7 @@
 #include "base/files/file_ledger_json.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/page_charts.h"
-#include "optimizer/report/page_pictures.h"
 #include "optimizer/report/page_text.h"
-#include "optimizer/report/report_data.h"
 #include "optimizer/report/result/profile_report.h"
 
 #include <math.h>

@@ -2,7 +2,7 @@
 
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/result/result_json.h"
-#include "optimizer/stages/run/document_fingerprint.h"
+#include "optimizer/stages/run/worker_folder.h"
 #include "renderer/estimate/rank_helper.h"
 #include "renderer/estimate/rank_orders.h"
 #include "renderer/scene/scene_pack.h"

@@ -1,6 +1,5 @@
 /* Averages of a fit's estimates at one point: linear_model_pool. */
 #include "optimizer/fit/linear/linear_gain.h"
-#include "optimizer/fit/linear/linear_pairs.h"
 #include "optimizer/fit/objective/objective.h"
 
 #include <math.h>
@@ -278,6 +277,37 @@ static void set_photograph(struct linear_model *m, const struct observation *o, 
     m->expected[row] = o->expected ? 1.0 : 0.0;
 }
 
+/* Adds the partners of configuration i in one estimate to the pairs that begin at `first`. */
+static void add_partners(struct linear_model *m, size_t first, size_t i, const struct estimate *e)
+{
+    for (uint32_t k = 0; k < e->n_partner; k++) {
+        size_t p = first;
+        while (p < m->n_pair && m->pair[p].j != e->partner[k].configuration) p++;
+        if (p == first + ESTIMATE_MAX_PARTNER) continue; /* cannot happen: all estimates have the same partners */
+        if (p == m->n_pair) m->pair[m->n_pair++] = (struct linear_pair){i, e->partner[k].configuration, 0.0};
+        m->pair[p].correlation += (double)e->n_path * (double)e->partner[k].correlation;
+    }
+}
+
+/* Fills in m->pair, rows that share their camera paths: correlations as means over all estimates, weighted by their
+ * paths. */
+static void pool_pairs(struct linear_model *m, const struct linear_history *h)
+{
+    m->n_pair = 0;
+    for (size_t i = 0; i < h->observation->n; i++) {
+        const size_t first = m->n_pair;
+        double n_path = 0.0;
+        for (size_t k = 0; k < h->n_step; k++) {
+            for (int q = 0; q < 2; q++) {
+                const struct estimate *e = &h->step[k].replica[q][i];
+                n_path += (double)e->n_path;
+                add_partners(m, first, i, e);
+            }
+        }
+        for (size_t p = first; p < m->n_pair; p++) m->pair[p].correlation /= n_path;
+    }
+}
+
 status linear_model_pool(struct linear_model *m, const struct linear_history *h, const double *x_ref, struct error *err)
 {
     status s = STATUS_OK;
@@ -295,7 +325,7 @@ status linear_model_pool(struct linear_model *m, const struct linear_history *h,
     for (size_t i = 0; i < h->observation->n; i++) pool_configuration(m, h, mean, i, carried, weight);
     for (size_t row = 0; row < m->n_row; row++) set_photograph(m, &h->observation->item[row / 3], row);
     m->n_effective /= (double)h->observation->n;
-    linear_pairs_pool(m, h);
+    pool_pairs(m, h);
     if (m->gain_sd > 0.0) linear_gain_absorb(m, h->observation);
 out:
     free(mean);

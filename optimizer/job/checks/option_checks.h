@@ -4,7 +4,21 @@
 #define SELVEDGE_OPTIMIZER_OPTION_CHECKS_H
 
 #include "base/status.h"
-#include "optimizer/job/checks/option_value.h"
+#include "optimizer/job/document/job_sections.h"
+
+#include <jansson.h>
+
+struct job_option;
+
+/* A value for a check. It and all options of earlier rows have been read. */
+struct option_value {
+    const struct job_option *row;
+    const json_t *value;
+    const char *path; /* "photographs[3].crop_px" */
+    void *target;
+    void *own; /* the section struct that target is in, which a check may complete */
+    const struct job_sections *section;
+};
 
 status job_check_document(const struct option_value *v, struct error *err);
 status job_check_sample(const struct option_value *v, struct error *err);
@@ -17,7 +31,7 @@ status job_check_axes(const struct option_value *v, struct error *err);
 status job_check_matrix(const struct option_value *v, struct error *err);
 status job_check_crop_voxel(const struct option_value *v, struct error *err);
 status job_check_filter(const struct option_value *v, struct error *err);
-/* Also makes job_document.cloth of the section and checks it. */
+/* Also makes job_cloth.description of the section and checks it. */
 status job_check_cloth(const struct option_value *v, struct error *err);
 /* Reads the numbers of the section "correction". */
 status job_check_correction(const struct option_value *v, struct error *err);

@@ -1,7 +1,7 @@
 #include "optimizer/job/options/option_reader.h"
 #include "optimizer/job/checks/job_consistency.h"
 #include "optimizer/job/checks/job_faults.h"
-#include "optimizer/job/checks/option_value.h"
+#include "optimizer/job/checks/option_checks.h"
 #include "optimizer/job/document/job_file_name.h"
 #include "optimizer/job/document/json_field.h"
 #include "optimizer/job/options/option_table.h"

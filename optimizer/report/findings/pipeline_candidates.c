@@ -1,7 +1,7 @@
 /* The next photograph: every candidate configuration of the job is rendered at the result, with derivatives, and ranked
  * by the information that it would add (next_photograph.h). */
 #include "optimizer/job/document/job_fit.h"
-#include "optimizer/report/findings/pipeline_advice.h"
+#include "optimizer/report/findings/findings.h"
 #include "optimizer/stages/fit/pipeline_cloth.h"
 #include "optimizer/stages/fit/pipeline_fit_option.h"
 #include "optimizer/stages/fit/pipeline_trace.h"

@@ -1,7 +1,7 @@
 /* The gradient certificate of a job: derivative_check.h on its own cloth, photographs and result. */
 #include "base/clock.h"
 #include "optimizer/fit/descent/trace_estimator.h"
-#include "optimizer/report/findings/pipeline_advice.h"
+#include "optimizer/report/findings/findings.h"
 #include "optimizer/stages/fit/pipeline_cloth.h"
 
 #include <math.h>

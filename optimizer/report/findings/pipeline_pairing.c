@@ -1,5 +1,5 @@
-#include "optimizer/report/findings/pipeline_pairing.h"
 #include "optimizer/fit/objective/objective.h"
+#include "optimizer/report/findings/findings.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 
 #include <math.h>

@@ -1,4 +1,4 @@
-#include "optimizer/report/findings/pipeline_skill.h"
+#include "optimizer/report/findings/findings.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 
 #include <math.h>

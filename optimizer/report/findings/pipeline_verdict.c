@@ -1,7 +1,6 @@
-#include "optimizer/report/findings/pipeline_verdict.h"
 #include "optimizer/job/document/job_fit_option.h"
 #include "optimizer/job/document/job_scan.h"
-#include "optimizer/report/findings/pipeline_advice.h"
+#include "optimizer/report/findings/findings.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 
 #include <math.h>

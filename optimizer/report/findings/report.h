@@ -50,13 +50,13 @@ struct pipeline_candidate {
     struct candidate_score score;
 };
 
-/* Two additions to the result of a model (pipeline_advice.h). */
+/* Two additions to the result of a model (findings.h). */
 struct model_advice {
     struct derivative_check certificate;  /* of the free parameters at the result */
     struct pipeline_candidate *candidate; /* as many as the document has, best first; NULL when none were asked for */
 };
 
-/* A plain BRDF fitted to the same rows, and its errors (pipeline_skill.h). */
+/* A plain BRDF fitted to the same rows, and its errors (findings.h). */
 struct pipeline_skill {
     bool measured; /* false where a row is lit by an environment too */
     struct plain_brdf brdf;

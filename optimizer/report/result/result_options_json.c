@@ -4,7 +4,7 @@
 #include "optimizer/job/document/job_setup.h"
 #include "optimizer/job/document/json_number.h"
 
-#include "optimizer/report/findings/pipeline_advice.h"
+#include "optimizer/report/findings/findings.h"
 #include "optimizer/stages/validation/pipeline_contrast.h"
 #include "optimizer/stages/validation/pipeline_discrepancy.h"
 

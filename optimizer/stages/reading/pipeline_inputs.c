@@ -21,7 +21,7 @@
 #include "optimizer/stages/reading/pipeline_profile_prior.h"
 #include "optimizer/stages/reading/pipeline_texture.h"
 #include "optimizer/stages/reading/texture_start.h"
-#include "optimizer/stages/run/document_fingerprint.h"
+#include "optimizer/stages/run/worker_folder.h"
 #include "optimizer/stages/scene/pipeline_adopt.h"
 #include "optimizer/stages/scene/pipeline_volume.h"
 #include "optimizer/stages/scene/scan_order.h"

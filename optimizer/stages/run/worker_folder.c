@@ -15,6 +15,7 @@
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
+#include <zlib.h>
 
 /* Who only looks whether a worker runs, as the doctor does, has the lock for a moment. */
 enum { MAX_ATTEMPT_BYTES = 4096, TRIES_OF_LOCK = 10 };
@@ -198,6 +199,25 @@ void worker_folder_sweep(const struct worker_folder *f)
         worker_folder_path(f, folder[i], NULL, path);
         nftw(path, remove_temporary, 16, FTW_PHYS);
     }
+}
+
+enum { PROGRAM_MAX_BYTES = 256 << 20 };
+
+/* Checksum of the running program, because another build may trace other numbers, which must not be mixed with the
+ * numbers of an earlier run. 0 where the system does not show the program. */
+static uint32_t program_sum(void)
+{
+    char *text = NULL;
+    size_t n = 0;
+    if (file_read_all("/proc/self/exe", PROGRAM_MAX_BYTES, &text, &n, NULL) != STATUS_OK) return 0;
+    uint32_t sum = (uint32_t)crc32_z(0, (const void *)text, n);
+    free(text);
+    return sum;
+}
+
+uint64_t document_fingerprint(const char *document, size_t n_bytes)
+{
+    return crc32_z(program_sum(), (const void *)document, n_bytes);
 }
 
 status worker_folder_claim_inputs(const struct worker_folder *f, uint64_t fingerprint, bool *changed, struct error *err)

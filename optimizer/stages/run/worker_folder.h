@@ -5,6 +5,7 @@
 #include "base/status.h"
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 enum { WORKER_PATH_BYTES = 4096 };
@@ -38,6 +39,10 @@ status worker_folder_replace(const struct worker_folder *f, const char *path, co
 /* Removes the temporary files in work/ and results/ that a worker left that was killed while it wrote. To be called
  * before anything is written; one that cannot be removed does no harm. */
 void worker_folder_sweep(const struct worker_folder *f);
+
+/* Checksum of the two things that a checkpoint depends on besides the input files: the text of the job document, and
+ * this build of the program. */
+uint64_t document_fingerprint(const char *document, size_t n_bytes);
 
 /* Compares the fingerprint of the inputs with the fingerprint of the run before. When it is another one (a document or
  * a file was edited by hand) or there is none, everything that was computed before is removed: work/, results/,

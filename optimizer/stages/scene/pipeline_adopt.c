@@ -3,7 +3,7 @@
 #include "base/option_id.h"
 #include "optimizer/job/document/job_limits.h"
 #include "optimizer/job/job_folder.h"
-#include "optimizer/stages/run/document_fingerprint.h"
+#include "optimizer/stages/run/worker_folder.h"
 
 #include <errno.h>
 #include <inttypes.h>

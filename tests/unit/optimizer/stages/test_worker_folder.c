@@ -1,7 +1,6 @@
 /* The inputs that a job folder's files belong to: other inputs empty the folder, but only for the worker that holds the
  * present attempt. */
 #include "optimizer/job/job_folder.h"
-#include "optimizer/stages/run/document_fingerprint.h"
 #include "optimizer/stages/run/worker_folder.h"
 #include "tests/support/scratch_folder.h"
 
