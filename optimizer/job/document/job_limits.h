@@ -10,6 +10,7 @@ enum {
     JOB_MAX_SAMPLE_BYTES = 256,
     JOB_MAX_ID_BYTES = 64, /* ids of jobs */
     JOB_MAX_PHOTOGRAPH = 1024,
+    JOB_MAX_MORE_EXPOSURES = 15, /* of a photograph */
     JOB_MAX_BOWL_MARK = 100,
     JOB_MAX_BOWL_PHOTOGRAPH = 64,
     JOB_MAX_MODEL = 32 /* more than there are models, so that a job can compare all of them */

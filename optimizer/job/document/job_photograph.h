@@ -8,8 +8,6 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { JOB_MAX_MORE_EXPOSURES = 15 };
-
 /* One more exposure of the view of a photograph. */
 struct job_exposure {
     char file[JOB_MAX_NAME_BYTES];

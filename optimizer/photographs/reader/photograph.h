@@ -13,9 +13,10 @@
 #define SELVEDGE_OPTIMIZER_PHOTOGRAPH_H
 
 #include "optimizer/job/document/job_limits.h"
-#include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/picture_words.h"
 #include "optimizer/photographs/reader/photograph_reader.h"
+
+struct job_photograph;
 
 /* Causes of errors that all photographs of a camera share: three of the color matrix for each channel of radiance, the
  * rounding of exposure times, and of f-numbers. */
