@@ -23,6 +23,7 @@ struct reconstruct_report {
     double voxel_size_m[3];
     double file_voxel_size_m[3]; /* as stated in the file; NaN if it is not */
     bool has_padding;            /* parts of the scan are unknown (scan_look.h) */
+    bool is_all_padded;          /* so many that no column of the tile is known; tile is then all zero */
     struct main_directions main; /* main and align only with option "align" */
     struct alignment align;
     bool aligned;                             /* the estimated matrix was used; it is in the options */

@@ -1,4 +1,5 @@
 /* Step "orientation": the fiber diameter, and the direction of the fiber through every voxel of material. */
+#include "base/option_id.h"
 #include "geometry/reconstruct/reconstruct.h"
 
 #include "geometry/diameter/fiber_diameter.h"
@@ -9,6 +10,8 @@
 
 #include <math.h>
 
+/* Diameters of textile fibers. */
+static const double LEAST_FIBER_UM = 2.0, MOST_FIBER_UM = 60.0;
 /* Ratio of diameters that are the same peak. */
 static const double SAME_PEAK = 1.3;
 /* Noise over the step from void to material from which on thin fibers get the usual filter: a narrow one sees more of
@@ -61,6 +64,22 @@ static status find_diameter(const struct volume *v, const struct reconstruct_opt
     return s;
 }
 
+/* Asks about the scale of a scan whose fibers are none of a textile. Who states their diameter has answered. */
+static status ask_scale(const struct volume *v, const struct reconstruct_option *option,
+                        const struct reconstruct_report *report, struct error *err)
+{
+    const double voxel_um = 1e6 * v->voxel_size_m[0], voxel = report->fiber_diameter_voxel;
+    const double um[2] = {voxel * voxel_um, report->other_diameter_voxel * voxel_um};
+    for (int i = 0; i < 2; i++)
+        if (um[i] >= LEAST_FIBER_UM && um[i] <= MOST_FIBER_UM) return STATUS_OK;
+    if (!isnan(option->fiber_diameter_voxel)) return STATUS_OK;
+    return error_set_field(
+        err, STATUS_INVALID, OPTION_VOXEL_SIZE,
+        "fibers of %.1f voxels are %.3g um thick with voxels of %.3g um, and textile fibers are 2 to "
+        "60 um: correct the voxel size, or state 'fiber_diameter_voxel' if both are right",
+        voxel, um[0], voxel_um);
+}
+
 /* Measures the diameter once more in the rescaled volume, where the scales of the filter are neither about as fine as
  * the voxels nor coarse. A peak far from the first one is another one. */
 static status measure_again(const struct volume *grid, double edge, struct thread_pool *pool,
@@ -107,6 +126,7 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
     const struct progress inner = progress_of_part(&part);
     *d = (struct direction_volume){0};
     status s = find_diameter(v, option, pool, &inner, report, err);
+    if (s == STATUS_OK) s = ask_scale(v, option, report, err);
     if (s != STATUS_OK) return s;
     const double edge = trace_grid_edge(report->fiber_diameter_voxel, v->n);
     report->trace_edge_voxel = edge;

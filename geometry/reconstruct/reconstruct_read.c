@@ -211,16 +211,22 @@ static status estimate_alignment(const struct volume *stored, struct reconstruct
     return STATUS_OK;
 }
 
-/* With option "crop" chooses the box that tiles best. After any matrix measures how much of the tile lies in the
- * scan. */
+/* With option "crop" chooses the box that tiles best. After any matrix, and with padding, measures how much of the
+ * tile lies in the scan. A scan in which every column meets padding has no such box, and is kept whole without the
+ * option. */
 static status choose_crop(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
                           const struct progress *progress, struct reconstruct_report *report, struct error *err)
 {
     struct density_modes m;
-    if (!o->crop && is_identity(o->matrix)) return STATUS_OK;
+    if (!o->crop && is_identity(o->matrix) && !report->has_padding) return STATUS_OK;
     status s = density_modes_find(v, &m, err);
     if (s == STATUS_OK)
         s = tile_crop_find(v, m.half, m.low, o->crop ? o->crop_keep : 1.0, pool, progress, &report->tile, err);
+    report->is_all_padded = s == STATUS_INVALID && !o->crop && report->has_padding;
+    if (report->is_all_padded) {
+        s = STATUS_OK;
+        if (err != NULL) *err = (struct error){0};
+    }
     if (s != STATUS_OK || !o->crop) return s;
     memcpy(o->crop_voxel, report->tile.box, sizeof o->crop_voxel);
     volume_crop(v, o->crop_voxel);

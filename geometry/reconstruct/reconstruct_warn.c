@@ -5,19 +5,6 @@
 #include <math.h>
 #include <stdio.h>
 
-static void warn_spacing(const struct warning_sink *warn, const struct reconstruct_option *o,
-                         const struct reconstruct_report *r)
-{
-    for (int a = 0; a < 3; a++) {
-        double stated = r->file_voxel_size_m[a], given = o->voxel_size_m[a];
-        if (!(stated > 0.0) || !(given > 0.0) || fabs(given / stated - 1.0) < 0.01) continue;
-        warning_send(warn, OPTION_VOXEL_SIZE,
-                     "the job says %.4g um along %c, the file says %.4g um; the job's value is used", given * 1e6,
-                     "xyz"[a], stated * 1e6);
-        return;
-    }
-}
-
 static void warn_alignment(const struct warning_sink *warn, const struct reconstruct_option *o,
                            const struct reconstruct_report *r)
 {
@@ -41,11 +28,17 @@ static void warn_alignment(const struct warning_sink *warn, const struct reconst
                      r->align.se_deg);
     const size_t *valid = r->tile.valid, *box = o->crop_voxel; /* valid counts in the cropped box */
     double share = (double)(valid[2] - valid[0]) * (double)(valid[3] - valid[1]) / ((double)r->n[0] * (double)r->n[1]);
-    if (!o->crop && valid[2] > 0 && share < 0.98)
+    if (r->is_all_padded)
+        warning_send(warn, OPTION_CROP_BOX,
+                     "every column of the tile meets voxels without a measurement (padding), so the tile is nowhere "
+                     "complete: crop it in z");
+    else if (!o->crop && valid[2] > 0 && share < 0.98)
         warning_send(
             warn, OPTION_CROP_BOX,
-            "the matrix brings corners from outside of the scan into the tile, so only %.0f %% of it is complete: crop "
-            "to x %zu..%zu, y %zu..%zu, or give 'crop' as \"auto\"",
+            "%s into the tile, so only %.0f %% of it is complete: crop to x %zu..%zu, y %zu..%zu, or give 'crop' as "
+            "\"auto\"",
+            r->has_padding ? "padding, which is no measurement, reaches"
+                           : "the matrix brings corners from outside of the scan",
             100.0 * share, box[0] + valid[0], box[0] + valid[2], box[1] + valid[1], box[1] + valid[3]);
     for (int a = 0; a < 2; a++)
         if (o->crop && r->tile.mismatch[a] > TILE_MOST_MISMATCH)
@@ -78,7 +71,6 @@ static void warn_lumens(const struct warning_sink *warn, const struct reconstruc
 void reconstruct_warn_volume(const struct reconstruct_option *o, const struct reconstruct_report *r,
                              const struct warning_sink *warn)
 {
-    warn_spacing(warn, o, r);
     warn_alignment(warn, o, r);
     if (r->separability < 0.7)
         warning_send(

@@ -33,7 +33,7 @@ static struct reconstruct_option clean_option(void)
 static struct reconstruct_report clean_report(void)
 {
     struct reconstruct_report r = {.n = {100, 100, 50}, .separability = 0.9, .noise.scan_sd = 0.2, .dice = 0.9};
-    for (int a = 0; a < 3; a++) r.voxel_size_m[a] = r.file_voxel_size_m[a] = 2e-6;
+    for (int a = 0; a < 3; a++) r.voxel_size_m[a] = 2e-6;
     r.fiber_diameter_voxel = 7.0;
     r.other_diameter_voxel = r.other_diameter_noise_share = NAN;
     r.grade.verdict = GRADE_RESOLVED;
@@ -51,31 +51,23 @@ static void expect_volume(const struct reconstruct_option *o, const struct recon
     if (strstr(t.text, part) == NULL) fail_msg("'%s' is not in '%s'", part, t.text);
 }
 
-static void test_spacing(void **state)
+static void test_padding(void **state)
 {
-    struct reconstruct_option o = clean_option();
+    const struct reconstruct_option o = clean_option();
     struct reconstruct_report r = clean_report();
     (void)state;
+    r.has_padding = true;
+    r.tile = (struct tile_crop){.valid = {0, 0, 100, 100}};
     expect_volume(&o, &r, NULL, NULL);
-    for (int a = 0; a < 3; a++) {
-        static const char *const said[] = {"3 um along x, the file says 2 um", "3 um along y, the file says 2 um",
-                                           "3 um along z, the file says 2 um"};
-        o = clean_option();
-        o.voxel_size_m[a] = 2e-6 * 1.009;
-        expect_volume(&o, &r, NULL, NULL);
-        o.voxel_size_m[a] = 3e-6;
-        expect_volume(&o, &r, OPTION_VOXEL_SIZE, said[a]);
-        o.voxel_size_m[a] = 2e-6 / 1.02;
-        expect_volume(&o, &r, OPTION_VOXEL_SIZE, "the job's value is used");
-        o.voxel_size_m[a] = 0.0; /* not given */
-        expect_volume(&o, &r, NULL, NULL);
-        o.voxel_size_m[a] = 3e-6;
-        r.file_voxel_size_m[a] = NAN; /* not stated */
-        expect_volume(&o, &r, NULL, NULL);
-        r.file_voxel_size_m[a] = 2e-6;
-    }
-    o.voxel_size_m[0] = o.voxel_size_m[1] = 5e-6; /* both are wrong: one warning is enough */
-    expect_volume(&o, &r, OPTION_VOXEL_SIZE, "along x");
+    r.tile = (struct tile_crop){.valid = {15, 20, 85, 80}};
+    expect_volume(&o, &r, OPTION_CROP_BOX,
+                  "padding, which is no measurement, reaches into the tile, so only 42 % of it is complete: crop to x "
+                  "25..95, y 40..100");
+    r.has_padding = false;
+    expect_volume(&o, &r, OPTION_CROP_BOX, "the matrix brings corners from outside of the scan into the tile");
+    r = clean_report();
+    r.has_padding = r.is_all_padded = true;
+    expect_volume(&o, &r, OPTION_CROP_BOX, "the tile is nowhere complete");
 }
 
 static void test_alignment(void **state)
@@ -250,7 +242,7 @@ static void test_lumens(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_lumens), cmocka_unit_test(test_spacing),       cmocka_unit_test(test_alignment),
+        cmocka_unit_test(test_lumens), cmocka_unit_test(test_padding),       cmocka_unit_test(test_alignment),
         cmocka_unit_test(test_crop),   cmocka_unit_test(test_densities),     cmocka_unit_test(test_fibers),
         cmocka_unit_test(test_grade),  cmocka_unit_test(test_unseen_lumens),
     };
