@@ -19,6 +19,7 @@ struct job_setup {
     bool has_color, has_chart, has_white;
     struct job_photograph chart, white;
     double chart_corner_px[8]; /* NaN: found in the picture */
+    double chart_cloth_px[2];  /* place of the cloth in the chart's picture; NaN: the middle of the chart */
     bool chart_from_2014;      /* made in November 2014 or later */
     double white_reflectance[3];
     double environment_rgb[3];

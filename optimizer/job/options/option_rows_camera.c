@@ -25,7 +25,7 @@ const struct job_option option_rows_camera[] = {
      .left_out = "this or `white`",
      .meaning =
          "A ColorChecker Classic of 24 patches that lies flat in the place of the cloth. A 3 x 3 matrix is fitted "
-         "to it that matches the white patch exactly."},
+         "to it, together with the fall of the lamp's light over it."},
     {.path = "color.chart.file",
      .kind = OPTION_FILE_NAME,
      .id = OPTION_COLOR_CHART,
@@ -57,6 +57,14 @@ const struct job_option option_rows_camera[] = {
      .allowed = "x, y of four points",
      .meaning = "Outer corners of the corner patches, in this order: dark skin, bluish green, black, white (the first "
                 "patch, then around the chart along its rows)."},
+    {.path = "color.chart.cloth_px",
+     .kind = OPTION_NUMBERS,
+     NUMBERS_INTO(setup, chart_cloth_px),
+     RANGE(-1e6, 1e6),
+     .unit = "pixels",
+     .left_out = "the middle of the chart",
+     .allowed = "x, y",
+     .meaning = "Where the cloth lies in this picture: scale and light are those of this place."},
     {.path = "color.white",
      .kind = OPTION_SECTION,
      INTO(setup, has_white),

@@ -1,5 +1,6 @@
 #include "optimizer/photographs/camera/color_chart.h"
 
+#include "base/option_id.h"
 #include "geometry/vision/vision_chart.h"
 #include "optimizer/photographs/camera/color_matrix.h"
 
@@ -12,43 +13,8 @@
 static const double patch = 2.5, gap = 0.25;
 static const double middle = 0.5; /* share of a patch's edge that is averaged */
 enum { SAMPLES = 24, PARTS = 4, PICTURE_PATCH_PX = 60, LEAST_PATCH_PX = 6 };
-static const double largest_mean_delta_e = 12.0;
-
-static const double reference_lab[2][COLOR_CHART_PATCHES][3] = {
-    {
-        /* made before November 2014 */
-        {37.986, 13.555, 14.059},  {65.711, 18.130, 17.810},   {49.927, -4.880, -21.925}, {43.139, -13.095, 21.905},
-        {55.112, 8.844, -25.399},  {70.719, -33.397, -0.199},  {62.661, 36.067, 57.096},  {40.020, 10.410, -45.964},
-        {51.124, 48.239, 16.248},  {30.325, 22.976, -21.587},  {72.532, -23.709, 57.255}, {71.941, 19.363, 67.857},
-        {28.778, 14.179, -50.297}, {55.261, -38.342, 31.370},  {42.101, 53.378, 28.190},  {81.733, 4.039, 79.819},
-        {51.935, 49.986, -14.574}, {51.038, -28.631, -28.638}, {96.539, -0.425, 1.186},   {81.257, -0.638, -0.335},
-        {66.766, -0.734, -0.504},  {50.867, -0.153, -0.270},   {35.656, -0.421, -1.231},  {20.461, -0.079, -0.973},
-    },
-    {
-        /* made in November 2014 or later */
-        {37.54, 14.37, 14.92},  {64.66, 19.27, 17.50},   {49.32, -3.82, -22.54}, {43.46, -12.74, 22.72},
-        {54.94, 9.61, -24.79},  {70.48, -32.26, -0.37},  {62.73, 35.83, 56.50},  {39.43, 10.75, -45.17},
-        {50.57, 48.64, 16.67},  {30.10, 22.54, -20.87},  {71.77, -24.13, 58.19}, {71.51, 18.24, 67.37},
-        {28.37, 15.42, -49.80}, {54.38, -39.72, 32.27},  {42.43, 51.05, 28.62},  {81.80, 2.67, 80.41},
-        {50.63, 51.28, -14.12}, {49.57, -29.71, -28.32}, {95.19, -1.03, 2.93},   {81.29, -0.57, 0.44},
-        {66.89, -0.75, -0.06},  {50.76, -0.13, 0.14},    {35.63, -0.46, -0.48},  {20.64, 0.07, -0.46},
-    },
-};
-
-static double from_lab(double f) { return f > 6.0 / 29.0 ? f * f * f : (116.0 * f - 16.0) * 27.0 / 24389.0; }
-
-void color_chart_reference(bool from_2014, size_t i, double rgb[3])
-{
-    static const double white_d50[3] = {0.96422, 1.0, 0.82521};
-    /* XYZ under D50 to linear sRGB, adapted by Bradford (Lindbloom) */
-    static const double to_rgb[9] = {3.1338561, -1.6168667, -0.4906146, -0.9787684, 1.9161415,
-                                     0.0334540, 0.0719453,  -0.2289914, 1.4052427};
-    const double *lab = reference_lab[from_2014][i];
-    double fy = (lab[0] + 16.0) / 116.0;
-    double xyz[3] = {white_d50[0] * from_lab(fy + lab[1] / 500.0), white_d50[1] * from_lab(fy),
-                     white_d50[2] * from_lab(fy - lab[2] / 200.0)};
-    color_matrix_apply(to_rgb, xyz, rgb);
-}
+static const double warn_delta_e = 4.0, refuse_delta_e = 6.0; /* means of CIEDE2000 */
+static const double warn_light = 0.1;
 
 /* ---- where it is ---- */
 
@@ -164,47 +130,165 @@ static status measure_patch(struct color_chart *k, const struct image *im, size_
             if ((double)p[c] >= saturation) k->saturated[i] = true;
         }
     }
-    for (size_t c = 0; c < 3; c++) k->measured_rgb[i][c] = sum[c] / (SAMPLES * SAMPLES);
+    for (size_t c = 0; c < 3; c++) {
+        k->measured_rgb[i][c] = sum[c] / (SAMPLES * SAMPLES);
+        if (!(sum[c] > 0.0)) k->saturated[i] = true; /* cut off at black, as colors outside of sRGB are */
+    }
     set_variance(k, i, (const double(*)[3])part);
     return STATUS_OK;
 }
 
-/* Fits the matrix to the patches that are not saturated. */
-static status fit(struct color_chart *k, struct error *err)
+/* Place of point (u, v) of patch i: from -1 to 1 along the chart's length, in the same unit along its height. */
+static void place_on_chart(size_t i, double place[2])
 {
-    double measured[COLOR_CHART_PATCHES][3], wanted[COLOR_CHART_PATCHES][3], var[COLOR_CHART_PATCHES][3];
-    size_t n = 0, white = 0;
-    for (size_t i = 0; i < COLOR_CHART_PATCHES; i++) {
-        if (k->saturated[i]) continue;
-        if (i == COLOR_CHART_WHITE) white = n;
-        memcpy(var[n], k->patch_var[i], sizeof var[n]);
-        memcpy(measured[n], k->measured_rgb[i], sizeof measured[n]);
-        memcpy(wanted[n++], k->wanted_rgb[i], sizeof wanted[0]);
-    }
-    status s = color_matrix_fit(n, (const double(*)[3])measured, (const double(*)[3])wanted, white, k->matrix, err);
-    if (s == STATUS_OK)
-        color_matrix_covariance(n, (const double(*)[3])measured, (const double(*)[3])wanted, white, k->matrix,
-                                (const double(*)[3])var, k->matrix_cov);
-    return s;
+    const double width = 6.0 * patch + 5.0 * gap, height = 4.0 * patch + 3.0 * gap;
+    place[0] = 2.0 * (((double)(i % COLOR_CHART_COLUMNS)) * (patch + gap) + 0.5 * patch) / width - 1.0;
+    place[1] = (2.0 * ((double)(i / COLOR_CHART_COLUMNS) * (patch + gap) + 0.5 * patch) - height) / width;
 }
 
-/* Color differences before and after, as under a lamp that makes a perfect white 1. Returns the mean one after. */
-static double compare(struct color_chart *k, double cos_theta)
+/* Place of a pixel, by Newton's method from the middle. False where it lies far off the chart. */
+static bool place_of_pixel(const double corner_px[8], const double at_px[2], double place[2])
 {
-    double sum = 0.0, gain = k->wanted_rgb[COLOR_CHART_WHITE][1] / k->measured_rgb[COLOR_CHART_WHITE][1];
-    for (size_t i = 0; i < COLOR_CHART_PATCHES; i++) {
-        double before[3], after[3], wanted[3];
-        color_matrix_apply(k->matrix, k->measured_rgb[i], after);
-        for (size_t c = 0; c < 3; c++) {
-            before[c] = k->measured_rgb[i][c] * gain / cos_theta;
-            after[c] /= cos_theta;
-            wanted[c] = k->wanted_rgb[i][c] / cos_theta;
-        }
-        k->delta_e_before[i] = color_delta_e_2000(before, wanted);
-        k->delta_e_after[i] = color_delta_e_2000(after, wanted);
-        sum += k->delta_e_after[i];
+    static const double step = 1e-4;
+    const double width = 6.0 * patch + 5.0 * gap, height = 4.0 * patch + 3.0 * gap;
+    double uv[2] = {0.5, 0.5};
+    for (int round = 0; round < 20; round++) {
+        double here[2], right[2], down[2];
+        color_chart_place(corner_px, uv[0], uv[1], here);
+        color_chart_place(corner_px, uv[0] + step, uv[1], right);
+        color_chart_place(corner_px, uv[0], uv[1] + step, down);
+        const double a = (right[0] - here[0]) / step, b = (down[0] - here[0]) / step, c = (right[1] - here[1]) / step,
+                     d = (down[1] - here[1]) / step, det = a * d - b * c, x = at_px[0] - here[0],
+                     y = at_px[1] - here[1];
+        uv[0] += (d * x - b * y) / det;
+        uv[1] += (a * y - c * x) / det;
     }
-    return sum / COLOR_CHART_PATCHES;
+    place[0] = 2.0 * uv[0] - 1.0;
+    place[1] = (2.0 * uv[1] - 1.0) * height / width;
+    return fabs(uv[0] - 0.5) <= 1.0 && fabs(uv[1] - 0.5) <= 1.0;
+}
+
+/* The patches that are not saturated, as the fit takes them. */
+struct used_patches {
+    double measured[COLOR_CHART_PATCHES][3], wanted[COLOR_CHART_PATCHES][3], var[COLOR_CHART_PATCHES][3],
+        place[COLOR_CHART_PATCHES][2];
+    size_t of[COLOR_CHART_PATCHES];
+    struct chart_patches list;
+};
+
+static status use_patches(const struct color_chart *k, double cos_theta, struct used_patches *u, struct error *err)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < COLOR_CHART_PATCHES; i++) {
+        if (k->saturated[i]) continue;
+        u->of[n] = i;
+        memcpy(u->var[n], k->patch_var[i], sizeof u->var[n]);
+        memcpy(u->measured[n], k->measured_rgb[i], sizeof u->measured[n]);
+        memcpy(u->wanted[n], k->wanted_rgb[i], sizeof u->wanted[n]);
+        place_on_chart(i, u->place[n++]);
+    }
+    u->list = (struct chart_patches){n,
+                                     (const double(*)[3])u->measured,
+                                     (const double(*)[3])u->wanted,
+                                     (const double(*)[3])u->var,
+                                     (const double(*)[2])u->place,
+                                     {0.0, 0.0},
+                                     cos_theta};
+    if (isnan(k->scale_at_px[0]) || place_of_pixel(k->corner_px, k->scale_at_px, u->list.scale_at)) return STATUS_OK;
+    return error_set(err, STATUS_INVALID, "the cloth's place (%g, %g) is more than half a chart away from the chart",
+                     k->scale_at_px[0], k->scale_at_px[1]);
+}
+
+/* Difference of a radiance and the wanted one, as under a lamp that makes a perfect white 1. */
+static double difference(const struct color_chart *k, size_t i, const double rgb[3], double cos_theta)
+{
+    double own[3], wanted[3];
+    for (size_t c = 0; c < 3; c++) {
+        own[c] = rgb[c] / cos_theta;
+        wanted[c] = k->wanted_rgb[i][c] / cos_theta;
+    }
+    return color_delta_e_2000(own, wanted);
+}
+
+/* Sets the color differences. Saturated patches have none of the matrix of the others. */
+static void compare(struct color_chart *k, const struct used_patches *u, double factor, double cos_theta)
+{
+    double least = INFINITY, most = 0.0;
+    k->worst = u->of[0];
+    for (size_t i = 0; i < COLOR_CHART_PATCHES; i++) {
+        double before[3], after[3], place[2];
+        place_on_chart(i, place);
+        k->light[i] = chart_fit_light(&k->fit, place);
+        least = fmin(least, k->light[i]);
+        most = fmax(most, k->light[i]);
+        color_matrix_apply(k->fit.matrix, k->measured_rgb[i], after);
+        for (size_t c = 0; c < 3; c++) {
+            before[c] = k->measured_rgb[i][c] * factor / k->light[i];
+            after[c] /= k->light[i];
+        }
+        k->delta_e_before[i] = difference(k, i, before, cos_theta);
+        k->delta_e_after[i] = k->delta_e_left_out[i] = difference(k, i, after, cos_theta);
+    }
+    for (size_t j = 0; j < u->list.n; j++) {
+        double rgb[3];
+        if (!chart_fit_left_out(&u->list, j, rgb)) continue;
+        k->delta_e_left_out[u->of[j]] = difference(k, u->of[j], rgb, cos_theta);
+        if (k->delta_e_left_out[u->of[j]] > k->delta_e_left_out[k->worst]) k->worst = u->of[j];
+    }
+    k->light_range = least > 0.0 ? most / least - 1.0 : INFINITY;
+}
+
+double color_chart_mean(const double delta_e[COLOR_CHART_PATCHES])
+{
+    double sum = 0.0;
+    for (size_t i = 0; i < COLOR_CHART_PATCHES; i++) sum += delta_e[i] / COLOR_CHART_PATCHES;
+    return sum;
+}
+
+static status judge(const struct color_chart *k, const struct warning_sink *warn, struct error *err)
+{
+    const double left_out = color_chart_mean(k->delta_e_left_out), before = color_chart_mean(k->delta_e_before);
+    const double mean = fmin(left_out, k->matrix_used ? left_out : before);
+    if (!(mean <= refuse_delta_e))
+        return error_set(err, STATUS_INVALID,
+                         "its colors are not those of a ColorChecker: by the matrix of the other patches each differs "
+                         "by %.1f (CIEDE2000) in the mean, '%s' by %.0f; check the order of the corners, shadows, "
+                         "reflections and the edition",
+                         mean, color_chart_patch_name(k->worst), k->delta_e_left_out[k->worst]);
+    if (mean > warn_delta_e)
+        warning_send(warn, OPTION_COLOR_CHART,
+                     "by the matrix of the other patches each patch of the color chart differs by %.1f (CIEDE2000) in "
+                     "the mean, '%s' by %.0f, where a good photograph has 0.2 to 3: check the edition, shadows and "
+                     "reflections",
+                     mean, color_chart_patch_name(k->worst), k->delta_e_left_out[k->worst]);
+    if (!k->matrix_used && left_out > before + 0.5)
+        warning_send(warn, OPTION_COLOR_CHART,
+                     "the matrix of the color chart makes colors worse (CIEDE2000 %.1f in the mean, %.1f without it) "
+                     "and is not used: one factor applies to all channels",
+                     left_out, before);
+    if (k->light_range > warn_light)
+        warning_send(warn, OPTION_COLOR_CHART,
+                     "the lamp's light falls by %.0f %% over the color chart, which is corrected; the scale holds %s",
+                     100.0 * (1.0 - 1.0 / (1.0 + k->light_range)),
+                     isnan(k->scale_at_px[0]) ? "in its middle" : "at 'cloth_px'");
+    return STATUS_OK;
+}
+
+/* Fits matrix and light, and judges them. */
+static status fit(struct color_chart *k, double cos_theta, const struct warning_sink *warn, struct error *err)
+{
+    struct used_patches u;
+    status s = use_patches(k, cos_theta, &u, err);
+    if (s == STATUS_OK) s = chart_fit_patches(&u.list, &k->fit, err);
+    if (s != STATUS_OK) return s;
+    const double factor = chart_fit_factor(&u.list, &k->fit);
+    compare(k, &u, factor, cos_theta);
+    k->matrix_used = color_chart_mean(k->delta_e_left_out) <= color_chart_mean(k->delta_e_before);
+    if (!k->matrix_used) { /* the covariance of the matrix stays: the factor is at least as good */
+        for (size_t j = 0; j < 9; j++) k->fit.matrix[j] = j % 4 == 0 ? factor : 0.0;
+        memcpy(k->delta_e_after, k->delta_e_before, sizeof k->delta_e_after);
+    }
+    return judge(k, warn, err);
 }
 
 static status check_size(const double corner_px[8], struct error *err)
@@ -220,25 +304,20 @@ static status check_size(const double corner_px[8], struct error *err)
 }
 
 status color_chart_measure(struct color_chart *k, const struct image *im, double saturation, double light_theta_rad,
-                           struct error *err)
+                           const struct warning_sink *warn, struct error *err)
 {
     status s = check_size(k->corner_px, err);
+    k->white = 0;
     for (size_t i = 0; i < COLOR_CHART_PATCHES && s == STATUS_OK; i++) {
         color_chart_reference(k->from_2014, i, k->wanted_rgb[i]);
         for (size_t c = 0; c < 3; c++) k->wanted_rgb[i][c] *= cos(light_theta_rad);
+        if (k->wanted_rgb[i][1] > k->wanted_rgb[k->white][1]) k->white = i;
         s = measure_patch(k, im, i, saturation, err);
     }
     if (s != STATUS_OK) return s;
-    if (k->saturated[COLOR_CHART_WHITE])
+    if (k->saturated[k->white])
         return error_set(err, STATUS_INVALID, "its white patch is saturated: expose for less light");
-    s = fit(k, err);
-    if (s != STATUS_OK) return s;
-    double mean = compare(k, cos(light_theta_rad));
-    if (mean <= largest_mean_delta_e) return STATUS_OK;
-    return error_set(err, STATUS_INVALID,
-                     "its colors are not those of a ColorChecker: after the matrix they differ by %.0f (CIEDE2000) in "
-                     "the mean; check the order of the corners, shadows and reflections",
-                     mean);
+    return fit(k, cos(light_theta_rad), warn, err);
 }
 
 status color_chart_picture(const struct color_chart *k, const struct image *im, struct image *picture,
@@ -257,7 +336,7 @@ status color_chart_picture(const struct color_chart *k, const struct image *im, 
             if (fabs(in_x - 0.5) < 0.2 && fabs(in_y - 0.5) < 0.2)
                 memcpy(rgb, k->wanted_rgb[i], sizeof rgb);
             else if (p != NULL)
-                color_matrix_apply(k->matrix, (double[3]){(double)p[0], (double)p[1], (double)p[2]}, rgb);
+                color_matrix_apply(k->fit.matrix, (double[3]){(double)p[0], (double)p[1], (double)p[2]}, rgb);
             for (size_t c = 0; c < 3; c++) picture->pixel[3 * (y * w + x) + c] = (float)rgb[c];
         }
     return s;

@@ -33,7 +33,9 @@ static void apply_color(const struct photograph_process *k, struct image *im, st
     const size_t n = im->width * im->height;
     double out[3] = {0}, mean[3] = {0};
     for (size_t i = 0; i < 3 * n; i++) mean[i % 3] += (double)im->pixel[i] / (double)n;
-    for (size_t c = 0; c < 3; c++) color_matrix_error(k->matrix_cov[c], mean, r->color_error[c] + 3 * c);
+    double error[3][COLOR_MATRIX_CAUSES];
+    color_matrix_error(k->matrix_cov, mean, error);
+    for (size_t c = 0; c < 3; c++) memcpy(r->color_error[c], error[c], sizeof error[c]);
     color_matrix_apply_image(k->matrix, im);
     for (size_t c = 0; c < 9; c++)
         out[c / 3] += k->matrix[c] * k->matrix[c] * r->noise_se_rgb[c % 3] * r->noise_se_rgb[c % 3];
@@ -134,17 +136,19 @@ static status load_chart(struct photograph_process *k, const struct job_setup *s
     status s = photograph_develop(k, folder, &setup->chart, &im, &r, err);
     if (s != STATUS_OK) return s;
     memcpy(k->chart.corner_px, setup->chart_corner_px, sizeof k->chart.corner_px);
+    memcpy(k->chart.scale_at_px, setup->chart_cloth_px, sizeof k->chart.scale_at_px);
     k->chart.from_2014 = setup->chart_from_2014;
     s = color_chart_find(&im, k->chart.corner_px, &k->chart.found_automatically, err);
     if (s == STATUS_NOT_FOUND)
         s = error_set(err, STATUS_INVALID, "no chart was found: give the corners of its patches ('corners_px')");
     if (s == STATUS_OK)
-        s = color_chart_measure(&k->chart, &im, saturation_of(&r), setup->chart.light_theta_deg * RAD_PER_DEG, err);
+        s = color_chart_measure(&k->chart, &im, saturation_of(&r), setup->chart.light_theta_deg * RAD_PER_DEG, k->warn,
+                                err);
     if (s == STATUS_OK) s = color_chart_picture(&k->chart, &im, &k->chart_picture, err);
     image_release(&im);
     if (s != STATUS_OK) return error_prefix(err, s, "cannot use color chart '%s'", setup->chart.file);
-    memcpy(k->matrix, k->chart.matrix, sizeof k->matrix);
-    memcpy(k->matrix_cov, k->chart.matrix_cov, sizeof k->matrix_cov);
+    memcpy(k->matrix, k->chart.fit.matrix, sizeof k->matrix);
+    memcpy(k->matrix_cov, k->chart.fit.cov, sizeof k->matrix_cov);
     k->color_info = r.info;
     k->color_exposure = (struct exposure_reference){r.scale_s, r.info.aperture};
     return STATUS_OK;
@@ -166,7 +170,7 @@ static status load_white(struct photograph_process *k, const struct job_setup *s
             return error_set(err, STATUS_INVALID, "cannot use white reference '%s': it is black in a channel",
                              setup->white.file);
         k->matrix[4 * c] = setup->white_reflectance[c] * cos_theta / mean.mean_rgb[c];
-        k->matrix_cov[c][4 * c] = pow(k->matrix[4 * c] * mean.se_rgb[c] / mean.mean_rgb[c], 2.0);
+        k->matrix_cov[4 * c * 10] = pow(k->matrix[4 * c] * mean.se_rgb[c] / mean.mean_rgb[c], 2.0);
     }
     k->color_info = mean.record.info;
     k->color_exposure = (struct exposure_reference){mean.record.scale_s, mean.record.info.aperture};

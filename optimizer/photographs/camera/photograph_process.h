@@ -32,11 +32,12 @@ struct photograph_process {
     struct dark_mean *dark;
     struct lens lens; /* of the rig, as the markers */
     struct marker_board board;
-    double lamp_distance_cm; /* that chart, white reference and scale belong to; NaN: does not matter */
-    bool has_color;          /* matrix: from the camera's rgb, over its exposure, to radiances */
+    double lamp_distance_cm;         /* that chart, white reference and scale belong to; NaN: does not matter */
+    const struct warning_sink *warn; /* receives doubts about the chart, of the caller; NULL: not wanted */
+    bool has_color;                  /* matrix: from the camera's rgb, over its exposure, to radiances */
     double matrix[9];
-    double matrix_cov[3][9];           /* covariance of each row of the matrix; rows are taken to be independent */
-    struct photograph_info color_info; /* of the photograph of the chart or of the white reference */
+    double matrix_cov[81];                    /* covariance of its elements */
+    struct photograph_info color_info;        /* of the photograph of the chart or of the white reference */
     struct exposure_reference color_exposure; /* of the same */
     struct color_chart chart;                 /* with has_color and the document's has_chart */
     struct image chart_picture;               /* color_chart_picture; no pixels without a chart */

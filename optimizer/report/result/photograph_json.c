@@ -29,11 +29,14 @@ json_t *photograph_record_json(const struct photograph_record *r)
 static json_t *patch_json(const struct color_chart *k, size_t i)
 {
     double rgb[3];
-    color_matrix_apply(k->matrix, k->measured_rgb[i], rgb);
-    return json_pack("{s:o, s:o, s:o, s:o, s:o, s:b}", "camera", json_number_list(k->measured_rgb[i], 3, 1.0),
-                     "measured", json_number_list(rgb, 3, 1.0), "reference", json_number_list(k->wanted_rgb[i], 3, 1.0),
-                     "delta_e_before", json_number(k->delta_e_before[i]), "delta_e_after",
-                     json_number(k->delta_e_after[i]), "saturated", (int)k->saturated[i]);
+    color_matrix_apply(k->fit.matrix, k->measured_rgb[i], rgb);
+    for (size_t c = 0; c < 3; c++) rgb[c] /= k->light[i];
+    return json_pack("{s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:b}", "name", color_chart_patch_name(i), "camera",
+                     json_number_list(k->measured_rgb[i], 3, 1.0), "measured", json_number_list(rgb, 3, 1.0),
+                     "reference", json_number_list(k->wanted_rgb[i], 3, 1.0), "delta_e_before",
+                     json_number(k->delta_e_before[i]), "delta_e_after", json_number(k->delta_e_after[i]),
+                     "delta_e_left_out", json_number(k->delta_e_left_out[i]), "light", json_number(k->light[i]),
+                     "saturated", (int)k->saturated[i]);
 }
 
 static json_t *mean_and_largest(const double *v)
@@ -60,6 +63,11 @@ json_t *photograph_color_json(const struct photograph_process *k, const struct j
     json_object_set_new(json, "corners_px", json_number_list(k->chart.corner_px, 8, 1.0));
     json_object_set_new(json, "delta_e_2000_before", mean_and_largest(k->chart.delta_e_before));
     json_object_set_new(json, "delta_e_2000_after", mean_and_largest(k->chart.delta_e_after));
+    json_object_set_new(json, "delta_e_2000_left_out", mean_and_largest(k->chart.delta_e_left_out));
+    json_object_set_new(json, "worst_patch", json_string(color_chart_patch_name(k->chart.worst)));
+    json_object_set_new(json, "matrix_used", json_boolean(k->chart.matrix_used));
+    json_object_set_new(json, "light_range", json_number(k->chart.light_range));
+    json_object_set_new(json, "scale_at", json_string(isnan(k->chart.scale_at_px[0]) ? "middle" : "cloth_px"));
     json_object_set_new(json, "patches", patches);
     json_object_set_new(json, "picture", json_string("pictures/color-chart.png"));
     return json;

@@ -58,6 +58,7 @@ static status load_observations(const struct stage_tools *tools, struct job_inpu
     struct uneven_photographs uneven = {.tools = tools};
     worker_folder_path(tools->folder, JOB_FOLDER_INPUT, NULL, path);
     in->rows.process.files = in->files;
+    in->rows.process.warn = &tools->warn;
     status s = photograph_process_load(&in->rows.process, in->doc->setup, in->doc->rows, path, err);
     if (s == STATUS_OK)
         s = observation_set_load(in->section.setup, in->section.rows, in->section.fit, path, &in->rows.process,

@@ -123,6 +123,13 @@ static int preview_files(const struct camera_option *o, const struct job_photogr
     return exit_code;
 }
 
+static void print_warning(void *context, const char *option, const char *text)
+{
+    (void)context;
+    (void)option;
+    printf("warning: %s\n", text);
+}
+
 static void print_color(const struct photograph_process *k)
 {
     if (!k->has_color) return;
@@ -131,13 +138,14 @@ static void print_color(const struct photograph_process *k)
         printf("  %-14s %10.4g %10.4g %10.4g\n", i == 0 ? "matrix" : "", k->matrix[3 * i], k->matrix[3 * i + 1],
                k->matrix[3 * i + 2]);
     if (k->chart_picture.pixel == NULL) return;
-    double before = 0.0, after = 0.0;
-    for (size_t i = 0; i < COLOR_CHART_PATCHES; i++) {
-        before += k->chart.delta_e_before[i] / COLOR_CHART_PATCHES;
-        after += k->chart.delta_e_after[i] / COLOR_CHART_PATCHES;
-    }
-    printf("  %-14s %s; CIEDE2000 %.2f before, %.2f after the matrix\n", "chart",
-           k->chart.found_automatically ? "found" : "at the corners given", before, after);
+    const struct color_chart *c = &k->chart;
+    printf("  %-14s %s; CIEDE2000 %.2f before, %.2f after the matrix%s\n", "chart",
+           c->found_automatically ? "found" : "at the corners given", color_chart_mean(c->delta_e_before),
+           color_chart_mean(c->delta_e_after), c->matrix_used ? "" : " (not used: one factor for all channels)");
+    printf("  %-14s %.2f; the worst patch is '%s', %.2f\n", "left out", color_chart_mean(c->delta_e_left_out),
+           color_chart_patch_name(c->worst), c->delta_e_left_out[c->worst]);
+    printf("  %-14s varies by %.1f %% over the chart; the scale holds %s\n", "lamp's light", 100.0 * c->light_range,
+           isnan(c->scale_at_px[0]) ? "in its middle" : "at 'cloth_px'");
 }
 
 /* A row of the JSON file: the values that a job would take from a photograph. */
@@ -217,7 +225,9 @@ static int preview_job(const char *path, const char *json_path, const char *pict
     struct error err = {0};
     json_t *rows = json_array();
     bool whole = true;
+    const struct warning_sink warn = {print_warning, NULL};
     photograph_process_init(&process);
+    process.warn = &warn;
     status s = camera_job_read(path, &job, &err);
     if (s == STATUS_OK) s = photograph_process_load(&process, job.setup, job.rows, job.folder, &err);
     if (s == STATUS_OK) print_color(&process);

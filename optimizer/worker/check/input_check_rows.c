@@ -189,6 +189,7 @@ static void check_profile(struct input_check *c)
 
 void input_check_rows(struct input_check *c)
 {
+    const struct warning_sink warn = {input_check_warn, c};
     struct photograph_process process;
     struct error fault = {0};
     bool usable;
@@ -196,6 +197,7 @@ void input_check_rows(struct input_check *c)
     if (job_sections_kind(&c->section) != JOB_OF_FIT) return;
     photograph_process_init(&process);
     process.files = c->files;
+    process.warn = &warn;
     if (c->section.rows->measurement_file[0] != '\0')
         usable = check_table(c);
     else {

@@ -13,6 +13,7 @@ camera.cards: even cards, 20 cameras. Here the error is noise and what the chart
 z_max_expected: the median of the largest of random values with the stated covariance, in which the errors of the color matrix are common to
 the views of a camera; chi2_per_value: the squares with that covariance, over their number. 1 is right.
 camera.exposures: the even cards by cameras whose true exposure times differ by 5 % from the stated ones.
+camera.chart_fall: the same under a lamp that gives 20 % less light at one end of the chart.
 """
 import argparse
 import contextlib
@@ -217,6 +218,7 @@ def main():
         bench_cloth(arguments, folder)
         bench_cards(arguments, folder)
         bench_fault(arguments, folder, "exposures", "--exposure-error", 0.05)
+        bench_fault(arguments, folder, "chart_fall", "--chart-fall", 0.2)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
  * compared with the scatter of fits of photographs whose matrix differs from draw to draw. */
 #include "base/rng.h"
 #include "optimizer/fit/objective/objective.h"
-#include "optimizer/photographs/camera/color_matrix.h"
+#include "optimizer/photographs/camera/chart_fit.h"
 #include "tests/support/fit_fixture.h"
 
 #include <math.h>
@@ -24,18 +24,20 @@ static const double row_cov[3][9] = {
 /* States the errors of the matrix, and changes the radiances by one draw of them. */
 static void apply_draw(struct observation_set *o, struct rng *rng)
 {
-    double z[3][4];
+    double z[3][4], cov[81] = {0}, all[3][COLOR_MATRIX_CAUSES];
     for (size_t c = 0; c < 3; c++) {
         rng_normal_pair(rng, z[c]);
         rng_normal_pair(rng, z[c] + 2);
     }
+    for (size_t k = 0; k < 27; k++) cov[9 * (k / 9 * 3 + k % 9 / 3) + k / 9 * 3 + k % 3] = row_cov[k / 9][k % 9];
     for (size_t i = 0; i < o->n; i++) {
         double truth[3];
         memcpy(truth, o->item[i].mean_rgb, sizeof truth);
+        color_matrix_error(cov, truth, all);
         for (size_t c = 0; c < 3; c++) {
-            double *error = o->item[i].photograph.color_error[c] + 3 * c;
-            color_matrix_error(row_cov[c], truth, error);
-            for (size_t cause = 0; cause < 3; cause++) o->item[i].mean_rgb[c] += z[c][cause] * error[cause];
+            double *error = o->item[i].photograph.color_error[c];
+            memcpy(error, all[c], sizeof all[c]);
+            for (size_t cause = 0; cause < 9; cause++) o->item[i].mean_rgb[c] += z[cause / 3][cause % 3] * error[cause];
             o->item[i].se_rgb[c] = hypot(o->item[i].se_rgb[c], photograph_color_se(&o->item[i].photograph, c));
         }
     }

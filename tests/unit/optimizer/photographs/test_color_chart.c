@@ -1,6 +1,5 @@
-/* The color matrix on patches without noise, published color differences, and ColorCheckers: drawn and warped here, and
- * a real one (data/color-target). */
-#include "base/rng.h"
+/* Published color differences, and ColorCheckers: drawn, warped and unevenly lit here, and a real one
+ * (data/color-target). */
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/photographs/camera/color_chart.h"
 #include "optimizer/photographs/camera/color_matrix.h"
@@ -17,82 +16,6 @@
 #include <cmocka.h>
 
 static const double camera[9] = {0.61, 0.22, 0.05, 0.11, 0.74, 0.09, 0.02, 0.18, 0.48}; /* radiance to camera rgb */
-
-static void test_matrix(void **state)
-{
-    double measured[24][3], wanted[24][3], matrix[9], product[9] = {0}, out[3];
-    (void)state;
-    for (size_t i = 0; i < 24; i++) {
-        color_chart_reference(false, i, wanted[i]);
-        color_matrix_apply(camera, wanted[i], measured[i]);
-    }
-    assert_int_equal(color_matrix_fit(24, (const double(*)[3])measured, (const double(*)[3])wanted, 18, matrix, NULL),
-                     STATUS_OK);
-    for (size_t i = 0; i < 27; i++)
-        product[i / 9 * 3 + i % 3] += matrix[i / 9 * 3 + i / 3 % 3] * camera[i / 3 % 3 * 3 + i % 3];
-    for (size_t i = 0; i < 9; i++) assert_true(fabs(product[i] - (i % 4 == 0 ? 1.0 : 0.0)) < 1e-6);
-    for (size_t i = 0; i < 24; i++) /* noise: the white patch is matched all the same */
-        for (size_t c = 0; c < 3; c++) measured[i][c] *= 1.0 + 0.05 * sin((double)(7 * i + 3 * c));
-    assert_int_equal(color_matrix_fit(24, (const double(*)[3])measured, (const double(*)[3])wanted, 18, matrix, NULL),
-                     STATUS_OK);
-    color_matrix_apply(matrix, measured[18], out);
-    for (size_t c = 0; c < 3; c++) assert_true(fabs(out[c] - wanted[18][c]) < 1e-9);
-    for (size_t i = 0; i < 24; i++)
-        for (size_t c = 0; c < 3; c++) measured[i][c] = 0.1 * (double)i + 0.1;
-    assert_int_equal(color_matrix_fit(24, (const double(*)[3])measured, (const double(*)[3])wanted, 18, matrix, NULL),
-                     STATUS_NUMERIC);
-}
-
-/* Radiance of one row of the matrix for a card, in one draw of the patches' noise, whose variance is proportional to
- * the light, and the variance that is stated. */
-static double read_card(struct rng *rng, const double (*exact)[3], const double (*wanted)[3], const double card[3],
-                        double *stated)
-{
-    double measured[24][3], var[24][3], matrix[9], cov[3][9], error[3], out[3], z[4];
-    for (size_t i = 0; i < 24; i++) {
-        rng_normal_pair(rng, z);
-        rng_normal_pair(rng, z + 2);
-        for (size_t c = 0; c < 3; c++) {
-            var[i][c] = 1e-6 + 1e-4 * exact[i][c];
-            measured[i][c] = exact[i][c] + sqrt(var[i][c]) * z[c];
-        }
-    }
-    assert_int_equal(color_matrix_fit(24, (const double(*)[3])measured, wanted, 18, matrix, NULL), STATUS_OK);
-    color_matrix_covariance(24, (const double(*)[3])measured, wanted, 18, matrix, (const double(*)[3])var, cov);
-    color_matrix_apply(matrix, card, out);
-    color_matrix_error(cov[0], card, error);
-    *stated = error[0] * error[0] + error[1] * error[1] + error[2] * error[2];
-    return out[0];
-}
-
-/* Stated errors of the matrix are the scatter over draws of noise that is stronger in bright patches, for a bright card
- * and for a dark one. With one variance for all patches that of the bright card would be too small. */
-static void test_errors_of_the_matrix(void **state)
-{
-    enum { N_DRAW = 2000 };
-    static const double card_rgb[2][3] = {{0.9, 0.3, 0.1}, {0.05, 0.06, 0.2}};
-    double exact[24][3], wanted[24][3];
-    (void)state;
-    for (size_t i = 0; i < 24; i++) {
-        color_chart_reference(false, i, wanted[i]);
-        color_matrix_apply(camera, wanted[i], exact[i]);
-    }
-    for (size_t k = 0; k < 2; k++) {
-        double card[3], mean = 0.0, square = 0.0, stated = 0.0;
-        struct rng rng;
-        rng_start(&rng, &(struct rng_key){.seed = 3 + k}, 0, 0);
-        color_matrix_apply(camera, card_rgb[k], card);
-        for (size_t draw = 0; draw < N_DRAW; draw++) {
-            double var, value = read_card(&rng, (const double(*)[3])exact, (const double(*)[3])wanted, card, &var);
-            mean += value / N_DRAW;
-            square += value * value / N_DRAW;
-            stated += var / N_DRAW;
-        }
-        double ratio = sqrt(stated / (square - mean * mean));
-        print_message("card %zu: stated error over scatter %.3f\n", k, ratio);
-        assert_true(ratio > 0.95 && ratio < 1.1);
-    }
-}
 
 /* The neutral patches are nearly grey, their luminances those of Munsell values 9.5 to 2. */
 static void test_reference(void **state)
@@ -140,7 +63,7 @@ static void check_matrix(const struct color_chart *k, double gain, double tolera
         color_chart_reference(false, i, rgb);
         color_matrix_apply(camera, rgb, out);
         for (size_t c = 0; c < 3; c++) out[c] *= gain;
-        color_matrix_apply(k->matrix, out, out);
+        color_matrix_apply(k->fit.matrix, out, out);
         for (size_t c = 0; c < 3; c++)
             if (!(fabs(out[c] - rgb[c]) < tolerance))
                 fail_msg("patch %zu, channel %zu: %g, not %g", i, c, out[c], rgb[c]);
@@ -157,7 +80,7 @@ static void test_drawn_charts(void **state)
     (void)state;
     for (size_t i = 0; i < 3; i++) {
         struct image im;
-        struct color_chart k = {0};
+        struct color_chart k = {.scale_at_px = {NAN, NAN}};
         struct error err = {0};
         assert_int_equal(image_init(&im, 800, 600, 3, NULL), STATUS_OK);
         draw_chart(&im, corner[i], camera, 300.0, i == 2 ? 0.02 : 0.0);
@@ -169,10 +92,112 @@ static void test_drawn_charts(void **state)
             for (size_t c = 0; c < 8; c++)
                 if (fabs(k.corner_px[c] - corner[i][c]) > 8.0)
                     fail_msg("%zu: corner %zu at %g, not %g", i, c, k.corner_px[c], corner[i][c]);
-            if (color_chart_measure(&k, &im, INFINITY, 0.0, &err) != STATUS_OK) fail_msg("%s", err.text);
+            if (color_chart_measure(&k, &im, INFINITY, 0.0, NULL, &err) != STATUS_OK) fail_msg("%s", err.text);
             check_matrix(&k, 300.0, i == 2 ? 6e-3 : 1e-6);
             assert_true(k.delta_e_before[2] > 2.0 && k.delta_e_after[2] < (i == 2 ? 0.5 : 1e-3));
         }
+        image_release(&im);
+    }
+}
+
+/* Light over the chart: linear terms, and a bend. */
+static double light_at(const double place[2], double slope, double phi, double bend)
+{
+    return 1.0 + slope * (cos(phi) * place[0] + sin(phi) * place[1]) -
+           bend * (place[0] * place[0] + place[1] * place[1]);
+}
+
+/* Multiplies a picture by a light that falls along a direction of the picture, from the middle of the corners. */
+static void light_picture(struct image *im, double slope, double phi, double bend)
+{
+    for (size_t i = 0; i < im->width * im->height; i++) {
+        const double place[2] = {((double)(i % im->width) - 400.0) / 250.0, ((double)(i / im->width) - 285.0) / 250.0};
+        for (size_t c = 0; c < 3; c++) im->pixel[3 * i + c] *= (float)fmax(0.05, light_at(place, slope, phi, bend));
+    }
+}
+
+struct heard {
+    char text[4][600];
+    size_t n;
+};
+
+static void hear(void *context, const char *option, const char *text)
+{
+    struct heard *h = context;
+    assert_string_equal(option, "color_chart");
+    snprintf(h->text[h->n++ % 4], sizeof h->text[0], "%s", text);
+}
+
+/* Lamps that fall by 0 to 30 % over the chart in any direction, also warm and cold ones, with a patch saturated, and
+ * charts upside down: the matrix is right in the middle of the chart, and the fall is told from 10 % on. */
+static void test_fall_of_light(void **state)
+{
+    static const double corner[2][8] = {{150, 120, 650, 120, 650, 450, 150, 450},
+                                        {650, 450, 150, 450, 150, 120, 650, 120}};
+    static const double lamp[3][3] = {{1, 1, 1}, {1.6, 1, 0.5}, {0.7, 1, 1.5}};
+    (void)state;
+    for (size_t t = 0; t < 12; t++) {
+        const double fall = 0.3 * (double)t / 11.0, slope = fall / (2.0 - fall);
+        double tinted[9];
+        struct image im;
+        struct color_chart k = {.scale_at_px = {NAN, NAN}};
+        struct heard heard = {.n = 0};
+        struct error err = {0};
+        for (size_t j = 0; j < 9; j++) tinted[j] = camera[j] * lamp[t % 3][j / 3];
+        assert_int_equal(image_init(&im, 800, 600, 3, NULL), STATUS_OK);
+        draw_chart(&im, corner[t % 2], tinted, 1.0, 0.01);
+        light_picture(&im, slope, 0.6 * (double)t, t > 8 ? 0.04 : 0.0);
+        memcpy(k.corner_px, corner[t % 2], sizeof k.corner_px);
+        for (size_t y = 200; y < 290 && t == 4; y++) /* the orange patch is saturated */
+            for (size_t x = 145; x < 230; x++) im.pixel[3 * (800 * y + x)] = 5.0f;
+        if (color_chart_measure(&k, &im, 5.0, 0.0, &(struct warning_sink){hear, &heard}, &err) != STATUS_OK)
+            fail_msg("%zu: %s", t, err.text);
+        assert_true(k.saturated[6] == (t == 4) && k.white == 18);
+        for (size_t i = 0; i < 24; i++) {
+            double rgb[3], out[3], error[3][COLOR_MATRIX_CAUSES];
+            color_chart_reference(false, i, rgb);
+            color_matrix_apply(tinted, rgb, out);
+            color_matrix_error(k.fit.cov, out, error);
+            color_matrix_apply(k.fit.matrix, out, out);
+            for (size_t c = 0; c < 3; c++) {
+                double var = 0.0;
+                for (size_t e = 0; e < COLOR_MATRIX_CAUSES; e++) var += error[c][e] * error[c][e];
+                if (fabs(out[c] - rgb[c]) > 0.005 || fabs(out[c] - rgb[c]) > 4.5 * sqrt(var))
+                    fail_msg("fall %g, patch %zu, channel %zu: %g +- %g, not %g", fall, i, c, out[c], sqrt(var),
+                             rgb[c]);
+            }
+        }
+        assert_true(heard.n == (k.light_range > 0.1) && (heard.n == 0 || strstr(heard.text[0], "falls by") != NULL));
+        if (fall > 0.13) assert_true(heard.n == 1);
+        image_release(&im);
+    }
+}
+
+/* A chart with other colors: refused with the worst patch by name. One that is a little different warns. */
+static void test_other_charts(void **state)
+{
+    const double corner[8] = {150, 120, 650, 120, 650, 450, 150, 450};
+    struct image im;
+    struct error err = {0};
+    (void)state;
+    for (int strong = 0; strong < 2; strong++) {
+        struct color_chart k = {.scale_at_px = {NAN, NAN}};
+        struct heard heard = {.n = 0};
+        assert_int_equal(image_init(&im, 800, 600, 3, NULL), STATUS_OK);
+        draw_chart(&im, corner, camera, 1.0, 0.0);
+        for (size_t i = 0; i < 800 * 600; i++) { /* other pigments in every other column of patches */
+            const size_t column = i % 800 > 150 ? (i % 800 - 150) * 6 / 500 : 0;
+            if (column % 2 == 1) im.pixel[3 * i] *= strong ? 2.0f : 1.35f;
+        }
+        memcpy(k.corner_px, corner, sizeof corner);
+        status s = color_chart_measure(&k, &im, INFINITY, 0.0, &(struct warning_sink){hear, &heard}, &err);
+        assert_int_equal(s, strong ? STATUS_INVALID : STATUS_OK);
+        print_message("%g, worst %s\n", color_chart_mean(k.delta_e_left_out), color_chart_patch_name(k.worst));
+        if (strong && (strstr(err.text, "not those of a ColorChecker") == NULL ||
+                       strstr(err.text, color_chart_patch_name(k.worst)) == NULL))
+            fail_msg("%s", err.text);
+        if (!strong && (heard.n == 0 || strstr(heard.text[0], "(CIEDE2000) in the mean") == NULL))
+            fail_msg("no warning");
         image_release(&im);
     }
 }
@@ -200,13 +225,13 @@ static void test_refused_charts(void **state)
 {
     const double corner[8] = {150, 120, 650, 120, 650, 450, 150, 450};
     struct image im, picture;
-    struct color_chart k = {0};
+    struct color_chart k = {.scale_at_px = {NAN, NAN}};
     struct error err = {0};
     (void)state;
     assert_int_equal(image_init(&im, 800, 600, 3, NULL), STATUS_OK);
     draw_chart(&im, corner, camera, 1.0, 0.0);
     memcpy(k.corner_px, corner, sizeof corner);
-    assert_int_equal(color_chart_measure(&k, &im, INFINITY, 1.0, &err), STATUS_OK);
+    assert_int_equal(color_chart_measure(&k, &im, INFINITY, 1.0, NULL, &err), STATUS_OK);
     assert_true(fabs(k.wanted_rgb[18][1] / cos(1.0) - 0.913) < 0.01); /* a tilted lamp */
     assert_int_equal(color_chart_picture(&k, &im, &picture, &err), STATUS_OK);
     double want[3];
@@ -214,13 +239,13 @@ static void test_refused_charts(void **state)
     const float *p = picture.pixel + 3 * (picture.width * (picture.height - 5) + 5);
     for (size_t c = 0; c < 3; c++) assert_true(fabs((double)p[c] - want[c] * cos(1.0)) < 1e-5);
     image_release(&picture);
-    assert_int_equal(color_chart_measure(&k, &im, 0.5, 0.0, &err), STATUS_INVALID);
+    assert_int_equal(color_chart_measure(&k, &im, 0.5, 0.0, NULL, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "white patch is saturated"));
     memcpy(k.corner_px, (double[8]){650, 120, 650, 450, 150, 450, 150, 120}, sizeof corner);
-    assert_int_equal(color_chart_measure(&k, &im, INFINITY, 0.0, &err), STATUS_INVALID);
+    assert_int_equal(color_chart_measure(&k, &im, INFINITY, 0.0, NULL, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "order of the corners"));
     memcpy(k.corner_px, (double[8]){150, 120, 950, 120, 950, 450, 150, 450}, sizeof corner);
-    assert_int_equal(color_chart_measure(&k, &im, INFINITY, 0.0, &err), STATUS_INVALID);
+    assert_int_equal(color_chart_measure(&k, &im, INFINITY, 0.0, NULL, &err), STATUS_INVALID);
     assert_non_null(strstr(err.text, "outside of the picture"));
     for (size_t i = 0; i < 800 * 600 * 3; i++) im.pixel[i] = 0.3f;
     k.corner_px[0] = NAN;
@@ -235,7 +260,7 @@ static void test_real_chart(void **state)
     const char *data = getenv("SELVEDGE_DATA");
     const struct job_photograph p = photograph_plain(JOB_TRANSFER_SRGB);
     struct image im;
-    struct color_chart k = {.corner_px = {NAN}};
+    struct color_chart k = {.corner_px = {NAN}, .scale_at_px = {NAN, NAN}};
     struct error err = {0};
     (void)state;
     snprintf(path, sizeof path, "%s/color-target/img-colorchecker_3.5MB.jpg", data != NULL ? data : "../shared/data");
@@ -247,12 +272,10 @@ static void test_real_chart(void **state)
     fclose(file);
     if (photograph_read(path, &p, &im, NULL, &err) != STATUS_OK) fail_msg("%s", err.text);
     if (color_chart_find(&im, k.corner_px, &k.found_automatically, &err) != STATUS_OK) fail_msg("%s", err.text);
-    if (color_chart_measure(&k, &im, INFINITY, 0.0, &err) != STATUS_OK) fail_msg("%s", err.text);
-    double before = 0.0, after = 0.0;
-    for (size_t i = 0; i < 24; i++) {
-        before += k.delta_e_before[i] / 24.0;
-        after += k.delta_e_after[i] / 24.0;
-    }
+    if (color_chart_measure(&k, &im, INFINITY, 0.0, NULL, &err) != STATUS_OK) fail_msg("%s", err.text);
+    const double before = color_chart_mean(k.delta_e_before), after = color_chart_mean(k.delta_e_after);
+    print_message("left out %.2f, worst %s %.2f, light %.2f, matrix used %d\n", color_chart_mean(k.delta_e_left_out),
+                  color_chart_patch_name(k.worst), k.delta_e_left_out[k.worst], k.light_range, k.matrix_used);
     printf("corners %.0f,%.0f %.0f,%.0f %.0f,%.0f %.0f,%.0f; CIEDE2000 %.2f before, %.2f after\n", k.corner_px[0],
            k.corner_px[1], k.corner_px[2], k.corner_px[3], k.corner_px[4], k.corner_px[5], k.corner_px[6],
            k.corner_px[7], before, after);
@@ -269,10 +292,11 @@ static void test_real_chart(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_matrix),         cmocka_unit_test(test_errors_of_the_matrix),
+
         cmocka_unit_test(test_reference),      cmocka_unit_test(test_delta_e),
         cmocka_unit_test(test_drawn_charts),   cmocka_unit_test(test_same_chart_again),
-        cmocka_unit_test(test_refused_charts), cmocka_unit_test(test_real_chart),
+        cmocka_unit_test(test_refused_charts), cmocka_unit_test(test_fall_of_light),
+        cmocka_unit_test(test_other_charts),   cmocka_unit_test(test_real_chart),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
