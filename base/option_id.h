@@ -43,6 +43,7 @@
 #define OPTION_YARNS "yarns"
 #define OPTION_CLOTH "described_cloth"
 #define OPTION_CORRECTION "correction"
+#define OPTION_DRAFT_FILE "draft_file"
 #define OPTION_CLOTH_TEXTURE "cloth_texture"
 #define OPTION_TEXTURE_PX_PER_MM "texture_px_per_mm"
 /* the set-up */

@@ -15,6 +15,7 @@ function filesOf(doc) {
   const add = (name, role) => { if (typeof name === "string" && !list.some((f) => f.name === name)) list.push({ name, role }); };
   for (const name of doc.volume?.files ?? []) add(name, "volume");
   add(doc.fibers?.file, "fibers");
+  add(doc.cloth?.draft_file, "draft");
   add(doc.cloth?.texture, "photograph");
   add(doc.environment?.file, "environment");
   add(doc.measurements?.file, "measurements");

@@ -109,6 +109,11 @@ static void fiber_seeds(void)
     uint8_t binary[15 + sizeof mitsuba] = "BINARY_HAIR\2"; /* two points */
     memcpy(binary + 15, mitsuba, sizeof mitsuba);
     put("hair", "mitsuba.hair", "", binary, sizeof binary);
+    put("wif", "twill.wif",
+        "[WIF]\nVersion=1.1\n[WEAVING]\nShafts=4\nTreadles=4\nRising Shed=yes\n[WARP]\nThreads=4\n[WEFT]\nThreads=4\n"
+        "[THREADING]\n1=1\n2=2\n3=3\n4=4\n[TIEUP]\n1=1,2\n2=2,3\n3=3,4\n4=4,1\n[TREADLING]\n1=1\n2=2\n3=3\n4=4\n",
+        "", 0);
+    put("wif", "plan.wif", "[wif]\n[threading]\n1=1\n2=2\n[liftplan]\n1=1\n2=2\n[warp colors]\n1=3\n", "", 0);
     put("obj", "square.obj",
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 2 0\nvt 2 2\nvt 0 2\nf 1/1 2/2 3/3 4/4\nf -4/-4 -2/-2/1 "
         "-1/-1\n",

@@ -45,6 +45,7 @@ struct named_file {
 
 static const struct named_file named[] = {
     {{"fibers", NULL}, "file", "fibers", "fibers.file"},
+    {{"cloth", NULL}, "draft_file", "draft", "cloth.draft_file"},
     {{"cloth", NULL}, "texture", "photograph", "cloth.texture"},
     {{"environment", NULL}, "file", "environment", "environment.file"},
     {{"measurements", NULL}, "file", "measurements", "measurements.file"},

@@ -16,8 +16,9 @@ def files_of(document: Document) -> list[tuple[str, str]]:
     for key in ("fibers", "environment", "measurements", "rig", "profile"):
         if "file" in document.get(key, {}):
             names.append((document[key]["file"], key))
-    if "texture" in document.get("cloth", {}):
-        names.append((document["cloth"]["texture"], "photograph"))
+    for key, role in (("draft_file", "draft"), ("texture", "photograph")):
+        if key in document.get("cloth", {}):
+            names.append((document["cloth"][key], role))
     camera, color = document.get("camera", {}), document.get("color", {})
     names += [(camera["noise_file"], "camera_noise")] if "noise_file" in camera else []
     names += [(name, "dark_frame") for name in camera.get("dark_frames", [])]

@@ -36,6 +36,7 @@ enum file_kind {
     KIND_TABLE,
     KIND_JSON,
     KIND_MESH,
+    KIND_DRAFT,
     KIND_OTHER
 };
 
@@ -55,7 +56,7 @@ static enum file_kind kind_of(const char *name)
                  {".bmp", KIND_OTHER},    {".webp", KIND_OTHER},  {".mp4", KIND_OTHER},   {".dcm", KIND_OTHER},
                  {".hdf5", KIND_OTHER},   {".h5", KIND_OTHER},    {".npy", KIND_OTHER},   {".mat", KIND_OTHER},
                  {".psd", KIND_OTHER},    {".obj", KIND_MESH},    {".ply", KIND_OTHER},   {".stl", KIND_OTHER},
-                 {".fbx", KIND_OTHER}};
+                 {".fbx", KIND_OTHER},    {".wif", KIND_DRAFT}};
     const char *dot = strrchr(name, '.');
     enum file_kind kind = KIND_UNKNOWN;
     for (size_t i = 0; dot != NULL && i < sizeof known / sizeof known[0]; i++)
@@ -87,6 +88,7 @@ static const struct role_rule role_rule[] = {
     {"dark_frame", "a photograph: OpenEXR, TIFF, camera raw, PNG or JPEG", {ANY_PHOTOGRAPH}},
     {"camera_noise", "a record of `selvedge calibrate-camera`: .json", {[KIND_UNKNOWN] = true, [KIND_JSON] = true}},
     {"mesh", "a mesh: .obj", {[KIND_UNKNOWN] = true, [KIND_MESH] = true}},
+    {"draft", "a draft: .wif", {[KIND_UNKNOWN] = true, [KIND_DRAFT] = true}},
     {"rig", "a rig file: .json", {[KIND_UNKNOWN] = true, [KIND_JSON] = true}},
 };
 

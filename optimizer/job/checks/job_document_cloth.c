@@ -185,12 +185,14 @@ static void take_kinds(const struct job_cloth *cloth, const json_t *section, str
 static status read_weave(const json_t *section, struct job_cloth *cloth, struct cloth_description *d, struct error *err)
 {
     const json_t *draft = json_object_get(section, "draft");
-    bool named = json_object_get(section, "weave") != NULL, shown = cloth->texture[0] != '\0';
-    if (named == (draft != NULL) && (named || !shown))
+    const bool named = json_object_get(section, "weave") != NULL, filed = cloth->draft_file[0] != '\0';
+    const int n_given = named + filed + (draft != NULL);
+    if (n_given > 1 || (n_given == 0 && cloth->texture[0] == '\0'))
         return error_set_field(err, STATUS_INVALID, "cloth.weave",
-                               "a described cloth takes either 'cloth.weave' or 'cloth.draft', or neither with a "
-                               "photograph in 'cloth.texture'");
-    cloth->draft_from_texture = !named && draft == NULL; /* until it is read, the weave stands as plain */
+                               "a described cloth takes one of 'cloth.weave', 'cloth.draft' and 'cloth.draft_file', or "
+                               "none of them with a photograph in 'cloth.texture'");
+    cloth->draft_from_texture = n_given == 0;
+    /* until a file or a photograph is read, the weave stands as plain */
     status st = cloth_description_init(d, named ? cloth->weave : "plain", err);
     return st == STATUS_OK && draft != NULL ? read_draft(draft, d, err) : st;
 }
@@ -208,7 +210,8 @@ static status read_cloth(const json_t *section, struct job_cloth *cloth, struct 
     for (int k = 0; k < 2 && st == STATUS_OK; k++) {
         enum cloth_direction a = k == 0 ? CLOTH_WEFT : CLOTH_WARP;
         /* the tile of a draft that is not known yet is checked when it is */
-        d->n_yarn[a] = cloth->draft_from_texture ? 0 : cloth->tile_yarn[a];
+        const bool open = cloth->draft_from_texture || cloth->draft_file[0] != '\0';
+        d->n_yarn[a] = open ? 0 : cloth->tile_yarn[a];
         if (!isnan(cloth->threads_per_cm[a])) d->threads_per_cm[a] = cloth->threads_per_cm[a];
         st = read_order(section, a, d, err);
     }

@@ -25,14 +25,15 @@ struct job_cloth {
     double voxel_um;        /* NaN: chosen from the radius */
     /* The section "cloth" as given; `description` is the checked description, NULL without the section. */
     char weave[16];
-    char texture[JOB_MAX_NAME_BYTES]; /* photograph that shows the weave; "" when none is given */
-    double texture_px_per_mm;         /* NaN: not given */
-    bool texture_colors;              /* start C_TT of the kinds at the colors of the photograph */
-    bool draft_from_texture;          /* neither weave nor draft is given */
-    size_t tile_yarn[2];              /* of enum cloth_direction; 0: not given */
-    size_t final_tiles;               /* times that the tile of the final fit is as long along both edges */
-    bool renew_places;                /* other random places in each estimate of the joint fit */
-    double threads_per_cm[2];         /* NaN: not given */
+    char draft_file[JOB_MAX_NAME_BYTES]; /* "" when none is given */
+    char texture[JOB_MAX_NAME_BYTES];    /* photograph that shows the weave; "" when none is given */
+    double texture_px_per_mm;            /* NaN: not given */
+    bool texture_colors;                 /* start C_TT of the kinds at the colors of the photograph */
+    bool draft_from_texture;             /* neither weave nor draft is given */
+    size_t tile_yarn[2];                 /* of enum cloth_direction; 0: not given */
+    size_t final_tiles;                  /* times that the tile of the final fit is as long along both edges */
+    bool renew_places;                   /* other random places in each estimate of the joint fit */
+    double threads_per_cm[2];            /* NaN: not given */
     uint64_t seed;
     size_t n_yarn;
     struct job_cloth_yarn *yarn;

@@ -46,6 +46,7 @@ void job_sections_visit_files(const struct job_sections *section,
 {
     for (size_t i = 0; i < section->scan->n_file; i++) visit(context, section->scan->file[i], "volume");
     if (section->cloth->fiber_file[0] != '\0') visit(context, section->cloth->fiber_file, "fibers");
+    if (section->cloth->draft_file[0] != '\0') visit(context, section->cloth->draft_file, "draft");
     if (section->cloth->texture[0] != '\0') visit(context, section->cloth->texture, "photograph");
     if (section->setup->environment_file[0] != '\0') visit(context, section->setup->environment_file, "environment");
     if (section->rows->measurement_file[0] != '\0') visit(context, section->rows->measurement_file, "measurements");
@@ -103,6 +104,7 @@ void job_sections_file_key(const struct job_sections *section, const char *name,
         const char *file, *key;
     } single[] = {{section->cloth->fiber_file, "fibers.file"},
                   {section->rows->measurement_file, "measurements.file"},
+                  {section->cloth->draft_file, "cloth.draft_file"},
                   {section->cloth->texture, "cloth.texture"},
                   {section->setup->environment_file, "environment.file"},
                   {section->setup->rig_file, "rig.file"},

@@ -34,7 +34,7 @@ enum job_kind {
 
 enum job_kind job_sections_kind(const struct job_sections *section);
 
-/* Calls visit for every input file that the document names, with its role ("volume", "fibers", "environment",
+/* Calls visit for every input file that the document names, with its role ("volume", "fibers", "environment", "draft",
  * "measurements", "photograph", "camera_noise", "dark_frame", "chart", "white_reference", "mesh", "profile"). */
 void job_sections_visit_files(const struct job_sections *section,
                               void (*visit)(void *context, const char *name, const char *role), void *context);

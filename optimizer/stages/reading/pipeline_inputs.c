@@ -1,6 +1,7 @@
 /* Reads and checks the inputs of a job before its first stage: the document, the parameters of its models, the
  * observations. */
 #include "base/files/durable.h"
+#include "base/files/file_ledger_json.h"
 #include "base/option_id.h"
 #include "optimizer/fit/baseline/row_consistency.h"
 #include "optimizer/job/document/job_cloth.h"
@@ -22,6 +23,7 @@
 #include "optimizer/stages/reading/pipeline_texture.h"
 #include "optimizer/stages/reading/texture_start.h"
 #include "optimizer/stages/run/worker_folder.h"
+#include "optimizer/stages/scene/draft_file.h"
 #include "optimizer/stages/scene/pipeline_adopt.h"
 #include "optimizer/stages/scene/pipeline_volume.h"
 #include "optimizer/stages/scene/scan_order.h"
@@ -284,6 +286,19 @@ static status read_rows(const struct stage_tools *tools, struct job_inputs *in, 
     return s == STATUS_OK ? pipeline_warn_budget(tools, in, err) : s;
 }
 
+/* The draft of a described cloth that a file states. */
+static status read_draft(const struct stage_tools *tools, const struct job_inputs *in, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    struct file_ledger ledger = {0};
+    const struct job_cloth *cloth = in->section.cloth;
+    if (cloth->description == NULL || cloth->draft_file[0] == '\0') return STATUS_OK;
+    worker_folder_path(tools->folder, JOB_FOLDER_INPUT, cloth->draft_file, path);
+    status s = draft_file_take(path, cloth, &ledger, err);
+    if (s == STATUS_OK) file_ledger_append(in->files, cloth->draft_file, &ledger);
+    return s;
+}
+
 status job_inputs_read(const struct stage_tools *tools, struct job_inputs *in, struct error *err)
 {
     in->files = json_array();
@@ -292,6 +307,7 @@ status job_inputs_read(const struct stage_tools *tools, struct job_inputs *in, s
     if (s == STATUS_OK) s = scan_order_check(in->section.scan, in->files, &tools->warn, err);
     if (s == STATUS_OK && in->section.scan->n_file > 0)
         s = scan_examine(tools->folder, in->section.scan, in->files, err);
+    if (s == STATUS_OK) s = read_draft(tools, in, err);
     if (s == STATUS_OK) s = read_rows(tools, in, err);
     if (s == STATUS_OK && tools->folder->lock_fd >= 0)
         s = pipeline_adopt_geometry(tools, in->section.scan->geometry_job, err);

@@ -1,3 +1,4 @@
+#include "base/catalogue/cloth_description.h"
 #include "base/files/file_ledger_json.h"
 #include "base/option_id.h"
 #include "base/warning.h"
@@ -9,6 +10,7 @@
 #include "optimizer/job/document/job_setup.h"
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/photographs/reader/photograph.h"
+#include "optimizer/stages/scene/draft_file.h"
 #include "optimizer/stages/scene/fiber_file.h"
 #include "optimizer/stages/scene/pipeline_volume.h"
 #include "optimizer/stages/scene/scan_order.h"
@@ -79,6 +81,19 @@ static void check_environment(struct input_check *c)
     environment_free(environment);
 }
 
+static void check_draft(struct input_check *c)
+{
+    char path[INPUT_PATH_BYTES];
+    struct error fault = {0};
+    struct file_ledger ledger = {0};
+    const struct job_cloth *cloth = c->section.cloth;
+    if (cloth->description == NULL || cloth->description->n_kind == 0 || !input_check_has(c, cloth->draft_file)) return;
+    input_check_path(c, cloth->draft_file, path);
+    status s = draft_file_take(path, c->section.cloth, &ledger, &fault);
+    if (s == STATUS_OK) file_ledger_append(c->files, cloth->draft_file, &ledger);
+    if (s != STATUS_OK) input_check_fault(c, &fault);
+}
+
 /* The photograph that shows the weave: as the job will read it. */
 static void check_texture(struct input_check *c)
 {
@@ -108,6 +123,7 @@ void input_check_cloth(struct input_check *c)
 {
     if (c->section.scan->n_file > 0) check_volume(c);
     check_fibers(c);
+    check_draft(c);
     check_environment(c);
     check_texture(c);
 }
