@@ -1,6 +1,7 @@
-/* The files that a job document names, and their SHA-256. The source file is included here, because the parts of the
+/* The files that a job document names, and their SHA-256. The source files are included here, because the parts of the
  * client are in no library. */
 #include "clients/cli/commands/cli_job_files.c" /* NOLINT */
+#include "clients/cli/text/cli_text.c"          /* NOLINT */
 
 #include <setjmp.h>
 #include <stdarg.h>
