@@ -1,5 +1,5 @@
 /* Factors on the light of one path: the discrepancy of the cloth (renderer/transport/discrepancy.h), and the speckle of
- * fibers (renderer/scattering/speckle.h). Inside of path_tracer.c.
+ * fibers (renderer/scattering/speckle.h). Inside of path_steps.h.
  */
 #ifndef SELVEDGE_RENDERER_PATH_FACTOR_H
 #define SELVEDGE_RENDERER_PATH_FACTOR_H
@@ -8,7 +8,7 @@
 
 static inline bool path_factor_wanted(const struct path_setting *s)
 {
-    return s->discrepancy != NULL || s->speckle.table != NULL;
+    return !PATH_PLAIN && (s->discrepancy != NULL || s->speckle.table != NULL);
 }
 
 /* Stores the values of the present bounce of the walk that the factors need. */

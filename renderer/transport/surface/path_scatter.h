@@ -1,4 +1,4 @@
-/* Scattering by a fiber at a bounce of a path. Inside of path_tracer.c. */
+/* Scattering by a fiber at a bounce of a path. Inside of path_steps.h. */
 #ifndef SELVEDGE_RENDERER_PATH_SCATTER_H
 #define SELVEDGE_RENDERER_PATH_SCATTER_H
 
@@ -13,13 +13,13 @@ float path_scatter_widths(const struct scattering_model *m, const struct scatter
 static inline void path_scatter_look(const struct walk *w, struct bounce *b)
 {
     const struct scattering_model *m = w->s->model;
-    if (m->view_of != NULL) m->view_of(w->state, b->wo, w->throughput, &b->view);
+    if (PATH_PLAIN || m->view_of != NULL) m->view_of(w->state, b->wo, w->throughput, &b->view);
 }
 
 static inline void path_scatter_sample(const struct walk *w, const struct bounce *b, const float u[3], float wi[3])
 {
     const struct scattering_model *m = w->s->model;
-    if (m->view_of != NULL)
+    if (PATH_PLAIN || m->view_of != NULL)
         m->sample_view(w->state, &b->view, u, wi);
     else
         m->sample(w->state, b->wo, w->throughput, u, wi);
@@ -32,9 +32,9 @@ static inline float path_scatter(const struct walk *w, const struct bounce *b, c
 {
     const struct path_setting *s = w->s;
     const struct scattering_model *m = s->model;
-    const float pdf = m->view_of != NULL ? m->eval_pdf_view(w->state, wi, &b->view, s_rgb, score)
-                                         : m->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, score);
-    if (!s->shows_width) return pdf;
+    const float pdf = PATH_PLAIN || m->view_of != NULL ? m->eval_pdf_view(w->state, wi, &b->view, s_rgb, score)
+                                                       : m->eval_pdf(w->state, wi, b->wo, w->throughput, s_rgb, score);
+    if (PATH_PLAIN || !s->shows_width) return pdf;
     const float widths = path_scatter_widths(s->model, w->state, wi, b->wo, score);
     for (int c = 0; c < 3; c++) s_rgb[c] *= widths;
     return pdf;
@@ -48,7 +48,7 @@ static inline void path_scatter_score(struct walk *w, const struct bounce *b, co
     float s_rgb[3];
     if (!s->want_jacobian) return;
     s->model->eval(w->state, wi, b->wo, s_rgb, w->score);
-    if (s->shows_width) path_scatter_widths(s->model, w->state, wi, b->wo, w->score);
+    if (!PATH_PLAIN && s->shows_width) path_scatter_widths(s->model, w->state, wi, b->wo, w->score);
 }
 
 #endif

@@ -33,3 +33,11 @@ void path_setting_init_sets(struct path_setting *s, const struct scene *scene, c
         if (s->has_strips) s->lobe_rad[i] = s->model->lobe_rad(s->state[i]);
     }
 }
+
+void path_setting_choose(struct path_setting *s)
+{
+    const struct scattering_model *m = s->model;
+    const bool simple_model = m->view_of != NULL && !m->flat_section && !m->near_field && !m->across_width;
+    s->plain = simple_model && !s->shows_width && s->n_set == 1 && s->discrepancy == NULL && s->speckle.table == NULL &&
+               s->lights.image == NULL && s->n_traced == 0 && s->begin == NULL;
+}

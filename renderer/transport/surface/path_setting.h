@@ -47,6 +47,7 @@ struct path_setting {
      * for recorded paths, nor for what finish adds. */
     struct speckle speckle;
     bool want_jacobian;
+    bool plain; /* path_setting_choose has found that the paths need not ask for any of the rare parts at their hits */
 };
 
 /* The lights of the configuration, the default roulette threshold, guided paths if there is a lamp, one parameter
@@ -57,6 +58,11 @@ void path_setting_init(struct path_setting *s, const struct scene *scene, const 
 /* The same with a parameter set per material group. The sets must outlive the setting. */
 void path_setting_init_sets(struct path_setting *s, const struct scene *scene, const struct parameter_sets *sets,
                             const struct configuration *c, bool want_jacobian);
+
+/* To be called last, when all members are set: chooses the walk that is compiled for settings without flat sections,
+ * near fields, light across the width, groups, factors, an image, and ends of paths. Settings for which it is not
+ * called are traced by the walk that knows all, with the same results. */
+void path_setting_choose(struct path_setting *s);
 
 /* Only the first 3 * n_set * n_param derivatives are set. */
 struct path_result {

@@ -1,9 +1,14 @@
-/* The state of a path from bounce to bounce: inside of path_tracer.c. */
+/* The state of a path from bounce to bounce: inside of path_steps.h. */
 #ifndef SELVEDGE_RENDERER_PATH_WALK_H
 #define SELVEDGE_RENDERER_PATH_WALK_H
 
 #include "renderer/scene/fiber_frame.h"
 #include "renderer/transport/surface/path_setting.h"
+
+/* 1: in the file that is for plain settings only (path_steps.h). */
+#ifndef PATH_PLAIN
+#define PATH_PLAIN 0
+#endif
 
 static inline void unwrapped(const float local_mm[3], const double offset_mm[2], float out[3])
 {
@@ -61,11 +66,13 @@ static inline bool path_walk_hides(const struct walk *w, const float direction[3
     return w->s->hides_below && direction[2] <= 0;
 }
 
+static inline bool path_walk_recorded(const struct walk *w) { return !PATH_PLAIN && w->step != NULL; }
+
 /* Whether the lamp is found by direct connections alone: at the first hit of a path that always ends there. */
 static inline bool path_walk_connects_all(const struct walk *w)
 {
     const struct path_setting *s = w->s;
-    return w->last && s->n_traced == 1 && !s->lights.has_constant && s->lights.image == NULL;
+    return !PATH_PLAIN && w->last && s->n_traced == 1 && !s->lights.has_constant && s->lights.image == NULL;
 }
 
 #endif

@@ -54,6 +54,7 @@ static status prepare(const struct radiance_input *in, const struct configuratio
         if (in->plain_paths) s->setting[i].guided_paths = s->setting[i].has_strips = false;
         s->setting[i].discrepancy = in->discrepancy;
         if (in->has_speckle) s->setting[i].speckle = (struct speckle){m->speckle, &s->numbers, in->speckle_seed};
+        path_setting_choose(&s->setting[i]);
         camera_init(&s->camera[i], &c[i]);
     }
     *state = s;
