@@ -1,5 +1,6 @@
 #include "geometry/fibers/fiber_import.h"
 #include "base/files/durable.h"
+#include "base/files/reading_note.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -24,9 +25,13 @@ status fiber_import(struct fiber_set *f, const char *path, const struct fiber_fi
     if (file == NULL) return error_set_errno(err, "cannot read fibers '%s'", path_file_name(path));
     const size_t n = fread(data, 1, sizeof data, file);
     fclose(file);
-    if (n >= sizeof mitsuba - 1 && memcmp(data, mitsuba, sizeof mitsuba - 1) == 0)
-        return fiber_import_mitsuba(f, path, terms, err);
-    return is_text(data, n) ? fiber_import_text(f, path, terms, err) : fiber_import_hair(f, path, terms, err);
+    const bool is_mitsuba = n >= sizeof mitsuba - 1 && memcmp(data, mitsuba, sizeof mitsuba - 1) == 0;
+    reading_note_set("fibers", path);
+    status s = is_mitsuba         ? fiber_import_mitsuba(f, path, terms, err)
+               : is_text(data, n) ? fiber_import_text(f, path, terms, err)
+                                  : fiber_import_hair(f, path, terms, err);
+    reading_note_set(NULL, NULL);
+    return s;
 }
 
 status fiber_set_read_hair(struct fiber_set *f, const char *path, struct error *err)

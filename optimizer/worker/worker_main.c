@@ -1,5 +1,6 @@
 /* selvedge-worker JOBDIR: one job from its folder to its results. Layout of the folder: optimizer/job/job_folder.h. */
 #include "base/files/file_tree.h"
+#include "base/files/reading_note.h"
 #include "base/log.h"
 #include "base/process.h"
 #include "base/thread_pool.h"
@@ -344,6 +345,7 @@ int main(int argc, char **argv)
     if (code < 0 && !files_only(&a) && !a.team.given && !a.confinement.executed)
         code = worker_ranks_start(argv, a.folder, a.n_rank, a.n_thread);
     if (code >= 0) return code;
+    reading_note_on_crash(a.check != NULL);
     enter_sandbox(&a, argv, &failed);
     if ((files_only(&a) || is_helper(&a)) && failed.code != STATUS_OK && a.sandbox == CONFINE_REQUIRED) {
         fprintf(stderr, "selvedge-worker: %s\n", failed.text);

@@ -1,5 +1,7 @@
 #include "renderer/image/image_exr.h"
 
+#include "base/files/reading_note.h"
+
 #include <OpenEXR/openexr.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -326,14 +328,19 @@ static status read_channels(struct image *im, const char *path, const char *pref
     memset(im, 0, sizeof *im);
     exr_context_initializer_t init = initializer(&rd.note);
     if (access(path, R_OK) != 0) return error_set_errno(err, "cannot read image '%s'", path);
+    reading_note_set("OpenEXR", path);
     exr_result_t r = exr_start_read(&rd.file, path, &init);
-    if (r != EXR_ERR_SUCCESS) return refuse(&rd, err, reason(&rd.note, r));
+    if (r != EXR_ERR_SUCCESS) {
+        reading_note_set(NULL, NULL);
+        return refuse(&rd, err, reason(&rd.note, r));
+    }
     status st = read_header(&rd, limit_pixel, err);
     if (st == STATUS_OK) st = read_pixels(&rd, err);
     if (st == STATUS_OK && said != NULL) exr_statements_read(rd.file, said);
     if (st != STATUS_OK) image_release(im);
     free(rd.rest);
     exr_finish(&rd.file);
+    reading_note_set(NULL, NULL);
     return st;
 }
 

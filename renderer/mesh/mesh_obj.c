@@ -1,5 +1,6 @@
 /* Wavefront OBJ: v x y z, vt u v, f v/vt[/vn] ... with indices from 1, or from the last point when negative. */
 #include "base/files/durable.h"
+#include "base/files/reading_note.h"
 #include "renderer/mesh/mesh.h"
 
 #include <stdbool.h>
@@ -243,6 +244,7 @@ status mesh_read_obj_ledger(const char *path, double scale_mm, struct mesh *m, s
     char *data = NULL, *text = NULL;
     size_t n_bytes = 0;
     struct obj_reader r = {.name = path_file_name(path), .scale_mm = scale_mm, .m = m, .ledger = ledger};
+    reading_note_set("OBJ mesh", path);
     status s = file_read_all(path, FILE_LIMIT_BYTES, &data, &n_bytes, err);
     memset(m, 0, sizeof *m);
     if (s == STATUS_OK) s = find_text(r.name, data, n_bytes, &text, err);
@@ -258,6 +260,7 @@ status mesh_read_obj_ledger(const char *path, double scale_mm, struct mesh *m, s
     if (s == STATUS_OK) s = mesh_check(m, err);
     if (s != STATUS_OK) mesh_release(m);
 out:
+    reading_note_set(NULL, NULL);
     free(data);
     return s;
 }

@@ -159,7 +159,7 @@ static status ask(struct job_service *v, const struct worker_paths *paths, json_
     pid_t pid;
     status s = worker_launch(paths, v->settings, &pid, err);
     if (s == STATUS_OK) s = wait_for(v, pid, paths->report_fd, end, refusal, err);
-    if (s == STATUS_OK && !end->by_signal) *report = read_report(paths->report_fd);
+    if (s == STATUS_OK) *report = read_report(paths->report_fd); /* a crash reports the file that was being read */
     return s;
 }
 

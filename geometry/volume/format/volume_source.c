@@ -2,6 +2,7 @@
 #include "base/option_id.h"
 
 #include "base/files/durable.h"
+#include "base/files/reading_note.h"
 #include "geometry/volume/format/raw_source.h"
 #include "geometry/volume/format/volume_reader.h"
 
@@ -22,6 +23,7 @@ struct volume_source {
     const volume_reader *reader;
     void *handle;
     struct volume_source_info info;
+    char name[256]; /* of the first file */
 };
 
 size_t volume_reader_count(void) { return sizeof reader / sizeof *reader; }
@@ -77,8 +79,11 @@ status volume_source_open_declared(const char *const *path, size_t n_path, const
     if (v == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot read volume '%s': out of memory", path_file_name(path[0]));
     v->reader = found;
+    snprintf(v->name, sizeof v->name, "%s", path_file_name(path[0]));
+    reading_note_set(found->title, v->name);
     s = found == &raw_reader ? raw_source_open(path, n_path, raw, &v->handle, &v->info, err)
                              : found->open(path, n_path, part, &v->handle, &v->info, err);
+    reading_note_set(NULL, NULL);
     if (s != STATUS_OK) {
         free(v);
         return s;
@@ -106,5 +111,8 @@ status volume_source_read(struct volume_source *source, size_t i_slice, size_t n
     if (i_slice > source->info.n[2] || n_slice > source->info.n[2] - i_slice)
         return error_set(err, STATUS_INTERNAL, "cannot read slices %zu..%zu of %zu", i_slice, i_slice + n_slice,
                          source->info.n[2]);
-    return source->reader->read(source->handle, i_slice, n_slice, value, err);
+    reading_note_set(source->reader->title, source->name);
+    status s = source->reader->read(source->handle, i_slice, n_slice, value, err);
+    reading_note_set(NULL, NULL);
+    return s;
 }

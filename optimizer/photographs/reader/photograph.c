@@ -189,6 +189,9 @@ static void warn(const struct image *im, const char *name, struct photograph_mea
                  "photograph '%s' was enlarged or strongly filtered: its neighbouring pixels hardly differ. Give the "
                  "picture as the camera made it",
                  name);
+    else if (file_ledger_find(&mean->record.info.ledger, "damage beside the samples") != NULL)
+        snprintf(mean->warning, n_bytes, "photograph '%s' is damaged beside its samples: %.120s", name,
+                 file_ledger_find(&mean->record.info.ledger, "damage beside the samples")->value);
     else if (mean->record.info.has_alpha)
         snprintf(mean->warning, n_bytes,
                  "photograph '%s' has an alpha channel, as edited pictures have: it is opaque and was left out", name);

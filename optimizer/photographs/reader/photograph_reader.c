@@ -1,6 +1,7 @@
 #include "optimizer/photographs/reader/photograph_reader.h"
 
 #include "base/files/durable.h"
+#include "base/files/reading_note.h"
 #include "optimizer/photographs/reader/saturation.h"
 #include "renderer/image/color_primaries.h"
 
@@ -152,7 +153,11 @@ status photograph_file_read(const char *path, const struct photograph_request *q
             "the right suffix",
             path_file_name(path), named->title, found->title);
     info->format = found->title;
+    char reader_name[40];
+    snprintf(reader_name, sizeof reader_name, "%s photograph", found->title);
+    reading_note_set(reader_name, path);
     s = found->read(path, q, im, info, err);
+    reading_note_set(NULL, NULL);
     if (s != STATUS_OK) return s;
     saturation_find(im, info);
     if (info->to_rec709[0] != 0.0 && !color_matrix_is_identity(info->to_rec709)) convert_primaries(im, info);

@@ -12,14 +12,16 @@
 
 #include <jpeglib.h>
 
+#include <jerror.h>
+
 /* At most about 400 pixels a byte: constant blocks of 8 x 8 take less than two bits. */
 enum { MOST_PIXELS_PER_BYTE = 4096 };
 
 struct jpeg_failure {
     struct jpeg_error_mgr manager; /* first: libjpeg knows this part alone */
     jmp_buf jump;
-    char text[JMSG_LENGTH_MAX];
-    bool damaged;
+    char text[JMSG_LENGTH_MAX], stray[JMSG_LENGTH_MAX];
+    bool damaged, in_header;
 };
 
 static void on_error(j_common_ptr jpeg)
@@ -29,11 +31,16 @@ static void on_error(j_common_ptr jpeg)
     longjmp(f->jump, 1);
 }
 
-/* Warnings are damaged data: libjpeg would go on with grey. */
+/* Warnings are damaged data: libjpeg would go on with grey. Bytes between the segments before the picture data touch no
+ * pixel. */
 static void on_message(j_common_ptr jpeg, int level)
 {
     struct jpeg_failure *f = (struct jpeg_failure *)jpeg->err;
     if (level >= 0 || f->damaged) return;
+    if (f->in_header && jpeg->err->msg_code == JWRN_EXTRANEOUS_DATA) {
+        jpeg->err->format_message(jpeg, f->stray);
+        return;
+    }
     f->damaged = true;
     jpeg->err->format_message(jpeg, f->text);
 }
@@ -98,7 +105,12 @@ static status decode(struct jpeg_work *w, FILE *file, const char *path, const st
     jpeg_stdio_src(jpeg, file);
     jpeg_save_markers(jpeg, JPEG_APP0 + 1, 0xffff);
     jpeg_save_markers(jpeg, JPEG_APP0 + 2, 0xffff);
+    w->failure.in_header = true;
     jpeg_read_header(jpeg, TRUE);
+    w->failure.in_header = false;
+    if (w->failure.stray[0] != '\0')
+        file_ledger_add(&info->ledger, "damage beside the samples", "bytes between segments touch no pixel", "%s",
+                        w->failure.stray);
     status s = check_header(jpeg, path_file_name(path), q, file, err);
     if (s == STATUS_OK) s = take_colors(w, path, info, err);
     if (s == STATUS_OK) s = integer_samples_declare(path, q, 8, &w->color, info, err);

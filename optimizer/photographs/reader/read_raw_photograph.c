@@ -7,6 +7,7 @@
  * are (sample - black) / (white - black), neither clamped at 0 nor cut at 1; a pixel with a sample at or above the
  * camera's limit is at least 1. */
 #include "base/files/durable.h"
+#include "optimizer/photographs/reader/float_dng.h"
 #include "optimizer/photographs/reader/photograph_reader.h"
 
 #include <libraw/libraw.h>
@@ -196,11 +197,13 @@ static status read_raw(const char *path, const struct photograph_request *q, str
                        struct photograph_info *info, struct error *err)
 {
     int n_damaged = 0;
+    status s = float_dng_read(path, q, im, info, err);
+    if (s != STATUS_NOT_FOUND) return s;
     libraw_data_t *lr = libraw_init(LIBRAW_OPIONS_NO_MEMERR_CALLBACK | LIBRAW_OPIONS_NO_DATAERR_CALLBACK);
     if (lr == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot read photograph '%s': out of memory", path_file_name(path));
     libraw_set_dataerror_handler(lr, ignore_data_error, &n_damaged);
-    status s = decode(lr, path, q, im, info, err);
+    s = decode(lr, path, q, im, info, err);
     if (s == STATUS_OK && n_damaged > 0) {
         image_release(im);
         s = error_set(err, STATUS_FORMAT, "cannot read photograph '%s': its raw data are damaged or end too early",

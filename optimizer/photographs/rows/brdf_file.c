@@ -2,6 +2,7 @@
 
 #include "base/angle.h"
 #include "base/files/durable.h"
+#include "base/files/reading_note.h"
 #include "base/option_id.h"
 #include "optimizer/job/document/job_rows.h"
 
@@ -174,7 +175,9 @@ status brdf_file_read(const brdf_reader *r, const char *path, const struct job_s
 {
     void *handle = NULL;
     const char *name = path_file_name(path);
+    reading_note_set(r->title, path);
     status s = r->open(path, rows->measurement_symmetry, &handle, err);
+    reading_note_set(NULL, NULL);
     if (s != STATUS_OK) {
         if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_MEASUREMENT_FILE);
         return s;

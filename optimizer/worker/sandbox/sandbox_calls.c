@@ -1,5 +1,7 @@
 #include "optimizer/worker/sandbox/sandbox_calls.h"
 
+#include "base/files/reading_note.h"
+
 #include <errno.h>
 #include <sched.h>
 #include <seccomp.h>
@@ -148,11 +150,11 @@ static const char *name_of(int number)
 static void report(int signal_number, siginfo_t *info, void *context)
 {
     (void)context;
-    char text[160];
+    char text[600];
     const char *const part[] = {"selvedge-worker: the sandbox forbids the system call '", name_of(info->si_syscall),
-                                "'\n"};
+                                "'", reading_note_text(), "\n"};
     size_t n = 0;
-    for (size_t i = 0; i < 3; i++)
+    for (size_t i = 0; i < sizeof part / sizeof *part; i++)
         for (const char *c = part[i]; *c != '\0' && n < sizeof text; c++) text[n++] = *c;
     if (write(STDERR_FILENO, text, n) < 0) {
         /* nothing else can be done */
