@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { LEAST_ROWS = 6, PLAIN_NUMBERS = 12 };
+enum { LEAST_ROWS = 6, LEAST_LONG = 16, PLAIN_NUMBERS = 12 };
 
 /* Largest share of the plain BRDF's error that another reading of the rows may leave to be better, and the error
  * from which there is something to explain. */
@@ -76,9 +76,9 @@ static void warn_scale(double median, const struct warning_sink *warn)
                      median);
 }
 
-/* The error of the plain BRDF that is fitted to the rows, each multiplied by factor(row). */
-static status plain_error(const struct observation_set *rows, double (*factor)(const struct observation *o),
-                          double *error, struct error *err)
+/* The error of the plain BRDF that is fitted to the rows, each read in another way. reread: NULL for none. */
+static status plain_error(const struct observation_set *rows, void (*reread)(struct observation *o), double *error,
+                          struct error *err)
 {
     struct observation_set other;
     struct plain_brdf brdf;
@@ -87,7 +87,7 @@ static status plain_error(const struct observation_set *rows, double (*factor)(c
     for (size_t i = 0; i < rows->n && s == STATUS_OK; i++) {
         struct observation row = rows->item[i];
         row.set = JOB_SET_FIT;
-        for (int c = 0; c < 3 && factor != NULL; c++) row.mean_rgb[c] *= factor(&rows->item[i]);
+        if (reread != NULL) reread(&row);
         s = observation_set_append(&other, &row, err);
     }
     if (s == STATUS_OK) s = plain_brdf_fit(&other, &brdf, err);
@@ -105,21 +105,82 @@ static double largest_share(size_t n_row)
     return fmin(better_share, exp(-least_deviates / sqrt(freedom - 1.0)));
 }
 
-/* Radiance of a row whose value is a BRDF. */
-static double brdf_to_radiance(const struct observation *o) { return M_PI * incident(o); }
-
-static status warn_brdf(const struct observation_set *rows, const struct warning_sink *warn, struct error *err)
+/* Makes the radiance of a row whose value is a BRDF. */
+static void brdf_to_radiance(struct observation *o)
 {
-    double as_given, as_brdf;
-    status s = plain_error(rows, NULL, &as_given, err);
-    if (s == STATUS_OK) s = plain_error(rows, brdf_to_radiance, &as_brdf, err);
-    if (s != STATUS_OK || as_given < least_error || as_brdf > largest_share(rows->n) * as_given) return s;
+    for (int c = 0; c < 3; c++) o->mean_rgb[c] *= M_PI * incident(o);
+}
+
+/* Exchanges lamp and camera. */
+static void exchange(struct observation *o)
+{
+    struct configuration *c = &o->configuration;
+    const double theta = c->light_theta_rad, phi = c->light_phi_rad;
+    c->light_theta_rad = c->camera_theta_rad;
+    c->light_phi_rad = c->camera_phi_rad;
+    c->camera_theta_rad = theta;
+    c->camera_phi_rad = phi;
+}
+
+/* Whether all cameras are in front of the cloth, so that a lamp may stand in their places. */
+static bool seen_from_front(const struct observation_set *rows)
+{
+    for (size_t i = 0; i < rows->n; i++)
+        if (!(rows->item[i].configuration.camera_theta_rad < M_PI_2)) return false;
+    return true;
+}
+
+static void warn_brdf(double as_brdf, double as_given, const struct warning_sink *warn)
+{
     warning_send(warn, OPTION_NONE,
                  "the values look like those of a BRDF (1/sr), not like radiances: they do not fall as the lamp comes "
                  "in at grazing angles, and a plain surface fits them to %.2g %% if each is multiplied by pi and the "
                  "cosine of the lamp's angle, and to %.2g %% as they are",
                  100.0 * as_brdf, 100.0 * as_given);
+}
+
+static void warn_exchanged(double exchanged, double as_given, const struct warning_sink *warn)
+{
+    warning_send(warn, OPTION_NONE,
+                 "lamp and camera look exchanged: the values fall as the camera, not the lamp, goes to grazing angles, "
+                 "and a plain surface fits them to %.2g %% with lamp and camera exchanged, and to %.2g %% as they are",
+                 100.0 * exchanged, 100.0 * as_given);
+}
+
+/* Warns where another reading explains the rows far better: of two of them, the better one. */
+static status warn_readings(const struct observation_set *rows, const struct warning_sink *warn, struct error *err)
+{
+    double as_given, as_brdf = INFINITY, exchanged = INFINITY;
+    status s = plain_error(rows, NULL, &as_given, err);
+    if (s == STATUS_OK) s = plain_error(rows, brdf_to_radiance, &as_brdf, err);
+    if (s == STATUS_OK && seen_from_front(rows)) s = plain_error(rows, exchange, &exchanged, err);
+    if (s != STATUS_OK || as_given < least_error) return s;
+    const double most = largest_share(rows->n) * as_given;
+    if (exchanged <= most && exchanged < as_brdf)
+        warn_exchanged(exchanged, as_given, warn);
+    else if (as_brdf <= most)
+        warn_brdf(as_brdf, as_given, warn);
     return STATUS_OK;
+}
+
+/* Warns of a long table in which the lamp comes from one azimuth of the cloth alone, as in means over all rotations. */
+static void warn_one_azimuth(const struct observation_set *rows, const struct warning_sink *warn)
+{
+    const double same_rad = 0.5 / DEG_PER_RAD;
+    const struct configuration *first = &rows->item[0].configuration;
+    bool out_of_plane = false;
+    for (size_t i = 0; i < rows->n; i++) {
+        const struct configuration *c = &rows->item[i].configuration;
+        const double turn = c->light_phi_rad - c->cloth_rotation_rad - first->light_phi_rad + first->cloth_rotation_rad;
+        const bool lamp_turns = sin(c->light_theta_rad) > 0.05 && fabs(sin(0.5 * turn)) > sin(0.5 * same_rad);
+        if (c->n_rotation > 1 || c->cloth_rotation_rad != 0.0 || lamp_turns) return;
+        out_of_plane = out_of_plane || fabs(sin(c->camera_phi_rad - c->light_phi_rad)) > 0.05;
+    }
+    if (rows->n < LEAST_LONG || !out_of_plane) return;
+    warning_send(warn, OPTION_NONE,
+                 "in all %zu rows the lamp comes from one side of the cloth at rotation 0: if the data are isotropic "
+                 "(means over all rotations), write 'all' as cloth_rotation_deg",
+                 rows->n);
 }
 
 /* Selects the rows that are judged. */
@@ -139,7 +200,8 @@ status row_consistency_warn(const struct observation_set *o, const struct warnin
     status s = select_judged(o, &rows, err);
     if (s == STATUS_OK) s = median_reflected(&rows, &median, err);
     if (s == STATUS_OK) warn_scale(median, warn);
-    if (s == STATUS_OK && rows.n >= LEAST_ROWS) s = warn_brdf(&rows, warn, err);
+    if (s == STATUS_OK && rows.n > 0) warn_one_azimuth(&rows, warn);
+    if (s == STATUS_OK && rows.n >= LEAST_ROWS) s = warn_readings(&rows, warn, err);
     observation_set_release(&rows);
     return s;
 }

@@ -1,6 +1,6 @@
 /* Consistency checks of measured radiances, for mistakes that no single row shows: another unit, another scale, angles
- * in radians, rows in another order. The checks use bounds on the light that a cloth can reflect under the stated
- * lamps, and a plain BRDF (plain_brdf.h). They take milliseconds. */
+ * in radians, lamp and camera exchanged, means over all rotations given as one. The checks use bounds on the light that
+ * a cloth can reflect under the stated lamps, and a plain BRDF (plain_brdf.h). They take milliseconds. */
 #ifndef SELVEDGE_OPTIMIZER_ROW_CONSISTENCY_H
 #define SELVEDGE_OPTIMIZER_ROW_CONSISTENCY_H
 

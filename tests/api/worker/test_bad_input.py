@@ -87,6 +87,18 @@ def many_rows(value, n=12):
     return file("rows.csv", ("\n".join(lines) + "\n").encode())
 
 
+def grid(radiance, rotation=0, lamp_phi=(0,)):
+    """A table of 36 rows: lamps and cameras at 10 to 70 degrees, cameras at azimuths of 180 and 75; radiance(lamp, camera cosine)."""
+    lines = ["set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg,r,g,b"]
+    for i, lamp in enumerate((10, 20, 35, 50, 60, 70)):
+        for k, camera in enumerate((15, 40, 70)):
+            for azimuth in (180, 75):
+                v = radiance(*(math.cos(math.radians(a)) for a in (lamp, camera)))
+                at = lamp_phi[(i + k) % len(lamp_phi)]
+                lines.append(f"fit,{lamp},{at},{camera},{(at + azimuth) % 360},{rotation},{v:.6f},{0.8 * v:.6f},{0.6 * v:.6f}")
+    return file("rows.csv", ("\n".join(lines) + "\n").encode())
+
+
 def both(*changes):
     def change(document, files):
         for c in changes:
@@ -134,7 +146,7 @@ CASES = [
     ("unknown parameter", TAB, put("fit.fixed", {"beta_X": 5}), "fault", "beta_X"),
     ("parameter outside of its range", TAB, put("fit.start", {"beta_TT": 900}), "fault", "beta_TT"),
     ("path in a file name", TAB, put("measurements.file", "../rows.csv"), "fault", "file name"),
-    ("blank in a file name", TAB, put("measurements.file", "my rows.csv"), "fault", "file name"),
+    ("backslash in a file name", TAB, put("measurements.file", "my\\rows.csv"), "fault", "file name"),
     ("table and photographs", PHO, put("measurements", {"file": "rows.csv"}), "fault", "measurements"),
     ("photograph without angles", PHO, put("photographs.1.light_theta_deg", None), "fault", "photographs[1].light_theta_deg"),
     ("lamp below the horizon", PHO, put("photographs.1.light_theta_deg", 120), "fault", "photographs[1].light_theta_deg"),
@@ -193,6 +205,10 @@ CASES = [
     ("all rows above white", TAB, rows(lambda v: v[:5] + [x * 40 for x in v[5:]]), "warning", "all rows are above white"),
     ("values of a BRDF", TAB, many_rows(lambda cos: 0.2), "warning", "look like those of a BRDF"),
     ("values of a BRDF in six rows", TAB, many_rows(lambda cos: 0.2, 6), "warning", "look like those of a BRDF"),
+    ("lamp and camera exchanged", TAB, grid(lambda lamp, camera: 0.3 * camera, lamp_phi=(0, 90)), "warning", "lamp and camera look exchanged"),
+    ("lamp and camera exchanged, with a sheen", TAB, grid(lambda lamp, camera: 0.3 * camera * (1 + 0.5 * (1 - lamp) ** 3), lamp_phi=(0, 90)), "warning",
+     "lamp and camera look exchanged"),
+    ("isotropic data at rotation 0", TAB, grid(lambda lamp, camera: 0.3 * lamp), "warning", "write 'all' as cloth_rotation_deg"),
     ("one dark row", TAB, line(3, "fit,45,0,45,180,0,0.0001,0.0001,0.0001"), "warning", "is dark"),
     ("a mesh without texture", TAB, on_mesh(SHEET + b"f 1 2 3\n"), "fault", "pictures[1].mesh_file: "),
     ("a mesh that turns over", TAB, on_mesh(SHEET + b"f 1/1 2/3 3/2\n"), "fault", "pictures[1].mesh_file: "),
