@@ -6,7 +6,7 @@
  * turn per tile; the lattice then maps to itself, so the tile closes. All fibers are then pushed apart until they
  * hardly interpenetrate, without being bent more than fibers can bear. The yarn model follows Zhao et al. 2016,
  * "Fitting procedural yarn models for realistic cloth rendering" (section 3: packing, twist, migration, fly-aways),
- * without plies. With the parameters of a real yarn (phantom_yarn_read) yarns are plied by the laws of that paper
+ * without plies. With the parameters of a real yarn (phantom_yarn_read) yarns are plied by the laws of the paper
  * instead. The loop of the knit follows Peirce's jersey. The result depends only on the options and the seed, not on
  * the number of threads. */
 #ifndef SELVEDGE_GEOMETRY_PHANTOM_H
@@ -57,7 +57,7 @@ struct phantom_scan_option {
     double beam_hardening; /* share of the signal that is lost amid material; 0: none */
     double phase_fringes;  /* strength of the fringes at outlines; 0: none (phantom_raster.c) */
     struct phantom_section_law section; /* that with which the fibers were made */
-    bool own_sections; /* draws the sections that the fibers state (fiber_shape.h), instead of those of the law */
+    bool own_sections; /* draws the sections that the fibers state (fiber_shape.h), not sections of the law */
 };
 
 void phantom_scan_option_default(struct phantom_scan_option *o);
@@ -87,7 +87,7 @@ status phantom_write_tiff(const struct volume *v, const struct phantom_file_opti
 /* Writes MetaImage: path ends in ".mhd", and the data goes to a file ".raw" beside it. Spacing is in millimetres. */
 status phantom_write_metaimage(const struct volume *v, const struct phantom_file_option *o, const char *path,
                                struct error *err);
-/* Writes a CSV table with radius and section of each fiber, one line a fiber. Angles are those of phantom_section.h. */
+/* Writes a CSV table with radius and section of each fiber, one line a fiber. Angles as in phantom_section.h. */
 status phantom_write_sections(const struct fiber_set *f, const struct phantom_section_law *law, const char *path,
                               struct error *err);
 

@@ -19,12 +19,12 @@ enum phantom_weave {
     PHANTOM_WEAVE_COUNT
 };
 
-/* A real yarn: plies around the centre of the yarn, and fibers around their ply. Lengths are those of the yarn;
+/* A real yarn: plies around the centre of the yarn, and fibers around their ply. Lengths belong to the yarn;
  * pairs are mean and standard deviation. Pitches are lengths of one turn, negative if clockwise. */
 struct phantom_yarn_law {
     size_t n_ply, n_fiber; /* fibers per ply; n_ply 0: no such yarn */
     double ply_pitch_m, fiber_pitch_m;
-    double ply_distance_m;       /* distance of the plies' centres from that of the yarn */
+    double ply_distance_m;       /* distance of the plies' centres from the yarn's centre */
     double ellipse_m[2];         /* half axes of a ply's section: around the yarn, and towards its centre */
     double epsilon, beta, r_max; /* radial density of fibers */
     double migration_waves, rho_min, rho_max; /* waves per turn of the fiber */

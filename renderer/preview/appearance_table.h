@@ -10,7 +10,7 @@
  * (Seeliger 1888): the remainder changes slowly even where light and view graze the cloth. Textures that are averaged
  * over an area (mipmaps) give the mean radiance of it.
  *
- * Directions are those of a square grid over each hemisphere (direction_grid.h): view (side, row, column), light
+ * Directions form a square grid over each hemisphere (direction_grid.h): view (side, row, column), light
  * likewise, side 0 above. Between the middles of the grid's cells the table is interpolated bilinearly.
  */
 #ifndef SELVEDGE_RENDERER_APPEARANCE_TABLE_H
@@ -39,8 +39,8 @@ struct appearance_table {
     float *value;    /* owned; n_view x n_light x n_basis x 3: T_k */
     size_t n_smooth; /* steps of smoothing over neighbouring cells, as many as bring the table nearer to the truth */
     /* How far the interpolated T_0 is from means traced anew in random directions, root mean square over their mean,
-     * each weighted by cos th_o; and what of it is the noise of those means. The first two figures leave out light and
-     * view beyond 70 degrees, where a cloth may be many times as bright. */
+     * each weighted by cos th_o; and the part of it that is the noise of the means. The first two figures leave out
+     * light and view beyond 70 degrees, where a cloth may be many times as bright. */
     double mean_rel_rms, mean_rel_noise, all_rel_rms, all_rel_noise;
 };
 

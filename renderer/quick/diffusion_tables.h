@@ -1,7 +1,7 @@
 /* What diffusion knows of a cloth with a pile: how much of the light that is scattered more often than paths are traced
  * comes back to the eye, from where, and from which directions. Averages over random walks through the flat cloth.
  *
- * The radiance of that light at the last traced hit is, for light L from the directions of one side of the cloth,
+ * The radiance of such light at the last traced hit is, for light L from the directions of one side of the cloth,
  *     leaving(wo) integral of R(r) / R  L(x + r, w) entering(w) pair(wo, w) |cos| / pi  dw dr,
  * equations 2.3 and 2.5 of the dissertation of Yan with these functions in place of Fresnel's transmission, and with a
  * dipole's R(r) that has the reflectance and the mean square distance of the walks.
@@ -41,10 +41,10 @@ struct diffusion_tables {
     double mean_square_mm2[2][3];
 };
 
-/* A fiber stands whose two ends differ in height by a third of the cloth's thickness or more, as those of weft and warp
+/* A fiber stands whose two ends differ in height by a third of the cloth's thickness or more, as ends of weft and warp
  * do not. standing (may be NULL): the fraction of what is seen of a flat cloth, from all directions of a side by their
  * cosines, that are such fibers; of the side that has more. STATUS_INVALID (field "cloth"), stating it, for a cloth
- * without a pile, of which less than half stands; STATUS_NO_MEMORY. */
+ * without a pile, where less than half stands; STATUS_NO_MEMORY. */
 status diffusion_check_pile(const struct scene *flat, double *standing, struct error *err);
 
 struct diffusion_request {
