@@ -123,8 +123,9 @@ make_sample() {
     else
         # more than the crop, and the blur of the lens
         render "$sample/rendered" --paths 204800 --px 80 --crop-cm 1.25 --blur-mm 0.12
-        echo "camera: three raw files of each, a color chart, dark and flat frames (takes half a minute)"
-        "$bin/selvedge-phantom" camera --photographs "$sample/rendered" --out "$sample" --seed 5
+        echo "camera: three raw files of each, with times that are 5 % off the stated ones, a color chart under a lamp that"
+        echo "falls by 20 %, dark and flat frames (takes half a minute)"
+        "$bin/selvedge-phantom" camera --photographs "$sample/rendered" --out "$sample" --seed 5 --exposure-error 0.05 --chart-fall 0.2
         "$bin/selvedge" calibrate-camera --dark "$sample"/dark-*.dng --flat "$sample"/flat-*.dng --out "$sample/noise.json"
     fi
     python3 clients/demo_report.py document "$sample" "$title"

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { GRID = 8, GROUPS = GRID * GRID, LEAST_GROUPS = 6, MAX_BLOCK_PX = 8 };
+enum { GRID = 8, GROUPS = GRID * GRID, LEAST_GROUPS = 6, MAX_BLOCK_PX = 8, MARGIN_PX = 2 };
 static const double prior_sd = 0.05;        /* of ln time: of stated times of shutters */
 static const double most_share = 0.9;       /* of the full scale, of samples that are compared */
 static const double impossible = 1.25;      /* ratio of light to stated times */
@@ -37,29 +37,41 @@ struct block {
     size_t x0, y0, x1, y1, c;
 };
 
-/* Sums of a block by halves. Returns false for a half that the other half excludes, or that has a saturated sample. */
+/* Largest share of the full scale that each half has in and around a block. At the edge of a saturated area a green of
+ * two samples, one of them saturated, looks dark. */
+static void largest_around(const struct exposure_set *e, const size_t pair[2], const struct block *b, double most[2])
+{
+    const size_t x0 = b->x0 > MARGIN_PX ? b->x0 - MARGIN_PX : 0, y0 = b->y0 > MARGIN_PX ? b->y0 - MARGIN_PX : 0,
+                 x1 = b->x1 + MARGIN_PX < e->width ? b->x1 + MARGIN_PX : e->width,
+                 y1 = b->y1 + MARGIN_PX < e->height ? b->y1 + MARGIN_PX : e->height;
+    most[0] = most[1] = 0.0;
+    for (size_t y = y0; y < y1; y++)
+        for (size_t x = x0; x < x1; x++)
+            for (size_t j = 0; j < 2; j++) {
+                const size_t i = pair[j], half = (x + y) & 1;
+                if (e->full_scale[i] == 1.0) continue;
+                most[half] = fmax(most[half], (double)e->image[i]->pixel[3 * (y * e->width + x) + b->c]);
+            }
+}
+
+/* Sums of a block by halves. use: false for a half that the other half excludes, or that has a saturated sample. */
 static void sum_block(const struct exposure_set *e, const size_t pair[2], const struct block *b, double sum[2][2],
                       size_t n[2], bool use[2])
 {
     const struct noise_channel *k = exposure_noise(e, b->c);
-    double most[2] = {0};
-    bool whole[2] = {true, true};
+    double most[2];
     memset(sum, 0, 4 * sizeof **sum);
     n[0] = n[1] = 0;
     for (size_t y = b->y0; y < b->y1; y++)
         for (size_t x = b->x0; x < b->x1; x++) {
             const size_t half = (x + y) & 1, p = 3 * (y * e->width + x) + b->c;
             n[half]++;
-            for (size_t j = 0; j < 2; j++) {
-                const size_t i = pair[j];
-                const double dn = exposure_sample_dn(e, i, p);
-                whole[half] = whole[half] && !isnan(dn);
-                if (e->full_scale[i] != 1.0) most[half] = fmax(most[half], (double)e->image[i]->pixel[p]);
-                sum[half][j] += dn - k->read_mean - e->t_s[i] * k->dark_mean;
-            }
+            for (size_t j = 0; j < 2; j++)
+                sum[half][j] += exposure_sample_dn(e, pair[j], p) - k->read_mean - e->t_s[pair[j]] * k->dark_mean;
         }
+    largest_around(e, pair, b, most);
     for (size_t half = 0; half < 2; half++)
-        use[half] = n[0] > 0 && n[1] > 0 && whole[half] && most[1 - half] < most_share;
+        use[half] = n[0] > 0 && n[1] > 0 && isfinite(sum[half][0] + sum[half][1]) && most[1 - half] < most_share;
 }
 
 /* Weight of a half: light over variance of the shorter exposure, by the light of the other half in the longer one. */
@@ -217,7 +229,11 @@ static status compare(const struct exposure_set *e, const size_t pair[2], const 
     *r = (struct pair_ratio){.shorter = pair[0], .longer = pair[1], .var = INFINITY};
     for (size_t g = 0; g < GROUPS; g++)
         for (size_t i = 0; i < 12; i++) total[i / 4][i % 2] += s->light[g][i / 4][i / 2 % 2][i % 2];
-    for (size_t c = 0; c < 3; c++) has[c] = total[c][0] > 0.0 && total[c][1] > 0.0;
+    for (size_t c = 0; c < 3; c++) {
+        size_t n_group = 0;
+        for (size_t g = 0; g < GROUPS; g++) n_group += s->light[g][c][0][1] != 0.0 || s->light[g][c][1][1] != 0.0;
+        has[c] = n_group >= LEAST_GROUPS && total[c][0] > 0.0 && total[c][1] > 0.0;
+    }
     scatter_of(s, total, has, &k);
     for (size_t c = 0; c < 3; c++) {
         if (!has[c]) continue;
@@ -227,7 +243,7 @@ static status compare(const struct exposure_set *e, const size_t pair[2], const 
         has[c] = r->channel_var[c] < least_determined * least_determined;
         any = any || has[c];
     }
-    if (!any || k.n < LEAST_GROUPS) return STATUS_OK;
+    if (!any) return STATUS_OK;
     combine(r, has, &k);
     return check_balance(e, r, has, &k, err);
 }

@@ -153,6 +153,31 @@ static void test_steps(void **state)
     }
 }
 
+/* Stripes that saturate the longer exposure. Beside them a green of two samples, one of them saturated, is too dark,
+ * although it is far from the full scale. */
+static void test_edges_of_saturation(void **state)
+{
+    static const double t[2] = {0.16, 1.28}, level[2] = {16000, 16000};
+    struct image im[2], *list[2] = {&im[0], &im[1]};
+    const struct exposure_set e = {
+        .n = 2, .width = EDGE, .height = EDGE, .t_s = t, .full_scale = level, .image = list, .name = name};
+    struct exposure_ratio r;
+    struct error err = {0};
+    (void)state;
+    for (size_t i = 0; i < 2; i++) assert_int_equal(image_init(&im[i], EDGE, EDGE, 3, NULL), STATUS_OK);
+    for (size_t p = 0; p < 3 * EDGE * EDGE; p++) {
+        const size_t column = p / 3 % EDGE % 12;
+        const double dark = 0.1 + 1e-3 * (double)(p % 7), bright = 1.6;
+        const bool edge = p % 3 == 1 && (column == 6 || column == 11);
+        const double light = column < 6 ? bright : edge ? 0.5 * (dark + bright) : dark;
+        im[0].pixel[p] = (float)(light / 8.0);
+        im[1].pixel[p] = (float)(edge ? 0.5 * (dark + 1.0) : fmin(light, 1.0));
+    }
+    if (exposure_ratio_fit(&e, NULL, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
+    assert_true(fabs(r.t_s[0] / 0.16 - 1.0) < 1e-3);
+    for (size_t i = 0; i < 2; i++) image_release(&im[i]);
+}
+
 static void test_balance(void **state)
 {
     struct view v = {.base = 3000,
@@ -246,6 +271,7 @@ int main(void)
         cmocka_unit_test(test_warnings),
         cmocka_unit_test(test_steps),
         cmocka_unit_test(test_balance),
+        cmocka_unit_test(test_edges_of_saturation),
         cmocka_unit_test(test_agreement),
         cmocka_unit_test(test_rounding),
     };
