@@ -1,0 +1,52 @@
+"""A scan whose corners hold no measurement gives the fibers that the same scan gives without padding, and says what is missing."""
+import json
+import math
+import os
+import random
+import subprocess
+
+import pytest
+from daemon_under_test import program
+from scan_file import page16, tiff
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
+
+N, PERIOD, RADIUS = 48, 12, 3.5
+
+
+def pages(padding):
+    """Four times four fibers along z, in voxels; padding: the value outside of a round field of view, None for none."""
+    noise = random.Random(5)
+
+    def page():
+        def value(x, y):
+            if padding is not None and math.hypot(x - N / 2 + 0.5, y - N / 2 + 0.5) > N / 2:
+                return padding
+            solid = min(1, max(0, RADIUS + 0.5 - math.hypot(x % PERIOD - PERIOD / 2 + 0.5, y % PERIOD - PERIOD / 2 + 0.5)))
+            return round(20000 + 10000 * solid + noise.gauss(0, 700))
+        return page16(value, N, N)
+    return [page() for _ in range(40)]
+
+
+def trace(folder, padding):
+    (folder / "input").mkdir(parents=True)
+    (folder / "input" / "s.tif").write_bytes(tiff(pages(padding), N, N))
+    (folder / "job.json").write_text(json.dumps({"sample": "s", "volume": {"files": ["s.tif"], "voxel_size_um": 2}}))
+    done = subprocess.run([program("selvedge-worker"), "--quiet", str(folder)], capture_output=True, timeout=300, check=False)
+    assert done.returncode == 0, (folder / "log.txt").read_text()
+    return json.loads((folder / "results" / "result.json").read_text()), json.loads((folder / "status.json").read_text())["warnings"]
+
+
+def test_padding_is_neither_void_nor_material(tmp_path):
+    whole, _ = trace(tmp_path / "whole", None)
+    assert whole["geometry"]["n_fiber"] == 16 and whole["files"] == []
+    for padding in (0, 65535):
+        padded, warnings = trace(tmp_path / str(padding), padding)
+        geometry = padded["geometry"]
+        assert [s["value"].split(" in ")[0] for s in padded["files"][0]["statements"]] == [str(padding)]
+        assert 12 <= geometry["n_fiber"] <= 16  # the corners hold four
+        assert geometry["density_low"] == pytest.approx(whole["geometry"]["density_low"], rel=0.01)
+        assert geometry["density_high"] == pytest.approx(whole["geometry"]["density_high"], rel=0.01)
+        assert geometry["radius_um"][2] == pytest.approx(whole["geometry"]["radius_um"][2], rel=0.05)
+        assert "padding, which is no measurement, reaches into the tile" in json.dumps(warnings)
+        assert padded["verdict"]["code"] != "good"
