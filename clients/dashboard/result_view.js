@@ -52,7 +52,7 @@ export function statements(job) {
   }
   return [...groups.values()].map((g) => ({ applied: g.use === "applied",
     text: `${g.file}${g.others ? ` and ${g.others} other file${g.others > 1 ? "s" : ""} state` : " states"} ${g.name} ${g.value}${g.differ ? " (others state other values)" : ""}: ${g.use === "applied" ? "applied" : `not used, ${g.reason}`}` }))
-    .sort((a, b) => a.applied - b.applied);
+    .sort((a, b) => Number(a.applied) - Number(b.applied));
 }
 
 // Returns the fitted parameters of a job or of one of its models: [{set, name, unit, value, se, flags: [text], lower,
