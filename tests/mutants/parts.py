@@ -21,7 +21,7 @@ GATE = {
                     ["unit/optimizer/fit/", "unit/geometry/fibers/"], []),
     "readers": (["geometry/volume/format/", "geometry/volume/format/voxel_stream", "geometry/volume/format/volume_source", "geometry/volume/format/sample_type",
                  *(f"optimizer/photographs/reader/{name}" for name in ("declared_color", "exif", "float_dng", "integer_samples", "photograph_reader", "read_",
-                                                                       "saturation", "tiff_statements")),
+                                                                       "saturation", "tiff_statements", "xmp")),
                  *(f"optimizer/photographs/rows/{name}" for name in ("brdf_", "number_table", "table_text", "tensor_file"))],
                 ["unit/geometry/volume/", "unit/optimizer/photographs/", "api/photographs/test_measured_brdf"], []),
 }

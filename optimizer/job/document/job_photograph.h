@@ -26,6 +26,7 @@ struct job_photograph {
     size_t crop_px[4];                            /* all 0: whole picture */
     double crop_exact_px[4];                      /* the same before rounding, where markers gave it; or all 0 */
     enum job_transfer transfer;
+    bool transfer_assumed;                         /* nobody declared it: a curve that the file declares comes first */
     double exposure_s, iso, aperture, black_level; /* NaN: as the file states */
     size_t n_exposure;                             /* besides the first one, which is `file` */
     struct job_exposure *exposure;

@@ -65,7 +65,7 @@ static status first_photograph(struct bowl_pictures *p, struct error *err)
     p->height = p->photograph.height;
     status s = bowl_camera_fit(b, &p->process.lens, p->width, p->height, &p->camera, err);
     if (s != STATUS_OK || b->mask[0] == '\0') return s;
-    struct job_photograph plain = photograph_plain(JOB_TRANSFER_LINEAR);
+    struct job_photograph plain = photograph_assumed(JOB_TRANSFER_LINEAR);
     char path[4096];
     snprintf(path, sizeof path, "%s/%s", p->folder, b->mask);
     s = photograph_read(path, &plain, &p->mask, NULL, err);

@@ -19,7 +19,7 @@ static status settle_curve(const char *path, const struct photograph_request *q,
 {
     if (color->curve[0] == NULL) return STATUS_OK;
     info->curve_of_file = true;
-    if (q->transfer == JOB_TRANSFER_UNDECLARED) return STATUS_OK;
+    if (q->transfer == JOB_TRANSFER_UNDECLARED || q->transfer_assumed) return STATUS_OK;
     if (declared_color_difference(color, q->transfer) > allowed_difference)
         return error_set(err, STATUS_INVALID,
                          "cannot use photograph '%s': its %s says that its values are %s, and the document says "

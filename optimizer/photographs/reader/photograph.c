@@ -98,11 +98,20 @@ struct job_photograph photograph_plain(enum job_transfer transfer)
                                    .black_level = NAN};
 }
 
+struct job_photograph photograph_assumed(enum job_transfer transfer)
+{
+    struct job_photograph p = photograph_plain(transfer);
+    p.transfer_assumed = true;
+    return p;
+}
+
 status photograph_read_values(const char *path, const struct job_photograph *p, struct image *im,
                               struct photograph_record *record, struct error *err)
 {
-    const struct photograph_request q = {
-        .transfer = p->transfer, .black_level = p->black_level, .limit_pixel = LIMIT_PIXEL};
+    const struct photograph_request q = {.transfer = p->transfer,
+                                         .transfer_assumed = p->transfer_assumed,
+                                         .black_level = p->black_level,
+                                         .limit_pixel = LIMIT_PIXEL};
     struct photograph_record r = {0};
     status s = photograph_file_read(path, &q, im, &r.info, err);
     if (s != STATUS_OK) return s;

@@ -67,6 +67,8 @@ status photograph_measure_image(const struct image *im, const char *name, enum j
 /* Returns a photograph that declares nothing but its transfer: scale 1, no crop, exposure and black level as the file
  * states. */
 struct job_photograph photograph_plain(enum job_transfer transfer);
+/* The same for a picture whose transfer nobody declared: this one is taken where the file states no curve. */
+struct job_photograph photograph_assumed(enum job_transfer transfer);
 
 /* The crop as the file's values: neither divided by the exposure, which record states, nor scaled. */
 status photograph_read_values(const char *path, const struct job_photograph *p, struct image *im,

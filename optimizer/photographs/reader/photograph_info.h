@@ -11,6 +11,7 @@
 
 /* The request of a reader: transfer curve, black level and limits. */
 struct photograph_request {
+    bool transfer_assumed;      /* a curve that the file declares comes before `transfer` */
     enum job_transfer transfer; /* of integer samples; undeclared is an error for them */
     double black_level;         /* value of the file that stands for no light; NaN: the file's own, or 0 */
     size_t limit_pixel;

@@ -3,6 +3,7 @@
 #include "optimizer/photographs/reader/exif.h"
 #include "optimizer/photographs/reader/integer_samples.h"
 #include "optimizer/photographs/reader/photograph_reader.h"
+#include "optimizer/photographs/reader/xmp.h"
 
 #include <setjmp.h>
 #include <stdio.h>
@@ -71,6 +72,10 @@ static void take_exif(const struct jpeg_decompress_struct *jpeg, struct photogra
     for (const struct jpeg_marker_struct *m = jpeg->marker_list; m != NULL; m = m->next)
         if (m->marker == JPEG_APP0 + 1 && m->data_length > 6 && memcmp(m->data, "Exif\0\0", 6) == 0)
             exif_read_bytes(m->data, m->data_length, info);
+    static const char xmp[] = "http://ns.adobe.com/xap/1.0/"; /* its final 0 is part of the marker */
+    for (const struct jpeg_marker_struct *m = jpeg->marker_list; m != NULL; m = m->next)
+        if (m->marker == JPEG_APP0 + 1 && m->data_length > sizeof xmp && memcmp(m->data, xmp, sizeof xmp) == 0)
+            xmp_read(m->data + sizeof xmp, m->data_length - sizeof xmp, info);
 }
 
 /* The state that outlives the longjmp. */

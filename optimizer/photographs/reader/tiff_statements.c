@@ -1,6 +1,7 @@
 #include "optimizer/photographs/reader/tiff_statements.h"
 
 #include "optimizer/photographs/reader/exif.h"
+#include "optimizer/photographs/reader/xmp.h"
 
 #include <math.h>
 
@@ -53,6 +54,8 @@ status tiff_statements_read(TIFF *tiff, const char *path, struct declared_color 
     uint16_t photometric = PHOTOMETRIC_RGB;
     status s = STATUS_OK;
     take_exif(path, info);
+    if (TIFFGetField(tiff, TIFFTAG_XMLPACKET, &n_profile, &profile) && profile != NULL)
+        xmp_read(profile, n_profile, info);
     TIFFGetField(tiff, TIFFTAG_PHOTOMETRIC, &photometric);
     if (photometric == PHOTOMETRIC_MINISWHITE)
         file_ledger_add(&info->ledger, "photometric sense", NULL, "white is zero");

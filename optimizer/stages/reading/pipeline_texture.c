@@ -110,7 +110,7 @@ static status name_file(struct error *err, status s)
 static status detect(const struct texture_input *in, struct texture_guess *texture, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
-    const struct job_photograph photograph = photograph_plain(JOB_TRANSFER_SRGB);
+    const struct job_photograph photograph = photograph_assumed(JOB_TRANSFER_SRGB);
     struct image im;
     worker_folder_path(in->tools->folder, JOB_FOLDER_INPUT, in->cloth->texture, path);
     status s = photograph_read(path, &photograph, &im, NULL, err);

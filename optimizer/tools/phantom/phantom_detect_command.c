@@ -67,7 +67,8 @@ static status parse(int argc, char **argv, struct detect_option *o, struct error
 static status detect_one(const struct detect_option *o, size_t i, struct photograph_guess *g, json_t *list,
                          struct error *err)
 {
-    const struct job_photograph photograph = photograph_plain(o->srgb ? JOB_TRANSFER_SRGB : JOB_TRANSFER_LINEAR);
+    const struct job_photograph photograph =
+        o->srgb ? photograph_plain(JOB_TRANSFER_SRGB) : photograph_assumed(JOB_TRANSFER_LINEAR);
     status s = photograph_read(o->file[i], &photograph, &g->image, NULL, err);
     if (s != STATUS_OK) return s;
     const struct weave_picture picture = {g->image.pixel, g->image.width, g->image.height};

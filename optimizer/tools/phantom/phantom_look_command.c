@@ -117,7 +117,7 @@ static status measure_rendering(const struct look_option *o, double width_px, st
 static status measure_photograph(const struct look_option *o, struct weave_look *look, double *width_px,
                                  struct error *err)
 {
-    struct job_photograph p = photograph_plain(o->srgb ? JOB_TRANSFER_SRGB : JOB_TRANSFER_LINEAR);
+    struct job_photograph p = o->srgb ? photograph_plain(JOB_TRANSFER_SRGB) : photograph_assumed(JOB_TRANSFER_LINEAR);
     struct image im;
     p.scale = o->scale;
     for (int k = 0; k < 4; k++) p.crop_px[k] = (size_t)o->crop_px[k];

@@ -101,7 +101,7 @@ static void check_texture(struct input_check *c)
     struct image im;
     struct weave_guess guess;
     struct error fault = {0};
-    const struct job_photograph photograph = photograph_plain(JOB_TRANSFER_SRGB);
+    const struct job_photograph photograph = photograph_assumed(JOB_TRANSFER_SRGB);
     if (!input_check_has(c, c->section.cloth->texture)) return;
     input_check_path(c, c->section.cloth->texture, path);
     status s = photograph_read(path, &photograph, &im, NULL, &fault);

@@ -13,6 +13,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <tiffio.h>
 
 #include <cmocka.h>
 
@@ -200,6 +201,37 @@ static void test_dng(void **state)
     free(whole);
 }
 
+/* A raw file is turned as it says, as viewers show it. */
+static void test_turned_dng(void **state)
+{
+    static uint16_t mosaic[40 * 24];
+    const char *path = scratch_path(state, "turned.dng");
+    for (size_t i = 0; i < 40 * 24; i++) mosaic[i] = (uint16_t)(1000 + 100 * (i % 40 / 2) + 7 * (i / 80));
+    for (uint16_t k = 1; k <= 8; k++) {
+        struct image im;
+        struct photograph_record r;
+        assert_int_equal(dng_file_write(path, &(struct dng_picture){40, 24, 0, 16383, 0, 0, 0}, mosaic, NULL),
+                         STATUS_OK);
+        TIFF *tiff = TIFFOpen(path, "r+");
+        assert_non_null(tiff);
+        TIFFSetField(tiff, TIFFTAG_ORIENTATION, k);
+        assert_int_equal(TIFFRewriteDirectory(tiff), 1);
+        TIFFClose(tiff);
+        read_ok(path, &no_transfer, &im, &r);
+        assert_true(r.info.orientation == k && im.width == (k < 5 ? 20 : 12) && im.height == (k < 5 ? 12 : 20));
+        const bool from_right[9] = {0, 0, 1, 1, 0, 0, 0, 1, 1}, from_below[9] = {0, 0, 0, 1, 1, 0, 1, 1, 0};
+        for (size_t y = 0; y < im.height; y++)
+            for (size_t x = 0; x < im.width; x++) { /* of a column or row from 5 on, rows and columns are exchanged */
+                size_t column = k < 5 ? x : y, row = k < 5 ? y : x;
+                if (from_right[k]) column = 19 - column;
+                if (from_below[k]) row = 11 - row;
+                assert_true(fabs((double)im.pixel[3 * (y * im.width + x)] * 16383.0 -
+                                 (double)(1000 + 100 * column + 7 * row)) < 0.01);
+            }
+        image_release(&im);
+    }
+}
+
 static void test_files_that_are_missing(void **state)
 {
     static const char *const name[] = {"none.png", "none.jpg", "none.tif", "none.exr", "none.dng"};
@@ -295,6 +327,7 @@ int main(void)
         cmocka_unit_test(test_exif_of_tiff),
         cmocka_unit_test(test_jpeg),
         cmocka_unit_test(test_dng),
+        cmocka_unit_test(test_turned_dng),
         cmocka_unit_test(test_black_of_exr),
         cmocka_unit_test(test_files_that_are_missing),
         cmocka_unit_test(test_real_raw),

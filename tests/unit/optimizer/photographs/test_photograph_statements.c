@@ -308,6 +308,58 @@ static void test_tags_of_tiff(void **state)
     }
 }
 
+/* XMP as attributes, as elements, and with a list; Exif data come first. */
+static void test_xmp(void **state)
+{
+    static const char *const packet[] = {
+        "<x:xmpmeta><rdf:Description exif:ExposureTime=\"1/10\" exif:FNumber=\"80/10\" tiff:Orientation=\"6\">"
+        "<exif:ISOSpeedRatings><rdf:Seq><rdf:li>100</rdf:li></rdf:Seq></exif:ISOSpeedRatings></rdf:Description>",
+        "<exif:ShutterSpeedValue>3321928/1000000</exif:ShutterSpeedValue> <exif:ApertureValue>6/1</exif:ApertureValue>"
+        "<exifEX:PhotographicSensitivity>100</exifEX:PhotographicSensitivity><tiff:Orientation> 6 </tiff:Orientation>"};
+    static uint8_t marker[ROOM], rgb[EDGE * EDGE * 3], folder[ROOM];
+    static uint16_t word[EDGE * EDGE * 3];
+    const char *jpeg = scratch_path(state, "x.jpg"), *png = scratch_path(state, "x.png");
+    for (size_t i = 0; i < EDGE * EDGE * 3; i++) word[i] = rgb[i] = (uint8_t)(100 + i % 7);
+    for (int k = 0; k < 2; k++) {
+        struct image im;
+        struct photograph_record r;
+        memcpy(marker, "http://ns.adobe.com/xap/1.0/", 29);
+        memcpy(marker + 29, packet[k], strlen(packet[k]));
+        stated_write_jpeg(jpeg, EDGE, EDGE, rgb, &(struct file_part){NULL, 0xe1, marker, 29 + strlen(packet[k])}, 1);
+        check_exposure(jpeg, JOB_TRANSFER_SRGB, 0.1, 8.0, 100.0);
+        memcpy(marker, "XML:com.adobe.xmp\0\0\0\0", 22);
+        memcpy(marker + 22, packet[k], strlen(packet[k]));
+        const struct file_part text = {"iTXt", 0, marker, 22 + strlen(packet[k])};
+        stated_write_png(png, EDGE, EDGE, 8, 3, word, &text, 1);
+        check_exposure(png, JOB_TRANSFER_SRGB, 0.1, 8.0, 100.0);
+        read_ok(png, JOB_TRANSFER_SRGB, &im, &r);
+        image_release(&im);
+        assert_int_equal(r.info.orientation, 6);
+        const struct folder_entry exif = {0x829a, 5, 0.5, true};
+        const size_t n_folder = folder_build(true, &exif, 1, NULL, 0, folder, sizeof folder);
+        stated_write_png(png, EDGE, EDGE, 8, 3, word, (struct file_part[]){{"eXIf", 0, folder, n_folder}, text}, 2);
+        check_exposure(png, JOB_TRANSFER_SRGB, 0.5, 8.0, 100.0);
+    }
+}
+
+/* A picture whose curve nobody declared has the curve of its file, else the assumed one. */
+static void test_assumed_transfer(void **state)
+{
+    static uint16_t word[EDGE * EDGE];
+    const char *path = scratch_path(state, "assumed.png");
+    const struct file_part linear = {"gAMA", 0, "\0\1\x86\xa0", 4};
+    for (size_t i = 0; i < EDGE * EDGE; i++) word[i] = (uint16_t)(20000 + 50 * i);
+    for (size_t n = 0; n < 2; n++) {
+        struct image im;
+        const struct job_photograph p = photograph_assumed(JOB_TRANSFER_SRGB);
+        stated_write_png(path, EDGE, EDGE, 16, 1, word, &linear, n);
+        assert_int_equal(photograph_read(path, &p, &im, NULL, NULL), STATUS_OK);
+        const double v = word[7] / 65535.0, want = n == 1 ? v : pow((v + 0.055) / 1.055, 2.4);
+        assert_true(fabs((double)im.pixel[21] - want) < 1e-5);
+        image_release(&im);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -319,6 +371,8 @@ int main(void)
         cmocka_unit_test(test_grey_of_few_bits),
         cmocka_unit_test(test_orientation),
         cmocka_unit_test(test_tags_of_tiff),
+        cmocka_unit_test(test_xmp),
+        cmocka_unit_test(test_assumed_transfer),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }

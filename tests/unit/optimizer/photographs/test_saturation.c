@@ -1,5 +1,6 @@
 /* Clipped pictures of every container are found, and bright or flat ones that are not clipped are left alone. */
 #include "optimizer/job/document/job_photograph.h"
+#include "optimizer/photographs/camera/photograph_develop.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "optimizer/photographs/reader/saturation.h"
 #include "tests/support/camera_files.h"
@@ -9,6 +10,7 @@
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -141,11 +143,47 @@ static void test_floats(void **state)
     }
 }
 
+/* Two exposures of 12 bits in 16: the long one is clipped in most places, which the merged picture does not show. */
+static void test_merged(void **state)
+{
+    static uint16_t sample[2][3 * N_PIXEL];
+    struct job_exposure longer = {.exposure_s = 0.4};
+    struct job_photograph p = photograph_plain(JOB_TRANSFER_LINEAR);
+    struct photograph_process process;
+    struct photograph_record r;
+    struct image im;
+    struct error err = {0};
+    double mean[3] = {0}, want[3] = {0};
+    char folder[1024];
+    for (size_t i = 0; i < 3 * N_PIXEL; i++) {
+        const double light = 4095.0 * (0.3 + 0.06 * normal()) * (i % 3 == 2 ? 0.5 : 1.0);
+        sample[0][i] = (uint16_t)lrint(fmin(fmax(light, 0.0), 4095.0));
+        sample[1][i] = (uint16_t)lrint(fmin(fmax(4.0 * light, 0.0), 4095.0));
+        want[i % 3] += light / 65535.0 / 0.1 / N_PIXEL;
+    }
+    stated_write_png(scratch_path(state, "short.png"), EDGE, EDGE, 16, 3, sample[0], NULL, 0);
+    stated_write_png(scratch_path(state, "long.png"), EDGE, EDGE, 16, 3, sample[1], NULL, 0);
+    snprintf(folder, sizeof folder, "%s", scratch_path(state, ""));
+    snprintf(p.file, sizeof p.file, "short.png");
+    snprintf(longer.file, sizeof longer.file, "long.png");
+    p.exposure_s = 0.1;
+    p.n_exposure = 1;
+    p.exposure = &longer;
+    photograph_process_init(&process);
+    if (photograph_develop(&process, folder, &p, &im, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
+    for (size_t i = 0; i < 3 * N_PIXEL; i++) mean[i % 3] += (double)im.pixel[i] / N_PIXEL;
+    for (int c = 0; c < 3; c++)
+        if (!(fabs(mean[c] / want[c] - 1.0) < 2e-3)) fail_msg("channel %d: %g, not %g", c, mean[c], want[c]);
+    assert_true(r.saturated_share < 0.001);
+    image_release(&im);
+    photograph_process_release(&process);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_clipped),     cmocka_unit_test(test_any_level), cmocka_unit_test(test_stated),
-        cmocka_unit_test(test_not_clipped), cmocka_unit_test(test_floats),
+        cmocka_unit_test(test_not_clipped), cmocka_unit_test(test_floats),    cmocka_unit_test(test_merged),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }
