@@ -204,6 +204,14 @@ static void note_unused(const struct hair_header *h, bool groups, struct file_le
         file_ledger_add(ledger, "colors", fitted, "%g %g %g", (double)c[0], (double)c[1], (double)c[2]);
 }
 
+void fiber_import_hair_statements(const uint8_t header[HAIR_HEADER_BYTES], struct file_ledger *ledger,
+                                  double tile_size_m[2])
+{
+    bool groups;
+    const struct hair_header h = get_header(header, tile_size_m, &groups);
+    note_unused(&h, groups, ledger);
+}
+
 /* The radius of the job is for files that state none. */
 static status settle_radius(struct hair_header *h, double radius_m, const char *name, struct error *err)
 {

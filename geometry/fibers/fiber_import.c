@@ -34,6 +34,17 @@ status fiber_import(struct fiber_set *f, const char *path, const struct fiber_fi
     return s;
 }
 
+void fiber_import_statements(const char *path, struct file_ledger *ledger, double tile_size_m[2])
+{
+    uint8_t head[LOOK_BYTES] = {0};
+    tile_size_m[0] = tile_size_m[1] = 0.0;
+    FILE *file = fopen(path, "rbe");
+    if (file == NULL) return;
+    if (fread(head, 1, sizeof head, file) == sizeof head && memcmp(head, "HAIR", 4) == 0)
+        fiber_import_hair_statements(head, ledger, tile_size_m);
+    fclose(file);
+}
+
 status fiber_set_read_hair(struct fiber_set *f, const char *path, struct error *err)
 {
     return fiber_import_hair(f, path, &(struct fiber_file_terms){.radius_m = NAN}, err);

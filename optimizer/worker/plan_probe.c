@@ -62,7 +62,7 @@ static double path_share_of_file(const struct job_plan *plan)
     worker_folder_path(plan->tools->folder, JOB_FOLDER_INPUT, plan->in->section.cloth->fiber_file, path);
     if (stat(path, &file) != 0 || file.st_size > FIBER_FILE_MOST_BYTES) return share;
     fiber_set_init(&f);
-    if (fiber_file_read(path, plan->in->section.cloth, &f, NULL, NULL) == STATUS_OK) share = plan_probe_path_share(&f);
+    if (fiber_file_read(path, plan->in->section.cloth, &f, NULL) == STATUS_OK) share = plan_probe_path_share(&f);
     fiber_set_release(&f);
     return share;
 }

@@ -168,7 +168,8 @@ status cli_reconstruct(struct cli *cli, int *exit_code, struct error *err)
     if (s == STATUS_OK) s = cli_submit_document(cli, document, folder, id, err);
     if (s == STATUS_OK) s = cli_watch_job(cli, id, exit_code, err);
     if (s == STATUS_OK && *exit_code == CLI_EXIT_OK) s = cli_results_to_out(cli, id, err);
-    if (s != STATUS_OK && s != STATUS_CONFLICT && id[0] != '\0') /* a conflict is a job that has failed */
+    if (s != STATUS_OK && s != STATUS_CONFLICT && s != STATUS_INVALID &&
+        id[0] != '\0') /* a conflict is a job that has failed */
         fprintf(cli->note, "continue with: selvedge watch %s, then selvedge results %s\n", id, id);
     json_decref(document);
     return s;

@@ -8,6 +8,7 @@
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_fit_option.h"
 #include "optimizer/job/document/job_profile.h"
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/job_rows.h"
 #include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/document/job_setup.h"
@@ -24,6 +25,8 @@
 #include "optimizer/stages/reading/texture_start.h"
 #include "optimizer/stages/run/worker_folder.h"
 #include "optimizer/stages/scene/draft_file.h"
+#include "optimizer/stages/scene/fiber_file.h"
+#include "optimizer/stages/scene/mesh_file.h"
 #include "optimizer/stages/scene/pipeline_adopt.h"
 #include "optimizer/stages/scene/pipeline_volume.h"
 #include "optimizer/stages/scene/scan_order.h"
@@ -299,6 +302,23 @@ static status read_draft(const struct stage_tools *tools, const struct job_input
     return s;
 }
 
+/* Statements of the fiber file and of meshes, which later stages read. */
+static status examine_files(const struct stage_tools *tools, const struct job_inputs *in, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    const struct job_results *results = in->section.results;
+    status s = STATUS_OK;
+    worker_folder_path(tools->folder, JOB_FOLDER_INPUT, in->section.cloth->fiber_file, path);
+    if (in->section.cloth->fiber_file[0] != '\0') fiber_file_note(path, in->section.cloth, in->files);
+    for (size_t i = 0; i < results->n_surface_picture && s == STATUS_OK; i++) {
+        const struct job_surface_picture *p = &results->surface_picture[i];
+        if (p->on != JOB_ON_MESH) continue;
+        worker_folder_path(tools->folder, JOB_FOLDER_INPUT, p->mesh_file, path);
+        s = mesh_file_examine(path, p, i, in->files, &tools->warn, err);
+    }
+    return s;
+}
+
 status job_inputs_read(const struct stage_tools *tools, struct job_inputs *in, struct error *err)
 {
     in->files = json_array();
@@ -308,6 +328,7 @@ status job_inputs_read(const struct stage_tools *tools, struct job_inputs *in, s
     if (s == STATUS_OK && in->section.scan->n_file > 0)
         s = scan_examine(tools->folder, in->section.scan, in->files, err);
     if (s == STATUS_OK) s = read_draft(tools, in, err);
+    if (s == STATUS_OK) s = examine_files(tools, in, err);
     if (s == STATUS_OK) s = read_rows(tools, in, err);
     if (s == STATUS_OK && tools->folder->lock_fd >= 0)
         s = pipeline_adopt_geometry(tools, in->section.scan->geometry_job, err);

@@ -1,4 +1,5 @@
 #include "optimizer/stages/scene/fiber_file.h"
+#include "base/files/file_ledger_json.h"
 #include "base/option_id.h"
 #include "geometry/fibers/fiber_import.h"
 #include "optimizer/job/options/option_key.h"
@@ -27,27 +28,27 @@ static status check_radii(const struct fiber_set *f, const char *name, struct er
     return STATUS_OK;
 }
 
-/* States in the ledger which tile is taken. */
-static void note_tile(const struct fiber_set *f, const struct job_cloth *cloth, struct file_ledger *ledger)
+void fiber_file_note(const char *path, const struct job_cloth *cloth, json_t *files)
 {
-    const double *tile_m = f->tile_size_m;
+    double tile_m[2];
+    struct file_ledger ledger = {0};
     const bool given = !isnan(cloth->tile_mm[0]);
+    fiber_import_statements(path, &ledger, tile_m);
     if (tile_m[0] > 0.0)
-        file_ledger_add(ledger, "tile", given ? "the job states it" : NULL, "%g x %g mm", tile_m[0] / mm,
+        file_ledger_add(&ledger, "tile", given ? "the job states it" : NULL, "%g x %g mm", tile_m[0] / mm,
                         tile_m[1] / mm);
+    file_ledger_append(files, cloth->fiber_file, &ledger);
 }
 
-status fiber_file_read(const char *path, const struct job_cloth *cloth, struct fiber_set *f, struct file_ledger *ledger,
-                       struct error *err)
+status fiber_file_read(const char *path, const struct job_cloth *cloth, struct fiber_set *f, struct error *err)
 {
     const char *name = cloth->fiber_file;
-    const struct fiber_file_terms terms = {.radius_m = cloth->fiber_radius_um * um, .ledger = ledger};
+    const struct fiber_file_terms terms = {.radius_m = cloth->fiber_radius_um * um, .ledger = NULL};
     status s = fiber_import(f, path, &terms, err);
     if (s != STATUS_OK) {
         if (err != NULL && err->field[0] == '\0') snprintf(err->field, sizeof err->field, OPTION_FIBER_FILE);
         return s;
     }
-    note_tile(f, cloth, ledger);
     for (int a = 0; a < 2; a++)
         if (!isnan(cloth->tile_mm[a])) f->tile_size_m[a] = cloth->tile_mm[a] * mm;
     if (!(f->tile_size_m[0] > 0.0 && f->tile_size_m[1] > 0.0))

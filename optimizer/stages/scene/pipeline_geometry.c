@@ -208,7 +208,7 @@ static status read_fiber_file(const struct fibers_input *in, struct fibers_outpu
 {
     char path[WORKER_PATH_BYTES];
     worker_folder_path(in->tools->folder, JOB_FOLDER_INPUT, in->cloth->fiber_file, path);
-    status s = fiber_file_read(path, in->cloth, &out->fiber, NULL, err);
+    status s = fiber_file_read(path, in->cloth, &out->fiber, err);
     if (s == STATUS_OK) fiber_file_warn(&out->fiber, in->cloth, &in->tools->warn);
     return s;
 }

@@ -56,12 +56,11 @@ static void check_fibers(struct input_check *c)
     char path[INPUT_PATH_BYTES];
     struct fiber_set f;
     struct error fault = {0};
-    struct file_ledger ledger = {0};
     if (!input_check_has(c, c->section.cloth->fiber_file)) return;
     input_check_path(c, c->section.cloth->fiber_file, path);
     fiber_set_init(&f);
-    status s = fiber_file_read(path, c->section.cloth, &f, &ledger, &fault);
-    if (s == STATUS_OK) file_ledger_append(c->files, c->section.cloth->fiber_file, &ledger);
+    status s = fiber_file_read(path, c->section.cloth, &f, &fault);
+    if (s == STATUS_OK) fiber_file_note(path, c->section.cloth, c->files);
     if (s == STATUS_OK) fiber_file_warn(&f, c->section.cloth, &(struct warning_sink){input_check_warn, c});
     if (s != STATUS_OK) input_check_fault(c, &fault);
     fiber_set_release(&f);

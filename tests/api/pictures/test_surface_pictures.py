@@ -143,7 +143,7 @@ def test_a_cylinder_may_be_wrapped_all_around(real):
 def test_a_mesh_that_cannot_be_used_is_found_before_the_fit(real, obj, words):
     mesh = {"on": "mesh", "mesh_file": "sheet.obj", **VIEW}
     _, done = run(real, document({"on": "flat", **VIEW}, mesh), obj)
-    assert done["state"] == "failed" and done["stage"] == "scene" and done["error"]["field"] == "pictures[1].mesh_file"
+    assert done["state"] == "failed" and done["stage"] == "volume" and done["error"]["field"] == "pictures[1].mesh_file"
     assert all(w in done["error"]["text"] for w in words), done["error"]
 
 

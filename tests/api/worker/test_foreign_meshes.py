@@ -5,7 +5,7 @@ import subprocess
 
 import pytest
 from daemon_under_test import program
-from small_cloth import TABLE
+from small_cloth import TABLE, hair
 
 pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
 
@@ -53,3 +53,24 @@ def test_cloth_that_stretches_a_little_is_no_question(tmp_path):
 def test_what_the_mesh_states_beside_its_surface_is_listed(tmp_path):
     report = check(tmp_path, ("mtllib a.mtl\nusemtl red\n" + FULL + "vn 0 0 1\nf 1/1/1 2/2/1 3/3/1 4/4/1\n").encode())
     assert "m.obj" in json.dumps(report["files"]) and "material library" in json.dumps(report["files"])
+
+
+@pytest.mark.slow
+def test_the_result_of_a_run_has_the_warning_and_the_statements(tmp_path):
+    mesh = "usemtl red\n" + POINTS + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n"
+    check(tmp_path, mesh.encode())
+    document = json.loads((tmp_path / "job.json").read_text())
+    document["fit"].update(max_iterations=1, path_budget=1000, render_px=8, render_samples=1)
+    document.update(fibers={"file": "y.hair", "voxel_um": 5})
+    del document["cloth"]
+    (tmp_path / "input").mkdir()
+    for name in ("m.obj", "rows.csv"):
+        (tmp_path / name).rename(tmp_path / "input" / name)
+    (tmp_path / "input" / "y.hair").write_bytes(hair())
+    (tmp_path / "job.json").write_text(json.dumps(document))
+    done = subprocess.run([program("selvedge-worker"), "--quiet", str(tmp_path)], capture_output=True, text=True, check=False)
+    status = json.loads((tmp_path / "status.json").read_text())
+    assert any("100 times the area of its texture" in w for w in status["warnings"]), done.stderr
+    result = json.loads((tmp_path / "results" / "result.json").read_text())
+    stated = {f["file"]: [s["name"] for s in f["statements"]] for f in result["files"]}
+    assert stated == {"m.obj": ["material"], "y.hair": ["tile"]}
