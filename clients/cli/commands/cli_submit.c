@@ -284,7 +284,8 @@ static status start_job(struct submit *u, struct error *err)
     return s == STATUS_OK ? s : error_prefix(err, s, "cannot start the job");
 }
 
-/* Prints every fault and warning that the server's worker finds in the files. STATUS_INVALID when there are faults. */
+/* Prints every fault and warning that the server's worker finds in the files, and the statements of the files.
+ * STATUS_INVALID when there are faults. */
 static status judge_files(struct submit *u, struct error *err)
 {
     char path[256];
@@ -294,6 +295,7 @@ static status judge_files(struct submit *u, struct error *err)
     if (s != STATUS_OK) return error_prefix(err, s, "cannot have the files judged");
     const size_t n = cli_print_faults(json_object_get(report, "errors"), "fault", u->cli->note);
     cli_print_faults(json_object_get(report, "warnings"), "warning", u->cli->note);
+    cli_print_statements(json_object_get(report, "files"), u->cli->note);
     json_decref(report);
     return n == 0 ? STATUS_OK
                   : error_set(err, STATUS_INVALID, "the input has %zu fault%s, so the job is not started", n,

@@ -46,8 +46,15 @@ static void read_lengths(const char *text, const double px_per_unit[2], struct v
         if (a == 2 && value_of(text, "spacing", value, sizeof value)) size_m[2] = metre * fabs(strtod(value, NULL));
         if (!isfinite(size_m[a])) size_m[a] = NAN;
     }
+    const bool of_prints = length_unit_m(unit[0], strlen(unit[0])) >= 0.01; /* inches, centimetres */
+    if (of_prints && size_m[0] >= MOST_PRINT_VOXEL_M) {
+        file_ledger_add(&info->ledger, "resolution", "it is no size of a voxel", "%g pixels per %s (ImageJ)",
+                        px_per_unit[0], unit[0]);
+        return;
+    }
     volume_state_voxel_size(info, size_m, "ImageJ");
-    info->is_weak_size = px_per_unit[0] == 1.0 && px_per_unit[1] == 1.0; /* what tifffile writes by default */
+    /* one pixel per unit is what tifffile writes by default */
+    info->is_weak_size = of_prints || (px_per_unit[0] == 1.0 && px_per_unit[1] == 1.0);
     if (isnan(info->voxel_size_m[0]) && unit[0][0] != '\0')
         file_ledger_add(&info->ledger, "unit of length", "no voxel size comes from it", "%s", unit[0]);
 }

@@ -4,6 +4,9 @@
 
 #include "geometry/volume/format/volume_info.h"
 
+/* Edge from which on a resolution in pixels per inch or centimetre is for prints, and no size of a voxel. */
+#define MOST_PRINT_VOXEL_M 1e-4
+
 /* Returns the metres of a unit, the n bytes at text: "um", "micron", "mm", "cm", "m", "nm", "inch" and their like, in
  * upper or lower case, in UTF-8, in Latin-1, or with ImageJ's escape for the letter mu. NaN for other words. */
 double length_unit_m(const char *text, size_t n);

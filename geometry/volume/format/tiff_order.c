@@ -42,7 +42,7 @@ static void state_resolution(TIFF *tiff, struct volume_source_info *info)
     if (isnan(px[0]) || isnan(px[1]) || !isnan(info->voxel_size_m[0])) return;
     const char *word = unit == RESUNIT_CENTIMETER ? "cm" : unit == RESUNIT_INCH ? "inch" : "no unit";
     for (int a = 0; a < 2; a++) size_m[a] = unit == RESUNIT_NONE ? NAN : length_unit_m(word, strlen(word)) / px[a];
-    if (size_m[0] < 1e-4 && size_m[1] < 1e-4) {
+    if (size_m[0] < MOST_PRINT_VOXEL_M && size_m[1] < MOST_PRINT_VOXEL_M) {
         volume_state_voxel_size(info, size_m, "resolution tags");
         info->is_weak_size = true;
     } else if (unit != RESUNIT_NONE || px[0] != 1.0 || px[1] != 1.0)

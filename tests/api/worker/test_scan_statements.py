@@ -196,7 +196,8 @@ def test_lengths_of_a_tiff_apply(tmp_path, tags, value):
 
 
 @pytest.mark.parametrize("tags", [[tag(296, 3, 2), tag(282, 5, (72, 1)), tag(283, 5, (72, 1))], [imagej(slices=Z, unit="pixel", spacing=2)],
-                                  [tag(296, 3, 1), tag(282, 5, (1, 1)), tag(283, 5, (1, 1))]], ids=["72-dpi", "pixel", "ratio"])
+                                  [imagej(images=Z, slices=Z, unit="inch"), tag(296, 3, 2), tag(282, 5, (100, 1)), tag(283, 5, (100, 1))],
+                                  [tag(296, 3, 1), tag(282, 5, (1, 1)), tag(283, 5, (1, 1))]], ids=["72-dpi", "pixel", "inches-of-imagej", "ratio"])
 def test_a_resolution_that_is_no_length_is_not_used(tmp_path, tags):
     assert fault(check(tmp_path, "s.tif", tiff([slope()] * Z, W, H, first=tags)))[0] == "volume.voxel_size_um"
     assert check(tmp_path, "s.tif", tiff([slope()] * Z, W, H, first=tags), voxel_size_um=2)["faults"] == []

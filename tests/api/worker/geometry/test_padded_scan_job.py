@@ -7,7 +7,7 @@ import subprocess
 
 import pytest
 from daemon_under_test import program
-from scan_file import page16, tiff
+from scan_file import imagej, page16, tag, tiff
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
 
@@ -50,3 +50,14 @@ def test_padding_is_neither_void_nor_material(tmp_path):
         assert geometry["radius_um"][2] == pytest.approx(whole["geometry"]["radius_um"][2], rel=0.05)
         assert "padding, which is no measurement, reaches into the tile" in json.dumps(warnings)
         assert padded["verdict"]["code"] != "good"
+
+
+def test_reconstruct_prints_what_the_scan_states(tmp_path, real):
+    (tmp_path / "s.tif").write_bytes(tiff(pages(0), N, N, first=[imagej(images=40, slices=40, unit="um", spacing=2), tag(282, 5, (1, 2)), tag(283, 5, (1, 2))]))
+    command = [program("selvedge"), "--server", real.url, "reconstruct", str(tmp_path / "s.tif"), "--out", str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "s.tif states voxel size 2 x 2 x 2 um (ImageJ): applied" in done.stderr
+    assert "s.tif states padding value 0 in 2" in done.stderr
+    result = json.loads(next((tmp_path / "out").rglob("result.json")).read_text())
+    assert {s["name"] for s in result["files"][0]["statements"]} == {"voxel size", "padding value"}
