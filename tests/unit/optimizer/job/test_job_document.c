@@ -30,7 +30,7 @@ static void test_defaults(void **state)
     assert_true(d->scan->given);
     assert_string_equal(d->scan->file[0], "scan.tif");
     assert_true(d->scan->voxel_size_um[2] == 2.0);
-    assert_string_equal(d->scan->axes, "xyz");
+    assert_string_equal(d->scan->axes, "");
     assert_true(isnan(d->scan->density_low) && isnan(d->scan->filter_s) && isnan(d->scan->radius_um) &&
                 isnan(d->fit->model[0].fixed[0]) && isnan(d->fit->model[0].start[8]));
     assert_true(d->setup->lamp_side_cm == 10.0 && d->setup->lamp_distance_cm == 61.0 &&
