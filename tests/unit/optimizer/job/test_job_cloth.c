@@ -132,8 +132,8 @@ static void test_mistakes_are_named(void **state)
 {
     (void)state;
     job_document_check_error(CLOTH("\"weave\":\"tweed\""), "cloth.weave", "twill31");
-    job_document_check_error(CLOTH("\"seed\":1"), "cloth.weave", "either");
-    job_document_check_error(CLOTH("\"weave\":\"plain\",\"draft\":[\"10\",\"01\"]"), "cloth.weave", "either");
+    job_document_check_error(CLOTH("\"seed\":1"), "cloth.weave", "takes one of");
+    job_document_check_error(CLOTH("\"weave\":\"plain\",\"draft\":[\"10\",\"01\"]"), "cloth.weave", "takes one of");
     job_document_check_error(CLOTH("\"draft\":[\"10\",\"011\"]"), "cloth.draft", "does not repeat");
     job_document_check_error(CLOTH("\"draft\":[\"10\",\"10\"]"), "cloth.draft", "never crosses");
     job_document_check_error(CLOTH("\"weave\":\"plain\",\"warp\":[0,1]"), "cloth.warp", "one of the 1 kinds");
