@@ -56,6 +56,7 @@
 #define OPTION_CAMERA_NOISE "camera_noise"
 #define OPTION_DARK_FRAMES "dark_frames"
 #define OPTION_COLOR_CHART "color_chart"
+#define OPTION_CHART_REFERENCE "chart_reference"
 #define OPTION_COLOR_WHITE "color_white"
 /* the measurements */
 #define OPTION_MEASUREMENT_FILE "measurement_file"

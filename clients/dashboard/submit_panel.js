@@ -24,6 +24,7 @@ function filesOf(doc) {
   add(doc.camera?.noise_file, "camera_noise");
   for (const name of doc.camera?.dark_frames ?? []) add(name, "dark_frame");
   add(doc.color?.chart?.file, "chart");
+  add(doc.color?.chart?.reference, "measurements");
   add(doc.color?.white?.file, "white_reference");
   for (const p of doc.photographs ?? []) for (const q of [p, ...(p?.more_exposures ?? [])]) add(q?.file, "photograph");
   add(doc.profile?.bowl?.mask, "photograph");

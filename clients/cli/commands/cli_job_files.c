@@ -54,6 +54,7 @@ static const struct named_file named[] = {
     {{"rig", NULL}, "file", "rig", "rig.file"},
     {{"camera", NULL}, "noise_file", "camera_noise", "camera.noise_file"},
     {{"color", "chart"}, "file", "chart", "color.chart.file"},
+    {{"color", "chart"}, "reference", "measurements", "color.chart.reference"},
     {{"color", "white"}, "file", "white_reference", "color.white.file"},
 };
 

@@ -23,6 +23,7 @@ def files_of(document: Document) -> list[tuple[str, str]]:
     names += [(camera["noise_file"], "camera_noise")] if "noise_file" in camera else []
     names += [(name, "dark_frame") for name in camera.get("dark_frames", [])]
     names += [(color[key]["file"], role) for key, role in (("chart", "chart"), ("white", "white_reference")) if key in color]
+    names += [(color["chart"]["reference"], "measurements")] if "reference" in color.get("chart", {}) else []
     for p in document.get("photographs", []):
         names += [(q["file"], "photograph") for q in (p, *p.get("more_exposures", []))]
     bowl = document.get("profile", {}).get("bowl", {})

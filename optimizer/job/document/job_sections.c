@@ -57,6 +57,8 @@ void job_sections_visit_files(const struct job_sections *section,
     for (size_t i = 0; i < section->setup->n_dark_frame; i++)
         visit(context, section->setup->dark_frame[i], "dark_frame");
     if (section->setup->chart.file[0] != '\0') visit(context, section->setup->chart.file, "chart");
+    if (section->setup->chart_reference_file[0] != '\0')
+        visit(context, section->setup->chart_reference_file, "measurements");
     if (section->setup->white.file[0] != '\0') visit(context, section->setup->white.file, "white_reference");
     for (size_t i = 0; i < section->rows->n_photograph; i++) {
         visit(context, section->rows->photograph[i].file, "photograph");
@@ -112,6 +114,7 @@ void job_sections_file_key(const struct job_sections *section, const char *name,
                   {section->profile->bowl.mask, "profile.bowl.mask"},
                   {section->setup->noise_file, "camera.noise_file"},
                   {section->setup->chart.file, "color.chart.file"},
+                  {section->setup->chart_reference_file, "color.chart.reference"},
                   {section->setup->white.file, "color.white.file"}};
     snprintf(key, n_key, "%s", "");
     for (size_t i = 0; i < sizeof single / sizeof single[0]; i++)

@@ -21,6 +21,7 @@ struct job_setup {
     double chart_corner_px[8]; /* NaN: found in the picture */
     double chart_cloth_px[2];  /* place of the cloth in the chart's picture; NaN: the middle of the chart */
     bool chart_from_2014;      /* made in November 2014 or later */
+    char chart_reference_file[JOB_MAX_NAME_BYTES]; /* colors of the patches; "": of a ColorChecker */
     double white_reflectance[3];
     double environment_rgb[3];
     char environment_file[JOB_MAX_NAME_BYTES]; /* "" when none is given */

@@ -41,6 +41,13 @@ const struct job_option option_rows_camera[] = {
      .meaning =
          "When the chart was made: before November 2014, or then and later (X-Rite changed its colors; the year is "
          "on its back). The white patches differ by 4 %, and so does the scale."},
+    {.path = "color.chart.reference",
+     .kind = OPTION_FILE_NAME,
+     .id = OPTION_CHART_REFERENCE,
+     INTO(setup, chart_reference_file),
+     .left_out = "the colors of `edition`",
+     .allowed = "`.csv`: columns L, a, b or X, Y, Z (D50), 24 rows",
+     .meaning = "Colors of another chart's patches, row by row. Role: `measurements`."},
     {.path = "color.chart.light_theta_deg",
      .kind = OPTION_NUMBER,
      INTO(setup, chart.light_theta_deg),
@@ -64,7 +71,7 @@ const struct job_option option_rows_camera[] = {
      .unit = "pixels",
      .left_out = "the middle of the chart",
      .allowed = "x, y",
-     .meaning = "Where the cloth lies in this picture: scale and light are those of this place."},
+     .meaning = "Where the cloth lies in this picture; the scale holds there."},
     {.path = "color.white",
      .kind = OPTION_SECTION,
      INTO(setup, has_white),

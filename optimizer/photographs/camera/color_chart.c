@@ -253,7 +253,7 @@ static status judge(const struct color_chart *k, const struct warning_sink *warn
         return error_set(err, STATUS_INVALID,
                          "its colors are not those of a ColorChecker: by the matrix of the other patches each differs "
                          "by %.1f (CIEDE2000) in the mean, '%s' by %.0f; check the order of the corners, shadows, "
-                         "reflections and the edition",
+                         "reflections and the edition; for a chart of another maker give its colors ('reference')",
                          mean, color_chart_patch_name(k->worst), k->delta_e_left_out[k->worst]);
     if (mean > warn_delta_e)
         warning_send(warn, OPTION_COLOR_CHART,
@@ -309,7 +309,10 @@ status color_chart_measure(struct color_chart *k, const struct image *im, double
     status s = check_size(k->corner_px, err);
     k->white = 0;
     for (size_t i = 0; i < COLOR_CHART_PATCHES && s == STATUS_OK; i++) {
-        color_chart_reference(k->from_2014, i, k->wanted_rgb[i]);
+        if (k->reference != NULL)
+            memcpy(k->wanted_rgb[i], k->reference[i], sizeof k->wanted_rgb[i]);
+        else
+            color_chart_reference(k->from_2014, i, k->wanted_rgb[i]);
         for (size_t c = 0; c < 3; c++) k->wanted_rgb[i][c] *= cos(light_theta_rad);
         if (k->wanted_rgb[i][1] > k->wanted_rgb[k->white][1]) k->white = i;
         s = measure_patch(k, im, i, saturation, err);

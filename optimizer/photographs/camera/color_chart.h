@@ -16,7 +16,8 @@
 enum { COLOR_CHART_ROWS = 4, COLOR_CHART_COLUMNS = 6 };
 
 struct color_chart {
-    bool from_2014; /* in: the chart was made in November 2014 or later */
+    bool from_2014;               /* in: the chart was made in November 2014 or later */
+    const double (*reference)[3]; /* in: colors of another chart's patches, of the caller; NULL: of a ColorChecker */
     bool found_automatically;
     double corner_px[8]; /* x, y: outer corners of the patches dark skin, bluish green, black, white */
     double measured_rgb[COLOR_CHART_PATCHES][3]; /* means over the middle of each patch */

@@ -128,16 +128,28 @@ static double saturation_of(const struct photograph_record *r)
     return 0.999999 * photograph_saturation(&r->info) / r->exposure;
 }
 
+static status read_reference(const struct job_setup *setup, const char *folder, double rgb[COLOR_CHART_PATCHES][3],
+                             struct error *err)
+{
+    char path[PATH_BYTES];
+    if (setup->chart_reference_file[0] == '\0') return STATUS_OK;
+    snprintf(path, sizeof path, "%s/%s", folder, setup->chart_reference_file);
+    return color_chart_reference_read(path, rgb, err);
+}
+
 static status load_chart(struct photograph_process *k, const struct job_setup *setup, const char *folder,
                          struct error *err)
 {
     struct image im;
     struct photograph_record r;
-    status s = photograph_develop(k, folder, &setup->chart, &im, &r, err);
+    double reference[COLOR_CHART_PATCHES][3];
+    status s = read_reference(setup, folder, reference, err);
+    if (s == STATUS_OK) s = photograph_develop(k, folder, &setup->chart, &im, &r, err);
     if (s != STATUS_OK) return s;
     memcpy(k->chart.corner_px, setup->chart_corner_px, sizeof k->chart.corner_px);
     memcpy(k->chart.scale_at_px, setup->chart_cloth_px, sizeof k->chart.scale_at_px);
     k->chart.from_2014 = setup->chart_from_2014;
+    k->chart.reference = setup->chart_reference_file[0] != '\0' ? (const double(*)[3])reference : NULL;
     s = color_chart_find(&im, k->chart.corner_px, &k->chart.found_automatically, err);
     if (s == STATUS_NOT_FOUND)
         s = error_set(err, STATUS_INVALID, "no chart was found: give the corners of its patches ('corners_px')");
@@ -145,6 +157,7 @@ static status load_chart(struct photograph_process *k, const struct job_setup *s
         s = color_chart_measure(&k->chart, &im, saturation_of(&r), setup->chart.light_theta_deg * RAD_PER_DEG, k->warn,
                                 err);
     if (s == STATUS_OK) s = color_chart_picture(&k->chart, &im, &k->chart_picture, err);
+    k->chart.reference = NULL;
     image_release(&im);
     if (s != STATUS_OK) return error_prefix(err, s, "cannot use color chart '%s'", setup->chart.file);
     memcpy(k->matrix, k->chart.fit.matrix, sizeof k->matrix);

@@ -17,6 +17,12 @@ CORNERS = [MARGIN, MARGIN, MARGIN + 6 * PATCH + 5 * GAP, MARGIN, MARGIN + 6 * PA
            MARGIN + 4 * PATCH + 3 * GAP]
 
 
+def xyz(lab):
+    fy = (lab[0] + 16) / 116
+    return [100 * w * (f**3 if f > 6 / 29 else (116 * f - 16) * 27 / 24389)
+            for w, f in zip((0.96422, 1, 0.82521), (fy + lab[1] / 500, fy, fy - lab[2] / 200))]
+
+
 def code(rng, linear):
     """8 bits of the sRGB curve, dithered by the noise of a camera."""
     linear = min(max(linear * (1 + 0.01 * rng.gauss(0, 1)), 0), 1)
@@ -81,3 +87,21 @@ def test_a_chart_of_another_maker(tmp_path):
     random.Random(2).shuffle(patches)
     done = photo(tmp_path, patches + [reflectance(lab) for lab in LAB[18:]], 0.0)
     assert done.returncode == 1 and "its colors are not those of a ColorChecker" in done.stderr and "CIEDE2000" in done.stderr, done.stdout
+
+
+@pytest.mark.parametrize("head", ["Name,L,a,b", "Name;X;Y;Z"])
+def test_a_chart_of_another_maker_with_its_colors(tmp_path, head):
+    order = list(range(18))
+    random.Random(2).shuffle(order)
+    labs = [LAB[i] for i in order + list(range(18, 24))]
+    rows = labs if "L" in head else [xyz(lab) for lab in labs]
+    sign = head[4]
+    table = "# colors\n" + "\n".join([head] + [sign.join([f"p{i}", *(f"{v:.4f}" for v in row)]) for i, row in enumerate(rows)]) + "\n"
+    (tmp_path / "colors.csv").write_text(table)
+    done = photo(tmp_path, [reflectance(lab) for lab in labs], 0.0, reference="colors.csv")
+    assert done.returncode == 0, done.stderr
+    row = json.loads((tmp_path / "rows.json").read_text())[0]
+    assert row["mean_rgb"] == pytest.approx(CLOTH, rel=0.05)
+    (tmp_path / "colors.csv").write_text("\n".join(table.splitlines()[:-1]))
+    done = photo(tmp_path, [reflectance(lab) for lab in labs], 0.0, reference="colors.csv")
+    assert done.returncode == 1 and "'colors.csv': it has 23 rows, a chart has 24" in done.stderr
