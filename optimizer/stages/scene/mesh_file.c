@@ -33,7 +33,7 @@ status mesh_file_examine(const char *path, const struct job_surface_picture *pic
         warn_stretch(option, picture->mesh_file, &m, warn);
         file_ledger_append(files, picture->mesh_file, &ledger);
     } else if (err != NULL)
-        snprintf(err->field, sizeof err->field, "%s", option);
+        snprintf(err->field, sizeof err->field, OPTION_MESH_FILE "[%zu]", i);
     mesh_release(&m);
     return s == STATUS_OK ? s : error_prefix(err, s, "picture %zu", i + 1);
 }
