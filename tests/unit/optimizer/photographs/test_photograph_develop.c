@@ -16,6 +16,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <tiffio.h>
 
 #include <cmocka.h>
 
@@ -292,6 +293,16 @@ static void check_refused(void **state, const char *camera_keys, const char *pho
     job_document_free(doc);
 }
 
+/* States that the picture is to be shown after half a turn. */
+static void turn_file(const char *path)
+{
+    TIFF *tiff = TIFFOpen(path, "r+");
+    assert_non_null(tiff);
+    TIFFSetField(tiff, TIFFTAG_ORIENTATION, ORIENTATION_BOTRIGHT);
+    assert_int_equal(TIFFRewriteDirectory(tiff), 1);
+    TIFFClose(tiff);
+}
+
 static void test_refused(void **state)
 {
     static uint16_t word[EDGE * EDGE * 3];
@@ -309,6 +320,16 @@ static void test_refused(void **state)
                   "{\"file\":\"low.tif\",\"transfer\":\"linear\",\"more_exposures\":[{\"file\":\"iso.tif\"}]," ANGLES
                   "}",
                   "", "different ISO values");
+    turn_file(scratch_path(state, "iso.tif"));
+    check_refused(state, "",
+                  "{\"file\":\"low.tif\",\"transfer\":\"linear\",\"more_exposures\":[{\"file\":\"iso.tif\"}]," ANGLES
+                  "}",
+                  "", "different orientations");
+    camera_write_tiff(scratch_path(state, "dark.tif"),
+                      &(struct camera_tiff){EDGE, EDGE, 3, 16, .exposure_s = 0.01, .iso = 100, .aperture = 8}, word);
+    turn_file(scratch_path(state, "dark.tif"));
+    check_refused(state, "\"dark_frames\":[\"dark.tif\"]", "{\"file\":\"low.tif\",\"transfer\":\"linear\"," ANGLES "}",
+                  "", "its orientation is 1, its dark frame's is 3");
     check_refused(state, "", "{\"file\":\"a.dng\"," ANGLES "},{\"file\":\"a.tif\",\"transfer\":\"linear\"," ANGLES "}",
                   "", "'a.tif': its exposure time is not known, but that of 'a.dng' is");
     check_refused(state, "", "{\"file\":\"a.dng\"," ANGLES "}",
