@@ -10,8 +10,6 @@
 enum { NOTE_BYTES = 400 };
 
 static _Thread_local char note[NOTE_BYTES];
-static bool writes_report;
-
 void reading_note_set(const char *reader, const char *path)
 {
     char text[NOTE_BYTES];
@@ -26,6 +24,10 @@ void reading_note_set(const char *reader, const char *path)
 }
 
 const char *reading_note_text(void) { return note; }
+
+#ifndef SELVEDGE_NO_SANDBOX
+
+static bool writes_report;
 
 /* Appends text to a buffer of n_room bytes, from which n are used. Returns the new number. */
 static size_t append(char *to, size_t n, size_t n_room, const char *text)
@@ -60,12 +62,14 @@ static void on_crash(int signal_number)
 
 void reading_note_on_crash(bool as_report)
 {
-#ifdef SELVEDGE_NO_SANDBOX
-    (void)as_report;
-#else
     static const int number[] = {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT};
     struct sigaction action = {.sa_handler = on_crash, .sa_flags = (int)SA_RESETHAND};
     writes_report = as_report;
     for (size_t i = 0; i < sizeof number / sizeof *number; i++) sigaction(number[i], &action, NULL);
-#endif
 }
+
+#else
+
+void reading_note_on_crash(bool as_report) { (void)as_report; }
+
+#endif
