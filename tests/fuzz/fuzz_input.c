@@ -61,7 +61,7 @@ void fuzz_volume(const volume_reader *reader, const uint8_t *data, size_t size)
     struct volume_source_info info = {0};
     struct error err = {0};
     void *handle = NULL;
-    status s = reader->open(&path, 1, &handle, &info, &err);
+    status s = reader->open(&path, 1, NULL, &handle, &info, &err);
     fuzz_check_error(s, &err);
     if (s == STATUS_OK) fuzz_read_slices(reader, handle, &info);
 }
