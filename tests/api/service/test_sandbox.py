@@ -210,8 +210,8 @@ def test_what_a_worker_gets_of_the_daemon(daemon_maker):
 
 
 def bomb(edge, n_page):
-    """A TIFF of n_page pages of edge x edge zeros, all with the same deflated strip."""
-    strip = zlib.compress(bytes(edge) * edge, 9)
+    """A TIFF of n_page pages of edge x edge pixels, half of them black, all with the same deflated strip."""
+    strip = zlib.compress((bytes(edge // 2) + b"\xc8" * (edge - edge // 2)) * edge, 9)
     data, links = b"II*\0" + struct.pack("<I", 8 + len(strip)) + strip, []
     tags = [(256, 4, edge), (257, 4, edge), (258, 3, 8), (259, 3, 8), (262, 3, 1), (273, 4, 8), (277, 3, 1), (278, 4, edge), (279, 4, len(strip))]
     directory = struct.pack("<H", len(tags)) + b"".join(struct.pack("<HHII", tag, kind, 1, value) for tag, kind, value in tags)

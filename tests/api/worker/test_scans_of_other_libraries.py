@@ -6,8 +6,13 @@ import subprocess
 import pytest
 from daemon_under_test import program
 
-numpy = pytest.importorskip("numpy", reason="numpy is not installed")
-pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
+try:
+    import numpy
+except ImportError:
+    numpy = None
+
+pytestmark = [pytest.mark.skipif(numpy is None, reason="numpy is not installed"),
+              pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
 
 SIZE = {"C": 2, "Z": 6, "T": 3, "Y": 16, "X": 32}
 
