@@ -167,7 +167,7 @@ static void deep_light_goes_on(void **state)
     q.journal_path = journal;
     q.deep_traced = 1;
     q.deep_edge = 4;
-    q.deep_paths = 15000;
+    q.deep_paths = 40000;
     assert_false(attempt(&q, 0.85, pool, pieces)); /* the table is made from 0.73 on */
     size_t kept = length_of(journal);
     assert_true(kept > length_of(cells));
