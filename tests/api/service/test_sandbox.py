@@ -100,6 +100,20 @@ def test_an_input_that_is_a_link_is_only_read(hostile, tmp_path):
         assert f"hostile: {act}: {outcome}" in done.stderr, done.stderr
 
 
+@pytest.mark.parametrize("how", ["daemon", "option"])
+def test_a_link_that_a_worker_may_have_made_is_out_of_reach(hostile, tmp_path, how):
+    """In the folder of a daemon, which has attempt.json, and where the daemon forbids links."""
+    secret = tmp_path / "secret"
+    secret.write_text(TABLE)
+    folder = job_folder(tmp_path / "job")
+    (folder / "input" / "rows.csv").unlink()
+    (folder / "input" / "rows.csv").symlink_to(secret)
+    if how == "daemon":
+        (folder / "attempt.json").write_text(json.dumps({"attempt": 1, "token": "t"}))
+    done = run(hostile, folder, f"read {secret}", *(["--no-links"] if how == "option" else []), HOSTILE_TO="")
+    assert "hostile: read: Permission denied" in done.stderr, done.stderr
+
+
 def test_a_shared_checkpoint_cannot_be_changed(hostile, tmp_path):
     """Files that two jobs have are for reading only (test_geometry_only_job.py), for a worker of root, too."""
     folder = job_folder(tmp_path / "job")

@@ -1,6 +1,7 @@
 /* TIFF volumes that are damaged, or have values that no scan has. The errors name the file. */
 #include "base/option_id.h"
 #include "geometry/reconstruct/reconstruct.h"
+#include "geometry/volume/format/volume_part.h"
 #include "geometry/volume/format/volume_source.h"
 #include "tests/support/scan/tiff_stack.h"
 
@@ -237,6 +238,44 @@ static void test_bad_values(void **state)
     assert_string_equal(err.field, OPTION_AXES);
 }
 
+/* A file that goes, or becomes another, after it was opened gives an error and no voxels. */
+static void test_files_that_change(void **state)
+{
+    (void)state;
+    static uint8_t data[1 << 16];
+    static float value[2 * STACK_WIDTH * STACK_HEIGHT];
+    char first[128], second[128];
+    const char *list[2] = {first, second};
+    struct volume_source *s = NULL;
+    struct error err = {0};
+    stack_path(first, "first.tif");
+    stack_path(second, "second.tif");
+    stack_write(first, 8, 1, COMPRESSION_NONE, TEST_STRIPS);
+    stack_write(second, 8, 1, COMPRESSION_NONE, TEST_STRIPS);
+    assert_int_equal(volume_source_open(list, 2, &s, NULL), STATUS_OK);
+    size_t n = tiff_read_bytes(second, data, sizeof data);
+    assert_int_equal(volume_source_read(s, 0, 1, value, NULL), STATUS_OK);
+    tiff_patch_tag(data, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISWHITE);
+    test_write_bytes(second, data, n);
+    assert_int_equal(volume_source_read(s, 1, 1, value, &err), STATUS_UNSUPPORTED);
+    assert_int_equal(volume_source_read(s, 0, 1, value, NULL), STATUS_OK);
+    unlink(second);
+    assert_int_equal(volume_source_read(s, 1, 1, value, &err), STATUS_NOT_FOUND);
+    volume_source_close(s);
+}
+
+static void test_the_part_that_is_read(void **state)
+{
+    (void)state;
+    struct file_ledger ledger = {0};
+    size_t index[2];
+    const struct volume_parts parts = {.n = {3, 0}, .source = "the description"};
+    const struct volume_part part = {.channel = 2};
+    assert_int_equal(volume_part_choose("a.tif", &parts, &part, index, &ledger, NULL), STATUS_OK);
+    assert_true(index[VOLUME_CHANNELS] == 1 && index[VOLUME_TIMES] == 0 && ledger.n == 1);
+    assert_string_equal(ledger.item[0].value, "3, number 2 is read");
+}
+
 static void test_missing(void **state)
 {
     (void)state;
@@ -258,6 +297,8 @@ int main(void)
         cmocka_unit_test(test_compressed_pages_have_a_limit),
         cmocka_unit_test(test_bad_values),
         cmocka_unit_test(test_missing),
+        cmocka_unit_test(test_files_that_change),
+        cmocka_unit_test(test_the_part_that_is_read),
         cmocka_unit_test(test_strip_beyond_the_end),
         cmocka_unit_test(test_samples_of_no_stated_kind),
     };
