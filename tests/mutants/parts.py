@@ -11,8 +11,8 @@ LANGUAGE = {".c": "c", ".js": "js", ".py": "py"}
 # counters of lines do not reach there: they test processes that end without writing their counters.
 GATE = {
     "sandbox": (["optimizer/worker/sandbox/sandbox_", "optimizer/worker/sandbox/worker_confine"],
-                ["unit/optimizer/worker/sandbox/", "api/service/test_sandbox"],
-                ["unit/optimizer/worker/sandbox/", "api/service/test_sandbox"]),
+                ["unit/optimizer/worker/sandbox/", "api/service/test_sandbox", "api/worker/geometry/test_geometry_only_job"],
+                ["unit/optimizer/worker/sandbox/", "api/service/test_sandbox", "api/worker/geometry/test_geometry_only_job"]),
     "store": (["server/store/"], ["unit/server/", "api/access/test_owners", "api/access/test_tokens", "api/batches/test_batches",
                                   "api/service/test_backup", "api/service/test_list", "api/test_durable_replies", "api/test_jobs_api"], []),
     "retention": (["server/retention/"], ["unit/server/retention/", "api/service/test_retention"], []),
@@ -23,7 +23,8 @@ GATE = {
                  *(f"optimizer/photographs/reader/{name}" for name in ("declared_color", "exif", "float_dng", "integer_samples", "photograph_reader", "read_",
                                                                        "saturation", "tiff_statements", "xmp")),
                  *(f"optimizer/photographs/rows/{name}" for name in ("brdf_", "number_table", "table_text", "tensor_file"))],
-                ["unit/geometry/volume/", "unit/optimizer/photographs/", "api/photographs/test_measured_brdf"], []),
+                ["unit/geometry/volume/", "unit/optimizer/photographs/", "api/photographs/test_measured_brdf", "api/worker/test_scan_statements"],
+                ["api/worker/test_scan_statements"]),
 }
 WHOLE = {name: ([name + "/"], ["unit/", "api/"], [])
          for name in ("base", "geometry", "renderer", "optimizer", "server", "clients/cli", "clients/dashboard", "clients/python")}
