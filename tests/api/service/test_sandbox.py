@@ -114,6 +114,16 @@ def test_a_link_that_a_worker_may_have_made_is_out_of_reach(hostile, tmp_path, h
     assert "hostile: read: Permission denied" in done.stderr, done.stderr
 
 
+def test_the_file_of_speeds_is_written_in_place(hostile, tmp_path):
+    """It is made before the sandbox closes; the folder around it stays out of reach."""
+    speeds = tmp_path / "elsewhere" / "speeds.json"
+    speeds.parent.mkdir()
+    done = run(hostile, job_folder(tmp_path / "job"), f"overwrite {speeds}", "--speeds", str(speeds), HOSTILE_TO="")
+    assert "hostile: overwrite: done" in done.stderr, done.stderr
+    done = run(hostile, job_folder(tmp_path / "other"), f"write {speeds.parent}/new", "--speeds", str(speeds), HOSTILE_TO="")
+    assert "hostile: write: Permission denied" in done.stderr, done.stderr
+
+
 def test_a_shared_checkpoint_cannot_be_changed(hostile, tmp_path):
     """Files that two jobs have are for reading only (test_geometry_only_job.py), for a worker of root, too."""
     folder = job_folder(tmp_path / "job")
