@@ -1,6 +1,7 @@
 /* DNG of floating point samples: linear rgb is read, in strips and tiles, compressed, and beside a preview; mosaics are
  * refused by name. JPEG with bytes between its segments, which is read, and within its picture data, which is not. */
 #include "optimizer/job/document/job_photograph.h"
+#include "optimizer/photographs/reader/float_dng.h"
 #include "optimizer/photographs/reader/photograph.h"
 #include "tests/support/camera_files.h"
 #include "tests/support/scratch_folder.h"
@@ -127,6 +128,20 @@ static void test_float_dng(void **state)
     free(whole);
 }
 
+static void test_a_picture_beyond_the_limit(void **state)
+{
+    static float sample[N];
+    const char *path = scratch_path(state, "large.dng");
+    write_dng(path, STRIPS, sample);
+    for (size_t missing = 0; missing < 2; missing++) {
+        struct image im;
+        struct photograph_info info = {0};
+        const struct photograph_request q = {.black_level = NAN, .limit_pixel = WIDTH * HEIGHT - missing};
+        assert_int_equal(float_dng_read(path, &q, &im, &info, NULL), missing ? STATUS_TOO_LARGE : STATUS_OK);
+        if (missing == 0) image_release(&im);
+    }
+}
+
 /* Inserts bytes at a place. */
 static void insert(const char *path, const char *data, size_t n, size_t at, const char *bytes, size_t n_byte)
 {
@@ -174,6 +189,8 @@ static void test_stray_bytes(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_float_dng), cmocka_unit_test(test_stray_bytes)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_float_dng),
+                                       cmocka_unit_test(test_a_picture_beyond_the_limit),
+                                       cmocka_unit_test(test_stray_bytes)};
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }

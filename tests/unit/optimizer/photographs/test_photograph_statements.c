@@ -1,6 +1,7 @@
 /* Statements of picture files beside their samples, from every carrier: exposure, samples of few bits. */
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/photographs/reader/photograph.h"
+#include "optimizer/photographs/reader/xmp.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/stated_files.h"
 
@@ -166,6 +167,7 @@ static void test_statements_of_exr(void **state)
     image_release(&im);
     const struct file_statement *f = file_ledger_find(&r.info.ledger, "further attributes");
     assert_true(f != NULL && strcmp(f->value, "lensModel") == 0 && f->use == FILE_STATEMENT_NOT_USED);
+    assert_null(file_ledger_find(&r.info.ledger, "channels")); /* all of them are read */
 }
 
 /* Colors of other primaries. Wanted values: NumPy in double precision, by Bradford's matrix and the definition of
@@ -342,6 +344,16 @@ static void test_xmp(void **state)
     }
 }
 
+/* A time of zero, as some programs write for "not known", is no statement. */
+static void test_xmp_of_zero(void **state)
+{
+    (void)state;
+    static const char packet[] = "<exif:ExposureTime>0/1</exif:ExposureTime><exif:FNumber>8</exif:FNumber>";
+    struct photograph_info info = {.exposure_s = NAN, .iso = NAN, .aperture = NAN};
+    xmp_read(packet, sizeof packet - 1, &info);
+    assert_true(isnan(info.exposure_s) && isnan(info.iso) && info.aperture == 8.0);
+}
+
 /* A picture whose curve nobody declared has the curve of its file, else the assumed one. */
 static void test_assumed_transfer(void **state)
 {
@@ -372,6 +384,7 @@ int main(void)
         cmocka_unit_test(test_orientation),
         cmocka_unit_test(test_tags_of_tiff),
         cmocka_unit_test(test_xmp),
+        cmocka_unit_test(test_xmp_of_zero),
         cmocka_unit_test(test_assumed_transfer),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
