@@ -346,7 +346,7 @@ static void test_clipped_and_converted(void **state)
     struct image im;
     struct photograph_record r;
     for (size_t i = 0; i < N_SAMPLE; i++) sample[i] = (uint16_t)(i % 3 == 1 ? 65000 : 20000 + i % 97);
-    for (size_t i = 0; i < 10; i++) sample[3 * 30 * i] = 65535;
+    for (size_t i = 0; i < 10; i++) sample[3 * 30 * i + i % 3] = 65535; /* each channel in turn */
     stated_write_png(path, EDGE, EDGE, 16, 3, sample,
                      &(struct file_part){"iCCP", 0, chunk, pack_profile(bytes, n, chunk)}, 1);
     read_ok(path, JOB_TRANSFER_UNDECLARED, &im, &r);

@@ -201,6 +201,29 @@ static void test_dng(void **state)
     free(whole);
 }
 
+/* A black level for each place of 4 x 4 samples, of which the first is 0. */
+static void test_black_of_places(void **state)
+{
+    static uint16_t mosaic[32 * 32];
+    float black[16];
+    const uint16_t repeat[2] = {4, 4};
+    const char *path = scratch_path(state, "places.dng");
+    struct image im;
+    struct photograph_record r;
+    for (size_t i = 0; i < 16; i++) black[i] = 10.0f * (float)i;
+    for (size_t i = 0; i < 32 * 32; i++) mosaic[i] = (uint16_t)(1000 + 10 * (i / 32 % 4 * 4 + i % 4));
+    assert_int_equal(dng_file_write(path, &(struct dng_picture){32, 32, 0, 16383, 0, 0, 0}, mosaic, NULL), STATUS_OK);
+    TIFF *tiff = TIFFOpen(path, "r+");
+    assert_non_null(tiff);
+    TIFFSetField(tiff, TIFFTAG_BLACKLEVELREPEATDIM, repeat);
+    TIFFSetField(tiff, TIFFTAG_BLACKLEVEL, 16, black);
+    assert_int_equal(TIFFRewriteDirectory(tiff), 1);
+    TIFFClose(tiff);
+    read_ok(path, &no_transfer, &im, &r);
+    for (size_t i = 0; i < 16 * 16 * 3; i++) assert_true(fabs((double)im.pixel[i] * r.info.full_scale - 1000.0) < 0.01);
+    image_release(&im);
+}
+
 /* A raw file is turned as it says, as viewers show it. */
 static void test_turned_dng(void **state)
 {
@@ -327,6 +350,7 @@ int main(void)
         cmocka_unit_test(test_exif_of_tiff),
         cmocka_unit_test(test_jpeg),
         cmocka_unit_test(test_dng),
+        cmocka_unit_test(test_black_of_places),
         cmocka_unit_test(test_turned_dng),
         cmocka_unit_test(test_black_of_exr),
         cmocka_unit_test(test_files_that_are_missing),

@@ -86,6 +86,23 @@ static void test_any_level(void **state)
     }
 }
 
+/* Clipped cloth before a black ground: its pile of zeros does not make the picture a synthetic one. */
+static void test_black_ground(void **state)
+{
+    static uint16_t sample[3 * N_PIXEL];
+    size_t n_clipped = 0;
+    for (size_t i = 0; i < N_PIXEL; i++) {
+        bool clipped = false;
+        for (unsigned c = 0; c < 3; c++) {
+            const double v = i % 3 == 0 ? 0.0 : 40000.0 * (0.7 + 0.2 * normal());
+            clipped = clipped || lrint(v) >= 40000;
+            sample[3 * i + c] = (uint16_t)lrint(fmin(fmax(v, 0.0), 40000.0));
+        }
+        n_clipped += clipped;
+    }
+    assert_true(n_clipped > 0 && share_of(state, sample, NULL, 0) == (double)n_clipped / N_PIXEL);
+}
+
 /* sBIT and MaxSampleValue say what the largest value is, also for a picture of one value. */
 static void test_stated(void **state)
 {
@@ -182,8 +199,9 @@ static void test_merged(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_clipped),     cmocka_unit_test(test_any_level), cmocka_unit_test(test_stated),
-        cmocka_unit_test(test_not_clipped), cmocka_unit_test(test_floats),    cmocka_unit_test(test_merged),
+        cmocka_unit_test(test_clipped), cmocka_unit_test(test_any_level),   cmocka_unit_test(test_black_ground),
+        cmocka_unit_test(test_stated),  cmocka_unit_test(test_not_clipped), cmocka_unit_test(test_floats),
+        cmocka_unit_test(test_merged),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }
