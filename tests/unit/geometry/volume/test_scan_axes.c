@@ -116,19 +116,20 @@ static void test_twist_survives_a_mirrored_file(void **state)
 {
     enum { N = 32 };
     static const struct {
-        const char *directions;
+        const char *space, *directions;
         int turn;
-    } c[] = {{"(0.002,0,0) (0,0.002,0) (0,0,0.002)", 1},
-             {"(0.002,0,0) (0,0.002,0) (0,0,-0.002)", -1},
-             {"(-0.002,0,0) (0,0.002,0) (0,0,0.002)", -1},
-             {"(0,0.002,0) (0.002,0,0) (0,0,0.002)", -1}};
+    } c[] = {{"RAS", "(0.002,0,0) (0,0.002,0) (0,0,0.002)", 1},
+             {"RAS", "(0.002,0,0) (0,0.002,0) (0,0,-0.002)", -1},
+             {"RAS", "(-0.002,0,0) (0,0.002,0) (0,0,0.002)", -1},
+             {"RAS", "(0,0.002,0) (0.002,0,0) (0,0,0.002)", -1},
+             {"LAS", "(0.002,0,0) (0,0.002,0) (0,0,0.002)", -1}};
     static uint8_t file[256 + N * N * N];
     for (size_t i = 0; i < sizeof c / sizeof *c; i++) {
         const char *path = scratch_path(state, "helix.nrrd");
         int n = snprintf((char *)file, 256,
                          "NRRD0005\ntype: uint8\ndimension: 3\nsizes: 32 32 32\nencoding: raw\nspace: "
-                         "RAS\nspace directions: %s\n\n",
-                         c[i].directions);
+                         "%s\nspace directions: %s\n\n",
+                         c[i].space, c[i].directions);
         for (int k = 0; k < N; k++)
             for (int j = 0; j < N; j++)
                 for (int x = 0; x < N; x++) {
@@ -144,7 +145,7 @@ static void test_twist_survives_a_mirrored_file(void **state)
         struct error err = {0};
         reconstruct_option_default(&o);
         if (reconstruct_read(&path, 1, &o, NULL, NULL, NULL, &v, &r, &err) != STATUS_OK) fail_msg("%s", err.text);
-        if (!(handedness(&v) > 0.0)) fail_msg("'%s' became a mirror image", c[i].directions);
+        if (!(handedness(&v) > 0.0)) fail_msg("'%s' in %s became a mirror image", c[i].directions, c[i].space);
         volume_release(&v);
     }
 }

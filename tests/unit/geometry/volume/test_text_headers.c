@@ -222,6 +222,8 @@ static void test_refused_metaimage(void **state)
         {META "ElementSpacing = 1 0 1\nElementDataFile = LOCAL\n", "ElementSpacing is not three", STATUS_FORMAT},
         {META "ElementSpacing = 1 inf 1\nElementDataFile = LOCAL\n", "ElementSpacing is not three", STATUS_FORMAT},
         {META "ElementSpacing = 1 2\nElementDataFile = LOCAL\n", "ElementSpacing is not three", STATUS_FORMAT},
+        {META "TransformMatrix = 1 0 0 0 1 0 0 0\nElementDataFile = LOCAL\n", "TransformMatrix is not a square",
+         STATUS_FORMAT},
         {META "ElementType = MET_LONG\nElementDataFile = LOCAL\n", "unsupported ElementType 'MET_LONG'", STATUS_FORMAT},
         {META "NDims = 2\nElementDataFile = LOCAL\n", "NDims must be 3 or 4, not '2'", STATUS_FORMAT},
         {META "DimSize = 2 1\nElementDataFile = LOCAL\n", "DimSize is not three positive numbers", STATUS_FORMAT},

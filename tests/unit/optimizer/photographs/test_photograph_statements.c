@@ -284,6 +284,27 @@ static void test_orientation(void **state)
         }
 }
 
+/* Samples of twelve bits in the upper bits of a word: their largest value is white. */
+static void test_largest_sample_in_upper_bits(void **state)
+{
+    static const uint16_t largest = 4095 << 4;
+    static uint16_t word[EDGE * EDGE];
+    static uint8_t file[ROOM];
+    const char *path = scratch_path(state, "upper.tif");
+    struct image im;
+    struct photograph_record r;
+    for (size_t i = 0; i < EDGE * EDGE; i++) word[i] = (uint16_t)(i % 50 == 0 ? largest : (300 + i % 7) << 4);
+    const struct folder_entry entry[] = {
+        {256, 3, EDGE}, {257, 3, EDGE}, {258, 3, 16},   {259, 3, 1},           {262, 3, 1},
+        {273, 4, 0},    {277, 3, 1},    {278, 3, EDGE}, {279, 4, sizeof word}, {281, 3, 0, false, 1, &largest}};
+    const size_t n = folder_build(false, entry, sizeof entry / sizeof *entry, word, sizeof word, file, sizeof file);
+    scratch_write(path, (char *)file, n);
+    read_ok(path, JOB_TRANSFER_LINEAR, &im, &r);
+    image_release(&im);
+    assert_true(fabs(r.saturated_share - 12.0 / (EDGE * EDGE)) < 1e-9);
+    assert_int_equal(file_ledger_find(&r.info.ledger, "MaxSampleValue")->use, FILE_STATEMENT_APPLIED);
+}
+
 /* Grey whose zero is white, and a largest sample that the file states. */
 static void test_tags_of_tiff(void **state)
 {
@@ -382,6 +403,7 @@ int main(void)
         cmocka_unit_test(test_primaries_of_exr),
         cmocka_unit_test(test_grey_of_few_bits),
         cmocka_unit_test(test_orientation),
+        cmocka_unit_test(test_largest_sample_in_upper_bits),
         cmocka_unit_test(test_tags_of_tiff),
         cmocka_unit_test(test_xmp),
         cmocka_unit_test(test_xmp_of_zero),
