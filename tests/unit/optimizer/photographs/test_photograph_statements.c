@@ -1,7 +1,6 @@
 /* Statements of picture files beside their samples, from every carrier: exposure, samples of few bits. */
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/photographs/reader/photograph.h"
-#include "optimizer/photographs/reader/xmp.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/stated_files.h"
 
@@ -287,8 +286,7 @@ static void test_orientation(void **state)
 /* Samples of twelve bits in the upper bits of a word: their largest value is white. */
 static void test_largest_sample_in_upper_bits(void **state)
 {
-    static const uint16_t largest = 4095 << 4;
-    static uint16_t word[EDGE * EDGE];
+    static uint16_t word[EDGE * EDGE], largest = 4095 << 4;
     static uint8_t file[ROOM];
     const char *path = scratch_path(state, "upper.tif");
     struct image im;
@@ -365,16 +363,6 @@ static void test_xmp(void **state)
     }
 }
 
-/* A time of zero, as some programs write for "not known", is no statement. */
-static void test_xmp_of_zero(void **state)
-{
-    (void)state;
-    static const char packet[] = "<exif:ExposureTime>0/1</exif:ExposureTime><exif:FNumber>8</exif:FNumber>";
-    struct photograph_info info = {.exposure_s = NAN, .iso = NAN, .aperture = NAN};
-    xmp_read(packet, sizeof packet - 1, &info);
-    assert_true(isnan(info.exposure_s) && isnan(info.iso) && info.aperture == 8.0);
-}
-
 /* A picture whose curve nobody declared has the curve of its file, else the assumed one. */
 static void test_assumed_transfer(void **state)
 {
@@ -406,7 +394,6 @@ int main(void)
         cmocka_unit_test(test_largest_sample_in_upper_bits),
         cmocka_unit_test(test_tags_of_tiff),
         cmocka_unit_test(test_xmp),
-        cmocka_unit_test(test_xmp_of_zero),
         cmocka_unit_test(test_assumed_transfer),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
