@@ -24,18 +24,18 @@ ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 CHECKS = ["layers", "format-check", "columns", "lint-c", "lint-javascript", "lint-python", "lint-shell", "lint-words"]
 SLOW_CHECKS = ["clang", "tsan-requests"]
 # unit tests that take more than 4 s of a core, which the inner loop leaves to `make test`
-LONG_UNIT_TESTS = ["unit/renderer/test_scattering", "unit/renderer/fast/test_precompute_journal", "unit/renderer/preview/test_joint_filter",
-                   "unit/renderer/dual/test_dual_scattering", "unit/geometry/test_lumen_fill", "unit/geometry/test_lumen_refill",
+LONG_UNIT_TESTS = ["unit/renderer/scattering/test_scattering", "unit/renderer/fast/test_precompute_journal", "unit/renderer/preview/test_joint_filter",
+                   "unit/renderer/quick/test_dual_scattering", "unit/geometry/diameter/test_lumen_fill", "unit/geometry/reconstruct/test_lumen_refill",
                    "unit/renderer/fast/test_deep_light",
                    "unit/renderer/mesh/test_drape", "unit/renderer/fast/test_fast_tables", "unit/geometry/fibers/test_shape_measure",
                    "unit/geometry/weave/test_weave_detect", "unit/renderer/preview/test_sheared_filter", "unit/optimizer/report/test_hair_fit",
-                   "unit/geometry/volume/test_slice_tiles", "unit/renderer/fast/test_gaussian_light", "unit/geometry/test_alignment",
-                   "unit/geometry/volume/test_bad_input", "unit/geometry/test_reconstruct", "unit/renderer/table/test_appearance_table"]
+                   "unit/geometry/volume/test_slice_tiles", "unit/renderer/fast/test_gaussian_light", "unit/geometry/orientation/test_alignment",
+                   "unit/geometry/volume/test_bad_input", "unit/geometry/reconstruct/test_reconstruct", "unit/renderer/preview/test_appearance_table"]
 # limits in seconds of a core, and how long a test may use next to none
 MOST_CORE_S, MOST_PYTEST_CORE_S = 600, 1500
 STILL_S, STILL_CORE_S = 900, 2
 # Those that take longest start first, so that no lane waits for one of them at the end.
-LONGEST = ["physics/test_reconstruct_phantom", "physics/test_derivative_check", "physics/test_scan_trial", "unit/renderer/test_scattering",
+LONGEST = ["physics/test_reconstruct_phantom", "physics/test_derivative_check", "physics/test_scan_trial", "unit/renderer/scattering/test_scattering",
            "real/test_real_input", "api/driven/test_openapi_driven", "browser/test_accessibility", "browser/test_dashboard",
            "api/worker/test_cloth_search_job", "crash/test_worker_resume", "crash/test_daemon_disk", "crash/test_daemon_kill",
            "physics/exact/test_exact_scene", "api/service/test_bodies", "browser/test_dashboard_submit", "api/worker/test_groups",

@@ -3,7 +3,7 @@
 
 # tests that know a long variant (tests/support/agreement.h)
 TEST_LONG := physics/test_naive physics/volume/test_volume_naive physics/test_derivative_check physics/test_derivative \
-	physics/test_chi_square physics/test_energy_bound physics/test_reconstruct_phantom physics/test_scan_trial unit/renderer/test_scattering
+	physics/test_chi_square physics/test_energy_bound physics/test_reconstruct_phantom physics/test_scan_trial unit/renderer/scattering/test_scattering
 TEST_LONG_PYTHON := tests/physics/exact tests/real tests/api/driven tests/api/worker/test_correction_job.py tests/api/worker/test_several_models.py
 test-long: | deps-test ## the renderer against the naive tracers with enough paths to see a difference of 0.5 %, its scene against the exact one, every model at every place, both real scans, all phantoms, the boundary cases of the description of the API (half an hour on 2 quiet cores for the first, the rest not timed)
 	@$(MAKE) --no-print-directory -j$$(nproc) all $(EXACT_BINS) $(addprefix $(BUILD)/tests/,$(TEST_LONG))

@@ -259,7 +259,7 @@ def test_a_volume_model_on_a_cylinder(real):
 
 @pytest.mark.slow
 def test_a_twin_is_written_as_its_description_says(real):
-    """The only test of the worker's tables as a file; their numbers are those of tests/unit/renderer/table."""
+    """The only test of the worker's tables as a file; their numbers are those of tests/unit/renderer/preview."""
     flat = {"on": "flat", "width_mm": 3, **VIEW, "samples": 2}
     job, done = run(real, {**document(flat), "twin": {"make": True, "paths": 4000, "texels": 16}})
     assert done["state"] == "succeeded", done["error"]
