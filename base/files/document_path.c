@@ -42,7 +42,8 @@ static const char *next_of_names(const char *at, char name[NAME_BYTES])
     return *at == '.' ? at + 1 : at;
 }
 
-static bool place_of(const json_t *list, const char *name, size_t *i)
+/* Reads the name of a list's member, its index. False: it is no index of the list. */
+static bool index_of(const json_t *list, const char *name, size_t *i)
 {
     if (name[0] == '\0' || strspn(name, "0123456789") != strlen(name) || strlen(name) > 9) return false;
     *i = (size_t)strtoul(name, NULL, 10);
@@ -53,7 +54,7 @@ static bool set_child(json_t *parent, const char *name, json_t *value)
 {
     size_t i;
     if (json_is_object(parent)) return json_object_set_new(parent, name, value) == 0;
-    if (json_is_array(parent) && place_of(parent, name, &i)) return json_array_set_new(parent, i, value) == 0;
+    if (json_is_array(parent) && index_of(parent, name, &i)) return json_array_set_new(parent, i, value) == 0;
     json_decref(value);
     return false;
 }
@@ -61,7 +62,7 @@ static bool set_child(json_t *parent, const char *name, json_t *value)
 static json_t *get_child(const json_t *parent, const char *name)
 {
     size_t i;
-    if (json_is_array(parent)) return place_of(parent, name, &i) ? json_array_get(parent, i) : NULL;
+    if (json_is_array(parent)) return index_of(parent, name, &i) ? json_array_get(parent, i) : NULL;
     return json_object_get(parent, name);
 }
 

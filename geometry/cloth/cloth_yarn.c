@@ -79,8 +79,9 @@ static void round_point(const struct filling *y, const struct place *q, double r
     out[1] = k->ply_distance_m * sin(ply) + rho_m * sin(own);
 }
 
-/* Place number i of n: even density in the disc, without a lattice that would meet itself at whole twists only. */
-static struct place place_of(const struct filling *y, size_t i)
+/* Returns the place of fiber i in the section of its yarn. The density in the disc is even, and there is no lattice,
+ * which would meet itself at whole twists only. */
+static struct place fiber_place(const struct filling *y, size_t i)
 {
     const struct kind_shape *k = y->shape;
     size_t n = (k->n_fiber + k->n_ply - 1 - i % k->n_ply) / k->n_ply, j = i / k->n_ply;
@@ -138,7 +139,7 @@ static status add_staple(struct filling *y, size_t i, double start, struct error
 {
     const struct rng_key key = {.seed = y->w->d->seed, .iteration = STREAM_STAPLE};
     const struct kind_shape *k = y->shape;
-    struct place q = place_of(y, i);
+    struct place q = fiber_place(y, i);
     struct wander v;
     struct rng rng;
     double z[2], (*node)[3];

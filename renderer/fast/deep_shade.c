@@ -49,7 +49,7 @@ static void add_from(const struct fast_setting *s, const struct deep_hit *h, con
     struct scene_place place;
     float row[3][3], wi[3];
     enter_beside(s, h, direction, rng, &at);
-    scene_place_of(scene, &at, h->offset_mm, &place);
+    scene_place_find(scene, &at, h->offset_mm, &place);
     if (scene_shell_shades(scene, &at, &place, no_shift, direction)) return;
     scene_place_rotation(&place, row);
     turn((const float(*)[3])row, direction, wi);
@@ -69,7 +69,7 @@ void deep_shade_begin(const void *context, const struct scene_hit *hit, const st
         if (a < 2) h.offset_mm[a] = ray->offset_mm[a];
         h.position_mm[a] = (float)((double)hit->position_mm[a] + (a < 2 ? h.offset_mm[a] : 0.0));
     }
-    scene_place_of(s->path.scene, hit, h.offset_mm, &place);
+    scene_place_find(s->path.scene, hit, h.offset_mm, &place);
     scene_place_rotation(&place, h.row);
     turn((const float(*)[3])h.row, back, h.wo);
     scene_place_to_cloth(&place, hit->tangent, h.tangent);

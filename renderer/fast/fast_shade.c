@@ -32,7 +32,7 @@ static void describe(const struct fast_setting *s, const struct scene_ray *ray, 
         h->position_mm[a] = (float)((double)h->hit.position_mm[a] + (a < 2 ? h->offset_mm[a] : 0.0));
         h->wo_scene[a] = -ray->direction[a];
     }
-    scene_place_of(s->path.scene, &h->hit, h->offset_mm, &h->place);
+    scene_place_find(s->path.scene, &h->hit, h->offset_mm, &h->place);
     fiber_frame_from(&h->frame, h->hit.tangent);
     fiber_frame_to_local(&h->frame, h->wo_scene, h->wo);
     h->i_set = s->path.n_set > 1 ? scene_group_of(s->path.scene, h->hit.i_segment) : 0;

@@ -21,8 +21,9 @@ struct run {
     struct image *im;
 };
 
-/* Place of a point along the lamp's edges, over its distance from the lamp's plane, which is returned. */
-static double place_of(const struct lamp *l, const double p_mm[3], double x[2])
+/* Returns the distance of a point from the lamp's plane. x: its coordinates along the lamp's edges, divided by this
+ * distance. */
+static double lamp_coordinates(const struct lamp *l, const double p_mm[3], double x[2])
 {
     double to[3], depth = 0;
     for (int a = 0; a < 3; a++) to[a] = p_mm[a] - (double)l->centre_mm[a];
@@ -34,7 +35,7 @@ static double place_of(const struct lamp *l, const double p_mm[3], double x[2])
     return depth;
 }
 
-/* The point of the plane at a place. False: there is none. */
+/* Finds the point of the plane with these lamp_coordinates. Returns false if there is none. */
 static bool point_at(const struct ground_plane *g, const double x[2], double p_mm[3])
 {
     const struct lamp *l = &g->lamp;
@@ -54,7 +55,7 @@ static bool lay_grid(struct run *r, size_t n[2])
     for (size_t i = 0; i <= OUTLINE; i++)
         for (size_t k = 0; k <= OUTLINE; k++) {
             double xy[2] = {(double)i / OUTLINE, (double)k / OUTLINE}, p[3], x[2];
-            if (!ground_plane_meet(r->g, xy, p) || !(place_of(&r->g->lamp, p, x) > 0)) continue;
+            if (!ground_plane_meet(r->g, xy, p) || !(lamp_coordinates(&r->g->lamp, p, x) > 0)) continue;
             for (int e = 0; e < 2; e++) low[e] = fmin(low[e], x[e]), high[e] = fmax(high[e], x[e]);
         }
     const size_t wanted[2] = {r->g->q->width, r->g->q->height};
@@ -81,7 +82,7 @@ static bool look(struct run *r, size_t i, const double from[3], const double to[
     if (!scene_trace(scene, &ray, &hit)) return scene_sheet_met(scene, &ray);
     const double p[3] = {(double)hit.position_mm[0] + ray.offset_mm[0], (double)hit.position_mm[1] + ray.offset_mm[1],
                          (double)hit.position_mm[2]};
-    double depth = place_of(&r->g->lamp, p, x);
+    double depth = lamp_coordinates(&r->g->lamp, p, x);
     if (depth > 0) light_field_meet(&r->field, i, 1 / depth - 1 / receiver_depth);
     return true;
 }
@@ -95,7 +96,7 @@ static void sample_receiver(struct run *r, size_t i, const double x[2])
     ground_plane_random(r->g, i, true, &rng);
     for (int e = 0; e < 2; e++) f->jitter[i][e] = (float)rng_double(&rng);
     if (!point_at(r->g, x, p)) return;
-    double depth = place_of(l, p, unused);
+    double depth = lamp_coordinates(l, p, unused);
     for (size_t j = 0; j < f->n_side * f->n_side; j++) {
         double y[2] = {light_field_place_mm(f, i, 0, j % f->n_side), light_field_place_mm(f, i, 1, j / f->n_side)};
         for (int a = 0; a < 3; a++)
@@ -122,7 +123,7 @@ static float visibility_at(const struct run *r, const double p_mm[3])
     const size_t n[2] = {f->width, f->height};
     double x[2], part[2];
     size_t at[2];
-    if (!(place_of(&r->g->lamp, p_mm, x) > 0)) return 1;
+    if (!(lamp_coordinates(&r->g->lamp, p_mm, x) > 0)) return 1;
     for (int e = 0; e < 2; e++) {
         double u = fmin(fmax((x[e] - r->low[e]) / f->cell[e], 0), (double)(n[e] - 1));
         at[e] = (size_t)fmin(u, (double)(n[e] - 2));

@@ -116,7 +116,7 @@ static void finish(const void *context, const struct scene_hit *hit, const struc
     struct last_hit h = {.hit = *hit};
     for (int a = 0; a < 3; a++)
         h.position_mm[a] = (float)((double)hit->position_mm[a] + (a < 2 ? ray->offset_mm[a] : 0.0));
-    scene_place_of(s->path.scene, hit, ray->offset_mm, &h.place);
+    scene_place_find(s->path.scene, hit, ray->offset_mm, &h.place);
     scene_place_to_cloth(&h.place, back, h.wo);
     for (size_t side = 0; side < 2; side++) diffusion_leaving_at(s->option->tables, side, h.wo, h.leaving[side]);
     if (s->path.lights.has_lamp) add_lamp(s, &h, rng, rgb);

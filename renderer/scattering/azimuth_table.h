@@ -1,5 +1,5 @@
-/* Tables of azimuthal scattering that dielectric.v1 and elliptical.v1 share: places between nodes, and densities over
- * half a turn that azimuths are drawn with, piecewise linear between n + 1 nodes. */
+/* Tables of azimuthal scattering that dielectric.v1 and elliptical.v1 share: where directions lie between nodes, and
+ * densities over half a turn that azimuths are drawn with, piecewise linear between n + 1 nodes. */
 #ifndef SELVEDGE_RENDERER_AZIMUTH_TABLE_H
 #define SELVEDGE_RENDERER_AZIMUTH_TABLE_H
 
@@ -10,7 +10,8 @@
 
 static inline float table_mix(float a, float b, float t) { return a + t * (b - a); }
 
-/* Place of x, at least 0, between the n + 1 nodes 0, 1, ... n of a table: node i and the fraction beyond it. */
+/* Index of x, at least 0, in a table of n + 1 nodes 0, 1, ... n: sets *i to the node before x and returns the fraction
+ * beyond it. */
 static inline float table_position(float x, int n, int *i)
 {
     *i = x < (float)(n - 1) ? (int)x : n - 1;
@@ -20,16 +21,16 @@ static inline float table_position(float x, int n, int *i)
 /* Stretches u to [0, 1) within an interval that starts at 0. */
 static inline float table_stretch(float u, float width) { return fminf(u / width, 0x1.fffffep-1f); }
 
-/* Place of two directions in a table by cos th_d (n_row + 1 nodes) and by |ph| (n_phi + 1 nodes). */
-struct azimuth_place {
+/* Index of two directions in a table by cos th_d (n_row + 1 nodes) and by |ph| (n_phi + 1 nodes). */
+struct azimuth_index {
     struct fiber_direction in, out;
     int row, column, out_row;
     float x, y, out_x; /* between rows, columns, and rows of th_d = th_o */
 };
 
-static inline struct azimuth_place azimuth_place_of(const float wi[3], const float wo[3], int n_row, int n_phi)
+static inline struct azimuth_index azimuth_index_of(const float wi[3], const float wo[3], int n_row, int n_phi)
 {
-    struct azimuth_place g = {.in = fiber_direction_of(wi), .out = fiber_direction_of(wo)};
+    struct azimuth_index g = {.in = fiber_direction_of(wi), .out = fiber_direction_of(wo)};
     float c = g.in.cos_theta + g.out.cos_theta, u = wi[0] + wo[0], cos_d = 0.5f * sqrtf(c * c + u * u);
     float a = g.in.azimuth[0] - g.out.azimuth[0], b = g.in.azimuth[1] - g.out.azimuth[1];
     float half_sine = 0.5f * sqrtf(a * a + b * b), /* sin(ph / 2) */
@@ -40,7 +41,7 @@ static inline struct azimuth_place azimuth_place_of(const float wi[3], const flo
     return g;
 }
 
-/* Value at the place of g between four corners: row and row + 1, each at column and column + 1. */
+/* Value at the index g between four corners: row and row + 1, each at column and column + 1. */
 #define AZIMUTH_BILINEAR(corner, g, field)                                                                             \
     table_mix(table_mix((corner)[0]->field, (corner)[1]->field, (g)->y),                                               \
               table_mix((corner)[2]->field, (corner)[3]->field, (g)->y), (g)->x)

@@ -24,8 +24,8 @@ void scene_segment_at(const struct scene *s, uint32_t i_segment, struct scene_se
 
 static float within(double x, double period) { return (float)(x - floor(x / period) * period); }
 
-void scene_place_of(const struct scene *s, const struct scene_hit *hit, const double offset_mm[2],
-                    struct scene_place *p)
+void scene_place_find(const struct scene *s, const struct scene_hit *hit, const double offset_mm[2],
+                      struct scene_place *p)
 {
     memset(p, 0, sizeof *p);
     if (s->bent == NULL) {

@@ -33,9 +33,9 @@ static inline void scene_place_to_cloth(const struct scene_place *p, const float
 
 bool scene_is_bent(const struct scene *scene);
 void scene_segment_at(const struct scene *scene, uint32_t i_segment, struct scene_segment *segment);
-/* offset_mm: that of the ray that hit. */
-void scene_place_of(const struct scene *scene, const struct scene_hit *hit, const double offset_mm[2],
-                    struct scene_place *place);
+/* Maps a hit to the flat cloth. offset_mm: offset_mm of the ray that hit (scene_ray.h). */
+void scene_place_find(const struct scene *scene, const struct scene_hit *hit, const double offset_mm[2],
+                      struct scene_place *place);
 /* Rows of the rotation into the flat cloth that is nearest to place->to_cloth among those that keep the normal of the
  * cloth: for angles between a light and the cloth, which to_cloth changes where threads are sheared. */
 void scene_place_rotation(const struct scene_place *place, float row[3][3]);

@@ -212,14 +212,15 @@ static status print_sections(const char *name, bool plain, const struct phantom_
             name, s.ratio_p10, s.ratio_median, s.ratio_p90, s.ratio_se_median, s.angle_se_median_rad * 180.0 / M_PI,
             100.0 * s.flat_share, s.n_varying, f->n_fiber, 100.0 * s.variation, 100.0 * s.variation_se_median);
     if (st == STATUS_OK)
-        fprintf(
-            stderr,
-            "%s: sections: radius %.3f (bias %.3f, %.3f with one a fiber, pull %.1f), ratio of axes %.3f (bias %.3f, "
-            "median %.3f, pull %.1f), turn %.1f degrees (median, pull %.1f)\n",
-            name, c.radius_rms, c.radius_bias, c.mean_radius_rms, c.radius_pull, c.ratio_rms, c.ratio_bias,
-            c.ratio_median, c.ratio_pull, c.turn_median_deg, c.turn_pull);
+        fprintf(stderr,
+                "%s: sections: radius %.3f (bias %.3f, %.3f with one a fiber, error over stated %.1f), ratio of axes "
+                "%.3f (bias %.3f, "
+                "median %.3f, error over stated %.1f), turn %.1f degrees (median, error over stated %.1f)\n",
+                name, c.radius_rms, c.radius_bias, c.mean_radius_rms, c.radius_pull, c.ratio_rms, c.ratio_bias,
+                c.ratio_median, c.ratio_pull, c.turn_median_deg, c.turn_pull);
     if (st == STATUS_OK && r->report.lumens_measured)
-        fprintf(stderr, "%s: lumens: RMS error %.3f, bias %.3f, pull %.1f, told of %.0f %% of the length\n", name,
+        fprintf(stderr,
+                "%s: lumens: RMS error %.3f, bias %.3f, error over stated %.1f, told of %.0f %% of the length\n", name,
                 c.lumen_rms, c.lumen_bias, c.lumen_pull, 100.0 * c.lumen_share);
     if (st == STATUS_OK && !plain) {
         print(name, "radius_along_rms", c.radius_rms, "1", "lower");

@@ -164,10 +164,10 @@ def test_submit_goes_on_with_its_job_after_a_broken_upload(stub, browser, tmp_pa
     wait_for(browser, "document.querySelector('.drop .note.bad') && !document.querySelector('.drop button').disabled")
     (job_id,) = set(jobs()) - set(before)
     # the corrected scan is dropped again and replaces the declared one
-    mended = tmp_path / "scan.tif"
-    mended.write_bytes(b"mended scan")
+    corrected = tmp_path / "scan.tif"
+    corrected.write_bytes(b"corrected scan")
     browser.execute_script("window.fetch = realFetch")
-    drop_in(browser, sample / "job.json", mended)
+    drop_in(browser, sample / "job.json", corrected)
     button.click()
     wait_for(browser, f"location.hash === '#{job_id}'")
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)

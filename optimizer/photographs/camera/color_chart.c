@@ -146,8 +146,9 @@ static void place_on_chart(size_t i, double place[2])
     place[1] = (2.0 * ((double)(i / COLOR_CHART_COLUMNS) * (patch + gap) + 0.5 * patch) - height) / width;
 }
 
-/* Place of a pixel, by Newton's method from the middle. False where it lies far off the chart. */
-static bool place_of_pixel(const double corner_px[8], const double at_px[2], double place[2])
+/* Finds the place of a pixel on the chart by Newton's method, which starts at the middle. Returns false where the pixel
+ * lies far off the chart. */
+static bool pixel_to_chart(const double corner_px[8], const double at_px[2], double place[2])
 {
     static const double step = 1e-4;
     const double width = 6.0 * patch + 5.0 * gap, height = 4.0 * patch + 3.0 * gap;
@@ -194,7 +195,7 @@ static status use_patches(const struct color_chart *k, double cos_theta, struct 
                                      (const double(*)[2])u->place,
                                      {0.0, 0.0},
                                      cos_theta};
-    if (isnan(k->scale_at_px[0]) || place_of_pixel(k->corner_px, k->scale_at_px, u->list.scale_at)) return STATUS_OK;
+    if (isnan(k->scale_at_px[0]) || pixel_to_chart(k->corner_px, k->scale_at_px, u->list.scale_at)) return STATUS_OK;
     return error_set(err, STATUS_INVALID, "the cloth's place (%g, %g) is more than half a chart away from the chart",
                      k->scale_at_px[0], k->scale_at_px[1]);
 }

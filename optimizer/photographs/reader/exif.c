@@ -106,7 +106,8 @@ static double first_number(const struct exif *e, uint64_t entry)
     return isfinite(value) ? value : NAN;
 }
 
-static double *place_of(struct exif_values *v, uint64_t tag)
+/* Returns the member that holds the value of a tag; NULL for a tag that is not read. */
+static double *value_of_tag(struct exif_values *v, uint64_t tag)
 {
     switch (tag) {
     case TAG_ORIENTATION:
@@ -147,7 +148,7 @@ static uint64_t take_folder(const struct exif *e, uint64_t at, struct exif_value
     for (uint64_t i = 0; i < n_entry && i < MOST_ENTRIES; i++) {
         uint64_t entry = at + count_bytes + i * entry_bytes;
         if (!take(e, entry, 2, &tag)) break;
-        double *place = place_of(v, tag);
+        double *place = value_of_tag(v, tag);
         if (place != NULL && isnan(*place)) *place = first_number(e, entry);
         if (tag == TAG_EXIF_FOLDER && !take(e, entry + (e->big_tiff ? 12 : 8), e->big_tiff ? 8 : 4, &inner)) inner = 0;
     }

@@ -170,7 +170,7 @@ static void add_input(void *context, const char *name, const char *role)
     input->sum = (uint32_t)crc32_z(input->sum, (const void *)seen, sizeof seen);
 }
 
-static status claim_inputs(const struct stage_tools *tools, struct job_inputs *in, struct error *err)
+static status match_inputs(const struct stage_tools *tools, struct job_inputs *in, struct error *err)
 {
     struct input_sum input = {.folder = tools->folder};
     bool changed;
@@ -179,7 +179,7 @@ static status claim_inputs(const struct stage_tools *tools, struct job_inputs *i
     worker_folder_path(tools->folder, JOB_FOLDER_WORK, WORKER_FILE_FINGERPRINT, before);
     in->resumed = access(before, F_OK) == 0;
     job_sections_visit_files(&in->section, add_input, &input);
-    status s = worker_folder_claim_inputs(tools->folder, in->fingerprint << 32 | input.sum, &changed, err);
+    status s = worker_folder_match_inputs(tools->folder, in->fingerprint << 32 | input.sum, &changed, err);
     in->resumed = in->resumed && !changed;
     if (s == STATUS_OK && changed)
         log_info(tools->log, "the inputs, or the program, have changed since the last run: starting anew");
@@ -248,7 +248,7 @@ static status take_values(const struct stage_tools *tools, struct job_inputs *in
     if (s == STATUS_OK && in->number.n > 0)
         s = error_set_field(err, STATUS_INVALID, OPTION_CLOTH,
                             "numbers of the cloth are to be fitted, which needs photographs: give their values");
-    if (s == STATUS_OK) s = claim_inputs(tools, in, err);
+    if (s == STATUS_OK) s = match_inputs(tools, in, err);
     return s == STATUS_OK ? load_environment(tools, in, err) : s;
 }
 
@@ -257,7 +257,7 @@ static status read_profile(const struct stage_tools *tools, struct job_inputs *i
 {
     char folder[WORKER_PATH_BYTES];
     worker_folder_path(tools->folder, JOB_FOLDER_INPUT, NULL, folder);
-    status s = claim_inputs(tools, in, err);
+    status s = match_inputs(tools, in, err);
     if (s != STATUS_OK || !in->section.profile->bowl.given)
         return s == STATUS_OK ? fiber_profile_load(&in->fiber.profile, in->section.profile, folder, err) : s;
     s = bowl_profile_load(&in->fiber.profile, &in->doc->profile->bowl, in->doc->setup, in->doc->rows, folder,
@@ -270,7 +270,7 @@ static status read_profile(const struct stage_tools *tools, struct job_inputs *i
 
 static status read_rows(const struct stage_tools *tools, struct job_inputs *in, struct error *err)
 {
-    if (in->kind == JOB_OF_GEOMETRY) return claim_inputs(tools, in, err);
+    if (in->kind == JOB_OF_GEOMETRY) return match_inputs(tools, in, err);
     status s = pipeline_profile_priors(tools, in->doc->cloth, in->doc->fit, err);
     if (s == STATUS_OK) s = set_models(in, err);
     if (s == STATUS_OK && in->kind == JOB_OF_PROFILE) s = read_profile(tools, in, err);
@@ -278,7 +278,7 @@ static status read_rows(const struct stage_tools *tools, struct job_inputs *in, 
     if (s == STATUS_OK && in->kind == JOB_OF_PICTURES) return take_values(tools, in, err);
     if (s == STATUS_OK) s = pipeline_read_texture(&(struct texture_input){tools, in->doc->cloth}, &in->texture, err);
     if (s == STATUS_OK) s = cloth_numbers_read(in, err);
-    if (s == STATUS_OK) s = claim_inputs(tools, in, err);
+    if (s == STATUS_OK) s = match_inputs(tools, in, err);
     if (s == STATUS_OK) s = load_observations(tools, in, err);
     if (s == STATUS_OK) texture_take_colors(tools, in);
     if (s == STATUS_OK) s = load_environment(tools, in, err);

@@ -107,8 +107,8 @@ static void remove_claims(const struct worker_folder *f, const char *keep)
     if (d != NULL) closedir(d);
 }
 
-/* Whose claim it is, when there is one already: a start that repeats its own request, as a network file system may do,
- * has it. */
+/* Returns STATUS_STALE when the claim is another start's. A claim of this start is its own: a network file system may
+ * repeat the request that made it. */
 static status check_claim(const char *path, const char *start, struct error *err)
 {
     char *text = NULL;
@@ -220,7 +220,7 @@ uint64_t document_fingerprint(const char *document, size_t n_bytes)
     return crc32_z(program_sum(), (const void *)document, n_bytes);
 }
 
-status worker_folder_claim_inputs(const struct worker_folder *f, uint64_t fingerprint, bool *changed, struct error *err)
+status worker_folder_match_inputs(const struct worker_folder *f, uint64_t fingerprint, bool *changed, struct error *err)
 {
     char path[WORKER_PATH_BYTES], series[WORKER_PATH_BYTES], want[32], *have = NULL;
     size_t n = 0;

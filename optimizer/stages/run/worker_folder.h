@@ -23,10 +23,11 @@ struct worker_folder {
  * STATUS_STALE: another worker holds it. */
 status worker_folder_open(struct worker_folder *f, const char *path, struct error *err);
 void worker_folder_close(struct worker_folder *f);
-/* Takes the attempt for one start of a worker, whose name an engine gives (option --start), such as "slurm-123.0": its
- * number and how often it was started. An engine may start one submission twice, on two nodes, where the lock may not
- * reach from one to the other; both have the same token. The file claim-<token> is made exclusively, so one start has
- * the attempt. STATUS_STALE: another start has it. Nothing is done in a folder made by hand. */
+/* Claims the attempt for one start of a worker: makes the file claim-<token>, which only one start can make. An engine
+ * gives the name of the start (option --start), such as "slurm-123.0": its number and how often it was started. The
+ * claim is needed because an engine may start one submission twice with the same token, on two nodes, where the lock
+ * may not reach from one to the other. STATUS_STALE: another start has the attempt. Does nothing in a folder made by
+ * hand. */
 status worker_folder_claim(const struct worker_folder *f, const char *start, struct error *err);
 /* STATUS_STALE when attempt.json names another attempt by now. To be called before every durable write. */
 status worker_folder_check(const struct worker_folder *f, struct error *err);
@@ -44,10 +45,10 @@ void worker_folder_sweep(const struct worker_folder *f);
  * this build of the program. */
 uint64_t document_fingerprint(const char *document, size_t n_bytes);
 
-/* Compares the fingerprint of the inputs with the fingerprint of the run before. When it is another one (a document or
- * a file was edited by hand) or there is none, everything that was computed before is removed: work/, results/,
- * series.rec. *changed: there was another one. */
-status worker_folder_claim_inputs(const struct worker_folder *f, uint64_t fingerprint, bool *changed,
+/* Compares the fingerprint of the inputs with the fingerprint of the previous run. If they differ (a document or a file
+ * was edited by hand), or there is none, it removes everything that was computed before: work/, results/, series.rec.
+ * *changed: there was a fingerprint, and it differs. */
+status worker_folder_match_inputs(const struct worker_folder *f, uint64_t fingerprint, bool *changed,
                                   struct error *err);
 
 /* A stage whose outputs are complete has the mark work/<stage>.done. */

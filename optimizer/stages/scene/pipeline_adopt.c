@@ -103,17 +103,17 @@ static status other_folder(const struct worker_folder *own, const char *geometry
 /* The first half of a fingerprint depends on the document and on the program (document_fingerprint.h). */
 static status check_program(const char *geometry_job, const struct worker_folder *f, struct error *err)
 {
-    char path[WORKER_PATH_BYTES], *document = NULL, *claimed = NULL;
-    size_t n_document = 0, n_claimed = 0;
+    char path[WORKER_PATH_BYTES], *document = NULL, *stored = NULL;
+    size_t n_document = 0, n_stored = 0;
     uint64_t have = 0;
     worker_folder_path(f, JOB_FILE_DOCUMENT, NULL, path);
     status s = file_read_all(path, JOB_MAX_DOCUMENT_BYTES, &document, &n_document, err);
     worker_folder_path(f, JOB_FOLDER_WORK, "inputs.fingerprint", path);
-    if (s == STATUS_OK) s = file_read_all(path, 64, &claimed, &n_claimed, NULL);
-    bool same = s == STATUS_OK && sscanf(claimed, "%16" SCNx64, &have) == 1 &&
+    if (s == STATUS_OK) s = file_read_all(path, 64, &stored, &n_stored, NULL);
+    bool same = s == STATUS_OK && sscanf(stored, "%16" SCNx64, &have) == 1 &&
                 have >> 32 == (document_fingerprint(document, n_document) & 0xffffffffu);
     free(document);
-    free(claimed);
+    free(stored);
     if (same) return STATUS_OK;
     return error_set_field(
         err, STATUS_INVALID, OPTION_GEOMETRY_JOB,

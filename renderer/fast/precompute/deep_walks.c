@@ -163,8 +163,8 @@ static void count(const struct deep_job *x, const struct start *b, const struct 
     }
 }
 
-/* Where a hit lies in the endless cloth. */
-static void place_of(const struct scene_hit *hit, const struct scene_ray *ray, double place_mm[2])
+/* Sets place_mm to the position of a hit in the endless cloth. */
+static void endless_position(const struct scene_hit *hit, const struct scene_ray *ray, double place_mm[2])
 {
     for (int a = 0; a < 2; a++) place_mm[a] = (double)hit->position_mm[a] + ray->offset_mm[a];
 }
@@ -179,9 +179,9 @@ static void walk(const struct deep_job *x, size_t i_class, const double wo[3], s
     double first_mm[2], last_mm[2];
     struct start from;
     begin(x, i_class, wo, &hit, &from, sum);
-    place_of(&hit, &ray, first_mm);
+    endless_position(&hit, &ray, first_mm);
     for (uint32_t i = 1; i < (uint32_t)FIBER_WALK_MOST_STEPS; i++) {
-        place_of(&hit, &ray, last_mm);
+        endless_position(&hit, &ray, last_mm);
         if (!fiber_walk_step(j->q->scene, &j->sets, &hit, &ray, rng, throughput)) return;
         if (scene_trace(j->q->scene, &ray, &hit)) continue;
         if (i > x->d->n_traced && !scene_sheet_met(j->q->scene, &ray)) {

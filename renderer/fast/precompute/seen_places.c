@@ -22,7 +22,7 @@ static void find_one(const struct scene *s, uint32_t i, struct seen_place *out)
     out->met = fiber_walk_enter(s, below, &rng, &ray) && scene_trace(s, &ray, &out->hit);
     if (!out->met) return;
     struct scene_place place;
-    scene_place_of(s, &out->hit, ray.offset_mm, &place);
+    scene_place_find(s, &out->hit, ray.offset_mm, &place);
     memcpy(out->position_mm, place.position_mm, sizeof out->position_mm);
 }
 

@@ -28,7 +28,7 @@ def test_the_cookie_stands_for_the_token(signed_in):
     assert who == {"token_needed": True, "name": "ann", "owner": "ann", "scope": "submit", "quota": {"requests_per_minute": 0, "stored_bytes": 0, "jobs": 3},
                    "used": {"stored_bytes": 0, "jobs": 1}}
     problem(signed_in.get("/v1/tokens"), 403, "scope")
-    # the cookie's value is no bearer token, and a wrong header is not mended by a cookie
+    # the cookie's value is no bearer token, and a wrong header is not replaced by a cookie
     value = signed_in.session.cookies["selvedge_session"]
     problem(requests.get(signed_in.url + "/v1/jobs", headers={"Authorization": f"Bearer {value}"}, timeout=20), 401, "token")
     problem(signed_in.get("/v1/jobs", headers={"Authorization": "Bearer x"}), 401, "token")

@@ -62,10 +62,10 @@ def test_edit_filter_and_keys(daemon, sample):
     assert job.id in [j.id for j in client.jobs(state="failed")] and job.id in [j.id for j in client.jobs(sample="ake: fai")]
     assert job.id not in [j.id for j in client.jobs(state="succeeded")] and list(client.jobs(verdict="good")) == []
 
-    def mend(doc):
+    def correct(doc):
         doc["sample"] = "fake: succeed"
 
-    assert job.edit(mend).state == "draft" and job.document()["sample"] == "fake: succeed"
+    assert job.edit(correct).state == "draft" and job.document()["sample"] == "fake: succeed"
 
     def race(doc):
         daemon.put(f"/v1/jobs/{job.id}/document", json=dict(doc, sample="fake: other"))

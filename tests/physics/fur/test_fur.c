@@ -122,7 +122,7 @@ static void share_derivatives(void **unused)
     }
 }
 
-/* Mean shares at th_d = 0 by the published equations, with TT^s mended and s_m rounded off by `edge` (fur_ray.h). */
+/* Mean shares at th_d = 0 by the published equations, with TT^s corrected and s_m rounded off by `edge` (fur_ray.h). */
 static void published_means(const double *fiber, double ma, double edge, double mean[FUR_FAR_N_LOBE])
 {
     enum { N = 4000 };

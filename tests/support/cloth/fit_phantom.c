@@ -6,7 +6,7 @@
 #include "optimizer/fit/objective/objective.h"
 #include "optimizer/job/document/job_setup.h"
 #include "optimizer/tools/phantom/phantom_view_table.h"
-#include "tests/support/cloth/kept_estimate.h"
+#include "tests/support/cloth/cached_estimate.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -143,7 +143,7 @@ void fit_phantom_observe(struct fit_phantom *f, const struct observation_set *o)
 
 void fit_phantom_render(const struct fit_phantom *f, const double *param, size_t n_path, struct estimate *out)
 {
-    const struct kept_call call = {param, f->configuration, f->observation.n, SEED_SCORE, 0, false};
+    const struct cached_call call = {param, f->configuration, f->observation.n, SEED_SCORE, 0, false};
     kept_run(f, &call, 1, n_path, out);
 }
 
@@ -170,8 +170,9 @@ void fit_phantom_photograph(struct fit_phantom *f, const struct fit_photography 
     fit_check_memory(t);
     fit_check_memory(e);
     views(t, configuration);
-    const struct kept_call call = {f->truth, configuration, FIT_N_VIEW, SEED_PHOTOGRAPH, 0, .plain_paths = !f->guided};
-    kept_estimate(f, &call, how->part * kept_n_chunks(how->n_path), how->n_path, e);
+    const struct cached_call call = {
+        f->truth, configuration, FIT_N_VIEW, SEED_PHOTOGRAPH, 0, .plain_paths = !f->guided};
+    cached_estimate(f, &call, how->part * cached_n_chunks(how->n_path), how->n_path, e);
     rng_start(&rng, &(struct rng_key){.seed = how->noise_seed, .iteration = 65533}, 0, 0);
     observation_set_init(&o);
     for (size_t i = 0; i < FIT_N_VIEW; i++) {
@@ -193,9 +194,9 @@ void fit_phantom_photograph(struct fit_phantom *f, const struct fit_photography 
 
 uint64_t fit_phantom_fingerprint(const struct fit_phantom *f)
 {
-    const struct kept_call call = {f->truth, f->configuration, f->observation.n, 0, 0, false};
+    const struct cached_call call = {f->truth, f->configuration, f->observation.n, 0, 0, false};
     uint32_t sum = 0;
     for (size_t i = 0; i < f->fitted.n; i++)
         sum = (uint32_t)crc32_z(sum, (const void *)f->fitted.item[i].mean_rgb, sizeof f->fitted.item[i].mean_rgb);
-    return (uint64_t)kept_call_sum(f, &call, 0, 0) << 32 | sum;
+    return (uint64_t)cached_call_sum(f, &call, 0, 0) << 32 | sum;
 }

@@ -1,7 +1,7 @@
 /* Scores of fits on a phantom (fit_phantom.h). */
 #include "optimizer/fit/linear/linear_model.h"
 #include "optimizer/fit/objective/objective.h"
-#include "tests/support/cloth/kept_estimate.h"
+#include "tests/support/cloth/cached_estimate.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -54,8 +54,8 @@ static void scorer_release(struct scorer *s)
 static void append_kept(struct scorer *s, const struct fit_phantom *f, const double *at, size_t n_kept)
 {
     for (uint32_t q = 0; q < 2; q++)
-        kept_estimate(f, &(struct kept_call){at, s->configuration, s->part.n, SEED_KEPT, q, true, !f->guided}, 0,
-                      n_kept, s->replica[q]);
+        cached_estimate(f, &(struct cached_call){at, s->configuration, s->part.n, SEED_KEPT, q, true, !f->guided}, 0,
+                        n_kept, s->replica[q]);
     append_here(s, f, at);
 }
 
@@ -89,8 +89,8 @@ double fit_phantom_stated_score(const struct fit_phantom *f, enum job_set set)
 static void append_score_paths(struct scorer *s, const struct fit_phantom *f, const double *param, size_t n_path)
 {
     for (uint32_t q = 0; q < 2; q++)
-        kept_run(f, &(struct kept_call){param, s->configuration, s->part.n, SEED_SCORE, q, true, !f->guided}, 0, n_path,
-                 s->replica[q]);
+        kept_run(f, &(struct cached_call){param, s->configuration, s->part.n, SEED_SCORE, q, true, !f->guided}, 0,
+                 n_path, s->replica[q]);
     append_here(s, f, param);
 }
 
@@ -166,7 +166,7 @@ struct fit_score fit_phantom_score_to(const struct fit_phantom *f, enum job_set 
         struct scorer s;
         scorer_start(&s, f, set);
         for (uint32_t q = 0; q < 2; q++)
-            kept_run_counts(f, &(struct kept_call){param, s.configuration, s.part.n, SEED_SCORE, q, false}, round,
+            kept_run_counts(f, &(struct cached_call){param, s.configuration, s.part.n, SEED_SCORE, q, false}, round,
                             count, s.replica[q]);
         append_here(&s, f, param);
         pool_at(&s, f, param);

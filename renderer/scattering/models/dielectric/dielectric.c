@@ -27,14 +27,14 @@ static status prepare(const double *param, struct scattering_state **state, stru
 
 static void release(struct scattering_state *s) { free(s); }
 
-static struct azimuth_place place_of(const float wi[3], const float wo[3])
+static struct azimuth_index index_of(const float wi[3], const float wo[3])
 {
-    return azimuth_place_of(wi, wo, DIELECTRIC_N_ROW, DIELECTRIC_N_PHI);
+    return azimuth_index_of(wi, wo, DIELECTRIC_N_ROW, DIELECTRIC_N_PHI);
 }
 
 #define BILINEAR(field) AZIMUTH_BILINEAR(corner, g, field)
 
-static struct dielectric_cell cell_at(const struct scattering_state *s, const struct azimuth_place *g)
+static struct dielectric_cell cell_at(const struct scattering_state *s, const struct azimuth_index *g)
 {
     const struct dielectric_cell *corner[4] = {&s->cell[g->row][g->column], &s->cell[g->row][g->column + 1],
                                                &s->cell[g->row + 1][g->column], &s->cell[g->row + 1][g->column + 1]};
@@ -44,7 +44,7 @@ static struct dielectric_cell cell_at(const struct scattering_state *s, const st
     return y;
 }
 
-static struct dielectric_slope slope_at(const struct scattering_state *s, const struct azimuth_place *g)
+static struct dielectric_slope slope_at(const struct scattering_state *s, const struct azimuth_index *g)
 {
     const struct dielectric_slope *corner[4] = {&s->slope[g->row][g->column], &s->slope[g->row][g->column + 1],
                                                 &s->slope[g->row + 1][g->column], &s->slope[g->row + 1][g->column + 1]};
@@ -64,7 +64,7 @@ static void mode_probabilities(const struct scattering_state *s, int row, float 
                                LEAST_PROBABILITY, p);
 }
 
-static float density(const struct scattering_state *s, const struct azimuth_place *g, const float *weight_rgb,
+static float density(const struct scattering_state *s, const struct azimuth_index *g, const float *weight_rgb,
                      const float m[DIELECTRIC_N_LOBE])
 {
     const struct dielectric_row *a = &s->row[g->out_row], *b = a + 1;
@@ -86,7 +86,7 @@ struct terms {
     float rest[3], d_scale[2]; /* d ln of the scales of both directions by eta and by beta */
 };
 
-static void scores(const struct scattering_state *s, const struct azimuth_place *g, const struct terms *t, float *score)
+static void scores(const struct scattering_state *s, const struct azimuth_index *g, const struct terms *t, float *score)
 {
     const float *m = t->m, *d_beta = t->d_beta;
     const struct dielectric_slope d = slope_at(s, g);
@@ -114,7 +114,7 @@ static void scores(const struct scattering_state *s, const struct azimuth_place 
     }
 }
 
-static void eval_at(const struct scattering_state *s, const struct azimuth_place *g, const float m[DIELECTRIC_N_LOBE],
+static void eval_at(const struct scattering_state *s, const struct azimuth_index *g, const float m[DIELECTRIC_N_LOBE],
                     const float *d_beta, float s_rgb[3], float *score)
 {
     float d_in[2], d_out[2],
@@ -135,7 +135,7 @@ static void eval_at(const struct scattering_state *s, const struct azimuth_place
 static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb,
                       float s_rgb[3], float *score)
 {
-    const struct azimuth_place g = place_of(wi, wo);
+    const struct azimuth_index g = index_of(wi, wo);
     float m[DIELECTRIC_N_LOBE], d_beta[DIELECTRIC_N_LOBE];
     dielectric_longitudinal(&s->along, wi[0], g.in.cos_theta, wo[0], g.out.cos_theta, m, score != NULL ? d_beta : NULL);
     eval_at(s, &g, m, d_beta, s_rgb, score);
@@ -144,7 +144,7 @@ static float eval_pdf(const struct scattering_state *s, const float wi[3], const
 
 static void eval(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
 {
-    const struct azimuth_place g = place_of(wi, wo);
+    const struct azimuth_index g = index_of(wi, wo);
     float m[DIELECTRIC_N_LOBE], d_beta[DIELECTRIC_N_LOBE];
     dielectric_longitudinal(&s->along, wi[0], g.in.cos_theta, wo[0], g.out.cos_theta, m, score != NULL ? d_beta : NULL);
     eval_at(s, &g, m, d_beta, s_rgb, score);
@@ -152,7 +152,7 @@ static void eval(const struct scattering_state *s, const float wi[3], const floa
 
 static float pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)
 {
-    const struct azimuth_place g = place_of(wi, wo);
+    const struct azimuth_index g = index_of(wi, wo);
     float m[DIELECTRIC_N_LOBE];
     dielectric_longitudinal(&s->along, wi[0], g.in.cos_theta, wo[0], g.out.cos_theta, m, NULL);
     return density(s, &g, weight_rgb, m);

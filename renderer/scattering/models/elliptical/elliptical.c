@@ -32,12 +32,12 @@ static status prepare(const double *param, struct scattering_state **state, stru
 
 static void release(struct scattering_state *s) { free(s); }
 
-static struct azimuth_place place_of(const float wi[3], const float wo[3])
+static struct azimuth_index index_of(const float wi[3], const float wo[3])
 {
-    return azimuth_place_of(wi, wo, ELLIPTICAL_N_ROW, ELLIPTICAL_N_PHI);
+    return azimuth_index_of(wi, wo, ELLIPTICAL_N_ROW, ELLIPTICAL_N_PHI);
 }
 
-static void along(const struct scattering_state *s, const struct azimuth_place *g, float m[ELLIPTICAL_N_LOBE],
+static void along(const struct scattering_state *s, const struct azimuth_index *g, float m[ELLIPTICAL_N_LOBE],
                   float (*d)[2])
 {
     elliptical_along(s->along, g->in.theta_rad + g->out.theta_rad, m, d);
@@ -45,7 +45,7 @@ static void along(const struct scattering_state *s, const struct azimuth_place *
 
 #define BILINEAR(field) AZIMUTH_BILINEAR(corner, g, field)
 
-static struct elliptical_cell cell_at(const struct scattering_state *s, const struct azimuth_place *g)
+static struct elliptical_cell cell_at(const struct scattering_state *s, const struct azimuth_index *g)
 {
     const struct elliptical_cell *corner[4] = {&s->cell[g->row][g->column], &s->cell[g->row][g->column + 1],
                                                &s->cell[g->row + 1][g->column], &s->cell[g->row + 1][g->column + 1]};
@@ -55,7 +55,7 @@ static struct elliptical_cell cell_at(const struct scattering_state *s, const st
     return y;
 }
 
-static struct elliptical_slope slope_at(const struct scattering_state *s, const struct azimuth_place *g)
+static struct elliptical_slope slope_at(const struct scattering_state *s, const struct azimuth_index *g)
 {
     const struct elliptical_slope *corner[4] = {&s->slope[g->row][g->column], &s->slope[g->row][g->column + 1],
                                                 &s->slope[g->row + 1][g->column], &s->slope[g->row + 1][g->column + 1]};
@@ -74,7 +74,7 @@ static void mode_probabilities(const struct scattering_state *s, int row, float 
                                LEAST_PROBABILITY, p);
 }
 
-static float density(const struct scattering_state *s, const struct azimuth_place *g, const float *weight_rgb,
+static float density(const struct scattering_state *s, const struct azimuth_index *g, const float *weight_rgb,
                      const float m[ELLIPTICAL_N_LOBE])
 {
     const struct elliptical_row *a = &s->row[g->out_row], *b = a + 1;
@@ -97,7 +97,7 @@ struct terms {
     float rest[3], d_scale[ELLIPTICAL_N_SCALE]; /* d ln of the scales of both directions */
 };
 
-static void scores(const struct scattering_state *s, const struct azimuth_place *g, const struct terms *t, float *score)
+static void scores(const struct scattering_state *s, const struct azimuth_index *g, const struct terms *t, float *score)
 {
     const struct elliptical_slope d = slope_at(s, g);
     const struct elliptical_row *a = &s->row[g->row], *b = a + 1;
@@ -124,7 +124,7 @@ static void scores(const struct scattering_state *s, const struct azimuth_place 
 }
 
 /* t->m, and t->d when there are scores, are set. */
-static void eval_at(const struct scattering_state *s, const struct azimuth_place *g, struct terms *t, float s_rgb[3],
+static void eval_at(const struct scattering_state *s, const struct azimuth_index *g, struct terms *t, float s_rgb[3],
                     float *score)
 {
     for (int k = 0; k < ELLIPTICAL_N_SCALE; k++) t->d_scale[k] = 0;
@@ -144,7 +144,7 @@ static void eval_at(const struct scattering_state *s, const struct azimuth_place
 static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb,
                       float s_rgb[3], float *score)
 {
-    const struct azimuth_place g = place_of(wi, wo);
+    const struct azimuth_index g = index_of(wi, wo);
     struct terms t;
     along(s, &g, t.m, score != NULL ? t.d : NULL);
     eval_at(s, &g, &t, s_rgb, score);
@@ -153,7 +153,7 @@ static float eval_pdf(const struct scattering_state *s, const float wi[3], const
 
 static void eval(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
 {
-    const struct azimuth_place g = place_of(wi, wo);
+    const struct azimuth_index g = index_of(wi, wo);
     struct terms t;
     along(s, &g, t.m, score != NULL ? t.d : NULL);
     eval_at(s, &g, &t, s_rgb, score);
@@ -161,7 +161,7 @@ static void eval(const struct scattering_state *s, const float wi[3], const floa
 
 static float pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)
 {
-    const struct azimuth_place g = place_of(wi, wo);
+    const struct azimuth_index g = index_of(wi, wo);
     float m[ELLIPTICAL_N_LOBE];
     along(s, &g, m, NULL);
     return density(s, &g, weight_rgb, m);

@@ -61,15 +61,15 @@ static struct seen seen_of(const float w[3])
 }
 
 /* A pair of directions in the tables. */
-struct place {
+struct table_index {
     struct seen in, out;
     int row, psi, delta;
     float x, y, z, turn_rad; /* between rows, psi and Delta; ph_o - ph_i within half a turn */
 };
 
-static struct place place_of(const float wi[3], const float wo[3])
+static struct table_index index_of(const float wi[3], const float wo[3])
 {
-    struct place g = {.in = seen_of(wi), .out = seen_of(wo)};
+    struct table_index g = {.in = seen_of(wi), .out = seen_of(wo)};
     const float c = g.in.direction.cos_theta + g.out.direction.cos_theta, u = wi[0] + wo[0];
     g.turn_rad = remainderf(g.out.azimuth_rad - g.in.azimuth_rad, (float)(2 * M_PI));
     const float psi = fabsf(remainderf(g.in.azimuth_rad + 0.5f * g.turn_rad, (float)M_PI));
@@ -117,7 +117,7 @@ static void multiply_balance(const struct scattering_state *s, const struct seen
     for (int k = 0; k < ORIENTED_N_M; k++) out->d_ln[k] += sum.d_ln[k] / sum.m;
 }
 
-static void scores(const struct scattering_state *s, const struct place *g, const struct terms *t, float *score)
+static void scores(const struct scattering_state *s, const struct table_index *g, const struct terms *t, float *score)
 {
     struct elliptical_slope d = {0};
     CORNERS(slope, struct elliptical_slope, &d);
@@ -160,7 +160,7 @@ static float width(const struct scattering_state *s, const float w[3], float *sc
     return h;
 }
 
-static void eval_at(const struct scattering_state *s, const struct place *g, struct terms *t, float s_rgb[3],
+static void eval_at(const struct scattering_state *s, const struct table_index *g, struct terms *t, float s_rgb[3],
                     float *score)
 {
     const float th_i = g->in.direction.theta_rad, th_o = g->out.direction.theta_rad;
@@ -203,7 +203,7 @@ static void mode_probabilities(const struct oriented_view **view, const float sh
                                LEAST_PROBABILITY, p);
 }
 
-static float density(const struct scattering_state *s, const struct place *g, const float *weight_rgb,
+static float density(const struct scattering_state *s, const struct table_index *g, const float *weight_rgb,
                      const float m[ELLIPTICAL_N_LOBE])
 {
     const struct oriented_view *view[4];
@@ -226,7 +226,7 @@ static float density(const struct scattering_state *s, const struct place *g, co
 static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb,
                       float s_rgb[3], float *score)
 {
-    const struct place g = place_of(wi, wo);
+    const struct table_index g = index_of(wi, wo);
     struct terms t;
     eval_at(s, &g, &t, s_rgb, score);
     return density(s, &g, weight_rgb, t.m);
@@ -234,14 +234,14 @@ static float eval_pdf(const struct scattering_state *s, const float wi[3], const
 
 static void eval(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
 {
-    const struct place g = place_of(wi, wo);
+    const struct table_index g = index_of(wi, wo);
     struct terms t;
     eval_at(s, &g, &t, s_rgb, score);
 }
 
 static float pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)
 {
-    const struct place g = place_of(wi, wo);
+    const struct table_index g = index_of(wi, wo);
     float m[ELLIPTICAL_N_LOBE];
     elliptical_along(s->along, g.in.direction.theta_rad + g.out.direction.theta_rad, m, NULL);
     return density(s, &g, weight_rgb, m);

@@ -41,7 +41,7 @@ static void mode_probabilities(const struct scattering_state *s, int row, float 
 
 /* A pair of directions: M of each lobe, and the factors of the tables. */
 struct terms {
-    struct azimuth_place g;
+    struct azimuth_index g;
     float m[FUR_N_LOBE], d[FUR_N_LOBE][2];             /* M, and by shift and width */
     float factor[FUR_FAR_N_LOBE];                      /* of N of each lobe in S */
     float d_scale[FUR_N_SCALE], d_wide[FUR_N_MEAN_BY]; /* d ln of the scales of the lobes and of scattered light */
@@ -50,7 +50,7 @@ struct terms {
 
 static void add_medulla(const struct scattering_state *s, float cos_d, struct terms *t)
 {
-    const struct azimuth_place *g = &t->g;
+    const struct azimuth_index *g = &t->g;
     const float through = ((float)g->column + g->y) / FUR_N_PHI, in = g->in.theta_rad, out = g->out.theta_rad;
     float half[MEDULLA_N_HALF], d[MEDULLA_N_BY][MEDULLA_N_HALF];
     medulla_along_at(&s->along.medulla, in + out, in - out, half, d);
@@ -61,7 +61,7 @@ static void add_medulla(const struct scattering_state *s, float cos_d, struct te
 
 static void terms_of(const struct scattering_state *s, const float wi[3], const float wo[3], struct terms *t)
 {
-    t->g = azimuth_place_of(wi, wo, FUR_FAR_ROW, FUR_N_PHI);
+    t->g = azimuth_index_of(wi, wo, FUR_FAR_ROW, FUR_N_PHI);
     for (int k = 0; k < FUR_N_SCALE; k++) t->d_scale[k] = 0;
     const float scale = fur_scale_at(&s->along, t->g.in.theta_rad, t->d_scale) *
                         fur_scale_at(&s->along, t->g.out.theta_rad, t->d_scale);
@@ -74,7 +74,7 @@ static void terms_of(const struct scattering_state *s, const float wi[3], const 
     add_medulla(s, ((float)t->g.row + t->g.x) / FUR_FAR_ROW, t);
 }
 
-static float density(const struct scattering_state *s, const struct azimuth_place *g, const float *weight_rgb,
+static float density(const struct scattering_state *s, const struct azimuth_index *g, const float *weight_rgb,
                      const float m[FUR_N_LOBE])
 {
     const struct fur_row *a = &s->row[g->out_row], *b = a + 1;
@@ -101,7 +101,7 @@ static void scores(const struct scattering_state *s, const struct terms *t, floa
 {
     static const int of_scale[FUR_N_SCALE] = {FUR_P_ETA, FUR_P_KAPPA, FUR_P_LAYERS, FUR_P_MS,
                                               FUR_P_G,   FUR_P_ALPHA, FUR_P_BETA};
-    const struct azimuth_place *g = &t->g;
+    const struct azimuth_index *g = &t->g;
     const struct fur_slope *corner[4] = {&s->slope[g->row][g->column], &s->slope[g->row][g->column + 1],
                                          &s->slope[g->row + 1][g->column], &s->slope[g->row + 1][g->column + 1]};
     const struct fur_row *a = &s->row[g->row], *b = a + 1;
@@ -133,7 +133,7 @@ static void scores(const struct scattering_state *s, const struct terms *t, floa
 
 static void eval_at(const struct scattering_state *s, const struct terms *t, float s_rgb[3], float *score)
 {
-    const struct azimuth_place *g = &t->g;
+    const struct azimuth_index *g = &t->g;
     const struct fur_cell *corner[4] = {&s->cell[g->row][g->column], &s->cell[g->row][g->column + 1],
                                         &s->cell[g->row + 1][g->column], &s->cell[g->row + 1][g->column + 1]};
     const struct fur_row *a = &s->row[g->row], *b = a + 1;
@@ -164,7 +164,7 @@ static void eval(const struct scattering_state *s, const float wi[3], const floa
 
 static float pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)
 {
-    const struct azimuth_place g = azimuth_place_of(wi, wo, FUR_FAR_ROW, FUR_N_PHI);
+    const struct azimuth_index g = azimuth_index_of(wi, wo, FUR_FAR_ROW, FUR_N_PHI);
     float m[FUR_N_LOBE];
     for (int p = 0; p < FUR_N_LOBE; p++)
         m[p] = tilted_lobe_eval(&s->along.lobe[p], g.in.theta_rad + g.out.theta_rad, NULL);

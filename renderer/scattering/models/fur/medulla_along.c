@@ -59,22 +59,22 @@ static void fill(struct medulla_along *m, int half, double depth, double g)
 }
 
 /* Where the table is read for two angles. */
-struct place {
+struct table_index {
     int i, j;
     float x, y;
 };
 
-static struct place place_of(float sum, float difference)
+static struct table_index index_of(float sum, float difference)
 {
-    struct place g;
+    struct table_index g;
     g.x = table_position(fabsf(sum) * (float)((MEDULLA_FINE_SUM - 1) / M_PI), MEDULLA_FINE_SUM - 1, &g.i);
     g.y = table_position(fabsf(difference) * (float)((MEDULLA_FINE_DIFFERENCE - 1) / M_PI), MEDULLA_FINE_DIFFERENCE - 1,
                          &g.j);
     return g;
 }
 
-static inline float read_half(const float (*table)[MEDULLA_FINE_DIFFERENCE][MEDULLA_N_HALF], const struct place *g,
-                              int half)
+static inline float read_half(const float (*table)[MEDULLA_FINE_DIFFERENCE][MEDULLA_N_HALF],
+                              const struct table_index *g, int half)
 {
     const float(*row)[MEDULLA_N_HALF] = &table[g->i][g->j], (*next)[MEDULLA_N_HALF] = &table[g->i + 1][g->j];
     return table_mix(table_mix(row[0][half], row[1][half], g->y), table_mix(next[0][half], next[1][half], g->y), g->x);
@@ -83,7 +83,7 @@ static inline float read_half(const float (*table)[MEDULLA_FINE_DIFFERENCE][MEDU
 void medulla_along_at(const struct medulla_along *m, float sum, float difference, float value[MEDULLA_N_HALF],
                       float (*d)[MEDULLA_N_HALF])
 {
-    const struct place g = place_of(sum, difference);
+    const struct table_index g = index_of(sum, difference);
     for (int half = 0; half < MEDULLA_N_HALF; half++) {
         value[half] = read_half(m->m, &g, half);
         for (int q = 0; q < MEDULLA_N_BY && d != NULL; q++) d[q][half] = read_half(m->d[q], &g, half);
@@ -112,7 +112,7 @@ static void fill_kernel(const struct medulla_along *m, struct balance *b)
     for (int i = 0; i < N_THETA; i++)
         for (int j = 0; j <= i; j++) {
             const float sum = (float)(i + j) * step, difference = (float)(i - j) * step;
-            const struct place near = place_of(difference, sum), far = place_of(sum, difference);
+            const struct table_index near = index_of(difference, sum), far = index_of(sum, difference);
             b->solver.kernel[i][j] = b->solver.kernel[j][i] =
                 (double)(read_half(m->m, &near, b->half) + read_half(m->m, &far, b->half));
             for (int q = 0; q < MEDULLA_N_BY; q++)

@@ -36,9 +36,9 @@ static status prepare(const double *param, struct scattering_state **state, stru
 
 static void release(struct scattering_state *s) { free(s); }
 
-static struct azimuth_place place_of(const float wi[3], const float wo[3])
+static struct azimuth_index index_of(const float wi[3], const float wo[3])
 {
-    return azimuth_place_of(wi, wo, MICROFACET_N_ROW, MICROFACET_N_PHI);
+    return azimuth_index_of(wi, wo, MICROFACET_N_ROW, MICROFACET_N_PHI);
 }
 
 /* a(th); adds d ln a to d_ln. */
@@ -53,7 +53,7 @@ static float scale_at(const struct scattering_state *s, float theta_rad, float d
 
 #define BILINEAR(field) AZIMUTH_BILINEAR(corner, g, field)
 
-static struct microfacet_cell cell_at(const struct scattering_state *s, const struct azimuth_place *g)
+static struct microfacet_cell cell_at(const struct scattering_state *s, const struct azimuth_index *g)
 {
     const struct microfacet_cell *corner[4] = {&s->cell[g->row][g->column], &s->cell[g->row][g->column + 1],
                                                &s->cell[g->row + 1][g->column], &s->cell[g->row + 1][g->column + 1]};
@@ -66,7 +66,7 @@ static struct microfacet_cell cell_at(const struct scattering_state *s, const st
     return y;
 }
 
-static struct microfacet_slope slope_at(const struct scattering_state *s, const struct azimuth_place *g)
+static struct microfacet_slope slope_at(const struct scattering_state *s, const struct azimuth_index *g)
 {
     const struct microfacet_slope *corner[4] = {&s->slope[g->row][g->column], &s->slope[g->row][g->column + 1],
                                                 &s->slope[g->row + 1][g->column], &s->slope[g->row + 1][g->column + 1]};
@@ -90,7 +90,7 @@ struct terms {
     float rest[3], d_scale[MICROFACET_N_SCALE];                    /* d ln of the scales of both directions */
 };
 
-static void scores(const struct scattering_state *s, const struct azimuth_place *g, const struct terms *t,
+static void scores(const struct scattering_state *s, const struct azimuth_index *g, const struct terms *t,
                    const float sum[3], float *score)
 {
     enum { REST = MICROFACET_N_INNER };
@@ -121,7 +121,7 @@ static void scores(const struct scattering_state *s, const struct azimuth_place 
 }
 
 static void eval_at(const struct scattering_state *s, const float wi[3], const float wo[3],
-                    const struct azimuth_place *g, float s_rgb[3], float *score)
+                    const struct azimuth_index *g, float s_rgb[3], float *score)
 {
     enum { REST = MICROFACET_N_INNER };
     struct terms t = {.d_scale = {0}};
@@ -162,7 +162,7 @@ static struct tilted_lobe lobe_along(const struct scattering_state *s, int k, in
 {
     const struct microfacet_row *a = &s->row[row], *b = a + 1;
     if (k == MICROFACET_REST) return (struct tilted_lobe){0, fminf(table_mix(a->width, b->width, x), MOST_WIDTH)};
-    const struct azimuth_place place = {.x = x, .y = y}, *g = &place;
+    const struct azimuth_index index = {.x = x, .y = y}, *g = &index;
     if (k == MICROFACET_R) {
         const float shift = table_mix(table_mix(a->shift_r[column], a->shift_r[column + 1], y),
                                       table_mix(b->shift_r[column], b->shift_r[column + 1], y), x);
@@ -176,7 +176,7 @@ static struct tilted_lobe lobe_along(const struct scattering_state *s, int k, in
     return (struct tilted_lobe){fabsf(BILINEAR(shift[p])), fminf(BILINEAR(width[p]), MOST_WIDTH)};
 }
 
-static float density(const struct scattering_state *s, const struct azimuth_place *g, const float *weight_rgb)
+static float density(const struct scattering_state *s, const struct azimuth_index *g, const float *weight_rgb)
 {
     const struct microfacet_row *a = &s->row[g->out_row], *b = a + 1;
     float p[MICROFACET_N_LOBE], sum = 0;
@@ -198,20 +198,20 @@ static float density(const struct scattering_state *s, const struct azimuth_plac
 static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb,
                       float s_rgb[3], float *score)
 {
-    const struct azimuth_place g = place_of(wi, wo);
+    const struct azimuth_index g = index_of(wi, wo);
     eval_at(s, wi, wo, &g, s_rgb, score);
     return density(s, &g, weight_rgb);
 }
 
 static void eval(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
 {
-    const struct azimuth_place g = place_of(wi, wo);
+    const struct azimuth_index g = index_of(wi, wo);
     eval_at(s, wi, wo, &g, s_rgb, score);
 }
 
 static float pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)
 {
-    const struct azimuth_place g = place_of(wi, wo);
+    const struct azimuth_index g = index_of(wi, wo);
     return density(s, &g, weight_rgb);
 }
 

@@ -37,9 +37,9 @@ static status fill(struct scattering_state *s, const struct wave_table *table, c
 
 static void release(struct scattering_state *s) { free(s); }
 
-static struct azimuth_place place_of(const float wi[3], const float wo[3])
+static struct azimuth_index index_of(const float wi[3], const float wo[3])
 {
-    return azimuth_place_of(wi, wo, WAVE_N_ROW, WAVE_N_PHI);
+    return azimuth_index_of(wi, wo, WAVE_N_ROW, WAVE_N_PHI);
 }
 
 /* a(th); adds d ln a by beta. */
@@ -54,7 +54,7 @@ static float scale_at(const struct scattering_state *s, float theta_rad, float *
 #define BILINEAR(field) AZIMUTH_BILINEAR(corner, g, field)
 
 /* m: g(th_i + th_o), and its derivative by beta when there are scores. */
-static void eval_at(const struct scattering_state *s, const struct azimuth_place *g, const float m[2], float s_rgb[3],
+static void eval_at(const struct scattering_state *s, const struct azimuth_index *g, const float m[2], float s_rgb[3],
                     float *score)
 {
     const struct wave_cell *corner[4] = {&s->cell[g->row][g->column], &s->cell[g->row][g->column + 1],
@@ -73,7 +73,7 @@ static void eval_at(const struct scattering_state *s, const struct azimuth_place
 }
 
 /* g(th_i + th_o), and its derivative by beta when wanted. */
-static void along(const struct scattering_state *s, const struct azimuth_place *g, float m[2], bool scores)
+static void along(const struct scattering_state *s, const struct azimuth_index *g, float m[2], bool scores)
 {
     float d[2];
     m[0] = tilted_lobe_eval(&s->along, g->in.theta_rad + g->out.theta_rad, scores ? d : NULL);
@@ -87,7 +87,7 @@ static void channel_probabilities(const struct scattering_state *s, int row, flo
     azimuth_mode_probabilities(s->row[row].energy, s->row[row + 1].energy, x, 3, weight_rgb, LEAST_PROBABILITY, p);
 }
 
-static float density(const struct scattering_state *s, const struct azimuth_place *g, const float *weight_rgb, float m)
+static float density(const struct scattering_state *s, const struct azimuth_index *g, const float *weight_rgb, float m)
 {
     const struct wave_row *a = &s->row[g->out_row], *b = a + 1;
     float p[3], around = 0;
@@ -104,7 +104,7 @@ static float density(const struct scattering_state *s, const struct azimuth_plac
 static float eval_pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb,
                       float s_rgb[3], float *score)
 {
-    const struct azimuth_place g = place_of(wi, wo);
+    const struct azimuth_index g = index_of(wi, wo);
     float m[2];
     along(s, &g, m, score != NULL);
     eval_at(s, &g, m, s_rgb, score);
@@ -113,7 +113,7 @@ static float eval_pdf(const struct scattering_state *s, const float wi[3], const
 
 static void eval(const struct scattering_state *s, const float wi[3], const float wo[3], float s_rgb[3], float *score)
 {
-    const struct azimuth_place g = place_of(wi, wo);
+    const struct azimuth_index g = index_of(wi, wo);
     float m[2];
     along(s, &g, m, score != NULL);
     eval_at(s, &g, m, s_rgb, score);
@@ -121,7 +121,7 @@ static void eval(const struct scattering_state *s, const float wi[3], const floa
 
 static float pdf(const struct scattering_state *s, const float wi[3], const float wo[3], const float *weight_rgb)
 {
-    const struct azimuth_place g = place_of(wi, wo);
+    const struct azimuth_index g = index_of(wi, wo);
     float m[2];
     along(s, &g, m, false);
     return density(s, &g, weight_rgb, m[0]);

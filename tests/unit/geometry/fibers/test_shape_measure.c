@@ -76,7 +76,7 @@ static void draw(struct volume *v, const struct test_fiber *f)
             }
 }
 
-/* Sums over some vertices of some fibers. */
+/* Sums over some vertices of some fibers. A pull is a normalised error: error over standard error. */
 struct pulls {
     double radius, ratio, angle, n, radius_error, ratio_error, angle_error;
     size_t n_varying;

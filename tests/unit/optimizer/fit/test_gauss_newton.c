@@ -333,10 +333,10 @@ static struct blind fit_blind(const struct param_info *eighth, double start, siz
     return b;
 }
 
-/* A parameter that the photographs do not determine follows the pull: a width goes from the model's start to wide
- * lobes, and from a stated start back to that start; another positive quantity stays. Parameters that are determined
- * are the same as without the pull. */
-static void test_pull(void **state)
+/* A parameter that the photographs do not determine follows the regularization: a width goes from the model's start to
+ * wide lobes, and from a stated start back to that start; another positive quantity stays. Parameters that are
+ * determined are the same as without it. */
+static void test_regularization(void **state)
 {
     (void)state;
     struct fit_result r[3];
@@ -364,7 +364,7 @@ static void test_pull(void **state)
         assert_true(fake_rel_rms(&f, 0, FAKE_N_FIT, r[k].param, truth) < 0.01);
     }
     (void)fit_blind(&width, width.start, 1,
-                    &r[0]); /* the pull does not act at the end of a fit, not even of a single step */
+                    &r[0]); /* regularization does not act at the end of a fit, not even of a single step */
     assert_true(fabs(log(r[0].param[8] / width.start)) < 1e-6);
 }
 
@@ -377,6 +377,6 @@ int main(void)
                                        cmocka_unit_test(test_errors_where_a_width_ends_at_its_bound),
                                        cmocka_unit_test(test_exact_renderings_of_noisy_photographs),
                                        cmocka_unit_test(test_says_when_it_has_not_converged),
-                                       cmocka_unit_test(test_pull)};
+                                       cmocka_unit_test(test_regularization)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,5 @@
-/* Progress of a fit by Gauss-Newton after its pull has ended: where the objective is lowest, and for how many points it
- * has not fallen. */
+/* Progress of a fit by Gauss-Newton after its regularization has ended: where the objective is lowest, and for how many
+ * points it has not fallen. */
 #include "optimizer/fit/descent/gauss_newton.h"
 
 #include <setjmp.h>

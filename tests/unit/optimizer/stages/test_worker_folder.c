@@ -48,12 +48,12 @@ static void test_other_inputs_empty_the_folder(void **state)
     bool changed = true;
     assert_int_equal(worker_folder_open(&f, *state, NULL), STATUS_OK);
     write_result(&f); /* of inputs that nobody knows */
-    assert_int_equal(worker_folder_claim_inputs(&f, 1, &changed, NULL), STATUS_OK);
+    assert_int_equal(worker_folder_match_inputs(&f, 1, &changed, NULL), STATUS_OK);
     assert_false(changed || has_result(&f) || worker_folder_stage_done(&f, "trace"));
     write_result(&f);
-    assert_int_equal(worker_folder_claim_inputs(&f, 1, &changed, NULL), STATUS_OK);
+    assert_int_equal(worker_folder_match_inputs(&f, 1, &changed, NULL), STATUS_OK);
     assert_true(!changed && has_result(&f) && worker_folder_stage_done(&f, "trace"));
-    assert_int_equal(worker_folder_claim_inputs(&f, 2, &changed, NULL), STATUS_OK);
+    assert_int_equal(worker_folder_match_inputs(&f, 2, &changed, NULL), STATUS_OK);
     assert_true(changed && !has_result(&f) && !worker_folder_stage_done(&f, "trace"));
     worker_folder_close(&f);
 }
@@ -65,10 +65,10 @@ static void test_a_worker_of_an_old_attempt_removes_nothing(void **state)
     bool changed;
     write_attempt(*state, "{\"attempt\": 1, \"token\": \"one\"}");
     assert_int_equal(worker_folder_open(&f, *state, NULL), STATUS_OK);
-    assert_int_equal(worker_folder_claim_inputs(&f, 1, &changed, NULL), STATUS_OK);
+    assert_int_equal(worker_folder_match_inputs(&f, 1, &changed, NULL), STATUS_OK);
     write_result(&f);
     write_attempt(*state, "{\"attempt\": 2, \"token\": \"two\"}");
-    assert_int_equal(worker_folder_claim_inputs(&f, 2, &changed, &err), STATUS_STALE);
+    assert_int_equal(worker_folder_match_inputs(&f, 2, &changed, &err), STATUS_STALE);
     assert_true(has_result(&f) && worker_folder_stage_done(&f, "trace"));
     worker_folder_close(&f);
 }

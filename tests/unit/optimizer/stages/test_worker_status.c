@@ -15,14 +15,14 @@
 
 #include <cmocka.h>
 
-struct desk {
+struct fixture {
     const char *folder;
     struct worker_folder hold;
     struct log *log;
     struct worker_status *status;
 };
 
-static void start(struct desk *d, void **state)
+static void start(struct fixture *d, void **state)
 {
     struct error err = {0};
     char path[512];
@@ -39,7 +39,7 @@ static void start(struct desk *d, void **state)
 }
 
 /* Ends the status and returns status.json. */
-static json_t *finish_as(struct desk *d, const char *end, const struct error *error)
+static json_t *finish_as(struct fixture *d, const char *end, const struct error *error)
 {
     struct error err = {0};
     char path[512];
@@ -53,11 +53,11 @@ static json_t *finish_as(struct desk *d, const char *end, const struct error *er
     return json;
 }
 
-static json_t *finish(struct desk *d, const struct error *error) { return finish_as(d, "failed", error); }
+static json_t *finish(struct fixture *d, const struct error *error) { return finish_as(d, "failed", error); }
 
 static void test_warnings_beyond_the_list_are_counted(void **state)
 {
-    struct desk d = {0};
+    struct fixture d = {0};
     char text[64];
     start(&d, state);
     for (int i = 0; i < 60; i++) {
@@ -76,7 +76,7 @@ static void test_warnings_beyond_the_list_are_counted(void **state)
 
 static void test_texts_that_are_no_utf8(void **state)
 {
-    struct desk d = {0};
+    struct fixture d = {0};
     char longer[600];
     start(&d, state);
     memset(longer, 'x', sizeof longer);
@@ -103,7 +103,7 @@ static void test_a_part_of_the_plan_is_no_forecast(void **state)
     enum { READING, PLANNING, BEGUN, N_CASE };
     static const struct speed_book none = {.n = 0};
     for (int at = READING; at < N_CASE; at++) {
-        struct desk d = {0};
+        struct fixture d = {0};
         start(&d, state);
         worker_status_stage(d.status, "volume", "Reading the job", 0, 8);
         if (at >= PLANNING) {

@@ -147,8 +147,8 @@ static struct round_kind after_step(struct nearest_rounds *r, struct polyline_se
     return nearest_rounds_next(r, is_last);
 }
 
-/* Claims serve three rounds and are found anew after a step of more than a tenth of a voxel. The last round keeps
- * none. */
+/* Nearest segments serve three rounds and are found anew after a step of more than a tenth of a voxel. The last round
+ * stores none. */
 static void test_rounds(void **state)
 {
     (void)state;

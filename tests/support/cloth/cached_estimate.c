@@ -1,4 +1,4 @@
-#include "tests/support/cloth/kept_estimate.h"
+#include "tests/support/cloth/cached_estimate.h"
 
 #include "base/files/durable.h"
 
@@ -14,7 +14,7 @@ void fit_check_memory(const void *p)
     exit(1);
 }
 
-void kept_run_counts(const struct fit_phantom *f, const struct kept_call *c, uint32_t iteration, const size_t *count,
+void kept_run_counts(const struct fit_phantom *f, const struct cached_call *c, uint32_t iteration, const size_t *count,
                      struct estimate *out)
 {
     struct error err = {0};
@@ -33,7 +33,7 @@ void kept_run_counts(const struct fit_phantom *f, const struct kept_call *c, uin
     fit_check(estimate_run(&q, f->pool, NULL, out, &err), &err);
 }
 
-void kept_run(const struct fit_phantom *f, const struct kept_call *c, uint32_t iteration, size_t n_path,
+void kept_run(const struct fit_phantom *f, const struct cached_call *c, uint32_t iteration, size_t n_path,
               struct estimate *out)
 {
     size_t count[FIT_MAX_OBSERVATION];
@@ -41,7 +41,7 @@ void kept_run(const struct fit_phantom *f, const struct kept_call *c, uint32_t i
     kept_run_counts(f, c, iteration, count, out);
 }
 
-uint32_t kept_call_sum(const struct fit_phantom *f, const struct kept_call *c, uint32_t chunk, size_t n_path)
+uint32_t cached_call_sum(const struct fit_phantom *f, const struct cached_call *c, uint32_t chunk, size_t n_path)
 {
     const struct fiber_set *s = &f->cloth.fiber;
     const uint32_t number[] = {(uint32_t)c->seed, c->replica, chunk, c->want_jacobian, (uint32_t)n_path};
@@ -59,13 +59,13 @@ uint32_t kept_call_sum(const struct fit_phantom *f, const struct kept_call *c, u
     return (uint32_t)crc32_z(sum, (const void *)number, sizeof number);
 }
 
-static void chunk_estimate(const struct fit_phantom *f, const struct kept_call *c, uint32_t chunk, size_t n_path,
+static void chunk_estimate(const struct fit_phantom *f, const struct cached_call *c, uint32_t chunk, size_t n_path,
                            struct estimate *out)
 {
     struct error err = {0};
     char path[1024], *data = NULL;
     size_t n = c->n_configuration * sizeof *out, n_read = 0;
-    snprintf(path, sizeof path, "%s/%08x.estimates", f->folder, kept_call_sum(f, c, chunk, n_path));
+    snprintf(path, sizeof path, "%s/%08x.estimates", f->folder, cached_call_sum(f, c, chunk, n_path));
     if (file_read_all(path, n, &data, &n_read, &err) == STATUS_OK && n_read == n) {
         memcpy(out, data, n);
     } else {
@@ -90,12 +90,12 @@ static void merge(struct estimate *sum, const struct estimate *part, double shar
     sum->n_bounce += part->n_bounce;
 }
 
-size_t kept_n_chunks(size_t n_path) { return (n_path + FIT_CHUNK - 1) / FIT_CHUNK; }
+size_t cached_n_chunks(size_t n_path) { return (n_path + FIT_CHUNK - 1) / FIT_CHUNK; }
 
-void kept_estimate(const struct fit_phantom *f, const struct kept_call *c, size_t first_chunk, size_t n_path,
-                   struct estimate *out)
+void cached_estimate(const struct fit_phantom *f, const struct cached_call *c, size_t first_chunk, size_t n_path,
+                     struct estimate *out)
 {
-    size_t n_chunk = kept_n_chunks(n_path);
+    size_t n_chunk = cached_n_chunks(n_path);
     struct estimate *part = calloc(c->n_configuration, sizeof *part);
     fit_check_memory(part);
     memset(out, 0, c->n_configuration * sizeof *out);
