@@ -20,8 +20,8 @@
 
 struct scan_look;
 
-/* Memory, or space in files, that all steps together need for a voxel of the scan. */
-enum { SCAN_BYTES_PER_VOXEL = 22 };
+/* Memory, or space in files, that all steps together need for a voxel of the scan, and of a scan with padding. */
+enum { SCAN_BYTES_PER_VOXEL = 22, SCAN_BYTES_PER_PADDED_VOXEL = 26 };
 
 /* Settles the statements of a scan's files against the options: each is applied (an option that was left out takes
  * its value), or its entry in the ledger, a copy of info->ledger, says why it is not used. STATUS_INVALID, with the
@@ -43,7 +43,8 @@ status reconstruct_examine(const char *const *path, size_t n_path, struct recons
  * memory without a limit. Errors name the file and the option that is wrong: STATUS_FORMAT (incomplete file, pages of
  * different size or depth), STATUS_INVALID (NaN voxels, constant, or empty: nothing above the threshold),
  * STATUS_CANCELLED, STATUS_NO_MEMORY, STATUS_DISK_FULL (scratch space; in all steps), STATUS_TOO_LARGE (the scan needs
- * more than the scratch space may hold, by SCAN_BYTES_PER_VOXEL). */
+ * more than the scratch space may hold, by the numbers above). Padding is entered in v->unknown: the steps below find
+ * fibers in known voxels only (volume_unknown.h). */
 status reconstruct_read(const char *const *path, size_t n_path, struct reconstruct_option *o,
                         struct scratch_space *space, struct thread_pool *pool, const struct progress *progress,
                         struct volume *v, struct reconstruct_report *report, struct error *err);

@@ -7,6 +7,7 @@
 #include "geometry/filter/filter_directions.h"
 #include "geometry/reconstruct/trace_grid.h"
 #include "geometry/volume/volume_rescale.h"
+#include "geometry/volume/volume_unknown.h"
 
 #include <math.h>
 
@@ -118,9 +119,9 @@ static status filter_rescaled(const struct volume *v, double edge, struct recons
     return s;
 }
 
-status reconstruct_orientation(const struct volume *v, struct reconstruct_option *option, struct thread_pool *pool,
-                               const struct progress *progress, struct direction_volume *d,
-                               struct reconstruct_report *report, struct error *err)
+static status find_directions(const struct volume *v, struct reconstruct_option *option, struct thread_pool *pool,
+                              const struct progress *progress, struct direction_volume *d,
+                              struct reconstruct_report *report, struct error *err)
 {
     struct progress_part part = {progress, 0.0, 0.1};
     const struct progress inner = progress_of_part(&part);
@@ -133,4 +134,32 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
     part = (struct progress_part){progress, 0.1, 0.9};
     if (edge == 1.0) return filter_directions(v, report->fiber_diameter_voxel, option, pool, &inner, d, report, err);
     return filter_rescaled(v, edge, option, pool, &inner, d, report, err);
+}
+
+/* Leaves out the voxels without a measurement, which a copy has filled. */
+static void empty_unknown(const struct volume *v, double eps_d, struct direction_volume *d,
+                          struct reconstruct_report *report)
+{
+    const size_t n = volume_n_voxel(v->n), n_slice = v->n[0] * v->n[1];
+    volume_unknown_empty(v, d);
+    report->n_material_voxel = report->n_kept_voxel = 0;
+    for (size_t i = 0; i < n; i++) {
+        if (i % n_slice == 0) scratch_keep_within(v->space);
+        report->n_material_voxel += v->density[i] >= (float)eps_d;
+        report->n_kept_voxel += d->density[i] > 0;
+    }
+}
+
+status reconstruct_orientation(const struct volume *v, struct reconstruct_option *option, struct thread_pool *pool,
+                               const struct progress *progress, struct direction_volume *d,
+                               struct reconstruct_report *report, struct error *err)
+{
+    struct volume continued = {0};
+    if (v->unknown.n == 0) return find_directions(v, option, pool, progress, d, report, err);
+    *d = (struct direction_volume){0};
+    status s = volume_continue(v, &continued, err);
+    if (s == STATUS_OK) s = find_directions(&continued, option, pool, progress, d, report, err);
+    if (s == STATUS_OK) empty_unknown(v, option->eps_d, d, report);
+    volume_release(&continued);
+    return s;
 }

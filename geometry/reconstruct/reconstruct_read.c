@@ -9,6 +9,7 @@
 #include "geometry/volume/density_map.h"
 #include "geometry/volume/format/volume_source.h"
 #include "geometry/volume/volume_align.h"
+#include "geometry/volume/volume_unknown.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -248,6 +249,7 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
 {
     struct density_modes m;
     status s = density_modes_find(v, &m, err);
+    if (s == STATUS_OK && report->has_padding) s = volume_mark_unknown(v, err);
     if (s != STATUS_OK) return s;
     const bool low_alone = !isnan(o->density_low) && isnan(o->density_high);
     if (isnan(o->density_low)) o->density_low = m.low;
@@ -297,7 +299,8 @@ status reconstruct_read(const char *const *path, size_t n_path, struct reconstru
     if (s != STATUS_OK) goto out;
     size_t n[3];
     for (int a = 0; a < 3; a++) n[a] = p.box_stored[3 + a] - p.box_stored[a];
-    s = scratch_check(space, SCAN_BYTES_PER_VOXEL * (double)volume_n_voxel(n), "the scan", err);
+    const int n_byte = report->has_padding ? SCAN_BYTES_PER_PADDED_VOXEL : SCAN_BYTES_PER_VOXEL;
+    s = scratch_check(space, n_byte * (double)volume_n_voxel(n), "the scan", err);
     if (s != STATUS_OK) {
         if (err != NULL) snprintf(err->field, sizeof err->field, OPTION_SCAN_FILES);
         goto out;

@@ -45,6 +45,8 @@ struct trace_job {
     double shared_radius_se;     /* voxels, with lumens that were measured: of all radii together (shape_measure.h) */
 };
 
+typedef status trace_find(struct trace_job *job, bool finish, struct polyline_set *lines, struct error *err);
+
 /* Sets the members that follow from others at the start: whether fibers are hollow, the diameter of the report, and a
  * profile. */
 void trace_job_start(struct trace_job *job);
@@ -74,8 +76,14 @@ status trace_leftover(struct trace_job *job, struct polyline_set *lines, struct 
  * deviate. */
 status trace_lines(struct trace_job *job, struct polyline_set *lines, struct error *err);
 status trace_finish(struct trace_job *job, struct polyline_set *lines, struct error *err);
+/* Repeats the last fit of trace_finish. */
+status trace_refit(struct trace_job *job, struct polyline_set *lines, struct error *err);
 /* In place of trace_finish where lines need not be exact: one round of its repairs. */
 status trace_settle(struct trace_job *job, struct polyline_set *lines, struct error *err);
+/* Finds lines by `find` in a scan some voxels of which are unknown (volume_unknown.h): in a copy whose densities
+ * continue there. Keeps the parts of lines in known voxels, and fits finished ones once more to these alone, but not
+ * where voxels are interpolated. */
+status trace_known(struct trace_job *job, bool finish, trace_find *find, struct polyline_set *lines, struct error *err);
 /* Finds the lines of a scan (trace_scan.c), to the end (finish) or until they are settled. They are in voxels of the
  * scan. */
 status trace_scan(struct trace_job *job, bool finish, struct polyline_set *lines, struct error *err);

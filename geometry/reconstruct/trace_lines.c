@@ -229,3 +229,8 @@ status trace_finish(struct trace_job *job, struct polyline_set *lines, struct er
     if (s == STATUS_OK) s = straighten(job, lines, true, job->o->min_vertex, err);
     return s == STATUS_OK ? trace_join(job, lines, false, err) : s;
 }
+
+status trace_refit(struct trace_job *job, struct polyline_set *lines, struct error *err)
+{
+    return fit_axes(job, lines, true, err);
+}

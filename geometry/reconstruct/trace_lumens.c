@@ -3,6 +3,7 @@
 #include "geometry/reconstruct/trace_job.h"
 
 #include "geometry/fibers/axes/hollow_fit.h"
+#include "geometry/volume/volume_unknown.h"
 
 #include <math.h>
 
@@ -21,6 +22,7 @@ status trace_lumens(struct trace_job *job, struct polyline_set *lines, struct er
     profile.clamp_sd = job->report->noise.mapped_sd;
     status s = volume_copy_unfilled(job->v, &scan, err);
     if (s != STATUS_OK) return s;
+    volume_unknown_ignore(job->v, &scan);
     trace_enter_part(job, TRACE_FINISHED_END, TRACE_LUMENS_END);
     const struct hollow_fit fit = {&scan, job->diameter, job->pool, &job->inner};
     s = polylines_fit_hollow(lines, &fit, &profile, &measure, err);

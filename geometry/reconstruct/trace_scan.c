@@ -67,10 +67,16 @@ static status trace_on_scan(struct trace_job *job, bool all, bool finish, struct
     return s;
 }
 
-status trace_scan(struct trace_job *job, bool finish, struct polyline_set *lines, struct error *err)
+static status find_lines(struct trace_job *job, bool finish, struct polyline_set *lines, struct error *err)
 {
     const double edge = job->report->trace_edge_voxel;
     status s = edge == 1.0 ? STATUS_OK : trace_rescaled(job, edge, finish, lines, err);
     if (s == STATUS_OK && edge >= 1.0) s = trace_on_scan(job, edge == 1.0, finish, lines, err);
     return s;
+}
+
+status trace_scan(struct trace_job *job, bool finish, struct polyline_set *lines, struct error *err)
+{
+    if (job->v->unknown.n == 0) return find_lines(job, finish, lines, err);
+    return trace_known(job, finish, find_lines, lines, err);
 }

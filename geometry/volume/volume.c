@@ -41,6 +41,7 @@ void volume_release(struct volume *v)
     scratch_release(v->space, v->density);
     scratch_release(v->space, v->filled.voxel);
     scratch_release(v->space, v->filled.density);
+    scratch_release(v->space, v->unknown.run);
     *v = (struct volume){0};
 }
 

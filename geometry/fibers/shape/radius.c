@@ -1,11 +1,14 @@
 #include "geometry/fibers/shape/radius.h"
 
+#include "geometry/volume/volume_unknown.h"
+
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { BRICK = 16, FINE = BRICK * RADIUS_UPSAMPLING, N_FINE = FINE * FINE * FINE + SEGMENT_SLACK, MAX_BRICK = 500 };
+enum { CUT_OFF = RADIUS_PARTS }; /* part of the segments near unknown voxels, which hide material around them */
 
 struct radius_job {
     const struct volume *v;
@@ -92,6 +95,7 @@ static void measure_brick(void *context, size_t i_task, size_t i_thread)
             for (size_t i = 0; i < l.n[0]; i++, at++) {
                 float density = row[i];
                 size_t bin = (size_t)(sqrtf(distance2[at]) * inverse_bin);
+                if (nearest[at] != UINT32_MAX && job->part[nearest[at]] == CUT_OFF) continue;
                 if (nearest[at] == UINT32_MAX || bin >= RADIUS_BINS) {
                     far->far_inside += density >= job->eps_d;
                     far->far_count++;
@@ -136,24 +140,34 @@ static size_t choose_bricks(const struct segment_bricks *b, uint32_t *chosen)
 }
 
 /* Adds the length of the lines inside the chosen bricks. Each segment counts to the brick of its middle. */
-static void add_lengths(const struct segment_bricks *bricks, const bool *is_chosen, struct distance_histogram *part)
+static void add_lengths(const struct segment_bricks *bricks, const bool *is_chosen, const uint8_t *part_of_segment,
+                        struct distance_histogram *part)
 {
     for (size_t i = 0; i < bricks->n_segment; i++) {
         const struct segment *g = &bricks->segment[i];
         double length2 = 0.0;
         size_t brick;
         for (int a = 0; a < 3; a++) length2 += (double)((g->b[a] - g->a[a]) * (g->b[a] - g->a[a]));
-        if (brick_of(bricks, g, &brick) && is_chosen[brick])
+        if (brick_of(bricks, g, &brick) && is_chosen[brick] && part_of_segment[i] != CUT_OFF)
             part[part_of(brick)].length_voxel[g->axis] += sqrt(length2);
     }
 }
 
-static void assign_parts(const struct segment_bricks *bricks, uint8_t *part)
+/* Segments that unknown voxels are near are left out, unless all are such. */
+static void assign_parts(const struct segment_bricks *bricks, const struct volume *v, float farthest, uint8_t *part)
 {
+    size_t n_whole = 0;
+    for (size_t i = 0; i < bricks->n_segment; i++) {
+        const struct segment *g = &bricks->segment[i];
+        const float middle[3] = {0.5f * (g->a[0] + g->b[0]), 0.5f * (g->a[1] + g->b[1]), 0.5f * (g->a[2] + g->b[2])};
+        const bool cut_off = volume_unknown_near(v, middle, farthest);
+        part[i] = cut_off ? CUT_OFF : 0;
+        n_whole += !cut_off;
+    }
     for (size_t i = 0; i < bricks->n_segment; i++) {
         size_t brick;
         brick_of(bricks, &bricks->segment[i], &brick);
-        part[i] = (uint8_t)part_of(brick);
+        if (part[i] != CUT_OFF || n_whole == 0) part[i] = (uint8_t)part_of(brick);
     }
 }
 
@@ -181,11 +195,11 @@ status distance_histogram_measure(const struct volume *v, const struct polyline_
         for (size_t t = 0; t < n_thread * RADIUS_PARTS; t++) job.histogram[t].bin_voxel = part[0].bin_voxel;
         size_t n_chosen = choose_bricks(&bricks, chosen);
         for (size_t i = 0; i < n_chosen; i++) is_chosen[chosen[i]] = true;
-        assign_parts(&bricks, job.part);
+        assign_parts(&bricks, v, (float)farthest_voxel, job.part);
         s = thread_pool_run(pool, n_chosen, measure_brick, &job, progress);
         if (s != STATUS_OK) error_set(err, s, "measuring the fiber radius was cancelled");
         for (size_t t = 0; t < n_thread * RADIUS_PARTS; t++) add_histogram(&part[t % RADIUS_PARTS], &job.histogram[t]);
-        add_lengths(&bricks, is_chosen, part);
+        add_lengths(&bricks, is_chosen, job.part, part);
     }
     free(chosen);
     free(job.part);

@@ -97,11 +97,13 @@ status volume_checkpoint_read(const struct stage_tools *tools, struct volume_out
                                      {v.voxel_size_m, sizeof v.voxel_size_m},
                                      {NULL, 0, tools->space},
                                      {NULL, 0, tools->space},
+                                     {NULL, 0, tools->space},
                                      {NULL, 0, tools->space}};
-    s = work_file_read(path, "volume.2", section, 7, err);
+    s = work_file_read(path, "volume.3", section, 8, err);
     if (s != STATUS_OK) return s;
     v.density = section[4].data;
     v.filled = (struct volume_filled){section[5].n_bytes / sizeof(size_t), section[5].data, section[6].data};
+    v.unknown = (struct volume_unknown){section[7].n_bytes / sizeof(struct volume_run), section[7].data};
     volume_release(&out->volume);
     out->volume = v;
     return STATUS_OK;

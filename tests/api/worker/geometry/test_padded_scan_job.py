@@ -28,9 +28,24 @@ def pages(padding):
     return [page() for _ in range(40)]
 
 
-def trace(folder, padding):
+def crossed_pages(padding):
+    """Four layers of four fibers, along x and y in turn."""
+    noise = random.Random(5)
+
+    def page(z):
+        def value(x, y):
+            if padding is not None and math.hypot(x - N / 2 + 0.5, y - N / 2 + 0.5) > N / 2:
+                return padding
+            across = x if z // 10 % 2 else y
+            solid = min(1, max(0, RADIUS + 0.5 - math.hypot(across % PERIOD - PERIOD / 2 + 0.5, z % 10 - 4.5)))
+            return round(20000 + 10000 * solid + noise.gauss(0, 700))
+        return page16(value, N, N)
+    return [page(z) for z in range(40)]
+
+
+def trace(folder, padding, draw=pages):
     (folder / "input").mkdir(parents=True)
-    (folder / "input" / "s.tif").write_bytes(tiff(pages(padding), N, N))
+    (folder / "input" / "s.tif").write_bytes(tiff(draw(padding), N, N))
     (folder / "job.json").write_text(json.dumps({"sample": "s", "volume": {"files": ["s.tif"], "voxel_size_um": 2}}))
     done = subprocess.run([program("selvedge-worker"), "--quiet", str(folder)], capture_output=True, timeout=300, check=False)
     assert done.returncode == 0, (folder / "log.txt").read_text()
@@ -50,6 +65,19 @@ def test_padding_is_neither_void_nor_material(tmp_path):
         assert geometry["radius_um"][2] == pytest.approx(whole["geometry"]["radius_um"][2], rel=0.05)
         assert "padding, which is no measurement, reaches into the tile" in json.dumps(warnings)
         assert padded["verdict"]["code"] != "good"
+
+
+def test_the_border_of_the_view_is_no_surface_of_fibers(tmp_path):
+    """Fibers that the border cuts keep their number and radius, and end there."""
+    whole, _ = trace(tmp_path / "whole", None, crossed_pages)
+    assert whole["geometry"]["n_fiber"] == 16
+    chords = sum(4 * 2 * math.sqrt((N / 2) ** 2 - d * d) for d in (-18, -6, 6, 18)) * 2e-3
+    for padding in (0, 65535):
+        geometry = trace(tmp_path / str(padding), padding, crossed_pages)[0]["geometry"]
+        assert geometry["n_fiber"] == 16
+        assert geometry["radius_um"][0] == pytest.approx(whole["geometry"]["radius_um"][0], rel=0.01)
+        assert geometry["total_length_mm"] == pytest.approx(chords, rel=0.05)
+        assert geometry["radius_spread"] < 0.02
 
 
 def test_reconstruct_prints_what_the_scan_states(tmp_path, real):
