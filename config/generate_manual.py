@@ -1,10 +1,11 @@
 #!/usr/bin/python3
-"""Writes the manual pages, and the completion of bash and zsh, from the tables and texts behind --help.
+"""Writes the manual pages, and the completion of bash, zsh and fish, from the tables and texts behind --help.
 
     config/generate_manual.py PRINT-COMMANDS BIN OUT
 
 PRINT-COMMANDS prints the commands and options of `selvedge` as JSON (clients/cli/arguments/print_commands_main.c). BIN is the folder of
-the programs, whose --help is read, and selvedge.conf(5) follows from `selvedged --print-config`. OUT gets man/, bash/ and zsh/."""
+the programs, whose --help is read, and selvedge.conf(5) follows from `selvedged --print-config`. OUT gets man/,
+bash/, zsh/ and fish/."""
 import json
 import os
 import re
@@ -244,16 +245,52 @@ selvedge) _selvedge_client ;;
 """
 
 
+def fish_text(text):
+    return "'" + " ".join(text.split()).replace("\\", "\\\\").replace("'", "\\'") + "'"
+
+
+def fish_option(program, option, condition):
+    letter = f" -s {option['letter']}" if option["letter"] else ""
+    value = " -r" if option["value"] else ""
+    return f"complete -c {program}{condition}{letter} -l {option['name']}{value} -d {fish_text(option['help'])}\n"
+
+
+def fish_client(table):
+    commands = table["commands"] + table["tools"]
+    text = "# completion of selvedge for fish\n"
+    for command in commands:
+        text += f"complete -c selvedge -n __fish_use_subcommand -f -a {command['name']} -d {fish_text(command['summary'])}\n"
+    names = " ".join(command["name"] for command in commands)
+    text += "complete -c selvedge -n __fish_use_subcommand -f -a help -d 'explain a command'\n"
+    text += f"complete -c selvedge -n '__fish_seen_subcommand_from help' -f -a '{names}'\n"
+    for option in table["options"]:
+        takers = " ".join(command["name"] for command in table["commands"] if option["name"] in command["options"])
+        if option["everywhere"] or option["name"] == "version":
+            text += fish_option("selvedge", option, "")
+        else:
+            text += fish_option("selvedge", option, f" -n '__fish_seen_subcommand_from {takers}'")
+    return text
+
+
+def fish_program(program, folder):
+    text = f"# completion of {program} for fish\n"
+    commands = [command for command, _ in helps(program, folder) if command]
+    if commands:
+        text += f"complete -c {program} -n __fish_use_subcommand -f -a '{' '.join(commands)}'\n"
+    return text + "".join(f"complete -c {program} -l {option[2:]}\n" for option in long_options(program, folder))
+
+
 def main():
     print_commands, folder, out = sys.argv[1:]
     table = json.loads(run(print_commands))
     files = {"man/selvedge.1": client_page(table), "man/selvedge.conf.5": settings_page(folder),
-             "bash/selvedge": bash_client(table), "zsh/_selvedge": zsh(table, folder)}
+             "bash/selvedge": bash_client(table), "zsh/_selvedge": zsh(table, folder), "fish/selvedge.fish": fish_client(table)}
     for program, (section, _) in PURPOSES.items():
         if os.path.exists(os.path.join(folder, program)):
             files[f"man/{program}.{section}"] = program_page(program, folder)
             if long_options(program, folder):
                 files[f"bash/{program}"] = bash_program(program, folder)
+                files[f"fish/{program}.fish"] = fish_program(program, folder)
     for name, text in files.items():
         path = os.path.join(out, name)
         os.makedirs(os.path.dirname(path), exist_ok=True)

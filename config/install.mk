@@ -15,6 +15,7 @@ INSTALL ?= install
 MANUAL := $(BUILD)/manual
 BASHDIR := $(PREFIX)/share/bash-completion/completions
 ZSHDIR := $(PREFIX)/share/zsh/$(if $(filter /usr,$(PREFIX)),vendor-completions,site-functions)
+FISHDIR := $(PREFIX)/share/fish/vendor_completions.d
 MAN_NAMES := selvedge.1 selvedged.8 selvedge-worker.1 selvedge-phantom.1 selvedge-camera.1 selvedge-mpi.1 selvedge.conf.5
 
 DASHBOARD_FOLDERS := $(notdir $(patsubst %/,%,$(wildcard clients/dashboard/*/)))
@@ -40,10 +41,11 @@ install: all manual ## install below PREFIX (/usr/local) of DESTDIR: programs, d
 	$(INSTALL) -m 644 config/selvedge.sysusers "$(DESTDIR)$(SYSUSERSDIR)/selvedge.conf"
 	[ -e "$(DESTDIR)$(SYSCONFDIR)/selvedge/selvedge.conf" ] || \
 		$(INSTALL) -m 644 config/selvedge.conf "$(DESTDIR)$(SYSCONFDIR)/selvedge/selvedge.conf"
-	$(INSTALL) -d $(addprefix "$(DESTDIR)$(MANDIR)/man",1 5 8) "$(DESTDIR)$(BASHDIR)" "$(DESTDIR)$(ZSHDIR)"
+	$(INSTALL) -d $(addprefix "$(DESTDIR)$(MANDIR)/man",1 5 8) "$(DESTDIR)$(BASHDIR)" "$(DESTDIR)$(ZSHDIR)" "$(DESTDIR)$(FISHDIR)"
 	for page in $(MANUAL)/man/*; do $(INSTALL) -m 644 "$$page" "$(DESTDIR)$(MANDIR)/man$${page##*.}" || exit 1; done
 	$(INSTALL) -m 644 $(MANUAL)/bash/* "$(DESTDIR)$(BASHDIR)"
 	$(INSTALL) -m 644 $(MANUAL)/zsh/_selvedge "$(DESTDIR)$(ZSHDIR)"
+	$(INSTALL) -m 644 $(MANUAL)/fish/* "$(DESTDIR)$(FISHDIR)"
 
 # data and configuration are the administrator's
 uninstall:         ## remove what install has put there, but neither configuration nor data
@@ -51,7 +53,7 @@ uninstall:         ## remove what install has put there, but neither configurati
 	rm -rf "$(DESTDIR)$(SHAREDIR)" "$(DESTDIR)$(DOCDIR)" "$(DESTDIR)$(PREFIX)/lib/selvedge"
 	rm -f "$(DESTDIR)$(UNITDIR)/selvedge.service" "$(DESTDIR)$(SYSUSERSDIR)/selvedge.conf"
 	rm -f $(foreach p,$(MAN_NAMES),"$(DESTDIR)$(MANDIR)/man$(patsubst .%,%,$(suffix $(p)))/$(p)") "$(DESTDIR)$(ZSHDIR)/_selvedge"
-	rm -f $(patsubst %,"$(DESTDIR)$(BASHDIR)/%",$(notdir $(PROGRAMS)))
+	rm -f $(foreach p,$(notdir $(PROGRAMS)),"$(DESTDIR)$(BASHDIR)/$p" "$(DESTDIR)$(FISHDIR)/$p.fish")
 	@echo "kept: $(DESTDIR)$(SYSCONFDIR)/selvedge, the data and the user 'selvedge'"
 
 # made anew each time: the texts of all programs are part of it

@@ -30,7 +30,8 @@ def test_install_and_uninstall_into_a_staging_folder(tmp_path):
     assert {"etc/selvedge/selvedge.conf", f"usr/{UNIT}", "usr/share/selvedge/openapi.json", "usr/share/selvedge/result.schema.json",
             "usr/share/selvedge/dashboard/index.html", "usr/share/doc/selvedge/docs/operating.md"} <= there
     assert {"usr/share/man/man8/selvedged.8", "usr/share/man/man1/selvedge.1", "usr/share/man/man5/selvedge.conf.5",
-            "usr/share/bash-completion/completions/selvedge", "usr/share/zsh/vendor-completions/_selvedge"} <= there
+            "usr/share/bash-completion/completions/selvedge", "usr/share/zsh/vendor-completions/_selvedge",
+            "usr/share/fish/vendor_completions.d/selvedge.fish"} <= there
     assert os.stat(tmp_path / "etc/selvedge/secrets").st_mode & 0o777 == 0o700
     changed = tmp_path / "etc/selvedge/selvedge.conf"
     changed.write_text("[server]\nport = 7000\n")
@@ -65,7 +66,8 @@ def test_every_option_is_in_manual_and_completion(prefix, program):
     with open(prefix / "share/man" / ("man8" if program == "selvedged" else "man1") / (program + (".8" if program == "selvedged" else ".1"))) as f:
         page = f.read().replace("\\-", "-")
     completions = [(prefix / "share/bash-completion/completions" / program).read_text(),
-                   (prefix / "share/zsh/site-functions/_selvedge").read_text()]
+                   (prefix / "share/zsh/site-functions/_selvedge").read_text(),
+                   (prefix / f"share/fish/vendor_completions.d/{program}.fish").read_text().replace(" -l ", " --")]
     n = 0
     for command, text in helps(prefix, program):
         assert command in page and all(command in script for script in completions), command
@@ -89,6 +91,24 @@ def test_bash_completes_commands_and_their_options(prefix):
     assert complete("selvedge", "reconstruct", "scan.tif", "--vo") == ["--voxel-um"]
     assert complete("selvedge", "list", "--voxel") == []
     assert complete("selvedge", "help", "watch-") == ["watch-folder"]
+
+
+@pytest.mark.skipif(shutil.which("fish") is None, reason="fish is not installed")
+def test_fish_completes_commands_and_their_options(prefix, tmp_path):
+    folder = prefix / "share/fish/vendor_completions.d"
+
+    def complete(line):
+        script = "".join(f'source "{path}"; ' for path in sorted(folder.glob("*.fish"))) + f'complete -C "{line}"'
+        done = subprocess.run(["fish", "--no-config", "-c", script], capture_output=True, text=True, check=True, timeout=20, cwd=tmp_path,
+                              env={**os.environ, "HOME": str(tmp_path)})
+        assert done.stderr == ""
+        return [word.split("\t")[0] for word in done.stdout.splitlines()]
+
+    assert complete("selvedge rec") == ["reconstruct"]
+    assert complete("selvedge reconstruct scan.tif --vo") == ["--voxel-um"]
+    assert complete("selvedge list --voxel") == []
+    assert complete("selvedge help watch-") == ["watch-folder"]
+    assert complete("selvedge-phantom clo") == ["cloth"]
 
 
 def test_every_setting_is_in_its_manual_page(prefix):
