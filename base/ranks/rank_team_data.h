@@ -1,4 +1,4 @@
-/* Inside of struct rank_team, for the files of this folder. */
+/* The members of struct rank_team and its messages. Only the files of this folder include this header. */
 #ifndef SELVEDGE_BASE_RANK_TEAM_DATA_H
 #define SELVEDGE_BASE_RANK_TEAM_DATA_H
 
@@ -31,10 +31,10 @@ struct rank_team {
     uint32_t serial;    /* of the present order */
     uint32_t cancelled; /* serial of the last order that was cancelled */
     atomic_bool cancel;
-    uint32_t answered;  /* helper: serial of the last order that the root has been told the end of */
+    uint32_t answered;  /* helper: serial of the last order whose end it has reported to the root */
     atomic_bool broken; /* the link has failed */
-    bool ended;         /* helper: the root has ended this rank while it shared tasks */
-    char *buffer;       /* RANK_MESSAGE_MOST: of the message that was received last */
+    bool ended;         /* helper: the root's order to end came while tasks were shared */
+    char *buffer;       /* the last message received; RANK_MESSAGE_MOST bytes */
     void *companion;
     struct rank_traffic traffic;
 };
@@ -42,10 +42,10 @@ struct rank_team {
 /* Sends a message of the present order. */
 status rank_team_send(struct rank_team *t, size_t peer, enum rank_message kind, const void *data, size_t n_bytes,
                       struct error *err);
-/* Reads the next message to t->buffer. Takes note of cancellations itself, and leaves out messages of earlier orders;
- * *got is false for both. */
+/* Reads the next message into t->buffer. *got is false if there is nothing for the caller: no message within wait_ms, a
+ * cancellation (which sets t->cancel), or a message of an earlier order (which is dropped). */
 status rank_team_receive(struct rank_team *t, int wait_ms, bool *got, struct rank_frame *frame, struct error *err);
-/* Helper: passes an order on that has come while tasks were shared, which ends this rank (t->ended). */
+/* Helper: an order that arrives while tasks are shared is the order to end. Passes it on and sets t->ended. */
 void rank_team_end_early(struct rank_team *t);
 /* Turns a message RANK_REFUSE into an error that names the rank. */
 status rank_team_refusal(const struct rank_team *t, const struct rank_frame *frame, struct error *err);

@@ -13,11 +13,11 @@ static inline double scale_sigma(int i) { return 0.7 * pow(1.14, i); }
 /* Blurs a[n[2]][n[1]][n[0]] in place by a Gaussian, with edge values repeated; n at most SCALE_EDGE. b: scratch of the
  * same size. */
 void scale_blur(float *a, float *b, const size_t n[3], double sigma);
-/* Blurs a brick that is blurred to scale i - 1 (the first time: not at all) further to scale i, because the variances
- * of Gaussians add. */
+/* Blurs a brick from scale i - 1 to scale i, which works because the variances of Gaussians add. For i = 0 the brick is
+ * not blurred yet. */
 void scale_blur_on(float *a, float *b, const size_t n[3], int i);
 
-/* Returns -lap at p, in a volume with rows of sy and slices of sz voxels. */
+/* Returns minus the Laplacian at p by differences. sy, sz: steps from row to row and from slice to slice, in voxels. */
 static inline float scale_minus_laplacian(const float *p, ptrdiff_t sy, ptrdiff_t sz)
 {
     return 6.0f * p[0] - p[-1] - p[1] - p[-sy] - p[sy] - p[-sz] - p[sz];

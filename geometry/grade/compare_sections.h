@@ -1,13 +1,13 @@
-/* Compares the sections along reconstructed fibers with true ones: radius, ratio of axes, turn of the long axis, and
- * whether the stated errors are those that were made. */
+/* Compares the sections along reconstructed fibers with the true ones: radius, ratio of axes, turn of the long axis.
+ * Also tells whether the stated standard errors are right. */
 #ifndef SELVEDGE_GEOMETRY_COMPARE_SECTIONS_H
 #define SELVEDGE_GEOMETRY_COMPARE_SECTIONS_H
 
 #include "geometry/fibers/fiber_set.h"
 
-/* Over vertices of found fibers that lie within the radius of a true fiber. A pull is a normalised error: the median of
- * |error| over the standard error, divided by 0.6745, the median of a normal variable's absolute value: 1 where the
- * stated errors are right. Root mean squares contain places where a line follows no fiber. NaN where there are no
+/* Figures over those vertices of found fibers that lie within the radius of a true fiber. A pull is a normalised error,
+ * 1 where the stated errors are right: the median of |error| / standard error, divided by 0.6745, which is the median
+ * of |x| for a standard normal x. Root mean squares include places where a line follows no fiber. NaN: there are no
  * values. */
 struct section_compare {
     size_t n;
@@ -17,8 +17,8 @@ struct section_compare {
     double ratio_bias, ratio_rms;      /* of found / true - 1 */
     double ratio_median, ratio_pull;   /* median of |found / true - 1| */
     double turn_median_deg, turn_pull; /* where the true ratio is above 1.3 */
-    /* Of the found minus the true ratio of lumen width to fiber width; share of the vertices where the scan tells
-     * it. */
+    /* Errors of the ratio of lumen width to fiber width, found minus true; lumen_share: share of the vertices where the
+     * scan shows this ratio. */
     double lumen_rms, lumen_bias, lumen_pull, lumen_share;
 };
 

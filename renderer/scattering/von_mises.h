@@ -14,7 +14,7 @@ struct von_mises {
     float kappa;                          /* s^-2 */
     float norm;                           /* 1 / (2 pi exp(-kappa) I0(kappa)): the density at its peak */
     float score_at_peak;                  /* d ln f / d s at ph = 0 */
-    float score_slope;                    /* ... falls by this per unit of 1 - cos ph */
+    float score_slope;                    /* decrease of d ln f / d s per unit of 1 - cos ph */
     float node[VON_MISES_N_PIECE + 1][2]; /* K and dK/dz times the step */
 };
 

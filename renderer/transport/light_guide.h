@@ -1,12 +1,10 @@
-/* Density of directions near a lamp, in which guided shadow paths are drawn: fibers in these directions scatter the
- * light of the lamp on most strongly, because forward scattering dominates.
+/* Density from which the directions of guided shadow paths are drawn, around the direction to a lamp. Fibers that lie
+ * there send most of the lamp's light on to the point, because fibers scatter mainly forward.
  *
  *     p(w) = kappa / (2 pi) exp(kappa (w . d - 1)),   d towards the lamp's centre
  *
- * (von Mises-Fisher; 1 - exp(-2 kappa) is taken as 1).
- * kappa 20 is 13 degrees a side, between the widths of usual TT lobes; 10 and 40 cost up to 10 % more time to the same
- * error.
- */
+ * (von Mises-Fisher; 1 - exp(-2 kappa) is taken as 1). kappa = 20 is a width of 13 degrees, like usual TT lobes. kappa
+ * = 10 or 40 takes up to 10 % more time to the same error. */
 #ifndef SELVEDGE_RENDERER_LIGHT_GUIDE_H
 #define SELVEDGE_RENDERER_LIGHT_GUIDE_H
 
@@ -16,8 +14,9 @@
 
 #define LIGHT_GUIDE_KAPPA 20.0f
 
-/* Energy that a fiber scatters of light that arrives across it, per channel: within 35 degrees of straight on, and in
- * all directions. Sets how often guided paths are traced. */
+/* Share of the light that a fiber scatters, per channel, when light arrives at right angles to it: `forward`, within 35
+ * degrees of the direction of the light; `all`, in all directions. Their ratio sets how often guided paths are traced.
+ */
 struct light_guide_energy {
     float forward[3], all[3];
 };
@@ -50,7 +49,7 @@ static inline void light_guide_sample(const float towards[3], const float u[2], 
     struct fiber_frame f;
     fiber_frame_from(&f, towards);
     float c = 1 + logf(1 - u[0]) / LIGHT_GUIDE_KAPPA, local[3];
-    c = c > -1 ? c : -1; /* one in exp(2 kappa) */
+    c = c > -1 ? c : -1; /* happens once in exp(2 kappa) samples */
     float s = sqrtf(1 - c * c), angle = (float)(2 * M_PI) * u[1];
     local[0] = c;
     local[1] = s * cosf(angle);

@@ -6,8 +6,8 @@
 
 enum { JOB_DIGEST_BYTES = 13 };
 
-/* Returns the row without null members, owned by the caller, or NULL when memory is out. digest: hash of all other
- * members, also the member "digest". */
+/* Returns the row without null members, owned by the caller, or NULL when memory is out. digest: receives the value of
+ * the member "digest", a hash of all other members. */
 json_t *job_row_view(struct job_service *v, const struct job_row *row, char digest[JOB_DIGEST_BYTES]);
 
 #endif

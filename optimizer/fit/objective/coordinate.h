@@ -6,8 +6,8 @@
 
 #include "base/catalogue/param_info.h"
 
-/* Largest number of parameters of a fit. It may exceed the number of a scattering model's parameters, because the cloth
- * may have numbers of its own and several sets of parameters. */
+/* Largest number of parameters of a fit. A scattering model has fewer, but a cloth may have several sets of parameters,
+ * and numbers of its own. */
 enum { FIT_MAX_PARAM = 64 };
 
 struct coordinate {

@@ -1,7 +1,6 @@
 /* Statements of Exif data (Exif 2.32) and of the first folder of a TIFF file: exposure, orientation, color space.
  * libexif 0.6.24 has no function for numbers of type FLOAT and DOUBLE, and libtiff skips entries whose type is not the
- * one of the standard, so the folders are read here. Foreign data: whatever is not as it should be counts as not
- * stated. */
+ * one of the standard, so the folders are read here. The data are foreign: a malformed entry counts as not stated. */
 #ifndef SELVEDGE_OPTIMIZER_EXIF_H
 #define SELVEDGE_OPTIMIZER_EXIF_H
 
@@ -13,7 +12,7 @@
  * Numbers may have any type. Where there is no exposure time or f-number, the APEX values are taken. Sets the members
  * of info that are stated and not set yet, and adds the rest to the ledger. */
 void exif_read(FILE *file, struct photograph_info *info);
-/* The same of Exif data in memory, which begin with the TIFF structure or with "Exif\0\0" before it. */
+/* Reads the same from Exif data in memory. They begin with the TIFF structure, or with "Exif\0\0" before it. */
 void exif_read_bytes(const void *data, size_t n_bytes, struct photograph_info *info);
 
 #endif

@@ -2,9 +2,10 @@
  * (clients/dashboard/twin). twin.json describes the tables and their error, twin.bin holds them:
  *
  *     textures   half floats [n_basis / 4][height][width][4]: W_4g .. W_4g+3 of appearance_table.h
- *     table      half floats [3 n_basis / 4][rows][columns][4]: layer 3-channel-major, c * n_basis / 4 + g, has
- *                T_4g .. T_4g+3 of channel c; row (view side * view_edge + view row) * light_edge + light row, column
- *                (view column * sides + light side) * light_edge + light column
+ *     table      half floats [3 n_basis / 4][rows][columns][4]
+ *                layer c * n_basis / 4 + g:  T_4g .. T_4g+3 of channel c
+ *                row:     (view side * view_edge + view row) * light_edge + light row
+ *                column:  (view column * sides + light side) * light_edge + light column
  *     drape      unsigned 16-bit [n][n][3]: positions between `low` and `high` of a square piece over a ball, rows
  *                along the warp
  *
@@ -18,7 +19,7 @@
 /* Camera paths that the tables take, 0 without a twin. */
 double twin_result_paths(const struct job_results *results);
 /* Makes the tables of the best model if the job asks for them and an earlier attempt has not finished them. from, to:
- * shares of the stage before and after. A volume model gives a warning. Errors of appearance_table_make. */
+ * the stage's progress before and after. A volume model gives a warning. Errors of appearance_table_make. */
 status twin_result_write(struct report *report, double from, double to, struct error *err);
 
 /* For twin_result_write: the block of twin.bin, and the description of its parts for twin.json. The caller frees

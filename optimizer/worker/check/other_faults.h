@@ -4,8 +4,8 @@
 
 #include "optimizer/stages/run/stage_tools.h"
 
-/* When the status s is one that inputs cause, warns of their other faults. Takes the folder of the inputs out of the
- * text of err, because users know their files by their names alone. Does nothing for STATUS_OK. */
+/* If inputs can cause the status s, checks all inputs and warns about every further fault. Removes the path of the
+ * input folder from err->text, because users know their files by name only. Does nothing for STATUS_OK. */
 void other_faults_name(const struct stage_tools *tools, status s, struct error *err);
 
 #endif
