@@ -1,12 +1,8 @@
 /* Exposure times of one view, measured by the light that its exposures have in common.
  *
  * Cameras round the times that they state (1/60 s is 1/64 s) and shutters keep them to a few percent, which leaves
- * steps in merged pictures. Neighbours in the order of times are compared: in small blocks where the longer exposure is
- * not saturated, the ratio of the sums over both pictures, weighted by the camera's noise. Ratios of sums have no bias
- * by noise. One half of a block's pixels decides whether the other half is used, so a sample's own noise never decides.
- * The variance of a ratio is the scatter over an 8 x 8 grid of the picture, which contains noise, flicker and movement.
- * The level of black is taken as uncertain by half a step of the file's values, or by a tenth with a record of the
- * camera's noise.
+ * steps in merged pictures. Neighbours in the order of times are compared (exposure_pair.h); ratios of exposures that
+ * have no light in common come from other views (exposure_carry.h).
  *
  * One exposure keeps its stated time: the one whose time the caller ranks lowest, and of equal ranks the longest. The
  * others are fitted together, with a prior of 5 % about the stated times, which determines exposures that have no light
@@ -14,7 +10,7 @@
 #ifndef SELVEDGE_OPTIMIZER_EXPOSURE_RATIO_H
 #define SELVEDGE_OPTIMIZER_EXPOSURE_RATIO_H
 
-#include "optimizer/photographs/camera/exposure_merge.h"
+#include "optimizer/photographs/camera/exposure_pair.h"
 
 struct exposure_ratio {
     size_t i_scale;                               /* the exposure that keeps its stated time */
@@ -23,9 +19,11 @@ struct exposure_ratio {
     char warning[400];                            /* "", or why the stated times or the pictures are doubtful */
 };
 
-/* rank: NULL for equal ranks. STATUS_INVALID, naming the exposures: the light of one is more than 1.25 times the
- * prediction by the others and the stated times, or less than that over 1.25; the ratios of the channels differ, so the
- * files were balanced differently. */
+/* pair: of exposure_pairs_compare. rank: NULL for equal ranks. STATUS_INVALID, naming the exposure: its light is more
+ * than 1.25 times the prediction by the others and the stated times, or less than that over 1.25. */
+status exposure_ratio_solve(const struct exposure_set *e, const double *rank, const struct exposure_pair *pair,
+                            struct exposure_ratio *r, struct error *err);
+/* Compares the exposures and solves. Errors of both. */
 status exposure_ratio_fit(const struct exposure_set *e, const double *rank, struct exposure_ratio *r,
                           struct error *err);
 /* Standard error of ln t_s[i]. */

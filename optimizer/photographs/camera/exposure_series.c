@@ -44,16 +44,27 @@ double exposure_aperture_rounding(double n)
     return to_series(n, 6.0, 4.0); /* a stop is a factor of sqrt 2 */
 }
 
+double exposure_iso_rounding(double iso)
+{
+    static const double number[] = {50,   64,   70,   80,   100,  125,   140,   160,   200,   250,   280,   320,  400,
+                                    500,  560,  640,  800,  1000, 1100,  1250,  1600,  2000,  2200,  2500,  3200, 4000,
+                                    4500, 5000, 6400, 8000, 9000, 10000, 12800, 16000, 18000, 20000, 25600, 51200};
+    if (!(iso > 0.0) || !is_listed(number, sizeof number / sizeof *number, iso)) return 0.0;
+    return to_series(iso / 100.0, 3.0, 2.0);
+}
+
 void exposure_rounding_state(struct photograph_record *r, const struct exposure_reference *reference,
                              const double mean_rgb[3], double se_rgb[3])
 {
     const double time = exposure_time_rounding(r->scale_s) - exposure_time_rounding(reference->time_s);
     const double aperture =
         exposure_aperture_rounding(reference->aperture) - exposure_aperture_rounding(r->info.aperture);
+    const double iso = exposure_iso_rounding(r->info.iso) - exposure_iso_rounding(reference->iso);
     for (size_t c = 0; c < 3; c++) {
         double *error = r->color_error[c];
         error[PHOTOGRAPH_TIME_CAUSE] = time * mean_rgb[c];
         error[PHOTOGRAPH_APERTURE_CAUSE] = 2.0 * aperture * mean_rgb[c];
-        se_rgb[c] = hypot(se_rgb[c], hypot(error[PHOTOGRAPH_TIME_CAUSE], error[PHOTOGRAPH_APERTURE_CAUSE]));
+        error[PHOTOGRAPH_ISO_CAUSE] = iso * mean_rgb[c];
+        for (size_t k = PHOTOGRAPH_TIME_CAUSE; k < PHOTOGRAPH_CAUSES; k++) se_rgb[c] = hypot(se_rgb[c], error[k]);
     }
 }

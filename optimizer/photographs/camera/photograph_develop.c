@@ -163,7 +163,7 @@ static status load_chart(struct photograph_process *k, const struct job_setup *s
     memcpy(k->matrix, k->chart.fit.matrix, sizeof k->matrix);
     memcpy(k->matrix_cov, k->chart.fit.cov, sizeof k->matrix_cov);
     k->color_info = r.info;
-    k->color_exposure = (struct exposure_reference){r.scale_s, r.info.aperture};
+    k->color_exposure = (struct exposure_reference){r.scale_s, r.info.aperture, r.info.iso};
     return STATUS_OK;
 }
 
@@ -186,7 +186,8 @@ static status load_white(struct photograph_process *k, const struct job_setup *s
         k->matrix_cov[4 * c * 10] = pow(k->matrix[4 * c] * mean.se_rgb[c] / mean.mean_rgb[c], 2.0);
     }
     k->color_info = mean.record.info;
-    k->color_exposure = (struct exposure_reference){mean.record.scale_s, mean.record.info.aperture};
+    k->color_exposure =
+        (struct exposure_reference){mean.record.scale_s, mean.record.info.aperture, mean.record.info.iso};
     return s;
 }
 
@@ -211,6 +212,8 @@ status photograph_process_load(struct photograph_process *k, struct job_setup *s
         s = rig_apply(path, setup, rows, &k->lens, &k->board, err);
         if (s == STATUS_OK) s = marker_views_apply(&k->board, &k->lens, folder, setup, rows, err);
     }
+    k->rows = rows;
+    if (s == STATUS_OK && k->carry == NULL) k->carry = calloc(1, sizeof *k->carry);
     k->lamp_distance_cm = setup->lamp_directional ? NAN : setup->lamp_distance_cm;
     if (s == STATUS_OK && setup->noise_file[0] != '\0') {
         snprintf(path, sizeof path, "%s/%s", folder, setup->noise_file);

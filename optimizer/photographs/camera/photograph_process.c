@@ -20,6 +20,8 @@ void photograph_process_release(struct photograph_process *k)
     for (size_t i = 0; i < k->n_dark; i++) image_release(&k->dark[i].image);
     free(k->dark);
     image_release(&k->chart_picture);
+    if (k->carry != NULL) exposure_carry_release(k->carry);
+    free(k->carry);
     photograph_process_init(k);
 }
 
@@ -119,5 +121,6 @@ status photograph_process_subtract_dark(const struct photograph_process *k, cons
 struct exposure_reference photograph_process_reference(const struct photograph_process *k,
                                                        const struct photograph_record *first)
 {
-    return k->has_color ? k->color_exposure : (struct exposure_reference){first->scale_s, first->info.aperture};
+    return k->has_color ? k->color_exposure
+                        : (struct exposure_reference){first->scale_s, first->info.aperture, first->info.iso};
 }

@@ -5,6 +5,7 @@
 
 #include "base/warning.h"
 #include "optimizer/photographs/camera/color_chart.h"
+#include "optimizer/photographs/camera/exposure_carry.h"
 #include "optimizer/photographs/camera/exposure_series.h"
 #include "optimizer/photographs/camera/lens.h"
 #include "optimizer/photographs/camera/marker_board.h"
@@ -41,6 +42,10 @@ struct photograph_process {
     struct exposure_reference color_exposure; /* of the same */
     struct color_chart chart;                 /* with has_color and the document's has_chart */
     struct image chart_picture;               /* color_chart_picture; no pixels without a chart */
+    /* The views of the job, of the caller, whose exposures are compared when a view needs ratios of others; NULL: none.
+     * carry: owned. */
+    const struct job_rows *rows;
+    struct exposure_carry *carry;
     /* The list that the ledger of every file that is read is appended to (base/files/file_ledger_json.h), of the
      * caller; NULL: not wanted. */
     json_t *files;

@@ -2,10 +2,12 @@
 
 #include "base/files/file_ledger_json.h"
 #include "optimizer/job/document/job_photograph.h"
+#include "optimizer/job/document/job_rows.h"
 #include "optimizer/photographs/camera/exposure_ratio.h"
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { PATH_BYTES = 4096 };
@@ -125,65 +127,131 @@ static double scale_to_saturation(const struct photograph_info *info, struct ima
     return level;
 }
 
-/* Merges into image[0], which keeps the unit of the first exposure. */
-static status merge(const struct photograph_process *k, const struct job_photograph *p, struct view_exposures *e,
-                    struct error *err)
-{
-    struct noise_record noise = k->noise;
-    double full_scale[EXPOSURE_MAX], stated_s[EXPOSURE_MAX], rank[EXPOSURE_MAX], level = 1.0;
+/* What the estimator takes of a view: its exposures, scaled to saturation. */
+struct scaled_view {
+    struct noise_record noise;
+    double full_scale[EXPOSURE_MAX], stated_s[EXPOSURE_MAX], level; /* level: that image[0] was divided by */
     struct image *image[EXPOSURE_MAX];
+    struct exposure_set set; /* of the members above */
+};
+
+static void scale_view(const struct photograph_process *k, struct view_exposures *e, struct scaled_view *v)
+{
+    v->noise = k->noise;
+    for (size_t c = 0; c < 3 && k->n_dark > 0; c++) /* dark frames hold the mean of both noises */
+        v->noise.channel[c].read_mean = v->noise.channel[c].dark_mean = 0.0;
+    for (size_t i = 0; i < e->n; i++) {
+        v->stated_s[i] = e->record[i].info.exposure_s;
+        const double own = scale_to_saturation(&e->record[i].info, &e->image[i], &v->full_scale[i]);
+        if (i == 0) v->level = own;
+        v->image[i] = &e->image[i];
+    }
+    v->set = (struct exposure_set){k->has_noise ? &v->noise : NULL,
+                                   e->n,
+                                   v->image[0]->width,
+                                   v->image[0]->height,
+                                   v->stated_s,
+                                   v->full_scale,
+                                   v->image,
+                                   e->name,
+                                   e->record[0].info.curved};
+}
+
+/* Reads and checks all exposures of p. */
+static status read_view(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
+                        struct view_exposures *e, struct error *err)
+{
+    status s = STATUS_OK;
+    for (size_t i = 0; i <= p->n_exposure && s == STATUS_OK; i++) s = read_exposure(k, folder, p, i, e, err);
+    if (s != STATUS_OK || (p->n_exposure == 0 && !k->has_noise)) return s;
+    s = check_exposures(e, err);
+    return s == STATUS_OK ? check_noise(k, e, err) : s;
+}
+
+/* Compares the exposures of a view of the job. A view that cannot be used says so when it is developed. */
+static status search_view(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
+                          struct error *err)
+{
+    struct exposure_pair pair[EXPOSURE_MAX];
+    struct view_exposures *e = calloc(1, sizeof *e);
+    struct scaled_view *v = calloc(1, sizeof *v);
+    status s = e != NULL && v != NULL ? STATUS_OK
+                                      : error_set(err, STATUS_NO_MEMORY, "cannot compare exposures: out of memory");
+    if (s == STATUS_OK && read_view(k, folder, p, e, NULL) == STATUS_OK) {
+        scale_view(k, e, v);
+        if (exposure_pairs_compare(&v->set, pair, NULL) == STATUS_OK)
+            s = exposure_carry_add(k->carry, &v->set, &e->record[0].info, pair, err);
+    }
+    if (e != NULL) view_exposures_release(e);
+    free(e);
+    free(v);
+    return s;
+}
+
+/* Gives exposures that cannot be compared in this view the ratios of others. All views are read for this, once. */
+static status take_carried(const struct photograph_process *k, const char *folder, const struct view_exposures *e,
+                           const struct exposure_set *set, struct exposure_pair *pair, struct error *err)
+{
+    bool wanted = false;
+    status s = STATUS_OK;
+    for (size_t i = 0; i + 1 < set->n; i++) wanted = wanted || !isfinite(pair[i].var);
+    if (!wanted || k->carry == NULL || k->rows == NULL) return STATUS_OK;
+    for (size_t i = 0; i < k->rows->n_photograph && !k->carry->searched && s == STATUS_OK; i++)
+        if (k->rows->photograph[i].n_exposure > 0) s = search_view(k, folder, &k->rows->photograph[i], err);
+    k->carry->searched = s == STATUS_OK;
+    exposure_carry_fill(k->carry, set, &e->record[0].info, pair);
+    return s;
+}
+
+/* Fits the times of the exposures. */
+static status fit_times(const struct photograph_process *k, const char *folder, struct view_exposures *e,
+                        const struct exposure_set *set, struct exposure_ratio *ratio, struct error *err)
+{
+    double rank[EXPOSURE_MAX];
+    struct exposure_pair pair[EXPOSURE_MAX];
+    rank_exposures(k, e, rank);
+    status s = exposure_pairs_compare(set, pair, err);
+    if (s == STATUS_OK) s = take_carried(k, folder, e, set, pair, err);
+    if (s == STATUS_OK) s = exposure_ratio_solve(set, rank, pair, ratio, err);
+    for (size_t i = 0; i < e->n && s == STATUS_OK; i++) enter_time(e, i, ratio);
+    return s;
+}
+
+/* Merges into image[0], which keeps the unit of the first exposure. */
+static status merge(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
+                    struct view_exposures *e, struct error *err)
+{
     struct photograph_record *r = &e->record[0];
+    struct scaled_view v = {.level = 1.0};
     struct exposure_ratio ratio;
     struct exposure_light light = {0};
-    for (size_t c = 0; c < 3 && k->n_dark > 0; c++) /* dark frames hold the mean of both noises */
-        noise.channel[c].read_mean = noise.channel[c].dark_mean = 0.0;
-    for (size_t i = 0; i < e->n; i++) {
-        stated_s[i] = e->record[i].info.exposure_s;
-        const double own = scale_to_saturation(&e->record[i].info, &e->image[i], &full_scale[i]);
-        if (i == 0) level = own;
-        image[i] = &e->image[i];
-    }
-    struct exposure_set set = {k->has_noise ? &noise : NULL,
-                               e->n,
-                               image[0]->width,
-                               image[0]->height,
-                               stated_s,
-                               full_scale,
-                               image,
-                               e->name,
-                               r->info.curved};
-    rank_exposures(k, e, rank);
-    status s = k->has_noise ? image_init(&e->variance, image[0]->width, image[0]->height, 3, err) : STATUS_OK;
-    if (s == STATUS_OK) s = exposure_ratio_fit(&set, rank, &ratio, err);
+    scale_view(k, e, &v);
+    struct image *const first = v.image[0];
+    status s = k->has_noise ? image_init(&e->variance, first->width, first->height, 3, err) : STATUS_OK;
+    if (s == STATUS_OK) s = fit_times(k, folder, e, &v.set, &ratio, err);
     if (s != STATUS_OK) return s;
-    for (size_t i = 0; i < e->n; i++) enter_time(e, i, &ratio);
-    region_of_crop(p, image[0], light.region);
-    set.t_s = ratio.t_s;
-    s = exposure_merge_images(&set, k->has_noise ? &e->variance : NULL, &light, &r->saturated_share, err);
+    region_of_crop(p, first, light.region);
+    v.set.t_s = ratio.t_s;
+    s = exposure_merge_images(&v.set, k->has_noise ? &e->variance : NULL, &light, &r->saturated_share, err);
     if (s != STATUS_OK) return s;
     r->merged = true;
     r->n_exposure = e->n;
-    r->scale_s = stated_s[ratio.i_scale];
+    r->scale_s = v.stated_s[ratio.i_scale];
     memcpy(r->fitted_s, ratio.t_s, sizeof r->fitted_s);
     snprintf(r->exposure_warning, sizeof r->exposure_warning, "%s", ratio.warning);
     time_error(&ratio, e->n, &light, e->time_error);
-    for (size_t i = 0; i < 3 * e->n; i++) e->time_error[i / 3][i % 3] *= stated_s[0];
-    for (size_t i = 0; i < 3 * e->n; i++) e->time_error[i / 3][i % 3] *= level;
-    image_scale(image[0], level * stated_s[0]); /* the first one's time is divided by later */
-    if (k->has_noise) image_scale(&e->variance, level * level * stated_s[0] * stated_s[0]);
+    for (size_t i = 0; i < 3 * e->n; i++) e->time_error[i / 3][i % 3] *= v.stated_s[0];
+    for (size_t i = 0; i < 3 * e->n; i++) e->time_error[i / 3][i % 3] *= v.level;
+    image_scale(first, v.level * v.stated_s[0]); /* the first one's time is divided by later */
+    if (k->has_noise) image_scale(&e->variance, v.level * v.level * v.stated_s[0] * v.stated_s[0]);
     return STATUS_OK;
 }
 
 status view_exposures_read(const struct photograph_process *k, const char *folder, const struct job_photograph *p,
                            struct view_exposures *e, struct error *err)
 {
-    status s = STATUS_OK;
-    for (size_t i = 0; i <= p->n_exposure && s == STATUS_OK; i++) s = read_exposure(k, folder, p, i, e, err);
-    if (s == STATUS_OK && (p->n_exposure > 0 || k->has_noise)) {
-        s = check_exposures(e, err);
-        if (s == STATUS_OK) s = check_noise(k, e, err);
-        if (s == STATUS_OK) s = merge(k, p, e, err);
-    }
+    status s = read_view(k, folder, p, e, err);
+    if (s == STATUS_OK && (p->n_exposure > 0 || k->has_noise)) s = merge(k, folder, p, e, err);
     for (size_t i = 0; i < e->n; i++) file_ledger_append(k->files, e->name[i], &e->record[i].info.ledger);
     return s;
 }

@@ -19,10 +19,11 @@
 struct job_photograph;
 
 /* Causes of errors that all photographs of a camera share: three of the color matrix for each channel of radiance, the
- * rounding of exposure times, and of f-numbers. */
+ * rounding of exposure times, of f-numbers and of ISO values. */
 enum {
     PHOTOGRAPH_TIME_CAUSE = 9,
     PHOTOGRAPH_APERTURE_CAUSE,
+    PHOTOGRAPH_ISO_CAUSE,
     PHOTOGRAPH_CAUSES,
     PHOTOGRAPH_EXPOSURES = JOB_MAX_MORE_EXPOSURES + 1
 };

@@ -1,6 +1,7 @@
 /* Exposure times by the light that exposures have in common: right within their stated errors over many cameras, wrong
  * times named, impossible ones and differently balanced colors refused, and the rounding of cameras. */
 #include "base/rng.h"
+#include "optimizer/photographs/camera/exposure_carry.h"
 #include "optimizer/photographs/camera/exposure_ratio.h"
 #include "optimizer/photographs/camera/exposure_series.h"
 
@@ -243,7 +244,8 @@ static void test_rounding(void **state)
                 {0.0123, 0.0123},
                 {0.16, 0.16},
                 {30, 32}},
-      aperture[] = {{11, 11.3137}, {5.6, 5.65685}, {22, 22.6274}, {8, 8}, {3.5, 3.5636}, {1.2, 1.1892}, {7.3, 7.3}};
+      aperture[] = {{11, 11.3137}, {5.6, 5.65685}, {22, 22.6274}, {8, 8}, {3.5, 3.5636}, {1.2, 1.1892}, {7.3, 7.3}},
+      iso[] = {{100, 100}, {125, 125.992}, {1250, 1269.92}, {640, 634.96}, {3200, 3200}, {117, 117}, {50, 50}};
     (void)state;
     for (size_t i = 0; i < sizeof time / sizeof *time; i++)
         if (fabs(exposure_time_rounding(time[i].stated) - log(time[i].truth / time[i].stated)) > 1e-4)
@@ -251,17 +253,51 @@ static void test_rounding(void **state)
     for (size_t i = 0; i < sizeof aperture / sizeof *aperture; i++)
         if (fabs(exposure_aperture_rounding(aperture[i].stated) - log(aperture[i].truth / aperture[i].stated)) > 1e-4)
             fail_msg("f/%g: %g", aperture[i].stated, exposure_aperture_rounding(aperture[i].stated));
-    struct photograph_record r = {.scale_s = 1.0 / 60, .info.aperture = 11};
+    for (size_t i = 0; i < sizeof iso / sizeof *iso; i++)
+        if (fabs(exposure_iso_rounding(iso[i].stated) - log(iso[i].truth / iso[i].stated)) > 1e-4)
+            fail_msg("ISO %g: %g", iso[i].stated, exposure_iso_rounding(iso[i].stated));
+    struct photograph_record r = {.scale_s = 1.0 / 60, .info.aperture = 11, .info.iso = 1250};
     const double mean[3] = {0.5, 0.2, 0.1};
     double se[3] = {0.01, 0.0, 0.0};
-    exposure_rounding_state(&r, &(struct exposure_reference){1.0 / 8, 8}, mean, se);
-    assert_true(fabs(se[1] / 0.2 - hypot(log(64.0 / 60), 2.0 * log(11.3137 / 11))) < 1e-4);
+    exposure_rounding_state(&r, &(struct exposure_reference){1.0 / 8, 8, 100}, mean, se);
+    const double of_all = hypot(log(1269.92 / 1250), hypot(log(64.0 / 60), 2.0 * log(11.3137 / 11)));
+    assert_true(fabs(se[1] / 0.2 - of_all) < 1e-4);
     assert_true(fabs(se[0] - hypot(0.01, 0.5 * se[1] / 0.2)) < 1e-9);
-    exposure_rounding_state(&r, &(struct exposure_reference){1.0 / 60, 11}, mean, memset(se, 0, sizeof se));
+    exposure_rounding_state(&r, &(struct exposure_reference){1.0 / 60, 11, 1250}, mean, memset(se, 0, sizeof se));
     assert_true(se[0] == 0.0 && photograph_color_se(&r, 0) == 0.0); /* the chart ties them */
-    r.info.aperture = r.scale_s = NAN;
-    exposure_rounding_state(&r, &(struct exposure_reference){NAN, NAN}, mean, se);
+    r.info.aperture = r.info.iso = r.scale_s = NAN;
+    exposure_rounding_state(&r, &(struct exposure_reference){NAN, NAN, NAN}, mean, se);
     assert_true(se[0] == 0.0);
+}
+
+/* The ratio of a view that has none: the mean of the same stated exposures, with the scatter between views. */
+static void test_carried_ratios(void **state)
+{
+    static const double t_s[2] = {0.02, 0.16}, other_s[2] = {0.02, 0.2};
+    static const double measured[4] = {0.05, 0.07, 0.06, 0.06};
+    const struct photograph_info info = {.iso = 100, .aperture = NAN}, other_iso = {.iso = 200, .aperture = NAN};
+    const struct exposure_set view = {.n = 2, .t_s = t_s}, other = {.n = 2, .t_s = other_s};
+    struct exposure_carry carry = {0};
+    struct exposure_pair none = {.shorter = 0, .longer = 1, .var = INFINITY}, pair = none;
+    (void)state;
+    exposure_carry_fill(&carry, &view, &info, &pair);
+    assert_true(isinf(pair.var));
+    assert_int_equal(exposure_carry_add(&carry, &view, &info, &none, NULL), STATUS_OK);
+    assert_int_equal(carry.n, 0);
+    for (size_t i = 0; i < 40; i++) {
+        const struct exposure_pair of = {.shorter = 0, .longer = 1, .value = measured[i % 4], .var = 1e-8};
+        assert_int_equal(exposure_carry_add(&carry, &view, &info, &of, NULL), STATUS_OK);
+    }
+    exposure_carry_fill(&carry, &other, &info, &pair);
+    exposure_carry_fill(&carry, &view, &other_iso, &pair);
+    assert_true(isinf(pair.var));
+    exposure_carry_fill(&carry, &view, &info, &pair);
+    assert_float_equal(pair.value, 0.06, 1e-9);
+    assert_float_equal(sqrt(pair.var), sqrt((1e-4 + 40 * 0.5e-4) / 40 * (1.0 + 1.0 / 40)), 1e-4); /* scatter 0.0071 */
+    pair = (struct exposure_pair){.shorter = 0, .longer = 1, .value = 0.3, .var = 1e-4};
+    exposure_carry_fill(&carry, &view, &info, &pair);
+    assert_true(pair.value == 0.3); /* the view's own */
+    exposure_carry_release(&carry);
 }
 
 int main(void)
@@ -274,6 +310,7 @@ int main(void)
         cmocka_unit_test(test_edges_of_saturation),
         cmocka_unit_test(test_agreement),
         cmocka_unit_test(test_rounding),
+        cmocka_unit_test(test_carried_ratios),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

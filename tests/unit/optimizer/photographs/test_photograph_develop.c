@@ -207,8 +207,12 @@ static void test_chart_round_trip(void **state)
     job_document_free(doc);
 }
 
+/* A view of four times the bright one, whose exposure of the chart's time is saturated everywhere. */
+static const double glaring[3] = {3.6, 2.8, 2.4};
+#define GLARE "{\"file\":\"g0.dng\",\"more_exposures\":[{\"file\":\"g1.dng\"}]," ANGLES "}"
+
 /* Stated times that are 5 % off: the exposure that has the chart's time keeps the scale, the others are measured by
- * their light, and the ledger says so. */
+ * their light, and the ledger says so. A view whose exposures have no light in common takes the ratio of the others. */
 static void test_wrong_exposure_times(void **state)
 {
     const double corner[8] = {42, 38, 270, 56, 262, 206, 30, 186};
@@ -224,6 +228,8 @@ static void test_wrong_exposure_times(void **state)
         take(state, name, EDGE, bright, exposure_s[i] / off[i], (uint32_t)(10 + i));
         snprintf(name, sizeof name, "d%zu.dng", i);
         take(state, name, EDGE, dim, exposure_s[i] / off[i], (uint32_t)(20 + i));
+        snprintf(name, sizeof name, "g%zu.dng", i);
+        take(state, name, EDGE, glaring, exposure_s[i] / off[i], (uint32_t)(70 + i));
     }
     assert_int_equal(image_init(&chart, 320, 240, 3, NULL), STATUS_OK);
     draw_chart(&chart, corner, camera, cos(20.0 * M_PI / 180.0), 0.0);
@@ -231,15 +237,21 @@ static void test_wrong_exposure_times(void **state)
     expose(scratch_path(state, "chart.dng"), &chart, 0.16 / off[1], 31);
     stated_over_true = 1.0;
     image_release(&chart);
-    struct job_document *doc = parse("\"noise_file\":\"noise.json\"", THREE("b") "," THREE("d"),
+    struct job_document *doc = parse("\"noise_file\":\"noise.json\"", GLARE "," THREE("b") "," THREE("d"),
                                      "{\"chart\":{\"file\":\"chart.dng\",\"light_theta_deg\":20}}");
     files = json_array();
     if (load(state, doc, &o, &err) != STATUS_OK) fail_msg("%s: %s", err.field, err.text);
-    check_radiance(&o.item[0], bright);
-    check_radiance(&o.item[1], dim);
-    const struct photograph_record *r = &o.item[1].photograph;
+    check_radiance(&o.item[1], bright);
+    check_radiance(&o.item[2], dim);
+    for (size_t c = 0; c < 3; c++) {
+        const double wrong = o.item[0].mean_rgb[c] / glaring[c] - 1.0;
+        const double error = o.item[0].photograph.exposure_se_rgb[c] / glaring[c];
+        if (!(fabs(wrong) < 0.01 && fabs(error - 0.009) < 0.001))
+            fail_msg("channel %zu: %g, error %g", c, wrong, error);
+    }
+    const struct photograph_record *r = &o.item[2].photograph;
     assert_true(fabs(r->scale_s - 0.16) < 1e-6 && fabs(r->fitted_s[2] / (1.28 * 1.05 * 1.05) - 1.0) < 0.01);
-    assert_non_null(strstr(o.item[0].photograph.exposure_warning, "is stated as"));
+    assert_non_null(strstr(o.item[1].photograph.exposure_warning, "is stated as"));
     assert_true(r->exposure_se_rgb[0] > 0.0 && r->exposure_se_rgb[0] < 0.01 * dim[0]);
     assert_true(r->color_error[0][PHOTOGRAPH_TIME_CAUSE] == 0.0); /* the chart has this time */
     char *text = json_dumps(files, 0);
