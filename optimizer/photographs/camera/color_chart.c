@@ -14,6 +14,7 @@ static const double patch = 2.5, gap = 0.25;
 static const double middle = 0.5; /* share of a patch's edge that is averaged */
 enum { SAMPLES = 24, PARTS = 4, PICTURE_PATCH_PX = 60, LEAST_PATCH_PX = 6 };
 static const double warn_delta_e = 4.0, refuse_delta_e = 6.0; /* means of CIEDE2000 */
+static const double other_edition_share = 0.7; /* of the difference of the declared one, below which it fits better */
 static const double warn_light = 0.1;
 
 /* ---- where it is ---- */
@@ -262,6 +263,11 @@ static status judge(const struct color_chart *k, const struct warning_sink *warn
                      "the mean, '%s' by %.0f, where a good photograph has 0.2 to 3: check the edition, shadows and "
                      "reflections",
                      mean, color_chart_patch_name(k->worst), k->delta_e_left_out[k->worst]);
+    else if (k->delta_e_left_out[k->worst] > refuse_delta_e)
+        warning_send(warn, OPTION_COLOR_CHART,
+                     "patch '%s' of the color chart differs by %.0f (CIEDE2000) from the matrix of the other patches, "
+                     "which differ by %.1f in the mean: look for a shadow or a reflection there",
+                     color_chart_patch_name(k->worst), k->delta_e_left_out[k->worst], left_out);
     if (!k->matrix_used && left_out > before + 0.5)
         warning_send(warn, OPTION_COLOR_CHART,
                      "the matrix of the color chart makes colors worse (CIEDE2000 %.1f in the mean, %.1f without it) "
@@ -275,8 +281,8 @@ static status judge(const struct color_chart *k, const struct warning_sink *warn
     return STATUS_OK;
 }
 
-/* Fits matrix and light, and judges them. */
-static status fit(struct color_chart *k, double cos_theta, const struct warning_sink *warn, struct error *err)
+/* Fits matrix and light. */
+static status fit(struct color_chart *k, double cos_theta, struct error *err)
 {
     struct used_patches u;
     status s = use_patches(k, cos_theta, &u, err);
@@ -289,7 +295,37 @@ static status fit(struct color_chart *k, double cos_theta, const struct warning_
         for (size_t j = 0; j < 9; j++) k->fit.matrix[j] = j % 4 == 0 ? factor : 0.0;
         memcpy(k->delta_e_after, k->delta_e_before, sizeof k->delta_e_after);
     }
-    return judge(k, warn, err);
+    return STATUS_OK;
+}
+
+static void set_wanted(struct color_chart *k, double cos_theta)
+{
+    k->white = 0;
+    for (size_t i = 0; i < COLOR_CHART_PATCHES; i++) {
+        if (k->reference != NULL)
+            memcpy(k->wanted_rgb[i], k->reference[i], sizeof k->wanted_rgb[i]);
+        else
+            color_chart_reference(k->from_2014, i, k->wanted_rgb[i]);
+        for (size_t c = 0; c < 3; c++) k->wanted_rgb[i][c] *= cos_theta;
+        if (k->wanted_rgb[i][1] > k->wanted_rgb[k->white][1]) k->white = i;
+    }
+}
+
+/* Warns where the colors of the other edition fit clearly better: those of the wrong one make a radiance wrong by up to
+ * 7 %, and differ by 1 in the mean, as a good photograph does. */
+static void check_edition(const struct color_chart *k, double cos_theta, const struct warning_sink *warn)
+{
+    struct color_chart other = *k;
+    other.from_2014 = !k->from_2014;
+    if (k->reference != NULL) return;
+    set_wanted(&other, cos_theta);
+    if (fit(&other, cos_theta, NULL) != STATUS_OK) return;
+    const double own = color_chart_mean(k->delta_e_left_out), of_other = color_chart_mean(other.delta_e_left_out);
+    if (of_other < other_edition_share * own)
+        warning_send(warn, OPTION_COLOR_CHART,
+                     "the colors of a chart made %s November 2014 fit better (CIEDE2000 %.1f in the mean, %.1f as "
+                     "declared): check 'edition'",
+                     other.from_2014 ? "since" : "before", of_other, own);
 }
 
 static status check_size(const double corner_px[8], struct error *err)
@@ -307,21 +343,17 @@ static status check_size(const double corner_px[8], struct error *err)
 status color_chart_measure(struct color_chart *k, const struct image *im, double saturation, double light_theta_rad,
                            const struct warning_sink *warn, struct error *err)
 {
+    const double cos_theta = cos(light_theta_rad);
     status s = check_size(k->corner_px, err);
-    k->white = 0;
-    for (size_t i = 0; i < COLOR_CHART_PATCHES && s == STATUS_OK; i++) {
-        if (k->reference != NULL)
-            memcpy(k->wanted_rgb[i], k->reference[i], sizeof k->wanted_rgb[i]);
-        else
-            color_chart_reference(k->from_2014, i, k->wanted_rgb[i]);
-        for (size_t c = 0; c < 3; c++) k->wanted_rgb[i][c] *= cos(light_theta_rad);
-        if (k->wanted_rgb[i][1] > k->wanted_rgb[k->white][1]) k->white = i;
-        s = measure_patch(k, im, i, saturation, err);
-    }
+    set_wanted(k, cos_theta);
+    for (size_t i = 0; i < COLOR_CHART_PATCHES && s == STATUS_OK; i++) s = measure_patch(k, im, i, saturation, err);
     if (s != STATUS_OK) return s;
     if (k->saturated[k->white])
         return error_set(err, STATUS_INVALID, "its white patch is saturated: expose for less light");
-    return fit(k, cos(light_theta_rad), warn, err);
+    s = fit(k, cos_theta, err);
+    if (s == STATUS_OK) s = judge(k, warn, err);
+    if (s == STATUS_OK) check_edition(k, cos_theta, warn);
+    return s;
 }
 
 status color_chart_picture(const struct color_chart *k, const struct image *im, struct image *picture,

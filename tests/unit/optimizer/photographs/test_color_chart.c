@@ -202,6 +202,38 @@ static void test_other_charts(void **state)
     }
 }
 
+/* Measures a drawn chart of before November 2014, one patch of which is darker, and returns the warnings about it. */
+static struct heard warnings_of(bool from_2014, float light_of_red)
+{
+    static const double corner[8] = {150, 120, 650, 120, 650, 450, 150, 450};
+    struct color_chart k = {.from_2014 = from_2014, .scale_at_px = {NAN, NAN}};
+    struct heard heard = {.n = 0};
+    struct image im;
+    assert_int_equal(image_init(&im, 800, 600, 3, NULL), STATUS_OK);
+    draw_chart(&im, corner, camera, 1.0, 0.002);
+    for (size_t i = 0; i < 3 * 800 * 600; i++) { /* red is the third patch of the third row */
+        const size_t x = i / 3 % 800, y = i / 3 / 800;
+        if (x > 315 && x < 395 && y > 285 && y < 365) im.pixel[i] *= light_of_red;
+    }
+    memcpy(k.corner_px, corner, sizeof corner);
+    assert_int_equal(color_chart_measure(&k, &im, INFINITY, 0.0, &(struct warning_sink){hear, &heard}, NULL),
+                     STATUS_OK);
+    image_release(&im);
+    return heard;
+}
+
+/* The other edition's colors, which fit better, and a single patch that is off are named; a right chart is silent. */
+static void test_single_doubts(void **state)
+{
+    (void)state;
+    assert_int_equal(warnings_of(false, 1.0f).n, 0);
+    const struct heard edition = warnings_of(true, 1.0f), shadow = warnings_of(false, 0.5f);
+    assert_int_equal(edition.n, 1);
+    assert_non_null(strstr(edition.text[0], "a chart made before November 2014 fit better"));
+    assert_int_equal(shadow.n, 1);
+    assert_non_null(strstr(shadow.text[0], "patch 'red' of the color chart differs by"));
+}
+
 /* The same picture gives the same corners, to the last bit, however the machine shares its cores. */
 static void test_same_chart_again(void **state)
 {
@@ -296,7 +328,8 @@ int main(void)
         cmocka_unit_test(test_reference),      cmocka_unit_test(test_delta_e),
         cmocka_unit_test(test_drawn_charts),   cmocka_unit_test(test_same_chart_again),
         cmocka_unit_test(test_refused_charts), cmocka_unit_test(test_fall_of_light),
-        cmocka_unit_test(test_other_charts),   cmocka_unit_test(test_real_chart),
+        cmocka_unit_test(test_other_charts),   cmocka_unit_test(test_single_doubts),
+        cmocka_unit_test(test_real_chart),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
