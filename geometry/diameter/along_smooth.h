@@ -1,9 +1,9 @@
 /* Lowers the noise of a scan along its fibers, and leaves their sections as sharp as they are.
  *
- * The walls of a hollow fiber may be thinner than two voxels, so that blurring across them levels the basin of its
- * lumen, and noise opens the walls somewhere along it. Along a fiber nothing changes within a few voxels. Each voxel
- * becomes a Gaussian mean along the direction of the structure tensor (structure_tensor.h); Weickert 1999,
- * "Coherence-enhancing diffusion filtering", does the same by diffusion. */
+ * It is meant for hollow fibers whose walls are thinner than two voxels: a blur across the walls would fill the lumen,
+ * and without any blur noise makes holes in them. Along a fiber nothing changes within a few voxels. Each voxel becomes
+ * a Gaussian mean along the direction of the structure tensor (structure_tensor.h); Weickert 1999, "Coherence-enhancing
+ * diffusion filtering", does the same by diffusion. */
 #ifndef SELVEDGE_GEOMETRY_ALONG_SMOOTH_H
 #define SELVEDGE_GEOMETRY_ALONG_SMOOTH_H
 

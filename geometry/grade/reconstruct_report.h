@@ -17,7 +17,7 @@ enum lumen_answer { LUMENS_GIVEN, LUMENS_FILLED, LUMENS_DOUBTFUL, LUMENS_NONE, L
 /* "given", "filled", "possible", "none" or "unknown". */
 const char *lumen_answer_name(enum lumen_answer a);
 
-/* What is reported with the result, in the units named. */
+/* Figures that are reported with the result, in the units of their names. */
 struct reconstruct_report {
     size_t n[3];
     double voxel_size_m[3];
@@ -46,7 +46,7 @@ struct reconstruct_report {
     double other_diameter_voxel, diameter_noise_share, other_diameter_noise_share;
     double trace_edge_voxel; /* edge of the voxels that fibers were found in, per voxel of the scan (trace_grid.h) */
     size_t n_material_voxel, n_kept_voxel; /* V >= eps_d; V >= eps_d and J <= eps_j */
-    size_t n_class_voxel[3];               /* of the grid that fibers were found in, as the next */
+    size_t n_class_voxel[3];               /* this and the next member: of the grid in which fibers were found */
     size_t n_center[3], n_chain[3], n_short_dropped[3];
     size_t n_gap_bridged, n_joined;
     size_t n_fiber, n_vertex;

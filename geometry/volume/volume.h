@@ -34,7 +34,7 @@ struct volume {
     size_t n[3];
     double voxel_size_m[3];
     float *density;              /* n[0]*n[1]*n[2]; in [0, 1] after density_map_apply, raw scanner values before */
-    struct volume_filled filled; /* from the same space, as the next one */
+    struct volume_filled filled; /* this and the next member are from the same space */
     struct volume_unknown unknown;
     struct scratch_space *space; /* not owned */
     /* Which parts of it other ranks have (geometry/volume/volume_slabs.h); NULL: none. Not owned. */

@@ -44,7 +44,8 @@ uint32_t estimate_blocks_at_once(const struct estimate_blocks *b, size_t i_group
  * ESTIMATE_MOST_VALUES. */
 void estimate_trace_blocks(const struct estimate_blocks *b, const struct block_range *range, float *value,
                            struct block_sum *sum);
-/* Traces n paths of a group. value: room for n * estimate_n_value, is cleared first. Result: the number of bounces. */
+/* Traces n paths of a group. Returns the number of bounces. value: n * estimate_n_value floats, which are cleared
+ * first. */
 uint64_t estimate_trace(const struct estimate_blocks *b, size_t i_group, size_t n, double (*xy)[2], struct rng *rng,
                         float *value);
 

@@ -29,7 +29,8 @@ struct contrast_plan {
 /* n_path: rounded up to 4 a cell. STATUS_NO_MEMORY. */
 status contrast_plan_init(struct contrast_plan *c, size_t n_side, size_t n_path, size_t n_jac, struct error *err);
 void contrast_plan_release(struct contrast_plan *c);
-/* All paths of task i_task; value: room for RADIANCE_BLOCK_PATHS x (3 + n_jac). Result: the number of bounces. */
+/* Traces all paths of task i_task. Returns the number of bounces. value: room for RADIANCE_BLOCK_PATHS x (3 + n_jac).
+ */
 uint64_t contrast_trace_task(const struct estimate_blocks *b, const struct contrast_plan *c, size_t i_group,
                              size_t i_task, float *value);
 /* The sums of task i_task, which lie in a row, and how many they are. */

@@ -45,7 +45,7 @@ struct derivative_check {
     uint64_t n_path, n_step; /* paths, and their scattering events */
 };
 
-/* What is left of the error of parameter p beyond what noise explains (3 standard deviations); may be negative. */
+/* Returns the error of parameter p less 3 standard deviations of its noise; may be negative. */
 double derivative_check_excess(const struct derivative_check *check, size_t p);
 
 /* STATUS_INVALID as for an estimate; STATUS_CANCELLED; STATUS_NUMERIC (naming model and parameter) for a value that is

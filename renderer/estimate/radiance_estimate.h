@@ -14,15 +14,15 @@ struct estimate_partner {
     float correlation;
 };
 
-/* rgb means in radiance units. For a configuration with contrast_cells: its contrast and the derivatives of that. For
- * one with n_rotation: the mean over its rotations, each of which counts as a configuration of its own. */
+/* The estimate of one configuration: rgb means in radiance units. If the configuration has contrast_cells, `mean` is
+ * its contrast; if it has n_rotation, `mean` is the mean over its rotations. */
 struct estimate {
     double mean[3], var[3];              /* var: of the mean */
     double jac[3 * SCATTERING_MAX_FLAT]; /* d mean[c] / d flat param p at [c * n_flat + p], by internal unit, with
                                             n_flat = n_param of the model * number of sets */
     double jac_var[3 * SCATTERING_MAX_FLAT];
     uint64_t n_path, n_bounce;
-    uint32_t n_partner; /* of a mean over rotations that shares its paths with more rows: the first ones */
+    uint32_t n_partner; /* a mean over rotations may have more than fit, and lists the first ones */
     struct estimate_partner partner[ESTIMATE_MAX_PARTNER];
 };
 

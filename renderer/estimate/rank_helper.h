@@ -1,4 +1,4 @@
-/* What a rank does that helps the root of its team: it traces what the root asks for. */
+/* The work of a helper rank: it traces the estimates and pictures that the root of its team orders. */
 #ifndef SELVEDGE_RENDERER_RANK_HELPER_H
 #define SELVEDGE_RENDERER_RANK_HELPER_H
 

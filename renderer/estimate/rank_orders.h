@@ -1,4 +1,4 @@
-/* What the root of a team asks its helpers for. */
+/* The orders that the root of a team gives its helpers. */
 #ifndef SELVEDGE_RENDERER_RANK_ORDERS_H
 #define SELVEDGE_RENDERER_RANK_ORDERS_H
 

@@ -11,7 +11,7 @@
 
 enum { GAUSSIAN_DIRECTIONS = 1024 }; /* of a Gaussian lamp over a flat cloth */
 
-/* The hit of an eye's ray. */
+/* The hit of a camera ray. */
 struct seen_hit {
     struct scene_hit hit;
     struct scene_place place;

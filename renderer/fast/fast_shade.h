@@ -1,4 +1,4 @@
-/* Radiance of one eye's ray by the tables. */
+/* The radiance along one camera ray, by the tables of the fast renderer. */
 #ifndef SELVEDGE_RENDERER_FAST_SHADE_H
 #define SELVEDGE_RENDERER_FAST_SHADE_H
 
@@ -8,7 +8,7 @@
 status fast_setting_init(struct fast_setting *s, const struct fast_option *option, struct error *err);
 void fast_setting_release(struct fast_setting *s);
 
-/* ray: from camera_ray; it is changed. Adds to radiance. Result: the number of bounces traced. */
+/* Adds the radiance along a ray of camera_ray to `radiance`. Changes the ray. Returns the number of bounces traced. */
 uint32_t fast_shade(const struct fast_setting *s, struct scene_ray *ray, struct rng *rng, float radiance[3]);
 
 #endif

@@ -1,4 +1,4 @@
-/* What an OpenEXR file states beside its samples. */
+/* Statements of an OpenEXR file beside its samples. */
 #ifndef SELVEDGE_RENDERER_IMAGE_EXR_H
 #define SELVEDGE_RENDERER_IMAGE_EXR_H
 

@@ -1,4 +1,5 @@
-/* What the pixels of a picture see: means over a few eye's rays, and the variances of these means. */
+/* Albedo, normal and distance of the fibers that each pixel of a picture shows: means over a few camera rays, and the
+ * variances of these means. */
 #ifndef SELVEDGE_RENDERER_FEATURE_IMAGE_H
 #define SELVEDGE_RENDERER_FEATURE_IMAGE_H
 

@@ -1,4 +1,4 @@
-/* Radiance of one eye's ray: some traced hits, and diffusion for the light that is scattered more often. */
+/* The radiance along one camera ray: some traced hits, and diffusion for the light that is scattered more often. */
 #ifndef SELVEDGE_RENDERER_DIFFUSION_SHADE_H
 #define SELVEDGE_RENDERER_DIFFUSION_SHADE_H
 
@@ -13,7 +13,7 @@ struct diffusion_setting {
 /* s->path is filled in. s must stay where it is. */
 void diffusion_setting_init(struct diffusion_setting *s, const struct diffusion_option *option);
 
-/* ray: from camera_ray; it is changed. Adds to radiance. Result: the number of bounces traced. */
+/* Adds the radiance along a ray of camera_ray to `radiance`. Changes the ray. Returns the number of bounces traced. */
 uint32_t diffusion_shade(const struct diffusion_setting *s, struct scene_ray *ray, struct rng *rng, float radiance[3]);
 
 #endif

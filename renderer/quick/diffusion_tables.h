@@ -1,4 +1,4 @@
-/* What diffusion knows of a cloth with a pile: how much of the light that is scattered more often than paths are traced
+/* Tables of diffusion for a cloth with a pile: how much of the light that is scattered more often than paths are traced
  * comes back to the eye, from where, and from which directions. Averages over random walks through the flat cloth.
  *
  * The radiance of such light at the last traced hit is, for light L from the directions of one side of the cloth,
@@ -6,8 +6,7 @@
  * equations 2.3 and 2.5 of the dissertation of Yan with these functions in place of Fresnel's transmission, and with a
  * dipole's R(r) that has the reflectance and the mean square distance of the walks.
  *
- * Directions point away from the cloth, in the frame of the flat cloth; side 0 is above, 1 below. Millimetres.
- */
+ * Directions point away from the cloth, in the frame of the flat cloth; side 0 is above, 1 below. Millimetres. */
 #ifndef SELVEDGE_RENDERER_DIFFUSION_TABLES_H
 #define SELVEDGE_RENDERER_DIFFUSION_TABLES_H
 

@@ -1,4 +1,4 @@
-/* Radiance of one eye's ray by dual scattering. */
+/* The radiance along one camera ray, by dual scattering. */
 #ifndef SELVEDGE_RENDERER_DUAL_SHADE_H
 #define SELVEDGE_RENDERER_DUAL_SHADE_H
 
@@ -11,7 +11,7 @@ struct dual_setting {
     const struct dual_option *option;
 };
 
-/* Where an eye's ray meets a fiber. */
+/* The place where a camera ray meets a fiber. */
 struct dual_hit {
     struct scene_hit hit;
     double offset_mm[2];
@@ -35,7 +35,7 @@ bool dual_front_of(const struct dual_setting *s, const struct dual_hit *h, const
 void dual_scattering(const struct dual_setting *s, const struct dual_hit *h, const float wi[3],
                      const struct dual_front *front, float s_rgb[3]);
 
-/* ray: from camera_ray; it is changed. Adds to radiance. Result: the number of hits, 0 or 1. */
+/* Adds the radiance along a ray of camera_ray to `radiance`. Changes the ray. Returns the number of hits, 0 or 1. */
 uint32_t dual_shade(const struct dual_setting *s, struct scene_ray *ray, struct rng *rng, float radiance[3]);
 
 #endif

@@ -1,11 +1,10 @@
-/* What dual scattering knows of a kind of fiber, as averages of its scattering model (Zinke, Yuksel, Weber and Keyser
+/* Tables of dual scattering for a kind of fiber: averages of its scattering model (Zinke, Yuksel, Weber and Keyser
  * 2008, "Dual Scattering Approximation for Fast Multiple Scattering in Hair"; dissertation of Yan, section 2.5,
  * equations 2.18 to 2.20): how much light goes on forwards and comes back, and how far it spreads along the fiber.
  *
  * theta: angle of a direction from the plane across the fiber, in [-pi/2, pi/2]; phi: azimuth between the directions to
  * the light and to the eye, 0 where both lie on the same side. The averages hold for round fibers, whose scattering
- * depends on the difference of azimuths only and is the same for phi and -phi.
- */
+ * depends on the difference of azimuths only and is the same for phi and -phi. */
 #ifndef SELVEDGE_RENDERER_DUAL_TABLES_H
 #define SELVEDGE_RENDERER_DUAL_TABLES_H
 

@@ -1,4 +1,5 @@
-/* The quadratic B-spline of nodes one apart, by which numbers are spread over nodes and read from them. */
+/* The quadratic B-spline on nodes at whole numbers: distributes a value over three nodes, and interpolates between
+ * them. */
 #ifndef SELVEDGE_RENDERER_QUADRATIC_SPLINE_H
 #define SELVEDGE_RENDERER_QUADRATIC_SPLINE_H
 

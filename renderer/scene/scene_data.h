@@ -1,4 +1,4 @@
-/* Inside of struct scene, for the files of this folder. Millimetres. */
+/* The members of struct scene. Only the files of this folder include this header. Lengths are in millimetres. */
 #ifndef SELVEDGE_RENDERER_SCENE_DATA_H
 #define SELVEDGE_RENDERER_SCENE_DATA_H
 

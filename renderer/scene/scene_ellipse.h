@@ -1,11 +1,10 @@
-/* Inside of struct scene: fibers with elliptical sections, as primitives of our own in Embree.
+/* The part of struct scene for fibers with elliptical sections, which are primitives of our own in Embree.
  *
  * Each segment is a straight cylinder with the elliptical section of its middle: the mean of radius, ratio of axes and
  * long axis at both ends. It ends at the plane that halves the angle to its neighbour, or at a plane across a free end.
  * Exact for straight fibers; where a section turns or a fiber bends, neighbours meet in planes that both ellipses fill
  * up to the step between them. The planes are faces of the segment, so that it is closed. A fiber that ends where
- * another one begins, in this tile or in the next, has it as its neighbour.
- */
+ * another one begins, in this tile or in the next, has it as its neighbour. */
 #ifndef SELVEDGE_RENDERER_SCENE_ELLIPSE_H
 #define SELVEDGE_RENDERER_SCENE_ELLIPSE_H
 

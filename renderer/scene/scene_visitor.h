@@ -5,7 +5,7 @@
 
 #include "renderer/scene/scene_ray.h"
 
-/* What scene_visit_ahead hands on. */
+/* The arguments that scene_visit_ahead passes on. */
 struct scene_visitor {
     const struct scene *flat;
     scene_visit *visit;

@@ -75,7 +75,7 @@ struct radiance_tracer {
     status (*prepare)(const struct radiance_input *in, const struct configuration *c, size_t n_configuration,
                       void **state, struct error *err);
     void (*release)(void *state);
-    /* value[n_path][n_member][3 + n_jac], preset to 0: radiance, then derivatives. Result: the number of bounces. */
+    /* value[n_path][n_member][3 + n_jac], preset to 0: radiance, then derivatives. Returns the number of bounces. */
     uint64_t (*trace)(const void *state, const struct radiance_block *b, float *value);
     /* One path of configuration i through xy of the crop with its derivatives, value[3 + n_jac] preset to 0. */
     void (*record)(const void *state, size_t i_configuration, const double xy[2], struct rng *rng,

@@ -13,7 +13,7 @@
 
 #include <stdbool.h>
 
-/* What all bricks share. */
+/* The data that all bricks share. */
 struct axis_model {
     const struct volume *v;
     size_t first_row;                    /* of the whole volume that v begins with; 0 but in ranks with a slab of it */

@@ -19,7 +19,7 @@ struct segment {
 struct segment_bricks {
     size_t n_voxel[3], n_brick[3];
     size_t edge; /* edge of a brick in voxels */
-    float reach; /* the list of a brick has all segments within this distance of it, unless each has its own */
+    float reach; /* a brick lists the segments within this distance; the largest reach if each segment has its own */
     struct segment *segment;
     size_t n_segment;
     size_t *first; /* number of bricks + 1 */
@@ -30,12 +30,13 @@ struct segment_bricks {
  * (2^32 segments) there is nothing to release. */
 status segment_bricks_init(struct segment_bricks *s, const struct polyline_set *lines, const size_t n_voxel[3],
                            size_t edge, float reach, struct error *err);
-/* The list of a brick has the segments that reach it. reach: of each segment, in the order of the lines. */
+/* The same, but a brick lists the segments within whose own reach it lies. reach: one value for each segment, in the
+ * order of the lines. */
 status segment_bricks_init_each(struct segment_bricks *s, const struct polyline_set *lines, const size_t n_voxel[3],
                                 size_t edge, const float *reach, struct error *err);
-/* Takes new places and radii of the lines that the lists were made from. The lists stay as they are, and *first
- * becomes the segments that they were made from, unless it has them from an earlier move (else NULL); the caller frees
- * it. STATUS_NO_MEMORY. */
+/* Updates places and radii of the segments from the lines that the lists were made from; the lists of the bricks stay
+ * as they are. *first: NULL, or the result of an earlier move; if it is NULL, it receives the original
+ * segments, which the caller frees. STATUS_NO_MEMORY. */
 status segment_bricks_move(struct segment_bricks *s, const struct polyline_set *lines, struct segment **first,
                            struct error *err);
 status segment_bricks_from_fibers(struct segment_bricks *s, const struct fiber_set *f, const size_t n_voxel[3],

@@ -1,4 +1,4 @@
-/* Inside descent/: the methods that the registry lists, and the functions that they share. */
+/* The methods of descent that the registry lists, and the functions that they share. */
 #ifndef SELVEDGE_OPTIMIZER_DESCENT_METHODS_H
 #define SELVEDGE_OPTIMIZER_DESCENT_METHODS_H
 

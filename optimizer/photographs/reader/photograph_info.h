@@ -1,4 +1,4 @@
-/* What a picture reader is asked for, and what a file states besides its pixels. */
+/* The request to a picture reader, and the statements of a file beside its pixels. */
 #ifndef SELVEDGE_OPTIMIZER_PHOTOGRAPH_INFO_H
 #define SELVEDGE_OPTIMIZER_PHOTOGRAPH_INFO_H
 

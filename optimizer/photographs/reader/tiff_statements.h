@@ -1,4 +1,4 @@
-/* What a TIFF photograph states beside its samples: Exif, orientation, profile, curve, primaries, largest sample. */
+/* Statements of a TIFF photograph beside its samples: Exif, orientation, profile, curve, primaries, largest sample. */
 #ifndef SELVEDGE_OPTIMIZER_TIFF_STATEMENTS_H
 #define SELVEDGE_OPTIMIZER_TIFF_STATEMENTS_H
 

@@ -9,8 +9,8 @@
  * NaN where the reference is black. */
 struct surface_difference {
     double mean[3], mean_se[3]; /* of the whole picture in red, green and blue, and its standard error */
-    double field_rms;           /* root mean square over lit fields and channels, with the noise of both taken off */
-    double field_noise;         /* the noise that was taken off */
+    double field_rms;           /* root mean square over lit fields and channels, less the noise of both pictures */
+    double field_noise;         /* the noise that was subtracted */
 };
 
 /* Both pictures have the same size and six channels: radiance in rgb, and its variance. */

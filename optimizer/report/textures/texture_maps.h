@@ -10,10 +10,10 @@
 struct texture_maps {
     size_t width, height;
     double pixel_mm[2];
-    float *height_mm;    /* of the highest fiber; 0 is the top of the cloth */
-    float *fiber_normal; /* x 3, of the highest fiber; (0, 0, 1) where there is none */
-    float *normal;       /* x 3, of the smoothed heights */
-    float *spread; /* root mean square of the fibers' slopes that the smooth surface does not have, over its mean */
+    float *height_mm;     /* of the highest fiber; 0 is the top of the cloth */
+    float *fiber_normal;  /* x 3, of the highest fiber; (0, 0, 1) where there is none */
+    float *normal;        /* x 3, of the smoothed heights */
+    float *spread;        /* root mean square of the fibers' slopes relative to the smooth surface, over its mean */
     float *direction_rad; /* along the fibers, from +x, in [0, pi) */
     float *coherence;     /* 0: fibers run everywhere; 1: all along direction */
 };

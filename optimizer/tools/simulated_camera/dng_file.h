@@ -1,5 +1,5 @@
-/* Writes a raw mosaic as an uncompressed DNG file (Adobe, Digital Negative 1.3), as a camera with a Bayer sensor does:
- * with only the tags that simulated cameras and the tests of the readers of real ones need. */
+/* Writes the raw mosaic of a Bayer sensor as an uncompressed DNG file (Adobe, Digital Negative 1.3). The file has only
+ * the tags that the simulated camera and the tests of the DNG reader need. */
 #ifndef SELVEDGE_OPTIMIZER_DNG_FILE_H
 #define SELVEDGE_OPTIMIZER_DNG_FILE_H
 

@@ -1,4 +1,4 @@
-/* Connections of a bounce with the lights, and how light is added to a path. Inside of path_steps.h. */
+/* Connections of a bounce with the lights, and how light is added to a path. Only path_steps.h includes this header. */
 #ifndef SELVEDGE_RENDERER_PATH_CONNECT_H
 #define SELVEDGE_RENDERER_PATH_CONNECT_H
 

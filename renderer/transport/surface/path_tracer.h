@@ -9,7 +9,7 @@
 
 #include "renderer/transport/surface/path_setting.h"
 
-/* ray: from camera_ray; it is changed. record: NULL, or with n_step = 0. */
+/* ray: from camera_ray; it is changed. record: NULL, or a record with n_step = 0, which receives the path. */
 void path_trace(const struct path_setting *s, struct scene_ray *ray, struct rng *rng, struct path_result *out,
                 struct path_record *record);
 
@@ -20,7 +20,7 @@ void path_trace_lamps(const struct path_setting *s, const struct lamp *lamp, siz
                       struct rng *rng, struct path_result *out);
 
 /* Sum over channels of the radiance that a recorded path has with other parameters, by the formula at path_step.
- * shows_width: the value of the path's setting; S has the widths as a factor then. */
+ * shows_width: path_setting.shows_width of the path; if true, S contains the fiber's widths as a factor. */
 double path_replay(const struct parameter_sets *sets, const struct path_record *record, bool shows_width);
 
 #endif

@@ -1,6 +1,5 @@
-/* What radiance sources of fibers share that add up what a function of their own finds for each eye's ray, in place of
- * whole paths: by tables, by dual scattering, by diffusion. They have no derivatives, and no records of paths.
- */
+/* Shared by the radiance sources of fibers whose own function gives the radiance along each camera ray, in place of
+ * whole paths: by tables, by dual scattering, by diffusion. They have no derivatives, and no records of paths. */
 #ifndef SELVEDGE_RENDERER_SHADED_RADIANCE_H
 #define SELVEDGE_RENDERER_SHADED_RADIANCE_H
 
@@ -18,7 +17,7 @@ struct shaded_method {
     status (*init)(void *setting, const struct radiance_input *in, struct error *err);
     /* Of a setting whose init was called, also if that failed; NULL: there is nothing to release. */
     void (*release)(void *setting);
-    /* ray: from camera_ray; it is changed. Adds to radiance. Result: the number of bounces. */
+    /* Adds the radiance along a ray of camera_ray to `radiance`. Changes the ray. Returns the number of bounces. */
     uint32_t (*shade)(const void *setting, struct scene_ray *ray, struct rng *rng, float radiance[3]);
 };
 

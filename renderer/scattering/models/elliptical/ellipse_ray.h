@@ -1,16 +1,15 @@
-/* Geometric optics of a smooth dielectric fiber with an elliptical section: exits of a ray that meets it at a place of
- * its width, by exact hops in the section (Khungurn and Marschner 2017, "Azimuthal Scattering from Elliptical Hair
- * Fibers"; fabric thesis, section 4.4). Each quantity carries its derivatives by the index of refraction and by the
- * ratio of axes.
+/* Geometric optics of a smooth dielectric fiber with an elliptical section. One ray enters at a given offset; its exits
+ * follow by exact hops in the section (Khungurn and Marschner 2017, "Azimuthal Scattering from Elliptical Hair Fibers";
+ * fabric thesis, section 4.4). Each quantity carries its derivatives by the index of refraction and by the ratio of
+ * axes.
  *
  * Section: semi-axes A = sqrt(a), B = 1 / sqrt(a) along v and w, so its area is pi and lengths are in units of the root
- * of the product of both semi-axes. A ray comes from the azimuth phi at the offset H sin x, H half of the width that
- * the section shows there. The walls turn it in the section as Snell's law does with Bravais' index eta' = sqrt(eta^2 -
- * sin^2 th) / cos th; reflectances are taken at the true angles in space.
+ * of the product of both semi-axes. A ray comes from the azimuth phi at the offset H sin x, where H is half of the
+ * section's width as seen from phi. In the plane of the section the ray is refracted by Snell's law with Bravais' index
+ * eta' = sqrt(eta^2 - sin^2 th) / cos th; reflectances are taken at the true angles in space.
  *
  *     hop     from the point (A cos g, B sin g) along the direction t: delta = atan2(sin t / B, cos t / A), next point
- *             g' = 2 delta - g + pi
- */
+ *             g' = 2 delta - g + pi */
 #ifndef SELVEDGE_RENDERER_ELLIPSE_RAY_H
 #define SELVEDGE_RENDERER_ELLIPSE_RAY_H
 
@@ -22,7 +21,8 @@ struct dual {
 };
 
 enum { ELLIPSE_BY_ETA, ELLIPSE_BY_RATIO };
-/* Exits that are followed, and those whose azimuth is known to the model: R, TT, TRT, TRRT. */
+/* ELLIPSE_N_EXIT: the exits that are followed. ELLIPSE_N_MODE: the first exits, R, TT, TRT and TRRT, whose azimuth the
+ * model uses. */
 enum { ELLIPSE_N_EXIT = 12, ELLIPSE_N_MODE = 4 };
 
 struct ellipse {
@@ -46,7 +46,7 @@ struct ellipse_wall {
 struct ellipse_path {
     int n;
     struct dual share[ELLIPSE_N_EXIT + 1], length[ELLIPSE_N_EXIT + 1]; /* true length of the way inside */
-    struct dual azimuth[ELLIPSE_N_MODE];                               /* of exit less azimuth of the ray; any turn */
+    struct dual azimuth[ELLIPSE_N_MODE]; /* azimuth of the exit minus azimuth of the ray, plus any number of turns */
 };
 
 struct ellipse ellipse_of(double eta, double ratio);
