@@ -1,11 +1,12 @@
-/* The parts of a phantom whose twists are rounded so that the tile closes (used only in this folder). */
+/* Functions that add the yarns, loops, felt and pile of a phantom; twists are rounded so that the tile closes. Used
+ * only in this folder. */
 #ifndef SELVEDGE_GEOMETRY_PHANTOM_STRAND_H
 #define SELVEDGE_GEOMETRY_PHANTOM_STRAND_H
 
 #include "geometry/cloth/yarn_path.h"
 #include "geometry/phantom/phantom_option.h"
 
-/* The strands of a phantom, and the properties of a real yarn as made. */
+/* The strands of a phantom, and the numbers of its plied yarns after rounding. */
 struct phantom_strands {
     struct strand_set set;
     struct phantom_plied plied;

@@ -20,7 +20,7 @@ struct volume_slabs {
 };
 
 struct slab_rows {
-    size_t begin, end;          /* rows that the rank answers for, or that its columns touch */
+    size_t begin, end;          /* rows that the rank owns (volume_slabs_own), or touches (volume_slabs_touched) */
     size_t with_halo, halo_end; /* rows that it has */
 };
 
@@ -58,7 +58,7 @@ status volume_slabs_deal(struct volume_slabs *s, const struct volume *v, struct 
 /* Root: sends every helper its slab. The rows are given by volume_slabs_touched, or by volume_slabs_own where there is
  * a halo. STATUS_IO, STATUS_NO_MEMORY. */
 status volume_slabs_send(const struct volume_slabs *s, const struct volume *v, struct error *err);
-/* Root: both, for a volume without a halo that is made known as v->slabs. team NULL: does nothing. */
+/* Root: deals and sends a volume without a halo, and sets v->slabs = s. team NULL: does nothing. */
 status volume_slabs_share(struct volume_slabs *s, struct rank_team *team, struct volume *v, struct error *err);
 /* Root: the helpers forget their slabs. s may be all zero. */
 void volume_slabs_release(struct volume_slabs *s);

@@ -8,8 +8,8 @@
  * (with its prior penalty) is lower by more than two standard errors of the difference. An extra start, which is the
  * result of another fit, is kept when its objective is lower at all, so that the fit does not end worse than the other.
  *
- * Deterministic like the methods themselves, and it asks for the same estimates in the same order: with a journal below
- * (estimate_journal.h) every option resumes bit by bit. */
+ * A fit is deterministic, as its method is: it asks for the same estimates in the same order. With a journal as
+ * estimator (estimate_journal.h), a fit with any option resumes bit by bit. */
 #ifndef SELVEDGE_OPTIMIZER_FIT_RUN_H
 #define SELVEDGE_OPTIMIZER_FIT_RUN_H
 

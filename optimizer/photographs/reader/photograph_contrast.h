@@ -4,12 +4,11 @@
  *
  * each channel on its own; pixels on the edge of a part are shared by area, so that all parts are equal. Noise of the
  * pixels adds its relative variance over the number of pixels of a part (5 % in 10 x 10 pixels: 0.000025, a scatter of
- * 0.5 %). It is not taken off: pixels of cloth differ by threads and fibers too, and a single picture cannot tell the
- * two apart (complementary halves of the pixels gave half of the contrast where pixels are as large as the fibers'
- * distances).
+ * 0.5 %). It is not subtracted, because a single picture cannot tell noise from threads and fibers. (Comparing
+ * complementary halves of the pixels halved the contrast where pixels are as large as the distance of fibers.)
  *
- * Standard error: how much C changes from one piece of the cloth to another, by the scatter of the parts'
- * contributions, taken as independent. For a pattern that repeats within the crop it is too large. */
+ * The standard error states how much C differs between pieces of the cloth. It follows from the scatter of the parts'
+ * contributions, which count as independent, and is too large for a pattern that repeats within the crop. */
 #ifndef SELVEDGE_OPTIMIZER_PHOTOGRAPH_CONTRAST_H
 #define SELVEDGE_OPTIMIZER_PHOTOGRAPH_CONTRAST_H
 

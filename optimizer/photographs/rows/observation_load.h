@@ -12,8 +12,8 @@ struct job_setup;
 
 /* Appends the observations of the table or of all photographs to o; their files are in `folder`. Photographs that are
  * not uniform (photograph.h), or too dark for the texture that the document asks for, give warnings; warn may be NULL.
- * process: the properties of the camera; NULL: nothing. Errors: from file_read_all, measurement_table.h, photograph.h
- * and photograph_contrast.h, with the option in err->field. */
+ * process: noise, colors and lens of the camera; NULL: none is known. Errors: from file_read_all, measurement_table.h,
+ * photograph.h and photograph_contrast.h, with the option in err->field. */
 status observation_set_load(const struct job_setup *setup, const struct job_rows *rows, const struct job_fit *fit,
                             const char *folder, const struct photograph_process *process,
                             const struct warning_sink *warn, struct observation_set *o, struct error *err);

@@ -1,10 +1,9 @@
 /* Removes the noise of paths from a table of deep light: retains the part on which two independent halves agree.
  *
- * Means over lights and over views have little noise, and are kept exactly: of each view, channel and light, so that no
- * energy is lost. The remainder is a matrix of views x (lights and channels). Its largest singular values are
- * kept whole, and the rest of it with one factor, as far as both halves agree on it. Number and factor are those with
- * which the matrix of one half is nearest to the other half (cross-validation; both ways, in the mean of squares over
- * views and lights). */
+ * Means over lights and means over views have little noise. They are retained exactly, so that no energy is lost. The
+ * remainder is a matrix of views x (lights and channels): its largest singular values are retained, and the rest of it
+ * is multiplied by one factor. Cross-validation chooses the number of singular values and the factor, such that the
+ * result from one half differs least from the other half, in the mean of squares. */
 #ifndef SELVEDGE_RENDERER_DEEP_RANK_H
 #define SELVEDGE_RENDERER_DEEP_RANK_H
 
@@ -22,10 +21,10 @@ struct deep_halves {
 struct deep_rank_fit {
     size_t rank;    /* singular values that are kept, 0 to DEEP_RANK_MOST */
     double of_rest; /* factor of the rest, 0 to 1 */
-    double noise2;  /* sum over the table of both areas times the square of a standard error, from both halves */
+    double noise2;  /* sum of view_area * light_area * squared standard error, by the halves' difference */
 };
 
-/* value: as large as a half, apart from them. STATUS_NO_MEMORY, STATUS_CANCELLED. */
+/* Writes the table to value, an array of its own as large as a half. STATUS_NO_MEMORY, STATUS_CANCELLED. */
 status deep_rank_keep(const struct deep_halves *t, struct thread_pool *pool, double *value, struct deep_rank_fit *fit,
                       struct error *err);
 

@@ -1,11 +1,11 @@
-/* The state of a path from bounce to bounce: inside of path_steps.h. */
+/* The state of a path from bounce to bounce, for the headers of path_steps.h. */
 #ifndef SELVEDGE_RENDERER_PATH_WALK_H
 #define SELVEDGE_RENDERER_PATH_WALK_H
 
 #include "renderer/scene/fiber_frame.h"
 #include "renderer/transport/surface/path_setting.h"
 
-/* 1: in the file that is for plain settings only (path_steps.h). */
+/* path_plain.c, which traces only paths with plain settings, sets it to 1 (path_steps.h). */
 #ifndef PATH_PLAIN
 #define PATH_PLAIN 0
 #endif
@@ -42,12 +42,13 @@ struct walk {
     const struct scattering_state *state; /* of the fiber that was hit */
     size_t i_set;                         /* its parameter set */
     bool last;                            /* the present bounce is the n_traced-th */
-    float to_camera[3], cos_camera;   /* direction to the camera from the first bounce, and its cosine to the cloth's
+    float to_camera[3], cos_camera; /* direction to the camera from the first bounce, and its cosine to the cloth's
                                        normal there; only with a factor (path_factor.h), after the first bounce */
-    struct fiber_frame speckle_frame; /* of the first bounce, the direction to the camera in it, and its fiber; only */
-    float speckle_wo[3];              /* with speckle, after the first bounce */
-    uint32_t i_fiber;
-    float normal[3]; /* of the cloth at the present bounce; likewise */
+    /* The next three are set only with speckle, after the first bounce. */
+    struct fiber_frame speckle_frame; /* the fiber frame of the first bounce */
+    float speckle_wo[3];              /* direction to the camera in it */
+    uint32_t i_fiber;                 /* the fiber of the first bounce */
+    float normal[3];                  /* of the cloth at the present bounce; only with a factor (path_factor.h) */
     float throughput[3];
     bool has_strips;                        /* path_setting.has_strips, and the walk is not recorded */
     struct lamp_strip strip[PATH_MAX_LAMP]; /* of the lamps, from the present bounce; only with has_strips */

@@ -1,18 +1,18 @@
 /* Light that is scattered in the medulla of a fiber, the core of hairs and wool, from tables (Yan, Jensen and
  * Ramamoorthi 2017, "An Efficient and Practical Near and Far Field Fur Reflectance Model", section 4).
  *
- *     around   density of the azimuth of exit psi, from the one that points back along the ray in the medulla, by the
- *              optical radius of the medulla, the anisotropy g, and asin of the offset h' of the ray in radii of the
- *              medulla, which passes the axis on the side of psi < 0 where h' > 0. Integral 1 over a turn.
- *     along    M of the half that leaves on the side of entry (back) and of the half that goes through, by the
- *              optical radius, g, and both longitudinal angles. Symmetric; integral of M cos^2 th_o dth_o = 1: a
- *              symmetric scale removes the error of the compression.
+ *     around   density of the azimuth psi at which light leaves. psi = 0 points back along the ray in the medulla.
+ *              Depends on the optical radius of the medulla, the anisotropy g, and asin h', where h' is the offset of
+ *              the ray in radii of the medulla; a ray with h' > 0 passes the axis on the side of psi < 0. The integral
+ *              over a turn is 1.
+ *     along    M of the light that leaves on the side of entry ("back"), and M of the light that goes through. Depends
+ *              on the optical radius, g, and both longitudinal angles. Symmetric. A symmetric scale makes the integral
+ *              of M cos^2 th_o dth_o exactly 1 in spite of the compression.
  *
  * The tables are sums of MEDULLA_*_RANK products of functions of one variable, made by medulla-tables, a program of the
  * tree that traces random walks (medulla_walk.h, medulla_fit.h): 34 kB, checked in as C source because making them
  * takes a minute on two cores (`make medulla-tables`). Functions go through their nodes as cubics with continuous
- * slopes (Catmull and Rom), so derivatives are exact for the tabulated function.
- */
+ * slopes (Catmull and Rom), so derivatives are exact for the tabulated function. */
 #ifndef SELVEDGE_RENDERER_MEDULLA_H
 #define SELVEDGE_RENDERER_MEDULLA_H
 
@@ -54,7 +54,7 @@ void medulla_ray_init(const struct medulla_around *m, double depth, double offse
 /* The density at psi for h' >= 0 (for h' < 0: the density at -psi), in [0, pi) or any other turn. When d is not NULL,
  * its derivatives as of medulla_ray_by, and the derivative by psi as the last. */
 double medulla_ray_density(const struct medulla_ray *ray, double psi, double *d);
-/* Coefficients of cos(k psi) and sin(k psi) of each function of psi, whose integral is 1: integrals of the products. */
+/* Writes the integrals of cos(k psi) and sin(k psi) times each function of psi, k = 0 .. n_wave - 1. */
 void medulla_waves(int n_wave, float (*cosine)[MEDULLA_ROUND_RANK], float (*sine)[MEDULLA_ROUND_RANK]);
 /* Adds the n waves of a ray; of[r * n + k]: wave k of function r of psi. */
 static inline void medulla_add_waves(const float weight[MEDULLA_ROUND_RANK], const float *of, int n,

@@ -32,12 +32,12 @@ enum { WAVE_P_C_T = 0, WAVE_P_BETA = 3, WAVE_P_GAMMA, WAVE_N_PARAM };
 enum { WAVE_N_ROW = 32, WAVE_N_PHI = 180 };
 enum { WAVE_D_C_T, WAVE_D_GAMMA, WAVE_N_SLOPE };
 
-/* N at one place of the table, and its derivatives; that by C_T is by the one of the channel. */
+/* N at one node of the table, and its derivatives. The derivative by C_T is taken by the channel's own C_T. */
 struct wave_cell {
     float n[3], d[WAVE_N_SLOPE][3];
 };
 
-/* By cos th_d. Samples choose a channel and an azimuth of it. */
+/* The sampling tables for one cos th_d. A sample chooses a channel, then an azimuth by the density of this channel. */
 struct wave_row {
     float energy[3][3]; /* light of each channel that leaves, on the diagonal */
     float density[3][WAVE_N_PHI + 1], below[3][WAVE_N_PHI + 1];

@@ -35,8 +35,8 @@ struct wave_problem {
     size_t n_node; /* even */
 };
 
-/* Nodes for `per_wave` of them in each wavelength inside, where the outline runs fastest: with 4, errors of smooth
- * outlines are below 1e-10, with 3 below 1e-3 of the forward amplitude. */
+/* Returns the number of nodes that puts at least `per_wave` nodes on each wavelength inside. With 4, errors of smooth
+ * outlines are below 1e-10 of the forward amplitude, with 3 below 1e-3. */
 size_t wave_solver_nodes(const struct wave_outline *o, double k, double index, double per_wave);
 
 struct wave_solver;
@@ -47,13 +47,15 @@ void wave_solver_free(struct wave_solver *s);
 
 /* Solves for waves that travel towards each of n angles from the x axis. STATUS_NO_MEMORY. */
 status wave_solver_solve(struct wave_solver *s, const double *angle_rad, size_t n, struct error *err);
-/* T of all n waves towards one angle from the x axis; of one wave towards n_angle equidistant ones, the first 0. */
+/* Three ways to get amplitudes T: of all n waves towards one angle from the x axis; of one wave towards n_angle
+ * equidistant angles, the first of which is 0; of one wave towards one angle. */
 void wave_solver_towards(const struct wave_solver *s, double angle_rad, double complex *t);
 void wave_solver_amplitudes(const struct wave_solver *s, size_t i_wave, double complex *t, size_t n_angle);
 double complex wave_solver_amplitude(const struct wave_solver *s, size_t i_wave, double angle_rad);
 
 double wave_solver_extinction(const struct wave_solver *s, size_t i_wave);
-/* Of n amplitudes all around; exact for n above 2 k times the largest distance within the outline. */
+/* Returns the scattering cross-section from amplitudes towards n equidistant angles. Exact for n above 2 k times the
+ * largest distance within the outline. */
 double wave_scattering_of(double k, const double complex *t, size_t n);
 double wave_solver_absorption(const struct wave_solver *s, size_t i_wave);
 
