@@ -1,6 +1,6 @@
 /* Opens files below a folder that somebody else may write, such as a worker that its input has taken over. Only regular
- * files count: a link, a pipe, a device, a folder or a file without the right to read it is answered as if there were
- * none, so that nobody follows it or waits for it. */
+ * files count: a link, pipe, device, folder or unreadable file counts as absent, so that no caller follows it or waits
+ * for it. */
 #ifndef SELVEDGE_BASE_FOREIGN_FILE_H
 #define SELVEDGE_BASE_FOREIGN_FILE_H
 

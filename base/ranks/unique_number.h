@@ -1,4 +1,4 @@
-/* Numbers that this process has not used before: by them one knows a thing again that others have a copy of. */
+/* Numbers that this process has not used before. They identify a thing of which other processes have copies. */
 #ifndef SELVEDGE_BASE_UNIQUE_NUMBER_H
 #define SELVEDGE_BASE_UNIQUE_NUMBER_H
 

@@ -12,10 +12,10 @@
 status volume_rescale(const struct volume *v, double edge, struct thread_pool *pool, const struct progress *progress,
                       struct volume *out, struct error *err);
 
-/* Makes `out` with the grid of v, whose voxels take the direction of the voxel of `from` that holds their centre (if
- * that is empty, of one whose centre they hold), and their density from v. A voxel is empty below eps_d, and where the
- * voxels of `from` are. *n_material: voxels of eps_d and more; *n_kept: voxels that are not empty. STATUS_CANCELLED,
- * and as volume_init_in. */
+/* Makes `out` with the grid and the densities of v. Each voxel takes the direction of the voxel of `from` that holds
+ * its centre; if this one is empty, the direction of a voxel of `from` whose centre it holds. A voxel is empty below
+ * eps_d, and where the voxels of `from` are. *n_material: voxels of eps_d and more; *n_kept: voxels that are not empty.
+ * STATUS_CANCELLED, and as volume_init_in. */
 status direction_volume_rescale(const struct direction_volume *from, const struct volume *v, double eps_d,
                                 struct thread_pool *pool, struct direction_volume *out, size_t *n_material,
                                 size_t *n_kept, struct error *err);

@@ -22,8 +22,8 @@ enum { VOLUME_CONTINUED_VOXELS = 32 };
 status volume_continue(const struct volume *v, struct volume *to, struct error *err);
 /* Empties the unknown voxels of directions that were found in the copy. */
 void volume_unknown_empty(const struct volume *v, struct direction_volume *d);
-/* Sets the unknown voxels of a copy to a density so far from all others that the fits of axes, whose losses are bounded
- * (axis_compare.c), give them no weight. */
+/* Sets the unknown voxels of a copy to a density far from all others. Fits of axes then give them no weight, because
+ * their losses are bounded (axis_compare.c). */
 #define VOLUME_IGNORED (-1e4f)
 void volume_unknown_ignore(const struct volume *v, struct volume *to);
 

@@ -31,7 +31,8 @@ struct weave_look {
     double mean_rgb[3], contrast[WEAVE_SCALES];
 };
 
-/* Of an rgb picture (height x width x 3, linear); contrast of the mean of the channels. Errors as weave_contrast. */
+/* Measures an rgb picture (height x width x 3, linear). Its contrast is the contrast of the mean of the channels.
+ * Errors as weave_contrast. */
 status weave_look_measure(const float *rgb, size_t width, size_t height, double period_px, struct weave_look *look,
                           struct error *err);
 

@@ -1,5 +1,5 @@
-/* Cloths and environments that all ranks of a team have. The root sends those that are new; both sides keep the last
- * SHARED_CLOTH_KEPT of them in the order of their use, so that the root knows what the helpers have. */
+/* Cloths and environments that all ranks of a team have. The root sends those that are new; both sides cache the
+ * SHARED_CLOTH_KEPT cloths that were used last, so that the root knows which cloths the helpers have. */
 #ifndef SELVEDGE_RENDERER_SHARED_CLOTH_H
 #define SELVEDGE_RENDERER_SHARED_CLOTH_H
 

@@ -20,8 +20,8 @@ struct dual_hit {
     size_t i_set;
 };
 
-/* The light that arrives at a hit from a direction: what the fibers in front let through, for each channel, and the
- * variance that they add to its angle with the fiber. Light that passes no fiber: 1, 0 and 0 fibers. */
+/* The light that arrives at a hit from a direction: the transmittance of the fibers in front for each channel, and the
+ * variance that these fibers add to the light's angle with the fiber. Light that passes no fiber: 1, 0 and 0 fibers. */
 struct dual_front {
     float transmitted[3], var_rad2;
     uint32_t n_fiber;

@@ -52,10 +52,11 @@ void speckle_factor(const struct speckle *s, uint32_t i_fiber, const float wi[3]
 void speckle_amplitude(const struct speckle *s, uint32_t i_fiber, uint32_t i_band, const float place[3],
                        float re_im[2]);
 
-/* Correlation of f at two places that are so many cells of band 0 apart across the fiber, in the mean over places and
- * directions. */
+/* Returns the correlation of f at two places across the fiber, as a mean over places and directions. distance: in cells
+ * of band 0. */
 double speckle_correlation(const float weight[SPECKLE_N_BAND], double distance);
-/* Correlation of A at two places, likewise, so many of its cells apart: 1 for 0, and 0 from 4.3 on. */
+/* Returns the correlation of A at two places: 1 at the distance 0, and 0 from 4.3 on. distance: in cells of the band.
+ */
 double speckle_band_correlation(double distance);
 
 #endif

@@ -1,15 +1,15 @@
-/* Which faces of fibers count for rays that start inside of fibers. Inside of struct scene.
+/* The faces of fibers that count for rays which start inside of fibers. Only the files of this folder include this
+ * header.
  *
  * A scattering event stands for the whole way through a fiber: a ray that goes on through the fiber skips the inside of
  * its surface (fabric thesis, section 2.4.2). A fiber is one closed tube, over its joints and over the faces of the
  * tile (scene_ends.h): the union of its segments. A round segment is the convex hull of the balls around its two ends
  * (scene_segment.h), an elliptical one the cylinder between its two planes (scene_ellipse.h). Fibers overlap a little
- * where they touch. So a ray meets the next front face of a tube, wherever that lies, and a tube that it starts in only
- * after it has come out. Faces of segments inside of their own tube are none. Rays that start outside never reach them.
+ * where they touch. So a ray meets the next front face of any tube, but the tube in which it starts only after it has
+ * left it. A face of a segment that lies inside of its own tube does not count; rays that start outside never reach it.
  *
- * A straight line so meets each tube once, however tubes overlap: those that are pressed into each other scatter as
- * often as those that touch.
- */
+ * So a straight line meets each tube once, however tubes overlap: tubes that are pressed into each other scatter as
+ * often as tubes that touch. */
 #ifndef SELVEDGE_RENDERER_SCENE_FACES_H
 #define SELVEDGE_RENDERER_SCENE_FACES_H
 

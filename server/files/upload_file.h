@@ -1,5 +1,5 @@
-/* The file of an upload: its two places in the job's folder, the space that it reserves, and the move from the one
- * place to the other. data: the data folder. */
+/* The file of an upload: its paths in the job's folder while it is incomplete and afterwards, the space that it
+ * reserves, and the move between these paths. data: the data folder. */
 #ifndef SELVEDGE_SERVER_UPLOAD_FILE_H
 #define SELVEDGE_SERVER_UPLOAD_FILE_H
 

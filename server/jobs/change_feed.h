@@ -1,5 +1,5 @@
-/* Wakes requests that wait for a change of a job or of the list of jobs. Each of them has a descriptor of its own, so a
- * change of a job wakes those that watch it or the list, and no others. All functions are thread-safe. */
+/* Wakes requests that wait for a change of a job or of the list of jobs. Each request waits on its own descriptor, so a
+ * change of a job wakes only the requests that watch this job or the list. All functions are thread-safe. */
 #ifndef SELVEDGE_SERVER_CHANGE_FEED_H
 #define SELVEDGE_SERVER_CHANGE_FEED_H
 

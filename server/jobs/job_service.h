@@ -19,8 +19,7 @@ struct backup_keeper;
 struct queue_forecast;
 struct lease_keeper;
 
-/* A lock that threads get in the order in which they ask for it, so that one which takes it again and again lets others
- * through. */
+/* A fair lock: threads get it in the order in which they ask for it. */
 struct job_turns {
     pthread_mutex_t lock;
     pthread_cond_t next_turn;

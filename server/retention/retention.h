@@ -24,7 +24,7 @@ struct retention_job {
 };
 
 struct retention_plan {
-    struct retention_job *job; /* those that would go, first the one that ended first */
+    struct retention_job *job; /* the jobs that would be removed, the one that ended first in front */
     size_t n;
     int64_t removed_bytes, total_bytes; /* of them, and of all jobs */
     int64_t n_kept;                     /* jobs that are kept */

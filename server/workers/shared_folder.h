@@ -11,9 +11,8 @@
  * STATUS_UNSUPPORTED names the operation that does not work. */
 status shared_folder_check(const char *folder, double *clock_lag_s, struct error *err);
 
-/* With a shared database: checks the folder, and that it is the one of this database, as the file store.id says; a
- * folder without jobs becomes so. With an embedded database: that the folder is not of a shared one. STATUS_CONFLICT.
- * */
+/* With a shared database: checks the folder, and that its file store.id names this database; a folder without jobs gets
+ * this file. With an embedded database: checks that the folder belongs to no shared one. STATUS_CONFLICT. */
 status shared_folder_admit(struct job_service *v, struct error *err);
 
 #endif

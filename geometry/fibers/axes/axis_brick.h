@@ -1,4 +1,4 @@
-/* The sums of axis_fit.h over one brick of the scan: what its voxels say about the lines near them. Lengths are in
+/* The sums of axis_fit.h over one brick of the scan: normal equations of the lines near its voxels. Lengths are in
  * voxels. */
 #ifndef SELVEDGE_GEOMETRY_AXIS_BRICK_H
 #define SELVEDGE_GEOMETRY_AXIS_BRICK_H

@@ -1,10 +1,10 @@
 /* Fits whole lines with sections of two axes (fiber_section.h), and removes lines that follow a part of another fiber.
  *
- * A flat fiber that was traced as round ones has a second line in the part that a disc does not cover, which looks like
- * a thin fiber beside a thick one. Where fibers turn out to be flat, lines that come nearer to a longer one than
- * touching fibers are suspects. The other lines are fitted once more without them: if the section of one then extends
- * over a suspect, both were the same fiber, and the suspect is removed. Otherwise it is a fiber of its own and stays,
- * because a section that covers a neighbour would also cover the void beside their contact. */
+ * Tracing takes fibers for round: a flat fiber gets a second line in the part that a disc does not cover, as if a thin
+ * fiber lay beside a thick one. Where fibers turn out to be flat, lines that come nearer to a longer one than touching
+ * fibers are suspects. The other lines are fitted once more without them: if the section of one then extends over a
+ * suspect, both were the same fiber, and the suspect is removed. Otherwise it is a fiber of its own and stays, because
+ * a section that covers a neighbour would also cover the void beside their contact. */
 #ifndef SELVEDGE_GEOMETRY_FLAT_FIT_H
 #define SELVEDGE_GEOMETRY_FLAT_FIT_H
 

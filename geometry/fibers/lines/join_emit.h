@@ -6,8 +6,8 @@
 
 #include <stdbool.h>
 
-/* Of every end: the one that it is joined to, UINT32_MAX for a free end; the vertices that are left out there. End 2 l
- * is the first vertex of line l, 2 l + 1 the last. */
+/* The joints of all ends. partner: the end to which an end is joined, UINT32_MAX for a free end; then the number of
+ * vertices that are left out there. End 2 l is the first vertex of line l, end 2 l + 1 the last. */
 struct join_partners {
     const uint32_t *partner;
     const uint8_t *trim;

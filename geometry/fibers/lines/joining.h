@@ -21,8 +21,8 @@ struct join_counts {
     size_t n_gap_bridged, n_joined; /* summed over calls, so they must start at zero */
 };
 
-/* touching: distance of the axes of two fibers that run beside each other, over the sum of their radii, below which
- * they are one; 0 while radii are not known well. pool NULL: one thread. */
+/* touching: two lines beside each other are one fiber if the distance of their axes, over the sum of their radii, is
+ * below this; 0 while radii are not known well. pool NULL: one thread. */
 struct duplicate_option {
     size_t n_voxel[3];
     double diameter_voxel, touching;

@@ -39,8 +39,8 @@ void seam_ends_release(struct seam_ends *s);
  * over 0.2 rad and of the difference of their radii over a fifth of them. */
 enum seam_cost { SEAM_BY_DISTANCE, SEAM_BY_SHAPE };
 
-/* Finds partners within `reach` radii, after the offsets of `field` (NULL: none) have been taken off, by the assignment
- * of least cost, where two ends that stay alone cost reach^2. STATUS_NO_MEMORY. */
+/* Finds partners within `reach` radii by the assignment of least cost; two ends without partners cost reach^2. The
+ * offsets of `field` (NULL: none) are subtracted first. STATUS_NO_MEMORY. */
 status seam_ends_match(struct seam_ends *s, enum seam_cost cost, double reach, const struct seam_field *field,
                        struct error *err);
 

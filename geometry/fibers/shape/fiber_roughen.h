@@ -2,9 +2,9 @@
  *
  * Waves of a few fixed lengths and random phases are added to each axis. Their spectrum equals the spectrum of the
  * reconstruction's error: k^2 / (1 + (k l)^4) for directions, l being the length over which the axes were smoothed, cut
- * off at k l = 3. The variance of the direction is exact in the mean over a long fiber. The error that fibers were
- * smoothed too little or too much changes a rendering in proportion to that variance, so this is the measure for both
- * (Cook and Stefanski 1994, "Simulation-extrapolation estimation in parametric measurement error models", section
+ * off at k l = 3. The variance of the direction is exact in the mean over a long fiber. Renderings change in proportion
+ * to the variance of the directions, whether fibers were smoothed too little or too much, so one measurement serves for
+ * both (Cook and Stefanski 1994, "Simulation-extrapolation estimation in parametric measurement error models", section
  * 2). */
 #ifndef SELVEDGE_GEOMETRY_FIBER_ROUGHEN_H
 #define SELVEDGE_GEOMETRY_FIBER_ROUGHEN_H

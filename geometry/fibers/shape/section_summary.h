@@ -17,8 +17,8 @@ struct section_summary {
     size_t n_varying; /* fibers whose radius varies along them */
     /* Widths of lumens over widths of the fibers, where the scan tells them; share of the length where it does. */
     double lumen_p10, lumen_median, lumen_p90, lumen_se_median, lumen_share;
-    /* Of the fibers whose radius varies: mean standard deviation of the radius along a fiber over its mean, and
-     * median error over that. */
+    /* variation: over the fibers whose radius varies, the mean of the radius' standard deviation along a fiber over its
+     * mean radius. variation_se_median: median standard error of this ratio. */
     double variation, variation_se_median;
 };
 

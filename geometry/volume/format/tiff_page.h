@@ -12,7 +12,7 @@ struct tiff_page {
     uint32_t width, height, depth; /* pixels; slices in the page (ImageDepth), of which the rest is one */
     enum sample_type sample;
     uint16_t bits, compression;  /* values of the tags, as libtiff names them */
-    uint16_t orientation;        /* likewise; 0: not stated, so it is the first page's, or none */
+    uint16_t orientation;        /* value of the tag; 0: not stated, the page has the first page's, or none */
     uint16_t n_sample;           /* of a pixel: channels, or a grey value and its alpha */
     bool has_alpha, is_separate; /* is_separate: every channel has strips or tiles of its own */
     bool is_preview;             /* of a page before it, in fewer pixels */

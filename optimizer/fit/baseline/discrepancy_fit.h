@@ -28,7 +28,7 @@ struct discrepancy_row {
 bool discrepancy_applies(const struct observation *o);
 /* The row of an observation that is rendered as rendered_rgb. */
 void discrepancy_row_of(const struct observation *o, const double rendered_rgb[3], struct discrepancy_row *row);
-/* Of more than DISCREPANCY_MAX_PLACE rows as many are used, evenly spaced. n = 0 or share 0: no discrepancy.
+/* Uses at most DISCREPANCY_MAX_PLACE rows, evenly spaced among the n rows. n = 0 or share 0: no discrepancy.
  * STATUS_NO_MEMORY. */
 status discrepancy_fit(const struct discrepancy_row *row, size_t n, double share, struct discrepancy *d,
                        struct error *err);

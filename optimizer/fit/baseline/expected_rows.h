@@ -25,7 +25,7 @@ enum { EXPECTED_ROWS = 24 };
 
 struct expected_rows {
     size_t n;     /* rows that were appended: EXPECTED_ROWS, or 0 */
-    double count; /* so many measured rows weigh as much as all of them together */
+    double count; /* number of measured rows that weigh as much as all expected rows together */
     double left_out_rgb[EXPECTED_ROWS][3 * FOLDS_MAX];
 };
 

@@ -40,8 +40,8 @@ struct fit_step {
     const double *param;    /* where the objective was estimated */
     const double *param_se; /* NULL when unknown */
     const struct estimate *replica[2];
-    /* Of the step that led here: its largest move and the limit that it had, both in step limits (coordinate.h), the
-     * decrease of the objective that it was predicted to bring, and the damping added to the diagonal. */
+    /* The step that led here: its largest move and the limit on it, both in units of coordinate.step_limit; the
+     * predicted decrease of the objective; and the damping added to the diagonal. */
     double step_length, step_limit, decrease, damping;
     double noise; /* mean Monte-Carlo variance of a residual of the pooled model */
     const char *note;

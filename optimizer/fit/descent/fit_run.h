@@ -5,8 +5,9 @@
  * golden ratio) over the inner 80 % of the bounds in fit coordinates, or over two standard deviations of a prior. Extra
  * starts of the option come after the problem's own and before the others. Each takes its share of the path budget when
  * one is given, and the method's default otherwise. A later start is kept instead of an earlier one when its objective
- * (with its prior penalty) is lower by more than two standard errors of the difference. An extra start, which is the
- * result of another fit, is kept when its objective is lower at all, so that the fit does not end worse than the other.
+ * (with its prior penalty) is lower by more than two standard errors of the difference. An extra start is the result of
+ * another fit. It is kept if its objective is lower by any amount, so that this fit does not end worse than the other
+ * one.
  *
  * A fit is deterministic, as its method is: it asks for the same estimates in the same order. With a journal as
  * estimator (estimate_journal.h), a fit with any option resumes bit by bit. */

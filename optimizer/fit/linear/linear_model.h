@@ -1,18 +1,17 @@
-/* The linear model of the residuals near one point, pooled from all estimates of a fit so far:
- * R(x) ~ R + J (x - x_ref), for two independent replicas.
+/* The linear model of the residuals near one point, pooled from all estimates of a fit so far: R(x) ~ R + J (x -
+ * x_ref), for two independent replicas.
  *
- * Every estimate of every iteration is kept (linear_history). For a reference point each of them is carried there by
- * derivatives taken half way, which are averages over all steps in which those near the middle count most; that is
- * exact to second order. The carried estimates are averaged with weights 1 / (noise^2 + bend^2). The noise follows
- * from the number of paths and the configuration's pooled variance per path, not from the estimate's own variance,
- * which is correlated with its value; and from the noise of the derivatives on the way, which r_var contains too. The
- * bend follows from the cube of the predicted change of the residuals between the two points, and from the changes by
- * single parameters: along a valley these changes cancel, but their bends do not. So early, cheap iterations fade out
- * and the last ones add up, which is the averaging over the last steps.
+ * Every estimate of every iteration is kept (linear_history). To pool them at a reference point, each estimate is
+ * carried there by derivatives at half the way, which is exact to second order. These derivatives are averages over all
+ * steps, with the largest weights near the middle. The carried estimates are averaged with weights 1 / (noise^2 +
+ * bend^2). The noise follows from the number of paths and the configuration's pooled variance per path, not from the
+ * estimate's own variance, which is correlated with its value; and from the noise of the derivatives on the way, which
+ * r_var contains too. The bend follows from the cube of the predicted change of the residuals between the two points,
+ * and from the changes by single parameters: along a valley these changes cancel, but their bends do not. So early,
+ * cheap iterations fade out and the last ones add up, which is the averaging over the last steps.
  *
  * Residuals are in units of the objective: r = sqrt(w_i) (R_ic - M_ic) in row 3 i + c. Columns are the fit coordinates
- * of all parameters. Ownership: init/release. Not thread-safe.
- */
+ * of all parameters. Ownership: init/release. Not thread-safe. */
 #ifndef SELVEDGE_OPTIMIZER_LINEAR_MODEL_H
 #define SELVEDGE_OPTIMIZER_LINEAR_MODEL_H
 

@@ -3,10 +3,10 @@
  * A few evenly spaced evaluations bracket it; the others go where they say most about its place: near the vertex of a
  * polynomial fitted to all (of degree 4, or 3 or 2 where there are too few points or its minimum is not sure: a
  * lopsided minimum would be shifted by less), and so far to its sides that the rise stands out of the noise. Weighted
- * least squares; a point may be off the polynomial by its own error and by 20 % of its rise over the lowest one, so
- * that far points count little and near ones by their own error. The vertex gets the error that follows from the
- * points' errors, larger by the square root of chi^2 per degree of freedom where the points scatter more than that. A
- * function of the values it is given: the same values, the same search. */
+ * least squares; a point may differ from the polynomial by its own error and by 20 % of its rise over the lowest point.
+ * So far points have little weight, and near points a weight by their own error. The vertex gets the error that follows
+ * from the points' errors, larger by the square root of chi^2 per degree of freedom where the points scatter more than
+ * that. A function of the values it is given: the same values, the same search. */
 #ifndef SELVEDGE_OPTIMIZER_NOISY_MINIMUM_H
 #define SELVEDGE_OPTIMIZER_NOISY_MINIMUM_H
 

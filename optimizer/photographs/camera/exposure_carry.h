@@ -1,9 +1,9 @@
 /* Ratios of exposures that have no light in common, from other views of the job.
  *
- * A shutter repeats a time better than it keeps the stated one. Where the longer exposure of a view is saturated, or
- * the shorter one black, so that they cannot be compared (exposure_pair.h), the ratio of two exposures of the same
- * stated times, ISO value and f-number in other views stands for theirs. Its variance is the error of the mean over
- * these views plus the scatter from view to view, which is measured, with a prior of 1 %. */
+ * A shutter repeats a time better than it keeps the stated one. Two exposures of a view cannot be compared if the
+ * longer one is saturated or the shorter one black (exposure_pair.h). Their ratio is then taken from exposures of the
+ * same stated times, ISO value and f-number in other views. Its variance is the error of the mean over these views plus
+ * the scatter from view to view, which is measured, with a prior of 1 %. */
 #ifndef SELVEDGE_OPTIMIZER_EXPOSURE_CARRY_H
 #define SELVEDGE_OPTIMIZER_EXPOSURE_CARRY_H
 

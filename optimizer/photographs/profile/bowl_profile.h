@@ -8,7 +8,7 @@
  * each pixel (bowl_place.h), and the samples become cells (bowl_cells.h). Radiances have no absolute scale: the fit has
  * one.
  *
- * Places that the mask hides, and those that are saturated, count as if they had the mean of the others. */
+ * Masked and saturated places count with the mean of all other places. */
 #ifndef SELVEDGE_OPTIMIZER_BOWL_PROFILE_H
 #define SELVEDGE_OPTIMIZER_BOWL_PROFILE_H
 

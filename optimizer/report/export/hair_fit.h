@@ -7,8 +7,8 @@
 
 enum { HAIR_FIT_N_BLEND = 2 };
 
-/* Two hair materials. A point of a fiber has the second one with the probability second_share, because one material has
- * one roughness for the light that is reflected and for the light that goes through. */
+/* Two hair materials. A point of a fiber has the second material with the probability second_share. Two are needed
+ * because a material has a single roughness for reflected and transmitted light. */
 struct hair_blend {
     struct hair_lobes lobes[HAIR_FIT_N_BLEND];
     double second_share;

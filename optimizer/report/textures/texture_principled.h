@@ -1,8 +1,8 @@
 /* The surface of a texture set as the principled material of U3M has it: Burley 2012, "Physically Based Shading at
  * Disney", with the exact Fresnel reflection of a dielectric (Burley 2015), as Mitsuba 3 computes it: a diffuse base
- * that is brighter where light grazes, sheen, and microfacets that are rougher across the fibers. The base keeps its
- * brightness under the highlight, other than OpenPBR's, so it has a map of its own. The other maps are OpenPBR's, with
- * factors. */
+ * that is brighter where light grazes, sheen, and microfacets that are rougher across the fibers. Unlike the base of
+ * OpenPBR, this base keeps its brightness under the highlight, so it has its own map. The other maps are OpenPBR's,
+ * with factors. */
 #ifndef SELVEDGE_OPTIMIZER_TEXTURE_PRINCIPLED_H
 #define SELVEDGE_OPTIMIZER_TEXTURE_PRINCIPLED_H
 

@@ -2,13 +2,14 @@
  * speed of this job so far.
  *
  * Before it runs, a stage is expected to take units x seconds per unit, times a factor by which those finished stages
- * of this job were slower than expected whose time hardly varies between jobs. While it runs, that is combined with its
- * elapsed time over the share of its time that has passed at its fraction, each weighted by its uncertainty (logarithms
- * of times are taken to be normal). A stage that predicts its own end (a fit) has a fraction that runs evenly with
- * time, except for the errors of such predictions in earlier jobs; its time says nothing about the speed of other
- * stages. The stated fraction of the job is elapsed time over elapsed and remaining time; it never falls, and it rises
- * by at most JOB_CLOCK_STEP between two looks and in a second; where a job is short, in a second also by twice the even
- * rate. Times are of the monotonic clock, in seconds. Not thread-safe. */
+ * of this job were slower than expected whose time hardly varies between jobs. While a stage runs, a second prediction
+ * is its elapsed time divided by the share of the time that usually has passed at its fraction. Both predictions are
+ * combined, each weighted by its uncertainty (logarithms of times are taken to be normal). A stage that predicts its
+ * own end (a fit) has a fraction that runs evenly with time, except for the errors of such predictions in earlier jobs;
+ * its time says nothing about the speed of other stages. The stated fraction of the job is elapsed time over elapsed
+ * and remaining time; it never falls, and it rises by at most JOB_CLOCK_STEP between two looks and in a second; where a
+ * job is short, in a second also by twice the even rate. Times are of the monotonic clock, in seconds. Not thread-safe.
+ */
 #ifndef SELVEDGE_OPTIMIZER_JOB_CLOCK_H
 #define SELVEDGE_OPTIMIZER_JOB_CLOCK_H
 

@@ -1,9 +1,8 @@
-/* A journal of the finished parts of a precomputation, in a file to which they are appended, so that an interrupted
- * one goes on there and ends with the same bits. The file begins with the number of the request; records that are
- * incomplete or damaged end it.
+/* A journal file to which the finished parts of a precomputation are appended. An interrupted precomputation continues
+ * from it and ends with the same bits. The file begins with the number of the request; records that are incomplete or
+ * damaged end it.
  *
- * A part of the work fills arrays row by row, and rows are finished in order, some at a time.
- */
+ * A part of the work fills arrays row by row, and rows are finished in order, some at a time. */
 #ifndef SELVEDGE_RENDERER_PRECOMPUTE_JOURNAL_H
 #define SELVEDGE_RENDERER_PRECOMPUTE_JOURNAL_H
 

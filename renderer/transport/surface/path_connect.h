@@ -87,7 +87,8 @@ static float connect_point(struct walk *w, const struct seen_lamp *seen, const f
 
 /* Next-event estimation from a bounce to a random point of the lamp and, if a narrow lobe meets the lamp, to one of the
  * strip that it sees. weight: multiple-importance weight of these connections, in [0, 1]. Sets the strip if the walk
- * has strips. Returns the incident light of the former as stored in path_step.light, or 0 if it is occluded. */
+ * has strips. Returns the incident light from the random point, as stored in path_step.light, or 0 if the point is
+ * occluded. */
 static float path_connect_lamp(struct walk *w, const struct lamp *lamp, float weight, const struct bounce *b,
                                struct lamp_strip *strip, float wi[3])
 {

@@ -29,9 +29,9 @@ struct path_setting {
     bool hides_below;                   /* scene_sheet_hides all directions downwards */
     bool shows_width;     /* the scene has the sections of the fibers as surfaces, and the model states their widths */
     float roulette_below; /* throughput under which paths are ended at random; 0: never */
-    /* Ends paths at their n_traced-th hit (0: nowhere): what that scatters of light that nothing scattered before is
-     * added as ever, and of the other light what finish knows: rgb, radiance along the ray reversed. Values only: no
-     * derivatives, one lamp. */
+    /* n_traced > 0 ends paths at their n_traced-th hit. Light that arrives there directly from lamps is added as usual;
+     * for all other light `finish` returns the radiance in rgb that goes back along the ray. Only for one lamp without
+     * derivatives. */
     uint32_t n_traced;
     void (*finish)(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,
                    float rgb[3]);

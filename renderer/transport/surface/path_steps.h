@@ -1,6 +1,5 @@
 /* A walk from bounce to bounce. This file is compiled twice: for all settings (path_tracer.c), and with PATH_PLAIN 1
- * for those that path_setting_choose calls plain (path_plain.c), so that nobody asks at their hits for what they lack.
- */
+ * for plain settings (path_setting.plain; path_plain.c), whose walks then contain no tests for rare parts. */
 #ifndef SELVEDGE_RENDERER_PATH_STEPS_H
 #define SELVEDGE_RENDERER_PATH_STEPS_H
 

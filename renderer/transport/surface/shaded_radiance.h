@@ -10,12 +10,12 @@
 struct shaded_method {
     const char *name; /* as in "cannot render by <name>" */
     size_t setting_bytes;
-    /* What the method asks of the input besides a scattering model without a frame of its own, no derivatives, no
-     * discrepancy and no speckle. */
+    /* Checks further requirements of the method. The input has already been checked for a scattering model without its
+     * own frame, no derivatives, no discrepancy and no speckle. */
     status (*check)(const struct radiance_input *in, struct error *err);
     /* Fills in the rest of a setting, which is all 0 after its path_setting. STATUS_NO_MEMORY. */
     status (*init)(void *setting, const struct radiance_input *in, struct error *err);
-    /* Of a setting whose init was called, also if that failed; NULL: there is nothing to release. */
+    /* Releases a setting whose init was called, even if init failed. NULL: there is nothing to release. */
     void (*release)(void *setting);
     /* Adds the radiance along a ray of camera_ray to `radiance`. Changes the ray. Returns the number of bounces. */
     uint32_t (*shade)(const void *setting, struct scene_ray *ray, struct rng *rng, float radiance[3]);

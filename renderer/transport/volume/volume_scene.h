@@ -4,11 +4,10 @@
  * Frame: the cloth frame in millimetres, z shifted so that the top of the highest layer that holds anything is z = 0
  * (as with fibers, up to a voxel). Inside, positions are in voxels. Immutable: shared by threads.
  *
- * Storage, made for reads in random order: bricks of 4^3 voxels, a voxel in 4 bytes (8 bits of density,
- * a direction of 12 + 12 bits, right within 0.035 degrees), a brick in 4 cache lines. Bricks that hold
- * nothing are not stored; the brick table has the distance to the nearest brick that holds something in their place, so
- * that rays skip them. The direction volume (5 bytes a voxel) is not needed afterwards.
- */
+ * Storage, made for reads in random order: bricks of 4^3 voxels, a voxel in 4 bytes (8 bits of density, a direction of
+ * 12 + 12 bits, right within 0.035 degrees), a brick in 4 cache lines. Bricks that hold nothing are not stored; in
+ * place of an empty brick the table has the distance to the nearest brick with material, so that rays skip empty
+ * bricks. The direction volume (5 bytes a voxel) is not needed afterwards. */
 #ifndef SELVEDGE_RENDERER_VOLUME_SCENE_H
 #define SELVEDGE_RENDERER_VOLUME_SCENE_H
 

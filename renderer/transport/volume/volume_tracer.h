@@ -92,8 +92,8 @@ struct volume_record {
 void volume_trace(const struct volume_setting *s, struct volume_ray *ray, struct rng *rng, struct volume_result *out,
                   struct volume_record *record);
 
-/* Traces n paths, 16 of them in turns, so that one computes while the others wait for memory. Each has a ray and random
- * numbers of its own, which are not changed, and the result that volume_trace gives. */
+/* Traces n paths, 16 at a time in turns, so that one path computes while others wait for memory. Each has a ray and
+ * random numbers of its own, which are not changed, and the result that volume_trace gives. */
 void volume_trace_many(const struct volume_setting *s, size_t n, struct volume_ray *ray, struct rng *rng,
                        struct volume_result *out);
 
