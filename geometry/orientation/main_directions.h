@@ -4,8 +4,9 @@
  * material. The histogram of their angle within the plane of x and y, smoothed by 8 degrees, has its highest peak at
  * one system of yarns, and its next highest at least 30 degrees away at the other. Crimp leans out of the plane and so
  * does not split a peak. The direction of each system is the mean of the voxels' directions that are nearer to it than
- * to the other system, and within 50 degrees of it in the plane. Directions get equal signs first. The mean is the net course
- * of the fibers, in which crimp and twist cancel. The assignment and the mean are repeated until they no longer change.
+ * to the other system, and within 50 degrees of it in the plane. Directions get equal signs first. The mean is the net
+ * course of the fibers, in which crimp and twist cancel. The assignment and the mean are repeated until they no longer
+ * change.
  *
  * Only bricks of some 30 voxels are read at a time, so the volume may be larger than memory. Results do not depend on
  * the number of threads. */
