@@ -1,5 +1,6 @@
 #include "renderer/image/image_exr.h"
 
+#include "base/files/durable.h"
 #include "base/files/reading_note.h"
 
 #include <OpenEXR/openexr.h>
@@ -163,7 +164,7 @@ static int letter_index(const struct reader *rd, const char *name)
 
 static status refuse(const struct reader *rd, struct error *err, const char *why)
 {
-    return error_set(err, STATUS_FORMAT, "cannot read image '%s': %s", rd->path, why);
+    return error_set(err, STATUS_FORMAT, "cannot read image '%s': %s", path_file_name(rd->path), why);
 }
 
 static bool has_channel(const exr_attr_chlist_t *list, const char *name)
@@ -196,8 +197,8 @@ static status check_channels(struct reader *rd, struct error *err)
     if (!rd->grey) return STATUS_OK;
     for (int c = 0; c < 3; c++)
         if (!have[c])
-            return error_set(err, STATUS_FORMAT, "cannot read image '%s': channel '%s%c' is missing", rd->path,
-                             rd->prefix, channel_letter[c]);
+            return error_set(err, STATUS_FORMAT, "cannot read image '%s': channel '%s%c' is missing",
+                             path_file_name(rd->path), rd->prefix, channel_letter[c]);
     return refuse(rd, err, "channels are missing");
 }
 
@@ -213,14 +214,14 @@ static status read_header(struct reader *rd, size_t limit_pixel, struct error *e
     if (width <= 0 || height <= 0) return refuse(rd, err, "it is empty");
     if (width > INT32_MAX / 16 || height > INT32_MAX / 16 || (uint64_t)width * (uint64_t)height > limit_pixel)
         return error_set(err, STATUS_TOO_LARGE, "cannot read image '%s': %lld x %lld pixels, at most %zu are allowed",
-                         rd->path, (long long)width, (long long)height, limit_pixel);
+                         path_file_name(rd->path), (long long)width, (long long)height, limit_pixel);
     /* a small file that promises a huge picture: no compression makes a photograph 4096 pixels a byte */
     struct stat file;
-    if (stat(rd->path, &file) != 0) return error_set_errno(err, "cannot read image '%s'", rd->path);
+    if (stat(rd->path, &file) != 0) return error_set_errno(err, "cannot read image '%s'", path_file_name(rd->path));
     if ((uint64_t)width * (uint64_t)height / 4096 > (uint64_t)file.st_size)
         return error_set(err, STATUS_FORMAT,
                          "cannot read image '%s': its header promises %lld x %lld pixels, the file has %lld bytes",
-                         rd->path, (long long)width, (long long)height, (long long)file.st_size);
+                         path_file_name(rd->path), (long long)width, (long long)height, (long long)file.st_size);
     rd->width = (int32_t)width;
     rd->height = (int32_t)height;
     rd->min_y = w.min.y;
@@ -327,7 +328,7 @@ static status read_channels(struct image *im, const char *path, const char *pref
     struct reader rd = {.im = im, .path = path, .prefix = prefix};
     memset(im, 0, sizeof *im);
     exr_context_initializer_t init = initializer(&rd.note);
-    if (access(path, R_OK) != 0) return error_set_errno(err, "cannot read image '%s'", path);
+    if (access(path, R_OK) != 0) return error_set_errno(err, "cannot read image '%s'", path_file_name(path));
     reading_note_set("OpenEXR", path);
     exr_result_t r = exr_start_read(&rd.file, path, &init);
     if (r != EXR_ERR_SUCCESS) {
@@ -358,7 +359,8 @@ status image_read_exr(struct image *im, const char *path, size_t limit_pixel, st
     if (st != STATUS_OK || !said.has_primaries) return st;
     if (!color_primaries_matrix(&said.primaries, matrix)) {
         image_release(im);
-        return error_set(err, STATUS_FORMAT, "cannot read image '%s': its chromaticities are no primaries", path);
+        return error_set(err, STATUS_FORMAT, "cannot read image '%s': its chromaticities are no primaries",
+                         path_file_name(path));
     }
     if (!color_matrix_is_identity(matrix)) image_apply_matrix(im, matrix);
     return STATUS_OK;

@@ -1,8 +1,12 @@
 #include "server/workers/console.h"
 
+#include "base/utf8.h"
+
 #include <errno.h>
 #include <fcntl.h>
+#include <stdbool.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/stat.h>
 #include <sys/types.h>
 #include <unistd.h>
@@ -46,10 +50,15 @@ void console_tail(const char *path, char *out, size_t n_out)
     if (fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode)) n = read_end(fd, st.st_size, last, sizeof last);
     if (fd >= 0) close(fd);
     while (n > 0 && (last[n - 1] == '\n' || last[n - 1] == ' ')) n--;
-    size_t keep = n < n_out - 1 ? n : n_out - 1;
-    for (size_t i = 0; i < keep; i++) {
-        unsigned char c = (unsigned char)last[n - keep + i];
-        out[i] = (char)(c < 32 || c > 126 ? ' ' : c);
+    size_t first = n < n_out - 1 ? 0 : n - (n_out - 1);
+    while (first < n && ((unsigned char)last[first] & 0xc0) == 0x80) first++; /* of a character that was cut */
+    for (size_t i = first; i < n; i++) {
+        const unsigned char c = (unsigned char)last[i], next = i + 1 < n ? (unsigned char)last[i + 1] : 0;
+        const bool c1 = c == 0xc2 && next >= 0x80 && next < 0xa0; /* control characters of 8 bits */
+        if (c < 32 || c == 127 || c1) last[i] = ' ';
+        if (c1) last[i + 1] = ' ';
     }
-    out[keep] = '\0';
+    memcpy(out, last + first, n - first);
+    out[n - first] = '\0';
+    utf8_repair(out);
 }
