@@ -1,4 +1,6 @@
 #include "clients/cli/commands/cli_job_files.h"
+#include "base/files/alike_name.h"
+#include "base/files/durable.h"
 #include "base/natural_order.h"
 #include "clients/cli/text/cli_text.h"
 
@@ -186,6 +188,19 @@ void cli_job_files_release(struct cli_file_list *list)
     *list = (struct cli_file_list){0};
 }
 
+static status cannot_open(const char *path, struct error *err)
+{
+    char folder[4096], hint[400];
+    if (errno != ENOENT) return error_set_errno(err, "cannot open input file '%s'", path);
+    const char *name = path_file_name(path);
+    snprintf(folder, sizeof folder, "%.*s", name > path ? (int)(name - path) : 1, name > path ? path : ".");
+    alike_name_hint(folder, name, hint, sizeof hint);
+    return error_set(err, STATUS_NOT_FOUND,
+                     "input file '%s' does not exist, which the job document names%s; `selvedge check` lists all that "
+                     "is wrong",
+                     path, hint);
+}
+
 status cli_file_hash(struct cli_file *file, bool (*changed)(void *context, uint64_t n_done), void *context,
                      struct error *err)
 {
@@ -198,12 +213,7 @@ status cli_file_hash(struct cli_file *file, bool (*changed)(void *context, uint6
     file->n_bytes = 0;
     int fd = cli_file_open(file);
     if (fd < 0) {
-        s = errno == ENOENT
-                ? error_set(err, STATUS_NOT_FOUND,
-                            "input file '%s' does not exist, which the job document names; `selvedge check` "
-                            "lists all that is wrong",
-                            file->path)
-                : error_set_errno(err, "cannot open input file '%s'", file->path);
+        s = cannot_open(file->path, err);
         goto out;
     }
     if (fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) {

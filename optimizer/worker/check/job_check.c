@@ -1,4 +1,5 @@
 #include "optimizer/worker/check/job_check.h"
+#include "base/files/alike_name.h"
 #include "base/files/durable.h"
 #include "optimizer/job/checks/job_faults.h"
 #include "optimizer/job/job_folder.h"
@@ -19,10 +20,12 @@ static void look_for(void *context, const char *name, const char *role)
     input_check_path(c, name, path);
     c->n_file++;
     if (name[0] == '\0') return; /* a fault of the document */
-    if (stat(path, &file) != 0)
-        error_set_field(&fault, STATUS_NOT_FOUND, name, "input file '%s' (%s) does not exist in '%s'", name, role,
-                        c->folder);
-    else if (!S_ISREG(file.st_mode))
+    if (stat(path, &file) != 0) {
+        char hint[400];
+        alike_name_hint(c->folder, name, hint, sizeof hint);
+        error_set_field(&fault, STATUS_NOT_FOUND, name, "input file '%s' (%s) does not exist in '%s'%s", name, role,
+                        c->folder, hint);
+    } else if (!S_ISREG(file.st_mode))
         error_set_field(&fault, STATUS_INVALID, name, "input '%s' (%s) is not a regular file", name, role);
     else if (file.st_size == 0)
         error_set_field(&fault, STATUS_INVALID, name, "input file '%s' (%s) is empty", name, role);

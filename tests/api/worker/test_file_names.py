@@ -3,6 +3,7 @@ import json
 import os
 import subprocess
 import sys
+import unicodedata
 
 import pytest
 from daemon_under_test import program
@@ -48,6 +49,21 @@ def test_check_names_files_as_their_user_does(tmp_path):
     (tmp_path / "größe & 'a'.tif").write_bytes(b"II*\0damaged")
     done = subprocess.run([program("selvedge"), "check", str(tmp_path / "job.json")], capture_output=True, text=True, check=False)
     assert done.returncode == 1 and "'größe & 'a'.tif'" in done.stdout
+
+
+def test_a_name_in_decomposed_letters_is_named(real, tmp_path):
+    """macOS writes an umlaut as a letter and a mark."""
+    composed, decomposed = (unicodedata.normalize(form, "Größe.tif") for form in ("NFC", "NFD"))
+    (tmp_path / decomposed).write_bytes(grey_tiff(6, 5, lambda x, y: x))
+    (tmp_path / "Grüße.tif").write_bytes(b"another")
+    (tmp_path / "job.json").write_text(json.dumps({"sample": "s", "volume": {"files": [composed], "voxel_size_um": 2}}))
+    done = subprocess.run([program("selvedge"), "check", str(tmp_path / "job.json")], capture_output=True, text=True, check=False)
+    assert done.returncode == 1 and f"the folder has '{decomposed}', which looks the same and has other bytes" in done.stdout
+    done = run(real, "submit", tmp_path / "job.json")
+    assert done.returncode == 1 and f"the folder has '{decomposed}', which looks the same" in done.stderr
+    (tmp_path / decomposed).unlink()
+    done = run(real, "submit", tmp_path / "job.json")
+    assert done.returncode == 1 and "does not exist" in done.stderr and "looks the same" not in done.stderr
 
 
 @pytest.mark.parametrize("name", ["a\\\\b.tif", ".a.tif", "a/b.tif", "a\\u0007.tif", "\\u0085.tif", "ä" * 64 + ".tif"])
