@@ -1,11 +1,10 @@
 /* Tells lumens from the gaps between fibers among the basins that were filled (lumen_fill.h), and fills lumens whole.
  *
  * A filled lumen is the middle of a fiber, and a filled gap is not: there the scale-normalised Laplacian of the filled
- * scan at the scale of the fibers (Lindeberg 1998) has a ridge and a saddle. A single voxel does not tell in the noise
- * and among neighbours, but the mean over a whole basin does, which is a tube as long as its fiber stays inside of the
- * scan. Basins with too small a mean are emptied. That is done twice, because filled gaps lower the response of the
- * lumens beside them. The walls next to the lumens that are left are filled by one voxel, because the rim of a lumen is
- * shallower than its basin has to be. */
+ * scan at the scale of the fibers (Lindeberg 1998) has a ridge and a saddle. Noise and neighbours hide this at a single
+ * voxel, but the mean over a whole basin shows it: a basin is as long as its fiber within the scan. Basins with too
+ * small a mean are emptied. That is done twice, because filled gaps lower the response of the lumens beside them. The
+ * remaining lumens are then enlarged by one voxel, because at the rim a lumen is too shallow to count as a basin. */
 #ifndef SELVEDGE_GEOMETRY_LUMEN_FILTER_H
 #define SELVEDGE_GEOMETRY_LUMEN_FILTER_H
 

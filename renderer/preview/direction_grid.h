@@ -25,7 +25,8 @@ static inline void direction_grid_square(const double d[3], double square[2])
     square[1] = 0.5 + 0.5 * (d[0] - d[1]) / sum;
 }
 
-/* The four cells around a direction and their bilinear weights; beyond the middles of the outermost cells, those. */
+/* Writes the four cells around a direction and their bilinear weights. Beyond the middle of an outermost cell this cell
+ * has all the weight. */
 static inline void direction_grid_cells(const double d[3], size_t edge, size_t cell[4], double weight[4])
 {
     double square[2], part[2];

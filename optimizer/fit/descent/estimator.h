@@ -20,12 +20,12 @@ enum estimator_replica {
     REPLICA_CANDIDATE_B = 8
 };
 
-/* Estimates of the next replica at the same parameters, which will be asked for next. An estimator whose work several
- * processes share may make them at the same time, because more tasks at once keep all of them busy. */
+/* The next call, announced in advance: the next replica at the same parameters. An estimator whose work several
+ * processes share may make both replicas at the same time, because more tasks keep all processes busy. */
 struct estimator_pair {
     struct estimate *next;       /* room for n_configuration */
-    bool ready;                  /* they are there: a call with `out` = next, for these two numbers, keeps them */
-    uint32_t iteration, replica; /* of them */
+    bool ready;                  /* `next` is filled in; the call for its numbers with `out` = next then does nothing */
+    uint32_t iteration, replica; /* the numbers of `next` */
 };
 
 struct estimator_call {

@@ -24,8 +24,9 @@ status pipeline_measure_skill(struct report *report, struct error *err);
 
 /* ---- rows in another order of the cloth's rotation than the job states ---- */
 
-/* Warns when the measurements of every lamp and camera, in reverse order of their rotations or moved on by one or one
- * back, differ from each other much more as the best model's renderings do. After validation. STATUS_NO_MEMORY. */
+/* Tries other orders of the cloth's rotations: reversed, and shifted by one forwards or backwards, for every lamp and
+ * camera. Warns when the measurements in another order agree with the renderings of the best model much better than in
+ * the stated order. After validation. STATUS_NO_MEMORY. */
 status pipeline_warn_pairing(struct report *report, struct error *err);
 
 /* ---- verdict (verdict.h) ---- */

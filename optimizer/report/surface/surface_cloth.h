@@ -15,15 +15,15 @@ struct surface_input {
     const struct made_cloth *made;
 };
 
-/* As the model sees it: one of both. */
+/* The cloth on a surface: `fibers` for surface models, `volume` for volume models. The other member is unused. */
 struct surface_cloth {
     struct scene *fibers;
     struct volume_scene volume;
 };
 
-/* The cloth of a scene of fibers, or without one (NULL) of on->made->volume_scene, as picture i shows it; these must
- * outlive it. STATUS_FORMAT and STATUS_INVALID (field: option id), naming the picture: a mesh that cannot be used or
- * that bends too tightly. STATUS_NO_MEMORY. Release in any case. */
+/* Lays the cloth on the surface of picture i: the scene `fibers`, or on->made->volume_scene if `fibers` is NULL. This
+ * scene must outlive the result. STATUS_FORMAT and STATUS_INVALID (field: option id), naming the picture: a mesh that
+ * cannot be used or that bends too tightly. STATUS_NO_MEMORY. Release in any case. */
 status surface_cloth_init(const struct surface_input *on, size_t i, const struct scene *fibers,
                           struct surface_cloth *cloth, struct error *err);
 void surface_cloth_release(struct surface_cloth *cloth);
