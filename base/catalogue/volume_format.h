@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-enum { VOLUME_MAX_ENDING = 3, VOLUME_MAX_KEY = 2 };
+enum { VOLUME_MAX_ENDING = 4, VOLUME_MAX_KEY = 2 };
 
 struct volume_format {
     const char *ending[VOLUME_MAX_ENDING]; /* in lower case; NULL after the last one */
@@ -14,6 +14,7 @@ struct volume_format {
     const char *header_ending;
     char separator;
     const char *data_key[VOLUME_MAX_KEY];
+    const char *data_ending; /* the data file has the name of the header but for this ending; NULL: a line names it */
 };
 
 /* "TIFF, .mhd, .mha, ...": all formats, for messages and help. */

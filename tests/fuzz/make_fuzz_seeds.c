@@ -67,6 +67,34 @@ static void volume_seeds(void)
     direction_volume_release(&d);
 }
 
+/* Arrays of NumPy, and NIfTI-1 with a sform. */
+static void array_seeds(const uint8_t data[120])
+{
+    static const char text[] = "{'descr': '<u2', 'fortran_order': False, 'shape': (4, 3, 5), }         \n",
+                      turned[] = "{'descr': '|u1', 'fortran_order': True, 'shape': (4, 5, 6), }         \n";
+    uint8_t file[10 + sizeof text + 120] = "\x93NUMPY\1", nifti[352 + 120] = {0x5c, 1};
+    const float pixdim[4] = {1, 2, 2, 2}, offset = 352, scale[2] = {2, 1}, srow[12] = {2, 0, 0, 0, 0, 0, 2, 0, 0, 2};
+    const int16_t size[5] = {4, 6, 5, 4, 1}, type = 2, form = 1;
+    for (int k = 0; k < 2; k++) {
+        const size_t n = k == 0 ? sizeof text - 1 : sizeof turned - 1;
+        file[8] = (uint8_t)n;
+        memcpy(file + 10, k == 0 ? text : turned, n);
+        memcpy(file + 10 + n, data, 120);
+        put("npy", k == 0 ? "u16.npy" : "u8-fortran.npy", "", file, 10 + n + 120);
+    }
+    memcpy(nifti + 40, size, sizeof size);
+    memcpy(nifti + 70, &type, sizeof type);
+    memcpy(nifti + 76, pixdim, sizeof pixdim);
+    memcpy(nifti + 108, &offset, sizeof offset);
+    memcpy(nifti + 112, scale, sizeof scale);
+    nifti[123] = 3;
+    memcpy(nifti + 254, &form, sizeof form);
+    memcpy(nifti + 280, srow, sizeof srow);
+    memcpy(nifti + 344, "n+1", 4);
+    memcpy(nifti + 352, data, 120);
+    put("nifti", "u8.nii", "", nifti, sizeof nifti);
+}
+
 static void header_seeds(void)
 {
     uint8_t data[120], packed[256];
@@ -91,6 +119,7 @@ static void header_seeds(void)
         "NRRD0004\ntype: ushort\ndimension: 3\nsizes: 5 4 2\nendian: little\nencoding: gzip\nbyte skip: 40\nline skip: "
         "1\n\nline\n",
         packed, n_packed);
+    array_seeds(data);
     put("raw", "u8", "\x06\x05\x04", "\0\0\0", 3);
     uint8_t raw[126] = {5, 4, 3, 1, 2, 0};
     memcpy(raw + 6, data, 120);

@@ -3,8 +3,10 @@
 #include "base/natural_order.h"
 #include "clients/cli/commands/cli.h"
 
+#include <ctype.h>
 #include <dirent.h>
 #include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -76,6 +78,20 @@ static status add_data_file(const char *path, const struct volume_format *format
     return found ? STATUS_OK : error_set(err, STATUS_FORMAT, "the scan '%s' does not name its data file", path);
 }
 
+/* Adds the data file that has the name of its header and another ending, in capital letters like the header's. */
+static status add_data_beside(const char *path, const struct volume_format *format, json_t *files, struct error *err)
+{
+    const char *name = name_of(path);
+    const size_t stem = strlen(name) - strlen(format->header_ending);
+    const bool capital = isupper((unsigned char)name[stem + 1]);
+    char data[NAME_MAX + 16];
+    snprintf(data, sizeof data, "%.*s%s", (int)stem, name, format->data_ending);
+    for (char *c = data + stem; capital && *c != '\0'; c++) *c = (char)toupper((unsigned char)*c);
+    return json_array_append_new(files, json_string(data)) == 0
+               ? STATUS_OK
+               : error_set(err, STATUS_INVALID, "the name of the file '%s' is not UTF-8: rename it", data);
+}
+
 /* Lists the names of the scan's files, and the folder that they lie in. */
 static status list_scan(const char *scan, json_t *files, char *folder, size_t n_bytes, struct error *err)
 {
@@ -88,8 +104,9 @@ static status list_scan(const char *scan, json_t *files, char *folder, size_t n_
     cli_folder_of(scan, folder, n_bytes);
     json_array_append_new(files, json_string(name_of(scan)));
     const struct volume_format *format = volume_format_of(scan);
-    return format != NULL && volume_format_is_header(format, scan) ? add_data_file(scan, format, files, err)
-                                                                   : STATUS_OK;
+    if (format == NULL || !volume_format_is_header(format, scan)) return STATUS_OK;
+    return format->data_ending != NULL ? add_data_beside(scan, format, files, err)
+                                       : add_data_file(scan, format, files, err);
 }
 
 /* "2" or "2,2,3": one edge for all axes, or three. */

@@ -53,7 +53,7 @@ static status read_first_bytes(const char *path, uint8_t first_byte[16], struct 
 /* The error of a file that no reader takes: names every format, "neither TIFF nor ... nor .vol". */
 static status no_reader_takes(const char *path, struct error *err)
 {
-    char list[200] = "";
+    char list[300] = "";
     int n = 0;
     for (size_t i = 0; i < volume_reader_count() && n < (int)sizeof list; i++)
         n += snprintf(list + n, sizeof list - (size_t)n, "%s %s", i == 0 ? "neither" : " nor", reader[i]->title);

@@ -89,7 +89,7 @@ def test_command_line(real, scan, tmp_path):
 @pytest.mark.parametrize("name,header,sent", [
     ("a.mhd", "NDims = 3\nElementDataFile = b.raw\n", ["a.mhd", "b.raw"]), ("A.MHD", "elementdatafile=LOCAL\n", ["A.MHD"]),
     ("a.nhdr", "NRRD0004\ndatafile: b.raw\n", ["a.nhdr", "b.raw"]), ("a.nhdr", "NRRD0004\nData File: b.raw\n", ["a.nhdr", "b.raw"]),
-    ("slices/1.TIF", "II*", ["1.TIF"]),
+    ("a.hdr", "-", ["a.hdr", "a.img"]), ("slices/1.TIF", "II*", ["1.TIF"]),
 ])
 def test_files_of_a_scan(real, tmp_path, name, header, sent):
     """The worker refuses these scans, but the client finds their files."""
@@ -97,6 +97,7 @@ def test_files_of_a_scan(real, tmp_path, name, header, sent):
     scan.parent.mkdir(exist_ok=True)
     scan.write_text(header)
     (tmp_path / "b.raw").write_bytes(b"0")
+    (tmp_path / "a.img").write_bytes(b"0")
     done = reconstruct(real, scan.parent if name.startswith("slices") else scan, "--voxel-um", "2", "--id-file", tmp_path / "id")
     assert done.returncode != 0
     job = real.get(f"/v1/jobs/{(tmp_path / 'id').read_text().strip()}").json()

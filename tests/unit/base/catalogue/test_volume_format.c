@@ -30,13 +30,18 @@ static void test_headers(void **state)
     assert_true(volume_format_is_header(nrrd, "scan.nhdr"));
     assert_false(volume_format_is_header(nrrd, "scan.nrrd"));
     assert_false(volume_format_is_header(volume_format_of("a.tif"), "a.tif"));
+    const struct volume_format *nifti = volume_format_of("scan.hdr");
+    assert_true(volume_format_is_header(nifti, "scan.hdr") && nifti == volume_format_of("scan.img"));
+    assert_false(volume_format_is_header(nifti, "scan.nii.gz"));
+    assert_string_equal(nifti->data_ending, ".img");
 }
 
 /* Every ending that a user may give stands in the list of the help, but for TIFF, which stands there by name. */
 static void test_list(void **state)
 {
     (void)state;
-    static const char *const shown[] = {"TIFF", ".mhd", ".mha", ".nrrd", ".nhdr", ".vol"};
+    static const char *const shown[] = {"TIFF", ".mhd", ".mha", ".nrrd",   ".nhdr",
+                                        ".vol", ".npy", ".nii", ".nii.gz", ".hdr"};
     for (size_t i = 0; i < sizeof shown / sizeof shown[0]; i++) assert_non_null(strstr(volume_format_list, shown[i]));
     assert_int_equal(volume_format_list[0], 'T');
 }
