@@ -3,8 +3,9 @@
 C tests are cmocka programs build/tests/{unit,physics}/test_*, Python tests are pytest folders. A program that crashes,
 hangs or writes no results counts as one failed test. Each check of the sources (tests/checks.mk) counts as one test.
 Each line says how long a test took and how many seconds of a core that were. Tests of the API and the browser wait for
-daemons most of the time, so four of them run beside one that computes. --quick runs the checks, the unit tests that take
-at most 4 s of a core and the quick API tests, three that wait beside two that compute. --programs leaves out the checks
+daemons most of the time, so four of them run beside one that computes. Python files of a folder that are not long share
+a Python, and a browser, FEW at a time, because a start takes half a second of a core. --quick runs the checks, the unit
+tests that take at most 4 s of a core and the quick API tests, three that wait beside two that compute. --programs leaves out the checks
 of the sources, which neither sanitizers nor coverage change, and runs the long unit tests in spite of --quick.
 """
 import argparse
@@ -41,6 +42,8 @@ LONGEST = ["physics/test_reconstruct_phantom", "physics/test_derivative_check", 
            "physics/exact/test_exact_scene", "api/service/test_bodies", "browser/test_dashboard_submit", "api/worker/test_groups",
            "api/worker/test_correction_job", "api/test_recipes", "browser/test_repair", "api/worker/test_several_models",
            "api/test_supervision", "api/test_cli", "api/batches/test_batch_plan", "api/batches/test_batches", "api/service/test_rescue"]
+# how many Python files share a process
+FEW = 6
 
 
 def count_junit(path):
@@ -116,6 +119,20 @@ def run(command, most_s, environment):
 
 def longest_first(names):
     return sorted(names, key=lambda name: LONGEST.index(name) if name in LONGEST else len(LONGEST))
+
+
+def in_groups(names, quick):
+    """Lists of the names that share a process, those of the longest tests first. In the inner loop no file is long."""
+    alone = [] if quick else [name for name in longest_first(names) if name in LONGEST]
+    groups = [[name] for name in alone]
+    folders = {}
+    for name in names:
+        if name not in alone:
+            folders.setdefault(os.path.dirname(name), []).append(name)
+    for files in folders.values():
+        n_group = -(-len(files) // FEW)
+        groups += [files[i::n_group] for i in range(n_group)]
+    return groups
 
 
 def run_lane(own, other):
@@ -214,18 +231,19 @@ def main():
                 if wanted(name):
                     yield name
 
-    def run_python(folder, name):
-        junit = os.path.join(folder, name.replace("/", ".") + ".xml")
+    def run_python(folder, names):
+        name = ", ".join([names[0]] + [os.path.basename(one) for one in names[1:]])
+        junit = os.path.join(folder, names[0].replace("/", ".") + ".xml")
         # A folder of its own: otherwise pytest removes the files of an earlier run before it ends, which takes many
         # seconds where there are thousands.
         files = tempfile.mkdtemp(dir=folder)
         command = ["/usr/bin/python3", "-m", "pytest", "-q", "-ra", "-p", "no:cacheprovider", f"--basetemp={files}",
-                   f"--junitxml={junit}", os.path.join("tests", name + ".py")]
+                   f"--junitxml={junit}", *[os.path.join("tests", one + ".py") for one in names]]
         if arguments.quick:
             command += ["-m", "not slow"]
         code, output, time_taken = run(command, MOST_PYTEST_CORE_S, environment)
         cleaner.submit(shutil.rmtree, files, ignore_errors=True)
-        if code == 5 and arguments.quick:  # all tests of the file are slow ones
+        if code == 5 and arguments.quick:  # all tests of the files are slow ones
             return
         totals.add(name, junit, code, output, time_taken)
 
@@ -234,8 +252,8 @@ def main():
         of_c, of_python = list(c_tests()), list(python_tests(["api"] if arguments.quick else ["api", "browser", "crash", "physics"]))
         real = list(python_tests([] if arguments.quick else ["real"]))
         computing = [lambda name=name: run_check(name) for name in checks()]
-        computing += [lambda name=name: (run_c if name in of_c else run_python)(folder, name) for name in longest_first(of_c + real)]
-        waiting = [lambda name=name: run_python(folder, name) for name in longest_first(of_python)]
+        computing += [lambda name=name: run_c(folder, name) if name in of_c else run_python(folder, [name]) for name in longest_first(of_c + real)]
+        waiting = [lambda names=names: run_python(folder, names) for names in in_groups(of_python, arguments.quick)]
         lanes = [computing, computing, waiting, waiting, waiting] if arguments.quick else [computing, waiting, waiting, waiting, waiting]
         with concurrent.futures.ThreadPoolExecutor(max_workers=len(lanes)) as pool:
             for done in [pool.submit(run_lane, own, waiting if own is computing else computing) for own in lanes]:
