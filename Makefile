@@ -219,6 +219,7 @@ speckle-tables: $(BUILD)/tools/speckle-tables ## make the tables of speckle of w
 include config/install.mk
 include tests/exact/exact.mk
 include tests/tests.mk
+include tests/zoo/zoo.mk
 include tests/mutants/mutants.mk
 include tests/bench/bench.mk
 include tests/checks.mk

@@ -33,7 +33,7 @@ check: | deps-test ## quick inner loop: checks of the sources, unit tests, quick
 test: | deps       ## everything that continuous integration runs; ends with "N passed, N failed"
 	@$(MAKE) --no-print-directory -j$$(nproc) all & ./config/install-dependencies test; installed=$$?; \
 		wait $$! && [ $$installed -eq 0 ]
-	@$(MAKE) --no-print-directory -j$$(nproc) all build-tests
+	@$(MAKE) --no-print-directory -j$$(nproc) all build-tests zoo
 	@/usr/bin/python3 tests/run_tests.py --build $(BUILD)
 
 # PAGES: some of the browser tests only, such as PAGES=test_pairs.py

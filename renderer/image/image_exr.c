@@ -184,9 +184,15 @@ static status check_channels(struct reader *rd, struct error *err)
         return refuse(rd, err, "it holds luminance and chroma (channels Y, RY, BY): save it as RGB");
     if (has_channel(list, "X") && has_channel(list, "Y") && has_channel(list, "Z"))
         return refuse(rd, err, "it holds tristimulus values (channels X, Y, Z): save it as RGB");
+    exr_compression_t packing = EXR_COMPRESSION_NONE;
+    exr_get_compression(rd->file, 0, &packing);
+    const bool b44 = packing == EXR_COMPRESSION_B44 || packing == EXR_COMPRESSION_B44A;
     for (int i = 0; i < list->num_channels; i++) {
         const exr_attr_chlist_entry_t *e = &list->entries[i];
         int which = letter_index(rd, e->name.str);
+        /* OpenEXRCore 3.1.5 mixes up the rows of such channels */
+        if (b44 && e->pixel_type != EXR_PIXEL_HALF)
+            return refuse(rd, err, "B44 compression of float channels is not supported: save it with ZIP compression");
         if (which < 0) continue;
         if (e->pixel_type == EXR_PIXEL_UINT) return refuse(rd, err, "its pixels are integers, half or float is needed");
         if (e->x_sampling != 1 || e->y_sampling != 1) return refuse(rd, err, "its channels are subsampled");

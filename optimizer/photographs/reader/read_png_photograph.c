@@ -45,18 +45,37 @@ static unsigned sample(const png_byte *row, unsigned depth, size_t x, size_t c, 
     return depth == 16 ? (unsigned)p[0] << 8 | p[1] : p[0];
 }
 
+/* The color of chunk tRNS whose pixels are transparent. Returns false when the file has none. */
+static bool transparent_color(png_structp png, png_infop info, unsigned color[3])
+{
+    png_bytep alpha = NULL;
+    png_color_16p key = NULL;
+    int n = 0;
+    if (png_get_tRNS(png, info, &alpha, &n, &key) == 0 || key == NULL) return false;
+    const bool grey = (png_get_color_type(png, info) & PNG_COLOR_MASK_COLOR) == 0;
+    color[0] = grey ? key->gray : key->red;
+    color[1] = grey ? key->gray : key->green;
+    color[2] = grey ? key->gray : key->blue;
+    return true;
+}
+
 static status convert(png_structp png, png_infop info, const float *light, struct image *im, const char *path,
                       struct error *err)
 {
     png_bytepp row = png_get_rows(png, info);
+    unsigned key[3] = {0};
+    const bool has_key = transparent_color(png, info, key);
     const unsigned depth = png_get_bit_depth(png, info), largest = (1u << depth) - 1;
     size_t n = png_get_channels(png, info), n_color = n <= 2 ? 1 : 3;
     for (size_t y = 0; y < im->height; y++) {
         for (size_t x = 0; x < im->width; x++) {
-            for (size_t c = 0; c < 3; c++)
-                im->pixel[(y * im->width + x) * 3 + c] =
-                    light[(c << depth) + sample(row[y], depth, x, n_color == 3 ? c : 0, n)];
-            if (n > n_color && sample(row[y], depth, x, n_color, n) != largest)
+            bool is_key = has_key;
+            for (size_t c = 0; c < 3; c++) {
+                const unsigned value = sample(row[y], depth, x, n_color == 3 ? c : 0, n);
+                im->pixel[(y * im->width + x) * 3 + c] = light[(c << depth) + value];
+                is_key = is_key && value == key[c];
+            }
+            if (is_key || (n > n_color && sample(row[y], depth, x, n_color, n) != largest))
                 return integer_samples_transparent(path, err);
         }
     }
@@ -164,6 +183,9 @@ static unsigned take_others(png_structp png, png_infop png_info, const struct pn
         file_ledger_add(&info->ledger, "pHYs", "lengths follow from the crop", "%u x %u pixels per %s", x, y,
                         unit == PNG_RESOLUTION_METER ? "m" : "unit");
     if (info->has_alpha) file_ledger_add(&info->ledger, "alpha", "it is opaque everywhere", "one channel");
+    unsigned key[3];
+    if (transparent_color(png, png_info, key))
+        file_ledger_add(&info->ledger, "transparency", "no pixel has this color", "color %u %u %u", key[0], key[1], key[2]);
     if (failure->warning[0] != '\0')
         file_ledger_add(&info->ledger, "damage beside the samples", "it is left out", "%s", failure->warning);
     return integer_samples_significant(bits, png_get_bit_depth(png, png_info), info);
