@@ -57,8 +57,10 @@ static json_t *read_scan(const char *path, const struct volume_part *part)
     const size_t n = info->n[0] * info->n[1] * info->n[2];
     float *value = n <= MOST_PIXELS ? malloc((n + 1) * sizeof *value) : NULL;
     json_t *said;
-    if (value == NULL) said = json_pack("{s:s}", "refused", "too large for the zoo");
-    else if (volume_source_read(source, 0, info->n[2], value, &err) != STATUS_OK) said = refusal(&err);
+    if (value == NULL)
+        said = json_pack("{s:s}", "refused", "too large for the zoo");
+    else if (volume_source_read(source, 0, info->n[2], value, &err) != STATUS_OK)
+        said = refusal(&err);
     else {
         write_values(path, value, n);
         said = json_pack("{s:[i,i,i], s:[o,o,o], s:s, s:b, s:o, s:s, s:o}", "size", (int)info->n[0], (int)info->n[1],
@@ -85,11 +87,11 @@ static json_t *read_photograph(const char *path, const char *transfer)
     struct error err = {0};
     if (photograph_file_read(path, &request, &im, &info, &err) != STATUS_OK) return refusal(&err);
     write_values(path, im.pixel, im.width * im.height * 3);
-    json_t *said = json_pack("{s:[i,i], s:o, s:o, s:o, s:i, s:i, s:b, s:b, s:o}", "size", (int)im.width, (int)im.height,
-                             "exposure_s", number(info.exposure_s), "iso", number(info.iso), "aperture",
-                             number(info.aperture), "bits", (int)info.bits, "orientation", (int)info.orientation,
-                             "curve_of_file", info.curve_of_file, "alpha", info.has_alpha, "files",
-                             ledger_json(&info.ledger));
+    json_t *said =
+        json_pack("{s:[i,i], s:o, s:o, s:o, s:i, s:i, s:b, s:b, s:o}", "size", (int)im.width, (int)im.height,
+                  "exposure_s", number(info.exposure_s), "iso", number(info.iso), "aperture", number(info.aperture),
+                  "bits", (int)info.bits, "orientation", (int)info.orientation, "curve_of_file", info.curve_of_file,
+                  "alpha", info.has_alpha, "files", ledger_json(&info.ledger));
     image_release(&im);
     return said;
 }
@@ -103,7 +105,8 @@ static json_t *answer(char *line)
     if (path == NULL || third == NULL || strlen(path) >= PATH_BYTES) return NULL;
     if (strcmp(kind, "photograph") == 0) return read_photograph(path, third);
     if (strcmp(kind, "scan") != 0 || fourth == NULL) return NULL;
-    return read_scan(path, &(struct volume_part){.channel = strtoul(third, NULL, 10), .time = strtoul(fourth, NULL, 10)});
+    return read_scan(path,
+                     &(struct volume_part){.channel = strtoul(third, NULL, 10), .time = strtoul(fourth, NULL, 10)});
 }
 
 int main(void)

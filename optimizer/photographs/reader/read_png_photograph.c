@@ -185,7 +185,8 @@ static unsigned take_others(png_structp png, png_infop png_info, const struct pn
     if (info->has_alpha) file_ledger_add(&info->ledger, "alpha", "it is opaque everywhere", "one channel");
     unsigned key[3];
     if (transparent_color(png, png_info, key))
-        file_ledger_add(&info->ledger, "transparency", "no pixel has this color", "color %u %u %u", key[0], key[1], key[2]);
+        file_ledger_add(&info->ledger, "transparency", "no pixel has this color", "color %u %u %u", key[0], key[1],
+                        key[2]);
     if (failure->warning[0] != '\0')
         file_ledger_add(&info->ledger, "damage beside the samples", "it is left out", "%s", failure->warning);
     return integer_samples_significant(bits, png_get_bit_depth(png, png_info), info);
