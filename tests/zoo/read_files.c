@@ -87,11 +87,11 @@ static json_t *read_photograph(const char *path, const char *transfer)
     struct error err = {0};
     if (photograph_file_read(path, &request, &im, &info, &err) != STATUS_OK) return refusal(&err);
     write_values(path, im.pixel, im.width * im.height * 3);
-    json_t *said =
-        json_pack("{s:[i,i], s:o, s:o, s:o, s:i, s:i, s:b, s:b, s:o}", "size", (int)im.width, (int)im.height,
-                  "exposure_s", number(info.exposure_s), "iso", number(info.iso), "aperture", number(info.aperture),
-                  "bits", (int)info.bits, "orientation", (int)info.orientation, "curve_of_file", info.curve_of_file,
-                  "alpha", info.has_alpha, "files", ledger_json(&info.ledger));
+    json_t *said = json_pack("{s:[i,i], s:o, s:o, s:o, s:o, s:i, s:i, s:b, s:b, s:o}", "size", (int)im.width,
+                             (int)im.height, "saturation", number(photograph_saturation(&info)), "exposure_s",
+                             number(info.exposure_s), "iso", number(info.iso), "aperture", number(info.aperture),
+                             "bits", (int)info.bits, "orientation", (int)info.orientation, "curve_of_file",
+                             info.curve_of_file, "alpha", info.has_alpha, "files", ledger_json(&info.ledger));
     image_release(&im);
     return said;
 }

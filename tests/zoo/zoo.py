@@ -21,6 +21,7 @@ try:
     from specimen import Refused
     from zoo_photographs import photographs
     from zoo_scans import scans
+    from zoo_variants import variants
 except ImportError as missing:
     print(f"zoo: {missing.name or missing} is not installed", file=sys.stderr)
     sys.exit(2)
@@ -77,7 +78,7 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         folder = arguments.keep or scratch
         os.makedirs(folder, exist_ok=True)
-        zoo = [s for s in [*scans(), *photographs()] if not arguments.name or any(n in s.name for n in arguments.name)]
+        zoo = [s for s in [*scans(), *photographs(), *variants()] if not arguments.name or any(n in s.name for n in arguments.name)]
         paths = [os.path.join(folder, s.name) for s in zoo]
         assert len(set(paths)) == len(paths), "two files of one name"
         wanted = [s.make(p) for s, p in zip(zoo, paths)]

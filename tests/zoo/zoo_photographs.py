@@ -141,8 +141,8 @@ def pngs():
         yield png("cicp-" + name, before=[(b"cICP", bytes((9, code, 0, 1)))], transfer="file", words=("cICP", word))
     yield png("cicp-srgb", before=[(b"cICP", bytes((1, 13, 0, 1)))], transfer="file", curve=srgb, stated={"cICP": "applied"})
     yield png("phys", before=[(b"pHYs", struct.pack(">IIB", 3779, 3779, 1))], stated={"pHYs": "not_used"})
-    rec709 = struct.pack(">8I", 31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000)
-    yield png("chrm-rec709", before=[(b"gAMA", struct.pack(">I", 100000)), (b"cHRM", rec709)], transfer="file", stated={"cHRM": None})
+    of_rec709 = struct.pack(">8I", 31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000)
+    yield png("chrm-rec709", before=[(b"gAMA", struct.pack(">I", 100000)), (b"cHRM", of_rec709)], transfer="file", stated={"cHRM": None})
     yield png("sbit-all", before=[(b"sBIT", bytes((8, 8, 8)))])
     for name, (entries, values) in EXPOSURES.items():
         for order, where in itertools.product("<>", ("before", "after")):
@@ -235,8 +235,8 @@ def turned(array, turn):
 
 def tiffs():
     for kind, channels, order in itertools.product(("u1", "u2", "f4"), (1, 3, 4), "<>"):
-        more = {"extrasamples": ["unassalpha"]} if channels == 4 else {}
-        yield tiff(f"{kind}-{channels}-{'big' if order == '>' else 'little'}", kind, channels, byteorder=order, **more)
+        alpha = {"extrasamples": ["unassalpha"]} if channels == 4 else {}
+        yield tiff(f"{kind}-{channels}-{'big' if order == '>' else 'little'}", kind, channels, byteorder=order, **alpha)
     for kind, packing, planar in itertools.product(("u1", "u2", "f4"), ("zlib", "lzw", "packbits"), ("contig", "separate")):
         yield tiff(f"{kind}-{packing}-{planar}", kind, compression=packing, planarconfig=planar)
     for kind, packing in itertools.product(("u1", "u2", "f4"), (None, "zlib")):

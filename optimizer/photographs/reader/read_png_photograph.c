@@ -3,6 +3,7 @@
 #include "optimizer/photographs/reader/exif.h"
 #include "optimizer/photographs/reader/integer_samples.h"
 #include "optimizer/photographs/reader/photograph_reader.h"
+#include "optimizer/photographs/reader/png_raw_profile.h"
 #include "optimizer/photographs/reader/xmp.h"
 
 #include <math.h>
@@ -112,9 +113,11 @@ static void take_exif(png_structp png, png_infop png_info, struct photograph_inf
     if (png_get_eXIf_1(png, png_info, &n, &exif) != 0 && exif != NULL) exif_read_bytes(exif, n, info);
     png_textp text = NULL;
     const int n_text = png_get_text(png, png_info, &text, NULL);
-    for (int i = 0; i < n_text; i++)
-        if (strcmp(text[i].key, "XML:com.adobe.xmp") == 0 && text[i].text != NULL)
-            xmp_read(text[i].text, strlen(text[i].text), info);
+    for (int i = 0; i < n_text; i++) {
+        if (text[i].text == NULL) continue;
+        if (strcmp(text[i].key, "XML:com.adobe.xmp") == 0) xmp_read(text[i].text, strlen(text[i].text), info);
+        png_raw_profile_read(text[i].key, text[i].text, strlen(text[i].text), info);
+    }
 }
 
 /* gAMA and cHRM, which sRGB and iCCP replace. */
