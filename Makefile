@@ -14,7 +14,7 @@ ifeq ($(ARCH),x86_64)
 MACHINE ?= -march=x86-64-v3
 endif
 
-PKGS := OpenEXR libmicrohttpd jansson sqlite3 libsodium inih libtiff-4 uuid nlopt zlib libzstd libarchive libpng libjpeg libraw_r lcms2 libcurl libseccomp
+PKGS := OpenEXR libmicrohttpd jansson sqlite3 libsodium inih libtiff-4 uuid nlopt zlib libzstd libarchive libpng libjpeg libraw_r lcms2 hdf5-serial libcurl libseccomp
 PKG_CFLAGS := $(shell pkg-config --cflags $(PKGS) 2>/dev/null | tr ' ' '\n' | sed 's/^-I/-isystem /' | tr '\n' ' ') -isystem /usr/include/opencv4
 # fields left out of an initialiser are zero, and zero is made to mean the usual thing
 WARN := -Wall -Wextra -Wpedantic -Wshadow -Wno-missing-field-initializers
@@ -65,7 +65,7 @@ ifneq ($(OPENMPI),)
 PROGRAMS += $(BUILD)/bin/selvedge-mpi
 endif
 LINK_BASE := -lz -lm -pthread -Wl,--undefined=processor_required
-LINK_GEOMETRY := $(shell pkg-config --libs libtiff-4 libzstd 2>/dev/null) -Wl,--as-needed -lopencv_mcc -lopencv_aruco -Wl,--no-as-needed -lopencv_imgproc -lopencv_core -lstdc++ $(LINK_BASE)
+LINK_GEOMETRY := $(shell pkg-config --libs libtiff-4 libzstd hdf5-serial 2>/dev/null) -Wl,--as-needed -lopencv_mcc -lopencv_aruco -Wl,--no-as-needed -lopencv_imgproc -lopencv_core -lstdc++ $(LINK_BASE)
 LINK_RENDERER := -lembree3 -lOpenEXRCore -lpng -llcms2 $(LINK_GEOMETRY)
 LINK_OPTIMIZER := -lseccomp -lraw_r -ljpeg -lnlopt -ljansson -lsodium -larchive $(LINK_RENDERER)
 LINK_WAVE := -llapacke # the solver of waves, which no installed program contains

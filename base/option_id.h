@@ -12,6 +12,7 @@
 #define OPTION_GEOMETRY_JOB "geometry_job"
 #define OPTION_SCAN_CHANNEL "scan_channel"
 #define OPTION_SCAN_TIME "scan_time"
+#define OPTION_SCAN_DATASET "scan_dataset"
 #define OPTION_RAW "raw"
 #define OPTION_RAW_SHAPE "raw_shape"
 #define OPTION_RAW_TYPE "raw_type"

@@ -18,6 +18,7 @@ struct volume_raw_declaration {
 /* The part of a scan that has several channels or times. Both count from 1; 0: the document does not say. */
 struct volume_part {
     size_t channel, time;
+    char dataset[128]; /* name of the data set, in formats that have several; "": the document does not say */
 };
 
 struct volume_source_info {

@@ -23,6 +23,7 @@ typedef struct volume_reader {
     /* Reads slices i_slice .. i_slice + n_slice - 1, which exist, to value[n_slice][rows][columns]. */
     status (*read)(void *handle, size_t i_slice, size_t n_slice, float *value, struct error *err);
     void (*close)(void *handle);
+    bool has_datasets; /* the part may name one */
 } volume_reader;
 
 /* All formats that can be recognised by the start or the name of a file, in the order in which they are tried. */

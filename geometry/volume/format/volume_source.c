@@ -75,6 +75,10 @@ status volume_source_open_declared(const char *const *path, size_t n_path, const
     for (size_t i = 0; i < volume_reader_count() && found == NULL; i++)
         if (reader[i]->recognise(first_byte, path[0])) found = reader[i];
     if (found == NULL) return no_reader_takes(path[0], err);
+    if (part != NULL && part->dataset[0] != '\0' && !found->has_datasets)
+        return error_set_field(err, STATUS_INVALID, OPTION_SCAN_DATASET,
+                               "cannot read volume '%s': it has no data sets, so none can be chosen",
+                               path_file_name(path[0]));
     struct volume_source *v = calloc(1, sizeof *v);
     if (v == NULL)
         return error_set(err, STATUS_NO_MEMORY, "cannot read volume '%s': out of memory", path_file_name(path[0]));

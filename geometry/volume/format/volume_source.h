@@ -15,12 +15,13 @@
 struct volume_source;
 
 /* Opens a scan. path: one multi-page TIFF, one .mhd or .mha, one .nrrd or .nhdr (data file beside it), one .vol, one
- * .npy, one .nii, .nii.gz or .hdr (with its .img), or TIFF slices in order. The field of errors is OPTION_SCAN_FILES.
- * STATUS_IO, STATUS_NOT_FOUND; STATUS_FORMAT for files that do not have their stated format; STATUS_UNSUPPORTED. */
+ * .npy, one .nii, .nii.gz or .hdr (with its .img), one HDF5, or TIFF slices in order. The field of errors is
+ * OPTION_SCAN_FILES. STATUS_IO, STATUS_NOT_FOUND; STATUS_FORMAT for files that do not have their stated format;
+ * STATUS_UNSUPPORTED. */
 status volume_source_open(const char *const *path, size_t n_path, struct volume_source **source, struct error *err);
 /* The same; with a declaration (n[0] > 0) the only file at path has raw samples. part: the channel and the time of a
  * file that has several, which is an error where none is chosen. raw and part may be NULL. Fields also OPTION_RAW,
- * OPTION_SCAN_CHANNEL, OPTION_SCAN_TIME. */
+ * OPTION_SCAN_CHANNEL, OPTION_SCAN_TIME, OPTION_SCAN_DATASET. */
 status volume_source_open_declared(const char *const *path, size_t n_path, const struct volume_raw_declaration *raw,
                                    const struct volume_part *part, struct volume_source **source, struct error *err);
 void volume_source_close(struct volume_source *source);

@@ -20,6 +20,7 @@ struct job_scan {
     bool raw_big_endian;
     size_t raw_header_bytes;
     size_t channel, time; /* of a scan that has several, from 1; 0: not given */
+    char dataset[128];    /* "": not given */
     double voxel_size_um[3];
     char axes[8]; /* "": not given */
     double matrix[9];

@@ -20,7 +20,8 @@ void volume_options(const struct job_scan *scan, struct reconstruct_option *o)
     memcpy(o->raw.type, scan->raw_type, sizeof o->raw.type);
     o->raw.big_endian = scan->raw_big_endian;
     o->raw.header_bytes = scan->raw_header_bytes;
-    o->part = (struct volume_part){scan->channel, scan->time};
+    o->part = (struct volume_part){scan->channel, scan->time, ""};
+    memcpy(o->part.dataset, scan->dataset, sizeof o->part.dataset);
     for (int a = 0; a < 3; a++) o->voxel_size_m[a] = scan->voxel_size_um[a] * um; /* NaN stays NaN */
     memcpy(o->axes, scan->axes, sizeof o->axes);
     memcpy(o->matrix, scan->matrix, sizeof o->matrix);

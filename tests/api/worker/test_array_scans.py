@@ -1,5 +1,5 @@
 """Scans of programs for arrays and for medicine give the fibers of the same voxels as raw samples, bit by bit: NumPy's own .npy,
-NIfTI by nibabel or by bytes. Each is judged by `selvedge check`, too."""
+NIfTI by nibabel or by bytes, HDF5 by h5py. Each is judged by `selvedge check`, too."""
 import gzip
 import os
 import struct
@@ -7,7 +7,7 @@ import subprocess
 
 import pytest
 from daemon_under_test import program
-from test_scan_statements import check, fault, statement
+from test_scan_statements import check, fault, statement, value_read
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
 
@@ -89,6 +89,14 @@ def test_nibabel_writes_files_that_are_read(real, cloth, truth, tmp_path, kind):
     assert fibers(real, tmp_path / "out", tmp_path / "scan.nii.gz") == truth
 
 
+@pytest.mark.parametrize("kept", [{}, {"compression": "gzip", "shuffle": True, "chunks": (16, 32, 32)}], ids=["plain", "gzip"])
+def test_h5py_writes_files_that_are_read(real, cloth, truth, tmp_path, kept):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "scan.h5", "w") as file:
+        file.create_dataset("entry/volume", data=cloth, **kept)
+    assert fibers(real, tmp_path / "out", tmp_path / "scan.h5") == truth
+
+
 # ---- statements ----
 
 def sample(numpy, value=1000):
@@ -123,3 +131,32 @@ def test_arrays_that_are_no_scan(tmp_path):
                                (numpy.zeros((7, 4, 5, 6), dtype="u2"), "volume.channel", "7 channels")]:
         got, detail = fault(check(tmp_path, "s.npy", saved(array), voxel_size_um=2))
         assert got == field and text in detail, detail
+
+
+def test_data_sets_of_hdf5(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    numpy = pytest.importorskip("numpy")
+    with h5py.File(tmp_path / "two.h5", "w") as file:
+        for name, value in (("a/raw", 7), ("b", 9)):
+            file[name] = sample(numpy, value)
+            file[name].attrs["element_size_um"] = [2.5, 2, 2]
+    data = (tmp_path / "two.h5").read_bytes()
+    field, detail = fault(check(tmp_path, "s.h5", data))
+    assert field == "volume.dataset" and "'a/raw', 'b'" in detail
+    report = check(tmp_path, "s.h5", data, dataset="b")
+    assert value_read(report) == 9 and statement(report, "voxel size")["value"] == "2 x 2 x 2.5 um (element_size_um)"
+    field, detail = fault(check(tmp_path, "s.nii", nifti_bytes(sample(numpy), datatype=512), dataset="b"))
+    assert field == "volume.dataset" and "no data sets" in detail
+
+
+def test_hdf5_reaches_no_other_file(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    numpy = pytest.importorskip("numpy")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["d"] = sample(numpy)
+    with h5py.File(tmp_path / "link.h5", "w") as file:
+        file["d"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "d")
+    assert "no data set" in fault(check(tmp_path, "s.h5", (tmp_path / "link.h5").read_bytes(), voxel_size_um=2))[1]
+    with h5py.File(tmp_path / "lzf.h5", "w") as file:
+        file.create_dataset("d", data=sample(numpy), compression="lzf")
+    assert "gzip" in fault(check(tmp_path, "s.h5", (tmp_path / "lzf.h5").read_bytes(), voxel_size_um=2))[1]

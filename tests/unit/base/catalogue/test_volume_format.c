@@ -40,8 +40,8 @@ static void test_headers(void **state)
 static void test_list(void **state)
 {
     (void)state;
-    static const char *const shown[] = {"TIFF", ".mhd", ".mha", ".nrrd",   ".nhdr",
-                                        ".vol", ".npy", ".nii", ".nii.gz", ".hdr"};
+    static const char *const shown[] = {"TIFF", ".mhd", ".mha",    ".nrrd", ".nhdr", ".vol",
+                                        ".npy", ".nii", ".nii.gz", ".hdr",  ".h5",   ".hdf5"};
     for (size_t i = 0; i < sizeof shown / sizeof shown[0]; i++) assert_non_null(strstr(volume_format_list, shown[i]));
     assert_int_equal(volume_format_list[0], 'T');
 }
