@@ -17,6 +17,7 @@ enum {
     TAG_SHUTTER_SPEED = 0x9201,
     TAG_APERTURE = 0x9202,
     TAG_COLOR_SPACE = 0xa001,
+    TAG_WHITE_BALANCE = 0xa403,
     TAG_DIGITAL_ZOOM = 0xa404,
     ISO_OUT_OF_RANGE = 65535, /* the 16 bits of TAG_ISO do not hold the number */
     MOST_ENTRIES = 2000
@@ -43,7 +44,7 @@ struct exif {
 /* The values of tags of interest; NaN: not stated. */
 struct exif_values {
     double exposure_s, f_number, shutter_apex, aperture_apex, iso, other_iso, orientation, color_space, resolution,
-        unit, zoom;
+        unit, white_balance, zoom;
 };
 
 /* Reads a number of n_byte bytes; false beyond the end of the file. */
@@ -132,6 +133,8 @@ static double *value_of_tag(struct exif_values *v, uint64_t tag)
         return &v->aperture_apex;
     case TAG_COLOR_SPACE:
         return &v->color_space;
+    case TAG_WHITE_BALANCE:
+        return &v->white_balance;
     case TAG_DIGITAL_ZOOM:
         return &v->zoom;
     default:
@@ -178,13 +181,17 @@ static void state(const struct exif_values *v, struct photograph_info *info)
     if (v->resolution > 1.0 && v->unit != 1.0)
         file_ledger_add(&info->ledger, "resolution", "lengths follow from the crop", "%g pixels per %s", v->resolution,
                         v->unit == 3.0 ? "cm" : "inch");
+    if (v->white_balance == 0.0 || v->white_balance == 1.0)
+        file_ledger_add(&info->ledger, "white balance", "samples are taken as they are", "%s",
+                        v->white_balance == 0.0 ? "automatic" : "manual");
+    info->auto_balance = info->auto_balance || v->white_balance == 0.0;
     if (v->zoom > 1.0) file_ledger_add(&info->ledger, "digital zoom", "a mean does not need it", "%g", v->zoom);
 }
 
 void exif_read(FILE *file, struct photograph_info *info)
 {
     struct exif e = {.file = file};
-    struct exif_values v = {NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+    struct exif_values v = {NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
     uint64_t order, version, first;
     if (!take(&e, 0, 1, &order)) return;
     e.big_endian = order == 'M';

@@ -36,6 +36,7 @@ struct photograph_info {
     float narrow_scale[6];     /* light of the largest values of 10, 12 and 14 bits in 16, low and high; or 0 */
     unsigned orientation;      /* of Exif and TIFF, 1 to 8, 1 where it is not stated; already applied */
     unsigned exif_color_space; /* 1: sRGB, 2: Adobe RGB, 65535: uncalibrated; 0: not stated */
+    bool auto_balance;         /* the camera chose the white balance by the picture */
     double to_rec709[9];       /* from the file's primaries, row-major; all 0 where it states none */
     char camera[96];           /* maker and model; "": not stated */
     struct file_ledger ledger; /* every statement of the file, also those above */

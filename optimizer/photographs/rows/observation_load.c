@@ -142,18 +142,35 @@ static status check_exposures(const struct observation_set *o, size_t first, con
     return STATUS_OK;
 }
 
+static bool is_processed(const struct photograph_info *info) { return info->less_trustworthy; }
+static bool is_balanced(const struct photograph_info *info) { return info->less_trustworthy && info->auto_balance; }
+
+/* Counts the photographs for which `is` holds; *which: the first. */
+static size_t count_photographs(const struct observation_set *o, size_t first,
+                                bool (*is)(const struct photograph_info *info), size_t *which)
+{
+    size_t n = 0;
+    for (size_t i = o->n; i-- > first;)
+        if (is(&o->item[i].photograph.info)) {
+            n++;
+            *which = i;
+        }
+    return n;
+}
+
 static void warn_less_trustworthy(const struct observation_set *o, size_t first, const struct warning_sink *warn)
 {
-    size_t n = 0, which = 0;
-    for (size_t i = o->n; i-- > first;)
-        if (o->item[i].photograph.info.less_trustworthy) {
-            n++;
-            which = i;
-        }
+    size_t which = 0, n = count_photographs(o, first, is_processed, &which);
     if (n > 0)
         warning_send(warn, OPTION_PHOTOGRAPHS,
                      "%zu of %zu photographs ('%s'%s) have 8 bits, or the curve of a camera's own processing: trust "
                      "the fitted values less than those of raw files or OpenEXR",
+                     n, o->n - first, o->item[which].name, n > 1 ? " and others" : "");
+    n = count_photographs(o, first, is_balanced, &which);
+    if (n > 0)
+        warning_send(warn, OPTION_PHOTOGRAPHS,
+                     "%zu of %zu photographs ('%s'%s) state an automatic white balance, which may have given each "
+                     "picture other colors: set the balance by hand, or give the raw files",
                      n, o->n - first, o->item[which].name, n > 1 ? " and others" : "");
 }
 
