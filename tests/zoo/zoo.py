@@ -19,6 +19,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 try:
     import numpy
     from specimen import Refused
+    from zoo_arrays import arrays
     from zoo_photographs import photographs
     from zoo_scans import scans
     from zoo_variants import variants
@@ -78,7 +79,7 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         folder = arguments.keep or scratch
         os.makedirs(folder, exist_ok=True)
-        zoo = [s for s in [*scans(), *photographs(), *variants()] if not arguments.name or any(n in s.name for n in arguments.name)]
+        zoo = [s for s in [*scans(), *arrays(), *photographs(), *variants()] if not arguments.name or any(n in s.name for n in arguments.name)]
         paths = [os.path.join(folder, s.name) for s in zoo]
         assert len(set(paths)) == len(paths), "two files of one name"
         wanted = [s.make(p) for s, p in zip(zoo, paths)]

@@ -20,9 +20,14 @@ struct npy {
     size_t n, shape[NPY_MAX_DIMENSION]; /* the slowest first in C's order */
 };
 
+/* value: text of the header, shown up to the end of its first bracket or line */
 static status bad(const struct npy *m, const char *what, const char *value, struct error *err)
 {
-    return volume_header_refuse(&m->header, what, value, err);
+    char shown[80];
+    size_t n = strcspn(value, ")]\n");
+    if (value[n] == ')' || value[n] == ']') n++;
+    snprintf(shown, sizeof shown, "%.*s", (int)n, value);
+    return volume_header_refuse(&m->header, what, shown, err);
 }
 
 static const char *after_blanks(const char *p) { return p + strspn(p, " \t\n"); }
