@@ -272,7 +272,8 @@ static void nothing_is_nan(void **state)
         const struct scattering_model *m = scattering_registry()[k];
         struct rng r;
         model_stream_start(&r, 3, m->id);
-        for (unsigned b = 0; b < 6; b++) {
+        const unsigned n_point = has_dear_tables(m->id) ? 3 : 6;
+        for (unsigned b = 0; b < n_point; b++) {
             double param[SCATTERING_MAX_PARAM];
             box_point(m, b, &r, param);
             struct scattering_state *s = prepare(m, param);
@@ -306,7 +307,8 @@ static void reciprocal_models_are(void **state)
         struct rng r;
         model_stream_start(&r, 4, m->id);
         double param[SCATTERING_MAX_PARAM];
-        for (unsigned b = 0; b < 12; b++) {
+        const unsigned n_point = has_dear_tables(m->id) ? 4 : 12;
+        for (unsigned b = 0; b < n_point; b++) {
             box_point(m, b, &r, param);
             struct scattering_state *s = prepare(m, param);
             for (int i = 0; i < 200; i++) {
