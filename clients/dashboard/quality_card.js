@@ -18,6 +18,7 @@ export function qualityRows(g) {
   if (g.input === "volume") rows.push(
     ["fibers in the scan", g.grade ? `${g.grade.verdict}, ${percent(g.grade.safe_share, 0)} of the length is sure` : "–", "whether the scan shows single fibers, and for which share of their length"],
     ["valley between neighbours", isNumber(g.grade?.valley_depth) ? percent(g.grade.valley_depth, 0) : "–", "median fall of the density between fibers side by side; small also where they touch"],
+    ["material that no fiber explains", isNumber(g.grade?.unexplained_share) ? percent(g.grade.unexplained_share, 1) : "–", g.grade?.unexplained_slices ? `away from every traced fiber; most in slices ${g.grade.unexplained_slices.join(", ")} across x, y, z` : "away from every traced fiber"],
     ["material explained (Dice)", number(g.dice), "overlap of fibers and material; 1 is complete"],
     ["gaps bridged, pieces joined", `${g.n_gap_bridged}, ${g.n_joined}`, ""],
     ["fiber diameter", `${number(g.fiber_diameter_voxel)} voxels`, "fibers are distinguished from 4 on"],

@@ -13,6 +13,10 @@ enum { N_PLACE = 9, N_RING = 4, N_AROUND = 6, N_NEAR = 24, POINTS_PER_WINDOW = 4
 static const double PATCH_RADII = 1.6, EDGE_VOXEL = 2.0;
 /* Distances of neighbours in sums of radii: nearer ones are the same fiber, farther ones have others between. */
 static const double LEAST_APART = 0.5, MOST_APART = 1.6;
+/* Two lines that are nearer, in sums of radii, may be one fiber; those of touching fibers have 1. */
+static const double DOUBLE_APART = 0.8;
+/* Least density of a fiber that its contrast is compared with. */
+static const double LEAST_LEVEL = 0.25;
 
 const char *grade_verdict_name(enum grade_verdict v)
 {
@@ -23,13 +27,14 @@ const char *grade_verdict_name(enum grade_verdict v)
 /* Points of one fiber, first .. first + n. */
 struct window {
     size_t first, n;
+    double double_share; /* of the points that have another line too near */
     bool is_beside;
     double depth, contrast;
 };
 
-/* Sums for the slope of measured on expected densities. */
+/* Sums for the slope of measured on expected densities; middle, n_middle: measured at half the radius and within. */
 struct slope {
-    double n, x, y, xx, xy;
+    double n, x, y, xx, xy, middle, n_middle;
 };
 
 struct grade_job {
@@ -73,13 +78,15 @@ static void add_profile(const struct volume *v, const float p[3], const double w
     }
 }
 
-static void add_beside(const struct grade_job *j, const struct grade_point *p, const struct grade_point *q,
-                       double profile[N_PLACE])
+/* Returns the distance of the neighbour q in sums of the radii. */
+static double add_beside(const struct grade_job *j, const struct grade_point *p, const struct grade_point *q,
+                         double profile[N_PLACE])
 {
     double way[3], along = 0.0;
     for (int a = 0; a < 3; a++) along += ((double)q->p[a] - (double)p->p[a]) * (double)p->t[a];
     for (int a = 0; a < 3; a++) way[a] = (double)q->p[a] - (double)p->p[a] - along * (double)p->t[a];
     add_profile(j->v, p->p, way, 1.0, profile);
+    return hypot(hypot(way[0], way[1]), way[2]) / (j->points.radius[p->fiber] + j->points.radius[q->fiber]);
 }
 
 /* Density at x if the scan shows the fibers: those near are full discs with blurred edges. */
@@ -134,14 +141,18 @@ static void add_patch(const struct grade_job *j, size_t i_point, struct slope *s
             s->y += measured;
             s->xx += expected * expected;
             s->xy += expected * measured;
+            s->middle += ring <= 1 ? measured : 0.0;
+            s->n_middle += ring <= 1 ? 1.0 : 0.0;
         }
 }
 
-/* 0 where the expected densities are all the same, because no scan could show the fibers there. */
-static double slope_of(const struct slope *s)
+/* Slope over the density of the fiber, which need not be 1. 0 where the expected densities are all the same, because no
+ * scan could show the fibers there. */
+static double contrast_of(const struct slope *s)
 {
-    double var = s->xx - s->x * s->x / s->n, least = 1e-4 * s->n;
-    return var > least ? (s->xy - s->x * s->y / s->n) / var : 0.0;
+    const double var = s->xx - s->x * s->x / s->n, least = 1e-4 * s->n;
+    const double level = fmin(1.0, fmax(LEAST_LEVEL, s->middle / s->n_middle));
+    return var > least ? (s->xy - s->x * s->y / s->n) / var / level : 0.0;
 }
 
 static double highest(const double *x, int from, int to)
@@ -172,18 +183,19 @@ static void grade_window(void *context, size_t i_task, size_t i_thread)
     struct window *w = &j->window[i_task];
     struct slope slope = {0};
     double profile[N_PLACE] = {0.0};
-    size_t n_beside = 0;
+    size_t n_beside = 0, n_double = 0;
     (void)i_thread;
     scratch_keep_within(j->v->space);
     for (size_t i = w->first; i < w->first + w->n; i++) {
         const struct grade_point *q = grade_points_beside(&j->points, i, LEAST_APART, MOST_APART);
-        if (q != NULL) add_beside(j, &j->points.point[i], q, profile);
+        if (q != NULL) n_double += add_beside(j, &j->points.point[i], q, profile) < DOUBLE_APART;
         n_beside += q != NULL;
         add_patch(j, i, &slope);
     }
     w->is_beside = 2 * n_beside >= w->n;
     w->depth = depth_of(profile);
-    w->contrast = slope_of(&slope);
+    w->double_share = (double)n_double / (double)w->n;
+    w->contrast = contrast_of(&slope);
 }
 
 /* Cuts the points of every fiber into windows of about equal length. */
@@ -237,13 +249,14 @@ static status medians(const struct grade_job *j, struct scan_grade *grade, struc
 /* Adds up lengths; a point stands for half a radius of its fiber. */
 static void sum_lengths(const struct grade_job *j, struct scan_grade *grade, float *safe)
 {
-    double all = 0.0, beside = 0.0, sure = 0.0;
+    double all = 0.0, beside = 0.0, sure = 0.0, doubled = 0.0;
     for (size_t i = 0; i < j->n_window; i++) {
         const struct window *w = &j->window[i];
         size_t fiber = j->points.point[w->first].fiber;
         double length = (double)w->n * j->points.radius[fiber];
         all += length;
         beside += w->is_beside ? length : 0.0;
+        doubled += w->double_share * length;
         if (w->contrast < GRADE_SAFE_CONTRAST) continue;
         sure += length;
         if (safe != NULL)
@@ -251,6 +264,7 @@ static void sum_lengths(const struct grade_job *j, struct scan_grade *grade, flo
     }
     grade->beside_share = all > 0.0 ? beside / all : NAN;
     grade->safe_share = all > 0.0 ? sure / all : NAN;
+    grade->double_share = all > 0.0 ? doubled / all : NAN;
     grade->verdict = !(all > 0.0)                                 ? GRADE_NONE
                      : grade->safe_share >= GRADE_RESOLVED_SHARE  ? GRADE_RESOLVED
                      : grade->safe_share < GRADE_UNRESOLVED_SHARE ? GRADE_UNRESOLVED
@@ -278,7 +292,7 @@ status scan_grade_measure(const struct volume *v, const struct fiber_set *f, str
                           const struct progress *progress, struct scan_grade *grade, float *safe, struct error *err)
 {
     struct grade_job j = {.v = v};
-    *grade = (struct scan_grade){.valley_depth = NAN, .contrast = NAN};
+    *grade = (struct scan_grade){.valley_depth = NAN, .contrast = NAN, .score = NAN};
     for (size_t i = 0; i < f->n_fiber && safe != NULL; i++) safe[i] = 0.0f;
     status s = grade_windows(&j, f, pool, progress, err);
     if (s == STATUS_OK) sum_lengths(&j, grade, safe);

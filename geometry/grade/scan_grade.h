@@ -11,6 +11,8 @@
 
 #include "base/thread_pool.h"
 #include "geometry/fibers/fiber_set.h"
+#include "geometry/grade/fiber_likeness.h"
+#include "geometry/grade/scan_coverage.h"
 #include "geometry/volume/volume.h"
 
 enum { GRADE_WINDOW_DIAMETERS = 4 };
@@ -18,6 +20,18 @@ enum { GRADE_WINDOW_DIAMETERS = 4 };
 #define GRADE_SAFE_CONTRAST 0.5
 #define GRADE_RESOLVED_SHARE 0.85
 #define GRADE_UNRESOLVED_SHARE 0.5
+
+/* Faults of the lines that contrast does not show, and their limits. GRADE_KIND_SHARE: share of the material from which
+ * on a kind of material (scan_coverage.h) has to be explained by itself. */
+enum grade_fault { GRADE_UNEXPLAINED = 1, GRADE_PARTICLES = 2, GRADE_DOUBLED = 4, GRADE_PIECES = 8 };
+#define GRADE_LEAST_EXPLAINED 0.93
+#define GRADE_KIND_SHARE 0.05
+#define GRADE_LEAST_KIND 0.8
+#define GRADE_MOST_PARTICLES 0.05
+#define GRADE_MOST_DOUBLED 0.06
+#define GRADE_MOST_FRAGMENTS 1.4
+/* Score below which the lines do not describe the cloth. */
+#define GRADE_LEAST_SCORE 0.5
 
 enum grade_verdict { GRADE_NONE, GRADE_RESOLVED, GRADE_PARTLY, GRADE_UNRESOLVED };
 
@@ -27,7 +41,14 @@ struct scan_grade {
     double valley_depth;        /* median over windows beside a neighbour; NaN if no fiber has one */
     double beside_share;        /* share of the length that lies beside a neighbour */
     double safe_share;          /* share of the length in windows with a contrast of at least GRADE_SAFE_CONTRAST */
-    size_t n_dropped;           /* fibers that scan_grade_sort has put last; 0 after measuring */
+    double double_share;        /* share of the length that has another line nearer than fibers can be */
+    struct scan_coverage coverage;
+    struct fiber_likeness likeness;
+    /* Estimate of the smaller of recall and precision of the lines: the smaller of the explained share, and of the
+     * share of the length that is neither particles nor doubled, less a little for pieces. NaN: not measured. */
+    double score;
+    unsigned faults;  /* of enum grade_fault */
+    size_t n_dropped; /* fibers that scan_grade_sort has put last; 0 after measuring */
 };
 
 /* "none", "resolved", "partly" or "unresolved". */
@@ -36,6 +57,11 @@ const char *grade_verdict_name(enum grade_verdict v);
  * the number of threads. STATUS_NO_MEMORY, STATUS_CANCELLED. */
 status scan_grade_measure(const struct volume *v, const struct fiber_set *f, struct thread_pool *pool,
                           const struct progress *progress, struct scan_grade *grade, float *safe, struct error *err);
+/* Measures the coverage, looks at lines that may be no fibers, and sets score and faults. Call it after
+ * scan_grade_measure, with the same v, f, and safe. in: v, f, and their diameter, blur and noise. Errors as there, and
+ * STATUS_DISK_FULL. */
+status scan_grade_explain(const struct coverage_input *in, struct thread_pool *pool, struct scan_grade *grade,
+                          float *safe, struct error *err);
 /* Writes the contrast at every vertex, measured in the window around it: how clearly the scan shows the fiber there.
  * Below GRADE_SAFE_CONTRAST the scan does not show it, and the line is filled in. contrast: n_vertex; NaN for a fiber
  * too short to have a window. Else as scan_grade_measure. */

@@ -83,6 +83,14 @@ status reconstruct_fibers(const struct volume *v, const struct direction_volume 
                           struct thread_pool *pool, const struct progress *progress, struct fiber_set *f,
                           struct reconstruct_report *report, struct error *err);
 
+/* Last part of the step "fibers": grades the lines against the scan, into report->grade. safe: a share of safe length
+ * for each fiber, or NULL. STATUS_NO_MEMORY, STATUS_DISK_FULL, STATUS_CANCELLED. */
+status reconstruct_grade(const struct volume *v, const struct fiber_set *f, struct thread_pool *pool,
+                         struct reconstruct_report *report, float *safe, struct error *err);
+/* The input of scan_coverage_measure for fibers of this report. */
+struct coverage_input reconstruct_coverage_input(const struct volume *v, const struct fiber_set *f,
+                                                 const struct reconstruct_report *report);
+
 /* Optional part of the step "fibers": scans a phantom of the fibers f with the noise (its strength and its correlation)
  * and the blur of the scan v, reconstructs it, and writes into report->trial how well f is found again. At most
  * SCAN_TRIAL_VOXELS from the middle of the scan are tried. report: as filled by reconstruct_fibers. The phantom's

@@ -145,6 +145,35 @@ static void warn_grade(const struct warning_sink *warn, const struct scan_grade 
                      100.0 * g->safe_share);
 }
 
+/* Says which material no line explains, and which lines may be no fibers. */
+static void warn_faults(const struct warning_sink *warn, const struct scan_grade *g)
+{
+    const struct scan_coverage *c = &g->coverage;
+    if (g->faults & GRADE_UNEXPLAINED)
+        warning_send(
+            warn, OPTION_SCAN_FILES,
+            "no traced fiber explains %.0f %% of the material, whose density is about %.2f of the densest; most "
+            "of it lies in slices x %zu, y %zu, z %zu: if it is a lighter kind of "
+            "fiber, give a lower 'density_high'; if fibers of other diameters, give 'fiber_diameter_voxel'",
+            100.0 * (1.0 - c->explained_share), c->unexplained_density, c->slice[0], c->slice[1], c->slice[2]);
+    if (g->faults & GRADE_PARTICLES)
+        warning_send(warn, OPTION_SCAN_FILES,
+                     "%.0f %% of the traced length is in lines that are shorter than %.0f diameters and end inside of "
+                     "the scan at both ends: they may be particles",
+                     100.0 * g->likeness.particle_share, FIBER_LEAST_DIAMETERS);
+    if (g->faults & GRADE_DOUBLED)
+        warning_send(warn, OPTION_FIBER_DIAMETER,
+                     "%.0f %% of the traced length lies within another traced fiber, so thick fibers may hold several "
+                     "lines: give the diameter of the thickest fibers",
+                     100.0 * g->double_share);
+    if (g->faults & GRADE_PIECES)
+        warning_send(
+            warn, OPTION_SCAN_FILES,
+            "fibers are traced in about %.1f pieces each: %zu of %zu ends inside of the scan lie in the middle "
+            "of material",
+            g->likeness.fragments, g->likeness.n_lost_end, g->likeness.n_end);
+}
+
 void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fiber_set *f,
                              const struct warning_sink *warn)
 {
@@ -169,6 +198,7 @@ void reconstruct_warn_fibers(const struct reconstruct_report *r, const struct fi
             "on, and hardly below 4",
             r->fiber_diameter_voxel);
     warn_grade(warn, &r->grade);
+    warn_faults(warn, &r->grade);
     warn_unseen_lumens(warn, r);
     if (r->n[0] > 0 && r->dice > 0.0 && r->dice < 0.5)
         warning_send(warn, OPTION_NONE,

@@ -134,6 +134,17 @@ static void print_scan(const struct report *report, FILE *out)
     if (isfinite(g->grade.valley_depth))
         row(out, "valley between neighbours", "median fall of the density; small also between fibers that touch",
             "%.0f %%", 100.0 * g->grade.valley_depth);
+    row(out, "material that no fiber explains", "away from every traced fiber and denser than the void around it",
+        "%.1f %%", 100.0 * (1.0 - g->grade.coverage.explained_share));
+    if (g->grade.faults & GRADE_UNEXPLAINED)
+        row(out, "where it is", "slices across x, y, z with the most of it, and its density over the densest",
+            "%zu, %zu, %zu; %.2f", g->grade.coverage.slice[0], g->grade.coverage.slice[1], g->grade.coverage.slice[2],
+            g->grade.coverage.unexplained_density);
+    row(out, "length that may be no fibers",
+        "shorter than 5 diameters with both ends inside of the scan; within another one", "%.1f, %.1f %%",
+        100.0 * g->grade.likeness.particle_share, 100.0 * g->grade.double_share);
+    row(out, "pieces of a fiber", "by the ends that lie in the middle of material", "%.2f",
+        g->grade.likeness.fragments);
     row(out, "material explained (Dice)", "overlap of fibers and kept voxels; 1 is complete", "%.3f", g->dice);
     row(out, "voxels of material", "density of at least eps_d", "%zu", g->n_material_voxel);
     row(out, "voxels kept", "those with a clear direction", "%zu", g->n_kept_voxel);

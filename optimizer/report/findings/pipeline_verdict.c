@@ -100,6 +100,7 @@ void pipeline_reach_verdict(struct report *report)
     char not_determined[NAMES_BYTES] = "", at_bound[NAMES_BYTES] = "";
     struct verdict_facts facts = {.scan = scan_of(report),
                                   .scan_safe_share = report->in.made->geometry.grade.safe_share,
+                                  .grade = report->in.job->scan->given ? &report->in.made->geometry.grade : NULL,
                                   .n_input_warning = report->in.n_input_warning,
                                   .not_determined = not_determined,
                                   .at_bound = at_bound};

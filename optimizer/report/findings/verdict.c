@@ -134,6 +134,24 @@ static void reserve_fit(const struct verdict_facts *f, struct verdict *v)
     if (f->at_bound[0] != '\0') reserve(v, "parameters_at_bound", "At the edge of the allowed range: %s.", f->at_bound);
 }
 
+static void reserve_lines(const struct scan_grade *g, struct verdict *v)
+{
+    const struct scan_coverage *c = &g->coverage;
+    if (g->faults & GRADE_UNEXPLAINED)
+        reserve(v, "material_unexplained",
+                "No traced fiber explains %.0f %% of the material (density about %.2f of the densest), most of it near "
+                "slices x %zu, y %zu, z %zu.",
+                100.0 * (1.0 - c->explained_share), c->unexplained_density, c->slice[0], c->slice[1], c->slice[2]);
+    if (g->faults & GRADE_PARTICLES)
+        reserve(v, "lines_are_particles", "%.0f %% of the traced length may be particles in place of fibers.",
+                100.0 * g->likeness.particle_share);
+    if (g->faults & GRADE_DOUBLED)
+        reserve(v, "lines_within_fibers", "%.0f %% of the traced length lies within another traced fiber.",
+                100.0 * g->double_share);
+    if (g->faults & GRADE_PIECES)
+        reserve(v, "fibers_in_pieces", "Fibers are traced in about %.1f pieces each.", g->likeness.fragments);
+}
+
 static void reserve_input(const struct verdict_facts *f, struct verdict *v)
 {
     const double share = 100.0 * f->scan_safe_share;
@@ -144,6 +162,7 @@ static void reserve_input(const struct verdict_facts *f, struct verdict *v)
     if (f->scan == VERDICT_SCAN_PARTLY)
         reserve(v, "scan_partly_resolved", "The scan shows single fibers in part: %.0f %% of the length is sure.",
                 share);
+    if (f->grade != NULL) reserve_lines(f->grade, v);
     if (f->n_input_warning > 0)
         reserve(v, "input_warnings", "%zu warning%s about the input and its geometry; see the warnings.",
                 f->n_input_warning, f->n_input_warning == 1 ? "" : "s");
@@ -154,7 +173,8 @@ static void reserve_input(const struct verdict_facts *f, struct verdict *v)
 static bool does_not_describe(const struct verdict_facts *f)
 {
     const double error = sure_error(f);
-    if (!f->has_fit) return f->scan == VERDICT_SCAN_UNRESOLVED;
+    if (!f->has_fit)
+        return f->scan == VERDICT_SCAN_UNRESOLVED || (f->grade != NULL && f->grade->score < GRADE_LEAST_SCORE);
     if (above(error, VERDICT_FAR * f->allowed)) return true;
     if (isfinite(f->one_color_error) && above(error, f->one_color_error)) return true;
     return isfinite(f->plain_brdf_error) && above(error, VERDICT_NEAR * f->allowed) &&
@@ -164,7 +184,7 @@ static bool does_not_describe(const struct verdict_facts *f)
 static void put_text(const struct verdict_facts *f, struct verdict *v)
 {
     static const char *const of_scan[] = {
-        [VERDICT_GOOD] = "The scan shows single fibers.",
+        [VERDICT_GOOD] = "The scan shows single fibers, and they explain its material.",
         [VERDICT_USABLE] = "The traced fibers can be used with reservations.",
         [VERDICT_DOES_NOT_DESCRIBE] = "The traced fibers do not describe this cloth.",
     };

@@ -11,10 +11,13 @@
  *   good                           otherwise
  *
  * From the error two of its standard errors are subtracted first, so noise of the rendering condemns nothing. Without a
- * fit (a job that ends with the geometry) the grade of the scan decides alone: unresolved, partly, resolved. */
+ * fit (a job that ends with the geometry) the grade of the scan decides alone: it does not describe the cloth if single
+ * fibers are unresolved or its score is below GRADE_LEAST_SCORE, and is good if they are resolved and have no faults
+ * (scan_grade.h). */
 #ifndef SELVEDGE_OPTIMIZER_VERDICT_H
 #define SELVEDGE_OPTIMIZER_VERDICT_H
 
+#include "geometry/grade/scan_grade.h"
 #include "optimizer/photographs/rows/observation.h"
 
 #include <jansson.h>
@@ -34,7 +37,7 @@ enum verdict_code { VERDICT_NONE, VERDICT_GOOD, VERDICT_USABLE, VERDICT_DOES_NOT
 enum verdict_rows { VERDICT_HELD_OUT, VERDICT_LEFT_OUT, VERDICT_FITTED }; /* rows that the error is about */
 enum verdict_scan { VERDICT_NO_SCAN, VERDICT_SCAN_RESOLVED, VERDICT_SCAN_PARTLY, VERDICT_SCAN_UNRESOLVED };
 
-enum { VERDICT_MAX_RESERVATION = 12, VERDICT_TEXT_BYTES = 320 };
+enum { VERDICT_MAX_RESERVATION = 16, VERDICT_TEXT_BYTES = 320 };
 
 /* The facts behind a verdict. Texts are lists of names, "a, b, c", or "". */
 struct verdict_facts {
@@ -48,7 +51,8 @@ struct verdict_facts {
     const char *not_determined, *at_bound;
     enum verdict_scan scan;
     double scan_safe_share;
-    size_t n_input_warning; /* warnings about the input and its geometry */
+    const struct scan_grade *grade; /* faults of the lines; NULL: none are known */
+    size_t n_input_warning;         /* warnings about the input and its geometry */
 };
 
 struct verdict_reservation {

@@ -111,13 +111,32 @@ static json_t *texture_json(const struct report *report)
     return json;
 }
 
-/* The grade of the scan: how clearly it shows the fibers. */
+/* What no line explains, and which lines may be no fibers. */
+static void set_faults(json_t *json, const struct scan_grade *g)
+{
+    const struct scan_coverage *c = &g->coverage;
+    const bool where = isfinite(c->unexplained_density);
+    json_object_set_new(json, "score", json_number(g->score));
+    json_object_set_new(json, "unexplained_share", json_number(1.0 - c->explained_share));
+    json_object_set_new(json, "unexplained_density", json_number(c->unexplained_density));
+    json_object_set_new(json, "unexplained_slices", where ? json_count_list(c->slice, 3) : json_null());
+    json_object_set_new(json, "dense_explained_share", json_number(c->kind[COVERAGE_DENSE_KIND].explained_share));
+    json_object_set_new(json, "light_explained_share", json_number(c->kind[COVERAGE_LIGHT_KIND].explained_share));
+    json_object_set_new(json, "light_share", json_number(c->kind[COVERAGE_LIGHT_KIND].share));
+    json_object_set_new(json, "particle_share", json_number(g->likeness.particle_share));
+    json_object_set_new(json, "double_share", json_number(g->double_share));
+    json_object_set_new(json, "pieces_per_fiber", json_number(g->likeness.fragments));
+}
+
+/* The grade of the scan: how clearly it shows the fibers, and how much of it they explain. */
 static json_t *grade_json(const struct scan_grade *g)
 {
-    return json_pack("{s:s, s:o, s:o, s:o, s:o, s:o}", "verdict", grade_verdict_name(g->verdict), "contrast",
-                     json_number(g->contrast), "valley_depth", json_number(g->valley_depth), "beside_share",
-                     json_number(g->beside_share), "safe_share", json_number(g->safe_share), "n_dropped",
-                     json_count(g->n_dropped));
+    json_t *json = json_pack("{s:s, s:o, s:o, s:o, s:o, s:o}", "verdict", grade_verdict_name(g->verdict), "contrast",
+                             json_number(g->contrast), "valley_depth", json_number(g->valley_depth), "beside_share",
+                             json_number(g->beside_share), "safe_share", json_number(g->safe_share), "n_dropped",
+                             json_count(g->n_dropped));
+    set_faults(json, g);
+    return json;
 }
 
 /* The quality that such a scan can give; null unless a trial was asked for and could be made. */

@@ -254,7 +254,7 @@ static status grade_fibers(const struct fibers_input *in, struct fibers_output *
     struct reconstruct_report *g = &out->geometry;
     float *safe = malloc((out->fiber.n_fiber + 1) * sizeof *safe);
     if (safe == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot grade the scan: out of memory");
-    status s = scan_grade_measure(&in->volume->volume, &out->fiber, in->tools->pool, NULL, &g->grade, safe, err);
+    status s = reconstruct_grade(&in->volume->volume, &out->fiber, in->tools->pool, g, safe, err);
     if (s == STATUS_OK && g->grade.verdict == GRADE_UNRESOLVED) s = scan_grade_sort(&out->fiber, safe, &g->grade, err);
     free(safe);
     if (s == STATUS_OK) reconstruct_tell_lumens(&in->volume->volume, g);

@@ -33,8 +33,8 @@ static status compare(struct phantom_reconstruction *r, const struct direction_v
 static status grade(struct phantom_reconstruction *r, struct thread_pool *pool, struct error *err)
 {
     double start_s = clock_monotonic_s(), start_cpu_s = clock_process_s();
-    status s = scan_grade_measure(&r->v, &r->found, pool, NULL, &r->grade, NULL, err);
-    r->report.grade = r->grade;
+    status s = reconstruct_grade(&r->v, &r->found, pool, &r->report, NULL, err);
+    r->grade = r->report.grade;
     r->wall_s -= clock_monotonic_s() - start_s;
     r->cpu_s -= clock_process_s() - start_cpu_s;
     return s;

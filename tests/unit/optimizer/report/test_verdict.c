@@ -117,6 +117,15 @@ static void test_geometry_alone(void **state)
     expect(f, VERDICT_USABLE, "scan_partly_resolved");
     f.scan = VERDICT_SCAN_UNRESOLVED;
     expect(f, VERDICT_DOES_NOT_DESCRIBE, "scan_not_resolved");
+    f.scan = VERDICT_SCAN_RESOLVED;
+    struct scan_grade g = {.score = 0.9};
+    f.grade = &g;
+    expect(f, VERDICT_GOOD, "");
+    g.faults = GRADE_UNEXPLAINED | GRADE_PARTICLES | GRADE_DOUBLED | GRADE_PIECES;
+    expect(f, VERDICT_USABLE, "material_unexplained lines_are_particles lines_within_fibers fibers_in_pieces");
+    g = (struct scan_grade){.score = 0.4, .faults = GRADE_UNEXPLAINED};
+    expect(f, VERDICT_DOES_NOT_DESCRIBE, "material_unexplained");
+    f.grade = NULL;
     f.scan = VERDICT_NO_SCAN;
     expect(f, VERDICT_NONE, "");
     verdict_reach(&f, &v);

@@ -1,0 +1,32 @@
+/* The score of a reconstruction and its faults. Scores were compared with the smaller of recall and precision, and
+ * limits chosen, on scans whose fibers are known (tests/bench/verdict). */
+#include "geometry/grade/scan_grade.h"
+
+#include <math.h>
+
+/* Loss of score for each piece a fiber beyond the first. */
+static const double PIECE_LOSS = 0.05;
+
+static bool explains(const struct scan_coverage *c)
+{
+    bool enough = !(c->explained_share < GRADE_LEAST_EXPLAINED);
+    for (int k = 0; k < COVERAGE_KINDS; k++)
+        enough = enough && !(c->kind[k].share >= GRADE_KIND_SHARE && c->kind[k].explained_share < GRADE_LEAST_KIND);
+    return enough;
+}
+
+status scan_grade_explain(const struct coverage_input *in, struct thread_pool *pool, struct scan_grade *grade,
+                          float *safe, struct error *err)
+{
+    status s = scan_coverage_measure(in, pool, NULL, &grade->coverage, err);
+    if (s != STATUS_OK) return s;
+    fiber_likeness_measure(in->v, in->f, safe, &grade->likeness);
+    const struct fiber_likeness *l = &grade->likeness;
+    const double of_fibers = (1.0 - l->particle_share) * (1.0 - grade->double_share);
+    grade->score = fmin(grade->coverage.explained_share, of_fibers / (1.0 + PIECE_LOSS * (l->fragments - 1.0)));
+    grade->faults = (explains(&grade->coverage) ? 0U : GRADE_UNEXPLAINED) |
+                    (l->particle_share > GRADE_MOST_PARTICLES ? GRADE_PARTICLES : 0U) |
+                    (grade->double_share > GRADE_MOST_DOUBLED ? GRADE_DOUBLED : 0U) |
+                    (l->fragments > GRADE_MOST_FRAGMENTS ? GRADE_PIECES : 0U);
+    return STATUS_OK;
+}
