@@ -5,7 +5,7 @@
 
 /* At most EDGE columns and rows of a slice are looked at; quantiles come from about N_QUANTILE values. */
 enum { EDGE = 512, N_QUANTILE = 1 << 16 };
-static const double LEAST_DISTANCE = 0.1, LEAST_SHARE = 0.005, MOST_SHARE = 0.95;
+static const double LEAST_GAP = 0.02, MOST_NEAR = 0.001, LEAST_DISTANCE = 0.1, LEAST_SHARE = 0.005, MOST_SHARE = 0.95;
 static const double MOST_BETWEEN = 0.02, MOST_BETWEEN_OTHERS = 0.005;
 
 struct lattice {
@@ -94,12 +94,22 @@ static status measure_others(const struct lattice *l, float code, struct others 
     return STATUS_OK;
 }
 
+/* Returns whether a code is far from the other values: all of them, or all but a few in the tail of the noise. */
+static bool is_apart(const struct lattice *l, float code, const struct others *o)
+{
+    const double distance = (double)code < o->least ? o->least - (double)code : (double)code - o->most;
+    size_t n_near = 0;
+    if (!(o->spread > 0.0) || !(distance >= LEAST_GAP * o->spread)) return false;
+    for (size_t i = 0; i < n_all(l); i++)
+        n_near += !is_code(l, l->value[i], code) && fabs((double)(l->value[i] - code)) < LEAST_DISTANCE * o->spread;
+    return (double)n_near <= MOST_NEAR * (double)o->n;
+}
+
 static bool is_padding(const struct lattice *l, float code, const struct others *o, bool stated)
 {
     const double n = (double)n_all(l), share = (double)o->n_code / n;
-    const double distance = (double)code < o->least ? o->least - (double)code : (double)code - o->most;
     if (share < LEAST_SHARE || share > MOST_SHARE || o->n == 0) return false;
-    if (isfinite(code) && !stated && !(o->spread > 0.0 && distance >= LEAST_DISTANCE * o->spread)) return false;
+    if (isfinite(code) && !stated && !is_apart(l, code, o)) return false;
     const double between = (double)between_others(l, code);
     return between <= MOST_BETWEEN * (double)o->n_code && between <= MOST_BETWEEN_OTHERS * (double)o->n;
 }

@@ -17,8 +17,8 @@ struct scan_look {
 };
 
 /* Reads up to SCAN_LOOK_SLICES slices, evenly from the first to the last. A value is padding where
- *  - it is NaN, infinite, or beyond all other values by a tenth of their spread (from the 1 % to the 99 %
- *    quantile),
+ *  - it is NaN, infinite, or beyond all other values by 2 % of their spread (from the 1 % to the 99 % quantile), with
+ *    at most a thousandth of them, the tail of the noise, nearer than a tenth of the spread,
  *  - at least 0.5 % and at most 95 % of the voxels have it,
  *  - it fills the ends of rows, columns and lines along z: of its voxels at most 2 %, and at most 0.5 % of the number
  *    of others, lie between others. A field of view is convex; void in cloth is not, so a clipped void is no padding.

@@ -78,6 +78,22 @@ static void test_fields_of_view(void **state)
         }
 }
 
+/* Zero outside of a round view whose void has values down to 12 of 255, as 8-bit exports have; and zero that clips the
+ * same noise. */
+static void test_near_the_noise(void **state)
+{
+    for (int clipped = 0; clipped < 2; clipped++) {
+        draw(800.0);
+        for (int i = 0; i < N; i++) {
+            const float v = rintf((scan[i] - 800.0f) / 14.0f);
+            scan[i] = fmaxf(clipped ? 0.0f : 12.0f, clipped ? v - 80.0f : v);
+            if (!in_cylinder(i % NX, i / NX % NY, 0)) scan[i] = 0.0f;
+        }
+        const struct scan_look look = look_at(state, "float32");
+        assert_int_equal(look.n_padding, clipped ? 0 : 1);
+    }
+}
+
 static void test_two_codes(void **state)
 {
     draw(600.0);
@@ -123,9 +139,8 @@ static void test_single_voxels(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_fields_of_view),
-        cmocka_unit_test(test_two_codes),
-        cmocka_unit_test(test_void_is_no_padding),
+        cmocka_unit_test(test_fields_of_view), cmocka_unit_test(test_near_the_noise),
+        cmocka_unit_test(test_two_codes),      cmocka_unit_test(test_void_is_no_padding),
         cmocka_unit_test(test_single_voxels),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
