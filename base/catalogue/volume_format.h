@@ -9,6 +9,7 @@ enum { VOLUME_MAX_ENDING = 4, VOLUME_MAX_KEY = 2 };
 struct volume_format {
     const char *ending[VOLUME_MAX_ENDING]; /* in lower case; NULL after the last one */
     bool may_be_slices;                    /* a scan may be a folder of such files, one slice each */
+    bool orders_itself;                    /* its slices state their order, so their names do not */
     /* A file with this ending is a header that names its data file: a line with one of the keys, the separator and the
      * name, or LOCAL. NULL: the format has no such headers. */
     const char *header_ending;

@@ -95,6 +95,35 @@ static void array_seeds(const uint8_t data[120])
     put("nifti", "u8.nii", "", nifti, sizeof nifti);
 }
 
+/* A slice of DICOM in explicit little-endian, 6 x 5 pixels of 16 bits, with two frames. */
+static void dicom_seed(const uint8_t data[120])
+{
+    static const char element[] = "\x02\0\x10\0UI\x14\0"
+                                  "1.2.840.10008.1.2.1\0"
+                                  "\x20\0\x32\0DS\x06\0"
+                                  "0\\0\\0 "
+                                  "\x20\0\x37\0DS\x0c\0"
+                                  "1\\0\\0\\0\\1\\0 "
+                                  "\x28\0\x02\0US\x02\0\x01\0"
+                                  "\x28\0\x04\0CS\x0c\0MONOCHROME2 "
+                                  "\x28\0\x08\0IS\x02\0"
+                                  "2 "
+                                  "\x28\0\x10\0US\x02\0\x05\0"
+                                  "\x28\0\x11\0US\x02\0\x06\0"
+                                  "\x28\0\x30\0DS\x04\0"
+                                  "2\\2 "
+                                  "\x28\0\x00\1US\x02\0\x10\0"
+                                  "\x28\0\x01\1US\x02\0\x0c\0"
+                                  "\x28\0\x02\1US\x02\0\x0b\0"
+                                  "\x28\0\x03\1US\x02\0\x01\0"
+                                  "\xe0\x7f\x10\0OW\0\0\x78\0\0";
+    uint8_t file[132 + sizeof element + 120] = {0};
+    memcpy(file + 128, "DICM", 4);
+    memcpy(file + 132, element, sizeof element);
+    memcpy(file + 132 + sizeof element, data, 120);
+    put("dicom", "two-frames.dcm", "", file, sizeof file);
+}
+
 static void header_seeds(void)
 {
     uint8_t data[120], packed[256];
@@ -120,6 +149,7 @@ static void header_seeds(void)
         "1\n\nline\n",
         packed, n_packed);
     array_seeds(data);
+    dicom_seed(data);
     put("raw", "u8", "\x06\x05\x04", "\0\0\0", 3);
     uint8_t raw[126] = {5, 4, 3, 1, 2, 0};
     memcpy(raw + 6, data, 120);

@@ -47,7 +47,7 @@ static status list_slices(const char *folder, json_t *files, struct error *err)
     free(name);
     if (s != STATUS_OK) return s;
     if (!ok) return error_set(err, STATUS_NO_MEMORY, "cannot list the folder '%s': out of memory", folder);
-    return n > 0 ? STATUS_OK : error_set(err, STATUS_NOT_FOUND, "the folder '%s' has no TIFF files", folder);
+    return n > 0 ? STATUS_OK : error_set(err, STATUS_NOT_FOUND, "the folder '%s' has no TIFF or DICOM files", folder);
 }
 
 /* Whether the first n characters of the line are a key of the format, whatever the case. */

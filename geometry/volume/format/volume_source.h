@@ -15,9 +15,9 @@
 struct volume_source;
 
 /* Opens a scan. path: one multi-page TIFF, one .mhd or .mha, one .nrrd or .nhdr (data file beside it), one .vol, one
- * .npy, one .nii, .nii.gz or .hdr (with its .img), one HDF5, or TIFF slices in order. The field of errors is
- * OPTION_SCAN_FILES. STATUS_IO, STATUS_NOT_FOUND; STATUS_FORMAT for files that do not have their stated format;
- * STATUS_UNSUPPORTED. */
+ * .npy, one .nii, .nii.gz or .hdr (with its .img), one HDF5, TIFF slices in order, or DICOM
+ * slices in any order. The field of errors is OPTION_SCAN_FILES. STATUS_IO, STATUS_NOT_FOUND; STATUS_FORMAT for files
+ * that do not have their stated format; STATUS_INVALID for slices without an order; STATUS_UNSUPPORTED. */
 status volume_source_open(const char *const *path, size_t n_path, struct volume_source **source, struct error *err);
 /* The same; with a declaration (n[0] > 0) the only file at path has raw samples. part: the channel and the time of a
  * file that has several, which is an error where none is chosen. raw and part may be NULL. Fields also OPTION_RAW,

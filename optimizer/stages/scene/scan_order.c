@@ -9,12 +9,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Whether every file can be a slice: a header and its data are no set. */
+/* Whether every file can be a slice whose name gives its place: a header and its data are no set. */
 static bool is_set(const struct job_scan *scan)
 {
     for (size_t i = 0; i < scan->n_file; i++) {
         const struct volume_format *format = volume_format_of(scan->file[i]);
-        if (format == NULL || !format->may_be_slices) return false;
+        if (format == NULL || !format->may_be_slices || format->orders_itself) return false;
     }
     return scan->n_file > 1;
 }

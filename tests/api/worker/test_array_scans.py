@@ -97,6 +97,54 @@ def test_h5py_writes_files_that_are_read(real, cloth, truth, tmp_path, kept):
     assert fibers(real, tmp_path / "out", tmp_path / "scan.h5") == truth
 
 
+def dicom(path, pydicom, samples, **stated):
+    """Writes a file of one or several frames; stated: further attributes."""
+    meta = pydicom.dataset.FileMetaDataset()
+    meta.TransferSyntaxUID = pydicom.uid.ExplicitVRLittleEndian
+    meta.MediaStorageSOPClassUID = "1.2.840.10008.5.1.4.1.1.2"
+    meta.MediaStorageSOPInstanceUID = pydicom.uid.generate_uid()
+    d = pydicom.dataset.FileDataset(str(path), {}, file_meta=meta, preamble=bytes(128))
+    d.is_little_endian, d.is_implicit_VR = True, False
+    d.SeriesInstanceUID = "1.2.3"
+    d.Rows, d.Columns = samples.shape[-2:]
+    d.SamplesPerPixel, d.PhotometricInterpretation, d.PixelRepresentation = 1, "MONOCHROME2", 0
+    d.BitsAllocated = d.BitsStored = 8 * samples.dtype.itemsize
+    d.HighBit = d.BitsStored - 1
+    for key, value in stated.items():
+        setattr(d, key, value)
+    d.PixelData = samples.tobytes()
+    d["PixelData"].VR = "OW"
+    d.save_as(str(path), write_like_original=False)
+
+
+def test_a_folder_of_slices_that_pydicom_writes_is_read_by_positions(real, cloth, truth, tmp_path):
+    pydicom = pytest.importorskip("pydicom")
+    (tmp_path / "slices").mkdir()
+    for z, page in enumerate(cloth):
+        dicom(tmp_path / "slices" / f"I{7919 * (z + 3) % 1009:05}.dcm", pydicom, page, ImageOrientationPatient=[1, 0, 0, 0, 1, 0],
+              ImagePositionPatient=[0, 0, 0.002 * z], PixelSpacing=[0.002, 0.002], SliceThickness=0.005)
+    assert fibers(real, tmp_path / "out", tmp_path / "slices") == truth
+
+
+def test_frames_of_one_file_are_read_by_positions(real, cloth, truth, tmp_path):
+    pydicom = pytest.importorskip("pydicom")
+
+    def group(**sequences):
+        d = pydicom.dataset.Dataset()
+        for name, members in sequences.items():
+            inner = pydicom.dataset.Dataset()
+            for key, value in members.items():
+                setattr(inner, key, value)
+            setattr(d, name, [inner])
+        return d
+    n = len(cloth)
+    shared = group(PixelMeasuresSequence={"PixelSpacing": [0.002, 0.002]}, PlaneOrientationSequence={"ImageOrientationPatient": [1, 0, 0, 0, 1, 0]})
+    frames = [group(PlanePositionSequence={"ImagePositionPatient": [0, 0, 0.002 * (n - z)]}) for z in range(n)]
+    dicom(tmp_path / "all.dcm", pydicom, cloth[::-1].copy(), NumberOfFrames=n, SharedFunctionalGroupsSequence=[shared],
+          PerFrameFunctionalGroupsSequence=frames)
+    assert fibers(real, tmp_path / "out", tmp_path / "all.dcm") == truth
+
+
 # ---- statements ----
 
 def sample(numpy, value=1000):

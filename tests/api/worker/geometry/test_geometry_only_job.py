@@ -113,7 +113,7 @@ def test_what_the_command_line_says_of_fibers(real, tmp_path):
 
 
 @pytest.mark.parametrize("words,text", [
-    (["nothing.tif"], "cannot read the scan 'nothing.tif'"), ([".", "--voxel-um", "2"], "has no TIFF files"),
+    (["nothing.tif"], "cannot read the scan 'nothing.tif'"), ([".", "--voxel-um", "2"], "has no TIFF or DICOM files"),
     (["lost.mhd"], "does not name its data file"), *((["scan.tif", "--voxel-um", um], "--voxel-um") for um in ("2,3", "2,,3", "2,", "-2")),
     (["scan.tif", "--hollow", "maybe"], "'--hollow' takes yes or no: 'maybe'"),
     (["scan.tif", "--diameter-voxel", "0"], "'--diameter-voxel' takes a number above 0"),

@@ -48,9 +48,9 @@ static void test_raw(void **state)
 /* The first bytes of the files of each reader, and of a file that no reader takes. */
 static const struct {
     char id[16], byte[16];
-} beginning[] = {
-    {"tiff.v1", "II*"},        {"metaimage.v1", "NDims = 3\n"}, {"nrrd.v1", "NRRD0004\n"},        {"vol.v1", "VOL\3"},
-    {"npy.v1", "\x93NUMPY\1"}, {"nifti.v1", "\x5c\1"},          {"hdf5.v1", "\x89HDF\r\n\x1a\n"}, {"", "hello, there"}};
+} beginning[] = {{"tiff.v1", "II*"},           {"metaimage.v1", "NDims = 3\n"},  {"nrrd.v1", "NRRD0004\n"},
+                 {"vol.v1", "VOL\3"},          {"npy.v1", "\x93NUMPY\1"},        {"nifti.v1", "\x5c\1"},
+                 {"dicom.v1", "\2\0\0\0UL\4"}, {"hdf5.v1", "\x89HDF\r\n\x1a\n"}, {"", "hello, there"}};
 
 static const char *beginning_of(const char *reader_id)
 {
