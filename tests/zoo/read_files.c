@@ -1,7 +1,9 @@
 /* Reads foreign files as the worker does, and prints what it found: one JSON object for each line of standard input.
  *
- *   scan PATH [CHANNEL TIME]       a scan of one file; channel and time count from 1, 0: not chosen
- *   photograph PATH TRANSFER       TRANSFER: "linear" or "srgb", or "file" for the curve that the file states
+ *   scan PATH CHANNEL TIME DATASET [PATH ...]
+ *       a scan of one or more files; channel and time count from 1, 0: not chosen
+ *   photograph PATH TRANSFER
+ *       TRANSFER: "linear" or "srgb", or "file" for the curve that the file states
  *
  * Samples go to PATH.values as 32-bit floats in the order of the file: slices, rows and columns of a scan, and rows,
  * columns and three channels of a photograph. A file that is refused gives {"refused": MESSAGE}. tests/zoo/zoo.py
@@ -16,7 +18,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_PIXELS = 1 << 22, PATH_BYTES = 4000 };
+enum { MOST_PIXELS = 1 << 22, PATH_BYTES = 4000, MOST_PATHS = 64 };
 
 static json_t *ledger_json(const struct file_ledger *ledger)
 {
@@ -48,11 +50,12 @@ static json_t *refusal(const struct error *err) { return json_pack("{s:s}", "ref
 /* JSON has no NaN: a number that is not stated is null. */
 static json_t *number(double x) { return isfinite(x) ? json_real(x) : json_null(); }
 
-static json_t *read_scan(const char *path, const struct volume_part *part)
+static json_t *read_scan(const char *const *paths, size_t n_path, const struct volume_part *part)
 {
+    const char *path = paths[0];
     struct volume_source *source = NULL;
     struct error err = {0};
-    if (volume_source_open_declared(&path, 1, NULL, part, &source, &err) != STATUS_OK) return refusal(&err);
+    if (volume_source_open_declared(paths, n_path, NULL, part, &source, &err) != STATUS_OK) return refusal(&err);
     const struct volume_source_info *info = volume_source_describe(source);
     const size_t n = info->n[0] * info->n[1] * info->n[2];
     float *value = n <= MOST_PIXELS ? malloc((n + 1) * sizeof *value) : NULL;
@@ -100,13 +103,16 @@ static json_t *read_photograph(const char *path, const char *transfer)
 static json_t *answer(char *line)
 {
     char *rest = line;
-    const char *kind = strsep(&rest, "\t"), *path = strsep(&rest, "\t"), *third = strsep(&rest, "\t");
-    const char *fourth = strsep(&rest, "\t");
-    if (path == NULL || third == NULL || strlen(path) >= PATH_BYTES) return NULL;
-    if (strcmp(kind, "photograph") == 0) return read_photograph(path, third);
-    if (strcmp(kind, "scan") != 0 || fourth == NULL) return NULL;
-    return read_scan(path,
-                     &(struct volume_part){.channel = strtoul(third, NULL, 10), .time = strtoul(fourth, NULL, 10)});
+    const char *kind = strsep(&rest, "\t"), *path[MOST_PATHS] = {strsep(&rest, "\t")}, *third = strsep(&rest, "\t");
+    if (path[0] == NULL || third == NULL || strlen(path[0]) >= PATH_BYTES) return NULL;
+    if (strcmp(kind, "photograph") == 0) return read_photograph(path[0], third);
+    const char *time = strsep(&rest, "\t"), *dataset = strsep(&rest, "\t");
+    if (strcmp(kind, "scan") != 0 || dataset == NULL) return NULL;
+    size_t n = 1;
+    while (rest != NULL && n < MOST_PATHS) path[n++] = strsep(&rest, "\t");
+    struct volume_part part = {.channel = strtoul(third, NULL, 10), .time = strtoul(time, NULL, 10)};
+    snprintf(part.dataset, sizeof part.dataset, "%s", dataset);
+    return read_scan(path, n, &part);
 }
 
 int main(void)

@@ -23,15 +23,21 @@ class Refused:
 @dataclasses.dataclass
 class Specimen:
     """name: of the file, unique in the zoo. kind: "scan" or "photograph". how: fields of the line that read_files.c takes behind the
-    path. make(path): writes the file and returns Right or Refused."""
+    path. make(path): writes the file and returns Right or Refused. parts: number of files of a scan; those after the first are at
+    beside(path, 1), beside(path, 2), ..."""
     name: str
     kind: str
     how: tuple
     make: typing.Callable
+    parts: int = 1
 
 
-def scan(name, make, channel=0, time=0):
-    return Specimen(name, "scan", (str(channel), str(time)), make)
+def beside(path, i):
+    return f"{path}.{i}"
+
+
+def scan(name, make, channel=0, time=0, dataset="", parts=1):
+    return Specimen(name, "scan", (str(channel), str(time), dataset), make, parts)
 
 
 def photograph(name, make, transfer="linear"):

@@ -18,8 +18,9 @@ import tempfile
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 try:
     import numpy
-    from specimen import Refused
+    from specimen import Refused, beside
     from zoo_arrays import arrays
+    from zoo_containers import containers
     from zoo_photographs import photographs
     from zoo_scans import scans
     from zoo_variants import variants
@@ -79,11 +80,11 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         folder = arguments.keep or scratch
         os.makedirs(folder, exist_ok=True)
-        zoo = [s for s in [*scans(), *arrays(), *photographs(), *variants()] if not arguments.name or any(n in s.name for n in arguments.name)]
+        zoo = [s for s in [*scans(), *arrays(), *containers(), *photographs(), *variants()] if not arguments.name or any(n in s.name for n in arguments.name)]
         paths = [os.path.join(folder, s.name) for s in zoo]
         assert len(set(paths)) == len(paths), "two files of one name"
         wanted = [s.make(p) for s, p in zip(zoo, paths)]
-        lines = "".join("\t".join((s.kind, p, *s.how)) + "\n" for s, p in zip(zoo, paths))
+        lines = "".join("\t".join((s.kind, p, *s.how, *(beside(p, i) for i in range(1, s.parts)))) + "\n" for s, p in zip(zoo, paths))
         done = subprocess.run([arguments.reader], input=lines, capture_output=True, text=True, check=False)
         answers = [json.loads(line) for line in done.stdout.splitlines()]
         if done.returncode != 0 or len(answers) != len(zoo):
