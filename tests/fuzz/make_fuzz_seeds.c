@@ -8,6 +8,7 @@
 #include "tests/support/camera_files.h"
 #include "tests/support/rgl_bytes.h"
 
+#include <hdf5.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -124,6 +125,23 @@ static void dicom_seed(const uint8_t data[120])
     put("dicom", "two-frames.dcm", "", file, sizeof file);
 }
 
+/* A data set of HDF5 in deflated chunks. */
+static void hdf5_seed(const uint8_t data[120])
+{
+    static const hsize_t size[3] = {4, 5, 6}, chunk[3] = {2, 3, 4};
+    const hid_t file = H5Fcreate(seed_path("hdf5", "u8z.h5"), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+    const hid_t plan = H5Pcreate(H5P_DATASET_CREATE), space = H5Screate_simple(3, size, NULL);
+    H5Pset_chunk(plan, 3, chunk);
+    H5Pset_shuffle(plan);
+    H5Pset_deflate(plan, 6);
+    const hid_t set = H5Dcreate2(file, "scan", H5T_STD_U8LE, space, H5P_DEFAULT, plan, H5P_DEFAULT);
+    must(H5Dwrite(set, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0, "HDF5");
+    H5Dclose(set);
+    H5Sclose(space);
+    H5Pclose(plan);
+    must(H5Fclose(file) >= 0, "HDF5");
+}
+
 static void header_seeds(void)
 {
     uint8_t data[120], packed[256];
@@ -150,6 +168,7 @@ static void header_seeds(void)
         packed, n_packed);
     array_seeds(data);
     dicom_seed(data);
+    hdf5_seed(data);
     put("raw", "u8", "\x06\x05\x04", "\0\0\0", 3);
     uint8_t raw[126] = {5, 4, 3, 1, 2, 0};
     memcpy(raw + 6, data, 120);
