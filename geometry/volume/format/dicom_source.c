@@ -186,7 +186,8 @@ static void state(const struct dicom *m, struct volume_source_info *info, double
 }
 
 /* The axes: columns, rows, and slices from the first to the last. */
-static status settle(struct dicom *m, double step, struct volume_source_info *info, struct error *err)
+static status settle(struct dicom *m, double step, const struct volume_part *part, struct volume_source_info *info,
+                     struct error *err)
 {
     static const char *const type[2][3] = {{"uint8", "uint16", "uint32"}, {"int8", "int16", "int32"}};
     const struct dicom_file *f = &m->first;
@@ -218,7 +219,7 @@ static status settle(struct dicom *m, double step, struct volume_source_info *in
         if (!(fabs(v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - 1.0) < 1e-2))
             return refuse(m->header.name, "its directions of columns and rows are no unit vectors", err);
     }
-    return header_axes_settle(&axes, &m->header, NULL, info, err);
+    return header_axes_settle(&axes, &m->header, part, info, err);
 }
 
 static void dicom_close(void *handle)
@@ -251,14 +252,13 @@ static status start(struct dicom *m, const char *const *path, size_t n_path, str
 static status dicom_open(const char *const *path, size_t n_path, const struct volume_part *part, void **handle,
                          struct volume_source_info *info, struct error *err)
 {
-    (void)part; /* several series, times or channels are several volumes, which a list of files chooses from */
     double step = NAN;
     struct dicom *m = calloc(1, sizeof *m);
     if (m == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
     status s = start(m, path, n_path, err);
     if (s == STATUS_OK) s = read_files(m, err);
     if (s == STATUS_OK) s = sort_slices(m, &step, err);
-    if (s == STATUS_OK) s = settle(m, step, info, err);
+    if (s == STATUS_OK) s = settle(m, step, part, info, err);
     if (s == STATUS_OK) m->buffer = malloc(m->first.rows * m->first.columns * (m->first.bits_allocated / 8));
     if (s == STATUS_OK && m->buffer == NULL) s = error_set(err, STATUS_NO_MEMORY, "cannot read volume: out of memory");
     if (s == STATUS_OK)

@@ -222,6 +222,10 @@ static void test_refused(void **state)
     s[0] = plain;
     s[0].frames = "9";
     expect_open(state, s, 1, STATUS_FORMAT, "too short for its frames");
+    const struct volume_part second = {.channel = 2};
+    struct volume_source *none = NULL;
+    const char *const *one = write_slices(state, &plain, 1);
+    assert_int_equal(volume_source_open_declared(one, 1, NULL, &second, &none, NULL), STATUS_INVALID);
     const struct writer whole_file = slice_bytes(&plain);
     const char *path = scratch_path(state, "cut.dcm");
     for (size_t n = 132; n < whole_file.n; n++) {
