@@ -57,9 +57,10 @@ bench-pile: | deps-test ## previews of velvets by dual scattering and by diffusi
 
 # WEAVES, CONDITIONS: comma-separated, such as WEAVES=twill CONDITIONS=spread,hollow; then without time and memory
 bench-geometry: | deps-test ## accuracy of reconstructed fibers on phantoms and real scans; time and memory
-	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %/bench_geometry %/bench_geometry_size,$(BENCH_BINS)) >&2
+	@$(MAKE) --no-print-directory -j$$(nproc) all $(filter %/bench_geometry %/bench_geometry_size %/bench_verdict,$(BENCH_BINS)) >&2
 	@$(BUILD)/tests/bench/bench_geometry $(if $(WEAVES),--weaves $(WEAVES)) $(if $(CONDITIONS),--conditions $(CONDITIONS))
 	@$(if $(WEAVES)$(CONDITIONS),,$(BUILD)/tests/bench/bench_geometry_size)
+	@$(if $(WEAVES)$(CONDITIONS),,/usr/bin/python3 tests/bench/verdict/judge_verdicts.py --build $(BUILD))
 
 bench-geometry-bars: | deps-test ## the figures of flat and of thin fibers that must not fall, in three of the scans of bench-geometry
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/bench_geometry >&2

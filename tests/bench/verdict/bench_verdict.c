@@ -1,0 +1,96 @@
+/* Reconstructs scans with known fibers, and prints the errors of the lines beside their grade: one JSON object a line.
+ *
+ * bench_verdict VOXEL_UM SCAN...
+ *   VOXEL_UM  edge of the voxels of all scans
+ *   SCAN  a scan; its true fibers are in the text of the same name (none: no fibers)
+ * Each line has name, recall, precision, fragments (geometry/phantom/compare.h), lumens, score and faults
+ * (geometry/grade/scan_grade.h), is_good, and wall_s; or the error that ended the reconstruction. */
+#include "base/clock.h"
+#include "geometry/phantom/compare.h"
+#include "geometry/reconstruct/reconstruct.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+struct scan_run {
+    struct volume v;
+    struct fiber_set truth, found;
+    struct reconstruct_report report;
+    struct compare_report compare;
+};
+
+static status reconstruct(const char *path, double voxel_m, struct thread_pool *pool, struct scan_run *r,
+                          struct error *err)
+{
+    struct reconstruct_option o;
+    struct direction_volume d = {0};
+    reconstruct_option_default(&o);
+    for (int a = 0; a < 3; a++) o.voxel_size_m[a] = voxel_m;
+    status s = reconstruct_read(&path, 1, &o, NULL, pool, NULL, &r->v, &r->report, err);
+    if (s == STATUS_OK) s = reconstruct_refill_lumens(&r->v, &o, pool, NULL, &r->report, err);
+    if (s == STATUS_OK) s = reconstruct_orientation(&r->v, &o, pool, NULL, &d, &r->report, err);
+    if (s == STATUS_OK) s = reconstruct_redirect(&r->v, &d, &o, pool, NULL, &r->report, err);
+    if (s == STATUS_OK) s = reconstruct_fibers(&r->v, &d, &o, pool, NULL, &r->found, &r->report, err);
+    if (s == STATUS_OK) s = reconstruct_grade(&r->v, &r->found, pool, &r->report, NULL, err);
+    direction_volume_release(&d);
+    return s;
+}
+
+/* Compares the fibers with the truth. Without one every line is wrong. */
+static status compare(const char *path, struct scan_run *r, struct error *err)
+{
+    char truth[4096];
+    const char *end = strrchr(path, '.');
+    const struct compare_option o = {.voxel_size_m = r->v.voxel_size_m[0], .margin_m = 3.0 * r->v.voxel_size_m[0]};
+    snprintf(truth, sizeof truth, "%.*s.txt", (int)(end != NULL ? end - path : 0), path);
+    if (access(truth, R_OK) != 0) return STATUS_OK;
+    status s = fiber_set_read_text(&r->truth, truth, err);
+    memcpy(r->truth.tile_size_m, r->found.tile_size_m, sizeof r->truth.tile_size_m);
+    return s == STATUS_OK ? compare_fibers(&r->truth, &r->found, &o, &r->compare, err) : s;
+}
+
+static double number(double x) { return isfinite(x) ? x : 0.0; }
+
+static void bench_scan(const char *path, double voxel_m, struct thread_pool *pool)
+{
+    struct scan_run r = {0};
+    struct error err = {0};
+    const char *name = strrchr(path, '/') != NULL ? strrchr(path, '/') + 1 : path;
+    const struct scan_grade *g = &r.report.grade;
+    const double start_s = clock_monotonic_s();
+    fiber_set_init(&r.truth);
+    fiber_set_init(&r.found);
+    status s = reconstruct(path, voxel_m, pool, &r, &err);
+    const double wall_s = clock_monotonic_s() - start_s;
+    if (s == STATUS_OK) s = compare(path, &r, &err);
+    if (s != STATUS_OK)
+        printf("{\"name\":\"%s\",\"wall_s\":%.1f,\"error\":\"%s\"}\n", name, wall_s, err.text);
+    else
+        printf(
+            "{\"name\":\"%s\",\"wall_s\":%.1f,\"recall\":%.4f,\"precision\":%.4f,\"fragments\":%.3f,\"lumens\":\"%s\","
+            "\"score\":%.4f,\"faults\":%u,\"verdict\":\"%s\",\"is_good\":%s}\n",
+            name, wall_s, number(r.compare.center_recall), number(r.compare.center_precision),
+            number(r.compare.fragments_per_fiber), lumen_answer_name(r.report.lumens), number(g->score), g->faults,
+            grade_verdict_name(g->verdict), g->verdict == GRADE_RESOLVED && g->faults == 0 ? "true" : "false");
+    fflush(stdout);
+    volume_release(&r.v);
+    fiber_set_release(&r.truth);
+    fiber_set_release(&r.found);
+}
+
+int main(int argc, char **argv)
+{
+    struct thread_pool *pool = NULL;
+    struct error err = {0};
+    if (thread_pool_new(0, &pool, &err) != STATUS_OK) {
+        fprintf(stderr, "bench_verdict: %s\n", err.text);
+        return 1;
+    }
+    const double voxel_m = argc > 1 ? 1e-6 * strtod(argv[1], NULL) : 0.0;
+    for (int i = 2; i < argc; i++) bench_scan(argv[i], voxel_m, pool);
+    thread_pool_free(pool);
+    return 0;
+}

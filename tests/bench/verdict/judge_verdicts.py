@@ -1,0 +1,110 @@
+"""Is the verdict on a scan about the cloth? Makes small scans (verdict_scans.py, selvedge-phantom), reconstructs them with
+bench_verdict, and prints figures, one JSON object a line; the rows go to standard error.
+
+    judge_verdicts.py [--build DIR] [--unseen DIR] [NAME ...]
+
+geometry.verdict.false_good        scans called good with a recall below 0.9, a precision below 0.93 or above 1.5 fragments
+geometry.verdict.good_called_bad   scans without these faults whose score says that the lines do not describe the cloth
+geometry.verdict.rank_correlation  of the score with the smaller of recall and precision (Spearman)
+geometry.false_lumens              share of the solid scans that are called hollow or maybe hollow
+Scans with a truth in other units than the product's text of fibers (--unseen) are converted.
+"""
+import argparse
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+
+import verdict_scans
+
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "..")
+PRODUCT = {"product-knit": ["knit"], "product-plain": ["plain"], "product-twill": ["twill"], "product-velvet": ["velvet"], "product-felt": ["felt"],
+           "product-plain-noisy": ["plain", "--snr", "2"], "product-knit-noisy": ["knit", "--snr", "2"], "product-felt-flat": ["felt", "--aspect", "2.5"],
+           "product-twill-d4": ["twill", "--diameter-voxel", "4"], "product-plain-d4-noisy": ["plain", "--diameter-voxel", "4", "--snr", "2"]}
+
+
+def make_product(build, folder, name):
+    """A phantom of the product, of 7 fibers a yarn; returns its scan."""
+    path = os.path.join(folder, name)
+    command = [os.path.join(build, "bin", "selvedge-phantom"), "cloth", "--weave", *PRODUCT[name], "--fibers-per-yarn", "40" if "felt" in name else "7", "--out", path]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    os.replace(os.path.join(path, "scan.tif"), path + ".tif")
+    os.replace(os.path.join(path, "truth.txt"), path + ".txt")
+    return path + ".tif"
+
+
+def take_unseen(source, folder, name):
+    """Copies a scan whose truth has voxel centers at whole numbers; returns its copy."""
+    path, voxel_mm, lines, radius = os.path.join(folder, name), 2.2e-3, [], "0"
+    with open(os.path.join(source, name + ".tif"), "rb") as f, open(path + ".tif", "wb") as to:
+        to.write(f.read())
+    truth = os.path.join(source, name + ".truth.txt")
+    if not os.path.exists(truth):
+        return path + ".tif"
+    with open(truth, encoding="utf-8") as f:
+        for line in f:
+            if line.startswith("fiber"):
+                lines.append("")
+                radius = line.split()[3]
+            elif line.strip() and not line.startswith("#"):
+                lines.append(" ".join("%.6f" % x for x in [*((float(x) + 0.5) * voxel_mm for x in line.split()), float(radius) * voxel_mm]))
+    with open(path + ".txt", "w", encoding="utf-8") as f:
+        f.write("\n".join(lines).strip() + "\n")
+    return path + ".tif"
+
+
+def rank(values):
+    values = np.asarray(values, float)
+    order = np.empty(len(values))
+    order[np.argsort(values, kind="stable")] = np.arange(len(values))
+    for v in np.unique(values):
+        order[values == v] = order[values == v].mean()
+    return order
+
+
+def figure(name, value, unit, better="lower"):
+    print(json.dumps({"name": "geometry." + name, "value": value, "unit": unit, "better": better}), flush=True)
+
+
+def judge(rows):
+    """Prints the figures of the rows that could be reconstructed; errors are counted."""
+    figure("verdict.errors", sum("error" in r for r in rows), "scans")
+    rows = [r for r in rows if "error" not in r]
+    truth = [min(r["recall"], r["precision"]) for r in rows]
+    right = [r["recall"] >= 0.9 and r["precision"] >= 0.93 and r["fragments"] <= 1.5 for r in rows]
+    solid = [r["lumens"] in ("filled", "possible") for r in rows]
+    figure("verdict.scans", len(rows), "scans", "higher")
+    figure("verdict.false_good", sum(r["is_good"] and not ok for r, ok in zip(rows, right)), "scans")
+    figure("verdict.good_called_bad", sum(ok and (r["score"] < 0.5 or r["verdict"] == "unresolved") for r, ok in zip(rows, right)), "scans")
+    figure("verdict.rank_correlation", round(float(np.corrcoef(rank(truth), rank([r["score"] for r in rows]))[0, 1]), 4), "1", "higher")
+    figure("false_lumens", round(sum(solid) / len(rows), 4), "1")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", default=os.path.join(ROOT, "build"))
+    parser.add_argument("--unseen", default=os.path.join(ROOT, "..", "shared", "data", "unseen-scans"))
+    parser.add_argument("name", nargs="*")
+    arguments = parser.parse_args()
+    folder = os.path.join(arguments.build, "bench-verdict")
+    os.makedirs(folder, exist_ok=True)
+    unseen = sorted(f[:-4] for f in os.listdir(arguments.unseen) if f.endswith(".tif")) if os.path.isdir(arguments.unseen) else []
+    rows = []
+    for name in arguments.name or [*verdict_scans.SCANS, *PRODUCT, *unseen]:
+        if name in PRODUCT:
+            path = make_product(arguments.build, folder, name)
+        elif name in unseen:
+            path = take_unseen(arguments.unseen, folder, name)
+        else:
+            verdict_scans.make(name, {**verdict_scans.DEFAULT, **verdict_scans.SCANS[name]}, folder)
+            path = os.path.join(folder, name + ".mhd")
+        made = subprocess.run([os.path.join(arguments.build, "tests", "bench", "verdict", "bench_verdict"), "2.2" if name in unseen else "2", path], check=True, stdout=subprocess.PIPE, text=True)
+        print(made.stdout, end="", file=sys.stderr, flush=True)
+        rows.append(json.loads(made.stdout.replace("nan", "0")))
+    judge(rows)
+
+
+if __name__ == "__main__":
+    main()
