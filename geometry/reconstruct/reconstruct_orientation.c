@@ -5,6 +5,7 @@
 #include "geometry/diameter/fiber_diameter.h"
 #include "geometry/filter/filter_choice.h"
 #include "geometry/filter/filter_directions.h"
+#include "geometry/reconstruct/trace_diameter.h"
 #include "geometry/reconstruct/trace_grid.h"
 #include "geometry/volume/volume_rescale.h"
 #include "geometry/volume/volume_unknown.h"
@@ -19,6 +20,9 @@ static const double SAME_PEAK = 1.3;
  * it. It lies between a half, at which some cloths gain by the narrow one and others lose, and a fifth, at which all
  * that touch gain (geometry/NOTES.md, "Thin fibers: the filter was too wide"). */
 static const double MOST_NOISE = 1.0 / 3.0;
+
+/* Share of noise in a peak up to which lines are traced by its diameter. */
+static const double MOST_PEAK_NOISE = 0.5;
 
 /* Takes the diameter of the fibers that noise hid in the scan, if only their yarns are left since it was smoothed. */
 static void prefer_hidden(const struct scan_noise *noise, struct fiber_diameter *d)
@@ -81,8 +85,22 @@ static status ask_scale(const struct volume *v, const struct reconstruct_option 
         voxel, um[0], voxel_um);
 }
 
-/* Measures the diameter once more in the rescaled volume, where the scales of the filter are neither about as fine as
- * the voxels nor coarse. A peak far from the first one is another one. */
+/* Returns whether fibers are so thin and the scan so noisy that lines of noise are traced as well. */
+static bool is_thin_in_noise(const struct reconstruct_report *report, double edge)
+{
+    return edge < 1.0 && report->noise.scan_sd >= MOST_NOISE;
+}
+
+/* Returns whether lines of fibers can be told from lines of noise at the measured diameter. */
+static bool lines_tell_diameter(const struct volume *v, const struct reconstruct_report *report)
+{
+    const double diameter = report->fiber_diameter_voxel;
+    return report->diameter_noise_share <= MOST_PEAK_NOISE && diameter != report->noise.hidden_diameter_voxel &&
+           !is_thin_in_noise(report, trace_grid_edge(diameter, v->n));
+}
+
+/* Measures the diameter once more in the rescaled volume, where lines would be no better. A peak far from the first one
+ * is another one. */
 static status measure_again(const struct volume *grid, double edge, struct thread_pool *pool,
                             const struct progress *progress, struct reconstruct_report *report, struct error *err)
 {
@@ -102,11 +120,10 @@ static status filter_rescaled(const struct volume *v, double edge, struct recons
     struct direction_volume on_grid = {0};
     const struct progress quiet = progress_silent(progress);
     status s = volume_rescale(v, edge, pool, &quiet, &grid, err);
-    if (s == STATUS_OK && isnan(option->fiber_diameter_voxel))
+    if (s == STATUS_OK && isnan(option->fiber_diameter_voxel) && is_thin_in_noise(report, edge))
         s = measure_again(&grid, edge, pool, &quiet, report, err);
     trace_grid_rescale_option(option, edge);
-    if (edge < 1.0 && report->noise.scan_sd < MOST_NOISE)
-        filter_choose_thin(option, report->fiber_diameter_voxel / edge);
+    if (edge < 1.0 && !is_thin_in_noise(report, edge)) filter_choose_thin(option, report->fiber_diameter_voxel / edge);
     if (s == STATUS_OK)
         s = filter_directions(&grid, report->fiber_diameter_voxel / edge, option, pool, progress, &on_grid, report,
                               err);
@@ -119,8 +136,9 @@ static status filter_rescaled(const struct volume *v, double edge, struct recons
     return s;
 }
 
-static status find_directions(const struct volume *v, struct reconstruct_option *option, struct thread_pool *pool,
-                              const struct progress *progress, struct direction_volume *d,
+/* known: v before its densities were continued into unknown voxels. */
+static status find_directions(const struct volume *v, const struct volume *known, struct reconstruct_option *option,
+                              struct thread_pool *pool, const struct progress *progress, struct direction_volume *d,
                               struct reconstruct_report *report, struct error *err)
 {
     struct progress_part part = {progress, 0.0, 0.1};
@@ -128,6 +146,8 @@ static status find_directions(const struct volume *v, struct reconstruct_option 
     *d = (struct direction_volume){0};
     status s = find_diameter(v, option, pool, &inner, report, err);
     if (s == STATUS_OK) s = ask_scale(v, option, report, err);
+    if (s == STATUS_OK && isnan(option->fiber_diameter_voxel) && lines_tell_diameter(v, report))
+        s = trace_diameter(v, known, reconstruct_orientation, pool, &inner, report, err);
     if (s != STATUS_OK) return s;
     const double edge = trace_grid_edge(report->fiber_diameter_voxel, v->n);
     report->trace_edge_voxel = edge;
@@ -155,10 +175,10 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
                                struct reconstruct_report *report, struct error *err)
 {
     struct volume continued = {0};
-    if (v->unknown.n == 0) return find_directions(v, option, pool, progress, d, report, err);
+    if (v->unknown.n == 0) return find_directions(v, v, option, pool, progress, d, report, err);
     *d = (struct direction_volume){0};
     status s = volume_continue(v, &continued, err);
-    if (s == STATUS_OK) s = find_directions(&continued, option, pool, progress, d, report, err);
+    if (s == STATUS_OK) s = find_directions(&continued, v, option, pool, progress, d, report, err);
     if (s == STATUS_OK) empty_unknown(v, option->eps_d, d, report);
     volume_release(&continued);
     return s;
