@@ -28,7 +28,8 @@ PRODUCT = {"product-knit": ["knit"], "product-plain": ["plain"], "product-twill"
 def make_product(build, folder, name):
     """A phantom of the product, of 7 fibers a yarn; returns its scan."""
     path = os.path.join(folder, name)
-    command = [os.path.join(build, "bin", "selvedge-phantom"), "cloth", "--weave", *PRODUCT[name], "--fibers-per-yarn", "40" if "felt" in name else "7", "--out", path]
+    n_fiber = "40" if "felt" in name else "7"
+    command = [os.path.join(build, "bin", "selvedge-phantom"), "cloth", "--weave", *PRODUCT[name], "--fibers-per-yarn", n_fiber, "--out", path]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     os.replace(os.path.join(path, "scan.tif"), path + ".tif")
     os.replace(os.path.join(path, "truth.txt"), path + ".txt")
@@ -100,7 +101,8 @@ def main():
         else:
             verdict_scans.make(name, {**verdict_scans.DEFAULT, **verdict_scans.SCANS[name]}, folder)
             path = os.path.join(folder, name + ".mhd")
-        made = subprocess.run([os.path.join(arguments.build, "tests", "bench", "verdict", "bench_verdict"), "2.2" if name in unseen else "2", path], check=True, stdout=subprocess.PIPE, text=True)
+        program = os.path.join(arguments.build, "tests", "bench", "verdict", "bench_verdict")
+        made = subprocess.run([program, "2.2" if name in unseen else "2", path], check=True, stdout=subprocess.PIPE, text=True)
         print(made.stdout, end="", file=sys.stderr, flush=True)
         rows.append(json.loads(made.stdout.replace("nan", "0")))
     judge(rows)
