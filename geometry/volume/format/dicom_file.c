@@ -1,5 +1,6 @@
 #include "geometry/volume/format/dicom_file.h"
 #include "base/option_id.h"
+#include "geometry/volume/format/voxel_stream.h"
 
 #include <errno.h>
 #include <math.h>
@@ -121,7 +122,15 @@ static status take_of_samples(struct reader *r, uint32_t tag, const char *text, 
     if (tag == 0x00280004) copy_text(f->photometric, sizeof f->photometric, text);
     if (tag == 0x00280008) f->n_frame = strtoul(text, NULL, 10);
     if (tag == 0x00280103) f->is_signed = u == 1;
+    if (tag == 0x00280009) { /* FrameTime, FrameTimeVector */
+        const uint32_t by = number((const uint8_t *)text + 2, 2, r->big);
+        f->has_times = number((const uint8_t *)text, 2, r->big) == 0x0018 && (by == 0x1063 || by == 0x1065);
+    }
     if (tag == 0x00280120) f->padding = f->is_signed ? (double)(int16_t)u : (double)u;
+    if (tag == 0x00280121) f->padding_limit = f->is_signed ? (double)(int16_t)u : (double)u;
+    if (tag == 0x00281050) to_numbers(text, 1, &f->window_center);
+    if (tag == 0x00281051) to_numbers(text, 1, &f->window_width);
+    if (tag == 0x00282110) f->is_lossy = strncmp(text, "01", 2) == 0;
     if (tag == 0x00280030) return take_once(r, text, 2, f->spacing_mm, err);
     if (tag == 0x00281052) return take_once(r, text, 1, &f->inter, err);
     return tag == 0x00281053 ? take_once(r, text, 1, &f->slope, err) : STATUS_OK;
@@ -134,9 +143,11 @@ static status take(struct reader *r, uint32_t tag, const char *text, size_t n, s
     if (tag >> 16 == 0x0028)
         return take_of_samples(r, tag, text, number((const uint8_t *)text, n < 4 ? 2 : 4, r->big), err);
     if (tag == 0x00020010) copy_text(f->syntax, sizeof f->syntax, text);
+    if (tag == 0x00080060) copy_text(f->modality, sizeof f->modality, text);
     if (tag == 0x0008103e) copy_text(f->description, sizeof f->description, text);
     if (tag == 0x00180050) to_numbers(text, 1, &f->thickness_mm);
     if (tag == 0x00180088) to_numbers(text, 1, &f->between_slices_mm);
+    if (tag == 0x00181164) to_numbers(text, 2, f->detector_mm);
     if (tag == 0x0020000e) copy_text(f->series, sizeof f->series, text);
     if (tag == 0x00200013) to_numbers(text, 1, &f->instance);
     if (tag == 0x00200037) return take_once(r, text, 6, f->direction, err);
@@ -171,6 +182,7 @@ static status read_content(struct reader *r, const struct element *e, int depth,
         r->f->pixel_bytes = e->length;
         return e->length == UNDEFINED ? refuse(r, "its samples are compressed", err) : STATUS_OK;
     }
+    if (e->tag == 0x00283000 && depth == 0) r->f->has_table = true;
     if (e->length != UNDEFINED && here + e->length > r->file_bytes) return refuse(r, "it is cut off", err);
     if (!is_nested && is_used) return read_value(r, e, err);
     if (!is_nested) return fseeko(r->file, e->length, SEEK_CUR) == 0 ? STATUS_OK : refuse(r, "it is cut off", err);
@@ -240,11 +252,16 @@ static status check_frames(const struct reader *r, struct error *err)
                                "cannot read volume '%s': %zu bits stored in %zu, the highest of which is %zu, are not "
                                "read",
                                r->name, f->bits_stored, bits, f->high_bit);
-    if (f->rows < 1 || f->columns < 1 || f->n_frame < 1 || f->n_frame > MAX_FRAMES)
+    if (f->has_table) return refuse(r, "a table gives its values (ModalityLUTSequence): save the values", err);
+    if (f->has_times) return refuse(r, "its frames are times of one slice: a scan has slices", err);
+    if (f->rows < 1 || f->rows > VOXEL_STREAM_MAX_EDGE || f->columns < 1 || f->columns > VOXEL_STREAM_MAX_EDGE ||
+        f->n_frame < 1 || f->n_frame > MAX_FRAMES || (uint64_t)f->rows * f->columns * (bits / 8) > UINT32_MAX)
         return refuse(r, "it states an impossible size", err);
-    const uint64_t want = (uint64_t)f->rows * f->columns * (bits / 8) * f->n_frame;
+    const uint64_t row = (uint64_t)f->columns * (bits / 8), want = row * f->rows * f->n_frame;
     if (want > f->pixel_bytes || (uint64_t)f->pixel_offset + want > r->file_bytes)
         return refuse(r, "it is too short for its frames", err);
+    if (f->pixel_bytes > want + 1 && f->pixel_bytes >= want + row)
+        return refuse(r, "its samples are longer than its frames", err);
     return STATUS_OK;
 }
 
@@ -272,6 +289,10 @@ status dicom_file_read(struct dicom_file *f, const char *path, const char *name,
                              .slope = NAN,
                              .inter = NAN,
                              .padding = NAN,
+                             .padding_limit = NAN,
+                             .detector_mm = {NAN, NAN},
+                             .window_center = NAN,
+                             .window_width = NAN,
                              .instance = NAN,
                              .direction = {NAN, NAN, NAN, NAN, NAN, NAN}};
     r.file = fopen(path, "rbe");

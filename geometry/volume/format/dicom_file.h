@@ -16,9 +16,12 @@ struct dicom_file {
     size_t columns, rows, n_frame, samples_per_pixel, bits_allocated, bits_stored, high_bit;
     bool is_signed;
     double spacing_mm[2]; /* between rows, between columns */
-    double between_slices_mm, thickness_mm, slope, inter, padding, instance;
-    double direction[6];   /* in which columns, then rows, count up */
-    double (*position)[3]; /* of each frame: millimetres */
+    double between_slices_mm, thickness_mm, slope, inter, padding, padding_limit, instance;
+    double detector_mm[2], window_center, window_width; /* pixels of the detector; range of display */
+    char modality[20];
+    bool is_lossy, has_table, has_times; /* a table gives the values; the frames are times of one slice */
+    double direction[6];                 /* in which columns, then rows, count up */
+    double (*position)[3];               /* of each frame: millimetres */
     size_t n_position;
     long long pixel_offset; /* of the samples in the file; 0: none */
     uint64_t pixel_bytes;

@@ -1,6 +1,6 @@
 /* DICOM: a file for each slice, or one with several frames, without compression. Slices are ordered by their positions
- * along the normal of the picture, else by InstanceNumber, never by names. Space is that of the patient (left,
- * posterior, superior), a right-handed frame, whose axes are those of the cloth as with NRRD. Source: dicom_file.h. */
+ * along the normal of the picture, else by InstanceNumber, never by names. Space is the frame of the patient (left,
+ * posterior, superior), which is right-handed; its axes are the axes of the cloth. Source: dicom_file.h. */
 #include "base/files/durable.h"
 #include "base/option_id.h"
 #include "geometry/volume/format/dicom_file.h"
@@ -27,13 +27,16 @@ struct dicom {
     char **path;
     size_t n_path, n_slice;
     struct dicom_slice *slice;
-    bool has_positions, has_scale;
+    bool has_positions, has_scale, has_scales, has_paddings; /* several of them */
     FILE *file;
     size_t i_open; /* path of `file` */
     void *buffer;
 };
 
 static const char *name_of(const struct dicom *m, size_t i) { return path_file_name(m->path[m->slice[i].i_path]); }
+
+/* Positions are often rounded, to thousandths of a millimetre. Shares of the distance of slices: */
+static const double MOST_DISTANCE = 1.75, MOST_OFF_LINE = 0.6;
 
 static status refuse(const char *name, const char *text, struct error *err)
 {
@@ -92,6 +95,7 @@ static status add_frames(struct dicom *m, size_t i_path, const struct dicom_file
         s->slope = isnan(f->slope) || f->slope == 0.0 ? 1.0 : f->slope;
         s->inter = isnan(f->inter) ? 0.0 : f->inter;
         m->has_scale = m->has_scale || s->slope != 1.0 || s->inter != 0.0;
+        m->has_scales = m->has_scales || s->slope != m->slice[0].slope || s->inter != m->slice[0].inter;
         if (placed) memcpy(s->position, f->position[k], sizeof s->position);
         s->place = placed ? normal_component(f->direction, s->position) : m->n_path > 1 ? f->instance : (double)k;
     }
@@ -107,6 +111,9 @@ static status read_files(struct dicom *m, struct error *err)
         s = dicom_file_read(&f, m->path[i], name, err);
         if (s == STATUS_OK && i > 0) s = compare(m, &f, name, err);
         if (s == STATUS_OK) s = add_frames(m, i, &f, err);
+        if (s == STATUS_OK && i > 0)
+            m->has_paddings = m->has_paddings || differs(&f.padding, &m->first.padding, 1) ||
+                              differs(&f.padding_limit, &m->first.padding_limit, 1);
         if (s == STATUS_OK && i == 0) {
             m->first = f;
             m->first.position = NULL; /* the slices have them */
@@ -120,6 +127,26 @@ static int by_place(const void *a, const void *b)
 {
     const double x = ((const struct dicom_slice *)a)->place, y = ((const struct dicom_slice *)b)->place;
     return (x > y) - (x < y);
+}
+
+/* Checks that positions lie on the line from the first to the last one, and returns the length of its step. */
+static status check_line(const struct dicom *m, double *step, struct error *err)
+{
+    const size_t last = m->n_slice - 1;
+    const double *begin = m->slice[0].position, *end = m->slice[last].position;
+    double d[3], square = 0.0;
+    for (int a = 0; a < 3; a++) {
+        d[a] = (end[a] - begin[a]) / (double)last;
+        square += d[a] * d[a];
+    }
+    *step = sqrt(square);
+    for (size_t i = 1; i < last; i++)
+        for (int a = 0; a < 3; a++)
+            if (fabs(m->slice[i].position[a] - begin[a] - (double)i * d[a]) > MOST_OFF_LINE * *step)
+                return error_set_field(err, STATUS_INVALID, OPTION_SCAN_FILES,
+                                       "cannot read volume '%s': its position is not on the line of the other slices",
+                                       name_of(m, i));
+    return STATUS_OK;
 }
 
 /* Sorts the slices and checks their distances, which are returned in *step: NaN for one slice. */
@@ -138,7 +165,7 @@ static status sort_slices(struct dicom *m, double *step, struct error *err)
     }
     for (size_t i = 1; i < n; i++) {
         const double gap = m->slice[i].place - m->slice[i - 1].place;
-        if (gap > *step * 1.02)
+        if (gap > *step * MOST_DISTANCE)
             return error_set_field(
                 err, STATUS_INVALID, OPTION_SCAN_FILES,
                 "cannot read volume '%s': slices are missing between it and '%s': they are %.6g apart, "
@@ -146,7 +173,7 @@ static status sort_slices(struct dicom *m, double *step, struct error *err)
                 name_of(m, i - 1), name_of(m, i), gap, *step);
     }
     if (n > 1) *step = (m->slice[n - 1].place - m->slice[0].place) / (double)(n - 1);
-    return STATUS_OK;
+    return n > 1 && m->has_positions ? check_line(m, step, err) : STATUS_OK;
 }
 
 static double scaled(const struct dicom *m, const struct dicom_slice *s, double v)
@@ -170,7 +197,10 @@ static void state(const struct dicom *m, struct volume_source_info *info, double
         file_ledger_add(ledger, "photometric sense", NULL, "MONOCHROME1: values are inverted");
     if (f->bits_stored < f->bits_allocated)
         file_ledger_add(ledger, "significant bits", NULL, "%zu of %zu", f->bits_stored, f->bits_allocated);
-    if (m->has_scale)
+    if (m->has_scales)
+        file_ledger_add(ledger, "scale of values", NULL, "of each file, of the first %.6g x value + %.6g",
+                        m->slice[0].slope, m->slice[0].inter);
+    else if (m->has_scale)
         file_ledger_add(ledger, "scale of values", NULL, "%.6g x value + %.6g", m->slice[0].slope, m->slice[0].inter);
     if (!isnan(f->thickness_mm))
         file_ledger_add(ledger, "thickness of slices", "only distances count", "%.6g mm", f->thickness_mm);
@@ -182,7 +212,28 @@ static void state(const struct dicom *m, struct volume_source_info *info, double
     if (m->has_positions)
         file_ledger_add(ledger, "origin", "the cloth begins at the corner of the scan", "%.6g %.6g %.6g",
                         m->slice[0].position[0], m->slice[0].position[1], m->slice[0].position[2]);
-    if (!isnan(f->padding)) info->padding = scaled(m, &m->slice[0], f->padding);
+}
+
+/* What is no statement on the place of slices. */
+static void state_rest(const struct dicom *m, struct volume_source_info *info)
+{
+    struct file_ledger *ledger = &info->ledger;
+    const struct dicom_file *f = &m->first;
+    if (m->has_paddings || (m->has_scales && !isnan(f->padding)))
+        file_ledger_add(ledger, "padding value", "it differs among the files", "%.6g in the first", f->padding);
+    else if (!isnan(f->padding) && !isnan(f->padding_limit) && f->padding_limit != f->padding)
+        file_ledger_add(ledger, "padding value", "one value can be unknown, no range", "%.6g to %.6g", f->padding,
+                        f->padding_limit);
+    else if (!isnan(f->padding))
+        info->padding = scaled(m, &m->slice[0], f->padding);
+    if (!isnan(f->window_center) || !isnan(f->window_width))
+        file_ledger_add(ledger, "range of display", "densities come from the histogram", "center %.6g, width %.6g",
+                        f->window_center, f->window_width);
+    if (!isnan(f->detector_mm[0]))
+        file_ledger_add(ledger, "pixels of the detector", "they are no voxels", "%.6g x %.6g mm", f->detector_mm[1],
+                        f->detector_mm[0]);
+    if (f->is_lossy) file_ledger_add(ledger, "lossy compression", "its values are read as they are", "once");
+    if (f->modality[0] != '\0') file_ledger_add(ledger, "modality", "all values are densities", "%s", f->modality);
 }
 
 /* The axes: columns, rows, and slices from the first to the last. */
@@ -209,6 +260,7 @@ static status settle(struct dicom *m, double step, const struct volume_part *par
     *info = volume_source_info_empty();
     info->sample = type[f->is_signed][f->bits_allocated == 8 ? 0 : f->bits_allocated == 16 ? 1 : 2];
     state(m, info, step);
+    state_rest(m, info);
     if (isnan(between) && !isnan(f->spacing_mm[0])) {
         for (int a = 0; a < 3; a++) axes.spacing_m[a] = NAN;
         file_ledger_add(&info->ledger, "voxel size", "the distance of the slices is not stated", "%.6g x %.6g mm",
@@ -268,7 +320,7 @@ static status dicom_open(const char *const *path, size_t n_path, const struct vo
     return s;
 }
 
-/* Converts samples of which bits_stored bits count. */
+/* Converts samples, whose lowest bits_stored bits count. */
 static void convert(const struct dicom *m, const struct dicom_slice *s, float *value)
 {
     const struct dicom_file *f = &m->first;

@@ -68,6 +68,11 @@ struct slice {
     double z;
     const char *series, *photometric, *position, *orientation, *scale, *frames, *padding, *spacing;
     uint16_t value[4];
+    struct {
+        uint32_t tag;
+        const char *vr, *value;
+        size_t n;
+    } more; /* an element that other slices do not have; tag 0: none */
 };
 
 static const struct slice plain = {.syntax = EXPLICIT,
@@ -86,7 +91,7 @@ static struct writer slice_bytes(const struct slice *s)
     memcpy(w.byte + 128, "DICM", 4);
     w.n = 132;
     text(&w, 0x00020010, "UI", uid[s->syntax]);
-    /* an icon, whose samples and sizes are not those of the slice */
+    /* an icon, whose samples and sizes are others */
     struct writer icon = {.syntax = s->syntax};
     whole(&icon, 0x00280010, 77);
     struct writer item = {.syntax = s->syntax};
@@ -117,6 +122,8 @@ static struct writer slice_bytes(const struct slice *s)
         text(&w, 0x00281052, "DS", "-10");
         text(&w, 0x00281053, "DS", s->scale);
     }
+    if (s->padding != NULL) element(&w, 0x00280120, "US", s->padding, 2);
+    if (s->more.tag != 0) element(&w, s->more.tag, s->more.vr, s->more.value, s->more.n);
     if (s->syntax == IMPLICIT) element(&w, 0x00880200, "SQ", item.byte, item.n);
     uint8_t sample[8];
     for (int i = 0; i < 4; i++) {
@@ -261,6 +268,102 @@ static void test_directions(void **state)
     }
 }
 
+/* What would change the values or the place of slices, and no reader could show. */
+static void test_refused_statements(void **state)
+{
+    struct slice s[3] = {plain, plain, plain};
+    s[0].frames = "1";
+    expect_open(state, s, 1, STATUS_FORMAT, "longer than its frames");
+    s[0] = plain;
+    s[0].more.tag = 0x00283000;
+    s[0].more.vr = "SQ";
+    expect_open(state, s, 1, STATUS_FORMAT, "ModalityLUTSequence");
+    s[0] = plain;
+    s[0].frames = "2";
+    s[0].more.tag = 0x00280009; /* of FrameTime */
+    s[0].more.vr = "AT";
+    s[0].more.value = "\x18\0\x63\x10";
+    s[0].more.n = 4;
+    expect_open(state, s, 1, STATUS_FORMAT, "frames are times");
+    s[0] = plain;
+    s[0].more.tag = 0x00280010;
+    s[0].more.vr = "UL";
+    s[0].more.value = "\1\0\x10\0";
+    s[0].more.n = 4;
+    expect_open(state, s, 1, STATUS_FORMAT, "impossible size");
+    s[0] = plain;
+    s[1].z = 0.004;
+    s[1].position = "0\\0.004\\0.004";
+    s[2].z = 0.008;
+    expect_open(state, s, 3, STATUS_INVALID, "'b.dcm': its position is not on the line of the other slices");
+    const struct volume_part part = {.channel = 2};
+    struct volume_source *source = NULL;
+    struct error err = {0};
+    s[0] = plain;
+    assert_int_equal(volume_source_open_declared(write_slices(state, s, 1), 1, NULL, &part, &source, &err),
+                     STATUS_INVALID);
+    assert_string_equal(err.field, OPTION_SCAN_CHANNEL);
+}
+
+/* Writers round positions: 2.5 um in thousandths of a millimetre. */
+static void test_rounded_positions(void **state)
+{
+    struct slice s[3] = {plain, plain, plain};
+    s[1].z = 0.002;
+    s[2].z = 0.005;
+    scan_expect_values(write_slices(state, s, 3), 3, NULL, (const size_t[3]){2, 1, 3},
+                       (const double[3]){0.002, 0.003, 0.0025}, (const float[6]){1, 2, 1, 2, 1, 2});
+}
+
+static struct volume_source_info info_of(void **state, const struct slice *s, size_t n)
+{
+    struct volume_source *source = NULL;
+    struct error err = {0};
+    if (volume_source_open(write_slices(state, s, n), n, &source, &err) != STATUS_OK) fail_msg("%s", err.text);
+    const struct volume_source_info info = *volume_source_describe(source);
+    volume_source_close(source);
+    return info;
+}
+
+static void test_statements(void **state)
+{
+    static const struct {
+        uint32_t tag;
+        const char *vr, *value, *name;
+    } c[] = {{0x00181164, "DS", "0.1\\0.1 ", "pixels of the detector"},
+             {0x00281050, "DS", "40", "range of display"},
+             {0x00282110, "CS", "01", "lossy compression"},
+             {0x00080060, "CS", "CT", "modality"}};
+    for (size_t i = 0; i < sizeof c / sizeof *c; i++) {
+        struct slice s = plain;
+        s.more.tag = c[i].tag;
+        s.more.vr = c[i].vr;
+        s.more.value = c[i].value;
+        s.more.n = strlen(c[i].value);
+        const struct volume_source_info info = info_of(state, &s, 1);
+        const struct file_statement *found = file_ledger_find(&info.ledger, c[i].name);
+        if (found == NULL || found->use != FILE_STATEMENT_NOT_USED) fail_msg("%s", c[i].name);
+    }
+    struct slice s[2] = {plain, plain};
+    s[1].z = 0.004;
+    s[0].padding = s[1].padding = "\7\0";
+    assert_true(info_of(state, s, 2).padding == 7.0);
+    s[0].scale = "2";
+    s[1].scale = "3"; /* 7 then stands for 4 and for 11 */
+    struct volume_source_info info = info_of(state, s, 2);
+    assert_true(isnan(info.padding));
+    assert_int_equal(file_ledger_find(&info.ledger, "padding value")->use, FILE_STATEMENT_NOT_USED);
+    assert_non_null(strstr(file_ledger_find(&info.ledger, "scale of values")->value, "each file"));
+    s[1].scale = "2";
+    s[0].more.tag = s[1].more.tag = 0x00280121;
+    s[0].more.vr = s[1].more.vr = "US";
+    s[0].more.value = s[1].more.value = "\x09\0";
+    s[0].more.n = s[1].more.n = 2;
+    info = info_of(state, s, 2);
+    assert_true(isnan(info.padding));
+    assert_int_equal(file_ledger_find(&info.ledger, "padding value")->use, FILE_STATEMENT_NOT_USED);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -268,6 +371,9 @@ int main(void)
         cmocka_unit_test(test_values),
         cmocka_unit_test(test_refused),
         cmocka_unit_test(test_directions),
+        cmocka_unit_test(test_refused_statements),
+        cmocka_unit_test(test_rounded_positions),
+        cmocka_unit_test(test_statements),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }
