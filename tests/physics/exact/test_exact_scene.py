@@ -15,6 +15,7 @@ LONG = bool(os.environ.get("SELVEDGE_TEST_LONG"))
 # About five of 10^4 comparisons of correct programs differ by more standard errors (tests/support/agreement.h).
 MOST_SE = 3.5
 MEAN_BAR, DERIVATIVE_BAR = 0.002, 0.01
+MOST_ROUNDS = 60
 # by day a difference of 1 % is seen between ways of writing the same cloth, at night one of 0.5 %
 FEWER, SAME_VISIBLE = (1, 0.005) if LONG else (4, 0.01)
 PATHS = {"two_lobe.v1": 256, "textile.v3": 256, "dielectric_near.v1": 2048}  # of a block: its lobes are narrow
@@ -33,13 +34,30 @@ def check(differences, bar, visible):
     assert not blind, "too few paths:\n" + "\n".join(blind)
 
 
+def mean_over_rows(one, other):
+    return CommonDifference([(a[f"mean.{c}"], b[f"mean.{c}"]) for a, b in zip(one, other) for c in "rgb"])
+
+
 def check_all(one, other):
     """Each mean and derivative within its standard errors or the bar; the bars are seen in the mean over rows, and in each parameter."""
-    means, parameters = mean_differences(one, other), parameter_differences(one, other)
-    check(means, MEAN_BAR, math.inf)
+    check(mean_differences(one, other), MEAN_BAR, math.inf)
     check(derivative_differences(one, other), DERIVATIVE_BAR, math.inf)
-    check({"mean over rows": CommonDifference([(a[f"mean.{c}"], b[f"mean.{c}"]) for a, b in zip(one, other) for c in "rgb"])}, MEAN_BAR, MEAN_BAR)
-    check(parameters, DERIVATIVE_BAR, 2 * DERIVATIVE_BAR)
+    check({"mean over rows": mean_over_rows(one, other)}, MEAN_BAR, MEAN_BAR)
+    check(parameter_differences(one, other), DERIVATIVE_BAR, 2 * DERIVATIVE_BAR)
+
+
+def check_all_with_more(*request, **more):
+    """check_all with as many blocks as it needs to see the bars: narrow lobes need forty times those of others. The standard error alone
+    says when it is enough, and never the difference."""
+    one, other = [], []
+    for seed in range(1, MOST_ROUNDS + 1):
+        new = [trace(p, *request, blocks=128, paths=512, seed=seed, **more) for p in (PRODUCT, EXACT)]
+        for series, rows in zip((one, other), new):
+            series[:] = rows if not series else [{key: old[key] + row[key] for key in old} for old, row in zip(series, rows)]
+        wide = [d.se for d in parameter_differences(one, other).values()]
+        if MOST_SE * mean_over_rows(one, other).se <= MEAN_BAR and MOST_SE * max(wide) <= 2 * DERIVATIVE_BAR:
+            break
+    check_all(one, other)
 
 
 @pytest.mark.parametrize("model", ["two_lobe.v1", "textile.v3", "dielectric_near.v1"])
@@ -97,8 +115,7 @@ def test_the_same_cloth_written_otherwise(folder, program):
 @pytest.mark.parametrize("cloth", list(CLOTHS))
 def test_all_cloths(folder, cloth, model):
     fibers = make_cloth(cloth, folder)
-    one, other = (trace(p, fibers, model, blocks=128, paths=512) for p in (PRODUCT, EXACT))
-    check_all(one, other)
+    check_all_with_more(fibers, model)
 
 
 @pytest.mark.skipif(not LONG, reason="make test-long")
@@ -107,5 +124,4 @@ def test_all_cloths(folder, cloth, model):
 def test_all_cloths_bent(folder, cloth, model):
     mesh = write_half_cylinder(os.path.join(folder, "half.obj"))
     fibers = make_cloth(cloth, folder)
-    one, other = (trace(p, fibers, model, blocks=128, paths=512, mesh=mesh) for p in (PRODUCT, EXACT))
-    check_all(one, other)
+    check_all_with_more(fibers, model, mesh=mesh)
