@@ -152,9 +152,10 @@ static status take_levels(const struct coverage_means *m, struct coverage_backgr
                           struct error *err)
 {
     const size_t n_block = b->n[0] * b->n[1];
-    double *of_block = malloc(2 * n_block * sizeof *of_block), *noise = of_block + n_block;
+    double *of_block = malloc(2 * n_block * sizeof *of_block);
     size_t n = 0;
     if (of_block == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot grade the scan: out of memory");
+    double *noise = of_block + n_block;
     for (size_t block = 0; block < n_block; block++) {
         const atomic_uint *of = count + block * BINS;
         double all = 0.0;
