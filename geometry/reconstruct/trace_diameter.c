@@ -14,6 +14,9 @@ static const double EDGE_DIAMETERS = 10.0, LEAST_EDGE = 48.0, MOST_EDGE = 96.0;
  * tenth, and lines that are thicker run through several fibers. Lines of thin fibers do so at once, and
  * never raise it. */
 static const double MOST_RISE = 1.1;
+/* Blur in voxels from which the peak is kept: the filter and the reaches of tracing then fit the blurred width better
+ * (geometry/NOTES.md). */
+static const double STRONG_BLUR = 1.2;
 /* Ratio of the diameters of two rounds up to which they are the same. */
 static const double SETTLED = 1.04;
 
@@ -88,7 +91,8 @@ static status trace_once(const struct volume *box, trace_orientation *find, doub
         trace_job_start(&job);
         s = trace_scan(&job, false, &lines, err);
     }
-    if (s == STATUS_OK && lines.n_line > 0 && report.radius_spread <= TRACE_MOST_SPREAD)
+    const bool resolved = lines.n_line > 0 && report.radius_spread <= TRACE_MOST_SPREAD;
+    if (s == STATUS_OK && resolved && report.profile_blur_m < STRONG_BLUR * box->voxel_size_m[0])
         *found = without_blur(report.profile_radius_m, report.profile_blur_m) / box->voxel_size_m[0];
     direction_volume_release(&d);
     polyline_set_release(&lines);

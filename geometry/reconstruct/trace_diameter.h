@@ -19,10 +19,11 @@ typedef status trace_orientation(const struct volume *v, struct reconstruct_opti
                                  struct reconstruct_report *report, struct error *err);
 
 /* Replaces report->fiber_diameter_voxel, the diameter of a peak, by the mean diameter of traced lines. A round changes
- * nothing where no lines are found, where their radii differ so much that the box does not resolve its fibers, or where
- * the result is of other fibers: thinner than the peak by FIBER_DIAMETER_FINER, thicker by a tenth, or thicker at all
- * where voxels are interpolated. v: densities; known: the same volume before densities were continued into its unknown
- * voxels (volume_unknown.h). STATUS_CANCELLED, STATUS_NO_MEMORY, STATUS_DISK_FULL. */
+ * nothing where no lines are found, where their radii differ so much that the box does not resolve its fibers, where
+ * the scan is strongly blurred, or where the result is of other fibers: thinner than the peak by FIBER_DIAMETER_FINER,
+ * thicker by a tenth, or thicker at all where voxels are interpolated. v: densities; known: the same volume before
+ * densities were continued into its unknown voxels (volume_unknown.h). STATUS_CANCELLED, STATUS_NO_MEMORY,
+ * STATUS_DISK_FULL. */
 status trace_diameter(const struct volume *v, const struct volume *known, trace_orientation *find,
                       struct thread_pool *pool, const struct progress *progress, struct reconstruct_report *report,
                       struct error *err);
