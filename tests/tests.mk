@@ -25,7 +25,7 @@ deps-test:         ## install what the tests need as well
 
 build-tests: $(TEST_BINS) $(EXACT_BINS) $(PRINT_OPTIONS)
 
-check: | deps-test ## quick inner loop: checks of the sources, unit tests, quick API tests (< 2 minutes)
+check: | deps-test ## quick inner loop: checks of the sources, unit tests, quick API tests (3 minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) all build-tests
 	@/usr/bin/python3 tests/run_tests.py --quick --build $(BUILD)
 
