@@ -283,7 +283,7 @@ static void test_missing(void **state)
     char path[128];
     stack_path(path, "text.tif");
     test_write_bytes(path, "hello, this is not a volume", 27);
-    stack_expect_open_error(path, STATUS_UNSUPPORTED, "neither TIFF nor MetaImage");
+    stack_expect_open_error(path, STATUS_UNSUPPORTED, "neither TIFF nor DICOM");
 }
 
 int main(void)
