@@ -58,6 +58,10 @@ def virtual(file):
     file.create_virtual_dataset("volume", layout)
 
 
+def half_written(file):
+    file.create_dataset("volume", shape=SHAPE, dtype="u2", chunks=(1, 12, 17), compression="gzip")[:3] = cloth("u2")[:3]
+
+
 def soft_link(file):
     file["real"] = cloth("u2")
     file["alias"] = h5py.SoftLink("/real")
@@ -80,6 +84,7 @@ def hdf5s():
     yield hdf5("hdf5-two-misspelt", two_sets, dataset="rwa", words=("rwa", "raw"))
     yield hdf5("hdf5-size", with_size, "volume", stated={"voxel size": None}, fields={"voxel_size_um": [2.5, 2.5, 3.0]})
     yield hdf5("hdf5-uncertain-size", with_uncertain_size, "volume", stated={"attribute spacing": "not_used"})
+    yield hdf5("hdf5-half-written", half_written, "volume", stated={"missing chunks": "applied"})
     yield hdf5("hdf5-soft-link", soft_link, "real")
     for fill in (linked, external, virtual):
         yield hdf5("hdf5-" + fill.__name__, fill, words=())

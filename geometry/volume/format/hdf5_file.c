@@ -189,6 +189,19 @@ void hdf5_file_close(struct hdf5_file *h)
     h->file = h->set = h->space = -1;
 }
 
+uint64_t hdf5_file_missing_chunks(const struct hdf5_file *h)
+{
+    hsize_t chunk[HDF5_MAX_DIMENSION], n_written = 0;
+    const hid_t plan = H5Dget_create_plist(h->set);
+    uint64_t n_chunk = 1;
+    if (plan < 0) return 0;
+    const bool is_chunked = H5Pget_layout(plan) == H5D_CHUNKED && H5Pget_chunk(plan, (int)h->n, chunk) == (int)h->n;
+    H5Pclose(plan);
+    if (!is_chunked || H5Dget_num_chunks(h->set, h->space, &n_written) < 0) return 0;
+    for (size_t a = 0; a < h->n; a++) n_chunk *= (h->size[a] + chunk[a] - 1) / chunk[a];
+    return n_chunk > n_written ? n_chunk - n_written : 0;
+}
+
 status hdf5_file_read(struct hdf5_file *h, const hsize_t *start, const hsize_t *count, float *value, struct error *err)
 {
     const hid_t memory = H5Screate_simple((int)h->n, count, NULL);

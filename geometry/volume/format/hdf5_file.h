@@ -7,6 +7,7 @@
 #include "geometry/volume/format/sample_type.h"
 
 #include <hdf5.h>
+#include <stdint.h>
 
 enum { HDF5_MAX_DIMENSION = 5, HDF5_MAX_NAME_BYTES = 128 };
 
@@ -24,6 +25,8 @@ struct hdf5_file {
  * one; the text lists the names. Close it in every case. */
 status hdf5_file_open(struct hdf5_file *h, const char *path, const char *wanted, struct error *err);
 void hdf5_file_close(struct hdf5_file *h);
+/* Returns how many chunks of the data set were never written: their samples read as its fill value. */
+uint64_t hdf5_file_missing_chunks(const struct hdf5_file *h);
 /* Reads `count` samples from `start` on, in each dimension, as floats. STATUS_FORMAT. */
 status hdf5_file_read(struct hdf5_file *h, const hsize_t *start, const hsize_t *count, float *value, struct error *err);
 

@@ -91,6 +91,10 @@ static status settle(struct hdf5 *m, const struct volume_part *part, struct volu
     info->sample = sample_name(m->file.sample);
     file_ledger_add(&info->ledger, "data set", NULL, "%s%s", m->file.set_name,
                     m->file.is_only ? " (the only one)" : "");
+    const uint64_t n_missing = hdf5_file_missing_chunks(&m->file);
+    if (n_missing > 0)
+        file_ledger_add(&info->ledger, "missing chunks", NULL, "%llu, which hold the fill value",
+                        (unsigned long long)n_missing);
     status s = header_axes_settle(&axes, &m->header, part, info, err);
     if (read_numbers(m->file.set, "element_size_um", zyx_um) == 3)
         for (int a = 0; a < 3; a++) edge_m[a] = 1e-6 * zyx_um[2 - a];

@@ -55,6 +55,24 @@ static hid_t packed(void)
     return plan;
 }
 
+/* The chunks that an interrupted program did not write are counted. */
+static void test_missing_chunks(void **state)
+{
+    const char *path = scratch_path(state, "half.h5");
+    const hid_t file = new_file(path), plan = packed(), space = H5Screate_simple(3, zyx, NULL);
+    H5Dclose(H5Dcreate2(file, "v", H5T_STD_U16LE, space, H5P_DEFAULT, plan, H5P_DEFAULT));
+    H5Sclose(space);
+    H5Pclose(plan);
+    H5Fclose(file);
+    struct volume_source *source;
+    struct error err = {0};
+    assert_int_equal(volume_source_open(&path, 1, &source, &err), STATUS_OK);
+    const struct file_statement *said = file_ledger_find(&volume_source_describe(source)->ledger, "missing chunks");
+    assert_non_null(said);
+    assert_string_equal(said->value, "4, which hold the fill value"); /* 1 x 2 x 2 chunks */
+    volume_source_close(source);
+}
+
 static void test_types(void **state)
 {
     static const double none[3] = {0, 0, 0};
@@ -226,8 +244,8 @@ static void test_damaged(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_types),       cmocka_unit_test(test_choice),  cmocka_unit_test(test_channels),
-        cmocka_unit_test(test_other_files), cmocka_unit_test(test_damaged),
+        cmocka_unit_test(test_types),    cmocka_unit_test(test_missing_chunks), cmocka_unit_test(test_choice),
+        cmocka_unit_test(test_channels), cmocka_unit_test(test_other_files),    cmocka_unit_test(test_damaged),
     };
     return cmocka_run_group_tests(tests, scratch_folder_setup, scratch_folder_teardown);
 }
