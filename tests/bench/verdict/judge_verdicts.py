@@ -1,7 +1,10 @@
 """Is the verdict on a scan about the cloth? Makes small scans (verdict_scans.py, selvedge-phantom), reconstructs them with
 bench_verdict, and prints figures, one JSON object a line; the rows go to standard error.
 
-    judge_verdicts.py [--build DIR] [--unseen DIR] [NAME ...]
+    judge_verdicts.py [--build DIR] [--unseen DIR] [--drawn FIRST LAST] [NAME ...]
+
+NAME: a scan of verdict_scans.py, of the product, of --unseen, or drawn-N of drawn_scans.py; default: all but the drawn ones.
+--drawn: only those (and NAME), for limits that were chosen on the named scans.
 
 geometry.verdict.false_good        scans called good with a recall below 0.9, a precision below 0.93 or above 1.5 fragments
 geometry.verdict.good_called_bad   scans without these faults whose score says that the lines do not describe the cloth
@@ -17,6 +20,7 @@ import sys
 
 import numpy as np
 
+import drawn_scans
 import verdict_scans
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "..")
@@ -87,17 +91,23 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", default=os.path.join(ROOT, "build"))
     parser.add_argument("--unseen", default=os.path.join(ROOT, "..", "shared", "data", "unseen-scans"))
+    parser.add_argument("--drawn", type=int, nargs=2)
     parser.add_argument("name", nargs="*")
     arguments = parser.parse_args()
     folder = os.path.join(arguments.build, "bench-verdict")
     os.makedirs(folder, exist_ok=True)
     unseen = sorted(f[:-4] for f in os.listdir(arguments.unseen) if f.endswith(".tif")) if os.path.isdir(arguments.unseen) else []
     rows = []
-    for name in arguments.name or [*verdict_scans.SCANS, *PRODUCT, *unseen]:
+    drawn = ["drawn-%d" % i for i in range(arguments.drawn[0], arguments.drawn[1] + 1)] if arguments.drawn else []
+    named = [*verdict_scans.SCANS, *PRODUCT, *unseen] if not arguments.drawn else []
+    for name in (arguments.name or named) + drawn:
         if name in PRODUCT:
             path = make_product(arguments.build, folder, name)
         elif name in unseen:
             path = take_unseen(arguments.unseen, folder, name)
+        elif name.startswith("drawn-"):
+            verdict_scans.make(name, drawn_scans.drawn(int(name[6:]), verdict_scans.DEFAULT), folder)
+            path = os.path.join(folder, name + ".mhd")
         else:
             verdict_scans.make(name, {**verdict_scans.DEFAULT, **verdict_scans.SCANS[name]}, folder)
             path = os.path.join(folder, name + ".mhd")
