@@ -1,7 +1,7 @@
 #include "clients/cli/arguments/cli_parse.h"
+#include "base/word_guess.h"
 #include "clients/cli/arguments/cli_option_table.h"
 #include "clients/cli/arguments/cli_tool.h"
-#include "clients/cli/text/cli_text.h"
 
 #include <getopt.h>
 #include <stddef.h>
@@ -14,7 +14,7 @@ static status find_command(const char *word, enum cli_command_id *id, struct err
 {
     size_t best = 99;
     for (int i = 0; i < CLI_N_COMMAND; i++) {
-        size_t d = text_distance(word, cli_command_table[i].name);
+        size_t d = word_distance(word, cli_command_table[i].name);
         if (d < best) best = d, *id = (enum cli_command_id)i;
     }
     if (best == 0) return STATUS_OK;

@@ -145,22 +145,3 @@ void text_progress_plain(const struct job_view *v, char *out, size_t n_out)
     eta_part(v, eta, sizeof eta);
     snprintf(out, n_out, "%3.0f %%  %s  ETA %s%s", isnan(v->fraction) ? 0.0 : 100.0 * v->fraction, stage, eta, fit);
 }
-
-size_t text_distance(const char *a, const char *b)
-{
-    size_t row[32], n_b = strlen(b);
-    if (n_b >= 32 || strlen(a) >= 32) return 99;
-    for (size_t j = 0; j <= n_b; j++) row[j] = j;
-    for (size_t i = 1; a[i - 1] != '\0'; i++) {
-        size_t diagonal = row[0];
-        row[0] = i;
-        for (size_t j = 1; j <= n_b; j++) {
-            size_t best = diagonal + (a[i - 1] != b[j - 1]);
-            diagonal = row[j];
-            if (row[j] + 1 < best) best = row[j] + 1;
-            if (row[j - 1] + 1 < best) best = row[j - 1] + 1;
-            row[j] = best;
-        }
-    }
-    return row[n_b];
-}

@@ -32,7 +32,4 @@ void text_progress(const struct job_view *v, size_t n_column, char *out, size_t 
 /* The same without a bar, for logs. */
 void text_progress_plain(const struct job_view *v, char *out, size_t n_out);
 
-/* Edit distance of two words of less than 32 characters, for "did you mean"; 99 for longer ones. */
-size_t text_distance(const char *a, const char *b);
-
 #endif

@@ -1,5 +1,7 @@
 #include "optimizer/job/document/json_field.h"
 
+#include "base/word_guess.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -55,6 +57,10 @@ status json_field_check_keys(const struct json_field *f, const char *const *allo
         char path[JSON_PATH_BYTES], list[400];
         json_field_path(f, key, path);
         json_list_text(allowed, list, sizeof list);
+        const char *meant = word_guess(key, allowed);
+        if (meant != NULL)
+            return error_set_field(err, STATUS_INVALID, path,
+                                   "unknown field '%s': did you mean '%s'? Allowed here are %s", path, meant, list);
         return error_set_field(err, STATUS_INVALID, path, "unknown field '%s': allowed here are %s", path, list);
     }
     return STATUS_OK;

@@ -4,6 +4,7 @@
 #include "optimizer/job/checks/option_checks.h"
 #include "optimizer/job/document/job_file_name.h"
 #include "optimizer/job/document/json_field.h"
+#include "optimizer/job/options/option_section.h"
 #include "optimizer/job/options/option_table.h"
 
 #include <math.h>
@@ -191,7 +192,12 @@ static status read_object(const struct job_option *row, const struct json_field 
     status s = json_field_object(f, key, &sub, &present, err);
     if (s != STATUS_OK) return s;
     if (row->stored) *(bool *)((char *)base + row->at) = present;
-    return read_section(&sub, row->path, base, r, err);
+    const size_t n_before = n_fault(r);
+    const bool may_be_empty = row->stored || row->check != NULL || json_object_size(sub.object) > 0;
+    s = read_section(&sub, row->path, base, r, err);
+    if (s != STATUS_OK || may_be_empty || n_fault(r) > n_before) return s;
+    return error_set_field(err, STATUS_INVALID, sub.path, "'%s' is empty and would do nothing: fill it or leave it out",
+                           sub.path);
 }
 
 /* Reads the value of a key that is given or required. */
@@ -265,26 +271,6 @@ static status read_option(const struct job_option *row, const struct json_field 
     return row->check(&v, err);
 }
 
-/* Refuses keys that are not allowed: one by one where all faults are collected. */
-static status check_keys(const struct json_field *f, const char *const *allowed, struct reading *r, struct error *err)
-{
-    struct error fault = {0};
-    status s = json_field_check_keys(f, allowed, &fault);
-    if (s == STATUS_OK || r->fault == NULL || !json_is_object(f->object)) return stop_or_keep(s, &fault, r, err);
-    const char *key;
-    json_t *value, *object = (json_t *)(uintptr_t)f->object;
-    json_object_foreach(object, key, value)
-    {
-        struct json_field one = *f;
-        one.object = json_pack("{s:O}", key, value);
-        if (one.object == NULL) continue;
-        s = json_field_check_keys(&one, allowed, &fault);
-        json_decref((json_t *)(uintptr_t)one.object);
-        if (s != STATUS_OK) job_faults_add(r->fault, &fault);
-    }
-    return STATUS_OK;
-}
-
 /* Reads all members of an object. pattern: its path in the table; base: the struct to which the offsets of the members
  * refer. */
 static status read_section(const struct json_field *f, const char *pattern, void *base, struct reading *r,
@@ -300,7 +286,7 @@ static status read_section(const struct json_field *f, const char *pattern, void
         allowed[n++] = key;
     }
     allowed[n] = NULL;
-    status s = check_keys(f, allowed, r, err);
+    status s = job_option_check_keys(f, allowed, r->fault, err);
     for (size_t i = 0; s == STATUS_OK && json_is_object(f->object) && i < n; i++) {
         struct error fault = {0};
         s = stop_or_keep(read_option(of[i], f, allowed[i], base, r, &fault), &fault, r, err);

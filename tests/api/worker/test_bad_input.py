@@ -134,9 +134,10 @@ TAB, PHO, WEAVE = table_job, photo_job, weave_job
 CASES = [
     ("no sample", TAB, put("sample", None), "fault", "sample"),
     ("empty sample", TAB, put("sample", ""), "fault", "sample"),
-    ("unknown key", TAB, put("colour", 1), "fault", "unknown field 'colour'"),
+    ("unknown key", TAB, put("colour", 1), "fault", "unknown field 'colour': did you mean 'color'?"),
     ("unknown key in a section", TAB, put("fibers.radius", 1), "fault", "unknown field 'fibers.radius'"),
-    ("key in a wrong section", TAB, put("fit.voxel_size_um", 2), "fault", "unknown field 'fit.voxel_size_um'"),
+    ("key in a wrong section", TAB, put("fit.voxel_size_um", 2), "fault", "unknown field 'fit.voxel_size_um': it belongs in 'volume'"),
+    ("empty section", TAB, put("twin", {}), "fault", "'twin' is empty and would do nothing"),
     ("text for a number", TAB, put("fibers.voxel_um", "5 um"), "fault", "'fibers.voxel_um' must be a number"),
     ("negative voxel", TAB, put("fibers.voxel_um", -5), "fault", "fibers.voxel_um"),
     ("no cloth", TAB, put("fibers", None), "fault", "volume"),
