@@ -9,6 +9,7 @@ NAME: a scan of verdict_scans.py, of the product, of --unseen, or drawn-N of dra
 geometry.verdict.false_good        scans called good with a recall below 0.9, a precision below 0.93 or above 1.5 fragments
 geometry.verdict.good_called_bad   scans without these faults whose score says that the lines do not describe the cloth
 geometry.verdict.rank_correlation  of the score with the smaller of recall and precision (Spearman)
+geometry.{noise,sponge}.wall_s     time until a scan without fibers ends; noise is refused, which is no error
 geometry.false_lumens              share of the solid scans that are called hollow or maybe hollow
 Scans with a truth in other units than the product's text of fibers (--unseen) are converted.
 """
@@ -75,7 +76,10 @@ def figure(name, value, unit, better="lower"):
 
 def judge(rows):
     """Prints the figures of the rows that could be reconstructed; errors are counted."""
-    figure("verdict.errors", sum("error" in r for r in rows), "scans")
+    for r in rows:
+        if r["name"] in ("noise.mhd", "sponge.mhd"):
+            figure(r["name"][:-4] + ".wall_s", r["wall_s"], "s")
+    figure("verdict.errors", sum("error" in r and "nothing but noise" not in r["error"] for r in rows), "scans")
     rows = [r for r in rows if "error" not in r]
     truth = [min(r["recall"], r["precision"]) for r in rows]
     right = [r["recall"] >= 0.9 and r["precision"] >= 0.93 and r["fragments"] <= 1.5 for r in rows]
