@@ -189,6 +189,40 @@ def test_errors_before_anything_is_created(daemon, sample):
     assert [j["id"] for j in json.loads(run(daemon.url, "list", "--json").stdout)] == before
 
 
+def test_exit_status_by_verdict(daemon, sample):
+    write_document(sample, "usable twill")
+    job_id = run(daemon.url, "submit", sample / "job.json", "--watch", "--require", "usable").stdout.splitlines()[0]
+    assert "worse than 'good'" in run(daemon.url, "watch", job_id, "--require", "good", expect=4).stderr
+    write_document(sample, "good twill")
+    run(daemon.url, "submit", sample / "job.json", "--watch", "--require", "good")
+    write_document(sample, "bad twill")
+    run(daemon.url, "submit", sample / "job.json", "--watch", "--require", "usable", expect=4)
+    write_document(sample, "quick twill")
+    run(daemon.url, "submit", sample / "job.json", "--watch", "--require", "usable", expect=4)
+    assert "allowed are good, usable" in run(daemon.url, "watch", job_id, "--require", "best", expect=2).stderr
+    assert "needs --watch" in run(daemon.url, "submit", sample / "job.json", "--require", "good", expect=2).stderr
+
+
+def test_files_in_place_of_a_document(sample):
+    for name, said in {"scan.tif": "`selvedge reconstruct FILE`", "cloth.csv": "'measurements.file'"}.items():
+        for command in ("check", "submit"):
+            assert said in run("http://127.0.0.1:1", command, sample / name, expect=1).stderr
+    assert "is a folder" in run("http://127.0.0.1:1", "check", sample, expect=1).stderr
+    (sample / "empty.json").write_text("")
+    assert "is empty" in run("http://127.0.0.1:1", "check", sample / "empty.json", expect=1).stderr
+    (sample / "list.json").write_text("[]")
+    assert "does not begin with {" in run("http://127.0.0.1:1", "check", sample / "list.json", expect=1).stderr
+
+
+def test_help_of_every_command():
+    listed = run("http://x", "help").stdout
+    names = [line.split()[0] for line in listed.split("commands:\n")[1].split("\n\n")[0].splitlines()]
+    assert {"submit", "doctor", "photo", "bowl"} < set(names)
+    for name in names:
+        assert name in run("http://x", "help", name).stdout
+    assert "did you mean 'photo'" in run("http://x", "foto", expect=2).stderr
+
+
 def test_server_not_reachable():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]

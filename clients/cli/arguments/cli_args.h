@@ -29,6 +29,7 @@ struct cli_args {
     const char *out_dir;                   /* --out */
     const char *resume_id;                 /* --resume */
     const char *id_file;                   /* --id-file */
+    const char *require;                   /* --require: the worst verdict that is accepted */
     const char *voxel_um;                  /* --voxel-um */
     const char *axes;                      /* --axes */
     const char *hollow, *diameter_voxel;   /* --hollow, --diameter-voxel: of a scan */

@@ -9,6 +9,9 @@ const struct cli_option cli_option_table[CLI_N_OPTION] = {
     {NULL, 0, "input-dir", "DIR", "folder of the input files (default: the document's folder)",
      offsetof(struct cli_args, input_dir)},
     {NULL, 'w', "watch", NULL, "follow the job until it ends", offsetof(struct cli_args, watch)},
+    {NULL, 0, "require", "VERDICT",
+     "status 4 if the result has a worse verdict than this: good, usable (needs --watch" CLI_NEXT_LINE "with submit)",
+     offsetof(struct cli_args, require)},
     {NULL, 0, "resume", "ID",
      "continue an interrupted submit of job ID (JOB.json is then not needed" CLI_NEXT_LINE
      "if the files are in the current folder or --input-dir)",

@@ -18,9 +18,12 @@ static status find_command(const char *word, enum cli_command_id *id, struct err
         if (d < best) best = d, *id = (enum cli_command_id)i;
     }
     if (best == 0) return STATUS_OK;
-    if (best <= 2)
-        return error_set(err, STATUS_INVALID, "unknown command '%s'; did you mean '%s'?", word,
-                         cli_command_table[*id].name);
+    const char *meant = cli_command_table[*id].name;
+    for (size_t i = 0; i < CLI_N_TOOL; i++) {
+        const size_t d = word_distance(word, cli_tool_table[i].name);
+        if (d < best) best = d, meant = cli_tool_table[i].name;
+    }
+    if (best <= 2) return error_set(err, STATUS_INVALID, "unknown command '%s'; did you mean '%s'?", word, meant);
     return error_set(err, STATUS_INVALID, "unknown command '%s'; `selvedge --help` lists them", word);
 }
 
@@ -124,6 +127,10 @@ static status check(const struct cli_args *a, struct error *err)
                          c->needs != NULL ? c->needs : "a job id (`selvedge list` shows them)", c->name, c->operand);
     if (c->operand == NULL && a->operand != NULL)
         return error_set(err, STATUS_INVALID, "'selvedge %s' takes no '%s'", c->name, a->operand);
+    if (a->require != NULL && strcmp(a->require, "good") != 0 && strcmp(a->require, "usable") != 0)
+        return error_set(err, STATUS_INVALID, "--require is '%s': allowed are good, usable", a->require);
+    if (a->require != NULL && a->command == CLI_SUBMIT && !a->watch)
+        return error_set(err, STATUS_INVALID, "--require needs --watch: the verdict is known when the job has ended");
     if (strncmp(a->server, "http://", 7) != 0 && strncmp(a->server, "https://", 8) != 0 &&
         strncmp(a->server, "unix:/", 6) != 0)
         return error_set(err, STATUS_INVALID, "server '%s' is not an http://, https:// or unix:/ address", a->server);
@@ -215,5 +222,6 @@ void cli_help(const struct cli_args *args, char *text, size_t n_bytes)
     put_options(NULL, text, n_bytes, &at);
     put(text, n_bytes, &at,
         "\n`selvedge help COMMAND` describes a command. docs/options.md describes the job document.\n"
-        "Exit status: 0 done, 1 error or failed job, 2 wrong command line, 3 cancelled job, 130 interrupted.\n");
+        "Exit status: 0 done, 1 error or failed job, 2 wrong command line, 3 cancelled job, 4 verdict\n"
+        "worse than --require, 130 interrupted.\n");
 }

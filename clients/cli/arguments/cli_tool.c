@@ -8,11 +8,16 @@
 #include <unistd.h>
 
 const struct cli_tool cli_tool_table[CLI_N_TOOL] = {
-    {"doctor", "[JOB]", "examine this machine and the service's data, or a job", "selvedged", "--doctor"},
-    {"photo", "FILE...", "show what becomes of a photograph", "selvedge-camera", NULL},
-    {"calibrate-camera", NULL, "make the record of a camera's noise from dark and flat frames", "selvedge-camera",
+    {"doctor", "[JOB]", "examine this machine and the service's data, or a job", "selvedged", "--doctor",
+     "Looks at programs and libraries, limits, free space, the database and its folders, and says what is wrong and\n"
+     "how to mend it. JOB: an id, or the folder of a job. Exit status 1 when there are\n"
+     "faults.\n\noptions:\n"
+     "      --config FILE   settings (default: those of the installed service)\n"
+     "      --data DIR      folder of the database and of all jobs\n"},
+    {"photo", "FILE...", "show what becomes of a photograph", "selvedge-camera", NULL, NULL},
+    {"calibrate-camera", NULL, "make the record of a camera's noise from dark and flat frames", "selvedge-camera", NULL,
      NULL},
-    {"bowl", "JOB.json", "make the profile of a fiber from photographs of a bowl", "selvedge-camera", NULL},
+    {"bowl", "JOB.json", "make the profile of a fiber from photographs of a bowl", "selvedge-camera", NULL, NULL},
 };
 enum { MOST_ARGUMENTS = 60 };
 
@@ -24,6 +29,15 @@ bool cli_tool_knows(const char *word)
     for (size_t i = 0; i < CLI_N_TOOL; i++)
         if (strcmp(cli_tool_table[i].name, word) == 0) return true;
     return false;
+}
+
+bool cli_tool_help(const char *word, char *text, size_t n_bytes)
+{
+    const struct cli_tool *t = cli_tool_table;
+    while (strcmp(t->name, word) != 0) t++;
+    if (t->text == NULL) return false;
+    snprintf(text, n_bytes, "usage: selvedge %s %s [options]\n\n%s.\n\n%s", t->name, t->operand, t->summary, t->text);
+    return true;
 }
 
 static bool names_a_service(char *const *argv)

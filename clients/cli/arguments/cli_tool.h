@@ -12,12 +12,15 @@ struct cli_tool {
     const char *name, *operand, *summary; /* operand: NULL: none */
     const char *program;
     const char *option; /* the option of the program that stands for the command; NULL: the command's name itself */
+    const char *text;   /* help beside the summary; NULL: the program prints it */
 };
 enum { CLI_N_TOOL = 4 };
 extern const struct cli_tool cli_tool_table[CLI_N_TOOL];
 
 /* Whether word is such a command ("photo"). */
 bool cli_tool_knows(const char *word);
+/* Writes the help of a command that has a text; false: its program prints it. */
+bool cli_tool_help(const char *word, char *text, size_t n_bytes);
 /* Replaces this process by the program that runs the command argv[1]: the one beside this program, or else in PATH.
  * Returns only on failure: STATUS_NOT_FOUND. */
 status cli_tool_run(char **argv, struct error *err);

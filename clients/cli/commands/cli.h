@@ -14,6 +14,7 @@ enum cli_exit {
     CLI_EXIT_ERROR = 1,
     CLI_EXIT_USAGE = 2,
     CLI_EXIT_CANCELLED = 3,
+    CLI_EXIT_VERDICT = 4, /* the result is worse than --require */
     CLI_EXIT_INTERRUPTED = 130
 };
 

@@ -2,6 +2,7 @@
  * is a mode of `selvedge-worker`, which reads every file format; the client runs it and prints its report. */
 #include "clients/cli/arguments/cli_tool.h"
 #include "clients/cli/commands/cli.h"
+#include "clients/cli/commands/cli_document.h"
 #include "clients/cli/text/cli_report.h"
 #include "clients/cli/text/cli_text.h"
 
@@ -61,8 +62,9 @@ status cli_check(struct cli *cli, int *exit_code, struct error *err)
         snprintf(folder, sizeof folder, "%s", a->input_dir);
     else
         cli_folder_of(a->operand, folder, sizeof folder);
-    if (access(a->operand, R_OK) != 0) return error_set_errno(err, "cannot read the job document '%s'", a->operand);
-    status s = run_worker(a->operand, folder, &report, err);
+    status s = cli_document_check(a->operand, err);
+    if (s != STATUS_OK) return s;
+    s = run_worker(a->operand, folder, &report, err);
     if (s == STATUS_OK && a->json) {
         json_dumpf(report, cli->out, JSON_INDENT(1));
         fputc('\n', cli->out);

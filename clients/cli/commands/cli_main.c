@@ -74,16 +74,29 @@ static int execute(const struct cli_args *given)
     return s == STATUS_CANCELLED ? CLI_EXIT_INTERRUPTED : CLI_EXIT_ERROR;
 }
 
+/* Returns only if another program does not take over. */
+static int run_tool(char **argv)
+{
+    char text[2048];
+    struct error err = {0};
+    const bool asks = argv[2] != NULL && (strcmp(argv[2], "--help") == 0 || strcmp(argv[2], "-h") == 0);
+    if (asks && cli_tool_help(argv[1], text, sizeof text)) {
+        fputs(text, stdout);
+        return CLI_EXIT_OK;
+    }
+    cli_tool_run(argv, &err);
+    print_error(&err);
+    return CLI_EXIT_ERROR;
+}
+
 int main(int argc, char **argv)
 {
     struct cli_args args;
     struct error err = {0};
     setlocale(LC_CTYPE, "");
-    if (argc >= 2 && cli_tool_knows(argv[1])) {
-        cli_tool_run(argv, &err);
-        print_error(&err);
-        return CLI_EXIT_ERROR;
-    }
+    if (argc >= 2 && cli_tool_knows(argv[1])) return run_tool(argv);
+    if (argc >= 3 && strcmp(argv[1], "help") == 0 && cli_tool_knows(argv[2]))
+        return run_tool((char *[]){argv[0], argv[2], (char[]){"--help"}, NULL});
     const struct cli_environment env = {getenv("SELVEDGE_SERVER"), getenv("SELVEDGE_TOKEN"),
                                         getenv("SELVEDGE_TOKEN_FILE")};
     if (cli_args_parse(argc, argv, &env, &args, &err) != STATUS_OK) {

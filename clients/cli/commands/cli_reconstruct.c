@@ -170,7 +170,7 @@ static status make_document(const struct cli_args *a, json_t **document, char *f
 
 CLI_COMMAND(
     RECONSTRUCT, cli_reconstruct, .place = 30, .name = "reconstruct", .operand = "SCAN", .needs = "a scan",
-    .options = "scan out id-file",
+    .options = "scan out id-file require",
     .summary = "trace the fibers of a scan, without photographs, and download the results",
     .text =
         "SCAN is a file (" CLI_SCAN_FORMATS ") or a folder of slices. The job ends with the\n"

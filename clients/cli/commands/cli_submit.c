@@ -1,4 +1,5 @@
 #include "clients/cli/commands/cli.h"
+#include "clients/cli/commands/cli_document.h"
 #include "clients/cli/commands/cli_job_files.h"
 #include "clients/cli/text/cli_report.h"
 #include "clients/cli/text/cli_text.h"
@@ -88,14 +89,14 @@ void cli_folder_of(const char *path, char *folder, size_t n_bytes)
 static status read_document(struct submit *u, const char *path, struct error *err)
 {
     json_error_t where;
+    status s = cli_document_check(path, err);
+    if (s != STATUS_OK) return s;
     u->document = json_load_file(path, JSON_REJECT_DUPLICATES, &where);
     if (u->document == NULL && where.line <= 0)
         return error_set(err, STATUS_NOT_FOUND, "cannot read the job document: %s", where.text);
     if (u->document == NULL)
         return error_set(err, STATUS_INVALID, "job document '%s', line %d, column %d: %s", path, where.line,
                          where.column, where.text);
-    if (!json_is_object(u->document))
-        return error_set(err, STATUS_INVALID, "job document '%s' is not a JSON object", path);
     return STATUS_OK;
 }
 
@@ -353,7 +354,7 @@ status cli_submit_once(struct cli *cli, const json_t *document, const char *fold
 
 CLI_COMMAND(
     SUBMIT, cli_submit, .place = 10, .name = "submit", .operand = "JOB.json", .needs = "a job document",
-    .options = "input-dir watch resume draft id-file",
+    .options = "input-dir watch require resume draft id-file",
     .summary = "send a job document and its files, and start the job",
     .text =
         "Every file that the document names is taken from the document's folder (or --input-dir), declared with\n"

@@ -139,6 +139,15 @@ static bool ended(const struct job_view *v)
            strcmp(v->state, "cancelled") == 0 || strcmp(v->state, "draft") == 0;
 }
 
+/* Whether the verdict of a job that has succeeded is at least `least`; NULL: any is. A job without a verdict has none
+ * that is good enough. */
+static bool is_good_enough(const char *least, const json_t *job)
+{
+    const char *code = json_string_value(json_object_get(json_object_get(job, "verdict"), "code"));
+    if (least == NULL) return true;
+    return code != NULL && (strcmp(code, "good") == 0 || strcmp(code, least) == 0);
+}
+
 static status report_outcome(struct watch *w, int *exit_code, struct error *err)
 {
     const char *state = w->view.state;
@@ -149,6 +158,10 @@ static status report_outcome(struct watch *w, int *exit_code, struct error *err)
         status s = cli_add_result(w->cli, w->job, err);
         if (s != STATUS_OK) return s;
         report_result(w->job, w->cli->out);
+        if (!is_good_enough(w->cli->args->require, w->job)) {
+            fprintf(w->cli->note, "the verdict is worse than '%s', which --require asks for\n", w->cli->args->require);
+            *exit_code = CLI_EXIT_VERDICT;
+        }
         fprintf(w->cli->note, "results: selvedge results %s, or %s/#%s\n", w->id, http_server(w->cli->http), w->id);
         return STATUS_OK;
     }
@@ -187,9 +200,10 @@ status cli_watch_job(struct cli *cli, const char *id, int *exit_code, struct err
 }
 
 CLI_COMMAND(
-    WATCH, cli_watch, .place = 60, .name = "watch", .operand = "ID", .summary = "follow a job until it ends",
+    WATCH, cli_watch, .place = 60, .name = "watch", .operand = "ID", .options = "require",
+    .summary = "follow a job until it ends",
     .text = "A live progress line in a terminal, one line per change otherwise. Exit status 0 when the job succeeded,\n"
-            "1 when it failed, 3 when it was cancelled.\n")
+            "1 when it failed, 3 when it was cancelled, 4 when its verdict is worse than --require.\n")
 
 status cli_watch(struct cli *cli, int *exit_code, struct error *err)
 {

@@ -2,8 +2,9 @@
 """A stub of selvedge-worker for tests of clients. It reports all stages and writes invented curves and results,
 but computes nothing.
 
-The sample's name selects its behaviour: "slow ..." takes 40 s for the fit, "failing ..." fails in the first
-stage with a field, "twin ..." has tables of a twin among its results, files of "faulty ..." have two faults, anything else succeeds within a second or two."""
+The sample's name selects its behaviour: "slow ..." takes 40 s for the fit, "failing ..." fails in the first stage with a
+field, "twin ..." has tables of a twin among its results, "good ...", "usable ..." and "bad ..." end with this verdict, files
+of "faulty ..." have two faults, anything else succeeds within a second or two."""
 import json
 import math
 import os
@@ -48,6 +49,15 @@ def status(**changes):
 def log(text):
     with open(path("log.txt"), "a", encoding="utf-8") as f:
         f.write(time.strftime("%Y-%m-%dT%H:%M:%S.000Z INFO ", time.gmtime()) + text + "\n")
+
+
+def verdict(sample):
+    """The verdict that a sample's name begins with, or none."""
+    code = sample.split()[0]
+    known = {"good": "good", "usable": "usable with reservations", "bad": "does not describe this cloth"}
+    if code not in known:
+        return None
+    return {"code": "does_not_describe_this_cloth" if code == "bad" else code, "words": known[code], "text": "A stub says so.", "reservations": []}
 
 
 def series(step):
@@ -96,7 +106,7 @@ def main():
     results()
     if sample.startswith("twin"):
         synthetic_twin.write(path("results"), sample)
-    status(state="succeeded", stage="report", i_stage=len(STAGES) - 1, stage_fraction=1.0, fraction=1.0, eta_s=0.0)
+    status(state="succeeded", stage="report", i_stage=len(STAGES) - 1, stage_fraction=1.0, fraction=1.0, eta_s=0.0, verdict=verdict(sample))
     return 0
 
 

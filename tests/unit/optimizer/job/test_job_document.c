@@ -102,7 +102,7 @@ static void test_structure(void **state)
     job_document_check_error("{", "", "not valid JSON");
     job_document_check_error("[]", "", "must be an object");
     job_document_check_error("{\"sample\":\"s\",\"sample\":\"t\"}", "", "duplicate");
-    job_document_check_error("{\"sampel\":\"s\"}", "sampel", "allowed here are sample, volume");
+    job_document_check_error("{\"sampel\":\"s\"}", "sampel", "did you mean 'sample'? Allowed here are sample, volume");
     job_document_check_error("{\"sample\":\"\"}", "sample", "1 to");
     job_document_check_error("{\"sample\":7}", "sample", "must be a text, but it is a number");
     job_document_check_error("{\"sample\":\"a\\u0001b\"}", "sample", "control");
