@@ -20,13 +20,18 @@ status scan_grade_explain(const struct coverage_input *in, struct thread_pool *p
 {
     status s = scan_coverage_measure(in, pool, NULL, &grade->coverage, err);
     if (s != STATUS_OK) return s;
+    s = section_misfit_measure(in->v, in->f, pool, &grade->section_misfit, err);
+    if (s != STATUS_OK) return s;
     fiber_likeness_measure(in->v, in->f, safe, &grade->likeness);
     const struct fiber_likeness *l = &grade->likeness;
-    const double of_fibers = (1.0 - l->particle_share) * (1.0 - grade->double_share);
+    /* lines whose sections are much too uneven hold several fibers each, so that hardly any fiber is found */
+    const double uneven = fmax(1.0, grade->section_misfit / SECTION_MOST_MISFIT); /* 1 if it is NaN */
+    const double of_fibers = (1.0 - l->particle_share) * (1.0 - grade->double_share) / (uneven * uneven);
     grade->score = fmin(grade->coverage.explained_share, of_fibers / (1.0 + PIECE_LOSS * (l->fragments - 1.0)));
     grade->faults = (explains(&grade->coverage) ? 0U : GRADE_UNEXPLAINED) |
                     (l->particle_share > GRADE_MOST_PARTICLES ? GRADE_PARTICLES : 0U) |
                     (grade->double_share > GRADE_MOST_DOUBLED ? GRADE_DOUBLED : 0U) |
-                    (l->fragments > GRADE_MOST_FRAGMENTS ? GRADE_PIECES : 0U);
+                    (l->fragments > GRADE_MOST_FRAGMENTS ? GRADE_PIECES : 0U) |
+                    (grade->section_misfit > SECTION_MOST_MISFIT ? GRADE_SEVERAL : 0U);
     return STATUS_OK;
 }

@@ -200,3 +200,26 @@ size_t grade_points_near(const struct grade_points *g, size_t i, double reach, c
                 }
     return n;
 }
+
+double grade_density_at(const struct volume *v, const double x[3])
+{
+    size_t i[3];
+    double f[3], sum = 0.0;
+    for (int a = 0; a < 3; a++) {
+        double c = fmin(fmax(x[a] - 0.5, 0.0), (double)v->n[a] - 1.0);
+        i[a] = (size_t)c;
+        if (i[a] + 1 == v->n[a] && i[a] > 0) i[a]--;
+        f[a] = v->n[a] > 1 ? c - (double)i[a] : 0.0;
+    }
+    for (size_t corner = 0; corner < 8; corner++) {
+        double weight = 1.0;
+        size_t at[3];
+        for (size_t a = 0; a < 3; a++) {
+            size_t up = corner >> a & 1;
+            weight *= up ? f[a] : 1.0 - f[a];
+            at[a] = i[a] + (v->n[a] > 1 ? up : 0);
+        }
+        if (weight > 0.0) sum += weight * (double)v->density[volume_index(v->n, at[0], at[1], at[2])];
+    }
+    return sum;
+}

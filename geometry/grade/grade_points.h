@@ -3,6 +3,7 @@
 #define SELVEDGE_GEOMETRY_GRADE_POINTS_H
 
 #include "geometry/fibers/fiber_set.h"
+#include "geometry/volume/volume.h"
 
 /* A point of a fiber, in voxels, and the unit direction there. */
 struct grade_point {
@@ -34,5 +35,7 @@ const struct grade_point *grade_points_beside(const struct grade_points *g, size
  * distance of their surfaces, in voxels. Returns their number. */
 size_t grade_points_near(const struct grade_points *g, size_t i, double reach, const struct grade_point **near,
                          size_t n_most);
+/* Density at a place in voxels, between the centers of voxels; places beyond a face have the density of the face. */
+double grade_density_at(const struct volume *v, const double x[3]);
 
 #endif

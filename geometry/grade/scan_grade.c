@@ -44,29 +44,6 @@ struct grade_job {
     size_t n_window;
 };
 
-static double density_at(const struct volume *v, const double x[3])
-{
-    size_t i[3];
-    double f[3], sum = 0.0;
-    for (int a = 0; a < 3; a++) {
-        double c = fmin(fmax(x[a] - 0.5, 0.0), (double)v->n[a] - 1.0);
-        i[a] = (size_t)c;
-        if (i[a] + 1 == v->n[a] && i[a] > 0) i[a]--;
-        f[a] = v->n[a] > 1 ? c - (double)i[a] : 0.0;
-    }
-    for (size_t corner = 0; corner < 8; corner++) {
-        double weight = 1.0;
-        size_t at[3];
-        for (size_t a = 0; a < 3; a++) {
-            size_t up = corner >> a & 1;
-            weight *= up ? f[a] : 1.0 - f[a];
-            at[a] = i[a] + (v->n[a] > 1 ? up : 0);
-        }
-        if (weight > 0.0) sum += weight * (double)v->density[volume_index(v->n, at[0], at[1], at[2])];
-    }
-    return sum;
-}
-
 /* Adds the densities on the way from p by `way`. */
 static void add_profile(const struct volume *v, const float p[3], const double way[3], double weight,
                         double profile[N_PLACE])
@@ -74,7 +51,7 @@ static void add_profile(const struct volume *v, const float p[3], const double w
     for (int k = 0; k < N_PLACE; k++) {
         double x[3];
         for (int a = 0; a < 3; a++) x[a] = (double)p[a] + way[a] * k / (N_PLACE - 1);
-        profile[k] += weight * density_at(v, x);
+        profile[k] += weight * grade_density_at(v, x);
     }
 }
 
@@ -135,7 +112,7 @@ static void add_patch(const struct grade_job *j, size_t i_point, struct slope *s
         for (int k = 0; k < (ring == 0 ? 1 : N_AROUND); k++) {
             double angle = 2.0 * M_PI * (k + 0.5 * (ring % 2)) / N_AROUND, away = outer * ring / N_RING, x[3];
             for (int a = 0; a < 3; a++) x[a] = (double)p->p[a] + away * (cos(angle) * e[a] + sin(angle) * o[a]);
-            double expected = expected_at(j, near, n, x), measured = density_at(j->v, x);
+            double expected = expected_at(j, near, n, x), measured = grade_density_at(j->v, x);
             s->n += 1.0;
             s->x += expected;
             s->y += measured;

@@ -13,6 +13,7 @@
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/grade/fiber_likeness.h"
 #include "geometry/grade/scan_coverage.h"
+#include "geometry/grade/section_misfit.h"
 #include "geometry/volume/volume.h"
 
 enum { GRADE_WINDOW_DIAMETERS = 4 };
@@ -23,7 +24,13 @@ enum { GRADE_WINDOW_DIAMETERS = 4 };
 
 /* Faults of the lines that contrast does not show, and their limits. GRADE_KIND_SHARE: share of the material from which
  * on a kind of material (scan_coverage.h) has to be explained by itself. */
-enum grade_fault { GRADE_UNEXPLAINED = 1, GRADE_PARTICLES = 2, GRADE_DOUBLED = 4, GRADE_PIECES = 8 };
+enum grade_fault {
+    GRADE_UNEXPLAINED = 1,
+    GRADE_PARTICLES = 2,
+    GRADE_DOUBLED = 4,
+    GRADE_PIECES = 8,
+    GRADE_SEVERAL = 16
+};
 #define GRADE_LEAST_EXPLAINED 0.93
 #define GRADE_KIND_SHARE 0.05
 #define GRADE_LEAST_KIND 0.8
@@ -42,10 +49,12 @@ struct scan_grade {
     double beside_share;        /* share of the length that lies beside a neighbour */
     double safe_share;          /* share of the length in windows with a contrast of at least GRADE_SAFE_CONTRAST */
     double double_share;        /* share of the length that has another line nearer than fibers can be */
+    double section_misfit;      /* of the lines from round fibers (section_misfit.h); NaN: not measured */
     struct scan_coverage coverage;
     struct fiber_likeness likeness;
     /* Estimate of the smaller of recall and precision of the lines: the smaller of the explained share, and of the
-     * share of the length that is neither particles nor doubled, less a little for pieces. NaN: not measured. */
+     * share of the length that is neither particles nor doubled, less a little for pieces, and much for sections that
+     * are not round. NaN: not measured. */
     double score;
     unsigned faults;  /* of enum grade_fault */
     size_t n_dropped; /* fibers that scan_grade_sort has put last; 0 after measuring */

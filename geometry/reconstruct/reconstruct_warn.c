@@ -166,6 +166,13 @@ static void warn_faults(const struct warning_sink *warn, const struct scan_grade
                      "%.0f %% of the traced length lies within another traced fiber, so thick fibers may hold several "
                      "lines: give the diameter of the thickest fibers",
                      100.0 * g->double_share);
+    if (g->faults & GRADE_SEVERAL)
+        warning_send(warn, OPTION_FIBER_DIAMETER,
+                     "the traced lines do not have the sections of single fibers (densities around their axes vary by "
+                     "%.0f %%): each "
+                     "line may hold several fibers, or a yarn; give the diameter of the fibers, or scan with smaller "
+                     "voxels",
+                     100.0 * g->section_misfit);
     if (g->faults & GRADE_PIECES)
         warning_send(
             warn, OPTION_SCAN_FILES,

@@ -71,10 +71,11 @@ static void bench_scan(const char *path, double voxel_m, struct thread_pool *poo
     else
         printf(
             "{\"name\":\"%s\",\"wall_s\":%.1f,\"recall\":%.4f,\"precision\":%.4f,\"fragments\":%.3f,\"lumens\":\"%s\","
-            "\"score\":%.4f,\"faults\":%u,\"verdict\":\"%s\",\"is_good\":%s}\n",
+            "\"score\":%.4f,\"misfit\":%.4f,\"faults\":%u,\"verdict\":\"%s\",\"is_good\":%s}\n",
             name, wall_s, number(r.compare.center_recall), number(r.compare.center_precision),
-            number(r.compare.fragments_per_fiber), lumen_answer_name(r.report.lumens), number(g->score), g->faults,
-            grade_verdict_name(g->verdict), g->verdict == GRADE_RESOLVED && g->faults == 0 ? "true" : "false");
+            number(r.compare.fragments_per_fiber), lumen_answer_name(r.report.lumens), number(g->score),
+            number(g->section_misfit), g->faults, grade_verdict_name(g->verdict),
+            g->verdict == GRADE_RESOLVED && g->faults == 0 ? "true" : "false");
     fflush(stdout);
     volume_release(&r.v);
     fiber_set_release(&r.truth);

@@ -89,9 +89,11 @@ static struct scan_grade grade_of(const struct volume *v, const struct fiber_set
     if (unexplained != NULL)
         assert_int_equal(scan_coverage_measure(&in, pool, unexplained, &other.coverage, NULL), STATUS_OK);
     thread_pool_free(pool);
-    print_message("explained %.3f (dense %.2f, light %.2f of %.2f), particles %.2f, doubled %.2f, pieces %.2f: %.3f\n",
+    print_message("explained %.3f (dense %.2f, light %.2f of %.2f), particles %.2f, doubled %.2f, pieces %.2f, misfit "
+                  "%.3f: %.3f\n",
                   g.coverage.explained_share, g.coverage.kind[0].explained_share, g.coverage.kind[1].explained_share,
-                  g.coverage.kind[1].share, g.likeness.particle_share, g.double_share, g.likeness.fragments, g.score);
+                  g.coverage.kind[1].share, g.likeness.particle_share, g.double_share, g.likeness.fragments,
+                  g.section_misfit, g.score);
     return g;
 }
 
@@ -222,6 +224,38 @@ static void test_particles_doubles_and_pieces(void **state)
     volume_release(&balls);
 }
 
+/* Four touching fibers of a radius of two voxels beside each other, each in a line, and all in one line. */
+static void test_a_yarn_is_no_fiber(void **state)
+{
+    (void)state;
+    static const double from[4][3] = {{0, 28, 28}, {0, 32, 28}, {0, 30, 31.5}, {0, 34, 31.5}};
+    static const double to[4][3] = {{72, 28, 28}, {72, 32, 28}, {72, 30, 31.5}, {72, 34, 31.5}};
+    static const double middle[2][3] = {{0, 31, 29.7}, {72, 31, 29.7}};
+    struct fiber_set thin = lines_of(4, from, to), one = lines_of(1, &middle[0], &middle[1]), round = four();
+    struct volume yarn = empty_scan(), even = empty_scan();
+    double misfit;
+    for (size_t i = 0; i < 4; i++) thin.radius_m[i] = (float)(2.0 * voxel_m);
+    one.radius_m[0] = (float)(4.0 * voxel_m);
+    add_scan(&yarn, &thin, 1.0f);
+    add_noise(&yarn);
+    struct scan_grade g = grade_of(&yarn, &one, NULL);
+    assert_true((g.faults & GRADE_SEVERAL) && g.section_misfit > 1.5 * SECTION_MOST_MISFIT);
+    g = grade_of(&yarn, &thin, NULL);
+    assert_true(!(g.faults & GRADE_SEVERAL) && g.section_misfit < SECTION_MOST_MISFIT);
+    add_scan(&even, &round, 1.0f);
+    add_noise(&even);
+    assert_int_equal(section_misfit_measure(&even, &round, NULL, &misfit, NULL), STATUS_OK);
+    assert_true(misfit < 0.03);
+    for (size_t i = 0; i < 3 * round.first_vertex[4]; i++) round.position_m[i] += (float)(0.4 * voxel_m);
+    assert_int_equal(section_misfit_measure(&even, &round, NULL, &misfit, NULL), STATUS_OK);
+    assert_true(misfit < 0.5 * SECTION_MOST_MISFIT); /* an axis off its place is no yarn */
+    fiber_set_release(&thin);
+    fiber_set_release(&one);
+    fiber_set_release(&round);
+    volume_release(&yarn);
+    volume_release(&even);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -230,6 +264,7 @@ int main(void)
         cmocka_unit_test(test_a_light_fiber),
         cmocka_unit_test(test_a_background_that_varies),
         cmocka_unit_test(test_particles_doubles_and_pieces),
+        cmocka_unit_test(test_a_yarn_is_no_fiber),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

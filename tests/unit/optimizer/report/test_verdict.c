@@ -121,8 +121,9 @@ static void test_geometry_alone(void **state)
     struct scan_grade g = {.score = 0.9};
     f.grade = &g;
     expect(f, VERDICT_GOOD, "");
-    g.faults = GRADE_UNEXPLAINED | GRADE_PARTICLES | GRADE_DOUBLED | GRADE_PIECES;
-    expect(f, VERDICT_USABLE, "material_unexplained lines_are_particles lines_within_fibers fibers_in_pieces");
+    g.faults = GRADE_UNEXPLAINED | GRADE_PARTICLES | GRADE_DOUBLED | GRADE_PIECES | GRADE_SEVERAL;
+    expect(f, VERDICT_USABLE,
+           "material_unexplained lines_are_particles lines_within_fibers lines_hold_several_fibers fibers_in_pieces");
     g = (struct scan_grade){.score = 0.4, .faults = GRADE_UNEXPLAINED};
     expect(f, VERDICT_DOES_NOT_DESCRIBE, "material_unexplained");
     f.grade = NULL;
