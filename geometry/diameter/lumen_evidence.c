@@ -14,6 +14,8 @@ static const float MIDDLE = 0.3f;          /* response in the middle of a fiber 
 static const double LEAST_ENCLOSED = 1e-3; /* share below which there are too few places to look at */
 /* Thresholds of middle_share, and of middle_share / enclosed_share, above which lumens are possible, and clear. */
 static const double POSSIBLE[2] = {0.001, 0.015}, CLEAR[2] = {0.002, 0.015};
+/* Thresholds of hollow_share above which lumens are possible, and clear. */
+static const double POSSIBLE_LINES = 0.15, CLEAR_LINES = 0.2;
 /* Where lumens show (lumen_evidence_would_show): least diameter in voxels, and largest noise, also where it is
  * correlated by more than LONG_BLUR voxels. */
 #define SHOWN_DIAMETER 6.0
@@ -120,8 +122,12 @@ static double middle_share(const struct evidence_box *b, double width)
 enum lumen_verdict lumen_evidence_judge(const struct lumen_evidence *e)
 {
     const double middle = e->middle_share, of_enclosed = middle / fmax(e->enclosed_share, 1e-12);
-    if (middle >= CLEAR[0] && of_enclosed >= CLEAR[1]) return LUMENS_CLEAR;
-    return middle >= POSSIBLE[0] && of_enclosed >= POSSIBLE[1] ? LUMENS_POSSIBLE : LUMENS_NOT_SEEN;
+    if (middle < POSSIBLE[0] || of_enclosed < POSSIBLE[1]) return LUMENS_NOT_SEEN;
+    if (isfinite(e->hollow_share))
+        return e->hollow_share >= CLEAR_LINES      ? LUMENS_CLEAR
+               : e->hollow_share >= POSSIBLE_LINES ? LUMENS_POSSIBLE
+                                                   : LUMENS_NOT_SEEN;
+    return middle >= CLEAR[0] && of_enclosed >= CLEAR[1] ? LUMENS_CLEAR : LUMENS_POSSIBLE;
 }
 
 bool lumen_evidence_would_show(double diameter_voxel, double noise_sd, double noise_blur_voxel)
@@ -133,7 +139,7 @@ status lumen_evidence_measure(const struct volume *v, double noise_sd, struct th
                               struct lumen_evidence *e, struct error *err)
 {
     struct evidence_box b = {0};
-    *e = (struct lumen_evidence){0};
+    *e = (struct lumen_evidence){.hollow_share = NAN};
     status s = copy_middle(v, &b.scan, err);
     if (s == STATUS_OK) s = copy_middle(v, &b.filled, err);
     if (s == STATUS_OK) s = lumens_fill(&b.filled, noise_sd, pool, &e->enclosed_share, err);

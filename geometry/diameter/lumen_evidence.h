@@ -1,4 +1,5 @@
-/* Whether the fibers of a scan look hollow, before any of them is traced.
+/* Whether the fibers of a scan look hollow, before any of them is traced. Where they do, a few are traced
+ * (reconstruct/lumen_lines.h).
  *
  * Lumens are filled in a copy of the middle of the scan (lumen_fill.h). Enclosed gaps between solid fibers are filled
  * too, but only a filled lumen is then the middle of a fiber, where the scale-normalised Laplacian of the scan is large
@@ -16,11 +17,13 @@ struct lumen_evidence {
     double enclosed_share; /* filled voxels over material voxels */
     double width_voxel;    /* of the filled space, if it were round tubes; 0: nothing was filled */
     double middle_share;   /* filled voxels in the middle of a fiber over material voxels */
+    double hollow_share;   /* of lines that were traced (reconstruct/lumen_lines.h); NaN: none were */
 };
 
-/* The verdict on the evidence. Of phantoms of solid fibers of 4 to 12 voxels none has a middle_share of 0.001 that is
- * 0.015 of enclosed_share. Lumens of 0.3 and 0.4 of the width have at least 0.0032 and 0.022 at 7 voxels and
- * signal-to-noise 3, also where radii differ; at 2, and at 4 voxels, most of them cannot be told from gaps between
+/* The verdict on the evidence. Some scans of solid fibers have a middle_share of 0.001 to 0.02 that is 0.015 of
+ * enclosed_share, and lumens of 0.3 and 0.4 of the width at 7 voxels and signal-to-noise 3 have 0.0018 and more, so
+ * lines decide there: solid fibers have a hollow_share of at most 0.05, hollow ones of at least 0.27. Without lines a
+ * middle_share of 0.002 is clear. At signal-to-noise 2, and at 4 voxels, most lumens cannot be told from gaps between
  * solid fibers (geometry/NOTES.md). */
 enum lumen_verdict { LUMENS_NOT_SEEN, LUMENS_POSSIBLE, LUMENS_CLEAR };
 enum lumen_verdict lumen_evidence_judge(const struct lumen_evidence *e);

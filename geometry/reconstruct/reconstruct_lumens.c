@@ -1,6 +1,7 @@
 /* Part of the step "volume": the lumens of hollow fibers are filled, so that their fibers are traced as solid ones.
  *
- * Void that is enclosed is filled first (lumen_fill.h, lumen_filter.h). Where diameters differ, that leaves most lumens
+ * Void that is enclosed is filled first (lumen_fill.h, lumen_filter.h), and emptied again where lines that are traced
+ * in it show no hollow fibers (lumen_lines.h). Where diameters differ, that leaves most lumens
  * of the thinnest fibers open: their walls are blurred to 0.6 to 0.8 of the density, and noise opens them somewhere.
  * Such fibers look like the background of touching fibers beside those that were filled. Once most others are traced
  * and subtracted (trace_leftover.c), they are seen. Lines are therefore traced here, the inner parts of their fibers
@@ -9,6 +10,7 @@
 #include "geometry/diameter/lumen_fill.h"
 #include "geometry/diameter/lumen_filter.h"
 #include "geometry/grade/scan_noise.h"
+#include "geometry/reconstruct/lumen_lines.h"
 #include "geometry/reconstruct/reconstruct.h"
 #include "geometry/reconstruct/trace_job.h"
 
@@ -17,14 +19,30 @@
 
 enum { N_REFILL = 3, ENCLOSED = 1, CORE = 2 };
 
-/* Fills enclosed void, at the scale of the fibers as they are once all of it is filled. */
-static status fill_enclosed(struct volume *v, double diameter_voxel, struct thread_pool *pool,
+/* Fills enclosed void, at the scale of the fibers as they are once all of it is filled. *diameter_voxel: of the
+ * fibers; NaN: it is measured. */
+static status fill_enclosed(struct volume *v, double *diameter_voxel, struct thread_pool *pool,
                             struct reconstruct_report *report, struct error *err)
 {
-    struct fiber_diameter d = {.voxel = diameter_voxel};
+    struct fiber_diameter d = {.voxel = *diameter_voxel};
     status s = lumens_fill(v, report->noise.mapped_sd, pool, &report->lumen_share, err);
-    if (s == STATUS_OK && isnan(diameter_voxel)) s = fiber_diameter_measure(v, pool, NULL, &d, err);
+    if (s == STATUS_OK && isnan(*diameter_voxel)) s = fiber_diameter_measure(v, pool, NULL, &d, err);
+    *diameter_voxel = d.voxel;
     if (s == STATUS_OK) s = lumens_filter(v, d.voxel, pool, &report->lumen_share, err);
+    return s;
+}
+
+/* Gives all voxels the densities that they had before they were filled. */
+static status empty_all(struct volume *v, struct reconstruct_report *report, struct error *err)
+{
+    void *mark = NULL;
+    report->lumen_share = 0.0;
+    if (v->filled.n == 0) return STATUS_OK;
+    status s = scratch_new(v->space, volume_n_voxel(v->n), "the lumens of fibers", &mark, err);
+    if (s != STATUS_OK) return s;
+    memset(mark, 0, volume_n_voxel(v->n));
+    s = volume_fill_marked(v, mark, ENCLOSED, err);
+    scratch_release(v->space, mark);
     return s;
 }
 
@@ -82,18 +100,32 @@ static status refill_once(struct refill *r, const struct reconstruct_report *rep
     return s;
 }
 
+/* Fills enclosed void where the job says that the fibers are hollow, or where lines that are traced say so. */
+static status judge_lumens(struct volume *v, int hollow_fibers, double diameter_voxel, struct thread_pool *pool,
+                           struct reconstruct_report *report, struct error *err)
+{
+    const bool ask = hollow_fibers <= 0;
+    if (ask && lumen_evidence_judge(&report->lumen) == LUMENS_NOT_SEEN) return STATUS_OK;
+    status s = fill_enclosed(v, &diameter_voxel, pool, report, err);
+    if (s == STATUS_OK && ask)
+        s = lumen_lines_measure(v, diameter_voxel, pool, report, &report->lumen.hollow_share, err);
+    if (s != STATUS_OK || !ask) return s;
+    report->lumens_found = hollow_fibers < 0 && lumen_evidence_judge(&report->lumen) == LUMENS_CLEAR;
+    return report->lumens_found ? STATUS_OK : empty_all(v, report, err);
+}
+
 status reconstruct_lumens(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
                           struct reconstruct_report *report, struct error *err)
 {
     report->lumen_share = 0.0;
+    report->lumens_found = false;
     status s = lumen_evidence_measure(v, report->noise.mapped_sd, pool, &report->lumen, err);
-    report->lumens_found = o->hollow_fibers < 0 && lumen_evidence_judge(&report->lumen) == LUMENS_CLEAR;
+    if (s == STATUS_OK) s = judge_lumens(v, o->hollow_fibers, o->fiber_diameter_voxel, pool, report, err);
     report->lumens = o->hollow_fibers >= 0                                     ? LUMENS_GIVEN
                      : report->lumens_found                                    ? LUMENS_FILLED
                      : lumen_evidence_judge(&report->lumen) == LUMENS_POSSIBLE ? LUMENS_DOUBTFUL
                                                                                : LUMENS_NONE;
     if (o->hollow_fibers < 0) o->hollow_fibers = report->lumens_found;
-    if (s == STATUS_OK && o->hollow_fibers > 0) s = fill_enclosed(v, o->fiber_diameter_voxel, pool, report, err);
     return s;
 }
 

@@ -1,15 +1,13 @@
 #include "geometry/reconstruct/trace_diameter.h"
 
 #include "geometry/diameter/fiber_diameter.h"
+#include "geometry/reconstruct/trace_box.h"
 #include "geometry/reconstruct/trace_grid.h"
 #include "geometry/reconstruct/trace_job.h"
 
 #include <math.h>
-#include <string.h>
 
-enum { N_ROUND = 3, SUM_STEP = 3 /* voxels */ };
-/* Edge of the box in diameters, and its bounds in voxels. */
-static const double EDGE_DIAMETERS = 10.0, LEAST_EDGE = 48.0, MOST_EDGE = 96.0;
+enum { N_ROUND = 3 };
 /* Largest ratio of the lines' diameter to the peak's: neighbours that touch lower the scale of the peak by less than a
  * tenth, and lines that are thicker run through several fibers. Lines of thin fibers do so at once, and
  * never raise it. */
@@ -19,51 +17,6 @@ static const double MOST_RISE = 1.1;
 static const double STRONG_BLUR = 1.2;
 /* Ratio of the diameters of two rounds up to which they are the same. */
 static const double SETTLED = 1.04;
-
-/* Sum of the densities of every third voxel along each axis. */
-static double sum_densities(const struct volume *v, const size_t from[3], const size_t n[3])
-{
-    double sum = 0.0;
-    scratch_keep_within(v->space);
-    for (size_t k = from[2]; k < from[2] + n[2]; k += SUM_STEP)
-        for (size_t j = from[1]; j < from[1] + n[1]; j += SUM_STEP)
-            for (size_t i = from[0]; i < from[0] + n[0]; i += SUM_STEP)
-                sum += (double)v->density[volume_index(v->n, i, j, k)];
-    return sum;
-}
-
-/* Finds the box of n voxels with the most material, of a lattice of boxes that covers the volume. */
-static void find_fullest(const struct volume *v, const size_t n[3], size_t fullest[3])
-{
-    size_t n_cell[3];
-    double most = -1.0;
-    for (int a = 0; a < 3; a++) n_cell[a] = (v->n[a] + n[a] - 1) / n[a];
-    for (size_t c = 0; c < volume_n_voxel(n_cell); c++) {
-        const size_t cell[3] = {c % n_cell[0], c / n_cell[0] % n_cell[1], c / (n_cell[0] * n_cell[1])};
-        size_t from[3];
-        for (int a = 0; a < 3; a++) from[a] = n_cell[a] == 1 ? 0 : cell[a] * (v->n[a] - n[a]) / (n_cell[a] - 1);
-        const double sum = sum_densities(v, from, n);
-        if (sum <= most) continue;
-        most = sum;
-        memcpy(fullest, from, sizeof from);
-    }
-}
-
-/* Copies the box of v in which `known` has the most material. */
-static status copy_fullest(const struct volume *v, const struct volume *known, double diameter, struct volume *box,
-                           struct error *err)
-{
-    const size_t edge = (size_t)fmin(MOST_EDGE, fmax(LEAST_EDGE, EDGE_DIAMETERS * diameter));
-    size_t n[3], from[3] = {0, 0, 0};
-    for (int a = 0; a < 3; a++) n[a] = v->n[a] < edge ? v->n[a] : edge;
-    find_fullest(known, n, from);
-    status s = volume_init_in(box, n, v->voxel_size_m, v->space, err);
-    for (size_t k = 0; k < n[2] && s == STATUS_OK; k++)
-        for (size_t j = 0; j < n[1]; j++)
-            memcpy(box->density + volume_index(n, 0, j, k),
-                   v->density + volume_index(v->n, from[0], from[1] + j, from[2] + k), n[0] * sizeof *box->density);
-    return s;
-}
 
 /* Returns a diameter from the radius and the blur of a fit, which has the edge of a blurred plane (axis_profile.h).
  * Blur moves the edge of a single cylinder inwards by blur^2 / (2 radius), while neighbours that touch it move it
@@ -104,11 +57,12 @@ status trace_diameter(const struct volume *v, const struct volume *known, trace_
                       struct error *err)
 {
     struct volume box = {0};
+    size_t from[3];
     const struct progress quiet = progress_silent(progress);
     const double peak = report->fiber_diameter_voxel;
     const double most = trace_grid_edge(peak, v->n) < 1.0 ? peak : MOST_RISE * peak;
     double diameter = peak, ratio = INFINITY;
-    status s = copy_fullest(v, known, peak, &box, err);
+    status s = trace_box_copy(v, known, peak, &box, from, err);
     for (int round = 0; round < N_ROUND && fabs(log(ratio)) > log(SETTLED) && s == STATUS_OK; round++) {
         double found;
         s = trace_once(&box, find, diameter, pool, &quiet, *report, &found, err);

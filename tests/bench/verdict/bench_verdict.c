@@ -1,6 +1,7 @@
 /* Reconstructs scans with known fibers, and prints the errors of the lines beside their grade: one JSON object a line.
  *
- * bench_verdict VOXEL_UM SCAN...
+ * bench_verdict [--lumens] VOXEL_UM SCAN...
+ *   --lumens  only reads the scans, and prints whether they look hollow (geometry/diameter/lumen_evidence.h)
  *   VOXEL_UM  edge of the voxels of all scans
  *   SCAN  a scan; its true fibers are in the text of the same name (none: no fibers)
  * Each line has name, recall, precision, fragments (geometry/phantom/compare.h), lumens, score and faults
@@ -82,16 +83,43 @@ static void bench_scan(const char *path, double voxel_m, struct thread_pool *poo
     fiber_set_release(&r.found);
 }
 
+static void bench_lumens(const char *path, double voxel_m, struct thread_pool *pool)
+{
+    struct volume v = {0};
+    struct reconstruct_report r = {0};
+    struct reconstruct_option o;
+    struct error err = {0};
+    const char *name = strrchr(path, '/') != NULL ? strrchr(path, '/') + 1 : path;
+    const double start_s = clock_process_s();
+    reconstruct_option_default(&o);
+    for (int a = 0; a < 3; a++) o.voxel_size_m[a] = voxel_m;
+    if (reconstruct_read(&path, 1, &o, NULL, pool, NULL, &v, &r, &err) != STATUS_OK)
+        printf("{\"name\":\"%s\",\"error\":\"%s\"}\n", name, err.text);
+    else
+        printf("{\"name\":\"%s\",\"cpu_s\":%.1f,\"lumens\":\"%s\",\"middle_share\":%.5f,\"enclosed_share\":%.5f,"
+               "\"hollow_share\":%.3f}\n",
+               name, clock_process_s() - start_s, lumen_answer_name(r.lumens), r.lumen.middle_share,
+               r.lumen.enclosed_share, number(r.lumen.hollow_share));
+    fflush(stdout);
+    volume_release(&v);
+}
+
 int main(int argc, char **argv)
 {
+    const bool lumens = argc > 1 && strcmp(argv[1], "--lumens") == 0;
     struct thread_pool *pool = NULL;
     struct error err = {0};
     if (thread_pool_new(0, &pool, &err) != STATUS_OK) {
         fprintf(stderr, "bench_verdict: %s\n", err.text);
         return 1;
     }
-    const double voxel_m = argc > 1 ? 1e-6 * strtod(argv[1], NULL) : 0.0;
-    for (int i = 2; i < argc; i++) bench_scan(argv[i], voxel_m, pool);
+    const int first = lumens ? 2 : 1;
+    const double voxel_m = argc > first ? 1e-6 * strtod(argv[first], NULL) : 0.0;
+    for (int i = first + 1; i < argc; i++)
+        if (lumens)
+            bench_lumens(argv[i], voxel_m, pool);
+        else
+            bench_scan(argv[i], voxel_m, pool);
     thread_pool_free(pool);
     return 0;
 }

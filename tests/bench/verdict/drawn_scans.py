@@ -53,3 +53,16 @@ def drawn(number, default):
     side = int(np.clip(12 * widest, 80, 128))
     o["size"] = (side, side, int(np.clip(8 * widest, 48, 96)))
     return o
+
+
+def hollow(number, default):
+    """The options of scan hollow-`number`: as scans within the domain, with lumens that a scan of their noise shows."""
+    rng = np.random.default_rng([20261129, number])
+    d = float(rng.uniform(6, 10))
+    o = {**default, "kind": str(rng.choice(["gauze", "twill", "felt"])), "d": (d, d), "n": int(rng.choice([4, 7, 12])),
+         "snr": float(rng.uniform(3, 8)), "blur": float(rng.uniform(0.4, 1.0)), "spread": float(rng.uniform(0, 0.15)),
+         "fibers": int(rng.integers(25, 110)), "lumen": float(rng.uniform(0.3, 0.6))}
+    o["open"] = float(rng.uniform(1.3, 2.2)) if o["kind"] == "gauze" else float(rng.uniform(1.02, 1.2))
+    side = int(np.clip(12 * d, 80, 128))
+    o["size"] = (side, side, int(np.clip(8 * d, 48, 96)))
+    return o

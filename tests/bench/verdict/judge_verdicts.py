@@ -1,16 +1,19 @@
 """Is the verdict on a scan about the cloth? Makes small scans (verdict_scans.py, selvedge-phantom), reconstructs them with
 bench_verdict, and prints figures, one JSON object a line; the rows go to standard error.
 
-    judge_verdicts.py [--build DIR] [--unseen DIR] [--drawn FIRST LAST] [NAME ...]
+    judge_verdicts.py [--build DIR] [--unseen DIR] [--drawn FIRST LAST] [--lumens] [NAME ...]
 
-NAME: a scan of verdict_scans.py, of the product, of --unseen, or drawn-N of drawn_scans.py; default: all but the drawn ones.
---drawn: only those (and NAME), for limits that were chosen on the named scans.
+NAME: a scan of verdict_scans.py, of the product, of --unseen, or drawn-N or hollow-N of drawn_scans.py; default: all but the
+drawn ones.
+--drawn: only those (and NAME), for limits that were chosen on the named scans; with --lumens also the hollow ones.
+--lumens: only whether the fibers look hollow, in a tenth of the time.
 
 geometry.verdict.false_good        scans called good with a recall below 0.9, a precision below 0.93 or above 1.5 fragments
 geometry.verdict.good_called_bad   scans without these faults whose score says that the lines do not describe the cloth
 geometry.verdict.rank_correlation  of the score with the smaller of recall and precision (Spearman)
 geometry.{noise,sponge}.wall_s     time until a scan without fibers ends; noise is refused, which is no error
 geometry.false_lumens              share of the solid scans that are called hollow or maybe hollow
+geometry.hollow_power              share of the scans of hollow fibers that are called hollow
 Scans with a truth in other units than the product's text of fibers (--unseen) are converted.
 """
 import argparse
@@ -27,7 +30,8 @@ import verdict_scans
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "..")
 PRODUCT = {"product-knit": ["knit"], "product-plain": ["plain"], "product-twill": ["twill"], "product-velvet": ["velvet"], "product-felt": ["felt"],
            "product-plain-noisy": ["plain", "--snr", "2"], "product-knit-noisy": ["knit", "--snr", "2"], "product-felt-flat": ["felt", "--aspect", "2.5"],
-           "product-twill-d4": ["twill", "--diameter-voxel", "4"], "product-plain-d4-noisy": ["plain", "--diameter-voxel", "4", "--snr", "2"]}
+           "product-twill-d4": ["twill", "--diameter-voxel", "4"], "product-plain-d4-noisy": ["plain", "--diameter-voxel", "4", "--snr", "2"],
+           "product-knit-hollow": ["knit", "--lumen", "0.4"], "product-velvet-hollow": ["velvet", "--lumen", "0.4"]}
 
 
 def make_product(build, folder, name):
@@ -83,12 +87,21 @@ def judge(rows):
     rows = [r for r in rows if "error" not in r]
     truth = [min(r["recall"], r["precision"]) for r in rows]
     right = [r["recall"] >= 0.9 and r["precision"] >= 0.93 and r["fragments"] <= 1.5 for r in rows]
-    solid = [r["lumens"] in ("filled", "possible") for r in rows]
     figure("verdict.scans", len(rows), "scans", "higher")
     figure("verdict.false_good", sum(r["is_good"] and not ok for r, ok in zip(rows, right)), "scans")
     figure("verdict.good_called_bad", sum(ok and (r["score"] < 0.5 or r["verdict"] == "unresolved") for r, ok in zip(rows, right)), "scans")
     figure("verdict.rank_correlation", round(float(np.corrcoef(rank(truth), rank([r["score"] for r in rows]))[0, 1]), 4), "1", "higher")
-    figure("false_lumens", round(sum(solid) / len(rows), 4), "1")
+    judge_lumens(rows)
+
+
+def judge_lumens(rows):
+    """Prints the shares of solid scans that are called hollow or maybe hollow, and of hollow ones that are called hollow."""
+    hollow = [r["lumens"] == "filled" for r in rows if "hollow" in r["name"]]
+    solid = [r["lumens"] in ("filled", "possible") for r in rows if "hollow" not in r["name"]]
+    if solid:
+        figure("false_lumens", round(sum(solid) / len(solid), 4), "1")
+    if hollow:
+        figure("hollow_power", round(sum(hollow) / len(hollow), 4), "1", "higher")
 
 
 def main():
@@ -96,30 +109,37 @@ def main():
     parser.add_argument("--build", default=os.path.join(ROOT, "build"))
     parser.add_argument("--unseen", default=os.path.join(ROOT, "..", "shared", "data", "unseen-scans"))
     parser.add_argument("--drawn", type=int, nargs=2)
+    parser.add_argument("--lumens", action="store_true")
     parser.add_argument("name", nargs="*")
     arguments = parser.parse_args()
     folder = os.path.join(arguments.build, "bench-verdict")
     os.makedirs(folder, exist_ok=True)
     unseen = sorted(f[:-4] for f in os.listdir(arguments.unseen) if f.endswith(".tif")) if os.path.isdir(arguments.unseen) else []
     rows = []
-    drawn = ["drawn-%d" % i for i in range(arguments.drawn[0], arguments.drawn[1] + 1)] if arguments.drawn else []
+    numbers = range(arguments.drawn[0], arguments.drawn[1] + 1) if arguments.drawn else []
+    drawn = [kind + "-%d" % i for i in numbers for kind in (["drawn", "hollow"] if arguments.lumens else ["drawn"])]
     named = [*verdict_scans.SCANS, *PRODUCT, *unseen] if not arguments.drawn else []
     for name in (arguments.name or named) + drawn:
         if name in PRODUCT:
             path = make_product(arguments.build, folder, name)
         elif name in unseen:
             path = take_unseen(arguments.unseen, folder, name)
-        elif name.startswith("drawn-"):
-            verdict_scans.make(name, drawn_scans.drawn(int(name[6:]), verdict_scans.DEFAULT), folder)
+        elif name.startswith(("drawn-", "hollow-")):
+            draw = drawn_scans.drawn if name.startswith("drawn-") else drawn_scans.hollow
+            verdict_scans.make(name, draw(int(name.split("-")[1]), verdict_scans.DEFAULT), folder)
             path = os.path.join(folder, name + ".mhd")
         else:
             verdict_scans.make(name, {**verdict_scans.DEFAULT, **verdict_scans.SCANS[name]}, folder)
             path = os.path.join(folder, name + ".mhd")
         program = os.path.join(arguments.build, "tests", "bench", "verdict", "bench_verdict")
-        made = subprocess.run([program, "2.2" if name in unseen else "2", path], check=True, stdout=subprocess.PIPE, text=True)
+        command = [program, *(["--lumens"] if arguments.lumens else []), "2.2" if name in unseen else "2", path]
+        made = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
         print(made.stdout, end="", file=sys.stderr, flush=True)
         rows.append(json.loads(made.stdout.replace("nan", "0")))
-    judge(rows)
+    if arguments.lumens:
+        judge_lumens([r for r in rows if "error" not in r])
+    else:
+        judge(rows)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import numpy as np
 
 VOXEL_UM = 2.0
 DEFAULT = {"kind": "gauze", "size": (112, 112, 72), "d": (7, 7), "rho": (1, 1), "n": 7, "snr": 5, "blur": 0.7, "corr": 0.5, "open": 1.5,
-           "spread": 0.08, "balls": 0, "ball_radius": (3, 7), "hairs": 0, "fibers": 60, "cup": 0, "rim": 0, "pad": 0, "mixed": 0, "length": 0, "plate": 0}
+           "spread": 0.08, "balls": 0, "ball_radius": (3, 7), "hairs": 0, "fibers": 60, "cup": 0, "rim": 0, "pad": 0, "mixed": 0, "length": 0, "plate": 0, "lumen": 0, "solid": 0}
 SCANS = {
     "gauze": {}, "gauze-noisy": {"snr": 2.5}, "gauze-d10": {"d": (10, 10), "size": (128, 128, 96)},
     "gauze-35": {"rho": (1, 0.35)}, "gauze-50": {"rho": (1, 0.5)}, "gauze-70": {"rho": (0.7, 1)}, "gauze-20": {"rho": (0.2, 1)},
@@ -38,6 +38,11 @@ SCANS = {
     "felt-d12": {"kind": "felt", "d": (12, 12), "fibers": 28, "size": (128, 128, 96)},
     "balls": {"kind": "none", "balls": 350}, "balls-large": {"kind": "none", "balls": 120, "ball_radius": (6, 11)},
     "noise": {"kind": "none"}, "sponge": {"kind": "sponge"},
+    "gauze-hollow": {"size": (96, 96, 64), "lumen": 0.4}, "gauze-hollow-noisy": {"size": (96, 96, 64), "lumen": 0.4, "snr": 3},
+    "twill-hollow": {"kind": "twill", "open": 1.05, "size": (96, 96, 64), "lumen": 0.3},
+    "twill-hollow-d6": {"kind": "twill", "open": 1.05, "size": (96, 96, 64), "d": (6, 6), "lumen": 0.4},
+    "felt-hollow": {"kind": "felt", "size": (96, 96, 64), "lumen": 0.4},
+    "felt-hollow-half": {"kind": "felt", "size": (96, 96, 64), "lumen": 0.4, "solid": 0.5},
 }
 
 
@@ -189,7 +194,10 @@ def make(name, o, folder):
     true = []
     for path, kind in fibers:
         radius = 0.5 * o["d"][kind] * (1 - o["spread"] * rng.uniform(0, 1))
-        draw(volume, path, radius, 0.35 if rng.uniform() < o["mixed"] else o["rho"][kind])
+        rho = 0.35 if rng.uniform() < o["mixed"] else o["rho"][kind]
+        draw(volume, path, radius, rho)
+        if o["lumen"] and rng.uniform() >= o["solid"]:
+            draw(volume, path, o["lumen"] * radius, -rho)
         true.append((path, radius))
     add_balls(volume, o, rng, points)
     if o["kind"] == "sponge":

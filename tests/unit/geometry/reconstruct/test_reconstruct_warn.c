@@ -225,7 +225,7 @@ static void test_lumens(void **state)
     struct reconstruct_option o = clean_option();
     struct reconstruct_report r = clean_report();
     (void)state;
-    r.lumen = (struct lumen_evidence){.enclosed_share = 0.05, .middle_share = 0.012};
+    r.lumen = (struct lumen_evidence){.enclosed_share = 0.05, .middle_share = 0.012, .hollow_share = NAN};
     expect_volume(&o, &r, OPTION_HOLLOW_FIBERS, "the fibers look hollow: voids in the middle of fibers are 1.20 %");
     o.hollow_fibers = 1;
     expect_volume(&o, &r, NULL, NULL);
