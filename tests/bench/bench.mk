@@ -3,6 +3,7 @@
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
+$(BUILD)/tests/bench/verdict/bench_verdict: $(BUILD)/obj/tests/bench/verdict/line_pulls.c.o
 $(BUILD)/tests/bench/models/bench_recovery: $(BUILD)/obj/tests/bench/fit_bench.c.o
 $(BUILD)/tests/bench/pictures/bench_pictures: $(patsubst %,$(BUILD)/obj/tests/bench/pictures/%.c.o,field_pair field_samples field_comparison)
 $(BUILD)/tests/unit/renderer/test_field_comparison: $(BUILD)/obj/tests/bench/pictures/field_comparison.c.o

@@ -5,10 +5,11 @@
  *   VOXEL_UM  edge of the voxels of all scans
  *   SCAN  a scan; its true fibers are in the text of the same name (none: no fibers)
  * Each line has name, recall, precision, fragments (geometry/phantom/compare.h), lumens, score and faults
- * (geometry/grade/scan_grade.h), is_good, and wall_s; or the error that ended the reconstruction. */
+ * (geometry/grade/scan_grade.h), is_good, errors over stated errors (line_pulls.h), and wall_s; or the error that ended the reconstruction. */
 #include "base/clock.h"
 #include "geometry/phantom/compare.h"
 #include "geometry/reconstruct/reconstruct.h"
+#include "tests/bench/verdict/line_pulls.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -21,6 +22,7 @@ struct scan_run {
     struct fiber_set truth, found;
     struct reconstruct_report report;
     struct compare_report compare;
+    struct line_pulls pulls;
 };
 
 static status reconstruct(const char *path, double voxel_m, struct thread_pool *pool, struct scan_run *r,
@@ -50,10 +52,18 @@ static status compare(const char *path, struct scan_run *r, struct error *err)
     if (access(truth, R_OK) != 0) return STATUS_OK;
     status s = fiber_set_read_text(&r->truth, truth, err);
     memcpy(r->truth.tile_size_m, r->found.tile_size_m, sizeof r->truth.tile_size_m);
-    return s == STATUS_OK ? compare_fibers(&r->truth, &r->found, &o, &r->compare, err) : s;
+    if (s == STATUS_OK) s = compare_fibers(&r->truth, &r->found, &o, &r->compare, err);
+    if (s == STATUS_OK) s = line_pulls_measure(&r->truth, &r->found, &r->report, o.margin_m, &r->pulls, err);
+    return s;
 }
 
 static double number(double x) { return isfinite(x) ? x : 0.0; }
+
+static void print_pull(const char *name, const struct pull *p)
+{
+    printf(",\"%s\":{\"robust\":%.3f,\"rms\":%.3f,\"covered\":%.3f}", name, number(p->robust), number(p->rms),
+           number(p->covered));
+}
 
 static void bench_scan(const char *path, double voxel_m, struct thread_pool *pool)
 {
@@ -67,16 +77,21 @@ static void bench_scan(const char *path, double voxel_m, struct thread_pool *poo
     status s = reconstruct(path, voxel_m, pool, &r, &err);
     const double wall_s = clock_monotonic_s() - start_s;
     if (s == STATUS_OK) s = compare(path, &r, &err);
-    if (s != STATUS_OK)
+    if (s != STATUS_OK) {
         printf("{\"name\":\"%s\",\"wall_s\":%.1f,\"error\":\"%s\"}\n", name, wall_s, err.text);
-    else
+    } else {
         printf(
             "{\"name\":\"%s\",\"wall_s\":%.1f,\"recall\":%.4f,\"precision\":%.4f,\"fragments\":%.3f,\"lumens\":\"%s\","
-            "\"score\":%.4f,\"misfit\":%.4f,\"faults\":%u,\"verdict\":\"%s\",\"is_good\":%s}\n",
+            "\"score\":%.4f,\"misfit\":%.4f,\"faults\":%u,\"verdict\":\"%s\",\"is_good\":%s",
             name, wall_s, number(r.compare.center_recall), number(r.compare.center_precision),
             number(r.compare.fragments_per_fiber), lumen_answer_name(r.report.lumens), number(g->score),
             number(g->section_misfit), g->faults, grade_verdict_name(g->verdict),
             g->verdict == GRADE_RESOLVED && g->faults == 0 ? "true" : "false");
+        print_pull("position_pull", &r.pulls.position);
+        print_pull("radius_pull", &r.pulls.radius);
+        print_pull("point_radius_pull", &r.pulls.point_radius);
+        printf("}\n");
+    }
     fflush(stdout);
     volume_release(&r.v);
     fiber_set_release(&r.truth);

@@ -14,6 +14,10 @@ geometry.verdict.rank_correlation  of the score with the smaller of recall and p
 geometry.{noise,sponge}.wall_s     time until a scan without fibers ends; noise is refused, which is no error
 geometry.false_lumens              share of the solid scans that are called hollow or maybe hollow
 geometry.hollow_power              share of the scans of hollow fibers that are called hollow
+geometry.pull.position             error of the axes over the stated error, robust; median over the scans
+geometry.pull.radius               the same of the radius of fibers
+geometry.pull.point_radius         share of the vertices whose radius is within two stated errors; median over the scans
+geometry.pull.*.worst              the scan with the largest pull, or the smallest share; its name is in "scan"
 Scans with a truth in other units than the product's text of fibers (--unseen) are converted.
 """
 import argparse
@@ -74,8 +78,20 @@ def rank(values):
     return order
 
 
-def figure(name, value, unit, better="lower"):
-    print(json.dumps({"name": "geometry." + name, "value": value, "unit": unit, "better": better}), flush=True)
+def figure(name, value, unit, better="lower", **more):
+    print(json.dumps({"name": "geometry." + name, "value": value, "unit": unit, "better": better, **more}), flush=True)
+
+
+def judge_pulls(rows):
+    """Prints the errors over the stated ones of scans in which lines were matched."""
+    for name, key, unit, worst, better in (("position", "robust", "stated errors", max, "lower"), ("radius", "robust", "stated errors", max, "lower"),
+                                           ("point_radius", "covered", "1", min, "higher")):
+        pulls = [(r[name + "_pull"][key], r["name"]) for r in rows if r[name + "_pull"]["rms"] > 0]
+        if not pulls:
+            continue
+        figure("pull." + name, round(float(np.median([p for p, _ in pulls])), 3), unit, better)
+        value, scan = worst(pulls)
+        figure("pull." + name + ".worst", value, unit, better, scan=scan)
 
 
 def judge(rows):
@@ -92,6 +108,7 @@ def judge(rows):
     figure("verdict.good_called_bad", sum(ok and (r["score"] < 0.5 or r["verdict"] == "unresolved") for r, ok in zip(rows, right)), "scans")
     figure("verdict.rank_correlation", round(float(np.corrcoef(rank(truth), rank([r["score"] for r in rows]))[0, 1]), 4), "1", "higher")
     judge_lumens(rows)
+    judge_pulls(rows)
 
 
 def judge_lumens(rows):
