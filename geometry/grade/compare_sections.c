@@ -92,7 +92,7 @@ static void sum_up(struct errors *e, double mean_radius2, struct section_compare
                                     .radius_rms = e->n > 0 ? sqrt(radius2) : NAN,
                                     .mean_radius_rms = e->n > 0 ? sqrt(mean_radius2 / n) : NAN,
                                     .radius_bias = e->n > 0 ? radius : NAN,
-                                    .radius_pull = PULL(e, radius, (float)radius),
+                                    .radius_pull = PULL(e, radius, 0.0f),
                                     .ratio_bias = e->n > 0 ? ratio : NAN,
                                     .ratio_rms = e->n > 0 ? sqrt(ratio2) : NAN,
                                     .ratio_median = MEDIAN(e, ratio, 0.0f),

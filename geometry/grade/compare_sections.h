@@ -13,7 +13,7 @@ struct section_compare {
     size_t n;
     double radius_rms;                 /* of found / true - 1, with the radius at the vertex */
     double mean_radius_rms;            /* the same with the mean radius of the found fiber */
-    double radius_bias, radius_pull;   /* mean of found / true - 1; the pull is without this mean */
+    double radius_bias, radius_pull;   /* mean of found / true - 1 */
     double ratio_bias, ratio_rms;      /* of found / true - 1 */
     double ratio_median, ratio_pull;   /* median of |found / true - 1| */
     double turn_median_deg, turn_pull; /* where the true ratio is above 1.3 */

@@ -52,7 +52,7 @@ struct reconstruct_report {
     size_t n_fiber, n_vertex;
     double total_length_m;
     double radius_m[3], radius_score[3];
-    double radius_se_m[3]; /* standard error; NaN where the radius was given */
+    double radius_se_m[3]; /* standard error that all fibers share; NaN where the radius was given */
     /* Radius of the profile that was fitted to the axes: a second measurement, by the edges instead of the mass. */
     double profile_radius_m;
     double profile_blur_m;     /* standard deviation of the blur that the profile has: of the scan and of its voxels */
@@ -60,7 +60,7 @@ struct reconstruct_report {
     double single_radius_se_m; /* typical standard error of the radius of one fiber */
     double axis_ratio;         /* mean ratio of the axes of the sections, and its standard deviation between fibers */
     double axis_ratio_spread;
-    /* Standard errors of the axes by the scan's noise (axis_fit.h): position and direction, one component. */
+    /* Standard errors of the axes (axis_error.h): position and direction, one component. */
     double axis_position_se_m, axis_direction_se_rad;
     bool radius_per_axis;          /* each class has a radius of its own */
     double dice;                   /* overlap of fibers of radius r with kept voxels */

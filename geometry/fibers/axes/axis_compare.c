@@ -8,7 +8,7 @@ static const float OUTLIER = 0.6f; /* difference of densities beyond which a res
 
 /* Sums of shared_sum for one plane of the brick. */
 struct plane_sum {
-    lanes gradient[AXIS_N_SHARED], normal[15], square, weight, slope;
+    lanes gradient[AXIS_N_SHARED], normal[15], square, weight, slope, edge_slope;
 };
 
 /* Mean of a normal variable of standard deviation sd about `value` after it was clamped to [0, 1], and its
@@ -58,6 +58,7 @@ static void compare_lanes(const struct axis_model *m, struct axis_scratch *s, si
     of[0] = share;
     of[3] = weighted;
     lanes_to_rows(of, s->model + at);
+    sum->edge_slope += weight * (4.0f * q - 3.0f) * by[0] * by[0];
     for (int a = 0, i = 0; a < 4; a++) {
         sum->gradient[a] += weighted * by[a];
         for (int b = 0; b <= a; b++, i++) sum->normal[i] += weight * by[a] * by[b];
@@ -74,6 +75,7 @@ static void add_plane(const struct plane_sum *plane, struct shared_sum *sum)
     sum->square += (double)lanes_sum(plane->square);
     sum->weight += (double)lanes_sum(plane->weight);
     sum->slope += (double)lanes_sum(plane->slope);
+    sum->edge_slope += (double)lanes_sum(plane->edge_slope);
     for (int a = 0, i = 0; a < AXIS_N_SHARED; a++) {
         sum->gradient[a] += (double)lanes_sum(plane->gradient[a]);
         for (int b = 0; b <= a; b++, i++) {

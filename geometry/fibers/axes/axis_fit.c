@@ -1,5 +1,6 @@
 #include "geometry/fibers/axes/axis_fit.h"
 #include "base/small_matrix.h"
+#include "geometry/fibers/axes/axis_error.h"
 #include "geometry/fibers/axes/axis_round.h"
 #include "geometry/fibers/axes/axis_share.h"
 #include "geometry/fibers/axes/axis_solve.h"
@@ -21,24 +22,11 @@ static void add_shared(struct shared_sum *to, const struct shared_sum *from)
     to->square += from->square;
     to->weight += from->weight;
     to->slope += from->slope;
+    to->edge_slope += from->edge_slope;
     for (int a = 0; a < AXIS_N_SHARED; a++) {
         to->gradient[a] += from->gradient[a];
         for (int c = 0; c < AXIS_N_SHARED; c++) to->normal[a][c] += from->normal[a][c];
     }
-}
-
-/* States the errors of the axes that the step has made (axis_fit.h), as means over n vertices. */
-static void state_error(double information, double variance, const double *stiffness, size_t n, struct axis_profile *p)
-{
-    double position = 0.0, direction = 0.0; /* over the part that is the same everywhere */
-    for (size_t i = 0; i < n; i++) {
-        const double inverse_length = sqrt(sqrt(information / stiffness[i]));
-        position += inverse_length;
-        direction += inverse_length * inverse_length * inverse_length;
-    }
-    const double square = variance / (2.0 * M_SQRT2 * information * fmax((double)n, 1.0));
-    p->position_se = sqrt(square * position);
-    p->direction_se_rad = sqrt(square * direction);
 }
 
 /* Data that a fit keeps from round to round. */
@@ -217,6 +205,19 @@ static void damp(struct fit_work *w, struct axis_profile *p)
     w->last_square = square;
 }
 
+/* States the errors of the axes after the last step. */
+static void state_errors(const struct fit_work *w, size_t n_vertex, double diameter, struct axis_profile *p)
+{
+    const bool measured = p->section != NULL && p->measure != NULL;
+    const double slope = axis_edge_slope(&w->shared), variance = w->shared.square / w->shared.weight / p->independent;
+    /* the measured noise is per information with the mean slope */
+    const double noise = measured ? p->measure->axis_noise * axis_mean_slope(&w->shared) / slope : 0.0;
+    const struct axis_data data = {.information = slope * axis_information(w->total, n_vertex),
+                                   .noise = fmax(noise, variance),
+                                   .correlation = p->measured_curvature ? axis_bend_correlation(diameter) : 0.0};
+    if (w->shared.weight > 0.0) axis_errors(&data, w->stiffness, n_vertex, &p->position_se, &p->direction_se_rad);
+}
+
 /* Steps all vertices, radii and the profile from the sums of all bricks. */
 static status make_step(struct axis_batch *job, struct polyline_set *lines, struct fit_work *w, double diameter,
                         struct thread_pool *pool, struct error *err)
@@ -238,7 +239,6 @@ static status make_step(struct axis_batch *job, struct polyline_set *lines, stru
         axis_local_stiffness(lines, diameter, variance, w->stiffness);
     else
         for (size_t i = 0; i < lines->n_vertex; i++) w->stiffness[i] = variance / (sd * sd);
-    state_error(axis_information(w->total, lines->n_vertex), variance, w->stiffness, lines->n_vertex, profile);
     status s = STATUS_OK;
     w->hold = variance / (FLATNESS_SD * FLATNESS_SD);
     if (w->section != NULL)
@@ -382,13 +382,14 @@ status polylines_fit(struct polyline_set *lines, const struct volume *v, double 
                                   .diameter = diameter_voxel,
                                   .section_length = SECTION_DIAMETERS * diameter_voxel,
                                   .section_hold = work.hold,
-                                  .slope = fmax(0.2, work.shared.slope / work.shared.weight)};
+                                  .slope = axis_mean_slope(&work.shared)};
         shared_variances(&work.shared, profile->lumen != NULL ? AXIS_N_SHARED : AXIS_N_SHARED - 1, &sums.shared_radius,
                          &sums.shared_area);
         sums.model_square = profile->model_error * profile->model_error * work.shared.weight;
         fiber_sections_turn(lines, profile->section);
         s = fiber_shapes_measure(lines, &sums, profile->measure, err);
     }
+    if (s == STATUS_OK && n_round > 0) state_errors(&work, lines->n_vertex, diameter_voxel, profile);
     release_work(&work);
     axis_batch_release(job, n_thread);
     free(job);

@@ -13,13 +13,9 @@
  * (axis_solve.h), as bends of fibers are: if its curvature could change at every voxel, a fiber would take noise for
  * bends.
  *
- * The errors of the axes follow from the same sum. With data of information n a vertex, residuals of variance s and
- * stiffness L, the posterior spectrum of the position is s / (n + L k^4). The integrals of the spectrum, and of k^2
- * times the spectrum, are
- *     position^2 = s / (2 sqrt 2 n l),   direction^2 = position^2 / l^2,   l = (L / n)^(1/4) voxels,
- * l being the length over which the axes are smoothed. The noise of voxels counts as independent, so that the errors
- * are lower limits where a scanner's filter has blurred its noise. They do not count on the correlation of bends: with
- * it the spectrum says little more than half of the direction errors that phantoms have (NOTES.md of geometry). */
+ * The errors of the axes follow from the same sum (axis_error.h). Where sections are measured, their noise is taken from
+ * the gradients of radii, whose scatter contains the correlation of the noise and whatever the model leaves out. Without,
+ * the noise of voxels counts as independent, so that the errors are lower limits. */
 #ifndef SELVEDGE_GEOMETRY_AXIS_FIT_H
 #define SELVEDGE_GEOMETRY_AXIS_FIT_H
 

@@ -10,7 +10,7 @@ enum { BAND = 3, LEAST_PIECES = 5 };
 static const double SMOOTH = 0.75;
 /* Lengths in diameters: pieces whose differences show the noise of the radius and of the section, pieces of the test,
  * and smoothing of a radius that varies. */
-static const double RADIUS_PIECE = 1.0, SECTION_PIECE = 0.5, TEST_PIECE = 2.0, RADIUS_LENGTH = 1.0;
+static const double RADIUS_PIECE = 1.0, SECTION_PIECE = 0.5, TEST_PIECE = 2.0, RADIUS_LENGTH = 1.0, AXIS_PIECE = 2.0;
 /* Number of pieces of a line from which on its own noise weighs more than the noise of all lines together. */
 static const double PRIOR_PIECES = 10.0;
 /* The radius varies where chi^2 is less probable than so many standard deviations of a normal variable, and the
@@ -119,15 +119,18 @@ static size_t take_pieces(struct line_work *w, size_t length)
 static size_t piece_length(double diameters, double diameter) { return (size_t)fmax(2.0, diameters * diameter + 0.5); }
 
 /* Segments, not vertices: the halves of neighbouring vertices would be correlated. */
-static void segment_scatter(struct line_work *w, const struct shape_sums *sums, terms_of *terms, struct scatter *to)
+static void segment_scatter(struct line_work *w, const struct shape_sums *sums, terms_of *terms, struct scatter *to,
+                            struct scatter *axis)
 {
-    static const double fourth[5] = {1.0, -4.0, 6.0, -4.0, 1.0};
+    static const double fourth[5] = {1.0, -4.0, 6.0, -4.0, 1.0}, second[3] = {1.0, -2.0, 1.0};
     for (size_t i = 0; i < w->n; i++) {
         const struct piece_sum t = terms(w, sums, i);
         w->gradient[i] = t.gradient;
         w->information[i] = t.information;
     }
     add_differences(w->piece, take_pieces(w, piece_length(RADIUS_PIECE, sums->diameter)), fourth, 5, to);
+    if (axis != NULL)
+        add_differences(w->piece, take_pieces(w, piece_length(AXIS_PIECE, sums->diameter)), second, 3, axis);
 }
 
 static void section_scatter(struct line_work *w, const struct shape_sums *sums, struct scatter *to)
@@ -333,19 +336,19 @@ static void start_line(struct line_work *w, const struct polyline_set *lines, si
     w->area_by_radius = radius > 0.0 ? both / radius : 0.0;
 }
 
-/* Adds the scatter of a line's gradients: of the radius, of the section, and of the lumen. */
-static void add_scatter(struct line_work *w, const struct shape_sums *sums, struct scatter to[3])
+/* Adds the scatter of a line's gradients: of the radius, of the section, of the lumen, and of the radius for the axis. */
+static void add_scatter(struct line_work *w, const struct shape_sums *sums, struct scatter to[4])
 {
-    segment_scatter(w, sums, radius_terms, &to[0]);
+    segment_scatter(w, sums, radius_terms, &to[0], &to[3]);
     section_scatter(w, sums, &to[1]);
-    if (sums->lumen != NULL) segment_scatter(w, sums, area_terms, &to[2]);
+    if (sums->lumen != NULL) segment_scatter(w, sums, area_terms, &to[2], NULL);
 }
 
 status fiber_shapes_measure(struct polyline_set *lines, const struct shape_sums *sums, struct shape_measure *measure,
                             struct error *err)
 {
     struct line_work w;
-    struct scatter all[3] = {{0}};
+    struct scatter all[4] = {{0}};
     const double stiffness = fiber_sections_stiffness(sums->section, lines->n_vertex, sums->section_length);
     status s = lines->shape == NULL ? polyline_shapes_init(lines, err) : STATUS_OK;
     if (!line_work_init(&w, lines) && s == STATUS_OK)
@@ -356,9 +359,11 @@ status fiber_shapes_measure(struct polyline_set *lines, const struct shape_sums 
     }
     *measure = (struct shape_measure){
         .radius_noise = noise_of(&all[0]), .section_noise = noise_of(&all[1]), .lumen_noise = noise_of(&all[2])};
+    /* too short lines show the shorter pieces at most */
+    measure->axis_noise = fmax(measure->radius_noise, noise_of(&all[3]));
     measure->shared_radius_se = sqrt((measure->radius_noise / sums->slope + sums->model_square) * sums->shared_radius);
     for (size_t l = 0; l < lines->n_line && s == STATUS_OK; l++) {
-        struct scatter own[3] = {{0}};
+        struct scatter own[4] = {{0}};
         start_line(&w, lines, l, sums);
         add_scatter(&w, sums, own);
         struct fiber_shape *shape = lines->shape + w.first;

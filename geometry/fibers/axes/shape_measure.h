@@ -5,7 +5,9 @@
  * leaves out. It is in the gradients of single vertices, so their scatter is measured instead of counting voxels: sums
  * of gradients over pieces of a line have a variance of v times their information. Differences of order two (section:
  * pieces of half a diameter) and four (radius: pieces of a diameter) of neighbouring pieces give v without slow
- * variations. v is measured over all lines, or over a line itself where it is larger.
+ * variations. v is measured over all lines, or over a line itself where it is larger. The axes have a v of their own:
+ * differences of order two of pieces of two diameters, because errors of the model at crossings and between touching
+ * fibers are as long as that.
  *
  * Curvature. The weights of the fit fall with the residuals, so the gradient of a converged fit changes by less than
  * the N of the normal equations for a step of 1: by `slope` N, which stands for N below.
@@ -46,14 +48,14 @@ struct shape_sums {
     double shared_area, shared_radius;      /* variances of a change of all areas, or of all radii, for a noise of 1 */
     double model_square; /* largest variance of a shared number by errors of the model, over the same; 0: none */
     double diameter, section_length, section_hold;
-    double slope; /* of weighted residuals by residuals, over the mean weight: the share of N in the true curvature */
+    double slope; /* share of N in the true curvature (axis_mean_slope) */
 };
 
 struct shape_measure {
     size_t n_varying; /* lines whose radius varies */
     size_t n_varying_lumen;
-    double radius_noise, section_noise, lumen_noise; /* v, per (voxel density)^2 */
-    double shared_radius_se;                         /* voxels, of a change of all radii together */
+    double radius_noise, section_noise, lumen_noise, axis_noise; /* v, per (voxel density)^2 */
+    double shared_radius_se;                                     /* voxels, of a change of all radii together */
 };
 
 /* Writes lines->shape, which is made first if it is NULL. Where the set has one, its radii are those that the gradients

@@ -8,6 +8,19 @@
 
 bool section_report_applies(const struct report *report) { return report->in.made->fiber.shape != NULL; }
 
+/* Error of the variation of a radius along a fiber: without the error that all radii share. */
+static double variation_error(const struct report *report, const struct section_summary *s)
+{
+    const struct reconstruct_report *g = &report->in.made->geometry;
+    double shared_m = INFINITY;
+    for (int a = 0; a < 3; a++)
+        if (isfinite(g->radius_se_m[a])) shared_m = fmin(shared_m, g->radius_se_m[a]);
+    if (!report->in.job->scan->given || !isfinite(shared_m) || !(g->profile_radius_m > 0.0))
+        return s->variation_se_median;
+    const double shared = shared_m / g->profile_radius_m;
+    return sqrt(fmax(0.0, s->variation_se_median * s->variation_se_median - shared * shared));
+}
+
 json_t *section_report_json(const struct report *report)
 {
     struct section_summary s;
@@ -30,7 +43,7 @@ json_t *section_report_json(const struct report *report)
                   {"lumen_median", s.lumen_median},
                   {"lumen_p90", s.lumen_p90},
                   {"lumen_error", s.lumen_se_median},
-                  {"radius_variation_error", s.variation_se_median}};
+                  {"radius_variation_error", variation_error(report, &s)}};
     for (size_t i = 0; i < sizeof figure / sizeof *figure; i++)
         json_object_set_new(json, figure[i].key, json_number(figure[i].value));
     json_object_set_new(json, "n_varying_radius", json_count(s.n_varying));
@@ -86,7 +99,7 @@ void section_report_table(const struct report *report, FILE *out)
     if (s.n_varying > 0) {
         open_row(out, "variation of their radius");
         fprintf(out, "%.1f %%", 100.0 * s.variation);
-        if (isfinite(s.variation_se_median)) fprintf(out, " (error %.1f %%)", 100.0 * s.variation_se_median);
+        if (isfinite(s.variation_se_median)) fprintf(out, " (error %.1f %%)", 100.0 * variation_error(report, &s));
         close_row(out, "standard deviation along a fiber, mean over these fibers");
     }
     if (report->in.job->scan->given && report->in.made->geometry.lumen_share > 0.0) {

@@ -136,7 +136,7 @@ double made_cloth_radius_error(const struct cloth_job *job, const struct made_cl
     for (size_t i = 0; i < f->n_fiber; i++) mean_m += (double)f->radius_m[i] / (double)f->n_fiber;
     for (int a = 0; a < 3; a++)
         if (isfinite(g->radius_se_m[a])) se_m = fmax(se_m, g->radius_se_m[a]);
-    return hypot(se_m, mean_m - g->profile_radius_m) / mean_m;
+    return se_m / mean_m;
 }
 
 void made_cloth_release(struct made_cloth *made)

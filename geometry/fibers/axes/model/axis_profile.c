@@ -38,6 +38,20 @@ double axis_scatter(const float *value, size_t stride, size_t n, size_t piece)
     return of_piece * count * (double)n / (double)used;
 }
 
+/* Least share of the curvature that is believed. */
+static const double LEAST_SLOPE = 0.2;
+
+double axis_mean_slope(const struct shared_sum *shared)
+{
+    return shared->weight > 0.0 ? fmax(LEAST_SLOPE, shared->slope / shared->weight) : 1.0;
+}
+
+double axis_edge_slope(const struct shared_sum *shared)
+{
+    const double normal = shared->normal[0][0], mean = axis_mean_slope(shared);
+    return normal > 0.0 ? fmax(LEAST_SLOPE, fmin(mean, shared->edge_slope / normal)) : mean;
+}
+
 /* Mean radius of the lines by length, their spread without the part of white noise, and their errors. The errors of
  * lines too short to show their scatter count as the mean of the others. hold: towards the mean radius. */
 static void measure_spread(struct axis_profile *p, const struct radius_sum *line, const double *length, size_t n_line,
@@ -134,4 +148,5 @@ void axis_profile_step(struct axis_profile *p, const struct shared_sum *shared, 
     p->low = low;
     p->high = high;
     measure_spread(p, line, length, n_line, variance, hold, radius);
+    p->radius_se /= axis_edge_slope(shared);
 }

@@ -29,7 +29,8 @@ struct axis_profile {
     /* Written by the fit: mean radius (voxels, by length), standard deviation of the fibers' radii without the part of
      * errors by white noise (relative), root mean square of the errors of single fibers (relative). */
     double radius, radius_spread, radius_se;
-    /* Written by the fit: standard error of one component of the axes' position (voxels) and of their direction. */
+    /* Written by the fit: standard error of one component of the axes' position (voxels) and of their direction; by the
+     * residuals, and by noise as measured where there is a measure. */
     double position_se, direction_se_rad;
 };
 
@@ -55,6 +56,7 @@ struct shared_sum {
     double normal[AXIS_N_SHARED][AXIS_N_SHARED], gradient[AXIS_N_SHARED];
     double square, weight; /* of the residuals */
     double slope;          /* sum of the derivatives of weight times residual by the residual */
+    double edge_slope;     /* the same weighted by the squared derivatives of the densities by all radii */
 };
 
 /* Normal equation of the radius of one line, and the terms that it has in common with the shared ones. */
@@ -69,6 +71,11 @@ struct radius_sum {
  * be correlated in any way, as are the gradients of a radius: by the noise of the scan, by a radius that varies along
  * the fiber, and by neighbours that are not modelled. stride: of the values, in floats. Infinite below two pieces. */
 double axis_scatter(const float *value, size_t stride, size_t n, size_t piece);
+
+/* Return the curvature of the sum over the normal equations', because weights fall with the residuals: the mean, and at the
+ * edges of fibers if that is smaller, as it is where void and solid are clamped. */
+double axis_mean_slope(const struct shared_sum *shared);
+double axis_edge_slope(const struct shared_sum *shared);
 
 /* Makes one Gauss-Newton step for the numbers that all fibers share, and then one for the radius of each line with the
  * remaining residuals, limited to plausible values. (All at once overshoots: lines that touch share voxels, which the
