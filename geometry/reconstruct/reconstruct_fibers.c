@@ -35,8 +35,8 @@ static double mean_radius(const struct polyline_set *lines)
 }
 
 /* Error of radii that all fibers share. Edges and mass disagree by the errors of both models: in dense cloth the edges
- * are right, and around single fibers the mass. Densities of void and fiber are known to some 2 %, so that radii are off by
- * half as much even where both agree. se_voxel: by noise. Hollow fibers have only the radii by the edges. */
+ * are right, and around single fibers the mass. Densities of void and fiber are known to some 2 %, so that radii are
+ * off by half as much even where both agree. se_voxel: by noise. Hollow fibers have only the radii by the edges. */
 static double shared_error(const struct trace_job *job, double mean_voxel, double se_voxel)
 {
     static const double DENSITY_ERROR = 0.02;

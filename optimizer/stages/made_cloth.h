@@ -42,8 +42,8 @@ struct cloth_job {
 };
 
 void made_cloth_release(struct made_cloth *made);
-/* Relative error of the radius of scanned fibers that all of them share. 0 where the radius was given, or is fitted to the
- * photographs. */
+/* Relative error of the radius of scanned fibers that all of them share. 0 where the radius was given, or is fitted to
+ * the photographs. */
 double made_cloth_radius_error(const struct cloth_job *job, const struct made_cloth *made);
 
 /* Stage "scene". out comes with geometry, fiber, traced, report and direction, which it takes over from the stages

@@ -1,8 +1,9 @@
 /* Standard errors of fitted axes (axis_fit.h).
  *
- * With data of information n a vertex, whose gradients have a variance of v n, and bends of penalty P(k) (axis_solve.h),
- * the posterior spectrum of the position is v / (n + P), and k^2 times that of the direction. The errors are the
- * integrals over all wave numbers. v is measured (shape_measure.h), so that correlated noise counts as it is. */
+ * With data of information n a vertex, whose gradients have a variance of v n, and bends of penalty P(k)
+ * (axis_solve.h), the posterior spectrum of the position is v / (n + P), and k^2 times that is the direction's. The
+ * errors are the integrals over all wave numbers. v is measured (shape_measure.h), so that correlated noise counts as
+ * it is. */
 #ifndef SELVEDGE_GEOMETRY_AXIS_ERROR_H
 #define SELVEDGE_GEOMETRY_AXIS_ERROR_H
 

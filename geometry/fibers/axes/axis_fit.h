@@ -13,9 +13,9 @@
  * (axis_solve.h), as bends of fibers are: if its curvature could change at every voxel, a fiber would take noise for
  * bends.
  *
- * The errors of the axes follow from the same sum (axis_error.h). Where sections are measured, their noise is taken from
- * the gradients of radii, whose scatter contains the correlation of the noise and whatever the model leaves out. Without,
- * the noise of voxels counts as independent, so that the errors are lower limits. */
+ * The errors of the axes follow from the same sum (axis_error.h). Where sections are measured, their noise is taken
+ * from the gradients of radii, whose scatter contains the correlation of the noise and whatever the model leaves out.
+ * Without, the noise of voxels counts as independent, so that the errors are lower limits. */
 #ifndef SELVEDGE_GEOMETRY_AXIS_FIT_H
 #define SELVEDGE_GEOMETRY_AXIS_FIT_H
 

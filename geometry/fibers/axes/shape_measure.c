@@ -336,7 +336,7 @@ static void start_line(struct line_work *w, const struct polyline_set *lines, si
     w->area_by_radius = radius > 0.0 ? both / radius : 0.0;
 }
 
-/* Adds the scatter of a line's gradients: of the radius, of the section, of the lumen, and of the radius for the axis. */
+/* Adds the scatter of a line's gradients: of radius, section, lumen, and of the radius for the axis. */
 static void add_scatter(struct line_work *w, const struct shape_sums *sums, struct scatter to[4])
 {
     segment_scatter(w, sums, radius_terms, &to[0], &to[3]);

@@ -5,7 +5,8 @@
  *   VOXEL_UM  edge of the voxels of all scans
  *   SCAN  a scan; its true fibers are in the text of the same name (none: no fibers)
  * Each line has name, recall, precision, fragments (geometry/phantom/compare.h), lumens, score and faults
- * (geometry/grade/scan_grade.h), is_good, errors over stated errors (line_pulls.h), and wall_s; or the error that ended the reconstruction. */
+ * (geometry/grade/scan_grade.h), is_good, errors over stated errors (line_pulls.h), and wall_s; or the error that ended
+ * the reconstruction. */
 #include "base/clock.h"
 #include "geometry/phantom/compare.h"
 #include "geometry/reconstruct/reconstruct.h"

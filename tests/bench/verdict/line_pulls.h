@@ -12,8 +12,8 @@ struct pull {
     double covered; /* share below 2; 0.954 of a normal variable */
 };
 
-/* Only of places of found fibers within the radius of a true one, at least margin_m from the faces of the tile in x and y, and not
- * beyond the ends of the true one. NaN: there are none, or no error is stated. */
+/* Only of places of found fibers within the radius of a true one, at least margin_m from the faces of the tile in x and
+ * y, and not beyond the ends of the true one. NaN: there are none, or no error is stated. */
 struct line_pulls {
     struct pull position;     /* both components across the true fiber */
     struct pull radius;       /* mean radius of a found fiber, if half of its vertices are such places */

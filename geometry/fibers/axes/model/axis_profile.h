@@ -72,8 +72,8 @@ struct radius_sum {
  * the fiber, and by neighbours that are not modelled. stride: of the values, in floats. Infinite below two pieces. */
 double axis_scatter(const float *value, size_t stride, size_t n, size_t piece);
 
-/* Return the curvature of the sum over the normal equations', because weights fall with the residuals: the mean, and at the
- * edges of fibers if that is smaller, as it is where void and solid are clamped. */
+/* Return the curvature of the sum over the normal equations', because weights fall with the residuals: the mean, and at
+ * the edges of fibers if that is smaller, as it is where void and solid are clamped. */
 double axis_mean_slope(const struct shared_sum *shared);
 double axis_edge_slope(const struct shared_sum *shared);
 

@@ -1,5 +1,5 @@
-/* Stated errors of axes (geometry/fibers/axes/axis_error.h): their closed form, and the errors found in a scan whose noise
- * is white or correlated. */
+/* Stated errors of axes (geometry/fibers/axes/axis_error.h): their closed form, and the errors found in scans with
+ * white and with correlated noise. */
 #include "geometry/fibers/axes/axis_error.h"
 #include "geometry/fibers/axes/axis_fit.h"
 #include "geometry/fibers/axes/flat_fit.h"
@@ -67,7 +67,7 @@ static void add_errors(const struct polyline_set *lines, double position_se, dou
             (position_se * position_se);
 }
 
-/* A straight fiber loses nothing by smoothing, so it has a part of the stated error only, whatever correlates the noise. */
+/* A straight fiber loses nothing by smoothing, so it has a part of the stated error only. */
 static void test_correlated_noise(void **state)
 {
     (void)state;
