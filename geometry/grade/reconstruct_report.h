@@ -2,9 +2,11 @@
 #ifndef SELVEDGE_GEOMETRY_RECONSTRUCT_REPORT_H
 #define SELVEDGE_GEOMETRY_RECONSTRUCT_REPORT_H
 
+#include "geometry/diameter/light_material.h"
 #include "geometry/diameter/lumen_evidence.h"
 #include "geometry/diameter/scan_densities.h"
 #include "geometry/fibers/seam/fiber_seam.h"
+#include "geometry/grade/fiber_kinds.h"
 #include "geometry/grade/scan_grade.h"
 #include "geometry/grade/scan_trial.h"
 #include "geometry/orientation/alignment.h"
@@ -33,6 +35,7 @@ struct reconstruct_report {
     struct seam_join seam_join;               /* all zero if they were not joined */
     double density_low, density_high;         /* scanner values */
     double separability;                      /* of void and material in the histogram, 0..1 (density_map.h) */
+    struct light_material light;              /* fibers that were raised to the density of others */
     struct scan_noise noise;                  /* of the scan, and after smoothing */
     double lumen_share;          /* enclosed void that is filled over material; 0 if the fibers are solid */
     bool lumens_found;           /* they were filled because the fibers look hollow */
@@ -62,6 +65,7 @@ struct reconstruct_report {
     double axis_ratio_spread;
     /* Standard errors of the axes (axis_error.h): position and direction, one component. */
     double axis_position_se_m, axis_direction_se_rad;
+    struct fiber_kinds kinds;      /* set by reconstruct_grade */
     bool radius_per_axis;          /* each class has a radius of its own */
     double dice;                   /* overlap of fibers of radius r with kept voxels */
     struct scan_grade grade;       /* how clearly the scan shows the fibers; set by the caller of reconstruct_fibers */

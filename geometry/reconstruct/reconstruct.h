@@ -83,7 +83,8 @@ status reconstruct_fibers(const struct volume *v, const struct direction_volume 
                           struct thread_pool *pool, const struct progress *progress, struct fiber_set *f,
                           struct reconstruct_report *report, struct error *err);
 
-/* Last part of the step "fibers": grades the lines against the scan, into report->grade. safe: a share of safe length
+/* Last part of the step "fibers": grades the lines against the scan, into report->grade, and sorts them into
+ * report->kinds. safe: a share of safe length
  * for each fiber, or NULL. STATUS_NO_MEMORY, STATUS_DISK_FULL, STATUS_CANCELLED. */
 status reconstruct_grade(const struct volume *v, const struct fiber_set *f, struct thread_pool *pool,
                          struct reconstruct_report *report, float *safe, struct error *err);

@@ -3,6 +3,7 @@
 #include "geometry/reconstruct/reconstruct.h"
 
 #include "geometry/diameter/fiber_diameter.h"
+#include "geometry/diameter/light_material.h"
 #include "geometry/diameter/scan_structure.h"
 #include "geometry/orientation/repeat_direction.h"
 #include "geometry/reconstruct/scan_look.h"
@@ -274,9 +275,15 @@ static status map_densities(struct volume *v, struct reconstruct_option *o, stru
     if (s == STATUS_OK) s = refuse_noise(v, m.separability, o, pool, err);
     if (s != STATUS_OK) return s;
     const bool low_alone = !isnan(o->density_low) && isnan(o->density_high);
+    const bool is_open = isnan(o->density_high);
+    report->light = (struct light_material){.density = NAN};
     if (isnan(o->density_low)) o->density_low = m.low;
     if (isnan(o->density_high)) o->density_high = m.high;
-    s = scan_densities_map(v, o->density_low, o->density_high, o->fiber_diameter_voxel, pool, &report->noise, err);
+    if (is_open && !(o->hollow_fibers > 0))
+        s = light_material_raise(v, o->density_low, o->density_high, pool, &report->light, err);
+    if (!isnan(report->light.density)) o->density_high = report->light.high;
+    if (s == STATUS_OK)
+        s = scan_densities_map(v, o->density_low, o->density_high, o->fiber_diameter_voxel, pool, &report->noise, err);
     if (s == STATUS_INVALID && low_alone && err != NULL) snprintf(err->field, sizeof err->field, OPTION_DENSITY_LOW);
     if (s != STATUS_OK) return s;
     double threshold = isnan(o->eps_d) ? 0.5 : o->eps_d;

@@ -42,6 +42,7 @@ void volume_release(struct volume *v)
     scratch_release(v->space, v->filled.voxel);
     scratch_release(v->space, v->filled.density);
     scratch_release(v->space, v->unknown.run);
+    scratch_release(v->space, v->light.run);
     *v = (struct volume){0};
 }
 

@@ -28,14 +28,23 @@ struct volume_unknown {
     } * run;
 };
 
+/* Voxels of lighter fibers, whose densities were divided by `density` (light_material.h), as runs of indices in
+ * ascending order (voxel_runs.h). */
+struct volume_light {
+    double density;
+    size_t n;
+    struct volume_run *run;
+};
+
 struct volume_slabs;
 
 struct volume {
     size_t n[3];
     double voxel_size_m[3];
     float *density;              /* n[0]*n[1]*n[2]; in [0, 1] after density_map_apply, raw scanner values before */
-    struct volume_filled filled; /* this and the next member are from the same space */
+    struct volume_filled filled; /* this and the next two members are from the same space */
     struct volume_unknown unknown;
+    struct volume_light light;
     struct scratch_space *space; /* not owned */
     /* Which parts of it other ranks have (geometry/volume/volume_slabs.h); NULL: none. Not owned. */
     const struct volume_slabs *slabs;

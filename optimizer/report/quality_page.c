@@ -54,6 +54,20 @@ static const char *radii_in_words(const struct report *report)
     return report->in.made->geometry.radius_per_axis ? "one for each class" : "one for all fibers";
 }
 
+/* Prints the kinds of fibers of a scan that has several. */
+static void print_kinds(const struct fiber_kinds *kinds, FILE *out)
+{
+    if (kinds->n < 2) return;
+    fprintf(out, "<p>The scan has %zu kinds of fibers:", kinds->n);
+    for (size_t i = 0; i < kinds->n; i++) {
+        const struct fiber_kind *k = &kinds->kind[i];
+        fprintf(out, "%s radius %.2f", i > 0 ? ";" : "", 1e6 * k->radius_m);
+        if (isfinite(k->radius_se_m)) fprintf(out, " &plusmn; %.2f", 1e6 * k->radius_se_m);
+        fprintf(out, " um, density %.2f (%.0f %% of the length)", k->density, 100.0 * k->share);
+    }
+    fputs(". Density 1 is the densest kind in the scan.</p>\n", out);
+}
+
 static void print_fibers(const struct report *report, const struct fiber_lengths *l, FILE *out)
 {
     static const char *const name[] = {"along x (weft)", "along y (warp)", "along z (pile)"};
@@ -85,6 +99,7 @@ static void print_fibers(const struct report *report, const struct fiber_lengths
     fputs("</table>\n", out);
     if (report->in.job->scan->given)
         fprintf(out, "<p>Radius: %s, with standard errors where it was measured.</p>\n", radii_in_words(report));
+    if (report->in.job->scan->given) print_kinds(&g->kinds, out);
     fprintf(out, "<p>Lengths: median %.3g mm, mean %.3g mm, 80 %% between %.3g and %.3g mm, longest %.3g mm.</p>\n",
             l->median_m * 1e3, l->mean_m * 1e3, l->p10_m * 1e3, l->p90_m * 1e3, l->longest_m * 1e3);
     fputs("<figure><img class=\"plot\" src=\"pictures/fiber-lengths.svg\" alt=\"length distribution of the "

@@ -176,6 +176,19 @@ static json_t *trial_json(const struct scan_trial *t)
     return json;
 }
 
+static json_t *kinds_of_fibers_json(const struct fiber_kinds *kinds)
+{
+    json_t *list = json_array();
+    for (size_t i = 0; i < kinds->n; i++) {
+        const struct fiber_kind *k = &kinds->kind[i];
+        json_array_append_new(list, json_pack("{s:o, s:o, s:o, s:o, s:o}", "density", json_number(k->density), "share",
+                                              json_number(k->share), "n_fiber", json_count(k->n_fiber), "radius_um",
+                                              json_number(1e6 * k->radius_m), "radius_error_um",
+                                              json_number(1e6 * k->radius_se_m)));
+    }
+    return list;
+}
+
 static void set_radii(json_t *json, const struct reconstruct_report *g)
 {
     const double um = 1e6;
@@ -184,6 +197,7 @@ static void set_radii(json_t *json, const struct reconstruct_report *g)
     json_object_set_new(json, "radius_profile_um", json_number(g->profile_radius_m * um));
     json_object_set_new(json, "radius_spread", json_number(g->radius_spread));
     json_object_set_new(json, "radius_error_um", json_number(g->single_radius_se_m * um));
+    json_object_set_new(json, "kinds", kinds_of_fibers_json(&g->kinds));
     json_object_set_new(json, "section_axis_ratio", json_number(g->axis_ratio));
     json_object_set_new(json, "section_axis_ratio_spread", json_number(g->axis_ratio_spread));
 }

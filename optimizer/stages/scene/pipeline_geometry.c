@@ -66,8 +66,10 @@ status stage_volume(const struct volume_input *in, struct volume_output *out, st
         {out->volume.density, volume_n_voxel(out->volume.n) * sizeof(float), in->tools->space},
         {filled->voxel, filled->n * sizeof *filled->voxel, in->tools->space},
         {filled->density, filled->n * sizeof *filled->density, in->tools->space},
-        {out->volume.unknown.run, out->volume.unknown.n * sizeof *out->volume.unknown.run, in->tools->space}};
-    return work_file_write(path, "volume.3", section, 8, err);
+        {out->volume.unknown.run, out->volume.unknown.n * sizeof *out->volume.unknown.run, in->tools->space},
+        {out->volume.light.run, out->volume.light.n * sizeof *out->volume.light.run, in->tools->space},
+        {&out->volume.light.density, sizeof out->volume.light.density}};
+    return work_file_write(path, "volume.4", section, 10, err);
 }
 
 status stage_volume_load(const struct volume_input *in, struct volume_output *out, struct error *err)

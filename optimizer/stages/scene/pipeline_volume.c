@@ -90,6 +90,7 @@ status volume_checkpoint_read(const struct stage_tools *tools, struct volume_out
 {
     char path[WORKER_PATH_BYTES];
     struct volume v = {.space = tools->space};
+    double light_density = 0.0;
     status s = stage_work_path(tools, "volume", "volume.bin", path, err);
     if (s != STATUS_OK) return s;
     struct work_section section[] = {{&out->option, sizeof out->option},
@@ -99,12 +100,15 @@ status volume_checkpoint_read(const struct stage_tools *tools, struct volume_out
                                      {NULL, 0, tools->space},
                                      {NULL, 0, tools->space},
                                      {NULL, 0, tools->space},
-                                     {NULL, 0, tools->space}};
-    s = work_file_read(path, "volume.3", section, 8, err);
+                                     {NULL, 0, tools->space},
+                                     {NULL, 0, tools->space},
+                                     {&light_density, sizeof light_density}};
+    s = work_file_read(path, "volume.4", section, 10, err);
     if (s != STATUS_OK) return s;
     v.density = section[4].data;
     v.filled = (struct volume_filled){section[5].n_bytes / sizeof(size_t), section[5].data, section[6].data};
     v.unknown = (struct volume_unknown){section[7].n_bytes / sizeof(struct volume_run), section[7].data};
+    v.light = (struct volume_light){light_density, section[8].n_bytes / sizeof(struct volume_run), section[8].data};
     volume_release(&out->volume);
     out->volume = v;
     return STATUS_OK;

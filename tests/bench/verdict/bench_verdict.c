@@ -5,8 +5,9 @@
  *   VOXEL_UM  edge of the voxels of all scans
  *   SCAN  a scan; its true fibers are in the text of the same name (none: no fibers)
  * Each line has name, recall, precision, fragments (geometry/phantom/compare.h), lumens, score and faults
- * (geometry/grade/scan_grade.h), is_good, errors over stated errors (line_pulls.h), and wall_s; or the error that ended
- * the reconstruction. */
+ * (geometry/grade/scan_grade.h), is_good, errors over stated errors (line_pulls.h), wall_s, and for each kind of fibers
+ * density, share of the length, and radius in voxels with its standard error (geometry/grade/fiber_kinds.h); or the
+ * error that ended the reconstruction. */
 #include "base/clock.h"
 #include "geometry/phantom/compare.h"
 #include "geometry/reconstruct/reconstruct.h"
@@ -66,6 +67,17 @@ static void print_pull(const char *name, const struct pull *p)
            number(p->covered));
 }
 
+static void print_kinds(const struct fiber_kinds *kinds, double voxel_m)
+{
+    printf(",\"kinds\":[");
+    for (size_t k = 0; k < kinds->n; k++) {
+        const struct fiber_kind *kind = &kinds->kind[k];
+        printf("%s[%.3f,%.3f,%.2f,%.2f]", k > 0 ? "," : "", kind->density, kind->share, kind->radius_m / voxel_m,
+               number(kind->radius_se_m / voxel_m));
+    }
+    printf("]");
+}
+
 static void bench_scan(const char *path, double voxel_m, struct thread_pool *pool)
 {
     struct scan_run r = {0};
@@ -91,6 +103,7 @@ static void bench_scan(const char *path, double voxel_m, struct thread_pool *poo
         print_pull("position_pull", &r.pulls.position);
         print_pull("radius_pull", &r.pulls.radius);
         print_pull("point_radius_pull", &r.pulls.point_radius);
+        print_kinds(&r.report.kinds, voxel_m);
         printf("}\n");
     }
     fflush(stdout);
