@@ -29,6 +29,7 @@ struct cli_args {
     const char *out_dir;                   /* --out */
     const char *resume_id;                 /* --resume */
     const char *id_file;                   /* --id-file */
+    const char *names, *weave;             /* --names: of photographs; --weave: of a cloth without a scan */
     const char *require;                   /* --require: the worst verdict that is accepted */
     const char *voxel_um;                  /* --voxel-um */
     const char *axes;                      /* --axes */

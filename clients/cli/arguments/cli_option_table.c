@@ -9,6 +9,13 @@ const struct cli_option cli_option_table[CLI_N_OPTION] = {
     {NULL, 0, "input-dir", "DIR", "folder of the input files (default: the document's folder)",
      offsetof(struct cli_args, input_dir)},
     {NULL, 'w', "watch", NULL, "follow the job until it ends", offsetof(struct cli_args, watch)},
+    {NULL, 0, "names", "PATTERN",
+     "angles in the names of photographs, such as \"t{light_theta}_p{light_phi}\"; also {camera_theta}," CLI_NEXT_LINE
+     "{camera_phi}, {rotation}, and * for any text (default: the usual ones are tried)",
+     offsetof(struct cli_args, names)},
+    {NULL, 0, "weave", "NAME",
+     "weave of a cloth that was not scanned: plain, twill, satin ... (docs/described-cloth.md)",
+     offsetof(struct cli_args, weave)},
     {NULL, 0, "require", "VERDICT",
      "status 4 if the result has a worse verdict than this: good, usable (needs --watch" CLI_NEXT_LINE "with submit)",
      offsetof(struct cli_args, require)},

@@ -7,6 +7,7 @@
 #include "clients/cli/arguments/cli_args.h"
 #include "clients/cli/commands/cli_http.h"
 
+#include <jansson.h>
 #include <stdio.h>
 
 enum cli_exit {
@@ -53,6 +54,14 @@ status cli_results_of(struct cli *cli, const char *id, const char *folder, struc
 /* The same to --out, or to selvedge-ID, and prints the folder. */
 status cli_results_to_out(struct cli *cli, const char *id, struct error *err);
 /* Follows job `id` until it ends, and prints the fitted parameters. */
+/* Adds the names of the files of a scan (one, a header and its data, or a folder of slices) to a list, and writes the
+ * folder that they lie in. STATUS_NOT_FOUND, STATUS_IO, STATUS_FORMAT, STATUS_INVALID. */
+status cli_scan_files(const char *scan, json_t *files, char *folder, size_t n_bytes, struct error *err);
+/* The edges of a voxel in micrometres from "2" or "2,2,3". STATUS_INVALID. */
+status cli_scan_voxel(const char *text, json_t **voxel, struct error *err);
+/* Prints the faults, warnings and statements of a document's files, as `selvedge check` does. */
+status cli_check_document(const char *document, const char *folder, FILE *out, size_t *n_fault, struct error *err);
+
 status cli_watch_job(struct cli *cli, const char *id, int *exit_code, struct error *err);
 /* Writes the id of the one job whose id begins with text, which has four characters or more; a text that cannot be the
  * beginning of an id is copied. STATUS_NOT_FOUND, STATUS_INVALID (several jobs). */

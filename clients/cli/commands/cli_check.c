@@ -46,6 +46,37 @@ static status run_worker(const char *document, const char *folder, json_t **repo
     return STATUS_OK;
 }
 
+status cli_check_document(const char *document, const char *folder, FILE *out, size_t *n_fault, struct error *err)
+{
+    json_t *report = NULL;
+    status s = run_worker(document, folder, &report, err);
+    *n_fault = json_array_size(json_object_get(report, "faults"));
+    if (s == STATUS_OK) {
+        cli_print_faults(json_object_get(report, "faults"), "fault", out);
+        size_t n_warning = cli_print_faults(json_object_get(report, "warnings"), "warning", out);
+        const long long n_file = json_integer_value(json_object_get(report, "n_file"));
+        cli_print_statements(json_object_get(report, "files"), out);
+        fprintf(out, "%lld file%s, %zu fault%s, %zu warning%s%s\n", n_file, n_file == 1 ? "" : "s", *n_fault,
+                *n_fault == 1 ? "" : "s", n_warning, n_warning == 1 ? "" : "s",
+                *n_fault == 0 ? ": the job can be submitted" : "");
+    }
+    json_decref(report);
+    return s;
+}
+
+static status print_json(const char *document, const char *folder, FILE *out, size_t *n_fault, struct error *err)
+{
+    json_t *report = NULL;
+    status s = run_worker(document, folder, &report, err);
+    *n_fault = json_array_size(json_object_get(report, "faults"));
+    if (s == STATUS_OK) {
+        json_dumpf(report, out, JSON_INDENT(1));
+        fputc('\n', out);
+    }
+    json_decref(report);
+    return s;
+}
+
 CLI_COMMAND(
     CHECK, cli_check, .place = 20, .name = "check", .operand = "JOB.json", .needs = "a job document",
     .options = "input-dir json", .summary = "check a job document and its files, without a server",
@@ -56,29 +87,17 @@ CLI_COMMAND(
 status cli_check(struct cli *cli, int *exit_code, struct error *err)
 {
     char folder[PATH_ROOM];
-    json_t *report = NULL;
+    size_t n_fault = 0;
     const struct cli_args *a = cli->args;
     if (a->input_dir != NULL)
         snprintf(folder, sizeof folder, "%s", a->input_dir);
     else
         cli_folder_of(a->operand, folder, sizeof folder);
     status s = cli_document_check(a->operand, err);
-    if (s != STATUS_OK) return s;
-    s = run_worker(a->operand, folder, &report, err);
-    if (s == STATUS_OK && a->json) {
-        json_dumpf(report, cli->out, JSON_INDENT(1));
-        fputc('\n', cli->out);
-    }
-    size_t n_fault = json_array_size(json_object_get(report, "faults"));
-    if (s == STATUS_OK && !a->json) {
-        cli_print_faults(json_object_get(report, "faults"), "fault", cli->out);
-        size_t n_warning = cli_print_faults(json_object_get(report, "warnings"), "warning", cli->out);
-        cli_print_statements(json_object_get(report, "files"), cli->out);
-        fprintf(cli->out, "%lld files, %zu faults, %zu warnings%s\n",
-                json_integer_value(json_object_get(report, "n_file")), n_fault, n_warning,
-                n_fault == 0 ? ": the job can be submitted" : "");
-    }
+    if (s == STATUS_OK && a->json)
+        s = print_json(a->operand, folder, cli->out, &n_fault, err);
+    else if (s == STATUS_OK)
+        s = cli_check_document(a->operand, folder, cli->out, &n_fault, err);
     if (n_fault > 0) *exit_code = CLI_EXIT_ERROR;
-    json_decref(report);
     return s;
 }

@@ -92,8 +92,7 @@ static status add_data_beside(const char *path, const struct volume_format *form
                : error_set(err, STATUS_INVALID, "the name of the file '%s' is not UTF-8: rename it", data);
 }
 
-/* Lists the names of the scan's files, and the folder that they lie in. */
-static status list_scan(const char *scan, json_t *files, char *folder, size_t n_bytes, struct error *err)
+status cli_scan_files(const char *scan, json_t *files, char *folder, size_t n_bytes, struct error *err)
 {
     struct stat st;
     if (stat(scan, &st) != 0) return error_set_errno(err, "cannot read the scan '%s'", scan);
@@ -109,8 +108,7 @@ static status list_scan(const char *scan, json_t *files, char *folder, size_t n_
                                        : add_data_file(scan, format, files, err);
 }
 
-/* "2" or "2,2,3": one edge for all axes, or three. */
-static status read_voxel(const char *text, json_t **voxel, struct error *err)
+status cli_scan_voxel(const char *text, json_t **voxel, struct error *err)
 {
     double um[3];
     char *end = NULL;
@@ -152,8 +150,8 @@ static status make_document(const struct cli_args *a, json_t **document, char *f
                             struct error *err)
 {
     json_t *files = json_array(), *volume = json_object(), *voxel = NULL;
-    status s = list_scan(a->operand, files, folder, n_bytes, err);
-    if (s == STATUS_OK && a->voxel_um != NULL) s = read_voxel(a->voxel_um, &voxel, err);
+    status s = cli_scan_files(a->operand, files, folder, n_bytes, err);
+    if (s == STATUS_OK && a->voxel_um != NULL) s = cli_scan_voxel(a->voxel_um, &voxel, err);
     json_object_set_new(volume, "files", files);
     if (voxel != NULL) json_object_set_new(volume, "voxel_size_um", voxel);
     if (a->axes != NULL) json_object_set_new(volume, "axes", json_string(a->axes));
