@@ -13,7 +13,9 @@ import numpy as np
 
 VOXEL_UM = 2.0
 DEFAULT = {"kind": "gauze", "size": (112, 112, 72), "d": (7, 7), "rho": (1, 1), "n": 7, "snr": 5, "blur": 0.7, "corr": 0.5, "open": 1.5,
-           "spread": 0.08, "balls": 0, "ball_radius": (3, 7), "hairs": 0, "fibers": 60, "cup": 0, "rim": 0, "pad": 0, "mixed": 0, "length": 0, "plate": 0, "lumen": 0, "solid": 0}
+           "spread": 0.08, "balls": 0, "ball_radius": (3, 7), "hairs": 0, "fibers": 60, "cup": 0, "rim": 0, "pad": 0, "mixed": 0, "length": 0, "plate": 0,
+           "lumen": 0, "solid": 0, "flat": 1, "plies": 1, "tilt": 0, "relax": 0}
+TWILL = {"kind": "twill", "open": 1.05, "relax": 50}
 SCANS = {
     "gauze": {}, "gauze-noisy": {"snr": 2.5}, "gauze-d10": {"d": (10, 10), "size": (128, 128, 96)},
     "gauze-35": {"rho": (1, 0.35)}, "gauze-50": {"rho": (1, 0.5)}, "gauze-70": {"rho": (0.7, 1)}, "gauze-20": {"rho": (0.2, 1)},
@@ -22,12 +24,14 @@ SCANS = {
     "gauze-rim": {"cup": 0.3, "rim": 0.4},
     "gauze-pad": {"pad": 1}, "gauze-balls": {"balls": 120}, "gauze-particles": {"balls": 12, "ball_radius": (2, 4)}, "gauze-many": {"balls": 300},
     "gauze-hairs": {"hairs": 25}, "gauze-blur": {"blur": 1.5}, "gauze-plate": {"plate": 5},
-    "twill": {"kind": "twill", "open": 1.05}, "twill-noisy": {"kind": "twill", "open": 1.05, "snr": 2},
-    "twill-d4": {"kind": "twill", "open": 1.05, "d": (4, 4), "size": (96, 96, 48)},
-    "twill-d5": {"kind": "twill", "open": 1.05, "d": (5, 5), "size": (96, 96, 56)}, "twill-35": {"kind": "twill", "open": 1.05, "rho": (0.35, 1)},
-    "twill-blur": {"kind": "twill", "open": 1.05, "blur": 1.6}, "twill-cup": {"kind": "twill", "open": 1.05, "cup": 0.5, "rim": 0.3},
-    "twill-d3": {"kind": "twill", "open": 1.05, "d": (3, 3), "size": (80, 80, 40), "snr": 3},
-    "twill-diameters": {"kind": "twill", "open": 1.05, "d": (5, 10), "size": (128, 128, 88)},
+    "twill": TWILL, "twill-noisy": {**TWILL, "snr": 2},
+    "twill-d4": {**TWILL, "d": (4, 4), "size": (96, 96, 48)},
+    "twill-d5": {**TWILL, "d": (5, 5), "size": (96, 96, 56)}, "twill-35": {**TWILL, "rho": (0.35, 1)},
+    "twill-blur": {**TWILL, "blur": 1.6}, "twill-cup": {**TWILL, "cup": 0.5, "rim": 0.3},
+    "twill-d3": {**TWILL, "d": (3, 3), "size": (80, 80, 40), "snr": 3},
+    "twill-diameters": {**TWILL, "d": (5, 10), "size": (128, 128, 88)},
+    "twill-slices": {**TWILL, "blur": (0.6, 0.6, 1.8)}, "twill-flat": {**TWILL, "flat": 1.8},
+    "twill-plied": {**TWILL, "plies": 2, "n": 4, "snr": 2}, "twill-tilted": {**TWILL, "tilt": 30},
     "felt": {"kind": "felt"}, "felt-noisy": {"kind": "felt", "snr": 2}, "felt-dense": {"kind": "felt", "fibers": 130},
     "felt-mixed": {"kind": "felt", "mixed": 0.5},
     "felt-35": {"kind": "felt", "mixed": 0.8}, "felt-d4": {"kind": "felt", "d": (4, 4), "fibers": 100, "size": (96, 96, 64)},
@@ -39,21 +43,22 @@ SCANS = {
     "balls": {"kind": "none", "balls": 350}, "balls-large": {"kind": "none", "balls": 120, "ball_radius": (6, 11)},
     "noise": {"kind": "none"}, "sponge": {"kind": "sponge"},
     "gauze-hollow": {"size": (96, 96, 64), "lumen": 0.4}, "gauze-hollow-noisy": {"size": (96, 96, 64), "lumen": 0.4, "snr": 3},
-    "twill-hollow": {"kind": "twill", "open": 1.05, "size": (96, 96, 64), "lumen": 0.3},
-    "twill-hollow-d6": {"kind": "twill", "open": 1.05, "size": (96, 96, 64), "d": (6, 6), "lumen": 0.4},
+    "twill-hollow": {**TWILL, "size": (96, 96, 64), "lumen": 0.3},
+    "twill-hollow-d6": {**TWILL, "size": (96, 96, 64), "d": (6, 6), "lumen": 0.4},
     "felt-hollow": {"kind": "felt", "size": (96, 96, 64), "lumen": 0.4},
     "felt-hollow-half": {"kind": "felt", "size": (96, 96, 64), "lumen": 0.4, "solid": 0.5},
 }
 
 
 def smooth(volume, sd):
-    """A Gaussian by its Fourier transform, with the faces continued."""
-    if sd <= 0:
+    """A Gaussian by its Fourier transform, with the faces continued. sd: one, or those along x, y and z."""
+    along = np.broadcast_to(sd, 3)[::-1]
+    if not along.any():
         return volume
-    edge = int(4 * sd + 2)
+    edge = int(4 * max(along) + 2)
     padded = np.pad(volume, edge, mode="edge")
-    transfer = [np.exp(-2 * (math.pi * sd * np.fft.fftfreq(n)) ** 2) for n in padded.shape[:2]]
-    transfer.append(np.exp(-2 * (math.pi * sd * np.fft.rfftfreq(padded.shape[2])) ** 2))
+    transfer = [np.exp(-2 * (math.pi * w * np.fft.fftfreq(n)) ** 2) for w, n in zip(along, padded.shape[:2])]
+    transfer.append(np.exp(-2 * (math.pi * along[2] * np.fft.rfftfreq(padded.shape[2])) ** 2))
     spectrum = np.fft.rfftn(padded) * transfer[0][:, None, None] * transfer[1][None, :, None] * transfer[2][None, None, :]
     result = np.fft.irfftn(spectrum, s=padded.shape, axes=(0, 1, 2))
     return result[edge:-edge, edge:-edge, edge:-edge]
@@ -94,16 +99,90 @@ def yarn(axis, twist, places, turn):
     return [axis + (p[0] * c - p[1] * s) * across + (p[0] * s + p[1] * c) * up for p in places]
 
 
+def plied(o, axis, places, turn):
+    """The fibers of a yarn whose plies, each like a yarn of its own, are twisted the other way round each other."""
+    twist = 0.45 * 2 * math.pi / 150
+    if o["plies"] == 1:
+        return yarn(axis, twist, places, turn)
+    width = np.linalg.norm(places, axis=1).max() + 0.5 * max(o["d"])
+    center = [(width * math.cos(a), width * math.sin(a)) for a in 2 * math.pi * np.arange(o["plies"]) / o["plies"]]
+    return [fiber for ply in yarn(axis, twist, center, turn) for fiber in yarn(ply, -2 * twist, places, turn)]
+
+
+def tilted(path, o):
+    """A path turned about the middle of the scan: about z, and then about x."""
+    c, s = math.cos(math.radians(o["tilt"])), math.sin(math.radians(o["tilt"]))
+    turn = np.array([[1, 0, 0], [0, c, -s], [0, s, c]]) @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    return (path - np.array(o["size"]) / 2) @ turn.T + np.array(o["size"]) / 2
+
+
+def draw_flat(volume, path, radius, rho, flat, turn):
+    """Adds a fiber whose section has the ratio of axes `flat` and the area of a disc of the radius: discs side by side."""
+    thin = radius * math.sqrt(math.pi / (math.pi + 4 * (flat - 1)))
+    tangent = np.gradient(path, axis=0)
+    side = np.cross(tangent, [math.cos(turn), math.sin(turn), 0.5])
+    side *= thin * (flat - 1) / np.linalg.norm(side, axis=1)[:, None]
+    cover = np.zeros_like(volume)
+    for at in np.linspace(-1, 1, 5):
+        one = np.zeros_like(volume)
+        draw(one, path + at * side, thin, rho)
+        np.maximum(cover, one, out=cover)
+    volume += cover
+
+
+def pushes(place, radius, fiber):
+    """Moves that take points of fibers that overlap most of the way apart: means over the points that each overlaps."""
+    push, square = np.zeros_like(place), np.sum(np.square(place), 1)
+    for first in range(0, len(place), 512):
+        part = slice(first, first + 512)
+        near = square[part, None] + square[None] - 2 * place[part] @ place.T
+        i, j = np.nonzero(near < (2 * radius.max()) ** 2)
+        i, j = (index[fiber[first + i] != fiber[j]] for index in (i, j))
+        overlap = radius[first + i] + radius[j] - np.sqrt(np.maximum(near[i, j], 0.01))
+        i, j, overlap = (x[overlap > 0] for x in (i, j, overlap))
+        away = place[first + i] - place[j]
+        away *= (0.7 * overlap / np.maximum(np.linalg.norm(away, axis=1), 0.1))[:, None]
+        np.add.at(push, first + i, away)
+        push[part] /= np.maximum(1, np.bincount(i, minlength=len(near)))[:, None]
+    return push
+
+
+def relaxed(fibers, o):
+    """Fibers that pass through each other at crossings, pushed apart."""
+    if o["relax"] == 0:
+        return fibers
+    stride, kernel = 8, np.hanning(7) / np.hanning(7).sum()
+    sparse = [path[::stride] for path, _ in fibers]
+    fiber = np.repeat(np.arange(len(sparse)), [len(p) for p in sparse])
+    radius = np.array([0.51 * o["d"][kind] for _, kind in fibers])[fiber]
+    start = place = np.concatenate(sparse)
+    inside = np.all((place > -12) & (place < np.array(o["size"]) + 12), 1)
+    for _ in range(o["relax"]):
+        push = np.zeros_like(place)
+        push[inside] = pushes(place[inside], radius[inside], fiber[inside])
+        for f in range(len(sparse)):
+            push[fiber == f] = np.stack([np.convolve(np.pad(x, 3, mode="edge"), kernel, "valid") for x in push[fiber == f].T], 1)
+        place = place + push
+    result = []
+    for f, (path, kind) in enumerate(fibers):
+        moved = (place - start)[fiber == f]
+        path = path + np.stack([np.interp(np.arange(len(path)), stride * np.arange(len(moved)), x) for x in moved.T], 1)
+        along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+        result.append([np.stack([np.interp(np.arange(0, along[-1], 0.45), along, x) for x in path.T], 1), kind])
+    return result
+
+
 def woven(o, rng):
     """Fibers of a weave: [path, kind], kind 0 along y and 1 along x."""
     nx, ny, nz = o["size"]
     fibers, places = [], [hexagon(o["n"], 1.1 * d) for d in o["d"]]
-    width = [np.linalg.norm(p, axis=1).max() + 0.5 * d for p, d in zip(places, o["d"])]
+    width = [(np.linalg.norm(p, axis=1).max() + 0.5 * d) * (1 if o["plies"] == 1 else 2) for p, d in zip(places, o["d"])]
+    reach = 0 if o["tilt"] == 0 else max(o["size"])
     spacing, height = 2 * o["open"] * max(width), 0.53 * (width[0] + width[1])
     for kind in (0, 1):
         length, n_across = (ny, nx) if kind == 0 else (nx, ny)
-        step = np.arange(-8, length + 8, 0.45)
-        for i in range(-1, int(n_across / spacing) + 2):
+        step = np.arange(-reach - 8, length + reach + 8, 0.45)
+        for i in range(-int(reach / spacing) - 1, int((n_across + reach) / spacing) + 2):
             phase = step / spacing
             if o["kind"] == "twill":
                 wave = np.sin(0.5 * math.pi * (phase - i)) if kind == 0 else -np.sin(0.5 * math.pi * (i + 1 - phase))
@@ -112,7 +191,7 @@ def woven(o, rng):
                 wave = (1 if kind == 0 else -1) * (-1) ** i * np.sin(math.pi * phase)
             lateral = np.full_like(step, (i + 0.5) * spacing)
             axis = np.stack([lateral, step, nz / 2 + height * wave] if kind == 0 else [step, lateral, nz / 2 + height * wave], 1)
-            fibers += [[path, kind] for path in yarn(axis, 0.45 * 2 * math.pi / 150, places[kind], rng.uniform(0, 7))]
+            fibers += [[path, kind] for path in plied(o, axis, places[kind], rng.uniform(0, 7))]
     return fibers
 
 
@@ -186,7 +265,7 @@ def make(name, o, folder):
     volume = np.zeros(o["size"][::-1])
     fibers, points = [], []
     if o["kind"] in ("gauze", "twill"):
-        fibers = woven(o, rng)
+        fibers = relaxed([[tilted(path, o), kind] for path, kind in woven(o, rng)], o)
         points = [np.column_stack([p[::4], np.full(len(p[::4]), 0.5 * o["d"][kind])]) for p, kind in fibers]
     if o["kind"] == "felt" or o["hairs"]:
         more, points = scattered(o, rng, o["fibers"] if o["kind"] == "felt" else o["hairs"], points)
@@ -195,7 +274,10 @@ def make(name, o, folder):
     for path, kind in fibers:
         radius = 0.5 * o["d"][kind] * (1 - o["spread"] * rng.uniform(0, 1))
         rho = 0.35 if rng.uniform() < o["mixed"] else o["rho"][kind]
-        draw(volume, path, radius, rho)
+        if o["flat"] > 1:
+            draw_flat(volume, path, radius, rho, o["flat"], rng.uniform(0, 7))
+        else:
+            draw(volume, path, radius, rho)
         if o["lumen"] and rng.uniform() >= o["solid"]:
             draw(volume, path, o["lumen"] * radius, -rho)
         true.append((path, radius))
