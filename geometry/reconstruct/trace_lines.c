@@ -6,6 +6,7 @@
 #include "geometry/fibers/lines/disagreement.h"
 #include "geometry/fibers/lines/kinks.h"
 #include "geometry/fibers/lines/line_ends.h"
+#include "geometry/fibers/lines/weak_lines.h"
 #include "geometry/fibers/shape/smoothing.h"
 
 #include <math.h>
@@ -32,6 +33,10 @@ enum {
 /* Distance of the axes of neighbours over the sum of their radii, below which one of two fitted lines is wrong: fibers
  * do not pass through each other. */
 #define TOUCHING 0.85
+/* Radius over the least one of a fit up to which a fit has found no edge, and density over a fiber's below which such a
+ * line is on noise: lines beside fibers and on a bright background have 0.4 to 0.75, thin fibers 0.85 and more. */
+#define NO_EDGE 1.02
+#define WEAK 0.75
 
 /* Smooths every line, and drops those with fewer than min_vertex vertices. */
 static status smooth_and_drop(struct trace_job *job, const struct polyline_set *in, struct polyline_set *out,
@@ -53,6 +58,36 @@ static status smooth_and_drop(struct trace_job *job, const struct polyline_set *
         s = polyline_add_part(out, in, l, in->first[l], in->first[l + 1], err);
     }
     free(work);
+    return s;
+}
+
+/* Mean radius of the lines by length, and the spread of the radii without the part of their errors. */
+static void measure_radii(const struct polyline_set *lines, struct axis_profile *profile)
+{
+    double length = 0.0, sum = 0.0, square = 0.0;
+    for (size_t l = 0; l < lines->n_line; l++) {
+        const double n = (double)polyline_length(lines, l), r = (double)lines->radius[l];
+        length += n;
+        sum += n * r;
+        square += n * r * r;
+    }
+    if (!(length > 0.0)) return;
+    profile->radius = sum / length;
+    const double spread = square / length / (profile->radius * profile->radius) - 1.0;
+    profile->radius_spread = sqrt(fmax(0.0, spread - profile->radius_se * profile->radius_se));
+}
+
+/* Leaves out the lines on noise, whose fit has found no edge. */
+static status drop_weak(const struct trace_job *job, struct axis_profile *profile, struct polyline_set *lines,
+                        struct error *err)
+{
+    struct polyline_set kept;
+    polyline_set_init(&kept);
+    status s = polylines_drop_weak(lines, job->v, NO_EDGE * AXIS_RADIUS_LEAST * job->diameter, WEAK * profile->high,
+                                   &kept, err);
+    if (s == STATUS_OK && kept.n_line < lines->n_line) measure_radii(&kept, profile);
+    polyline_set_release(lines);
+    *lines = kept;
     return s;
 }
 
@@ -78,6 +113,7 @@ static status fit_axes(struct trace_job *job, struct polyline_set *lines, bool l
     if (!last) job->flat = even.shape != NULL;
     if (s == STATUS_OK)
         s = polylines_keep_inside(&even, job->v->n, job->o->min_vertex, &inside, job->report->n_short_dropped, err);
+    if (s == STATUS_OK) s = drop_weak(job, &profile, &inside, err);
     if (s == STATUS_OK) {
         trace_state_profile(job, &profile);
         job->report->axis_ratio = ratio.mean;

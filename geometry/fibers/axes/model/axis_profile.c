@@ -3,8 +3,8 @@
 
 #include <math.h>
 
-/* Bounds of the radius of a fiber, per typical diameter, and of a step, voxels. */
-static const double RADIUS_LEAST = 0.2, RADIUS_MOST = 1.0, RADIUS_STEP = 0.3;
+/* Largest radius of a fiber, per typical diameter, and bound of a step, voxels. */
+static const double RADIUS_MOST = 1.0, RADIUS_STEP = 0.3;
 /* Largest density of the walls of hollow fibers: void and brightest voxels are at 0 and 1. */
 static const double HIGH_OF_WALLS = 3.0;
 /* Bounds of the area of a lumen over its outline's, and of a step; share of the information about it that must be left
@@ -142,7 +142,7 @@ void axis_profile_step(struct axis_profile *p, const struct shared_sum *shared, 
         if (p->lumen != NULL) step -= line[l].cross[4] * x[4];
         if (p->lumen != NULL) step = step_lumen(p, &line[l], x, part, normal, step, &p->lumen[l]);
         double r = (double)radius[l] + x[0] + within(-RADIUS_STEP, step / normal, RADIUS_STEP);
-        radius[l] = (float)within(RADIUS_LEAST * diameter, r, RADIUS_MOST * diameter);
+        radius[l] = (float)within(AXIS_RADIUS_LEAST * diameter, r, RADIUS_MOST * diameter);
     }
     p->blur = blur;
     p->low = low;

@@ -44,6 +44,8 @@ struct axis_table {
 
 /* A fiber is modelled up to AXIS_TAIL times the blur beyond its surface. */
 #define AXIS_TAIL 2.5
+/* Least radius of a fiber that a fit gives it, over the typical diameter. */
+#define AXIS_RADIUS_LEAST 0.2
 #define AXIS_CORE 3.5 /* depth below the surface at which a fiber is solid */
 
 void axis_table_init(struct axis_table *t);
