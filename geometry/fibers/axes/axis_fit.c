@@ -209,11 +209,12 @@ static void damp(struct fit_work *w, struct axis_profile *p)
 static void state_errors(const struct fit_work *w, size_t n_vertex, double diameter, struct axis_profile *p)
 {
     const bool measured = p->section != NULL && p->measure != NULL;
-    const double slope = axis_edge_slope(&w->shared), variance = w->shared.square / w->shared.weight / p->independent;
-    /* the measured noise is per information with the mean slope */
-    const double noise = measured ? p->measure->axis_noise * axis_mean_slope(&w->shared) / slope : 0.0;
-    const struct axis_data data = {.information = slope * axis_information(w->total, n_vertex),
-                                   .noise = fmax(noise, variance),
+    const double slope = axis_edge_slope(&w->shared), mean_slope = axis_mean_slope(&w->shared);
+    const struct axis_data data = {.information = axis_information(w->total, n_vertex),
+                                   .slope = slope,
+                                   .residual = w->shared.square / w->shared.weight / p->independent,
+                                   /* measured per information with the mean slope */
+                                   .noise = measured ? p->measure->axis_noise * mean_slope / slope : 0.0,
                                    .correlation = p->measured_curvature ? axis_bend_correlation(diameter) : 0.0};
     if (w->shared.weight > 0.0) axis_errors(&data, w->stiffness, n_vertex, &p->position_se, &p->direction_se_rad);
 }

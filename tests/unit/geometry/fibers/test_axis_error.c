@@ -20,19 +20,21 @@ static void test_smooth_axes(void **state)
     const double length = 8.0, information = 3.0, noise = 0.2,
                  stiffness[3] = {information * pow(length, 4.0), information * pow(length, 4.0),
                                  information * pow(length, 4.0)};
-    const struct axis_data data = {information, noise, 0.0};
+    const struct axis_data data = {.information = information, .slope = 1.0, .noise = noise};
     double position, direction;
     axis_errors(&data, stiffness, 3, &position, &direction);
     const double expected = sqrt(noise / (2.0 * M_SQRT2 * information * length));
     print_message("position %.5f of %.5f, direction %.5f of %.5f\n", position, expected, direction, expected / length);
     assert_true(fabs(position / expected - 1.0) < 0.05 && fabs(direction * length / expected - 1.0) < 0.05);
-    /* bends that are correlated let less noise of short waves pass */
-    const struct axis_data bends = {information, noise, 0.9};
+    /* correlated bends let less noise of short waves pass, but not less than independent residuals have */
+    struct axis_data bends = {.information = information, .slope = 1.0, .noise = noise, .correlation = 0.9};
     const double loose[1] = {information};
-    double straighter;
+    double straighter, residual;
     axis_errors(&data, loose, 1, &position, &direction);
     axis_errors(&bends, loose, 1, &position, &straighter);
-    assert_true(straighter < 0.8 * direction);
+    bends.residual = noise;
+    axis_errors(&bends, loose, 1, &position, &residual);
+    assert_true(straighter < 0.8 * direction && fabs(residual / direction - 1.0) < 1e-9);
 }
 
 enum { LENGTH = 400, WIDTH = 24 };
