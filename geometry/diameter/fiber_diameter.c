@@ -62,15 +62,23 @@ static struct energy bright_energy(const float *a, const uint8_t *far, const siz
     size_t margin = SCALE_EDGE / 8, count = 0, least_k = n[2] > 4 * margin ? margin : 1;
     double sum = 0.0, raw = 0.0;
     float s2 = (float)(sigma * sigma), q3 = (float)(3.0 * noise_var);
+    float cube[EDGE], less[EDGE];
     for (size_t k = least_k; k + least_k < n[2]; k++)
-        for (size_t j = 1; j + 1 < n[1]; j++)
-            for (size_t i = 1; i + 1 < n[0]; i++, count++) {
-                const float *p = a + (ptrdiff_t)k * sz + (ptrdiff_t)j * sy + (ptrdiff_t)i;
-                if (p[0] < MIN_BLURRED || far[p - a] > NEAR_MATERIAL) continue;
-                float bright = s2 * scale_minus_laplacian(p, sy, sz);
-                if (bright > 0.0f) raw += (double)(bright * bright * bright);
-                if (bright > 0.0f && bright * bright > q3) sum += (double)(bright * (bright * bright - q3));
+        for (size_t j = 1; j + 1 < n[1] && n[0] > 2; j++, count += n[0] - 2) {
+            const float *p = a + (k * n[1] + j) * n[0] + 1;
+            const uint8_t *q = far + (p - a);
+            for (size_t i = 0; i + 2 < n[0]; i++) {
+                const float response = s2 * scale_minus_laplacian(p + i, sy, sz);
+                const bool counts = !(p[i] < MIN_BLURRED) & (q[i] <= NEAR_MATERIAL) & (response > 0.0f);
+                const float bright = counts ? response : 0.0f, square = bright * bright;
+                cube[i] = square * bright;
+                less[i] = square > q3 ? bright * (square - q3) : 0.0f;
             }
+            for (size_t i = 0; i + 2 < n[0]; i++) {
+                raw += (double)cube[i];
+                sum += (double)less[i];
+            }
+        }
     double per_voxel = count > 0 ? 1.0 / (double)count : 0.0;
     return (struct energy){sum * per_voxel, raw * per_voxel};
 }

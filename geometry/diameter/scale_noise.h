@@ -16,7 +16,8 @@ struct scale_noise {
 };
 
 /* Fills far with the distance of each voxel from material (density blurred by 1.4 voxels above 0.4) and from places
- * without noise, such as the outside of a round field of view, as steps to one of the 26 neighbours. a, b: scratch. */
+ * without noise, such as the outside of a round field of view, as steps to one of the 26 neighbours; UINT8_MAX from 8
+ * steps on. a, b: scratch. */
 void scale_find_void(const float *density, float *a, float *b, uint8_t *far, const size_t n[3]);
 
 /* Adds the void of a brick of n voxels, at most SCALE_EDGE along each axis. a, b, far: scratch of one value per voxel.

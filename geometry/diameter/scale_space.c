@@ -1,27 +1,43 @@
 #include "geometry/diameter/scale_space.h"
 
+#include "base/lanes.h"
+
 #include <string.h>
 
 enum { MAX_REACH = 40 };
 
-static void add_scaled(float *restrict to, const float *restrict from, float w, size_t n)
+/* Sums n values of the lines `in`, each times its weight of the kernel: out[i] = sum_t kernel[t] in[t][i]. Sums stay in
+ * registers. */
+static void sum_lines(const float *const *in, const float *kernel, int n_tap, float *out, size_t n)
 {
-    for (size_t i = 0; i < n; i++) to[i] += w * from[i];
+    size_t i = 0;
+    for (; i + (size_t)(4 * LANES) <= n; i += (size_t)(4 * LANES)) {
+        lanes sum[4] = {{0.0f}, {0.0f}, {0.0f}, {0.0f}};
+        for (int t = 0; t < n_tap; t++)
+            for (int l = 0; l < 4; l++) sum[l] += kernel[t] * *(const lanes *)(in[t] + i + l * LANES);
+        for (int l = 0; l < 4; l++) *(lanes *)(out + i + l * LANES) = sum[l];
+    }
+    for (; i < n; i++) {
+        float sum = 0.0f;
+        for (int t = 0; t < n_tap; t++) sum += kernel[t] * in[t][i];
+        out[i] = sum;
+    }
 }
 
 /* Convolves rows of n values, at most SCALE_EDGE, with edge values repeated. */
 static void blur_rows(const float *in, float *out, size_t n, size_t n_row, const float *kernel, int reach)
 {
     float padded[SCALE_EDGE + 2 * MAX_REACH];
+    const float *tap[2 * MAX_REACH + 1];
     size_t before = (size_t)reach;
-    memset(out, 0, n * n_row * sizeof *out);
+    for (size_t t = 0; t <= 2 * before; t++) tap[t] = padded + t;
     for (size_t k = 0; k < n_row; k++, in += n, out += n) {
         for (size_t i = 0; i < before; i++) {
             padded[i] = in[0];
             padded[before + n + i] = in[n - 1];
         }
         memcpy(padded + before, in, n * sizeof *in);
-        for (size_t t = 0; t <= 2 * before; t++) add_scaled(out, padded + t, kernel[t], n);
+        sum_lines(tap, kernel, 2 * reach + 1, out, n);
     }
 }
 
@@ -29,14 +45,16 @@ static void blur_rows(const float *in, float *out, size_t n, size_t n_row, const
 static void blur_lines(const float *in, float *out, size_t n_inner, size_t n_line, size_t n_outer, const float *kernel,
                        int reach)
 {
+    const float *tap[2 * MAX_REACH + 1];
     ptrdiff_t last = (ptrdiff_t)n_line - 1;
-    memset(out, 0, n_inner * n_line * n_outer * sizeof *out);
     for (size_t o = 0; o < n_outer; o++, in += n_inner * n_line, out += n_inner * n_line)
-        for (ptrdiff_t c = 0; c <= last; c++)
+        for (ptrdiff_t c = 0; c <= last; c++) {
             for (int t = -reach; t <= reach; t++) {
                 ptrdiff_t s = c + t < 0 ? 0 : c + t > last ? last : c + t;
-                add_scaled(out + (size_t)c * n_inner, in + (size_t)s * n_inner, kernel[t + reach], n_inner);
+                tap[t + reach] = in + (size_t)s * n_inner;
             }
+            sum_lines(tap, kernel, 2 * reach + 1, out + (size_t)c * n_inner, n_inner);
+        }
 }
 
 void scale_blur(float *a, float *b, const size_t n[3], double sigma)
