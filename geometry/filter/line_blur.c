@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_REACH = 60 };
+enum { MAX_REACH = 60, LEAST_SLAB = 16 /* slices of a slab in ample memory */ };
 
 struct kernel {
     int reach;
@@ -122,6 +122,8 @@ status line_filter_blur(const struct volume *v, double s, double t, struct threa
     if (!(s > 0.0) || !(t > 0.0) || !make_kernel(fmax(s, t), &job.kernel) || !make_kernel(fmin(s, t), &job.kernel))
         return error_set(err, STATUS_INVALID, "cannot make the direction filter with s %g, t %g", s, t);
     if (n_slab < 4) n_slab = 4;
+    const size_t enough = 2 * thread_pool_n_thread(pool); /* larger slabs take memory and no less time */
+    if (n_slab > LEAST_SLAB && n_slab > enough) n_slab = enough > LEAST_SLAB ? enough : LEAST_SLAB;
     if (n_slab > v->n[2]) n_slab = v->n[2];
     status st = volume_init_in(out, v->n, v->voxel_size_m, v->space, err);
     if (st != STATUS_OK) return st;

@@ -14,6 +14,7 @@
 #include <string.h>
 
 enum {
+    LEAST_SLAB = 32, /* slices that are filled together in ample memory */
     N_SCALE = 5,
     PEAK_REACH = 2, /* pixels to a kept voxel's from a peak that has a slope (center_slope.h) */
     N_BYTES = 3     /* sets of pixels in the work of a thread */
@@ -319,6 +320,8 @@ status centers_detect(const struct center_search *search, struct thread_pool *po
     size_t n_slab = scratch_buffer_bytes(v->space) / (n_pixel * sizeof(float));
     status s = STATUS_OK;
     *list = (struct center_list){0};
+    const size_t enough = 2 * n_thread > LEAST_SLAB ? 2 * n_thread : LEAST_SLAB;
+    n_slab = n_slab > enough ? enough : n_slab;
     n_slab = n_slab < n_thread ? n_thread : n_slab > n_slice ? n_slice : n_slab;
     job.diameter = diameter_voxel;
     job.min_distance = MIN_SPACING * (float)(MOST_RADIUS * diameter_voxel);
