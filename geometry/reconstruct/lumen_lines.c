@@ -120,7 +120,7 @@ static status trace_in_box(const struct volume *box, double diameter, struct thr
     reconstruct_option_default(&o);
     o.fiber_diameter_voxel = diameter;
     report.radius_spread = 0.0;
-    status s = reconstruct_orientation(box, &o, pool, NULL, &d, &report, err);
+    status s = reconstruct_orientation_again(box, &o, pool, NULL, &d, &report, err);
     if (s == STATUS_OK) {
         trace_job_start(&job);
         s = trace_scan(&job, false, lines, err);

@@ -69,6 +69,11 @@ status reconstruct_orientation(const struct volume *v, struct reconstruct_option
                                const struct progress *progress, struct direction_volume *d,
                                struct reconstruct_report *report, struct error *err);
 
+/* The same by the diameter in the options, which was found before and is not compared with the scan's. */
+status reconstruct_orientation_again(const struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
+                                     const struct progress *progress, struct direction_volume *d,
+                                     struct reconstruct_report *report, struct error *err);
+
 /* The part of the step "orientation" after it, in noisy scans (reconstruct_redirects): traces lines up to four times,
  * and voxels within a diameter of one take its direction. d stays as it is in other scans, where voxels are
  * interpolated, and where radii of lines differ so much that the scan does not resolve its fibers. Errors as those of

@@ -136,7 +136,8 @@ static status filter_rescaled(const struct volume *v, double edge, struct recons
     return s;
 }
 
-/* known: v before its densities were continued into unknown voxels. */
+/* known: v before its densities were continued into unknown voxels; NULL: the options have a diameter that is not
+ * compared with the scan's. */
 static status find_directions(const struct volume *v, const struct volume *known, struct reconstruct_option *option,
                               struct thread_pool *pool, const struct progress *progress, struct direction_volume *d,
                               struct reconstruct_report *report, struct error *err)
@@ -144,10 +145,14 @@ static status find_directions(const struct volume *v, const struct volume *known
     struct progress_part part = {progress, 0.0, 0.1};
     const struct progress inner = progress_of_part(&part);
     *d = (struct direction_volume){0};
-    status s = find_diameter(v, option, pool, &inner, report, err);
+    status s = STATUS_OK;
+    if (known == NULL)
+        report->fiber_diameter_voxel = option->fiber_diameter_voxel;
+    else
+        s = find_diameter(v, option, pool, &inner, report, err);
     if (s == STATUS_OK) s = ask_scale(v, option, report, err);
     if (s == STATUS_OK && isnan(option->fiber_diameter_voxel) && lines_tell_diameter(v, report))
-        s = trace_diameter(v, known, reconstruct_orientation, pool, &inner, report, err);
+        s = trace_diameter(v, known, reconstruct_orientation_again, pool, &inner, report, err);
     if (s != STATUS_OK) return s;
     const double edge = trace_grid_edge(report->fiber_diameter_voxel, v->n);
     report->trace_edge_voxel = edge;
@@ -170,16 +175,32 @@ static void empty_unknown(const struct volume *v, double eps_d, struct direction
     }
 }
 
+/* is_sure: the options have a diameter that is not compared with the scan's. */
+static status orient(const struct volume *v, bool is_sure, struct reconstruct_option *option, struct thread_pool *pool,
+                     const struct progress *progress, struct direction_volume *d, struct reconstruct_report *report,
+                     struct error *err)
+{
+    struct volume continued = {0};
+    const struct volume *known = is_sure ? NULL : v;
+    if (v->unknown.n == 0) return find_directions(v, known, option, pool, progress, d, report, err);
+    *d = (struct direction_volume){0};
+    status s = volume_continue(v, &continued, err);
+    if (s == STATUS_OK) s = find_directions(&continued, known, option, pool, progress, d, report, err);
+    if (s == STATUS_OK) empty_unknown(v, option->eps_d, d, report);
+    volume_release(&continued);
+    return s;
+}
+
 status reconstruct_orientation(const struct volume *v, struct reconstruct_option *option, struct thread_pool *pool,
                                const struct progress *progress, struct direction_volume *d,
                                struct reconstruct_report *report, struct error *err)
 {
-    struct volume continued = {0};
-    if (v->unknown.n == 0) return find_directions(v, v, option, pool, progress, d, report, err);
-    *d = (struct direction_volume){0};
-    status s = volume_continue(v, &continued, err);
-    if (s == STATUS_OK) s = find_directions(&continued, v, option, pool, progress, d, report, err);
-    if (s == STATUS_OK) empty_unknown(v, option->eps_d, d, report);
-    volume_release(&continued);
-    return s;
+    return orient(v, false, option, pool, progress, d, report, err);
+}
+
+status reconstruct_orientation_again(const struct volume *v, struct reconstruct_option *option,
+                                     struct thread_pool *pool, const struct progress *progress,
+                                     struct direction_volume *d, struct reconstruct_report *report, struct error *err)
+{
+    return orient(v, true, option, pool, progress, d, report, err);
 }

@@ -18,10 +18,11 @@ static const double STRONG_BLUR = 1.2;
 /* Ratio of the diameters of two rounds up to which they are the same. */
 static const double SETTLED = 1.04;
 
-/* Returns a diameter from the radius and the blur of a fit, which has the edge of a blurred plane (axis_profile.h).
- * Blur moves the edge of a single cylinder inwards by blur^2 / (2 radius), while neighbours that touch it move it
- * outwards along a part of its outline; on phantoms half of the shift is left. */
-static double without_blur(double radius, double blur) { return 2.0 * (radius + 0.25 * blur * blur / radius); }
+double trace_diameter_of_lines(const struct reconstruct_report *report, double voxel_m)
+{
+    const double radius = report->profile_radius_m, blur = report->profile_blur_m;
+    return 2.0 * (radius + 0.25 * blur * blur / radius) / voxel_m;
+}
 
 /* Traces lines by a diameter, with the filter that belongs to it whatever the job's is: then a job that is given the
  * filter another one has chosen finds the same fibers. *found: their mean diameter in voxels; NaN: no fibers are
@@ -46,7 +47,7 @@ static status trace_once(const struct volume *box, trace_orientation *find, doub
     }
     const bool resolved = lines.n_line > 0 && report.radius_spread <= TRACE_MOST_SPREAD;
     if (s == STATUS_OK && resolved && report.profile_blur_m < STRONG_BLUR * box->voxel_size_m[0])
-        *found = without_blur(report.profile_radius_m, report.profile_blur_m) / box->voxel_size_m[0];
+        *found = trace_diameter_of_lines(&report, box->voxel_size_m[0]);
     direction_volume_release(&d);
     polyline_set_release(&lines);
     return s == STATUS_INVALID ? STATUS_OK : s;

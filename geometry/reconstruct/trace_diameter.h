@@ -13,7 +13,7 @@
 #include "geometry/grade/reconstruct_report.h"
 #include "geometry/volume/volume.h"
 
-/* Finds the directions of a volume, as reconstruct_orientation does. */
+/* Finds the directions of a volume by the diameter in the options, as reconstruct_orientation_again does. */
 typedef status trace_orientation(const struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
                                  const struct progress *progress, struct direction_volume *d,
                                  struct reconstruct_report *report, struct error *err);
@@ -27,5 +27,11 @@ typedef status trace_orientation(const struct volume *v, struct reconstruct_opti
 status trace_diameter(const struct volume *v, const struct volume *known, trace_orientation *find,
                       struct thread_pool *pool, const struct progress *progress, struct reconstruct_report *report,
                       struct error *err);
+
+/* Returns the mean diameter in voxels of the lines that a tracing has found, as the report states it. The fit has the
+ * edge of a blurred plane (axis_profile.h): blur moves the edge of a single cylinder inwards by blur^2 / (2 radius),
+ * while neighbours that touch it move it outwards along a part of its outline; on phantoms half of the shift is left.
+ */
+double trace_diameter_of_lines(const struct reconstruct_report *report, double voxel_m);
 
 #endif

@@ -70,11 +70,11 @@ static void test_peak_stays(void **state)
     struct volume v;
     struct reconstruct_report r = {.fiber_diameter_voxel = 14.0};
     make_bundle(&v, 7.0, 0.0, 0.5);
-    assert_int_equal(trace_diameter(&v, &v, reconstruct_orientation, NULL, NULL, &r, NULL), STATUS_OK);
+    assert_int_equal(trace_diameter(&v, &v, reconstruct_orientation_again, NULL, NULL, &r, NULL), STATUS_OK);
     assert_true(r.fiber_diameter_voxel == 14.0);
     for (size_t i = 0; i < volume_n_voxel(v.n); i++) v.density[i] = 0.0f;
     r.fiber_diameter_voxel = 7.0;
-    assert_int_equal(trace_diameter(&v, &v, reconstruct_orientation, NULL, NULL, &r, NULL), STATUS_OK);
+    assert_int_equal(trace_diameter(&v, &v, reconstruct_orientation_again, NULL, NULL, &r, NULL), STATUS_OK);
     assert_true(r.fiber_diameter_voxel == 7.0);
     volume_release(&v);
 }
@@ -94,7 +94,7 @@ static void test_box_is_known(void **state)
         if (i < size) v.density[i] = known.density[i] = part.density[i];
         if (i >= 2 * size) v.density[i] = 1.0f;
     }
-    assert_int_equal(trace_diameter(&v, &known, reconstruct_orientation, NULL, NULL, &r, NULL), STATUS_OK);
+    assert_int_equal(trace_diameter(&v, &known, reconstruct_orientation_again, NULL, NULL, &r, NULL), STATUS_OK);
     print_message("diameter 6.4: %.2f\n", r.fiber_diameter_voxel);
     assert_true(fabs(r.fiber_diameter_voxel / 6.4 - 1.0) < 0.04);
     volume_release(&part);
