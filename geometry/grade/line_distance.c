@@ -1,5 +1,7 @@
 #include "geometry/grade/line_distance.h"
 
+#include "base/lanes.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -19,23 +21,33 @@ struct capsule {
     uint8_t kind;
 };
 
-/* Distance of a point from the surface. rest: from the nearest point of the axis. */
-static float surface_distance(const struct capsule *c, const float rest[3])
+/* Enters a capsule in a row of n voxels, the first of which lies at x from its end a. */
+static void enter_row(const struct capsule *c, const float x[3], size_t n, uint8_t *code)
 {
-    const float away2 = rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2], away = sqrtf(away2);
-    if (c->stretch <= 1.0f || away2 <= 0.0f) return away - c->radius;
-    const float along = rest[0] * c->long_axis[0] + rest[1] * c->long_axis[1] + rest[2] * c->long_axis[2];
-    const float across2 = fmaxf(0.0f, away2 - along * along);
-    const float as_disc = sqrtf(along * along / (c->stretch * c->stretch) + across2 * c->stretch * c->stretch);
-    return (as_disc - c->radius) * away / as_disc;
-}
-
-static void enter(const struct capsule *c, float distance, uint8_t *code)
-{
-    const float units = floorf(distance * LINE_PER_VOXEL);
-    const uint8_t found = distance <= 0.0f ? (uint8_t)(LINE_INSIDE + c->kind)
-                                           : (uint8_t)(LINE_OUTSIDE + fminf(units, LINE_FAR - LINE_OUTSIDE));
-    if (found < *code) *code = found;
+    static const lanes STEP = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
+    const lanes zero = {0.0f}, one = zero + 1.0f, most = zero + (LINE_FAR - LINE_OUTSIDE), least = zero + 1e-6f;
+    const float inverse2 = c->length2 > 0.0f ? 1.0f / c->length2 : 0.0f;
+    const float wide2 = c->stretch * c->stretch, narrow2 = 1.0f / wide2;
+    const float ahead = x[1] * c->u[1] + x[2] * c->u[2];
+    for (size_t i = 0; i < n; i += LANES) {
+        const lanes dx = x[0] + (STEP + (float)(int)i);
+        lanes t = (dx * c->u[0] + ahead) * inverse2;
+        t = lanes_choose(t < zero, zero, t);
+        t = lanes_choose(t > one, one, t);
+        const lanes rx = dx - t * c->u[0], ry = x[1] - t * c->u[1], rz = x[2] - t * c->u[2];
+        const lanes away2 = rx * rx + ry * ry + rz * rz;
+        const lanes along = rx * c->long_axis[0] + ry * c->long_axis[1] + rz * c->long_axis[2];
+        const lanes rest2 = away2 - along * along, across2 = lanes_choose(rest2 > zero, rest2, zero);
+        lanes as_disc = lanes_sqrt(along * along * narrow2 + across2 * wide2);
+        as_disc = lanes_choose(as_disc > least, as_disc, least);
+        const lanes distance = (as_disc - c->radius) * lanes_sqrt(away2) / as_disc;
+        lanes units = distance * (float)LINE_PER_VOXEL;
+        units = lanes_choose(units < most, units, most);
+        const lane_mask whole = __builtin_convertvector(units, lane_mask) + LINE_OUTSIDE, in = distance <= zero;
+        const lane_mask found = (whole & ~in) | (in & (LINE_INSIDE + c->kind));
+        for (size_t l = 0; l < LANES && i + l < n; l++)
+            code[i + l] = found[l] < code[i + l] ? (uint8_t)found[l] : code[i + l];
+    }
 }
 
 /* Enters a capsule in the slices from .. end - 1. */
@@ -52,15 +64,10 @@ static void enter_capsule(const struct capsule *c, const size_t n[3], size_t fro
     low[2] = low[2] < from ? from : low[2];
     high[2] = high[2] > end ? end : high[2];
     for (size_t k = low[2]; k < high[2]; k++)
-        for (size_t j = low[1]; j < high[1]; j++)
-            for (size_t i = low[0]; i < high[0]; i++) {
-                uint8_t *to = &code[volume_index(n, i, j, k)];
-                float rest[3] = {(float)i + 0.5f - c->a[0], (float)j + 0.5f - c->a[1], (float)k + 0.5f - c->a[2]};
-                const float dot = rest[0] * c->u[0] + rest[1] * c->u[1] + rest[2] * c->u[2];
-                const float t = c->length2 > 0.0f ? fminf(fmaxf(dot / c->length2, 0.0f), 1.0f) : 0.0f;
-                for (int x = 0; x < 3; x++) rest[x] -= t * c->u[x];
-                enter(c, surface_distance(c, rest), to);
-            }
+        for (size_t j = low[1]; j < high[1] && low[0] < high[0]; j++) {
+            const float x[3] = {(float)low[0] + 0.5f - c->a[0], (float)j + 0.5f - c->a[1], (float)k + 0.5f - c->a[2]};
+            enter_row(c, x, high[0] - low[0], &code[volume_index(n, low[0], j, k)]);
+        }
 }
 
 /* The segment that begins at vertex k of fiber i. */
