@@ -15,6 +15,13 @@ static const double MOST_RISE = 1.1;
 /* Blur in voxels from which the peak is kept: the filter and the reaches of tracing then fit the blurred width better
  * (geometry/NOTES.md). */
 static const double STRONG_BLUR = 1.2;
+/* Diameter over the peak's that is tried where radii spread by SEVERAL_SPREAD or more: centers and radii of fibers of
+ * half of it to one and a half are found. */
+static const double SEVERAL_SPREAD = 0.22, THICKER = 1.4;
+/* Where fibers have two diameters, the tried one has radii that spread by so much, and more than before by this ratio;
+ * and lines of at most this length and at least this volume over those before. Fibers of one kind whose radii spread by
+ * a quarter have 0.27, as before. */
+static const double TWO_SPREAD = 0.35, MORE_SPREAD = 1.25, MOST_LENGTH = 0.97, LEAST_VOLUME = 0.98;
 /* Ratio of the diameters of two rounds up to which they are the same. */
 static const double SETTLED = 1.04;
 
@@ -24,18 +31,33 @@ double trace_diameter_of_lines(const struct reconstruct_report *report, double v
     return 2.0 * (radius + 0.25 * blur * blur / radius) / voxel_m;
 }
 
+/* Lines of a tracing: mean diameter in voxels, NaN where no fibers are resolved; length, and the volume of their
+ * cylinders over pi, in voxels. */
+struct found {
+    double diameter, length, volume;
+    double spread; /* of the radii, relative */
+};
+
+static void sum_lines(const struct polyline_set *lines, struct found *f)
+{
+    for (size_t l = 0; l < lines->n_line; l++) {
+        const double length = (double)polyline_length(lines, l), radius = (double)lines->radius[l];
+        f->length += length;
+        f->volume += length * radius * radius;
+    }
+}
+
 /* Traces lines by a diameter, with the filter that belongs to it whatever the job's is: then a job that is given the
- * filter another one has chosen finds the same fibers. *found: their mean diameter in voxels; NaN: no fibers are
- * resolved. report: a copy. */
+ * filter another one has chosen finds the same fibers. report: a copy. */
 static status trace_once(const struct volume *box, trace_orientation *find, double diameter, struct thread_pool *pool,
-                         const struct progress *progress, struct reconstruct_report report, double *found,
+                         const struct progress *progress, struct reconstruct_report report, struct found *found,
                          struct error *err)
 {
     struct direction_volume d = {0};
     struct reconstruct_option o;
     struct trace_job job = {.v = box, .d = &d, .o = &o, .pool = pool, .report = &report, .part.outer = progress};
     struct polyline_set lines;
-    *found = NAN;
+    *found = (struct found){.diameter = NAN};
     polyline_set_init(&lines);
     reconstruct_option_default(&o);
     o.fiber_diameter_voxel = diameter;
@@ -45,12 +67,28 @@ static status trace_once(const struct volume *box, trace_orientation *find, doub
         trace_job_start(&job);
         s = trace_scan(&job, false, &lines, err);
     }
+    found->spread = report.radius_spread;
+    sum_lines(&lines, found);
     const bool resolved = lines.n_line > 0 && report.radius_spread <= TRACE_MOST_SPREAD;
     if (s == STATUS_OK && resolved && report.profile_blur_m < STRONG_BLUR * box->voxel_size_m[0])
-        *found = trace_diameter_of_lines(&report, box->voxel_size_m[0]);
+        found->diameter = trace_diameter_of_lines(&report, box->voxel_size_m[0]);
     direction_volume_release(&d);
     polyline_set_release(&lines);
     return s == STATUS_INVALID ? STATUS_OK : s;
+}
+
+/* Where the lines of the first tracing differ much in radius, they may be thin fibers, and several in each thick one. A
+ * thicker diameter, between both, is then taken if fewer lines explain as much and differ more. */
+static status try_thicker(const struct volume *box, trace_orientation *find, const struct found *before,
+                          struct thread_pool *pool, const struct progress *progress,
+                          const struct reconstruct_report *report, double *diameter, struct error *err)
+{
+    struct found found;
+    status s = trace_once(box, find, THICKER * *diameter, pool, progress, *report, &found, err);
+    if (s == STATUS_OK && found.spread >= fmax(TWO_SPREAD, MORE_SPREAD * before->spread) &&
+        found.length <= MOST_LENGTH * before->length && found.volume >= LEAST_VOLUME * before->volume)
+        *diameter *= THICKER;
+    return s;
 }
 
 status trace_diameter(const struct volume *v, const struct volume *known, trace_orientation *find,
@@ -65,11 +103,14 @@ status trace_diameter(const struct volume *v, const struct volume *known, trace_
     double diameter = peak, ratio = INFINITY;
     status s = trace_box_copy(v, known, peak, &box, from, err);
     for (int round = 0; round < N_ROUND && fabs(log(ratio)) > log(SETTLED) && s == STATUS_OK; round++) {
-        double found;
+        struct found found;
         s = trace_once(&box, find, diameter, pool, &quiet, *report, &found, err);
-        if (!(found < most && found * FIBER_DIAMETER_FINER > peak)) break;
-        ratio = found / diameter;
-        diameter = found;
+        if (s == STATUS_OK && round == 0 && found.spread >= SEVERAL_SPREAD)
+            s = try_thicker(&box, find, &found, pool, &quiet, report, &diameter, err);
+        if (diameter > most) break;
+        if (!(found.diameter < most && found.diameter * FIBER_DIAMETER_FINER > peak)) break;
+        ratio = found.diameter / diameter;
+        diameter = found.diameter;
     }
     if (s == STATUS_OK) report->fiber_diameter_voxel = diameter;
     volume_release(&box);

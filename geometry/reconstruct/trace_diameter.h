@@ -3,7 +3,8 @@
  * The scale of the strongest response (fiber_diameter.h) grows with the blur, and more where diameters differ, because
  * it weighs responses by their third power. The fit of axes separates radius and blur (axis_profile.h). So a box with
  * much material is traced with the measured diameter, and traced again with the diameter of the lines that were found,
- * until it stays the same. */
+ * until it stays the same. Where thin and thick fibers lie side by side, their lines at the peak may be several in each
+ * thick fiber; a diameter between both then finds one. */
 #ifndef SELVEDGE_GEOMETRY_TRACE_DIAMETER_H
 #define SELVEDGE_GEOMETRY_TRACE_DIAMETER_H
 
@@ -21,7 +22,8 @@ typedef status trace_orientation(const struct volume *v, struct reconstruct_opti
 /* Replaces report->fiber_diameter_voxel, the diameter of a peak, by the mean diameter of traced lines. A round changes
  * nothing where no lines are found, where their radii differ so much that the box does not resolve its fibers, where
  * the scan is strongly blurred, or where the result is of other fibers: thinner than the peak by FIBER_DIAMETER_FINER,
- * thicker by a tenth, or thicker at all where voxels are interpolated. v: densities; known: the same volume before
+ * thicker by a tenth, or thicker at all where voxels are interpolated. Of
+ * fibers with two diameters, 1.4 times the peak is taken. v: densities; known: the same volume before
  * densities were continued into its unknown voxels (volume_unknown.h). STATUS_CANCELLED, STATUS_NO_MEMORY,
  * STATUS_DISK_FULL. */
 status trace_diameter(const struct volume *v, const struct volume *known, trace_orientation *find,

@@ -102,12 +102,37 @@ static void test_box_is_known(void **state)
     volume_release(&v);
 }
 
+/* Where thin fibers and thick ones, in each of which several thin lines would fit, lie in one scan, a diameter between
+ * both is taken. */
+static void test_two_diameters_meet_between(void **state)
+{
+    (void)state;
+    enum { N_THICK = 3, N_THIN = 10 };
+    const size_t n[3] = {N_SIDE, N_SIDE, N_SIDE};
+    struct test_cylinder c[N_THICK + N_THIN];
+    struct volume v;
+    struct reconstruct_report r = {.fiber_diameter_voxel = 5.0};
+    for (int i = 0; i < N_THICK; i++)
+        c[i] = (struct test_cylinder){{32.0, 12.0 + 19.0 * i, 14.0}, {1.0, 0.1, 0.05}, 6.0};
+    for (int i = 0; i < N_THIN; i++)
+        c[N_THICK + i] =
+            (struct test_cylinder){{7.0 + 10.5 * (i % 5), 32.0, 32.0 + 14.0 * (i / 5)}, {0.1, 1.0, 0.05}, 2.2};
+    assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
+    test_fill_cylinders(&v, c, N_THICK + N_THIN, 0.1, 7);
+    for (size_t i = 0; i < volume_n_voxel(n); i++) v.density[i] = fminf(1.0f, fmaxf(0.0f, v.density[i]));
+    assert_int_equal(trace_diameter(&v, &v, reconstruct_orientation, NULL, NULL, &r, NULL), STATUS_OK);
+    print_message("diameters 4.4 and 12: from 5 to %.2f\n", r.fiber_diameter_voxel);
+    assert_true(fabs(r.fiber_diameter_voxel - 7.0) < 1e-9);
+    volume_release(&v);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_blur_is_taken_out),
         cmocka_unit_test(test_peak_stays),
         cmocka_unit_test(test_box_is_known),
+        cmocka_unit_test(test_two_diameters_meet_between),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
