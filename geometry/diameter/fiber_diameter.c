@@ -69,7 +69,7 @@ static struct energy bright_energy(const float *a, const uint8_t *far, const siz
             const uint8_t *q = far + (p - a);
             for (size_t i = 0; i + 2 < n[0]; i++) {
                 const float response = s2 * scale_minus_laplacian(p + i, sy, sz);
-                const bool counts = !(p[i] < MIN_BLURRED) & (q[i] <= NEAR_MATERIAL) & (response > 0.0f);
+                const bool counts = (p[i] >= MIN_BLURRED) & (q[i] <= NEAR_MATERIAL) & (response > 0.0f);
                 const float bright = counts ? response : 0.0f, square = bright * bright;
                 cube[i] = square * bright;
                 less[i] = square > q3 ? bright * (square - q3) : 0.0f;
