@@ -231,7 +231,7 @@ static status print_sections(const char *name, bool plain, const struct phantom_
     const struct fiber_set *f = &r->found;
     struct section_summary s;
     struct section_compare c;
-    status st = section_summary_make(f, &s, err);
+    status st = section_summary_make(f, r->report.radius_se_m[0], &s, err);
     if (st == STATUS_OK) st = compare_sections(&r->truth, f, &c, err);
     if (st == STATUS_OK)
         fprintf(

@@ -79,7 +79,8 @@ struct lists {
     struct list ratio, ratio_se, angle_se, radius_se, lumen, lumen_se;
 };
 
-static void add_fiber(const struct fiber_set *f, size_t i, struct section_summary *out, struct lists *l, double *all)
+static void add_fiber(const struct fiber_set *f, size_t i, double shared_se_m, struct section_summary *out,
+                      struct lists *l, double *all)
 {
     double variation;
     const bool varying = varies(f, i, &variation);
@@ -89,7 +90,8 @@ static void add_fiber(const struct fiber_set *f, size_t i, struct section_summar
         const struct fiber_shape *s = &f->shape[k];
         const double length = length_at(f, i, k);
         *all += length;
-        if (varying && s->radius_se > 0.0f) add(&l->radius_se, (double)(s->radius_se / s->radius), length);
+        const double se = (double)s->radius_se, own_se = sqrt(fmax(0.0, se * se - shared_se_m * shared_se_m));
+        if (varying && own_se > 0.0) add(&l->radius_se, own_se / (double)s->radius, length);
         if (s->lumen_se > 0.0f) {
             add(&l->lumen, (double)s->lumen, length);
             add(&l->lumen_se, (double)s->lumen_se, length);
@@ -126,7 +128,8 @@ static void finish(struct section_summary *out, struct lists *l, double all)
     out->variation_se_median = sorted_quantile(&l->radius_se, 0.5);
 }
 
-status section_summary_make(const struct fiber_set *f, struct section_summary *out, struct error *err)
+status section_summary_make(const struct fiber_set *f, double shared_se_m, struct section_summary *out,
+                            struct error *err)
 {
     struct lists l = {{0}};
     struct list *const list[] = {&l.ratio, &l.ratio_se, &l.angle_se, &l.radius_se, &l.lumen, &l.lumen_se};
@@ -140,7 +143,7 @@ status section_summary_make(const struct fiber_set *f, struct section_summary *o
         list[k]->item = malloc((f->n_vertex + 1) * sizeof *list[k]->item);
         failed = failed || list[k]->item == NULL;
     }
-    for (size_t i = 0; i < f->n_fiber && f->shape != NULL && !failed; i++) add_fiber(f, i, out, &l, &all);
+    for (size_t i = 0; i < f->n_fiber && f->shape != NULL && !failed; i++) add_fiber(f, i, shared_se_m, out, &l, &all);
     if (!failed) finish(out, &l, all);
     for (int k = 0; k < N_LIST; k++) free(list[k]->item);
     return failed ? error_set(err, STATUS_NO_MEMORY, "cannot summarize sections of fibers: out of memory") : STATUS_OK;

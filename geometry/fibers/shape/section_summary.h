@@ -22,7 +22,8 @@ struct section_summary {
     double variation, variation_se_median;
 };
 
-/* STATUS_NO_MEMORY. */
-status section_summary_make(const struct fiber_set *f, struct section_summary *out, struct error *err);
+/* shared_se_m: error that all radii share, which is no error of their variation; 0: none. STATUS_NO_MEMORY. */
+status section_summary_make(const struct fiber_set *f, double shared_se_m, struct section_summary *out,
+                            struct error *err);
 
 #endif

@@ -8,24 +8,20 @@
 
 bool section_report_applies(const struct report *report) { return report->in.made->fiber.shape != NULL; }
 
-/* Error of the variation of a radius along a fiber: without the error that all radii share. */
-static double variation_error(const struct report *report, const struct section_summary *s)
+/* Summary without the error that all radii share. */
+static status make_summary(const struct report *report, struct section_summary *s)
 {
     const struct reconstruct_report *g = &report->in.made->geometry;
     double shared_m = INFINITY;
-    for (int a = 0; a < 3; a++)
+    for (int a = 0; a < 3 && report->in.job->scan->given; a++)
         if (isfinite(g->radius_se_m[a])) shared_m = fmin(shared_m, g->radius_se_m[a]);
-    if (!report->in.job->scan->given || !isfinite(shared_m) || !(g->profile_radius_m > 0.0))
-        return s->variation_se_median;
-    const double shared = shared_m / g->profile_radius_m;
-    return sqrt(fmax(0.0, s->variation_se_median * s->variation_se_median - shared * shared));
+    return section_summary_make(&report->in.made->fiber, isfinite(shared_m) ? shared_m : 0.0, s, NULL);
 }
 
 json_t *section_report_json(const struct report *report)
 {
     struct section_summary s;
-    if (!section_report_applies(report) || section_summary_make(&report->in.made->fiber, &s, NULL) != STATUS_OK)
-        return json_null();
+    if (!section_report_applies(report) || make_summary(report, &s) != STATUS_OK) return json_null();
     json_t *json = json_object();
     const struct {
         const char *key;
@@ -43,7 +39,7 @@ json_t *section_report_json(const struct report *report)
                   {"lumen_median", s.lumen_median},
                   {"lumen_p90", s.lumen_p90},
                   {"lumen_error", s.lumen_se_median},
-                  {"radius_variation_error", variation_error(report, &s)}};
+                  {"radius_variation_error", s.variation_se_median}};
     for (size_t i = 0; i < sizeof figure / sizeof *figure; i++)
         json_object_set_new(json, figure[i].key, json_number(figure[i].value));
     json_object_set_new(json, "n_varying_radius", json_count(s.n_varying));
@@ -90,7 +86,7 @@ static void print_lumens(const struct section_summary *s, FILE *out)
 void section_report_table(const struct report *report, FILE *out)
 {
     struct section_summary s;
-    if (!section_report_applies(report) || section_summary_make(&report->in.made->fiber, &s, NULL) != STATUS_OK) return;
+    if (!section_report_applies(report) || make_summary(report, &s) != STATUS_OK) return;
     fputs("<h2>Sections of the fibers</h2>\n<table>\n", out);
     if (s.measured_share > 0.0) print_ratios(&s, out);
     open_row(out, "fibers whose radius varies");
@@ -99,7 +95,7 @@ void section_report_table(const struct report *report, FILE *out)
     if (s.n_varying > 0) {
         open_row(out, "variation of their radius");
         fprintf(out, "%.1f %%", 100.0 * s.variation);
-        if (isfinite(s.variation_se_median)) fprintf(out, " (error %.1f %%)", 100.0 * variation_error(report, &s));
+        if (isfinite(s.variation_se_median)) fprintf(out, " (error %.1f %%)", 100.0 * s.variation_se_median);
         close_row(out, "standard deviation along a fiber, mean over these fibers");
     }
     if (report->in.job->scan->given && report->in.made->geometry.lumen_share > 0.0) {
@@ -129,7 +125,7 @@ void section_report_plot(const struct report *report, FILE *out)
             "font-family=\"sans-serif\" font-size=\"12\" fill=\"#222\">\n<rect width=\"%d\" height=\"%d\" "
             "fill=\"#fff\"/>\n",
             WIDTH, HEIGHT, WIDTH, HEIGHT, WIDTH, HEIGHT);
-    const bool made = section_summary_make(&report->in.made->fiber, &s, NULL) == STATUS_OK;
+    const bool made = make_summary(report, &s) == STATUS_OK;
     for (int b = 0; b < SECTION_N_BIN && made; b++) most = fmax(most, s.bin_share[b]);
     const double step = most > 0.5 ? 0.2 : most > 0.2 ? 0.1 : 0.05;
     for (double y = 0.0; y <= most && made; y += step) {

@@ -204,7 +204,7 @@ static void test_summary(void **state)
     (void)state;
     struct fiber_set f = tapered(false);
     struct section_summary s;
-    assert_int_equal(section_summary_make(&f, &s, NULL), STATUS_OK);
+    assert_int_equal(section_summary_make(&f, 0.0, &s, NULL), STATUS_OK);
     assert_true(fabs(s.ratio_median - 1.6) < 1e-6 && fabs(s.flat_share - 1.0) < 1e-6 && s.n_varying == 2);
     assert_true(fabs(s.ratio_p10 - 1.2) < 1e-6 && fabs(s.ratio_p90 - 2.0) < 1e-6 &&
                 fabs(s.measured_share - 1.0) < 1e-9);
@@ -214,7 +214,7 @@ static void test_summary(void **state)
     assert_true(fabs(all - 1.0) < 1e-6);
     free(f.shape);
     f.shape = NULL;
-    assert_int_equal(section_summary_make(&f, &s, NULL), STATUS_OK);
+    assert_int_equal(section_summary_make(&f, 0.0, &s, NULL), STATUS_OK);
     assert_true(s.measured_share == 0.0 && isnan(s.ratio_median) && s.n_varying == 0);
     fiber_set_release(&f);
 }
