@@ -152,7 +152,7 @@ static status find_directions(const struct volume *v, const struct volume *known
         s = find_diameter(v, option, pool, &inner, report, err);
     if (s == STATUS_OK) s = ask_scale(v, option, report, err);
     if (s == STATUS_OK && isnan(option->fiber_diameter_voxel) && lines_tell_diameter(v, report))
-        s = trace_diameter(v, known, reconstruct_orientation_again, pool, &inner, report, err);
+        s = trace_diameter(v, known, reconstruct_orientation_again, option, pool, &inner, report, err);
     if (s != STATUS_OK) return s;
     const double edge = trace_grid_edge(report->fiber_diameter_voxel, v->n);
     report->trace_edge_voxel = edge;

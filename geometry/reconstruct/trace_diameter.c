@@ -1,6 +1,7 @@
 #include "geometry/reconstruct/trace_diameter.h"
 
 #include "geometry/diameter/fiber_diameter.h"
+#include "geometry/filter/filter_choice.h"
 #include "geometry/reconstruct/trace_box.h"
 #include "geometry/reconstruct/trace_grid.h"
 #include "geometry/reconstruct/trace_job.h"
@@ -12,8 +13,8 @@ enum { N_ROUND = 3 };
  * tenth, and lines that are thicker run through several fibers. Lines of thin fibers do so at once, and
  * never raise it. */
 static const double MOST_RISE = 1.1;
-/* Blur in voxels from which the peak is kept: the filter and the reaches of tracing then fit the blurred width better
- * (geometry/NOTES.md). */
+/* Blur in voxels from which the peak is kept, because the reaches of tracing then fit the blurred width better, and
+ * from which the filter is narrower (geometry/NOTES.md). */
 static const double STRONG_BLUR = 1.2;
 /* Diameter over the peak's that is tried where radii spread by SEVERAL_SPREAD or more: centers and radii of fibers of
  * half of it to one and a half are found. */
@@ -22,6 +23,8 @@ static const double SEVERAL_SPREAD = 0.22, THICKER = 1.4;
  * and lines of at most this length and at least this volume over those before. Fibers of one kind whose radii spread by
  * a quarter have 0.27, as before. */
 static const double TWO_SPREAD = 0.35, MORE_SPREAD = 1.25, MOST_LENGTH = 0.97, LEAST_VOLUME = 0.98;
+/* Noise over the step from void to material from which a narrower filter sees noise. */
+static const double MOST_NOISE = 0.3;
 /* Ratio of the diameters of two rounds up to which they are the same. */
 static const double SETTLED = 1.04;
 
@@ -36,6 +39,7 @@ double trace_diameter_of_lines(const struct reconstruct_report *report, double v
 struct found {
     double diameter, length, volume;
     double spread; /* of the radii, relative */
+    bool blurred;  /* strongly, and without strong noise */
 };
 
 static void sum_lines(const struct polyline_set *lines, struct found *f)
@@ -70,7 +74,9 @@ static status trace_once(const struct volume *box, trace_orientation *find, doub
     found->spread = report.radius_spread;
     sum_lines(&lines, found);
     const bool resolved = lines.n_line > 0 && report.radius_spread <= TRACE_MOST_SPREAD;
-    if (s == STATUS_OK && resolved && report.profile_blur_m < STRONG_BLUR * box->voxel_size_m[0])
+    const bool blurred = report.profile_blur_m >= STRONG_BLUR * box->voxel_size_m[0];
+    if (s == STATUS_OK && resolved && blurred) found->blurred = report.noise.scan_sd < MOST_NOISE;
+    if (s == STATUS_OK && resolved && !blurred)
         found->diameter = trace_diameter_of_lines(&report, box->voxel_size_m[0]);
     direction_volume_release(&d);
     polyline_set_release(&lines);
@@ -92,8 +98,8 @@ static status try_thicker(const struct volume *box, trace_orientation *find, con
 }
 
 status trace_diameter(const struct volume *v, const struct volume *known, trace_orientation *find,
-                      struct thread_pool *pool, const struct progress *progress, struct reconstruct_report *report,
-                      struct error *err)
+                      struct reconstruct_option *option, struct thread_pool *pool, const struct progress *progress,
+                      struct reconstruct_report *report, struct error *err)
 {
     struct volume box = {0};
     size_t from[3];
@@ -107,6 +113,7 @@ status trace_diameter(const struct volume *v, const struct volume *known, trace_
         s = trace_once(&box, find, diameter, pool, &quiet, *report, &found, err);
         if (s == STATUS_OK && round == 0 && found.spread >= SEVERAL_SPREAD)
             s = try_thicker(&box, find, &found, pool, &quiet, report, &diameter, err);
+        if (found.blurred) filter_choose_blurred(option, diameter);
         if (diameter > most) break;
         if (!(found.diameter < most && found.diameter * FIBER_DIAMETER_FINER > peak)) break;
         ratio = found.diameter / diameter;

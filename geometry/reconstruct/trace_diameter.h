@@ -19,16 +19,16 @@ typedef status trace_orientation(const struct volume *v, struct reconstruct_opti
                                  const struct progress *progress, struct direction_volume *d,
                                  struct reconstruct_report *report, struct error *err);
 
-/* Replaces report->fiber_diameter_voxel, the diameter of a peak, by the mean diameter of traced lines. A round changes
- * nothing where no lines are found, where their radii differ so much that the box does not resolve its fibers, where
- * the scan is strongly blurred, or where the result is of other fibers: thinner than the peak by FIBER_DIAMETER_FINER,
- * thicker by a tenth, or thicker at all where voxels are interpolated. Of
- * fibers with two diameters, 1.4 times the peak is taken. v: densities; known: the same volume before
- * densities were continued into its unknown voxels (volume_unknown.h). STATUS_CANCELLED, STATUS_NO_MEMORY,
- * STATUS_DISK_FULL. */
+/* Replaces report->fiber_diameter_voxel, the diameter of a peak, by the mean diameter of traced lines. A round
+ * changes nothing where no lines are found, where their radii differ so much that the box does not resolve its
+ * fibers, where the scan is strongly blurred, or where the result is of other fibers: thinner than the peak by
+ * FIBER_DIAMETER_FINER, thicker by a tenth, or thicker at all where voxels are interpolated. Of fibers with two
+ * diameters, 1.4 times the peak is taken. Where the scan is strongly blurred, option gets a narrower filter
+ * (filter_choice.h). v: densities; known: the same volume before densities were continued into its unknown voxels
+ * (volume_unknown.h). STATUS_CANCELLED, STATUS_NO_MEMORY, STATUS_DISK_FULL. */
 status trace_diameter(const struct volume *v, const struct volume *known, trace_orientation *find,
-                      struct thread_pool *pool, const struct progress *progress, struct reconstruct_report *report,
-                      struct error *err);
+                      struct reconstruct_option *option, struct thread_pool *pool, const struct progress *progress,
+                      struct reconstruct_report *report, struct error *err);
 
 /* Returns the mean diameter in voxels of the lines that a tracing has found, as the report states it. The fit has the
  * edge of a blurred plane (axis_profile.h): blur moves the edge of a single cylinder inwards by blur^2 / (2 radius),

@@ -1,6 +1,7 @@
 /* The fiber diameter without the blur of the scan: known answers. */
 #include "geometry/diameter/fiber_diameter.h"
 #include "geometry/diameter/scale_space.h"
+#include "geometry/filter/filter_choice.h"
 #include "geometry/reconstruct/reconstruct.h"
 #include "geometry/reconstruct/trace_diameter.h"
 #include "tests/support/scan/scan_files.h"
@@ -69,12 +70,14 @@ static void test_peak_stays(void **state)
     (void)state;
     struct volume v;
     struct reconstruct_report r = {.fiber_diameter_voxel = 14.0};
+    struct reconstruct_option o;
+    reconstruct_option_default(&o);
     make_bundle(&v, 7.0, 0.0, 0.5);
-    assert_int_equal(trace_diameter(&v, &v, reconstruct_orientation_again, NULL, NULL, &r, NULL), STATUS_OK);
+    assert_int_equal(trace_diameter(&v, &v, reconstruct_orientation_again, &o, NULL, NULL, &r, NULL), STATUS_OK);
     assert_true(r.fiber_diameter_voxel == 14.0);
     for (size_t i = 0; i < volume_n_voxel(v.n); i++) v.density[i] = 0.0f;
     r.fiber_diameter_voxel = 7.0;
-    assert_int_equal(trace_diameter(&v, &v, reconstruct_orientation_again, NULL, NULL, &r, NULL), STATUS_OK);
+    assert_int_equal(trace_diameter(&v, &v, reconstruct_orientation_again, &o, NULL, NULL, &r, NULL), STATUS_OK);
     assert_true(r.fiber_diameter_voxel == 7.0);
     volume_release(&v);
 }
@@ -86,6 +89,8 @@ static void test_box_is_known(void **state)
     const size_t n[3] = {N_SIDE, N_SIDE, 4 * N_SIDE};
     struct volume part, v, known;
     struct reconstruct_report r = {.fiber_diameter_voxel = 7.0};
+    struct reconstruct_option o;
+    reconstruct_option_default(&o);
     make_bundle(&part, 6.4, 0.0, 0.5);
     assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
     assert_int_equal(volume_init(&known, n, voxel_m, NULL), STATUS_OK);
@@ -94,7 +99,7 @@ static void test_box_is_known(void **state)
         if (i < size) v.density[i] = known.density[i] = part.density[i];
         if (i >= 2 * size) v.density[i] = 1.0f;
     }
-    assert_int_equal(trace_diameter(&v, &known, reconstruct_orientation_again, NULL, NULL, &r, NULL), STATUS_OK);
+    assert_int_equal(trace_diameter(&v, &known, reconstruct_orientation_again, &o, NULL, NULL, &r, NULL), STATUS_OK);
     print_message("diameter 6.4: %.2f\n", r.fiber_diameter_voxel);
     assert_true(fabs(r.fiber_diameter_voxel / 6.4 - 1.0) < 0.04);
     volume_release(&part);
@@ -112,6 +117,8 @@ static void test_two_diameters_meet_between(void **state)
     struct test_cylinder c[N_THICK + N_THIN];
     struct volume v;
     struct reconstruct_report r = {.fiber_diameter_voxel = 5.0};
+    struct reconstruct_option o;
+    reconstruct_option_default(&o);
     for (int i = 0; i < N_THICK; i++)
         c[i] = (struct test_cylinder){{32.0, 12.0 + 19.0 * i, 14.0}, {1.0, 0.1, 0.05}, 6.0};
     for (int i = 0; i < N_THIN; i++)
@@ -120,9 +127,31 @@ static void test_two_diameters_meet_between(void **state)
     assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
     test_fill_cylinders(&v, c, N_THICK + N_THIN, 0.1, 7);
     for (size_t i = 0; i < volume_n_voxel(n); i++) v.density[i] = fminf(1.0f, fmaxf(0.0f, v.density[i]));
-    assert_int_equal(trace_diameter(&v, &v, reconstruct_orientation, NULL, NULL, &r, NULL), STATUS_OK);
+    assert_int_equal(trace_diameter(&v, &v, reconstruct_orientation, &o, NULL, NULL, &r, NULL), STATUS_OK);
     print_message("diameters 4.4 and 12: from 5 to %.2f\n", r.fiber_diameter_voxel);
     assert_true(fabs(r.fiber_diameter_voxel - 7.0) < 1e-9);
+    volume_release(&v);
+}
+
+/* A strongly blurred scan keeps its peak and gets a narrower filter, but not one that is noisy too. */
+static void test_blurred_filter_is_narrow(void **state)
+{
+    (void)state;
+    const double noise[2] = {0.1, 0.4};
+    struct volume v;
+    make_bundle(&v, 7.0, 0.0, 1.6);
+    for (int k = 0; k < 2; k++) {
+        struct reconstruct_report r = {.fiber_diameter_voxel = 7.0, .noise.scan_sd = noise[k]};
+        struct reconstruct_option o, usual, narrow;
+        reconstruct_option_default(&o);
+        usual = narrow = o;
+        filter_choose(&usual, &v, 7.0);
+        filter_choose_blurred(&narrow, 7.0);
+        assert_true(narrow.s > 1.5 * usual.s && narrow.h < usual.h);
+        assert_int_equal(trace_diameter(&v, &v, reconstruct_orientation_again, &o, NULL, NULL, &r, NULL), STATUS_OK);
+        assert_true(r.fiber_diameter_voxel == 7.0);
+        assert_true(k == 0 ? o.s == narrow.s && o.h == narrow.h : isnan(o.s) && o.h == 0);
+    }
     volume_release(&v);
 }
 
@@ -133,6 +162,7 @@ int main(void)
         cmocka_unit_test(test_peak_stays),
         cmocka_unit_test(test_box_is_known),
         cmocka_unit_test(test_two_diameters_meet_between),
+        cmocka_unit_test(test_blurred_filter_is_narrow),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
