@@ -82,7 +82,8 @@ static status watch(const int *answer, size_t n, char **said, struct error *err)
     FILE *note = open_memstream(said, &n_said), *out = fopen("/dev/null", "w");
     assert_non_null(note);
     assert_non_null(out);
-    struct cli cli = {.out = out, .note = note};
+    struct cli_args args = {0};
+    struct cli cli = {.args = &args, .out = out, .note = note};
     script = answer;
     n_script = n;
     i_script = 0;
