@@ -12,7 +12,6 @@
 #include "geometry/grade/scan_noise.h"
 #include "geometry/reconstruct/lumen_lines.h"
 #include "geometry/reconstruct/reconstruct.h"
-#include "geometry/reconstruct/trace_diameter.h"
 #include "geometry/reconstruct/trace_job.h"
 
 #include <math.h>
@@ -57,7 +56,6 @@ struct refill {
     struct thread_pool *pool;
     struct progress_part tracing; /* progress of the present tracing */
     uint8_t *mark;                /* of the voxels: ENCLOSED where void was enclosed */
-    double diameter;              /* of the lines of the last tracing, voxels; NaN before the first one */
 };
 
 /* Traces lines in the volume as it is filled. report: a copy. None where voxels would be interpolated, or where nothing
@@ -71,15 +69,11 @@ static status trace_filled(struct refill *r, struct reconstruct_report *report, 
     struct progress_part part;
     const struct progress inner = progress_begin_part(&part, &tracing, 0.0, orientation_share);
     struct trace_job job = {.v = r->v, .d = &d, .o = &option, .pool = r->pool, .report = report, .part.outer = &inner};
-    const bool again = !isnan(r->diameter);
-    if (again && isnan(option.fiber_diameter_voxel)) option.fiber_diameter_voxel = r->diameter;
-    status s = (again ? reconstruct_orientation_again : reconstruct_orientation)(r->v, &option, r->pool, &inner, &d,
-                                                                                 report, err);
+    status s = reconstruct_orientation(r->v, &option, r->pool, &inner, &d, report, err);
     part = (struct progress_part){&tracing, orientation_share, (1.0 - orientation_share) / TRACE_SETTLED_END};
     if (s == STATUS_OK && report->trace_edge_voxel >= 1.0) {
         trace_job_start(&job);
         s = trace_scan(&job, false, lines, err);
-        r->diameter = trace_diameter_of_lines(report, r->v->voxel_size_m[0]);
     }
     direction_volume_release(&d);
     return s == STATUS_INVALID ? STATUS_OK : s;
@@ -145,7 +139,7 @@ status reconstruct_refill_lumens(struct volume *v, const struct reconstruct_opti
     if (s != STATUS_OK) return s;
     memset(mark, 0, volume_n_voxel(v->n));
     for (size_t i = 0; i < v->filled.n; i++) ((uint8_t *)mark)[v->filled.voxel[i]] = ENCLOSED;
-    struct refill r = {.v = v, .o = o, .pool = pool, .mark = mark, .diameter = NAN};
+    struct refill r = {.v = v, .o = o, .pool = pool, .mark = mark};
     for (int round = 0; round < N_REFILL && again && s == STATUS_OK; round++) {
         r.tracing = (struct progress_part){progress, (double)round / N_REFILL, 1.0 / N_REFILL};
         s = refill_once(&r, report, &again, err);

@@ -28,7 +28,11 @@ static const double MOST_NOISE = 0.3;
 /* Ratio of the diameters of two rounds up to which they are the same. */
 static const double SETTLED = 1.04;
 
-double trace_diameter_of_lines(const struct reconstruct_report *report, double voxel_m)
+/* Returns the mean diameter in voxels of the lines that a tracing has found, as the report states it. The fit has the
+ * edge of a blurred plane (axis_profile.h): blur moves the edge of a single cylinder inwards by blur^2 / (2 radius),
+ * while neighbours that touch it move it outwards along a part of its outline; on phantoms half of the shift is left.
+ */
+static double diameter_of_lines(const struct reconstruct_report *report, double voxel_m)
 {
     const double radius = report->profile_radius_m, blur = report->profile_blur_m;
     return 2.0 * (radius + 0.25 * blur * blur / radius) / voxel_m;
@@ -76,8 +80,7 @@ static status trace_once(const struct volume *box, trace_orientation *find, doub
     const bool resolved = lines.n_line > 0 && report.radius_spread <= TRACE_MOST_SPREAD;
     const bool blurred = report.profile_blur_m >= STRONG_BLUR * box->voxel_size_m[0];
     if (s == STATUS_OK && resolved && blurred) found->blurred = report.noise.scan_sd < MOST_NOISE;
-    if (s == STATUS_OK && resolved && !blurred)
-        found->diameter = trace_diameter_of_lines(&report, box->voxel_size_m[0]);
+    if (s == STATUS_OK && resolved && !blurred) found->diameter = diameter_of_lines(&report, box->voxel_size_m[0]);
     direction_volume_release(&d);
     polyline_set_release(&lines);
     return s == STATUS_INVALID ? STATUS_OK : s;

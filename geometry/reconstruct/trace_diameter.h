@@ -30,10 +30,4 @@ status trace_diameter(const struct volume *v, const struct volume *known, trace_
                       struct reconstruct_option *option, struct thread_pool *pool, const struct progress *progress,
                       struct reconstruct_report *report, struct error *err);
 
-/* Returns the mean diameter in voxels of the lines that a tracing has found, as the report states it. The fit has the
- * edge of a blurred plane (axis_profile.h): blur moves the edge of a single cylinder inwards by blur^2 / (2 radius),
- * while neighbours that touch it move it outwards along a part of its outline; on phantoms half of the shift is left.
- */
-double trace_diameter_of_lines(const struct reconstruct_report *report, double voxel_m);
-
 #endif
