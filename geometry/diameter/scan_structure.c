@@ -136,8 +136,11 @@ static status list_bricks(const struct volume *v, struct brick **brick, size_t *
             }
     }
     qsort(all, *n, sizeof *all, denser_first);
-    for (size_t i = 0; i<MAX_BRICK && * n> MAX_BRICK; i++) all[i] = all[i * *n / MAX_BRICK];
-    if (*n > MAX_BRICK) *n = MAX_BRICK;
+    const size_t n_all = *n;
+    if (n_all > MAX_BRICK) {
+        for (size_t i = 0; i < MAX_BRICK; i++) all[i] = all[i * n_all / MAX_BRICK];
+        *n = MAX_BRICK;
+    }
     *brick = all;
     return STATUS_OK;
 }

@@ -51,26 +51,44 @@ struct group {
     double mean, variance, length;
 };
 
+/* Sums over rows: of lengths, and of lengths times the radius and its square. */
+struct row_sum {
+    double length, radius, square;
+};
+
+static void add_row(struct row_sum *s, const struct fiber_row *row, double sign)
+{
+    s->length += sign * row->length_m;
+    s->radius += sign * row->length_m * row->radius_m;
+    s->square += sign * row->length_m * row->radius_m * row->radius_m;
+}
+
+static struct group group_of(const struct row_sum *s)
+{
+    if (!(s->length > 0.0)) return (struct group){0.0, 0.0, 0.0};
+    const double mean = s->radius / s->length;
+    return (struct group){mean, fmax(0.0, s->square / s->length - mean * mean), s->length};
+}
+
 static struct group measure(const struct fiber_row *row, size_t n)
 {
-    double length = 0.0, sum = 0.0, square = 0.0;
-    for (size_t i = 0; i < n; i++) {
-        length += row[i].length_m;
-        sum += row[i].length_m * row[i].radius_m;
-        square += row[i].length_m * row[i].radius_m * row[i].radius_m;
-    }
-    if (!(length > 0.0)) return (struct group){0.0, 0.0, 0.0};
-    return (struct group){sum / length, fmax(0.0, square / length - sum * sum / (length * length)), length};
+    struct row_sum s = {0};
+    for (size_t i = 0; i < n; i++) add_row(&s, row + i, 1.0);
+    return group_of(&s);
 }
 
 /* Returns how many of the rows, which begin with the thickest, are a kind of their own; n if there is one kind. */
 static size_t split(const struct fiber_row *row, size_t n)
 {
-    const double all = measure(row, n).length;
+    struct row_sum before = {0}, after = {0};
+    for (size_t i = 0; i < n; i++) add_row(&after, row + i, 1.0);
+    const double all = after.length;
     double least = INFINITY;
     size_t best = n;
     for (size_t i = 1; i < n; i++) {
-        const struct group thick = measure(row, i), thin = measure(row + i, n - i);
+        add_row(&before, row + i - 1, 1.0);
+        add_row(&after, row + i - 1, -1.0);
+        const struct group thick = group_of(&before), thin = group_of(&after);
         const double within = thick.length * thick.variance + thin.length * thin.variance;
         const double sd = sqrt(0.5 * (thick.variance + thin.variance));
         if (within >= least) continue;

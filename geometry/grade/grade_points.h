@@ -1,4 +1,4 @@
-/* Points along fibers in cells, to find the neighbours of a point (used only in this folder). */
+/* Points along fibers in cells, to find the neighbours of a point. */
 #ifndef SELVEDGE_GEOMETRY_GRADE_POINTS_H
 #define SELVEDGE_GEOMETRY_GRADE_POINTS_H
 

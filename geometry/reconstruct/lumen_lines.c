@@ -1,5 +1,6 @@
 #include "geometry/reconstruct/lumen_lines.h"
 
+#include "geometry/grade/grade_points.h"
 #include "geometry/reconstruct/reconstruct.h"
 #include "geometry/reconstruct/trace_box.h"
 #include "geometry/reconstruct/trace_job.h"
@@ -16,27 +17,6 @@ static const double LEAST_DIP = 0.1;
 /* Diameter over the width of the filled space: 3.0 to 4.1 in phantoms of hollow fibers. Beyond the first it is a
  * yarn's, and the second takes its place. */
 static const double MOST_WIDTHS = 4.5, USUAL_WIDTHS = 3.6;
-
-/* Density at a point, interpolated between voxel centers and constant beyond those at the faces. */
-static double density_at(const struct volume *v, const double x[3])
-{
-    size_t low[3], high[3];
-    double f[3], sum = 0.0;
-    for (int a = 0; a < 3; a++) {
-        const double c = fmin(fmax(x[a] - 0.5, 0.0), (double)(v->n[a] - 1));
-        low[a] = (size_t)c;
-        high[a] = low[a] + 1 < v->n[a] ? low[a] + 1 : low[a];
-        f[a] = c - (double)low[a];
-    }
-    for (int corner = 0; corner < 8; corner++) {
-        const bool up[3] = {(corner & 1) != 0, (corner & 2) != 0, (corner & 4) != 0};
-        double weight = 1.0;
-        for (int a = 0; a < 3; a++) weight *= up[a] ? f[a] : 1.0 - f[a];
-        sum += weight * (double)v->density[volume_index(v->n, up[0] ? high[0] : low[0], up[1] ? high[1] : low[1],
-                                                        up[2] ? high[2] : low[2])];
-    }
-    return sum;
-}
 
 /* Two unit vectors perpendicular to the unit vector t and to each other. */
 static void frame_of(const float t[3], double e[2][3])
@@ -66,7 +46,7 @@ static void add_rings(const struct volume *v, const struct polyline_set *lines, 
             double x[3];
             for (int a = 0; a < 3; a++)
                 x[a] = (double)lines->vertex[i][a] + r * (cos(angle) * e[0][a] + sin(angle) * e[1][a]);
-            ring[g] += density_at(v, x) / N_AROUND;
+            ring[g] += grade_density_at(v, x) / N_AROUND;
         }
 }
 

@@ -57,9 +57,9 @@ static void warn_lumens(const struct warning_sink *warn, const struct reconstruc
     if (r->lumens_found)
         warning_send(
             warn, OPTION_HOLLOW_FIBERS,
-            "the fibers are hollow: voids in the middle of fibers are %.2f %% of the material, and traced lines are "
-            "dark "
-            "along their axes, so void that is enclosed was filled before tracing; give false if they are solid",
+            "the fibers are hollow: voids in the middle of fibers are %.2f %% of the material, and traced lines "
+            "are dark along their axes, so void that is enclosed was filled before tracing; give false if they are "
+            "solid",
             percent);
     else if (o->hollow_fibers <= 0 && verdict != LUMENS_NOT_SEEN)
         warning_send(

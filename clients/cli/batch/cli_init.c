@@ -158,6 +158,7 @@ static status add_measurements(struct init *i, struct error *err)
     if (s == STATUS_OK) s = only_file(i, FILE_CHART, &chart, err);
     if (s == STATUS_OK) s = only_file(i, FILE_WHITE, &white, err);
     if (s != STATUS_OK) return s;
+    const char *const for_photographs[] = {rig, noise, chart, white};
     const bool photographed = folder_kinds_count(&i->kinds, FILE_PHOTOGRAPH, NULL) > 0;
     if (photographed && table != NULL)
         return error_set(err, STATUS_INVALID,
@@ -171,6 +172,12 @@ static status add_measurements(struct init *i, struct error *err)
         json_object_set_new(i->document, "color", json_pack("{s:{s:s}}", "chart", "file", chart));
     else if (photographed && white != NULL)
         json_object_set_new(i->document, "color", json_pack("{s:{s:s}}", "white", "file", white));
+    if (i->out == NULL) return STATUS_OK;
+    if (photographed && chart != NULL && white != NULL)
+        fprintf(i->out, "not used: '%s', because the color chart gives the scale\n", white);
+    for (size_t n = 0; !photographed && n < sizeof for_photographs / sizeof *for_photographs; n++)
+        if (for_photographs[n] != NULL)
+            fprintf(i->out, "not used: '%s', because there are no photographs\n", for_photographs[n]);
     return STATUS_OK;
 }
 

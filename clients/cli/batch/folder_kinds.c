@@ -17,7 +17,7 @@ const char *const file_kind_name[FILE_N_KIND] = {"not used",
                                                  "color chart",
                                                  "white card",
                                                  "dark frame",
-                                                 "flat frame",
+                                                 "flat frame, not used by a job: `selvedge calibrate-camera`",
                                                  "fibers",
                                                  "draft",
                                                  "rig",
@@ -91,7 +91,7 @@ static bool ends_in(const char *name, const char *ending)
     return n > n_ending && strcmp(name + n - n_ending, ending) == 0;
 }
 
-/* A TIFF file, whose kind its ending does not tell, is a photograph if its name has angles or a view of the rig. */
+/* A picture is a photograph of the cloth if its name has angles or a view of the rig. */
 static bool is_named_as_photograph(const struct folder_kinds *k, const char *name, const char *pattern)
 {
     char stem[NAME_ROOM];
@@ -109,16 +109,18 @@ static enum file_kind kind_of(const struct folder_kinds *k, const char *name, co
     lower(name, small);
     const bool is_tiff = ends_in(small, ".tif") || ends_in(small, ".tiff");
     if (kind == FILE_PHOTOGRAPH) {
+        /* first, because the cloth may be dark or white */
+        if (is_named_as_photograph(k, name, pattern)) return FILE_PHOTOGRAPH;
         for (size_t i = 0; i < sizeof by_word / sizeof *by_word; i++)
             if (strstr(small, by_word[i].word) != NULL) return by_word[i].kind;
-        if (!is_tiff || is_named_as_photograph(k, name, pattern)) return FILE_PHOTOGRAPH;
+        if (!is_tiff) return FILE_PHOTOGRAPH;
     } else if (kind != FILE_UNKNOWN) {
         return kind;
     }
     return volume_format_of(name) != NULL ? FILE_SCAN : FILE_UNKNOWN;
 }
 
-/* Samples beside a header are not a scan of their own, and a text beside other things is no scan at all. */
+/* Samples beside a header are not a scan of their own. */
 static void settle_scans(struct folder_kinds *k)
 {
     size_t n_header = 0;

@@ -71,6 +71,20 @@ def test_photographs_by_name(folder):
     assert made["photographs"][2] == {"file": "t40_p90.png", "light_theta_deg": 40, "light_phi_deg": 90, "camera_theta_deg": 0, "camera_phi_deg": 0}
 
 
+def test_a_dark_cloth_and_files_without_use(folder):
+    for name in ("dark-blue_t10_p0.png", "dark-blue_t50_p0.png"):
+        picture(folder / name)
+    for name in ("white.png", "chart.png", "flat-1.png"):
+        picture(folder / name)
+    said = init(folder, "--weave", "plain", expect=1)  # the chart shows no patches
+    assert [p["file"] for p in document(folder)["photographs"]] == ["dark-blue_t10_p0.png", "dark-blue_t50_p0.png"]
+    assert "not used: 'white.png'" in said and "calibrate-camera" in next(x for x in said.splitlines() if "flat-1" in x)
+    for name in ("dark-blue_t10_p0.png", "dark-blue_t50_p0.png", "white.png", "job.json"):
+        (folder / name).unlink()
+    table(folder / "rows.csv")
+    assert "not used: 'chart.png', because there are no photographs" in init(folder, "--weave", "plain")
+
+
 def test_exposures_and_a_pattern_of_ones_own(folder):
     for name in ("a-10-0-short.png", "a-10-0-long.png", "a-50-0-short.png", "a-50-0-long.png"):
         picture(folder / name)
