@@ -1,6 +1,7 @@
 #include "server/main/webhook.h"
 #include "base/clock.h"
 #include "base/version.h"
+#include "server/files/worker_files.h"
 #include "server/settings/secret_file.h"
 #include "server/store/store_cluster.h"
 #include "server/store/store_delivery.h"
@@ -96,8 +97,23 @@ static int on_progress(void *context, curl_off_t a, curl_off_t b, curl_off_t c, 
     return atomic_load(&w->stop);
 }
 
-/* The body of a delivery: the same bytes at every try. NULL when memory is out. */
-static char *body_of(const struct delivery_row *d)
+/* Returns {"code", "words"}, or null without a verdict. The words are in the job's folder as long as the job keeps this
+ * verdict; afterwards the code stands for them. */
+static json_t *verdict_of(const char *data, const struct delivery_row *d)
+{
+    if (d->verdict[0] == '\0') return json_null();
+    json_t *st = worker_status_read(data, d->job_id), *there = json_object_get(st, "verdict");
+    const char *code = json_string_value(json_object_get(there, "code")),
+               *words = json_string_value(json_object_get(there, "words"));
+    bool same = code != NULL && words != NULL && strcmp(code, d->verdict) == 0;
+    json_t *out = json_pack("{s:s,s:s}", "code", d->verdict, "words", same ? words : d->verdict);
+    json_decref(st);
+    return out;
+}
+
+/* Returns the body of a delivery: the same bytes at every try while the job is not run again. NULL when memory is out.
+ * The caller frees it. */
+static char *body_of(const char *data, const struct delivery_row *d)
 {
     char event[32], url[80];
     const char *state = job_state_name(d->job_state);
@@ -106,8 +122,9 @@ static char *body_of(const struct delivery_row *d)
     json_t *error = d->error_code[0] == '\0' ? json_null()
                                              : json_pack("{s:s,s:s,s:s}", "code", d->error_code, "field",
                                                          d->error_field, "text", d->error_text);
-    json_t *job = json_pack("{s:s,s:s,s:s,s:I,s:o,s:s}", "id", d->job_id, "sample", d->sample, "state", state,
-                            "attempt", (json_int_t)d->attempt, "error", error, "url", url);
+    json_t *job =
+        json_pack("{s:s,s:s,s:s,s:I,s:o,s:o,s:s}", "id", d->job_id, "sample", d->sample, "state", state, "attempt",
+                  (json_int_t)d->attempt, "error", error, "verdict", verdict_of(data, d), "url", url);
     json_t *body = json_pack("{s:s,s:s,s:f,s:o}", "delivery", d->id, "event", event, "created_unix_s",
                              d->created_unix_s, "job", job);
     char *text = body == NULL ? NULL : json_dumps(body, JSON_COMPACT);
@@ -135,7 +152,7 @@ static bool post(struct webhook *w, struct delivery_row *d)
     const struct settings *s = w->use.settings;
     size_t n_answer = 0;
     long code = 0;
-    char *body = body_of(d);
+    char *body = body_of(s->data, d);
     struct curl_slist *headers = body == NULL ? NULL : headers_of(w, d, body);
     CURL *c = w->curl;
     curl_easy_reset(c);

@@ -6,7 +6,7 @@
 
 #define COLUMNS                                                                                                        \
     "serial, id, job_id, sample, job_state, attempt, error_code, error_field, error_text, created, state, tries, "     \
-    "next, status, error, delivered"
+    "next, status, error, delivered, verdict"
 
 static void read_row(struct store_query *q, struct delivery_row *row)
 {
@@ -27,6 +27,7 @@ static void read_row(struct store_query *q, struct delivery_row *row)
     row->http_status = store_int64(q, 13);
     store_text(q, 14, row->error, sizeof row->error);
     row->delivered_unix_s = store_real(q, 15);
+    store_text(q, 16, row->verdict, sizeof row->verdict);
 }
 
 /* One statement that changes something, under the lock. */

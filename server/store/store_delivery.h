@@ -16,6 +16,7 @@ struct delivery_row {
     enum job_state job_state;
     int64_t attempt;
     char error_code[32], error_field[160], error_text[1024]; /* error_code "": none */
+    char verdict[40];                                        /* its code; "": none */
     double created_unix_s;
     /* state of the delivery */
     enum delivery_state state;

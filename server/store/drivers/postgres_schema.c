@@ -90,8 +90,20 @@ static const char *const version_1[] = {
     "CREATE TRIGGER job_news AFTER INSERT OR UPDATE OR DELETE ON job FOR EACH ROW EXECUTE FUNCTION job_is_news();",
     NULL};
 
+/* The code of the verdict in deliveries, for jobs that have succeeded. */
+static const char *const version_2[] = {
+    "ALTER TABLE delivery ADD COLUMN verdict" TEXT_COLUMN " DEFAULT '';"
+    "CREATE OR REPLACE FUNCTION job_has_ended() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN"
+    " IF EXISTS (SELECT 1 FROM webhook) THEN"
+    " INSERT INTO delivery (id, job_id, job_state, sample, attempt, error_code, error_field, error_text, created,"
+    " state, tries, next, status, error, delivered, owner, verdict) VALUES (NEW.id || '.' || NEW.revision, NEW.id,"
+    " NEW.state, NEW.sample, NEW.attempt, NEW.error_code, NEW.error_field, NEW.error_text, NEW.updated, 0, 0,"
+    " NEW.updated, 0, '', 0, NEW.owner, CASE NEW.state WHEN 4 THEN NEW.verdict ELSE '' END); END IF; RETURN NULL;"
+    " END $$;",
+    NULL};
+
 /* Entry i changes the schema from version i to version i + 1, by one script after the other. */
-static const char *const *const migration[] = {version_1};
+static const char *const *const migration[] = {version_1, version_2};
 
 const char *const *const *store_postgres_migrations(int *n)
 {

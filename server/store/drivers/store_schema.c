@@ -156,6 +156,16 @@ static const char *const migration[] = {
     " AND OLD.state <> 2; END;"
     "CREATE TRIGGER turn_job_removed AFTER DELETE ON job WHEN OLD.deleted = 0 AND OLD.state = 1 BEGIN"
     " UPDATE turn SET queued = queued - 1 WHERE owner = OLD.owner AND batch = OLD.batch; END;",
+    /* the code of the verdict in deliveries, for jobs that have succeeded */
+    "ALTER TABLE delivery ADD COLUMN verdict TEXT NOT NULL DEFAULT '';"
+    "DROP TRIGGER job_ended;"
+    "CREATE TRIGGER job_ended AFTER UPDATE OF state ON job WHEN NEW.state <> OLD.state AND NEW.state IN (4, 5, 6)"
+    " AND NEW.deleted = 0 AND EXISTS (SELECT 1 FROM webhook) BEGIN"
+    " INSERT INTO delivery (id, job_id, job_state, sample, attempt, error_code, error_field, error_text, created, "
+    "state,"
+    " tries, next, status, error, delivered, owner, verdict) VALUES (NEW.id || '.' || NEW.revision, NEW.id, NEW.state,"
+    " NEW.sample, NEW.attempt, NEW.error_code, NEW.error_field, NEW.error_text, NEW.updated, 0, 0, NEW.updated, 0, '',"
+    " 0, NEW.owner, CASE NEW.state WHEN 4 THEN NEW.verdict ELSE '' END); END;",
 };
 
 const char *const *store_migrations(int *n)

@@ -1,11 +1,10 @@
 """The list of jobs: filters, orders, pages, rows and digests, tags, actions on many jobs, and the forecast of the queue."""
-import contextlib
 import os
-import sqlite3
 import time
 
 import pytest
 from daemon_under_test import document
+from servers.old_database import make_older
 
 
 @pytest.fixture(scope="module")
@@ -165,20 +164,7 @@ def test_an_older_database_gets_its_verdicts(daemon_maker):
         text = f.read()
     with open(status, "w") as f:
         f.write(text.rstrip().rstrip("}") + ', "verdict": {"code": "usable", "words": "usable with reservations", "text": "."}}')
-    with contextlib.closing(sqlite3.connect(os.path.join(daemon.data, "selvedge.db"))) as db:
-        for index in ("job_finished", "job_sample", "file_content"):
-            db.execute(f"DROP INDEX {index}")
-        for trigger in ("use_version_changed", "use_job_hidden", "use_job_removed", "turn_job_added", "turn_job_changed", "turn_job_removed"):
-            db.execute(f"DROP TRIGGER {trigger}")
-        db.execute("DROP TABLE batch")
-        db.execute("DROP TABLE turn")
-        db.execute("DROP INDEX job_batch")
-        db.execute("DROP INDEX job_turn")
-        db.execute("CREATE INDEX job_turn ON job (owner, priority DESC, queued, serial) WHERE deleted = 0 AND state = 1")
-        for column in ("tags", "verdict", "version_bytes", "batch", "batch_place"):
-            db.execute(f"ALTER TABLE job DROP COLUMN {column}")
-        db.execute("PRAGMA user_version = 4")
-        db.commit()
+    make_older(os.path.join(daemon.data, "selvedge.db"), 4)
     daemon.start()
     (row,) = daemon.get("/v1/jobs?view=row&verdict=usable").json()["jobs"]
     assert row["id"] == job and row["verdict"] == {"code": "usable", "words": "usable with reservations"}

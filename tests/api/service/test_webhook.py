@@ -2,14 +2,16 @@
 import hmac
 import http.server
 import json
+import os
 import socket
 import subprocess
 import threading
 import time
 
 import pytest
-from daemon_under_test import program, wait_until
+from daemon_under_test import DOCUMENT, FAKE_WORKER, FILES, ROOT, program, wait_until
 
+CLIENT_WORKER = os.path.join(ROOT, "tests", "support", "python", "client_stub_worker.py")
 SECRET = b"a secret of the laboratory"
 
 
@@ -56,13 +58,13 @@ def service(daemon_maker, tmp_path):
     """service(answer, **settings): a daemon and the receiver of its webhook."""
     made = []
 
-    def make(answer=None, secret_mode=0o600, **settings):
+    def make(answer=None, secret_mode=0o600, worker=FAKE_WORKER, **settings):
         secret = tmp_path / "secret"
         secret.write_bytes(SECRET + b"\n")
         secret.chmod(secret_mode)
         made.append(Receiver(answer))
         options = {"webhook.url": made[-1].url, "webhook.secret_file": secret, "webhook.retry_s": 1, "webhook.timeout_s": 30}
-        return daemon_maker(options={**options, **{"webhook." + k: v for k, v in settings.items()}}), made[-1]
+        return daemon_maker(options={**options, **{"webhook." + k: v for k, v in settings.items()}}, worker=worker), made[-1]
 
     yield make
     for r in made:
@@ -102,6 +104,20 @@ def test_every_end_of_a_job_is_delivered_once(service):
     page = d.get("/v1/deliveries?limit=2").json()
     rest = d.get("/v1/deliveries", params={"limit": 2, "cursor": page["next_cursor"]}).json()
     assert [x["id"] for x in page["deliveries"] + rest["deliveries"]] == [x["id"] for x in listed] and rest["next_cursor"] is None
+
+
+@pytest.mark.parametrize("code, words", [("good", "good"), ("does_not_describe_this_cloth", "does not describe this cloth"), (None, None)])
+def test_a_delivery_has_the_verdict(service, code, words):
+    """Code and words, as the job has them; null where the job ended without one."""
+    d, receiver = service(worker=CLIENT_WORKER)
+    job = d.create(dict(DOCUMENT, sample={"good": "good twill", None: "plain twill"}.get(code, "bad twill")))
+    for name, (role, data) in FILES.items():
+        d.upload(job, name, data, role)
+    assert d.post(f"/v1/jobs/{job}/start").status_code == 202
+    only(d, "delivered")
+    said = json.loads(receiver.got[0][1])["job"]
+    assert said["id"] == job and said["verdict"] == (None if code is None else {"code": code, "words": words})
+    assert (d.job(job)["verdict"] or {}).get("words") == words
 
 
 @pytest.mark.slow

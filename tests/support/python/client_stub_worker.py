@@ -57,7 +57,8 @@ def verdict(sample):
     known = {"good": "good", "usable": "usable with reservations", "bad": "does not describe this cloth"}
     if code not in known:
         return None
-    return {"code": "does_not_describe_this_cloth" if code == "bad" else code, "words": known[code], "text": "A stub says so.", "reservations": []}
+    return {"code": "does_not_describe_this_cloth" if code == "bad" else code, "words": known[code], "text": "A stub says so.", "judged_by": "held_out",
+            "rel_rms": 0.03, "rel_rms_se": 0.001, "allowed_rel_rms": 0.02, "one_color_rel_rms": 0.4, "plain_brdf_rel_rms": 0.1, "reservations": []}
 
 
 def series(step):

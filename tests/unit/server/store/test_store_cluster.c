@@ -330,48 +330,6 @@ static void test_texts_that_are_cut_within_a_character_can_be_stored(void **stat
     assert_string_equal(row.error_text, "the worker said: ?");
 }
 
-/* ---- the schema */
-
-/* Lists the columns of all tables as "table.column ", sorted by bytes. */
-static void columns_of(struct store *store, const char *sql, char *out, size_t n_out)
-{
-    struct store_query *q = NULL;
-    size_t n = 0;
-    assert_int_equal(store_prepare(&store->read, &q, NULL, sql, ""), STATUS_OK);
-    while (store_step(q) == STORE_ROW && n < n_out)
-        n += (size_t)snprintf(out + n, n_out - n, "%s ", store_column_text(q, 0));
-    store_finish(q);
-}
-
-static void test_both_databases_have_the_same_columns(void **state)
-{
-    struct fixture *f = *state;
-    static char embedded[8192], shared[8192];
-    char folder[] = "/tmp/selvedge-schema-XXXXXX", path[96];
-    struct store *store = NULL;
-    assert_non_null(mkdtemp(folder));
-    snprintf(path, sizeof path, "%s/selvedge.db", folder);
-    assert_int_equal(store_open(path, &store, NULL), STATUS_OK);
-    /* job_count and owner_use are views of PostgreSQL, turn.queued is counted there, and the rest is about daemons */
-    columns_of(
-        store,
-        "SELECT m.name || '.' || c.name FROM sqlite_schema m JOIN pragma_table_info(m.name) c WHERE m.type = 'table' "
-        "AND m.name NOT LIKE 'sqlite%' AND m.name NOT IN ('job_count', 'owner_use') AND NOT (m.name = 'turn' AND "
-        "c.name = 'queued') ORDER BY 1",
-        embedded, sizeof embedded);
-    columns_of(
-        f->one,
-        "SELECT (table_name || '.' || column_name) COLLATE \"C\" FROM information_schema.columns WHERE table_schema "
-        "= 'public' AND table_name NOT IN ('job_count', 'owner_use', 'daemon', 'duty', 'identity', 'store_version') "
-        "AND NOT (table_name = 'job' AND column_name = 'holder') ORDER BY 1",
-        shared, sizeof shared);
-    assert_true(strlen(embedded) > 500);
-    assert_string_equal(embedded, shared);
-    store_close(store);
-    unlink(path);
-    rmdir(folder);
-}
-
 static int run(const char *database)
 {
 #define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
@@ -388,7 +346,6 @@ static int run(const char *database)
         TEST(test_a_connection_that_was_lost_may_have_missed_changes),
         cmocka_unit_test(test_a_password_in_a_malformed_address_is_not_quoted),
         TEST(test_texts_that_are_cut_within_a_character_can_be_stored),
-        TEST(test_both_databases_have_the_same_columns),
     };
 #undef TEST
     return cmocka_run_group_tests_name(database, tests, NULL, NULL);

@@ -265,6 +265,7 @@ static void end_job(struct store *store, const char *id, enum job_state how, int
     snprintf(row.error_code, sizeof row.error_code, "code");
     snprintf(row.error_field, sizeof row.error_field, "field");
     snprintf(row.error_text, sizeof row.error_text, "text");
+    snprintf(row.verdict, sizeof row.verdict, "good");
     assert_int_equal(store_job_update(store, &row, NULL), STATUS_OK);
 }
 
@@ -308,6 +309,7 @@ static void test_deliveries(void **state)
     assert_true(strcmp(d.job_id, job_one) == 0 && strcmp(d.sample, "sample 2") == 0 && d.created_unix_s > 0);
     assert_true(strcmp(d.error_code, "code") == 0 && strcmp(d.error_field, "field") == 0 && d.id[0] != '\0');
     assert_string_equal(d.error_text, "text");
+    assert_string_equal(d.verdict, ""); /* a verdict of the run before, which this failed run has nothing to do with */
     d.n_try = 3;
     d.next_unix_s = 4e9; /* the others come first */
     d.http_status = 503;
@@ -323,6 +325,7 @@ static void test_deliveries(void **state)
     assert_true(n == 3 && list[0].attempt == 4 && list[1].attempt == 3 && list[2].attempt == 2);
     assert_true(list[1].state == DELIVERY_DELIVERED && list[1].delivered_unix_s == 55 && list[2].http_status == 503);
     assert_true(list[2].n_try == 3 && list[2].next_unix_s == 4e9 && strcmp(list[2].error, "busy") == 0);
+    assert_string_equal(list[0].verdict, "good");
     const int64_t newest = list[0].serial;
     free(list);
     check_selections(store, newest);
