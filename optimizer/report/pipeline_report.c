@@ -1,6 +1,8 @@
 /* Stage "report": everything under results/. The numbers are written first, so that they can be looked at while
  * pictures are rendered. */
+#include "base/clock.h"
 #include "base/option_id.h"
+#include "base/process.h"
 #include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/report/export/exports.h"
@@ -10,6 +12,7 @@
 #include "optimizer/report/quality.h"
 #include "optimizer/report/report_page.h"
 #include "optimizer/report/report_pdf.h"
+#include "optimizer/report/report_work.h"
 #include "optimizer/report/result/profile_report.h"
 #include "optimizer/report/result/result_json.h"
 #include "optimizer/report/result/result_pictures.h"
@@ -33,6 +36,54 @@ static void warn_of_overlap(const struct report *report)
         job_option_key(OPTION_CLOTH), 100.0 * report->in.made->report.overlap_mean);
 }
 
+/* ---- parts, whose ends are steps of the stage's progress and lines of the log ---- */
+
+static double before(const struct report *report, enum report_part part)
+{
+    return report_work_before(report->in.work_s, part);
+}
+
+static double after(const struct report *report, enum report_part part) { return before(report, part + 1); }
+
+/* Ends a part, in which s was returned. Returns s. */
+static status done(struct report *report, enum report_part part, const char *name, status s)
+{
+    const double now_s = clock_monotonic_s(), cpu_s = process_use().cpu_s;
+    if (s != STATUS_OK) return s;
+    progress_report(&report->in.job->tools->progress, after(report, part));
+    log_info(report->in.job->tools->log, "report, %s: %.2f s, processor %.2f s, expected %.2f s", name,
+             now_s - report->part_from_s, cpu_s - report->part_from_cpu_s, report->in.work_s[part]);
+    report->part_from_s = now_s;
+    report->part_from_cpu_s = cpu_s;
+    return STATUS_OK;
+}
+
+static status write_geometry(struct report *report, struct error *err)
+{
+    status s = result_geometry_write(report, err);
+    if (s == STATUS_OK) s = quality_write(report, err);
+    return done(report, REPORT_GEOMETRY, "geometry", s);
+}
+
+static status write_surfaces(struct report *report, struct error *err)
+{
+    status s = surface_pictures_write(report, before(report, REPORT_SURFACES), after(report, REPORT_SURFACES), err);
+    return done(report, REPORT_SURFACES, "pictures", s);
+}
+
+static status write_twin(struct report *report, struct error *err)
+{
+    status s = twin_result_write(report, before(report, REPORT_TWIN), after(report, REPORT_TWIN), err);
+    return done(report, REPORT_TWIN, "twin", s);
+}
+
+static status write_pages(struct report *report, struct error *err)
+{
+    status s = report_write(report, err);
+    if (s == STATUS_OK) s = report_pdf_write(report, err);
+    return done(report, REPORT_PAGES, "pages", s);
+}
+
 /* Writes the results of a job that ends with the geometry. */
 static status report_geometry(struct report *report, struct error *err)
 {
@@ -41,10 +92,8 @@ static status report_geometry(struct report *report, struct error *err)
     pipeline_reach_verdict(report);
     status s = result_geometry_json_write(report, err);
     if (s == STATUS_OK) s = result_summary_write(report, err);
-    if (s == STATUS_OK) s = result_geometry_write(report, err);
-    if (s == STATUS_OK) s = quality_write(report, err);
-    if (s == STATUS_OK) s = report_write(report, err);
-    return s == STATUS_OK ? report_pdf_write(report, err) : s;
+    if (s == STATUS_OK) s = write_geometry(report, err);
+    return s == STATUS_OK ? write_pages(report, err) : s;
 }
 
 /* Writes the results of a job that renders given parameters. */
@@ -52,17 +101,13 @@ static status report_pictures(struct report *report, struct error *err)
 {
     warn_of_overlap(report);
     report_pdf_warn(report);
-    status s = result_geometry_write(report, err);
-    if (s == STATUS_OK) s = quality_write(report, err);
-    double on_surfaces = surface_pictures_paths(report->in.results),
-           until = on_surfaces / (on_surfaces + twin_result_paths(report->in.results));
-    if (s == STATUS_OK) s = surface_pictures_write(report, 0.0, until, err);
-    if (s == STATUS_OK) s = twin_result_write(report, until, 1.0, err);
+    status s = write_geometry(report, err);
+    if (s == STATUS_OK) s = write_surfaces(report, err);
+    if (s == STATUS_OK) s = write_twin(report, err);
     if (s == STATUS_OK) pipeline_reach_verdict(report);
     if (s == STATUS_OK) s = result_pictures_json_write(report, err);
     if (s == STATUS_OK) s = result_summary_write(report, err);
-    if (s == STATUS_OK) s = report_write(report, err);
-    return s == STATUS_OK ? report_pdf_write(report, err) : s;
+    return s == STATUS_OK ? write_pages(report, err) : s;
 }
 
 /* Writes the results of a job with the profile of a single fiber. */
@@ -80,8 +125,7 @@ static status use_best(struct report *report, struct error *err)
     return pipeline_cloth_use(report->in.job, &report->in.fit[best], best, report->in.made, err);
 }
 
-/* Writes the results of a job that fits models to rows. */
-static status report_fit(struct report *report, struct error *err)
+static status find(struct report *report, struct error *err)
 {
     status s = pipeline_certify(report, err);
     if (s == STATUS_OK) s = pipeline_rank_candidates(report, err);
@@ -93,20 +137,25 @@ static status report_fit(struct report *report, struct error *err)
     if (s == STATUS_OK) pipeline_reach_verdict(report);
     if (s == STATUS_OK) s = result_json_write(report, err);
     if (s == STATUS_OK) s = result_summary_write(report, err);
-    if (s == STATUS_OK) s = result_geometry_write(report, err);
-    if (s == STATUS_OK) s = quality_write(report, err);
-    double n_fit_path = (double)report->model[report_best_model(report)].fit->result.n_path;
-    double done = result_renderings_paths(report->in.results, report->in.job->rows->observation.n, n_fit_path),
-           on_surfaces = done + surface_pictures_paths(report->in.results),
-           all = on_surfaces + twin_result_paths(report->in.results), first = 0.1,
-           rest = all > 0.0 ? (1.0 - first) / all : 0.0;
-    if (s == STATUS_OK) s = result_renderings_write(report, first, first + rest * done, err);
-    if (s == STATUS_OK) s = surface_pictures_write(report, first + rest * done, first + rest * on_surfaces, err);
-    if (s == STATUS_OK) s = twin_result_write(report, first + rest * on_surfaces, 1.0, err);
-    if (s == STATUS_OK) s = exports_write(report, err);
+    return done(report, REPORT_FINDINGS, "findings", s);
+}
+
+/* Writes the results of a job that fits models to rows. */
+static status report_fit(struct report *report, struct error *err)
+{
+    status s = find(report, err);
+    if (s == STATUS_OK) s = write_geometry(report, err);
+    if (s == STATUS_OK)
+        s = done(
+            report, REPORT_RENDERINGS, "renderings",
+            result_renderings_write(report, before(report, REPORT_RENDERINGS), after(report, REPORT_RENDERINGS), err));
+    if (s == STATUS_OK) s = write_surfaces(report, err);
+    if (s == STATUS_OK) s = write_twin(report, err);
+    if (s == STATUS_OK)
+        s = done(report, REPORT_EXPORTS, "exports",
+                 exports_write(report, before(report, REPORT_EXPORTS), after(report, REPORT_EXPORTS), err));
     if (s == STATUS_OK) s = result_json_write(report, err);
-    if (s == STATUS_OK) s = report_write(report, err);
-    return s == STATUS_OK ? report_pdf_write(report, err) : s;
+    return s == STATUS_OK ? write_pages(report, err) : s;
 }
 
 static status run(struct report *report, struct error *err)
@@ -140,6 +189,8 @@ status stage_report(const struct report_input *in, struct report_output *out, st
     if (report == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the results: out of memory");
     report->in = *in;
     report->n_model = n_model;
+    report->part_from_s = clock_monotonic_s();
+    report->part_from_cpu_s = process_use().cpu_s;
     report->exports = json_array();
     report->surface_pictures = json_array();
     report->advice = calloc(n_model + 1, sizeof *report->advice);

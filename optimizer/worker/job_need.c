@@ -1,4 +1,5 @@
 #include "optimizer/worker/job_need.h"
+#include "base/clock.h"
 #include "optimizer/job/document/job_cloth.h"
 #include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/document/json_number.h"
@@ -178,7 +179,7 @@ static json_t *stages_json(struct job_plan *plan)
 {
     size_t n_stage;
     const struct pipeline_stage_info *info = pipeline_stage_table(&n_stage);
-    json_t *list = json_array();
+    json_t *list = json_pack("[{s:s, s:o}]", "name", "inputs", "wall_s", json_number(plan->inputs_s));
     for (size_t i = 0; i < n_stage; i++)
         if (pipeline_stage_applies(&info[i], plan->in->kind, plan->in->section.scan->given))
             json_array_append_new(list, json_pack("{s:s, s:o}", "name", info[i].name, "wall_s",
@@ -193,13 +194,14 @@ static json_t *needs_json(struct job_plan *plan, const struct speed_book *book)
     plan_stages(plan);
     const struct job_clock_look look = worker_status_look(plan->status);
     const struct job_need need = expected(plan, book);
-    const bool certain = isnan(look.eta_low_s); /* a range that is narrow is not stated by the clock */
+    const double least_s = plan->inputs_s + look.eta_s * exp(-look.spread),
+                 most_s = plan->inputs_s + look.eta_s * exp(look.spread);
     return json_pack("{s:n, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "error", "n_thread",
-                     json_count(thread_pool_n_thread(plan->tools->pool)), "wall_s", json_number(look.eta_s),
-                     "wall_low_s", json_number(certain ? look.eta_s : look.eta_low_s), "wall_high_s",
-                     json_number(certain ? look.eta_s : look.eta_high_s), "cpu_s", json_number(need.cpu_s),
-                     "memory_bytes", json_number(need.memory_bytes), "disk_bytes", json_number(need.disk_bytes),
-                     "stages", stages_json(plan));
+                     json_count(thread_pool_n_thread(plan->tools->pool)), "wall_s",
+                     json_number(plan->inputs_s + look.eta_s), "wall_low_s", json_number(least_s), "wall_high_s",
+                     json_number(most_s), "cpu_s", json_number(need.cpu_s), "memory_bytes",
+                     json_number(need.memory_bytes), "disk_bytes", json_number(need.disk_bytes), "stages",
+                     stages_json(plan));
 }
 
 static status read_and_plan(struct stage_tools *tools, struct job_inputs *in, const struct speed_book *book,
@@ -208,8 +210,10 @@ static status read_and_plan(struct stage_tools *tools, struct job_inputs *in, co
     struct error fault = {0};
     struct job_plan plan;
     size_t n[3] = {0, 0, 0};
+    const double from_s = clock_monotonic_s();
     status s = job_inputs_read(tools, in, &fault);
     job_plan_init(&plan, tools, in);
+    plan.inputs_s = clock_monotonic_s() - from_s;
     if (s == STATUS_OK && in->section.scan->n_file > 0) s = scan_size(tools->folder, in->section.scan, n, &fault);
     memcpy(plan.geometry.n, n, sizeof n);
     *report = s == STATUS_OK ? needs_json(&plan, book)

@@ -165,7 +165,8 @@ static status do_report(struct pipeline *p, const struct taken *t, bool load, st
                                     .made = t->cloth,
                                     .pdf = p->option->pdf,
                                     .n_input_warning = p->n_input_warning,
-                                    .stage_wall_s = p->stage_wall_s};
+                                    .stage_wall_s = p->stage_wall_s,
+                                    .work_s = p->plan->report_s};
     (void)load;
     return stage_report(&in, &p->out.report, err);
 }

@@ -5,9 +5,6 @@
 #include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/stage_table.h"
-#include "optimizer/report/export/twin_result.h"
-#include "optimizer/report/result/result_pictures.h"
-#include "optimizer/report/surface/surface_pictures.h"
 #include "optimizer/stages/fit/pipeline_correction.h"
 #include "optimizer/stages/fit/pipeline_scan_error.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
@@ -27,7 +24,8 @@ struct voxel_stage {
     double s_per_voxel, log_sd;
     const double *curve;
 };
-static const double render_s_per_path = 6e-6;
+/* A path of a picture: on three described weaves 3 to 17 us, by how bright and how closed the cloth is. */
+static const double render_s_per_path = 8e-6;
 static const double read_curve[SPEED_CURVE_POINTS] = {0.03, 0.05, 0.08, 0.10, 0.12, 0.40, 0.40, 0.94, 0.94, 0.94,
                                                       0.94, 0.94, 0.94, 0.94, 0.94, 0.94, 0.94, 0.94, 0.94, 0.94};
 static const double hollow_curve[SPEED_CURVE_POINTS] = {0.00, 0.01, 0.01, 0.02, 0.02, 0.05, 0.05, 0.10, 0.18, 0.25,
@@ -45,8 +43,7 @@ static const struct voxel_stage read_stage = {"volume", 1e-7, 0.8, read_curve},
                                 redirect_stage = {"orientation.noisy", 1.3e-5, 0.8, NULL},
                                 fibers_stage = {"fibers.material", 6e-6, 0.4, fibers_curve},
                                 trial_stage = {"fibers.trial", 6e-6, 0.4, NULL},
-                                transfer_stage = {"directions.material", 4e-7, 0.8, transfer_curve},
-                                report_stage = {"report.geometry", 8e-8, 0.8, NULL};
+                                transfer_stage = {"directions.material", 4e-7, 0.8, transfer_curve};
 /* The same of a path of a fit to rows whose brightest channel has the mean usual_radiance. In bright cloth paths are
  * longer: the time goes with this power of the radiance. */
 static const double fit_s_per_path = 9e-6, usual_radiance = 0.13, radiance_power = 0.4;
@@ -58,14 +55,13 @@ static const double usual_material = 0.4;
 static const double misfit_row_paths = 62500.0, noise_row_paths = 264000.0, cloth_share = 0.7;
 /* The fit's share of its stage's time where a scan's errors are carried on. */
 static const double usual_budget = 6e6, fit_share = 1.0 - PIPELINE_SCAN_ERROR_SHARE;
-/* Time of a validated path over the time of a fitted one. The rest of a report in units of a path's time, without the
- * preparation of models for its gradient certificate: pages, and the geometry of a scan. */
-static const double validated_path = 0.88, page_paths = 2e4, scan_page_paths = 7e4;
+/* Time of a validated path over the time of a fitted one. */
+static const double validated_path = 0.88;
 static const double least_s = 0.05;
 /* Time of one thread in which a model is fitted to the profile of a fiber. */
 static const double usual_profile_s = 3.0;
 /* Standard deviations of the logarithm of a time where no job has been run. */
-static const double sd_of_fit = 0.5, sd_of_rest = 0.5;
+static const double sd_of_fit = 0.5, sd_of_pictures = 0.7, sd_of_rest = 0.5;
 
 /* By the size of the files one voxel has one or two bytes. */
 double pipeline_plan_voxels(const struct job_plan *plan)
@@ -115,6 +111,8 @@ static void plan_fibers(struct job_plan *plan, size_t i)
 /* Size of a felt's fiber, in units of the other structures; seconds of one thread for a unit: weaves of sizes from
  * 3,000 to 143,000 needed 1.5e-5 to 1.6e-5, felts of 600 and 2,500 fibers 1.2e-5 to 1.3e-5. */
 static const double felt_fiber_size = 38.0, make_s_per_size = 1.5e-5;
+/* Segments of a unit of that size; time of one thread for a segment that is read, or put into a scene. */
+static const double segments_of_size = 2.4, s_per_segment = 1e-6, least_segments = 1e4;
 
 static double fibers_of_yarn(const struct cloth_description *d, int direction, size_t i)
 {
@@ -145,6 +143,22 @@ static void plan_cloth(struct job_plan *plan, size_t i)
                                         .units = pipeline_plan_cloth_size(plan) / n_thread(plan),
                                         .usual_s = make_s_per_size,
                                         .log_sd = sd_of_fit};
+    worker_status_plan(plan->status, i, &work);
+}
+
+/* Segments of the fibers: as traced, or before by the size of a file of fibers or of the description. */
+static double n_segment(const struct job_plan *plan)
+{
+    const double size = pipeline_plan_cloth_size(plan);
+    if (plan->geometry.n_vertex > 0) return (double)plan->geometry.n_vertex;
+    return size > 0.0 ? segments_of_size * size : plan->file_segments;
+}
+
+/* Reading a file of fibers, or building the scene: a stage of one thread that goes through all segments. */
+static void plan_segments(struct job_plan *plan, size_t i, const char *name)
+{
+    const struct job_clock_work work = {
+        .key = name, .units = fmax(n_segment(plan), least_segments), .usual_s = s_per_segment, .log_sd = sd_of_fit};
     worker_status_plan(plan->status, i, &work);
 }
 
@@ -248,38 +262,61 @@ static double validation_paths(const struct job_plan *plan)
             pipeline_factor_paths(plan->in->section.fit, n_fit) + pipeline_pilot_paths(n_fit));
 }
 
-/* Paths of a report. Its certificate runs on one thread. */
-static double report_paths(const struct job_plan *plan)
+/* Time of a path on all threads: by the fits of this job, or as usual before their end. */
+static double path_s_of(const struct job_plan *plan)
 {
-    const double n_fit = fit_paths(plan), path_s = s_per_path(plan),
-                 certificate_path_s = isfinite(path_s) ? path_s : usual_s_per_path(plan) / n_thread(plan);
-    return result_renderings_paths(plan->in->section.results, plan->in->rows.observation.n, n_fit) +
-           surface_pictures_paths(plan->in->section.results) + twin_result_paths(plan->in->section.results) +
-           (plan->in->section.scan->given ? scan_page_paths : page_paths) + plan->certificate_s / certificate_path_s;
+    const double own_s = s_per_path(plan);
+    if (isfinite(own_s)) return own_s;
+    return (plan->in->kind == JOB_OF_FIT ? usual_s_per_path(plan) : plan->path_share * render_s_per_path) /
+           n_thread(plan);
 }
 
-/* A stage of n_path paths after the fit, which is stage i_fit and counts as a number of paths before it has ended. */
-static void plan_after_fit(struct job_plan *plan, size_t i, size_t i_fit, double n_path)
+static struct report_work_input report_input(const struct job_plan *plan)
 {
-    static const char *const key[] = {"validation", "report"};
-    const char *const own = key[i - i_fit - 1];
-    const double path_s = s_per_path(plan), of_fit = plan->in->section.scan->given ? fit_share : 1.0;
-    if (isfinite(path_s))
-        worker_status_plan_own(plan->status, i, own, fmax(n_path * path_s, least_s));
+    const bool fits = plan->in->kind == JOB_OF_FIT;
+    return (struct report_work_input){.kind = plan->in->kind,
+                                      .results = plan->in->section.results,
+                                      .n_row = plan->in->rows.observation.n,
+                                      .n_candidate = plan->in->section.fit->n_candidate,
+                                      .n_fit_path = fits ? fit_paths(plan) : 0.0,
+                                      .n_fit_path_of_models = fits ? fit_paths(plan) * (double)plan->in->n_model : 0.0,
+                                      .path_s = path_s_of(plan),
+                                      .n_thread = n_thread(plan),
+                                      .n_voxel = plan->in->section.scan->given ? pipeline_plan_voxels(plan) : 0.0,
+                                      .n_segment = n_segment(plan),
+                                      .certificate_s = plan->certificate_s};
+}
+
+/* A stage after the fit, which is stage i_fit, of so many seconds by this job's speed. Before the end of the fit it
+ * takes a share of the fit's time, because all of them are slow together. */
+static void plan_after_fit(struct job_plan *plan, size_t i, size_t i_fit, const char *key, double seconds)
+{
+    const double of_fit = plan->in->section.scan->given ? fit_share : 1.0,
+                 fit_s = (double)plan->in->n_model * fit_paths(plan) * path_s_of(plan) / of_fit;
+    if (isfinite(s_per_path(plan)))
+        worker_status_plan_own(plan->status, i, key, fmax(seconds, least_s));
     else
-        worker_status_plan_share(plan->status, i, own, n_path * of_fit / ((double)plan->in->n_model * fit_paths(plan)),
-                                 i_fit);
+        worker_status_plan_share(plan->status, i, key, seconds / fit_s, i_fit);
 }
 
-static void plan_pictures(struct job_plan *plan, size_t i)
+/* The report of every kind of job: its parts, which the stage divides its progress by. */
+static void plan_report(struct job_plan *plan, size_t i)
 {
+    static const char *const kind[] = {[JOB_OF_FIT] = "",
+                                       [JOB_OF_GEOMETRY] = ".geometry",
+                                       [JOB_OF_PICTURES] = ".cloth",
+                                       [JOB_OF_PROFILE] = ".profile"};
+    const struct report_work_input in = report_input(plan);
+    char key[SPEED_BOOK_KEY_BYTES], parts[64];
+    report_work(&in, plan->report_s);
+    report_work_kind(&in, parts, sizeof parts);
+    snprintf(key, sizeof key, "report%s%s", kind[plan->in->kind], parts);
     const struct job_clock_work work = {
-        .key = "report.pictures",
-        .units = (surface_pictures_paths(plan->in->section.results) + twin_result_paths(plan->in->section.results)) /
-                 n_thread(plan),
-        .usual_s = render_s_per_path,
-        .log_sd = sd_of_fit};
-    worker_status_plan(plan->status, i, &work);
+        .key = key, .units = report_work_sum(plan->report_s), .usual_s = 1.0, .log_sd = sd_of_pictures};
+    if (plan->in->kind == JOB_OF_FIT)
+        plan_after_fit(plan, i, i - 2, key, work.units);
+    else
+        worker_status_plan(plan->status, i, &work);
 }
 
 void pipeline_plan_fit_paths(struct job_plan *plan, double n_path)
@@ -307,7 +344,9 @@ void pipeline_plan_stage(struct job_plan *plan, const char *name, size_t i)
                                            .units = (double)plan->in->n_model / n_thread(plan),
                                            .usual_s = usual_profile_s,
                                            .log_sd = sd_of_rest};
-    if (plan->in->kind == JOB_OF_PROFILE)
+    if (strcmp(name, "report") == 0)
+        plan_report(plan, i);
+    else if (plan->in->kind == JOB_OF_PROFILE)
         worker_status_plan(plan->status, i, strcmp(name, "fit") == 0 ? &profile : &rest);
     else if (strcmp(name, "volume") == 0)
         plan_voxels(plan, i, plan->in->section.scan->hollow_fibers > 0 ? &hollow_stage : &read_stage,
@@ -324,15 +363,9 @@ void pipeline_plan_stage(struct job_plan *plan, const char *name, size_t i)
     else if (strcmp(name, "fit") == 0)
         plan_fit(plan, i);
     else if (strcmp(name, "validation") == 0)
-        plan_after_fit(plan, i, i - 1, validation_paths(plan));
-    else if (strcmp(name, "report") == 0 && plan->in->kind == JOB_OF_PICTURES)
-        plan_pictures(plan, i);
-    else if (strcmp(name, "report") == 0 && plan->in->kind == JOB_OF_GEOMETRY)
-        plan_voxels(plan, i, &report_stage, pipeline_plan_voxels(plan));
-    else if (strcmp(name, "report") == 0)
-        plan_after_fit(plan, i, i - 2, report_paths(plan));
+        plan_after_fit(plan, i, i - 1, name, validation_paths(plan) * path_s_of(plan));
     else
-        worker_status_plan(plan->status, i, &rest);
+        plan_segments(plan, i, strcmp(name, "fibers") == 0 ? "fibers.given" : name);
 }
 
 void job_plan_init(struct job_plan *plan, const struct stage_tools *tools, const struct job_inputs *in)

@@ -2,6 +2,7 @@
 #ifndef SELVEDGE_OPTIMIZER_PIPELINE_PLAN_H
 #define SELVEDGE_OPTIMIZER_PIPELINE_PLAN_H
 
+#include "optimizer/report/report_work.h"
 #include "optimizer/stages/fit_stages.h"
 
 /* The state of a job as far as its plan goes. Nothing is owned. */
@@ -16,7 +17,10 @@ struct job_plan {
     double fit_path;      /* that the fits are expected to take, with the other work of their stage */
     double usual_wall_s;  /* of the whole job, by the speeds of a common machine (job_need.h) */
     double certificate_s; /* processor time of the gradient certificates, on one thread (plan_probe.h) */
+    double inputs_s;      /* elapsed time of reading the inputs, which a job that runs takes again; 0 where it runs */
     double path_share;    /* time of a path in this cloth over that in a closed one */
+    double file_segments; /* of a given file of fibers, by its size; 0 without one */
+    double report_s[REPORT_N_PART]; /* expected seconds of the parts of the report, once that stage is planned */
 };
 
 /* A plan of a job whose inputs have been read. */

@@ -12,6 +12,8 @@ static const double points_of_parameter = 4.0;
  * areas of 0.8, 2.3, 4.6, 9.2 and 18.4 tiles, whose rows textile.v3 was fitted to, took 0.30, 0.56, 0.84, 0.97 and 1 of
  * it. */
 static const double layers = 2.5, least_path_share = 0.1;
+/* Bytes of a .hair file for each segment: a position and a diameter. */
+static const double bytes_of_segment = 16.0;
 /* Larger files have the fibers of a closed cloth, and reading them would take longer than the rest of a plan. */
 enum { FIBER_FILE_MOST_BYTES = 4 << 20 };
 
@@ -52,19 +54,23 @@ double plan_probe_path_share(const struct fiber_set *f)
     return fmax(1.0 - exp(-area_m2 / (layers * f->tile_size_m[0] * f->tile_size_m[1])), least_path_share);
 }
 
-static double path_share_of_file(const struct job_plan *plan)
+/* Reads the given file of fibers where it is small: sets path_share and file_segments. */
+static void probe_file(struct job_plan *plan)
 {
     char path[WORKER_PATH_BYTES];
     struct stat file;
     struct fiber_set f;
-    double share = 1.0;
-    if (plan->in->section.cloth->fiber_file[0] == '\0') return share;
+    plan->path_share = 1.0;
+    plan->file_segments = 0.0;
+    if (plan->in->section.cloth->fiber_file[0] == '\0') return;
     worker_folder_path(plan->tools->folder, JOB_FOLDER_INPUT, plan->in->section.cloth->fiber_file, path);
-    if (stat(path, &file) != 0 || file.st_size > FIBER_FILE_MOST_BYTES) return share;
+    if (stat(path, &file) != 0) return;
+    plan->file_segments = (double)file.st_size / bytes_of_segment;
+    if (file.st_size > FIBER_FILE_MOST_BYTES) return;
     fiber_set_init(&f);
-    if (fiber_file_read(path, plan->in->section.cloth, &f, NULL) == STATUS_OK) share = plan_probe_path_share(&f);
+    if (fiber_file_read(path, plan->in->section.cloth, &f, NULL) == STATUS_OK)
+        plan->path_share = plan_probe_path_share(&f);
     fiber_set_release(&f);
-    return share;
 }
 
 void plan_probe_take(struct job_plan *plan)
@@ -72,5 +78,5 @@ void plan_probe_take(struct job_plan *plan)
     const bool fits = plan->in->kind == JOB_OF_FIT;
     plan->certificate_s = 0.0;
     for (size_t i = 0; fits && i < plan->in->n_model; i++) plan->certificate_s += certificate_s(&plan->in->model[i]);
-    plan->path_share = path_share_of_file(plan);
+    probe_file(plan);
 }

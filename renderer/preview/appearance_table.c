@@ -291,6 +291,11 @@ static status fill(struct table_work *w, const struct appearance_table_option *o
     return smooth_and_check(w, err);
 }
 
+double appearance_table_fixed_paths(size_t n_texel)
+{
+    return (double)APPEARANCE_BASIS_VIEWS * (double)n_texel + (double)CHECK_VIEWS * (double)CHECK_PATHS;
+}
+
 status appearance_table_make(const struct radiance_input *in, const struct appearance_table_option *o,
                              struct thread_pool *pool, const struct progress *progress, struct appearance_table *t,
                              struct error *err)

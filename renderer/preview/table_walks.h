@@ -33,6 +33,8 @@ void table_walks_place(const struct table_walks *w, const double start[2], uint3
 void table_walks_trace(const struct table_walks *w, const double at_mm[2], const double wo[3], double (*wi)[3],
                        size_t n_light, struct rng *rng, float (*rgb)[3]);
 
+/* Views from which the textures are made, with TABLE_LIGHTS lights each, one path a texel. */
+enum { APPEARANCE_BASIS_VIEWS = 64 };
 /* Textures W_1 .. W_(n_basis - 1) of t, whose sizes are set; W_0 is written, too. */
 status appearance_basis_make(const struct table_walks *w, struct thread_pool *pool, const struct progress *progress,
                              struct appearance_table *t, struct error *err);

@@ -20,11 +20,14 @@ struct export_scene {
     struct hair_fit hair[SCATTERING_MAX_SET];
     double z_low_m, z_high_m;
     const char *folder; /* of the format that is being written, under results/ */
+    const struct progress *progress;
 };
 
 struct export_format {
     /* *json: an array with one object for each group of fibers, a new reference. */
     status (*write)(struct export_scene *e, json_t **materials, struct error *err);
+    /* Light paths that it takes, after a fit of n_fit_path; NULL: none. */
+    double (*paths)(const struct job_results *results, size_t n_row, double n_fit_path);
 };
 
 #define EXPORT(name, meaning) /* a row stands for nothing in the source of its export */

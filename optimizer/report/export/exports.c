@@ -90,17 +90,29 @@ static void warn_of_rest(const struct export_scene *e)
             "exported textures contain it");
 }
 
-static bool any_wanted(const struct report *report)
+size_t exports_count(const struct job_results *results)
 {
-    for (size_t i = 0; i < N_FORMAT; i++)
-        if (report->in.results->exported[i]) return true;
-    return false;
+    size_t n = 0;
+    for (size_t i = 0; i < N_FORMAT; i++) n += results->exported[i];
+    return n;
 }
 
-status exports_write(struct report *report, struct error *err)
+double exports_paths(const struct job_results *results, size_t n_row, double n_fit_path)
 {
-    struct export_scene e = {.report = report, .model = &report->model[report_best_model(report)]};
-    if (!any_wanted(report)) return STATUS_OK;
+    double n = 0.0;
+    for (size_t i = 0; i < N_FORMAT; i++)
+        if (results->exported[i] && exports[i].format->paths != NULL)
+            n += exports[i].format->paths(results, n_row, n_fit_path);
+    return n;
+}
+
+status exports_write(struct report *report, double from, double to, struct error *err)
+{
+    struct progress_part part;
+    struct progress progress = progress_begin_part(&part, &report->in.job->tools->progress, from, to - from);
+    struct export_scene e = {
+        .report = report, .model = &report->model[report_best_model(report)], .progress = &progress};
+    if (exports_count(report->in.results) == 0) return STATUS_OK;
     if (e.model->setup->appearance.kind != MODEL_SURFACE) {
         worker_status_warn(report->in.job->tools->status,
                            "nothing was exported: the model '%s' sees no fibers, which an export needs",

@@ -35,7 +35,7 @@ static status certify(struct report *report, size_t i_model, const struct config
                       const double *weight, struct error *err)
 {
     const struct pipeline_model *m = &report->model[i_model];
-    struct progress progress = report->in.job->tools->progress;
+    struct progress progress = progress_silent(&report->in.job->tools->progress); /* the smallest part of the stage */
     bool skip[FIT_MAX_PARAM];
     double start_s = clock_monotonic_s();
     for (size_t p = 0; p < m->setup->sets.info.n_param; p++) skip[p] = m->setup->parameter[p].fixed;

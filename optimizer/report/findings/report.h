@@ -37,6 +37,7 @@ struct report_input {
     struct pdf_helper pdf;
     size_t n_input_warning;     /* warnings of reading the job and of its geometry */
     const double *stage_wall_s; /* by index of the stage table; of this attempt, NaN for a stage of an earlier one */
+    const double *work_s;       /* the expected seconds of each part of this stage (optimizer/report/report_work.h) */
 };
 
 struct report_output {
@@ -71,9 +72,10 @@ struct report {
     struct model_advice *advice;                /* of each model */
     struct pipeline_skill skill;
     struct verdict verdict;
-    json_t *exports;             /* the files for other programs, as result.json lists them */
-    json_t *surface_pictures;    /* the pictures of the cloth on surfaces, as result.json lists them */
-    struct volume_output volume; /* the scan; empty until report_need_volume */
+    json_t *exports;                     /* the files for other programs, as result.json lists them */
+    json_t *surface_pictures;            /* the pictures of the cloth on surfaces, as result.json lists them */
+    struct volume_output volume;         /* the scan; empty until report_need_volume */
+    double part_from_s, part_from_cpu_s; /* when the running part of the stage began */
 };
 
 /* Index of the best model (pipeline_choice.h). */

@@ -39,12 +39,12 @@ struct one_picture {
 
 static double paths_of(const struct job_surface_picture *p)
 {
-    return (double)p->px * (double)p->px * (double)p->sample * (p->reference ? 2.0 : 1.0);
+    return (double)p->px * (double)p->px * (double)p->sample * surface_sample_paths(p);
 }
 
 double surface_pictures_paths(const struct job_results *results)
 {
-    double n = 0.0;
+    double n = surface_tables_paths(results);
     for (size_t i = 0; i < results->n_surface_picture; i++) n += paths_of(&results->surface_picture[i]);
     return n;
 }
@@ -341,14 +341,15 @@ status surface_pictures_write(struct report *report, double from, double to, str
     worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, "pictures", path);
     status s = durable_make_folder(path, err);
     struct surface_tables tables = {0};
-    double for_tables = (to - from) * surface_tables_share(report);
+    double for_tables = (to - from) * surface_tables_paths(report->in.results) / all;
     struct progress_part making;
     struct progress make = progress_begin_part(&making, &report->in.job->tools->progress, from, for_tables);
     if (s == STATUS_OK) s = surface_tables_get(report, &make, &tables, err);
+    const double whole = to - from;
     from += for_tables;
     for (size_t i = 0; i < report->in.results->n_surface_picture && s == STATUS_OK; i++) {
         const struct job_surface_picture *p = &report->in.results->surface_picture[i];
-        double share = (to - from) * paths_of(p) / all;
+        double share = whole * paths_of(p) / all;
         struct progress_part part;
         struct progress progress = progress_begin_part(&part, &report->in.job->tools->progress, from + done, share);
         s = write_one(report, i, &tables, &progress, err);

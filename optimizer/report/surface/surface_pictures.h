@@ -4,7 +4,7 @@
 
 #include "optimizer/report/findings/report.h"
 
-/* Samples of all pictures together. */
+/* Samples of all pictures together, with their tables: in paths of a path-traced picture that take as long. */
 double surface_pictures_paths(const struct job_results *results);
 
 /* Renders the pictures that the job document asks for, and fills report->surface_pictures, the entries of result.json.

@@ -21,17 +21,17 @@ static const double deep_path_s = 12e-6, cell_path_s = 3e-3, visibility_s = 60.0
                     path_sample_s = 20e-6;
 
 /* Returns whether a picture takes the visibility of its segments from tables. */
-static bool wants_visibility(const struct report *report)
+static bool wants_visibility(const struct job_results *results)
 {
-    for (size_t i = 0; i < report->in.results->n_surface_picture; i++)
-        if (report->in.results->surface_picture[i].visibility_by_tables) return true;
+    for (size_t i = 0; i < results->n_surface_picture; i++)
+        if (results->surface_picture[i].visibility_by_tables) return true;
     return false;
 }
 
-static bool wants_tables(const struct report *report)
+static bool wants_tables(const struct job_results *results)
 {
-    for (size_t i = 0; i < report->in.results->n_surface_picture; i++)
-        if (report->in.results->surface_picture[i].method == JOB_PICTURE_FAST) return true;
+    for (size_t i = 0; i < results->n_surface_picture; i++)
+        if (results->surface_picture[i].method == JOB_PICTURE_FAST) return true;
     return false;
 }
 
@@ -42,56 +42,54 @@ static bool by_directions(const struct job_surface_picture *p)
 }
 
 /* Paths for that table; 0: no picture asks for it. */
-static size_t deep_paths(const struct report *report)
+static size_t deep_paths(const struct job_results *results)
 {
     size_t n = 0;
-    for (size_t i = 0; i < report->in.results->n_surface_picture; i++) {
-        const struct job_surface_picture *p = &report->in.results->surface_picture[i];
+    for (size_t i = 0; i < results->n_surface_picture; i++) {
+        const struct job_surface_picture *p = &results->surface_picture[i];
         if (by_directions(p) && p->n_deep_path > n) n = p->n_deep_path;
     }
     return n;
 }
 
 /* Paths of a cell; without a picture by cells they only say how far light spreads. */
-static uint32_t cell_paths(const struct report *report)
+static uint32_t cell_paths(const struct job_results *results)
 {
-    for (size_t i = 0; i < report->in.results->n_surface_picture; i++) {
-        const struct job_surface_picture *p = &report->in.results->surface_picture[i];
+    for (size_t i = 0; i < results->n_surface_picture; i++) {
+        const struct job_surface_picture *p = &results->surface_picture[i];
         if (p->method == JOB_PICTURE_FAST && !by_directions(p)) return CELL_PATHS;
     }
     return SPREAD_PATHS;
 }
 
 /* Filters take the albedo of fibers from the averages. */
-static bool wants_averages(const struct report *report, bool of_filters)
+static bool wants_averages(const struct job_results *results, bool of_filters)
 {
-    for (size_t i = 0; i < report->in.results->n_surface_picture; i++) {
-        const struct job_surface_picture *p = &report->in.results->surface_picture[i];
+    for (size_t i = 0; i < results->n_surface_picture; i++) {
+        const struct job_surface_picture *p = &results->surface_picture[i];
         if (p->method == JOB_PICTURE_DUAL || (of_filters && p->filter)) return true;
     }
     return false;
 }
 
-static bool wants_method(const struct report *report, enum job_picture_method m)
+static bool wants_method(const struct job_results *results, enum job_picture_method m)
 {
-    for (size_t i = 0; i < report->in.results->n_surface_picture; i++)
-        if (report->in.results->surface_picture[i].method == m) return true;
+    for (size_t i = 0; i < results->n_surface_picture; i++)
+        if (results->surface_picture[i].method == m) return true;
     return false;
 }
 
-double surface_tables_share(const struct report *report)
+double surface_tables_paths(const struct job_results *results)
 {
-    if (!wants_tables(report)) return 0.0;
-    double tables_s = deep_path_s * (double)deep_paths(report) + cell_path_s * cell_paths(report) +
-                      (wants_visibility(report) ? visibility_s : 0.0);
-    double pictures_s = 0.0;
-    for (size_t i = 0; i < report->in.results->n_surface_picture; i++) {
-        const struct job_surface_picture *p = &report->in.results->surface_picture[i];
-        double n_sample = (double)(p->px * p->px * p->sample);
-        pictures_s += n_sample * (p->method == JOB_PICTURE_FAST ? fast_sample_s : path_sample_s);
-        if (p->reference) pictures_s += n_sample * path_sample_s;
-    }
-    return tables_s / (tables_s + pictures_s);
+    if (!wants_tables(results)) return 0.0;
+    return (deep_path_s * (double)deep_paths(results) + cell_path_s * cell_paths(results) +
+            (wants_visibility(results) ? visibility_s : 0.0)) /
+           path_sample_s;
+}
+
+double surface_sample_paths(const struct job_surface_picture *p)
+{
+    return (p->method == JOB_PICTURE_FAST ? fast_sample_s / path_sample_s : 1.0) + (p->reference ? 1.0 : 0.0);
 }
 
 static status get_tables(struct report *report, const struct progress *progress, struct surface_tables *t,
@@ -103,10 +101,10 @@ static status get_tables(struct report *report, const struct progress *progress,
                                               .model = model->setup->appearance.surface,
                                               .param = model->fit->result.param,
                                               .n_set = model->setup->sets.n_set,
-                                              .n_path = cell_paths(report),
-                                              .no_visibility = !wants_visibility(report),
-                                              .deep_traced = deep_paths(report) > 0 ? N_TRACED : 0,
-                                              .deep_paths = (double)deep_paths(report),
+                                              .n_path = cell_paths(report->in.results),
+                                              .no_visibility = !wants_visibility(report->in.results),
+                                              .deep_traced = deep_paths(report->in.results) > 0 ? N_TRACED : 0,
+                                              .deep_paths = (double)deep_paths(report->in.results),
                                               .journal_path = journal,
                                               .journal_every_s = JOURNAL_EVERY_S};
     worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_WORK, "report/fast.journal", journal);
@@ -148,13 +146,13 @@ status surface_tables_get(struct report *report, const struct progress *progress
                           struct error *err)
 {
     const struct pipeline_model *model = &report->model[report_best_model(report)];
-    const bool tables = wants_tables(report), averages = wants_averages(report, true),
-               pile = wants_method(report, JOB_PICTURE_DIFFUSION);
+    const bool tables = wants_tables(report->in.results), averages = wants_averages(report->in.results, true),
+               pile = wants_method(report->in.results, JOB_PICTURE_DIFFUSION);
     *t = (struct surface_tables){0};
     if (!tables && !averages && !pile) return STATUS_OK;
     if (model->setup->appearance.kind != MODEL_SURFACE ||
         scattering_frame_reason(model->setup->appearance.surface) != NULL) {
-        if (tables || pile || wants_averages(report, false))
+        if (tables || pile || wants_averages(report->in.results, false))
             worker_status_warn(report->in.job->tools->status,
                                "all pictures are rendered path by path: there are no tables for the model '%s'",
                                model->setup->appearance.id);

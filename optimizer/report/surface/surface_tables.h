@@ -26,9 +26,11 @@ struct surface_method {
     struct diffusion_option diffusion;
 };
 
-/* Share of the time of the tables and the pictures together that the tables are expected to take; 0 when no picture
- * asks for tables of renderer/fast: averages take a second. */
-double surface_tables_share(const struct report *report);
+/* Paths of a path-traced picture that take as long as the tables; 0 when no picture asks for tables of renderer/fast:
+ * averages take a second. */
+double surface_tables_paths(const struct job_results *results);
+/* The same of one sample of a picture, with its reference. */
+double surface_sample_paths(const struct job_surface_picture *p);
 /* Reads the tables of the best model from the job's folder, work/report/fast.tables, if the file has the tables of this
  * cloth with these parameters. Otherwise makes and stores them, and goes on from the file fast.journal beside it that
  * an interrupted attempt has left. Makes averages. Errors of fast_precompute, fast_tables_write, dual_tables_init and

@@ -48,6 +48,26 @@ struct textures {
 
 /* ---- renderings of one tile under even light of radiance 1 ---- */
 
+static size_t edge_of(const struct job_results *results)
+{
+    const size_t edge = 2 * (results->render_px > 0 ? results->render_px : RESULT_PICTURE_PX);
+    return edge < MIN_EDGE ? MIN_EDGE : edge > MAX_EDGE ? MAX_EDGE : edge;
+}
+
+static size_t samples_of(const struct job_results *results, size_t n_row, double n_fit_path)
+{
+    const size_t n = SAMPLES_OF_A_RENDERING * result_picture_samples(results, n_row, n_fit_path);
+    return n > MIN_SAMPLE ? n : MIN_SAMPLE;
+}
+
+/* Light paths of the renderings of one tile above a black sheet and without one. */
+static double texture_paths(const struct job_results *results, size_t n_row, double n_fit_path)
+{
+    const double edge = (double)edge_of(results);
+    return 2.0 * edge * edge * (double)samples_of(results, n_row, n_fit_path);
+}
+
+/* Renders the tile above a black sheet or without one, which are the two halves of the export's progress. */
 static status render_tile(const struct textures *t, bool black_sheet, struct image *im, struct error *err)
 {
     struct report *report = t->e->report;
@@ -63,23 +83,23 @@ static status render_tile(const struct textures *t, bool black_sheet, struct ima
                                         .crop_m = size_m[0],
                                         .crop_aspect = size_m[0] / size_m[1]};
     struct scene *scene = NULL;
-    const size_t n_sample = SAMPLES_OF_A_RENDERING *
-                            result_picture_samples(report->in.results, report->in.job->rows->observation.n,
-                                                   (double)report->model[report_best_model(report)].fit->result.n_path);
+    struct progress_part half;
+    struct progress progress = progress_begin_part(&half, t->e->progress, black_sheet ? 0.0 : 0.5, 0.5);
     status s = scene_new(&report->in.made->fiber, &(struct scene_option){.black_sheet = black_sheet}, &scene, err);
     if (s != STATUS_OK) return s;
-    const struct render_request q = {.input = {.scene = {.fibers = scene},
-                                               .model = &m->setup->appearance,
-                                               .param = m->fit->result.param,
-                                               .n_set = m->setup->sets.n_set,
-                                               .discrepancy = pipeline_discrepancy(m->validation)},
-                                     .configuration = &above,
-                                     .width = t->maps.width,
-                                     .height = t->maps.height,
-                                     .n_sample = n_sample > MIN_SAMPLE ? n_sample : MIN_SAMPLE,
-                                     .seed = report->in.job->seed ^ 0x74657874757265u,
-                                     .stream = STREAM};
-    s = render_run(&q, report->in.job->tools->pool, &report->in.job->tools->progress, im, err);
+    const struct render_request q = {
+        .input = {.scene = {.fibers = scene},
+                  .model = &m->setup->appearance,
+                  .param = m->fit->result.param,
+                  .n_set = m->setup->sets.n_set,
+                  .discrepancy = pipeline_discrepancy(m->validation)},
+        .configuration = &above,
+        .width = t->maps.width,
+        .height = t->maps.height,
+        .n_sample = samples_of(report->in.results, report->in.job->rows->observation.n, (double)m->fit->result.n_path),
+        .seed = report->in.job->seed ^ 0x74657874757265u,
+        .stream = STREAM};
+    s = render_run(&q, report->in.job->tools->pool, &progress, im, err);
     scene_free(scene);
     return s;
 }
@@ -233,9 +253,7 @@ static json_t *material_json(const struct textures *t)
 static status write_textures(struct export_scene *e, json_t **materials, struct error *err)
 {
     struct textures t = {.e = e};
-    size_t edge = 2 * (e->report->in.results->render_px > 0 ? e->report->in.results->render_px : RESULT_PICTURE_PX);
-    edge = edge < MIN_EDGE ? MIN_EDGE : edge > MAX_EDGE ? MAX_EDGE : edge;
-    status s = texture_maps_make(&e->report->in.made->fiber, edge, &t.maps, err);
+    status s = texture_maps_make(&e->report->in.made->fiber, edge_of(e->report->in.results), &t.maps, err);
     t.surface.maps = &t.maps;
     if (s == STATUS_OK) s = render_both(&t, err);
     if (s == STATUS_OK) s = texture_surface_fit(&t.surface, e->report, e->model, err);
@@ -254,4 +272,4 @@ static status write_textures(struct export_scene *e, json_t **materials, struct 
 EXPORT(textures, "Textures of one tile with a MaterialX document (OpenPBR) and a U3M 1.1 material. They have as "
                  "many pixels as the renderings of the job.")
 
-const struct export_format export_textures = {write_textures};
+const struct export_format export_textures = {.write = write_textures, .paths = texture_paths};

@@ -17,6 +17,8 @@ static const double long_wait = 0.1;
 /* A stage whose time varies by more than this between jobs says nothing about the speed of the machine. On one machine
  * the filters of scans took 0.5 to 4.2 times their usual time, while tracing took 1.0 to 1.3 times its usual time. */
 static const double most_sd_of_speed = 0.6;
+/* Share of a running stage that is taken to be left, also where its fraction says that nothing is. */
+static const double least_share = 0.05;
 /* A stage below this many seconds is not remembered and says nothing about the others. */
 static const double least_s = 0.3;
 
@@ -180,8 +182,8 @@ static double remaining_s(const struct job_clock *c, double now_s, double *sd_s)
     if (runs) {
         const double share = running_share(c, now_s);
         total = running_s(c, now_s, &running_log_sd);
-        double rest = total * (1.0 - c->from_share) - (now_s - c->from_s);
-        sum = fmax(rest, 0.5 * (1.0 - share) * total);
+        const double elapsed_s = now_s - c->from_s, rest = total * (1.0 - c->from_share) - elapsed_s;
+        sum = fmax(rest, 0.5 * fmax(1.0 - share, least_share) * fmax(total, elapsed_s));
         var = total * running_log_sd * total * running_log_sd * (1.0 - share) * (1.0 - share);
     }
     for (size_t i = 0; i < c->n_stage; i++) {
@@ -220,18 +222,19 @@ static double taken_s(const struct job_clock *c, double now_s)
 
 struct job_clock_look job_clock_look(struct job_clock *c, double now_s)
 {
-    struct job_clock_look look = {.eta_s = NAN, .eta_low_s = NAN, .eta_high_s = NAN};
+    struct job_clock_look look = {.spread = NAN, .eta_s = NAN, .eta_low_s = NAN, .eta_high_s = NAN};
     double sd_s, rest = remaining_s(c, now_s, &sd_s), taken = taken_s(c, now_s);
     if (rest > 0.0) {
         look.eta_s = rest;
-        double spread = 2.0 * sd_s / rest;
-        if (spread > 0.25) {
-            look.eta_low_s = rest * exp(-spread);
-            look.eta_high_s = rest * exp(fmin(spread, 3.0));
+        look.spread = fmin(2.0 * sd_s / rest, 3.0);
+        if (look.spread > 0.25) {
+            look.eta_low_s = rest * exp(-look.spread);
+            look.eta_high_s = rest * exp(look.spread);
         }
-        const double fraction = fmin(taken / (taken + rest), 0.995), passed_s = now_s - c->looked_s;
+        const double passed_s = now_s - c->looked_s,
+                     creep = (1.0 - c->shown) * fmin(0.5 * passed_s / (rest + 0.5 * taken), 0.5);
         const double step = fmin(fmax(1.0, 2.0 / JOB_CLOCK_STEP / (taken + rest)) * passed_s, 1.0) * JOB_CLOCK_STEP;
-        c->shown = fmax(c->shown, fmin(fraction, c->shown + step));
+        c->shown += fmin(fmax(taken / (taken + rest) - c->shown, creep), step);
     }
     c->looked_s = now_s;
     look.fraction = c->shown;

@@ -5,10 +5,12 @@
  * of this job were slower than expected whose time hardly varies between jobs. While a stage runs, a second prediction
  * is its elapsed time divided by the share of the time that usually has passed at its fraction. Both predictions are
  * combined, each weighted by its uncertainty (logarithms of times are taken to be normal). A stage that predicts its
- * own end (a fit) has a fraction that runs evenly with time, except for the errors of such predictions in earlier jobs;
- * its time says nothing about the speed of other stages. The stated fraction of the job is elapsed time over elapsed
- * and remaining time; it never falls, and it rises by at most JOB_CLOCK_STEP between two looks and in a second; where a
- * job is short, in a second also by twice the even rate. Times are of the monotonic clock, in seconds. Not thread-safe.
+ * own end (a fit) has a fraction that runs evenly with time, except for the errors of such predictions in earlier
+ * jobs; its time says nothing about the speed of other stages. The stated fraction of the job is elapsed time over
+ * elapsed and remaining time; it never falls, and it rises by at most JOB_CLOCK_STEP between two looks and in a
+ * second; where a job is short, in a second also by twice the even rate. Nor does it stand still where a job takes
+ * longer than expected: it goes on towards 1, which it does not reach, by half of the way in the remaining and half of
+ * the elapsed time. Times are of the monotonic clock, in seconds. Not thread-safe.
  */
 #ifndef SELVEDGE_OPTIMIZER_JOB_CLOCK_H
 #define SELVEDGE_OPTIMIZER_JOB_CLOCK_H
@@ -46,6 +48,7 @@ struct job_clock {
 struct job_clock_look {
     double fraction;              /* of the job, in [0, 1) */
     double eta_s;                 /* NaN before the first stage is planned */
+    double spread;                /* two standard deviations of the logarithm of eta_s, at most 3; NaN as eta_s */
     double eta_low_s, eta_high_s; /* two standard deviations either way; NaN where that is less than a quarter */
 };
 

@@ -14,6 +14,9 @@
 #include <unistd.h>
 
 enum { LIMIT_BYTES = 1 << 20 };
+/* A job whose logarithm of seconds per unit is further than this from the mean counts as if it were so far: one job on
+ * a machine that was busy with something else moves the mean little, and a machine that has changed moves it soon. */
+static const double most_off = 1.0;
 
 static bool read_entry(const char *key, const json_t *from, struct speed_entry *e)
 {
@@ -127,6 +130,7 @@ void speed_book_add(struct speed_book *book, const char *key, double seconds, do
     struct speed_entry *e = known != NULL ? &book->entry[known - book->entry] : make_entry(book, key);
     e->n_job = fmin(e->n_job + 1.0, SPEED_BOOK_MEMORY);
     double share = 1.0 / e->n_job, off = log(seconds / units) - e->log_s_per_unit;
+    if (known != NULL) off = fmin(fmax(off, -most_off), most_off);
     e->log_s_per_unit += share * off;
     e->log_var = (1.0 - share) * (e->log_var + share * off * off);
     for (size_t k = 0; k < SPEED_CURVE_POINTS; k++) e->curve[k] += share * (curve[k] - e->curve[k]);

@@ -64,7 +64,8 @@ static struct job_clock_look look_at(struct worker_status *st)
 {
     if (st->clock.stage[st->clock.i_stage].began && any_stage_planned(&st->clock))
         return job_clock_look(&st->clock, clock_monotonic_s());
-    return (struct job_clock_look){.eta_s = NAN, .eta_low_s = NAN, .eta_high_s = NAN, .fraction = st->clock.shown};
+    return (struct job_clock_look){
+        .spread = NAN, .eta_s = NAN, .eta_low_s = NAN, .eta_high_s = NAN, .fraction = st->clock.shown};
 }
 
 /* To be called with the mutex held. */
@@ -210,7 +211,9 @@ void worker_status_speeds(struct worker_status *st, const struct speed_book *boo
     size_t n_stage;
     pipeline_stage_table(&n_stage);
     pthread_mutex_lock(&st->mutex);
+    const double began_s = st->clock.began_s; /* the inputs have been read since */
     job_clock_init(&st->clock, n_stage, book, clock_monotonic_s());
+    st->clock.began_s = began_s;
     pthread_mutex_unlock(&st->mutex);
 }
 

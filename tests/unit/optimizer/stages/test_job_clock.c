@@ -206,6 +206,28 @@ static void test_nothing_known_is_a_range(void **state)
     assert_true(fabs(look.eta_s - 30.0) < 0.1 && isnan(look.eta_low_s) == (isnan(look.eta_high_s)));
 }
 
+/* A last stage of 10 s by its plan takes 200 s and says after one second that nothing is left: a remaining time is
+ * stated all along, and the fraction rises in every ten seconds. */
+static void test_a_fraction_that_does_not_stand_still(void **state)
+{
+    (void)state;
+    static struct job_clock c;
+    double before = 0.0;
+    job_clock_init(&c, 1, &empty, 0.0);
+    plan(&c, 0, "last", 10.0, 1.0);
+    job_clock_begin(&c, 0, 0.0);
+    for (int t = 1; t <= 200; t++) {
+        job_clock_fraction(&c, 1.0, t);
+        const struct job_clock_look look = job_clock_look(&c, t);
+        assert_true(look.eta_s > 0.0 && look.fraction < 1.0 && look.fraction >= before);
+        if (t % 10 != 0) continue;
+        print_message("%d s: %.4f\n", t, look.fraction);
+        assert_true(look.fraction > before + 5e-5);
+        before = look.fraction;
+    }
+    assert_true(before > 0.99 && before < 0.9995);
+}
+
 /* What an earlier attempt has done counts as done, and its time says nothing about the speed. */
 static void test_a_resumed_job(void **state)
 {
@@ -297,6 +319,7 @@ int main(void)
         cmocka_unit_test(test_a_usual_curve),
         cmocka_unit_test(test_predictions_that_were_off),
         cmocka_unit_test(test_nothing_known_is_a_range),
+        cmocka_unit_test(test_a_fraction_that_does_not_stand_still),
         cmocka_unit_test(test_a_resumed_job),
         cmocka_unit_test_setup_teardown(test_the_book_is_a_file, scratch_folder_setup, scratch_folder_teardown),
         cmocka_unit_test(test_a_full_book_forgets_the_first),

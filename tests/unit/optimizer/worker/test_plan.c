@@ -3,6 +3,7 @@
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/job_rows.h"
+#include "optimizer/report/report_work.h"
 #include "optimizer/report/result/result_pictures.h"
 #include "optimizer/worker/pipeline_plan.h"
 #include "optimizer/worker/plan_probe.h"
@@ -18,6 +19,12 @@
 #include <math.h>
 
 enum { N_ROW = 16, N_ALL = 40 };
+enum {
+#define EXPORT(name, ...) EXPORT_##name,
+#include "generated/exports.def"
+#undef EXPORT
+    N_EXPORT
+};
 
 struct job {
     struct job_plan plan;
@@ -89,6 +96,53 @@ static void test_pictures_cost_less_than_the_fit(void **state)
     assert_true(result_picture_px(j->doc->results, N_ALL, 1e4) == 48);
 }
 
+/* Processor seconds that the reports of three jobs have taken, without the pages: pictures of a dense twill of 1,284
+ * fibers and of a loose plain weave of 387, and a fit to a table with exports and report.pdf. */
+static void test_reports_that_were_measured(void **state)
+{
+    (void)state;
+    static const struct {
+        enum job_kind kind;
+        size_t n_twin_path, n_texel;
+        double n_segment, took_s;
+    } row[] = {{JOB_OF_PICTURES, 40000, 256, 76770.0, 9.14},
+               {JOB_OF_PICTURES, 20000, 1024, 12668.0, 4.25},
+               {JOB_OF_FIT, 20000, 256, 27186.0, 22.9}};
+    for (size_t i = 0; i < sizeof row / sizeof *row; i++) {
+        struct job_results *r = make_job()->doc->results;
+        struct job_surface_picture picture = {.px = 128, .sample = 8};
+        double part_s[REPORT_N_PART], at = 0.0;
+        r->n_surface_picture = 1;
+        r->surface_picture = &picture;
+        r->twin = true;
+        r->twin_paths = row[i].n_twin_path;
+        r->twin_texels = row[i].n_texel;
+        for (size_t k = 0; k < JOB_MAX_EXPORT; k++) r->exported[k] = row[i].kind == JOB_OF_FIT && k < N_EXPORT;
+        r->export_pdf = row[i].kind == JOB_OF_FIT;
+        const struct report_work_input in = {.kind = row[i].kind,
+                                             .results = r,
+                                             .n_row = 12,
+                                             .n_fit_path = 2e5,
+                                             .n_fit_path_of_models = 2e5,
+                                             .path_s = 8e-6,
+                                             .n_thread = 1.0,
+                                             .n_segment = row[i].n_segment};
+        report_work(&in, part_s);
+        const double expected_s = report_work_sum(part_s) - part_s[REPORT_PAGES];
+        print_message("expected %.1f s, took %.1f s\n", expected_s, row[i].took_s);
+        assert_true(fmax(expected_s, row[i].took_s) < 2.5 * fmin(expected_s, row[i].took_s));
+        for (size_t k = 0; k <= REPORT_N_PART; k++) {
+            const double before = report_work_before(part_s, k);
+            assert_true(before >= at && before <= 1.0);
+            at = before;
+        }
+        assert_true(at == 1.0 && report_work_before(part_s, REPORT_FINDINGS) == 0.0);
+        assert_true((part_s[REPORT_EXPORTS] > 5.0 && part_s[REPORT_PAGES] > 1.0) == (row[i].kind == JOB_OF_FIT));
+        r->surface_picture = NULL;
+        r->n_surface_picture = 0;
+    }
+}
+
 /* n straight fibers of 10 um radius and 1 mm length, each of two pieces, in a tile of 1 mm x 1 mm. */
 static void make_layers(struct fiber_set *f, size_t n)
 {
@@ -153,9 +207,9 @@ static void test_the_certificate_goes_with_the_model(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_paths_follow_from_the_rows),
-                                       cmocka_unit_test(test_pictures_cost_less_than_the_fit),
-                                       cmocka_unit_test(test_paths_in_a_thin_cloth_are_shorter),
-                                       cmocka_unit_test(test_the_certificate_goes_with_the_model)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_paths_follow_from_the_rows), cmocka_unit_test(test_pictures_cost_less_than_the_fit),
+        cmocka_unit_test(test_reports_that_were_measured), cmocka_unit_test(test_paths_in_a_thin_cloth_are_shorter),
+        cmocka_unit_test(test_the_certificate_goes_with_the_model)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
