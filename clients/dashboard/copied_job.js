@@ -21,10 +21,10 @@ export function memberText(text, name) {
   return null;
 }
 
-// Returns {id, sample, source, files}: source, the document as text; files, a Map of name -> {size, sha256} of the inputs; sha256 is null if the
-// bytes have not arrived.
+// Returns {id, sample, state, source, files}: source, the document as text; files, a Map of name -> {size, sha256, offset} of the inputs; sha256 is
+// null if the bytes have not arrived, of which there are `offset`.
 export async function copiedJob(id) {
   if (!/^[A-Za-z0-9_-]{1,80}$/.test(id)) throw new Problem(404, { detail: "The address names no job to copy." });
   const text = await (await raw("GET", `/v1/jobs/${id}`)).text(), job = JSON.parse(text);
-  return { id, sample: job.sample, source: memberText(text, "document"), files: new Map((job.files ?? []).map((f) => [f.name, { size: f.size, sha256: f.state === "complete" ? f.sha256 : null }])) };
+  return { id, sample: job.sample, state: job.state, source: memberText(text, "document"), files: new Map((job.files ?? []).map((f) => [f.name, { size: f.size, sha256: f.state === "complete" ? f.sha256 : null, offset: f.offset }])) };
 }

@@ -15,7 +15,7 @@ const page = document.getElementById("page");
 const crumb = document.getElementById("crumb");
 const user = document.getElementById("user");
 let leave = null, signingIn = false;
-let handed = []; // files that were dropped on another page
+let handed = null; // files that were dropped on another page
 
 function route() {
   if (leave) leave();
@@ -28,7 +28,7 @@ function route() {
     document.title = "New job – Selvedge";
     crumb.append(el("a", { href: "#" }, "Jobs"), " › New job");
     page.append(submitPanel(handed, new URLSearchParams(query ?? "").get("copy")));
-    handed = [];
+    handed = null;
     leave = null;
   } else if (id.startsWith("compare/")) {
     crumb.append(el("a", { href: "#" }, "Jobs"), " › Comparison");
@@ -65,7 +65,7 @@ window.addEventListener("drop", async (event) => {
   event.preventDefault();
   if (signingIn || location.hash.startsWith("#new")) return;
   handed = await droppedFiles(event.dataTransfer);
-  if (handed.length) location.hash = "new";
+  if (handed.files.length) location.hash = "new";
 });
 window.addEventListener("hashchange", route);
 window.addEventListener("sign-in", askForToken);

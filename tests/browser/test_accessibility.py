@@ -63,7 +63,7 @@ def check(browser, axe, name, ready):
 PAGES = {"finished": ("/#{0}", "document.querySelector('#parameters') && document.querySelector('#files')"),
          "list": ("/", "document.querySelectorAll('#jobs tbody tr').length === 2"),
          "compare": ("/#compare/{0},{1}", "document.querySelector('#compare-rows table') || document.querySelector('#compare-rows tbody')"),
-         "new": ("/#new", "document.querySelector('.drop button')"),
+         "new": ("/#new", "document.querySelector('#send')"),
          "copy": ("/#new?copy={0}", "document.querySelector('#document').textContent.includes('small plain weave')"),
          "unknown": ("/#00000000-0000-0000-0000-000000000000", "document.querySelector('main').textContent.includes('does not exist')"),
          "quality": ("/v1/jobs/{0}/results/quality.html", "document.querySelector('h1')"),
@@ -112,9 +112,11 @@ def test_pages_of_batches(stub, browser, axe):
         check(browser, axe, name, ready)
 
 
+# Tab reaches one radio button of a group; arrow keys choose among them.
 FOCUSABLE = """const shown = (e) => e.checkVisibility({visibilityProperty: true}) && e.getClientRects().length > 0;
     return [...document.querySelectorAll("a[href], button, input, select, textarea, summary, [tabindex='0']")]
-        .filter((e) => shown(e) && !e.disabled && e.type !== "file" && e.tabIndex >= 0)"""
+        .filter((e) => shown(e) && !e.disabled && e.type !== "file" && e.tabIndex >= 0)
+        .filter((e, i, all) => e.type !== "radio" || all.find((f) => f.name === e.name) === e)"""
 
 
 @pytest.mark.parametrize("name", ["list", "finished", "compare", "new"])

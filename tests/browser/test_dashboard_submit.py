@@ -18,11 +18,11 @@ def test_submit_by_choosing_files(stub, browser):
     chooser = browser.find_element(By.CSS_SELECTOR, ".drop input:not([webkitdirectory])")
     browser.execute_script("arguments[0].style.display = 'block'", chooser)
     chooser.send_keys(str(sample / "job.json"))
-    wait_for(browser, "document.querySelector('.drop').textContent.includes('2 of 2 files are still missing')")
-    assert not browser.find_element(By.CSS_SELECTOR, ".drop button").is_enabled()
+    wait_for(browser, "document.querySelector('#submit').textContent.includes('2 of 2 files are still missing')")
+    assert not browser.find_element(By.CSS_SELECTOR, "#send").is_enabled()
     chooser.send_keys("\n".join(str(sample / n) for n in ("scan.tif", "cloth.csv")))
-    wait_for(browser, "!document.querySelector('.drop button').disabled")
-    click_on(browser, ".drop button")
+    wait_for(browser, "!document.querySelector('#send').disabled")
+    click_on(browser, "#send")
     wait_for(browser, "location.hash.length > 10")
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)
     assert text_of(browser, "h1") == "dropped twill"
@@ -36,7 +36,7 @@ def drop_in(browser, *paths):
     chooser = browser.find_element(By.CSS_SELECTOR, ".drop input:not([webkitdirectory])")
     browser.execute_script("arguments[0].style.display = 'block'", chooser)
     chooser.send_keys("\n".join(map(str, paths)))
-    wait_for(browser, "!document.querySelector('.drop button').disabled")
+    wait_for(browser, "!document.querySelector('#send').disabled")
 
 
 def option(browser, path):
@@ -96,12 +96,12 @@ def test_form_writes_a_job_document(stub, browser, tmp_path):
     drop_in(browser, *(tmp_path / n for n in ("cloth.hair", "p0.exr", "p1.exr")))
     # the server refuses a value: its row is marked, and the corrected document is another one
     fill_in(browser, "lamp.side_cm", "5000")
-    click(browser, browser.find_element(By.CSS_SELECTOR, ".drop button"))
+    click(browser, browser.find_element(By.CSS_SELECTOR, "#send"))
     wait_for(browser, "document.querySelector(`#editor .option.bad[data-path='lamp.side_cm'] .problem`)?.textContent.includes('0.01 to 1000')")
     keep(browser, "form-refused")
     fill_in(browser, "lamp.side_cm", "12.5")
     assert "bad" not in option(browser, "lamp.side_cm").get_attribute("class")
-    click(browser, browser.find_element(By.CSS_SELECTOR, ".drop button"))
+    click(browser, browser.find_element(By.CSS_SELECTOR, "#send"))
     wait_for(browser, "location.hash.length > 10")
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)
     assert selvedge.Client(url).job(browser.execute_script("return location.hash.slice(1)")).document() == document
@@ -139,7 +139,7 @@ def test_pieces_are_no_larger_than_the_server_takes(browser, tmp_path):
         (sample / "scan.tif").write_bytes(os.urandom(2_500_000))
         browser.get(url + "/#new")
         drop_in(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))
-        click_on(browser, ".drop button")
+        click_on(browser, "#send")
         wait_for(browser, "document.querySelector('.state.succeeded')")
         assert complaints(browser) == []
     finally:
@@ -156,12 +156,12 @@ def test_submit_goes_on_with_its_job_after_a_broken_upload(stub, browser, tmp_pa
     before = jobs()
     browser.get(url + "/#new")
     drop_in(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))
-    button = browser.find_element(By.CSS_SELECTOR, ".drop button")
+    button = browser.find_element(By.CSS_SELECTOR, "#send")
     browser.execute_script("""
         window.realFetch = fetch;
         window.fetch = (u, o) => o.method === "PATCH" ? Promise.resolve(new Response("{}", {status: 500})) : realFetch(u, o);""")
     button.click()
-    wait_for(browser, "document.querySelector('.drop .note.bad') && !document.querySelector('.drop button').disabled")
+    wait_for(browser, "document.querySelector('#submit .note.bad') && !document.querySelector('#send').disabled")
     (job_id,) = set(jobs()) - set(before)
     # the corrected scan is dropped again and replaces the declared one
     corrected = tmp_path / "scan.tif"
@@ -185,7 +185,7 @@ def test_the_document_is_sent_as_it_was_written(stub, browser):
     (sample / "job.json").write_text(json.dumps(document))
     browser.get(url + "/#new")
     drop_in(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))
-    click_on(browser, ".drop button")
+    click_on(browser, "#send")
     wait_for(browser, "location.hash.length > 10")
     job = selvedge.Client(url).job(browser.execute_script("return location.hash.slice(1)"))
     assert job.document() == document
@@ -202,9 +202,9 @@ def test_copy_a_job_with_changes(stub, browser, tmp_path):
     browser.get(f"{url}/#{first.id}")
     wait_for(browser, "document.querySelector('#state a.button')")
     click(browser, browser.find_element(By.CSS_SELECTOR, "#state a.button"))
-    wait_for(browser, "document.querySelector('.drop').textContent.includes('Ready.')")
+    wait_for(browser, "document.querySelector('#submit').textContent.includes('Ready.')")
     assert browser.current_url.endswith(f"#new?copy={first.id}") and written(browser) == first.state().raw["document"]
-    asked = text_of(browser, ".drop ul")
+    asked = text_of(browser, "#new-files")
     assert "scan.tif" in asked and "cloth.csv" in asked and "4 B in the copied job, on the server already: it is not sent again" in asked
     assert "copied <b>twill" in text_of(browser, "#submit") and browser.find_elements(By.CSS_SELECTOR, "#submit p b") == []
     wait_for(browser, "document.querySelectorAll('#editor .options > *').length >= 9")
@@ -212,12 +212,12 @@ def test_copy_a_job_with_changes(stub, browser, tmp_path):
     fill_in(browser, "volume.voxel_size_um", "2.5")
     (tmp_path / "cloth.csv").write_text("another table\n")
     drop_in(browser, tmp_path / "cloth.csv")  # the scan is that of the copied job
-    assert "another file: 4 B in the copied job" in text_of(browser, ".drop ul")
+    assert "another file: 4 B in the copied job" in text_of(browser, "#new-files")
     keep(browser, "copy")
     with sized(browser, 375, 800):
         assert scrolls_sideways(browser) == []
         keep(browser, "copy-375", 375, 800)
-    click(browser, browser.find_element(By.CSS_SELECTOR, ".drop button"))
+    click(browser, browser.find_element(By.CSS_SELECTOR, "#send"))
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)
     made = selvedge.Client(url).job(browser.execute_script("return location.hash.slice(1)")).state().raw
     changed = {"sample": "changed twill", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.5}}
@@ -242,8 +242,8 @@ def test_copy_from_the_list_keeps_large_numbers(stub, browser):
     wait_for(browser, "document.querySelector('#document')?.textContent.includes('seed')")
     assert written(browser) == document and str(LARGE_SEED) in text_of(browser, "#document")
     browser.get(f"{url}/#new?copy=00000000-0000-0000-0000-000000000000")
-    wait_for(browser, "document.querySelector('.drop .note.bad')?.textContent.includes('The job to copy is not there')")
+    wait_for(browser, "document.querySelector('#submit .note.bad')?.textContent.includes('The job to copy is not there')")
     browser.get(f"{url}/#new?copy=%22%3E")
-    wait_for(browser, "document.querySelector('.drop .note.bad')?.textContent.includes('names no job')")
+    wait_for(browser, "document.querySelector('#submit .note.bad')?.textContent.includes('names no job')")
     job.delete()
     assert [c for c in complaints(browser) if "404" not in c] == []

@@ -31,9 +31,9 @@ def test_faults_are_shown_before_anything_is_sent(stub, browser, tmp_path):
     wait_for(browser, "document.querySelectorAll('#faults li').length === 2")
     faults = texts(browser, "#faults li")
     assert any("volume.voxel_size_um" in f for f in faults) and any("lamp.side_cm" in f for f in faults)
-    shown = texts(browser, ".drop > ul > li")
+    shown = texts(browser, "#new-files > li")
     assert "is empty" in shown[0] and "scan.tiff" in shown[2] and "Not named by the document" in shown[2]
-    assert browser.execute_script("return document.querySelector('.drop button').disabled")
+    assert browser.execute_script("return document.querySelector('#send').disabled")
     click_on(browser, "#editor > summary")
     wait_for(browser, "document.querySelector(`#editor .option[data-path='lamp.side_cm']`)")
     wait_for(browser, "document.querySelector(`#editor .option.bad[data-path='lamp.side_cm'] .problem`)?.textContent.includes('0.01 to 1000')")
@@ -47,8 +47,8 @@ def test_faults_are_shown_before_anything_is_sent(stub, browser, tmp_path):
     wait_for(browser, "document.querySelectorAll('#faults li').length === 0")
     (tmp_path / "scan.tif").write_bytes(b"scan")
     choose(browser, tmp_path / "scan.tif")
-    wait_for(browser, "!document.querySelector('.drop button').disabled")
-    assert text_of(browser, ".drop > p") == "Ready."
+    wait_for(browser, "!document.querySelector('#send').disabled")
+    assert text_of(browser, "#send-state") == "Ready."
     assert len(list(selvedge.Client(url).jobs())) == before and count(browser, "/v1/uploads/") == 0
     assert complaints(browser) == []
 
@@ -61,8 +61,8 @@ def test_a_file_that_is_too_large(tmp_path, browser):
     (tmp_path / "cloth.csv").write_text("set\n")
     browser.get(url + "/#new")
     choose(browser, *(tmp_path / n for n in ("job.json", "scan.tif", "cloth.csv")))
-    wait_for(browser, "document.querySelector('.drop > p').textContent.includes('this server takes')")
-    assert browser.execute_script("return document.querySelector('.drop button').disabled")
+    wait_for(browser, "document.querySelector('#send-state').textContent.includes('this server takes')")
+    assert browser.execute_script("return document.querySelector('#send').disabled")
     stop_daemon(process)
 
 
@@ -74,10 +74,10 @@ def test_faults_of_files_are_all_shown_before_the_job_starts(stub, browser, tmp_
     (tmp_path / "cloth.csv").write_text("set\n")
     browser.get(url + "/#new")
     choose(browser, *(tmp_path / n for n in ("job.json", "scan.tif", "cloth.csv")))
-    wait_for(browser, "!document.querySelector('.drop button').disabled")
-    click_on(browser, ".drop button")
-    wait_for(browser, "document.querySelector('.drop > p').textContent.includes('2 faults')")
-    said = text_of(browser, ".drop > p")
+    wait_for(browser, "!document.querySelector('#send').disabled")
+    click_on(browser, "#send")
+    wait_for(browser, "document.querySelector('#send-state').textContent.includes('2 faults')")
+    said = text_of(browser, "#send-state")
     assert "volume.files: cannot read volume 'scan.tif': it is no scan" in said and "measurements.file: line 1 of 'cloth.csv'" in said
     keep(browser, "faults-of-files")
     made = next(j for j in selvedge.Client(url).jobs() if j.sample == "faulty files")
@@ -91,10 +91,10 @@ def test_files_that_the_server_has_are_not_sent(stub, browser):
     first, sample = submit(url, folder, "sent once")
     browser.get(url + "/#new")
     choose(browser, *(sample / n for n in ("job.json", "scan.tif", "cloth.csv")))
-    wait_for(browser, "document.querySelectorAll('.drop > ul > li .hint').length === 2")
-    assert all("on the server already: it is not sent again" in t for t in texts(browser, ".drop > ul > li"))
+    wait_for(browser, "document.querySelectorAll('#new-files > li .hint').length === 2")
+    assert all("on the server already: it is not sent again" in t for t in texts(browser, "#new-files > li"))
     keep(browser, "known-inputs")
-    click_on(browser, ".drop button")
+    click_on(browser, "#send")
     wait_for(browser, "location.hash.length > 10")
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)
     made = selvedge.Client(url).job(browser.execute_script("return location.hash.slice(1)"))

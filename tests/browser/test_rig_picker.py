@@ -48,7 +48,7 @@ def test_views_of_a_rig_are_picked(stub, browser, tmp_path):
     assert "v01: lamp low, camera top, cloth turned 90°" in text_of(browser, "#rig-picker select")
     # the driver adds to the files that were chosen before, the document too: so all others come before the views
     choose_files(browser, *[tmp_path / name for name in ("cloth.hair", "p0.exr", "p1.exr", "p2.exr")])
-    wait_for(browser, "!document.querySelector('.drop button').disabled")
+    wait_for(browser, "!document.querySelector('#send').disabled")
     pick(browser, 0, "v01")
     pick(browser, 1, "v02")
     pick(browser, 2, "v01")
@@ -58,9 +58,9 @@ def test_views_of_a_rig_are_picked(stub, browser, tmp_path):
         assert browser.execute_script("""return ['#rig-picker', '#rig-picker .scroll'].every((s) => {
             const n = document.querySelector(s); return n.scrollWidth <= n.clientWidth; })""")
         keep(browser, "rig-phone", 375, 812)
-    wait_for(browser, "!document.querySelector('.drop button').disabled")
+    wait_for(browser, "!document.querySelector('#send').disabled")
     keep(browser, "rig-picker")
-    click_on(browser, ".drop button")
+    click_on(browser, "#send")
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)
     job = selvedge.Client(url).job(browser.execute_script("return location.hash.slice(1)"))
     stored = job.document()

@@ -2,6 +2,7 @@
 import { bulkActions } from "./bulk_actions.js";
 import { JobTable } from "./job_table.js";
 import { el } from "../page_parts.js";
+import { exampleOffer } from "../submit/example_job.js";
 import { getJson, poll, raw } from "../server_link.js";
 
 const PAGE_SIZE = 50, WAIT_S = 25, STATES = ["draft", "queued", "running", "paused", "succeeded", "failed", "cancelled"];
@@ -53,7 +54,8 @@ function heading(text, key, wanted, change) {
 
 export function listPage(page, asked) {
   const wanted = new URLSearchParams([...asked].filter(([key]) => KEYS.includes(key)));
-  const picked = new Map(), body = el("tbody"), head = el("tr"), empty = el("p", { class: "hint hidden", id: "no-jobs" });
+  const picked = new Map(), body = el("tbody"), head = el("tr"), empty = el("p", { class: "hint hidden", id: "no-jobs" }), example = exampleOffer();
+  example.classList.add("hidden");
   const cursors = [null]; // of the pages before, and of this one
   let tag = null, next = null, request = new AbortController();
 
@@ -77,7 +79,7 @@ export function listPage(page, asked) {
     el("th", {}, "Progress"), el("th", {}, "Stage or fault"), el("th", { class: "number" }, "Time left"), heading("Created", "created", wanted, change));
   headings();
   page.append(el("section", { class: "card" }, el("h1", { class: "list" }, "Jobs"), filters(wanted, change), bulk.node,
-    el("div", { class: "wide" }, el("table", { id: "jobs" }, el("thead", {}, head), body)), empty, el("div", { class: "pages" }, back, forth, place)));
+    el("div", { class: "wide" }, el("table", { id: "jobs" }, el("thead", {}, head), body)), empty, example, el("div", { class: "pages" }, back, forth, place)));
 
   const poller = poll(async () => {
     const query = queryOf(wanted), cursor = cursors[cursors.length - 1], have = table.digests(), signal = request.signal;
@@ -91,8 +93,9 @@ export function listPage(page, asked) {
     next = behind;
     table.update(jobs);
     const filtered = ["sample", "state", "verdict", "tag", "from", "to", "batch"].some((key) => wanted.get(key));
-    empty.textContent = filtered ? "No job fits these filters." : "No jobs yet. Press “New job”, drop a job document and its files on this page, or use `selvedge submit JOB.json`.";
+    empty.textContent = filtered ? "No job fits these filters." : "No jobs yet. Press “New job”, or drop the files of a sample or their folder on this page.";
     empty.classList.toggle("hidden", jobs.length > 0);
+    example.classList.toggle("hidden", jobs.length > 0 || filtered);
     back.disabled = cursors.length === 1;
     forth.disabled = next === null;
     const sorted = wanted.get("sort") === "sample" || wanted.get("order") === "asc";

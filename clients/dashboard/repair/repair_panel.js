@@ -3,7 +3,8 @@
 import { memberText } from "../copied_job.js";
 import { el, size } from "../page_parts.js";
 import { raw, sendJson } from "../server_link.js";
-import { declare, filesOf, pieceBytes, removeFile, upload } from "../submit_panel.js";
+import { filesOf } from "../submit/job_files.js";
+import { declare, pieceBytes, removeFile, upload } from "../submit/uploads.js";
 import { placeOf, replaced } from "./json_place.js";
 
 const INPUT_ERRORS = new Set(["invalid", "format", "numeric", "unsupported", "not_found", "too_large"]), SHOWN_FILES = 6;

@@ -55,6 +55,13 @@ export class LiveCheck {
     }, PAUSE_MS);
   }
 
+  // Takes the faults away while the document is not complete.
+  clear() {
+    clearTimeout(this.timer);
+    this.turn++;
+    if (this.node.childElementCount) this.show([]);
+  }
+
   show(faults) {
     const line = ({ field, detail }) => el("li", {}, field && !detail.includes(field) ? `${field}: ${detail}` : detail);
     this.node.replaceChildren(...(faults.length ? [el("p", { class: "note bad" }, faults.length === 1 ? "The job document has a fault:" : `The job document has ${faults.length} faults:`), el("ul", {}, faults.map(line))] : []));
