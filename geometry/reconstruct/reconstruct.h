@@ -106,7 +106,9 @@ status reconstruct_trial(const struct volume *v, const struct fiber_set *f, cons
                          struct thread_pool *pool, const struct progress *progress, struct reconstruct_report *report,
                          struct error *err);
 
-/* Step "directions": voxels within 2r of a polyline get its tangent as direction (thesis 5.6.7). */
+/* Step "directions": voxels within 2r of a polyline get its tangent as direction (thesis 5.6.7). Then the density of
+ * voxels in and beside fibers becomes the share of the voxel that they fill (line_densities.h), but for scans whose
+ * grade is GRADE_UNRESOLVED. */
 status reconstruct_transfer(const struct fiber_set *f, struct direction_volume *d, struct thread_pool *pool,
                             const struct progress *progress, struct reconstruct_report *report, struct error *err);
 

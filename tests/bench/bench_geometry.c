@@ -205,6 +205,7 @@ static void print_figures(const char *name, const struct condition *k, double bl
     print(name, "direction_volume_p95_deg", r->transferred.inside.p95_deg, "deg", "lower");
     print(name, "direction_volume_rim_mean_deg", r->transferred.rim.mean_deg, "deg", "lower");
     print(name, "radius_bias", 0.01 * fabs(c->radius_bias_percent), "1", "lower");
+    print(name, "volume_ratio_error", fabs(r->volume_ratio - 1.0), "1", "lower");
     print(name, "contrast", r->grade.contrast, "1", "higher");
     print(name, "valley_depth", r->grade.valley_depth, "1", "higher");
     print(name, "safe_share", r->grade.safe_share, "1", "higher");

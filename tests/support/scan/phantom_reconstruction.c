@@ -40,6 +40,24 @@ static status grade(struct phantom_reconstruction *r, struct thread_pool *pool, 
     return s;
 }
 
+/* Sum of the densities in voxels, over the volume of fibers. */
+static double volume_ratio(const struct fiber_set *f, const struct direction_volume *d)
+{
+    double sum = 0.0, volume_m3 = 0.0;
+    for (size_t i = 0; i < volume_n_voxel(d->n); i++) sum += (double)d->density[i] / 255.0;
+    for (size_t i = 0; i < f->n_fiber; i++)
+        for (size_t k = f->first_vertex[i]; k + 1 < f->first_vertex[i + 1]; k++) {
+            const double r = 0.5 * (double)(fiber_radius_m(f, i, k) + fiber_radius_m(f, i, k + 1));
+            double length2 = 0.0;
+            for (size_t a = 0; a < 3; a++) {
+                const double step = (double)f->position_m[3 * k + 3 + a] - (double)f->position_m[3 * k + a];
+                length2 += step * step;
+            }
+            volume_m3 += M_PI * r * r * sqrt(length2);
+        }
+    return sum * d->voxel_size_m[0] * d->voxel_size_m[1] * d->voxel_size_m[2] / volume_m3;
+}
+
 static status reconstruct(struct phantom_reconstruction *r, struct thread_pool *pool, struct error *err)
 {
     struct direction_volume d = {0};
@@ -57,6 +75,7 @@ static status reconstruct(struct phantom_reconstruction *r, struct thread_pool *
     if (s == STATUS_OK) s = grade(r, pool, err);
     if (s == STATUS_OK) s = reconstruct_transfer(&r->found, &d, pool, NULL, &r->report, err);
     if (s == STATUS_OK) s = compare(r, &d, pool, &r->transferred, err);
+    if (s == STATUS_OK) r->volume_ratio = volume_ratio(&r->truth, &d);
     direction_volume_release(&d);
     return s;
 }

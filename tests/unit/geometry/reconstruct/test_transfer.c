@@ -1,6 +1,7 @@
 /* Direction transfer (fabric thesis 5.6.7) against distances computed here: a kept voxel within 2 r of the axis of a
- * fiber takes that fiber's direction, all others keep theirs; the share of fibers that is material counts voxels
- * within r. In a scan that does not resolve fibers, directions are means over those around. */
+ * fiber takes that fiber's direction, all others keep theirs, but for empty ones that a fiber fills in part; the
+ * share of fibers that is material counts voxels within r. Densities are the shares of the voxels that fibers fill.
+ * In a scan that does not resolve fibers, directions are means over those around. */
 #include "geometry/reconstruct/reconstruct.h"
 
 #include <math.h>
@@ -56,6 +57,14 @@ static double radii_away(size_t y, size_t z, size_t i)
     return hypot((double)y + 0.5 - fiber[i][0], (double)z + 0.5 - fiber[i][1]) / fiber[i][2];
 }
 
+/* Distance of a voxel's center from the surface of the fiber whose axis is nearer. */
+static double surface_away(size_t y, size_t z)
+{
+    double away[2];
+    for (size_t i = 0; i < 2; i++) away[i] = radii_away(y, z, i) * fiber[i][2];
+    return away[0] < away[1] ? away[0] - fiber[0][2] : away[1] - fiber[1][2];
+}
+
 static void test_transfer(void **state)
 {
     (void)state;
@@ -69,12 +78,16 @@ static void test_transfer(void **state)
     for (size_t at = 0; at < (size_t)NX * NY * NZ; at++) {
         size_t y = at / NX % NY, z = at / (NX * NY);
         double away = fmin(radii_away(y, z, 0), radii_away(y, z, 1));
-        bool changes = is_kept(z) && away <= 2.0;
+        const double surface = surface_away(y, z);
+        const int share = (int)fmax(1.0, rint(255.0 * fmin(1.0, 0.5 - surface)));
+        bool changes = (is_kept(z) && away <= 2.0) || surface < 0.499;
+        if (surface < 0.49) assert_true(abs((int)d.density[at] - share) <= 3);
+        if (surface > 0.51) assert_int_equal(d.density[at], is_kept(z) ? 200 : 0);
         float got[3];
         direction_volume_get(&d, at, got);
         float cosine = changes ? got[0] : got[0] * before[0] + got[1] * before[1] + got[2] * before[2];
         if (fabsf(cosine) < 0.9999f) fail_msg("voxel y %zu, z %zu, %.3f radii from a fiber", y, z, away);
-        n_changed += changes;
+        n_changed += is_kept(z) && away <= 2.0;
         n_fiber += away <= 1.0;
         n_both += away <= 1.0 && is_kept(z);
         n_kept += is_kept(z);
