@@ -46,12 +46,12 @@ static void count_axes(const struct direction_volume *d, double share[3])
 }
 
 static const double MOST_SCALE = 1.25, MOST_GROWTH = 1.03;
-static const double EDGE_SHIFT = 0.3; /* 0.5 for single cylinders */
+static const double EDGE_SHIFT = 0.35; /* 0.5 for single cylinders */
 
 /* Returns the radius by the edges of the fibers over the mean of their radii, which are scaled to their mass. Mass
  * counts blurred fibers as too thick, because the blur lowers the density on their axes that it is compared with, and
  * those with bright rims as too thin. Blur moves the edge of a single cylinder inwards by blur^2 / (2 radius), and
- * 0.6 of it remains where neighbours touch. 1 where radii are those by the edges or were given. */
+ * 0.7 of it remains where neighbours touch. 1 where radii are those by the edges or were given. */
 static double edges_over_mass(const struct fiber_set *f, const struct reconstruct_report *report)
 {
     const double edge = report->profile_radius_m, blur = report->profile_blur_m;
