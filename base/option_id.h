@@ -81,6 +81,7 @@
 #define OPTION_STARTS "starts"
 #define OPTION_PRIORS "priors"
 #define OPTION_PROFILE_JOB "profile_job"
+#define OPTION_RESULT_FILE "result_file"
 #define OPTION_NUISANCE "nuisance"
 #define OPTION_TEXTURE_BLOCK "texture_block"
 #define OPTION_FIT_RADIUS "fit_radius"

@@ -77,6 +77,12 @@ static status write_twin(struct report *report, struct error *err)
     return done(report, REPORT_TWIN, "twin", s);
 }
 
+static status write_exports(struct report *report, struct error *err)
+{
+    status s = exports_write(report, before(report, REPORT_EXPORTS), after(report, REPORT_EXPORTS), err);
+    return done(report, REPORT_EXPORTS, "exports", s);
+}
+
 static status write_pages(struct report *report, struct error *err)
 {
     status s = report_write(report, err);
@@ -104,6 +110,7 @@ static status report_pictures(struct report *report, struct error *err)
     status s = write_geometry(report, err);
     if (s == STATUS_OK) s = write_surfaces(report, err);
     if (s == STATUS_OK) s = write_twin(report, err);
+    if (s == STATUS_OK) s = write_exports(report, err);
     if (s == STATUS_OK) pipeline_reach_verdict(report);
     if (s == STATUS_OK) s = result_pictures_json_write(report, err);
     if (s == STATUS_OK) s = result_summary_write(report, err);
@@ -151,9 +158,7 @@ static status report_fit(struct report *report, struct error *err)
             result_renderings_write(report, before(report, REPORT_RENDERINGS), after(report, REPORT_RENDERINGS), err));
     if (s == STATUS_OK) s = write_surfaces(report, err);
     if (s == STATUS_OK) s = write_twin(report, err);
-    if (s == STATUS_OK)
-        s = done(report, REPORT_EXPORTS, "exports",
-                 exports_write(report, before(report, REPORT_EXPORTS), after(report, REPORT_EXPORTS), err));
+    if (s == STATUS_OK) s = write_exports(report, err);
     if (s == STATUS_OK) s = result_json_write(report, err);
     return s == STATUS_OK ? write_pages(report, err) : s;
 }

@@ -16,6 +16,7 @@
 #include "optimizer/photographs/rows/observation.h"
 #include "optimizer/stages/run/stage_tools.h"
 #include "renderer/scattering/appearance.h"
+#include "renderer/transport/discrepancy.h"
 
 /* The rows of a job. */
 struct measured_rows {
@@ -34,6 +35,13 @@ struct measured_rows {
 struct profile_rows {
     struct fiber_profile profile;
     struct bowl_record bowl; /* of a profile from photographs of a bowl */
+};
+
+/* The result of an earlier job whose parameters are shown: of each row of measured_rows.observation its rendered mean
+ * and variance, and the smooth factor. */
+struct given_result {
+    double (*rendered_rgb)[3], (*rendered_var)[3]; /* NULL: none was given */
+    struct discrepancy factor;
 };
 
 /* A model of the job and its parameters before the fit. */
@@ -73,6 +81,7 @@ struct job_inputs {
     bool resumed;         /* an earlier attempt has left work of the same inputs */
     uint64_t fingerprint; /* of the job document's text and this build of the program */
     struct measured_rows rows;
+    struct given_result given;
     struct profile_rows fiber;
     size_t n_model;
     struct model_setup *model; /* in the order of the document */

@@ -384,6 +384,7 @@ status pipeline_run(struct stage_tools *tools, const struct job_inputs *inputs, 
     status s = open_space(p, err);
     if (s == STATUS_OK) s = list_files(inputs, &p->files, err);
     if (s == STATUS_OK && inputs->kind == JOB_OF_PICTURES) s = fit_output_given(inputs, &p->out.fit, err);
+    if (s == STATUS_OK && inputs->kind == JOB_OF_PICTURES) s = validation_output_given(inputs, &p->out.validation, err);
     if (s == STATUS_OK) s = run_stages(p, err);
     pipeline_release(p);
     free(p);

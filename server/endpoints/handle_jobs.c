@@ -98,7 +98,7 @@ void handle_create_job(struct http_request *r)
         else
             reply_refusal(r, &refusal, &err);
     else
-        reply_job(r, id, MHD_HTTP_CREATED, true, replayed);
+        reply_new_job(r, id, replayed);
 }
 
 void handle_get_job(struct http_request *r)
@@ -148,6 +148,11 @@ void handle_delete_job(struct http_request *r)
         reply_problem(r, NULL, &err, NULL);
     else
         reply_empty(r, MHD_HTTP_NO_CONTENT);
+}
+
+void reply_new_job(struct http_request *r, const char *id, bool replayed)
+{
+    reply_job(r, id, MHD_HTTP_CREATED, true, replayed);
 }
 
 static void begin_job(struct http_request *r, bool retry)

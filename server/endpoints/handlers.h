@@ -14,6 +14,8 @@ void handle_upload_bytes_abandoned(struct http_request *request);
 /* The files of the dashboard. */
 void handle_static(struct http_request *request);
 
+/* Replies 201 with a job that was made, now or by an earlier request (`replayed`). */
+void reply_new_job(struct http_request *request, const char *id, bool replayed);
 /* Judges the files of a job that is to be started. Returns false after deciding a reply: 422 with all faults, or why
  * they could not be judged. */
 bool check_inputs(struct http_request *request);

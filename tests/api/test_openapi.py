@@ -13,6 +13,7 @@ import requests
 from daemon_under_test import DOCUMENT, ROOT, TUS
 from hypothesis import strategies as st
 from openapi_check import METHODS, OpenApiCheck, load
+from small_cloth import hair
 
 API = load()
 OPERATIONS = [(path, method, item[method]) for path, item in API["paths"].items() for method in METHODS if method in item]
@@ -217,6 +218,13 @@ def test_every_operation_answers_as_documented(daemon, daemon_maker):
     call("getBatchTable", "GET", f"/v1/batches/{batch}/results.csv")
     call("deleteBatch", "DELETE", f"/v1/batches/{batch}?jobs=delete")
     call("listDeliveries", "GET", "/v1/deliveries")
+    results = os.path.join(daemon.data, "jobs", job, "results")
+    with open(os.path.join(results, "fibers.hair"), "wb") as f:
+        f.write(hair())
+    with open(os.path.join(results, "result.json"), "w", encoding="utf-8") as f:
+        json.dump({"sample": "s", "model": "isotropic.v1", "parameters": [{"name": f"C.{c}", "set": None, "value": 0.5} for c in "rgb"], "rows": []}, f)
+    call("deriveJob", "POST", f"/v1/jobs/{job}/derive", json={"pictures": [{"on": "mesh", "mesh_file": "a.obj", "light_theta_deg": 45, "light_phi_deg": 0,
+                                                                            "camera_theta_deg": 30, "camera_phi_deg": 180}]})
     call("keepJob", "PUT", f"/v1/jobs/{job}/keep")
     call("unkeepJob", "DELETE", f"/v1/jobs/{job}/keep")
     call("planRetention", "GET", "/v1/retention?max_bytes=1")

@@ -89,6 +89,7 @@ static const struct role_rule role_rule[] = {
     {"camera_noise", "a record of `selvedge calibrate-camera`: .json", {[KIND_UNKNOWN] = true, [KIND_JSON] = true}},
     {"mesh", "a mesh: .obj", {[KIND_UNKNOWN] = true, [KIND_MESH] = true}},
     {"draft", "a draft: .wif", {[KIND_UNKNOWN] = true, [KIND_DRAFT] = true}},
+    {"result", "the result of a job: result.json", {[KIND_UNKNOWN] = true, [KIND_JSON] = true}},
     {"rig", "a rig file: .json", {[KIND_UNKNOWN] = true, [KIND_JSON] = true}},
 };
 

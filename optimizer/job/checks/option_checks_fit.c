@@ -113,9 +113,25 @@ static status make_grid(const struct job_setup *setup, struct job_fit *fit, stru
 status job_check_export(const struct option_value *v, struct error *err)
 {
     const bool *wanted = v->target;
-    if (!*wanted || job_sections_kind(v->section) == JOB_OF_FIT) return STATUS_OK;
+    if (!*wanted || job_sections_kind(v->section) == JOB_OF_FIT || v->section->fit->result_file[0] != '\0')
+        return STATUS_OK;
+    return error_set_field(
+        err, STATUS_INVALID, v->path,
+        "'%s' needs a fitted model: give 'photographs', 'measurements', or the result of another job "
+        "as 'fit.result_file'",
+        v->path);
+}
+
+status job_check_result_file(const struct option_value *v, struct error *err)
+{
+    const struct job_fit *fit = v->section->fit;
+    const enum job_kind kind = job_sections_kind(v->section);
+    if (fit->result_file[0] == '\0' || kind == JOB_OF_PICTURES) return STATUS_OK;
     return error_set_field(err, STATUS_INVALID, v->path,
-                           "'%s' needs a fitted model: give 'photographs' or 'measurements'", v->path);
+                           "'%s' is given, but the job finds parameters of its own: leave it out, or '%s'", v->path,
+                           kind == JOB_OF_PROFILE               ? "profile"
+                           : v->section->rows->n_photograph > 0 ? "photographs"
+                                                                : "measurements");
 }
 
 /* Speckle is of path-traced pictures of models that have it, whichever of the job's models will be the best. */

@@ -181,11 +181,11 @@ static status check_one_cloth(const struct option_value *v, struct error *err)
         "file ('fibers') or a description ('cloth')");
 }
 
-/* Of a job without photographs and measurements: it ends with the geometry of a scan, or renders pictures. */
+/* Of a job without photographs and measurements: it ends with the geometry of a scan, or shows given parameters. */
 static status check_no_measurement(const struct option_value *v, struct error *err)
 {
     static const char missing[] = "'photographs' is missing: ";
-    bool pictures = given(v, "pictures");
+    bool pictures = given(v, "pictures") || v->section->fit->result_file[0] != '\0';
     if (!given(v, "volume") && !pictures)
         return error_set_field(err, STATUS_INVALID, "photographs",
                                "%sgive a list of photographs, or 'measurements' with a table", missing);

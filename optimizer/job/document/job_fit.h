@@ -37,6 +37,7 @@ struct job_fit {
     double precision;     /* noise of tracing over the photographs' errors at which the fit ends; 0: none */
     char
         profile_job[JOB_MAX_ID_BYTES]; /* id of a job with a profile, whose results are priors; "" when none is given */
+    char result_file[JOB_MAX_NAME_BYTES]; /* result.json of the job whose parameters are shown; "" when none is given */
     bool share_camera_paths;
     double plain_prior; /* strength; 0: none */
     bool discrepancy;

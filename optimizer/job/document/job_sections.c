@@ -1,5 +1,6 @@
 #include "optimizer/job/document/job_sections.h"
 #include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_profile.h"
 #include "optimizer/job/document/job_results.h"
@@ -21,7 +22,8 @@ enum job_kind job_sections_kind(const struct job_sections *section)
 {
     if (section->rows->n_photograph > 0 || section->rows->measurement_file[0] != '\0') return JOB_OF_FIT;
     if (job_profile_given(section->profile)) return JOB_OF_PROFILE;
-    return section->results->n_surface_picture > 0 ? JOB_OF_PICTURES : JOB_OF_GEOMETRY;
+    return section->results->n_surface_picture > 0 || section->fit->result_file[0] != '\0' ? JOB_OF_PICTURES
+                                                                                           : JOB_OF_GEOMETRY;
 }
 
 /* ---- input files ---- */
@@ -50,6 +52,7 @@ void job_sections_visit_files(const struct job_sections *section,
     if (section->cloth->texture[0] != '\0') visit(context, section->cloth->texture, "photograph");
     if (section->setup->environment_file[0] != '\0') visit(context, section->setup->environment_file, "environment");
     if (section->rows->measurement_file[0] != '\0') visit(context, section->rows->measurement_file, "measurements");
+    if (section->fit->result_file[0] != '\0') visit(context, section->fit->result_file, "result");
     if (section->profile->file[0] != '\0') visit(context, section->profile->file, "profile");
     visit_bowl(&section->profile->bowl, visit, context);
     if (section->setup->rig_file[0] != '\0') visit(context, section->setup->rig_file, "rig");
@@ -110,6 +113,7 @@ void job_sections_file_key(const struct job_sections *section, const char *name,
                   {section->cloth->texture, "cloth.texture"},
                   {section->setup->environment_file, "environment.file"},
                   {section->setup->rig_file, "rig.file"},
+                  {section->fit->result_file, "fit.result_file"},
                   {section->profile->file, "profile.file"},
                   {section->profile->bowl.mask, "profile.bowl.mask"},
                   {section->setup->noise_file, "camera.noise_file"},

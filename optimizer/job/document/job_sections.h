@@ -27,7 +27,7 @@ struct job_sections {
 /* The work of a job, by the sections that its document has. */
 enum job_kind {
     JOB_OF_GEOMETRY, /* ends with the geometry of its scan */
-    JOB_OF_PICTURES, /* renders pictures of its cloth with the parameters that the document holds fixed */
+    JOB_OF_PICTURES, /* shows its cloth with parameters that the document holds fixed */
     JOB_OF_FIT,      /* fits models to photographs or a table of measurements */
     JOB_OF_PROFILE   /* fits models to the profile of a single fiber; it has no cloth */
 };
@@ -35,7 +35,8 @@ enum job_kind {
 enum job_kind job_sections_kind(const struct job_sections *section);
 
 /* Calls visit for every input file that the document names, with its role ("volume", "fibers", "environment", "draft",
- * "measurements", "photograph", "camera_noise", "dark_frame", "chart", "white_reference", "mesh", "profile"). */
+ * "measurements", "photograph", "camera_noise", "dark_frame", "chart", "white_reference", "mesh", "profile",
+ * "result"). */
 void job_sections_visit_files(const struct job_sections *section,
                               void (*visit)(void *context, const char *name, const char *role), void *context);
 /* Writes the key that names an input file, as "photographs[2].file": the last one where several do, "" where none. */

@@ -14,11 +14,13 @@ static const char *const none_auto[] = {"none", "auto", NULL};
 #define ONE_OF(a, b) "{\"oneOf\": [" REQUIRED(a) ", " REQUIRED(b) "]}"
 #define NONE_OF_FOUR(a, b, c, d)                                                                                       \
     "{\"not\": {\"anyOf\": [" REQUIRED(a) ", " REQUIRED(b) ", " REQUIRED(c) ", " REQUIRED(d) "]}}"
-/* A job of pictures only: parameters that are given, without photographs. */
+/* A job that shows parameters that are given, without photographs. */
+#define SHOWN                                                                                                          \
+    "{\"anyOf\": [" REQUIRED("pictures") ", {\"properties\": {\"fit\": {\"required\": [\"result_file\"], "             \
+                                         "\"description\": \"With the result of another job.\"}}}]}"
 #define PICTURES_ONLY                                                                                                  \
-    "{\"allOf\": [{\"required\": [\"pictures\", \"fit\"]}, "                                                           \
-    "{\"not\": {\"anyOf\": [" REQUIRED("measurements") ", " REQUIRED("photographs") ", " REQUIRED(                     \
-        "correction") "]}}]}"
+    "{\"allOf\": [" REQUIRED("fit") ", " SHOWN ", {\"not\": {\"anyOf\": [" REQUIRED("measurements") ", " REQUIRED(     \
+        "photographs") ", " REQUIRED("correction") "]}}]}"
 /* A job with the profile of a single fiber: it has no cloth. */
 #define NOT(a) "{\"not\": " REQUIRED(a) "}"
 #define PROFILE_ONLY                                                                                                   \

@@ -117,6 +117,15 @@ const struct job_option option_rows_fit[] = {
      .meaning = "A job that fitted models to the profile of a fiber of this cloth. Its determined parameters become "
                 "`priors` here, with their standard errors, unless they are fixed, tied or have priors; colors only "
                 "where the profile has three channels."},
+    {.path = "fit.result_file",
+     .kind = OPTION_FILE_NAME,
+     .id = OPTION_RESULT_FILE,
+     TEXT_INTO(fit, result_file),
+     .check = job_check_result_file,
+     .left_out = "none",
+     .allowed = "`result.json` of another job",
+     .meaning = "In a job without measurements: the result that the parameters in `fixed` are from. "
+                "Exports then have its rows with their radiances, and renderings its smooth factor. Role: `result`."},
     {.path = "fit.share_camera_paths",
      .kind = OPTION_BOOL,
      INTO(fit, share_camera_paths),

@@ -1,6 +1,8 @@
 #include "optimizer/report/export/exports.h"
 
 #include "base/files/durable.h"
+#include "base/option_id.h"
+#include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/job_setup.h"
 #include "optimizer/job/job_folder.h"
@@ -119,6 +121,11 @@ status exports_write(struct report *report, double from, double to, struct error
                            e.model->setup->appearance.id);
         return STATUS_OK;
     }
+    if (report->in.job->rows->observation.n == 0)
+        return error_set_field(err, STATUS_INVALID, OPTION_RESULT_FILE,
+                               "nothing can be exported: the result '%s' has no rows, whose lamp and camera the scenes "
+                               "take over",
+                               report->in.job->fit->result_file);
     fiber_set_z_range_m(&report->in.made->fiber, &e.z_low_m, &e.z_high_m);
     status s = fit_materials(&e, err);
     for (size_t i = 0; i < N_FORMAT && s == STATUS_OK; i++)

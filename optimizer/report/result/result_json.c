@@ -383,10 +383,10 @@ status result_geometry_json_write(struct report *report, struct error *err)
 status result_pictures_json_write(struct report *report, struct error *err)
 {
     const struct pipeline_model *m = report->model;
-    json_t *json = json_pack("{s:i, s:s, s:s, s:n, s:o, s:[], s:[], s:I}", "format", 1, "sample", report->in.sample,
-                             "model", m->setup->appearance.id, "method", "parameters", result_parameters_json(m),
-                             "rows", "models", "seed", (json_int_t)report->in.job->seed);
-    json_object_set(json, "pictures", report->surface_pictures);
+    json_t *json = json_pack("{s:i, s:s, s:s, s:n, s:o, s:[], s:[], s:I, s:O, s:O}", "format", 1, "sample",
+                             report->in.sample, "model", m->setup->appearance.id, "method", "parameters",
+                             result_parameters_json(m), "rows", "models", "seed", (json_int_t)report->in.job->seed,
+                             "pictures", report->surface_pictures, "exports", report->exports);
     return result_json_finish(report, json, err);
 }
 

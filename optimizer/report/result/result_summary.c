@@ -248,8 +248,11 @@ static void print_pictures(struct report *report, FILE *out)
             m->setup->appearance.id, m->setup->appearance.title);
     print_cloth(report, out);
     print_parameters(m, out);
-    fprintf(out, "\n%zu picture%s in the folder pictures\n", report->in.results->n_surface_picture,
-            report->in.results->n_surface_picture == 1 ? "" : "s");
+    const size_t n = report->in.results->n_surface_picture;
+    if (n > 0) fprintf(out, "\n%zu picture%s in the folder pictures\n", n, n == 1 ? "" : "s");
+    for (size_t i = 0; i < json_array_size(report->exports); i++)
+        fprintf(out, "\nexported to %s\n",
+                json_string_value(json_object_get(json_array_get(report->exports, i), "folder")));
     print_warnings(report, out);
 }
 

@@ -19,6 +19,7 @@
 #include "optimizer/photographs/rows/observation_load.h"
 #include "optimizer/stages/fit/pipeline_cloth.h"
 #include "optimizer/stages/job_inputs.h"
+#include "optimizer/stages/reading/given_result.h"
 #include "optimizer/stages/reading/pipeline_budget.h"
 #include "optimizer/stages/reading/pipeline_profile_prior.h"
 #include "optimizer/stages/reading/pipeline_texture.h"
@@ -249,6 +250,7 @@ static status take_values(const struct stage_tools *tools, struct job_inputs *in
         s = error_set_field(err, STATUS_INVALID, OPTION_CLOTH,
                             "numbers of the cloth are to be fitted, which needs photographs: give their values");
     if (s == STATUS_OK) s = match_inputs(tools, in, err);
+    if (s == STATUS_OK) s = given_result_read(tools, in, err);
     return s == STATUS_OK ? load_environment(tools, in, err) : s;
 }
 
@@ -354,6 +356,7 @@ void job_inputs_release(struct job_inputs *in)
     observation_set_release(&in->rows.row);
     observation_set_release(&in->rows.contrast);
     environment_free(in->rows.environment);
+    given_result_release(&in->given);
     fiber_profile_release(&in->fiber.profile);
     free(in->model);
     json_decref(in->files);

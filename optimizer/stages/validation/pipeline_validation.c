@@ -14,6 +14,7 @@
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { VALIDATION_PILOT = 8192, VALIDATION_LEAST = 1024, VALIDATION_BLOCK = 256, VALIDATION_MAX = 1 << 20 };
 
@@ -258,6 +259,21 @@ static void warn_choice(const struct validation_input *in, const struct validati
         view[i] =
             (struct pipeline_model){.setup = &in->job->model[i], .fit = &in->fit[i], .validation = &out->model[i]};
     pipeline_warn_choice(in->job->tools->status, view, in->job->n_model);
+}
+
+status validation_output_given(const struct job_inputs *in, struct validation_output *out, struct error *err)
+{
+    if (in->given.rendered_rgb == NULL) return STATUS_OK;
+    status s = allocate_validations(in->n_model, in->rows.observation.n, out, err);
+    for (size_t i = 0; s == STATUS_OK && i < in->rows.observation.n; i++)
+        for (int q = 0; q < 2; q++) {
+            struct estimate *e = &out->model->replica[q][i];
+            memcpy(e->mean, in->given.rendered_rgb[i], sizeof e->mean);
+            /* two replicas of twice the variance have the mean's variance together */
+            for (int c = 0; c < 3; c++) e->var[c] = 2.0 * in->given.rendered_var[i][c];
+        }
+    if (s == STATUS_OK) out->model->discrepancy.factor = in->given.factor;
+    return s;
 }
 
 void validation_output_release(struct validation_output *out, size_t n_model)

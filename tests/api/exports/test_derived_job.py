@@ -1,0 +1,111 @@
+"""Jobs that show the result of a finished job without a new fit."""
+import csv
+import os
+
+import pytest
+from daemon_under_test import problem, program
+from small_cloth import hair, start_small_job
+
+pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
+DOCUMENT = {"sample": "blue twill", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"}, "camera": {"crop_cm": 0.1},
+            "fit": {"path_budget": 20000, "render_px": 8, "render_samples": 1, "model": "two_lobe.v1"}, "export": {"mitsuba": True}}
+VIEW = {"light_theta_deg": 45, "light_phi_deg": 0, "camera_theta_deg": 30, "camera_phi_deg": 180, "px": 16, "samples": 2, "width_mm": 1, "size_mm": 1}
+
+
+@pytest.fixture(scope="module")
+def fitted(real):
+    job = start_small_job(real, DOCUMENT)
+    real.wait_state(job, "succeeded", timeout_s=120)
+    return job
+
+
+def text_of(real, job, path):
+    reply = real.get(f"/v1/jobs/{job}/results/{path}")
+    assert reply.status_code == 200, path
+    return reply.text
+
+
+def derive(real, job, **wanted):
+    reply = real.post(f"/v1/jobs/{job}/derive", json=wanted)
+    assert reply.status_code == 201, reply.text
+    made = reply.json()
+    assert made["state"] in ("queued", "running"), made
+    assert reply.headers["Location"] == f"/v1/jobs/{made['id']}" and made["tags"] == [f"of:{job[:8]}"]
+    return made["id"]
+
+
+def test_an_export_made_later_is_the_export_of_the_fit(real, fitted):
+    """The scene, and the rows with measured and rendered radiances; only the fit and its estimates are not made again."""
+    job = derive(real, fitted, export={"mitsuba": True, "pbrt": True})
+    done = real.wait_state(job, "succeeded", timeout_s=120)
+    assert done["sample"] == "blue twill for mitsuba, pbrt" and done["document"]["fit"]["result_file"] == "result.json"
+    assert [e["format"] for e in done["result"]["exports"]] == ["mitsuba", "pbrt"] and done["result"]["method"] is None
+    assert text_of(real, job, "export/mitsuba/scene.xml") == text_of(real, fitted, "export/mitsuba/scene.xml")
+    both = [list(csv.DictReader(text_of(real, j, "export/mitsuba/rows.csv").splitlines())) for j in (job, fitted)]
+    assert len(both[0]) == len(both[1]) == 6
+    for ours, theirs in zip(*both):
+        assert ours.pop("set") == theirs.pop("set")
+        assert list(map(float, ours.values())) == pytest.approx(list(map(float, theirs.values())), rel=1e-6, abs=1e-9)
+    assert "stage fit" not in real.get(f"/v1/jobs/{job}/log").text
+
+
+def test_pictures_in_another_light_outlive_the_job(real, fitted):
+    """The finished job may be deleted at once, because its files are copied."""
+    own = start_small_job(real, {k: v for k, v in DOCUMENT.items() if k != "export"})
+    real.wait_state(own, "succeeded", timeout_s=120)
+    sky = {"radiance": [0.2, 0.2, 0.3]}
+    job = derive(real, own, pictures=[{"on": "drape", "radius_mm": 1, **VIEW}], lamp={"kind": "directional"}, environment=sky, sample="silk")
+    assert real.delete(f"/v1/jobs/{own}").status_code == 204
+    done = real.wait_state(job, "succeeded", timeout_s=120)
+    assert done["sample"] == "silk" and done["document"]["lamp"] == {"kind": "directional"} and len(done["result"]["pictures"]) == 1
+    again = derive(real, job, export={"usd": True})
+    assert real.wait_state(again, "succeeded", timeout_s=120)["result"]["exports"], "rows of the first job, through the second"
+
+
+def test_a_mesh_is_uploaded_before_the_start(real, fitted):
+    reply = real.post(f"/v1/jobs/{fitted}/derive", json={"pictures": [{"on": "mesh", "mesh_file": "a.obj", **VIEW}]})
+    assert reply.status_code == 201 and reply.json()["state"] == "draft" and reply.json()["missing_files"] == ["a.obj"]
+    assert real.delete(f"/v1/jobs/{reply.json()['id']}").status_code == 204
+
+
+def test_a_repeated_request_makes_one_job(real, fitted):
+    key, wanted = {"Idempotency-Key": "derive-1"}, {"pictures": [{"on": "flat", **VIEW}]}
+    one, two = (real.post(f"/v1/jobs/{fitted}/derive", json=wanted, headers=key) for _ in range(2))
+    assert one.status_code == two.status_code == 201 and one.json()["id"] == two.json()["id"] and two.headers["Idempotent-Replay"] == "true"
+    real.wait_state(one.json()["id"], "succeeded", timeout_s=60)
+
+
+@pytest.mark.parametrize("wanted, field", [({}, "pictures"), ({"sample": "s"}, "pictures"), ({"fit": {}}, "fit"),
+                                           ({"export": {"maya": True}}, "export.maya"),
+                                           ({"pictures": [{"on": "moon"}]}, "pictures[0].on"),
+                                           ({"twin": {"make": True}, "environment": {"file": "sky.exr"}}, "environment.file")])
+def test_what_cannot_be_made_is_refused_with_its_key(real, fitted, wanted, field):
+    before = len(real.get("/v1/jobs?limit=500").json()["jobs"])
+    problem(real.post(f"/v1/jobs/{fitted}/derive", json=wanted), 422, "invalid", field=field)
+    assert len(real.get("/v1/jobs?limit=500").json()["jobs"]) == before
+
+
+def test_a_job_without_a_result_is_refused(real):
+    job = real.create(DOCUMENT)
+    real.upload(job, "cloth.hair", hair(), "fibers")
+    problem(real.post(f"/v1/jobs/{job}/derive", json={"export": {"usd": True}}), 409, "conflict")
+    problem(real.post("/v1/jobs/00000000-0000-0000-0000-000000000000/derive", json={"export": {"usd": True}}), 404, "not_found")
+
+
+def test_the_result_file_belongs_to_given_parameters(real):
+    doc = {**DOCUMENT, "fit": {"model": "two_lobe.v1", "result_file": "result.json"}}
+    problem(real.post("/v1/jobs", json=doc), 422, "invalid", field="fit.result_file")
+
+
+@pytest.mark.parametrize("text, said", [("{}", "no list 'rows'"), ('{"rows": [{"set": "fit"}]}', "'light_theta_deg' of row 1"), ("[1]", "result.json"),
+                                        ('{"rows": [], "discrepancy": {"scale": [1, 1, 1, 0], "place": [], "log_weight": []}}', "no smooth factor"),
+                                        ('{"rows": []}', "has no rows")])
+def test_a_result_that_is_none_is_named(real, text, said):
+    fixed = {"C_R": 0.1, "C_TT": 0.6, "beta_R": 6, "beta_TT": 12, "gamma_TT": 30}
+    job = real.create({"sample": "s", "fibers": {"file": "cloth.hair"}, "export": {"pbrt": True},
+                       "fit": {"model": "two_lobe.v1", "fixed": fixed, "result_file": "result.json"}})
+    real.upload(job, "cloth.hair", hair(), "fibers")
+    real.upload(job, "result.json", text.encode(), "result")
+    assert real.post(f"/v1/jobs/{job}/start").status_code == 202
+    error = real.wait_state(job, "failed", timeout_s=60)["error"]
+    assert error["field"] == "fit.result_file" and said in error["text"], error
