@@ -13,6 +13,7 @@ export function holdsLargeNumber(value) {
 // changed(text) is called when the form has changed the document.
 export function documentEditor(changed) {
   const text = el("pre", { class: "log", id: "document", tabIndex: 0, role: "region", "aria-label": "the job document" }), body = el("div"), note = el("p", { class: "hint" });
+  const save = el("p", {}, el("a", { class: "button", href: "#", download: "job.json", onclick: (e) => { e.currentTarget.href = URL.createObjectURL(new Blob([source], { type: "application/json" })); } }, "Download job.json"));
   let source = "", options = null, form = null, wrong = [];
   const marked = new Map(); // row -> the server's fault
   const markFaults = () => {
@@ -44,7 +45,7 @@ export function documentEditor(changed) {
     let doc = {};
     try { if (source !== "") doc = JSON.parse(source); } catch { doc = null; } // the submit panel reports the error
     const editable = doc !== null && !holdsLargeNumber(doc);
-    note.textContent = editable ? "An option is in the document when its box is ticked; the grey text says what holds without it."
+    note.textContent = editable ? "An option is in the document when its box is ticked."
       : "The form cannot edit this document: it is not valid JSON, or holds a whole number above 2^53. Edit the file and drop it again.";
     form = null;
     body.replaceChildren();
@@ -57,7 +58,7 @@ export function documentEditor(changed) {
     if (form === null) render();
   };
   const node = el("details", { id: "editor", ontoggle: () => { if (node.open) open(); } },
-    el("summary", {}, "Write or edit the job document"), note, el("div", { class: "columns editor" }, body, text));
+    el("summary", {}, "The job document and all options"), note, save, el("div", { class: "columns editor" }, body, text));
   return {
     node,
     // Opens the form with a document that another job has, and returns its text: indented, if no number is rounded by that.

@@ -1,9 +1,11 @@
-// A form for a job document, built from the table of options (GET /v1/options). It has nested sections, lists of
-// sections, and one row for each option. It edits the given document and calls `changed` after every change. The rows of
+// A form for a job document, built from the table of options (GET /v1/options). It has a search, nested sections, lists of
+// sections, and one row for each option: its words first, its key small. It edits the given document and calls `changed` after every change. The rows of
 // a section are built when the section is opened.
+import { foundOptions, keyOf, prose, wordsOf } from "./option_words.js";
 import { el } from "./page_parts.js";
 
 const isObject = (x) => typeof x === "object" && x !== null && !Array.isArray(x);
+const MOST_FOUND = 10;
 const LISTS = new Set(["numbers", "integers", "number_or_numbers", "file_names"]);
 
 // The rows directly under a path: "volume" is a section, "photographs[]" an element of a list.
@@ -11,10 +13,6 @@ function membersOf(options, path) {
   const start = path ? `${path}.` : "";
   return options.filter((row) => row.path.startsWith(start) && row.path.length > start.length && !/[.[]/.test(row.path.slice(start.length)));
 }
-const keyOf = (row) => row.path.slice(row.path.lastIndexOf(".") + 1);
-
-// Text in which words between backquotes are shown as code.
-const prose = (text) => text.split("`").map((part, i) => (i % 2 ? el("code", {}, part) : part));
 
 // ---- places ----
 // A place is an object of the document that may not exist yet. It has a path, get() (the object or undefined), make()
@@ -70,8 +68,8 @@ function inputOf(row) {
 const rangeOf = (row) => row.allowed ?? ("upper" in row && row.kind !== "other" ? `${row.lower} to ${row.upper}` : "");
 
 function help(row) {
-  const range = rangeOf(row);
-  return el("span", { class: "hint" }, ...prose(row.meaning ?? ""), ...(range ? [" Allowed: ", ...prose(range), "."] : []));
+  const range = rangeOf(row), without = "default" in row ? `Without it: ${textOf(row, row.default)}.` : row.left_out ? `Without it: ${row.left_out}.` : "";
+  return el("span", { class: "hint" }, ...prose([wordsOf(row).rest, without, range ? `Allowed: ${range}.` : ""].filter(Boolean).join(" ")));
 }
 
 // ---- rows and sections ----
@@ -86,7 +84,8 @@ export function optionForm(options, document, changed) {
     const given = place.get()?.[key];
     const present = given !== undefined && !isObject(given) || row.kind === "other" && given !== undefined;
     const box = row.required ? null : el("input", { type: "checkbox", checked: present, title: "Set this option", "aria-label": `set ${row.path}` });
-    const line = el("div", { class: "option", "data-path": path }, el("label", {}, box, el("b", {}, key), row.unit ? ` ${row.unit}` : ""), input, help(row), problem);
+    const line = el("div", { class: "option", "data-path": path }, el("label", {}, box, el("b", {}, ...prose(wordsOf(row).words)), el("small", {}, key)),
+      el("span", { class: "value" }, input, row.unit ? el("span", { class: "unit" }, row.unit) : null), help(row), problem);
     const remove = () => { if (place.get()) { delete place.get()[key]; place.prune(); } };
     const take = () => {
       line.classList.remove("bad");
@@ -129,11 +128,12 @@ export function optionForm(options, document, changed) {
     return node;
   }
 
-  const heading = (row) => [el("b", {}, keyOf(row)), " ", el("span", { class: "hint" }, ...prose(row.meaning ?? ""))];
+  const heading = (row) => [el("b", {}, ...prose(wordsOf(row).words)), " ", el("small", {}, keyOf(row))];
+  const more = (row) => { const { rest } = wordsOf(row); return rest ? [el("p", { class: "hint" }, ...prose(rest))] : []; };
 
   function section(row, parent) {
     const place = memberPlace(parent, keyOf(row));
-    return folded(place.path, heading(row), place.get() !== undefined, () => membersOf(options, row.path).map((member) => part(member, place)));
+    return folded(place.path, heading(row), place.get() !== undefined, () => [...more(row), ...membersOf(options, row.path).map((member) => part(member, place))]);
   }
 
   function list(row, parent) {
@@ -142,7 +142,7 @@ export function optionForm(options, document, changed) {
     const element = (i) => {
       const place = elementPlace(listed(), path, i);
       const remove = el("button", { type: "button", "aria-label": `Remove ${key}[${i}]`, onclick: () => drop(i) }, "Remove");
-      const members = folded(place.path, [el("b", {}, `${key}[${i}]`), " ", el("span", { class: "hint" }, place.get().file ?? "")],
+      const members = folded(place.path, [el("b", {}, place.get().file ?? `${key}[${i}]`), " ", el("small", {}, `${key}[${i}]`)],
         Object.keys(place.get()).length === 0, () => membersOf(options, `${row.path}[]`).map((member) => part(member, place)));
       return el("div", { class: "element" }, members, remove);
     };
@@ -179,11 +179,18 @@ export function optionForm(options, document, changed) {
     return more.length ? el("div", {}, line, el("div", { class: "members" }, ...more)) : line;
   }
 
-  const node = el("div", { class: "options" }, ...membersOf(options, "").map((row) => part(row, root)));
+  const results = el("ul", { class: "found" }), search = el("input", { type: "search", placeholder: "search, such as twist, seed or picture", "aria-label": "search the options", oninput: () => find(search.value) });
+  const node = el("div", { class: "options" }, el("div", { class: "search" }, search, results), ...membersOf(options, "").map((row) => part(row, root)));
 
-  // Shows the row of a key that the server refused, and opens the sections that contain it.
-  // quiet: neither opens sections nor scrolls
-  function mark(path, message, quiet = false) {
+  function find(text) {
+    const found = foundOptions(options, text), line = (row) => el("li", {}, el("button", { type: "button", onclick: () => { results.replaceChildren(); reveal(row.path); } },
+      el("b", {}, ...prose(wordsOf(row).words)), " ", el("small", {}, row.path)));
+    results.replaceChildren(...found.slice(0, MOST_FOUND).map(line), ...(found.length > MOST_FOUND ? [el("li", { class: "hint" }, `and ${found.length - MOST_FOUND} more`)] : []),
+      ...(text.trim() && found.length === 0 ? [el("li", { class: "hint" }, "No option has these words.")] : []));
+  }
+
+  // The row of a path, or of the section around it. quiet: does not open the sections on the way
+  function rowOf(path, quiet) {
     const ends = [...path.matchAll(/[.[]/g)].map((m) => m.index).concat(path.length);
     let row = null;
     for (const end of ends) {
@@ -191,6 +198,23 @@ export function optionForm(options, document, changed) {
       if (!quiet) sections.get(prefix)?.();
       row = [...node.querySelectorAll("[data-path]")].find((one) => one.dataset.path === prefix) ?? row;
     }
+    return row;
+  }
+
+  // Opens the way to an option and puts the cursor on it; of an option of a list, to the list or its first entry.
+  function reveal(path) {
+    const row = rowOf(path.replaceAll("[]", "[0]"), false) ?? rowOf(path.replace(/\[\].*/, ""), false);
+    row?.scrollIntoView({ block: "center" });
+    for (const one of node.querySelectorAll(".shown")) one.classList.remove("shown");
+    row?.classList.add("shown");
+    const target = row?.querySelector("input, select, textarea, summary");
+    if (target instanceof HTMLElement) target.focus({ preventScroll: true });
+  }
+
+  // Shows the row of a key that the server refused, and opens the sections that contain it.
+  // quiet: neither opens sections nor scrolls
+  function mark(path, message, quiet = false) {
+    const row = rowOf(path, quiet);
     row?.classList.add("bad");
     const problem = row?.querySelector(":scope > .problem");
     if (problem) problem.textContent = message;

@@ -121,7 +121,7 @@ export function submitPanel(handed = null, copy = null) {
     notes = writeFiles(now, kinds, grid.patternOf(names.filter((n) => kinds.get(n) === "photograph")), rig.rig);
     if (now.volume && now.cloth && Object.keys(now.cloth).every((k) => ["weave", "warp_per_cm", "weft_per_cm"].includes(k))) delete now.cloth;
     const scan = [...kinds].find(([, kind]) => kind === "scan" || kind === "slice")?.[0], rows = [...kinds].find(([, kind]) => kind === "table")?.[0];
-    const named = folderName || stemOf(scan ?? rows ?? now.fibers?.file ?? now.cloth?.draft_file ?? "");
+    const named = folderName || stemOf(scan ?? now.fibers?.file ?? now.cloth?.draft_file ?? rows ?? "");
     if (now.sample === undefined && named) now.sample = named;
     statesVoxel = true;
     table = null;

@@ -41,7 +41,7 @@ def test_faults_are_shown_before_anything_is_sent(stub, browser, tmp_path):
     # a value that is set right takes its fault away, and a file that is not empty makes the form ready
     for path, text in (("lamp.side_cm", "12"), ("volume.voxel_size_um", "2")):
         browser.execute_script("""
-            const input = document.querySelector(`#editor .option[data-path='${arguments[0]}'] > input:not([type=checkbox])`);
+            const input = document.querySelector(`#editor .option[data-path='${arguments[0]}'] .value > input`);
             input.value = arguments[1];
             input.dispatchEvent(new Event("change"));""", path, text)
     wait_for(browser, "document.querySelectorAll('#faults li').length === 0")

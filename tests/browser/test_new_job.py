@@ -278,3 +278,27 @@ def test_the_empty_list_offers_an_example(browser, tmp_path):
         assert complaints(browser) == []
     finally:
         stop_daemon(process)
+
+
+def test_the_form_has_words_first_and_a_search(stub, browser, tmp_path):
+    url, _ = stub
+    browser.get(url + "/#new")
+    drop(browser, sample(tmp_path, ["cloth.hair", "rows.csv"]))
+    click_on(browser, "#editor > summary")
+    wait_for(browser, "document.querySelector('#editor .search input')")
+    # only the sections that the document has are open
+    opened = browser.execute_script("return [...document.querySelectorAll('#editor .options details[open]')].map((d) => d.dataset.path)")
+    assert opened == ["fibers", "measurements"]
+    assert text_of(browser, "#editor details[data-path='lamp'] > summary") == "The lamp of every photograph lamp"
+    browser.find_element(By.CSS_SELECTOR, "#editor .search input").send_keys("twist metre")
+    wait_for(browser, "document.querySelectorAll('#editor .found button').length >= 2")
+    browser.execute_script("arguments[0].value = 'seed'; arguments[0].dispatchEvent(new Event('input'))", browser.find_element(By.CSS_SELECTOR, "#editor .search input"))
+    seeds = texts(browser, "#editor .found button")
+    assert seeds[0].endswith("cloth.seed") and any(s.endswith("fit.seed") for s in seeds)
+    click_on(browser, "#editor .found button", next(i for i, s in enumerate(seeds) if s.endswith("fit.seed")))
+    row = browser.find_element(By.CSS_SELECTOR, "#editor .option[data-path='fit.seed']")
+    assert row.is_displayed() and "Without it: 1" in row.text and browser.execute_script("return arguments[0].contains(document.activeElement)", row)
+    keep(browser, "option-search")
+    browser.execute_script("document.querySelector('#editor a[download]').click()")
+    assert browser.execute_script("return document.querySelector('#editor a[download]').href").startswith("blob:")
+    assert complaints(browser) == []
