@@ -1,17 +1,22 @@
 #include "server/jobs/queue_forecast.h"
 #include "base/clock.h"
+#include "optimizer/job/job_folder.h"
 #include "server/files/worker_files.h"
 #include "server/jobs/queue_turn.h"
+#include "server/settings/job_paths.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 enum { FORESEEN_MOST = 1000, SLOT_MOST = 256, RECENT = 15 };
 
 struct foreseen {
     char id[STORE_ID_BYTES];
     struct queue_place place;
+    double plan_s;           /* of its plan; NaN without one */
+    struct timespec plan_at; /* when that file was written */
 };
 
 struct queue_forecast {
@@ -34,7 +39,8 @@ struct plan {
     struct queued_job *job;
     size_t n_job;
     struct queue_turn *turn;
-    double typical_s; /* INFINITY: unknown */
+    double typical_s;       /* INFINITY: unknown */
+    struct foreseen *known; /* of each job, in the order of `job`: id and plan */
 };
 
 struct queue_forecast *queue_forecast_new(void)
@@ -72,12 +78,64 @@ static double typical_s(struct job_service *v)
     return fmax(took_s[n / 2], 0);
 }
 
+/* ---- plans ---- */
+
+static double plan_s(struct job_service *v, const char *job_id)
+{
+    json_t *plan = worker_plan_read(v->settings->data, job_id);
+    const json_t *wall = json_object_get(plan, "wall_s");
+    const double s = json_is_number(wall) ? json_number_value(wall) : NAN;
+    json_decref(plan);
+    return s;
+}
+
+static int by_id(const void *a, const void *b)
+{
+    const struct foreseen *x = a, *y = b;
+    return strcmp(x->id, y->id);
+}
+
+/* Finds the job's plan. old: the last forecast, sorted by id; a plan whose file has not changed since is not read
+ * again. */
+static void look_up_plan(struct job_service *v, const struct queue_forecast *old, struct foreseen *one)
+{
+    char path[PATH_BYTES];
+    struct stat st;
+    one->plan_s = NAN;
+    path_join(path, v->settings->data, "jobs", one->id, JOB_FILE_PLAN, NULL);
+    if (stat(path, &st) != 0) return;
+    one->plan_at = st.st_mtim;
+    const struct foreseen *before = old->n == 0 ? NULL : bsearch(one, old->job, old->n, sizeof *old->job, by_id);
+    if (before != NULL && isfinite(before->plan_s) && before->plan_at.tv_sec == st.st_mtim.tv_sec &&
+        before->plan_at.tv_nsec == st.st_mtim.tv_nsec)
+        one->plan_s = before->plan_s;
+    else
+        one->plan_s = plan_s(v, one->id);
+}
+
+/* Returns the time that queued job i takes. */
+static double takes_s(const struct plan *p, size_t i)
+{
+    double sum = 0, n = 0;
+    if (isfinite(p->known[i].plan_s)) return p->known[i].plan_s;
+    for (size_t k = 0; k < p->n_job && p->job[i].batch[0] != '\0'; k++)
+        if (isfinite(p->known[k].plan_s) && strcmp(p->job[k].batch, p->job[i].batch) == 0) {
+            sum += p->known[k].plan_s;
+            n++;
+        }
+    return n > 0 ? sum / n : p->typical_s;
+}
+
+/* ---- running jobs ---- */
+
 /* The time at which a running job will end. */
 static double end_of(struct job_service *v, const struct job_row *row, double typical, double now)
 {
     json_t *st = worker_status_read(v->settings->data, row->id);
     const json_t *eta = json_object_get(st, "eta_s");
-    double left_s = json_is_number(eta) ? json_number_value(eta) : typical - (now - row->started_unix_s);
+    const bool says = json_is_number(eta) && json_integer_value(json_object_get(st, "attempt")) == row->attempt;
+    double left_s = says ? json_number_value(eta) : plan_s(v, row->id) - (now - row->started_unix_s);
+    if (!says && !isfinite(left_s)) left_s = typical - (now - row->started_unix_s);
     json_decref(st);
     return now + fmax(left_s, 0);
 }
@@ -100,12 +158,6 @@ static void place_running(struct job_service *v, struct plan *p, double now)
     job_rows_free(row, n);
 }
 
-static int by_id(const void *a, const void *b)
-{
-    const struct foreseen *x = a, *y = b;
-    return strcmp(x->id, y->id);
-}
-
 static void foresee(struct queue_forecast *f, struct plan *p)
 {
     while (f->n < FORESEEN_MOST) {
@@ -117,14 +169,14 @@ static void foresee(struct queue_forecast *f, struct plan *p)
         size_t next = queue_turn_next(p->turn, slot->free_unix_s);
         if (next == p->n_job) break;
         struct foreseen *one = &f->job[f->n++];
-        *one = (struct foreseen){.place.position = (int64_t)f->n};
-        memcpy(one->id, p->job[next].id, sizeof one->id);
+        *one = p->known[next];
+        one->place.position = (int64_t)f->n;
         if (isfinite(slot->free_unix_s)) one->place.start_unix_s = 30 * ceil(slot->free_unix_s / 30);
         memcpy(slot->owner, p->job[next].owner, sizeof slot->owner);
         memcpy(slot->batch, p->job[next].batch, sizeof slot->batch);
         slot->busy = true;
         queue_turn_running(p->turn, slot->owner, slot->batch, 1);
-        slot->free_unix_s += p->typical_s;
+        slot->free_unix_s += takes_s(p, next);
         if (isfinite(slot->free_unix_s)) one->place.end_unix_s = 30 * ceil(slot->free_unix_s / 30);
     }
     qsort(f->job, f->n, sizeof *f->job, by_id);
@@ -133,20 +185,27 @@ static void foresee(struct queue_forecast *f, struct plan *p)
 static void make(struct job_service *v, struct queue_forecast *f)
 {
     struct plan *p = calloc(1, sizeof *p);
-    free(f->job);
+    struct queue_forecast old = {.job = f->job, .n = f->n};
     f->job = NULL;
     f->n = 0;
     if (p == NULL || store_job_queue(v->store, SIZE_MAX >> 1, &p->job, &p->n_job, NULL) != STATUS_OK || p->n_job == 0)
         goto out;
     size_t n_most = p->n_job < FORESEEN_MOST ? p->n_job : FORESEEN_MOST;
     f->job = calloc(n_most, sizeof *f->job);
+    p->known = calloc(p->n_job, sizeof *p->known);
     p->turn = queue_turn_new(p->job, p->n_job);
-    if (f->job == NULL || p->turn == NULL) goto out;
+    if (f->job == NULL || p->known == NULL || p->turn == NULL) goto out;
+    for (size_t i = 0; i < p->n_job; i++) {
+        memcpy(p->known[i].id, p->job[i].id, sizeof p->known[i].id);
+        look_up_plan(v, &old, &p->known[i]);
+    }
     p->typical_s = typical_s(v);
     place_running(v, p, clock_wall_s());
     if (p->n_slot > 0) foresee(f, p);
 out:
+    free(old.job);
     if (p != NULL) {
+        free(p->known);
         free(p->job);
         queue_turn_free(p->turn);
     }

@@ -1,6 +1,8 @@
-/* When queued jobs will probably start. It repeats the supervisor's choice (queue_turn.h) in advance. Running jobs end
- * after their eta_s; a job without an estimate takes the median time of the jobs that succeeded last. It is computed
- * once a second at most, so it costs little however many requests ask for it. Thread-safe. */
+/* When queued jobs will probably start and end. It repeats the supervisor's choice (queue_turn.h) in advance. Running
+ * jobs end after their eta_s. A queued job takes as long as its plan says (input_plan of server/workers/input_judge.h),
+ * the same number that `selvedge plan` shows. A job without a plan takes as long as the planned jobs of its batch on
+ * average, or the median of the jobs that succeeded last. It is computed once a second at most, so it costs little
+ * however many requests ask for it. Thread-safe. */
 #ifndef SELVEDGE_SERVER_QUEUE_FORECAST_H
 #define SELVEDGE_SERVER_QUEUE_FORECAST_H
 

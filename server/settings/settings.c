@@ -135,6 +135,8 @@ static const struct setting table[] = {
            "time in seconds that a worker may run; its job then fails, and a retry resumes it; 0: no limit"),
     NUMBER("jobs", "check_limit_s", check_limit_s, 300, 1, 86400,
            "time in seconds in which a worker must have judged the files of a job that is not started yet"),
+    NUMBER("jobs", "plan_queued", plan_queued, 1, 0, 1,
+           "1: jobs that wait in the queue are planned, so that the forecast of the queue knows how long each takes"),
     TEXT(
         "slurm", "commands", slurm_commands, "",
         "folder of sbatch, squeue and scancel; empty: found in PATH. Read with jobs.backend = slurm (docs/cluster.md), "

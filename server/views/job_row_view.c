@@ -72,6 +72,7 @@ static void put_queue(struct job_service *v, json_t *out, const struct job_row *
     struct queue_place place = queue_forecast_of(v, row->id);
     if (place.position > 0) json_object_set_new(out, "queue_position", json_integer((json_int_t)place.position));
     put_time(out, "expected_start_unix_s", place.start_unix_s);
+    put_time(out, "expected_end_unix_s", place.end_unix_s);
 }
 
 static json_t *describe(struct job_service *v, const struct job_row *row)

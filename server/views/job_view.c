@@ -84,6 +84,7 @@ static void put_place(struct job_service *v, json_t *out, const struct job_row *
     json_object_set_new(out, "queue_position",
                         place.position > 0 ? json_integer((json_int_t)place.position) : json_null());
     json_object_set_new(out, "expected_start_unix_s", time_or_null(place.start_unix_s));
+    json_object_set_new(out, "expected_end_unix_s", time_or_null(place.end_unix_s));
 }
 
 json_t *job_view_heartbeat_age(struct job_service *v, const struct job_row *row)

@@ -20,7 +20,9 @@ function leftCell(job) {
   if (job.state === "running") return timeLeft(job);
   if (job.state !== "queued" || !job.expected_start_unix_s) return "";
   const wait = job.expected_start_unix_s - Date.now() / 1000;
-  return el("span", { title: `about ${new Date(1000 * job.expected_start_unix_s).toLocaleString()}` }, wait > 30 ? `starts in ${duration(wait)}` : "starts soon");
+  const ends = job.expected_end_unix_s ? `, ends in ${duration(job.expected_end_unix_s - Date.now() / 1000)}` : "";
+  const title = `about ${new Date(1000 * job.expected_start_unix_s).toLocaleString()}`;
+  return el("span", { title }, `${wait > 30 ? `starts in ${duration(wait)}` : "starts soon"}${ends}`);
 }
 
 function cells(job, owners, byTag) {

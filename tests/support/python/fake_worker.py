@@ -22,8 +22,9 @@ if "--plan" in sys.argv:
         sys.exit(1)
     while os.path.exists(os.path.join(sys.argv[-1], "hold")):
         time.sleep(0.01)
-    print(json.dumps({"error": None, "n_thread": 2, "wall_s": 10, "wall_low_s": 5, "wall_high_s": 20, "cpu_s": 16, "memory_bytes": 1e8,
-                      "disk_bytes": 5e6, "stages": [{"name": "fit", "wall_s": 10}]}))
+    wall_s = float(sample.partition("planned ")[2] or 10)  # "fake: work 60, planned 600"
+    print(json.dumps({"error": None, "n_thread": 2, "wall_s": wall_s, "wall_low_s": wall_s / 2, "wall_high_s": 2 * wall_s, "cpu_s": 16,
+                      "memory_bytes": 1e8, "disk_bytes": 5e6, "stages": [{"name": "fit", "wall_s": wall_s}]}))
     sys.exit(0)
 
 job = sys.argv[-1]
@@ -147,7 +148,7 @@ elif behaviour == "nest":  # folders inside each other, so many levels in each o
                 pass
     finish()
 elif behaviour == "work":
-    work(float(argument or 3600))
+    work(float((argument or "3600").partition(",")[0]))
     finish()
 elif behaviour == "hold":  # holds so many MB of memory of its own
     held = b"\1" * (int(argument) << 20)
