@@ -1,9 +1,9 @@
+#include "optimizer/report/page_pictures.h"
 #include "base/files/durable.h"
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_rows.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/page_text.h"
-#include "optimizer/report/report_page.h"
 #include "renderer/image/image.h"
 
 #include <math.h>
@@ -13,7 +13,7 @@
 #include <unistd.h>
 
 /* Rows with pictures, and the largest edge of a picture in the page. */
-enum { MAX_ROWS = 64, MAX_EDGE = 160, MAX_SURFACE_EDGE = 480, PNG_LIMIT_BYTES = 4 << 20 };
+enum { MAX_ROWS = 64, MAX_EDGE = 160, MAX_SURFACE_EDGE = 480, MAX_FRONT_EDGE = 1050, PNG_LIMIT_BYTES = 16 << 20 };
 
 static int compare_float(const void *a, const void *b)
 {
@@ -56,16 +56,12 @@ static status shrink(const struct image *from, size_t width, size_t height, stru
     return s;
 }
 
-/* Writes the image as <img src="data:...">. */
-static status put_image(const struct report *report, const struct image *im, double exposure, const char *what,
-                        FILE *out, struct error *err)
+/* Writes the PNG file as <img src="data:...">. */
+static status put_file(const char *path, const char *what, FILE *out, struct error *err)
 {
-    char path[WORKER_PATH_BYTES], *png = NULL;
+    char *png = NULL;
     size_t n = 0;
-    status s = stage_work_path(report->in.job->tools, "report", "page.png", path, err);
-    if (s == STATUS_OK) s = image_write_png(im, exposure, path, err);
-    if (s == STATUS_OK) s = file_read_all(path, PNG_LIMIT_BYTES, &png, &n, err);
-    unlink(path);
+    status s = file_read_all(path, PNG_LIMIT_BYTES, &png, &n, err);
     if (s != STATUS_OK) return s;
     size_t n_text = sodium_base64_ENCODED_LEN(n, sodium_base64_VARIANT_ORIGINAL);
     char *text = malloc(n_text);
@@ -78,6 +74,37 @@ static status put_image(const struct report *report, const struct image *im, dou
     free(text);
     free(png);
     return s;
+}
+
+static status put_image(const struct report *report, const struct image *im, double exposure, const char *what,
+                        FILE *out, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    status s = stage_work_path(report->in.job->tools, "report", "page.png", path, err);
+    if (s == STATUS_OK) s = image_write_png(im, exposure, path, err);
+    if (s == STATUS_OK) s = put_file(path, what, out, err);
+    unlink(path);
+    return s;
+}
+
+status page_bytes_image(const struct report *report, const uint8_t *rgb, size_t width, size_t height, const char *what,
+                        FILE *out, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    status s = stage_work_path(report->in.job->tools, "report", "page.png", path, err);
+    if (s == STATUS_OK) s = image_write_png_rgb8(rgb, width, height, path, err);
+    if (s == STATUS_OK) s = put_file(path, what, out, err);
+    unlink(path);
+    return s;
+}
+
+status page_picture_file(const struct report *report, const char *name, const char *what, FILE *out, bool *written,
+                         struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, name, path);
+    *written = access(path, R_OK) == 0;
+    return *written ? put_file(path, what, out, err) : STATUS_OK;
 }
 
 /* Rendering minus photograph, so that no difference is the middle of a picture of exposure 1. */
@@ -152,15 +179,42 @@ status page_pictures(const struct report *report, const json_t *rows, FILE *out,
     return s;
 }
 
-static status put_surface(const struct report *report, const json_t *picture, FILE *out, struct error *err)
+/* The picture in at most max_edge pixels an edge. *written: whether it could be read. */
+static status put_surface_image(const struct report *report, const json_t *picture, size_t max_edge, FILE *out,
+                                bool *written, struct error *err)
 {
     char path[WORKER_PATH_BYTES];
     struct image im, small = {0};
     worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, page_string(picture, "file"), path);
-    if (image_read_exr(&im, path, (size_t)1 << 28, NULL) != STATUS_OK) return STATUS_OK;
-    status s = shrink(&im, least(im.width, MAX_SURFACE_EDGE), least(im.height, MAX_SURFACE_EDGE), &small, err);
-    fputs("<figure>", out);
+    *written = image_read_exr(&im, path, (size_t)1 << 28, NULL) == STATUS_OK;
+    if (!*written) return STATUS_OK;
+    const double most = (double)(im.width > im.height ? im.width : im.height), scale = fmin((double)max_edge / most, 1);
+    status s = shrink(&im, (size_t)fmax(1.0, scale * (double)im.width), (size_t)fmax(1.0, scale * (double)im.height),
+                      &small, err);
     if (s == STATUS_OK) s = put_image(report, &small, page_number(picture, "png_exposure"), "the cloth", out, err);
+    image_release(&small);
+    image_release(&im);
+    return s;
+}
+
+status page_front_surface(const struct report *report, const json_t *picture, FILE *out, bool *written,
+                          struct error *err)
+{
+    *written = false;
+    if (picture == NULL) return STATUS_OK;
+    status s = put_surface_image(report, picture, MAX_FRONT_EDGE, out, written, err);
+    if (!*written) return s;
+    fputs("<figcaption>The cloth, rendered: ", out);
+    page_escaped(page_string(picture, "on"), out);
+    fputs(".</figcaption>", out);
+    return s;
+}
+
+static status put_surface(const struct report *report, const json_t *picture, FILE *out, struct error *err)
+{
+    bool written;
+    fputs("<figure>", out);
+    status s = put_surface_image(report, picture, MAX_SURFACE_EDGE, out, &written, err);
     fputs("<figcaption>", out);
     page_escaped(page_string(picture, "on"), out);
     fprintf(out, ", exposure &times; %.3g, noise of a pixel ", page_number(picture, "png_exposure"));
@@ -173,8 +227,6 @@ static status put_surface(const struct report *report, const json_t *picture, FI
         page_with_error(json_object_get(reference, "field_noise"), NULL, 100.0, " %", out);
     }
     fputs("</figcaption></figure>\n", out);
-    image_release(&small);
-    image_release(&im);
     return s;
 }
 
@@ -183,7 +235,7 @@ status page_surface_pictures(const struct report *report, const json_t *list, FI
     size_t i;
     const json_t *picture;
     status s = STATUS_OK;
-    fputs("<div class=\"pictures\">\n", out);
+    fputs("<div class=\"pictures surfaces\">\n", out);
     json_array_foreach(list, i, picture) if (s == STATUS_OK) s = put_surface(report, picture, out, err);
     fputs("</div>\n", out);
     return s;

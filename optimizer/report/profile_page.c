@@ -60,7 +60,7 @@ static void chart(const struct report *report, size_t i_model, const struct prof
     free(point);
 }
 
-static void charts(const struct report *report, size_t i_model, FILE *out)
+void profile_charts(const struct report *report, size_t i_model, size_t most, FILE *out)
 {
     const struct fiber_profile *p = &report->in.fiber->profile;
     const struct profile_row **row = calloc(p->n + 1, sizeof *row);
@@ -68,7 +68,7 @@ static void charts(const struct report *report, size_t i_model, FILE *out)
     if (row != NULL && slice != NULL) {
         for (size_t i = 0; i < p->n; i++) row[i] = &p->row[i];
         qsort(row, p->n, sizeof *row, compare_rows);
-        const size_t n = find_slices(row, p->n, slice), n_shown = n < MOST_CHART ? n : MOST_CHART;
+        const size_t n = find_slices(row, p->n, slice), n_shown = n < most ? n : most;
         fputs("<p class=\"hint\">Dots: measured, with stated errors; lines: fitted.</p>\n<div class=\"charts\">\n",
               out);
         for (size_t k = 0; k < n_shown; k++)
@@ -92,5 +92,5 @@ void profile_page(const struct report *report, size_t i, FILE *out)
     fprintf(out, "<tr><td>scale</td><td>%.5g%s</td></tr>\n", f->scale, f->scale_se > 0.0 ? "" : ", as stated");
     fprintf(out, "<tr><td>starts that came to this result</td><td>%zu of %zu</td></tr>\n</table>\n", f->n_agree,
             f->n_start);
-    charts(report, i, out);
+    profile_charts(report, i, MOST_CHART, out);
 }

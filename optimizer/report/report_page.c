@@ -1,7 +1,10 @@
 #include "optimizer/report/report_page.h"
 #include "base/files/file_ledger_json.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/report/front_page.h"
 #include "optimizer/report/page_charts.h"
+#include "optimizer/report/page_pictures.h"
+#include "optimizer/report/page_style.h"
 #include "optimizer/report/page_text.h"
 #include "optimizer/report/result/profile_report.h"
 
@@ -9,37 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-
-static const char style[] =
-    "body { font: 14px/1.45 system-ui, sans-serif; max-width: 1060px; margin: 2em auto; padding: 0 1em; color: "
-    "#1c1f24; "
-    "background: #fff; }\n"
-    "h1 { font-size: 1.6em; margin-bottom: .2em; } h2 { font-size: 1.15em; margin: 1.8em 0 .5em; border-bottom: 1px "
-    "solid #ddd; padding-bottom: .2em; }\n"
-    "table { border-collapse: collapse; } th, td { text-align: left; padding: .14em 1.2em .14em 0; vertical-align: "
-    "top; "
-    "} th { font-weight: 600; } td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; }\n"
-    "tr.held td { color: #2457a6; } .flag { color: #8a5a00; } .hint { color: #667; }\n"
-    ".verdict { padding: .6em 1em; border-left: 6px solid; margin: 1em 0; } .good { border-color: #1d7a46; background: "
-    "#dcf2e5; } .usable { border-color: #e0a100; background: #fdf0d2; } .does_not_describe_this_cloth { border-color: "
-    "#b3261e; background: #fbe3e1; }\n"
-    ".charts { display: flex; flex-wrap: wrap; gap: 12px; } .pictures { display: flex; flex-wrap: wrap; gap: 14px; } "
-    "figure { margin: 0; min-width: 10em; break-inside: avoid; } figure img { width: 104px; height: 104px; "
-    "image-rendering: pixelated; "
-    "margin-right: 3px; } figcaption { font-size: .85em; color: #555; width: 0; min-width: 100%; }\n"
-    "@media screen and (max-width: 700px) { body { margin: 1em; } h1, li, td, th, code, pre { overflow-wrap: anywhere; "
-    "} "
-    "pre { white-space: pre-wrap; } th, td { padding-right: .6em; font-size: 12px; } svg, img { max-width: 100%; } "
-    "svg { height: auto; } }\n"
-    "@page { size: A4; margin: 15mm; }\n"
-    "@media print { body { margin: 0; padding: 0; max-width: none; font-size: 10px; } h2, h2 + p { break-after: avoid; "
-    "} tr, "
-    "svg "
-    "{ break-inside: avoid; } th, td { padding-right: .8em; } td.n { white-space: nowrap; } td { overflow-wrap: "
-    "anywhere; "
-    "} .charts, .pictures { display: block; } .charts svg { width: 48%; height: auto; } figure { display: "
-    "inline-block; "
-    "margin: 0 14px 10px 0; vertical-align: top; } }\n";
 
 static void heading(const char *text, FILE *out) { fprintf(out, "<h2>%s</h2>\n", text); }
 
@@ -50,25 +22,6 @@ static void print_time(const char *label, double unix_s, FILE *out)
     char text[40];
     if (gmtime_r(&t, &utc) != NULL && strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &utc) > 0)
         fprintf(out, "<tr><td>%s</td><td>%s</td></tr>\n", label, text);
-}
-
-static void print_verdict(const json_t *verdict, FILE *out)
-{
-    size_t i;
-    const json_t *reservation, *list = json_object_get(verdict, "reservations");
-    if (!json_is_object(verdict)) return;
-    fprintf(out, "<div class=\"verdict %s\"><b>Verdict: ", page_string(verdict, "code"));
-    page_escaped(page_string(verdict, "words"), out);
-    fputs(".</b> ", out);
-    page_escaped(page_string(verdict, "text"), out);
-    fputs("\n<ul>", out);
-    json_array_foreach(list, i, reservation)
-    {
-        fputs("<li>", out);
-        page_escaped(page_string(reservation, "text"), out);
-        fputs("</li>\n", out);
-    }
-    fputs("</ul></div>\n", out);
 }
 
 static void error_row(const json_t *result, const char *label, const char *key, FILE *out)
@@ -127,8 +80,8 @@ static void print_parameters(const char *title, const json_t *list, FILE *out)
     const json_t *p;
     if (json_array_size(list) == 0) return;
     heading(title, out);
-    fputs("<table>\n<tr><th>name</th><th class=\"n\">value &plusmn; standard error</th><th>unit</th><th "
-          "class=\"n\">allowed</th><th></th></tr>\n",
+    fputs("<table>\n<thead><tr><th>name</th><th class=\"n\">value &plusmn; standard error</th><th>unit</th><th "
+          "class=\"n\">allowed</th><th></th></tr></thead>\n",
           out);
     json_array_foreach(list, i, p)
     {
@@ -148,7 +101,7 @@ static void print_parameters(const char *title, const json_t *list, FILE *out)
 
 static void rgb_cell(const json_t *rgb, FILE *out)
 {
-    fputs("<td class=\"n\">", out);
+    fputs("<td class=\"n rgb\">", out);
     for (size_t c = 0; c < 3; c++) fprintf(out, "%s%.4f", c > 0 ? " " : "", json_number_value(json_array_get(rgb, c)));
     fputs("</td>", out);
 }
@@ -167,33 +120,42 @@ static bool any_turned(const json_t *rows)
     return false;
 }
 
+/* A direction as "polar angle / azimuth". */
+static void direction_cell(const json_t *row, const char *theta, const char *phi, FILE *out)
+{
+    fprintf(out, "<td class=\"n\">%.1f / %.1f</td>", page_number(row, theta), page_number(row, phi));
+}
+
+static void print_row(const json_t *row, FILE *out)
+{
+    fprintf(out, "<tr%s><td>", strcmp(page_string(row, "set"), "fit") == 0 ? "" : " class=\"held\"");
+    page_escaped(page_string(row, "name"), out);
+    fprintf(out, "</td><td>%s</td>", page_string(row, "set"));
+    direction_cell(row, "light_theta_deg", "light_phi_deg", out);
+    direction_cell(row, "camera_theta_deg", "camera_phi_deg", out);
+    if (json_is_true(json_object_get(row, "all_rotations")))
+        fputs("<td class=\"n\">all</td>", out);
+    else
+        fprintf(out, "<td class=\"n\">%.1f</td>", page_number(row, "cloth_rotation_deg"));
+    rgb_cell(json_object_get(row, "measured"), out);
+    rgb_cell(json_object_get(row, "rendered"), out);
+    fputs("<td class=\"n\">", out);
+    page_with_error(json_object_get(row, "rel_error"), json_object_get(row, "rel_error_se"), 100.0, " %", out);
+    fputs("</td></tr>\n", out);
+}
+
 static void print_rows(const json_t *rows, FILE *out)
 {
-    static const char *const angle[] = {"light_theta_deg", "light_phi_deg", "camera_theta_deg", "camera_phi_deg",
-                                        "cloth_rotation_deg"};
     size_t i;
     const json_t *row;
     heading("Measured and rendered", out);
-    fputs("<table>\n<tr><th>row</th><th>set</th><th class=\"n\">lamp</th><th class=\"n\">phi</th><th "
-          "class=\"n\">camera</th><th class=\"n\">phi</th><th class=\"n\">turned</th><th class=\"n\">measured r g "
-          "b</th><th class=\"n\">rendered r g b</th><th class=\"n\">error</th></tr>\n",
+    fputs("<p class=\"hint\">Angles in degrees: polar angle / azimuth.</p>\n<table class=\"rows\">\n<thead><tr><th>row"
+          "</th><th>set</th><th class=\"n\">lamp</th><th class=\"n\">camera</th><th class=\"n\">turned</th><th "
+          "class=\"n\">measured r g b</th><th class=\"n\">rendered r g b</th><th class=\"n\">error</th></tr></thead>\n"
+          "<tbody>\n",
           out);
-    json_array_foreach(rows, i, row)
-    {
-        fprintf(out, "<tr%s><td>", strcmp(page_string(row, "set"), "fit") == 0 ? "" : " class=\"held\"");
-        page_escaped(page_string(row, "name"), out);
-        fprintf(out, "</td><td>%s</td>", page_string(row, "set"));
-        bool all = json_is_true(json_object_get(row, "all_rotations"));
-        for (size_t k = 0; k < (all ? 4 : 5); k++)
-            fprintf(out, "<td class=\"n\">%.1f</td>", page_number(row, angle[k]));
-        if (all) fputs("<td class=\"n\">all</td>", out);
-        rgb_cell(json_object_get(row, "measured"), out);
-        rgb_cell(json_object_get(row, "rendered"), out);
-        fputs("<td class=\"n\">", out);
-        page_with_error(json_object_get(row, "rel_error"), json_object_get(row, "rel_error_se"), 100.0, " %", out);
-        fputs("</td></tr>\n", out);
-    }
-    fputs("</table>\n<div class=\"charts\">\n", out);
+    json_array_foreach(rows, i, row) print_row(row, out);
+    fputs("</tbody>\n</table>\n<div class=\"charts\">\n", out);
     page_scatter(rows, out);
     page_errors_over(rows, "light_theta_deg", "angle of the lamp, degrees", out);
     page_errors_over(rows, "camera_theta_deg", "angle of the camera, degrees", out);
@@ -254,7 +216,8 @@ static void print_inputs(const json_t *inputs, FILE *out)
     size_t i;
     const json_t *input;
     heading("Inputs", out);
-    fputs("<table>\n<tr><th>file</th><th>role</th><th class=\"n\">bytes</th><th>SHA-256</th></tr>\n", out);
+    fputs("<table>\n<thead><tr><th>file</th><th>role</th><th class=\"n\">bytes</th><th>SHA-256</th></tr></thead>\n",
+          out);
     json_array_foreach(inputs, i, input)
     {
         fputs("<tr><td>", out);
@@ -304,18 +267,24 @@ static void print_list(const char *title, const json_t *texts, FILE *out)
     fputs("</ul>\n", out);
 }
 
-static status print_page(struct report *report, const json_t *data, FILE *out, struct error *err)
+/* All reservations of the verdict: the first page has room for some. */
+static void print_reservations(const json_t *verdict, FILE *out)
+{
+    json_t *texts = json_array();
+    size_t i;
+    const json_t *reservation;
+    json_array_foreach(json_object_get(verdict, "reservations"), i, reservation)
+        json_array_append(texts, json_object_get(reservation, "text"));
+    print_list("Reservations", texts, out);
+    json_decref(texts);
+}
+
+/* Everything that a reader may ask for after the first two pages. */
+static status print_appendix(struct report *report, const json_t *data, FILE *out, struct error *err)
 {
     const json_t *result = json_object_get(data, "result");
     status s = STATUS_OK;
-    fputs("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
-          "content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" href=\"data:,\">\n"
-          "<title>",
-          out);
-    page_escaped(report->in.sample, out);
-    fprintf(out, " - report</title>\n<style>\n%s</style>\n</head>\n<body>\n<h1>", style);
-    page_escaped(report->in.sample, out);
-    fputs("</h1>\n<p class=\"hint\">", out);
+    fputs("<h2 class=\"appendix\">Appendix: details</h2>\n<p class=\"hint\">", out);
     if (json_is_string(json_object_get(result, "model"))) {
         page_escaped(page_string(result, "model"), out);
         if (page_string(result, "method")[0] != '\0') fputs(", ", out);
@@ -323,7 +292,7 @@ static status print_page(struct report *report, const json_t *data, FILE *out, s
         fputs(". ", out);
     }
     fputs("The same as data: report.json.</p>\n", out);
-    print_verdict(json_object_get(result, "verdict"), out);
+    print_reservations(json_object_get(result, "verdict"), out);
     print_list("Warnings", json_object_get(result, "warnings"), out);
     if (report->in.kind == JOB_OF_FIT) s = print_fit(report, data, out, err);
     if (report->in.kind == JOB_OF_PROFILE)
@@ -334,6 +303,21 @@ static status print_page(struct report *report, const json_t *data, FILE *out, s
     print_list("Statements of the files", statements, out);
     json_decref(statements);
     print_settings(data, out);
+    return s;
+}
+
+static status print_page(struct report *report, const json_t *data, FILE *out, struct error *err)
+{
+    fputs("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
+          "content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" href=\"data:,\">\n"
+          "<title>",
+          out);
+    page_escaped(report->in.sample, out);
+    fputs(" - report</title>\n<style>\n", out);
+    page_style(false, out);
+    fputs("</style>\n</head>\n<body>\n", out);
+    status s = front_pages(report, data, out, err);
+    if (s == STATUS_OK) s = print_appendix(report, data, out, err);
     fputs("</body>\n</html>\n", out);
     return s;
 }

@@ -9,7 +9,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-static size_t profile_best_model(const struct report *report)
+size_t profile_best_model(const struct report *report)
 {
     size_t best = 0;
     for (size_t i = 1; i < report->n_model; i++)

@@ -235,7 +235,7 @@ def test_pictures_of_given_parameters(real):
     for x, y in zip(a["mean"], b["mean"]):  # 16 x 16 pixels, and the file's rounding of the axes
         assert abs(x - y) < 5 * math.hypot(a["noise"], b["noise"]) * sum(a["mean"]) / 3 / 16 + 1e-3 * x
     page = real.get(f"/v1/jobs/{second}/results/report.html").text
-    assert "Given parameters" in page and "The cloth on surfaces" in page and page.count("data:image/png") == 1
+    assert "Given parameters" in page and "The cloth on surfaces" in page and page.count("data:image/png") == 3  # on the first page, its geometry, in the list
     assert "with given parameters" in real.get(f"/v1/jobs/{second}/results/summary.txt").text
 
 

@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 import subprocess
+import time
 
 import jsonschema
 import pytest
@@ -69,7 +70,31 @@ def test_the_page_needs_nothing_else(which, request):
                   "Gradient certificate", "Geometry", "Settings: the job document", "Settings that have their defaults", "Inputs", "Program and dates"):
         assert f"<h2>{title}</h2>" in page
     pictures = page.count("data:image/png;base64,")
-    assert pictures == (3 if which == "of_photographs" else 1) * len(result["rows"])
+    assert pictures == (3 if which == "of_photographs" else 1) * len(result["rows"]) + 2  # the cloth and its geometry
+
+
+def fronts(folder):
+    """The two sections of the page for a customer, and the rest."""
+    first, second, rest = (folder / "report.html").read_text().split("</section>")
+    return first, second, rest
+
+
+@pytest.mark.parametrize("which", ["of_table", "of_photographs"])
+def test_the_first_two_pages_are_for_a_customer(which, request):
+    folder = request.getfixturevalue(which)
+    result = json.loads((folder / "result.json").read_text())
+    first, second, rest = fronts(folder)
+    written = time.strftime("%Y-%m-%d", time.gmtime(json.loads((folder / "report.json").read_text())["written_unix_s"]))
+    assert first.count("<img") == 1 and result["verdict"]["text"] in first and f">{written}<" in first
+    assert first.count("<dt>") == 4 and f"<dd>{result['geometry']['n_fiber']}</dd>" in first
+    known = [p for p in result["parameters"] if p["determined"] and not p["fixed"]]
+    assert f"<dd>{len(known)} of {len(result['parameters'])}</dd>" in first
+    assert "Reflectance of the surface lobe R" in second and "Azimuthal width of the transmitted lobe TT." in second
+    symbols = {re.sub(r"\.[rgb]$", "", p["name"]) for p in result["parameters"]}
+    assert second.count("<tr>") == 1 + len(symbols) < len(result["parameters"]) and second.count("<svg") == 1 and second.count("<img") == 1
+    assert "<h2>Measured and rendered</h2>" in rest and "Measured and rendered</h2>" not in first + second
+    for reservation in result["verdict"]["reservations"]:
+        assert reservation["text"] in rest
 
 
 def test_the_data_beside_it(of_table):
@@ -114,11 +139,21 @@ def test_the_report_as_pdf(tmp_path, code):
         assert [w for w in json.loads((folder / "result.json").read_text())["warnings"] if "report.pdf" in str(w)]
 
 
+def text_of(pdf, page):
+    return subprocess.run(["pdftotext", "-layout", "-f", str(page), "-l", str(page), pdf, "-"], capture_output=True, text=True, check=True).stdout
+
+
 @pytest.mark.slow
-@pytest.mark.skipif(shutil.which("weasyprint") is None, reason="no WeasyPrint on this machine")
+@pytest.mark.skipif(shutil.which("weasyprint") is None or shutil.which("pdftotext") is None, reason="no WeasyPrint or no pdftotext on this machine")
 def test_the_pdf_of_photographs(tmp_path, of_photographs):
-    """What the real program makes of the page: so many A4 pages, with its pictures."""
-    subprocess.run(["weasyprint", "--quiet", of_photographs / "report.html", tmp_path / "report.pdf"], check=True)
-    pdf = (tmp_path / "report.pdf").read_bytes()
-    assert pdf.startswith(b"%PDF-") and pdf.rstrip().endswith(b"%%EOF")
-    assert len(re.findall(rb"/Subtype ?/Image", pdf)) >= 4
+    """What the real program makes of the page: two pages for a customer, with their pictures, and the appendix from the third on."""
+    pdf = tmp_path / "report.pdf"
+    subprocess.run(["weasyprint", "--quiet", of_photographs / "report.html", pdf], check=True)
+    data = pdf.read_bytes()
+    assert data.startswith(b"%PDF-") and data.rstrip().endswith(b"%%EOF")
+    assert len(re.findall(rb"/Subtype ?/Image", data)) >= 6
+    assert re.search(rb"/MediaBox \[ ?0 0 595\.\d+ 841\.\d+ ?\]", data)
+    first, second, third = (text_of(pdf, i + 1) for i in range(3))
+    assert 'report <&> "x"' in first and "Verdict:" in first and "parameters determined" in first
+    assert "Parameters, with their standard errors" in second and "measured mean radiance" in second and "mean radius" in second
+    assert third.strip().startswith("Appendix: details") and "page 3 of" in third

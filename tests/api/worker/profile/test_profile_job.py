@@ -61,7 +61,7 @@ def test_the_result(real, finished):
     assert lines[0] == "theta_i_deg,theta_o_deg,phi_deg,channel,radiance,kajiya_kay.v1,isotropic.v1" and len(lines) == 109
     assert float(lines[1].split(",")[6]) == pytest.approx(2 * red["value"] / math.pi**2 * math.cos(math.radians(40)), rel=1e-6)
     page, summary = (real.get(f"/v1/jobs/{job}/results/{name}").text for name in ("report.html", "summary.txt"))
-    assert page.count("<polyline") == 16 and "isotropic.v1, the best model" in page, "eight charts for each of two models"
+    assert page.count("<polyline") == 18 and "isotropic.v1, the best model" in page, "eight charts for each of two models, two on the second page"
     assert "residual" in summary and "108 radiances" in summary
     done = {s["name"] for s in result["stages"] if s["wall_s"] is not None}
     assert done == {"fit"}, "the report is not done while it is written"
