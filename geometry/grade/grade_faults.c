@@ -6,6 +6,8 @@
 
 /* Loss of score for each piece a fiber beyond the first. */
 static const double PIECE_LOSS = 0.05;
+/* Fibers in a line that holds several. */
+static const double LEAST_HELD = 4.0;
 
 static bool explains(const struct scan_coverage *c)
 {
@@ -15,23 +17,29 @@ static bool explains(const struct scan_coverage *c)
     return enough;
 }
 
+static bool has_yarns(const struct section_misfit *m)
+{
+    return m->surface > SECTION_MOST_MISFIT || m->several_share > GRADE_MOST_SEVERAL;
+}
+
 status scan_grade_explain(const struct coverage_input *in, struct thread_pool *pool, struct scan_grade *grade,
                           float *safe, struct error *err)
 {
     status s = scan_coverage_measure(in, pool, NULL, &grade->coverage, err);
     if (s != STATUS_OK) return s;
-    s = section_misfit_measure(in->v, in->f, pool, &grade->section_misfit, err);
+    s = section_misfit_measure(in->v, in->f, in->blur_voxel, pool, &grade->section, err);
     if (s != STATUS_OK) return s;
     fiber_likeness_measure(in->v, in->f, safe, &grade->likeness);
     const struct fiber_likeness *l = &grade->likeness;
     /* lines whose sections are much too uneven hold several fibers each, so that hardly any fiber is found */
-    const double uneven = fmax(1.0, grade->section_misfit / SECTION_MOST_MISFIT); /* 1 if it is NaN */
-    const double of_fibers = (1.0 - l->particle_share) * (1.0 - grade->double_share) / (uneven * uneven);
+    const double uneven = fmax(1.0, grade->section.surface / SECTION_MOST_MISFIT); /* 1 if it is NaN */
+    const double found = 1.0 / (1.0 + (LEAST_HELD - 1.0) * fmax(0.0, grade->section.several_share));
+    const double of_fibers = (1.0 - l->particle_share) * (1.0 - grade->double_share) * found / (uneven * uneven);
     grade->score = fmin(grade->coverage.explained_share, of_fibers / (1.0 + PIECE_LOSS * (l->fragments - 1.0)));
     grade->faults = (explains(&grade->coverage) ? 0U : GRADE_UNEXPLAINED) |
                     (l->particle_share > GRADE_MOST_PARTICLES ? GRADE_PARTICLES : 0U) |
                     (grade->double_share > GRADE_MOST_DOUBLED ? GRADE_DOUBLED : 0U) |
                     (l->fragments > GRADE_MOST_FRAGMENTS ? GRADE_PIECES : 0U) |
-                    (grade->section_misfit > SECTION_MOST_MISFIT ? GRADE_SEVERAL : 0U);
+                    (has_yarns(&grade->section) ? GRADE_SEVERAL : 0U);
     return STATUS_OK;
 }

@@ -37,24 +37,25 @@ enum grade_fault {
 #define GRADE_MOST_PARTICLES 0.05
 #define GRADE_MOST_DOUBLED 0.06
 #define GRADE_MOST_FRAGMENTS 1.4
+#define GRADE_MOST_SEVERAL 0.05 /* share of the length in lines that hold several fibers */
 /* Score below which the lines do not describe the cloth. */
 #define GRADE_LEAST_SCORE 0.5
 
 enum grade_verdict { GRADE_NONE, GRADE_RESOLVED, GRADE_PARTLY, GRADE_UNRESOLVED };
 
 struct scan_grade {
-    enum grade_verdict verdict; /* GRADE_NONE: not measured */
-    double contrast;            /* median over windows; NaN without fibers */
-    double valley_depth;        /* median over windows beside a neighbour; NaN if no fiber has one */
-    double beside_share;        /* share of the length that lies beside a neighbour */
-    double safe_share;          /* share of the length in windows with a contrast of at least GRADE_SAFE_CONTRAST */
-    double double_share;        /* share of the length that has another line nearer than fibers can be */
-    double section_misfit;      /* of the lines from round fibers (section_misfit.h); NaN: not measured */
+    enum grade_verdict verdict;    /* GRADE_NONE: not measured */
+    double contrast;               /* median over windows; NaN without fibers */
+    double valley_depth;           /* median over windows beside a neighbour; NaN if no fiber has one */
+    double beside_share;           /* share of the length that lies beside a neighbour */
+    double safe_share;             /* share of the length in windows with a contrast of at least GRADE_SAFE_CONTRAST */
+    double double_share;           /* share of the length that has another line nearer than fibers can be */
+    struct section_misfit section; /* of the lines from round fibers; NaN: not measured */
     struct scan_coverage coverage;
     struct fiber_likeness likeness;
     /* Estimate of the smaller of recall and precision of the lines: the smaller of the explained share, and of the
-     * share of the length that is neither particles nor doubled, less a little for pieces, and much for sections that
-     * are not round. NaN: not measured. */
+     * share of the length that is neither particles nor doubled, less a little for pieces, and much for lines that
+     * hold several fibers. NaN: not measured. */
     double score;
     unsigned faults;  /* of enum grade_fault */
     size_t n_dropped; /* fibers that scan_grade_sort has put last; 0 after measuring */

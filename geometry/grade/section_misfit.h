@@ -6,15 +6,22 @@
 #include "geometry/fibers/fiber_set.h"
 #include "geometry/volume/volume.h"
 
-/* How much densities vary around the axes, just within the surface of the fibers: their RMS deviation from a mean and a
- * first harmonic (an axis beside its place) over the RMS density on the axis, in windows of two diameters. Noise does
- * not count, because deviations of every second section are multiplied with deviations of the sections between. Flat
- * fibers are looked at along the ellipses of their sections. Near 0 for single fibers; a yarn that is traced as one
- * fiber has more than SECTION_MOST_MISFIT.
- * v: densities in [0, 1] in cubic voxels. misfit: NaN without fibers. The result does not depend on the number of
- * threads. STATUS_NO_MEMORY. */
-status section_misfit_measure(const struct volume *v, const struct fiber_set *f, struct thread_pool *pool,
-                              double *misfit, struct error *err);
+struct section_misfit {
+    /* RMS deviation of the densities around the axes, just within the surface of the fibers, from a mean and a first
+     * harmonic (an axis beside its place), over the RMS density on the axis, in windows of two diameters. Near 0 for
+     * single fibers; above SECTION_MOST_MISFIT where most lines are yarns. */
+    double surface;
+    /* Share of the length in lines that hold several fibers: densities vary around the axis also so deep below the
+     * surface that neighbours have no part in it. */
+    double several_share;
+};
+
+/* Noise does not count, because deviations of every second section are multiplied with deviations of the sections
+ * between. Flat fibers are looked at along the ellipses of their sections. Both are NaN without fibers.
+ * v: densities in [0, 1] in cubic voxels. blur_voxel: standard deviation of the blur of surfaces. The result does not
+ * depend on the number of threads. STATUS_NO_MEMORY. */
+status section_misfit_measure(const struct volume *v, const struct fiber_set *f, double blur_voxel,
+                              struct thread_pool *pool, struct section_misfit *misfit, struct error *err);
 
 #define SECTION_MOST_MISFIT 0.1
 

@@ -99,10 +99,9 @@ static status find_radius(struct trace_job *job, struct polyline_set *lines, str
     return s;
 }
 
-static status to_fiber_set(const struct trace_job *job, const struct polyline_set *lines, struct fiber_set *f,
-                           struct error *err)
+status trace_fiber_set(const struct volume *v, const struct polyline_set *lines, struct fiber_set *f, struct error *err)
 {
-    double voxel_m = job->v->voxel_size_m[0];
+    const double voxel_m = v->voxel_size_m[0];
     status s = fiber_set_reserve(f, lines->n_line, lines->n_vertex, err);
     if (s != STATUS_OK) return s;
     memcpy(f->first_vertex, lines->first, (lines->n_line + 1) * sizeof *f->first_vertex);
@@ -118,9 +117,16 @@ static status to_fiber_set(const struct trace_job *job, const struct polyline_se
         f->shape[i].radius = (float)((double)f->shape[i].radius * voxel_m);
         f->shape[i].radius_se = (float)((double)f->shape[i].radius_se * voxel_m);
     }
+    f->tile_size_m[0] = (double)v->n[0] * voxel_m;
+    f->tile_size_m[1] = (double)v->n[1] * voxel_m;
+    return s;
+}
+
+static status to_fiber_set(const struct trace_job *job, const struct polyline_set *lines, struct fiber_set *f,
+                           struct error *err)
+{
+    status s = trace_fiber_set(job->v, lines, f, err);
     if (s != STATUS_OK) return s;
-    f->tile_size_m[0] = (double)job->v->n[0] * voxel_m;
-    f->tile_size_m[1] = (double)job->v->n[1] * voxel_m;
     job->report->n_fiber = f->n_fiber;
     job->report->n_vertex = f->n_vertex;
     job->report->total_length_m = fiber_set_length_m(f);

@@ -169,11 +169,10 @@ static void warn_faults(const struct warning_sink *warn, const struct scan_grade
                      100.0 * g->double_share);
     if (g->faults & GRADE_SEVERAL)
         warning_send(warn, OPTION_FIBER_DIAMETER,
-                     "the traced lines do not have the sections of single fibers (densities around their axes vary by "
-                     "%.0f %%): each "
-                     "line may hold several fibers, or a yarn; give the diameter of the fibers, or scan with smaller "
+                     "%.0f %% of the traced length is in lines that hold several fibers, or a yarn (densities around "
+                     "the axes of all lines vary by %.0f %%): give the diameter of the fibers, or scan with smaller "
                      "voxels",
-                     100.0 * g->section_misfit);
+                     100.0 * g->section.several_share, 100.0 * g->section.surface);
     if (g->faults & GRADE_PIECES)
         warning_send(
             warn, OPTION_SCAN_FILES,

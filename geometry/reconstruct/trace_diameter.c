@@ -2,6 +2,8 @@
 
 #include "geometry/diameter/fiber_diameter.h"
 #include "geometry/filter/filter_choice.h"
+#include "geometry/grade/scan_grade.h"
+#include "geometry/reconstruct/reconstruct.h"
 #include "geometry/reconstruct/trace_box.h"
 #include "geometry/reconstruct/trace_grid.h"
 #include "geometry/reconstruct/trace_job.h"
@@ -16,13 +18,15 @@ static const double MOST_RISE = 1.1;
 /* Blur in voxels from which the peak is kept, because the reaches of tracing then fit the blurred width better, and
  * from which the filter is narrower (geometry/NOTES.md). */
 static const double STRONG_BLUR = 1.2;
-/* Diameter over the peak's that is tried where radii spread by SEVERAL_SPREAD or more: centers and radii of fibers of
- * half of it to one and a half are found. */
-static const double SEVERAL_SPREAD = 0.22, THICKER = 1.4;
-/* Where fibers have two diameters, the tried one has radii that spread by so much, and more than before by this ratio;
- * and lines of at most this length and at least this volume over those before. Fibers of one kind whose radii spread by
- * a quarter have 0.27, as before. */
-static const double TWO_SPREAD = 0.35, MORE_SPREAD = 1.25, MOST_LENGTH = 0.97, LEAST_VOLUME = 0.98;
+/* Diameters over the peak's that are tried where thin and thick fibers may lie side by side: centers and radii of
+ * fibers of half of a diameter to one and a half are found. A thicker one where radii spread by SEVERAL_SPREAD or more:
+ * the peak may be the thin fibers', with several lines in each thick one. A thinner one where lines of LEAST_SEVERAL of
+ * the length hold several fibers: the peak may be the thick fibers', with one line in each yarn of thin ones. */
+static const double SEVERAL_SPREAD = 0.22, THICKER = 1.4, LEAST_SEVERAL = 0.03, THINNER = 1.0 / 1.6;
+/* Where fibers have two diameters, the tried one has lines that describe the box better by this score (scan_grade.h),
+ * whose radii spread by so much, and with a thicker diameter more than before by this ratio. Fibers of one kind whose
+ * radii spread by a quarter have 0.27, as before. */
+static const double BETTER = 0.01, TWO_SPREAD = 0.25, THICKER_SPREAD = 0.35, MORE_SPREAD = 1.25;
 /* Noise over the step from void to material from which a narrower filter sees noise. */
 static const double MOST_NOISE = 0.3;
 /* Ratio of the diameters of two rounds up to which they are the same. */
@@ -38,21 +42,32 @@ static double diameter_of_lines(const struct reconstruct_report *report, double 
     return 2.0 * (radius + 0.25 * blur * blur / radius) / voxel_m;
 }
 
-/* Lines of a tracing: mean diameter in voxels, NaN where no fibers are resolved; length, and the volume of their
- * cylinders over pi, in voxels. */
+/* Lines of a tracing: mean diameter in voxels, NaN where no fibers are resolved. */
 struct found {
-    double diameter, length, volume;
-    double spread; /* of the radii, relative */
-    bool blurred;  /* strongly, and without strong noise */
+    double diameter;
+    double spread;         /* of the radii, relative */
+    double score, several; /* scan_grade.h; share of the length in lines that hold several fibers */
+    bool blurred;          /* strongly, and without strong noise */
 };
 
-static void sum_lines(const struct polyline_set *lines, struct found *f)
+/* Grades lines against the box. report: of their tracing. */
+static status grade_lines(const struct volume *box, const struct polyline_set *lines, struct thread_pool *pool,
+                          const struct reconstruct_report *report, struct found *found, struct error *err)
 {
-    for (size_t l = 0; l < lines->n_line; l++) {
-        const double length = (double)polyline_length(lines, l), radius = (double)lines->radius[l];
-        f->length += length;
-        f->volume += length * radius * radius;
+    struct fiber_set f;
+    struct scan_grade grade;
+    if (lines->n_line == 0) return STATUS_OK;
+    fiber_set_init(&f);
+    status s = trace_fiber_set(box, lines, &f, err);
+    const struct coverage_input in = reconstruct_coverage_input(box, &f, report);
+    if (s == STATUS_OK) s = scan_grade_measure(box, &f, pool, NULL, &grade, NULL, err);
+    if (s == STATUS_OK) s = scan_grade_explain(&in, pool, &grade, NULL, err);
+    if (s == STATUS_OK) {
+        found->score = grade.score;
+        found->several = grade.section.several_share;
     }
+    fiber_set_release(&f);
+    return s;
 }
 
 /* Traces lines by a diameter, with the filter that belongs to it whatever the job's is: then a job that is given the
@@ -75,8 +90,8 @@ static status trace_once(const struct volume *box, trace_orientation *find, doub
         trace_job_start(&job);
         s = trace_scan(&job, false, &lines, err);
     }
+    if (s == STATUS_OK) s = grade_lines(box, &lines, pool, &report, found, err);
     found->spread = report.radius_spread;
-    sum_lines(&lines, found);
     const bool resolved = lines.n_line > 0 && report.radius_spread <= TRACE_MOST_SPREAD;
     const bool blurred = report.profile_blur_m >= STRONG_BLUR * box->voxel_size_m[0];
     if (s == STATUS_OK && resolved && blurred) found->blurred = report.noise.scan_sd < MOST_NOISE;
@@ -86,17 +101,19 @@ static status trace_once(const struct volume *box, trace_orientation *find, doub
     return s == STATUS_INVALID ? STATUS_OK : s;
 }
 
-/* Where the lines of the first tracing differ much in radius, they may be thin fibers, and several in each thick one. A
- * thicker diameter, between both, is then taken if fewer lines explain as much and differ more. */
-static status try_thicker(const struct volume *box, trace_orientation *find, const struct found *before,
+/* Where lines of the first tracing differ much in radius, or hold several fibers, thin and thick fibers may lie side by
+ * side. A diameter between both is then taken if its lines describe the box better and differ more. */
+static status try_between(const struct volume *box, trace_orientation *find, const struct found *before,
                           struct thread_pool *pool, const struct progress *progress,
                           const struct reconstruct_report *report, double *diameter, struct error *err)
 {
     struct found found;
-    status s = trace_once(box, find, THICKER * *diameter, pool, progress, *report, &found, err);
-    if (s == STATUS_OK && found.spread >= fmax(TWO_SPREAD, MORE_SPREAD * before->spread) &&
-        found.length <= MOST_LENGTH * before->length && found.volume >= LEAST_VOLUME * before->volume)
-        *diameter *= THICKER;
+    const bool thinner = before->several >= LEAST_SEVERAL;
+    if (!thinner && !(before->spread >= SEVERAL_SPREAD)) return STATUS_OK;
+    const double ratio = thinner ? THINNER : THICKER;
+    status s = trace_once(box, find, ratio * *diameter, pool, progress, *report, &found, err);
+    const double spread = thinner ? TWO_SPREAD : fmax(THICKER_SPREAD, MORE_SPREAD * before->spread);
+    if (s == STATUS_OK && found.spread >= spread && found.score >= before->score + BETTER) *diameter *= ratio;
     return s;
 }
 
@@ -113,11 +130,11 @@ status trace_diameter(const struct volume *v, const struct volume *known, trace_
     status s = trace_box_copy(v, known, peak, &box, from, err);
     for (int round = 0; round < N_ROUND && fabs(log(ratio)) > log(SETTLED) && s == STATUS_OK; round++) {
         struct found found;
+        const double tried = diameter;
         s = trace_once(&box, find, diameter, pool, &quiet, *report, &found, err);
-        if (s == STATUS_OK && round == 0 && found.spread >= SEVERAL_SPREAD)
-            s = try_thicker(&box, find, &found, pool, &quiet, report, &diameter, err);
+        if (s == STATUS_OK && round == 0) s = try_between(&box, find, &found, pool, &quiet, report, &diameter, err);
         if (found.blurred) filter_choose_blurred(option, diameter);
-        if (diameter > most) break;
+        if (diameter != tried) break; /* one between the diameters of two kinds */
         if (!(found.diameter < most && found.diameter * FIBER_DIAMETER_FINER > peak)) break;
         ratio = found.diameter / diameter;
         diameter = found.diameter;

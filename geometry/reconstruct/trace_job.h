@@ -8,6 +8,7 @@
 #include "base/progress.h"
 #include "base/thread_pool.h"
 #include "geometry/fibers/axes/model/axis_profile.h"
+#include "geometry/fibers/fiber_set.h"
 #include "geometry/fibers/lines/joining.h"
 #include "geometry/grade/reconstruct_option.h"
 #include "geometry/grade/reconstruct_report.h"
@@ -87,6 +88,9 @@ status trace_known(struct trace_job *job, bool finish, trace_find *find, struct 
 /* Finds the lines of a scan (trace_scan.c), to the end (finish) or until they are settled. They are in voxels of the
  * scan. */
 status trace_scan(struct trace_job *job, bool finish, struct polyline_set *lines, struct error *err);
+/* Makes fibers of the lines that were found in v. f: initialised. STATUS_NO_MEMORY. */
+status trace_fiber_set(const struct volume *v, const struct polyline_set *lines, struct fiber_set *f,
+                       struct error *err);
 /* Marks the voxels in the inner parts of fibers (trace_lumens.c), in a volume of n. Voxels that have a mark keep it. */
 void trace_mark_cores(const struct polyline_set *lines, double diameter, const size_t n[3], uint8_t value,
                       uint8_t *mark);

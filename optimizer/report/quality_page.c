@@ -158,9 +158,12 @@ static void print_scan(const struct report *report, FILE *out)
     row(out, "length that may be no fibers",
         "shorter than 5 diameters with both ends inside of the scan; within another one", "%.1f, %.1f %%",
         100.0 * g->grade.likeness.particle_share, 100.0 * g->grade.double_share);
-    if (isfinite(g->grade.section_misfit))
+    if (isfinite(g->grade.section.surface))
         row(out, "sections that no single fiber has", "variation of densities around the axes; above 10 % for yarns",
-            "%.1f %%", 100.0 * g->grade.section_misfit);
+            "%.1f %%", 100.0 * g->grade.section.surface);
+    if (isfinite(g->grade.section.several_share))
+        row(out, "length in lines that hold several fibers", "densities vary inside of them", "%.1f %%",
+            100.0 * g->grade.section.several_share);
     row(out, "pieces of a fiber", "by the ends that lie in the middle of material", "%.2f",
         g->grade.likeness.fragments);
     row(out, "material explained (Dice)", "overlap of fibers and kept voxels; 1 is complete", "%.3f", g->dice);

@@ -125,7 +125,8 @@ static void set_faults(json_t *json, const struct scan_grade *g)
     json_object_set_new(json, "light_share", json_number(c->kind[COVERAGE_LIGHT_KIND].share));
     json_object_set_new(json, "particle_share", json_number(g->likeness.particle_share));
     json_object_set_new(json, "double_share", json_number(g->double_share));
-    json_object_set_new(json, "section_misfit", json_number(g->section_misfit));
+    json_object_set_new(json, "section_misfit", json_number(g->section.surface));
+    json_object_set_new(json, "several_share", json_number(g->section.several_share));
     json_object_set_new(json, "pieces_per_fiber", json_number(g->likeness.fragments));
 }
 

@@ -5,7 +5,8 @@
  *   VOXEL_UM  edge of the voxels of all scans
  *   SCAN  a scan; its true fibers are in the text of the same name (none: no fibers)
  * Each line has name, recall, precision, fragments, axis_rms and merges (geometry/phantom/compare.h), lumens, the
- * measured diameter in voxels, score and faults (geometry/grade/scan_grade.h), is_good, errors over stated errors
+ * measured diameter in voxels, score, misfit and several (of the sections, geometry/grade/section_misfit.h), faults
+ * (geometry/grade/scan_grade.h), is_good, errors over stated errors
  * (line_pulls.h), wall_s, and for each kind of fibers density, share of the length, and radius in voxels with its
  * standard error (geometry/grade/fiber_kinds.h); or the error that ended the reconstruction. */
 #include "base/clock.h"
@@ -95,13 +96,14 @@ static void bench_scan(const char *path, double voxel_m, struct thread_pool *poo
     } else {
         printf(
             "{\"name\":\"%s\",\"wall_s\":%.1f,\"recall\":%.4f,\"precision\":%.4f,\"fragments\":%.3f,\"lumens\":\"%s\","
-            "\"axis_rms\":%.4f,\"merges\":%.4f,\"diameter\":%.3f,\"score\":%.4f,\"misfit\":%.4f,\"faults\":%u,"
+            "\"axis_rms\":%.4f,\"merges\":%.4f,\"diameter\":%.3f,\"score\":%.4f,\"misfit\":%.4f,\"several\":%.4f,"
+            "\"faults\":%u,"
             "\"verdict\":\"%s\",\"is_good\":%s",
             name, wall_s, number(r.compare.center_recall), number(r.compare.center_precision),
             number(r.compare.fragments_per_fiber), lumen_answer_name(r.report.lumens),
             number(r.compare.centerline_rms_voxel), number(r.compare.merges_per_fiber), r.report.fiber_diameter_voxel,
-            number(g->score), number(g->section_misfit), g->faults, grade_verdict_name(g->verdict),
-            g->verdict == GRADE_RESOLVED && g->faults == 0 ? "true" : "false");
+            number(g->score), number(g->section.surface), number(g->section.several_share), g->faults,
+            grade_verdict_name(g->verdict), g->verdict == GRADE_RESOLVED && g->faults == 0 ? "true" : "false");
         print_pull("position_pull", &r.pulls.position);
         print_pull("radius_pull", &r.pulls.radius);
         print_pull("point_radius_pull", &r.pulls.point_radius);

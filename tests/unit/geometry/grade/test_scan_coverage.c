@@ -90,10 +90,10 @@ static struct scan_grade grade_of(const struct volume *v, const struct fiber_set
         assert_int_equal(scan_coverage_measure(&in, pool, unexplained, &other.coverage, NULL), STATUS_OK);
     thread_pool_free(pool);
     print_message("explained %.3f (dense %.2f, light %.2f of %.2f), particles %.2f, doubled %.2f, pieces %.2f, misfit "
-                  "%.3f: %.3f\n",
+                  "%.3f, several %.2f: %.3f\n",
                   g.coverage.explained_share, g.coverage.kind[0].explained_share, g.coverage.kind[1].explained_share,
                   g.coverage.kind[1].share, g.likeness.particle_share, g.double_share, g.likeness.fragments,
-                  g.section_misfit, g.score);
+                  g.section.surface, g.section.several_share, g.score);
     return g;
 }
 
@@ -233,27 +233,59 @@ static void test_a_yarn_is_no_fiber(void **state)
     static const double middle[2][3] = {{0, 31, 29.7}, {72, 31, 29.7}};
     struct fiber_set thin = lines_of(4, from, to), one = lines_of(1, &middle[0], &middle[1]), round = four();
     struct volume yarn = empty_scan(), even = empty_scan();
-    double misfit;
+    struct section_misfit misfit;
     for (size_t i = 0; i < 4; i++) thin.radius_m[i] = (float)(2.0 * voxel_m);
     one.radius_m[0] = (float)(4.0 * voxel_m);
     add_scan(&yarn, &thin, 1.0f);
     add_noise(&yarn);
     struct scan_grade g = grade_of(&yarn, &one, NULL);
-    assert_true((g.faults & GRADE_SEVERAL) && g.section_misfit > 1.5 * SECTION_MOST_MISFIT);
+    assert_true((g.faults & GRADE_SEVERAL) && g.section.surface > 1.5 * SECTION_MOST_MISFIT);
     g = grade_of(&yarn, &thin, NULL);
-    assert_true(!(g.faults & GRADE_SEVERAL) && g.section_misfit < SECTION_MOST_MISFIT);
+    assert_true(!(g.faults & GRADE_SEVERAL) && g.section.surface < SECTION_MOST_MISFIT);
     add_scan(&even, &round, 1.0f);
     add_noise(&even);
-    assert_int_equal(section_misfit_measure(&even, &round, NULL, &misfit, NULL), STATUS_OK);
-    assert_true(misfit < 0.03);
+    assert_int_equal(section_misfit_measure(&even, &round, 0.7, NULL, &misfit, NULL), STATUS_OK);
+    assert_true(misfit.surface < 0.03 && misfit.several_share == 0.0);
     for (size_t i = 0; i < 3 * round.first_vertex[4]; i++) round.position_m[i] += (float)(0.4 * voxel_m);
-    assert_int_equal(section_misfit_measure(&even, &round, NULL, &misfit, NULL), STATUS_OK);
-    assert_true(misfit < 0.5 * SECTION_MOST_MISFIT); /* an axis off its place is no yarn */
+    assert_int_equal(section_misfit_measure(&even, &round, 0.7, NULL, &misfit, NULL), STATUS_OK);
+    assert_true(misfit.several_share == 0.0 &&
+                misfit.surface < 0.5 * SECTION_MOST_MISFIT); /* an axis off its place is no yarn */
     fiber_set_release(&thin);
     fiber_set_release(&one);
     fiber_set_release(&round);
     volume_release(&yarn);
     volume_release(&even);
+}
+
+/* Four thick fibers and a yarn of seven thin ones: with a line for each, and with one line for the yarn, which is
+ * little of the length. */
+static void test_a_yarn_among_thick_fibers(void **state)
+{
+    (void)state;
+    double from[11][3], to[11][3];
+    const double middle[5][2] = {{15, 15}, {45, 15}, {15, 45}, {45, 45}, {30, 30}};
+    for (int i = 0; i < 11; i++) {
+        const double *m = middle[i < 4 ? i : 4], away = i < 5 ? 0.0 : 4.4, angle = M_PI / 3.0 * i;
+        from[i][0] = 0.0;
+        to[i][0] = 72.0;
+        from[i][1] = to[i][1] = m[0] + away * cos(angle);
+        from[i][2] = to[i][2] = m[1] + away * sin(angle);
+    }
+    struct fiber_set fibers = lines_of(11, (const double(*)[3])from, (const double(*)[3])to);
+    struct fiber_set lines = lines_of(5, (const double(*)[3])from, (const double(*)[3])to);
+    struct volume v = empty_scan();
+    for (size_t i = 4; i < 11; i++) fibers.radius_m[i] = (float)(2.0 * voxel_m);
+    lines.radius_m[4] = (float)(6.0 * voxel_m);
+    add_scan(&v, &fibers, 1.0f);
+    add_noise(&v);
+    struct scan_grade g = grade_of(&v, &lines, NULL);
+    assert_true((g.faults & GRADE_SEVERAL) && fabs(g.section.several_share - 0.2) < 0.02);
+    assert_true(g.section.surface < SECTION_MOST_MISFIT && g.score < 0.7);
+    g = grade_of(&v, &fibers, NULL);
+    assert_true(!(g.faults & GRADE_SEVERAL) && g.section.several_share == 0.0);
+    fiber_set_release(&fibers);
+    fiber_set_release(&lines);
+    volume_release(&v);
 }
 
 int main(void)
@@ -265,6 +297,7 @@ int main(void)
         cmocka_unit_test(test_a_background_that_varies),
         cmocka_unit_test(test_particles_doubles_and_pieces),
         cmocka_unit_test(test_a_yarn_is_no_fiber),
+        cmocka_unit_test(test_a_yarn_among_thick_fibers),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

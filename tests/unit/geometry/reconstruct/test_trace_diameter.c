@@ -133,6 +133,36 @@ static void test_two_diameters_meet_between(void **state)
     volume_release(&v);
 }
 
+/* Where the peak is of thick fibers, as wide as a yarn of thin ones, a diameter between both is taken. Without a yarn
+ * the same thick fibers have their own diameter. */
+static void test_a_yarn_is_no_thick_fiber(void **state)
+{
+    (void)state;
+    enum { N_THICK = 3, N_THIN = 14 };
+    const size_t n[3] = {N_SIDE, N_SIDE, N_SIDE};
+    struct test_cylinder c[N_THICK + N_THIN];
+    for (int i = 0; i < N_THICK; i++)
+        c[i] = (struct test_cylinder){{32.0, 12.0 + 19.0 * i, 14.0}, {1.0, 0.1, 0.05}, 6.0};
+    for (int i = 0; i < N_THIN; i++) {
+        const double away = i % 7 == 0 ? 0.0 : 4.4, angle = M_PI / 3.0 * i;
+        c[N_THICK + i] = (struct test_cylinder){
+            {17.0 + 30.0 * (i / 7) + away * cos(angle), 32.0, 42.0 + away * sin(angle)}, {0.0, 1.0, 0.0}, 2.0};
+    }
+    for (int k = 0; k < 2; k++) {
+        struct volume v;
+        struct reconstruct_report r = {.fiber_diameter_voxel = 12.0};
+        struct reconstruct_option o;
+        reconstruct_option_default(&o);
+        assert_int_equal(volume_init(&v, n, voxel_m, NULL), STATUS_OK);
+        test_fill_cylinders(&v, c, k == 0 ? N_THICK + N_THIN : N_THICK, 0.1, 7);
+        for (size_t i = 0; i < volume_n_voxel(n); i++) v.density[i] = fminf(1.0f, fmaxf(0.0f, v.density[i]));
+        assert_int_equal(trace_diameter(&v, &v, reconstruct_orientation_again, &o, NULL, NULL, &r, NULL), STATUS_OK);
+        print_message("diameters 12 and %d: from 12 to %.2f\n", k == 0 ? 4 : 12, r.fiber_diameter_voxel);
+        assert_true(fabs(r.fiber_diameter_voxel - (k == 0 ? 7.5 : 12.0)) < 0.5);
+        volume_release(&v);
+    }
+}
+
 /* A strongly blurred scan keeps its peak and gets a narrower filter, but not one that is noisy too. */
 static void test_blurred_filter_is_narrow(void **state)
 {
@@ -162,6 +192,7 @@ int main(void)
         cmocka_unit_test(test_peak_stays),
         cmocka_unit_test(test_box_is_known),
         cmocka_unit_test(test_two_diameters_meet_between),
+        cmocka_unit_test(test_a_yarn_is_no_thick_fiber),
         cmocka_unit_test(test_blurred_filter_is_narrow),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
