@@ -21,12 +21,12 @@ from daemon_under_test import BUILD, Daemon, program, store_options  # noqa: E40
 from fit_outcome import outcome  # noqa: E402
 from servers.postgres_server import PostgresMissing, PostgresServer, programs  # noqa: E402
 from slurm_cluster import SlurmCluster, missing  # noqa: E402
-from small_cloth import TABLE, hair  # noqa: E402
+from small_cloth import hair  # noqa: E402
 
 SKIPPED = 77
 N_SAMPLE = 6
 TEMPLATE = {"sample": "", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"},
-            "fit": {"model": "two_lobe.v1", "path_budget": 120000, "max_iterations": 8, "render_px": 8, "render_samples": 1, "seed": 7}}
+            "fit": {"model": "two_lobe.v1", "path_budget": 600000, "render_px": 32, "render_samples": 4, "seed": 7}}
 # files whose bytes have times in them: outcome() compares what else is in result.json, from which the pages are made
 WITH_TIMES = ("result.json", "report.json", "summary.txt", ".html")
 
@@ -35,8 +35,35 @@ def say(text):
     print(text, flush=True)
 
 
+# lamp and camera of each row: theta and phi of both, rotation of the cloth
+FITTED = [(20, 0, 20, 180, 0), (45, 0, 45, 180, 0), (60, 0, 0, 180, 0), (45, 0, 45, 90, 90), (30, 0, 60, 180, 45), (60, 0, 60, 180, 90),
+          (15, 0, 40, 90, 0), (70, 0, 30, 180, 90), (45, 0, 10, 0, 45), (30, 0, 30, 180, 90), (60, 0, 45, 45, 0), (10, 0, 60, 90, 45)]
+HELD_OUT = [(30, 0, 50, 180, 0), (60, 0, 30, 20, 90), (40, 0, 20, 135, 45), (50, 0, 50, 180, 90), (20, 0, 65, 45, 0), (65, 0, 15, 180, 45)]
+ANGLES = ("light_theta_deg", "light_phi_deg", "camera_theta_deg", "camera_phi_deg", "cloth_rotation_deg")
+
+
+def photograph(folder, i):
+    """Renders the rows of cloth i with parameters of its own, and writes their mean radiances as its table."""
+    rows = [("fit", *row) for row in FITTED] + [("held-out", *row) for row in HELD_OUT]
+    head = ",".join(("set", *ANGLES))
+    with open(os.path.join(folder, "angles.csv"), "w") as f:
+        f.write(head + ",r,g,b\n" + "".join(",".join(map(str, row)) + ",1,1,1\n" for row in rows))
+    parameters = {"C_R": (0.06 + 0.01 * i, 0.05, 0.09 - 0.008 * i), "C_TT": (0.75 - 0.06 * i, 0.5 + 0.02 * i, 0.35 + 0.06 * i), "beta_R": (5 + 0.5 * i,),
+                  "beta_TT": (18,), "gamma_TT": (20,)}
+    truth = os.path.join(folder, "truth")
+    subprocess.run([program("selvedge-phantom"), "photograph", "--quiet", "--fibers", os.path.join(folder, "cloth.hair"), "--table",
+                    os.path.join(folder, "angles.csv"), "--out", truth, "--paths", "16384", "--px", "8", "--noise", "0.005", "--seed", str(i + 1),
+                    *(f"--param={name}={','.join(f'{x:.4f}' for x in value)}" for name, value in parameters.items())], check=True)
+    with open(os.path.join(truth, "truth.json")) as f:
+        mean = [row["mean_rgb"] for row in json.load(f)["photographs"]]
+    with open(os.path.join(folder, "rows.csv"), "w") as f:
+        f.write(head + ",r,g,b\n" + "".join(",".join([*map(str, row), *(f"{x:.6f}" for x in rgb)]) + "\n" for row, rgb in zip(rows, mean)))
+    shutil.rmtree(truth)
+    os.remove(os.path.join(folder, "angles.csv"))
+
+
 def make_samples(folder):
-    """A template, a table, and a folder of each sample: cloths of other radii and colours."""
+    """A template, a table, and a folder of each sample: cloths of other radii and colours, measured with an error of 0.5 %."""
     os.makedirs(folder)
     with open(os.path.join(folder, "template.json"), "w") as f:
         json.dump(TEMPLATE, f)
@@ -47,12 +74,7 @@ def make_samples(folder):
         os.makedirs(sample)
         with open(os.path.join(sample, "cloth.hair"), "wb") as f:
             f.write(hair(radius_mm=0.007 + 0.0004 * i))
-        head, *rows = TABLE.splitlines()[1:]
-        with open(os.path.join(sample, "rows.csv"), "w") as f:
-            f.write(head + "\n")
-            for row in rows:
-                cells = row.split(",")
-                f.write(",".join(cells[:6] + [f"{float(c) * (0.8 + 0.06 * i):.5f}" for c in cells[6:]]) + "\n")
+        photograph(sample, i)
     return folder
 
 
