@@ -58,8 +58,7 @@ def fill_in(browser, path, text):
     if boxes and not boxes[0].is_selected():
         click(browser, boxes[0])
     browser.execute_script("""
-        const input = document.querySelector(`#editor .option[data-path='${arguments[0]}'] .value > input, #editor .option[data-path='${arguments[0]}'] .value > select,
-                                              #editor .option[data-path='${arguments[0]}'] .value > textarea`);
+        const input = document.querySelector(`#editor .option[data-path='${arguments[0]}'] .value > :is(input, select, textarea)`);
         input.value = arguments[1];
         input.dispatchEvent(new Event("change"));""", path, text)
 

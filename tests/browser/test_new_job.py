@@ -292,7 +292,8 @@ def test_the_form_has_words_first_and_a_search(stub, browser, tmp_path):
     assert text_of(browser, "#editor details[data-path='lamp'] > summary") == "The lamp of every photograph lamp"
     browser.find_element(By.CSS_SELECTOR, "#editor .search input").send_keys("twist metre")
     wait_for(browser, "document.querySelectorAll('#editor .found button').length >= 2")
-    browser.execute_script("arguments[0].value = 'seed'; arguments[0].dispatchEvent(new Event('input'))", browser.find_element(By.CSS_SELECTOR, "#editor .search input"))
+    search = browser.find_element(By.CSS_SELECTOR, "#editor .search input")
+    browser.execute_script("arguments[0].value = 'seed'; arguments[0].dispatchEvent(new Event('input'))", search)
     seeds = texts(browser, "#editor .found button")
     assert seeds[0].endswith("cloth.seed") and any(s.endswith("fit.seed") for s in seeds)
     click_on(browser, "#editor .found button", next(i for i, s in enumerate(seeds) if s.endswith("fit.seed")))

@@ -1,6 +1,6 @@
 """What does the dashboard cost in a browser? Prints figures dashboard.* (headless Chromium, the real daemon).
 
-    bench_dashboard.py [--build DIR] [--scan-edge N] [list] [job] [slices]
+    bench_dashboard.py [--build DIR] [--scan-edge N] [list] [job] [slices] [first_hour]
 
 list_10k_ms: time from the navigation until the list shows its 50 rows, with 10,000 jobs in the store (median of 7 loads).
 poll_bytes: bytes of a poll of that list when one row has changed (largest of 10). scripting_ms: time of scripts for each
@@ -12,6 +12,8 @@ request to the drawn slice with its centers: first_ms the first slice of an axis
 the scan that was not looked at before, step_ms the next one; medians over all axes, and the slowest twentieth of jumps and
 steps. main_thread_ms: processor time of the page's main thread for a slice. slice_bytes: bytes that a jump transfers, with
 the slices read ahead, a slice.
+
+first_hour.*: clicks and keys from the empty page to a submitted job (bench_first_hour.py).
 """
 import argparse
 import json
@@ -209,13 +211,16 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", default="build")
     parser.add_argument("--scan-edge", type=int, help="edge of the scan in voxels instead of Fleece's")
-    parser.add_argument("names", nargs="*", default=["list", "job", "slices"])
+    parser.add_argument("names", nargs="*", default=["first_hour", "list", "job", "slices"])
     arguments = parser.parse_args()
     os.environ["SELVEDGE_BUILD"] = os.path.join(ROOT, arguments.build)
     from daemon_under_test import Daemon  # it reads SELVEDGE_BUILD
     with tempfile.TemporaryDirectory() as folder:
         browser = open_browser(folder)
         try:
+            if "first_hour" in arguments.names:
+                from bench_first_hour import bench_first_hour
+                bench_first_hour(folder, browser, Daemon)
             if "list" in arguments.names:
                 bench_list(folder, browser, Daemon)
             if "job" in arguments.names:
