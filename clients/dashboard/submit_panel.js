@@ -4,7 +4,7 @@ import { copiedJob } from "./copied_job.js";
 import { documentEditor, holdsLargeNumber } from "./document_editor.js";
 import { droppedFiles } from "./dropped_files.js";
 import { el, size } from "./page_parts.js";
-import { raw, sendJson } from "./server_link.js";
+import { Problem, raw, sendJson } from "./server_link.js";
 import { AngleGrid, unplaced } from "./submit/angle_grid.js";
 import { exampleOffer } from "./submit/example_job.js";
 import { fileLines } from "./submit/file_list.js";
@@ -32,6 +32,7 @@ export function submitPanel(handed = null, copy = null) {
   let preset = null, picked = null, statesVoxel = true, table = null, notes = [], open = [];
   // kept while the document is the same, so that another try continues an interrupted submit
   let key = null, sent = new Map();
+  let accepted = null; // the document whose warnings were shown
   const list = el("ul", { id: "new-files", tabIndex: 0, "aria-label": "files of the job" }), message = el("p", { class: "hint", id: "send-state", role: "status" });
   const go = el("button", { class: "main", id: "send", disabled: true }, "Submit"), bar = new UploadBar(), interrupted = el("div"), remarks = el("div", { id: "file-notes" });
   const say = (text, bad) => { message.textContent = text; message.className = bad ? "note bad" : "hint"; };
@@ -91,14 +92,14 @@ export function submitPanel(handed = null, copy = null) {
     rig.show(doc, locked);
     grid.show(locked ? null : doc, rig.rig !== null && (doc?.photographs ?? []).every((p) => p.view !== undefined));
     allow();
-    if (busy) return;
+    if (busy || (accepted !== null && accepted === source)) return;
     if (written && open.length && doc) say(`Still to give: ${open.join("; ")}.`);
     else if (doc && missing.length) say(`${missing.length} of ${wanted().length} files are still missing; drop them here.`);
     else if (doc && faulty.length) say(`${faulty[0].name} ${faultOf(faulty[0].name)}.`, true);
     else if (doc) say("Ready.");
   };
   const use = (now) => {
-    if (now !== source) { key = newKey(); sent = new Map(); }
+    if (now !== source) { key = newKey(); sent = new Map(); accepted = null; go.textContent = "Submit"; }
     source = now;
     doc = null; // when it is no JSON
     doc = JSON.parse(source);
@@ -131,6 +132,8 @@ export function submitPanel(handed = null, copy = null) {
   };
   const take = async (files, folderName = "") => {
     let isOther = false;
+    accepted = null;
+    go.textContent = "Submit";
     for (const file of files) {
       dropped.set(file.name, file);
       if (!file.name.endsWith(".json")) { check.file(file); continue; }
@@ -181,6 +184,13 @@ export function submitPanel(handed = null, copy = null) {
   };
   if (copy !== null) begin(); else offerUpload(interrupted, goOn);
   if (handed) take(handed.files, handed.folder);
+  // The files can be used, but look as if something were wrong: the job starts when the button is pressed again.
+  const warn = (list) => {
+    accepted = source;
+    go.textContent = "Start all the same";
+    message.className = "note";
+    message.textContent = [list.length === 1 ? "The files can be used, but:" : `The files can be used, but there are ${list.length} warnings:`, ...list.map((w) => w.detail)].join("\n");
+  };
   const submit = async () => {
     busy = true;
     allow();
@@ -198,7 +208,12 @@ export function submitPanel(handed = null, copy = null) {
       };
       await sendFiles({ job: job.id, files, fileOf, known: sent, bar, gone });
       say("Looking into the files ...");
-      await sendJson("POST", `/v1/jobs/${job.id}/start?check=1`);
+      if (accepted !== source) {
+        const judged = await sendJson("POST", `/v1/jobs/${job.id}/check`);
+        if (!judged.valid) throw new Problem(422, { detail: judged.errors[0]?.detail, field: judged.errors[0]?.field, errors: judged.errors });
+        if (judged.warnings.length) { warn(judged.warnings); return; }
+      }
+      await sendJson("POST", `/v1/jobs/${job.id}/start`);
       forgetUpload();
       key = newKey(); // submitting the same document again makes another job
       sent = new Map();
@@ -209,9 +224,10 @@ export function submitPanel(handed = null, copy = null) {
       else say(faults.length > 1 ? [`The input has ${faults.length} faults:`, ...faults.map((f) => (f.field ? `${f.field}: ${f.detail}` : f.detail))].join("\n") : error.message, true);
       if (faults.length > 1) for (const f of faults) if (f.field) await editor.mark(f.field, f.detail);
       if (faults.length <= 1 && error.body?.field) editor.mark(error.body.field, error.message);
+    } finally {
+      busy = false;
+      allow();
     }
-    busy = false;
-    allow();
   };
   go.addEventListener("click", submit);
   const node = el("section", { id: "submit" }, el("div", { class: "card" }, el("h1", {}, copy === null ? "New job" : "New job, from another one"), from, interrupted, presets.node, drop, example, list, remarks, questions.node),

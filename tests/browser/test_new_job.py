@@ -201,6 +201,28 @@ def test_a_table_that_does_not_say_how_the_cloth_was_turned(stub, browser, tmp_p
     assert complaints(browser) == []
 
 
+def test_warnings_are_shown_before_the_job_starts(stub, browser, tmp_path):
+    url, _ = stub
+    browser.get(url + "/#new")
+    drop(browser, sample(tmp_path, ["cloth.hair", "rows.csv"]))
+    answer(browser, "sample", "warned cloth")
+    wait_for(browser, "!document.querySelector('#send').disabled")
+    click_on(browser, "#send")
+    wait_for(browser, "document.querySelector('#send').textContent === 'Start all the same' && !document.querySelector('#send').disabled")
+    assert "lamp and camera look exchanged" in text_of(browser, "#send-state")
+    keep(browser, "warned")
+    (job,) = [j for j in selvedge.Client(url).jobs() if j.sample == "warned cloth"]
+    assert job.state == "draft"
+    # another answer makes another document, which is judged again; then the job starts
+    answer(browser, "sample", "warned cloth, second")
+    assert text_of(browser, "#send") == "Submit"
+    click_on(browser, "#send")
+    wait_for(browser, "document.querySelector('#send').textContent === 'Start all the same' && !document.querySelector('#send').disabled")
+    click_on(browser, "#send")
+    wait_for(browser, "document.querySelector('.state.succeeded')", 60)
+    assert complaints(browser) == []
+
+
 def test_no_scanner_asks_for_the_weave(stub, browser, tmp_path):
     url, _ = stub
     browser.get(url + "/#new")

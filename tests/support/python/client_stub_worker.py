@@ -18,10 +18,12 @@ import synthetic_twin  # noqa: E402
 
 if "--check" in sys.argv:
     with open(sys.argv[sys.argv.index("--check") + 1], encoding="utf-8") as checked:
-        faulty = json.load(checked)["sample"].startswith("faulty")
+        name = json.load(checked)["sample"]
+    faulty = name.startswith("faulty")
+    warnings = [{"field": "measurements.file", "detail": "lamp and camera look exchanged"}] if name.startswith("warned") else []
     faults = [{"code": "format", "field": "volume.files", "detail": "cannot read volume 'scan.tif': it is no scan"},
               {"code": "format", "field": "measurements.file", "detail": "line 1 of 'cloth.csv' has no numbers"}] if faulty else []
-    print(json.dumps({"faults": faults, "warnings": [], "files": [], "n_file": 2}))
+    print(json.dumps({"faults": faults, "warnings": warnings, "files": [], "n_file": 2}))
     sys.exit(int(faulty))
 
 FOLDER = sys.argv[-1]
