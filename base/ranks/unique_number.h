@@ -1,4 +1,4 @@
-/* Numbers that this process has not used before. They identify a thing of which other processes have copies. */
+/* Numbers that this process has not used before. They identify a thing that other processes have copies of. */
 #ifndef SELVEDGE_BASE_UNIQUE_NUMBER_H
 #define SELVEDGE_BASE_UNIQUE_NUMBER_H
 

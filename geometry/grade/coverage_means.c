@@ -60,7 +60,7 @@ static void sum_along_z(const struct coverage_means *m, size_t k, float *density
     }
 }
 
-/* Sums over 2 reach + 1 places of lines of n, `step` apart, of which there are n_line, `apart` apart. */
+/* Sums over 2 reach + 1 places of n_line lines, `apart` apart, of n values each, `step` apart. */
 static void sum_along(const float *in, float *out, size_t reach, const size_t line[4])
 {
     const size_t n = line[0], step = line[1], n_line = line[2], apart = line[3];

@@ -13,7 +13,7 @@ enum { N_PLACE = 9, N_RING = 4, N_AROUND = 6, N_NEAR = 24, POINTS_PER_WINDOW = 4
 static const double PATCH_RADII = 1.6, EDGE_VOXEL = 2.0;
 /* Distances of neighbours in sums of radii: nearer ones are the same fiber, farther ones have others between. */
 static const double LEAST_APART = 0.5, MOST_APART = 1.6;
-/* Two lines that are nearer, in sums of radii, may be one fiber; those of touching fibers have 1. */
+/* Two lines that are nearer, in sums of radii, may be one fiber; lines of touching fibers have 1. */
 static const double DOUBLE_APART = 0.8;
 /* Least density of a fiber that its contrast is compared with. */
 static const double LEAST_LEVEL = 0.25;

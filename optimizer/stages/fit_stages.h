@@ -102,7 +102,7 @@ status stage_validation_load(const struct validation_input *in, struct validatio
 
 /* The fit of a job that fits nothing: the parameters are those that the document holds fixed. STATUS_NO_MEMORY. */
 status fit_output_given(const struct job_inputs *in, struct fit_output *out, struct error *err);
-/* The validation of that job: radiances and smooth factor are those of the result that it was given. Nothing happens
+/* The validation of that job: radiances and smooth factor are taken from the result that it was given. Nothing happens
  * without one. STATUS_NO_MEMORY. */
 status validation_output_given(const struct job_inputs *in, struct validation_output *out, struct error *err);
 void fit_output_release(struct fit_output *out, size_t n_model);

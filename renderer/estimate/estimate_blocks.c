@@ -264,7 +264,7 @@ static size_t most_bytes(const struct run *r)
     return most + 2 * sizeof(uint64_t);
 }
 
-/* The tasks of one replica, then those of the next one. */
+/* The tasks of one replica, then the tasks of the next one. */
 struct replicas {
     struct run run[2];
     struct estimate_blocks blocks[2]; /* differ in their replica */

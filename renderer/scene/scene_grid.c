@@ -10,7 +10,7 @@
 /* Segments reach into cells that are nearer than this part of a radius, and than this part of the tile: rounding. */
 static const float slack_radii = 1e-2f, slack_of_tile = 1e-6f;
 
-/* Cells that the box around a segment meets; x and y are those of the endless cloth. */
+/* Cells that the box around a segment meets; x and y run over the endless cloth. */
 struct cell_range {
     int low[3], high[3];
 };

@@ -14,7 +14,7 @@ struct scene_place {
     float to_cloth[3][3]; /* rows: takes a direction here to one in the flat cloth, nearly without stretching it */
 };
 
-/* A segment of the scene, whose fibers may be cut into more segments than those of the fiber set. */
+/* A segment of the scene, whose fibers may be cut into more segments than the fiber set has. */
 struct scene_segment {
     float middle_mm[3], tangent[3], radius_mm;
 };

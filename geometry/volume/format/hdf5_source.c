@@ -15,7 +15,7 @@
 struct hdf5 {
     struct volume_header header; /* its name, and the layout as header_axes.h finds it */
     struct hdf5_file file;
-    size_t place[HDF5_MAX_DIMENSION], n_place; /* dimensions that are left once those of one voxel are out */
+    size_t place[HDF5_MAX_DIMENSION], n_place; /* dimensions that are left without the parts of one voxel */
 };
 
 /* Reads up to three numbers of an attribute. Returns their count; 0 for an attribute of another kind. */

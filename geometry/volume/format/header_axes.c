@@ -32,7 +32,7 @@ static void name_unknown(struct header_axes *axes)
         }
 }
 
-/* Adds an axis of `n` volumes, of which number i is read, that is slower than those in `parts`. */
+/* Adds an axis of `n` volumes that is slower than the axes in `parts`. Volume i is read. */
 static void add_part(struct voxel_parts *parts, size_t n, size_t i)
 {
     const size_t before = parts->n > 1 ? parts->n : 1;

@@ -224,7 +224,7 @@ static void metaimage_close(void *handle)
     free(m);
 }
 
-/* The axes of the file: channels first, then those of the header, with the fourth as times. */
+/* The axes of the file: channels first, then the axes of the header, with the fourth as times. */
 static status settle_axes(struct metaimage *m, const struct volume_part *part, struct volume_source_info *info,
                           struct error *err)
 {

@@ -141,7 +141,7 @@ static status parse_centers(struct nrrd_axes *m, const char *value)
 
 static bool is(const char *key, const char *name) { return strcasecmp(key, name) == 0; }
 
-/* Spaces in which x, y and z are those of a left hand. */
+/* Spaces whose x, y and z are left-handed. */
 static bool is_left_handed(const char *space)
 {
     return strncasecmp(space, "left-anterior-superior", 22) == 0 || strncasecmp(space, "LAS", 3) == 0 ||

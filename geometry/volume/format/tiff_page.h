@@ -9,7 +9,7 @@
 #include <tiffio.h>
 
 struct tiff_page {
-    uint32_t width, height, depth; /* pixels; slices in the page (ImageDepth), of which the rest is one */
+    uint32_t width, height, depth; /* pixels; slices in the page (ImageDepth, else one) */
     enum sample_type sample;
     uint16_t bits, compression;  /* values of the tags, as libtiff names them */
     uint16_t orientation;        /* value of the tag; 0: not stated, the page has the first page's, or none */

@@ -7,7 +7,7 @@
 #include "base/status.h"
 #include "geometry/volume/format/sample_type.h"
 
-/* Several volumes in one file: `n` of them, of which number i is read. 0 counts as 1. */
+/* Several volumes in one file: `n` of them; number i is read. 0 counts as 1. */
 struct voxel_parts {
     size_t n, i;
 };

@@ -311,7 +311,7 @@ static void set_wanted(struct color_chart *k, double cos_theta)
     }
 }
 
-/* Warns where the colors of the other edition fit clearly better: those of the wrong one make a radiance wrong by up to
+/* Warns where the colors of the other edition fit clearly better: the wrong one makes a radiance wrong by up to
  * 7 %, and differ by 1 in the mean, as a good photograph does. */
 static void check_edition(const struct color_chart *k, double cos_theta, const struct warning_sink *warn)
 {
