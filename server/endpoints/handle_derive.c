@@ -49,7 +49,7 @@ static status make_document(struct derivation *d, struct error *err)
     struct derived_files files;
     path_join(folder, d->request->service->settings->data, "jobs", d->from.id, NULL);
     if (d->from.state != JOB_SUCCEEDED)
-        return error_set(err, STATUS_CONFLICT, "job %s has no result to show: it has not succeeded", d->from.id);
+        return error_set(err, STATUS_CONFLICT, "job %s has no fitted model to show: it has not succeeded", d->from.id);
     d->document_of_from = json_loads(d->from.document, 0, NULL);
     status s = foreign_json_read(folder, JOB_FOLDER_RESULTS "/" DERIVED_RESULT, &result_bounds, &result, err);
     if (s == STATUS_OK) s = derived_document_make(d->document_of_from, result, d->wanted, &made, &files, err);

@@ -28,6 +28,7 @@ struct cli_args {
     const char *input_dir;                 /* --input-dir: the folder of the files that the document names */
     const char *out_dir;                   /* --out */
     const char *resume_id;                 /* --resume */
+    const char *to;                        /* --to: formats of an export */
     const char *id_file;                   /* --id-file */
     const char *names, *weave;             /* --names: of photographs; --weave: of a cloth without a scan */
     const char *require;                   /* --require: the worst verdict that is accepted */

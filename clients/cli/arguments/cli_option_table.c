@@ -49,6 +49,8 @@ const struct cli_option cli_option_table[CLI_N_OPTION] = {
     {"picture", 0, name, value, help, offsetof(struct cli_args, picture.key)},
 #include "clients/cli/arguments/picture_options.def"
 #undef PICTURE_OPTION
+    {NULL, 0, "to", "FORMAT", "mitsuba, pbrt, usd, blender, textures, or several between commas (docs/exports.md)",
+     offsetof(struct cli_args, to)},
     {NULL, 0, "template", "JOB.json",
      "job document of samples that have no job.json; '*' in names of files is filled in",
      offsetof(struct cli_args, template)},

@@ -1,15 +1,11 @@
-/* selvedge render ID: a picture of a finished job's cloth on a surface, as a job of its own. Its document has the
- * fibers and the fitted parameters of the first job, which is not run again and may be deleted. */
-#include "base/files/file_tree.h"
-#include "clients/cli/commands/cli.h"
+/* selvedge render ID: a picture of a finished job's cloth on a surface, as a job of its own. */
+#include "clients/cli/commands/cli_derive.h"
 
 #include <libgen.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-static const char fiber_file[] = "fibers.hair";
 
 /* *is: whether the text is "yes"; false when the option is left out. */
 static status read_yes(const char *option, const char *text, bool *is, struct error *err)
@@ -101,98 +97,6 @@ static status read_picture(const struct cli_args *a, json_t *picture, const char
     return s;
 }
 
-/* The section "fit" of the new document: the model of a result, with its parameters. groups: names of their sets. */
-static json_t *fixed_fit(const json_t *result, json_t *groups)
-{
-    const json_t *list = json_object_get(result, "parameters"), *p;
-    json_t *fixed = json_object(),
-           *fit = json_pack("{s:O, s:o}", "model", json_object_get(result, "model"), "fixed", fixed);
-    const char *last = NULL;
-    size_t i;
-    json_array_foreach(list, i, p)
-    {
-        if (strcmp(json_string_value(json_object_get(p, "name")), "density_multiplier") == 0) {
-            json_object_set(fit, "density_multiplier_per_cm", json_object_get(p, "value"));
-            continue;
-        }
-        const char *set = json_string_value(json_object_get(p, "set"));
-        json_object_set(fixed, json_string_value(json_object_get(p, "name")), json_object_get(p, "value"));
-        if (set != NULL && (last == NULL || strcmp(last, set) != 0)) json_array_append_new(groups, json_string(set));
-        last = set;
-    }
-    return fit;
-}
-
-/* Sections that a picture shares with the photographs. */
-static void copy_light(const json_t *from, json_t *to)
-{
-    static const char *const key[] = {"lamp", "environment", "black_sheet"};
-    for (size_t i = 0; i < sizeof key / sizeof *key; i++)
-        if (json_object_get(from, key[i]) != NULL) json_object_set(to, key[i], json_object_get(from, key[i]));
-    const json_t *camera = json_object_get(from, "camera");
-    static const char *const of_camera[] = {"distance_cm", "far_field"};
-    for (size_t i = 0; i < sizeof of_camera / sizeof *of_camera; i++)
-        if (json_object_get(camera, of_camera[i]) != NULL) {
-            if (json_object_get(to, "camera") == NULL) json_object_set_new(to, "camera", json_object());
-            json_object_set(json_object_get(to, "camera"), of_camera[i], json_object_get(camera, of_camera[i]));
-        }
-}
-
-static status make_document(const json_t *job, json_t *picture, json_t **out, struct error *err)
-{
-    const json_t *result = json_object_get(job, "result"), *from = json_object_get(job, "document");
-    const char *id = json_string_value(json_object_get(job, "id")),
-               *sample = json_string_value(json_object_get(job, "sample"));
-    char name[200];
-    if (json_array_size(json_object_get(result, "parameters")) == 0)
-        return error_set(err, STATUS_INVALID, "job %s has no fitted model to show (its state is %s)", id,
-                         json_string_value(json_object_get(job, "state")));
-    json_t *groups = json_array(), *fibers = json_pack("{s:s}", "file", fiber_file);
-    json_t *fit = fixed_fit(result, groups);
-    if (json_array_size(groups) > 1) json_object_set(fibers, "groups", groups);
-    json_decref(groups);
-    snprintf(name, sizeof name, "%.*s on %s", 150, sample, json_string_value(json_object_get(picture, "on")));
-    json_t *d = json_pack("{s:s, s:o, s:o, s:[O]}", "sample", name, "fibers", fibers, "fit", fit, "pictures", picture);
-    if (d == NULL) /* the name was cut inside of a character */
-        return error_set(err, STATUS_INVALID, "the result of job %s cannot be used", id);
-    copy_light(from, d);
-    *out = d;
-    return STATUS_OK;
-}
-
-/* A file of the job into a folder. where: "/results/" or "/files/". */
-static status fetch_file(struct cli *cli, const char *id, const char *where, const char *name, const char *folder,
-                         struct error *err)
-{
-    char url[1024], path[4096], tail[512], escaped[CLI_ESCAPED_BYTES];
-    if (!cli_path_is_safe(name))
-        return error_set(err, STATUS_INVALID, "job %s names a file that cannot be written here: '%.80s'", id, name);
-    cli_name_escape(name, escaped);
-    snprintf(tail, sizeof tail, "%s%s", where, escaped);
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    status s = cli_job_path(id, tail, url, sizeof url, err);
-    return s == STATUS_OK ? http_download(cli->http, url, path, NULL, NULL, err) : s;
-}
-
-/* Puts the fibers of the job, the file of its environment and the mesh into a folder, from which they are uploaded. */
-static status gather_files(struct cli *cli, const char *id, const char *mesh, const char *folder, json_t *document,
-                           struct error *err)
-{
-    char path[4096], target[4096];
-    json_t *picture = json_array_get(json_object_get(document, "pictures"), 0);
-    const char *around = json_string_value(json_object_get(json_object_get(document, "environment"), "file"));
-    status s = fetch_file(cli, id, "/results/", fiber_file, folder, err);
-    if (s == STATUS_OK && around != NULL) s = fetch_file(cli, id, "/files/", around, folder, err);
-    if (s != STATUS_OK || mesh == NULL) return s;
-    snprintf(target, sizeof target, "%s", mesh);
-    const char *name = basename(target);
-    json_object_set_new(picture, "mesh_file", json_string(name));
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    char whole[4096];
-    if (realpath(mesh, whole) == NULL) return error_set_errno(err, "cannot read the mesh '%s'", mesh);
-    return symlink(whole, path) == 0 ? STATUS_OK : error_set_errno(err, "cannot use the mesh '%s'", mesh);
-}
-
 static double number_at(const json_t *list, size_t i)
 {
     const json_t *x = json_array_get(list, i);
@@ -238,19 +142,6 @@ static status describe(struct cli *cli, const char *id, struct error *err)
     return s;
 }
 
-/* Submits the job of the picture and waits for it. */
-static status render(struct cli *cli, const json_t *document, const char *folder, int *exit_code, struct error *err)
-{
-    char id[CLI_ID_BYTES] = "";
-    status s = cli_submit_document(cli, document, folder, id, err);
-    if (s == STATUS_OK) s = cli_watch_job(cli, id, exit_code, err);
-    if (s == STATUS_OK && *exit_code == CLI_EXIT_OK) s = cli_results_to_out(cli, id, err);
-    if (s == STATUS_OK && *exit_code == CLI_EXIT_OK) s = describe(cli, id, err);
-    if (s != STATUS_OK && s != STATUS_CONFLICT && id[0] != '\0') /* a conflict is a job that has failed */
-        fprintf(cli->note, "continue with: selvedge watch %s, then selvedge results %s\n", id, id);
-    return s;
-}
-
 CLI_COMMAND(
     RENDER, cli_render, .place = 40, .name = "render", .operand = "ID", .options = "picture out id-file",
     .summary = "show the cloth of a finished job on a surface, and download the picture",
@@ -261,27 +152,22 @@ CLI_COMMAND(
 
 status cli_render(struct cli *cli, int *exit_code, struct error *err)
 {
-    const char *mesh = NULL, *temporary = getenv("TMPDIR");
-    char path[256], folder[4000];
-    json_t *picture = json_object(), *job = NULL, *document = NULL;
+    const char *mesh = NULL;
+    char made[CLI_ID_BYTES] = "", copy[4096];
+    json_t *picture = json_object(), *wanted = json_pack("{s:[O]}", "pictures", picture);
     bool twin = false;
     status s = read_picture(cli->args, picture, &mesh, err);
     if (s == STATUS_OK) s = read_yes("twin", cli->args->twin, &twin, err);
-    if (s == STATUS_OK) s = cli_job_path(cli->args->operand, "", path, sizeof path, err);
-    if (s == STATUS_OK) s = http_json(cli->http, "GET", path, NULL, NULL, &job, err);
-    if (s == STATUS_OK) s = cli_add_result(cli, job, err);
-    snprintf(folder, sizeof folder, "%s/selvedge-render-XXXXXX", temporary != NULL ? temporary : "/tmp");
-    if (s == STATUS_OK && mkdtemp(folder) == NULL)
-        s = error_set_errno(err, "cannot make a folder in '%s'", temporary != NULL ? temporary : "/tmp");
-    else if (s == STATUS_OK) {
-        s = make_document(job, picture, &document, err);
-        if (s == STATUS_OK && twin) json_object_set_new(document, "twin", json_pack("{s:b}", "make", true));
-        if (s == STATUS_OK) s = gather_files(cli, cli->args->operand, mesh, folder, document, err);
-        if (s == STATUS_OK) s = render(cli, document, folder, exit_code, err);
-        file_tree_remove(folder, NULL);
+    if (s == STATUS_OK && mesh != NULL) {
+        snprintf(copy, sizeof copy, "%s", mesh);
+        if (access(mesh, R_OK) != 0) s = error_set_errno(err, "cannot read the mesh '%s'", mesh);
+        json_object_set_new(picture, "mesh_file", json_string(basename(copy)));
     }
+    if (twin) json_object_set_new(wanted, "twin", json_pack("{s:b}", "make", 1));
+    if (s == STATUS_OK) s = cli_derive(cli, cli->args->operand, wanted, mesh, made, exit_code, err);
+    if (s == STATUS_OK && *exit_code == CLI_EXIT_OK) s = cli_results_to_out(cli, made, err);
+    if (s == STATUS_OK && *exit_code == CLI_EXIT_OK) s = describe(cli, made, err);
     json_decref(picture);
-    json_decref(document);
-    json_decref(job);
+    json_decref(wanted);
     return s;
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 import os
 import time
 import urllib.parse
+import uuid
 from typing import IO, TYPE_CHECKING, Any, Callable, Iterable, Optional, Union
 
 from .documents import Document, declaration
@@ -144,6 +145,41 @@ class Job:
         url = self.state().raw["result_url"]
         return Result.of(self.client.request("GET", url).json()) if url else None
 
+    def derive(self, *, pictures: Iterable[dict[str, Any]] = (), twin: bool = False, export: Iterable[str] = (), **light: Any) -> Job:
+        """Start a job that shows the result of this one without a new fit, and return it. pictures: as in a job document; export:
+        names of formats; light: `lamp`, `environment`, `camera`, `black_sheet` in place of those of this job, or `sample`."""
+        wanted: dict[str, Any] = dict(light)
+        if pictures:
+            wanted["pictures"] = list(pictures)
+        if twin:
+            wanted["twin"] = {"make": True}
+        if export:
+            wanted["export"] = {name: True for name in export}
+        answer = self.client.request("POST", self.path + "/derive", json_body=wanted, headers={"Idempotency-Key": uuid.uuid4().hex})
+        return Job(self.client, answer.json()["id"])
+
+    def export(self, formats: Union[str, Iterable[str]], folder: str, on_progress: Optional[Callable[[JobState], None]] = None) -> list[str]:
+        """Make the files of one format or of several ("mitsuba", "usd" ...; docs/exports.md) without a new fit, and download them to
+        folder/export/FORMAT. Return their paths."""
+        job = self.derive(export=[formats] if isinstance(formats, str) else list(formats))
+        job.wait(on_progress)
+        return job.download(folder, under="export/")
+
+    def picture(self, folder: str, on: str = "drape", lamp_deg: tuple[float, float] = (45, 0), camera_deg: tuple[float, float] = (30, 180),
+                on_progress: Optional[Callable[[JobState], None]] = None, **options: Any) -> list[str]:
+        """Render the cloth "flat", on a "cylinder" or as a "drape" without a new fit, and download folder/pictures/on-1.png and .exr.
+        lamp_deg, camera_deg: angles from the vertical and around it. options: keys of a picture in a job document, such as px."""
+        angles = {"light_theta_deg": lamp_deg[0], "light_phi_deg": lamp_deg[1], "camera_theta_deg": camera_deg[0], "camera_phi_deg": camera_deg[1]}
+        job = self.derive(pictures=[{"on": on, **angles, **options}])
+        job.wait(on_progress)
+        return job.download(folder, under="pictures/on-")
+
+    def twin(self, folder: str, on_progress: Optional[Callable[[JobState], None]] = None) -> list[str]:
+        """Make the tables of the twin for a browser without a new fit, and download them to folder/twin."""
+        job = self.derive(twin=True)
+        job.wait(on_progress)
+        return job.download(folder, under="twin/")
+
     def series(self) -> list[dict[str, Any]]:
         """Return all points of the fit's curve, oldest first (the server merges more than 5000)."""
         points: list[dict[str, Any]] = []
@@ -183,10 +219,10 @@ class Job:
         os.replace(path + ".part", path)
         return path
 
-    def download(self, folder: str, on_progress: Callable[[Progress], None] = show_nothing) -> list[str]:
-        """Download all results to a folder and return their paths."""
+    def download(self, folder: str, on_progress: Callable[[Progress], None] = show_nothing, under: str = "") -> list[str]:
+        """Download all results, or those whose paths begin with `under`, to a folder and return their paths."""
         paths: list[str] = []
-        files, done = self.results(), 0
+        files, done = [f for f in self.results() if f.path.startswith(under)], 0
         total = sum(f.size for f in files)
         for file in files:
             parts = file.path.split("/")

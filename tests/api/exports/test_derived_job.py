@@ -1,10 +1,15 @@
 """Jobs that show the result of a finished job without a new fit."""
 import csv
 import os
+import subprocess
+import sys
 
 import pytest
-from daemon_under_test import problem, program
+from daemon_under_test import ROOT, problem, program
 from small_cloth import hair, start_small_job
+
+sys.path.insert(0, os.path.join(ROOT, "clients", "python"))
+import selvedge  # noqa: E402
 
 pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
 DOCUMENT = {"sample": "blue twill", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"}, "camera": {"crop_cm": 0.1},
@@ -109,3 +114,47 @@ def test_a_result_that_is_none_is_named(real, text, said):
     assert real.post(f"/v1/jobs/{job}/start").status_code == 202
     error = real.wait_state(job, "failed", timeout_s=60)["error"]
     assert error["field"] == "fit.result_file" and said in error["text"], error
+
+
+def cli(*arguments, **more):
+    return subprocess.run([program("selvedge"), *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False, **more)
+
+
+def test_the_commands_download_what_they_make(real, fitted, tmp_path):
+    done = cli("export", fitted[:8], "--to", "mitsuba,pbrt", "--out", tmp_path / "out", "--server", real.url)
+    assert done.returncode == 0, done.stderr
+    assert sorted(os.listdir(tmp_path / "out")) == ["export"] and sorted(os.listdir(tmp_path / "out/export")) == ["mitsuba", "pbrt"]
+    assert (tmp_path / "out/export/mitsuba/scene.xml").read_text() == text_of(real, fitted, "export/mitsuba/scene.xml")
+    wrong = cli("export", fitted, "--to", "maya", "--server", real.url)
+    assert wrong.returncode == 1 and "'maya'" in wrong.stderr and "mitsuba, pbrt" in wrong.stderr
+    (tmp_path / "sheet.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n")
+    shown = cli("render", fitted, "--on", tmp_path / "sheet.obj", "--px", 16, "--samples", 1, "--width-mm", 2, "--out", tmp_path / "shown",
+                "--server", real.url)
+    assert shown.returncode == 0 and (tmp_path / "shown/pictures/on-1.png").exists(), shown.stderr
+
+
+def test_a_folder_of_results_is_exported_without_a_server(real, fitted, tmp_path):
+    selvedge.Client(real.url).job(fitted).download(str(tmp_path))
+    before = (tmp_path / "export/mitsuba/scene.xml").read_text()
+    (tmp_path / "export/mitsuba/scene.xml").write_text("old")
+    done = cli("export", tmp_path, "--to", "mitsuba", "--server", "http://127.0.0.1:1")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "export/mitsuba/scene.xml").read_text() == before
+    assert [n for n in os.listdir(tmp_path) if n.startswith(".")] == []
+    (tmp_path / "fibers.hair").unlink()
+    lost = cli("export", tmp_path, "--to", "usd")
+    assert lost.returncode == 1 and "fibers.hair" in lost.stderr
+    assert "report.json" in cli("export", "/tmp", "--to", "usd", "--out", tmp_path / "x").stderr
+
+
+def test_python_exports_and_shows_a_finished_job(real, fitted, tmp_path):
+    job = selvedge.Client(real.url).job(fitted)
+    assert str(tmp_path / "export/usd/cloth.usda") in job.export("usd", str(tmp_path))
+    paths = job.picture(str(tmp_path), "flat", (45, 0), (30, 180), px=16, samples=1, size_mm=1, width_mm=1)
+    assert str(tmp_path / "pictures/on-1.png") in paths and all("/pictures/on-1" in p for p in paths)
+
+
+def test_the_help_names_every_format(real):
+    formats = {key.split(".")[1] for key in (o["path"] for o in real.get("/v1/options").json()["options"]) if key.startswith("export.")} - {"pdf"}
+    said = cli("export", "--help").stdout
+    assert formats and all(f in said for f in formats), said
