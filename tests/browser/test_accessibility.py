@@ -101,6 +101,18 @@ def test_pages_of_other_jobs(stub, browser, axe, name, ready):
     check(browser, axe, name.split()[0], ready)
 
 
+def test_page_of_a_new_job_with_files(stub, browser, axe, tmp_path):
+    """With its list of files, the questions, the grid of angles, and the form of all options."""
+    browser.get(stub[0] + "/#new")
+    paths = [tmp_path / name for name in ("scan.tif", "t20_p0.png", "t45_p90.png", "chart.png", "long-name-of-a-picture-that-has-no-angles-at-all.flat.png")]
+    for path in paths:
+        path.write_bytes(b"bytes of " + path.name.encode())
+    browser.find_element("css selector", ".drop input:not([webkitdirectory])").send_keys("\n".join(map(str, paths)))
+    wait_for(browser, "document.querySelectorAll('#angles tbody tr').length === 2")
+    browser.execute_script("document.querySelector('#editor > summary').click()")
+    check(browser, axe, "new-with-files", "document.querySelector('#editor .search') && document.querySelector('#new-files li')")
+
+
 def test_pages_of_batches(stub, browser, axe):
     url, folder = stub
     batch = made_batch(url, folder, ["axe one", "failing axe"])

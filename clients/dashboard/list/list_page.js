@@ -78,8 +78,9 @@ export function listPage(page, asked) {
   const headings = () => head.replaceChildren(el("th", { class: "pick" }, all), el("td", {}), heading("Sample", "sample", wanted, change), el("th", {}, "State"), el("th", {}, "Verdict"),
     el("th", {}, "Progress"), el("th", {}, "Stage or fault"), el("th", { class: "number" }, "Time left"), heading("Created", "created", wanted, change));
   headings();
-  page.append(el("section", { class: "card" }, el("h1", { class: "list" }, "Jobs"), filters(wanted, change), bulk.node,
-    el("div", { class: "wide" }, el("table", { id: "jobs" }, el("thead", {}, head), body)), empty, example, el("div", { class: "pages" }, back, forth, place)));
+  const card = el("section", { class: "card" }, el("h1", { class: "list" }, "Jobs"), filters(wanted, change), bulk.node,
+    el("div", { class: "wide" }, el("table", { id: "jobs" }, el("thead", {}, head), body)), empty, example, el("div", { class: "pages" }, back, forth, place));
+  page.append(card);
 
   const poller = poll(async () => {
     const query = queryOf(wanted), cursor = cursors[cursors.length - 1], have = table.digests(), signal = request.signal;
@@ -95,7 +96,9 @@ export function listPage(page, asked) {
     const filtered = ["sample", "state", "verdict", "tag", "from", "to", "batch"].some((key) => wanted.get(key));
     empty.textContent = filtered ? "No job fits these filters." : "No jobs yet. Press “New job”, or drop the files of a sample or their folder on this page.";
     empty.classList.toggle("hidden", jobs.length > 0);
-    example.classList.toggle("hidden", jobs.length > 0 || filtered);
+    const none = jobs.length === 0 && !filtered && cursors.length === 1;
+    example.classList.toggle("hidden", !none);
+    card.classList.toggle("without-jobs", none);
     back.disabled = cursors.length === 1;
     forth.disabled = next === null;
     const sorted = wanted.get("sort") === "sample" || wanted.get("order") === "asc";

@@ -15,7 +15,7 @@ async function submitExample() {
 
 // A button that submits the example and goes to its page, with a sentence on it.
 export function exampleOffer() {
-  const said = el("span", { class: "hint", role: "status" }, "A blue twill and 40 measured values come with this page: the fit takes about two minutes and ends with a cloth to turn with the mouse.");
+  const said = el("span", { class: "hint", role: "status" }, "A blue twill and 40 measured values come with this page: after a minute or two there is a cloth to turn with the mouse.");
   const button = el("button", { type: "button", id: "example", onclick: async () => {
     button.disabled = true;
     try { location.hash = await submitExample(); } catch (error) { said.className = "note bad"; said.textContent = error.message; button.disabled = false; }

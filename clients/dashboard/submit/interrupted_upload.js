@@ -2,6 +2,7 @@
 import { copiedJob } from "../copied_job.js";
 import { el, size } from "../page_parts.js";
 import { raw } from "../server_link.js";
+import { filesOf } from "./job_files.js";
 
 const KEY = "selvedge.upload";
 
@@ -19,7 +20,7 @@ export async function offerUpload(node, goOn) {
   const files = [...job.files.values()], whole = files.filter((f) => f.sha256), bytes = files.reduce((sum, f) => sum + (f.sha256 ? f.size : f.offset ?? 0), 0);
   const close = () => node.replaceChildren();
   node.replaceChildren(el("div", { class: "note", id: "interrupted" },
-    el("p", {}, `The upload of “${job.sample || "a job without a name"}” was interrupted: ${whole.length} of ${files.length} declared files have arrived, ${size(bytes)} in all.`),
+    el("p", {}, `The upload of “${job.sample || "a job without a name"}” was interrupted: ${whole.length} of ${filesOf(JSON.parse(job.source)).length} files have arrived whole, ${size(bytes)} in all.`),
     el("button", { type: "button", class: "main", onclick: () => { close(); goOn(job); } }, "Go on"),
     el("button", { type: "button", onclick: async () => { close(); forgetUpload(); await raw("DELETE", `/v1/jobs/${id}`).catch(() => {}); } }, "Discard it"),
     el("button", { type: "button", onclick: () => { close(); forgetUpload(); } }, "Keep the draft for later")));
