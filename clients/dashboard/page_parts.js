@@ -66,9 +66,18 @@ export function timeOf(unix) {
 }
 export const stateTag = (state) => el("span", { class: `state ${state}` }, state);
 
+// Verdicts by their code, from the best to the worst: words where the number of undetermined parameters is not known, and a
+// class. "usable" is of older results.
+export const VERDICTS = {
+  good: ["good", "good"],
+  good_but_undetermined: ["good, but some parameters are undetermined", "good"],
+  pictures_only: ["usable for pictures only", "warn"],
+  does_not_describe_this_cloth: ["does not describe this cloth", "bad"],
+  usable: ["usable with reservations", "warn"],
+};
+export const verdictWords = (code) => VERDICTS[code]?.[0] ?? code;
 // The verdict on a result as a coloured tag; null before there is one. The sentence is its title.
-const VERDICT_CLASS = { good: "good", usable: "warn", does_not_describe_this_cloth: "bad" };
-export const verdictTag = (verdict) => (verdict ? el("span", { class: `tag ${VERDICT_CLASS[verdict.code] ?? ""}`, title: verdict.text }, verdict.words) : null);
+export const verdictTag = (verdict) => (verdict ? el("span", { class: `tag ${VERDICTS[verdict.code]?.[1] ?? ""}`, title: verdict.text }, verdict.words) : null);
 
 // Converts linear radiance to an sRGB byte colour.
 export function colour(rgb, exposure) {

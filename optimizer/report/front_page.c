@@ -197,7 +197,7 @@ static status print_figures(struct report *report, const json_t *result, FILE *o
     const bool fit = report->in.kind == JOB_OF_FIT && json_array_size(rows) > 0;
     if (report->in.kind == JOB_OF_PROFILE) {
         fputs("<h2>Measured and fitted</h2>\n", out);
-        profile_charts(report, profile_best_model(report), 2, out);
+        profile_charts(report, report_best_model(report), 2, out);
         return STATUS_OK;
     }
     fprintf(out, "<h2>%s</h2>\n<div class=\"pair\">\n", fit ? "Measured and rendered; geometry" : "Geometry");

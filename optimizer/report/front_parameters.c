@@ -74,8 +74,7 @@ static size_t lines(const struct param_info *info, size_t n_info, const json_t *
 
 static const struct pipeline_model *best_model(const struct report *report)
 {
-    if (report->in.kind == JOB_OF_PROFILE) return &report->model[profile_best_model(report)];
-    return &report->model[report->in.kind == JOB_OF_FIT ? report_best_model(report) : 0];
+    return &report->model[report->in.kind == JOB_OF_PICTURES ? 0 : report_best_model(report)];
 }
 
 void front_parameters(const struct report *report, const json_t *result, FILE *out)

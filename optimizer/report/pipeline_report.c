@@ -120,6 +120,7 @@ static status report_pictures(struct report *report, struct error *err)
 /* Writes the results of a job with the profile of a single fiber. */
 static status report_profile(struct report *report, struct error *err)
 {
+    pipeline_reach_verdict(report);
     status s = profile_json_write(report, err);
     if (s == STATUS_OK) s = result_summary_write(report, err);
     if (s == STATUS_OK) s = profile_csv_write(report, err);

@@ -88,14 +88,22 @@ static json_t *row_of(struct job_service *v, const struct job_row *row)
     return out;
 }
 
-status batch_results(struct job_service *v, const char *id, json_t **table, struct error *err)
+static bool is_wanted(const char *verdicts, const struct job_row *row)
+{
+    char code[sizeof row->verdict + 2];
+    snprintf(code, sizeof code, ",%s,", row->verdict);
+    return verdicts[0] == '\0' || strstr(verdicts, code) != NULL;
+}
+
+status batch_results(struct job_service *v, const char *id, const char *verdicts, json_t **table, struct error *err)
 {
     struct job_row *row = NULL;
     size_t n = 0;
     status s = batch_jobs(v, id, &row, &n, err);
     if (s != STATUS_OK) return s;
     json_t *list = json_array();
-    for (size_t i = 0; i < n; i++) json_array_append_new(list, row_of(v, &row[i]));
+    for (size_t i = 0; i < n; i++)
+        if (is_wanted(verdicts, &row[i])) json_array_append_new(list, row_of(v, &row[i]));
     job_rows_free(row, n);
     *table = json_pack("{s:s,s:o}", "batch", id, "samples", list);
     return STATUS_OK;

@@ -11,8 +11,9 @@ status batch_summary(struct job_service *v, const struct batch_row *row, json_t 
 status batch_view(struct job_service *v, const struct batch_row *row, json_t **view, struct error *err);
 
 /* The table of results, a row for each sample: parameters with standard errors, verdict, errors of the fit, flags. It
- * reads the result of every job that has one. */
-status batch_results(struct job_service *v, const char *id, json_t **table, struct error *err);
+ * reads the result of every job that has one. verdicts: codes as in job_query.verdict, to which the rows are limited;
+ * "": all rows. */
+status batch_results(struct job_service *v, const char *id, const char *verdicts, json_t **table, struct error *err);
 /* That table as CSV (RFC 4180), with a value and a standard error for each parameter that any sample has. NULL: out of
  * memory. The caller frees it. */
 char *batch_results_csv(const json_t *table);

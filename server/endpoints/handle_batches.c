@@ -4,6 +4,7 @@
 #include "server/batches/batch_view.h"
 #include "server/endpoints/handlers.h"
 #include "server/endpoints/request_json.h"
+#include "server/endpoints/verdict_filter.h"
 #include "server/http/http_reply.h"
 #include "server/http/long_poll.h"
 
@@ -170,9 +171,11 @@ static json_t *results_of(struct http_request *r)
     struct error err = {0};
     struct batch_row row;
     json_t *table = NULL;
+    char filter[VERDICT_FILTER_BYTES];
+    if (!verdict_filter_read(r, filter)) return NULL;
     status s = batch_get(r->service, r->param[0], &row, &err);
     batch_row_release(&row);
-    if (s == STATUS_OK) s = batch_results(r->service, r->param[0], &table, &err);
+    if (s == STATUS_OK) s = batch_results(r->service, r->param[0], filter, &table, &err);
     if (s == STATUS_OK) return table;
     reply_problem(r, NULL, &err, NULL);
     return NULL;

@@ -1,5 +1,6 @@
 /* The list of jobs: filters, orders, pages, and rows that a client may have already. */
 #include "server/endpoints/handlers.h"
+#include "server/endpoints/verdict_filter.h"
 #include "server/http/http_reply.h"
 #include "server/http/long_poll.h"
 #include "server/views/job_row_view.h"
@@ -19,7 +20,7 @@ struct list_request {
     struct job_query query;
     bool rows;        /* short rows instead of summaries */
     const char *have; /* digests of the rows that the client has, between commas; NULL: none */
-    char verdict[160], key[STORE_KEY_BYTES];
+    char verdict[VERDICT_FILTER_BYTES], key[STORE_KEY_BYTES];
 };
 
 static const char *given(struct http_request *r, const char *name)
@@ -58,21 +59,8 @@ static bool read_states(struct http_request *r, struct job_query *q)
 
 static bool read_verdicts(struct http_request *r, struct list_request *l)
 {
-    static const char *const known[] = {"good", "usable", "does_not_describe_this_cloth", "none"};
-    const char *text = given(r, "verdict");
-    if (text == NULL) return true;
-    size_t n_out = (size_t)snprintf(l->verdict, sizeof l->verdict, ",");
-    for (const char *at = text;; at++) {
-        size_t n = strcspn(at, ","), i = 0, n_known = sizeof known / sizeof known[0];
-        while (i < n_known && !(strlen(known[i]) == n && strncmp(known[i], at, n) == 0)) i++;
-        if (i == n_known || n_out + n + 2 >= sizeof l->verdict)
-            return refuse(r, "verdict", "it must be good, usable, does_not_describe_this_cloth or none", text);
-        n_out +=
-            (size_t)snprintf(l->verdict + n_out, sizeof l->verdict - n_out, "%s,", i + 1 == n_known ? "" : known[i]);
-        at += n;
-        if (*at == '\0') break;
-    }
-    l->query.verdict = l->verdict;
+    if (!verdict_filter_read(r, l->verdict)) return false;
+    if (l->verdict[0] != '\0') l->query.verdict = l->verdict;
     return true;
 }
 

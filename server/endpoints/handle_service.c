@@ -78,6 +78,11 @@ static void print_counts(FILE *out, const struct http_request *r)
     for (int i = JOB_SUCCEEDED; i < JOB_N_STATE; i++)
         fprintf(out, "selvedge_jobs_finished_total{state=\"%s\"} %llu\n", job_state_name((enum job_state)i),
                 (unsigned long long)atomic_load(&r->service->n_finished_total[i]));
+    fprintf(out, "# HELP selvedge_verdicts_total Jobs that have succeeded since the daemon started, by their verdict.\n"
+                 "# TYPE selvedge_verdicts_total counter\n");
+    for (int i = 0; i < VERDICT_N_CODE; i++)
+        fprintf(out, "selvedge_verdicts_total{verdict=\"%s\"} %llu\n", verdict_code_id((enum verdict_code)i),
+                (unsigned long long)atomic_load(&r->service->n_verdict_total[i]));
     fprintf(
         out,
         "# HELP selvedge_http_requests_total Replies by status code.\n# TYPE selvedge_http_requests_total counter\n");

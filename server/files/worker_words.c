@@ -1,4 +1,5 @@
 #include "server/files/worker_words.h"
+#include "base/catalogue/verdict_code.h"
 #include "base/files/file_ledger_json.h"
 #include "base/files/json_member.h"
 
@@ -78,14 +79,11 @@ static const struct json_member of_status[] = {TEXT("state"),
 
 static bool is_verdict(json_t *verdict)
 {
-    static const char *const known[] = {"good", "usable", "does_not_describe_this_cloth"};
+    enum verdict_code code = VERDICT_NONE;
     json_members_keep(verdict, of_reasons, N(of_reasons), true);
     if (!json_members_keep(verdict, of_verdict, N(of_verdict), false)) return false;
     json_items_keep(json_object_get(verdict, "reservations"), of_reservation, N(of_reservation));
-    const char *code = json_string_value(json_object_get(verdict, "code"));
-    for (size_t i = 0; i < N(known); i++)
-        if (strcmp(code, known[i]) == 0) return true;
-    return false;
+    return verdict_code_parse(json_string_value(json_object_get(verdict, "code")), &code) && code != VERDICT_NONE;
 }
 
 void worker_words_of_status(json_t *status)

@@ -3,6 +3,7 @@
 #ifndef SELVEDGE_SERVER_JOB_SERVICE_H
 #define SELVEDGE_SERVER_JOB_SERVICE_H
 
+#include "base/catalogue/verdict_code.h"
 #include "base/log.h"
 #include "server/access/access_registry.h"
 #include "server/files/upload.h"
@@ -52,6 +53,7 @@ struct job_service {
     atomic_bool stopping;
     atomic_int n_judging; /* checks of input files that run now (server/workers/input_judge.h) */
     atomic_uint_least64_t n_attempt_total, n_lost_total, n_finished_total[JOB_N_STATE];
+    atomic_uint_least64_t n_verdict_total[VERDICT_N_CODE]; /* of jobs that have succeeded */
 };
 
 /* Why a request is refused, beyond the status and the text of the error. */

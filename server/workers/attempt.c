@@ -312,6 +312,13 @@ static void restore_folders(const struct job_service *v, const char *job_id)
     }
 }
 
+static void count_verdict(struct job_service *v, const char *id)
+{
+    enum verdict_code code;
+    verdict_code_parse(id, &code);
+    atomic_fetch_add(&v->n_verdict_total[code], 1);
+}
+
 status attempt_finish(struct job_service *v, const char *job_id, const char *token, const struct worker_end *end,
                       enum attempt_stop stop, struct attempt_outcome *outcome, struct error *err)
 {
@@ -331,6 +338,7 @@ status attempt_finish(struct job_service *v, const char *job_id, const char *tok
     if (over) row.cancel_requested = false;
     s = job_update_surely(v, &row, err);
     if (s == STATUS_OK && over) atomic_fetch_add(&v->n_finished_total[row.state], 1);
+    if (s == STATUS_OK && row.state == JOB_SUCCEEDED) count_verdict(v, row.verdict);
     if (s == STATUS_OK)
         log_info(v->log, "job %s is %s%s%s", job_id, job_state_name(row.state), row.error_text[0] ? ": " : "",
                  row.error_text);

@@ -119,7 +119,7 @@ def test_from_submit_to_results(daemon, sample, tmp_path):
     assert "2 files in place" in done.stderr and "fit (6/8)" in done.stderr and "objective" in done.stderr
     assert "C_TT.r" in done.stdout and "+- 0.010" in done.stdout and "not determined" in done.stdout
     assert "gamma_TT" in next(line for line in done.stdout.splitlines() if "at upper bound" in line)
-    assert "held out: 3.00 %" in done.stdout
+    assert "held out: 3 %" in done.stdout
     assert "\x1b" not in done.stderr  # no escape sequences outside a terminal
     out = tmp_path / "results"
     told = run(daemon.url, "results", job_id, "--out", out).stderr
@@ -190,16 +190,18 @@ def test_errors_before_anything_is_created(daemon, sample):
 
 
 def test_exit_status_by_verdict(daemon, sample):
-    write_document(sample, "usable twill")
-    job_id = run(daemon.url, "submit", sample / "job.json", "--watch", "--require", "usable").stdout.splitlines()[0]
-    assert "worse than 'good'" in run(daemon.url, "watch", job_id, "--require", "good", expect=4).stderr
-    write_document(sample, "good twill")
-    run(daemon.url, "submit", sample / "job.json", "--watch", "--require", "good")
-    write_document(sample, "bad twill")
-    run(daemon.url, "submit", sample / "job.json", "--watch", "--require", "usable", expect=4)
-    write_document(sample, "quick twill")
-    run(daemon.url, "submit", sample / "job.json", "--watch", "--require", "usable", expect=4)
-    assert "allowed are good, usable" in run(daemon.url, "watch", job_id, "--require", "best", expect=2).stderr
+    order = {"good": "good", "undetermined": "good_but_undetermined", "pictures": "pictures_only", "bad": None, "quick": None}
+    asked = ["good", "good_but_undetermined", "pictures_only", "usable"]  # the last one is the old word for the third
+    for i, (word, code) in enumerate(order.items()):
+        write_document(sample, f"{word} twill")
+        job_id = run(daemon.url, "submit", sample / "job.json", "--watch").stdout.splitlines()[0]
+        assert (job := json.loads(run(daemon.url, "status", job_id, "--json").stdout)["verdict"]) is None or code in (None, job["code"])
+        for k, least in enumerate(asked):
+            enough = code is not None and i <= k
+            text = run(daemon.url, "watch", job_id, "--require", least, expect=0 if enough else 4).stderr
+            assert enough or f"worse than '{least}'" in text
+    for word in ("best", "none", "does_not_describe_this_cloth"):
+        assert "allowed are good, good_but_undetermined and pictures_only" in run(daemon.url, "watch", job_id, "--require", word, expect=2).stderr
     assert "needs --watch" in run(daemon.url, "submit", sample / "job.json", "--require", "good", expect=2).stderr
 
 

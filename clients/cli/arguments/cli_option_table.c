@@ -17,7 +17,8 @@ const struct cli_option cli_option_table[CLI_N_OPTION] = {
      "weave of a cloth that was not scanned: plain, twill, satin ... (docs/described-cloth.md)",
      offsetof(struct cli_args, weave)},
     {NULL, 0, "require", "VERDICT",
-     "status 4 if the result has a worse verdict than this: good, usable (needs --watch" CLI_NEXT_LINE "with submit)",
+     "status 4 if the result has a worse verdict than this: good, good_but_undetermined or" CLI_NEXT_LINE
+     "pictures_only (needs --watch with submit)",
      offsetof(struct cli_args, require)},
     {NULL, 0, "resume", "ID",
      "continue an interrupted submit of job ID (JOB.json is then not needed" CLI_NEXT_LINE
@@ -62,7 +63,9 @@ const struct cli_option cli_option_table[CLI_N_OPTION] = {
      offsetof(struct cli_args, once)},
     {"selection", 0, "state", "STATES", "only jobs in these states, such as queued,running",
      offsetof(struct cli_args, state)},
-    {"selection", 0, "verdict", "CODES", "only with a verdict: good, usable, does_not_describe_this_cloth, none",
+    {"selection", 0, "verdict", "CODES",
+     "only with a verdict: good, good_but_undetermined, pictures_only," CLI_NEXT_LINE
+     "does_not_describe_this_cloth, none, or usable (of older results), between commas",
      offsetof(struct cli_args, verdict)},
     {"selection", 0, "tag", "TAG", "only with this tag", offsetof(struct cli_args, tag)},
     {"selection", 0, "sample", "TEXT", "only samples whose name contains this", offsetof(struct cli_args, sample)},

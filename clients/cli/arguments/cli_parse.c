@@ -1,4 +1,5 @@
 #include "clients/cli/arguments/cli_parse.h"
+#include "base/catalogue/verdict_code.h"
 #include "base/word_guess.h"
 #include "clients/cli/arguments/cli_option_table.h"
 #include "clients/cli/arguments/cli_tool.h"
@@ -113,6 +114,18 @@ static bool is_given(const struct cli_args *a, const struct cli_option *o)
     return o->value != NULL ? *(const char *const *)at != NULL : *(const bool *)at;
 }
 
+/* "usable", the word before there were the two verdicts in the middle, is known as well. */
+static status check_requirement(const struct cli_args *a, struct error *err)
+{
+    enum verdict_code code;
+    if (!verdict_code_parse(a->require, &code) || code < VERDICT_GOOD || code > VERDICT_PICTURES_ONLY)
+        return error_set(err, STATUS_INVALID,
+                         "--require is '%s': allowed are good, good_but_undetermined and pictures_only", a->require);
+    if (a->command == CLI_SUBMIT && !a->watch)
+        return error_set(err, STATUS_INVALID, "--require needs --watch: the verdict is known when the job has ended");
+    return STATUS_OK;
+}
+
 /* Options and operands must belong to the command. */
 static status check(const struct cli_args *a, struct error *err)
 {
@@ -127,10 +140,10 @@ static status check(const struct cli_args *a, struct error *err)
                          c->needs != NULL ? c->needs : "a job id (`selvedge list` shows them)", c->name, c->operand);
     if (c->operand == NULL && a->operand != NULL)
         return error_set(err, STATUS_INVALID, "'selvedge %s' takes no '%s'", c->name, a->operand);
-    if (a->require != NULL && strcmp(a->require, "good") != 0 && strcmp(a->require, "usable") != 0)
-        return error_set(err, STATUS_INVALID, "--require is '%s': allowed are good, usable", a->require);
-    if (a->require != NULL && a->command == CLI_SUBMIT && !a->watch)
-        return error_set(err, STATUS_INVALID, "--require needs --watch: the verdict is known when the job has ended");
+    if (a->require != NULL) {
+        status s = check_requirement(a, err);
+        if (s != STATUS_OK) return s;
+    }
     if (strncmp(a->server, "http://", 7) != 0 && strncmp(a->server, "https://", 8) != 0 &&
         strncmp(a->server, "unix:/", 6) != 0)
         return error_set(err, STATUS_INVALID, "server '%s' is not an http://, https:// or unix:/ address", a->server);

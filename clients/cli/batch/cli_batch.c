@@ -142,12 +142,23 @@ static status list(struct cli *cli, int *exit_code, struct error *err)
     return s;
 }
 
+static status results_path(struct cli *cli, char *path, size_t n_path, struct error *err)
+{
+    const char *verdict = cli->args->verdict;
+    char tail[300];
+    if (verdict != NULL && verdict[strspn(verdict, "abcdefghijklmnopqrstuvwxyz_,")] != '\0')
+        return error_set(err, STATUS_INVALID, "--verdict is '%.40s': it must be codes between commas", verdict);
+    snprintf(tail, sizeof tail, "%s%s%.240s", cli->args->json ? "/results.json" : "/results.csv",
+             verdict != NULL ? "?verdict=" : "", verdict != NULL ? verdict : "");
+    return batch_path(cli, tail, path, n_path, err);
+}
+
 static status results(struct cli *cli, int *exit_code, struct error *err)
 {
     (void)exit_code;
-    char path[200];
+    char path[500];
     json_t *table = NULL;
-    status s = batch_path(cli, cli->args->json ? "/results.json" : "/results.csv", path, sizeof path, err);
+    status s = results_path(cli, path, sizeof path, err);
     if (s == STATUS_OK && cli->args->out_dir != NULL) /* a file here */
         s = http_download(cli->http, path, cli->args->out_dir, NULL, NULL, err);
     else if (s == STATUS_OK && cli->args->json) {
@@ -177,13 +188,14 @@ static status delete_batch(struct cli *cli, int *exit_code, struct error *err)
 CLI_COMMAND(
     BATCH, cli_batch, .place = 200, .name = "batch", .operand = "ACTION",
     .needs = "an action: submit, list, show, start, retry, cancel, results or delete", .second = "NAME",
-    .third = "TABLE", .options = "batch draft json out",
+    .third = "TABLE", .options = "batch draft json out verdict",
     .summary = "run many samples with one template, or say how they are",
     .text =
         "selvedge batch submit TEMPLATE.json TABLE.csv    a job of each row; or a folder with a folder of each sample\n"
         "selvedge batch list\n"
         "selvedge batch show|start|retry|cancel NAME      or its id; retry queues all that have failed\n"
-        "selvedge batch results NAME                      table of results as CSV (--json; --out FILE)\n"
+        "selvedge batch results NAME                      table of results as CSV (--json; --out FILE; --verdict "
+        "CODES)\n"
         "selvedge batch delete NAME --keep-jobs|--delete-jobs\n"
         "docs/automation.md describes the table. Submitting a changed table with --update runs only what differs.\n")
 

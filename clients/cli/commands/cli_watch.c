@@ -1,4 +1,5 @@
 /* Follows a job: polls with the ETag, prints changes, and reports the outcome. */
+#include "base/catalogue/verdict_code.h"
 #include "clients/cli/commands/cli.h"
 #include "clients/cli/text/cli_report.h"
 #include "clients/cli/text/cli_text.h"
@@ -143,9 +144,11 @@ static bool ended(const struct job_view *v)
  * that is good enough. */
 static bool is_good_enough(const char *least, const json_t *job)
 {
-    const char *code = json_string_value(json_object_get(json_object_get(job, "verdict"), "code"));
+    const char *id = json_string_value(json_object_get(json_object_get(job, "verdict"), "code"));
+    enum verdict_code wanted, code;
     if (least == NULL) return true;
-    return code != NULL && (strcmp(code, "good") == 0 || strcmp(code, least) == 0);
+    return id != NULL && verdict_code_parse(least, &wanted) && verdict_code_parse(id, &code) && code != VERDICT_NONE &&
+           code <= wanted;
 }
 
 static status report_outcome(struct watch *w, int *exit_code, struct error *err)

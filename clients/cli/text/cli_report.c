@@ -1,5 +1,6 @@
 #include "clients/cli/text/cli_report.h"
 #include "base/files/file_ledger_json.h"
+#include "base/percent_words.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -158,18 +159,12 @@ static void print_parameters(const json_t *parameters, FILE *out)
     }
 }
 
-/* Writes "2.41 +- 0.05 %", "2.41 %" for an older result without an error, or "-" if there is no value. */
-static void percent(const json_t *of, const char *key, char *text, size_t n)
+/* Writes an error with its standard error (base/percent_words.h). */
+static void percent(const json_t *of, const char *key, char text[PERCENT_WORDS_BYTES])
 {
     char key_se[64];
     snprintf(key_se, sizeof key_se, "%s_se", key);
-    const double x = member_number(of, key), se = member_number(of, key_se);
-    if (isnan(x))
-        snprintf(text, n, "-");
-    else if (isnan(se))
-        snprintf(text, n, "%.2f %%", 100.0 * x);
-    else
-        snprintf(text, n, "%.2f +- %.2f %%", 100.0 * x, 100.0 * se);
+    percent_words(member_number(of, key), member_number(of, key_se), text);
 }
 
 /* Prints one line for each model if there are several. */
@@ -179,22 +174,23 @@ static void print_models(const json_t *models, const char *chosen_by, FILE *out)
     const json_t *m;
     if (json_array_size(models) < 2) return;
     const bool gains = !isnan(member_number(json_array_get(models, 0), "fit_rel_rms_with_gains"));
-    fprintf(out, "%-24s %16s %16s %16s %12s %8s\n", "model (rel. RMS error)", "fitted", "left out in turn", "held out",
+    fprintf(out, "%-24s %16s %16s %16s %12s %8s\n", "model (rel. RMS error)", "fitted", "rows left out", "held out",
             "paths", "time");
     json_array_foreach(models, i, m)
     {
-        char id[64], fitted[48], left_out[48], held_out[48], time[CLI_SHORT_TEXT];
+        char id[64], fitted[PERCENT_WORDS_BYTES], left_out[PERCENT_WORDS_BYTES], held_out[PERCENT_WORDS_BYTES];
+        char time[CLI_SHORT_TEXT];
         text_clean(member_text(m, "id"), id, sizeof id);
-        percent(m, gains ? "fit_rel_rms_with_gains" : "fit_rel_rms", fitted, sizeof fitted);
-        percent(m, gains ? "heldout_rel_rms_with_gains" : "heldout_rel_rms", held_out, sizeof held_out);
-        percent(json_object_get(m, "cross_validation"), "rel_rms", left_out, sizeof left_out);
+        percent(m, gains ? "fit_rel_rms_with_gains" : "fit_rel_rms", fitted);
+        percent(m, gains ? "heldout_rel_rms_with_gains" : "heldout_rel_rms", held_out);
+        percent(json_object_get(m, "cross_validation"), "rel_rms", left_out);
         text_duration(member_number(m, "fit_wall_s"), time);
         fprintf(out, "  %-22s %16s %16s %16s %12.3g %8s  %s%s\n", id, fitted, left_out, held_out,
                 member_number(m, "n_path_fit"), time, json_is_true(json_object_get(m, "best")) ? "best " : "",
                 json_is_false(json_object_get(m, "converged")) ? "not converged" : "");
     }
     fprintf(out, "%sof the best model%s:\n", gains ? "(errors: each photograph with its own gain)\n" : "",
-            strcmp(chosen_by, "cross_validation") == 0 ? ", chosen by the fitted rows left out in turn" : "");
+            strcmp(chosen_by, "cross_validation") == 0 ? ", chosen by fitted rows left out one after another" : "");
 }
 
 static void print_radius(const json_t *radius, FILE *out)
@@ -247,10 +243,10 @@ static void print_profile(const json_t *profile, FILE *out)
     fprintf(out, "%-24s %10s %10s %14s %8s\n", "model (residual)", "of range", "relative", "scale", "time");
     json_array_foreach(json_object_get(profile, "models"), i, m)
     {
-        char id[64], range[48], relative[48], time[CLI_SHORT_TEXT];
+        char id[64], range[PERCENT_WORDS_BYTES], relative[PERCENT_WORDS_BYTES], time[CLI_SHORT_TEXT];
         text_clean(member_text(m, "id"), id, sizeof id);
-        percent(m, "nrmse", range, sizeof range);
-        percent(m, "rel_rms", relative, sizeof relative);
+        percent(m, "nrmse", range);
+        percent(m, "rel_rms", relative);
         text_duration(member_number(m, "fit_wall_s"), time);
         fprintf(out, "  %-22s %10s %10s %14.5g %8s  %s%s\n", id, range, relative, member_number(m, "scale"), time,
                 json_is_true(json_object_get(m, "best")) ? "best " : "",
@@ -291,14 +287,14 @@ void report_result(const json_t *job, FILE *out)
     print_radius(json_object_get(result, "radius"), out);
     print_parameters(parameters, out);
     for (i = 0; i < sizeof residual / sizeof residual[0]; i++) {
-        char text[48];
-        percent(result, residual[i].key, text, sizeof text);
+        char text[PERCENT_WORDS_BYTES];
+        percent(result, residual[i].key, text);
         if (strcmp(text, "-") != 0) fprintf(out, "%s: %s\n", residual[i].label, text);
     }
     if (json_is_object(json_object_get(result, "cross_validation"))) {
-        char text[48];
-        percent(json_object_get(result, "cross_validation"), "rel_rms", text, sizeof text);
-        fprintf(out, "relative RMS error, fitted rows left out in turn: %s\n", text);
+        char text[PERCENT_WORDS_BYTES];
+        percent(json_object_get(result, "cross_validation"), "rel_rms", text);
+        fprintf(out, "relative RMS error, fitted rows left out one after another: %s\n", text);
     }
     json_array_foreach(json_object_get(result, "nuisance"), i, parameter) print_parameter(parameter, out);
     const json_t *converged = json_object_get(result, "converged");
@@ -309,7 +305,10 @@ void report_result(const json_t *job, FILE *out)
 static const char *verdict_word(const json_t *job)
 {
     const char *code = member_text(json_object_get(job, "verdict"), "code");
-    return strcmp(code, "does_not_describe_this_cloth") == 0 ? "does not describe" : code;
+    return strcmp(code, "does_not_describe_this_cloth") == 0 ? "does not describe"
+           : strcmp(code, "good_but_undetermined") == 0      ? "good, undetermined"
+           : strcmp(code, "pictures_only") == 0              ? "pictures only"
+                                                             : code;
 }
 
 void report_summary(const json_t *job, FILE *out)
@@ -321,7 +320,7 @@ void report_summary(const json_t *job, FILE *out)
     text_clean(member_text(job, "sample"), sample, sizeof sample);
     text_duration(view.eta_s, eta);
     text_clean(verdict_word(job), verdict, sizeof verdict);
-    fprintf(out, "%-36s  %-10s %-17s %4.0f %% %8s  %s\n", id, view.state, verdict,
+    fprintf(out, "%-36s  %-10s %-18s %4.0f %% %8s  %s\n", id, view.state, verdict,
             isnan(view.fraction) ? 0.0 : 100.0 * view.fraction, eta, sample);
 }
 

@@ -1,15 +1,13 @@
 // "#batch/ID": one batch. Its progress, failures with their reasons and a button that runs them again, and its results.
-import { el, isNumber, percent, refill, stateTag, timeOf, withError } from "../page_parts.js";
+import { el, isNumber, percent, refill, stateTag, timeOf, verdictTag, verdictWords, withError } from "../page_parts.js";
 import { getJson, poll, sendJson } from "../server_link.js";
 import { stateBar, stateWords } from "./state_bar.js";
 
-const WORDS = { good: "good", usable: "usable with reservations", does_not_describe_this_cloth: "does not describe this cloth" };
-const VERDICT_CLASS = { good: "good", usable: "warn", does_not_describe_this_cloth: "bad" };
 const ACTIONS = { start: "started", retry: "queued again", cancel: "cancelled" };
 const ROWS_SHOWN = 200;
 
 function summary(batch) {
-  const verdicts = Object.entries(batch.verdicts).map(([code, n]) => `${n} ${WORDS[code] ?? code}`).join(", ");
+  const verdicts = Object.entries(batch.verdicts).map(([code, n]) => `${n} ${verdictWords(code)}`).join(", ");
   const fact = (name, ...value) => [el("dt", {}, name), el("dd", {}, ...value)];
   return [el("h1", {}, batch.name), stateBar(batch), el("dl", { class: "batch-facts" },
     fact("Samples", `${batch.n_sample}: ${stateWords(batch.states)}`), fact("Done", percent(batch.fraction)),
@@ -34,7 +32,7 @@ const parameterText = (p) => (p.fixed ? `${withError(p.value, null)} (fixed)` : 
 function resultLine(row, names) {
   const byName = new Map(row.parameters.map((p) => [p.name, p]));
   return el("tr", {}, el("th", { scope: "row" }, el("a", { href: `#${row.job}` }, row.sample)), el("td", {}, stateTag(row.state)),
-    el("td", {}, row.verdict ? el("span", { class: `tag ${VERDICT_CLASS[row.verdict] ?? ""}` }, WORDS[row.verdict] ?? row.verdict) : ""),
+    el("td", {}, row.verdict ? verdictTag({ code: row.verdict, words: verdictWords(row.verdict), text: "" }) : ""),
     el("td", { class: "number" }, isNumber(row.heldout_rel_rms) ? percent(row.heldout_rel_rms, 2) : ""),
     el("td", {}, row.flags.map((f) => f.replaceAll("_", " ")).join(", ")),
     names.map((name) => el("td", { class: "number" }, byName.has(name) ? parameterText(byName.get(name)) : "")));

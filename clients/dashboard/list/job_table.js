@@ -1,8 +1,7 @@
 // The table of jobs. It is brought up to date row by row, so that focus, selection and scroll position stay.
-import { duration, el, isNumber, stateTag, timeLeft, timeOf, verdictTag } from "../page_parts.js";
+import { duration, el, isNumber, stateTag, timeLeft, timeOf, verdictTag, verdictWords } from "../page_parts.js";
 
 const BUSY = new Set(["running", "queued", "paused"]);
-const CODES = { good: "good", usable: "usable", does_not_describe_this_cloth: "does not describe this cloth" };
 
 function stateCell(job) {
   const place = isNumber(job.queue_position) ? el("div", { class: "hint" }, `place ${job.queue_position}`) : null;
@@ -26,7 +25,7 @@ function leftCell(job) {
 }
 
 function cells(job, owners, byTag) {
-  const verdict = job.verdict ? verdictTag({ ...job.verdict, text: CODES[job.verdict.code] ?? "" }) : null;
+  const verdict = job.verdict ? verdictTag({ ...job.verdict, text: verdictWords(job.verdict.code) }) : null;
   const tags = (job.tags ?? []).map((tag) => el("button", { class: "tag link", title: `only jobs with the tag ${tag}`, onclick: (e) => { e.stopPropagation(); byTag(tag); } }, tag));
   return [
     el("td", { class: "thumb" }, job.thumbnail_url ? el("img", { src: job.thumbnail_url, alt: "", loading: "lazy" }) : null),

@@ -1,12 +1,12 @@
 // The list of jobs: filters, order and pages, which are in the address; live by long polls that transfer changed rows.
 import { bulkActions } from "./bulk_actions.js";
 import { JobTable } from "./job_table.js";
-import { el } from "../page_parts.js";
+import { el, VERDICTS } from "../page_parts.js";
 import { exampleOffer } from "../submit/example_job.js";
 import { getJson, poll, raw } from "../server_link.js";
 
 const PAGE_SIZE = 50, WAIT_S = 25, STATES = ["draft", "queued", "running", "paused", "succeeded", "failed", "cancelled"];
-const VERDICTS = [["good", "good"], ["usable", "usable with reservations"], ["does_not_describe_this_cloth", "does not describe this cloth"], ["none", "none"]];
+const VERDICT_CHOICES = [...Object.entries(VERDICTS).map(([code, [words]]) => [code, code === "usable" ? `${words} (older results)` : words]), ["none", "none"]];
 const KEYS = ["sample", "state", "verdict", "tag", "from", "to", "batch", "sort", "order"];
 
 // The beginning of a day in the reader's zone, in seconds since 1970; days: how many days later.
@@ -39,7 +39,7 @@ function filters(wanted, change) {
   const day = (label, key) => el("label", {}, label, el("input", { type: "date", value: wanted.get(key) ?? "", onchange: (e) => change(key, e.target.value) }));
   return el("form", { class: "filters", role: "search", onsubmit: (e) => e.preventDefault() },
     el("label", {}, "Sample", el("input", { type: "search", name: "sample", value: wanted.get("sample") ?? "", placeholder: "part of its name", oninput: soon })),
-    choice("State", "state", wanted, STATES.map((s) => [s, s]), change), choice("Verdict", "verdict", wanted, VERDICTS, change),
+    choice("State", "state", wanted, STATES.map((s) => [s, s]), change), choice("Verdict", "verdict", wanted, VERDICT_CHOICES, change),
     el("label", {}, "Tag", tag, tags), day("Made from", "from"), day("to", "to"),
     wanted.get("batch") ? el("button", { type: "button", onclick: (e) => { e.target.remove(); change("batch", ""); } }, "Jobs of all batches") : null);
 }

@@ -10,7 +10,8 @@ ENDED = ("succeeded", "failed", "cancelled")
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a result can be used: "good", "usable" or "does_not_describe_this_cloth"."""
+    """Whether a result can be used: "good", "good_but_undetermined", "pictures_only" or "does_not_describe_this_cloth" ("usable" in
+    results of older versions)."""
     code: str
     words: str
     text: str

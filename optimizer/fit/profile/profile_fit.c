@@ -198,18 +198,21 @@ static status refine(struct profile_search *s, struct profile_fit *fit, struct e
 static void put_residuals(const struct profile_search *s, struct profile_fit *fit)
 {
     const struct profile_target *t = s->target;
-    double least = INFINITY, most = 0.0, sum = 0.0;
+    const struct fiber_profile *p = t->problem->profile;
+    double least = INFINITY, most = 0.0, sum = 0.0, stated = 0.0;
     fit->bic = (double)fit->n_free * log((double)t->n_value);
     for (size_t i = 0; i < t->n_value; i++) {
         const double r = s->here.value[i] - t->measured[i];
         sum += r * r;
+        if (p->has_se) stated += pow(p->row[i / p->n_channel].se[i % p->n_channel] / t->base[i], 2.0);
         fit->bic += r * r / (s->error[i] * s->error[i]) + 2.0 * log(s->error[i]);
         least = fmin(least, t->measured[i]);
         most = fmax(most, t->measured[i]);
     }
     fit->nrmse = most > least ? sqrt(sum / (double)t->n_value) / (most - least) : NAN;
     fit->rel_rms = rel_rms_of(t, s->here.value);
-    fit->chi_square = t->problem->profile->has_se ? reduced_sum(s, fit->n_free, 0.0) : NAN;
+    fit->stated_rms = sqrt(stated / (double)t->n_value);
+    fit->chi_square = p->has_se ? reduced_sum(s, fit->n_free, 0.0) : NAN;
 }
 
 size_t profile_fit_starts(const struct fit_option *option)

@@ -25,6 +25,7 @@ struct profile_fit {
     size_t n_value, n_free; /* unknowns: parameters and the scale */
     double nrmse;           /* root mean square of s L - m over the range of m, as published; NaN without a range */
     double rel_rms;         /* root mean square of (s L - m) / (m + 0.02 mean of m) */
+    double stated_rms;      /* root mean square of se / (m + 0.02 mean of m); 0 without stated errors */
     double misfit;          /* t */
     double chi_square; /* the minimised sum without priors and with t = 0, per value less unknown; NaN without se */
     double bic;        /* sum of ((s L - m) / e)^2 + 2 ln e over all values, plus n_free ln n_value */

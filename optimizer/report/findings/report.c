@@ -2,7 +2,19 @@
 #include "optimizer/stages/scene/pipeline_volume.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 
-size_t report_best_model(const struct report *report) { return pipeline_best_model(report->model, report->n_model); }
+static size_t best_profile(const struct report *report)
+{
+    size_t best = 0;
+    for (size_t i = 1; i < report->n_model; i++)
+        if (report->model[i].fit->profile.bic < report->model[best].fit->profile.bic) best = i;
+    return best;
+}
+
+size_t report_best_model(const struct report *report)
+{
+    return report->in.kind == JOB_OF_PROFILE ? best_profile(report)
+                                             : pipeline_best_model(report->model, report->n_model);
+}
 
 status report_need_volume(struct report *report, struct error *err)
 {

@@ -78,7 +78,7 @@ struct report {
     double part_from_s, part_from_cpu_s; /* when the running part of the stage began */
 };
 
-/* Index of the best model (pipeline_choice.h). */
+/* Returns the index of the best model: by pipeline_choice.h or, for the profile of a fiber, by profile_fit.bic. */
 size_t report_best_model(const struct report *report);
 /* Reads the scan from its checkpoint, if it is not in memory. */
 status report_need_volume(struct report *report, struct error *err);

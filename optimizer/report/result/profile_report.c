@@ -9,20 +9,12 @@
 #include <math.h>
 #include <stdlib.h>
 
-size_t profile_best_model(const struct report *report)
-{
-    size_t best = 0;
-    for (size_t i = 1; i < report->n_model; i++)
-        if (report->model[i].fit->profile.bic < report->model[best].fit->profile.bic) best = i;
-    return best;
-}
-
 static json_t *model_json(const struct report *report, size_t i)
 {
     const struct pipeline_model *m = &report->model[i];
     const struct profile_fit *f = &m->fit->profile;
     json_t *json = json_pack("{s:s, s:s, s:b, s:o, s:o, s:o, s:b}", "id", m->setup->appearance.id, "title",
-                             m->setup->appearance.title, "best", (int)(i == profile_best_model(report)), "parameters",
+                             m->setup->appearance.title, "best", (int)(i == report_best_model(report)), "parameters",
                              result_parameters_json(m), "scale", json_number(f->scale), "scale_se",
                              json_number(f->scale_se), "scale_fitted", (int)isnan(report->in.profile->scale));
     json_object_set_new(json, "nrmse", json_number(f->nrmse));
@@ -87,7 +79,7 @@ static json_t *profile_json(const struct report *report)
 
 status profile_json_write(struct report *report, struct error *err)
 {
-    const struct pipeline_model *m = &report->model[profile_best_model(report)];
+    const struct pipeline_model *m = &report->model[report_best_model(report)];
     json_t *json =
         json_pack("{s:i, s:s, s:s, s:n, s:o, s:[], s:[], s:I, s:o}", "format", 1, "sample", report->in.sample, "model",
                   m->setup->appearance.id, "method", "parameters", result_parameters_json(m), "rows", "models", "seed",
@@ -125,7 +117,7 @@ void profile_print(const struct report *report, size_t i, FILE *out)
     const struct pipeline_model *m = &report->model[i];
     const struct profile_fit *f = &m->fit->profile;
     fprintf(out, "model    %s (%s)%s, fitted to the profile of a fiber\n", m->setup->appearance.id,
-            m->setup->appearance.title, report->n_model > 1 && i == profile_best_model(report) ? ", the best" : "");
+            m->setup->appearance.title, report->n_model > 1 && i == report_best_model(report) ? ", the best" : "");
     fputs("residual ", out);
     if (isfinite(f->nrmse)) fprintf(out, "%.2f %% of the range of %zu radiances; ", 100.0 * f->nrmse, f->n_value);
     fprintf(out, "relative %.2f %%", 100.0 * f->rel_rms);

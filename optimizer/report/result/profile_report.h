@@ -18,8 +18,6 @@ status profile_json_write(struct report *report, struct error *err);
 /* results/profile.csv: theta_i_deg, theta_o_deg, phi_deg, radiance, and the radiance by each model; one line for each
  * row and channel. */
 status profile_csv_write(const struct report *report, struct error *err);
-/* Index of the best model. */
-size_t profile_best_model(const struct report *report);
 /* The residuals of model i in the summary. */
 void profile_print(const struct report *report, size_t i, FILE *out);
 /* The residuals of model i and charts of the radiance over phi, measured and fitted, in the page. */

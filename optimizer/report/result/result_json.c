@@ -309,8 +309,7 @@ static json_t *definitions_json(void)
         "null", "a number that does not exist");
 }
 
-/* Adds the entries of every job, also of a job of geometry only; a fiber without a cloth has neither geometry nor
- * verdict. */
+/* Adds the entries of every job, also of a job of geometry only; a fiber without a cloth has no geometry. */
 static void put_job(json_t *json, struct report *report)
 {
     const bool of_cloth = report->in.kind != JOB_OF_PROFILE;

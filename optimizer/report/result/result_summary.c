@@ -189,7 +189,7 @@ static void print_cloth(const struct report *report, FILE *out)
 static void print_verdict(const struct verdict *v, FILE *out)
 {
     if (v->code == VERDICT_NONE) return;
-    fprintf(out, "verdict  %s\n         %s\n", verdict_code_words(v->code), v->text);
+    fprintf(out, "verdict  %s\n         %s\n", v->words, v->text);
     for (size_t i = 0; i < v->n_reservation; i++) fprintf(out, "         - %s\n", v->reservation[i].text);
     fputc('\n', out);
 }
@@ -244,8 +244,10 @@ static void print_geometry(struct report *report, FILE *out)
 static void print_pictures(struct report *report, FILE *out)
 {
     const struct pipeline_model *m = report->model;
-    fprintf(out, "%s\n\nmodel    %s (%s), with given parameters: the job has no photographs\n", report->in.sample,
-            m->setup->appearance.id, m->setup->appearance.title);
+    fprintf(out, "%s\n\n", report->in.sample);
+    print_verdict(&report->verdict, out);
+    fprintf(out, "model    %s (%s), with given parameters: the job has no photographs\n", m->setup->appearance.id,
+            m->setup->appearance.title);
     print_cloth(report, out);
     print_parameters(m, out);
     const size_t n = report->in.results->n_surface_picture;
@@ -260,6 +262,7 @@ static void print_pictures(struct report *report, FILE *out)
 static void print_profile(struct report *report, FILE *out)
 {
     fprintf(out, "%s\n\n", report->in.sample);
+    print_verdict(&report->verdict, out);
     for (size_t i = 0; i < report->n_model; i++) {
         profile_print(report, i, out);
         print_parameters(&report->model[i], out);

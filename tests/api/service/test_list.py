@@ -29,7 +29,10 @@ def test_filters(daemon, jobs):
     made = daemon.get(f"/v1/jobs/{one}").json()["created_unix_s"]
     assert names(daemon, f"created_after={made!r}") == ["ähre", "wool twill", "a_b"]
     assert names(daemon, f"created_before={made!r}") == ["Silk 100%", "blue Twill"]
-    assert set(names(daemon, "verdict=none")) == set(jobs) and names(daemon, "verdict=good,usable") == []
+    assert set(names(daemon, "verdict=none")) == set(jobs) and names(daemon, "verdict=good,good_but_undetermined,pictures_only,usable") == []
+    refused = daemon.get("/v1/jobs?verdict=good,best")
+    assert refused.status_code == 422 and refused.json()["field"] == "verdict"
+    assert "has 'best'; it must be good, good_but_undetermined" in refused.json()["detail"]
 
 
 @pytest.mark.parametrize("sort", ["created", "finished", "sample"])

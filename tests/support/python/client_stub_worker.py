@@ -3,7 +3,7 @@
 but computes nothing.
 
 The sample's name selects its behaviour: "slow ..." takes 40 s for the fit, "failing ..." fails in the first stage with a
-field, "twin ..." has tables of a twin among its results, "good ...", "usable ..." and "bad ..." end with this verdict, files
+field, "twin ..." has tables of a twin among its results, "good ...", "undetermined ...", "pictures ..." and "bad ..." end with this verdict, files
 of "faulty ..." have two faults, anything else succeeds within a second or two."""
 import json
 import math
@@ -55,11 +55,12 @@ def log(text):
 
 def verdict(sample):
     """The verdict that a sample's name begins with, or none."""
-    code = sample.split()[0]
-    known = {"good": "good", "usable": "usable with reservations", "bad": "does not describe this cloth"}
-    if code not in known:
+    known = {"good": ("good", "good"), "undetermined": ("good_but_undetermined", "good, but 2 parameters are undetermined"),
+             "pictures": ("pictures_only", "usable for pictures only"), "bad": ("does_not_describe_this_cloth", "does not describe this cloth")}
+    if sample.split()[0] not in known:
         return None
-    return {"code": "does_not_describe_this_cloth" if code == "bad" else code, "words": known[code], "text": "A stub says so.", "judged_by": "held_out",
+    code, words = known[sample.split()[0]]
+    return {"code": code, "words": words, "text": "A stub says so.", "judged_by": "held_out",
             "rel_rms": 0.03, "rel_rms_se": 0.001, "allowed_rel_rms": 0.02, "one_color_rel_rms": 0.4, "plain_brdf_rel_rms": 0.1, "reservations": []}
 
 

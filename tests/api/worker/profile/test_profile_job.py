@@ -46,7 +46,8 @@ def test_the_result(real, finished):
     job, result = finished
     with open(os.path.join(ROOT, "config", "result.schema.json"), encoding="utf-8") as f:
         jsonschema.validate(result, json.load(f))
-    assert result["model"] == "isotropic.v1" and result["geometry"] is None and result["verdict"] is None
+    assert result["model"] == "isotropic.v1" and result["geometry"] is None
+    assert result["verdict"]["code"] == "good" and result["verdict"]["judged_by"] == "fitted" and real.job(job)["verdict"]["code"] == "good"
     models = {m["id"]: m for m in result["profile"]["models"]}
     best = models["isotropic.v1"]
     assert best["best"] and best["converged"] and best["parameters"] == result["parameters"] and best["scale"] == 2 and best["scale_se"] == 0
@@ -65,6 +66,22 @@ def test_the_result(real, finished):
     assert "residual" in summary and "108 radiances" in summary
     done = {s["name"] for s in result["stages"] if s["wall_s"] is not None}
     assert done == {"fit"}, "the report is not done while it is written"
+
+
+def test_a_residual_far_above_the_noise_is_not_good(real):
+    """A fiber with a strong highlight, to which a model without one is fitted."""
+    lines = ["theta_o_deg,phi_deg,radiance,radiance_se"]
+    for theta_o in range(10, 51, 10):
+        for phi in range(-20, 201, 20):
+            radiance = 0.05 * (1 + 3 * math.exp(-(phi / 40) ** 2))
+            lines.append(f"{theta_o},{phi},{radiance:.6g},{0.005 * radiance:.4g}")
+    document = {**DOCUMENT, "fit": {"model": "isotropic.v1"}}
+    job = real.wait_state(start(real, document, [("fiber.csv", "profile", "\n".join(lines).encode())]), "succeeded", timeout_s=120)
+    best, verdict = job["result"]["profile"]["models"][0], job["verdict"]
+    assert best["chi_square"] > 5000
+    assert verdict["code"] == "does_not_describe_this_cloth" and verdict["words"] == "does not describe this fiber"
+    assert "error_beyond_noise" in [r["code"] for r in verdict["reservations"]] and verdict["rel_rms"] == pytest.approx(best["rel_rms"], rel=1e-9)
+    assert verdict["words"] in real.get(f"/v1/jobs/{job['id']}/results/summary.txt").text
 
 
 def cloth(profile_job, **fit):

@@ -82,11 +82,15 @@ static void test_residuals(void **state)
           "'nuisance': [{'name': 'gain', 'value': 1.5}]}}",
           "fiber radius: 7.50 +- 0.25 um (start 8 um)  not determined  at the edge of its range\n"
           "relative RMS error, fitted: 2.41 +- 0.05 %\n"
-          "relative RMS error, held out: 3.00 %\n"
-          "relative RMS error, fitted rows left out in turn: 4.00 +- 0.10 %\n"
+          "relative RMS error, held out: 3 %\n"
+          "relative RMS error, fitted rows left out one after another: 4.00 +- 0.10 %\n"
           "  gain               1.5                           \n"
           "The fit has NOT converged; see the log.\n");
     check("{'result': {'converged': true, 'fit_rel_rms': null}}", "");
+    check("{'result': {'fit_rel_rms': 0.0, 'fit_rel_rms_se': 0.0055, 'heldout_rel_rms': 0.0, 'heldout_rel_rms_se': "
+          "0.018}}",
+          "relative RMS error, fitted: below 1.1 %\n"
+          "relative RMS error, held out: below 3.6 %\n");
 }
 
 /* Several models make a table; errors with gains are shown where the models have them. */
@@ -98,18 +102,19 @@ static void test_models(void **state)
                 "{'id': 'a.v1', 'fit_rel_rms': 0.02, 'fit_wall_s': 61.0, 'n_path_fit': 1e6, 'best': true},"
                 "{'id': 'b.v1', 'fit_rel_rms': 0.03, 'cross_validation': {'rel_rms': 0.05}, 'converged': false}]}}");
     assert_non_null(
-        strstr(got, "  a.v1                             2.00 %                -                -        1e+06     1:01"
+        strstr(got, "  a.v1                                2 %                -                -        1e+06     1:01"
                     "  best \n"));
-    assert_non_null(strstr(got, "  b.v1                             3.00 %           5.00 %                -"));
-    assert_non_null(strstr(got, "not converged\nof the best model, chosen by the fitted rows left out in turn:\n"));
+    assert_non_null(strstr(got, "  b.v1                                3 %              5 %                -"));
+    assert_non_null(
+        strstr(got, "not converged\nof the best model, chosen by fitted rows left out one after another:\n"));
     free(got);
     got = printed(
         "{'result': {'models': [{'id': 'a.v1', 'fit_rel_rms': 0.02, 'fit_rel_rms_with_gains': 0.01},"
         "{'id': 'b.v1', 'fit_rel_rms': 0.03, 'fit_rel_rms_with_gains': 0.015, 'heldout_rel_rms_with_gains': 0.07}]}}");
-    assert_non_null(strstr(got, " 1.00 % "));
-    assert_non_null(strstr(got, " 1.50 % "));
-    assert_non_null(strstr(got, " 7.00 % "));
-    assert_null(strstr(got, "2.00 %"));
+    assert_non_null(strstr(got, " 1 % "));
+    assert_non_null(strstr(got, " 1.5 % "));
+    assert_non_null(strstr(got, " 7 % "));
+    assert_null(strstr(got, " 2 %"));
     assert_non_null(strstr(got, "(errors: each photograph with its own gain)\nof the best model:\n"));
     free(got);
     check("{'result': {'models': [{'id': 'a.v1', 'fit_rel_rms': 0.02}]}}", "");
@@ -118,9 +123,9 @@ static void test_models(void **state)
 static void test_verdict(void **state)
 {
     (void)state;
-    check("{'verdict': {'code': 'usable', 'words': 'usable with reservations', 'text': 'A sentence.',"
+    check("{'verdict': {'code': 'pictures_only', 'words': 'usable for pictures only', 'text': 'A sentence.',"
           "'reservations': [{'code': 'a', 'text': 'First.'}, {'code': 'b', 'text': 'Second.'}]}}",
-          "verdict      usable with reservations\n"
+          "verdict      usable for pictures only\n"
           "             A sentence.\n"
           "  -          First.\n"
           "  -          Second.\n");
