@@ -12,6 +12,7 @@ import { guessedKinds, kindOfJson } from "./submit/guessed_kinds.js";
 import { forgetUpload, offerUpload, rememberUpload } from "./submit/interrupted_upload.js";
 import { filesOf } from "./submit/job_files.js";
 import { LiveCheck } from "./submit/live_check.js";
+import { stemOf } from "./submit/name_angles.js";
 import { missingParts, PresetCards, presetOf } from "./submit/presets.js";
 import { Questions } from "./submit/questions.js";
 import { RigPicker, rigOf } from "./submit/rig_picker.js";
@@ -20,221 +21,310 @@ import { thumbnail } from "./submit/thumbnails.js";
 import { sendFiles, UploadBar } from "./submit/uploads.js";
 import { statesVoxelSize } from "./submit/voxel_statement.js";
 import { writeFiles } from "./submit/written_document.js";
-import { stemOf } from "./submit/name_angles.js";
 
 const newKey = () => [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
 
-// handed: {files, folder} that were dropped on another page, or null. copy: the id of a job whose document is the beginning.
-export function submitPanel(handed = null, copy = null) {
-  const dropped = new Map(), json = new Map(), chosen = new Map();
-  let kinds = new Map(), doc = null, source = null, busy = false, before = null, resumed = null;
-  let written = copy === null; // by this page, from the files; otherwise the document was dropped or is a copy
-  let preset = null, picked = null, statesVoxel = true, table = null, notes = [], open = [];
-  // kept while the document is the same, so that another try continues an interrupted submit
-  let key = null, sent = new Map();
-  let accepted = null; // the document whose warnings were shown
-  const list = el("ul", { id: "new-files", tabIndex: 0, "aria-label": "files of the job" }), message = el("p", { class: "hint", id: "send-state", role: "status" });
-  const go = el("button", { class: "main", id: "send", disabled: true }, "Submit"), bar = new UploadBar(), interrupted = el("div"), remarks = el("div", { id: "file-notes" });
-  const say = (text, bad) => { message.textContent = text; message.className = bad ? "note bad" : "hint"; };
-  const wanted = () => (doc ? filesOf(doc) : []);
-  // the file itself, or the input of the copied job, whose bytes are on the server
-  const fileOf = (name) => dropped.get(name) ?? (before?.files.get(name)?.sha256 ? before.files.get(name) : undefined);
-  const faultOf = (name) => (dropped.has(name) ? check.fault(dropped.get(name)) : null);
-  const allow = () => { go.disabled = busy || doc === null || (written && open.length > 0) || wanted().some((f) => !fileOf(f.name) || faultOf(f.name)); };
+class SubmitPanel {
+  // handed: {files, folder} that were dropped on another page, or null. copy: the id of a job whose document is the beginning, or null.
+  constructor(handed, copy) {
+    this.dropped = new Map(); // name -> File
+    this.json = new Map(); // name -> kind of a JSON file
+    this.chosen = new Map(); // name -> kind that the user has set
+    this.kinds = new Map(); // name -> kind
+    this.doc = null;
+    this.source = null; // the document as text
+    this.written = copy === null; // by this page, from the files; otherwise the document was dropped or is a copy
+    this.before = null; // the copied job
+    this.resumed = null; // {id, source} of an interrupted upload that goes on
+    this.picked = null; // the preset that the user has chosen
+    this.preset = null;
+    this.statesVoxel = true;
+    this.table = null; // the head of the table
+    this.notes = [];
+    this.open = []; // what must be known and is not
+    this.busy = false;
+    // kept while the document is the same, so that another try continues an interrupted submit
+    this.key = null;
+    this.sent = new Map();
+    this.accepted = null; // the document whose warnings were shown
+    this.build(copy);
+    if (copy !== null) this.beginCopy(copy); else offerUpload(this.interrupted, (job) => this.goOn(job));
+    if (handed) this.take(handed.files, handed.folder);
+    this.show();
+  }
+
+  build(copy) {
+    const change = (now) => this.change(now);
+    this.list = el("ul", { id: "new-files", tabIndex: 0, "aria-label": "files of the job" });
+    this.message = el("p", { class: "hint", id: "send-state", role: "status" });
+    this.go = el("button", { class: "main", id: "send", disabled: true, onclick: () => this.submit() }, "Submit");
+    this.bar = new UploadBar();
+    this.interrupted = el("div");
+    this.remarks = el("div", { id: "file-notes" });
+    this.from = el("p", { class: "hint" });
+    this.example = exampleOffer();
+    this.editor = documentEditor((now) => { this.use(now); this.show(); this.judge(); });
+    this.check = new LiveCheck(this.editor, () => this.show());
+    this.rig = new RigPicker(change);
+    this.grid = new AngleGrid(change);
+    this.questions = new Questions(change);
+    this.presets = new PresetCards((id) => { this.picked = id; this.change(this.doc ?? {}); });
+    const drop = this.dropZone();
+    this.node = el("section", { id: "submit" }, el("div", { class: "card" }, el("h1", {}, copy === null ? "New job" : "New job, from another one"), this.from, this.interrupted,
+      this.presets.node, drop, this.example, this.list, this.remarks, this.questions.node),
+    this.rig.node, this.grid.node, el("div", { class: "card" }, this.editor.node), el("div", { class: "card send" }, this.check.node, this.message, this.bar.node, this.go));
+    this.node.addEventListener("dragover", (e) => { e.preventDefault(); drop.classList.add("over"); });
+    this.node.addEventListener("dragleave", () => drop.classList.remove("over"));
+    this.node.addEventListener("drop", (e) => { e.preventDefault(); drop.classList.remove("over"); droppedFiles(e.dataTransfer).then(({ files, folder }) => this.take(files, folder)); });
+  }
+
+  dropZone() {
+    const files = el("input", { type: "file", multiple: true, onchange: () => this.take(files.files) });
+    const folder = el("input", { type: "file", webkitdirectory: true,
+      onchange: () => this.take([...folder.files].filter((f) => !f.name.startsWith(".")), folder.files[0]?.webkitRelativePath.split("/")[0]) });
+    return el("div", { class: "drop" }, el("p", {}, "Drop the files of a sample here, or a folder: scan, photographs, table, draft, rig, or a job document (.json). Or choose ",
+      el("label", { class: "file" }, "files", files), " or ", el("label", { class: "file" }, "a folder", folder), "."));
+  }
+
+  say(text, className = "hint") { this.message.textContent = text; this.message.className = className; }
+
+  // ---- files ----
+
+  wanted() { return this.doc ? filesOf(this.doc) : []; }
+
+  // The file itself, or the input of the copied job, whose bytes are on the server.
+  fileOf(name) { return this.dropped.get(name) ?? (this.before?.files.get(name)?.sha256 ? this.before.files.get(name) : undefined); }
+
+  faultOf(name) { return this.dropped.has(name) ? this.check.fault(this.dropped.get(name)) : null; }
+
   // The entry of a file in the copied job.
-  const otherSize = (name) => {
-    const known = before?.files.get(name)?.size, now = dropped.get(name)?.size, where = resumed ? "" : " in the copied job", offset = before?.files.get(name)?.offset;
+  otherSize(name) {
+    const known = this.before?.files.get(name)?.size, now = this.dropped.get(name)?.size, where = this.resumed ? "" : " in the copied job";
     if (known === undefined || now === known) return null;
-    if (now === undefined && fileOf(name)) return el("span", { class: "hint" }, `${size(known)}${where}, on the server already: it is not sent again`);
-    if (now === undefined) return el("span", { class: "hint" }, resumed ? `${size(offset ?? 0)} of ${size(known)} have arrived` : `${size(known)}${where}`);
+    if (now === undefined && this.fileOf(name)) return el("span", { class: "hint" }, `${size(known)}${where}, on the server already: it is not sent again`);
+    if (now === undefined) return el("span", { class: "hint" }, this.resumed ? `${size(this.before.files.get(name).offset ?? 0)} of ${size(known)} have arrived` : `${size(known)}${where}`);
     return el("span", { class: "tag warn" }, `another file: ${size(known)}${where || " before"}`);
-  };
-  const stateOf = (name) => {
-    const file = dropped.get(name);
-    if (!file) return fileOf(name) ? null : el("span", { class: "tag warn" }, "still missing");
-    if (faultOf(name)) return el("span", { class: "tag bad" }, faultOf(name));
-    return check.isKnown(file) ? el("span", { class: "hint" }, "on the server already: it is not sent again") : null;
-  };
-  const named = (f) => el("li", { "data-file": f.name }, dropped.has(f.name) ? thumbnail(dropped.get(f.name), () => show()) : el("span", { class: "thumbnail", "aria-hidden": "true" }, el("span", { class: "sign" }, "?")),
-    el("span", { class: "name" }, el("span", { class: "mono" }, f.name), dropped.has(f.name) ? el("span", { class: "size" }, size(dropped.get(f.name).size)) : null), el("span", { class: "said" }, otherSize(f.name), " ", stateOf(f.name)));
-  const lines = () => {
-    const names = new Set(wanted().map((f) => f.name));
-    if (!written) {
-      const unused = [...dropped.keys()].filter((name) => !names.has(name) && !name.endsWith(".json"));
-      return [...wanted().map(named), ...(doc && unused.length ? [el("li", { class: "hint" }, `Not named by the document, so not sent: ${unused.slice(0, 6).join(", ")}${unused.length > 6 ? ` and ${unused.length - 6} more` : ""}`)] : [])];
+  }
+
+  stateOf(name) {
+    const file = this.dropped.get(name);
+    if (!file) return this.fileOf(name) ? null : el("span", { class: "tag warn" }, "still missing");
+    if (this.faultOf(name)) return el("span", { class: "tag bad" }, this.faultOf(name));
+    return this.check.isKnown(file) ? el("span", { class: "hint" }, "on the server already: it is not sent again") : null;
+  }
+
+  // The line of a file that the document names.
+  named({ name }) {
+    const file = this.dropped.get(name), picture = file ? thumbnail(file, () => this.show()) : el("span", { class: "thumbnail", "aria-hidden": "true" }, el("span", { class: "sign" }, "?"));
+    return el("li", { "data-file": name }, picture, el("span", { class: "name" }, el("span", { class: "mono" }, name), file ? el("span", { class: "size" }, size(file.size)) : null),
+      el("span", { class: "said" }, this.otherSize(name), " ", this.stateOf(name)));
+  }
+
+  lines() {
+    if (this.written) {
+      const choose = (names, kind) => { for (const name of names) this.chosen.set(name, kind); this.sync(); };
+      return [...fileLines({ files: this.dropped, kinds: this.kinds, stateOf: (name) => this.stateOf(name), choose, changed: () => this.show() }),
+        ...this.wanted().filter((f) => !this.dropped.has(f.name)).map((f) => this.named(f))];
     }
-    return [...fileLines({ files: dropped, kinds, stateOf, choose: (of, kind) => { for (const name of of) chosen.set(name, kind); sync(); }, changed: () => show() }),
-      ...wanted().filter((f) => !dropped.has(f.name)).map(named)];
-  };
-  const tableNotes = () => {
-    const [name] = [...kinds].find(([, kind]) => kind === "table") ?? [], head = name && doc?.measurements?.file === name ? table : null;
+    const names = new Set(this.wanted().map((f) => f.name)), unused = [...this.dropped.keys()].filter((name) => !names.has(name) && !name.endsWith(".json"));
+    const more = unused.length > 6 ? ` and ${unused.length - 6} more` : "";
+    return [...this.wanted().map((f) => this.named(f)), this.doc && unused.length ? el("li", { class: "hint" }, `Not named by the document, so not sent: ${unused.slice(0, 6).join(", ")}${more}`) : null].filter(Boolean);
+  }
+
+  tableNotes() {
+    const name = this.nameOf("table"), head = name && this.doc?.measurements?.file === name ? this.table : null;
     if (!head) return [];
+    const turn = async () => this.take([await withAllRotations(this.dropped.get(name), head.by)]);
     return [head.exchanged ? el("p", { class: "note" }, `${name}: ${head.exchanged}`) : null, head.turned ? null : el("div", { class: "note", id: "no-rotation" },
       el("p", {}, `${name} does not say how the cloth was turned, and its lamps all stand on one side: its rows count as measured with the warp along 90°. Is it a material that looks the same from all sides, or a mean over all turns?`),
-      el("button", { type: "button", onclick: async () => { await take([await withAllRotations(dropped.get(name), head.by)]); } }, "They are means over all turns"))];
-  };
-  const show = () => {
-    const missing = wanted().filter((f) => !fileOf(f.name)), faulty = wanted().filter((f) => faultOf(f.name)), focused = document.activeElement?.getAttribute("aria-label");
-    const locked = doc && holdsLargeNumber(doc) ? "Views cannot be chosen here: the document holds a whole number above 2^53." : null;
-    list.replaceChildren(...lines());
-    const again = focused && [...list.querySelectorAll("select")].find((s) => s.getAttribute("aria-label") === focused);
+      el("button", { type: "button", onclick: turn }, "They are means over all turns"))].filter(Boolean);
+  }
+
+  nameOf(...wanted) { return [...this.kinds].find(([, kind]) => wanted.includes(kind))?.[0]; }
+
+  // ---- the page as a whole ----
+
+  show() {
+    const doc = this.doc ?? {}, focused = document.activeElement?.getAttribute("aria-label");
+    const locked = this.doc && holdsLargeNumber(this.doc) ? "Views cannot be chosen here: the document holds a whole number above 2^53." : null;
+    this.list.replaceChildren(...this.lines());
+    const again = focused && [...this.list.querySelectorAll("select")].find((s) => s.getAttribute("aria-label") === focused);
     if (again instanceof HTMLElement) again.focus();
-    preset = picked ?? presetOf(kinds);
-    presets.show(doc ?? {}, preset);
-    questions.node.classList.toggle("hidden", !written || (dropped.size === 0 && picked === null));
-    presets.node.classList.toggle("hidden", !written);
-    example.classList.toggle("hidden", !written || dropped.size > 0 || source !== null);
-    open = written ? questions.show(doc ?? {}, { preset, statesVoxel }) : [];
-    if (written) open.push(...missingParts(doc ?? {}, preset));
-    const angles = unplaced(doc).length;
-    if (written && angles) open.push(`the angles of ${angles} photographs`);
-    remarks.replaceChildren(...notes.map((text) => el("p", { class: "note" }, text)), ...tableNotes().filter(Boolean));
-    rig.show(doc, locked);
-    grid.show(locked ? null : doc, rig.rig !== null && (doc?.photographs ?? []).every((p) => p.view !== undefined));
-    allow();
-    if (busy || (accepted !== null && accepted === source)) return;
-    if (written && open.length && doc) say(`Still to give: ${open.join("; ")}.`);
-    else if (doc && missing.length) say(`${missing.length} of ${wanted().length} files are still missing; drop them here.`);
-    else if (doc && faulty.length) say(`${faulty[0].name} ${faultOf(faulty[0].name)}.`, true);
-    else if (doc) say("Ready.");
-  };
-  const use = (now) => {
-    if (now !== source) { key = newKey(); sent = new Map(); accepted = null; go.textContent = "Submit"; }
-    source = now;
-    doc = null; // when it is no JSON
-    doc = JSON.parse(source);
-  };
-  const checked = () => { if (!written || open.length === 0) check.document(source); else check.clear(); };
-  const editor = documentEditor((now) => { use(now); show(); checked(); });
-  const check = new LiveCheck(editor, () => show());
-  const change = (now) => {
+    this.preset = this.picked ?? presetOf(this.kinds);
+    this.presets.show(doc, this.preset);
+    this.presets.node.classList.toggle("hidden", !this.written);
+    this.questions.node.classList.toggle("hidden", !this.written || (this.dropped.size === 0 && this.picked === null));
+    this.example.classList.toggle("hidden", !this.written || this.dropped.size > 0 || this.source !== null);
+    this.open = this.written ? this.questionsLeft(doc) : [];
+    this.remarks.replaceChildren(...this.notes.map((text) => el("p", { class: "note" }, text)), ...this.tableNotes());
+    this.rig.show(this.doc, locked);
+    this.grid.show(locked ? null : this.doc, this.rig.rig !== null && (doc.photographs ?? []).every((p) => p.view !== undefined));
+    this.allow();
+    if (!this.busy && this.doc && this.accepted !== this.source) this.sayState();
+  }
+
+  questionsLeft(doc) {
+    const open = [...this.questions.show(doc, { preset: this.preset, statesVoxel: this.statesVoxel }), ...missingParts(doc, this.preset)], angles = unplaced(doc).length;
+    if (angles) open.push(`the angles of ${angles} photographs`);
+    return open;
+  }
+
+  sayState() {
+    const wanted = this.wanted(), missing = wanted.filter((f) => !this.fileOf(f.name)), faulty = wanted.find((f) => this.faultOf(f.name));
+    if (this.open.length) this.say(`Still to give: ${this.open.join("; ")}.`);
+    else if (missing.length) this.say(`${missing.length} of ${wanted.length} files are still missing; drop them here.`);
+    else if (faulty) this.say(`${faulty.name} ${this.faultOf(faulty.name)}.`, "note bad");
+    else this.say("Ready.");
+  }
+
+  allow() {
+    this.go.disabled = this.busy || this.doc === null || this.open.length > 0 || this.wanted().some((f) => !this.fileOf(f.name) || this.faultOf(f.name));
+    this.go.textContent = this.accepted !== null && this.accepted === this.source ? "Start all the same" : "Submit";
+  }
+
+  // ---- the document ----
+
+  use(now) {
+    if (now !== this.source) { this.key = newKey(); this.sent = new Map(); this.accepted = null; }
+    this.source = now;
+    this.doc = null; // when it is no JSON
+    this.doc = JSON.parse(now);
+  }
+
+  // The server's check, when nothing is left open.
+  judge() { if (this.open.length === 0) this.check.document(this.source); else this.check.clear(); }
+
+  change(now) {
     const text = JSON.stringify(now, null, 2);
-    if (text !== source) { use(text); editor.show(text); }
-    show();
-    checked();
-  };
-  const rig = new RigPicker(change), grid = new AngleGrid(change), questions = new Questions(change);
-  const presets = new PresetCards((id) => { picked = id; change(doc ?? {}); }), example = exampleOffer();
+    if (text !== this.source) { this.use(text); this.editor.show(text); }
+    this.show();
+    this.judge();
+  }
+
   // Brings a written document in step with the files.
-  const sync = (folderName = "") => {
-    const now = doc ?? {}, names = [...dropped.keys()];
-    kinds = guessedKinds(names, json, rig.rig, grid.pattern, chosen);
-    notes = writeFiles(now, kinds, grid.patternOf(names.filter((n) => kinds.get(n) === "photograph")), rig.rig);
+  sync(folder = "") {
+    const now = this.doc ?? {}, names = [...this.dropped.keys()];
+    this.kinds = guessedKinds(names, this.json, this.rig.rig, this.grid.pattern, this.chosen);
+    this.notes = writeFiles(now, this.kinds, this.grid.patternOf(names.filter((n) => this.kinds.get(n) === "photograph")), this.rig.rig);
     if (now.volume && now.cloth && Object.keys(now.cloth).every((k) => ["weave", "warp_per_cm", "weft_per_cm"].includes(k))) delete now.cloth;
-    const scan = [...kinds].find(([, kind]) => kind === "scan" || kind === "slice")?.[0], rows = [...kinds].find(([, kind]) => kind === "table")?.[0];
-    const named = folderName || stemOf(scan ?? now.fibers?.file ?? now.cloth?.draft_file ?? rows ?? "");
-    if (now.sample === undefined && named) now.sample = named;
-    statesVoxel = true;
-    table = null;
-    if (scan) statesVoxelSize(dropped.get(scan)).then((states) => { if (states !== statesVoxel) { statesVoxel = states; show(); } });
-    if (rows) tableHead(dropped.get(rows)).then((head) => { table = head; show(); });
-    change(now);
-  };
-  const take = async (files, folderName = "") => {
-    let isOther = false;
-    accepted = null;
-    go.textContent = "Submit";
+    const scan = this.nameOf("scan", "slice"), rows = this.nameOf("table"), name = folder || stemOf(scan ?? now.fibers?.file ?? now.cloth?.draft_file ?? rows ?? "");
+    if (now.sample === undefined && name) now.sample = name;
+    this.statesVoxel = true;
+    this.table = null;
+    if (scan) statesVoxelSize(this.dropped.get(scan)).then((states) => { if (states !== this.statesVoxel) { this.statesVoxel = states; this.show(); } });
+    if (rows) tableHead(this.dropped.get(rows)).then((head) => { this.table = head; this.show(); });
+    this.change(now);
+  }
+
+  async take(files, folder = "") {
+    this.accepted = null;
     for (const file of files) {
-      dropped.set(file.name, file);
-      if (!file.name.endsWith(".json")) { check.file(file); continue; }
-      const now = await file.text(), described = rigOf(now), kind = kindOfJson(now);
-      json.set(file.name, kind);
-      if (described) rig.use(file.name, described);
-      if (described || kind === "noise") check.file(file);
-      if (kind !== "document" && (written || kind !== "unused")) continue;
-      written = false;
-      try { use(now); } catch (error) { say(`${file.name}: ${error.message}`, true); return; } finally { editor.show(now); }
-      isOther = true;
+      this.dropped.set(file.name, file);
+      if (!file.name.endsWith(".json")) { this.check.file(file); continue; }
+      if (!await this.takeJson(file)) return;
     }
-    if (written) {
-      sync(folderName);
-      return;
+    if (this.written) { this.sync(folder); return; }
+    if (!this.doc) this.say("Drop the job document (.json) as well.");
+    this.show();
+    if (this.doc) this.check.document(this.source);
+  }
+
+  // A rig, the noise of a camera, or the job document. Returns false when it is no JSON.
+  async takeJson(file) {
+    const text = await file.text(), described = rigOf(text), kind = kindOfJson(text);
+    this.json.set(file.name, kind);
+    if (described) this.rig.use(file.name, described);
+    if (described || kind === "noise") this.check.file(file);
+    if (kind !== "document" && (this.written || kind !== "unused")) return true;
+    this.written = false;
+    try { this.use(text); } catch (error) { this.say(`${file.name}: ${error.message}`, "note bad"); return false; } finally { this.editor.show(text); }
+    return true;
+  }
+
+  // ---- a copy, and an upload that goes on ----
+
+  async useBefore(job) {
+    this.before = job;
+    this.written = false;
+    this.use(this.editor.load(job.source));
+    this.check.document(this.source);
+    const name = this.doc.rig?.file;
+    if (name && job.files.has(name)) {
+      const described = await raw("GET", `/v1/jobs/${job.id}/files/${encodeURIComponent(name)}`).then((answer) => answer.text()).then(rigOf).catch(() => null); // not complete
+      if (described) this.rig.use(name, described);
     }
-    if (!doc) say("Drop the job document (.json) as well.");
-    show();
-    if (isOther) check.document(source);
-  };
-  const input = el("input", { type: "file", multiple: true, onchange: () => take(input.files) });
-  const folder = el("input", { type: "file", webkitdirectory: true, onchange: () => take([...folder.files].filter((f) => !f.name.startsWith(".")), folder.files[0]?.webkitRelativePath.split("/")[0]) });
-  const drop = el("div", { class: "drop" }, el("p", {}, "Drop the files of a sample here, or a folder: scan, photographs, table, draft, rig, or a job document (.json). Or choose ", el("label", { class: "file" }, "files", input), " or ",
-    el("label", { class: "file" }, "a folder", folder), "."));
-  const from = el("p", { class: "hint" });
-  const useBefore = async (job) => {
-    before = job;
-    written = false;
-    use(editor.load(before.source));
-    check.document(source);
-    if (doc.rig?.file && before.files.has(doc.rig.file)) {
-      const described = await raw("GET", `/v1/jobs/${before.id}/files/${encodeURIComponent(doc.rig.file)}`).then((answer) => answer.text()).then(rigOf).catch(() => null); // not complete
-      if (described) rig.use(doc.rig.file, described);
-    }
-    show();
-  };
-  const begin = async () => {
+    this.show();
+  }
+
+  async beginCopy(id) {
     try {
-      await useBefore(await copiedJob(copy));
-      from.append("A copy of ", el("a", { href: `#${before.id}` }, before.sample || "(no name)"), ". Change the document below, then submit it: the earlier job stays as it is.");
-    } catch (error) { say(error.status === 404 ? `The job to copy is not there: ${error.message}` : error.message, true); }
-  };
-  const goOn = async (job) => {
-    await useBefore(job);
-    resumed = { id: job.id, source };
-    from.append("Browsers do not keep files over a reload: drop the same files again. Each is recognised by its name, its size and its content, and goes on where it was.");
-    show();
-  };
-  if (copy !== null) begin(); else offerUpload(interrupted, goOn);
-  if (handed) take(handed.files, handed.folder);
-  // The files can be used, but look as if something were wrong: the job starts when the button is pressed again.
-  const warn = (list) => {
-    accepted = source;
-    go.textContent = "Start all the same";
-    message.className = "note";
-    message.textContent = [list.length === 1 ? "The files can be used, but:" : `The files can be used, but there are ${list.length} warnings:`, ...list.map((w) => w.detail)].join("\n");
-  };
-  const submit = async () => {
-    busy = true;
-    allow();
-    const files = wanted();
+      await this.useBefore(await copiedJob(id));
+      this.from.append("A copy of ", el("a", { href: `#${this.before.id}` }, this.before.sample || "(no name)"), ". Change the document below, then submit it: the earlier job stays as it is.");
+    } catch (error) { this.say(error.status === 404 ? `The job to copy is not there: ${error.message}` : error.message, "note bad"); }
+  }
+
+  async goOn(job) {
+    await this.useBefore(job);
+    this.resumed = { id: job.id, source: this.source };
+    this.from.append("Browsers do not keep files over a reload: drop the same files again. Each is recognised by its name, its size and its content, and goes on where it was.");
+    this.show();
+  }
+
+  // ---- sending ----
+
+  async submit() {
+    this.busy = true;
+    this.allow();
     try {
-      // sent as it was written, because JSON.parse does not keep numbers above 2^53
-      const job = resumed && resumed.source === source ? resumed
-        : await (await raw("POST", "/v1/jobs", { body: source, header: { "Content-Type": "application/json", "Idempotency-Key": key } })).json();
-      rememberUpload(job.id);
-      say("Sending the files ...");
-      const gone = (name) => {
-        before.files.get(name).sha256 = null;
-        show();
-        throw new Error(`${name} of the copied job is not on the server any more; drop it here.`);
-      };
-      await sendFiles({ job: job.id, files, fileOf, known: sent, bar, gone });
-      say("Looking into the files ...");
-      if (accepted !== source) {
-        const judged = await sendJson("POST", `/v1/jobs/${job.id}/check`);
-        if (!judged.valid) throw new Problem(422, { detail: judged.errors[0]?.detail, field: judged.errors[0]?.field, errors: judged.errors });
-        if (judged.warnings.length) { warn(judged.warnings); return; }
-      }
-      await sendJson("POST", `/v1/jobs/${job.id}/start`);
-      forgetUpload();
-      key = newKey(); // submitting the same document again makes another job
-      sent = new Map();
-      location.hash = job.id;
+      await this.send();
     } catch (error) {
-      const faults = error.body?.errors ?? [];
-      if (error.name === "AbortError") say("Cancelled. The job stays a draft with the files that have arrived; Submit goes on.");
-      else say(faults.length > 1 ? [`The input has ${faults.length} faults:`, ...faults.map((f) => (f.field ? `${f.field}: ${f.detail}` : f.detail))].join("\n") : error.message, true);
-      if (faults.length > 1) for (const f of faults) if (f.field) await editor.mark(f.field, f.detail);
-      if (faults.length <= 1 && error.body?.field) editor.mark(error.body.field, error.message);
+      await this.refused(error);
     } finally {
-      busy = false;
-      allow();
+      this.busy = false;
+      this.allow();
     }
-  };
-  go.addEventListener("click", submit);
-  const node = el("section", { id: "submit" }, el("div", { class: "card" }, el("h1", {}, copy === null ? "New job" : "New job, from another one"), from, interrupted, presets.node, drop, example, list, remarks, questions.node),
-    rig.node, grid.node, el("div", { class: "card" }, editor.node), el("div", { class: "card send" }, check.node, message, bar.node, go));
-  node.addEventListener("dragover", (e) => { e.preventDefault(); drop.classList.add("over"); });
-  node.addEventListener("dragleave", () => drop.classList.remove("over"));
-  node.addEventListener("drop", (e) => { e.preventDefault(); drop.classList.remove("over"); droppedFiles(e.dataTransfer).then(({ files, folder: name }) => take(files, name)); });
-  show();
-  return node;
+  }
+
+  async send() {
+    // sent as it was written, because JSON.parse does not keep numbers above 2^53
+    const job = this.resumed && this.resumed.source === this.source ? this.resumed
+      : await (await raw("POST", "/v1/jobs", { body: this.source, header: { "Content-Type": "application/json", "Idempotency-Key": this.key } })).json();
+    rememberUpload(job.id);
+    this.say("Sending the files ...");
+    await sendFiles({ job: job.id, files: this.wanted(), fileOf: (name) => this.fileOf(name), known: this.sent, bar: this.bar, gone: (name) => this.gone(name) });
+    if (this.accepted !== this.source) {
+      this.say("Looking into the files ...");
+      const judged = await sendJson("POST", `/v1/jobs/${job.id}/check`);
+      if (!judged.valid) throw new Problem(422, { detail: judged.errors[0]?.detail, field: judged.errors[0]?.field, errors: judged.errors });
+      if (judged.warnings.length) { this.warn(judged.warnings); return; }
+    }
+    await sendJson("POST", `/v1/jobs/${job.id}/start`);
+    forgetUpload();
+    this.key = newKey(); // submitting the same document again makes another job
+    this.sent = new Map();
+    location.hash = job.id;
+  }
+
+  gone(name) {
+    this.before.files.get(name).sha256 = null;
+    this.show();
+    throw new Error(`${name} of the copied job is not on the server any more; drop it here.`);
+  }
+
+  // The files can be used, but look as if something were wrong: the job starts when the button is pressed again.
+  warn(list) {
+    this.accepted = this.source;
+    this.say([list.length === 1 ? "The files can be used, but:" : `The files can be used, but there are ${list.length} warnings:`, ...list.map((w) => w.detail)].join("\n"), "note");
+  }
+
+  async refused(error) {
+    const faults = error.body?.errors ?? [];
+    if (error.name === "AbortError") this.say("Cancelled. The job stays a draft with the files that have arrived; Submit goes on.");
+    else if (faults.length > 1) this.say([`The input has ${faults.length} faults:`, ...faults.map((f) => (f.field ? `${f.field}: ${f.detail}` : f.detail))].join("\n"), "note bad");
+    else this.say(error.message, "note bad");
+    if (faults.length > 1) for (const f of faults) if (f.field) await this.editor.mark(f.field, f.detail);
+    if (faults.length <= 1 && error.body?.field) this.editor.mark(error.body.field, error.message);
+  }
 }
+
+export const submitPanel = (handed = null, copy = null) => new SubmitPanel(handed, copy).node;
