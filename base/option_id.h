@@ -52,6 +52,7 @@
 #define OPTION_MESH_FILE "mesh_file"
 #define OPTION_PICTURE_RADIUS "picture_radius"
 #define OPTION_PICTURE_METHOD "picture_method"
+#define OPTION_REPORT_PDF "report_pdf"
 #define OPTION_RIG "rig_file"
 #define OPTION_PHOTOGRAPH_VIEW "photograph_view"
 #define OPTION_CAMERA_NOISE "camera_noise"

@@ -1,6 +1,7 @@
 #include "base/process.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -35,4 +36,20 @@ bool program_folder(char *folder, size_t n_bytes)
     char *slash = strrchr(folder, '/');
     if (slash != NULL) *slash = '\0';
     return slash != NULL;
+}
+
+bool program_find(const char *name, char *folder, size_t n_bytes)
+{
+    const char *from = getenv("PATH");
+    while (from != NULL && *from != '\0') {
+        char path[4096];
+        const int n = (int)strcspn(from, ":"), length = snprintf(path, sizeof path, "%.*s/%s", n, from, name);
+        if (n > 0 && length < (int)sizeof path && (size_t)n < n_bytes && access(path, X_OK) == 0) {
+            snprintf(folder, n_bytes, "%.*s", n, from);
+            return true;
+        }
+        from += n + (from[n] == ':');
+    }
+    folder[0] = '\0';
+    return false;
 }

@@ -1,5 +1,5 @@
-/* This process: the processor time and the memory that it has used so far, and the folder of its program, for finding
- * files beside it. */
+/* This process: the processor time and the memory that it has used so far, and the folders of its program, for finding
+ * files beside it, and of others. */
 #ifndef SELVEDGE_BASE_PROCESS_H
 #define SELVEDGE_BASE_PROCESS_H
 
@@ -17,5 +17,8 @@ struct process_use process_use(void);
 /* Writes the folder of this program, without a '/' at its end. Returns false, with "", if it cannot be found or is
  * longer than n_bytes - 1. */
 bool program_folder(char *folder, size_t n_bytes);
+/* Writes the first folder of PATH that has the program `name`, without a '/' at its end. Returns false, with "", if
+ * none has it. */
+bool program_find(const char *name, char *folder, size_t n_bytes);
 
 #endif

@@ -8,6 +8,8 @@
  *   JOB/input/<name>        input files under the names that job.json uses. The daemon verifies them, the worker reads
  *                           them.
  *   JOB/attempt.json        {"attempt":3,"token":"..."}: the attempt that may write. Absent when run by hand.
+ *   JOB/letterhead.json     {"laboratory","logo","paper"} for the report: a name, an image as URI "data:image/...",
+ *                           "A4" or "letter". May be absent.
  *   JOB/lock                The worker holds a flock() on it while it lives.
  *   JOB/claim-<token>       the start of a worker that has the attempt of this token (option --start), when an engine
  *                           could start one twice
@@ -45,6 +47,7 @@
 #define JOB_FILE_JOURNAL "journal.rec"
 #define JOB_FILE_ATTEMPT "attempt.json"
 #define JOB_FILE_LOCK "lock"
+#define JOB_FILE_LETTERHEAD "letterhead.json"
 #define JOB_FILE_BACKEND "backend.json"
 #define JOB_CLAIM_PREFIX "claim-"
 #define JOB_FILE_STATUS "status.json"
@@ -58,6 +61,8 @@
 #define JOB_FILE_RUN "run.json"
 #define JOB_FOLDER_VERSIONS "versions"
 #define JOB_THUMBNAIL "thumbnail.png" /* among the results: a small picture for lists */
+
+#define JOB_PDF_PROGRAM "weasyprint" /* makes report.pdf; the Debian package has the same name */
 
 /* Exit codes of the worker. */
 enum worker_exit {

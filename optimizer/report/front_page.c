@@ -213,17 +213,22 @@ static status print_figures(struct report *report, const json_t *result, FILE *o
     return s;
 }
 
-static void print_head(const struct report *report, const json_t *data, FILE *out)
+static void print_head(const struct report *report, const json_t *data, const json_t *head, FILE *out)
 {
     const json_t *result = json_object_get(data, "result");
     const time_t t = (time_t)page_number(data, "written_unix_s");
     struct tm day;
     char text[40] = "";
     if (gmtime_r(&t, &day) != NULL) strftime(text, sizeof text, "%Y-%m-%d", &day);
-    fprintf(out,
-            "<header class=\"letterhead\"><span class=\"name\">Report on a cloth</span><span class=\"date\">%s"
-            "</span></header>\n<h1>",
-            text);
+    fputs("<header class=\"letterhead\">", out);
+    if (page_string(head, "logo")[0] != '\0') {
+        fputs("<img alt=\"logo\" src=\"", out);
+        page_escaped(page_string(head, "logo"), out);
+        fputs("\">", out);
+    }
+    fputs("<span class=\"name\">", out);
+    page_escaped(page_string(head, "laboratory"), out);
+    fprintf(out, "</span><span class=\"date\">%s</span></header>\n<h1>", text);
     page_escaped(report->in.sample, out);
     fputs("</h1>\n<p class=\"subtitle\">", out);
     page_escaped(report->in.kind == JOB_OF_FIT        ? "Digital twin of a cloth, fitted to measurements"
@@ -238,11 +243,11 @@ static void print_head(const struct report *report, const json_t *data, FILE *ou
     fputs("</p>\n", out);
 }
 
-status front_pages(struct report *report, const json_t *data, FILE *out, struct error *err)
+status front_pages(struct report *report, const json_t *data, const json_t *head, FILE *out, struct error *err)
 {
     const json_t *result = json_object_get(data, "result");
     fputs("<section class=\"front\">\n", out);
-    print_head(report, data, out);
+    print_head(report, data, head, out);
     status s = print_cloth(report, result, out, err);
     print_verdict(json_object_get(result, "verdict"), out);
     print_numbers(report, result, out);

@@ -8,8 +8,8 @@
 #include <jansson.h>
 #include <stdio.h>
 
-/* data: report.json. STATUS_NO_MEMORY, STATUS_IO. */
-status front_pages(struct report *report, const json_t *data, FILE *out, struct error *err);
+/* data: report.json; head: the letterhead (letterhead_file.h). STATUS_NO_MEMORY, STATUS_IO. */
+status front_pages(struct report *report, const json_t *data, const json_t *head, FILE *out, struct error *err);
 
 /* ---- parts ---- */
 

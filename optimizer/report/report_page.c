@@ -2,6 +2,7 @@
 #include "base/files/file_ledger_json.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/front_page.h"
+#include "optimizer/report/letterhead_file.h"
 #include "optimizer/report/page_charts.h"
 #include "optimizer/report/page_pictures.h"
 #include "optimizer/report/page_style.h"
@@ -308,15 +309,17 @@ static status print_appendix(struct report *report, const json_t *data, FILE *ou
 
 static status print_page(struct report *report, const json_t *data, FILE *out, struct error *err)
 {
+    json_t *head = letterhead_file_read(report);
     fputs("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
           "content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" href=\"data:,\">\n"
           "<title>",
           out);
     page_escaped(report->in.sample, out);
     fputs(" - report</title>\n<style>\n", out);
-    page_style(false, out);
+    page_style(strcmp(page_string(head, "paper"), "letter") == 0, out);
     fputs("</style>\n</head>\n<body>\n", out);
-    status s = front_pages(report, data, out, err);
+    status s = front_pages(report, data, head, out, err);
+    json_decref(head);
     if (s == STATUS_OK) s = print_appendix(report, data, out, err);
     fputs("</body>\n</html>\n", out);
     return s;

@@ -1,6 +1,7 @@
 #include "optimizer/report/report_pdf.h"
 
 #include "base/files/durable.h"
+#include "base/process.h"
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/job_folder.h"
 
@@ -13,27 +14,17 @@
 #include <time.h>
 #include <unistd.h>
 
-const char report_pdf_program[] = "weasyprint";
 enum { WAIT_MS = 50, LONGEST_S = 300 };
 
 bool report_pdf_installed(char prefix[WORKER_PATH_BYTES])
 {
-    const char *from = getenv("PATH");
-    while (from != NULL && *from != '\0') {
-        char path[WORKER_PATH_BYTES];
-        int n = (int)strcspn(from, ":");
-        int length = snprintf(path, sizeof path, "%.*s/%s", n, from, report_pdf_program);
-        if (n > 0 && length < (int)sizeof path && access(path, X_OK) == 0) {
-            char up[WORKER_PATH_BYTES], whole[PATH_MAX];
-            snprintf(up, sizeof up, "%.*s/..", n, from);
-            /* from a /bin of its own it needs only the folders that every program needs */
-            bool all = realpath(up, whole) == NULL || strcmp(whole, "/") == 0;
-            snprintf(prefix, WORKER_PATH_BYTES, "%s", all ? "/usr" : up);
-            return true;
-        }
-        from += n + (from[n] == ':');
-    }
-    return false;
+    char folder[WORKER_PATH_BYTES - 8], up[WORKER_PATH_BYTES], whole[PATH_MAX];
+    if (!program_find(JOB_PDF_PROGRAM, folder, sizeof folder)) return false;
+    snprintf(up, sizeof up, "%s/..", folder);
+    /* from a /bin of its own it needs only the folders that every program needs */
+    const bool all = realpath(up, whole) == NULL || strcmp(whole, "/") == 0;
+    snprintf(prefix, WORKER_PATH_BYTES, "%s", all ? "/usr" : up);
+    return true;
 }
 
 void report_pdf_warn(const struct report *report)
@@ -41,8 +32,8 @@ void report_pdf_warn(const struct report *report)
     char prefix[WORKER_PATH_BYTES];
     if (!report->in.results->export_pdf || report_pdf_installed(prefix)) return;
     worker_status_warn(report->in.job->tools->status,
-                       "report.pdf was not made: this machine has no program '%s' (Debian package %s)",
-                       report_pdf_program, report_pdf_program);
+                       "report.pdf was not made: this machine has no program '%s' (Debian package %s)", JOB_PDF_PROGRAM,
+                       JOB_PDF_PROGRAM);
 }
 
 void report_pdf_paths(const struct worker_folder *folder, struct pdf_paths *p)
@@ -81,6 +72,6 @@ status report_pdf_write(struct report *report, struct error *err)
     if (progress_cancelled(&report->in.job->tools->progress))
         return error_set(err, STATUS_CANCELLED, "cancelled while making report.pdf");
     worker_status_warn(report->in.job->tools->status, "report.pdf was not made: the program '%s' failed",
-                       report_pdf_program);
+                       JOB_PDF_PROGRAM);
     return STATUS_OK;
 }

@@ -7,8 +7,6 @@
 
 #include "optimizer/report/findings/report.h"
 
-/* Name of the program. */
-extern const char report_pdf_program[];
 /* Finds the program in the folders of PATH; writes the folder above that folder, which has the program's files. */
 bool report_pdf_installed(char prefix[WORKER_PATH_BYTES]);
 

@@ -1,6 +1,8 @@
 /* Examines the data folder and the other things that the service needs with these settings. */
 #include "base/clock.h"
+#include "base/process.h"
 #include "base/version.h"
+#include "optimizer/job/job_folder.h"
 #include "server/doctor/doctor_report.h"
 #include "server/http/http_listen.h"
 #include "server/http/http_tls.h"
@@ -8,6 +10,7 @@
 #include "server/rescue/backup_files.h"
 #include "server/rescue/rebuild.h"
 #include "server/settings/job_paths.h"
+#include "server/settings/letterhead.h"
 #include "server/settings/secret_file.h"
 #include "server/store/drivers/store_backup.h"
 #include "server/store/store.h"
@@ -281,6 +284,25 @@ static void examine_dashboard(struct doctor *d)
     static_files_free(files);
 }
 
+/* The letterhead of reports, and the program that makes PDFs of them. */
+static void examine_reports(struct doctor *d)
+{
+    char folder[PATH_BYTES], *text = NULL;
+    struct error err = {0};
+    if (letterhead_read(d->settings, &text, &err) != STATUS_OK)
+        doctor_say(d, DOCTOR_FAULT, "letterhead", "%s", err.text);
+    else if (d->settings->report_laboratory[0] != '\0' || d->settings->report_logo[0] != '\0')
+        doctor_say(d, DOCTOR_OK, "letterhead", "name and logo of reports can be used");
+    free(text);
+    if (strcmp(d->settings->backend, "local") != 0) return; /* reports are made on other machines */
+    if (program_find(JOB_PDF_PROGRAM, folder, sizeof folder))
+        doctor_say(d, DOCTOR_OK, "pdf", "reports as PDF are made by '%s/" JOB_PDF_PROGRAM "'", folder);
+    else
+        doctor_say(d, DOCTOR_NOTE, "pdf",
+                   "jobs get no report.pdf, because there is no program '" JOB_PDF_PROGRAM
+                   "'; install the Debian package " JOB_PDF_PROGRAM);
+}
+
 void doctor_examine_service(struct doctor *d)
 {
     bool usable = examine_folder(d), runs = usable && daemon_runs(d);
@@ -298,4 +320,5 @@ void doctor_examine_service(struct doctor *d)
     examine_secrets(d);
     if (examine_worker(d)) examine_sandbox(d);
     examine_dashboard(d);
+    examine_reports(d);
 }

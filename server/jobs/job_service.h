@@ -40,6 +40,7 @@ struct job_runner {
 
 struct job_service {
     const struct settings *settings;
+    char *letterhead; /* content of letterhead.json in the folders of jobs (settings/letterhead.h) */
     struct store *store;
     struct upload_set *upload;
     struct change_feed *feed;        /* wakes long polls */

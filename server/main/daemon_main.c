@@ -3,6 +3,7 @@
 #include "base/files/durable.h"
 #include "base/process.h"
 #include "base/version.h"
+#include "optimizer/job/job_folder.h"
 #include "server/endpoints/endpoint_table.h"
 #include "server/http/http_server.h"
 #include "server/http/static_files.h"
@@ -217,6 +218,15 @@ static void announce(const struct settings *s, const char *url, struct log *log)
     fflush(stdout);
 }
 
+/* Says at the start that reports as PDF cannot be made; where workers run on other machines, nothing is known of it. */
+static void note_pdf(const struct settings *s, struct log *log)
+{
+    char folder[PATH_BYTES];
+    if (strcmp(s->backend, "local") == 0 && !program_find(JOB_PDF_PROGRAM, folder, sizeof folder))
+        log_info(log, "jobs get no report.pdf: there is no program '" JOB_PDF_PROGRAM
+                      "' (Debian package " JOB_PDF_PROGRAM ")");
+}
+
 /* Returns whether to try a failed step of the start once more: on a full disk the reserved space is released, so that
  * users can delete jobs. */
 static bool make_room(const struct settings *s, struct log *log, status failed, const struct error *err)
@@ -289,6 +299,7 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     if (r == STATUS_OK) r = http_server_start(service, endpoint_find, files, &server, url, err);
     if (r == STATUS_OK) {
         announce(s, url, log);
+        note_pdf(s, log);
         if (store_daemon_announce(service->store, url, err) != STATUS_OK) log_warning(log, "%s", err->text);
         wait_for_signal(signals, server, log);
     }

@@ -4,6 +4,7 @@
 #include "server/jobs/queue_forecast.h"
 #include "server/main/job_recovery.h"
 #include "server/settings/job_paths.h"
+#include "server/settings/letterhead.h"
 #include "server/store/store_settings.h"
 #include "server/workers/lease_keeper.h"
 #include "server/workers/shared_folder.h"
@@ -33,7 +34,12 @@ status service_open(const struct settings *settings, struct log *log, struct job
     v->log = log;
     pthread_mutex_init(&v->change.lock, NULL);
     pthread_cond_init(&v->change.next_turn, NULL);
-    status s = make_data_folders(settings->data, err);
+    status s = letterhead_read(settings, &v->letterhead, err);
+    if (s != STATUS_OK) {
+        service_close(v);
+        return s;
+    }
+    s = make_data_folders(settings->data, err);
     struct error why = {0};
     if (s == STATUS_OK && journal_key_read(settings->data, true, &v->journal_key, &why) != STATUS_OK)
         log_warning(log, "journals of jobs are not sealed: %s", why.text);
@@ -62,6 +68,7 @@ void service_close(struct job_service *v)
     store_close(v->store);
     queue_forecast_free(v->forecast);
     change_feed_free(v->feed);
+    free(v->letterhead);
     pthread_mutex_destroy(&v->change.lock);
     pthread_cond_destroy(&v->change.next_turn);
     free(v);

@@ -33,6 +33,7 @@ struct setting {
 
 static const char *const sandbox_words[] = {"auto", "required", "off", NULL};
 static const char *const backend_words[] = {"local", "slurm", NULL};
+static const char *const paper_words[] = {"A4", "letter", NULL};
 static const char *const required_words[] = {"auto", "always", NULL};
 
 static const struct setting table[] = {
@@ -188,6 +189,10 @@ static const struct setting table[] = {
     NUMBER("disk", "ballast_bytes", ballast_bytes, 8 * MIB, 0, GIB,
            "reserved disk space, which is released when the disk is full so that deleting jobs still works; "
            "at least 1 MiB while there is room"),
+    TEXT("report", "laboratory", report_laboratory, "", "name at the head of reports (docs/operating.md); empty: none"),
+    TEXT("report", "logo", report_logo, "",
+         "PNG or SVG file of at most 256 KiB at the head of reports, which is read at the start; empty: none"),
+    WORD("report", "paper", report_paper, "A4", paper_words, "paper on which reports are printed: A4 or letter"),
 };
 enum { N_SETTING = sizeof table / sizeof table[0] };
 

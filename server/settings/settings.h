@@ -43,6 +43,8 @@ struct settings {
     /* [backup] */
     int64_t backup_every_s, backup_keep, backup_keep_days;
     char backup_folder[SETTING_TEXT_BYTES];
+    /* [report] */
+    char report_laboratory[SETTING_TEXT_BYTES], report_logo[SETTING_TEXT_BYTES], report_paper[SETTING_TEXT_BYTES];
     /* [disk] */
     int64_t floor_bytes, ballast_bytes;
 };

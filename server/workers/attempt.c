@@ -53,6 +53,9 @@ static status write_folder(struct job_service *v, const struct job_row *row, str
     status s = STATUS_OK;
     if (!holds(folder, JOB_FILE_DOCUMENT, row->document))
         s = foreign_file_replace(path, row->document, strlen(row->document), true, err);
+    path_join(path, folder, JOB_FILE_LETTERHEAD, NULL);
+    if (s == STATUS_OK && !holds(folder, JOB_FILE_LETTERHEAD, v->letterhead))
+        s = foreign_file_replace(path, v->letterhead, strlen(v->letterhead), true, err);
     if (s != STATUS_OK) return s;
     int n = snprintf(text, sizeof text, "{\"attempt\":%lld,\"token\":\"%s\"}\n", (long long)row->attempt, row->token);
     path_join(path, folder, JOB_FILE_ATTEMPT, NULL);

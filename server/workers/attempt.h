@@ -29,9 +29,9 @@ struct attempt_request {
     double heartbeat_unix_s; /* by the clock of the worker; 0: none of this attempt, or it cannot be read */
 };
 
-/* Changes a job from queued to running: claims it, sets a new attempt number and token, writes job.json and
- * attempt.json, and clears the folder after an edit. token: receives the token of the attempt. STATUS_CONFLICT when the
- * job is no longer queued, or another daemon has claimed it. */
+/* Changes a job from queued to running: claims it, sets a new attempt number and token, writes job.json,
+ * letterhead.json and attempt.json, and clears the folder after an edit. token: receives the token of the attempt.
+ * STATUS_CONFLICT when the job is no longer queued, or another daemon has claimed it. */
 status attempt_prepare(struct job_service *v, const char *job_id, char token[STORE_ID_BYTES], struct error *err);
 /* Reads the requests of users about a running job and, while its worker computes, its last heartbeat. Returns false,
  * with no request, when the database cannot be read. */

@@ -345,6 +345,7 @@ const struct job_option option_rows_fit[] = {
 #include "generated/exports.def"
 #undef EXPORT
     {.path = "export.pdf",
+     .id = OPTION_REPORT_PDF,
      .kind = OPTION_BOOL,
      INTO(results, export_pdf),
      .standard = "false",

@@ -1,7 +1,10 @@
 #include "optimizer/worker/check/job_check.h"
 #include "base/files/alike_name.h"
 #include "base/files/durable.h"
+#include "base/option_id.h"
+#include "base/process.h"
 #include "optimizer/job/checks/job_faults.h"
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/job/job_parse.h"
 #include "optimizer/worker/check/input_check.h"
@@ -30,6 +33,16 @@ static void look_for(void *context, const char *name, const char *role)
     else if (file.st_size == 0)
         error_set_field(&fault, STATUS_INVALID, name, "input file '%s' (%s) is empty", name, role);
     if (fault.code != STATUS_OK) job_faults_add(c->fault, &fault);
+}
+
+/* Warns of a PDF that this machine cannot make. */
+static void check_pdf(struct input_check *c)
+{
+    char folder[INPUT_PATH_BYTES];
+    if (c->section.results->export_pdf && !program_find(JOB_PDF_PROGRAM, folder, sizeof folder))
+        input_check_warn(c, OPTION_REPORT_PDF,
+                         "report.pdf will not be made: this machine has no program '" JOB_PDF_PROGRAM
+                         "' (Debian package " JOB_PDF_PROGRAM ")");
 }
 
 static json_t *report_of(struct input_check *c)
@@ -64,6 +77,7 @@ status job_check(const char *path, const char *folder, json_t **report, struct e
         input_check_cloth(&c);
         input_check_rows(&c);
         input_check_pictures(&c);
+        check_pdf(&c);
     }
     *report = report_of(&c);
 out:

@@ -70,7 +70,7 @@ static _Noreturn void be_helper(const struct worker_folder *folder, const char *
     if (read(ORDER_FD, &go, 1) != 1) _exit(0); /* the worker has ended */
     close(ORDER_FD);
     setenv("TMPDIR", work, 1);
-    execlp(report_pdf_program, report_pdf_program, "--quiet", path.from, path.part, (char *)NULL);
+    execlp(JOB_PDF_PROGRAM, JOB_PDF_PROGRAM, "--quiet", path.from, path.part, (char *)NULL);
     _exit(EXIT_NO_PROGRAM);
 }
 
