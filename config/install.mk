@@ -28,7 +28,7 @@ install: all manual ## install below PREFIX (/usr/local) of DESTDIR: programs, d
 	$(if $(PLUGINS),$(INSTALL) -d "$(DESTDIR)$(PREFIX)/lib/selvedge" && $(INSTALL) -m 644 $(PLUGINS) "$(DESTDIR)$(PREFIX)/lib/selvedge")
 	$(INSTALL) -m 644 $(filter-out %.md,$(wildcard clients/dashboard/*.*)) "$(DESTDIR)$(SHAREDIR)/dashboard"
 	for folder in $(DASHBOARD_FOLDERS); do $(INSTALL) -m 644 clients/dashboard/$$folder/* "$(DESTDIR)$(SHAREDIR)/dashboard/$$folder" || exit 1; done
-	$(INSTALL) -m 644 config/openapi.json config/result.schema.json config/selvedge.conf "$(DESTDIR)$(SHAREDIR)"
+	$(INSTALL) -m 644 config/openapi.json config/result.schema.json config/selvedge.conf docs/glossary.md "$(DESTDIR)$(SHAREDIR)"
 	$(INSTALL) -m 644 README.md CHANGELOG.md SECURITY.md CITATION.cff LICENSE "$(DESTDIR)$(DOCDIR)"
 	$(INSTALL) -m 644 docs/*.md "$(DESTDIR)$(DOCDIR)/docs"
 	$(INSTALL) -m 644 docs/images/* "$(DESTDIR)$(DOCDIR)/docs/images"

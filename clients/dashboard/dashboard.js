@@ -1,29 +1,45 @@
 // Entry point of the dashboard: "#" shows the list of jobs, "#?state=failed" a part of it, "#ID" one job, "#new" the
 // form for a new job ("#new?copy=ID" filled with the document of another), "#compare/ID,ID" several jobs side by side,
-// "#batches" the batches, "#batch/ID" one of them.
+// "#batches" the batches, "#batch/ID" one of them, "#glossary" the words that the pages use. The page of a job has tabs:
+// "#ID/pictures".
 import { batchPage } from "./batch/batch_page.js";
 import { batchesPage } from "./batch/batches_page.js";
 import { comparePage } from "./compare/compare_page.js";
 import { el } from "./page_parts.js";
 import { droppedFiles } from "./dropped_files.js";
+import { glossaryPage } from "./glossary_page.js";
 import { listPage } from "./list/list_page.js";
-import { jobPage } from "./job_page.js";
+import { jobPage } from "./job/job_page.js";
+import { restoreScroll } from "./scroll_memory.js";
 import { showUser, signInPage } from "./sign_in.js";
 import { submitPanel } from "./submit_panel.js";
 
 const page = document.getElementById("page");
 const crumb = document.getElementById("crumb");
 const user = document.getElementById("user");
+const ABOVE_PANEL = 110; // header and tabs
 let leave = null, signingIn = false;
 let handed = null; // files that were dropped on another page
+let paged = { root: null, turn: null }; // the page that is shown, if it has tabs: its address without the tab
+
+// A tab of the page that is shown already; the page stays, and the tabs come into view if they were above.
+function turnTab(root, tab) {
+  if (paged.root !== root) return false;
+  paged.turn(tab);
+  const panel = page.querySelector(".tab-panel"), top = panel ? window.scrollY + panel.getBoundingClientRect().top - ABOVE_PANEL : 0;
+  if (!restoreScroll() && window.scrollY > top) window.scrollTo(0, top);
+  return true;
+}
 
 function route() {
+  const [id, query] = location.hash.slice(1).split("?"), [, root, tab] = /^((?:compare\/)?[^/]*)(?:\/([a-z]+))?$/.exec(id) ?? [null, id];
+  if (!signingIn && turnTab(root, tab)) return;
   if (leave) leave();
+  paged = { root: null, turn: null };
   signingIn = false;
-  const [id, query] = location.hash.slice(1).split("?");
   page.replaceChildren();
   crumb.replaceChildren();
-  window.scrollTo(0, 0);
+  if (!restoreScroll()) window.scrollTo(0, 0);
   if (id === "new") {
     document.title = "New job – Selvedge";
     crumb.append(el("a", { href: "#" }, "Jobs"), " › New job");
@@ -33,15 +49,20 @@ function route() {
   } else if (id.startsWith("compare/")) {
     crumb.append(el("a", { href: "#" }, "Jobs"), " › Comparison");
     leave = comparePage(page, id.slice("compare/".length));
+  } else if (id === "glossary") {
+    crumb.append(el("a", { href: "#" }, "Jobs"), " › Glossary");
+    leave = glossaryPage(page);
   } else if (id === "batches") {
     crumb.append(el("a", { href: "#" }, "Jobs"), " › Batches");
     leave = batchesPage(page);
   } else if (/^batch\/[0-9a-f-]{1,40}$/.test(id)) {
     crumb.append(el("a", { href: "#" }, "Jobs"), " › ", el("a", { href: "#batches" }, "Batches"), " › Batch");
     leave = batchPage(page, id.slice("batch/".length));
-  } else if (/^[A-Za-z0-9_-]{1,80}$/.test(id)) {
-    crumb.append(el("a", { href: "#" }, "Jobs"), " › ", el("span", { class: "mono" }, id));
-    leave = jobPage(page, id);
+  } else if (/^[A-Za-z0-9_-]{1,80}$/.test(root)) {
+    crumb.append(el("a", { href: "#" }, "Jobs"), " › ", el("span", { class: "mono" }, root));
+    const shown = jobPage(page, root, tab);
+    leave = () => shown.leave();
+    paged = { root, turn: (name) => shown.turn(name) };
   } else {
     document.title = "Selvedge";
     leave = listPage(page, new URLSearchParams(query ?? ""));
@@ -52,6 +73,7 @@ function askForToken() {
   if (signingIn) return;
   if (leave) leave();
   leave = null;
+  paged = { root: null, turn: null };
   signingIn = true;
   page.replaceChildren();
   crumb.replaceChildren();

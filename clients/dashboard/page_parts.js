@@ -28,6 +28,8 @@ export function refill(node, key, make) {
   node.replaceChildren(...[make()].flat().filter((c) => c !== null && c !== undefined));
 }
 
+export const card = (title, ...content) => el("section", { class: "card" }, el("h2", {}, title), ...content);
+
 export const isNumber = (x) => typeof x === "number" && Number.isFinite(x);
 
 export function duration(s) {
@@ -56,7 +58,19 @@ export function withError(value, se) {
 }
 
 export const percent = (x, digits = 1) => (isNumber(x) ? `${(100 * x).toFixed(digits)} %` : "–");
-export const percentWithError = (x, se, digits = 2) => (isNumber(x) && isNumber(se) ? `${(100 * x).toFixed(digits)} ± ${(100 * se).toFixed(digits)} %` : percent(x, digits));
+
+// Rounds up to two digits: 1.0123 becomes 1.1.
+function roundedUp(x) {
+  const unit = 10 ** (Math.floor(Math.log10(x)) - 1);
+  return Number((unit * Math.ceil(x / unit - 1e-9)).toPrecision(2));
+}
+
+// A relative error with its standard error. An error of less than two standard errors cannot be told from zero, and reads
+// "below 1.1 %": the error plus two standard errors.
+export function percentWithError(x, se, digits = 2) {
+  if (!isNumber(x) || !isNumber(se) || se <= 0) return percent(x, digits);
+  return x < 2 * se ? `below ${roundedUp(100 * (x + 2 * se))} %` : `${(100 * x).toFixed(digits)} ± ${(100 * se).toFixed(digits)} %`;
+}
 export const when = (unix) => (isNumber(unix) && unix > 0 ? new Date(1000 * unix).toLocaleString() : "–");
 // A time in the reader's zone, with the UTC time as its title.
 export function timeOf(unix) {

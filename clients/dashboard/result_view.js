@@ -20,6 +20,9 @@ export function parameterGroups(parameters) {
   return groups;
 }
 
+// The meaning of each parameter by "MODEL NAME", from the catalogue of models of GET /v1/options; the name without the set.
+export const parameterMeanings = (models) => new Map((models ?? []).flatMap((m) => m.parameters.map((p) => [`${m.id} ${p.name}`, p.meaning])));
+
 // Describes the n numbers of a model's points: [{name, unit, lower, upper, fixed}]. A series describes its models; one
 // without descriptions belongs to a job with a single model.
 export function describedParameters(model, job, n) {
@@ -94,6 +97,19 @@ export function configurations(job, urls) {
   });
 }
 
+// Photographs and renderings among the files of a job that has no result yet: [{name, photograph, rendering}], addresses
+// or null
+export function picturesSoFar(files) {
+  const found = new Map();
+  for (const { path, url } of files) {
+    const [, folder, name] = /^(photographs|renderings)\/([^/]+)\.png$/.exec(path) ?? [];
+    if (!folder) continue;
+    if (!found.has(name)) found.set(name, { name, photograph: null, rendering: null });
+    found.get(name)[folder === "photographs" ? "photograph" : "rendering"] = url;
+  }
+  return [...found.values()];
+}
+
 // The pictures of slices and the fiber file among the results.
 export const sliceFiles = (files) => files.filter((f) => /(^|\/)slice[^/]*\.png$/.test(f.path));
 export const fiberFile = (files) => files.find((f) => f.path === "fibers.hair") ?? null;
@@ -112,6 +128,9 @@ export function channelErrors(job) {
   const of = (set, key) => ({ set, rgb: (job.result?.[key] ?? []).map((value, c) => ({ value, se: job.result[`${key}_se`]?.[c] })) });
   return [of("fitted", "fit_channel_rel_rms"), of("held out", "heldout_channel_rel_rms")].filter(({ rgb }) => rgb.length && rgb.every(({ value }) => isNumber(value)));
 }
+// The kinds of fibers in a scan: [{density, share, n, radius, radiusError}], density over the densest kind's
+export const fiberKinds = (job) => (job.result?.geometry?.kinds ?? []).map((k) => ({ density: k.density, share: k.share, n: k.n_fiber, radius: k.radius_um, radiusError: k.radius_error_um }));
+
 // The correlations of the parameters that are not fixed: {names, matrix}; null for fewer than two.
 export function correlations(job) {
   const all = job.result?.parameters ?? [], full = job.result?.correlation;
@@ -121,6 +140,6 @@ export function correlations(job) {
 }
 // The reason for choosing the best of several models, as a sentence.
 export const choiceOf = (job) => (job.result?.chosen_by === "cross_validation"
-  ? "The best model has the lowest error over fitted rows that were left out in turn (cross-validation); held-out rows have no part in the choice."
+  ? "The best model has the lowest cross-validated error, over parts of the fitted rows that a fit to the others predicts; held-out rows have no part in the choice."
   : "The fitted rows are too few for cross-validation, so the best model has the lowest error over the fitted rows.");
 export const finite = (x) => (isNumber(x) ? x : null);

@@ -1,4 +1,5 @@
 #include "base/version.h"
+#include "optimizer/job/document/catalogue_json.h"
 #include "optimizer/job/document/job_limits.h"
 #include "optimizer/job/options/option_json.h"
 #include "optimizer/job/stage_table.h"
@@ -37,7 +38,14 @@ void handle_about(struct http_request *r)
                          "states", states, "limits", limits));
 }
 
-void handle_options(struct http_request *r) { reply_json(r, MHD_HTTP_OK, job_options_json()); }
+/* The options of a job document, and the models with the meanings of their parameters. */
+void handle_options(struct http_request *r)
+{
+    json_t *options = job_options_json(), *catalogue = catalogue_json();
+    json_object_set(options, "models", json_object_get(catalogue, "models"));
+    json_decref(catalogue);
+    reply_json(r, MHD_HTTP_OK, options);
+}
 
 static void reply_static(struct http_request *r, const char *url)
 {

@@ -128,6 +128,7 @@ status static_files_new(const char *web, const char *openapi, struct log *log, s
         add(f, "/v1/openapi.json", path);
     else
         log_warning(log, "openapi.json was not found, so /v1/openapi.json is not served");
+    if (find_beside("docs/glossary.md", "glossary.md", path)) add(f, "/glossary.md", path);
     *out = f;
     return STATUS_OK;
 }

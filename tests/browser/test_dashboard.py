@@ -11,7 +11,7 @@ pytest.importorskip("selenium.webdriver", reason="python3-selenium is not instal
 import selvedge  # noqa: E402
 import small_cloth  # noqa: E402
 from browser_page import (  # noqa: E402
-    click_on, complaints, keep, scrolls_sideways, sized, small_weave, start_daemon, stop_daemon, submit, text_of, texts, wait_for)
+    click_on, complaints, error_words, keep, open_tab, scrolls_sideways, sized, small_weave, start_daemon, stop_daemon, submit, text_of, texts, wait_for)
 from selenium.webdriver.common.by import By  # noqa: E402
 
 
@@ -51,12 +51,17 @@ def test_real_job_live_and_finished(real, browser):
     click_on(browser, "#jobs tbody tr a")
     wait_for(browser, "document.querySelectorAll('.stage').length === 8")
     # while the job runs: curves appear during the fit
+    browser.execute_script("location.hash += '/parameters'")
     wait_for(browser, "document.querySelectorAll('.chart canvas').length >= 8", 240)
-    assert any(t.startswith("Objective") for t in texts(browser, ".chart-title"))
     keep(browser, "running")
+    open_tab(browser, "log")
+    wait_for(browser, "document.querySelectorAll('.chart canvas').length === 2")
+    assert [t.startswith("Objective") for t in texts(browser, ".chart-title")] == [True]
+    open_tab(browser, "parameters")
     # finished
     wait_for(browser, "document.querySelector('.state.succeeded')", 400)
     wait_for(browser, "document.querySelector('#parameters')")
+    browser.execute_script("document.querySelector('#course').open = true")
     # the curves of both models under their own names, and the table that compares them
 
     def titles():
@@ -64,7 +69,7 @@ def test_real_job_live_and_finished(real, browser):
     wait_for(browser, "document.querySelectorAll('#models-shown button').length === 2")
     # the curves of the best model, although the other was fitted last
     wait_for(browser, "document.querySelector('#models-shown button.main').textContent === 'two_lobe.v1'")
-    wait_for(browser, "document.querySelectorAll('.chart canvas').length >= 14")
+    wait_for(browser, "document.querySelectorAll('.chart canvas').length >= 12")
     assert any(t.startswith("beta_TT (°)") for t in titles()) and not any(t.startswith("alpha") for t in titles())
     click_on(browser, "#models-shown button", 1)
     wait_for(browser, "[...document.querySelectorAll('.chart-title')].some((e) => e.textContent.startsWith('alpha'))")
@@ -74,27 +79,38 @@ def test_real_job_live_and_finished(real, browser):
     assert [c.split()[0] for c in compared] == ["two_lobe.v1", "microflake.v1"] and sum("best" in c for c in compared) == 1 and "best" in compared[0]
     result = job.result().raw
     rows = texts(browser, "#parameters tbody tr")
-    assert len(rows) == 9 and rows[0].startswith("C_R.r") and "±" in rows[3]
+    assert len(rows) == 9 and rows[0].startswith("C_R.r") and "±" in rows[3] and "Reflectance of the surface lobe R" in rows[0] and "Reflectance" not in rows[1]
+    open_tab(browser, "rows")
     n_positive = sum(m > 0 and r > 0 for row in result["rows"] for m, r in zip(row["measured"], row["rendered"]))
     assert len(browser.find_elements(By.CSS_SELECTOR, "svg.scatter circle")) == n_positive
+    assert len(browser.find_elements(By.CSS_SELECTOR, "#next-photograph tbody tr")) == 2
+    textures = texts(browser, "#textures tbody tr")
+    assert len(textures) == 13 and all("%" in t for t in textures)
+    open_tab(browser, "pictures")
     pairs = browser.execute_script("return [...document.querySelectorAll('.pair')].map((p) => p.className)")
     assert len(pairs) == 13 and sum("held" in p for p in pairs) == 4
     browser.execute_script("for (const i of document.images) i.loading = 'eager'")
     wait_for(browser, "[...document.images].every((i) => i.complete && i.naturalWidth > 0)")
     assert len(browser.find_elements(By.CSS_SELECTOR, ".pair canvas")) == 26
-    assert len(browser.find_elements(By.CSS_SELECTOR, "canvas.slice")) == 1
-    assert "passed" in text_of(browser, "#certificate")
-    assert len(browser.find_elements(By.CSS_SELECTOR, "#next-photograph tbody tr")) == 2
-    textures = texts(browser, "#textures tbody tr")
-    assert len(textures) == 13 and all("%" in t for t in textures)
     assert all(len(m["rows"][0]["texture"]["rendered_se"]) == 3 for m in result["models"])
-    listed = text_of(browser, "#files")
-    assert "result.json" in listed and "fibers.hair" in listed and "density.vol" in listed
-    assert "stage" in text_of(browser, "pre.log")
+    open_tab(browser, "files")
+    listed = []
+    while True:  # page by page
+        listed += texts(browser, "#files tr")
+        if not browser.execute_script("const b = document.querySelector('[aria-label=\"next files\"]'); const on = !b.disabled; b.click(); return on"):
+            break
+    names = [line.split()[0] for line in listed]
+    assert {"result.json", "fibers.hair", "density.vol"} <= set(names) and len(set(names)) == len(names) > 50
+    open_tab(browser, "log")
+    wait_for(browser, "document.querySelector('pre.log').textContent.includes('stage')")
+    assert "passed" in text_of(browser, "#certificate")
+    open_tab(browser, "geometry")
+    assert len(browser.find_elements(By.CSS_SELECTOR, "canvas.slice")) == 1
     # fibers in 3D, or a sentence with the reason (a machine without WebGL)
     browser.execute_script("document.querySelector('.view3d button').click()")
     wait_for(browser, "document.querySelector('.view3d canvas') || document.querySelector('.view3d').textContent.includes('not available')")
     # the key figures of the geometry, and the page with all of them
+    browser.execute_script("document.querySelector('#quality details').open = true")
     quality = text_of(browser, "#quality")
     assert "material explained" in quality and "direction noise" in quality and "continue" in quality
     keep(browser, "finished")
@@ -114,6 +130,7 @@ def test_correlations_and_record(real, browser):
     job.wait()
     browser.get(f"{url}/#{job.id}")
     wait_for(browser, "document.querySelector('#correlation')")
+    browser.execute_script("document.querySelector('#correlations').open = true")
     result, state = job.result().raw, job.state().raw
     free = [i for i, p in enumerate(result["parameters"]) if not p["fixed"]]
     shown = browser.execute_script("""return [...document.querySelectorAll('#correlation tbody tr')]
@@ -123,19 +140,24 @@ def test_correlations_and_record(real, browser):
     strong = max(((abs(wanted[i][j]), i, j) for i in range(len(free)) for j in range(i)))
     names = [result["parameters"][i]["name"] for i in free]
     assert strong[0] < 0.7 or f"Strongest: {names[strong[2]]} and {names[strong[1]]} (" in text_of(browser, "#correlation-words")
+    with sized(browser, 375, 800):
+        assert scrolls_sideways(browser) == []
+        browser.execute_script("document.getElementById('correlation').scrollIntoView()")
+        keep(browser, "correlation-375", 375, 800)
+    open_tab(browser, "files")
     inputs = texts(browser, "#record-inputs tbody tr")
     assert len(inputs) == 14 and all(f["name"] in t and f["sha256"] in t for f, t in zip(state["files"], inputs))
+    open_tab(browser, "settings")
     dates = text_of(browser, "#record-dates")
     assert job.id in dates and result["program"] in dates and len(browser.find_elements(By.CSS_SELECTOR, "#record-dates time[title$=UTC]")) == 4
-    browser.execute_script("document.querySelector('#record details').open = true")
     settings = text_of(browser, "#record-settings")
+    click_on(browser, "[aria-label='next settings']")
+    settings += text_of(browser, "#record-settings")
     assert "volume.voxel_size_um 2" in settings and f"photographs[{state['document']['photographs'][0]['file']}].light_theta_deg" in settings
     keep(browser, "record")
     with sized(browser, 375, 800):
         assert scrolls_sideways(browser) == []
-        for part in ("correlation", "record"):
-            browser.execute_script("document.getElementById(arguments[0]).scrollIntoView()", part)
-            keep(browser, f"{part}-375", 375, 800)
+        keep(browser, "record-375", 375, 800)
     assert complaints(browser) == []
 
 
@@ -175,7 +197,7 @@ def test_compare_two_jobs(real, other, browser):
             .filter((r) => r.querySelector('th[scope=row]')?.textContent.startsWith(arguments[1]))
             .map((r) => [...r.querySelectorAll('td')].map((d) => d.textContent.trim()))""", card, title)
     held = cells("compare-errors", "held out")[0]
-    assert all(text.endswith(f"{100 * r['heldout_rel_rms']:.2f} ± {100 * r['heldout_rel_rms_se']:.2f} %") for text, r in zip(held, (a, b)))
+    assert all(text.endswith(error_words(r, 'heldout_rel_rms')) for text, r in zip(held, (a, b)))
     assert cells("compare-errors", "plain BRDF, held")[0] == [f"{100 * r['skill']['plain_brdf']['heldout_rel_rms']:.2f} %" for r in (a, b)]
     assert cells("compare-errors", "rows")[0] == ["9 + 4", "8 + 4"]
     assert "fitted rows are not the same" in text_of(browser, "#compare-errors .note")
@@ -241,8 +263,9 @@ def test_parameters_of_two_groups(real, browser, tmp_path):
     browser.get(f"{url}/#{job.id}")
     wait_for(browser, "document.querySelector('#parameters')")
     rows = texts(browser, "#parameters tbody tr")
-    assert len(rows) == 20 and rows[0] == "weft" and rows[1].startswith("C_R.r ") and rows[10] == "warp" and rows[11].startswith("C_R.r ")
+    assert len(rows) == 20 and rows[0] == "weft" and rows[1].startswith("C_R.r") and rows[10] == "warp" and rows[11].startswith("C_R.r")
     assert "fixed" in rows[7] and "tied to weft.beta_TT" in rows[18]
+    browser.execute_script("document.querySelector('#course').open = true")
     wait_for(browser, "document.querySelectorAll('.charts').length === 2")
     charts = [[e.text.split()[0] for e in c.find_elements(By.CSS_SELECTOR, ".chart-title")] for c in browser.find_elements(By.CSS_SELECTOR, ".charts")]
     assert charts == [["C_R", "C_TT", "beta_TT", "gamma_TT"], ["C_R", "C_TT", "beta_R", "beta_TT", "gamma_TT"]]
@@ -269,7 +292,7 @@ def test_corrections(real, browser, tmp_path):
     keeps = without["heldout_gain"] >= 2 * without["heldout_gain_se"]
     assert ("LOWER THE HELD-OUT ERROR" if keeps else "NOT WORTH KEEPING") in text.upper()
     assert ("ask for radius" if without["asked_for"] else "ask for none of these corrections") in text
-    assert f"{100 * without['heldout_rel_rms']:.2f} % over the held-out rows; with them: {100 * result['fit_rel_rms']:.2f} %" in text
+    assert f"{error_words(without, 'heldout_rel_rms')} over the held-out rows; with them: {error_words(result, 'fit_rel_rms')}" in text
     assert f"{100 * abs(without['heldout_gain']):.2f} % ± {100 * without['heldout_gain_se']:.2f} %" in text
     assert text_of(browser, "#cloth-numbers tbody tr").startswith("radius")
     keep(browser, "corrections")
@@ -288,7 +311,7 @@ def test_pictures_grow_on_the_page(real, browser, tmp_path):
                      {"on": "flat", **view, "px": 32, "samples": 1024}],
         "fit": {"fixed": {"C_R": [0.1] * 3, "C_TT": [0.6, 0.4, 0.3], "beta_R": 6, "beta_TT": 12, "gamma_TT": 30}, "model": "two_lobe.v1"}}))
     job = selvedge.Client(url).submit(str(tmp_path / "job.json"))
-    browser.get(f"{url}/#{job.id}")
+    browser.get(f"{url}/#{job.id}/pictures")
     wait_for(browser, "document.querySelector('#surfaces .tag') && / of 1024 samples/.test(document.querySelector('#surfaces').textContent)", 60)
     keep(browser, "pictures-growing")
     job.wait()
@@ -342,8 +365,8 @@ def test_long_log_does_not_freeze(stub, browser):
     with open(log[0], "a", encoding="utf-8") as f:
         for block in range(200):
             f.write("".join(f"2026-01-01T00:00:00.000Z INFO line {1000 * block + i} of a very long log\n" for i in range(1000)))
-    browser.get(f"{url}/#{job.id}")
-    wait_for(browser, "document.querySelector('pre.log').textContent.includes('line 199999 ')")
+    browser.get(f"{url}/#{job.id}/log")
+    wait_for(browser, "document.querySelector('pre.log')?.textContent.includes('line 199999 ')")
     with open(log[0], "a", encoding="utf-8") as f:
         f.write("2026-01-01T00:00:00.000Z INFO the end\n")
     wait_for(browser, "document.querySelector('pre.log').textContent.endsWith('the end')", 30)

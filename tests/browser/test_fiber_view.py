@@ -75,7 +75,7 @@ def test_the_reader_chooses_the_colours(page, browser, tmp_path):
         "fit": {"model": "isotropic.v1", "fixed": {"C": [0.8, 0.5, 0.3]}}}))
     job = selvedge.Client(page).submit(str(tmp_path / "job.json"))
     assert job.wait().state == "succeeded"
-    browser.get(f"{page}/#{job.id}")
+    browser.get(f"{page}/#{job.id}/geometry")
     wait_for(browser, "document.querySelector('.view3d button')", 60)
     browser.execute_script("document.querySelector('.view3d button').click()")
     wait_for(browser, "document.querySelector('.view3d canvas') || document.querySelector('.view3d').textContent.includes('not available')")

@@ -8,7 +8,8 @@ import pytest
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
 import small_cloth  # noqa: E402
-from browser_page import click_on, complaints, keep, scrolls_sideways, sized, small_weave, start_daemon, stop_daemon, text_of, texts, wait_for  # noqa: E402
+from browser_page import (  # noqa: E402
+    click_on, complaints, keep, open_tab, scrolls_sideways, sized, small_weave, start_daemon, stop_daemon, text_of, texts, wait_for)
 from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
@@ -75,7 +76,7 @@ def percentile(picture):
 
 
 def open_page(browser, url, job):
-    browser.get(f"{url}/#{job.id}")
+    browser.get(f"{url}/#{job.id}/pictures")
     wait_for(browser, "document.querySelector('#pairs')")
     browser.execute_script("document.querySelector('#pairs .gallery').scrollIntoView()")
 
@@ -109,16 +110,18 @@ def test_exposures_of_the_gallery(fitted, browser):
 def test_bars_lead_to_pairs(fitted, browser):
     url, job, _ = fitted
     rows = job.result().raw["rows"]
-    open_page(browser, url, job)
+    browser.get(f"{url}/#{job.id}/rows")
+    wait_for(browser, "document.querySelectorAll('#residuals li').length")
     bars = texts(browser, "#residuals li")
-    assert all(row["name"] in bar and f"{100 * row['rel_error']:.1f} ±" in bar for row, bar in zip(rows, bars)) and len(bars) == len(rows)
+    hidden = [row["rel_error"] < 2 * row["rel_error_se"] for row in rows]
+    assert len(bars) == len(rows) and all(row["name"] in bar and ("below " in bar if low else f"{100 * row['rel_error']:.1f} ±" in bar)
+                                          for row, bar, low in zip(rows, bars, hidden)), bars
     assert all(("brighter" in bar) == (sum(row["rendered"]) > sum(row["measured"])) for row, bar in zip(rows, bars))
     browser.execute_script("const s = document.querySelector('#residual-order'); s.value = 'error'; s.dispatchEvent(new Event('change'))")
     worst = sorted(rows, key=lambda r: -r["rel_error"])
     assert [t.split()[0] for t in texts(browser, "#residuals .name")] == [r["name"] for r in worst]
-    assert browser.execute_script("return document.querySelector('#pair-viewer').hidden")
     click_on(browser, "#residuals button", 1)
-    wait_for(browser, f"document.querySelector('#pair-title').textContent.startsWith('{worst[1]['name']}')")
+    wait_for(browser, f"document.querySelector('#pair-title')?.textContent.startsWith('{worst[1]['name']}')")
     wait_for(browser, "document.querySelector('#pair-readout').textContent.includes('measured')")
     keep(browser, "pairs")
     press(browser, Keys.PAGE_DOWN)
@@ -126,6 +129,10 @@ def test_bars_lead_to_pairs(fitted, browser):
     wait_for(browser, f"document.querySelector('#pair-title').textContent.startsWith('{after}')")
     press(browser, Keys.ESCAPE)
     assert browser.execute_script("return document.querySelector('#pair-viewer').hidden")
+    # Back leads to the rows, in the order that was chosen
+    browser.back()
+    wait_for(browser, "document.querySelector('#residuals')")
+    assert browser.execute_script("return document.querySelector('#residual-order').value") == "error"
     assert complaints(browser) == []
 
 
@@ -223,8 +230,9 @@ def test_rows_without_photographs(fitted, browser):
     url, _, job = fitted
     row = job.result().raw["rows"][1]
     open_page(browser, url, job)
+    open_tab(browser, "rows")
     click_on(browser, "#residuals button", 1)
-    wait_for(browser, "document.querySelector('#pair-readout').textContent.includes('measured')")
+    wait_for(browser, "document.querySelector('#pair-readout')?.textContent.includes('measured')")
     assert texts(browser, "#pair-viewer figcaption") == ["measured (mean of the row)", "rendered"]
     assert near(values(text_of(browser, "#pair-readout span")), row["measured"])
     keep(browser, "pairs-of-a-table")

@@ -42,9 +42,8 @@ def volume(data):
 
 
 def open_page(browser, url, job):
-    browser.get(f"{url}/#{job.id}")
+    browser.get(f"{url}/#{job.id}/geometry")
     wait_for(browser, "document.querySelector('canvas.slice')")
-    wait_for(browser, "document.querySelectorAll('#files tr').length > 5")
     browser.execute_script("document.querySelector('canvas.slice').scrollIntoView({block: 'center'})")
     wait_for(browser, SHOWN)
 
@@ -229,7 +228,7 @@ def test_a_broken_file_says_so(scanned, browser):
     url, job = scanned
     browser.execute_cdp_cmd("Network.enable", {})
     browser.execute_cdp_cmd("Network.setBlockedURLs", {"urls": ["*z.slices"]})
-    browser.get(f"{url}/#{job.id}")
+    browser.get(f"{url}/#{job.id}/geometry")
     wait_for(browser, "document.querySelector('canvas.slice')")
     browser.execute_script("document.querySelector('canvas.slice').scrollIntoView()")
     wait_for(browser, "document.querySelector('#slices .fault').textContent")

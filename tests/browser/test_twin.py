@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import synthetic_twin  # noqa: E402
-from browser_page import complaints, keep, submit, wait_for  # noqa: E402
+from browser_page import complaints, keep, sized, submit, wait_for  # noqa: E402
 from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
@@ -36,12 +36,13 @@ def opened(stub, browser, request):
     url, folder = stub
     job = submit(url, folder, f"twin {getattr(request, 'param', 'above')} {len(list(folder.iterdir()))}")[0]
     browser.get(f"{url}/#{job.id}")
-    wait_for(browser, "document.querySelector('#twin-open')", 60)
+    wait_for(browser, "document.querySelector('#twin')", 60)
     return browser
 
 
 def press(browser, name):
-    browser.execute_script(f"document.getElementById('{name}').click()")
+    """Presses a button. Small tables open by themselves, so that the button that opens them may be gone."""
+    browser.execute_script(f"document.getElementById('{name}')?.click()")
 
 
 def test_the_twin_is_drawn_as_its_tables_say(opened):
@@ -122,8 +123,25 @@ def test_the_saved_file_shows_the_same_alone(opened, tmp_path):
     assert complaints(opened) == []
 
 
-def test_without_webgl_the_page_says_so(opened):
-    opened.execute_script("HTMLCanvasElement.prototype.getContext = () => null")
-    press(opened, "twin-open")
-    wait_for(opened, "document.querySelector('#twin .hint').textContent.includes('no WebGL 2')")
-    assert complaints(opened) == []
+def test_without_webgl_the_page_says_so(stub, browser):
+    url, folder = stub
+    job = submit(url, folder, f"twin above {len(list(folder.iterdir()))}")[0]
+    script = browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": "HTMLCanvasElement.prototype.getContext = () => null"})
+    browser.get(f"{url}/#{job.id}")
+    wait_for(browser, "document.querySelector('#twin .hint')?.textContent.includes('no WebGL 2')", 60)
+    browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", script)
+    assert complaints(browser) == []
+
+
+def test_a_narrow_page_asks_before_it_loads_the_tables(stub, browser):
+    url, folder = stub
+    job = submit(url, folder, f"twin above {len(list(folder.iterdir()))}")[0]
+    with sized(browser, 375, 800):
+        browser.get(f"{url}/#{job.id}")
+        wait_for(browser, "document.querySelector('#twin-open')", 60)
+        asked = "return performance.getEntriesByType('resource').filter((e) => e.name.endsWith('twin.bin')).length"
+        assert browser.execute_script(asked) == 0
+        press(browser, "twin-open")
+        wait_for(browser, "document.querySelector('canvas.twin-view')?.twin")
+        assert browser.execute_script(asked) == 1
+    assert complaints(browser) == []

@@ -12,7 +12,7 @@ def test_versions_of_an_edited_job(stub, browser):
     url, folder = stub
     job, _ = submit(url, folder, "run twice")
     job.wait(timeout_s=60)
-    browser.get(f"{url}/#{job.id}")
+    browser.get(f"{url}/#{job.id}/files")
     wait_for(browser, "document.querySelector('#files')")
     assert texts(browser, "#versions") == [], "one run has no earlier result"
     job.edit(lambda doc: doc.update(sample="run with coarser voxels", volume={"files": ["scan.tif"], "voxel_size_um": 2.5}))

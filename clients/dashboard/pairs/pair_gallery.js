@@ -1,9 +1,10 @@
 // All pairs of a job as small pictures. They are loaded when they come into view and kept small, so that a change of the exposure draws
 // them at once.
 import { el, percentWithError } from "../page_parts.js";
+import { PagedList } from "../paged_list.js";
 import { automaticExposure, draw, loadPicture, thumbnail, uniform } from "./linear_picture.js";
 
-const EDGE = 160, AT_ONCE = 3;
+const EDGE = 160, AT_ONCE = 3, SHOWN = 18;
 const degrees = (x) => (typeof x === "number" ? `${Number(x.toFixed(1))}°` : "–");
 const row = (name, value, title = "") => el("div", { class: "row", title }, el("span", {}, name), el("span", {}, value));
 
@@ -14,7 +15,8 @@ export class PairGallery {
     this.busy = 0;
     this.stop = new AbortController();
     this.pairs = list.map((c, i) => this.card(c, i, open));
-    this.node = el("div", { class: "gallery" }, this.pairs.map((p) => p.node));
+    this.node = el("div", { class: "gallery" });
+    this.pages = new PagedList(this.node, this.pairs.map((p) => p.node), SHOWN, "pairs").pages;
     this.seen = new IntersectionObserver((entries) => {
       for (const e of entries.filter((x) => x.isIntersecting)) {
         this.seen.unobserve(e.target);

@@ -1,5 +1,10 @@
 // The relative error of each row as a bar; a click leads to the row's pair.
 import { el, isNumber, percentWithError } from "../page_parts.js";
+import { PagedList } from "../paged_list.js";
+
+const SHOWN = 30;
+const degrees = (x) => (isNumber(x) ? `${Number(x.toFixed(1))}°` : "–");
+const whereOf = (a) => `light ${degrees(a.light_theta_deg)}, ${degrees(a.light_phi_deg)}; camera ${degrees(a.camera_theta_deg)}, ${degrees(a.camera_phi_deg)}; cloth turned ${a.all_rotations ? "by all angles" : degrees(a.cloth_rotation_deg)}`;
 
 const sum = (rgb) => rgb[0] + rgb[1] + rgb[2];
 
@@ -21,15 +26,14 @@ export function residualBars(list, open) {
         whisker.style.width = share(Math.min(4 * c.errorSe, c.error + 2 * c.errorSe));
       }
     }
-    return { i, c, node: el("li", {}, el("button", { type: "button", class: c.held ? "held" : "", onclick: () => open(i) },
+    return { i, c, node: el("li", {}, el("button", { type: "button", class: c.held ? "held" : "", title: whereOf(c.angles), onclick: () => open(i) },
       el("span", { class: "mono name" }, c.name, c.held ? [" ", el("span", { class: "tag" }, "held out")] : null), el("span", { class: "track" }, bar, whisker),
       el("span", { class: "number" }, percentWithError(c.error, c.errorSe, 1)), el("span", { class: "hint" }, side(c)))) };
   });
-  const box = el("ol", { class: "residuals", id: "residuals" }, rows.map((r) => r.node));
+  const box = el("ol", { class: "residuals", id: "residuals" }), pages = new PagedList(box, rows.map((r) => r.node), SHOWN, "rows");
   const order = el("select", { id: "residual-order", onchange: () => {
     const sorted = order.value === "error" ? [...rows].sort((a, b) => (b.c.error ?? -1) - (a.c.error ?? -1)) : rows;
-    box.append(...sorted.map((r) => r.node));
+    pages.reorder(sorted.map((r) => r.node));
   } }, el("option", { value: "rows" }, "as in the document"), el("option", { value: "error" }, "worst first"));
-  return el("details", { open: list.length <= 30 }, el("summary", {}, `Relative error of each of ${list.length} rows`),
-    el("p", { class: "hint" }, "Bars with two standard errors either way; held-out rows are hatched. A bar leads to its pictures. ", el("label", {}, "Order ", order)), box);
+  return [el("p", { class: "hint" }, "Bars with two standard errors either way; held-out rows are hatched. A bar leads to its pictures. ", el("label", {}, "Order ", order)), box, pages.pages];
 }

@@ -1,8 +1,10 @@
-// The record of a job: settings of its document, input files with sizes and SHA-256, versions and dates.
+// The record of a job: settings of its document, input files with sizes and SHA-256, versions and dates. Long tables
+// are shown a page at a time.
 import { flatten } from "../compare/compare_documents.js";
-import { el, size, timeOf } from "../page_parts.js";
+import { card, duration, el, isNumber, size, timeOf } from "../page_parts.js";
+import { PagedList } from "../paged_list.js";
 
-const OPEN = 14; // settings that are shown without a click
+const SHOWN = 20; // rows of a page
 
 const pair = (name, ...value) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, ...value));
 
@@ -17,27 +19,30 @@ function dates(job, about) {
     result && Number.isSafeInteger(result.seed) ? pair("seed", el("span", { class: "mono" }, String(result.seed))) : null,
     pair("created", timeOf(job.created_unix_s)), pair("started", timeOf(job.started_unix_s)), pair("finished", timeOf(job.finished_unix_s)),
     pair("changed", timeOf(job.updated_unix_s)),
+    isNumber(job.started_unix_s) && isNumber(job.finished_unix_s) ? pair("took", duration(job.finished_unix_s - job.started_unix_s)) : null,
+    job.peak_rss_bytes > 0 ? pair("memory", size(job.peak_rss_bytes)) : null,
     pair("fresh starts, attempts", `${job.generation}, ${job.attempt}`),
   ].filter(Boolean)));
 }
 
-function inputs(job) {
+export function inputsOf(job) {
   const files = job.files ?? [], missing = (job.missing_files ?? []).filter((name) => !files.some((f) => f.name === name));
   if (files.length + missing.length === 0) return el("p", { class: "hint" }, "This job has no input files.");
   const line = (f) => el("tr", {}, el("td", {}, f.state === "complete" ? el("a", { href: f.url, class: "mono", download: f.name }, f.name) : el("span", { class: "mono" }, f.name)),
     el("td", {}, f.role.replaceAll("_", " ")), el("td", { class: "number" }, size(f.size)),
     el("td", { class: "mono hash" }, f.state === "complete" ? f.sha256 ?? "–" : el("span", { class: "tag warn" }, `${size(f.offset)} have arrived`)));
-  return el("div", { class: "wide", tabIndex: 0, role: "region", "aria-label": "input files" }, el("table", { class: "record", id: "record-inputs" },
+  const body = el("tbody"), rows = [...files.map(line), ...missing.map((name) => el("tr", {}, el("td", { class: "mono" }, name), el("td", {}), el("td", {}), el("td", {}, el("span", { class: "tag warn" }, "missing"))))];
+  const pages = new PagedList(body, rows, SHOWN, "input files");
+  return el("div", {}, el("div", { class: "wide", tabIndex: 0, role: "region", "aria-label": "input files" }, el("table", { class: "record", id: "record-inputs" },
     el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "File"), el("th", { scope: "col" }, "What"), el("th", { scope: "col", class: "number" }, "Size"), el("th", { scope: "col" }, "SHA-256 of its bytes"))),
-    el("tbody", {}, files.map(line), missing.map((name) => el("tr", {}, el("td", { class: "mono" }, name), el("td", {}), el("td", {}), el("td", {}, el("span", { class: "tag warn" }, "missing")))))));
+    body)), pages.pages);
 }
 
 function settings(job) {
-  const rows = [...flatten(job.document ?? {})].map(([path, value]) => pair(el("span", { class: "mono" }, path), el("span", { class: "mono" }, value)));
-  const table = el("table", { class: "record", id: "record-settings" }, el("tbody", {}, rows));
-  const words = el("p", { class: "hint" }, "What the job document sets; for everything else the defaults of the version hold that computed the job.");
-  return rows.length <= OPEN ? [words, table] : [words, el("details", {}, el("summary", {}, `${rows.length} settings`), el("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": "settings" }, table))];
+  const body = el("tbody"), rows = [...flatten(job.document ?? {})].map(([path, value]) => pair(el("span", { class: "mono" }, path), el("span", { class: "mono" }, value)));
+  const pages = new PagedList(body, rows, SHOWN, "settings");
+  return [el("p", { class: "hint" }, "Settings of the job document; everything else has the default of the version that computed the job."),
+    el("table", { class: "record", id: "record-settings" }, body), pages.pages];
 }
 
-export const jobRecord = (job, about) => el("section", { class: "card", id: "record" }, el("h2", {}, "Settings, inputs, versions and dates"),
-  dates(job, about), el("h3", {}, "Inputs"), inputs(job), el("h3", {}, "Settings"), settings(job));
+export const jobRecord = (job, about) => el("div", { id: "record" }, card("Settings", ...settings(job)), card("Versions and dates", dates(job, about)));

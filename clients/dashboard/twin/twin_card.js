@@ -1,10 +1,11 @@
-// The twin on the page of a job: loads its tables when the user asks for it, and offers the page to download.
+// The twin on the page of a job: loads its tables at once where they are small and the page is wide, else when the user
+// asks for it, and offers the page to download.
 import { el, size } from "../page_parts.js";
 import { getJson, raw } from "../server_link.js";
 import { twinPage } from "./twin_download.js";
 import { TwinPanel, twinNote } from "./twin_panel.js";
 
-const MOST_PHOTOGRAPHS = 12;
+const MOST_PHOTOGRAPHS = 12, AT_ONCE_BYTES = 8e6, WIDE = "(min-width: 900px)";
 
 // Rows with a photograph; theirs are the angles in the frame of the cloth, which the twin does not turn.
 function photographsOf(compared, cropMm, exposure) {
@@ -37,16 +38,20 @@ export function twinCard(job, files, compared) {
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 60000);
   };
-  const open = async (event) => {
-    event.target.disabled = true;
+  let left = false;
+  const open = async () => {
+    start.disabled = true;
     try {
       data = await load(job, files, compared);
+      if (left) return;
       panel = new TwinPanel(box, data);
       note.replaceChildren(`${twinNote(panel.works, data.description)} `, el("button", { id: "twin-save", onclick: save }, "Save as one HTML file"));
     } catch (error) {
       note.replaceChildren(`The twin cannot be shown: ${error.message}.`);
     }
   };
-  note.append(el("button", { id: "twin-open", onclick: open }, `Turn, bend and light the cloth (${size(tables.size)})`));
-  return { box: el("div", { id: "twin" }, box, note), close: () => panel?.close() };
+  const start = el("button", { id: "twin-open", onclick: open }, `Turn, bend and light the cloth (${size(tables.size)})`);
+  note.append(start);
+  if (tables.size <= AT_ONCE_BYTES && matchMedia(WIDE).matches) open();
+  return { box: el("div", { id: "twin" }, box, note), close: () => { left = true; panel?.close(); } };
 }

@@ -1,6 +1,7 @@
 """A daemon and a page of the dashboard, for the tests in tests/browser. SELVEDGE_SCREENSHOTS=DIR keeps screenshots."""
 import contextlib
 import json
+import math
 import os
 import subprocess
 import sys
@@ -73,6 +74,25 @@ def click_on(browser, selector, index=0):
     """Clicks on one element of a selector, found and clicked in one script."""
     script = "const found = document.querySelectorAll(arguments[0]); found[arguments[1]]?.click(); return found.length"
     assert browser.execute_script(script, selector, index) > index, f"nothing on the page matches {selector}[{index}]"
+
+
+def open_tab(browser, name):
+    """Turns to a tab of the page of a job or of a comparison, by its link."""
+    wait_for(browser, f"document.querySelector('.tab-bar a[data-tab={name}]')")
+    click_on(browser, f".tab-bar a[data-tab={name}]")
+    wait_for(browser, f"document.querySelector('.tab-bar a.active')?.dataset.tab === '{name}'")
+
+
+def error_words(result, key):
+    """A relative error of a result as pages write it: with its standard error, or as a bound where noise hides it."""
+    value, se = result[key], result.get(f"{key}_se")
+    if not se:
+        return f"{100 * value:.2f} %"
+    if value >= 2 * se:
+        return f"{100 * value:.2f} ± {100 * se:.2f} %"
+    bound = 100 * (value + 2 * se)
+    unit = 10 ** (math.floor(math.log10(bound)) - 1)
+    return f"below {unit * math.ceil(bound / unit - 1e-9):.2g} %"
 
 
 @contextlib.contextmanager

@@ -1,5 +1,8 @@
 // Shows the quality of the job's geometry: the key figures, the length distribution, and a link to the full report.
-import { el, isNumber, percent, withError } from "./page_parts.js";
+import { el, isNumber, percent, withError } from "../page_parts.js";
+import { fiberKinds } from "../result_view.js";
+
+const SHOWN = 6; // figures
 
 const number = (x, digits = 3) => (isNumber(x) ? String(Number(x.toPrecision(digits))) : "–");
 const pair = (v, show) => (v ? v.map((x) => (isNumber(x) ? show(x) : "–")).join(" / ") : "–");
@@ -37,13 +40,26 @@ export function qualityRows(g) {
   return rows;
 }
 
+// Thick before thin, or dense before light: the content of a card, or null for a cloth whose fibers are of one kind.
+export function kindsTable(job) {
+  const kinds = fiberKinds(job);
+  if (kinds.length < 2) return null;
+  const cell = (text) => el("td", { class: "number" }, text);
+  const rows = kinds.map((k, i) => el("tr", {}, el("th", { scope: "row" }, `kind ${i + 1}`), cell(percent(k.density, 0)), cell(isNumber(k.radius) ? `${withError(k.radius, k.radiusError)} µm` : "–"), cell(String(k.n ?? "–")), cell(percent(k.share, 0))));
+  return [el("p", { class: "hint" }, "The scan shows fibers of different density or thickness. Densities are over those of the densest kind."),
+    el("div", { class: "wide", tabIndex: 0, role: "region", "aria-label": "kinds of fibers" }, el("table", { id: "fiber-kinds" },
+      el("thead", {}, el("tr", {}, el("td", {}), ["Density", "Radius", "Fibers", "Share of the length"].map((h) => el("th", { class: "number" }, h)))), el("tbody", {}, rows)))];
+}
+
 export function qualityCard(job, files) {
   const g = job.result?.geometry, find = (path) => files.find((f) => f.path === path);
   if (!g) return null;
   const plot = find("pictures/fiber-lengths.svg"), page = find("quality.html");
+  const table = (rows) => el("table", {}, el("tbody", {}, rows.map(([name, value, hint]) => el("tr", {}, el("td", {}, name, hint ? el("div", { class: "hint" }, hint) : ""), el("td", { class: "number" }, value)))));
+  const rows = qualityRows(g);
   return el("div", { id: "quality" },
     el("div", { class: "columns" },
-      el("table", {}, el("tbody", {}, qualityRows(g).map(([name, value, hint]) => el("tr", {}, el("td", {}, name, hint ? el("div", { class: "hint" }, hint) : ""), el("td", { class: "number" }, value))))),
+      el("div", {}, table(rows.slice(0, SHOWN)), rows.length > SHOWN ? el("details", {}, el("summary", {}, `${rows.length - SHOWN} more figures`), table(rows.slice(SHOWN))) : null),
       plot ? el("img", { src: plot.url, alt: "length distribution of the fibers", class: "plot", loading: "lazy" }) : null),
     page ? el("p", {}, el("a", { href: page.url, target: "_blank" }, "Full quality report")) : null);
 }

@@ -1,6 +1,6 @@
-// Shows results of a fit beyond its parameters: numbers of the cloth, gradient certificate, nuisance terms, gains of
-// photographs, textures, several starts and the next photograph.
-import { el, isNumber, percent, withError } from "./page_parts.js";
+// Shows results of a fit beyond its parameters, in three places: numbers of the cloth and comparisons beside the
+// parameters; gains, textures and the next photograph beside the rows; checks of the fit's inside beside the log.
+import { el, isNumber, percent, percentWithError, withError } from "../page_parts.js";
 
 function table(id, heads, rows) {
   return el("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": `table ${id}` }, el("table", { id }, el("thead", {}, el("tr", {}, heads.map((h) => el("th", { class: h.startsWith("#") ? "number" : null }, h.replace("#", ""))))), el("tbody", {}, rows)));
@@ -21,8 +21,8 @@ function gains(result) {
   const rows = (result.rows ?? []).filter((r) => isNumber(r.gain));
   if (!rows.length) return null;
   return el("div", {}, el("h3", {}, "Gain of each photograph"),
-    el("p", { class: "hint" }, `With these gains the relative RMS error over the fitted rows is ${percent(result.fit_rel_rms_with_gains, 2)}` +
-      (result.heldout_rel_rms_with_gains == null ? "." : `, over the held-out rows ${percent(result.heldout_rel_rms_with_gains, 2)}.`)),
+    el("p", { class: "hint" }, `With these gains the relative RMS error over the fitted rows is ${percentWithError(result.fit_rel_rms_with_gains, result.fit_rel_rms_with_gains_se)}` +
+      (result.heldout_rel_rms_with_gains == null ? "." : `, over the held-out rows ${percentWithError(result.heldout_rel_rms_with_gains, result.heldout_rel_rms_with_gains_se)}.`)),
     table("gains", ["Photograph", "#Gain ± standard error", ""], rows.map((r) => el("tr", {}, el("td", { class: "mono" }, r.name), number(withError(r.gain, r.gain_se)),
       el("td", {}, Math.abs(r.gain - 1) > 3 * r.gain_se && Math.abs(r.gain - 1) > 0.05 ? tag("differs from the others") : "")))));
 }
@@ -33,12 +33,16 @@ function textures(result) {
   const rows = (result.rows ?? []).filter((r) => r.texture);
   if (!rows.length) return null;
   const mean = (rgb) => (rgb[0] + rgb[1] + rgb[2]) / 3;
-  const scatter = (rgb) => Math.sqrt(Math.max(0, mean(rgb)));
+  // of a contrast that noise hides, the bound
+  const scatter = (rgb, se) => {
+    const contrast = mean(rgb), noise = mean(se);
+    return contrast < 2 * noise ? `below ${percent(Math.sqrt(Math.max(0, contrast) + 2 * noise), 1)}` : percent(Math.sqrt(contrast), 1);
+  };
   return el("div", {}, el("h3", {}, "Texture"),
     el("p", { class: "hint" }, `Scatter of the means of ${rows[0].texture.block_mm} mm blocks, in per cent of the mean.`),
     table("textures", ["Photograph", "Set", "#Measured", "#Rendered", ""], rows.map(({ name, set, texture: t }) => {
       const apart = Math.abs(mean(t.rendered) - mean(t.measured)), noise = Math.hypot(mean(t.rendered_se), mean(t.measured_se));
-      return el("tr", {}, el("td", { class: "mono" }, name), el("td", {}, set), number(percent(scatter(t.measured), 1)), number(percent(scatter(t.rendered), 1)),
+      return el("tr", {}, el("td", { class: "mono" }, name), el("td", {}, set), number(scatter(t.measured, t.measured_se)), number(scatter(t.rendered, t.rendered_se)),
         el("td", {}, apart > 3 * noise && apart > 0.3 * mean(t.measured) ? tag("differs") : ""));
     })));
 }
@@ -66,7 +70,7 @@ function skill(result) {
   if (!plain || !isNumber(plain.heldout_rel_rms)) return null;
   const better = result.skill.heldout_ratio < 1;
   return el("div", { id: "skill" }, el("h3", {}, "Skill ", tag(better ? "better than a plain BRDF" : "no better than a plain BRDF", better ? "good" : "warn")),
-    el("p", { class: "hint" }, `A plain BRDF that knows nothing of the cloth, fitted to the same rows, has a relative RMS error of ${percent(plain.heldout_rel_rms, 2)} over the held-out rows; this fit has ${percent(result.heldout_rel_rms, 2)}.`));
+    el("p", { class: "hint" }, `A plain BRDF that knows nothing of the cloth, fitted to the same rows, has a relative RMS error of ${percent(plain.heldout_rel_rms, 2)} over the held-out rows; this fit has ${percentWithError(result.heldout_rel_rms, result.heldout_rel_rms_se)}.`));
 }
 
 const SHOWN_CANDIDATES = 8;
@@ -99,16 +103,18 @@ function corrections(result) {
   const asked = without.asked_for;
   const scored = isNumber(without.heldout_gain), gains = scored && without.heldout_gain >= 2 * without.heldout_gain_se;
   const verdict = !scored ? null : gains ? tag("lower the held-out error", "good") : tag("not worth keeping", "warn");
-  const errors = (fit, heldout) => `${percent(fit, 2)} over the fitted rows${isNumber(heldout) ? `, ${percent(heldout, 2)} over the held-out rows` : ""}`;
+  const errors = (r) => `${percentWithError(r.fit_rel_rms, r.fit_rel_rms_se)} over the fitted rows${isNumber(r.heldout_rel_rms) ? `, ${percentWithError(r.heldout_rel_rms, r.heldout_rel_rms_se)} over the held-out rows` : ""}`;
   return el("div", { id: "corrections" }, el("h3", {}, "Corrections of the fibers ", verdict),
     el("p", { class: "hint" }, asked.length ? `The photographs ask for ${asked.join(", ")}. ` : "The photographs ask for none of these corrections. ",
-      `Relative RMS error without them: ${errors(without.fit_rel_rms, without.heldout_rel_rms)}; with them: ${errors(result.fit_rel_rms, result.heldout_rel_rms)}.`,
+      `Relative RMS error without them: ${errors(without)}; with them: ${errors(result)}.`,
       scored ? ` They ${without.heldout_gain < 0 ? "raise" : "lower"} the held-out error by ${percent(Math.abs(without.heldout_gain), 2)} ± ${percent(without.heldout_gain_se, 2)}.` : ""));
 }
 
-// Returns the content of the card, or null if there is nothing to show.
-export function fitDetails(job) {
-  if (!job.result) return null;
-  const parts = [skill, clothNumbers, corrections, certificate, nuisance, gains, textures, starts, nextPhotograph].map((part) => part(job.result)).filter((p) => p !== null);
-  return parts.length ? el("div", { id: "fit-details" }, parts) : null;
+// Returns these parts of the result, or null if there is nothing to show.
+function shown(job, parts) {
+  const made = job.result ? parts.map((part) => part(job.result)).filter((p) => p !== null) : [];
+  return made.length ? el("div", { class: "fit-details" }, made) : null;
 }
+export const fitBeside = (job) => shown(job, [skill, clothNumbers, corrections, nuisance]);
+export const fitOfRows = (job) => shown(job, [gains, textures, nextPhotograph]);
+export const fitInside = (job) => shown(job, [certificate, starts]);

@@ -1,9 +1,9 @@
-// Draws the curves of one fit from the incremental series: objective (log axis), relative RMS error, and one chart for
-// each parameter.
+// Draws the curves of one fit from the incremental series: relative error (log axis) and one chart for each parameter in
+// one place, the objective in another.
 import { CurveChart } from "./curve_charts.js";
-import { el } from "./page_parts.js";
-import { describedParameters, finite, parameterGroups } from "./result_view.js";
-import { getJson } from "./server_link.js";
+import { el } from "../page_parts.js";
+import { describedParameters, finite, parameterGroups } from "../result_view.js";
+import { getJson } from "../server_link.js";
 
 const BAND = 2; // standard errors
 const MAX_POINT = 200; // a chart has some 250 to 600 pixels; drawing takes time with each point
@@ -22,11 +22,13 @@ function block(title, tall) {
 }
 
 export class JobCharts {
-  constructor(fitCard, parameterCard) {
-    this.fitCard = fitCard;
-    this.parameterCard = parameterCard;
+  constructor() {
+    this.node = el("div", { class: "course" });
+    this.objectiveNode = el("div");
     this.reset(null);
   }
+
+  get drawn() { return this.charts.length > 0; }
 
   reset(generation) {
     this.destroy();
@@ -37,11 +39,12 @@ export class JobCharts {
     this.parameterCharts = null;
     this.models = [];
     this.chosen = null; // the model that the user has chosen
-    this.fitCard.replaceChildren(el("p", { class: "hint" }, "The curve appears when the fit has started."));
-    this.parameterCard.replaceChildren(el("p", { class: "hint" }, "The curves appear when the fit has started."));
+    this.node.replaceChildren();
+    this.objectiveNode.replaceChildren(el("p", { class: "hint" }, "The curve appears when the fit has started."));
   }
 
   async update(job) {
+    this.fits = Boolean(job.document?.photographs || job.document?.measurements);
     if (job.generation !== this.generation) this.reset(job.generation);
     for (let round = 0; round < 20; round++) {
       const series = await getJson(`/v1/jobs/${job.id}/series?after_step=${this.after}&max_points=${MAX_POINT}`);
@@ -84,8 +87,8 @@ export class JobCharts {
     this.destroy();
     this.shown = model;
     this.tabs = el("p", { class: "tabs", id: "models-shown" });
-    const objective = block("Objective f ± 2 s.e. (log)", true), rms = block("Relative RMS error of the fitted means, % (log)");
-    this.fitCard.replaceChildren(this.tabs, objective.box, rms.box);
+    const objective = block("Objective f ± 2 s.e. (log)", true), rms = block("Relative error of the fitted rows, % (log)");
+    this.objectiveNode.replaceChildren(objective.box);
     this.objective = new CurveChart(objective.node, objective.legend, ["f"], ["--accent"], { log: true });
     this.rms = new CurveChart(rms.node, rms.legend, ["%"], ["--warn"], { log: true, digits: 3 });
     const n = this.points.find((x) => (x.i_model ?? 0) === model)?.parameter?.length ?? 0;
@@ -97,9 +100,14 @@ export class JobCharts {
       return { group, box: part.box, chart: new CurveChart(part.node, part.legend, labels, colours, { digits: 4 }) };
     });
     const sets = [...new Set(this.parameterCharts.map((c) => c.group.set))];
-    this.parameterCard.replaceChildren(...sets.flatMap((set) => [sets.length > 1 ? el("h3", {}, set || "cloth") : "",
+    this.node.replaceChildren(this.tabs, rms.box, ...sets.flatMap((set) => [sets.length > 1 ? el("h3", {}, set || "cloth") : "",
       el("div", { class: "charts" }, this.parameterCharts.filter((c) => c.group.set === set).map((c) => c.box))]));
     this.charts = [this.objective, this.rms, ...this.parameterCharts.map((c) => c.chart)];
+  }
+
+  // To be called when the charts become visible: a chart in a hidden tab has no size.
+  resize() {
+    for (const chart of this.charts) chart.resize();
   }
 
   destroy() {

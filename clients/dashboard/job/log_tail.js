@@ -1,7 +1,7 @@
 // Shows the end of a job's log: starts 64 KiB before its end, keeps at most MAX_LINE lines, and follows it while the
 // reader is at the bottom. Earlier parts are read on request, a piece at a time.
-import { el, size } from "./page_parts.js";
-import { raw } from "./server_link.js";
+import { el, size } from "../page_parts.js";
+import { raw } from "../server_link.js";
 
 const MAX_LINE = 1000, START_BYTES = 65536, PIECE = 262144, MAX_PIECE_A_ROUND = 4;
 

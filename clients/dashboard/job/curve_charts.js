@@ -33,7 +33,13 @@ export class CurveChart {
     return values.map((v, i) => `${this.labels.length > 1 ? `${this.labels[i]} ` : ""}${v === null ? "–" : Number(v.toPrecision(digits))}`).join("   ");
   }
 
+  // The curves are drawn when the node is seen: without a size they cannot be.
   set(rows) {
+    this.rows = rows;
+    if (this.node.clientWidth > 0) this.draw(rows);
+  }
+
+  draw(rows) {
     const usable = rows.filter((r) => r.slice(1).some((v) => v !== null)), left = rows.length - usable.length;
     this.hidden.textContent = left === 0 ? "" : `${left} of ${rows.length} steps are not shown: ${this.options.log ? "no number above 0, which a log axis needs" : "no number"}`;
     if (usable.length === 0) return;
@@ -59,6 +65,13 @@ export class CurveChart {
       unhighlightCallback: () => { this.legend.textContent = this.formatLegend(this.last); },
       ...this.style(),
     });
+  }
+
+  // To be called when the node has become visible.
+  resize() {
+    if (this.node.clientWidth === 0 || !this.rows) return;
+    if (!this.graph) this.draw(this.rows);
+    else { this.graph.resize(); this.set(this.rows); }
   }
 
   destroy() {

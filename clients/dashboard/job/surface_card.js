@@ -1,6 +1,6 @@
 // Pictures of the cloth on surfaces, each as far as it is rendered: while the job runs they grow, and their noise falls.
-import { el, isNumber, percent } from "./page_parts.js";
-import { getJson, raw } from "./server_link.js";
+import { el, isNumber, percent } from "../page_parts.js";
+import { getJson, raw } from "../server_link.js";
 
 const degrees = (x) => `${Number((x ?? 0).toFixed(1))}°`;
 

@@ -1,0 +1,158 @@
+"""The page of a job: the result first, then tabs that stand in the address, of bounded height."""
+import pytest
+
+pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
+import selvedge  # noqa: E402
+from browser_page import (  # noqa: E402
+    click_on, complaints, keep, open_tab, scrolls_sideways, sized, small_weave, start_daemon, stop_daemon, submit, text_of, texts, wait_for)
+
+MOST_PX = 3000  # of the tallest tab, at 1280 pixels
+ACTIVE = "document.querySelector('.tab-bar a.active')?.dataset.tab"
+NAMES = "return [...document.querySelectorAll('.tab-bar a')].map((a) => a.dataset.tab)"
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    """A scan with 44 photographs, fitted with few paths: long tables of files, settings and rows."""
+    folder = tmp_path_factory.mktemp("tabs")
+    photographs = small_weave(folder, "--px", "24", "--paths", "512")
+    names = [p["file"] for p in photographs]
+    copies = [dict(p, file=f"again-{k}-{p['file']}") for k in range(2) for p in photographs[:14]]
+    for copy in copies:
+        (folder / copy["file"]).write_bytes((folder / copy["file"].split("-", 2)[2]).read_bytes())
+    document = {"sample": "many rows", "volume": {"files": ["scan.tif"], "voxel_size_um": 2.0}, "photographs": photographs[:18] + copies,
+                "fit": {"models": ["two_lobe.v1", "microflake.v1"], "path_budget": 60000, "render_px": 16, "render_samples": 2}}
+    assert len(names) >= 18
+    process, url = start_daemon(tmp_path_factory.mktemp("data"))
+    job = selvedge.Client(url).submit(document, str(folder))
+    assert job.wait().state == "succeeded"
+    yield url, job
+    stop_daemon(process)
+
+
+def test_the_result_comes_first(fitted, browser):
+    url, job = fitted
+    browser.get(f"{url}/#{job.id}")
+    wait_for(browser, "document.querySelector('#front img')?.naturalWidth > 0")
+    verdict = job.result().raw["verdict"]
+    assert verdict["text"] in text_of(browser, "#verdict") and len(texts(browser, "#key-numbers > div")) == 4
+    top = browser.execute_script("return document.querySelector('#key-numbers').getBoundingClientRect().bottom")
+    assert top < 900, "verdict, picture and numbers are seen without scrolling"
+    assert "objective" not in text_of(browser, "main").lower()
+    words = text_of(browser, "#key-numbers")
+    determined = sum(p["determined"] and not p["fixed"] for p in job.result().raw["parameters"])
+    assert f"{determined} of {sum(not p['fixed'] for p in job.result().raw['parameters'])}" in words
+    keep(browser, "front")
+    assert complaints(browser) == []
+
+
+def test_no_tab_is_tall(fitted, browser):
+    """Every tab of a job with 46 rows, at three widths; and the words of the fit's inside are in the log alone."""
+    url, job = fitted
+    browser.get(f"{url}/#{job.id}")
+    wait_for(browser, ACTIVE)
+    names = browser.execute_script(NAMES)
+    assert names == ["parameters", "pictures", "geometry", "rows", "files", "settings", "log"]
+    for name in names:
+        open_tab(browser, name)
+        for width in (1280, 375):
+            with sized(browser, width, 900):
+                assert scrolls_sideways(browser) == [], (name, width)
+                if width == 1280:
+                    tall = browser.execute_script("return document.documentElement.scrollHeight")
+                    assert tall <= MOST_PX, f"{name} has {tall} pixels"
+                keep(browser, f"tab-{name}-{width}", width, 900)
+        said = browser.execute_script("return document.querySelector('main').textContent").lower()
+        assert name == "log" or not any(word in said for word in ("objective", "fresh paths", "left out in turn")), name
+    assert complaints(browser) == []
+
+
+def test_back_and_scroll_position(fitted, browser):
+    url, job = fitted
+    browser.get(url + "/")
+    wait_for(browser, "document.querySelector('#jobs tbody tr a')")
+    click_on(browser, "#jobs tbody tr a")
+    wait_for(browser, f"{ACTIVE} === 'parameters'")
+    wait_for(browser, "document.querySelector('#parameters')")
+    open_tab(browser, "rows")
+    assert browser.current_url.endswith(f"#{job.id}/rows")
+    browser.execute_script("window.scrollTo(0, 700)")
+    wait_for(browser, "window.scrollY === 700")
+    browser.execute_async_script("setTimeout(arguments[0], 250)")
+    open_tab(browser, "files")
+    wait_for(browser, "window.scrollY < 1000")
+    browser.back()
+    wait_for(browser, f"{ACTIVE} === 'rows' && window.scrollY === 700")
+    # a poll in between changes neither the tab nor the place
+    browser.execute_script("document.dispatchEvent(new Event('visibilitychange'))")
+    browser.execute_async_script("setTimeout(arguments[0], 500)")
+    wait_for(browser, f"{ACTIVE} === 'rows' && window.scrollY === 700")
+    browser.back()
+    wait_for(browser, f"{ACTIVE} === 'parameters'")
+    browser.back()
+    wait_for(browser, "document.querySelector('#jobs tbody tr')")
+    browser.forward()
+    browser.forward()
+    wait_for(browser, f"{ACTIVE} === 'rows' && window.scrollY === 700")
+    # a reload keeps the tab
+    browser.refresh()
+    wait_for(browser, f"{ACTIVE} === 'rows'")
+    assert complaints(browser) == []
+
+
+def test_two_windows_of_one_job(fitted, browser):
+    url, job = fitted
+    browser.get(f"{url}/#{job.id}/files")
+    wait_for(browser, f"{ACTIVE} === 'files'")
+    first = browser.current_window_handle
+    browser.switch_to.new_window("tab")
+    browser.get(f"{url}/#{job.id}/settings")
+    wait_for(browser, f"{ACTIVE} === 'settings'")
+    open_tab(browser, "log")
+    second = browser.current_window_handle
+    browser.switch_to.window(first)
+    browser.execute_script("document.dispatchEvent(new Event('visibilitychange'))")
+    wait_for(browser, f"{ACTIVE} === 'files' && document.querySelector('#files tr')")
+    browser.switch_to.window(second)
+    wait_for(browser, f"{ACTIVE} === 'log'")
+    browser.close()
+    browser.switch_to.window(first)
+    assert complaints(browser) == []
+
+
+def test_only_tabs_with_content(stub, browser):
+    url, folder = stub
+    job, _ = submit(url, folder, "tabs of a failing one")
+    browser.get(f"{url}/#{job.id}")
+    wait_for(browser, ACTIVE)
+    job.wait()
+    wait_for(browser, f"{ACTIVE} === 'parameters'")
+    assert browser.execute_script(NAMES) == ["parameters", "files", "settings", "log"], "this stub has no rows, pictures and geometry"
+    browser.get(f"{url}/#{job.id}/geometry")
+    wait_for(browser, f"{ACTIVE} === 'parameters'")
+    failed, _ = submit(url, folder, "failing tabs")
+    browser.get(f"{url}/#{failed.id}")
+    wait_for(browser, "document.querySelector('.state.failed')")
+    wait_for(browser, f"{ACTIVE} === 'log'")
+    assert browser.execute_script(NAMES) == ["files", "settings", "log"]
+    assert complaints(browser) == []
+
+
+def test_errors_below_the_noise(stub, browser):
+    """An error that noise hides is a bound; others have their standard error."""
+    browser.get(stub[0] + "/")
+    wait_for(browser, "document.querySelector('#jobs, .hint')")
+    read = """const [pairs, done] = arguments;
+        import("/page_parts.js").then(({ percentWithError }) => done(pairs.map(([x, se]) => percentWithError(x, se))));"""
+    pairs = [[0, 0.009], [0.0002, 0.005], [0.047, 0.001], [0.02, 0.01], [0.0199, 0.01], [0.0123, None], [None, 0.1]]
+    assert browser.execute_async_script(read, pairs) == ["below 1.8 %", "below 1.1 %", "4.70 ± 0.10 %", "2.00 ± 1.00 %", "below 4 %", "1.23 %", "–"]
+
+
+def test_the_glossary(stub, browser):
+    browser.get(stub[0] + "/#glossary")
+    wait_for(browser, "document.querySelectorAll('#words tr').length >= 20")
+    words = texts(browser, "#words tr")
+    assert any(w.startswith("verdict") for w in words) and not any("**" in w or "`" in w or "](" in w for w in words)
+    assert "Azimuthal width of the transmitted lobe TT." in text_of(browser, "main")
+    keep(browser, "glossary")
+    assert complaints(browser) == []
