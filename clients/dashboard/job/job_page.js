@@ -156,6 +156,7 @@ class JobPage {
   // Another tab of the same job, from its address.
   turn(tab) {
     this.wanted = tab;
+    if (!tab) this.active = null;
     this.showTab().catch((error) => console.error(error));
   }
 

@@ -172,17 +172,17 @@ void gauss_newton_explain_end(const struct gauss_newton *g, bool precise, double
     const double ratio = g->run.problem->precision > 0.0 ? error_ratio(g) : 0.0;
     result->stop = precise ? STOP_ARRIVED : STOP_ARRIVED_WITHIN_PHOTOGRAPHS;
     if (precise)
-        snprintf(text, n, "further steps promise to lower the objective, %.3g with a noise of %.1g, by %g %%", f, se,
+        snprintf(text, n, "further steps promise to lower the sum of squared errors, %.3g with a noise of %.1g, by %g %%", f, se,
                  promised_percent(g));
     else if (ratio > 0.0)
         snprintf(text, n,
-                 "further steps promise to lower the objective by %g %%, and the noise of tracing makes %.2g times the "
+                 "further steps promise to lower the sum of squared errors by %g %%, and the noise of tracing makes %.2g times the "
                  "error of the fitted means that the photographs' own errors make",
                  promised_percent(g), ratio);
     else
         snprintf(
             text, n,
-            "further steps promise to lower the objective by %g %%, and tracing adds %.1f times the photographs' own "
+            "further steps promise to lower the sum of squared errors by %g %%, and tracing adds %.1f times the photographs' own "
             "variance; exact renderings would narrow the errors by some %.0f %%",
             promised_percent(g), noise_ratio(g), 100.0 * (1.0 - 1.0 / sqrt(1.0 + noise_ratio(g))));
 }
@@ -192,7 +192,7 @@ void gauss_newton_explain_misfit(const struct gauss_newton *g, double f, double 
     result->stop = STOP_MISFIT;
     snprintf(result->reason, sizeof result->reason,
              "what is left is a difference between model and measurements of about %.2g %%, more paths from this start "
-             "will not lower it: the objective is %.3g with a noise of %.1g",
+             "will not lower it: the sum of squared errors is %.3g with a noise of %.1g",
              100.0 * sqrt(linear_model_misfit(&g->model, g->n_free)), f, se);
 }
 
@@ -207,19 +207,19 @@ void gauss_newton_explain_early_end(const struct gauss_newton *g, const struct g
     result->stop = explained ? end->used_up : end->failed ? STOP_STEP_TAKEN_BACK : STOP_TOO_FEW_STEPS;
     if (result->converged)
         snprintf(text, n,
-                 "%s ended when further steps promised to lower the objective, %.3g with a noise of %.1g, by %g %%; "
+                 "%s ended when further steps promised to lower the sum of squared errors, %.3g with a noise of %.1g, by %g %%; "
                  "more paths "
                  "would narrow the errors",
                  used, f, se, promised_percent(g));
     else if (end->failed)
-        snprintf(text, n, "%s ended with a step that made the objective worse and was taken back", used);
+        snprintf(text, n, "%s ended with a step that made the sum of squared errors worse and was taken back", used);
     else if (end->arrived)
         snprintf(text, n, "%s ended after %zu steps: too few to tell whether the fit has arrived", used,
                  g->history.n_step);
     else
         snprintf(
             text, n,
-            "%s ended while further steps still promised to lower the objective, %.3g with a noise of %.1g, by about "
+            "%s ended while further steps still promised to lower the sum of squared errors, %.3g with a noise of %.1g, by about "
             "%.0f %%",
             used, f, se, promised_percent(g));
 }

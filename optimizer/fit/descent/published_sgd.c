@@ -175,7 +175,7 @@ static void judge(const struct winner *best, const struct rest_check *end, struc
                    : !at_rest ? STOP_STILL_MOVING
                               : rest_check_verdict(end);
     result->converged = result->stop == STOP_SCHEDULE;
-    int n = snprintf(result->reason, sizeof result->reason, "run %d of %d had the lowest objective%s; ",
+    int n = snprintf(result->reason, sizeof result->reason, "run %d of %d had the lowest sum of squared errors%s; ",
                      best->i_run + 1, N_RUN, at_end ? ", which is at the end of the bracket" : "");
     char *rest = result->reason + n;
     const size_t room = sizeof result->reason - (size_t)n;
@@ -186,7 +186,7 @@ static void judge(const struct winner *best, const struct rest_check *end, struc
     else
         snprintf(rest, room,
                  "its steps have a mean cosine of %.2f (below %.1f is at rest); further steps promise to lower the "
-                 "objective, %.3g, by %.2g with a noise of %.2g",
+                 "sum of squared errors, %.3g, by %.2g with a noise of %.2g",
                  best->turn, turn_limit, result->objective.value, end->promised, end->noise);
 }
 
