@@ -172,19 +172,21 @@ void gauss_newton_explain_end(const struct gauss_newton *g, bool precise, double
     const double ratio = g->run.problem->precision > 0.0 ? error_ratio(g) : 0.0;
     result->stop = precise ? STOP_ARRIVED : STOP_ARRIVED_WITHIN_PHOTOGRAPHS;
     if (precise)
-        snprintf(text, n, "further steps promise to lower the sum of squared errors, %.3g with a noise of %.1g, by %g %%", f, se,
+        snprintf(text, n,
+                 "further steps promise to lower the sum of squared errors, %.3g with a noise of %.1g, by %g %%", f, se,
                  promised_percent(g));
     else if (ratio > 0.0)
         snprintf(text, n,
-                 "further steps promise to lower the sum of squared errors by %g %%, and the noise of tracing makes %.2g times the "
+                 "further steps promise to lower the sum of squared errors by %g %%, and the noise of tracing makes "
+                 "%.2g times the "
                  "error of the fitted means that the photographs' own errors make",
                  promised_percent(g), ratio);
     else
-        snprintf(
-            text, n,
-            "further steps promise to lower the sum of squared errors by %g %%, and tracing adds %.1f times the photographs' own "
-            "variance; exact renderings would narrow the errors by some %.0f %%",
-            promised_percent(g), noise_ratio(g), 100.0 * (1.0 - 1.0 / sqrt(1.0 + noise_ratio(g))));
+        snprintf(text, n,
+                 "further steps promise to lower the sum of squared errors by %g %%, and tracing adds %.1f times the "
+                 "photographs' own "
+                 "variance; exact renderings would narrow the errors by some %.0f %%",
+                 promised_percent(g), noise_ratio(g), 100.0 * (1.0 - 1.0 / sqrt(1.0 + noise_ratio(g))));
 }
 
 void gauss_newton_explain_misfit(const struct gauss_newton *g, double f, double se, struct fit_result *result)
@@ -207,7 +209,8 @@ void gauss_newton_explain_early_end(const struct gauss_newton *g, const struct g
     result->stop = explained ? end->used_up : end->failed ? STOP_STEP_TAKEN_BACK : STOP_TOO_FEW_STEPS;
     if (result->converged)
         snprintf(text, n,
-                 "%s ended when further steps promised to lower the sum of squared errors, %.3g with a noise of %.1g, by %g %%; "
+                 "%s ended when further steps promised to lower the sum of squared errors, %.3g with a noise of %.1g, "
+                 "by %g %%; "
                  "more paths "
                  "would narrow the errors",
                  used, f, se, promised_percent(g));
@@ -217,9 +220,9 @@ void gauss_newton_explain_early_end(const struct gauss_newton *g, const struct g
         snprintf(text, n, "%s ended after %zu steps: too few to tell whether the fit has arrived", used,
                  g->history.n_step);
     else
-        snprintf(
-            text, n,
-            "%s ended while further steps still promised to lower the sum of squared errors, %.3g with a noise of %.1g, by about "
-            "%.0f %%",
-            used, f, se, promised_percent(g));
+        snprintf(text, n,
+                 "%s ended while further steps still promised to lower the sum of squared errors, %.3g with a noise of "
+                 "%.1g, by about "
+                 "%.0f %%",
+                 used, f, se, promised_percent(g));
 }

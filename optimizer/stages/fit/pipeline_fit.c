@@ -110,11 +110,11 @@ static void warn_of_starts(const struct fit_input *in, const struct pipeline_mod
 {
     for (size_t k = 0; k < m->fit->result.n_start; k++) {
         if (!m->fit->result.start[k].elsewhere) continue;
-        worker_status_warn(
-            in->job->tools->status,
-            "start %zu of the fit of %s ended at other parameters with a sum of squared errors (%.4g) that cannot be told "
-            "from the one kept: the photographs allow more than one solution",
-            k + 1, m->setup->appearance.id, m->fit->result.start[k].objective);
+        worker_status_warn(in->job->tools->status,
+                           "start %zu of the fit of %s ended at other parameters with a sum of squared errors (%.4g) "
+                           "that cannot be told "
+                           "from the one kept: the photographs allow more than one solution",
+                           k + 1, m->setup->appearance.id, m->fit->result.start[k].objective);
     }
 }
 
