@@ -105,7 +105,7 @@ static void warn_of_equals(struct worker_status *st, const struct pipeline_model
             describe(&model[best], choice, name);
             used = (size_t)snprintf(
                 text, sizeof text, "the %s do not tell %s from",
-                choice == CHOICE_CROSS_VALIDATION ? "fitted rows, left out in turn," : "fitted rows", name);
+                choice == CHOICE_CROSS_VALIDATION ? "fitted rows, cross-validated," : "fitted rows", name);
         }
         describe(&model[i], choice, name);
         used += (size_t)snprintf(text + used, sizeof text - used, " %s", name);
