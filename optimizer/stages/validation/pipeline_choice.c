@@ -103,9 +103,9 @@ static void warn_of_equals(struct worker_status *st, const struct pipeline_model
         if (i == best || !(more < 2.0 * se)) continue;
         if (used == 0) {
             describe(&model[best], choice, name);
-            used = (size_t)snprintf(
-                text, sizeof text, "the %s do not tell %s from",
-                choice == CHOICE_CROSS_VALIDATION ? "fitted rows, cross-validated," : "fitted rows", name);
+            used = (size_t)snprintf(text, sizeof text, "the %s do not tell %s from",
+                                    choice == CHOICE_CROSS_VALIDATION ? "fitted rows, cross-validated," : "fitted rows",
+                                    name);
         }
         describe(&model[i], choice, name);
         used += (size_t)snprintf(text + used, sizeof text - used, " %s", name);
