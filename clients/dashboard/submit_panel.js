@@ -7,6 +7,7 @@ import { el, size } from "./page_parts.js";
 import { Problem, raw, sendJson } from "./server_link.js";
 import { AngleGrid, unplaced } from "./submit/angle_grid.js";
 import { exampleOffer } from "./submit/example_job.js";
+import { exposureFault, nameFault } from "./submit/file_faults.js";
 import { fileLines } from "./submit/file_list.js";
 import { guessedKinds, kindOfJson } from "./submit/guessed_kinds.js";
 import { forgetUpload, offerUpload, rememberUpload } from "./submit/interrupted_upload.js";
@@ -40,7 +41,8 @@ class SubmitPanel {
     this.preset = null;
     this.statesVoxel = true;
     this.table = null; // the head of the table
-    this.notes = [];
+    this.notes = []; // on files that a job cannot use besides the others
+    this.twice = null; // a sentence on names that several files have
     this.open = []; // what must be known and is not
     this.busy = false;
     // kept while the document is the same, so that another try continues an interrupted submit
@@ -156,7 +158,8 @@ class SubmitPanel {
     this.questions.node.classList.toggle("hidden", !this.written || (this.dropped.size === 0 && this.picked === null));
     this.example.classList.toggle("hidden", !this.written || this.dropped.size > 0 || this.source !== null);
     this.open = this.written ? this.questionsLeft(doc) : [];
-    this.remarks.replaceChildren(...this.notes.map((text) => el("p", { class: "note" }, text)), ...this.tableNotes());
+    const pictures = [...this.dropped.values()].filter((file) => this.kinds.get(file.name) === "photograph");
+    this.remarks.replaceChildren(...[...this.notes, this.twice, exposureFault(pictures)].filter(Boolean).map((text) => el("p", { class: "note" }, text)), ...this.tableNotes());
     this.rig.show(this.doc, locked);
     this.grid.show(locked ? null : this.doc, this.rig.rig !== null && (doc.photographs ?? []).every((p) => p.view !== undefined));
     this.allow();
@@ -218,6 +221,7 @@ class SubmitPanel {
 
   async take(files, folder = "") {
     this.accepted = null;
+    this.twice = nameFault([...files]);
     for (const file of files) {
       this.dropped.set(file.name, file);
       if (!file.name.endsWith(".json")) { this.check.file(file); continue; }

@@ -72,6 +72,7 @@ def test_the_document_is_written_from_the_files(stub, browser, tmp_path):
     assert browser.execute_script("return document.querySelector('#presets :checked').value") == "scan_photographs"
     assert browser.execute_script("return document.querySelector('#send').disabled")
     answer(browser, "voxel", "2,5")
+    answer(browser, "edition", "from_2014")
     answer(browser, "sample", "twill of the files")
     wait_for(browser, "!document.querySelector('#send').disabled")
     assert text_of(browser, "#send-state") == "Ready." and texts(browser, "#faults li") == []
@@ -84,7 +85,7 @@ def test_the_document_is_written_from_the_files(stub, browser, tmp_path):
     made = selvedge.Client(url).job(browser.execute_script("return location.hash.slice(1)")).state().raw
     document = made["document"]
     assert document["volume"] == {"files": ["scan.tif"], "voxel_size_um": 2.5} and document["sample"] == "twill of the files"
-    assert document["camera"] == {"dark_frames": ["dark-1.dng"]} and document["color"] == {"chart": {"file": "chart.png"}}
+    assert document["camera"] == {"dark_frames": ["dark-1.dng"]} and document["color"] == {"chart": {"file": "chart.png", "edition": "from_2014"}}
     assert document["photographs"][5] == {"file": "t45_p90.png", "light_theta_deg": 45, "light_phi_deg": 90, "camera_theta_deg": 0, "camera_phi_deg": 0}
     assert {f["name"]: f["role"] for f in made["files"]}["chart.png"] == "chart" and len(made["files"]) == len(NAMES)
     assert complaints(browser) == []
@@ -92,7 +93,8 @@ def test_the_document_is_written_from_the_files(stub, browser, tmp_path):
 
 @pytest.mark.parametrize("names", [
     NAMES, ["a.hair", "rows.csv", "white-card.png"], ["weave.wif", "lt20_lp0_ct0_cp0_r90.exr", "lt45_lp0_ct0_cp0_r0.exr"],
-    ["scan.mhd", "scan.raw", "table.binary"], ["slice_01.tif", "slice_02.tif", "slice_10.tif", "t20_p0.png", "t45.5_p0.png"],
+    ["scan.mhd", "scan.raw", "table.binary"], ["slice_01.tif", "slice_02.tif", "slice_10.tif", "t20_p0.png", "t20.5_p0.png"],
+    ["s2.tif", "s10.tif", "s1.tif", "b.png", "A.png"],
     ["yarn.hair", "t45_p0-1.exr", "t45_p0-2.exr", "t60_p0-1.exr", "t60_p0-2.exr"]])
 def test_the_same_document_as_the_shell_writes(stub, browser, tmp_path, names):
     url, _ = stub
@@ -119,6 +121,27 @@ def test_a_guess_is_changed(stub, browser, tmp_path):
     assert [p["file"] for p in written(browser)["photographs"]] == ["cloth.png"] and kinds(browser)["other.png"] == "unused"
     browser.execute_script(choose, "chart")
     assert written(browser)["color"] == {"chart": {"file": "other.png"}} and written(browser)["cloth"] == {"draft_file": "weave.wif"}
+    assert complaints(browser) == []
+
+
+def jpeg_with_exposure(path, seconds):
+    """The head of a JPEG with an Exif directory that states the exposure time, as cameras write it."""
+    exif = b"MM\0*\0\0\0\x08" + struct.pack(">HHHII", 1, 0x8769, 4, 1, 26) + bytes(4)
+    exif += struct.pack(">HHHII", 1, 0x829A, 5, 1, 44) + bytes(4) + struct.pack(">II", 1, round(1 / seconds))
+    path.write_bytes(b"\xff\xd8\xff\xe1" + struct.pack(">H", len(exif) + 8) + b"Exif\0\0" + exif + b"\xff\xd9")
+    return path
+
+
+def test_faults_of_the_files_together(stub, browser, tmp_path):
+    url, _ = stub
+    (tmp_path / "deeper").mkdir()
+    without = tmp_path / "t60_p0.jpg"
+    without.write_bytes(b"\xff\xd8\xff\xd9" + bytes(16))
+    paths = [jpeg_with_exposure(tmp_path / f"t{t}_p0.jpg", 1 / 60) for t in (20, 45)]
+    browser.get(url + "/#new")
+    drop(browser, [*sample(tmp_path, ["cloth.hair"]), *paths, without, *sample(tmp_path / "deeper", ["cloth.hair"])])
+    wait_for(browser, "document.querySelector('#file-notes').textContent.includes('1 of 3 photographs do not state their exposure (t60_p0.jpg)')")
+    assert "1/60 s" in text_of(browser, "li[data-file='t20_p0.jpg']") and "Several files have the name cloth.hair" in text_of(browser, "#file-notes")
     assert complaints(browser) == []
 
 
@@ -231,9 +254,11 @@ def test_no_scanner_asks_for_the_weave(stub, browser, tmp_path):
     drop(browser, sample(tmp_path, ["t20_p0.png", "t45_p0.png"]))
     answer(browser, "weave", "twill")
     answer(browser, "warp", "24")
+    answer(browser, "scale", "0.9")
     answer(browser, "sample", "described")
     wait_for(browser, "!document.querySelector('#send').disabled")
     assert written(browser)["cloth"] == {"weave": "twill", "warp_per_cm": 24}
+    assert [p["scale"] for p in written(browser)["photographs"]] == [0.9, 0.9]
     assert browser.execute_script("return document.querySelector('#ask-voxel').offsetParent === null")
     assert complaints(browser) == []
 

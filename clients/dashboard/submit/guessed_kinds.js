@@ -17,7 +17,17 @@ const HEADER = /\.(mhd|nhdr|hdr)$/, DATA = /\.(raw|img|zraw|raw\.gz|bin)$/;
 const BY_WORD = [["dark", "dark"], ["flat", "flat"], ["chart", "chart"], ["colorchecker", "chart"], ["white", "white"], ["grey", "white"]];
 
 export const endingOf = (name) => /\.([^.]{1,12})$/.exec(name.toLowerCase())?.[1] ?? "";
-export const byName = new Intl.Collator("en", { numeric: true }).compare;
+
+// The order of names: numbers in them count as numbers, as in base/natural_order.c.
+export function byName(a, b) {
+  const parts = (text) => text.match(/\d+|\D/g) ?? [], p = parts(a), q = parts(b);
+  for (let i = 0; i < Math.min(p.length, q.length); i++) {
+    if (/^\d/.test(p[i]) && /^\d/.test(q[i])) {
+      if (Number(p[i]) !== Number(q[i])) return Number(p[i]) - Number(q[i]);
+    } else if (p[i] !== q[i]) return p[i] < q[i] ? -1 : 1;
+  }
+  return p.length - q.length || (a < b ? -1 : Number(a > b));
+}
 
 // The kind of a JSON file by its text.
 export function kindOfJson(text) {

@@ -28,6 +28,13 @@ const QUESTIONS = [
     asked: (doc) => bent(doc).length > 0, needed: () => false, get: (doc) => bent(doc)[0]?.transfer ?? "",
     set: (doc, text) => { for (const p of bent(doc)) if (text) p.transfer = text; else delete p.transfer; },
     hint: "A picture that does not declare its curve is refused without this." },
+  { id: "edition", label: "The color chart was made", choices: { "": "before November 2014", from_2014: "in November 2014 or later" }, keys: ["color", "chart", "edition"], read: (text) => text || undefined,
+    asked: (doc) => Boolean(doc.color?.chart?.file), needed: () => false, hint: "The year is on its back; the white patches differ by 4 %." },
+  { id: "reflectance", label: "Reflectance of the white card", example: "0.99", keys: ["color", "white", "reflectance"], read: numberOf, asked: (doc) => Boolean(doc.color?.white?.file), needed: () => false,
+    hint: "Empty: 0.99, as of sintered PTFE." },
+  { id: "scale", label: "Radiance of a pixel value of 1", example: "0.92", asked: (doc) => (doc.photographs ?? []).length > 0 && !doc.color, needed: () => false, get: (doc) => doc.photographs[0]?.scale,
+    set: (doc, text) => { const scale = numberOf(text); for (const p of doc.photographs) if (typeof scale === "number") p.scale = scale; else delete p.scale; },
+    hint: "A white diffuser that faces the lamp has 1. A photograph of a color chart or a white card, dropped here, says it better." },
 ];
 
 export class Questions {
@@ -54,9 +61,10 @@ export class Questions {
     const missing = [];
     this.doc = doc;
     for (const [q, { input, line }] of this.lines) {
-      const asked = q.asked(doc, about), value = q.get ? q.get(doc) : valueAt(doc, q.keys);
+      const asked = q.asked(doc, about);
       line.classList.toggle("hidden", !asked);
       if (!asked) continue;
+      const value = q.get ? q.get(doc) : valueAt(doc, q.keys);
       const text = value === undefined || typeof value === "object" && !Array.isArray(value) ? "" : Array.isArray(value) ? value.join(" ") : String(value);
       if (document.activeElement !== input || input.tagName === "SELECT") input.value = text;
       const isMissing = value === undefined && q.needed(doc, about);

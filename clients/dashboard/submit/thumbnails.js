@@ -1,7 +1,7 @@
 // Small pictures of dropped files: of PNG, JPEG and raw files with a preview by the browser; of others a sign with their ending.
 import { el } from "../page_parts.js";
 import { endingOf } from "./guessed_kinds.js";
-import { exposureWords, readExif } from "./exif_reader.js";
+import { readExif } from "./exif_reader.js";
 
 const WIDTH = 56, HEIGHT = 42, SHOWN = new Set(["png", "jpg", "jpeg"]), WITH_TAGS = new Set(["jpg", "jpeg", "tif", "tiff", "dng", "nef", "cr2", "arw", "pef"]);
 const made = new WeakMap(), exposures = new WeakMap();
@@ -11,10 +11,13 @@ let last = Promise.resolve();
 /** @returns {{exposure_s?: number, aperture?: number, iso?: number, preview?: Blob}} */
 export const exposureOf = (file) => exposures.get(file) ?? {};
 
+// Whether the tags of a file were read, which may be none; false for formats that a browser cannot judge.
+export const hasReadTags = (file) => WITH_TAGS.has(endingOf(file.name)) && exposures.has(file);
+
 async function fill(file, canvas, sign, changed) {
   const ending = endingOf(file.name), exif = WITH_TAGS.has(ending) ? await readExif(file) : {};
   exposures.set(file, exif);
-  if (exposureWords(exif)) changed();
+  if (WITH_TAGS.has(ending)) changed();
   const source = SHOWN.has(ending) ? file : exif.preview;
   if (!source) return;
   const picture = await createImageBitmap(source, { resizeHeight: 2 * HEIGHT, resizeQuality: "medium" });
