@@ -1,6 +1,7 @@
 #include "server/access/access_registry.h"
 #include "base/clock.h"
 #include "server/access/access_secret.h"
+#include "server/store/store_share.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -82,6 +83,18 @@ status access_find(struct access_registry *d, const char *secret, bool is_sessio
         q->requests_per_minute == QUOTA_DEFAULT ? t->requests_per_minute : q->requests_per_minute;
     grant->quota.stored_bytes = q->stored_bytes == QUOTA_DEFAULT ? t->stored_bytes : q->stored_bytes;
     grant->quota.jobs = q->jobs == QUOTA_DEFAULT ? t->jobs_of_owner : q->jobs;
+    return STATUS_OK;
+}
+
+status access_find_share(struct access_registry *d, const char *secret, struct access_grant *grant, struct error *err)
+{
+    unsigned char hash[STORE_SECRET_HASH_BYTES];
+    struct share_row row;
+    access_secret_hash(secret, hash);
+    status s = store_share_find(d->store, hash, clock_wall_s(), &row, err);
+    if (s != STATUS_OK) return s;
+    *grant = (struct access_grant){.scope = ACCESS_READ};
+    memcpy(grant->job, row.job_id, sizeof grant->job);
     return STATUS_OK;
 }
 

@@ -15,6 +15,7 @@ struct access_grant {
     char token_id[STORE_ID_BYTES]; /* "": none */
     char name[STORE_OWNER_BYTES], owner[STORE_OWNER_BYTES];
     struct access_quota quota; /* in effect; 0: no limit */
+    char job[STORE_ID_BYTES];  /* of a link that shows this job alone; "": a token's, or everyone's */
 };
 
 struct access_registry;
@@ -32,6 +33,9 @@ struct access_grant access_grant_of_everyone(void);
 /* The grant of a token, or of a session. STATUS_NOT_FOUND when it is unknown, revoked or has ended. */
 status access_find(struct access_registry *registry, const char *secret, bool is_session, struct access_grant *grant,
                    struct error *err);
+/* The grant of a link's secret: it reads one job. STATUS_NOT_FOUND when the link is unknown, revoked or has ended. */
+status access_find_share(struct access_registry *registry, const char *secret, struct access_grant *grant,
+                         struct error *err);
 /* Counts a request at the monotonic time now_s. Returns 0, or after how many seconds (at least 1) it may be tried
  * again, when the quota of requests is used up. A token may use up the requests of a minute at once. */
 long long access_count(struct access_registry *registry, const struct access_grant *grant, double now_s);

@@ -18,6 +18,26 @@ static const char *secret_of(const struct http_request *r, bool *is_session)
     return header + strspn(header, " ");
 }
 
+/* The requests that a link allows: those that read its job and the results of it. */
+static bool is_shared(const struct http_route *route)
+{
+    static const char *const path[] = {"/v1/jobs/{id}", "/v1/jobs/{id}/results", "/v1/jobs/{id}/results/{path...}",
+                                       "/v1/jobs/{id}/results.tar"};
+    for (size_t i = 0; i < sizeof path / sizeof *path; i++)
+        if (strcmp(route->method, "GET") == 0 && strcmp(route->path, path[i]) == 0) return true;
+    return false;
+}
+
+/* Finds the grant of a link to the job of the request: its secret is a bearer token, or the cookie of links. */
+static bool find_share(struct http_request *r, struct access_grant *grant)
+{
+    bool is_session;
+    const char *secret = secret_of(r, &is_session);
+    if (is_session) secret = MHD_lookup_connection_value(r->connection, MHD_COOKIE_KIND, ACCESS_SHARE_COOKIE);
+    return secret != NULL && is_shared(r->route) && access_find_share(r->registry, secret, grant, NULL) == STATUS_OK &&
+           strcmp(grant->job, r->param[0]) == 0;
+}
+
 static void refuse(struct http_request *r, const char *challenge, const char *detail)
 {
     reply_code(r, "token", "Authorization", detail);
@@ -104,6 +124,7 @@ bool guard_access(struct http_request *r)
         return false;
     }
     if (!required) return true;
+    if (find_share(r, &r->grant)) return true;
     r->grant = (struct access_grant){.scope = ACCESS_OPEN};
     return find_grant(r, &r->grant) && within_rate(r) && within_scope(r) && is_own(r);
 }
@@ -111,5 +132,10 @@ bool guard_access(struct http_request *r)
 bool guard_access_still(struct http_request *r)
 {
     struct access_grant now;
+    if (r->grant.job[0] != '\0' && find_share(r, &now)) return true;
+    if (r->grant.job[0] != '\0') {
+        refuse(r, "Bearer realm=\"selvedge\"", "the link has ended or was revoked");
+        return false;
+    }
     return r->grant.token_serial == 0 || find_grant(r, &now);
 }

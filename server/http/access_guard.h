@@ -7,6 +7,8 @@
 #include "server/http/http_request.h"
 
 #define ACCESS_COOKIE "selvedge_session"
+/* The secret of a link that shows one job (server/store/store_share.h). */
+#define ACCESS_SHARE_COOKIE "selvedge_share"
 
 /* Sets request->grant; returns false after deciding a 401, 403, 404, 429 or 500. */
 bool guard_access(struct http_request *request);

@@ -225,6 +225,10 @@ def test_every_operation_answers_as_documented(daemon, daemon_maker):
         json.dump({"sample": "s", "model": "isotropic.v1", "parameters": [{"name": f"C.{c}", "set": None, "value": 0.5} for c in "rgb"], "rows": []}, f)
     call("deriveJob", "POST", f"/v1/jobs/{job}/derive", json={"pictures": [{"on": "mesh", "mesh_file": "a.obj", "light_theta_deg": 45, "light_phi_deg": 0,
                                                                             "camera_theta_deg": 30, "camera_phi_deg": 180}]})
+    made = call("makeShare", "POST", f"/v1/jobs/{job}/shares", json={}).json()
+    call("listShares", "GET", f"/v1/jobs/{job}/shares")
+    call("openShare", "POST", "/v1/shared", json={"secret": made["secret"]})
+    call("revokeShare", "DELETE", f"/v1/jobs/{job}/shares/{made['id']}")
     call("keepJob", "PUT", f"/v1/jobs/{job}/keep")
     call("unkeepJob", "DELETE", f"/v1/jobs/{job}/keep")
     call("planRetention", "GET", "/v1/retention?max_bytes=1")

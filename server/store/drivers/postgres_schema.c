@@ -102,8 +102,15 @@ static const char *const version_2[] = {
     " END $$;",
     NULL};
 
+/* Links that show one job to whoever has them. */
+static const char *const version_3[] = {"CREATE TABLE share (" SERIAL ", job_id" TEXT_COLUMN ", made_by" TEXT_COLUMN
+                                        ", hash BYTEA NOT NULL UNIQUE, created" REAL_COLUMN ", expires" REAL_COLUMN
+                                        ", revoked" REAL_COLUMN ");"
+                                        "CREATE INDEX share_job ON share (job_id, serial);",
+                                        NULL};
+
 /* Entry i changes the schema from version i to version i + 1, by one script after the other. */
-static const char *const *const migration[] = {version_1, version_2};
+static const char *const *const migration[] = {version_1, version_2, version_3};
 
 const char *const *const *store_postgres_migrations(int *n)
 {

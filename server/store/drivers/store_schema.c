@@ -166,6 +166,11 @@ static const char *const migration[] = {
     " tries, next, status, error, delivered, owner, verdict) VALUES (NEW.id || '.' || NEW.revision, NEW.id, NEW.state,"
     " NEW.sample, NEW.attempt, NEW.error_code, NEW.error_field, NEW.error_text, NEW.updated, 0, 0, NEW.updated, 0, '',"
     " 0, NEW.owner, CASE NEW.state WHEN 4 THEN NEW.verdict ELSE '' END); END;",
+    /* links that show one job to whoever has them */
+    "CREATE TABLE share (serial INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, job_id TEXT NOT NULL,"
+    " made_by TEXT NOT NULL, hash BLOB NOT NULL UNIQUE, created REAL NOT NULL, expires REAL NOT NULL,"
+    " revoked REAL NOT NULL);"
+    "CREATE INDEX share_job ON share (job_id, serial);",
 };
 
 const char *const *store_migrations(int *n)
