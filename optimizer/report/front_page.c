@@ -118,7 +118,7 @@ static void print_fit_numbers(const json_t *result, FILE *out)
         n_known += is_free && json_is_true(json_object_get(item, "determined"));
     }
     open_number(text, out);
-    page_with_error(json_object_get(verdict, "rel_rms"), json_object_get(verdict, "rel_rms_se"), 100.0, " %", out);
+    page_percent(verdict, "rel_rms", out);
     close_number(out);
     open_number("parameters determined", out);
     fprintf(out, "%zu of %zu", n_known, n_free);

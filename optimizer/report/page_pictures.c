@@ -158,7 +158,7 @@ static status put_figure(const struct report *report, size_t i, const json_t *ro
     fputs("<br><b>", out);
     page_escaped(page_string(row, "name"), out);
     fprintf(out, "</b> (%s), error ", page_string(row, "set"));
-    page_with_error(json_object_get(row, "rel_error"), json_object_get(row, "rel_error_se"), 100.0, " %", out);
+    page_percent(row, "rel_error", out);
     fputs("</figcaption></figure>\n", out);
     if (has_photograph) image_release(&photograph);
     image_release(&rendering);

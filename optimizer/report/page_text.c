@@ -1,4 +1,5 @@
 #include "optimizer/report/page_text.h"
+#include "base/percent_words.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -62,6 +63,24 @@ void page_with_error(const json_t *value, const json_t *se, double factor, const
         fprintf(out, "%.*f &plusmn; %.*f%s", digits, x, digits, e, unit);
     else
         fprintf(out, "%.4g%s", x, unit);
+}
+
+void page_percent(const json_t *object, const char *key, FILE *out)
+{
+    char key_se[64], text[PERCENT_WORDS_BYTES];
+    const json_t *value = json_object_get(object, key), *se;
+    snprintf(key_se, sizeof key_se, "%s_se", key);
+    se = json_object_get(object, key_se);
+    if (!json_is_number(value)) {
+        fputs("&ndash;", out);
+        return;
+    }
+    percent_words(json_number_value(value), json_is_number(se) ? json_number_value(se) : NAN, text);
+    const char *sign = strstr(text, "+-");
+    if (sign == NULL)
+        fputs(text, out);
+    else
+        fprintf(out, "%.*s&plusmn;%s", (int)(sign - text), text, sign + 2);
 }
 
 static void object_rows(const char *prefix, const json_t *object, FILE *out)

@@ -9,6 +9,9 @@
 void page_escaped(const char *text, FILE *out);
 /* A value of JSON as people read it: text, number, yes or no, list "a, b"; "-" for null and for missing values. */
 void page_value(const json_t *value, FILE *out);
+/* The relative error `key` of an object with its standard error `key`_se, in words: "4.7 &plusmn; 0.1 %", "below 1.1 %"
+ * (base/percent_words.h); "-" for a value that is no number. */
+void page_percent(const json_t *object, const char *key, FILE *out);
 /* "2.41 &plusmn; 0.05", in units of 1 / factor (100 for per cent); "-" for values that are no numbers. */
 void page_with_error(const json_t *value, const json_t *se, double factor, const char *unit, FILE *out);
 /* A table of the members of an object, members of objects inside as "a.b"; long lists are left out. */

@@ -27,10 +27,8 @@ static void print_time(const char *label, double unix_s, FILE *out)
 
 static void error_row(const json_t *result, const char *label, const char *key, FILE *out)
 {
-    char key_se[64];
-    snprintf(key_se, sizeof key_se, "%s_se", key);
     fprintf(out, "<tr><td>%s</td><td>", label);
-    page_with_error(json_object_get(result, key), json_object_get(result, key_se), 100.0, " %", out);
+    page_percent(result, key, out);
     fputs("</td></tr>\n", out);
 }
 
@@ -38,19 +36,17 @@ static void print_errors(const json_t *result, FILE *out)
 {
     const json_t *plain = json_object_get(json_object_get(result, "skill"), "plain_brdf");
     heading("Errors", out);
-    fputs(
-        "<p class=\"hint\">Relative RMS errors of mean radiances, by fresh paths; after &plusmn; the standard error by "
-        "tracing. The error of a row is its part of them.</p>\n<table>\n",
-        out);
+    fputs("<p class=\"hint\">Relative root mean square differences of measured and rendered radiances; after &plusmn; "
+          "the "
+          "standard error by tracing. The error of a row is its part of them.</p>\n<table>\n",
+          out);
     error_row(result, "fitted rows", "fit_rel_rms", out);
     error_row(result, "held-out rows", "heldout_rel_rms", out);
-    error_row(json_object_get(result, "cross_validation"), "fitted rows left out in turn", "rel_rms", out);
+    error_row(json_object_get(result, "cross_validation"), "fitted rows left out one after another", "rel_rms", out);
     error_row(plain, "a plain BRDF, held-out rows", "heldout_rel_rms", out);
-    error_row(plain, "a plain BRDF, fitted rows left out in turn", "left_out_rel_rms", out);
+    error_row(plain, "a plain BRDF, fitted rows left out one after another", "left_out_rel_rms", out);
     error_row(json_object_get(result, "verdict"), "what the measurements allow", "allowed_rel_rms", out);
-    fputs("<tr><td>objective, fitted rows</td><td>", out);
-    page_with_error(json_object_get(result, "objective"), json_object_get(result, "objective_se"), 1.0, "", out);
-    fputs("</td></tr>\n<tr><td>end of the fit</td><td>", out);
+    fputs("<tr><td>end of the fit</td><td>", out);
     page_escaped(page_string(result, "reason"), out);
     fputs("</td></tr>\n</table>\n", out);
 }
@@ -75,19 +71,28 @@ static void print_flags(const json_t *p, FILE *out)
     page_escaped(page_string(p, "tied_to"), out);
 }
 
+/* The three channels of a color have one meaning, which stands once. */
+static bool says_the_same(const json_t *p, const json_t *before)
+{
+    return before != NULL && strcmp(page_string(p, "meaning"), page_string(before, "meaning")) == 0;
+}
+
 static void print_parameters(const char *title, const json_t *list, FILE *out)
 {
     size_t i;
-    const json_t *p;
+    const json_t *p, *before = NULL;
     if (json_array_size(list) == 0) return;
     heading(title, out);
-    fputs("<table>\n<thead><tr><th>name</th><th class=\"n\">value &plusmn; standard error</th><th>unit</th><th "
-          "class=\"n\">allowed</th><th></th></tr></thead>\n",
+    fputs("<table>\n<thead><tr><th>name</th><th>meaning</th><th class=\"n\">value &plusmn; standard "
+          "error</th><th>unit</th><th class=\"n\">allowed</th><th></th></tr></thead>\n",
           out);
     json_array_foreach(list, i, p)
     {
         fputs("<tr><td>", out);
         page_escaped(page_string(p, "name"), out);
+        fputs("</td><td class=\"hint\">", out);
+        if (!says_the_same(p, before)) page_escaped(page_string(p, "meaning"), out);
+        before = p;
         fputs("</td><td class=\"n\">", out);
         page_with_error(json_object_get(p, "value"), json_object_get(p, "standard_error"), 1.0, "", out);
         fputs("</td><td>", out);
@@ -141,7 +146,7 @@ static void print_row(const json_t *row, FILE *out)
     rgb_cell(json_object_get(row, "measured"), out);
     rgb_cell(json_object_get(row, "rendered"), out);
     fputs("<td class=\"n\">", out);
-    page_with_error(json_object_get(row, "rel_error"), json_object_get(row, "rel_error_se"), 100.0, " %", out);
+    page_percent(row, "rel_error", out);
     fputs("</td></tr>\n", out);
 }
 

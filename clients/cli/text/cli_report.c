@@ -110,7 +110,7 @@ static void print_flags(const json_t *parameter, FILE *out)
 {
     const json_t *at_bound = json_object_get(parameter, "at_bound");
     if (json_is_true(json_object_get(parameter, "fixed"))) {
-        fputs("fixed", out);
+        fputs("fixed  ", out);
         return;
     }
     if (json_is_string(json_object_get(parameter, "tied_to")))
@@ -119,7 +119,7 @@ static void print_flags(const json_t *parameter, FILE *out)
     if (json_is_string(at_bound))
         fprintf(out, "at %s bound  ", strcmp(json_string_value(at_bound), "lower") == 0 ? "lower" : "upper");
     if (json_is_true(at_bound)) fputs("at a bound  ", out);
-    if (json_is_false(json_object_get(parameter, "determined"))) fputs("not determined", out);
+    if (json_is_false(json_object_get(parameter, "determined"))) fputs("not determined  ", out);
 }
 
 /* Returns the name of a parameter without its set: "C_R.r" for "warp.C_R.r". */
@@ -130,21 +130,23 @@ static const char *own_name(const json_t *parameter)
     return n > 0 && strncmp(name, set, n) == 0 && name[n] == '.' ? name + n + 1 : name;
 }
 
-static void print_parameter(const json_t *parameter, FILE *out)
+/* meaning: "" where the line before says it. */
+static void print_parameter(const json_t *parameter, const char *meaning, FILE *out)
 {
-    char name[64], unit[24], value[CLI_SHORT_TEXT];
+    char name[64], unit[24], value[CLI_SHORT_TEXT], clean[300];
+    text_clean(meaning, clean, sizeof clean);
     text_clean(own_name(parameter), name, sizeof name);
     text_clean(member_text(parameter, "unit"), unit, sizeof unit);
     text_with_error(member_number(parameter, "value"), member_number(parameter, "standard_error"), value);
     fprintf(out, "  %-18s %-24s %-5s", name, value, unit);
     print_flags(parameter, out);
-    fputc('\n', out);
+    fprintf(out, "%s\n", clean);
 }
 
 /* Prints the parameters set by set, each under the name of its group of fibers when there are several. */
 static void print_parameters(const json_t *parameters, FILE *out)
 {
-    const char *before = "";
+    const char *before = "", *meaning_before = "";
     size_t i;
     const json_t *parameter;
     if (json_array_size(parameters) > 0) fprintf(out, "fitted parameters (value +- standard error)\n");
@@ -155,7 +157,9 @@ static void print_parameters(const json_t *parameters, FILE *out)
         text_clean(set, heading, sizeof heading);
         if (strcmp(set, before) != 0) fprintf(out, " %s\n", heading);
         before = set;
-        print_parameter(parameter, out);
+        const char *meaning = member_text(parameter, "meaning"); /* one for the three channels of a color */
+        print_parameter(parameter, strcmp(meaning, meaning_before) == 0 ? "" : meaning, out);
+        meaning_before = meaning;
     }
 }
 
@@ -296,7 +300,7 @@ void report_result(const json_t *job, FILE *out)
         percent(json_object_get(result, "cross_validation"), "rel_rms", text);
         fprintf(out, "relative RMS error, fitted rows left out one after another: %s\n", text);
     }
-    json_array_foreach(json_object_get(result, "nuisance"), i, parameter) print_parameter(parameter, out);
+    json_array_foreach(json_object_get(result, "nuisance"), i, parameter) print_parameter(parameter, "", out);
     const json_t *converged = json_object_get(result, "converged");
     if (json_is_false(converged)) fprintf(out, "The fit has NOT converged; see the log.\n");
 }

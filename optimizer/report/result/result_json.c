@@ -82,8 +82,8 @@ json_t *result_parameters_json(const struct pipeline_model *m)
         const struct param_info *info = &m->setup->sets.info.param[p];
         const struct fit_parameter *k = &m->setup->parameter[p];
         json_t *parameter =
-            json_pack("{s:s, s:s, s:s?, s:o, s:o, s:f, s:f, s:f, s:o, s:b, s:b}", "name", info->name, "unit",
-                      param_unit_name(info->unit), "set", info->set, "value",
+            json_pack("{s:s, s:s?, s:s, s:s?, s:o, s:o, s:f, s:f, s:f, s:o, s:b, s:b}", "name", info->name, "meaning",
+                      info->meaning, "unit", param_unit_name(info->unit), "set", info->set, "value",
                       json_number(param_to_file_unit(info, m->fit->result.param[p])), "standard_error",
                       json_number(param_to_file_unit(info, m->fit->result.uncertainty.se_param[p])), "lower",
                       param_to_file_unit(info, k->lower), "upper", param_to_file_unit(info, k->upper), "start",

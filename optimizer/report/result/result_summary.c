@@ -1,5 +1,6 @@
 /* results/summary.txt: the result on one page, for people. */
 #include "base/angle.h"
+#include "base/percent_words.h"
 #include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_fit_option.h"
 #include "optimizer/job/document/job_results.h"
@@ -19,7 +20,7 @@
 
 static void print_parameters(const struct pipeline_model *m, FILE *out)
 {
-    fprintf(out, "%-18s %10s %10s  %-22s %s\n", "parameter", "value", "std error", "allowed", "remarks");
+    fprintf(out, "%-18s %10s %10s  %-22s %s\n", "parameter", "value", "std error", "allowed", "remarks, meaning");
     for (size_t p = 0; p < m->setup->sets.info.n_param; p++) {
         const struct param_info *info = &m->setup->sets.info.param[p];
         const struct fit_parameter *k = &m->setup->parameter[p];
@@ -30,75 +31,73 @@ static void print_parameters(const struct pipeline_model *m, FILE *out)
         snprintf(error, sizeof error, isnan(u->se_param[p]) ? "-" : "%.4f", param_to_file_unit(info, u->se_param[p]));
         snprintf(allowed, sizeof allowed, "%.4g .. %.4g %s", param_to_file_unit(info, k->lower),
                  param_to_file_unit(info, k->upper), param_unit_name(info->unit));
-        fprintf(out, "%-18s %10.4f %10s  %-22s %s%s%s\n", param_own_name(info),
+        const bool new_meaning = p == 0 || info->meaning != m->setup->sets.info.param[p - 1].meaning;
+        fprintf(out, "%-18s %10.4f %10s  %-22s %s%s%s%s\n", param_own_name(info),
                 param_to_file_unit(info, m->fit->result.param[p]), error, allowed,
                 k->fixed                           ? "fixed "
                 : m->setup->option->leader[p] != p ? "tied "
                                                    : "",
-                u->at_bound[p] ? "at a bound " : "", u->determined[p] ? "" : "not determined by these measurements");
+                u->at_bound[p] ? "at a bound " : "", u->determined[p] ? "" : "not determined by these measurements ",
+                new_meaning && info->meaning != NULL ? info->meaning : "");
     }
 }
 
 static void print_rows(const struct report *report, const struct pipeline_model *m, FILE *out)
 {
     const double deg = DEG_PER_RAD;
-    fprintf(out, "\n%-14s %-8s %6s %6s %6s %6s %6s   %-26s %-26s %7s\n", "row", "set", "lamp", "phi", "camera", "phi",
+    fprintf(out, "\n%-14s %-8s %6s %6s %6s %6s %6s   %-26s %-26s %12s\n", "row", "set", "lamp", "phi", "camera", "phi",
             "turn", "measured r g b", "rendered r g b", "error");
     for (size_t i = 0; i < report->in.job->rows->observation.n; i++) {
         const struct observation *o = &report->in.job->rows->observation.item[i];
         const struct configuration *k = &o->configuration;
         double r[3], se;
-        char turn[16];
+        char turn[16], error_words[PERCENT_WORDS_BYTES];
         struct estimate a, b;
         nuisance_show(&m->fit->result.nuisance, &m->validation->replica[0][i], &a);
         nuisance_show(&m->fit->result.nuisance, &m->validation->replica[1][i], &b);
         for (int q = 0; q < 3; q++) r[q] = 0.5 * (a.mean[q] + b.mean[q]);
         snprintf(turn, sizeof turn, "%.1f", k->cloth_rotation_rad * deg);
-        fprintf(out, "%-14.14s %-8s %6.1f %6.1f %6.1f %6.1f %6s   %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %6.1f%%\n",
-                o->name, o->set == JOB_SET_FIT ? "fit" : "held-out", k->light_theta_rad * deg, k->light_phi_rad * deg,
+        const double error = result_row_error(report, m, i, &se);
+        percent_words_short(error, se, error_words);
+        fprintf(out, "%-14.14s %-8s %6.1f %6.1f %6.1f %6.1f %6s   %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %12s\n", o->name,
+                o->set == JOB_SET_FIT ? "fit" : "held-out", k->light_theta_rad * deg, k->light_phi_rad * deg,
                 k->camera_theta_rad * deg, k->camera_phi_rad * deg, k->n_rotation > 1 ? "all" : turn, o->mean_rgb[0],
-                o->mean_rgb[1], o->mean_rgb[2], r[0], r[1], r[2], 100.0 * result_row_error(report, m, i, &se));
+                o->mean_rgb[1], o->mean_rgb[2], r[0], r[1], r[2], error_words);
     }
 }
 
-/* Writes "2.41 +- 0.05 %", or "-" when there are no such rows. */
-static void percent(const struct objective_value *v, char *text, size_t n)
-{
-    if (isfinite(v->rel_rms))
-        snprintf(text, n, "%.2f +- %.2f %%", 100.0 * v->rel_rms, 100.0 * v->rel_rms_se);
-    else
-        snprintf(text, n, "-");
-}
-
-/* The same for fitted rows that were left out in turn. */
-static void percent_left_out(const struct pipeline_model *m, char *text, size_t n)
+/* Writes the error of fitted rows that were left out one after another. */
+static void percent_left_out(const struct pipeline_model *m, char text[PERCENT_WORDS_BYTES])
 {
     const struct cross_validation *v = &m->fit->result.cross_validation;
     if (v->n_fold > 0)
-        snprintf(text, n, "%.2f +- %.2f %%", 100.0 * v->rel_rms, 100.0 * v->rel_rms_se);
+        percent_words(v->rel_rms, v->rel_rms_se, text);
     else
-        snprintf(text, n, "too few rows");
+        snprintf(text, PERCENT_WORDS_BYTES, "too few rows");
 }
 
 static void print_channels(const char *label, const struct objective_channels *v, FILE *out)
 {
     if (!isfinite(v->rel_rms[0])) return;
     fprintf(out, "%-43s", label);
-    for (int c = 0; c < 3; c++)
-        fprintf(out, "%s%.2f +- %.2f", c > 0 ? ", " : "", 100.0 * v->rel_rms[c], 100.0 * v->rel_rms_se[c]);
-    fprintf(out, " %%\n");
+    for (int c = 0; c < 3; c++) {
+        char text[PERCENT_WORDS_BYTES];
+        percent_words(v->rel_rms[c], v->rel_rms_se[c], text);
+        fprintf(out, "%s%s", c > 0 ? ", " : "", text);
+    }
+    fputc('\n', out);
 }
 
 static void print_errors(const struct report *report, const struct pipeline_model *m, FILE *out)
 {
     const struct validation *v = m->validation;
-    char text[80];
-    percent(&v->fit, text, sizeof text);
+    char text[PERCENT_WORDS_BYTES];
+    percent_words(v->fit.rel_rms, v->fit.rel_rms_se, text);
     fprintf(out, "relative RMS error over the fitted rows    %s\n", text);
-    percent_left_out(m, text, sizeof text);
-    fprintf(out, "fitted rows left out in turn               %s (cross-validation%s)\n", text,
-            report->in.made->number.n > 0 ? ", numbers of the cloth held" : "");
-    percent(&v->held_out, text, sizeof text);
+    percent_left_out(m, text);
+    fprintf(out, "fitted rows left out one after another     %s%s\n", text,
+            report->in.made->number.n > 0 ? " (numbers of the cloth held)" : "");
+    percent_words(v->held_out.rel_rms, v->held_out.rel_rms_se, text);
     if (isfinite(v->held_out.rel_rms)) fprintf(out, "relative RMS error over the held-out rows  %s\n", text);
     print_channels("red, green, blue apart, fitted rows", &v->fit_channels, out);
     print_channels("red, green, blue apart, held-out rows", &v->held_out_channels, out);
@@ -108,13 +107,15 @@ static void print_errors(const struct report *report, const struct pipeline_mode
 static void print_comparison(const struct report *report, FILE *out)
 {
     const bool gains = report->model[0].setup->option->gain == JOB_GAIN_PER_PHOTOGRAPH;
-    fprintf(out, "%-24s %16s %16s %16s %9s %9s\n", "model", "fitted", "left out in turn", "held out", "paths", "time");
+    fprintf(out, "%-24s %16s %16s %16s %9s %9s\n", "model", "fitted", "rows left out", "held out", "paths", "time");
     for (size_t i = 0; i < report->n_model; i++) {
         const struct pipeline_model *m = &report->model[i];
-        char fitted[48], left_out[48], held_out[48];
-        percent(gains ? &m->validation->fit_with_gains : &m->validation->fit, fitted, sizeof fitted);
-        percent(gains ? &m->validation->held_out_with_gains : &m->validation->held_out, held_out, sizeof held_out);
-        percent_left_out(m, left_out, sizeof left_out);
+        const struct objective_value *f = gains ? &m->validation->fit_with_gains : &m->validation->fit,
+                                     *h = gains ? &m->validation->held_out_with_gains : &m->validation->held_out;
+        char fitted[PERCENT_WORDS_BYTES], left_out[PERCENT_WORDS_BYTES], held_out[PERCENT_WORDS_BYTES];
+        percent_words(f->rel_rms, f->rel_rms_se, fitted);
+        percent_words(h->rel_rms, h->rel_rms_se, held_out);
+        percent_left_out(m, left_out);
         fprintf(out, "%-24s %16s %16s %16s %9.3g %7.0f s  %s%s\n", m->setup->appearance.id, fitted, left_out, held_out,
                 (double)m->fit->result.n_path, m->fit->result.wall_s, i == report_best_model(report) ? "best" : "",
                 m->fit->result.converged ? "" : " NOT CONVERGED");
@@ -122,8 +123,8 @@ static void print_comparison(const struct report *report, FILE *out)
     fprintf(out, "relative RMS errors%s; the best model was chosen by %s; what follows is of the best model\n\n",
             gains ? ", each photograph with its own gain" : "",
             pipeline_choice(report->model, report->n_model) == CHOICE_CROSS_VALIDATION
-                ? "fitted rows that were left out in turn (cross-validation)"
-                : "the fitted rows, which are too few for cross-validation");
+                ? "fitted rows left out one after another"
+                : "the fitted rows, which are too few to leave some out");
 }
 
 /* The plain BRDF beside the fit's own errors, where it was measured. */
@@ -132,7 +133,7 @@ static void print_skill(const struct report *report, FILE *out)
     if (!report->skill.measured) return;
     fprintf(out, "a plain BRDF fitted to the same rows       %.3g %% fitted", 100.0 * report->skill.fit_rel_rms);
     if (isfinite(report->skill.left_out_rel_rms))
-        fprintf(out, ", %.3g %% by cross-validation", 100.0 * report->skill.left_out_rel_rms);
+        fprintf(out, ", %.3g %% of rows left out", 100.0 * report->skill.left_out_rel_rms);
     if (isfinite(report->skill.heldout_rel_rms))
         fprintf(out, ", %.3g %% held out", 100.0 * report->skill.heldout_rel_rms);
     fprintf(out, "\n");
@@ -222,8 +223,7 @@ static void print_summary(struct report *report, FILE *out)
     print_errors(report, m, out);
     print_skill(report, out);
     print_discrepancy(report, out);
-    fprintf(out, "objective %.5g +- %.2g; rendered means have standard errors below %.2f %%\n\n",
-            m->validation->fit.value, m->validation->fit.se, 100.0 * m->validation->worst_rel_se);
+    fprintf(out, "rendered means have standard errors below %.2f %%\n\n", 100.0 * m->validation->worst_rel_se);
     print_parameters(m, out);
     result_summary_options(report, m, out);
     print_rows(report, m, out);

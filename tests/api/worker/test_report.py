@@ -1,5 +1,6 @@
 """The report on a job: one page that needs nothing else, its data, and the schema of result.json."""
 import hashlib
+import html
 import json
 import os
 import re
@@ -66,6 +67,10 @@ def test_the_page_needs_nothing_else(which, request):
     result = json.loads((folder / "result.json").read_text())
     for text in (result["verdict"]["text"], result["reason"], *(p["name"] for p in result["parameters"]), *(r["name"] for r in result["rows"])):
         assert text.replace("<", "&lt;").replace(">", "&gt;") in page
+    meanings = {p["meaning"] for p in result["parameters"]}
+    assert None not in meanings and "fresh paths" not in page and "left out in turn" not in page
+    for meaning in meanings:
+        assert meaning in html.unescape(page) and meaning in (folder / "summary.txt").read_text()
     for title in ("Errors", "Fitted parameters", "Measured and rendered", "Pictures", "Course of the fit", "Correlation of the parameters",
                   "Gradient certificate", "Geometry", "Settings: the job document", "Settings that have their defaults", "Inputs", "Program and dates"):
         assert f"<h2>{title}</h2>" in page

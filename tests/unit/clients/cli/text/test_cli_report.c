@@ -48,8 +48,8 @@ static void test_parameters(void **state)
           "fitted parameters (value +- standard error)\n"
           "  C_R.r              0.500 +- 0.010                at lower bound  \n"
           "  beta_R             7.25 +- 0.50             deg  at upper bound  \n"
-          "  w                  0.3                           fixed\n"
-          "  s                  0.3                           at a bound  not determined\n"
+          "  w                  0.3                           fixed  \n"
+          "  s                  0.3                           at a bound  not determined  \n"
           "  C_R.g              0.5                           tied to C_R.r  with a prior  \n");
 }
 
@@ -70,6 +70,19 @@ static void test_sets(void **state)
           "  wefts.s            4                             \n"
           " \n"
           "  s                  5                             \n");
+}
+
+/* The meaning stands beside the name, once for the channels of a color. */
+static void test_meanings(void **state)
+{
+    (void)state;
+    check("{'parameters': [{'name': 'C_R.r', 'value': 0.5, 'meaning': 'Share of R.'},"
+          "{'name': 'C_R.g', 'value': 0.5, 'meaning': 'Share of R.', 'fixed': true},"
+          "{'name': 'w', 'value': 0.3, 'meaning': 'Width.', 'determined': false}]}",
+          "fitted parameters (value +- standard error)\n"
+          "  C_R.r              0.5                           Share of R.\n"
+          "  C_R.g              0.5                           fixed  \n"
+          "  w                  0.3                           not determined  Width.\n");
 }
 
 static void test_residuals(void **state)
@@ -145,8 +158,9 @@ static void test_geometry_only(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_parameters), cmocka_unit_test(test_sets),    cmocka_unit_test(test_residuals),
-        cmocka_unit_test(test_models),     cmocka_unit_test(test_verdict), cmocka_unit_test(test_geometry_only),
+        cmocka_unit_test(test_parameters),    cmocka_unit_test(test_sets),   cmocka_unit_test(test_meanings),
+        cmocka_unit_test(test_residuals),     cmocka_unit_test(test_models), cmocka_unit_test(test_verdict),
+        cmocka_unit_test(test_geometry_only),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
