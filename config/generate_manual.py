@@ -229,14 +229,16 @@ def zsh(table, folder):
 _selvedge_client()
 {{
     local -a commands
-    commands=({commands})
+    commands=({commands} \\
+        'help:explain a command')
     if (( CURRENT == 2 )); then
         _describe command commands
         _arguments {anywhere}
         return
     fi
     case "$words[2]" in
-{cases}    *) _files ;;
+{cases}    help) _describe command commands ;;
+    *) _files ;;
     esac
 }}
 case "$service" in

@@ -62,6 +62,23 @@ static void list_options(char letters[2 * CLI_N_OPTION + 3], struct option named
     named[CLI_N_OPTION] = (struct option){0};
 }
 
+/* An option that nobody has, and the one that was meant: of the command, if it is known already. */
+static status unknown_option(const struct cli_args *a, const char *word, struct error *err)
+{
+    const char *name[CLI_N_OPTION + 1], *meant;
+    char given[40];
+    size_t n = 0;
+    for (size_t i = 0; i < CLI_N_OPTION; i++)
+        if (!a->has_command || cli_takes_option(&cli_command_table[a->command], &cli_option_table[i]))
+            name[n++] = cli_option_table[i].name;
+    name[n] = NULL;
+    word += strspn(word, "-");
+    snprintf(given, sizeof given, "%.*s", (int)strcspn(word, "="), word);
+    meant = word_guess(given, name);
+    return meant != NULL ? error_set(err, STATUS_INVALID, "unknown option '--%s'; did you mean '--%s'?", given, meant)
+                         : error_set(err, STATUS_INVALID, "unknown option '--%s'; try --help", given);
+}
+
 /* Takes an option as getopt_long reports it: code may be ':' (a missing value) or '?'. word is the last one that it has
  * read. */
 static status take_option(struct cli_args *a, int code, const char *word, struct error *err)
@@ -69,7 +86,7 @@ static status take_option(struct cli_args *a, int code, const char *word, struct
     bool wrong = code == ':' || code == '?';
     const struct cli_option *o = option_of(wrong ? optopt : code);
     if (o == NULL && optopt != 0) return error_set(err, STATUS_INVALID, "unknown option '-%c'; try --help", optopt);
-    if (o == NULL) return error_set(err, STATUS_INVALID, "unknown option '%s'; try --help", word);
+    if (o == NULL) return unknown_option(a, word, err);
     if (code == '?') return error_set(err, STATUS_INVALID, "option '--%s' takes no value", o->name);
     if (code == ':')
         return error_set(err, STATUS_INVALID, "option '--%s' needs a value: --%s %s", o->name, o->name, o->value);

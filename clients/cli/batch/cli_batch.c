@@ -1,6 +1,7 @@
 /* Commands about batches: many samples with one template. */
 #include "clients/cli/batch/cli_batch.h"
 #include "clients/cli/text/cli_text.h"
+#include "clients/cli/text/text_table.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -112,29 +113,31 @@ struct listing {
     const struct cli *cli;
     json_t *all;
     size_t n;
+    struct text_table table;
 };
 
 static bool list_one(void *context, const json_t *batch)
 {
     struct listing *l = context;
-    char name[300], numbers[300];
+    char n_sample[24], numbers[300];
     l->n++;
     if (l->cli->args->json) {
         json_array_append(l->all, (json_t *)(uintptr_t)batch);
         return true;
     }
-    text_clean(text_of(batch, "name"), name, sizeof name);
     cli_batch_numbers(json_object_get(batch, "states"), numbers, sizeof numbers);
-    fprintf(l->cli->out, "%-36s  %6lld  %s: %s\n", text_of(batch, "id"),
-            (long long)json_integer_value(json_object_get(batch, "n_sample")), name, numbers);
-    return ferror(l->cli->out) == 0;
+    snprintf(n_sample, sizeof n_sample, "%lld", (long long)json_integer_value(json_object_get(batch, "n_sample")));
+    text_table_add(&l->table, (const char *const[]){text_of(batch, "id"), n_sample, text_of(batch, "name"), numbers});
+    return true;
 }
 
 static status list(struct cli *cli, int *exit_code, struct error *err)
 {
+    static const char *const head[] = {"id", ">samples", "name", "jobs", NULL};
     (void)exit_code;
-    struct listing l = {.cli = cli, .all = json_array()};
+    struct listing l = {.cli = cli, .all = json_array(), .table = {.head = head, .colored = text_colored(cli->out)}};
     status s = visit_batches(cli, list_one, &l, err);
+    text_table_print(&l.table, cli->out);
     if (s == STATUS_OK && cli->args->json) cli_print_json(l.all, cli->out);
     if (s == STATUS_OK && l.n == 0 && !cli->args->json)
         fprintf(cli->note, "no batches; `selvedge batch submit TEMPLATE.json TABLE.csv` makes one\n");

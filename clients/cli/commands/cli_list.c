@@ -51,6 +51,7 @@ status cli_list(struct cli *cli, int *exit_code, struct error *err)
     (void)exit_code;
     char base[2048], path[3072];
     size_t n_job = 0;
+    struct text_table table = {.head = report_list_head, .colored = text_colored(cli->out)};
     status s = list_path(cli, base, sizeof base, err);
     if (s != STATUS_OK) return s;
     snprintf(path, sizeof path, "%s", base);
@@ -62,11 +63,10 @@ status cli_list(struct cli *cli, int *exit_code, struct error *err)
         json_array_foreach(json_object_get(page, "jobs"), i, job)
         {
             if (cli->args->json) json_array_append(all, job);
-            if (!cli->args->json && n_job == 0)
-                fprintf(cli->out, "%-36s  %-10s %6s %8s  %s\n", "id", "state", "done", "ETA", "sample");
-            if (!cli->args->json) report_summary(job, cli->out);
+            if (!cli->args->json) report_list_add(job, &table);
             n_job++;
         }
+        text_table_print(&table, cli->out);
         const char *cursor = json_string_value(json_object_get(page, "next_cursor"));
         if (cursor != NULL) snprintf(path, sizeof path, "%s&cursor=%s", base, cursor);
         bool more = cursor != NULL && json_array_size(json_object_get(page, "jobs")) > 0;

@@ -4,6 +4,7 @@
 #include "clients/cli/arguments/cli_tool.h"
 #include "clients/cli/commands/cli.h"
 #include "clients/cli/text/cli_text.h"
+#include "clients/cli/text/text_table.h"
 
 #include <curl/curl.h>
 #include <locale.h>
@@ -35,10 +36,9 @@ static void print_error(const struct error *err)
     text_clean(err->field, field, sizeof field);
     text_clean(err->text, text, sizeof text);
     /* print the field only if the server's sentence does not contain it */
-    if (field[0] != '\0' && strstr(text, field) == NULL)
-        fprintf(stderr, "error: %s: %s\n", field, text);
-    else
-        fprintf(stderr, "error: %s\n", text);
+    const bool named = field[0] == '\0' || strstr(text, field) != NULL;
+    text_put_word("error", text_colored(stderr), stderr);
+    fprintf(stderr, ": %s%s%s\n", named ? "" : field, named ? "" : ": ", text);
 }
 
 /* Whether the program behind a pipe, such as `head`, has read enough and ended. */

@@ -1,6 +1,7 @@
 /* The commands about which jobs stay: keep, unkeep, retention. */
 #include "clients/cli/commands/cli.h"
 #include "clients/cli/text/cli_text.h"
+#include "clients/cli/text/text_table.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -46,9 +47,9 @@ static status add_limit(char *path, size_t n_path, const char *name, const char 
     return STATUS_OK;
 }
 
-static void print_job(const json_t *job, FILE *out)
+static void add_job(const json_t *job, struct text_table *table)
 {
-    char day[32] = "-", size[CLI_SHORT_TEXT], sample[256];
+    char day[32] = "-", size[CLI_SHORT_TEXT];
     const char *id = json_string_value(json_object_get(job, "id")),
                *state = json_string_value(json_object_get(job, "state")),
                *reason = json_string_value(json_object_get(job, "reason")),
@@ -57,18 +58,18 @@ static void print_job(const json_t *job, FILE *out)
     struct tm date;
     if (localtime_r(&end, &date) != NULL) strftime(day, sizeof day, "%Y-%m-%d", &date);
     text_size(json_number_value(json_object_get(job, "bytes")), size);
-    text_clean(name == NULL ? "" : name, sample, sizeof sample);
-    fprintf(out, "%-36s  %-10s  %-10s  %10s  %-7s  %s\n", id == NULL ? "?" : id, state == NULL ? "?" : state, day, size,
-            reason == NULL ? "?" : reason, sample);
+    text_table_add(table, (const char *const[]){id == NULL ? "?" : id, state == NULL ? "?" : state, day, size,
+                                                reason == NULL ? "?" : reason, name == NULL ? "" : name});
 }
 
 static void print_jobs(const json_t *jobs, FILE *out)
 {
+    static const char *const head[] = {"id", "*state", "ended", ">size", "for its", "sample", NULL};
+    struct text_table table = {.head = head, .colored = text_colored(out)};
     size_t i;
     const json_t *job;
-    if (json_array_size(jobs) > 0)
-        fprintf(out, "%-36s  %-10s  %-10s  %10s  %-7s  %s\n", "id", "state", "ended", "size", "for its", "sample");
-    json_array_foreach(jobs, i, job) print_job(job, out);
+    json_array_foreach(jobs, i, job) add_job(job, &table);
+    text_table_print(&table, out);
 }
 
 static void print_plan(const struct cli *cli, const json_t *plan)

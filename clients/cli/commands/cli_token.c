@@ -2,7 +2,7 @@
  * revokes them. */
 #include "base/files/durable.h"
 #include "clients/cli/commands/cli.h"
-#include "clients/cli/text/cli_text.h"
+#include "clients/cli/text/text_table.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -83,31 +83,34 @@ static status make_token(struct cli *cli, const char *name, struct error *err)
     return s;
 }
 
-static void put_day(FILE *out, const json_t *time)
+enum { DAY_BYTES = 32 };
+
+static const char *day_of(const json_t *token, const char *key, char out[DAY_BYTES])
 {
-    char text[32] = "-";
+    const json_t *time = json_object_get(token, key);
     time_t t = (time_t)json_number_value(time);
     struct tm day;
-    if (json_is_number(time) && localtime_r(&t, &day) != NULL) strftime(text, sizeof text, "%Y-%m-%d %H:%M", &day);
-    fprintf(out, "  %-16s", text);
+    if (!json_is_number(time) || localtime_r(&t, &day) == NULL || strftime(out, DAY_BYTES, "%Y-%m-%d %H:%M", &day) == 0)
+        snprintf(out, DAY_BYTES, "-");
+    return out;
 }
 
 static void print_tokens(const json_t *list, FILE *out)
 {
+    static const char *const head[] = {"name", "owner", "scope", "made", "last used", "revoked", NULL};
+    struct text_table table = {.head = head, .colored = text_colored(out)};
     size_t i;
     const json_t *t;
-    fprintf(out, "%-20s  %-20s  %-6s  %-16s  %-16s  %-16s\n", "NAME", "OWNER", "SCOPE", "MADE", "LAST USED", "REVOKED");
     json_array_foreach(list, i, t)
     {
-        char name[80], owner[80];
-        text_clean(json_string_value(json_object_get(t, "name")), name, sizeof name);
-        text_clean(json_string_value(json_object_get(t, "owner")), owner, sizeof owner);
-        fprintf(out, "%-20s  %-20s  %-6s", name, owner, json_string_value(json_object_get(t, "scope")));
-        put_day(out, json_object_get(t, "created_unix_s"));
-        put_day(out, json_object_get(t, "last_used_unix_s"));
-        put_day(out, json_object_get(t, "revoked_unix_s"));
-        fputc('\n', out);
+        char made[DAY_BYTES], used[DAY_BYTES], revoked[DAY_BYTES];
+        text_table_add(&table, (const char *const[]){
+                                   json_string_value(json_object_get(t, "name")),
+                                   json_string_value(json_object_get(t, "owner")),
+                                   json_string_value(json_object_get(t, "scope")), day_of(t, "created_unix_s", made),
+                                   day_of(t, "last_used_unix_s", used), day_of(t, "revoked_unix_s", revoked)});
     }
+    text_table_print(&table, out);
 }
 
 static status list_tokens(struct cli *cli, struct error *err)

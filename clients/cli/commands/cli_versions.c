@@ -1,22 +1,24 @@
 /* The command versions: the results of a job's runs. */
 #include "clients/cli/commands/cli.h"
 #include "clients/cli/text/cli_text.h"
+#include "clients/cli/text/text_table.h"
 
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
-static void print_version(const json_t *one, FILE *out)
+static void add_version(const json_t *one, struct text_table *table)
 {
-    char date[40] = "-", size[CLI_SHORT_TEXT], words[64];
+    char number[24], date[40] = "-", size[CLI_SHORT_TEXT];
     time_t end = (time_t)json_number_value(json_object_get(one, "finished_unix_s"));
     struct tm local;
     if (localtime_r(&end, &local) != NULL) strftime(date, sizeof date, "%Y-%m-%d %H:%M:%S", &local);
     const char *verdict = json_string_value(json_object_get(json_object_get(one, "verdict"), "code"));
     text_size(json_number_value(json_object_get(one, "bytes")), size);
-    text_clean(verdict == NULL ? "-" : verdict, words, sizeof words);
-    fprintf(out, "%7lld  %-19s  %10s  %s%s\n", (long long)json_integer_value(json_object_get(one, "version")), date,
-            size, words, json_is_true(json_object_get(one, "current")) ? "  (the present result)" : "");
+    snprintf(number, sizeof number, "%lld", (long long)json_integer_value(json_object_get(one, "version")));
+    text_table_add(table,
+                   (const char *const[]){number, date, size, verdict == NULL ? "-" : verdict,
+                                         json_is_true(json_object_get(one, "current")) ? "the present result" : ""});
 }
 
 static status list_versions(struct cli *cli, const char *id, struct error *err)
@@ -24,6 +26,8 @@ static status list_versions(struct cli *cli, const char *id, struct error *err)
     char path[256];
     size_t i;
     json_t *list = NULL, *one;
+    static const char *const head[] = {">version", "finished", ">size", "*verdict", "", NULL};
+    struct text_table table = {.head = head, .colored = text_colored(cli->out)};
     status s = cli_job_path(id, "/versions", path, sizeof path, err);
     if (s == STATUS_OK) s = http_json(cli->http, "GET", path, NULL, NULL, &list, err);
     if (s != STATUS_OK) return s;
@@ -32,9 +36,10 @@ static status list_versions(struct cli *cli, const char *id, struct error *err)
         cli_print_json(versions, cli->out);
     else if (json_array_size(versions) == 0)
         fprintf(cli->note, "job %s has no results yet; `selvedge watch %s` waits for them\n", id, id);
-    else
-        fprintf(cli->out, "version  %-19s  %10s  verdict\n", "finished", "size");
-    if (!cli->args->json) json_array_foreach(versions, i, one) print_version(one, cli->out);
+    else {
+        json_array_foreach(versions, i, one) add_version(one, &table);
+        text_table_print(&table, cli->out);
+    }
     json_decref(list);
     return STATUS_OK;
 }

@@ -315,17 +315,17 @@ static const char *verdict_word(const json_t *job)
                                                              : code;
 }
 
-void report_summary(const json_t *job, FILE *out)
+const char *const report_list_head[] = {"id", "*state", "*verdict", ">done", ">ETA", "sample", NULL};
+
+void report_list_add(const json_t *job, struct text_table *table)
 {
     struct job_view view;
-    char id[64], sample[80], eta[CLI_SHORT_TEXT], verdict[32];
+    char done[16], eta[CLI_SHORT_TEXT];
     report_view(job, &view);
-    text_clean(member_text(job, "id"), id, sizeof id);
-    text_clean(member_text(job, "sample"), sample, sizeof sample);
     text_duration(view.eta_s, eta);
-    text_clean(verdict_word(job), verdict, sizeof verdict);
-    fprintf(out, "%-36s  %-10s %-18s %4.0f %% %8s  %s\n", id, view.state, verdict,
-            isnan(view.fraction) ? 0.0 : 100.0 * view.fraction, eta, sample);
+    snprintf(done, sizeof done, "%.0f %%", isnan(view.fraction) ? 0.0 : 100.0 * view.fraction);
+    text_table_add(table, (const char *const[]){member_text(job, "id"), view.state, verdict_word(job), done, eta,
+                                                member_text(job, "sample")});
 }
 
 size_t cli_print_faults(const json_t *list, const char *label, FILE *out)
@@ -340,7 +340,8 @@ size_t cli_print_faults(const json_t *list, const char *label, FILE *out)
         text_clean(f != NULL ? f : "", field, sizeof field);
         text_clean(d != NULL ? d : "", detail, sizeof detail);
         bool named = field[0] == '\0' || strstr(detail, field) != NULL;
-        fprintf(out, "%s: %s%s%s\n", label, named ? "" : field, named ? "" : ": ", detail);
+        text_put_word(label, text_colored(out), out);
+        fprintf(out, ": %s%s%s\n", named ? "" : field, named ? "" : ": ", detail);
     }
     return json_array_size(list);
 }

@@ -4,6 +4,7 @@
 #define SELVEDGE_CLIENTS_CLI_REPORT_H
 
 #include "clients/cli/text/cli_text.h"
+#include "clients/cli/text/text_table.h"
 
 #include <jansson.h>
 #include <stdio.h>
@@ -15,8 +16,9 @@ void report_view(const json_t *job, struct job_view *view);
 void report_job(const json_t *job, FILE *out);
 /* Prints the fitted parameters with standard errors and remarks, and the residuals. */
 void report_result(const json_t *job, FILE *out);
-/* Prints one line of a list. */
-void report_summary(const json_t *job, FILE *out);
+/* A list of jobs: the titles of its columns, and the row of a job (text_table.h). */
+extern const char *const report_list_head[];
+void report_list_add(const json_t *job, struct text_table *table);
 
 /* Prints a list of {"field", "detail"}, a line each behind the label. Returns how many there are. */
 size_t cli_print_faults(const json_t *list, const char *label, FILE *out);

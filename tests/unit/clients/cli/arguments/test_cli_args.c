@@ -95,6 +95,10 @@ static void test_errors(void **state)
     expect_error(PARSE("watch", "a", "b"), "'b' follows 'a'");
     expect_error(PARSE("list", "a"), "takes no 'a'");
     expect_error(PARSE("list", "--follow"), "no option '--follow'");
+    expect_error(PARSE("list", "--lmit"), "unknown option '--lmit'; try --help");
+    expect_error(PARSE("list", "--verdit=good"), "unknown option '--verdit'; did you mean '--verdict'?");
+    expect_error(PARSE("list", "--jsn"), "unknown option '--jsn'; did you mean '--json'?");
+    expect_error(PARSE("watch", "a", "--verdit"), "unknown option '--verdit'; try --help"); /* watch has no --verdict */
     expect_error(PARSE("watch", "a", "--colour"), "unknown option '--colour'");
     expect_error(PARSE("results", "a", "--out"), "needs a value");
     expect_error(PARSE("results", "a", "--out="), "empty value");

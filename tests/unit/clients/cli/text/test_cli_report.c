@@ -3,6 +3,7 @@
 #include "clients/cli/text/cli_text.c" /* NOLINT */
 
 #include "clients/cli/text/cli_report.c" /* NOLINT */
+#include "clients/cli/text/text_table.c" /* NOLINT */
 
 #include <setjmp.h>
 #include <stdarg.h>
