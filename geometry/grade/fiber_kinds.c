@@ -10,10 +10,6 @@
  * 3.5), their least ratio, and the least share of the length of each. */
 static const double LEAST_GAP = 4.5, LEAST_RATIO = 1.3, LEAST_SHARE = 0.05;
 
-struct fiber_row {
-    double radius_m, length_m;
-};
-
 static bool is_light(const struct volume *v, const struct fiber_set *f, size_t i_fiber)
 {
     const size_t first = f->first_vertex[i_fiber], end = f->first_vertex[i_fiber + 1];
@@ -43,7 +39,7 @@ static double length_of(const struct fiber_set *f, size_t i_fiber)
 static int thicker_first(const void *a, const void *b)
 {
     const struct fiber_row *x = a, *y = b;
-    return (x->radius_m < y->radius_m) - (x->radius_m > y->radius_m);
+    return (x->radius < y->radius) - (x->radius > y->radius);
 }
 
 /* Mean radius by length, its variance between fibers, and the length of all. */
@@ -58,9 +54,9 @@ struct row_sum {
 
 static void add_row(struct row_sum *s, const struct fiber_row *row, double sign)
 {
-    s->length += sign * row->length_m;
-    s->radius += sign * row->length_m * row->radius_m;
-    s->square += sign * row->length_m * row->radius_m * row->radius_m;
+    s->length += sign * row->length;
+    s->radius += sign * row->length * row->radius;
+    s->square += sign * row->length * row->radius * row->radius;
 }
 
 static struct group group_of(const struct row_sum *s)
@@ -77,10 +73,10 @@ static struct group measure(const struct fiber_row *row, size_t n)
     return group_of(&s);
 }
 
-/* Returns how many of the rows, which begin with the thickest, are a kind of their own; n if there is one kind. */
-static size_t split(const struct fiber_row *row, size_t n)
+size_t fiber_rows_split(struct fiber_row *row, size_t n)
 {
     struct row_sum before = {0}, after = {0};
+    qsort(row, n, sizeof *row, thicker_first);
     for (size_t i = 0; i < n; i++) add_row(&after, row + i, 1.0);
     const double all = after.length;
     double least = INFINITY;
@@ -127,8 +123,7 @@ status fiber_kinds_measure(const struct volume *v, const struct fiber_set *f, do
         size_t n = 0;
         for (size_t i = 0; i < f->n_fiber; i++)
             if (light[i] == (k == 1)) row[n++] = (struct fiber_row){(double)f->radius_m[i], length_of(f, i)};
-        qsort(row, n, sizeof *row, thicker_first);
-        const size_t n_thick = split(row, n);
+        const size_t n_thick = fiber_rows_split(row, n);
         add_kind(kinds, row, n_thick, density, single_se_m, shared_se_m);
         add_kind(kinds, row + n_thick, n - n_thick, density, single_se_m, shared_se_m);
     }

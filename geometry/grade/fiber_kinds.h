@@ -7,6 +7,14 @@
 
 enum { FIBER_KINDS_MOST = 4 };
 
+/* A fiber by its radius and length, in any unit. */
+struct fiber_row {
+    double radius, length;
+};
+
+/* Sorts rows, the thickest first, and returns how many of them are a kind of their own; n if there is one kind. */
+size_t fiber_rows_split(struct fiber_row *row, size_t n);
+
 struct fiber_kinds {
     size_t n;
     struct fiber_kind {

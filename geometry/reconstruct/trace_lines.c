@@ -1,5 +1,6 @@
 /* Lines on one grid, from chains of centers to the last fit. */
 #include "geometry/reconstruct/trace_job.h"
+#include "geometry/reconstruct/trace_kinds.h"
 
 #include "geometry/fibers/axes/axis_fit.h"
 #include "geometry/fibers/axes/flat_fit.h"
@@ -233,14 +234,18 @@ static status settle_once(struct trace_job *job, struct polyline_set *lines, int
     return s;
 }
 
-/* Returns whether another round may join fibers that are in pieces. Lines of a scan that does not resolve its fibers
+/* Finds whether another round may join fibers that are in pieces. Lines of a scan that does not resolve its fibers
  * are left alone, and so are flat fibers: fitted as discs, they would get second lines at their sides. */
-static bool has_lost_ends(const struct trace_job *job, const struct polyline_set *lines)
+static status has_lost_ends(const struct trace_job *job, const struct polyline_set *lines, bool *lost,
+                            struct error *err)
 {
+    struct trace_kinds kinds;
+    status s = trace_find_kinds(lines, job->report->radius_spread, &kinds, err);
     const double n_lost = (double)polylines_count_lost_ends(lines, job->v, job->o->eps_d, 0.5 * job->diameter);
     const double share = n_lost / (2.0 * (double)lines->n_line + 1.0);
-    const bool fits = !job->flat && job->report->radius_spread <= TRACE_MOST_SPREAD;
-    return fits && share > LOST_SHARE && (share < MOST_LOST_SHARE || job->independent < 1.0);
+    const bool fits = !job->flat && kinds.spread <= TRACE_MOST_SPREAD;
+    *lost = fits && share > LOST_SHARE && (share < MOST_LOST_SHARE || job->independent < 1.0);
+    return s;
 }
 
 status trace_settle(struct trace_job *job, struct polyline_set *lines, struct error *err)
@@ -250,13 +255,36 @@ status trace_settle(struct trace_job *job, struct polyline_set *lines, struct er
     return settle_once(job, lines, 1, true, &n_join, err);
 }
 
+/* Where fibers have two diameters, some thick ones hold two lines, whose radii have grown since they were compared
+ * last: removes the shorter one, and lets the other move to the middle. */
+static status merge_within(struct trace_job *job, struct polyline_set *lines, struct error *err)
+{
+    struct trace_kinds kinds;
+    struct join_counts counts = {0};
+    struct polyline_set out;
+    size_t n_join;
+    status s = trace_find_kinds(lines, job->report->radius_spread, &kinds, err);
+    if (s != STATUS_OK || !(kinds.thin_diameter > 0.0)) return s;
+    const size_t *n = job->v->n;
+    const struct duplicate_option one = {{n[0], n[1], n[2]}, job->diameter, TOUCHING, job->pool};
+    polyline_set_init(&out);
+    s = polylines_remove_duplicates(lines, &one, TRACE_MIN_PIECE, &out, &counts, err);
+    polyline_set_release(lines);
+    *lines = out;
+    return s == STATUS_OK && counts.n_duplicate > 0 ? settle_once(job, lines, N_SETTLE_FIT, false, &n_join, err) : s;
+}
+
 status trace_finish(struct trace_job *job, struct polyline_set *lines, struct error *err)
 {
     size_t n_join = 0;
     const int n_settle = job->independent < 1.0 ? N_SETTLE_THIN : N_SETTLE;
     trace_enter_part(job, 0.54, TRACE_SETTLED_END);
     status s = settle_once(job, lines, 1, true, &n_join, err);
-    for (int k = 0; k < n_settle && s == STATUS_OK && has_lost_ends(job, lines); k++) {
+    if (s == STATUS_OK) s = merge_within(job, lines, err);
+    for (int k = 0; k < n_settle && s == STATUS_OK; k++) {
+        bool lost = false;
+        s = has_lost_ends(job, lines, &lost, err);
+        if (s != STATUS_OK || !lost) break;
         if (k > 0 && (double)n_join <= JOINED_SHARE * (double)lines->n_line) break; /* nothing moves any more */
         s = settle_once(job, lines, N_SETTLE_FIT, false, &n_join, err);
     }

@@ -106,6 +106,21 @@ static void test_two_densities(void **state)
     release(&s);
 }
 
+/* Diameters of 4.1 and 11.4 voxels: once two or three lines in each thick fiber, and radii 34 % too small. */
+static void test_two_diameters(void **state)
+{
+    (void)state;
+    struct scan s;
+    reconstruct_scan("two-diameters.tif", &s);
+    compare("two-diameters.truth.txt", &s);
+    const struct fiber_kind *thick = &s.r.kinds.kind[0], *thin = &s.r.kinds.kind[1];
+    print_message("radii %.2f and %.2f voxels\n", thick->radius_m / voxel_m, thin->radius_m / voxel_m);
+    assert_true(s.c.center_recall > 0.985 && s.c.center_precision > 0.985 && s.c.fragments_per_fiber < 1.02);
+    assert_true(s.r.kinds.n == 2 && thick->radius_m > 0.87 * 5.74 * voxel_m && thin->radius_m < 2.1 * voxel_m);
+    assert_true(s.r.grade.faults == 0);
+    release(&s);
+}
+
 /* 350 balls and no fiber: once 69 fibers, and the scan was called good. */
 static void test_grains(void **state)
 {
@@ -119,6 +134,7 @@ static void test_grains(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_two_densities), cmocka_unit_test(test_grains)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_two_densities), cmocka_unit_test(test_two_diameters),
+                                       cmocka_unit_test(test_grains)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
