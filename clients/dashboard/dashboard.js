@@ -1,7 +1,8 @@
 // Entry point of the dashboard: "#" shows the list of jobs, "#?state=failed" a part of it, "#ID" one job, "#new" the
 // form for a new job ("#new?copy=ID" filled with the document of another), "#compare/ID,ID" several jobs side by side,
 // "#batches" the batches, "#batch/ID" one of them, "#glossary" the words that the pages use. The page of a job has tabs:
-// "#ID/pictures".
+// "#ID/pictures". "#share/SECRET" shows one job to someone without an account.
+import { sharedPage } from "./actions/shared_page.js";
 import { batchPage } from "./batch/batch_page.js";
 import { batchesPage } from "./batch/batches_page.js";
 import { comparePage } from "./compare/compare_page.js";
@@ -49,6 +50,9 @@ function route() {
   } else if (id.startsWith("compare/")) {
     crumb.append(el("a", { href: "#" }, "Jobs"), " › Comparison");
     leave = comparePage(page, id.slice("compare/".length));
+  } else if (/^share\/[\w-]{1,80}$/.test(id)) {
+    crumb.append("A job that was shared with you");
+    leave = sharedPage(page, id.slice("share/".length));
   } else if (id === "glossary") {
     crumb.append(el("a", { href: "#" }, "Jobs"), " › Glossary");
     leave = glossaryPage(page);
@@ -91,5 +95,5 @@ window.addEventListener("drop", async (event) => {
 });
 window.addEventListener("hashchange", route);
 window.addEventListener("sign-in", askForToken);
-showUser(user, askForToken);
+if (!location.hash.startsWith("#share/")) showUser(user, askForToken);
 route();

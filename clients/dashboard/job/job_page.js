@@ -7,6 +7,7 @@ import { getJson, poll, sendJson } from "../server_link.js";
 import { JobCharts } from "./job_charts.js";
 import { frontKey, jobFront } from "./job_front.js";
 import { LIVE, factsOf, notesOf, stagesOf } from "./job_progress.js";
+import { actionsTab } from "../actions/actions_tab.js";
 import { TabBar } from "../tabs/tab_bar.js";
 import { filesTab } from "../tabs/files_tab.js";
 import { geometryTab } from "../tabs/geometry_tab.js";
@@ -17,7 +18,7 @@ import { rowsTab } from "../tabs/rows_tab.js";
 import { settingsTab } from "../tabs/settings_tab.js";
 
 /** @type {any[]} */
-const TABS = [parametersTab, picturesTab, geometryTab, rowsTab, filesTab, settingsTab, logTab];
+const TABS = [parametersTab, picturesTab, geometryTab, rowsTab, actionsTab, filesTab, settingsTab, logTab];
 const LIST_EVERY = 4; // polls of a running job from one list of its files to the next
 // The tab that opens without one in the address: of a job that runs, the first of these with content.
 const FIRST_OF_LIVE = ["pictures", "geometry", "parameters", "log"];
