@@ -39,7 +39,7 @@ export function errorTable(columns, base, rows) {
   const table = sideBySide("verdicts and errors", columns, [
     ["verdict", each((c) => verdictTag(c.job.verdict) ?? "–")],
     ["model", each((c) => el("span", { class: "mono" }, c.job.result.model ?? "–"))],
-    ["error, fitted", compared("fit")], ["left out in turn", each((c) => errorCell(of(c).leftOut, of(c).leftOutSe))], ["held out", compared("held")],
+    ["error, fitted", compared("fit")], ["rows left out", each((c) => errorCell(of(c).leftOut, of(c).leftOutSe))], ["held out", compared("held")],
     ["plain BRDF, fitted", each((c) => errorCell(plain(c).fit))], ["plain BRDF, held out", each((c) => errorCell(plain(c).held))],
     ["rows, fitted + held out", each((c) => `${c.list.filter((r) => !r.held).length} + ${c.list.filter((r) => r.held).length}`)],
     ["converged", each((c) => (of(c).converged ? "yes" : "no"))],

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Iterable, Mapping, Optional, Union
 
 from .documents import Document, DocumentOrPath, declaration, files_of, read_document
 from .job import Job
+from .tables import batch_row, to_pandas
 from .transport import Problem
 
 if TYPE_CHECKING:
@@ -81,6 +82,11 @@ class BatchState:
         return not any(self.states[state] for state in ("draft", "queued", "running", "paused"))
 
 
+def filter_of(verdict: Optional[str]) -> str:
+    """Return the query of a table whose samples have one of these verdicts; None: of all samples."""
+    return "" if verdict is None else "?" + urllib.parse.urlencode({"verdict": verdict}, safe=",")
+
+
 class Batch:
     """One batch of a server. Methods ask the server every time; only the id and the answer to the submission are kept."""
 
@@ -130,15 +136,27 @@ class Batch:
         plan: dict[str, Any] = self.client.request("GET", path).json()
         return dict(plan, unplanned=unplanned)
 
-    def results(self) -> list[dict[str, Any]]:
-        """Return the table of results: a dict for each sample, with parameters, standard errors, verdict and flags."""
-        rows: list[dict[str, Any]] = self.client.request("GET", f"{self.path}/results.json").json()["samples"]
+    def results(self, verdict: Optional[str] = None) -> list[dict[str, Any]]:
+        """Return the table of results: a dict for each sample, with parameters, standard errors, verdict and flags. verdict: codes
+        between commas, to which the samples are limited."""
+        rows: list[dict[str, Any]] = self.client.request("GET", f"{self.path}/results.json{filter_of(verdict)}").json()["samples"]
         return rows
 
-    def results_csv(self) -> str:
+    def results_csv(self, verdict: Optional[str] = None) -> str:
         """Return the same table as CSV."""
-        text: str = self.client.request("GET", f"{self.path}/results.csv").read().decode()
+        text: str = self.client.request("GET", f"{self.path}/results.csv{filter_of(verdict)}").read().decode()
         return text
+
+    def table(self, verdict: Optional[str] = None) -> list[dict[str, Any]]:
+        """Return the same table as flat rows: dicts of numbers and texts, with NAME, NAME_se and NAME_determined for each parameter."""
+        return [batch_row(sample) for sample in self.results(verdict)]
+
+    def to_pandas(self, verdict: Optional[str] = None) -> Any:
+        """Return the same table as a pandas.DataFrame. Raises ImportError where pandas is not installed."""
+        return to_pandas(self.table(verdict), ("sample", "verdict"))
+
+    def __repr__(self) -> str:
+        return f"Batch({self.id!r})"
 
     def wait(self, timeout_s: Optional[float] = None, poll_s: float = 2) -> BatchState:
         """Wait until all jobs have ended. Failed ones raise nothing: they are in `failures`. Raises TimeoutError."""

@@ -31,6 +31,9 @@ class Job:
         self.client, self.id = client, job_id
         self.path = f"/v1/jobs/{urllib.parse.quote(job_id, safe='')}"
 
+    def __repr__(self) -> str:
+        return f"Job({self.id!r})"
+
     def state(self) -> JobState:
         """Return the present state; its `raw` is the whole job object of docs/api.md."""
         return JobState.of(self.client.request("GET", self.path).json())

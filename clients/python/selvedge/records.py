@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Mapping, Optional
 
+from .tables import flat, percent, to_pandas, with_error
+
 ENDED = ("succeeded", "failed", "cancelled")
 
 
@@ -70,9 +72,10 @@ class JobState:
         return line
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Parameter:
-    """A fitted parameter, in the units of files (degrees where unit is "deg"). `set`: its group of fibers, or None."""
+    """A fitted parameter, in the units of files (degrees where unit is "deg"). `set`: its group of fibers, or None. `meaning`: the
+    quantity, in one sentence ("" in results of older versions)."""
     name: str
     unit: str
     set: Optional[str]
@@ -83,12 +86,19 @@ class Parameter:
     determined: bool
     at_bound: Optional[str]
     fixed: bool
+    meaning: str
     raw: Mapping[str, Any] = field(repr=False)
 
     @classmethod
     def of(cls, raw: Mapping[str, Any]) -> Parameter:
         return cls(raw["name"], raw.get("unit", ""), raw.get("set"), raw.get("value"), raw.get("standard_error"), raw.get("lower"), raw.get("upper"),
-                   bool(raw.get("determined", True)), raw.get("at_bound"), bool(raw.get("fixed", False)), raw)
+                   bool(raw.get("determined", True)), raw.get("at_bound"), bool(raw.get("fixed", False)), raw.get("meaning") or "", raw)
+
+    def __repr__(self) -> str:
+        remarks = [text for holds, text in ((self.fixed, "fixed"), (self.at_bound is not None, f"at its {self.at_bound} bound"),
+                                            (not self.determined and not self.fixed, "not determined")) if holds]
+        value = f"{with_error(self.value, self.standard_error)} {self.unit}".rstrip()
+        return f"{self.name} = {value}" + (f" ({', '.join(remarks)})" if remarks else "")
 
 
 @dataclass(frozen=True)
@@ -107,10 +117,10 @@ class Model:
                    tuple(Parameter.of(p) for p in raw.get("parameters", ())), raw)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Result:
     """result.json. Jobs that end with the geometry have no parameters and no errors. The models of a job with the profile
-    of a fiber have their relative residual as fit_rel_rms."""
+    of a fiber have their relative residual as fit_rel_rms. Printed, it is a verdict, the errors and a line for each parameter."""
     verdict: Optional[Verdict]
     converged: Optional[bool]
     fit_rel_rms: Optional[float]
@@ -132,6 +142,23 @@ class Result:
             if p.name == name and set in (None, p.set):
                 return p
         raise KeyError(name)
+
+    def table(self, what: str = "parameters") -> list[dict[str, Any]]:
+        """Return "parameters" or "rows" (measured and rendered radiances) as flat rows: dicts of numbers and texts. Raises KeyError for
+        another word."""
+        if what not in ("parameters", "rows"):
+            raise KeyError(f"a result has no table '{what}': it has 'parameters' and 'rows'")
+        return [flat(row) for row in self.raw.get(what) or ()]
+
+    def to_pandas(self, what: str = "parameters") -> Any:
+        """Return the same table as a pandas.DataFrame. Raises ImportError where pandas is not installed."""
+        return to_pandas(self.table(what), ("name", "set", "value", "standard_error", "unit"))
+
+    def __repr__(self) -> str:
+        lines = [f"Result: {self.verdict.words if self.verdict else 'without a verdict'}"]
+        errors = [f"{percent(self.raw[key], self.raw.get(key + '_se'))} {words}" for key, words in (("heldout_rel_rms", "held out"), ("fit_rel_rms", "fitted"))
+                  if self.raw.get(key) is not None]
+        return "\n  ".join(lines + (["relative error " + ", ".join(errors)] if errors else []) + [repr(p) for p in self.parameters])
 
 
 @dataclass(frozen=True)
