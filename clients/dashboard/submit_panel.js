@@ -49,6 +49,7 @@ class SubmitPanel {
     this.key = null;
     this.sent = new Map();
     this.accepted = null; // the document whose warnings were shown
+    this.timer = null;
     this.build(copy);
     if (copy !== null) this.beginCopy(copy); else offerUpload(this.interrupted, (job) => this.goOn(job));
     if (handed) this.take(handed.files, handed.folder);
@@ -66,7 +67,7 @@ class SubmitPanel {
     this.from = el("p", { class: "hint" });
     this.example = exampleOffer();
     this.editor = documentEditor((now) => { this.use(now); this.show(); this.judge(); });
-    this.check = new LiveCheck(this.editor, () => this.show());
+    this.check = new LiveCheck(this.editor, () => this.soon());
     this.rig = new RigPicker(change);
     this.grid = new AngleGrid(change);
     this.questions = new Questions(change);
@@ -117,7 +118,7 @@ class SubmitPanel {
 
   // The line of a file that the document names.
   named({ name }) {
-    const file = this.dropped.get(name), picture = file ? thumbnail(file, () => this.show()) : el("span", { class: "thumbnail", "aria-hidden": "true" }, el("span", { class: "sign" }, "?"));
+    const file = this.dropped.get(name), picture = file ? thumbnail(file, () => this.soon()) : el("span", { class: "thumbnail", "aria-hidden": "true" }, el("span", { class: "sign" }, "?"));
     return el("li", { "data-file": name }, picture, el("span", { class: "name" }, el("span", { class: "mono" }, name), file ? el("span", { class: "size" }, size(file.size)) : null),
       el("span", { class: "said" }, this.otherSize(name), " ", this.stateOf(name)));
   }
@@ -125,7 +126,7 @@ class SubmitPanel {
   lines() {
     if (this.written) {
       const choose = (names, kind) => { for (const name of names) this.chosen.set(name, kind); this.sync(); };
-      return [...fileLines({ files: this.dropped, kinds: this.kinds, stateOf: (name) => this.stateOf(name), choose, changed: () => this.show() }),
+      return [...fileLines({ files: this.dropped, kinds: this.kinds, stateOf: (name) => this.stateOf(name), choose, changed: () => this.soon() }),
         ...this.wanted().filter((f) => !this.dropped.has(f.name)).map((f) => this.named(f))];
     }
     const names = new Set(this.wanted().map((f) => f.name)), unused = [...this.dropped.keys()].filter((name) => !names.has(name) && !name.endsWith(".json"));
@@ -145,6 +146,9 @@ class SubmitPanel {
   nameOf(...wanted) { return [...this.kinds].find(([, kind]) => wanted.includes(kind))?.[0]; }
 
   // ---- the page as a whole ----
+
+  // Shows the page a moment later, once for all that becomes known until then: of a thousand slices, say.
+  soon() { this.timer ??= setTimeout(() => { this.timer = null; this.show(); }, 100); }
 
   show() {
     const doc = this.doc ?? {}, focused = document.activeElement?.getAttribute("aria-label");

@@ -175,6 +175,12 @@ def test_angles_by_keys_and_from_a_spreadsheet(stub, browser, tmp_path):
     drop(browser, sample(tmp_path, ["cloth.hair", "a.png", "b.png", "c.png"]))
     wait_for(browser, "document.querySelectorAll('#angles tbody tr').length === 3")
     point(browser, 0, 0)
+    cell(browser, 2, 4).send_keys("9")
+    drop(browser, sample(tmp_path, ["dark-1.png"]))  # the page is shown anew while a cell is being filled
+    wait_for(browser, "document.querySelector(`li[data-file='dark-1.png']`)")
+    assert cell(browser, 2, 4).get_attribute("value") == "9"
+    cell(browser, 2, 4).clear()
+    point(browser, 0, 0)
     for word in ("30", Keys.ENTER, "40", Keys.ARROW_DOWN, "5", Keys.ARROW_UP, Keys.ARROW_RIGHT, "270", Keys.TAB):
         ActionChains(browser).send_keys(word).perform()
     assert [p.get("light_theta_deg") for p in written(browser)["photographs"]] == [30, 40, 5] and written(browser)["photographs"][1]["light_phi_deg"] == 270

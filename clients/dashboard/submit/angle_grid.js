@@ -41,8 +41,9 @@ export class AngleGrid {
     this.body.addEventListener("keydown", (e) => this.move(e));
     this.body.addEventListener("paste", (e) => this.paste(e));
     this.body.addEventListener("focusin", (e) => this.point(Number(e.target.dataset.row)));
+    this.body.addEventListener("input", (e) => { e.target.dataset.typed = ""; });
     this.body.addEventListener("input", (e) => this.drawing.show({ ...this.doc.photographs[Number(e.target.dataset.row)], [ANGLES[Number(e.target.dataset.column)][0]]: Number(e.target.value.replace(",", ".")) }));
-    this.body.addEventListener("change", (e) => { this.put(Number(e.target.dataset.row), Number(e.target.dataset.column), e.target.value); this.changed(this.doc); });
+    this.body.addEventListener("change", (e) => { delete e.target.dataset.typed; this.put(Number(e.target.dataset.row), Number(e.target.dataset.column), e.target.value); this.changed(this.doc); });
     this.body.addEventListener("pointerover", (e) => { const row = e.target.closest("tr")?.dataset.row; if (row !== undefined && !this.body.contains(document.activeElement)) this.point(Number(row)); });
   }
 
@@ -123,7 +124,7 @@ export class AngleGrid {
     }
     photographs.forEach((p, row) => ANGLES.forEach(([name], column) => {
       const input = this.cell(row, column), text = p[name] === undefined ? "" : String(p[name]);
-      if (input && input.value !== text) input.value = text;
+      if (input && input.value !== text && input.dataset.typed === undefined) input.value = text; // what is being typed stays
       if (input && column === 4) input.placeholder = "0";
     }));
     const guessed = this.patternOf(photographs.map((p) => p.file).filter((f) => typeof f === "string")), missing = unplaced(doc).length;

@@ -1,7 +1,7 @@
 // The files that a job document names, with the roles under which they are sent.
 export function filesOf(doc) {
-  const list = [];
-  const add = (name, role) => { if (typeof name === "string" && !list.some((f) => f.name === name)) list.push({ name, role }); };
+  const list = [], names = new Set();
+  const add = (name, role) => { if (typeof name === "string" && !names.has(name)) { names.add(name); list.push({ name, role }); } };
   for (const name of doc.volume?.files ?? []) add(name, "volume");
   add(doc.fibers?.file, "fibers");
   add(doc.cloth?.draft_file, "draft");

@@ -1,8 +1,9 @@
 """Jobs whose cloth is described: from the document to results, and what cannot be."""
+import json
 import os
 
 import pytest
-from daemon_under_test import problem, program
+from daemon_under_test import ROOT, problem, program
 from small_cloth import TABLE
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
@@ -79,3 +80,15 @@ def test_a_crimp_that_cannot_be(real):
 def test_a_mistake_is_refused_at_once(real):
     reply = real.post("/v1/jobs", json={"sample": "s", "cloth": {"weave": "plain", "crimp": 2}, "measurements": {"file": "rows.csv"}})
     problem(reply, 422, "invalid", "cloth.crimp")
+
+
+def test_the_example_of_the_dashboard_is_without_fault(real):
+    """Its files pass the check without a warning, and it asks for the picture and the twin that the button promises."""
+    with open(os.path.join(ROOT, "clients", "dashboard", "submit", "example.json"), encoding="utf-8") as f:
+        example = json.load(f)
+    document = example["document"]
+    job = real.create(document)
+    real.upload(job, document["measurements"]["file"], ("\n".join(example["table"]) + "\n").encode(), "measurements")
+    judged = real.post(f"/v1/jobs/{job}/check").json()
+    assert judged["valid"] and judged["errors"] == [] and judged["warnings"] == []
+    assert document["twin"]["make"] and [p["on"] for p in document["pictures"]] == ["drape"]
