@@ -52,7 +52,7 @@ def test_no_tab_is_tall(fitted, browser):
     browser.get(f"{url}/#{job.id}")
     wait_for(browser, ACTIVE)
     names = browser.execute_script(NAMES)
-    assert names == ["parameters", "pictures", "geometry", "rows", "files", "settings", "log"]
+    assert names == ["parameters", "pictures", "geometry", "rows", "more", "files", "settings", "log"]
     for name in names:
         open_tab(browser, name)
         for width in (1280, 375):
@@ -128,7 +128,8 @@ def test_only_tabs_with_content(stub, browser):
     wait_for(browser, ACTIVE)
     job.wait()
     wait_for(browser, f"{ACTIVE} === 'parameters'")
-    assert browser.execute_script(NAMES) == ["parameters", "files", "settings", "log"], "this stub has no rows, pictures and geometry"
+    wait_for(browser, "document.querySelector('.state.succeeded')")
+    assert browser.execute_script(NAMES) == ["parameters", "more", "files", "settings", "log"], "this stub has no rows, pictures and geometry"
     browser.get(f"{url}/#{job.id}/geometry")
     wait_for(browser, f"{ACTIVE} === 'parameters'")
     failed, _ = submit(url, folder, "failing tabs")

@@ -48,8 +48,9 @@ struct cli_args {
     const char *max_age, *max_bytes;                     /* of retention */
     const char *state, *verdict, *tag, *sample, *days;   /* of list */
     bool watch, json, follow, draft, align, once, yes;
-    bool trial; /* --trial: of a scan */
-    bool help;  /* --help was given: for one command if has_command is set */
+    bool revoke, links; /* --revoke, --links: of share */
+    bool trial;         /* --trial: of a scan */
+    bool help;          /* --help was given: for one command if has_command is set */
     bool version;
     bool has_command;
 };

@@ -52,6 +52,8 @@ const struct cli_option cli_option_table[CLI_N_OPTION] = {
 #undef PICTURE_OPTION
     {NULL, 0, "to", "FORMAT", "mitsuba, pbrt, usd, blender, textures, or several between commas (docs/exports.md)",
      offsetof(struct cli_args, to)},
+    {NULL, 0, "revoke", NULL, "end all links of the job", offsetof(struct cli_args, revoke)},
+    {NULL, 0, "links", NULL, "list the links that are valid", offsetof(struct cli_args, links)},
     {NULL, 0, "template", "JOB.json",
      "job document of samples that have no job.json; '*' in names of files is filled in",
      offsetof(struct cli_args, template)},
@@ -69,7 +71,8 @@ const struct cli_option cli_option_table[CLI_N_OPTION] = {
      offsetof(struct cli_args, verdict)},
     {"selection", 0, "tag", "TAG", "only with this tag", offsetof(struct cli_args, tag)},
     {"selection", 0, "sample", "TEXT", "only samples whose name contains this", offsetof(struct cli_args, sample)},
-    {"selection", 0, "days", "N", "only jobs of the last N days", offsetof(struct cli_args, days)},
+    {"selection", 0, "days", "N", "only jobs of the last N days; of share: how long the link is valid",
+     offsetof(struct cli_args, days)},
     {NULL, 0, "json", NULL, "print JSON", offsetof(struct cli_args, json)},
     {NULL, 'o', "out", "DIR", "folder for the files (default: selvedge-ID)", offsetof(struct cli_args, out_dir)},
     {NULL, 'f', "follow", NULL, "keep printing until the job ends", offsetof(struct cli_args, follow)},

@@ -183,6 +183,19 @@ class Job:
         job.wait(on_progress)
         return job.download(folder, under="twin/")
 
+    def share(self, days: float = 30) -> str:
+        """Make a link that shows this job and its results, read only, to someone without a token, and return its address, which
+        nothing gives again. It ends after `days`, or by unshare()."""
+        answer = self.client.request("POST", self.path + "/shares", json_body={"days": days}, n_try=1).json()
+        return f"{self.client.url}/#share/{answer['secret']}"
+
+    def unshare(self) -> int:
+        """Revoke all links of this job; return how many."""
+        valid = [s["id"] for s in self.client.request("GET", self.path + "/shares").json()["shares"] if s["open"]]
+        for share in valid:
+            self.client.request("DELETE", f"{self.path}/shares/{share}").read()
+        return len(valid)
+
     def series(self) -> list[dict[str, Any]]:
         """Return all points of the fit's curve, oldest first (the server merges more than 5000)."""
         points: list[dict[str, Any]] = []

@@ -2,13 +2,18 @@
 import glob
 import os
 import sqlite3
+import subprocess
+import sys
 
 import pytest
 import requests
-from daemon_under_test import DOCUMENT, Daemon, problem
+from daemon_under_test import DOCUMENT, ROOT, Daemon, problem, program
 from openapi_check import METHODS, load
 from test_owners import call, make_batch
 from test_tokens import make
+
+sys.path.insert(0, os.path.join(ROOT, "clients", "python"))
+import selvedge  # noqa: E402
 
 OPERATIONS = [(path, method, item[method]) for path, item in load()["paths"].items() for method in METHODS if method in item]
 ALLOWED = {"getJob", "listResults", "getResult", "getArchive"}
@@ -135,3 +140,23 @@ def test_without_tokens_a_link_says_that_it_protects_nothing(daemon):
     assert requests.post(daemon.url + "/v1/shared", json={"secret": made["secret"]}, timeout=30).json()["job"] == job
     problem(daemon.post("/v1/shared", json={"secret": "x" * 30}), 404, "not_found")
     problem(daemon.post("/v1/shared", json={"secret": 5}), 422, "invalid", field="secret")
+
+
+def test_command_and_python_make_and_revoke_links(lab):
+    token = make(lab.admin, "dora", owner="ann")
+
+    def share_command(*words):
+        return subprocess.run([program("selvedge"), "share", lab.job, *words, "--server", lab.url], env=dict(os.environ, SELVEDGE_TOKEN=token),
+                              capture_output=True, text=True, timeout=60, check=False)
+
+    made = share_command("--days", "2")
+    assert made.returncode == 0 and made.stdout.startswith(f"{lab.url}/#share/selvedge_") and "valid until" in made.stderr, made.stderr
+    reader = lab.of(made.stdout.strip().split("/#share/")[1])
+    address = selvedge.Client(lab.url, token).job(lab.job).share(3)
+    other = lab.of(address.split("/#share/")[1])
+    assert reader.get(f"/v1/jobs/{lab.job}").status_code == other.get(f"/v1/jobs/{lab.job}").status_code == 200
+    assert share_command("--links").stdout.count("made by dora") == 2
+    assert share_command("--revoke").stdout.count("revoked") >= 2
+    assert reader.get(f"/v1/jobs/{lab.job}").status_code == other.get(f"/v1/jobs/{lab.job}").status_code == 401
+    assert "no link" in share_command("--links").stderr and share_command("--days", "soon").returncode == 1
+    assert selvedge.Client(lab.url, token).job(lab.job).unshare() == 0
