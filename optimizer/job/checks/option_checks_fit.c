@@ -271,5 +271,8 @@ status job_check_twin(const struct option_value *v, struct error *err)
 status job_check_candidates(const struct option_value *v, struct error *err)
 {
     struct job_fit *fit = v->own;
+    if (fit->n_candidate == 0 && !fit->candidate_grid)
+        return error_set_field(err, STATUS_INVALID, v->path,
+                               "'%s' has no configurations and no grid: fill it or leave it out", v->path);
     return fit->candidate_grid ? make_grid(v->section->setup, fit, err) : STATUS_OK;
 }

@@ -193,7 +193,7 @@ static status read_object(const struct job_option *row, const struct json_field 
     if (s != STATUS_OK) return s;
     if (row->stored) *(bool *)((char *)base + row->at) = present;
     const size_t n_before = n_fault(r);
-    const bool may_be_empty = row->stored || row->check != NULL || json_object_size(sub.object) > 0;
+    const bool may_be_empty = row->stored || row->may_be_empty || json_object_size(sub.object) > 0;
     s = read_section(&sub, row->path, base, r, err);
     if (s != STATUS_OK || may_be_empty || n_fault(r) > n_before) return s;
     return error_set_field(err, STATUS_INVALID, sub.path, "'%s' is empty and would do nothing: fill it or leave it out",

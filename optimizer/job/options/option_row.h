@@ -50,6 +50,7 @@ struct job_option {
     enum option_kind kind;
     bool required;
     bool or_section;                /* OPTION_BOOL, OPTION_LIST: an object of the rows under path is allowed as well */
+    bool may_be_empty;              /* OPTION_SECTION: {} means something, or the check says what it lacks */
     bool stored;                    /* it has a target */
     enum job_section section;       /* of the target */
     size_t at;                      /* offset of the target in the section, or in an element of a list */

@@ -33,6 +33,7 @@ static const char *weave_name(size_t i) { return cloth_weave_names[i]; }
 const struct job_option option_rows_described[] = {
     {.path = "cloth",
      .kind = OPTION_SECTION,
+     .may_be_empty = true,
      OF_SECTION(cloth),
      .id = OPTION_CLOTH,
      .check = job_check_cloth,

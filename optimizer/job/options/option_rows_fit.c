@@ -41,6 +41,7 @@ _Static_assert((int)N_EXPORT <= (int)JOB_MAX_EXPORT, "more exports than JOB_MAX_
 const struct job_option option_rows_fit[] = {
     {.path = "fit",
      .kind = OPTION_SECTION,
+     .may_be_empty = true,
      OF_SECTION(fit),
      .check = job_check_fit,
      .schema = FEWER_ITERATIONS,

@@ -12,6 +12,7 @@ static const char *const job_bowl_channels[] = {"grey", "rgb", NULL};
 const struct job_option option_rows_profile[] = {
     {.path = "profile",
      .kind = OPTION_SECTION,
+     .may_be_empty = true,
      .check = job_check_profile,
      .left_out = "this, or a cloth with `photographs` or `measurements`",
      .meaning = "The measured profile of a single fiber, to which the models of `fit` are fitted. Such a job has no "
