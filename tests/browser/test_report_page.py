@@ -46,6 +46,15 @@ def test_page_and_charts_have_the_theme_of_the_screen(browser, page, theme, leas
     assert complaints(browser) == []
 
 
+@pytest.mark.parametrize("theme, least, most", [("light", 200, 255), ("dark", 0, 70)])
+def test_the_quality_page_and_its_plots_have_it_too(browser, page, theme, least, most):
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]})
+    browser.get(page.replace("report.html", "quality.html"))
+    for element in [browser.find_element("css selector", "h1"), browser.find_element("css selector", "img.plot")]:
+        assert least <= mean_level(element) <= most, element.get_attribute("outerHTML")
+    assert complaints(browser) == []
+
+
 def test_a_phone_needs_no_sideways_scrolling(browser, page):
     browser.get(page)
     with sized(browser, 375, 800):

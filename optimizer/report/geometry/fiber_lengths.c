@@ -117,7 +117,7 @@ void fiber_lengths_plot(const struct fiber_lengths *l, double tile_m, FILE *out)
     fprintf(out,
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\" "
             "font-family=\"sans-serif\" font-size=\"12\" "
-            "fill=\"#222\">\n<rect width=\"%d\" height=\"%d\" fill=\"#fff\"/>\n",
+            "fill=\"#222\">\n" SVG_DARK_STYLE "<rect width=\"%d\" height=\"%d\" fill=\"#fff\"/>\n",
             WIDTH, HEIGHT, WIDTH, HEIGHT, WIDTH, HEIGHT);
     plot_axes(l, most_m, out);
     if (most_m > 0.0) plot_bars(l, most_m, out);

@@ -22,4 +22,10 @@ status fiber_lengths_measure(const struct fiber_set *f, struct fiber_lengths *l,
  * tile_m, the larger edge of the tile. */
 void fiber_lengths_plot(const struct fiber_lengths *l, double tile_m, FILE *out);
 
+/* A style sheet inside of an SVG picture, which exchanges its colors where the page that shows it is dark. */
+#define SVG_DARK_STYLE                                                                                                 \
+    "<style>@media (prefers-color-scheme: dark) { svg { fill: #e6e8ec; } [fill=\"#fff\"] { fill: #14171c; } "          \
+    "[stroke=\"#ddd\"] { stroke: #3a404a; } [fill=\"#b00\"] { fill: #ff8a80; } [stroke=\"#b00\"] { stroke: #ff8a80; "  \
+    "} }</style>\n"
+
 #endif

@@ -3,6 +3,7 @@
 #include "geometry/fibers/shape/section_summary.h"
 #include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/document/json_number.h"
+#include "optimizer/report/geometry/fiber_lengths.h"
 
 #include <math.h>
 
@@ -122,7 +123,8 @@ void section_report_plot(const struct report *report, FILE *out)
     const double bar = (double)(WIDTH - LEFT - RIGHT) / SECTION_N_BIN;
     fprintf(out,
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\" "
-            "font-family=\"sans-serif\" font-size=\"12\" fill=\"#222\">\n<rect width=\"%d\" height=\"%d\" "
+            "font-family=\"sans-serif\" font-size=\"12\" fill=\"#222\">\n" SVG_DARK_STYLE
+            "<rect width=\"%d\" height=\"%d\" "
             "fill=\"#fff\"/>\n",
             WIDTH, HEIGHT, WIDTH, HEIGHT, WIDTH, HEIGHT);
     const bool made = make_summary(report, &s) == STATUS_OK;
