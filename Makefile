@@ -71,7 +71,7 @@ LINK_OPTIMIZER := -lseccomp -lraw_r -ljpeg -lnlopt -ljansson -lsodium -larchive 
 LINK_WAVE := -llapacke # the solver of waves, which no installed program contains
 LINK_SERVER := -lmicrohttpd -lgnutls -ljansson -lsqlite3 -lsodium -linih -luuid -larchive -lcurl $(LINK_BASE)
 
-.PHONY: all generate medulla-tables wave-tables speckle-tables deps help check test nightly demo demo-camera night cluster-demo clean
+.PHONY: all generate medulla-tables wave-tables speckle-tables deps help check test nightly demo demo-camera night examples cluster-demo clean
 ##@ Build and run
 all: $(PROGRAMS) $(PLUGINS) ## build the programs into build/bin
 
@@ -89,6 +89,10 @@ demo-camera: | deps ## the same from raw files of a simulated camera: noise, thr
 night: | deps      ## a night's run: ten synthetic samples in a watched folder (a few minutes; docs/automation.md)
 	@$(MAKE) --no-print-directory -j$$(nproc) all
 	@./clients/night.sh
+
+examples: | deps   ## the files of three small jobs in examples/: a scan with photographs, a scan with a table, a described cloth
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@python3 clients/make_examples.py --bin $(BUILD)/bin examples
 
 cluster-demo:      ## a batch of six samples on a Slurm of two virtual nodes started here, a worker killed, results compared (docs/cluster.md)
 	@./config/install-dependencies cluster

@@ -28,8 +28,8 @@ void report_work(const struct report_work_input *in, double part_s[REPORT_N_PART
     part_s[REPORT_EXPORTS] = in->path_s * exports_paths(in->results, in->n_row, in->n_fit_path) +
                              segment_s * in->n_segment * (double)exports_count(in->results);
     if (in->kind != JOB_OF_FIT) return;
-    part_s[REPORT_FINDINGS] =
-        in->certificate_s + (in->n_candidate > 0 ? candidate_share * in->path_s * in->n_fit_path_of_models : 0.0);
+    part_s[REPORT_FINDINGS] = page_s + in->certificate_s +
+                              (in->n_candidate > 0 ? candidate_share * in->path_s * in->n_fit_path_of_models : 0.0);
     part_s[REPORT_RENDERINGS] = in->path_s * result_renderings_paths(in->results, in->n_row, in->n_fit_path);
 }
 

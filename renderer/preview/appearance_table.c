@@ -17,6 +17,9 @@ enum {
     MOST_SMOOTH = 4
 };
 
+/* Smoothing the table takes as long as so many of its paths: 2.8 of 10 processor seconds beside 298,000 paths. */
+static const double smooth_paths = 1e5;
+
 struct check;
 struct table_work {
     struct table_walks walks;
@@ -218,7 +221,7 @@ static void smooth_table(const struct appearance_table *t, float *value, float *
 }
 
 /* Smooths the table while that brings it nearer to one half of the check; the other half tells its error. */
-static status smooth_and_check(const struct table_work *w, struct error *err)
+static status smooth_and_check(const struct table_work *w, const struct progress *progress, struct error *err)
 {
     struct appearance_table *t = w->t;
     size_t n_byte = n_cell(t, t->view_edge) * n_cell(t, t->light_edge) * 3 * t->n_basis * sizeof *t->value;
@@ -230,6 +233,7 @@ static status smooth_and_check(const struct table_work *w, struct error *err)
                                              : error_set(err, STATUS_NO_MEMORY, "cannot make tables: out of memory");
     t->n_smooth = 0;
     for (size_t i = 1; i <= MOST_SMOOTH && s == STATUS_OK; i++) {
+        progress_report(progress, (double)i / (MOST_SMOOTH + 1.0));
         memcpy(best, t->value, n_byte);
         smooth_table(t, t->value, spare);
         check_error(w, &choose, &error, &noise);
@@ -268,6 +272,11 @@ static status set_sizes(const struct table_walks *walks, const struct appearance
     return error_set(err, STATUS_NO_MEMORY, "cannot make tables: out of memory");
 }
 
+double appearance_table_fixed_paths(size_t n_texel)
+{
+    return (double)APPEARANCE_BASIS_VIEWS * (double)n_texel + (double)CHECK_VIEWS * (double)CHECK_PATHS + smooth_paths;
+}
+
 static status fill(struct table_work *w, const struct appearance_table_option *o, struct thread_pool *pool,
                    const struct progress *progress, struct error *err)
 {
@@ -277,23 +286,23 @@ static status fill(struct table_work *w, const struct appearance_table_option *o
     w->n_group = (n_light + TABLE_LIGHTS - 1) / TABLE_LIGHTS;
     w->n_path = (size_t)(o->n_path / (n_view * w->n_group));
     if (w->n_path == 0) w->n_path = 1;
-    struct progress inner = progress_begin_part(&part, progress, 0.0, 0.2);
+    const double n_texel = (double)(t->width * t->height), basis = (double)APPEARANCE_BASIS_VIEWS * n_texel,
+                 all = (double)o->n_path + appearance_table_fixed_paths(t->width * t->height),
+                 check = (double)CHECK_VIEWS * (double)CHECK_PATHS;
+    struct progress inner = progress_begin_part(&part, progress, 0.0, basis / all);
     status s = appearance_basis_make(&w->walks, pool, &inner, t, err);
     if (s != STATUS_OK) return s;
-    part.from = 0.2;
-    part.share = 0.75;
+    part.from = basis / all;
+    part.share = (double)o->n_path / all;
     s = thread_pool_run(pool, n_view * w->n_group, table_task, w, &inner);
-    part.from = 0.95;
-    part.share = 0.05;
+    part.from += part.share;
+    part.share = check / all;
     if (s == STATUS_OK) s = thread_pool_run(pool, CHECK_VIEWS, check_task, w, &inner);
+    part.from += part.share;
+    part.share = 1.0 - part.from;
     if (s != STATUS_OK || progress_cancelled(progress))
         return error_set(err, STATUS_CANCELLED, "making tables was cancelled");
-    return smooth_and_check(w, err);
-}
-
-double appearance_table_fixed_paths(size_t n_texel)
-{
-    return (double)APPEARANCE_BASIS_VIEWS * (double)n_texel + (double)CHECK_VIEWS * (double)CHECK_PATHS;
+    return smooth_and_check(w, &inner, err);
 }
 
 status appearance_table_make(const struct radiance_input *in, const struct appearance_table_option *o,

@@ -46,7 +46,8 @@ struct appearance_table {
 
 size_t appearance_table_n_direction(const struct appearance_table *t, size_t edge);
 
-/* Paths with TABLE_LIGHTS lights that the textures and the check of the table's error take, besides n_path. */
+/* Paths with TABLE_LIGHTS lights that the textures, the smoothing and the check of the table's error take, besides
+ * n_path. */
 double appearance_table_fixed_paths(size_t n_texel);
 /* The cloth of in->scene.fibers, which must be flat. Both sides are computed if it has no black sheet. The bits do not
  * depend on the number of threads. STATUS_INVALID: a volume model, a bent cloth, sizes of 0 or too large, and as

@@ -85,9 +85,10 @@ bench-scan-errors: | deps-test ## scanned cloths: whether the stated errors cont
 	@/usr/bin/python3 tests/bench/bench_scan_errors.py --build $(BUILD)
 
 # PROGRESS: some of the jobs, such as PROGRESS="demo fiber_ct weave_ct": fleece alone takes a quarter of an hour
-bench-progress: | deps-test ## predicted against actual remaining time of four jobs, and the largest jump of their progress (half an hour on 2 quiet cores)
+bench-progress: | deps-test ## predicted against actual remaining time of four jobs and of jobs of six kinds, and the largest jump of their progress (35 minutes on 2 quiet cores)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/bench_progress.py --build $(BUILD) $(PROGRESS)
+	@$(if $(PROGRESS),,/usr/bin/python3 tests/bench/bench_forecast.py --build $(BUILD))
 
 # DASHBOARD: some of the figures only: first_hour list job slices
 bench-dashboard: | deps-test ## clicks and keys to a first job, and what the dashboard costs in a browser: opening a list of 10,000 jobs, bytes of a poll, scripts of a page with a long fit and log, slices of a scan of Fleece's size (three minutes)

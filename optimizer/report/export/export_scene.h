@@ -26,7 +26,7 @@ struct export_scene {
 struct export_format {
     /* *json: an array with one object for each group of fibers, a new reference. */
     status (*write)(struct export_scene *e, json_t **materials, struct error *err);
-    /* Light paths that it takes, after a fit of n_fit_path; NULL: none. */
+    /* Paths of a photograph that take as long, after a fit of n_fit_path; NULL: it renders nothing. */
     double (*paths)(const struct job_results *results, size_t n_row, double n_fit_path);
 };
 

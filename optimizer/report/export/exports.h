@@ -8,7 +8,8 @@
 
 /* Number of formats that the job asks for. */
 size_t exports_count(const struct job_results *results);
-/* Light paths that the exports take, all for textures, which have as many pixels as the renderings. */
+/* Paths of a photograph that take as long as the exports, all of textures, whose pixels are as many as those of the
+ * renderings. */
 double exports_paths(const struct job_results *results, size_t n_row, double n_fit_path);
 /* Writes the folders for the best model and adds one object each to report->exports. Warns when the best model sees no
  * fibers, and of parts that a scene lacks. from, to: shares of the stage before and after. */

@@ -52,6 +52,7 @@ void job_clock_plan(struct job_clock *c, size_t i, const struct job_clock_work *
     snprintf(s->key, sizeof s->key, "%s", work->key);
     s->planned = true;
     s->own_speed = false;
+    s->remembered = e != NULL;
     s->predicts_end = work->predicts_end;
     s->i_of_plus_one = 0;
     s->units = work->units;
@@ -72,8 +73,9 @@ void job_clock_plan_own(struct job_clock *c, size_t i, const char *key, double s
     c->stage[i].log_sd = fmin(c->stage[i].log_sd, sd_own);
 }
 
-/* Factor by which the stages of this job take longer than expected, shrunk towards 1 where few stages have ended. */
-static double slower_by(const struct job_clock *c)
+/* Factor by which the stages of this job take longer than expected, shrunk towards 1 where few stages have ended.
+ * *log_sd: standard deviation of its logarithm. */
+static double slower_by(const struct job_clock *c, double *log_sd)
 {
     double sum = 0.0, weight = 1.0 / (sd_factor * sd_factor);
     for (size_t i = 0; i < c->n_stage; i++) {
@@ -85,6 +87,7 @@ static double slower_by(const struct job_clock *c)
         sum += w * log(s->wall_s / s->expected_s);
         weight += w;
     }
+    *log_sd = 1.0 / sqrt(weight);
     return exp(sum / weight);
 }
 
@@ -96,7 +99,8 @@ void job_clock_plan_share(struct job_clock *c, size_t i, const char *key, double
 
 static double expected_s(const struct job_clock *c, const struct job_clock_stage *s)
 {
-    return s->planned ? s->expected_s * (s->own_speed ? 1.0 : slower_by(c)) : 0.0;
+    double unused;
+    return s->planned ? s->expected_s * (s->own_speed ? 1.0 : slower_by(c, &unused)) : 0.0;
 }
 
 /* Share of the stage's time that has passed at a fraction. likely: the share by its elapsed time. Where the fraction of
@@ -177,7 +181,7 @@ static double running_s(const struct job_clock *c, double now_s, double *log_sd)
 static double remaining_s(const struct job_clock *c, double now_s, double *sd_s)
 {
     const struct job_clock_stage *s = &c->stage[c->i_stage];
-    double sum = 0.0, var = 0.0, log_sd, total = 0.0, running_log_sd = 0.0;
+    double sum = 0.0, var = 0.0, log_sd, total = 0.0, running_log_sd = 0.0, unknown = 0.0;
     const bool runs = s->began && !s->ended;
     if (runs) {
         const double share = running_share(c, now_s);
@@ -198,8 +202,10 @@ static double remaining_s(const struct job_clock *c, double now_s, double *sd_s)
         }
         sum += rest;
         var += rest * log_sd * rest * log_sd;
+        if (!later->remembered && !later->own_speed) unknown += rest;
     }
-    *sd_s = sqrt(var);
+    slower_by(c, &log_sd);
+    *sd_s = hypot(sqrt(var), unknown * log_sd); /* how fast this machine is enters all stages alike */
     return sum;
 }
 

@@ -27,6 +27,7 @@ struct job_clock_stage {
     bool planned, began, ended, loaded; /* loaded: an earlier attempt has done it */
     size_t i_of_plus_one;               /* its units are a share of the time of that stage; 0: they are not */
     bool own_speed;                     /* its units are seconds by this job's own speed: the factor is not applied */
+    bool remembered;                    /* its speed is of earlier jobs on this machine */
     bool predicts_end;                  /* job_clock_work.predicts_end */
     double units, expected_s, log_sd;
     double wall_s;                       /* of an ended stage */
