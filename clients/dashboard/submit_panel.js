@@ -19,7 +19,7 @@ import { Questions } from "./submit/questions.js";
 import { RigPicker, rigOf } from "./submit/rig_picker.js";
 import { tableHead, withAllRotations } from "./submit/table_head.js";
 import { thumbnail } from "./submit/thumbnails.js";
-import { sendFiles, UploadBar } from "./submit/uploads.js";
+import { removeFile, sendFiles, UploadBar } from "./submit/uploads.js";
 import { statesVoxelSize } from "./submit/voxel_statement.js";
 import { writeFiles } from "./submit/written_document.js";
 
@@ -36,7 +36,8 @@ class SubmitPanel {
     this.source = null; // the document as text
     this.written = copy === null; // by this page, from the files; otherwise the document was dropped or is a copy
     this.before = null; // the copied job
-    this.resumed = null; // {id, source} of an interrupted upload that goes on
+    this.resumed = false; // whether an interrupted upload goes on
+    this.draft = null; // {id, source} of the job that was made by an earlier press of the button, and has not started
     this.picked = null; // the preset that the user has chosen
     this.preset = null;
     this.statesVoxel = true;
@@ -45,9 +46,8 @@ class SubmitPanel {
     this.twice = null; // a sentence on names that several files have
     this.open = []; // what must be known and is not
     this.busy = false;
-    // kept while the document is the same, so that another try continues an interrupted submit
-    this.key = null;
-    this.sent = new Map();
+    this.key = null; // of the document, so that a request that is sent twice makes one job
+    this.sent = new Map(); // name -> mark of the files that were sent
     this.accepted = null; // the document whose warnings were shown
     this.timer = null;
     this.build(copy);
@@ -192,7 +192,7 @@ class SubmitPanel {
   // ---- the document ----
 
   use(now) {
-    if (now !== this.source) { this.key = newKey(); this.sent = new Map(); this.accepted = null; }
+    if (now !== this.source) { this.key = newKey(); this.accepted = null; }
     this.source = now;
     this.doc = null; // when it is no JSON
     this.doc = JSON.parse(now);
@@ -273,7 +273,8 @@ class SubmitPanel {
 
   async goOn(job) {
     await this.useBefore(job);
-    this.resumed = { id: job.id, source: this.source };
+    this.resumed = true;
+    this.draft = { id: job.id, source: this.source };
     this.from.append("Browsers do not keep files over a reload: drop the same files again. Each is recognised by its name, its size and its content, and goes on where it was.");
     this.show();
   }
@@ -293,10 +294,27 @@ class SubmitPanel {
     }
   }
 
-  async send() {
+  // The job of this page: made once, then its document is replaced when it has changed, and files that it no longer names are removed.
+  async makeDraft() {
     // sent as it was written, because JSON.parse does not keep numbers above 2^53
-    const job = this.resumed && this.resumed.source === this.source ? this.resumed
-      : await (await raw("POST", "/v1/jobs", { body: this.source, header: { "Content-Type": "application/json", "Idempotency-Key": this.key } })).json();
+    const header = { "Content-Type": "application/json" }, body = this.source;
+    if (this.draft && this.draft.source !== body) {
+      try {
+        await raw("PUT", `/v1/jobs/${this.draft.id}/document`, { body, header });
+        const names = new Set(this.wanted().map((f) => f.name));
+        for (const name of [...this.sent.keys()].filter((n) => !names.has(n))) { await removeFile(this.draft.id, name); this.sent.delete(name); }
+        this.draft.source = body;
+      } catch (error) {
+        if (error.status !== 404 && error.status !== 409) throw error;
+        this.draft = null; // deleted or started elsewhere
+      }
+    }
+    this.draft ??= { id: (await (await raw("POST", "/v1/jobs", { body, header: { ...header, "Idempotency-Key": this.key } })).json()).id, source: body };
+    return this.draft;
+  }
+
+  async send() {
+    const job = await this.makeDraft();
     rememberUpload(job.id);
     this.say("Sending the files ...");
     await sendFiles({ job: job.id, files: this.wanted(), fileOf: (name) => this.fileOf(name), known: this.sent, bar: this.bar, gone: (name) => this.gone(name) });
@@ -308,7 +326,8 @@ class SubmitPanel {
     }
     await sendJson("POST", `/v1/jobs/${job.id}/start`);
     forgetUpload();
-    this.key = newKey(); // submitting the same document again makes another job
+    this.draft = null; // submitting the same document again makes another job
+    this.key = newKey();
     this.sent = new Map();
     location.hash = job.id;
   }
@@ -327,6 +346,7 @@ class SubmitPanel {
 
   async refused(error) {
     const faults = error.body?.errors ?? [];
+    if (error.status === 404) this.draft = null; // deleted elsewhere: the next press makes another one
     if (error.name === "AbortError") this.say("Cancelled. The job stays a draft with the files that have arrived; Submit goes on.");
     else if (faults.length > 1) this.say([`The input has ${faults.length} faults:`, ...faults.map((f) => (f.field ? `${f.field}: ${f.detail}` : f.detail))].join("\n"), "note bad");
     else this.say(error.message, "note bad");

@@ -242,13 +242,14 @@ def test_warnings_are_shown_before_the_job_starts(stub, browser, tmp_path):
     keep(browser, "warned")
     (job,) = [j for j in selvedge.Client(url).jobs() if j.sample == "warned cloth"]
     assert job.state == "draft"
-    # another answer makes another document, which is judged again; then the job starts
+    # another answer changes the document of the draft, which is judged again; then the job starts
     answer(browser, "sample", "warned cloth, second")
     assert text_of(browser, "#send") == "Submit"
     click_on(browser, "#send")
     wait_for(browser, "document.querySelector('#send').textContent === 'Start all the same' && !document.querySelector('#send').disabled")
     click_on(browser, "#send")
     wait_for(browser, "document.querySelector('.state.succeeded')", 60)
+    assert [(j.id, j.sample) for j in selvedge.Client(url).jobs() if j.sample.startswith("warned")] == [(job.id, "warned cloth, second")]
     assert complaints(browser) == []
 
 
