@@ -4,8 +4,8 @@
 
 #include "geometry/diameter/fiber_diameter.h"
 #include "geometry/diameter/light_material.h"
-#include "geometry/diameter/scan_structure.h"
 #include "geometry/orientation/repeat_direction.h"
+#include "geometry/reconstruct/noise_refusal.h"
 #include "geometry/reconstruct/scan_look.h"
 #include "geometry/reconstruct/void_trim.h"
 #include "geometry/volume/density_map.h"
@@ -22,8 +22,6 @@
 static const double READ_SHARE = 0.6, MAPPED_SHARE = 0.7;
 /* Separability from which on void and material can be distinguished (reconstruct_warn.c). */
 static const double LEAST_SEPARABILITY = 0.7;
-/* Noise alone has a separability of 0.64, and felt at a signal-to-noise ratio of 1 to 2 hardly more. */
-static const double NOISE_SEPARABILITY = 0.65;
 
 /* Changes to make to the grid of the file. "stored": after the permutation of axes, before matrix and cubic
  * resampling. */
@@ -248,31 +246,13 @@ static void state_trim(const struct plan *p, struct reconstruct_option *o, struc
     }
 }
 
-/* Refuses a scan of noise alone, in which lines of noise would be traced for minutes. Who states the diameter of the
- * fibers knows that there are some. */
-static status refuse_noise(const struct volume *v, double separability, const struct reconstruct_option *o,
-                           struct thread_pool *pool, struct error *err)
-{
-    double deviation = INFINITY;
-    if (separability >= NOISE_SEPARABILITY || !isnan(o->fiber_diameter_voxel)) return STATUS_OK;
-    status s = scan_structure_measure(v, pool, &deviation, err);
-    if (s != STATUS_OK || deviation >= SCAN_STRUCTURE_LEAST) return s;
-    return error_set_field(
-        err, STATUS_INVALID, OPTION_SCAN_FILES,
-        "cannot find fibers: the scan shows nothing but noise; void and material cannot be "
-        "distinguished (separability %.2f; noise alone has 0.64), and at scales of 1 to 6 voxels its "
-        "densities are spread as noise is; check that this is the right file, and its type and byte "
-        "order, or state 'fiber_diameter_voxel' to trace it all the same",
-        separability);
-}
-
 static status map_densities(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
                             const struct progress *progress, struct reconstruct_report *report, struct error *err)
 {
     struct density_modes m;
     status s = density_modes_find(v, &m, err);
     if (s == STATUS_OK && report->has_padding) s = volume_mark_unknown(v, err);
-    if (s == STATUS_OK) s = refuse_noise(v, m.separability, o, pool, err);
+    if (s == STATUS_OK) s = noise_refuse(v, m.separability, o, pool, err);
     if (s != STATUS_OK) return s;
     const bool low_alone = !isnan(o->density_low) && isnan(o->density_high);
     const bool is_open = isnan(o->density_high);

@@ -3,6 +3,7 @@
 #include "base/option_id.h"
 #include "base/warning.h"
 #include "geometry/fibers/fiber_set.h"
+#include "geometry/reconstruct/noise_refusal.h"
 #include "geometry/reconstruct/reconstruct.h"
 #include "geometry/weave/weave_detect.h"
 #include "optimizer/job/document/job_photograph.h"
@@ -42,7 +43,10 @@ static void check_volume(struct input_check *c)
     }
     if (!all) goto out;
     volume_options(scan, &option);
-    if (reconstruct_examine(path, scan->n_file, &option, &ledger, &fault) != STATUS_OK) input_check_fault(c, &fault);
+    status s = reconstruct_examine(path, scan->n_file, &option, &ledger, &fault);
+    if (s == STATUS_OK)
+        s = noise_refuse_early(path, scan->n_file, &option, &(struct warning_sink){input_check_warn, c}, &fault);
+    if (s != STATUS_OK) input_check_fault(c, &fault);
     file_ledger_append(c->files, scan->file[0], &ledger);
 out:
     free(text);

@@ -2,6 +2,7 @@
 SHA-256; a worker in its sandbox opens them."""
 import json
 import os
+import random
 import shutil
 import signal
 import subprocess
@@ -165,3 +166,18 @@ def test_links_of_a_folder_made_by_hand_are_read_and_those_of_a_job_are_not(real
     os.symlink(tmp_path / "elsewhere" / "p.exr", at)
     if landlock:
         assert real.post(f"/v1/jobs/{job}/check").json()["valid"] is False
+
+
+def test_a_scan_of_noise_is_told_before_the_job_starts(real):
+    """A scan of bytes that have no order, as a file of another type has; with its fibers' diameter stated it is taken."""
+    random.seed(3)
+    scan = b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 64 64 64\nencoding: raw\n\n" + random.randbytes(64**3)
+    for stated in ({}, {"fiber_diameter_voxel": 6}):
+        job = real.create({"sample": "noise", "volume": {"files": ["noise.nrrd"], "voxel_size_um": 2, **stated}})
+        real.upload(job, "noise.nrrd", scan)
+        checked = real.post(f"/v1/jobs/{job}/check").json()
+        assert checked["valid"] is bool(stated)
+        if not stated:
+            (error,) = checked["errors"]
+            assert error["field"] == "volume.files" and "nothing but noise" in error["detail"]
+            assert real.post(f"/v1/jobs/{job}/start?check=1").status_code == 422 and real.job(job)["state"] == "draft"

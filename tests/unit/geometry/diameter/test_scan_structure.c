@@ -4,6 +4,7 @@
 #include "base/rng.h"
 #include "geometry/diameter/scale_space.h"
 #include "geometry/diameter/scan_structure.h"
+#include "geometry/reconstruct/noise_refusal.h"
 #include "geometry/reconstruct/reconstruct.h"
 #include "tests/support/scan/scan_files.h"
 
@@ -110,6 +111,69 @@ static void test_thin_scans_are_not_judged(void **state)
     assert_true(isinf(deviation_of(&v)));
 }
 
+static void count_warning(void *context, const char *option, const char *text)
+{
+    assert_string_equal(option, OPTION_SCAN_FILES);
+    assert_non_null(strstr(text, "slices in the middle of the scan show nothing but noise"));
+    ++*(int *)context;
+}
+
+/* The check of a job says so before it starts, unless the job states a diameter. */
+static void check_early_refusal(const char *path)
+{
+    int n_warning = 0;
+    const struct warning_sink warn = {count_warning, &n_warning};
+    struct reconstruct_option o;
+    struct error err = {0};
+    reconstruct_option_default(&o);
+    assert_int_equal(noise_refuse_early(&path, 1, &o, &warn, &err), STATUS_INVALID);
+    assert_string_equal(err.field, OPTION_SCAN_FILES);
+    assert_non_null(strstr(err.text, "nothing but noise"));
+    o.fiber_diameter_voxel = 7.0;
+    assert_int_equal(noise_refuse_early(&path, 1, &o, &warn, &err), STATUS_OK);
+    assert_int_equal(n_warning, 0);
+}
+
+/* A scan whose middle is noise and whose first slices are not: small, it is looked at whole and passes; large, it is
+ * warned of. */
+static void test_scans_with_noise_in_the_middle(void **state)
+{
+    (void)state;
+    char folder[64], path[96];
+    const char *file = path;
+    test_make_folder(folder);
+    snprintf(path, sizeof path, "%s/scan.raw", folder);
+    for (size_t large = 0; large < 2; large++) {
+        const size_t side = large > 0 ? 460 : 200;
+        struct reconstruct_option o;
+        struct error err = {0};
+        struct rng r;
+        int n_warning = 0;
+        const struct warning_sink warn = {count_warning, &n_warning};
+        FILE *raw = fopen(path, "wb");
+        uint8_t *row = malloc(side);
+        assert_true(raw != NULL && row != NULL);
+        rng_start(&r, &(struct rng_key){.seed = 9}, 1, 0);
+        for (size_t k = 0; k < N_SIDE * side; k++) {
+            /* a bright block below, noise of the sum of four draws above */
+            for (size_t i = 0; i < side; i++)
+                row[i] = k / side < 4 && i > side / 2
+                             ? 250
+                             : (uint8_t)(25.0 * (rng_double(&r) + rng_double(&r) + rng_double(&r) + rng_double(&r)));
+            assert_int_equal(fwrite(row, 1, side, raw), side);
+        }
+        free(row);
+        assert_int_equal(fclose(raw), 0);
+        reconstruct_option_default(&o);
+        memcpy(o.raw.n, (size_t[3]){side, side, N_SIDE}, sizeof o.raw.n);
+        snprintf(o.raw.type, sizeof o.raw.type, "uint8");
+        assert_int_equal(noise_refuse_early(&file, 1, &o, &warn, &err), STATUS_OK);
+        assert_int_equal(n_warning, large);
+    }
+    unlink(path);
+    rmdir(folder);
+}
+
 /* The step that reads a scan of noise says why it ends, unless the job states a diameter. */
 static void test_noise_is_refused(void **state)
 {
@@ -144,6 +208,7 @@ static void test_noise_is_refused(void **state)
         assert_non_null(strstr(err.text, "nothing but noise"));
         assert_non_null(strstr(err.text, "separability 0.6"));
     }
+    check_early_refusal(path);
     unlink(path);
     rmdir(folder);
 }
@@ -151,10 +216,9 @@ static void test_noise_is_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_noise_has_no_structure),
-        cmocka_unit_test(test_fibers_in_noise_are_structure),
-        cmocka_unit_test(test_thin_scans_are_not_judged),
-        cmocka_unit_test(test_noise_is_refused),
+        cmocka_unit_test(test_noise_has_no_structure),         cmocka_unit_test(test_fibers_in_noise_are_structure),
+        cmocka_unit_test(test_thin_scans_are_not_judged),      cmocka_unit_test(test_noise_is_refused),
+        cmocka_unit_test(test_scans_with_noise_in_the_middle),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
