@@ -171,7 +171,8 @@ class SubmitPanel {
   }
 
   questionsLeft(doc) {
-    const open = [...this.questions.show(doc, { preset: this.preset, statesVoxel: this.statesVoxel }), ...missingParts(doc, this.preset)], angles = unplaced(doc).length;
+    const asked = this.questions.show(doc, { preset: this.preset, statesVoxel: this.statesVoxel }), angles = unplaced(doc).length;
+    const open = [...asked, ...missingParts(doc, this.preset).filter((part) => !asked.some((word) => part.includes(word)))];
     if (angles) open.push(`the angles of ${angles} photographs`);
     return open;
   }

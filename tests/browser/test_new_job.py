@@ -16,6 +16,8 @@ from selenium.webdriver.common.by import By  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
 
 TIFF = b"II*\0\x08\0\0\0\0\0\0\0\0\0"  # no directory entries, so it states no size of a voxel
+RIG = {"selvedge_rig": 1, "lamps": {"low": {"theta_deg": 60, "phi_deg": 0}}, "cameras": {"top": {"theta_deg": 0, "phi_deg": 0}},
+       "views": {"v01": {"lamp": "low", "camera": "top"}, "v02": {"lamp": "low", "camera": "top", "cloth_rotation_deg": 90}}}
 TABLE = "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,r,g,b\n"
 
 
@@ -95,6 +97,7 @@ def test_the_document_is_written_from_the_files(stub, browser, tmp_path):
     NAMES, ["a.hair", "rows.csv", "white-card.png"], ["weave.wif", "lt20_lp0_ct0_cp0_r90.exr", "lt45_lp0_ct0_cp0_r0.exr"],
     ["scan.mhd", "scan.raw", "table.binary"], ["slice_01.tif", "slice_02.tif", "slice_10.tif", "t20_p0.png", "t20.5_p0.png"],
     ["s2.tif", "s10.tif", "s1.tif", "b.png", "A.png"],
+    ["cloth.hair", "my-rig.json", "v01.exr", "v02.exr", "chart.png"],
     ["yarn.hair", "t45_p0-1.exr", "t45_p0-2.exr", "t60_p0-1.exr", "t60_p0-2.exr"]])
 def test_the_same_document_as_the_shell_writes(stub, browser, tmp_path, names):
     url, _ = stub
@@ -103,12 +106,15 @@ def test_the_same_document_as_the_shell_writes(stub, browser, tmp_path, names):
     paths = sample(folder, names)
     if "scan.mhd" in names:
         (folder / "scan.mhd").write_text("ObjectType = Image\nNDims = 3\nElementDataFile = scan.raw\n")
+    if "my-rig.json" in names:
+        (folder / "my-rig.json").write_text(json.dumps(RIG))
     subprocess.run([os.path.join(BIN, "selvedge"), "init", str(folder)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
     shell = json.loads((folder / "job.json").read_text())
     browser.get(url + "/#new")
     drop(browser, paths)
     answer(browser, "sample", "sample")
     assert written(browser) == shell
+    assert browser.execute_script("return document.querySelector('#rig-picker').hidden") == ("my-rig.json" not in names)
 
 
 def test_a_guess_is_changed(stub, browser, tmp_path):
@@ -257,7 +263,7 @@ def test_no_scanner_asks_for_the_weave(stub, browser, tmp_path):
     url, _ = stub
     browser.get(url + "/#new")
     click_on(browser, "#presets input[value='no_scanner']")
-    assert "weave" in text_of(browser, "#send-state")
+    assert text_of(browser, "#send-state") == "Still to give: name of the sample; weave; photographs, or a table."
     drop(browser, sample(tmp_path, ["t20_p0.png", "t45_p0.png"]))
     answer(browser, "weave", "twill")
     answer(browser, "warp", "24")
@@ -356,4 +362,16 @@ def test_the_form_has_words_first_and_a_search(stub, browser, tmp_path):
     keep(browser, "option-search")
     browser.execute_script("document.querySelector('#editor a[download]').click()")
     assert browser.execute_script("return document.querySelector('#editor a[download]').href").startswith("blob:")
+    assert complaints(browser) == []
+
+
+def test_a_folder_gives_the_sample_its_name(stub, browser, tmp_path):
+    url, _ = stub
+    folder = tmp_path / "green twill"
+    folder.mkdir()
+    sample(folder, ["cloth.hair", "rows.csv", ".hidden"])
+    browser.get(url + "/#new")
+    browser.find_element(By.CSS_SELECTOR, ".drop input[webkitdirectory]").send_keys(str(folder))
+    wait_for(browser, "!document.querySelector('#send').disabled")
+    assert written(browser) == {"sample": "green twill", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"}}
     assert complaints(browser) == []

@@ -5,7 +5,7 @@ const R = 92, WIDTH = 300, HEIGHT = 230, CENTER = [150, 150], STEPS = 48;
 
 const rad = (deg) => (Number.isFinite(deg) ? deg : 0) * Math.PI / 180;
 // Where a point of space is drawn.
-const place = (p) => { const [x, y, z] = p; return [CENTER[0] + R * (x + 0.32 * y), CENTER[1] - R * (0.92 * z + 0.38 * y)]; };
+const place = (p) => { const [x, y, z] = p; return [CENTER[0] + R * (x + 0.5 * y), CENTER[1] - R * (0.95 * z + 0.32 * y)]; };
 const at = (theta, phi, r = 1) => [r * Math.sin(theta) * Math.cos(phi), r * Math.sin(theta) * Math.sin(phi), r * Math.cos(theta)];
 const path = (points) => points.map((p, i) => `${i ? "L" : "M"}${place(p).map((v) => v.toFixed(1)).join(" ")}`).join("");
 const turn = (make) => Array.from({ length: STEPS + 1 }, (_, i) => make(i / STEPS));
