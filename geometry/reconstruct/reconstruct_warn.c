@@ -147,6 +147,22 @@ static void warn_grade(const struct warning_sink *warn, const struct scan_grade 
 }
 
 /* Says which material no line explains, and which lines may be no fibers. */
+/* Says how many lines hold several fibers, if they can be told one by one. */
+static void warn_yarns(const struct warning_sink *warn, const struct section_misfit *m)
+{
+    if (m->several_share > GRADE_MOST_SEVERAL)
+        warning_send(warn, OPTION_FIBER_DIAMETER,
+                     "%.0f %% of the traced length is in lines that hold several fibers, or a yarn: give the diameter "
+                     "of the fibers (of thick and thin ones, one between both), or scan with smaller voxels",
+                     100.0 * m->several_share);
+    else
+        warning_send(warn, OPTION_FIBER_DIAMETER,
+                     "the traced lines do not have the sections of single fibers (densities around their axes vary by "
+                     "%.0f %%): each line may hold several fibers, or a yarn; give the diameter of the fibers, or scan "
+                     "with smaller voxels",
+                     100.0 * m->surface);
+}
+
 static void warn_faults(const struct warning_sink *warn, const struct scan_grade *g)
 {
     const struct scan_coverage *c = &g->coverage;
@@ -167,12 +183,7 @@ static void warn_faults(const struct warning_sink *warn, const struct scan_grade
                      "%.0f %% of the traced length lies within another traced fiber, so thick fibers may hold several "
                      "lines: give the diameter of the thickest fibers",
                      100.0 * g->double_share);
-    if (g->faults & GRADE_SEVERAL)
-        warning_send(warn, OPTION_FIBER_DIAMETER,
-                     "%.0f %% of the traced length is in lines that hold several fibers, or a yarn (densities around "
-                     "the axes of all lines vary by %.0f %%): give the diameter of the fibers, or scan with smaller "
-                     "voxels",
-                     100.0 * g->section.several_share, 100.0 * g->section.surface);
+    if (g->faults & GRADE_SEVERAL) warn_yarns(warn, &g->section);
     if (g->faults & GRADE_PIECES)
         warning_send(
             warn, OPTION_SCAN_FILES,

@@ -149,7 +149,7 @@ static void reserve_lines(const struct scan_grade *g, struct verdict *v)
                 "%.0f %% of the traced length lies within another traced fiber.", 100.0 * g->double_share);
     if (g->faults & GRADE_SEVERAL)
         reserve(v, VERDICT_PICTURES_ONLY, "lines_hold_several_fibers",
-                "The traced lines do not have the sections of single fibers: each may hold several, or a yarn.");
+                "Traced lines do not have the sections of single fibers: they hold several, or a yarn.");
     if (g->faults & GRADE_PIECES)
         reserve(v, VERDICT_PICTURES_ONLY, "fibers_in_pieces", "Fibers are traced in about %.1f pieces each.",
                 g->likeness.fragments);

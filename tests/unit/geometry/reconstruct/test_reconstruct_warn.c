@@ -199,6 +199,19 @@ static void test_grade(void **state)
     expect_fibers(&r, 8, 7e-6, NULL);
 }
 
+/* Lines that hold several fibers are counted where they can be told one by one. */
+static void test_yarns(void **state)
+{
+    struct reconstruct_report r = clean_report();
+    (void)state;
+    r.grade = (struct scan_grade){.verdict = GRADE_RESOLVED, .section = {.surface = 0.046, .several_share = 0.1145}};
+    expect_fibers(&r, 8, 7e-6, NULL);
+    r.grade.faults = GRADE_SEVERAL;
+    expect_fibers(&r, 8, 7e-6, "11 % of the traced length is in lines that hold several fibers");
+    r.grade.section = (struct section_misfit){.surface = 0.22, .several_share = 0.0};
+    expect_fibers(&r, 8, 7e-6, "densities around their axes vary by 22 %): each line may hold several");
+}
+
 /* A scan that would not show lumens says so, unless it shows no fibers either. */
 static void test_unseen_lumens(void **state)
 {
@@ -242,9 +255,9 @@ static void test_lumens(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_lumens), cmocka_unit_test(test_padding),       cmocka_unit_test(test_alignment),
-        cmocka_unit_test(test_crop),   cmocka_unit_test(test_densities),     cmocka_unit_test(test_fibers),
-        cmocka_unit_test(test_grade),  cmocka_unit_test(test_unseen_lumens),
+        cmocka_unit_test(test_lumens), cmocka_unit_test(test_padding),   cmocka_unit_test(test_alignment),
+        cmocka_unit_test(test_crop),   cmocka_unit_test(test_densities), cmocka_unit_test(test_fibers),
+        cmocka_unit_test(test_grade),  cmocka_unit_test(test_yarns),     cmocka_unit_test(test_unseen_lumens),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
