@@ -13,7 +13,8 @@
 #include <string.h>
 #include <time.h>
 
-enum { MAX_RESERVATION = 4 };
+/* Reservations that the first page shows, and the number from which on its picture is lower to make room. */
+enum { MAX_RESERVATION = 3, MANY_RESERVATION = 2 };
 
 /* ---- the picture ---- */
 
@@ -39,9 +40,11 @@ static status draw_cloth(const struct report *report, const json_t *rows, FILE *
     uint8_t *rgb = NULL;
     size_t width, height;
     for (size_t c = 0; c < 3 && row != NULL; c++) color[c] = fmax(json_number_value(json_array_get(rendered, c)), 0.0);
+    fputs("<div class=\"drawing\">", out);
     status s = cloth_drawing(report, color, &rgb, &width, &height, err);
     if (s != STATUS_OK) return s;
     s = page_bytes_image(report, rgb, width, height, "drawing of the cloth", out, err);
+    fputs("</div>", out);
     free(rgb);
     if (row == NULL)
         fputs("<figcaption>Drawing of the fibers from above. The tile is repeated.</figcaption>", out);
@@ -92,6 +95,12 @@ static void print_verdict(const json_t *verdict, FILE *out)
 
 static void open_number(const char *label, FILE *out) { fprintf(out, "<div><dt>%s</dt><dd>", label); }
 static void close_number(FILE *out) { fputs("</dd></div>\n", out); }
+
+/* A length in millimetres, of a metre and more in metres. */
+static void print_length(double mm, FILE *out)
+{
+    fprintf(out, mm < 1000.0 ? "%.3g mm" : "%.3g m", mm < 1000.0 ? mm : mm / 1000.0);
+}
 
 static void print_tile(const json_t *geometry, FILE *out)
 {
@@ -148,7 +157,7 @@ static void print_numbers(const struct report *report, const json_t *result, FIL
         fprintf(out, "%.3g µm", page_number(geometry, "mean_radius_um"));
         close_number(out);
         open_number("length of all fibers", out);
-        fprintf(out, "%.3g mm", page_number(geometry, "total_length_mm"));
+        print_length(page_number(geometry, "total_length_mm"), out);
         close_number(out);
     }
     fputs("</dl>\n", out);
@@ -181,11 +190,12 @@ static status print_geometry(struct report *report, const json_t *geometry, FILE
     status s =
         page_picture_file(report, scan ? "pictures/slice-z.png" : "pictures/top.png",
                           scan ? "a slice of the scan with its fibers" : "fibers from above", out, &written, err);
-    fprintf(out, "<figcaption>%s %.0f fibers of %.3g mm together in a tile of ",
+    fprintf(out, "<figcaption>%s %.0f fibers of ",
             scan ? "A slice of the scan; red crosses mark the fibers that were found."
-                 : "One tile from above, "
-                   "brighter is higher.",
-            page_number(geometry, "n_fiber"), page_number(geometry, "total_length_mm"));
+                 : "One tile from above, brighter is higher.",
+            page_number(geometry, "n_fiber"));
+    print_length(page_number(geometry, "total_length_mm"), out);
+    fputs(" together in a tile of ", out);
     print_tile(geometry, out);
     fprintf(out, ", with a mean radius of %.3g µm.</figcaption></figure>\n", page_number(geometry, "mean_radius_um"));
     return s;
@@ -246,15 +256,16 @@ static void print_head(const struct report *report, const json_t *data, const js
 status front_pages(struct report *report, const json_t *data, const json_t *head, FILE *out, struct error *err)
 {
     const json_t *result = json_object_get(data, "result");
-    fputs("<section class=\"front\">\n", out);
+    const size_t n = json_array_size(json_object_get(json_object_get(result, "verdict"), "reservations"));
+    fprintf(out, "<section class=\"front%s\">\n", n >= MANY_RESERVATION ? " many" : "");
     print_head(report, data, head, out);
     status s = print_cloth(report, result, out, err);
     print_verdict(json_object_get(result, "verdict"), out);
     print_numbers(report, result, out);
-    print_method(report, result, out);
     fputs("</section>\n<section class=\"front\">\n", out);
     if (report->in.kind != JOB_OF_GEOMETRY) front_parameters(report, result, out);
     if (s == STATUS_OK) s = print_figures(report, result, out, err);
+    print_method(report, result, out);
     fputs("</section>\n", out);
     return s;
 }

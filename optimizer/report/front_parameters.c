@@ -5,7 +5,7 @@
 #include <string.h>
 
 /* Lines of the table, so that the page has room for the figures. */
-enum { MAX_LINE = 14 };
+enum { MAX_LINE = 10 };
 
 static void cell(const json_t *p, bool percent, const char *span, FILE *out)
 {

@@ -53,8 +53,8 @@ static const char front[] =
     ".numbers dd { margin: 0; font-size: 1.3em; font-weight: 600; font-variant-numeric: tabular-nums; }\n"
     ".front h2 { margin-top: 1.2em; } .front ul { margin: .4em 0; padding-left: 1.3em; }\n"
     "table.words { width: 100%; } table.words td, table.words th { padding: .3em .8em .3em 0; border-bottom: 1px "
-    "solid; border-bottom-color: var(--line); } table.words td.n { white-space: nowrap; } table.words small { color: "
-    "var(--soft); }\n"
+    "solid; border-bottom-color: var(--line); } table.words td.n, table.words td.flag { white-space: nowrap; "
+    "overflow-wrap: normal; } table.words small { color: var(--soft); }\n"
     ".pair { display: flex; justify-content: space-between; align-items: flex-start; } .pair > figure { width: 48%; "
     "min-width: 0; } .pair svg, .pair img { width: 100%; height: auto; display: block; } .pair img { max-height: "
     "380px; object-fit: contain; object-position: left; }\n";
@@ -63,17 +63,20 @@ static const char screens[] =
     "@media screen and (max-width: 700px) { body { margin: 1em auto; } h2, li, td, th, code, pre, p { overflow-wrap: "
     "anywhere; } pre { white-space: pre-wrap; } th, td { padding-right: .6em; font-size: 12px; } svg, img { max-width: "
     "100%; } svg { height: auto; } .pair { display: block; } .pair > figure { width: 100%; margin-bottom: 1em; } "
-    "td.rgb { "
-    "max-width: 3.2em; } table.words td.n { white-space: normal; } .letterhead { flex-wrap: wrap; } }\n";
+    "td.rgb { max-width: 3.2em; } table.words td.n, table.words td.flag { white-space: normal; overflow-wrap: "
+    "anywhere; } .letterhead { flex-wrap: wrap; } }\n";
 
 static const char prints[] =
     "@media print { body { margin: 0; padding: 0; max-width: none; font-size: 10px; } h1 { string-set: sample "
     "content(); } h2, h2 + p { break-after: avoid; } thead { display: table-header-group; } tr, svg { break-inside: "
-    "avoid; } th, td { padding-right: .8em; } td.n { white-space: nowrap; } td { overflow-wrap: anywhere; }\n"
+    "avoid; } th, td { padding-right: .8em; } td.n { white-space: nowrap; } td { overflow-wrap: anywhere; } "
+    "td.key, td.flag { overflow-wrap: normal; }\n"
     ".charts, .pictures { display: block; } .charts svg { width: 48%; height: auto; } .pictures figure { display: "
     "inline-block; margin: 0 14px 10px 0; vertical-align: top; }\n"
     ".front { font-size: 11.5px; break-after: page; } .front h2 { font-size: 15px; } .cloth img { max-height: 124mm; } "
-    ".pair img { max-height: 78mm; } .letterhead { margin-bottom: 5mm; } h2.appendix { margin-top: 0; } }\n";
+    ".many .cloth img { max-height: 88mm; } .drawing img { object-fit: cover; } .pair img { max-height: 66mm; } "
+    "table.words { font-size: 10.5px; } table.words td, table.words th { padding: .2em .8em .2em 0; } .letterhead { "
+    "margin-bottom: 5mm; } h2.appendix { margin-top: 0; } }\n";
 
 void page_style(bool letter, FILE *out)
 {

@@ -88,7 +88,7 @@ static void print_parameters(const char *title, const json_t *list, FILE *out)
           out);
     json_array_foreach(list, i, p)
     {
-        fputs("<tr><td>", out);
+        fputs("<tr><td class=\"key\">", out);
         page_escaped(page_string(p, "name"), out);
         fputs("</td><td class=\"hint\">", out);
         if (!says_the_same(p, before)) page_escaped(page_string(p, "meaning"), out);

@@ -22,18 +22,27 @@ def report_of(d, **more):
     return job, d.get(f"/v1/jobs/{job}/results/report.html").text
 
 
+def page_text(pdf, page):
+    return subprocess.run(["pdftotext", "-f", str(page), "-l", str(page), pdf, "-"], capture_output=True, text=True, check=True).stdout
+
+
 @pytest.mark.parametrize("kind, logo", [("png", png(24, lambda x, y: 10 * x)), ("svg+xml", SVG)])
 def test_reports_have_the_head_of_the_settings(tmp_path, kind, logo):
     (tmp_path / "logo").write_bytes(logo)
     options = {"report.laboratory": "Fäden & <Tücher>", "report.logo": tmp_path / "logo", "report.paper": "letter"}
     with Daemon(tmp_path / "data", worker=None, options=options) as d:
-        job, page = report_of(d, export={"pdf": True})
+        job, page = report_of(d, export={"pdf": True}, sample="A cotton cloth with a rather long name, of which there are more, " * 2)
         head = page.split("</header>")[0]
         assert '<span class="name">Fäden &amp; &lt;Tücher&gt;</span>' in head
         assert f'src="data:image/{kind};base64,{base64.b64encode(logo).decode()}"' in head
         assert "@page { size: letter;" in page
-        if shutil.which("weasyprint"):
-            assert re.search(rb"/MediaBox \[ ?0 0 612 792 ?\]", d.get(f"/v1/jobs/{job}/results/report.pdf").content)
+        if shutil.which("weasyprint") and shutil.which("pdftotext"):
+            (tmp_path / "report.pdf").write_bytes(d.get(f"/v1/jobs/{job}/results/report.pdf").content)
+            assert re.search(rb"/MediaBox \[ ?0 0 612 792 ?\]", (tmp_path / "report.pdf").read_bytes())
+            # the pages for a customer are two, also with a long name and many reservations
+            assert len(d.get(f"/v1/jobs/{job}/results/result.json").json()["verdict"]["reservations"]) > 3
+            assert page_text(tmp_path / "report.pdf", 2).strip().startswith("Parameters, with their standard errors")
+            assert page_text(tmp_path / "report.pdf", 3).strip().startswith("Appendix: details")
 
 
 def test_a_report_without_such_settings(tmp_path):
