@@ -83,6 +83,7 @@
 #define OPTION_PRIORS "priors"
 #define OPTION_PROFILE_JOB "profile_job"
 #define OPTION_RESULT_FILE "result_file"
+#define OPTION_REPORT_FILE "report_file"
 #define OPTION_NUISANCE "nuisance"
 #define OPTION_TEXTURE_BLOCK "texture_block"
 #define OPTION_FIT_RADIUS "fit_radius"

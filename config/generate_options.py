@@ -124,7 +124,7 @@ def with_schema(text, options):
 def with_words(text, options):
     """The words of exports[].format, pictures[].on and pictures[].method are those of the job's options."""
     schema, row_of = json.loads(text), {row["path"]: row for row in options}
-    formats = [path.split(".")[1] for path in row_of if path.startswith("export.") and path != "export.pdf"]
+    formats = [path.split(".")[1] for path in row_of if path.startswith("export.") and path not in ("export.pdf", "export.report_file")]
     schema["properties"]["exports"]["items"]["properties"]["format"]["enum"] = formats
     for key in ("on", "method"):
         schema["properties"]["pictures"]["items"]["properties"][key]["enum"] = row_of["pictures[]." + key]["choices"]

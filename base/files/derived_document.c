@@ -125,6 +125,17 @@ static status find_files(const json_t *from, const json_t *document, struct deri
                            around);
 }
 
+/* A PDF is made of the report of the finished job. */
+static void take_report(json_t *d, struct derived_files *files)
+{
+    json_t *export = json_object_get(d, "export");
+    files->report = json_is_true(json_object_get(export, "pdf"));
+    if (!files->report) return;
+    export = json_deep_copy(export); /* it is shared with the request */
+    json_object_set_new(export, "report_file", json_string(DERIVED_REPORT));
+    json_object_set_new(d, "export", export);
+}
+
 status derived_document_make(const json_t *document, const json_t *result, const json_t *wanted, json_t **out,
                              struct derived_files *files, struct error *err)
 {
@@ -147,6 +158,7 @@ status derived_document_make(const json_t *document, const json_t *result, const
     for (size_t i = 0; i < N_SHOWN; i++)
         if (json_object_get(wanted, shown[i]) != NULL) json_object_set(d, shown[i], json_object_get(wanted, shown[i]));
     s = find_files(document, d, files, err);
+    if (s == STATUS_OK) take_report(d, files);
     if (s == STATUS_OK)
         *out = d;
     else

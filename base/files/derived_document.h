@@ -11,12 +11,14 @@
 
 #define DERIVED_FIBERS "fibers.hair"
 #define DERIVED_RESULT "result.json"
+#define DERIVED_REPORT "report.html"
 
 /* The files of the new job that come from the finished one. */
 struct derived_files {
     const char *result; /* of the inputs of the finished job, borrowed from its document; NULL: DERIVED_RESULT of its
                                 results */
     const char *environment; /* of its inputs, borrowed; NULL: none */
+    bool report;             /* DERIVED_REPORT of its results, from which a PDF is made */
 };
 
 /* Makes the document. document, result: of the finished job. wanted: an object with `pictures`, `twin` and `export` as

@@ -1,5 +1,8 @@
 #include "optimizer/report/report_page.h"
+#include "base/files/durable.h"
 #include "base/files/file_ledger_json.h"
+#include "base/option_id.h"
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/front_page.h"
 #include "optimizer/report/letterhead_file.h"
@@ -13,6 +16,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+
+enum { MOST_PAGE_BYTES = 256 << 20 }; /* of a report that is taken over */
 
 static void heading(const char *text, FILE *out) { fprintf(out, "<h2>%s</h2>\n", text); }
 
@@ -337,8 +342,22 @@ static status write_text(const struct report *report, const char *name, const ch
     return worker_folder_replace(report->in.job->tools->folder, path, text, n, err);
 }
 
+/* Takes the page over from another job. */
+static status take_page(const struct report *report, struct error *err)
+{
+    char path[WORKER_PATH_BYTES], *text = NULL;
+    size_t n = 0;
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_INPUT, report->in.results->report_file, path);
+    status s = file_read_all(path, MOST_PAGE_BYTES, &text, &n, err);
+    if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, OPTION_REPORT_FILE);
+    if (s == STATUS_OK) s = write_text(report, "report.html", text, n, err);
+    free(text);
+    return s;
+}
+
 static status write_page(struct report *report, const json_t *data, struct error *err)
 {
+    if (report->in.results->report_file[0] != '\0') return take_page(report, err);
     char *text = NULL;
     size_t n = 0;
     FILE *out = open_memstream(&text, &n);

@@ -19,7 +19,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { PIECE_BYTES = 1 << 20, N_FILE = 3 };
+enum { PIECE_BYTES = 1 << 20, N_FILE = 4 };
 
 static const char *const held[] = {"sample", "model", "parameters", NULL};
 static const struct foreign_bounds result_bounds = {
@@ -62,6 +62,8 @@ static status make_document(struct derivation *d, struct error *err)
     if (files.environment != NULL)
         d->file[d->n_file++] =
             (struct taken_file){files.environment, "environment", JOB_FOLDER_INPUT, files.environment};
+    if (files.report)
+        d->file[d->n_file++] = (struct taken_file){DERIVED_REPORT, "report", JOB_FOLDER_RESULTS, DERIVED_REPORT};
     d->document = json_dumps(made, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
     json_decref(made);
     return d->document != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot make a job: out of memory");

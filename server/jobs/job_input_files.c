@@ -73,7 +73,7 @@ static bool role_valid(const char *role)
 {
     static const char *const known[] = {"volume", "fibers",     "measurements", "photograph",      "environment",
                                         "chart",  "dark_frame", "camera_noise", "white_reference", "rig",
-                                        "mesh",   "profile",    "draft",        "result"};
+                                        "mesh",   "profile",    "draft",        "result",          "report"};
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
         if (strcmp(role, known[i]) == 0) return true;
     return false;
@@ -91,7 +91,8 @@ status job_check_declaration(struct job_service *v, struct file_row *row, struct
         return error_set_field(
             err, STATUS_INVALID, "role",
             "role '%.31s' is not one of volume, fibers, measurements, photograph, environment, chart, dark_frame, "
-            "camera_noise, white_reference, rig, mesh, profile, draft, result",
+            "camera_noise, white_reference, rig, mesh, profile, draft, result, "
+            "report",
             row->role);
     if (row->size_bytes < 1)
         return error_set_field(err, STATUS_INVALID, "size",

@@ -11,7 +11,7 @@ static status read_formats(const char *text, json_t **formats, struct error *err
 #define EXPORT(name, ...) #name,
 #include "generated/exports.def"
 #undef EXPORT
-    };
+        "pdf"};
     char list[256] = "";
     for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
         const size_t n = strlen(list);
@@ -32,6 +32,13 @@ static status read_formats(const char *text, json_t **formats, struct error *err
         text += n + (text[n] == ',');
     }
     return STATUS_OK;
+}
+
+/* The PDF lies beside the folder of exports, which is not there without another format. */
+static bool only_pdf(const json_t *wanted)
+{
+    const json_t *formats = json_object_get(wanted, "export");
+    return json_object_size(formats) == 1 && json_object_get(formats, "pdf") != NULL;
 }
 
 static bool is_folder(const char *path)
@@ -65,8 +72,9 @@ status cli_export(struct cli *cli, int *exit_code, struct error *err)
     json_t *wanted = json_pack("{s:o}", "export", formats != NULL ? formats : json_object());
     const char *from = cli->args->operand, *to = cli->args->out_dir != NULL ? cli->args->out_dir : from;
     if (s == STATUS_OK)
-        s = is_folder(from) ? cli_export_folder(cli, from, wanted, to, err)
-                            : make_and_fetch(cli, from, wanted, "export/", exit_code, err);
+        s = is_folder(from)
+                ? cli_export_folder(cli, from, wanted, to, err)
+                : make_and_fetch(cli, from, wanted, only_pdf(wanted) ? "report.pdf" : "export/", exit_code, err);
     json_decref(wanted);
     return s;
 }

@@ -60,6 +60,7 @@ static status fill_job(const char *folder, const json_t *wanted, const char *job
     if (s == STATUS_OK) s = copy_input(folder, "result.json", job, DERIVED_RESULT, err);
     if (s == STATUS_OK && files.environment != NULL)
         s = copy_input(folder, files.environment, job, files.environment, err);
+    if (s == STATUS_OK && files.report) s = copy_input(folder, DERIVED_REPORT, job, DERIVED_REPORT, err);
     json_decref(made);
     json_decref(report);
     return s;
@@ -105,10 +106,11 @@ static status move_exports(struct cli *cli, const json_t *formats, const char *j
     json_object_foreach((json_t *)formats, format, value)
     {
         if (s != STATUS_OK) break;
-        snprintf(from, sizeof from, "%.4000s/results/export/%.40s", job, format);
-        snprintf(target, sizeof target, "%.4000s/%.40s", parent, format);
+        const bool pdf = strcmp(format, "pdf") == 0;
+        snprintf(from, sizeof from, "%.4000s/results/%s%.40s", job, pdf ? "report." : "export/", format);
+        snprintf(target, sizeof target, "%.4000s/%s%.40s", pdf ? to : parent, pdf ? "report." : "", format);
         if (access(from, F_OK) != 0)
-            return error_set(err, STATUS_UNSUPPORTED, "nothing was exported: the model of this result sees no fibers");
+            return error_set(err, STATUS_UNSUPPORTED, "'%s' was not made: the log above says why", format);
         if (access(target, F_OK) == 0) file_tree_remove(target, NULL);
         if (rename(from, target) != 0)
             s = error_set_errno(err, "cannot move the export to '%s'", target);

@@ -32,11 +32,11 @@ function ball(x, y, soft, dark) {
 
 // Lamps and surroundings. `picture`: keys of the picture; `job`: sections of the job in place of those of the finished one.
 export const LIGHTS = [
-  { id: "side", words: "Lamp from the side", ground: true, draw: () => ball("30", "22", "44", "unlit"), picture: { light_theta_deg: 45, light_phi_deg: 150 } },
-  { id: "low", words: "Low lamp, long shadows", ground: true, draw: () => ball("14", "34", "40", "unlit"), picture: { light_theta_deg: 72, light_phi_deg: 150 } },
+  { id: "side", words: "Lamp from the side", ground: true, draw: () => ball("30", "22", "44", "unlit"), picture: { light_theta_deg: 45, light_phi_deg: 190 } },
+  { id: "low", words: "Low lamp, long shadows", ground: true, draw: () => ball("14", "34", "40", "unlit"), picture: { light_theta_deg: 72, light_phi_deg: 185 } },
   { id: "camera", words: "Lamp beside the camera", ground: true, draw: () => ball("44", "34", "44", "unlit"), picture: { light_theta_deg: 35, light_phi_deg: 235 } },
-  { id: "window", words: "Large window, soft", ground: true, draw: () => ball("26", "26", "70", "dim"), picture: { light_theta_deg: 50, light_phi_deg: 150, lamp_sharpness: 10 } },
-  { id: "sky", words: "Bright surroundings", ground: false, draw: () => ball("40", "14", "90", "dim"), picture: { light_theta_deg: 40, light_phi_deg: 150, lamp_sharpness: 4 },
+  { id: "window", words: "Large window, soft", ground: true, draw: () => ball("26", "26", "70", "dim"), picture: { light_theta_deg: 50, light_phi_deg: 195, lamp_sharpness: 10 } },
+  { id: "sky", words: "Bright surroundings", ground: false, draw: () => ball("40", "14", "90", "dim"), picture: { light_theta_deg: 40, light_phi_deg: 190, lamp_sharpness: 4 },
     job: { environment: { radiance: [0.5, 0.55, 0.65] } } },
   { id: "behind", words: "Lamp behind the cloth", ground: false, draw: () => ball("72", "60", "30", "unlit"), picture: { light_theta_deg: 130, light_phi_deg: 60, black_sheet: false } },
 ];
@@ -51,10 +51,10 @@ const CAMERA = { camera_theta_deg: 40, camera_phi_deg: 250, cloth_rotation_deg: 
 
 // The request for a picture (POST /v1/jobs/{id}/derive).
 export function pictureRequest(shape, light, size) {
-  const ground = shape.ground && light.ground ? { ground_gap_mm: 0.5, ground_albedo: 0.5 } : {};
+  const ground = shape.ground && light.ground ? { ground_gap_mm: 0.5, ground_albedo: 0.25 } : {};
   // without surroundings of its own a picture has none: those of the photographs would change the light that was chosen
   return { environment: { radiance: [0, 0, 0] }, ...light.job, pictures: [{ ...shape.more, ...CAMERA, ...light.picture, ...size.more, ...ground }] };
 }
 
 // The formats of exports, from the options of a job: the first sentence of their meaning in words.
-export const formatsOf = (options) => options.filter((o) => /^export\.(?!pdf$)/.test(o.path)).map((o) => ({ id: o.path.split(".")[1], words: o.meaning }));
+export const formatsOf = (options) => options.filter((o) => o.kind === "boolean" && o.path.startsWith("export.")).map((o) => ({ id: o.path.split(".")[1], words: o.meaning }));

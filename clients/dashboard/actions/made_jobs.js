@@ -18,6 +18,7 @@ async function resultOf(job) {
     el("div", { class: "made-links" },
       picture ? el("a", { class: "button", href: picture.url, download: `${job.id.slice(0, 8)}.png` }, "Picture") : "",
       files.some((f) => f.path === "twin/twin.bin") ? el("a", { class: "button", href: `#${job.id}` }, "Turn the cloth") : "",
+      files.some((f) => f.path === "report.pdf") ? el("a", { class: "button", href: files.find((f) => f.path === "report.pdf").url, target: "_blank" }, "Report as PDF") : "",
       formats.length ? el("a", { class: "button", href: archive, download: `${formats.join("-")}-${job.id.slice(0, 8)}.tar` }, `Files (${formats.join(", ")})`) : "",
       el("a", { href: `#${job.id}` }, "Page of this job")));
 }

@@ -163,10 +163,12 @@ class Job:
 
     def export(self, formats: Union[str, Iterable[str]], folder: str, on_progress: Optional[Callable[[JobState], None]] = None) -> list[str]:
         """Make the files of one format or of several ("mitsuba", "usd" ...; docs/exports.md) without a new fit, and download them to
-        folder/export/FORMAT. Return their paths."""
-        job = self.derive(export=[formats] if isinstance(formats, str) else list(formats))
+        folder/export/FORMAT; "pdf" is the report, folder/report.pdf. Return their paths."""
+        names = [formats] if isinstance(formats, str) else list(formats)
+        job = self.derive(export=names)
         job.wait(on_progress)
-        return job.download(folder, under="export/")
+        report = job.download(folder, under="report.pdf") if "pdf" in names else []
+        return report + job.download(folder, under="export/")
 
     def picture(self, folder: str, on: str = "drape", lamp_deg: tuple[float, float] = (45, 0), camera_deg: tuple[float, float] = (30, 180),
                 on_progress: Optional[Callable[[JobState], None]] = None, **options: Any) -> list[str]:

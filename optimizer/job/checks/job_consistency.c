@@ -90,6 +90,7 @@ static const struct role_rule role_rule[] = {
     {"mesh", "a mesh: .obj", {[KIND_UNKNOWN] = true, [KIND_MESH] = true}},
     {"draft", "a draft: .wif", {[KIND_UNKNOWN] = true, [KIND_DRAFT] = true}},
     {"result", "the result of a job: result.json", {[KIND_UNKNOWN] = true, [KIND_JSON] = true}},
+    {"report", "the report of a job: report.html", {[KIND_UNKNOWN] = true, [KIND_OTHER] = true}},
     {"rig", "a rig file: .json", {[KIND_UNKNOWN] = true, [KIND_JSON] = true}},
 };
 

@@ -60,6 +60,7 @@ status job_check_nuisance(const struct option_value *v, struct error *err);
 status job_check_texture(const struct option_value *v, struct error *err);
 /* Each picture names a mesh where it is to lie on one, and nowhere else; its lamp can light it. */
 status job_check_pictures(const struct option_value *v, struct error *err);
+status job_check_report_file(const struct option_value *v, struct error *err);
 status job_check_result_file(const struct option_value *v, struct error *err);
 status job_check_twin(const struct option_value *v, struct error *err);
 /* Also makes the built-in grid of candidates when the document asks for it. */

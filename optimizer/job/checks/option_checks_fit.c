@@ -122,6 +122,15 @@ status job_check_export(const struct option_value *v, struct error *err)
         v->path);
 }
 
+status job_check_report_file(const struct option_value *v, struct error *err)
+{
+    if (v->section->results->report_file[0] == '\0' || v->section->fit->result_file[0] != '\0') return STATUS_OK;
+    return error_set_field(err, STATUS_INVALID, v->path,
+                           "'%s' is given, but the job writes a report of its own: leave it out, or give the result of "
+                           "another job as 'fit.result_file'",
+                           v->path);
+}
+
 status job_check_result_file(const struct option_value *v, struct error *err)
 {
     const struct job_fit *fit = v->section->fit;

@@ -49,6 +49,7 @@ struct job_results {
     size_t twin_paths, twin_texels;
     bool exported[JOB_MAX_EXPORT]; /* in the order of the rows EXPORT */
     bool export_pdf;
+    char report_file[JOB_MAX_NAME_BYTES]; /* report.html of another job, in place of the job's own; "": none */
 };
 
 #endif

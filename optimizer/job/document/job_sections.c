@@ -53,6 +53,7 @@ void job_sections_visit_files(const struct job_sections *section,
     if (section->setup->environment_file[0] != '\0') visit(context, section->setup->environment_file, "environment");
     if (section->rows->measurement_file[0] != '\0') visit(context, section->rows->measurement_file, "measurements");
     if (section->fit->result_file[0] != '\0') visit(context, section->fit->result_file, "result");
+    if (section->results->report_file[0] != '\0') visit(context, section->results->report_file, "report");
     if (section->profile->file[0] != '\0') visit(context, section->profile->file, "profile");
     visit_bowl(&section->profile->bowl, visit, context);
     if (section->setup->rig_file[0] != '\0') visit(context, section->setup->rig_file, "rig");
@@ -114,6 +115,7 @@ void job_sections_file_key(const struct job_sections *section, const char *name,
                   {section->setup->environment_file, "environment.file"},
                   {section->setup->rig_file, "rig.file"},
                   {section->fit->result_file, "fit.result_file"},
+                  {section->results->report_file, "export.report_file"},
                   {section->profile->file, "profile.file"},
                   {section->profile->bowl.mask, "profile.bowl.mask"},
                   {section->setup->noise_file, "camera.noise_file"},

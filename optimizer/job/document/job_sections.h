@@ -36,7 +36,7 @@ enum job_kind job_sections_kind(const struct job_sections *section);
 
 /* Calls visit for every input file that the document names, with its role ("volume", "fibers", "environment", "draft",
  * "measurements", "photograph", "camera_noise", "dark_frame", "chart", "white_reference", "mesh", "profile",
- * "result"). */
+ * "result", "report"). */
 void job_sections_visit_files(const struct job_sections *section,
                               void (*visit)(void *context, const char *name, const char *role), void *context);
 /* Writes the key that names an input file, as "photographs[2].file": the last one where several do, "" where none. */

@@ -351,5 +351,13 @@ const struct job_option option_rows_fit[] = {
      INTO(results, export_pdf),
      .standard = "false",
      .meaning = "The report as PDF, too: `report.pdf`. Needs the program WeasyPrint on the machine of the service."},
+    {.path = "export.report_file",
+     .kind = OPTION_FILE_NAME,
+     .id = OPTION_REPORT_FILE,
+     TEXT_INTO(results, report_file),
+     .check = job_check_report_file,
+     .left_out = "none",
+     .allowed = "`report.html` of another job",
+     .meaning = "With `fit.result_file`: the report that is taken over, as for its PDF. Role: `report`."},
     {.path = NULL},
 };

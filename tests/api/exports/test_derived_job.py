@@ -1,6 +1,7 @@
 """Jobs that show the result of a finished job without a new fit."""
 import csv
 import os
+import shutil
 import subprocess
 import sys
 
@@ -80,6 +81,18 @@ def test_a_repeated_request_makes_one_job(real, fitted):
     real.wait_state(one.json()["id"], "succeeded", timeout_s=60)
 
 
+@pytest.mark.skipif(shutil.which("weasyprint") is None, reason="WeasyPrint is not installed")
+def test_the_report_of_a_finished_job_as_pdf(real, fitted, tmp_path):
+    """It is the report of the fit, not of the job that makes the PDF."""
+    job = derive(real, fitted, export={"pdf": True})
+    real.wait_state(job, "succeeded", timeout_s=120)
+    assert text_of(real, job, "report.html") == text_of(real, fitted, "report.html")
+    assert real.get(f"/v1/jobs/{job}/results/report.pdf").content.startswith(b"%PDF")
+    selvedge.Client(real.url).job(fitted).download(str(tmp_path))
+    done = cli("export", tmp_path, "--to", "pdf")
+    assert done.returncode == 0 and (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF"), done.stderr
+
+
 @pytest.mark.parametrize("wanted, field", [({}, "pictures"), ({"sample": "s"}, "pictures"), ({"fit": {}}, "fit"),
                                            ({"export": {"maya": True}}, "export.maya"),
                                            ({"pictures": [{"on": "moon"}]}, "pictures[0].on"),
@@ -155,6 +168,6 @@ def test_python_exports_and_shows_a_finished_job(real, fitted, tmp_path):
 
 
 def test_the_help_names_every_format(real):
-    formats = {key.split(".")[1] for key in (o["path"] for o in real.get("/v1/options").json()["options"]) if key.startswith("export.")} - {"pdf"}
+    formats = {o["path"].split(".")[1] for o in real.get("/v1/options").json()["options"] if o["path"].startswith("export.") and o["kind"] == "boolean"}
     said = cli("export", "--help").stdout
     assert formats and all(f in said for f in formats), said
