@@ -37,12 +37,12 @@ status job_disk_check(struct job_service *v, int64_t n_bytes, struct error *err)
     long long free_bytes = 0;
     status s = path_free_bytes(v->settings->data, &free_bytes, err);
     if (s != STATUS_OK) return s;
-    if (free_bytes < n_bytes || free_bytes - n_bytes < v->settings->floor_bytes)
-        return error_set(
-            err, STATUS_DISK_FULL,
-            "cannot take new work: %lld bytes are free, %lld are kept in reserve; delete jobs or free space",
-            free_bytes, (long long)v->settings->floor_bytes);
-    return STATUS_OK;
+    if (free_bytes >= n_bytes && free_bytes - n_bytes >= v->settings->floor_bytes) return STATUS_OK;
+    char needed[64] = "";
+    if (n_bytes > 0) snprintf(needed, sizeof needed, " and %lld are needed", (long long)n_bytes);
+    return error_set(err, STATUS_DISK_FULL,
+                     "cannot take new work: %lld bytes are free, %lld are kept in reserve%s; delete jobs or free space",
+                     free_bytes, (long long)v->settings->floor_bytes, needed);
 }
 
 status job_check_quota(struct job_service *v, const struct access_grant *grant, const char *owner,

@@ -1,14 +1,24 @@
 /* The actions of users on a job: start, retry, cancel, delete. */
 #include "base/clock.h"
+#include "server/files/worker_files.h"
 #include "server/jobs/job_access.h"
 #include "server/jobs/job_change.h"
 #include "server/jobs/job_service.h"
 
 #include <string.h>
 
+/* Returns the bytes that a job writes by its plan when it runs for the first time; 0 without a plan. */
+static int64_t planned_bytes(const struct job_service *v, const struct job_row *row)
+{
+    json_t *plan = row->attempt == 0 ? worker_plan_read(v->settings->data, row->id) : NULL;
+    const double n = json_number_value(json_object_get(plan, "disk_bytes"));
+    json_decref(plan);
+    return (int64_t)n;
+}
+
 status job_make_queued(struct job_service *v, struct job_row *row, struct job_refusal *refusal, struct error *err)
 {
-    status s = job_disk_check(v, 0, err);
+    status s = job_disk_check(v, planned_bytes(v, row), err);
     if (s != STATUS_OK) return s;
     json_t *missing = NULL;
     s = job_missing_files(v, row, &missing, err);

@@ -56,6 +56,10 @@ static void put_progress(json_t *out, const struct job_row *row, const json_t *s
     put(out, "eta_high_s", running ? st : NULL, "eta_high_s", JSON_REAL, json_null());
     json_object_set_new(out, "heartbeat_age_s", json_null());
     put(out, "message", st, "message", JSON_STRING, json_string(""));
+    if (row->state == JOB_PAUSED)
+        json_object_set_new(out, "message",
+                            json_string("the disk of the service is nearly full; the job goes on where it was when "
+                                        "there is space again"));
     put(out, "objective", st, "objective", JSON_REAL, json_null());
     put(out, "objective_se", st, "objective_se", JSON_REAL, json_null());
     put(out, "step", st, "step", JSON_INTEGER, json_null());

@@ -146,12 +146,29 @@ def test_running_jobs_pause_under_the_floor_and_go_on(small_disk):
         wait_until(lambda: d.job(job)["fraction"] == 0.5)
         with open(small_disk / "filler", "wb") as f:
             f.write(b"x" * (12 << 20))
-        assert d.wait_state(job, "paused")["lost_attempts"] == 0
+        paused = d.wait_state(job, "paused")
+        assert paused["lost_attempts"] == 0 and "nearly full; the job goes on" in paused["message"]
         problem(d.post("/v1/jobs", json=document("succeed")), 507, "disk_full")
         problem(d.get("/readyz"), 503, "not_ready")
         os.remove(small_disk / "filler")
         done = d.wait_state(job, "succeeded")
         assert done["attempt"] == 2 and done["lost_attempts"] == 0
+
+
+def test_a_job_that_needs_more_than_is_free_is_refused_at_its_start(small_disk):
+    """The plan of the fake worker says 5 MB; the disk has room for 3 MB above the floor."""
+    with Daemon(small_disk / "data", options={"disk.floor_bytes": 8 << 20, "disk.ballast_bytes": 0}) as d:
+        planned, unplanned = d.ready_job(), d.ready_job()
+        assert d.post(f"/v1/jobs/{planned}/plan").json()["disk_bytes"] == 5e6
+        free = os.statvfs(small_disk)
+        with open(small_disk / "filler", "wb") as f:
+            f.write(b"x" * (free.f_bavail * free.f_frsize - (11 << 20)))
+        r = d.post(f"/v1/jobs/{planned}/start")
+        assert "5000000 are needed" in problem(r, 507, "disk_full")["detail"] and d.job(planned)["state"] == "draft"
+        assert d.post(f"/v1/jobs/{unplanned}/start").status_code == 202
+        os.remove(small_disk / "filler")
+        assert d.post(f"/v1/jobs/{planned}/start").status_code == 202
+        d.wait_state(planned, "succeeded")
 
 
 def test_a_paused_job_can_be_cancelled(small_disk):

@@ -22,6 +22,7 @@ export function factsOf(job) {
   const facts = [];
   if (LIVE.has(job.state)) facts.push(fact("done", percent(job.fraction, 0)), fact("time left", timeLeft(job)));
   if (job.state === "running" && /^(fitting|fiber radius)/.test(job.message)) facts.push(fact("now", job.message));
+  if (job.state === "paused" && job.message) facts.push(fact("paused:", job.message));
   if (LIVE.has(job.state) && isNumber(job.step)) facts.push(fact("step", String(job.step)));
   if (!LIVE.has(job.state) && isNumber(job.started_unix_s) && isNumber(job.finished_unix_s)) facts.push(fact(job.state === "succeeded" ? "finished" : "stopped", when(job.finished_unix_s)), fact("took", duration(job.finished_unix_s - job.started_unix_s)));
   if (job.attempt > 1) facts.push(fact("attempt", String(job.attempt)));
