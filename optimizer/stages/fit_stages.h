@@ -57,6 +57,7 @@ struct profile_fit_input {
     const struct profile_rows *fiber;
     size_t n_model;
     const struct model_setup *model;
+    const double *expected_s; /* of the fit of each model, all positive */
 };
 /* The stage "fit" of a job with the profile of a fiber; it stores nothing and always runs. */
 status stage_profile_fit(const struct profile_fit_input *in, struct fit_output *out, struct error *err);

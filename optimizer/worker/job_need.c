@@ -112,7 +112,8 @@ static struct job_need model_of(const struct job_plan *plan)
     if (plan->tools->memory_limit_bytes > 0)
         geometry_bytes = fmin(geometry_bytes, (double)plan->tools->memory_limit_bytes);
     const double size = pipeline_plan_cloth_size(plan), n_thread = (double)thread_pool_n_thread(plan->tools->pool),
-                 thread_s = plan->usual_wall_s * n_thread - plan->certificate_s * (n_thread - 1.0);
+                 alone_s = plan->in->kind == JOB_OF_FIT ? plan->certificate_s : 0.0,
+                 thread_s = plan->usual_wall_s * n_thread - alone_s * (n_thread - 1.0);
     return (struct job_need){.cpu_s = usual_busy * thread_s,
                              .memory_bytes = program_bytes + geometry_bytes + fiber_file_bytes * input.fibers +
                                              cloth_bytes * size + profile_bytes(plan),

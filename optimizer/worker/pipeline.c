@@ -133,8 +133,8 @@ static status do_scene(struct pipeline *p, const struct taken *t, bool load, str
 static status do_fit(struct pipeline *p, const struct taken *t, bool load, struct error *err)
 {
     const struct fit_input in = {&p->job, pipeline_plan_usual_paths(p->plan), t->cloth};
-    const struct profile_fit_input profile = {p->tools,      p->in->section.fit, p->in->section.profile,
-                                              &p->in->fiber, p->in->n_model,     p->in->model};
+    const struct profile_fit_input profile = {p->tools,       p->in->section.fit, p->in->section.profile, &p->in->fiber,
+                                              p->in->n_model, p->in->model,       p->plan->profile_s};
     if (p->in->kind == JOB_OF_PROFILE) return stage_profile_fit(&profile, &p->out.fit, err);
     return (load ? stage_fit_load : stage_fit)(&in, &p->out.fit, err);
 }

@@ -322,15 +322,17 @@ static void plan_report(struct job_plan *plan, size_t i)
         worker_status_plan(plan->status, i, &work);
 }
 
+/* Sets the time of each model's fit on one thread, too, by which the stage divides its progress. */
 static void plan_profile(struct job_plan *plan, size_t i)
 {
-    const double n_row = (double)plan->in->fiber.profile.n,
-                 rows_s = (double)plan->in->n_model * profile_evaluations * n_row * s_per_profile_row;
-    const struct job_clock_work work = {.key = "fit.profile",
-                                        .units = fmax(rows_s + profile_certificates * plan->certificate_s, 1e-3) /
-                                                 n_thread(plan),
-                                        .usual_s = 1.0,
-                                        .log_sd = sd_of_profile};
+    const double rows_s = profile_evaluations * (double)plan->in->fiber.profile.n * s_per_profile_row;
+    double sum_s = 1e-3;
+    for (size_t k = 0; k < plan->in->n_model; k++) {
+        plan->profile_s[k] = rows_s + profile_certificates * plan->model_s[k];
+        sum_s += plan->profile_s[k];
+    }
+    const struct job_clock_work work = {
+        .key = "fit.profile", .units = sum_s / n_thread(plan), .usual_s = 1.0, .log_sd = sd_of_profile};
     worker_status_plan(plan->status, i, &work);
 }
 

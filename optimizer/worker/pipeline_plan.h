@@ -18,9 +18,11 @@ struct job_plan {
     double usual_wall_s;  /* of the whole job, by the speeds of a common machine (job_need.h) */
     double certificate_s; /* processor time of the gradient certificates, on one thread (plan_probe.h) */
     double inputs_s;      /* elapsed time of reading the inputs, which a job that runs takes again; 0 where it runs */
-    double path_share;    /* time of a path in this cloth over that in a closed one */
-    double file_segments; /* of a given file of fibers, by its size; 0 without one */
-    double report_s[REPORT_N_PART]; /* expected seconds of the parts of the report, once that stage is planned */
+    double model_s[JOB_MAX_MODEL];   /* the same of each model */
+    double profile_s[JOB_MAX_MODEL]; /* processor time of fitting each model to the profile of a fiber */
+    double path_share;               /* time of a path in this cloth over that in a closed one */
+    double file_segments;            /* of a given file of fibers, by its size; 0 without one */
+    double report_s[REPORT_N_PART];  /* expected seconds of the parts of the report, once that stage is planned */
 };
 
 /* A plan of a job whose inputs have been read. */

@@ -77,6 +77,9 @@ void plan_probe_take(struct job_plan *plan)
 {
     const bool fits = plan->in->kind == JOB_OF_FIT || plan->in->kind == JOB_OF_PROFILE;
     plan->certificate_s = 0.0;
-    for (size_t i = 0; fits && i < plan->in->n_model; i++) plan->certificate_s += certificate_s(&plan->in->model[i]);
+    for (size_t i = 0; fits && i < plan->in->n_model; i++) {
+        plan->model_s[i] = certificate_s(&plan->in->model[i]);
+        plan->certificate_s += plan->model_s[i];
+    }
     probe_file(plan);
 }

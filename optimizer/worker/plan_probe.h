@@ -5,8 +5,8 @@
 
 #include "optimizer/worker/pipeline_plan.h"
 
-/* Sets certificate_s, path_share and file_segments of a plan whose inputs have been read. Prepares each model once,
- * which takes 0.2 s at most, and reads the file of fibers where it is small. */
+/* Sets certificate_s, model_s, path_share and file_segments of a plan whose inputs have been read. Prepares each model
+ * once, which takes 0.2 s at most, and reads the file of fibers where it is small. */
 void plan_probe_take(struct job_plan *plan);
 /* Returns the time of a path in a cloth over its time in a closed cloth, in (0, 1], by the area of all fibers over the
  * area of the tile. */

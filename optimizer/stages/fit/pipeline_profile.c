@@ -38,6 +38,8 @@ static void warn(struct worker_status *st, const struct model_setup *m, const st
 status stage_profile_fit(const struct profile_fit_input *in, struct fit_output *out, struct error *err)
 {
     status s = STATUS_OK;
+    double all_s = 0.0, before_s = 0.0;
+    for (size_t i = 0; i < in->n_model; i++) all_s += in->expected_s[i];
     out->model = calloc(in->n_model, sizeof *out->model);
     if (out->model == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit a profile: out of memory");
     for (size_t i = 0; i < in->n_model && s == STATUS_OK; i++) {
@@ -45,8 +47,9 @@ status stage_profile_fit(const struct profile_fit_input *in, struct fit_output *
         struct model_fit *fit = &out->model[i];
         struct fit_option option;
         struct progress_part part;
-        const double share = 1.0 / (double)in->n_model;
-        const struct progress progress = progress_begin_part(&part, &in->tools->progress, (double)i * share, share);
+        const struct progress progress =
+            progress_begin_part(&part, &in->tools->progress, before_s / all_s, in->expected_s[i] / all_s);
+        before_s += in->expected_s[i];
         pipeline_fit_option(m->option, m->sets.info.param, m->sets.info.n_param, &option);
         const struct profile_problem problem = {.model = m->appearance.surface,
                                                 .profile = &in->fiber->profile,
