@@ -223,7 +223,7 @@ def test_health_and_metrics(daemon):
     daemon.create()
     text = daemon.get("/metrics").text
     for line in text.splitlines():
-        assert re.match(r"# (HELP|TYPE) [a-z_]+ .+$|[a-z_]+(\{[a-z]+=\"[a-z0-9]+\"\})? [0-9.e+-]+$", line), line
+        assert re.match(r"# (HELP|TYPE) [a-z_]+ .+$|[a-z_]+(\{[a-z]+=\"[a-z0-9_]+\"\})? [0-9.e+-]+$", line), line
     assert re.search(r'^selvedge_jobs\{state="draft"\} [1-9]', text, re.M)
     assert "process_resident_memory_bytes" in text and not re.search(r"[0-9a-f]{8}-[0-9a-f]{4}", text)
 
