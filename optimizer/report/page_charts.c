@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <string.h>
 
-enum { WIDTH = 460, HEIGHT = 340, LEFT = 62, RIGHT = 12, TOP = 14, BOTTOM = 44 };
+enum { WIDTH = 460, HEIGHT = 340, LEFT = 62, RIGHT = 18, TOP = 14, BOTTOM = 44 };
 static const char *const channel_color[] = {"#c0392b", "#1e8449", "#2457a6"};
 
 struct axes {

@@ -63,8 +63,9 @@ static const char screens[] =
     "@media screen and (max-width: 700px) { body { margin: 1em auto; } h2, li, td, th, code, pre, p { overflow-wrap: "
     "anywhere; } pre { white-space: pre-wrap; } th, td { padding-right: .6em; font-size: 12px; } svg, img { max-width: "
     "100%; } svg { height: auto; } .pair { display: block; } .pair > figure { width: 100%; margin-bottom: 1em; } "
-    "td.rgb { max-width: 3.2em; } table.words td.n, table.words td.flag { white-space: normal; overflow-wrap: "
-    "anywhere; } .letterhead { flex-wrap: wrap; } }\n";
+    "td.rgb { max-width: 3.2em; } table.words td.n, table.words td.flag, table.words th { white-space: normal; "
+    "overflow-wrap: normal; padding-right: .5em; } table.words td.n { min-width: 3.2em; } .letterhead { flex-wrap: "
+    "wrap; } }\n";
 
 static const char prints[] =
     "@media print { body { margin: 0; padding: 0; max-width: none; font-size: 10px; } h1 { string-set: sample "
