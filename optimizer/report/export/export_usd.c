@@ -280,6 +280,6 @@ static status write_usd(struct export_scene *e, json_t **materials, struct error
     return *materials != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot export as USD: out of memory");
 }
 
-EXPORT(usd, "The scene as Universal Scene Description: curves with a preview surface of which cloth is as bright.")
+EXPORT(usd, "The scene as Universal Scene Description: curves, with a preview surface that makes the cloth as bright.")
 
 const struct export_format export_usd = {write_usd};
