@@ -7,6 +7,7 @@
 #include "optimizer/job/job_outline.h"
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/job/stage_table.h"
+#include "optimizer/report/result/first_results.h"
 #include "optimizer/report/surface/surface_cloth.h"
 #include "optimizer/stages/scene/pipeline_adopt.h"
 #include "optimizer/worker/worker_team.h"
@@ -292,6 +293,8 @@ static status run_stages(struct pipeline *p, struct error *err)
         p->plan->stage_fraction = 0.0;
         worker_status_stage(p->tools->status, info[i].name, info[i].title, i, n_stage);
         status s = do_stage(p, i, &earlier_ran, &loaded, err);
+        if (s == STATUS_OK && !loaded && p->in->section.scan->given)
+            s = first_results_write(&p->job, info[i].name, &p->out.volume, &p->out.fibers.fiber, &p->out.cloth, err);
         worker_status_stage_end(p->tools->status, loaded);
         release_scan(p, i);
         if (s == STATUS_OK && progress_cancelled(&p->tools->progress))
@@ -385,6 +388,7 @@ status pipeline_run(struct stage_tools *tools, const struct job_inputs *inputs, 
     if (s == STATUS_OK) s = list_files(inputs, &p->files, err);
     if (s == STATUS_OK && inputs->kind == JOB_OF_PICTURES) s = fit_output_given(inputs, &p->out.fit, err);
     if (s == STATUS_OK && inputs->kind == JOB_OF_PICTURES) s = validation_output_given(inputs, &p->out.validation, err);
+    if (s == STATUS_OK && inputs->kind == JOB_OF_FIT) s = first_photographs_write(&p->job, inputs->section.rows, err);
     if (s == STATUS_OK) s = run_stages(p, err);
     pipeline_release(p);
     free(p);

@@ -26,12 +26,12 @@ def fitted(tmp_path_factory):
     process, url = start_daemon(tmp_path_factory.mktemp("data"))
     job = selvedge.Client(url).submit(document, str(folder))
     assert job.wait().state == "succeeded"
-    yield url, job
+    yield url, job, str(folder)
     stop_daemon(process)
 
 
 def test_the_result_comes_first(fitted, browser):
-    url, job = fitted
+    url, job, _ = fitted
     browser.get(f"{url}/#{job.id}")
     wait_for(browser, "document.querySelector('#front img')?.naturalWidth > 0")
     verdict = job.result().raw["verdict"]
@@ -48,7 +48,7 @@ def test_the_result_comes_first(fitted, browser):
 
 def test_no_tab_is_tall(fitted, browser):
     """Every tab of a job with 46 rows, at three widths; and the words of the fit's inside are in the log alone."""
-    url, job = fitted
+    url, job, _ = fitted
     browser.get(f"{url}/#{job.id}")
     wait_for(browser, ACTIVE)
     names = browser.execute_script(NAMES)
@@ -69,7 +69,7 @@ def test_no_tab_is_tall(fitted, browser):
 
 
 def test_back_and_scroll_position(fitted, browser):
-    url, job = fitted
+    url, job, _ = fitted
     browser.get(url + "/")
     wait_for(browser, "document.querySelector('#jobs tbody tr a')")
     click_on(browser, "#jobs tbody tr a")
@@ -102,7 +102,7 @@ def test_back_and_scroll_position(fitted, browser):
 
 
 def test_two_windows_of_one_job(fitted, browser):
-    url, job = fitted
+    url, job, _ = fitted
     browser.get(f"{url}/#{job.id}/files")
     wait_for(browser, f"{ACTIVE} === 'files'")
     first = browser.current_window_handle
@@ -157,4 +157,30 @@ def test_the_glossary(stub, browser):
     assert any(w.startswith("verdict") for w in words) and not any("**" in w or "`" in w or "](" in w for w in words)
     assert "Azimuthal width of the transmitted lobe TT." in text_of(browser, "main")
     keep(browser, "glossary")
+    assert complaints(browser) == []
+
+
+def test_a_running_job_shows_what_there_is(fitted, browser):
+    """Photographs at once, slices with the traced fibers before the fit has ended; no card is empty."""
+    url, first, folder = fitted
+    document = first.state().raw["document"]
+    document["fit"].update(path_budget=50_000_000, models=["two_lobe.v1"])
+    document["photographs"] = [p for p in document["photographs"] if not p["file"].startswith("again")]
+    job = selvedge.Client(url).submit(document, folder)
+    browser.get(f"{url}/#{job.id}")
+    wait_for(browser, f"document.querySelectorAll('#so-far img').length >= 18 && {ACTIVE} === 'pictures'", 60)
+    wait_for(browser, "[...document.querySelectorAll('#so-far img')].slice(0, 4).every((i) => i.complete && i.naturalWidth > 0)")
+    wait_for(browser, "document.querySelector('#front img')?.naturalWidth > 0")
+    assert len(texts(browser, "#so-far .none")) == 18, "nothing is rendered yet"
+    open_tab(browser, "geometry")
+    wait_for(browser, "document.querySelector('canvas.slice')?.dataset.shown", 60)
+    assert job.state().state == "running" and "traced fiber" in text_of(browser, "#slices .legend")
+    keep(browser, "running-geometry")
+    for name in browser.execute_script(NAMES):
+        open_tab(browser, name)
+        empty = browser.execute_script("""return [...document.querySelectorAll('main .card')].map((c) => [c, c.querySelector('h2')?.innerText ?? ''])
+            .filter(([c, head]) => c.innerText.trim() === head.trim() && !c.querySelector('canvas, img, svg')).map(([, head]) => head)""")
+        assert empty == [], name
+    job.cancel()
+    wait_for(browser, "document.querySelector('.state.cancelled')", 60)
     assert complaints(browser) == []

@@ -90,17 +90,25 @@ status result_picture_write(const struct report *report, const char *name, const
     return put_in_place(report, image_write_png_rgb8(rgb, width, height, temporary, err), temporary, path, err);
 }
 
-static status write_slice(const struct report *report, int axis, struct error *err)
+static status write_slice(const struct report *report, const struct volume *volume, const struct fiber_set *traced,
+                          int axis, struct error *err)
 {
     static const char *const name[] = {"slice-x", "slice-y", "slice-z"};
     uint8_t *rgb = NULL;
     size_t width, height;
-    status s = reconstruct_slice_picture(&report->volume.volume, &report->in.made->traced, axis,
-                                         report->volume.volume.n[axis] / 2, &rgb, &width, &height, err);
+    status s = reconstruct_slice_picture(volume, traced, axis, volume->n[axis] / 2, &rgb, &width, &height, err);
     if (s != STATUS_OK) return s;
     s = result_picture_write(report, name[axis], rgb, width, height, err);
     if (s == STATUS_OK && axis == 2) s = result_thumbnail_of_bytes(report, rgb, width, height, err);
     free(rgb);
+    return s;
+}
+
+status result_slices_write(const struct report *report, const struct volume *volume, const struct fiber_set *traced,
+                           struct error *err)
+{
+    status s = STATUS_OK;
+    for (int axis = 0; axis < 3 && s == STATUS_OK; axis++) s = write_slice(report, volume, traced, axis, err);
     return s;
 }
 
@@ -110,7 +118,7 @@ status result_geometry_write(struct report *report, struct error *err)
     if (s != STATUS_OK || !report->in.job->scan->given) return s;
     s = write_volumes(report, err);
     if (s == STATUS_OK) s = report_need_volume(report, err);
-    for (int axis = 0; axis < 3 && s == STATUS_OK; axis++) s = write_slice(report, axis, err);
+    if (s == STATUS_OK) s = result_slices_write(report, &report->volume.volume, &report->in.made->traced, err);
     return s == STATUS_OK ? scan_slices_write(report, err) : s;
 }
 
@@ -133,8 +141,10 @@ status result_image_write(const struct report *report, const struct image *im, c
 static status write_photograph(const struct report *report, size_t i, const char *name, double exposure,
                                struct error *err)
 {
-    char path[WORKER_PATH_BYTES];
+    char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
     struct image im;
+    picture_paths(report, "photographs", name, ".png", path, temporary); /* written last of the two */
+    if (exists(path)) return STATUS_OK;
     worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_INPUT, NULL, path);
     status s = photograph_develop(&report->in.job->rows->process, path, &report->in.photographs->photograph[i], &im,
                                   NULL, err);
@@ -201,21 +211,31 @@ static status write_rendering(struct report *report, size_t i, const char *name,
     return s;
 }
 
+status result_photographs_write(const struct report *report, struct error *err)
+{
+    const struct job_rows *rows = report->in.photographs;
+    const struct image *chart = &report->in.job->rows->process.chart_picture;
+    picture_name *name = NULL;
+    double exposure = result_png_exposure(&report->in.job->rows->observation);
+    status s = result_picture_names(&report->in.job->rows->observation, &name, err);
+    if (s == STATUS_OK && rows->n_photograph > 0) s = make_folder(report, "photographs", err);
+    if (s == STATUS_OK && chart->pixel != NULL) s = make_folder(report, "pictures", err);
+    if (s == STATUS_OK && chart->pixel != NULL)
+        s = result_image_write(report, chart, "pictures", "color-chart", 1.0, false, err);
+    for (size_t i = 0; i < rows->n_photograph && s == STATUS_OK; i++)
+        s = write_photograph(report, i, name[i], exposure, err);
+    free(name);
+    return s;
+}
+
 status result_renderings_write(struct report *report, double from, double to, struct error *err)
 {
     picture_name *name = NULL;
     double exposure = result_png_exposure(&report->in.job->rows->observation);
     size_t n = report->in.job->rows->observation.n;
-    status s = result_picture_names(&report->in.job->rows->observation, &name, err);
+    status s = result_photographs_write(report, err);
+    if (s == STATUS_OK) s = result_picture_names(&report->in.job->rows->observation, &name, err);
     if (s == STATUS_OK) s = make_folder(report, "renderings", err);
-    if (s == STATUS_OK && report->in.photographs->n_photograph > 0) s = make_folder(report, "photographs", err);
-    if (s == STATUS_OK && report->in.job->rows->process.chart_picture.pixel != NULL)
-        s = make_folder(report, "pictures", err);
-    if (s == STATUS_OK && report->in.job->rows->process.chart_picture.pixel != NULL)
-        s = result_image_write(report, &report->in.job->rows->process.chart_picture, "pictures", "color-chart", 1.0,
-                               false, err);
-    for (size_t i = 0; i < report->in.photographs->n_photograph && s == STATUS_OK; i++)
-        s = write_photograph(report, i, name[i], exposure, err);
     for (size_t i = 0; i < n && s == STATUS_OK; i++) {
         struct progress_part part;
         struct progress progress =

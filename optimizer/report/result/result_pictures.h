@@ -8,6 +8,11 @@
 /* fibers.hair, fibers.txt; with a volume also density.vol (uint8), direction.vol (2-byte directions) and
  * pictures/slice-{x,y,z}.png. */
 status result_geometry_write(struct report *report, struct error *err);
+/* pictures/slice-{x,y,z}.png and the job's thumbnail: the middle slices, with traced fibers in red. */
+status result_slices_write(const struct report *report, const struct volume *volume, const struct fiber_set *traced,
+                           struct error *err);
+/* photographs/<name>.exr and .png, and pictures/color-chart.png. Photographs that are there stay as they are. */
+status result_photographs_write(const struct report *report, struct error *err);
 /* pictures/<name>.png: 3 bytes a pixel, row 0 at the top. */
 status result_picture_write(const struct report *report, const char *name, const uint8_t *rgb, size_t width,
                             size_t height, struct error *err);
@@ -24,7 +29,7 @@ size_t result_picture_px(const struct job_results *results, size_t n_row, double
 size_t result_picture_samples(const struct job_results *results, size_t n_row, double n_fit_path);
 /* Samples of all renderings together, after such a fit. */
 double result_renderings_paths(const struct job_results *results, size_t n_row, double n_fit_path);
-/* renderings/<name>.exr and .png, and photographs/<name>.png, for every observation. from, to: shares of the stage
+/* renderings/<name>.exr and .png for every observation, after the photographs. from, to: shares of the stage
  * before and after, between which progress is reported. */
 status result_renderings_write(struct report *report, double from, double to, struct error *err);
 
