@@ -1,6 +1,6 @@
 """What does the dashboard cost in a browser? Prints figures dashboard.* (headless Chromium, the real daemon).
 
-    bench_dashboard.py [--build DIR] [--scan-edge N] [list] [job] [slices] [first_hour]
+    bench_dashboard.py [--build DIR] [--scan-edge N] [page] [list] [job] [slices] [first_hour]
 
 list_10k_ms: time from the navigation until the list shows its 50 rows, with 10,000 jobs in the store (median of 7 loads).
 poll_bytes: bytes of a poll of that list when one row has changed (largest of 10). scripting_ms: time of scripts for each
@@ -27,7 +27,7 @@ import zlib
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(HERE)))
-for folder in (HERE, os.path.join(ROOT, "tests", "support", "python")):
+for folder in (HERE, os.path.join(ROOT, "tests", "support", "python"), os.path.join(ROOT, "clients", "python")):
     sys.path.insert(0, folder)
 N_JOB, N_LOAD, N_POINT, LOG_BYTES, WATCH_S = 10000, 7, 100000, 50 << 20, 20.0
 FLAGS = ["--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking", "--window-size=1280,900"]
@@ -122,7 +122,7 @@ def bench_job(folder, browser, daemon_type):
             series.flush()
             log.write(line * (LOG_BYTES // len(line)))
             log.flush()
-            browser.get(f"{daemon.url}/#{job}")
+            browser.get(f"{daemon.url}/#{job}/parameters")
             wait(browser, "document.querySelectorAll('.chart canvas').length >= 8")
             time.sleep(3)
             browser.execute_cdp_cmd("Profiler.enable", {})
@@ -190,7 +190,7 @@ def bench_slices(folder, browser, daemon_type, edge):
         program = os.path.join(os.environ["SELVEDGE_BUILD"], "tests", "bench", "service", "bench_scan_slices")
         subprocess.run([program, os.path.join(daemon.data, "jobs", job, "results"), *([str(edge)] if edge else [])], check=True)
         browser.set_script_timeout(300)
-        browser.get(f"{daemon.url}/#{job}")
+        browser.get(f"{daemon.url}/#{job}/geometry")
         wait(browser, "document.querySelector('canvas.slice')")
         browser.execute_script("document.querySelector('canvas.slice').scrollIntoView()")
         wait(browser, "document.querySelector('canvas.slice').dataset.shown")
@@ -211,7 +211,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", default="build")
     parser.add_argument("--scan-edge", type=int, help="edge of the scan in voxels instead of Fleece's")
-    parser.add_argument("names", nargs="*", default=["first_hour", "list", "job", "slices"])
+    parser.add_argument("names", nargs="*", default=["first_hour", "page", "list", "job", "slices"])
     arguments = parser.parse_args()
     os.environ["SELVEDGE_BUILD"] = os.path.join(ROOT, arguments.build)
     from daemon_under_test import Daemon  # it reads SELVEDGE_BUILD
@@ -221,6 +221,9 @@ def main():
             if "first_hour" in arguments.names:
                 from bench_first_hour import bench_first_hour
                 bench_first_hour(folder, browser, Daemon)
+            if "page" in arguments.names:
+                from bench_job_page import bench_job_page
+                bench_job_page(folder, browser, Daemon)
             if "list" in arguments.names:
                 bench_list(folder, browser, Daemon)
             if "job" in arguments.names:
