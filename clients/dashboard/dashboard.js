@@ -1,7 +1,7 @@
 // Entry point of the dashboard: "#" shows the list of jobs, "#?state=failed" a part of it, "#ID" one job, "#new" the
 // form for a new job ("#new?copy=ID" filled with the document of another), "#compare/ID,ID" several jobs side by side,
-// "#batches" the batches, "#batch/ID" one of them, "#glossary" the words that the pages use. The page of a job has tabs:
-// "#ID/pictures". "#share/SECRET" shows one job to someone without an account.
+// "#batches" the batches, "#batch/ID" one of them, "#glossary" the words that the pages use. The pages of a job and of a
+// comparison have tabs: "#ID/pictures". "#share/SECRET" shows one job to someone without an account.
 import { sharedPage } from "./actions/shared_page.js";
 import { batchPage } from "./batch/batch_page.js";
 import { batchesPage } from "./batch/batches_page.js";
@@ -49,7 +49,9 @@ function route() {
     leave = null;
   } else if (id.startsWith("compare/")) {
     crumb.append(el("a", { href: "#" }, "Jobs"), " › Comparison");
-    leave = comparePage(page, id.slice("compare/".length));
+    const shown = comparePage(page, root.slice("compare/".length), tab);
+    leave = () => shown.leave();
+    paged = { root, turn: (name) => shown.turn(name) };
   } else if (/^share\/[\w-]{1,80}$/.test(id)) {
     crumb.append("A job that was shared with you");
     leave = sharedPage(page, id.slice("share/".length));

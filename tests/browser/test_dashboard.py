@@ -184,7 +184,7 @@ def test_compare_two_jobs(real, other, browser):
     for id in (first.id, other.id):
         browser.execute_script("document.querySelector(`#jobs a[href='#${arguments[0]}']`).closest('tr').querySelector('input').click()", id)
     click_on(browser, "#bulk button", texts(browser, "#bulk button").index("Compare"))
-    wait_for(browser, "document.querySelector('#compare-parameters')")
+    wait_for(browser, "document.querySelector('#compare-errors')")
     assert browser.current_url.endswith(f"#compare/{first.id},{other.id}")
     assert browser.find_elements(By.CSS_SELECTOR, "main i") == [] and "true <i>fibers</i>" in text_of(browser, "#compare")
     a, b = first.result().raw, other.result().raw
@@ -199,6 +199,7 @@ def test_compare_two_jobs(real, other, browser):
     assert cells("compare-errors", "rows")[0] == ["9 + 4", "8 + 4"]
     assert "fitted rows are not the same" in text_of(browser, "#compare-errors .note")
     # parameters of the model that both have; the other model has one column
+    open_tab(browser, "parameters")
     mine = {p["name"]: p for p in next(m for m in a["models"] if m["id"] == "two_lobe.v1")["parameters"]}
     for p in b["parameters"]:
         pair, q = cells("compare-parameters", p["name"])[0], mine[p["name"]]
@@ -207,18 +208,25 @@ def test_compare_two_jobs(real, other, browser):
         assert len(pair) == 2 and ("s.e." in pair[1]) == (known and abs(n) > 2) and "s.e." not in pair[0], (p, q, pair)
     assert len(cells("compare-parameters", "alpha")[0]) == 1 and "fixed" in cells("compare-parameters", "beta_R")[0][1]
     # every row, and every photograph once with both renderings
+    open_tab(browser, "rows")
     rows = browser.find_elements(By.CSS_SELECTOR, "#compare-rows tbody tr")
     assert len(rows) == 13 and sum("–" in r.text for r in rows) == 1
-    browser.execute_script("""for (const b of document.querySelectorAll('#compare-pictures button')) b.click();
-        for (const i of document.images) i.loading = 'eager';""")
-    wait_for(browser, "[...document.images].every((i) => i.complete && i.naturalWidth > 0)")
-    assert len(browser.find_elements(By.CSS_SELECTOR, "#compare-pictures img")) == 13 + 13 + 12
+    open_tab(browser, "pictures")
+    n_picture = n_dimmed = 0
+    for _ in range(2):  # pages of eight photographs
+        browser.execute_script("for (const i of document.images) i.loading = 'eager'")
+        wait_for(browser, "[...document.images].every((i) => i.complete && i.naturalWidth > 0)")
+        n_picture += len(browser.find_elements(By.CSS_SELECTOR, "#compare-pictures img"))
+        n_dimmed += len(browser.find_elements(By.CSS_SELECTOR, "#compare-pictures img[style*=dim-B]"))
+        click_on(browser, "[aria-label='next photographs']")
+    assert n_picture == 13 + 13 + 12
     # the job without the brightest photograph wrote brighter pictures, which are dimmed to those of the other
     assert b["png_exposure"] > a["png_exposure"]
-    assert len(browser.find_elements(By.CSS_SELECTOR, "#compare-pictures img[style*=dim-B]")) == 12
+    assert n_dimmed == 12
     slope = browser.execute_script("return Number(document.querySelector('#dim-B feFuncG').getAttribute('slope'))")
     assert abs(slope - a["png_exposure"] / b["png_exposure"]) < 1e-9
     # settings: those that differ, and no others
+    open_tab(browser, "settings")
     settings = text_of(browser, "#compare-settings")
     assert cells("compare-settings", "fit.path_budget")[0] == ["300000", "100000"] and cells("compare-settings", "volume.voxel_size_um")[0] == ["2", "not set"]
     assert "fit.render_px" not in settings and "SHA-256 of truth.hair" in settings
@@ -238,7 +246,7 @@ def test_compare_two_jobs(real, other, browser):
     wait_for(browser, f"location.hash === '#compare/{draft.id},{unknown},{other.id}'")
     many = ",".join([first.id, other.id, *(f"job-{i}" for i in range(7))])
     browser.get(f"{url}/#compare/{many}")
-    wait_for(browser, "document.querySelector('#compare .note')?.textContent.includes('of the 9 in the address')")
+    wait_for(browser, "document.querySelector('#compare .note')?.textContent.includes('the first 8 of these 9 jobs')")
     browser.get(f"{url}/#compare/{first.id}")
     wait_for(browser, "document.querySelector('#compare .note')?.textContent.includes('not two jobs')")
     draft.delete()

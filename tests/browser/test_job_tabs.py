@@ -5,6 +5,7 @@ pytest.importorskip("selenium.webdriver", reason="python3-selenium is not instal
 import selvedge  # noqa: E402
 from browser_page import (  # noqa: E402
     click_on, complaints, keep, open_tab, scrolls_sideways, sized, small_weave, start_daemon, stop_daemon, submit, text_of, texts, wait_for)
+from selenium.webdriver.common.by import By  # noqa: E402
 
 MOST_PX = 3000  # of the tallest tab, at 1280 pixels
 ACTIVE = "document.querySelector('.tab-bar a.active')?.dataset.tab"
@@ -183,4 +184,28 @@ def test_a_running_job_shows_what_there_is(fitted, browser):
         assert empty == [], name
     job.cancel()
     wait_for(browser, "document.querySelector('.state.cancelled')", 60)
+    assert complaints(browser) == []
+
+
+def test_plots_of_many_jobs(stub, browser):
+    """Twelve jobs: a scatter plot of two chosen quantities, and a line for each in parallel coordinates."""
+    url, folder = stub
+    jobs = [submit(url, folder, f"plotted {i}")[0] for i in range(12)]
+    for job in jobs:
+        job.wait()
+    browser.get(f"{url}/#compare/{','.join(job.id for job in jobs)}/plots")
+    wait_for(browser, "document.querySelectorAll('#job-scatter circle').length === 12", 60)
+    assert "Tables show the first 8 of these 12 jobs" in text_of(browser, "#compare")
+    browser.execute_script("""const s = document.querySelector('#plot-across'), wanted = [...s.options].findIndex((o) => o.text.startsWith('gamma_TT'));
+        s.selectedIndex = wanted; s.dispatchEvent(new Event('change'))""")
+    labels = browser.execute_script("return [...document.querySelectorAll('#job-scatter text.name')].map((t) => t.textContent)")
+    assert labels == ["gamma_TT (degrees)", "error over held-out rows"]
+    browser.execute_script("""for (const b of document.querySelectorAll('.choices input'))
+        if (!b.checked && b.parentElement.textContent.startsWith('C_R')) b.click()""")
+    assert len(browser.find_elements(By.CSS_SELECTOR, "#job-parallel polyline")) == 12
+    keep(browser, "plots")
+    open_tab(browser, "result")
+    wait_for(browser, "document.querySelectorAll('#compare-errors thead th').length === 8")
+    browser.back()
+    wait_for(browser, "document.querySelector('#plot-across')?.selectedOptions[0].text.startsWith('gamma_TT')")
     assert complaints(browser) == []

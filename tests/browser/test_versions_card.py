@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
-from browser_page import click_on, complaints, keep, sized, submit, text_of, texts, wait_for  # noqa: E402
+from browser_page import click_on, complaints, keep, open_tab, sized, submit, text_of, texts, wait_for  # noqa: E402
 
 
 def test_versions_of_an_edited_job(stub, browser):
@@ -34,6 +34,7 @@ def test_versions_of_an_edited_job(stub, browser):
     click_on(browser, "#versions .hint a")
     wait_for(browser, "document.querySelectorAll('#compare .compared li').length === 2")
     assert "run 1" in texts(browser, "#compare .compared li")[0]
+    open_tab(browser, "settings")
     differ = text_of(browser, "#compare-settings")
     assert "volume.voxel_size_um" in differ and "2.5" in differ and "SHA-256" not in differ
     keep(browser, "versions-compared")

@@ -1,12 +1,17 @@
-// Two to eight jobs side by side: "#compare/ID,ID@2", where @2 is the result of run 2 of a job. Each job is a column under the same letter in all tables.
+// Two to eight jobs side by side, and up to a hundred in plots: "#compare/ID,ID@2", where @2 is the result of run 2 of a job;
+// "#compare/ID,ID/plots" is one of its tabs. Each of the first eight has the same letter everywhere.
 import { comparedPictures, pictureRows } from "./compare_pictures.js";
+import { comparePlots } from "./compare_plots.js";
 import { documentTable } from "./compare_documents.js";
 import { errorTable, parameterTables, rowTable } from "./compare_tables.js";
 import { el, stateTag, timeLeft, verdictTag } from "../page_parts.js";
 import { configurations } from "../result_view.js";
 import { getJson, poll } from "../server_link.js";
+import { TabBar } from "../tabs/tab_bar.js";
 
-export const MOST = 8;
+export const MOST = 8, MOST_PLOTTED = 100; // jobs in tables, and in plots
+const AT_ONCE = 8; // requests
+const TABS = [{ name: "result", title: "Result" }, { name: "parameters", title: "Parameters" }, { name: "plots", title: "Plots" }, { name: "rows", title: "Rows" }, { name: "pictures", title: "Pictures" }, { name: "settings", title: "Settings" }];
 const LIVE = new Set(["queued", "running", "paused"]);
 
 export const compareAddress = (ids) => `#compare/${ids.join(",")}`;
@@ -46,7 +51,7 @@ function lackOf({ job }) {
 
 function notes(columns, unknown, asked) {
   const list = [];
-  if (asked > MOST) list.push(`At most ${MOST} jobs are compared: of the ${asked} in the address, these are the first ${MOST}.`);
+  if (asked > MOST) list.push(`Tables show the first ${MOST} of these ${asked} jobs; the plots show ${asked > MOST_PLOTTED ? `the first ${MOST_PLOTTED}` : "all of them"}.`);
   for (const { id, missing } of unknown) list.push(`${id}: ${missing}`);
   for (const c of columns) if (lackOf(c)) list.push(`${c.letter}, ${c.job.sample}, ${lackOf(c)}`);
   if (columns.length < 2) list.push("There are not two jobs to compare. Select two to eight jobs in the list, then press “Compare”.");
@@ -63,33 +68,52 @@ function headCard(columns, ids, reference, choose) {
 
 const card = (id, title, ...content) => el("section", { class: "card", id }, el("h2", {}, title), ...content);
 
-// columns: [{id, letter, job, urls, list}]; the first one is not always the reference
-function cards(columns, reference) {
-  const ended = columns.filter((c) => c.job.result), base = ended.find((c) => c.id === reference) ?? ended[0], parts = [];
+// The tabs with content, each a function that makes it. columns: [{id, letter, job, urls, list}]; the first one is not always
+// the reference; others: jobs beyond the tables
+function contents(columns, others, reference, choice) {
+  const ended = columns.filter((c) => c.job.result), base = ended.find((c) => c.id === reference) ?? ended[0], made = new Map();
   if (ended.length) {
-    const parameters = parameterTables(ended, base), rows = pictureRows(ended);
-    parts.push(card("compare-errors", "Verdicts and errors", errorTable(columns, base, rows)));
-    if (parameters.length) parts.push(card("compare-parameters", "Parameters", ...parameters));
-    if (rows.length) parts.push(card("compare-rows", "Errors by row", ...rowTable(ended, base, rows)));
-    if (rows.length) parts.push(card("compare-pictures", "The same photograph with each rendering", ...comparedPictures(ended, rows)));
+    const rows = pictureRows(ended);
+    made.set("result", () => [card("compare-errors", "Verdicts and errors", errorTable(columns, base, rows))]);
+    if (ended.some((c) => c.job.parameters?.length)) made.set("parameters", () => [card("compare-parameters", "Parameters", ...parameterTables(ended, base))]);
+    if (ended.length + others.length > 1) made.set("plots", () => [comparePlots([...columns, ...others], choice)]);
+    if (rows.length) made.set("rows", () => [card("compare-rows", "Errors by row", ...rowTable(ended, base, rows))]);
+    if (rows.length) made.set("pictures", () => [card("compare-pictures", "The same photograph with each rendering", ...comparedPictures(ended, rows))]);
   }
-  if (columns.length > 1) parts.push(card("compare-settings", "Settings that differ", ...documentTable(columns)));
-  return parts;
+  if (columns.length > 1) made.set("settings", () => [card("compare-settings", "Settings that differ", ...documentTable(columns))]);
+  return made;
 }
 
-export function comparePage(page, text) {
-  const asked = [...new Set(text.split(",").filter((id) => id !== ""))], ids = asked.slice(0, MOST);
-  const head = el("section", { class: "card", id: "compare" }), rest = el("div");
-  let reference = ids[0], shown = "", columns = [], unknown = [], gone = false;
-  document.title = "Comparison – Selvedge";
-  page.append(head, rest);
+// The jobs beyond the tables, read once, a few at a time.
+async function fetchOthers(ids) {
+  const found = [];
+  for (let i = 0; i < ids.length; i += AT_ONCE) found.push(...await Promise.all(ids.slice(i, i + AT_ONCE).map(fetchColumn)));
+  return found.filter((c) => c.job?.result);
+}
 
+export function comparePage(page, text, tab) {
+  const asked = [...new Set(text.split(",").filter((id) => id !== ""))], ids = asked.slice(0, MOST);
+  const head = el("section", { class: "card", id: "compare" }), rest = el("div", { class: "tab-panel", id: "tab" }), bar = new TabBar(`compare/${text}`, TABS, "parts of this comparison"), choice = {};
+  let reference = ids[0], shown = "", columns = [], unknown = [], others = null, gone = false, wanted = tab, made = new Map(), drawn = "";
+  document.title = "Comparison – Selvedge";
+  page.append(head, bar.node, rest);
+
+  const showTab = () => {
+    const name = made.has(wanted) ? wanted : [...made.keys()][0] ?? "";
+    bar.offer([...made.keys()], name);
+    if (name === drawn) return;
+    drawn = name;
+    rest.replaceChildren(...(made.get(name)?.() ?? []));
+  };
   const show = () => {
     head.replaceChildren(el("h1", {}, "Comparison"), ...headCard(columns, ids, reference, (id) => { reference = id; show(); head.querySelector("select").focus(); }).filter(Boolean), ...notes(columns, unknown, asked.length));
-    rest.replaceChildren(...cards(columns, reference));
+    made = contents(columns, others ?? [], reference, choice);
+    drawn = "";
+    showTab();
   };
   const poller = poll(async () => {
     const all = await Promise.all(ids.map(fetchColumn));
+    others ??= await fetchOthers(asked.slice(MOST, MOST_PLOTTED));
     if (gone) return 5;
     columns = all.filter((c) => c.job).map((c, i) => ({ ...c, letter: "ABCDEFGH"[i], list: configurations(c.job, c.urls) }));
     unknown = all.filter((c) => c.missing);
@@ -97,5 +121,5 @@ export function comparePage(page, text) {
     if (key !== shown) { shown = key; show(); }
     return columns.some((c) => LIVE.has(c.job.state)) ? 3 : 30;
   });
-  return () => { gone = true; poller.stop(); };
+  return { turn: (name) => { wanted = name; showTab(); }, leave: () => { gone = true; poller.stop(); } };
 }

@@ -1,8 +1,9 @@
 // The photographs of all jobs, each once, with the rendering of every job beside it at one exposure.
 import { commonExposure, picture } from "../comparison.js";
+import { PagedList } from "../paged_list.js";
 import { el, isNumber, percentWithError, svg } from "../page_parts.js";
 
-const SHOWN = 12; // photographs at first
+const SHOWN = 8; // photographs of a page
 const round = (x) => (isNumber(x) ? String(Number(x.toFixed(1))) : "–");
 
 const whereOf = (a) => `light ${round(a.light_theta_deg)}°, ${round(a.light_phi_deg)}°; camera ${round(a.camera_theta_deg)}°, ${round(a.camera_phi_deg)}°; ${a.all_rotations ? "all rotations" : `turned ${round(a.cloth_rotation_deg)}°`}`;
@@ -54,8 +55,7 @@ export function comparedPictures(columns, rows) {
             sameLight(one, first) ? null : el("span", { class: "tag warn", title: "This job has other measured values for this row than the picture at the left." }, "measured otherwise"));
         }))));
   };
-  const box = el("div", {}, rows.slice(0, SHOWN).map(line));
-  const more = rows.length > SHOWN ? el("button", { type: "button", onclick: () => { box.append(...rows.slice(SHOWN).map(line)); more.remove(); } }, `Show the other ${rows.length - SHOWN}`) : null;
+  const box = el("div"), { pages } = new PagedList(box, rows.map(line), SHOWN, "photographs");
   const dimmed = filters.childElementCount > 0 ? " Pictures that were written brighter are dimmed to it, so that what was white in them is grey." : "";
-  return [el("p", { class: "hint" }, `All pictures have the same exposure, the least of these jobs.${dimmed} Plain squares show mean colours.`), filters, box, more].filter(Boolean);
+  return [el("p", { class: "hint" }, `All pictures have the same exposure, the least of these jobs.${dimmed} Plain squares show mean colours.`), filters, box, pages];
 }

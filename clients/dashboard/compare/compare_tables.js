@@ -1,7 +1,9 @@
 // Tables of the comparison: verdicts and errors, parameters, errors by row. A column is {id, letter, job, urls, list}.
 import { duration, el, isNumber, percent, percentWithError, verdictTag, withError } from "../page_parts.js";
+import { PagedList } from "../paged_list.js";
 import { models, plainErrors, residuals } from "../result_view.js";
 
+const SHOWN_ROWS = 25;
 const MARK = 2; // standard errors of the difference from which on it is marked
 
 // The difference of two values in standard errors of the difference, taken as independent. A value without a standard
@@ -27,6 +29,12 @@ export function sideBySide(label, columns, rows, first = "") {
   const body = rows.map((row) => (typeof row === "string" ? el("tr", {}, el("th", { class: "set", colSpan: columns.length + 1, scope: "colgroup" }, row))
     : el("tr", {}, el("th", { scope: "row" }, row[0]), row[1].map((cell) => el("td", { class: "number" }, cell)))));
   return el("div", { class: "wide", tabIndex: 0, role: "region", "aria-label": label }, el("table", { class: "side" }, el("thead", {}, el("tr", {}, el("td", {}, first), head)), el("tbody", {}, body)));
+}
+
+// The same, a page at a time.
+function pagedRows(label, columns, rows) {
+  const table = sideBySide(label, columns, rows), body = table.querySelector("tbody"), pages = new PagedList(body, [...body.children], SHOWN_ROWS, "rows");
+  return el("div", { class: "scroll-rows" }, table, pages.pages);
 }
 
 const errorCell = (value, se) => (isNumber(value) ? percentWithError(value, se) : "–");
@@ -97,5 +105,5 @@ export function rowTable(columns, base, rows) {
     return [markOf(n, base), " ", x.held ? el("span", { class: "tag" }, "held out") : null, " ", isNumber(x.errorSe) ? percentWithError(x.error, x.errorSe, 1) : percent(x.error)];
   };
   return [el("p", { class: "hint" }, `Relative error of each row ± standard error by tracing. A row is the same in two jobs when its name and its angles are. Marked: more than ${MARK} standard errors of the difference from ${base.letter}.`),
-    el("div", { class: "scroll-rows" }, sideBySide("errors by row", columns, rows.map((row) => [[el("span", { class: "mono" }, row.name), el("div", { class: "hint" }, row.where)], columns.map((c) => cell(row, c))])))];
+    pagedRows("errors by row", columns, rows.map((row) => [[el("span", { class: "mono" }, row.name), el("div", { class: "hint" }, row.where)], columns.map((c) => cell(row, c))]))];
 }

@@ -1,5 +1,5 @@
 // Actions on the selected jobs of the list.
-import { compareAddress, MOST } from "../compare/compare_page.js";
+import { compareAddress, MOST_PLOTTED as MOST } from "../compare/compare_page.js";
 import { el } from "../page_parts.js";
 import { sendJson } from "../server_link.js";
 
@@ -44,7 +44,7 @@ export function bulkActions(picked, { clear, done }) {
     cancel.disabled = !jobs.some((j) => LIVE.has(j.state) || j.state === "draft");
     retry.disabled = !jobs.some((j) => ENDED.has(j.state));
     compare.disabled = jobs.length < 2 || jobs.length > MOST;
-    compare.title = compare.disabled ? `Select two to ${MOST} jobs to compare them.` : "side by side";
+    compare.title = compare.disabled ? `Select two to ${MOST} jobs to compare them.` : "side by side, and as plots";
     copy.disabled = jobs.length !== 1;
     copy.title = copy.disabled ? "Select one job to copy it." : "a new job with this document, to be changed";
     remove.textContent = sure ? `Really delete ${jobs.length}?` : "Delete";
