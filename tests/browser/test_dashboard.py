@@ -196,7 +196,7 @@ def test_compare_two_jobs(real, other, browser):
     held = cells("compare-errors", "held out")[0]
     assert all(text.endswith(error_words(r, 'heldout_rel_rms')) for text, r in zip(held, (a, b)))
     assert cells("compare-errors", "plain BRDF, held")[0] == [f"{100 * r['skill']['plain_brdf']['heldout_rel_rms']:.2f} %" for r in (a, b)]
-    assert cells("compare-errors", "rows")[0] == ["9 + 4", "8 + 4"]
+    assert cells("compare-errors", "rows, fitted")[0] == ["9 + 4", "8 + 4"]
     assert "fitted rows are not the same" in text_of(browser, "#compare-errors .note")
     # parameters of the model that both have; the other model has one column
     open_tab(browser, "parameters")
