@@ -65,7 +65,7 @@ def scan_and_photographs(a, folder):
 
 def scan_and_table(a, folder):
     volume = scan(a, folder, "plain", 3)
-    shown = photograph(a, folder, 131072, 8, C_R=(0.05, 0.06, 0.09), C_TT=(0.3, 0.5, 0.75), beta_R=6, beta_TT=18, gamma_TT=22)
+    shown = photograph(a, folder, 131072, 8, C_R=(0.1, 0.1, 0.12), C_TT=(0.3, 0.5, 0.7), beta_R=5, beta_TT=18, gamma_TT=20)
     return {"sample": "plain weave, scanned, with a table", "volume": volume, "measurements": to_table(folder, shown), "fit": FIT}
 
 
