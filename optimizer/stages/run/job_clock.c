@@ -7,10 +7,10 @@
  * ones; and of a stage by this job's own speed. The scatter between jobs of all kinds counts as much as the scatter of
  * this many remembered jobs. */
 static const double sd_least = 0.08, sd_factor = 0.4, sd_own = 0.3, usual_jobs = 0.5;
-/* The same of elapsed time over the passed share x, times (1 - x) / sqrt(x): by a remembered curve; by a straight line
- * or the stage's own prediction; and by a usual curve, taken from four other scans: at half of the fraction of tracing
- * fibers 35 to 73 % of the time had passed, and at two thirds 58 to 95 %. */
-static const double sd_by_curve = 0.2, sd_by_line = 0.35, sd_by_usual = 1.0;
+/* The same of elapsed time over the passed share x, times (1 - x) / sqrt(x): by a remembered curve; by the
+ * stage's own prediction; by a straight line in the first job of a kind; and by a usual curve, taken from four other
+ * scans: at half of the fraction of tracing fibers 35 to 73 % of the time had passed, and at two thirds 58 to 95 %. */
+static const double sd_by_curve = 0.2, sd_by_line = 0.35, sd_by_first_line = 0.6, sd_by_usual = 1.0;
 static const double usual_curve_jobs = 1.0;
 /* Share of a stage's time in one of SPEED_CURVE_POINTS parts of its fraction from which on the fraction has waited. */
 static const double long_wait = 0.1;
@@ -37,7 +37,10 @@ void job_clock_init(struct job_clock *c, size_t n_stage, const struct speed_book
 static void set_curve(struct job_clock_stage *s, const struct speed_entry *e, const struct job_clock_work *work)
 {
     const double n_usual = e == NULL || work->predicts_end ? usual_curve_jobs : 0.0, n_job = e != NULL ? e->n_job : 0.0;
-    s->curve_sd = e != NULL && !work->predicts_end ? sd_by_curve : work->usual_curve != NULL ? sd_by_usual : sd_by_line;
+    s->curve_sd = e != NULL && !work->predicts_end  ? sd_by_curve
+                  : work->usual_curve != NULL       ? sd_by_usual
+                  : e != NULL || work->predicts_end ? sd_by_line
+                                                    : sd_by_first_line;
     for (size_t k = 0; k < SPEED_CURVE_POINTS; k++) {
         const double straight = (double)(k + 1) / SPEED_CURVE_POINTS;
         const double usual = work->usual_curve != NULL ? work->usual_curve[k] : straight;
