@@ -5,7 +5,7 @@ import { comparePlots } from "./compare_plots.js";
 import { documentTable } from "./compare_documents.js";
 import { errorTable, parameterTables, rowTable } from "./compare_tables.js";
 import { el, stateTag, timeLeft, verdictTag } from "../page_parts.js";
-import { configurations } from "../result_view.js";
+import { configurations, parameterMeanings } from "../result_view.js";
 import { getJson, poll } from "../server_link.js";
 import { TabBar } from "../tabs/tab_bar.js";
 
@@ -70,12 +70,12 @@ const card = (id, title, ...content) => el("section", { class: "card", id }, el(
 
 // The tabs with content, each a function that makes it. columns: [{id, letter, job, urls, list}]; the first one is not always
 // the reference; others: jobs beyond the tables
-function contents(columns, others, reference, choice) {
+function contents(columns, others, reference, choice, meanings) {
   const ended = columns.filter((c) => c.job.result), base = ended.find((c) => c.id === reference) ?? ended[0], made = new Map();
   if (ended.length) {
     const rows = pictureRows(ended);
     made.set("result", () => [card("compare-errors", "Verdicts and errors", errorTable(columns, base, rows))]);
-    if (ended.some((c) => c.job.parameters?.length)) made.set("parameters", () => [card("compare-parameters", "Parameters", ...parameterTables(ended, base))]);
+    if (ended.some((c) => c.job.parameters?.length)) made.set("parameters", () => [card("compare-parameters", "Parameters", ...parameterTables(ended, base, meanings))]);
     if (ended.length + others.length > 1) made.set("plots", () => [comparePlots([...columns, ...others], choice)]);
     if (rows.length) made.set("rows", () => [card("compare-rows", "Errors by row", ...rowTable(ended, base, rows))]);
     if (rows.length) made.set("pictures", () => [card("compare-pictures", "The same photograph with each rendering", ...comparedPictures(ended, rows))]);
@@ -94,7 +94,7 @@ async function fetchOthers(ids) {
 export function comparePage(page, text, tab) {
   const asked = [...new Set(text.split(",").filter((id) => id !== ""))], ids = asked.slice(0, MOST);
   const head = el("section", { class: "card", id: "compare" }), rest = el("div", { class: "tab-panel", id: "tab" }), bar = new TabBar(`compare/${text}`, TABS, "parts of this comparison"), choice = {};
-  let reference = ids[0], shown = "", columns = [], unknown = [], others = null, gone = false, wanted = tab, made = new Map(), drawn = "";
+  let reference = ids[0], shown = "", columns = [], unknown = [], others = null, gone = false, wanted = tab, made = new Map(), drawn = "", meanings = null;
   document.title = "Comparison – Selvedge";
   page.append(head, bar.node, rest);
 
@@ -107,11 +107,12 @@ export function comparePage(page, text, tab) {
   };
   const show = () => {
     head.replaceChildren(el("h1", {}, "Comparison"), ...headCard(columns, ids, reference, (id) => { reference = id; show(); head.querySelector("select").focus(); }).filter(Boolean), ...notes(columns, unknown, asked.length));
-    made = contents(columns, others ?? [], reference, choice);
+    made = contents(columns, others ?? [], reference, choice, meanings);
     drawn = "";
     showTab();
   };
   const poller = poll(async () => {
+    meanings ??= parameterMeanings((await getJson("/v1/options")).models);
     const all = await Promise.all(ids.map(fetchColumn));
     others ??= await fetchOthers(asked.slice(MOST, MOST_PLOTTED));
     if (gone) return 5;

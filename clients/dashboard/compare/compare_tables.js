@@ -73,7 +73,8 @@ function parameterCell(p, other, base, isBase) {
 }
 
 // A table for each model that a job has fitted: parameters are compared within a model, in one unit.
-export function parameterTables(columns, base) {
+// meanings: by "MODEL NAME", of parameterMeanings()
+export function parameterTables(columns, base, meanings) {
   const ids = [...new Set(columns.flatMap((c) => modelsOf(c).map((m) => m.id)))];
   const tables = ids.map((id) => {
     const having = columns.map((c) => ({ c, model: modelsOf(c).find((m) => m.id === id) })).filter((x) => x.model);
@@ -81,11 +82,13 @@ export function parameterTables(columns, base) {
     const keyOf = (p) => `${p.set}\n${p.name}\n${p.unit}`;
     for (const { model } of having) for (const p of model.parameters) if (!keys.has(keyOf(p))) keys.set(keyOf(p), p);
     const find = (x, key) => x.model.parameters.find((p) => keyOf(p) === key), rows = [];
-    let set = "";
+    let set = "", before = null;
     for (const [key, p] of keys) {
-      if (p.set !== set) rows.push(p.set);
+      if (p.set !== set) { rows.push(p.set); before = null; }
       ({ set } = p);
-      rows.push([el("span", { class: "mono" }, `${p.name}${p.unit ? ` ${p.unit === "deg" ? "°" : p.unit}` : ""}`), having.map((x) => parameterCell(find(x, key), find(against, key), against.c, x === against))]);
+      const meaning = meanings.get(`${id} ${p.name}`), again = meaning === before; // r, g, b of one colour
+      before = meaning;
+      rows.push([[el("span", { class: "mono" }, `${p.name}${p.unit ? ` ${p.unit === "deg" ? "°" : p.unit}` : ""}`), meaning && !again ? el("div", { class: "hint" }, meaning) : null], having.map((x) => parameterCell(find(x, key), find(against, key), against.c, x === against))]);
     }
     const best = having.filter((x) => x.model.best).map((x) => x.c.letter);
     return rows.length === 0 ? null : el("div", {}, el("h3", {}, el("span", { class: "mono" }, id), ids.length > 1 ? el("span", { class: "hint" }, best.length ? ` best model of ${best.join(", ")}` : " best model of none") : null),
