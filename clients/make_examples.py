@@ -14,6 +14,7 @@ import subprocess
 
 ANGLES = ("light_theta_deg", "light_phi_deg", "camera_theta_deg", "camera_phi_deg", "cloth_rotation_deg")
 ERROR = 0.005
+TWILL = {"C_R": (0.06, 0.05, 0.08), "C_TT": (0.72, 0.55, 0.35), "beta_R": 4, "beta_TT": 20, "gamma_TT": 18}
 FIT = {"model": "two_lobe.v1", "seed": 1}
 
 
@@ -31,9 +32,9 @@ def write(folder, name, document):
         json.dump(document, f, indent=1)
 
 
-def scan(a, folder, weave, seed):
-    """Returns the section `volume` of a scan that is made in the folder, with its true fibers."""
-    phantom(a, "cloth", "--weave", weave, "--fibers-per-yarn", 7, "--seed", seed, "--snr", 8, "--out", folder)
+def scan(a, folder):
+    """Returns the section `volume` of the scan of a twill that is made in the folder, with its true fibers."""
+    phantom(a, "cloth", "--weave", "twill", "--seed", 7, "--out", folder)
     return {"files": ["scan.tif"], "voxel_size_um": load(folder, "phantom.json")["cloth"]["voxel_size_um"]}
 
 
@@ -58,15 +59,13 @@ def to_table(folder, photographs):
 
 
 def scan_and_photographs(a, folder):
-    volume = scan(a, folder, "twill", 7)
-    shown = photograph(a, folder, 65536, 48, C_R=(0.06, 0.05, 0.08), C_TT=(0.72, 0.55, 0.35), beta_R=4, beta_TT=20, gamma_TT=18)
-    return {"sample": "twill, scanned and photographed", "volume": volume, "photographs": shown, "fit": FIT}
+    volume = scan(a, folder)
+    return {"sample": "twill, scanned and photographed", "volume": volume, "photographs": photograph(a, folder, 131072, 64, **TWILL), "fit": FIT}
 
 
 def scan_and_table(a, folder):
-    volume = scan(a, folder, "plain", 3)
-    shown = photograph(a, folder, 131072, 8, C_R=(0.1, 0.1, 0.12), C_TT=(0.3, 0.5, 0.7), beta_R=5, beta_TT=18, gamma_TT=20)
-    return {"sample": "plain weave, scanned, with a table", "volume": volume, "measurements": to_table(folder, shown), "fit": FIT}
+    volume = scan(a, folder)
+    return {"sample": "twill, scanned, with a table", "volume": volume, "measurements": to_table(folder, photograph(a, folder, 131072, 8, **TWILL)), "fit": FIT}
 
 
 def described_cloth(a, folder):
