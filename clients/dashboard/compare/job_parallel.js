@@ -10,7 +10,7 @@ export function parallelOf(jobs, axes) {
     const values = jobs.map(({ job }) => q.of(job)?.value).filter(isNumber), low = Math.min(...values), high = Math.max(...values);
     return { low, high, y: (v) => (high > low ? H - B - (H - T - B) * (v - low) / (high - low) : (H - B + T) / 2) };
   });
-  const root = svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "plot job-parallel", role: "img", "aria-label": `${jobs.length} jobs over ${axes.map((q) => q.name).join(", ")}` });
+  const root = svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "plot job-parallel", role: "group", "aria-label": `${jobs.length} jobs over ${axes.map((q) => q.name).join(", ")}` });
   root.setAttribute("width", String(W));
   axes.forEach((q, i) => {
     const words = q.name.match(/.{1,18}(?:\s|$)|\S{1,18}/g) ?? [q.name];

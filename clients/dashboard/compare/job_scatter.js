@@ -21,7 +21,7 @@ export function scatterOf(jobs, across, up) {
   if (points.length === 0) return el("p", { class: "hint" }, "No job has both of these.");
   const [x0, x1] = rangeOf(points, "x", across), [y0, y1] = rangeOf(points, "y", up);
   const X = (v) => L + (W - L - R) * (v - x0) / (x1 - x0), Y = (v) => H - B - (H - T - B) * (v - y0) / (y1 - y0);
-  const root = svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "plot job-scatter", role: "img", "aria-label": `${up.name} against ${across.name}, ${points.length} jobs` });
+  const root = svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "plot job-scatter", role: "group", "aria-label": `${up.name} against ${across.name}, ${points.length} jobs` });
   for (const v of ticksOf(across, x0, x1)) root.append(svg("line", { class: "axis", x1: X(v), x2: X(v), y1: T, y2: H - B }), svg("text", { x: X(v), y: H - B + 17, "text-anchor": "middle" }, across.show(v)));
   for (const v of ticksOf(up, y0, y1)) root.append(svg("line", { class: "axis", x1: L, x2: W - R, y1: Y(v), y2: Y(v) }), svg("text", { x: L - 6, y: Y(v) + 4, "text-anchor": "end" }, up.show(v)));
   root.append(svg("text", { class: "name", x: (L + W - R) / 2, y: H - 8, "text-anchor": "middle" }, across.name), svg("text", { class: "name", x: 16, y: (H - B + T) / 2, "text-anchor": "middle", transform: `rotate(-90 16 ${(H - B + T) / 2})` }, up.name));
