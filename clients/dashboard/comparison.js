@@ -74,5 +74,5 @@ export function radiusPlot(search) {
   for (const r of [list[0].radius, Math.exp((from + to) / 2), list[list.length - 1].radius]) label(Number(r.toPrecision(3)), { x: x(r), y: H - B + 15, "text-anchor": "middle" });
   for (const f of [low, high]) label(Number(f.toPrecision(2)), { x: L - 6, y: y(f) + (f === low ? 0 : 10), "text-anchor": "end" });
   label("fiber radius, µm", { x: (L + W - R) / 2, y: H - 4, "text-anchor": "middle" });
-  return el("div", {}, el("p", { class: "hint" }, "Objective of the fit at each radius ± 2 s.e. The band is the fitted radius with its standard error."), svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "radius" }, ...parts));
+  return el("div", {}, el("p", { class: "hint" }, "Sum of squared errors of the fit at each radius ± 2 s.e. The band is the fitted radius with its standard error."), svg("svg", { viewBox: `0 0 ${W} ${H}`, class: "radius" }, ...parts));
 }

@@ -170,7 +170,7 @@ void page_curve(const json_t *curve, FILE *out)
     }
     if (!(a.y1 > a.y0)) return;
     a.x1 = 4.0 * ceil(a.x1 / 4.0); /* the ticks are whole steps */
-    open_chart(&a, "step", "objective (ring: below its noise)", out);
+    open_chart(&a, "step", "sum of squared errors (ring: below its noise)", out);
     json_array_foreach(curve, i, point)
     {
         double f = page_number(point, "objective"), se = page_number(point, "objective_se");

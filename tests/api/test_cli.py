@@ -116,7 +116,7 @@ def run(url, *words, expect=0, cwd=None):
 def test_from_submit_to_results(daemon, sample, tmp_path):
     done = run(daemon.url, "submit", sample / "job.json", "--watch")
     job_id = done.stdout.splitlines()[0]
-    assert "2 files in place" in done.stderr and "fit (6/8)" in done.stderr and "objective" in done.stderr
+    assert "2 files in place" in done.stderr and "fit (6/8)" in done.stderr and "squared errors" in done.stderr
     assert "C_TT.r" in done.stdout and "+- 0.010" in done.stdout and "not determined" in done.stdout
     assert "gamma_TT" in next(line for line in done.stdout.splitlines() if "at upper bound" in line)
     assert "held out: 3 %" in done.stdout

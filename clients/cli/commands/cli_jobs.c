@@ -206,7 +206,7 @@ static void print_point(const json_t *point, FILE *out)
 }
 
 CLI_COMMAND(SERIES, cli_series, .place = 130, .name = "series", .operand = "ID", .options = "json",
-            .summary = "print the fit step by step: objective, residual, parameters (tab-separated)")
+            .summary = "print the fit step by step: sum of squared errors, relative error, parameters (tab-separated)")
 
 status cli_series(struct cli *cli, int *exit_code, struct error *err)
 {

@@ -101,9 +101,9 @@ static void fit_part(const struct job_view *v, char *out, size_t n_out)
     if (isnan(v->objective)) return;
     text_with_error(v->objective, v->objective_se, objective);
     if (v->step >= 0)
-        snprintf(out, n_out, "  step %ld  objective %s", v->step, objective);
+        snprintf(out, n_out, "  step %ld  squared errors %s", v->step, objective);
     else
-        snprintf(out, n_out, "  objective %s", objective);
+        snprintf(out, n_out, "  squared errors %s", objective);
 }
 
 static void stage_part(const struct job_view *v, char *out, size_t n_out)

@@ -53,7 +53,7 @@ function starts(result) {
   const names = result.parameters.map((p) => p.name);
   const short = (v) => v.map((x, i) => `${names[i]} ${Number(x.toPrecision(3))}`).join(", ");
   return el("div", {}, el("h3", {}, "Starts"),
-    table("starts", ["Start", "#Objective ± s.e.", "", "Ended at"], list.map((s, i) => el("tr", {}, el("td", { title: short(s.start) }, String(i + 1)), number(withError(s.objective, s.objective_se)),
+    table("starts", ["Start", "#Sum of squared errors ± s.e.", "", "Ended at"], list.map((s, i) => el("tr", {}, el("td", { title: short(s.start) }, String(i + 1)), number(withError(s.objective, s.objective_se)),
       el("td", {}, s.kept ? tag("kept", "good") : "", s.converged ? "" : tag("not converged"), s.elsewhere ? tag("as good, elsewhere") : ""), el("td", { class: "hint" }, short(s.value))))));
 }
 

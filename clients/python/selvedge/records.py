@@ -68,7 +68,7 @@ class JobState:
     def __str__(self) -> str:
         line = f"{self.state} {self.stage or ''} {100 * self.fraction:.0f} %"
         if self.objective is not None:
-            line += f"  objective {self.objective:.5g} +- {self.objective_se or 0:.2g}"
+            line += f"  squared errors {self.objective:.5g} +- {self.objective_se or 0:.2g}"
         return line
 
 

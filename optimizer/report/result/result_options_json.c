@@ -203,8 +203,8 @@ void result_summary_options(const struct report *report, const struct pipeline_m
         char left_out[60] = "";
         if (isfinite(s->cross_validation))
             snprintf(left_out, sizeof left_out, ", cross-validation %.2f %%", 100.0 * s->cross_validation);
-        fprintf(out, "start %-2zu objective %.5g +- %.2g%s%s%s%s\n", k + 1, s->objective, s->objective_se, left_out,
-                s->converged ? "" : ", not converged", s->kept ? ", kept" : "",
+        fprintf(out, "start %-2zu squared errors %.5g +- %.2g%s%s%s%s\n", k + 1, s->objective, s->objective_se,
+                left_out, s->converged ? "" : ", not converged", s->kept ? ", kept" : "",
                 s->elsewhere ? ", as good but at other parameters" : "");
     }
 }

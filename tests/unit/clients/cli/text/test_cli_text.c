@@ -112,7 +112,7 @@ static void test_progress_line(void **state)
     assert_non_null(strstr(out, " 50 %"));
     assert_non_null(strstr(out, "fit (6/8)"));
     assert_non_null(strstr(out, "ETA 1:05"));
-    assert_non_null(strstr(out, "step 7  objective 0.02360 +- 0.00080"));
+    assert_non_null(strstr(out, "step 7  squared errors 0.02360 +- 0.00080"));
     v.eta_low_s = 50;
     v.eta_high_s = 130;
     text_progress(&v, 200, out, sizeof out);
