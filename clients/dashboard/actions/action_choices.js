@@ -57,4 +57,4 @@ export function pictureRequest(shape, light, size) {
 }
 
 // The formats of exports, from the options of a job: the first sentence of their meaning in words.
-export const formatsOf = (options) => options.filter((o) => o.kind === "boolean" && o.path.startsWith("export.")).map((o) => ({ id: o.path.split(".")[1], words: o.meaning }));
+export const formatsOf = (options) => options.filter((o) => o.kind === "boolean" && o.path.startsWith("export.")).map((o) => ({ id: o.path.split(".")[1], words: o.meaning.replaceAll("`", "") }));

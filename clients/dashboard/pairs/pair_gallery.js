@@ -4,7 +4,7 @@ import { el, percentWithError } from "../page_parts.js";
 import { PagedList } from "../paged_list.js";
 import { automaticExposure, draw, loadPicture, thumbnail, uniform } from "./linear_picture.js";
 
-const EDGE = 160, AT_ONCE = 3, SHOWN = 18;
+const EDGE = 160, AT_ONCE = 3, SHOWN = window.innerWidth < 700 ? 6 : 18; // a phone has one column
 const degrees = (x) => (typeof x === "number" ? `${Number(x.toFixed(1))}°` : "–");
 const row = (name, value, title = "") => el("div", { class: "row", title }, el("span", {}, name), el("span", {}, value));
 
