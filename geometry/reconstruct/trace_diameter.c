@@ -132,6 +132,7 @@ status trace_diameter(const struct volume *v, const struct volume *known, trace_
         struct found found;
         const double tried = diameter;
         s = trace_once(&box, find, diameter, pool, &quiet, *report, &found, err);
+        if (v->filled.n > 0) found.several = 0.0; /* lumens that are not filled yet look like gaps between fibers */
         if (s == STATUS_OK && round == 0) s = try_between(&box, find, &found, pool, &quiet, report, &diameter, err);
         if (found.blurred) filter_choose_blurred(option, diameter);
         if (diameter != tried) break; /* one between the diameters of two kinds */
