@@ -1,7 +1,8 @@
-"""The viewer of slices on the page of a scan's job: what is drawn is what density.vol and direction.vol hold, across all
-axes; wheel, keys and fingers; fibers found and filled in, there and in 3D."""
+"""The viewer of slices on the page of a scan's job: what is drawn are the scan's densities, which go with the shares of
+density.vol, and the directions of direction.vol, across all axes; wheel, keys and fingers; fibers found and filled in, there and in 3D."""
 import json
 import math
+import statistics
 import struct
 import urllib.request
 
@@ -62,7 +63,8 @@ def pixel(browser, size, u, v):
 
 @pytest.mark.parametrize("axis", "xyz")
 def test_what_is_drawn(scanned, browser, axis):
-    """Directions have the colours of their axes, and only where the job has kept a direction."""
+    """Densities go with density.vol place by place (the scan has noise and blur besides); directions have the colours of
+    their axes, and only where the job has kept a direction."""
     url, job = scanned
     n, direction = volume(result(url, job, "direction.vol"))
     density = volume(result(url, job, "density.vol"))[1]
@@ -75,7 +77,7 @@ def test_what_is_drawn(scanned, browser, axis):
     assert browser.execute_script(f"return {SHOWN}") == f"{axis} {n[a] // 2} 0 density"
     press(browser, Keys.PAGE_UP)
     wait_for(browser, f"{SHOWN} === '{axis} {n[a] // 2 + 1} 0 density'")
-    seen = {}
+    seen, share = {}, {}
     for colours in ("density", "direction"):
         if colours == "direction":
             press(browser, "d")
@@ -84,10 +86,10 @@ def test_what_is_drawn(scanned, browser, axis):
             for j in range(2, n[v], 5):
                 place = [0, 0, 0]
                 place[u], place[v], place[a] = i, j, n[a] // 2 + 1
-                got, kept = pixel(browser, (n[u], n[v]), i, j), density(*place)[0]
+                got = pixel(browser, (n[u], n[v]), i, j)
                 if colours == "density":
-                    assert got[0] == got[1] == got[2] and (kept == 0 or abs(got[0] - kept) <= 5), (place, got, kept)
-                    seen[i, j] = got[0]
+                    assert got[0] == got[1] == got[2], (place, got)
+                    seen[i, j], share[i, j] = got[0], density(*place)[0]
                 elif direction(*place)[0] == 255:
                     assert got[0] == got[1] == got[2] <= 0.45 * seen[i, j] + 2, (place, got)
                 else:
@@ -100,6 +102,8 @@ def test_what_is_drawn(scanned, browser, axis):
                         assert got[2] > got[0] + 20, (place, got)
     assert max(seen.values()) > 200 and min(seen.values()) < 60
     assert complaints(browser) == []
+    # other places correlate by 1 / sqrt(number of places), these by some 0.7 with noise and blur
+    assert statistics.correlation(list(seen.values()), list(share.values())) > max(0.5, 4 / math.sqrt(len(seen)))
 
 
 def test_wheel_keys_zoom_and_readout(scanned, browser):

@@ -128,9 +128,10 @@ static struct job_document *parse(const char *camera_keys, const char *photograp
     char text[4096];
     struct job_document *doc = NULL;
     struct error err = {0};
-    snprintf(text, sizeof text,
-             "{\"sample\":\"s\",\"fibers\":{\"file\":\"c.hair\"},\"camera\":{%s},\"photographs\":[%s]%s%s}",
-             camera_keys, photographs, color[0] != '\0' ? ",\"color\":" : "", color);
+    const bool has_camera = camera_keys[0] != '\0';
+    snprintf(text, sizeof text, "{\"sample\":\"s\",\"fibers\":{\"file\":\"c.hair\"}%s%s%s,\"photographs\":[%s]%s%s}",
+             has_camera ? ",\"camera\":{" : "", camera_keys, has_camera ? "}" : "", photographs,
+             color[0] != '\0' ? ",\"color\":" : "", color);
     if (job_document_parse(text, strlen(text), &doc, &err) != STATUS_OK) fail_msg("%s: %s", err.field, err.text);
     return doc;
 }
