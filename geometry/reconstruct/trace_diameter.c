@@ -48,6 +48,7 @@ struct found {
     double spread;         /* of the radii, relative */
     double score, several; /* scan_grade.h; share of the length in lines that hold several fibers */
     bool blurred;          /* strongly, and without strong noise */
+    bool resolved;         /* scan_grade.h */
 };
 
 /* Grades lines against the box. report: of their tracing. */
@@ -65,6 +66,7 @@ static status grade_lines(const struct volume *box, const struct polyline_set *l
     if (s == STATUS_OK) {
         found->score = grade.score;
         found->several = grade.section.several_share;
+        found->resolved = grade.verdict != GRADE_UNRESOLVED;
     }
     fiber_set_release(&f);
     return s;
@@ -113,7 +115,8 @@ static status try_between(const struct volume *box, trace_orientation *find, con
     const double ratio = thinner ? THINNER : THICKER;
     status s = trace_once(box, find, ratio * *diameter, pool, progress, *report, &found, err);
     const double spread = thinner ? TWO_SPREAD : fmax(THICKER_SPREAD, MORE_SPREAD * before->spread);
-    if (s == STATUS_OK && found.spread >= spread && found.score >= before->score + BETTER) *diameter *= ratio;
+    if (s != STATUS_OK || !found.resolved) return s; /* the thinner lines are no fibers */
+    if (found.spread >= spread && found.score >= before->score + BETTER) *diameter *= ratio;
     return s;
 }
 
