@@ -1,10 +1,14 @@
 """The page of a job: the result first, then tabs that stand in the address, of bounded height."""
+import math
+import os
+import shutil
+
 import pytest
 
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import selvedge  # noqa: E402
 from browser_page import (  # noqa: E402
-    click_on, complaints, keep, open_tab, scrolls_sideways, sized, small_weave, start_daemon, stop_daemon, submit, text_of, texts, wait_for)
+    ROOT, click_on, complaints, keep, open_tab, scrolls_sideways, sized, small_weave, start_daemon, stop_daemon, submit, text_of, texts, wait_for)
 from selenium.webdriver.common.by import By  # noqa: E402
 
 MOST_PX = 3000  # of the tallest tab, at 1280 pixels
@@ -208,4 +212,38 @@ def test_plots_of_many_jobs(stub, browser):
     wait_for(browser, "document.querySelectorAll('#compare-errors thead th').length === 8")
     browser.back()
     wait_for(browser, "document.querySelector('#plot-across')?.selectedOptions[0].text.startsWith('gamma_TT')")
+    assert complaints(browser) == []
+
+
+def test_a_profile_has_its_plot(fitted, browser, tmp_path):
+    """The profile of a fiber that scatters evenly: words and numbers fill the first card, and the plot has measured points."""
+    true = 2 * 0.6 / math.pi**2 * math.cos(math.radians(40))
+    lines = [f"{theta},{phi},{true * (1 + 0.02 * math.sin(7 * theta + phi)):.6g},{0.02 * true:.4g}"
+             for theta in range(10, 51, 10) for phi in range(-20, 201, 20)]
+    (tmp_path / "fiber.csv").write_text("theta_o_deg,phi_deg,radiance,radiance_se\n" + "\n".join(lines) + "\n")
+    document = {"sample": "wool fiber", "profile": {"file": "fiber.csv", "theta_i_deg": -40, "scale": 2}, "fit": {"models": ["isotropic.v1"]}}
+    url = fitted[0]
+    job = selvedge.Client(url).submit(document, str(tmp_path))
+    assert job.wait().state == "succeeded"
+    browser.get(f"{url}/#{job.id}")
+    wait_for(browser, "document.querySelectorAll('main svg circle').length >= 11")
+    card, words = (browser.execute_script(f"return document.querySelector('{s}').getBoundingClientRect().width") for s in ("#front", "#verdict"))
+    assert words > 0.9 * card, "no empty place where other jobs have a picture"
+    error = job.result().raw["profile"]["models"][0]["rel_rms"]
+    assert f"{100 * error:.2f} %" in text_of(browser, "#key-numbers") and complaints(browser) == []
+
+
+def test_kinds_of_fibers(fitted, browser, tmp_path):
+    scan = os.path.join(os.environ.get("SELVEDGE_DATA") or os.path.join(ROOT, "..", "shared", "data"), "unseen-scans", "two-densities.tif")
+    if not os.path.exists(scan):
+        pytest.skip("no scan with two densities in SELVEDGE_DATA")
+    shutil.copy(scan, tmp_path)
+    url = fitted[0]
+    job = selvedge.Client(url).submit({"sample": "two densities", "volume": {"files": ["two-densities.tif"], "voxel_size_um": 2.0}}, str(tmp_path))
+    assert job.wait().state == "succeeded"
+    browser.get(f"{url}/#{job.id}/geometry")
+    wait_for(browser, "document.querySelectorAll('#fiber-kinds tbody tr').length === 2")
+    rows = browser.execute_script("return [...document.querySelectorAll('#fiber-kinds tr')].map((r) => [...r.cells].map((c) => c.textContent))")
+    assert rows[0] == ["Kind", "Density", "Radius", "Fibers", "Share of the length"] and rows[1][1] == "100 %"
+    assert 25 <= int(rows[2][1].split()[0]) <= 45  # the light kind has 0.35 of the density
     assert complaints(browser) == []

@@ -20,6 +20,6 @@ export function jobFront({ job, list, compared }) {
   const numbers = done && keyNumbers(job).length ? numbersNode(job) : null, verdict = done ? verdictNode(job.verdict) : null;
   if (!picture && !verdict && !numbers) return { node: null, close: () => {} };
   const pictures = el("div", { class: "looks" }, picture ? pictureNode(picture) : null, twin?.box);
-  return { node: el("section", { class: `card front${twin ? " with-twin" : ""}${done ? "" : " early"}`, id: "front" }, verdict, picture || twin ? pictures : null, numbers), close: () => twin?.close() };
+  return { node: el("section", { class: `card front${twin ? " with-twin" : picture ? "" : " words"}${done ? "" : " early"}`, id: "front" }, verdict, picture || twin ? pictures : null, numbers), close: () => twin?.close() };
 }
 export const frontKey = ({ job, list }) => [job.generation, job.state === "succeeded", job.verdict, job.state === "succeeded" ? 0 : clothPicture(job, list.files)];

@@ -11,7 +11,7 @@ function errorOf(job) {
   if (isNumber(held)) return [percentWithError(held, heldSe), "error over held-out rows", "relative RMS error of rows that were never fitted"];
   if (isNumber(leftOut)) return [percentWithError(leftOut, leftOutSe), "error, cross-validated", "relative RMS error over parts of the rows that a fit to the others predicts"];
   if (isNumber(fit)) return [percentWithError(fit, fitSe), "error over fitted rows", "relative RMS error"];
-  return best ? [percentWithError(best.nrmse), "error, of the profile's range", "root mean square residual over the range of the radiances"] : null;
+  return best ? [percentWithError(best.rel_rms), "error over the profile", "relative RMS residual of the fitted model"] : null;
 }
 
 function determinedOf(job) {

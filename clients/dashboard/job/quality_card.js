@@ -45,10 +45,10 @@ export function kindsTable(job) {
   const kinds = fiberKinds(job);
   if (kinds.length < 2) return null;
   const cell = (text) => el("td", { class: "number" }, text);
-  const rows = kinds.map((k, i) => el("tr", {}, el("th", { scope: "row" }, `kind ${i + 1}`), cell(percent(k.density, 0)), cell(isNumber(k.radius) ? `${withError(k.radius, k.radiusError)} µm` : "–"), cell(String(k.n ?? "–")), cell(percent(k.share, 0))));
+  const rows = kinds.map((k, i) => el("tr", {}, el("td", {}, String(i + 1)), cell(percent(k.density, 0)), cell(isNumber(k.radius) ? `${withError(k.radius, k.radiusError)} µm` : "–"), cell(String(k.n ?? "–")), cell(percent(k.share, 0))));
   return [el("p", { class: "hint" }, "The scan shows fibers of different density or thickness. Densities are over those of the densest kind."),
     el("div", { class: "wide", tabIndex: 0, role: "region", "aria-label": "kinds of fibers" }, el("table", { id: "fiber-kinds" },
-      el("thead", {}, el("tr", {}, el("td", {}), ["Density", "Radius", "Fibers", "Share of the length"].map((h) => el("th", { class: "number" }, h)))), el("tbody", {}, rows)))];
+      el("thead", {}, el("tr", {}, el("th", {}, "Kind"), ["Density", "Radius", "Fibers", "Share of the length"].map((h) => el("th", { class: "number" }, h)))), el("tbody", {}, rows)))];
 }
 
 export function qualityCard(job, files) {
