@@ -50,7 +50,7 @@ export function errorTable(columns, base, rows) {
     ["error, fitted", compared("fit")], ["rows left out", each((c) => errorCell(of(c).leftOut, of(c).leftOutSe))], ["held out", compared("held")],
     ["plain BRDF, fitted", each((c) => errorCell(plain(c).fit))], ["plain BRDF, held out", each((c) => errorCell(plain(c).held))],
     ["rows, fitted + held out", each((c) => `${c.list.filter((r) => !r.held).length} + ${c.list.filter((r) => r.held).length}`)],
-    ["converged", each((c) => (of(c).converged ? "yes" : "no"))],
+    ["converged", each((c) => (typeof of(c).converged !== "boolean" ? "–" : of(c).converged ? "yes" : "no"))],
     ["took", columns.map((c) => (isNumber(c.job.finished_unix_s) ? duration(c.job.finished_unix_s - c.job.started_unix_s) : "–"))],
   ]);
   const same = (held) => columns.every((c) => !c.job.result || rows.filter((r) => r.cells.some((x) => x?.held === held)).every((r) => r.cells[c.place]?.held === held));
