@@ -342,6 +342,8 @@ def test_the_empty_list_offers_an_example(browser, tmp_path):
 
 def test_the_form_has_words_first_and_a_search(stub, browser, tmp_path):
     url, _ = stub
+    browser.get("about:blank")
+    complaints(browser)  # forgets the polls of an earlier page whose daemon has ended
     browser.get(url + "/#new")
     drop(browser, sample(tmp_path, ["cloth.hair", "rows.csv"]))
     click_on(browser, "#editor > summary")
