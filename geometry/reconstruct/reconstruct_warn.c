@@ -146,7 +146,6 @@ static void warn_grade(const struct warning_sink *warn, const struct scan_grade 
                      100.0 * g->safe_share);
 }
 
-/* Says which material no line explains, and which lines may be no fibers. */
 /* Says how many lines hold several fibers, if they can be told one by one. */
 static void warn_yarns(const struct warning_sink *warn, const struct section_misfit *m)
 {
@@ -163,6 +162,7 @@ static void warn_yarns(const struct warning_sink *warn, const struct section_mis
                      100.0 * m->surface);
 }
 
+/* Says which material no line explains, and which lines may be no fibers. */
 static void warn_faults(const struct warning_sink *warn, const struct scan_grade *g)
 {
     const struct scan_coverage *c = &g->coverage;
