@@ -40,7 +40,9 @@ struct plan {
     size_t n_job;
     struct queue_turn *turn;
     double typical_s;       /* INFINITY: unknown */
-    struct foreseen *known; /* of each job, in the order of `job`: id and plan */
+    struct foreseen *known; /* of each job, in the order of `job`: id and plan; no id: not looked up */
+    size_t n_first;         /* jobs at the begin of the queue that are looked up in any case */
+    struct queue_forecast last;
 };
 
 struct queue_forecast *queue_forecast_new(void)
@@ -95,12 +97,14 @@ static int by_id(const void *a, const void *b)
     return strcmp(x->id, y->id);
 }
 
-/* Finds the job's plan. old: the last forecast, sorted by id; a plan whose file has not changed since is not read
- * again. */
-static void look_up_plan(struct job_service *v, const struct queue_forecast *old, struct foreseen *one)
+/* Finds the plan of queued job i. A plan whose file has not changed since the last forecast is not read again. */
+static void look_up_plan(struct job_service *v, struct plan *p, size_t i)
 {
     char path[PATH_BYTES];
     struct stat st;
+    struct foreseen *one = &p->known[i];
+    const struct queue_forecast *old = &p->last;
+    memcpy(one->id, p->job[i].id, sizeof one->id);
     one->plan_s = NAN;
     path_join(path, v->settings->data, "jobs", one->id, JOB_FILE_PLAN, NULL);
     if (stat(path, &st) != 0) return;
@@ -113,12 +117,12 @@ static void look_up_plan(struct job_service *v, const struct queue_forecast *old
         one->plan_s = plan_s(v, one->id);
 }
 
-/* Returns the time that queued job i takes. */
+/* Returns the time that queued job i takes: of its plan, or the mean of its batch at the begin of the queue. */
 static double takes_s(const struct plan *p, size_t i)
 {
     double sum = 0, n = 0;
     if (isfinite(p->known[i].plan_s)) return p->known[i].plan_s;
-    for (size_t k = 0; k < p->n_job && p->job[i].batch[0] != '\0'; k++)
+    for (size_t k = 0; k < p->n_first && p->job[i].batch[0] != '\0'; k++)
         if (isfinite(p->known[k].plan_s) && strcmp(p->job[k].batch, p->job[i].batch) == 0) {
             sum += p->known[k].plan_s;
             n++;
@@ -158,7 +162,7 @@ static void place_running(struct job_service *v, struct plan *p, double now)
     job_rows_free(row, n);
 }
 
-static void foresee(struct queue_forecast *f, struct plan *p)
+static void foresee(struct job_service *v, struct queue_forecast *f, struct plan *p)
 {
     while (f->n < FORESEEN_MOST) {
         struct worker_slot *slot = p->slot;
@@ -168,6 +172,7 @@ static void foresee(struct queue_forecast *f, struct plan *p)
         slot->busy = false;
         size_t next = queue_turn_next(p->turn, slot->free_unix_s);
         if (next == p->n_job) break;
+        if (p->known[next].id[0] == '\0') look_up_plan(v, p, next);
         struct foreseen *one = &f->job[f->n++];
         *one = p->known[next];
         one->place.position = (int64_t)f->n;
@@ -185,25 +190,23 @@ static void foresee(struct queue_forecast *f, struct plan *p)
 static void make(struct job_service *v, struct queue_forecast *f)
 {
     struct plan *p = calloc(1, sizeof *p);
-    struct queue_forecast old = {.job = f->job, .n = f->n};
+    struct foreseen *old = f->job;
+    if (p != NULL) p->last = (struct queue_forecast){.job = f->job, .n = f->n};
     f->job = NULL;
     f->n = 0;
     if (p == NULL || store_job_queue(v->store, SIZE_MAX >> 1, &p->job, &p->n_job, NULL) != STATUS_OK || p->n_job == 0)
         goto out;
-    size_t n_most = p->n_job < FORESEEN_MOST ? p->n_job : FORESEEN_MOST;
-    f->job = calloc(n_most, sizeof *f->job);
+    p->n_first = p->n_job < FORESEEN_MOST ? p->n_job : FORESEEN_MOST;
+    f->job = calloc(p->n_first, sizeof *f->job);
     p->known = calloc(p->n_job, sizeof *p->known);
     p->turn = queue_turn_new(p->job, p->n_job);
     if (f->job == NULL || p->known == NULL || p->turn == NULL) goto out;
-    for (size_t i = 0; i < p->n_job; i++) {
-        memcpy(p->known[i].id, p->job[i].id, sizeof p->known[i].id);
-        look_up_plan(v, &old, &p->known[i]);
-    }
+    for (size_t i = 0; i < p->n_first; i++) look_up_plan(v, p, i);
     p->typical_s = typical_s(v);
     place_running(v, p, clock_wall_s());
-    if (p->n_slot > 0) foresee(f, p);
+    if (p->n_slot > 0) foresee(v, f, p);
 out:
-    free(old.job);
+    free(old);
     if (p != NULL) {
         free(p->known);
         free(p->job);
