@@ -196,7 +196,7 @@ def main():
     arguments = parser.parse_args()
     environment = dict(os.environ, SELVEDGE_BUILD=os.path.join(ROOT, arguments.build), OPENBLAS_NUM_THREADS="1")
     environment.setdefault("SELVEDGE_DATA", os.path.join(ROOT, "..", "shared", "data"))
-    environment.setdefault("SELVEDGE_TEST_PATIENCE", "3")  # limits of waiting, which lanes side by side make longer
+    environment.setdefault("SELVEDGE_TEST_PATIENCE", "8")  # limits of waiting: lanes run side by side, on machines that others load
     totals = Totals()
     environment.pop("MAKEFLAGS", None)  # a make that a check starts is no part of the one that started us
 

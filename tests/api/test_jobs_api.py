@@ -99,7 +99,7 @@ def test_one_of_two_editors_with_the_same_tag_wins(daemon):
         tag, sockets = daemon.get(f"/v1/jobs/{job}").headers["ETag"], []
         for i in range(n):
             body = json.dumps(document(f"{k}-{i}"))
-            s = socket.create_connection(address, timeout=60)
+            s = socket.create_connection(address, timeout=300)
             s.sendall((f"PUT /v1/jobs/{job}/document HTTP/1.1\r\nHost: {host}\r\nContent-Type: application/json\r\nIf-Match: {tag}\r\n"
                        f"Content-Length: {len(body)}\r\nConnection: close\r\n\r\n{body[:-1]}").encode())
             sockets.append(s)

@@ -15,7 +15,7 @@ PLAIN = weave(["10", "01"], 4, 4)
 
 
 def run(command, *arguments):
-    p = subprocess.run([program("selvedge-phantom"), command, *map(str, arguments)], capture_output=True, timeout=120)
+    p = subprocess.run([program("selvedge-phantom"), command, *map(str, arguments)], capture_output=True, timeout=600)
     return p.returncode, p.stdout.decode(), p.stderr.decode()
 
 

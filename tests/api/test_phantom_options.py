@@ -25,7 +25,7 @@ use_flyaways: 0
 
 
 def cloth(folder, *options):
-    p = subprocess.run([program("selvedge-phantom"), "cloth", "--voxel-um", "8", "--out", str(folder), *options], capture_output=True, timeout=120)
+    p = subprocess.run([program("selvedge-phantom"), "cloth", "--voxel-um", "8", "--out", str(folder), *options], capture_output=True, timeout=600)
     assert p.returncode == 0, p.stderr.decode()
     assert p.stdout.decode().rstrip().endswith(str(folder / "phantom.json")) and p.stdout.count(b"\n") == 1
     return json.loads((folder / "phantom.json").read_text())
@@ -70,13 +70,13 @@ def test_a_phantom_describes_itself(tmp_path, weave, options):
 def test_a_wrong_description(tmp_path):
     given = tmp_path / "given.json"
     given.write_text('{"weave": "plain", "crimp": 3}')
-    p = subprocess.run([program("selvedge-phantom"), "cloth", "--out", str(tmp_path), "--description", str(given)], capture_output=True, timeout=60)
+    p = subprocess.run([program("selvedge-phantom"), "cloth", "--out", str(tmp_path), "--description", str(given)], capture_output=True, timeout=300)
     assert p.returncode == 2 and b"cloth.crimp" in p.stderr
 
 
 def test_meshes_of_the_shapes_of_pictures(tmp_path):
     def mesh(*options):
-        return subprocess.run([program("selvedge-phantom"), "mesh", *options, "--out", str(tmp_path / "m.obj")], capture_output=True, text=True, timeout=60)
+        return subprocess.run([program("selvedge-phantom"), "mesh", *options, "--out", str(tmp_path / "m.obj")], capture_output=True, text=True, timeout=300)
     made = mesh("--on", "cylinder", "--radius-mm", "10", "--size-mm", "20", "--wrap-deg", "90")
     assert made.returncode == 0 and made.stdout == "362 points, 360 triangles\n", made.stderr
     points = [[float(x) for x in line.split()[1:]] for line in (tmp_path / "m.obj").read_text().splitlines() if line.startswith("v ")]

@@ -40,5 +40,5 @@ def test_the_daemon_runs_with_it(daemon_maker):
 def test_mistakes_in_the_file(tmp_path, text, why):
     path = tmp_path / "bad.conf"
     path.write_text(text)
-    r = subprocess.run([program("selvedged"), "--config", str(path), "--data", str(tmp_path / "d")], capture_output=True, text=True, timeout=30)
+    r = subprocess.run([program("selvedged"), "--config", str(path), "--data", str(tmp_path / "d")], capture_output=True, text=True, timeout=150)
     assert r.returncode == 2 and why in r.stderr and "bad.conf" in r.stderr, r.stderr

@@ -19,7 +19,7 @@ def version():
 
 @pytest.mark.parametrize("name", ["selvedge", "selvedged", "selvedge-worker", "selvedge-phantom"])
 def test_programs(name):
-    p = subprocess.run([program(name), "--version"], capture_output=True, text=True, timeout=60, check=True)
+    p = subprocess.run([program(name), "--version"], capture_output=True, text=True, timeout=300, check=True)
     assert p.stdout == f"{name} {version()}\n"
 
 

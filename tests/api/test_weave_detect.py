@@ -28,7 +28,7 @@ TRUTH = {
 
 
 def detect(*arguments):
-    p = subprocess.run([program("selvedge-phantom"), "detect", *arguments], capture_output=True, timeout=120)
+    p = subprocess.run([program("selvedge-phantom"), "detect", *arguments], capture_output=True, timeout=600)
     return p.returncode, json.loads(p.stdout) if p.stdout else None, p.stderr.decode()
 
 

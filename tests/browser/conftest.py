@@ -30,7 +30,7 @@ def start_chromium(profile):
         options.add_argument(flag)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     driver = webdriver.Chrome(service=Service(DRIVER), options=options)
-    driver.set_script_timeout(30)
+    driver.set_script_timeout(200)
     return driver
 
 

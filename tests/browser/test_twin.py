@@ -101,7 +101,7 @@ def test_a_photograph_brings_its_lamp_and_camera(opened):
 def test_the_saved_file_shows_the_same_alone(opened, tmp_path):
     press(opened, "twin-open")
     wait_for(opened, "document.querySelector('#twin-save')")
-    opened.set_script_timeout(30)
+    opened.set_script_timeout(200)
     page = opened.execute_async_script("""const done = arguments[0], make = URL.createObjectURL;
       URL.createObjectURL = (blob) => {
         const r = new FileReader();

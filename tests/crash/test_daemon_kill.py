@@ -119,12 +119,12 @@ def kills_in_mid_upload(figures, tmp_path, seed):
         try:
             for _ in range(30):
                 name = rng.choice(unfinished or list(FILES))
-                r = requests.request("HEAD", d.url + url[name], headers=TUS, timeout=20)
+                r = requests.request("HEAD", d.url + url[name], headers=TUS, timeout=100)
                 assert r.status_code == 200
                 offset = int(r.headers["Upload-Offset"])
                 assert acknowledged[name] <= offset <= len(data[name]), "acknowledged bytes are gone"
                 size = rng.choice([1, 1000, 70_000, 400_000])
-                r = requests.patch(d.url + url[name], data=data[name][offset:offset + size], timeout=20, headers={
+                r = requests.patch(d.url + url[name], data=data[name][offset:offset + size], timeout=100, headers={
                     **TUS, "Upload-Offset": str(offset), "Content-Type": "application/offset+octet-stream"})
                 assert r.status_code == 204, r.text
                 acknowledged[name] = int(r.headers["Upload-Offset"])

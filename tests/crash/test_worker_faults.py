@@ -20,7 +20,7 @@ FAULTS = [("write", "ENOSPC"), ("pwrite64", "ENOSPC"), ("fsync", "EIO"), ("fdata
 
 def work(folder, *strace):
     command = [*strace, WORKER, "--threads", "1", folder]
-    return subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120)
+    return subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
 
 
 def small_job(folder):

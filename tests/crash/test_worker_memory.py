@@ -36,7 +36,7 @@ def make_job(folder, scan):
 
 def work(folder, mib, **options):
     command = [os.path.join(BUILD, "bin", "selvedge-worker"), "--quiet", "--threads", "2", "--memory-mib", str(mib), folder]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, **options).returncode
+    return subprocess.run(command, capture_output=True, text=True, timeout=600, **options).returncode
 
 
 def products(folder):

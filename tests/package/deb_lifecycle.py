@@ -89,7 +89,7 @@ class Chroot:
 
 
 def get(url, path):
-    with urllib.request.urlopen(url + path, timeout=30) as reply:
+    with urllib.request.urlopen(url + path, timeout=150) as reply:
         return reply.read()
 
 
@@ -106,7 +106,7 @@ def write_sample(sample):
 
 def run_a_job(chroot, url):
     write_sample(chroot.path / "tmp" / "sample")
-    job = chroot.run("selvedge", "submit", "--server", url, "/tmp/sample/job.json", timeout=60).stdout.split()[-1]
+    job = chroot.run("selvedge", "submit", "--server", url, "/tmp/sample/job.json", timeout=300).stdout.split()[-1]
     end = time.monotonic() + 300
     while time.monotonic() < end:
         state = json.loads(get(url, f"/v1/jobs/{job}"))
@@ -232,7 +232,7 @@ class Booted:
         enter = ["nsenter", "--target", first[0] if first else "0", "--mount", "--pid", "--uts", "--ipc", "--cgroup", "sh", "-c",
                  f"[ -e /{MARK} ] || exit 97\n{script}"]
         p = subprocess.run(enter, env={"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "DEBIAN_FRONTEND": "noninteractive"},
-                           capture_output=True, text=True, timeout=300)
+                           capture_output=True, text=True, timeout=1500)
         assert p.returncode == 0 or not check, f"{script}:\n{p.stdout[-2000:]}{p.stderr[-2000:]}"
         return p
 

@@ -106,7 +106,7 @@ class SlurmCluster:
 
     def run(self, *command, check=True):
         """What a command of Slurm prints."""
-        done = subprocess.run(command, env=dict(os.environ, **self.environment), capture_output=True, text=True, check=False, timeout=60)
+        done = subprocess.run(command, env=dict(os.environ, **self.environment), capture_output=True, text=True, check=False, timeout=300)
         if check and done.returncode != 0:
             raise RuntimeError(f"{' '.join(command)}: {done.stderr}")
         return done.stdout

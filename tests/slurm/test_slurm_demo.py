@@ -68,7 +68,7 @@ def test_an_interrupted_demo_leaves_nothing(cluster, number):
     wait_until(lambda: os.path.exists(os.path.join(BUILD, folder, "slurm", "jobs")))
     time.sleep(1)
     os.killpg(demo.pid, number)  # as Ctrl-C in a terminal does
-    demo.communicate(timeout=60)
+    demo.communicate(timeout=300)
     assert demo.returncode == 128 + number
     assert folders() == before
     mark = f"/{folder}/".encode()

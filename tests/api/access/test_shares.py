@@ -137,7 +137,7 @@ def test_without_tokens_a_link_says_that_it_protects_nothing(daemon):
     job = daemon.create(DOCUMENT)
     made = share(daemon, job)
     assert made["protected"] is False and made["made_by"] == ""
-    assert requests.post(daemon.url + "/v1/shared", json={"secret": made["secret"]}, timeout=30).json()["job"] == job
+    assert requests.post(daemon.url + "/v1/shared", json={"secret": made["secret"]}, timeout=150).json()["job"] == job
     problem(daemon.post("/v1/shared", json={"secret": "x" * 30}), 404, "not_found")
     problem(daemon.post("/v1/shared", json={"secret": 5}), 422, "invalid", field="secret")
 
@@ -147,7 +147,7 @@ def test_command_and_python_make_and_revoke_links(lab):
 
     def share_command(*words):
         return subprocess.run([program("selvedge"), "share", lab.job, *words, "--server", lab.url], env=dict(os.environ, SELVEDGE_TOKEN=token),
-                              capture_output=True, text=True, timeout=60, check=False)
+                              capture_output=True, text=True, timeout=300, check=False)
 
     made = share_command("--days", "2")
     assert made.returncode == 0 and made.stdout.startswith(f"{lab.url}/#share/selvedge_") and "valid until" in made.stderr, made.stderr

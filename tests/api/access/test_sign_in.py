@@ -30,7 +30,7 @@ def test_the_cookie_stands_for_the_token(signed_in):
     problem(signed_in.get("/v1/tokens"), 403, "scope")
     # the cookie's value is no bearer token, and a wrong header is not replaced by a cookie
     value = signed_in.session.cookies["selvedge_session"]
-    problem(requests.get(signed_in.url + "/v1/jobs", headers={"Authorization": f"Bearer {value}"}, timeout=20), 401, "token")
+    problem(requests.get(signed_in.url + "/v1/jobs", headers={"Authorization": f"Bearer {value}"}, timeout=100), 401, "token")
     problem(signed_in.get("/v1/jobs", headers={"Authorization": "Bearer x"}), 401, "token")
 
 
@@ -46,8 +46,8 @@ def test_signing_out_ends_it_on_the_server(signed_in):
     cookies = signed_in.session.cookies.copy()
     r = signed_in.delete("/v1/session")
     assert r.status_code == 204 and "Max-Age=0" in r.headers["Set-Cookie"]
-    problem(requests.get(signed_in.url + "/v1/jobs", cookies=cookies, timeout=20), 401, "token")
-    assert requests.delete(signed_in.url + "/v1/session", cookies=cookies, timeout=20).status_code == 204
+    problem(requests.get(signed_in.url + "/v1/jobs", cookies=cookies, timeout=100), 401, "token")
+    assert requests.delete(signed_in.url + "/v1/session", cookies=cookies, timeout=100).status_code == 204
 
 
 def test_a_session_survives_a_restart_and_ends_in_time(signed_in):
@@ -76,5 +76,5 @@ def test_the_cookie_is_secure_where_https_is_spoken(daemon_maker, tmp_path, sign
     assert "; Secure" in behind.headers["Set-Cookie"]
     d = daemon_maker("tls", options=certificate(tmp_path))
     token = d.make_token("root")
-    r = requests.post(d.url + "/v1/session", json={"token": token}, verify=d.options["server.tls_certificate"], timeout=20)
+    r = requests.post(d.url + "/v1/session", json={"token": token}, verify=d.options["server.tls_certificate"], timeout=100)
     assert r.status_code == 200 and "; Secure" in r.headers["Set-Cookie"]

@@ -50,18 +50,18 @@ class User(threading.Thread):
         headers = {"Authorization": f"Bearer {token}"}
         kind = self.random.random()
         if kind < 0.4:
-            r = self.session.get(self.url + "/v1/jobs?limit=100", headers=headers, timeout=60)
+            r = self.session.get(self.url + "/v1/jobs?limit=100", headers=headers, timeout=300)
             if r.status_code == 200 and ({j["owner"] for j in r.json()["jobs"]} - {self.owner} or len(r.json()["jobs"]) > MOST_JOBS):
                 self.faults.append(r.text)
             if r.status_code == 200 and r.json()["jobs"] and kind < 0.1:
-                self.session.delete(self.url + "/v1/jobs/" + r.json()["jobs"][0]["id"], headers=headers, timeout=60)
+                self.session.delete(self.url + "/v1/jobs/" + r.json()["jobs"][0]["id"], headers=headers, timeout=300)
         elif kind < 0.8:
-            r = self.session.post(self.url + "/v1/jobs", headers=headers, timeout=60,
+            r = self.session.post(self.url + "/v1/jobs", headers=headers, timeout=300,
                                   json={"sample": "s", "volume": {"files": ["a.tif"]}, "measurements": {"file": "a.csv"}})
         else:
-            r = requests.post(self.url + "/v1/session", json={"token": token}, timeout=60)
+            r = requests.post(self.url + "/v1/session", json={"token": token}, timeout=300)
             if r.status_code == 200:
-                r = requests.get(self.url + "/v1/session", cookies=r.cookies, timeout=60)
+                r = requests.get(self.url + "/v1/session", cookies=r.cookies, timeout=300)
         if must_fail and r.status_code != 401:
             self.faults.append(f"a revoked token got {r.status_code}")
         if r.status_code not in (200, 201, 401, 429, 507):

@@ -18,7 +18,7 @@ SELVEDGE = program("selvedge")
 
 
 def run(daemon, *words, expect=0):
-    done = subprocess.run([SELVEDGE, "--server", daemon.url, "batch", *map(str, words)], capture_output=True, text=True, check=False, timeout=120)
+    done = subprocess.run([SELVEDGE, "--server", daemon.url, "batch", *map(str, words)], capture_output=True, text=True, check=False, timeout=600)
     assert done.returncode == expect, done.stdout + done.stderr
     return done.stdout + done.stderr
 

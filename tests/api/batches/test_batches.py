@@ -316,10 +316,10 @@ def test_kills_leave_whole_batches(daemon_maker):
         killer.start()
         acknowledged = None
         try:
-            r = d.session.post(d.url + "/v1/batches", json=table(f"kill {i}", samples), timeout=30)
+            r = d.session.post(d.url + "/v1/batches", json=table(f"kill {i}", samples), timeout=150)
             acknowledged = r.json() if r.status_code in (200, 201) else None
             if acknowledged:
-                d.session.post(d.url + f"/v1/batches/{acknowledged['id']}/start", timeout=30)
+                d.session.post(d.url + f"/v1/batches/{acknowledged['id']}/start", timeout=150)
         except OSError:
             pass
         killer.join()

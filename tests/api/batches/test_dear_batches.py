@@ -53,7 +53,7 @@ def test_other_requests_are_answered_beside_a_large_batch(daemon_maker):
 
     def submit():
         start = time.monotonic()
-        made.append(d.session.post(d.url + "/v1/batches", json=table, timeout=300))
+        made.append(d.session.post(d.url + "/v1/batches", json=table, timeout=1500))
         made.append(time.monotonic() - start)
     thread = threading.Thread(target=submit)
     thread.start()

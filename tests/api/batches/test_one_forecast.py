@@ -44,7 +44,7 @@ def test_one_number_for_one_job(daemon_maker):
     assert abs(second["expected_start_unix_s"] - first["expected_end_unix_s"]) < ROUNDING_S
     assert abs(view["expected_end_unix_s"] - second["expected_end_unix_s"]) < ROUNDING_S
     assert [rows[job]["expected_end_unix_s"] for job in jobs] == [first["expected_end_unix_s"], second["expected_end_unix_s"]]
-    said = subprocess.run([program("selvedge"), "--server", d.url, "plan", "week"], capture_output=True, text=True, check=True, timeout=60).stdout
+    said = subprocess.run([program("selvedge"), "--server", d.url, "plan", "week"], capture_output=True, text=True, check=True, timeout=300).stdout
     assert "time       40:00 (20:00 to 1:20:00)" in said, said
     d.post("/v1/actions", json={"action": "delete", "jobs": [*jobs, running]})
 

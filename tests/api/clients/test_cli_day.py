@@ -12,7 +12,7 @@ SELVEDGE = program("selvedge")
 
 
 def run(daemon, *words, expect=0):
-    done = subprocess.run([SELVEDGE, "--server", daemon.url, *words], capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run([SELVEDGE, "--server", daemon.url, *words], capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == expect, done.stdout + done.stderr
     return done.stdout + done.stderr
 

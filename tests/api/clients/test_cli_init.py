@@ -14,7 +14,7 @@ CLI = os.path.join(BUILD, "bin", "selvedge")
 
 
 def init(folder, *more, expect=0):
-    done = subprocess.run([CLI, "init", str(folder), *more], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=120)
+    done = subprocess.run([CLI, "init", str(folder), *more], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=600)
     assert done.returncode == expect, f"exit {done.returncode}\n{done.stdout}\n{done.stderr}"
     return done.stdout + done.stderr
 

@@ -18,7 +18,7 @@ NO_USER = {"HOME": "/nonexistent", "ZDOTDIR": "/nonexistent"}
 
 @pytest.fixture(scope="module", autouse=True)
 def scripts():
-    subprocess.run(["make", "-s", "-o", "all", "manual", f"BUILD={BUILD}"], cwd=ROOT, check=True, timeout=120, capture_output=True)
+    subprocess.run(["make", "-s", "-o", "all", "manual", f"BUILD={BUILD}"], cwd=ROOT, check=True, timeout=600, capture_output=True)
 
 
 def in_terminal(command, timeout_s=20, **environment):
@@ -54,12 +54,12 @@ def bash(line):
 COMP_WORDS=({words}); COMP_CWORD=$(( ${{#COMP_WORDS[@]}} - 1 )); COMP_LINE='{line}'; COMP_POINT=${{#COMP_LINE}}
 $(complete -p selvedge | sed 's/.*-F \\([^ ]*\\) .*/\\1/') selvedge "${{COMP_WORDS[COMP_CWORD]}}" "${{COMP_WORDS[COMP_CWORD-1]}}"
 printf '%s\\n' "${{COMPREPLY[@]}}\""""
-    return subprocess.run(["bash", "--norc", "-c", script], capture_output=True, text=True, check=True, timeout=20).stdout.split()
+    return subprocess.run(["bash", "--norc", "-c", script], capture_output=True, text=True, check=True, timeout=100).stdout.split()
 
 
 def fish(line):
     done = subprocess.run(["fish", "--no-config", "-c", f"source {SCRIPTS}/fish/selvedge.fish; complete -C '{line}'"], capture_output=True, text=True,
-                          check=True, timeout=20, env={**os.environ, **NO_USER, "HOME": SCRIPTS})
+                          check=True, timeout=100, env={**os.environ, **NO_USER, "HOME": SCRIPTS})
     return [word.split("\t")[0] for word in done.stdout.splitlines()]
 
 

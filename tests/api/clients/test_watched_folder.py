@@ -25,7 +25,7 @@ def jobs(daemon):
 
 
 def once(daemon, folder, *options):
-    return subprocess.run([*Watcher(folder, daemon.url).command, "--once", *options], capture_output=True, text=True, timeout=100)
+    return subprocess.run([*Watcher(folder, daemon.url).command, "--once", *options], capture_output=True, text=True, timeout=500)
 
 
 def test_marked_samples_become_jobs_and_results_come_back(daemon_maker, folder):

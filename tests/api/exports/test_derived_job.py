@@ -130,7 +130,7 @@ def test_a_result_that_is_none_is_named(real, text, said):
 
 
 def cli(*arguments, **more):
-    return subprocess.run([program("selvedge"), *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False, **more)
+    return subprocess.run([program("selvedge"), *map(str, arguments)], capture_output=True, text=True, timeout=600, check=False, **more)
 
 
 def test_the_commands_download_what_they_make(real, fitted, tmp_path):

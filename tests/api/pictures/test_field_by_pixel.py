@@ -21,7 +21,7 @@ def document(model, *pictures):
 def pictures_of(folder, doc):
     (folder / "input").mkdir(parents=True)
     (folder / "job.json").write_text(json.dumps(doc))
-    p = subprocess.run([program("selvedge-worker"), "--quiet", str(folder)], capture_output=True, timeout=120)
+    p = subprocess.run([program("selvedge-worker"), "--quiet", str(folder)], capture_output=True, timeout=600)
     assert p.returncode == 0, (folder / "log.txt").read_text()
     return json.loads((folder / "results/result.json").read_text())["pictures"]
 

@@ -40,7 +40,7 @@ def start(folder, ranks=1, threads=1, **environment):
 
 def finish(folder, ranks=1, threads=1):
     worker = start(folder, ranks, threads)
-    _, words = worker.communicate(timeout=120)
+    _, words = worker.communicate(timeout=600)
     assert worker.returncode == 0, (read_json(folder, "status.json"), words)
     return words
 
@@ -132,7 +132,7 @@ def test_a_lost_rank_costs_no_more_than_time(alone, tmp_path, rank):
     lost = processes_of(folder, rank)
     assert len(lost) == 1
     os.kill(lost[0], signal.SIGKILL)
-    _, words = worker.communicate(timeout=120)
+    _, words = worker.communicate(timeout=600)
     assert worker.returncode == 0, words
     assert "a rank is lost; the job goes on" in words
     assert "cancelled" not in (folder / "log.txt").read_text()
@@ -163,7 +163,7 @@ def test_a_worker_that_is_killed_leaves_neither_ranks_nor_files(tmp_path):
     shared = shared_memory_of([parent_of(pid) for r in (0, 1) for pid in processes_of(folder, r)])
     assert files_of_mpi(tmp_path) and shared
     worker.kill()
-    worker.communicate(timeout=60)
+    worker.communicate(timeout=300)
     deadline = time.monotonic() + 10
     while any(processes_of(folder, r) for r in (0, 1)) or files_of_mpi(tmp_path) or any(map(os.path.exists, shared)):
         assert time.monotonic() < deadline, (files_of_mpi(tmp_path), shared)
@@ -177,7 +177,7 @@ def test_stopping_while_the_ranks_start_is_not_lost(tmp_path):
     while not any(b"mpirun" in words for words in command_lines_below(worker.pid)):
         assert time.monotonic() < deadline
     worker.send_signal(signal.SIGTERM)
-    _, words = worker.communicate(timeout=60)
+    _, words = worker.communicate(timeout=300)
     assert worker.returncode == 3, words
     assert not (folder / "results" / "result.json").exists()
 
@@ -188,7 +188,7 @@ def test_a_rank_that_its_sandbox_ends_is_not_started_again(tmp_path):
     worker = start(folder, 2)
     wait_for_estimates(worker, folder, 20)
     os.kill(processes_of(folder, 1)[0], signal.SIGSYS)
-    _, words = worker.communicate(timeout=60)
+    _, words = worker.communicate(timeout=300)
     assert worker.returncode == -signal.SIGSYS, words
 
 
@@ -198,7 +198,7 @@ def test_cancelling_keeps_what_there_is(alone, tmp_path):
     worker = start(folder, 3)
     wait_for_estimates(worker, folder, 20)
     worker.send_signal(signal.SIGTERM)
-    _, words = worker.communicate(timeout=60)
+    _, words = worker.communicate(timeout=300)
     assert worker.returncode == 3, words
     assert read_json(folder, "status.json")["state"] == "cancelled"
     deadline = time.monotonic() + 10
@@ -214,7 +214,7 @@ def test_a_job_that_fails_ends_all_ranks(tmp_path):
     folder = make_job(tmp_path / "job")
     (folder / "input" / "cloth.hair").write_bytes(b"no fibers")
     worker = start(folder, 2)
-    _, words = worker.communicate(timeout=60)
+    _, words = worker.communicate(timeout=300)
     assert worker.returncode == 1, words
     assert "cloth.hair" in read_json(folder, "status.json")["error"]["text"]
     assert not processes_of(folder, 1)
@@ -225,7 +225,7 @@ def test_mpirun_may_start_the_worker_itself(alone, tmp_path):
     folder = make_job(tmp_path / "job")
     environment = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     subprocess.run(["mpirun", "-q", "--oversubscribe", "-n", "2", WORKER, "--quiet", "--threads", "1", str(folder)],
-                   env=environment, stdin=subprocess.DEVNULL, check=True, timeout=120)
+                   env=environment, stdin=subprocess.DEVNULL, check=True, timeout=600)
     assert outcome(folder) == outcome(alone)
     assert "2 ranks shared" in (folder / "log.txt").read_text()
 
@@ -234,7 +234,7 @@ def test_without_the_program_of_the_ranks_it_is_asked_for(tmp_path):
     folder = make_job(tmp_path / "job")
     copy = tmp_path / "selvedge-worker"
     shutil.copy(WORKER, copy)
-    end = subprocess.run([copy, "--quiet", "--ranks", "2", str(folder)], capture_output=True, text=True, timeout=60)
+    end = subprocess.run([copy, "--quiet", "--ranks", "2", str(folder)], capture_output=True, text=True, timeout=300)
     assert end.returncode == 2
     assert "selvedge-mpi' is not there" in end.stderr and "libopenmpi-dev" in end.stderr
     assert not (folder / "status.json").exists()

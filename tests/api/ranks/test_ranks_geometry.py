@@ -76,7 +76,7 @@ def test_a_rank_that_is_lost_amid_the_geometry_costs_no_more_than_time(alone, sc
     lost = processes_of(folder, 1)
     assert len(lost) == 1 and not (folder / "work" / "fibers" / "fibers.bin").exists()
     os.kill(lost[0], signal.SIGKILL)
-    _, words = worker.communicate(timeout=120)
+    _, words = worker.communicate(timeout=600)
     assert worker.returncode == 0, words
     assert "a rank is lost; the job goes on" in words
     assert_same(folder, alone)

@@ -107,11 +107,11 @@ def test_tls_by_the_settings(tmp_path):
         own, foreign = f"https://127.0.0.1:{d.port}", f"http://127.0.0.1:{d.port}"
         assert [d.post("/v1/jobs", json=DOCUMENT, headers={"Origin": o}).status_code for o in (own, foreign)] == [201, 403]
         with pytest.raises(requests.ConnectionError):
-            requests.get(f"http://127.0.0.1:{d.port}/livez", timeout=20)
+            requests.get(f"http://127.0.0.1:{d.port}/livez", timeout=100)
         with pytest.raises(requests.exceptions.SSLError):
             session = requests.Session()
             session.trust_env = False
-            session.get(d.url + "/livez", timeout=20)
+            session.get(d.url + "/livez", timeout=100)
 
 
 @pytest.mark.parametrize("spoil", ["readable", "no_key", "garbage", "missing"])
@@ -186,21 +186,21 @@ def use(port, trusted, token):
     session, url = requests.Session(), f"https://127.0.0.1:{port}"
     session.trust_env, session.verify = False, str(trusted)
     session.headers.update({"Host": "selvedge.example.org", "Origin": ORIGIN})
-    assert session.get(url + "/v1/jobs", timeout=20).status_code == 401
+    assert session.get(url + "/v1/jobs", timeout=100).status_code == 401
     if token:
         session.headers["Authorization"] = f"Bearer {token}"
     else:
         session.auth = ("ada", "secret")
-    page = session.get(url + "/", timeout=20)
+    page = session.get(url + "/", timeout=100)
     assert page.status_code == 200 and "Selvedge" in page.text
-    job = session.post(url + "/v1/jobs", json=DOCUMENT, timeout=20).json()["id"]
+    job = session.post(url + "/v1/jobs", json=DOCUMENT, timeout=100).json()["id"]
     for name, (role, data) in FILES.items():
-        declared = session.post(f"{url}/v1/jobs/{job}/files", json={"name": name, "role": role, "size": len(data), "sha256": None}, timeout=20).json()
-        sent = session.patch(url + declared["upload_url"], data=data, timeout=20, headers={
+        declared = session.post(f"{url}/v1/jobs/{job}/files", json={"name": name, "role": role, "size": len(data), "sha256": None}, timeout=100).json()
+        sent = session.patch(url + declared["upload_url"], data=data, timeout=100, headers={
             "Tus-Resumable": "1.0.0", "Upload-Offset": "0", "Content-Type": "application/offset+octet-stream"})
         assert sent.status_code == 204 and sent.headers["Upload-Offset"] == str(len(data))
-    assert session.post(f"{url}/v1/jobs/{job}/start", timeout=20).status_code == 202
-    wait_until(lambda: session.get(f"{url}/v1/jobs/{job}", timeout=20).json()["state"] == "succeeded", what="the job succeeds")
-    assert session.get(f"{url}/v1/jobs/{job}/results.tar", timeout=20).content[:100] != b""
-    answer = session.post(url + "/v1/jobs", json=DOCUMENT, headers={"Origin": "https://evil.example"}, timeout=20)
+    assert session.post(f"{url}/v1/jobs/{job}/start", timeout=100).status_code == 202
+    wait_until(lambda: session.get(f"{url}/v1/jobs/{job}", timeout=100).json()["state"] == "succeeded", what="the job succeeds")
+    assert session.get(f"{url}/v1/jobs/{job}/results.tar", timeout=100).content[:100] != b""
+    answer = session.post(url + "/v1/jobs", json=DOCUMENT, headers={"Origin": "https://evil.example"}, timeout=100)
     problem(answer, 403, "origin")

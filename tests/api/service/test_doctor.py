@@ -16,7 +16,7 @@ def doctor(data, *arguments, program_name="selvedge", **options):
     """(exit status, [(grade, subject, text)], all that was printed)"""
     more = [part for key, value in options.items() for part in ("--set", f"{key.replace('__', '.')}={value}")]
     start = [program("selvedge"), "doctor"] if program_name == "selvedge" else [program("selvedged"), "--doctor"]
-    done = subprocess.run([*start, "--data", str(data), "--port", "0", *more, *arguments], capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run([*start, "--data", str(data), "--port", "0", *more, *arguments], capture_output=True, text=True, check=False, timeout=300)
     lines = [line.split(None, 2) for line in done.stdout.splitlines() if line.startswith(("ok ", "note ", "FAULT "))]
     return done.returncode, lines, done.stdout + done.stderr
 
@@ -85,7 +85,7 @@ def test_faults_of_a_machine(tmp_path, subject, words, spoil):
 @pytest.mark.parametrize("name", ["selvedge", "selvedged", "selvedge-worker", "selvedge-phantom", "selvedge-camera"])
 def test_an_old_processor_gets_a_sentence(name):
     """Nehalem, of 2008, has no AVX2. Without the sentence a program would end by an illegal instruction."""
-    done = subprocess.run(["qemu-x86_64", "-cpu", "Nehalem", program(name), "--version"], capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(["qemu-x86_64", "-cpu", "Nehalem", program(name), "--version"], capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 1 and done.stderr.startswith("error: this processor cannot run this program"), done
 
 

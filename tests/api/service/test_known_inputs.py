@@ -165,7 +165,7 @@ def test_clients_say_that_nothing_was_sent(daemon, tmp_path):
     (tmp_path / "job.json").write_text(json.dumps(DOCUMENT))
     for sent, known in ((2, 0), (0, 2)):
         done = subprocess.run([program("selvedge"), "submit", str(tmp_path / "job.json"), "--server", daemon.url], capture_output=True, text=True,
-                              timeout=60, check=False)
+                              timeout=300, check=False)
         assert done.returncode == 0 and f"{sent} uploaded now, {known} on the server already" in done.stderr, done.stderr
     client = selvedge.Client(daemon.url)
     assert client.has_input(sha256((tmp_path / "scan.tif").read_bytes())) and not client.has_input("0" * 64)

@@ -61,7 +61,7 @@ def test_a_logo_that_cannot_be_used_is_refused_at_the_start(tmp_path, content, w
         (tmp_path / "logo").write_bytes(content)
     command = [program("selvedged"), "--data", tmp_path / "data", "--port", "0", *settings_arguments({"report.logo": tmp_path / "logo"})]
     for more in ([], ["--doctor"]):
-        done = subprocess.run([*command, *more], capture_output=True, text=True, check=False, timeout=30)
+        done = subprocess.run([*command, *more], capture_output=True, text=True, check=False, timeout=150)
         said = done.stdout + done.stderr
         assert done.returncode == 1 and "report.logo" in said and words in said and str(tmp_path / "logo") in said, said
 
@@ -80,6 +80,6 @@ def test_a_pdf_that_cannot_be_made_is_said_at_once(tmp_path):
             (tmp_path / "bin" / "weasyprint").write_text("#!/bin/sh\n")
             (tmp_path / "bin" / "weasyprint").chmod(0o755)
         done = subprocess.run([program("selvedged"), "--data", tmp_path / "data", "--port", "0", "--doctor"], capture_output=True, text=True,
-                              check=False, timeout=30, env={**os.environ, "PATH": str(tmp_path / "bin")})
+                              check=False, timeout=150, env={**os.environ, "PATH": str(tmp_path / "bin")})
         line = next(line for line in done.stdout.splitlines() if line.split()[1] == "pdf")
         assert line.startswith("ok" if found else "note") and "weasyprint" in line

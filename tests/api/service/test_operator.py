@@ -25,7 +25,7 @@ int clock_gettime(clockid_t clock, struct timespec *t)
 
 
 def start_fails(folder, *options):
-    done = subprocess.run([program("selvedged"), "--data", str(folder), "--port", "0", *options], capture_output=True, text=True, check=False, timeout=30)
+    done = subprocess.run([program("selvedged"), "--data", str(folder), "--port", "0", *options], capture_output=True, text=True, check=False, timeout=150)
     assert done.returncode != 0
     return done.stderr
 
@@ -33,7 +33,7 @@ def start_fails(folder, *options):
 def start_by_itself(d, job):
     """Starts a job on a connection of its own. One too many may be closed instead of waiting (libmicrohttpd 0.9.75)."""
     try:
-        return requests.post(f"{d.url}/v1/jobs/{job}/start", timeout=20).status_code
+        return requests.post(f"{d.url}/v1/jobs/{job}/start", timeout=100).status_code
     except requests.ConnectionError:
         return None
 
@@ -106,7 +106,7 @@ def test_a_folder_that_cannot_be_written(tmp_path):
         pass
     mount = 'mount --bind "$0" "$0" && mount -o remount,ro,bind "$0" && exec "$1" --data "$0" --port 0'
     done = subprocess.run(["unshare", "-m", "sh", "-c", mount, tmp_path / "data", program("selvedged")],
-                          capture_output=True, text=True, check=False, timeout=30)
+                          capture_output=True, text=True, check=False, timeout=150)
     if "mount" in done.stderr.split("error:")[0]:
         pytest.skip("this machine permits no mounts")
     assert done.returncode == 1 and done.stderr.startswith("error: cannot open") and "Read-only file system" in done.stderr, done.stderr

@@ -35,7 +35,7 @@ def exists(d, job):
 
 
 def cli(d, *arguments):
-    return subprocess.run([program("selvedge"), arguments[0], "--server", d.url, *arguments[1:]], capture_output=True, text=True, timeout=60)
+    return subprocess.run([program("selvedge"), arguments[0], "--server", d.url, *arguments[1:]], capture_output=True, text=True, timeout=300)
 
 
 def test_the_daemon_removes_by_age_and_says_so(daemon_maker):

@@ -55,7 +55,7 @@ def job_folder(folder):
 
 def run(hostile, folder, act, *options, **variables):
     environment = {**os.environ, "LD_PRELOAD": hostile, "HOSTILE": act, **variables}
-    return subprocess.run([WORKER, "--quiet", *options, str(folder)], env=environment, capture_output=True, text=True, check=False, timeout=60)
+    return subprocess.run([WORKER, "--quiet", *options, str(folder)], env=environment, capture_output=True, text=True, check=False, timeout=300)
 
 
 def test_a_secret_elsewhere_is_not_visible(hostile, tmp_path):

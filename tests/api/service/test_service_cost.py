@@ -10,7 +10,7 @@ import threading
 import time
 
 import pytest
-from daemon_under_test import document, problem, wait_until
+from daemon_under_test import TIMEOUT_S, document, problem, wait_until
 
 
 def slices(n, **more):
@@ -166,7 +166,7 @@ def test_slow_readers_are_disconnected(daemon_maker):
     n += len(steady.recv(1))
     connected = n_connected(d)
     # until the daemon has ended the slow one, which its limit lets it do after 10 s at the earliest
-    while n_connected(d) >= connected and time.monotonic() - start < 40:
+    while n_connected(d) >= connected and time.monotonic() - start < 40 * TIMEOUT_S:
         slow.recv(1)
         n += len(steady.recv(20_000))
         time.sleep(0.1)

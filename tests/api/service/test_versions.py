@@ -175,7 +175,7 @@ def test_numbers_that_are_taken_are_not_taken_again(daemon_maker):
 
 
 def cli(d, *arguments):
-    return subprocess.run([program("selvedge"), *arguments, "--server", d.url], capture_output=True, text=True, timeout=60, check=False)
+    return subprocess.run([program("selvedge"), *arguments, "--server", d.url], capture_output=True, text=True, timeout=300, check=False)
 
 
 def test_clients(daemon, tmp_path):

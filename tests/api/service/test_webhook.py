@@ -9,7 +9,7 @@ import threading
 import time
 
 import pytest
-from daemon_under_test import DOCUMENT, FAKE_WORKER, FILES, ROOT, program, wait_until
+from daemon_under_test import DOCUMENT, FAKE_WORKER, FILES, ROOT, TIMEOUT_S, program, wait_until
 
 CLIENT_WORKER = os.path.join(ROOT, "tests", "support", "python", "client_stub_worker.py")
 SECRET = b"a secret of the laboratory"
@@ -169,7 +169,7 @@ def test_receivers_that_hang_and_lie(service, answer, words):
     d, receiver = service(answer, max_tries=1, timeout_s=1)
     d.start_job("succeed")
     begin = time.monotonic()
-    assert d.get("/livez").status_code == 200 and time.monotonic() - begin < 5
+    assert d.get("/livez").status_code == 200 and time.monotonic() - begin < 5 * TIMEOUT_S
     failed = only(d, "failed")
     assert words in failed["last_error"] and failed["n_try"] == 1 and failed["next_try_unix_s"] is None
     assert len(receiver.got) == 1, "a redirect was followed"
@@ -194,7 +194,7 @@ def test_a_stop_does_not_wait_for_a_receiver_that_hangs(service):
     wait_until(lambda: receiver.got)
     begin = time.monotonic()
     d.stop()
-    assert time.monotonic() - begin < 20
+    assert time.monotonic() - begin < 60
 
 
 @pytest.mark.parametrize("settings, words", [
@@ -208,7 +208,7 @@ def test_settings_are_checked(tmp_path, settings, words):
     command = [program("selvedged"), "--data", str(tmp_path / "data"), "--port", "0"]
     for key, value in options.items():
         command += ["--set", f"webhook.{key}={value}"]
-    run = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    run = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert run.returncode == 1 and words in run.stderr
 
 

@@ -27,7 +27,7 @@ def cloth(tmp_path_factory):
 
 def fibers(d, folder, scan):
     done = subprocess.run([program("selvedge"), "reconstruct", str(scan), "--voxel-um", "2", "--out", str(folder)],
-                          env=dict(os.environ, SELVEDGE_SERVER=d.url, SELVEDGE_TOKEN=""), capture_output=True, text=True, timeout=300)
+                          env=dict(os.environ, SELVEDGE_SERVER=d.url, SELVEDGE_TOKEN=""), capture_output=True, text=True, timeout=1500)
     assert done.returncode == 0, done.stderr
     return (folder / "fibers.hair").read_bytes()
 

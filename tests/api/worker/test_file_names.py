@@ -25,7 +25,7 @@ def slices(folder, names=NAMES):
 
 
 def run(d, *arguments):
-    return subprocess.run([program("selvedge"), "--server", d.url, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=120)
+    return subprocess.run([program("selvedge"), "--server", d.url, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=600)
 
 
 def test_a_folder_of_slices_is_reconstructed(real, tmp_path):

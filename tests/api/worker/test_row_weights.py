@@ -35,7 +35,7 @@ def run(folder, text, **fit):
     (folder / "job.json").write_text(json.dumps(document))
     (folder / "input" / "cloth.hair").write_bytes(hair())
     (folder / "input" / "rows.csv").write_text(text)
-    worker = subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "1", str(folder)], capture_output=True, timeout=120)
+    worker = subprocess.run([program("selvedge-worker"), "--quiet", "--threads", "1", str(folder)], capture_output=True, timeout=600)
     if worker.returncode != 0:
         return json.loads((folder / "status.json").read_text())
     return json.loads((folder / "results" / "result.json").read_text())

@@ -69,12 +69,12 @@ def test_reconstruct_takes_the_slices_of_a_folder_by_number(real, tmp_path):
     slices(folder, [f"s{k}.tif" for k in range(12)])
     command = [program("selvedge"), "--server", real.url, "reconstruct", str(folder), "--voxel-um", "2", "--out", str(tmp_path / "out"),
                "--id-file", str(tmp_path / "id")]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
     assert "scan of 12 files: s0.tif, s1.tif ... s11.tif" in done.stderr
     job = (tmp_path / "id").read_text().strip()
     assert real.job(job)["document"]["volume"]["files"] == [f"s{k}.tif" for k in range(12)]
     (folder / "s5.tif").unlink()
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
     assert done.returncode == 1 and "'s5.tif' between 's4.tif' and 's6.tif'" in done.stderr
     assert real.job((tmp_path / "id").read_text().strip())["state"] == "draft", "it is judged before it is started"
 
@@ -86,8 +86,8 @@ def test_a_batch_and_a_watched_folder_take_them_by_number(real, tmp_path):
     (samples / "one").mkdir(parents=True)
     slices(samples / "one", [f"s{k}.tif" for k in range(12)])
     run = [program("selvedge"), "--server", real.url]
-    subprocess.run([*run, "batch", "submit", str(template), str(samples), "--draft"], check=True, capture_output=True, timeout=120)
+    subprocess.run([*run, "batch", "submit", str(template), str(samples), "--draft"], check=True, capture_output=True, timeout=600)
     (samples / "one" / "READY").touch()
-    subprocess.run([*run, "watch-folder", str(samples), "--template", str(template), "--once"], check=False, capture_output=True, timeout=120)
+    subprocess.run([*run, "watch-folder", str(samples), "--template", str(template), "--once"], check=False, capture_output=True, timeout=600)
     documents = [real.job(j["id"])["document"] for j in real.get("/v1/jobs?limit=100").json()["jobs"] if j["sample"] == "one"]
     assert len(documents) == 2 and all(d["volume"]["files"] == [f"s{k}.tif" for k in range(12)] for d in documents)

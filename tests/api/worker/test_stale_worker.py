@@ -70,7 +70,7 @@ def test_every_durable_write_follows_a_look_at_the_attempt(tmp_path):
         pytest.skip("strace may not trace here")
     record = tmp_path / "calls.txt"
     strace = ["strace", "-f", "-qq", "-y", "-s", "400", "-e", "trace=open,openat,rename,renameat,renameat2,pwrite64", "-o", record]
-    done = subprocess.run([*strace, WORKER, "--quiet", "--sandbox", "off", folder], check=False, timeout=120)
+    done = subprocess.run([*strace, WORKER, "--quiet", "--sandbox", "off", folder], check=False, timeout=600)
     assert done.returncode == 0, (folder / "log.txt").read_text()
     writes, unseen = durable_writes(record.read_text())
     assert len(writes) > 30 and unseen == []

@@ -32,7 +32,7 @@ def run(folder, table=TABLE, expect=0, photographs=(), set_up=None, **fit):
 
 
 def run_again(folder, expect=0):
-    p = subprocess.run([program("selvedge-worker"), "--quiet", str(folder)], capture_output=True, timeout=120)
+    p = subprocess.run([program("selvedge-worker"), "--quiet", str(folder)], capture_output=True, timeout=600)
     log = (folder / "log.txt").read_text()
     assert p.returncode == expect, log
     return json.loads((folder / "status.json").read_text())

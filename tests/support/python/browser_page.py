@@ -10,6 +10,7 @@ import time
 ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..", ".."))
 BUILD = os.environ.get("SELVEDGE_BUILD") or os.path.join(ROOT, "build")
 BIN = os.path.join(BUILD, "bin")
+TIMEOUT_S = float(os.environ.get("SELVEDGE_TEST_PATIENCE", "1"))
 sys.path.insert(0, os.path.join(ROOT, "clients", "python"))
 import selvedge  # noqa: E402
 
@@ -44,7 +45,7 @@ def small_weave(folder, *photograph, diameter="6"):
 
 def wait_for(browser, condition, seconds=30):
     """Waits until the JavaScript expression is true."""
-    end, pause_s = time.monotonic() + seconds, 0.02
+    end, pause_s = time.monotonic() + seconds * TIMEOUT_S, 0.02
     while time.monotonic() < end:
         if browser.execute_script(f"return Boolean({condition})"):
             return

@@ -86,7 +86,7 @@ def settings_arguments(options):
 def selvedged(data, *arguments, expect=0):
     """Runs a command of an operator; what it prints."""
     store = settings_arguments(SharedStore.options(str(data)))
-    done = subprocess.run([program("selvedged"), "--data", str(data), *store, *arguments], capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run([program("selvedged"), "--data", str(data), *store, *arguments], capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == expect, done.stdout + done.stderr
     return done.stdout + done.stderr
 

@@ -74,7 +74,7 @@ def test_geometry_alone_and_a_job_that_goes_on_from_it(real, scan):
 
 def reconstruct(d, *words):
     return subprocess.run([program("selvedge"), "reconstruct", *map(str, words)], env=dict(os.environ, SELVEDGE_SERVER=d.url, SELVEDGE_TOKEN=""),
-                          capture_output=True, text=True, timeout=300)
+                          capture_output=True, text=True, timeout=1500)
 
 
 def test_command_line(real, scan, tmp_path):

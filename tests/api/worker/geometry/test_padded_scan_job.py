@@ -47,7 +47,7 @@ def trace(folder, padding, draw=pages):
     (folder / "input").mkdir(parents=True)
     (folder / "input" / "s.tif").write_bytes(tiff(draw(padding), N, N))
     (folder / "job.json").write_text(json.dumps({"sample": "s", "volume": {"files": ["s.tif"], "voxel_size_um": 2}}))
-    done = subprocess.run([program("selvedge-worker"), "--quiet", str(folder)], capture_output=True, timeout=300, check=False)
+    done = subprocess.run([program("selvedge-worker"), "--quiet", str(folder)], capture_output=True, timeout=1500, check=False)
     assert done.returncode == 0, (folder / "log.txt").read_text()
     return json.loads((folder / "results" / "result.json").read_text()), json.loads((folder / "status.json").read_text())["warnings"]
 
@@ -83,7 +83,7 @@ def test_the_border_of_the_view_is_no_surface_of_fibers(tmp_path):
 def test_reconstruct_prints_what_the_scan_states(tmp_path, real):
     (tmp_path / "s.tif").write_bytes(tiff(pages(0), N, N, first=[imagej(images=40, slices=40, unit="um", spacing=2), tag(282, 5, (1, 2)), tag(283, 5, (1, 2))]))
     command = [program("selvedge"), "--server", real.url, "reconstruct", str(tmp_path / "s.tif"), "--out", str(tmp_path / "out")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=1500, check=False)
     assert done.returncode == 0, done.stderr
     assert "s.tif states voxel size 2 x 2 x 2 um (ImageJ): applied" in done.stderr
     assert "s.tif states padding value 0 in 2" in done.stderr

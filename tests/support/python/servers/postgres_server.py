@@ -43,7 +43,7 @@ class PostgresServer:
         command = [os.path.join(self.bin, program), *arguments]
         if self.user:
             command = ["runuser", "-u", self.user, "--", *command]
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, cwd="/")
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300, cwd="/")
         assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
         return done.stdout
 
