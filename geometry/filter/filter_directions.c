@@ -23,7 +23,7 @@ static void count_slice(void *context, size_t k, size_t i_thread)
     scratch_keep_within(c->v->space);
     for (size_t at = k * n; at < (k + 1) * n; at++) {
         n_material += c->v->density[at] >= c->eps_d;
-        n_kept += c->d->density[at] > 0;
+        n_kept += direction_volume_is_kept(c->d, at);
     }
     c->n_material[k] = n_material;
     c->n_kept[k] = n_kept;

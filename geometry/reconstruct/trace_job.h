@@ -30,8 +30,17 @@ enum {
 /* Angle between a line and the direction of its voxels from which on it may be wrong. */
 #define TRACE_DISAGREEMENT_RAD (30.0 * RAD_PER_DEG)
 
+/* A volume that was made from a scan by volume_rescale. A step may use its array for other densities, if it makes it
+ * anew afterwards (volume_rescale_again). */
+struct trace_grid {
+    const struct volume *scan;
+    struct volume *v;
+    double edge;
+};
+
 struct trace_job {
     const struct volume *v;
+    const struct trace_grid *grid; /* of v; NULL: v must stay as it is */
     const struct direction_volume *d;
     struct reconstruct_option *o;
     struct thread_pool *pool;

@@ -9,6 +9,7 @@
 
 #include "geometry/fibers/axes/model/fiber_section.h"
 #include "geometry/filter/filter_directions.h"
+#include "geometry/volume/volume_rescale.h"
 #include "geometry/volume/volume_slabs.h"
 
 #include <math.h>
@@ -25,6 +26,7 @@ static const double LEAST_LEFT = 0.03;
  * neighbours then spread their radii by 0.09 to 0.15. */
 static const double LEAST_SPREAD_THIN = 0.05;
 static const double LEAST_DIAMETERS = 1.5; /* length of the lines that are added */
+enum { SLAB = 16 };                        /* slices whose densities are held while the grid has what is left */
 /* Density of thin hollow fibers whose lumens were not filled: blurred walls have 0.75 at most, and the middle 0.55. */
 static const float HOLLOW_DENSITY = 0.62f;
 
@@ -46,28 +48,38 @@ static float depth_in(const struct piece *p, const float d[3])
     return fiber_section_place(p->section, p->radius, across).depth;
 }
 
+/* Slices from .. to - 1 of the scan, from which fibers are subtracted. */
+struct slab {
+    size_t from, to;
+    const float *density; /* of the scan, beginning with slice `from` */
+};
+
 /* Lowers the density around a vertex by a piece of a fiber. width: of its blurred edge. */
-static void subtract_piece(const struct volume *v, const struct piece *p, float width, struct volume *left)
+static void subtract_piece(const struct slab *slab, const struct piece *p, float width, struct volume *left)
 {
     size_t from[3], to[3];
     for (int a = 0; a < 3; a++) {
-        const float lo = floorf(p->x[a] - p->reach), hi = ceilf(p->x[a] + p->reach), last = (float)v->n[a];
+        const float lo = floorf(p->x[a] - p->reach), hi = ceilf(p->x[a] + p->reach), last = (float)left->n[a];
         from[a] = (size_t)fminf(fmaxf(lo, 0.0f), last);
         to[a] = (size_t)fminf(fmaxf(hi, 0.0f), last);
     }
+    if (from[2] < slab->from) from[2] = slab->from;
+    if (to[2] > slab->to) to[2] = slab->to;
+    const size_t before = volume_index(left->n, 0, 0, slab->from);
     for (size_t k = from[2]; k < to[2]; k++)
         for (size_t j = from[1]; j < to[1]; j++)
             for (size_t i = from[0]; i < to[0]; i++) {
                 const float d[3] = {(float)i + 0.5f - p->x[0], (float)j + 0.5f - p->x[1], (float)k + 0.5f - p->x[2]};
                 const float share = fminf(1.0f, 0.5f - depth_in(p, d) / width);
-                const size_t at = volume_index(v->n, i, j, k);
-                if (share > 0.0f) left->density[at] = fmaxf(0.0f, fminf(left->density[at], v->density[at] - share));
+                const size_t at = volume_index(left->n, i, j, k);
+                const float scan = slab->density[at - before];
+                if (share > 0.0f) left->density[at] = fmaxf(0.0f, fminf(left->density[at], scan - share));
             }
 }
 
 /* Subtracts the fiber around vertex i of a line. */
 static void subtract_vertex(const struct trace_job *job, const struct polyline_set *lines, size_t line, size_t i,
-                            struct volume *left)
+                            const struct slab *slab, struct volume *left)
 {
     const float width = (float)(sqrt(2.0 * M_PI) * job->profile.blur), origin[3] = {0.0f, 0.0f, 0.0f};
     const float radius = lines->radius[line] > 0.0f ? lines->radius[line] : (float)(0.5 * job->diameter);
@@ -82,7 +94,16 @@ static void subtract_vertex(const struct trace_job *job, const struct polyline_s
         p.section = &view;
         p.reach = p.radius * view.stretch + 0.5f * width;
     }
-    subtract_piece(job->v, &p, width, left);
+    subtract_piece(slab, &p, width, left);
+}
+
+static void subtract_all(const struct trace_job *job, const struct polyline_set *lines, const struct slab *slab,
+                         struct volume *left)
+{
+    for (size_t l = 0; l < lines->n_line; l++) {
+        for (size_t i = lines->first[l]; i < lines->first[l + 1]; i++) subtract_vertex(job, lines, l, i, slab, left);
+        scratch_keep_within(left->space);
+    }
 }
 
 static size_t count_material(const struct volume *v, double eps_d)
@@ -95,24 +116,63 @@ static size_t count_material(const struct volume *v, double eps_d)
     return n;
 }
 
-/* Makes the volume of the scan without the lines. *share: its material over the material of the scan. */
-static status subtract_lines(const struct trace_job *job, const struct polyline_set *lines, struct volume *left,
-                             double *share, struct error *err)
+/* Subtracts the lines from a copy of the scan. */
+static status subtract_from_copy(const struct trace_job *job, const struct polyline_set *lines, struct volume *left,
+                                 struct error *err)
 {
     const struct volume *v = job->v;
     const size_t n_slice = v->n[0] * v->n[1];
+    const struct slab all = {0, v->n[2], v->density};
     status s = volume_init_in(left, v->n, v->voxel_size_m, v->space, err);
     for (size_t k = 0; k < v->n[2] && s == STATUS_OK; k++) {
         memcpy(left->density + k * n_slice, v->density + k * n_slice, n_slice * sizeof *v->density);
         scratch_keep_within(v->space);
     }
-    if (s != STATUS_OK) return s;
-    const size_t n_material = count_material(v, job->o->eps_d);
-    for (size_t l = 0; l < lines->n_line; l++) {
-        for (size_t i = lines->first[l]; i < lines->first[l + 1]; i++) subtract_vertex(job, lines, l, i, left);
-        scratch_keep_within(v->space);
+    if (s == STATUS_OK) subtract_all(job, lines, &all, left);
+    return s;
+}
+
+/* Subtracts the lines from the densities of the grid, slab by slab. */
+static status subtract_in_place(const struct trace_job *job, const struct polyline_set *lines, struct volume *left,
+                                struct error *err)
+{
+    const size_t *n = left->n, n_slice = n[0] * n[1];
+    float *scan = malloc(SLAB * n_slice * sizeof *scan);
+    if (scan == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot look for more fibers: out of memory");
+    for (size_t k = 0; k < n[2]; k += SLAB) {
+        const struct slab slab = {k, k + SLAB < n[2] ? k + SLAB : n[2], scan};
+        memcpy(scan, left->density + k * n_slice, (slab.to - slab.from) * n_slice * sizeof *scan);
+        subtract_all(job, lines, &slab, left);
     }
-    *share = n_material > 0 ? (double)count_material(left, job->o->eps_d) / (double)n_material : 0.0;
+    free(scan);
+    return STATUS_OK;
+}
+
+/* Makes the volume of the scan without the lines: of a copy, or of the grid itself, which its owner then restores.
+ * *share: its material over the material of the scan. */
+static status subtract_lines(const struct trace_job *job, const struct polyline_set *lines, struct volume *left,
+                             double *share, struct error *err)
+{
+    const size_t n_material = count_material(job->v, job->o->eps_d);
+    status s;
+    if (job->grid != NULL) {
+        *left = *job->grid->v;
+        left->slabs = NULL;
+        s = subtract_in_place(job, lines, left, err);
+    } else {
+        s = subtract_from_copy(job, lines, left, err);
+    }
+    if (s == STATUS_OK && n_material > 0) *share = (double)count_material(left, job->o->eps_d) / (double)n_material;
+    return s;
+}
+
+/* Ends the use of the volume without the lines. */
+static status release_left(const struct trace_job *job, struct volume *left, struct error *err)
+{
+    const struct trace_grid *g = job->grid;
+    const struct progress quiet = progress_silent(&job->inner);
+    if (g != NULL) return volume_rescale_again(g->scan, g->edge, job->pool, &quiet, g->v, err);
+    volume_release(left);
     return STATUS_OK;
 }
 
@@ -149,8 +209,6 @@ static status add_lines(const struct trace_job *job, const struct volume *left, 
     status s = filter_directions(left, look.diameter, &option, job->pool, &look.inner, &d, &report, err);
     const bool nothing = s == STATUS_INVALID; /* no voxel looks like a part of a fiber */
     if (nothing) s = STATUS_OK;
-    if (s == STATUS_OK && job->v->slabs != NULL) /* other ranks have one slab at a time: a slab of `left` until here */
-        s = volume_slabs_send(job->v->slabs, job->v, err);
     if (s == STATUS_OK && !nothing) s = trace_chains(&look, &part[0], err);
     if (s == STATUS_OK && !nothing) s = trace_repair(&look, &part[0], false, 0.0, &part[1], &counts, err);
     if (s == STATUS_OK && !nothing) s = trace_repair(&look, &part[1], true, 0.0, &part[2], &counts, err);
@@ -183,7 +241,11 @@ status trace_leftover(struct trace_job *job, struct polyline_set *lines, struct 
     if (!look) return STATUS_OK;
     if (s == STATUS_OK) raise_hollow(job, &left);
     if (s == STATUS_OK && share >= LEAST_LEFT) s = add_lines(job, &left, lines, err);
-    volume_release(&left);
+    const status released = release_left(job, &left, s == STATUS_OK ? err : NULL);
+    if (s == STATUS_OK) s = released;
+    if (s == STATUS_OK && share >= LEAST_LEFT && job->v->slabs != NULL)
+        s = volume_slabs_send(job->v->slabs, job->v,
+                              err); /* ranks have one slab at a time: a slab of `left` until here */
     if (s != STATUS_OK || lines->n_line == n_before) return s;
     trace_classify(lines);
     return trace_center(job, lines, 1, err);

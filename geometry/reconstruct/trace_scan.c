@@ -21,6 +21,15 @@ static status end_lines(struct trace_job *job, bool finish, struct polyline_set 
     return finish ? trace_finish(job, lines, err) : trace_settle(job, lines, err);
 }
 
+/* Gives the voxels of a grid their directions. */
+static status take_directions(const struct trace_job *job, double edge, const struct volume *grid,
+                              struct direction_volume *direction, struct error *err)
+{
+    size_t n_material, n_kept;
+    if (edge < 1.0) return direction_volume_refine(job->d, grid, job->o->eps_d, job->pool, direction, err);
+    return direction_volume_rescale(job->d, grid, job->o->eps_d, job->pool, direction, &n_material, &n_kept, err);
+}
+
 /* Finds lines in voxels whose edge is `edge` voxels of the scan. The last fit is to the finer of both grids. The lines
  * are in voxels of the scan. */
 static status trace_rescaled(const struct trace_job *job, double edge, bool finish, struct polyline_set *lines,
@@ -30,13 +39,13 @@ static status trace_rescaled(const struct trace_job *job, double edge, bool fini
     struct direction_volume direction = {0};
     struct trace_job on_grid = *job;
     struct volume_slabs slabs = {0};
-    size_t n_material, n_kept;
+    const struct trace_grid made = {job->v, &grid, edge};
     on_grid.inner = progress_of_part(&on_grid.part);
     const struct progress quiet = progress_silent(&on_grid.inner);
     status s = volume_rescale(job->v, edge, job->pool, &quiet, &grid, err);
-    if (s == STATUS_OK)
-        s = direction_volume_rescale(job->d, &grid, job->o->eps_d, job->pool, &direction, &n_material, &n_kept, err);
+    if (s == STATUS_OK) s = take_directions(job, edge, &grid, &direction, err);
     on_grid.v = &grid;
+    on_grid.grid = &made;
     on_grid.d = &direction;
     on_grid.diameter = job->diameter / edge;
     on_grid.independent = fmin(1.0, edge * edge * edge);

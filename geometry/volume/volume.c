@@ -1,5 +1,7 @@
 #include "geometry/volume/volume.h"
 
+#include "geometry/volume/kept_directions.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -108,18 +110,39 @@ status direction_volume_init(struct direction_volume *v, const size_t n[3], cons
     return direction_volume_init_in(v, n, voxel_size_m, NULL, err);
 }
 
+status direction_volume_init_kept(struct direction_volume *v, const size_t n[3], const double voxel_size_m[3],
+                                  struct scratch_space *space, struct error *err)
+{
+    *v = (struct direction_volume){.space = space};
+    memcpy(v->n, n, sizeof v->n);
+    memcpy(v->voxel_size_m, voxel_size_m, sizeof v->voxel_size_m);
+    return kept_directions_new(n, space, &v->kept_only, err);
+}
+
 void direction_volume_release(struct direction_volume *v)
 {
     if (v == NULL) return;
     scratch_release(v->space, v->density);
     scratch_release(v->space, v->octahedral);
+    kept_directions_free(v->kept_only);
     *v = (struct direction_volume){0};
+}
+
+bool direction_volume_is_kept(const struct direction_volume *v, size_t i_voxel)
+{
+    return v->kept_only != NULL ? kept_directions_has(v->kept_only, i_voxel) : v->density[i_voxel] > 0;
+}
+
+const int16_t *direction_volume_code(const struct direction_volume *v, size_t i_voxel)
+{
+    return v->kept_only != NULL ? kept_directions_code(v->kept_only, i_voxel) : v->octahedral + 2 * i_voxel;
 }
 
 /* Octahedral map (Cigolle et al. 2014, "A survey of efficient representations for independent unit vectors"). */
 void direction_volume_get(const struct direction_volume *v, size_t i_voxel, float d[3])
 {
-    float u = (float)v->octahedral[2 * i_voxel] / 32767.0f, w = (float)v->octahedral[2 * i_voxel + 1] / 32767.0f;
+    const int16_t *code = direction_volume_code(v, i_voxel);
+    float u = (float)code[0] / 32767.0f, w = (float)code[1] / 32767.0f;
     float z = 1.0f - fabsf(u) - fabsf(w);
     if (z < 0.0f) {
         float u_folded = (1.0f - fabsf(w)) * copysignf(1.0f, u);

@@ -11,6 +11,7 @@
 #include "base/files/scratch_space.h"
 #include "base/status.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 /* Voxels whose density was replaced by 1 because they lie in lumens (lumen_filter.h), by index, with their former
@@ -64,21 +65,32 @@ status volume_fill_marked(struct volume *v, const uint8_t *mark, uint8_t least, 
 static inline size_t volume_n_voxel(const size_t n[3]) { return n[0] * n[1] * n[2]; }
 static inline size_t volume_index(const size_t n[3], size_t i, size_t j, size_t k) { return (k * n[1] + j) * n[0] + i; }
 
+struct kept_directions;
+
 /* Density in [0, 1] as a byte (0: emptied), and a unit direction as two 16-bit octahedral coordinates: 5 bytes per
- * voxel. A direction and its opposite stand for the same fiber. */
+ * voxel. A direction and its opposite stand for the same fiber. On fine grids only which voxels are kept, and their
+ * directions (kept_directions.h); such a volume is only read. */
 struct direction_volume {
     size_t n[3];
     double voxel_size_m[3];
     uint8_t *density;
-    int16_t *octahedral;         /* 2 per voxel */
-    struct scratch_space *space; /* not owned */
+    int16_t *octahedral;               /* 2 per voxel */
+    struct kept_directions *kept_only; /* owned; NULL: the arrays above. Otherwise these are NULL. */
+    struct scratch_space *space;       /* not owned */
 };
 
 status direction_volume_init(struct direction_volume *v, const size_t n[3], const double voxel_size_m[3],
                              struct error *err);
 status direction_volume_init_in(struct direction_volume *v, const size_t n[3], const double voxel_size_m[3],
                                 struct scratch_space *space, struct error *err);
+/* Makes a volume of kept voxels alone, none at first. STATUS_NO_MEMORY, STATUS_DISK_FULL. */
+status direction_volume_init_kept(struct direction_volume *v, const size_t n[3], const double voxel_size_m[3],
+                                  struct scratch_space *space, struct error *err);
 void direction_volume_release(struct direction_volume *v);
+/* Returns whether a voxel has a direction. */
+bool direction_volume_is_kept(const struct direction_volume *v, size_t i_voxel);
+/* The octahedral coordinates of a voxel that is kept. */
+const int16_t *direction_volume_code(const struct direction_volume *v, size_t i_voxel);
 /* The direction of a voxel is only meaningful where density > 0. The direction that is set may have any length
  * except 0; that returned is a unit vector with an error below 0.005 degrees. */
 void direction_volume_get(const struct direction_volume *v, size_t i_voxel, float d[3]);

@@ -28,6 +28,10 @@ status axis_map_parse(const char *text, struct axis_map *map, struct error *err)
 status volume_resample(const struct volume *in, const double matrix[9], double voxel_m, const size_t box[6],
                        struct thread_pool *pool, const struct progress *progress, struct volume *out,
                        struct error *err);
+/* The same for a volume that exists: fills its densities. Voxel (0, 0, 0) is `first` of that grid. */
+status volume_resample_to(const struct volume *in, const double matrix[9], const size_t first[3],
+                          struct thread_pool *pool, const struct progress *progress, struct volume *out,
+                          struct error *err);
 /* Computes the shape of the whole resampled grid: extents of `in` over voxel_m, rounded. */
 void volume_resampled_shape(const size_t n_in[3], const double voxel_size_m[3], double voxel_m, size_t n_out[3]);
 

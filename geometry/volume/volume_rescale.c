@@ -1,5 +1,6 @@
 #include "geometry/volume/volume_rescale.h"
 
+#include "geometry/volume/kept_directions.h"
 #include "geometry/volume/volume_align.h"
 
 #include <math.h>
@@ -65,41 +66,47 @@ static void mean_slice(void *context, size_t k, size_t i_thread)
     }
 }
 
+/* Fills `out`, whose array is there. */
 static status coarsen(const struct volume *v, double edge, struct thread_pool *pool, const struct progress *progress,
                       struct volume *out, struct error *err)
 {
     struct mean_job job = {.in = v, .out = out, .edge = edge};
-    size_t n[3];
-    double size_m[3];
-    for (int a = 0; a < 3; a++) {
-        n[a] = (size_t)ceil((double)v->n[a] / edge - 1e-9);
-        size_m[a] = v->voxel_size_m[a] * edge;
-    }
     job.row = malloc(thread_pool_n_thread(pool) * v->n[0] * sizeof *job.row);
     if (job.row == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot make larger voxels: out of memory");
-    status s = volume_init_in(out, n, size_m, v->space, err);
-    if (s == STATUS_OK) {
-        s = thread_pool_run(pool, n[2], mean_slice, &job, progress);
-        if (s != STATUS_OK) {
-            volume_release(out);
-            error_set(err, s, "making larger voxels was cancelled");
-        }
-    }
+    status s = thread_pool_run(pool, out->n[2], mean_slice, &job, progress);
     free(job.row);
-    return s;
+    return s == STATUS_OK ? s : error_set(err, s, "making larger voxels was cancelled");
+}
+
+static status rescale(const struct volume *v, double edge, struct thread_pool *pool, const struct progress *progress,
+                      struct volume *out, struct error *err)
+{
+    static const double identity[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+    if (edge >= 1.0) return coarsen(v, edge, pool, progress, out, err);
+    return volume_resample_to(v, identity, (const size_t[3]){0, 0, 0}, pool, progress, out, err);
 }
 
 status volume_rescale(const struct volume *v, double edge, struct thread_pool *pool, const struct progress *progress,
                       struct volume *out, struct error *err)
 {
-    static const double identity[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
-    *out = (struct volume){0};
-    if (edge >= 1.0) return coarsen(v, edge, pool, progress, out, err);
     size_t n[3];
-    const double voxel_m = edge * v->voxel_size_m[0];
-    volume_resampled_shape(v->n, v->voxel_size_m, voxel_m, n);
-    const size_t box[6] = {0, 0, 0, n[0], n[1], n[2]};
-    return volume_resample(v, identity, voxel_m, box, pool, progress, out, err);
+    double size_m[3];
+    *out = (struct volume){0};
+    for (int a = 0; a < 3; a++) {
+        n[a] = (size_t)ceil((double)v->n[a] / edge - 1e-9);
+        size_m[a] = edge * v->voxel_size_m[edge < 1.0 ? 0 : a];
+    }
+    if (edge < 1.0) volume_resampled_shape(v->n, v->voxel_size_m, size_m[0], n);
+    status s = volume_init_in(out, n, size_m, v->space, err);
+    if (s == STATUS_OK) s = rescale(v, edge, pool, progress, out, err);
+    if (s != STATUS_OK) volume_release(out);
+    return s;
+}
+
+status volume_rescale_again(const struct volume *v, double edge, struct thread_pool *pool,
+                            const struct progress *progress, struct volume *out, struct error *err)
+{
+    return rescale(v, edge, pool, progress, out, err);
 }
 
 struct direction_job {
@@ -132,13 +139,13 @@ static size_t source_of(const struct direction_job *job, const size_t x[3])
 {
     const struct direction_volume *from = job->from;
     size_t at = volume_index(from->n, holder(job, 0, x[0]), holder(job, 1, x[1]), holder(job, 2, x[2])), lo[3], hi[3];
-    if (from->density[at] > 0) return at;
+    if (direction_volume_is_kept(from, at)) return at;
     for (int a = 0; a < 3; a++) centres_in(job, a, x[a], &lo[a], &hi[a]);
     for (size_t k = lo[2]; k < hi[2]; k++)
         for (size_t j = lo[1]; j < hi[1]; j++)
             for (size_t i = lo[0]; i < hi[0]; i++) {
                 at = volume_index(from->n, i, j, k);
-                if (from->density[at] > 0) return at;
+                if (direction_volume_is_kept(from, at)) return at;
             }
     return SIZE_MAX;
 }
@@ -161,7 +168,8 @@ static void direction_slice(void *context, size_t k, size_t i_thread)
             job->n_kept[k]++;
             long byte = lrintf(255.0f * density);
             job->out->density[at] = (uint8_t)(byte < 1 ? 1 : byte > 255 ? 255 : byte);
-            memcpy(job->out->octahedral + 2 * at, from->octahedral + 2 * source, 2 * sizeof *from->octahedral);
+            memcpy(job->out->octahedral + 2 * at, direction_volume_code(from, source),
+                   2 * sizeof *job->out->octahedral);
         }
     }
 }
@@ -190,5 +198,44 @@ status direction_volume_rescale(const struct direction_volume *from, const struc
         direction_volume_release(out);
         error_set(err, s, "rescaling directions was cancelled");
     }
+    return s;
+}
+
+static void refine_task(void *context, size_t i_task, size_t i_thread)
+{
+    (void)i_thread;
+    const struct direction_job *job = context;
+    struct kept_directions *k = job->out->kept_only;
+    const size_t n_voxel = volume_n_voxel(job->v->n), from = i_task * KEPT_TASK;
+    scratch_keep_within(job->v->space);
+    for (size_t at = from; at < n_voxel && at < from + KEPT_TASK; at++)
+        if (job->v->density[at] >= job->eps_d && job->from->density[kept_directions_holder(k, at)] > 0)
+            k->kept[at / KEPT_WORD] |= (uint64_t)1 << at % KEPT_WORD;
+}
+
+static status find_holders(const struct direction_job *job, struct kept_directions *k, struct error *err)
+{
+    memcpy(k->n_coarse, job->from->n, sizeof k->n_coarse);
+    k->coarse = job->from->octahedral;
+    for (int a = 0; a < 3; a++) {
+        k->holder[a] = malloc(k->n[a] * sizeof *k->holder[a]);
+        if (k->holder[a] == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot rescale directions: out of memory");
+        for (size_t i = 0; i < k->n[a]; i++) k->holder[a][i] = (uint32_t)holder(job, a, i);
+    }
+    return STATUS_OK;
+}
+
+status direction_volume_refine(const struct direction_volume *from, const struct volume *v, double eps_d,
+                               struct thread_pool *pool, struct direction_volume *out, struct error *err)
+{
+    struct direction_job job = {.from = from, .v = v, .out = out, .eps_d = (float)eps_d};
+    const size_t n_task = (volume_n_voxel(v->n) + KEPT_TASK - 1) / KEPT_TASK;
+    status s = direction_volume_init_kept(out, v->n, v->voxel_size_m, v->space, err);
+    if (s == STATUS_OK) s = find_holders(&job, out->kept_only, err);
+    if (s == STATUS_OK) {
+        s = thread_pool_run(pool, n_task, refine_task, &job, NULL);
+        if (s != STATUS_OK) error_set(err, s, "rescaling directions was cancelled");
+    }
+    if (s != STATUS_OK) direction_volume_release(out);
     return s;
 }

@@ -23,7 +23,7 @@ static float sine2(const struct polyline_set *p, size_t line, size_t i, const st
         norm += t[c] * t[c];
     }
     size_t voxel = volume_index(d->n, at[0], at[1], at[2]);
-    if (d->density[voxel] == 0 || !(norm > 0.0f)) return -1.0f;
+    if (!direction_volume_is_kept(d, voxel) || !(norm > 0.0f)) return -1.0f;
     direction_volume_get(d, voxel, e);
     for (int c = 0; c < 3; c++) cosine += t[c] * e[c];
     return fmaxf(0.0f, 1.0f - cosine * cosine / norm);

@@ -37,7 +37,7 @@ static void mask_slice(void *context, size_t k, size_t i_thread)
     scratch_keep_within(job->d->space);
     for (x[1] = 0; x[1] < n[1]; x[1]++)
         for (x[0] = 0; x[0] < n[0]; x[0]++, at++) {
-            if (job->d->density[at] == 0) continue;
+            if (!direction_volume_is_kept(job->d, at)) continue;
             float d[3];
             direction_volume_get(job->d, at, d);
             int nearest = 0;
@@ -64,11 +64,12 @@ static void rim_slice(void *context, size_t k, size_t i_thread)
     scratch_keep_within(job->d->space);
     for (x[1] = 0; x[1] < n[1]; x[1]++)
         for (x[0] = 0; x[0] < n[0]; x[0]++, at++) {
-            if (job->d->density[at] > 0) continue;
+            if (direction_volume_is_kept(job->d, at)) continue;
             unsigned seen = 0;
             for (int a = 0; a < 3; a++) { /* only kept neighbours are read, because their masks do not change here */
-                if (x[a] > 0 && job->d->density[at - stride[a]] > 0) seen |= job->mask[at - stride[a]];
-                if (x[a] + 1 < n[a] && job->d->density[at + stride[a]] > 0) seen |= job->mask[at + stride[a]];
+                if (x[a] > 0 && direction_volume_is_kept(job->d, at - stride[a])) seen |= job->mask[at - stride[a]];
+                if (x[a] + 1 < n[a] && direction_volume_is_kept(job->d, at + stride[a]))
+                    seen |= job->mask[at + stride[a]];
             }
             job->mask[at] = (uint16_t)((seen == 0 ? ~0u : seen) & ((1u << N_SLICE_FRAME) - 1u));
         }
