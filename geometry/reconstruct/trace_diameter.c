@@ -42,6 +42,17 @@ static double diameter_of_lines(const struct reconstruct_report *report, double 
     return 2.0 * (radius + 0.25 * blur * blur / radius) / voxel_m;
 }
 
+/* A box of a scan, and how it is traced. report: of the scan; peak: its diameter; filled: lumens will be filled. */
+struct boxed_scan {
+    const struct volume *box;
+    trace_orientation *find;
+    struct thread_pool *pool;
+    const struct progress *progress;
+    const struct reconstruct_report *report;
+    double peak;
+    bool filled;
+};
+
 /* Lines of a tracing: mean diameter in voxels, NaN where no fibers are resolved. */
 struct found {
     double diameter;
@@ -73,26 +84,28 @@ static status grade_lines(const struct volume *box, const struct polyline_set *l
 }
 
 /* Traces lines by a diameter, with the filter that belongs to it whatever the job's is: then a job that is given the
- * filter another one has chosen finds the same fibers. report: a copy. */
-static status trace_once(const struct volume *box, trace_orientation *find, double diameter, struct thread_pool *pool,
-                         const struct progress *progress, struct reconstruct_report report, struct found *found,
-                         struct error *err)
+ * filter another one has chosen finds the same fibers. */
+static status trace_once(const struct boxed_scan *scan, double diameter, struct found *found, struct error *err)
 {
+    const struct volume *box = scan->box;
+    struct reconstruct_report report = *scan->report;
     struct direction_volume d = {0};
     struct reconstruct_option o;
-    struct trace_job job = {.v = box, .d = &d, .o = &o, .pool = pool, .report = &report, .part.outer = progress};
+    struct trace_job job = {
+        .v = box, .d = &d, .o = &o, .pool = scan->pool, .report = &report, .part.outer = scan->progress};
     struct polyline_set lines;
     *found = (struct found){.diameter = NAN};
     polyline_set_init(&lines);
     reconstruct_option_default(&o);
     o.fiber_diameter_voxel = diameter;
     report.radius_spread = 0.0;
-    status s = find(box, &o, pool, progress, &d, &report, err);
+    status s = scan->find(box, &o, scan->pool, scan->progress, &d, &report, err);
     if (s == STATUS_OK) {
         trace_job_start(&job);
         s = trace_scan(&job, false, &lines, err);
     }
-    if (s == STATUS_OK) s = grade_lines(box, &lines, pool, &report, found, err);
+    if (s == STATUS_OK) s = grade_lines(box, &lines, scan->pool, &report, found, err);
+    if (scan->filled) found->several = 0.0; /* lumens that are not filled yet look like gaps between fibers */
     found->spread = report.radius_spread;
     const bool resolved = lines.n_line > 0 && report.radius_spread <= TRACE_MOST_SPREAD;
     const bool blurred = report.profile_blur_m >= STRONG_BLUR * box->voxel_size_m[0];
@@ -103,20 +116,35 @@ static status trace_once(const struct volume *box, trace_orientation *find, doub
     return s == STATUS_INVALID ? STATUS_OK : s;
 }
 
-/* Where lines of the first tracing differ much in radius, or hold several fibers, thin and thick fibers may lie side by
- * side. A diameter between both is then taken if its lines describe the box better and differ more. */
-static status try_between(const struct volume *box, trace_orientation *find, const struct found *before,
-                          struct thread_pool *pool, const struct progress *progress,
-                          const struct reconstruct_report *report, double *diameter, struct error *err)
+/* Tries a diameter between those of thin and thick fibers side by side. It is taken if its lines describe the box
+ * better than those of `before`, and their radii spread, for a thicker diameter more than before. */
+static status try_between(const struct boxed_scan *scan, double ratio, const struct found *before, double *diameter,
+                          struct error *err)
 {
     struct found found;
-    const bool thinner = before->several >= LEAST_SEVERAL;
-    if (!thinner && !(before->spread >= SEVERAL_SPREAD)) return STATUS_OK;
-    const double ratio = thinner ? THINNER : THICKER;
-    status s = trace_once(box, find, ratio * *diameter, pool, progress, *report, &found, err);
-    const double spread = thinner ? TWO_SPREAD : fmax(THICKER_SPREAD, MORE_SPREAD * before->spread);
+    const double spread = ratio < 1.0 ? TWO_SPREAD : fmax(THICKER_SPREAD, MORE_SPREAD * before->spread);
+    status s = trace_once(scan, ratio * scan->peak, &found, err);
     if (s != STATUS_OK || !found.resolved) return s; /* the thinner lines are no fibers */
-    if (found.spread >= spread && found.score >= before->score + BETTER) *diameter *= ratio;
+    if (found.spread >= spread && found.score >= before->score + BETTER) *diameter = ratio * scan->peak;
+    return s;
+}
+
+/* Repeats the tracing by the diameter of its lines until that stays the same. found: of the last tracing. */
+static status settle_diameter(const struct boxed_scan *scan, double most, double *diameter, struct found *found,
+                              struct error *err)
+{
+    double ratio = INFINITY;
+    status s = STATUS_OK;
+    for (int round = 0; round < N_ROUND && fabs(log(ratio)) > log(SETTLED) && s == STATUS_OK; round++) {
+        const double tried = *diameter;
+        s = trace_once(scan, tried, found, err);
+        const bool spread = round == 0 && found->spread >= SEVERAL_SPREAD && found->several < LEAST_SEVERAL;
+        if (s == STATUS_OK && spread) s = try_between(scan, THICKER, found, diameter, err);
+        if (*diameter != tried) break; /* one between the diameters of two kinds */
+        if (!(found->diameter < most && found->diameter * FIBER_DIAMETER_FINER > scan->peak)) break;
+        ratio = found->diameter / tried;
+        *diameter = found->diameter;
+    }
     return s;
 }
 
@@ -129,20 +157,13 @@ status trace_diameter(const struct volume *v, const struct volume *known, trace_
     const struct progress quiet = progress_silent(progress);
     const double peak = report->fiber_diameter_voxel;
     const double most = trace_grid_edge(peak, v->n) < 1.0 ? peak : MOST_RISE * peak;
-    double diameter = peak, ratio = INFINITY;
+    const struct boxed_scan scan = {&box, find, pool, &quiet, report, peak, v->filled.n > 0};
+    struct found found = {.diameter = NAN};
+    double diameter = peak;
     status s = trace_box_copy(v, known, peak, &box, from, err);
-    for (int round = 0; round < N_ROUND && fabs(log(ratio)) > log(SETTLED) && s == STATUS_OK; round++) {
-        struct found found;
-        const double tried = diameter;
-        s = trace_once(&box, find, diameter, pool, &quiet, *report, &found, err);
-        if (v->filled.n > 0) found.several = 0.0; /* lumens that are not filled yet look like gaps between fibers */
-        if (s == STATUS_OK && round == 0) s = try_between(&box, find, &found, pool, &quiet, report, &diameter, err);
-        if (found.blurred) filter_choose_blurred(option, diameter);
-        if (diameter != tried) break; /* one between the diameters of two kinds */
-        if (!(found.diameter < most && found.diameter * FIBER_DIAMETER_FINER > peak)) break;
-        ratio = found.diameter / diameter;
-        diameter = found.diameter;
-    }
+    if (s == STATUS_OK) s = settle_diameter(&scan, most, &diameter, &found, err);
+    if (s == STATUS_OK && found.several >= LEAST_SEVERAL) s = try_between(&scan, THINNER, &found, &diameter, err);
+    if (found.blurred) filter_choose_blurred(option, diameter);
     if (s == STATUS_OK) report->fiber_diameter_voxel = diameter;
     volume_release(&box);
     return s;
