@@ -1,6 +1,7 @@
 #include "geometry/filter/consensus.h"
 #include "base/small_matrix.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 status consensus_init(struct consensus *c, const size_t n_voxel[3], size_t cell, struct scratch_space *space,
@@ -39,38 +40,51 @@ void consensus_add(struct consensus *c, size_t i, size_t j, size_t k, const floa
 }
 
 struct blur_job {
-    const struct consensus *c;
-    float (*out)[6];
+    struct consensus *c;
     int axis;
+    float (*before)[6]; /* per thread: the cells of a row before they were blurred */
 };
 
-static void blur_layer(void *context, size_t layer, size_t i_thread)
+/* Blurs the cells of n lines that begin side by side at `first`, step by step along the lines. */
+static void blur_lines(const struct blur_job *job, size_t first, size_t n, size_t stride, float (*before)[6])
 {
-    (void)i_thread;
+    float(*t)[6] = job->c->tensor + first;
+    const size_t last = job->c->n[job->axis] - 1;
+    memcpy(before, t, n * sizeof *before);
+    for (size_t x = 0; x <= last; x++, t += stride)
+        for (size_t i = 0; i < n; i++)
+            for (int m = 0; m < 6; m++) {
+                const float own = t[i][m], high = x < last ? t[i + stride][m] : own;
+                t[i][m] = 0.25f * before[i][m] + 0.5f * own + 0.25f * high;
+                before[i][m] = own;
+            }
+}
+
+/* Layers along x and y, and rows of columns along z. */
+static void blur_task(void *context, size_t i_task, size_t i_thread)
+{
     const struct blur_job *job = context;
-    const struct consensus *c = job->c;
-    size_t n_layer = c->n[0] * c->n[1], stride = job->axis == 0 ? 1 : job->axis == 1 ? c->n[0] : n_layer;
-    scratch_keep_within(c->space);
-    for (size_t i = layer * n_layer; i < (layer + 1) * n_layer; i++) {
-        size_t x = i / stride % c->n[job->axis];
-        const float *low = c->tensor[x > 0 ? i - stride : i],
-                    *high = c->tensor[x + 1 < c->n[job->axis] ? i + stride : i];
-        for (int m = 0; m < 6; m++) job->out[i][m] = 0.25f * low[m] + 0.5f * c->tensor[i][m] + 0.25f * high[m];
-    }
+    const size_t *n = job->c->n, n_layer = n[0] * n[1];
+    float(*before)[6] = job->before + i_thread * n[0];
+    scratch_keep_within(job->c->space);
+    if (job->axis == 0)
+        for (size_t y = 0; y < n[1]; y++) blur_lines(job, i_task * n_layer + y * n[0], 1, 1, before);
+    else if (job->axis == 1)
+        blur_lines(job, i_task * n_layer, n[0], n[0], before);
+    else
+        blur_lines(job, i_task * n[0], n[0], n_layer, before);
 }
 
 status consensus_blur(struct consensus *c, int n_pass, struct thread_pool *pool, struct error *err)
 {
-    void *other;
-    status s = scratch_new(c->space, c->n[0] * c->n[1] * c->n[2] * sizeof *c->tensor,
-                           "the directions of neighbourhoods", &other, err);
+    struct blur_job job = {.c = c, .before = malloc(thread_pool_n_thread(pool) * c->n[0] * sizeof *job.before)};
+    status s = STATUS_OK;
+    if (job.before == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot filter directions: out of memory");
     for (int pass = 0; pass < 3 * n_pass && s == STATUS_OK; pass++) {
-        struct blur_job job = {c, other, pass % 3};
-        s = thread_pool_run(pool, c->n[2], blur_layer, &job, NULL);
-        other = c->tensor;
-        c->tensor = job.out;
+        job.axis = pass % 3;
+        s = thread_pool_run(pool, job.axis < 2 ? c->n[2] : c->n[1], blur_task, &job, NULL);
     }
-    scratch_release(c->space, other);
+    free(job.before);
     return s;
 }
 

@@ -24,7 +24,7 @@ void consensus_release(struct consensus *c);
 /* Adds direction d to the cell of voxel (i, j, k). Several threads may add at the same time to different layers of
  * cells (k / cell). */
 void consensus_add(struct consensus *c, size_t i, size_t j, size_t k, const float d[3], float weight);
-/* Applies the binomial filter 1 2 1 n_pass times along each axis. STATUS_NO_MEMORY, STATUS_DISK_FULL. */
+/* Applies the binomial filter 1 2 1 n_pass times along each axis. STATUS_NO_MEMORY. */
 status consensus_blur(struct consensus *c, int n_pass, struct thread_pool *pool, struct error *err);
 /* Writes the main direction around a voxel to d. Returns false where nothing was added. */
 bool consensus_direction(const struct consensus *c, size_t i, size_t j, size_t k, float d[3]);

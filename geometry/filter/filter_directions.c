@@ -51,9 +51,10 @@ static status count_voxels(const struct volume *v, const struct direction_volume
                            report->n_material_voxel, option->eps_d, option->eps_j);
 }
 
-status filter_directions(const struct volume *v, double diameter_voxel, struct reconstruct_option *option,
-                         struct thread_pool *pool, const struct progress *progress, struct direction_volume *d,
-                         struct reconstruct_report *report, struct error *err)
+/* Chooses the options, and filters, together with the other ranks where that helps. */
+static status filter(const struct volume *v, double diameter_voxel, struct reconstruct_option *option, bool kept_only,
+                     struct thread_pool *pool, const struct progress *progress, struct direction_volume *d,
+                     struct error *err)
 {
     struct volume_slabs slabs = {0};
     const size_t all[2] = {0, v->n[1]};
@@ -65,8 +66,26 @@ status filter_directions(const struct volume *v, double diameter_voxel, struct r
     if (slabs.first != NULL)
         s = direction_share_filter(&slabs, v, diameter_voxel, option, pool, progress, d, err);
     else
-        s = filter_rows(v, all, diameter_voxel, option, pool, progress, d, err);
+        s = filter_rows(v, kept_only ? NULL : all, diameter_voxel, option, pool, progress, d, err);
     volume_slabs_release(&slabs);
+    return s;
+}
+
+status filter_directions(const struct volume *v, double diameter_voxel, struct reconstruct_option *option,
+                         struct thread_pool *pool, const struct progress *progress, struct direction_volume *d,
+                         struct reconstruct_report *report, struct error *err)
+{
+    status s = filter(v, diameter_voxel, option, false, pool, progress, d, err);
+    if (s == STATUS_OK) s = count_voxels(v, d, option, pool, report, err);
+    if (s != STATUS_OK) direction_volume_release(d);
+    return s;
+}
+
+status filter_directions_kept(const struct volume *v, double diameter_voxel, struct reconstruct_option *option,
+                              struct thread_pool *pool, const struct progress *progress, struct direction_volume *d,
+                              struct reconstruct_report *report, struct error *err)
+{
+    status s = filter(v, diameter_voxel, option, true, pool, progress, d, err);
     if (s == STATUS_OK) s = count_voxels(v, d, option, pool, report, err);
     if (s != STATUS_OK) direction_volume_release(d);
     return s;

@@ -14,5 +14,9 @@
 status filter_directions(const struct volume *v, double diameter_voxel, struct reconstruct_option *option,
                          struct thread_pool *pool, const struct progress *progress, struct direction_volume *d,
                          struct reconstruct_report *report, struct error *err);
+/* The same, for directions that are only read: d may have kept voxels alone (volume.h), which takes less memory. */
+status filter_directions_kept(const struct volume *v, double diameter_voxel, struct reconstruct_option *option,
+                              struct thread_pool *pool, const struct progress *progress, struct direction_volume *d,
+                              struct reconstruct_report *report, struct error *err);
 
 #endif

@@ -10,9 +10,9 @@
 /* Computes directions d for rows row[0] .. row[1] - 1 of v, whose fibers are diameter_voxel thick, with options that
  * are chosen (filter_choice.h). v holds their surroundings: filter_rows_halo rows to both sides, unless the whole
  * volume ends there, and a first row that is a multiple of filter_rows_alignment in the whole volume. Then the rows
- * equal the rows of the whole volume bit by bit; other rows of d do not. STATUS_CANCELLED, STATUS_NO_MEMORY,
- * STATUS_DISK_FULL. */
-status filter_rows(const struct volume *v, const size_t row[2], double diameter_voxel,
+ * equal the rows of the whole volume bit by bit; other rows of d do not. row NULL: all rows, and d has kept voxels
+ * alone (volume.h). STATUS_CANCELLED, STATUS_NO_MEMORY, STATUS_DISK_FULL. */
+status filter_rows(const struct volume *v, const size_t *row, double diameter_voxel,
                    const struct reconstruct_option *option, struct thread_pool *pool, const struct progress *progress,
                    struct direction_volume *d, struct error *err);
 size_t filter_rows_halo(const struct reconstruct_option *option, double diameter_voxel);

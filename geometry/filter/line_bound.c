@@ -4,16 +4,17 @@
 #include <string.h>
 
 struct bound_job {
-    const struct volume *blurred;
+    struct volume blurred;
     struct line_bound *b;
     float least;
+    size_t layer;
 };
 
 static bool any_above(const struct bound_job *job, const size_t from[3], const size_t to[3])
 {
     for (size_t k = from[2]; k < to[2]; k++)
         for (size_t j = from[1]; j < to[1]; j++) {
-            const float *row = job->blurred->density + volume_index(job->blurred->n, 0, j, k);
+            const float *row = job->blurred.density + volume_index(job->blurred.n, 0, j, k);
             int above = 0; /* no early exit, so that the loop over a row is vectorised */
             for (size_t i = from[0]; i < to[0]; i++) above |= row[i] >= job->least;
             if (above) return true;
@@ -21,22 +22,35 @@ static bool any_above(const struct bound_job *job, const size_t from[3], const s
     return false;
 }
 
-static void mark_layer(void *context, size_t layer, size_t i_thread)
+static void mark_row(void *context, size_t y, size_t i_thread)
 {
     (void)i_thread;
     const struct bound_job *job = context;
     struct line_bound *b = job->b;
-    scratch_keep_within(job->blurred->space);
-    for (size_t y = 0; y < b->n[1]; y++)
-        for (size_t x = 0; x < b->n[0]; x++) {
-            const size_t cell[3] = {x, y, layer};
-            size_t from[3], to[3];
-            for (int a = 0; a < 3; a++) {
-                from[a] = cell[a] * LINE_BOUND_CELL;
-                to[a] = from[a] + LINE_BOUND_CELL < job->blurred->n[a] ? from[a] + LINE_BOUND_CELL : job->blurred->n[a];
-            }
-            b->reaches[(layer * b->n[1] + y) * b->n[0] + x] = any_above(job, from, to);
+    scratch_keep_within(job->blurred.space);
+    for (size_t x = 0; x < b->n[0]; x++) {
+        const size_t cell[3] = {x, y, job->layer};
+        size_t from[3], to[3];
+        for (int a = 0; a < 3; a++) {
+            from[a] = cell[a] * LINE_BOUND_CELL;
+            to[a] = from[a] + LINE_BOUND_CELL < job->blurred.n[a] ? from[a] + LINE_BOUND_CELL : job->blurred.n[a];
         }
+        b->reaches[(job->layer * b->n[1] + y) * b->n[0] + x] = any_above(job, from, to);
+    }
+}
+
+/* Marks the cells whose L is at least `least` somewhere. */
+static status mark_cells(struct line_bound *b, struct line_blur *blur, float least, struct thread_pool *pool)
+{
+    struct bound_job job = {.b = b, .least = least};
+    status s = STATUS_OK;
+    for (job.layer = 0; job.layer < b->n[2] && s == STATUS_OK; job.layer++) {
+        const size_t from = job.layer * LINE_BOUND_CELL, n = line_blur_volume(blur).n[2];
+        s = line_blur_move(blur, from, from + LINE_BOUND_CELL < n ? from + LINE_BOUND_CELL : n, pool, NULL);
+        job.blurred = line_blur_volume(blur);
+        if (s == STATUS_OK) s = thread_pool_run(pool, b->n[1], mark_row, &job, NULL);
+    }
+    return s;
 }
 
 /* Sets a cell if one within `cells` of it along one axis is set. Applied along all three axes this dilates by a box. */
@@ -52,11 +66,12 @@ static void dilate(const struct line_bound *b, int axis, size_t cells, const boo
     }
 }
 
-status line_bound_init(struct line_bound *b, const struct volume *blurred, size_t reach, double least,
+status line_bound_init(struct line_bound *b, struct line_blur *blur, size_t reach, double least,
                        struct thread_pool *pool, struct error *err)
 {
     *b = (struct line_bound){0};
-    for (int a = 0; a < 3; a++) b->n[a] = (blurred->n[a] + LINE_BOUND_CELL - 1) / LINE_BOUND_CELL;
+    const struct volume blurred = line_blur_volume(blur);
+    for (int a = 0; a < 3; a++) b->n[a] = (blurred.n[a] + LINE_BOUND_CELL - 1) / LINE_BOUND_CELL;
     size_t n = b->n[0] * b->n[1] * b->n[2], cells = (reach + LINE_BOUND_CELL - 1) / LINE_BOUND_CELL;
     bool *other = malloc(n * sizeof *other);
     b->reaches = malloc(n * sizeof *b->reaches);
@@ -65,8 +80,8 @@ status line_bound_init(struct line_bound *b, const struct volume *blurred, size_
         line_bound_release(b);
         return error_set(err, STATUS_NO_MEMORY, "cannot filter directions: out of memory");
     }
-    struct bound_job job = {blurred, b, (float)(0.999 * least)}; /* the factor keeps rounding from excluding a voxel */
-    status s = thread_pool_run(pool, b->n[2], mark_layer, &job, NULL);
+    /* the factor keeps rounding from excluding a voxel */
+    status s = mark_cells(b, blur, (float)(0.999 * least), pool);
     for (int a = 0; a < 3; a++) {
         dilate(b, a, cells, b->reaches, other);
         bool *swap = b->reaches;

@@ -5,7 +5,7 @@
 #define SELVEDGE_GEOMETRY_LINE_BOUND_H
 
 #include "base/thread_pool.h"
-#include "geometry/volume/volume.h"
+#include "geometry/filter/line_blur.h"
 
 #include <stdbool.h>
 
@@ -16,9 +16,9 @@ struct line_bound {
     bool *reaches;
 };
 
-/* Sets a cell of `reaches` if L is at least `least` somewhere within `reach` voxels of it. STATUS_NO_MEMORY,
- * STATUS_CANCELLED. */
-status line_bound_init(struct line_bound *b, const struct volume *blurred, size_t reach, double least,
+/* Sets a cell of `reaches` if L is at least `least` somewhere within `reach` voxels of it. Moves `blur`.
+ * STATUS_NO_MEMORY, STATUS_CANCELLED. */
+status line_bound_init(struct line_bound *b, struct line_blur *blur, size_t reach, double least,
                        struct thread_pool *pool, struct error *err);
 void line_bound_release(struct line_bound *b);
 

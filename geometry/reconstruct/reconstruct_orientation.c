@@ -125,8 +125,8 @@ static status filter_rescaled(const struct volume *v, double edge, struct recons
     trace_grid_rescale_option(option, edge);
     if (edge < 1.0 && !is_thin_in_noise(report, edge)) filter_choose_thin(option, report->fiber_diameter_voxel / edge);
     if (s == STATUS_OK)
-        s = filter_directions(&grid, report->fiber_diameter_voxel / edge, option, pool, progress, &on_grid, report,
-                              err);
+        s = filter_directions_kept(&grid, report->fiber_diameter_voxel / edge, option, pool, progress, &on_grid, report,
+                                   err);
     trace_grid_rescale_option(option, 1.0 / edge);
     volume_release(&grid);
     if (s == STATUS_OK)

@@ -206,7 +206,7 @@ static status add_lines(const struct trace_job *job, const struct volume *left, 
     look.report = &report;
     look.diameter = THINNER * job->diameter;
     for (int i = 0; i < 3; i++) polyline_set_init(&part[i]);
-    status s = filter_directions(left, look.diameter, &option, job->pool, &look.inner, &d, &report, err);
+    status s = filter_directions_kept(left, look.diameter, &option, job->pool, &look.inner, &d, &report, err);
     const bool nothing = s == STATUS_INVALID; /* no voxel looks like a part of a fiber */
     if (nothing) s = STATUS_OK;
     if (s == STATUS_OK && !nothing) s = trace_chains(&look, &part[0], err);
