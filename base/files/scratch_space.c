@@ -29,6 +29,7 @@ struct scratch_space {
     pthread_mutex_t lock;
     struct array *array;
     size_t memory_bytes; /* of the arrays that are not in files */
+    size_t most_bytes;   /* of all arrays at one time */
     atomic_size_t file_bytes;
     atomic_bool dropping;
 };
@@ -156,6 +157,8 @@ status scratch_new(struct scratch_space *s, size_t n_bytes, const char *what, vo
         a->next = s->array;
         s->array = a;
         if (a->in_file) atomic_fetch_add(&s->file_bytes, n_bytes);
+        const size_t all = s->memory_bytes + atomic_load(&s->file_bytes);
+        if (all > s->most_bytes) s->most_bytes = all;
         *result = a->address;
     } else if (!a->in_file) {
         s->memory_bytes -= n_bytes;
@@ -215,6 +218,14 @@ void scratch_keep_within(struct scratch_space *s)
 size_t scratch_buffer_bytes(const struct scratch_space *s)
 {
     return s == NULL ? (size_t)256 << 20 : s->limit_bytes / 8;
+}
+
+size_t scratch_most_bytes(struct scratch_space *s)
+{
+    pthread_mutex_lock(&s->lock);
+    const size_t most = s->most_bytes;
+    pthread_mutex_unlock(&s->lock);
+    return most;
 }
 
 size_t scratch_file_bytes(struct scratch_space *s) { return s == NULL ? 0 : atomic_load(&s->file_bytes); }

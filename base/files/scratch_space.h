@@ -38,5 +38,7 @@ void scratch_keep_within(struct scratch_space *space);
 size_t scratch_buffer_bytes(const struct scratch_space *space);
 /* Returns the bytes of all arrays that are in files at present. */
 size_t scratch_file_bytes(struct scratch_space *space);
+/* Returns the most bytes that all arrays have had at one time, in memory and in files. */
+size_t scratch_most_bytes(struct scratch_space *space);
 
 #endif

@@ -259,13 +259,11 @@ size_t filter_rows_halo(const struct reconstruct_option *option, double diameter
 }
 
 static status prepare(struct orientation_job *o, const struct reconstruct_option *option, double diameter_voxel,
-                      size_t n_thread, struct error *err)
+                      struct thread_pool *pool, struct error *err)
 {
-    const size_t *n = o->v->n;
+    const size_t *n = o->v->n, n_thread = thread_pool_n_thread(pool);
     status s = direction_set_init(&o->fine, N_FINE, err);
     if (s == STATUS_OK) s = line_filter_new(&o->fine, option->h, n, &o->filter, err);
-    if (s != STATUS_OK) return s;
-    s = ridge_map_init(&o->ridges, n, (size_t)climb_of(diameter_voxel), o->v->space, err);
     if (s != STATUS_OK) return s;
     o->scratch_per_thread = line_filter_scratch(o->filter);
     o->scratch = calloc(n_thread, o->scratch_per_thread * sizeof *o->scratch);
@@ -282,7 +280,7 @@ static status prepare(struct orientation_job *o, const struct reconstruct_option
     for (ptrdiff_t c = 0, m = 0; c < 27; c++)
         if (c != 13)
             o->neighbour[m++] = c % 3 - 1 + (c / 3 % 3 - 1) * (ptrdiff_t)n[0] + (c / 9 - 1) * (ptrdiff_t)(n[0] * n[1]);
-    return STATUS_OK;
+    return ridge_map_init(&o->ridges, o->v, o->eps_d, (size_t)o->n_climb, pool, err);
 }
 
 static void release(struct orientation_job *o)
@@ -333,7 +331,7 @@ status filter_rows(const struct volume *v, const size_t *row, double diameter_vo
     *d = (struct direction_volume){0};
     if (row != NULL) o.begin = row[0];
     if (row != NULL) o.end = row[1];
-    status s = prepare(&o, option, diameter_voxel, thread_pool_n_thread(pool), err);
+    status s = prepare(&o, option, diameter_voxel, pool, err);
     const size_t most = o.look > (size_t)o.n_climb ? o.look : (size_t)o.n_climb;
     if (s == STATUS_OK) s = line_blur_new(v, option->s, option->t, o.slab + 2 * most, pool, &o.blur, err);
     if (s == STATUS_OK) /* the climb, half a line, and the taps of its interpolation */

@@ -26,14 +26,14 @@ static const int16_t *code_of(const struct ridge_assign *o, size_t at)
     return direction_volume_code(&o->ridges->direction, ridge_map_place(o->ridges, ridge));
 }
 
-/* Writes the directions of KEPT_TASK voxels. Densities are 0 at first. */
+/* Writes the directions of VOXEL_BITS_TASK voxels. Densities are 0 at first. */
 static void assign_task(void *context, size_t i_task, size_t i_thread)
 {
     (void)i_thread;
     const struct assign_job *o = context;
-    const size_t n = volume_n_voxel(o->d->n), from = i_task * KEPT_TASK;
+    const size_t n = volume_n_voxel(o->d->n), from = i_task * VOXEL_BITS_TASK;
     scratch_keep_within(o->d->space);
-    for (size_t at = from; at < n && at < from + KEPT_TASK; at++) {
+    for (size_t at = from; at < n && at < from + VOXEL_BITS_TASK; at++) {
         if (!is_kept(o->rule, at)) continue;
         const long byte = lrintf(255.0f * o->rule->v->density[at]);
         o->d->density[at] = (uint8_t)(byte < 1 ? 1 : byte > 255 ? 255 : byte);
@@ -46,11 +46,11 @@ static void mark_task(void *context, size_t i_task, size_t i_thread)
 {
     (void)i_thread;
     const struct assign_job *o = context;
-    uint64_t *kept = o->d->kept_only->kept;
-    const size_t n = volume_n_voxel(o->d->n), from = i_task * KEPT_TASK;
+    struct voxel_bits *kept = &o->d->kept_only->kept;
+    const size_t n = volume_n_voxel(o->d->n), from = i_task * VOXEL_BITS_TASK;
     scratch_keep_within(o->d->space);
-    for (size_t at = from; at < n && at < from + KEPT_TASK; at++)
-        if (is_kept(o->rule, at)) kept[at / KEPT_WORD] |= (uint64_t)1 << at % KEPT_WORD;
+    for (size_t at = from; at < n && at < from + VOXEL_BITS_TASK; at++)
+        if (is_kept(o->rule, at)) voxel_bits_add(kept, at);
 }
 
 /* Lists their directions. */
@@ -59,18 +59,18 @@ static void list_task(void *context, size_t i_task, size_t i_thread)
     (void)i_thread;
     const struct assign_job *o = context;
     struct kept_directions *k = o->d->kept_only;
-    const size_t n = volume_n_voxel(o->d->n), from = i_task * KEPT_TASK;
+    const size_t n = volume_n_voxel(o->d->n), from = i_task * VOXEL_BITS_TASK;
     scratch_keep_within(o->d->space);
-    for (size_t at = from; at < n && at < from + KEPT_TASK; at++)
-        if (kept_directions_has(k, at))
-            memcpy(k->octahedral + 2 * kept_directions_place(k, at), code_of(o->rule, at), 2 * sizeof *k->octahedral);
+    for (size_t at = from; at < n && at < from + VOXEL_BITS_TASK; at++)
+        if (voxel_bits_has(&k->kept, at))
+            memcpy(k->octahedral + 2 * voxel_bits_place(&k->kept, at), code_of(o->rule, at), 2 * sizeof *k->octahedral);
 }
 
 status ridge_assign_all(const struct ridge_assign *rule, bool kept_only, struct thread_pool *pool,
                         struct direction_volume *d, struct error *err)
 {
     const struct volume *v = rule->v;
-    const size_t n_task = (volume_n_voxel(v->n) + KEPT_TASK - 1) / KEPT_TASK;
+    const size_t n_task = (volume_n_voxel(v->n) + VOXEL_BITS_TASK - 1) / VOXEL_BITS_TASK;
     struct assign_job job = {rule, d};
     status s = kept_only ? direction_volume_init_kept(d, v->n, v->voxel_size_m, v->space, err)
                          : direction_volume_init_in(d, v->n, v->voxel_size_m, v->space, err);

@@ -130,7 +130,7 @@ void direction_volume_release(struct direction_volume *v)
 
 bool direction_volume_is_kept(const struct direction_volume *v, size_t i_voxel)
 {
-    return v->kept_only != NULL ? kept_directions_has(v->kept_only, i_voxel) : v->density[i_voxel] > 0;
+    return v->kept_only != NULL ? voxel_bits_has(&v->kept_only->kept, i_voxel) : v->density[i_voxel] > 0;
 }
 
 const int16_t *direction_volume_code(const struct direction_volume *v, size_t i_voxel)

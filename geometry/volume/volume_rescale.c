@@ -206,11 +206,11 @@ static void refine_task(void *context, size_t i_task, size_t i_thread)
     (void)i_thread;
     const struct direction_job *job = context;
     struct kept_directions *k = job->out->kept_only;
-    const size_t n_voxel = volume_n_voxel(job->v->n), from = i_task * KEPT_TASK;
+    const size_t n_voxel = volume_n_voxel(job->v->n), from = i_task * VOXEL_BITS_TASK;
     scratch_keep_within(job->v->space);
-    for (size_t at = from; at < n_voxel && at < from + KEPT_TASK; at++)
+    for (size_t at = from; at < n_voxel && at < from + VOXEL_BITS_TASK; at++)
         if (job->v->density[at] >= job->eps_d && job->from->density[kept_directions_holder(k, at)] > 0)
-            k->kept[at / KEPT_WORD] |= (uint64_t)1 << at % KEPT_WORD;
+            voxel_bits_add(&k->kept, at);
 }
 
 static status find_holders(const struct direction_job *job, struct kept_directions *k, struct error *err)
@@ -229,7 +229,7 @@ status direction_volume_refine(const struct direction_volume *from, const struct
                                struct thread_pool *pool, struct direction_volume *out, struct error *err)
 {
     struct direction_job job = {.from = from, .v = v, .out = out, .eps_d = (float)eps_d};
-    const size_t n_task = (volume_n_voxel(v->n) + KEPT_TASK - 1) / KEPT_TASK;
+    const size_t n_task = (volume_n_voxel(v->n) + VOXEL_BITS_TASK - 1) / VOXEL_BITS_TASK;
     status s = direction_volume_init_kept(out, v->n, v->voxel_size_m, v->space, err);
     if (s == STATUS_OK) s = find_holders(&job, out->kept_only, err);
     if (s == STATUS_OK) {
