@@ -19,8 +19,9 @@ enum { N_X = 48, N_Y = 56, N_Z = 72, N_ROW = 9, N_BUNDLE = N_ROW * N_ROW };
  * directions for all of its voxels. */
 static const double MOST_BYTES = 60.0;
 
-/* Bytes for each voxel of the scan. 174 were needed when the second look had a copy of the grid, and each copy had
- * directions for all of its voxels. */
+/* A bundle of parallel fibers of 4 voxels. Every third one is thinner, so that the second look has something to
+ * find. */
+static void make_bundle(struct volume *v, struct scratch_space *space)
 {
     const size_t n[3] = {N_X, N_Y, N_Z};
     struct test_cylinder c[N_BUNDLE];
