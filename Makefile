@@ -139,8 +139,8 @@ $(BUILD)/obj/%.cpp.o: %.cpp
 	@$(CXX) $(CXXFLAGS_ALL) -MMD -MP -c $< -o $@
 
 # inner loops of the geometry that round a product and a sum once, in one instruction; clang does so without being told
-FUSED := fibers/lines/segment_bricks fibers/axes/axis_brick fibers/axes/model/nearest_segment \
-         fibers/axes/axis_compare fibers/slices/blob_response filter/line_filter
+FUSED := fibers/lines/segment_bricks fibers/lines/segment_distances fibers/axes/axis_brick \
+         fibers/axes/model/nearest_segment fibers/axes/axis_compare fibers/slices/blob_response filter/line_filter
 $(FUSED:%=$(BUILD)/obj/geometry/%.c.o): CFLAGS_ALL += -ffp-contract=fast
 $(BUILD)/obj/renderer/scene/scene_grid_walk.c.o: CFLAGS_ALL += -ffp-contract=fast
 
