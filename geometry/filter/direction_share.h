@@ -1,6 +1,6 @@
 /* The directions of fibers (geometry/filter/filter_directions.h) by slabs over the ranks: each filters its rows of
  * the volume, with a halo of those that have an effect on them, and the root gathers the rows. A helper holds about
- * 18 bytes for each voxel of its slab with the halo meanwhile. */
+ * 12 bytes for each voxel of its slab with the halo meanwhile. */
 #ifndef SELVEDGE_GEOMETRY_DIRECTION_SHARE_H
 #define SELVEDGE_GEOMETRY_DIRECTION_SHARE_H
 

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_BATCH = 1 << 20 };                /* segments, of 128 bytes each */
+enum { MAX_BATCH = 1 << 16 };                /* segments, of 128 bytes each, and of 200 with sections */
 static const double SECTION_DIAMETERS = 1.0; /* length over which sections are smoothed */
 /* Standard deviation of the flatness of fibers (fiber_section.h) that holds sections to discs. */
 static const double FLATNESS_SD = 0.3;

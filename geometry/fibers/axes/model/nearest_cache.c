@@ -1,5 +1,6 @@
 #include "geometry/fibers/axes/model/nearest_cache.h"
 
+#include <malloc.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -20,6 +21,7 @@ void nearest_cache_release(struct nearest_cache *s)
     free(s->brick);
     s->brick = NULL;
     s->n_brick = 0;
+    malloc_trim(0); /* thousands of small blocks, which would stay with the process */
 }
 
 void nearest_cache_add(struct nearest_cache *s, size_t i_brick, const struct nearest_list *nearest, size_t n_segment)
