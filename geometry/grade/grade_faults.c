@@ -6,8 +6,11 @@
 
 /* Loss of score for each piece a fiber beyond the first. */
 static const double PIECE_LOSS = 0.05;
-/* Fibers in a line that holds several. */
-static const double LEAST_HELD = 4.0;
+/* Fibers in a line that holds several. Where the sections of all lines are uneven by more than the limit, and surely
+ * where by 1 / SURELY_UNEVEN more, all lines are taken for such. */
+static const double LEAST_HELD = 4.0, SURELY_UNEVEN = 10.0;
+/* Loss of precision for each share of the length in lines that may be particles: others are a little longer. */
+static const double PARTICLE_LOSS = 1.5;
 
 static bool explains(const struct scan_coverage *c)
 {
@@ -31,11 +34,12 @@ status scan_grade_explain(const struct coverage_input *in, struct thread_pool *p
     if (s != STATUS_OK) return s;
     fiber_likeness_measure(in->v, in->f, safe, &grade->likeness);
     const struct fiber_likeness *l = &grade->likeness;
-    /* lines whose sections are much too uneven hold several fibers each, so that hardly any fiber is found */
-    const double uneven = fmax(1.0, grade->section.surface / SECTION_MOST_MISFIT); /* 1 if it is NaN */
-    const double found = 1.0 / (1.0 + (LEAST_HELD - 1.0) * fmax(0.0, grade->section.several_share));
-    const double of_fibers = (1.0 - l->particle_share) * (1.0 - grade->double_share) * found / (uneven * uneven);
-    grade->score = fmin(grade->coverage.explained_share, of_fibers / (1.0 + PIECE_LOSS * (l->fragments - 1.0)));
+    /* fmax and fmin take NaN for no share of such lines */
+    const double all_uneven = fmin(1.0, SURELY_UNEVEN * fmax(0.0, grade->section.surface / SECTION_MOST_MISFIT - 1.0)),
+                 held = fmax(all_uneven, fmax(0.0, grade->section.several_share)),
+                 single = 1.0 / (1.0 + (LEAST_HELD - 1.0) * held),
+                 fibers = fmax(0.0, 1.0 - PARTICLE_LOSS * l->particle_share) * (1.0 - grade->double_share) * single;
+    grade->score = fmin(grade->coverage.fiber_share, fibers / (1.0 + PIECE_LOSS * (l->fragments - 1.0)));
     grade->faults = (explains(&grade->coverage) ? 0U : GRADE_UNEXPLAINED) |
                     (l->particle_share > GRADE_MOST_PARTICLES ? GRADE_PARTICLES : 0U) |
                     (grade->double_share > GRADE_MOST_DOUBLED ? GRADE_DOUBLED : 0U) |

@@ -63,7 +63,8 @@ struct reconstruct_report {
     double single_radius_se_m; /* typical standard error of the radius of one fiber */
     double axis_ratio;         /* mean ratio of the axes of the sections, and its standard deviation between fibers */
     double axis_ratio_spread;
-    /* Standard errors of the axes (axis_error.h): position and direction, one component. */
+    /* Standard errors of the axes, one component: position, and direction (axis_error.h). After tracing that of the
+     * position is axis_noise_se_m; reconstruct_grade adds what the contact of blurred fibers does. */
     double axis_position_se_m, axis_direction_se_rad;
     struct fiber_kinds kinds;      /* set by reconstruct_grade */
     bool radius_per_axis;          /* each class has a radius of its own */
@@ -73,6 +74,7 @@ struct reconstruct_report {
     double direction_noise_deg[2]; /* before and after the transfer (direction_noise.h) */
     double direction_change_mean_deg; /* between filtered and transferred directions */
     double axis_share[3];             /* of the voxels with a direction: those that run most along x, y, z */
+    double axis_noise_se_m;           /* standard error of the axes' position by noise and model (axis_error.h) */
 };
 
 #endif

@@ -1,6 +1,7 @@
 #include "geometry/grade/scan_coverage.h"
 
 #include "geometry/grade/coverage_means.h"
+#include "geometry/volume/voxel_runs.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -8,6 +9,10 @@
 
 /* Standard deviations of the means that noise may reach. */
 static const double NOISE_SD = 5.0;
+
+/* Particles, in contrast to pieces of fibers: share of their ball that they fill, which a cylinder of more than four
+ * diameters does not, and largest radius of that ball in fiber diameters. */
+static const double PARTICLE_FILL = 0.17, PARTICLE_RADIUS = 2.5;
 
 /* Counts of one slice. */
 struct slice_count {
@@ -19,7 +24,8 @@ struct coverage_job {
     struct coverage_means means;
     struct coverage_background background;
     double least;
-    uint8_t *unexplained; /* NULL: not wanted */
+    size_t margin[3];     /* voxels at the faces that do not count */
+    uint8_t *unexplained; /* a mark for each voxel */
     struct slice_count *slice;
     uint32_t *by_row, *by_column; /* unexplained voxels of each slice and row, and of each slice and column */
 };
@@ -52,15 +58,35 @@ static uint8_t *kinds_of(const struct volume *v, const struct fiber_set *f)
 
 /* ---- counting ---- */
 
+/* Fibers whose axes lie beyond a face reach half a diameter into the scan, and means one reach farther. At most a
+ * quarter of a thin scan. */
+static void set_margin(struct coverage_job *j, double diameter_voxel)
+{
+    for (int a = 0; a < 3; a++) {
+        const size_t quarter = j->means.v->n[a] / 4, wide = (size_t)(0.5 * diameter_voxel + 0.5) + j->means.reach;
+        j->margin[a] = wide < quarter ? wide : quarter;
+    }
+}
+
+static bool is_near_face(const struct coverage_job *j, size_t i, size_t row, size_t k)
+{
+    const size_t at[3] = {i, row, k};
+    for (int a = 0; a < 3; a++)
+        if (at[a] < j->margin[a] || at[a] + j->margin[a] >= j->means.v->n[a]) return true;
+    return false;
+}
+
 static void count_voxel(struct coverage_job *j, size_t i, size_t row, size_t k, float mean)
 {
     const size_t *n = j->means.v->n, at = (k * n[1] + row) * n[0] + i;
     const uint8_t code = j->means.code[at];
     struct slice_count *s = &j->slice[k];
+    j->unexplained[at] = 0;
+    if (is_near_face(j, i, row, k)) return;
     if (code < LINE_KINDS) s->inside[code]++;
     const double above = (double)mean - coverage_background_at(&j->background, i, row);
     const bool is_unexplained = !isnan(mean) && above > j->least;
-    if (j->unexplained != NULL) j->unexplained[at] = is_unexplained;
+    j->unexplained[at] = is_unexplained;
     if (!is_unexplained) return;
     s->unexplained[above < COVERAGE_DENSE ? COVERAGE_LIGHT_KIND : COVERAGE_DENSE_KIND]++;
     s->density += above;
@@ -123,9 +149,28 @@ static void sum_slices(const struct coverage_job *j, struct scan_coverage *c)
     find_slices(j, c);
 }
 
+static status count_particles(struct coverage_job *j, double diameter_voxel, struct scan_coverage *c, struct error *err)
+{
+    double explained = 0.0, unexplained = 0.0;
+    size_t particles = 0;
+    for (size_t k = 0; k < j->means.v->n[2]; k++)
+        for (int kind = 0; kind < COVERAGE_KINDS; kind++) {
+            explained += (double)j->slice[k].inside[kind];
+            unexplained += (double)j->slice[k].unexplained[kind];
+        }
+    if (!(explained + unexplained > 0.0)) return STATUS_OK;
+    status s = unexplained > 0.0 ? voxel_marks_count_compact(j->means.v->n, j->unexplained, PARTICLE_FILL,
+                                                             PARTICLE_RADIUS * diameter_voxel, &particles, err)
+                                 : STATUS_OK;
+    c->particle_share = (double)particles / (explained + unexplained);
+    c->fiber_share = explained / (explained + unexplained - (double)particles);
+    return s;
+}
+
 /* ---- the order of the steps ---- */
 
-static status count(struct coverage_job *j, struct thread_pool *pool, struct scan_coverage *c, struct error *err)
+static status count(struct coverage_job *j, double diameter_voxel, struct thread_pool *pool, struct scan_coverage *c,
+                    struct error *err)
 {
     const size_t *n = j->means.v->n;
     status s = coverage_background_measure(&j->means, pool, &j->background, err);
@@ -140,27 +185,38 @@ static status count(struct coverage_job *j, struct thread_pool *pool, struct sca
     s = thread_pool_run(pool, n[2], count_slice, j, NULL);
     if (s != STATUS_OK) return error_set(err, s, "grading the scan was cancelled");
     sum_slices(j, c);
-    return STATUS_OK;
+    return count_particles(j, diameter_voxel, c, err);
 }
 
 status scan_coverage_measure(const struct coverage_input *in, struct thread_pool *pool, uint8_t *unexplained,
                              struct scan_coverage *c, struct error *err)
 {
     struct coverage_job j = {.unexplained = unexplained};
-    void *code = NULL;
-    *c = (struct scan_coverage){.explained_share = NAN, .unexplained_density = NAN, .least_density = NAN};
+    const size_t n_voxel = volume_n_voxel(in->v->n);
+    void *code = NULL, *mark = NULL;
+    *c = (struct scan_coverage){.explained_share = NAN,
+                                .fiber_share = NAN,
+                                .particle_share = NAN,
+                                .unexplained_density = NAN,
+                                .least_density = NAN};
     uint8_t *kind = kinds_of(in->v, in->f);
-    status s = kind != NULL ? scratch_new(in->v->space, volume_n_voxel(in->v->n), "distances from fibers", &code, err)
+    status s = kind != NULL ? scratch_new(in->v->space, n_voxel, "distances from fibers", &code, err)
                             : error_set(err, STATUS_NO_MEMORY, "cannot grade the scan: out of memory");
+    if (s == STATUS_OK && unexplained == NULL) {
+        s = scratch_new(in->v->space, n_voxel, "unexplained voxels", &mark, err);
+        j.unexplained = mark;
+    }
     if (s == STATUS_OK) s = line_distance_map(in->v, in->f, kind, pool, code, err);
     if (s == STATUS_OK) s = coverage_means_init(&j.means, in, code, pool, err);
-    if (s == STATUS_OK) s = count(&j, pool, c, err);
+    if (s == STATUS_OK) set_margin(&j, in->diameter_voxel);
+    if (s == STATUS_OK) s = count(&j, in->diameter_voxel, pool, c, err);
     coverage_means_release(&j.means);
     coverage_background_release(&j.background);
     free(j.slice);
     free(j.by_row);
     free(j.by_column);
     scratch_release(in->v->space, code);
+    scratch_release(in->v->space, mark);
     free(kind);
     return s;
 }

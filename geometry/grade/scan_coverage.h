@@ -1,10 +1,11 @@
 /* How much of the material of a scan the traced fibers explain.
  *
  * A voxel is unexplained if it lies at least COVERAGE_APART_VOXEL beyond the surface of every fiber and the densities
- * around it, without those nearer to fibers, exceed the local background. The means are over cubes of an edge of about
- * 0.7 fiber diameters, less the blurred rims of the fibers. Background and noise of these means come from the void of
- * the scan, in blocks of its columns, so that a signal that varies over the scan (cupping, rims of truncated scans) is
- * no material. */
+ * around it, without those nearer to fibers, exceed the local background. Voxels near the faces of the scan do not
+ * count: fibers whose axes lie beyond a face reach half a diameter into the scan. The means are over cubes of an edge
+ * of about 0.7 fiber diameters, less the blurred rims of the fibers. Background and noise of these means come from the
+ * void of the scan, in blocks of its columns, so that a signal that varies over the scan (cupping, rims of truncated
+ * scans) is no material. */
 #ifndef SELVEDGE_GEOMETRY_SCAN_COVERAGE_H
 #define SELVEDGE_GEOMETRY_SCAN_COVERAGE_H
 
@@ -20,6 +21,9 @@ enum { COVERAGE_DENSE_KIND, COVERAGE_LIGHT_KIND, COVERAGE_KINDS };
 
 struct scan_coverage {
     double explained_share; /* voxels in fibers, over these and the unexplained ones; NaN: not measured */
+    /* Share of the unexplained voxels of compact sets in all material, and the share that is explained without them:
+     * particles are no fibers that were missed. */
+    double particle_share, fiber_share;
     /* The same of dense and of light material; NaN where there is none. share: of all material. */
     struct {
         double share, explained_share;

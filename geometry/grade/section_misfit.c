@@ -5,11 +5,15 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
+#include <string.h>
 
-/* N_AROUND: places around an axis. N_POINT, N_DEEP_POINT: points of a window, a quarter of a diameter apart; fibers
- * turn around each other in a yarn, so that its inside looks even in long windows. LEAST_WINDOWS: of a line that is
- * judged by itself. */
-enum { N_AROUND = 12, N_POINT = 8, N_DEEP_POINT = 4, LEAST_WINDOWS = 4 };
+/* N_AROUND: places around an axis. N_POINT: points of a window, a quarter of a diameter apart. N_PRODUCT: products of
+ * two sections each in a window inside of a fiber; MOST_APART: largest distance of the two, in points. LEAST_WINDOWS:
+ * of a line that is judged by itself. */
+enum { N_AROUND = 12, N_POINT = 8, N_PRODUCT = 4, MOST_APART = 4, LEAST_WINDOWS = 4 };
+/* Least distance of two sections that are multiplied, in voxels: scanners' noise is correlated over less. It is not
+ * larger, because fibers turn around each other in a yarn. */
+static const double LEAST_APART_VOXEL = 3.2;
 /* Distance from the axis of places just within the surface, in radii. */
 static const double RING = 0.95;
 /* Depth below the surface, in blurs, at which single fibers are solid whatever is beside them, and the least distance
@@ -121,20 +125,26 @@ static void leave_deviation(double x[N_AROUND])
         x[k] -= mean + c * cos(2.0 * M_PI * k / N_AROUND) + s * sin(2.0 * M_PI * k / N_AROUND);
 }
 
-/* Adds a window of n_point points, the first of which is `first`. vertex: the one nearest to the last point so far. */
-static void add_window(const struct misfit_job *j, size_t first, size_t n_point, double depth, struct section *s,
-                       size_t *vertex, struct deviation_sum *sum)
+/* Moves to a point of the same fiber. vertex: the one nearest to the last point so far. Returns the density there. */
+static double move_to(const struct misfit_job *j, size_t point, struct section *s, size_t *vertex)
+{
+    double x[3];
+    s->at = &j->points.point[point];
+    turn_frame(s->at->t, s->e, s->o);
+    if (j->f->shape != NULL) s->shape = &j->f->shape[ *vertex = nearest_vertex(j, s->at->fiber, s->at, *vertex)];
+    for (int a = 0; a < 3; a++) x[a] = (double)s->at->p[a];
+    return grade_density_at(j->v, x);
+}
+
+/* Adds a window within the surface, the first point of which is `first`: every second section times those between. */
+static void add_window(const struct misfit_job *j, size_t first, struct section *s, size_t *vertex,
+                       struct deviation_sum *sum)
 {
     double ring[2][2][N_AROUND] = {{{0.0}}}, level = 0.0;
-    const double n = (double)n_point;
-    for (size_t k = 0; k < n_point; k++) {
-        double x[3];
-        s->at = &j->points.point[first + k];
-        turn_frame(s->at->t, s->e, s->o);
-        if (j->f->shape != NULL) s->shape = &j->f->shape[ *vertex = nearest_vertex(j, s->at->fiber, s->at, *vertex)];
-        for (int of_shape = 0; of_shape < 2; of_shape++) add_ring(j->v, s, of_shape != 0, depth, ring[of_shape][k & 1]);
-        for (int a = 0; a < 3; a++) x[a] = (double)s->at->p[a];
-        level += grade_density_at(j->v, x) / n;
+    const double n = N_POINT;
+    for (size_t k = 0; k < N_POINT; k++) {
+        level += move_to(j, first + k, s, vertex) / n;
+        for (int of_shape = 0; of_shape < 2; of_shape++) add_ring(j->v, s, of_shape != 0, 0.0, ring[of_shape][k & 1]);
     }
     for (int of_shape = 0; of_shape < 2; of_shape++) {
         double(*half)[N_AROUND] = ring[of_shape], product = 0.0;
@@ -149,14 +159,46 @@ static void add_window(const struct misfit_job *j, size_t first, size_t n_point,
 }
 
 /* Adds the windows of a fiber. */
-static void add_fiber(const struct misfit_job *j, size_t i_fiber, size_t n_point, double depth,
-                      struct deviation_sum *sum)
+static void add_surface(const struct misfit_job *j, size_t i_fiber, struct deviation_sum *sum)
 {
     struct section s = {.radius = j->points.radius[i_fiber]};
     const size_t end = j->points.first[i_fiber + 1];
     size_t vertex = j->f->first_vertex[i_fiber];
-    for (size_t first = j->points.first[i_fiber]; first + n_point <= end; first += n_point)
-        add_window(j, first, n_point, depth, &s, &vertex, sum);
+    for (size_t first = j->points.first[i_fiber]; first + N_POINT <= end; first += N_POINT)
+        add_window(j, first, &s, &vertex, sum);
+}
+
+/* The same inside of the fiber: each section times one that is some points before it. */
+static void add_inside(const struct misfit_job *j, size_t i_fiber, struct deviation_sum *sum)
+{
+    struct section s = {.radius = j->points.radius[i_fiber]};
+    const size_t first = j->points.first[i_fiber], end = j->points.first[i_fiber + 1],
+                 apart = (size_t)fmin(MOST_APART, ceil(LEAST_APART_VOXEL / (0.5 * s.radius)));
+    double ring[MOST_APART + 1][2][N_AROUND], product[2] = {0.0}, level = 0.0;
+    size_t vertex = j->f->first_vertex[i_fiber], n = 0;
+    for (size_t i = first; i < end; i++) {
+        double(*now)[N_AROUND] = ring[(i - first) % (apart + 1)];
+        memset(now, 0, sizeof ring[0]);
+        const double density = move_to(j, i, &s, &vertex);
+        for (int of_shape = 0; of_shape < 2; of_shape++) {
+            add_ring(j->v, &s, of_shape != 0, j->depth, now[of_shape]);
+            leave_deviation(now[of_shape]);
+        }
+        if (i - first < apart) continue;
+        double(*before)[N_AROUND] = ring[(i - first - apart) % (apart + 1)];
+        for (int k = 0; k < 2 * N_AROUND; k++)
+            product[k / N_AROUND] += now[k / N_AROUND][k % N_AROUND] * before[k / N_AROUND][k % N_AROUND] / N_AROUND;
+        level += density;
+        if (++n < N_PRODUCT) continue;
+        for (int k = 0; k < 2; k++) {
+            sum->product[k] += product[k] / N_PRODUCT;
+            sum->square[k] += product[k] * product[k] / (N_PRODUCT * N_PRODUCT);
+        }
+        sum->level += level * level / (N_PRODUCT * N_PRODUCT);
+        sum->n++;
+        product[0] = product[1] = level = 0.0;
+        n = 0;
+    }
 }
 
 static void misfit_of_fiber(void *context, size_t i_fiber, size_t i_thread)
@@ -165,8 +207,8 @@ static void misfit_of_fiber(void *context, size_t i_fiber, size_t i_thread)
     struct misfit_sum *sum = &j->of_fiber[i_fiber];
     (void)i_thread;
     scratch_keep_within(j->v->space);
-    add_fiber(j, i_fiber, N_POINT, 0.0, &sum->surface);
-    add_fiber(j, i_fiber, N_DEEP_POINT, j->depth, &sum->inside);
+    add_surface(j, i_fiber, &sum->surface);
+    add_inside(j, i_fiber, &sum->inside);
     sum->length = 0.5 * j->points.radius[i_fiber] * (double)(j->points.first[i_fiber + 1] - j->points.first[i_fiber]);
 }
 

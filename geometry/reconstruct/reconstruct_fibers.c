@@ -39,10 +39,10 @@ static double mean_radius(const struct polyline_set *lines)
  * off by half as much even where both agree. se_voxel: by noise. Hollow fibers have only the radii by the edges. */
 static double shared_error(const struct trace_job *job, double mean_voxel, double se_voxel)
 {
-    static const double DENSITY_ERROR = 0.02;
+    static const double DENSITY_ERROR = 0.02, CALIBRATED = 0.8;
     const double edges_voxel = job->report->profile_radius_m / job->v->voxel_size_m[0],
                  by_model = job->report->lumens_measured ? 0.0 : mean_voxel - edges_voxel;
-    return hypot(hypot(se_voxel, by_model), 0.5 * DENSITY_ERROR * mean_voxel);
+    return CALIBRATED * hypot(hypot(se_voxel, by_model), 0.5 * DENSITY_ERROR * mean_voxel);
 }
 
 /* Adds the shared errors to those by noise: of the classes, of single fibers, and along them. */

@@ -117,7 +117,7 @@ void trace_state_profile(const struct trace_job *job, const struct axis_profile 
 {
     struct reconstruct_report *r = job->report;
     const double voxel_m = job->v->voxel_size_m[0];
-    r->axis_position_se_m = profile->position_se * voxel_m;
+    r->axis_noise_se_m = r->axis_position_se_m = profile->position_se * voxel_m;
     r->axis_direction_se_rad = profile->direction_se_rad;
     r->profile_radius_m = profile->radius * voxel_m;
     r->profile_blur_m = profile->blur * voxel_m;

@@ -1,5 +1,6 @@
 #include "geometry/volume/voxel_runs.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -81,6 +82,53 @@ status voxel_marks_drop_small(const size_t n[3], size_t least, uint8_t *mark, st
     free(parent);
     free(size);
     return fits ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot look for light material: out of memory");
+}
+
+/* Sums over the voxels of a connected set: number, places, and squares of these. */
+struct set_sum {
+    double n, place[3], square;
+};
+
+static void add_run(struct set_sum *s, const size_t n[3], const struct volume_run *run)
+{
+    const double count = (double)(run->end - run->first), x = (double)(run->first % n[0]) + 0.5 * (count - 1.0),
+                 y = (double)(run->first / n[0] % n[1]), z = (double)(run->first / (n[0] * n[1]));
+    s->n += count;
+    s->place[0] += count * x;
+    s->place[1] += count * y;
+    s->place[2] += count * z;
+    s->square += count * (x * x + y * y + z * z + (count * count - 1.0) / 12.0);
+}
+
+static bool is_compact(const struct set_sum *s, double least_fill, double most_radius)
+{
+    double spread = s->square / s->n + 0.25; /* of the cubes of three voxel edges: 3 / 12 */
+    for (int a = 0; a < 3; a++) spread -= s->place[a] * s->place[a] / (s->n * s->n);
+    const double radius = sqrt(5.0 / 3.0 * spread);
+    return radius <= most_radius && s->n >= least_fill * 4.0 / 3.0 * M_PI * radius * radius * radius;
+}
+
+status voxel_marks_count_compact(const size_t n[3], const uint8_t *mark, double least_fill, double most_radius,
+                                 size_t *count, struct error *err)
+{
+    const size_t n_run = voxel_runs_of(n, mark, NULL);
+    struct volume_run *run = malloc((n_run + 1) * sizeof *run);
+    size_t *parent = malloc((n_run + 1) * sizeof *parent);
+    struct set_sum *sum = calloc(n_run + 1, sizeof *sum);
+    const bool fits = run != NULL && parent != NULL && sum != NULL;
+    *count = 0;
+    if (fits) {
+        voxel_runs_of(n, mark, run);
+        for (size_t i = 0; i < n_run; i++) parent[i] = i;
+        join_neighbours(n, run, n_run, parent);
+        for (size_t i = 0; i < n_run; i++) add_run(&sum[root_of(parent, i)], n, &run[i]);
+        for (size_t i = 0; i < n_run; i++)
+            if (parent[i] == i && is_compact(&sum[i], least_fill, most_radius)) *count += (size_t)sum[i].n;
+    }
+    free(run);
+    free(parent);
+    free(sum);
+    return fits ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot look for particles: out of memory");
 }
 
 /* ---- distances ---- */

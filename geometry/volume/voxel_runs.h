@@ -14,6 +14,12 @@ bool voxel_runs_hold(const struct volume_run *run, size_t n_run, size_t voxel);
 /* Sets the marks of all voxels to 0 that belong to a set of marked voxels, connected by their faces, of less than
  * `least` voxels. STATUS_NO_MEMORY. */
 status voxel_marks_drop_small(const size_t n[3], size_t least, uint8_t *mark, struct error *err);
+/* Counts the marked voxels of sets, connected by their faces, that are compact: of their ball of the same spread (RMS
+ * distance of the voxels from their middle) they fill at least the share `least_fill`, and its radius is at most
+ * `most_radius` voxels. A ball fills 1, two balls that touch 0.46, and a cylinder of 2, 3, 4, 5 or 10 diameters 0.56,
+ * 0.32, 0.20, 0.13 or 0.04. STATUS_NO_MEMORY. */
+status voxel_marks_count_compact(const size_t n[3], const uint8_t *mark, double least_fill, double most_radius,
+                                 size_t *count, struct error *err);
 /* Writes the squared distance of each voxel from the nearest one whose mark has one of `bits` into `square`: exact
  * below (reach + 1)^2, and at least that elsewhere. reach: at most 6 voxels. work: a byte for each voxel, changed too.
  * STATUS_CANCELLED. */

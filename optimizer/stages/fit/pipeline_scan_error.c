@@ -152,7 +152,7 @@ status pipeline_scan_error_carry(const struct fit_input *in, size_t i_model, con
     if (!pipeline_scan_error_applies(in->job, in->made, i_model)) return STATUS_OK;
     const double direction = g->axis_direction_se_rad,
                  sd[N_NUMBER] = {made_cloth_radius_error(in->job, in->made), noise_sd};
-    struct scan_trace t = {.in = in, .i_model = i_model, .noise = {g->axis_position_se_m / direction, direction}};
+    struct scan_trace t = {.in = in, .i_model = i_model, .noise = {g->axis_noise_se_m / direction, direction}};
     struct pipeline_joint *j = malloc(sizeof *j);
     struct fit_result *joint = malloc(sizeof *joint);
     t.configuration = trace_configurations(&in->job->rows->row);

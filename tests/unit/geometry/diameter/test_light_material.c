@@ -207,12 +207,36 @@ static void test_marks_far_and_small(void **state)
     for (size_t i = 0; i < sizeof mark; i++) assert_int_equal(mark[i], i == at || i == at + N || i == at + N + N * N);
 }
 
+/* A ball, a cylinder of five diameters, and a ball that is too large. */
+static void test_compact_sets_are_counted(void **state)
+{
+    (void)state;
+    enum { X = 64, Y = 40, Z = 40 };
+    static const size_t n[3] = {X, Y, Z};
+    static uint8_t mark[X * Y * Z];
+    size_t count = 0, n_ball = 0;
+    for (size_t i = 0; i < sizeof mark; i++) {
+        const double x = (double)(i % X), y = (double)(i / X % Y), z = (double)(i / (X * Y));
+        const bool ball = hypot(hypot(x - 8.0, y - 8.0), z - 8.0) < 4.0,
+                   large = hypot(hypot(x - 50.0, y - 26.0), z - 26.0) < 9.0,
+                   cylinder = hypot(y - 30.0, z - 8.0) < 3.0 && x > 2.0 && x < 33.0;
+        mark[i] = ball || large || cylinder;
+        n_ball += ball;
+    }
+    assert_int_equal(voxel_marks_count_compact(n, mark, 0.17, 6.0, &count, NULL), STATUS_OK);
+    assert_int_equal(count, n_ball);
+    assert_int_equal(voxel_marks_count_compact(n, mark, 0.1, 20.0, &count, NULL), STATUS_OK);
+    size_t n_all = 0;
+    for (size_t i = 0; i < sizeof mark; i++) n_all += mark[i];
+    assert_int_equal(count, n_all);
+}
+
 int main(void)
 {
     const struct CMUnitTest test[] = {
         cmocka_unit_test(test_light_fibers_become_dense), cmocka_unit_test(test_value_of_dense_fibers_is_found),
         cmocka_unit_test(test_one_material_stays),        cmocka_unit_test(test_fibers_are_sorted_into_kinds),
-        cmocka_unit_test(test_marks_far_and_small),
+        cmocka_unit_test(test_marks_far_and_small),       cmocka_unit_test(test_compact_sets_are_counted),
     };
     return cmocka_run_group_tests(test, NULL, NULL);
 }

@@ -3,6 +3,7 @@
 #include "base/rng.h"
 #include "geometry/grade/scan_grade.h"
 #include "geometry/phantom/phantom.h"
+#include "geometry/reconstruct/reconstruct.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -140,6 +141,7 @@ static void test_a_missing_fiber(void **state)
         n_there += unexplained[i] != 0 && hypot(x, z) < radius + 2.5;
     }
     assert_true(dense.faults == GRADE_UNEXPLAINED && light.faults == GRADE_UNEXPLAINED);
+    assert_true(dense.coverage.particle_share == 0.0 && dense.score < 0.85 && light.score < 0.9);
     assert_true(fabs(1.0 - light.coverage.explained_share - true_share) < 0.05);
     assert_true(1.0 - dense.coverage.explained_share > true_share);
     assert_true(light.coverage.kind[COVERAGE_LIGHT_KIND].explained_share < 0.05);
@@ -288,6 +290,55 @@ static void test_a_yarn_among_thick_fibers(void **state)
     volume_release(&v);
 }
 
+/* Balls without a line are material, but no fibers that were missed; nor is a fiber with its axis beyond a face. */
+static void test_particles_are_no_missing_fibers(void **state)
+{
+    (void)state;
+    static const double ball_from[3][3] = {{20, 30, 30}, {36, 30, 30}, {52, 30, 30}};
+    static const double ball_to[3][3] = {{23, 30, 30}, {39, 30, 30}, {55, 30, 30}};
+    static const double edge_from[1][3] = {{0, 30, -1}}, edge_to[1][3] = {{72, 30, -1}};
+    struct fiber_set f = four(), balls = lines_of(3, ball_from, ball_to), edge = lines_of(1, edge_from, edge_to);
+    struct volume v = empty_scan(), grazed = empty_scan();
+    add_scan(&v, &f, 1.0f);
+    add_scan(&v, &balls, 1.0f);
+    add_noise(&v);
+    struct scan_grade g = grade_of(&v, &f, NULL);
+    assert_true(g.coverage.explained_share < 0.93 && (g.faults & GRADE_UNEXPLAINED));
+    assert_true(g.coverage.particle_share > 0.05 && g.coverage.fiber_share > 0.99 && g.score > 0.97);
+    add_scan(&grazed, &f, 1.0f);
+    add_scan(&grazed, &edge, 1.0f);
+    add_noise(&grazed);
+    g = grade_of(&grazed, &f, NULL);
+    assert_true(g.faults == 0 && g.coverage.explained_share > 0.99);
+    fiber_set_release(&f);
+    fiber_set_release(&balls);
+    fiber_set_release(&edge);
+    volume_release(&v);
+    volume_release(&grazed);
+}
+
+/* The stated error of positions: where fibers touch, blur adds to it, once however often a scan is graded. */
+static void test_contact_adds_to_the_error_of_positions(void **state)
+{
+    (void)state;
+    static const double from[2][3] = {{0, 26.5, 30}, {0, 33.5, 30}}, to[2][3] = {{72, 26.5, 30}, {72, 33.5, 30}};
+    struct fiber_set apart = four(), touching = lines_of(2, from, to);
+    struct reconstruct_report r = {.fiber_diameter_voxel = 7.0, .axis_noise_se_m = 0.1 * voxel_m};
+    struct volume v = empty_scan();
+    add_scan(&v, &touching, 1.0f);
+    r.profile_blur_m = 1.4 * voxel_m;
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(reconstruct_grade(&v, &touching, NULL, &r, NULL, NULL), STATUS_OK);
+        assert_true(r.grade.beside_share > 0.99);
+        assert_true(fabs(r.axis_position_se_m / voxel_m - hypot(0.085, 1.4 * 1.4 / 7.0)) < 0.01);
+    }
+    assert_int_equal(reconstruct_grade(&v, &apart, NULL, &r, NULL, NULL), STATUS_OK);
+    assert_true(fabs(r.axis_position_se_m / voxel_m - 0.085) < 1e-6);
+    fiber_set_release(&apart);
+    fiber_set_release(&touching);
+    volume_release(&v);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -296,8 +347,10 @@ int main(void)
         cmocka_unit_test(test_a_light_fiber),
         cmocka_unit_test(test_a_background_that_varies),
         cmocka_unit_test(test_particles_doubles_and_pieces),
+        cmocka_unit_test(test_particles_are_no_missing_fibers),
         cmocka_unit_test(test_a_yarn_is_no_fiber),
         cmocka_unit_test(test_a_yarn_among_thick_fibers),
+        cmocka_unit_test(test_contact_adds_to_the_error_of_positions),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
