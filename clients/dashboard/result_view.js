@@ -85,16 +85,21 @@ export function radiusSearch(job) {
   return { value: r.radius_um, se: r.standard_error_um, start: r.start_um, flags, curve };
 }
 
-// Returns all configurations: [{name, held, angles, measured, rendered, measuredPicture, renderedPicture, measuredLinear, renderedLinear, error, errorSe}],
-// Linear: the OpenEXR files of the pictures; error: the relative error of the row
+// Returns all configurations: [{name, sphere, held, angles, measured, rendered, measuredPicture, renderedPicture, measuredLinear, renderedLinear, error, errorSe}],
+// Linear: the OpenEXR files of the pictures; error: the relative error of the row; sphere: the rendering is of a sphere
 export function configurations(job, urls) {
   return (job.result?.rows ?? []).map((c) => {
     return {
-      name: c.name, held: c.set === "held-out", angles: c, measured: c.measured, rendered: c.rendered, error: c.rel_error ?? null, errorSe: c.rel_error_se,
+      name: c.name, sphere: c.rendering_shows === "sphere", held: c.set === "held-out", angles: c, measured: c.measured, rendered: c.rendered, error: c.rel_error ?? null, errorSe: c.rel_error_se,
       measuredPicture: urls.get(c.photograph_png) ?? null, renderedPicture: urls.get(c.rendering_png) ?? null,
       measuredLinear: urls.get(c.photograph_png?.replace(/\.png$/, ".exr")) ?? null, renderedLinear: urls.get(c.rendering_exr) ?? null,
     };
   });
+}
+
+// Returns the rendered lobes of a table: [{row: name, angles: degrees of the camera, rgb: [[r, g, b], ...]}]
+export function lobesOf(job) {
+  return (job.result?.lobes ?? []).map((l) => ({ row: l.row, angles: l.camera_theta_deg, rgb: l.rendered }));
 }
 
 // Photographs and renderings among the files of a job that has no result yet: [{name, photograph, rendering}], addresses

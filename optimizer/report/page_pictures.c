@@ -169,11 +169,11 @@ status page_pictures(const struct report *report, const json_t *rows, FILE *out,
 {
     size_t n = json_array_size(rows), n_shown = n < MAX_ROWS ? n : MAX_ROWS;
     status s = STATUS_OK;
-    fprintf(out, "<p>%s Each row has an exposure of its own. %zu of %zu rows.</p>\n<div class=\"pictures\">\n",
-            report->in.photographs->n_photograph > 0
-                ? "Photograph, rendering, and their difference about grey, which is amplified."
-                : "Renderings; the measurements are a table and have no pictures.",
-            n_shown, n);
+    fprintf(
+        out,
+        "<p>Photograph, rendering, and their difference about grey, which is amplified. Each row has an exposure of "
+        "its own. %zu of %zu rows.</p>\n<div class=\"pictures\">\n",
+        n_shown, n);
     for (size_t i = 0; i < n_shown && s == STATUS_OK; i++) s = put_figure(report, i, json_array_get(rows, i), out, err);
     fputs("</div>\n", out);
     return s;

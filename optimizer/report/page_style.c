@@ -27,7 +27,8 @@ static const char text[] =
     "tr.held td { color: var(--held); } .flag { color: var(--flag); } .hint { color: var(--soft); }\n"
     ".charts, .pictures { display: flex; flex-wrap: wrap; gap: 14px; } figure { margin: 0; min-width: 10em; "
     "break-inside: avoid; } .pictures img { width: 104px; height: 104px; image-rendering: pixelated; margin-right: "
-    "3px; } .surfaces img { width: auto; height: auto; max-width: 100%; } figcaption { font-size: .85em; margin-top: "
+    "3px; } .lobes img { width: 128px; height: 128px; image-rendering: auto; vertical-align: bottom; } "
+    ".surfaces img { width: auto; height: auto; max-width: 100%; } figcaption { font-size: .85em; margin-top: "
     ".3em; color: "
     "var(--soft); } .pictures figcaption { width: 0; min-width: 100%; }\n";
 

@@ -4,6 +4,7 @@
 #include "base/option_id.h"
 #include "base/process.h"
 #include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_rows.h"
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/report/export/exports.h"
 #include "optimizer/report/export/twin_result.h"
@@ -16,6 +17,7 @@
 #include "optimizer/report/result/profile_report.h"
 #include "optimizer/report/result/result_json.h"
 #include "optimizer/report/result/result_pictures.h"
+#include "optimizer/report/result/table_lobes.h"
 #include "optimizer/report/surface/surface_pictures.h"
 #include "optimizer/stages/fit/pipeline_cloth.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
@@ -63,6 +65,14 @@ static status write_geometry(struct report *report, struct error *err)
     status s = result_geometry_write(report, err);
     if (s == STATUS_OK) s = quality_write(report, err);
     return done(report, REPORT_GEOMETRY, "geometry", s);
+}
+
+static status write_renderings(struct report *report, struct error *err)
+{
+    const double from = before(report, REPORT_RENDERINGS), to = after(report, REPORT_RENDERINGS);
+    status s = report->in.photographs->n_photograph > 0 ? result_renderings_write(report, from, to, err)
+                                                        : table_lobes_write(report, from, to, err);
+    return done(report, REPORT_RENDERINGS, "renderings", s);
 }
 
 static status write_surfaces(struct report *report, struct error *err)
@@ -153,10 +163,7 @@ static status report_fit(struct report *report, struct error *err)
 {
     status s = find(report, err);
     if (s == STATUS_OK) s = write_geometry(report, err);
-    if (s == STATUS_OK)
-        s = done(
-            report, REPORT_RENDERINGS, "renderings",
-            result_renderings_write(report, before(report, REPORT_RENDERINGS), after(report, REPORT_RENDERINGS), err));
+    if (s == STATUS_OK) s = write_renderings(report, err);
     if (s == STATUS_OK) s = write_surfaces(report, err);
     if (s == STATUS_OK) s = write_twin(report, err);
     if (s == STATUS_OK) s = write_exports(report, err);

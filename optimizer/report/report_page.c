@@ -2,11 +2,14 @@
 #include "base/files/durable.h"
 #include "base/files/file_ledger_json.h"
 #include "base/option_id.h"
+#include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_results.h"
+#include "optimizer/job/document/job_rows.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/front_page.h"
 #include "optimizer/report/letterhead_file.h"
 #include "optimizer/report/page_charts.h"
+#include "optimizer/report/page_lobes.h"
 #include "optimizer/report/page_pictures.h"
 #include "optimizer/report/page_style.h"
 #include "optimizer/report/page_text.h"
@@ -181,8 +184,9 @@ static status print_fit(struct report *report, const json_t *data, FILE *out, st
     print_parameters("Fitted parameters", json_object_get(result, "parameters"), out);
     print_parameters("Numbers of the cloth", json_object_get(result, "cloth_numbers"), out);
     print_rows(rows, out);
-    heading("Pictures", out);
-    status s = page_pictures(report, rows, out, err);
+    const bool table = report->in.photographs->n_photograph == 0;
+    heading(table ? "Lobes" : "Pictures", out);
+    status s = table ? page_lobes(report, result, out, err) : page_pictures(report, rows, out, err);
     heading("Course of the fit", out);
     page_curve(json_object_get(data, "curve"), out);
     heading("Correlation of the parameters", out);

@@ -9,6 +9,7 @@
 #include "optimizer/report/result/photograph_json.h"
 #include "optimizer/report/result/result_numbers.h"
 #include "optimizer/report/result/result_options_json.h"
+#include "optimizer/report/result/row_pictures.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 
 #include <jansson.h>
@@ -209,17 +210,13 @@ static json_t *model_json(const struct report *report, size_t i_model)
     return json;
 }
 
-static json_t *row_json(const struct report *report, const struct pipeline_model *m, size_t i, const char *picture)
+static json_t *row_json(const struct report *report, const struct pipeline_model *m, size_t i, picture_name *picture)
 {
     const struct observation *o = &report->in.job->rows->observation.item[i];
     const struct configuration *k = &o->configuration;
     const double deg = DEG_PER_RAD;
     double rendered[3], se[3];
-    char png[200], exr[200], photograph[200];
     result_rendered_mean(m, i, rendered, se);
-    snprintf(png, sizeof png, "renderings/%s.png", picture);
-    snprintf(exr, sizeof exr, "renderings/%s.exr", picture);
-    snprintf(photograph, sizeof photograph, "photographs/%s.png", picture);
     json_t *row = json_pack("{s:s, s:s, s:f, s:f, s:f, s:f, s:f, s:f}", "name", o->name, "set",
                             o->set == JOB_SET_FIT ? "fit" : "held-out", "light_theta_deg", k->light_theta_rad * deg,
                             "light_phi_deg", k->light_phi_rad * deg, "camera_theta_deg", k->camera_theta_rad * deg,
@@ -231,10 +228,7 @@ static json_t *row_json(const struct report *report, const struct pipeline_model
     json_object_set_new(row, "rendered", json_number_list(rendered, 3, 1.0));
     json_object_set_new(row, "rendered_se", json_number_list(se, 3, 1.0));
     put_row_error(row, report, m, i);
-    json_object_set_new(row, "rendering_png", json_string(png));
-    json_object_set_new(row, "rendering_exr", json_string(exr));
-    json_object_set_new(row, "photograph_png",
-                        report->in.photographs->n_photograph > 0 ? json_string(photograph) : json_null());
+    row_pictures_put(report, picture[row_pictures_shown(report, i)], picture[i], row);
     if (o->photograph.info.format != NULL)
         json_object_set_new(row, "photograph", photograph_record_json(&o->photograph));
     result_row_options(report, m, i, row);
@@ -333,7 +327,7 @@ static json_t *result_json(struct report *report, picture_name *picture)
     const struct pipeline_model *best = &report->model[report_best_model(report)];
     json_t *rows = json_array(), *models = json_array();
     for (size_t i = 0; i < report->in.job->rows->observation.n; i++)
-        json_array_append_new(rows, row_json(report, best, i, picture[i]));
+        json_array_append_new(rows, row_json(report, best, i, picture));
     for (size_t i = 0; i < report->n_model; i++) json_array_append_new(models, model_json(report, i));
     json_t *json = json_pack("{s:i, s:s, s:s, s:s, s:I}", "format", 1, "sample", report->in.sample, "model",
                              best->setup->appearance.id, "method", report->in.job->fit->method, "seed",
@@ -343,6 +337,7 @@ static json_t *result_json(struct report *report, picture_name *picture)
     put_fit(json, report, best);
     json_object_set_new(json, "rows", rows);
     json_object_set_new(json, "models", models);
+    row_pictures_put_lobes(report, json);
     json_object_set_new(json, "skill", skill_json(report));
     json_object_set_new(json, "discrepancy", discrepancy_json(best));
     json_object_set_new(json, "radius", radius_json(report));

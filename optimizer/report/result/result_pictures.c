@@ -180,6 +180,16 @@ double result_renderings_paths(const struct job_results *results, size_t n_row, 
     return px * px * (double)n_row * (double)result_picture_samples(results, n_row, n_fit_path);
 }
 
+struct radiance_input result_radiance_input(const struct report *report)
+{
+    const struct pipeline_model *m = &report->model[report_best_model(report)];
+    return (struct radiance_input){.scene = made_cloth_scene(report->in.made, m->setup),
+                                   .model = &m->setup->appearance,
+                                   .param = m->fit->result.param,
+                                   .n_set = m->setup->sets.n_set,
+                                   .discrepancy = pipeline_discrepancy(m->validation)};
+}
+
 static status write_rendering(struct report *report, size_t i, const char *name, double exposure,
                               const struct progress *progress, struct error *err)
 {
@@ -190,11 +200,7 @@ static status write_rendering(struct report *report, size_t i, const char *name,
     const struct pipeline_model *m = &report->model[report_best_model(report)];
     const size_t px =
         result_picture_px(report->in.results, report->in.job->rows->observation.n, (double)m->fit->result.n_path);
-    const struct render_request q = {.input = {.scene = made_cloth_scene(report->in.made, m->setup),
-                                               .model = &m->setup->appearance,
-                                               .param = m->fit->result.param,
-                                               .n_set = m->setup->sets.n_set,
-                                               .discrepancy = pipeline_discrepancy(m->validation)},
+    const struct render_request q = {.input = result_radiance_input(report),
                                      .configuration = &report->in.job->rows->observation.item[i].configuration,
                                      .width = px,
                                      .height = px,

@@ -4,6 +4,7 @@
 #define SELVEDGE_OPTIMIZER_RESULT_PICTURES_H
 
 #include "optimizer/report/findings/report.h"
+#include "renderer/transport/radiance_request.h"
 
 /* fibers.hair, fibers.txt; with a volume also density.vol (uint8), direction.vol (2-byte directions) and
  * pictures/slice-{x,y,z}.png. */
@@ -29,7 +30,9 @@ size_t result_picture_px(const struct job_results *results, size_t n_row, double
 size_t result_picture_samples(const struct job_results *results, size_t n_row, double n_fit_path);
 /* Samples of all renderings together, after such a fit. */
 double result_renderings_paths(const struct job_results *results, size_t n_row, double n_fit_path);
-/* renderings/<name>.exr and .png for every observation, after the photographs. from, to: shares of the stage
+/* The best model of the job's cloth at its result, as a source of radiance. */
+struct radiance_input result_radiance_input(const struct report *report);
+/* renderings/<name>.exr and .png for every photograph, after the photographs. from, to: shares of the stage
  * before and after, between which progress is reported. */
 status result_renderings_write(struct report *report, double from, double to, struct error *err);
 

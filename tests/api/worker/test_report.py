@@ -12,7 +12,7 @@ import jsonschema
 import pytest
 from daemon_under_test import ROOT, program
 from small_cloth import TABLE, hair
-from small_exr import exr
+from small_exr import exr, read_exr
 
 pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
 FIT = {"path_budget": 20000, "render_px": 16, "render_samples": 1}
@@ -71,11 +71,37 @@ def test_the_page_needs_nothing_else(which, request):
     assert None not in meanings and "fresh paths" not in page and "left out in turn" not in page
     for meaning in meanings:
         assert meaning in html.unescape(page) and meaning in (folder / "summary.txt").read_text()
-    for title in ("Errors", "Fitted parameters", "Measured and rendered", "Pictures", "Course of the fit", "Correlation of the parameters",
+    shown = "Lobes" if which == "of_table" else "Pictures"
+    for title in ("Errors", "Fitted parameters", "Measured and rendered", shown, "Course of the fit", "Correlation of the parameters",
                   "Gradient certificate", "Geometry", "Settings: the job document", "Settings that have their defaults", "Inputs", "Program and dates"):
         assert f"<h2>{title}</h2>" in page
     pictures = page.count("data:image/png;base64,")
-    assert pictures == (3 if which == "of_photographs" else 1) * len(result["rows"]) + 2  # the cloth and its geometry
+    lamps = {(row["light_theta_deg"], row["light_phi_deg"]) for row in result["rows"]}
+    assert pictures == (3 * len(result["rows"]) if which == "of_photographs" else len(lamps)) + 2  # the cloth and its geometry
+
+
+def test_lobes_and_spheres_of_a_table(of_table):
+    """Every lamp has a sphere, lit from the left and dark beyond its terminator; every lobe is rendered over its angles; the page draws both."""
+    result = json.loads((of_table / "result.json").read_text())
+    rows, lobes = {r["name"]: r for r in result["rows"]}, {lobe["row"]: lobe for lobe in result["lobes"]}
+    assert {r["rendering_shows"] for r in rows.values()} == {"sphere"} and len({r["rendering_png"] for r in rows.values()}) == 4
+    assert rows["fit-01"]["rendering_exr"] == rows["fit-03"]["rendering_exr"]
+    assert len(lobes) == 6  # 45 degrees twice: by the plane and by the turn of the cloth; 60 degrees twice as well
+    for lobe in lobes.values():
+        angles = lobe["camera_theta_deg"]
+        assert len(angles) == len(lobe["rendered"]) == len(lobe["rendered_se"]) >= 17 and angles == sorted(angles) and angles[0] == -angles[-1] == -80
+    # at the angle of a row the lobe passes through the row's own rendering
+    row, lobe = rows["fit-00"], lobes["fit-00"]
+    near = sorted(range(len(lobe["rendered"])), key=lambda k: abs(lobe["camera_theta_deg"][k] - row["camera_theta_deg"]))[:2]
+    mean, se = (sum(lobe[key][k][1] for k in near) / 2 for key in ("rendered", "rendered_se"))
+    assert abs(mean - row["rendered"][1]) < 5 * (se + row["rendered_se"][1]) + 0.1 * row["rendered"][1]
+    size, _, pixel = read_exr((of_table / rows["fit-02"]["rendering_exr"]).read_bytes())
+    left, right = (sum(pixel(int(size * x), y)[0] for y in range(size)) for x in (0.25, 0.95))
+    assert left > 0 and right == 0 and pixel(0, 0) == (0, 0, 0)  # lamp at 60 degrees
+    page = (of_table / "report.html").read_text()
+    assert page.count("<title>radiance over the angle of the camera</title>") == 4 and page.count("<polyline") >= 6
+    for name, r in rows.items():
+        assert f"{name}: measured {sum(r['measured']) / 3:.4g}, rendered" in page
 
 
 def fronts(folder):
