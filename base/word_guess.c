@@ -2,6 +2,7 @@
 
 #include <stdbool.h>
 #include <string.h>
+#include <strings.h>
 
 size_t word_distance(const char *a, const char *b)
 {
@@ -33,6 +34,7 @@ const char *word_guess(const char *word, const char *const *list)
     const char *nearest = NULL, *longer = NULL;
     size_t least = 3, n_longer = 0;
     for (; *list != NULL; list++) {
+        if (strcasecmp(word, *list) == 0) return *list;
         size_t d = word_distance(word, *list);
         if (d < least && 3 * d <= strlen(*list)) least = d, nearest = *list;
         if (begins_alike(word, *list)) longer = *list, n_longer++;

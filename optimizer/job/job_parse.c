@@ -1,6 +1,7 @@
 #include "optimizer/job/job_parse.h"
 #include "base/catalogue/cloth_description.h"
 #include "base/files/json_depth.h"
+#include "base/files/json_text.h"
 #include "optimizer/job/checks/job_document_parts.h"
 #include "optimizer/job/checks/job_faults.h"
 #include "optimizer/job/document/job_cloth.h"
@@ -35,18 +36,13 @@ static status document_new(struct job_document **doc, struct error *err)
 /* The text as JSON; NULL with an error. */
 static json_t *read_json(const char *text, size_t n_bytes, struct error *err)
 {
-    json_error_t at;
     if (n_bytes > JOB_MAX_DOCUMENT_BYTES) {
         error_set(err, STATUS_TOO_LARGE, "the job document has %zu bytes, the limit is %d", n_bytes,
                   JOB_MAX_DOCUMENT_BYTES);
         return NULL;
     }
     if (json_depth_check(text, n_bytes, "the job document", err) != STATUS_OK) return NULL;
-    json_t *json = json_loadb(text, n_bytes, JSON_REJECT_DUPLICATES, &at);
-    if (json == NULL)
-        error_set(err, STATUS_INVALID, "the job document is not valid JSON: line %d, column %d: %s", at.line, at.column,
-                  at.text);
-    return json;
+    return json_text_parse(text, n_bytes, "the job document", err);
 }
 
 status job_document_parse(const char *text, size_t n_bytes, struct job_document **doc, struct error *err)

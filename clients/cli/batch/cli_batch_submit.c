@@ -1,4 +1,5 @@
 /* Submits a batch: reads the table, sends it, and uploads the files that the server does not have. */
+#include "base/files/json_text.h"
 #include "clients/cli/batch/batch_rows.h"
 #include "clients/cli/batch/cli_batch.h"
 
@@ -170,16 +171,15 @@ static status read_rows(struct submission *u, struct error *err)
 {
     const struct cli_args *a = u->cli->args;
     char folder[4096];
-    json_error_t where;
+    struct error fault = {0};
     struct stat st;
     if (a->second == NULL || a->third == NULL)
         return error_set(err, STATUS_INVALID,
                          "'selvedge batch submit' needs a template and a table: selvedge batch submit TEMPLATE.json "
                          "TABLE.csv");
-    u->template_ = json_load_file(a->second, JSON_REJECT_DUPLICATES, &where);
-    if (u->template_ == NULL)
-        return error_set(err, where.line > 0 ? STATUS_INVALID : STATUS_NOT_FOUND,
-                         "template '%s', line %d, column %d: %s", a->second, where.line, where.column, where.text);
+    snprintf(folder, sizeof folder, "the template '%s'", a->second);
+    u->template_ = json_text_file(a->second, folder, &fault);
+    if (u->template_ == NULL) return error_set(err, fault.code, "%s", fault.text);
     if (!json_is_object(u->template_))
         return error_set(err, STATUS_INVALID, "template '%s' is not a JSON object", a->second);
     if (stat(a->third, &st) != 0) return error_set_errno(err, "cannot read '%s'", a->third);

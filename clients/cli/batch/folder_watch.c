@@ -2,6 +2,7 @@
  * harmlessly: its job is found by a key of its content, and state.json is written before the next step. So the watcher,
  * the daemon and the machine may be killed at any time. The folder is polled, because network shares send no events. */
 #include "base/clock.h"
+#include "base/files/json_text.h"
 #include "clients/cli/batch/sample_outcome.h"
 #include "clients/cli/text/cli_text.h"
 
@@ -313,7 +314,8 @@ static status lock(struct folder_watch *w, struct error *err)
 static status read_options(struct folder_watch *w, struct error *err)
 {
     const struct cli_args *a = w->cli->args;
-    json_error_t where;
+    struct error fault = {0};
+    char what[4200];
     char *end = NULL;
     w->folder = a->operand;
     w->marker = a->marker != NULL ? a->marker : "READY";
@@ -321,10 +323,11 @@ static status read_options(struct folder_watch *w, struct error *err)
     if (a->quiet_s != NULL && (*end != '\0' || !(w->quiet_s >= 0 && w->quiet_s <= 86400)))
         return error_set(err, STATUS_INVALID, "option '--quiet' takes seconds from 0 to 86400: '%s'", a->quiet_s);
     if (a->template == NULL) return STATUS_OK;
-    w->template = json_load_file(a->template, JSON_REJECT_DUPLICATES, &where);
+    snprintf(what, sizeof what, "the template '%s'", a->template);
+    w->template = json_text_file(a->template, what, &fault);
+    if (w->template == NULL) return error_set(err, fault.code, "%s", fault.text);
     if (json_is_object(w->template)) return STATUS_OK;
-    return error_set(err, STATUS_INVALID, "the template '%s' is not a job document: line %d: %s", a->template,
-                     where.line, where.text);
+    return error_set(err, STATUS_INVALID, "%s is not a job document, which is a JSON object", what);
 }
 
 CLI_COMMAND(WATCH_FOLDER, cli_watch_folder, .place = 150, .name = "watch-folder", .operand = "DIR", .needs = "a folder",

@@ -6,6 +6,7 @@
 
 #include "base/clock.h"
 #include "base/files/durable.h"
+#include "base/files/json_text.h"
 
 #include <math.h>
 #include <sodium.h>
@@ -88,16 +89,14 @@ void cli_folder_of(const char *path, char *folder, size_t n_bytes)
 
 static status read_document(struct submit *u, const char *path, struct error *err)
 {
-    json_error_t where;
+    struct error fault = {0};
+    char what[4200];
     status s = cli_document_check(path, err);
     if (s != STATUS_OK) return s;
-    u->document = json_load_file(path, JSON_REJECT_DUPLICATES, &where);
-    if (u->document == NULL && where.line <= 0)
-        return error_set(err, STATUS_NOT_FOUND, "cannot read the job document: %s", where.text);
-    if (u->document == NULL)
-        return error_set(err, STATUS_INVALID, "job document '%s', line %d, column %d: %s", path, where.line,
-                         where.column, where.text);
-    return STATUS_OK;
+    snprintf(what, sizeof what, "the job document '%s'", path);
+    u->document = json_text_file(path, what, &fault);
+    if (u->document == NULL && err != NULL) *err = fault;
+    return fault.code;
 }
 
 /* --input-dir, else the folder of the document, else the current one. */

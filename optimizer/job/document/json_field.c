@@ -211,6 +211,10 @@ status json_field_choice(const struct json_field *f, const char *key, const char
         *index = i;
         return STATUS_OK;
     }
+    const char *meant = word_guess(text, allowed);
+    if (meant != NULL)
+        return error_set_field(err, STATUS_INVALID, path, "'%s' is '%.80s': did you mean '%s'? Allowed are %s", path,
+                               text, meant, list);
     return error_set_field(err, STATUS_INVALID, path, "'%s' is '%.80s': allowed are %s", path, text, list);
 }
 

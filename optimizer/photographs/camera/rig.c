@@ -1,6 +1,7 @@
 #include "optimizer/photographs/camera/rig.h"
 
 #include "base/files/durable.h"
+#include "base/files/json_text.h"
 #include "base/option_id.h"
 #include "optimizer/job/checks/job_consistency.h"
 #include "optimizer/job/document/job_photograph.h"
@@ -248,17 +249,16 @@ status rig_apply(const char *path, struct job_setup *setup, struct job_rows *row
 {
     char *text = NULL;
     size_t n = 0;
-    json_error_t at;
+    struct error fault = {0};
     const char *name = path_file_name(path);
     *lens = (struct lens){0};
     *board = (struct marker_board){0};
     status s = file_read_all(path, MAX_BYTES, &text, &n, err);
     if (s != STATUS_OK) return s;
-    json_t *json = json_loadb(text, n, JSON_REJECT_DUPLICATES, &at);
+    json_t *json = json_text_parse(text, n, "its text", &fault);
     free(text);
     if (json == NULL)
-        return error_set_field(err, STATUS_FORMAT, OPTION_RIG, "cannot use rig '%s': it is not JSON: line %d: %s", name,
-                               at.line, at.text);
+        return error_set_field(err, STATUS_FORMAT, OPTION_RIG, "cannot use rig '%s': %s", name, fault.text);
     s = apply(json, setup, rows, lens, board, err);
     json_decref(json);
     if (s == STATUS_OK) return STATUS_OK;

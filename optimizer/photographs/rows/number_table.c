@@ -1,4 +1,5 @@
 #include "optimizer/photographs/rows/number_table.h"
+#include "base/word_guess.h"
 #include "optimizer/photographs/rows/table_text.h"
 
 #include <math.h>
@@ -12,14 +13,21 @@ static status split(struct number_table *t, char *line, struct error *err)
     return number_table_error(t, STATUS_FORMAT, "more than %d cells", t->file, t->line, NUMBER_TABLE_MAX_CELL);
 }
 
+static status unknown_column(const struct number_table *t, const char *name, struct error *err)
+{
+    const char *meant = word_guess(name, t->column_name);
+    if (meant == NULL) return number_table_error(t, STATUS_FORMAT, "unknown column '%.60s'", t->file, t->line, name);
+    return number_table_error(t, STATUS_FORMAT, "unknown column '%.60s': did you mean '%s'?", t->file, t->line, name,
+                              meant);
+}
+
 static status read_header(struct number_table *t, struct error *err)
 {
     for (size_t c = 0; c < NUMBER_TABLE_MAX_COLUMN; c++) t->place[c] = -1;
     for (size_t i = 0; i < t->n_cell; i++) {
         size_t c = 0;
         while (t->column_name[c] != NULL && strcmp(t->column_name[c], t->cell[i]) != 0) c++;
-        if (t->column_name[c] == NULL)
-            return number_table_error(t, STATUS_FORMAT, "unknown column '%.60s'", t->file, t->line, t->cell[i]);
+        if (t->column_name[c] == NULL) return unknown_column(t, t->cell[i], err);
         if (t->place[c] >= 0)
             return number_table_error(t, STATUS_FORMAT, "column '%s' appears twice", t->file, t->line,
                                       t->column_name[c]);

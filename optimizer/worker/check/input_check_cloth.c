@@ -21,8 +21,19 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* ---- the scan ---- */
+
+/* Whether an option has a fault already: what its default then lacks is no second one. */
+static bool has_fault(const struct input_check *c, const struct error *like)
+{
+    struct error named = *like;
+    job_option_name_field(named.code, &named);
+    for (size_t i = 0; i < c->fault->n; i++)
+        if (strcmp(c->fault->fault[i].field, named.field) == 0) return true;
+    return false;
+}
 
 static void check_volume(struct input_check *c)
 {
@@ -46,7 +57,8 @@ static void check_volume(struct input_check *c)
     status s = reconstruct_examine(path, scan->n_file, &option, &ledger, &fault);
     if (s == STATUS_OK)
         s = noise_refuse_early(path, scan->n_file, &option, &(struct warning_sink){input_check_warn, c}, &fault);
-    if (s != STATUS_OK) input_check_fault(c, &fault);
+    if (s != STATUS_OK && !(strcmp(fault.field, OPTION_VOXEL_SIZE) == 0 && has_fault(c, &fault)))
+        input_check_fault(c, &fault);
     file_ledger_append(c->files, scan->file[0], &ledger);
 out:
     free(text);

@@ -1,7 +1,9 @@
+#include "base/catalogue/model_catalogue.h"
 #include "base/files/durable.h"
 #include "base/option_id.h"
 #include "base/warning.h"
 #include "optimizer/fit/baseline/row_consistency.h"
+#include "optimizer/job/document/job_fit.h"
 #include "optimizer/job/document/job_photograph.h"
 #include "optimizer/job/document/job_profile.h"
 #include "optimizer/job/document/job_rows.h"
@@ -15,6 +17,7 @@
 #include "optimizer/photographs/rows/observation_load.h"
 #include "optimizer/worker/check/input_check.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -138,6 +141,26 @@ static bool check_table(struct input_check *c)
     return s == STATUS_OK;
 }
 
+/* Warns where the fitted rows have fewer values than a model has parameters of its own that are fitted. */
+static void warn_few_rows(struct input_check *c, const struct observation_set *rows)
+{
+    const struct job_fit *fit = c->section.fit;
+    const size_t n_row = observation_set_count(rows, JOB_SET_FIT);
+    for (size_t m = 0; m < fit->n_model; m++) {
+        const struct model_info *model = model_catalogue_find(fit->model[m].id);
+        size_t n_free = 0;
+        if (model == NULL) continue;
+        for (size_t p = 0; p < model->n_param; p++)
+            n_free += isnan(fit->model[m].fixed[p]) && fit->model[m].option.leader[p] == p;
+        if (3 * n_row >= n_free) continue;
+        char text[256];
+        snprintf(text, sizeof text,
+                 "%zu fitted rows have %zu values, and %s has %zu parameters to fit: not all of them can be determined",
+                 n_row, 3 * n_row, model->id, n_free);
+        input_check_warn(c, OPTION_MODEL, text);
+    }
+}
+
 static void judge_rows(struct input_check *c, const struct photograph_process *process)
 {
     struct observation_set rows;
@@ -150,6 +173,7 @@ static void judge_rows(struct input_check *c, const struct photograph_process *p
         s = row_consistency_check_angles(&rows, OPTION_MEASUREMENT_FILE, &fault);
     if (s == STATUS_OK) {
         observation_set_check(&rows, &warn);
+        warn_few_rows(c, &rows);
         s = row_consistency_warn(&rows, &warn, &fault);
     }
     if (s != STATUS_OK) input_check_fault(c, &fault);

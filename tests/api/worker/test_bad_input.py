@@ -15,7 +15,7 @@ from small_png import png_rgb
 pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
 
 VIEWS = [(20, 20, 180, 0), (45, 45, 180, 0), (60, 0, 180, 0), (45, 45, 90, 90)]
-FIT = {"path_budget": 20000}
+FIT = {"model": "two_lobe.v1", "path_budget": 20000}
 
 
 def table_job():
@@ -146,6 +146,8 @@ CASES = [
     ("no cloth", TAB, put("fibers", None), "fault", "volume"),
     ("two cloths", TAB, put("cloth", {"weave": "plain", "yarns": [{"fibers": 7}]}), "fault", "cloth"),
     ("unknown model", TAB, put("fit.model", "three_lobe.v1"), "fault", "three_lobe.v1"),
+    ("mistyped model", TAB, put("fit.model", "two_lob.v1"), "fault", "'fit.model' is 'two_lob.v1': did you mean 'two_lobe.v1'?"),
+    ("mistyped weave", WEAVE, put("cloth.weave", "pliain"), "fault", "did you mean 'plain'?"),
     ("unknown method", TAB, put("fit.method", "newton"), "fault", "newton"),
     ("unknown parameter", TAB, put("fit.fixed", {"beta_X": 5}), "fault", "beta_X"),
     ("parameter outside of its range", TAB, put("fit.start", {"beta_TT": 900}), "fault", "beta_TT"),
@@ -204,6 +206,10 @@ CASES = [
     ("negative radiance", TAB, line(3, "fit,45,0,45,180,0,-0.1,0.10,0.06"), "fault", "line 4"),
     ("too few cells", TAB, line(3, "fit,45,0,45,180"), "fault", "line 4"),
     ("unknown column", TAB, line(1, "set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,turn,r,g,b"), "fault", "turn"),
+    ("column in capitals", TAB, file("rows.csv", TABLE.replace(",r,g,b", ",R,G,B").encode()), "fault", "unknown column 'R': did you mean 'r'?"),
+    ("mistyped column", TAB, file("rows.csv", TABLE.replace("light_theta_deg", "light_theta").encode()), "fault", "did you mean 'light_theta_deg'?"),
+    ("fewer values than parameters", TAB, file("rows.csv", "\n".join(TABLE.split("\n")[:4]).encode()), "warning",
+     "2 fitted rows have 6 values, and two_lobe.v1 has 9 parameters to fit"),
     ("no fitted row", TAB, file("rows.csv", TABLE.replace("fit,", "held-out,").encode()), "fault", "fit"),
     ("all rows dark", TAB, rows(lambda v: v[:5] + [x * 1e-3 for x in v[5:]]), "warning", "all rows are dark"),
     ("all rows above white", TAB, rows(lambda v: v[:5] + [x * 40 for x in v[5:]]), "warning", "all rows are above white"),
@@ -279,6 +285,27 @@ def test_bad_input_gets_a_message(tmp_path, name, document, change, kind, messag
     found = [f"{item['field']}: {item['detail']}" for item in report["faults" if kind == "fault" else "warnings"]]
     assert any(message in text for text in found), report
     assert all(len(text) < 900 for text in found)
+
+
+@pytest.mark.parametrize("old,new,hint", [
+    ('"sample": "bad",', '"sample": "bad" // mine\n,', "JSON has no comments"), ('"rows.csv"}', '"rows.csv",}', "the comma before it is one too many"),
+    ('"sample": "bad",', '"sample": "bad"', "is a comma missing before it?"), ('"bad"', "'bad'", "JSON has double quotes only"),
+    ('20000', 'None', "JSON has true, false and null")])
+def test_a_slip_of_json_gets_a_hint(tmp_path, old, new, hint):
+    write(tmp_path, table_job(), files_of(table_job()))
+    text = (tmp_path / "job.json").read_text()
+    assert old in text
+    (tmp_path / "job.json").write_text(text.replace(old, new))
+    (fault,) = check(tmp_path)["faults"]
+    assert "not valid JSON: line 1" in fault["detail"] or "not valid JSON: line 2" in fault["detail"]
+    assert hint in fault["detail"]
+
+
+def test_a_byte_order_mark_is_no_fault(tmp_path):
+    write(tmp_path, table_job(), files_of(table_job()))
+    text = (tmp_path / "job.json").read_bytes()
+    (tmp_path / "job.json").write_bytes(b"\xef\xbb\xbf" + text)
+    assert check(tmp_path)["faults"] == []
 
 
 def test_all_faults_come_at_once(tmp_path):

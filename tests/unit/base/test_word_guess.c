@@ -22,6 +22,7 @@ static void test_guesses(void **state)
 {
     (void)state;
     assert_string_equal(word_guess("modell", list), "model");
+    assert_string_equal(word_guess("FIT", list), "fit");
     assert_string_equal(word_guess("volumne", list), "volume");
     assert_string_equal(word_guess("path_budget_s", list), "path_budget");
     assert_string_equal(word_guess("path", list), "path_budget");

@@ -98,7 +98,7 @@ static void test_bad_rigs(void **state)
     static const struct {
         const char *rig, *part;
     } bad[] = {
-        {"{", "not JSON"},
+        {"{", "not valid JSON"},
         {"{\"views\":{}}", "'selvedge_rig' is missing"},
         {"{\"selvedge_rig\":2}", "selvedge_rig"},
         {"{\"selvedge_rig\":1,\"lamp\":{}}", "unknown field 'lamp'"},
