@@ -122,12 +122,15 @@ def with_schema(text, options):
 # ---- config/result.schema.json ----
 
 def with_words(text, options):
-    """The words of exports[].format, pictures[].on and pictures[].method are those of the job's options."""
+    """The words of exports[].format and of pictures[].on, .method and .kind are those of the job's options."""
     schema, row_of = json.loads(text), {row["path"]: row for row in options}
     formats = [path.split(".")[1] for path in row_of if path.startswith("export.") and path not in ("export.pdf", "export.report_file")]
     schema["properties"]["exports"]["items"]["properties"]["format"]["enum"] = formats
-    for key in ("on", "method"):
-        schema["properties"]["pictures"]["items"]["properties"][key]["enum"] = row_of["pictures[]." + key]["choices"]
+    picture = schema["properties"]["pictures"]["items"]["properties"]
+    for key in ("on", "method", "kind"):
+        picture[key]["enum"] = list(row_of["pictures[]." + key]["choices"])
+    picture["on"]["enum"] += ["roll", "fold"]  # of the studio alone
+    picture["kind"]["enum"].remove("measurement")
     return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
 
 

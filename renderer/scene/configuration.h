@@ -14,6 +14,7 @@
 
 #include "base/status.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 struct environment; /* renderer/transport/environment.h */
@@ -55,6 +56,7 @@ struct configuration {
     double environment_rgb[3];             /* radiance of a constant environment, besides the lamp; 0: none */
     const struct environment *environment; /* an image around the scene, fixed to the world (not turned with the cloth),
                                               besides the lamp; not owned; NULL: none */
+    bool unseen_lights; /* camera rays that miss the cloth meet neither lamp nor environment: they see 0 */
     enum configuration_light light;
     double light_sharpness; /* of LIGHT_GAUSSIAN: radiance falls as exp(sharpness (cos - 1)); 1 to 100,000 */
     enum configuration_camera camera;

@@ -275,9 +275,26 @@ status scene_new(const struct fiber_set *f, const struct scene_option *o, struct
     return st;
 }
 
+status scene_lift(const struct scene *flat, struct scene **lifted, struct error *err)
+{
+    struct scene *s = flat->bent == NULL ? malloc(sizeof *s) : NULL;
+    if (flat->bent != NULL) return error_set(err, STATUS_INVALID, "cannot take the sheet from under a bent cloth");
+    if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot copy a scene: out of memory");
+    memcpy(s, flat, sizeof *s);
+    s->black_sheet = false;
+    s->is_lifted = true;
+    s->number = unique_number();
+    *lifted = s;
+    return STATUS_OK;
+}
+
 void scene_free(struct scene *s)
 {
     if (s == NULL) return;
+    if (s->is_lifted && s->bent == NULL) {
+        free(s);
+        return;
+    }
     if (s->bent != NULL) {
         bent_free(s); /* all else belongs to the flat scene */
         return;

@@ -31,6 +31,9 @@ status scene_new(const struct fiber_set *f, const struct scene_option *o, struct
  * bent already; STATUS_NO_MEMORY. The mesh must have passed mesh_check and may be released afterwards. */
 status scene_bend(const struct scene *flat, const struct mesh *mesh, bool black_sheet, struct scene **bent,
                   struct error *err);
+/* The same flat cloth without its black sheet. Nothing is copied: `flat` must outlive it. STATUS_INVALID for a scene
+ * that is bent, STATUS_NO_MEMORY. */
+status scene_lift(const struct scene *flat, struct scene **lifted, struct error *err);
 /* Whether a point (orbit center at the origin) lies in the cloth, between its upper and its lower side. */
 bool scene_encloses(const struct scene *scene, const double p_mm[3]);
 /* z of the lowest point of the cloth, its thickness included (orbit center at the origin). */

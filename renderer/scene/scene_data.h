@@ -47,6 +47,7 @@ struct scene {
     float inset_low_mm[2], inset_high_mm[2]; /* where every fiber of the endless cloth is present */
     float bottom_mm;                         /* < 0; the top is 0 */
     bool black_sheet, no_avx512;
+    bool is_lifted;          /* all but the struct belongs to another scene (scene_lift) */
     uint64_t number;         /* that no other scene of this process has had */
     struct bent_cloth *bent; /* NULL: the cloth is flat. Otherwise device, tile and block are those of the flat cloth */
     atomic_llong device_bytes;

@@ -13,6 +13,7 @@ void lights_init(struct lights *l, const struct configuration *c)
         if (l->constant[k] > 0) l->has_constant = true;
     }
     l->image = c->environment;
+    l->unseen = c->unseen_lights;
     l->image_turn[0] = (float)cos(c->cloth_rotation_rad);
     l->image_turn[1] = (float)sin(c->cloth_rotation_rad);
 }

@@ -11,6 +11,7 @@ struct lights {
     struct lamp lamp;
     bool has_lamp;
     bool has_constant;
+    bool unseen;       /* by camera rays */
     float constant[3]; /* the same radiance from every direction (from below only without the black sheet) */
     const struct environment *image; /* or NULL */
     float image_turn[2];             /* cosine and sine of the angle from the cloth's frame to the world's */

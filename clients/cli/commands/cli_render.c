@@ -77,8 +77,8 @@ static status set_flag(const char *option, bool given, json_t *picture, const ch
     return STATUS_OK;
 }
 
-/* The picture that the command line describes; *mesh is the path of its mesh, or NULL. */
-static status read_picture(const struct cli_args *a, json_t *picture, const char **mesh, struct error *err)
+/* Surface, lamp and camera of a measurement. */
+static status read_view(const struct cli_args *a, json_t *picture, const char **mesh, struct error *err)
 {
     const char *on = a->on != NULL ? a->on : "cylinder";
     bool shape = strcmp(on, "flat") == 0 || strcmp(on, "cylinder") == 0 || strcmp(on, "drape") == 0;
@@ -88,7 +88,19 @@ static status read_picture(const struct cli_args *a, json_t *picture, const char
         return error_set(err, STATUS_INVALID, "option '--on' takes flat, cylinder, drape or a mesh NAME.obj: '%s'", on);
     json_object_set_new(picture, "on", json_string(shape ? on : "mesh"));
     status s = read_angles("lamp", a->lamp, 45.0, 0.0, picture, "light", err);
-    if (s == STATUS_OK) s = read_angles("camera", a->camera, 30.0, 180.0, picture, "camera", err);
+    return s == STATUS_OK ? read_angles("camera", a->camera, 30.0, 180.0, picture, "camera", err) : s;
+}
+
+/* The picture that the command line describes; *mesh is the path of its mesh, or NULL. */
+static status read_picture(const struct cli_args *a, json_t *picture, const char **mesh, struct error *err)
+{
+    const char *view = a->on != NULL ? "on" : a->lamp != NULL ? "lamp" : a->camera != NULL ? "camera" : NULL;
+    const bool studio = a->picture.kind != NULL && strcmp(a->picture.kind, "measurement") != 0;
+    *mesh = NULL;
+    if (studio && view != NULL)
+        return error_set(err, STATUS_INVALID, "option '--%s' is not for '--kind %s', which has a view of its own", view,
+                         a->picture.kind);
+    status s = studio ? STATUS_OK : read_view(a, picture, mesh, err);
 #define PICTURE_OPTION(key, name, value, kind, help)                                                                   \
     if (s == STATUS_OK) s = set_##kind(name, a->picture.key, picture, #key, err);
 #include "clients/cli/arguments/picture_options.def"
@@ -148,7 +160,8 @@ CLI_COMMAND(
     .text =
         "A job of its own renders the job's fibers with the fitted parameters, fiber by fiber. The results go to the\n"
         "folder of --out (default: selvedge-ID): pictures/on-1.png, and on-1.exr with the radiance.\n"
-        "--reference alone means --method fast.\n")
+        "--reference alone means --method fast. --kind drape, roll, fold, swatch, close_up, far or lit_through is a\n"
+        "picture for the eye in a studio; otherwise surface, lamp and camera are given.\n")
 
 status cli_render(struct cli *cli, int *exit_code, struct error *err)
 {

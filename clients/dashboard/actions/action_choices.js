@@ -21,6 +21,25 @@ export const SHAPES = [
     draw: () => drawing(line("M16 54 Q16 16 48 16 Q80 16 80 54 Q80 60 48 60 Q16 60 16 54 Z", "cloth"), line("M30 57 Q30 30 40 17"), line("M48 60 L48 16"), line("M66 57 Q66 30 56 17")) },
 ];
 
+// Views of the studio (pictures[].kind), which need no lamp.
+export const VIEWS = [
+  { id: "drape", words: "Draped", draw: SHAPES[0].draw },
+  { id: "roll", words: "A roll", draw: () => drawing(line("M24 50 Q14 50 14 38 Q14 26 24 26 L66 14 Q76 14 76 26 Q76 38 66 38 Z", "cloth"), svg("circle", { cx: "24", cy: "38", r: "12", class: "edge" }), svg("circle", { cx: "24", cy: "38", r: "7", class: "edge" }), line("M24 50 L50 62 L90 46 L66 38")) },
+  { id: "fold", words: "Hung in folds", draw: () => drawing(line("M14 10 L82 10 L82 60 Q74 66 66 60 Q58 54 48 60 Q38 66 30 60 Q22 54 14 60 Z", "cloth"), line("M30 10 L30 60"), line("M48 10 L48 60"), line("M66 10 L66 60")) },
+  { id: "swatch", words: "Flat, with a scale", draw: SHAPES[1].draw },
+  { id: "close_up", words: "Close up: fibers", draw: () => drawing(line("M10 20 Q48 2 86 20 L86 34 Q48 16 10 34 Z", "cloth"), line("M10 25 Q48 7 86 25"), line("M10 30 Q48 12 86 30"), line("M10 50 Q48 34 86 50 L86 64 Q48 48 10 64 Z", "cloth"), line("M10 55 Q48 39 86 55"), line("M10 60 Q48 44 86 60")) },
+  { id: "far", words: "From far", draw: () => drawing(line("M34 50 Q38 48 40 40 Q43 28 48 28 Q53 28 56 40 Q58 48 62 50 Q56 54 52 50 Q48 54 44 50 Q39 54 34 50 Z", "cloth")) },
+  { id: "lit_through", words: "Lit through", draw: () => drawing(line("M26 14 L84 14 L70 44 L12 44 Z", "cloth"), line("M30 64 L38 50"), line("M44 66 L46 50"), line("M58 64 L54 50")) },
+];
+
+export const STUDIO_SIZES = [
+  { id: "look", words: "a quick look (384 pixels)", more: { px: 384, samples: 8 } },
+  { id: "slide", words: "for a slide (1024 pixels)", more: { px: 1024, samples: 16 } },
+  { id: "print", words: "for print (2048 pixels)", more: { px: 2048, samples: 32 } },
+];
+
+export const studioRequest = (view, size) => ({ pictures: [{ kind: view.id, ...size.more }] });
+
 let nGradient = 0;
 
 // A ball in the light: `x`, `y` the place of its bright spot, `soft` how far the light reaches around it.

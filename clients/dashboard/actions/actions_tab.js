@@ -2,7 +2,7 @@
 // its own without a new fit.
 import { card, el } from "../page_parts.js";
 import { getJson, sendJson } from "../server_link.js";
-import { LIGHTS, SHAPES, SIZES, formatsOf, pictureRequest } from "./action_choices.js";
+import { LIGHTS, SHAPES, SIZES, STUDIO_SIZES, VIEWS, formatsOf, pictureRequest, studioRequest } from "./action_choices.js";
 import { MadeJobs } from "./made_jobs.js";
 import { ShareCard } from "./share_card.js";
 
@@ -29,7 +29,7 @@ class Actions {
     this.note = el("p", { class: "note bad", hidden: true, role: "alert" });
     this.formats = el("div", { class: "formats" });
     const twin = view.list.files.some((f) => f.path === "twin/twin.bin");
-    const makers = isCloth(view) ? [this.pictureCard(), el("div", { class: "columns" },
+    const makers = isCloth(view) ? [this.studioCard(), this.pictureCard(), el("div", { class: "columns" },
       card("Files for other programs", this.formats, this.button("make-export", "Make the files", () => this.exportRequest())),
       card("The cloth to turn with the mouse",
         el("p", { class: "hint" }, twin ? "This job has it: it stands at the top of the page." : "Tables from which a browser shows the cloth while it is turned, bent and lit. They take one to three minutes of a processor."),
@@ -39,9 +39,14 @@ class Actions {
     if (makers.length) this.showFormats().catch((error) => this.fail(error));
   }
 
+  studioCard() {
+    const view = choiceOf("View", VIEWS), size = choiceOf("Size", STUDIO_SIZES);
+    return card("A picture in the studio", view.node, size.node, this.button("make-studio", "Make the picture", () => studioRequest(view.chosen(), size.chosen())));
+  }
+
   pictureCard() {
     const shape = choiceOf("Shape", SHAPES), light = choiceOf("Light", LIGHTS), size = choiceOf("Size", SIZES);
-    return card("A picture of the cloth", shape.node, light.node, size.node,
+    return card("A picture with a lamp of your choice", shape.node, light.node, size.node,
       this.button("make-picture", "Make the picture", () => pictureRequest(shape.chosen(), light.chosen(), size.chosen())));
   }
 

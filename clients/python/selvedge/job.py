@@ -173,9 +173,11 @@ class Job:
     def picture(self, folder: str, on: str = "drape", lamp_deg: tuple[float, float] = (45, 0), camera_deg: tuple[float, float] = (30, 180),
                 on_progress: Optional[Callable[[JobState], None]] = None, **options: Any) -> list[str]:
         """Render the cloth "flat", on a "cylinder" or as a "drape" without a new fit, and download folder/pictures/on-1.png and .exr.
-        lamp_deg, camera_deg: angles from the vertical and around it. options: keys of a picture in a job document, such as px."""
+        lamp_deg, camera_deg: angles from the vertical and around it. options: keys of a picture in a job document, such as px. With
+        `kind`, such as kind="roll", it is a picture in the studio, and on, lamp_deg and camera_deg do not count."""
         angles = {"light_theta_deg": lamp_deg[0], "light_phi_deg": lamp_deg[1], "camera_theta_deg": camera_deg[0], "camera_phi_deg": camera_deg[1]}
-        job = self.derive(pictures=[{"on": on, **angles, **options}])
+        view = {} if options.get("kind", "measurement") != "measurement" else {"on": on, **angles}
+        job = self.derive(pictures=[{**view, **options}])
         job.wait(on_progress)
         return job.download(folder, under="pictures/on-")
 

@@ -9,6 +9,7 @@
 #include <jansson.h>
 
 struct job_option;
+struct job_surface_picture;
 
 /* A value for a check. It and all options of earlier rows have been read. */
 struct option_value {
@@ -60,6 +61,9 @@ status job_check_nuisance(const struct option_value *v, struct error *err);
 status job_check_texture(const struct option_value *v, struct error *err);
 /* Each picture names a mesh where it is to lie on one, and nowhere else; its lamp can light it. */
 status job_check_pictures(const struct option_value *v, struct error *err);
+/* Fills in what the kind of picture i decides, whose document is `given`. STATUS_INVALID for a key that the kind does
+ * not take, and for one that it lacks. */
+status job_picture_complete(const json_t *given, size_t i, struct job_surface_picture *picture, struct error *err);
 status job_check_report_file(const struct option_value *v, struct error *err);
 status job_check_result_file(const struct option_value *v, struct error *err);
 status job_check_twin(const struct option_value *v, struct error *err);

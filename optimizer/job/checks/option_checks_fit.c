@@ -202,12 +202,30 @@ static status check_deep_paths(const struct job_surface_picture *p, const json_t
                            "'%s' is given, but the picture has no table of view and light: %s", field, why);
 }
 
+/* Tables of diffusion are made over the job's sheet, which the studio does not have. */
+static status check_studio_method(const struct job_surface_picture *p, size_t i, struct error *err)
+{
+    char field[64];
+    snprintf(field, sizeof field, "pictures[%zu].%s", i, p->reference ? "reference" : "method");
+    if (p->method == JOB_PICTURE_DIFFUSION)
+        return error_set_field(
+            err, STATUS_INVALID, field,
+            "'pictures[%zu].method' is \"diffusion\", which the studio does not have: take \"fast\", "
+            "\"path\" or \"dual\"",
+            i);
+    if (p->reference && p->method == JOB_PICTURE_PATH)
+        return error_set_field(err, STATUS_INVALID, field,
+                               "'%s' is true, but 'method' is \"path\": such a picture is its own reference", field);
+    return STATUS_OK;
+}
+
 static status check_picture(const struct job_setup *setup, const struct job_fit *fit, const struct job_results *results,
                             size_t i, struct error *err)
 {
     const struct job_surface_picture *p = &results->surface_picture[i];
     bool sheet = p->black_sheet < 0 ? setup->black_sheet : p->black_sheet != 0;
     char field[64];
+    if (p->kind != JOB_KIND_MEASUREMENT) return check_studio_method(p, i, err);
     snprintf(field, sizeof field, "pictures[%zu].mesh_file", i);
     if (p->on == JOB_ON_MESH && p->mesh_file[0] == '\0')
         return error_set_field(err, STATUS_INVALID, field, "'%s' is missing: the picture is to lie on a mesh", field);
@@ -260,8 +278,10 @@ static status check_picture(const struct job_setup *setup, const struct job_fit 
 status job_check_pictures(const struct option_value *v, struct error *err)
 {
     status s = STATUS_OK;
+    struct job_results *own = v->own;
     for (size_t i = 0; i < v->section->results->n_surface_picture && s == STATUS_OK; i++) {
-        s = check_picture(v->section->setup, v->section->fit, v->section->results, i, err);
+        s = job_picture_complete(json_array_get(v->value, i), i, &own->surface_picture[i], err);
+        if (s == STATUS_OK) s = check_picture(v->section->setup, v->section->fit, v->section->results, i, err);
         if (s == STATUS_OK)
             s = check_deep_paths(&v->section->results->surface_picture[i], json_array_get(v->value, i), i, err);
     }

@@ -16,10 +16,33 @@ enum job_picture_method {
 #include "base/catalogue/picture_methods.def"
 };
 
-enum job_surface { JOB_ON_FLAT, JOB_ON_CYLINDER, JOB_ON_DRAPE, JOB_ON_MESH };
+enum job_surface {
+    JOB_ON_FLAT,
+    JOB_ON_CYLINDER,
+    JOB_ON_DRAPE,
+    JOB_ON_MESH,
+    JOB_ON_ROLL, /* of studio pictures only, and the next */
+    JOB_ON_FOLD
+};
+
+/* The set-up of a picture: as of a measurement, or a view of the studio (checks/picture_kinds.c). */
+enum job_picture_kind {
+    JOB_KIND_MEASUREMENT,
+    JOB_KIND_SWATCH,
+    JOB_KIND_ROLL,
+    JOB_KIND_DRAPE,
+    JOB_KIND_FOLD,
+    JOB_KIND_CLOSE_UP,
+    JOB_KIND_FAR,
+    JOB_KIND_LIT_THROUGH
+};
+
+/* Its word in job documents. */
+const char *job_picture_kind_name(enum job_picture_kind kind);
 
 /* A picture of the fitted cloth laid on a surface. */
 struct job_surface_picture {
+    enum job_picture_kind kind;
     enum job_surface on;
     char mesh_file[JOB_MAX_NAME_BYTES]; /* of JOB_ON_MESH; "" otherwise */
     double mesh_unit_mm;                /* a unit of the file in millimetres */

@@ -6,6 +6,10 @@
 #define OF_PICTURE(member) INTO_OF(struct job_surface_picture, member)
 
 static const char *const surface_names[] = {"flat", "cylinder", "drape", "mesh", NULL};
+/* In the order of enum job_picture_kind. */
+static const char *const kind_names[] = {"measurement", "swatch", "roll",        "drape", "fold",
+                                         "close_up",    "far",    "lit_through", NULL};
+static const char of_measurement[] = "required of `kind` `measurement`, refused of others";
 static const char *const deep_light_names[] = {"directions", "cells", NULL};
 static const char *const visibility_names[] = {"traced", "tables", NULL};
 /* " `path`: every path is traced. `fast`: ...", with a blank in front. */
@@ -26,11 +30,22 @@ const struct job_option option_rows_pictures[] = {
      .meaning = "Pictures of the fitted cloth laid on a surface (docs/bent-cloth.md), in the folder `pictures` of the "
                 "results. They show the best model. Without `photographs` and `measurements` "
                 "nothing is fitted: they show `fit.model` with `fit.fixed`, which then names every parameter."},
+    {.path = "pictures[].kind",
+     .kind = OPTION_CHOICE,
+     OF_PICTURE(kind),
+     .choice = kind_names,
+     .standard = "\"measurement\"",
+     .meaning =
+         "`measurement`: lamp, camera and surface are given by the keys below, on black. The others are pictures for "
+         "the eye in a studio (docs/bent-cloth.md), which take `px`, `samples`, `method`, `deep_light_paths`, "
+         "`cloth_rotation_deg` and `reference` only: a flat `swatch` of 40 mm with a scale bar, a `roll`, a `drape` "
+         "over a ball, a hung piece in folds (`fold`), a `close_up` of 2 mm, a drape of 30 cm from `far`, and 8 mm "
+         "on a light table (`lit_through`)."},
     {.path = "pictures[].on",
      .kind = OPTION_CHOICE,
      OF_PICTURE(on),
      .choice = surface_names,
-     .required = true,
+     .left_out = of_measurement,
      .meaning =
          "A flat piece, a cylinder with the weft around it, a square piece that has fallen over a ball, or a mesh of "
          "your own."},
@@ -79,10 +94,10 @@ const struct job_option option_rows_pictures[] = {
      .meaning =
          "Whether a black sheet lies under all of the cloth, bent as it is: without it light comes through. With "
          "`method` `fast` and `diffusion` it is that of the job."},
-    ANGLE("pictures[]", struct job_surface_picture, light_theta_deg, 0, 180, .required = true,
+    ANGLE("pictures[]", struct job_surface_picture, light_theta_deg, 0, 180, .left_out = of_measurement,
           .allowed = "0 to 180; for a flat piece not 90, and above it only without the black sheet",
           .meaning = "Angle of the lamp from the vertical. Above 90 the lamp is below."),
-    OTHER_ANGLES("pictures[]", struct job_surface_picture, .required = true),
+    OTHER_ANGLES("pictures[]", struct job_surface_picture, .left_out = of_measurement),
     {.path = "pictures[].lamp_sharpness",
      .kind = OPTION_NUMBER,
      OF_PICTURE(lamp_sharpness),
@@ -103,7 +118,7 @@ const struct job_option option_rows_pictures[] = {
      OF_PICTURE(px),
      RANGE(8, 4096),
      .unit = "pixels",
-     .standard = "512",
+     .left_out = "512, in the studio 1024",
      .meaning = "Width and height of the picture."},
     {.path = "pictures[].samples",
      .kind = OPTION_COUNT,
@@ -119,7 +134,7 @@ const struct job_option option_rows_pictures[] = {
      .choice = picture_method_name,
      .removed_word = "corrected",
      .removed_why = "was removed, because it gained nothing over path tracing: take \"path\" or \"fast\"",
-     .standard = "\"path\"",
+     .left_out = "`path`, in the studio `fast`",
      .meaning = method_meaning + 1},
     {.path = "pictures[].visibility",
      .kind = OPTION_SWITCH,

@@ -124,15 +124,19 @@ status result_geometry_write(struct report *report, struct error *err)
 
 /* ---- renderings ---- */
 
+status result_exr_write(const struct report *report, const struct image *im, const char *folder, const char *name,
+                        struct error *err)
+{
+    char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
+    picture_paths(report, folder, name, ".exr", path, temporary);
+    return put_in_place(report, image_write_exr(im, temporary, err), temporary, path, err);
+}
+
 status result_image_write(const struct report *report, const struct image *im, const char *folder, const char *name,
                           double exposure, bool exr, struct error *err)
 {
     char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
-    status s = STATUS_OK;
-    if (exr) {
-        picture_paths(report, folder, name, ".exr", path, temporary);
-        s = put_in_place(report, image_write_exr(im, temporary, err), temporary, path, err);
-    }
+    status s = exr ? result_exr_write(report, im, folder, name, err) : STATUS_OK;
     picture_paths(report, folder, name, ".png", path, temporary);
     return s == STATUS_OK ? put_in_place(report, image_write_png(im, exposure, temporary, err), temporary, path, err)
                           : s;

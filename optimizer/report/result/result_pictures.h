@@ -17,6 +17,9 @@ status result_photographs_write(const struct report *report, struct error *err);
 /* pictures/<name>.png: 3 bytes a pixel, row 0 at the top. */
 status result_picture_write(const struct report *report, const char *name, const uint8_t *rgb, size_t width,
                             size_t height, struct error *err);
+/* Writes RESULTS/<folder>/<name>.exr. Errors of image_write_exr. */
+status result_exr_write(const struct report *report, const struct image *im, const char *folder, const char *name,
+                        struct error *err);
 /* <folder>/<name>.png, brighter by exposure, and with `exr` before it <name>.exr. The folder must be there. */
 status result_image_write(const struct report *report, const struct image *im, const char *folder, const char *name,
                           double exposure, bool exr, struct error *err);

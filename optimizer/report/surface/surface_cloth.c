@@ -4,9 +4,12 @@
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/job_setup.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/report/surface/surface_view.h"
+#include "renderer/mesh/mesh_curves.h"
 #include "renderer/mesh/mesh_drape.h"
 #include "renderer/mesh/mesh_shapes.h"
 #include "renderer/quick/diffusion_tables.h"
+#include "renderer/scene/scene_ray.h"
 #include "renderer/transport/volume/volume_bent.h"
 
 #include <math.h>
@@ -18,12 +21,14 @@
 /* Cells of a cylinder's mesh around all of it: chords are 1e-5 of the radius from the circle. */
 enum { CYLINDER_CELLS = 720 };
 
-/* The number of the first picture that shows the same drape. */
+/* The number of the first picture whose drape has the same shape: by the radius over the size. */
 static size_t first_of_drape(const struct job_results *results, size_t i)
 {
     const struct job_surface_picture *p = results->surface_picture;
     for (size_t k = 0; k < i; k++)
-        if (p[k].on == JOB_ON_DRAPE && p[k].size_mm == p[i].size_mm && p[k].radius_mm == p[i].radius_mm) return k;
+        if (p[k].on == JOB_ON_DRAPE && surface_studio_is(&p[k]) == surface_studio_is(&p[i]) &&
+            fabs(p[k].radius_mm * p[i].size_mm - p[i].radius_mm * p[k].size_mm) <= 1e-9 * p[i].radius_mm * p[k].size_mm)
+            return k;
     return i;
 }
 
@@ -32,21 +37,55 @@ static size_t first_of_drape(const struct job_results *results, size_t i)
 static status make_drape(const struct surface_input *on, size_t i, struct mesh *m, struct error *err)
 {
     const struct job_surface_picture *p = &on->results->surface_picture[i];
+    const double scale = surface_studio_scale(p, on->made);
     char path[WORKER_PATH_BYTES], name[64], *text = NULL;
     size_t n_bytes;
     worker_folder_path(on->tools->folder, JOB_FOLDER_RESULTS, "pictures", path);
     status s = durable_make_folder(path, err);
-    snprintf(name, sizeof name, "pictures/on-%zu.obj", first_of_drape(on->results, i) + 1);
+    const size_t first = first_of_drape(on->results, i);
+    const struct job_surface_picture *p0 = &on->results->surface_picture[first];
+    snprintf(name, sizeof name, "pictures/on-%zu.obj", first + 1);
     worker_folder_path(on->tools->folder, JOB_FOLDER_RESULTS, name, path);
     if (s == STATUS_OK && access(path, F_OK) != 0) {
         struct progress silent = progress_silent(&on->tools->progress);
-        s = mesh_drape(p->size_mm, p->radius_mm, &silent, m, err);
+        s = mesh_drape(scale * p0->size_mm, scale * p0->radius_mm, &silent, m, err);
         if (s == STATUS_OK) s = mesh_obj_text(m, &text, &n_bytes, err);
         if (s == STATUS_OK) s = worker_folder_replace(on->tools->folder, path, text, n_bytes, err);
         free(text);
         mesh_release(m);
     }
-    return s == STATUS_OK ? mesh_read_obj(path, 1.0, m, err) : s;
+    return s == STATUS_OK ? mesh_read_obj(path, p->size_mm / p0->size_mm, m, err) : s;
+}
+
+/* The innermost turn of a roll and the way between turns, over the thickness of the cloth. */
+static const double core_thicknesses = 4.0, pitch_thicknesses = 1.06;
+static const double least_core_mm = 2.0, tail_share = 2.2; /* of the radius */
+static const double fold_rad = 1.15;
+enum { N_FOLD = 4 };
+
+static status make_roll(const struct surface_input *on, const struct job_surface_picture *p, struct mesh *m,
+                        struct error *err)
+{
+    const double scale = surface_studio_scale(p, on->made), radius_mm = scale * p->radius_mm;
+    const double thickness_mm = on->made->scene != NULL ? scene_thickness_mm(on->made->scene)
+                                                        : volume_scene_thickness_mm(&on->made->volume_scene);
+    return mesh_roll_make(&(struct mesh_roll){.radius_mm = radius_mm,
+                                              .core_mm = fmax(least_core_mm, core_thicknesses * thickness_mm),
+                                              .pitch_mm = fmax(pitch_thicknesses * thickness_mm, 0.02 * radius_mm),
+                                              .tail_mm = tail_share * radius_mm,
+                                              .length_mm = scale * p->size_mm},
+                          m, err);
+}
+
+static status make_folds(const struct surface_input *on, const struct job_surface_picture *p, struct mesh *m,
+                         struct error *err)
+{
+    const double scale = surface_studio_scale(p, on->made);
+    return mesh_folds_make(&(struct mesh_folds){.width_mm = 1.35 * scale * p->size_mm,
+                                                .height_mm = scale * p->size_mm,
+                                                .angle_rad = fold_rad,
+                                                .n_fold = N_FOLD},
+                           m, err);
 }
 
 static status make_mesh(const struct surface_input *on, size_t i, struct mesh *m, struct error *err)
@@ -61,6 +100,10 @@ static status make_mesh(const struct surface_input *on, size_t i, struct mesh *m
         return mesh_flat((const double[2]){p->size_mm, p->size_mm}, (const size_t[2]){1, 1}, m, err);
     case JOB_ON_DRAPE:
         return make_drape(on, i, m, err);
+    case JOB_ON_ROLL:
+        return make_roll(on, p, m, err);
+    case JOB_ON_FOLD:
+        return make_folds(on, p, m, err);
     default:
         worker_folder_path(on->tools->folder, JOB_FOLDER_INPUT, p->mesh_file, path);
         return mesh_read_obj(path, p->mesh_unit_mm, m, err);
@@ -124,6 +167,7 @@ static status check_surface(const struct surface_input *on, size_t i, const stru
             snprintf(err->field, sizeof err->field, OPTION_PICTURE_METHOD "[%zu]", i);
         if (s != STATUS_OK) return s;
     }
+    if (surface_studio_is(p)) return STATUS_OK;
     point_from(p->camera_theta_deg, p->camera_phi_deg - p->cloth_rotation_deg, mm_per_cm * d->camera_distance_cm, at);
     if (!d->camera_far_field && scene_encloses(bent, at))
         return error_set(err, STATUS_INVALID,

@@ -1,5 +1,6 @@
 #include "optimizer/report/surface/surface_ground.h"
 #include "optimizer/job/document/job_results.h"
+#include "optimizer/report/surface/surface_view.h"
 #include "renderer/preview/ground_shadow.h"
 
 #include <math.h>
@@ -7,21 +8,25 @@
 
 /* The plane's radius in widths of the picture, and rays along an edge of the lamp for each place of a filtered one. */
 static const double radius_widths = 3.0;
+static const double studio_gap_mm = 0.05;
 enum { FILTER_SIDE = 4 };
 
 status surface_ground_init(const struct report *report, size_t i, const struct render_request *q,
                            const struct progress *progress, struct surface_ground *ground, struct error *err)
 {
     const struct job_surface_picture *p = &report->in.results->surface_picture[i];
+    const bool studio = surface_studio_is(p);
     memset(ground, 0, sizeof *ground);
-    if (isnan(p->ground_gap_mm)) return STATUS_OK;
+    if (isnan(p->ground_gap_mm) && (!studio || p->kind == JOB_KIND_LIT_THROUGH)) return STATUS_OK;
     if (q->input.scene.fibers == NULL) {
         worker_status_warn(report->in.job->tools->status,
                            "picture %zu has no ground: the shadow of a volume model is not traced", i + 1);
         return STATUS_OK;
     }
+    struct progress silent = progress_silent(progress);
     ground->present = true;
-    ground->z_mm = ground_below(q->input.scene.fibers, p->ground_gap_mm);
+    ground->z_mm = ground_below(q->input.scene.fibers, studio ? studio_gap_mm : p->ground_gap_mm);
+    if (studio) return surface_studio_ground(report, q, ground->z_mm, &silent, &ground->layer, err);
     const struct ground_request g = {.scene = q->input.scene.fibers,
                                      .configuration = q->configuration,
                                      .z_mm = ground->z_mm,
@@ -32,7 +37,6 @@ status surface_ground_init(const struct report *report, size_t i, const struct r
                                      .n_sample = q->n_sample > 1 ? q->n_sample : 2,
                                      .seed = q->seed,
                                      .stream = q->stream};
-    struct progress silent = progress_silent(progress);
     status s = ground_render(&g, report->in.job->tools->pool, &silent, &ground->layer, err);
     ground->sheared = q->configuration->light == LIGHT_SQUARE_LAMP;
     if (s == STATUS_OK && p->filter && ground->sheared)

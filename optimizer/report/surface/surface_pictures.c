@@ -13,9 +13,12 @@
 #include "optimizer/report/surface/surface_filter.h"
 #include "optimizer/report/surface/surface_ground.h"
 #include "optimizer/report/surface/surface_passes.h"
+#include "optimizer/report/surface/surface_studio.h"
 #include "optimizer/report/surface/surface_tables.h"
+#include "optimizer/report/surface/surface_view.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 #include "optimizer/stages/validation/pipeline_discrepancy.h"
+#include "renderer/preview/studio_light.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -23,9 +26,8 @@
 #include <string.h>
 
 enum { STREAM = 4000 };
-static const double mm = 1e-3;
 
-static const char *const surface_name[] = {"flat", "cylinder", "drape", "mesh"};
+static const char *const surface_name[] = {"flat", "cylinder", "drape", "mesh", "roll", "fold"};
 
 /* One picture of the document. */
 struct one_picture {
@@ -155,6 +157,27 @@ static status write_json(struct report *report, const char *path, const json_t *
     return s;
 }
 
+/* The same of the studio. It is filtered and written after the first pass, and whenever the samples have doubled. */
+static status write_studio(struct report *report, const struct one_picture *one, const struct surface_filter *filter,
+                           const struct surface_passes *so_far, const struct surface_passes *shown, double exposure,
+                           struct error *err)
+{
+    const size_t n = so_far->n_sample;
+    const bool whole = n == report->in.results->surface_picture[one->i].sample;
+    status s = whole || (n & (n - 1)) == 0
+                   ? surface_studio_write(report, one->i, filter, one->ground, so_far, exposure, err)
+                   : STATUS_OK;
+    return s == STATUS_OK && whole ? result_exr_write(report, &shown->image, "pictures", so_far->name, err) : s;
+}
+
+/* What the entry of a studio picture says besides. */
+static void put_studio(json_t *entry, const struct job_surface_picture *p, const struct surface_filter *filter)
+{
+    json_object_set_new(entry, "kind", json_string(job_picture_kind_name(p->kind)));
+    json_object_set_new(entry, "tone_curve", json_string("khronos_pbr_neutral"));
+    if (filter->feature.pixel != NULL) json_object_set_new(entry, "filter", json_string("joint.v1"));
+}
+
 /* The entry of result.json lies beside the picture and is written last: a picture is finished when its entry has all
  * samples. *out: the entry; the caller owns a reference to it. */
 static status write_entry(struct report *report, const struct one_picture *one, const struct surface_filter *filter,
@@ -165,15 +188,19 @@ static status write_entry(struct report *report, const struct one_picture *one, 
     struct surface_passes shown;
     status s = surface_ground_add(one->ground, so_far, &shown, err);
     if (s != STATUS_OK) return s;
-    double exposure = exposure_of(&shown.image);
-    s = write_picture(report, p, &shown, exposure, err);
-    if (s == STATUS_OK) s = surface_filter_write(report, filter, one->ground, so_far, exposure, &filtered, err);
+    const bool studio = surface_studio_is(p);
+    const double exposure = studio ? studio_exposure(&so_far->image) : exposure_of(&shown.image);
+    s = studio ? write_studio(report, one, filter, so_far, &shown, exposure, err)
+               : write_picture(report, p, &shown, exposure, err);
+    if (s == STATUS_OK && !studio)
+        s = surface_filter_write(report, filter, one->ground, so_far, exposure, &filtered, err);
     if (s == STATUS_OK) {
         json_decref(*out);
         *out = picture_json(one, p, &shown, exposure);
     }
     surface_passes_release(&shown);
     if (s != STATUS_OK) return s;
+    if (studio) put_studio(*out, p, filter);
     if (p->speckle) json_object_set_new(*out, "speckle", json_true());
     if (one->ground->present) json_object_set_new(*out, "ground_z_mm", json_number(one->ground->z_mm));
     if (filtered != NULL) json_object_set_new(*out, "filtered", filtered);
@@ -232,21 +259,15 @@ static status render(struct report *report, const struct one_picture *one, const
     struct surface_cloth cloth;
     struct appearance far;
     const struct appearance *shown = surface_field_model(report, one->i, &model->setup->appearance, &far);
-    struct configuration view =
-        observation_configuration(report->in.job->setup, p->light_theta_deg, p->light_phi_deg, p->camera_theta_deg,
-                                  p->camera_phi_deg, p->cloth_rotation_deg);
-    view.crop_m = mm * p->width_mm;
-    view.crop_aspect = 1.0;
-    view.environment = report->in.job->rows->environment;
-    if (!isnan(p->lamp_sharpness)) {
-        view.light = LIGHT_GAUSSIAN;
-        view.light_sharpness = p->lamp_sharpness;
-    }
+    struct surface_view view;
     const struct scene *fibers =
         model->setup->appearance.kind == MODEL_SURFACE ? made_cloth_scene(report->in.made, model->setup).fibers : NULL;
-    status s = surface_cloth_init(
-        &(struct surface_input){report->in.job->tools, report->in.results, report->in.job->setup, report->in.made},
-        one->i, fibers, &cloth, err);
+    status s = surface_view_init(report, one->i, &view, err);
+    memset(&cloth, 0, sizeof cloth);
+    if (s == STATUS_OK)
+        s = surface_cloth_init(
+            &(struct surface_input){report->in.job->tools, report->in.results, report->in.job->setup, report->in.made},
+            one->i, fibers, &cloth, err);
     struct render_request q = {
         .input = {.scene = {.fibers = cloth.fibers, .volume = cloth.volume.bent != NULL ? &cloth.volume : NULL},
                   .model = shown,
@@ -255,7 +276,7 @@ static status render(struct report *report, const struct one_picture *one, const
                   .discrepancy = traced ? pipeline_discrepancy(model->validation) : NULL,
                   .has_speckle = p->speckle,
                   .speckle_seed = report->in.job->seed},
-        .configuration = &view,
+        .configuration = &view.configuration,
         .width = p->px,
         .height = p->px,
         .n_sample = p->sample,
@@ -264,7 +285,7 @@ static status render(struct report *report, const struct one_picture *one, const
     surface_method_apply(&one->how, &q.input);
     struct progress_part part;
     struct progress first = progress_begin_part(&part, progress, 0.0, compared ? 0.5 : 1.0);
-    if (!traced && pipeline_discrepancy(model->validation) != NULL)
+    if (!traced && !surface_studio_is(p) && pipeline_discrepancy(model->validation) != NULL)
         worker_status_warn(report->in.job->tools->status,
                            "picture %zu is not path traced, and goes without the discrepancy", one->i + 1);
     struct surface_ground ground = {0};
@@ -277,6 +298,7 @@ static status render(struct report *report, const struct one_picture *one, const
     if (s == STATUS_OK && compared) s = render_reference(report, &with, q, &first, so_far, *entry, err);
     surface_ground_release(&ground);
     surface_cloth_release(&cloth);
+    surface_view_release(&view);
     return s == STATUS_OK || s == STATUS_CANCELLED ? s : error_prefix(err, s, "picture %zu", one->i + 1);
 }
 
@@ -285,7 +307,7 @@ static bool is_finished(const json_t *entry, const struct job_surface_picture *p
 {
     const char *method = json_string_value(json_object_get(entry, "method"));
     if (json_integer_value(json_object_get(entry, "samples")) != (json_int_t)p->sample) return false;
-    if (p->filter && has_fibers && json_object_get(entry, "filtered") == NULL) return false;
+    if (p->filter && !surface_studio_is(p) && has_fibers && json_object_get(entry, "filtered") == NULL) return false;
     return !p->reference || method == NULL || strcmp(method, picture_method_name[JOB_PICTURE_PATH]) == 0 ||
            json_object_get(entry, "reference") != NULL;
 }

@@ -4,7 +4,9 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 #include "renderer/fast/precompute/fast_precompute.h"
+#include "renderer/scene/scene_ray.h"
 
+#include <stdio.h>
 #include <unistd.h>
 
 /* Three traced hits leave a third of the error of one (renderer/fast/NOTES.md); the transfer to a cell has an error of
@@ -18,20 +20,30 @@ enum { N_TRACED_IN_PILE = 2 };
 /* Rough processor seconds on a twill of 26,000 segments: of a path of the table of directions, of a path of all cells,
  * of the tables of visible directions, and of a sample of a picture by tables and path by path. */
 static const double deep_path_s = 12e-6, cell_path_s = 3e-3, visibility_s = 60.0, fast_sample_s = 5e-6,
-                    path_sample_s = 20e-6;
+                    fast_studio_sample_s = 9e-6, path_sample_s = 20e-6;
+
+/* Pictures of a studio have tables of their own, because no black sheet lies under their cloth. */
+static bool is_of(const struct job_surface_picture *p, bool studio)
+{
+    return (p->kind != JOB_KIND_MEASUREMENT) == studio;
+}
 
 /* Returns whether a picture takes the visibility of its segments from tables. */
-static bool wants_visibility(const struct job_results *results)
+static bool wants_visibility(const struct job_results *results, bool studio)
 {
-    for (size_t i = 0; i < results->n_surface_picture; i++)
-        if (results->surface_picture[i].visibility_by_tables) return true;
+    for (size_t i = 0; i < results->n_surface_picture; i++) {
+        const struct job_surface_picture *p = &results->surface_picture[i];
+        if (is_of(p, studio) && p->visibility_by_tables) return true;
+    }
     return false;
 }
 
-static bool wants_tables(const struct job_results *results)
+static bool wants_tables(const struct job_results *results, bool studio)
 {
-    for (size_t i = 0; i < results->n_surface_picture; i++)
-        if (results->surface_picture[i].method == JOB_PICTURE_FAST) return true;
+    for (size_t i = 0; i < results->n_surface_picture; i++) {
+        const struct job_surface_picture *p = &results->surface_picture[i];
+        if (is_of(p, studio) && p->method == JOB_PICTURE_FAST) return true;
+    }
     return false;
 }
 
@@ -42,22 +54,22 @@ static bool by_directions(const struct job_surface_picture *p)
 }
 
 /* Paths for that table; 0: no picture asks for it. */
-static size_t deep_paths(const struct job_results *results)
+static size_t deep_paths(const struct job_results *results, bool studio)
 {
     size_t n = 0;
     for (size_t i = 0; i < results->n_surface_picture; i++) {
         const struct job_surface_picture *p = &results->surface_picture[i];
-        if (by_directions(p) && p->n_deep_path > n) n = p->n_deep_path;
+        if (is_of(p, studio) && by_directions(p) && p->n_deep_path > n) n = p->n_deep_path;
     }
     return n;
 }
 
 /* Paths of a cell; without a picture by cells they only say how far light spreads. */
-static uint32_t cell_paths(const struct job_results *results)
+static uint32_t cell_paths(const struct job_results *results, bool studio)
 {
     for (size_t i = 0; i < results->n_surface_picture; i++) {
         const struct job_surface_picture *p = &results->surface_picture[i];
-        if (p->method == JOB_PICTURE_FAST && !by_directions(p)) return CELL_PATHS;
+        if (is_of(p, studio) && p->method == JOB_PICTURE_FAST && !by_directions(p)) return CELL_PATHS;
     }
     return SPREAD_PATHS;
 }
@@ -81,49 +93,69 @@ static bool wants_method(const struct job_results *results, enum job_picture_met
 
 double surface_tables_paths(const struct job_results *results)
 {
-    if (!wants_tables(results)) return 0.0;
-    return (deep_path_s * (double)deep_paths(results) + cell_path_s * cell_paths(results) +
-            (wants_visibility(results) ? visibility_s : 0.0)) /
-           path_sample_s;
+    double seconds = 0.0;
+    for (int studio = 0; studio < 2; studio++)
+        if (wants_tables(results, studio))
+            seconds += deep_path_s * (double)deep_paths(results, studio) + cell_path_s * cell_paths(results, studio) +
+                       (wants_visibility(results, studio) ? visibility_s : 0.0);
+    return seconds / path_sample_s;
 }
 
 double surface_sample_paths(const struct job_surface_picture *p)
 {
-    return (p->method == JOB_PICTURE_FAST ? fast_sample_s / path_sample_s : 1.0) + (p->reference ? 1.0 : 0.0);
+    const bool studio = p->kind != JOB_KIND_MEASUREMENT;
+    const double fast_s = studio ? fast_studio_sample_s : fast_sample_s;
+    return (p->method == JOB_PICTURE_FAST ? fast_s / path_sample_s : 1.0) + (p->reference ? 1.0 : 0.0);
 }
 
-static status get_tables(struct report *report, const struct progress *progress, struct surface_tables *t,
-                         struct error *err)
+/* Reads or makes the tables that are kept as work/report/<name>.tables. */
+static status get_tables(struct report *report, bool studio, const struct scene *scene, const struct progress *progress,
+                         struct fast_tables *t, struct error *err)
 {
+    const struct job_results *results = report->in.results;
     const struct pipeline_model *model = &report->model[report_best_model(report)];
-    char path[WORKER_PATH_BYTES], journal[WORKER_PATH_BYTES];
-    const struct fast_precompute_request q = {.scene = report->in.made->scene,
+    const char *name = studio ? "studio" : "fast";
+    char path[WORKER_PATH_BYTES], journal[WORKER_PATH_BYTES], relative[64];
+    const struct fast_precompute_request q = {.scene = scene,
                                               .model = model->setup->appearance.surface,
                                               .param = model->fit->result.param,
                                               .n_set = model->setup->sets.n_set,
-                                              .n_path = cell_paths(report->in.results),
-                                              .no_visibility = !wants_visibility(report->in.results),
-                                              .deep_traced = deep_paths(report->in.results) > 0 ? N_TRACED : 0,
-                                              .deep_paths = (double)deep_paths(report->in.results),
+                                              .n_path = cell_paths(results, studio),
+                                              .no_visibility = !wants_visibility(results, studio),
+                                              .deep_traced = deep_paths(results, studio) > 0 ? N_TRACED : 0,
+                                              .deep_paths = (double)deep_paths(results, studio),
                                               .journal_path = journal,
                                               .journal_every_s = JOURNAL_EVERY_S};
-    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_WORK, "report/fast.journal", journal);
+    snprintf(relative, sizeof relative, "report/%s.journal", name);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_WORK, relative, journal);
     worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_WORK, "report", path);
     status s = durable_make_folder(path, err);
     if (s != STATUS_OK) return s;
-    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_WORK, "report/fast.tables", path);
+    snprintf(relative, sizeof relative, "report/%s.tables", name);
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_WORK, relative, path);
     struct error unread;
-    const status kept = fast_precompute_kept(&q, path, &t->tables, &unread);
-    t->present = kept == STATUS_OK;
-    if (t->present) {
+    const status kept = fast_precompute_kept(&q, path, t, &unread);
+    if (kept == STATUS_OK) {
         unlink(journal); /* of an attempt that ended after it had written the tables */
         return STATUS_OK;
     }
     if (kept != STATUS_NOT_FOUND) log_info(report->in.job->tools->log, "tables are made anew: %s", unread.text);
-    s = fast_precompute(&q, report->in.job->tools->pool, progress, &t->tables, err);
-    t->present = s == STATUS_OK;
-    if (s == STATUS_OK) s = fast_tables_write(&t->tables, path, err);
+    s = fast_precompute(&q, report->in.job->tools->pool, progress, t, err);
+    if (s != STATUS_OK) return s;
+    s = fast_tables_write(t, path, err);
     if (s == STATUS_OK && unlink(journal) != 0) s = error_set_errno(err, "cannot remove '%s'", path_file_name(journal));
+    return s;
+}
+
+static status get_studio_tables(struct report *report, const struct progress *progress, struct surface_tables *t,
+                                struct error *err)
+{
+    const struct scene *scene = report->in.made->scene;
+    struct scene *lifted = NULL;
+    status s = scene_has_black_sheet(scene) ? scene_lift(scene, &lifted, err) : STATUS_OK;
+    if (s == STATUS_OK) s = get_tables(report, true, lifted != NULL ? lifted : scene, progress, &t->studio, err);
+    scene_free(lifted);
+    t->has_studio = s == STATUS_OK;
     return s;
 }
 
@@ -146,13 +178,14 @@ status surface_tables_get(struct report *report, const struct progress *progress
                           struct error *err)
 {
     const struct pipeline_model *model = &report->model[report_best_model(report)];
-    const bool tables = wants_tables(report->in.results), averages = wants_averages(report->in.results, true),
+    const bool tables = wants_tables(report->in.results, false), studio = wants_tables(report->in.results, true),
+               averages = wants_averages(report->in.results, true),
                pile = wants_method(report->in.results, JOB_PICTURE_DIFFUSION);
     *t = (struct surface_tables){0};
-    if (!tables && !averages && !pile) return STATUS_OK;
+    if (!tables && !studio && !averages && !pile) return STATUS_OK;
     if (model->setup->appearance.kind != MODEL_SURFACE ||
         scattering_frame_reason(model->setup->appearance.surface) != NULL) {
-        if (tables || pile || wants_averages(report->in.results, false))
+        if (tables || studio || pile || wants_averages(report->in.results, false))
             worker_status_warn(report->in.job->tools->status,
                                "all pictures are rendered path by path: there are no tables for the model '%s'",
                                model->setup->appearance.id);
@@ -167,22 +200,29 @@ status surface_tables_get(struct report *report, const struct progress *progress
         t->averaged = s == STATUS_OK;
     }
     if (s == STATUS_OK && pile) s = get_pile(report, progress, t, err);
-    return s == STATUS_OK && tables ? get_tables(report, progress, t, err) : s;
+    if (s == STATUS_OK && studio) s = get_studio_tables(report, progress, t, err);
+    if (s != STATUS_OK || !tables) return s;
+    s = get_tables(report, false, report->in.made->scene, progress, &t->tables, err);
+    t->present = s == STATUS_OK;
+    return s;
 }
 
 void surface_tables_release(struct surface_tables *t)
 {
     fast_tables_release(&t->tables);
+    fast_tables_release(&t->studio);
     dual_tables_release(&t->averages);
 }
 
 struct surface_method surface_tables_method(const struct surface_tables *t, const struct job_surface_picture *p)
 {
+    const bool studio = p->kind != JOB_KIND_MEASUREMENT;
     const bool has = p->method == JOB_PICTURE_DUAL        ? t->averaged
                      : p->method == JOB_PICTURE_DIFFUSION ? t->piled
+                     : studio                             ? t->has_studio
                                                           : t->present;
     return (struct surface_method){.method = has ? p->method : JOB_PICTURE_PATH,
-                                   .fast = {.tables = &t->tables,
+                                   .fast = {.tables = studio ? &t->studio : &t->tables,
                                             .visibility = p->visibility_by_tables ? FAST_TABLES : FAST_TRACED,
                                             .n_traced = N_TRACED,
                                             .deep = by_directions(p)},

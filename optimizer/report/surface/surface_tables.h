@@ -10,10 +10,11 @@
 #include "renderer/quick/dual_tables.h"
 
 struct surface_tables {
-    struct fast_tables tables;
+    struct fast_tables tables, studio; /* of measurements, over the job's sheet; of studio pictures, without a sheet */
     struct dual_tables averages;
     struct diffusion_tables pile;
-    bool present;  /* false: no picture asks for tables, or the model's fibers are flat, which a warning says */
+    bool present; /* false: no picture asks for tables, or the model's fibers are flat, which a warning says */
+    bool has_studio;
     bool averaged; /* the same of the averages */
     bool piled;    /* the same of the pile */
 };
@@ -31,10 +32,10 @@ struct surface_method {
 double surface_tables_paths(const struct job_results *results);
 /* The same of one sample of a picture, with its reference. */
 double surface_sample_paths(const struct job_surface_picture *p);
-/* Reads the tables of the best model from the job's folder, work/report/fast.tables, if the file has the tables of this
- * cloth with these parameters. Otherwise makes and stores them, and goes on from the file fast.journal beside it that
- * an interrupted attempt has left. Makes averages. Errors of fast_precompute, fast_tables_write, dual_tables_init and
- * diffusion_tables_make. */
+/* Reads the tables of the best model from the job's folder, work/report/fast.tables and studio.tables, if the files
+ * have the tables of this cloth with these parameters. Otherwise makes and stores them, and goes on from the files
+ * fast.journal and studio.journal beside them that an interrupted attempt has left. Makes averages. Errors of
+ * fast_precompute, fast_tables_write, dual_tables_init and diffusion_tables_make. */
 status surface_tables_get(struct report *report, const struct progress *progress, struct surface_tables *t,
                           struct error *err);
 void surface_tables_release(struct surface_tables *t);

@@ -8,7 +8,7 @@
 static inline void path_add_beyond(const struct path_setting *s, const struct scene_ray *ray, float radiance[3])
 {
     float position[3], beyond[3] = {0, 0, 0};
-    if (scene_sheet_met(s->scene, ray)) return;
+    if (s->lights.unseen || scene_sheet_met(s->scene, ray)) return;
     for (int a = 0; a < 3; a++) position[a] = (float)((double)ray->origin_mm[a] + (a < 2 ? ray->offset_mm[a] : 0.0));
     lights_add_environment(&s->lights, ray->direction, 0, beyond);
     float lamp = s->lights.has_lamp ? lights_lamp_beyond(&s->lights.lamp, position, ray->direction, 0) : 0;

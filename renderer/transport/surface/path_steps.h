@@ -16,7 +16,7 @@
 static void add_beyond(struct walk *w, const struct scene_ray *ray, float pdf)
 {
     const struct path_setting *s = w->s;
-    if (scene_sheet_met(s->scene, ray)) return;
+    if (scene_sheet_met(s->scene, ray) || (pdf == 0 && s->lights.unseen)) return;
     float around[3] = {0, 0, 0}, position[3];
     lights_add_environment(&s->lights, ray->direction, pdf, around);
     unwrapped(ray->origin_mm, ray->offset_mm, position);

@@ -151,7 +151,7 @@ static void connect_lights(struct bent_path *p, const double position[3])
 /* Adds the light that a path meets after it has left the cloth. pdf: as lights_lamp_beyond. */
 static void add_beyond(struct bent_path *p, float pdf)
 {
-    if (p->walk.i_cell == SHELL_ON_SHEET) return;
+    if (p->walk.i_cell == SHELL_ON_SHEET || (pdf == 0 && p->s->lights.unseen)) return;
     float direction[3], from[3], beyond[3] = {0, 0, 0};
     for (int a = 0; a < 3; a++) {
         direction[a] = (float)p->walk.direction[a];

@@ -117,7 +117,7 @@ static void add_light(const struct volume_setting *s, struct volume_path *l, con
 static void add_beyond(const struct volume_setting *s, struct volume_path *l)
 {
     const float *direction = l->ray.direction;
-    if (direction[2] < 0 && s->scene->black_sheet) return;
+    if ((direction[2] < 0 && s->scene->black_sheet) || (l->pdf == 0 && s->lights.unseen)) return;
     float beyond[3] = {0, 0, 0}, value[3];
     if (s->lights.has_lamp) {
         float lamp = lights_lamp_beyond(&s->lights.lamp, l->origin_mm, direction, l->pdf);
