@@ -10,9 +10,9 @@
 /* Standard deviations of the means that noise may reach. */
 static const double NOISE_SD = 5.0;
 
-/* Particles, in contrast to pieces of fibers: share of their ball that they fill, which a cylinder of more than four
+/* Particles, in contrast to pieces of fibers: share of their ball that they fill, which a cylinder of three
  * diameters does not, and largest radius of that ball in fiber diameters. */
-static const double PARTICLE_FILL = 0.17, PARTICLE_RADIUS = 2.5;
+static const double PARTICLE_FILL = 0.35, PARTICLE_RADIUS = 2.0;
 
 /* Counts of one slice. */
 struct slice_count {

@@ -45,6 +45,47 @@ static double shared_error(const struct trace_job *job, double mean_voxel, doubl
     return CALIBRATED * hypot(hypot(se_voxel, by_model), 0.5 * DENSITY_ERROR * mean_voxel);
 }
 
+/* Mean density on the axis of a line. */
+static double axis_density(const struct volume *v, const struct polyline_set *lines, size_t l)
+{
+    double sum = 0.0;
+    for (size_t i = lines->first[l]; i < lines->first[l + 1]; i++) {
+        size_t at[3];
+        for (int a = 0; a < 3; a++) at[a] = (size_t)fmin(fmax((double)lines->vertex[i][a], 0.0), (double)v->n[a] - 1.0);
+        sum += (double)v->density[volume_index(v->n, at[0], at[1], at[2])];
+    }
+    return sum / (double)polyline_length(lines, l);
+}
+
+/* Error of the radius of a line whose density is not the mean of all: the fit takes less density for a thinner fiber,
+ * by 0.3 to 1.1 of the difference on scans of several materials. */
+static double density_error(const struct volume *v, const struct polyline_set *lines, size_t l, double mean)
+{
+    static const double PART = 0.6, NOISE = 0.03;
+    return PART * (double)lines->radius[l] * fmax(0.0, fabs(axis_density(v, lines, l) - mean) - NOISE);
+}
+
+/* Adds the errors by density to those by noise, of single fibers and along them. Filled lumens have no density. */
+static void add_density_errors(struct trace_job *job, struct polyline_set *lines)
+{
+    struct reconstruct_report *report = job->report;
+    double mean = 0.0, square = 0.0, length = 0.0;
+    if (report->lumens_measured) return;
+    for (size_t l = 0; l < lines->n_line; l++) {
+        mean += axis_density(job->v, lines, l) * (double)polyline_length(lines, l);
+        length += (double)polyline_length(lines, l);
+    }
+    for (size_t l = 0; l < lines->n_line; l++) {
+        const double error = density_error(job->v, lines, l, mean / length);
+        square += error * error * (double)polyline_length(lines, l);
+        for (size_t i = lines->first[l]; i < lines->first[l + 1] && lines->shape != NULL; i++)
+            if (lines->shape[i].radius_se > 0.0f)
+                lines->shape[i].radius_se = hypotf(lines->shape[i].radius_se, (float)error);
+    }
+    report->single_radius_se_m =
+        hypot(report->single_radius_se_m, sqrt(square / fmax(1.0, length)) * job->v->voxel_size_m[0]);
+}
+
 /* Adds the shared errors to those by noise: of the classes, of single fibers, and along them. */
 static void state_errors(struct trace_job *job, struct polyline_set *lines)
 {
@@ -94,7 +135,10 @@ static status find_radius(struct trace_job *job, struct polyline_set *lines, str
     }
     for (int a = 0; a < 3; a++) m.radius_voxel[a] = job->o->radius_m[a] / voxel_m;
     if (s == STATUS_OK) polylines_set_radii(lines, &m, !is_given && job->o->radius_rule == RADIUS_AUTO);
-    if (s == STATUS_OK) state_errors(job, lines);
+    if (s == STATUS_OK) {
+        add_density_errors(job, lines);
+        state_errors(job, lines);
+    }
     free(part);
     return s;
 }

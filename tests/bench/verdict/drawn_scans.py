@@ -1,6 +1,6 @@
 """Options of scans that are drawn at random, so that limits that were chosen on the named scans can be judged on others.
 
-A scan drawn-N is the same on every machine. Half of the scans lie in the domain that the product promises (fibers of 5 to 10
+A scan drawn-N, hollow-N or broad-N is the same on every machine. Half of the scans lie in the domain that the product promises (fibers of 5 to 10
 voxels that are alike, signal-to-noise 3 and more); the others have one or two things that scans suffer from.
 """
 import numpy as np
@@ -65,4 +65,21 @@ def hollow(number, default):
     o["open"] = float(rng.uniform(1.3, 2.2)) if o["kind"] == "gauze" else float(rng.uniform(1.02, 1.2))
     side = int(np.clip(12 * d, 80, 128))
     o["size"] = (side, side, int(np.clip(8 * d, 48, 96)))
+    return o
+
+
+def broad(number, default):
+    """The options of scan broad-`number`: blends of fibers of two or three kinds, of densities of 0.2 to 1 and diameters of
+    0.5 to 1 of the thickest, in the same yarns, and often balls, of any density; light fibers may be beneath the noise."""
+    rng = np.random.default_rng([20261130, number])
+    d = float(rng.uniform(6, 12))
+    o = {**default, "kind": str(rng.choice(["gauze", "twill", "felt"])), "d": (d, d), "n": int(rng.choice([4, 7])),
+         "snr": float(rng.uniform(2.5, 8)), "blur": float(rng.uniform(0.5, 1.2)), "fibers": int(rng.integers(25, 90)), "spread": float(rng.uniform(0, 0.15))}
+    o["open"] = float(rng.uniform(1.2, 2.0)) if o["kind"] == "gauze" else float(rng.uniform(1.02, 1.2))
+    kinds = [(1.0, 1.0)] + [(float(rng.uniform(0.2, 1)), float(rng.uniform(0.5, 1))) for _ in range(int(rng.integers(1, 3)))]
+    o["blend"] = tuple(kinds[i] for i in rng.integers(0, len(kinds), 4)) + tuple(kinds)
+    if rng.uniform() < 0.4:
+        o.update(balls=int(rng.integers(8, 160)), ball_radius=(2, float(rng.uniform(3, 8))), ball_rho=(float(rng.uniform(0.3, 1)), 1.5))
+    side = int(np.clip(12 * d, 88, 128))
+    o["size"] = (side, side, int(np.clip(8 * d, 56, 96)))
     return o

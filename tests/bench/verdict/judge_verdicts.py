@@ -3,9 +3,10 @@ bench_verdict, and prints figures, one JSON object a line; the rows go to standa
 
     judge_verdicts.py [--build DIR] [--unseen DIR] [--drawn FIRST LAST] [--lumens] [NAME ...]
 
-NAME: a scan of verdict_scans.py, of the product, of --unseen, or drawn-N or hollow-N of drawn_scans.py; default: all but the
+NAME: a scan of verdict_scans.py, of the product, of --unseen, or drawn-N, broad-N or hollow-N of drawn_scans.py; default: all but the
 drawn ones.
 --drawn: only those (and NAME), for limits that were chosen on the named scans; with --lumens also the hollow ones.
+--broad: the scans broad-FIRST to broad-LAST as well, blends of kinds of fibers.
 --lumens: only whether the fibers look hollow, in a tenth of the time.
 
 geometry.verdict.false_good        scans called good with a recall below 0.9, a precision below 0.93 or above 1.5 fragments
@@ -126,6 +127,7 @@ def main():
     parser.add_argument("--build", default=os.path.join(ROOT, "build"))
     parser.add_argument("--unseen", default=os.path.join(ROOT, "..", "shared", "data", "unseen-scans"))
     parser.add_argument("--drawn", type=int, nargs=2)
+    parser.add_argument("--broad", type=int, nargs=2)
     parser.add_argument("--lumens", action="store_true")
     parser.add_argument("name", nargs="*")
     arguments = parser.parse_args()
@@ -135,15 +137,16 @@ def main():
     rows = []
     numbers = range(arguments.drawn[0], arguments.drawn[1] + 1) if arguments.drawn else []
     drawn = [kind + "-%d" % i for i in numbers for kind in (["drawn", "hollow"] if arguments.lumens else ["drawn"])]
-    named = [*verdict_scans.SCANS, *PRODUCT, *unseen] if not arguments.drawn else []
+    drawn += ["broad-%d" % i for i in range(arguments.broad[0], arguments.broad[1] + 1)] if arguments.broad else []
+    named = [*verdict_scans.SCANS, *PRODUCT, *unseen] if not drawn else []
     for name in (arguments.name or named) + drawn:
         if name in PRODUCT:
             path = make_product(arguments.build, folder, name)
         elif name in unseen:
             path = take_unseen(arguments.unseen, folder, name)
-        elif name.startswith(("drawn-", "hollow-")):
-            draw = drawn_scans.drawn if name.startswith("drawn-") else drawn_scans.hollow
-            verdict_scans.make(name, draw(int(name.split("-")[1]), verdict_scans.DEFAULT), folder)
+        elif name.startswith(("drawn-", "hollow-", "broad-")):
+            kind, number = name.split("-")
+            verdict_scans.make(name, getattr(drawn_scans, kind)(int(number), verdict_scans.DEFAULT), folder)
             path = os.path.join(folder, name + ".mhd")
         else:
             verdict_scans.make(name, {**verdict_scans.DEFAULT, **verdict_scans.SCANS[name]}, folder)

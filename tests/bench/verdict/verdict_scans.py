@@ -14,7 +14,8 @@ import numpy as np
 VOXEL_UM = 2.0
 DEFAULT = {"kind": "gauze", "size": (112, 112, 72), "d": (7, 7), "rho": (1, 1), "n": 7, "snr": 5, "blur": 0.7, "corr": 0.5, "open": 1.5,
            "spread": 0.08, "balls": 0, "ball_radius": (3, 7), "hairs": 0, "fibers": 60, "cup": 0, "rim": 0, "pad": 0, "mixed": 0, "length": 0, "plate": 0,
-           "lumen": 0, "solid": 0, "flat": 1, "plies": 1, "tilt": 0, "relax": 0}
+           "lumen": 0, "solid": 0, "flat": 1, "plies": 1, "tilt": 0, "relax": 0,
+           "blend": (), "ball_rho": (1, 1)}
 TWILL = {"kind": "twill", "open": 1.05, "relax": 50}
 SCANS = {
     "gauze": {}, "gauze-noisy": {"snr": 2.5}, "gauze-d10": {"d": (10, 10), "size": (128, 128, 96)},
@@ -232,7 +233,7 @@ def add_balls(volume, o, rng, points):
             center = rng.uniform(radius + 1, size - radius - 1)
             if all(np.min(np.linalg.norm(q[:, :3] - center, axis=1) - q[:, 3]) > radius + 0.5 for q in points):
                 points.append(np.array([[*center, radius]]))
-                draw(volume, center[None], radius, 1.0)
+                draw(volume, center[None], radius, 1.0 if o["ball_rho"] == (1, 1) else rng.uniform(*o["ball_rho"]))
                 break
 
 
@@ -274,6 +275,9 @@ def make(name, o, folder):
     for path, kind in fibers:
         radius = 0.5 * o["d"][kind] * (1 - o["spread"] * rng.uniform(0, 1))
         rho = 0.35 if rng.uniform() < o["mixed"] else o["rho"][kind]
+        if o["blend"]:
+            rho, part = o["blend"][rng.integers(len(o["blend"]))]
+            radius *= part
         if o["flat"] > 1:
             draw_flat(volume, path, radius, rho, o["flat"], rng.uniform(0, 7))
         else:
