@@ -19,6 +19,7 @@ geometry.pull.position             error of the axes over the stated error, robu
 geometry.pull.radius               the same of the radius of fibers
 geometry.pull.point_radius         share of the vertices whose radius is within two stated errors; median over the scans
 geometry.pull.*.worst              the scan with the largest pull, or the smallest share; its name is in "scan"
+With --drawn or --broad the names begin with geometry.drawn.
 Scans with a truth in other units than the product's text of fibers (--unseen) are converted.
 """
 import argparse
@@ -83,43 +84,43 @@ def figure(name, value, unit, better="lower", **more):
     print(json.dumps({"name": "geometry." + name, "value": value, "unit": unit, "better": better, **more}), flush=True)
 
 
-def judge_pulls(rows):
+def judge_pulls(rows, of):
     """Prints the errors over the stated ones of scans in which lines were matched."""
     for name, key, unit, worst, better in (("position", "robust", "stated errors", max, "lower"), ("radius", "robust", "stated errors", max, "lower"),
                                            ("point_radius", "covered", "1", min, "higher")):
         pulls = [(r[name + "_pull"][key], r["name"]) for r in rows if r[name + "_pull"]["rms"] > 0]
         if not pulls:
             continue
-        figure("pull." + name, round(float(np.median([p for p, _ in pulls])), 3), unit, better)
+        figure(of + "pull." + name, round(float(np.median([p for p, _ in pulls])), 3), unit, better)
         value, scan = worst(pulls)
-        figure("pull." + name + ".worst", value, unit, better, scan=scan)
+        figure(of + "pull." + name + ".worst", value, unit, better, scan=scan)
 
 
-def judge(rows):
+def judge(rows, of):
     """Prints the figures of the rows that could be reconstructed; errors are counted."""
     for r in rows:
         if r["name"] in ("noise.mhd", "sponge.mhd"):
             figure(r["name"][:-4] + ".wall_s", r["wall_s"], "s")
-    figure("verdict.errors", sum("error" in r and "nothing but noise" not in r["error"] for r in rows), "scans")
+    figure(of + "verdict.errors", sum("error" in r and "nothing but noise" not in r["error"] for r in rows), "scans")
     rows = [r for r in rows if "error" not in r]
     truth = [min(r["recall"], r["precision"]) for r in rows]
     right = [r["recall"] >= 0.9 and r["precision"] >= 0.93 and r["fragments"] <= 1.5 for r in rows]
-    figure("verdict.scans", len(rows), "scans", "higher")
-    figure("verdict.false_good", sum(r["is_good"] and not ok for r, ok in zip(rows, right)), "scans")
-    figure("verdict.good_called_bad", sum(ok and (r["score"] < 0.5 or r["verdict"] == "unresolved") for r, ok in zip(rows, right)), "scans")
-    figure("verdict.rank_correlation", round(float(np.corrcoef(rank(truth), rank([r["score"] for r in rows]))[0, 1]), 4), "1", "higher")
-    judge_lumens(rows)
-    judge_pulls(rows)
+    figure(of + "verdict.scans", len(rows), "scans", "higher")
+    figure(of + "verdict.false_good", sum(r["is_good"] and not ok for r, ok in zip(rows, right)), "scans")
+    figure(of + "verdict.good_called_bad", sum(ok and (r["score"] < 0.5 or r["verdict"] == "unresolved") for r, ok in zip(rows, right)), "scans")
+    figure(of + "verdict.rank_correlation", round(float(np.corrcoef(rank(truth), rank([r["score"] for r in rows]))[0, 1]), 4), "1", "higher")
+    judge_lumens(rows, of)
+    judge_pulls(rows, of)
 
 
-def judge_lumens(rows):
+def judge_lumens(rows, of):
     """Prints the shares of solid scans that are called hollow or maybe hollow, and of hollow ones that are called hollow."""
     hollow = [r["lumens"] == "filled" for r in rows if "hollow" in r["name"]]
     solid = [r["lumens"] in ("filled", "possible") for r in rows if "hollow" not in r["name"]]
     if solid:
-        figure("false_lumens", round(sum(solid) / len(solid), 4), "1")
+        figure(of + "false_lumens", round(sum(solid) / len(solid), 4), "1")
     if hollow:
-        figure("hollow_power", round(sum(hollow) / len(hollow), 4), "1", "higher")
+        figure(of + "hollow_power", round(sum(hollow) / len(hollow), 4), "1", "higher")
 
 
 def main():
@@ -156,10 +157,11 @@ def main():
         made = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
         print(made.stdout, end="", file=sys.stderr, flush=True)
         rows.append(json.loads(made.stdout.replace("nan", "0")))
+    of = "drawn." if drawn else ""
     if arguments.lumens:
-        judge_lumens([r for r in rows if "error" not in r])
+        judge_lumens([r for r in rows if "error" not in r], of)
     else:
-        judge(rows)
+        judge(rows, of)
 
 
 if __name__ == "__main__":
