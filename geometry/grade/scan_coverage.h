@@ -12,6 +12,8 @@
 #include "base/thread_pool.h"
 #include "geometry/grade/coverage_input.h"
 
+#include <stdbool.h>
+
 /* Density above the background that counts as material, in parts of the densest; more where the noise is strong. */
 #define COVERAGE_LEAST_DENSITY 0.12
 /* Border between light and dense material. */
@@ -33,6 +35,11 @@ struct scan_coverage {
     double least_density;       /* above the background, that was counted as material */
 };
 
+/* Returns whether more than half of the unexplained voxels are of compact sets. */
+static inline bool scan_coverage_has_particles(const struct scan_coverage *c)
+{
+    return c->particle_share > 0.5 * (1.0 - c->explained_share);
+}
 /* unexplained: NULL, or a byte for each voxel, which becomes 1 where it is unexplained and 0 elsewhere. The result does
  * not depend on the number of threads. STATUS_NO_MEMORY, STATUS_DISK_FULL, STATUS_CANCELLED. */
 status scan_coverage_measure(const struct coverage_input *in, struct thread_pool *pool, uint8_t *unexplained,

@@ -170,9 +170,11 @@ static void warn_faults(const struct warning_sink *warn, const struct scan_grade
         warning_send(
             warn, OPTION_SCAN_FILES,
             "no traced fiber explains %.0f %% of the material, whose density is about %.2f of the densest; most "
-            "of it lies in slices x %zu, y %zu, z %zu: if it is a lighter kind of "
-            "fiber, give a lower 'density_high'; if fibers of other diameters, give 'fiber_diameter_voxel'",
-            100.0 * (1.0 - c->explained_share), c->unexplained_density, c->slice[0], c->slice[1], c->slice[2]);
+            "of it lies in slices x %zu, y %zu, z %zu: %s",
+            100.0 * (1.0 - c->explained_share), c->unexplained_density, c->slice[0], c->slice[1], c->slice[2],
+            scan_coverage_has_particles(c) ? "it is mostly compact, as particles are"
+                                           : "if it is a lighter kind of fiber, give a lower 'density_high'; if fibers "
+                                             "of other diameters, give 'fiber_diameter_voxel'");
     if (g->faults & GRADE_PARTICLES)
         warning_send(warn, OPTION_SCAN_FILES,
                      "%.0f %% of the traced length is in lines that are shorter than %.0f diameters and end inside of "

@@ -136,10 +136,13 @@ static void reserve_lines(const struct scan_grade *g, struct verdict *v)
 {
     const struct scan_coverage *c = &g->coverage;
     if (g->faults & GRADE_UNEXPLAINED)
-        reserve(v, VERDICT_PICTURES_ONLY, "material_unexplained",
-                "No traced fiber explains %.0f %% of the material (density about %.2f of the densest), most of it near "
-                "slices x %zu, y %zu, z %zu.",
-                100.0 * (1.0 - c->explained_share), c->unexplained_density, c->slice[0], c->slice[1], c->slice[2]);
+        reserve(
+            v, VERDICT_PICTURES_ONLY, "material_unexplained",
+            "No traced fiber explains %.0f %% of the material (density about %.2f of the densest%s), most of it near "
+            "slices x %zu, y %zu, z %zu.",
+            100.0 * (1.0 - c->explained_share), c->unexplained_density,
+            scan_coverage_has_particles(c) ? "; mostly compact, as particles are" : "", c->slice[0], c->slice[1],
+            c->slice[2]);
     if (g->faults & GRADE_PARTICLES)
         reserve(v, VERDICT_PICTURES_ONLY, "lines_are_particles",
                 "%.0f %% of the traced length may be particles in place of fibers.",
