@@ -139,7 +139,7 @@ status lumen_evidence_measure(const struct volume *v, double noise_sd, struct th
                               struct lumen_evidence *e, struct error *err)
 {
     struct evidence_box b = {0};
-    *e = (struct lumen_evidence){.hollow_share = NAN};
+    *e = (struct lumen_evidence){.hollow_share = NAN, .radius_spread = NAN};
     status s = copy_middle(v, &b.scan, err);
     if (s == STATUS_OK) s = copy_middle(v, &b.filled, err);
     if (s == STATUS_OK) s = lumens_fill(&b.filled, noise_sd, pool, &e->enclosed_share, err);

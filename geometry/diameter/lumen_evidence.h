@@ -18,6 +18,7 @@ struct lumen_evidence {
     double width_voxel;    /* of the filled space, if it were round tubes; 0: nothing was filled */
     double middle_share;   /* filled voxels in the middle of a fiber over material voxels */
     double hollow_share;   /* of lines that were traced (reconstruct/lumen_lines.h); NaN: none were */
+    double radius_spread;  /* of the radii of these lines, over their mean; NaN: there are none */
 };
 
 /* The verdict on the evidence. Some scans of solid fibers have a middle_share of 0.001 to 0.02 that is 0.015 of

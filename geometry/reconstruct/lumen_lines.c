@@ -90,17 +90,17 @@ static void empty_box(const struct volume *v, const size_t from[3], struct volum
     }
 }
 
-/* Traces lines in a box. No lines where nothing in it looks like a fiber. report: a copy. */
+/* Traces lines in a box. No lines where nothing in it looks like a fiber. report: a copy, which gets their spread. */
 static status trace_in_box(const struct volume *box, double diameter, struct thread_pool *pool,
-                           struct reconstruct_report report, struct polyline_set *lines, struct error *err)
+                           struct reconstruct_report *report, struct polyline_set *lines, struct error *err)
 {
     struct direction_volume d = {0};
     struct reconstruct_option o;
-    struct trace_job job = {.v = box, .d = &d, .o = &o, .pool = pool, .report = &report};
+    struct trace_job job = {.v = box, .d = &d, .o = &o, .pool = pool, .report = report};
     reconstruct_option_default(&o);
     o.fiber_diameter_voxel = diameter;
-    report.radius_spread = 0.0;
-    status s = reconstruct_orientation_again(box, &o, pool, NULL, &d, &report, err);
+    report->radius_spread = 0.0;
+    status s = reconstruct_orientation_again(box, &o, pool, NULL, &d, report, err);
     if (s == STATUS_OK) {
         trace_job_start(&job);
         s = trace_scan(&job, false, lines, err);
@@ -110,20 +110,22 @@ static status trace_in_box(const struct volume *box, double diameter, struct thr
 }
 
 status lumen_lines_measure(const struct volume *v, double diameter_voxel, struct thread_pool *pool,
-                           const struct reconstruct_report *report, double *hollow_share, struct error *err)
+                           const struct reconstruct_report *report, struct lumen_evidence *e, struct error *err)
 {
+    struct reconstruct_report look = *report;
     const double width = report->lumen.width_voxel;
     const double diameter = diameter_voxel > MOST_WIDTHS * width ? USUAL_WIDTHS * width : diameter_voxel;
     struct volume box = {0};
     struct polyline_set lines;
     size_t from[3];
-    *hollow_share = NAN;
+    e->hollow_share = e->radius_spread = NAN;
     polyline_set_init(&lines);
     status s = trace_box_copy(v, v, diameter, &box, from, err);
-    if (s == STATUS_OK) s = trace_in_box(&box, diameter, pool, *report, &lines, err);
+    if (s == STATUS_OK) s = trace_in_box(&box, diameter, pool, &look, &lines, err);
     if (s == STATUS_OK) {
         empty_box(v, from, &box);
-        *hollow_share = share_of_hollow(&box, &lines, diameter);
+        e->hollow_share = share_of_hollow(&box, &lines, diameter);
+        if (lines.n_line > 0) e->radius_spread = look.radius_spread;
     }
     polyline_set_release(&lines);
     volume_release(&box);

@@ -11,11 +11,11 @@
 #include "geometry/grade/reconstruct_report.h"
 #include "geometry/volume/volume.h"
 
-/* Traces lines in the fullest box of a volume whose enclosed void was filled, and sets *hollow_share to the share of
- * their mass (length times square of the radius) that has a dark axis in the scan before it was filled. NaN: no lines
- * were found. diameter_voxel: of the fibers in v; report: of the steps before. STATUS_CANCELLED, STATUS_NO_MEMORY; with
- * a scratch space also STATUS_DISK_FULL. */
+/* Traces lines in the fullest box of a volume whose enclosed void was filled. Sets e->hollow_share to the share of
+ * their mass (length times square of the radius) that has a dark axis in the scan before it was filled, and
+ * e->radius_spread. Both are NaN if no lines were found. diameter_voxel: of the fibers in v; report: of the steps
+ * before. STATUS_CANCELLED, STATUS_NO_MEMORY; with a scratch space also STATUS_DISK_FULL. */
 status lumen_lines_measure(const struct volume *v, double diameter_voxel, struct thread_pool *pool,
-                           const struct reconstruct_report *report, double *hollow_share, struct error *err);
+                           const struct reconstruct_report *report, struct lumen_evidence *e, struct error *err);
 
 #endif

@@ -53,10 +53,12 @@ status reconstruct_read(const char *const *path, size_t n_path, struct reconstru
  * is known. STATUS_CANCELLED, STATUS_NO_MEMORY; with a scratch space also STATUS_DISK_FULL. */
 status reconstruct_lumens(struct volume *v, struct reconstruct_option *o, struct thread_pool *pool,
                           struct reconstruct_report *report, struct error *err);
-/* The part after it, where anything was filled: traces fibers, and where their diameters differ fills their inner parts
- * as well. Otherwise v stays as it is. Measures the seams of the volume anew. Errors as before. */
+/* The part after it, where anything was filled and the lines that showed lumens have not shown that fibers are alike
+ * (reconstruct_refills): traces fibers, and where their diameters differ fills their inner parts as well. Otherwise v
+ * stays as it is. Measures the seams of the volume anew. Errors as before. */
 status reconstruct_refill_lumens(struct volume *v, const struct reconstruct_option *o, struct thread_pool *pool,
                                  const struct progress *progress, struct reconstruct_report *report, struct error *err);
+bool reconstruct_refills(const struct volume *v, const struct reconstruct_report *report);
 
 /* Changes report->lumens from LUMENS_NONE to LUMENS_UNKNOWN where lumens would not have been seen
  * (lumen_evidence_would_show), and where the grade is GRADE_UNRESOLVED. v: as it was traced; report: with its grade. */
@@ -74,9 +76,9 @@ status reconstruct_orientation_again(const struct volume *v, struct reconstruct_
                                      const struct progress *progress, struct direction_volume *d,
                                      struct reconstruct_report *report, struct error *err);
 
-/* The part of the step "orientation" after it, in noisy scans (reconstruct_redirects): traces lines up to four times,
- * and voxels within a diameter of one take its direction. d stays as it is in other scans, where voxels are
- * interpolated, and where radii of lines differ so much that the scan does not resolve its fibers. Errors as those of
+/* The part of the step "orientation" after it, in noisy scans (reconstruct_redirects): traces lines twice, and voxels
+ * within a diameter of one take its direction. d stays as it is in other scans, where voxels are interpolated, and
+ * where radii of lines differ so much that the scan does not resolve its fibers. Errors as those of
  * reconstruct_fibers. */
 status reconstruct_redirect(const struct volume *v, struct direction_volume *d, const struct reconstruct_option *o,
                             struct thread_pool *pool, const struct progress *progress,

@@ -5,7 +5,8 @@
  * of the thinnest fibers open: their walls are blurred to 0.6 to 0.8 of the density, and noise opens them somewhere.
  * Such fibers look like the background of touching fibers beside those that were filled. Once most others are traced
  * and subtracted (trace_leftover.c), they are seen. Lines are therefore traced here, the inner parts of their fibers
- * are filled, and the step "fibers" traces them again in the volume that results. */
+ * are filled, and the step "fibers" traces them again in the volume that results. Where the lines that have judged
+ * whether there are lumens have radii that are alike, nothing is traced. */
 #include "geometry/diameter/fiber_diameter.h"
 #include "geometry/diameter/lumen_fill.h"
 #include "geometry/diameter/lumen_filter.h"
@@ -107,8 +108,7 @@ static status judge_lumens(struct volume *v, int hollow_fibers, double diameter_
     const bool ask = hollow_fibers <= 0;
     if (ask && lumen_evidence_judge(&report->lumen) == LUMENS_NOT_SEEN) return STATUS_OK;
     status s = fill_enclosed(v, &diameter_voxel, pool, report, err);
-    if (s == STATUS_OK && ask)
-        s = lumen_lines_measure(v, diameter_voxel, pool, report, &report->lumen.hollow_share, err);
+    if (s == STATUS_OK && ask) s = lumen_lines_measure(v, diameter_voxel, pool, report, &report->lumen, err);
     if (s != STATUS_OK || !ask) return s;
     report->lumens_found = hollow_fibers < 0 && lumen_evidence_judge(&report->lumen) == LUMENS_CLEAR;
     return report->lumens_found ? STATUS_OK : empty_all(v, report, err);
@@ -129,12 +129,17 @@ status reconstruct_lumens(struct volume *v, struct reconstruct_option *o, struct
     return s;
 }
 
+bool reconstruct_refills(const struct volume *v, const struct reconstruct_report *report)
+{
+    return v->filled.n > 0 && !(report->lumen.radius_spread < TRACE_LEAST_SPREAD);
+}
+
 status reconstruct_refill_lumens(struct volume *v, const struct reconstruct_option *o, struct thread_pool *pool,
                                  const struct progress *progress, struct reconstruct_report *report, struct error *err)
 {
     void *mark = NULL;
     bool again = true;
-    if (v->filled.n == 0) return STATUS_OK;
+    if (!reconstruct_refills(v, report)) return STATUS_OK;
     status s = scratch_new(v->space, volume_n_voxel(v->n), "the lumens of fibers", &mark, err);
     if (s != STATUS_OK) return s;
     memset(mark, 0, volume_n_voxel(v->n));

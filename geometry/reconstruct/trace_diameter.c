@@ -116,6 +116,14 @@ static status trace_once(const struct boxed_scan *scan, double diameter, struct 
     return s == STATUS_INVALID ? STATUS_OK : s;
 }
 
+/* Returns whether a thinner diameter than the peak is tried: not for fibers so thin that voxels are interpolated, in so
+ * much noise that lines of noise are traced as well. */
+static bool may_be_thinner(const struct boxed_scan *scan, const struct volume *v, const struct found *found)
+{
+    const bool in_noise = scan->report->noise.scan_sd >= MOST_NOISE;
+    return found->several >= LEAST_SEVERAL && !(in_noise && trace_grid_edge(THINNER * scan->peak, v->n) < 1.0);
+}
+
 /* Tries a diameter between those of thin and thick fibers side by side. It is taken if its lines describe the box
  * better than those of `before`, and their radii spread, for a thicker diameter more than before. */
 static status try_between(const struct boxed_scan *scan, double ratio, const struct found *before, double *diameter,
@@ -162,7 +170,7 @@ status trace_diameter(const struct volume *v, const struct volume *known, trace_
     double diameter = peak;
     status s = trace_box_copy(v, known, peak, &box, from, err);
     if (s == STATUS_OK) s = settle_diameter(&scan, most, &diameter, &found, err);
-    if (s == STATUS_OK && found.several >= LEAST_SEVERAL) s = try_between(&scan, THINNER, &found, &diameter, err);
+    if (s == STATUS_OK && may_be_thinner(&scan, v, &found)) s = try_between(&scan, THINNER, &found, &diameter, err);
     if (found.blurred) filter_choose_blurred(option, diameter);
     if (s == STATUS_OK) report->fiber_diameter_voxel = diameter;
     volume_release(&box);

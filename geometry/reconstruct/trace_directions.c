@@ -9,10 +9,10 @@
 
 #include <math.h>
 
-enum { N_ROUND = 4 };
-/* Rounds end where the number of lines, which are pieces of fibers, has not fallen to this share of the last one. */
-static const double LEAST_FALL = 0.97;
-/* Noise over the step from void to material from which on lines are traced for their directions (geometry/NOTES.md). */
+/* Tracings for the directions alone. The lines that are traced afterwards gain nothing by a third one
+ * (geometry/NOTES.md, "Directions by traced lines in noisy scans"). */
+enum { N_ROUND = 2 };
+/* Noise over the step from void to material from which on lines are traced for their directions. */
 static const double LEAST_NOISE = 0.3;
 
 /* Gives voxels within a diameter of a line its direction. */
@@ -37,7 +37,6 @@ status reconstruct_redirect(const struct volume *v, struct direction_volume *d, 
 {
     status s = STATUS_OK;
     bool again = reconstruct_redirects(report) && report->trace_edge_voxel >= 1.0;
-    size_t n_before = SIZE_MAX;
     for (int round = 0; round < N_ROUND && again && s == STATUS_OK; round++) {
         struct reconstruct_report look = *report;
         struct reconstruct_option option = *o;
@@ -51,8 +50,7 @@ status reconstruct_redirect(const struct volume *v, struct direction_volume *d, 
         s = trace_scan(&job, true, &lines, err);
         const bool fibers = lines.n_line > 0 && look.radius_spread <= TRACE_MOST_SPREAD;
         if (s == STATUS_OK && fibers) s = take_directions(&lines, d, pool, err);
-        again = fibers && (double)lines.n_line < LEAST_FALL * (double)n_before;
-        n_before = lines.n_line;
+        again = fibers;
         polyline_set_release(&lines);
     }
     if (s == STATUS_OK) progress_report(progress, 1.0);

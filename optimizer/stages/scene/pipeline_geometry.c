@@ -39,7 +39,7 @@ static status read_volume(const struct volume_input *in, struct volume_output *o
 /* Fills the lumens of hollow fibers. That the fibers are hollow may not have been known before the scan was read. */
 static status fill_lumens(const struct volume_input *in, struct volume_output *out, struct error *err)
 {
-    if (out->volume.filled.n == 0) return STATUS_OK;
+    if (!reconstruct_refills(&out->volume, &out->geometry)) return STATUS_OK;
     struct progress_part part;
     const struct progress inner = progress_begin_part(&part, &in->tools->progress, read_share, 1.0 - read_share);
     if (in->tools->plan.hollow != NULL) in->tools->plan.hollow(in->tools->plan.context, out->geometry.n);
