@@ -85,12 +85,12 @@ export function radiusSearch(job) {
   return { value: r.radius_um, se: r.standard_error_um, start: r.start_um, flags, curve };
 }
 
-// Returns all configurations: [{name, sphere, held, angles, measured, rendered, measuredPicture, renderedPicture, measuredLinear, renderedLinear, error, errorSe}],
-// Linear: the OpenEXR files of the pictures; error: the relative error of the row; sphere: the rendering is of a sphere
+// Returns all configurations: [{name, sphere, filter, held, angles, measured, rendered, measuredPicture, renderedPicture, measuredLinear, renderedLinear, error, errorSe}],
+// Linear: the OpenEXR files of the pictures; error: the relative error of the row; sphere: the rendering is of a sphere; filter: of the rendering, or null
 export function configurations(job, urls) {
   return (job.result?.rows ?? []).map((c) => {
     return {
-      name: c.name, sphere: c.rendering_shows === "sphere", held: c.set === "held-out", angles: c, measured: c.measured, rendered: c.rendered, error: c.rel_error ?? null, errorSe: c.rel_error_se,
+      name: c.name, sphere: c.rendering_shows === "sphere", filter: c.rendering_filter ?? null, held: c.set === "held-out", angles: c, measured: c.measured, rendered: c.rendered, error: c.rel_error ?? null, errorSe: c.rel_error_se,
       measuredPicture: urls.get(c.photograph_png) ?? null, renderedPicture: urls.get(c.rendering_png) ?? null,
       measuredLinear: urls.get(c.photograph_png?.replace(/\.png$/, ".exr")) ?? null, renderedLinear: urls.get(c.rendering_exr) ?? null,
     };

@@ -146,7 +146,9 @@ static status put_figure(const struct report *report, size_t i, const json_t *ro
     struct image rendering, photograph;
     bool has_photograph = false;
     worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, page_string(row, "rendering_exr"), path);
-    if (image_read_exr(&rendering, path, (size_t)1 << 26, NULL) != STATUS_OK) return STATUS_OK;
+    const bool filtered = json_is_string(json_object_get(row, "rendering_filter"));
+    if ((filtered ? image_read_exr_filtered : image_read_exr)(&rendering, path, (size_t)1 << 26, NULL) != STATUS_OK)
+        return STATUS_OK;
     if (report->in.photographs->n_photograph > i) {
         worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_INPUT, NULL, path);
         has_photograph =

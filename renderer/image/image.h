@@ -27,6 +27,8 @@ status image_write_exr(const struct image *im, const char *path, struct error *e
 status image_read_exr(struct image *im, const char *path, size_t limit_pixel, struct error *err);
 /* The same for the variances of the pixels' means, channels var.R, var.G and var.B of a rendering. */
 status image_read_exr_variance(struct image *im, const char *path, size_t limit_pixel, struct error *err);
+/* The same for the layer of a filtered view, channels filtered.R, filtered.G and filtered.B. */
+status image_read_exr_filtered(struct image *im, const char *path, size_t limit_pixel, struct error *err);
 /* 8-bit sRGB PNG of rgb * exposure. */
 status image_write_png(const struct image *im, double exposure, const char *path, struct error *err);
 /* 8-bit rgb bytes straight to PNG. */

@@ -376,3 +376,8 @@ status image_read_exr_variance(struct image *im, const char *path, size_t limit_
 {
     return read_channels(im, path, "var.", limit_pixel, NULL, err);
 }
+
+status image_read_exr_filtered(struct image *im, const char *path, size_t limit_pixel, struct error *err)
+{
+    return read_channels(im, path, "filtered.", limit_pixel, NULL, err);
+}

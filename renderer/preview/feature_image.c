@@ -11,7 +11,8 @@ struct run {
     const struct feature_request *q;
     const struct progress *progress;
     struct camera camera;
-    double plane[4]; /* towards the camera, over the width of the crop: the plane of the crop */
+    double plane[4];  /* towards the camera, over the width of the crop: the plane of the crop */
+    float axis[3][3]; /* unit: the camera's right, up and view */
     struct image *im;
 };
 
@@ -22,7 +23,22 @@ static void find_plane(struct run *r)
     double n[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
     double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]),
            width = sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
-    for (int k = 0; k < 3; k++) r->plane[k] = n[k] / length / width;
+    for (int k = 0; k < 3; k++) {
+        r->plane[k] = n[k] / length / width;
+        r->axis[0][k] = (float)(a[k] / width);
+        r->axis[1][k] = (float)(b[k] / sqrt(b[0] * b[0] + b[1] * b[1] + b[2] * b[2]));
+        r->axis[2][k] = (float)(n[k] / length);
+    }
+}
+
+static void describe_tangent(const struct run *r, const float tangent[3], float feature[3])
+{
+    float t[3] = {0, 0, 0};
+    for (int a = 0; a < 3; a++)
+        for (int k = 0; k < 3; k++) t[a] += r->axis[a][k] * tangent[k];
+    feature[0] = t[0] * t[0] - t[1] * t[1];
+    feature[1] = 2 * t[0] * t[1];
+    feature[2] = t[2] * t[2];
 }
 
 static void albedo_of(const struct run *r, const struct scene_hit *hit, const float direction[3], float albedo[3])
@@ -46,6 +62,8 @@ static void see(const struct run *r, const double xy[2], float feature[N_FEATURE
     struct scene_hit hit;
     if (!camera_ray(&r->camera, r->q->scene, xy, &ray) || !scene_trace(r->q->scene, &ray, &hit)) return;
     albedo_of(r, &hit, ray.direction, feature + FEATURE_ALBEDO);
+    describe_tangent(r, hit.tangent, feature + FEATURE_TANGENT);
+    feature[FEATURE_SEEN] = 1;
     for (int a = 0; a < 3; a++) {
         double at = (double)hit.position_mm[a] + (a < 2 ? ray.offset_mm[a] : 0.0);
         feature[FEATURE_NORMAL + a] = hit.normal[a];

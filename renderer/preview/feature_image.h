@@ -1,5 +1,5 @@
-/* Albedo, normal and distance of the fibers that each pixel of a picture shows: means over a few camera rays, and the
- * variances of these means. */
+/* Albedo, normal, direction and distance of the fibers that each pixel of a picture shows: means over a few camera
+ * rays, and the variances of these means. */
 #ifndef SELVEDGE_RENDERER_FEATURE_IMAGE_H
 #define SELVEDGE_RENDERER_FEATURE_IMAGE_H
 
@@ -9,9 +9,17 @@
 #include "renderer/scene/configuration.h"
 #include "renderer/scene/scene.h"
 
-/* Albedo of the fiber in rgb, its normal in the cloth's frame, and the distance from the plane of the crop over its
- * width. 0 where nothing is seen. */
-enum { FEATURE_ALBEDO = 0, FEATURE_NORMAL = 3, FEATURE_DISTANCE = 6, N_FEATURE = 7 };
+/* Albedo of the fiber in rgb; its normal in the cloth's frame; the distance from the plane of the crop over its width;
+ * the direction t of the fiber along the camera's right, up and view, as t_r^2 - t_u^2, 2 t_r t_u and t_v^2, which do
+ * not depend on its sign; 1. All are 0 where nothing is seen. */
+enum {
+    FEATURE_ALBEDO = 0,
+    FEATURE_NORMAL = 3,
+    FEATURE_DISTANCE = 6,
+    FEATURE_TANGENT = 7,
+    FEATURE_SEEN = 10,
+    N_FEATURE = 11
+};
 
 struct feature_request {
     const struct scene *scene;

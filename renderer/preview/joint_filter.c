@@ -1,174 +1,215 @@
 #include "renderer/preview/joint_filter.h"
 #include "renderer/preview/feature_image.h"
+#include "renderer/preview/window_regression.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { REACH = 7, PATCH = 1, SMOOTH = 2, BAND = 16, N_RGB = 3 };
-static const float k_color2 = 0.45f * 0.45f, k_feature2 = 0.6f * 0.6f, least_albedo = 0.05f;
-/* Differences of features that count as none: of albedo, of a normal, of a distance over the width of the picture. */
-static const float least_feature2[N_FEATURE] = {1e-3f, 1e-3f, 1e-3f, 1e-2f, 1e-2f, 1e-2f, 2e-4f};
+enum { N_RGB = 3, N_SCALE = 4, ERROR_REACH = 6, BLEND_REACH = 3, DEPTH_REACH = 12, N_FROM_FEATURE = N_FEATURE };
+/* Reach of the windows in pixels; 0: the picture itself. */
+static const size_t scale_reach[N_SCALE] = {0, 4, 8, 16};
 
 struct run {
-    const struct image *feature;
+    const struct joint_input *in;
     const struct progress *progress;
-    struct image color; /* over the albedo: rgb, and its smoothed variances */
-    struct image *out;
-    float *scratch; /* per thread: PATCH_ROWS rows of distances, then BAND rows of weights and of weighted colors */
-    size_t scratch_length;
+    size_t width, height, n; /* n: pixels */
+    float *block;            /* all planes below */
+    struct regression_input planes;
+    float *fitted[REGRESSION_VALUE]; /* of the scale under way */
+    float *shown[N_SCALE][N_RGB];    /* light other than direct light, of each scale */
+    float *error[N_SCALE];           /* estimated squared error, then its mean around a pixel */
+    float *spread[N_SCALE];          /* of that the part that is noise, which halves tell better */
+    float *temporary;
+    float *scratch; /* regression_scratch() of each thread */
+    size_t reach;
 };
 
-enum { PATCH_ROWS = BAND + 2 * PATCH };
+enum { N_PLANE = REGRESSION_GUIDE + 2 * REGRESSION_VALUE + N_SCALE * (N_RGB + 2) + 1 };
 
-static const float *pixel_of(const struct image *im, size_t x, size_t y)
+static const float *pixel_of(const struct image *im, size_t i) { return im->pixel + i * im->n_channel; }
+
+/* ---- planes ---- */
+
+static void set_planes(struct run *r)
 {
-    return im->pixel + (y * im->width + x) * im->n_channel;
-}
-
-static bool inside(const struct image *im, long x, long y)
-{
-    return x >= 0 && y >= 0 && x < (long)im->width && y < (long)im->height;
-}
-
-/* ---- what is filtered: the light on the cloth, its color divided by the albedo ---- */
-
-static void albedo_at(const struct image *feature, size_t x, size_t y, float albedo[N_RGB])
-{
-    const float *f = pixel_of(feature, x, y) + FEATURE_ALBEDO;
-    for (int c = 0; c < N_RGB; c++) albedo[c] = fmaxf(f[c], least_albedo);
-}
-
-static void divide_albedo(const struct image *picture, const struct image *feature, struct image *color)
-{
-    for (size_t y = 0; y < picture->height; y++)
-        for (size_t x = 0; x < picture->width; x++) {
-            float albedo[N_RGB], *out = color->pixel + (y * color->width + x) * color->n_channel;
-            albedo_at(feature, x, y, albedo);
-            for (int c = 0; c < N_RGB; c++) out[c] = pixel_of(picture, x, y)[c] / albedo[c];
-            float n = 0;
-            for (long v = (long)y - SMOOTH; v <= (long)y + SMOOTH; v++)
-                for (long u = (long)x - SMOOTH; u <= (long)x + SMOOTH; u++) {
-                    if (!inside(picture, u, v)) continue;
-                    const float *p = pixel_of(picture, (size_t)u, (size_t)v);
-                    n++;
-                    for (int c = 0; c < N_RGB; c++) out[N_RGB + c] += p[N_RGB + c] / (albedo[c] * albedo[c]);
-                }
-            for (int c = 0; c < N_RGB; c++) {
-                float own = pixel_of(picture, x, y)[N_RGB + c] / (albedo[c] * albedo[c]);
-                out[N_RGB + c] = fmaxf(out[N_RGB + c] / n, own);
-            }
-        }
-}
-
-/* ---- weights ---- */
-
-/* Squared difference of colors beyond what their variances explain, over these. */
-static float color_distance(const float *p, const float *q)
-{
-    float sum = 0;
-    for (int c = 0; c < N_RGB; c++) {
-        float d = p[c] - q[c], vp = p[N_RGB + c], vq = q[N_RGB + c];
-        sum += (d * d - (vp + fminf(vp, vq))) / (1e-12f + k_color2 * (vp + vq));
+    float *at = r->block;
+    for (size_t k = 0; k < REGRESSION_GUIDE; k++, at += r->n) r->planes.guide[k] = at;
+    for (size_t k = 0; k < REGRESSION_VALUE; k++, at += r->n) r->planes.value[k] = at;
+    for (size_t k = 0; k < REGRESSION_VALUE; k++, at += r->n) r->fitted[k] = at;
+    for (size_t s = 0; s < N_SCALE; s++) {
+        for (size_t c = 0; c < N_RGB; c++, at += r->n) r->shown[s][c] = at;
+        r->error[s] = at;
+        r->spread[s] = at + r->n;
+        at += 2 * r->n;
     }
-    return sum / N_RGB;
+    r->temporary = at;
 }
 
-static float feature_distance(const float *p, const float *q)
+/* Brings a plane to mean 0 and variance 1; one that hardly varies becomes 0. */
+static void standardise(float *plane, size_t n)
 {
-    float most = 0;
-    for (int k = 0; k < N_FEATURE; k++) {
-        float d = p[k] - q[k], vp = p[N_FEATURE + k], vq = q[N_FEATURE + k];
-        most = fmaxf(most, (d * d - (vp + fminf(vp, vq))) / (k_feature2 * fmaxf(vp, least_feature2[k])));
+    double sum = 0, square = 0;
+    for (size_t i = 0; i < n; i++) {
+        sum += (double)plane[i];
+        square += (double)plane[i] * (double)plane[i];
     }
-    return most;
+    const double mean = sum / (double)n, variance = square / (double)n - mean * mean;
+    const double scale = variance > 1e-12 * (1.0 + mean * mean) ? 1.0 / sqrt(variance) : 0.0;
+    for (size_t i = 0; i < n; i++) plane[i] = (float)(((double)plane[i] - mean) * scale);
 }
 
-/* Distances of a band's pixels, and of PATCH rows around it, to those at an offset; infinite where there is none. */
-static void fill_distances(const struct run *r, size_t first, long dx, long dy, float *distance)
+static void fill_planes(struct run *r)
 {
-    const struct image *im = &r->color;
-    for (long i = 0; i < PATCH_ROWS; i++)
-        for (long x = 0; x < (long)im->width; x++) {
-            long y = (long)first + i - PATCH;
-            bool both = inside(im, x, y) && inside(im, x + dx, y + dy);
-            distance[i * (long)im->width + x] = both ? color_distance(pixel_of(im, (size_t)x, (size_t)y),
-                                                                      pixel_of(im, (size_t)(x + dx), (size_t)(y + dy)))
-                                                     : INFINITY;
+    const struct image *direct = r->in->direct;
+    for (size_t i = 0; i < r->n; i++) {
+        const float *feature = pixel_of(r->in->feature, i);
+        for (size_t k = 0; k < N_FROM_FEATURE; k++) r->planes.guide[k][i] = feature[k];
+        for (size_t c = 0; c < N_RGB; c++) {
+            const float d = direct != NULL ? pixel_of(direct, i)[c] : 0;
+            r->planes.guide[N_FROM_FEATURE + c][i] = d;
+            for (size_t h = 0; h < 2; h++) r->planes.value[h * N_RGB + c][i] = pixel_of(r->in->half[h], i)[c] - d;
         }
+    }
+    /* how high a fiber lies beside its neighbours, and not the shape of the whole cloth */
+    float *depth = r->planes.guide[FEATURE_DISTANCE];
+    memcpy(r->fitted[0], depth, r->n * sizeof *depth);
+    regression_box(r->fitted[0], r->width, r->height, DEPTH_REACH, r->temporary);
+    for (size_t i = 0; i < r->n; i++) depth[i] -= r->fitted[0][i];
+    for (size_t k = 0; k < REGRESSION_GUIDE; k++) standardise(r->planes.guide[k], r->n);
 }
 
-static float patch_mean(const struct run *r, const float *distance, long row, long x)
+/* ---- scales ---- */
+
+static void run_tile(void *context, size_t i_tile, size_t i_thread)
 {
-    long width = (long)r->color.width;
-    float sum = 0, n = 0;
-    for (long v = row - PATCH; v <= row + PATCH; v++)
-        for (long u = x - PATCH; u <= x + PATCH; u++) {
-            if (u < 0 || u >= width || isinf(distance[v * width + u])) continue;
-            sum += distance[v * width + u];
-            n++;
+    struct run *r = context;
+    const size_t across = (r->width + REGRESSION_TILE - 1) / REGRESSION_TILE;
+    if (progress_cancelled(r->progress)) return;
+    regression_tile(&r->planes, r->reach, i_tile % across * REGRESSION_TILE, i_tile / across * REGRESSION_TILE,
+                    r->scratch + i_thread * regression_scratch(), r->fitted);
+}
+
+/* Sets the light of a scale and its squared error: with halves a, b and their filtered f, g, E(f - b)^2 is the squared
+ * error of f and the variance of b, whose difference is known from (a - b)^2; averaging f and g takes (f - g)^2 / 4. */
+static void judge(struct run *r, size_t s)
+{
+    for (size_t i = 0; i < r->n; i++) {
+        float sum = 0, spread = 0;
+        for (size_t c = 0; c < N_RGB; c++) {
+            const float a = r->planes.value[c][i], b = r->planes.value[N_RGB + c][i];
+            const float f = s > 0 ? r->fitted[c][i] : a, g = s > 0 ? r->fitted[N_RGB + c][i] : b;
+            r->shown[s][c][i] = (f + g) / 2;
+            spread += (f - g) * (f - g) / 4;
+            if (s > 0) sum += ((f - b) * (f - b) + (g - a) * (g - a) - (a - b) * (a - b)) / 2 - (f - g) * (f - g) / 4;
         }
-    return sum / n;
+        r->spread[s][i] = spread / N_RGB;
+        if (s == 0) sum = spread;
+        r->error[s][i] = sum / N_RGB;
+    }
 }
 
-static void add_offset(const struct run *r, size_t first, size_t n_row, long dx, long dy, float *distance, float *sum)
+static status run_scales(struct run *r, struct thread_pool *pool)
 {
-    const struct image *im = &r->color;
-    fill_distances(r, first, dx, dy, distance);
-    for (size_t i = 0; i < n_row; i++)
-        for (size_t x = 0; x < im->width; x++) {
-            size_t y = first + i;
-            long u = (long)x + dx, v = (long)y + dy;
-            if (!inside(im, u, v)) continue;
-            const float *q = pixel_of(im, (size_t)u, (size_t)v);
-            float far = fmaxf(patch_mean(r, distance, (long)i + PATCH, (long)x), 0);
-            far = fmaxf(far, feature_distance(pixel_of(r->feature, x, y), pixel_of(r->feature, (size_t)u, (size_t)v)));
-            float weight = dx == 0 && dy == 0 ? 1 : expf(-far), *out = sum + (i * im->width + x) * (N_RGB + 1);
-            for (int c = 0; c < N_RGB; c++) out[c] += weight * q[c];
-            out[N_RGB] += weight;
+    const size_t across = (r->width + REGRESSION_TILE - 1) / REGRESSION_TILE,
+                 down = (r->height + REGRESSION_TILE - 1) / REGRESSION_TILE;
+    for (size_t s = 0; s < N_SCALE; s++) {
+        r->reach = scale_reach[s];
+        status st = s > 0 ? thread_pool_run(pool, across * down, run_tile, r, r->progress) : STATUS_OK;
+        if (st == STATUS_OK && progress_cancelled(r->progress)) st = STATUS_CANCELLED;
+        if (st != STATUS_OK) return st;
+        judge(r, s);
+    }
+    return STATUS_OK;
+}
+
+/* ---- the picture ---- */
+
+/* Chooses the scale with the least error around each pixel, and lets neighbouring choices run into each other. Returns
+ * the sum of the squared errors of what was chosen, which is at least its noise. error[s] become the weights of the
+ * scales. */
+static double choose(struct run *r)
+{
+    double sum = 0, spread = 0;
+    for (size_t s = 0; s < N_SCALE; s++) {
+        memcpy(r->fitted[s], r->error[s], r->n * sizeof *r->error[s]);
+        for (int k = 0; k < 2; k++) regression_box(r->error[s], r->width, r->height, ERROR_REACH, r->temporary);
+    }
+    for (size_t i = 0; i < r->n; i++) {
+        size_t best = 0;
+        for (size_t s = 1; s < N_SCALE; s++)
+            if (r->error[s][i] < r->error[best][i]) best = s;
+        sum += (double)r->fitted[best][i];
+        spread += (double)r->spread[best][i];
+        for (size_t s = 0; s < N_SCALE; s++) r->error[s][i] = s == best;
+    }
+    for (size_t s = 0; s < N_SCALE; s++)
+        for (int k = 0; k < 2; k++) regression_box(r->error[s], r->width, r->height, BLEND_REACH, r->temporary);
+    return fmax(sum, spread);
+}
+
+static void write_picture(struct run *r, struct image *out, double *error)
+{
+    double square = choose(r), mean = 0;
+    for (size_t i = 0; i < r->n; i++) {
+        const bool seen = pixel_of(r->in->feature, i)[FEATURE_SEEN] > 0;
+        for (size_t c = 0; c < N_RGB; c++) {
+            float sum = 0;
+            for (size_t s = 0; s < N_SCALE; s++) sum += r->error[s][i] * r->shown[s][c][i];
+            if (!seen) sum = r->shown[0][c][i];
+            const float d = r->in->direct != NULL ? pixel_of(r->in->direct, i)[c] : 0;
+            if (r->in->direct != NULL) square += (double)pixel_of(r->in->direct, i)[N_RGB + c] / N_RGB;
+            out->pixel[i * N_RGB + c] = fmaxf(sum, seen ? 0 : -d) + d;
+            mean += (double)out->pixel[i * N_RGB + c];
         }
+    }
+    mean /= (double)(N_RGB * r->n);
+    *error = mean > 0 ? sqrt(fmax(square, 0) / (double)r->n) / mean : NAN;
 }
 
-static void filter_band(void *context, size_t i_band, size_t i_thread)
+static bool same_size(const struct image *a, const struct image *b)
 {
-    const struct run *r = context;
-    size_t width = r->color.width, first = i_band * BAND, left = r->color.height - first;
-    size_t n_row = left < BAND ? left : BAND;
-    float *distance = r->scratch + i_thread * r->scratch_length, *sum = distance + PATCH_ROWS * width;
-    memset(sum, 0, BAND * width * (N_RGB + 1) * sizeof *sum);
-    for (long dy = -REACH; dy <= REACH && !progress_cancelled(r->progress); dy++)
-        for (long dx = -REACH; dx <= REACH; dx++) add_offset(r, first, n_row, dx, dy, distance, sum);
-    for (size_t i = 0; i < n_row; i++)
-        for (size_t x = 0; x < width; x++) {
-            const float *s = sum + (i * width + x) * (N_RGB + 1);
-            float albedo[N_RGB], *out = r->out->pixel + ((first + i) * width + x) * N_RGB;
-            albedo_at(r->feature, x, first + i, albedo);
-            for (int c = 0; c < N_RGB; c++) out[c] = albedo[c] * s[c] / s[N_RGB];
-        }
+    return a->width == b->width && a->height == b->height;
 }
 
-status joint_filter(const struct image *picture, const struct image *feature, struct thread_pool *pool,
-                    const struct progress *progress, struct image *out, struct error *err)
+static status check(const struct joint_input *in, struct error *err)
 {
-    struct run r = {.feature = feature, .progress = progress, .out = out};
-    size_t n_thread = pool != NULL ? thread_pool_n_thread(pool) : 1;
+    const bool fits = same_size(in->half[0], in->half[1]) && same_size(in->half[0], in->feature) &&
+                      (in->direct == NULL || same_size(in->half[0], in->direct));
+    if (fits && in->half[0]->n_channel >= N_RGB && in->half[1]->n_channel >= N_RGB &&
+        (in->direct == NULL || in->direct->n_channel >= (size_t)2 * N_RGB) &&
+        in->feature->n_channel == (size_t)2 * N_FEATURE)
+        return STATUS_OK;
+    return error_set(err, STATUS_INVALID, "cannot filter a picture of %zu channels by features of %zu",
+                     in->half[0]->n_channel, in->feature->n_channel);
+}
+
+status joint_filter(const struct joint_input *in, struct thread_pool *pool, const struct progress *progress,
+                    struct image *out, double *error, struct error *err)
+{
+    struct run r = {.in = in, .progress = progress, .width = in->half[0]->width, .height = in->half[0]->height};
+    const size_t n_thread = pool != NULL ? thread_pool_n_thread(pool) : 1;
     memset(out, 0, sizeof *out);
-    if (picture->n_channel < 2 * N_RGB || feature->n_channel != (size_t)2 * N_FEATURE ||
-        picture->width != feature->width || picture->height != feature->height)
-        return error_set(err, STATUS_INVALID, "cannot filter a picture of %zu channels by features of %zu",
-                         picture->n_channel, feature->n_channel);
-    r.scratch_length = (PATCH_ROWS + BAND * (N_RGB + 1)) * picture->width;
-    r.scratch = malloc(n_thread * r.scratch_length * sizeof *r.scratch);
-    status s = r.scratch != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot filter a picture: no memory");
-    if (s == STATUS_OK) s = image_init(&r.color, picture->width, picture->height, 2 * N_RGB, err);
-    if (s == STATUS_OK) s = image_init(out, picture->width, picture->height, N_RGB, err);
+    status s = check(in, err);
+    if (s != STATUS_OK) return s;
+    r.n = r.width * r.height;
+    r.planes.width = r.width;
+    r.planes.height = r.height;
+    r.block = malloc(N_PLANE * r.n * sizeof *r.block);
+    r.scratch = malloc(n_thread * regression_scratch() * sizeof *r.scratch);
+    if (r.block == NULL || r.scratch == NULL)
+        s = error_set(err, STATUS_NO_MEMORY, "cannot filter a picture: out of memory");
+    if (s == STATUS_OK) s = image_init(out, r.width, r.height, N_RGB, err);
     if (s == STATUS_OK) {
-        divide_albedo(picture, feature, &r.color);
-        s = thread_pool_run(pool, (picture->height + BAND - 1) / BAND, filter_band, &r, progress);
-        if (s == STATUS_OK && progress_cancelled(progress)) s = STATUS_CANCELLED;
-        if (s != STATUS_OK) error_set(err, s, "filtering was cancelled");
+        set_planes(&r);
+        fill_planes(&r);
+        s = run_scales(&r, pool);
+        if (s == STATUS_OK)
+            write_picture(&r, out, error);
+        else
+            error_set(err, s, "filtering was cancelled");
     }
-    image_release(&r.color);
+    free(r.block);
     free(r.scratch);
     if (s != STATUS_OK) image_release(out);
     return s;

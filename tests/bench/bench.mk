@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-pictures bench-pile bench-weave bench-weave-rendered
+.PHONY: bench bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-comparison bench-pictures bench-pile bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -165,7 +165,11 @@ docs-speckle: | deps-test ## make docs/images/speckle.png anew: silk without and
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/pictures/speckle_pictures
 	@$(BUILD)/tests/bench/pictures/speckle_pictures docs/images/speckle.png
 
-bench-pictures: bench-browser
+bench-pictures: bench-browser bench-comparison
+bench-comparison: | deps-test ## noise of renderings beside that of their photographs (a minute; part of bench-pictures)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/pictures/bench_comparison.py --build $(BUILD)
+
 bench-browser: | deps-test ## the twin in headless Chromium against the path-traced picture of the same view (2 minutes; part of bench-pictures)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/pictures/bench_twin.py --build $(BUILD)

@@ -1,5 +1,5 @@
 // Reads OpenEXR files as the daemon's results have them: scan lines, 32-bit floats, not compressed. Everything else is
-// refused with an error that names it.
+// refused with an error that names it. A filtered view is taken in place of the picture where the file has one.
 
 const MAGIC = 20000630, TILED = 0x200, PARTS = 0x1800, FLOAT = 2, MOST_PIXELS = 1 << 26;
 
@@ -48,7 +48,7 @@ function read(buffer) {
   c.at = found.get("dataWindow");
   const [left, top, right, bottom] = [c.int(), c.int(), c.int(), c.int()], width = right - left + 1, height = bottom - top + 1;
   if (!(width > 0 && height > 0 && width * height <= MOST_PIXELS)) throw new Error(`it has ${width} x ${height} pixels`);
-  const names = channelNames(c, found.get("channels")), place = ["R", "G", "B"].map((n) => names.indexOf(n));
+  const names = channelNames(c, found.get("channels")), layer = names.includes("filtered.R") ? "filtered." : "", place = ["R", "G", "B"].map((n) => names.indexOf(layer + n));
   if (place.includes(-1)) throw new Error(`it has the channels ${names.join(", ")} instead of R, G, B`);
   const rgb = new Float32Array(3 * width * height);
   for (let line = 0; line < height; line++) {

@@ -10,7 +10,7 @@ export function pairsCard(list, shared) {
   const exposure = new ExposureControl(shared ?? commonExposure(list)), viewer = new PairViewer(list, exposure);
   const gallery = new PairGallery(list, exposure, (i) => viewer.open(i));
   const box = el("div", { id: "pairs" },
-    el("p", { class: "hint" }, list.some((c) => c.sphere) ? "Left: the measured mean colour of each row; right: a sphere wrapped in the fitted cloth under the row's lamp, which stands on the left. Rows in dashed frames were held out of the fit." : "Left: measured; right: rendered with the fitted parameters, both from linear values. Photographs in dashed frames were held out of the fit. Plain squares show mean colours. A click on a pair shows it large."),
+    el("p", { class: "hint" }, list.some((c) => c.sphere) ? "Left: the measured mean colour of each row; right: a sphere wrapped in the fitted cloth under the row's lamp, which stands on the left. Rows in dashed frames were held out of the fit." : "Left: measured; right: rendered with the fitted parameters, both from linear values. Photographs in dashed frames were held out of the fit. Plain squares show mean colours." + (list.some((c) => c.filter) ? ` Noise of the renderings is filtered (${list[0].filter}); numbers are of unfiltered paths.` : "") + " A click on a pair shows it large."),
     exposure.node, viewer.node, gallery.node, gallery.pages);
   return { box, open: (i) => viewer.open(i), close: () => { gallery.close(); viewer.close(); } };
 }

@@ -321,15 +321,15 @@ const struct job_option option_rows_fit[] = {
      INTO(results, render_px),
      RANGE(8, 2048),
      .unit = "pixels",
-     .left_out = "96; fewer, at least 48, where two samples of each pixel would take more than half of the paths of "
-                 "the fit",
+     .left_out = "192; fewer, at least 48, where four samples of each pixel would take more than half of the paths "
+                 "of the fit",
      .meaning = "Edge of the renderings in the result."},
     {.path = "fit.render_samples",
      .kind = OPTION_COUNT,
      INTO(results, render_sample),
      RANGE(1, 65536),
      .unit = "per pixel",
-     .left_out = "so many that all renderings together take half of the paths of the fit, 2 to 16",
+     .left_out = "so many that all renderings together take half of the paths of the fit, 4 to 16",
      .meaning = "Samples of the renderings in the result."},
     {.path = "export",
      .kind = OPTION_SECTION,

@@ -13,6 +13,7 @@
 #include "optimizer/stages/validation/pipeline_choice.h"
 #include "optimizer/stages/validation/pipeline_discrepancy.h"
 #include "renderer/estimate/render.h"
+#include "renderer/estimate/render_guides.h"
 
 #include <errno.h>
 #include <math.h>
@@ -160,7 +161,7 @@ static status write_photograph(const struct report *report, size_t i, const char
 
 /* Without numbers in the job document, all renderings together take this share of the paths of the best model's fit,
  * within these bounds: pictures do not cost more than the fit. */
-static const double picture_share = 0.5, least_sample = 2.0, most_sample = 16.0, least_px = 48.0;
+static const double picture_share = 0.5, least_sample = 4.0, most_sample = 16.0, least_px = 48.0;
 
 size_t result_picture_px(const struct job_results *results, size_t n_row, double n_fit_path)
 {
@@ -194,30 +195,92 @@ struct radiance_input result_radiance_input(const struct report *report)
                                    .discrepancy = pipeline_discrepancy(m->validation)};
 }
 
+static const char *const filtered_name[] = {"R",     "G",          "B",          "var.R",     "var.G",
+                                            "var.B", "filtered.R", "filtered.G", "filtered.B"};
+
+/* The mean of two halves of n[0] and n[1] samples, its variance, and the filtered view as a layer. */
+static status layers_of(const struct image half[2], const size_t n[2], const struct image *view, struct image *im,
+                        struct error *err)
+{
+    const double all = (double)(n[0] + n[1]), w[2] = {(double)n[0] / all, (double)n[1] / all};
+    status s = image_init(im, view->width, view->height, 9, err);
+    if (s != STATUS_OK) return s;
+    im->channel_name = filtered_name;
+    for (size_t i = 0; i < view->width * view->height; i++)
+        for (size_t c = 0; c < 3; c++) {
+            const float *p[2] = {half[0].pixel + i * half[0].n_channel + c, half[1].pixel + i * half[1].n_channel + c};
+            const double mean[2] = {(double)p[0][0], (double)p[1][0]}, apart = mean[0] - mean[1];
+            double variance = 0.0;
+            /* the sum of squares about the common mean, from those about each half's mean, which one sample has not */
+            for (int h = 0; h < 2; h++)
+                if (n[h] > 1) variance += (double)p[h][3] * (double)n[h] * (double)(n[h] - 1);
+            variance += apart * apart * (double)n[0] * (double)n[1] / all;
+            im->pixel[9 * i + c] = (float)(w[0] * mean[0] + w[1] * mean[1]);
+            im->pixel[9 * i + 3 + c] = (float)(variance / (all * (all - 1.0)));
+            im->pixel[9 * i + 6 + c] = view->pixel[3 * i + c];
+        }
+    return STATUS_OK;
+}
+
+/* Renders the request as two halves and filters them. im: with the filtered view as a layer; view: the filtered view
+ * alone. Both are to be released by the caller. */
+static status render_filtered(const struct report *report, const struct render_request *q,
+                              const struct progress *progress, struct image *im, struct image *view, struct error *err)
+{
+    struct thread_pool *pool = report->in.job->tools->pool;
+    const size_t n[2] = {q->n_sample / 2, q->n_sample - q->n_sample / 2};
+    struct image half[2] = {{0}, {0}};
+    struct render_guides guides = {0};
+    struct progress silent = progress_silent(progress);
+    double error;
+    status s = STATUS_OK;
+    for (int h = 0; h < 2 && s == STATUS_OK; h++) {
+        struct render_request part = *q;
+        struct progress_part share;
+        struct progress inner = progress_begin_part(&share, progress, 0.5 * h, 0.5);
+        part.first_sample = h == 0 ? 0 : n[0];
+        part.n_sample = n[h];
+        s = render_run(&part, pool, &inner, &half[h], err);
+    }
+    if (s == STATUS_OK) s = render_guides_make(q, NULL, pool, &silent, &guides, err);
+    if (s == STATUS_OK) s = render_guides_filter(&guides, half, pool, &silent, view, &error, err);
+    if (s == STATUS_OK) s = layers_of(half, n, view, im, err);
+    render_guides_release(&guides);
+    image_release(&half[0]);
+    image_release(&half[1]);
+    return s;
+}
+
 static status write_rendering(struct report *report, size_t i, const char *name, double exposure,
                               const struct progress *progress, struct error *err)
 {
     char path[WORKER_PATH_BYTES], temporary[WORKER_PATH_BYTES];
-    struct image im;
+    struct image im = {0}, view = {0};
     picture_paths(report, "renderings", name, ".png", path, temporary); /* written last of the two */
     if (exists(path)) return STATUS_OK;
     const struct pipeline_model *m = &report->model[report_best_model(report)];
-    const size_t px =
-        result_picture_px(report->in.results, report->in.job->rows->observation.n, (double)m->fit->result.n_path);
+    const size_t n_row = report->in.job->rows->observation.n;
+    const double n_fit_path = (double)m->fit->result.n_path;
+    const size_t px = result_picture_px(report->in.results, n_row, n_fit_path);
     const struct render_request q = {.input = result_radiance_input(report),
                                      .configuration = &report->in.job->rows->observation.item[i].configuration,
                                      .width = px,
                                      .height = px,
-                                     .n_sample =
-                                         result_picture_samples(report->in.results, report->in.job->rows->observation.n,
-                                                                (double)m->fit->result.n_path),
+                                     .n_sample = result_picture_samples(report->in.results, n_row, n_fit_path),
                                      .seed = report->in.job->seed ^ 0x70696374757265u,
                                      .stream = (uint32_t)i};
-    status s = render_run(&q, report->in.job->tools->pool, progress, &im, err);
-    if (s != STATUS_OK) return s;
-    s = result_image_write(report, &im, "renderings", name, exposure, true, err);
-    if (s == STATUS_OK && i == 0) s = result_thumbnail_of_image(report, &im, err);
+    const bool filtered = m->setup->appearance.kind == MODEL_SURFACE && q.n_sample > 1;
+    status s = filtered ? render_filtered(report, &q, progress, &im, &view, err)
+                        : render_run(&q, report->in.job->tools->pool, progress, &im, err);
+    if (s == STATUS_OK) {
+        picture_paths(report, "renderings", name, ".exr", path, temporary);
+        s = put_in_place(report, image_write_exr(&im, temporary, err), temporary, path, err);
+    }
+    const struct image *shown = filtered ? &view : &im;
+    if (s == STATUS_OK) s = result_image_write(report, shown, "renderings", name, exposure, false, err);
+    if (s == STATUS_OK && i == 0) s = result_thumbnail_of_image(report, shown, err);
     image_release(&im);
+    image_release(&view);
     return s;
 }
 

@@ -24,7 +24,7 @@ status result_exr_write(const struct report *report, const struct image *im, con
 status result_image_write(const struct report *report, const struct image *im, const char *folder, const char *name,
                           double exposure, bool exr, struct error *err);
 /* Largest edge of the renderings where the job document states none. */
-enum { RESULT_PICTURE_PX = 96 };
+enum { RESULT_PICTURE_PX = 192 };
 /* Edge of the renderings in pixels: the job document's edge, or fewer than RESULT_PICTURE_PX where the best model's fit
  * has taken only n_fit_path. */
 size_t result_picture_px(const struct job_results *results, size_t n_row, double n_fit_path);
@@ -35,7 +35,8 @@ size_t result_picture_samples(const struct job_results *results, size_t n_row, d
 double result_renderings_paths(const struct job_results *results, size_t n_row, double n_fit_path);
 /* The best model of the job's cloth at its result, as a source of radiance. */
 struct radiance_input result_radiance_input(const struct report *report);
-/* renderings/<name>.exr and .png for every photograph, after the photographs. from, to: shares of the stage
+/* renderings/<name>.exr and .png for every photograph, after the photographs. Of surface models with two samples or
+ * more, the PNG and the layer `filtered` of the EXR are a filtered view (joint_filter.h). from, to: shares of the stage
  * before and after, between which progress is reported. */
 status result_renderings_write(struct report *report, double from, double to, struct error *err);
 

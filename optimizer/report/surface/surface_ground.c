@@ -62,6 +62,7 @@ status surface_ground_add(const struct surface_ground *ground, const struct surf
 {
     const struct image *im = &so_far->image;
     *shown = *so_far;
+    shown->first = (struct image){0};
     status s = image_init(&shown->image, im->width, im->height, im->n_channel, err);
     if (s != STATUS_OK) return s;
     shown->image.channel_name = im->channel_name;

@@ -9,7 +9,9 @@
 /* The picture so far: the mean of all samples, and its variance. */
 struct surface_passes {
     struct image image;
-    size_t n_sample;  /* so far; 0: image is empty */
+    size_t n_sample;    /* so far; 0: image is empty */
+    struct image first; /* rgb: the mean of n_first of the samples, about half of them; for filters */
+    size_t n_first;
     const char *name; /* of the picture: its checkpoint is work/report/<name>.pass */
 };
 
@@ -22,6 +24,9 @@ status surface_passes_start(const struct report *report, const char *name, size_
  * Errors of render_run; STATUS_STALE, STATUS_IO, STATUS_DISK_FULL. */
 status surface_passes_add(struct report *report, const struct render_request *q, const struct progress *progress,
                           struct surface_passes *p, struct error *err);
+/* Two means of about half of the samples each, rgb, to be released by the caller. Needs two samples. STATUS_NO_MEMORY.
+ */
+status surface_passes_halves(const struct surface_passes *p, struct image half[2], struct error *err);
 void surface_passes_release(struct surface_passes *p);
 
 #endif

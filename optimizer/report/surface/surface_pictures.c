@@ -175,7 +175,7 @@ static void put_studio(json_t *entry, const struct job_surface_picture *p, const
 {
     json_object_set_new(entry, "kind", json_string(job_picture_kind_name(p->kind)));
     json_object_set_new(entry, "tone_curve", json_string("khronos_pbr_neutral"));
-    if (filter->feature.pixel != NULL) json_object_set_new(entry, "filter", json_string("joint.v1"));
+    if (filter->guides.feature.pixel != NULL) json_object_set_new(entry, "filter", json_string(JOINT_FILTER_ID));
 }
 
 /* The entry of result.json lies beside the picture and is written last: a picture is finished when its entry has all
@@ -307,7 +307,8 @@ static bool is_finished(const json_t *entry, const struct job_surface_picture *p
 {
     const char *method = json_string_value(json_object_get(entry, "method"));
     if (json_integer_value(json_object_get(entry, "samples")) != (json_int_t)p->sample) return false;
-    if (p->filter && !surface_studio_is(p) && has_fibers && json_object_get(entry, "filtered") == NULL) return false;
+    if (p->filter && p->sample > 1 && !surface_studio_is(p) && has_fibers && json_object_get(entry, "filtered") == NULL)
+        return false;
     return !p->reference || method == NULL || strcmp(method, picture_method_name[JOB_PICTURE_PATH]) == 0 ||
            json_object_get(entry, "reference") != NULL;
 }

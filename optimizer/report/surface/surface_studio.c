@@ -4,7 +4,6 @@
 #include "optimizer/report/result/result_thumbnail.h"
 #include "optimizer/report/surface/surface_scale_bar.h"
 #include "renderer/image/tone_curve.h"
-#include "renderer/preview/joint_filter.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -14,9 +13,8 @@ static status shown_cloth(const struct report *report, const struct surface_filt
                           const struct surface_passes *so_far, struct image *out, struct error *err)
 {
     const struct image *im = &so_far->image;
-    struct progress silent = progress_silent(&report->in.job->tools->progress);
-    if (filter->feature.pixel != NULL && so_far->n_sample > 1)
-        return joint_filter(im, &filter->feature, report->in.job->tools->pool, &silent, out, err);
+    double error;
+    if (surface_filter_can(filter, so_far)) return surface_filter_view(report, filter, so_far, out, &error, err);
     status s = image_init(out, im->width, im->height, 3, err);
     for (size_t i = 0; s == STATUS_OK && i < im->width * im->height; i++)
         memcpy(out->pixel + 3 * i, im->pixel + i * im->n_channel, 3 * sizeof *out->pixel);

@@ -19,7 +19,15 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { MIN_EDGE = 16, MAX_EDGE = 512, MIN_SAMPLE = 64, SAMPLES_OF_A_RENDERING = 4, N_CHANNEL = 16, STREAM = 4090 };
+enum {
+    DEFAULT_PX = 96,
+    MIN_EDGE = 16,
+    MAX_EDGE = 512,
+    MIN_SAMPLE = 64,
+    SAMPLES_OF_A_RENDERING = 4,
+    N_CHANNEL = 16,
+    STREAM = 4090
+};
 static const char *const channel[N_CHANNEL] = {"R",
                                                "G",
                                                "B",
@@ -50,7 +58,7 @@ struct textures {
 
 static size_t edge_of(const struct job_results *results)
 {
-    const size_t edge = 2 * (results->render_px > 0 ? results->render_px : RESULT_PICTURE_PX);
+    const size_t edge = 2 * (results->render_px > 0 ? results->render_px : DEFAULT_PX);
     return edge < MIN_EDGE ? MIN_EDGE : edge > MAX_EDGE ? MAX_EDGE : edge;
 }
 

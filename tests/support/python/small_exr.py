@@ -23,8 +23,8 @@ def exr(width, height, rgb):
     return head + table + lines
 
 
-def read_exr(data):
-    """Reads what `exr` and the worker write: (width, height, pixel), where pixel(x, y) is (r, g, b)."""
+def read_exr(data, layer=""):
+    """Reads what `exr` and the worker write: (width, height, pixel), where pixel(x, y) is (r, g, b) of the layer."""
     assert data[:8] == b"\x76\x2f\x31\x01\x02\0\0\0"
     at, found = 8, {}
     while data[at]:
@@ -43,5 +43,5 @@ def read_exr(data):
     stride = 8 + 4 * width * len(names)
 
     def pixel(x, y):
-        return tuple(struct.unpack_from("<f", data, first + y * stride + 4 * (names.index(c) * width + x))[0] for c in "RGB")
+        return tuple(struct.unpack_from("<f", data, first + y * stride + 4 * (names.index(layer + c) * width + x))[0] for c in "RGB")
     return width, height, pixel
