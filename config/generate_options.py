@@ -89,6 +89,8 @@ def option_schema(options, row):
     schema = value_schema(options, row)
     if row.get("or_section"):
         schema = {"anyOf": [schema, section_schema(options, row["path"])]}
+    if "or_word" in row:
+        schema = {"anyOf": [schema, {"const": row["or_word"]}]}
     schema.update(row.get("schema", {}))
     if "default" in row:
         schema["default"] = row["default"]

@@ -15,6 +15,8 @@
  *                           could start one twice
  *   JOB/backend.json        where an engine other than the daemon runs the job (server/files/backend_note.h)
  *   JOB/status.json         The worker replaces it at least every second while it lives.
+ *   JOB/pictures.json       the same for the stage after the result (worker option --pictures), besides the state
+ *                           "waiting", which the daemon writes
  *   JOB/series.rec          record file (durable.h), append-only: one JSON object for each step of the fit
  *   JOB/log.txt             the worker's log, append-only
  *   JOB/work/<stage>/       checkpoints of a stage; JOB/work/<stage>.done marks a stage whose outputs are complete
@@ -51,6 +53,7 @@
 #define JOB_FILE_BACKEND "backend.json"
 #define JOB_CLAIM_PREFIX "claim-"
 #define JOB_FILE_STATUS "status.json"
+#define JOB_FILE_PICTURES "pictures.json"
 #define JOB_FILE_PLAN "plan.json" /* the needs that were predicted for the job (server/workers/input_judge.h) */
 #define JOB_FILE_SERIES "series.rec"
 #define JOB_FILE_LOG "log.txt"

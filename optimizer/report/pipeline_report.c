@@ -4,7 +4,9 @@
 #include "base/option_id.h"
 #include "base/process.h"
 #include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/job_rows.h"
+#include "optimizer/job/job_folder.h"
 #include "optimizer/job/options/option_key.h"
 #include "optimizer/report/export/exports.h"
 #include "optimizer/report/export/twin_result.h"
@@ -23,6 +25,18 @@
 #include "optimizer/stages/validation/pipeline_choice.h"
 
 #include <stdlib.h>
+#include <unistd.h>
+
+/* What is made after the result: 90 s of two cores on the demo, the draft within 20 s. */
+enum {
+    DRAFT_PX = 256,
+    DRAFT_SAMPLES = 4,
+    DRAFT_PATHS = 100000,
+    HERO_PX = 640,
+    HERO_SAMPLES = 12,
+    HERO_PATHS = 2000000,
+    TWIN_PATHS = 800000
+};
 
 /* Depth by which fibers run into each other, over their diameter and as a mean over all points, above which a described
  * cloth has more fiber than fits. Default numbers make 0 to 0.07; a packing of 0.85 makes 0.14. */
@@ -187,7 +201,7 @@ static status run(struct report *report, struct error *err)
 
 static void report_release(struct report *report)
 {
-    for (size_t i = 0; i < report->n_model && report->advice != NULL; i++) free(report->advice[i].candidate);
+    for (size_t i = 0; i < report->n_model; i++) free(report->advice[i].candidate);
     free(report->advice);
     json_decref(report->exports);
     json_decref(report->surface_pictures);
@@ -195,26 +209,92 @@ static void report_release(struct report *report)
     free(report);
 }
 
-status stage_report(const struct report_input *in, struct report_output *out, struct error *err)
+/* *out: to be freed by report_release. STATUS_NO_MEMORY. */
+static status report_new(const struct report_input *in, struct report **out, struct error *err)
 {
     const size_t n_model = in->job->n_model;
     struct report *report = calloc(1, sizeof *report);
-    if (report == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the results: out of memory");
+    struct model_advice *advice = calloc(n_model + 1, sizeof *advice);
+    if (report == NULL || advice == NULL) {
+        free(report);
+        free(advice);
+        return error_set(err, STATUS_NO_MEMORY, "cannot write the results: out of memory");
+    }
     report->in = *in;
     report->n_model = n_model;
     report->part_from_s = clock_monotonic_s();
     report->part_from_cpu_s = process_use().cpu_s;
     report->exports = json_array();
     report->surface_pictures = json_array();
-    report->advice = calloc(n_model + 1, sizeof *report->advice);
+    report->advice = advice;
     for (size_t i = 0; i < n_model; i++)
         report->model[i] = (struct pipeline_model){.setup = &in->job->model[i],
                                                    .fit = in->fit != NULL ? &in->fit[i] : NULL,
                                                    .validation = in->validation != NULL ? &in->validation[i] : NULL,
                                                    .advice = &report->advice[i]};
-    status s = report->advice != NULL ? run(report, err)
-                                      : error_set(err, STATUS_NO_MEMORY, "cannot write the results: out of memory");
+    *out = report;
+    return STATUS_OK;
+}
+
+status stage_report(const struct report_input *in, struct report_output *out, struct error *err)
+{
+    struct report *report;
+    status s = report_new(in, &report, err);
+    if (s != STATUS_OK) return s;
+    s = run(report, err);
     out->verdict = report->verdict;
+    report_release(report);
+    return s;
+}
+
+/* The picture in the studio; draft: of few pixels, samples and paths of tables. */
+static status write_hero(struct report *report, bool draft, double from, double to, struct error *err)
+{
+    struct job_results results = *report->in.results;
+    struct job_surface_picture hero;
+    char path[WORKER_PATH_BYTES];
+    worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, "pictures/hero.png", path);
+    if (draft && access(path, F_OK) == 0) return STATUS_OK;
+    job_picture_studio(JOB_KIND_DRAPE, &hero);
+    hero.name = "hero";
+    hero.is_draft = draft;
+    hero.px = draft ? DRAFT_PX : HERO_PX;
+    hero.sample = draft ? DRAFT_SAMPLES : HERO_SAMPLES;
+    hero.n_deep_path = draft ? DRAFT_PATHS : HERO_PATHS;
+    results.n_surface_picture = 1;
+    results.surface_picture = &hero;
+    const struct job_results *own = report->in.results;
+    report->in.results = &results;
+    status s = surface_pictures_write(report, from, to, err);
+    report->in.results = own;
+    return s;
+}
+
+static status write_default_twin(struct report *report, double from, double to, struct error *err)
+{
+    struct job_results results = *report->in.results;
+    const struct job_results *own = report->in.results;
+    if (own->twin) return STATUS_OK;
+    results.twin = true;
+    results.twin_paths = TWIN_PATHS;
+    report->in.results = &results;
+    status s = twin_result_write(report, from, to, err);
+    report->in.results = own;
+    return s;
+}
+
+status stage_pictures(const struct report_input *in, struct error *err)
+{
+    struct report *report;
+    status s = report_new(in, &report, err);
+    if (s != STATUS_OK) return s;
+    bool studio = false;
+    for (size_t i = 0; i < in->results->n_surface_picture; i++)
+        studio = studio || in->results->surface_picture[i].kind != JOB_KIND_MEASUREMENT;
+    if (in->kind == JOB_OF_FIT) s = use_best(report, err);
+    if (s == STATUS_OK && !studio) s = write_hero(report, true, 0.0, 0.1, err);
+    if (s == STATUS_OK) s = write_default_twin(report, 0.1, 0.5, err);
+    if (s == STATUS_OK && !studio) s = write_hero(report, false, 0.5, 1.0, err);
     report_release(report);
     return s;
 }

@@ -128,7 +128,7 @@ static status do_scene(struct pipeline *p, const struct taken *t, bool load, str
     const struct surface_input surface = {p->tools, p->in->section.results, p->in->section.setup, t->cloth};
     (void)load;
     status s = stage_scene(&p->job, &p->out.cloth, err);
-    return s == STATUS_OK ? surface_cloth_check(&surface, err) : s;
+    return s == STATUS_OK && !p->option->pictures ? surface_cloth_check(&surface, err) : s;
 }
 
 static status do_fit(struct pipeline *p, const struct taken *t, bool load, struct error *err)
@@ -169,7 +169,7 @@ static status do_report(struct pipeline *p, const struct taken *t, bool load, st
                                     .stage_wall_s = p->stage_wall_s,
                                     .work_s = p->plan->report_s};
     (void)load;
-    return stage_report(&in, &p->out.report, err);
+    return p->option->pictures ? stage_pictures(&in, err) : stage_report(&in, &p->out.report, err);
 }
 
 /* In the order of pipeline_stage_table (a test compares the names). */
@@ -229,8 +229,7 @@ static void plan_fit_paths(void *context, double n_path)
     pipeline_plan_fit_paths(((struct pipeline *)context)->plan, n_path);
 }
 
-/* Removes the marks of stage i and of all later ones: when a stage runs, the stored outputs of later stages are out of
- * date, also for a later attempt. */
+/* Removes the marks of stage i and of all later ones: when it runs, their stored outputs are out of date. */
 static status unmark_from(const struct pipeline *p, size_t i, struct error *err)
 {
     status s = STATUS_OK;
@@ -257,8 +256,12 @@ static status do_stage(struct pipeline *p, size_t i, bool *earlier_ran, bool *lo
         }
         if (geometry_job[0] != '\0' && !(stage->takes & CLOTH))
             return job_option_name_field(pipeline_geometry_lost(geometry_job, why.text, err), err);
+        if (p->option->pictures)
+            return error_set(err, STATUS_NOT_FOUND, "no pictures without stage %s: %.300s", stage->name, why.text);
         log_warning(tools->log, "stage %s runs again: %s", stage->name, why.text);
     }
+    if (stores && p->option->pictures)
+        return error_set(err, STATUS_NOT_FOUND, "no pictures without stage %s, whose output is gone", stage->name);
     status s = stores && !*earlier_ran ? unmark_from(p, i, err) : STATUS_OK;
     if (stores) *earlier_ran = true;
     log_info(tools->log, "stage %s", stage->name);
@@ -293,7 +296,7 @@ static status run_stages(struct pipeline *p, struct error *err)
         p->plan->stage_fraction = 0.0;
         worker_status_stage(p->tools->status, info[i].name, info[i].title, i, n_stage);
         status s = do_stage(p, i, &earlier_ran, &loaded, err);
-        if (s == STATUS_OK && !loaded && p->in->section.scan->given)
+        if (s == STATUS_OK && !loaded && p->in->section.scan->given && !p->option->pictures)
             s = first_results_write(&p->job, info[i].name, &p->out.volume, &p->out.fibers.fiber, &p->out.cloth, err);
         worker_status_stage_end(p->tools->status, loaded);
         release_scan(p, i);
@@ -388,7 +391,8 @@ status pipeline_run(struct stage_tools *tools, const struct job_inputs *inputs, 
     if (s == STATUS_OK) s = list_files(inputs, &p->files, err);
     if (s == STATUS_OK && inputs->kind == JOB_OF_PICTURES) s = fit_output_given(inputs, &p->out.fit, err);
     if (s == STATUS_OK && inputs->kind == JOB_OF_PICTURES) s = validation_output_given(inputs, &p->out.validation, err);
-    if (s == STATUS_OK && inputs->kind == JOB_OF_FIT) s = first_photographs_write(&p->job, inputs->section.rows, err);
+    if (s == STATUS_OK && inputs->kind == JOB_OF_FIT && !option->pictures)
+        s = first_photographs_write(&p->job, inputs->section.rows, err);
     if (s == STATUS_OK) s = run_stages(p, err);
     pipeline_release(p);
     free(p);

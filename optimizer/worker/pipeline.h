@@ -10,6 +10,8 @@
 struct pipeline_option {
     size_t most_scratch_bytes; /* bound on the files of large arrays; 0: the free disk is */
     struct pdf_helper pdf;
+    bool pictures; /* all stages but the last are loaded, and pictures are made in place of the report; STATUS_NOT_FOUND
+                      where a stage has no output */
 };
 
 /* tools: folder, status, log, pool and memory limit; the others are set here. plan: of these tools and inputs. Errors

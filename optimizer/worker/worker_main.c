@@ -47,6 +47,8 @@ static const char usage[] =
     "                     one is lost; the processors are divided among them unless --threads is given. Results do "
     "not\n"
     "                     depend on it. mpirun and srun may also start this program themselves\n"
+    "  --pictures         of a job that has succeeded: make its picture in the studio and its twin, with progress in\n"
+    "                     JOBDIR/pictures.json\n"
     "  --quiet            log to JOBDIR/log.txt only\n"
     "  --check JOB.json   check the document and its files (in JOBDIR), and print all faults and warnings as JSON;\n"
     "                     exit status 1 when there are faults\n"
@@ -68,7 +70,7 @@ struct arguments {
     const char *check;  /* a document to check; NULL: the job is run */
     size_t n_thread, n_rank, memory_mib, scratch_mib;
     struct worker_team_place team;
-    bool quiet, no_links, plan;
+    bool quiet, no_links, plan, pictures;
     enum confine_mode sandbox;
     struct confinement confinement;
 };
@@ -166,6 +168,7 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
                                            {"confined", required_argument, NULL, 'C'},
                                            {"start", required_argument, NULL, 'N'},
                                            {"quiet", no_argument, NULL, 'q'},
+                                           {"pictures", no_argument, NULL, 'P'},
                                            {"no-links", no_argument, NULL, 'l'},
                                            {"help", no_argument, NULL, 'h'},
                                            {"version", no_argument, NULL, 'v'},
@@ -181,7 +184,8 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
         if (c == 'l') a->no_links = true;
         if (c == '?') return fputs(usage, stderr) < 0 ? WORKER_FAILED : WORKER_USAGE;
         if (c == 'p') a->plan = true;
-        if (c == 'q' || c == 'l' || c == 'p' || take_value(c, optarg, a)) continue;
+        if (c == 'P') a->pictures = true;
+        if (c == 'q' || c == 'l' || c == 'p' || c == 'P' || take_value(c, optarg, a)) continue;
         fprintf(stderr, "selvedge-worker: '%s' is not an allowed value\n", optarg);
         return WORKER_USAGE;
     }
@@ -214,15 +218,17 @@ static status run_stages(struct stage_tools *tools, const struct arguments *a, s
 {
     struct speed_book book = {.n = 0};
     struct job_plan plan;
-    const struct pipeline_option option = {.most_scratch_bytes = a->scratch_mib << 20, .pdf = a->confinement.pdf};
+    const struct pipeline_option option = {
+        .most_scratch_bytes = a->scratch_mib << 20, .pdf = a->confinement.pdf, .pictures = a->pictures};
     if (a->speeds != NULL) speed_book_read(a->speeds, &book);
     status s = job_inputs_read(tools, in, err);
     job_plan_init(&plan, tools, in);
     if (s == STATUS_OK) job_need_begin(&plan);
     worker_status_speeds(tools->status, &book);
-    if (s == STATUS_OK) s = pipeline_run(tools, in, &option, &plan, err);
+    if (s == STATUS_OK && (!a->pictures || job_sections_wants_pictures(&in->section)))
+        s = pipeline_run(tools, in, &option, &plan, err);
     other_faults_name(tools, s, err);
-    if (s == STATUS_OK && a->speeds != NULL) remember_speeds(&plan, a->speeds, a->team.fd < 0);
+    if (s == STATUS_OK && a->speeds != NULL && !a->pictures) remember_speeds(&plan, a->speeds, a->team.fd < 0);
     return s;
 }
 
@@ -369,7 +375,9 @@ int main(int argc, char **argv)
         (struct stage_tools){.folder = &folder, .memory_limit_bytes = a.memory_mib << 20, .warn = {stage_warn, &tools}};
     worker_folder_path(&folder, JOB_FILE_LOG, NULL, log_path);
     s = log_open(log_path, a.quiet ? NULL : stderr, LOG_LEVEL_INFO, &tools.log, &err);
-    if (s == STATUS_OK) s = worker_status_start(&folder, tools.log, &tools.status, &err);
+    if (s == STATUS_OK)
+        s = worker_status_start(&folder, tools.log, a.pictures ? JOB_FILE_PICTURES : JOB_FILE_STATUS, &tools.status,
+                                &err);
     if (s != STATUS_OK) {
         fprintf(stderr, "selvedge-worker: %s\n", err.text);
         code = WORKER_FAILED;

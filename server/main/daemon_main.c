@@ -19,6 +19,7 @@
 #include "server/store/store_cluster.h"
 #include "server/store/store_settings.h"
 #include "server/workers/lease_keeper.h"
+#include "server/workers/picture_maker.h"
 #include "server/workers/queue_planner.h"
 #include "server/workers/supervisor.h"
 
@@ -281,6 +282,7 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     struct webhook *webhook = NULL;
     struct retention_watch *retention = NULL;
     struct queue_planner *planner = NULL;
+    struct picture_maker *pictures = NULL;
     struct backup_keeper *backup = NULL;
     struct static_files *files = NULL;
     struct http_server *server = NULL;
@@ -296,6 +298,7 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     if (r == STATUS_OK) r = supervisor_start(service, worker, &supervisor, err);
     if (r == STATUS_OK) r = retention_watch_start(service, &retention, err);
     if (r == STATUS_OK) r = queue_planner_start(service, &planner, err);
+    if (r == STATUS_OK) r = picture_maker_start(service, &pictures, err);
     if (r == STATUS_OK) r = http_server_start(service, endpoint_find, files, &server, url, err);
     if (r == STATUS_OK) {
         announce(s, url, log);
@@ -306,6 +309,7 @@ static status serve(struct settings *s, struct log *log, const sigset_t *signals
     if (service != NULL) atomic_store(&service->stopping, true);
 out:
     http_server_stop(server); /* first, because its threads wake the supervisor */
+    picture_maker_stop(pictures);
     queue_planner_stop(planner);
     retention_watch_stop(retention); /* before the supervisor, because it wakes it */
     supervisor_stop(supervisor);

@@ -138,6 +138,10 @@ static const struct setting table[] = {
            "time in seconds in which a worker must have judged the files of a job that is not started yet"),
     NUMBER("jobs", "plan_queued", plan_queued, 1, 0, 1,
            "1: jobs that wait in the queue are planned, so that the forecast of the queue knows how long each takes"),
+    NUMBER(
+        "jobs", "pictures", pictures, 1, 0, 1,
+        "1: after the result of a job with a cloth, and while no job waits or runs, its picture in the studio and its "
+        "twin are made; with the backend local"),
     TEXT(
         "slurm", "commands", slurm_commands, "",
         "folder of sbatch, squeue and scancel; empty: found in PATH. Read with jobs.backend = slurm (docs/cluster.md), "

@@ -26,7 +26,7 @@ struct settings {
     int64_t threads, ranks, scratch_limit_bytes, file_limit_bytes, folder_depth, thread_limit, open_files,
         oom_score_adj;
     int64_t nice, memory_limit_bytes, resident_limit_bytes, volume_memory_bytes, cancel_grace_s, max_lost_attempts,
-        heartbeat_timeout_s, time_limit_s, check_limit_s, plan_queued;
+        heartbeat_timeout_s, time_limit_s, check_limit_s, plan_queued, pictures;
     /* [slurm] */
     char slurm_commands[SETTING_TEXT_BYTES], slurm_partition[SETTING_TEXT_BYTES], slurm_account[SETTING_TEXT_BYTES],
         slurm_qos[SETTING_TEXT_BYTES], slurm_extra[SETTING_TEXT_BYTES], slurm_mpi[SETTING_TEXT_BYTES];

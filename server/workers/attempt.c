@@ -11,6 +11,7 @@
 #include "server/store/store_cluster.h"
 #include "server/views/result_version.h"
 #include "server/workers/console.h"
+#include "server/workers/picture_maker.h"
 
 #include <signal.h>
 #include <sodium.h>
@@ -22,8 +23,9 @@
 /* Removes the checkpoints that belong to the input before an edit, and keeps its result as a version. */
 static status clear_folder(struct job_service *v, struct job_row *row, struct error *err)
 {
-    static const char *const stale[] = {JOB_FILE_STATUS,    JOB_FILE_SERIES, JOB_FILE_LOG,     JOB_FOLDER_WORK,
-                                        JOB_FOLDER_RESULTS, JOB_FILE_RUN,    JOB_FILE_BACKEND, "console.txt"};
+    static const char *const stale[] = {JOB_FILE_STATUS,  JOB_FILE_SERIES,    JOB_FILE_LOG,
+                                        JOB_FOLDER_WORK,  JOB_FOLDER_RESULTS, JOB_FILE_RUN,
+                                        JOB_FILE_BACKEND, JOB_FILE_PICTURES,  "console.txt"};
     char path[PATH_BYTES];
     const char *job_id = row->id;
     status s = version_keep(v, row, err);
@@ -342,6 +344,7 @@ status attempt_finish(struct job_service *v, const char *job_id, const char *tok
     s = job_update_surely(v, &row, err);
     if (s == STATUS_OK && over) atomic_fetch_add(&v->n_finished_total[row.state], 1);
     if (s == STATUS_OK && row.state == JOB_SUCCEEDED) count_verdict(v, row.verdict);
+    if (s == STATUS_OK && row.state == JOB_SUCCEEDED) picture_list_add(v, job_id);
     if (s == STATUS_OK)
         log_info(v->log, "job %s is %s%s%s", job_id, job_state_name(row.state), row.error_text[0] ? ": " : "",
                  row.error_text);

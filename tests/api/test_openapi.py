@@ -194,6 +194,10 @@ def test_every_operation_answers_as_documented(daemon, daemon_maker):
     call("listResults", "GET", f"/v1/jobs/{job}/results")
     call("getResult", "GET", f"/v1/jobs/{job}/results/result.json")
     call("getArchive", "GET", f"/v1/jobs/{job}/results.tar")
+    call("getPictures", "GET", f"/v1/jobs/{job}/pictures")
+    assert daemon.post(f"/v1/jobs/{job}/pictures/start").status_code == 409  # jobs.pictures is off; test_picture_stage starts it
+    done.add("startPictures")
+    call("stopPictures", "POST", f"/v1/jobs/{job}/pictures/stop")
     call("listVersions", "GET", f"/v1/jobs/{job}/versions")
     call("getVersion", "GET", f"/v1/jobs/{job}/versions/1")
     call("getVersionFile", "GET", f"/v1/jobs/{job}/versions/1/result.json")

@@ -22,4 +22,5 @@ export function jobFront({ job, list, compared }) {
   const pictures = el("div", { class: "looks" }, picture ? pictureNode(picture) : null, twin?.box);
   return { node: el("section", { class: `card front${twin ? " with-twin" : picture ? "" : " words"}${done ? "" : " early"}`, id: "front" }, verdict, picture || twin ? pictures : null, numbers), close: () => twin?.close() };
 }
-export const frontKey = ({ job, list }) => [job.generation, job.state === "succeeded", job.verdict, job.state === "succeeded" ? 0 : clothPicture(job, list.files)];
+// The twin of a job may come after its result, and the picture grows.
+export const frontKey = ({ job, list }) => [job.generation, job.state === "succeeded", job.verdict, clothPicture(job, list.files), list.files.some((f) => f.path === "twin/twin.json")];

@@ -1,12 +1,12 @@
 // The page of one job: name, state and actions; the result first, then tabs. A tab is made when it is looked at, and made
 // anew when its content is another.
-import { el, refill, stateTag } from "../page_parts.js";
+import { el, percent, refill, stateTag } from "../page_parts.js";
 import { RepairPanel, failedByInput } from "../repair/repair_panel.js";
 import { configurations, parameterMeanings } from "../result_view.js";
 import { getJson, poll, sendJson } from "../server_link.js";
 import { JobCharts } from "./job_charts.js";
 import { frontKey, jobFront } from "./job_front.js";
-import { LIVE, factsOf, notesOf, stagesOf } from "./job_progress.js";
+import { LIVE, MAKING, factsOf, laterOf, notesOf, stagesOf } from "./job_progress.js";
 import { actionsTab } from "../actions/actions_tab.js";
 import { TabBar } from "../tabs/tab_bar.js";
 import { filesTab } from "../tabs/files_tab.js";
@@ -39,6 +39,7 @@ class JobPage {
     this.stages = el("div", { class: "stages" });
     this.facts = el("div", { class: "facts" });
     this.notes = el("div");
+    this.later = el("div"); // what is made after the result
     this.front = { node: null, close: () => {} };
     this.frontPlace = el("div");
     this.bar = new TabBar(id, TABS, "parts of this job");
@@ -47,7 +48,7 @@ class JobPage {
     this.charts = new JobCharts();
     this.repair = new RepairPanel(id, () => this.poller.wake());
     this.pair = { wanted: null }; // the row whose pictures the tab "Pictures" is to open
-    page.append(el("section", { class: "card", id: "state" }, this.head, this.stages, this.facts, this.notes), this.repair.node, this.frontPlace, this.bar.node, this.panel);
+    page.append(el("section", { class: "card", id: "state" }, this.head, this.stages, this.facts, this.later, this.notes), this.repair.node, this.frontPlace, this.bar.node, this.panel);
     this.poller = poll(() => this.round());
   }
 
@@ -97,7 +98,9 @@ class JobPage {
   }
 
   async fetchList(job) {
-    const key = JSON.stringify([job.state, job.generation, job.attempt, job.stage, job.finished_unix_s]);
+    const later = job.state === "succeeded" ? await getJson(`/v1/jobs/${this.id}/pictures`).catch(() => null) : null;
+    this.pictures = later;
+    const key = JSON.stringify([job.state, job.generation, job.attempt, job.stage, job.finished_unix_s, later?.state, later?.fraction]);
     if (job.state === "draft" || (key === this.listKey && (!LIVE.has(job.state) || this.nPoll % LIST_EVERY !== 0))) return;
     this.list = await getJson(`/v1/jobs/${this.id}/results`).catch((error) => { if (error.status === 404) return NO_FILES; throw error; });
     this.listKey = key;
@@ -114,6 +117,7 @@ class JobPage {
     refill(this.head, [job.sample, job.state, job.error?.code, job.cancel_requested, job.missing_files], () => [el("h1", {}, job.sample), stateTag(job.state), el("span", { class: "space" }), ...this.buttons(job)]);
     refill(this.stages, [job.state, job.i_stage, job.stage_fraction], () => stagesOf(job, this.about.stages));
     refill(this.facts, [job.state, job.message, job.fraction, job.eta_s, job.step, job.attempt, job.finished_unix_s], () => factsOf(job));
+    refill(this.later, [job.state, this.pictures?.state, percent(this.pictures?.fraction ?? 0, 0)], () => laterOf(job.state === "succeeded" ? this.pictures : null, (verb) => this.act(`pictures/${verb}`)));
     refill(this.notes, [job.warnings, job.error, job.state, job.missing_files], () => notesOf(job));
   }
 
@@ -183,7 +187,7 @@ class JobPage {
     if (this.gone) return 5;
     this.showFront(this.view);
     await this.showTab();
-    return job.state === "running" ? 1 : LIVE.has(job.state) ? 2 : 10;
+    return job.state === "running" ? 1 : LIVE.has(job.state) || MAKING.has(this.pictures?.state) ? 2 : 10;
   }
 
   leave() {

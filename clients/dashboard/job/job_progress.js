@@ -2,6 +2,7 @@
 import { duration, el, isNumber, percent, timeLeft, when } from "../page_parts.js";
 
 export const LIVE = new Set(["queued", "running", "paused"]);
+export const MAKING = new Set(["waiting", "running"]); // of the picture and the twin after the result
 const SHOWN_WARNINGS = 2; // of a job that has no result
 
 export function stagesOf(job, stages) {
@@ -42,4 +43,13 @@ export function notesOf(job) {
   if (job.missing_files?.length && job.state === "draft") notes.push(el("p", { class: "note" }, `Files still missing: ${job.missing_files.join(", ")}`));
   if (job.result?.converged === false && !job.warnings.some((w) => w.includes("not converged"))) notes.push(el("p", { class: "note" }, `The fit has not converged: ${job.result.reason ?? "the parameters are the best point found"}`));
   return notes;
+}
+
+// The picture and the twin that are made after the result: `state` of GET /v1/jobs/{id}/pictures, or null.
+export function laterOf(pictures, act) {
+  const words = { waiting: "A picture and the twin are made when no job waits or runs.", cancelled: "The picture and the twin were stopped.", failed: `There is no picture: ${pictures?.error}` }[pictures?.state];
+  if (pictures?.state !== "running" && !words) return [];
+  const making = MAKING.has(pictures.state);
+  return [el("p", { class: "hint", id: "later" }, words ?? `A picture and the twin are being made: ${percent(pictures.fraction, 0)}. `, " ",
+    el("button", { onclick: act(making ? "stop" : "start") }, making ? "Stop" : "Make them"))];
 }

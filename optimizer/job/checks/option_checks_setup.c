@@ -185,7 +185,7 @@ static status check_one_cloth(const struct option_value *v, struct error *err)
 static status check_no_measurement(const struct option_value *v, struct error *err)
 {
     static const char missing[] = "'photographs' is missing: ";
-    bool pictures = given(v, "pictures") || v->section->fit->result_file[0] != '\0';
+    bool pictures = json_is_array(json_object_get(v->value, "pictures")) || v->section->fit->result_file[0] != '\0';
     if (!given(v, "volume") && !pictures)
         return error_set_field(err, STATUS_INVALID, "photographs",
                                "%sgive a list of photographs, or 'measurements' with a table", missing);

@@ -82,6 +82,22 @@ static void take_view(const struct studio_view *view, struct job_surface_picture
     p->black_sheet = 0;
 }
 
+void job_picture_studio(enum job_picture_kind kind, struct job_surface_picture *p)
+{
+    *p = (struct job_surface_picture){.kind = kind,
+                                      .wrap_deg = 180.0,
+                                      .lamp_sharpness = NAN,
+                                      .ground_gap_mm = NAN,
+                                      .ground_albedo = 0.5,
+                                      .px = STUDIO_PX,
+                                      .sample = 16,
+                                      .method = JOB_PICTURE_FAST,
+                                      .n_deep_path = STUDIO_DEEP_PATHS,
+                                      .filter = true,
+                                      .cloth_rotation_deg = view_of[kind].rotation_deg};
+    take_view(&view_of[kind], p);
+}
+
 status job_picture_complete(const json_t *given, size_t i, struct job_surface_picture *p, struct error *err)
 {
     const struct studio_view *view = &view_of[p->kind];

@@ -40,8 +40,14 @@ enum job_picture_kind {
 /* Its word in job documents. */
 const char *job_picture_kind_name(enum job_picture_kind kind);
 
+struct job_surface_picture;
+/* A picture of the studio with the settings that a document leaves out. */
+void job_picture_studio(enum job_picture_kind kind, struct job_surface_picture *p);
+
 /* A picture of the fitted cloth laid on a surface. */
 struct job_surface_picture {
+    const char *name; /* of its files, pictures/<name>.png; NULL: on-<number> */
+    bool is_draft;    /* a better one will replace it */
     enum job_picture_kind kind;
     enum job_surface on;
     char mesh_file[JOB_MAX_NAME_BYTES]; /* of JOB_ON_MESH; "" otherwise */
@@ -66,6 +72,7 @@ struct job_surface_picture {
 
 struct job_results {
     size_t render_px, render_sample; /* 0: chosen from the paths of the fit */
+    bool no_pictures;                /* "pictures": "none": nothing is made after the result */
     size_t n_surface_picture;
     struct job_surface_picture *surface_picture;
     bool twin; /* tables for the page in the browser */

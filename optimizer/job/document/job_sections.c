@@ -26,6 +26,13 @@ enum job_kind job_sections_kind(const struct job_sections *section)
                                                                                            : JOB_OF_GEOMETRY;
 }
 
+bool job_sections_wants_pictures(const struct job_sections *section)
+{
+    const enum job_kind kind = job_sections_kind(section);
+    const bool shows_own = kind == JOB_OF_PICTURES && section->fit->result_file[0] == '\0';
+    return (kind == JOB_OF_FIT || shows_own) && !section->results->no_pictures;
+}
+
 /* ---- input files ---- */
 
 /* Several photographs of a bowl may name one background. */

@@ -3,6 +3,7 @@
 #ifndef SELVEDGE_OPTIMIZER_JOB_SECTIONS_H
 #define SELVEDGE_OPTIMIZER_JOB_SECTIONS_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 struct job_scan;
@@ -33,6 +34,10 @@ enum job_kind {
 };
 
 enum job_kind job_sections_kind(const struct job_sections *section);
+
+/* Whether a picture and a twin are made after the result: of a cloth with a model, unless the document leaves them out.
+ * Jobs that show another job's result make what they were asked for alone. */
+bool job_sections_wants_pictures(const struct job_sections *section);
 
 /* Calls visit for every input file that the document names, with its role ("volume", "fibers", "environment", "draft",
  * "measurements", "photograph", "camera_noise", "dark_frame", "chart", "white_reference", "mesh", "profile",

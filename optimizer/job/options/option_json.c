@@ -80,6 +80,7 @@ static json_t *option_json(const struct job_option *row)
     json_t *json =
         json_pack("{s:s,s:s,s:b}", "path", row->path, "kind", kind_name[row->kind], "required", (int)row->required);
     if (row->or_section) json_object_set_new(json, "or_section", json_true());
+    put_text(json, "or_word", row->or_word);
     put_text(json, "unit", row->unit);
     put_range(json, row);
     if (is_choice(row->kind)) put_choices(json, row);

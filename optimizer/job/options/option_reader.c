@@ -162,7 +162,12 @@ static status read_list(const struct job_option *row, const struct json_field *l
                         struct error *err)
 {
     char *element, pattern[JSON_PATH_BYTES];
+    const char *word = json_string_value(list->object);
     if (row->or_section && json_is_object(list->object)) return read_section(list, row->path, base, r, err);
+    if (row->or_word != NULL && word != NULL && strcmp(word, row->or_word) == 0) {
+        *(bool *)((char *)base + row->word_at) = true;
+        return STATUS_OK;
+    }
     status s = new_list(row, list, base, &element, err);
     snprintf(pattern, sizeof pattern, "%s[]", row->path);
     for (size_t i = 0; s == STATUS_OK && i < json_array_size(list->object); i++, element += row->element_bytes) {

@@ -50,6 +50,8 @@ struct job_option {
     enum option_kind kind;
     bool required;
     bool or_section;                /* OPTION_BOOL, OPTION_LIST: an object of the rows under path is allowed as well */
+    const char *or_word;            /* OPTION_LIST: this word is allowed as well, and means an empty list */
+    size_t word_at;                 /* of it: offset of a bool in the section */
     bool may_be_empty;              /* OPTION_SECTION: {} means something, or the check says what it lacks */
     bool stored;                    /* it has a target */
     enum job_section section;       /* of the target */

@@ -24,12 +24,17 @@ const struct job_option option_rows_pictures[] = {
      LIST_INTO(results, surface_picture, n_surface_picture),
      .upper = JOB_MAX_SURFACE_PICTURE,
      .check = job_check_pictures,
-     .left_out = "none",
-     .allowed = "1..32",
+     .or_word = "none",
+     .word_at = offsetof(struct job_results, no_pictures),
+     .left_out = "a draped picture and the twin after the result",
+     .allowed = "1..32, or `none`",
      .items = "pictures",
-     .meaning = "Pictures of the fitted cloth laid on a surface (docs/bent-cloth.md), in the folder `pictures` of the "
-                "results. They show the best model. Without `photographs` and `measurements` "
-                "nothing is fitted: they show `fit.model` with `fit.fixed`, which then names every parameter."},
+     .meaning =
+         "Pictures of the fitted cloth laid on a surface (docs/bent-cloth.md), in the folder `pictures` of the "
+         "results. They show the best model. Without `photographs` and `measurements` "
+         "nothing is fitted: they show `fit.model` with `fit.fixed`, which then names every parameter. After the "
+         "result of a job with a cloth the service makes a picture in the studio, pictures/hero.png, and the "
+         "twin, while no job waits; `none` leaves them out."},
     {.path = "pictures[].kind",
      .kind = OPTION_CHOICE,
      OF_PICTURE(kind),

@@ -44,6 +44,10 @@ struct report_output {
     struct verdict verdict; /* of the best model or, without a fit, of the geometry */
 };
 status stage_report(const struct report_input *in, struct report_output *out, struct error *err);
+/* What is made after the result, while the service has nothing else to do: pictures/hero.png of the results, at first
+ * from tables of few paths, and the twin. Goes on where an earlier attempt was interrupted. What the document asks for
+ * itself is left out. Errors of surface_pictures_write and twin_result_write. */
+status stage_pictures(const struct report_input *in, struct error *err);
 
 /* A candidate for the next photograph. */
 struct pipeline_candidate {

@@ -44,8 +44,11 @@ static status make_drape(const struct surface_input *on, size_t i, struct mesh *
     status s = durable_make_folder(path, err);
     const size_t first = first_of_drape(on->results, i);
     const struct job_surface_picture *p0 = &on->results->surface_picture[first];
-    snprintf(name, sizeof name, "pictures/on-%zu.obj", first + 1);
-    worker_folder_path(on->tools->folder, JOB_FOLDER_RESULTS, name, path);
+    if (p->name != NULL) /* that of no document */
+        snprintf(name, sizeof name, "report/%s.obj", p->name);
+    else
+        snprintf(name, sizeof name, "pictures/on-%zu.obj", first + 1);
+    worker_folder_path(on->tools->folder, p->name != NULL ? JOB_FOLDER_WORK : JOB_FOLDER_RESULTS, name, path);
     if (s == STATUS_OK && access(path, F_OK) != 0) {
         struct progress silent = progress_silent(&on->tools->progress);
         s = mesh_drape(scale * p0->size_mm, scale * p0->radius_mm, &silent, m, err);

@@ -174,6 +174,8 @@ static status write_studio(struct report *report, const struct one_picture *one,
 static void put_studio(json_t *entry, const struct job_surface_picture *p, const struct surface_filter *filter)
 {
     json_object_set_new(entry, "kind", json_string(job_picture_kind_name(p->kind)));
+    if (p->is_draft || json_integer_value(json_object_get(entry, "samples")) < (json_int_t)p->sample)
+        json_object_set_new(entry, "partial", json_true());
     json_object_set_new(entry, "tone_curve", json_string("khronos_pbr_neutral"));
     if (filter->guides.feature.pixel != NULL) json_object_set_new(entry, "filter", json_string(JOINT_FILTER_ID));
 }
@@ -305,6 +307,7 @@ static status render(struct report *report, const struct one_picture *one, const
 /* Returns whether an entry of an earlier attempt has all that the document asks for. */
 static bool is_finished(const json_t *entry, const struct job_surface_picture *p, bool has_fibers)
 {
+    if (json_is_true(json_object_get(entry, "partial"))) return false;
     const char *method = json_string_value(json_object_get(entry, "method"));
     if (json_integer_value(json_object_get(entry, "samples")) != (json_int_t)p->sample) return false;
     if (p->filter && p->sample > 1 && !surface_studio_is(p) && has_fibers && json_object_get(entry, "filtered") == NULL)
@@ -333,7 +336,10 @@ static status write_one(struct report *report, size_t i, const struct surface_ta
     char name[32], relative[64], path[WORKER_PATH_BYTES];
     const bool has_fibers = report->model[report_best_model(report)].setup->appearance.kind == MODEL_SURFACE;
     struct surface_passes so_far;
-    snprintf(name, sizeof name, "on-%zu", i + 1);
+    if (p->name != NULL)
+        snprintf(name, sizeof name, "%s", p->name);
+    else
+        snprintf(name, sizeof name, "on-%zu", i + 1);
     snprintf(relative, sizeof relative, "pictures/%s.json", name);
     worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, relative, path);
     json_t *entry = json_load_file(path, 0, NULL);

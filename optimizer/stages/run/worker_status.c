@@ -22,6 +22,7 @@ enum { MAX_WARNING = 50, WARNING_BYTES = 512, HEARTBEAT_MS = 400 };
 struct worker_status {
     const struct worker_folder *folder;
     struct log *log;
+    const char *file; /* in the job's folder */
     pthread_t thread;
     bool running;
     atomic_bool cancel, stale, stop;
@@ -103,7 +104,7 @@ static void beat(struct worker_status *st)
         atomic_store(&st->cancel, true);
         return;
     }
-    worker_folder_path(st->folder, JOB_FILE_STATUS, NULL, path);
+    worker_folder_path(st->folder, st->file, NULL, path);
     pthread_mutex_lock(&st->mutex);
     char *text = status_text(st, "running", NULL);
     pthread_mutex_unlock(&st->mutex);
@@ -139,6 +140,7 @@ status worker_status_new(const struct worker_folder *folder, struct log *log, st
     if (st == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot start the worker: out of memory");
     st->folder = folder;
     st->log = log;
+    st->file = JOB_FILE_STATUS;
     size_t n_stage;
     const struct speed_book none = {.n = 0};
     pipeline_stage_table(&n_stage);
@@ -150,12 +152,13 @@ status worker_status_new(const struct worker_folder *folder, struct log *log, st
     return STATUS_OK;
 }
 
-status worker_status_start(const struct worker_folder *folder, struct log *log, struct worker_status **out,
-                           struct error *err)
+status worker_status_start(const struct worker_folder *folder, struct log *log, const char *file,
+                           struct worker_status **out, struct error *err)
 {
     struct worker_status *st;
     status s = worker_status_new(folder, log, &st, err);
     if (s != STATUS_OK) return s;
+    st->file = file;
     if (pthread_create(&st->thread, NULL, heartbeat, st) != 0) {
         worker_status_free(st);
         return error_set(err, STATUS_NO_MEMORY, "cannot start the worker: no thread");
@@ -187,7 +190,7 @@ status worker_status_finish(struct worker_status *st, const char *state, const s
     char *text = status_text(st, state, error);
     pthread_mutex_unlock(&st->mutex);
     if (text == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the final status: out of memory");
-    worker_folder_path(st->folder, JOB_FILE_STATUS, NULL, path);
+    worker_folder_path(st->folder, st->file, NULL, path);
     status s = worker_folder_replace(st->folder, path, text, strlen(text), err);
     free(text);
     return s;

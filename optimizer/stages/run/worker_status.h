@@ -17,9 +17,10 @@ struct worker_status;
 /* A status without the thread, which is written nowhere: for planning. STATUS_NO_MEMORY. */
 status worker_status_new(const struct worker_folder *folder, struct log *log, struct worker_status **st,
                          struct error *err);
-/* The same with the thread. SIGTERM and SIGINT must be blocked in the caller (and so in all threads made later). */
-status worker_status_start(const struct worker_folder *folder, struct log *log, struct worker_status **st,
-                           struct error *err);
+/* The same with the thread, written to `file` of the job's folder: JOB_FILE_STATUS, or JOB_FILE_PICTURES. SIGTERM and
+ * SIGINT must be blocked in the caller (and so in all threads made later). */
+status worker_status_start(const struct worker_folder *folder, struct log *log, const char *file,
+                           struct worker_status **st, struct error *err);
 /* Writes the final state ("succeeded", "failed", "cancelled") durably and ends the thread; error only for "failed". A
  * stale worker writes nothing. */
 status worker_status_finish(struct worker_status *st, const char *state, const struct error *error, struct error *err);

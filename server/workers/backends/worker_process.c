@@ -127,6 +127,7 @@ void worker_arguments_set(struct worker_arguments *a, const struct worker_paths 
     add(a, p->document != NULL ? "--check" : "--speeds");
     add(a, p->document != NULL ? p->document : p->speeds);
     if (p->plan) add(a, "--plan");
+    if (p->pictures) add(a, "--pictures");
     if (p->document != NULL || p->plan) add(a, "--no-links");
     if (threads > 0) {
         add(a, "--threads");

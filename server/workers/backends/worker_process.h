@@ -17,6 +17,7 @@ struct worker_paths {
     const char *console;  /* gets stdout and stderr, and is made new */
     const char *speeds;   /* of earlier jobs */
     const char *document; /* a job document whose files in job_folder are judged; NULL: the job is run or planned */
+    bool pictures;        /* the job has succeeded: its pictures are made (worker option --pictures) */
     bool plan;            /* the job is not run: its expected resources are reported */
     int report_fd;        /* gets the report of a check or a plan, in place of the console */
     int64_t threads;      /* computing threads; 0: as the settings say */

@@ -107,7 +107,7 @@ class Daemon:
     def __init__(self, folder, worker=FAKE_WORKER, options=None, environment=None, wrapper=None):
         self.data = str(folder)
         self.worker = worker
-        self.options = {"disk.floor_bytes": 0, "jobs.cancel_grace_s": 1, **SANITIZED, **SharedStore.options(self.data), **(options or {})}
+        self.options = {"disk.floor_bytes": 0, "jobs.cancel_grace_s": 1, "jobs.pictures": 0, **SANITIZED, **SharedStore.options(self.data), **(options or {})}
         self.environment = environment or {}
         self.wrapper = wrapper if wrapper is not None else os.environ.get("SELVEDGE_TEST_WRAPPER", "").split()
         self.process = None

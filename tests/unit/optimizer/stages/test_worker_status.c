@@ -35,7 +35,7 @@ static void start(struct fixture *d, void **state)
     assert_int_equal(worker_folder_open(&d->hold, d->folder, &err), STATUS_OK);
     snprintf(path, sizeof path, "%s/log.txt", d->folder);
     assert_int_equal(log_open(path, NULL, LOG_LEVEL_INFO, &d->log, &err), STATUS_OK);
-    assert_int_equal(worker_status_start(&d->hold, d->log, &d->status, &err), STATUS_OK);
+    assert_int_equal(worker_status_start(&d->hold, d->log, JOB_FILE_STATUS, &d->status, &err), STATUS_OK);
 }
 
 /* Ends the status and returns status.json. */

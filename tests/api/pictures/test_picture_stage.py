@@ -1,0 +1,80 @@
+"""The stage after the result: a picture and the twin, while no job waits or runs, stopped and resumed, found after a crash."""
+import json
+import os
+import time
+
+import pytest
+from daemon_under_test import problem
+from small_cloth import hair
+
+FIXED = {"C_R": [0.1, 0.1, 0.1], "C_TT": [0.5, 0.3, 0.2], "beta_R": 10, "beta_TT": 20, "gamma_TT": 25}
+SMALL = {"on": "flat", "light_theta_deg": 45, "light_phi_deg": 0, "camera_theta_deg": 45, "camera_phi_deg": 180, "px": 8, "samples": 2}
+
+
+@pytest.fixture
+def making(daemon_maker):
+    return daemon_maker(worker=None, options={"jobs.pictures": 1})
+
+
+def start(daemon, **more):
+    job = daemon.create({"sample": "stage", "fibers": {"file": "cloth.hair"}, "fit": {"model": "two_lobe.v1", "fixed": FIXED}, "pictures": [SMALL], **more})
+    daemon.upload(job, "cloth.hair", hair(layers=3), "fibers")
+    assert daemon.post(f"/v1/jobs/{job}/start").status_code == 202
+    return job
+
+
+def pictures(daemon, job):
+    return daemon.get(f"/v1/jobs/{job}/pictures").json()
+
+
+def wait(daemon, job, *states, timeout_s=240):
+    end = time.monotonic() + timeout_s
+    while (now := pictures(daemon, job))["state"] not in states:
+        assert time.monotonic() < end, (now, daemon.get(f"/v1/jobs/{job}/log").text[-1000:])
+        time.sleep(0.2)
+    return now
+
+
+def files(daemon, job):
+    return {f["path"] for f in daemon.get(f"/v1/jobs/{job}/results").json()["files"]}
+
+
+def wait_file(daemon, job, path, timeout_s=240):
+    end = time.monotonic() + timeout_s
+    while path not in files(daemon, job):
+        assert time.monotonic() < end and pictures(daemon, job)["state"] in ("waiting", "running"), pictures(daemon, job)
+        time.sleep(0.3)
+
+
+def test_stop_and_resume_and_a_crash(making):
+    """The result is there before the picture; a draft comes first; a stop keeps it; a killed daemon's list is still there."""
+    daemon = making
+    job = start(daemon)
+    done = daemon.wait_state(job, "succeeded", "failed", timeout_s=120)
+    assert done["state"] == "succeeded", done["error"]
+    assert "pictures/hero.png" not in files(daemon, job)
+    wait_file(daemon, job, "pictures/hero.png")
+    draft = json.loads(daemon.get(f"/v1/jobs/{job}/results/pictures/hero.json").content)
+    assert draft["kind"] == "drape" and draft["partial"]
+    stopped = daemon.post(f"/v1/jobs/{job}/pictures/stop")
+    assert stopped.status_code == 200
+    wait(daemon, job, "cancelled")
+    assert "pictures/hero.png" in files(daemon, job) and daemon.get(f"/v1/jobs/{job}").json()["state"] == "succeeded"
+    assert daemon.post(f"/v1/jobs/{job}/pictures/start").json()["state"] in ("waiting", "running")
+    wait(daemon, job, "running")
+    daemon.kill()
+    daemon.start()
+    wait(daemon, job, "running")
+    assert daemon.get(f"/v1/jobs/{job}").json()["state"] == "succeeded"
+    other = start(daemon, pictures=[SMALL, {**SMALL, "light_phi_deg": 10}])
+    assert daemon.wait_state(other, "succeeded", "failed", timeout_s=120)["state"] == "succeeded"
+    assert {pictures(daemon, j)["state"] for j in (job, other)} <= {"waiting", "running"}
+
+
+def test_jobs_that_want_none(making):
+    """A geometry would have none; a document may leave them out; a job that has not succeeded has none to start."""
+    daemon = making
+    job = daemon.create({"sample": "s", "fibers": {"file": "cloth.hair"}, "measurements": {"file": "rows.csv"}, "pictures": "none"})
+    assert pictures(daemon, job) == {"state": "none", "fraction": 0.0, "error": None}
+    assert "not succeeded" in problem(daemon.post(f"/v1/jobs/{job}/pictures/start"), 409, "conflict")["detail"]
+    assert not os.listdir(os.path.join(daemon.data, "pictures"))
