@@ -34,6 +34,8 @@ test: | deps       ## everything that continuous integration runs; ends with "N 
 	@$(MAKE) --no-print-directory -j$$(nproc) all & ./config/install-dependencies test; installed=$$?; \
 		wait $$! && [ $$installed -eq 0 ]
 	@$(MAKE) --no-print-directory -j$$(nproc) all build-tests zoo
+	@$(MAKE) --no-print-directory $(EXPORTS_PYTHON)/bin/packages-are-there || \
+		echo "no package index: exported scenes are not opened by Mitsuba, USD and MaterialX"
 	@/usr/bin/python3 tests/run_tests.py --build $(BUILD)
 
 # PAGES: some of the browser tests only, such as PAGES=test_pairs.py

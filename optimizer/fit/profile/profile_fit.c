@@ -5,6 +5,7 @@
 #include "optimizer/fit/profile/profile_error.h"
 
 #include <math.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -94,13 +95,37 @@ static void target_release(struct profile_target *t)
 
 /* ---- starts ---- */
 
+/* Share of the time that the starts take; the rest goes to the best one. */
+static const double share_of_starts = 0.95;
+
+struct starts;
+struct start {
+    struct starts *all;
+    double done; /* share */
+};
+
 struct starts {
     const struct profile_target *target;
+    size_t n;
     struct profile_search search[MOST_START];
     status code[MOST_START];
     struct error error[MOST_START];
-    bool side_by_side; /* each start in one thread */
+    struct start start[MOST_START];
+    pthread_mutex_t lock; /* of `done` of all starts, and of reports */
 };
+
+/* Reports the mean share of all starts. context: one of them. */
+static void report_start(void *context, double done)
+{
+    struct start *one = context;
+    struct starts *all = one->all;
+    double sum = 0.0;
+    pthread_mutex_lock(&all->lock);
+    one->done = done;
+    for (size_t k = 0; k < all->n; k++) sum += all->start[k].done;
+    progress_report(all->target->problem->progress, share_of_starts * sum / (double)all->n);
+    pthread_mutex_unlock(&all->lock);
+}
 
 static void run_start(void *context, size_t k, size_t i_thread)
 {
@@ -111,8 +136,11 @@ static void run_start(void *context, size_t k, size_t i_thread)
     for (size_t u = 0; u < l->n_unknown; u++) unknown[u] = l->parameter[u].start;
     if (k > 0) fit_run_start(l, k, unknown);
     all->code[k] = profile_search_begin(&all->search[k], all->target, NULL, unknown, first_misfit, &all->error[k]);
+    all->start[k].all = all;
+    all->search[k].progress = (struct progress){.report = report_start, .context = &all->start[k]};
     if (all->code[k] == STATUS_OK)
         all->code[k] = profile_search_run(&all->search[k], ITERATIONS_OF_START, &all->error[k]);
+    report_start(&all->start[k], 1.0);
 }
 
 static double rel_rms_of(const struct profile_target *t, const double *value)
@@ -129,7 +157,8 @@ static double rel_rms_of(const struct profile_target *t, const double *value)
 static status run_starts(struct starts *all, struct profile_fit *fit, size_t *best, struct error *err)
 {
     const struct profile_problem *problem = all->target->problem;
-    status s = thread_pool_run(problem->pool, fit->n_start, run_start, all, problem->progress);
+    const struct progress silent = progress_silent(problem->progress);
+    status s = thread_pool_run(problem->pool, fit->n_start, run_start, all, &silent);
     if (s != STATUS_OK) return error_set(err, s, "cancelled");
     *best = 0;
     for (size_t k = 0; k < fit->n_start; k++) {
@@ -232,11 +261,14 @@ static status fit_target(struct profile_target *t, struct profile_fit *fit, stru
     size_t best = 0;
     if (all == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit a profile: out of memory");
     all->target = t;
-    fit->n_start = profile_fit_starts(t->problem->option);
+    pthread_mutex_init(&all->lock, NULL);
+    all->n = fit->n_start = profile_fit_starts(t->problem->option);
     status s = run_starts(all, fit, &best, err);
     struct profile_search *search = &all->search[best];
     const size_t before = search->n_evaluation;
+    struct progress_part part = {t->problem->progress, share_of_starts, 1.0 - share_of_starts};
     search->pool = t->problem->pool;
+    search->progress = progress_of_part(&part);
     if (s == STATUS_OK) s = refine(search, fit, err);
     if (s == STATUS_OK) {
         fit->n_evaluation += search->n_evaluation - before;
@@ -246,6 +278,7 @@ static status fit_target(struct profile_target *t, struct profile_fit *fit, stru
         search->here.value = NULL;
     }
     for (size_t k = 0; k < fit->n_start; k++) profile_search_end(&all->search[k]);
+    pthread_mutex_destroy(&all->lock);
     free(all);
     return s;
 }

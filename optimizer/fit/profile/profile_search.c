@@ -205,6 +205,7 @@ status profile_search_run(struct profile_search *s, size_t max_iteration, struct
     s->here.f = sum_of(s, &s->here);
     for (size_t i = 0; i < max_iteration; i++) {
         if (progress_cancelled(s->target->problem->progress)) return error_set(err, STATUS_CANCELLED, "cancelled");
+        progress_report(&s->progress, (double)i / (double)max_iteration);
         status code = step(s, damping, &expected, err);
         if (code == STATUS_OK && expected <= least_decrease * s->here.f) {
             s->converged = true;

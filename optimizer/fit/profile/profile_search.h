@@ -26,6 +26,7 @@ struct profile_point {
 struct profile_search {
     const struct profile_target *target;
     struct thread_pool *pool;
+    struct progress progress; /* of this search alone */
     struct profile_point here, next;
     double *error;    /* e of each value */
     double *by_param; /* derivatives by the model's parameters */
@@ -39,7 +40,7 @@ status profile_search_begin(struct profile_search *s, const struct profile_targe
 void profile_search_end(struct profile_search *s);
 /* Memory of one search. */
 size_t profile_search_bytes(const struct fiber_profile *profile, size_t n_param);
-/* Goes on for at most max_iteration steps. */
+/* Goes on for at most max_iteration steps, and reports the share of these that are done. */
 status profile_search_run(struct profile_search *s, size_t max_iteration, struct error *err);
 /* The error e of each value for a relative misfit t. */
 void profile_search_set_misfit(struct profile_search *s, double misfit);

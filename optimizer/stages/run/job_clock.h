@@ -47,10 +47,11 @@ struct job_clock {
 };
 
 struct job_clock_look {
-    double fraction;              /* of the job, in [0, 1) */
-    double eta_s;                 /* NaN before the first stage is planned */
-    double spread;                /* two standard deviations of the logarithm of eta_s, at most 3; NaN as eta_s */
-    double eta_low_s, eta_high_s; /* two standard deviations either way; NaN where that is less than a quarter */
+    double fraction; /* of the job, in [0, 1) */
+    double eta_s;    /* NaN before the first stage is planned */
+    double spread;   /* two standard deviations of the logarithm of eta_s, up to three where a stage that is
+                                   * left is the first of its kind; at most 3; NaN as eta_s */
+    double eta_low_s, eta_high_s; /* that much either way; NaN where it is less than a quarter */
 };
 
 /* The work of a stage: units > 0, each of about usual_s seconds where no speed is remembered under the key. log_sd:

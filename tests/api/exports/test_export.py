@@ -40,7 +40,7 @@ def test_a_scene_for_mitsuba(real, tmp_path):
     rows = list(csv.DictReader((tmp_path / "rows.csv").open()))
     assert [float(r["rendered_g"]) for r in rows] == pytest.approx([r["rendered"][1] for r in result["rows"]], rel=1e-6)
     if not os.access(PYTHON, os.X_OK):
-        pytest.skip("the files are right; no Mitsuba to open them with (make bench-exports installs it)")
+        pytest.skip("the files are right; no Mitsuba to open them with (make test installs it where there is a package index)")
     done = subprocess.run([PYTHON, ROW, "mitsuba", str(tmp_path), "0", "8", "16"], capture_output=True, text=True, check=True)
     assert all(x > 0 for x in map(float, done.stdout.strip("[]\n").split(",")))
 
