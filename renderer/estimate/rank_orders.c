@@ -23,7 +23,7 @@ bool rank_orders_can_share(const struct configuration *c, size_t n, const struct
 {
     bool one, surface = in->model->kind == MODEL_SURFACE;
     only_environment(c, n, &one);
-    return one && in->fast == NULL && in->dual == NULL && in->diffusion == NULL && !in->has_speckle && !in->first_hit &&
+    return one && in->fast == NULL && in->dual == NULL && in->diffusion == NULL && !in->has_speckle && in->n_hit == 0 &&
            strlen(in->model->id) < RANK_MODEL_BYTES &&
            (surface ? !scene_is_bent(in->scene.fibers) : in->scene.volume->bent == NULL);
 }

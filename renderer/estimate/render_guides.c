@@ -4,7 +4,10 @@
 
 #include <string.h>
 
-enum { LEAST_DIRECT = 16, MOST_DIRECT = 128, LEAST_FEATURE = 16, MOST_FEATURE = 64, FIRST_DIRECT = 1 << 24 };
+/* Hits of the light that is taken from samples of its own: three leave less structure to be guessed, but are worth
+ * their noise only where there are many samples (renderer/preview/NOTES.md). */
+enum { FEW_HITS = 1, MORE_HITS = 3, FROM_SAMPLES = 24 };
+enum { LEAST_EARLY = 16, MOST_EARLY = 128, LEAST_FEATURE = 16, MOST_FEATURE = 64, FIRST_EARLY = 1 << 24 };
 
 static size_t samples(size_t wanted, size_t least, size_t most)
 {
@@ -12,16 +15,17 @@ static size_t samples(size_t wanted, size_t least, size_t most)
     return n > least ? n : least;
 }
 
-static status make_direct(const struct render_request *q, struct thread_pool *pool, const struct progress *progress,
-                          struct image *direct, struct error *err)
+static status make_early(const struct render_request *q, struct thread_pool *pool, const struct progress *progress,
+                         struct image *early, struct error *err)
 {
     struct render_request first = *q;
     if (q->input.dual != NULL || q->input.diffusion != NULL) return STATUS_OK;
+    const bool many = q->n_sample >= FROM_SAMPLES && q->input.fast == NULL; /* tables have these hits, and no others */
     first.input.fast = NULL;
-    first.input.first_hit = true;
-    first.n_sample = samples(4 * q->n_sample, LEAST_DIRECT, MOST_DIRECT);
-    first.first_sample = FIRST_DIRECT; /* other random numbers than the picture's */
-    return render_run(&first, pool, progress, direct, err);
+    first.input.n_hit = many ? MORE_HITS : FEW_HITS;
+    first.n_sample = samples((many ? 2 : 4) * q->n_sample, LEAST_EARLY, MOST_EARLY);
+    first.first_sample = FIRST_EARLY; /* other random numbers than the picture's */
+    return render_run(&first, pool, progress, early, err);
 }
 
 status render_guides_make(const struct render_request *q, const struct dual_tables *averages, struct thread_pool *pool,
@@ -36,20 +40,20 @@ status render_guides_make(const struct render_request *q, const struct dual_tabl
                                       .n_sample = samples(2 * q->n_sample, LEAST_FEATURE, MOST_FEATURE),
                                       .seed = q->seed};
     status s = feature_image_render(&f, pool, progress, &guides->feature, err);
-    return s == STATUS_OK ? make_direct(q, pool, progress, &guides->direct, err) : s;
+    return s == STATUS_OK ? make_early(q, pool, progress, &guides->early, err) : s;
 }
 
 void render_guides_release(struct render_guides *guides)
 {
     image_release(&guides->feature);
-    image_release(&guides->direct);
+    image_release(&guides->early);
 }
 
 status render_guides_filter(const struct render_guides *guides, const struct image half[2], struct thread_pool *pool,
                             const struct progress *progress, struct image *out, double *error, struct error *err)
 {
     const struct joint_input in = {.half = {&half[0], &half[1]},
-                                   .direct = guides->direct.pixel != NULL ? &guides->direct : NULL,
+                                   .early = guides->early.pixel != NULL ? &guides->early : NULL,
                                    .feature = &guides->feature};
     return joint_filter(&in, pool, progress, out, error, err);
 }

@@ -17,7 +17,7 @@ struct run {
     float *block;            /* all planes below */
     struct regression_input planes;
     float *fitted[REGRESSION_VALUE]; /* of the scale under way */
-    float *shown[N_SCALE][N_RGB];    /* light other than direct light, of each scale */
+    float *shown[N_SCALE][N_RGB];    /* light other than early light, of each scale */
     float *error[N_SCALE];           /* estimated squared error, then its mean around a pixel */
     float *spread[N_SCALE];          /* of that the part that is noise, which halves tell better */
     float *temporary;
@@ -61,12 +61,12 @@ static void standardise(float *plane, size_t n)
 
 static void fill_planes(struct run *r)
 {
-    const struct image *direct = r->in->direct;
+    const struct image *early = r->in->early;
     for (size_t i = 0; i < r->n; i++) {
         const float *feature = pixel_of(r->in->feature, i);
         for (size_t k = 0; k < N_FROM_FEATURE; k++) r->planes.guide[k][i] = feature[k];
         for (size_t c = 0; c < N_RGB; c++) {
-            const float d = direct != NULL ? pixel_of(direct, i)[c] : 0;
+            const float d = early != NULL ? pixel_of(early, i)[c] : 0;
             r->planes.guide[N_FROM_FEATURE + c][i] = d;
             for (size_t h = 0; h < 2; h++) r->planes.value[h * N_RGB + c][i] = pixel_of(r->in->half[h], i)[c] - d;
         }
@@ -157,8 +157,8 @@ static void write_picture(struct run *r, struct image *out, double *error)
             float sum = 0;
             for (size_t s = 0; s < N_SCALE; s++) sum += r->error[s][i] * r->shown[s][c][i];
             if (!seen) sum = r->shown[0][c][i];
-            const float d = r->in->direct != NULL ? pixel_of(r->in->direct, i)[c] : 0;
-            if (r->in->direct != NULL) square += (double)pixel_of(r->in->direct, i)[N_RGB + c] / N_RGB;
+            const float d = r->in->early != NULL ? pixel_of(r->in->early, i)[c] : 0;
+            if (r->in->early != NULL) square += (double)pixel_of(r->in->early, i)[N_RGB + c] / N_RGB;
             out->pixel[i * N_RGB + c] = fmaxf(sum, seen ? 0 : -d) + d;
             mean += (double)out->pixel[i * N_RGB + c];
         }
@@ -175,9 +175,9 @@ static bool same_size(const struct image *a, const struct image *b)
 static status check(const struct joint_input *in, struct error *err)
 {
     const bool fits = same_size(in->half[0], in->half[1]) && same_size(in->half[0], in->feature) &&
-                      (in->direct == NULL || same_size(in->half[0], in->direct));
+                      (in->early == NULL || same_size(in->half[0], in->early));
     if (fits && in->half[0]->n_channel >= N_RGB && in->half[1]->n_channel >= N_RGB &&
-        (in->direct == NULL || in->direct->n_channel >= (size_t)2 * N_RGB) &&
+        (in->early == NULL || in->early->n_channel >= (size_t)2 * N_RGB) &&
         in->feature->n_channel == (size_t)2 * N_FEATURE)
         return STATUS_OK;
     return error_set(err, STATUS_INVALID, "cannot filter a picture of %zu channels by features of %zu",

@@ -1,7 +1,6 @@
-/* A filter for noisy pictures of cloth, for the eye: it keeps yarns and fibers, because light that is scattered once
- * comes from many cheap rays, and all other light is a linear function of what each pixel shows (README.md). A filtered
- * picture is no measurement.
- */
+/* A filter for noisy pictures of cloth, for the eye: it keeps yarns and fibers, because light that is scattered up to a
+ * few times comes from more samples, and all other light is a linear function of what each pixel shows (README.md). A
+ * filtered picture is no measurement. */
 #ifndef SELVEDGE_RENDERER_JOINT_FILTER_H
 #define SELVEDGE_RENDERER_JOINT_FILTER_H
 
@@ -14,7 +13,7 @@
 struct joint_input {
     const struct image *half[2]; /* rgb of independent samples of the same view, about as many each; further channels
                                      are not looked at */
-    const struct image *direct;  /* rgb and variances of radiance_input.first_hit; NULL: none */
+    const struct image *early;   /* rgb and variances of the picture with radiance_input.n_hit; NULL: none */
     const struct image *feature; /* of feature_image_render */
 };
 

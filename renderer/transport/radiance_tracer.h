@@ -42,8 +42,8 @@ struct radiance_input {
      * with derivatives, for recorded paths, volumes, or other ways than path tracing. */
     bool has_speckle;
     uint64_t speckle_seed;
-    bool first_hit;   /* paths of surface models end at their first hit, with the light that reaches it from the lights:
-                         without derivatives, records, or other ways than path tracing */
+    uint32_t n_hit;   /* more than 0: paths of surface models end at their n_hit-th hit, with the light that reaches it
+                       from the lights: without derivatives, records, or other ways than path tracing */
     bool plain_paths; /* trace neither guided shadow paths nor to strips of lamps (path_tracer.h): same means, more
                          variance; volumes have none */
 };

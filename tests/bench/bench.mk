@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-comparison bench-pictures bench-pile bench-weave bench-weave-rendered
+.PHONY: bench bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-comparison bench-looks bench-pictures bench-pile bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -165,7 +165,12 @@ docs-speckle: | deps-test ## make docs/images/speckle.png anew: silk without and
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/pictures/speckle_pictures
 	@$(BUILD)/tests/bench/pictures/speckle_pictures docs/images/speckle.png
 
-bench-pictures: bench-browser bench-comparison
+# LOOKS: some of the fabrics only, and options of the program, such as LOOKS="silk --px 96 --reference 8192"
+bench-pictures: bench-browser bench-comparison bench-looks
+bench-looks: | deps-test ## FLIP of pictures of six fabrics against path-traced references, which are kept in build (2 hours on 2 quiet cores; part of bench-pictures)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/pictures/bench_looks.py --build $(BUILD) $(LOOKS)
+
 bench-comparison: | deps-test ## noise of renderings beside that of their photographs (a minute; part of bench-pictures)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/pictures/bench_comparison.py --build $(BUILD)

@@ -329,7 +329,7 @@ const struct job_option option_rows_fit[] = {
      INTO(results, render_sample),
      RANGE(1, 65536),
      .unit = "per pixel",
-     .left_out = "so many that all renderings together take half of the paths of the fit, 4 to 16",
+     .left_out = "so many that all renderings together take about half of the time of the fit, 4 to 16",
      .meaning = "Samples of the renderings in the result."},
     {.path = "export",
      .kind = OPTION_SECTION,

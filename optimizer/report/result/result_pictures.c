@@ -159,9 +159,11 @@ static status write_photograph(const struct report *report, size_t i, const char
     return s;
 }
 
+/* Time of a rendering with the guides of its filter, over the time of its paths alone. */
+static const double guides_cost = 1.2;
 /* Without numbers in the job document, all renderings together take this share of the paths of the best model's fit,
- * within these bounds: pictures do not cost more than the fit. */
-static const double picture_share = 0.5, least_sample = 4.0, most_sample = 16.0, least_px = 48.0;
+ * with guides about half of its time, within these bounds: pictures do not cost more than the fit. */
+static const double picture_share = 0.5 / 1.2, least_sample = 4.0, most_sample = 16.0, least_px = 48.0;
 
 size_t result_picture_px(const struct job_results *results, size_t n_row, double n_fit_path)
 {
@@ -182,7 +184,7 @@ size_t result_picture_samples(const struct job_results *results, size_t n_row, d
 double result_renderings_paths(const struct job_results *results, size_t n_row, double n_fit_path)
 {
     const double px = (double)result_picture_px(results, n_row, n_fit_path);
-    return px * px * (double)n_row * (double)result_picture_samples(results, n_row, n_fit_path);
+    return guides_cost * px * px * (double)n_row * (double)result_picture_samples(results, n_row, n_fit_path);
 }
 
 struct radiance_input result_radiance_input(const struct report *report)

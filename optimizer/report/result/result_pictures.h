@@ -31,7 +31,7 @@ size_t result_picture_px(const struct job_results *results, size_t n_row, double
 /* Samples a pixel of the renderings: the job document's number, or as many as the cost of the best model's fit allows,
  * which has taken n_fit_path. */
 size_t result_picture_samples(const struct job_results *results, size_t n_row, double n_fit_path);
-/* Samples of all renderings together, after such a fit. */
+/* Paths that take as long as all renderings together, after such a fit. */
 double result_renderings_paths(const struct job_results *results, size_t n_row, double n_fit_path);
 /* The best model of the job's cloth at its result, as a source of radiance. */
 struct radiance_input result_radiance_input(const struct report *report);

@@ -35,8 +35,8 @@ static status prepare(const struct radiance_input *in, const struct configuratio
     if (in->has_speckle && in->want_derivative)
         return error_set(err, STATUS_INVALID,
                          "cannot trace with speckle and derivatives: speckle is of pictures alone");
-    if (in->first_hit && in->want_derivative)
-        return error_set(err, STATUS_INVALID, "cannot trace first hits with derivatives: they are of pictures alone");
+    if (in->n_hit > 0 && in->want_derivative)
+        return error_set(err, STATUS_INVALID, "cannot end paths at a hit with derivatives: they are of pictures alone");
     struct surface_state *s = calloc(1, sizeof *s);
     if (s == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot trace fibers: out of memory");
     s->scene = in->scene.fibers;
@@ -53,10 +53,8 @@ static status prepare(const struct radiance_input *in, const struct configuratio
     s->n_jac = in->want_derivative ? 3 * s->sets.n * m->n_param : 0;
     for (size_t i = 0; i < n_configuration; i++) {
         path_setting_init_sets(&s->setting[i], s->scene, &s->sets, &c[i], in->want_derivative);
-        if (in->first_hit) {
-            s->setting[i].n_traced = 1;
-            s->setting[i].guided_paths = false;
-        }
+        s->setting[i].n_traced = in->n_hit;
+        if (in->n_hit == 1) s->setting[i].guided_paths = false;
         if (in->plain_paths) s->setting[i].guided_paths = s->setting[i].has_strips = false;
         s->setting[i].discrepancy = in->discrepancy;
         if (in->has_speckle) s->setting[i].speckle = (struct speckle){m->speckle, &s->numbers, in->speckle_seed};

@@ -79,4 +79,5 @@ def main():
         write_png(a.out, compose([[pictures[k] for pictures in shown] for k in range(len(VIEW))], a.px))
 
 
-main()
+if __name__ == "__main__":
+    main()

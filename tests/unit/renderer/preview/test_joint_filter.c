@@ -22,25 +22,25 @@ enum { EDGE = 48, N_PIXEL = EDGE * EDGE };
 
 /* Two halves of a picture, each with noise of a standard deviation, and what guides the filter. */
 struct scene_picture {
-    struct image half[2], direct, feature;
+    struct image half[2], early, feature;
 };
 
-/* Radiance left and right of the middle; the normal turns at the middle if `turned`. direct: every fourth column has 1
- * more, which the direct light says. */
-static void make(double left, double right, double sd, bool turned, bool direct, struct scene_picture *p)
+/* Radiance left and right of the middle; the normal turns at the middle if `turned`. early: every fourth column has 1
+ * more, which the early light says. */
+static void make(double left, double right, double sd, bool turned, bool early, struct scene_picture *p)
 {
     struct rng rng;
     rng_start(&rng, &(struct rng_key){.seed = 2}, 0, 0);
     for (int h = 0; h < 2; h++) assert_int_equal(image_init(&p->half[h], EDGE, EDGE, 6, NULL), STATUS_OK);
-    assert_int_equal(image_init(&p->direct, EDGE, EDGE, 6, NULL), STATUS_OK);
+    assert_int_equal(image_init(&p->early, EDGE, EDGE, 6, NULL), STATUS_OK);
     assert_int_equal(image_init(&p->feature, EDGE, EDGE, (size_t)2 * N_FEATURE, NULL), STATUS_OK);
     for (size_t i = 0; i < N_PIXEL; i++) {
         bool second = i % EDGE >= EDGE / 2;
         float *f = p->feature.pixel + i * 2 * N_FEATURE;
         for (size_t c = 0; c < 3; c++) {
-            double normal[2], more = direct && i % 4 == 0 ? 1 : 0;
+            double normal[2], more = early && i % 4 == 0 ? 1 : 0;
             rng_normal_pair(&rng, normal);
-            p->direct.pixel[6 * i + c] = (float)more;
+            p->early.pixel[6 * i + c] = (float)more;
             for (int h = 0; h < 2; h++)
                 p->half[h].pixel[6 * i + c] = (float)((second ? right : left) + more + sd * normal[h]);
             f[FEATURE_ALBEDO + c] = 0.8f;
@@ -52,12 +52,12 @@ static void make(double left, double right, double sd, bool turned, bool direct,
 
 static void release(struct scene_picture *p)
 {
-    image_release(&p->half[0]), image_release(&p->half[1]), image_release(&p->direct), image_release(&p->feature);
+    image_release(&p->half[0]), image_release(&p->half[1]), image_release(&p->early), image_release(&p->feature);
 }
 
 static void filter(const struct scene_picture *p, struct image *out, double *error)
 {
-    const struct joint_input in = {{&p->half[0], &p->half[1]}, &p->direct, &p->feature};
+    const struct joint_input in = {{&p->half[0], &p->half[1]}, &p->early, &p->feature};
     struct error err = {0};
     if (joint_filter(&in, NULL, NULL, out, error, &err) != STATUS_OK) fail_msg("%s", err.text);
 }
@@ -110,8 +110,8 @@ static void features_keep_edges(void **state)
     }
 }
 
-/* Light that is scattered once stays pixel by pixel, whatever noise lies over it. */
-static void direct_light_stays(void **state)
+/* Light that is scattered a few times stays pixel by pixel, whatever noise lies over it. */
+static void early_light_stays(void **state)
 {
     (void)state;
     struct scene_picture p;
@@ -153,9 +153,9 @@ static void pictures_of_other_sizes_are_refused(void **state)
     struct error err = {0};
     double error;
     make(1, 1, 0.1, false, false, &p);
-    image_release(&p.direct);
-    assert_int_equal(image_init(&p.direct, EDGE, EDGE + 1, 6, NULL), STATUS_OK);
-    const struct joint_input in = {{&p.half[0], &p.half[1]}, &p.direct, &p.feature};
+    image_release(&p.early);
+    assert_int_equal(image_init(&p.early, EDGE, EDGE + 1, 6, NULL), STATUS_OK);
+    const struct joint_input in = {{&p.half[0], &p.half[1]}, &p.early, &p.feature};
     assert_int_equal(joint_filter(&in, NULL, NULL, &out, &error, &err), STATUS_INVALID);
     release(&p);
 }
@@ -257,7 +257,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(noise_falls_and_the_mean_stays),
         cmocka_unit_test(features_keep_edges),
-        cmocka_unit_test(direct_light_stays),
+        cmocka_unit_test(early_light_stays),
         cmocka_unit_test(certain_pixels_stay),
         cmocka_unit_test(pictures_of_other_sizes_are_refused),
         cmocka_unit_test(a_rendering_comes_nearer),
