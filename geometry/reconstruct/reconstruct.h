@@ -76,14 +76,18 @@ status reconstruct_orientation_again(const struct volume *v, struct reconstruct_
                                      const struct progress *progress, struct direction_volume *d,
                                      struct reconstruct_report *report, struct error *err);
 
-/* The part of the step "orientation" after it, in noisy scans (reconstruct_redirects): traces lines twice, and voxels
- * within a diameter of one take its direction. d stays as it is in other scans, where voxels are interpolated, and
+/* The part of the step "orientation" after it, in noisy scans and where many lines in a part of the scan have lost
+ * their fibers (reconstruct_redirects): traces lines twice, or once where voxels are interpolated, and voxels within a
+ * diameter of one take its direction. d stays as it is in other scans, in noise where voxels are interpolated, and
  * where radii of lines differ so much that the scan does not resolve its fibers. Errors as those of
  * reconstruct_fibers. */
 status reconstruct_redirect(const struct volume *v, struct direction_volume *d, const struct reconstruct_option *o,
                             struct thread_pool *pool, const struct progress *progress,
                             const struct reconstruct_report *report, struct error *err);
 bool reconstruct_redirects(const struct reconstruct_report *report);
+/* Share of the progress of the step "orientation" before it. reconstruct_orientation reports no more than this share if
+ * only the lines in a part of the scan, which it traces, show that this part follows. */
+#define RECONSTRUCT_FILTER_SHARE 0.2
 
 /* Step "fibers": subvolumes, fiber centers, linking, smoothing and radius. STATUS_INVALID when no fiber is found. */
 status reconstruct_fibers(const struct volume *v, const struct direction_volume *d, struct reconstruct_option *o,

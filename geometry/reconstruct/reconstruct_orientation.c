@@ -146,6 +146,8 @@ static status find_directions(const struct volume *v, const struct volume *known
     const struct progress inner = progress_of_part(&part);
     *d = (struct direction_volume){0};
     status s = STATUS_OK;
+    const bool is_known_noisy = reconstruct_redirects(report);
+    if (known != NULL) report->lost_ends = 0.0;
     if (known == NULL)
         report->fiber_diameter_voxel = option->fiber_diameter_voxel;
     else
@@ -156,7 +158,8 @@ static status find_directions(const struct volume *v, const struct volume *known
     if (s != STATUS_OK) return s;
     const double edge = trace_grid_edge(report->fiber_diameter_voxel, v->n);
     report->trace_edge_voxel = edge;
-    part = (struct progress_part){progress, 0.1, 0.9};
+    const bool is_redirected = known != NULL && !is_known_noisy && reconstruct_redirects(report);
+    part = (struct progress_part){progress, 0.1, is_redirected ? RECONSTRUCT_FILTER_SHARE - 0.1 : 0.9};
     if (edge == 1.0) return filter_directions(v, report->fiber_diameter_voxel, option, pool, &inner, d, report, err);
     return filter_rescaled(v, edge, option, pool, &inner, d, report, err);
 }

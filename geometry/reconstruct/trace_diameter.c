@@ -1,6 +1,7 @@
 #include "geometry/reconstruct/trace_diameter.h"
 
 #include "geometry/diameter/fiber_diameter.h"
+#include "geometry/fibers/lines/line_ends.h"
 #include "geometry/filter/filter_choice.h"
 #include "geometry/grade/scan_grade.h"
 #include "geometry/reconstruct/reconstruct.h"
@@ -58,6 +59,7 @@ struct found {
     double diameter;
     double spread;         /* of the radii, relative */
     double score, several; /* scan_grade.h; share of the length in lines that hold several fibers */
+    double lost_ends;      /* share of the ends that are in the middle of material */
     bool blurred;          /* strongly, and without strong noise */
     bool resolved;         /* scan_grade.h */
 };
@@ -83,6 +85,14 @@ static status grade_lines(const struct volume *box, const struct polyline_set *l
     return s;
 }
 
+/* Share of the ends of lines in a box that are in the middle of material. */
+static double share_of_lost_ends(const struct polyline_set *lines, const struct volume *box, double eps_d,
+                                 double diameter)
+{
+    const size_t n_lost = polylines_count_lost_ends(lines, box, eps_d, 0.5 * diameter);
+    return (double)n_lost / (2.0 * (double)lines->n_line + 1.0);
+}
+
 /* Traces lines by a diameter, with the filter that belongs to it whatever the job's is: then a job that is given the
  * filter another one has chosen finds the same fibers. */
 static status trace_once(const struct boxed_scan *scan, double diameter, struct found *found, struct error *err)
@@ -105,6 +115,7 @@ static status trace_once(const struct boxed_scan *scan, double diameter, struct 
         s = trace_scan(&job, false, &lines, err);
     }
     if (s == STATUS_OK) s = grade_lines(box, &lines, scan->pool, &report, found, err);
+    if (s == STATUS_OK) found->lost_ends = share_of_lost_ends(&lines, box, o.eps_d, diameter);
     if (scan->filled) found->several = 0.0; /* lumens that are not filled yet look like gaps between fibers */
     found->spread = report.radius_spread;
     const bool resolved = lines.n_line > 0 && report.radius_spread <= TRACE_MOST_SPREAD;
@@ -173,6 +184,7 @@ status trace_diameter(const struct volume *v, const struct volume *known, trace_
     if (s == STATUS_OK && may_be_thinner(&scan, v, &found)) s = try_between(&scan, THINNER, &found, &diameter, err);
     if (found.blurred) filter_choose_blurred(option, diameter);
     if (s == STATUS_OK) report->fiber_diameter_voxel = diameter;
+    report->lost_ends = found.lost_ends;
     volume_release(&box);
     return s;
 }

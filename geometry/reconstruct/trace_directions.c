@@ -3,7 +3,8 @@
  * The line filter sees a few diameters of a fiber, and strong noise turns its directions: by 20 degrees in the mean in
  * a plain weave at signal-to-noise 2, where chains then end and change from fiber to fiber. Lines that follow a fiber
  * farther know its direction better. Voxels near them take theirs, and lines that are traced once more in these
- * directions are longer. */
+ * directions are longer. So are they where fibers are flat, light, or so thin that voxels are interpolated, and the
+ * lines in a part of the scan end in the middle of material. */
 #include "geometry/reconstruct/line_directions.h"
 #include "geometry/reconstruct/trace_job.h"
 
@@ -11,9 +12,11 @@
 
 /* Tracings for the directions alone. The lines that are traced afterwards gain nothing by a third one
  * (geometry/NOTES.md, "Directions by traced lines in noisy scans"). */
-enum { N_ROUND = 2 };
+enum { N_ROUND = 2, N_ROUND_THIN = 1 /* where voxels are interpolated */ };
 /* Noise over the step from void to material from which on lines are traced for their directions. */
 static const double LEAST_NOISE = 0.3;
+/* The same of the share of the ends of lines in a part of the scan that are in the middle of material. */
+static const double LEAST_LOST_ENDS = 0.15;
 
 /* Gives voxels within a diameter of a line its direction. */
 static status take_directions(const struct polyline_set *lines, struct direction_volume *d, struct thread_pool *pool,
@@ -29,18 +32,25 @@ static status take_directions(const struct polyline_set *lines, struct direction
     return s;
 }
 
-bool reconstruct_redirects(const struct reconstruct_report *report) { return report->noise.scan_sd >= LEAST_NOISE; }
+static bool is_noisy(const struct reconstruct_report *report) { return report->noise.scan_sd >= LEAST_NOISE; }
+
+bool reconstruct_redirects(const struct reconstruct_report *report)
+{
+    return is_noisy(report) || report->lost_ends >= LEAST_LOST_ENDS;
+}
 
 status reconstruct_redirect(const struct volume *v, struct direction_volume *d, const struct reconstruct_option *o,
                             struct thread_pool *pool, const struct progress *progress,
                             const struct reconstruct_report *report, struct error *err)
 {
     status s = STATUS_OK;
-    bool again = reconstruct_redirects(report) && report->trace_edge_voxel >= 1.0;
-    for (int round = 0; round < N_ROUND && again && s == STATUS_OK; round++) {
+    const bool thin = report->trace_edge_voxel < 1.0;
+    const int n_round = thin ? N_ROUND_THIN : N_ROUND;
+    bool again = reconstruct_redirects(report) && !(thin && is_noisy(report));
+    for (int round = 0; round < n_round && again && s == STATUS_OK; round++) {
         struct reconstruct_report look = *report;
         struct reconstruct_option option = *o;
-        struct progress_part part = {progress, (double)round / N_ROUND, 1.0 / N_ROUND / TRACE_FINISHED_END};
+        struct progress_part part = {progress, (double)round / n_round, 1.0 / n_round / TRACE_FINISHED_END};
         const struct progress inner = progress_of_part(&part);
         struct trace_job job = {.v = v, .d = d, .o = &option, .pool = pool, .report = &look, .part.outer = &inner};
         struct polyline_set lines;

@@ -135,10 +135,10 @@ status stage_orientation(const struct orientation_input *in, struct orientation_
     out->option = in->volume->option;
     *g = in->volume->geometry;
     struct progress_part part;
-    const double filter = reconstruct_redirects(g) ? 0.2 : 1.0;
+    const double filter = reconstruct_redirects(g) ? RECONSTRUCT_FILTER_SHARE : 1.0;
     const struct progress inner = progress_begin_part(&part, &in->tools->progress, 0.0, filter);
     status s = reconstruct_orientation(volume, &out->option, in->tools->pool, &inner, &out->direction, g, err);
-    part = (struct progress_part){&in->tools->progress, filter, 1.0 - filter};
+    part = (struct progress_part){&in->tools->progress, RECONSTRUCT_FILTER_SHARE, 1.0 - RECONSTRUCT_FILTER_SHARE};
     if (s == STATUS_OK && reconstruct_redirects(g))
         s = reconstruct_redirect(volume, &out->direction, &out->option, in->tools->pool, &inner, g, err);
     return s == STATUS_OK

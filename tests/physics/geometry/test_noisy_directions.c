@@ -82,6 +82,8 @@ static void test_clear_scans_stay(void **state)
 {
     (void)state;
     struct scanned x;
+    atomic_bool cancel = true;
+    const struct progress cancelled = {.cancel = &cancel};
     filter_plain(&x, 5.0);
     const size_t n_byte = 2 * volume_n_voxel(x.d.n) * sizeof *x.d.octahedral;
     int16_t *before = malloc(n_byte);
@@ -90,6 +92,10 @@ static void test_clear_scans_stay(void **state)
     assert_int_equal(reconstruct_redirect(&x.v, &x.d, &x.option, NULL, NULL, &x.r, NULL), STATUS_OK);
     assert_memory_equal(before, x.d.octahedral, n_byte);
     free(before);
+    print_message("share of the ends within material %.3f\n", x.r.lost_ends);
+    x.r.lost_ends = 0.2; /* unless its lines are in pieces */
+    assert_true(reconstruct_redirects(&x.r));
+    assert_int_equal(reconstruct_redirect(&x.v, &x.d, &x.option, NULL, &cancelled, &x.r, NULL), STATUS_CANCELLED);
     release(&x);
 }
 
