@@ -19,7 +19,7 @@ function onSurface(job, find) {
 function rendering(job, files) {
   const rows = configurations(job, new Map(files.map((f) => [f.path, f.url]))).filter((c) => c.renderedPicture);
   const facing = rows.filter((c) => c.angles.camera_theta_deg <= STEEP_DEG), [best] = (facing.length ? facing : rows).sort((a, b) => brightness(b) - brightness(a));
-  return best ? { url: best.renderedPicture, words: `The cloth, rendered with the lamp and camera of ${best.name}` } : null;
+  return best ? { url: best.renderedPicture, words: best.sphere ? `A sphere wrapped in the cloth under the lamp of ${best.name}` : `The cloth, rendered with the lamp and camera of ${best.name}` } : null;
 }
 
 // Returns {url, at: the time of the file where it may change, words}, or null without any picture.

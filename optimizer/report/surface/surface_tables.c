@@ -1,5 +1,6 @@
 #include "optimizer/report/surface/surface_tables.h"
 #include "base/files/durable.h"
+#include "base/process.h"
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
@@ -140,8 +141,10 @@ static status get_tables(struct report *report, bool studio, const struct scene 
         return STATUS_OK;
     }
     if (kept != STATUS_NOT_FOUND) log_info(report->in.job->tools->log, "tables are made anew: %s", unread.text);
+    const double before_s = process_use().cpu_s;
     s = fast_precompute(&q, report->in.job->tools->pool, progress, t, err);
     if (s != STATUS_OK) return s;
+    log_info(report->in.job->tools->log, "tables of light: processor %.2f s", process_use().cpu_s - before_s);
     s = fast_tables_write(t, path, err);
     if (s == STATUS_OK && unlink(journal) != 0) s = error_set_errno(err, "cannot remove '%s'", path_file_name(journal));
     return s;

@@ -5,7 +5,7 @@ processor, so that the middle N x N of its pixels (--px) are rendered, path by p
 DIR/bench-looks. Their own noise, and FLIP between the pictures of two references that are rendered apart, are printed to standard error.
 
   pictures.<fabric>.flip                  mean FLIP of the fast renderer's filtered view against the reference
-  pictures.<fabric>.flip_path_equal_time  the same of path tracing in the time of the fast picture with its filter, without a filter
+  pictures.<fabric>.flip_path_equal_time  the same of path tracing without a filter, in the time of the fast picture with its filter
   pictures.<fabric>.field_error           difference of the fast picture from the reference: root mean square over fields of 4 x 4 pixels,
                                           over the mean, less the noise of both
   pictures.<fabric>.wall_s                seconds of the fast picture with its filter, times the pixels of 1,024 x 1,024 over those of
@@ -17,7 +17,6 @@ import argparse
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 
@@ -38,31 +37,21 @@ def crop_document(name, px, **picture):
     return job
 
 
-def run(build, folder, job, seed, again=False):
-    """Processor seconds of the job's pictures. A finished folder is kept; again: with a new picture, but its tables."""
+def run(build, folder, job, seed):
+    """Processor seconds of the job's pictures with their filter, and of the tables for these. A finished folder is kept."""
     done = os.path.join(folder, "seconds.json")
-    if os.path.exists(done) and not again:
+    if os.path.exists(done):
         with open(done, encoding="utf-8") as f:
             return json.load(f)
-    if again:
-        for path in ("results", "log.txt", "status.json"):
-            shutil.rmtree(os.path.join(folder, path), ignore_errors=True)
-            if os.path.exists(os.path.join(folder, path)):
-                os.remove(os.path.join(folder, path))
-        for file in os.listdir(os.path.join(folder, "work")):
-            if file != "report":
-                path = os.path.join(folder, "work", file)
-                shutil.rmtree(path) if os.path.isdir(path) else os.remove(path)
-        for file in os.listdir(os.path.join(folder, "work", "report")):
-            if file.endswith(".pass"):
-                os.remove(os.path.join(folder, "work", "report", file))
     os.makedirs(os.path.join(folder, "input"), exist_ok=True)
     job["fit"]["seed"] = seed
     with open(os.path.join(folder, "job.json"), "w", encoding="utf-8") as f:
         json.dump(job, f)
     subprocess.run([os.path.join(build, "bin", "selvedge-worker"), "--quiet", folder], check=True)
     with open(os.path.join(folder, "log.txt"), encoding="utf-8") as f:
-        seconds = float(re.findall(r"report, pictures: [\d.]+ s, processor ([\d.]+) s", f.read())[-1])
+        text = f.read()
+    tables = sum(map(float, re.findall(r"tables of light: processor ([\d.]+) s", text)))
+    seconds = float(re.findall(r"report, pictures: [\d.]+ s, processor ([\d.]+) s", text)[-1]) - tables, tables
     with open(done, "w", encoding="utf-8") as f:
         json.dump(seconds, f)
     return seconds
@@ -103,16 +92,13 @@ def bench(a, python, name):
     reference = [tuple((x + y) / 2 for x, y in zip(p, q)) for p, q in zip(*parts)]
     variance = [tuple((x + y) / 4 for x, y in zip(p, q)) for p, q in zip(*variances)]
     traced = os.path.join(folder, "path")
-    traced_s = run(a.build, traced, crop_document(name, a.px, samples=FILTERED_SAMPLES, filter=True), seed=7)
-    fast = os.path.join(folder, "fast")
-    tables = {"method": "fast", "deep_light_paths": a.deep_paths, "filter": True}
-    precompute_s = run(a.build, fast + "-tables", crop_document(name, a.px, samples=2, **{**tables, "filter": False}), seed=9)
-    if not os.path.exists(os.path.join(fast, "seconds.json")):
-        shutil.copytree(fast + "-tables", fast)
-    fast_s = run(a.build, fast, crop_document(name, a.px, samples=FAST_SAMPLES, **tables), seed=9, again=True)
+    traced_s, _ = run(a.build, traced, crop_document(name, a.px, samples=FILTERED_SAMPLES, filter=True), seed=7)
+    fast = os.path.join(folder, f"fast-{a.deep_paths}")
+    by_tables = {"samples": FAST_SAMPLES, "method": "fast", "deep_light_paths": a.deep_paths, "filter": True}
+    fast_s, precompute_s = run(a.build, fast, crop_document(name, a.px, **by_tables), seed=9)
     equal = max(1, round(FILTERED_SAMPLES * fast_s / traced_s))
-    equal_time = os.path.join(folder, "path-equal-time")
-    run(a.build, equal_time, crop_document(name, a.px, samples=equal), seed=8, again=os.path.exists(equal_time))
+    equal_time = os.path.join(folder, f"path-{equal}")
+    run(a.build, equal_time, crop_document(name, a.px, samples=equal), seed=8)
     shown = [picture(fast, a.px, "on-1-filtered"), picture(equal_time, a.px), picture(traced, a.px), picture(traced, a.px, "on-1-filtered"),
              picture(fast, a.px)]
     of = flip(python, a.px, reference, shown)
