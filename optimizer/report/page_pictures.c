@@ -5,6 +5,7 @@
 #include "optimizer/job/job_folder.h"
 #include "optimizer/report/page_text.h"
 #include "renderer/image/image.h"
+#include "renderer/image/tone_curve.h"
 
 #include <math.h>
 #include <sodium.h>
@@ -181,6 +182,18 @@ status page_pictures(const struct report *report, const json_t *rows, FILE *out,
     return s;
 }
 
+/* A picture of the studio, which has a tone curve. */
+static status put_toned(const struct report *report, const struct image *im, double exposure, FILE *out,
+                        struct error *err)
+{
+    uint8_t *rgb = malloc(3 * im->width * im->height);
+    if (rgb == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write the report: out of memory");
+    tone_curve_bytes(im, exposure, rgb);
+    status s = page_bytes_image(report, rgb, im->width, im->height, "the cloth", out, err);
+    free(rgb);
+    return s;
+}
+
 /* The picture in at most max_edge pixels an edge. *written: whether it could be read. */
 static status put_surface_image(const struct report *report, const json_t *picture, size_t max_edge, FILE *out,
                                 bool *written, struct error *err)
@@ -193,10 +206,23 @@ static status put_surface_image(const struct report *report, const json_t *pictu
     const double most = (double)(im.width > im.height ? im.width : im.height), scale = fmin((double)max_edge / most, 1);
     status s = shrink(&im, (size_t)fmax(1.0, scale * (double)im.width), (size_t)fmax(1.0, scale * (double)im.height),
                       &small, err);
-    if (s == STATUS_OK) s = put_image(report, &small, page_number(picture, "png_exposure"), "the cloth", out, err);
+    const double exposure = page_number(picture, "png_exposure");
+    if (s == STATUS_OK)
+        s = json_object_get(picture, "tone_curve") != NULL ? put_toned(report, &small, exposure, out, err)
+                                                           : put_image(report, &small, exposure, "the cloth", out, err);
     image_release(&small);
     image_release(&im);
     return s;
+}
+
+/* The file for the eye of a picture of the studio, which is filtered. */
+static status put_eye_file(const struct report *report, const json_t *picture, FILE *out, bool *written,
+                           struct error *err)
+{
+    char name[256];
+    const char *file = page_string(picture, "file");
+    snprintf(name, sizeof name, "%.*s.png", (int)strcspn(file, "."), file);
+    return page_picture_file(report, name, "the cloth", out, written, err);
 }
 
 status page_front_surface(const struct report *report, const json_t *picture, FILE *out, bool *written,
@@ -204,7 +230,9 @@ status page_front_surface(const struct report *report, const json_t *picture, FI
 {
     *written = false;
     if (picture == NULL) return STATUS_OK;
-    status s = put_surface_image(report, picture, MAX_FRONT_EDGE, out, written, err);
+    const bool studio = json_object_get(picture, "tone_curve") != NULL;
+    status s = studio ? put_eye_file(report, picture, out, written, err)
+                      : put_surface_image(report, picture, MAX_FRONT_EDGE, out, written, err);
     if (!*written) return s;
     fputs("<figcaption>The cloth, rendered: ", out);
     page_escaped(page_string(picture, "on"), out);

@@ -1,5 +1,5 @@
 # Benchmarks, and pictures of the documentation that come from them.
-.PHONY: bench bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics docs-ground docs-seam docs-bowl bench-browser bench-comparison bench-looks bench-pictures bench-pile bench-weave bench-weave-rendered
+.PHONY: bench bench-house docs-benchmarks bench-service bench-scale bench-ranks docs-ranks bench-dashboard bench-cloth bench-scan-errors bench-progress bench-exact bench-exports bench-camera bench-geometry bench-geometry-bars bench-transport bench-models bench-recovery bench-model-tables bench-fit bench-published docs-fit-curve docs-grazing docs-pairs docs-pictures docs-weave docs-columns docs-speckle docs-lobes docs-fabrics gallery docs-ground docs-seam docs-bowl bench-browser bench-comparison bench-looks bench-pictures bench-pile bench-weave bench-weave-rendered
 BENCH_BINS := $(patsubst %.c,$(BUILD)/%,$(shell find tests/bench -name 'bench_*.c' 2>/dev/null))
 # bench_fit is more than one file
 $(BUILD)/tests/bench/bench_fit: $(patsubst %,$(BUILD)/obj/tests/bench/%.c.o,fit_bench fit_tables fit_grazing fit_analytic)
@@ -186,6 +186,10 @@ docs-columns: | deps-test ## draw docs/images/cylinder-columns.svg anew: column 
 docs-fabrics: | deps-test ## make docs/images/six-fabrics.png anew: the fabrics of Table 5.3 on a cylinder and draped (15 minutes on two cores; kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/pictures/six_fabrics.py --build $(BUILD) --out docs/images/six-fabrics.png
+
+gallery: | deps-test ## make the pictures of docs/gallery.md anew: six fabrics in the studio, four views of 1,024 pixels each (an hour on two cores; kept in build; GALLERY="--px 400 --samples 6 twill": quicker)
+	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
+	@/usr/bin/python3 tests/bench/pictures/gallery.py --build $(BUILD) --out docs/images/gallery $(GALLERY)
 
 docs-ground: | deps-test ## make docs/images/ground-shadow.png anew: cloths over a plane, as rendered and filtered (half a minute of a core; kept in build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
