@@ -36,8 +36,10 @@ DESCRIPTIONS = {
 }
 
 
-def figure(name, value, unit, better="lower"):
-    print(json.dumps({"name": name, "value": value, "unit": unit, "better": better}), flush=True)
+def figure(name, value, unit, better="lower", note=None):
+    """note: what the page says of a value, such as "not converged"."""
+    row = {"name": name, "value": value, "unit": unit, "better": better}
+    print(json.dumps(row if note is None else {**row, "note": note}), flush=True)
 
 
 class Failure(Exception):

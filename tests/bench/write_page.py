@@ -3,7 +3,7 @@
     write_page.py [--check] [--add FILE --date YYYY-MM-DD --machine TEXT]
 
 figures.jsonl holds the last measured figures, one JSON object a line, as the benchmarks print them ("name", "value", "unit",
-"better") with "date" and "machine", and optionally "se", a standard error. --add takes figures that a benchmark has printed
+"better") with "date" and "machine", and optionally "se", a standard error, and "note". --add takes figures that a benchmark has printed
 to FILE into it: they replace those of the same name. With --check nothing is written, and the exit status is 1 when page and
 figures disagree.
 
@@ -91,7 +91,7 @@ def page(figures, readings):
 def add(figures, path, date, machine):
     """Takes over what a benchmark printed."""
     for name, row in read_figures(path).items():
-        figures[name] = {key: row[key] for key in ("name", "value", "unit", "better", "se") if key in row}
+        figures[name] = {key: row[key] for key in ("name", "value", "unit", "better", "se", "note") if key in row}
         figures[name].update(date=date, machine=machine)
 
 

@@ -79,7 +79,7 @@ def bench_table(arguments, table):
           + ", ".join(f"{name}: {sum(r['set'] == 'held-out' and kind(r) == name for r in result['rows'])}" for name in KINDS), file=sys.stderr)
     for model in result["models"]:
         for what in ("fit_rel_rms", "heldout_rel_rms"):
-            figure(f"models.real.{sample}.{model['id']}.{what}", model[what], "1")
+            figure(f"models.real.{sample}.{model['id']}.{what}", model[what], "1", note=None if model["converged"] else "not converged")
         rows = [{**a, **b} for a, b in zip(result["rows"], model["rows"])]
         print(f"  {model['id']:26} fitted {with_se(model, 'fit_rel_rms')}, "
               f"held out {with_se(model, 'heldout_rel_rms')}, {'converged' if model['converged'] else 'not converged'}; {by_kind(rows)}", file=sys.stderr)
