@@ -25,7 +25,8 @@ class Daemon:
     def __init__(self, folder, *more):
         self.folder = str(folder)
         self.process = subprocess.Popen([os.path.join(BUILD, "bin", "selvedged"), "--data", str(folder), "--port", "0", "--worker", STUB,
-                                         "--set", "disk.floor_bytes=0", *more], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+                                         "--set", "disk.floor_bytes=0", "--set", "jobs.pictures=0", *more],
+                                        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         line = self.process.stdout.readline()
         assert "listens on http://" in line, line
         self.url = line.split()[-1]

@@ -46,7 +46,7 @@ class Service:
     def __init__(self, build, folder, data):
         programs, self.socket = os.path.join(build, "bin"), os.path.join(folder, "socket")
         self.command = {"daemon": [os.path.join(programs, "selvedged"), "--data", data, "--set", f"server.unix_socket={self.socket}",
-                                   "--set", "disk.floor_bytes=0", "--set", "jobs.workers=2"],
+                                   "--set", "disk.floor_bytes=0", "--set", "jobs.workers=2", "--set", "jobs.pictures=0"],
                         "watcher": [os.path.join(programs, "selvedge"), "--server", f"unix:{self.socket}", "watch-folder",
                                     os.path.join(folder, "inbox"), "--quiet", str(QUIET_S)]}
         self.log = {name: open(os.path.join(folder, name + ".log"), "ab") for name in self.command}

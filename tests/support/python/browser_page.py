@@ -16,7 +16,8 @@ import selvedge  # noqa: E402
 
 
 def start_daemon(folder, *more):
-    process = subprocess.Popen([os.path.join(BIN, "selvedged"), "--data", str(folder), "--port", "0", "--set", "disk.floor_bytes=0", *more],
+    process = subprocess.Popen([os.path.join(BIN, "selvedged"), "--data", str(folder), "--port", "0", "--set", "disk.floor_bytes=0",
+                                "--set", "jobs.pictures=0", *more],
                                stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     line = process.stdout.readline()
     assert "listens on http://" in line, line
