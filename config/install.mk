@@ -23,7 +23,7 @@ DASHBOARD_FOLDERS := $(notdir $(patsubst %/,%,$(wildcard clients/dashboard/*/)))
 ##@ Installation
 # configuration: kept where there is one; the default is beside the dashboard
 install: all manual ## install below PREFIX (/usr/local) of DESTDIR: programs, dashboard, documents, unit, configuration
-	$(INSTALL) -d $(addprefix "$(DESTDIR)",$(PREFIX)/bin $(addprefix $(SHAREDIR)/dashboard/,$(DASHBOARD_FOLDERS)) $(DOCDIR)/docs/images $(DOCDIR)/examples)
+	$(INSTALL) -d $(addprefix "$(DESTDIR)",$(PREFIX)/bin $(addprefix $(SHAREDIR)/dashboard/,$(DASHBOARD_FOLDERS)) $(DOCDIR)/docs/images/gallery $(DOCDIR)/examples)
 	$(INSTALL) $(PROGRAMS) "$(DESTDIR)$(PREFIX)/bin"
 	$(if $(PLUGINS),$(INSTALL) -d "$(DESTDIR)$(PREFIX)/lib/selvedge" && $(INSTALL) -m 644 $(PLUGINS) "$(DESTDIR)$(PREFIX)/lib/selvedge")
 	$(INSTALL) -m 644 $(filter-out %.md,$(wildcard clients/dashboard/*.*)) "$(DESTDIR)$(SHAREDIR)/dashboard"
@@ -31,7 +31,8 @@ install: all manual ## install below PREFIX (/usr/local) of DESTDIR: programs, d
 	$(INSTALL) -m 644 config/openapi.json config/result.schema.json config/selvedge.conf docs/glossary.md "$(DESTDIR)$(SHAREDIR)"
 	$(INSTALL) -m 644 README.md CHANGELOG.md SECURITY.md CITATION.cff LICENSE "$(DESTDIR)$(DOCDIR)"
 	$(INSTALL) -m 644 docs/*.md "$(DESTDIR)$(DOCDIR)/docs"
-	$(INSTALL) -m 644 docs/images/* "$(DESTDIR)$(DOCDIR)/docs/images"
+	$(INSTALL) -m 644 docs/images/*.* "$(DESTDIR)$(DOCDIR)/docs/images"
+	$(INSTALL) -m 644 docs/images/gallery/* "$(DESTDIR)$(DOCDIR)/docs/images/gallery"
 	$(INSTALL) -m 644 config/examples/* config/nginx.conf "$(DESTDIR)$(DOCDIR)/examples"
 	$(INSTALL) -d "$(DESTDIR)$(UNITDIR)" "$(DESTDIR)$(SYSUSERSDIR)" "$(DESTDIR)$(SYSCONFDIR)/selvedge"
 	$(INSTALL) -d -m 700 "$(DESTDIR)$(SYSCONFDIR)/selvedge/secrets"
