@@ -14,7 +14,7 @@ async function resultOf(job) {
   const { files, archive } = await getJson(`/v1/jobs/${job.id}/results`), picture = pictureOf(files);
   const formats = [...new Set(files.map((f) => f.path.match(/^export\/([^/]+)\//)?.[1]).filter(Boolean))];
   return el("div", { class: "made-result" },
-    picture ? el("a", { href: `#${job.id}` }, el("img", { src: picture.url, alt: job.sample, loading: "lazy" })) : "",
+    picture ? el("a", { href: `#${job.id}` }, el("img", { src: picture.url, alt: job.sample })) : "",
     el("div", { class: "made-links" },
       picture ? el("a", { class: "button", href: picture.url, download: `${job.id.slice(0, 8)}.png` }, "Picture") : "",
       files.some((f) => f.path === "twin/twin.bin") ? el("a", { class: "button", href: `#${job.id}` }, "Turn the cloth") : "",
