@@ -20,7 +20,7 @@ static const double most_sd_of_speed = 0.6;
 /* Share of a running stage that is taken to be left, also where its fraction says that nothing is. */
 static const double least_share = 0.05;
 /* The range is two standard deviations either way. In first jobs of a kind it is wider by a half, up to this logarithm:
- * two held 71 and 77 % of the remaining times of a profile and a table, three 84 and 96 %. */
+ * of the remaining times of a table two held 77 %, and this 96 to 100 %. */
 static const double sd_of_range = 2.0, wider_in_first = 1.5, most_widened = 1.2;
 /* A stage below this many seconds is not remembered and says nothing about the others. */
 static const double least_s = 0.3;
