@@ -202,7 +202,8 @@ static void watch(struct picture_maker *m)
         return;
     }
     const double now_s = clock_monotonic_s();
-    if (m->asked_s <= 0 && (is_busy(m->v) || !is_listed(m->v, m->job_id) || atomic_load(&m->v->stopping))) {
+    if (m->asked_s <= 0 && (is_busy(m->v) || !is_listed(m->v, m->job_id) || !has_succeeded(m->v, m->job_id) ||
+                            atomic_load(&m->v->stopping))) {
         m->asked_s = now_s;
         worker_signal(m->pid, SIGTERM);
     }
