@@ -102,6 +102,7 @@ def sized(browser, width, height):
     """A window whose page has this size, also one narrower than Chromium allows."""
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600})
     browser.page_width = width
+    browser.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")  # the page hears of its size with a frame
     yield
     del browser.page_width
     browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
