@@ -37,7 +37,8 @@ struct reconstruct_report {
     double separability;                      /* of void and material in the histogram, 0..1 (density_map.h) */
     struct light_material light;              /* fibers that were raised to the density of others */
     struct scan_noise noise;                  /* of the scan, and after smoothing */
-    double lost_ends;            /* share of the ends of lines in a box (trace_diameter.h) that lie within material */
+    double lost_ends;            /* share of the ends of lines in boxes (trace_diameter.h) that lie within material */
+    bool in_pieces;              /* so many that lines are traced once more, where that is no worse in the box */
     double lumen_share;          /* enclosed void that is filled over material; 0 if the fibers are solid */
     bool lumens_found;           /* they were filled because the fibers look hollow */
     struct lumen_evidence lumen; /* whether the fibers look hollow */

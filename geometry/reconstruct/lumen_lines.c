@@ -120,7 +120,7 @@ status lumen_lines_measure(const struct volume *v, double diameter_voxel, struct
     size_t from[3];
     e->hollow_share = e->radius_spread = NAN;
     polyline_set_init(&lines);
-    status s = trace_box_copy(v, v, diameter, &box, from, err);
+    status s = trace_box_copy(v, v, diameter, 0, &box, from, err);
     if (s == STATUS_OK) s = trace_in_box(&box, diameter, pool, &look, &lines, err);
     if (s == STATUS_OK) {
         empty_box(v, from, &box);

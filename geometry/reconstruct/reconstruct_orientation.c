@@ -147,7 +147,7 @@ static status find_directions(const struct volume *v, const struct volume *known
     *d = (struct direction_volume){0};
     status s = STATUS_OK;
     const bool is_known_noisy = reconstruct_redirects(report);
-    if (known != NULL) report->lost_ends = 0.0;
+    if (known != NULL) report->in_pieces = false;
     if (known == NULL)
         report->fiber_diameter_voxel = option->fiber_diameter_voxel;
     else

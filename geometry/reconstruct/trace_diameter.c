@@ -30,6 +30,8 @@ static const double SEVERAL_SPREAD = 0.22, THICKER = 1.4, LEAST_SEVERAL = 0.03, 
 static const double BETTER = 0.01, TWO_SPREAD = 0.25, THICKER_SPREAD = 0.35, MORE_SPREAD = 1.25;
 /* Noise over the step from void to material from which a narrower filter sees noise. */
 static const double MOST_NOISE = 0.3;
+/* Lines are in pieces where this share of their ends or more is in the middle of material. */
+static const double LEAST_LOST_ENDS = 0.15;
 /* Ratio of the diameters of two rounds up to which they are the same. */
 static const double SETTLED = 1.04;
 
@@ -59,7 +61,7 @@ struct found {
     double diameter;
     double spread;         /* of the radii, relative */
     double score, several; /* scan_grade.h; share of the length in lines that hold several fibers */
-    double lost_ends;      /* share of the ends that are in the middle of material */
+    double n_end, n_lost;  /* ends, and ends in the middle of material */
     bool blurred;          /* strongly, and without strong noise */
     bool resolved;         /* scan_grade.h */
 };
@@ -85,17 +87,10 @@ static status grade_lines(const struct volume *box, const struct polyline_set *l
     return s;
 }
 
-/* Share of the ends of lines in a box that are in the middle of material. */
-static double share_of_lost_ends(const struct polyline_set *lines, const struct volume *box, double eps_d,
-                                 double diameter)
-{
-    const size_t n_lost = polylines_count_lost_ends(lines, box, eps_d, 0.5 * diameter);
-    return (double)n_lost / (2.0 * (double)lines->n_line + 1.0);
-}
-
 /* Traces lines by a diameter, with the filter that belongs to it whatever the job's is: then a job that is given the
- * filter another one has chosen finds the same fibers. */
-static status trace_once(const struct boxed_scan *scan, double diameter, struct found *found, struct error *err)
+ * filter another one has chosen finds the same fibers. again: in the directions of their own lines. */
+static status trace_once(const struct boxed_scan *scan, double diameter, bool again, struct found *found,
+                         struct error *err)
 {
     const struct volume *box = scan->box;
     struct reconstruct_report report = *scan->report;
@@ -110,12 +105,15 @@ static status trace_once(const struct boxed_scan *scan, double diameter, struct 
     o.fiber_diameter_voxel = diameter;
     report.radius_spread = 0.0;
     status s = scan->find(box, &o, scan->pool, scan->progress, &d, &report, err);
+    report.in_pieces = again;
+    if (s == STATUS_OK && again) s = reconstruct_redirect(box, &d, &o, scan->pool, scan->progress, &report, err);
     if (s == STATUS_OK) {
         trace_job_start(&job);
         s = trace_scan(&job, false, &lines, err);
     }
     if (s == STATUS_OK) s = grade_lines(box, &lines, scan->pool, &report, found, err);
-    if (s == STATUS_OK) found->lost_ends = share_of_lost_ends(&lines, box, o.eps_d, diameter);
+    if (s == STATUS_OK) found->n_lost = (double)polylines_count_lost_ends(&lines, box, o.eps_d, 0.5 * diameter);
+    if (s == STATUS_OK) found->n_end = 2.0 * (double)lines.n_line + 1.0;
     if (scan->filled) found->several = 0.0; /* lumens that are not filled yet look like gaps between fibers */
     found->spread = report.radius_spread;
     const bool resolved = lines.n_line > 0 && report.radius_spread <= TRACE_MOST_SPREAD;
@@ -142,7 +140,7 @@ static status try_between(const struct boxed_scan *scan, double ratio, const str
 {
     struct found found;
     const double spread = ratio < 1.0 ? TWO_SPREAD : fmax(THICKER_SPREAD, MORE_SPREAD * before->spread);
-    status s = trace_once(scan, ratio * scan->peak, &found, err);
+    status s = trace_once(scan, ratio * scan->peak, false, &found, err);
     if (s != STATUS_OK || !found.resolved) return s; /* the thinner lines are no fibers */
     if (found.spread >= spread && found.score >= before->score + BETTER) *diameter = ratio * scan->peak;
     return s;
@@ -156,7 +154,7 @@ static status settle_diameter(const struct boxed_scan *scan, double most, double
     status s = STATUS_OK;
     for (int round = 0; round < N_ROUND && fabs(log(ratio)) > log(SETTLED) && s == STATUS_OK; round++) {
         const double tried = *diameter;
-        s = trace_once(scan, tried, found, err);
+        s = trace_once(scan, tried, false, found, err);
         const bool spread = round == 0 && found->spread >= SEVERAL_SPREAD && found->several < LEAST_SEVERAL;
         if (s == STATUS_OK && spread) s = try_between(scan, THICKER, found, diameter, err);
         if (*diameter != tried) break; /* one between the diameters of two kinds */
@@ -164,6 +162,35 @@ static status settle_diameter(const struct boxed_scan *scan, double most, double
         ratio = found->diameter / tried;
         *diameter = found->diameter;
     }
+    return s;
+}
+
+/* Finds whether lines are in pieces, and longer if traced once more in their own directions: in the box, and in large
+ * scans in two more, which tell a share near the limit better. found: in the box. */
+static status find_pieces(const struct boxed_scan *scan, const struct volume *v, const struct volume *known,
+                          double diameter, const struct found *found, struct reconstruct_report *report,
+                          struct error *err)
+{
+    double n_end = found->n_end, n_lost = found->n_lost;
+    struct found other;
+    status s = STATUS_OK;
+    report->in_pieces = false;
+    for (int i = 1; i < TRACE_N_BOX && s == STATUS_OK && n_lost >= LEAST_LOST_ENDS * n_end; i++) {
+        struct volume box = {0};
+        struct boxed_scan there = *scan;
+        size_t from[3];
+        there.box = &box;
+        s = trace_box_copy(v, known, scan->peak, i, &box, from, err);
+        if (s != STATUS_OK || box.n[0] == 0) break;
+        s = trace_once(&there, diameter, false, &other, err);
+        n_end += other.n_end;
+        n_lost += other.n_lost;
+        volume_release(&box);
+    }
+    report->lost_ends = n_end > 0.0 ? n_lost / n_end : 0.0;
+    if (s != STATUS_OK || !(report->lost_ends >= LEAST_LOST_ENDS) || reconstruct_redirects(report)) return s;
+    s = trace_once(scan, diameter, true, &other, err);
+    report->in_pieces = s == STATUS_OK && other.score > found->score - BETTER;
     return s;
 }
 
@@ -179,12 +206,12 @@ status trace_diameter(const struct volume *v, const struct volume *known, trace_
     const struct boxed_scan scan = {&box, find, pool, &quiet, report, peak, v->filled.n > 0};
     struct found found = {.diameter = NAN};
     double diameter = peak;
-    status s = trace_box_copy(v, known, peak, &box, from, err);
+    status s = trace_box_copy(v, known, peak, 0, &box, from, err);
     if (s == STATUS_OK) s = settle_diameter(&scan, most, &diameter, &found, err);
     if (s == STATUS_OK && may_be_thinner(&scan, v, &found)) s = try_between(&scan, THINNER, &found, &diameter, err);
     if (found.blurred) filter_choose_blurred(option, diameter);
     if (s == STATUS_OK) report->fiber_diameter_voxel = diameter;
-    report->lost_ends = found.lost_ends;
+    if (s == STATUS_OK) s = find_pieces(&scan, v, known, diameter, &found, report, err);
     volume_release(&box);
     return s;
 }

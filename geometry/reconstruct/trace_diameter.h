@@ -24,9 +24,11 @@ typedef status trace_orientation(const struct volume *v, struct reconstruct_opti
  * fibers, where the scan is strongly blurred, or where the result is of other fibers: thinner than the peak by
  * FIBER_DIAMETER_FINER, thicker by a tenth, or thicker at all where voxels are interpolated. Of fibers with two
  * diameters, 1.4 times the peak is taken, or 0.62 times where lines of the last round hold several fibers. Where
- * the scan is strongly blurred, option gets a narrower filter (filter_choice.h). Sets report->lost_ends.
- * v: densities; known: the same volume before densities were continued into its unknown voxels (volume_unknown.h).
- * STATUS_CANCELLED, STATUS_NO_MEMORY, STATUS_DISK_FULL. */
+ * the scan is strongly blurred, option gets a narrower filter (filter_choice.h). Sets
+ * report->lost_ends and in_pieces: where 15 % of the ends are lost, lines of the box are traced once more in their own
+ * directions, and the scan's will be if these have no worse a score. v: densities; known: the same volume before
+ * densities were continued into its unknown voxels (volume_unknown.h). STATUS_CANCELLED, STATUS_NO_MEMORY,
+ * STATUS_DISK_FULL. */
 status trace_diameter(const struct volume *v, const struct volume *known, trace_orientation *find,
                       struct reconstruct_option *option, struct thread_pool *pool, const struct progress *progress,
                       struct reconstruct_report *report, struct error *err);

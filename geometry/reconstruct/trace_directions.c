@@ -15,8 +15,6 @@
 enum { N_ROUND = 2, N_ROUND_THIN = 1 /* where voxels are interpolated */ };
 /* Noise over the step from void to material from which on lines are traced for their directions. */
 static const double LEAST_NOISE = 0.3;
-/* The same of the share of the ends of lines in a part of the scan that are in the middle of material. */
-static const double LEAST_LOST_ENDS = 0.15;
 
 /* Gives voxels within a diameter of a line its direction. */
 static status take_directions(const struct polyline_set *lines, struct direction_volume *d, struct thread_pool *pool,
@@ -34,10 +32,7 @@ static status take_directions(const struct polyline_set *lines, struct direction
 
 static bool is_noisy(const struct reconstruct_report *report) { return report->noise.scan_sd >= LEAST_NOISE; }
 
-bool reconstruct_redirects(const struct reconstruct_report *report)
-{
-    return is_noisy(report) || report->lost_ends >= LEAST_LOST_ENDS;
-}
+bool reconstruct_redirects(const struct reconstruct_report *report) { return is_noisy(report) || report->in_pieces; }
 
 status reconstruct_redirect(const struct volume *v, struct direction_volume *d, const struct reconstruct_option *o,
                             struct thread_pool *pool, const struct progress *progress,

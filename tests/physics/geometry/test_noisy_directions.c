@@ -93,7 +93,7 @@ static void test_clear_scans_stay(void **state)
     assert_memory_equal(before, x.d.octahedral, n_byte);
     free(before);
     print_message("share of the ends within material %.3f\n", x.r.lost_ends);
-    x.r.lost_ends = 0.2; /* unless its lines are in pieces */
+    x.r.in_pieces = true; /* unless its lines are in pieces */
     assert_true(reconstruct_redirects(&x.r));
     assert_int_equal(reconstruct_redirect(&x.v, &x.d, &x.option, NULL, &cancelled, &x.r, NULL), STATUS_CANCELLED);
     release(&x);

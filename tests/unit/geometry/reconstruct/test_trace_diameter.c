@@ -3,6 +3,7 @@
 #include "geometry/diameter/scale_space.h"
 #include "geometry/filter/filter_choice.h"
 #include "geometry/reconstruct/reconstruct.h"
+#include "geometry/reconstruct/trace_box.h"
 #include "geometry/reconstruct/trace_diameter.h"
 #include "tests/support/scan/scan_files.h"
 
@@ -185,6 +186,34 @@ static void test_blurred_filter_is_narrow(void **state)
     volume_release(&v);
 }
 
+/* The first box of a scan is its fullest. A large scan has other ones, with at least half as much material. */
+static void test_boxes(void **state)
+{
+    (void)state;
+    enum { N = 192, N_BOX = 48 };
+    struct volume v, box = {0};
+    size_t from[3];
+    assert_int_equal(volume_init(&v, (const size_t[3]){N, N, N}, voxel_m, NULL), STATUS_OK);
+    for (size_t i = 0; i < volume_n_voxel(v.n); i++) {
+        const size_t z = i / (N * N);
+        v.density[i] = z < N / 2 ? 0.1f : z < 3 * N / 4 ? 0.3f : 0.4f;
+    }
+    assert_int_equal(trace_box_copy(&v, &v, 4.0, 0, &box, from, NULL), STATUS_OK);
+    assert_int_equal(from[2], N - N_BOX);
+    volume_release(&box);
+    for (int i = 1; i < TRACE_N_BOX; i++) {
+        assert_int_equal(trace_box_copy(&v, &v, 4.0, i, &box, from, NULL), STATUS_OK);
+        assert_int_equal(box.n[0], N_BOX);
+        assert_true(from[2] >= N / 2 && box.density[0] >= 0.3f);
+        volume_release(&box);
+    }
+    volume_crop(&v, (const size_t[6]){0, 0, 0, 96, 96, 96}); /* eight boxes: one of them says enough */
+    box = (struct volume){0};
+    assert_int_equal(trace_box_copy(&v, &v, 4.0, 1, &box, from, NULL), STATUS_OK);
+    assert_int_equal(box.n[0], 0);
+    volume_release(&v);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -194,6 +223,7 @@ int main(void)
         cmocka_unit_test(test_two_diameters_meet_between),
         cmocka_unit_test(test_a_yarn_is_no_thick_fiber),
         cmocka_unit_test(test_blurred_filter_is_narrow),
+        cmocka_unit_test(test_boxes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
