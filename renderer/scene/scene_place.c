@@ -14,7 +14,8 @@ void scene_segment_at(const struct scene *s, uint32_t i_segment, struct scene_se
 {
     const struct scene_vertex *v = &s->vertex[s->segment_vertex[i_segment]];
     const float d[3] = {v[1].x - v[0].x, v[1].y - v[0].y, v[1].z - v[0].z};
-    float inv = 1 / sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    out->length_mm = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    float inv = 1 / out->length_mm;
     out->middle_mm[0] = 0.5f * (v[0].x + v[1].x);
     out->middle_mm[1] = 0.5f * (v[0].y + v[1].y);
     out->middle_mm[2] = 0.5f * (v[0].z + v[1].z);

@@ -16,7 +16,7 @@ struct scene_place {
 
 /* A segment of the scene, whose fibers may be cut into more segments than the fiber set has. */
 struct scene_segment {
-    float middle_mm[3], tangent[3], radius_mm;
+    float middle_mm[3], tangent[3], length_mm, radius_mm;
 };
 
 /* A direction of the scene in the flat cloth, of length 1. */

@@ -73,6 +73,30 @@ def test_light_comes_through_a_cloth_without_sheet(opened):
     assert complaints(opened) == []
 
 
+def linear_mean(rows):
+    values = [v / 255 for row in rows for rgb in row for v in rgb]
+    return sum(v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in values) / len(values)
+
+
+@pytest.mark.parametrize("opened", ["fibers"], indirect=True)
+def test_fibers_are_drawn_close_up_with_the_mean_of_the_tables(opened):
+    press(opened, "twin-open")
+    wait_for(opened, "document.querySelector('canvas.twin-view')?.dataset.drawn === 'whole'")
+    check_drawing(opened)
+    near = {"width": 8, "center": [5, 5, 0], "exposure": 0.5}
+    bare, seen = pixels(opened, **near, fibers=False), pixels(opened, **near)
+    # from above, to the right is +y: fibers are upright stripes, each a millimetre of eight pixels
+    columns = [sum(seen[row][x][0] for row in range(EDGE)) / EDGE for x in range(EDGE)]
+    for k in range(1, 7):
+        middle, gap = columns[8 * k + 4], columns[8 * k]
+        assert middle > 30 and gap < 0.7 * middle, (k, columns)
+    assert linear_mean(seen) == pytest.approx(linear_mean(bare), rel=0.04), "nothing jumps where they fade in"
+    # far off, single fibers are not drawn: the drawing is that of the tables, to the byte
+    assert pixels(opened, width=90) == pixels(opened, width=90, fibers=False)
+    keep(opened, "twin-near")
+    assert complaints(opened) == []
+
+
 BESIDE = """const done = arguments[0];
 import("/twin/twin_panel.js").then(async ({ TwinPanel }) => {
   const old = document.querySelector("canvas.twin-view").twin, box = document.createElement("div");

@@ -16,15 +16,32 @@ function photographsOf(compared, cropMm, exposure) {
   });
 }
 
+// The tables of a twin as TwinView takes them, as soon as enough is there for a draft. url(path): address of a file of its results.
+export async function loadCloth(url) {
+  const description = await getJson(url("twin/twin.json"));
+  if (!/^selvedge-twin\.v[12]$/.test(description.format)) throw new Error(`its tables have the format ${description.format}`);
+  const { view_edge: view, light_edge: light, sides, offset } = description.parts.table;
+  const head = description.format === "selvedge-twin.v1" ? description.bytes : offset + 24 * (sides * view * light) ** 2;
+  const bytes = new Uint8Array(description.bytes), reader = (await raw("GET", url("twin/twin.bin"))).body.getReader();
+  let filled = 0;
+  const fill = async (until) => {
+    while (filled < until) {
+      const { done, value } = await reader.read();
+      if (done || filled + value.length > bytes.length) throw new Error("its tables are incomplete");
+      bytes.set(value, filled);
+      filled += value.length;
+    }
+  };
+  await fill(head);
+  return { description, buffer: bytes.buffer, whole: filled < bytes.length ? fill(bytes.length) : undefined };
+}
+
 async function load(job, files, compared) {
   const url = (path) => files.find((f) => f.path === path)?.url;
-  const description = await getJson(url("twin/twin.json"));
-  if (description.format !== "selvedge-twin.v1") throw new Error(`its tables have the format ${description.format}`);
-  const buffer = await (await raw("GET", url("twin/twin.bin"))).arrayBuffer(), result = job.result ?? {};
-  if (buffer.byteLength !== description.bytes) throw new Error("its tables are incomplete");
+  const cloth = await loadCloth(url), result = job.result ?? {};
   const pictures = (result.pictures ?? []).map((p) => ({ name: `the cloth, ${p.on}`, address: url(p.file.replace(".exr", ".png")) })).filter((p) => p.address);
   const exposure = result.png_exposure ?? result.pictures?.[0]?.png_exposure ?? 1;
-  return { description, buffer, exposure, pictures, photographs: photographsOf(compared, 10 * (job.document?.camera?.crop_cm ?? 1), exposure) };
+  return { ...cloth, exposure, pictures, photographs: photographsOf(compared, 10 * (job.document?.camera?.crop_cm ?? 1), exposure) };
 }
 
 // null when the job has no twin. {box, close}
@@ -34,6 +51,7 @@ export function twinCard(job, files, compared) {
   const box = el("div", { class: "twin" }), note = el("p", { class: "hint" });
   let panel = null, data = null;
   const save = async () => {
+    await data.whole;
     const link = el("a", { href: URL.createObjectURL(await twinPage(data, (address) => raw("GET", address))), download: `twin-${job.id}.html` });
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 60000);
@@ -44,6 +62,7 @@ export function twinCard(job, files, compared) {
     try {
       data = await load(job, files, compared);
       if (left) return;
+      data.whole?.catch((error) => note.append(` It stays a draft: ${error.message}.`));
       panel = new TwinPanel(box, data);
       note.replaceChildren(`${twinNote(panel.works, data.description)} `, el("button", { id: "twin-save", onclick: save }, "Save as one HTML file"));
     } catch (error) {

@@ -29,9 +29,11 @@ const box = (d, theta, phi, half) => dot(d, direction(theta, phi)) > Math.cos(ha
 // Radiance of each environment in a direction, in units of a white diffuser that faces the lamp.
 const environment = {
   "lamp only": null,
+  studio: (d) => (box(d, 45, 60, 16) ? [9, 8.6, 8] : box(d, 60, 250, 20) ? [3, 3.1, 3.3] : d[2] > 0 ? [0.12, 0.12, 0.12] : [0.03, 0.03, 0.03]),
+  daylight: (d) => (box(d, 40, 150, 6) ? [75, 70, 62] : d[2] > 0 ? [0.16, 0.21, 0.29].map((x) => x * (1.4 - 0.7 * d[2])) : [0.08, 0.075, 0.06]),
+  evening: (d) => (box(d, 76, 215, 8) ? [44, 23, 9] : d[2] > 0 ? [0.3, 0.17, 0.11].map((x, c) => x * (1 - d[2]) ** 2 + [0.05, 0.07, 0.13][c]) : [0.035, 0.025, 0.025]),
   "overcast sky": (d) => (d[2] > 0 ? [0.36, 0.39, 0.42].map((x) => x * (1 + 2 * d[2])) : [0.08, 0.08, 0.07]),
   window: (d) => (box(d, 60, 150, 24) ? [7, 7.6, 8.2] : d[2] > 0 ? [0.14, 0.13, 0.12] : [0.05, 0.05, 0.04]),
-  studio: (d) => (box(d, 45, 60, 16) ? [9, 8.6, 8] : box(d, 60, 250, 20) ? [3, 3.1, 3.3] : d[2] > 0 ? [0.12, 0.12, 0.12] : [0.03, 0.03, 0.03]),
 };
 export const environmentNames = Object.keys(environment);
 export const MOST_LIGHTS = 12;

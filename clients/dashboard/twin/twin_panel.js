@@ -1,8 +1,8 @@
-// The twin under the mouse: the drawing, its controls, and a photograph beside it. Stands alone: the page that is
-// downloaded has no other part of the dashboard.
-import { environmentNames } from "./twin_lights.js";
-import { TwinScene } from "./twin_scene.js";
+// Twins under the mouse: a drawing of each cloth with the same camera and light, their controls, and a photograph beside them. Stands alone:
+// the page that is downloaded has no other part of the dashboard.
+import { direction, environmentNames } from "./twin_lights.js";
 import { shapeNames } from "./twin_shapes.js";
+import { TwinView } from "./twin_view.js";
 
 const START = { shape: "drape", theta: 50, phi: 250, width: 42, center: [0, 0, 0], lampTheta: 50, lampPhi: 200, lampPower: 1, environment: "lamp only", exposure: 1 };
 
@@ -16,6 +16,8 @@ function node(name, attributes = {}, ...children) {
   return made;
 }
 
+const REACH = 40; // mm, of the point that the camera looks at
+
 const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
 
 // Notes for the reader of the drawing: how it is moved, and how far it can be trusted.
@@ -26,32 +28,35 @@ export function twinNote(works, { mean_rel_rms: rms, mean_rel_noise: noise }) {
 }
 
 export class TwinPanel {
-  #canvas = node("canvas", { class: "twin-view", width: 640, height: 640, tabindex: 0, "aria-label": "the cloth; drag turns it, shift and drag moves the lamp, the wheel zooms" });
-  #scene = null;
+  #views = [];
   #state = { ...START };
   #controls = new Map();
   #photo = node("figure", { class: "twin-photo", hidden: "" });
-  #waiting = 0;
-  #observer = null;
 
-  // data: {description, buffer, exposure, photographs: [{name, address, theta, phi, lampTheta, lampPhi, width}], pictures: [{name, address}]}
+  // data: {cloths: [{description, buffer, name?, whole?}] (TwinView), exposure, photographs: [{name, address, theta, phi, lampTheta, lampPhi,
+  // width}], pictures: [{name, address}]}; a single cloth may be in data itself.
   constructor(box, data) {
     this.#state.exposure = data.exposure ?? 1;
+    const cloths = data.cloths ?? [data], side = node("div", { class: "twin-side" });
     try {
-      this.#scene = new TwinScene(this.#canvas, data.description, data.buffer);
+      for (const cloth of cloths) {
+        const canvas = node("canvas", { class: "twin-view", width: 640, height: 640, tabindex: 0, "aria-label": `the cloth${cloth.name ? ` of ${cloth.name}` : ""}; drag turns it, shift and drag moves the lamp, the wheel zooms` });
+        this.#views.push(new TwinView(canvas, cloth, this.#state));
+        side.append(cloth.name ? node("figure", { class: "twin-figure" }, canvas, node("figcaption", {}, cloth.name)) : canvas);
+        this.#listen(canvas);
+        Object.assign(canvas, { twin: this }); // for programs that look at the page
+      }
     } catch (error) {
+      this.close();
       box.append(node("p", { class: "hint" }, `The cloth cannot be turned here: ${error.message}. These are pictures of it.`),
         node("div", { class: "twin-pictures" }, ...data.pictures.map((p) => node("img", { src: p.address, alt: p.name }))));
       return;
     }
-    box.append(node("div", { class: "twin-side" }, this.#canvas, this.#photo), this.#makeControls(data));
-    this.#listen();
-    this.#observer = new ResizeObserver(() => this.draw());
-    this.#observer.observe(this.#canvas);
-    Object.assign(this.#canvas, { twin: this }); // for programs that look at the page
+    side.append(this.#photo);
+    box.append(side, this.#makeControls(data));
   }
 
-  get works() { return this.#scene !== null; }
+  get works() { return this.#views.length > 0; }
 
   // Changes a part of the state and draws.
   show(change) {
@@ -60,16 +65,23 @@ export class TwinPanel {
     this.draw();
   }
 
-  pixels(change, edge) { return this.#scene.pixels({ ...this.#state, ...change }, edge); }
+  // Of the first cloth, as TwinScene has them.
+  pixels(change, edge) { return this.#views[0].pixels({ ...this.#state, ...change }, edge); }
 
-  draw() {
-    if (this.#waiting || !this.#scene) return;
-    this.#waiting = requestAnimationFrame(() => {
-      this.#waiting = 0;
-      const ratio = Math.min(2, devicePixelRatio), width = Math.round(ratio * this.#canvas.clientWidth), height = Math.round(ratio * this.#canvas.clientHeight);
-      if (width > 0 && (this.#canvas.width !== width || this.#canvas.height !== height)) { this.#canvas.width = width; this.#canvas.height = height; }
-      this.#scene.draw(this.#state);
-    });
+  draw() { for (const view of this.#views) view.draw(); }
+
+  // Zooms towards the place of the canvas that an event of the pointer is over.
+  #zoom(canvas, event, factor) {
+    const s = this.#state, width = clamp(s.width * factor, 0.5, 120), box = canvas.getBoundingClientRect();
+    const x = (event.clientX - box.left) / box.width - 0.5, y = (0.5 - (event.clientY - box.top) / box.height) * box.height / box.width;
+    this.#move((s.width - width) * x, (s.width - width) * y);
+    this.show({ width: width });
+  }
+
+  // Moves the point that the camera looks at to the right and upwards in the picture, mm.
+  #move(right, up) {
+    const s = this.#state, p = s.phi * Math.PI / 180, above = direction(s.theta - 90, s.phi);
+    s.center = s.center.map((x, a) => clamp(x + right * [-Math.sin(p), Math.cos(p), 0][a] + up * above[a], -REACH, REACH));
   }
 
   #slider(key, text, low, high) {
@@ -111,9 +123,9 @@ export class TwinPanel {
     return node("label", {}, "Beside a photograph", select);
   }
 
-  #listen() {
+  #listen(c) {
     let last = null;
-    const c = this.#canvas, touches = new Map();
+    const touches = new Map();
     c.addEventListener("contextmenu", (e) => e.preventDefault());
     c.addEventListener("pointerdown", (e) => { last = [e.clientX, e.clientY]; touches.set(e.pointerId, last); c.setPointerCapture(e.pointerId); });
     for (const end of ["pointerup", "pointercancel"]) c.addEventListener(end, (e) => { touches.delete(e.pointerId); last = null; });
@@ -123,7 +135,7 @@ export class TwinPanel {
       const dx = e.clientX - was[0], dy = e.clientY - was[1], s = this.#state;
       if (touches.size === 2) {
         const other = [...touches].find(([id]) => id !== e.pointerId)[1], before = Math.hypot(was[0] - other[0], was[1] - other[1]);
-        s.width = clamp(s.width * before / Math.max(1, Math.hypot(e.clientX - other[0], e.clientY - other[1])), 0.5, 120);
+        this.#zoom(c, { clientX: other[0], clientY: other[1] }, before / Math.max(1, Math.hypot(e.clientX - other[0], e.clientY - other[1])));
       } else if (e.shiftKey || e.buttons & 2) {
         s.lampPhi = (s.lampPhi + 0.4 * dx + 540) % 360 - 180;
         s.lampTheta = clamp(s.lampTheta + 0.4 * dy, 0, 180);
@@ -136,14 +148,9 @@ export class TwinPanel {
     });
     c.addEventListener("wheel", (e) => {
       e.preventDefault();
-      this.show({ width: clamp(this.#state.width * Math.exp(0.001 * e.deltaY), 0.5, 120) });
+      this.#zoom(c, e, Math.exp(0.001 * e.deltaY));
     }, { passive: false });
   }
 
-  close() {
-    this.#observer?.disconnect();
-    cancelAnimationFrame(this.#waiting);
-    this.#scene?.close();
-    this.#scene = null;
-  }
+  close() { for (const view of this.#views.splice(0)) view.close(); }
 }

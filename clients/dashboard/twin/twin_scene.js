@@ -1,25 +1,12 @@
 // Draws the twin with WebGL 2: the tables as textures, one shape, one lamp with its shadow map, and parallel lights.
-import { cameraFrom, lightsOf, MOST_LIGHTS } from "./twin_lights.js";
+import { cameraFrom, direction, lightsOf, MOST_LIGHTS } from "./twin_lights.js";
+import { TwinNear } from "./twin_near.js";
+import { glProgram } from "./twin_program.js";
 import { depthFragmentText, depthVertexText, fragmentText, vertexText } from "./twin_shaders.js";
 import { makeShape } from "./twin_shapes.js";
 
 const SHADOW_EDGE = 1024, FAR_FIELD_MM = 20000;
 const ATTRIBUTES = ["position", "normal", "weft", "place"];
-
-function program(gl, vertex, fragment) {
-  const made = gl.createProgram();
-  for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
-    const shader = gl.createShader(kind);
-    gl.shaderSource(shader, text);
-    gl.compileShader(shader);
-    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader) ?? "the shader was refused");
-    gl.attachShader(made, shader);
-  }
-  ATTRIBUTES.forEach((name, i) => gl.bindAttribLocation(made, i, name));
-  gl.linkProgram(made);
-  if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(made) ?? "the shaders were refused");
-  return made;
-}
 
 function halfToFloat(h) {
   const sign = h & 0x8000 ? -1 : 1, exponent = h >> 10 & 31, mantissa = h & 1023;
@@ -42,6 +29,14 @@ function shrink(pixels, width, height) {
   return { pixels: out, width: w, height: h };
 }
 
+// Lamp and surroundings as the parallel lights of close views, the strongest first.
+function nearLights(state, lights) {
+  const list = lights.map((l) => ({ from: l.from, color: l.color.map((x) => x * l.share) }));
+  if (state.lampPower > 0) list.push({ from: direction(state.lampTheta, state.lampPhi), color: [1, 1, 1].map((x) => x * state.lampPower) });
+  const power = (l) => l.color[0] + l.color[1] + l.color[2];
+  return list.sort((a, b) => power(b) - power(a));
+}
+
 export class TwinScene {
   #gl;
   #description;
@@ -51,34 +46,62 @@ export class TwinScene {
   #uniforms = new Map();
   #shape = { name: "", count: 0, array: null, buffers: [] };
   #shadow;
+  #groups = 0;
+  #textures = [];
+  #near = null;
 
-  // Throws when the browser has no WebGL 2 or cannot hold the tables.
-  constructor(canvas, description, buffer) {
+  // Throws when the browser has no WebGL 2 or cannot hold the tables. groups: the textures, in fours, that the buffer holds already; with fewer than
+  // all of them the drawing is a draft until finish().
+  constructor(canvas, description, buffer, groups = description.parts.textures.n / 4) {
     const gl = canvas.getContext("webgl2", { antialias: true, alpha: false, powerPreference: "high-performance" });
     if (!gl) throw new Error("this browser has no WebGL 2");
     this.#gl = gl;
     this.#description = description;
     this.#buffer = buffer;
-    this.#surface = program(gl, vertexText, fragmentText(description.parts.textures.n / 4, MOST_LIGHTS));
-    this.#depth = program(gl, depthVertexText, depthFragmentText);
+    this.#depth = glProgram(gl, depthVertexText, depthFragmentText, ATTRIBUTES);
+    this.#makeShadow();
+    this.#takeGroups(groups);
+    gl.enable(gl.DEPTH_TEST);
+    if (groups === description.parts.textures.n / 4) this.finish();
+  }
+
+  // The buffer is filled: all textures, and the fibers of close views.
+  finish() {
+    const all = this.#description.parts.textures.n / 4;
+    if (this.#groups !== all) this.#takeGroups(all);
+    try {
+      this.#near = TwinNear.make(this.#gl, this.#description, this.#buffer);
+    } catch {
+      this.#near = null; // a driver that refuses these shaders still draws the cloth
+    }
+    this.#shape.name = "";
+  }
+
+  #takeGroups(groups) {
+    const gl = this.#gl;
+    for (const t of this.#textures.splice(0)) gl.deleteTexture(t);
+    if (this.#surface) gl.deleteProgram(this.#surface);
+    this.#groups = groups;
+    this.#uniforms.clear();
+    this.#surface = glProgram(gl, vertexText, fragmentText(groups, MOST_LIGHTS), ATTRIBUTES);
     this.#makeTextures();
     this.#makeTable();
-    this.#makeShadow();
-    gl.enable(gl.DEPTH_TEST);
   }
 
   #array(unit, repeat, filter) {
     const gl = this.#gl;
     gl.activeTexture(gl.TEXTURE0 + unit);
-    gl.bindTexture(gl.TEXTURE_2D_ARRAY, gl.createTexture());
+    const texture = gl.createTexture();
+    this.#textures.push(texture);
+    gl.bindTexture(gl.TEXTURE_2D_ARRAY, texture);
     for (const wrap of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D_ARRAY, wrap, repeat ? gl.REPEAT : gl.CLAMP_TO_EDGE);
     gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MIN_FILTER, filter);
     gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
   }
 
   #makeTextures() {
-    const gl = this.#gl, { n, width, height, offset } = this.#description.parts.textures, groups = n / 4;
-    const halves = new Uint16Array(this.#buffer, offset, n * width * height);
+    const gl = this.#gl, { width, height, offset } = this.#description.parts.textures, groups = this.#groups;
+    const halves = new Uint16Array(this.#buffer, offset, 4 * groups * width * height);
     this.#array(0, true, gl.LINEAR_MIPMAP_LINEAR);
     const levels = 1 + Math.floor(Math.log2(Math.max(width, height)));
     gl.texStorage3D(gl.TEXTURE_2D_ARRAY, levels, gl.RGBA16F, width, height, groups);
@@ -94,15 +117,19 @@ export class TwinScene {
   }
 
   #makeTable() {
-    const gl = this.#gl, { view_edge: view, light_edge: light, sides, offset } = this.#description.parts.table, n = this.#description.parts.textures.n;
-    const columns = view * sides * light, rows = sides * view * light, layers = 3 * n / 4;
+    const gl = this.#gl, { view_edge: view, light_edge: light, sides, offset } = this.#description.parts.table, groups = this.#groups;
+    const columns = view * sides * light, rows = sides * view * light, layer = 4 * columns * rows;
+    // the first version has the layers in another order
+    const place = (k) => (this.#description.format === "selvedge-twin.v1" ? k % 3 * this.#description.parts.textures.n / 4 + Math.floor(k / 3) : k);
     this.#array(1, false, gl.LINEAR);
-    gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, gl.RGBA16F, columns, rows, layers);
-    gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, 0, columns, rows, layers, gl.RGBA, gl.HALF_FLOAT, new Uint16Array(this.#buffer, offset, 4 * columns * rows * layers));
+    gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, gl.RGBA16F, columns, rows, 3 * groups);
+    for (let k = 0; k < 3 * groups; k++)
+      gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, k, columns, rows, 1, gl.RGBA, gl.HALF_FLOAT, new Uint16Array(this.#buffer, offset + 2 * layer * place(k), layer));
     gl.useProgram(this.#surface);
     this.#set("uniform1i", "textures", 0);
     this.#set("uniform1i", "table", 1);
     this.#set("uniform1i", "shadows", 2);
+    this.#set("uniform1i", "fibers", 3);
     this.#set("uniform2f", "tableSize", columns, rows);
     this.#set("uniform1f", "viewEdge", view);
     this.#set("uniform1f", "lightEdge", light);
@@ -149,17 +176,18 @@ export class TwinScene {
     });
     fill(gl.ELEMENT_ARRAY_BUFFER, made.index);
     this.#shape = { name, count: made.index.length, array, buffers };
+    this.#near?.takeShape(made);
   }
 
   #draw() { this.#gl.drawElements(this.#gl.TRIANGLES, this.#shape.count, this.#gl.UNSIGNED_INT, 0); }
 
-  // state: {shape, theta, phi, width, center, lampTheta, lampPhi, lampPower, environment, exposure}; angles in degrees,
-  // lengths in millimetres. Draws into the canvas as large as it is.
+  // state: {shape, theta, phi, width, center, lampTheta, lampPhi, lampPower, environment, exposure, fibers}; angles in degrees,
+  // lengths in millimetres; fibers false: by the tables alone. Draws into the canvas as large as it is.
   draw(state) {
     const gl = this.#gl, { setup } = this.#description, canvas = gl.canvas;
     this.#takeShape(state.shape);
-    gl.bindVertexArray(this.#shape.array);
     const lamp = cameraFrom({ theta: state.lampTheta, phi: state.lampPhi, distance: setup.lamp_distance_mm, width: 64, depth: 45 });
+    gl.bindVertexArray(this.#shape.array);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.#shadow);
     gl.viewport(0, 0, SHADOW_EDGE, SHADOW_EDGE);
     gl.clear(gl.DEPTH_BUFFER_BIT);
@@ -168,6 +196,8 @@ export class TwinScene {
     this.#draw();
     const eye = cameraFrom({ theta: state.theta, phi: state.phi, width: state.width, center: state.center, aspect: canvas.width / canvas.height,
       distance: setup.far_field ? FAR_FIELD_MM : setup.camera_distance_mm });
+    const lights = lightsOf(state.environment), near = (state.fibers !== false && this.#near?.draw(eye, state, nearLights(state, lights))) || { weight: 0 };
+    gl.bindVertexArray(this.#shape.array);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(0, 0, 0, 1);
@@ -183,7 +213,9 @@ export class TwinScene {
     this.#set("uniform2f", "lampRange", lamp.near, lamp.far);
     this.#set("uniform1f", "lampPixel", lamp.widthAtOne);
     this.#set("uniform1f", "exposure", state.exposure);
-    const lights = lightsOf(state.environment);
+    this.#set("uniform1i", "curve", state.environment === "lamp only" ? 0 : 1);
+    this.#set("uniform1f", "nearWeight", near.weight);
+    this.#set("uniform1f", "nearLevel", near.level ?? 0);
     this.#set("uniform1i", "lightCount", lights.length);
     lights.forEach((light, i) => {
       this.#set("uniform4f", `lightFrom[${i}]`, ...light.from, light.share);
@@ -202,6 +234,12 @@ export class TwinScene {
     for (let y = 0; y < edge; y++) turned.set(out.subarray(row * (edge - 1 - y), row * (edge - y)), row * y);
     return turned;
   }
+
+  // Draws single fibers of half as many copies of the tile at most.
+  takeFewerFibers() { this.#near?.takeFewer(); }
+
+  // Waits until all is drawn.
+  settle() { this.#gl.readPixels(0, 0, 1, 1, this.#gl.RGBA, this.#gl.UNSIGNED_BYTE, new Uint8Array(4)); }
 
   close() { this.#gl.getExtension("WEBGL_lose_context")?.loseContext(); }
 }

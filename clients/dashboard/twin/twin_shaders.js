@@ -1,5 +1,6 @@
 // Shaders of the twin. The cloth's radiance is |cos th_i| / (|cos th_i| + |cos th_o|) sum_k W_k(x) T_k(wo, wi): W in an array of textures of the tile,
 // T in a second array, whose layers, rows and columns twin.json describes (optimizer/report/export/twin_result.h).
+import { nearDetailText } from "./twin_near_shaders.js";
 
 export const vertexText = `#version 300 es
 in vec3 position;
@@ -55,6 +56,7 @@ uniform int lightCount;
 uniform vec4 lightFrom[LIGHTS]; // direction, and radiance times solid angle over pi
 uniform vec3 lightColor[LIGHTS];
 uniform float exposure;
+uniform bool curve;             // highlights keep their color
 out vec4 color;
 
 vec4 weight[GROUPS];
@@ -69,7 +71,7 @@ vec3 look(vec2 view, vec2 light) {
   vec2 p = (view * vec2(float(sides), 1.0) * lightEdge + light) / tableSize;
   vec3 sum = vec3(0.0);
   for (int g = 0; g < GROUPS; g++)
-    for (int c = 0; c < 3; c++) sum[c] += dot(weight[g], texture(table, vec3(p, float(c * GROUPS + g))));
+    for (int c = 0; c < 3; c++) sum[c] += dot(weight[g], texture(table, vec3(p, float(3 * g + c))));
   return sum;
 }
 
@@ -113,6 +115,17 @@ float seen(vec3 n, float cosine) {
   return open;
 }
 
+${nearDetailText}
+// Khronos PBR Neutral, as renderer/image/tone_curve.h has it.
+vec3 toned(vec3 c) {
+  const float start = 0.76, room = 0.24;
+  float least = min(c.r, min(c.g, c.b));
+  c -= least < 0.08 ? least - 6.25 * least * least : 0.04;
+  float peak = max(c.r, max(c.g, c.b)), lowered = 1.0 - room * room / (peak + room - start);
+  if (peak < start) return c;
+  return mix(c * lowered / peak, vec3(lowered), 1.0 - 1.0 / (0.15 * (peak - lowered) + 1.0));
+}
+
 float encoded(float x) { return x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1.0 / 2.4) - 0.055; }
 
 void main() {
@@ -120,19 +133,25 @@ void main() {
   vec3 toEye = normalize(eye - at), toLamp = lamp - at;
   vec3 wo = vec3(dot(toEye, t), dot(toEye, b), dot(toEye, n));
   for (int g = 0; g < GROUPS; g++) weight[g] = texture(textures, vec3(cloth / tile, float(g)));
-  vec3 sum = vec3(0.0);
+  vec3 sum = vec3(0.0), bare = vec3(0.0); // bare: without shadow
   if (lampPower > 0.0) {
     float far = length(toLamp);
     vec3 l = toLamp / far;
     float faces = max(dot(normalize(lamp), l), 0.0), falls = lampDistance / far;
     vec3 lit = radiance(wo, vec3(dot(l, t), dot(l, b), dot(l, n)));
-    if (lit.r + lit.g + lit.b > 0.0) sum += lampPower * faces * falls * falls * seen(dot(l, n) > 0.0 ? n : -n, abs(dot(l, n))) * lit;
+    lit *= lampPower * faces * falls * falls;
+    bare += lit;
+    if (lit.r + lit.g + lit.b > 0.0) sum += seen(dot(l, n) > 0.0 ? n : -n, abs(dot(l, n))) * lit;
   }
   for (int i = 0; i < LIGHTS; i++) {
     if (i >= lightCount) break;
     vec3 l = lightFrom[i].xyz;
-    sum += lightFrom[i].w * lightColor[i] * radiance(wo, vec3(dot(l, t), dot(l, b), dot(l, n)));
+    vec3 lit = lightFrom[i].w * lightColor[i] * radiance(wo, vec3(dot(l, t), dot(l, b), dot(l, n)));
+    sum += lit;
+    bare += lit;
   }
+  if (nearWeight > 0.0) sum *= fiberDetail(bare);
   sum *= exposure;
+  if (curve) sum = toned(sum);
   color = vec4(encoded(sum.r), encoded(sum.g), encoded(sum.b), 1.0);
 }`;

@@ -27,7 +27,7 @@ function grid(n, m, of) {
       const k = j * (n + 1) + i;
       index.set([k, k + 1, k + n + 2, k, k + n + 2, k + n + 1], at);
     }
-  return { position, normal, weft, place, index };
+  return { position, normal, weft, place, index, size: [n + 1, m + 1], from: [...place.subarray(0, 2)], to: [...place.subarray(-2)] };
 }
 
 const flat = () => grid(1, 1, (i, j) => [(i - 0.5) * SIZE, (j - 0.5) * SIZE, 0, (i - 0.5) * SIZE, (j - 0.5) * SIZE]);

@@ -52,7 +52,7 @@ static bool add_textures(const struct appearance_table *t, struct twin_block *b)
 
 static bool add_table(const struct appearance_table *t, struct twin_block *b)
 {
-    size_t v = t->view_edge, l = t->light_edge, n_light = t->n_side * l * l, n_group = t->n_basis / 4;
+    size_t v = t->view_edge, l = t->light_edge, n_light = t->n_side * l * l;
     size_t columns = v * t->n_side * l, rows = t->n_side * v * l;
     uint16_t *out = grow(b, 3 * t->n_basis * columns * rows * sizeof *out);
     if (out == NULL) return false;
@@ -61,7 +61,7 @@ static bool add_table(const struct appearance_table *t, struct twin_block *b)
             const float *value = t->value + (i * n_light + j) * 3 * t->n_basis;
             size_t row = i / v * l + j / l % l, column = (i % v * t->n_side + j / (l * l)) * l + j % l;
             for (size_t k = 0; k < 3 * t->n_basis; k++) {
-                size_t layer = k % 3 * n_group + k / 3 / 4;
+                size_t layer = k / 3 / 4 * 3 + k % 3;
                 out[((layer * rows + row) * columns + column) * 4 + k / 3 % 4] = half_of(value[k]);
             }
         }
@@ -101,28 +101,104 @@ static status add_drape(const struct progress *progress, struct twin_block *b, j
     return STATUS_OK;
 }
 
-status twin_file_make(const struct appearance_table *t, const struct progress *progress, char **block, size_t *n_byte,
-                      json_t **parts, struct error *err)
+static bool add_lobes(const struct near_fibers *f, struct twin_block *b)
+{
+    const size_t n = f->n_set * NEAR_LOBE_CELLS;
+    uint16_t *out = grow(b, 4 * n * sizeof *out);
+    for (size_t i = 0; i < n && out != NULL; i++) {
+        for (size_t c = 0; c < 3; c++) out[4 * i + c] = half_of(f->lobe[3 * i + c]);
+        out[4 * i + 3] = 0;
+    }
+    return out != NULL;
+}
+
+static void find_bounds(const struct near_fibers *f, double low[3], double high[3], double *radius_mm)
+{
+    *radius_mm = 0.0;
+    for (int a = 0; a < 3; a++) {
+        low[a] = INFINITY;
+        high[a] = -INFINITY;
+    }
+    for (size_t i = 0; i < f->n_point; i++) {
+        *radius_mm = fmax(*radius_mm, (double)f->point[i].radius_mm);
+        for (int a = 0; a < 3; a++) {
+            low[a] = fmin(low[a], (double)f->point[i].position_mm[a]);
+            high[a] = fmax(high[a], (double)f->point[i].position_mm[a]);
+        }
+    }
+}
+
+static uint32_t step_of(double x, double low, double high)
+{
+    return high > low ? (uint32_t)lround(65535.0 * (x - low) / (high - low)) : 0;
+}
+
+/* Adds both parts of the fibers to json; no part without fibers. */
+static bool add_fibers(const struct near_fibers *f, struct twin_block *b, json_t *json)
+{
+    double low[3], high[3], radius_mm;
+    if (f->n_point == 0) return true;
+    const size_t lobes_at = b->n_byte, fibers_at = lobes_at + 8 * f->n_set * NEAR_LOBE_CELLS;
+    find_bounds(f, low, high, &radius_mm);
+    uint32_t *out = add_lobes(f, b) ? grow(b, 8 * f->n_point * sizeof *out) : NULL;
+    for (size_t i = 0; i < f->n_point && out != NULL; i++, out += 8) {
+        const struct near_point *p = &f->point[i];
+        uint32_t at[3];
+        for (int a = 0; a < 3; a++) at[a] = step_of((double)p->position_mm[a], low[a], high[a]);
+        out[0] = at[0] | at[1] << 16;
+        out[1] = at[2] | step_of((double)p->radius_mm, 0.0, radius_mm) << 16;
+        out[2] = p->i_set | (p->is_last ? 1U << 31 : 0U);
+        out[3] = 0;
+        for (int k = 0; k < 4; k++) out[4 + k] = (uint32_t)(p->open[k / 2] >> (k % 2 * 32));
+    }
+    if (out == NULL) return false;
+    json_object_set_new(
+        json, "lobes",
+        part_json(lobes_at, json_pack("{s:I, s:i, s:i, s:i}", "sets", (json_int_t)f->n_set, "azimuth",
+                                      NEAR_LOBE_AZIMUTH, "difference", NEAR_LOBE_DIFFERENCE, "half", NEAR_LOBE_HALF)));
+    json_object_set_new(json, "fibers",
+                        part_json(fibers_at, json_pack("{s:I, s:f, s:[f, f, f], s:[f, f, f]}", "points",
+                                                       (json_int_t)f->n_point, "radius_mm", radius_mm, "low", low[0],
+                                                       low[1], low[2], "high", high[0], high[1], high[2])));
+    return true;
+}
+
+static json_t *tables_json(const struct appearance_table *t, size_t textures_at, size_t table_at)
+{
+    return json_pack(
+        "{s:o, s:o}", "textures",
+        part_json(textures_at, json_pack("{s:I, s:I, s:I}", "n", (json_int_t)t->n_basis, "width", (json_int_t)t->width,
+                                         "height", (json_int_t)t->height)),
+        "table",
+        part_json(table_at, json_pack("{s:I, s:I, s:I}", "view_edge", (json_int_t)t->view_edge, "light_edge",
+                                      (json_int_t)t->light_edge, "sides", (json_int_t)t->n_side)));
+}
+
+status twin_file_make(const struct appearance_table *t, const struct near_fibers *f, const struct progress *progress,
+                      char **block, size_t *n_byte, json_t **parts, struct error *err)
 {
     struct twin_block b = {0};
-    json_t *drape = NULL;
-    bool made = add_textures(t, &b);
-    size_t table_at = b.n_byte;
+    json_t *drape = NULL, *json = NULL;
+    status s = add_drape(progress, &b, &drape, err);
+    const size_t over = b.n_byte % 8, textures_at = b.n_byte + (8 - over) % 8;
+    if (over > 0 && s == STATUS_OK) {
+        char *room = grow(&b, 8 - over); /* numbers of 4 bytes follow, too */
+        if (room != NULL) memset(room, 0, 8 - over);
+    }
+    bool made = s == STATUS_OK && b.n_byte == textures_at && add_textures(t, &b);
+    const size_t table_at = b.n_byte;
     made = made && add_table(t, &b);
-    status s = made ? add_drape(progress, &b, &drape, err)
-                    : error_set(err, STATUS_NO_MEMORY, "cannot write the twin: out of memory");
+    json = made ? tables_json(t, textures_at, table_at) : NULL;
+    if (s == STATUS_OK && (json == NULL || !add_fibers(f, &b, json)))
+        s = error_set(err, STATUS_NO_MEMORY, "cannot write the twin: out of memory");
     if (s != STATUS_OK) {
         free(b.data);
+        json_decref(drape);
+        json_decref(json);
         return s;
     }
-    *parts =
-        json_pack("{s:o, s:o, s:o}", "textures",
-                  part_json(0, json_pack("{s:I, s:I, s:I}", "n", (json_int_t)t->n_basis, "width", (json_int_t)t->width,
-                                         "height", (json_int_t)t->height)),
-                  "table",
-                  part_json(table_at, json_pack("{s:I, s:I, s:I}", "view_edge", (json_int_t)t->view_edge, "light_edge",
-                                                (json_int_t)t->light_edge, "sides", (json_int_t)t->n_side)),
-                  "drape", drape);
+    json_object_set_new(json, "drape", drape);
+    *parts = json;
     *block = b.data;
     *n_byte = b.n_byte;
     return STATUS_OK;

@@ -15,6 +15,8 @@
 /* Sizes of the tables: the grids of a cloth that is shown from both sides have fewer directions on each, because there
  * are four pairs of sides. */
 enum { BASIS = 16, VIEW_EDGE = 12, LIGHT_EDGE = 16, VIEW_EDGE_OF_TWO = 8, LIGHT_EDGE_OF_TWO = 10 };
+/* Points of fibers for close views: 2 MB. */
+enum { MOST_POINTS = 65536 };
 
 double twin_result_paths(const struct job_results *results)
 {
@@ -38,7 +40,7 @@ static status write_json(const struct report *report, const struct appearance_ta
 {
     char path[WORKER_PATH_BYTES];
     json_t *json = json_pack("{s:s, s:s, s:s, s:[f, f], s:f, s:b, s:I, s:I, s:o, s:o, s:o, s:o, s:I, s:o, s:o}",
-                             "format", "selvedge-twin.v1", "sample", report->in.sample, "model",
+                             "format", "selvedge-twin.v2", "sample", report->in.sample, "model",
                              report->model[report_best_model(report)].setup->appearance.id, "tile_mm", t->tile_mm[0],
                              t->tile_mm[1], "thickness_mm", scene_thickness_mm(report->in.made->scene), "black_sheet",
                              report->in.job->setup->black_sheet, "paths", (json_int_t)report->in.results->twin_paths,
@@ -66,7 +68,8 @@ static bool is_finished(const struct report *report)
     return same;
 }
 
-static status write_files(const struct report *report, const struct appearance_table *t, struct error *err)
+static status write_files(const struct report *report, const struct appearance_table *t, const struct near_fibers *f,
+                          struct error *err)
 {
     char path[WORKER_PATH_BYTES], *block = NULL;
     size_t n_byte;
@@ -74,7 +77,7 @@ static status write_files(const struct report *report, const struct appearance_t
     struct progress silent = progress_silent(&report->in.job->tools->progress);
     worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, "twin", path);
     status s = durable_make_folder(path, err);
-    if (s == STATUS_OK) s = twin_file_make(t, &silent, &block, &n_byte, &parts, err);
+    if (s == STATUS_OK) s = twin_file_make(t, f, &silent, &block, &n_byte, &parts, err);
     worker_folder_path(report->in.job->tools->folder, JOB_FOLDER_RESULTS, "twin/twin.bin", path);
     if (s == STATUS_OK) s = worker_folder_replace(report->in.job->tools->folder, path, block, n_byte, err);
     free(block);
@@ -105,11 +108,15 @@ status twin_result_write(struct report *report, double from, double to, struct e
                                       .n_set = m->setup->sets.n_set,
                                       .discrepancy = pipeline_discrepancy(m->validation)};
     struct appearance_table t;
+    struct near_fibers f = {0};
     struct progress_part part;
-    struct progress progress = progress_begin_part(&part, &report->in.job->tools->progress, from, to - from);
+    struct progress progress = progress_begin_part(&part, &report->in.job->tools->progress, from, to - from),
+                    silent = progress_silent(&progress);
     status s = appearance_table_make(&in, &o, report->in.job->tools->pool, &progress, &t, err);
     if (s != STATUS_OK) return s;
-    s = write_files(report, &t, err);
+    s = near_fibers_make(&in, MOST_POINTS, report->in.job->tools->pool, &silent, &f, err);
+    if (s == STATUS_OK) s = write_files(report, &t, &f, err);
+    near_fibers_release(&f);
     if (s == STATUS_OK)
         log_info(report->in.job->tools->log,
                  "twin: means in random directions differ from the table by %.1f %%, of which noise %.1f %%",

@@ -266,15 +266,19 @@ def test_a_twin_is_written_as_its_description_says(real):
     twin = json.loads(real.get(f"/v1/jobs/{job}/results/twin/twin.json").content)
     data = real.get(f"/v1/jobs/{job}/results/twin/twin.bin").content
     textures, table, drape = (twin["parts"][k] for k in ("textures", "table", "drape"))
-    assert twin["format"] == "selvedge-twin.v1" and len(data) == twin["bytes"] == drape["offset"] + 6 * drape["points"]**2
+    lobes, fibers = twin["parts"]["lobes"], twin["parts"]["fibers"]
+    assert twin["format"] == "selvedge-twin.v2" and len(data) == twin["bytes"] == fibers["offset"] + 32 * fibers["points"]
+    assert drape["offset"] == 0 and 6 * drape["points"]**2 <= textures["offset"] < 6 * drape["points"]**2 + 8
     n_texel = textures["width"] * textures["height"]
     weights = struct.unpack_from(f"<{textures['n'] * n_texel}e", data, textures["offset"])
     assert textures["n"] == 16 and n_texel == 16 and all(weights[4 * i] == 1 for i in range(n_texel)), "W_0 is 1"
     assert abs(sum(weights[4 * i + 1] for i in range(n_texel))) < 0.1 and abs(sum(weights[4 * i + 1]**2 for i in range(n_texel)) - n_texel) < 0.1
     n = (table["view_edge"] * table["light_edge"])**2
-    assert table["sides"] == 1 and drape["offset"] - table["offset"] == 2 * 3 * textures["n"] * n
+    assert table["sides"] == 1 and lobes["offset"] - table["offset"] == 2 * 3 * textures["n"] * n
     means = struct.unpack_from(f"<{4 * n}e", data, table["offset"])[::4]
     assert min(means) >= 0 and sum(means) > 0, "T_0 of red"
+    words = struct.unpack_from(f"<{8 * fibers['points']}I", data, fibers["offset"])
+    assert words[8 * fibers["points"] - 6] >> 31 and any(words[4::8]) and not any(words[6::8]), "the last line ends; a black sheet lies below"
     row = next(r for r in done["result"]["rows"] if (r["light_theta_deg"], r["camera_theta_deg"]) == (45, 45))
     assert 0.1 * row["rendered"][0] < 0.5 * sum(means) / n < 10 * row["rendered"][0]
 
