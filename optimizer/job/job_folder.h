@@ -17,6 +17,7 @@
  *   JOB/status.json         The worker replaces it at least every second while it lives.
  *   JOB/pictures.json       the same for the stage after the result (worker option --pictures), besides the state
  *                           "waiting", which the daemon writes
+ *   JOB/pictures-log.txt    the log of this stage, append-only
  *   JOB/series.rec          record file (durable.h), append-only: one JSON object for each step of the fit
  *   JOB/log.txt             the worker's log, append-only
  *   JOB/work/<stage>/       checkpoints of a stage; JOB/work/<stage>.done marks a stage whose outputs are complete
@@ -57,6 +58,7 @@
 #define JOB_FILE_PLAN "plan.json" /* the needs that were predicted for the job (server/workers/input_judge.h) */
 #define JOB_FILE_SERIES "series.rec"
 #define JOB_FILE_LOG "log.txt"
+#define JOB_FILE_PICTURES_LOG "pictures-log.txt"
 #define JOB_FOLDER_INPUT "input"
 #define JOB_FOLDER_WORK "work"
 #define JOB_FOLDER_ADOPTED "adopted"

@@ -48,7 +48,7 @@ static const char usage[] =
     "not\n"
     "                     depend on it. mpirun and srun may also start this program themselves\n"
     "  --pictures         of a job that has succeeded: make its picture in the studio and its twin, with progress in\n"
-    "                     JOBDIR/pictures.json\n"
+    "                     JOBDIR/pictures.json and a log of its own, JOBDIR/pictures-log.txt\n"
     "  --quiet            log to JOBDIR/log.txt only\n"
     "  --check JOB.json   check the document and its files (in JOBDIR), and print all faults and warnings as JSON;\n"
     "                     exit status 1 when there are faults\n"
@@ -373,7 +373,7 @@ int main(int argc, char **argv)
     worker_folder_sweep(&folder);
     tools =
         (struct stage_tools){.folder = &folder, .memory_limit_bytes = a.memory_mib << 20, .warn = {stage_warn, &tools}};
-    worker_folder_path(&folder, JOB_FILE_LOG, NULL, log_path);
+    worker_folder_path(&folder, a.pictures ? JOB_FILE_PICTURES_LOG : JOB_FILE_LOG, NULL, log_path);
     s = log_open(log_path, a.quiet ? NULL : stderr, LOG_LEVEL_INFO, &tools.log, &err);
     if (s == STATUS_OK)
         s = worker_status_start(&folder, tools.log, a.pictures ? JOB_FILE_PICTURES : JOB_FILE_STATUS, &tools.status,

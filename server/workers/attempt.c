@@ -23,9 +23,9 @@
 /* Removes the checkpoints that belong to the input before an edit, and keeps its result as a version. */
 static status clear_folder(struct job_service *v, struct job_row *row, struct error *err)
 {
-    static const char *const stale[] = {JOB_FILE_STATUS,  JOB_FILE_SERIES,    JOB_FILE_LOG,
-                                        JOB_FOLDER_WORK,  JOB_FOLDER_RESULTS, JOB_FILE_RUN,
-                                        JOB_FILE_BACKEND, JOB_FILE_PICTURES,  "console.txt"};
+    static const char *const stale[] = {JOB_FILE_STATUS,       JOB_FILE_SERIES, JOB_FILE_LOG,     JOB_FOLDER_WORK,
+                                        JOB_FOLDER_RESULTS,    JOB_FILE_RUN,    JOB_FILE_BACKEND, JOB_FILE_PICTURES,
+                                        JOB_FILE_PICTURES_LOG, "console.txt"};
     char path[PATH_BYTES];
     const char *job_id = row->id;
     status s = version_keep(v, row, err);

@@ -1,6 +1,7 @@
 """The stage after the result: a picture and the twin, while no job waits or runs, stopped and resumed, found after a crash."""
 import json
 import os
+import pathlib
 import time
 
 import pytest
@@ -44,6 +45,54 @@ def wait_file(daemon, job, path, timeout_s=240):
     while path not in files(daemon, job):
         assert time.monotonic() < end and pictures(daemon, job)["state"] in ("waiting", "running"), pictures(daemon, job)
         time.sleep(0.3)
+
+
+def makers(job):
+    """Processes that make the pictures of a job."""
+    found = []
+    for path in pathlib.Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            words = path.read_bytes().decode(errors="replace").split("\0")
+        except OSError:
+            continue
+        if "--pictures" in words and any(w.rstrip("/").endswith(job) for w in words):
+            found.append(int(path.parent.name))
+    return found
+
+
+def wait_ended(job, timeout_s):
+    """Waits until no process makes pictures of the job, and returns how long that took."""
+    begin = time.monotonic()
+    while makers(job):
+        assert time.monotonic() < begin + timeout_s, "the worker goes on"
+        time.sleep(0.02)
+    return time.monotonic() - begin
+
+
+def test_a_deleted_job_and_a_queued_one_end_the_worker(making):
+    """The worker ends soon, whichever of both comes; of a deleted job nothing remains; the log of the job stays as it was."""
+    daemon = making
+    job = start(daemon)
+    assert daemon.wait_state(job, "succeeded", "failed", timeout_s=120)["state"] == "succeeded"
+    log = daemon.get(f"/v1/jobs/{job}/log").text
+    wait_file(daemon, job, "pictures/hero.png")
+    assert makers(job) and daemon.get(f"/v1/jobs/{job}/log").text == log
+    other = start(daemon, pictures=[SMALL, {**SMALL, "light_phi_deg": 10}])
+    yielded_s = wait_ended(job, 20)
+    print(f"worker of pictures ended {yielded_s:.2f} s after a job was queued")
+    assert daemon.wait_state(other, "succeeded", "failed", timeout_s=120)["state"] == "succeeded"
+    wait(daemon, job, "running")
+    folder = os.path.join(daemon.data, "jobs", job)
+    assert os.path.exists(os.path.join(folder, "pictures-log.txt")) and makers(job)
+    assert daemon.delete(f"/v1/jobs/{job}").status_code == 204
+    ended_s = wait_ended(job, 20)
+    print(f"worker of pictures ended {ended_s:.2f} s after its job was deleted")
+    end = time.monotonic() + 20
+    while os.path.exists(folder) or os.path.exists(os.path.join(daemon.data, "pictures", job)):
+        assert time.monotonic() < end, os.listdir(daemon.data)
+        time.sleep(0.1)
+    assert daemon.get(f"/v1/jobs/{job}/pictures").status_code == 404
+    wait(daemon, other, "running", "succeeded")
 
 
 def test_stop_and_resume_and_a_crash(making):
