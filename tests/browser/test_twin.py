@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("selenium.webdriver", reason="python3-selenium is not installed")
 import synthetic_twin  # noqa: E402
-from browser_page import complaints, keep, sized, submit, wait_for  # noqa: E402
+from browser_page import click_on, complaints, keep, sized, submit, wait_for  # noqa: E402
 from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
@@ -145,6 +145,27 @@ def test_the_saved_file_shows_the_same_alone(opened, tmp_path):
     assert "shift and drag moves the lamp" in note and "differ from path tracing by" in note, "whoever gets the file has no other page"
     keep(opened, "twin-alone")
     assert complaints(opened) == []
+
+
+def test_two_twins_have_one_camera_and_one_lamp(stub, browser):
+    url, folder = stub
+    jobs = [submit(url, folder, f"twin {kind} {len(list(folder.iterdir()))}")[0] for kind in ("above", "fibers")]
+    browser.get(f"{url}/#compare/{jobs[0].id},{jobs[1].id}/twins")
+    wait_for(browser, "document.querySelectorAll('#compare-twins canvas').length === 2", 60)
+    wait_for(browser, "[...document.querySelectorAll('#compare-twins canvas')].every((c) => c.dataset.drawn === 'whole')")
+    first, second = browser.find_elements(By.CSS_SELECTOR, "#compare-twins canvas")
+    seen = "const t = arguments[0].twin; return [0, 1].map((i) => Array.from(t.pixels({ shape: 'flat', width: 90 }, 16, i)).join())"
+    before = browser.execute_script(seen, first)
+    assert before[0] == before[1], "the same tables under the same lamp"
+    ActionChains(browser).key_down(Keys.SHIFT).move_to_element(second).click_and_hold().move_by_offset(0, 60).release().key_up(Keys.SHIFT).perform()
+    after = browser.execute_script(seen, first)
+    assert after[0] == after[1] != before[0], "the lamp of both was moved"
+    names = browser.execute_script("return [...document.querySelectorAll('#compare-twins figcaption')].map((e) => e.textContent)")
+    assert [n[0] for n in names[:2]] == ["A", "B"]
+    keep(browser, "twins")
+    click_on(browser, ".tab-bar a[data-tab=settings]")
+    wait_for(browser, "!document.querySelector('#compare-twins')")
+    assert complaints(browser) == []
 
 
 def test_without_webgl_the_page_says_so(stub, browser):

@@ -3,6 +3,7 @@
 import { comparedPictures, pictureRows } from "./compare_pictures.js";
 import { comparePlots } from "./compare_plots.js";
 import { documentTable } from "./compare_documents.js";
+import { comparedTwins, withTwin } from "./compare_twins.js";
 import { errorTable, parameterTables, rowTable } from "./compare_tables.js";
 import { el, stateTag, timeLeft, verdictTag } from "../page_parts.js";
 import { configurations, parameterMeanings } from "../result_view.js";
@@ -11,7 +12,7 @@ import { TabBar } from "../tabs/tab_bar.js";
 
 export const MOST = 8, MOST_PLOTTED = 100; // jobs in tables, and in plots
 const AT_ONCE = 8; // requests
-const TABS = [{ name: "result", title: "Result" }, { name: "parameters", title: "Parameters" }, { name: "plots", title: "Plots" }, { name: "rows", title: "Rows" }, { name: "pictures", title: "Pictures" }, { name: "settings", title: "Settings" }];
+const TABS = [{ name: "result", title: "Result" }, { name: "parameters", title: "Parameters" }, { name: "plots", title: "Plots" }, { name: "rows", title: "Rows" }, { name: "pictures", title: "Pictures" }, { name: "twins", title: "Twins" }, { name: "settings", title: "Settings" }];
 const LIVE = new Set(["queued", "running", "paused"]);
 
 export const compareAddress = (ids) => `#compare/${ids.join(",")}`;
@@ -80,6 +81,7 @@ function contents(columns, others, reference, choice, meanings) {
     if (rows.length) made.set("rows", () => [card("compare-rows", "Errors by row", ...rowTable(ended, base, rows))]);
     if (rows.length) made.set("pictures", () => [card("compare-pictures", "The same photograph with each rendering", ...comparedPictures(ended, rows))]);
   }
+  if (withTwin(ended).length > 1) made.set("twins", () => [comparedTwins(withTwin(ended), base)]);
   if (columns.length > 1) made.set("settings", () => [card("compare-settings", "Settings that differ", ...documentTable(columns))]);
   return made;
 }
@@ -98,11 +100,13 @@ export function comparePage(page, text, tab) {
   document.title = "Comparison – Selvedge";
   page.append(head, bar.node, rest);
 
+  const leaveTab = () => { for (const node of rest.children) node.leave?.(); };
   const showTab = () => {
     const name = made.has(wanted) ? wanted : [...made.keys()][0] ?? "";
     bar.offer([...made.keys()], name);
     if (name === drawn) return;
     drawn = name;
+    leaveTab();
     rest.replaceChildren(...(made.get(name)?.() ?? []));
   };
   const show = () => {
@@ -122,5 +126,5 @@ export function comparePage(page, text, tab) {
     if (key !== shown) { shown = key; show(); }
     return columns.some((c) => LIVE.has(c.job.state)) ? 3 : 30;
   });
-  return { turn: (name) => { wanted = name; showTab(); }, leave: () => { gone = true; poller.stop(); } };
+  return { turn: (name) => { wanted = name; showTab(); }, leave: () => { gone = true; leaveTab(); poller.stop(); } };
 }

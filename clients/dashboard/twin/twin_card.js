@@ -5,10 +5,11 @@ import { getJson, raw } from "../server_link.js";
 import { twinPage } from "./twin_download.js";
 import { TwinPanel, twinNote } from "./twin_panel.js";
 
-const MOST_PHOTOGRAPHS = 12, AT_ONCE_BYTES = 8e6, WIDE = "(min-width: 900px)";
+const MOST_PHOTOGRAPHS = 12, AT_ONCE_BYTES = 8e6;
+export const WIDE = "(min-width: 900px)";
 
 // Rows with a photograph; theirs are the angles in the frame of the cloth, which the twin does not turn.
-function photographsOf(compared, cropMm, exposure) {
+export function photographsOf(compared, cropMm, exposure) {
   return compared.filter((c) => c.measuredPicture && !c.angles.all_rotations).slice(0, MOST_PHOTOGRAPHS).map((c) => {
     const turn = c.angles.cloth_rotation_deg ?? 0;
     return { name: c.name, address: c.measuredPicture, width: cropMm, exposure, theta: c.angles.camera_theta_deg, phi: c.angles.camera_phi_deg - turn,

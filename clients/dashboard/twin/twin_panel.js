@@ -20,11 +20,15 @@ const REACH = 40; // mm, of the point that the camera looks at
 
 const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
 
+// How far the tables of a twin can be trusted, in percent.
+export function twinError({ mean_rel_rms: rms, mean_rel_noise: noise }) {
+  return `${(100 * Math.sqrt(Math.max(rms ** 2 - noise ** 2, 0))).toFixed(1)} %`;
+}
+
 // Notes for the reader of the drawing: how it is moved, and how far it can be trusted.
-export function twinNote(works, { mean_rel_rms: rms, mean_rel_noise: noise }) {
-  const own = Math.sqrt(Math.max(rms ** 2 - noise ** 2, 0));
+export function twinNote(works, description, error = twinError(description)) {
   return !works ? "" : "Drag turns, shift and drag moves the lamp, the wheel zooms. " +
-    `Mean radiances of the flat cloth differ from path tracing by ${(100 * own).toFixed(1)} % up to 70° from its normal, and by more beyond. Shadows are those of the lamp only, and light between folds is left out.`;
+    `Mean radiances of the flat cloth differ from path tracing by ${error} up to 70° from its normal, and by more beyond. Shadows are those of the lamp only, and light between folds is left out.`;
 }
 
 export class TwinPanel {
@@ -65,8 +69,8 @@ export class TwinPanel {
     this.draw();
   }
 
-  // Of the first cloth, as TwinScene has them.
-  pixels(change, edge) { return this.#views[0].pixels({ ...this.#state, ...change }, edge); }
+  // Of a cloth, as TwinScene has them.
+  pixels(change, edge, cloth = 0) { return this.#views[cloth].pixels({ ...this.#state, ...change }, edge); }
 
   draw() { for (const view of this.#views) view.draw(); }
 
@@ -116,7 +120,7 @@ export class TwinPanel {
       const chosen = list.find((p) => p.name === select.value);
       this.#photo.hidden = !chosen;
       if (!chosen) return;
-      this.#photo.replaceChildren(node("img", { src: chosen.address, alt: chosen.name }), node("figcaption", {}, `photograph ${chosen.name}; left the twin with the same lamp and camera`));
+      this.#photo.replaceChildren(node("img", { src: chosen.address, alt: chosen.name }), node("figcaption", {}, `photograph ${chosen.name}; beside it the twin with the same lamp and camera`));
       const { theta, phi, lampTheta, lampPhi, width } = chosen;
       this.show({ shape: "flat", environment: "lamp only", lampPower: 1, center: [0, 0, 0], theta, phi, lampTheta, lampPhi, width, exposure: chosen.exposure });
     } }, node("option", { value: "" }, "none"), ...list.map((p) => node("option", { value: p.name }, p.name)));
