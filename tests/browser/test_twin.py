@@ -1,6 +1,7 @@
 """The twin under the mouse, from tables whose drawing is known in closed form: on the page of a job, in the file that is
 saved from there, and where the browser has no WebGL 2."""
 import base64
+import io
 
 import pytest
 
@@ -166,6 +167,35 @@ def test_two_twins_have_one_camera_and_one_lamp(stub, browser):
     click_on(browser, ".tab-bar a[data-tab=settings]")
     wait_for(browser, "!document.querySelector('#compare-twins')")
     assert complaints(browser) == []
+
+
+TURN = """const done = arguments[0], twin = document.querySelector("canvas.twin-view").twin;
+twin.show({ shape: "flat", environment: "studio", width: 60 });
+twin.turn(96, 12).then((blob) => {
+  const r = new FileReader();
+  r.onload = () => done(r.result.split(",")[1]);
+  r.readAsDataURL(blob);
+}).catch((e) => done(`!${e}`));"""
+
+
+def test_a_turn_is_saved_as_a_file_that_loops(opened):
+    image = pytest.importorskip("PIL.Image", reason="python3-pil is not installed")
+    press(opened, "twin-open")
+    wait_for(opened, "document.querySelector('canvas.twin-view')?.twin")
+    opened.set_script_timeout(120)
+    said = opened.execute_async_script(TURN)
+    assert said[0] != "!", said
+    made = image.open(io.BytesIO(base64.b64decode(said)))
+    assert (made.format, made.size, made.n_frames, made.info["loop"]) == ("WEBP", (96, 96), 12, 0)
+    frames, took = [], []
+    for i in range(12):
+        made.seek(i)
+        frames.append(made.convert("L").tobytes())
+        took.append(made.info["duration"])
+    assert took == [500] * 12
+    steps = [sum(abs(a - b) for a, b in zip(frames[i - 1], frames[i])) for i in range(12)]  # step 0: from the last to the first
+    assert min(steps) > 0 and steps[0] <= max(steps[1:]), "it goes on where it ends"
+    assert complaints(opened) == []
 
 
 def test_without_webgl_the_page_says_so(stub, browser):

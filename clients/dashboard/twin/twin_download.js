@@ -1,7 +1,7 @@
 // One HTML file that shows the twin without the service and without a network: the modules of this folder, the tables and
 // the pictures are inside.
 
-const MODULES = ["twin_program.js", "twin_near_shaders.js", "twin_shaders.js", "twin_shapes.js", "twin_lights.js", "twin_near.js", "twin_scene.js", "twin_view.js", "twin_panel.js"];
+const MODULES = ["twin_program.js", "twin_near_shaders.js", "twin_shaders.js", "twin_shapes.js", "twin_lights.js", "twin_near.js", "twin_scene.js", "twin_view.js", "twin_turntable.js", "twin_panel.js"];
 
 async function base64(blob) {
   const reader = new FileReader();

@@ -45,7 +45,8 @@ const fibonacci = (i, n) => {
 
 // The environment as parallel lights {from, share, color}: its radiance in 2,000 directions, gathered around MOST_LIGHTS of
 // them; each light stands in the middle of its light. share is radiance times solid angle over pi.
-export function lightsOf(name) {
+// turn: of all of it around the vertical, degrees.
+export function lightsOf(name, turn = 0) {
   const radiance = environment[name];
   if (!radiance) return [];
   const n = 2000, sums = Array.from({ length: MOST_LIGHTS }, () => ({ from: [0, 0, 0], color: [0, 0, 0], power: 0 }));
@@ -56,5 +57,9 @@ export function lightsOf(name) {
     for (let a = 0; a < 3; a++) { sums[best].from[a] += power * d[a]; sums[best].color[a] += rgb[a] * 4 / n; }
     sums[best].power += power;
   }
-  return sums.filter((s) => s.power > 0).map((s) => ({ from: s.from.map((x) => x / Math.hypot(...s.from)), share: 1, color: s.color }));
+  const cosine = Math.cos(turn * Math.PI / 180), sine = Math.sin(turn * Math.PI / 180);
+  return sums.filter((s) => s.power > 0).map(({ from, color }) => {
+    const [x, y, z] = from.map((a) => a / Math.hypot(...from));
+    return { from: [x * cosine - y * sine, x * sine + y * cosine, z], share: 1, color };
+  });
 }

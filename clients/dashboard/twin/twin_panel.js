@@ -2,6 +2,7 @@
 // the page that is downloaded has no other part of the dashboard.
 import { direction, environmentNames } from "./twin_lights.js";
 import { shapeNames } from "./twin_shapes.js";
+import { turntable } from "./twin_turntable.js";
 import { TwinView } from "./twin_view.js";
 
 const START = { shape: "drape", theta: 50, phi: 250, width: 42, center: [0, 0, 0], lampTheta: 50, lampPhi: 200, lampPower: 1, environment: "lamp only", exposure: 1 };
@@ -109,10 +110,33 @@ export class TwinPanel {
       this.#slider("lampTheta", "Lamp from the vertical", 0, 180), this.#slider("lampPhi", "Lamp around", -180, 360),
       this.#slider("lampPower", "Lamp strength", 0, 2), this.#slider("exposure", "Exposure", -4, 6),
       data.photographs.length ? this.#photographs(data.photographs) : null,
-      node("button", { type: "button", onclick: () => this.show({ ...START, exposure: data.exposure ?? 1 }) }, "Start view"));
+      node("button", { type: "button", onclick: () => this.show({ ...START, exposure: data.exposure ?? 1 }) }, "Start view"),
+      this.#turntable());
     this.show({});
     return made;
   }
+
+  // The button that saves the first cloth as it turns once.
+  #turntable() {
+    const words = "Save a turn as WebP", button = node("button", { type: "button", class: "twin-turn", onclick: async () => {
+      button.disabled = true;
+      try {
+        const file = await turntable(this.#views[0], this.#state, (share) => { button.textContent = `Turning: ${Math.round(100 * share)} %`; });
+        const link = node("a", { href: URL.createObjectURL(file), download: "turntable.webp" });
+        link.click();
+        setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+        button.textContent = words;
+      } catch (error) {
+        button.textContent = `No turn was saved: ${error.message}`;
+      }
+      button.disabled = false;
+      this.draw();
+    } }, words);
+    return button;
+  }
+
+  // The file of that button, smaller and with fewer frames.
+  turn(edge, frames) { return turntable(this.#views[0], this.#state, () => {}, edge, frames).finally(() => this.draw()); }
 
   // Choosing a photograph shows it, and the flat cloth with its lamp and camera.
   #photographs(list) {

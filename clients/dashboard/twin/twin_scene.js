@@ -29,6 +29,13 @@ function shrink(pixels, width, height) {
   return { pixels: out, width: w, height: h };
 }
 
+// The state in the frame of a cloth that has been turned: camera and lamp go the other way around.
+function turned(state) {
+  if (!state.turn) return state;
+  const [x, y, z] = state.center ?? [0, 0, 0], a = state.turn * Math.PI / 180, center = [x * Math.cos(a) - y * Math.sin(a), x * Math.sin(a) + y * Math.cos(a), z];
+  return { ...state, center, phi: state.phi + state.turn, lampPhi: state.lampPhi + state.turn };
+}
+
 // Lamp and surroundings as the parallel lights of close views, the strongest first.
 function nearLights(state, lights) {
   const list = lights.map((l) => ({ from: l.from, color: l.color.map((x) => x * l.share) }));
@@ -181,10 +188,10 @@ export class TwinScene {
 
   #draw() { this.#gl.drawElements(this.#gl.TRIANGLES, this.#shape.count, this.#gl.UNSIGNED_INT, 0); }
 
-  // state: {shape, theta, phi, width, center, lampTheta, lampPhi, lampPower, environment, exposure, fibers}; angles in degrees,
+  // state: {turn, shape, theta, phi, width, center, lampTheta, lampPhi, lampPower, environment, exposure, fibers}; turn: of the cloth, camera and light staying; angles in degrees,
   // lengths in millimetres; fibers false: by the tables alone. Draws into the canvas as large as it is.
-  draw(state) {
-    const gl = this.#gl, { setup } = this.#description, canvas = gl.canvas;
+  draw(asked) {
+    const state = turned(asked), gl = this.#gl, { setup } = this.#description, canvas = gl.canvas;
     this.#takeShape(state.shape);
     const lamp = cameraFrom({ theta: state.lampTheta, phi: state.lampPhi, distance: setup.lamp_distance_mm, width: 64, depth: 45 });
     gl.bindVertexArray(this.#shape.array);
@@ -196,7 +203,7 @@ export class TwinScene {
     this.#draw();
     const eye = cameraFrom({ theta: state.theta, phi: state.phi, width: state.width, center: state.center, aspect: canvas.width / canvas.height,
       distance: setup.far_field ? FAR_FIELD_MM : setup.camera_distance_mm });
-    const lights = lightsOf(state.environment), near = (state.fibers !== false && this.#near?.draw(eye, state, nearLights(state, lights))) || { weight: 0 };
+    const lights = lightsOf(state.environment, state.turn), near = (state.fibers !== false && this.#near?.draw(eye, state, nearLights(state, lights))) || { weight: 0 };
     gl.bindVertexArray(this.#shape.array);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, canvas.width, canvas.height);

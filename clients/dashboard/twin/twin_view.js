@@ -24,6 +24,13 @@ export class TwinView {
 
   pixels(state, edge) { return this.#scene.pixels(state, edge); }
 
+  // A drawing of edge x edge as a file; the canvas is drawn as before afterwards.
+  photograph(state, edge, type, quality) {
+    this.#canvas.width = this.#canvas.height = edge;
+    this.#scene.draw(state);
+    return new Promise((done) => { this.#canvas.toBlob(done, type, quality); });
+  }
+
   draw() {
     if (this.#waiting || !this.#scene) return;
     clearTimeout(this.#resting);
