@@ -177,7 +177,7 @@ $(BUILD)/obj/shared/%.c.o: %.c
 	@$(CC) $(CFLAGS_ALL) -fPIC $(shell pkg-config --cflags libpq 2>/dev/null | sed 's/-I/-isystem /g') -MMD -MP -c $< -o $@
 $(BUILD)/bin/selvedge: $(call objs,$(shell find clients/cli -name '*.c' ! -name print_commands_main.c 2>/dev/null)) $(L)base.a
 	@mkdir -p $(@D)
-	$(CC) $(LDFLAGS) -o $@ $^ -lcurl -ljansson -lsodium $(LINK_BASE)
+	$(CC) $(LDFLAGS) -o $@ $^ -lcurl -ljansson -lsodium -lwebpmux -lwebp -lpng $(LINK_BASE)
 
 # the commands of selvedge as JSON: of this the manual page and the completion of shells are made
 PRINT_COMMANDS := $(BUILD)/tools/print-commands

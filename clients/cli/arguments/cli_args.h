@@ -49,6 +49,7 @@ struct cli_args {
     const char *state, *verdict, *tag, *sample, *days;   /* of list */
     bool watch, json, follow, draft, align, once, yes;
     bool revoke, links; /* --revoke, --links: of share */
+    bool turntable;     /* --turntable: of render */
     bool trial;         /* --trial: of a scan */
     bool help;          /* --help was given: for one command if has_command is set */
     bool version;

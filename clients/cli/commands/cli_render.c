@@ -1,11 +1,15 @@
 /* selvedge render ID: a picture of a finished job's cloth on a surface, as a job of its own. */
 #include "clients/cli/commands/cli_derive.h"
+#include "clients/cli/text/turntable_file.h"
 
 #include <libgen.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+
+/* A turn: the number of pictures, and for how long each is shown. */
+enum { TURN_FRAMES = 24, TURN_FRAME_MS = 250 };
 
 /* *is: whether the text is "yes"; false when the option is left out. */
 static status read_yes(const char *option, const char *text, bool *is, struct error *err)
@@ -95,8 +99,13 @@ static status read_view(const struct cli_args *a, json_t *picture, const char **
 static status read_picture(const struct cli_args *a, json_t *picture, const char **mesh, struct error *err)
 {
     const char *view = a->on != NULL ? "on" : a->lamp != NULL ? "lamp" : a->camera != NULL ? "camera" : NULL;
-    const bool studio = a->picture.kind != NULL && strcmp(a->picture.kind, "measurement") != 0;
+    const bool studio = a->turntable || (a->picture.kind != NULL && strcmp(a->picture.kind, "measurement") != 0);
     *mesh = NULL;
+    if (a->turntable && a->picture.kind != NULL && strcmp(a->picture.kind, "measurement") == 0)
+        return error_set(err, STATUS_INVALID, "option '--turntable' is not for '--kind measurement'");
+    if (a->turntable && view != NULL)
+        return error_set(err, STATUS_INVALID, "option '--%s' is not for '--turntable', which has a view of its own",
+                         view);
     if (studio && view != NULL)
         return error_set(err, STATUS_INVALID, "option '--%s' is not for '--kind %s', which has a view of its own", view,
                          a->picture.kind);
@@ -106,6 +115,44 @@ static status read_picture(const struct cli_args *a, json_t *picture, const char
 #include "clients/cli/arguments/picture_options.def"
 #undef PICTURE_OPTION
     if (a->picture.reference && a->picture.method == NULL) json_object_set_new(picture, "method", json_string("fast"));
+    return s;
+}
+
+/* The pictures of a turn, from the one that the command line describes. */
+static void make_turn(json_t *picture, json_t *wanted)
+{
+    static const struct {
+        const char *key;
+        int value;
+    } standard[] = {{"px", 360}, {"samples", 6}, {"deep_light_paths", 1000000}};
+    json_t *list = json_array();
+    if (json_object_get(picture, "kind") == NULL) json_object_set_new(picture, "kind", json_string("drape"));
+    for (size_t k = 0; k < sizeof standard / sizeof *standard; k++)
+        if (json_object_get(picture, standard[k].key) == NULL)
+            json_object_set_new(picture, standard[k].key, json_integer(standard[k].value));
+    for (int i = 0; i < TURN_FRAMES; i++) {
+        json_t *frame = json_deep_copy(picture);
+        json_object_set_new(frame, "cloth_rotation_deg", json_real(360.0 * i / TURN_FRAMES));
+        json_array_append_new(list, frame);
+    }
+    json_object_set_new(wanted, "pictures", list);
+}
+
+/* Writes turntable.webp beside the downloaded pictures. */
+static status write_turn(struct cli *cli, const char *id, struct error *err)
+{
+    char folder[4096], frames[4120], path[4120];
+    size_t n_byte = 0;
+    if (cli->args->out_dir != NULL)
+        snprintf(folder, sizeof folder, "%s", cli->args->out_dir);
+    else
+        snprintf(folder, sizeof folder, "selvedge-%s", id);
+    snprintf(frames, sizeof frames, "%s/pictures", folder);
+    snprintf(path, sizeof path, "%s/turntable.webp", folder);
+    status s = turntable_file_write(frames, TURN_FRAMES, TURN_FRAME_MS, path, &n_byte, err);
+    if (s == STATUS_OK)
+        fprintf(cli->out, "turntable.webp: %d pictures of a turn in %g s, %zu bytes\n", TURN_FRAMES,
+                1e-3 * TURN_FRAMES * TURN_FRAME_MS, n_byte);
     return s;
 }
 
@@ -161,7 +208,9 @@ CLI_COMMAND(
         "A job of its own renders the job's fibers with the fitted parameters, fiber by fiber. The results go to the\n"
         "folder of --out (default: selvedge-ID): pictures/on-1.png, and on-1.exr with the radiance.\n"
         "--reference alone means --method fast. --kind drape, roll, fold, swatch, close_up, far or lit_through is a\n"
-        "picture for the eye in a studio; otherwise surface, lamp and camera are given.\n")
+        "picture for the eye in a studio; otherwise surface, lamp and camera are given. --turntable turns such a "
+        "cloth\n"
+        "once and joins its pictures to turntable.webp.\n")
 
 status cli_render(struct cli *cli, int *exit_code, struct error *err)
 {
@@ -176,10 +225,12 @@ status cli_render(struct cli *cli, int *exit_code, struct error *err)
         if (access(mesh, R_OK) != 0) s = error_set_errno(err, "cannot read the mesh '%s'", mesh);
         json_object_set_new(picture, "mesh_file", json_string(basename(copy)));
     }
+    if (cli->args->turntable) make_turn(picture, wanted);
     if (twin) json_object_set_new(wanted, "twin", json_pack("{s:b}", "make", 1));
     if (s == STATUS_OK) s = cli_derive(cli, cli->args->operand, wanted, mesh, made, exit_code, err);
     if (s == STATUS_OK && *exit_code == CLI_EXIT_OK) s = cli_results_to_out(cli, made, err);
-    if (s == STATUS_OK && *exit_code == CLI_EXIT_OK) s = describe(cli, made, err);
+    if (s == STATUS_OK && *exit_code == CLI_EXIT_OK)
+        s = cli->args->turntable ? write_turn(cli, made, err) : describe(cli, made, err);
     json_decref(picture);
     json_decref(wanted);
     return s;

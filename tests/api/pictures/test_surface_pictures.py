@@ -347,3 +347,20 @@ def test_what_pictures_without_photographs_need(real, change, field, word):
     doc = {"sample": "s", "fibers": {"file": "a.hair"}, "pictures": [{"on": "flat", **VIEW}], "fit": {"model": "two_lobe.v1"}, **change}
     doc = {k: v for k, v in doc.items() if v is not None}
     assert word in problem(real.post("/v1/jobs", json=doc), 422, "invalid", field)["detail"]
+
+
+def test_the_command_makes_a_turntable(real, tmp_path):
+    job, _ = run(real, {k: v for k, v in document().items() if k != "pictures"})
+    words = ["--turntable", "--kind", "swatch", "--px", 16, "--samples", 2, "--deep-light-paths", 2000, "--out", tmp_path / "out"]
+    refused = render(real, job, "--turntable", "--lamp", "45,0")
+    assert refused.returncode != 0 and "not for '--turntable'" in refused.stderr
+    shown = render(real, job, *words)
+    assert shown.returncode == 0, shown.stderr
+    assert "turntable.webp: 24 pictures of a turn in 6 s" in shown.stdout
+    data = (tmp_path / "out/turntable.webp").read_bytes()
+    assert data[:4] == b"RIFF" and data[8:16] == b"WEBPVP8X" and int.from_bytes(data[4:8], "little") == len(data) - 8
+    at = data.index(b"ANIM")
+    assert data[at + 12:at + 14] == b"\0\0", "it loops for ever"
+    image = pytest.importorskip("PIL.Image", reason="python3-pil is not installed")
+    made = image.open(tmp_path / "out/turntable.webp")
+    assert made.size == (16, 16) and made.n_frames > 12, "equal frames are joined"
