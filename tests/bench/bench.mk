@@ -159,7 +159,7 @@ docs-pictures: | deps-test ## make docs/images/{twill,derivatives,cloth-weaves,c
 docs-lobes:        ## draw NAME-lobes.svg in every folder of renderer/scattering/models anew, from what the models evaluate (seconds)
 	@$(MAKE) --no-print-directory $(BUILD)/tests/bench/models/draw_lobes >&2
 	@for rows in renderer/scattering/models/*/*.def; do \
-		$(BUILD)/tests/bench/models/draw_lobes $$(sed -nE 's/^(SURFACE|VOLUME)_MODEL\(\w+, "([^"]+)".*/\2/p' $$rows) > $${rows%.def}-lobes.svg || exit 1; done
+		$(BUILD)/tests/bench/models/draw_lobes $$(sed -nE 's/^(SURFACE|VOLUME)_MODEL\(\w+, "([^"]+)".*/\2/p' $$rows) > $${rows%_rows.def}-lobes.svg || exit 1; done
 
 docs-speckle: | deps-test ## make docs/images/speckle.png anew: silk without and with speckle (half a minute of a core)
 	@$(MAKE) --no-print-directory -j$$(nproc) $(BUILD)/tests/bench/pictures/speckle_pictures

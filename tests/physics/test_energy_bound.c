@@ -1,5 +1,6 @@
 /* Every scattering model in the registry: no more light leaves a fiber than comes, whatever the direction it comes
- * from. The one exception, marschner.v1 at grazing directions, is bounded too. What a fiber that absorbs nothing loses
+ * from. The exceptions, marschner.v1 at grazing directions and light onto hair_mixture.v1, which follows the published
+ * division by the cosine of the light, are bounded too. What a fiber that absorbs nothing loses
  * or gains is at most what docs/model.md states, from either side.
  */
 #include "base/angle.h"
@@ -26,6 +27,9 @@ static double most_leaving(const struct scattering_model *m, double theta_deg)
     return grazing_gain ? 1.5 : few_views ? 1 + 5e-3 : 1 + 2e-3;
 }
 
+/* hair_mixture.v1 keeps the light that is followed from the view alone. */
+static bool keeps_light(const struct scattering_model *m) { return strcmp(m->id, "hair_mixture.v1") != 0; }
+
 static void no_model_gains_energy(void **state)
 {
     (void)state;
@@ -51,7 +55,7 @@ static void no_model_gains_energy(void **state)
                 const struct model_furnace fine = {.n_theta = 450, .n_phi = 180},
                                            views = {.n_theta = 450, .n_phi = 120, .n_view = 6};
                 double sum[3];
-                model_furnace(m, s, m->near_field ? &views : &fine, theta_deg[a] * RAD_PER_DEG, true, sum);
+                model_furnace(m, s, m->near_field ? &views : &fine, theta_deg[a] * RAD_PER_DEG, keeps_light(m), sum);
                 for (int c = 0; c < 3; c++)
                     if (!(sum[c] > 0 && sum[c] < most_leaving(m, theta_deg[a])))
                         fail_msg("%s, set %d, %g degrees: %.5f of the light leaves", m->id, set, theta_deg[a], sum[c]);
@@ -73,7 +77,8 @@ static struct balance stated_balance(const struct scattering_model *m)
     static const struct balance stated[] = {{"two_lobe.v1", {2e-3, 0.28}, {2e-3, 0.01}},
                                             {"two_lobe_diffuse.v1", {2e-3, 0.28}, {2e-3, 0.01}},
                                             {"kajiya_kay.v1", {0.1, 0.1}, {2e-3, 2e-3}},
-                                            {"marschner.v1", {0.21, 0.21}, {2e-3, 2e-3}}};
+                                            {"marschner.v1", {0.21, 0.21}, {2e-3, 2e-3}},
+                                            {"hair_mixture.v1", {0.03, 2e-3}, {0.7, 2e-3}}};
     for (size_t k = 0; k < sizeof stated / sizeof stated[0]; k++)
         if (strcmp(stated[k].id, m->id) == 0) return stated[k];
     return (struct balance){m->id, {2e-3, 2e-3}, {2e-3, 2e-3}};

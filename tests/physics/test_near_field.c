@@ -86,8 +86,8 @@ static double published_along(double theta_i, double theta_o, double v)
     return sum * exp(a - sin(theta_i) * sin(theta_o) / v - 1 / v) / (v * -expm1(-2 / v));
 }
 
-/* S over cos th_i as published, at th_d = th_o. */
-static double published(const double *param, double sigma, double theta_o, double h, double phi)
+/* S cos th_i as published. */
+static double published_at(const double *param, double sigma, double theta_i, double theta_o, double h, double phi)
 {
     double bm = param[4], bn = param[5], root = 0.726 * bm + 0.812 * bm * bm + 3.7 * pow(bm, 20), share[4], sum = 0;
     double s = 0.626657069 * (0.265 * bn + 1.194 * bn * bn + 5.372 * pow(bn, 22)), eta = param[3];
@@ -97,9 +97,14 @@ static double published(const double *param, double sigma, double theta_o, doubl
     for (int p = 0; p < 4; p++) {
         double x = remainder(phi - (2 * p * asin(h / index) - 2 * asin(h) + p * M_PI), 2 * M_PI), e = exp(-fabs(x) / s);
         double d = e / (s * (1 + e) * (1 + e)) / (logistic_cdf(M_PI, s) - logistic_cdf(-M_PI, s));
-        sum += published_along(-theta_o, theta_o, v[p]) * share[p] * (p < 3 ? d : 0.5 / M_PI);
+        sum += published_along(theta_i, theta_o, v[p]) * share[p] * (p < 3 ? d : 0.5 / M_PI);
     }
     return sum;
+}
+
+static double published(const double *param, double sigma, double theta_o, double h, double phi)
+{
+    return published_at(param, sigma, -theta_o, theta_o, h, phi);
 }
 
 /* On the cone th_i = -th_o the difference angle is th_o, and a(th) the same at every azimuth and offset: the model is
@@ -142,6 +147,32 @@ static void published_model(void **unused)
     }
     m->release(a);
     by_color->release(b);
+}
+
+/* hair_mixture.v1 is the mixture of two of the published model, at any two angles and with its division by cos th_i. */
+static void mixture_of_the_published_model(void **unused)
+{
+    (void)unused;
+    const struct scattering_model *m = scattering_find("hair_mixture.v1");
+    const double param[13] = {0.9, 0.5, 0.1, 1.55, 0.2, 0.3, 0.05, 0.3, 0.7, 2.6, 0.8, 0.9, 0.35};
+    struct scattering_state *s = prepare(m, param);
+    for (int j = 0; j < 200; j++) {
+        const double angles[2] = {-1.4 + 0.0139 * j, 1.3 - 0.67 * (j % 5)}, h = -0.97 + 0.033 * (j % 60),
+                     phi = 0.1 + 0.41 * j;
+        double got[3] = {0};
+        near_at(m, s, angles, phi, asin(h), got);
+        for (int c = 0; c < 3; c++) {
+            double want = 0;
+            for (int k = 0; k < 2; k++)
+                want += (k == 0 ? 0.65 : 0.35) *
+                        published_at(param + 6 * k, -0.5 * log(param[6 * k + c]), angles[0], angles[1], h, phi);
+            /* 1e-4: the model's Bessel function and angles are of single precision */
+            if (!(fabs(got[c] * cos(angles[0]) - want) < 1e-4 * want + 1e-12))
+                fail_msg("angles %g and %g, h %g, azimuth %g: %g instead of %g", angles[0], angles[1], h, phi,
+                         got[c] * cos(angles[0]), want);
+        }
+    }
+    m->release(s);
 }
 
 /* ---- energy ---- */
@@ -273,8 +304,11 @@ static void single_fibers_look_the_same(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mean_is_the_far_field),       cmocka_unit_test(published_model),
-        cmocka_unit_test(energy_from_both_sides),      cmocka_unit_test(energy_of_one_view),
+        cmocka_unit_test(mean_is_the_far_field),
+        cmocka_unit_test(published_model),
+        cmocka_unit_test(mixture_of_the_published_model),
+        cmocka_unit_test(energy_from_both_sides),
+        cmocka_unit_test(energy_of_one_view),
         cmocka_unit_test(single_fibers_look_the_same),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -213,4 +213,4 @@ static status write_blender(struct export_scene *e, json_t **materials, struct e
 
 EXPORT(blender, "A script that builds the scene in Blender, with hair curves and Blender's hair material.")
 
-const struct export_format export_blender = {write_blender};
+const struct export_format export_blender = {.has_hair = true, .write = write_blender};

@@ -195,4 +195,4 @@ static status write_mitsuba(struct export_scene *e, json_t **materials, struct e
 
 EXPORT(mitsuba, "A scene for Mitsuba 3: fibers, lamp, camera, and hair lobes near to the fitted scattering.")
 
-const struct export_format export_mitsuba = {write_mitsuba};
+const struct export_format export_mitsuba = {.has_hair = true, .write = write_mitsuba};

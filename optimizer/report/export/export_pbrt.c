@@ -156,4 +156,4 @@ static status write_pbrt(struct export_scene *e, json_t **materials, struct erro
 
 EXPORT(pbrt, "The scene for pbrt-v4, with one file for each row.")
 
-const struct export_format export_pbrt = {write_pbrt};
+const struct export_format export_pbrt = {.has_hair = true, .write = write_pbrt};

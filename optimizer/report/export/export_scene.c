@@ -238,11 +238,9 @@ static json_t *lobes_json(const struct hair_lobes *l, double share)
 static json_t *hair_json(const struct hair_fit *h)
 {
     const struct hair_blend *b = &h->blend;
-    return json_pack("{s:[o, o], s:o, s:o, s:o, s:o, s:o}", "hair", lobes_json(&b->lobes[0], 1.0 - b->second_share),
-                     lobes_json(&b->lobes[1], b->second_share), "rel_rms", json_number(h->rel_rms), "fitted_albedo",
-                     json_number_list(h->albedo, 3, 1.0), "albedo", json_number_list(h->blend_albedo, 3, 1.0),
-                     "fitted_turned_back", json_number_list(h->turned, 3, 1.0), "turned_back",
-                     json_number_list(h->blend_turned, 3, 1.0));
+    return json_pack("{s:[o, o], s:o, s:o}", "hair", lobes_json(&b->lobes[0], 1.0 - b->second_share),
+                     lobes_json(&b->lobes[1], b->second_share), "fitted_albedo", json_number_list(h->albedo, 3, 1.0),
+                     "fitted_turned_back", json_number_list(h->turned, 3, 1.0));
 }
 
 json_t *export_hair_json(const struct export_scene *e)

@@ -14,16 +14,27 @@
 
 enum { EXPORT_MAX_REPEAT = 200 }; /* of the tile, along one axis */
 
+/* How far the cloth with the hair mixtures is from the fitted cloth: root mean squares of differences of radiance over
+ * the mean of the fitted cloth's channels, or over 0.02 where that is darker (optimizer/fit/objective/objective.h). */
+struct hair_error {
+    bool stated;    /* false: there is no error (hair_on_cloth.h) */
+    double rel_rms; /* over lamps and cameras of the hemisphere that were not fitted */
+    double row_rel_rms, row_rel_rms_se;
+    double *row_rel_error; /* of each row of the job; owned */
+};
+
 struct export_scene {
     struct report *report;
     const struct pipeline_model *model;
     struct hair_fit hair[SCATTERING_MAX_SET];
+    struct hair_error hair_error;
     double z_low_m, z_high_m;
     const char *folder; /* of the format that is being written, under results/ */
     const struct progress *progress;
 };
 
 struct export_format {
+    bool has_hair; /* hair materials are written (hair_on_cloth.h) */
     /* *json: an array with one object for each group of fibers, a new reference. */
     status (*write)(struct export_scene *e, json_t **materials, struct error *err);
     /* Paths of a photograph that take as long, after a fit of n_fit_path; NULL: it renders nothing. */
@@ -88,7 +99,7 @@ status export_rows_write(const struct export_scene *e, struct error *err);
 
 /* Adds the name of the group to the entry of its material in result.json. */
 json_t *export_material_json(const struct export_scene *e, size_t group, json_t *material);
-/* Parameters of the hair materials and the error of the conversion, of all groups. */
+/* Parameters of the hair materials of all groups. */
 json_t *export_hair_json(const struct export_scene *e);
 
 #endif

@@ -282,4 +282,4 @@ static status write_usd(struct export_scene *e, json_t **materials, struct error
 
 EXPORT(usd, "The scene as Universal Scene Description: curves, with a preview surface that makes the cloth as bright.")
 
-const struct export_format export_usd = {write_usd};
+const struct export_format export_usd = {.has_hair = true, .write = write_usd};

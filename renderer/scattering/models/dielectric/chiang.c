@@ -1,9 +1,8 @@
 /* chiang.v1 and chiang_albedo.v1: the near-field model of Chiang et al. 2016, "A Practical and Controllable Hair and
  * Fur Model for Production Path Tracing", with R, TT, TRT and the residual lobe of all longer paths.
  *
- * The longitudinal roughness b = beta_M gives the variance v = (0.726 b + 0.812 b^2 + 3.7 b^20)^2 of R; TT has v / 4,
- * TRT and all longer paths 4 v. The azimuthal roughness b = beta_N gives the scale of the logistic lobe, sqrt(pi / 8)
- * (0.265 b + 1.194 b^2 + 5.372 b^22).
+ * The longitudinal roughness beta_M gives the width of R (chiang_width.h); TT has half of it, TRT and all longer paths
+ * twice. The azimuthal roughness beta_N gives the scale of the logistic lobe.
  *
  * chiang.v1 takes the absorption as C_T, the share of the light that one diameter lets through: C_T = exp(-2 sigma),
  * sigma an absorption per radius. chiang_albedo.v1 takes the color of a mass of such fibers, from which their section
@@ -12,16 +11,10 @@
  * Differs from the publication: the factor 1 / cos th_i is replaced by the scale a(th_i) a(th_o), attenuation and
  * azimuth are taken at the difference angle (near_field.h), and the surface has no tilted scales.
  */
+#include "renderer/scattering/models/dielectric/chiang_width.h"
 #include "renderer/scattering/models/dielectric/near_field.h"
 
 #include <stdlib.h>
-
-/* a b + c b^2 + d b^n and its derivative. */
-static double roughness(double b, const double factor[3], double n, double *d)
-{
-    *d = factor[0] + 2 * factor[1] * b + n * factor[2] * pow(b, n - 1);
-    return factor[0] * b + factor[1] * b * b + factor[2] * pow(b, n);
-}
 
 /* g and its derivative. */
 static double albedo_polynomial(double b, double *d)
@@ -39,17 +32,16 @@ static double albedo_polynomial(double b, double *d)
 /* Sets everything but C_T and its derivatives. */
 static struct scattering_state *start(const double *param, double *beta_rad, struct error *err)
 {
-    static const double along[3] = {0.726, 0.812, 3.7}, around[3] = {0.265, 1.194, 5.372};
     struct scattering_state *s = calloc(1, sizeof *s);
     if (s == NULL) {
         error_set(err, STATUS_NO_MEMORY, "cannot prepare scattering model: out of memory");
         return NULL;
     }
-    *beta_rad = roughness(param[NEAR_P_ALONG], along, 20, &s->d_beta);
-    double d_width, width = sqrt(M_PI / 8) * roughness(param[NEAR_P_AROUND], around, 22, &d_width);
+    *beta_rad = chiang_width_along_rad(param[NEAR_P_ALONG], &s->d_beta);
+    double d_width, width = chiang_width_around_rad(param[NEAR_P_AROUND], &d_width);
     for (int p = 0; p < DIELECTRIC_N_LOBE; p++) {
         near_azimuth_init(&s->azimuth[p], NEAR_LOGISTIC, width);
-        s->d_width[p] = sqrt(M_PI / 8) * d_width;
+        s->d_width[p] = d_width;
     }
     s->eta = param[NEAR_P_ETA];
     return s;

@@ -163,15 +163,16 @@ static double truncation(const double ln_s[3], double h, double slope)
 
 /* Step of a difference over the room that a parameter has. The tables of elliptical models are sums over rays, some
  * of which begin to be reflected totally within a larger step; in those of elliptical_oriented.v1 fewer rays share an
- * azimuth. Azimuths of fur_near.v1 follow the index of refraction,
- * and its narrowest lobes are of a degree. Tables of microfacet_ellipse.v1 are linear between nodes of a grid of its
- * parameters, and a larger step reaches beyond the next nodes. Tilts of up to ten degrees move lobes of one degree. */
+ * azimuth. Azimuths of fur_near.v1 and hair_mixture.v1 follow the index of refraction, and their narrowest lobes are of
+ * a degree. Tables of microfacet_ellipse.v1 are linear between nodes of a grid of its parameters, and a larger step
+ * reaches beyond the next nodes. Tilts of up to ten degrees move lobes of one degree. */
 static double difference_step(const struct scattering_model *m, const struct param_info *info)
 {
     if (strcmp(m->id, "elliptical.v1") == 0 && info->kind == PARAM_SHAPE) return 3e-4;
     if (strcmp(m->id, "elliptical_oriented.v1") == 0 && info->kind == PARAM_SHAPE) return 1e-4;
     if (strcmp(info->symbol, "alpha") == 0) return 2e-3;
-    bool small = strcmp(m->id, "fur_near.v1") == 0 || strcmp(m->id, "microfacet_ellipse.v1") == 0;
+    bool small = strcmp(m->id, "fur_near.v1") == 0 || strcmp(m->id, "microfacet_ellipse.v1") == 0 ||
+                 strcmp(m->id, "hair_mixture.v1") == 0;
     return small && info->kind == PARAM_SHAPE ? 1e-3 : 5e-3;
 }
 

@@ -1,0 +1,282 @@
+#include "optimizer/report/export/hair_on_cloth.h"
+
+#include "optimizer/fit/descent/fit_run.h"
+#include "optimizer/fit/descent/trace_estimator.h"
+#include "optimizer/job/document/job_cloth.h"
+#include "optimizer/report/result/result_json.h"
+#include "optimizer/stages/validation/pipeline_discrepancy.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Parameters of one material of hair_mixture.v1, and of the whole mixture (dielectric_rows.def). */
+enum { P_INDEX = 3, P_ALONG, P_AROUND, N_OF_MATERIAL, P_SHARE = HAIR_FIT_N_BLEND * N_OF_MATERIAL, N_OF_MIXTURE };
+enum { N_FITTED = 64, N_BETWEEN = 24, N_DIRECTION = N_FITTED + N_BETWEEN, N_REPLICA = 2, LEAST_PATHS = 512 };
+static const char model_id[] = "hair_mixture.v1";
+/* Beyond this angle lamps of a job are rare, and the published division by a cosine makes hair bright. */
+static const double most_theta_rad = 75.0 * M_PI / 180.0;
+/* Paths of the fit: as many as the job's own, between these. Each of the directions of the fitted cloth, and each
+ * judgement, takes a share of them. */
+static const double least_budget = 1e6, most_budget = 4e6, traced_share = 0.35, judged_share = 0.25;
+/* How many times as long as a path of a photograph a path with this model takes: on a twill. */
+static const double path_of_mixture = 1.6;
+
+struct on_cloth {
+    struct export_scene *e;
+    struct appearance mixture;
+    struct model_sets sets;
+    struct configuration configuration[N_DIRECTION];
+    struct observation_set fitted, between, rows; /* with the radiances of the fitted cloth as measured ones */
+    double budget;
+    double param[FIT_MAX_PARAM];
+    struct fit_result result;
+    double rel_rms, start_rel_rms;
+};
+
+static double budget_of(double n_fit_path)
+{
+    return n_fit_path > 0.0 ? fmin(fmax(n_fit_path, least_budget), most_budget) : most_budget;
+}
+
+double hair_on_cloth_paths(double n_fit_path)
+{
+    return path_of_mixture * (1.0 + traced_share + 3.0 * judged_share) * budget_of(n_fit_path);
+}
+
+/* A sequence of low discrepancy over the directions of lamp and camera (additive recurrence by the generalised golden
+ * ratio of four dimensions): all solid angles up to most_theta_rad count alike, and the last ones lie between the
+ * first. */
+static void make_directions(const double tile_m[2], struct configuration c[N_DIRECTION])
+{
+    const double ratio = 1.1673039782614187, most = sin(most_theta_rad);
+    for (int i = 0; i < N_DIRECTION; i++) {
+        double u[4];
+        for (int k = 0; k < 4; k++) u[k] = fmod(0.5 + (i + 1) / pow(ratio, k + 1), 1.0);
+        c[i] = (struct configuration){.light = LIGHT_DIRECTIONAL,
+                                      .light_theta_rad = asin(sqrt(u[0]) * most),
+                                      .light_phi_rad = 2.0 * M_PI * u[1],
+                                      .camera = CAMERA_FAR_FIELD,
+                                      .camera_theta_rad = asin(sqrt(u[2]) * most),
+                                      .camera_phi_rad = 2.0 * M_PI * u[3],
+                                      .light_distance_m = 1.0,
+                                      .lamp_side_m = 0.1,
+                                      .camera_distance_m = 1.0,
+                                      .crop_m = tile_m[0],
+                                      .crop_aspect = tile_m[0] / tile_m[1]};
+    }
+}
+
+static struct estimate_request request_of(const struct on_cloth *f, const struct configuration *c, size_t n)
+{
+    return (struct estimate_request){
+        .configuration = c, .n_configuration = n, .seed = f->e->report->in.job->seed ^ 0x68616972u};
+}
+
+/* The cloth as it was fitted, with its smooth factor. */
+static struct radiance_input fitted_cloth(const struct on_cloth *f)
+{
+    const struct pipeline_model *m = f->e->model;
+    return (struct radiance_input){.scene = made_cloth_scene(f->e->report->in.made, m->setup),
+                                   .model = &m->setup->appearance,
+                                   .param = m->fit->result.param,
+                                   .n_set = m->setup->sets.n_set,
+                                   .discrepancy = pipeline_discrepancy(m->validation)};
+}
+
+static struct radiance_input cloth_of_mixtures(const struct on_cloth *f)
+{
+    return (struct radiance_input){.scene = {.fibers = f->e->report->in.made->scene},
+                                   .model = &f->mixture,
+                                   .param = f->param,
+                                   .n_set = f->sets.n_set};
+}
+
+/* Estimates with as many paths for each configuration, during a part of the progress of e. */
+static status trace(struct on_cloth *f, const struct estimate_request *request, double n_path_of_all,
+                    const double part[2], struct estimate *out, struct error *err)
+{
+    struct estimate_request q = *request;
+    struct progress_part p;
+    const struct progress progress = progress_begin_part(&p, f->e->progress, part[0], part[1] - part[0]);
+    size_t *n_path = malloc(q.n_configuration * sizeof *n_path);
+    if (n_path == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit hair on the cloth: out of memory");
+    for (size_t i = 0; i < q.n_configuration; i++)
+        n_path[i] = (size_t)fmax(n_path_of_all / (double)q.n_configuration, LEAST_PATHS);
+    q.n_path = n_path;
+    status s = estimate_run(&q, f->e->report->in.job->tools->pool, &progress, out, err);
+    free(n_path);
+    return s;
+}
+
+static status trace_fitted_cloth(struct on_cloth *f, const double part[2], struct error *err)
+{
+    struct estimate_request q = request_of(f, f->configuration, N_DIRECTION);
+    struct estimate *twin = calloc(N_DIRECTION, sizeof *twin);
+    if (twin == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit hair on the cloth: out of memory");
+    q.input = fitted_cloth(f);
+    q.replica = REPLICA_CERTIFICATE;
+    status s = trace(f, &q, traced_share * f->budget, part, twin, err);
+    for (int i = 0; i < N_DIRECTION && s == STATUS_OK; i++) {
+        struct observation o = {.set = JOB_SET_FIT, .configuration = f->configuration[i], .weight = 1.0};
+        for (int c = 0; c < 3; c++) {
+            o.mean_rgb[c] = twin[i].mean[c];
+            o.se_rgb[c] = sqrt(twin[i].var[c]);
+        }
+        s = observation_set_append(i < N_FITTED ? &f->fitted : &f->between, &o, err);
+    }
+    free(twin);
+    return s;
+}
+
+/* The rows of the job as it renders them. */
+static status take_rows(struct on_cloth *f, struct error *err)
+{
+    const struct observation_set *rows = &f->e->report->in.job->rows->observation;
+    status s = STATUS_OK;
+    for (size_t i = 0; i < rows->n && s == STATUS_OK; i++) {
+        struct observation o = {.set = JOB_SET_FIT, .configuration = rows->item[i].configuration, .weight = 1.0};
+        result_rendered_mean(f->e->model, i, o.mean_rgb, o.se_rgb);
+        s = observation_set_append(&f->rows, &o, err);
+    }
+    return s;
+}
+
+/* ---- parameters ---- */
+
+static void param_of(const struct hair_blend *b, const struct param_info *info, double *param)
+{
+    for (size_t k = 0; k < HAIR_FIT_N_BLEND; k++) {
+        const struct hair_lobes *l = &b->lobes[k];
+        double *own = param + N_OF_MATERIAL * k;
+        for (size_t c = 0; c < 3; c++) own[c] = exp(-2.0 * l->absorption[c]);
+        own[P_INDEX] = l->index;
+        own[P_ALONG] = l->longitudinal_roughness;
+        own[P_AROUND] = l->azimuthal_roughness;
+    }
+    param[P_SHARE] = b->second_share;
+    for (size_t p = 0; p < N_OF_MIXTURE; p++) { /* the fit moves none that stands at a bound */
+        const double inside = 1e-3 * (info[p].upper - info[p].lower);
+        param[p] = fmin(fmax(param[p], info[p].lower + inside), info[p].upper - inside);
+    }
+}
+
+static struct hair_blend blend_of(const double *param)
+{
+    struct hair_blend b = {.second_share = param[P_SHARE]};
+    for (size_t k = 0; k < HAIR_FIT_N_BLEND; k++) {
+        const double *own = param + N_OF_MATERIAL * k;
+        b.lobes[k] = (struct hair_lobes){own[P_ALONG], own[P_AROUND], own[P_INDEX], {0}};
+        for (size_t c = 0; c < 3; c++) b.lobes[k].absorption[c] = -0.5 * log(own[c]);
+    }
+    return b;
+}
+
+/* ---- fit and judgement ---- */
+
+/* The error of the cloth of mixtures over a set, and of each of its rows where row_error is not NULL. */
+static status judge(struct on_cloth *f, const struct observation_set *o, uint32_t iteration, const double part[2],
+                    struct objective_value *value, double *row_error, struct error *err)
+{
+    struct configuration *c = trace_configurations(o);
+    struct estimate *a = calloc(N_REPLICA * o->n, sizeof *a);
+    status s =
+        c != NULL && a != NULL ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot judge an export: out of memory");
+    for (uint32_t r = 0; r < N_REPLICA && s == STATUS_OK; r++) {
+        const double middle = 0.5 * (part[0] + part[1]),
+                     half[2] = {r == 0 ? part[0] : middle, r == 0 ? middle : part[1]};
+        struct estimate_request q = request_of(f, c, o->n);
+        q.input = cloth_of_mixtures(f);
+        q.iteration = iteration;
+        q.replica = REPLICA_FINAL_A + r;
+        s = trace(f, &q, judged_share * f->budget / N_REPLICA, half, a + r * o->n, err);
+    }
+    if (s == STATUS_OK) objective_evaluate(o, a, a + o->n, value);
+    for (size_t i = 0; i < o->n && row_error != NULL && s == STATUS_OK; i++) {
+        double se;
+        row_error[i] = objective_row_error(&o->item[i], &a[i], &a[o->n + i], &se);
+    }
+    free(c);
+    free(a);
+    return s;
+}
+
+static status fit(struct on_cloth *f, const double part[2], struct error *err)
+{
+    struct progress_part p;
+    const struct progress progress = progress_begin_part(&p, f->e->progress, part[0], part[1] - part[0]);
+    struct trace_estimator live = {request_of(f, f->configuration, N_FITTED), f->e->report->in.job->tools->pool};
+    live.request.input = cloth_of_mixtures(f);
+    const struct estimator estimator = trace_estimator(&live);
+    struct fit_parameter parameter[FIT_MAX_PARAM];
+    for (size_t i = 0; i < f->sets.info.n_param; i++)
+        parameter[i] =
+            (struct fit_parameter){f->sets.info.param[i].lower, f->sets.info.param[i].upper, f->param[i], false};
+    const struct fit_problem problem = {.n_param = f->sets.info.n_param,
+                                        .info = f->sets.info.param,
+                                        .parameter = parameter,
+                                        .observation = &f->fitted,
+                                        .estimator = &estimator,
+                                        .path_budget = (uint64_t)f->budget,
+                                        .progress = &progress};
+    status s = fit_run(descent_find("gauss_newton.v1"), &problem, NULL, &f->result, err);
+    if (s == STATUS_OK) memcpy(f->param, f->result.param, sizeof f->param);
+    return s;
+}
+
+/* Keeps the mixtures of single fibers where the fit found no nearer ones, judged between the fitted directions. */
+static status fit_and_choose(struct on_cloth *f, double from, double to, struct error *err)
+{
+    const double step = (to - from) / 10.0,
+                 at[6] = {from, from + 2 * step, from + 3 * step, from + 8 * step, from + 9 * step, to};
+    struct objective_value before = {0}, after = {0}, rows = {0};
+    double start[FIT_MAX_PARAM];
+    memcpy(start, f->param, sizeof start);
+    status s = trace_fitted_cloth(f, &at[0], err);
+    if (s == STATUS_OK) s = judge(f, &f->between, 0, &at[1], &before, NULL, err);
+    if (s == STATUS_OK) s = fit(f, &at[2], err);
+    if (s == STATUS_OK) s = judge(f, &f->between, 1, &at[3], &after, NULL, err);
+    if (s != STATUS_OK) return s;
+    log_info(f->e->report->in.job->tools->log,
+             "exports: the cloth with hair mixtures differs by %.1f %% (mixtures nearest to single fibers: %.1f %%)",
+             1e2 * after.rel_rms, 1e2 * before.rel_rms);
+    if (before.rel_square < after.rel_square) memcpy(f->param, start, sizeof start);
+    s = judge(f, &f->rows, 2, &at[4], &rows, f->e->hair_error.row_rel_error, err);
+    f->e->hair_error.rel_rms = fmin(before.rel_rms, after.rel_rms);
+    f->e->hair_error.row_rel_rms = rows.rel_rms;
+    f->e->hair_error.row_rel_rms_se = rows.rel_rms_se;
+    f->e->hair_error.stated = s == STATUS_OK;
+    return s;
+}
+
+status hair_on_cloth_run(struct export_scene *e, double from, double to, struct error *err)
+{
+    const size_t n_set = e->model->setup->sets.n_set;
+    if (n_set * N_OF_MIXTURE > MODEL_MAX_FLAT) return STATUS_OK;
+    struct on_cloth *f = calloc(1, sizeof *f);
+    e->hair_error.row_rel_error = calloc(e->report->in.job->rows->observation.n, sizeof(double));
+    if (f == NULL || e->hair_error.row_rel_error == NULL) {
+        free(f);
+        return error_set(err, STATUS_NO_MEMORY, "cannot fit hair on the cloth: out of memory");
+    }
+    f->e = e;
+    f->budget = budget_of((double)e->model->fit->result.n_path);
+    observation_set_init(&f->fitted);
+    observation_set_init(&f->between);
+    observation_set_init(&f->rows);
+    make_directions(e->report->in.made->fiber.tile_size_m, f->configuration);
+    status s =
+        appearance_find(model_id, &f->mixture)
+            ? model_sets_init(&f->sets, model_catalogue_find(model_id), e->report->in.job->cloth->group, n_set, err)
+            : error_set(err, STATUS_INTERNAL, "there is no model %s", model_id);
+    for (size_t g = 0; g < n_set && s == STATUS_OK; g++)
+        param_of(&e->hair[g].blend, f->mixture.param, f->param + g * N_OF_MIXTURE);
+    if (s == STATUS_OK) s = take_rows(f, err);
+    if (s == STATUS_OK) s = fit_and_choose(f, from, to, err);
+    for (size_t g = 0; g < n_set && s == STATUS_OK; g++) e->hair[g].blend = blend_of(f->param + g * N_OF_MIXTURE);
+    observation_set_release(&f->fitted);
+    observation_set_release(&f->between);
+    observation_set_release(&f->rows);
+    free(f);
+    return s;
+}
