@@ -77,8 +77,8 @@ status trace_repair(struct trace_job *job, struct polyline_set *in, bool grow, d
 /* Joins the ends of lines that were fitted and cut, where the scan shows one fiber (join_evidence.h); before that, lets
  * them grow. Adds to the counts of the report. */
 status trace_join(struct trace_job *job, struct polyline_set *lines, bool grow, struct error *err);
-/* Moves lines that are still in pieces towards their axes, and finds their radii, by n_fit fits. */
-status trace_center(struct trace_job *job, struct polyline_set *lines, int n_fit, struct error *err);
+/* Moves lines that are still in pieces towards their axes, and finds their radii, by n_round rounds of fitting. */
+status trace_center(struct trace_job *job, struct polyline_set *lines, int n_round, struct error *err);
 /* Adds lines to fibers that have none, in the scan without `lines` (trace_leftover.c), where radii differ. The report
  * has their spread. */
 status trace_leftover(struct trace_job *job, struct polyline_set *lines, struct error *err);

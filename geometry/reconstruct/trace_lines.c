@@ -15,11 +15,12 @@
 
 enum {
     N_REPAIR = 2,      /* rounds of growing, joining and cutting */
+    N_CENTER = 2,      /* rounds of fitting pieces of lines to the scan */
     N_FIT = 4,         /* rounds of fitting whole lines, and of all fits of flat fibers */
     N_LAST_FIT = 2,    /* rounds of the last fit, whose lines have been fitted before */
     N_SETTLE = 3,      /* most rounds of fitting, cutting and joining before the last fit beyond the first one */
     N_SETTLE_THIN = 2, /* the same where voxels are interpolated: a third round loses length there */
-    N_SETTLE_FIT = 3   /* fits in each of them */
+    N_SETTLE_FIT = 6   /* rounds of fitting in each of them */
 };
 
 /* Lines are repaired once more while more than this share of their ends lies in the middle of material, and the last
@@ -167,10 +168,10 @@ status trace_lines(struct trace_job *job, struct polyline_set *lines, struct err
     for (int round = 0; round < N_REPAIR && s == STATUS_OK; round++) { /* grow and join, then cut wrong parts */
         const double from = 0.14 + 0.2 * round / N_REPAIR;
         trace_enter_part(job, from, from + 0.14 / N_REPAIR);
-        s = trace_center(job, &part[1], 1, err);
+        s = trace_center(job, &part[1], N_CENTER, err);
         if (s == STATUS_OK) s = trace_repair(job, &part[1], true, 0.0, &part[2], &counts, err);
         trace_enter_part(job, from + 0.14 / N_REPAIR, from + 0.2 / N_REPAIR);
-        if (s == STATUS_OK) s = trace_center(job, &part[2], 1, err);
+        if (s == STATUS_OK) s = trace_center(job, &part[2], N_CENTER, err);
         if (s == STATUS_OK) s = trace_repair(job, &part[2], false, 0.0, &part[1], &counts, err);
     }
     if (s == STATUS_OK) s = trace_repair(job, &part[1], true, 0.0, &part[0], &counts, err);
@@ -180,7 +181,7 @@ status trace_lines(struct trace_job *job, struct polyline_set *lines, struct err
         s = smooth_and_drop(job, &part[0], lines, err);
     }
     trace_enter_part(job, 0.35, 0.4);
-    if (s == STATUS_OK) s = trace_center(job, lines, 1, err);
+    if (s == STATUS_OK) s = trace_center(job, lines, N_CENTER, err);
     trace_enter_part(job, 0.4, 0.5);
     if (s == STATUS_OK) s = fit_axes(job, lines, false, err);
     if (s == STATUS_OK) s = straighten(job, lines, false, TRACE_MIN_PIECE, err);
@@ -218,15 +219,15 @@ static status look_again(struct trace_job *job, struct polyline_set *lines, stru
     return s;
 }
 
-/* One round of the last repair: fits the lines n_fit times, cuts them where they change to another fiber, and lets the
- * ends that this frees grow and join. first: looks again before they grow. *n_join: number of joins. */
-static status settle_once(struct trace_job *job, struct polyline_set *lines, int n_fit, bool first, size_t *n_join,
+/* One round of the last repair: fits the lines by n_round rounds, cuts them where they change to another fiber, and
+ * lets the ends that this frees grow and join. first: looks again before they grow. *n_join: number of joins. */
+static status settle_once(struct trace_job *job, struct polyline_set *lines, int n_round, bool first, size_t *n_join,
                           struct error *err)
 {
     const struct reconstruct_report *r = job->report;
     const size_t n_before = r->n_gap_bridged + r->n_joined;
     job->profile.at_rest = true;
-    status s = trace_center(job, lines, n_fit, err);
+    status s = trace_center(job, lines, n_round, err);
     if (s == STATUS_OK) s = straighten(job, lines, true, TRACE_MIN_PIECE, err);
     if (s == STATUS_OK && first) s = look_again(job, lines, err);
     if (s == STATUS_OK) s = trace_join(job, lines, true, err);
@@ -252,7 +253,7 @@ status trace_settle(struct trace_job *job, struct polyline_set *lines, struct er
 {
     size_t n_join;
     trace_enter_part(job, 0.54, TRACE_SETTLED_END);
-    return settle_once(job, lines, 1, true, &n_join, err);
+    return settle_once(job, lines, N_CENTER, true, &n_join, err);
 }
 
 /* Where fibers have two diameters, some thick ones hold two lines, whose radii have grown since they were compared
@@ -279,7 +280,7 @@ status trace_finish(struct trace_job *job, struct polyline_set *lines, struct er
     size_t n_join = 0;
     const int n_settle = job->independent < 1.0 ? N_SETTLE_THIN : N_SETTLE;
     trace_enter_part(job, 0.54, TRACE_SETTLED_END);
-    status s = settle_once(job, lines, 1, true, &n_join, err);
+    status s = settle_once(job, lines, N_CENTER, true, &n_join, err);
     if (s == STATUS_OK) s = merge_within(job, lines, err);
     for (int k = 0; k < n_settle && s == STATUS_OK; k++) {
         bool lost = false;

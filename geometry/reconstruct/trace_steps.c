@@ -11,8 +11,6 @@
 #include <stdint.h>
 #include <string.h>
 
-enum { N_CENTER = 2 }; /* rounds of fitting pieces of lines to the scan */
-
 /* The share of a part is its mean share of the time on a phantom, on a scan of cotton and on one of a weave. */
 void trace_enter_part(struct trace_job *job, double from, double to)
 {
@@ -125,7 +123,7 @@ void trace_state_profile(const struct trace_job *job, const struct axis_profile 
     r->single_radius_se_m = profile->radius_se * profile->radius * voxel_m;
 }
 
-status trace_center(struct trace_job *job, struct polyline_set *lines, int n_fit, struct error *err)
+status trace_center(struct trace_job *job, struct polyline_set *lines, int n_round, struct error *err)
 {
-    return polylines_fit(lines, job->v, job->diameter, n_fit * N_CENTER, &job->profile, job->pool, &job->inner, err);
+    return polylines_fit(lines, job->v, job->diameter, n_round, &job->profile, job->pool, &job->inner, err);
 }
