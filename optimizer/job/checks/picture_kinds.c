@@ -18,7 +18,7 @@ static const struct studio_view {
     [JOB_KIND_MEASUREMENT] = {.name = "measurement"},
     [JOB_KIND_SWATCH] = {"swatch", JOB_ON_FLAT, 40.0, 15.0, 52.0, 25.0, 270.0, 6.0},
     [JOB_KIND_ROLL] = {"roll", JOB_ON_ROLL, 40.0, 8.0, 50.0, 60.0, 245.0, 0.0},
-    [JOB_KIND_DRAPE] = {"drape", JOB_ON_DRAPE, 60.0, 15.0, 54.0, 56.0, 250.0, 20.0},
+    [JOB_KIND_DRAPE] = {"drape", JOB_ON_DRAPE, 60.0, 15.0, 58.0, 56.0, 250.0, 20.0},
     [JOB_KIND_FOLD] = {"fold", JOB_ON_FOLD, 40.0, 15.0, 56.0, 78.0, 262.0, 0.0},
     [JOB_KIND_CLOSE_UP] = {"close_up", JOB_ON_FLAT, 20.0, 15.0, 2.0, 30.0, 270.0, 12.0},
     [JOB_KIND_FAR] = {"far", JOB_ON_DRAPE, 300.0, 75.0, 270.0, 60.0, 250.0, 20.0},
