@@ -26,6 +26,25 @@ struct run {
     size_t pixels_per_task, n_pixel;
 };
 
+/* Places of samples in a pixel, which lie more evenly than random ones (Roberts' sequence in two dimensions, moved by a
+ * random way for each pixel): what fibers show differs within a pixel by more than by the random numbers of its paths.
+ */
+static void place_samples(const struct run *r, const struct rng_key *key, size_t i_pixel, size_t first, size_t n,
+                          double (*xy)[2])
+{
+    static const double step[2] = {0.7548776662466927, 0.5698402909980532};
+    const size_t corner[2] = {i_pixel % r->q->width, i_pixel / r->q->width};
+    struct rng rng;
+    double start[2];
+    rng_start(&rng, key, (uint32_t)i_pixel, UINT32_MAX - (uint32_t)(first / RENDER_HALF));
+    for (int a = 0; a < 2; a++) start[a] = rng_double(&rng);
+    for (size_t i = 0; i < n; i++)
+        for (int a = 0; a < 2; a++) {
+            const double u = start[a] + (double)(first + i) * step[a];
+            xy[i][a] = ((double)corner[a] + u - floor(u)) / (double)r->q->width;
+        }
+}
+
 /* Adds n samples of a pixel, from number `first`. */
 static void add_samples(const struct run *r, size_t i_pixel, size_t first, size_t n, double *x, double *x2)
 {
@@ -39,11 +58,8 @@ static void add_samples(const struct run *r, size_t i_pixel, size_t first, size_
     const struct radiance_block block = {
         .member = &configuration, .n_member = 1, .n_path = n, .xy = xy, .rng = rng, .progress = r->progress};
     memset(value, 0, n * n_value * sizeof *value);
-    for (size_t i = 0; i < n; i++) {
-        rng_start(&rng[i], &key, (uint32_t)i_pixel, (uint32_t)(first + i));
-        xy[i][0] = ((double)(i_pixel % q->width) + rng_double(&rng[i])) / (double)q->width;
-        xy[i][1] = ((double)(i_pixel / q->width) + rng_double(&rng[i])) / (double)q->height;
-    }
+    place_samples(r, &key, i_pixel, first, n, xy);
+    for (size_t i = 0; i < n; i++) rng_start(&rng[i], &key, (uint32_t)i_pixel, (uint32_t)(first + i));
     r->source->tracer->trace(r->source->state, &block, value);
     for (size_t i = 0; i < n; i++)
         for (size_t k = 0; k < n_value; k++) {

@@ -11,8 +11,13 @@ struct deep_hit {
     double offset_mm[2];
     float position_mm[3]; /* true place in the scene */
     float row[3][3];      /* of the rotation into the flat cloth at the hit */
-    float wo[3];
-    float tangent[3]; /* of the fiber, in the flat cloth */
+    struct deep_seen seen;
+};
+
+/* What takes the light of a direction. */
+struct deep_sum {
+    float *rgb;                 /* with the factor of the option; or NULL */
+    float (*term)[DEEP_FACTOR]; /* [3]: times each term */
 };
 
 static void turn(const float row[3][3], const float d[3], float out[3])
@@ -32,57 +37,96 @@ static void enter_beside(const struct fast_setting *s, const struct deep_hit *h,
         return;
     }
     turn(h->row, direction, wi);
-    deep_light_shift(deep, h->wo, wi, shift);
+    deep_light_shift(deep, h->seen.wo, wi, shift);
     rng_normal_pair(rng, normal);
     for (int a = 0; a < 2; a++) shift[a] += (float)normal[a] * deep->spread_mm;
     scene_hit_beside(s->path.scene, h->hit, shift, at);
 }
 
+static void add_light(const struct fast_setting *s, const struct deep_hit *h, const float direction[3], float rgb[3],
+                      const struct deep_sum *sum)
+{
+    float wi[3], term[DEEP_FACTOR];
+    const struct deep_factor *factor = s->option->factor;
+    if (factor != NULL || sum->rgb == NULL) {
+        turn(h->row, direction, wi);
+        deep_factor_terms(&h->seen, wi, term);
+    }
+    for (int c = 0; c < 3 && sum->rgb == NULL; c++)
+        for (int k = 0; k < DEEP_FACTOR; k++) sum->term[c][k] += rgb[c] * term[k];
+    if (sum->rgb == NULL) return;
+    if (factor != NULL) deep_factor_apply(factor, term, rgb);
+    for (int c = 0; c < 3; c++) sum->rgb[c] += rgb[c];
+}
+
 /* Adds light of one direction; a surface that faces it has the irradiance pi times scale. The light enters beside
  * the hit, where a bent cloth has another normal and other shadows. */
 static void add_from(const struct fast_setting *s, const struct deep_hit *h, const float direction[3],
-                     const float scale[3], struct rng *rng, float radiance[3])
+                     const float scale[3], struct rng *rng, const struct deep_sum *sum)
 {
     static const float no_shift[2] = {0, 0};
     const struct scene *scene = s->path.scene;
     struct scene_hit at;
     struct scene_place place;
-    float row[3][3], wi[3];
+    float row[3][3], wi[3], rgb[3] = {0, 0, 0};
     enter_beside(s, h, direction, rng, &at);
     scene_place_find(scene, &at, h->offset_mm, &place);
     if (scene_shell_shades(scene, &at, &place, no_shift, direction)) return;
     scene_place_rotation(&place, row);
     turn((const float(*)[3])row, direction, wi);
-    deep_light_add(&s->option->tables->deep, h->tangent, h->wo, wi, scale, radiance);
+    deep_light_add(&s->option->tables->deep, h->seen.tangent, h->seen.wo, wi, scale, rgb);
+    add_light(s, h, direction, rgb, sum);
 }
 
-void deep_shade_begin(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,
-                      float rgb[3])
+static void describe(const struct fast_setting *s, const struct scene_hit *hit, const struct scene_ray *ray,
+                     struct deep_hit *h)
 {
-    const struct fast_setting *s = context;
-    const struct lights *l = &s->path.lights;
-    struct deep_hit h = {.hit = hit};
     struct scene_place place;
-    float back[3], direction[3], pdf, scale[3], u[2];
+    float back[3];
+    *h = (struct deep_hit){.hit = hit};
     for (int a = 0; a < 3; a++) {
         back[a] = -ray->direction[a];
-        if (a < 2) h.offset_mm[a] = ray->offset_mm[a];
-        h.position_mm[a] = (float)((double)hit->position_mm[a] + (a < 2 ? h.offset_mm[a] : 0.0));
+        if (a < 2) h->offset_mm[a] = ray->offset_mm[a];
+        h->position_mm[a] = (float)((double)hit->position_mm[a] + (a < 2 ? h->offset_mm[a] : 0.0));
     }
-    scene_place_find(s->path.scene, hit, h.offset_mm, &place);
-    scene_place_rotation(&place, h.row);
-    turn((const float(*)[3])h.row, back, h.wo);
-    scene_place_to_cloth(&place, hit->tangent, h.tangent);
+    scene_place_find(s->path.scene, hit, h->offset_mm, &place);
+    scene_place_rotation(&place, h->row);
+    turn((const float(*)[3])h->row, back, h->seen.wo);
+    turn((const float(*)[3])h->row, hit->normal, h->seen.normal);
+    scene_place_to_cloth(&place, hit->tangent, h->seen.tangent);
+    h->seen.depth = (float)((double)place.position_mm[2] / s->option->tables->bottom_mm);
+}
+
+static void shade(const struct fast_setting *s, const struct deep_hit *h, struct rng *rng, const struct deep_sum *sum)
+{
+    const struct lights *l = &s->path.lights;
+    float direction[3], pdf, scale[3], u[2];
     if (l->has_lamp) {
         for (int k = 0; k < 2; k++) u[k] = rng_float(rng);
-        if (lamp_sample(&l->lamp, h.position_mm, u, direction, &pdf)) {
+        if (lamp_sample(&l->lamp, h->position_mm, u, direction, &pdf)) {
             for (int c = 0; c < 3; c++) scale[c] = lamp_radiance(&l->lamp, direction) / pdf * (float)M_1_PI;
-            add_from(s, &h, direction, scale, rng, rgb);
+            add_from(s, h, direction, scale, rng, sum);
         }
     }
     if (s->mixture.n == 0) return;
     size_t k = light_mixture_pick(&s->mixture, rng_float(rng));
     float share = s->mixture.cumulative[k] - (k > 0 ? s->mixture.cumulative[k - 1] : 0);
     for (int c = 0; c < 3; c++) scale[c] = s->mixture.rgb[k][c] / share * (float)M_1_PI;
-    add_from(s, &h, s->mixture.direction[k], scale, rng, rgb);
+    add_from(s, h, s->mixture.direction[k], scale, rng, sum);
+}
+
+void deep_shade_begin(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,
+                      float rgb[3])
+{
+    struct deep_hit h;
+    describe(context, hit, ray, &h);
+    shade(context, &h, rng, &(struct deep_sum){.rgb = rgb});
+}
+
+void deep_shade_terms(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,
+                      float sum[3][DEEP_FACTOR])
+{
+    struct deep_hit h;
+    describe(context, hit, ray, &h);
+    shade(context, &h, rng, &(struct deep_sum){.term = sum});
 }

@@ -12,6 +12,8 @@ static status check(const struct radiance_input *in, struct error *err)
     if (o->deep && (o->n_traced == 0 || o->tables->deep.n_traced != o->n_traced))
         return error_set(err, STATUS_INVALID, "cannot trace %u hits: the table of deep light is for %u", o->n_traced,
                          o->tables->deep.n_traced);
+    if (in->n_hit > 0 && !o->deep)
+        return error_set(err, STATUS_INVALID, "cannot end paths at a hit by tables: only with those of deep light");
     scene_tile_mm(in->scene.fibers, tile_mm);
     size_t n_set = in->n_set > 1 ? in->n_set : 1;
     if (o->tables->n_set != n_set || o->tables->tile_mm[0] != tile_mm[0] || o->tables->tile_mm[1] != tile_mm[1])
@@ -27,7 +29,10 @@ static status check(const struct radiance_input *in, struct error *err)
 
 static status init(void *setting, const struct radiance_input *in, struct error *err)
 {
-    return fast_setting_init(setting, in->fast, err);
+    struct fast_setting *s = setting;
+    status st = fast_setting_init(s, in->fast, err);
+    if (st == STATUS_OK && in->n_hit > 0) s->path.n_traced = in->n_hit;
+    return st;
 }
 
 static void release(void *setting) { fast_setting_release(setting); }

@@ -20,6 +20,7 @@
 #define SELVEDGE_RENDERER_FAST_TABLES_H
 
 #include "base/status.h"
+#include "renderer/fast/deep_factor.h"
 #include "renderer/fast/deep_light.h"
 
 #include <stdbool.h>
@@ -102,6 +103,7 @@ struct fast_option {
     /* Take light that is scattered more than n_traced times from tables->deep, at the first hit of a path, instead of
      * from the cells at the last. With FAST_TRACED and n_traced as in the table. */
     bool deep;
+    const struct deep_factor *factor; /* on deep light; NULL: 1 */
 };
 
 #endif

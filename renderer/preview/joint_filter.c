@@ -6,9 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_RGB = 3, N_SCALE = 4, ERROR_REACH = 6, BLEND_REACH = 3, DEPTH_REACH = 12, N_FROM_FEATURE = N_FEATURE };
-/* Reach of the windows in pixels; 0: the picture itself. */
-static const size_t scale_reach[N_SCALE] = {0, 4, 8, 16};
+enum { N_RGB = 3, N_SCALE = 3, ERROR_REACH = 6, NOISE_REACH = 2, DEPTH_REACH = 12, N_FROM_FEATURE = N_FEATURE };
+/* Pixels of a cell of the windows, which have 9 x 9 cells. */
+static const size_t scale_cell[N_SCALE] = {1, 2, 4};
 
 struct run {
     const struct joint_input *in;
@@ -16,16 +16,18 @@ struct run {
     size_t width, height, n; /* n: pixels */
     float *block;            /* all planes below */
     struct regression_input planes;
-    float *fitted[REGRESSION_VALUE]; /* of the scale under way */
-    float *shown[N_SCALE][N_RGB];    /* light other than early light, of each scale */
-    float *error[N_SCALE];           /* estimated squared error, then its mean around a pixel */
-    float *spread[N_SCALE];          /* of that the part that is noise, which halves tell better */
+    float *fitted[REGRESSION_VALUE]; /* of the scale under way; then its squared errors and the part that is noise */
+    float *shown[N_RGB];             /* light other than early light, of the scale under way */
+    float *sum[N_RGB], *error[N_RGB], *weight; /* of all scales: light and its squared error, times weights */
+    float *noise[N_RGB];                       /* squared, of the mean of both halves */
+    float *early_noise[N_RGB];                 /* squared, of early light; 0 without it */
     float *temporary;
     float *scratch; /* regression_scratch() of each thread */
-    size_t reach;
+    double unit;    /* of squared errors */
+    size_t cell;
 };
 
-enum { N_PLANE = REGRESSION_GUIDE + 2 * REGRESSION_VALUE + N_SCALE * (N_RGB + 2) + 1 };
+enum { N_PLANE = REGRESSION_GUIDE + 2 * REGRESSION_VALUE + 5 * N_RGB + 2 };
 
 static const float *pixel_of(const struct image *im, size_t i) { return im->pixel + i * im->n_channel; }
 
@@ -37,13 +39,15 @@ static void set_planes(struct run *r)
     for (size_t k = 0; k < REGRESSION_GUIDE; k++, at += r->n) r->planes.guide[k] = at;
     for (size_t k = 0; k < REGRESSION_VALUE; k++, at += r->n) r->planes.value[k] = at;
     for (size_t k = 0; k < REGRESSION_VALUE; k++, at += r->n) r->fitted[k] = at;
-    for (size_t s = 0; s < N_SCALE; s++) {
-        for (size_t c = 0; c < N_RGB; c++, at += r->n) r->shown[s][c] = at;
-        r->error[s] = at;
-        r->spread[s] = at + r->n;
-        at += 2 * r->n;
+    for (size_t c = 0; c < N_RGB; c++, at += 5 * r->n) {
+        r->shown[c] = at;
+        r->sum[c] = at + r->n;
+        r->error[c] = at + 2 * r->n;
+        r->noise[c] = at + 3 * r->n;
+        r->early_noise[c] = at + 4 * r->n;
     }
-    r->temporary = at;
+    r->weight = at;
+    r->temporary = at + r->n;
 }
 
 /* Brings a plane to mean 0 and variance 1; one that hardly varies becomes 0. */
@@ -84,87 +88,116 @@ static void fill_planes(struct run *r)
 static void run_tile(void *context, size_t i_tile, size_t i_thread)
 {
     struct run *r = context;
-    const size_t across = (r->width + REGRESSION_TILE - 1) / REGRESSION_TILE;
+    const size_t edge = REGRESSION_TILE * r->cell, across = (r->width + edge - 1) / edge;
     if (progress_cancelled(r->progress)) return;
-    regression_tile(&r->planes, r->reach, i_tile % across * REGRESSION_TILE, i_tile / across * REGRESSION_TILE,
+    regression_tile(&r->planes, r->cell, i_tile % across * edge, i_tile / across * edge,
                     r->scratch + i_thread * regression_scratch(), r->fitted);
 }
 
-/* Sets the light of a scale and its squared error: with halves a, b and their filtered f, g, E(f - b)^2 is the squared
- * error of f and the variance of b, whose difference is known from (a - b)^2; averaging f and g takes (f - g)^2 / 4. */
-static void judge(struct run *r, size_t s)
+static void spread(struct run *r, float *plane, size_t reach)
 {
-    for (size_t i = 0; i < r->n; i++) {
-        float sum = 0, spread = 0;
-        for (size_t c = 0; c < N_RGB; c++) {
-            const float a = r->planes.value[c][i], b = r->planes.value[N_RGB + c][i];
-            const float f = s > 0 ? r->fitted[c][i] : a, g = s > 0 ? r->fitted[N_RGB + c][i] : b;
-            r->shown[s][c][i] = (f + g) / 2;
-            spread += (f - g) * (f - g) / 4;
-            if (s > 0) sum += ((f - b) * (f - b) + (g - a) * (g - a) - (a - b) * (a - b)) / 2 - (f - g) * (f - g) / 4;
+    for (int k = 0; k < 2; k++) regression_box(plane, r->width, r->height, reach, r->temporary);
+}
+
+/* Squared noise of the mean of both halves, around each pixel. */
+static void find_noise(struct run *r)
+{
+    double square = 0;
+    for (size_t c = 0; c < N_RGB; c++) {
+        const float *a = r->planes.value[c], *b = r->planes.value[N_RGB + c];
+        for (size_t i = 0; i < r->n; i++) {
+            r->noise[c][i] = (a[i] - b[i]) * (a[i] - b[i]) / 4;
+            square += (double)r->noise[c][i];
+            r->early_noise[c][i] = r->in->early != NULL ? pixel_of(r->in->early, i)[N_RGB + c] : 0;
         }
-        r->spread[s][i] = spread / N_RGB;
-        if (s == 0) sum = spread;
-        r->error[s][i] = sum / N_RGB;
+        spread(r, r->noise[c], NOISE_REACH);
+        spread(r, r->early_noise[c], NOISE_REACH);
+    }
+    r->unit = square > 0 ? square / (double)r->n : 1;
+}
+
+/* Adds a scale: its light, and the squared error around each pixel. With halves a, b and their filtered f, g,
+ * E(f - b)^2 is the squared error of f and the variance of b, whose difference is known from (a - b)^2; averaging f and
+ * g takes (f - g)^2 / 4, which is the least that the error can be. */
+static void judge(struct run *r)
+{
+    for (size_t c = 0; c < N_RGB; c++) {
+        const float *a = r->planes.value[c], *b = r->planes.value[N_RGB + c];
+        float *error = r->fitted[c], *between = r->fitted[N_RGB + c];
+        for (size_t i = 0; i < r->n; i++) {
+            const float f = error[i], g = between[i], least = (f - g) * (f - g) / 4;
+            const float fb = (f - b[i]) * (f - b[i]), ga = (g - a[i]) * (g - a[i]), ab = (a[i] - b[i]) * (a[i] - b[i]);
+            r->shown[c][i] = (f + g) / 2;
+            error[i] = (fb + ga - ab) / 2 - least;
+            between[i] = least;
+        }
+        spread(r, error, ERROR_REACH);
+        spread(r, between, ERROR_REACH);
+    }
+    for (size_t i = 0; i < r->n; i++) {
+        float square[N_RGB];
+        double all = 0;
+        for (size_t c = 0; c < N_RGB; c++) {
+            square[c] = fmaxf(r->fitted[c][i], r->fitted[N_RGB + c][i]);
+            all += (double)square[c];
+        }
+        all = fmax(all / r->unit, 1e-7); /* nearly the scale with the least error, and no edges between scales */
+        const float weight = (float)(1 / (all * all * all * all));
+        r->weight[i] += weight;
+        for (size_t c = 0; c < N_RGB; c++) {
+            r->sum[c][i] += weight * r->shown[c][i];
+            r->error[c][i] += weight * square[c];
+        }
     }
 }
 
 static status run_scales(struct run *r, struct thread_pool *pool)
 {
-    const size_t across = (r->width + REGRESSION_TILE - 1) / REGRESSION_TILE,
-                 down = (r->height + REGRESSION_TILE - 1) / REGRESSION_TILE;
+    memset(r->weight, 0, r->n * sizeof *r->weight);
+    for (size_t c = 0; c < N_RGB; c++) {
+        memset(r->sum[c], 0, r->n * sizeof *r->sum[c]);
+        memset(r->error[c], 0, r->n * sizeof *r->error[c]);
+    }
+    find_noise(r);
     for (size_t s = 0; s < N_SCALE; s++) {
-        r->reach = scale_reach[s];
-        status st = s > 0 ? thread_pool_run(pool, across * down, run_tile, r, r->progress) : STATUS_OK;
+        r->cell = scale_cell[s];
+        const size_t edge = REGRESSION_TILE * r->cell, across = (r->width + edge - 1) / edge,
+                     down = (r->height + edge - 1) / edge;
+        status st = thread_pool_run(pool, across * down, run_tile, r, r->progress);
         if (st == STATUS_OK && progress_cancelled(r->progress)) st = STATUS_CANCELLED;
         if (st != STATUS_OK) return st;
-        judge(r, s);
+        judge(r);
     }
     return STATUS_OK;
 }
 
 /* ---- the picture ---- */
 
-/* Chooses the scale with the least error around each pixel, and lets neighbouring choices run into each other. Returns
- * the sum of the squared errors of what was chosen, which is at least its noise. error[s] become the weights of the
- * scales. */
-static double choose(struct run *r)
+/* Blends a channel of a pixel with what is filtered so that the squared error that both are known to have is least: as
+ * much of each as the other has error. Adds that error to *square. */
+static float blended(const struct run *r, size_t i, size_t c, double *square)
 {
-    double sum = 0, spread = 0;
-    for (size_t s = 0; s < N_SCALE; s++) {
-        memcpy(r->fitted[s], r->error[s], r->n * sizeof *r->error[s]);
-        for (int k = 0; k < 2; k++) regression_box(r->error[s], r->width, r->height, ERROR_REACH, r->temporary);
-    }
-    for (size_t i = 0; i < r->n; i++) {
-        size_t best = 0;
-        for (size_t s = 1; s < N_SCALE; s++)
-            if (r->error[s][i] < r->error[best][i]) best = s;
-        sum += (double)r->fitted[best][i];
-        spread += (double)r->spread[best][i];
-        for (size_t s = 0; s < N_SCALE; s++) r->error[s][i] = s == best;
-    }
-    for (size_t s = 0; s < N_SCALE; s++)
-        for (int k = 0; k < 2; k++) regression_box(r->error[s], r->width, r->height, BLEND_REACH, r->temporary);
-    return fmax(sum, spread);
+    const float light = r->in->early != NULL ? pixel_of(r->in->early, i)[c] : 0;
+    const float as_it_is = (r->planes.value[c][i] + r->planes.value[N_RGB + c][i]) / 2 + light;
+    if (!(pixel_of(r->in->feature, i)[FEATURE_SEEN] > 0)) return as_it_is;
+    const float filtered = fmaxf(r->sum[c][i] / r->weight[i], 0) + light,
+                error = r->error[c][i] / r->weight[i] + r->early_noise[c][i], noise = r->noise[c][i];
+    const float share = noise > 0 ? noise / (noise + error) : 0;
+    *square += (double)(share * error);
+    return fmaxf(share * filtered + (1 - share) * as_it_is, 0);
 }
 
-static void write_picture(struct run *r, struct image *out, double *error)
+static void write_picture(const struct run *r, struct image *out, double *error)
 {
-    double square = choose(r), mean = 0;
-    for (size_t i = 0; i < r->n; i++) {
-        const bool seen = pixel_of(r->in->feature, i)[FEATURE_SEEN] > 0;
+    double square = 0, mean = 0;
+    for (size_t i = 0; i < r->n; i++)
         for (size_t c = 0; c < N_RGB; c++) {
-            float sum = 0;
-            for (size_t s = 0; s < N_SCALE; s++) sum += r->error[s][i] * r->shown[s][c][i];
-            if (!seen) sum = r->shown[0][c][i];
-            const float d = r->in->early != NULL ? pixel_of(r->in->early, i)[c] : 0;
-            if (r->in->early != NULL) square += (double)pixel_of(r->in->early, i)[N_RGB + c] / N_RGB;
-            out->pixel[i * N_RGB + c] = fmaxf(sum, seen ? 0 : -d) + d;
-            mean += (double)out->pixel[i * N_RGB + c];
+            const float value = blended(r, i, c, &square);
+            out->pixel[i * N_RGB + c] = value;
+            mean += (double)value;
         }
-    }
     mean /= (double)(N_RGB * r->n);
-    *error = mean > 0 ? sqrt(fmax(square, 0) / (double)r->n) / mean : NAN;
+    *error = mean > 0 ? sqrt(square / (double)(N_RGB * r->n)) / mean : NAN;
 }
 
 static bool same_size(const struct image *a, const struct image *b)

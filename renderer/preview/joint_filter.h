@@ -7,7 +7,7 @@
 #include "base/thread_pool.h"
 #include "renderer/image/image.h"
 
-#define JOINT_FILTER_ID "joint.v2" /* in results */
+#define JOINT_FILTER_ID "joint.v3" /* in results */
 
 /* Pictures of the same size. */
 struct joint_input {

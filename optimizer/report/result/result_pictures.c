@@ -240,7 +240,7 @@ static status render_filtered(const struct report *report, const struct render_r
         struct render_request part = *q;
         struct progress_part share;
         struct progress inner = progress_begin_part(&share, progress, 0.5 * h, 0.5);
-        part.first_sample = h == 0 ? 0 : n[0];
+        part.first_sample = h == 0 ? 0 : RENDER_HALF;
         part.n_sample = n[h];
         s = render_run(&part, pool, &inner, &half[h], err);
     }

@@ -83,10 +83,13 @@ static void add_pass(struct surface_passes *p, const struct image *im, size_t n)
     p->n_sample += n;
 }
 
-/* Adds it to the first half, too, if that has no more samples than the second. */
+/* Whether the next samples belong to the first half, which then has no more samples than the second. */
+static bool is_first_next(const struct surface_passes *p) { return 2 * p->n_first <= p->n_sample; }
+
+/* Adds it to the first half, too, if it belongs there. */
 static void add_first(struct surface_passes *p, const struct image *im, size_t n)
 {
-    if (2 * p->n_first > p->n_sample) return;
+    if (!is_first_next(p)) return;
     const double all = (double)(p->n_first + n), a = (double)p->n_first / all, b = (double)n / all;
     for (size_t i = 0; i < p->image.width * p->image.height; i++)
         for (size_t k = 0; k < N_RGB; k++) {
@@ -126,7 +129,7 @@ status surface_passes_add(struct report *report, const struct render_request *q,
                  part_of[2] = {n < 2 * FIRST_SAMPLES ? n : n / 2, n < 2 * FIRST_SAMPLES ? 0 : n - n / 2};
     status s = STATUS_OK;
     for (int k = 0; k < 2 && part_of[k] > 0; k++) {
-        pass.first_sample = p->n_sample;
+        pass.first_sample = is_first_next(p) ? p->n_first : RENDER_HALF + p->n_sample - p->n_first;
         pass.n_sample = part_of[k];
         struct progress inner = progress_begin_part(&part, progress, (double)p->n_sample / (double)q->n_sample,
                                                     (double)pass.n_sample / (double)q->n_sample);

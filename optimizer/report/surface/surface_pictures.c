@@ -37,6 +37,7 @@ struct one_picture {
     const struct surface_tables *tables;
     const struct surface_ground *ground; /* from render on, and the next */
     const struct appearance *model;      /* that is shown */
+    struct surface_fit *fit;             /* made by render_picture */
 };
 
 static double paths_of(const struct job_surface_picture *p)
@@ -159,25 +160,14 @@ static status write_json(struct report *report, const char *path, const json_t *
 
 /* The same of the studio. It is filtered and written after the first pass, and whenever the samples have doubled. */
 static status write_studio(struct report *report, const struct one_picture *one, const struct surface_filter *filter,
-                           const struct surface_passes *so_far, const struct surface_passes *shown, double exposure,
-                           struct error *err)
+                           const struct surface_passes *so_far, const struct surface_passes *shown,
+                           struct surface_shown *how, struct error *err)
 {
     const size_t n = so_far->n_sample;
     const bool whole = n == report->in.results->surface_picture[one->i].sample;
-    status s = whole || (n & (n - 1)) == 0
-                   ? surface_studio_write(report, one->i, filter, one->ground, so_far, exposure, err)
-                   : STATUS_OK;
+    status s = whole || (n & (n - 1)) == 0 ? surface_studio_write(report, one->i, filter, one->ground, so_far, how, err)
+                                           : STATUS_OK;
     return s == STATUS_OK && whole ? result_exr_write(report, &shown->image, "pictures", so_far->name, err) : s;
-}
-
-/* What the entry of a studio picture says besides. */
-static void put_studio(json_t *entry, const struct job_surface_picture *p, const struct surface_filter *filter)
-{
-    json_object_set_new(entry, "kind", json_string(job_picture_kind_name(p->kind)));
-    if (p->is_draft || json_integer_value(json_object_get(entry, "samples")) < (json_int_t)p->sample)
-        json_object_set_new(entry, "partial", json_true());
-    json_object_set_new(entry, "tone_curve", json_string("khronos_pbr_neutral"));
-    if (filter->guides.feature.pixel != NULL) json_object_set_new(entry, "filter", json_string(JOINT_FILTER_ID));
 }
 
 /* The entry of result.json lies beside the picture and is written last: a picture is finished when its entry has all
@@ -191,18 +181,19 @@ static status write_entry(struct report *report, const struct one_picture *one, 
     status s = surface_ground_add(one->ground, so_far, &shown, err);
     if (s != STATUS_OK) return s;
     const bool studio = surface_studio_is(p);
-    const double exposure = studio ? studio_exposure(&so_far->image) : exposure_of(&shown.image);
-    s = studio ? write_studio(report, one, filter, so_far, &shown, exposure, err)
-               : write_picture(report, p, &shown, exposure, err);
+    struct surface_shown how = {.exposure = studio ? studio_exposure(&so_far->image) : exposure_of(&shown.image)};
+    s = studio ? write_studio(report, one, filter, so_far, &shown, &how, err)
+               : write_picture(report, p, &shown, how.exposure, err);
     if (s == STATUS_OK && !studio)
-        s = surface_filter_write(report, filter, one->ground, so_far, exposure, &filtered, err);
+        s = surface_filter_write(report, filter, one->ground, so_far, how.exposure, &filtered, err);
     if (s == STATUS_OK) {
         json_decref(*out);
-        *out = picture_json(one, p, &shown, exposure);
+        *out = picture_json(one, p, &shown, how.exposure);
     }
     surface_passes_release(&shown);
     if (s != STATUS_OK) return s;
-    if (studio) put_studio(*out, p, filter);
+    if (studio) surface_studio_put(*out, p, filter, &how);
+    if (one->how.method == JOB_PICTURE_FAST) surface_fit_put(*out, one->fit);
     if (p->speckle) json_object_set_new(*out, "speckle", json_true());
     if (one->ground->present) json_object_set_new(*out, "ground_z_mm", json_number(one->ground->z_mm));
     if (filtered != NULL) json_object_set_new(*out, "filtered", filtered);
@@ -214,10 +205,12 @@ static status render_picture(struct report *report, const struct one_picture *on
                              const struct progress *progress, struct surface_passes *so_far, json_t **entry,
                              struct error *err)
 {
-    struct surface_filter filter;
-    status s = surface_filter_init(report, one->i, q, one->tables, progress, &filter, err);
+    struct surface_filter filter = {0};
+    struct render_request by = *q;
+    status s = surface_fit_make(report, &by, progress, one->fit, err);
+    if (s == STATUS_OK) s = surface_filter_init(report, one->i, &by, one->tables, progress, &filter, err);
     while (s == STATUS_OK && so_far->n_sample < q->n_sample) {
-        s = surface_passes_add(report, q, progress, so_far, err);
+        s = surface_passes_add(report, &by, progress, so_far, err);
         if (s == STATUS_OK) s = write_entry(report, one, &filter, so_far, entry, err);
     }
     if (s == STATUS_OK && *entry == NULL) s = write_entry(report, one, &filter, so_far, entry, err);
@@ -291,7 +284,9 @@ static status render(struct report *report, const struct one_picture *one, const
         worker_status_warn(report->in.job->tools->status,
                            "picture %zu is not path traced, and goes without the discrepancy", one->i + 1);
     struct surface_ground ground = {0};
+    struct surface_fit fit;
     struct one_picture with = *one;
+    with.fit = &fit;
     with.ground = &ground;
     with.model = shown;
     if (s == STATUS_OK) s = surface_ground_init(report, one->i, &q, &first, &ground, err);

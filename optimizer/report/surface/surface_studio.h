@@ -4,11 +4,18 @@
 
 #include "optimizer/report/surface/surface_filter.h"
 
-/* Writes pictures/on-<number>.png of the picture so far of the cloth alone: filtered, with the ground, by the tone
- * curve, a flat cloth with a scale bar. *filtered: whether it could be filtered. STATUS_NO_MEMORY, STATUS_IO,
- * STATUS_DISK_FULL. */
+struct surface_shown {
+    double exposure;
+    double error; /* of a pixel after the filter, as of joint_filter; NaN: it was not filtered */
+};
+
+/* Writes pictures/on-<number>.png of the picture so far of the cloth alone: filtered where it can be, with the ground,
+ * by the tone curve, a flat cloth with a scale bar. Sets how->error. STATUS_NO_MEMORY, STATUS_IO, STATUS_DISK_FULL. */
 status surface_studio_write(struct report *report, size_t i, const struct surface_filter *filter,
-                            const struct surface_ground *ground, const struct surface_passes *so_far, double exposure,
-                            struct error *err);
+                            const struct surface_ground *ground, const struct surface_passes *so_far,
+                            struct surface_shown *how, struct error *err);
+/* What the entry of a studio picture says besides; its noise is what the filter leaves. */
+void surface_studio_put(json_t *entry, const struct job_surface_picture *p, const struct surface_filter *filter,
+                        const struct surface_shown *how);
 
 #endif

@@ -2,6 +2,7 @@
 #include "base/files/durable.h"
 #include "base/process.h"
 #include "optimizer/job/document/job_results.h"
+#include "optimizer/job/document/json_number.h"
 #include "optimizer/job/job_folder.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 #include "renderer/fast/precompute/fast_precompute.h"
@@ -13,6 +14,9 @@
 /* Three traced hits leave a third of the error of one (renderer/fast/NOTES.md); the transfer to a cell has an error of
  * 1 to 2 % by so many paths. */
 enum { N_TRACED = 3, CELL_PATHS = 8000, SPREAD_PATHS = 1024 };
+/* One path of the fit for so many samples of a picture takes as long as two of them; more than the most tell little
+ * more. */
+enum { SAMPLES_OF_FIT = 4, MOST_FIT = 1 << 18 };
 /* Two hits before diffusion leave its means without a part that stays (renderer/quick/diffusion-notes.md). */
 enum { N_TRACED_IN_PILE = 2 };
 #define JOURNAL_EVERY_S 2.0
@@ -238,4 +242,33 @@ void surface_method_apply(const struct surface_method *m, struct radiance_input 
     input->fast = m->method == JOB_PICTURE_FAST ? &m->fast : NULL;
     input->dual = m->method == JOB_PICTURE_DUAL ? &m->dual : NULL;
     input->diffusion = m->method == JOB_PICTURE_DIFFUSION ? &m->diffusion : NULL;
+}
+
+status surface_fit_make(const struct report *report, struct render_request *q, const struct progress *progress,
+                        struct surface_fit *fit, struct error *err)
+{
+    *fit = (struct surface_fit){0};
+    if (q->input.fast == NULL || !q->input.fast->deep) return STATUS_OK;
+    const size_t share = q->width * q->height * q->n_sample / SAMPLES_OF_FIT;
+    const double before_s = process_use().cpu_s;
+    struct progress silent = progress_silent(progress);
+    status s = deep_fit_make(&q->input, q->configuration, share < MOST_FIT ? share : MOST_FIT, q->seed,
+                             report->in.job->tools->pool, &silent, &fit->deep, err);
+    if (s != STATUS_OK) return s;
+    fit->made = true;
+    fit->fast = *q->input.fast;
+    fit->fast.factor = fit->deep.used ? &fit->deep.factor : NULL;
+    q->input.fast = &fit->fast;
+    log_info(report->in.job->tools->log, "deep light fitted: processor %.2f s, %.1f +- %.1f %% from the tables",
+             process_use().cpu_s - before_s, 100.0 * fit->deep.difference, 100.0 * fit->deep.error);
+    return STATUS_OK;
+}
+
+void surface_fit_put(json_t *entry, const struct surface_fit *fit)
+{
+    if (!fit->made) return;
+    json_object_set_new(entry, "tables",
+                        json_pack("{s:o, s:o, s:o, s:b}", "error", json_number((double)fit->fast.tables->deep.error),
+                                  "difference", json_number(fit->deep.difference), "difference_se",
+                                  json_number(fit->deep.error), "fitted", fit->deep.used));
 }

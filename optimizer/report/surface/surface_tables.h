@@ -5,6 +5,8 @@
 
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/report/findings/report.h"
+#include "renderer/estimate/render.h"
+#include "renderer/fast/deep_fit.h"
 #include "renderer/fast/fast_tables.h"
 #include "renderer/quick/diffusion_tables.h"
 #include "renderer/quick/dual_tables.h"
@@ -27,6 +29,13 @@ struct surface_method {
     struct diffusion_option diffusion;
 };
 
+/* What a picture by tables has of its own (renderer/fast/deep_fit.h). */
+struct surface_fit {
+    bool made; /* false: the picture takes no deep light from tables */
+    struct deep_fit deep;
+    struct fast_option fast; /* with its factor */
+};
+
 /* Paths of a path-traced picture that take as long as the tables; 0 when no picture asks for tables of renderer/fast:
  * averages take a second. */
 double surface_tables_paths(const struct job_results *results);
@@ -43,5 +52,13 @@ void surface_tables_release(struct surface_tables *t);
 struct surface_method surface_tables_method(const struct surface_tables *t, const struct job_surface_picture *p);
 /* Sets the method in the source of the picture's radiance. */
 void surface_method_apply(const struct surface_method *m, struct radiance_input *input);
+
+/* Fits the factor on deep light to paths of the picture of q, which then uses it; fit must outlive it. Other methods
+ * have none. Errors of deep_fit_make. */
+status surface_fit_make(const struct report *report, struct render_request *q, const struct progress *progress,
+                        struct surface_fit *fit, struct error *err);
+
+/* "tables" of the picture's entry: what is known of their error. */
+void surface_fit_put(json_t *entry, const struct surface_fit *fit);
 
 #endif

@@ -132,7 +132,7 @@ static void begin(const struct deep_job *x, size_t i_class, const double wo[3], 
 /* Numbers about ways: weight, x and y of each view, the same of each light, and the sum of squares. */
 static size_t n_way(const struct deep_job *x) { return 6 * x->n_node + 1; }
 
-/* Adds the way of a path, whose weight has the two factors. sum: where those of a view or a light begin. */
+/* Adds the way of a path, whose weight has the two factors. sum: where the numbers of a view or a light begin. */
 static void count_way(const double way_mm[2], double scale, const size_t node[4], const double weight[4], float *sum)
 {
     for (size_t k = 0; k < 4; k++) {

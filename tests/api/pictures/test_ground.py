@@ -44,7 +44,7 @@ def test_a_filtered_shadow_is_marked(tmp_path):
     plain = rendered(tmp_path / "plain", one)["pictures"][0]
     filtered = rendered(tmp_path / "filtered", {**one, "filter": True})["pictures"][0]
     view = filtered.pop("filtered")
-    assert view.pop("error") > 0 and view == {"file": "pictures/on-1-filtered.png", "filter": "joint.v2+sheared.v1"} and filtered == plain
+    assert view.pop("error") > 0 and view == {"file": "pictures/on-1-filtered.png", "filter": "joint.v3+sheared.v1"} and filtered == plain
     pictures = tmp_path / "filtered/results/pictures"
     assert (pictures / "on-1.exr").read_bytes() == (tmp_path / "plain/results/pictures/on-1.exr").read_bytes()
     png = (pictures / "on-1-filtered.png").read_bytes()
@@ -54,7 +54,7 @@ def test_a_filtered_shadow_is_marked(tmp_path):
     run_worker(tmp_path / "filtered")
     assert (pictures / "on-1-filtered.png").read_bytes() == png
     sharp = rendered(tmp_path / "sharp", {**one, "filter": True}, **other)["pictures"][0]
-    assert sharp["filtered"]["filter"] == "joint.v2"
+    assert sharp["filtered"]["filter"] == "joint.v3"
 
 
 def test_a_volume_has_no_ground(tmp_path):

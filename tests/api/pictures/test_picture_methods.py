@@ -116,7 +116,7 @@ def test_a_filtered_view_stands_beside_the_picture(tmp_path):
         made[name] = folder / "results/pictures"
     a, b = (json.loads((made[name] / "on-1.json").read_text()) for name in ("with", "without"))
     view = a.pop("filtered")
-    assert view.pop("error") > 0 and view == {"file": "pictures/on-1-filtered.png", "filter": "joint.v2"} and a == b
+    assert view.pop("error") > 0 and view == {"file": "pictures/on-1-filtered.png", "filter": "joint.v3"} and a == b
     for file in ("on-1.exr", "on-1.png", "on-1-columns.csv"):
         assert (made["with"] / file).read_bytes() == (made["without"] / file).read_bytes()
     png = (made["with"] / "on-1-filtered.png").read_bytes()

@@ -31,7 +31,7 @@ def test_views_of_the_studio(real, tmp_path):
     assert done["state"] == "succeeded", done["error"]
     pictures = done["result"]["pictures"]
     assert [p["kind"] for p in pictures] == kinds and [p["on"] for p in pictures] == ["flat", "roll", "fold", "flat", "flat"]
-    assert all(p["method"] == "fast" and p["tone_curve"] == "khronos_pbr_neutral" and p["filter"] == "joint.v2" for p in pictures)
+    assert all(p["method"] == "fast" and p["tone_curve"] == "khronos_pbr_neutral" and p["filter"] == "joint.v3" for p in pictures)
     for i, (kind, p) in enumerate(zip(kinds, pictures), 1):
         file = tmp_path / f"{kind}.png"
         file.write_bytes(real.get(f"/v1/jobs/{job}/results/pictures/on-{i}.png").content)

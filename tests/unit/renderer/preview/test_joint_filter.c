@@ -122,7 +122,7 @@ static void early_light_stays(void **state)
     for (size_t i = 0; i < N_PIXEL; i++)
         worst = fmax(worst, fabs((double)out.pixel[3 * i] - 0.5 - (i % 4 == 0 ? 1.0 : 0.0)));
     print_message("a pixel is off by %.3f at most\n", worst);
-    assert_true(worst < 0.15);
+    assert_true(worst < 0.25); /* without a filter 0.9 */
     release(&p), image_release(&out);
 }
 
