@@ -11,13 +11,19 @@ export class TwinView {
   #resting = 0;
   #share = SHARES.length - 1; // of the pixels along an edge, while it moves; the first picture is to come soon
   #observer;
+  #shown = null;
 
   // cloth: {description, buffer, whole?}; whole: a promise while only the first textures are in the buffer. Throws as TwinScene does.
   constructor(canvas, cloth, state) {
     this.#canvas = canvas;
     this.#state = state;
     this.#scene = new TwinScene(canvas, cloth.description, cloth.buffer, cloth.whole ? 1 : undefined);
-    cloth.whole?.then(() => { this.#scene?.finish(); this.draw(); }).catch(() => {});
+    // not before the draft is on the screen
+    Promise.all([cloth.whole, new Promise((done) => { this.#shown = done; })]).then(() => {
+      if (!cloth.whole) return;
+      this.#scene?.finish();
+      this.draw();
+    }).catch(() => {});
     this.#observer = new ResizeObserver(() => this.draw());
     this.#observer.observe(canvas);
   }
@@ -43,6 +49,7 @@ export class TwinView {
       if (took > FRAME_MS) this.#share = Math.min(this.#share + 1, SHARES.length - 1);
       else if (took < FRAME_MS / 3) this.#share = Math.max(this.#share - 1, 0);
       this.#canvas.dataset.drawn = "draft";
+      setTimeout(this.#shown);
       this.#resting = setTimeout(() => this.#rest(), REST_MS);
     });
   }
