@@ -36,7 +36,8 @@ static status check_wanted(const json_t *wanted, struct error *err)
     return error_set_field(err, STATUS_INVALID, "pictures", "nothing is asked for: give pictures, twin or export");
 }
 
-/* Makes the section "fit": the model of the result with its parameters. groups: receives the names of their sets. */
+/* Makes the section "fit": the model of the result with its parameters and its seed. groups: receives the names of
+ * their sets. */
 static json_t *fixed_fit(const json_t *result, json_t *groups)
 {
     const json_t *list = json_object_get(result, "parameters"), *p;
@@ -44,6 +45,8 @@ static json_t *fixed_fit(const json_t *result, json_t *groups)
                                                     "fixed", fixed, "result_file", DERIVED_RESULT);
     const char *last = NULL;
     size_t i;
+    const json_t *seed = json_object_get(result, "seed");
+    if (json_is_integer(seed)) json_object_set_new(fit, "seed", json_integer(json_integer_value(seed)));
     json_array_foreach(list, i, p)
     {
         const char *name = json_string_value(json_object_get(p, "name")),

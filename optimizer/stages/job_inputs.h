@@ -38,10 +38,11 @@ struct profile_rows {
 };
 
 /* The result of an earlier job whose parameters are shown: of each row of measured_rows.observation its rendered mean
- * and variance, and the smooth factor. */
+ * and variance, the smooth factor, and the paths that its fit took. */
 struct given_result {
     double (*rendered_rgb)[3], (*rendered_var)[3]; /* NULL: none was given */
     struct discrepancy factor;
+    uint64_t n_fit_path; /* of its fit; 0: not known */
 };
 
 /* A model of the job and its parameters before the fit. */

@@ -233,7 +233,7 @@ static double s_per_path(const struct job_plan *plan)
         n += (double)fits[i].result.n_path;
         s += fits[i].result.wall_s;
     }
-    return n > 0.0 ? s / n : NAN;
+    return n > 0.0 && s > 0.0 ? s / n : NAN;
 }
 
 /* Returns the best model so far: before the validation, its errors count as 0. */

@@ -16,9 +16,9 @@ enum { N_FITTED = 64, N_BETWEEN = 24, N_DIRECTION = N_FITTED + N_BETWEEN, N_REPL
 static const char model_id[] = "hair_mixture.v1";
 /* Beyond this angle lamps of a job are rare, and the published division by a cosine makes hair bright. */
 static const double most_theta_rad = 75.0 * M_PI / 180.0;
-/* Paths of the fit: as many as the job's own, between these. Each of the directions of the fitted cloth, and each
- * judgement, takes a share of them. */
-static const double least_budget = 1e6, most_budget = 4e6, traced_share = 0.35, judged_share = 0.25;
+/* Paths of the fit: twice as many as the job's own, between these. The directions of the fitted cloth, and each
+ * judgement, take shares of them. */
+static const double least_budget = 2e5, most_budget = 2e6, traced_share = 0.35, judged_share = 0.25;
 /* How many times as long as a path of a photograph a path with this model takes: on a twill. */
 static const double path_of_mixture = 1.6;
 
@@ -36,7 +36,7 @@ struct on_cloth {
 
 static double budget_of(double n_fit_path)
 {
-    return n_fit_path > 0.0 ? fmin(fmax(n_fit_path, least_budget), most_budget) : most_budget;
+    return n_fit_path > 0.0 ? fmin(fmax(2.0 * n_fit_path, least_budget), most_budget) : most_budget;
 }
 
 double hair_on_cloth_paths(double n_fit_path)

@@ -289,6 +289,7 @@ static status allocate_fits(size_t n_model, struct fit_output *out, struct error
 status fit_output_given(const struct job_inputs *in, struct fit_output *out, struct error *err)
 {
     status s = allocate_fits(in->n_model, out, err);
+    if (s == STATUS_OK) out->model->result.n_path = in->given.n_fit_path;
     for (size_t p = 0; s == STATUS_OK && p < in->model->sets.info.n_param; p++) {
         out->model->result.param[p] = in->model->parameter[p].start;
         out->model->result.uncertainty.se_param[p] = NAN;

