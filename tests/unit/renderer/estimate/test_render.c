@@ -170,6 +170,33 @@ static void bad_requests(void **state)
     scene_free(scene);
 }
 
+/* Samples lie evenly in a pixel, so that light which is scattered once has less noise than independent samples, whose
+ * variance is stated; samples from RENDER_HALF on are another half. */
+static void samples_lie_evenly(void **state)
+{
+    (void)state;
+    struct scene *scene = small_cloth(true);
+    struct render_request q = request(scene, &configuration[1]);
+    struct image half[2];
+    double square = 0, stated = 0;
+    q.input.want_derivative = false;
+    q.input.n_hit = 1;
+    for (size_t h = 0; h < 2; h++) {
+        q.first_sample = h * RENDER_HALF;
+        render_fixture_run(&q, 2, &half[h]);
+    }
+    for (size_t i = 0; i < q.width * q.height; i++)
+        for (size_t c = 0; c < 3; c++) {
+            const float *a = half[0].pixel + i * half[0].n_channel, *b = half[1].pixel + i * half[1].n_channel;
+            square += pow((double)a[c] - (double)b[c], 2);
+            stated += (double)a[3 + c] + (double)b[3 + c];
+        }
+    print_message("variance %.2f of that of independent samples\n", square / stated);
+    assert_true(square > 0.05 * stated && square < 0.9 * stated);
+    image_release(&half[0]), image_release(&half[1]);
+    scene_free(scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -178,6 +205,7 @@ int main(void)
         cmocka_unit_test(variance_is_that_of_the_mean),
         cmocka_unit_test(back_light),
         cmocka_unit_test(bad_requests),
+        cmocka_unit_test(samples_lie_evenly),
     };
     return cmocka_run_group_tests(tests, set_up, NULL);
 }
