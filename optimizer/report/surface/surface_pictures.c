@@ -158,15 +158,22 @@ static status write_json(struct report *report, const char *path, const json_t *
     return s;
 }
 
-/* The same of the studio. It is filtered and written after the first pass, and whenever the samples have doubled. */
+/* A picture is filtered after the first pass, whenever its samples have doubled, and in the end. */
+static bool is_filter_due(const struct job_surface_picture *p, const struct surface_passes *so_far)
+{
+    const size_t n = so_far->n_sample;
+    return n == p->sample || (n & (n - 1)) == 0;
+}
+
+/* The same of the studio, which shows the filtered picture alone. */
 static status write_studio(struct report *report, const struct one_picture *one, const struct surface_filter *filter,
                            const struct surface_passes *so_far, const struct surface_passes *shown,
                            struct surface_shown *how, struct error *err)
 {
-    const size_t n = so_far->n_sample;
-    const bool whole = n == report->in.results->surface_picture[one->i].sample;
-    status s = whole || (n & (n - 1)) == 0 ? surface_studio_write(report, one->i, filter, one->ground, so_far, how, err)
-                                           : STATUS_OK;
+    const struct job_surface_picture *p = &report->in.results->surface_picture[one->i];
+    const bool whole = so_far->n_sample == p->sample;
+    status s = is_filter_due(p, so_far) ? surface_studio_write(report, one->i, filter, one->ground, so_far, how, err)
+                                        : STATUS_OK;
     return s == STATUS_OK && whole ? result_exr_write(report, &shown->image, "pictures", so_far->name, err) : s;
 }
 
@@ -176,22 +183,28 @@ static status write_entry(struct report *report, const struct one_picture *one, 
                           const struct surface_passes *so_far, json_t **out, struct error *err)
 {
     const struct job_surface_picture *p = &report->in.results->surface_picture[one->i];
-    json_t *filtered = NULL;
     struct surface_passes shown;
     status s = surface_ground_add(one->ground, so_far, &shown, err);
     if (s != STATUS_OK) return s;
+    json_t *filtered = json_incref(json_object_get(*out, "filtered")); /* of an earlier pass */
     const bool studio = surface_studio_is(p);
-    struct surface_shown how = {.exposure = studio ? studio_exposure(&so_far->image) : exposure_of(&shown.image)};
+    struct surface_shown how = {.exposure = studio ? studio_exposure(&so_far->image) : exposure_of(&shown.image),
+                                .error = NAN};
     s = studio ? write_studio(report, one, filter, so_far, &shown, &how, err)
                : write_picture(report, p, &shown, how.exposure, err);
-    if (s == STATUS_OK && !studio)
+    if (s == STATUS_OK && !studio && is_filter_due(p, so_far)) {
+        json_decref(filtered);
         s = surface_filter_write(report, filter, one->ground, so_far, how.exposure, &filtered, err);
+    }
     if (s == STATUS_OK) {
         json_decref(*out);
         *out = picture_json(one, p, &shown, how.exposure);
     }
     surface_passes_release(&shown);
-    if (s != STATUS_OK) return s;
+    if (s != STATUS_OK) {
+        json_decref(filtered);
+        return s;
+    }
     if (studio) surface_studio_put(*out, p, filter, &how);
     if (one->how.method == JOB_PICTURE_FAST) surface_fit_put(*out, one->fit);
     if (p->speckle) json_object_set_new(*out, "speckle", json_true());
