@@ -10,7 +10,7 @@ The factor on deep light is fitted to paths of the crop, as many as the picture'
   pictures.<fabric>.flip_unfiltered       the same before the filter
   pictures.<fabric>.flip_path_equal_time  the same of path tracing without a filter, in the time of the fast picture with its filter
   pictures.<fabric>.field_error           difference of the fast picture from the reference: root mean square over fields of 4 x 4 pixels and
-                                          channels, over the mean of all channels, less the noise of both
+                                          channels, over the mean of all channels; noise falls out by a second fast picture
   pictures.<fabric>.wall_s                seconds of a fast picture of 1,024 x 1,024 pixels that shows nothing but cloth, with its filter, on
                                           two cores: what does not grow with pixels is timed in a picture of 8 x 8
   pictures.<fabric>.precompute_s          processor seconds of the tables, over two cores
@@ -62,9 +62,9 @@ def run(build, folder, job, seed):
         return json.load(f)
 
 
-def picture(folder, px, name="on-1", prefix=""):
+def picture(folder, px, name="on-1"):
     with open(os.path.join(folder, "results", "pictures", f"{name}.exr"), "rb") as f:
-        _, _, pixel = read_exr(f.read(), prefix)
+        _, _, pixel = read_exr(f.read())
     return [pixel(x, y) for y in range(px) for x in range(px)]
 
 
@@ -73,15 +73,16 @@ def mean_of(picture_):
 
 
 def fields(values, px):
-    """Means over 4 x 4 pixels and, of variances, their variances over 16."""
+    """Means over 4 x 4 pixels."""
     return [[sum(values[(4 * j + v) * px + 4 * i + u][c] for v in range(4) for u in range(4)) / 16 for c in range(3)]
             for j in range(px // 4) for i in range(px // 4)]
 
 
-def field_error(a, var_a, b, var_b, px):
-    square = [(x - y) ** 2 for p, q in zip(fields(a, px), fields(b, px)) for x, y in zip(p, q)]
-    noise = [(x + y) / 16 for p, q in zip(fields(var_a, px), fields(var_b, px)) for x, y in zip(p, q)]
-    return max(0.0, sum(square) / len(square) - sum(noise) / len(noise)) ** 0.5 / mean_of(b)
+def field_error(pictures, references, px):
+    """By two pictures and two references, whose noise is independent, so that it falls out of the product of differences."""
+    a, b, r, q = (fields(values, px) for values in (*pictures, *references))
+    square = [(w - y) * (x - z) for f in zip(a, b, r, q) for w, x, y, z in zip(*f)]
+    return max(0.0, sum(square) / len(square)) ** 0.5 / mean_of(references[0])
 
 
 def print_figure(name, value, unit="", better="lower"):
@@ -97,23 +98,23 @@ def bench(a, python, name):
     run(a.build, traced, crop_document(name, a.px, SHAPE, samples=FILTERED_SAMPLES, filter=True), seed=7)
     by_tables = {"samples": FAST_SAMPLES, "method": "fast", "deep_light_paths": a.deep_paths, "filter": True}
     fast = os.path.join(folder, f"fast-{a.deep_paths}")
-    fast_s, precompute_s, fit_s = run(a.build, fast, crop_document(name, a.px, SHAPE, **by_tables), seed=9)
+    fast_s, precompute_s, fit_s = run(a.build, fast, crop_document(name, a.px, SHAPE + SHAPE, **by_tables), seed=9)
     tiny = {**by_tables, "deep_light_paths": 10000}
-    fixed_s, _, _ = run(a.build, os.path.join(folder, "tiny"), crop_document(name, TINY_PX, SHAPE, **tiny), seed=9)
+    fixed_s, _, _ = run(a.build, os.path.join(folder, "tiny"), crop_document(name, TINY_PX, SHAPE + SHAPE, **tiny), seed=9)
+    fast_s, fit_s, fixed_s = fast_s / 2, fit_s / 2, fixed_s / 2
     whole_fit = max(1.0, MOST_FIT / (a.px ** 2 * FAST_SAMPLES // SAMPLES_OF_FIT))
     equal = max(1, round((fast_s - fixed_s + fit_s * whole_fit * (a.px / WHOLE_PX) ** 2) / sample_s))
     equal_time = os.path.join(folder, f"path-{equal}")
     run(a.build, equal_time, crop_document(name, a.px, SHAPE, samples=equal), seed=8)
     sums, of_fields = [0.0] * 5, 0.0
     for i, (shape, halves) in enumerate(at.items(), 1):
-        parts, variances = [picture(h, a.px) for h in halves], [picture(h, a.px, prefix="var.") for h in halves]
+        parts = [picture(h, a.px) for h in halves]
         reference = [tuple((x + y) / 2 for x, y in zip(p, q)) for p, q in zip(*parts)]
-        variance = [tuple((x + y) / 4 for x, y in zip(p, q)) for p, q in zip(*variances)]
         shown = [picture(fast, a.px, f"on-{i}-filtered"), picture(fast, a.px, f"on-{i}"), picture(equal_time, a.px, f"on-{i}"),
                  picture(traced, a.px, f"on-{i}-filtered"), picture(traced, a.px, f"on-{i}")]
         of = flip(python, a.px, reference, shown)
         sums = [x + y / len(at) for x, y in zip(sums, of)]
-        of_field = field_error(shown[1], picture(fast, a.px, f"on-{i}", "var."), reference, variance, a.px)
+        of_field = field_error([shown[1], picture(fast, a.px, f"on-{i + len(at)}")], parts, a.px)
         of_fields += of_field / len(at)
         print(f"{name}, {shape}: {a.px} x {a.px} pixels ({(a.px / WHOLE_PX) ** 2:.2%} of the picture), reference of {a.reference} samples, FLIP of its "
               f"halves {flip(python, a.px, parts[0], [parts[1]])[0]:.4f}; fast {of[0]:.4f}, without filter {of[1]:.4f}, fields {of_field:.4f}; path "
