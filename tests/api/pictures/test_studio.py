@@ -32,6 +32,8 @@ def test_views_of_the_studio(real, tmp_path):
     pictures = done["result"]["pictures"]
     assert [p["kind"] for p in pictures] == kinds and [p["on"] for p in pictures] == ["flat", "roll", "fold", "flat", "flat"]
     assert all(p["method"] == "fast" and p["tone_curve"] == "khronos_pbr_neutral" and p["filter"] == "joint.v3" for p in pictures)
+    # what is known of their error: noise after the filter, and of the tables
+    assert all(0 < p["noise"] < 1 and 0 < p["tables"]["error"] < 1 and p["tables"]["difference_se"] > 0 for p in pictures)
     for i, (kind, p) in enumerate(zip(kinds, pictures), 1):
         file = tmp_path / f"{kind}.png"
         file.write_bytes(real.get(f"/v1/jobs/{job}/results/pictures/on-{i}.png").content)
