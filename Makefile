@@ -121,6 +121,12 @@ $(eval $(call gathered,volume_formats.def,VOLUME_FORMAT,geometry/volume/format/t
 $(eval $(call gathered,exports.def,EXPORT,$(sort $(wildcard optimizer/report/*/export_*.c))))
 $(eval $(call gathered,cli_commands.def,CLI_COMMAND,$(sort $(shell find clients/cli -name '*.c'))))
 
+# files that programs write as they are: their bytes as an initialiser
+$(BUILD)/generated/selvedge_fiber.bytes: optimizer/report/export/selvedge_fiber.py
+	@mkdir -p $(@D)
+	@od -An -v -tu1 $< | sed 's/\([0-9][0-9]*\)/\1,/g' > $@
+GENERATED += $(BUILD)/generated/selvedge_fiber.bytes
+
 define part_rule
 $(BUILD)/lib/lib$(1).a: $$(call objs,$$(call srcs,$$(folder_$(1))))
 	@mkdir -p $$(@D)

@@ -133,8 +133,8 @@ static bool may_be_thinner(const struct boxed_scan *scan, const struct volume *v
     return found->several >= LEAST_SEVERAL && !(in_noise && trace_grid_edge(THINNER * scan->peak, v->n) < 1.0);
 }
 
-/* Tries a diameter between those of thin and thick fibers side by side. It is taken if its lines describe the box
- * better than those of `before`, and their radii spread, for a thicker diameter more than before. */
+/* Tries a diameter between thin and thick fibers side by side. It is taken if its lines describe the box
+ * better than the lines of `before`, and their radii spread, for a thicker diameter more than before. */
 static status try_between(const struct boxed_scan *scan, double ratio, const struct found *before, double *diameter,
                           struct error *err)
 {

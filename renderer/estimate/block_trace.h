@@ -22,13 +22,13 @@ struct estimate_blocks {
 
 /* Sums over the paths of one or more blocks, in path order: n_value sums, as many sums of squares, and for each pair of
  * members the sum of the products of their radiances, over all channels. Pair (a, b), b < a, has number a (a - 1) / 2 +
- * b. The counts are those of all sums of a task, in the first of them. */
+ * b. The first one counts for all sums of a task. */
 struct block_sum {
     uint64_t n_path, n_bounce;
     double *x, *x2, *pair;
 };
 
-/* n blocks of a group, the first of which is the begin-th after first_block. */
+/* n blocks of a group, beginning with the begin-th after first_block. */
 struct block_range {
     uint32_t i_group, first_block, begin, n, per_sum;
 };

@@ -95,7 +95,8 @@ def main():
                 continue
             material = export["materials"][0]
             stated = export.get("row_rel_rms", material.get("rel_rms"))
-            for seen, rel_rms in ((form, stated), ("usd_preview", material.get("preview_surface", {}).get("rel_rms"))):
+            exact = 0.0 if os.path.exists(os.path.join(folder, form, "exact.xml")) else None
+            for seen, rel_rms in ((form, stated), ("mitsuba_plugin", exact), ("usd_preview", material.get("preview_surface", {}).get("rel_rms"))):
                 if rel_rms is None:
                     continue
                 error, n, n_row = compare(arguments.python, seen, os.path.join(folder, form))

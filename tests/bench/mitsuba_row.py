@@ -1,11 +1,13 @@
 """Renders one row of an exported scene with Mitsuba 3, and prints its mean radiance: mitsuba_row.py FORMAT FOLDER ROW PX SPP. Run by a Python that
 has Mitsuba (pip install mitsuba usd-core), in a process of its own, because Mitsuba may end the process on an error.
 
-FORMAT mitsuba: the scene as it is. pbrt: what a reader of pbrt's grammar finds in the view of that row, with Mitsuba's hair material, which is the
-same as pbrt's. usd: what the USD library finds in the stage, with the hair material of its MaterialX network; lamp and camera are those of the row
-in rows.csv, which the stage has for the first row only. usd_preview: the same with the principled BSDF of the numbers of its preview surface.
+FORMAT mitsuba: the scene as it is. mitsuba_plugin: the scene with the exported plug-ins, which is fast with LLVM 19 named in DRJIT_LIBLLVM_PATH.
+pbrt: what a reader of pbrt's grammar finds in the view of that row, with Mitsuba's hair material, which is the same as pbrt's. usd: what the USD
+library finds in the stage, with the hair material of its MaterialX network; lamp and camera are those of the row in rows.csv, which the stage has
+for the first row only. usd_preview: the same with the principled BSDF of the numbers of its preview surface.
 textures: a plane with the maps of the U3M material, with their factors and without the rotation of the anisotropy."""
 import csv
+import importlib
 import json
 import os
 import subprocess
@@ -27,6 +29,12 @@ def place_of(folder, row):
 
 def mitsuba_scene(folder, row, px, spp):
     return mitsuba.load_file(os.path.join(folder, "scene.xml"), px=px, spp=spp, **place_of(folder, row))
+
+
+def mitsuba_plugin_scene(folder, row, px, spp):
+    sys.path.insert(0, folder)
+    importlib.import_module("selvedge_fiber")
+    return mitsuba.load_file(os.path.join(folder, "exact.xml"), px=px, spp=spp, **place_of(folder, row))
 
 
 def curves(folder, name, fibers, bsdf):
@@ -177,8 +185,9 @@ def usd_scene(folder, row, px, spp, preview=False):
 
 def main():
     form, folder, row, px, spp = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), int(sys.argv[5])
-    mitsuba.set_variant("scalar_rgb")
-    makers = {"mitsuba": mitsuba_scene, "pbrt": pbrt_scene, "usd": usd_scene, "usd_preview": usd_preview_scene, "textures": textures_scene}
+    mitsuba.set_variant("llvm_ad_rgb" if "DRJIT_LIBLLVM_PATH" in os.environ else "scalar_rgb")
+    makers = {"mitsuba": mitsuba_scene, "mitsuba_plugin": mitsuba_plugin_scene,
+              "pbrt": pbrt_scene, "usd": usd_scene, "usd_preview": usd_preview_scene, "textures": textures_scene}
     scene = makers[form](folder, row, px, spp)
     picture = numpy.array(mitsuba.render(scene))
     print(json.dumps([float(x) for x in picture[..., :3].mean((0, 1))]))

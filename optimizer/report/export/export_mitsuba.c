@@ -1,7 +1,9 @@
 /* results/export/mitsuba/: the fitted cloth for Mitsuba 3. scene.xml holds the tile of fibers, repeated, with the hair
- * lobes that come nearest to the fitted scattering (hair_fit.h), lamp, camera and black sheet of the first row;
- * fibers-<group>.txt the fibers of one group. Of a scanned cloth also density.vol, direction.vol and sggx.vol with
- * float32 samples, as Mitsuba's gridvolume reads them. */
+ * lobes that come nearest to the fitted cloth (hair_on_cloth.h), lamp, camera and black sheet of the first row;
+ * fibers-<group>.txt the fibers of one group. Of models that selvedge_fiber.py knows, exact.xml is the same scene with
+ * the scattering as it was fitted, by the plug-ins of that file. Of a scanned cloth also density.vol, direction.vol and
+ * sggx.vol with float32 samples, as Mitsuba's gridvolume reads them. */
+#include "base/angle.h"
 #include "geometry/volume/format/vol_file.h"
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/job_scan.h"
@@ -9,10 +11,21 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 static const double mm = 1e3;
 /* Least projected area of the flakes along the fiber, over that across it. */
 static const double least_along = 0.02;
+
+static const unsigned char plugin[] = {
+#include "generated/selvedge_fiber.bytes"
+};
+
+bool export_mitsuba_is_exact(const struct export_scene *e)
+{
+    const char *id = e->model->setup->appearance.id;
+    return strcmp(id, "two_lobe.v1") == 0 || strcmp(id, "textile.v3") == 0;
+}
 
 static void print_fiber(FILE *text, const struct export_scene *e, size_t i)
 {
@@ -74,13 +87,32 @@ static void print_material(FILE *text, const struct hair_blend *b)
     fprintf(text, "    </bsdf>\n");
 }
 
-static void print_tile(FILE *text, const struct export_scene *e)
+/* The fitted parameters of a group in the units of the job, with "_" for "." in their names. */
+static void print_fitted(FILE *text, const struct export_scene *e, size_t group)
+{
+    const struct appearance *a = &e->model->setup->appearance;
+    const double *param = e->model->fit->result.param + group * a->n_param;
+    fprintf(text, "    <bsdf type=\"selvedge_fiber\">\n      <string name=\"model\" value=\"%s\"/>\n", a->id);
+    for (size_t p = 0; p < a->n_param; p++) {
+        char name[64];
+        snprintf(name, sizeof name, "%s", a->param[p].name);
+        for (char *c = strchr(name, '.'); c != NULL; c = strchr(c, '.')) *c = '_';
+        fprintf(text, "      <float name=\"%s\" value=\"%.9g\"/>\n", name,
+                param[p] / (a->param[p].unit == PARAM_UNIT_DEG ? RAD_PER_DEG : 1.0));
+    }
+    fprintf(text, "    </bsdf>\n");
+}
+
+static void print_tile(FILE *text, const struct export_scene *e, bool exact)
 {
     fprintf(text, "  <shape type=\"shapegroup\" id=\"tile\">\n");
     for (size_t g = 0; g < e->model->setup->sets.n_set; g++) {
         fprintf(text, "   <shape type=\"bsplinecurve\">\n    <string name=\"filename\" value=\"fibers-%zu.txt\"/>\n",
                 g);
-        print_material(text, &e->hair[g].blend);
+        if (exact)
+            print_fitted(text, e, g);
+        else
+            print_material(text, &e->hair[g].blend);
         fprintf(text, "   </shape>\n");
     }
     fprintf(text, "  </shape>\n");
@@ -159,7 +191,7 @@ static void print_defaults(FILE *text, const struct export_view *v)
     fprintf(text, "  <default name=\"px\" value=\"256\"/>\n  <default name=\"spp\" value=\"64\"/>\n");
 }
 
-static status write_scene(const struct export_scene *e, struct error *err)
+static status write_scene(const struct export_scene *e, bool exact, struct error *err)
 {
     const struct configuration *k = &e->report->in.job->rows->observation.item[0].configuration;
     const struct export_view v = export_view_of(e, k);
@@ -169,16 +201,31 @@ static status write_scene(const struct export_scene *e, struct error *err)
     fprintf(t.file,
             "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n"
             "<!-- Made by Selvedge, for Mitsuba 3. Lengths are millimetres, radiances those of the job's rows.\n"
-            "     `mitsuba -D lamp_x=... -D camera_x=... scene.xml` shows another row of rows.csv. -->\n"
-            "<scene version=\"3.0.0\">\n");
+            "     `mitsuba -D lamp_x=... -D camera_x=... scene.xml` shows another row of rows.csv.%s -->\n"
+            "<scene version=\"3.0.0\">\n",
+            exact ? "\n     Python that loads this file imports selvedge_fiber first, which has the plug-ins." : "");
     print_defaults(t.file, &v);
-    fprintf(t.file, "  <integrator type=\"path\"><integer name=\"max_depth\" value=\"-1\"/></integrator>\n");
+    if (exact)
+        fprintf(t.file,
+                "  <integrator type=\"selvedge_path\"><boolean name=\"whole_width\" value=\"%s\"/></integrator>\n",
+                e->model->setup->appearance.surface->across_width ? "true" : "false");
+    else
+        fprintf(t.file, "  <integrator type=\"path\"><integer name=\"max_depth\" value=\"-1\"/></integrator>\n");
     print_camera(t.file, k, &v);
     print_lights(t.file, k, &v);
-    print_tile(t.file, e);
+    print_tile(t.file, e, exact);
     print_repeats(t.file, e);
     fprintf(t.file, "</scene>\n");
-    return export_text_close(e, &t, "scene.xml", err);
+    return export_text_close(e, &t, exact ? "exact.xml" : "scene.xml", err);
+}
+
+static status write_exact_scene(const struct export_scene *e, struct error *err)
+{
+    char path[WORKER_PATH_BYTES];
+    if (!export_mitsuba_is_exact(e)) return STATUS_OK;
+    export_path(e, "selvedge_fiber.py", path);
+    status s = worker_folder_replace(e->report->in.job->tools->folder, path, plugin, sizeof plugin, err);
+    return s == STATUS_OK ? write_scene(e, true, err) : s;
 }
 
 static status write_mitsuba(struct export_scene *e, json_t **materials, struct error *err)
@@ -188,7 +235,8 @@ static status write_mitsuba(struct export_scene *e, json_t **materials, struct e
         s = export_fibers_write(e, g, ".txt", print_fiber, err);
     if (s == STATUS_OK) s = write_volumes(e, err);
     if (s == STATUS_OK) s = export_rows_write(e, err);
-    if (s == STATUS_OK) s = write_scene(e, err);
+    if (s == STATUS_OK) s = write_scene(e, false, err);
+    if (s == STATUS_OK) s = write_exact_scene(e, err);
     if (s == STATUS_OK) *materials = export_hair_json(e);
     return s;
 }

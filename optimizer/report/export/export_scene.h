@@ -94,6 +94,9 @@ void export_repeat_at(const struct export_scene *e, const int n[2], int i, int j
 /* Half widths and height of the black sheet; false: the job has none. */
 bool export_sheet(const struct export_scene *e, double half_mm[2], double *z_mm);
 
+/* Whether the plug-ins of the export for Mitsuba evaluate the fitted model itself. */
+bool export_mitsuba_is_exact(const struct export_scene *e);
+
 /* rows.csv: lamp and camera of every row with its measured and rendered radiance. */
 status export_rows_write(const struct export_scene *e, struct error *err);
 

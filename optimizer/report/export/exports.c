@@ -95,8 +95,9 @@ static void warn_of_hair(const struct export_scene *e)
     else if (e->hair_error.row_rel_rms > most_row_error)
         worker_status_warn(e->report->in.job->tools->status,
                            "with the hair materials that other programs have, the cloth differs from this job's "
-                           "renderings by %.0f %% over its rows; Mitsuba with the exported plug-in shows it as it is",
-                           percent * e->hair_error.row_rel_rms);
+                           "renderings by %.0f %% over its rows%s",
+                           percent * e->hair_error.row_rel_rms,
+                           export_mitsuba_is_exact(e) ? "; exact.xml of the export for Mitsuba shows it as it is" : "");
 }
 
 static void warn_of_rest(const struct export_scene *e)

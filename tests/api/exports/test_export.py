@@ -1,16 +1,19 @@
 """Exports of a job to other programs: the files, what the result says of them, and whether the other program opens them."""
 import csv
+import json
 import os
 import subprocess
 
 import pytest
-from daemon_under_test import problem, program
+from daemon_under_test import ROOT, problem, program
 from small_cloth import start_small_job
 
 pytestmark = pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")
 FIT = {"path_budget": 20000, "render_px": 8, "render_samples": 1}
 PYTHON = os.path.join(os.path.dirname(os.path.dirname(program("selvedge-worker"))), "exports-python", "bin", "python")
 ROW = os.path.join(os.path.dirname(__file__), "..", "..", "bench", "mitsuba_row.py")
+PLUG_IN_CHECK = os.path.join(ROOT, "tests", "support", "python", "mitsuba_fiber.py")
+PLUG_IN = os.path.join(ROOT, "optimizer", "report", "export", "selvedge_fiber.py")
 
 
 def document(**more):
@@ -29,7 +32,7 @@ def save(real, job, folder):
 def test_a_scene_for_mitsuba(real, tmp_path):
     job = start_small_job(real, document())
     result = real.wait_state(job, "succeeded", timeout_s=400)["result"]
-    assert save(real, job, tmp_path) == ["conversion.json", "fibers-0.txt", "rows.csv", "scene.xml"]
+    assert save(real, job, tmp_path) == ["conversion.json", "exact.xml", "fibers-0.txt", "rows.csv", "scene.xml", "selvedge_fiber.py"]
     (export,) = result["exports"]
     (material,) = export["materials"]
     assert export["format"] == "mitsuba" and material["group"] is None
@@ -42,8 +45,22 @@ def test_a_scene_for_mitsuba(real, tmp_path):
     assert [float(r["rendered_g"]) for r in rows] == pytest.approx([r["rendered"][1] for r in result["rows"]], rel=1e-6)
     if not os.access(PYTHON, os.X_OK):
         pytest.skip("the files are right; no Mitsuba to open them with (make test installs it where there is a package index)")
-    done = subprocess.run([PYTHON, ROW, "mitsuba", str(tmp_path), "0", "8", "16"], capture_output=True, text=True, check=True)
-    assert all(x > 0 for x in map(float, done.stdout.strip("[]\n").split(",")))
+    for form, samples in (("mitsuba", "16"), ("mitsuba_plugin", "2")):
+        done = subprocess.run([PYTHON, ROW, form, str(tmp_path), "0", "8", samples], capture_output=True, text=True, check=True)
+        assert all(x > 0 for x in map(float, done.stdout.strip("[]\n").split(",")))
+
+
+def test_the_plug_ins_for_mitsuba_scatter_as_the_models_do():
+    """textile.v3 with clear fibers gives all light back; samples have the density that is stated for them."""
+    if not os.access(PYTHON, os.X_OK):
+        pytest.skip("no Mitsuba (make test installs it where there is a package index)")
+    done = subprocess.run([PYTHON, PLUG_IN_CHECK, PLUG_IN], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    for view in json.loads(done.stdout):
+        assert view["pdf"] == pytest.approx(1, abs=1e-3), view
+        assert abs(view["mean"] - view["given_back"]) < 4 * view["se"], view
+        if view["model"] == "textile.v3":
+            assert view["given_back"] == pytest.approx(1, abs=1e-3), view  # by quadrature: both of its sums are exact to 1e-4
 
 
 @pytest.mark.slow
