@@ -22,7 +22,7 @@ struct estimate_blocks {
 
 /* Sums over the paths of one or more blocks, in path order: n_value sums, as many sums of squares, and for each pair of
  * members the sum of the products of their radiances, over all channels. Pair (a, b), b < a, has number a (a - 1) / 2 +
- * b. The first one counts for all sums of a task. */
+ * b. The first of a task has the counts of all its sums. */
 struct block_sum {
     uint64_t n_path, n_bounce;
     double *x, *x2, *pair;

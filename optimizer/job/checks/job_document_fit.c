@@ -43,7 +43,7 @@ static status parse_model_list(const struct json_field *f, const char *const *na
     fit->n_model = 0;
     for (size_t i = 0; i < json_array_size(list); i++) {
         const char *id = json_string_value(json_array_get(list, i));
-        char path[JSON_PATH_BYTES], known[400];
+        char path[JSON_PATH_BYTES], known[600];
         size_t k = 0;
         snprintf(path, sizeof path, "fit.models[%zu]", i);
         while (name[k] != NULL && (id == NULL || strcmp(id, name[k]) != 0)) k++;
