@@ -54,7 +54,7 @@ status json_field_check_keys(const struct json_field *f, const char *const *allo
         size_t i = 0;
         while (allowed[i] != NULL && strcmp(allowed[i], key) != 0) i++;
         if (allowed[i] != NULL) continue;
-        char path[JSON_PATH_BYTES], list[400];
+        char path[JSON_PATH_BYTES], list[600];
         json_field_path(f, key, path);
         json_list_text(allowed, list, sizeof list);
         const char *meant = word_guess(key, allowed);
@@ -199,7 +199,7 @@ status json_field_choice(const struct json_field *f, const char *key, const char
 {
     const json_t *value = json_object_get(f->object, key);
     if (value == NULL) return STATUS_OK;
-    char path[JSON_PATH_BYTES], list[300];
+    char path[JSON_PATH_BYTES], list[600];
     json_field_path(f, key, path);
     json_list_text(allowed, list, sizeof list);
     if (!json_is_string(value))
