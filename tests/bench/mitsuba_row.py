@@ -186,6 +186,7 @@ def usd_scene(folder, row, px, spp, preview=False):
 def main():
     form, folder, row, px, spp = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), int(sys.argv[5])
     mitsuba.set_variant("llvm_ad_rgb" if "DRJIT_LIBLLVM_PATH" in os.environ else "scalar_rgb")
+    mitsuba.set_log_level(mitsuba.LogLevel.Error)  # warnings would stand in what is printed
     makers = {"mitsuba": mitsuba_scene, "mitsuba_plugin": mitsuba_plugin_scene,
               "pbrt": pbrt_scene, "usd": usd_scene, "usd_preview": usd_preview_scene, "textures": textures_scene}
     scene = makers[form](folder, row, px, spp)

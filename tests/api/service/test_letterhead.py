@@ -7,7 +7,7 @@ import shutil
 import subprocess
 
 import pytest
-from daemon_under_test import Daemon, program, settings_arguments
+from daemon_under_test import Daemon, program, settings_arguments, wait_until
 from small_cloth import start_small_job
 from small_png import png
 
@@ -70,7 +70,7 @@ def test_a_pdf_that_cannot_be_made_is_said_at_once(tmp_path):
     """At the start, by the doctor, and at the check of a job that asks for it."""
     (tmp_path / "bin").mkdir()
     with Daemon(tmp_path / "data", worker=None, environment={"PATH": str(tmp_path / "bin")}) as d:
-        assert "jobs get no report.pdf: there is no program 'weasyprint'" in d.log_text()
+        wait_until(lambda: "jobs get no report.pdf: there is no program 'weasyprint'" in d.log_text(), what="the words about report.pdf")
         for pdf in (False, True):
             job = d.create({**DOCUMENT, "export": {"pdf": pdf}})
             warnings = d.post(f"/v1/jobs/{job}/check").json()["warnings"]
