@@ -36,6 +36,9 @@ const environment = {
   window: (d) => (box(d, 60, 150, 24) ? [7, 7.6, 8.2] : d[2] > 0 ? [0.14, 0.13, 0.12] : [0.05, 0.05, 0.04]),
 };
 export const environmentNames = Object.keys(environment);
+// What is seen behind the cloth, as shown on the screen. Alone in the light of a lamp stands what is measured: on black.
+const backdrop = { studio: [0.9, 0.9, 0.9], daylight: [0.8, 0.86, 0.93], evening: [0.24, 0.19, 0.2], "overcast sky": [0.84, 0.86, 0.88], window: [0.76, 0.76, 0.75] };
+export const backdropOf = (name) => backdrop[name] ?? [0, 0, 0];
 export const MOST_LIGHTS = 12;
 
 const fibonacci = (i, n) => {

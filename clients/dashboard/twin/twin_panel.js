@@ -5,7 +5,7 @@ import { shapeNames } from "./twin_shapes.js";
 import { turntable } from "./twin_turntable.js";
 import { TwinView } from "./twin_view.js";
 
-const START = { shape: "drape", theta: 50, phi: 250, width: 42, center: [0, 0, 0], lampTheta: 50, lampPhi: 200, lampPower: 1, environment: "lamp only", exposure: 1 };
+const START = { shape: "drape", theta: 50, phi: 250, width: 42, center: [0, 0, 0], lampTheta: 50, lampPhi: 200, lampPower: 1, environment: "studio", exposure: 1 };
 
 function node(name, attributes = {}, ...children) {
   const made = document.createElement(name);

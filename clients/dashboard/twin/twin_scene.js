@@ -1,5 +1,5 @@
 // Draws the twin with WebGL 2: the tables as textures, one shape, one lamp with its shadow map, and parallel lights.
-import { cameraFrom, direction, lightsOf, MOST_LIGHTS } from "./twin_lights.js";
+import { backdropOf, cameraFrom, direction, lightsOf, MOST_LIGHTS } from "./twin_lights.js";
 import { TwinNear } from "./twin_near.js";
 import { glProgram } from "./twin_program.js";
 import { depthFragmentText, depthVertexText, fragmentText, vertexText } from "./twin_shaders.js";
@@ -207,7 +207,7 @@ export class TwinScene {
     gl.bindVertexArray(this.#shape.array);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, canvas.width, canvas.height);
-    gl.clearColor(0, 0, 0, 1);
+    gl.clearColor(...backdropOf(state.environment), 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.useProgram(this.#surface);
     this.#set("uniformMatrix4fv", "camera", false, eye.matrix);
