@@ -18,7 +18,7 @@ static const char model_id[] = "hair_mixture.v1";
 static const double most_theta_rad = 75.0 * M_PI / 180.0;
 /* Paths of the fit: twice as many as the job's own, between these. The directions of the fitted cloth, and each
  * judgement, take shares of them. */
-static const double least_budget = 2e5, most_budget = 2e6, traced_share = 0.35, judged_share = 0.25;
+static const double least_budget = 1e6, most_budget = 2e6, traced_share = 0.35, judged_share = 0.15;
 /* How many times as long as a path of a photograph a path with this model takes: on a twill. */
 static const double path_of_mixture = 1.6;
 
