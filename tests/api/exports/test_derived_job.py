@@ -32,12 +32,12 @@ def text_of(real, job, path):
     return reply.text
 
 
+HAIR = re.compile(r'(name="(?:weight|longitudinal_roughness|azimuthal_roughness|int_ior|sigma_a)" value=")[^"]*')
+
+
 def is_same_scene(ours, theirs):
-    """The hair is fitted again, with as many paths; only the parameters are rounded in result.json."""
-    scenes = [re.split(r'(?<=value=")([0-9. ]+)(?="/>)', scene) for scene in (ours, theirs)]
-    assert scenes[0][::2] == scenes[1][::2]
-    numbers = [[float(x) for value in scene[1::2] for x in value.split()] for scene in scenes]
-    assert numbers[0] == pytest.approx(numbers[1], rel=0.2, abs=0.02)
+    """All but the numbers of the hair, which is fitted again: from parameters that are rounded in result.json."""
+    assert len(HAIR.findall(ours)) >= 9 and HAIR.sub(r"\1", ours) == HAIR.sub(r"\1", theirs)
 
 
 def derive(real, job, **wanted):
