@@ -172,7 +172,7 @@ static status find_pieces(const struct boxed_scan *scan, const struct volume *v,
                           struct error *err)
 {
     double n_end = found->n_end, n_lost = found->n_lost;
-    struct found other;
+    struct found other = {0};
     status s = STATUS_OK;
     report->in_pieces = false;
     for (int i = 1; i < TRACE_N_BOX && s == STATUS_OK && n_lost >= LEAST_LOST_ENDS * n_end; i++) {

@@ -33,7 +33,7 @@ static void place_samples(const struct run *r, const struct rng_key *key, size_t
                           double (*xy)[2])
 {
     static const double step[2] = {0.7548776662466927, 0.5698402909980532};
-    const size_t corner[2] = {i_pixel % r->q->width, i_pixel / r->q->width};
+    const size_t corner[2] = {i_pixel % r->q->width, i_pixel / r->q->width}, size[2] = {r->q->width, r->q->height};
     struct rng rng;
     double start[2];
     rng_start(&rng, key, (uint32_t)i_pixel, UINT32_MAX - (uint32_t)(first / RENDER_HALF));
@@ -41,7 +41,7 @@ static void place_samples(const struct run *r, const struct rng_key *key, size_t
     for (size_t i = 0; i < n; i++)
         for (int a = 0; a < 2; a++) {
             const double u = start[a] + (double)(first + i) * step[a];
-            xy[i][a] = ((double)corner[a] + u - floor(u)) / (double)r->q->width;
+            xy[i][a] = ((double)corner[a] + u - floor(u)) / (double)size[a];
         }
 }
 
