@@ -9,7 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
-static uint8_t srgb_byte(double linear)
+uint8_t image_srgb_byte(double linear)
 {
     double v = linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055;
     if (!(v > 0)) return 0; /* NaN too */
@@ -36,17 +36,43 @@ static status write_file(png_image *png, const uint8_t *rgb, const char *path, s
                       : error_set(err, STATUS_IO, "cannot write image '%s': %s", path, png->message);
 }
 
+static status describe(png_image *png, size_t width, size_t height, const char *name, struct error *err)
+{
+    memset(png, 0, sizeof *png);
+    if (width == 0 || height == 0 || width > 1u << 16 || height > 1u << 16)
+        return error_set(err, STATUS_INVALID, "cannot write image '%s': %zu x %zu pixels", name, width, height);
+    png->version = PNG_IMAGE_VERSION;
+    png->width = (png_uint_32)width;
+    png->height = (png_uint_32)height;
+    png->format = PNG_FORMAT_RGB;
+    return STATUS_OK;
+}
+
 status image_write_png_rgb8(const uint8_t *rgb, size_t width, size_t height, const char *path, struct error *err)
 {
     png_image png;
-    memset(&png, 0, sizeof png);
-    if (width == 0 || height == 0 || width > 1u << 16 || height > 1u << 16)
-        return error_set(err, STATUS_INVALID, "cannot write image '%s': %zu x %zu pixels", path, width, height);
-    png.version = PNG_IMAGE_VERSION;
-    png.width = (png_uint_32)width;
-    png.height = (png_uint_32)height;
-    png.format = PNG_FORMAT_RGB;
-    return write_file(&png, rgb, path, err);
+    status s = describe(&png, width, height, path, err);
+    return s == STATUS_OK ? write_file(&png, rgb, path, err) : s;
+}
+
+status image_png_bytes_rgb8(const uint8_t *rgb, size_t width, size_t height, uint8_t **bytes, size_t *n_byte,
+                            struct error *err)
+{
+    png_image png;
+    png_alloc_size_t n = 0;
+    *bytes = NULL;
+    status s = describe(&png, width, height, "in memory", err);
+    if (s != STATUS_OK) return s;
+    n = PNG_IMAGE_PNG_SIZE_MAX(png);
+    *bytes = malloc(n);
+    if (*bytes != NULL && png_image_write_to_memory(&png, *bytes, &n, 0, rgb, 0, NULL) != 0) {
+        *n_byte = n;
+        return STATUS_OK;
+    }
+    png_image_free(&png);
+    free(*bytes);
+    *bytes = NULL;
+    return error_set(err, STATUS_NO_MEMORY, "cannot make a PNG image: out of memory");
 }
 
 status image_write_png(const struct image *im, double exposure, const char *path, struct error *err)
@@ -57,7 +83,8 @@ status image_write_png(const struct image *im, double exposure, const char *path
     uint8_t *rgb = malloc(3 * n);
     if (rgb == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot write image '%s': out of memory", path);
     for (size_t i = 0; i < n; i++)
-        for (size_t c = 0; c < 3; c++) rgb[3 * i + c] = srgb_byte((double)im->pixel[i * im->n_channel + c] * exposure);
+        for (size_t c = 0; c < 3; c++)
+            rgb[3 * i + c] = image_srgb_byte((double)im->pixel[i * im->n_channel + c] * exposure);
     status st = image_write_png_rgb8(rgb, im->width, im->height, path, err);
     free(rgb);
     return st;

@@ -4,14 +4,11 @@
  * rotation in turns, of the direction across the fibers), maps.exr (all of them as floats, with the height),
  * cloth.mtlx and cloth.u3m (texture_documents.h). Of the parameters, texture_surface.h. */
 #include "base/files/durable.h"
-#include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/report/export/export_scene.h"
-#include "optimizer/report/result/result_pictures.h"
 #include "optimizer/report/textures/texture_documents.h"
+#include "optimizer/report/textures/texture_tile.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
-#include "optimizer/stages/validation/pipeline_discrepancy.h"
-#include "renderer/estimate/render.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -19,15 +16,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum {
-    DEFAULT_PX = 96,
-    MIN_EDGE = 16,
-    MAX_EDGE = 512,
-    MIN_SAMPLE = 64,
-    SAMPLES_OF_A_RENDERING = 4,
-    N_CHANNEL = 16,
-    STREAM = 4090
-};
+enum { N_CHANNEL = 16 };
 static const char *const channel[N_CHANNEL] = {"R",
                                                "G",
                                                "B",
@@ -47,107 +36,10 @@ static const char *const channel[N_CHANNEL] = {"R",
 
 struct textures {
     struct export_scene *e;
-    struct texture_maps maps;
+    struct texture_tile tile;
     struct texture_surface surface;
     struct texture_principled principled;
-    struct image reflected, transmitted; /* 3 channels */
-    double noise;                        /* relative standard error of a pixel of `reflected`, root mean square */
 };
-
-/* ---- renderings of one tile under even light of radiance 1 ---- */
-
-static size_t edge_of(const struct job_results *results)
-{
-    const size_t edge = 2 * (results->render_px > 0 ? results->render_px : DEFAULT_PX);
-    return edge < MIN_EDGE ? MIN_EDGE : edge > MAX_EDGE ? MAX_EDGE : edge;
-}
-
-static size_t samples_of(const struct job_results *results, size_t n_row, double n_fit_path)
-{
-    const size_t n = SAMPLES_OF_A_RENDERING * result_picture_samples(results, n_row, n_fit_path);
-    return n > MIN_SAMPLE ? n : MIN_SAMPLE;
-}
-
-/* A path of a tile under even light takes a shorter time than a path of a photograph: on a twill 3.6 us. Fitting and
- * writing the textures takes a share of the export's time. */
-static const double path_of_tile = 0.42, fit_share = 0.2;
-
-/* Paths of a photograph that take as long as the renderings of one tile above a black sheet and without one, the fit of
- * the textures and their files. */
-static double texture_paths(const struct job_results *results, size_t n_row, double n_fit_path)
-{
-    const double edge = (double)edge_of(results);
-    return 2.0 * path_of_tile * edge * edge * (double)samples_of(results, n_row, n_fit_path) / (1.0 - fit_share);
-}
-
-/* Renders the tile above a black sheet, which is the first half of the progress of both renderings, or without one. */
-static status render_tile(const struct textures *t, bool black_sheet, struct image *im, struct error *err)
-{
-    struct report *report = t->e->report;
-    const struct pipeline_model *m = t->e->model;
-    const double *size_m = report->in.made->fiber.tile_size_m;
-    const struct configuration above = {.camera = CAMERA_FAR_FIELD,
-                                        .camera_phi_rad = -M_PI_2,
-                                        .light = LIGHT_NO_LAMP,
-                                        .environment_rgb = {1.0, 1.0, 1.0},
-                                        .light_distance_m = 1.0,
-                                        .lamp_side_m = 0.1,
-                                        .camera_distance_m = 1.0,
-                                        .crop_m = size_m[0],
-                                        .crop_aspect = size_m[0] / size_m[1]};
-    struct scene *scene = NULL;
-    struct progress_part half;
-    struct progress progress = progress_begin_part(&half, t->e->progress, black_sheet ? 0.0 : 0.5 * (1.0 - fit_share),
-                                                   0.5 * (1.0 - fit_share));
-    status s = scene_new(&report->in.made->fiber, &(struct scene_option){.black_sheet = black_sheet}, &scene, err);
-    if (s != STATUS_OK) return s;
-    const struct render_request q = {
-        .input = {.scene = {.fibers = scene},
-                  .model = &m->setup->appearance,
-                  .param = m->fit->result.param,
-                  .n_set = m->setup->sets.n_set,
-                  .discrepancy = pipeline_discrepancy(m->validation)},
-        .configuration = &above,
-        .width = t->maps.width,
-        .height = t->maps.height,
-        .n_sample = samples_of(report->in.results, report->in.job->rows->observation.n, (double)m->fit->result.n_path),
-        .seed = report->in.job->seed ^ 0x74657874757265u,
-        .stream = STREAM};
-    s = render_run(&q, report->in.job->tools->pool, &progress, im, err);
-    scene_free(scene);
-    return s;
-}
-
-static void take_pixels(struct textures *t, const struct image *dark, const struct image *open)
-{
-    const size_t n = t->maps.width * t->maps.height;
-    double variance = 0.0, square = 0.0;
-    for (size_t i = 0; i < n; i++)
-        for (size_t c = 0; c < 3; c++) {
-            double a = (double)dark->pixel[i * dark->n_channel + c], b = (double)open->pixel[i * open->n_channel + c];
-            t->reflected.pixel[3 * i + c] = (float)a;
-            t->transmitted.pixel[3 * i + c] = (float)fmax(b - a, 0.0);
-            t->surface.means.albedo[c] += a / (double)n;
-            t->surface.means.transmission[c] += (b - a) / (double)n;
-            variance += (double)dark->pixel[i * dark->n_channel + 3 + c];
-            square += a * a;
-        }
-    for (size_t c = 0; c < 3; c++) t->surface.means.transmission[c] = fmax(t->surface.means.transmission[c], 0.0);
-    t->noise = square > 0.0 ? sqrt(variance / square) : 0.0;
-}
-
-static status render_both(struct textures *t, struct error *err)
-{
-    struct image dark = {0}, open = {0};
-    status s = image_init(&t->reflected, t->maps.width, t->maps.height, 3, err);
-    if (s == STATUS_OK) s = image_init(&t->transmitted, t->maps.width, t->maps.height, 3, err);
-    if (s == STATUS_OK) s = render_tile(t, true, &dark, err);
-    if (s == STATUS_OK) s = render_tile(t, false, &open, err);
-    if (s == STATUS_OK) take_pixels(t, &dark, &open);
-    image_release(&dark);
-    image_release(&open);
-    return s;
-}
 
 /* ---- files ---- */
 
@@ -182,16 +74,16 @@ static void pixel_of(const struct textures *t, size_t i, float out[N_CHANNEL])
 {
     for (size_t c = 0; c < 3; c++) {
         /* in proportion, so that the mean is right in spite of the noise of dark pixels */
-        const double share = (double)t->reflected.pixel[3 * i + c] / fmax(t->surface.means.albedo[c], 1e-9);
+        const double share = (double)t->tile.reflected.pixel[3 * i + c] / fmax(t->tile.means.albedo[c], 1e-9);
         out[c] = (float)(share * texture_surface_base(&t->surface, c));
-        out[3 + c] = t->transmitted.pixel[3 * i + c];
-        out[6 + c] = t->maps.normal[3 * i + c];
+        out[3 + c] = t->tile.transmitted.pixel[3 * i + c];
+        out[6 + c] = t->tile.maps.normal[3 * i + c];
         out[13 + c] = (float)(share * t->principled.base[c]);
     }
     out[9] = (float)texture_surface_roughness(&t->surface, i);
     out[10] = (float)texture_surface_anisotropy(&t->surface, i);
-    out[11] = t->maps.direction_rad[i];
-    out[12] = t->maps.height_mm[i];
+    out[11] = t->tile.maps.direction_rad[i];
+    out[12] = t->tile.maps.height_mm[i];
 }
 
 /* Turns from +x to the direction across the fibers, which has no sign: in [0.125, 0.625), so that the angles of weft
@@ -234,7 +126,7 @@ static status write_maps(const struct textures *t, struct error *err)
                {11, 1, "anisotropy_rotation.png"},
                {13, 3, "principled_base_color.png"}};
     struct image all;
-    status s = image_init(&all, t->maps.width, t->maps.height, N_CHANNEL, err);
+    status s = image_init(&all, t->tile.maps.width, t->tile.maps.height, N_CHANNEL, err);
     if (s != STATUS_OK) return s;
     all.channel_name = channel;
     for (size_t i = 0; i < all.width * all.height; i++) pixel_of(t, i, all.pixel + i * N_CHANNEL);
@@ -259,17 +151,17 @@ static json_t *material_json(const struct textures *t)
     return json_pack("[{s:n, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}]", "group", "specular_weight",
                      json_number(u->weight), "specular_roughness", json_number(u->roughness), "specular_anisotropy",
                      json_number(u->anisotropy), "albedo", json_number_list(u->means.albedo, 3, 1.0), "transmission",
-                     json_number_list(u->means.transmission, 3, 1.0), "pixel_rel_se", json_number(t->noise), "rel_rms",
-                     json_number(u->rel_rms[0]), "heldout_rel_rms", json_number(u->rel_rms[1]), "principled",
+                     json_number_list(u->means.transmission, 3, 1.0), "pixel_rel_se", json_number(t->tile.noise),
+                     "rel_rms", json_number(u->rel_rms[0]), "heldout_rel_rms", json_number(u->rel_rms[1]), "principled",
                      principled_json(&t->principled));
 }
 
 static status write_textures(struct export_scene *e, json_t **materials, struct error *err)
 {
     struct textures t = {.e = e};
-    status s = texture_maps_make(&e->report->in.made->fiber, edge_of(e->report->in.results), &t.maps, err);
-    t.surface.maps = &t.maps;
-    if (s == STATUS_OK) s = render_both(&t, err);
+    status s = texture_tile_make(e, &t.tile, err);
+    t.surface.maps = &t.tile.maps;
+    t.surface.means = t.tile.means;
     if (s == STATUS_OK) s = texture_surface_fit(&t.surface, e->report, e->model, err);
     t.principled.open_pbr = &t.surface;
     if (s == STATUS_OK) s = texture_principled_fit(&t.principled, e->report, e->model, err);
@@ -277,13 +169,11 @@ static status write_textures(struct export_scene *e, json_t **materials, struct 
     if (s == STATUS_OK) s = texture_materialx_write(e, &t.surface, err);
     if (s == STATUS_OK) s = texture_u3m_write(e, &t.principled, err);
     if (s == STATUS_OK) *materials = material_json(&t);
-    image_release(&t.reflected);
-    image_release(&t.transmitted);
-    texture_maps_release(&t.maps);
+    texture_tile_release(&t.tile);
     return s;
 }
 
 EXPORT(textures, "Textures of one tile with a MaterialX document (OpenPBR) and a U3M 1.1 material. They have as "
                  "many pixels as the renderings of the job.")
 
-const struct export_format export_textures = {.write = write_textures, .paths = texture_paths};
+const struct export_format export_textures = {.write = write_textures, .paths = texture_tile_paths};
