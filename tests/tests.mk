@@ -36,6 +36,8 @@ test: | deps       ## everything that continuous integration runs; ends with "N 
 	@$(MAKE) --no-print-directory -j$$(nproc) all build-tests zoo
 	@$(MAKE) --no-print-directory $(EXPORTS_PYTHON)/bin/packages-are-there || \
 		echo "no package index: exported scenes are not opened by Mitsuba, USD and MaterialX"
+	@$(MAKE) --no-print-directory $(EXPORTS_NODE)/packages-are-there || \
+		echo "no npm or no package index: exported glTF files are not opened by three.js and Khronos' validator"
 	@/usr/bin/python3 tests/run_tests.py --build $(BUILD)
 
 # PAGES: some of the browser tests only, such as PAGES=test_pairs.py

@@ -33,10 +33,10 @@ status image_read_exr_filtered(struct image *im, const char *path, size_t limit_
 status image_write_png(const struct image *im, double exposure, const char *path, struct error *err);
 /* 8-bit rgb bytes straight to PNG. */
 status image_write_png_rgb8(const uint8_t *rgb, size_t width, size_t height, const char *path, struct error *err);
-/* The bytes of such a file, which the caller frees. STATUS_INVALID for a size that PNG does not have here,
- * STATUS_NO_MEMORY. */
-status image_png_bytes_rgb8(const uint8_t *rgb, size_t width, size_t height, uint8_t **bytes, size_t *n_byte,
-                            struct error *err);
+/* The bytes of such a file, of 3 channels or, with a share of coverage, of 4; the caller frees them. STATUS_INVALID for
+ * a size that PNG does not have here, STATUS_NO_MEMORY. */
+status image_png_bytes(const uint8_t *pixel, size_t width, size_t height, size_t n_channel, uint8_t **bytes,
+                       size_t *n_byte, struct error *err);
 /* The byte of the sRGB curve for a linear value; NaN and negative values give 0. */
 uint8_t image_srgb_byte(double linear);
 

@@ -55,17 +55,18 @@ status image_write_png_rgb8(const uint8_t *rgb, size_t width, size_t height, con
     return s == STATUS_OK ? write_file(&png, rgb, path, err) : s;
 }
 
-status image_png_bytes_rgb8(const uint8_t *rgb, size_t width, size_t height, uint8_t **bytes, size_t *n_byte,
-                            struct error *err)
+status image_png_bytes(const uint8_t *pixel, size_t width, size_t height, size_t n_channel, uint8_t **bytes,
+                       size_t *n_byte, struct error *err)
 {
     png_image png;
     png_alloc_size_t n = 0;
     *bytes = NULL;
     status s = describe(&png, width, height, "in memory", err);
     if (s != STATUS_OK) return s;
+    png.format = n_channel == 4 ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB;
     n = PNG_IMAGE_PNG_SIZE_MAX(png);
     *bytes = malloc(n);
-    if (*bytes != NULL && png_image_write_to_memory(&png, *bytes, &n, 0, rgb, 0, NULL) != 0) {
+    if (*bytes != NULL && png_image_write_to_memory(&png, *bytes, &n, 0, pixel, 0, NULL) != 0) {
         *n_byte = n;
         return STATUS_OK;
     }

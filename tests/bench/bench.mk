@@ -118,6 +118,11 @@ docs-ranks:        ## draw docs/images/ranks-scaling.svg anew from the tables of
 EXPORTS_PYTHON := $(BUILD)/exports-python
 $(EXPORTS_PYTHON)/bin/packages-are-there:
 	@/usr/bin/python3 -m venv $(EXPORTS_PYTHON) && $(EXPORTS_PYTHON)/bin/pip install -q mitsuba numpy usd-core MaterialX >&2 && touch $@
+# three.js and Khronos' glTF validator
+EXPORTS_NODE := $(BUILD)/exports-node
+$(EXPORTS_NODE)/packages-are-there:
+	@mkdir -p $(EXPORTS_NODE) && npm install --prefix $(EXPORTS_NODE) --no-audit --no-fund --no-save --ignore-scripts --loglevel=error \
+		three@0.187.0 gltf-validator@2.0.0-dev.3.10 >&2 && touch $@
 bench-exports: $(EXPORTS_PYTHON)/bin/packages-are-there | deps-test ## exported scenes rendered by Mitsuba 3 against the job's own renderings (6 minutes; installs Mitsuba and USD from PyPI into build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
 	@/usr/bin/python3 tests/bench/bench_exports.py --build $(BUILD) --python $(EXPORTS_PYTHON)/bin/python

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The piece that is draped, and how many of the points of its mesh are left out between two that are kept. */
-static const double drape_size_mm = 40.0, drape_radius_mm = 10.0;
+/* Every second point of the drape's mesh is kept along both edges. */
+static const double drape_size_mm = TWIN_DRAPE_SIZE_MM, drape_radius_mm = TWIN_DRAPE_RADIUS_MM;
 enum { DRAPE_STEP = 2 };
 
 struct twin_block {

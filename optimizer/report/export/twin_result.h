@@ -22,6 +22,9 @@
 #include "renderer/preview/appearance_table.h"
 #include "renderer/preview/near_fibers.h"
 
+/* The square piece that is draped in the twin, and the ball under it (renderer/mesh/mesh_drape.h). */
+enum { TWIN_DRAPE_SIZE_MM = 40, TWIN_DRAPE_RADIUS_MM = 10 };
+
 /* Camera paths that the tables take, 0 without a twin. */
 double twin_result_paths(const struct job_results *results);
 /* Makes the tables of the best model if the job asks for them and an earlier attempt has not finished them. from, to:

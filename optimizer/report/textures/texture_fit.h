@@ -7,7 +7,7 @@
 #include "optimizer/report/findings/report.h"
 #include "optimizer/report/textures/texture_maps.h"
 
-enum { TEXTURE_MAX_UNKNOWN = 6 };
+enum { TEXTURE_MAX_UNKNOWN = 9 };
 
 /* A place between the pixels. tangent: across the fibers, where the surface is rougher; root_spread: square root of
  * the map of spreads. */

@@ -1,0 +1,35 @@
+/* The surface of a texture set as a glTF 2.0 material has it: a diffuse base under microfacets that are rougher across
+ * the fibers, and sheen over both. Khronos 2021, "glTF 2.0 Specification", appendix B, with KHR_materials_specular,
+ * KHR_materials_anisotropy and KHR_materials_sheen. Where these leave a choice, viewers by three.js decide: masking of
+ * both directions together (Heitz 2014), sheen with the visibility of Ashikhmin and Premoze (2007), and an anisotropy
+ * whose frame keeps the tangent of the mesh. */
+#ifndef SELVEDGE_OPTIMIZER_GLTF_SURFACE_H
+#define SELVEDGE_OPTIMIZER_GLTF_SURFACE_H
+
+#include "optimizer/report/textures/texture_fit.h"
+
+enum { GLTF_N_COSINE = 24 };
+
+struct gltf_surface {
+    const struct texture_maps *maps;
+    struct texture_means means;
+    double f0, f90;               /* reflected share of light that comes straight, and of grazing light */
+    double roughness, anisotropy; /* factors of the maps of spread and coherence */
+    double base[3];               /* mean base color */
+    double sheen[3], sheen_roughness;
+    double sheen_albedo[GLTF_N_COSINE]; /* of sheen of color 1, by the cosine of a direction in equal steps of [0, 1] */
+    double rel_rms[2];                  /* over the fitted and the held-out rows; NaN without such rows */
+};
+
+/* Fits the numbers; maps and means are given. STATUS_NO_MEMORY. */
+status gltf_surface_fit(struct gltf_surface *g, const struct report *report, const struct pipeline_model *m,
+                        struct error *err);
+/* Roughness of pixel i of the maps. */
+double gltf_surface_roughness(const struct gltf_surface *g, size_t i);
+/* Radiance of a sample under a lamp of irradiance pi; as texture_model.reflect. */
+void gltf_surface_reflect(const void *surface, const struct texture_sample *s, const double wi[3], const double wo[3],
+                          double rgb[3]);
+/* Sets the table of the sheen's albedo for its roughness. */
+void gltf_surface_set_sheen(struct gltf_surface *g, double sheen_roughness);
+
+#endif
