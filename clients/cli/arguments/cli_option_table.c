@@ -54,7 +54,7 @@ const struct cli_option cli_option_table[CLI_N_OPTION] = {
     {"picture", 0, name, value, help, offsetof(struct cli_args, picture.key)},
 #include "clients/cli/arguments/picture_options.def"
 #undef PICTURE_OPTION
-    {NULL, 0, "to", "FORMAT", "mitsuba, pbrt, usd, blender, textures, pdf (the report), or several between commas",
+    {NULL, 0, "to", "FORMAT", "mitsuba, pbrt, usd, blender, textures, gltf, pdf (the report), several between commas",
      offsetof(struct cli_args, to)},
     {NULL, 0, "revoke", NULL, "end all links of the job", offsetof(struct cli_args, revoke)},
     {NULL, 0, "links", NULL, "list the links that are valid", offsetof(struct cli_args, links)},

@@ -6,6 +6,7 @@ import functools
 import json
 import math
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -14,7 +15,6 @@ import sys
 import jsonschema
 import pbrt_file
 import pytest
-import u3m_schema
 from daemon_under_test import ROOT, program
 from small_cloth import TABLE, hair
 
@@ -24,6 +24,7 @@ from png_picture import read_png  # noqa: E402
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not os.access(program("selvedge-worker"), os.X_OK), reason="no selvedge-worker in the build folder")]
 FIT = {"path_budget": 20000, "render_px": 8, "render_samples": 1, "model": "isotropic.v1"}
 FORMATS = ["pbrt", "usd", "blender", "textures"]
+SUPPORT = os.path.join(ROOT, "tests", "support")
 PYTHON = os.path.join(os.path.dirname(os.path.dirname(program("selvedge-worker"))), "exports-python", "bin", "python")
 
 
@@ -146,6 +147,7 @@ def test_a_stage_for_usd(results):
         at = [float(row[f"{name}_{a}_mm"]) for a in "xyz"]
         assert found[name]["at"] == pytest.approx(at, abs=1e-3)
         assert found[name]["look"] == pytest.approx([-x / math.dist(at, (0, 0, 0)) for x in at], abs=1e-5)
+    assert json.loads(by_python("pxr", os.path.join(SUPPORT, "exports", "usd_check.py"), folder / "cloth.usda")) == [[]]
     assert found["lamp"]["side"] == pytest.approx(100) and 100 < found["lamp"]["radiance"] < 1000
     assert found["camera"]["fov_deg"] == pytest.approx(math.degrees(2 * math.atan(0.5 * 0.01 / 1.0)), rel=0.1)
 
@@ -297,15 +299,16 @@ def changed(u3m, path, value):
 
 
 def test_a_u3m_material(results):
-    """The file has what version 1.1 of the public schema requires and allows, and the check notices what it does not allow."""
+    """The file has what the public schema of version 1.1 (github.com/vizoogmbh/u3m) requires and allows, which notices what it does not allow."""
     folder = results / "export" / "textures"
     u3m = json.loads((folder / "cloth.u3m").read_text())
-    schema = jsonschema.Draft202012Validator(u3m_schema.U3M)
-    schema.check_schema(u3m_schema.U3M)
+    with open(os.path.join(SUPPORT, "exports", "u3m_schema.json"), encoding="utf-8") as f:
+        schema = jsonschema.Draft7Validator(json.load(f))
     schema.validate(u3m)
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", u3m["material"]["created"])
     for path, value in (("material.front.alpha.constant", 1.1), ("material.front.ior", ...), ("material.front.normal.texture.factor", 1),
                         ("material.front.basecolor.constant.r", -0.1), ("material.front.basecolor.texture.image.path", "../a.png"),
-                        ("material.front.roughness.texture.image.path", "aux.png"), ("material.id", "1"), ("material.created", "yesterday"),
+                        ("material.front.roughness.texture.image.path", "aux.png"), ("material.id", "1"),
                         ("material.physics.devices.fab", ""), ("schema", "1.0"), ("extra", 1)):
         assert not schema.is_valid(changed(u3m, path, value)), path
     m, front = u3m["material"], u3m["material"]["front"]

@@ -12,7 +12,7 @@ import pytest
 from daemon_under_test import ROOT, program
 from small_cloth import TABLE, hair
 
-sys.path.insert(0, os.path.join(ROOT, "tests", "support", "gltf"))
+sys.path.insert(0, os.path.join(ROOT, "tests", "support", "exports"))
 from gltf_file import GltfFile  # noqa: E402
 
 image = pytest.importorskip("PIL.Image", reason="python3-pil is not installed")
@@ -148,16 +148,29 @@ def test_the_validator_of_khronos(export):
     if shutil.which("node") is None or not os.path.isdir(os.path.join(PACKAGES, "node_modules", "gltf-validator")):
         pytest.skip("the files are right so far; no gltf-validator (make test installs it where npm and a package index are)")
     files = [export[1] / name for name in ("drape.glb", "sphere.glb")]
-    done = subprocess.run(["node", os.path.join(ROOT, "tests", "support", "gltf", "validate_gltf.cjs"), PACKAGES, *files], capture_output=True, text=True,
+    done = subprocess.run(["node", os.path.join(ROOT, "tests", "support", "exports", "validate_gltf.cjs"), PACKAGES, *files], capture_output=True, text=True,
                           check=False)
     assert done.returncode == 0, done.stderr
     for issues in json.loads(done.stdout):
         assert issues["numErrors"] == issues["numWarnings"] == 0, issues
     broken = export[1].parent / "broken.glb"
     broken.write_bytes((export[1] / "sphere.glb").read_bytes().replace(b'"metallicFactor":0.0', b'"metallicFactor":2.0'))
-    done = subprocess.run(["node", os.path.join(ROOT, "tests", "support", "gltf", "validate_gltf.cjs"), PACKAGES, broken], capture_output=True, text=True,
+    done = subprocess.run(["node", os.path.join(ROOT, "tests", "support", "exports", "validate_gltf.cjs"), PACKAGES, broken], capture_output=True, text=True,
                           check=False)
     assert json.loads(done.stdout)[0]["numErrors"] > 0, "the check would notice a fault"
+
+
+@pytest.mark.parametrize("name", ["drape", "sphere"])
+def test_blender_opens_it(export, name, tmp_path):
+    if shutil.which("blender") is None:
+        pytest.skip("there is no Blender to open the files with (Debian package blender)")
+    done = subprocess.run(["blender", "-b", "--factory-startup", "--python-exit-code", "1", "--python",
+                           os.path.join(ROOT, "tests", "support", "exports", "blender_gltf.py"), "--", export[1] / f"{name}.glb"],
+                          capture_output=True, text=True, check=False, env={**os.environ, "HOME": str(tmp_path)})
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr
+    found = json.loads(next(line for line in done.stdout.split("\n") if line.startswith("found "))[6:])
+    assert 0.02 < max(found["size"]) < 0.05 and found["has_places"] and found["material"] == "cloth", "metres, and what reflects only is shown first"
+    assert "BSDF_PRINCIPLED" in found["kinds"] and {"base_color", "normal", "metallic_roughness"} <= set(found["images"])
 
 
 def test_three_js_shows_the_rows_as_stated(export):
