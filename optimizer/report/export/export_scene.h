@@ -14,13 +14,14 @@
 
 enum { EXPORT_MAX_REPEAT = 200 }; /* of the tile, along one axis */
 
-/* How far the cloth with the hair mixtures is from the fitted cloth: root mean squares of differences of radiance over
- * the mean of the fitted cloth's channels, or over 0.02 where that is darker (optimizer/fit/objective/objective.h). */
+/* How far the cloth with the materials of an export is from the fitted cloth: root mean squares of differences of
+ * radiance over the mean of the fitted cloth's channels, or over 0.02 where that is darker
+ * (optimizer/fit/objective/objective.h). */
 struct hair_error {
-    bool stated;    /* false: there is no error (hair_on_cloth.h) */
-    double rel_rms; /* over lamps and cameras of the hemisphere that were not fitted */
-    double row_rel_rms, row_rel_rms_se;
-    double *row_rel_error; /* of each row of the job; owned */
+    bool stated;                        /* false: there is no error (of hair: hair_on_cloth.h) */
+    double rel_rms;                     /* over lamps and cameras of the hemisphere that were not fitted */
+    double row_rel_rms, row_rel_rms_se; /* the latter 0: not known */
+    double *row_rel_error;              /* of each row of the job; owned */
 };
 
 struct export_scene {
@@ -28,6 +29,7 @@ struct export_scene {
     const struct pipeline_model *model;
     struct hair_fit hair[SCATTERING_MAX_SET];
     struct hair_error hair_error;
+    struct hair_error own_error; /* of a format that judges its material itself, set by its write */
     double z_low_m, z_high_m;
     const char *folder; /* of the format that is being written, under results/ */
     const struct progress *progress;

@@ -54,14 +54,13 @@ static status write_conversion(const struct export_scene *e, const json_t *json,
     return s;
 }
 
-/* Adds the errors of the cloth with hair materials to the entry of a format. */
-static void state_hair_error(const struct export_scene *e, json_t *json)
+/* Adds the errors of the cloth with the materials of a format to its entry. */
+static void state_error(const struct export_scene *e, const struct hair_error *h, json_t *json)
 {
-    const struct hair_error *h = &e->hair_error;
     if (!h->stated) return;
     json_object_set_new(json, "rel_rms", json_number(h->rel_rms));
     json_object_set_new(json, "row_rel_rms", json_number(h->row_rel_rms));
-    json_object_set_new(json, "row_rel_rms_se", json_number(h->row_rel_rms_se));
+    if (h->row_rel_rms_se > 0.0) json_object_set_new(json, "row_rel_rms_se", json_number(h->row_rel_rms_se));
     json_object_set_new(json, "row_rel_errors",
                         json_number_list(h->row_rel_error, e->report->in.job->rows->observation.n, 1.0));
 }
@@ -77,7 +76,9 @@ static status write_format(struct export_scene *e, size_t i, struct error *err)
     if (s == STATUS_OK) s = exports[i].format->write(e, &materials, err);
     if (s != STATUS_OK) return s;
     json_t *json = json_pack("{s:s, s:s, s:o}", "format", exports[i].name, "folder", folder, "materials", materials);
-    if (exports[i].format->has_hair) state_hair_error(e, json);
+    state_error(e, exports[i].format->has_hair ? &e->hair_error : &e->own_error, json);
+    free(e->own_error.row_rel_error);
+    e->own_error = (struct hair_error){.stated = false};
     s = write_conversion(e, json, err);
     if (s == STATUS_OK)
         json_array_append_new(e->report->exports, json);

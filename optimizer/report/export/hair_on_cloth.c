@@ -3,6 +3,7 @@
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/fit/descent/trace_estimator.h"
 #include "optimizer/job/document/job_cloth.h"
+#include "optimizer/report/export/cloth_directions.h"
 #include "optimizer/report/result/result_json.h"
 #include "optimizer/stages/validation/pipeline_discrepancy.h"
 
@@ -12,10 +13,8 @@
 
 /* Parameters of one material of hair_mixture.v1, and of the whole mixture (dielectric_rows.def). */
 enum { P_INDEX = 3, P_ALONG, P_AROUND, N_OF_MATERIAL, P_SHARE = HAIR_FIT_N_BLEND * N_OF_MATERIAL, N_OF_MIXTURE };
-enum { N_FITTED = 64, N_BETWEEN = 24, N_DIRECTION = N_FITTED + N_BETWEEN, N_REPLICA = 2, LEAST_PATHS = 512 };
+enum { N_FITTED = CLOTH_N_FITTED, N_DIRECTION = CLOTH_N_DIRECTION, N_REPLICA = 2, LEAST_PATHS = 512 };
 static const char model_id[] = "hair_mixture.v1";
-/* Beyond this angle lamps of a job are rare, and the published division by a cosine makes hair bright. */
-static const double most_theta_rad = 75.0 * M_PI / 180.0;
 /* Paths of the fit: twice as many as the job's own, between these. The directions of the fitted cloth, and each
  * judgement, take shares of them. */
 static const double least_budget = 1e6, most_budget = 2e6, traced_share = 0.35, judged_share = 0.15;
@@ -42,29 +41,6 @@ static double budget_of(double n_fit_path)
 double hair_on_cloth_paths(double n_fit_path)
 {
     return path_of_mixture * (1.0 + traced_share + 3.0 * judged_share) * budget_of(n_fit_path);
-}
-
-/* A sequence of low discrepancy over the directions of lamp and camera (additive recurrence by the generalised golden
- * ratio of four dimensions): all solid angles up to most_theta_rad count alike, and the last ones lie between the
- * first. */
-static void make_directions(const double tile_m[2], struct configuration c[N_DIRECTION])
-{
-    const double ratio = 1.1673039782614187, most = sin(most_theta_rad);
-    for (int i = 0; i < N_DIRECTION; i++) {
-        double u[4];
-        for (int k = 0; k < 4; k++) u[k] = fmod(0.5 + (i + 1) / pow(ratio, k + 1), 1.0);
-        c[i] = (struct configuration){.light = LIGHT_DIRECTIONAL,
-                                      .light_theta_rad = asin(sqrt(u[0]) * most),
-                                      .light_phi_rad = 2.0 * M_PI * u[1],
-                                      .camera = CAMERA_FAR_FIELD,
-                                      .camera_theta_rad = asin(sqrt(u[2]) * most),
-                                      .camera_phi_rad = 2.0 * M_PI * u[3],
-                                      .light_distance_m = 1.0,
-                                      .lamp_side_m = 0.1,
-                                      .camera_distance_m = 1.0,
-                                      .crop_m = tile_m[0],
-                                      .crop_aspect = tile_m[0] / tile_m[1]};
-    }
 }
 
 static struct estimate_request request_of(const struct on_cloth *f, const struct configuration *c, size_t n)
@@ -264,7 +240,7 @@ status hair_on_cloth_run(struct export_scene *e, double from, double to, struct 
     observation_set_init(&f->fitted);
     observation_set_init(&f->between);
     observation_set_init(&f->rows);
-    make_directions(e->report->in.made->fiber.tile_size_m, f->configuration);
+    cloth_directions_make(e->report->in.made->fiber.tile_size_m, f->configuration);
     status s =
         appearance_find(model_id, &f->mixture)
             ? model_sets_init(&f->sets, model_catalogue_find(model_id), e->report->in.job->cloth->group, n_set, err)

@@ -23,7 +23,7 @@ static json_t *extras_json(const struct gltf *f)
     const struct export_scene *e = f->e;
     return json_pack("{s:s, s:s, s:o, s:f, s:o}", "sample", e->report->in.sample, "model",
                      e->model->setup->appearance.id, "tile_mm", json_number_list(f->tile_mm, 2, 1.0), "thickness_mm",
-                     mm * (e->z_high_m - e->z_low_m), "row_rel_rms", json_number(f->surface.rel_rms[0]));
+                     mm * (e->z_high_m - e->z_low_m), "row_rel_rms", json_number(f->surface.error.row_rel_rms));
 }
 
 static json_t *primitive_json(const struct gltf_mesh *m, struct glb_file *file)
@@ -84,35 +84,47 @@ static status write_files(const struct gltf *f, struct error *err)
 static json_t *materials_json(const struct gltf *f)
 {
     const struct gltf_surface *g = &f->surface;
-    return json_pack("[{s:n, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}]", "group", "f0",
+    return json_pack("[{s:n, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}]", "group", "f0",
                      json_number(g->f0), "f90", json_number(g->f90), "roughness", json_number(g->roughness),
                      "anisotropy", json_number(g->anisotropy), "base_color", json_number_list(g->base, 3, 1.0),
                      "sheen_color", json_number_list(g->sheen, 3, 1.0), "sheen_roughness",
                      json_number(g->sheen_roughness), "transmission", json_number_list(g->means.transmission, 3, 1.0),
-                     "pixel_rel_se", json_number(f->tile.noise), "rel_rms", json_number(g->rel_rms[0]),
-                     "heldout_rel_rms", json_number(g->rel_rms[1]));
+                     "pixel_rel_se", json_number(f->tile.noise), "normal_scale", json_number(g->normal_scale),
+                     "rel_rms", json_number(g->error.rel_rms), "heldout_rel_rms",
+                     json_number(g->error.heldout_rel_rms));
 }
 
-static void warn(const struct gltf *f)
+/* The scene owns the errors of rows then. */
+static void state_error(struct gltf *f)
 {
-    if (f->surface.rel_rms[0] > most_error)
+    struct texture_error *error = &f->surface.error;
+    f->e->own_error = (struct hair_error){.stated = true,
+                                          .rel_rms = error->hemisphere_rel_rms,
+                                          .row_rel_rms = error->row_rel_rms,
+                                          .row_rel_error = error->row_rel_error};
+    error->row_rel_error = NULL;
+    if (error->row_rel_rms > most_error)
         worker_status_warn(f->e->report->in.job->tools->status,
                            "as a glTF material, the cloth differs from this job's renderings by %.0f %% over its rows",
-                           percent * f->surface.rel_rms[0]);
+                           percent * error->row_rel_rms);
 }
 
 static status write_gltf(struct export_scene *e, json_t **materials, struct error *err)
 {
     struct gltf f = {.e = e};
+    struct texture_target target = {0};
     for (size_t a = 0; a < 2; a++) f.tile_mm[a] = mm * e->report->in.made->fiber.tile_size_m[a];
     status s = texture_tile_make(e, &f.tile, err);
     f.surface.maps = &f.tile.maps;
     f.surface.means = f.tile.means;
-    if (s == STATUS_OK) s = gltf_surface_fit(&f.surface, e->report, e->model, err);
+    if (s == STATUS_OK) s = texture_target_make(e, TEXTURE_TILE_SHARE, 1.0, &target, err);
+    if (s == STATUS_OK) s = gltf_surface_fit(&f.surface, &f.tile.maps, &target, err);
     if (s == STATUS_OK) s = export_rows_write(e, err);
     if (s == STATUS_OK) s = write_files(&f, err);
-    if (s == STATUS_OK) warn(&f);
     if (s == STATUS_OK) *materials = materials_json(&f);
+    if (s == STATUS_OK) state_error(&f);
+    gltf_surface_release(&f.surface);
+    texture_target_release(&target);
     texture_tile_release(&f.tile);
     return s;
 }

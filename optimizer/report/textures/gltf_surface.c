@@ -3,16 +3,16 @@
 #include <math.h>
 
 enum { N_THETA = 16, N_PHI = 16, N_START = 4 };
-enum { F0, F90, ROUGHNESS, ANISOTROPY, BRIGHTNESS, GREY, SHEEN, SHEEN_ROUGHNESS, SHEEN_TINT, N_UNKNOWN };
+enum { F0, F90, ROUGHNESS, ANISOTROPY, BRIGHTNESS, GREY, SHEEN, SHEEN_ROUGHNESS, SHEEN_TINT, NORMAL_SCALE, N_UNKNOWN };
 /* Below this roughness viewers show no highlight of a lamp without size. */
 static const double least_roughness = 0.05, least_cosine = 1e-3;
 /* BRIGHTNESS of the base relative to the albedo, from which the share GREY of its grey is taken for the highlight. */
-static const double lower[N_UNKNOWN] = {0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0},
-                    upper[N_UNKNOWN] = {0.9, 1.0, 1.0, 1.0, 2.5, 1.0, 1.0, 1.0, 1.0};
-static const double start[N_START][TEXTURE_MAX_UNKNOWN] = {{0.04, 0.5, 0.6, 0.2, 0.9, 0.3, 0.1, 0.5, 0.5},
-                                                           {0.2, 0.9, 0.4, 0.5, 0.7, 0.5, 0.05, 0.3, 0.2},
-                                                           {0.01, 0.1, 0.9, 0.1, 0.9, 0.1, 0.3, 0.8, 0.8},
-                                                           {0.05, 0.3, 0.5, 0.7, 0.6, 0.2, 0.3, 0.4, 0.8}};
+static const double lower[N_UNKNOWN] = {0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0, 0.3},
+                    upper[N_UNKNOWN] = {0.9, 1.0, 1.0, 1.0, 2.5, 1.0, 1.0, 1.0, 1.0, 2.5};
+static const double start[N_START][TEXTURE_MAX_UNKNOWN] = {{0.04, 0.5, 0.6, 0.2, 0.9, 0.3, 0.1, 0.5, 0.5, 1.0},
+                                                           {0.2, 0.9, 0.4, 0.5, 0.7, 0.5, 0.05, 0.3, 0.2, 1.0},
+                                                           {0.01, 0.1, 0.9, 0.1, 0.9, 0.1, 0.3, 0.8, 0.8, 1.0},
+                                                           {0.05, 0.3, 0.5, 0.7, 0.6, 0.2, 0.3, 0.4, 0.8, 1.5}};
 
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -107,7 +107,8 @@ void gltf_surface_reflect(const void *surface, const struct texture_sample *s, c
     const double sheen = sheen_of(g->sheen_roughness, cosine[2], cosine[0], cosine[1]);
     const double below = 1.0 - largest(g->sheen) * fmax(albedo_at(g, cosine[0]), albedo_at(g, cosine[1]));
     for (int c = 0; c < 3; c++)
-        rgb[c] = cosine[0] * (below * (g->base[c] * (1.0 - fresnel) + M_PI * shine) + M_PI * g->sheen[c] * sheen);
+        rgb[c] = cosine[0] *
+                 (below * (g->base[c] * s->share[c] * (1.0 - fresnel) + M_PI * shine) + M_PI * g->sheen[c] * sheen);
 }
 
 /* ---- fit ---- */
@@ -125,14 +126,22 @@ static void take(void *surface, const double *x)
         g->base[c] = fmin(x[BRIGHTNESS] * (albedo[c] - x[GREY] * grey), 1.0);
         g->sheen[c] = x[SHEEN] * (1.0 - x[SHEEN_TINT] * (1.0 - albedo[c] / bright));
     }
+    g->normal_scale = x[NORMAL_SCALE];
     gltf_surface_set_sheen(g, x[SHEEN_ROUGHNESS]);
 }
 
 static void look(void *surface, const double wo[3]) { (void)surface, (void)wo; }
 
-status gltf_surface_fit(struct gltf_surface *g, const struct report *report, const struct pipeline_model *m,
+static double normal_scale(const void *surface) { return ((const struct gltf_surface *)surface)->normal_scale; }
+
+status gltf_surface_fit(struct gltf_surface *g, struct texture_maps *maps, const struct texture_target *target,
                         struct error *err)
 {
-    const struct texture_model model = {N_UNKNOWN, N_START, lower, upper, start, take, look, gltf_surface_reflect};
-    return texture_fit_run(&model, g, g->maps, &g->means, report, m, g->rel_rms, err);
+    const struct texture_model model = {N_UNKNOWN,   N_START, lower, upper, start, take, look, gltf_surface_reflect,
+                                        normal_scale};
+    status s = texture_fit_run(&model, g, maps, &g->means, target, &g->error, err);
+    if (s == STATUS_OK) texture_maps_scale_normals(maps, g->normal_scale);
+    return s;
 }
+
+void gltf_surface_release(struct gltf_surface *g) { texture_error_release(&g->error); }

@@ -18,12 +18,14 @@ struct gltf_surface {
     double base[3];               /* mean base color */
     double sheen[3], sheen_roughness;
     double sheen_albedo[GLTF_N_COSINE]; /* of sheen of color 1, by the cosine of a direction in equal steps of [0, 1] */
-    double rel_rms[2];                  /* over the fitted and the held-out rows; NaN without such rows */
+    double normal_scale;                /* factor on the slopes of the fibers, which the maps have after the fit */
+    struct texture_error error;         /* owned */
 };
 
-/* Fits the numbers; maps and means are given. STATUS_NO_MEMORY. */
-status gltf_surface_fit(struct gltf_surface *g, const struct report *report, const struct pipeline_model *m,
+/* Fits the numbers; maps and means are given. Scales the normals of the maps as the fit says. STATUS_NO_MEMORY. */
+status gltf_surface_fit(struct gltf_surface *g, struct texture_maps *maps, const struct texture_target *target,
                         struct error *err);
+void gltf_surface_release(struct gltf_surface *g);
 /* Roughness of pixel i of the maps. */
 double gltf_surface_roughness(const struct gltf_surface *g, size_t i);
 /* Radiance of a sample under a lamp of irradiance pi; as texture_model.reflect. */

@@ -26,13 +26,14 @@ static void print_image(FILE *text, const char *name, const char *type, const ch
 }
 
 /* base = reflected + transmitted, and the share of the latter goes to the thin-walled subsurface, which scatters
- * forwards only: (1 - share) base is reflected and share base is transmitted, as the maps have it. */
+ * forwards only: (1 - share) base is reflected and share base is transmitted, as the maps have it. Layers above let a
+ * part of the light through, by which the map of transmitted light is divided before. */
 static const char graph_nodes[] =
     "    <add name=\"scattered\" type=\"color3\">\n"
     "      <input name=\"in1\" type=\"color3\" nodename=\"albedo\"/>\n"
-    "      <input name=\"in2\" type=\"color3\" nodename=\"transmission\"/>\n    </add>\n"
+    "      <input name=\"in2\" type=\"color3\" nodename=\"through\"/>\n    </add>\n"
     "    <luminance name=\"gray_transmission\" type=\"color3\">\n"
-    "      <input name=\"in\" type=\"color3\" nodename=\"transmission\"/>\n    </luminance>\n"
+    "      <input name=\"in\" type=\"color3\" nodename=\"through\"/>\n    </luminance>\n"
     "    <luminance name=\"gray_scattered\" type=\"color3\">\n"
     "      <input name=\"in\" type=\"color3\" nodename=\"scattered\"/>\n    </luminance>\n"
     "    <extract name=\"transmitted\" type=\"float\">\n"
@@ -71,11 +72,38 @@ static const char surface_inputs[] =
     "    <input name=\"subsurface_weight\" type=\"float\" nodegraph=\"maps\" output=\"out_share\"/>\n"
     "    <input name=\"subsurface_scatter_anisotropy\" type=\"float\" value=\"1\"/>\n"
     "    <input name=\"geometry_thin_walled\" type=\"boolean\" value=\"true\"/>\n"
-    "    <input name=\"specular_ior\" type=\"float\" value=\"1.5\"/>\n"
     "    <input name=\"specular_roughness\" type=\"float\" nodegraph=\"maps\" output=\"out_roughness\"/>\n"
     "    <input name=\"specular_roughness_anisotropy\" type=\"float\" nodegraph=\"maps\" output=\"out_anisotropy\"/>\n"
     "    <input name=\"geometry_normal\" type=\"vector3\" nodegraph=\"maps\" output=\"out_normal\"/>\n"
     "    <input name=\"geometry_tangent\" type=\"vector3\" nodegraph=\"maps\" output=\"out_tangent\"/>\n";
+
+static void print_number(FILE *text, const char *name, double value)
+{
+    fprintf(text, "    <input name=\"%s\" type=\"float\" value=\"%.6g\"/>\n", name, value);
+}
+
+static void print_color(FILE *text, const char *name, const double rgb[3], double factor)
+{
+    fprintf(text, "    <input name=\"%s\" type=\"color3\" value=\"%.6g, %.6g, %.6g\"/>\n", name, factor * rgb[0],
+            factor * rgb[1], factor * rgb[2]);
+}
+
+/* Inputs without a map. */
+static void print_numbers(FILE *text, const struct texture_surface *t)
+{
+    const struct texture_open_pbr in = texture_surface_inputs(t);
+    const double weight = in.fuzz_weight, unit = weight > 0.0 ? weight : 1.0;
+    print_number(text, "specular_weight", in.specular_weight);
+    print_number(text, "specular_ior", in.specular_ior);
+    print_color(text, "specular_color", t->specular_color, 1.0);
+    print_number(text, "coat_weight", t->coat_weight);
+    print_number(text, "coat_ior", in.coat_ior);
+    print_number(text, "coat_roughness", t->coat_roughness);
+    print_number(text, "coat_darkening", 0.0);
+    print_number(text, "fuzz_weight", weight);
+    print_color(text, "fuzz_color", t->fuzz, 1.0 / unit);
+    print_number(text, "fuzz_roughness", t->fuzz_roughness);
+}
 
 status texture_materialx_write(const struct export_scene *e, const struct texture_surface *t, struct error *err)
 {
@@ -92,14 +120,18 @@ status texture_materialx_write(const struct export_scene *e, const struct textur
     print_image(text.file, "anisotropy", "float", "anisotropy.png", false, size_mm);
     print_image(text.file, "direction", "float", "anisotropy_rotation.png", false, size_mm);
     print_image(text.file, "normal", "vector3", "normal.png", false, size_mm);
+    fprintf(text.file,
+            "    <multiply name=\"through\" type=\"color3\">\n"
+            "      <input name=\"in1\" type=\"color3\" nodename=\"transmission\"/>\n"
+            "      <input name=\"in2\" type=\"float\" value=\"%.6g\"/>\n    </multiply>\n",
+            1.0 / fmax(texture_surface_kept(t), 0.01));
     fputs(graph_nodes, text.file);
     fprintf(text.file, "  <open_pbr_surface name=\"surface\" type=\"surfaceshader\">\n%s", surface_inputs);
-    fprintf(text.file,
-            "    <input name=\"specular_weight\" type=\"float\" value=\"%.6g\"/>\n  </open_pbr_surface>\n"
-            "  <surfacematerial name=\"cloth\" type=\"material\">\n"
-            "    <input name=\"surfaceshader\" type=\"surfaceshader\" nodename=\"surface\"/>\n"
-            "  </surfacematerial>\n</materialx>\n",
-            t->weight);
+    print_numbers(text.file, t);
+    fputs("  </open_pbr_surface>\n  <surfacematerial name=\"cloth\" type=\"material\">\n"
+          "    <input name=\"surfaceshader\" type=\"surfaceshader\" nodename=\"surface\"/>\n"
+          "  </surfacematerial>\n</materialx>\n",
+          text.file);
     return export_text_close(e, &text, "cloth.mtlx", err);
 }
 
@@ -132,11 +164,11 @@ static json_t *color_map_json(const double rgb[3], const struct texture_maps *m,
                      rgb_json(one), "image", image_json(m, file));
 }
 
-static json_t *normal_json(const struct texture_maps *m, const char *file)
+static json_t *normal_json(const struct texture_maps *m, const char *file, double scale)
 {
     json_t *j = json_pack("{s:{s:f, s:f, s:f}, s:n}", "constant", "x", 0.0, "y", 0.0, "z", 1.0, "texture");
     if (file != NULL)
-        json_object_set_new(j, "texture", json_pack("{s:f, s:o}", "scale", 1.0, "image", image_json(m, file)));
+        json_object_set_new(j, "texture", json_pack("{s:f, s:o}", "scale", scale, "image", image_json(m, file)));
     return j;
 }
 
@@ -149,42 +181,40 @@ static void add_rest(json_t *v)
     for (size_t i = 0; i < sizeof zero / sizeof zero[0]; i++) json_object_set_new(v, zero[i], number_json(0.0));
     json_object_set_new(v, "alpha", number_json(1.0));
     json_object_set_new(v, "ior", number_json(1.5));
-    json_object_set_new(v, "clearcoat_normal", normal_json(NULL, NULL));
+    json_object_set_new(v, "clearcoat_normal", normal_json(NULL, NULL, 1.0));
     json_object_set_new(v, "subsurface_color", json_pack("{s:o, s:n}", "constant", rgb_json(white), "texture"));
     json_object_set_new(v, "shader", json_string("principled"));
     json_object_set_new(v, "preview", json_null());
 }
 
-static double mean_of(const struct texture_surface *t, double (*value)(const struct texture_surface *, size_t))
+static double mean_of(const struct texture_principled *p, double (*value)(const struct texture_principled *, size_t))
 {
     double sum = 0.0;
-    const size_t n = t->maps->width * t->maps->height;
-    for (size_t i = 0; i < n; i++) sum += value(t, i);
+    const size_t n = p->maps->width * p->maps->height;
+    for (size_t i = 0; i < n; i++) sum += value(p, i);
     return sum / (double)n;
 }
 
 static json_t *front_json(const struct texture_principled *p)
 {
-    const struct texture_surface *t = p->open_pbr;
-    const struct texture_maps *m = t->maps;
-    const double *through = t->means.transmission;
+    const struct texture_maps *m = p->maps;
+    const double *through = p->means.transmission;
     json_t *v = json_object();
     add_rest(v);
     json_object_set_new(v, "basecolor", color_map_json(p->base, m, "principled_base_color.png"));
-    json_object_set_new(v, "normal", normal_json(m, "normal.png"));
+    json_object_set_new(v, "normal", normal_json(m, "normal.png", p->normal_scale));
     json_object_set_new(v, "roughness",
-                        number_map_json(fmin(p->roughness * mean_of(t, texture_surface_roughness), 1.0), p->roughness,
-                                        m, "roughness.png"));
+                        number_map_json(mean_of(p, texture_principled_roughness), 1.0, m, "principled_roughness.png"));
     json_object_set_new(
         v, "anisotropy_value",
-        number_map_json(p->anisotropy * mean_of(t, texture_surface_anisotropy), p->anisotropy, m, "anisotropy.png"));
+        number_map_json(mean_of(p, texture_principled_anisotropy), 1.0, m, "principled_anisotropy.png"));
     json_object_set_new(v, "anisotropy_rotation", number_map_json(0.0, 1.0, m, "anisotropy_rotation.png"));
     json_object_set_new(
         v, "transmission",
         number_map_json(fmin((through[0] + through[1] + through[2]) / 3.0, 1.0), 1.0, m, "transmission.png"));
     json_object_set_new(v, "specular_value", number_json(p->specular));
     json_object_set_new(v, "sheen_value", number_json(p->sheen));
-    json_object_set_new(v, "sheen_tint", number_json(1.0));
+    json_object_set_new(v, "sheen_tint", number_json(p->sheen_tint));
     return v;
 }
 

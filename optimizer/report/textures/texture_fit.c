@@ -1,21 +1,19 @@
 #include "optimizer/report/textures/texture_fit.h"
 
-#include "optimizer/report/result/result_json.h"
-
 #include <math.h>
-#include <nlopt.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_EVALUATION_OF_UNKNOWN = 90, N_GRID = 32, MOST_STEP = 4 };
+/* Samples along an edge of the tile. */
+enum { N_GRID = 16, N_SAMPLE = N_GRID * N_GRID, MOST_STEP = 4 };
 
 struct search {
     const struct texture_model *model;
     void *surface;
     const struct texture_means *means;
-    const struct observation_set *rows;
-    const struct pipeline_model *rendered;
-    struct texture_sample sample[N_GRID * N_GRID];
+    const struct texture_target *target;
+    size_t n_fitted;                                       /* radiances of the target that have a weight */
+    struct texture_sample map[N_SAMPLE], sample[N_SAMPLE]; /* as the maps have them, and with scaled normals */
 };
 
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -57,21 +55,32 @@ static void sample_at(const struct texture_maps *m, double x, double y, struct t
         for (size_t a = 0; a < 3; a++) s->normal[a] += weight[k] * (double)m->normal[3 * pixel[k] + a];
         s->root_spread += weight[k] * sqrt((double)m->spread[pixel[k]]);
         s->coherence += weight[k] * (double)m->coherence[pixel[k]];
+        for (size_t c = 0; c < 3; c++)
+            s->share[c] += weight[k] * (m->share != NULL ? (double)m->share[3 * pixel[k] + c] : 1.0);
     }
-    scale(s->normal, 1.0 / sqrt(dot(s->normal, s->normal)));
-    const double along = dot(across, s->normal);
-    for (int a = 0; a < 3; a++) s->tangent[a] = across[a] - along * s->normal[a];
-    scale(s->tangent, 1.0 / sqrt(dot(s->tangent, s->tangent)));
+    memcpy(s->tangent, across, sizeof across);
+}
+
+/* The place with slopes of the normal times `factor`, and a frame around the normal. */
+static struct texture_sample turned(const struct texture_sample *map, double factor)
+{
+    struct texture_sample s = *map;
+    for (int a = 0; a < 2; a++) s.normal[a] *= factor;
+    scale(s.normal, 1.0 / sqrt(dot(s.normal, s.normal)));
+    const double along = dot(s.tangent, s.normal);
+    for (int a = 0; a < 3; a++) s.tangent[a] -= along * s.normal[a];
+    scale(s.tangent, 1.0 / sqrt(dot(s.tangent, s.tangent)));
     for (int a = 0; a < 3; a++)
-        s->bitangent[a] =
-            s->normal[(a + 1) % 3] * s->tangent[(a + 2) % 3] - s->normal[(a + 2) % 3] * s->tangent[(a + 1) % 3];
+        s.bitangent[a] =
+            s.normal[(a + 1) % 3] * s.tangent[(a + 2) % 3] - s.normal[(a + 2) % 3] * s.tangent[(a + 1) % 3];
+    return s;
 }
 
 /* A grid over the tile, each line of it shifted against the one before, so that samples lie anywhere between the
  * pixels. */
 static void make_samples(const struct texture_maps *m, struct texture_sample *sample)
 {
-    for (size_t k = 0; k < N_GRID * N_GRID; k++) {
+    for (size_t k = 0; k < N_SAMPLE; k++) {
         const double shift = fmod(0.618034 * (double)(k / N_GRID), 1.0),
                      turn = fmod(0.618034 * (double)(k % N_GRID), 1.0);
         sample_at(m, ((double)(k % N_GRID) + shift) / N_GRID * (double)m->width,
@@ -82,7 +91,7 @@ static void make_samples(const struct texture_maps *m, struct texture_sample *sa
 /* Each rotation of a row that is a mean over n of them has its own samples, a part of all. */
 static void add_rotation(const struct search *f, const struct configuration *k, uint32_t r, uint32_t n, double rgb[3])
 {
-    const size_t step = n < MOST_STEP ? n : MOST_STEP, n_sample = N_GRID * N_GRID / step;
+    const size_t step = n < MOST_STEP ? n : MOST_STEP, n_sample = N_SAMPLE / step;
     const double turned = k->cloth_rotation_rad + 2.0 * M_PI * r / n;
     double wi[3], wo[3], one[3];
     polar(k->light_theta_rad, k->light_phi_rad - turned, wi);
@@ -106,68 +115,107 @@ static void radiance_of(const struct search *f, const struct configuration *k, d
     for (int c = 0; c < 3; c++) rgb[c] = rgb[c] / n + k->environment_rgb[c] * f->means->albedo[c];
 }
 
-static double rel_rms_of(const struct search *f, bool fitted)
+/* Sets the numbers, and turns the normals as they say. */
+static void take(struct search *f, const double *x)
 {
-    double square = 0.0, n = 0.0;
-    for (size_t i = 0; i < f->rows->n; i++) {
-        double ours[3], se[3], theirs[3];
-        if ((f->rows->item[i].set == JOB_SET_FIT) != fitted) continue;
-        result_rendered_mean(f->rendered, i, ours, se);
-        radiance_of(f, &f->rows->item[i].configuration, theirs);
-        double brightest = fmax(fmax(ours[0], ours[1]), fmax(ours[2], 1e-12));
-        for (int c = 0; c < 3; c++) square += pow((theirs[c] - ours[c]) / brightest, 2.0) / 3.0;
-        n += 1.0;
-    }
-    return n > 0.0 ? sqrt(square / n) : NAN;
-}
-
-static double objective(unsigned n, const double *x, double *gradient, void *data)
-{
-    (void)n, (void)gradient;
-    struct search *f = data;
     f->model->take(f->surface, x);
-    return rel_rms_of(f, true);
+    const double factor = f->model->normal_scale != NULL ? f->model->normal_scale(f->surface) : 1.0;
+    for (size_t i = 0; i < N_SAMPLE; i++) f->sample[i] = turned(&f->map[i], factor);
 }
 
-static status search_from(struct search *f, const double *start, double *x, double *value, struct error *err)
+static void residuals(void *context, const double *x, double *out)
 {
-    nlopt_opt opt = nlopt_create(NLOPT_LN_NELDERMEAD, (unsigned)f->model->n_unknown);
-    if (opt == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit textures: out of memory");
-    memcpy(x, start, TEXTURE_MAX_UNKNOWN * sizeof *x);
-    nlopt_set_lower_bounds(opt, f->model->lower);
-    nlopt_set_upper_bounds(opt, f->model->upper);
-    nlopt_set_min_objective(opt, objective, f);
-    nlopt_set_maxeval(opt, N_EVALUATION_OF_UNKNOWN * (int)f->model->n_unknown);
-    nlopt_set_ftol_rel(opt, 1e-6);
-    nlopt_optimize(opt, x, value); /* also when the evaluations are used up, x is the best point so far */
-    nlopt_destroy(opt);
+    struct search *f = context;
+    take(f, x);
+    for (size_t i = 0; i < f->target->n; i++) {
+        const struct texture_radiance *r = &f->target->item[i];
+        double rgb[3];
+        if (!(r->weight > 0.0)) continue;
+        radiance_of(f, &r->configuration, rgb);
+        for (int c = 0; c < 3; c++) *out++ = (rgb[c] - r->rgb[c]) * r->scale * sqrt(r->weight / 3.0);
+    }
+}
+
+/* A sum of squared errors of radiances, and how many they are. */
+struct part {
+    double square, n;
+};
+
+static double root_of(struct part a, struct part b)
+{
+    return a.n + b.n > 0.0 ? sqrt((a.square + b.square) / (a.n + b.n)) : NAN;
+}
+
+static status judge(struct search *f, struct texture_error *error, struct error *err)
+{
+    struct part part[TEXTURE_OTHER_DIRECTION + 1] = {{0.0, 0.0}};
+    const struct part none = {0.0, 0.0};
+    error->row_rel_error = calloc(f->target->n_row + 1, sizeof *error->row_rel_error);
+    if (error->row_rel_error == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot judge textures: out of memory");
+    for (size_t i = 0; i < f->target->n; i++) {
+        const struct texture_radiance *r = &f->target->item[i];
+        double rgb[3], square = 0.0;
+        radiance_of(f, &r->configuration, rgb);
+        for (int c = 0; c < 3; c++) square += pow((rgb[c] - r->rgb[c]) * r->scale, 2.0) / 3.0;
+        if (i < f->target->n_row) error->row_rel_error[i] = sqrt(square);
+        part[r->part].square += square;
+        part[r->part].n += 1.0;
+    }
+    error->rel_rms = root_of(part[TEXTURE_FITTED_ROW], none);
+    error->heldout_rel_rms = root_of(part[TEXTURE_HELDOUT_ROW], none);
+    error->row_rel_rms = root_of(part[TEXTURE_FITTED_ROW], part[TEXTURE_HELDOUT_ROW]);
+    error->hemisphere_rel_rms = root_of(part[TEXTURE_OTHER_DIRECTION], none);
+    return STATUS_OK;
+}
+
+/* From every start; the best end counts. */
+static status search_all(struct search *f, double best[TEXTURE_MAX_UNKNOWN], struct error *err)
+{
+    const struct least_squares p = {.n_unknown = f->model->n_unknown,
+                                    .n_residual = 3 * f->n_fitted,
+                                    .lower = f->model->lower,
+                                    .upper = f->model->upper,
+                                    .residuals = residuals,
+                                    .context = f};
+    double lowest = INFINITY;
+    memcpy(best, f->model->start[0], TEXTURE_MAX_UNKNOWN * sizeof *best);
+    for (size_t k = 0; k < f->model->n_start; k++) {
+        double x[TEXTURE_MAX_UNKNOWN], value = INFINITY;
+        memcpy(x, f->model->start[k], sizeof x);
+        status s = least_squares_run(&p, x, &value, err);
+        if (s != STATUS_OK) return s;
+        if (!(value < lowest)) continue;
+        lowest = value;
+        memcpy(best, x, sizeof x);
+    }
     return STATUS_OK;
 }
 
 status texture_fit_run(const struct texture_model *model, void *surface, const struct texture_maps *maps,
-                       const struct texture_means *means, const struct report *report,
-                       const struct pipeline_model *rendered, double rel_rms[2], struct error *err)
+                       const struct texture_means *means, const struct texture_target *target,
+                       struct texture_error *error, struct error *err)
 {
-    double best[TEXTURE_MAX_UNKNOWN], lowest = INFINITY;
+    double best[TEXTURE_MAX_UNKNOWN];
     struct search *f = calloc(1, sizeof *f);
+    *error = (struct texture_error){.row_rel_error = NULL};
     if (f == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot fit textures: out of memory");
-    *f = (struct search){
-        model, surface, means, &report->in.job->rows->observation, rendered, {{{0.0}, {0.0}, {0.0}, 0.0, 0.0}}};
-    make_samples(maps, f->sample);
-    memcpy(best, model->start[0], sizeof best);
-    status s = STATUS_OK;
-    for (size_t k = 0; k < model->n_start && s == STATUS_OK; k++) {
-        double x[TEXTURE_MAX_UNKNOWN], value = INFINITY;
-        s = search_from(f, model->start[k], x, &value, err);
-        if (s != STATUS_OK || !(value < lowest)) continue;
-        lowest = value;
-        memcpy(best, x, sizeof best);
-    }
+    f->model = model;
+    f->surface = surface;
+    f->means = means;
+    f->target = target;
+    for (size_t i = 0; i < target->n; i++) f->n_fitted += target->item[i].weight > 0.0;
+    make_samples(maps, f->map);
+    status s = search_all(f, best, err);
     if (s == STATUS_OK) {
-        model->take(surface, best);
-        rel_rms[0] = rel_rms_of(f, true);
-        rel_rms[1] = rel_rms_of(f, false);
+        take(f, best);
+        s = judge(f, error, err);
     }
     free(f);
     return s;
+}
+
+void texture_error_release(struct texture_error *error)
+{
+    free(error->row_rel_error);
+    error->row_rel_error = NULL;
 }

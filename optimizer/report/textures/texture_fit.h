@@ -1,19 +1,21 @@
-/* Fits the numbers of a surface model to the renderings of the fitted rows, so that the mean over the maps of a texture
- * set comes nearest to them. Programs interpolate between the pixels of maps, and so does this fit: normals between
- * pixels are flatter than normals at pixels. */
+/* Fits the numbers of a surface model to the radiances of a target, so that the mean over the maps of a texture set
+ * comes nearest to them. Programs interpolate between the pixels of maps, and so does this fit: normals between pixels
+ * are flatter than normals at pixels. */
 #ifndef SELVEDGE_OPTIMIZER_TEXTURE_FIT_H
 #define SELVEDGE_OPTIMIZER_TEXTURE_FIT_H
 
-#include "optimizer/report/findings/report.h"
+#include "optimizer/report/textures/least_squares.h"
 #include "optimizer/report/textures/texture_maps.h"
+#include "optimizer/report/textures/texture_target.h"
 
-enum { TEXTURE_MAX_UNKNOWN = 9 };
+enum { TEXTURE_MAX_UNKNOWN = LEAST_SQUARES_MAX_UNKNOWN };
 
 /* A place between the pixels. tangent: across the fibers, where the surface is rougher; root_spread: square root of
  * the map of spreads. */
 struct texture_sample {
     double tangent[3], bitangent[3], normal[3];
     double root_spread, coherence;
+    double share[3]; /* brightness of the map of reflected light here, over its mean */
 };
 
 struct texture_model {
@@ -27,6 +29,8 @@ struct texture_model {
     /* Radiance of a sample for a lamp of irradiance pi. */
     void (*reflect)(const void *surface, const struct texture_sample *s, const double wi[3], const double wo[3],
                     double rgb[3]);
+    /* Factor on the slopes of the map of normals; NULL: 1. */
+    double (*normal_scale)(const void *surface);
 };
 
 /* Reflected and transmitted shares of even light, means over the maps. */
@@ -34,10 +38,20 @@ struct texture_means {
     double albedo[3], transmission[3];
 };
 
-/* Leaves the best numbers in the surface. The errors are those over the fitted and over the held-out rows, relative
- * RMS in the measure of fits; NaN without such rows. STATUS_NO_MEMORY. */
+/* How far the radiances of a surface are from those of the target: differences over the mean of the target's channels,
+ * or over 0.02 where that is darker, as errors of fits (optimizer/fit/objective/objective.h). Root mean squares; NaN
+ * where there is nothing to compare. */
+struct texture_error {
+    double rel_rms, heldout_rel_rms; /* over the fitted and the held-out rows of the job */
+    double row_rel_rms;              /* over both */
+    double hemisphere_rel_rms;       /* over directions of the hemisphere that were not fitted */
+    double *row_rel_error;           /* of each row of the job; owned */
+};
+
+/* Leaves the best numbers in the surface, and fills *error. STATUS_NO_MEMORY. */
 status texture_fit_run(const struct texture_model *model, void *surface, const struct texture_maps *maps,
-                       const struct texture_means *means, const struct report *report,
-                       const struct pipeline_model *rendered, double rel_rms[2], struct error *err);
+                       const struct texture_means *means, const struct texture_target *target,
+                       struct texture_error *error, struct error *err);
+void texture_error_release(struct texture_error *error);
 
 #endif

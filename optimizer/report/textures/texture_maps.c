@@ -8,7 +8,9 @@
 static const double mm = 1e3;
 /* Yarns are smooth on the scale of some fibers: standard deviation of the smoothing, in fiber radii. */
 static const double smooth_radii = 3.0;
-enum { N_BOX = 3 }; /* box filters one after the other come near to a Gaussian */
+/* Largest fine pixel, in fiber radii. */
+static const double fine_radii = 0.5;
+enum { N_BOX = 3, MOST_FINE_EDGE = 1024 }; /* box filters one after the other come near to a Gaussian */
 
 struct raster {
     struct texture_maps *m;
@@ -37,6 +39,7 @@ static void add_ball(const struct raster *r, const double p[3], double radius_mm
             size_t at = wrapped(j, m->height) * m->width + wrapped(i, m->width);
             if (up2 <= 0.0 || p[2] + sqrt(up2) <= (double)m->height_mm[at]) continue;
             m->height_mm[at] = (float)(p[2] + sqrt(up2));
+            m->cover[at] = 1.0f;
             m->fiber_normal[3 * at] = (float)(dx / radius_mm);
             m->fiber_normal[3 * at + 1] = (float)(dy / radius_mm);
             m->fiber_normal[3 * at + 2] = (float)(sqrt(up2) / radius_mm);
@@ -168,7 +171,8 @@ static bool allocate(struct texture_maps *m)
     m->spread = floats(n);
     m->direction_rad = floats(n);
     m->coherence = floats(n);
-    return m->height_mm && m->fiber_normal && m->normal && m->spread && m->direction_rad && m->coherence;
+    m->cover = floats(n);
+    return m->cover && m->height_mm && m->fiber_normal && m->normal && m->spread && m->direction_rad && m->coherence;
 }
 
 static void fill(struct texture_maps *m, const struct raster *r, const struct fiber_set *f, float *smooth_mm,
@@ -189,27 +193,96 @@ static void fill(struct texture_maps *m, const struct raster *r, const struct fi
     make_spread(m);
     smooth(m, m->spread, 1, sd_mm, room);
     smooth(m, r->axis, 2, sd_mm, room);
-    make_directions(m, r->axis);
-    divide_by_mean(m->spread, n);
 }
 
-status texture_maps_make(const struct fiber_set *f, size_t edge, struct texture_maps *m, struct error *err)
+/* ---- pixels of the texture ---- */
+
+/* Adds what a fine pixel has to its pixel: mean slopes in place of the normal, whose length is 1 again later. */
+static void add_pixel(struct texture_maps *m, size_t to, const struct texture_maps *fine, size_t from, float share)
 {
-    double low, high, longer = fmax(f->tile_size_m[0], f->tile_size_m[1]);
+    const float *n = fine->normal + 3 * from;
+    m->height_mm[to] += share * fine->height_mm[from];
+    m->spread[to] += share * fine->spread[from];
+    m->cover[to] += share * fine->cover[from];
+    for (size_t a = 0; a < 2; a++) m->normal[3 * to + a] += share * n[a] / fmaxf(n[2], 0.05f);
+    for (size_t a = 0; a < 3; a++) m->fiber_normal[3 * to + a] += share * fine->fiber_normal[3 * from + a];
+}
+
+/* Means over squares of `step` fine pixels. What the slopes of the surface vary by inside a square adds to the spread.
+ */
+static void reduce(const struct texture_maps *fine, const float *fine_axis, size_t step, struct texture_maps *m,
+                   float *axis)
+{
+    const float share = 1.0f / (float)(step * step);
+    for (size_t j = 0; j < fine->height; j++)
+        for (size_t i = 0; i < fine->width; i++) {
+            const size_t from = j * fine->width + i, to = j / step * m->width + i / step;
+            const float *n = fine->normal + 3 * from;
+            add_pixel(m, to, fine, from, share);
+            m->spread[to] += share * (n[0] * n[0] + n[1] * n[1]) / fmaxf(n[2] * n[2], 0.0025f);
+            for (size_t a = 0; a < 2; a++) axis[2 * to + a] += share * fine_axis[2 * from + a];
+        }
+    for (size_t i = 0; i < m->width * m->height; i++) {
+        float *n = m->normal + 3 * i, *f = m->fiber_normal + 3 * i;
+        const float length = sqrtf(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+        m->spread[i] = fmaxf(m->spread[i] - n[0] * n[0] - n[1] * n[1], 0.0f);
+        normal_of_slopes(-(double)n[0], -(double)n[1], n);
+        for (size_t a = 0; a < 3; a++) f[a] = length > 0.0f ? f[a] / length : a == 2 ? 1.0f : 0.0f;
+    }
+}
+
+/* Fine pixels along an edge of a pixel: so many that a fiber is seen, and no more than a cloth has room for. */
+static size_t steps_of(const struct fiber_set *f, const struct texture_maps *m)
+{
+    const double wanted = ceil(fmax(m->pixel_mm[0], m->pixel_mm[1]) / (fine_radii * mean_radius_mm(f)));
+    const double most = floor((double)MOST_FINE_EDGE / (double)(m->width > m->height ? m->width : m->height));
+    return (size_t)fmax(fmin(wanted, most), 1.0);
+}
+
+static bool make_fine(const struct fiber_set *f, const struct texture_maps *m, size_t step, struct texture_maps *fine,
+                      float **axis)
+{
+    double low, high;
     fiber_set_z_range_m(f, &low, &high);
-    *m = (struct texture_maps){.width = (size_t)fmax(1.0, round((double)edge * f->tile_size_m[0] / longer)),
-                               .height = (size_t)fmax(1.0, round((double)edge * f->tile_size_m[1] / longer))};
-    m->pixel_mm[0] = mm * f->tile_size_m[0] / (double)m->width;
-    m->pixel_mm[1] = mm * f->tile_size_m[1] / (double)m->height;
-    const size_t n = m->width * m->height;
-    const struct raster r = {m, floats(2 * n), high};
+    *fine = (struct texture_maps){.width = step * m->width, .height = step * m->height};
+    for (int a = 0; a < 2; a++) fine->pixel_mm[a] = m->pixel_mm[a] / (double)step;
+    const size_t n = fine->width * fine->height;
+    *axis = floats(2 * n);
+    const struct raster r = {fine, *axis, high};
     float *smooth_mm = floats(n), *room = floats(2 * n);
-    const bool whole = allocate(m) && r.axis != NULL && smooth_mm != NULL && room != NULL;
-    if (whole) fill(m, &r, f, smooth_mm, room);
-    free(r.axis);
+    const bool whole = allocate(fine) && *axis != NULL && smooth_mm != NULL && room != NULL;
+    if (whole) fill(fine, &r, f, smooth_mm, room);
     free(smooth_mm);
     free(room);
+    return whole;
+}
+
+status texture_maps_make(const struct fiber_set *f, const size_t size[2], struct texture_maps *m, struct error *err)
+{
+    struct texture_maps fine = {0};
+    float *fine_axis = NULL;
+    *m = (struct texture_maps){.width = size[0], .height = size[1]};
+    for (int a = 0; a < 2; a++) m->pixel_mm[a] = mm * f->tile_size_m[a] / (double)size[a];
+    const size_t step = steps_of(f, m), n = m->width * m->height;
+    float *axis = floats(2 * n);
+    const bool whole = axis != NULL && allocate(m) && make_fine(f, m, step, &fine, &fine_axis);
+    if (whole) {
+        reduce(&fine, fine_axis, step, m, axis);
+        make_directions(m, axis);
+        divide_by_mean(m->spread, n);
+    }
+    free(axis);
+    free(fine_axis);
+    texture_maps_release(&fine);
     return whole ? STATUS_OK : error_set(err, STATUS_NO_MEMORY, "cannot make textures: out of memory");
+}
+
+void texture_maps_scale_normals(struct texture_maps *m, double factor)
+{
+    for (size_t i = 0; i < m->width * m->height; i++) {
+        float *n = m->normal + 3 * i;
+        if (n[2] > 0.0f) normal_of_slopes(-factor * (double)(n[0] / n[2]), -factor * (double)(n[1] / n[2]), n);
+    }
 }
 
 void texture_maps_release(struct texture_maps *m)
@@ -220,5 +293,7 @@ void texture_maps_release(struct texture_maps *m)
     free(m->spread);
     free(m->direction_rad);
     free(m->coherence);
+    free(m->cover);
+    free(m->share);
     *m = (struct texture_maps){0};
 }

@@ -16,10 +16,15 @@ struct texture_maps {
     float *spread;        /* root mean square of the fibers' slopes relative to the smooth surface, over its mean */
     float *direction_rad; /* along the fibers, from +x, in [0, pi) */
     float *coherence;     /* 0: fibers run everywhere; 1: all along direction */
+    float *cover;         /* part of the pixel where a fiber is seen */
+    float *share;         /* x 3, brightness of reflected light over its mean (texture_tile.h); NULL: not rendered */
 };
 
-/* edge: pixels of the longer side. STATUS_NO_MEMORY. The caller releases the maps, also on failure. */
-status texture_maps_make(const struct fiber_set *f, size_t edge, struct texture_maps *m, struct error *err);
+/* size: pixels along x and y. Pixels that are wide beside a fiber are means over finer ones. STATUS_NO_MEMORY. The
+ * caller releases the maps, also on failure. */
+status texture_maps_make(const struct fiber_set *f, const size_t size[2], struct texture_maps *m, struct error *err);
+/* Multiplies the slopes of the normals by a factor. */
+void texture_maps_scale_normals(struct texture_maps *m, double factor);
 void texture_maps_release(struct texture_maps *m);
 
 #endif

@@ -6,12 +6,12 @@
 #include "renderer/estimate/render.h"
 
 #include <math.h>
-#include <stddef.h>
+#include <stdlib.h>
 
 enum { DEFAULT_PX = 96, MIN_EDGE = 16, MAX_EDGE = 512, MIN_SAMPLE = 64, SAMPLES_OF_A_RENDERING = 4, STREAM = 4090 };
 /* A path of a tile under even light takes a shorter time than a path of a photograph: on a twill 3.6 us. Fitting and
  * writing the textures takes a share of the export's time. */
-static const double path_of_tile = 0.42, fit_share = 0.2;
+static const double path_of_tile = 0.42, fit_share = 1.0 - TEXTURE_TILE_SHARE;
 
 static size_t edge_of(const struct job_results *results)
 {
@@ -85,12 +85,16 @@ static void take_pixels(struct texture_tile *t, const struct image *dark, const 
             square += a * a;
         }
     for (size_t c = 0; c < 3; c++) t->means.transmission[c] = fmax(t->means.transmission[c], 0.0);
+    for (size_t i = 0; i < 3 * n; i++)
+        t->maps.share[i] = (float)((double)t->reflected.pixel[i] / fmax(t->means.albedo[i % 3], 1e-9));
     t->noise = square > 0.0 ? sqrt(variance / square) : 0.0;
 }
 
 static status render_both(const struct export_scene *e, struct texture_tile *t, struct error *err)
 {
     struct image dark = {0}, open = {0};
+    t->maps.share = calloc(3 * t->maps.width * t->maps.height, sizeof *t->maps.share);
+    if (t->maps.share == NULL) return error_set(err, STATUS_NO_MEMORY, "cannot render textures: out of memory");
     status s = image_init(&t->reflected, t->maps.width, t->maps.height, 3, err);
     if (s == STATUS_OK) s = image_init(&t->transmitted, t->maps.width, t->maps.height, 3, err);
     if (s == STATUS_OK) s = render_tile(e, t, true, &dark, err);
@@ -104,7 +108,11 @@ static status render_both(const struct export_scene *e, struct texture_tile *t, 
 status texture_tile_make(const struct export_scene *e, struct texture_tile *t, struct error *err)
 {
     *t = (struct texture_tile){0};
-    status s = texture_maps_make(&e->report->in.made->fiber, edge_of(e->report->in.results), &t->maps, err);
+    const double *size_m = e->report->in.made->fiber.tile_size_m, longer = fmax(size_m[0], size_m[1]);
+    const double edge = (double)edge_of(e->report->in.results);
+    const size_t size[2] = {(size_t)fmax(1.0, round(edge * size_m[0] / longer)),
+                            (size_t)fmax(1.0, round(edge * size_m[1] / longer))};
+    status s = texture_maps_make(&e->report->in.made->fiber, size, &t->maps, err);
     return s == STATUS_OK ? render_both(e, t, err) : s;
 }
 

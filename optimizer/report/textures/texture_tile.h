@@ -6,6 +6,8 @@
 #include "optimizer/report/textures/texture_fit.h"
 #include "renderer/image/image.h"
 
+#define TEXTURE_TILE_SHARE 0.8 /* of an export's progress, before its fit and its files */
+
 struct texture_tile {
     struct texture_maps maps;
     struct texture_means means;

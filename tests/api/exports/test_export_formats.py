@@ -320,9 +320,10 @@ def test_a_u3m_material(results):
     principled = conversion_of(results, "textures")["materials"][0]["principled"]
     assert front["basecolor"]["texture"]["image"]["path"] == "principled_base_color.png"
     assert [front["basecolor"]["constant"][c] for c in "rgb"] == pytest.approx(principled["base_color"], rel=1e-6)
-    assert front["roughness"]["texture"]["factor"] == pytest.approx(principled["roughness_factor"], rel=1e-6)
-    for name in ("specular", "sheen"):
-        assert front[f"{name}_value"]["constant"] == pytest.approx(principled[name])
+    assert front["roughness"]["texture"]["image"]["path"] == "principled_roughness.png" and front["roughness"]["texture"]["factor"] == 1
+    assert front["normal"]["texture"]["scale"] == pytest.approx(principled["normal_scale"], rel=1e-6)
+    for name in ("specular_value", "sheen_value", "sheen_tint"):
+        assert front[name]["constant"] == pytest.approx(principled[name.replace("_value", "")])
     # the mean of the map is the mean that was fitted
     rows = read_png(folder / "principled_base_color.png")
     for c in range(3):
@@ -335,10 +336,15 @@ def test_textures_of_a_tile(results):
     (material,) = export["materials"]
     assert sorted(p.name for p in folder.iterdir()) == sorted([
         "conversion.json", "cloth.mtlx", "cloth.u3m", "maps.exr", *(f"{n}.png" for n in (
-            "base_color", "principled_base_color", "transmission", "normal", "roughness", "anisotropy", "anisotropy_rotation"))])
-    principled = material["principled"]
-    assert 0 < principled["rel_rms"] < 0.5 and 0 < principled["heldout_rel_rms"] < 0.6
-    assert 0 < material["rel_rms"] < 0.5 and 0 < material["heldout_rel_rms"] < 0.6 and 0 < material["pixel_rel_se"] < 0.5
+            "base_color", "principled_base_color", "principled_roughness", "principled_anisotropy", "transmission", "normal", "roughness", "anisotropy",
+            "anisotropy_rotation"))])
+    rows = json.loads((results / "result.json").read_text())["rows"]
+    for found in (material, material["principled"]):
+        assert 0 < found["rel_rms"] < 0.2 and 0 < found["heldout_rel_rms"] < 0.3 and 0 < found["hemisphere_rel_rms"] < 0.3
+        of_set = {s: [e for e, row in zip(found["row_rel_errors"], rows) if row["set"] == s] for s in ("fit", "held-out")}
+        assert math.hypot(*of_set["fit"]) / len(of_set["fit"]) ** 0.5 == pytest.approx(found["rel_rms"])
+        assert math.hypot(*of_set["held-out"]) / len(of_set["held-out"]) ** 0.5 == pytest.approx(found["heldout_rel_rms"])
+    assert export["row_rel_errors"] == material["principled"]["row_rel_errors"] and 0 < material["pixel_rel_se"] < 0.5
     # a fiber that scatters less than all its light makes a cloth that does so, too
     both = [a + b for a, b in zip(material["albedo"], material["transmission"])]
     assert all(0 < x < 1 for x in both)
@@ -353,4 +359,4 @@ def test_textures_of_a_tile(results):
     assert found["valid"], found["why"]
     assert found["surface"] == "ND_open_pbr_surface_surfaceshader" and found["unknown"] == found["undefined"] == [] and found["materials"] == ["cloth"]
     assert all((folder / f).exists() for f in found["files"]) and len(found["files"]) == 6
-    assert found["weight"] == pytest.approx(material["specular_weight"], rel=1e-5)
+    assert found["weight"] == pytest.approx(material["specular_weight"], rel=1e-5) and 1 <= material["specular_ior"]
