@@ -5,7 +5,7 @@ FORMAT mitsuba: the scene as it is. mitsuba_plugin: the scene with the exported 
 pbrt: what a reader of pbrt's grammar finds in the view of that row, with Mitsuba's hair material, which is the same as pbrt's. usd: what the USD
 library finds in the stage, with the hair material of its MaterialX network; lamp and camera are those of the row in rows.csv, which the stage has
 for the first row only. usd_preview: the same with the principled BSDF of the numbers of its preview surface.
-textures: a plane with the maps of the U3M material, with their factors and without the rotation of the anisotropy."""
+textures: a plane with the maps of the U3M material."""
 import csv
 import importlib
 import json
@@ -13,6 +13,7 @@ import os
 import subprocess
 import sys
 
+import drjit
 import mitsuba
 import numpy
 
@@ -119,6 +120,50 @@ def pbrt_scene(folder, row, px, spp):
     return assemble(shapes, [where for _, where in found["instances"]], others)
 
 
+def turned_bsdf():
+    """Registers the BSDF `turned`: the one inside it with its frame turned about the normal by the texture `turns`, which Mitsuba has no input for."""
+    class Turned(mitsuba.BSDF):
+        def __init__(self, props):
+            mitsuba.BSDF.__init__(self, props)
+            self.inner, self.turns = props["inner"], props["turns"]
+            self.m_components = [self.inner.flags(i) for i in range(self.inner.component_count())]
+            self.m_flags = self.inner.flags()
+
+        def frame(self, si, active):
+            angle = self.turns.eval_1(si, active) * (2 * drjit.pi)
+            return drjit.cos(angle), drjit.sin(angle)
+
+        @staticmethod
+        def turn(v, cosine, sine):
+            return mitsuba.Vector3f(cosine * v.x + sine * v.y, cosine * v.y - sine * v.x, v.z)
+
+        def inside(self, si, active):
+            cosine, sine = self.frame(si, active)
+            turned = mitsuba.SurfaceInteraction3f(si)
+            turned.wi = self.turn(si.wi, cosine, sine)
+            return turned, cosine, sine
+
+        def sample(self, ctx, si, sample1, sample2, active=True):
+            turned, cosine, sine = self.inside(si, active)
+            found, value = self.inner.sample(ctx, turned, sample1, sample2, active)
+            found.wo = self.turn(found.wo, cosine, -sine)
+            return found, value
+
+        def eval(self, ctx, si, wo, active=True):
+            turned, cosine, sine = self.inside(si, active)
+            return self.inner.eval(ctx, turned, self.turn(wo, cosine, sine), active)
+
+        def pdf(self, ctx, si, wo, active=True):
+            turned, cosine, sine = self.inside(si, active)
+            return self.inner.pdf(ctx, turned, self.turn(wo, cosine, sine), active)
+
+        def eval_pdf(self, ctx, si, wo, active=True):
+            turned, cosine, sine = self.inside(si, active)
+            return self.inner.eval_pdf(ctx, turned, self.turn(wo, cosine, sine), active)
+
+    mitsuba.register_bsdf("turned", Turned)
+
+
 def textures_scene(folder, row, px, spp):
     """A plane with the maps of the U3M material under Mitsuba's principled BSDF, in the light of pbrt's view of that row. What a fiber shades or
     lets through is in the maps, so there is no sheet below."""
@@ -128,22 +173,34 @@ def textures_scene(folder, row, px, spp):
     found["meshes"] = [m for m in found["meshes"] if m[2]]
     half = 30.0
 
-    def bitmap(key, raw=True):
-        texture = front[key]["texture"]
-        image = texture["image"]
-        size = mitsuba.ScalarTransform4f().scale([2 * half / image["width"], 2 * half / image["height"], 1])
-        pixels = mitsuba.Bitmap(os.path.join(folder, image["path"])).convert(component_format=mitsuba.Struct.Type.Float32, srgb_gamma=False)
+    def pixels_of(key, raw=True):
+        bitmap = mitsuba.Bitmap(os.path.join(folder, front[key]["texture"]["image"]["path"]))
         if raw:  # numbers are stored as they are, whatever the file says of a curve
-            pixels = mitsuba.Bitmap(numpy.array(mitsuba.Bitmap(os.path.join(folder, image["path"])), dtype=numpy.float32) / 255.0)
-        factor = texture.get("factor", 1.0)
-        factor = numpy.array([factor[c] for c in "rgb"] if isinstance(factor, dict) else factor, dtype=numpy.float32)
-        return {"type": "bitmap", "bitmap": mitsuba.Bitmap(numpy.array(pixels)[..., :3] * factor), "raw": True, "to_uv": size}
+            return numpy.array(bitmap, dtype=numpy.float32)[..., :3] / 255.0
+        return numpy.array(bitmap.convert(component_format=mitsuba.Struct.Type.Float32, srgb_gamma=False))[..., :3]
 
-    surface = {"type": "principled", "base_color": bitmap("basecolor", raw=False), "roughness": bitmap("roughness"),
-               "anisotropic": bitmap("anisotropy_value"), "specular": front["specular_value"]["constant"],
-               "sheen": front["sheen_value"]["constant"], "sheen_tint": front["sheen_tint"]["constant"]}
+    def texture(key, pixels):
+        image = front[key]["texture"]["image"]
+        size = mitsuba.ScalarTransform4f().scale([2 * half / image["width"], 2 * half / image["height"], 1])
+        return {"type": "bitmap", "bitmap": mitsuba.Bitmap(numpy.ascontiguousarray(pixels, dtype=numpy.float32)), "raw": True, "to_uv": size}
+
+    def colors(key):
+        factor = front[key]["texture"]["factor"]
+        return texture(key, pixels_of(key, raw=False) * numpy.array([factor[c] for c in "rgb"]))
+
+    def numbers(key):
+        scale = front[key]["texture"]
+        return texture(key, scale["offset"] + scale["factor"] * pixels_of(key)[..., :1])
+
+    normal = (2 * pixels_of("normal") - 1) * numpy.array([front["normal"]["texture"]["scale"]] * 2 + [1])
+    normal /= numpy.linalg.norm(normal, axis=2, keepdims=True)
+    turned_bsdf()
+    surface = {"type": "principled", "base_color": colors("basecolor"), "roughness": numbers("roughness"), "anisotropic": numbers("anisotropy_value"),
+               "specular": front["specular_value"]["constant"], "sheen": front["sheen_value"]["constant"], "sheen_tint": front["sheen_tint"]["constant"]}
+    turned = {"type": "turned", "inner": surface, "turns": numbers("anisotropy_rotation")}
     plane = {"type": "rectangle", "to_world": mitsuba.ScalarTransform4f().scale([half, half, 1]),
-             "bsdf": {"type": "normalmap", "normalmap": bitmap("normal"), "bsdf": surface}}
+             "bsdf": {"type": "normalmap", "normalmap": texture("normal", 0.5 * (normal + 1)), "use_shadowing_function": False,
+                      "flip_invalid_normals": False, "bsdf": turned}}
     return mitsuba.load_dict({"type": "scene", "integrator": {"type": "path"}, "plane": plane, **pbrt_surroundings(found, px, spp)})
 
 
