@@ -54,6 +54,12 @@ void deep_light_add(const struct deep_light *d, const float tangent[3], const fl
     for (int c = 0; c < 3; c++) rgb[c] += scale[c] * (float)fabs(from[2]) * sum[c];
 }
 
+float deep_light_pile(const struct deep_light *d, size_t channel)
+{
+    const double r = (double)d->back[channel], t = (double)d->through[channel], b = 1.0 + r * r - t * t;
+    return r > 0.0 ? (float)((b - sqrt(fmax(b * b - 4.0 * r * r, 0.0))) / (2.0 * r)) : 0.0f;
+}
+
 void deep_light_shift(const struct deep_light *d, const float wo[3], const float wi[3], float shift_mm[2])
 {
     const float *direction[2] = {wo, wi};

@@ -29,8 +29,9 @@ struct deep_light {
     uint32_t n_side;   /* 1: views and lights are above only, because a black sheet lies below */
     float error;       /* relative standard error, root mean square, of light around the nodes: noise of the paths */
     float spread_mm;
-    float *value;      /* DEEP_LIGHT_N_CLASS x DEEP_LIGHT_N_TILT x n_node x n_node x 3 */
-    float (*shift)[2]; /* mm: n_node of views, then n_node of lights */
+    float back[3], through[3]; /* shares of diffuse light on its upper side that the cloth sends back, lets through */
+    float *value;              /* DEEP_LIGHT_N_CLASS x DEEP_LIGHT_N_TILT x n_node x n_node x 3 */
+    float (*shift)[2];         /* mm: n_node of views, then n_node of lights */
 };
 
 static inline size_t deep_light_n_node(const struct deep_light *d) { return (size_t)d->n_side * d->edge * d->edge; }
@@ -51,6 +52,9 @@ size_t deep_light_class(const float tangent[3]);
 /* The two kinds around the kind of a fiber, class * DEEP_LIGHT_N_TILT + node of tilt, and their weights, which sum to
  * 1. A tangent and its opposite are the same. */
 void deep_light_kinds(const float tangent[3], size_t kind[2], double weight[2]);
+/* The share of diffuse light that a pile of such cloths without end sends back, as the end of a roll is one (Kubelka and
+ * Munk: layers that send back R and let T through). */
+float deep_light_pile(const struct deep_light *d, size_t channel);
 /* Adds the radiance times scale. wo, wi: unit vectors; tangent: of the fiber in the flat cloth. A view from below where
  * there is a black sheet counts as one along the cloth; light from there as none. */
 void deep_light_add(const struct deep_light *d, const float tangent[3], const float wo[3], const float wi[3],

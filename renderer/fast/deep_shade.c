@@ -1,6 +1,7 @@
 #include "renderer/fast/deep_shade.h"
 
 #include "renderer/fast/fast_setting.h"
+#include "renderer/fast/layer_light.h"
 #include "renderer/scene/scene_place.h"
 
 #include <string.h>
@@ -11,6 +12,8 @@ struct deep_hit {
     double offset_mm[2];
     float position_mm[3]; /* true place in the scene */
     float row[3][3];      /* of the rotation into the flat cloth at the hit */
+    bool edge;            /* it is seen through the border of a bent cloth, whose place and normal follow */
+    float border_mm[3], border_normal[3];
     struct deep_seen seen;
 };
 
@@ -59,6 +62,22 @@ static void add_light(const struct fast_setting *s, const struct deep_hit *h, co
     for (int c = 0; c < 3; c++) sum->rgb[c] += rgb[c];
 }
 
+/* The same where a cut edge is seen, which light enters straight. */
+static void add_at_edge(const struct fast_setting *s, const struct deep_hit *h, const float direction[3],
+                        const float scale[3], const struct deep_sum *sum)
+{
+    float cosine = 0;
+    for (int a = 0; a < 3; a++) cosine += direction[a] * h->border_normal[a];
+    if (!(cosine > 0) || scene_shell_covers(s->path.scene, h->border_mm, direction)) return;
+    for (int c = 0; c < 3; c++) {
+        const float light = scale[c] * cosine * deep_light_pile(&s->option->tables->deep, (size_t)c);
+        if (sum->rgb != NULL)
+            sum->rgb[c] += light;
+        else
+            sum->term[c][0] += light;
+    }
+}
+
 /* Adds light of one direction; a surface that faces it has the irradiance pi times scale. The light enters beside
  * the hit, where a bent cloth has another normal and other shadows. */
 static void add_from(const struct fast_setting *s, const struct deep_hit *h, const float direction[3],
@@ -69,12 +88,41 @@ static void add_from(const struct fast_setting *s, const struct deep_hit *h, con
     struct scene_hit at;
     struct scene_place place;
     float row[3][3], wi[3], rgb[3] = {0, 0, 0};
+    if (h->edge) {
+        add_at_edge(s, h, direction, scale, sum);
+        return;
+    }
     enter_beside(s, h, direction, rng, &at);
     scene_place_find(scene, &at, h->offset_mm, &place);
     if (scene_shell_shades(scene, &at, &place, no_shift, direction)) return;
     scene_place_rotation(&place, row);
     turn((const float(*)[3])row, direction, wi);
     deep_light_add(&s->option->tables->deep, h->seen.tangent, h->seen.wo, wi, scale, rgb);
+    add_light(s, h, direction, rgb, sum);
+}
+
+/* Adds light that comes from another part of a bent cloth to a place beside the hit, on either side, in a direction that
+ * is chosen by the cosine there. */
+static void add_from_layers(const struct fast_setting *s, const struct deep_hit *h, struct rng *rng,
+                            const struct deep_sum *sum)
+{
+    static const float no_shift[2] = {0, 0};
+    const struct deep_light *deep = &s->option->tables->deep;
+    struct scene_hit at;
+    struct scene_place place;
+    float row[3][3], wi[3], direction[3], point[3], light[3], scale[3], rgb[3] = {0, 0, 0};
+    layer_light_direction(rng, wi);
+    if (deep->n_side > 1 && rng_float(rng) < 0.5f) wi[2] = -wi[2];
+    for (int a = 0; a < 3; a++) direction[a] = wi[0] * h->row[0][a] + wi[1] * h->row[1][a] + wi[2] * h->row[2][a];
+    enter_beside(s, h, direction, rng, &at);
+    scene_place_find(s->path.scene, &at, h->offset_mm, &place);
+    scene_place_rotation(&place, row);
+    for (int a = 0; a < 3; a++) direction[a] = wi[0] * row[0][a] + wi[1] * row[1][a] + wi[2] * row[2][a];
+    scene_surface_point(s->path.scene, &at, &place, no_shift, direction, point);
+    layer_light_arriving(s, point, direction, rng, light);
+    if (!(light[0] + light[1] + light[2] > 0)) return;
+    for (int c = 0; c < 3; c++) scale[c] = light[c] * (float)deep->n_side / fabsf(wi[2]);
+    deep_light_add(deep, h->seen.tangent, h->seen.wo, wi, scale, rgb);
     add_light(s, h, direction, rgb, sum);
 }
 
@@ -94,12 +142,14 @@ static void describe(const struct fast_setting *s, const struct scene_hit *hit, 
     turn((const float(*)[3])h->row, back, h->seen.wo);
     turn((const float(*)[3])h->row, hit->normal, h->seen.normal);
     scene_place_to_cloth(&place, hit->tangent, h->seen.tangent);
+    h->edge = scene_border_seen(s->path.scene, hit, back, h->border_mm, h->border_normal);
     h->seen.depth = (float)((double)place.position_mm[2] / s->option->tables->bottom_mm);
 }
 
 static void shade(const struct fast_setting *s, const struct deep_hit *h, struct rng *rng, const struct deep_sum *sum)
 {
     const struct lights *l = &s->path.lights;
+    if (scene_is_bent(s->path.scene) && !h->edge) add_from_layers(s, h, rng, sum);
     float direction[3], pdf, scale[3], u[2];
     if (l->has_lamp) {
         for (int k = 0; k < 2; k++) u[k] = rng_float(rng);
@@ -109,10 +159,8 @@ static void shade(const struct fast_setting *s, const struct deep_hit *h, struct
         }
     }
     if (s->mixture.n == 0) return;
-    size_t k = light_mixture_pick(&s->mixture, rng_float(rng));
-    float share = s->mixture.cumulative[k] - (k > 0 ? s->mixture.cumulative[k - 1] : 0);
-    for (int c = 0; c < 3; c++) scale[c] = s->mixture.rgb[k][c] / share * (float)M_1_PI;
-    add_from(s, h, s->mixture.direction[k], scale, rng, sum);
+    light_mixture_sample(&s->mixture, rng_float(rng), direction, scale);
+    add_from(s, h, direction, scale, rng, sum);
 }
 
 void deep_shade_begin(const void *context, const struct scene_hit *hit, const struct scene_ray *ray, struct rng *rng,

@@ -10,7 +10,7 @@
 #include <zlib.h>
 
 static const char magic[8] = "SELVFAST";
-enum { VERSION = 5, MOST_BYTES = 1 << 30, MOST_CELL = 1 << 22, MOST_SET = 64, MOST_SEGMENT = 1 << 28 };
+enum { VERSION = 6, MOST_BYTES = 1 << 30, MOST_CELL = 1 << 22, MOST_SET = 64, MOST_SEGMENT = 1 << 28 };
 
 struct header {
     char magic[8];
@@ -21,11 +21,11 @@ struct header {
     float transfer_error;
     uint32_t n_theta, n_component, n_gaussian, n_grid;
     uint32_t deep_traced, deep_edge, deep_side;
-    float deep_error, deep_spread_mm;
+    float deep_error, deep_spread_mm, deep_back[3], deep_through[3];
     uint32_t unused;
 };
 
-_Static_assert(sizeof(struct header) == 144, "renderer/fast/NOTES.md states the layout");
+_Static_assert(sizeof(struct header) == 168, "renderer/fast/NOTES.md states the layout");
 
 /* An array of the file. */
 struct part {
@@ -110,6 +110,8 @@ static void fill_header(const struct fast_tables *t, struct header *h)
                          .deep_side = t->deep.n_side,
                          .deep_error = t->deep.error,
                          .deep_spread_mm = t->deep.spread_mm};
+    memcpy(h->deep_back, t->deep.back, sizeof h->deep_back);
+    memcpy(h->deep_through, t->deep.through, sizeof h->deep_through);
     memcpy(h->magic, magic, sizeof magic);
 }
 
@@ -185,6 +187,8 @@ static void take_header(struct fast_tables *t, const struct header *h)
                                        .n_side = h->deep_side,
                                        .error = h->deep_error,
                                        .spread_mm = h->deep_spread_mm}};
+    memcpy(t->deep.back, h->deep_back, sizeof t->deep.back);
+    memcpy(t->deep.through, h->deep_through, sizeof t->deep.through);
 }
 
 /* Rows that tables point to must exist, whatever a file says. */

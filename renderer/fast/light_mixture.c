@@ -73,3 +73,11 @@ size_t light_mixture_pick(const struct light_mixture *m, float u)
     while (k + 1 < m->n && u >= m->cumulative[k]) k++;
     return k;
 }
+
+void light_mixture_sample(const struct light_mixture *m, float u, float direction[3], float scale[3])
+{
+    const size_t k = light_mixture_pick(m, u);
+    const float chance = m->cumulative[k] - (k > 0 ? m->cumulative[k - 1] : 0);
+    memcpy(direction, m->direction[k], 3 * sizeof *direction);
+    for (int c = 0; c < 3; c++) scale[c] = m->rgb[k][c] / chance * (float)M_1_PI;
+}

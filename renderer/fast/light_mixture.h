@@ -20,5 +20,7 @@ struct light_mixture {
 void light_mixture_init(struct light_mixture *m, const struct lights *l);
 /* One of them in proportion to its brightness, u in [0, 1). */
 size_t light_mixture_pick(const struct light_mixture *m, float u);
+/* The same with its light over its chance: a surface that faces the direction has the irradiance pi times scale. */
+void light_mixture_sample(const struct light_mixture *m, float u, float direction[3], float scale[3]);
 
 #endif

@@ -146,24 +146,13 @@ void scene_hit_beside(const struct scene *s, const struct scene_hit *hit, const 
     for (int a = 0; a < 3; a++) beside->position_mm[a] = (float)w.origin[a];
 }
 
-bool scene_shell_shades(const struct scene *s, const struct scene_hit *hit, const struct scene_place *place,
-                        const float shift_mm[2], const float direction[3])
+bool scene_shell_covers(const struct scene *s, const float point_mm[3], const float direction[3])
 {
-    if (s->bent == NULL) return false;
-    const struct shell_cell *c = &s->bent->space.shell.cell[hit->i_cell];
-    float out = 0, start[3];
-    for (int a = 0; a < 3; a++) out += place->to_cloth[2][a] * direction[a];
-    float to_surface = out > 0 ? lift_mm - place->position_mm[2] : s->bottom_mm - lift_mm - place->position_mm[2];
-    const float move[3] = {shift_mm[0], shift_mm[1], to_surface};
-    for (int a = 0; a < 3; a++) {
-        start[a] = hit->position_mm[a];
-        for (int k = 0; k < 3; k++) start[a] += c->to_world[a][k] * move[k];
-    }
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    struct RTCRay q = {.org_x = start[0],
-                       .org_y = start[1],
-                       .org_z = start[2],
+    struct RTCRay q = {.org_x = point_mm[0],
+                       .org_y = point_mm[1],
+                       .org_z = point_mm[2],
                        .dir_x = direction[0],
                        .dir_y = direction[1],
                        .dir_z = direction[2],
@@ -171,6 +160,103 @@ bool scene_shell_shades(const struct scene *s, const struct scene_hit *hit, cons
                        .mask = ~0u};
     rtcOccluded1(s->bent->space.outer, &context, &q);
     return q.tfar < 0;
+}
+
+void scene_surface_point(const struct scene *s, const struct scene_hit *hit, const struct scene_place *place,
+                         const float shift_mm[2], const float direction[3], float point_mm[3])
+{
+    const struct shell_cell *c = &s->bent->space.shell.cell[hit->i_cell];
+    float out = 0;
+    for (int a = 0; a < 3; a++) out += place->to_cloth[2][a] * direction[a];
+    float to_surface = out > 0 ? lift_mm - place->position_mm[2] : s->bottom_mm - lift_mm - place->position_mm[2];
+    const float move[3] = {shift_mm[0], shift_mm[1], to_surface};
+    for (int a = 0; a < 3; a++) {
+        point_mm[a] = hit->position_mm[a];
+        for (int k = 0; k < 3; k++) point_mm[a] += c->to_world[a][k] * move[k];
+    }
+}
+
+bool scene_shell_shades(const struct scene *s, const struct scene_hit *hit, const struct scene_place *place,
+                        const float shift_mm[2], const float direction[3])
+{
+    float start[3];
+    if (s->bent == NULL) return false;
+    scene_surface_point(s, hit, place, shift_mm, direction, start);
+    return scene_shell_covers(s, start, direction);
+}
+
+/* The first outer face in a direction; false: there is none. */
+static bool meet_outer(const struct scene *s, const float from[3], const float direction[3], struct RTCRayHit *q)
+{
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    memset(q, 0, sizeof *q);
+    q->ray = (struct RTCRay){.org_x = from[0],
+                             .org_y = from[1],
+                             .org_z = from[2],
+                             .dir_x = direction[0],
+                             .dir_y = direction[1],
+                             .dir_z = direction[2],
+                             .tfar = INFINITY,
+                             .mask = ~0u};
+    q->hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(s->bent->space.outer, &context, q);
+    return q->hit.geomID != RTC_INVALID_GEOMETRY_ID;
+}
+
+bool scene_shell_meets(const struct scene *s, const float point_mm[3], const float direction[3],
+                       struct scene_layer *layer)
+{
+    struct RTCRayHit q;
+    if (!meet_outer(s, point_mm, direction, &q)) return false;
+    float n[3] = {q.hit.Ng_x, q.hit.Ng_y, q.hit.Ng_z}, along = 0;
+    scaled_to_one(n);
+    for (int a = 0; a < 3; a++) along += n[a] * direction[a];
+    const bool leaves = along > 0; /* it began in the layer, whose other side it meets */
+    const float thickness = -s->bottom_mm + lift_mm;
+    for (int a = 0; a < 3; a++) {
+        const float at = point_mm[a] + q.ray.tfar * direction[a];
+        layer->normal[a] = leaves ? -n[a] : n[a];
+        layer->front_mm[a] = at + layer->normal[a] * (leaves ? thickness : lift_mm);
+        layer->behind_mm[a] = at - layer->normal[a] * (leaves ? lift_mm : thickness);
+    }
+    return true;
+}
+
+/* Whether an outer face belongs to the border: it has nodes of both ends of the prisms. */
+static bool is_border(const uint32_t node[3])
+{
+    const uint32_t n_upper = (node[0] & 1u) + (node[1] & 1u) + (node[2] & 1u);
+    return n_upper == 1 || n_upper == 2;
+}
+
+/* Whether the prism of a cell has a face on the border. */
+static bool is_at_border(const struct shell *h, uint32_t i_cell)
+{
+    const uint32_t first = i_cell - i_cell % 3;
+    for (uint32_t i = first; i < first + 3; i++)
+        for (int k = 0; k < 4; k++) {
+            uint32_t node[3];
+            int n = 0;
+            if (h->cell[i].neighbour[k] != SHELL_NONE) continue;
+            for (int j = 0; j < 4; j++)
+                if (j != k) node[n++] = h->corner[i][j];
+            if (is_border(node)) return true;
+        }
+    return false;
+}
+
+bool scene_border_seen(const struct scene *s, const struct scene_hit *hit, const float back[3], float point_mm[3],
+                       float normal[3])
+{
+    if (s->bent == NULL || !is_at_border(&s->bent->space.shell, hit->i_cell)) return false;
+    struct RTCRayHit q;
+    if (!meet_outer(s, hit->position_mm, back, &q) || !is_border(s->bent->space.shell.outer[q.hit.primID]))
+        return false;
+    normal[0] = q.hit.Ng_x, normal[1] = q.hit.Ng_y, normal[2] = q.hit.Ng_z;
+    scaled_to_one(normal);
+    for (int a = 0; a < 3; a++) point_mm[a] = hit->position_mm[a] + q.ray.tfar * back[a] + lift_mm * normal[a];
+    return true;
 }
 
 static uint64_t add_bytes(uint64_t h, const void *data, size_t n)

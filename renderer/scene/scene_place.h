@@ -43,11 +43,26 @@ void scene_place_rotation(const struct scene_place *place, float row[3][3]);
  * before. Only its position and its place in a bent cloth change. */
 void scene_hit_beside(const struct scene *scene, const struct scene_hit *hit, const float shift_mm[2],
                       struct scene_hit *beside);
-/* Whether the shell of a bent cloth lies in a direction from a point of its surface: of the upper side if the direction
- * points out of it, of the lower one otherwise. The point lies over the hit, moved by shift_mm in the plane of the
- * cloth there. Flat cloth never shades itself so. */
+/* A point of the surface of a bent cloth, a little outside: of the upper side if the direction points out of it, of the
+ * lower one otherwise. It lies over the hit, moved by shift_mm in the plane of the cloth there. */
+void scene_surface_point(const struct scene *scene, const struct scene_hit *hit, const struct scene_place *place,
+                         const float shift_mm[2], const float direction[3], float point_mm[3]);
+/* Whether the shell of a bent cloth lies in a direction from there. Flat cloth never shades itself so. */
 bool scene_shell_shades(const struct scene *scene, const struct scene_hit *hit, const struct scene_place *place,
                         const float shift_mm[2], const float direction[3]);
+/* Whether a ray that met a hit, and comes from direction `back` of it, came in through the border of a bent cloth, where
+ * its edge is cut: between the upper and the lower side. Then the place there, a little outside, and the normal. */
+bool scene_border_seen(const struct scene *scene, const struct scene_hit *hit, const float back[3], float point_mm[3],
+                       float normal[3]);
+/* Whether a bent cloth lies in a direction from a place outside of it. */
+bool scene_shell_covers(const struct scene *scene, const float point_mm[3], const float direction[3]);
+/* What lies in a direction from a place outside of a bent cloth, or between two layers that nearly touch: the places a
+ * little outside of the side that faces the ray and of the other one, and the normal towards the ray. */
+struct scene_layer {
+    float front_mm[3], behind_mm[3], normal[3];
+};
+bool scene_shell_meets(const struct scene *scene, const float point_mm[3], const float direction[3],
+                       struct scene_layer *layer);
 /* FNV-1a over vertices, radii, groups and tile of the flat cloth, going on from `from`. */
 uint64_t scene_checksum(const struct scene *scene, uint64_t from);
 

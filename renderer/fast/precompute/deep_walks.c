@@ -18,6 +18,9 @@
  * Beside them stand the means of the ways from the first hit to the last one, in the plane of the cloth, weighted by
  * throughput: of each view and of each light, less the mean over all of them.
  *
+ * And beside them the shares of diffuse light that leave on the side of the view and on the other one, by all paths,
+ * which count by the cosine of the view.
+ *
  * Each row of the part is the sum over some of the paths, which follow from its number: results do not depend on the
  * number of threads. Even and odd rows are the halves by which deep_rank.h takes noise off, and tells the error. */
 #include "renderer/fast/precompute/deep_rank.h"
@@ -36,7 +39,7 @@ struct deep_job {
     struct precompute_job *j;
     struct deep_light *d;
     size_t n_path, n_node, n_view; /* paths of a row; nodes of a grid; views */
-    size_t n_value, n_seen, n_sum; /* numbers of the tables; of seen; of a row: both, then n_way */
+    size_t n_value, n_seen, n_sum; /* numbers of the tables; of seen; of a row: both, then n_way and N_SHARE */
     float *sum;                    /* N_ROW x n_sum */
     double *overlap;               /* n_node x n_node: the matrix M of lights, integrals of weights over the disk */
     double *area;                  /* n_node: sums of its rows */
@@ -132,6 +135,11 @@ static void begin(const struct deep_job *x, size_t i_class, const double wo[3], 
 /* Numbers about ways: weight, x and y of each view, the same of each light, and the sum of squares. */
 static size_t n_way(const struct deep_job *x) { return 6 * x->n_node + 1; }
 
+/* Numbers about shares: the sum of cosines, light sent back and light let through. */
+enum { N_SHARE = 7 };
+
+static size_t first_share(const struct deep_job *x) { return x->n_value + x->n_seen + n_way(x); }
+
 /* Adds the way of a path, whose weight has the two factors. sum: where the numbers of a view or a light begin. */
 static void count_way(const double way_mm[2], double scale, const size_t node[4], const double weight[4], float *sum)
 {
@@ -163,6 +171,12 @@ static void count(const struct deep_job *x, const struct start *b, const struct 
     }
 }
 
+static void count_share(const double wo[3], const struct scene_ray *ray, const float throughput[3], float *share)
+{
+    const bool back = wo[2] * (double)ray->direction[2] > 0.0;
+    for (int c = 0; c < 3; c++) share[(back ? 1 : 4) + c] += (float)fabs(wo[2]) * throughput[c];
+}
+
 /* Sets place_mm to the position of a hit in the endless cloth. */
 static void endless_position(const struct scene_hit *hit, const struct scene_ray *ray, double place_mm[2])
 {
@@ -179,11 +193,13 @@ static void walk(const struct deep_job *x, size_t i_class, const double wo[3], s
     double first_mm[2], last_mm[2];
     struct start from;
     begin(x, i_class, wo, &hit, &from, sum);
+    sum[first_share(x)] += (float)fabs(wo[2]);
     endless_position(&hit, &ray, first_mm);
     for (uint32_t i = 1; i < (uint32_t)FIBER_WALK_MOST_STEPS; i++) {
         endless_position(&hit, &ray, last_mm);
         if (!fiber_walk_step(j->q->scene, &j->sets, &hit, &ray, rng, throughput)) return;
         if (scene_trace(j->q->scene, &ray, &hit)) continue;
+        if (!scene_sheet_met(j->q->scene, &ray)) count_share(wo, &ray, throughput, sum + first_share(x));
         if (i > x->d->n_traced && !scene_sheet_met(j->q->scene, &ray)) {
             const double way_mm[2] = {last_mm[0] - first_mm[0], last_mm[1] - first_mm[1]};
             count(x, &from, &ray, throughput, way_mm, sum);
@@ -271,6 +287,17 @@ static void finish_ways(const struct deep_job *x)
     x->d->spread_mm = mean[0] > 0.0 ? (float)sqrt(fmax(0.0, 0.5 * (square - explained) / mean[0])) : 0;
 }
 
+static void finish_shares(const struct deep_job *x)
+{
+    double sum[N_SHARE] = {0.0};
+    for (size_t r = 0; r < N_ROW; r++)
+        for (size_t i = 0; i < N_SHARE; i++) sum[i] += (double)x->sum[r * x->n_sum + first_share(x) + i];
+    for (size_t c = 0; c < 3 && sum[0] > 0.0; c++) {
+        x->d->back[c] = (float)(sum[1 + c] / sum[0]);
+        x->d->through[c] = (float)(sum[4 + c] / sum[0]);
+    }
+}
+
 /* Tilts that nobody met in a view: the mean over those that were. value: n_value. */
 static void fill_unseen(const struct deep_job *x, double *value)
 {
@@ -337,7 +364,7 @@ status precompute_deep(struct precompute_job *j, struct error *err)
     x.n_path = 4 * (size_t)ceil(j->q->deep_paths / (4 * N_ROW)); /* as many of each class and side */
     x.n_view = (size_t)DEEP_LIGHT_N_CLASS * DEEP_LIGHT_N_TILT * x.n_node;
     x.n_seen = x.n_view * N_NEAR;
-    x.n_sum = x.n_value + x.n_seen + n_way(&x);
+    x.n_sum = first_share(&x) + N_SHARE;
     x.sum = calloc(N_ROW * x.n_sum, sizeof *x.sum);
     x.overlap = calloc(x.n_node * (x.n_node + 1) + x.n_seen + x.n_view, sizeof *x.overlap);
     double *work = malloc(4 * x.n_value * sizeof *work);
@@ -354,6 +381,7 @@ status precompute_deep(struct precompute_job *j, struct error *err)
     s = precompute_journal_run(j->journal, &part, &paths, j->pool, j->progress, err);
     if (s == STATUS_OK) s = finish(&x, work, err);
     if (s == STATUS_OK) finish_ways(&x);
+    if (s == STATUS_OK) finish_shares(&x);
     release(&x, work);
     return s;
 }
