@@ -9,6 +9,7 @@
 
 /* Pixels an edge of a field of the coarse grid; rays to each of the two lights from a field. */
 enum { FIELD_PX = 4, FIELD_RAYS = 96, ITERATION_OF_FIELDS = 65531, ITERATION_OF_PIXELS = 65530, REPLICA = 15 };
+enum { MOST_LAYERS = 5 };
 
 struct run {
     const struct ground_request *q;
@@ -31,23 +32,36 @@ static bool meet(const struct run *r, const double xy[2], double p_mm[3])
     return true;
 }
 
-static bool is_open(const struct run *r, const double p_mm[3], const float direction[3])
+/* The share of light from a direction that comes through the layers of the cloth to a point of the ground. */
+static void come_through(const struct run *r, const double p_mm[3], const float direction[3], float share[3])
 {
     struct scene_ray ray;
+    struct scene_layer layer;
     double d[3];
-    for (int a = 0; a < 3; a++) d[a] = (double)direction[a];
-    return !scene_ray_enter(r->q->scene, p_mm, d, &ray) || !scene_occluded(r->q->scene, &ray);
+    float from[3];
+    for (int a = 0; a < 3; a++) {
+        d[a] = (double)direction[a];
+        from[a] = (float)p_mm[a];
+        share[a] = 1;
+    }
+    if (!scene_ray_enter(r->q->scene, p_mm, d, &ray) || !scene_occluded(r->q->scene, &ray)) return;
+    int n = 0;
+    for (; r->q->through != NULL && n < MOST_LAYERS && scene_shell_meets(r->q->scene, from, direction, &layer); n++) {
+        for (int c = 0; c < 3; c++) share[c] *= r->q->through[c];
+        memcpy(from, layer.behind_mm, sizeof from);
+    }
+    if (n == 0 || n == MOST_LAYERS) memset(share, 0, 3 * sizeof *share);
 }
 
 static void add_lamp(const struct run *r, const double p_mm[3], const float u[2], float rgb[3])
 {
     const float position[3] = {(float)p_mm[0], (float)p_mm[1], (float)p_mm[2]};
-    float direction[3], pdf;
+    float direction[3], share[3], pdf;
     if (!r->lights.has_lamp || !lamp_sample(&r->lights.lamp, position, u, direction, &pdf) || !(direction[2] > 0))
         return;
     const float light = lamp_radiance(&r->lights.lamp, direction) * direction[2] / pdf * (float)(r->q->albedo * M_1_PI);
-    if (!is_open(r, p_mm, direction)) return;
-    for (int c = 0; c < 3; c++) rgb[c] += light;
+    come_through(r, p_mm, direction, share);
+    for (int c = 0; c < 3; c++) rgb[c] += light * share[c];
 }
 
 /* By a direction with the density cosine over pi. */
@@ -55,10 +69,10 @@ static void add_environment(const struct run *r, const double p_mm[3], const flo
 {
     const float radius = sqrtf(u[0]), phi = 2 * (float)M_PI * u[1];
     const float direction[3] = {radius * cosf(phi), radius * sinf(phi), sqrtf(fmaxf(1 - u[0], 1e-6f))};
-    float light[3] = {0, 0, 0};
-    if (!is_open(r, p_mm, direction)) return;
+    float light[3] = {0, 0, 0}, share[3];
+    come_through(r, p_mm, direction, share);
     lights_add_environment(&r->lights, direction, 0, light);
-    for (int c = 0; c < 3; c++) rgb[c] += light[c] * (float)r->q->albedo;
+    for (int c = 0; c < 3; c++) rgb[c] += light[c] * share[c] * (float)r->q->albedo;
 }
 
 /* Points of a rank-1 lattice, shifted at random for each field. */

@@ -2,7 +2,8 @@
  * cloth: a layer that is added to a picture of the cloth whose camera does not see the lights.
  *
  * The light on the ground is smooth, so it is found on a coarse grid of the picture and interpolated; where the cloth
- * hides the ground is found for every pixel. Light that the cloth scatters or lets through onto the ground is left out.
+ * hides the ground is found for every pixel. Light that the cloth lets through onto the ground keeps its
+ * direction; light that it sends back to the ground is left out.
  */
 #ifndef SELVEDGE_RENDERER_STUDIO_GROUND_H
 #define SELVEDGE_RENDERER_STUDIO_GROUND_H

@@ -1,6 +1,7 @@
 #include "optimizer/report/surface/surface_view.h"
 #include "base/angle.h"
 #include "optimizer/job/document/job_results.h"
+#include "renderer/fast/fast_tables.h"
 #include "renderer/preview/studio_ground.h"
 #include "renderer/preview/studio_light.h"
 #include "renderer/scene/scene_ray.h"
@@ -66,6 +67,7 @@ status surface_studio_ground(const struct report *report, const struct render_re
                                      .configuration = q->configuration,
                                      .z_mm = z_mm,
                                      .albedo = STUDIO_GROUND_ALBEDO,
+                                     .through = q->input.fast != NULL ? q->input.fast->tables->deep.through : NULL,
                                      .width = q->width,
                                      .height = q->height,
                                      .n_sample = GROUND_RAYS,

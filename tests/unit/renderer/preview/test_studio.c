@@ -77,6 +77,38 @@ static void ground_has_the_light_of_its_lights(void **state)
     scene_free(flat);
 }
 
+/* A cloth that lets all light of a channel through has no shadow there; one that lets none through has the whole. */
+static void shadows_have_the_light_that_comes_through(void **state)
+{
+    static const float through[3] = {1, 0.5f, 0};
+    struct scene *flat = flat_scene(false), *piece = small_piece(flat);
+    struct configuration c = from_above();
+    struct image im[2];
+    struct error err;
+    for (int k = 0; k < 3; k++) c.environment_rgb[k] = 1;
+    for (int k = 0; k < 2; k++) {
+        const struct ground_request q = {.scene = piece,
+                                         .configuration = &c,
+                                         .z_mm = scene_lowest_mm(piece) - 0.5,
+                                         .albedo = 0.5,
+                                         .through = k == 1 ? through : NULL,
+                                         .width = PX,
+                                         .height = PX,
+                                         .n_sample = 4};
+        const struct progress silent = {.report = NULL};
+        assert_int_equal(studio_ground_render(&q, *state, &silent, &im[k], &err), STATUS_OK);
+    }
+    const size_t edge = (PX / 2 * PX + PX / 2 + PX / 7) * im[0].n_channel; /* just beside the piece */
+    const float *dark = im[0].pixel + edge, *lit = im[1].pixel + edge;
+    assert_true(dark[0] < 0.45f && fabsf(dark[0] - dark[2]) < 1e-6f);
+    assert_true(fabsf(lit[0] - 0.5f) < 1e-4f && fabsf(lit[2] - dark[2]) < 1e-6f);
+    /* a ray through the border and the side above it counts as one through two layers */
+    assert_true(lit[1] < 0.5f * (lit[0] + lit[2]) + 1e-4f && lit[1] - lit[2] > 0.9f * (0.5f * (lit[0] - lit[2])));
+    for (int k = 0; k < 2; k++) image_release(&im[k]);
+    scene_free(piece);
+    scene_free(flat);
+}
+
 static void lights_are_seen_on_the_light_table_alone(void **state)
 {
     (void)state;
@@ -146,6 +178,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ground_has_the_light_of_its_lights),
+        cmocka_unit_test(shadows_have_the_light_that_comes_through),
         cmocka_unit_test(lights_are_seen_on_the_light_table_alone),
         cmocka_unit_test(a_lifted_cloth_has_no_sheet),
         cmocka_unit_test(exposure_brings_cloths_halfway),
