@@ -52,8 +52,8 @@ size_t deep_light_class(const float tangent[3]);
 /* The two kinds around the kind of a fiber, class * DEEP_LIGHT_N_TILT + node of tilt, and their weights, which sum to
  * 1. A tangent and its opposite are the same. */
 void deep_light_kinds(const float tangent[3], size_t kind[2], double weight[2]);
-/* The share of diffuse light that a pile of such cloths without end sends back, as the end of a roll is one (Kubelka and
- * Munk: layers that send back R and let T through). */
+/* The share of diffuse light that a pile of such cloths without end sends back, as the end of a roll is one (Kubelka
+ * and Munk: layers that send back R and let T through). */
 float deep_light_pile(const struct deep_light *d, size_t channel);
 /* Adds the radiance times scale. wo, wi: unit vectors; tangent: of the fiber in the flat cloth. A view from below where
  * there is a black sheet counts as one along the cloth; light from there as none. */

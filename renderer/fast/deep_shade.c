@@ -101,8 +101,8 @@ static void add_from(const struct fast_setting *s, const struct deep_hit *h, con
     add_light(s, h, direction, rgb, sum);
 }
 
-/* Adds light that comes from another part of a bent cloth to a place beside the hit, on either side, in a direction that
- * is chosen by the cosine there. */
+/* Adds light that comes from another part of a bent cloth to a place beside the hit, on either side, in a direction
+ * that is chosen by the cosine there. */
 static void add_from_layers(const struct fast_setting *s, const struct deep_hit *h, struct rng *rng,
                             const struct deep_sum *sum)
 {

@@ -1,5 +1,6 @@
 /* Light from other parts of a bent cloth: from fold to fold, and through the layers of a roll. They are taken for matte
- * surfaces that send back and let through the shares of the table of deep light, and are lit by the lights of the setting. */
+ * surfaces that send back and let through the shares of the table of deep light, and are lit by the setting's
+ * lights. */
 #ifndef SELVEDGE_RENDERER_LAYER_LIGHT_H
 #define SELVEDGE_RENDERER_LAYER_LIGHT_H
 

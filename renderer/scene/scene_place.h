@@ -50,8 +50,8 @@ void scene_surface_point(const struct scene *scene, const struct scene_hit *hit,
 /* Whether the shell of a bent cloth lies in a direction from there. Flat cloth never shades itself so. */
 bool scene_shell_shades(const struct scene *scene, const struct scene_hit *hit, const struct scene_place *place,
                         const float shift_mm[2], const float direction[3]);
-/* Whether a ray that met a hit, and comes from direction `back` of it, came in through the border of a bent cloth, where
- * its edge is cut: between the upper and the lower side. Then the place there, a little outside, and the normal. */
+/* Whether a ray that met a hit, and comes from direction `back` of it, came in through the border of a bent cloth,
+ * where its edge is cut, between the upper and the lower side. Then the place there, a little outside, and normal. */
 bool scene_border_seen(const struct scene *scene, const struct scene_hit *hit, const float back[3], float point_mm[3],
                        float normal[3]);
 /* Whether a bent cloth lies in a direction from a place outside of it. */
