@@ -91,6 +91,7 @@ bool scene_section_normal(const struct scene *s, const struct scene_hit *hit, fl
     return across_both(axis, hit->tangent, normal);
 }
 
+bool scene_has_sections(const struct scene *s) { return s->long_axis != NULL; }
 bool scene_shows_sections(const struct scene *s) { return s->ratio != NULL; }
 
 static void scaled_to_one(float v[3])

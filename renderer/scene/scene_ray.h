@@ -76,6 +76,8 @@ bool scene_bent_normal(const struct scene *scene, const struct scene_hit *hit, f
 /* The direction of the short axis of the fiber's section where it was hit, unit and across the fiber. False: the
  * sections of the cloth were not measured, or are round (mean ratio of axes up to FIBER_RATIO_FLAT). */
 bool scene_section_normal(const struct scene *scene, const struct scene_hit *hit, float normal[3]);
+/* Whether that direction is known: sections were measured and are not round. */
+bool scene_has_sections(const struct scene *scene);
 /* Whether surfaces are elliptical cylinders with these sections (scene_option.sections), and not round tubes. */
 bool scene_shows_sections(const struct scene *scene);
 /* z of the lowest fiber surface (the top is 0). */

@@ -4,7 +4,7 @@
  *     blender --python cloth.py          or: blender -b --python cloth.py -- picture.exr SAMPLES PX ROW
  *
  * fibers-<group>.txt has the vertices of each fiber with its radius, scene.json the data for the script, which makes
- * hair curves with two Principled Hair BSDFs mixed (hair_fit.h; Cycles), instances, black sheet, camera and lamp.
+ * hair curves with two Principled Hair BSDFs mixed (hair_on_cloth.h; Cycles), instances, black sheet, camera and lamp.
  * Millimetres. */
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/json_number.h"

@@ -1,6 +1,6 @@
 /* results/export/pbrt/: the fitted cloth for pbrt-v4 (pbrt.org/fileformat-v4). cloth.pbrt holds the tile of fibers,
- * repeated, with two of pbrt's "hair" materials mixed (hair_fit.h) and the black sheet; fibers-<group>.pbrt the curves
- * of one group; view-<row>.pbrt lamp, camera and film of one row, and includes the cloth.
+ * repeated, with two of pbrt's "hair" materials mixed (hair_on_cloth.h) and the black sheet; fibers-<group>.pbrt the
+ * curves of one group; view-<row>.pbrt lamp, camera and film of one row, and includes the cloth.
  *
  * pbrt scales a light given as RGB so that its value is the value of the picture with the film's standard sensor. A
  * lamp with alpha 0 lights the cloth but is not seen. Pictures of pbrt are left-handed, therefore the Scale. */

@@ -3,8 +3,8 @@
  * sheet as a Mesh, camera and lamp of the first row. Millimetres, z is up.
  *
  * Each material has two surfaces: for renderers that read MaterialX in USD (outputs:mtlx:surface) the mixture of two
- * hair materials of hair_fit.h, and for all others a UsdPreviewSurface. That one lets no light through a fiber; it is
- * the opaque fiber of hair_fit.h. */
+ * hair materials of hair_on_cloth.h, and for all others a UsdPreviewSurface. That one lets no light through a fiber; it
+ * is the opaque fiber of hair_fit.h. */
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/report/export/export_scene.h"

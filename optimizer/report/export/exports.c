@@ -7,10 +7,12 @@
 #include "optimizer/job/document/job_setup.h"
 #include "optimizer/job/document/json_number.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/report/export/earlier_hair.h"
 #include "optimizer/report/export/export_scene.h"
 #include "optimizer/report/export/hair_on_cloth.h"
 #include "optimizer/stages/validation/pipeline_choice.h"
 #include "optimizer/stages/validation/pipeline_discrepancy.h"
+#include "renderer/scene/scene_ray.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -33,12 +35,15 @@ enum { N_FORMAT = sizeof exports / sizeof *exports };
 static const double percent = 100.0;
 static const double most_row_error = 0.1; /* of a cloth that is exported without a warning */
 
-static status fit_materials(struct export_scene *e, struct error *err)
+/* known: e->hair has the mixtures. */
+static status fit_materials(struct export_scene *e, bool known, struct error *err)
 {
     const struct appearance *a = &e->model->setup->appearance;
     status s = STATUS_OK;
     for (size_t g = 0; g < e->model->setup->sets.n_set && s == STATUS_OK; g++) {
-        s = hair_fit_run(a->surface, e->model->fit->result.param + g * e->model->setup->sets.n_own, &e->hair[g], err);
+        const double *param = e->model->fit->result.param + g * e->model->setup->sets.n_own;
+        const struct hair_blend earlier = e->hair[g].blend;
+        s = hair_fit_run(a->surface, param, known ? &earlier : NULL, &e->hair[g], err);
     }
     return s;
 }
@@ -65,6 +70,33 @@ static void state_error(const struct export_scene *e, const struct hair_error *h
                         json_number_list(h->row_rel_error, e->report->in.job->rows->observation.n, 1.0));
 }
 
+/* Whether exact.xml takes sections to lie flat that the model saw turn with their fibers. */
+static bool misses_sections(const struct export_scene *e, size_t i)
+{
+    return exports[i].format == &export_mitsuba && export_mitsuba_is_exact(e) &&
+           e->model->setup->appearance.surface->flat_section &&
+           scene_has_sections(made_cloth_scene(e->report->in.made, e->model->setup).fibers);
+}
+
+static const char no_hair_error[] = "the hair materials are those nearest to single fibers, with no error of the cloth "
+                                    "stated: its groups of fibers are more than such a fit has room for";
+static const char no_sections[] = "exact.xml of the export for Mitsuba takes the flat sections of the fibers to lie "
+                                  "flat in the cloth, because curves "
+                                  "of Mitsuba are round; in this job's renderings they turn as they were measured";
+
+/* Adds what people need to know of a format with this error to its entry. */
+static void state_warnings(const struct export_scene *e, size_t i, const struct hair_error *h, json_t *json)
+{
+    json_t *list = json_array();
+    if (exports[i].format->has_hair && !h->stated) json_array_append_new(list, json_string(no_hair_error));
+    if (h->stated && h->row_rel_rms > most_row_error)
+        json_array_append_new(list, json_sprintf("the cloth with these materials differs from this job's renderings by "
+                                                 "%.0f %% over its rows",
+                                                 percent * h->row_rel_rms));
+    if (misses_sections(e, i)) json_array_append_new(list, json_string(no_sections));
+    json_object_set_new(json, "warnings", list);
+}
+
 static status write_format(struct export_scene *e, size_t i, struct error *err)
 {
     char folder[64], path[WORKER_PATH_BYTES];
@@ -76,7 +108,9 @@ static status write_format(struct export_scene *e, size_t i, struct error *err)
     if (s == STATUS_OK) s = exports[i].format->write(e, &materials, err);
     if (s != STATUS_OK) return s;
     json_t *json = json_pack("{s:s, s:s, s:o}", "format", exports[i].name, "folder", folder, "materials", materials);
-    state_error(e, exports[i].format->has_hair ? &e->hair_error : &e->own_error, json);
+    const struct hair_error *error = exports[i].format->has_hair ? &e->hair_error : &e->own_error;
+    state_error(e, error, json);
+    state_warnings(e, i, error, json);
     free(e->own_error.row_rel_error);
     e->own_error = (struct hair_error){.stated = false};
     s = write_conversion(e, json, err);
@@ -90,9 +124,7 @@ static status write_format(struct export_scene *e, size_t i, struct error *err)
 static void warn_of_hair(const struct export_scene *e)
 {
     if (!e->hair_error.stated)
-        worker_status_warn(e->report->in.job->tools->status,
-                           "the hair materials of the exports are those nearest to single fibers, with no error of the "
-                           "cloth stated: its groups of fibers are more than such a fit has room for");
+        worker_status_warn(e->report->in.job->tools->status, "exports: %s", no_hair_error);
     else if (e->hair_error.row_rel_rms > most_row_error)
         worker_status_warn(e->report->in.job->tools->status,
                            "with the hair materials that other programs have, the cloth differs from this job's "
@@ -104,6 +136,9 @@ static void warn_of_hair(const struct export_scene *e)
 static void warn_of_rest(const struct export_scene *e)
 {
     int n[2];
+    for (size_t i = 0; i < N_FORMAT; i++)
+        if (e->report->in.results->exported[i] && misses_sections(e, i))
+            worker_status_warn(e->report->in.job->tools->status, "%s", no_sections);
     if (!export_repeats(e, n))
         worker_status_warn(e->report->in.job->tools->status,
                            "the exported scenes have %d x %d repeats of the tile, the most that are written: the "
@@ -151,9 +186,13 @@ static status fit_hair(struct export_scene *e, struct progress_part *part, struc
     const double n_fit_path = (double)e->model->fit->result.n_path, whole = part->share;
     const size_t n_row = e->report->in.job->rows->observation.n;
     const double share = hair_on_cloth_paths(n_fit_path) / exports_paths(results, n_row, n_fit_path);
+    bool known;
     if (!hair_wanted(results)) return STATUS_OK;
-    status s = fit_materials(e, err);
-    if (s == STATUS_OK) s = hair_on_cloth_run(e, 0.0, share, err);
+    status s = earlier_hair_read(e, &known, err);
+    if (s == STATUS_OK) s = fit_materials(e, known, err);
+    if (s == STATUS_OK && !known) s = hair_on_cloth_run(e, 0.0, share, err);
+    if (s == STATUS_OK && known)
+        log_info(e->report->in.job->tools->log, "exports: the hair materials are those of an earlier export");
     if (s == STATUS_OK) warn_of_hair(e);
     part->from += share * whole;
     part->share -= share * whole;

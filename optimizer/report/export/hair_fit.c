@@ -300,22 +300,21 @@ static void fit_surface(struct target *t, struct hair_fit *fit)
         }
 }
 
-static status fit_target(struct target *t, struct hair_fit *fit, struct error *err)
+static status fit_target(struct target *t, const struct hair_blend *known, struct hair_fit *fit, struct error *err)
 {
-    double x[N_UNKNOWN] = {0}, share[N_THETA_O][N_SIDE][3];
-    status s = minimise(t, x, err);
+    double x[N_UNKNOWN] = {0};
+    status s = known == NULL ? minimise(t, x, err) : STATUS_OK;
     if (s != STATUS_OK) return s;
-    fit->blend = blend_of(x);
+    fit->blend = known == NULL ? blend_of(x) : *known;
     fill_blend(&fit->blend, t);
     fit->rel_rms = sqrt(shape_square(t));
-    add_shares(t, t->lobes, share);
     mean_share(t, t->share, fit->turned, fit->albedo);
-    mean_share(t, share, fit->blend_turned, fit->blend_albedo);
     fit_surface(t, fit);
     return STATUS_OK;
 }
 
-status hair_fit_run(const struct scattering_model *model, const double *param, struct hair_fit *fit, struct error *err)
+status hair_fit_run(const struct scattering_model *model, const double *param, const struct hair_blend *known,
+                    struct hair_fit *fit, struct error *err)
 {
     struct target t = {.fiber = calloc(N_VALUE, sizeof(double)), .lobes = calloc(N_VALUE, sizeof(double))};
     struct scattering_state *state = NULL;
@@ -326,7 +325,7 @@ status hair_fit_run(const struct scattering_model *model, const double *param, s
         make_directions(&t);
         fill_fiber(model, state, &t);
         model->release(state);
-        s = fit_target(&t, fit, err);
+        s = fit_target(&t, known, fit, err);
     }
     free(t.fiber);
     free(t.lobes);

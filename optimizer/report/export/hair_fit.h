@@ -20,8 +20,8 @@ struct hair_fit {
      * root mean square of the fiber's own. */
     double rel_rms;
     /* Shares of the light, means over directions, by channel: all scattered light, and the part that turns back to the
-     * side of the light; for the fiber, and for the blend. */
-    double albedo[3], turned[3], blend_albedo[3], blend_turned[3];
+     * side of the light, of the fiber. */
+    double albedo[3], turned[3];
     /* For programs with surfaces only: an opaque fiber, diffuse under a rough dielectric. Index and roughness (whose
      * square is GGX's alpha) bring its scattering nearest to the fiber's; the colour makes a thick cloth as bright. By
      * the theory of Kubelka and Munk 1931 that is so if as much is absorbed for the light that turns back: (1 - albedo)
@@ -33,7 +33,9 @@ struct hair_fit {
 };
 
 /* param: one set, internal units. A section that is not round is seen as a mean over its turns about the axis.
- * STATUS_INVALID as the model's prepare, STATUS_NO_MEMORY. */
-status hair_fit_run(const struct scattering_model *model, const double *param, struct hair_fit *fit, struct error *err);
+ * known: a blend to take in place of the search for one, which takes seconds; NULL: none. STATUS_INVALID as the model's
+ * prepare, STATUS_NO_MEMORY. */
+status hair_fit_run(const struct scattering_model *model, const double *param, const struct hair_blend *known,
+                    struct hair_fit *fit, struct error *err);
 
 #endif

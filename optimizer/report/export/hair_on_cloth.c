@@ -3,9 +3,11 @@
 #include "optimizer/fit/descent/fit_run.h"
 #include "optimizer/fit/descent/trace_estimator.h"
 #include "optimizer/job/document/job_cloth.h"
+#include "optimizer/job/document/job_setup.h"
 #include "optimizer/report/export/cloth_directions.h"
 #include "optimizer/report/result/result_json.h"
 #include "optimizer/stages/validation/pipeline_discrepancy.h"
+#include "renderer/scene/scene_ray.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -23,6 +25,7 @@ static const double path_of_mixture = 1.6;
 
 struct on_cloth {
     struct export_scene *e;
+    struct scene *round; /* the fibers as round tubes, where the job's own scene shows their sections; owned, or NULL */
     struct appearance mixture;
     struct model_sets sets;
     struct configuration configuration[N_DIRECTION];
@@ -62,7 +65,7 @@ static struct radiance_input fitted_cloth(const struct on_cloth *f)
 
 static struct radiance_input cloth_of_mixtures(const struct on_cloth *f)
 {
-    return (struct radiance_input){.scene = {.fibers = f->e->report->in.made->scene},
+    return (struct radiance_input){.scene = {.fibers = f->round != NULL ? f->round : f->e->report->in.made->scene},
                                    .model = &f->mixture,
                                    .param = f->param,
                                    .n_set = f->sets.n_set};
@@ -245,6 +248,9 @@ status hair_on_cloth_run(struct export_scene *e, double from, double to, struct 
         appearance_find(model_id, &f->mixture)
             ? model_sets_init(&f->sets, model_catalogue_find(model_id), e->report->in.job->cloth->group, n_set, err)
             : error_set(err, STATUS_INTERNAL, "there is no model %s", model_id);
+    if (s == STATUS_OK && scene_shows_sections(e->report->in.made->scene))
+        s = scene_new(&e->report->in.made->fiber,
+                      &(struct scene_option){.black_sheet = e->report->in.job->setup->black_sheet}, &f->round, err);
     for (size_t g = 0; g < n_set && s == STATUS_OK; g++)
         param_of(&e->hair[g].blend, f->mixture.param, f->param + g * N_OF_MIXTURE);
     if (s == STATUS_OK) s = take_rows(f, err);
@@ -253,6 +259,7 @@ status hair_on_cloth_run(struct export_scene *e, double from, double to, struct 
     observation_set_release(&f->fitted);
     observation_set_release(&f->between);
     observation_set_release(&f->rows);
+    scene_free(f->round);
     free(f);
     return s;
 }

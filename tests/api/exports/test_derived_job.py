@@ -1,7 +1,7 @@
 """Jobs that show the result of a finished job without a new fit."""
 import csv
+import json
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -32,14 +32,6 @@ def text_of(real, job, path):
     return reply.text
 
 
-HAIR = re.compile(r'(name="(?:weight|longitudinal_roughness|azimuthal_roughness|int_ior|sigma_a)" value=")[^"]*')
-
-
-def is_same_scene(ours, theirs):
-    """All but the numbers of the hair, which is fitted again: from parameters that are rounded in result.json."""
-    assert len(HAIR.findall(ours)) >= 9 and HAIR.sub(r"\1", ours) == HAIR.sub(r"\1", theirs)
-
-
 def derive(real, job, **wanted):
     reply = real.post(f"/v1/jobs/{job}/derive", json=wanted)
     assert reply.status_code == 201, reply.text
@@ -50,12 +42,17 @@ def derive(real, job, **wanted):
 
 
 def test_an_export_made_later_is_the_export_of_the_fit(real, fitted):
-    """The scene, and the rows with measured and rendered radiances; only the fit and its estimates are not made again."""
+    """The scene with its hair, the stated errors, and the rows with measured and rendered radiances: no fit is made again."""
     job = derive(real, fitted, export={"mitsuba": True, "pbrt": True})
     done = real.wait_state(job, "succeeded", timeout_s=400)
     assert done["sample"] == "blue twill for mitsuba, pbrt" and done["document"]["fit"]["result_file"] == "result.json"
     assert [e["format"] for e in done["result"]["exports"]] == ["mitsuba", "pbrt"] and done["result"]["method"] is None
-    is_same_scene(*(text_of(real, j, "export/mitsuba/scene.xml") for j in (job, fitted)))
+    assert text_of(real, job, "export/mitsuba/scene.xml") == text_of(real, fitted, "export/mitsuba/scene.xml")
+    assert "those of an earlier export" in real.get(f"/v1/jobs/{job}/log").text
+    first, (again, pbrt) = json.loads(text_of(real, fitted, "result.json"))["exports"][0], done["result"]["exports"]
+    for key in ("rel_rms", "row_rel_rms", "row_rel_rms_se", "row_rel_errors"):
+        assert again[key] == pbrt[key] == first[key]
+    assert [m["hair"] for m in pbrt["materials"]] == [m["hair"] for m in first["materials"]]
     both = [list(csv.DictReader(text_of(real, j, "export/mitsuba/rows.csv").splitlines())) for j in (job, fitted)]
     assert len(both[0]) == len(both[1]) == 6
     for ours, theirs in zip(*both):
@@ -146,7 +143,7 @@ def test_the_commands_download_what_they_make(real, fitted, tmp_path):
     done = cli("export", fitted[:8], "--to", "mitsuba,pbrt", "--out", tmp_path / "out", "--server", real.url)
     assert done.returncode == 0, done.stderr
     assert sorted(os.listdir(tmp_path / "out")) == ["export"] and sorted(os.listdir(tmp_path / "out/export")) == ["mitsuba", "pbrt"]
-    is_same_scene((tmp_path / "out/export/mitsuba/scene.xml").read_text(), text_of(real, fitted, "export/mitsuba/scene.xml"))
+    assert (tmp_path / "out/export/mitsuba/scene.xml").read_text() == text_of(real, fitted, "export/mitsuba/scene.xml")
     wrong = cli("export", fitted, "--to", "maya", "--server", real.url)
     assert wrong.returncode == 1 and "'maya'" in wrong.stderr and "mitsuba, pbrt" in wrong.stderr
     (tmp_path / "sheet.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n")
@@ -161,7 +158,13 @@ def test_a_folder_of_results_is_exported_without_a_server(real, fitted, tmp_path
     (tmp_path / "export/mitsuba/scene.xml").write_text("old")
     done = cli("export", tmp_path, "--to", "mitsuba", "--server", "http://127.0.0.1:1")
     assert done.returncode == 0, done.stderr
-    is_same_scene((tmp_path / "export/mitsuba/scene.xml").read_text(), before)
+    assert (tmp_path / "export/mitsuba/scene.xml").read_text() == before
+    # hair of other parameters is not taken
+    result = json.loads((tmp_path / "result.json").read_text())
+    result["parameters"][0]["value"] *= 1.01
+    (tmp_path / "result.json").write_text(json.dumps(result))
+    assert cli("export", tmp_path, "--to", "mitsuba").returncode == 0
+    assert (tmp_path / "export/mitsuba/scene.xml").read_text() != before
     assert [n for n in os.listdir(tmp_path) if n.startswith(".")] == []
     (tmp_path / "fibers.hair").unlink()
     lost = cli("export", tmp_path, "--to", "usd")
