@@ -17,6 +17,27 @@ import numpy as np
 
 N_TABLE = 512
 HALF_PI = float(0.5 * np.pi)
+# Smallest and largest value of each parameter; colours have one for each channel.
+COLOURS = {f"{name}_{c}": (0, 1) for name in ("C_R", "C_TT") for c in "rgb"}
+MODELS = {"two_lobe.v1": {**COLOURS, "beta_R": (1, 10), "beta_TT": (10, 45), "gamma_TT": (1, 45)},
+          "textile.v3": {**COLOURS, "beta_R": (1, 30), "beta_TT": (5, 60), "gamma_TT": (5, 60), "w": (0.01, 0.98), "s": (0.02, 0.98), "f": (0.1, 0.98),
+                         "h": (0.02, 0.98)}}
+
+
+def read_parameters(props):
+    """Model and parameters by name. ValueError names what is missing or out of range."""
+    model = props["model"] if props.has_property("model") else None
+    if model not in MODELS:
+        raise ValueError(f"selvedge_fiber: 'model' is {model!r}, and must be one of {', '.join(MODELS)}")
+    values = {}
+    for name, (low, high) in MODELS[model].items():
+        if not props.has_property(name):
+            raise ValueError(f"selvedge_fiber: the parameter '{name}' of {model} is missing")
+        value = props[name]
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+            raise ValueError(f"selvedge_fiber: the parameter '{name}' of {model} is {value!r}, and must be a number from {low} to {high}")
+        values[name] = float(value)
+    return model, values
 
 
 def gauss(x, beta):
@@ -75,14 +96,12 @@ class Fiber(mi.BSDF):
         mi.BSDF.__init__(self, props)
         self.m_components = [mi.BSDFFlags.Glossy | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide | mi.BSDFFlags.Anisotropic]
         self.m_flags = self.m_components[0]
-        model = props["model"]
-        if model not in ("two_lobe.v1", "textile.v3"):
-            raise ValueError(f"selvedge_fiber knows two_lobe.v1 and textile.v3, not {model}")
+        model, value = read_parameters(props)
         self.textile = model == "textile.v3"
-        self.c_r, self.c_tt = ([float(props[f"{name}_{c}"]) for c in "rgb"] for name in ("C_R", "C_TT"))
-        self.beta = [float(np.radians(props[name])) for name in ("beta_R", "beta_TT")]
-        self.gamma = float(np.radians(props["gamma_TT"]))
-        self.w, self.s, self.f, self.h = ((float(props[name]) for name in "wsfh") if self.textile else (0.0, 0.0, 1.0, 0.5))
+        self.c_r, self.c_tt = ([value[f"{name}_{c}"] for c in "rgb"] for name in ("C_R", "C_TT"))
+        self.beta = [float(np.radians(value[name])) for name in ("beta_R", "beta_TT")]
+        self.gamma = float(np.radians(value["gamma_TT"]))
+        self.w, self.s, self.f, self.h = ((value[name] for name in "wsfh") if self.textile else (0.0, 0.0, 1.0, 0.5))
         self.prepare()
         self.choose()
 
