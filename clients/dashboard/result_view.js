@@ -97,6 +97,15 @@ export function configurations(job, urls) {
   });
 }
 
+// Returns the files for other programs: [{format, exact, error, errorSe, worst, row, warnings}]; error: relative RMS difference of
+// their cloth from the job's renderings over its rows; worst: the largest one, in the row of that name; null where none is stated
+export function exportsOf(job) {
+  return (job.result?.exports ?? []).map((e) => {
+    const errors = e.row_rel_errors ?? [], worst = errors.length ? Math.max(...errors) : null;
+    return { format: e.format, exact: e.exact === true, error: e.row_rel_rms ?? null, errorSe: e.row_rel_rms_se ?? null, worst, row: job.result.rows?.[errors.indexOf(worst)]?.name ?? null, warnings: e.warnings ?? [] };
+  });
+}
+
 // Returns the rendered lobes of a table: [{row: name, angles: degrees of the camera, rgb: [[r, g, b], ...]}]
 export function lobesOf(job) {
   return (job.result?.lobes ?? []).map((l) => ({ row: l.row, angles: l.camera_theta_deg, rgb: l.rendered }));

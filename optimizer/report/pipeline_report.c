@@ -182,6 +182,7 @@ static status report_fit(struct report *report, struct error *err)
     if (s == STATUS_OK) s = write_twin(report, err);
     if (s == STATUS_OK) s = write_exports(report, err);
     if (s == STATUS_OK) s = result_json_write(report, err);
+    if (s == STATUS_OK && json_array_size(report->exports) > 0) s = result_summary_write(report, err);
     return s == STATUS_OK ? write_pages(report, err) : s;
 }
 

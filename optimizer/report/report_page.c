@@ -9,6 +9,7 @@
 #include "optimizer/report/front_page.h"
 #include "optimizer/report/letterhead_file.h"
 #include "optimizer/report/page_charts.h"
+#include "optimizer/report/page_exports.h"
 #include "optimizer/report/page_lobes.h"
 #include "optimizer/report/page_pictures.h"
 #include "optimizer/report/page_style.h"
@@ -314,6 +315,7 @@ static status print_appendix(struct report *report, const json_t *data, FILE *ou
         print_profile(report, result, out);
     else if (s == STATUS_OK)
         s = print_surfaces(report, result, out, err);
+    page_exports(report, out);
     json_t *statements = file_ledger_sentences(json_object_get(result, "files"));
     print_list("Statements of the files", statements, out);
     json_decref(statements);

@@ -59,6 +59,10 @@ def test_a_picture_and_an_export_of_a_finished_job(lab, browser):
     choose(browser, "pbrt")
     click_on(browser, "#make-export")
     wait_for(browser, "[...document.querySelectorAll('.made a')].some((a) => a.textContent === 'Files (pbrt)')", 120)
+    (made,) = [j.id for j in client.jobs() if j.sample.endswith("for pbrt")]
+    said, result = text_of(browser, ".made .export-errors"), client.job(made).result().raw["exports"][0]
+    assert said.startswith("pbrt ") and "from this job's renderings over its rows" in said
+    assert ("More than 10 %" in said) == (result["row_rel_rms"] > 0.1), (said, result)
     assert browser.execute_script("return document.querySelector('#actions [role=alert]').hidden")
     looked_at(browser, "actions", "document.querySelector('.made img')?.naturalWidth === 256")
     assert complaints(browser) == []

@@ -269,6 +269,24 @@ static void report_verdict(const json_t *verdict, FILE *out)
         print_text("  -", member_text(reservation, "text"), out);
 }
 
+/* How far the cloth of each export is from the job's own renderings. */
+static void print_exports(const json_t *exports, FILE *out)
+{
+    size_t i, k;
+    const json_t *export, *warning;
+    if (json_array_size(exports) > 0) fprintf(out, "files for other programs (difference from the job's renderings)\n");
+    json_array_foreach(exports, i, export)
+    {
+        char folder[64], error[PERCENT_WORDS_BYTES];
+        text_clean(member_text(export, "folder"), folder, sizeof folder);
+        percent(export, "row_rel_rms", error);
+        fprintf(out, "  %-18s %-16s%s\n", folder, error,
+                json_is_true(json_object_get(export, "exact")) ? "  exact.xml shows the fitted scattering itself" : "");
+        json_array_foreach(json_object_get(export, "warnings"), k, warning) if (json_is_string(warning))
+            print_text("    warning", json_string_value(warning), out);
+    }
+}
+
 void report_result(const json_t *job, FILE *out)
 {
     static const struct {
@@ -301,6 +319,7 @@ void report_result(const json_t *job, FILE *out)
         fprintf(out, "relative RMS error, fitted rows left out one after another: %s\n", text);
     }
     json_array_foreach(json_object_get(result, "nuisance"), i, parameter) print_parameter(parameter, "", out);
+    print_exports(json_object_get(result, "exports"), out);
     const json_t *converged = json_object_get(result, "converged");
     if (json_is_false(converged)) fprintf(out, "The fit has NOT converged; see the log.\n");
 }

@@ -3,6 +3,7 @@
 import { card, el } from "../page_parts.js";
 import { getJson, sendJson } from "../server_link.js";
 import { LIGHTS, SHAPES, SIZES, STUDIO_SIZES, VIEWS, formatsOf, pictureRequest, studioRequest } from "./action_choices.js";
+import { exportErrors } from "./export_errors.js";
 import { MadeJobs } from "./made_jobs.js";
 import { ShareCard } from "./share_card.js";
 
@@ -28,9 +29,11 @@ class Actions {
     this.made = new MadeJobs(view.id);
     this.note = el("p", { class: "note bad", hidden: true, role: "alert" });
     this.formats = el("div", { class: "formats" });
+    const own = exportErrors(view.job);
     const twin = view.list.files.some((f) => f.path === "twin/twin.bin");
     const makers = isCloth(view) ? [this.studioCard(), this.pictureCard(), el("div", { class: "columns" },
-      card("Files for other programs", this.formats, this.button("make-export", "Make the files", () => this.exportRequest())),
+      card("Files for other programs", this.formats, this.button("make-export", "Make the files", () => this.exportRequest()),
+        own ? el("p", { class: "hint" }, "Files that this job has made itself:") : "", own ?? ""),
       card("The cloth to turn with the mouse",
         el("p", { class: "hint" }, twin ? "This job has it: it stands at the top of the page." : "Tables from which a browser shows the cloth while it is turned, bent and lit. They take one to three minutes of a processor."),
         twin ? "" : this.button("make-twin", "Make the twin", () => ({ twin: { make: true } })))),

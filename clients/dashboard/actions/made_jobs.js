@@ -1,6 +1,7 @@
 // The jobs that show the result of a finished one: their progress, what they have made, and links to their files.
 import { el, percent, refill, stateTag, timeLeft } from "../page_parts.js";
 import { getJson, poll } from "../server_link.js";
+import { exportErrors } from "./export_errors.js";
 
 const LIVE = new Set(["draft", "queued", "running", "paused"]);
 const MOST = 50;
@@ -13,6 +14,7 @@ function pictureOf(files) {
 async function resultOf(job) {
   const { files, archive } = await getJson(`/v1/jobs/${job.id}/results`), picture = pictureOf(files);
   const formats = [...new Set(files.map((f) => f.path.match(/^export\/([^/]+)\//)?.[1]).filter(Boolean))];
+  const result = formats.length ? files.find((f) => f.path === "result.json") : null, errors = result ? exportErrors({ result: await getJson(result.url) }) : null;
   return el("div", { class: "made-result" },
     picture ? el("a", { href: `#${job.id}` }, el("img", { src: picture.url, alt: job.sample })) : "",
     el("div", { class: "made-links" },
@@ -20,7 +22,7 @@ async function resultOf(job) {
       files.some((f) => f.path === "twin/twin.bin") ? el("a", { class: "button", href: `#${job.id}` }, "Turn the cloth") : "",
       files.some((f) => f.path === "report.pdf") ? el("a", { class: "button", href: files.find((f) => f.path === "report.pdf").url, target: "_blank" }, "Report as PDF") : "",
       formats.length ? el("a", { class: "button", href: archive, download: `${formats.join("-")}-${job.id.slice(0, 8)}.tar` }, `Files (${formats.join(", ")})`) : "",
-      el("a", { href: `#${job.id}` }, "Page of this job")));
+      el("a", { href: `#${job.id}` }, "Page of this job")), errors ?? "");
 }
 
 export class MadeJobs {

@@ -108,6 +108,8 @@ static status write_format(struct export_scene *e, size_t i, struct error *err)
     if (s == STATUS_OK) s = exports[i].format->write(e, &materials, err);
     if (s != STATUS_OK) return s;
     json_t *json = json_pack("{s:s, s:s, s:o}", "format", exports[i].name, "folder", folder, "materials", materials);
+    if (exports[i].format == &export_mitsuba)
+        json_object_set_new(json, "exact", json_boolean(export_mitsuba_is_exact(e)));
     const struct hair_error *error = exports[i].format->has_hair ? &e->hair_error : &e->own_error;
     state_error(e, error, json);
     state_warnings(e, i, error, json);

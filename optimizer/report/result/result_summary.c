@@ -6,6 +6,7 @@
 #include "optimizer/job/document/job_results.h"
 #include "optimizer/job/document/job_scan.h"
 #include "optimizer/job/job_folder.h"
+#include "optimizer/report/result/export_summary.h"
 #include "optimizer/report/result/profile_report.h"
 #include "optimizer/report/result/result_json.h"
 #include "optimizer/report/result/result_numbers.h"
@@ -227,6 +228,7 @@ static void print_summary(struct report *report, FILE *out)
     print_parameters(m, out);
     result_summary_options(report, m, out);
     print_rows(report, m, out);
+    export_summary_print(report, out);
     print_warnings(report, out);
 }
 
@@ -252,9 +254,7 @@ static void print_pictures(struct report *report, FILE *out)
     print_parameters(m, out);
     const size_t n = report->in.results->n_surface_picture;
     if (n > 0) fprintf(out, "\n%zu picture%s in the folder pictures\n", n, n == 1 ? "" : "s");
-    for (size_t i = 0; i < json_array_size(report->exports); i++)
-        fprintf(out, "\nexported to %s\n",
-                json_string_value(json_object_get(json_array_get(report->exports, i), "folder")));
+    export_summary_print(report, out);
     print_warnings(report, out);
 }
 

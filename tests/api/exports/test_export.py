@@ -38,6 +38,12 @@ def test_a_scene_for_mitsuba(real, tmp_path):
     assert export["format"] == "mitsuba" and material["group"] is None
     assert 0 <= export["rel_rms"] < 0.6 and 0 <= export["row_rel_rms"] < 0.6 and 0 < export["row_rel_rms_se"] < 0.3
     assert len(export["row_rel_errors"]) == len(result["rows"]) and all(0 <= x < 1 for x in export["row_rel_errors"])
+    summary, report = (real.get(f"/v1/jobs/{job}/results/{name}").text for name in ("summary.txt", "report.html"))
+    worst = max(range(len(result["rows"])), key=export["row_rel_errors"].__getitem__)
+    in_words = f"{100 * export['row_rel_errors'][worst]:.1f} %"
+    assert export["exact"] and f"at most {in_words} in row {result['rows'][worst]['name']}; exact.xml shows" in summary, summary
+    assert f">{in_words}</td>" in report.split("Files for other programs")[1].split("<h2>")[0]
+    assert bool(export["warnings"]) == (export["row_rel_rms"] > 0.1) and all(f"warning: {w}" in summary for w in export["warnings"])
     curves = [c for c in (tmp_path / "fibers-0.txt").read_text().split("\n\n") if c.strip()]
     assert len(curves) == result["geometry"]["n_fiber"]
     assert all(len(c.strip().split("\n")) >= 4 for c in curves), "Mitsuba's B-splines have four control points or more"
