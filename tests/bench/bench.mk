@@ -123,9 +123,10 @@ EXPORTS_NODE := $(BUILD)/exports-node
 $(EXPORTS_NODE)/packages-are-there:
 	@mkdir -p $(EXPORTS_NODE) && npm install --prefix $(EXPORTS_NODE) --no-audit --no-fund --no-save --ignore-scripts --loglevel=error \
 		three@0.187.0 gltf-validator@2.0.0-dev.3.10 >&2 && touch $@
-bench-exports: $(EXPORTS_PYTHON)/bin/packages-are-there | deps-test ## exported scenes rendered by Mitsuba 3 against the job's own renderings (6 minutes; installs Mitsuba and USD from PyPI into build)
+# EXPORTS: a part of it, such as EXPORTS="--only twill,scan --formats mitsuba,blender"; fits and comparisons that are finished are kept in build
+bench-exports: $(EXPORTS_PYTHON)/bin/packages-are-there $(EXPORTS_NODE)/packages-are-there | deps-test ## exports of twelve fits rendered by Mitsuba 3 and Blender against the jobs' own renderings (50 minutes on 2 quiet cores; installs Mitsuba and USD from PyPI, three.js from npm into build)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2
-	@/usr/bin/python3 tests/bench/bench_exports.py --build $(BUILD) --python $(EXPORTS_PYTHON)/bin/python
+	@/usr/bin/python3 tests/bench/bench_exports.py --build $(BUILD) --python $(EXPORTS_PYTHON)/bin/python $(EXPORTS)
 
 bench-camera: | deps-test ## mean radiances from raw files of a simulated camera against the true ones (2 minutes)
 	@$(MAKE) --no-print-directory -j$$(nproc) all >&2

@@ -1,108 +1,155 @@
-"""How near a scene that a job exports comes to the job's own renderings, when another program renders it: two described cloths with two models,
-every row rendered by Mitsuba 3 (mitsuba_row.py says what it makes of the other formats), and by Blender, where it is installed, the scene for it.
-Figures are relative RMS errors over the rows, in the same
-measure as those of fits."""
+"""How near a scene that a job exports comes to the job's own renderings, when another program renders it: the twelve fits of export_fits.py, every
+row of the fit rendered by Mitsuba 3 (mitsuba_row.py says what it makes of the other formats), the scene for Blender by Blender and the glTF files by
+three.js (gltf_rows.py), where these are installed. Figures are relative RMS errors over the rows, in the measure of fits, beside the error that the job states for the same rows.
+
+What is finished is kept in the folder of each fit: the job, its exports and compared.json. A second run goes on from there, and compares anew only
+what was exported anew. --only and --formats take a part."""
 import argparse
 import csv
+import glob
 import json
 import os
 import shutil
 import subprocess
 import sys
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-# light theta, light phi, camera theta, camera phi, rotation of the cloth, in degrees
-ROWS = [(30, 0, 0, 0, 0), (30, 180, 30, 0, 0), (45, 180, 45, 0, 0), (60, 180, 45, 0, 0), (45, 90, 45, 0, 0), (60, 90, 30, 0, 0), (20, 0, 60, 0, 0),
-        (60, 0, 60, 180, 90), (45, 0, 45, 180, 90)]
-FIT = {"path_budget": 100000, "render_px": 16, "render_samples": 4, "seed": 5}
-FORMATS = ["mitsuba", "pbrt", "usd", "textures", "blender"]
-# Narrow bounds: the fit ends at these parameters, whatever the rows are.
-TWO_LOBE = {"C_R": [0.045, 0.055], "C_TT": [0.55, 0.65], "beta_R": [7.5, 8.5], "beta_TT": [19, 21], "gamma_TT": [29, 31]}
-TEXTILE = dict(TWO_LOBE, w=[0.28, 0.32], s=[0.48, 0.52], f=[0.93, 0.95], h=[0.48, 0.52])
-# The default model has no name of its own in the figures.
-JOBS = {".two_lobe": ("twill", dict(FIT, model="two_lobe.v1", bounds=TWO_LOBE, start={k: sum(v) / 2 for k, v in TWO_LOBE.items()})),
-        "": ("plain", dict(FIT, model="textile.v3", bounds=TEXTILE, start={k: sum(v) / 2 for k, v in TEXTILE.items()}))}
+import export_fits
+
+ROOT = export_fits.ROOT
+# name in the figures: format of the job
+SEEN = {"mitsuba": "mitsuba", "mitsuba_plugin": "mitsuba", "pbrt": "pbrt", "usd": "usd", "blender": "blender", "textures": "textures", "gltf": "gltf"}
+LEAST_LLVM = 15  # Mitsuba renders the plug-ins in minutes without one, in seconds with it
+PX, SPP = 16, 64
+SPP_OF = {"mitsuba_plugin": 256}  # whose error is small, and whose time is that of its compilation
 
 
-def run_job(build, folder, weave, fit):
-    """The folder of the exported scenes, and result.json."""
-    shutil.rmtree(folder, ignore_errors=True)
-    os.makedirs(os.path.join(folder, "input"))
-    with open(os.path.join(folder, "input", "rows.csv"), "w", encoding="utf-8") as f:
-        f.write("set,light_theta_deg,light_phi_deg,camera_theta_deg,camera_phi_deg,cloth_rotation_deg,r,g,b\n")
-        for row in ROWS:
-            f.write(",".join(map(str, ("fit", *row, 0.2, 0.15, 0.1))) + "\n")
-    document = {"sample": "export", "cloth": {"weave": weave, "seed": 3}, "measurements": {"file": "rows.csv"}, "fit": fit,
-                "export": {name: True for name in FORMATS}}
-    with open(os.path.join(folder, "job.json"), "w", encoding="utf-8") as f:
-        json.dump(document, f)
-    subprocess.run([os.path.join(build, "bin", "selvedge-worker"), "--quiet", folder], check=True, stdout=sys.stderr)
-    with open(os.path.join(folder, "results", "result.json"), encoding="utf-8") as f:
-        return os.path.join(folder, "results", "export"), json.load(f)
+def llvm_library():
+    """The newest LLVM of this machine, or None."""
+    found = {}
+    for path in glob.glob("/usr/lib/*/libLLVM*"):
+        digits = os.path.basename(path).replace("libLLVM", "").strip("-.so").split(".so")[0].split(".")[0]
+        if digits.isdigit() and int(digits) >= LEAST_LLVM:
+            found[int(digits)] = path
+    return found[max(found)] if found else None
 
 
-def rendered_by_mitsuba(python, form, folder, row, px, spp):
-    """Mean radiance of a row, or None when Mitsuba fails."""
-    command = [python, os.path.join(ROOT, "tests", "bench", "mitsuba_row.py"), form, folder, str(row), str(px), str(spp)]
-    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=sys.stderr, check=False)
-    return json.loads(done.stdout) if done.returncode == 0 else None
+def by_mitsuba(python, seen, folder, rows):
+    """Mean radiances of rows by their numbers. Mitsuba may end its process on an error: the rows after it are rendered by another one."""
+    environment = {k: v for k, v in os.environ.items() if k != "DRJIT_LIBLLVM_PATH"}
+    library = os.environ.get("DRJIT_LIBLLVM_PATH") or llvm_library()
+    if seen == "mitsuba_plugin" and library:
+        environment["DRJIT_LIBLLVM_PATH"] = library
+    found, rest = {}, list(rows)
+    while rest:
+        command = [python, os.path.join(ROOT, "tests", "bench", "mitsuba_row.py"), seen, folder, ",".join(map(str, rest)), str(PX), str(SPP_OF.get(seen, SPP))]
+        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=sys.stderr, text=True, env=environment, check=False)
+        lines = done.stdout.splitlines()
+        found.update(zip(rest, map(json.loads, lines)))
+        rest = rest[len(lines) + 1:]
+    return found
 
 
-def rendered_by_blender(folder, row, px, spp):
+def by_blender(folder, rows):
     """The same, by the exported script in Blender."""
-    picture = os.path.join(folder, f"row-{row}.exr")
     reader = os.path.join(ROOT, "tests", "support", "python", "blender_scene.py")
-    command = ["blender", "-b", "--factory-startup", "--python-exit-code", "1", "--python", os.path.join(folder, "cloth.py"), "--python", reader,
-               "--", picture, str(spp), str(px), str(row)]
+    found = {}
+    for row in rows:
+        command = ["blender", "-b", "--factory-startup", "--python-exit-code", "1", "--python", os.path.join(folder, "cloth.py"), "--python", reader,
+                   "--", os.path.join(folder, f"row-{row}.exr"), str(SPP), str(PX), str(row)]
+        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=sys.stderr, text=True, check=False)
+        lines = [line for line in done.stdout.split("\n") if line.startswith("found ")]
+        if done.returncode == 0 and lines:
+            found[row] = json.loads(lines[0][6:])["mean"]
+    return found
+
+
+def by_three(packages, folder, rows):
+    """The same, by three.js in Chromium."""
+    command = ["/usr/bin/python3", os.path.join(ROOT, "tests", "bench", "gltf_rows.py"), folder, packages]
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=sys.stderr, text=True, check=False)
-    found = [line for line in done.stdout.split("\n") if line.startswith("found ")]
-    return json.loads(found[0][6:])["mean"] if done.returncode == 0 and found else None
+    found = json.loads(done.stdout) if done.returncode == 0 else []
+    return {row: found[row] for row in rows if row < len(found)}
 
 
-def compare(python, form, folder, px=16, spp=64):
-    """Relative RMS error over the rows, as in fits: squares over the square of a row's mean over its channels. And rows that were rendered."""
-    with open(os.path.join(os.path.dirname(folder), "mitsuba", "rows.csv"), encoding="utf-8") as f:
-        rows = list(csv.DictReader(f))
-    square, n = 0.0, 0
-    for i, row in enumerate(rows):
-        ours = [float(row["rendered_" + c]) for c in "rgb"]
-        blender = form == "blender"
-        theirs = rendered_by_blender(folder, i, px, spp) if blender else rendered_by_mitsuba(python, form, folder, i, px, spp)
-        if theirs is None:
-            print(f"{form}, row {i}: the renderer failed", file=sys.stderr)
+def stated_error(conversion, seen, rows):
+    """Over these rows where the job states an error for each; else over all of them."""
+    errors = conversion.get("row_rel_errors")
+    if seen == "mitsuba_plugin":
+        return 0.0
+    if errors and len(errors) > len(rows):
+        return (sum(errors[row] ** 2 for row in rows) / len(rows)) ** 0.5
+    return conversion.get("row_rel_rms", conversion["materials"][0].get("rel_rms"))
+
+
+def read_rows(folder):
+    """Radiances that the job rendered, by the number of a row of the fit."""
+    with open(os.path.join(folder, "rows.csv"), encoding="utf-8") as f:
+        return {i: [float(row["rendered_" + c]) for c in "rgb"] for i, row in enumerate(csv.DictReader(f)) if row["set"] == "fit"}
+
+
+def compare(arguments, exports, seen):
+    """rel_rms, as in fits: squares over the square of a row's mean over its channels. stated; and rows that no renderer finished."""
+    folder = os.path.join(exports, SEEN[seen])
+    ours = read_rows(os.path.join(exports, "mitsuba"))
+    others = {"blender": lambda: by_blender(folder, ours), "gltf": lambda: by_three(os.path.join(arguments.build, "exports-node"), folder, ours)}
+    theirs = others.get(seen, lambda: by_mitsuba(arguments.python, seen, folder, ours))()
+    for row, rgb in ours.items():
+        print(f"{seen}, row {row}: rendered {rgb}, by the other program {theirs.get(row)}", file=sys.stderr)
+    square = sum(sum((a - b) ** 2 for a, b in zip(ours[row], rgb)) / max(sum(ours[row]) / 3, 0.02) ** 2 / 3 for row, rgb in theirs.items())
+    with open(os.path.join(folder, "conversion.json"), encoding="utf-8") as f:
+        stated = stated_error(json.load(f), seen, list(ours))
+    return {"rel_rms": (square / len(theirs)) ** 0.5 if theirs else None, "stated": stated, "failed": [r for r in ours if r not in theirs],
+            "rows": {row: [rgb, theirs.get(row)] for row, rgb in ours.items()}}
+
+
+def kept_comparisons(path):
+    if not os.path.exists(path):
+        return {}
+    with open(path, encoding="utf-8") as f:
+        return json.load(f)
+
+
+def compare_fit(arguments, folder, results, wanted):
+    """compared.json of the folder, with what was wanted and missing or older than its export."""
+    path, exports = os.path.join(folder, "compared.json"), os.path.join(results, "export")
+    kept = kept_comparisons(path)
+    for seen in wanted:
+        made = os.path.join(exports, SEEN[seen], "conversion.json")
+        if seen == "mitsuba_plugin" and not os.path.exists(os.path.join(exports, "mitsuba", "exact.xml")):
             continue
-        print(f"{form}, row {i}: rendered {ours}, by the other program {theirs}", file=sys.stderr)
-        square += sum((a - b) ** 2 for a, b in zip(ours, theirs)) / max(sum(ours) / 3, 0.02) ** 2 / 3
-        n += 1
-    return (square / n) ** 0.5 if n > 0 else float("nan"), n, len(rows)
+        when = os.stat(made).st_mtime_ns
+        if kept.get(seen, {}).get("of") == when:
+            continue
+        kept[seen] = {"of": when, **compare(arguments, exports, seen)}
+        with open(path + ".new", "w", encoding="utf-8") as f:
+            json.dump(kept, f)
+        os.replace(path + ".new", path)
+    return {seen: kept[seen] for seen in wanted if seen in kept}
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--build", default="build")
     parser.add_argument("--python", required=True, help="a Python that has mitsuba")
-    parser.add_argument("--formats", default=",".join(FORMATS))
+    parser.add_argument("--only", default=",".join(export_fits.FITS), metavar="FIT[,FIT...]")
+    parser.add_argument("--formats", default=",".join(SEEN))
     arguments = parser.parse_args()
+    wanted = arguments.formats.split(",")
+    unknown = [x for x in arguments.only.split(",") if x not in export_fits.FITS] + [x for x in wanted if x not in SEEN]
+    if unknown:
+        parser.error(f"no such fit or format: {', '.join(unknown)} (fits: {', '.join(export_fits.FITS)}; formats: {', '.join(SEEN)})")
+    if "blender" in wanted and shutil.which("blender") is None:
+        print("no figures of blender, because there is none (Debian package blender)", file=sys.stderr)
+        wanted.remove("blender")
     whole = True
-    for name, (weave, fit) in JOBS.items():
-        folder, result = run_job(arguments.build, os.path.join(arguments.build, "bench-exports", weave), weave, fit)
-        for export in result["exports"]:
-            form = export["format"]
-            if form not in arguments.formats.split(","):
-                continue
-            if form == "blender" and shutil.which("blender") is None:
-                print("no figures of blender, because there is none (Debian package blender)", file=sys.stderr)
-                continue
-            material = export["materials"][0]
-            stated = export.get("row_rel_rms", material.get("rel_rms"))
-            exact = 0.0 if os.path.exists(os.path.join(folder, form, "exact.xml")) else None
-            for seen, rel_rms in ((form, stated), ("mitsuba_plugin", exact), ("usd_preview", material.get("preview_surface", {}).get("rel_rms"))):
-                if rel_rms is None:
-                    continue
-                error, n, n_row = compare(arguments.python, seen, os.path.join(folder, form))
-                whole = whole and n == n_row
-                for key, value in (("rel_rms", error), ("stated", rel_rms)):
-                    print(json.dumps({"name": f"exports.{seen}{name}.{key}", "value": value, "unit": "1", "better": "lower"}), flush=True)
+    for name in arguments.only.split(","):
+        folder = os.path.join(arguments.build, "bench-exports", name)
+        results = export_fits.run_fit(arguments.build, folder, name, list(dict.fromkeys(SEEN.values())))
+        for seen, found in compare_fit(arguments, folder, results, wanted).items():
+            whole = whole and not found["failed"]
+            for key in ("rel_rms", "stated"):
+                if found[key] is not None:
+                    print(json.dumps({"name": f"exports.{name}.{seen}.{key}", "value": found[key], "unit": "1", "better": "lower"}), flush=True)
     sys.exit(0 if whole else 1)
 
 

@@ -1,5 +1,5 @@
-"""Renders one row of an exported scene with Mitsuba 3, and prints its mean radiance: mitsuba_row.py FORMAT FOLDER ROW PX SPP. Run by a Python that
-has Mitsuba (pip install mitsuba usd-core), in a process of its own, because Mitsuba may end the process on an error.
+"""Renders rows of an exported scene with Mitsuba 3, and prints a line with the mean radiance of each: mitsuba_row.py FORMAT FOLDER ROW[,ROW...] PX
+SPP. Run by a Python that has Mitsuba (pip install mitsuba usd-core), in a process of its own, because Mitsuba may end the process on an error.
 
 FORMAT mitsuba: the scene as it is. mitsuba_plugin: the scene with the exported plug-ins, which is fast with LLVM 19 named in DRJIT_LIBLLVM_PATH.
 pbrt: what a reader of pbrt's grammar finds in the view of that row, with Mitsuba's hair material, which is the same as pbrt's. usd: what the USD
@@ -241,14 +241,14 @@ def usd_scene(folder, row, px, spp, preview=False):
 
 
 def main():
-    form, folder, row, px, spp = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), int(sys.argv[5])
+    form, folder, rows, px, spp = sys.argv[1], sys.argv[2], [int(r) for r in sys.argv[3].split(",")], int(sys.argv[4]), int(sys.argv[5])
     mitsuba.set_variant("llvm_ad_rgb" if "DRJIT_LIBLLVM_PATH" in os.environ else "scalar_rgb")
     mitsuba.set_log_level(mitsuba.LogLevel.Error)  # warnings would stand in what is printed
     makers = {"mitsuba": mitsuba_scene, "mitsuba_plugin": mitsuba_plugin_scene,
               "pbrt": pbrt_scene, "usd": usd_scene, "usd_preview": usd_preview_scene, "textures": textures_scene}
-    scene = makers[form](folder, row, px, spp)
-    picture = numpy.array(mitsuba.render(scene))
-    print(json.dumps([float(x) for x in picture[..., :3].mean((0, 1))]))
+    for row in rows:
+        picture = numpy.array(mitsuba.render(makers[form](folder, row, px, spp)))
+        print(json.dumps([float(x) for x in picture[..., :3].mean((0, 1))]), flush=True)
 
 
 if __name__ == "__main__":
