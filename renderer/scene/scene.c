@@ -126,7 +126,7 @@ static bool has_flat_sections(const struct fiber_set *f)
     return sum > FIBER_RATIO_FLAT * n;
 }
 
-/* Lowest and highest z of the surfaces, those of elliptical sections as of a level fiber, which reaches farthest. */
+/* Lowest and highest z of the surfaces. Elliptical sections count as on a level fiber, which reaches farthest. */
 static void z_range(const struct fiber_set *f, bool sections, double *z_min_m, double *z_max_m)
 {
     fiber_set_z_range_m(f, z_min_m, z_max_m);

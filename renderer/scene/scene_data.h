@@ -35,9 +35,8 @@ struct scene {
     uint32_t *segment_fiber;
     unsigned char *segment_flag;
     uint8_t *segment_group; /* NULL: all 0 */
-    float (
-        *long_axis)[3]; /* of each vertex: that of its section, a unit vector; NULL: sections are taken to be round */
-    float *ratio;       /* of each vertex: long over short axis; NULL: surfaces are round tubes */
+    float (*long_axis)[3];  /* of the section at each vertex, a unit vector; NULL: sections are taken to be round */
+    float *ratio;           /* of each vertex: long over short axis; NULL: surfaces are round tubes */
     struct scene_ellipse *ellipse; /* of each segment, where there are ratios (scene_ellipse.h) */
     struct scene_ends *ends;       /* scene_ends.h */
     struct scene_grid *grid;       /* of round fibers (scene_grid.h) */

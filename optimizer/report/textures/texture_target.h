@@ -1,5 +1,5 @@
-/* The radiances that the numbers of a surface model are fitted to: those of the job's rows as the job renders them, and
- * those of the fitted cloth over lamps and cameras of the hemisphere (cloth_directions.h), which weigh half as much
+/* The radiances that the numbers of a surface model are fitted to: the job's rows as the job renders them, and
+ * the fitted cloth over lamps and cameras of the hemisphere (cloth_directions.h), which weigh half as much
  * as all rows. Some nine rows alone would fix a dozen numbers, and leave them free everywhere else. */
 #ifndef SELVEDGE_OPTIMIZER_TEXTURE_TARGET_H
 #define SELVEDGE_OPTIMIZER_TEXTURE_TARGET_H
